@@ -1,0 +1,27 @@
+// Exceptions that the library throws. Nothing in the library prints or aborts.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace dynains {
+
+/// A configuration value is out of its documented bounds; the text names field, value and bound.
+class ConfigError : public std::invalid_argument {
+ public:
+  using std::invalid_argument::invalid_argument;
+};
+
+/// A pose is not a finite rigid transform, or a time stamp does not increase.
+class PoseError : public std::invalid_argument {
+ public:
+  using std::invalid_argument::invalid_argument;
+};
+
+/// A file cannot be read or written; the text gives path, position and what was expected.
+class IoError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace dynains

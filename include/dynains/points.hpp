@@ -1,0 +1,95 @@
+// Views over points and the labels they get. No view owns anything.
+#pragma once
+
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace dynains {
+
+/// Verdict on one input point.
+enum class PointLabel : std::uint8_t {
+  kInvalid,     ///< NaN or infinite coordinate, or no return (all zero); never enters the map
+  kOutOfRange,  ///< nearer than min_range or farther than max_range; never enters the map
+  kGround,      ///< static, and part of the ground
+  kStatic,      ///< static, above the ground
+  kDynamic,     ///< part of a moving instance; never enters the map
+};
+
+constexpr bool is_static(PointLabel label) {
+  return label == PointLabel::kGround || label == PointLabel::kStatic;
+}
+
+/// Instance id of points that belong to no instance.
+inline constexpr std::uint32_t kNoInstance = 0;
+
+/// Contiguous range that somebody else owns (C++17 has no std::span).
+template <class T>
+class Span {
+ public:
+  constexpr Span() = default;
+  constexpr Span(T* data, std::size_t size) : data_(data), size_(size) {}
+  /// From any contiguous container, as std::span does.
+  template <class Container,
+            class = std::enable_if_t<std::is_convertible_v<
+                std::remove_pointer_t<decltype(std::declval<Container&>().data())> (*)[],
+                T (*)[]>>>
+  constexpr Span(Container& container) : data_(container.data()), size_(container.size()) {}
+
+  constexpr T* data() const { return data_; }
+  constexpr std::size_t size() const { return size_; }
+  constexpr bool empty() const { return size_ == 0; }
+  constexpr T* begin() const { return data_; }
+  constexpr T* end() const { return data_ + size_; }
+  constexpr T& operator[](std::size_t i) const {
+    assert(i < size_);
+    return data_[i];
+  }
+  constexpr Span subspan(std::size_t offset, std::size_t count) const {
+    assert(offset + count <= size_);
+    return {data_ + offset, count};
+  }
+
+ private:
+  T* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+/// Points as three coordinate arrays of equal length, in metres.
+struct PointsView {
+  Span<const float> x;
+  Span<const float> y;
+  Span<const float> z;
+
+  std::size_t size() const { return x.size(); }
+  bool empty() const { return x.empty(); }
+  PointsView subview(std::size_t offset, std::size_t count) const {
+    return {x.subspan(offset, count), y.subspan(offset, count), z.subspan(offset, count)};
+  }
+};
+
+/// Points as three coordinate arrays that are owned here and reused from scan to scan.
+struct PointBuffer {
+  std::vector<float> x;
+  std::vector<float> y;
+  std::vector<float> z;
+
+  std::size_t size() const { return x.size(); }
+  void clear() { resize(0); }
+  void resize(std::size_t size) {
+    x.resize(size);
+    y.resize(size);
+    z.resize(size);
+  }
+  void push_back(float px, float py, float pz) {
+    x.push_back(px);
+    y.push_back(py);
+    z.push_back(pz);
+  }
+  operator PointsView() const { return {x, y, z}; }
+};
+
+}  // namespace dynains

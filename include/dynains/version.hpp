@@ -1,0 +1,11 @@
+// The one place where the version number stands: CMake reads it from here.
+#pragma once
+
+namespace dynains {
+
+inline constexpr int kVersionMajor = 0;
+inline constexpr int kVersionMinor = 1;
+inline constexpr int kVersionPatch = 0;
+inline constexpr char kVersionString[] = "0.1.0";
+
+}  // namespace dynains
