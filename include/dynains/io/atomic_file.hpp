@@ -1,0 +1,35 @@
+// Files that appear whole or not at all.
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <ostream>
+
+namespace dynains {
+
+/// Writes to a temporary name beside the target and renames it on `commit()`. Until then the
+/// target, if it exists, stays as it was; without a commit the temporary is removed.
+class AtomicFile {
+ public:
+  /// Opens the temporary. A symbolic link is followed: the file that it names is replaced.
+  /// Throws IoError if the folder cannot be written or the target is not a regular file.
+  explicit AtomicFile(std::filesystem::path target);
+  ~AtomicFile();
+  AtomicFile(const AtomicFile&) = delete;
+  AtomicFile& operator=(const AtomicFile&) = delete;
+
+  /// Binary stream into the temporary. Failures may be left to `commit()`, which reports them.
+  std::ostream& stream() { return stream_; }
+
+  /// Flushes to the disk and puts the file in place. Throws IoError if anything could not be
+  /// written; the target is then untouched.
+  void commit();
+
+ private:
+  std::filesystem::path target_;
+  std::filesystem::path temporary_;
+  std::ofstream stream_;
+  bool committed_ = false;
+};
+
+}  // namespace dynains

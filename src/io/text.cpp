@@ -1,0 +1,43 @@
+#include "text.hpp"
+
+#include <charconv>
+#include <sstream>
+
+namespace dynains::text {
+
+std::optional<double> parse_number(std::string_view token) {
+  if (token.size() > 1 && token[0] == '+' && token[1] != '-') token.remove_prefix(1);
+  double value = 0.0;
+#ifdef __cpp_lib_to_chars
+  const char* end = token.data() + token.size();
+  const auto [stop, error] = std::from_chars(token.data(), end, value);
+  if (token.empty() || error != std::errc{} || stop != end) return std::nullopt;
+#else
+  const std::string copy(token);
+  if (copy == "nan" || copy == "NaN" || copy == "-nan")
+    return std::numeric_limits<double>::quiet_NaN();
+  if (copy == "inf") return std::numeric_limits<double>::infinity();
+  if (copy == "-inf") return -std::numeric_limits<double>::infinity();
+  std::istringstream stream(copy);
+  stream.imbue(std::locale::classic());
+  if (!(stream >> value) || stream.peek() != std::istringstream::traits_type::eof()) {
+    return std::nullopt;
+  }
+#endif
+  return value;
+}
+
+std::string_view next_token(std::string_view& line) {
+  constexpr std::string_view kBlanks = " \t\r\n\v\f";
+  const std::size_t begin = line.find_first_not_of(kBlanks);
+  if (begin == std::string_view::npos) {
+    line = {};
+    return {};
+  }
+  const std::size_t end = line.find_first_of(kBlanks, begin);
+  const std::string_view token = line.substr(begin, end - begin);
+  line.remove_prefix(end == std::string_view::npos ? line.size() : end);
+  return token;
+}
+
+}  // namespace dynains::text

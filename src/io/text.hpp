@@ -1,0 +1,27 @@
+// Numbers in text files, independent of the locale of the process.
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <locale>
+#include <optional>
+#include <ostream>
+#include <string>
+#include <string_view>
+
+namespace dynains::text {
+
+/// The number that all of `token` spells; "nan" and "inf" are numbers.
+std::optional<double> parse_number(std::string_view token);
+
+/// Cuts the next token, separated by blanks, off the front of `line`; empty at the end.
+std::string_view next_token(std::string_view& line);
+
+/// Makes a stream write numbers that read back to the same double, whatever the locale.
+inline std::ostream& exact(std::ostream& stream) {
+  stream.imbue(std::locale::classic());
+  stream.precision(std::numeric_limits<double>::max_digits10);
+  return stream;
+}
+
+}  // namespace dynains::text
