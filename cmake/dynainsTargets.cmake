@@ -1,21 +1,58 @@
 # How this project builds its own targets. Nothing here reaches a consumer.
 
+option(DYNAINS_WARNINGS_AS_ERRORS "Refuse warnings in our own targets" OFF)
+
+# Both are for developers and have an effect only when this is the top-level project:
+#   cmake -B build-asan -DDYNAINS_SANITIZE="address;undefined"    or "thread"
+#   cmake -B build-cov  -DDYNAINS_COVERAGE=ON    then ctest, then gcovr or gcov on the build folder
+set(DYNAINS_SANITIZE "" CACHE STRING "Sanitizers for our own targets, as a list")
+option(DYNAINS_COVERAGE "Count executed lines in our own targets" OFF)
+
+set(dynains_warnings -Wall -Wextra -Wpedantic -Wconversion -Wshadow)
+
+# What code that links our instrumented targets has to be compiled and linked with as well.
+set(dynains_instrumentation "")
+if(dynains_top_level AND DYNAINS_SANITIZE)
+  string(REPLACE ";" "," dynains_sanitizers "${DYNAINS_SANITIZE}")
+  list(APPEND dynains_instrumentation
+    -fsanitize=${dynains_sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+endif()
+if(dynains_top_level AND DYNAINS_COVERAGE)
+  list(APPEND dynains_instrumentation --coverage)
+endif()
+
 # Strict warnings, and no fused multiply-add: the same bits from every compiler.
 function(dynains_own_target target)
   target_compile_features(${target} PRIVATE cxx_std_17)
   target_compile_options(${target} PRIVATE
-    -Wall -Wextra -Wpedantic -Wconversion -Wshadow -ffp-contract=off
-    $<$<BOOL:${DYNAINS_WARNINGS_AS_ERRORS}>:-Werror>)
+    ${dynains_warnings} -ffp-contract=off
+    $<$<BOOL:${DYNAINS_WARNINGS_AS_ERRORS}>:-Werror>
+    ${dynains_instrumentation}
+    # Optimized enough to run the whole suite, yet lines stay apart.
+    $<$<AND:$<BOOL:${dynains_top_level}>,$<BOOL:${DYNAINS_COVERAGE}>>:-O1>)
+  target_link_options(${target} PRIVATE ${dynains_instrumentation})
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)
 endfunction()
 
-# A compiled component: library dynains_<name>, alias and export name dynains::<name>.
+# A compiled component: library dynains_<name>, alias and export name dynains::<name>. Its public
+# headers live in include/dynains/<name>. Whatever it links as Package::target is found again by
+# the package's config file (see dynainsInstall.cmake).
 function(dynains_component name)
   add_library(dynains_${name} ${ARGN})
   add_library(dynains::${name} ALIAS dynains_${name})
   set_target_properties(dynains_${name} PROPERTIES
-    EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+    EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON
+    VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
   target_link_libraries(dynains_${name} PUBLIC dynains)
   dynains_own_target(dynains_${name})
   set_property(GLOBAL APPEND PROPERTY DYNAINS_COMPONENTS ${name})
+endfunction()
+
+# dynains_private_headers(<target> <library>...): header-only libraries used in source files only.
+# Unlike a link, this leaves no trace in the exported target: consumers need not have them.
+function(dynains_private_headers target)
+  foreach(library IN LISTS ARGN)
+    target_include_directories(${target} SYSTEM PRIVATE
+      $<TARGET_PROPERTY:${library},INTERFACE_INCLUDE_DIRECTORIES>)
+  endforeach()
 endfunction()

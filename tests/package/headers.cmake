@@ -1,0 +1,30 @@
+# Compiles each of HEADERS alone with COMPILER and refuses any warning.
+if(NOT COMPILER)
+  message("SKIPPED: this compiler is not installed")
+  return()
+endif()
+
+set(options -std=c++17 -fsyntax-only ${WARNINGS} -Werror -I${INCLUDE_DIR})
+foreach(dir IN LISTS SYSTEM_INCLUDE_DIRS)
+  if(dir)
+    list(APPEND options -isystem ${dir})
+  endif()
+endforeach()
+
+set(failed "")
+foreach(header IN LISTS HEADERS)
+  execute_process(COMMAND ${COMPILER} ${options} -include ${header} -x c++ /dev/null
+    RESULT_VARIABLE result ERROR_VARIABLE errors)
+  if(NOT result EQUAL 0)
+    message("${header} does not compile alone:\n${errors}")
+    list(APPEND failed ${header})
+  endif()
+endforeach()
+
+list(LENGTH HEADERS count)
+if(count EQUAL 0)
+  message(FATAL_ERROR "no headers found")
+elseif(failed)
+  message(FATAL_ERROR "failed with ${COMPILER}: ${failed}")
+endif()
+message("${count} headers compile alone with ${COMPILER}")

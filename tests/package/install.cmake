@@ -1,0 +1,42 @@
+# Installs BUILD_DIR into WORK_DIR, moves the result elsewhere and looks for traces of where it was.
+
+# install_tree(<name> <option>...) installs to a passing place and moves it to WORK_DIR/<name>.
+function(install_tree name)
+  set(passing ${WORK_DIR}/passing_${name})
+  file(REMOVE_RECURSE ${passing} ${WORK_DIR}/${name})
+  execute_process(
+    COMMAND ${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${passing} --config "${CONFIG}" ${ARGN}
+    RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "install failed:\n${output}")
+  endif()
+  file(RENAME ${passing} ${WORK_DIR}/${name})
+
+  file(GLOB_RECURSE files ${WORK_DIR}/${name}/*)
+  foreach(file IN LISTS files)
+    # Debug information rightly names the source files.
+    if(file MATCHES "\\.(hpp|cmake|pc)$" OR CONFIG MATCHES "^(Release|MinSizeRel)$")
+      foreach(path ${passing} ${BUILD_DIR} ${SOURCE_DIR})
+        execute_process(COMMAND grep -F -q -- ${path} ${file} RESULT_VARIABLE absent)
+        if(NOT absent)
+          message(SEND_ERROR "${file} contains the path ${path}")
+        endif()
+      endforeach()
+    endif()
+  endforeach()
+endfunction()
+
+install_tree(prefix)
+if(PROGRAM AND NOT EXISTS ${WORK_DIR}/prefix/${BIN_DIR}/${PROGRAM})
+  message(SEND_ERROR "the program ${PROGRAM} was not installed")
+endif()
+
+install_tree(prefix_core --component dynains_core)
+file(GLOB_RECURSE compiled
+  ${WORK_DIR}/prefix_core/*.a ${WORK_DIR}/prefix_core/*.so* ${WORK_DIR}/prefix_core/${BIN_DIR}/*)
+if(compiled)
+  message(SEND_ERROR "the core is headers only, but these were installed: ${compiled}")
+endif()
+if(NOT EXISTS ${WORK_DIR}/prefix_core/include/dynains/version.hpp)
+  message(SEND_ERROR "the core was installed without its headers")
+endif()

@@ -1,0 +1,36 @@
+# The project's VERSION, the header, the installed package files and the program name one version.
+
+function(expect_version where found)
+  if(NOT found STREQUAL VERSION)
+    message(SEND_ERROR "${where} says '${found}', the project says '${VERSION}'")
+  endif()
+endfunction()
+
+file(READ ${PREFIX}/include/dynains/version.hpp header)
+string(REGEX MATCH "kVersionString\\[\\] = \"([^\"]*)\"" line "${header}")
+expect_version("kVersionString" "${CMAKE_MATCH_1}")
+set(parts "")
+foreach(part Major Minor Patch)
+  string(REGEX MATCH "kVersion${part} = ([0-9]+)" line "${header}")
+  list(APPEND parts ${CMAKE_MATCH_1})
+endforeach()
+string(REPLACE ";" "." parts "${parts}")
+expect_version("kVersionMajor, kVersionMinor, kVersionPatch" "${parts}")
+
+set(PACKAGE_FIND_VERSION ${VERSION})
+include(${PREFIX}/${CONFIG_DIR}/dynainsConfigVersion.cmake)
+expect_version("dynainsConfigVersion.cmake" "${PACKAGE_VERSION}")
+
+file(STRINGS ${PREFIX}/${LIB_DIR}/pkgconfig/dynains.pc line REGEX "^Version: ")
+string(REPLACE "Version: " "" line "${line}")
+expect_version("dynains.pc" "${line}")
+
+if(PROGRAM)
+  execute_process(COMMAND ${PREFIX}/${BIN_DIR}/${PROGRAM} --version
+    OUTPUT_VARIABLE output RESULT_VARIABLE result)
+  string(REGEX MATCH "[0-9]+\\.[0-9]+\\.[0-9]+" found "${output}")
+  expect_version("${PROGRAM} --version" "${found}")
+  if(NOT result EQUAL 0)
+    message(SEND_ERROR "${PROGRAM} --version ended with ${result}")
+  endif()
+endif()
