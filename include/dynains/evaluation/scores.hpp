@@ -1,0 +1,51 @@
+// The numbers of both protocols, as counts: shares are derived, never stored.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+namespace dynains::evaluation {
+
+/// Share in percent; NaN when there is nothing to take a share of.
+inline double percent(std::uint64_t part, std::uint64_t whole) {
+  if (whole == 0) return std::numeric_limits<double>::quiet_NaN();
+  return 100.0 * static_cast<double>(part) / static_cast<double>(whole);
+}
+
+/// Harmonic mean; 0 if both are 0, NaN if either is.
+inline double harmonic_mean(double a, double b) { return a + b == 0 ? 0 : 2 * a * b / (a + b); }
+
+/// ERASOR's protocol (Lim et al., RA-L 2021): voxel points of the raw map that the estimate keeps.
+struct VoxelScore {
+  std::uint64_t static_total = 0;
+  std::uint64_t static_preserved = 0;
+  std::uint64_t dynamic_total = 0;
+  std::uint64_t dynamic_preserved = 0;
+
+  double preservation_rate() const { return percent(static_preserved, static_total); }  ///< PR, %
+  double rejection_rate() const {                                                       ///< RR, %
+    return percent(dynamic_total - dynamic_preserved, dynamic_total);
+  }
+  /// F1, in [0, 1]; NaN if the truth lacks static or dynamic points.
+  double f1() const { return harmonic_mean(preservation_rate(), rejection_rate()) / 100; }
+};
+
+/// KTH's protocol (Zhang et al., ITSC 2023): measured points that are judged right.
+struct PointScore {
+  std::uint64_t static_total = 0;
+  std::uint64_t static_kept = 0;
+  std::uint64_t dynamic_total = 0;
+  std::uint64_t dynamic_removed = 0;
+
+  double static_accuracy() const { return percent(static_kept, static_total); }        ///< SA, %
+  double dynamic_accuracy() const { return percent(dynamic_removed, dynamic_total); }  ///< DA, %
+  double associated_accuracy() const {                                                 ///< AA, %
+    return std::sqrt(static_accuracy() * dynamic_accuracy());
+  }
+  double harmonic_accuracy() const {  ///< HA, %
+    return harmonic_mean(static_accuracy(), dynamic_accuracy());
+  }
+};
+
+}  // namespace dynains::evaluation

@@ -1,0 +1,143 @@
+// The first of the two voxelisations: one scan, for several layers (subsets of its points) at once.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "detail/voxel_grid.hpp"
+#include "dynains/evaluation/truth.hpp"
+
+namespace dynains::evaluation::detail {
+
+/// Set of layers, one bit each.
+using LayerMask = std::uint8_t;
+
+/// Set of Truth values, one bit each.
+using TruthMask = std::uint8_t;
+constexpr TruthMask truth_bit(Truth truth) {
+  return static_cast<TruthMask>(1U << static_cast<unsigned>(truth));
+}
+inline constexpr TruthMask kBothTruths = truth_bit(Truth::kStatic) | truth_bit(Truth::kDynamic);
+
+/// One point of a scan that some layer holds.
+struct ScanPoint {
+  Eigen::Vector3d p_world;
+  VoxelKey key;
+  Truth truth;
+  LayerMask layers;
+};
+
+/// Voxelises one scan at a time; buffers are kept from scan to scan.
+class ScanVoxels {
+ public:
+  void clear() {
+    index_.clear();
+    voxels_.clear();
+    points_.clear();
+    voxel_of_point_.clear();
+  }
+
+  void add(const ScanPoint& point) {
+    const std::uint32_t number = index_.insert(point.key);
+    if (number == voxels_.size()) voxels_.push_back({point.key});
+    Voxel& voxel = voxels_[number];
+    voxel.sum += point.p_world;
+    ++voxel.count;
+    voxel.truths |= truth_bit(point.truth);
+    voxel.in_all &= point.layers;
+    voxel.in_any |= point.layers;
+    points_.push_back(point);
+    voxel_of_point_.push_back(number);
+  }
+
+  /// visit(key, layers, centroid, truth) for every voxel, once or once per layer: the centroid of
+  /// the layer's points in the voxel and the truth of the point nearest to it. Voxels come in the
+  /// order of their first points.
+  template <class Visit>
+  void for_each(LayerMask all_layers, Visit&& visit) {
+    gather_mixed();
+    for (const Voxel& voxel : voxels_) {
+      if (!voxel.mixed()) {
+        const Truth truth =
+            voxel.truths == truth_bit(Truth::kStatic) ? Truth::kStatic : Truth::kDynamic;
+        visit(voxel.key, voxel.in_any, centroid(voxel.sum, voxel.count), truth);
+        continue;
+      }
+      for (LayerMask layer = 1; layer != 0 && layer <= all_layers;
+           layer = static_cast<LayerMask>(layer << 1)) {
+        if ((voxel.in_any & layer) != 0) visit_layer(voxel, layer, visit);
+      }
+    }
+  }
+
+ private:
+  struct Voxel {
+    VoxelKey key;
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    std::uint32_t count = 0;
+    std::uint32_t first_mixed = 0;  // range in mixed_points_
+    TruthMask truths = 0;
+    LayerMask in_all = 0xff;
+    LayerMask in_any = 0;
+
+    /// Layers differ, or the truth must be looked up.
+    bool mixed() const { return in_all != in_any || truths == kBothTruths; }
+  };
+
+  static Eigen::Vector3d centroid(const Eigen::Vector3d& sum, std::uint32_t count) {
+    return sum / static_cast<double>(count);
+  }
+
+  /// Groups the points of the mixed voxels by voxel, in scan order.
+  void gather_mixed() {
+    std::uint32_t total = 0;
+    for (Voxel& voxel : voxels_) {
+      voxel.first_mixed = total;
+      if (voxel.mixed()) total += voxel.count;
+    }
+    mixed_points_.resize(total);
+    next_.resize(voxels_.size());
+    for (std::size_t v = 0; v < voxels_.size(); ++v) next_[v] = voxels_[v].first_mixed;
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      const std::uint32_t v = voxel_of_point_[i];
+      if (voxels_[v].mixed()) mixed_points_[next_[v]++] = static_cast<std::uint32_t>(i);
+    }
+  }
+
+  template <class Visit>
+  void visit_layer(const Voxel& voxel, LayerMask layer, Visit&& visit) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    std::uint32_t count = 0;
+    const auto* first = mixed_points_.data() + voxel.first_mixed;
+    const auto* last = first + voxel.count;
+    for (const auto* i = first; i != last; ++i) {
+      if ((points_[*i].layers & layer) == 0) continue;
+      sum += points_[*i].p_world;
+      ++count;
+    }
+    const Eigen::Vector3d center = centroid(sum, count);
+    double best = std::numeric_limits<double>::infinity();
+    Truth truth = Truth::kStatic;
+    for (const auto* i = first; i != last; ++i) {
+      if ((points_[*i].layers & layer) == 0) continue;
+      const double distance = (points_[*i].p_world - center).squaredNorm();
+      if (distance < best) {
+        best = distance;
+        truth = points_[*i].truth;
+      }
+    }
+    visit(voxel.key, layer, center, truth);
+  }
+
+  VoxelIndex index_;
+  std::vector<Voxel> voxels_;
+  std::vector<ScanPoint> points_;
+  std::vector<std::uint32_t> voxel_of_point_;
+  std::vector<std::uint32_t> mixed_points_;
+  std::vector<std::uint32_t> next_;
+};
+
+}  // namespace dynains::evaluation::detail

@@ -1,0 +1,234 @@
+#include "dynains/evaluation/voxel_protocol.hpp"
+
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "detail/range_gate.hpp"
+#include "detail/scan_voxels.hpp"
+#include "detail/voxel_grid.hpp"
+#include "dynains/errors.hpp"
+
+namespace dynains::evaluation {
+
+using detail::LayerMask;
+using detail::truth_bit;
+using detail::TruthMask;
+using detail::VoxelKey;
+
+class VoxelProtocol::Impl {
+ public:
+  Impl(const Settings& settings, std::size_t estimates)
+      : settings_(settings),
+        gate_(settings.min_range, settings.max_range),
+        layers_(kFirstEstimate + estimates),
+        all_layers_(static_cast<LayerMask>((1U << layers_) - 1)) {
+    if (!(settings.voxel > 0) || !std::isfinite(settings.voxel)) {
+      throw ConfigError("VoxelProtocol.voxel = " + std::to_string(settings.voxel) +
+                        " must be positive and finite");
+    }
+    if (estimates > kMaxEstimates) {
+      throw ConfigError("VoxelProtocol evaluates at most " + std::to_string(kMaxEstimates) +
+                        " estimates at once");
+    }
+  }
+
+  void add(const LabelledScan& scan) {
+    if (!grid_) grid_.emplace(settings_.voxel, scan.T_world_sensor.translation());
+    voxelise(scan, [](VoxelKey) { return true; });
+    scan_voxels_.for_each(all_layers_,
+                          [this](VoxelKey key, LayerMask layers, const Eigen::Vector3d& centroid,
+                                 Truth truth) { accumulate(key, layers, centroid, truth); });
+    finished_first_pass_ = false;
+  }
+
+  void resolve(const LabelledScan& scan) {
+    finish_first_pass();
+    if (pending_.size() == 0) return;
+    voxelise(scan,
+             [this](VoxelKey key) { return pending_.find(key) != detail::VoxelIndex::kNone; });
+    scan_voxels_.for_each(all_layers_, [this](VoxelKey key, LayerMask layers,
+                                              const Eigen::Vector3d& centroid, Truth truth) {
+      const Voxel& voxel = voxels_[index_.find(key)];
+      double* nearest = &nearest_[pending_.find(key) * layers_];
+      for (std::size_t layer = 0; layer < layers_; ++layer) {
+        if ((layers >> layer & 1U) == 0) continue;
+        Cell& cell = forks_[voxel.fork + layer];
+        const double distance = (centroid - cell.centroid()).squaredNorm();
+        if (distance < nearest[layer]) {
+          nearest[layer] = distance;
+          cell.truths = truth_bit(truth);
+        }
+      }
+    });
+  }
+
+  VoxelScore score(std::size_t row) {
+    finish_first_pass();
+    VoxelScore score;
+    for (const Voxel& voxel : voxels_) {
+      const Cell& raw = cell(voxel, kIdentity);
+      const Truth truth = raw.truth();
+      const bool preserved = preserves(row, voxel.key, raw.centroid(), truth);
+      if (truth == Truth::kStatic) {
+        ++score.static_total;
+        score.static_preserved += preserved;
+      } else {
+        ++score.dynamic_total;
+        score.dynamic_preserved += preserved;
+      }
+    }
+    return score;
+  }
+
+  void for_each(std::size_t row, const std::function<void(const VoxelPoint&)>& visit) {
+    finish_first_pass();
+    for (const Voxel& voxel : voxels_) {
+      const Cell& point = cell(voxel, row);
+      if (point.count > 0) visit({point.centroid(), point.truth()});
+    }
+  }
+
+  std::size_t rows() const { return layers_; }
+
+ private:
+  static constexpr std::uint32_t kNotForked = 0xffffffffU;
+
+  /// What one layer has in one voxel: at most one point of each scan.
+  struct Cell {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    std::uint32_t count = 0;
+    TruthMask truths = 0;
+
+    void add(const Eigen::Vector3d& point, Truth truth) {
+      sum += point;
+      ++count;
+      truths |= truth_bit(truth);
+    }
+    Eigen::Vector3d centroid() const { return sum / static_cast<double>(count); }
+    Truth truth() const {
+      return truths == truth_bit(Truth::kDynamic) ? Truth::kDynamic : Truth::kStatic;
+    }
+  };
+
+  /// Most voxels hold the same points in every layer: `shared` serves them all. The first scan that
+  /// makes a difference gives every layer its own copy, `forks_[fork + layer]`.
+  struct Voxel {
+    VoxelKey key;
+    Cell shared;
+    std::uint32_t fork = kNotForked;
+  };
+
+  const Cell& cell(const Voxel& voxel, std::size_t layer) const {
+    return voxel.fork == kNotForked ? voxel.shared : forks_[voxel.fork + layer];
+  }
+
+  template <class Wanted>
+  void voxelise(const LabelledScan& scan, Wanted&& wanted) {
+    const Eigen::Matrix3d R = scan.T_world_sensor.linear();
+    const Eigen::Vector3d t = scan.T_world_sensor.translation();
+    scan_voxels_.clear();
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+      const Truth truth = settings_.truth(scan.truth[i]);
+      if (truth == Truth::kIgnored) continue;
+      const float* p = scan.xyz + i * scan.stride;
+      if (!gate_.passes(p)) continue;
+      const Eigen::Vector3d p_world = R * Eigen::Vector3d(p[0], p[1], p[2]) + t;
+      const VoxelKey key = grid_->key(p_world);
+      if (key == detail::kNoKey || !wanted(key)) continue;
+      unsigned layers = 1U << kIdentity;
+      if (truth == Truth::kStatic) layers |= 1U << kOracle;
+      if (!scan.in_map.empty()) layers |= static_cast<unsigned>(scan.in_map[i]) << kFirstEstimate;
+      scan_voxels_.add({p_world, key, truth, static_cast<LayerMask>(layers & all_layers_)});
+    }
+  }
+
+  void accumulate(VoxelKey key, LayerMask layers, const Eigen::Vector3d& centroid, Truth truth) {
+    const std::uint32_t number = index_.insert(key);
+    if (number == voxels_.size()) voxels_.push_back({key, {}, kNotForked});
+    Voxel& voxel = voxels_[number];
+    if (voxel.fork == kNotForked && layers == all_layers_) {
+      voxel.shared.add(centroid, truth);
+      return;
+    }
+    if (voxel.fork == kNotForked) {
+      voxel.fork = static_cast<std::uint32_t>(forks_.size());
+      forks_.resize(forks_.size() + layers_, voxel.shared);
+    }
+    for (std::size_t layer = 0; layer < layers_; ++layer) {
+      if ((layers >> layer & 1U) != 0) forks_[voxel.fork + layer].add(centroid, truth);
+    }
+  }
+
+  /// Collects the voxels whose truth is not settled by what fell into them. They are forked:
+  /// the oracle holds the static part only.
+  void finish_first_pass() {
+    if (finished_first_pass_) return;
+    finished_first_pass_ = true;
+    pending_.clear();
+    for (const Voxel& voxel : voxels_) {
+      if (cell(voxel, kIdentity).truths == detail::kBothTruths) pending_.insert(voxel.key);
+    }
+    nearest_.assign(pending_.size() * layers_, std::numeric_limits<double>::infinity());
+  }
+
+  /// Exact: voxel * sqrt(3) / 2 is less than an edge, so no point farther than the 26 neighbouring
+  /// cells can be near enough, and rounding of centroids is far smaller than what is left.
+  bool preserves(std::size_t layer, VoxelKey key, const Eigen::Vector3d& p, Truth truth) const {
+    double nearest = 0.75 * settings_.voxel * settings_.voxel;
+    bool same = false;
+    for (const VoxelKey offset : detail::kNeighbours) {
+      const std::uint32_t number = index_.find(key + offset);
+      if (number == detail::VoxelIndex::kNone) continue;
+      const Cell& candidate = cell(voxels_[number], layer);
+      if (candidate.count == 0) continue;
+      const double distance = (candidate.centroid() - p).squaredNorm();
+      if (distance < nearest) {
+        nearest = distance;
+        same = candidate.truth() == truth;
+        if (distance == 0) break;
+      }
+    }
+    return same;
+  }
+
+  Settings settings_;
+  detail::RangeGate gate_;
+  std::size_t layers_;
+  LayerMask all_layers_;
+  std::optional<detail::VoxelGrid> grid_;
+  detail::ScanVoxels scan_voxels_;
+
+  detail::VoxelIndex index_;
+  std::vector<Voxel> voxels_;
+  std::vector<Cell> forks_;
+
+  bool finished_first_pass_ = false;
+  detail::VoxelIndex pending_;
+  std::vector<double> nearest_;  // squared, one per pending voxel and layer
+};
+
+VoxelProtocol::VoxelProtocol(const Settings& settings, std::size_t estimates)
+    : impl_(std::make_unique<Impl>(settings, estimates)) {}
+VoxelProtocol::~VoxelProtocol() = default;
+VoxelProtocol::VoxelProtocol(VoxelProtocol&&) noexcept = default;
+VoxelProtocol& VoxelProtocol::operator=(VoxelProtocol&&) noexcept = default;
+
+void VoxelProtocol::add(const LabelledScan& scan) { impl_->add(scan); }
+void VoxelProtocol::resolve(const LabelledScan& scan) { impl_->resolve(scan); }
+
+VoxelScore VoxelProtocol::score(std::size_t row) const {
+  assert(row < impl_->rows());
+  return impl_->score(row);
+}
+
+void VoxelProtocol::for_each(std::size_t row,
+                             const std::function<void(const VoxelPoint&)>& visit) const {
+  assert(row < impl_->rows());
+  impl_->for_each(row, visit);
+}
+
+}  // namespace dynains::evaluation
