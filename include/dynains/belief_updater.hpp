@@ -1,0 +1,105 @@
+// Belief that a cluster is dynamic, from the occupancy discrepancies of its observations
+// (Eq. 13-19).
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "dynains/parameters.hpp"
+#include "dynains/points.hpp"
+
+namespace dynains {
+
+/// l(p) = log(p / (1 - p)), the log-odds of a probability in (0, 1).
+inline double log_odds(double probability) { return std::log(probability / (1.0 - probability)); }
+
+/// Inverse of log_odds (below Eq. 19).
+inline double probability(double log_odds) { return 1.0 / (1.0 + std::exp(-log_odds)); }
+
+/// Binary Bayes filter over the observations of one cluster. Sees heights only, never points.
+class BeliefUpdater {
+ public:
+  struct Config {
+    double p_inc = 0.7;    ///< update probability of a cell that differs (Eq. 18)
+    double p_dec = 0.4;    ///< update probability of a cell that agrees (Eq. 18)
+    double tau_rho = 0.8;  ///< discrepancy ratio from which a cell agrees (Eq. 18)
+    double tau_p = 0.5;    ///< posterior above which a cluster is dynamic (Eq. 19)
+    double prior = 0.5;    ///< p(m) (Eq. 14)
+
+    template <class Self, class Visitor>
+    static void visit(Self& self, Visitor&& visitor) {
+      visitor(Parameter{"p_inc", self.p_inc, open(0.5, 1), "",
+                        "update probability of a cell that differs (Eq. 18)"});
+      visitor(Parameter{"p_dec", self.p_dec, open(0, 0.5), "",
+                        "update probability of a cell that agrees (Eq. 18)"});
+      visitor(Parameter{"tau_rho", self.tau_rho, half_open_below(0, 1), "",
+                        "height ratio from which a cell agrees (Eq. 18)"});
+      visitor(Parameter{"tau_p", self.tau_p, open(0, 1), "",
+                        "posterior above which a cluster is dynamic (Eq. 19)"});
+      visitor(Parameter{"prior", self.prior, open(0, 1), "",
+                        "probability of being dynamic before any observation (Eq. 14)"});
+    }
+
+    /// Throws ConfigError.
+    void validate() const { validate_parameters("BeliefUpdater", *this); }
+  };
+
+  BeliefUpdater() : BeliefUpdater(Config()) {}
+
+  /// Throws ConfigError.
+  explicit BeliefUpdater(const Config& config)
+      : config_(config),
+        increment_((config_.validate(), log_odds(config_.p_inc))),
+        decrement_(log_odds(config_.p_dec)),
+        log_odds_(log_odds(config_.prior)) {}
+
+  const Config& config() const { return config_; }
+
+  /// Back to the prior: a new cluster.
+  void reset() { log_odds_ = log_odds(config_.prior); }
+
+  /// One step of Eq. 15 with the update term of Eq. 16-18: heights of one observation against
+  /// those of the whole cluster, cell by cell, in metres and not negative. Cells that are empty in
+  /// both say nothing; if all are, the belief stays as it is.
+  void update(Span<const float> observation, Span<const float> cluster) {
+    // Counting is exact and independent of order; the sum of Eq. 17 follows from three counts.
+    std::size_t vanished = 0;
+    std::size_t changed = 0;
+    std::size_t alike = 0;
+    const auto tau = static_cast<float>(config_.tau_rho);
+    for (std::size_t i = 0; i < observation.size(); ++i) {
+      const float low = std::min(observation[i], cluster[i]);
+      const float high = std::max(observation[i], cluster[i]);
+      if (high == 0.0F) continue;
+      if (low == 0.0F) {
+        ++vanished;
+      } else if (low < tau * high) {
+        ++changed;
+      } else {
+        ++alike;
+      }
+    }
+    const std::size_t cells = vanished + changed + alike;
+    if (cells == 0) return;
+    log_odds_ += ((2.0 * static_cast<double>(vanished) + static_cast<double>(changed)) * increment_ +
+                  static_cast<double>(alike) * decrement_) /
+                 static_cast<double>(cells);
+  }
+
+  double log_odds_value() const { return log_odds_; }
+
+  /// p(m | z) (Eq. 13, by way of Eq. 15).
+  double posterior() const { return probability(log_odds_); }
+
+  /// Verdict of Eq. 19.
+  bool is_dynamic() const { return posterior() > config_.tau_p; }
+
+ private:
+  Config config_;
+  double increment_;
+  double decrement_;
+  double log_odds_;
+};
+
+}  // namespace dynains

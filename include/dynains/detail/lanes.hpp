@@ -1,0 +1,188 @@
+// Eight floats side by side, written as two four-wide vectors so that the baseline instruction set
+// of x86-64 (and of AArch64) holds them in registers. Every operation is exactly rounded IEEE
+// arithmetic: the same lanes give the same bits on every compiler and every instruction set, as
+// long as the compiler does not contract multiplications and additions.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
+namespace dynains::detail {
+
+inline constexpr std::size_t kLanes = 8;
+
+using Float4 = float __attribute__((vector_size(16)));
+using Int4 = std::int32_t __attribute__((vector_size(16)));
+
+/// Result of a comparison: all bits of a lane set, or none.
+struct Mask8 {
+  Int4 lo, hi;
+
+  friend Mask8 operator&(Mask8 a, Mask8 b) { return {a.lo & b.lo, a.hi & b.hi}; }
+  friend Mask8 operator|(Mask8 a, Mask8 b) { return {a.lo | b.lo, a.hi | b.hi}; }
+  friend Mask8 operator~(Mask8 a) { return {~a.lo, ~a.hi}; }
+
+  /// Lane i as bit i.
+  unsigned bits() const {
+#if defined(__SSE2__)
+    const __m128i words = _mm_packs_epi32(__m128i(lo), __m128i(hi));
+    return static_cast<unsigned>(_mm_movemask_epi8(_mm_packs_epi16(words, words))) & 0xFFU;
+#else
+    unsigned result = 0;
+    for (int i = 0; i < 4; ++i) {
+      result |= (lo[i] != 0 ? 1U : 0U) << i;
+      result |= (hi[i] != 0 ? 1U : 0U) << (i + 4);
+    }
+    return result;
+#endif
+  }
+  bool any() const { return bits() != 0; }
+};
+
+struct Int8 {
+  Int4 lo, hi;
+
+  Int8() = default;
+  Int8(Int4 low, Int4 high) : lo(low), hi(high) {}
+  explicit Int8(std::int32_t value)
+      : lo{value, value, value, value}, hi{value, value, value, value} {}
+
+  static Int8 load(const std::int32_t* from) {
+    Int8 result;
+    std::memcpy(&result.lo, from, sizeof(Int4));
+    std::memcpy(&result.hi, from + 4, sizeof(Int4));
+    return result;
+  }
+  void store(std::int32_t* to) const {
+    std::memcpy(to, &lo, sizeof(Int4));
+    std::memcpy(to + 4, &hi, sizeof(Int4));
+  }
+
+  friend Int8 operator+(Int8 a, Int8 b) { return {a.lo + b.lo, a.hi + b.hi}; }
+  friend Int8 operator-(Int8 a, Int8 b) { return {a.lo - b.lo, a.hi - b.hi}; }
+  friend Int8 operator&(Int8 a, Int8 b) { return {a.lo & b.lo, a.hi & b.hi}; }
+  friend Mask8 operator<(Int8 a, Int8 b) { return {a.lo < b.lo, a.hi < b.hi}; }
+  friend Mask8 operator>(Int8 a, Int8 b) { return {a.lo > b.lo, a.hi > b.hi}; }
+  friend Mask8 operator==(Int8 a, Int8 b) { return {a.lo == b.lo, a.hi == b.hi}; }
+};
+
+struct Float8 {
+  Float4 lo, hi;
+
+  Float8() = default;
+  Float8(Float4 low, Float4 high) : lo(low), hi(high) {}
+  explicit Float8(float value) : lo{value, value, value, value}, hi{value, value, value, value} {}
+
+  static Float8 load(const float* from) {
+    Float8 result;
+    std::memcpy(&result.lo, from, sizeof(Float4));
+    std::memcpy(&result.hi, from + 4, sizeof(Float4));
+    return result;
+  }
+  void store(float* to) const {
+    std::memcpy(to, &lo, sizeof(Float4));
+    std::memcpy(to + 4, &hi, sizeof(Float4));
+  }
+
+  friend Float8 operator+(Float8 a, Float8 b) { return {a.lo + b.lo, a.hi + b.hi}; }
+  friend Float8 operator-(Float8 a, Float8 b) { return {a.lo - b.lo, a.hi - b.hi}; }
+  friend Float8 operator*(Float8 a, Float8 b) { return {a.lo * b.lo, a.hi * b.hi}; }
+  friend Float8 operator/(Float8 a, Float8 b) { return {a.lo / b.lo, a.hi / b.hi}; }
+  friend Mask8 operator<(Float8 a, Float8 b) { return {a.lo < b.lo, a.hi < b.hi}; }
+  friend Mask8 operator<=(Float8 a, Float8 b) { return {a.lo <= b.lo, a.hi <= b.hi}; }
+  friend Mask8 operator>(Float8 a, Float8 b) { return {a.lo > b.lo, a.hi > b.hi}; }
+  friend Mask8 operator>=(Float8 a, Float8 b) { return {a.lo >= b.lo, a.hi >= b.hi}; }
+};
+
+inline Int4 bits_of(Float4 a) { return Int4(a); }
+
+/// `a` where the mask is set, else `b`.
+inline Float8 select(Mask8 mask, Float8 a, Float8 b) {
+  return {Float4((mask.lo & bits_of(a.lo)) | (~mask.lo & bits_of(b.lo))),
+          Float4((mask.hi & bits_of(a.hi)) | (~mask.hi & bits_of(b.hi)))};
+}
+inline Int8 select(Mask8 mask, Int8 a, Int8 b) {
+  return {(mask.lo & a.lo) | (~mask.lo & b.lo), (mask.hi & a.hi) | (~mask.hi & b.hi)};
+}
+/// `a` where the mask is set, else zero: one instruction cheaper than select.
+inline Float8 keep(Mask8 mask, Float8 a) {
+  return {Float4(mask.lo & bits_of(a.lo)), Float4(mask.hi & bits_of(a.hi))};
+}
+
+/// The second operand where either is NaN, as the SSE instruction has it.
+inline Float8 min(Float8 a, Float8 b) {
+#if defined(__SSE2__)
+  return {_mm_min_ps(a.lo, b.lo), _mm_min_ps(a.hi, b.hi)};
+#else
+  return select(a < b, a, b);
+#endif
+}
+inline Float8 max(Float8 a, Float8 b) {
+#if defined(__SSE2__)
+  return {_mm_max_ps(a.lo, b.lo), _mm_max_ps(a.hi, b.hi)};
+#else
+  return select(a > b, a, b);
+#endif
+}
+inline Int8 min(Int8 a, Int8 b) { return select(a < b, a, b); }
+inline Int8 max(Int8 a, Int8 b) { return select(a > b, a, b); }
+
+inline Float8 sqrt(Float8 a) {
+#if defined(__SSE2__)
+  return {_mm_sqrt_ps(a.lo), _mm_sqrt_ps(a.hi)};
+#else
+  Float8 result;
+  for (int i = 0; i < 4; ++i) {
+    result.lo[i] = std::sqrt(a.lo[i]);
+    result.hi[i] = std::sqrt(a.hi[i]);
+  }
+  return result;
+#endif
+}
+
+inline Float8 abs(Float8 a) {
+  const Int4 magnitude = {0x7FFFFFFF, 0x7FFFFFFF, 0x7FFFFFFF, 0x7FFFFFFF};
+  return {Float4(bits_of(a.lo) & magnitude), Float4(bits_of(a.hi) & magnitude)};
+}
+
+/// Rounds towards zero; lanes must lie within the range of int32.
+inline Int8 truncate(Float8 a) {
+  return {__builtin_convertvector(a.lo, Int4), __builtin_convertvector(a.hi, Int4)};
+}
+inline Float8 to_float(Int8 a) {
+  return {__builtin_convertvector(a.lo, Float4), __builtin_convertvector(a.hi, Float4)};
+}
+
+/// Sum in a fixed order.
+inline float sum(Float8 a) {
+  const Float4 s = a.lo + a.hi;
+  return (s[0] + s[2]) + (s[1] + s[3]);
+}
+inline float min_lane(Float8 a) {
+  float v[kLanes];
+  a.store(v);
+  float result = v[0];
+  for (std::size_t i = 1; i < kLanes; ++i) result = v[i] < result ? v[i] : result;
+  return result;
+}
+inline float max_lane(Float8 a) {
+  float v[kLanes];
+  a.store(v);
+  float result = v[0];
+  for (std::size_t i = 1; i < kLanes; ++i) result = v[i] > result ? v[i] : result;
+  return result;
+}
+
+/// True in the lanes below `count`.
+inline Mask8 first_lanes(std::size_t count) {
+  const Int8 index(Int4{0, 1, 2, 3}, Int4{4, 5, 6, 7});
+  return index < Int8(static_cast<std::int32_t>(count));
+}
+
+}  // namespace dynains::detail

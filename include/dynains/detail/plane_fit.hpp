@@ -1,0 +1,78 @@
+// Least-squares plane of a point set, from its moments.
+#pragma once
+
+#include <cmath>
+
+namespace dynains::detail {
+
+/// Sums over a point set, relative to a reference near it so that float sums stay accurate.
+struct PlaneMoments {
+  double count = 0.0;
+  double x = 0.0, y = 0.0, z = 0.0;
+  double xx = 0.0, xy = 0.0, xz = 0.0, yy = 0.0, yz = 0.0, zz = 0.0;
+};
+
+/// Plane `normal . p = offset` with an upward unit normal, in the frame of the moments.
+struct Plane {
+  double normal_x = 0.0, normal_y = 0.0, normal_z = 1.0;
+  double mean_x = 0.0, mean_y = 0.0, mean_z = 0.0;
+  double flatness = 0.0;  ///< smallest eigenvalue of the covariance over the sum of all, [0, 1/3]
+};
+
+/// The normal is the eigenvector of the smallest eigenvalue of the covariance. That eigenvalue is
+/// the smallest root of a cubic whose Newton iteration from zero rises to it monotonically.
+/// Needs count >= 3; degenerate sets (all points equal or on a line) give some normal across them.
+inline Plane fit_plane(const PlaneMoments& m) {
+  Plane plane;
+  const double inverse = 1.0 / m.count;
+  plane.mean_x = m.x * inverse;
+  plane.mean_y = m.y * inverse;
+  plane.mean_z = m.z * inverse;
+  const double xx = m.xx * inverse - plane.mean_x * plane.mean_x;
+  const double xy = m.xy * inverse - plane.mean_x * plane.mean_y;
+  const double xz = m.xz * inverse - plane.mean_x * plane.mean_z;
+  const double yy = m.yy * inverse - plane.mean_y * plane.mean_y;
+  const double yz = m.yz * inverse - plane.mean_y * plane.mean_z;
+  const double zz = m.zz * inverse - plane.mean_z * plane.mean_z;
+
+  const double trace = xx + yy + zz;
+  if (!(trace > 0.0)) return plane;
+  const double minors = xx * yy - xy * xy + xx * zz - xz * xz + yy * zz - yz * yz;
+  const double determinant =
+      xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
+  double lambda = 0.0;
+  for (int i = 0; i < 12; ++i) {
+    const double value = ((lambda - trace) * lambda + minors) * lambda - determinant;
+    const double slope = (3.0 * lambda - 2.0 * trace) * lambda + minors;
+    if (!(slope > 0.0) || !(value < 0.0)) break;
+    const double step = value / slope;
+    lambda -= step;
+    if (-step <= 1e-12 * trace) break;
+  }
+  plane.flatness = lambda / trace;
+
+  // The normal is orthogonal to every row of (covariance - lambda I): take the longest of the
+  // three cross products of rows.
+  const double a = xx - lambda;
+  const double b = yy - lambda;
+  const double c = zz - lambda;
+  const double cross[3][3] = {
+      {xy * yz - xz * b, xz * xy - a * yz, a * b - xy * xy},
+      {xy * c - xz * yz, xz * xz - a * c, a * yz - xy * xz},
+      {b * c - yz * yz, yz * xz - xy * c, xy * yz - b * xz},
+  };
+  double best = 0.0;
+  for (const auto& n : cross) {
+    const double squared = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+    if (squared > best) {
+      best = squared;
+      const double scale = (n[2] < 0.0 ? -1.0 : 1.0) / std::sqrt(squared);
+      plane.normal_x = n[0] * scale;
+      plane.normal_y = n[1] * scale;
+      plane.normal_z = n[2] * scale;
+    }
+  }
+  return plane;
+}
+
+}  // namespace dynains::detail

@@ -1,0 +1,75 @@
+// Point clouds in PLY and PCD files.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "dynains/io/atomic_file.hpp"
+
+namespace dynains {
+
+/// Beyond this distance from the origin, in metres, a float coordinate is off by up to 0.5 mm and
+/// soon more (UTM: 0.25 m): write doubles.
+inline constexpr double kFloatCoordinateLimit = 1e4;
+
+/// One point to write. Members that the file has no column for are ignored.
+struct FilePoint {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  float intensity = 0.0F;
+  std::array<std::uint8_t, 3> rgb{};
+  std::uint32_t label = 0;
+};
+
+/// Columns beside x y z.
+struct PointColumns {
+  bool double_xyz = false;  ///< x y z as double; some readers of PCD take floats only
+  bool intensity = false;   ///< float `intensity`
+  bool rgb = false;         ///< PLY: uchar `red` `green` `blue`; PCD: packed `rgb`
+  bool label = false;       ///< uint32 `label`
+};
+
+/// Writes a binary point file, point by point. It appears whole, at `commit()`, or not at all.
+class PointFileWriter {
+ public:
+  /// The format follows from the extension, .ply or .pcd. `count` points must be added.
+  /// Throws IoError for another extension or if the folder cannot be written.
+  PointFileWriter(const std::filesystem::path& path, std::size_t count,
+                  const PointColumns& columns = {});
+
+  void add(const FilePoint& point);
+  /// Throws IoError if points are missing or too many, or the disk does not take them.
+  void commit();
+
+ private:
+  std::filesystem::path path_;
+  PointColumns columns_;
+  bool pcd_;
+  std::size_t count_;
+  std::size_t added_ = 0;
+  AtomicFile file_;
+};
+
+/// Whether the extension is .ply or .pcd.
+bool is_point_file(const std::filesystem::path& path);
+
+/// What a point file held. A column that the file lacks stays empty; the others have one value for
+/// each position. Names are matched without regard to case; units are those of the file.
+struct PointFile {
+  std::vector<Eigen::Vector3d> positions;  ///< x y z
+  std::vector<float> intensity;            ///< intensity, i, reflectivity, scalar_intensity
+  std::vector<std::uint16_t> ring;         ///< ring, channel, line, scalar_ring
+  std::vector<double> time;                ///< time, t, timestamp, offset_time, scalar_time
+  std::vector<std::uint32_t> label;        ///< label, class, scalar_label
+  /// Pose of the sensor that the points were taken from: VIEWPOINT of PCD, else identity.
+  Eigen::Isometry3d viewpoint = Eigen::Isometry3d::Identity();
+};
+
+/// Reads PLY (ascii, binary of both byte orders) and PCD (ascii, binary, binary_compressed); the
+/// format follows from the extension. Throws IoError with path, line or byte, and expectation.
+PointFile read_points(const std::filesystem::path& path);
+
+}  // namespace dynains

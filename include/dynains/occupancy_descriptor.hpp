@@ -1,0 +1,223 @@
+// Occupancy descriptors of the observations of one cluster (Eq. 5-10) and their similarity
+// (Eq. 11-12).
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/cluster_set.hpp"
+#include "dynains/detail/arc_tangent.hpp"
+#include "dynains/parameters.hpp"
+#include "dynains/points.hpp"
+#include "dynains/polar_points.hpp"
+
+namespace dynains {
+
+/// Describes each observation S_k of a cluster by the heights of its points over a polar grid that
+/// spans the whole cluster.
+///
+/// Choices where the paper is silent: the azimuth extent is the smallest arc that holds the
+/// cluster, so that a cluster behind the sensor is not torn at +-pi; a point on the outer border
+/// belongs to the last cell; a cell whose highest point is the lowest of the cluster has height 0
+/// and counts as empty, as Eq. 9 and 10 say to the letter.
+class OccupancyDescriptor {
+ public:
+  struct Config {
+    double cell_range = 0.25;   ///< m, s_r of Eq. 6
+    double cell_azimuth = 1.5;  ///< deg, s_theta of Eq. 7
+    double tau_s = 0.6;         ///< similarity below which a cluster is proposed as dynamic
+
+    template <class Self, class Visitor>
+    static void visit(Self& self, Visitor&& visitor) {
+      visitor(Parameter{"cell_range", self.cell_range, closed(0.01, 10), "m",
+                        "radial size s_r of a descriptor cell (Eq. 6)"});
+      visitor(Parameter{"cell_azimuth", self.cell_azimuth, closed(0.05, 45), "deg",
+                        "angular size s_theta of a descriptor cell (Eq. 7)"});
+      visitor(Parameter{"tau_s", self.tau_s, closed(0, 1), "",
+                        "similarity below which a cluster is proposed as dynamic (Eq. 12)"});
+    }
+
+    /// Throws ConfigError.
+    void validate() const { validate_parameters("OccupancyDescriptor", *this); }
+  };
+
+  OccupancyDescriptor() : OccupancyDescriptor(Config()) {}
+
+  /// Throws ConfigError.
+  explicit OccupancyDescriptor(const Config& config) : config_(config) { config_.validate(); }
+
+  const Config& config() const { return config_; }
+
+  /// Lays the grid of Eq. 5-8 over a cluster and describes its oldest and newest observation.
+  /// The cluster must be comparable (ClusterSet) and outlive the calls that follow.
+  void describe(const ClusterView& cluster) {
+    cluster_ = cluster;
+    lay_grid();
+    const std::size_t scans = cluster_.scan_count();
+    heights_.resize(std::max(heights_.size(), scans * cell_count()));
+    fill(0);
+    fill(scans - 1);
+  }
+
+  /// Describes the observations between oldest and newest as well; belief needs them all.
+  void describe_rest() {
+    for (std::size_t k = 1; k + 1 < cluster_.scan_count(); ++k) fill(k);
+  }
+
+  std::size_t radial_cells() const { return radial_cells_; }    ///< N_r (Eq. 6)
+  std::size_t azimuth_cells() const { return azimuth_cells_; }  ///< N_theta (Eq. 7)
+  std::size_t cell_count() const { return radial_cells_ * azimuth_cells_; }
+  std::size_t scan_count() const { return cluster_.scan_count(); }
+
+  /// H_k flattened, radial index slowest: metres over the lowest point of the cluster (Eq. 9-10).
+  Span<const float> heights(std::size_t k) const {
+    return {heights_.data() + k * cell_count(), cell_count()};
+  }
+
+  /// Cosine similarity d of newest and oldest observation (Eq. 11), in [0, 1]. Two observations
+  /// without any height are equal (1); one without and one with are not (0).
+  double similarity() const {
+    const Span<const float> a = heights(0);
+    const Span<const float> b = heights(scan_count() - 1);
+    detail::Float8 dot(0.0F), aa(0.0F), bb(0.0F);
+    std::size_t i = 0;
+    for (; i + detail::kLanes <= a.size(); i += detail::kLanes) {
+      const detail::Float8 ai = detail::Float8::load(&a[i]);
+      const detail::Float8 bi = detail::Float8::load(&b[i]);
+      dot = dot + ai * bi;
+      aa = aa + ai * ai;
+      bb = bb + bi * bi;
+    }
+    double dot_sum = sum(dot);
+    double aa_sum = sum(aa);
+    double bb_sum = sum(bb);
+    for (; i < a.size(); ++i) {
+      dot_sum += a[i] * b[i];
+      aa_sum += a[i] * a[i];
+      bb_sum += b[i] * b[i];
+    }
+    if (aa_sum == 0.0 && bb_sum == 0.0) return 1.0;
+    if (aa_sum == 0.0 || bb_sum == 0.0) return 0.0;
+    return std::min(1.0, dot_sum / std::sqrt(aa_sum * bb_sum));
+  }
+
+  /// Whether the cluster is an initial dynamic proposal (Eq. 12).
+  bool proposes_dynamic() const { return similarity() < config_.tau_s; }
+
+ private:
+  void lay_grid() {
+    const PolarView& points = cluster_.points;
+    float range_max = points.range[0];
+    range_min_ = range_max;
+    z_min_ = points.z[0];
+    // Extents for the seam at +-pi and for the seam at 0: the smaller of the two is the smallest
+    // arc if it is at most half a turn.
+    float low = points.azimuth[0], high = low;
+    float low_turned = turned(low), high_turned = low_turned;
+    for (std::size_t i = 1; i < points.size(); ++i) {
+      range_min_ = std::min(range_min_, points.range[i]);
+      range_max = std::max(range_max, points.range[i]);
+      z_min_ = std::min(z_min_, points.z[i]);
+      const float azimuth = points.azimuth[i];
+      low = std::min(low, azimuth);
+      high = std::max(high, azimuth);
+      low_turned = std::min(low_turned, turned(azimuth));
+      high_turned = std::max(high_turned, turned(azimuth));
+    }
+    float extent = high - low;
+    azimuth_min_ = low;
+    if (high_turned - low_turned < extent) {
+      extent = high_turned - low_turned;
+      azimuth_min_ = low_turned;
+    }
+    if (extent > detail::kPi) extent = find_smallest_arc(extent);
+
+    cells_per_metre_ = static_cast<float>(1.0 / config_.cell_range);
+    cells_per_radian_ = static_cast<float>(180.0 / (M_PI * config_.cell_azimuth));
+    radial_cells_ = cells((range_max - range_min_) * cells_per_metre_);
+    azimuth_cells_ = cells(extent * cells_per_radian_);
+  }
+
+  static std::size_t cells(float extent) {
+    return static_cast<std::size_t>(std::max(1.0F, std::ceil(extent)));
+  }
+
+  static float turned(float azimuth) {
+    return azimuth < 0.0F ? azimuth + 2.0F * detail::kPi : azimuth;
+  }
+
+  // For clusters that reach around more than half of the sensor: the seam goes into the widest gap
+  // of an azimuth histogram finer than the cells.
+  float find_smallest_arc(float whole_extent) {
+    constexpr std::size_t kBins = 1024;
+    constexpr float kBinsPerRadian = static_cast<float>(kBins) / (2.0F * detail::kPi);
+    taken_.assign(kBins, 0);
+    const PolarView& points = cluster_.points;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const auto bin = static_cast<std::size_t>(turned(points.azimuth[i]) * kBinsPerRadian);
+      taken_[std::min(bin, kBins - 1)] = 1;
+    }
+    std::size_t widest = 0;
+    std::size_t seam = kBins;  // first taken bin behind the widest gap
+    std::size_t gap = 0;
+    for (std::size_t i = 0; i < 2 * kBins; ++i) {
+      if (taken_[i % kBins] == 0) {
+        ++gap;
+        continue;
+      }
+      if (gap > widest && i >= kBins) {
+        widest = gap;
+        seam = i % kBins;
+      }
+      gap = 0;
+    }
+    if (seam == kBins) return whole_extent;
+    const float origin = static_cast<float>(seam) / kBinsPerRadian;
+    float low = 2.0F * detail::kPi;
+    float high = 0.0F;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      float offset = turned(points.azimuth[i]) - origin;
+      if (offset < -0.5F / kBinsPerRadian) offset += 2.0F * detail::kPi;
+      low = std::min(low, offset);
+      high = std::max(high, offset);
+    }
+    azimuth_min_ = origin + low;
+    return high - low;
+  }
+
+  // Eq. 9-10 for one observation.
+  void fill(std::size_t k) {
+    const std::size_t cells = cell_count();
+    float* const heights = heights_.data() + k * cells;
+    std::fill(heights, heights + cells, 0.0F);
+    const PolarView points = cluster_.scan(k);
+    for (std::size_t p = 0; p < points.size(); ++p) {
+      const float radial = (points.range[p] - range_min_) * cells_per_metre_;
+      float offset = points.azimuth[p] - azimuth_min_;
+      if (offset < -detail::kPi * 1e-4F) offset += 2.0F * detail::kPi;
+      const float angular = offset * cells_per_radian_;
+      const std::size_t i = std::min(static_cast<std::size_t>(radial), radial_cells_ - 1);
+      const std::size_t j =
+          std::min(static_cast<std::size_t>(std::max(angular, 0.0F)), azimuth_cells_ - 1);
+      float& height = heights[i * azimuth_cells_ + j];
+      height = std::max(height, points.z[p] - z_min_);
+    }
+  }
+
+  Config config_;
+  ClusterView cluster_;
+  float range_min_ = 0.0F;
+  float azimuth_min_ = 0.0F;
+  float z_min_ = 0.0F;
+  float cells_per_metre_ = 1.0F;
+  float cells_per_radian_ = 1.0F;
+  std::size_t radial_cells_ = 0;
+  std::size_t azimuth_cells_ = 0;
+  std::vector<float> heights_;
+  std::vector<std::uint8_t> taken_;
+};
+
+}  // namespace dynains

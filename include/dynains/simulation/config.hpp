@@ -1,0 +1,104 @@
+// What is simulated: the place, the sensor and their disturbances.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "dynains/parameters.hpp"
+
+namespace dynains::simulation {
+
+/// Kind of place. Every seed of a scene is another place with other traffic.
+enum class Scene {
+  kUrban,       ///< street with crossings, moving, parked and stopping vehicles, pedestrians
+  kHighway,     ///< fast traffic both ways, guard rails, trucks, a lead vehicle at ego speed
+  kVegetation,  ///< dense trees and porous bushes, few movers
+  kCrowd,       ///< pedestrian zone: walkers in groups, along walls, standing ones who start
+  kStopAndGo,   ///< queues before, beside and behind the ego vehicle, which stops with them
+  kCanopy,      ///< movers below bridges, roofs and tree canopies
+  kHill,        ///< slopes of up to 10 %, curved ground
+  kCarPark,     ///< rows of parked cars, cars leaving and arriving, pedestrians between them
+  kStatic,      ///< the urban street without anything that moves, parked cars included
+};
+
+/// Beam pattern with its usual mounting height and range.
+enum class Sensor {
+  kHdl64,     ///< 64 beams in two blocks, +2 to -24.3 deg, 2083 columns
+  kVlp16,     ///< 16 beams, +-15 deg, 1800 columns
+  kHdl32,     ///< 32 beams, +10.7 to -30.7 deg, 2083 columns
+  kOs1_64,    ///< 64 beams, +-22.5 deg, 1024 columns
+  kOs0_128,   ///< 128 beams, +-45 deg, 1024 columns
+  kPandar64,  ///< 64 beams, dense around the horizon, 1800 columns; forward is -y
+  kLivox,     ///< non-repetitive rosette, 70 deg cone forward, 24,000 beams a scan
+};
+
+/// Which points of an object that moves at some time count as moving.
+enum class Labelling {
+  kEver,     ///< all, if it moves at any time while within the sensor's range (SemanticKITTI)
+  kInstant,  ///< those of scans in which it moves faster than 0.5 m/s
+};
+
+/// Names for files and command lines: "urban", "hdl64", "ever" ...
+const std::vector<std::string>& scene_names();
+const std::vector<std::string>& sensor_names();
+const std::vector<std::string>& labelling_names();
+
+/// Inverse of the names. Throw ConfigError that lists the known names.
+Scene scene_from_name(const std::string& name);
+Sensor sensor_from_name(const std::string& name);
+Labelling labelling_from_name(const std::string& name);
+
+struct Config {
+  Scene scene = Scene::kUrban;
+  Sensor sensor = Sensor::kHdl64;
+  Labelling labelling = Labelling::kEver;
+
+  int scans = 150;
+  std::uint64_t seed = 1;
+  double rate = 10.0;                  ///< scans per second
+  double ego_speed = -1.0;             ///< m/s; negative: usual for the scene
+  double traffic = 1.0;                ///< 1 is usual, 0 is nobody moving
+  double sensor_height = 0.0;          ///< m over ground; 0: usual for the sensor
+  double max_range = 0.0;              ///< m; 0: usual for the sensor
+  double mounting_pitch = 0.0;         ///< deg, positive looks down
+  double mounting_roll = 0.0;          ///< deg
+  double range_noise = 0.02;           ///< m, standard deviation
+  double dropout = 1.0;                ///< scales all causes of lost returns; 0 loses none
+  double pose_noise_translation = 0.0;  ///< m, standard deviation per axis and scan
+  double pose_noise_rotation = 0.0;     ///< deg, standard deviation per axis and scan
+  bool ego_points = false;             ///< whether the roof below the sensor is seen
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& visitor) {
+    visitor(Parameter{"scans", self.scans, closed(1, 1000000), "scans", "length of the sequence"});
+    visitor(Parameter{"seed", self.seed, Bounds{}, "", "another seed is another place"});
+    visitor(Parameter{"rate", self.rate, closed(1, 50), "1/s", "scans per second"});
+    visitor(Parameter{"ego_speed", self.ego_speed, closed(-1, 50), "m/s",
+                      "cruising speed; negative: usual for the scene"});
+    visitor(Parameter{"traffic", self.traffic, closed(0, 4), "",
+                      "number of movers relative to what is usual for the scene"});
+    visitor(Parameter{"sensor_height", self.sensor_height, closed(0, 10), "m",
+                      "height of the sensor over ground; 0: usual for the sensor"});
+    visitor(Parameter{"max_range", self.max_range, closed(0, 160), "m",
+                      "longest measured range; 0: usual for the sensor"});
+    visitor(Parameter{"mounting_pitch", self.mounting_pitch, closed(-45, 45), "deg",
+                      "tilt of the sensor, positive looks down"});
+    visitor(Parameter{"mounting_roll", self.mounting_roll, closed(-45, 45), "deg",
+                      "tilt of the sensor to the side"});
+    visitor(Parameter{"range_noise", self.range_noise, closed(0, 1), "m",
+                      "standard deviation of measured ranges"});
+    visitor(Parameter{"dropout", self.dropout, closed(0, 10), "",
+                      "scale of lost returns (dark, grazing, far); 0 loses none"});
+    visitor(Parameter{"pose_noise_translation", self.pose_noise_translation, closed(0, 10), "m",
+                      "standard deviation of the written poses, per axis"});
+    visitor(Parameter{"pose_noise_rotation", self.pose_noise_rotation, closed(0, 45), "deg",
+                      "standard deviation of the written poses, per axis"});
+    visitor(Parameter{"ego_points", self.ego_points, Bounds{}, "",
+                      "whether the sensor sees the roof of its own vehicle"});
+  }
+
+  void validate() const { validate_parameters("simulation", *this); }
+};
+
+}  // namespace dynains::simulation
