@@ -4,21 +4,21 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <streambuf>
 #include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
-#include "dynains/errors.hpp"
+#include "failure.hpp"
 
 namespace dynains {
 namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void fail(const fs::path& path, const char* what, int error) {
-  std::string text = path.string() + ": " + what;
-  if (error != 0) text += ": " + std::generic_category().message(error);
-  throw IoError(text);
+[[noreturn]] void fail_with(const fs::path& path, const std::string& what, int error) {
+  fail(path, what + ": " + std::generic_category().message(error));
 }
 
 /// The file that will be replaced: renaming over a link would cut it off from its target.
@@ -31,47 +31,86 @@ fs::path follow_links(fs::path path) {
 
 }  // namespace
 
-AtomicFile::AtomicFile(fs::path target) : target_(follow_links(std::move(target))) {
+/// std::filebuf hides why a write failed and cannot sync; this one knows its descriptor.
+class AtomicFile::Buffer : public std::streambuf {
+ public:
+  explicit Buffer(const fs::path& path)
+      : descriptor_(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)),
+        bytes_(std::size_t{1} << 16) {
+    if (descriptor_ < 0) error_ = errno;
+    setp(bytes_.data(), bytes_.data() + bytes_.size());
+  }
+  ~Buffer() override { close(); }
+  Buffer(const Buffer&) = delete;
+  Buffer& operator=(const Buffer&) = delete;
+
+  /// errno of the first failure, 0 if none.
+  int error() const { return error_; }
+
+  void flush_to_disk() {
+    if (sync() != 0) return;
+    // Without this, a power cut after the rename can leave an empty file under the final name.
+    // Some file systems cannot sync single files (EINVAL); the rename is still atomic there.
+    if (::fsync(descriptor_) != 0 && errno != EINVAL) error_ = errno;
+  }
+
+  void close() {
+    if (descriptor_ >= 0 && ::close(descriptor_) != 0 && error_ == 0) error_ = errno;
+    descriptor_ = -1;
+  }
+
+ protected:
+  int_type overflow(int_type c) override {
+    if (sync() != 0) return traits_type::eof();
+    if (!traits_type::eq_int_type(c, traits_type::eof())) sputc(traits_type::to_char_type(c));
+    return traits_type::not_eof(c);
+  }
+
+  int sync() override {
+    const char* next = pbase();
+    while (error_ == 0 && next != pptr()) {
+      const ssize_t count = ::write(descriptor_, next, static_cast<std::size_t>(pptr() - next));
+      if (count > 0) next += count;
+      if (count < 0 && errno != EINTR) error_ = errno;
+    }
+    setp(bytes_.data(), bytes_.data() + bytes_.size());
+    return error_ == 0 ? 0 : -1;
+  }
+
+ private:
+  int descriptor_;
+  int error_ = 0;
+  std::vector<char> bytes_;
+};
+
+AtomicFile::AtomicFile(fs::path target)
+    : target_(follow_links(std::move(target))), temporary_(target_), stream_(nullptr) {
   std::error_code error;
   const fs::file_status status = fs::status(target_, error);
   if (fs::exists(status) && !fs::is_regular_file(status)) {
-    fail(target_, "cannot be replaced: expected a regular file or none", 0);
+    fail(target_, "cannot be replaced: expected a regular file or none");
   }
-  temporary_ = target_;
   temporary_.replace_filename("." + target_.filename().string() + "." + std::to_string(::getpid()) +
                               ".tmp");
-  errno = 0;
-  stream_.open(temporary_, std::ios::binary | std::ios::trunc);
-  if (!stream_) fail(target_, "cannot be written", errno);
+  buffer_ = std::make_unique<Buffer>(temporary_);
+  if (buffer_->error() != 0) fail_with(target_, "cannot be written", buffer_->error());
+  stream_.rdbuf(buffer_.get());
 }
 
 AtomicFile::~AtomicFile() {
   if (committed_) return;
-  stream_.close();
+  buffer_->close();
   std::error_code ignored;
   fs::remove(temporary_, ignored);
 }
 
 void AtomicFile::commit() {
-  errno = 0;
-  stream_.flush();
-  if (stream_) stream_.close();
-  if (!stream_) fail(target_, "cannot be written to the end", errno);
-
-  // Without this, a power cut after the rename can leave an empty file under the final name.
-  const int descriptor = ::open(temporary_.c_str(), O_WRONLY | O_CLOEXEC);
-  if (descriptor < 0) fail(target_, "cannot be written to the disk", errno);
-  const int synced = ::fsync(descriptor);
-  const int sync_error = errno;
-  ::close(descriptor);
-  // Some file systems cannot sync single files (EINVAL); the rename is still atomic there.
-  if (synced != 0 && sync_error != EINVAL) {
-    fail(target_, "cannot be written to the disk", sync_error);
-  }
-
+  buffer_->flush_to_disk();
+  buffer_->close();
+  if (buffer_->error() != 0) fail_with(target_, "cannot be written to the end", buffer_->error());
   std::error_code error;
   fs::rename(temporary_, target_, error);
-  if (error) fail(target_, "cannot be put in place", error.value());
+  if (error) fail_with(target_, "cannot be put in place", error.value());
   committed_ = true;
 }
 

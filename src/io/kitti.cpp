@@ -8,8 +8,8 @@
 #include <string_view>
 #include <system_error>
 
-#include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
+#include "failure.hpp"
 #include "text.hpp"
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
@@ -24,14 +24,6 @@ constexpr std::size_t kFloatsPerPoint = 4;
 constexpr std::uintmax_t kBytesPerPoint = kFloatsPerPoint * sizeof(float);
 constexpr double kDefaultPeriod = 0.1;       // s, the 10 Hz of KITTI
 constexpr double kRotationTolerance = 1e-3;  // text with 4 digits passes, a scaled matrix does not
-
-[[noreturn]] void fail(const fs::path& path, const std::string& what) {
-  throw IoError(path.string() + ": " + what);
-}
-
-[[noreturn]] void fail_at(const fs::path& path, std::size_t line, const std::string& what) {
-  throw IoError(path.string() + ":" + std::to_string(line) + ": " + what);
-}
 
 std::ifstream open_for_reading(const fs::path& path) {
   std::error_code error;
@@ -77,14 +69,14 @@ std::array<double, kCount> parse_row(std::string_view line, const fs::path& path
   std::array<double, kCount> values{};
   for (std::size_t i = 0; i < kCount; ++i) {
     const std::string_view token = text::next_token(line);
-    if (token.empty()) fail_at(path, number, expected + "found " + std::to_string(i));
+    if (token.empty()) fail_at_line(path, number, expected + "found " + std::to_string(i));
     const std::optional<double> value = text::parse_number(token);
     if (!value || !std::isfinite(*value)) {
-      fail_at(path, number, expected + "found \"" + std::string(token.substr(0, 40)) + "\"");
+      fail_at_line(path, number, expected + "found \"" + std::string(token.substr(0, 40)) + "\"");
     }
     values[i] = *value;
   }
-  if (!text::next_token(line).empty()) fail_at(path, number, expected + "found more");
+  if (!text::next_token(line).empty()) fail_at_line(path, number, expected + "found more");
   return values;
 }
 
@@ -96,8 +88,8 @@ Eigen::Isometry3d parse_pose(std::string_view line, const fs::path& path, std::s
   const Eigen::Matrix3d rotation = matrix.leftCols<3>();
   const Eigen::Matrix3d error = rotation.transpose() * rotation - Eigen::Matrix3d::Identity();
   if (!(error.cwiseAbs().maxCoeff() <= kRotationTolerance) || !(rotation.determinant() > 0.0)) {
-    fail_at(path, number,
-            "expected a rigid transform (columns 1-3 of the 3x4 matrix are a rotation)");
+    fail_at_line(path, number,
+                 "expected a rigid transform (columns 1-3 of the 3x4 matrix are a rotation)");
   }
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
@@ -119,7 +111,7 @@ void for_each_row(const fs::path& path, Parse&& parse) {
       if (blank == 0) blank = number;
       continue;
     }
-    if (blank != 0) fail_at(path, blank, "expected a row, found a blank line");
+    if (blank != 0) fail_at_line(path, blank, "expected a row, found a blank line");
     parse(std::string_view(line), number);
   }
   if (file.bad()) fail(path, "reading stopped after line " + std::to_string(number));
@@ -138,7 +130,7 @@ std::vector<double> read_times(const fs::path& path) {
   for_each_row(path, [&](std::string_view line, std::size_t number) {
     const double time = parse_row<1>(line, path, number)[0];
     if (!times.empty() && !(time > times.back())) {
-      fail_at(path, number, "expected a time after that of the row before");
+      fail_at_line(path, number, "expected a time after that of the row before");
     }
     times.push_back(time);
   });
@@ -188,9 +180,9 @@ std::vector<std::pair<std::uint64_t, std::string>> list_scans(const fs::path& fo
 
 void check_rows(const fs::path& path, std::size_t rows, std::size_t needed) {
   if (rows >= needed) return;
-  fail_at(path, rows + 1,
-          "expected a row for each scan, at least " + std::to_string(needed) + ", found " +
-              std::to_string(rows));
+  fail_at_line(path, rows + 1,
+               "expected a row for each scan, at least " + std::to_string(needed) + ", found " +
+                   std::to_string(rows));
 }
 
 }  // namespace

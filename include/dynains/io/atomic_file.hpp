@@ -2,7 +2,7 @@
 #pragma once
 
 #include <filesystem>
-#include <fstream>
+#include <memory>
 #include <ostream>
 
 namespace dynains {
@@ -18,17 +18,20 @@ class AtomicFile {
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// Binary stream into the temporary. Failures may be left to `commit()`, which reports them.
+  /// Buffered binary stream into the temporary. Failures may be left to `commit()`.
   std::ostream& stream() { return stream_; }
 
   /// Flushes to the disk and puts the file in place. Throws IoError if anything could not be
-  /// written; the target is then untouched.
+  /// written, with the reason of the first failure; the target is then untouched.
   void commit();
 
  private:
+  class Buffer;
+
   std::filesystem::path target_;
   std::filesystem::path temporary_;
-  std::ofstream stream_;
+  std::unique_ptr<Buffer> buffer_;
+  std::ostream stream_;
   bool committed_ = false;
 };
 

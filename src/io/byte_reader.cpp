@@ -1,0 +1,57 @@
+#include "byte_reader.hpp"
+
+#include <algorithm>
+#include <system_error>
+
+#include "failure.hpp"
+
+namespace dynains {
+namespace {
+
+constexpr std::size_t kMaxLine = std::size_t{1} << 16;
+
+}  // namespace
+
+ByteReader::ByteReader(const std::filesystem::path& path) : path_(path) {
+  std::error_code error;
+  size_ = std::filesystem::file_size(path, error);
+  if (error) fail(path, "cannot be read: " + error.message());
+  file_.open(path, std::ios::binary);
+  if (!file_) fail(path, "cannot be opened for reading");
+}
+
+bool ByteReader::read_line(std::string& text) {
+  text.clear();
+  ++line_;
+  if (remaining() == 0) return false;
+  for (int c = file_.get(); c != std::ifstream::traits_type::eof(); c = file_.get()) {
+    ++position_;
+    if (c == '\n') break;
+    if (text.size() == kMaxLine) fail_on_line("expected a line of text, found no end of line");
+    text.push_back(static_cast<char>(c));
+  }
+  if (!text.empty() && text.back() == '\r') text.pop_back();
+  return true;
+}
+
+void ByteReader::read(char* target, std::size_t count, const char* purpose) {
+  file_.read(target, static_cast<std::streamsize>(count));
+  const auto got = static_cast<std::uint64_t>(file_.gcount());
+  position_ += got;
+  if (got != count) fail_here(std::string("file ends, expected ") + purpose);
+}
+
+void ByteReader::skip(std::uint64_t count, const char* purpose) {
+  if (count > remaining()) {
+    position_ = size_;
+    fail_here(std::string("file ends, expected ") + purpose);
+  }
+  file_.ignore(static_cast<std::streamsize>(count));
+  position_ += count;
+}
+
+void ByteReader::fail_here(const std::string& what) const { fail_at_byte(path_, position_, what); }
+
+void ByteReader::fail_on_line(const std::string& what) const { fail_at_line(path_, line_, what); }
+
+}  // namespace dynains

@@ -1,0 +1,42 @@
+// Sequential reader that knows where it stands and how much is left.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+namespace dynains {
+
+class ByteReader {
+ public:
+  /// Throws IoError unless `path` is a regular file that opens.
+  explicit ByteReader(const std::filesystem::path& path);
+
+  std::uint64_t position() const { return position_; }
+  std::uint64_t remaining() const { return size_ - position_; }
+  /// Number of the line last read, from 1.
+  std::uint64_t line() const { return line_; }
+
+  /// The next line without its end ("\n" or "\r\n"); false at the end of the file.
+  /// Throws IoError if a line is longer than any that we understand.
+  bool read_line(std::string& text);
+
+  /// Exactly `count` bytes; throws IoError, with what they are for, if the file ends before.
+  void read(char* target, std::size_t count, const char* purpose);
+  void skip(std::uint64_t count, const char* purpose);
+
+  [[noreturn]] void fail_here(const std::string& what) const;     ///< at this byte
+  [[noreturn]] void fail_on_line(const std::string& what) const;  ///< at the line last read
+
+ private:
+  std::filesystem::path path_;
+  std::ifstream file_;
+  std::uint64_t size_ = 0;
+  std::uint64_t position_ = 0;
+  std::uint64_t line_ = 0;
+};
+
+}  // namespace dynains

@@ -1,0 +1,26 @@
+// The form of every file error: path, position, what was expected.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "dynains/errors.hpp"
+
+namespace dynains {
+
+[[noreturn]] inline void fail(const std::filesystem::path& path, const std::string& what) {
+  throw IoError(path.string() + ": " + what);
+}
+
+[[noreturn]] inline void fail_at_line(const std::filesystem::path& path, std::uint64_t line,
+                                      const std::string& what) {
+  throw IoError(path.string() + ":" + std::to_string(line) + ": " + what);
+}
+
+[[noreturn]] inline void fail_at_byte(const std::filesystem::path& path, std::uint64_t byte,
+                                      const std::string& what) {
+  throw IoError(path.string() + ": byte " + std::to_string(byte) + ": " + what);
+}
+
+}  // namespace dynains

@@ -1,0 +1,37 @@
+#include "lzf.hpp"
+
+#include <algorithm>
+#include <cstddef>
+
+namespace dynains {
+
+bool decode_lzf(Span<const char> source, Span<char> target) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(source[i]); };
+  std::size_t in = 0;
+  std::size_t out = 0;
+  while (in < source.size()) {
+    const std::size_t control = byte(in++);
+    if (control < 32) {
+      const std::size_t count = control + 1;
+      if (count > source.size() - in || count > target.size() - out) return false;
+      std::copy_n(source.data() + in, count, target.data() + out);
+      in += count;
+      out += count;
+      continue;
+    }
+    std::size_t count = control >> 5;
+    if (count == 7) {
+      if (in == source.size()) return false;
+      count += byte(in++);
+    }
+    count += 2;
+    if (in == source.size()) return false;
+    const std::size_t distance = ((control & 31) << 8) + byte(in++) + 1;
+    if (distance > out || count > target.size() - out) return false;
+    // The run may overlap what it writes (distance < count), so it is copied byte by byte.
+    for (std::size_t i = 0; i < count; ++i, ++out) target[out] = target[out - distance];
+  }
+  return out == target.size();
+}
+
+}  // namespace dynains

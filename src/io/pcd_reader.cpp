@@ -1,0 +1,332 @@
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "byte_reader.hpp"
+#include "lzf.hpp"
+#include "point_readers.hpp"
+#include "point_sink.hpp"
+#include "scalar.hpp"
+#include "text.hpp"
+
+namespace dynains {
+namespace {
+
+struct Field {
+  std::string name;
+  std::size_t size = 0;
+  char type_letter = 0;
+  std::size_t count = 1;
+  Scalar type = Scalar::kFloat;
+  Role role = Role::kNone;
+
+  std::size_t bytes() const { return size * count; }
+};
+
+enum class Encoding : std::uint8_t { kAscii, kBinary, kCompressed };
+
+struct Header {
+  std::vector<Field> fields;
+  std::uint64_t width = 0;
+  std::uint64_t height = 1;
+  std::uint64_t points = 0;
+  bool has_width = false;
+  bool has_points = false;
+  Encoding encoding = Encoding::kAscii;
+
+  std::size_t record_bytes() const {
+    std::size_t bytes = 0;
+    for (const Field& field : fields) bytes += field.bytes();
+    return bytes;
+  }
+};
+
+constexpr std::size_t kMaxHeaderLines = 1000;
+constexpr std::size_t kMaxFields = 1000;
+constexpr std::size_t kMaxFieldCount = 1 << 16;
+
+std::uint64_t parse_unsigned(const ByteReader& reader, std::string_view token,
+                             const std::string& what) {
+  std::uint64_t value = 0;
+  const auto [stop, error] = std::from_chars(token.data(), token.data() + token.size(), value);
+  if (token.empty() || error != std::errc{} || stop != token.data() + token.size()) {
+    reader.fail_on_line("expected " + what);
+  }
+  return value;
+}
+
+/// Calls `parse(field, token)` for each field; the line must have a token for each.
+template <class Parse>
+void for_each_field(const ByteReader& reader, Header& header, std::string_view line,
+                    Parse&& parse) {
+  if (header.fields.empty()) reader.fail_on_line("expected FIELDS before this line");
+  for (Field& field : header.fields) {
+    const std::string_view token = text::next_token(line);
+    if (token.empty()) {
+      reader.fail_on_line("expected " + std::to_string(header.fields.size()) +
+                          " values, one for each field");
+    }
+    parse(field, token);
+  }
+  if (!text::next_token(line).empty()) {
+    reader.fail_on_line("expected " + std::to_string(header.fields.size()) +
+                        " values, one for each field");
+  }
+}
+
+Eigen::Isometry3d parse_viewpoint(const ByteReader& reader, std::string_view line) {
+  const std::string expected = "expected VIEWPOINT tx ty tz qw qx qy qz with a rotation";
+  std::array<double, 7> v{};
+  for (double& value : v) {
+    const auto number = text::parse_number(text::next_token(line));
+    if (!number || !std::isfinite(*number)) reader.fail_on_line(expected);
+    value = *number;
+  }
+  const Eigen::Quaterniond rotation(v[3], v[4], v[5], v[6]);
+  if (!(std::abs(rotation.norm() - 1.0) < 0.1)) reader.fail_on_line(expected);
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = rotation.normalized().toRotationMatrix();
+  pose.translation() = Eigen::Vector3d(v[0], v[1], v[2]);
+  return pose;
+}
+
+Encoding parse_encoding(const ByteReader& reader, std::string_view line) {
+  const std::string_view name = text::next_token(line);
+  if (name == "ascii") return Encoding::kAscii;
+  if (name == "binary") return Encoding::kBinary;
+  if (name == "binary_compressed") return Encoding::kCompressed;
+  reader.fail_on_line("expected DATA ascii, binary or binary_compressed");
+}
+
+Scalar scalar_of(const ByteReader& reader, const Field& field) {
+  const auto pick = [&](Scalar one, Scalar two, Scalar four, Scalar eight) {
+    return field.size == 1 ? one : field.size == 2 ? two : field.size == 4 ? four : eight;
+  };
+  if (field.type_letter == 'I') {
+    return pick(Scalar::kInt8, Scalar::kInt16, Scalar::kInt32, Scalar::kInt64);
+  }
+  if (field.type_letter == 'U') {
+    return pick(Scalar::kUint8, Scalar::kUint16, Scalar::kUint32, Scalar::kUint64);
+  }
+  if (field.size < 4) reader.fail_on_line("expected SIZE 4 or 8 for field " + field.name);
+  return field.size == 4 ? Scalar::kFloat : Scalar::kDouble;
+}
+
+void parse_header_line(const ByteReader& reader, std::string_view keyword, std::string_view line,
+                       Header& header, PointSink& sink) {
+  if (keyword == "VERSION") return;
+  if (keyword == "FIELDS" || keyword == "COLUMNS") {
+    if (!header.fields.empty()) reader.fail_on_line("expected FIELDS once");
+    for (auto name = text::next_token(line); !name.empty(); name = text::next_token(line)) {
+      if (header.fields.size() == kMaxFields) reader.fail_on_line("expected fewer fields");
+      Field field;
+      field.name = name;
+      header.fields.push_back(std::move(field));
+    }
+    if (header.fields.empty()) reader.fail_on_line("expected the names of the fields");
+  } else if (keyword == "SIZE") {
+    for_each_field(reader, header, line, [&](Field& field, std::string_view token) {
+      if (token != "1" && token != "2" && token != "4" && token != "8") {
+        reader.fail_on_line("expected SIZE 1, 2, 4 or 8 for field " + field.name);
+      }
+      field.size = static_cast<std::size_t>(token.front() - '0');
+    });
+  } else if (keyword == "TYPE") {
+    for_each_field(reader, header, line, [&](Field& field, std::string_view token) {
+      if (token != "I" && token != "U" && token != "F") {
+        reader.fail_on_line("expected TYPE I, U or F for field " + field.name);
+      }
+      field.type_letter = token.front();
+    });
+  } else if (keyword == "COUNT") {
+    for_each_field(reader, header, line, [&](Field& field, std::string_view token) {
+      const std::string what = "a COUNT from 0 to 65536 for field " + field.name;
+      const std::uint64_t count = parse_unsigned(reader, token, what);
+      if (count > kMaxFieldCount) reader.fail_on_line("expected " + what);
+      field.count = static_cast<std::size_t>(count);
+    });
+  } else if (keyword == "WIDTH") {
+    header.width = parse_unsigned(reader, text::next_token(line), "WIDTH as a whole number");
+    header.has_width = true;
+  } else if (keyword == "HEIGHT") {
+    header.height = parse_unsigned(reader, text::next_token(line), "HEIGHT as a whole number");
+  } else if (keyword == "VIEWPOINT") {
+    sink.file().viewpoint = parse_viewpoint(reader, line);
+  } else if (keyword == "POINTS") {
+    header.points = parse_unsigned(reader, text::next_token(line), "POINTS as a whole number");
+    header.has_points = true;
+  } else {
+    reader.fail_on_line("expected a line of a PCD header (FIELDS, SIZE, ... DATA), found \"" +
+                        std::string(keyword.substr(0, 40)) + "\"");
+  }
+}
+
+void finish_header(const ByteReader& reader, Header& header, PointSink& sink) {
+  for (Field& field : header.fields) {
+    if (field.size == 0) reader.fail_on_line("expected SIZE before DATA");
+    if (field.type_letter == 0) reader.fail_on_line("expected TYPE before DATA");
+    field.type = scalar_of(reader, field);
+    const Role role = field.count == 1 ? role_of(field.name) : Role::kNone;
+    if (role != Role::kNone && sink.claim(role)) field.role = role;
+  }
+  if (const auto name = sink.missing()) reader.fail_on_line("expected a field " + *name);
+  if (!header.has_width && !header.has_points) {
+    reader.fail_on_line("expected WIDTH or POINTS before DATA");
+  }
+  if (!header.has_width) return;
+  constexpr std::uint64_t kMax = std::numeric_limits<std::uint64_t>::max();
+  const bool overflows = header.height != 0 && header.width > kMax / header.height;
+  const std::uint64_t product = overflows ? kMax : header.width * header.height;
+  if (overflows || (header.has_points && header.points != product)) {
+    reader.fail_on_line("expected POINTS to be WIDTH * HEIGHT");
+  }
+  header.points = product;
+}
+
+Header read_header(ByteReader& reader, PointSink& sink) {
+  Header header;
+  std::string line;
+  for (std::size_t i = 0; i < kMaxHeaderLines; ++i) {
+    if (!reader.read_line(line)) reader.fail_on_line("file ends, expected a line DATA");
+    std::string_view rest = line;
+    const std::string_view keyword = text::next_token(rest);
+    if (keyword.empty() || keyword.front() == '#') continue;
+    if (keyword == "DATA") {
+      header.encoding = parse_encoding(reader, rest);
+      finish_header(reader, header, sink);
+      return header;
+    }
+    parse_header_line(reader, keyword, rest, header, sink);
+  }
+  reader.fail_on_line("expected a line DATA before this line");
+}
+
+void check_backed(const ByteReader& reader, const Header& header, std::uint64_t available,
+                  std::uint64_t each) {
+  if (header.points <= available / each) return;
+  reader.fail_here("expected " + std::to_string(header.points) + " points of at least " +
+                   std::to_string(each) + " bytes, the file has " +
+                   std::to_string(reader.remaining()) + " bytes left");
+}
+
+[[noreturn]] void fail_value(const Field& field, std::size_t i, const ByteReader& reader) {
+  reader.fail_here("expected a whole number that " + field.name + " can have, at point " +
+                   std::to_string(i));
+}
+
+void read_ascii(ByteReader& reader, const Header& header, PointSink& sink) {
+  std::uint64_t values = 0;
+  for (const Field& field : header.fields) values += field.count;
+  check_backed(reader, header, reader.remaining() + 1, 2 * values);
+  sink.resize(static_cast<std::size_t>(header.points));
+  std::string line;
+  for (std::size_t i = 0; i < header.points; ++i) {
+    if (!reader.read_line(line)) {
+      reader.fail_on_line("file ends, expected " + std::to_string(header.points) + " points");
+    }
+    std::string_view rest = line;
+    for (const Field& field : header.fields) {
+      for (std::size_t k = 0; k < field.count; ++k) {
+        const std::string_view token = text::next_token(rest);
+        const auto value = text::parse_number(token);
+        if (!value) {
+          reader.fail_on_line("expected a number for " + field.name + ", found " +
+                              (token.empty() ? "the end of the line"
+                                             : "\"" + std::string(token.substr(0, 40)) + "\""));
+        }
+        if (!sink.set(i, field.role, *value)) {
+          reader.fail_on_line("expected a whole number that " + field.name + " can have");
+        }
+      }
+    }
+    if (!text::next_token(rest).empty()) reader.fail_on_line("expected fewer values on this line");
+  }
+}
+
+void read_binary(ByteReader& reader, const Header& header, PointSink& sink) {
+  check_backed(reader, header, reader.remaining(), header.record_bytes());
+  if (header.points == 0) return;
+  std::vector<char> record(header.record_bytes());
+  sink.resize(static_cast<std::size_t>(header.points));
+  for (std::size_t i = 0; i < header.points; ++i) {
+    reader.read(record.data(), record.size(), "a point");
+    const char* bytes = record.data();
+    for (const Field& field : header.fields) {
+      if (field.role != Role::kNone &&
+          !sink.set(i, field.role, load_scalar(field.type, bytes, false))) {
+        fail_value(field, i, reader);
+      }
+      bytes += field.bytes();
+    }
+  }
+}
+
+/// The points are stored field after field, and compressed in one block.
+void read_compressed(ByteReader& reader, const Header& header, PointSink& sink) {
+  std::array<std::uint32_t, 2> sizes{};
+  std::array<char, sizeof(sizes)> bytes{};
+  reader.read(bytes.data(), bytes.size(), "the sizes of the compressed block");
+  std::memcpy(sizes.data(), bytes.data(), bytes.size());
+  const auto [compressed_size, plain_size] = sizes;
+  if (compressed_size > reader.remaining()) {
+    reader.fail_here("expected " + std::to_string(compressed_size) +
+                     " bytes of compressed points, the file has " +
+                     std::to_string(reader.remaining()) + " bytes left");
+  }
+  const std::uint64_t each = header.record_bytes();
+  if (plain_size % each != 0 || plain_size / each != header.points) {
+    reader.fail_here("expected a block of " + std::to_string(header.points) + " points of " +
+                     std::to_string(each) + " bytes, its size is given as " +
+                     std::to_string(plain_size));
+  }
+  if (plain_size > std::uint64_t{compressed_size} * kLzfMaxExpansion) {
+    reader.fail_here(
+        "expected a block that compression can have made: " + std::to_string(compressed_size) +
+        " bytes cannot hold " + std::to_string(plain_size));
+  }
+  std::vector<char> compressed(compressed_size);
+  reader.read(compressed.data(), compressed.size(), "compressed points");
+  std::vector<char> plain(plain_size);
+  if (!decode_lzf(compressed, plain)) {
+    reader.fail_here("expected a sound compressed block (LZF) before this byte");
+  }
+  const auto count = static_cast<std::size_t>(header.points);
+  sink.resize(count);
+  const char* column = plain.data();
+  for (const Field& field : header.fields) {
+    for (std::size_t i = 0; field.role != Role::kNone && i < count; ++i) {
+      if (!sink.set(i, field.role, load_scalar(field.type, column + i * field.size, false))) {
+        fail_value(field, i, reader);
+      }
+    }
+    column += field.bytes() * count;
+  }
+}
+
+}  // namespace
+
+PointFile read_pcd(const std::filesystem::path& path) {
+  ByteReader reader(path);
+  PointSink sink;
+  const Header header = read_header(reader, sink);
+  switch (header.encoding) {
+    case Encoding::kAscii:
+      read_ascii(reader, header, sink);
+      break;
+    case Encoding::kBinary:
+      read_binary(reader, header, sink);
+      break;
+    case Encoding::kCompressed:
+      read_compressed(reader, header, sink);
+      break;
+  }
+  return std::move(sink.file());
+}
+
+}  // namespace dynains

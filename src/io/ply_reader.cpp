@@ -1,0 +1,236 @@
+#include <array>
+#include <charconv>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "byte_reader.hpp"
+#include "point_readers.hpp"
+#include "point_sink.hpp"
+#include "scalar.hpp"
+#include "text.hpp"
+
+namespace dynains {
+namespace {
+
+struct Property {
+  Scalar type;
+  bool is_list = false;
+  Scalar length_type = Scalar::kUint8;  ///< of a list
+  Role role = Role::kNone;
+  std::string name;
+};
+
+struct Element {
+  bool is_vertex = false;
+  std::uint64_t count = 0;
+  std::vector<Property> properties;
+};
+
+enum class Encoding : std::uint8_t { kAscii, kLittleEndian, kBigEndian };
+
+struct Header {
+  Encoding encoding = Encoding::kAscii;
+  std::vector<Element> elements;  ///< up to and with the vertices
+};
+
+constexpr std::size_t kMaxHeaderItems = 1000;
+
+Scalar parse_type(const ByteReader& reader, std::string_view name) {
+  struct Entry {
+    std::string_view name;
+    Scalar type;
+  };
+  static constexpr Entry kTypes[] = {
+      {"char", Scalar::kInt8},     {"int8", Scalar::kInt8},     {"uchar", Scalar::kUint8},
+      {"uint8", Scalar::kUint8},   {"short", Scalar::kInt16},   {"int16", Scalar::kInt16},
+      {"ushort", Scalar::kUint16}, {"uint16", Scalar::kUint16}, {"int", Scalar::kInt32},
+      {"int32", Scalar::kInt32},   {"uint", Scalar::kUint32},   {"uint32", Scalar::kUint32},
+      {"float", Scalar::kFloat},   {"float32", Scalar::kFloat}, {"double", Scalar::kDouble},
+      {"float64", Scalar::kDouble}};
+  for (const Entry& entry : kTypes) {
+    if (entry.name == name) return entry.type;
+  }
+  reader.fail_on_line("expected a type such as float or uchar, found \"" +
+                      std::string(name.substr(0, 40)) + "\"");
+}
+
+std::uint64_t parse_count(const ByteReader& reader, std::string_view token) {
+  std::uint64_t count = 0;
+  const auto [stop, error] = std::from_chars(token.data(), token.data() + token.size(), count);
+  if (token.empty() || error != std::errc{} || stop != token.data() + token.size()) {
+    reader.fail_on_line("expected a number of elements");
+  }
+  return count;
+}
+
+Encoding parse_format(const ByteReader& reader, std::string_view line) {
+  const std::string_view name = text::next_token(line);
+  if (text::next_token(line) != "1.0") reader.fail_on_line("expected format version 1.0");
+  if (name == "ascii") return Encoding::kAscii;
+  if (name == "binary_little_endian") return Encoding::kLittleEndian;
+  if (name == "binary_big_endian") return Encoding::kBigEndian;
+  reader.fail_on_line("expected ascii, binary_little_endian or binary_big_endian");
+}
+
+Property parse_property(const ByteReader& reader, std::string_view line) {
+  Property property{};
+  std::string_view type = text::next_token(line);
+  if (type == "list") {
+    property.is_list = true;
+    property.length_type = parse_type(reader, text::next_token(line));
+    type = text::next_token(line);
+  }
+  property.type = parse_type(reader, type);
+  property.name = text::next_token(line);
+  if (property.name.empty()) reader.fail_on_line("expected the name of a property");
+  return property;
+}
+
+Header read_header(ByteReader& reader, PointSink& sink) {
+  std::string line;
+  if (!reader.read_line(line) || line != "ply") {
+    reader.fail_on_line("expected \"ply\" as first line");
+  }
+  Header header;
+  bool has_format = false;
+  bool has_vertices = false;
+  bool past_vertices = false;
+  std::size_t items = 0;
+  for (;;) {
+    if (!reader.read_line(line)) reader.fail_on_line("file ends, expected end_header");
+    if (++items > kMaxHeaderItems) reader.fail_on_line("expected end_header before this line");
+    std::string_view rest = line;
+    const std::string_view keyword = text::next_token(rest);
+    if (keyword == "end_header") break;
+    if (keyword == "comment" || keyword == "obj_info") continue;
+    if (keyword == "format") {
+      header.encoding = parse_format(reader, rest);
+      has_format = true;
+    } else if (keyword == "element") {
+      past_vertices = has_vertices;
+      Element element;
+      element.is_vertex = text::next_token(rest) == "vertex";
+      element.count = parse_count(reader, text::next_token(rest));
+      has_vertices = has_vertices || element.is_vertex;
+      if (!past_vertices) header.elements.push_back(std::move(element));
+    } else if (keyword == "property") {
+      if (header.elements.empty()) reader.fail_on_line("expected an element before a property");
+      Property property = parse_property(reader, rest);
+      if (past_vertices) continue;
+      Element& element = header.elements.back();
+      if (element.is_vertex && !property.is_list) {
+        const Role role = role_of(property.name);
+        if (role != Role::kNone && sink.claim(role)) property.role = role;
+      }
+      element.properties.push_back(std::move(property));
+    } else {
+      reader.fail_on_line("expected element, property, comment or end_header, found \"" +
+                          std::string(keyword.substr(0, 40)) + "\"");
+    }
+  }
+  if (!has_format) reader.fail_on_line("expected a line \"format\" before end_header");
+  if (!has_vertices) reader.fail_on_line("expected \"element vertex\" before end_header");
+  if (const auto name = sink.missing()) {
+    reader.fail_on_line("expected a number property " + *name + " of the vertices");
+  }
+  return header;
+}
+
+/// Reads the values of one element; `store(property, value)` gets those that are not in lists.
+template <class Store>
+void read_binary_element(ByteReader& reader, const Element& element, bool swap, Store&& store) {
+  std::array<char, 8> bytes{};
+  for (const Property& property : element.properties) {
+    if (!property.is_list) {
+      reader.read(bytes.data(), size_of(property.type), "a value");
+      store(property, load_scalar(property.type, bytes.data(), swap));
+      continue;
+    }
+    reader.read(bytes.data(), size_of(property.length_type), "the length of a list");
+    const double length = load_scalar(property.length_type, bytes.data(), swap);
+    if (!(length >= 0.0 && length <= static_cast<double>(reader.remaining()))) {
+      reader.fail_here("expected the length of a list before, that the rest of the file can hold");
+    }
+    reader.skip(static_cast<std::uint64_t>(length) * size_of(property.type), "the items of a list");
+  }
+}
+
+double next_number(const ByteReader& reader, std::string_view& line, const Property& property) {
+  const std::string_view token = text::next_token(line);
+  const auto value = text::parse_number(token);
+  if (!value) {
+    reader.fail_on_line(
+        "expected a number for " + property.name + ", found " +
+        (token.empty() ? "the end of the line" : "\"" + std::string(token.substr(0, 40)) + "\""));
+  }
+  return *value;
+}
+
+template <class Store>
+void read_ascii_element(ByteReader& reader, const Element& element, std::string& line,
+                        Store&& store) {
+  if (!reader.read_line(line)) reader.fail_on_line("file ends, expected one more element");
+  std::string_view rest = line;
+  for (const Property& property : element.properties) {
+    if (!property.is_list) {
+      store(property, next_number(reader, rest, property));
+      continue;
+    }
+    const double length = next_number(reader, rest, property);
+    if (!(length >= 0.0)) reader.fail_on_line("expected the length of list " + property.name);
+    for (double i = 0; i < length; ++i) next_number(reader, rest, property);
+  }
+  if (!text::next_token(rest).empty()) reader.fail_on_line("expected fewer values on this line");
+}
+
+/// Fewest bytes that one element takes in the file.
+std::uint64_t min_bytes(const Element& element, Encoding encoding) {
+  if (encoding == Encoding::kAscii) return 2 * element.properties.size();
+  std::uint64_t bytes = 0;
+  for (const Property& property : element.properties) {
+    bytes += size_of(property.is_list ? property.length_type : property.type);
+  }
+  return bytes;
+}
+
+void check_count(const ByteReader& reader, const Element& element, Encoding encoding) {
+  const std::uint64_t each = min_bytes(element, encoding);
+  // The last line of a text may lack its end.
+  const std::uint64_t available = reader.remaining() + (encoding == Encoding::kAscii ? 1 : 0);
+  if (each != 0 && element.count > available / each) {
+    reader.fail_here("expected " + std::to_string(element.count) + " elements of at least " +
+                     std::to_string(each) + " bytes, the file has " +
+                     std::to_string(reader.remaining()) + " bytes left");
+  }
+}
+
+}  // namespace
+
+PointFile read_ply(const std::filesystem::path& path) {
+  ByteReader reader(path);
+  PointSink sink;
+  const Header header = read_header(reader, sink);
+  const bool swap = header.encoding == Encoding::kBigEndian;
+  std::string line;
+  for (const Element& element : header.elements) {
+    check_count(reader, element, header.encoding);
+    if (element.properties.empty()) continue;
+    if (element.is_vertex) sink.resize(static_cast<std::size_t>(element.count));
+    for (std::size_t i = 0; i < element.count; ++i) {
+      const auto store = [&](const Property& property, double value) {
+        if (sink.set(i, property.role, value)) return;
+        const std::string what = "expected a whole number that " + property.name + " can have";
+        header.encoding == Encoding::kAscii ? reader.fail_on_line(what) : reader.fail_here(what);
+      };
+      if (header.encoding == Encoding::kAscii) {
+        read_ascii_element(reader, element, line, store);
+      } else {
+        read_binary_element(reader, element, swap, store);
+      }
+    }
+  }
+  return std::move(sink.file());
+}
+
+}  // namespace dynains

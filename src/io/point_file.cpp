@@ -1,0 +1,134 @@
+#include "dynains/io/point_file.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cstring>
+#include <ostream>
+#include <string>
+
+#include "failure.hpp"
+#include "point_readers.hpp"
+
+namespace dynains {
+namespace {
+
+namespace fs = std::filesystem;
+
+enum class Format { kPly, kPcd, kUnknown };
+
+Format format_of(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (extension == ".ply") return Format::kPly;
+  if (extension == ".pcd") return Format::kPcd;
+  return Format::kUnknown;
+}
+
+Format known_format_of(const fs::path& path) {
+  const Format format = format_of(path);
+  if (format == Format::kUnknown) fail(path, "expected a name that ends in .ply or .pcd");
+  return format;
+}
+
+void write_ply_header(std::ostream& out, std::size_t count, const PointColumns& columns) {
+  const char* coordinate = columns.double_xyz ? "double" : "float";
+  out << "ply\nformat binary_little_endian 1.0\nelement vertex " << count << '\n';
+  for (const char* axis : {"x", "y", "z"}) out << "property " << coordinate << ' ' << axis << '\n';
+  if (columns.intensity) out << "property float intensity\n";
+  if (columns.rgb) {
+    for (const char* colour : {"red", "green", "blue"}) out << "property uchar " << colour << '\n';
+  }
+  if (columns.label) out << "property uint label\n";
+  out << "end_header\n";
+}
+
+void write_pcd_header(std::ostream& out, std::size_t count, const PointColumns& columns) {
+  const char* coordinate_size = columns.double_xyz ? " 8 8 8" : " 4 4 4";
+  std::string fields = "FIELDS x y z";
+  std::string sizes = std::string("SIZE") + coordinate_size;
+  std::string types = "TYPE F F F";
+  std::string counts = "COUNT 1 1 1";
+  const auto add = [&](const char* name, const char* type) {
+    fields += std::string(" ") + name;
+    sizes += " 4";
+    types += std::string(" ") + type;
+    counts += " 1";
+  };
+  if (columns.intensity) add("intensity", "F");
+  if (columns.rgb) add("rgb", "F");
+  if (columns.label) add("label", "U");
+  out << "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n"
+      << fields << '\n'
+      << sizes << '\n'
+      << types << '\n'
+      << counts << "\nWIDTH " << count << "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " << count
+      << "\nDATA binary\n";
+}
+
+/// One record, packed.
+class Record {
+ public:
+  template <class T>
+  void put(const T& value) {
+    std::memcpy(bytes_.data() + size_, &value, sizeof(T));
+    size_ += sizeof(T);
+  }
+  void write_to(std::ostream& out) const {
+    out.write(bytes_.data(), static_cast<std::streamsize>(size_));
+  }
+
+ private:
+  std::array<char, 40> bytes_{};
+  std::size_t size_ = 0;
+};
+
+}  // namespace
+
+PointFileWriter::PointFileWriter(const fs::path& path, std::size_t count,
+                                 const PointColumns& columns)
+    : path_(path),
+      columns_(columns),
+      pcd_(known_format_of(path) == Format::kPcd),
+      count_(count),
+      file_(path) {
+  (pcd_ ? write_pcd_header : write_ply_header)(file_.stream(), count, columns);
+}
+
+void PointFileWriter::add(const FilePoint& point) {
+  Record record;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    if (columns_.double_xyz) {
+      record.put(point.position[i]);
+    } else {
+      record.put(static_cast<float>(point.position[i]));
+    }
+  }
+  if (columns_.intensity) record.put(point.intensity);
+  if (columns_.rgb) {
+    if (pcd_) {
+      record.put(static_cast<std::uint32_t>(point.rgb[0] << 16 | point.rgb[1] << 8 | point.rgb[2]));
+    } else {
+      record.put(point.rgb);
+    }
+  }
+  if (columns_.label) record.put(point.label);
+  record.write_to(file_.stream());
+  ++added_;
+}
+
+void PointFileWriter::commit() {
+  if (added_ != count_) {
+    fail(path_,
+         "expected " + std::to_string(count_) + " points to write, got " + std::to_string(added_));
+  }
+  file_.commit();
+}
+
+bool is_point_file(const fs::path& path) { return format_of(path) != Format::kUnknown; }
+
+PointFile read_points(const fs::path& path) {
+  return known_format_of(path) == Format::kPly ? read_ply(path) : read_pcd(path);
+}
+
+}  // namespace dynains

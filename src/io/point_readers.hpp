@@ -1,0 +1,13 @@
+// One reader for each format of point files.
+#pragma once
+
+#include <filesystem>
+
+#include "dynains/io/point_file.hpp"
+
+namespace dynains {
+
+PointFile read_ply(const std::filesystem::path& path);
+PointFile read_pcd(const std::filesystem::path& path);
+
+}  // namespace dynains

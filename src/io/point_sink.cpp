@@ -1,0 +1,116 @@
+#include "point_sink.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <limits>
+
+namespace dynains {
+namespace {
+
+struct Alias {
+  std::string_view name;
+  Role role;
+};
+
+constexpr Alias kAliases[] = {
+    {"x", Role::kX},
+    {"y", Role::kY},
+    {"z", Role::kZ},
+    {"intensity", Role::kIntensity},
+    {"i", Role::kIntensity},
+    {"reflectivity", Role::kIntensity},
+    {"scalar_intensity", Role::kIntensity},
+    {"ring", Role::kRing},
+    {"channel", Role::kRing},
+    {"line", Role::kRing},
+    {"scalar_ring", Role::kRing},
+    {"time", Role::kTime},
+    {"t", Role::kTime},
+    {"timestamp", Role::kTime},
+    {"offset_time", Role::kTime},
+    {"scalar_time", Role::kTime},
+    {"label", Role::kLabel},
+    {"class", Role::kLabel},
+    {"scalar_label", Role::kLabel},
+};
+
+template <class Integer>
+bool store(double value, Integer& target) {
+  // The comparison is false for NaN, which the conversion must never see.
+  if (!(value >= 0.0 && value <= static_cast<double>(std::numeric_limits<Integer>::max()))) {
+    return false;
+  }
+  if (value != std::floor(value)) return false;
+  target = static_cast<Integer>(value);
+  return true;
+}
+
+/// A double beyond the range of float is undefined to convert: it is infinite.
+float to_float(double value) {
+  constexpr double kMax = std::numeric_limits<float>::max();
+  if (value > kMax) return std::numeric_limits<float>::infinity();
+  if (value < -kMax) return -std::numeric_limits<float>::infinity();
+  return static_cast<float>(value);
+}
+
+}  // namespace
+
+Role role_of(std::string_view name) {
+  std::string lower(name);
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const Alias& alias : kAliases) {
+    if (alias.name == lower) return alias.role;
+  }
+  return Role::kNone;
+}
+
+bool PointSink::claim(Role role) {
+  bool& claimed = claimed_[static_cast<std::size_t>(role)];
+  if (claimed) return false;
+  claimed = true;
+  return true;
+}
+
+std::optional<std::string> PointSink::missing() const {
+  for (const Role role : {Role::kX, Role::kY, Role::kZ}) {
+    const auto index = static_cast<std::size_t>(role);
+    if (!claimed_[index]) return std::string(1, "xyz"[index]);
+  }
+  return std::nullopt;
+}
+
+void PointSink::resize(std::size_t count) {
+  const auto claimed = [this](Role role) { return claimed_[static_cast<std::size_t>(role)]; };
+  file_.positions.resize(count, Eigen::Vector3d::Zero());
+  if (claimed(Role::kIntensity)) file_.intensity.resize(count);
+  if (claimed(Role::kRing)) file_.ring.resize(count);
+  if (claimed(Role::kTime)) file_.time.resize(count);
+  if (claimed(Role::kLabel)) file_.label.resize(count);
+}
+
+bool PointSink::set(std::size_t i, Role role, double value) {
+  switch (role) {
+    case Role::kX:
+    case Role::kY:
+    case Role::kZ:
+      file_.positions[i][static_cast<Eigen::Index>(role)] = value;
+      return true;
+    case Role::kIntensity:
+      file_.intensity[i] = to_float(value);
+      return true;
+    case Role::kRing:
+      return store(value, file_.ring[i]);
+    case Role::kTime:
+      file_.time[i] = value;
+      return true;
+    case Role::kLabel:
+      return store(value, file_.label[i]);
+    case Role::kNone:
+      return true;
+  }
+  return true;
+}
+
+}  // namespace dynains

@@ -1,0 +1,86 @@
+// Numbers of any width in binary files.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+namespace dynains {
+
+enum class Scalar : std::uint8_t {
+  kInt8,
+  kUint8,
+  kInt16,
+  kUint16,
+  kInt32,
+  kUint32,
+  kInt64,
+  kUint64,
+  kFloat,
+  kDouble
+};
+
+inline std::size_t size_of(Scalar type) {
+  switch (type) {
+    case Scalar::kInt8:
+    case Scalar::kUint8:
+      return 1;
+    case Scalar::kInt16:
+    case Scalar::kUint16:
+      return 2;
+    case Scalar::kInt32:
+    case Scalar::kUint32:
+    case Scalar::kFloat:
+      return 4;
+    case Scalar::kInt64:
+    case Scalar::kUint64:
+    case Scalar::kDouble:
+      return 8;
+  }
+  return 0;
+}
+
+namespace scalar_detail {
+
+template <class T>
+double load(const char* bytes, bool swap) {
+  char copy[sizeof(T)];
+  std::memcpy(copy, bytes, sizeof(T));
+  if (swap) std::reverse(copy, copy + sizeof(T));
+  T value;
+  std::memcpy(&value, copy, sizeof(T));
+  return static_cast<double>(value);
+}
+
+}  // namespace scalar_detail
+
+/// The number at `bytes`; `swap` if its byte order is not ours. 64-bit integers are rounded to 53.
+inline double load_scalar(Scalar type, const char* bytes, bool swap) {
+  using scalar_detail::load;
+  switch (type) {
+    case Scalar::kInt8:
+      return load<std::int8_t>(bytes, swap);
+    case Scalar::kUint8:
+      return load<std::uint8_t>(bytes, swap);
+    case Scalar::kInt16:
+      return load<std::int16_t>(bytes, swap);
+    case Scalar::kUint16:
+      return load<std::uint16_t>(bytes, swap);
+    case Scalar::kInt32:
+      return load<std::int32_t>(bytes, swap);
+    case Scalar::kUint32:
+      return load<std::uint32_t>(bytes, swap);
+    case Scalar::kInt64:
+      return load<std::int64_t>(bytes, swap);
+    case Scalar::kUint64:
+      return load<std::uint64_t>(bytes, swap);
+    case Scalar::kFloat:
+      return load<float>(bytes, swap);
+    case Scalar::kDouble:
+      return load<double>(bytes, swap);
+  }
+  return 0.0;
+}
+
+}  // namespace dynains

@@ -1,0 +1,267 @@
+#include "dynains/io/kitti.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "dynains/errors.hpp"
+#include "io/files.hpp"
+#include "support/catch.hpp"
+
+namespace fs = std::filesystem;
+using namespace dynains;
+using namespace dynains::test;
+
+namespace {
+
+const char* const kIdentity = "1 0 0 0 0 1 0 0 0 0 1 0\n";
+
+std::string bytes(std::size_t count) { return std::string(count, '\0'); }
+
+/// A sound sequence of three scans with 2 points each; tests then spoil one thing.
+void make_sequence(const TemporaryFolder& folder) {
+  for (const char* name : {"000000", "000001", "000002"}) {
+    write_text(folder / ("velodyne/" + std::string(name) + ".bin"), bytes(32));
+    write_text(folder / ("labels/" + std::string(name) + ".label"), bytes(8));
+  }
+  write_text(folder / "poses.txt", std::string(kIdentity) + kIdentity + kIdentity);
+}
+
+std::string open_error(const TemporaryFolder& folder) {
+  return message_of<IoError>([&] { KittiSequence sequence(folder.path()); });
+}
+
+}  // namespace
+
+TEST_CASE("What is written is read back") {
+  TemporaryFolder folder;
+  make_sequence(folder);
+  const std::vector<float> scan = {1.5F, -2.0F, 3.25F, 0.5F, std::nanf(""), -0.0F, 1e30F, 1.0F};
+  const std::vector<std::uint32_t> labels = {251U | 7U << 16, 0xFFFFFFFFU};
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() =
+      Eigen::AngleAxisd(0.3, Eigen::Vector3d(1.0, 2.0, 3.0).normalized()).toRotationMatrix();
+  pose.translation() << 691234.123456, 5334567.654321, 512.25;  // UTM
+  const std::vector<Eigen::Isometry3d> poses(3, pose);
+  const std::vector<double> times = {1571.123456789, 1571.2, 1600000000.000001};
+
+  write_scan(folder / "velodyne/000001.bin", scan);
+  write_labels(folder / "labels/000001.label", labels);
+  write_poses(folder / "poses.txt", poses);
+  write_times(folder / "times.txt", times);
+
+  const KittiSequence sequence(folder.path());
+  CHECK(sequence.size() == 3);
+  CHECK(sequence.name(1) == "000001");
+  CHECK(sequence.point_count(1) == 2);
+  const std::vector<float> read = sequence.read_scan(1);
+  REQUIRE(read.size() == scan.size());
+  CHECK(read[2] == 3.25F);
+  CHECK(std::isnan(read[4]));
+  CHECK(std::signbit(read[5]));
+  CHECK(sequence.has_labels());
+  CHECK(sequence.read_labels(1) == labels);
+  CHECK(sequence.time(0) == times[0]);
+  CHECK(sequence.time(2) == times[2]);
+  CHECK(sequence.T_world_sensor(2).translation() == pose.translation());
+  CHECK(sequence.T_world_sensor(2).linear().isApprox(pose.linear(), 1e-15));
+}
+
+TEST_CASE("The pose of the sensor is Tr^-1 P Tr") {
+  TemporaryFolder folder;
+  make_sequence(folder);
+  // The camera sees z forward, x right, y down; the sensor has x forward, y left, z up, and is
+  // mounted 0.5 m above the camera. x_cam = -y, y_cam = -z - 0.5, z_cam = x.
+  write_text(folder / "calib.txt",
+             "P0: 7 0 6 0 0 7 1 0 0 0 1 0\nTr: 0 -1 0 0 0 0 -1 -0.5 1 0 0 0\n");
+  // The camera moved 2 m forward (+z) and 1 m to the right (+x).
+  write_text(folder / "poses.txt",
+             std::string(kIdentity) + "1 0 0 1 0 1 0 0 0 0 1 2\n" + kIdentity);
+  const KittiSequence sequence(folder.path());
+  CHECK(sequence.T_world_sensor(0).isApprox(Eigen::Isometry3d::Identity(), 1e-15));
+  // So did the sensor: 2 m along its x, -1 m along its y.
+  CHECK(sequence.T_world_sensor(1).translation().isApprox(Eigen::Vector3d(2.0, -1.0, 0.0)));
+}
+
+TEST_CASE("Without times.txt the clock of row n stands at n / 10 s") {
+  TemporaryFolder folder;
+  make_sequence(folder);
+  const KittiSequence sequence(folder.path());
+  CHECK(sequence.time(0) == 0.0);
+  CHECK(sequence.time(2) == Approx(0.2));
+}
+
+TEST_CASE("Scans find their rows by number, or by order in a clip") {
+  TemporaryFolder folder;
+  write_text(folder / "velodyne/000002.bin", bytes(16));
+  write_text(folder / "velodyne/000003.bin", bytes(16));
+  const auto row = [](int x) { return "1 0 0 " + std::to_string(x) + " 0 1 0 0 0 0 1 0\n"; };
+  SECTION("rows of the whole recording") {
+    write_text(folder / "poses.txt", row(10) + row(11) + row(12) + row(13) + row(14));
+    const KittiSequence sequence(folder.path());
+    CHECK(sequence.T_world_sensor(0).translation().x() == 12.0);
+    CHECK(sequence.T_world_sensor(1).translation().x() == 13.0);
+    CHECK(sequence.time(1) == Approx(0.3));
+  }
+  SECTION("rows of the clip") {
+    write_text(folder / "poses.txt", row(10) + row(11));
+    const KittiSequence sequence(folder.path());
+    CHECK(sequence.T_world_sensor(0).translation().x() == 10.0);
+    CHECK(sequence.T_world_sensor(1).translation().x() == 11.0);
+    CHECK(sequence.time(1) == Approx(0.1));
+  }
+  SECTION("neither") {
+    write_text(folder / "poses.txt", row(10) + row(11) + row(12));
+    CHECK_THAT(open_error(folder),
+               ContainsSubstring("poses.txt:4:") && ContainsSubstring("at least 4, found 3"));
+  }
+}
+
+TEST_CASE("Rounded rotations are accepted and made exact") {
+  TemporaryFolder folder;
+  make_sequence(folder);
+  // 30 degrees about z with four digits.
+  const std::string row = "0.8660 -0.5000 0 1 0.5000 0.8660 0 2 0 0 1 3\n";
+  write_text(folder / "poses.txt", row + row + row);
+  const KittiSequence sequence(folder.path());
+  const Eigen::Matrix3d R = sequence.T_world_sensor(0).linear();
+  CHECK((R.transpose() * R).isApprox(Eigen::Matrix3d::Identity(), 1e-14));
+  CHECK(R(1, 0) == Approx(0.5).epsilon(1e-4));
+}
+
+TEST_CASE("Empty scans and blank lines at the end are fine") {
+  TemporaryFolder folder;
+  make_sequence(folder);
+  write_text(folder / "velodyne/000001.bin", "");
+  write_text(folder / "poses.txt", std::string(kIdentity) + kIdentity + kIdentity + "\n  \n");
+  const KittiSequence sequence(folder.path());
+  CHECK(sequence.read_scan(1).empty());
+}
+
+TEST_CASE("Broken sequences are refused with path, line and expectation") {
+  TemporaryFolder folder;
+  make_sequence(folder);
+  const std::string id = kIdentity;
+  std::vector<std::string> parts;
+  SECTION("no folder") {
+    fs::remove_all(folder / "velodyne");
+    parts = {"velodyne: not found", "NNNNNN.bin"};
+  }
+  SECTION("no scans") {
+    fs::remove_all(folder / "velodyne");
+    fs::create_directory(folder / "velodyne");
+    parts = {"velodyne: expected at least one scan"};
+  }
+  SECTION("a scan that is no number") {
+    write_text(folder / "velodyne/cloud.bin", bytes(16));
+    parts = {"cloud.bin: expected a number"};
+  }
+  SECTION("two scans with one number") {
+    write_text(folder / "velodyne/1.bin", bytes(16));
+    parts = {"two scans with one number", "000001.bin", "1.bin"};
+  }
+  SECTION("no poses") {
+    fs::remove(folder / "poses.txt");
+    parts = {"poses.txt: not found", "12 numbers"};
+  }
+  SECTION("too few poses") {
+    write_text(folder / "poses.txt", id + id);
+    parts = {"poses.txt:3: expected a row for each scan, at least 3, found 2"};
+  }
+  SECTION("a short row") {
+    write_text(folder / "poses.txt", id + "1 0 0 0 0 1 0 0 0 0 1\n" + id);
+    parts = {"poses.txt:2: expected 12 finite numbers, found 11"};
+  }
+  SECTION("a long row") {
+    write_text(folder / "poses.txt", id + "1 0 0 0 0 1 0 0 0 0 1 0 0\n" + id);
+    parts = {"poses.txt:2: expected 12 finite numbers, found more"};
+  }
+  SECTION("a word") {
+    write_text(folder / "poses.txt", id + id + "1 0 0 0 0 1 0 0 0 0 1 O\n");
+    parts = {"poses.txt:3: expected 12 finite numbers, found \"O\""};
+  }
+  SECTION("NaN") {
+    write_text(folder / "poses.txt", "1 0 0 nan 0 1 0 0 0 0 1 0\n" + id + id);
+    parts = {"poses.txt:1: expected 12 finite numbers, found \"nan\""};
+  }
+  SECTION("a scaled rotation") {
+    write_text(folder / "poses.txt", id + "1.01 0 0 0 0 1.01 0 0 0 0 1.01 0\n" + id);
+    parts = {"poses.txt:2: expected a rigid transform"};
+  }
+  SECTION("a reflection") {
+    write_text(folder / "poses.txt", id + "1 0 0 0 0 1 0 0 0 0 -1 0\n" + id);
+    parts = {"poses.txt:2: expected a rigid transform"};
+  }
+  SECTION("a blank line between rows") {
+    write_text(folder / "poses.txt", id + "\n" + id + id);
+    parts = {"poses.txt:2: expected a row, found a blank line"};
+  }
+  SECTION("too few times") {
+    write_text(folder / "times.txt", "0\n0.1\n");
+    parts = {"times.txt:3: expected a row for each scan, at least 3, found 2"};
+  }
+  SECTION("time stands still") {
+    write_text(folder / "times.txt", "0\n0.1\n0.1\n");
+    parts = {"times.txt:3: expected a time after"};
+  }
+  SECTION("calibration without Tr") {
+    write_text(folder / "calib.txt", "P0: 7 0 6 0 0 7 1 0 0 0 1 0\n");
+    parts = {"calib.txt: expected a line \"Tr: \""};
+  }
+  SECTION("calibration that is not rigid") {
+    write_text(folder / "calib.txt", "P0: 1\nTr: 7 0 6 0 0 7 1 0 0 0 1 0\n");
+    parts = {"calib.txt:2: expected a rigid transform"};
+  }
+  REQUIRE(!parts.empty());
+  const std::string text = open_error(folder);
+  CHECK_THAT(text, StartsWith(folder.path().string()));
+  for (const std::string& part : parts) CHECK_THAT(text, ContainsSubstring(part));
+}
+
+TEST_CASE("Broken scans and labels are refused with path and size") {
+  TemporaryFolder folder;
+  make_sequence(folder);
+  const KittiSequence sequence(folder.path());
+  SECTION("truncated scan") {
+    write_text(folder / "velodyne/000001.bin", bytes(31));
+    CHECK_THAT(message_of<IoError>([&] { sequence.read_scan(1); }),
+               ContainsSubstring("000001.bin: truncated at byte 31") &&
+                   ContainsSubstring("multiple of 16"));
+  }
+  SECTION("vanished scan") {
+    fs::remove(folder / "velodyne/000001.bin");
+    CHECK_THAT(message_of<IoError>([&] { sequence.read_scan(1); }),
+               ContainsSubstring("000001.bin: cannot be read"));
+  }
+  SECTION("labels of another scan") {
+    write_text(folder / "labels/000001.label", bytes(12));
+    CHECK_THAT(message_of<IoError>([&] { sequence.read_labels(1); }),
+               ContainsSubstring("000001.label: has 12 bytes, expected 8") &&
+                   ContainsSubstring("2 points"));
+  }
+  SECTION("missing labels") {
+    fs::remove(folder / "labels/000001.label");
+    CHECK_THAT(message_of<IoError>([&] { sequence.read_labels(1); }),
+               ContainsSubstring("000001.label: cannot be read"));
+  }
+}
+
+TEST_CASE("A writer that fails leaves the old file") {
+  TemporaryFolder folder;
+  make_sequence(folder);
+  const std::vector<float> broken(5);
+  CHECK_THAT(message_of<IoError>([&] { write_scan(folder / "velodyne/000000.bin", broken); }),
+             ContainsSubstring("000000.bin: expected 4 floats"));
+  CHECK(read_text(folder / "velodyne/000000.bin") == bytes(32));
+}
+
+TEST_CASE("Real recordings open", "[data]") {
+  const fs::path clip = fs::path(DYNAINS_SHARED_DATA) / "kitti_van";
+  if (!fs::exists(clip)) {
+    WARN("skipped: no real recording at " << clip);
+    return;
+  }
+  const KittiSequence sequence(clip);
+  REQUIRE(sequence.size() > 1);
+  const std::size_t last = sequence.size() - 1;
+  CHECK(sequence.read_labels(last).size() * 4 == sequence.read_scan(last).size());
+}

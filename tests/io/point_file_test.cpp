@@ -1,0 +1,363 @@
+#include "dynains/io/point_file.hpp"
+
+#include <cmath>
+#include <cstring>
+
+#include "dynains/errors.hpp"
+#include "io/files.hpp"
+#include "support/catch.hpp"
+
+namespace fs = std::filesystem;
+using namespace dynains;
+using namespace dynains::test;
+
+namespace {
+
+/// Bytes of values as they stand in memory, one after the other.
+template <class... T>
+std::string pack(const T&... values) {
+  std::string bytes;
+  const auto append = [&](const auto& value) {
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof(value));
+  };
+  (append(values), ...);
+  return bytes;
+}
+
+std::string reversed(std::string bytes) { return {bytes.rbegin(), bytes.rend()}; }
+
+PointFile read(const std::string& name, const std::string& content) {
+  TemporaryFolder folder;
+  write_text(folder / name, content);
+  return read_points(folder / name);
+}
+
+std::string error(const std::string& name, const std::string& content) {
+  TemporaryFolder folder;
+  write_text(folder / name, content);
+  const std::string text = message_of<IoError>([&] { read_points(folder / name); });
+  CHECK_THAT(text, StartsWith((folder / name).string()));
+  return text;
+}
+
+const std::string kPlyXyz = "property float x\nproperty float y\nproperty float z\nend_header\n";
+
+std::string pcd_header(const std::string& points, const std::string& data) {
+  return "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH " + points +
+         "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + points + "\nDATA " + data + "\n";
+}
+
+}  // namespace
+
+TEST_CASE("Written point files are read back") {
+  TemporaryFolder folder;
+  const std::string extension = GENERATE(".ply", ".pcd", ".PLY");
+  const bool double_xyz = GENERATE(false, true);
+  PointColumns columns;
+  columns.double_xyz = double_xyz;
+  columns.intensity = true;
+  columns.rgb = true;
+  columns.label = true;
+  const fs::path path = folder / ("cloud" + extension);
+  FilePoint point;
+  point.position = {691234.125, 5334567.654321, -0.5};
+  point.intensity = 0.75F;
+  point.rgb = {200, 100, 50};
+  point.label = 251U | 9U << 16;
+  PointFileWriter writer(path, 2, columns);
+  writer.add(point);
+  writer.add(FilePoint{});
+  CHECK_FALSE(fs::exists(path));
+  writer.commit();
+
+  const PointFile file = read_points(path);
+  REQUIRE(file.positions.size() == 2);
+  if (double_xyz) {
+    CHECK(file.positions[0] == point.position);
+  } else {
+    CHECK(file.positions[0] == point.position.cast<float>().cast<double>());
+  }
+  CHECK(file.positions[1].isZero());
+  CHECK(file.intensity == std::vector<float>{0.75F, 0.0F});
+  CHECK(file.label == std::vector<std::uint32_t>{point.label, 0});
+  CHECK(file.ring.empty());
+  CHECK(file.time.empty());
+  CHECK(file.viewpoint.isApprox(Eigen::Isometry3d::Identity()));
+}
+
+TEST_CASE("The bytes of a written PLY are those of the format") {
+  TemporaryFolder folder;
+  PointColumns columns;
+  columns.rgb = true;
+  PointFileWriter writer(folder / "a.ply", 1, columns);
+  FilePoint point;
+  point.position = {1.0, 2.0, 3.0};
+  point.rgb = {7, 8, 9};
+  writer.add(point);
+  writer.commit();
+  CHECK(read_text(folder / "a.ply") ==
+        "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\n"
+        "property float y\nproperty float z\nproperty uchar red\nproperty uchar green\n"
+        "property uchar blue\nend_header\n" +
+            pack(1.0F, 2.0F, 3.0F) + "\x07\x08\x09");
+}
+
+TEST_CASE("A writer that did not get its points writes nothing") {
+  TemporaryFolder folder;
+  write_text(folder / "a.ply", "old");
+  {
+    PointFileWriter writer(folder / "a.ply", 2);
+    writer.add({});
+    CHECK_THAT(message_of<IoError>([&] { writer.commit(); }),
+               ContainsSubstring("a.ply: expected 2 points to write, got 1"));
+  }
+  CHECK(read_text(folder / "a.ply") == "old");
+  CHECK(count_entries(folder.path()) == 1);
+}
+
+TEST_CASE("Only .ply and .pcd are point files") {
+  CHECK(is_point_file("a/b.ply"));
+  CHECK(is_point_file("b.PCD"));
+  CHECK_FALSE(is_point_file("ply"));
+  CHECK_FALSE(is_point_file("a.las"));
+  CHECK_THAT(message_of<IoError>([] { PointFileWriter("a.las", 0); }),
+             ContainsSubstring("a.las: expected a name that ends in .ply or .pcd"));
+  CHECK_THAT(message_of<IoError>([] { read_points("a.las"); }), ContainsSubstring("a.las"));
+}
+
+TEST_CASE("PLY: ascii with other elements, lists, aliases and any order") {
+  const PointFile file = read("a.ply",
+                              "ply\r\nformat ascii 1.0\r\ncomment made by hand\r\n"
+                              "element camera 1\r\nproperty list uchar int ids\r\n"
+                              "property float f\r\nelement vertex 2\r\nproperty double z\r\n"
+                              "property uchar Ring\r\nproperty list uchar float extra\r\n"
+                              "property float x\r\nproperty int y\r\n"
+                              "property float scalar_Intensity\r\nproperty uint t\r\n"
+                              "element face 1\r\nproperty list uchar int vertex_index\r\n"
+                              "end_header\r\n"
+                              "2 5 6 1.5\r\n"
+                              "0.25 63 2 9 9 -1e3 4 0.5 4000000000\r\n"
+                              "nan 0 0 +2 -5 1 0\r\n"
+                              "3 0 1 2\r\n");
+  REQUIRE(file.positions.size() == 2);
+  CHECK(file.positions[0] == Eigen::Vector3d(-1000.0, 4.0, 0.25));
+  CHECK(file.positions[1].head<2>() == Eigen::Vector2d(2.0, -5.0));
+  CHECK(std::isnan(file.positions[1].z()));
+  CHECK(file.ring == std::vector<std::uint16_t>{63, 0});
+  CHECK(file.intensity == std::vector<float>{0.5F, 1.0F});
+  CHECK(file.time == std::vector<double>{4e9, 0.0});
+  CHECK(file.label.empty());
+}
+
+TEST_CASE("PLY: binary of both byte orders, all types, lists before and within") {
+  const std::string types =
+      "element other 2\nproperty list ushort short items\nelement vertex 1\n"
+      "property char a\nproperty short b\nproperty ushort ring\nproperty int c\n"
+      "property list int double d\nproperty uint label\nproperty double x\nproperty float y\n"
+      "property int8 z\nproperty float64 time\nend_header\n";
+  const auto check = [](const PointFile& file) {
+    REQUIRE(file.positions.size() == 1);
+    CHECK(file.positions[0] == Eigen::Vector3d(691234.125, -2.5, -7.0));
+    CHECK(file.ring == std::vector<std::uint16_t>{40000});
+    CHECK(file.label == std::vector<std::uint32_t>{4000000000U});
+    CHECK(file.time == std::vector<double>{0.1});
+  };
+  const auto v = [](auto value) { return pack(value); };
+  const auto build = [&](auto&& order) {
+    return order(v(std::uint16_t{2})) + order(v(std::int16_t{1})) + order(v(std::int16_t{2})) +
+           order(v(std::uint16_t{0})) + v(std::int8_t{-1}) + order(v(std::int16_t{-2})) +
+           order(v(std::uint16_t{40000})) + order(v(std::int32_t{-3})) + order(v(std::int32_t{1})) +
+           order(v(3.5)) + order(v(std::uint32_t{4000000000U})) + order(v(691234.125)) +
+           order(v(-2.5F)) + v(std::int8_t{-7}) + order(v(0.1));
+  };
+  check(read("le.ply", "ply\nformat binary_little_endian 1.0\n" + types +
+                           build([](std::string s) { return s; })));
+  check(read("be.ply", "ply\nformat binary_big_endian 1.0\n" + types + build(reversed)));
+}
+
+TEST_CASE("PCD: ascii, with a field to skip and a viewpoint") {
+  const PointFile file = read("a.pcd",
+                              "# .PCD v0.7\nVERSION .7\nFIELDS x y z normal ring label\n"
+                              "SIZE 4 4 4 4 2 4\nTYPE F F F F U U\nCOUNT 1 1 1 2 1 1\nWIDTH 2\n"
+                              "HEIGHT 1\n# half a turn about z\nVIEWPOINT 1 2 3 0 0 0 1\n"
+                              "POINTS 2\nDATA ascii\n"
+                              "1 2 3 0 0 5 251\nnan nan nan 0 0 6 9\n");
+  REQUIRE(file.positions.size() == 2);
+  CHECK(file.positions[0] == Eigen::Vector3d(1.0, 2.0, 3.0));
+  CHECK(file.positions[1].array().isNaN().all());
+  CHECK(file.ring == std::vector<std::uint16_t>{5, 6});
+  CHECK(file.label == std::vector<std::uint32_t>{251, 9});
+  const Eigen::Vector3d image = file.viewpoint * Eigen::Vector3d(1.0, 0.0, 0.0);
+  CHECK(image.isApprox(Eigen::Vector3d(0.0, 2.0, 3.0)));
+}
+
+TEST_CASE("PCD: binary and compressed hold the same") {
+  const std::string header =
+      "VERSION 0.7\nFIELDS x _ y z timestamp\nSIZE 4 1 4 4 8\nTYPE F U F F F\nCOUNT 1 3 1 1 1\n"
+      "WIDTH 1\nHEIGHT 2\nDATA ";
+  const auto check = [](const PointFile& file) {
+    REQUIRE(file.positions.size() == 2);
+    CHECK(file.positions[0] == Eigen::Vector3d(1.0, 2.0, 3.0));
+    CHECK(file.positions[1] == Eigen::Vector3d(4.0, 5.0, 6.0));
+    CHECK(file.time == std::vector<double>{0.25, 0.5});
+  };
+  check(read("a.pcd", header + "binary\n" + pack(1.0F) + "abc" + pack(2.0F, 3.0F, 0.25) +
+                          pack(4.0F) + "def" + pack(5.0F, 6.0F, 0.5)));
+  // Field after field; stored in runs of at most 32 plain bytes.
+  const std::string plain =
+      pack(1.0F, 4.0F) + "abcdef" + pack(2.0F, 5.0F, 3.0F, 6.0F) + pack(0.25, 0.5);
+  REQUIRE(plain.size() == 46);
+  const std::string compressed =
+      std::string(1, 31) + plain.substr(0, 32) + std::string(1, 13) + plain.substr(32);
+  check(read("a.pcd", header + "binary_compressed\n" + pack(std::uint32_t{48}, std::uint32_t{46}) +
+                          compressed));
+}
+
+TEST_CASE("Empty clouds") {
+  CHECK(read("a.ply", "ply\nformat ascii 1.0\nelement vertex 0\n" + kPlyXyz).positions.empty());
+  CHECK(read("a.pcd", pcd_header("0", "ascii")).positions.empty());
+  CHECK(read("a.pcd", pcd_header("0", "binary")).positions.empty());
+  CHECK(
+      read("a.pcd", pcd_header("0", "binary_compressed") + std::string(8, '\0')).positions.empty());
+}
+
+TEST_CASE("Malformed point files are refused with position and expectation") {
+  struct Case {
+    std::string name;
+    std::string content;
+    std::string expected;
+  };
+  const std::string ply = "ply\nformat ascii 1.0\n";
+  const std::string ply_le = "ply\nformat binary_little_endian 1.0\n";
+  const std::string huge = "18446744073709551615";
+  const auto pcd = [](const std::string& fields, const std::string& sizes, const std::string& types,
+                      const std::string& rest) {
+    return "FIELDS " + fields + "\nSIZE " + sizes + "\nTYPE " + types + "\n" + rest;
+  };
+  const std::vector<Case> cases = {
+      {"a.ply", "", ":1: expected \"ply\" as first line"},
+      {"a.ply", "PLY\n", ":1: expected \"ply\" as first line"},
+      {"a.ply", std::string(100000, 'p'), ":1: expected a line of text"},
+      {"a.ply", "ply\n", ":2: file ends, expected end_header"},
+      {"a.ply", "ply\nformat ascii 2.0\n", ":2: expected format version 1.0"},
+      {"a.ply", "ply\nformat text 1.0\n", ":2: expected ascii, binary_little_endian"},
+      {"a.ply", "ply\nelement vertex 0\n" + kPlyXyz, ":6: expected a line \"format\""},
+      {"a.ply", ply + "end_header\n", ":3: expected \"element vertex\""},
+      {"a.ply", ply + "property float x\n", ":3: expected an element before a property"},
+      {"a.ply", ply + "element vertex -1\n", ":3: expected a number of elements"},
+      {"a.ply", ply + "element vertex 1e3\n", ":3: expected a number of elements"},
+      {"a.ply", ply + "element vertex 99999999999999999999\n", ":3: expected a number of elements"},
+      {"a.ply", ply + "element vertex 1\nproperty half x\n", ":4: expected a type"},
+      {"a.ply", ply + "element vertex 1\nproperty list float\n", ":4: expected a type"},
+      {"a.ply", ply + "element vertex 1\nproperty float\n", ":4: expected the name"},
+      {"a.ply", ply + "element vertex 1\nvertices\n", ":4: expected element, property"},
+      {"a.ply", ply + "element vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n",
+       ":6: expected a number property z"},
+      {"a.ply", ply + "element vertex 2\n" + kPlyXyz + "1 2 3\n", ": byte 100: expected 2 elements"},
+      {"a.ply", ply + "element vertex 2\n" + kPlyXyz + "1.25 2.25 3.25\n", ":9: file ends"},
+      {"a.ply", ply + "element vertex 1\n" + kPlyXyz + "1 2\n\n\n", ":8: expected a number for z"},
+      {"a.ply", ply + "element vertex 1\n" + kPlyXyz + "1 2 x\n", "for z, found \"x\""},
+      {"a.ply", ply + "element vertex 1\n" + kPlyXyz + "1 2 3 4\n", ":8: expected fewer values"},
+      {"a.ply", ply + "element vertex " + huge + "\n" + kPlyXyz, "expected " + huge + " elements"},
+      {"a.ply", ply + "element vertex 1\nproperty int label\n" + kPlyXyz + "-1 0 0 0\n",
+       ":9: expected a whole number that label can have"},
+      {"a.ply", ply + "element vertex 1\nproperty float ring\n" + kPlyXyz + "nan 0 0 0\n",
+       ":9: expected a whole number that ring can have"},
+      {"a.ply", ply + "element vertex 1\nproperty float ring\n" + kPlyXyz + "1.5 0 0 0\n",
+       ":9: expected a whole number that ring can have"},
+      {"a.ply", ply + "element a 1\nproperty list int int i\nelement vertex 0\n" + kPlyXyz + "-1\n",
+       ":10: expected the length of list i"},
+      {"a.ply", ply_le + "element vertex " + huge + "\n" + kPlyXyz, "expected " + huge},
+      {"a.ply", ply_le + "element vertex 2\n" + kPlyXyz + std::string(23, 'x'),
+       "expected 2 elements of at least 12 bytes, the file has 23 bytes left"},
+      {"a.ply",
+       ply_le + "element vertex 1\nproperty list uint double l\n" + kPlyXyz +
+           std::string(16, '\xFF'),
+       "expected the length of a list before"},
+      {"a.ply",
+       ply_le + "element vertex 1\nproperty list uchar double l\n" + kPlyXyz +
+           std::string(1, '\x01') + std::string(12, '\0'),
+       "file ends, expected a value"},
+      {"a.ply",
+       ply_le + "element a " + huge + "\nproperty list uchar int i\nelement vertex 0\n" + kPlyXyz,
+       "expected " + huge + " elements of at least 1 bytes"},
+      {"a.pcd", "", ":1: file ends, expected a line DATA"},
+      {"a.pcd", "VERSION 0.7\n", ":2: file ends, expected a line DATA"},
+      {"a.pcd", "ply\n", ":1: expected a line of a PCD header"},
+      {"a.pcd", "FIELDS\n", ":1: expected the names of the fields"},
+      {"a.pcd", "FIELDS x\nFIELDS x\n", ":2: expected FIELDS once"},
+      {"a.pcd", "SIZE 4 4 4\n", ":1: expected FIELDS before this line"},
+      {"a.pcd", "FIELDS x y z\nSIZE 4 4\n", ":2: expected 3 values"},
+      {"a.pcd", "FIELDS x y z\nSIZE 4 4 4 4\n", ":2: expected 3 values"},
+      {"a.pcd", "FIELDS x y z\nSIZE 4 4 3\n", ":2: expected SIZE 1, 2, 4 or 8 for field z"},
+      {"a.pcd", "FIELDS x y z\nTYPE F F G\n", ":2: expected TYPE I, U or F for field z"},
+      {"a.pcd", "FIELDS x y z\nCOUNT 1 1 -1\n", ":2: expected a COUNT"},
+      {"a.pcd", "FIELDS x y z\nCOUNT 1 1 65537\n", ":2: expected a COUNT"},
+      {"a.pcd", "FIELDS x y z\nWIDTH many\n", ":2: expected WIDTH as a whole number"},
+      {"a.pcd", "FIELDS x y z\nVIEWPOINT 0 0 0 0 0 0 0\n", ":2: expected VIEWPOINT"},
+      {"a.pcd", "FIELDS x y z\nVIEWPOINT 0 0 0 1 0 0\n", ":2: expected VIEWPOINT"},
+      {"a.pcd", "FIELDS x y z\nVIEWPOINT nan 0 0 1 0 0 0\n", ":2: expected VIEWPOINT"},
+      {"a.pcd", "FIELDS x y z\nTYPE F F F\nWIDTH 0\nDATA ascii\n", ":4: expected SIZE"},
+      {"a.pcd", "FIELDS x y z\nSIZE 4 4 4\nWIDTH 0\nDATA ascii\n", ":4: expected TYPE"},
+      {"a.pcd", pcd("x y z", "4 4 2", "F F F", "WIDTH 0\nDATA ascii\n"),
+       ":5: expected SIZE 4 or 8"},
+      {"a.pcd", pcd("x y", "4 4", "F F", "WIDTH 0\nDATA ascii\n"), ":5: expected a field z"},
+      {"a.pcd", pcd("x y z", "4 4 4", "F F F", "COUNT 1 1 3\nWIDTH 0\nDATA ascii\n"),
+       ":6: expected a field z"},
+      {"a.pcd", pcd("x y z", "4 4 4", "F F F", "DATA ascii\n"), ":4: expected WIDTH or POINTS"},
+      {"a.pcd", pcd("x y z", "4 4 4", "F F F", "WIDTH 2\nHEIGHT 3\nPOINTS 5\nDATA ascii\n"),
+       ":7: expected POINTS to be WIDTH * HEIGHT"},
+      {"a.pcd", pcd("x y z", "4 4 4", "F F F", "WIDTH " + huge + "\nHEIGHT 2\nDATA binary\n"),
+       ":6: expected POINTS to be WIDTH * HEIGHT"},
+      {"a.pcd", pcd_header("1", "zipped"), ":10: expected DATA ascii, binary or"},
+      {"a.pcd", pcd_header("1", "ascii") + "1 2\n\n\n", ":11: expected a number for z"},
+      {"a.pcd", pcd_header("1", "ascii") + "1 2 3 4\n", ":11: expected fewer values"},
+      {"a.pcd", pcd_header("2", "ascii") + "1.5 2.5 3.5\n", ":12: file ends, expected 2 points"},
+      {"a.pcd", pcd_header(huge, "ascii"), "expected " + huge + " points"},
+      {"a.pcd", pcd_header("1000000000000", "binary") + std::string(24, 'x'),
+       "expected 1000000000000 points of at least 12 bytes, the file has 24 bytes left"},
+      {"a.pcd", pcd_header("2", "binary") + std::string(23, 'x'), "the file has 23 bytes left"},
+      {"a.pcd", pcd_header("1", "binary_compressed") + "1234567", "file ends, expected the sizes"},
+      {"a.pcd",
+       pcd_header("1", "binary_compressed") + pack(std::uint32_t{13}, std::uint32_t{12}) +
+           std::string(12, '\0'),
+       "expected 13 bytes of compressed points, the file has 12"},
+      {"a.pcd",
+       pcd_header("1", "binary_compressed") + pack(std::uint32_t{4}, std::uint32_t{13}) + "1234",
+       "expected a block of 1 points of 12 bytes, its size is given as 13"},
+      {"a.pcd",
+       pcd_header("100000000", "binary_compressed") +
+           pack(std::uint32_t{4}, std::uint32_t{1200000000}) + "1234",
+       "4 bytes cannot hold 1200000000"},
+      {"a.pcd",
+       pcd_header("1", "binary_compressed") + pack(std::uint32_t{2}, std::uint32_t{12}) + "\x20" +
+           std::string(1, '\0'),
+       "expected a sound compressed block"},
+  };
+  for (const Case& broken : cases) {
+    CAPTURE(broken.content.substr(0, 200));
+    CHECK_THAT(error(broken.name, broken.content), ContainsSubstring(broken.expected));
+  }
+}
+
+TEST_CASE("Any prefix of a point file is read or refused, never more") {
+  TemporaryFolder folder;
+  const std::string extension = GENERATE(".ply", ".pcd");
+  const fs::path path = folder / ("whole" + extension);
+  PointFileWriter writer(path, 3);
+  for (int i = 0; i < 3; ++i) writer.add({});
+  writer.commit();
+  const std::string whole = read_text(path);
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    CHECK(error("part" + extension, whole.substr(0, size)) != "(nothing was thrown)");
+  }
+}
+
+TEST_CASE("Point files that are not there are refused") {
+  CHECK_THAT(message_of<IoError>([] { read_points("/no/such/file.ply"); }),
+             ContainsSubstring("/no/such/file.ply: cannot be read"));
+  TemporaryFolder folder;
+  fs::create_directory(folder / "folder.pcd");
+  CHECK_THAT(message_of<IoError>([&] { read_points(folder / "folder.pcd"); }),
+             ContainsSubstring("folder.pcd: cannot be read"));
+}
