@@ -14,8 +14,8 @@ function(install_tree name)
 
   file(GLOB_RECURSE files ${WORK_DIR}/${name}/*)
   foreach(file IN LISTS files)
-    # Debug information rightly names the source files.
-    if(file MATCHES "\\.(hpp|cmake|pc)$" OR CONFIG MATCHES "^(Release|MinSizeRel)$")
+    # Debug information and instrumentation rightly name the source files.
+    if(file MATCHES "\\.(hpp|cmake|pc)$" OR (CONFIG STREQUAL "Release" AND NOT INSTRUMENTED))
       foreach(path ${passing} ${BUILD_DIR} ${SOURCE_DIR})
         execute_process(COMMAND grep -F -q -- ${path} ${file} RESULT_VARIABLE absent)
         if(NOT absent)
