@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "detail/preservation.hpp"
 #include "detail/range_gate.hpp"
 #include "detail/scan_voxels.hpp"
 #include "detail/voxel_grid.hpp"
@@ -69,17 +70,11 @@ class VoxelProtocol::Impl {
   VoxelScore score(std::size_t row) {
     finish_first_pass();
     VoxelScore score;
+    const auto point_at = [&](std::uint32_t number) { return point(voxels_[number], row); };
     for (const Voxel& voxel : voxels_) {
-      const Cell& raw = cell(voxel, kIdentity);
-      const Truth truth = raw.truth();
-      const bool preserved = preserves(row, voxel.key, raw.centroid(), truth);
-      if (truth == Truth::kStatic) {
-        ++score.static_total;
-        score.static_preserved += preserved;
-      } else {
-        ++score.dynamic_total;
-        score.dynamic_preserved += preserved;
-      }
+      const VoxelPoint raw = *point(voxel, kIdentity);
+      detail::count(score, raw.truth,
+                    detail::is_preserved(raw, voxel.key, settings_.voxel, index_, point_at));
     }
     return score;
   }
@@ -87,8 +82,7 @@ class VoxelProtocol::Impl {
   void for_each(std::size_t row, const std::function<void(const VoxelPoint&)>& visit) {
     finish_first_pass();
     for (const Voxel& voxel : voxels_) {
-      const Cell& point = cell(voxel, row);
-      if (point.count > 0) visit({point.centroid(), point.truth()});
+      if (const auto held = point(voxel, row)) visit(*held);
     }
   }
 
@@ -124,6 +118,12 @@ class VoxelProtocol::Impl {
 
   const Cell& cell(const Voxel& voxel, std::size_t layer) const {
     return voxel.fork == kNotForked ? voxel.shared : forks_[voxel.fork + layer];
+  }
+
+  std::optional<VoxelPoint> point(const Voxel& voxel, std::size_t layer) const {
+    const Cell& held = cell(voxel, layer);
+    if (held.count == 0) return std::nullopt;
+    return VoxelPoint{held.centroid(), held.truth()};
   }
 
   template <class Wanted>
@@ -173,26 +173,6 @@ class VoxelProtocol::Impl {
       if (cell(voxel, kIdentity).truths == detail::kBothTruths) pending_.insert(voxel.key);
     }
     nearest_.assign(pending_.size() * layers_, std::numeric_limits<double>::infinity());
-  }
-
-  /// Exact: voxel * sqrt(3) / 2 is less than an edge, so no point farther than the 26 neighbouring
-  /// cells can be near enough, and rounding of centroids is far smaller than what is left.
-  bool preserves(std::size_t layer, VoxelKey key, const Eigen::Vector3d& p, Truth truth) const {
-    double nearest = 0.75 * settings_.voxel * settings_.voxel;
-    bool same = false;
-    for (const VoxelKey offset : detail::kNeighbours) {
-      const std::uint32_t number = index_.find(key + offset);
-      if (number == detail::VoxelIndex::kNone) continue;
-      const Cell& candidate = cell(voxels_[number], layer);
-      if (candidate.count == 0) continue;
-      const double distance = (candidate.centroid() - p).squaredNorm();
-      if (distance < nearest) {
-        nearest = distance;
-        same = candidate.truth() == truth;
-        if (distance == 0) break;
-      }
-    }
-    return same;
   }
 
   Settings settings_;

@@ -33,7 +33,8 @@ constexpr std::uint16_t semantic_instance(std::uint32_t label) {
 class TruthClasses {
  public:
   /// Dynamic: SemanticKITTI's moving classes, 252 to 259.
-  explicit TruthClasses(Unlabeled unlabeled = Unlabeled::kIgnore);
+  TruthClasses() : TruthClasses(Unlabeled::kIgnore) {}
+  explicit TruthClasses(Unlabeled unlabeled);
 
   /// `dynamic_classes`: ids and closed ranges separated by commas, for example "252-257,259".
   /// Throws ConfigError if the list is malformed, empty, or an id exceeds 65535.

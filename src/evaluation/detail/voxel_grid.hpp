@@ -57,6 +57,18 @@ class VoxelGrid {
     return key;
   }
 
+  /// Lower corner of a voxel.
+  Eigen::Vector3d corner(VoxelKey key) const {
+    Eigen::Vector3d corner;
+    for (int axis = 0; axis < 3; ++axis) {
+      const VoxelKey field = (key >> (axis * kKeyBits)) & ((VoxelKey{1} << kKeyBits) - 1);
+      const std::int64_t number =
+          static_cast<std::int64_t>(field) - kKeyBias + anchor_[static_cast<std::size_t>(axis)];
+      corner[axis] = static_cast<double>(number) * edge_;
+    }
+    return corner;
+  }
+
  private:
   double edge_;
   std::array<std::int64_t, 3> anchor_{};  // cell numbers

@@ -1,0 +1,113 @@
+// Where an estimate went wrong: by class, instance, range and cause. Point-wise.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "dynains/evaluation/causes.hpp"
+#include "dynains/evaluation/scan.hpp"
+#include "dynains/evaluation/scores.hpp"
+#include "dynains/evaluation/truth.hpp"
+
+namespace dynains::evaluation {
+
+/// Collects the errors of estimate 0 of the scans it is shown.
+class ErrorAnalysis {
+ public:
+  struct Settings {
+    double min_range = 2.7;  ///< m, planar
+    double max_range = 50;   ///< m, planar; 0 = no limit
+    double ring_width = 10;  ///< m, planar
+    TruthClasses truth;
+  };
+
+  struct Counts {
+    std::uint64_t points = 0;
+    std::uint64_t removed = 0;
+    double removed_percent() const { return percent(removed, points); }
+  };
+
+  struct ClassErrors {
+    std::uint16_t id = 0;  ///< SemanticKITTI
+    Truth truth = Truth::kStatic;
+    Counts counts;
+  };
+
+  struct InstanceErrors {
+    std::uint16_t class_id = 0;
+    std::uint16_t instance = 0;
+    Truth truth = Truth::kStatic;
+    Counts counts;
+    std::size_t scans = 0;  ///< in which it has points
+    double mean_range = 0;  ///< m, planar, over its points
+    /// m/s: median over consecutive sightings of how fast the centroid moves in the world. A
+    /// centroid also moves as the view changes. Empty without time stamps or with one sighting.
+    std::optional<double> speed;
+  };
+
+  struct RingErrors {
+    double from = 0;  ///< m, planar
+    double to = 0;
+    PointScore score;
+  };
+
+  /// How often a cause stands at wrong and at right verdicts.
+  struct CauseErrors {
+    std::uint64_t missed_dynamic = 0;
+    std::uint64_t lost_static = 0;
+    std::uint64_t right = 0;
+  };
+
+  /// Errors of points whose cluster (LabelledScan::instances) mixes truths within the scan.
+  struct MergeErrors {
+    std::uint64_t missed_dynamic = 0;  ///< in clusters that are mostly static
+    std::uint64_t lost_static = 0;     ///< in clusters that are mostly dynamic
+  };
+
+  /// Throws ConfigError for settings out of bounds.
+  explicit ErrorAnalysis(const Settings& settings);
+
+  void add(const LabelledScan& scan);
+
+  std::vector<ClassErrors> by_class() const;        ///< by id
+  std::vector<InstanceErrors> by_instance() const;  ///< by class and instance; id 0 is left out
+  const std::vector<RingErrors>& by_range() const { return rings_; }
+  const std::array<CauseErrors, kCauseCount>& by_cause() const { return causes_; }
+  const MergeErrors& merged() const { return merged_; }
+  bool has_causes() const { return has_causes_; }
+  bool has_clusters() const { return has_clusters_; }
+
+ private:
+  struct Track {
+    Counts counts;
+    double range_sum = 0;
+    std::size_t scans = 0;
+    std::vector<double> speeds;
+    Eigen::Vector3d last_centroid = Eigen::Vector3d::Zero();
+    double last_time = 0;
+  };
+  struct Sighting {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    std::size_t count = 0;
+  };
+
+  RingErrors& ring(double range);
+  void count_causes(const LabelledScan& scan, const std::vector<std::size_t>& judged);
+  void count_merged(const LabelledScan& scan, const std::vector<std::size_t>& judged);
+
+  Settings settings_;
+  std::map<std::uint16_t, Counts> classes_;
+  std::map<std::uint32_t, Track> tracks_;  // by truth label, class in the lower 16 bits
+  std::vector<RingErrors> rings_;
+  std::array<CauseErrors, kCauseCount> causes_{};
+  MergeErrors merged_;
+  bool has_causes_ = false;
+  bool has_clusters_ = false;
+};
+
+}  // namespace dynains::evaluation

@@ -1,0 +1,79 @@
+#include "dynains/evaluation/evaluate.hpp"
+
+#include <stdexcept>
+
+#include "dynains/evaluation/map_protocol.hpp"
+#include "dynains/evaluation/point_protocol.hpp"
+#include "dynains/evaluation/voxel_protocol.hpp"
+
+namespace dynains::evaluation {
+namespace {
+
+void check_lengths(const LabelledScan& scan, std::size_t index) {
+  const auto check = [&](std::size_t size, const char* what) {
+    if (size != 0 && size != scan.size()) {
+      throw std::invalid_argument("scan " + std::to_string(index) + " has " +
+                                  std::to_string(scan.size()) + " points but " +
+                                  std::to_string(size) + " " + what);
+    }
+  };
+  check(scan.in_map.size(), "verdicts");
+  check(scan.causes.size(), "causes");
+  check(scan.instances.size(), "instance ids");
+}
+
+}  // namespace
+
+Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& estimates,
+                    const std::vector<MapEstimate>& maps, const EvaluationConfig& config) {
+  config.validate();
+  Evaluation result;
+  result.config = config;
+
+  VoxelProtocol voxels({config.voxel, config.min_range, config.max_range, config.truth},
+                       estimates.size());
+  PointProtocol points({config.min_range, config.point_max_range, config.truth}, estimates.size());
+  std::vector<MapProtocol> map_protocols;
+  for (const MapEstimate& map : maps) {
+    map_protocols.emplace_back(
+        MapProtocol::Settings{config.voxel, config.min_range, config.max_range,
+                              config.point_max_range, config.point_radius, config.truth},
+        map.points_world);
+  }
+  if (!estimates.empty()) {
+    result.errors.emplace(ErrorAnalysis::Settings{config.min_range, config.point_max_range,
+                                                  config.ring_width, config.truth});
+  }
+
+  LabelledScan scan;
+  for (; source(result.scans, scan); ++result.scans) {
+    check_lengths(scan, result.scans);
+    result.points += scan.size();
+    voxels.add(scan);
+    points.add(scan);
+    for (MapProtocol& map : map_protocols) map.add(scan);
+    if (result.errors) result.errors->add(scan);
+  }
+  for (std::size_t index = 0; index < result.scans && source(index, scan); ++index) {
+    check_lengths(scan, index);
+    voxels.resolve(scan);
+    for (MapProtocol& map : map_protocols) map.resolve(scan);
+  }
+
+  result.rows.push_back({"identity", voxels.score(VoxelProtocol::kIdentity), points.identity(),
+                         std::nullopt, std::nullopt});
+  result.rows.push_back({"oracle", voxels.score(VoxelProtocol::kOracle), points.oracle(),
+                         std::nullopt, std::nullopt});
+  for (std::size_t e = 0; e < estimates.size(); ++e) {
+    result.rows.push_back({estimates[e], voxels.score(VoxelProtocol::kFirstEstimate + e),
+                           points.score(e), std::nullopt, std::nullopt});
+  }
+  for (std::size_t m = 0; m < maps.size(); ++m) {
+    result.rows.push_back({maps[m].name, map_protocols[m].voxel_score(voxels),
+                           map_protocols[m].point_score(), map_protocols[m].foreign_points(),
+                           maps[m].points_world.size()});
+  }
+  return result;
+}
+
+}  // namespace dynains::evaluation

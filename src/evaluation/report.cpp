@@ -1,0 +1,290 @@
+#include "dynains/evaluation/report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <type_traits>
+#include <vector>
+
+namespace dynains::evaluation {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string number(double value, int decimals, const char* missing = "-") {
+  if (!std::isfinite(value)) return missing;
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(decimals) << value;
+  return text.str();
+}
+
+/// Right-aligned columns but the first, with widths from the contents.
+class Table {
+ public:
+  explicit Table(std::vector<std::string> header) { add(std::move(header)); }
+  void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
+
+  std::string to_string() const {
+    std::vector<std::size_t> widths(rows_.front().size(), 0);
+    for (const auto& row : rows_) {
+      for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], row[c].size());
+    }
+    std::ostringstream text;
+    for (const auto& row : rows_) {
+      for (std::size_t c = 0; c < row.size(); ++c) {
+        text << (c == 0 ? "" : "  ") << (c == 0 ? std::left : std::right)
+             << std::setw(static_cast<int>(widths[c])) << row[c];
+      }
+      text << '\n';
+    }
+    return text.str();
+  }
+
+ private:
+  std::vector<std::vector<std::string>> rows_;
+};
+
+const char* name(Truth truth) { return truth == Truth::kDynamic ? "dynamic" : "static"; }
+const char* name(Unlabeled unlabeled) {
+  return unlabeled == Unlabeled::kIgnore ? "ignore" : "static";
+}
+
+std::string range_text(double min, double max) {
+  std::string text = number(min, 1) + " m ";
+  return max > 0 ? text + "to " + number(max, 1) + " m" : text + "and farther";
+}
+
+Json json_number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+
+Json to_json(const VoxelScore& score) {
+  return {{"pr", json_number(score.preservation_rate())},
+          {"rr", json_number(score.rejection_rate())},
+          {"f1", json_number(score.f1())},
+          {"static_total", score.static_total},
+          {"static_preserved", score.static_preserved},
+          {"dynamic_total", score.dynamic_total},
+          {"dynamic_preserved", score.dynamic_preserved}};
+}
+
+Json to_json(const PointScore& score) {
+  return {{"sa", json_number(score.static_accuracy())},
+          {"da", json_number(score.dynamic_accuracy())},
+          {"aa", json_number(score.associated_accuracy())},
+          {"ha", json_number(score.harmonic_accuracy())},
+          {"static_total", score.static_total},
+          {"static_kept", score.static_kept},
+          {"dynamic_total", score.dynamic_total},
+          {"dynamic_removed", score.dynamic_removed}};
+}
+
+Json to_json(const ErrorAnalysis& errors) {
+  Json json;
+  json["by_class"] = Json::array();
+  for (const auto& one : errors.by_class()) {
+    json["by_class"].push_back({{"class", one.id},
+                                {"name", semantic_class_name(one.id)},
+                                {"truth", name(one.truth)},
+                                {"points", one.counts.points},
+                                {"removed", one.counts.removed},
+                                {"removed_percent", json_number(one.counts.removed_percent())}});
+  }
+  json["by_instance"] = Json::array();
+  for (const auto& one : errors.by_instance()) {
+    json["by_instance"].push_back({{"class", one.class_id},
+                                   {"instance", one.instance},
+                                   {"name", semantic_class_name(one.class_id)},
+                                   {"truth", name(one.truth)},
+                                   {"points", one.counts.points},
+                                   {"removed", one.counts.removed},
+                                   {"removed_percent", json_number(one.counts.removed_percent())},
+                                   {"scans", one.scans},
+                                   {"mean_range_m", one.mean_range},
+                                   {"speed_mps", one.speed ? Json(*one.speed) : Json()}});
+  }
+  json["by_range"] = Json::array();
+  for (const auto& ring : errors.by_range()) {
+    Json score = to_json(ring.score);
+    score["from_m"] = ring.from;
+    score["to_m"] = ring.to;
+    json["by_range"].push_back(score);
+  }
+  json["by_cause"] = Json();
+  if (errors.has_causes()) {
+    json["by_cause"] = Json::array();
+    for (std::size_t c = 0; c < kCauseCount; ++c) {
+      const auto& cause = errors.by_cause()[c];
+      json["by_cause"].push_back({{"cause", kCauseNames[c]},
+                                  {"missed_dynamic", cause.missed_dynamic},
+                                  {"lost_static", cause.lost_static},
+                                  {"right", cause.right}});
+    }
+  }
+  json["merged"] = Json();
+  if (errors.has_clusters()) {
+    json["merged"] = {{"missed_dynamic", errors.merged().missed_dynamic},
+                      {"lost_static", errors.merged().lost_static}};
+  }
+  return json;
+}
+
+/// Instances of one truth, most wrong points first.
+std::string worst_instances(const ErrorAnalysis& errors, Truth truth, std::size_t max_instances) {
+  std::vector<ErrorAnalysis::InstanceErrors> instances;
+  for (const auto& one : errors.by_instance()) {
+    if (one.truth == truth) instances.push_back(one);
+  }
+  if (instances.empty()) return {};
+  const auto wrong = [](const ErrorAnalysis::InstanceErrors& one) {
+    return one.truth == Truth::kDynamic ? one.counts.points - one.counts.removed
+                                        : one.counts.removed;
+  };
+  std::stable_sort(instances.begin(), instances.end(),
+                   [&](const auto& a, const auto& b) { return wrong(a) > wrong(b); });
+  const bool dynamic = truth == Truth::kDynamic;
+  Table table({dynamic ? "dynamic instance" : "static instance", "id", "points",
+               dynamic ? "missed" : "lost", "removed %", "scans", "range m", "speed m/s"});
+  const std::size_t shown = std::min(max_instances, instances.size());
+  for (std::size_t i = 0; i < shown; ++i) {
+    const auto& one = instances[i];
+    table.add({semantic_class_name(one.class_id), std::to_string(one.instance),
+               std::to_string(one.counts.points), std::to_string(wrong(one)),
+               number(one.counts.removed_percent(), 2), std::to_string(one.scans),
+               number(one.mean_range, 1), one.speed ? number(*one.speed, 2) : "-"});
+  }
+  std::string text = '\n' + table.to_string();
+  if (shown < instances.size()) {
+    text += "... and " + std::to_string(instances.size() - shown) + " more\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string to_table(const Evaluation& evaluation) {
+  const EvaluationConfig& config = evaluation.config;
+  std::ostringstream text;
+  text << evaluation.scans << " scans, " << evaluation.points << " points; dynamic: classes "
+       << config.truth.dynamic_classes() << "; unlabeled: " << name(config.truth.unlabeled())
+       << '\n'
+       << "PR RR F1: voxels of " << number(config.voxel, 3) << " m, "
+       << range_text(config.min_range, config.max_range)
+       << "; SA DA AA HA: " << range_text(config.min_range, config.point_max_range) << '\n';
+  Table table({"", "PR %", "RR %", "F1", "SA %", "DA %", "AA %", "HA %"});
+  for (const EvaluationRow& row : evaluation.rows) {
+    table.add({row.name, number(row.voxels.preservation_rate(), 3),
+               number(row.voxels.rejection_rate(), 3), number(row.voxels.f1(), 4),
+               number(row.points.static_accuracy(), 3), number(row.points.dynamic_accuracy(), 3),
+               number(row.points.associated_accuracy(), 3),
+               number(row.points.harmonic_accuracy(), 3)});
+  }
+  text << table.to_string();
+  for (const EvaluationRow& row : evaluation.rows) {
+    if (!row.foreign_points || *row.foreign_points == 0) continue;
+    text << row.name << ": " << *row.foreign_points << " of " << *row.map_points
+         << " map points lie near no judged point of the scans and were left out";
+    if (2 * *row.foreign_points > *row.map_points) {
+      text << "; is the map in the world frame of the poses?";
+    }
+    text << '\n';
+  }
+  return text.str();
+}
+
+std::string errors_to_table(const Evaluation& evaluation, std::size_t max_instances) {
+  if (!evaluation.errors) return {};
+  const ErrorAnalysis& errors = *evaluation.errors;
+  std::string text;
+
+  Table classes({"class", "id", "truth", "points", "removed", "removed %"});
+  for (const auto& one : errors.by_class()) {
+    classes.add({semantic_class_name(one.id), std::to_string(one.id), name(one.truth),
+                 std::to_string(one.counts.points), std::to_string(one.counts.removed),
+                 number(one.counts.removed_percent(), 2)});
+  }
+  text += classes.to_string();
+
+  text += worst_instances(errors, Truth::kDynamic, max_instances);
+  text += worst_instances(errors, Truth::kStatic, max_instances);
+
+  Table rings({"range m", "static", "lost", "SA %", "dynamic", "missed", "DA %"});
+  for (const auto& ring : errors.by_range()) {
+    const PointScore& score = ring.score;
+    rings.add({number(ring.from, 0) + "-" + number(ring.to, 0), std::to_string(score.static_total),
+               std::to_string(score.static_total - score.static_kept),
+               number(score.static_accuracy(), 2), std::to_string(score.dynamic_total),
+               std::to_string(score.dynamic_total - score.dynamic_removed),
+               number(score.dynamic_accuracy(), 2)});
+  }
+  text += '\n' + rings.to_string();
+
+  if (errors.has_causes()) {
+    Table causes({"cause", "missed dynamic", "lost static", "right"});
+    for (std::size_t c = 0; c < kCauseCount; ++c) {
+      const auto& cause = errors.by_cause()[c];
+      if (cause.missed_dynamic + cause.lost_static + cause.right == 0) continue;
+      causes.add({kCauseNames[c], std::to_string(cause.missed_dynamic),
+                  std::to_string(cause.lost_static), std::to_string(cause.right)});
+    }
+    text += '\n' + causes.to_string();
+  }
+  if (errors.has_clusters()) {
+    text += "\nin clusters of mostly the other truth: " +
+            std::to_string(errors.merged().missed_dynamic) + " points missed, " +
+            std::to_string(errors.merged().lost_static) + " lost\n";
+  }
+  return text;
+}
+
+std::string to_json(const Evaluation& evaluation) {
+  Json settings;
+  EvaluationConfig::visit(evaluation.config, [&](const auto& parameter) {
+    settings[parameter.name] = parameter.value;
+  });
+  settings["classes"] = evaluation.config.truth.dynamic_classes();
+  settings["unlabeled"] = name(evaluation.config.truth.unlabeled());
+
+  Json rows = Json::array();
+  for (const EvaluationRow& row : evaluation.rows) {
+    Json json = {
+        {"name", row.name}, {"voxels", to_json(row.voxels)}, {"points", to_json(row.points)}};
+    if (row.map_points) json["map_points"] = *row.map_points;
+    if (row.foreign_points) json["foreign_points"] = *row.foreign_points;
+    rows.push_back(json);
+  }
+  const Json json = {{"settings", settings},
+                     {"scans", evaluation.scans},
+                     {"points", evaluation.points},
+                     {"rows", rows},
+                     {"errors", evaluation.errors ? to_json(*evaluation.errors) : Json()}};
+  return json.dump(2) + '\n';
+}
+
+std::string to_csv(const Evaluation& evaluation) {
+  std::ostringstream text;
+  text << "name,pr,rr,f1,sa,da,aa,ha,static_voxels,static_voxels_preserved,dynamic_voxels,"
+          "dynamic_voxels_preserved,static_points,static_points_kept,dynamic_points,"
+          "dynamic_points_removed\n";
+  for (const EvaluationRow& row : evaluation.rows) {
+    std::string quoted;
+    for (const char c : row.name) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+    text << '"' << quoted << '"';
+    for (const double value :
+         {row.voxels.preservation_rate(), row.voxels.rejection_rate(), row.voxels.f1(),
+          row.points.static_accuracy(), row.points.dynamic_accuracy(),
+          row.points.associated_accuracy(), row.points.harmonic_accuracy()}) {
+      text << ',' << number(value, 6, "");
+    }
+    for (const std::uint64_t value :
+         {row.voxels.static_total, row.voxels.static_preserved, row.voxels.dynamic_total,
+          row.voxels.dynamic_preserved, row.points.static_total, row.points.static_kept,
+          row.points.dynamic_total, row.points.dynamic_removed}) {
+      text << ',' << value;
+    }
+    text << '\n';
+  }
+  return text.str();
+}
+
+}  // namespace dynains::evaluation
