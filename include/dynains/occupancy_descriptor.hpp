@@ -57,14 +57,23 @@ class OccupancyDescriptor {
     cluster_ = cluster;
     lay_grid();
     const std::size_t scans = cluster_.scan_count();
-    heights_.resize(std::max(heights_.size(), scans * cell_count()));
+    heights_.resize(std::max(heights_.size(), (scans + 1) * cell_count()));
     fill(0);
     fill(scans - 1);
   }
 
-  /// Describes the observations between oldest and newest as well; belief needs them all.
+  /// Describes the observations between oldest and newest, and the cluster as a whole: belief
+  /// needs them all, similarity does not.
   void describe_rest() {
-    for (std::size_t k = 1; k + 1 < cluster_.scan_count(); ++k) fill(k);
+    const std::size_t scans = cluster_.scan_count();
+    for (std::size_t k = 1; k + 1 < scans; ++k) fill(k);
+    const std::size_t cells = cell_count();
+    float* const whole = heights_.data() + scans * cells;
+    std::copy_n(heights_.data(), cells, whole);
+    for (std::size_t k = 1; k < scans; ++k) {
+      const float* const part = heights_.data() + k * cells;
+      for (std::size_t i = 0; i < cells; ++i) whole[i] = std::max(whole[i], part[i]);
+    }
   }
 
   std::size_t radial_cells() const { return radial_cells_; }    ///< N_r (Eq. 6)
@@ -76,6 +85,9 @@ class OccupancyDescriptor {
   Span<const float> heights(std::size_t k) const {
     return {heights_.data() + k * cell_count(), cell_count()};
   }
+
+  /// Heights of all observations together, h_{t1:tK} of Eq. 16; after describe_rest.
+  Span<const float> cluster_heights() const { return heights(scan_count()); }
 
   /// Cosine similarity d of newest and oldest observation (Eq. 11), in [0, 1]. Two observations
   /// without any height are equal (1); one without and one with are not (0).

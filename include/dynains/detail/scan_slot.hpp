@@ -1,0 +1,94 @@
+// One place in the facade's ring of scans.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/detail/lanes.hpp"
+#include "dynains/ground_segmenter.hpp"
+#include "dynains/point_cloud_traits.hpp"
+#include "dynains/points.hpp"
+#include "dynains/scan_verdict.hpp"
+
+namespace dynains::detail {
+
+/// A scan and all that is known of it. Reused from scan to scan.
+struct ScanSlot {
+  std::uint64_t scan = 0;
+  std::uint64_t segment = 0;  // scans of different segments never share a window
+  double time = 0.0;
+  Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+
+  GroundSplit split;
+  std::vector<std::uint32_t> input;  // place in the input of each point of the split
+  // By non-ground point, in the order of the split.
+  std::vector<std::uint8_t> votes;  // windows that called it dynamic
+  std::vector<float> belief;        // highest posterior of any window that proposed it
+  std::vector<std::uint32_t> cluster;  // in the window in which this scan was the newest
+  std::vector<std::uint8_t> is_kept;   // final verdict: static
+  // By cluster of that window.
+  std::vector<std::uint32_t> ids;
+  // By input point.
+  std::vector<PointLabel> labels;
+  std::vector<std::uint32_t> instances;
+  std::vector<float> beliefs;
+
+  std::size_t non_ground_count() const { return split.count - split.ground_count; }
+
+  ScanVerdict verdict() const {
+    return {scan, time, T_world_sensor, labels, instances, beliefs};
+  }
+};
+
+/// Takes a foreign cloud in: valid points as floats, and a label for each of the others.
+class Ingest {
+ public:
+  /// Points outside [min_range, max_range] (m, horizontal) or without finite coordinates stay out;
+  /// a point at the origin is a beam that did not return.
+  template <class Cloud>
+  void read(const Cloud& cloud, float min_range, float max_range, std::vector<PointLabel>& labels) {
+    using Traits = PointCloudTraits<Cloud>;
+    const std::size_t count = Traits::size(cloud);
+    labels.resize(count);
+    if (input_.size() < count + kLanes) {
+      points_.resize(count + kLanes);
+      input_.resize(count + kLanes);
+    }
+    const float min_squared = min_range * min_range;
+    const float max_squared = max_range * max_range;
+    count_ = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto p = Traits::point(cloud, i);
+      const float x = p.x();
+      const float y = p.y();
+      const float z = p.z();
+      const float squared = x * x + y * y;
+      points_.x[count_] = x;
+      points_.y[count_] = y;
+      points_.z[count_] = z;
+      input_[count_] = static_cast<std::uint32_t>(i);
+      // Comparisons with NaN are false, so that one test admits only good points.
+      const bool good = squared >= min_squared && squared <= max_squared && z - z == 0.0F;
+      if (good && (squared > 0.0F || z != 0.0F)) {
+        ++count_;
+      } else {
+        const bool finite = x - x == 0.0F && y - y == 0.0F && z - z == 0.0F;
+        const bool missing = x == 0.0F && y == 0.0F && z == 0.0F;
+        labels[i] = finite && !missing ? PointLabel::kOutOfRange : PointLabel::kInvalid;
+      }
+    }
+  }
+
+  PointsView points() const { return PointsView(points_).subview(0, count_); }
+  /// Position in the input of each point that was taken in.
+  const std::vector<std::uint32_t>& input() const { return input_; }
+
+ private:
+  std::size_t count_ = 0;
+  PointBuffer points_;
+  std::vector<std::uint32_t> input_;
+};
+
+}  // namespace dynains::detail

@@ -1,0 +1,75 @@
+// Compile-time contracts of the stages: a stage that does not fit fails with one readable line.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+#include <utility>
+
+#include "dynains/cluster_set.hpp"
+#include "dynains/ground_segmenter.hpp"
+#include "dynains/points.hpp"
+#include "dynains/polar_points.hpp"
+
+namespace dynains::detail {
+
+template <class Stage, class = void>
+struct IsConfigurable : std::false_type {};
+template <class Stage>
+struct IsConfigurable<Stage, std::void_t<typename Stage::Config,
+                                         decltype(Stage(std::declval<typename Stage::Config>())),
+                                         decltype(std::declval<typename Stage::Config>().validate())>>
+    : std::true_type {};
+
+template <class Stage, class = void>
+struct IsGround : std::false_type {};
+template <class Stage>
+struct IsGround<Stage, std::void_t<decltype(std::declval<Stage&>().segment(
+                           PointsView(), std::declval<GroundSplit&>()))>> : std::true_type {};
+
+template <class Stage, class = void>
+struct IsClusterer : std::false_type {};
+template <class Stage>
+struct IsClusterer<
+    Stage, std::enable_if_t<
+               std::is_convertible_v<decltype(std::declval<Stage&>().cluster(PolarView())),
+                                     Span<const std::uint32_t>> &&
+               std::is_convertible_v<decltype(std::declval<Stage&>().cluster_count()), std::size_t>>>
+    : std::true_type {};
+
+template <class Stage, class = void>
+struct IsDescriptor : std::false_type {};
+template <class Stage>
+struct IsDescriptor<
+    Stage,
+    std::void_t<decltype(std::declval<Stage&>().describe(std::declval<const ClusterView&>())),
+                decltype(std::declval<Stage&>().describe_rest()),
+                decltype(std::declval<Stage&>().heights(std::size_t{})),
+                decltype(std::declval<Stage&>().cluster_heights()),
+                std::enable_if_t<std::is_convertible_v<
+                    decltype(std::declval<Stage&>().proposes_dynamic()), bool>>>> : std::true_type {
+};
+
+template <class Stage, class = void>
+struct IsBelief : std::false_type {};
+template <class Stage>
+struct IsBelief<
+    Stage, std::void_t<decltype(std::declval<Stage&>().reset()),
+                       decltype(std::declval<Stage&>().update(Span<const float>(),
+                                                              Span<const float>())),
+                       std::enable_if_t<
+                           std::is_convertible_v<decltype(std::declval<Stage&>().posterior()),
+                                                 double> &&
+                           std::is_convertible_v<decltype(std::declval<Stage&>().is_dynamic()),
+                                                 bool>>>> : std::true_type {};
+
+template <class Stage, class = void>
+struct IsMap : std::false_type {};
+template <class Stage>
+struct IsMap<Stage, std::void_t<decltype(std::declval<Stage&>().insert(
+                                    PointsView(), Span<const std::uint8_t>(),
+                                    std::declval<const Eigen::Isometry3d&>())),
+                                decltype(std::declval<Stage&>().clear())>> : std::true_type {};
+
+}  // namespace dynains::detail

@@ -1,0 +1,362 @@
+// DynaInsRemover: scans and poses in, moving instances out, static map kept.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dynains/belief_updater.hpp"
+#include "dynains/cluster_set.hpp"
+#include "dynains/curved_voxel_clusterer.hpp"
+#include "dynains/detail/instance_ids.hpp"
+#include "dynains/detail/scan_slot.hpp"
+#include "dynains/detail/stage_checks.hpp"
+#include "dynains/ground_segmenter.hpp"
+#include "dynains/occupancy_descriptor.hpp"
+#include "dynains/parameters.hpp"
+#include "dynains/point_cloud_traits.hpp"
+#include "dynains/points.hpp"
+#include "dynains/polar_points.hpp"
+#include "dynains/pose.hpp"
+#include "dynains/remover_config.hpp"
+#include "dynains/scan_verdict.hpp"
+#include "dynains/static_map_accumulator.hpp"
+
+namespace dynains {
+
+/// The stages of the pipeline. To swap one, derive from this and re-alias its name.
+struct DefaultStages {
+  using Ground = GroundSegmenter;
+  using Clusterer = CurvedVoxelClusterer;
+  using Descriptor = OccupancyDescriptor;
+  using Belief = BeliefUpdater;
+  using Map = StaticMapAccumulator;
+};
+
+/// Removes moving instances from a stream of scans, one scan at a time.
+///
+/// Owns every buffer; once warm, a frame allocates nothing except when the map grows. Objects are
+/// independent of each other; one object serves one thread at a time.
+template <class Stages = DefaultStages>
+class BasicDynaInsRemover {
+ public:
+  using Ground = typename Stages::Ground;
+  using Clusterer = typename Stages::Clusterer;
+  using Descriptor = typename Stages::Descriptor;
+  using Belief = typename Stages::Belief;
+  using Map = typename Stages::Map;
+
+  static_assert(detail::IsConfigurable<Ground>::value && detail::IsGround<Ground>::value,
+                "Stages::Ground needs Config and segment(PointsView, GroundSplit&)");
+  static_assert(detail::IsConfigurable<Clusterer>::value && detail::IsClusterer<Clusterer>::value,
+                "Stages::Clusterer needs Config, cluster(PolarView) and cluster_count()");
+  static_assert(
+      detail::IsConfigurable<Descriptor>::value && detail::IsDescriptor<Descriptor>::value,
+      "Stages::Descriptor needs Config, describe(ClusterView), describe_rest(), heights(k), "
+      "cluster_heights() and proposes_dynamic()");
+  static_assert(detail::IsConfigurable<Belief>::value && detail::IsBelief<Belief>::value,
+                "Stages::Belief needs Config, reset(), update(heights, heights), posterior() and "
+                "is_dynamic()");
+  static_assert(detail::IsConfigurable<Map>::value && detail::IsMap<Map>::value,
+                "Stages::Map needs Config, insert(PointsView, flags, T_world_sensor) and clear()");
+
+  struct Config : RemoverConfig {
+    typename Ground::Config ground;
+    typename Clusterer::Config clusterer;
+    typename Descriptor::Config descriptor;
+    typename Belief::Config belief;
+    typename Map::Config map;
+
+    /// The paper to the letter, with its published parameters.
+    static Config paper() { return Config(); }
+
+    /// Calls `visitor(name, config)` for the facade's own fields and for those of each stage.
+    template <class Self, class Visitor>
+    static void visit_sections(Self& self, Visitor&& visitor) {
+      using Own = std::conditional_t<std::is_const_v<Self>, const RemoverConfig, RemoverConfig>;
+      visitor("DynaInsRemover", static_cast<Own&>(self));
+      visitor("GroundSegmenter", self.ground);
+      visitor("CurvedVoxelClusterer", self.clusterer);
+      visitor("OccupancyDescriptor", self.descriptor);
+      visitor("BeliefUpdater", self.belief);
+      visitor("StaticMapAccumulator", self.map);
+    }
+
+    /// Calls `visitor` with the Parameter of every field; names are unique over all stages.
+    template <class Self, class Visitor>
+    static void visit(Self& self, Visitor&& visitor) {
+      visit_sections(self, [&visitor](const char*, auto& section) {
+        std::remove_const_t<std::remove_reference_t<decltype(section)>>::visit(section, visitor);
+      });
+    }
+
+    /// Throws ConfigError.
+    void validate() const {
+      visit_sections(*this, [](const char*, const auto& section) { section.validate(); });
+    }
+  };
+
+  BasicDynaInsRemover() : BasicDynaInsRemover(Config()) {}
+
+  /// Throws ConfigError.
+  explicit BasicDynaInsRemover(const Config& config)
+      : config_((config.validate(), config)),
+        ground_(config.ground),
+        clusterer_(config.clusterer),
+        descriptor_(config.descriptor),
+        belief_(config.belief),
+        map_(config.map),
+        ring_(static_cast<std::size_t>(config.window)) {}
+
+  const Config& config() const { return config_; }
+  const Map& map() const { return map_; }
+
+  /// Scans between a push and the final verdict on it.
+  std::size_t latency() const {
+    return config_.votes == 0 ? 0 : static_cast<std::size_t>(config_.window) - 1;
+  }
+
+  /// Takes one scan in.
+  ///
+  /// `cloud`: metres, sensor frame, z up; see PointCloudTraits for what can be passed. Any size,
+  /// any content: bad points get a label of their own. `T_world_sensor`: pose of the sensor at
+  /// that scan. `time`: s, greater than that of the scan before. Throws PoseError, and then leaves
+  /// the state as it was.
+  template <class Cloud>
+  FrameResult push(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor, double time) {
+    validate_pose("T_world_sensor", T_world_sensor);
+    validate_time(time);
+    FrameResult result;
+    StageClock clock;
+
+    ScanSlot& newest = begin_scan(T_world_sensor, time);
+    ingest_.read(cloud, static_cast<float>(config_.min_range),
+                 static_cast<float>(config_.max_range), newest.labels);
+    clock.lap(result.times.ingest);
+
+    ground_.segment(ingest_.points(), newest.split);
+    newest.input.resize(newest.split.count);
+    for (std::size_t i = 0; i < newest.split.count; ++i) {
+      newest.input[i] = ingest_.input()[newest.split.source[i]];
+    }
+    clock.lap(result.times.ground);
+
+    gather_window();
+    clock.lap(result.times.window);
+
+    const Span<const std::uint32_t> cluster_of = clusterer_.cluster(window_.view());
+    clusters_.build(window_.view(), scan_begin_, cluster_of, clusterer_.cluster_count());
+    clock.lap(result.times.cluster);
+
+    judge_clusters();
+    clock.lap(result.times.descriptor);
+
+    record_verdicts(cluster_of);
+    write_verdict(newest, 1);
+    result.newest = newest.verdict();
+    clock.lap(result.times.verdict);
+
+    if (pushed_ - finished_ > latency()) {
+      ScanSlot& oldest = finish_next(clock, result.times);
+      result.finished = oldest.verdict();
+      if (&oldest == &newest) result.newest = newest.verdict();
+    }
+    return result;
+  }
+
+  /// The same with scan numbers for times: 0.1 s from scan to scan.
+  template <class Cloud>
+  FrameResult push(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor) {
+    constexpr double kPeriod = 0.1;
+    return push(cloud, T_world_sensor, pushed_ == 0 ? 0.0 : last_time_ + kPeriod);
+  }
+
+  /// Makes the verdict on all scans final that are still open, oldest first; `sink` is called with
+  /// the ScanVerdict of each. The next push starts a new window.
+  template <class Sink>
+  void flush(Sink&& sink) {
+    while (finished_ < pushed_) {
+      StageClock clock;
+      StageTimes times;
+      sink(std::as_const(finish_next(clock, times)).verdict());
+    }
+    ++segment_;
+  }
+
+  /// Back to the state after construction; buffers keep their capacity.
+  void reset() {
+    map_.clear();
+    pushed_ = 0;
+    finished_ = 0;
+    segment_ = 0;
+  }
+
+ private:
+  using ScanSlot = detail::ScanSlot;
+
+  void validate_time(double time) const {
+    if (!std::isfinite(time) || (pushed_ > 0 && !(time > last_time_))) {
+      throw PoseError("time = " + std::to_string(time) + " s must be finite and greater than " +
+                      (pushed_ > 0 ? std::to_string(last_time_) : std::string("-inf")) +
+                      ", the time of the scan before");
+    }
+  }
+
+  ScanSlot& slot(std::uint64_t scan) { return ring_[scan % ring_.size()]; }
+
+  ScanSlot& begin_scan(const Eigen::Isometry3d& T_world_sensor, double time) {
+    if (pushed_ > 0 && time - last_time_ > config_.max_gap) ++segment_;
+    ScanSlot& newest = slot(pushed_);
+    newest.scan = pushed_;
+    newest.segment = segment_;
+    newest.time = time;
+    newest.T_world_sensor = orthonormalized(T_world_sensor);
+    last_time_ = time;
+    ++pushed_;
+    return newest;
+  }
+
+  // Eq. 3: the non-ground points of the last K scans in the frame of the newest.
+  void gather_window() {
+    const ScanSlot& newest = slot(pushed_ - 1);
+    const auto length = std::min<std::uint64_t>(pushed_, static_cast<std::uint64_t>(config_.window));
+    window_first_ = pushed_ - length;
+    while (slot(window_first_).segment != newest.segment) ++window_first_;
+    window_.clear();
+    scan_begin_.clear();
+    scan_begin_.push_back(0);
+    const Eigen::Isometry3d T_newest_world = newest.T_world_sensor.inverse();
+    for (std::uint64_t scan = window_first_; scan < pushed_; ++scan) {
+      const ScanSlot& source = slot(scan);
+      const Eigen::Isometry3d T_newest_source = T_newest_world * source.T_world_sensor;
+      window_.append(source.split.non_ground(), T_newest_source.cast<float>());
+      scan_begin_.push_back(static_cast<std::uint32_t>(window_.size()));
+    }
+  }
+
+  // Eq. 5-19 for each cluster that the oldest and the newest scan saw; silence means static.
+  void judge_clusters() {
+    verdict_.assign(clusters_.size(), {0.0F, 0});
+    for (std::size_t c = 0; c < clusters_.size(); ++c) {
+      if (!clusters_.comparable(c)) continue;
+      descriptor_.describe(clusters_[c]);
+      if (!descriptor_.proposes_dynamic()) continue;
+      if (!config_.use_belief) {
+        verdict_[c] = {1.0F, 1};
+        continue;
+      }
+      descriptor_.describe_rest();
+      belief_.reset();
+      for (std::size_t k = 0; k < clusters_.scan_count(); ++k) {
+        belief_.update(descriptor_.heights(k), descriptor_.cluster_heights());
+      }
+      verdict_[c] = {static_cast<float>(belief_.posterior()),
+                     static_cast<std::uint8_t>(belief_.is_dynamic() ? 1 : 0)};
+    }
+  }
+
+  // From clusters to the points of every scan in the window.
+  void record_verdicts(Span<const std::uint32_t> cluster_of) {
+    ScanSlot& newest = slot(pushed_ - 1);
+    const std::size_t count = newest.non_ground_count();
+    newest.votes.assign(count, 0);
+    newest.belief.assign(count, 0.0F);
+    const Span<const std::uint32_t> newest_clusters =
+        cluster_of.subspan(cluster_of.size() - count, count);
+    newest.cluster.assign(newest_clusters.begin(), newest_clusters.end());
+    assign_ids(cluster_of, newest);
+
+    for (std::uint64_t scan = window_first_; scan < pushed_; ++scan) {
+      if (config_.votes == 0 && scan + 1 != pushed_) continue;
+      ScanSlot& target = slot(scan);
+      const std::uint32_t* const clusters = cluster_of.data() + scan_begin_[scan - window_first_];
+      for (std::size_t i = 0; i < target.non_ground_count(); ++i) {
+        if (clusters[i] == kNoCluster) continue;
+        const ClusterVerdict& verdict = verdict_[clusters[i]];
+        target.votes[i] = static_cast<std::uint8_t>(target.votes[i] + verdict.dynamic);
+        target.belief[i] = std::max(target.belief[i], verdict.belief);
+      }
+    }
+  }
+
+  void assign_ids(Span<const std::uint32_t> cluster_of, ScanSlot& newest) {
+    Span<const std::uint32_t> old_cluster, old_ids, cluster;
+    if (window_first_ + 1 < pushed_) {
+      const ScanSlot& before = slot(pushed_ - 2);
+      old_cluster = before.cluster;
+      old_ids = before.ids;
+      cluster = cluster_of.subspan(scan_begin_[scan_begin_.size() - 3], old_cluster.size());
+    }
+    instance_ids_.assign(old_cluster, old_ids, cluster, clusters_.size(), newest.ids);
+  }
+
+  // Labels, ids and beliefs by input point; a point with fewer dynamic votes than `votes` stays.
+  void write_verdict(ScanSlot& scan, int votes) {
+    const std::size_t count = scan.labels.size();
+    scan.instances.assign(count, kNoInstance);
+    scan.beliefs.assign(count, 0.0F);
+    const std::vector<std::uint32_t>& input = scan.input;
+    for (std::size_t i = 0; i < scan.split.ground_count; ++i) {
+      scan.labels[input[i]] = PointLabel::kGround;
+    }
+    const std::uint32_t* const source = input.data() + scan.split.ground_count;
+    scan.is_kept.resize(scan.non_ground_count());
+    for (std::size_t i = 0; i < scan.non_ground_count(); ++i) {
+      const bool dynamic = scan.votes[i] >= votes;
+      const std::uint32_t to = source[i];
+      scan.is_kept[i] = dynamic ? 0 : 1;
+      scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
+      scan.instances[to] =
+          scan.cluster[i] == kNoCluster ? kNoInstance : scan.ids[scan.cluster[i]];
+      scan.beliefs[to] = scan.belief[i];
+    }
+  }
+
+  ScanSlot& finish_next(StageClock& clock, StageTimes& times) {
+    ScanSlot& scan = slot(finished_);
+    write_verdict(scan, std::max(1, config_.votes));
+    clock.lap(times.verdict);
+    if (config_.build_map) {
+      map_.insert(scan.split.ground(), {}, scan.T_world_sensor);
+      map_.insert(scan.split.non_ground(), scan.is_kept, scan.T_world_sensor);
+    }
+    clock.lap(times.map);
+    ++finished_;
+    return scan;
+  }
+
+  struct ClusterVerdict {
+    float belief;
+    std::uint8_t dynamic;
+  };
+
+  Config config_;
+  Ground ground_;
+  Clusterer clusterer_;
+  Descriptor descriptor_;
+  Belief belief_;
+  Map map_;
+
+  detail::Ingest ingest_;
+  std::vector<ScanSlot> ring_;
+  PolarBuffer window_;
+  std::vector<std::uint32_t> scan_begin_;
+  ClusterSet clusters_;
+  std::vector<ClusterVerdict> verdict_;
+  detail::InstanceIds instance_ids_;
+
+  std::uint64_t pushed_ = 0;
+  std::uint64_t finished_ = 0;
+  std::uint64_t window_first_ = 0;
+  std::uint64_t segment_ = 0;
+  double last_time_ = 0.0;
+};
+
+using DynaInsRemover = BasicDynaInsRemover<>;
+
+}  // namespace dynains

@@ -1,0 +1,101 @@
+// How foreign clouds come in. Specialise PointCloudTraits for a type of your own:
+//
+//   template <> struct dynains::PointCloudTraits<MyCloud> {
+//     static std::size_t size(const MyCloud& cloud);
+//     static Eigen::Vector3f point(const MyCloud& cloud, std::size_t i);  // metres, sensor frame
+//   };
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <type_traits>
+#include <vector>
+
+#include "dynains/points.hpp"
+
+namespace dynains {
+
+template <class Cloud, class Enable = void>
+struct PointCloudTraits;
+
+/// Interleaved coordinates that somebody else owns: x, y, z first, then `stride - 3` values that
+/// are skipped, for example float x y z intensity with stride 4.
+template <class Scalar>
+struct RawPoints {
+  static_assert(std::is_floating_point_v<Scalar>, "coordinates are float or double");
+
+  const Scalar* data;
+  std::size_t count;
+  std::size_t stride = 3;  ///< scalars from one point to the next, at least 3
+};
+
+template <class Scalar>
+RawPoints(const Scalar*, std::size_t, std::size_t) -> RawPoints<Scalar>;
+template <class Scalar>
+RawPoints(const Scalar*, std::size_t) -> RawPoints<Scalar>;
+
+template <class Scalar>
+struct PointCloudTraits<RawPoints<Scalar>> {
+  static std::size_t size(const RawPoints<Scalar>& cloud) { return cloud.count; }
+  static Eigen::Vector3f point(const RawPoints<Scalar>& cloud, std::size_t i) {
+    const Scalar* const p = cloud.data + i * cloud.stride;
+    return {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
+  }
+};
+
+template <>
+struct PointCloudTraits<PointsView> {
+  static std::size_t size(const PointsView& cloud) { return cloud.size(); }
+  static Eigen::Vector3f point(const PointsView& cloud, std::size_t i) {
+    return {cloud.x[i], cloud.y[i], cloud.z[i]};
+  }
+};
+
+namespace detail {
+
+template <class Matrix>
+inline constexpr bool kIsPointMatrix = Matrix::RowsAtCompileTime == 3 ||
+                                       Matrix::RowsAtCompileTime == 4 ||
+                                       Matrix::ColsAtCompileTime == 3 ||
+                                       Matrix::ColsAtCompileTime == 4;
+
+}  // namespace detail
+
+/// Dense Eigen matrices, maps and blocks: a point per column if there are 3 or 4 rows at compile
+/// time, else a point per row if there are 3 or 4 columns. A fourth coordinate is ignored.
+template <class Matrix>
+struct PointCloudTraits<
+    Matrix, std::enable_if_t<std::is_base_of_v<Eigen::MatrixBase<Matrix>, Matrix> &&
+                             detail::kIsPointMatrix<Matrix>>> {
+  static constexpr bool kColumns =
+      Matrix::RowsAtCompileTime == 3 || Matrix::RowsAtCompileTime == 4;
+
+  static std::size_t size(const Matrix& cloud) {
+    return static_cast<std::size_t>(kColumns ? cloud.cols() : cloud.rows());
+  }
+  static Eigen::Vector3f point(const Matrix& cloud, std::size_t i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    if constexpr (kColumns) {
+      return {static_cast<float>(cloud(0, at)), static_cast<float>(cloud(1, at)),
+              static_cast<float>(cloud(2, at))};
+    } else {
+      return {static_cast<float>(cloud(at, 0)), static_cast<float>(cloud(at, 1)),
+              static_cast<float>(cloud(at, 2))};
+    }
+  }
+};
+
+/// Vectors of fixed-size Eigen vectors with at least three coordinates.
+template <class Scalar, int kRows, int kOptions, class Allocator>
+struct PointCloudTraits<
+    std::vector<Eigen::Matrix<Scalar, kRows, 1, kOptions, kRows, 1>, Allocator>> {
+  static_assert(kRows >= 3, "a point needs three coordinates");
+  using Cloud = std::vector<Eigen::Matrix<Scalar, kRows, 1, kOptions, kRows, 1>, Allocator>;
+
+  static std::size_t size(const Cloud& cloud) { return cloud.size(); }
+  static Eigen::Vector3f point(const Cloud& cloud, std::size_t i) {
+    return cloud[i].template head<3>().template cast<float>();
+  }
+};
+
+}  // namespace dynains

@@ -1,0 +1,51 @@
+// The facade's own parameters; those of the stages stand beside the stages.
+#pragma once
+
+#include <string>
+
+#include "dynains/parameters.hpp"
+
+namespace dynains {
+
+/// How the window slides and which points take part.
+struct RemoverConfig {
+  int window = 4;          ///< scans in the sliding window, K
+  bool use_belief = true;  ///< false: initial proposals are verdicts (the paper's IOC-only rows)
+  int votes = 1;           ///< windows, of the K that see a scan, that must call a point dynamic
+  double min_range = 2.7;  ///< m, horizontal; nearer points are the robot's own
+  double max_range = 250;  ///< m, horizontal; farther points are not measurements
+  double max_gap = 1.0;    ///< s; a longer pause between scans starts a new window
+  bool build_map = true;   ///< false: labels only, the map stays empty
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& visitor) {
+    visitor(Parameter{"window", self.window, closed(2, 64), "scans", "sliding window K (Eq. 3)"});
+    visitor(Parameter{"use_belief", self.use_belief, Bounds(), "",
+                      "revert proposals by belief (Eq. 13-19); off is the paper's IOC-only row"});
+    visitor(Parameter{"votes", self.votes, closed(0, 64), "windows",
+                      "windows that must call a point dynamic for the final verdict; 0: the newest "
+                      "window alone decides, without latency"});
+    visitor(Parameter{"min_range", self.min_range, closed(0, 100), "m",
+                      "nearer points (horizontally) are the robot's own and not judged"});
+    visitor(Parameter{"max_range", self.max_range, half_open_below(0, 10000), "m",
+                      "farther points (horizontally) are not judged"});
+    visitor(Parameter{"max_gap", self.max_gap, half_open_below(0, 1e9), "s",
+                      "a longer pause between two scans starts a new window"});
+    visitor(Parameter{"build_map", self.build_map, Bounds(), "", "accumulate the static map"});
+  }
+
+  /// Throws ConfigError.
+  void validate() const {
+    validate_parameters("DynaInsRemover", *this);
+    if (!(min_range < max_range)) {
+      throw ConfigError("DynaInsRemover.min_range = " + std::to_string(min_range) +
+                        " must be less than max_range = " + std::to_string(max_range));
+    }
+    if (votes > window) {
+      throw ConfigError("DynaInsRemover.votes = " + std::to_string(votes) +
+                        " must be at most window = " + std::to_string(window));
+    }
+  }
+};
+
+}  // namespace dynains

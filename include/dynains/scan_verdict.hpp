@@ -1,0 +1,31 @@
+// What the remover says about one scan.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+
+#include "dynains/points.hpp"
+#include "dynains/stage_times.hpp"
+
+namespace dynains {
+
+/// Verdict on every point of one scan, in the order of the input. Views hold until the next call
+/// of the remover.
+struct ScanVerdict {
+  std::uint64_t scan = 0;  ///< number of the push, from 0
+  double time = 0.0;       ///< s, as pushed
+  Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+  Span<const PointLabel> labels;
+  Span<const std::uint32_t> instances;  ///< kNoInstance for ground and points without a cluster
+  Span<const float> beliefs;            ///< probability of being dynamic, [0, 1]; 0 if never proposed
+};
+
+/// Answer to one scan.
+struct FrameResult {
+  ScanVerdict newest;                   ///< what the past alone says of the scan just pushed
+  std::optional<ScanVerdict> finished;  ///< the scan, if any, whose verdict is now final
+  StageTimes times;
+};
+
+}  // namespace dynains

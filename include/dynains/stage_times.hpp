@@ -1,0 +1,49 @@
+// Where the time of one frame went.
+#pragma once
+
+#include <chrono>
+
+namespace dynains {
+
+/// Milliseconds per stage of one call.
+struct StageTimes {
+  double ingest = 0.0;      ///< copying the cloud, sorting out bad points
+  double ground = 0.0;      ///< ground segmentation
+  double window = 0.0;      ///< Eq. 3
+  double cluster = 0.0;     ///< curved voxels and separation, Eq. 4
+  double descriptor = 0.0;  ///< Eq. 5-12 and, for proposals, the belief of Eq. 13-19
+  double verdict = 0.0;     ///< from clusters to points
+  double map = 0.0;         ///< Eq. 1
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& visitor) {
+    visitor("ingest", self.ingest);
+    visitor("ground", self.ground);
+    visitor("window", self.window);
+    visitor("cluster", self.cluster);
+    visitor("descriptor", self.descriptor);
+    visitor("verdict", self.verdict);
+    visitor("map", self.map);
+  }
+
+  double total() const {
+    double result = 0.0;
+    visit(*this, [&result](const char*, double milliseconds) { result += milliseconds; });
+    return result;
+  }
+};
+
+/// Adds the time since the last lap to a field of StageTimes.
+class StageClock {
+ public:
+  void lap(double& milliseconds) {
+    const auto now = std::chrono::steady_clock::now();
+    milliseconds += std::chrono::duration<double, std::milli>(now - last_).count();
+    last_ = now;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace dynains
