@@ -1,0 +1,87 @@
+#include "eval.hpp"
+
+#include <iostream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/evaluation/evaluate.hpp"
+#include "dynains/evaluation/report.hpp"
+#include "dynains/io/point_file.hpp"
+#include "evaluation_options.hpp"
+#include "labelled_sequence.hpp"
+
+namespace dynains::program {
+namespace {
+
+struct EvalOptions {
+  explicit EvalOptions(CLI::App& command) : evaluation(command, "ignore") {}
+
+  std::string sequence;
+  std::vector<std::string> runs;
+  std::vector<std::string> maps;
+  ScanWindow window;
+  EvaluationOptions evaluation;
+  bool online = false;
+  bool errors = false;
+  std::string json;
+  std::string csv;
+};
+
+void eval(const EvalOptions& options) {
+  const evaluation::EvaluationConfig config = options.evaluation.config();
+  if (options.runs.size() > evaluation::kMaxEstimates) {
+    throw ConfigError("at most " + std::to_string(evaluation::kMaxEstimates) +
+                      " runs can be evaluated at once, not " + std::to_string(options.runs.size()));
+  }
+
+  std::vector<RunLabels> runs;
+  std::vector<std::string> names;
+  for (const std::string& folder : options.runs) {
+    runs.push_back({folder, options.online ? "online" : "labels"});
+    names.push_back(options.runs.size() > 1 ? folder : options.online ? "online" : "run");
+  }
+
+  std::vector<PointFile> map_files;
+  std::vector<evaluation::MapEstimate> maps;
+  for (const std::string& path : options.maps) map_files.push_back(read_points(path));
+  for (std::size_t m = 0; m < map_files.size(); ++m) {
+    maps.push_back(
+        {std::filesystem::path(options.maps[m]).filename().string(), map_files[m].positions});
+  }
+
+  LabelledSequence sequence(options.sequence, options.window, runs);
+  const auto source = [&](std::size_t i, evaluation::LabelledScan& scan) {
+    return sequence.read(i, scan);
+  };
+  const evaluation::Evaluation result = evaluation::evaluate(source, names, maps, config);
+
+  if (!options.json.empty()) write_text_file(options.json, evaluation::to_json(result));
+  if (!options.csv.empty()) write_text_file(options.csv, evaluation::to_csv(result));
+  std::cout << evaluation::to_table(result);
+  if (options.errors) std::cout << '\n' << evaluation::errors_to_table(result);
+}
+
+}  // namespace
+
+void add_eval_command(CLI::App& program) {
+  CLI::App& command = *program.add_subcommand(
+      "eval",
+      "Judge runs or maps of any tool by a labelled sequence: PR, RR, F1 and SA, DA, AA, HA");
+  const auto options = std::make_shared<EvalOptions>(command);
+  command.add_option("sequence", options->sequence, "labelled sequence (SemanticKITTI folder)")
+      ->required();
+  command.add_option("runs", options->runs, "output folders of `dynains run`");
+  command.add_option("--map", options->maps,
+                     "map file to judge (PLY or PCD, world frame of the poses); can be repeated");
+  add_window_options(command, options->window);
+  command.add_flag("--online", options->online, "judge the zero-latency labels, OUT/online");
+  command.add_flag("--errors", options->errors,
+                   "also tell where the first run went wrong: by class, instance, range and cause");
+  command.add_option("--json", options->json, "write everything to this file, errors included");
+  command.add_option("--csv", options->csv, "write the table to this file");
+  command.callback([options] { eval(*options); });
+}
+
+}  // namespace dynains::program

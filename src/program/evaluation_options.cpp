@@ -1,0 +1,58 @@
+#include "evaluation_options.hpp"
+
+#include <algorithm>
+#include <type_traits>
+#include <utility>
+
+#include "dynains/io/atomic_file.hpp"
+
+namespace dynains::program {
+
+EvaluationOptions::EvaluationOptions(CLI::App& command, std::string unlabeled)
+    : unlabeled_(std::move(unlabeled)) {
+  using evaluation::EvaluationConfig;
+  EvaluationConfig::visit(config_, [&](const auto& parameter) {
+    std::string name = parameter.name;
+    if (name == "max_range" || name == "point_max_range") return;
+    std::replace(name.begin(), name.end(), '_', '-');
+    command.add_option("--" + name, parameter.value, std::string(parameter.help) + " [m]")
+        ->capture_default_str();
+  });
+  max_range_option_ = command.add_option(
+      "--max-range", max_range_,
+      "points at a larger planar range are not judged, 0 = no limit [m] (PR and RR: 0; SA, DA and "
+      "error analysis: 50)");
+  command
+      .add_option("--classes", classes_,
+                  "dynamic class ids of the ground truth, for example 252-257,259")
+      ->capture_default_str();
+  command
+      .add_option("--unlabeled", unlabeled_,
+                  "points of class 0 and 1: ignore them, or count them as static as the published "
+                  "tables do")
+      ->check(CLI::IsMember({"ignore", "static"}))
+      ->capture_default_str();
+}
+
+evaluation::EvaluationConfig EvaluationOptions::config() const {
+  evaluation::EvaluationConfig config = config_;
+  if (max_range_option_->count() > 0) config.max_range = config.point_max_range = max_range_;
+  config.truth =
+      evaluation::TruthClasses(classes_, unlabeled_ == "static" ? evaluation::Unlabeled::kStatic
+                                                                : evaluation::Unlabeled::kIgnore);
+  config.validate();
+  return config;
+}
+
+void add_window_options(CLI::App& command, ScanWindow& window) {
+  command.add_option("--start", window.start, "number of the first scan");
+  command.add_option("--end", window.end, "number of the last scan (inclusive)");
+}
+
+void write_text_file(const std::string& path, const std::string& text) {
+  AtomicFile file(path);
+  file.stream() << text;
+  file.commit();
+}
+
+}  // namespace dynains::program

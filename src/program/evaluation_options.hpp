@@ -1,0 +1,35 @@
+// The options that every evaluating command shares.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+
+#include "dynains/evaluation/evaluate.hpp"
+#include "labelled_sequence.hpp"
+
+namespace dynains::program {
+
+/// Adds itself to a command and gives, after parsing, what to evaluate with.
+class EvaluationOptions {
+ public:
+  /// `unlabeled`: the command's default for points without a class, "ignore" or "static".
+  EvaluationOptions(CLI::App& command, std::string unlabeled);
+
+  evaluation::EvaluationConfig config() const;
+
+ private:
+  evaluation::EvaluationConfig config_;
+  double max_range_ = 0;
+  CLI::Option* max_range_option_;
+  std::string classes_ = "252-259";
+  std::string unlabeled_;
+};
+
+/// `--start` and `--end`.
+void add_window_options(CLI::App& command, ScanWindow& window);
+
+/// Writes text to a file, whole or not at all. Throws IoError.
+void write_text_file(const std::string& path, const std::string& text);
+
+}  // namespace dynains::program

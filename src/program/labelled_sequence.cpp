@@ -1,0 +1,94 @@
+#include "labelled_sequence.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <utility>
+
+#include "dynains/errors.hpp"
+
+namespace dynains::program {
+namespace fs = std::filesystem;
+
+LabelledSequence::LabelledSequence(const fs::path& folder, const ScanWindow& window,
+                                   std::vector<RunLabels> runs)
+    : sequence_(folder), runs_(std::move(runs)) {
+  if (!sequence_.has_labels()) {
+    throw IoError((folder / "labels").string() +
+                  ": no ground truth; expected one NNNNNN.label (uint32 a point) for each scan");
+  }
+  const bool chosen = window.start || window.end;
+  const auto inside = [&](std::size_t index) {
+    const std::size_t number = std::stoul(sequence_.name(index));
+    if (chosen) return number >= window.start.value_or(0) && number <= window.end.value_or(number);
+    return every_run_has(index);
+  };
+  while (first_ < sequence_.size() && !inside(first_)) ++first_;
+  last_ = sequence_.size();
+  while (last_ > first_ && !inside(last_ - 1)) --last_;
+  if (first_ == last_) {
+    throw IoError(chosen ? folder.string() + ": no scan within the chosen window"
+                         : (runs_.front().folder / runs_.front().kind).string() +
+                               ": no labels for any scan of " + folder.string());
+  }
+}
+
+bool LabelledSequence::every_run_has(std::size_t index) const {
+  return std::all_of(runs_.begin(), runs_.end(), [&](const RunLabels& run) {
+    return fs::exists(run.folder / run.kind / (sequence_.name(index) + ".label"));
+  });
+}
+
+bool LabelledSequence::read(std::size_t i, evaluation::LabelledScan& scan) {
+  if (i >= size()) return false;
+  const std::size_t index = first_ + i;
+  sequence_.read_scan(index, xyzi_);
+  truth_ = sequence_.read_labels(index);
+  in_map_.assign(runs_.empty() ? 0 : truth_.size(), 0);
+  instances_.clear();
+  causes_.clear();
+  for (std::size_t run = 0; run < runs_.size(); ++run) read_run(run, sequence_.name(index));
+  if (!runs_.empty() && runs_.front().kind == "labels") read_causes(sequence_.name(index));
+
+  scan.xyz = xyzi_.data();
+  scan.stride = 4;
+  scan.T_world_sensor = sequence_.T_world_sensor(index);
+  scan.time = sequence_.time(index);
+  scan.truth = truth_;
+  scan.in_map = in_map_;
+  scan.instances = instances_;
+  scan.causes = causes_;
+  return true;
+}
+
+void LabelledSequence::read_run(std::size_t run, const std::string& name) {
+  const fs::path file = runs_[run].folder / runs_[run].kind / (name + ".label");
+  const std::vector<std::uint32_t> labels = read_labels(file, truth_.size());
+  if (run == 0) instances_.resize(labels.size());
+  for (std::size_t p = 0; p < labels.size(); ++p) {
+    const std::uint32_t id = labels[p] & 0xffffU;
+    if (id != kRunStatic && id != kRunMoving && id != kRunNotJudged) {
+      throw IoError(file.string() + ": point " + std::to_string(p) + " has class " +
+                    std::to_string(id) + "; expected 9 (static), 251 (moving) or 0 (not judged)");
+    }
+    if (id == kRunStatic) in_map_[p] = static_cast<std::uint8_t>(in_map_[p] | (1U << run));
+    if (run == 0) instances_[p] = labels[p] >> 16U;
+  }
+}
+
+void LabelledSequence::read_causes(const std::string& name) {
+  const fs::path file = runs_.front().folder / "causes" / (name + ".cause");
+  if (!fs::exists(file)) return;
+  if (fs::file_size(file) != truth_.size()) {
+    throw IoError(file.string() + ": " + std::to_string(fs::file_size(file)) +
+                  " bytes; expected one for each of the scan's " + std::to_string(truth_.size()) +
+                  " points");
+  }
+  causes_.resize(truth_.size());
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream.read(reinterpret_cast<char*>(causes_.data()),
+                   static_cast<std::streamsize>(causes_.size()))) {
+    throw IoError(file.string() + ": cannot be read");
+  }
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,68 @@
+// A window of a KITTI sequence with ground truth and, optionally, the labels of runs over it, as
+// the evaluation wants it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dynains/evaluation/scan.hpp"
+#include "dynains/io/kitti.hpp"
+
+namespace dynains::program {
+
+/// Class ids that `dynains run` writes (SemanticKITTI-MOS).
+inline constexpr std::uint32_t kRunNotJudged = 0;
+inline constexpr std::uint32_t kRunStatic = 9;
+inline constexpr std::uint32_t kRunMoving = 251;
+
+/// Scan numbers, both inclusive; an empty end is the sequence's own.
+struct ScanWindow {
+  std::optional<std::size_t> start;
+  std::optional<std::size_t> end;
+};
+
+/// Folder of one run and the subfolder of the labels to judge.
+struct RunLabels {
+  std::filesystem::path folder;  ///< OUT of `dynains run`
+  std::string kind = "labels";   ///< or "online"
+};
+
+/// Reads scan by scan; holds one scan at a time.
+class LabelledSequence {
+ public:
+  /// Opens the sequence and chooses its scans: those within `window`; without a window, from the
+  /// first to the last scan that every run has labels for. Throws IoError if the sequence has no
+  /// ground truth, or no scan is left.
+  LabelledSequence(const std::filesystem::path& folder, const ScanWindow& window,
+                   std::vector<RunLabels> runs = {});
+
+  const KittiSequence& sequence() const { return sequence_; }
+  std::size_t size() const { return last_ - first_; }
+  /// Index within sequence() of scan i of the window.
+  std::size_t index(std::size_t i) const { return first_ + i; }
+
+  /// evaluation::ScanSource over the window. Throws IoError for files that are missing, that do not
+  /// match the scan, or that hold labels no run writes.
+  bool read(std::size_t i, evaluation::LabelledScan& scan);
+
+ private:
+  bool every_run_has(std::size_t index) const;
+  void read_run(std::size_t run, const std::string& name);
+  void read_causes(const std::string& name);
+
+  KittiSequence sequence_;
+  std::vector<RunLabels> runs_;
+  std::size_t first_ = 0;  // half-open range within sequence_
+  std::size_t last_ = 0;
+  std::vector<float> xyzi_;
+  std::vector<std::uint32_t> truth_;
+  std::vector<std::uint8_t> in_map_;
+  std::vector<std::uint32_t> instances_;  // of run 0
+  std::vector<std::uint8_t> causes_;      // of run 0
+};
+
+}  // namespace dynains::program
