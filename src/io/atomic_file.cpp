@@ -66,6 +66,12 @@ class AtomicFile::Buffer : public std::streambuf {
     return traits_type::not_eof(c);
   }
 
+  /// Absolute positions only: enough to complete a header at the end.
+  pos_type seekpos(pos_type position, std::ios_base::openmode) override {
+    if (sync() != 0 || ::lseek(descriptor_, position, SEEK_SET) < 0) return pos_type(off_type(-1));
+    return position;
+  }
+
   int sync() override {
     const char* next = pbase();
     while (error_ == 0 && next != pptr()) {

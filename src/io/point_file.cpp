@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cstring>
+#include <limits>
 #include <ostream>
 #include <string>
 
@@ -31,22 +32,20 @@ Format known_format_of(const fs::path& path) {
   return format;
 }
 
-void write_ply_header(std::ostream& out, std::size_t count, const PointColumns& columns) {
-  const char* coordinate = columns.double_xyz ? "double" : "float";
-  out << "ply\nformat binary_little_endian 1.0\nelement vertex " << count << '\n';
-  for (const char* axis : {"x", "y", "z"}) out << "property " << coordinate << ' ' << axis << '\n';
-  if (columns.intensity) out << "property float intensity\n";
-  if (columns.rgb) {
-    for (const char* colour : {"red", "green", "blue"}) out << "property uchar " << colour << '\n';
-  }
-  if (columns.label) out << "property uint label\n";
-  out << "end_header\n";
+std::string ply_header(std::size_t count, const PointColumns& columns, const std::string& padding) {
+  const std::string coordinate = columns.double_xyz ? "double" : "float";
+  std::string text = "ply\nformat binary_little_endian 1.0\ncomment dynains" + padding +
+                     "\nelement vertex " + std::to_string(count) + '\n';
+  for (const char* axis : {"x", "y", "z"}) text += "property " + coordinate + ' ' + axis + '\n';
+  if (columns.intensity) text += "property float intensity\n";
+  if (columns.rgb) text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  if (columns.label) text += "property uint label\n";
+  return text + "end_header\n";
 }
 
-void write_pcd_header(std::ostream& out, std::size_t count, const PointColumns& columns) {
-  const char* coordinate_size = columns.double_xyz ? " 8 8 8" : " 4 4 4";
+std::string pcd_header(std::size_t count, const PointColumns& columns, const std::string& padding) {
   std::string fields = "FIELDS x y z";
-  std::string sizes = std::string("SIZE") + coordinate_size;
+  std::string sizes = columns.double_xyz ? "SIZE 8 8 8" : "SIZE 4 4 4";
   std::string types = "TYPE F F F";
   std::string counts = "COUNT 1 1 1";
   const auto add = [&](const char* name, const char* type) {
@@ -58,12 +57,10 @@ void write_pcd_header(std::ostream& out, std::size_t count, const PointColumns& 
   if (columns.intensity) add("intensity", "F");
   if (columns.rgb) add("rgb", "F");
   if (columns.label) add("label", "U");
-  out << "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n"
-      << fields << '\n'
-      << sizes << '\n'
-      << types << '\n'
-      << counts << "\nWIDTH " << count << "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " << count
-      << "\nDATA binary\n";
+  const std::string size = std::to_string(count);
+  return "# .PCD v0.7 - Point Cloud Data file format\n# dynains" + padding + "\nVERSION 0.7\n" +
+         fields + '\n' + sizes + '\n' + types + '\n' + counts + "\nWIDTH " + size +
+         "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + size + "\nDATA binary\n";
 }
 
 /// One record, packed.
@@ -85,14 +82,17 @@ class Record {
 
 }  // namespace
 
-PointFileWriter::PointFileWriter(const fs::path& path, std::size_t count,
-                                 const PointColumns& columns)
-    : path_(path),
-      columns_(columns),
-      pcd_(known_format_of(path) == Format::kPcd),
-      count_(count),
-      file_(path) {
-  (pcd_ ? write_pcd_header : write_ply_header)(file_.stream(), count, columns);
+PointFileWriter::PointFileWriter(const fs::path& path, const PointColumns& columns)
+    : columns_(columns), pcd_(known_format_of(path) == Format::kPcd), file_(path) {
+  file_.stream() << header();
+}
+
+/// Of the same length for every number of points: a comment takes up the difference.
+std::string PointFileWriter::header() const {
+  const auto text = pcd_ ? pcd_header : ply_header;
+  constexpr std::size_t kMost = std::numeric_limits<std::size_t>::max();
+  const std::size_t length = text(kMost, columns_, "").size();
+  return text(size_, columns_, std::string(length - text(size_, columns_, "").size(), '.'));
 }
 
 void PointFileWriter::add(const FilePoint& point) {
@@ -114,14 +114,12 @@ void PointFileWriter::add(const FilePoint& point) {
   }
   if (columns_.label) record.put(point.label);
   record.write_to(file_.stream());
-  ++added_;
+  ++size_;
 }
 
 void PointFileWriter::commit() {
-  if (added_ != count_) {
-    fail(path_,
-         "expected " + std::to_string(count_) + " points to write, got " + std::to_string(added_));
-  }
+  file_.stream().seekp(0);
+  file_.stream() << header();
   file_.commit();
 }
 

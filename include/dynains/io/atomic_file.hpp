@@ -18,7 +18,8 @@ class AtomicFile {
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// Buffered binary stream into the temporary. Failures may be left to `commit()`.
+  /// Buffered binary stream into the temporary; `seekp(position)` works. Failures may be left to
+  /// `commit()`.
   std::ostream& stream() { return stream_; }
 
   /// Flushes to the disk and puts the file in place. Throws IoError if anything could not be

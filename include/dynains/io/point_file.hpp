@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "dynains/io/atomic_file.hpp"
@@ -32,24 +33,25 @@ struct PointColumns {
   bool label = false;       ///< uint32 `label`
 };
 
-/// Writes a binary point file, point by point. It appears whole, at `commit()`, or not at all.
+/// Writes a binary point file, point by point: nothing is kept in memory, and the number of points
+/// need not be known before. The file appears whole, at `commit()`, or not at all.
 class PointFileWriter {
  public:
-  /// The format follows from the extension, .ply or .pcd. `count` points must be added.
+  /// The format follows from the extension, .ply or .pcd.
   /// Throws IoError for another extension or if the folder cannot be written.
-  PointFileWriter(const std::filesystem::path& path, std::size_t count,
-                  const PointColumns& columns = {});
+  explicit PointFileWriter(const std::filesystem::path& path, const PointColumns& columns = {});
 
   void add(const FilePoint& point);
-  /// Throws IoError if points are missing or too many, or the disk does not take them.
+  std::size_t size() const { return size_; }
+  /// Throws IoError if the disk did not take everything.
   void commit();
 
  private:
-  std::filesystem::path path_;
+  std::string header() const;
+
   PointColumns columns_;
   bool pcd_;
-  std::size_t count_;
-  std::size_t added_ = 0;
+  std::size_t size_ = 0;
   AtomicFile file_;
 };
 
