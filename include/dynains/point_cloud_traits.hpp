@@ -53,20 +53,19 @@ struct PointCloudTraits<PointsView> {
 
 namespace detail {
 
-template <class Matrix>
-inline constexpr bool kIsPointMatrix = Matrix::RowsAtCompileTime == 3 ||
-                                       Matrix::RowsAtCompileTime == 4 ||
-                                       Matrix::ColsAtCompileTime == 3 ||
-                                       Matrix::ColsAtCompileTime == 4;
+template <class Cloud, class = void>
+struct IsPointMatrix : std::false_type {};
+template <class Cloud>
+struct IsPointMatrix<Cloud, std::enable_if_t<std::is_base_of_v<Eigen::MatrixBase<Cloud>, Cloud>>>
+    : std::bool_constant<Cloud::RowsAtCompileTime == 3 || Cloud::RowsAtCompileTime == 4 ||
+                         Cloud::ColsAtCompileTime == 3 || Cloud::ColsAtCompileTime == 4> {};
 
 }  // namespace detail
 
 /// Dense Eigen matrices, maps and blocks: a point per column if there are 3 or 4 rows at compile
 /// time, else a point per row if there are 3 or 4 columns. A fourth coordinate is ignored.
 template <class Matrix>
-struct PointCloudTraits<
-    Matrix, std::enable_if_t<std::is_base_of_v<Eigen::MatrixBase<Matrix>, Matrix> &&
-                             detail::kIsPointMatrix<Matrix>>> {
+struct PointCloudTraits<Matrix, std::enable_if_t<detail::IsPointMatrix<Matrix>::value>> {
   static constexpr bool kColumns =
       Matrix::RowsAtCompileTime == 3 || Matrix::RowsAtCompileTime == 4;
 

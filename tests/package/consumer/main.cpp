@@ -1,37 +1,58 @@
-// What a stranger would write first: a few scans through the package, and a look at the answer.
+// What a stranger would write first: a few scans of a still street through the package.
+#include <cmath>
+#include <cstddef>
 #include <cstdio>
+#include <vector>
 
-#include "dynains/parameters.hpp"
-#include "dynains/points.hpp"
+#include "dynains/dyna_ins_remover.hpp"
 #include "dynains/version.hpp"
 
 namespace {
 
-struct Settings {
-  double resolution = 0.1;
-
-  template <class Self, class Visitor>
-  static void visit(Self& self, Visitor&& visitor) {
-    visitor(dynains::Parameter{"resolution", self.resolution, dynains::open(0.0, 1.0), "m", ""});
+// Flat ground 1.73 m below the sensor, and a wall 8 m to the left of it; m, sensor frame.
+std::vector<Eigen::Vector3f> make_street() {
+  std::vector<Eigen::Vector3f> points;
+  for (float radius = 3.0F; radius < 20.0F; radius += 0.5F) {
+    for (float azimuth = -3.1F; azimuth < 3.1F; azimuth += 0.02F) {
+      points.emplace_back(radius * std::cos(azimuth), radius * std::sin(azimuth), -1.73F);
+    }
   }
-};
-
-bool refuses(double resolution) {
-  try {
-    dynains::validate_parameters("Settings", Settings{resolution});
-  } catch (const dynains::ConfigError&) {
-    return true;
+  for (float x = -10.0F; x < 10.0F; x += 0.1F) {
+    for (float z = -1.5F; z < 1.5F; z += 0.1F) points.emplace_back(x, 8.0F, z);
   }
-  return false;
+  return points;
+}
+
+std::size_t count_static(const dynains::ScanVerdict& verdict) {
+  std::size_t count = 0;
+  for (const dynains::PointLabel label : verdict.labels) count += dynains::is_static(label) ? 1 : 0;
+  return count;
 }
 
 }  // namespace
 
 int main() {
-  dynains::PointBuffer points;
-  points.push_back(1.0F, 2.0F, 3.0F);
-  const dynains::PointsView view = points;
-  const bool works = view.size() == 1 && view.y[0] == 2.0F && refuses(2.0) && !refuses(0.5);
-  std::printf("dynains %s: %s\n", dynains::kVersionString, works ? "works" : "fails");
+  const std::vector<Eigen::Vector3f> street = make_street();
+  constexpr std::size_t kScans = 12;
+  std::size_t finished = 0;
+  std::size_t kept = 0;
+  const auto finish = [&](const dynains::ScanVerdict& verdict) {
+    ++finished;
+    kept += count_static(verdict);
+  };
+
+  dynains::DynaInsRemover remover(dynains::DynaInsRemover::Config::paper());
+  for (std::size_t scan = 0; scan < kScans; ++scan) {
+    const double time = 0.1 * static_cast<double>(scan);
+    const auto result = remover.push(street, Eigen::Isometry3d::Identity(), time);
+    if (result.finished) finish(*result.finished);
+  }
+  remover.flush(finish);
+
+  const bool works =
+      finished == kScans && kept == kScans * street.size() && remover.map().size() > 0;
+  std::printf("dynains %s: %zu scans, %zu of %zu points kept, %zu in the map\n",
+              dynains::kVersionString, finished, kept, kScans * street.size(),
+              remover.map().size());
   return works ? 0 : 1;
 }
