@@ -1,0 +1,147 @@
+#include "simulation/beams.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "simulation/random.hpp"
+
+namespace dynains::simulation {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kDegree = kPi / 180;
+
+/// `count` elevations from `top` downwards, degrees.
+void append_rings(std::vector<double>& elevations, double top, double step, int count) {
+  for (int i = 0; i < count; ++i) elevations.push_back((top - step * i) * kDegree);
+}
+
+}  // namespace
+
+SensorModel sensor_model(Sensor sensor) {
+  SensorModel model;
+  auto set = [&model](int columns, double height, double max_range, double min_range,
+                      double dark_range) {
+    model.columns = columns;
+    model.height = height;
+    model.max_range = max_range;
+    model.min_range = min_range;
+    model.dark_range = dark_range;
+  };
+  switch (sensor) {
+    case Sensor::kHdl64:
+      append_rings(model.elevations, 2.0, 1.0 / 3.0, 32);
+      append_rings(model.elevations, -8.83, 0.5, 32);
+      set(2083, 1.73, 120, 0.9, 50);
+      break;
+    case Sensor::kVlp16:
+      append_rings(model.elevations, 15, 2, 16);
+      set(1800, 1.2, 100, 0.5, 40);
+      break;
+    case Sensor::kHdl32:
+      append_rings(model.elevations, 10.67, 4.0 / 3.0, 32);
+      set(2083, 1.85, 100, 0.9, 45);
+      break;
+    case Sensor::kOs1_64:
+      append_rings(model.elevations, 22.5, 45.0 / 63, 64);
+      set(1024, 1.5, 100, 0.5, 45);
+      break;
+    case Sensor::kOs0_128:
+      append_rings(model.elevations, 45, 90.0 / 127, 128);
+      set(1024, 1.5, 50, 0.3, 20);
+      break;
+    case Sensor::kPandar64:
+      for (const double e : {15.0, 11.0, 8.0, 5.0, 3.0}) model.elevations.push_back(e * kDegree);
+      append_rings(model.elevations, 2, 1.0 / 6.0, 48);
+      append_rings(model.elevations, -6, 1, 9);
+      for (const double e : {-19.0, -25.0}) model.elevations.push_back(e * kDegree);
+      set(1800, 1.85, 150, 0.9, 80);
+      model.yaw = kPi / 2;
+      break;
+    case Sensor::kLivox:
+      set(24000, 1.2, 100, 0.5, 60);
+      break;
+  }
+  return model;
+}
+
+int BeamTable::row_of(double elevation) {
+  const double row = (elevation + kPi / 2) * (kRows / kPi);
+  return std::clamp(static_cast<int>(row), 0, kRows - 1);
+}
+
+int BeamTable::column_of(double azimuth) {
+  const double column = (azimuth + kPi) * (kColumns / (2 * kPi));
+  return std::clamp(static_cast<int>(column), 0, kColumns - 1);
+}
+
+void BeamTable::add(double azimuth, double cos_elevation, double sin_elevation, int row) {
+  unordered_.push_back({static_cast<float>(cos_elevation * std::cos(azimuth)),
+                        static_cast<float>(cos_elevation * std::sin(azimuth)),
+                        static_cast<float>(sin_elevation)});
+  cells_.push_back(static_cast<std::uint32_t>(row * kColumns + column_of(azimuth)));
+}
+
+void BeamTable::fill(const SensorModel& model, std::uint64_t seed, std::size_t scan) {
+  unordered_.clear();
+  cells_.clear();
+  if (model.elevations.empty()) {
+    // Two mirrors with incommensurate speeds: petals that precess from scan to scan.
+    const double opening = 35 * kDegree;
+    const double first = static_cast<double>(scan) * model.columns;
+    for (int i = 0; i < model.columns; ++i) {
+      const double t = (first + i) / model.columns;
+      const double petal = 2 * kPi * (t * 61.6180339887 - std::floor(t * 61.6180339887));
+      const double spin = 2 * kPi * (t * 17.4142135624 - std::floor(t * 17.4142135624));
+      const double angle = opening * std::cos(petal);
+      const double y = std::sin(angle) * std::cos(spin), z = std::sin(angle) * std::sin(spin);
+      const double elevation = std::asin(z);
+      add(std::atan2(y, std::cos(angle)), std::sqrt(1 - z * z), z, row_of(elevation));
+    }
+  } else {
+    const double step = 2 * kPi / model.columns;
+    const double phase = static_cast<double>(unit_float(mix(mix(seed, 11), scan)));
+    Random calibration(mix(seed, 12));
+    // Trigonometry once per column and ring.
+    std::vector<double> sines, cosines;
+    for (int i = 0; i < model.columns; ++i) {
+      const double azimuth = kPi - step * (i + phase);
+      sines.push_back(std::sin(azimuth));
+      cosines.push_back(std::cos(azimuth));
+    }
+    for (const double nominal : model.elevations) {
+      const double elevation = nominal + 0.03 * kDegree * calibration.normal();
+      const double turn = 0.5 * step * calibration.normal();
+      const double c = std::cos(elevation), s = std::sin(elevation);
+      const double cos_turn = std::cos(turn), sin_turn = std::sin(turn);
+      const int row = row_of(elevation);
+      for (int i = 0; i < model.columns; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        const double azimuth = kPi - step * (i + phase) + turn;
+        const double x = cosines[k] * cos_turn - sines[k] * sin_turn;
+        const double y = sines[k] * cos_turn + cosines[k] * sin_turn;
+        unordered_.push_back({static_cast<float>(c * x), static_cast<float>(c * y),
+                              static_cast<float>(s)});
+        const double wrapped = azimuth < -kPi ? azimuth + 2 * kPi
+                               : azimuth >= kPi ? azimuth - 2 * kPi
+                                                : azimuth;
+        cells_.push_back(static_cast<std::uint32_t>(row * kColumns + column_of(wrapped)));
+      }
+    }
+  }
+
+  // Counting sort by cell, stable.
+  first_.assign(static_cast<std::size_t>(kRows * kColumns) + 1, 0);
+  for (const std::uint32_t cell : cells_) ++first_[cell + 1];
+  for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
+  std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+  directions_.resize(unordered_.size());
+  slot_of_beam_.resize(unordered_.size());
+  for (std::size_t i = 0; i < unordered_.size(); ++i) {
+    const std::uint32_t slot = next[cells_[i]]++;
+    directions_[slot] = unordered_[i];
+    slot_of_beam_[i] = slot;
+  }
+}
+
+}  // namespace dynains::simulation

@@ -1,0 +1,61 @@
+// Directions in which a sensor measures.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/simulation/config.hpp"
+#include "simulation/vector.hpp"
+
+namespace dynains::simulation {
+
+/// What a sensor type fixes; angles in radians.
+struct SensorModel {
+  std::vector<double> elevations;  ///< of the rings, from the top; empty for the rosette
+  int columns = 0;                 ///< per turn; beams per scan for the rosette
+  double height = 0;               ///< m, usual height over ground
+  double max_range = 0;            ///< m
+  double min_range = 0;            ///< m
+  double dark_range = 0;           ///< m, where 10 % reflectivity is found nine times out of ten
+  double yaw = 0;                  ///< sensor x axis from the vehicle's forward direction
+};
+
+SensorModel sensor_model(Sensor sensor);
+
+/// Beams of one scan, grouped by direction so that all beams towards a small object are
+/// contiguous row by row.
+class BeamTable {
+ public:
+  static constexpr int kColumns = 720;  ///< cells of half a degree
+  static constexpr int kRows = 360;
+
+  /// Beams of scan `scan`: every scan starts at another azimuth, every seed is another
+  /// calibration, and the rosette never repeats.
+  void fill(const SensorModel& model, std::uint64_t seed, std::size_t scan);
+
+  std::size_t size() const { return directions_.size(); }
+  const Vec3& direction(std::size_t slot) const { return directions_[slot]; }
+  /// Slots in the order of measurement.
+  const std::vector<std::uint32_t>& measured_order() const { return slot_of_beam_; }
+  /// First slot of a cell; cells of a row follow one another, azimuth from -pi.
+  std::size_t first_slot(int row, int column) const {
+    return first_[static_cast<std::size_t>(row * kColumns + column)];
+  }
+  std::size_t last_slot(int row, int column) const {
+    return first_[static_cast<std::size_t>(row * kColumns + column) + 1];
+  }
+  static int row_of(double elevation);
+  static int column_of(double azimuth);
+
+ private:
+  void add(double azimuth, double cos_elevation, double sin_elevation, int row);
+
+  std::vector<Vec3> unordered_;
+  std::vector<std::uint32_t> cells_;
+  std::vector<Vec3> directions_;
+  std::vector<std::uint32_t> slot_of_beam_;
+  std::vector<std::uint32_t> first_;
+};
+
+}  // namespace dynains::simulation

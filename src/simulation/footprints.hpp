@@ -1,0 +1,45 @@
+// What stands where, seen from above.
+#pragma once
+
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
+
+#include "simulation/vector.hpp"
+
+namespace dynains::simulation {
+
+/// Oriented rectangle on the ground.
+struct Footprint {
+  Vec2 centre;
+  double heading = 0;
+  double half_length = 0, half_width = 0;
+};
+
+/// Distance from a point to the rectangle, 0 inside.
+double distance(const Footprint& footprint, Vec2 p);
+bool overlap(const Footprint& a, const Footprint& b);
+
+/// Rectangles that are found by place.
+class FootprintSet {
+ public:
+  void add(const Footprint& footprint);
+  /// Whether the rectangle, grown by `margin`, touches none of the set.
+  bool is_free(const Footprint& footprint, double margin = 0.1) const;
+  /// Rectangles whose surroundings contain `p`; the nearest 12 m at least.
+  template <class Visitor>
+  void visit_near(Vec2 p, Visitor&& visitor) const {
+    const auto found = cells_.find(key(p));
+    if (found == cells_.end()) return;
+    for (const std::uint32_t i : found->second) visitor(all_[i]);
+  }
+
+ private:
+  static constexpr double kCell = 24.0;
+  static std::uint64_t key(Vec2 p);
+
+  std::vector<Footprint> all_;
+  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
+};
+
+}  // namespace dynains::simulation

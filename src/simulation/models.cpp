@@ -1,0 +1,367 @@
+#include "simulation/models.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "simulation/materials.hpp"
+
+namespace dynains::simulation {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+Vec3 vec(double x, double y, double z) {
+  return {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
+}
+
+/// Corner-to-corner box in the axes of the model.
+Primitive block(const Material& material, double x0, double x1, double y0, double y1, double z0,
+                double z1) {
+  return make_primitive(Shape::kBox, material,
+                        vec((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2),
+                        vec((x1 - x0) / 2, (y1 - y0) / 2, (z1 - z0) / 2));
+}
+
+Primitive post(const Material& material, double x, double y, double z0, double z1,
+               double radius) {
+  return make_primitive(Shape::kCylinder, material, vec(x, y, (z0 + z1) / 2),
+                        vec(radius, radius, (z1 - z0) / 2));
+}
+
+Primitive ball(const Material& material, double x, double y, double z, double rx, double ry,
+               double rz, const Mat3& rotation = {}) {
+  return make_primitive(Shape::kEllipsoid, material, vec(x, y, z), vec(rx, ry, rz), rotation);
+}
+
+/// A limb that hangs from (x, y, z), turned by `swing` about the y axis.
+Primitive limb(const Material& material, double x, double y, double z, double length,
+               double radius, double swing) {
+  return ball(material, x - 0.5 * length * std::sin(swing), y, z - 0.5 * length * std::cos(swing),
+              radius, radius, 0.54 * length, rotation_y(swing));
+}
+
+void add_wheels(Model& model, double front, double rear, double width, double radius) {
+  const Mat3 axle = rotation_x(kPi / 2);
+  for (const double x : {front, rear}) {
+    for (const double side : {-1.0, 1.0}) {
+      model.push_back(make_primitive(Shape::kCylinder, materials::kTyre,
+                                     vec(x, side * (width / 2 - 0.12), radius),
+                                     vec(radius, radius, 0.11), axle));
+    }
+  }
+}
+
+}  // namespace
+
+std::uint16_t resting_label(Kind kind) {
+  switch (kind) {
+    case Kind::kTruck: return semantic::kTruck;
+    case Kind::kBus: return semantic::kBus;
+    case Kind::kPedestrian: return semantic::kPerson;
+    case Kind::kCyclist: return semantic::kBicyclist;
+    case Kind::kCar:
+    case Kind::kVan: break;
+  }
+  return semantic::kCar;
+}
+
+std::uint16_t moving_label(Kind kind) {
+  switch (kind) {
+    case Kind::kTruck: return semantic::kMovingTruck;
+    case Kind::kBus: return semantic::kMovingBus;
+    case Kind::kPedestrian: return semantic::kMovingPerson;
+    case Kind::kCyclist: return semantic::kMovingBicyclist;
+    case Kind::kCar:
+    case Kind::kVan: break;
+  }
+  return semantic::kMovingCar;
+}
+
+Size random_size(Kind kind, Random& random) {
+  const double a = random.unit(), b = random.unit(), c = random.unit();
+  switch (kind) {
+    case Kind::kCar: return {3.6 + 1.2 * a, 1.65 + 0.2 * b, 1.4 + 0.3 * c};
+    case Kind::kVan: return {4.8 + 1.4 * a, 1.9 + 0.15 * b, 2.0 + 0.6 * c};
+    case Kind::kTruck: return {7 + 8 * a, 2.4 + 0.15 * b, 3.1 + 0.7 * c};
+    case Kind::kBus: return {10.5 + 2 * a, 2.5, 3.0 + 0.2 * c};
+    case Kind::kPedestrian: return {0.5, 0.5 + 0.15 * b, 1.5 + 0.4 * c};
+    case Kind::kCyclist: return {1.75, 0.6, 1.65 + 0.2 * c};
+  }
+  return {};
+}
+
+Model vehicle_model(Kind kind, const Size& size, Random& random) {
+  Model model;
+  const double l = size.length / 2, w = size.width / 2, h = size.height;
+  const Material& paint = random.chance(0.35) ? materials::kDarkPaint : materials::kBrightPaint;
+  const double shape = random.unit();
+  if (kind == Kind::kCar) {
+    const double belt = 0.62 * h, floor = 0.22;
+    model.push_back(make_tapered_box(paint, vec(0, 0, (floor + belt) / 2),
+                                     vec(l, w, (belt - floor) / 2), 0.12F, 0.05F));
+    // The cabin leans inwards; estates keep it to the rear.
+    const double cabin_rear = -l + 0.1 + 0.5 * shape, cabin_front = 0.45 * l;
+    model.push_back(make_tapered_box(
+        materials::kGlass, vec((cabin_rear + cabin_front) / 2, 0, (belt + h - 0.06) / 2),
+        vec((cabin_front - cabin_rear) / 2, w - 0.06, (h - 0.06 - belt) / 2), 0.42F, 0.14F));
+    model.push_back(block(paint, cabin_rear + 0.42, cabin_front - 0.42, -w + 0.2, w - 0.2,
+                          h - 0.07, h));
+    // Roof pillars stop the glass from being all there is.
+    for (const double side : {-1.0, 1.0}) {
+      model.push_back(block(paint, cabin_rear + 0.25, cabin_rear + 0.55, side * (w - 0.14) - 0.04,
+                            side * (w - 0.14) + 0.04, belt, h - 0.05));
+      model.push_back(block(paint, 0.0, 0.1, side * (w - 0.13) - 0.04, side * (w - 0.13) + 0.04,
+                            belt, h - 0.05));
+      model.push_back(block(paint, 0.35 * l, 0.35 * l + 0.15, side * (w + 0.07) - 0.07,
+                            side * (w + 0.07) + 0.07, belt - 0.05, belt + 0.1));
+    }
+    add_wheels(model, 0.62 * l, -0.62 * l, size.width, 0.31);
+  } else if (kind == Kind::kVan) {
+    model.push_back(block(paint, -l, 0.55 * l, -w, w, 0.3, h));
+    model.push_back(make_tapered_box(paint, vec(0.75 * l, 0, 0.75), vec(0.25 * l, w, 0.45), 0.05F,
+                                     0.03F));
+    model.push_back(make_tapered_box(materials::kGlass, vec(0.62 * l, 0, (1.2 + h) / 2),
+                                     vec(0.2 * l, w - 0.03, (h - 1.2) / 2), 0.3F, 0.08F));
+    add_wheels(model, 0.6 * l, -0.6 * l, size.width, 0.34);
+  } else if (kind == Kind::kTruck) {
+    const double cab = l - 2.0;
+    model.push_back(block(paint, cab + 0.2, l, -w, w, 0.6, 0.62 * h));
+    model.push_back(block(materials::kGlass, l - 0.15, l + 0.01, -w + 0.15, w - 0.15, 0.62 * h,
+                          0.82 * h));
+    model.push_back(block(paint, cab + 0.2, l - 0.1, -w, w, 0.62 * h, 0.88 * h));
+    if (shape < 0.75) {
+      model.push_back(block(materials::kBrightPaint, -l, cab, -w, w, 1.1, h));
+    } else {
+      model.push_back(block(paint, -l, cab, -w, w, 1.0, 1.25));
+      model.push_back(make_tapered_box(materials::kStreetFurniture, vec(-0.2 * l, 0, 1.9),
+                                       vec(0.6 * l, w - 0.1, 0.65), 0.5F, 0.3F));
+    }
+    model.push_back(block(materials::kTyre, -l + 0.3, cab, -0.45, 0.45, 0.6, 1.0));
+    add_wheels(model, l - 1.2, -l + 1.2, size.width, 0.48);
+    add_wheels(model, -l + 2.4, -l + 3.6, size.width, 0.48);
+  } else {
+    model.push_back(block(paint, -l, l, -w, w, 0.3, 1.1));
+    model.push_back(block(materials::kGlass, -l + 0.03, l - 0.03, -w + 0.03, w - 0.03, 1.1, 2.3));
+    model.push_back(block(paint, -l, l, -w, w, 2.3, h));
+    for (int i = 0; i < 6; ++i) {
+      const double x = -l + 0.1 + i * (2 * l - 0.3) / 5;
+      model.push_back(block(paint, x, x + 0.14, -w, w, 1.1, 2.3));
+    }
+    add_wheels(model, 0.6 * l, -0.55 * l, size.width, 0.48);
+  }
+  model.push_back(block(materials::kPlate, -l - 0.01, -l + 0.02, -0.26, 0.26, 0.5, 0.62));
+  return model;
+}
+
+Model pedestrian_model(const Size& size, std::uint64_t seed, double phase, double stride) {
+  Random random(seed);
+  const double h = size.height, w = size.width / 2;
+  const Material& top = random.chance(0.4) ? materials::kDarkCloth : materials::kBrightCloth;
+  const Material& legs = random.chance(0.6) ? materials::kDarkCloth : materials::kBrightCloth;
+  const bool bag = random.chance(0.25);
+  const double swing = 0.5 * stride * std::sin(phase);
+  const double hip = 0.5 * h, shoulder = 0.8 * h;
+  Model model;
+  model.push_back(limb(legs, 0, 0.09, hip, hip, 0.085, swing));
+  model.push_back(limb(legs, 0, -0.09, hip, hip, 0.085, -swing));
+  model.push_back(ball(top, 0, 0, 0.66 * h, 0.13, w * 0.72, 0.2 * h));
+  model.push_back(limb(top, 0, w * 0.85, shoulder, 0.36 * h, 0.055, -0.8 * swing));
+  model.push_back(limb(top, 0, -w * 0.85, shoulder, 0.36 * h, 0.055, 0.8 * swing));
+  model.push_back(ball(materials::kSkin, 0.02, 0, 0.93 * h, 0.1, 0.085, 0.075 * h));
+  if (bag) model.push_back(block(materials::kDarkCloth, -0.3, -0.12, -0.15, 0.15, 0.55 * h, 0.8 * h));
+  return model;
+}
+
+Model cyclist_model(const Size& size, std::uint64_t seed, double phase) {
+  Random random(seed);
+  const Material& top = random.chance(0.4) ? materials::kDarkCloth : materials::kBrightCloth;
+  const double h = size.height, swing = 0.4 * std::sin(phase);
+  const Mat3 axle = rotation_x(kPi / 2);
+  Model model;
+  for (const double x : {-0.52, 0.52}) {
+    model.push_back(make_primitive(Shape::kCylinder, materials::kMetal, vec(x, 0, 0.34),
+                                   vec(0.34, 0.34, 0.03), axle));
+  }
+  model.push_back(block(materials::kDarkCloth, -0.35, 0.45, -0.03, 0.03, 0.5, 0.62));
+  model.push_back(block(materials::kDarkCloth, 0.38, 0.46, -0.28, 0.28, 0.95, 1.0));
+  model.push_back(limb(materials::kDarkCloth, -0.12, 0.11, 0.95, 0.7, 0.08, -0.35 + swing));
+  model.push_back(limb(materials::kDarkCloth, -0.12, -0.11, 0.95, 0.7, 0.08, -0.35 - swing));
+  model.push_back(ball(top, -0.02, 0, 0.7 * h + 0.05, 0.14, 0.2, 0.22 * h, rotation_y(0.45)));
+  model.push_back(limb(top, 0.12, 0.22, 0.8 * h + 0.05, 0.55, 0.05, -0.9));
+  model.push_back(limb(top, 0.12, -0.22, 0.8 * h + 0.05, 0.55, 0.05, -0.9));
+  model.push_back(ball(materials::kSkin, 0.22, 0, h - 0.11, 0.11, 0.09, 0.12));
+  return model;
+}
+
+Model tree_model(double height, double crown_radius, double clear_height, Random& random) {
+  Model model;
+  const double trunk = 0.08 + 0.018 * height * random.uniform(0.7, 1.3);
+  const double lean = random.uniform(-0.04, 0.04);
+  model.push_back(make_primitive(Shape::kCylinder, materials::kTreeTrunk,
+                                 vec(0, 0, 0.5 * (clear_height + 1) - 0.3),
+                                 vec(trunk, trunk, 0.5 * (clear_height + 1) + 0.3),
+                                 rotation_y(lean)));
+  const double middle = 0.5 * (clear_height + height);
+  const double half = 0.5 * (height - clear_height);
+  // Limbs inside the crown.
+  for (int i = 0; i < 3; ++i) {
+    const double heading = random.uniform(0, 2 * kPi), tilt = random.uniform(0.3, 0.9);
+    const double length = 0.8 * half;
+    const Mat3 rotation = rotation_z(heading) * rotation_y(tilt);
+    const Vec3 along = rotation * vec(0, 0, length / 2);
+    model.push_back(make_primitive(Shape::kCylinder, materials::kTreeTrunk,
+                                   vec(0, 0, clear_height + 0.3) + along,
+                                   vec(0.45 * trunk, 0.45 * trunk, length / 2), rotation));
+  }
+  // One thin ball as the whole, dense ones as boughs.
+  const bool thin = random.chance(0.3);
+  model.push_back(ball(materials::kThinLeaves, 0, 0, middle, crown_radius, crown_radius, half));
+  const auto boughs = static_cast<int>(5 + random.index(6));
+  for (int i = 0; i < boughs; ++i) {
+    const double heading = random.uniform(0, 2 * kPi);
+    const double out = crown_radius * random.uniform(0.2, 0.75);
+    const double up = half * random.uniform(-0.7, 0.75);
+    const double radius = crown_radius * random.uniform(0.3, 0.5);
+    const double flat = random.uniform(0.6, 1.0);
+    const double z = std::max(middle + up, clear_height + 0.7 * radius);
+    model.push_back(ball(thin ? materials::kThinLeaves : materials::kLeaves,
+                         out * std::cos(heading), out * std::sin(heading), z, radius, radius,
+                         radius * flat));
+  }
+  return model;
+}
+
+Model bush_model(double radius, double height, Random& random) {
+  Model model;
+  const auto parts = static_cast<int>(2 + random.index(3));
+  for (int i = 0; i < parts; ++i) {
+    const double heading = random.uniform(0, 2 * kPi), out = radius * random.uniform(0.1, 0.5);
+    const double r = radius * random.uniform(0.5, 0.8), h = height * random.uniform(0.35, 0.55);
+    model.push_back(ball(materials::kBush, out * std::cos(heading), out * std::sin(heading), h, r,
+                         r, h));
+  }
+  return model;
+}
+
+Model pole_model(double height, bool lamp, bool sign, Random& random) {
+  Model model;
+  const double radius = random.uniform(0.04, 0.1);
+  model.push_back(post(materials::kSteelPole, 0, 0, -0.3, height, radius));
+  if (lamp) {
+    model.push_back(block(materials::kSteelPole, -0.05, 0.05, -1.8, 0, height - 0.1, height));
+    model.push_back(block(materials::kSteelPole, -0.12, 0.12, -2.3, -1.6, height - 0.15, height));
+  }
+  if (sign) {
+    const double half = random.uniform(0.25, 0.4);
+    model.push_back(block(materials::kSignPlate, -0.08, -0.05, -half, half, height - 2 * half,
+                          height));
+  }
+  return model;
+}
+
+Model building_model(double length, double depth, double height, Random& random) {
+  Model model;
+  const double l = length / 2;
+  const bool windows = random.chance(0.85);
+  model.push_back(block(windows ? materials::kFacade : materials::kWall, -l, l, 0, depth, -1.0,
+                        height));
+  if (random.chance(0.5)) {
+    model.push_back(make_tapered_box(materials::kRoof, vec(0, depth / 2, height + 1.5),
+                                     vec(l + 0.2, depth / 2 + 0.3, 1.5), 0.3F,
+                                     static_cast<float>(depth / 2)));
+  }
+  // Bays, balconies and entrances break the plane.
+  if (random.chance(0.4)) {
+    const double x = random.uniform(-l + 2, std::max(l - 2, -l + 2.1));
+    model.push_back(block(materials::kWall, x - 1.2, x + 1.2, -0.6, 0.1, 2.8, height - 1));
+  }
+  const auto floors = static_cast<int>(height / 3);
+  if (random.chance(0.35)) {
+    const double x = random.uniform(-l + 1.5, std::max(l - 1.5, -l + 1.6));
+    for (int i = 1; i < floors; ++i) {
+      model.push_back(block(materials::kConcrete, x - 1.3, x + 1.3, -1.0, 0, 3.0 * i, 3.0 * i + 0.2));
+      model.push_back(block(materials::kWireFence, x - 1.3, x + 1.3, -1.0, -0.95, 3.0 * i + 0.2,
+                            3.0 * i + 1.1));
+    }
+  }
+  if (random.chance(0.4)) {
+    const double x = random.uniform(-l + 1.5, std::max(l - 1.5, -l + 1.6));
+    model.push_back(block(materials::kConcrete, x - 0.9, x + 0.9, -0.7, 0, -0.5, 0.3));
+    model.push_back(block(materials::kWall, x - 1.1, x + 1.1, -0.8, 0, 2.5, 2.65));
+  }
+  return model;
+}
+
+Model fence_model(double length, double height, bool wire) {
+  Model model;
+  const Material& material = wire ? materials::kWireFence : materials::kWoodFence;
+  const double half_width = wire ? 0.02 : 0.03;
+  model.push_back(block(material, -length / 2, length / 2, -half_width, half_width, -0.2, height));
+  for (double x = -length / 2; x <= length / 2; x += 2.5) {
+    model.push_back(post(materials::kWoodFence, x, 0, -0.3, height + 0.1, 0.05));
+  }
+  return model;
+}
+
+Model hedge_model(double length, double width, double height, Random& random) {
+  Model model;
+  const double l = length / 2, w = width / 2;
+  for (double x = -l; x < l - 0.1; x += 1.5) {
+    const double end = std::min(x + 1.55, l), wide = w * random.uniform(0.85, 1.1);
+    const double high = height * random.uniform(0.9, 1.08);
+    model.push_back(block(materials::kHedge, x, end, -wide, wide, -0.2, high));
+  }
+  return model;
+}
+
+Model guard_rail_model(double length) {
+  Model model;
+  model.push_back(block(materials::kGuardRail, -length / 2, length / 2, -0.05, 0.05, 0.45, 0.78));
+  for (double x = -length / 2; x < length / 2; x += 2) {
+    model.push_back(block(materials::kGuardRail, x - 0.06, x + 0.06, -0.06, 0.06, -0.3, 0.6));
+  }
+  return model;
+}
+
+Model bridge_model(double span, double width, double clearance) {
+  Model model;
+  const double s = span / 2, w = width / 2;
+  model.push_back(block(materials::kConcrete, -w, w, -s - 12, s + 12, clearance, clearance + 1));
+  for (const double side : {-1.0, 1.0}) {
+    model.push_back(block(materials::kConcrete, side * w - 0.15, side * w + 0.15, -s - 12, s + 12,
+                          clearance + 1, clearance + 2));
+    model.push_back(block(materials::kConcrete, -w, w, side * (s + 6) - 6, side * (s + 6) + 6, -1,
+                          clearance));
+  }
+  return model;
+}
+
+Model shelter_model(double length, double width, double height) {
+  Model model;
+  const double l = length / 2, w = width / 2;
+  model.push_back(block(materials::kConcrete, -l, l, -w, w, height, height + 0.25));
+  for (double x = -l + 0.3; x <= l - 0.2; x += std::max(3.0, length / 4)) {
+    for (const double side : {-1.0, 1.0}) {
+      model.push_back(post(materials::kSteelPole, x, side * (w - 0.2), -0.3, height, 0.1));
+    }
+  }
+  return model;
+}
+
+Model furniture_model(Random& random) {
+  Model model;
+  const double which = random.unit();
+  if (which < 0.35) {
+    model.push_back(post(materials::kStreetFurniture, 0, 0, -0.2, 1.0, 0.25));
+  } else if (which < 0.6) {
+    model.push_back(block(materials::kStreetFurniture, -0.8, 0.8, -0.2, 0.25, 0.35, 0.5));
+    model.push_back(block(materials::kStreetFurniture, -0.8, 0.8, 0.2, 0.27, 0.45, 0.9));
+  } else if (which < 0.8) {
+    model.push_back(block(materials::kStreetFurniture, -0.6, 0.6, -0.2, 0.2, -0.2, 1.25));
+  } else {
+    model.push_back(post(materials::kSteelPole, 0, 0, -0.2, 0.9, 0.08));
+  }
+  return model;
+}
+
+}  // namespace dynains::simulation

@@ -1,0 +1,44 @@
+// Compound objects. Frame of every model: z = 0 on the ground, x forward, origin in the middle.
+#pragma once
+
+#include <vector>
+
+#include "simulation/primitive.hpp"
+#include "simulation/random.hpp"
+
+namespace dynains::simulation {
+
+using Model = std::vector<Primitive>;
+
+enum class Kind { kCar, kVan, kTruck, kBus, kPedestrian, kCyclist };
+
+/// SemanticKITTI class at rest and in motion.
+std::uint16_t resting_label(Kind kind);
+std::uint16_t moving_label(Kind kind);
+
+struct Size {
+  double length = 0, width = 0, height = 0;
+};
+Size random_size(Kind kind, Random& random);
+
+/// Vehicles do not change their shape.
+Model vehicle_model(Kind kind, const Size& size, Random& random);
+/// People do: `phase` is the angle of the gait or of the pedals, `stride` its amplitude, 0 to 1.
+Model pedestrian_model(const Size& size, std::uint64_t seed, double phase, double stride);
+Model cyclist_model(const Size& size, std::uint64_t seed, double phase);
+
+Model tree_model(double height, double crown_radius, double clear_height, Random& random);
+Model bush_model(double radius, double height, Random& random);
+Model pole_model(double height, bool lamp, bool sign, Random& random);
+/// Front along x, `depth` to the left (y from 0 to depth), base below the ground.
+Model building_model(double length, double depth, double height, Random& random);
+Model fence_model(double length, double height, bool wire);
+Model hedge_model(double length, double width, double height, Random& random);
+Model guard_rail_model(double length);
+/// Deck across the x axis with pillars `span / 2` to both sides.
+Model bridge_model(double span, double width, double clearance);
+/// A roof on four posts.
+Model shelter_model(double length, double width, double height);
+Model furniture_model(Random& random);
+
+}  // namespace dynains::simulation

@@ -1,0 +1,320 @@
+#include "dynains/simulation/simulator.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "simulation/beams.hpp"
+#include "simulation/materials.hpp"
+#include "simulation/random.hpp"
+#include "simulation/renderer.hpp"
+#include "simulation/world.hpp"
+
+namespace dynains::simulation {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kMovingSpeed = 0.5;  // m/s
+
+/// Rotation Rz(yaw) Ry(pitch) Rx(roll) in doubles, without vector instructions that might differ.
+Eigen::Matrix3d rotation(double yaw, double pitch, double roll) {
+  const double cy = std::cos(yaw), sy = std::sin(yaw);
+  const double cp = std::cos(pitch), sp = std::sin(pitch);
+  const double cr = std::cos(roll), sr = std::sin(roll);
+  Eigen::Matrix3d m;
+  m << cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr,  //
+      sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr,   //
+      -sp, cp * sr, cp * cr;
+  return m;
+}
+
+Eigen::Isometry3d product(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
+  Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 4; ++c) {
+      double sum = c == 3 ? a(r, 3) : 0.0;
+      for (int k = 0; k < 3; ++k) sum += a(r, k) * b(k, c);
+      result(r, c) = sum;
+    }
+  }
+  return result;
+}
+
+Eigen::Isometry3d inverse(const Eigen::Isometry3d& t) {
+  Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
+  for (int r = 0; r < 3; ++r) {
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) {
+      result(r, k) = t(k, r);
+      sum -= t(k, r) * t(k, 3);
+    }
+    result(r, 3) = sum;
+  }
+  return result;
+}
+
+Rigid to_rigid(const Eigen::Isometry3d& t) {
+  auto f = [&t](int r, int c) { return static_cast<float>(t(r, c)); };
+  return {{{f(0, 0), f(0, 1), f(0, 2)}, {f(1, 0), f(1, 1), f(1, 2)}, {f(2, 0), f(2, 1), f(2, 2)}},
+          {f(0, 3), f(1, 3), f(2, 3)}};
+}
+
+Eigen::Isometry3d isometry(const Eigen::Matrix3d& r, double x, double y, double z) {
+  Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) result(i, j) = r(i, j);
+  }
+  result(0, 3) = x;
+  result(1, 3) = y;
+  result(2, 3) = z;
+  return result;
+}
+
+/// What is remembered of every scan.
+struct Moment {
+  double time = 0;
+  Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+  std::vector<ObjectPose> objects;
+};
+
+/// A body of the given length and width on uneven ground.
+Eigen::Isometry3d stand_on(Terrain& terrain, const Waypoint& at, double length, double width) {
+  const Vec2 u = direction(at.heading), v = left_of(u);
+  double front = 0, rear = 0, left = 0, right = 0;
+  // Several places under each axle: tyres and springs swallow the smallest bumps.
+  for (const double shift : {-0.4, 0.0, 0.4}) {
+    for (const int side : {-1, 1}) {
+      const Vec2 middle = at.position + shift * u + (side * 0.4 * width) * v;
+      const double f = terrain.height(middle + (0.3 * length) * u) / 6;
+      const double r = terrain.height(middle - (0.3 * length) * u) / 6;
+      front += f;
+      rear += r;
+      (side > 0 ? left : right) += f + r;
+    }
+  }
+  const double pitch = -std::atan2(front - rear, 0.6 * length);
+  const double roll = std::atan2(left - right, 0.8 * width);
+  const double z = 0.5 * (front + rear);
+  return isometry(rotation(at.heading, pitch, roll), at.position.x, at.position.y, z);
+}
+
+}  // namespace
+
+class Simulator::Implementation {
+ public:
+  explicit Implementation(const Config& config)
+      : config_((config.validate(), config)),
+        model_(sensor_model(config.sensor)),
+        world_(build_world(config)) {
+    if (config_.max_range > 0) model_.max_range = config_.max_range;
+    if (config_.sensor_height > 0) model_.height = config_.sensor_height;
+    play();
+  }
+
+  const Config& config() const { return config_; }
+  std::size_t size() const { return moments_.size(); }
+
+  SimulatedScan scan(std::size_t index) {
+    const Moment& moment = moments_.at(index);
+    SimulatedScan result;
+    result.time = moment.time;
+    result.T_world_sensor = moment.T_world_sensor;
+    result.T_world_sensor_noisy = with_noise(moment.T_world_sensor, index);
+
+    beams_.fill(model_, config_.seed, index);
+    const std::uint64_t scan_seed = mix(mix(config_.seed, 500), index);
+    renderer_.start(beams_, static_cast<float>(model_.max_range), scan_seed);
+    draw_world(moment, result.objects);
+    measure(moment, result, scan_seed);
+    return result;
+  }
+
+ private:
+  /// Moves everybody through the whole sequence.
+  void play() {
+    const double interval = 1 / config_.rate;
+    const int steps = std::max(1, static_cast<int>(std::ceil(interval / 0.05)));
+    const double dt = interval / steps;
+    ever_moved_.assign(world_.traffic.objects.size(), false);
+    for (int i = 0; i < config_.scans; ++i) {
+      const EgoPose ego = world_.traffic.ego();
+      Moment moment;
+      moment.time = i * interval;
+      moment.T_world_sensor = sensor_pose(ego, moment.time);
+      moment.objects = world_.traffic.around(ego.at.position, model_.max_range + 8);
+      ever_moved_.resize(world_.traffic.objects.size(), false);
+      for (const ObjectPose& pose : moment.objects) {
+        if (pose.speed > kMovingSpeed) ever_moved_[pose.object] = true;
+      }
+      moments_.push_back(std::move(moment));
+      for (int k = 0; k < steps; ++k) world_.traffic.step(dt);
+    }
+  }
+
+  Eigen::Isometry3d sensor_pose(const EgoPose& ego, double time) {
+    const Eigen::Isometry3d T_world_ground = stand_on(world_.terrain, ego.at, 4.3, 1.8);
+    // Springs: braking, bends, and a little swaying while driving.
+    const double sway = std::min(1.0, ego.speed / 5) * 0.12 * kPi / 180;
+    const double pitch = -0.0035 * std::clamp(ego.acceleration, -4.0, 2.0) +
+                         sway * (std::sin(2 * kPi * 1.3 * time) + std::sin(2 * kPi * 0.71 * time));
+    const double roll = 0.004 * std::clamp(ego.speed * ego.turn_rate, -3.0, 3.0) +
+                        sway * std::sin(2 * kPi * 0.93 * time + 1);
+    const Eigen::Isometry3d T_ground_body = isometry(rotation(0, pitch, roll), 0, 0, 0);
+    const Eigen::Matrix3d tilt = rotation(0, config_.mounting_pitch * kPi / 180,
+                                          config_.mounting_roll * kPi / 180);
+    const Eigen::Isometry3d T_body_mount = isometry(tilt, 0, 0, model_.height);
+    const Eigen::Isometry3d T_mount_sensor = isometry(rotation(model_.yaw, 0, 0), 0, 0, 0);
+    return product(product(product(T_world_ground, T_ground_body), T_body_mount), T_mount_sensor);
+  }
+
+  Eigen::Isometry3d with_noise(const Eigen::Isometry3d& pose, std::size_t index) const {
+    Random random(mix(mix(config_.seed, 600), index));
+    double offset[3], turn[3];
+    for (double& v : offset) v = config_.pose_noise_translation * random.normal();
+    for (double& v : turn) v = config_.pose_noise_rotation * kPi / 180 * random.normal();
+    Eigen::Isometry3d result =
+        product(pose, isometry(rotation(turn[0], turn[1], turn[2]), 0, 0, 0));
+    for (int i = 0; i < 3; ++i) result(i, 3) = pose(i, 3) + offset[i];
+    return result;
+  }
+
+  void draw_world(const Moment& moment, std::vector<ObjectState>& states) {
+    const Eigen::Isometry3d T_sensor_world = inverse(moment.T_world_sensor);
+    const Rigid T_world_sensor = to_rigid(moment.T_world_sensor);
+    const Rigid turn{transposed(T_world_sensor.rotation), {}};
+    const Vec3 origin = T_world_sensor.translation;
+    const Vec2 centre{moment.T_world_sensor(0, 3), moment.T_world_sensor(1, 3)};
+    world_.statics.visit_near(
+        centre, model_.max_range, [&](const Primitive& primitive, std::uint64_t salt) {
+          // Subtract first: large coordinates must not cost precision.
+          Primitive near = primitive;
+          near.centre = near.centre - origin;
+          renderer_.add(transformed(turn, near), kNoObject, mix(salt, 1));
+        });
+    for (const ObjectPose& pose : moment.objects) {
+      const Object& object = world_.traffic.objects[pose.object];
+      const bool person = object.kind == Kind::kPedestrian;
+      const Eigen::Isometry3d T_world_object =
+          person ? isometry(rotation(pose.at.heading, 0, 0), pose.at.position.x,
+                            pose.at.position.y, world_.terrain.height(pose.at.position))
+                 : stand_on(world_.terrain, pose.at, object.size.length, object.size.width);
+      states.push_back({pose.object + 1, label_of(pose), T_world_object, pose.speed,
+                        object.size.length, object.size.width, object.size.height});
+      const Rigid T_sensor_object = to_rigid(product(T_sensor_world, T_world_object));
+      Model shape;
+      if (person) {
+        const double stride = std::min(1.0, pose.speed / 1.0);
+        shape = pedestrian_model(object.size, object.seed, pose.phase, stride);
+      } else if (object.kind == Kind::kCyclist) {
+        shape = cyclist_model(object.size, object.seed, pose.phase);
+      }
+      for (const Primitive& primitive : object.model.empty() ? shape : object.model) {
+        renderer_.add(transformed(T_sensor_object, primitive),
+                      static_cast<std::uint32_t>(states.size() - 1), mix(pose.object, 2));
+      }
+    }
+    if (config_.ego_points) {
+      renderer_.add(make_primitive(Shape::kBox, materials::kEgoRoof,
+                                   {-0.6F, 0, -static_cast<float>(model_.height) + 0.75F},
+                                   {1.9F, 0.85F, 0.55F},
+                                   rotation_z(-model_.yaw)),
+                    kNoObject, 3);
+    }
+    renderer_.draw();
+  }
+
+  std::uint32_t label_of(const ObjectPose& pose) const {
+    const Kind kind = world_.traffic.objects[pose.object].kind;
+    const bool moving = config_.labelling == Labelling::kEver ? ever_moved_[pose.object]
+                                                              : pose.speed > kMovingSpeed;
+    return moving ? moving_label(kind) : resting_label(kind);
+  }
+
+  /// Turns hits and ground into points with noise, losses and labels.
+  void measure(const Moment& moment, SimulatedScan& scan, std::uint64_t scan_seed) {
+    const Rigid T_world_sensor = to_rigid(moment.T_world_sensor);
+    const Vec3 origin = T_world_sensor.translation;
+    world_.terrain.prepare({moment.T_world_sensor(0, 3), moment.T_world_sensor(1, 3)},
+                           model_.max_range);
+    const auto sigma = static_cast<float>(config_.range_noise);
+    const auto loss_scale = static_cast<float>(config_.dropout);
+    const auto dark_range = static_cast<float>(model_.dark_range);
+    const auto min_range = static_cast<float>(model_.min_range);
+    scan.xyzi.reserve(beams_.size() * 4);
+    scan.labels.reserve(beams_.size());
+    for (const std::uint32_t slot : beams_.measured_order()) {
+      const Renderer::Hit& hit = renderer_.hits()[slot];
+      const Vec3 direction = beams_.direction(slot);
+      const Vec3 world_direction = T_world_sensor.rotation * direction;
+      float range = hit.range, cosine = 1, loss = hit.extra_loss;
+      float reflectivity = 0.2F, roughness = 0;
+      std::uint32_t label = 0;
+      const float ground = world_.terrain.cast(origin, world_direction, hit.range);
+      if (ground > 0) {
+        range = ground;
+        const Vec3 p = origin + ground * world_direction;
+        cosine = std::abs(dot(world_.terrain.normal_near(p.x, p.y), world_direction));
+        label = world_.terrain.label_near(p.x, p.y);
+        loss = 0.01F;
+        const bool grass = label == semantic::kTerrain;
+        reflectivity = grass ? 0.3F : label == semantic::kSidewalk ? 0.28F : 0.18F;
+        roughness = grass ? 0.015F : 0.003F;
+      } else if (hit.drawn != Renderer::kNothing) {
+        const Renderer::Drawn& drawn = renderer_.drawn()[hit.drawn];
+        const Material& material = *drawn.primitive.material;
+        label = material.label;
+        if (drawn.object != kNoObject) {
+          const ObjectState& state = scan.objects[drawn.object];
+          label = state.label | (state.instance << 16);
+        }
+        reflectivity = material.reflectivity;
+        roughness = material.roughness;
+        loss += material.loss;
+        if (material.density == 0) {
+          cosine = std::abs(dot(surface_normal(drawn.primitive, range * direction), direction));
+        } else {
+          cosine = 0.7F;
+        }
+      } else {
+        continue;
+      }
+      const std::uint64_t random = mix(scan_seed, slot);
+      // Received power over what is needed: 1 where a dark surface is found nine times in ten.
+      const float reach = dark_range / range;
+      const float power = reflectivity * (0.08F + 0.92F * cosine) * 10 * reach * reach;
+      loss += 1 / (1 + 9 * power);
+      if (unit_float(mix(random, 1)) < loss * loss_scale) continue;
+      range += std::sqrt(sigma * sigma + (sigma > 0 ? roughness * roughness : 0)) *
+               normal_float(mix(random, 2));
+      if (range < min_range || range > static_cast<float>(model_.max_range)) continue;
+      const float brightness =
+          reflectivity * (0.3F + 0.7F * cosine) * (1 + 0.15F * normal_float(mix(random, 3)));
+      scan.xyzi.push_back(range * direction.x);
+      scan.xyzi.push_back(range * direction.y);
+      scan.xyzi.push_back(range * direction.z);
+      scan.xyzi.push_back(std::clamp(brightness, 0.0F, 1.0F));
+      scan.labels.push_back(label);
+    }
+  }
+
+  static constexpr std::uint32_t kNoObject = 0xffffffff;
+
+  Config config_;
+  SensorModel model_;
+  World world_;
+  std::vector<Moment> moments_;
+  std::vector<bool> ever_moved_;
+  BeamTable beams_;
+  Renderer renderer_;
+};
+
+Simulator::Simulator(const Config& config)
+    : implementation_(std::make_unique<Implementation>(config)) {}
+Simulator::~Simulator() = default;
+Simulator::Simulator(Simulator&&) noexcept = default;
+Simulator& Simulator::operator=(Simulator&&) noexcept = default;
+
+const Config& Simulator::config() const { return implementation_->config(); }
+std::size_t Simulator::size() const { return implementation_->size(); }
+SimulatedScan Simulator::scan(std::size_t i) { return implementation_->scan(i); }
+
+}  // namespace dynains::simulation

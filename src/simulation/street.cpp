@@ -1,0 +1,94 @@
+#include "simulation/street.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dynains::simulation {
+
+Route::Route(std::vector<Vec2> points) : points_(std::move(points)) {
+  const std::size_t n = points_.size();
+  arc_.assign(n, 0);
+  for (std::size_t i = 1; i < n; ++i) arc_[i] = arc_[i - 1] + norm(points_[i] - points_[i - 1]);
+  tangents_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t before = i == 0 ? 0 : i - 1, after = std::min(i + 1, n - 1);
+    const Vec2 chord = points_[after] - points_[before];
+    tangents_[i] = (1 / norm(chord)) * chord;
+  }
+}
+
+Waypoint Route::at(double s) const {
+  s = std::clamp(s, 0.0, length());
+  const auto upper = std::upper_bound(arc_.begin() + 1, arc_.end() - 1, s);
+  const auto i = static_cast<std::size_t>(upper - arc_.begin());
+  const double span = arc_[i] - arc_[i - 1];
+  const double u = (s - arc_[i - 1]) / span;
+  const double u2 = u * u, u3 = u2 * u;
+  const Vec2 position = (2 * u3 - 3 * u2 + 1) * points_[i - 1] +
+                        (span * (u3 - 2 * u2 + u)) * tangents_[i - 1] +
+                        (3 * u2 - 2 * u3) * points_[i] + (span * (u3 - u2)) * tangents_[i];
+  const Vec2 slope = (6 * (u2 - u) / span) * (points_[i - 1] - points_[i]) +
+                     (3 * u2 - 4 * u + 1) * tangents_[i - 1] + (3 * u2 - 2 * u) * tangents_[i];
+  return {position, std::atan2(slope.y, slope.x)};
+}
+
+Waypoint Route::beside(double s, double lateral) const {
+  Waypoint result = at(s);
+  result.position = result.position + lateral * left_of(direction(result.heading));
+  return result;
+}
+
+double Route::nearest(Vec2 p) const {
+  std::size_t best = 0;
+  double best_square = 1e300;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Vec2 difference = points_[i] - p;
+    const double square = dot(difference, difference);
+    if (square < best_square) {
+      best_square = square;
+      best = i;
+    }
+  }
+  return arc_[best];
+}
+
+Route Route::shifted(double begin, double end,
+                     const std::function<double(double)>& lateral) const {
+  constexpr double kStep = 1.0;
+  const auto count = static_cast<std::size_t>(std::max(1.0, std::abs(end - begin) / kStep));
+  std::vector<Vec2> result;
+  for (std::size_t i = 0; i <= count; ++i) {
+    const double s = begin + (end - begin) * static_cast<double>(i) / static_cast<double>(count);
+    const Vec2 p = beside(s, lateral(s)).position;
+    // Inside a tight bend the shifted line may fold back; leave those points out.
+    if (!result.empty()) {
+      const double heading = at(s).heading;
+      const double forward = dot(p - result.back(), direction(heading)) * (end < begin ? -1 : 1);
+      if (forward < 0.05) continue;
+    }
+    result.push_back(p);
+  }
+  while (result.size() < 2) result.push_back(beside(end, lateral(end)).position);
+  return Route(std::move(result));
+}
+
+std::vector<Vec2> turn_points(const Waypoint& from, const Waypoint& to) {
+  const Vec2 a = from.position, c = to.position;
+  const Vec2 u = direction(from.heading), v = direction(to.heading);
+  // Where the two tangents meet, or the middle if they are parallel.
+  const double cross = u.x * v.y - u.y * v.x;
+  Vec2 b = 0.5 * (a + c);
+  if (std::abs(cross) > 0.2) {
+    const Vec2 between = c - a;
+    b = a + ((between.x * v.y - between.y * v.x) / cross) * u;
+  }
+  const auto count = static_cast<int>(std::max(6.0, norm(c - a) / 0.8));
+  std::vector<Vec2> result;
+  for (int i = 0; i <= count; ++i) {
+    const double w = static_cast<double>(i) / count;
+    result.push_back(((1 - w) * (1 - w)) * a + (2 * w * (1 - w)) * b + (w * w) * c);
+  }
+  return result;
+}
+
+}  // namespace dynains::simulation

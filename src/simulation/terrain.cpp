@@ -1,0 +1,275 @@
+#include "simulation/terrain.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dynains::simulation {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kFar = 30.0;
+constexpr std::uint16_t kPavementLabel = 48;
+
+double smooth_step(double u) {
+  u = std::clamp(u, 0.0, 1.0);
+  return u * u * (3 - 2 * u);
+}
+
+double distance_to_segment(Vec2 p, Vec2 a, Vec2 b) {
+  const Vec2 ab = b - a, ap = p - a;
+  const double u = std::clamp(dot(ap, ab) / std::max(dot(ab, ab), 1e-9), 0.0, 1.0);
+  return norm(ap - u * ab);
+}
+
+int tile_index(double v, double size) { return static_cast<int>(std::floor(v / size)); }
+
+/// The part of a street that matters for one place.
+struct Corridor {
+  const Street* street;
+  std::vector<std::pair<Vec2, Vec2>> segments;
+};
+
+std::vector<Corridor> corridors_near(const std::vector<Street>& streets, Vec2 centre,
+                                     double radius) {
+  std::vector<Corridor> result;
+  for (const Street& street : streets) {
+    Corridor corridor{&street, {}};
+    const auto& points = street.centre.points();
+    const double reach = radius + kFar + street.half_width;
+    for (std::size_t i = 1; i < points.size(); ++i) {
+      if (norm(points[i] - centre) < reach) corridor.segments.push_back({points[i - 1], points[i]});
+    }
+    if (!corridor.segments.empty()) result.push_back(std::move(corridor));
+  }
+  return result;
+}
+
+struct Ground {
+  double edge = kFar;      ///< distance to the edge of the nearest carriageway
+  double half_width = 4;   ///< of that street
+  double pavement = 0;     ///< how far a pavement reaches beyond the point, positive if on it
+};
+
+Ground ground_at(const std::vector<Corridor>& corridors, Vec2 p) {
+  Ground result;
+  for (const Corridor& corridor : corridors) {
+    double distance = 1e9;
+    for (const auto& segment : corridor.segments) {
+      const Vec2 d = p - segment.first;
+      if (std::abs(d.x) > distance + 4 || std::abs(d.y) > distance + 4) continue;
+      distance = std::min(distance, distance_to_segment(p, segment.first, segment.second));
+    }
+    const double edge = distance - corridor.street->half_width;
+    if (edge < result.edge) {
+      result.edge = edge;
+      result.half_width = corridor.street->half_width;
+    }
+    result.pavement = std::max(result.pavement, corridor.street->pavement - edge);
+  }
+  return result;
+}
+
+}  // namespace
+
+Terrain::Terrain(const TerrainConfig& config, std::vector<Street> streets, Random random)
+    : config_(config), streets_(std::move(streets)), salt_(random.bits()) {
+  constexpr int kWaves = 5;
+  double steepness = 0;
+  for (int i = 0; i < kWaves; ++i) {
+    const double heading = random.uniform(0, 2 * kPi);
+    const double length = config_.hill_length * random.uniform(0.6, 1.7);
+    const double phase = random.uniform(0, 2 * kPi);
+    // The slopes of the waves add up to the steepest slope only where all agree.
+    const double slope = config_.hill_slope * random.uniform(0.3, 0.6);
+    const double number = 2 * kPi / length;
+    waves_.push_back({number * direction(heading), slope / number, phase});
+    steepness += slope;
+  }
+  steepest_ = static_cast<float>(steepness + 0.03 + config_.roughness);
+}
+
+double Terrain::hills(Vec2 p) const {
+  double sum = 0;
+  for (const Wave& wave : waves_) {
+    sum += wave.amplitude * std::sin(dot(wave.number, p) + wave.phase);
+  }
+  return sum;
+}
+
+double Terrain::bumps(Vec2 p, double wavelength, std::uint64_t salt) const {
+  const double u = p.x / wavelength, v = p.y / wavelength;
+  const double iu = std::floor(u), iv = std::floor(v);
+  auto corner = [&](double du, double dv) {
+    const auto a = static_cast<std::uint64_t>(static_cast<std::int64_t>(iu + du));
+    const auto b = static_cast<std::uint64_t>(static_cast<std::int64_t>(iv + dv));
+    return 2 * static_cast<double>(unit_float(mix(mix(salt_ + salt, a), b))) - 1;
+  };
+  const double fu = smooth_step(u - iu), fv = smooth_step(v - iv);
+  const double low = corner(0, 0) * (1 - fu) + corner(1, 0) * fu;
+  const double high = corner(0, 1) * (1 - fu) + corner(1, 1) * fu;
+  return low * (1 - fv) + high * fv;
+}
+
+void Terrain::build(int ix, int iy, Tile& tile) const {
+  const Vec2 corner{ix * kTile, iy * kTile};
+  const Vec2 centre = corner + Vec2{kTile / 2, kTile / 2};
+  const auto corridors = corridors_near(streets_, centre, kTile * 0.71);
+  for (int row = 0; row <= kCells; ++row) {
+    for (int column = 0; column <= kCells; ++column) {
+      const Vec2 p = corner + Vec2{column * kCell, row * kCell};
+      const Ground ground = ground_at(corridors, p);
+      const double off_street = smooth_step(ground.edge / 0.2);
+      const double on_pavement = smooth_step(ground.pavement / 0.4);
+      const double across = std::clamp(1 + ground.edge / ground.half_width, 0.0, 1.0);
+      const double wild = off_street * (1 - on_pavement);
+      const double uneven = config_.roughness * (0.3 + 0.7 * wild);
+      double height = hills(p) + uneven * (0.6 * bumps(p, 4.0, 1) + 0.4 * bumps(p, 1.1, 2));
+      height += config_.kerb * off_street * (0.5 + 0.5 * on_pavement);
+      height -= 0.02 * ground.half_width * across * across * (1 - off_street);
+      tile.heights[static_cast<std::size_t>(row * (kCells + 1) + column)] =
+          static_cast<float>(height);
+      if (row < kCells && column < kCells) {
+        const std::uint16_t label = ground.edge < 0     ? config_.street_label
+                                    : ground.pavement > 0 ? kPavementLabel
+                                                          : config_.open_label;
+        tile.labels[static_cast<std::size_t>(row * kCells + column)] =
+            static_cast<std::uint8_t>(label);
+      }
+    }
+  }
+}
+
+const Terrain::Tile& Terrain::tile(int ix, int iy) {
+  const std::uint64_t key = (static_cast<std::uint64_t>(static_cast<std::uint32_t>(ix)) << 32) |
+                            static_cast<std::uint32_t>(iy);
+  std::unique_ptr<Tile>& slot = tiles_[key];
+  if (!slot) {
+    slot = std::make_unique<Tile>();
+    build(ix, iy, *slot);
+  }
+  return *slot;
+}
+
+double Terrain::distance_to_street(Vec2 p) const {
+  return ground_at(corridors_near(streets_, p, 0), p).edge;
+}
+
+double Terrain::height(Vec2 p) {
+  const int ix = tile_index(p.x, kTile), iy = tile_index(p.y, kTile);
+  const Tile& t = tile(ix, iy);
+  const double u = (p.x - ix * kTile) / kCell, v = (p.y - iy * kTile) / kCell;
+  const int column = std::clamp(static_cast<int>(u), 0, kCells - 1);
+  const int row = std::clamp(static_cast<int>(v), 0, kCells - 1);
+  const double fu = u - column, fv = v - row;
+  auto sample = [&](int r, int c) {
+    return static_cast<double>(t.heights[static_cast<std::size_t>(r * (kCells + 1) + c)]);
+  };
+  return (1 - fv) * ((1 - fu) * sample(row, column) + fu * sample(row, column + 1)) +
+         fv * ((1 - fu) * sample(row + 1, column) + fu * sample(row + 1, column + 1));
+}
+
+std::uint16_t Terrain::label(Vec2 p) {
+  const int ix = tile_index(p.x, kTile), iy = tile_index(p.y, kTile);
+  const int column = std::clamp(static_cast<int>((p.x - ix * kTile) / kCell), 0, kCells - 1);
+  const int row = std::clamp(static_cast<int>((p.y - iy * kTile) / kCell), 0, kCells - 1);
+  return tile(ix, iy).labels[static_cast<std::size_t>(row * kCells + column)];
+}
+
+void Terrain::prepare(Vec2 centre, double radius) {
+  near_x_ = tile_index(centre.x, kTile) - kSide / 2;
+  near_y_ = tile_index(centre.y, kTile) - kSide / 2;
+  near_.fill(nullptr);
+  low_ = 1e9F;
+  high_ = -1e9F;
+  for (int iy = 0; iy < kSide; ++iy) {
+    for (int ix = 0; ix < kSide; ++ix) {
+      const double dx = (near_x_ + ix + 0.5) * kTile - centre.x;
+      const double dy = (near_y_ + iy + 0.5) * kTile - centre.y;
+      if (std::sqrt(dx * dx + dy * dy) > radius + 0.71 * kTile) continue;
+      const Tile& t = tile(near_x_ + ix, near_y_ + iy);
+      near_[static_cast<std::size_t>(iy * kSide + ix)] = &t;
+      for (std::size_t i = 0; i < t.heights.size(); i += 64) {
+        low_ = std::min(low_, t.heights[i]);
+        high_ = std::max(high_, t.heights[i]);
+      }
+    }
+  }
+  low_ -= 1;
+  high_ += 1;
+  // Tiles that were left behind are made again if they are needed again.
+  constexpr std::size_t kKeep = 1500;
+  if (tiles_.size() > kKeep) {
+    for (auto it = tiles_.begin(); it != tiles_.end();) {
+      const bool used = std::find(near_.begin(), near_.end(), it->second.get()) != near_.end();
+      it = used ? std::next(it) : tiles_.erase(it);
+    }
+  }
+}
+
+float Terrain::height_near(float x, float y) const {
+  constexpr auto kInverse = static_cast<float>(1 / kCell);
+  const float u = x * kInverse - static_cast<float>(near_x_ * kCells);
+  const float v = y * kInverse - static_cast<float>(near_y_ * kCells);
+  const int column = static_cast<int>(u), row = static_cast<int>(v);
+  if (u < 0 || v < 0 || column >= kSide * kCells || row >= kSide * kCells) return -1e9F;
+  const Tile* t = near_[static_cast<std::size_t>((row / kCells) * kSide + column / kCells)];
+  if (t == nullptr) return -1e9F;
+  const float fu = u - static_cast<float>(column), fv = v - static_cast<float>(row);
+  const float* s = &t->heights[static_cast<std::size_t>((row % kCells) * (kCells + 1) +
+                                                        column % kCells)];
+  const float low = s[0] + fu * (s[1] - s[0]);
+  const float high = s[kCells + 1] + fu * (s[kCells + 2] - s[kCells + 1]);
+  return low + fv * (high - low);
+}
+
+std::uint16_t Terrain::label_near(float x, float y) const {
+  constexpr auto kInverse = static_cast<float>(1 / kCell);
+  const int column = static_cast<int>(x * kInverse - static_cast<float>(near_x_ * kCells));
+  const int row = static_cast<int>(y * kInverse - static_cast<float>(near_y_ * kCells));
+  if (column < 0 || row < 0 || column >= kSide * kCells || row >= kSide * kCells) return 0;
+  const Tile* t = near_[static_cast<std::size_t>((row / kCells) * kSide + column / kCells)];
+  if (t == nullptr) return 0;
+  return t->labels[static_cast<std::size_t>((row % kCells) * kCells + column % kCells)];
+}
+
+Vec3 Terrain::normal_near(float x, float y) const {
+  constexpr float kStep = 0.3F;
+  const float dx = height_near(x + kStep, y) - height_near(x - kStep, y);
+  const float dy = height_near(x, y + kStep) - height_near(x, y - kStep);
+  const Vec3 normal{-dx, -dy, 2 * kStep};
+  return (1 / norm(normal)) * normal;
+}
+
+float Terrain::cast(Vec3 origin, Vec3 direction, float t_max) const {
+  // Sphere tracing: below the steepest slope no crossing can be missed. Kerbs are steeper, so a
+  // step may end below the ground; the crossing is then found by halving.
+  const float horizontal =
+      std::sqrt(direction.x * direction.x + direction.y * direction.y);
+  const float closing = steepest_ * horizontal - direction.z;
+  if (closing <= 0.002F) return -1;
+  float before = 0, t = 0;
+  if (direction.z < 0 && origin.z > high_) t = (high_ - origin.z) / direction.z;
+  for (int i = 0; i < 256; ++i) {
+    if (t > t_max) t = t_max;
+    const float z = origin.z + t * direction.z;
+    if (direction.z > 0 && z > high_) return -1;
+    const float clearance = z - height_near(origin.x + t * direction.x, origin.y + t * direction.y);
+    if (clearance <= 0) {
+      float above = before, below = t;
+      for (int j = 0; j < 12; ++j) {
+        const float middle = 0.5F * (above + below);
+        const float h =
+            height_near(origin.x + middle * direction.x, origin.y + middle * direction.y);
+        (origin.z + middle * direction.z > h ? above : below) = middle;
+      }
+      return 0.5F * (above + below);
+    }
+    if (t >= t_max) return -1;
+    before = t;
+    // A little farther than safe, so that the last metres do not take for ever.
+    t += std::max(clearance / closing * 1.02F, 0.01F + 0.0005F * t);
+  }
+  return -1;
+}
+
+}  // namespace dynains::simulation

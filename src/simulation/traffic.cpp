@@ -1,0 +1,374 @@
+#include "simulation/traffic.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dynains::simulation {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kActiveRadius = 260.0;  // m around the ego vehicle; nobody moves beyond
+constexpr std::size_t kNobody = std::numeric_limits<std::size_t>::max();
+
+double wrap(double angle) { return angle - 2 * kPi * std::floor((angle + kPi) / (2 * kPi)); }
+
+}  // namespace
+
+bool Signal::is_red(double time, int stream) const {
+  const double turn = (time + phase) / period;
+  const double part = turn - std::floor(turn);
+  return stream == 0 ? part >= 0.5 : part < 0.57 || part >= 0.92;
+}
+
+std::size_t Traffic::add_object(Kind kind) { return add_object(kind, random_size(kind, random_)); }
+
+std::size_t Traffic::add_object(Kind kind, const Size& size) {
+  Object object;
+  object.kind = kind;
+  object.size = size;
+  object.seed = random_.bits();
+  if (kind != Kind::kPedestrian && kind != Kind::kCyclist) {
+    Random random(object.seed);
+    object.model = vehicle_model(kind, size, random);
+  }
+  objects.push_back(std::move(object));
+  return objects.size() - 1;
+}
+
+std::size_t Traffic::add_lane(Route route, std::vector<StopLine> stop_lines) {
+  lanes.push_back({std::move(route), std::move(stop_lines)});
+  return lanes.size() - 1;
+}
+
+Traffic::Driver& Traffic::add_driver(std::size_t object, std::size_t lane, double s,
+                                     double cruise) {
+  Driver driver;
+  driver.object = object;
+  driver.lane = lane;
+  driver.s = s;
+  driver.speed = cruise;
+  driver.cruise = cruise;
+  drivers.push_back(driver);
+  return drivers.back();
+}
+
+Kind Traffic::random_kind(const Flow& flow) {
+  double u = random_.unit();
+  if ((u -= flow.trucks) < 0) return Kind::kTruck;
+  if ((u -= flow.buses) < 0) return Kind::kBus;
+  if ((u -= flow.vans) < 0) return Kind::kVan;
+  if ((u -= flow.cyclists) < 0) return Kind::kCyclist;
+  return Kind::kCar;
+}
+
+void Traffic::enter(Flow& flow, double s) {
+  const Kind kind = random_kind(flow);
+  const double factor = random_.uniform(0.85, 1.15);
+  const double speed = kind == Kind::kCyclist ? 4.5 * factor : flow.speed * factor;
+  const std::size_t object = add_object(kind);
+  Footprint footprint;
+  const Waypoint at = lanes[flow.lane].route.at(s);
+  footprint.centre = at.position;
+  footprint.heading = at.heading;
+  footprint.half_length = objects[object].size.length / 2 + 3;
+  footprint.half_width = objects[object].size.width / 2;
+  // Nobody appears inside somebody else.
+  for (const Driver& driver : drivers) {
+    if (!driver.active) continue;
+    const Waypoint other = lanes[driver.lane].route.at(driver.s);
+    const Size& size = objects[driver.object].size;
+    if (overlap(footprint, {other.position, other.heading, size.length / 2, size.width / 2})) {
+      objects.pop_back();
+      return;
+    }
+  }
+  if (!fixed.is_free(footprint, 0)) {
+    objects.pop_back();
+    return;
+  }
+  add_driver(object, flow.lane, s, speed);
+}
+
+void Traffic::fill(const Flow& flow) {
+  Flow mine = flow;
+  double s = random_.uniform(2, flow.spacing);
+  while (s < lanes[flow.lane].route.length() - 2) {
+    enter(mine, s);
+    s += std::max(14.0, flow.spacing * random_.uniform(0.4, 1.6));
+  }
+  mine.next_gap = flow.spacing;
+  flows.push_back(mine);
+}
+
+void Traffic::collect_bodies(Vec2 centre, double radius) {
+  bodies_.clear();
+  auto add = [&](const Waypoint& at, double speed, std::size_t object, std::size_t driver) {
+    const Size& size = objects[object].size;
+    const Kind kind = objects[object].kind;
+    bodies_.push_back({{at.position, at.heading, size.length / 2, size.width / 2},
+                       speed * direction(at.heading),
+                       driver,
+                       kind == Kind::kPedestrian});
+  };
+  for (std::size_t i = 0; i < drivers.size(); ++i) {
+    if (!drivers[i].active) continue;
+    const Waypoint at = lanes[drivers[i].lane].route.at(drivers[i].s);
+    if (norm(at.position - centre) < radius) add(at, drivers[i].speed, drivers[i].object, i);
+  }
+  for (const Walker& walker : walkers) {
+    if (norm(walker.position - centre) > radius) continue;
+    add({walker.position, walker.heading}, norm(walker.velocity), walker.object, kNobody);
+  }
+  for (const ObjectPose& pose : parked) {
+    if (norm(pose.at.position - centre) < radius) add(pose.at, 0, pose.object, kNobody);
+  }
+}
+
+double Traffic::free_distance(const Driver& driver, std::size_t index, double reach,
+                              double& speed_ahead) const {
+  const Lane& lane = lanes[driver.lane];
+  const Size& size = objects[driver.object].size;
+  const double clearance = size.width / 2 + 0.3;
+  const Vec2 here = lane.route.at(driver.s).position;
+  std::vector<const Body*> near;
+  for (const Body& body : bodies_) {
+    if (body.driver == index) continue;
+    const double far = reach + size.length + body.footprint.half_length + 4;
+    if (norm(body.footprint.centre - here) < far) near.push_back(&body);
+  }
+  if (near.empty()) return reach;
+  for (double d = 0; d <= reach; d += 0.7) {
+    const double s = driver.s + size.length / 2 + d;
+    if (s > lane.route.length()) break;
+    const Waypoint at = lane.route.at(s);
+    for (const Body* body : near) {
+      Footprint footprint = body->footprint;
+      bool blocked = distance(footprint, at.position) < clearance;
+      if (!blocked && body->person && d > 1) {
+        // People are given way to before they are in the way.
+        footprint.centre = footprint.centre + 1.2 * body->velocity;
+        blocked = distance(footprint, at.position) < clearance;
+      }
+      if (blocked) {
+        speed_ahead = std::max(0.0, dot(body->velocity, direction(at.heading)));
+        return d;
+      }
+    }
+  }
+  return reach;
+}
+
+double Traffic::wanted_acceleration(const Driver& driver, std::size_t index) const {
+  const Lane& lane = lanes[driver.lane];
+  const Size& size = objects[driver.object].size;
+  double cruise = driver.cruise;
+  for (const auto& change : driver.schedule) {
+    if (time_ >= change.first) cruise = change.second;
+  }
+  const double v = driver.speed;
+  if (driver.waits_for_gap && v < 0.1 && cruise > 0) {
+    const Waypoint at = lane.route.at(driver.s);
+    for (const Body& body : bodies_) {
+      if (body.driver == index || norm(body.velocity) < 1) continue;
+      const Vec2 towards = at.position - body.footprint.centre;
+      const double distance = norm(towards);
+      if (distance < 25 && dot(towards, body.velocity) > 0.7 * distance * norm(body.velocity)) {
+        cruise = 0;
+      }
+    }
+  }
+  // Bends: at most 2 m/s^2 to the side.
+  for (const double ahead : {0.0, 5.0, 12.0, 25.0}) {
+    const double a = lane.route.at(driver.s + ahead).heading;
+    const double b = lane.route.at(driver.s + ahead + 4).heading;
+    const double curvature = std::abs(wrap(b - a)) / 4;
+    if (curvature > 0.004) {
+      const double bend_speed = std::sqrt(2.0 / curvature);
+      cruise = std::min(cruise, std::sqrt(bend_speed * bend_speed + 2 * 1.5 * ahead));
+    }
+  }
+  if (cruise <= 0.01) return v > 0.05 ? -2.0 : -v / 0.1;
+
+  const double reach = v * v / 4 + 2.0 * v + 8;
+  double speed_ahead = 0;
+  double gap = free_distance(driver, index, reach, speed_ahead);
+  bool blocked = gap < reach;
+  const double front = driver.s + size.length / 2;
+  for (const StopLine& line : lane.stop_lines) {
+    const double to_line = line.s - front;
+    const bool can_stop = to_line > v * v / 7;
+    if (to_line > -0.5 && to_line < gap && can_stop &&
+        signals[line.signal].is_red(time_, line.stream)) {
+      gap = to_line + 1.5;
+      speed_ahead = 0;
+      blocked = true;
+    }
+  }
+  if (driver.stays_at_end) {
+    const double to_end = lane.route.length() - driver.s;
+    if (to_end + 2 < gap || to_end < 0.3) {
+      gap = to_end + 2;
+      speed_ahead = 0;
+      blocked = true;
+      if (to_end < 0.1) return -v / 0.1;
+    }
+  }
+  // Intelligent driver model: Treiber, Hennecke, Helbing, "Congested traffic states", 2000.
+  const double ratio = v / cruise;
+  double acceleration = driver.comfort * (1 - ratio * ratio * ratio * ratio);
+  if (blocked) {
+    const double closing = v - speed_ahead;
+    const double wanted =
+        2.0 + std::max(0.0, 1.1 * v + v * closing / (2 * std::sqrt(driver.comfort * 2.0)));
+    const double share = wanted / std::max(gap, 0.1);
+    acceleration -= driver.comfort * share * share;
+  }
+  return std::clamp(acceleration, -7.0, driver.comfort);
+}
+
+void Traffic::walk(Walker& walker, double dt) {
+  const bool standing = time_ < walker.start || time_ >= walker.stop || walker.goals.empty();
+  if (standing) {
+    walker.velocity = {};
+    return;
+  }
+  Vec2 to_goal = walker.goals[walker.goal] - walker.position;
+  if (norm(to_goal) < 0.8) {
+    ++walker.goal;
+    if (walker.goal == walker.goals.size()) {
+      walker.goal = 0;
+      if (walker.there_and_back) std::reverse(walker.goals.begin(), walker.goals.end());
+    }
+    to_goal = walker.goals[walker.goal] - walker.position;
+  }
+  const Vec2 wanted = (walker.pace / std::max(norm(to_goal), 0.3)) * to_goal;
+  // Social force model: Helbing and Molnar, 1995; people also pass on the right.
+  Vec2 force = (1 / 0.5) * (wanted - walker.velocity);
+  for (const Body& body : bodies_) {
+    const Vec2 apart = walker.position - body.footprint.centre;
+    const double far = norm(apart);
+    if (far > 4 + body.footprint.half_length || far < 1e-6) continue;
+    const double gap = distance(body.footprint, walker.position);
+    if (gap > 2.5 || far < 0.01) continue;
+    if (body.person && far < 0.05) continue;
+    const Vec2 away = (1 / far) * apart;
+    const double strength = (body.person ? 4.0 : 7.0) * std::exp(-gap / 0.45);
+    force = force + strength * (away + (-0.35) * left_of((1 / walker.pace) * wanted));
+  }
+  fixed.visit_near(walker.position, [&](const Footprint& footprint) {
+    const double gap = distance(footprint, walker.position);
+    if (gap > 1.2) return;
+    // Away from the nearest point of the rectangle.
+    const Vec2 u = direction(footprint.heading), d = walker.position - footprint.centre;
+    const double x = std::clamp(dot(d, u), -footprint.half_length, footprint.half_length);
+    const double y = std::clamp(dot(d, left_of(u)), -footprint.half_width, footprint.half_width);
+    const Vec2 nearest = footprint.centre + x * u + y * left_of(u);
+    const Vec2 apart = gap > 0.01 ? walker.position - nearest : d;
+    force = force + (8.0 * std::exp(-gap / 0.25) / std::max(norm(apart), 1e-3)) * apart;
+  });
+  Vec2 velocity = walker.velocity + dt * force;
+  const double speed = norm(velocity), limit = 1.4 * walker.pace;
+  if (speed > limit) velocity = (limit / speed) * velocity;
+  const Vec2 next = walker.position + dt * velocity;
+  // Nobody walks into a wall or a vehicle: stand if the step would end there.
+  bool blocked = false;
+  fixed.visit_near(next, [&](const Footprint& footprint) {
+    blocked = blocked || (distance(footprint, next) < 0.25 &&
+                          distance(footprint, next) < distance(footprint, walker.position));
+  });
+  for (const Body& body : bodies_) {
+    const double keep = body.person ? 0.2 : 0.35;
+    if (norm(body.footprint.centre - next) > 10) continue;
+    const double before = distance(body.footprint, walker.position);
+    if (body.person && norm(body.footprint.centre - walker.position) < 1e-6) continue;
+    if (distance(body.footprint, next) < keep && distance(body.footprint, next) < before) {
+      blocked = true;
+    }
+  }
+  if (blocked) {
+    walker.velocity = {};
+    return;
+  }
+  walker.velocity = velocity;
+  walker.position = next;
+  if (norm(velocity) > 0.2) {
+    const double turn = wrap(std::atan2(velocity.y, velocity.x) - walker.heading);
+    walker.heading += std::clamp(turn, -4 * dt, 4 * dt);
+  }
+  walker.phase += 2 * kPi * 0.75 * norm(velocity) * dt;
+}
+
+void Traffic::step(double dt) {
+  const Vec2 centre = lanes[drivers[0].lane].route.at(drivers[0].s).position;
+  collect_bodies(centre, kActiveRadius + 40);
+  for (std::size_t i = 0; i < drivers.size(); ++i) {
+    Driver& driver = drivers[i];
+    if (!driver.active) continue;
+    const Vec2 at = lanes[driver.lane].route.at(driver.s).position;
+    if (norm(at - centre) > kActiveRadius) {
+      driver.acceleration = 0;
+      continue;
+    }
+    driver.acceleration = wanted_acceleration(driver, i);
+  }
+  for (Driver& driver : drivers) {
+    const double before = driver.speed;
+    if (!driver.active) continue;
+    const Vec2 at = lanes[driver.lane].route.at(driver.s).position;
+    if (norm(at - centre) > kActiveRadius) continue;
+    driver.speed = std::max(0.0, before + dt * driver.acceleration);
+    driver.s += 0.5 * dt * (before + driver.speed);
+    const double length = lanes[driver.lane].route.length();
+    if (!driver.stays_at_end && driver.s >= length - 0.5 && &driver != &drivers[0]) {
+      driver.active = false;
+    }
+    driver.s = std::min(driver.s, length);
+  }
+  for (Walker& walker : walkers) {
+    if (norm(walker.position - centre) < kActiveRadius) walk(walker, dt);
+  }
+  for (Flow& flow : flows) {
+    double nearest = 1e9;
+    for (const Driver& driver : drivers) {
+      if (driver.active && driver.lane == flow.lane) nearest = std::min(nearest, driver.s);
+    }
+    if (nearest > flow.next_gap) {
+      enter(flow, 2.0);
+      flow.next_gap = std::max(14.0, flow.spacing * random_.uniform(0.4, 1.6));
+    }
+  }
+  time_ += dt;
+  const double heading = lanes[drivers[0].lane].route.at(drivers[0].s).heading;
+  if (time_ > 1.5 * dt) {
+    // What a body that cannot turn at once would feel.
+    turn_rate_ += 0.2 * (wrap(heading - last_heading_) / dt - turn_rate_);
+  }
+  last_heading_ = heading;
+}
+
+EgoPose Traffic::ego() const {
+  const Driver& driver = drivers[0];
+  return {lanes[driver.lane].route.at(driver.s), driver.speed, driver.acceleration, turn_rate_};
+}
+
+std::vector<ObjectPose> Traffic::around(Vec2 centre, double radius) const {
+  std::vector<ObjectPose> result;
+  auto add = [&](const ObjectPose& pose) {
+    if (norm(pose.at.position - centre) < radius) result.push_back(pose);
+  };
+  for (const ObjectPose& pose : parked) add(pose);
+  for (std::size_t i = 1; i < drivers.size(); ++i) {
+    const Driver& driver = drivers[i];
+    if (!driver.active) continue;
+    add({static_cast<std::uint32_t>(driver.object), lanes[driver.lane].route.at(driver.s),
+         driver.speed, 1.1 * driver.s});
+  }
+  for (const Walker& walker : walkers) {
+    add({static_cast<std::uint32_t>(walker.object), {walker.position, walker.heading},
+         norm(walker.velocity), walker.phase});
+  }
+  return result;
+}
+
+}  // namespace dynains::simulation

@@ -1,0 +1,149 @@
+// Everybody's motion: vehicles follow routes and brake for what is in front; people walk to their
+// goals and give way to one another.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <utility>
+#include <vector>
+
+#include "simulation/footprints.hpp"
+#include "simulation/models.hpp"
+#include "simulation/random.hpp"
+#include "simulation/street.hpp"
+
+namespace dynains::simulation {
+
+/// Something with an instance id, moving or not.
+struct Object {
+  Kind kind = Kind::kCar;
+  Size size;
+  std::uint64_t seed = 0;
+  Model model;  ///< empty for people, whose shape changes
+};
+
+/// Where an object is at the time of one scan.
+struct ObjectPose {
+  std::uint32_t object = 0;
+  Waypoint at;
+  double speed = 0;
+  double phase = 0;   ///< of the gait, rad
+};
+
+struct EgoPose {
+  Waypoint at;
+  double speed = 0;
+  double acceleration = 0;
+  double turn_rate = 0;  ///< rad/s
+};
+
+/// Traffic light for two crossing streams.
+struct Signal {
+  double period = 40;
+  double phase = 0;
+  /// Stream 0 is the main street, 1 the side street.
+  bool is_red(double time, int stream) const;
+};
+
+struct StopLine {
+  double s = 0;
+  std::size_t signal = 0;
+  int stream = 0;
+};
+
+struct Lane {
+  Route route;
+  std::vector<StopLine> stop_lines;
+};
+
+class Traffic {
+ public:
+  struct Driver {
+    std::size_t object = 0;
+    std::size_t lane = 0;
+    double s = 0;        ///< of the vehicle's middle
+    double speed = 0;
+    double cruise = 10;  ///< m/s
+    double comfort = 1.5;  ///< m/s^2
+    bool stays_at_end = false;  ///< parks at the end of the route instead of leaving the world
+    bool waits_for_gap = false;  ///< starts only when nobody comes from behind
+    /// From `first` seconds on, `second` replaces `cruise`.
+    std::vector<std::pair<double, double>> schedule;
+    double acceleration = 0;
+    bool active = true;
+  };
+
+  struct Walker {
+    std::size_t object = 0;
+    Vec2 position;
+    double heading = 0;
+    std::vector<Vec2> goals;  ///< visited in order
+    bool there_and_back = true;
+    double pace = 1.3;   ///< m/s
+    double start = 0;    ///< s; stands still before
+    double stop = 1e9;   ///< s; stands still from then on
+    Vec2 velocity;
+    std::size_t goal = 0;
+    double phase = 0;
+  };
+
+  /// New vehicles enter a lane at its start.
+  struct Flow {
+    std::size_t lane = 0;
+    double spacing = 40;  ///< m, about
+    double speed = 12;    ///< m/s, about
+    double trucks = 0.1, buses = 0.05, vans = 0.15, cyclists = 0;  ///< shares
+    double next_gap = 0;
+  };
+
+  explicit Traffic(Random random) : random_(random) {}
+
+  FootprintSet fixed;  ///< what walkers walk around
+  std::vector<Object> objects;
+  std::vector<ObjectPose> parked;
+  std::vector<Lane> lanes;
+  std::vector<Signal> signals;
+  std::vector<Driver> drivers;  ///< the first is the ego vehicle
+  std::vector<Walker> walkers;
+  std::vector<Flow> flows;
+
+  std::size_t add_object(Kind kind);
+  std::size_t add_object(Kind kind, const Size& size);
+  std::size_t add_lane(Route route, std::vector<StopLine> stop_lines = {});
+  Driver& add_driver(std::size_t object, std::size_t lane, double s, double cruise);
+  /// Vehicles all along the lane at random gaps, except near drivers that are already there.
+  void fill(const Flow& flow);
+
+  /// Advances by `dt` seconds.
+  void step(double dt);
+  double time() const { return time_; }
+
+  EgoPose ego() const;
+  /// Everybody within `radius` of `centre`.
+  std::vector<ObjectPose> around(Vec2 centre, double radius) const;
+
+ private:
+  struct Body {
+    Footprint footprint;
+    Vec2 velocity;
+    std::size_t driver;  ///< or kNobody
+    bool person;
+  };
+
+  Kind random_kind(const Flow& flow);
+  void enter(Flow& flow, double s);
+  void collect_bodies(Vec2 centre, double radius);
+  double free_distance(const Driver& driver, std::size_t index, double reach,
+                       double& speed_ahead) const;
+  double wanted_acceleration(const Driver& driver, std::size_t index) const;
+  void walk(Walker& walker, double dt);
+
+  Random random_;
+  double time_ = 0;
+  std::vector<Body> bodies_;
+  double last_heading_ = 0;
+  double turn_rate_ = 0;
+};
+
+}  // namespace dynains::simulation

@@ -1,0 +1,49 @@
+// Everything that a scene consists of.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <unordered_map>
+#include <vector>
+
+#include "dynains/simulation/config.hpp"
+#include "simulation/terrain.hpp"
+#include "simulation/traffic.hpp"
+
+namespace dynains::simulation {
+
+/// Primitives that never move, found by place. World frame.
+class StaticGeometry {
+ public:
+  void add(const Rigid& T_world_model, const Model& model);
+  /// Calls `visitor(primitive, salt)` for the cells within `radius` of `centre`.
+  template <class Visitor>
+  void visit_near(Vec2 centre, double radius, Visitor&& visitor) const {
+    for (const Cell& cell : cells_) {
+      const Vec2 d = cell.centre - centre;
+      if (norm(d) > radius + kCell) continue;
+      for (const std::uint32_t i : cell.members) visitor(primitives_[i], std::uint64_t{i});
+    }
+  }
+
+ private:
+  static constexpr double kCell = 40.0;
+  struct Cell {
+    Vec2 centre;
+    std::vector<std::uint32_t> members;
+  };
+  std::vector<Primitive> primitives_;
+  std::vector<Cell> cells_;
+  std::unordered_map<std::uint64_t, std::size_t> cell_of_;
+};
+
+struct World {
+  Terrain terrain;
+  StaticGeometry statics;
+  Traffic traffic;
+};
+
+/// Builds the scene; nobody has moved yet.
+World build_world(const Config& config);
+
+}  // namespace dynains::simulation

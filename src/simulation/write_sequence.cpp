@@ -1,0 +1,58 @@
+#include "dynains/simulation/write_sequence.hpp"
+
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/kitti.hpp"
+
+namespace dynains::simulation {
+namespace {
+
+/// Sensor to camera axes, as in a KITTI recording: x right, y down, z forward.
+Eigen::Isometry3d camera_from_sensor() {
+  Eigen::Isometry3d Tr = Eigen::Isometry3d::Identity();
+  Tr.linear() << 0, -1, 0, 0, 0, -1, 1, 0, 0;
+  Tr.translation() << 0.0, -0.08, -0.27;
+  return Tr;
+}
+
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw IoError(folder.string() + ": cannot create the folder: " + error.message());
+}
+
+}  // namespace
+
+bool write_sequence(Simulator& simulator, const std::filesystem::path& folder,
+                    const std::function<bool(std::size_t, std::size_t)>& progress) {
+  make_folder(folder / "velodyne");
+  make_folder(folder / "labels");
+  const Eigen::Isometry3d Tr = camera_from_sensor();
+  const Eigen::Isometry3d Tr_inverse = Tr.inverse();
+  std::vector<Eigen::Isometry3d> poses, true_poses;
+  std::vector<double> times;
+  for (std::size_t i = 0; i < simulator.size(); ++i) {
+    const SimulatedScan scan = simulator.scan(i);
+    std::string name = std::to_string(i);
+    name.insert(0, name.size() < 6 ? 6 - name.size() : 0, '0');
+    write_scan(folder / "velodyne" / (name + ".bin"), scan.xyzi);
+    write_labels(folder / "labels" / (name + ".label"), scan.labels);
+    poses.push_back(Tr * scan.T_world_sensor_noisy * Tr_inverse);
+    true_poses.push_back(Tr * scan.T_world_sensor * Tr_inverse);
+    times.push_back(scan.time);
+    if (progress && !progress(i + 1, simulator.size())) return false;
+  }
+  write_calib(folder / "calib.txt", Tr);
+  write_times(folder / "times.txt", times);
+  const Config& config = simulator.config();
+  if (config.pose_noise_translation > 0 || config.pose_noise_rotation > 0) {
+    write_poses(folder / "poses_true.txt", true_poses);
+  }
+  write_poses(folder / "poses.txt", poses);
+  return true;
+}
+
+}  // namespace dynains::simulation
