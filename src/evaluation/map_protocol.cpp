@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "detail/cell_groups.hpp"
+#include "detail/nearest.hpp"
 #include "detail/preservation.hpp"
 #include "detail/range_gate.hpp"
 #include "detail/scan_voxels.hpp"
@@ -242,7 +243,7 @@ class MapProtocol::Impl {
     for (std::size_t rank = 0; rank < points.size(); ++rank) {
       const Truth truth = truth_of(cell, rank);
       const double distance = (map_[points[rank]] - point.p_world).squaredNorm();
-      if (truth == Truth::kIgnored || !(distance < nearest)) continue;
+      if (truth == Truth::kIgnored || !detail::is_nearer(distance, nearest)) continue;
       nearest = distance;
       point.truth = truth;
     }

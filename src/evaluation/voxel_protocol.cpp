@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "detail/nearest.hpp"
 #include "detail/preservation.hpp"
 #include "detail/range_gate.hpp"
 #include "detail/scan_voxels.hpp"
@@ -59,7 +60,7 @@ class VoxelProtocol::Impl {
         if ((layers >> layer & 1U) == 0) continue;
         Cell& cell = forks_[voxel.fork + layer];
         const double distance = (centroid - cell.centroid()).squaredNorm();
-        if (distance < nearest[layer]) {
+        if (detail::is_nearer(distance, nearest[layer])) {
           nearest[layer] = distance;
           cell.truths = truth_bit(truth);
         }
@@ -163,14 +164,17 @@ class VoxelProtocol::Impl {
     }
   }
 
-  /// Collects the voxels whose truth is not settled by what fell into them. They are forked:
-  /// the oracle holds the static part only.
+  /// Collects the voxels where the scans' points disagree in some layer. They are forked: a voxel
+  /// whose layers are equal in every scan holds no dynamic point, for the oracle holds none.
   void finish_first_pass() {
     if (finished_first_pass_) return;
     finished_first_pass_ = true;
     pending_.clear();
     for (const Voxel& voxel : voxels_) {
-      if (cell(voxel, kIdentity).truths == detail::kBothTruths) pending_.insert(voxel.key);
+      if (voxel.fork == kNotForked) continue;
+      for (std::size_t layer = 0; layer < layers_; ++layer) {
+        if (forks_[voxel.fork + layer].truths == detail::kBothTruths) pending_.insert(voxel.key);
+      }
     }
     nearest_.assign(pending_.size() * layers_, std::numeric_limits<double>::infinity());
   }

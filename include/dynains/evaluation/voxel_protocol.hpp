@@ -14,7 +14,7 @@
 namespace dynains::evaluation {
 
 /// One labelled point of a voxel map: the centroid of what fell into the voxel, with the class of
-/// the source point nearest to it (the first one among equals).
+/// the source point nearest to it (among equals, which are those within 1e-8 m^2, the first).
 struct VoxelPoint {
   Eigen::Vector3d p_world;  ///< m
   Truth truth;              ///< static or dynamic

@@ -2,11 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
+#include "detail/nearest.hpp"
 #include "detail/voxel_grid.hpp"
 #include "dynains/evaluation/truth.hpp"
 
@@ -124,7 +125,7 @@ class ScanVoxels {
     for (const auto* i = first; i != last; ++i) {
       if ((points_[*i].layers & layer) == 0) continue;
       const double distance = (points_[*i].p_world - center).squaredNorm();
-      if (distance < best) {
+      if (is_nearer(distance, best)) {
         best = distance;
         truth = points_[*i].truth;
       }

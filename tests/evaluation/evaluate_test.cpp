@@ -1,0 +1,200 @@
+#include "dynains/evaluation/evaluate.hpp"
+
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/evaluation/point_protocol.hpp"
+#include "dynains/evaluation/report.hpp"
+#include "scenes.hpp"
+#include "support/catch.hpp"
+
+namespace dynains::evaluation::testing {
+namespace {
+
+/// Road and a car (class 252, instance 7) that drives 1 m per scan of 0.1 s. Estimate 0 misses the
+/// car in scan 1 and loses half of the road in scan 2.
+std::vector<OwnedScan> street() {
+  std::vector<OwnedScan> scans(3);
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    scans[s].time = 0.1 * static_cast<double>(s);
+    for (int i = 0; i < 10; ++i) {
+      const auto y = 5.0F + static_cast<float>(i);
+      scans[s].add(4.0F, y, 0.5F, kRoad, s == 2 && i < 5 ? 0 : 1);
+    }
+    for (int i = 0; i < 4; ++i) {
+      scans[s].add(20.0F + static_cast<float>(s), 0.25F * static_cast<float>(i), 0.5F,
+                   kMovingCar | 7U << 16U, s == 1 ? 1 : 0);
+    }
+  }
+  return scans;
+}
+
+}  // namespace
+
+TEST_CASE("Point-wise accuracies are shares of the points of either truth") {
+  PointProtocol protocol({2.7, 50, TruthClasses()}, 1);
+  for (const OwnedScan& scan : street()) protocol.add(scan.view());
+  const PointScore& score = protocol.score(0);
+  CHECK(score.static_total == 30);
+  CHECK(score.static_kept == 25);
+  CHECK(score.dynamic_total == 12);
+  CHECK(score.dynamic_removed == 8);
+  CHECK(score.static_accuracy() == Approx(83.3333333));
+  CHECK(score.dynamic_accuracy() == Approx(66.6666667));
+  CHECK(score.associated_accuracy() == Approx(74.5355992));  // sqrt(83.33 * 66.67)
+  CHECK(score.harmonic_accuracy() == Approx(74.0740741));    // 2 * 83.33 * 66.67 / 150
+  CHECK(protocol.identity().static_accuracy() == 100.0);
+  CHECK(protocol.identity().dynamic_accuracy() == 0.0);
+  CHECK(protocol.oracle().harmonic_accuracy() == 100.0);
+}
+
+TEST_CASE("Every evaluation carries identity and oracle") {
+  const auto scans = street();
+  const Evaluation result = evaluate(source_of(scans), {"run"}, {});
+  REQUIRE(result.rows.size() == 3);
+  CHECK(result.scans == 3);
+  CHECK(result.points == 42);
+  CHECK(result.rows[0].name == "identity");
+  CHECK(result.rows[0].voxels.preservation_rate() == 100.0);
+  CHECK(result.rows[0].voxels.rejection_rate() == 0.0);
+  CHECK(result.rows[1].name == "oracle");
+  CHECK(result.rows[1].voxels.f1() == 1.0);
+  CHECK(result.rows[1].points.harmonic_accuracy() == 100.0);
+  // The road's voxels are held by other scans; the car's four voxels of scan 1 are kept.
+  CHECK(result.rows[2].voxels.preservation_rate() == 100.0);
+  CHECK(result.rows[2].voxels.dynamic_total == 12);
+  CHECK(result.rows[2].voxels.dynamic_preserved == 4);
+}
+
+TEST_CASE("A map of the kept points scores as the labels do where voxels are apart") {
+  const auto scans = street();
+  std::vector<Eigen::Vector3d> map;
+  for (const OwnedScan& scan : scans) {
+    for (std::size_t i = 0; i < scan.truth.size(); ++i) {
+      if (scan.in_map[i] != 0) map.push_back(scan.view().point(i));
+    }
+  }
+  const Evaluation result = evaluate(source_of(scans), {"run"}, {{"map.ply", map}});
+  REQUIRE(result.rows.size() == 4);
+  CHECK(result.rows[3].voxels.preservation_rate() == result.rows[2].voxels.preservation_rate());
+  CHECK(result.rows[3].voxels.rejection_rate() == result.rows[2].voxels.rejection_rate());
+  // Point-wise the map still covers the road that scan 2 lost.
+  CHECK(result.rows[3].points.static_accuracy() == 100.0);
+  CHECK(*result.rows[3].foreign_points == 0);
+}
+
+TEST_CASE("Errors are told by class, instance, range, cause and cluster") {
+  auto scans = street();
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    scans[s].causes.assign(14, static_cast<std::uint8_t>(Cause::kNoEvidence));
+    scans[s].instances.assign(14, kNoInstance);
+  }
+  // In scan 1 the car is one cluster with the last eight road points.
+  for (std::size_t i = 2; i < 14; ++i) scans[1].instances[i] = 3;
+  for (std::size_t i = 10; i < 14; ++i) {
+    scans[1].causes[i] = static_cast<std::uint8_t>(Cause::kSimilar);
+  }
+  // In scan 2 two road points were removed with the car.
+  for (std::size_t i : {0U, 1U, 10U, 11U, 12U, 13U}) scans[2].instances[i] = 4;
+
+  const Evaluation result = evaluate(source_of(scans), {"run"}, {});
+  REQUIRE(result.errors);
+  const auto classes = result.errors->by_class();
+  REQUIRE(classes.size() == 2);
+  CHECK(classes[0].id == 40);
+  CHECK(classes[0].counts.removed == 5);
+  CHECK(classes[1].id == 252);
+  CHECK(classes[1].truth == Truth::kDynamic);
+  CHECK(classes[1].counts.removed == 8);
+
+  const auto instances = result.errors->by_instance();
+  REQUIRE(instances.size() == 1);
+  CHECK(instances[0].instance == 7);
+  CHECK(instances[0].scans == 3);
+  CHECK(instances[0].counts.points == 12);
+  CHECK(instances[0].mean_range == Approx(21.0).margin(0.01));
+  REQUIRE(instances[0].speed);
+  CHECK(*instances[0].speed == Approx(10.0));
+
+  // Road at sqrt(16 + y^2) for y = 5...14: y = 9.17 is the border of 10 m, so 5 in the first ring.
+  const auto& rings = result.errors->by_range();
+  REQUIRE(rings.size() == 3);
+  CHECK(rings[0].score.static_total == 15);
+  CHECK(rings[0].score.static_kept == 10);
+  CHECK(rings[1].score.static_total == 15);
+  CHECK(rings[1].score.static_kept == 15);
+  CHECK(rings[2].from == 20.0);
+  CHECK(rings[2].score.dynamic_removed == 8);
+
+  const auto& causes = result.errors->by_cause();
+  CHECK(causes[static_cast<std::size_t>(Cause::kSimilar)].missed_dynamic == 4);
+  CHECK(causes[static_cast<std::size_t>(Cause::kNoEvidence)].lost_static == 5);
+  CHECK(causes[static_cast<std::size_t>(Cause::kNoEvidence)].right == 33);
+  CHECK(result.errors->merged().missed_dynamic == 4);
+  CHECK(result.errors->merged().lost_static == 2);
+
+  const std::string text = errors_to_table(result);
+  CHECK(text.find("moving-car") != std::string::npos);
+  CHECK(text.find("similarity too high") != std::string::npos);
+}
+
+TEST_CASE("Reports carry the same numbers") {
+  const auto scans = street();
+  const Evaluation result = evaluate(source_of(scans), {"my \"run\""}, {});
+  const auto json = nlohmann::json::parse(to_json(result));
+  CHECK(json["rows"].size() == 3);
+  CHECK(json["rows"][2]["name"] == "my \"run\"");
+  CHECK(json["rows"][2]["voxels"]["rr"].get<double>() == result.rows[2].voxels.rejection_rate());
+  CHECK(json["settings"]["voxel"] == 0.2);
+  CHECK(json["settings"]["unlabeled"] == "ignore");
+  CHECK(json["errors"]["by_class"].size() == 2);
+  const std::string csv = to_csv(result);
+  CHECK(csv.find("\"my \"\"run\"\"\",100.000000,66.666667,0.800000,") != std::string::npos);
+  CHECK(to_table(result).find("66.667") != std::string::npos);
+
+  // A share of nothing is no number anywhere.
+  const Evaluation nothing = evaluate([](std::size_t, LabelledScan&) { return false; }, {}, {});
+  CHECK(nlohmann::json::parse(to_json(nothing))["rows"][0]["voxels"]["pr"].is_null());
+  CHECK(to_csv(nothing).find("nan") == std::string::npos);
+  CHECK(errors_to_table(nothing).empty());
+}
+
+TEST_CASE("Malformed scans and settings are refused by name") {
+  auto scans = street();
+  scans[1].in_map.pop_back();
+  CHECK_THROWS_WITH(evaluate(source_of(scans), {"run"}, {}),
+                    "scan 1 has 14 points but 13 verdicts");
+  scans = street();
+  scans[0].causes.assign(3, 0);
+  CHECK_THROWS_AS(evaluate(source_of(scans), {"run"}, {}), std::invalid_argument);
+
+  EvaluationConfig config;
+  config.voxel = 0;
+  CHECK_THROWS_AS(evaluate(source_of(scans), {}, {}, config), ConfigError);
+}
+
+TEST_CASE("Class lists are ids and ranges") {
+  const TruthClasses moving;
+  CHECK(moving(252) == Truth::kDynamic);
+  CHECK(moving(258) == Truth::kDynamic);
+  CHECK(moving(259 | 5U << 16U) == Truth::kDynamic);
+  CHECK(moving(251) == Truth::kStatic);
+  CHECK(moving(260) == Truth::kStatic);
+  CHECK(moving(0) == Truth::kIgnored);
+  CHECK(moving(1) == Truth::kIgnored);
+  CHECK(TruthClasses(Unlabeled::kStatic)(1) == Truth::kStatic);
+  CHECK(moving.dynamic_classes() == "252-259");
+
+  const TruthClasses own("9,3-5", Unlabeled::kIgnore);
+  CHECK(own(4) == Truth::kDynamic);
+  CHECK(own(6) == Truth::kStatic);
+  CHECK(own.dynamic_classes() == "3-5,9");
+  for (const char* list : {"", "x", "5-3", "1,", "1;2", "65536", "-1", "1-"}) {
+    CHECK_THROWS_AS(TruthClasses(list, Unlabeled::kIgnore), ConfigError);
+  }
+}
+
+}  // namespace dynains::evaluation::testing

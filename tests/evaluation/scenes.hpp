@@ -1,0 +1,99 @@
+// Small labelled scans for the tests of the evaluation.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "dynains/evaluation/scan.hpp"
+#include "dynains/evaluation/truth.hpp"
+
+namespace dynains::evaluation::testing {
+
+inline constexpr std::uint32_t kRoad = 40;
+inline constexpr std::uint32_t kMovingCar = 252;
+
+/// A scan that owns its data.
+struct OwnedScan {
+  std::vector<float> xyz;
+  std::vector<std::uint32_t> truth;
+  std::vector<std::uint8_t> in_map;
+  std::vector<std::uint8_t> causes;
+  std::vector<std::uint32_t> instances;
+  Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+  double time = 0;
+
+  void add(float x, float y, float z, std::uint32_t label, unsigned held_by = 0) {
+    xyz.insert(xyz.end(), {x, y, z});
+    truth.push_back(label);
+    in_map.push_back(static_cast<std::uint8_t>(held_by));
+  }
+
+  LabelledScan view() const {
+    LabelledScan scan;
+    scan.xyz = xyz.data();
+    scan.T_world_sensor = T_world_sensor;
+    scan.time = time;
+    scan.truth = truth;
+    scan.in_map = in_map;
+    scan.causes = causes;
+    scan.instances = instances;
+    return scan;
+  }
+};
+
+inline ScanSource source_of(const std::vector<OwnedScan>& scans) {
+  return [&scans](std::size_t index, LabelledScan& scan) {
+    if (index >= scans.size()) return false;
+    scan = scans[index].view();
+    return true;
+  };
+}
+
+/// The same numbers from every standard library.
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : engine_(seed) {}
+  /// In [min, max).
+  double uniform(double min, double max) {
+    return min + (max - min) * static_cast<double>(engine_() >> 11U) * 0x1p-53;
+  }
+  bool chance(double probability) { return uniform(0, 1) < probability; }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+/// Scans of a small box of points in which truths, ignored points and two estimates mix in most
+/// voxels of 0.2 m; the sensor turns and moves, some points are no return or not finite.
+inline std::vector<OwnedScan> mixed_scans(std::uint64_t seed, std::size_t scans,
+                                          std::size_t points_per_scan) {
+  Random random(seed);
+  std::vector<OwnedScan> result(scans);
+  for (std::size_t s = 0; s < scans; ++s) {
+    OwnedScan& scan = result[s];
+    scan.T_world_sensor = Eigen::Translation3d(500.0 + random.uniform(0, 0.5), -300.0, 2.0) *
+                          Eigen::AngleAxisd(random.uniform(-0.2, 0.2), Eigen::Vector3d::UnitZ());
+    scan.time = 0.1 * static_cast<double>(s);
+    for (std::size_t i = 0; i < points_per_scan; ++i) {
+      const bool moving = random.chance(0.4);
+      const std::uint32_t label = random.chance(0.1) ? 0 : moving ? kMovingCar : kRoad;
+      // Estimate 0 mostly right, estimate 1 nearly a coin.
+      const unsigned held =
+          (random.chance(moving ? 0.2 : 0.8) ? 1U : 0U) | (random.chance(0.5) ? 2U : 0U);
+      auto x = static_cast<float>(random.uniform(0.5, 3.0));
+      const auto y = static_cast<float>(random.uniform(-1.5, 1.5));
+      const auto z = static_cast<float>(random.uniform(-0.3, 0.6));
+      if (random.chance(0.01)) x = std::numeric_limits<float>::quiet_NaN();
+      if (random.chance(0.01)) {
+        scan.add(0, 0, 0, label, held);
+      } else {
+        scan.add(x, y, z, label, held);
+      }
+    }
+  }
+  return result;
+}
+
+}  // namespace dynains::evaluation::testing

@@ -1,0 +1,235 @@
+#include "dynains/evaluation/voxel_protocol.hpp"
+
+#include <limits>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "reference.hpp"
+#include "scenes.hpp"
+#include "support/catch.hpp"
+
+namespace dynains::evaluation::testing {
+namespace {
+
+VoxelProtocol::Settings settings(double voxel, double min_range = 0, double max_range = 0,
+                                 Unlabeled unlabeled = Unlabeled::kIgnore) {
+  return {voxel, min_range, max_range, TruthClasses(unlabeled)};
+}
+
+VoxelProtocol run(const std::vector<OwnedScan>& scans, const VoxelProtocol::Settings& with,
+                  std::size_t estimates) {
+  VoxelProtocol protocol(with, estimates);
+  for (const OwnedScan& scan : scans) protocol.add(scan.view());
+  for (const OwnedScan& scan : scans) protocol.resolve(scan.view());
+  return protocol;
+}
+
+VoxelScore estimate_score(const std::vector<OwnedScan>& scans, double voxel = 1.0) {
+  return run(scans, settings(voxel), 1).score(VoxelProtocol::kFirstEstimate);
+}
+
+std::vector<VoxelPoint> map_of(const VoxelProtocol& protocol, std::size_t row) {
+  std::vector<VoxelPoint> points;
+  protocol.for_each(row, [&](const VoxelPoint& point) { points.push_back(point); });
+  return points;
+}
+
+}  // namespace
+
+TEST_CASE("PR and RR count voxel points of the raw map") {
+  // Four static voxels, one of them removed; two dynamic voxels, one of them kept.
+  OwnedScan scan;
+  scan.add(0.5F, 0.5F, 0.5F, kRoad, 1);
+  scan.add(0.6F, 0.5F, 0.5F, kRoad, 1);  // same voxel: counts once
+  scan.add(2.5F, 0.5F, 0.5F, kRoad, 1);
+  scan.add(4.5F, 0.5F, 0.5F, kRoad, 1);
+  scan.add(6.5F, 0.5F, 0.5F, kRoad, 0);
+  scan.add(8.5F, 0.5F, 0.5F, kMovingCar, 0);
+  scan.add(10.5F, 0.5F, 0.5F, kMovingCar, 1);
+  const VoxelScore score = estimate_score({scan});
+  CHECK(score.static_total == 4);
+  CHECK(score.dynamic_total == 2);
+  CHECK(score.preservation_rate() == Approx(75.0));
+  CHECK(score.rejection_rate() == Approx(50.0));
+  CHECK(score.f1() == Approx(0.6));  // 2 * 75 * 50 / 125
+}
+
+TEST_CASE("A voxel without estimate is preserved by a near point beyond its boundary") {
+  // 0.9 and 1.1 lie in two voxels, 0.2 apart; the estimate holds the second only.
+  OwnedScan near;
+  near.add(0.9F, 0.5F, 0.5F, kRoad, 0);
+  near.add(1.1F, 0.5F, 0.5F, kRoad, 1);
+  CHECK(estimate_score({near}).static_preserved == 2);
+
+  // 0.1 and 1.1: 1.0 apart, which is more than sqrt(3) / 2.
+  OwnedScan far;
+  far.add(0.1F, 0.5F, 0.5F, kRoad, 0);
+  far.add(1.1F, 0.5F, 0.5F, kRoad, 1);
+  CHECK(estimate_score({far}).static_preserved == 1);
+
+  // Around zero: truncation instead of floor would put both into one voxel, and count one.
+  OwnedScan around_zero;
+  around_zero.add(-0.1F, 0.5F, 0.5F, kRoad, 1);
+  around_zero.add(0.1F, 0.5F, 0.5F, kRoad, 1);
+  CHECK(estimate_score({around_zero}).static_total == 2);
+}
+
+TEST_CASE("The radius is sqrt(3) / 2 of an edge, exclusive") {
+  // sqrt(3) / 2 = 0.8660; voxels [0, 1) and [1, 2).
+  const auto preserved = [](float kept) {
+    OwnedScan scan;
+    scan.add(0.25F, 0.5F, 0.5F, kRoad, 0);
+    scan.add(kept, 0.5F, 0.5F, kRoad, 1);
+    return estimate_score({scan}).static_preserved;
+  };
+  CHECK(preserved(1.115F) == 2);  // 0.865 apart
+  CHECK(preserved(1.117F) == 1);  // 0.867 apart
+}
+
+TEST_CASE("A voxel is lost within itself if the estimate keeps its far corner only") {
+  // Raw centroid (9 * 0.05 + 0.95) / 10 = 0.14 in every axis, estimate 0.95: 1.40 apart.
+  OwnedScan scan;
+  for (int i = 0; i < 9; ++i) scan.add(0.05F, 0.05F, 0.05F, kRoad, 0);
+  scan.add(0.95F, 0.95F, 0.95F, kRoad, 1);
+  const VoxelScore score = estimate_score({scan});
+  CHECK(score.static_total == 1);
+  CHECK(score.static_preserved == 0);
+}
+
+TEST_CASE("A voxel takes the class of the point nearest to its centroid, not of most points") {
+  // Centroid 0.45: the dynamic point at 0.5 is nearest although most points are static.
+  OwnedScan scan;
+  scan.add(0.1F, 0.5F, 0.5F, kRoad, 1);
+  scan.add(0.15F, 0.5F, 0.5F, kRoad, 1);
+  scan.add(0.5F, 0.5F, 0.5F, kMovingCar, 1);
+  scan.add(0.95F, 0.5F, 0.5F, kRoad, 1);
+  scan.add(0.55F, 0.5F, 0.5F, kMovingCar, 1);
+  const auto raw = map_of(run({scan}, settings(1.0), 1), VoxelProtocol::kIdentity);
+  REQUIRE(raw.size() == 1);
+  CHECK(raw[0].p_world.x() == Approx(0.45));
+  CHECK(raw[0].truth == Truth::kDynamic);
+}
+
+TEST_CASE("Each scan counts once in a voxel, however many points it has there") {
+  // Scan 0: ten static points at 0.1. Scan 1: one dynamic at 0.5. Scan 2: one dynamic at 0.6.
+  // Centroid of the scans' points (0.1 + 0.5 + 0.6) / 3 = 0.4: dynamic. Over all twelve points it
+  // would be 0.175: static.
+  std::vector<OwnedScan> scans(3);
+  for (int i = 0; i < 10; ++i) scans[0].add(0.1F, 0.5F, 0.5F, kRoad, 1);
+  scans[1].add(0.5F, 0.5F, 0.5F, kMovingCar, 1);
+  scans[2].add(0.6F, 0.5F, 0.5F, kMovingCar, 1);
+  const VoxelProtocol protocol = run(scans, settings(1.0), 1);
+  const auto raw = map_of(protocol, VoxelProtocol::kIdentity);
+  REQUIRE(raw.size() == 1);
+  CHECK(raw[0].p_world.x() == Approx(0.4));
+  CHECK(raw[0].truth == Truth::kDynamic);
+  // The oracle keeps the static point, 0.3 from the raw one: near, but of the other class.
+  CHECK(protocol.score(VoxelProtocol::kOracle).dynamic_preserved == 0);
+}
+
+TEST_CASE("Ranges are planar and inclusive, and are measured in the sensor frame") {
+  OwnedScan scan;
+  scan.T_world_sensor.translation().x() = 1000;
+  scan.add(2.6F, 0.0F, 9.0F, kRoad, 1);   // too near, however high
+  scan.add(2.75F, 0.0F, 0.0F, kRoad, 1);  // in
+  scan.add(0.0F, 50.0F, 0.0F, kRoad, 1);  // in, at the limit
+  scan.add(0.0F, 50.1F, 0.0F, kRoad, 1);  // too far
+  CHECK(run({scan}, settings(0.01, 2.7, 50), 1).score(0).static_total == 2);
+}
+
+TEST_CASE("Unlabeled points are static or belong to no map, for raw and estimate alike") {
+  OwnedScan scan;
+  scan.add(5.5F, 0.5F, 0.5F, kRoad, 0);
+  scan.add(5.9F, 0.5F, 0.5F, 0, 1);  // 0.4 from the removed road point
+  const VoxelScore ignored = run({scan}, settings(1.0), 1).score(VoxelProtocol::kFirstEstimate);
+  CHECK(ignored.static_total == 1);
+  CHECK(ignored.static_preserved == 0);
+  const VoxelScore kept =
+      run({scan}, settings(1.0, 0, 0, Unlabeled::kStatic), 1).score(VoxelProtocol::kFirstEstimate);
+  CHECK(kept.static_total == 1);
+  CHECK(kept.static_preserved == 1);
+}
+
+TEST_CASE("Streaming equals the all-at-once reference", "[reference]") {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const auto scans = mixed_scans(seed, 6, 900);
+    for (const Unlabeled unlabeled : {Unlabeled::kIgnore, Unlabeled::kStatic}) {
+      const auto with = settings(0.2, 0.8, 2.9, unlabeled);
+      const VoxelProtocol protocol = run(scans, with, 2);
+      const std::vector<Chosen> rows = {
+          [](const OwnedScan&, std::size_t, Truth) { return true; },
+          [](const OwnedScan&, std::size_t, Truth truth) { return truth == Truth::kStatic; },
+          [](const OwnedScan& scan, std::size_t i, Truth) { return (scan.in_map[i] & 1U) != 0; },
+          [](const OwnedScan& scan, std::size_t i, Truth) { return (scan.in_map[i] & 2U) != 0; }};
+      const auto raw = reference_map(scans, with, rows[0]);
+      REQUIRE(raw.size() > 500);
+      for (std::size_t row = 0; row < rows.size(); ++row) {
+        const auto estimate = reference_map(scans, with, rows[row]);
+        CHECK(map_of(protocol, row).size() == estimate.size());
+        CHECK(same(protocol.score(row), reference_score(raw, estimate, with.voxel)));
+      }
+      // The scene is hard enough to tell a wrong rule from a right one.
+      const VoxelScore score = protocol.score(VoxelProtocol::kFirstEstimate);
+      CHECK(score.preservation_rate() < 95);
+      CHECK(score.rejection_rate() < 95);
+    }
+  }
+}
+
+TEST_CASE("Identity preserves everything; the oracle rejects everything dynamic") {
+  const auto scans = mixed_scans(7, 5, 800);
+  const VoxelProtocol protocol = run(scans, settings(0.2), 0);
+  const VoxelScore identity = protocol.score(VoxelProtocol::kIdentity);
+  CHECK(identity.preservation_rate() == 100.0);
+  CHECK(identity.rejection_rate() == 0.0);
+  CHECK(protocol.score(VoxelProtocol::kOracle).rejection_rate() == 100.0);
+
+  // Where truths do not share voxels, the oracle is perfect.
+  OwnedScan apart;
+  for (int i = 0; i < 50; ++i) {
+    apart.add(5.0F + 0.1F * static_cast<float>(i), 3.0F, 0.1F, kRoad);
+    apart.add(5.0F + 0.1F * static_cast<float>(i), 5.0F, 0.1F, kMovingCar);
+  }
+  const VoxelScore oracle = run({apart}, settings(0.2), 0).score(VoxelProtocol::kOracle);
+  CHECK(oracle.static_total > 20);
+  CHECK(oracle.preservation_rate() == 100.0);
+  CHECK(oracle.rejection_rate() == 100.0);
+  CHECK(oracle.f1() == 1.0);
+}
+
+TEST_CASE("Coordinates of a national grid do not change the score") {
+  auto scans = mixed_scans(11, 4, 600);
+  const VoxelScore here = run(scans, settings(0.25), 2).score(2);
+  // Multiples of the edge that are exact in binary, so that the same points share voxels.
+  for (OwnedScan& scan : scans) {
+    scan.T_world_sensor.pretranslate(Eigen::Vector3d(500000.0, 5400000.0, 256.0));
+  }
+  const VoxelScore there = run(scans, settings(0.25), 2).score(2);
+  CHECK(here.static_total == there.static_total);
+  CHECK(same(here, there));
+}
+
+TEST_CASE("Nothing to judge gives shares of nothing, not numbers") {
+  const VoxelProtocol nothing = run({}, settings(0.2), 1);
+  CHECK(std::isnan(nothing.score(0).preservation_rate()));
+  CHECK(std::isnan(nothing.score(0).f1()));
+
+  OwnedScan bad;
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kInf = std::numeric_limits<float>::infinity();
+  bad.add(kNan, 5.0F, 0.0F, kRoad, 1);
+  bad.add(5.0F, 5.0F, kInf, kRoad, 1);
+  bad.add(0.0F, 0.0F, 0.0F, kRoad, 1);
+  bad.add(1e30F, 0.0F, 0.0F, kRoad, 1);  // out of the grid's reach
+  CHECK(run({bad}, settings(0.2), 1).score(0).static_total == 0);
+}
+
+TEST_CASE("Settings out of bounds are refused") {
+  CHECK_THROWS_AS(VoxelProtocol(settings(0.0), 1), ConfigError);
+  CHECK_THROWS_AS(VoxelProtocol(settings(0.2, -1.0), 1), ConfigError);
+  CHECK_THROWS_AS(VoxelProtocol(settings(0.2, 3.0, 2.0), 1), ConfigError);
+  CHECK_THROWS_AS(VoxelProtocol(settings(0.2), kMaxEstimates + 1), ConfigError);
+  CHECK_NOTHROW(VoxelProtocol(settings(0.2), kMaxEstimates));
+}
+
+}  // namespace dynains::evaluation::testing
