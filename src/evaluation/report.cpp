@@ -2,49 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
 #include <nlohmann/json.hpp>
 #include <sstream>
-#include <type_traits>
 #include <vector>
+
+#include "dynains/evaluation/text_table.hpp"
 
 namespace dynains::evaluation {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-std::string number(double value, int decimals, const char* missing = "-") {
-  if (!std::isfinite(value)) return missing;
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(decimals) << value;
-  return text.str();
-}
-
-/// Right-aligned columns but the first, with widths from the contents.
-class Table {
- public:
-  explicit Table(std::vector<std::string> header) { add(std::move(header)); }
-  void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
-
-  std::string to_string() const {
-    std::vector<std::size_t> widths(rows_.front().size(), 0);
-    for (const auto& row : rows_) {
-      for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], row[c].size());
-    }
-    std::ostringstream text;
-    for (const auto& row : rows_) {
-      for (std::size_t c = 0; c < row.size(); ++c) {
-        text << (c == 0 ? "" : "  ") << (c == 0 ? std::left : std::right)
-             << std::setw(static_cast<int>(widths[c])) << row[c];
-      }
-      text << '\n';
-    }
-    return text.str();
-  }
-
- private:
-  std::vector<std::vector<std::string>> rows_;
-};
 
 const char* name(Truth truth) { return truth == Truth::kDynamic ? "dynamic" : "static"; }
 const char* name(Unlabeled unlabeled) {
@@ -52,8 +19,8 @@ const char* name(Unlabeled unlabeled) {
 }
 
 std::string range_text(double min, double max) {
-  std::string text = number(min, 1) + " m ";
-  return max > 0 ? text + "to " + number(max, 1) + " m" : text + "and farther";
+  std::string text = format_number(min, 1) + " m ";
+  return max > 0 ? text + "to " + format_number(max, 1) + " m" : text + "and farther";
 }
 
 Json json_number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
@@ -143,15 +110,15 @@ std::string worst_instances(const ErrorAnalysis& errors, Truth truth, std::size_
   std::stable_sort(instances.begin(), instances.end(),
                    [&](const auto& a, const auto& b) { return wrong(a) > wrong(b); });
   const bool dynamic = truth == Truth::kDynamic;
-  Table table({dynamic ? "dynamic instance" : "static instance", "id", "points",
-               dynamic ? "missed" : "lost", "removed %", "scans", "range m", "speed m/s"});
+  TextTable table({dynamic ? "dynamic instance" : "static instance", "id", "points",
+                   dynamic ? "missed" : "lost", "removed %", "scans", "range m", "speed m/s"});
   const std::size_t shown = std::min(max_instances, instances.size());
   for (std::size_t i = 0; i < shown; ++i) {
     const auto& one = instances[i];
     table.add({semantic_class_name(one.class_id), std::to_string(one.instance),
                std::to_string(one.counts.points), std::to_string(wrong(one)),
-               number(one.counts.removed_percent(), 2), std::to_string(one.scans),
-               number(one.mean_range, 1), one.speed ? number(*one.speed, 2) : "-"});
+               format_number(one.counts.removed_percent(), 2), std::to_string(one.scans),
+               format_number(one.mean_range, 1), one.speed ? format_number(*one.speed, 2) : "-"});
   }
   std::string text = '\n' + table.to_string();
   if (shown < instances.size()) {
@@ -168,16 +135,17 @@ std::string to_table(const Evaluation& evaluation) {
   text << evaluation.scans << " scans, " << evaluation.points << " points; dynamic: classes "
        << config.truth.dynamic_classes() << "; unlabeled: " << name(config.truth.unlabeled())
        << '\n'
-       << "PR RR F1: voxels of " << number(config.voxel, 3) << " m, "
+       << "PR RR F1: voxels of " << format_number(config.voxel, 3) << " m, "
        << range_text(config.min_range, config.max_range)
        << "; SA DA AA HA: " << range_text(config.min_range, config.point_max_range) << '\n';
-  Table table({"", "PR %", "RR %", "F1", "SA %", "DA %", "AA %", "HA %"});
+  TextTable table({"", "PR %", "RR %", "F1", "SA %", "DA %", "AA %", "HA %"});
   for (const EvaluationRow& row : evaluation.rows) {
-    table.add({row.name, number(row.voxels.preservation_rate(), 3),
-               number(row.voxels.rejection_rate(), 3), number(row.voxels.f1(), 4),
-               number(row.points.static_accuracy(), 3), number(row.points.dynamic_accuracy(), 3),
-               number(row.points.associated_accuracy(), 3),
-               number(row.points.harmonic_accuracy(), 3)});
+    table.add({row.name, format_number(row.voxels.preservation_rate(), 3),
+               format_number(row.voxels.rejection_rate(), 3), format_number(row.voxels.f1(), 4),
+               format_number(row.points.static_accuracy(), 3),
+               format_number(row.points.dynamic_accuracy(), 3),
+               format_number(row.points.associated_accuracy(), 3),
+               format_number(row.points.harmonic_accuracy(), 3)});
   }
   text << table.to_string();
   for (const EvaluationRow& row : evaluation.rows) {
@@ -197,30 +165,31 @@ std::string errors_to_table(const Evaluation& evaluation, std::size_t max_instan
   const ErrorAnalysis& errors = *evaluation.errors;
   std::string text;
 
-  Table classes({"class", "id", "truth", "points", "removed", "removed %"});
+  TextTable classes({"class", "id", "truth", "points", "removed", "removed %"});
   for (const auto& one : errors.by_class()) {
     classes.add({semantic_class_name(one.id), std::to_string(one.id), name(one.truth),
                  std::to_string(one.counts.points), std::to_string(one.counts.removed),
-                 number(one.counts.removed_percent(), 2)});
+                 format_number(one.counts.removed_percent(), 2)});
   }
   text += classes.to_string();
 
   text += worst_instances(errors, Truth::kDynamic, max_instances);
   text += worst_instances(errors, Truth::kStatic, max_instances);
 
-  Table rings({"range m", "static", "lost", "SA %", "dynamic", "missed", "DA %"});
+  TextTable rings({"range m", "static", "lost", "SA %", "dynamic", "missed", "DA %"});
   for (const auto& ring : errors.by_range()) {
     const PointScore& score = ring.score;
-    rings.add({number(ring.from, 0) + "-" + number(ring.to, 0), std::to_string(score.static_total),
+    rings.add({format_number(ring.from, 0) + "-" + format_number(ring.to, 0),
+               std::to_string(score.static_total),
                std::to_string(score.static_total - score.static_kept),
-               number(score.static_accuracy(), 2), std::to_string(score.dynamic_total),
+               format_number(score.static_accuracy(), 2), std::to_string(score.dynamic_total),
                std::to_string(score.dynamic_total - score.dynamic_removed),
-               number(score.dynamic_accuracy(), 2)});
+               format_number(score.dynamic_accuracy(), 2)});
   }
   text += '\n' + rings.to_string();
 
   if (errors.has_causes()) {
-    Table causes({"cause", "missed dynamic", "lost static", "right"});
+    TextTable causes({"cause", "missed dynamic", "lost static", "right"});
     for (std::size_t c = 0; c < kCauseCount; ++c) {
       const auto& cause = errors.by_cause()[c];
       if (cause.missed_dynamic + cause.lost_static + cause.right == 0) continue;
@@ -274,7 +243,7 @@ std::string to_csv(const Evaluation& evaluation) {
          {row.voxels.preservation_rate(), row.voxels.rejection_rate(), row.voxels.f1(),
           row.points.static_accuracy(), row.points.dynamic_accuracy(),
           row.points.associated_accuracy(), row.points.harmonic_accuracy()}) {
-      text << ',' << number(value, 6, "");
+      text << ',' << format_number(value, 6, "");
     }
     for (const std::uint64_t value :
          {row.voxels.static_total, row.voxels.static_preserved, row.voxels.dynamic_total,
