@@ -40,6 +40,11 @@ class Random {
   /// In [0, 1).
   double unit() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
   double uniform(double min, double max) { return min + (max - min) * unit(); }
+  /// Uniform magnitude with a random sign.
+  double either_sign(double min, double max) {
+    const double magnitude = uniform(min, max);
+    return (bits() & 1) != 0 ? magnitude : -magnitude;
+  }
   double normal() { return static_cast<double>(normal_float(bits())); }
   bool chance(double probability) { return unit() < probability; }
   /// In [0, count).

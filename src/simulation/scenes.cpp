@@ -39,7 +39,7 @@ struct Frontage {
   double height = 12;       ///< m, about
   double street_trees = 0.6;
   double poles = 0.6;
-  double gardens = 0.5;     ///< hedges, fences, bushes and trees on open plots
+  double gardens = 0.85;    ///< hedges, fences, bushes and trees on open plots
   double parked = 0.6;      ///< share of parking places in use
   double furniture = 0.5;
 };
@@ -94,13 +94,14 @@ class Builder {
 
   void tree(Vec2 at, double height, double radius, double clear) {
     Random random = random_.fork(random_.bits());
-    place(tree_model(height, radius, clear, random), {at, random.uniform(0, 6), 0.35, 0.35}, 0.2);
+    const double heading = random.uniform(0, 2 * kPi);
+    place(tree_model(height, radius, clear, random), {at, heading, 0.35, 0.35}, 0.2);
   }
 
   void bush(Vec2 at, double radius, double height) {
     Random random = random_.fork(random_.bits());
-    place(bush_model(radius, height, random),
-          {at, random.uniform(0, 6), 0.8 * radius, 0.8 * radius}, 0.2);
+    const double heading = random.uniform(0, 2 * kPi);
+    place(bush_model(radius, height, random), {at, heading, 0.8 * radius, 0.8 * radius}, 0.2);
   }
 
   void park(const Waypoint& at, Kind kind) {
@@ -219,10 +220,10 @@ class Builder {
         place(fence_model(front, height, which < 0.65), strip, 0);
       }
     }
-    const auto plants = static_cast<int>(1 + random_.index(4));
+    const auto plants = static_cast<int>(3 + random_.index(7));
     for (int i = 0; i < plants; ++i) {
-      const double along = s + random_.uniform(1, front), deep = back + random_.uniform(2.5, 14);
-      const bool is_tree = random_.chance(0.5);
+      const double along = s + random_.uniform(1, front), deep = back + random_.uniform(2, 22);
+      const bool is_tree = random_.chance(0.45);
       const double size = random_.unit();
       const Vec2 p = at(along, deep, 0).position;
       if (world_.terrain.distance_to_street(p) < 3) continue;
@@ -302,7 +303,7 @@ class Builder {
     for (int i = 0; i < number; ++i) {
       const int side = random_.chance(0.5) ? 1 : -1;
       const double s = random_.uniform(from, to);
-      const double run = random_.uniform(30, 80) * (random_.chance(0.5) ? 1 : -1);
+      const double run = random_.either_sign(30, 80);
       const double lateral =
           street.half_width + random_.uniform(1.2, std::max(1.3, street.pavement - 0.4));
       const double pace = random_.uniform(0.9, 1.7);
@@ -489,7 +490,7 @@ struct StreetLanes {
 };
 
 StreetLanes add_crossing_traffic(Builder& builder, const std::vector<Crossing>& crossings,
-                                 double speed, double main_spacing, bool fill_forward) {
+                                 double speed) {
   Traffic& traffic = builder.traffic();
   Random& random = builder.random();
   const Street& main = builder.street(0);
@@ -505,8 +506,6 @@ StreetLanes add_crossing_traffic(Builder& builder, const std::vector<Crossing>& 
   }
   const StreetLanes lanes{builder.lane(main, -kLaneHalf, forward),
                           builder.lane(main, kLaneHalf, backward)};
-  (void)fill_forward;
-  (void)main_spacing;
   for (std::size_t i = 0; i < crossings.size() && builder.lively(); ++i) {
     const Street& side = builder.street(crossings[i].street);
     const double middle = side.centre.length() / 2;
@@ -599,7 +598,7 @@ World urban(const Config& config) {
   ground.hill_slope = random.uniform(0.005, 0.03);
   Builder builder(config, ground, std::move(streets));
 
-  const StreetLanes lanes = add_crossing_traffic(builder, crossings, speed, 30, true);
+  const StreetLanes lanes = add_crossing_traffic(builder, crossings, speed);
   builder.ego(lanes.forward, kBefore, speed);
   const double end = kBefore + travel(config, speed) + 40;
   if (builder.lively()) {
@@ -629,6 +628,567 @@ World urban(const Config& config) {
   return builder.finish();
 }
 
+/// Rails, walls or hedges along a street at a fixed distance from its centre line.
+void add_barrier(Builder& builder, const Street& street, double lateral, double piece,
+                 const std::function<Model(Random&)>& model) {
+  for (double s = piece / 2; s < street.centre.length() - piece / 2; s += piece) {
+    Random random = builder.random().fork(builder.random().bits());
+    const Waypoint at = street.centre.beside(s, lateral);
+    builder.traffic().fixed.add({at.position, at.heading, piece / 2, 0.1});
+    builder.place_anyway(model(random), at);
+  }
+}
+
+World highway(const Config& config) {
+  const double speed = 25;
+  Random random(mix(config.seed, 77));
+  const double length = 2 * kBefore + travel(config, speed) + 30;
+  const double median = random.uniform(0.9, 2.5), lane_width = 3.7;
+  const double inner = median + 0.5 + lane_width / 2, outer = inner + lane_width;
+  const double edge = outer + lane_width / 2 + 2.6;
+  std::vector<Street> streets;
+  streets.push_back({route_of_bends(winding(random, length, 0.0022, 0, 17)), edge, 0});
+  TerrainConfig ground;
+  ground.hill_slope = random.uniform(0.005, 0.025);
+  ground.hill_length = 400;
+  ground.kerb = 0;
+  ground.roughness = 0.1;
+  Builder builder(config, ground, std::move(streets));
+  Traffic& traffic = builder.traffic();
+  const Street& street = builder.street(0);
+
+  const std::size_t right = builder.lane(street, -outer), left = builder.lane(street, -inner);
+  const std::size_t far_left = builder.lane(street, inner), far_right = builder.lane(street, outer);
+  const bool ego_right = random.chance(0.65);
+  builder.ego(ego_right ? right : left, kBefore, speed);
+  if (builder.lively()) {
+    const double cruise = traffic.drivers[0].cruise;
+    const auto lead_kind = random.chance(0.3) ? Kind::kTruck : Kind::kCar;
+    const std::size_t lead = traffic.add_object(lead_kind);
+    traffic.add_driver(lead, ego_right ? right : left, kBefore + random.uniform(32, 48), cruise);
+    fill_lane(builder, right, 70, 0.93 * speed, 0.35, 0.05, 0);
+    fill_lane(builder, left, 65, 1.2 * speed, 0.02, 0.02, 0);
+    fill_lane(builder, far_left, 65, 1.2 * speed, 0.02, 0.02, 0);
+    fill_lane(builder, far_right, 60, 0.93 * speed, 0.35, 0.05, 0);
+  }
+  auto rail = [](Random&) { return guard_rail_model(8); };
+  add_barrier(builder, street, 0, 8, rail);
+  add_barrier(builder, street, edge + 0.4, 8, rail);
+  add_barrier(builder, street, -edge - 0.4, 8, rail);
+  for (const int side : {-1, 1}) {
+    if (random.chance(0.3)) {
+      const double wall_height = random.uniform(2.5, 4);
+      add_barrier(builder, street, side * (edge + 3.5), 5, [wall_height](Random&) {
+        return fence_model(5, wall_height, false);
+      });
+    }
+  }
+  // Gantries, poles and bridges.
+  for (double s = random.uniform(60, 160); s < street.centre.length() - 20;
+       s += random.uniform(150, 320)) {
+    if (random.chance(0.4)) {
+      builder.place_anyway(bridge_model(2 * edge + 4, 10, 5.5), street.centre.at(s));
+    } else {
+      Model gantry{make_primitive(Shape::kBox, materials::kSteelPole, {0, 0, 6.2F},
+                                  {0.15F, static_cast<float>(edge + 1), 0.15F}),
+                   make_primitive(Shape::kBox, materials::kSignPlate, {0.2F, -6, 6.6F},
+                                  {0.05F, 2.5F, 1.2F})};
+      for (const float side : {-1.0F, 1.0F}) {
+        gantry.push_back(make_primitive(Shape::kCylinder, materials::kSteelPole,
+                                        {0, side * static_cast<float>(edge + 1), 3},
+                                        {0.15F, 0.15F, 3.3F}));
+      }
+      builder.place_anyway(gantry, street.centre.at(s));
+    }
+  }
+  const double trees = random.uniform(4, 14), bushes = random.uniform(6, 25);
+  builder.plant(street, edge + 4.5, edge + 45, trees, bushes);
+  for (double s = random.uniform(5, 20); s < street.centre.length(); s += 50) {
+    Random model_random = random.fork(random.bits());
+    for (const int side : {-1, 1}) {
+      const Waypoint at = street.centre.beside(s, side * (edge + 1.2));
+      builder.place_anyway(pole_model(1.1, false, false, model_random), at);
+    }
+  }
+  return builder.finish();
+}
+
+World vegetation(const Config& config) {
+  const double speed = 6;
+  Random random(mix(config.seed, 77));
+  const double length = 2 * kBefore + travel(config, speed) + 30;
+  std::vector<Street> streets;
+  streets.push_back({route_of_bends(winding(random, length, 0.015, 0, 17)), 3.4, 0});
+  TerrainConfig ground;
+  ground.hill_slope = random.uniform(0.01, 0.05);
+  ground.hill_length = 90;
+  ground.roughness = 0.16;
+  ground.kerb = 0;
+  Builder builder(config, ground, std::move(streets));
+  const Street& street = builder.street(0);
+  const std::size_t forward = builder.lane(street, -1.6), backward = builder.lane(street, 1.6);
+  builder.ego(forward, kBefore, speed);
+  fill_lane(builder, forward, 75, speed, 0.05, 0, 0.15);
+  fill_lane(builder, backward, 60, 1.3 * speed, 0.05, 0, 0.2);
+  const double trees = random.uniform(40, 80), bushes = random.uniform(50, 100);
+  builder.plant(street, 4.4, 45, trees, bushes);
+  for (const int side : {-1, 1}) {
+    if (!random.chance(0.4)) continue;
+    add_barrier(builder, street, side * 4.6, 6, [](Random& r) {
+      return r.chance(0.6) ? hedge_model(6, 1.0, r.uniform(0.8, 2.2), r) : fence_model(6, 1.1, true);
+    });
+  }
+  for (int i = 0; i < builder.count(8); ++i) {
+    const double s = kBefore + random.uniform(-30, 90), pace = random.uniform(1, 1.8);
+    const double lateral = random.either_sign(2.7, 3.2);
+    const double run = random.chance(0.5) ? 40 : -40;
+    const double start = random.chance(0.2) ? random.uniform(2, 8) : 0;
+    builder.walker({street.centre.beside(s, lateral).position,
+                    street.centre.beside(s + run / 2, lateral).position,
+                    street.centre.beside(s + run, lateral).position},
+                   pace, start);
+  }
+  return builder.finish();
+}
+
+World crowd(const Config& config) {
+  const double speed = 1.2;
+  Random random(mix(config.seed, 77));
+  const double before = 80, length = 2 * before + travel(config, speed) + 20;
+  const double half = random.uniform(6, 11);
+  std::vector<Street> streets;
+  streets.push_back({route_of_bends(winding(random, length, 0.008, 0, 17)), half, 0});
+  TerrainConfig ground;
+  ground.street_label = semantic::kSidewalk;
+  ground.kerb = 0;
+  ground.hill_slope = random.uniform(0.002, 0.02);
+  Builder builder(config, ground, std::move(streets));
+  const Street& street = builder.street(0);
+  const double side_of_ego = random.uniform(-0.3, 0.3) * half;
+  const std::size_t lane = builder.traffic().add_lane(street.centre.shifted(
+      0, length, [side_of_ego](double s) { return side_of_ego + 0.6 * std::sin(s / 9); }));
+  builder.ego(lane, before, speed);
+  // A robot among people, not a car.
+  builder.traffic().objects[0].size = {1.0, 0.7, 0.9};
+
+  Frontage look;
+  look.buildings = 0.95;
+  look.setback = 0.6;
+  look.parked = 0;
+  for (const int side : {-1, 1}) builder.furnish(street, side, look);
+  for (double s = 5; s < length - 5; s += random.uniform(7, 14)) {
+    const double lateral = random.either_sign(0.5, 0.85) * half;
+    const Waypoint at = street.centre.beside(s, lateral);
+    Random model_random = random.fork(random.bits());
+    const double what = random.unit();
+    if (std::abs(lateral - side_of_ego) < 2.2) continue;
+    if (what < 0.45) {
+      const double tall = model_random.uniform(5, 9), radius = model_random.uniform(1.5, 2.8);
+      builder.tree(at.position, tall, radius, 2.3);
+    } else if (what < 0.8) {
+      builder.place(furniture_model(model_random), {at.position, at.heading, 0.8, 0.35});
+    } else {
+      // A stall.
+      builder.place(shelter_model(3, 2.2, 2.4), {at.position, at.heading, 1.5, 1.1});
+    }
+  }
+  const double from = before - 45, to = before + travel(config, speed) + 55;
+  const int number = builder.count(std::min(0.85 * (to - from), 2000.0));
+  for (int i = 0; i < number; ++i) {
+    const double s = random.uniform(from, to), mood = random.unit(), when = random.uniform(1.5, 11);
+    const bool along_wall = random.chance(0.25);
+    const double side = random.chance(0.5) ? 1 : -1;
+    const double lateral = along_wall ? side * (half - 0.1) : random.uniform(-0.85, 0.85) * half;
+    const double run = random.either_sign(15, 60);
+    const double drift = along_wall ? 0 : random.uniform(-0.3, 0.3) * half;
+    const double pace = random.uniform(0.7, 1.7);
+    const auto company = random.chance(0.35) ? 1 + random.index(3) : 0;
+    const double start = mood < 0.12 ? 1e9 : mood < 0.25 ? when : 0;
+    const double stop = mood > 0.9 ? when : 1e9;
+    for (std::size_t k = 0; k <= company; ++k) {
+      const double beside = 0.65 * static_cast<double>(k % 2), behind = -0.7 * static_cast<double>(k / 2);
+      std::vector<Vec2> goals;
+      for (int step = 0; step <= 3; ++step) {
+        const double u = step / 3.0;
+        const double l = std::clamp(lateral + drift * u + beside * (lateral > 0 ? -1 : 1),
+                                    -half + 0.05, half - 0.05);
+        goals.push_back(street.centre.beside(s + run * u + behind, l).position);
+      }
+      if (norm(goals[0] - builder.traffic().lanes[0].route.at(before).position) < 2.0) continue;
+      builder.walker(std::move(goals), pace, start, stop);
+    }
+  }
+  if (builder.lively()) {
+    for (int i = 0; i < 3; ++i) {
+      const double s = before + random.uniform(-40, 60), side = random.chance(0.5) ? 1 : -1;
+      const double lateral = side * random.uniform(0.2, 0.45) * half;
+      const bool with = random.chance(0.5);
+      const std::size_t object = builder.traffic().add_object(Kind::kCyclist);
+      const std::size_t path = builder.traffic().add_lane(street.centre.shifted(
+          with ? 0 : length, with ? length : 0, [lateral](double) { return lateral; }));
+      const double along = with ? s : builder.traffic().lanes[path].route.length() - s;
+      if (std::abs(s - before) < 5) {
+        builder.traffic().objects.pop_back();
+        continue;
+      }
+      builder.traffic().add_driver(object, path, along, 3.2);
+    }
+  }
+  return builder.finish();
+}
+
+World stop_and_go(const Config& config) {
+  const double speed = 8;
+  Random random(mix(config.seed, 77));
+  const double length = 2 * kBefore + travel(config, speed) + 30;
+  std::vector<Street> streets;
+  streets.push_back({route_of_bends(winding(random, length, 0.003, 0, 17)), 9.4, 3.2});
+  TerrainConfig ground;
+  ground.hill_slope = random.uniform(0.005, 0.03);
+  Builder builder(config, ground, std::move(streets));
+  Traffic& traffic = builder.traffic();
+  const Street& street = builder.street(0);
+  const double inner = -1.75, outer = -5.2;
+  const std::size_t lanes[] = {builder.lane(street, inner), builder.lane(street, outer)};
+  const std::size_t back_inner = builder.lane(street, -inner);
+  const std::size_t back_outer = builder.lane(street, -outer);
+  const std::size_t mine = random.index(2);
+  builder.ego(lanes[mine], kBefore, speed);
+  if (builder.lively()) {
+    traffic.drivers[0].speed = 0;
+    for (std::size_t lane = 0; lane < 2; ++lane) {
+      // A queue whose head waits, goes and waits again.
+      const auto ahead = static_cast<int>(3 + random.index(4));
+      double s = kBefore + (lane == mine ? 9 : random.uniform(-4, 4));
+      const auto first = traffic.drivers.size();
+      for (int i = 0; i < ahead; ++i) {
+        const double kind = random.unit();
+        const std::size_t object = traffic.add_object(kind < 0.75 ? Kind::kCar : kind < 0.9 ? Kind::kVan : Kind::kTruck);
+        s += traffic.objects[object].size.length / 2;
+        traffic.add_driver(object, lanes[lane], s, speed).speed = 0;
+        s += traffic.objects[object].size.length / 2 + random.uniform(1.8, 3.5);
+        if (i == 0) s += 0.5;
+      }
+      if (traffic.drivers.size() > first) {
+        Traffic::Driver& head = traffic.drivers.back();
+        double t = random.uniform(1, 4);
+        head.schedule = {{0, 0}};
+        const double end = config.scans / config.rate + 5;
+        while (t < end) {
+          head.schedule.push_back({t, random.uniform(5, 9)});
+          t += random.uniform(4, 9);
+          head.schedule.push_back({t, 0});
+          t += random.uniform(3, 6);
+        }
+      }
+      // And those behind.
+      double behind = kBefore - (lane == mine ? 2.2 : 6.0);
+      for (int i = 0; i < 4; ++i) {
+        const std::size_t object = traffic.add_object(random.chance(0.8) ? Kind::kCar : Kind::kVan);
+        behind -= traffic.objects[object].size.length / 2 + random.uniform(2, 4);
+        traffic.add_driver(object, lanes[lane], behind, speed).speed = 0;
+        behind -= traffic.objects[object].size.length / 2;
+      }
+    }
+    for (int i = 0; i < builder.count(9); ++i) {
+      const int side = random.chance(0.5) ? 1 : -1;
+      const double s = kBefore + random.uniform(-25, 80), start = random.uniform(1, 10);
+      builder.leaving_car(street, s, side * 8.28, side * 5.2, start, 7);
+    }
+    fill_lane(builder, back_inner, 25, speed, 0.08, 0.05, 0);
+    fill_lane(builder, back_outer, 22, 0.8 * speed, 0.08, 0.08, 0.05);
+  }
+  Frontage look;
+  look.buildings = random.uniform(0.6, 0.95);
+  look.parked = random.uniform(0.4, 0.8);
+  look.height = random.uniform(8, 18);
+  for (const int side : {-1, 1}) builder.furnish(street, side, look);
+  builder.pavement_walkers(street, kBefore - 40, kBefore + 90, builder.count(22));
+  builder.crossing_walkers(street, kBefore - 20, kBefore + 60, builder.count(3));
+  return builder.finish();
+}
+
+World canopy(const Config& config) {
+  const double speed = 6;
+  Random random(mix(config.seed, 77));
+  const double length = 2 * kBefore + travel(config, speed) + 30;
+  std::vector<Street> streets;
+  streets.push_back({route_of_bends(winding(random, length, 0.005, 0, 17)), 5.8, 3.4});
+  TerrainConfig ground;
+  ground.hill_slope = random.uniform(0.002, 0.015);
+  Builder builder(config, ground, std::move(streets));
+  const Street& street = builder.street(0);
+  const double half = street.half_width, verge = half + street.pavement;
+  const std::size_t forward = builder.lane(street, -kLaneHalf), backward = builder.lane(street, kLaneHalf);
+  builder.ego(forward, kBefore, speed);
+  const double end = kBefore + travel(config, speed) + 40;
+  if (builder.lively()) {
+    add_parking_moves(builder, kBefore - 20, end, builder.count(5), 6);
+    fill_lane(builder, forward, 30, speed, 0.1, 0.05, 0.06);
+    fill_lane(builder, backward, 24, 1.2 * speed, 0.1, 0.05, 0.06);
+  }
+  // Something overhead all along: bridges, roofs, trees whose crowns meet.
+  for (double s = random.uniform(10, 25); s < street.centre.length() - 25;) {
+    const double what = random.unit();
+    const Waypoint at = street.centre.at(s);
+    if (what < 0.35) {
+      const double width = random.uniform(8, 22), clearance = random.uniform(4.3, 5.2);
+      builder.place_anyway(bridge_model(2 * verge + 0.6, width, clearance), at);
+      for (const int side : {-1, 1}) {
+        builder.traffic().fixed.add({street.centre.beside(s, side * (verge + 6.3)).position,
+                                     at.heading, width / 2, 6});
+      }
+      s += width + random.uniform(15, 35);
+    } else if (what < 0.6) {
+      const double run = random.uniform(10, 24), height = random.uniform(4.2, 5);
+      builder.place_anyway(shelter_model(run, 2 * (half + 1.2), height), at);
+      for (double x = -run / 2; x < run / 2; x += 0.8) {
+        for (const int side : {-1, 1}) {
+          builder.traffic().fixed.add(
+              {street.centre.beside(s + x, side * (half + 1.0)).position, at.heading, 0.4, 0.15});
+        }
+      }
+      s += run + random.uniform(8, 25);
+    } else {
+      const int pairs = static_cast<int>(2 + random.index(4));
+      for (int i = 0; i < pairs; ++i) {
+        for (const int side : {-1, 1}) {
+          const Vec2 p = street.centre.beside(s + random.uniform(-1, 1), side * (half + 0.7)).position;
+          const double radius = random.uniform(3.8, 5.5), high = random.uniform(8, 12);
+          builder.tree(p, high, radius, random.uniform(3.6, 4.2));
+        }
+        s += random.uniform(7, 10);
+      }
+      s += random.uniform(3, 15);
+    }
+  }
+  // Arcades over the pavements.
+  for (double s = random.uniform(5, 40); s < street.centre.length() - 20; s += random.uniform(30, 70)) {
+    const int side = random.chance(0.5) ? 1 : -1;
+    const double run = random.uniform(8, 16), height = random.uniform(2.6, 3.2);
+    const Waypoint at = street.centre.beside(s, side * (verge - 0.6));
+    builder.place_anyway(shelter_model(run, 2.4, height), at);
+    for (double x = -run / 2 + 0.3; x <= run / 2; x += std::max(3.0, run / 4)) {
+      for (const double y : {-1.0, 1.0}) {
+        builder.traffic().fixed.add(
+            {at.position + x * direction(at.heading) + y * left_of(direction(at.heading)),
+             at.heading, 0.12, 0.12});
+      }
+    }
+  }
+  Frontage look;
+  look.buildings = 0.7;
+  look.street_trees = 0.1;
+  look.parked = 0.5;
+  for (const int side : {-1, 1}) builder.furnish(street, side, look);
+  builder.pavement_walkers(street, kBefore - 40, end + 20, builder.count(0.22 * (end - kBefore + 60)));
+  builder.crossing_walkers(street, kBefore - 10, end, builder.count(4));
+  return builder.finish();
+}
+
+World hill(const Config& config) {
+  const double speed = 9;
+  Random random(mix(config.seed, 77));
+  const double length = 2 * kBefore + travel(config, speed) + 30;
+  std::vector<Street> streets;
+  streets.push_back({route_of_bends(winding(random, length, 0.012, 0.15, 20)), random.chance(0.5) ? 5.8 : 3.9, 2.2});
+  TerrainConfig ground;
+  ground.hill_slope = random.uniform(0.055, 0.08);
+  ground.hill_length = random.uniform(110, 220);
+  ground.roughness = 0.08;
+  Builder builder(config, ground, std::move(streets));
+  const Street& street = builder.street(0);
+  const std::size_t forward = builder.lane(street, -kLaneHalf), backward = builder.lane(street, kLaneHalf);
+  builder.ego(forward, kBefore, speed);
+  const double end = kBefore + travel(config, speed) + 40;
+  if (builder.lively()) {
+    if (street.half_width > 5) add_parking_moves(builder, kBefore - 20, end, builder.count(4), 7);
+    fill_lane(builder, forward, 40, speed, 0.1, 0.05, 0.05);
+    fill_lane(builder, backward, 32, speed, 0.1, 0.05, 0.05);
+  }
+  Frontage look;
+  look.buildings = random.uniform(0.3, 0.65);
+  look.height = 7;
+  look.setback = 5;
+  look.street_trees = 0.25;
+  look.parked = random.uniform(0.2, 0.6);
+  for (const int side : {-1, 1}) builder.furnish(street, side, look);
+  const double trees = random.uniform(4, 15), bushes = random.uniform(5, 20);
+  builder.plant(street, street.half_width + street.pavement + 1, 50, trees, bushes);
+  builder.pavement_walkers(street, kBefore - 40, end + 20, builder.count(20));
+  builder.crossing_walkers(street, kBefore, end, builder.count(3));
+  return builder.finish();
+}
+
+World car_park(const Config& config) {
+  const double speed = 3;
+  Random random(mix(config.seed, 77));
+  const double aisle = random.uniform(60, 90), radius = 8.5;
+  const double before = 40, drive = travel(config, speed);
+  std::vector<Bend> bends{{aisle, 0}};
+  double length = aisle;
+  for (int turn = 1; length < 2 * before + drive + 60 || bends.size() < 7; turn = -turn) {
+    bends.push_back({kPi * radius, turn / radius});
+    bends.push_back({aisle, 0});
+    length += kPi * radius + aisle;
+  }
+  std::vector<Street> streets;
+  streets.push_back({route_of_bends(bends), 3.3, 0});
+  TerrainConfig ground;
+  ground.kerb = 0;
+  ground.roughness = 0.03;
+  ground.hill_slope = random.uniform(0.002, 0.03);
+  ground.street_label = semantic::kParking;
+  ground.open_label = semantic::kParking;
+  Builder builder(config, ground, std::move(streets));
+  Traffic& traffic = builder.traffic();
+  const Street& street = builder.street(0);
+  const std::size_t forward = builder.lane(street, -1.55), backward = builder.lane(street, 1.55);
+  builder.ego(forward, before, speed);
+  const double occupied = random.uniform(0.55, 0.9);
+  const double from = before - 30, to = before + drive + 60;
+
+  // Places on both sides of the straight parts, nose to the aisle or tail to it.
+  struct Place {
+    double s;
+    int side;
+  };
+  std::vector<Place> places;
+  for (const int side : {-1, 1}) {
+    for (double s = 6; s < street.centre.length() - 6; s += 2.6) {
+      const double bend = street.centre.at(s + 5).heading - street.centre.at(s - 5).heading;
+      if (std::abs(bend) > 0.02) continue;
+      const double u = random.unit();
+      if (u < 0.03) {
+        const Vec2 p = street.centre.beside(s, side * 7.5).position;
+        builder.tree(p, 6, 2, 2.2);
+        continue;
+      }
+      places.push_back({s, side});
+    }
+  }
+  std::vector<char> taken(places.size(), 0);
+  for (int i = 0; i < builder.count(9) && !places.empty(); ++i) {
+    // Leaving and arriving: a quarter turn between place and lane.
+    const std::size_t index = random.index(places.size());
+    const Place& place = places[index];
+    const bool leaving = random.chance(0.6);
+    const double start = random.uniform(1, 10);
+    if (place.s < from || place.s > to || taken[index]) continue;
+    Waypoint spot = street.centre.beside(place.s, place.side * 6.0);
+    spot.heading += place.side > 0 ? -kPi / 2 : kPi / 2;
+    const Footprint room{spot.position, spot.heading, 2.5, 1.2};
+    const double s_lane = place.s + (leaving ? 7.5 : -7.5) * (place.side < 0 ? 1 : -1);
+    const double lateral = place.side < 0 ? -1.55 : 1.55;
+    Waypoint lane = street.centre.beside(s_lane, lateral);
+    if (place.side > 0) lane.heading += kPi;
+    const double bend = street.centre.at(s_lane + 8).heading - street.centre.at(s_lane - 8).heading;
+    if (std::abs(bend) > 0.02 || !traffic.fixed.is_free(room, 0)) continue;
+    std::vector<Vec2> points;
+    if (leaving) {
+      points.push_back(spot.position);
+      points.push_back(spot.position + 0.7 * direction(spot.heading));
+      points.push_back(spot.position + 1.4 * direction(spot.heading));
+      for (const Vec2 p : turn_points({points.back() + 0.7 * direction(spot.heading), spot.heading}, lane)) points.push_back(p);
+      for (double d = 1; d < 60; d += 1) {
+        const double s = s_lane + (place.side < 0 ? d : -d);
+        if (s < 1 || s > street.centre.length() - 1) break;
+        points.push_back(street.centre.beside(s, lateral).position);
+      }
+    } else {
+      for (double d = 30; d > 0.5; d -= 1) {
+        const double s = s_lane - (place.side < 0 ? d : -d);
+        if (s < 1 || s > street.centre.length() - 1) continue;
+        points.push_back(street.centre.beside(s, lateral).position);
+      }
+      Waypoint mouth = spot;
+      mouth.heading += kPi;
+      mouth.position = spot.position - 2.1 * direction(mouth.heading);
+      for (const Vec2 p : turn_points(lane, mouth)) points.push_back(p);
+      points.push_back(spot.position - 1.4 * direction(mouth.heading));
+      points.push_back(spot.position - 0.7 * direction(mouth.heading));
+      points.push_back(spot.position);
+    }
+    if (points.size() < 8) continue;
+    Route route(std::move(points));
+    if (!builder.is_free_of_drivers(route.at(0), 3.5)) continue;
+    const std::size_t object = traffic.add_object(Kind::kCar);
+    const std::size_t path = traffic.add_lane(std::move(route));
+    Traffic::Driver& driver = traffic.add_driver(object, path, leaving ? 0 : 1, speed);
+    if (leaving) {
+      driver.speed = 0;
+      driver.schedule = {{0, 0}, {start, speed}};
+      driver.waits_for_gap = true;
+    } else {
+      driver.stays_at_end = true;
+    }
+    traffic.fixed.add({spot.position, spot.heading, 2.3, 0.95});
+    taken[index] = 1;
+  }
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const double along = places[i].s + 0.1 * random.normal();
+    Waypoint spot = street.centre.beside(along, places[i].side * (5.9 + 0.15 * random.normal()));
+    spot.heading += random.chance(0.7) ? kPi / 2 : -kPi / 2;
+    spot.heading += 0.02 * random.normal();
+    const bool used = random.chance(occupied), van = random.chance(0.12);
+    if (used && !taken[i]) builder.park(spot, van ? Kind::kVan : Kind::kCar);
+  }
+  fill_lane(builder, forward, 45, speed, 0, 0, 0);
+  fill_lane(builder, backward, 40, speed, 0, 0, 0);
+  for (int i = 0; i < builder.count(24); ++i) {
+    const double s = random.uniform(from, to), pace = random.uniform(0.9, 1.6);
+    const int side = random.chance(0.5) ? 1 : -1;
+    const double lateral = side * 2.95, deep = side * random.uniform(4, 8);
+    const double run = random.either_sign(15, 40);
+    const double start = random.chance(0.3) ? random.uniform(1, 9) : 0;
+    const Vec2 between = street.centre.beside(s + 1.3, deep).position;
+    builder.walker({between, street.centre.beside(s + 1.3, lateral).position,
+                    street.centre.beside(s + run / 2, lateral).position,
+                    street.centre.beside(s + run, lateral).position},
+                   pace, start);
+  }
+  // Around it: a shop, walls, hedges, lamps.
+  double low_x = 1e9, high_x = -1e9, low_y = 1e9, high_y = -1e9;
+  for (const Vec2 p : street.centre.points()) {
+    low_x = std::min(low_x, p.x);
+    high_x = std::max(high_x, p.x);
+    low_y = std::min(low_y, p.y);
+    high_y = std::max(high_y, p.y);
+  }
+  const double margin = random.uniform(10, 14);
+  for (int edge = 0; edge < 4; ++edge) {
+    const bool along_x = edge % 2 == 0;
+    const double sign = edge < 2 ? 1 : -1;
+    const double begin = along_x ? low_x - margin : low_y - margin;
+    const double finish = along_x ? high_x + margin : high_y + margin;
+    const double what = random.unit();
+    for (double d = begin + 4; d < finish; d += 8.2) {
+      const double cross = along_x ? (sign > 0 ? high_y + margin : low_y - margin)
+                                   : (sign > 0 ? high_x + margin : low_x - margin);
+      const Vec2 p = along_x ? Vec2{d, cross} : Vec2{cross, d};
+      const double heading = along_x ? (sign > 0 ? 0 : kPi) : (sign > 0 ? -kPi / 2 : kPi / 2);
+      Random model_random = random.fork(random.bits());
+      if (what < 0.4) {
+        const Vec2 middle = p + 5.0 * left_of(direction(heading));
+        if (traffic.fixed.is_free({middle, heading, 4.1, 5}, -0.1)) {
+          traffic.fixed.add({middle, heading, 4.1, 5});
+          builder.place_anyway(building_model(8.2, 10, 6 + 4 * what, model_random), {p, heading});
+        }
+      } else if (what < 0.75) {
+        builder.place(hedge_model(8, 0.8, 1.6, model_random), {p, heading, 4, 0.4}, -0.1);
+      } else {
+        builder.place(fence_model(8, 1.6, true), {p, heading, 4, 0.1}, -0.1);
+      }
+    }
+  }
+  for (double s = 10; s < street.centre.length(); s += random.uniform(18, 30)) {
+    Random model_random = random.fork(random.bits());
+    builder.place(pole_model(6, true, false, model_random),
+                  {street.centre.beside(s, 8.5).position, 0, 0.15, 0.15}, 0.05);
+  }
+  return builder.finish();
+}
+
 }  // namespace
 
 void StaticGeometry::add(const Rigid& T_world_model, const Model& model) {
@@ -646,6 +1206,19 @@ void StaticGeometry::add(const Rigid& T_world_model, const Model& model) {
   }
 }
 
-World build_world(const Config& config) { return urban(config); }
+World build_world(const Config& config) {
+  switch (config.scene) {
+    case Scene::kHighway: return highway(config);
+    case Scene::kVegetation: return vegetation(config);
+    case Scene::kCrowd: return crowd(config);
+    case Scene::kStopAndGo: return stop_and_go(config);
+    case Scene::kCanopy: return canopy(config);
+    case Scene::kHill: return hill(config);
+    case Scene::kCarPark: return car_park(config);
+    case Scene::kUrban:
+    case Scene::kStatic: break;
+  }
+  return urban(config);
+}
 
 }  // namespace dynains::simulation
