@@ -14,7 +14,8 @@ namespace dynains::program {
 class EvaluationOptions {
  public:
   /// `unlabeled`: the command's default for points without a class, "ignore" or "static".
-  EvaluationOptions(CLI::App& command, std::string unlabeled);
+  /// `prefix` starts the name of every flag, so that it differs from those of the remover.
+  EvaluationOptions(CLI::App& command, std::string unlabeled, const std::string& prefix = "");
 
   evaluation::EvaluationConfig config() const;
 

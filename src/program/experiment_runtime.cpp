@@ -1,0 +1,124 @@
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/evaluation/text_table.hpp"
+#include "dynains/io/kitti.hpp"
+#include "evaluation_options.hpp"
+#include "experiment.hpp"
+#include "remover_options.hpp"
+
+namespace dynains::program {
+namespace {
+
+using evaluation::format_number;
+
+struct RuntimeOptions {
+  explicit RuntimeOptions(CLI::App& command) : remover(command, "paper") {}
+
+  std::string sequence;
+  RemoverOptions remover;
+  std::size_t repeat = 5;
+  std::string csv;
+};
+
+/// Times of one component over all frames, ms.
+struct Component {
+  std::string name;
+  std::vector<double> times;
+
+  double mean() const {
+    double sum = 0;
+    for (const double time : times) sum += time;
+    return sum / static_cast<double>(times.size());
+  }
+  double quantile(double share) const {
+    std::vector<double> sorted = times;
+    std::sort(sorted.begin(), sorted.end());
+    const auto rank =
+        static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1) + 0.5);
+    return sorted[rank];
+  }
+};
+
+/// Frames of all repetitions; each starts with an empty map and warm buffers.
+std::vector<Component> measure(const RuntimeOptions& options) {
+  const KittiSequence sequence(options.sequence);
+  if (sequence.size() == 0) throw IoError(options.sequence + ": no scans");
+  std::vector<Component> components;
+  const StageTimes none;
+  StageTimes::visit(none, [&](const char* name, double) {
+    components.push_back({name, {}});
+  });
+  components.push_back({"total", {}});
+  components.push_back({"points", {}});
+
+  DynaInsRemover remover(options.remover.config());
+  std::vector<float> scan;
+  for (std::size_t repetition = 0; repetition < options.repeat; ++repetition) {
+    remover.reset();
+    for (std::size_t i = 0; i < sequence.size(); ++i) {
+      sequence.read_scan(i, scan);
+      const auto begin = std::chrono::steady_clock::now();
+      const FrameResult frame = remover.push(RawPoints<float>{scan.data(), scan.size() / 4, 4},
+                                             sequence.T_world_sensor(i), sequence.time(i));
+      const std::chrono::duration<double, std::milli> total =
+          std::chrono::steady_clock::now() - begin;
+      std::size_t next = 0;
+      StageTimes::visit(frame.times,
+                        [&](const char*, double ms) { components[next++].times.push_back(ms); });
+      components[next++].times.push_back(total.count());
+      components[next].times.push_back(static_cast<double>(scan.size() / 4));
+    }
+  }
+  return components;
+}
+
+void runtime(const RuntimeOptions& options) {
+  const std::vector<Component> components = measure(options);
+  evaluation::TextTable table({"component", "mean ms", "median", "p95", "p99", "max"});
+  std::ostringstream csv;
+  csv << "component,mean_ms,median_ms,p95_ms,p99_ms,max_ms\n";
+  for (std::size_t c = 0; c + 1 < components.size(); ++c) {
+    const Component& one = components[c];
+    const std::vector<double> values = {one.mean(), one.quantile(0.5), one.quantile(0.95),
+                                        one.quantile(0.99), one.quantile(1)};
+    std::vector<std::string> row = {one.name};
+    csv << one.name;
+    for (const double value : values) {
+      row.push_back(format_number(value, 3));
+      csv << ',' << format_number(value, 6);
+    }
+    csv << '\n';
+    table.add(row);
+  }
+  if (!options.csv.empty()) write_text_file(options.csv, csv.str());
+  const Component& points = components.back();
+  std::cout << points.times.size() << " frames (" << options.repeat << " times "
+            << points.times.size() / options.repeat << "), " << format_number(points.mean(), 0)
+            << " points on average, preset " << options.remover.preset_name() << '\n'
+            << table.to_string();
+}
+
+}  // namespace
+
+void add_runtime_command(CLI::App& experiment) {
+  CLI::App& command =
+      *experiment.add_subcommand("runtime", "Fig. 7: time per component, without file reading");
+  const auto options = std::make_shared<RuntimeOptions>(command);
+  command.add_option("sequence", options->sequence, "sequence (KITTI folder; no labels needed)")
+      ->required();
+  command.add_option("--repeat", options->repeat, "how often to go through the sequence")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  command.add_option("--csv", options->csv, "write the table to this file");
+  command.callback([options] { runtime(*options); });
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,134 @@
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/evaluation/report.hpp"
+#include "dynains/evaluation/text_table.hpp"
+#include "evaluation_options.hpp"
+#include "experiment.hpp"
+#include "labelled_sequence.hpp"
+#include "preset.hpp"
+#include "progress.hpp"
+#include "published_table.hpp"
+#include "variants.hpp"
+
+namespace dynains::program {
+namespace {
+
+namespace fs = std::filesystem;
+using evaluation::format_number;
+
+struct Table1Options {
+  explicit Table1Options(CLI::App& command) : evaluation(command, "static") {}
+
+  std::string root;
+  EvaluationOptions evaluation;
+  ScanWindow window;
+  bool quiet = false;
+  std::string json;
+  std::string csv;
+};
+
+/// A sequence to measure; `name` finds the published rows.
+struct Task {
+  std::string name;
+  fs::path folder;
+  ScanWindow window;
+};
+
+/// The sequence itself, or the published windows of whatever sequences lie below `root`.
+std::vector<Task> find_tasks(const fs::path& root, const ScanWindow& window) {
+  if (fs::exists(root / "velodyne")) {
+    const fs::path clean = fs::absolute(root).lexically_normal();
+    const fs::path name = clean.has_filename() ? clean.filename() : clean.parent_path().filename();
+    return {{name.string(), root, window}};
+  }
+  std::vector<Task> tasks;
+  for (const PublishedWindow& published : kPublishedWindows) {
+    for (const fs::path& below : {root / "sequences", root / "dataset" / "sequences", root}) {
+      if (!fs::exists(below / published.sequence / "velodyne")) continue;
+      tasks.push_back({published.sequence, below / published.sequence,
+                       ScanWindow{published.start, published.end}});
+      break;
+    }
+  }
+  if (tasks.empty()) {
+    throw IoError(root.string() +
+                  ": neither a sequence (no velodyne/) nor SemanticKITTI (no sequences/00, 01, 02, "
+                  "05 or 07 with velodyne/)");
+  }
+  return tasks;
+}
+
+std::vector<Variant> table1_variants() {
+  std::vector<Variant> variants = {{"dynains, paper preset, IOC only", preset("paper")},
+                                   {"dynains, paper preset, full", preset("paper")},
+                                   {"dynains, default preset", preset("default")}};
+  variants[0].config.use_belief = false;
+  return variants;
+}
+
+void table1(const Table1Options& options) {
+  const evaluation::EvaluationConfig config = options.evaluation.config();
+  const std::vector<Task> tasks = find_tasks(options.root, options.window);
+  const std::vector<Variant> variants = table1_variants();
+
+  evaluation::TextTable table({"Seq.", "Method", "PR [%]", "RR [%]", "F1 score"});
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  std::ostringstream csv;
+  csv << "sequence,method,pr,rr,f1,source\n";
+  const auto add = [&](const std::string& sequence, const std::string& method, double pr, double rr,
+                       double f1, const char* source) {
+    table.add({sequence, method, format_number(pr, 3), format_number(rr, 3), format_number(f1, 3)});
+    csv << sequence << ",\"" << method << "\"," << format_number(pr, 6, "") << ','
+        << format_number(rr, 6, "") << ',' << format_number(f1, 6, "") << ',' << source << '\n';
+  };
+
+  for (const Task& task : tasks) {
+    LabelledSequence sequence(task.folder, task.window);
+    Progress progress(sequence.size(), "scans of " + task.name, options.quiet);
+    const evaluation::Evaluation result =
+        evaluate_variants(sequence, variants, Answer::kFinal, config,
+                          [&](std::size_t done) { progress.update(done); });
+    for (const PublishedRow& row : kPublishedRows) {
+      if (task.name != row.sequence) continue;
+      add(task.name, std::string(row.method) + " (published)", row.pr, row.rr, row.f1, "published");
+    }
+    for (const evaluation::EvaluationRow& row : result.rows) {
+      add(task.name, row.name, row.voxels.preservation_rate(), row.voxels.rejection_rate(),
+          row.voxels.f1(), "measured");
+    }
+    json.push_back({{"sequence", task.name},
+                    {"evaluation", nlohmann::ordered_json::parse(evaluation::to_json(result))}});
+  }
+
+  if (!options.json.empty()) write_text_file(options.json, json.dump(2) + '\n');
+  if (!options.csv.empty()) write_text_file(options.csv, csv.str());
+  std::cout << table.to_string();
+}
+
+}  // namespace
+
+void add_table1_command(CLI::App& experiment) {
+  CLI::App& command = *experiment.add_subcommand(
+      "table1", "Table I: PR, RR and F1 with and without belief update, beside published numbers");
+  const auto options = std::make_shared<Table1Options>(command);
+  command
+      .add_option(
+          "root", options->root,
+          "SemanticKITTI (the published windows of 00, 01, 02, 05, 07), or any one labelled "
+          "sequence")
+      ->required();
+  add_window_options(command, options->window);
+  command.add_flag("--quiet", options->quiet, "no progress");
+  command.add_option("--json", options->json, "write everything to this file");
+  command.add_option("--csv", options->csv, "write the table to this file");
+  command.callback([options] { table1(*options); });
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,22 @@
+// Figures of a cloud of verdicts.
+#pragma once
+
+#include "picture.hpp"
+#include "verdict_cloud.hpp"
+
+namespace dynains::program {
+
+enum class Content {
+  kRaw,      ///< every point: static grey, dynamic blue (Fig. 1, top)
+  kVerdict,  ///< kept grey, removed dynamic green, lost static orange, missed dynamic red
+};
+
+Colour colour_of(Fate fate, Content content);
+
+/// Seen from above, world x to the right and y up, the longer side `pixels` long.
+Picture draw_from_above(const VerdictCloud& cloud, Content content, int pixels);
+
+/// Seen from behind and above the start of the path, in its direction; 16:9, `pixels` wide.
+Picture draw_perspective(const VerdictCloud& cloud, Content content, int pixels);
+
+}  // namespace dynains::program

@@ -1,0 +1,72 @@
+#include "picture.hpp"
+
+#include <png.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/atomic_file.hpp"
+
+namespace dynains::program {
+namespace {
+
+constexpr int kMaxSide = 16384;
+
+int checked_side(int side) {
+  if (side >= 1 && side <= kMaxSide) return side;
+  throw ConfigError("picture side = " + std::to_string(side) + " must be in [1, 16384] pixels");
+}
+
+}  // namespace
+
+Picture::Picture(int width, int height)
+    : width_(checked_side(width)),
+      height_(checked_side(height)),
+      pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height),
+              Colour{255, 255, 255}),
+      depths_(pixels_.size(), std::numeric_limits<float>::infinity()) {}
+
+void Picture::begin_layer() {
+  std::fill(depths_.begin(), depths_.end(), std::numeric_limits<float>::infinity());
+}
+
+void Picture::splat(double x, double y, double depth, int radius, Colour colour) {
+  // Far out points must not reach the conversion to int.
+  if (!(std::abs(x) < 1e6 && std::abs(y) < 1e6)) return;
+  const int center_x = static_cast<int>(std::floor(x));
+  const int center_y = static_cast<int>(std::floor(y));
+  const auto near = static_cast<float>(depth);
+  for (int v = std::max(0, center_y - radius); v <= std::min(height_ - 1, center_y + radius); ++v) {
+    for (int u = std::max(0, center_x - radius); u <= std::min(width_ - 1, center_x + radius);
+         ++u) {
+      if (!(near < depths_[index(u, v)])) continue;
+      depths_[index(u, v)] = near;
+      pixels_[index(u, v)] = colour;
+    }
+  }
+}
+
+void Picture::write_png(const std::filesystem::path& path) const {
+  static_assert(sizeof(Colour) == 3, "rows are handed to libpng as they are");
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = static_cast<png_uint_32>(width_);
+  image.height = static_cast<png_uint_32>(height_);
+  image.format = PNG_FORMAT_RGB;
+  png_alloc_size_t size = 0;
+  const bool sized =
+      png_image_write_get_memory_size(image, size, 0, pixels_.data(), 0, nullptr) != 0;
+  std::vector<char> bytes(size);
+  if (!sized ||
+      png_image_write_to_memory(&image, bytes.data(), &size, 0, pixels_.data(), 0, nullptr) == 0) {
+    throw IoError(path.string() + ": cannot be encoded as PNG: " + image.message);
+  }
+  AtomicFile file(path);
+  file.stream().write(bytes.data(), static_cast<std::streamsize>(size));
+  file.commit();
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,47 @@
+// A small colour picture of points: nearest point wins, layer by layer.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+namespace dynains::program {
+
+struct Colour {
+  std::uint8_t r = 0, g = 0, b = 0;
+};
+
+class Picture {
+ public:
+  /// White; throws ConfigError unless both sides are in [1, 16384] pixels.
+  Picture(int width, int height);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+
+  /// Points drawn from now on cover all that was drawn before, whatever their depth.
+  void begin_layer();
+
+  /// Square of 2 * radius + 1 pixels about a position in pixels from the upper left corner, clipped
+  /// to the picture; within a layer the smallest depth is seen.
+  void splat(double x, double y, double depth, int radius, Colour colour);
+
+  Colour at(int x, int y) const { return pixels_[index(x, y)]; }
+
+  /// Writes a PNG file, whole or not at all. Throws IoError.
+  void write_png(const std::filesystem::path& path) const;
+
+ private:
+  std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+           static_cast<std::size_t>(x);
+  }
+
+  int width_;
+  int height_;
+  std::vector<Colour> pixels_;
+  std::vector<float> depths_;
+};
+
+}  // namespace dynains::program

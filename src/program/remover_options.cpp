@@ -1,0 +1,30 @@
+#include "remover_options.hpp"
+
+#include <type_traits>
+#include <utility>
+
+#include "preset.hpp"
+
+namespace dynains::program {
+
+RemoverOptions::RemoverOptions(CLI::App& command, std::string default_preset)
+    : preset_(std::move(default_preset)) {
+  command.add_option("--preset", preset_, "parameters to start from")
+      ->check(CLI::IsMember(preset_names()))
+      ->capture_default_str();
+  command.add_option("--config", config_file_, "config file, see dynains config");
+  const auto defaults = preset(preset_);
+  DynaInsRemover::Config::visit_sections(defaults, [&](const char* name, const auto& section) {
+    flags_.add_to(command, section, name);
+  });
+}
+
+DynaInsRemover::Config RemoverOptions::config() const {
+  DynaInsRemover::Config config = preset(preset_);
+  if (!config_file_.empty()) read_config_file(config_file_).apply(config);
+  flags_.values().apply(config);
+  config.validate();
+  return config;
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,27 @@
+// Preset, config file and flags of the remover, in this order of precedence from low to high.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "dynains/dyna_ins_remover.hpp"
+#include "parameter_flags.hpp"
+
+namespace dynains::program {
+
+class RemoverOptions {
+ public:
+  RemoverOptions(CLI::App& command, std::string default_preset);
+
+  const std::string& preset_name() const { return preset_; }
+
+  /// Throws ConfigError.
+  DynaInsRemover::Config config() const;
+
+ private:
+  std::string preset_;
+  std::string config_file_;
+  ParameterFlags flags_;
+};
+
+}  // namespace dynains::program

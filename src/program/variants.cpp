@@ -1,0 +1,76 @@
+#include "variants.hpp"
+
+#include "dynains/errors.hpp"
+#include "dynains/point_cloud_traits.hpp"
+
+namespace dynains::program {
+
+VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Variant>& variants,
+                             Answer answer, const std::function<void(std::size_t)>& done) {
+  if (variants.size() > evaluation::kMaxEstimates) {
+    throw ConfigError("at most " + std::to_string(evaluation::kMaxEstimates) +
+                      " variants can be evaluated at once");
+  }
+  VariantVerdicts verdicts;
+  verdicts.in_map.resize(sequence.size());
+  verdicts.instances.resize(sequence.size());
+  const auto take = [&](std::size_t variant, const ScanVerdict& verdict) {
+    auto& in_map = verdicts.in_map[verdict.scan];
+    for (std::size_t p = 0; p < verdict.labels.size(); ++p) {
+      if (is_static(verdict.labels[p])) {
+        in_map[p] = static_cast<std::uint8_t>(in_map[p] | (1U << variant));
+      }
+    }
+    if (variant == 0) {
+      verdicts.instances[verdict.scan].assign(verdict.instances.begin(), verdict.instances.end());
+    }
+  };
+
+  std::vector<DynaInsRemover> removers;
+  for (const Variant& variant : variants) {
+    DynaInsRemover::Config config = variant.config;
+    config.build_map = false;
+    removers.emplace_back(config);
+  }
+  evaluation::LabelledScan scan;
+  for (std::size_t i = 0; sequence.read(i, scan); ++i) {
+    verdicts.in_map[i].assign(scan.size(), 0);
+    for (std::size_t v = 0; v < removers.size(); ++v) {
+      const FrameResult frame = removers[v].push(
+          RawPoints<float>{scan.xyz, scan.size(), scan.stride}, scan.T_world_sensor, scan.time);
+      if (answer == Answer::kNewest) {
+        take(v, frame.newest);
+      } else if (frame.finished) {
+        take(v, *frame.finished);
+      }
+    }
+    if (done) done(i + 1);
+  }
+  if (answer == Answer::kFinal) {
+    for (std::size_t v = 0; v < removers.size(); ++v) {
+      removers[v].flush([&](const ScanVerdict& verdict) { take(v, verdict); });
+    }
+  }
+  return verdicts;
+}
+
+evaluation::ScanSource judged_source(LabelledSequence& sequence, const VariantVerdicts& verdicts) {
+  return [&sequence, &verdicts](std::size_t i, evaluation::LabelledScan& scan) {
+    if (!sequence.read(i, scan)) return false;
+    scan.in_map = verdicts.in_map[i];
+    scan.instances = verdicts.instances[i];
+    return true;
+  };
+}
+
+evaluation::Evaluation evaluate_variants(LabelledSequence& sequence,
+                                         const std::vector<Variant>& variants, Answer answer,
+                                         const evaluation::EvaluationConfig& config,
+                                         const std::function<void(std::size_t)>& done) {
+  const VariantVerdicts verdicts = run_variants(sequence, variants, answer, done);
+  std::vector<std::string> names;
+  for (const Variant& variant : variants) names.push_back(variant.name);
+  return evaluation::evaluate(judged_source(sequence, verdicts), names, {}, config);
+}
+
+}  // namespace dynains::program
