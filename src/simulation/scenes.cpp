@@ -369,7 +369,10 @@ class Builder {
     }
     t.fixed.add({p.position, p.heading, size.length / 2, size.width / 2});
     Route route = street.centre.shifted(s - sign * 3, end, lateral);
-    Traffic::Driver& driver = t.add_driver(object, t.add_lane(std::move(route)), 3, cruise);
+    const std::size_t path =
+        t.add_lane(std::move(route), lines_from(street, s - sign * 3, lateral_lane < 0));
+    Traffic::Driver& driver = t.add_driver(object, path, 3, cruise);
+    driver.yields = true;
     driver.speed = 0;
     driver.schedule = {{0, 0}, {start, cruise}};
     driver.waits_for_gap = true;
@@ -390,9 +393,24 @@ class Builder {
       return lateral_lane + (lateral_place - lateral_lane) * u * u * (3 - 2 * u);
     };
     const std::size_t object = t.add_object(Kind::kCar);
-    Traffic::Driver& driver = t.add_driver(
-        object, t.add_lane(street.centre.shifted(from, s, lateral)), 1, cruise);
+    const std::size_t path = t.add_lane(street.centre.shifted(from, s, lateral),
+                                        lines_from(street, from, lateral_lane < 0));
+    Traffic::Driver& driver = t.add_driver(object, path, 1, cruise);
+    driver.yields = true;
     driver.stays_at_end = true;
+  }
+
+  /// Lights of the main street along it and against it, from the start of those lanes.
+  std::vector<StopLine> main_lines[2];
+
+  /// The same for a route that begins at arc length `begin` of the main street.
+  std::vector<StopLine> lines_from(const Street& street, double begin, bool with) const {
+    std::vector<StopLine> result;
+    for (StopLine line : main_lines[with ? 0 : 1]) {
+      line.s -= with ? begin : street.centre.length() - begin;
+      if (line.s > 0) result.push_back(line);
+    }
+    return result;
   }
 
   bool is_free_of_drivers(const Waypoint& at, double half_length) const {
@@ -490,7 +508,7 @@ struct StreetLanes {
 };
 
 StreetLanes add_crossing_traffic(Builder& builder, const std::vector<Crossing>& crossings,
-                                 double speed) {
+                                 double speed, double ego_s) {
   Traffic& traffic = builder.traffic();
   Random& random = builder.random();
   const Street& main = builder.street(0);
@@ -504,8 +522,12 @@ StreetLanes add_crossing_traffic(Builder& builder, const std::vector<Crossing>& 
     forward.push_back({crossing.main_s - margin, signal, 0});
     backward.push_back({main_length - crossing.main_s - margin, signal, 0});
   }
+  if (!builder.lively()) forward.clear();
   const StreetLanes lanes{builder.lane(main, -kLaneHalf, forward),
                           builder.lane(main, kLaneHalf, backward)};
+  builder.ego(lanes.forward, ego_s, speed);
+  builder.main_lines[0] = forward;
+  builder.main_lines[1] = backward;
   for (std::size_t i = 0; i < crossings.size() && builder.lively(); ++i) {
     const Street& side = builder.street(crossings[i].street);
     const double middle = side.centre.length() / 2;
@@ -546,7 +568,7 @@ StreetLanes add_crossing_traffic(Builder& builder, const std::vector<Crossing>& 
     const std::size_t object = traffic.add_object(Kind::kCar);
     const double s = random.uniform(8, run - 8);
     if (builder.is_free_of_drivers(traffic.lanes[turning].route.at(s), 5)) {
-      traffic.add_driver(object, turning, s, speed * 0.7);
+      traffic.add_driver(object, turning, s, speed * 0.7).yields = true;
     } else {
       traffic.objects.pop_back();
     }
@@ -598,13 +620,9 @@ World urban(const Config& config) {
   ground.hill_slope = random.uniform(0.005, 0.03);
   Builder builder(config, ground, std::move(streets));
 
-  const StreetLanes lanes = add_crossing_traffic(builder, crossings, speed);
-  builder.ego(lanes.forward, kBefore, speed);
+  const StreetLanes lanes = add_crossing_traffic(builder, crossings, speed, kBefore);
   const double end = kBefore + travel(config, speed) + 40;
   if (builder.lively()) {
-    // The ego vehicle is the first driver; those that came with the crossings follow it.
-    auto& drivers = builder.traffic().drivers;
-    std::swap(drivers.front(), drivers.back());
     add_parking_moves(builder, kBefore - 20, end, builder.count(8), 7);
     fill_lane(builder, lanes.forward, 38, speed, 0.08, 0.05, 0.06);
     fill_lane(builder, lanes.backward, 30, speed, 0.08, 0.05, 0.06);
@@ -769,7 +787,9 @@ World crowd(const Config& config) {
       0, length, [side_of_ego](double s) { return side_of_ego + 0.6 * std::sin(s / 9); }));
   builder.ego(lane, before, speed);
   // A robot among people, not a car.
-  builder.traffic().objects[0].size = {1.0, 0.7, 0.9};
+  builder.traffic().objects[0].size = {0.8, 0.6, 0.9};
+  builder.traffic().drivers[0].rest_gap = 0.3;
+  builder.traffic().drivers[0].foresight = 0.2;
 
   Frontage look;
   look.buildings = 0.95;
@@ -1043,7 +1063,7 @@ World car_park(const Config& config) {
   Builder builder(config, ground, std::move(streets));
   Traffic& traffic = builder.traffic();
   const Street& street = builder.street(0);
-  const std::size_t forward = builder.lane(street, -1.55), backward = builder.lane(street, 1.55);
+  const std::size_t forward = builder.lane(street, -1.35), backward = builder.lane(street, 1.35);
   builder.ego(forward, before, speed);
   const double occupied = random.uniform(0.55, 0.9);
   const double from = before - 30, to = before + drive + 60;
@@ -1079,7 +1099,7 @@ World car_park(const Config& config) {
     spot.heading += place.side > 0 ? -kPi / 2 : kPi / 2;
     const Footprint room{spot.position, spot.heading, 2.5, 1.2};
     const double s_lane = place.s + (leaving ? 7.5 : -7.5) * (place.side < 0 ? 1 : -1);
-    const double lateral = place.side < 0 ? -1.55 : 1.55;
+    const double lateral = place.side < 0 ? -1.35 : 1.35;
     Waypoint lane = street.centre.beside(s_lane, lateral);
     if (place.side > 0) lane.heading += kPi;
     const double bend = street.centre.at(s_lane + 8).heading - street.centre.at(s_lane - 8).heading;

@@ -147,8 +147,14 @@ double Traffic::free_distance(const Driver& driver, std::size_t index, double re
       bool blocked = distance(footprint, at.position) < clearance;
       if (!blocked && body->person && d > 1) {
         // People are given way to before they are in the way.
-        footprint.centre = footprint.centre + 1.2 * body->velocity;
+        footprint.centre = footprint.centre + driver.foresight * body->velocity;
         blocked = distance(footprint, at.position) < clearance;
+      }
+      if (!blocked && driver.yields && d > 2 && norm(body->velocity) > 1) {
+        for (const double ahead : {0.7, 1.4, 2.1}) {
+          footprint.centre = body->footprint.centre + ahead * body->velocity;
+          blocked = blocked || distance(footprint, at.position) < clearance + 0.3;
+        }
       }
       if (blocked) {
         speed_ahead = std::max(0.0, dot(body->velocity, direction(at.heading)));
@@ -220,7 +226,7 @@ double Traffic::wanted_acceleration(const Driver& driver, std::size_t index) con
   if (blocked) {
     const double closing = v - speed_ahead;
     const double wanted =
-        2.0 + std::max(0.0, 1.1 * v + v * closing / (2 * std::sqrt(driver.comfort * 2.0)));
+        driver.rest_gap + std::max(0.0, 1.1 * v + v * closing / (2 * std::sqrt(driver.comfort * 2.0)));
     const double share = wanted / std::max(gap, 0.1);
     acceleration -= driver.comfort * share * share;
   }

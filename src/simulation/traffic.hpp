@@ -68,6 +68,9 @@ class Traffic {
     double comfort = 1.5;  ///< m/s^2
     bool stays_at_end = false;  ///< parks at the end of the route instead of leaving the world
     bool waits_for_gap = false;  ///< starts only when nobody comes from behind
+    bool yields = false;    ///< gives way to vehicles that are about to cross
+    double rest_gap = 2.0;  ///< m, kept to what is in front when standing
+    double foresight = 1.2;  ///< s, how early people are given way to
     /// From `first` seconds on, `second` replaces `cruise`.
     std::vector<std::pair<double, double>> schedule;
     double acceleration = 0;
