@@ -47,9 +47,10 @@ class CurvedVoxelClusterer {
                         "points farther away belong to no cluster and stay static"});
     }
 
-    /// Number of cells from the horizon of azimuth, elevation and range together.
+    /// Number of cells of azimuth, elevation and range together. Rows of azimuth are padded to
+    /// whole words, at least 16 cells, so that a bound on cells is one on rows as well.
     double cell_count() const {
-      return std::round(360.0 / voxel_azimuth) * std::ceil(180.0 / voxel_elevation) *
+      return std::ceil(std::round(360.0 / voxel_azimuth) / 8.0) * 8.0 * std::ceil(180.0 / voxel_elevation) *
              (std::floor(cluster_range / voxel_range) + 1.0);
     }
 
