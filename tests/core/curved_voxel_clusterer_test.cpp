@@ -1,0 +1,190 @@
+#include "dynains/curved_voxel_clusterer.hpp"
+
+#include <limits>
+#include <vector>
+
+#include "polar_test_points.hpp"
+#include "reference_clusterer.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+namespace dynains::test {
+namespace {
+
+using Config = CurvedVoxelClusterer::Config;
+
+std::vector<std::uint32_t> clusters(const Config& config, PolarView points) {
+  CurvedVoxelClusterer clusterer(config);
+  const auto result = clusterer.cluster(points);
+  return {result.begin(), result.end()};
+}
+
+Config make(double range, double azimuth, double elevation, double reach = 90.0) {
+  Config config;
+  config.voxel_range = range;
+  config.voxel_azimuth = azimuth;
+  config.voxel_elevation = elevation;
+  config.cluster_range = reach;
+  return config;
+}
+
+struct Region {
+  double range_min, range_max;      // m, three-dimensional distance
+  double azimuth_min, azimuth_max;  // deg
+  double elevation_min, elevation_max;
+};
+
+// Random points none of which lies so near to a voxel border that float and double may differ.
+PolarBuffer random_points(const Config& config, const Region& region, std::size_t count,
+                          std::uint64_t seed) {
+  constexpr double kMargin = 2e-3;  // voxels
+  Random random(seed);
+  PolarBuffer points;
+  while (points.size() < count) {
+    const double distance = random.uniform(region.range_min, region.range_max);
+    const double azimuth = random.uniform(region.azimuth_min, region.azimuth_max);
+    const double elevation =
+        random.uniform(region.elevation_min, region.elevation_max) * kRadiansPerDegree;
+    add(points, distance * std::cos(elevation), azimuth > 180.0 ? azimuth - 360.0 : azimuth,
+        distance * std::sin(elevation));
+    const std::size_t last = points.size() - 1;
+    const auto at =
+        voxel_coordinates(config, points.range[last], points.azimuth[last], points.z[last]);
+    if (off_integer(at[0]) < kMargin || off_integer(at[1]) < kMargin ||
+        off_integer(at[2]) < kMargin) {
+      points.resize(last);
+    }
+  }
+  return points;
+}
+
+TEST_CASE("clusters are those of a breadth-first search over all 26 neighbours") {
+  struct Case {
+    const char* why;
+    Config config;
+    Region region;
+    std::size_t count;
+  };
+  const auto c = GENERATE(values<Case>({
+      {"a whole scan, sparse", make(0.5, 0.5, 3.0), {3, 80, -180, 180, -25, 15}, 3000},
+      {"many clusters that nearly touch", make(1.0, 4.0, 6.0), {3, 40, -180, 180, -25, 15}, 2000},
+      {"one dense lump", make(0.5, 0.5, 3.0), {10, 14, 20, 30, -5, 5}, 2000},
+      {"across the azimuth seam", make(0.5, 2.0, 3.0), {5, 15, 160, 200, -10, 10}, 500},
+      {"straight up and down", make(0.5, 10.0, 3.0), {3, 10, -180, 180, -90, 90}, 1500},
+      {"the zenith alone", make(0.5, 30.0, 5.0), {3, 6, -180, 180, 80, 90}, 100},
+      {"tiny voxels", make(0.05, 0.1, 0.5, 10.0), {5, 7, -5, 5, -5, 5}, 2000},
+      {"huge voxels", make(20.0, 30.0, 45.0), {3, 90, -180, 180, -90, 90}, 40},
+      {"an azimuth size that does not divide the circle", make(1.0, 7.0, 3.0),
+       {3, 40, -180, 180, -25, 15}, 700},
+      {"an elevation size that does not divide the half circle", make(1.0, 5.0, 7.0),
+       {3, 40, -180, 180, -90, 90}, 700},
+      {"beyond the horizon of clustering", make(0.5, 2.0, 3.0, 30.0),
+       {25, 35, -180, 180, -10, 10}, 1500},
+  }));
+  INFO(c.why);
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const PolarBuffer points = random_points(c.config, c.region, c.count, seed);
+    const auto expected = reference_clusters(c.config, points.view());
+    REQUIRE((clusters(c.config, points.view()) == expected));
+  }
+}
+
+TEST_CASE("a clusterer forgets one scan before the next") {
+  const Config config = make(0.5, 1.0, 3.0);
+  CurvedVoxelClusterer clusterer(config);
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    // Alternately many elevations and few, so that the grid behind it grows and shrinks.
+    const double half = seed % 2 == 0 ? 2.0 : 60.0;
+    const PolarBuffer points =
+        random_points(config, {3, 40, -180, 180, -half, half}, 100 * seed, seed);
+    const auto result = clusterer.cluster(points.view());
+    REQUIRE((std::vector<std::uint32_t>(result.begin(), result.end()) ==
+             reference_clusters(config, points.view())));
+  }
+}
+
+TEST_CASE("voxels that touch at a corner join, voxels one apart do not") {
+  const Config config = make(1.0, 10.0, 10.0);
+  // Azimuth voxels begin at multiples of 10 deg, elevation voxels too, range voxels at whole metres.
+  const auto at = [](PolarBuffer& points, double distance, double azimuth, double elevation) {
+    add(points, distance * std::cos(elevation * kRadiansPerDegree), azimuth,
+        distance * std::sin(elevation * kRadiansPerDegree));
+  };
+  PolarBuffer points;
+  at(points, 5.5, 5.0, 5.0);
+  SECTION("corner in all three coordinates") {
+    at(points, 6.5, 15.0, 15.0);
+    CHECK(clusters(config, points.view()) == std::vector<std::uint32_t>{0, 0});
+  }
+  SECTION("one free voxel in range") {
+    at(points, 7.5, 5.0, 5.0);
+    CHECK(clusters(config, points.view()) == std::vector<std::uint32_t>{0, 1});
+  }
+  SECTION("one free voxel in azimuth") {
+    at(points, 5.5, 25.0, 5.0);
+    CHECK(clusters(config, points.view()) == std::vector<std::uint32_t>{0, 1});
+  }
+  SECTION("one free voxel in elevation") {
+    at(points, 5.5, 5.0, 25.0);
+    CHECK(clusters(config, points.view()) == std::vector<std::uint32_t>{0, 1});
+  }
+}
+
+TEST_CASE("an object behind the sensor is one cluster, +180 and -180 degrees are neighbours") {
+  PolarBuffer points;
+  add(points, 10.0, 179.9, 0.0);
+  add(points, 10.0, -179.9, 0.0);
+  add(points, 10.0, 0.0, 0.0);
+  points.resize(5);
+  points.range[3] = points.range[4] = 10.0F;
+  points.z[3] = points.z[4] = 0.0F;
+  points.azimuth[3] = detail::kPi;  // both ends of the interval of azimuths
+  points.azimuth[4] = -detail::kPi;
+  CHECK(clusters(make(0.5, 0.5, 3.0), points.view()) ==
+        std::vector<std::uint32_t>{0, 0, 1, 0, 0});
+}
+
+TEST_CASE("a point at exactly the clustering range belongs to a cluster, the next float does not") {
+  PolarBuffer points;
+  add(points, 90.0, 0.0, 0.0);
+  points.resize(2);
+  points.range[1] = std::nextafter(90.0F, 100.0F);
+  points.azimuth[1] = points.z[1] = 0.0F;
+  CHECK(clusters(make(0.5, 0.5, 3.0), points.view()) == std::vector<std::uint32_t>{0, kNoCluster});
+}
+
+TEST_CASE("points that are not numbers belong to no cluster and disturb none") {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float infinity = std::numeric_limits<float>::infinity();
+  PolarBuffer points;
+  for (int i = 0; i < 5; ++i) add(points, 10.0, 0.0, 0.0);
+  points.range[1] = nan;
+  points.range[2] = infinity;
+  points.z[3] = -infinity;
+  CHECK(clusters(make(0.5, 0.5, 3.0), points.view()) ==
+        std::vector<std::uint32_t>{0, kNoCluster, kNoCluster, kNoCluster, 0});
+  CHECK(clusters(Config(), PolarView()).empty());
+}
+
+TEST_CASE("voxels of the largest grid that is allowed are told apart") {
+  // 12 azimuths, 1800 elevations: the row numbers of the grid run into the millions.
+  Config config = make(0.05, 30.0, 0.1, 1000.0);
+  double low = 1.0;
+  double high = 1000.0;
+  for (int i = 0; i < 60; ++i) {  // the farthest range that passes validation
+    config.cluster_range = 0.5 * (low + high);
+    try {
+      config.validate();
+      low = config.cluster_range;
+    } catch (const ConfigError&) {
+      high = config.cluster_range;
+    }
+  }
+  config.cluster_range = low;
+  const PolarBuffer points =
+      random_points(config, {low - 3.0, low, -180, 180, 88.5, 90.0}, 3000, 1);
+  REQUIRE((clusters(config, points.view()) == reference_clusters(config, points.view())));
+}
+
+}  // namespace
+}  // namespace dynains::test

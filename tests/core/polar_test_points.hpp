@@ -1,0 +1,25 @@
+// Polar points written by hand in degrees, or drawn at random.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "dynains/polar_points.hpp"
+
+namespace dynains::test {
+
+constexpr double kRadiansPerDegree = M_PI / 180.0;
+
+inline void add(PolarBuffer& points, double range, double azimuth_degrees, double z) {
+  const std::size_t at = points.size();
+  points.resize(at + 1);
+  points.range[at] = static_cast<float>(range);
+  points.azimuth[at] = static_cast<float>(azimuth_degrees * kRadiansPerDegree);
+  points.z[at] = static_cast<float>(z);
+}
+
+/// Distance of `value` from the nearest whole number.
+inline double off_integer(double value) { return std::abs(value - std::round(value)); }
+
+}  // namespace dynains::test

@@ -1,0 +1,36 @@
+// Random numbers that are the same with every standard library.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <utility>
+#include <vector>
+
+namespace dynains::test {
+
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : engine_(seed) {}
+
+  /// Uniform in [low, high).
+  double uniform(double low, double high) {
+    return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1p-53;
+  }
+  float uniform_float(double low, double high) { return static_cast<float>(uniform(low, high)); }
+  /// Uniform in [0, count).
+  std::size_t index(std::size_t count) { return static_cast<std::size_t>(engine_() % count); }
+
+  /// 0 to count - 1 in random order.
+  std::vector<std::size_t> permutation(std::size_t count) {
+    std::vector<std::size_t> order(count);
+    for (std::size_t i = 0; i < count; ++i) order[i] = i;
+    for (std::size_t i = count; i > 1; --i) std::swap(order[i - 1], order[index(i)]);
+    return order;
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+}  // namespace dynains::test

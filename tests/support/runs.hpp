@@ -1,0 +1,98 @@
+// Runs a remover over scans and keeps what it says.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/dyna_ins_remover.hpp"
+#include "support/scene.hpp"
+
+namespace dynains::test {
+
+/// A ScanVerdict that owns its arrays.
+struct Verdict {
+  std::uint64_t scan = 0;
+  double time = 0.0;
+  std::vector<PointLabel> labels;
+  std::vector<std::uint32_t> instances;
+  std::vector<float> beliefs;
+
+  Verdict() = default;
+  explicit Verdict(const ScanVerdict& v)
+      : scan(v.scan),
+        time(v.time),
+        labels(v.labels.begin(), v.labels.end()),
+        instances(v.instances.begin(), v.instances.end()),
+        beliefs(v.beliefs.begin(), v.beliefs.end()) {}
+
+  friend bool operator==(const Verdict& a, const Verdict& b) {
+    return a.scan == b.scan && a.time == b.time && a.labels == b.labels &&
+           a.instances == b.instances && a.beliefs == b.beliefs;
+  }
+};
+
+struct Run {
+  std::vector<Verdict> newest;  // as known at once
+  std::vector<Verdict> final;   // in the order in which they were given out
+};
+
+template <class Remover>
+Run run(Remover& remover, const std::vector<Scan>& scans) {
+  Run result;
+  for (const Scan& scan : scans) {
+    const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
+    result.newest.emplace_back(frame.newest);
+    if (frame.finished) result.final.emplace_back(*frame.finished);
+  }
+  remover.flush([&](const ScanVerdict& verdict) { result.final.emplace_back(verdict); });
+  return result;
+}
+
+inline Run run(const DynaInsRemover::Config& config, const std::vector<Scan>& scans) {
+  DynaInsRemover remover(config);
+  return run(remover, scans);
+}
+
+inline Run run_paper(const std::vector<Scan>& scans) {
+  return run(DynaInsRemover::Config::paper(), scans);
+}
+
+/// Points of one object (all objects if `object` is kAnyObject), and how many of them carry a label.
+inline constexpr int kAnyObject = -2;
+struct Share {
+  std::size_t labelled = 0;
+  std::size_t total = 0;
+  double value() const {
+    return total == 0 ? 0.0 : static_cast<double>(labelled) / static_cast<double>(total);
+  }
+};
+inline Share share(const std::vector<Scan>& scans, const std::vector<Verdict>& verdicts,
+                   PointLabel label, int object = kAnyObject) {
+  Share result;
+  for (const Verdict& verdict : verdicts) {
+    const Scan& scan = scans.at(verdict.scan);
+    for (std::size_t i = 0; i < scan.points.size(); ++i) {
+      if (object != kAnyObject && scan.object[i] != object) continue;
+      ++result.total;
+      if (verdict.labels[i] == label) ++result.labelled;
+    }
+  }
+  return result;
+}
+
+/// Share of points on which two runs disagree.
+inline double disagreement(const std::vector<Verdict>& a, const std::vector<Verdict>& b) {
+  std::size_t different = 0;
+  std::size_t total = 0;
+  for (std::size_t s = 0; s < a.size(); ++s) {
+    for (std::size_t i = 0; i < a[s].labels.size(); ++i) {
+      ++total;
+      if (a[s].labels[i] != b.at(s).labels.at(i)) ++different;
+    }
+  }
+  return static_cast<double>(different) / static_cast<double>(total);
+}
+
+}  // namespace dynains::test

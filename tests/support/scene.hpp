@@ -1,0 +1,128 @@
+// A small world of boxes on a plane, scanned by rays: scenes in which the right answer is obvious.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "support/random.hpp"
+
+namespace dynains::test {
+
+inline constexpr int kGroundObject = -1;
+inline constexpr double kSensorHeight = 1.723;  // m, the default of GroundSegmenter::Config
+
+/// Axis-aligned in the world; where it stands at time 0, and how it moves (m, m/s).
+struct Box {
+  Eigen::Vector3d low, high;
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+};
+
+/// A van of 4.2 x 1.8 x 2.2 m whose centre is at (x, y).
+inline Box van(double x, double y, const Eigen::Vector3d& velocity = Eigen::Vector3d::Zero()) {
+  return {{x - 2.1, y - 0.9, 0.05}, {x + 2.1, y + 0.9, 2.2}, velocity};
+}
+
+struct Scan {
+  Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+  double time = 0.0;
+  std::vector<Eigen::Vector3f> points;  // sensor frame, m
+  std::vector<int> object;              // index of the box hit, or kGroundObject
+};
+
+/// Boxes on the plane z = 0.
+struct Scene {
+  std::vector<Box> boxes;
+
+  /// 80 beams from -24.8 to +12 degrees, every 0.25 degrees of azimuth, 1 cm of range noise.
+  Scan scan(const Eigen::Isometry3d& T_world_sensor, double time) const {
+    constexpr int kBeams = 80;
+    constexpr int kAzimuths = 1440;
+    constexpr double kRadians = M_PI / 180.0;
+    Scan result{T_world_sensor, time, {}, {}};
+    Random random(1000 + static_cast<std::uint64_t>(time * 1000.0));
+    const Eigen::Vector3d origin = T_world_sensor.translation();
+    for (int a = 0; a < kAzimuths; ++a) {
+      const double azimuth = (a + 0.25) * 0.25 * kRadians;
+      for (int b = 0; b < kBeams; ++b) {
+        const double elevation = (-24.8 + 36.8 * b / (kBeams - 1)) * kRadians;
+        const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
+                                  std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+        const Eigen::Vector3d direction = T_world_sensor.linear() * ray;
+        int object = kGroundObject;
+        double range = direction.z() < 0.0 ? -origin.z() / direction.z() : kNever;
+        for (std::size_t i = 0; i < boxes.size(); ++i) {
+          const double hit = distance(boxes[i], origin, direction, time);
+          if (hit < range) {
+            range = hit;
+            object = static_cast<int>(i);
+          }
+        }
+        const double noise = random.uniform(-0.01, 0.01);
+        if (range > 80.0) continue;
+        result.points.push_back((ray * (range + noise)).cast<float>());
+        result.object.push_back(object);
+      }
+    }
+    return result;
+  }
+
+ private:
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+
+  static double distance(const Box& box, const Eigen::Vector3d& origin,
+                         const Eigen::Vector3d& direction, double time) {
+    double enter = 0.0;
+    double leave = kNever;
+    for (int i = 0; i < 3; ++i) {
+      const double shift = box.velocity[i] * time - origin[i];
+      const double a = (box.low[i] + shift) / direction[i];
+      const double b = (box.high[i] + shift) / direction[i];
+      enter = std::max(enter, std::min(a, b));
+      leave = std::min(leave, std::max(a, b));
+    }
+    return enter < leave ? enter : kNever;
+  }
+};
+
+/// Pose of a sensor at (x, y), kSensorHeight over the plane, turned by `yaw` (rad).
+inline Eigen::Isometry3d sensor_at(double x, double y = 0.0, double yaw = 0.0) {
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.translation() = Eigen::Vector3d(x, y, kSensorHeight);
+  T.linear() = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  return T;
+}
+
+/// `count` scans at 10 Hz along x at `speed` (m/s), the sensor turned by `yaw` (rad).
+inline std::vector<Scan> drive(const Scene& scene, int count, double speed, double yaw = 0.0) {
+  std::vector<Scan> scans;
+  for (int i = 0; i < count; ++i) {
+    scans.push_back(scene.scan(sensor_at(speed * 0.1 * i, 0.0, yaw), 0.1 * i));
+  }
+  return scans;
+}
+
+/// Two rows of pillars along x, nearer than 25 m, a free lane between them.
+inline Scene yard() {
+  Scene scene;
+  for (const double x : {-8.0, 0.0, 8.0, 16.0}) {
+    for (const double y : {-9.0, 9.0}) {
+      scene.boxes.push_back({{x - 1.0, y - 1.0, 0.0}, {x + 1.0, y + 1.0, 3.0}});
+    }
+  }
+  return scene;
+}
+
+/// yard() with one more box.
+inline Scene yard_with(const Box& box) {
+  Scene scene = yard();
+  scene.boxes.push_back(box);
+  return scene;
+}
+inline constexpr int kAddedBox = 8;  ///< its index
+
+}  // namespace dynains::test
