@@ -197,6 +197,8 @@ class OccupancyDescriptor {
       high = std::max(high, offset);
     }
     azimuth_min_ = origin + low;
+    // Back into the interval of azimuths, so that no point is more than one turn away.
+    if (azimuth_min_ > detail::kPi) azimuth_min_ -= 2.0F * detail::kPi;
     return high - low;
   }
 
