@@ -1,0 +1,226 @@
+#include "dynains/occupancy_descriptor.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include "polar_test_points.hpp"
+#include "reference_descriptor.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+namespace dynains::test {
+namespace {
+
+// A cluster that owns its points; scans are added oldest first.
+class Cluster {
+ public:
+  Cluster& point(double range, double azimuth_degrees, double z) {
+    add(points_, range, azimuth_degrees, z);
+    return *this;
+  }
+  Cluster& end_of_scan() {
+    scan_begin_.push_back(static_cast<std::uint32_t>(points_.size()));
+    return *this;
+  }
+  std::size_t size() const { return points_.size(); }
+  ClusterView view() const { return {points_.view(), scan_begin_}; }
+
+ private:
+  PolarBuffer points_;
+  std::vector<std::uint32_t> scan_begin_ = {0};
+};
+
+OccupancyDescriptor::Config make(double cell_range, double cell_azimuth, double tau_s = 0.6) {
+  OccupancyDescriptor::Config config;
+  config.cell_range = cell_range;
+  config.cell_azimuth = cell_azimuth;
+  config.tau_s = tau_s;
+  return config;
+}
+
+OccupancyDescriptor described(const OccupancyDescriptor::Config& config, const Cluster& cluster) {
+  OccupancyDescriptor descriptor(config);
+  descriptor.describe(cluster.view());
+  descriptor.describe_rest();
+  return descriptor;
+}
+
+void check_heights(Span<const float> heights, const std::vector<double>& expected) {
+  REQUIRE(heights.size() == expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    INFO("cell " << i);
+    CHECK(heights[i] == Approx(expected[i]).margin(1e-6));
+  }
+}
+
+TEST_CASE("Eq. 5-12 of a cluster worked by hand") {
+  // s_r = 0.5 m, s_theta = 10 deg. All points: r in [10, 10.6], theta in [0, 12] deg, z from -1.
+  //   N_r = ceil(0.6 / 0.5) = 2, N_theta = ceil(12 / 10) = 2                        (Eq. 6, 7)
+  // Oldest: (10.0,  0) z = -1.0 -> cell (1,1), h = 0.0    (10.6, 12) z = 0.5 -> (2,2), h = 1.5
+  // Newest: (10.0,  0) z =  0.0 -> cell (1,1), h = 1.0    (10.6, 12) z = 1.0 -> (2,2), h = 2.0
+  //   h_old = (0, 0, 0, 1.5), h_new = (1, 0, 0, 2)                                  (Eq. 8-10)
+  //   d = 1.5 * 2 / (1.5 * sqrt(1 + 4)) = 2 / sqrt(5) = 0.894427                    (Eq. 11)
+  const Cluster cluster = Cluster()
+                              .point(10.0, 0.0, -1.0)
+                              .point(10.6, 12.0, 0.5)
+                              .end_of_scan()
+                              .point(10.0, 0.0, 0.0)
+                              .point(10.6, 12.0, 1.0)
+                              .end_of_scan();
+  const OccupancyDescriptor descriptor = described(make(0.5, 10.0), cluster);
+  CHECK(descriptor.radial_cells() == 2);
+  CHECK(descriptor.azimuth_cells() == 2);
+  check_heights(descriptor.heights(0), {0.0, 0.0, 0.0, 1.5});
+  check_heights(descriptor.heights(1), {1.0, 0.0, 0.0, 2.0});
+  check_heights(descriptor.cluster_heights(), {1.0, 0.0, 0.0, 2.0});
+  CHECK(descriptor.similarity() == Approx(0.894427).epsilon(1e-6));
+  CHECK_FALSE(descriptor.proposes_dynamic());
+
+  // Eq. 12 on both sides of tau_s.
+  CHECK_FALSE(described(make(0.5, 10.0, 0.8944), cluster).proposes_dynamic());
+  CHECK(described(make(0.5, 10.0, 0.8945), cluster).proposes_dynamic());
+}
+
+TEST_CASE("a similarity of exactly tau_s is no proposal") {
+  // h_old = (3, 0, 4), h_new = (3, 0, 0) over a lowest point of its own cell: d = 9 / (5 * 3) = 0.6.
+  const auto make_cluster = [](double z) {
+    return Cluster()
+        .point(10.0, 0.0, 3.0)
+        .point(10.6, 0.0, 0.0)
+        .point(11.2, 0.0, z)
+        .end_of_scan()
+        .point(10.0, 0.0, 3.0)
+        .end_of_scan();
+  };
+  CHECK(described(make(0.5, 10.0), make_cluster(4.0)).similarity() == 0.6);
+  CHECK_FALSE(described(make(0.5, 10.0), make_cluster(4.0)).proposes_dynamic());
+  CHECK(described(make(0.5, 10.0), make_cluster(4.001)).proposes_dynamic());
+}
+
+TEST_CASE("descriptors are those of Eq. 5-11 in double on random clusters") {
+  struct Case {
+    const char* why;
+    double azimuth_min, azimuth_max;  // deg, may run over 180
+    double range_max;
+    std::size_t points;
+  };
+  const auto c = GENERATE(values<Case>({
+      {"a car ahead", -4.0, 6.0, 14.0, 60},
+      {"a car behind, across the seam", 174.0, 187.0, 14.0, 60},
+      {"a wall on one side", 20.0, 160.0, 20.0, 200},
+      {"more than half a turn, free ahead", 20.0, 330.0, 20.0, 200},
+      {"more than half a turn, free behind", -170.0, 130.0, 20.0, 200},
+      {"more than half a turn, free on the left", 110.0, 395.0, 20.0, 200},
+      {"more than half a turn, free on the right", -50.0, 220.0, 20.0, 200},
+  }));
+  INFO(c.why);
+  const OccupancyDescriptor::Config config = make(0.25, 1.5);
+  int compared = 0;
+  for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+    Random random(seed);
+    const int scans = 2 + static_cast<int>(seed % 4);
+    Cluster cluster;
+    for (int k = 0; k < scans; ++k) {
+      for (std::size_t i = 0; i < c.points / static_cast<std::size_t>(scans); ++i) {
+        double azimuth = random.uniform(c.azimuth_min, c.azimuth_max);
+        if (azimuth > 180.0) azimuth -= 360.0;
+        cluster.point(random.uniform(10.0, c.range_max), azimuth, random.uniform(-1.7, 2.0));
+      }
+      cluster.end_of_scan();
+    }
+    const auto expected = describe(config, cluster.view());
+    if (!expected) continue;
+    ++compared;
+    INFO("seed " << seed);
+    const OccupancyDescriptor descriptor = described(config, cluster);
+    REQUIRE(descriptor.radial_cells() == expected->radial_cells);
+    REQUIRE(descriptor.azimuth_cells() == expected->azimuth_cells);
+    for (std::size_t k = 0; k <= static_cast<std::size_t>(scans); ++k) {
+      const Span<const float> heights = descriptor.heights(k);
+      double worst = 0.0;
+      for (std::size_t i = 0; i < heights.size(); ++i) {
+        worst = std::max(worst, std::abs(heights[i] - expected->heights[k][i]));
+      }
+      REQUIRE(worst < 1e-6);
+    }
+    REQUIRE(descriptor.similarity() == Approx(expected->similarity).margin(1e-6));
+  }
+  CHECK(compared >= 50);
+}
+
+TEST_CASE("turning a cluster about the sensor leaves its descriptor as it is") {
+  // Offsets in the middle of cells, so that rounding cannot move a point.
+  const auto turned = [](double yaw) {
+    Cluster cluster;
+    for (int k = 0; k < 2; ++k) {
+      for (int j = 0; j < 4; ++j) {
+        double azimuth = yaw + 3.0 * j + (j > 0 ? 0.7 : 0.0);
+        while (azimuth > 180.0) azimuth -= 360.0;
+        cluster.point(12.0 + 0.1 * j, azimuth, 0.3 * j + 0.2 * k);
+      }
+      cluster.end_of_scan();
+    }
+    return cluster;
+  };
+  const OccupancyDescriptor ahead = described(make(0.25, 1.5), turned(0.0));
+  for (double yaw = -179.7; yaw < 180.0; yaw += 0.9) {
+    INFO("yaw " << yaw);
+    const OccupancyDescriptor other = described(make(0.25, 1.5), turned(yaw));
+    REQUIRE(other.azimuth_cells() == ahead.azimuth_cells());
+    REQUIRE(other.similarity() == Approx(ahead.similarity()).epsilon(1e-5));
+  }
+}
+
+TEST_CASE("a point on the outer border belongs to the last cell") {
+  // Extent 1.0 m of 0.5 m cells: N_r = 2, and r_max would be in a third cell by Eq. 8.
+  const Cluster cluster =
+      Cluster().point(10.0, 0.0, 0.0).point(11.0, 0.0, 2.0).end_of_scan().point(10.0, 0.0, 1.0)
+          .end_of_scan();
+  const OccupancyDescriptor descriptor = described(make(0.5, 10.0), cluster);
+  CHECK(descriptor.radial_cells() == 2);
+  check_heights(descriptor.heights(0), {0.0, 2.0});
+}
+
+TEST_CASE("a cluster of one place has one cell") {
+  const Cluster cluster =
+      Cluster().point(10.0, 0.0, 1.0).end_of_scan().point(10.0, 0.0, 1.0).end_of_scan();
+  const OccupancyDescriptor descriptor = described(make(0.25, 1.5), cluster);
+  CHECK(descriptor.cell_count() == 1);
+}
+
+TEST_CASE("observations without any height are equal to each other and unlike all others") {
+  SECTION("both flat: static") {
+    const Cluster flat =
+        Cluster().point(10.0, 0.0, 1.0).end_of_scan().point(12.0, 0.0, 1.0).end_of_scan();
+    CHECK(described(make(0.25, 1.5), flat).similarity() == 1.0);
+  }
+  SECTION("one flat: proposed") {
+    const Cluster half = Cluster()
+                             .point(10.0, 0.0, 0.0)
+                             .end_of_scan()
+                             .point(10.0, 0.0, 0.0)
+                             .point(12.0, 0.0, 1.0)
+                             .end_of_scan();
+    CHECK(described(make(0.25, 1.5), half).similarity() == 0.0);
+    CHECK(described(make(0.25, 1.5), half).proposes_dynamic());
+  }
+}
+
+TEST_CASE("tau_s = 0 proposes nothing, tau_s = 1 all that differ") {
+  const Cluster apart = Cluster()
+                            .point(10.0, 0.0, 0.0)
+                            .point(12.0, 0.0, 1.0)
+                            .end_of_scan()
+                            .point(14.0, 0.0, 1.0)
+                            .end_of_scan();
+  const Cluster alike =
+      Cluster().point(10.0, 0.0, 0.0).point(12.0, 0.0, 1.0).end_of_scan().point(10.0, 0.0, 0.0)
+          .point(12.0, 0.0, 1.0).end_of_scan();
+  CHECK(described(make(0.25, 1.5), apart).similarity() == 0.0);
+  CHECK_FALSE(described(make(0.25, 1.5, 0.0), apart).proposes_dynamic());
+  CHECK(described(make(0.25, 1.5, 1.0), apart).proposes_dynamic());
+  CHECK_FALSE(described(make(0.25, 1.5, 1.0), alike).proposes_dynamic());
+}
+
+}  // namespace
+}  // namespace dynains::test

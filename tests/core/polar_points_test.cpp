@@ -1,0 +1,63 @@
+#include "dynains/polar_points.hpp"
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+namespace dynains::test {
+namespace {
+
+Eigen::Isometry3d random_pose(Random& random, double reach) {
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear() = Eigen::Quaterniond(random.uniform(-1, 1), random.uniform(-1, 1),
+                                  random.uniform(-1, 1), random.uniform(-1, 1))
+                   .normalized()
+                   .toRotationMatrix();
+  T.translation() = Eigen::Vector3d(random.uniform(-reach, reach), random.uniform(-reach, reach),
+                                    random.uniform(-reach, reach));
+  return T;
+}
+
+TEST_CASE("points of the window are where Eq. 3 puts them in double") {
+  // Every count up to three vectors of eight lanes, so that tails of every length occur.
+  Random random(1);
+  for (std::size_t count = 0; count <= 24; ++count) {
+    const Eigen::Isometry3d T = random_pose(random, 5.0);
+    PointBuffer points;
+    for (std::size_t i = 0; i < count; ++i) {
+      points.push_back(random.uniform_float(-60, 60), random.uniform_float(-60, 60),
+                       random.uniform_float(-5, 10));
+    }
+    PolarBuffer window;
+    window.append(points, T.cast<float>());
+    window.append(points, Eigen::Isometry3f::Identity());
+    REQUIRE(window.size() == 2 * count);
+    for (std::size_t i = 0; i < 2 * count; ++i) {
+      const std::size_t from = i % count;
+      const Eigen::Vector3d source(points.x[from], points.y[from], points.z[from]);
+      const Eigen::Vector3d p = i < count ? T * source : source;
+      const double range = std::hypot(p.x(), p.y());
+      REQUIRE(window.range[i] == Approx(range).margin(3e-5));
+      const double azimuth = window.azimuth[i] - std::atan2(p.y(), p.x());
+      REQUIRE(std::abs(std::remainder(azimuth, 2.0 * M_PI)) < 1e-6 + 3e-5 / range);
+      REQUIRE(window.z[i] == Approx(p.z()).margin(3e-5));
+    }
+  }
+}
+
+TEST_CASE("a window that is cleared and refilled holds nothing old") {
+  PointBuffer points;
+  for (int i = 0; i < 20; ++i) points.push_back(3.0F, 4.0F, 1.0F);
+  PolarBuffer window;
+  window.append(points, Eigen::Isometry3f::Identity());
+  window.clear();
+  CHECK(window.view().empty());
+  window.append(PointsView(points).subview(0, 3), Eigen::Isometry3f::Identity());
+  REQUIRE(window.view().size() == 3);
+  CHECK(window.view().range[2] == 5.0F);
+}
+
+}  // namespace
+}  // namespace dynains::test
