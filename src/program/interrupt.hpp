@@ -1,0 +1,18 @@
+// Ctrl-C as a request that a loop looks at.
+#pragma once
+
+namespace dynains::program {
+
+/// While it lives, SIGINT and SIGTERM ask to stop; a second one ends the program at once.
+class InterruptGuard {
+ public:
+  InterruptGuard();
+  ~InterruptGuard();
+  InterruptGuard(const InterruptGuard&) = delete;
+  InterruptGuard& operator=(const InterruptGuard&) = delete;
+
+  /// Number of the signal that asked to stop, 0 if none did.
+  static int signal();
+};
+
+}  // namespace dynains::program

@@ -1,0 +1,52 @@
+#include <csignal>
+#include <exception>
+#include <iostream>
+
+#include "command.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/version.hpp"
+#include "eval.hpp"
+#include "experiment.hpp"
+
+namespace {
+
+using namespace dynains::program;
+
+int fail(int code, const char* what) {
+  std::cerr << "dynains: error: " << what << '\n';
+  return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // A closed pipe must not stop a run that writes files.
+  std::signal(SIGPIPE, SIG_IGN);
+
+  CLI::App app("Removes moving objects from LiDAR scans and maps, scan by scan.", "dynains");
+  app.set_version_flag("--version", std::string("dynains ") + dynains::kVersionString);
+  app.require_subcommand(1);
+  app.get_formatter()->column_width(36);
+  add_run_command(app);
+  add_config_command(app);
+  add_simulate_command(app);
+  add_eval_command(app);
+  add_experiment_command(app);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& success) {
+    return app.exit(success);
+  } catch (const CLI::ParseError& error) {
+    return fail(kExitUsage, (std::string(error.what()) + " (see dynains --help)").c_str());
+  } catch (const dynains::ConfigError& error) {
+    return fail(kExitUsage, error.what());
+  } catch (const Interrupted& interrupted) {
+    return 128 + interrupted.signal;
+  } catch (const std::bad_alloc&) {
+    return fail(kExitFailure, "out of memory");
+  } catch (const std::exception& error) {
+    return fail(kExitFailure, error.what());
+  }
+  return 0;
+}

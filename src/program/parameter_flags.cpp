@@ -1,0 +1,125 @@
+#include "parameter_flags.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <fstream>
+#include <limits>
+#include <locale>
+#include <sstream>
+
+namespace dynains::program {
+namespace {
+
+template <class Integer>
+std::optional<Integer> parse_integer(const std::string& text) {
+  Integer value = 0;
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  if (text.empty() || error != std::errc{} || stop != end) return std::nullopt;
+  return value;
+}
+
+template <class Real>
+std::optional<Real> parse_real(const std::string& text) {
+  std::istringstream stream(text);
+  stream.imbue(std::locale::classic());
+  Real value = 0;
+  if (!(stream >> std::noskipws >> value)) return std::nullopt;
+  if (stream.peek() != std::istringstream::traits_type::eof()) return std::nullopt;
+  return value;
+}
+
+template <class Real>
+std::string format_real(Real value) {
+  for (int digits = 6;; ++digits) {
+    std::ostringstream text;
+    text.imbue(std::locale::classic());
+    text.precision(digits);
+    text << value;
+    const bool exact = digits >= std::numeric_limits<Real>::max_digits10;
+    if (exact || parse_real<Real>(text.str()) == value) return text.str();
+  }
+}
+
+std::string trim(const std::string& text) {
+  constexpr const char* kBlanks = " \t\r";
+  const std::size_t begin = text.find_first_not_of(kBlanks);
+  if (begin == std::string::npos) return {};
+  return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
+}
+
+}  // namespace
+
+std::string flag_name(std::string parameter_name) {
+  std::replace(parameter_name.begin(), parameter_name.end(), '_', '-');
+  return parameter_name;
+}
+
+template <>
+std::optional<bool> parse_value(const std::string& text) {
+  if (text == "true" || text == "on" || text == "1") return true;
+  if (text == "false" || text == "off" || text == "0") return false;
+  return std::nullopt;
+}
+template <>
+std::optional<int> parse_value(const std::string& text) {
+  return parse_integer<int>(text);
+}
+template <>
+std::optional<std::uint64_t> parse_value(const std::string& text) {
+  return parse_integer<std::uint64_t>(text);
+}
+template <>
+std::optional<float> parse_value(const std::string& text) {
+  return parse_real<float>(text);
+}
+template <>
+std::optional<double> parse_value(const std::string& text) {
+  return parse_real<double>(text);
+}
+
+std::string format_value(double value) { return format_real(value); }
+std::string format_value(float value) { return format_real(value); }
+
+ParameterValues read_config_file(const std::filesystem::path& path) {
+  std::error_code error;
+  std::ifstream file(path);
+  if (!file || std::filesystem::is_directory(path, error)) {
+    throw IoError(path.string() + ": cannot be read; expected a config file, see dynains config");
+  }
+  ParameterValues values;
+  std::map<std::string, std::size_t> seen;
+  std::size_t number = 0;
+  for (std::string line; std::getline(file, line);) {
+    ++number;
+    line = trim(line.substr(0, line.find('#')));
+    if (line.empty()) continue;
+    const std::string where = path.string() + ":" + std::to_string(number) + ": ";
+    const std::size_t equals = line.find('=');
+    const std::string name = flag_name(trim(line.substr(0, equals)));
+    const std::string value = equals == std::string::npos ? "" : trim(line.substr(equals + 1));
+    if (name.empty() || value.empty()) {
+      throw ConfigError(where + "expected a line such as tau-s = 0.6");
+    }
+    const auto [first, is_new] = seen.emplace(name, number);
+    if (!is_new) {
+      throw ConfigError(where + name + " stands on line " + std::to_string(first->second) +
+                        " already");
+    }
+    values.set(name, value, where + name);
+  }
+  if (file.bad()) throw IoError(path.string() + ": reading stopped");
+  return values;
+}
+
+ParameterValues ParameterFlags::values() const {
+  ParameterValues values;
+  for (const CLI::Option* option : options_) {
+    if (option->count() == 0) continue;
+    const std::string flag = option->get_name();
+    values.set(flag.substr(2), option->results().back(), flag);
+  }
+  return values;
+}
+
+}  // namespace dynains::program

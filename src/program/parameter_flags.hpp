@@ -1,0 +1,132 @@
+// Parameters as flags, as lines of a config file and as text: all from Config::visit.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/parameters.hpp"
+
+namespace dynains::program {
+
+/// "tau_s" -> "tau-s", the name of the flag and of the line in a config file.
+std::string flag_name(std::string parameter_name);
+
+/// Value of a parameter as text; nothing if it is none of that type.
+template <class T>
+std::optional<T> parse_value(const std::string& text);
+template <>
+std::optional<bool> parse_value(const std::string& text);
+template <>
+std::optional<int> parse_value(const std::string& text);
+template <>
+std::optional<std::uint64_t> parse_value(const std::string& text);
+template <>
+std::optional<float> parse_value(const std::string& text);
+template <>
+std::optional<double> parse_value(const std::string& text);
+
+/// The shortest text that reads back to the same value.
+std::string format_value(double value);
+std::string format_value(float value);
+inline std::string format_value(bool value) { return value ? "true" : "false"; }
+template <class Integer, class = std::enable_if_t<std::is_integral_v<Integer>>>
+std::string format_value(Integer value) {
+  return std::to_string(value);
+}
+
+/// Kind of value that a parameter takes, for help texts: "true|false", "INT in [2, 64]" ...
+template <class T>
+std::string describe_range(const Parameter<T>& parameter) {
+  using Value = std::remove_const_t<T>;
+  if constexpr (std::is_same_v<Value, bool>) {
+    return "true|false";
+  } else {
+    std::string text = std::is_integral_v<Value> ? "INT" : "FLOAT";
+    const Bounds& bounds = parameter.bounds;
+    if (std::isfinite(bounds.min) || std::isfinite(bounds.max)) text += " in " + bounds.to_string();
+    return *parameter.unit == '\0' ? text : text + ' ' + parameter.unit;
+  }
+}
+
+/// Assigns `text` to a parameter. `where` starts the message of the ConfigError that is thrown if
+/// the text is no such value or the value is out of bounds.
+template <class T>
+void assign_parameter(const Parameter<T>& parameter, const std::string& text,
+                      const std::string& where) {
+  const std::optional<T> value = parse_value<T>(text);
+  bool valid = value.has_value();
+  if constexpr (!std::is_same_v<T, bool>) {
+    valid = valid && parameter.bounds.contain(static_cast<double>(*value));
+  }
+  if (!valid) {
+    throw ConfigError(where + " = " + text + ": expected " + describe_range(parameter) + " (" +
+                      parameter.help + ")");
+  }
+  parameter.value = *value;
+}
+
+/// Values by flag name, each with the place it comes from.
+class ParameterValues {
+ public:
+  void set(const std::string& name, const std::string& text, const std::string& where) {
+    values_[name] = {text, where};
+  }
+
+  /// Assigns all values to the parameters of `config`. Throws ConfigError, for unknown names too.
+  template <class Config>
+  void apply(Config& config) const {
+    std::map<std::string, Value> left = values_;
+    Config::visit(config, [&](const auto& parameter) {
+      const auto found = left.find(flag_name(parameter.name));
+      if (found == left.end()) return;
+      assign_parameter(parameter, found->second.text, found->second.where);
+      left.erase(found);
+    });
+    if (left.empty()) return;
+    throw ConfigError(left.begin()->second.where + ": unknown parameter, see dynains config");
+  }
+
+ private:
+  struct Value {
+    std::string text;
+    std::string where;
+  };
+  std::map<std::string, Value> values_;
+};
+
+/// Reads lines `name = value`; `#` starts a comment. Throws IoError if the file cannot be read,
+/// ConfigError for a line of another form or a name that stands twice.
+ParameterValues read_config_file(const std::filesystem::path& path);
+
+/// A flag for each parameter of a configuration.
+class ParameterFlags {
+ public:
+  /// Adds the flags to `command`. `defaults` are shown in --help.
+  template <class Config>
+  void add_to(CLI::App& command, const Config& defaults, const std::string& group) {
+    Config::visit(defaults, [&](const auto& parameter) {
+      const std::string help =
+          std::string(parameter.help) + " [" + format_value(parameter.value) + ']';
+      options_.push_back(command.add_option("--" + flag_name(parameter.name), help)
+                             ->type_name(describe_range(parameter))
+                             ->expected(1)
+                             ->group(group));
+    });
+  }
+
+  /// The flags that were given.
+  ParameterValues values() const;
+
+ private:
+  std::vector<CLI::Option*> options_;
+};
+
+}  // namespace dynains::program

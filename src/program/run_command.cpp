@@ -1,0 +1,217 @@
+#include <cstdint>
+#include <filesystem>
+#include <iomanip>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "command.hpp"
+#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/io/kitti.hpp"
+#include "dynains/io/point_file.hpp"
+#include "evaluation_options.hpp"
+#include "interrupt.hpp"
+#include "output_folder.hpp"
+#include "parameter_flags.hpp"
+#include "preset.hpp"
+#include "progress.hpp"
+#include "run_report.hpp"
+#include "run_results.hpp"
+#include "run_sequence.hpp"
+
+namespace dynains::program {
+namespace {
+
+namespace fs = std::filesystem;
+using Config = DynaInsRemover::Config;
+
+struct RunOptions {
+  std::string sequence;
+  std::string out;
+  std::string preset = "default";
+  std::string config_file;
+  std::string map;
+  ScanWindow window;
+  bool write_online = false;
+  bool force = false;
+  bool quiet = false;
+  ParameterFlags flags;
+};
+
+/// Preset, then config file, then flags.
+Config make_config(const RunOptions& options) {
+  Config config = preset(options.preset);
+  if (!options.config_file.empty()) read_config_file(options.config_file).apply(config);
+  options.flags.values().apply(config);
+  config.validate();
+  return config;
+}
+
+nlohmann::ordered_json to_json(const Config& config) {
+  nlohmann::ordered_json json;
+  Config::visit(config, [&](const auto& parameter) { json[parameter.name] = parameter.value; });
+  return json;
+}
+
+ScanRange select_scans(const KittiSequence& sequence, const ScanWindow& window) {
+  const auto number = [&](std::size_t i) { return std::stoull(sequence.name(i)); };
+  ScanRange range{0, sequence.size() - 1};
+  while (range.first <= range.last && window.start && number(range.first) < *window.start) {
+    ++range.first;
+  }
+  while (range.last > range.first && window.end && number(range.last) > *window.end) --range.last;
+  const bool none = range.first > range.last || (window.end && number(range.last) > *window.end);
+  if (none) {
+    throw ConfigError("--start and --end leave no scan of " + sequence.name(0) + " to " +
+                      sequence.name(sequence.size() - 1));
+  }
+  return range;
+}
+
+/// So that a broken file is noticed before anything is written.
+void check_scans(const KittiSequence& sequence, const ScanRange& range) {
+  for (std::size_t i = range.first; i <= range.last; ++i) sequence.point_count(i);
+}
+
+OutputFiles files_of_a_run() {
+  OutputFiles files;
+  files.marker = "report.json";
+  files.files = {"timing.csv", "static_map.ply", "dynamic_points.ply"};
+  files.folders = {"labels", "online"};
+  files.extensions = {".label"};
+  return files;
+}
+
+RunOutputs make_outputs(const RunOptions& options, const Config& config) {
+  RunOutputs outputs;
+  outputs.folder = options.out;
+  outputs.write_online = options.write_online;
+  if (options.map.empty()) {
+    if (config.build_map) outputs.map = outputs.folder / "static_map.ply";
+    return outputs;
+  }
+  if (!config.build_map) throw ConfigError("--map needs --build-map true");
+  if (!is_point_file(options.map)) {
+    throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
+  }
+  outputs.map = options.map;
+  return outputs;
+}
+
+void print_summary(const RunResults& results, const RunTiming& timing, const RunOutputs& outputs) {
+  const LabelCounts& labels = results.labels();
+  const auto percent = [&](std::uint64_t count) {
+    return results.points() == 0
+               ? 0.0
+               : 100.0 * static_cast<double>(count) / static_cast<double>(results.points());
+  };
+  std::vector<double> totals;
+  for (const TimingRow& row : timing.rows) totals.push_back(row.total);
+  const TimeStatistics time = statistics(std::move(totals));
+  const std::uint64_t moving = labels[PointLabel::kDynamic];
+  const std::uint64_t kept = labels[PointLabel::kGround] + labels[PointLabel::kStatic];
+  std::cout << std::fixed << std::setprecision(2) << results.finished() << " scans, "
+            << results.points() << " points: " << percent(moving) << " % moving, " << percent(kept)
+            << " % static, " << percent(results.points() - moving - kept) << " % not judged\n"
+            << "time per scan: median " << time.median << " ms, p95 " << time.p95 << " ms, max "
+            << time.max << " ms\n";
+  if (results.map_points()) {
+    std::cout << "static map: " << outputs.map.string() << " (" << *results.map_points()
+              << " points)\n";
+  }
+  std::cout << "moving points: " << (outputs.folder / "dynamic_points.ply").string() << " ("
+            << moving << " points)\n"
+            << "labels: " << (outputs.folder / "labels").string()
+            << "\nreport: " << (outputs.folder / "report.json").string() << std::endl;
+}
+
+void run(const RunOptions& options) {
+  const Config config = make_config(options);
+  const RunOutputs outputs = make_outputs(options, config);
+  DynaInsRemover remover(config);
+  const KittiSequence sequence(options.sequence);
+  const ScanRange range = select_scans(sequence, options.window);
+  check_scans(sequence, range);
+  prepare_output_folder(outputs.folder, files_of_a_run(), options.force,
+                        to_text(unfinished_report()));
+
+  RunResults results(sequence, range, outputs);
+  const InterruptGuard interrupt;
+  RunTiming timing;
+  {
+    Progress progress(range.size(), "scans", options.quiet);
+    timing = run_sequence(remover, sequence, range, results, [&](std::size_t done) {
+      progress.update(done);
+      return InterruptGuard::signal() == 0;
+    });
+  }
+  results.commit();
+
+  RunDescription description;
+  description.sequence = options.sequence;
+  description.first_scan = sequence.name(range.first);
+  description.last_scan = sequence.name(range.first + results.finished() - 1);
+  description.preset = options.preset;
+  description.complete = results.finished() == range.size();
+  description.map = outputs.map;
+  description.configuration = to_json(config);
+  write_timing(outputs.folder / "timing.csv", timing);
+  write_report(outputs.folder / "report.json", make_report(description, results, timing));
+  if (!options.quiet) print_summary(results, timing, outputs);
+  if (!description.complete) throw Interrupted{InterruptGuard::signal()};
+}
+
+}  // namespace
+
+void add_run_command(CLI::App& app) {
+  CLI::App& command = *app.add_subcommand("run", "Remove what moves from a recorded sequence");
+  auto options = std::make_shared<RunOptions>();
+  command
+      .add_option("SEQ", options->sequence,
+                  "KITTI or SemanticKITTI folder: velodyne/, poses.txt; optional calib.txt, "
+                  "times.txt")
+      ->required()
+      ->type_name("");
+  command
+      .add_option("-o,--out", options->out,
+                  "folder for the results; created, must be empty (see --force)")
+      ->required()
+      ->type_name("FOLDER");
+  command.add_flag(
+      "--force", options->force,
+      "replace the results of an earlier run in --out; they are removed first, so that "
+      "old and new files never mix. A folder that holds anything else is refused");
+  add_window_options(command, options->window);
+  command
+      .add_option("--preset", options->preset,
+                  "default, or paper: the paper to the letter [default]")
+      ->check(CLI::IsMember(preset_names()))
+      ->type_name("NAME");
+  command
+      .add_option("--config", options->config_file,
+                  "parameters, a line `name = value` each; dynains config prints one. Flags win")
+      ->type_name("FILE");
+  command
+      .add_option("--map", options->map,
+                  "static map, .ply or .pcd [static_map.ply in the folder of --out]")
+      ->type_name("FILE");
+  command.add_flag("--write-online", options->write_online,
+                   "also write the verdicts without latency, to the folder online");
+  command.add_flag("-q,--quiet", options->quiet, "print errors only");
+
+  const Config defaults = preset("default");
+  Config::visit_sections(defaults, [&](const char* name, const auto& section) {
+    options->flags.add_to(command, section, std::string("Parameters of ") + name);
+  });
+  command.footer(
+      "Writes labels/NNNNNN.label (uint32 a point: 251 moving, 9 static, 0 not judged; instance id "
+      "above\nthe 16th bit), static_map.ply, dynamic_points.ply, report.json and timing.csv. Each "
+      "file appears\nwhole or not at all; report.json says \"complete\": false until the end. "
+      "Ctrl-C ends the run after the\nscan at hand, writes what is there and exits with 130.");
+  command.callback([options] { run(*options); });
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,113 @@
+#include "run_report.hpp"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <iomanip>
+#include <locale>
+
+#include "dynains/io/atomic_file.hpp"
+#include "dynains/version.hpp"
+
+namespace dynains::program {
+namespace {
+
+nlohmann::ordered_json to_json(std::vector<double> milliseconds) {
+  const TimeStatistics s = statistics(std::move(milliseconds));
+  return {{"median", s.median}, {"p95", s.p95}, {"p99", s.p99}, {"max", s.max}};
+}
+
+nlohmann::ordered_json times_to_json(const RunTiming& timing) {
+  nlohmann::ordered_json json;
+  const auto column = [&](auto&& value_of) {
+    std::vector<double> values;
+    for (const TimingRow& row : timing.rows) values.push_back(value_of(row));
+    return to_json(std::move(values));
+  };
+  for (std::size_t stage = 0; stage < timing.stages.size(); ++stage) {
+    json[timing.stages[stage]] = column([&](const TimingRow& row) { return row.stages[stage]; });
+  }
+  json["total"] = column([](const TimingRow& row) { return row.total; });
+  return json;
+}
+
+}  // namespace
+
+TimeStatistics statistics(std::vector<double> milliseconds) {
+  if (milliseconds.empty()) return {};
+  std::sort(milliseconds.begin(), milliseconds.end());
+  const auto quantile = [&](double share) {
+    const double rank = std::ceil(share * static_cast<double>(milliseconds.size()));
+    return milliseconds[std::max<std::size_t>(static_cast<std::size_t>(rank), 1) - 1];
+  };
+  return {quantile(0.5), quantile(0.95), quantile(0.99), milliseconds.back()};
+}
+
+std::uint64_t peak_memory_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  constexpr std::uint64_t kUnit = 1024;  // Linux counts kilobytes
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * kUnit;
+}
+
+nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& results,
+                                   const RunTiming& timing) {
+  const LabelCounts& labels = results.labels();
+  nlohmann::ordered_json report = unfinished_report();
+  report["complete"] = run.complete;
+  report["sequence"] = run.sequence;
+  report["first_scan"] = run.first_scan;
+  report["last_scan"] = run.last_scan;
+  report["scans"] = results.finished();
+  report["points"] = results.points();
+  report["labels"] = {{"invalid", labels[PointLabel::kInvalid]},
+                      {"out_of_range", labels[PointLabel::kOutOfRange]},
+                      {"ground", labels[PointLabel::kGround]},
+                      {"static", labels[PointLabel::kStatic]},
+                      {"dynamic", labels[PointLabel::kDynamic]}};
+  if (results.map_points()) {
+    report["static_map"] = {{"file", run.map.string()}, {"points", *results.map_points()}};
+  } else {
+    report["static_map"] = nullptr;
+  }
+  report["milliseconds"] = times_to_json(timing);
+  report["flush_milliseconds"] = timing.flush;
+  report["peak_memory_bytes"] = peak_memory_bytes();
+  report["preset"] = run.preset;
+  report["configuration"] = run.configuration;
+  return report;
+}
+
+nlohmann::ordered_json unfinished_report() {
+  return {{"program", "dynains"}, {"version", kVersionString}, {"complete", false}};
+}
+
+std::string to_text(const nlohmann::ordered_json& report) {
+  // Paths need not be UTF-8.
+  return report.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
+}
+
+void write_report(const std::filesystem::path& path, const nlohmann::ordered_json& report) {
+  AtomicFile file(path);
+  file.stream() << to_text(report);
+  file.commit();
+}
+
+void write_timing(const std::filesystem::path& path, const RunTiming& timing) {
+  AtomicFile file(path);
+  std::ostream& out = file.stream();
+  out.imbue(std::locale::classic());
+  out << std::fixed << std::setprecision(4) << "scan,points";
+  for (const std::string& stage : timing.stages) out << ',' << stage << "_ms";
+  out << ",total_ms\n";
+  for (const TimingRow& row : timing.rows) {
+    out << row.scan << ',' << row.points;
+    for (const double ms : row.stages) out << ',' << ms;
+    out << ',' << row.total << '\n';
+  }
+  file.commit();
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,51 @@
+// report.json and timing.csv.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "run_results.hpp"
+#include "run_timing.hpp"
+
+namespace dynains::program {
+
+/// Milliseconds of one stage over all scans. Quantiles are the smallest value that at least that
+/// share of the values does not exceed; all 0 if there are none.
+struct TimeStatistics {
+  double median = 0.0;
+  double p95 = 0.0;
+  double p99 = 0.0;
+  double max = 0.0;
+};
+TimeStatistics statistics(std::vector<double> milliseconds);
+
+/// Highest resident memory of this process so far.
+std::uint64_t peak_memory_bytes();
+
+struct RunDescription {
+  std::string sequence;
+  std::string first_scan;
+  std::string last_scan;
+  std::string preset;
+  bool complete = true;  ///< false after a signal
+  std::filesystem::path map;
+  nlohmann::ordered_json configuration;  ///< parameter name -> value
+};
+
+nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& results,
+                                   const RunTiming& timing);
+
+/// What stands in the place of the report while the run is not finished.
+nlohmann::ordered_json unfinished_report();
+
+/// Text of a report, as in the file.
+std::string to_text(const nlohmann::ordered_json& report);
+
+/// Both throw IoError.
+void write_report(const std::filesystem::path& path, const nlohmann::ordered_json& report);
+void write_timing(const std::filesystem::path& path, const RunTiming& timing);
+
+}  // namespace dynains::program

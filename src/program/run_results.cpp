@@ -1,0 +1,98 @@
+#include "run_results.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace dynains::program {
+namespace {
+
+/// Points lie around the poses; near the limit doubles cost little and lose nothing.
+bool is_far(const KittiSequence& sequence, const ScanRange& range) {
+  constexpr double kReach = 500.0;  // m, of any sensor
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    const Eigen::Vector3d position = sequence.T_world_sensor(i).translation();
+    if (position.cwiseAbs().maxCoeff() > kFloatCoordinateLimit - kReach) return true;
+  }
+  return false;
+}
+
+PointColumns map_columns(bool far) {
+  PointColumns columns;
+  columns.double_xyz = far;
+  return columns;
+}
+
+PointColumns dynamic_columns(bool far) {
+  PointColumns columns = map_columns(far);
+  columns.intensity = true;
+  columns.label = true;
+  return columns;
+}
+
+}  // namespace
+
+RunResults::RunResults(const KittiSequence& sequence, const ScanRange& range,
+                       const RunOutputs& outputs)
+    : sequence_(sequence),
+      range_(range),
+      final_labels_(outputs.folder / "labels"),
+      dynamic_points_(outputs.folder / "dynamic_points.ply",
+                      dynamic_columns(is_far(sequence, range))) {
+  if (outputs.write_online) online_labels_.emplace(outputs.folder / "online");
+  if (!outputs.map.empty()) {
+    map_ = std::make_unique<PointFileWriter>(outputs.map, map_columns(is_far(sequence, range)));
+  }
+}
+
+void RunResults::take_newest(std::vector<float> scan, const ScanVerdict& verdict) {
+  points_ += verdict.labels.size();
+  open_scans_.push_back(std::move(scan));
+  if (online_labels_) online_labels_->write(sequence_.name(range_.first + verdict.scan), verdict);
+}
+
+void RunResults::take_final(const ScanVerdict& verdict) {
+  final_labels_.write(sequence_.name(range_.first + verdict.scan), verdict);
+  labels_.add(verdict.labels);
+
+  std::vector<float> scan = std::move(open_scans_.front());
+  open_scans_.pop_front();
+  for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
+    if (verdict.labels[i] != PointLabel::kDynamic) continue;
+    const float* xyzi = scan.data() + 4 * i;
+    FilePoint point;
+    point.position =
+        verdict.T_world_sensor * Eigen::Vector3f(xyzi[0], xyzi[1], xyzi[2]).cast<double>();
+    point.intensity = xyzi[3];
+    point.label = mos_label(verdict.labels[i], verdict.instances[i]);
+    dynamic_points_.add(point);
+  }
+  spare_.push_back(std::move(scan));
+  ++finished_;
+}
+
+std::vector<float> RunResults::recycle() {
+  if (spare_.empty()) return {};
+  std::vector<float> scan = std::move(spare_.back());
+  spare_.pop_back();
+  return scan;
+}
+
+void RunResults::add_map_point(const Eigen::Vector3d& point) {
+  FilePoint out;
+  out.position = point;
+  map_->add(out);
+}
+
+void RunResults::commit() {
+  final_labels_.finish();
+  if (online_labels_) online_labels_->finish();
+  dynamic_points_.commit();
+  if (map_) map_->commit();
+}
+
+std::optional<std::size_t> RunResults::map_points() const {
+  if (!map_) return std::nullopt;
+  return map_->size();
+}
+
+}  // namespace dynains::program

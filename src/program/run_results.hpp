@@ -1,0 +1,83 @@
+// Everything that a run leaves behind, but for the report.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dynains/io/kitti.hpp"
+#include "dynains/io/point_file.hpp"
+#include "dynains/scan_verdict.hpp"
+#include "label_writer.hpp"
+
+namespace dynains::program {
+
+/// Which scans of a sequence take part.
+struct ScanRange {
+  std::size_t first;  ///< index
+  std::size_t last;   ///< index, inclusive
+
+  std::size_t size() const { return last - first + 1; }
+};
+
+struct RunOutputs {
+  std::filesystem::path folder;
+  std::filesystem::path map;  ///< empty: no map
+  bool write_online = false;
+};
+
+/// Counts of points by final label.
+struct LabelCounts {
+  std::array<std::uint64_t, 5> of{};
+
+  void add(Span<const PointLabel> labels) {
+    for (const PointLabel label : labels) ++of[static_cast<std::size_t>(label)];
+  }
+  std::uint64_t operator[](PointLabel label) const { return of[static_cast<std::size_t>(label)]; }
+};
+
+/// Takes verdicts as they come and streams them to files. Nothing but the scans whose final
+/// verdict is open is kept in memory.
+class RunResults {
+ public:
+  /// Opens all files, so that a folder that cannot be written is noticed before the work.
+  /// The sequence outlives this. Throws IoError.
+  RunResults(const KittiSequence& sequence, const ScanRange& range, const RunOutputs& outputs);
+
+  /// The scan just pushed (interleaved x y z intensity), which this keeps, and the verdict on it.
+  void take_newest(std::vector<float> scan, const ScanVerdict& verdict);
+  void take_final(const ScanVerdict& verdict);
+  /// Memory of a scan that is finished, for reading the next.
+  std::vector<float> recycle();
+
+  void add_map_point(const Eigen::Vector3d& point);
+  /// Puts the map and the dynamic points in place.
+  void commit();
+
+  std::size_t finished() const { return finished_; }
+  std::uint64_t points() const { return points_; }
+  const LabelCounts& labels() const { return labels_; }
+  std::optional<std::size_t> map_points() const;
+
+ private:
+  const KittiSequence& sequence_;
+  ScanRange range_;
+  LabelWriter final_labels_;
+  std::optional<LabelWriter> online_labels_;
+  PointFileWriter dynamic_points_;
+  std::unique_ptr<PointFileWriter> map_;
+  std::deque<std::vector<float>> open_scans_;  // oldest first
+  std::vector<std::vector<float>> spare_;
+  std::size_t finished_ = 0;
+  std::uint64_t points_ = 0;
+  LabelCounts labels_;
+};
+
+}  // namespace dynains::program

@@ -1,0 +1,73 @@
+// The loop of `dynains run`, over any remover.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/kitti.hpp"
+#include "dynains/point_cloud_traits.hpp"
+#include "dynains/scan_verdict.hpp"
+#include "dynains/stage_times.hpp"
+#include "read_ahead.hpp"
+#include "run_results.hpp"
+#include "run_timing.hpp"
+
+namespace dynains::program {
+
+/// Pushes scan i. Throws PoseError that names the scan.
+template <class Remover>
+FrameResult push_scan(Remover& remover, const KittiSequence& sequence, std::size_t i,
+                      const std::vector<float>& xyzi) {
+  try {
+    return remover.push(RawPoints<float>{xyzi.data(), xyzi.size() / 4, 4},
+                        sequence.T_world_sensor(i), sequence.time(i));
+  } catch (const PoseError& error) {
+    throw PoseError("scan " + sequence.name(i) + ": " + error.what());
+  }
+}
+
+/// Pushes the scans of `range` and hands every verdict to `results`; at the end the open ones and
+/// the map too. `keep_going(done)` is asked after each scan; if it says no, the scans so far are
+/// finished as if the sequence ended there.
+template <class Remover, class KeepGoing>
+RunTiming run_sequence(Remover& remover, const KittiSequence& sequence, const ScanRange& range,
+                       RunResults& results, KeepGoing&& keep_going) {
+  using Clock = std::chrono::steady_clock;
+  const auto ms_since = [](Clock::time_point begin) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+  };
+  RunTiming timing;
+  const StageTimes no_times;
+  StageTimes::visit(no_times, [&](const char* name, double) { timing.stages.push_back(name); });
+
+  ReadAhead scans(sequence, range.first, range.last);
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    std::vector<float> scan = scans.next(results.recycle());
+    const Clock::time_point begin = Clock::now();
+    const FrameResult frame = push_scan(remover, sequence, i, scan);
+    TimingRow row{sequence.name(i), scan.size() / 4, {}, ms_since(begin)};
+    StageTimes::visit(frame.times, [&](const char*, double ms) { row.stages.push_back(ms); });
+    timing.rows.push_back(std::move(row));
+    results.take_newest(std::move(scan), frame.newest);
+    if (frame.finished) results.take_final(*frame.finished);
+    if (!keep_going(timing.rows.size())) break;
+  }
+
+  double writing = 0.0;
+  const Clock::time_point begin = Clock::now();
+  remover.flush([&](const ScanVerdict& verdict) {
+    const Clock::time_point begin_writing = Clock::now();
+    results.take_final(verdict);
+    writing += ms_since(begin_writing);
+  });
+  timing.flush = ms_since(begin) - writing;
+  if (results.map_points()) {
+    remover.map().for_each([&](const Eigen::Vector3d& point) { results.add_map_point(point); });
+  }
+  return timing;
+}
+
+}  // namespace dynains::program
