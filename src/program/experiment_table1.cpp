@@ -78,7 +78,7 @@ void table1(const Table1Options& options) {
   const std::vector<Task> tasks = find_tasks(options.root, options.window);
   const std::vector<Variant> variants = table1_variants();
 
-  evaluation::TextTable table({"Seq.", "Method", "PR [%]", "RR [%]", "F1 score"});
+  evaluation::TextTable table({"Seq.", "Method", "PR [%]", "RR [%]", "F1 score"}, 2);
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   std::ostringstream csv;
   csv << "sequence,method,pr,rr,f1,source\n";

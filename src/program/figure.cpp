@@ -48,6 +48,20 @@ void draw_layers(const VerdictCloud& cloud, Content content, Picture& picture, S
   }
 }
 
+/// Horizontal, along the path; a sensor that stands looks towards what moves.
+Eigen::Vector3d viewing_direction(const VerdictCloud& cloud) {
+  Eigen::Vector3d forward = cloud.path().back() - cloud.path().front();
+  forward.z() = 0;
+  if (forward.norm() < 1) {
+    forward.setZero();
+    for (const VerdictCloud::Point& point : cloud.points()) {
+      if (is_dynamic(point.fate)) forward += point.local.cast<double>();
+    }
+    forward.z() = 0;
+  }
+  return forward.norm() > 0 ? Eigen::Vector3d(forward.normalized()) : Eigen::Vector3d::UnitX();
+}
+
 }  // namespace
 
 Colour colour_of(Fate fate, Content content) {
@@ -79,10 +93,7 @@ Picture draw_from_above(const VerdictCloud& cloud, Content content, int pixels) 
 Picture draw_perspective(const VerdictCloud& cloud, Content content, int pixels) {
   Picture picture(pixels, std::max(1, pixels * 9 / 16));
   if (cloud.path().empty()) return picture;
-  Eigen::Vector3d forward = cloud.path().back() - cloud.path().front();
-  forward.z() = 0;
-  if (forward.norm() < 1) forward = Eigen::Vector3d::UnitX();
-  forward.normalize();
+  const Eigen::Vector3d forward = viewing_direction(cloud);
 
   constexpr double kBack = 22, kUp = 16, kAhead = 25, kFocal = 0.9;  // m, m, m, picture widths
   const Eigen::Vector3d eye = -kBack * forward + kUp * Eigen::Vector3d::UnitZ();

@@ -16,7 +16,8 @@ Colour colour_of(Fate fate, Content content);
 /// Seen from above, world x to the right and y up, the longer side `pixels` long.
 Picture draw_from_above(const VerdictCloud& cloud, Content content, int pixels);
 
-/// Seen from behind and above the start of the path, in its direction; 16:9, `pixels` wide.
+/// Seen from behind and above the start of the path, in its direction (towards what moves, if the
+/// sensor stands); 16:9, `pixels` wide.
 Picture draw_perspective(const VerdictCloud& cloud, Content content, int pixels);
 
 }  // namespace dynains::program

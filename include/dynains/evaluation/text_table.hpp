@@ -7,10 +7,10 @@
 
 namespace dynains::evaluation {
 
-/// The first column is left-aligned, the others right-aligned; widths follow the contents.
+/// The first columns are left-aligned, the others right-aligned; widths follow the contents.
 class TextTable {
  public:
-  explicit TextTable(std::vector<std::string> header);
+  explicit TextTable(std::vector<std::string> header, std::size_t left_columns = 1);
 
   /// Throws std::invalid_argument for more cells than the header has.
   void add(std::vector<std::string> row);
@@ -19,6 +19,7 @@ class TextTable {
   std::string to_string() const;
 
  private:
+  std::size_t left_columns_;
   std::vector<std::vector<std::string>> rows_;
 };
 
