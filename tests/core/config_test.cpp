@@ -1,0 +1,170 @@
+#include <cmath>
+#include <limits>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "dynains/dyna_ins_remover.hpp"
+#include "support/catch.hpp"
+
+namespace dynains::test {
+namespace {
+
+using Config = DynaInsRemover::Config;
+
+struct Field {
+  std::string section;
+  std::string name;
+  std::string help;
+  Bounds bounds;
+  double value;
+  bool is_number;
+  bool is_integer;
+};
+
+std::vector<Field> fields_of(const Config& config) {
+  std::vector<Field> result;
+  Config::visit_sections(config, [&](const char* section, const auto& part) {
+    using Part = std::remove_const_t<std::remove_reference_t<decltype(part)>>;
+    Part::visit(part, [&](const auto& parameter) {
+      using Value = std::remove_const_t<std::remove_reference_t<decltype(parameter.value)>>;
+      result.push_back({section, parameter.name, parameter.help, parameter.bounds,
+                        static_cast<double>(parameter.value), !std::is_same_v<Value, bool>,
+                        std::is_integral_v<Value>});
+    });
+  });
+  return result;
+}
+
+Config with(const std::string& name, double value) {
+  Config config = Config::paper();
+  Config::visit(config, [&](const auto& parameter) {
+    using Value = std::remove_reference_t<decltype(parameter.value)>;
+    if (parameter.name == name) parameter.value = static_cast<Value>(value);
+  });
+  return config;
+}
+
+std::string error_of(const Config& config) {
+  try {
+    config.validate();
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST_CASE("the paper's configuration has the published parameters") {
+  const Config config = Config::paper();
+  CHECK(config.window == 4);
+  CHECK(config.use_belief);
+  CHECK(config.descriptor.tau_s == 0.6);
+  CHECK(config.belief.p_inc == 0.7);
+  CHECK(config.belief.p_dec == 0.4);
+  CHECK(config.belief.tau_rho == 0.8);
+  CHECK(config.belief.tau_p == 0.5);
+  CHECK(config.belief.prior == 0.5);
+  CHECK(config.clusterer.voxel_range == 0.5);
+  CHECK(config.clusterer.voxel_azimuth == 0.5);
+  CHECK(config.clusterer.voxel_elevation == 3.0);
+  CHECK(config.descriptor.cell_range == 0.25);
+  CHECK(config.descriptor.cell_azimuth == 1.5);
+  CHECK(config.min_range == 2.7);
+  CHECK(config.map.map_voxel == 0.2);
+}
+
+TEST_CASE("the default and the paper's configuration are valid") {
+  CHECK_NOTHROW(Config().validate());
+  CHECK_NOTHROW(Config::paper().validate());
+}
+
+TEST_CASE("parameter names are unique, and every parameter is explained") {
+  std::set<std::string> names;
+  for (const Field& field : fields_of(Config())) {
+    INFO(field.section << '.' << field.name);
+    CHECK(names.insert(field.name).second);
+    CHECK(field.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") ==
+          std::string::npos);
+    CHECK(field.help.size() > 10);
+  }
+  CHECK(names.size() > 30);
+}
+
+TEST_CASE("a value out of bounds is refused by field, value and bound") {
+  for (const Field& field : fields_of(Config())) {
+    if (!field.is_number) continue;
+    INFO(field.section << '.' << field.name);
+    REQUIRE(std::isfinite(field.bounds.min));
+    REQUIRE(std::isfinite(field.bounds.max));
+    const double infinity = std::numeric_limits<double>::infinity();
+    const double step = field.is_integer ? 1.0 : 0.0;
+    const auto past = [&](double bound, bool is_open, double direction) {
+      if (is_open) return bound;
+      return field.is_integer ? bound + std::copysign(step, direction)
+                              : std::nextafter(bound, direction);
+    };
+    std::vector<double> bad = {past(field.bounds.min, field.bounds.min_open, -infinity),
+                               past(field.bounds.max, field.bounds.max_open, infinity)};
+    if (!field.is_integer) {
+      bad.insert(bad.end(), {std::nan(""), infinity, -infinity});
+    }
+    for (const double value : bad) {
+      const std::string error = error_of(with(field.name, value));
+      INFO(value << " gives: " << error);
+      CHECK_THAT(error, StartsWith(field.section + "." + field.name + " = "));
+      CHECK_THAT(error, ContainsSubstring("must be in " + field.bounds.to_string()));
+      if (field.is_integer) {
+        CHECK_THAT(error, ContainsSubstring(" = " + std::to_string(static_cast<int>(value))));
+      }
+      CHECK_THROWS_AS(DynaInsRemover(with(field.name, value)), ConfigError);
+    }
+    // The good side of both bounds: no complaint about this field's interval.
+    const double good[] = {
+        field.bounds.min_open ? std::nextafter(field.bounds.min, infinity) : field.bounds.min,
+        field.bounds.max_open ? std::nextafter(field.bounds.max, -infinity) : field.bounds.max};
+    for (const double value : good) {
+      const std::string error = error_of(with(field.name, value));
+      INFO(value << " gives: " << error);
+      CHECK(error.find("must be in " + field.bounds.to_string()) == std::string::npos);
+    }
+  }
+}
+
+TEST_CASE("parameters that do not go together are refused by name") {
+  Config config = Config::paper();
+  SECTION("range") {
+    config.min_range = config.max_range = 50.0;
+    CHECK_THAT(error_of(config), ContainsSubstring("min_range = 50") &&
+                                     ContainsSubstring("max_range = 50"));
+    config.max_range = 50.1;
+    CHECK(error_of(config).empty());
+  }
+  SECTION("votes") {
+    config.votes = 5;
+    CHECK_THAT(error_of(config), ContainsSubstring("votes = 5") && ContainsSubstring("window = 4"));
+    config.votes = 4;
+    CHECK(error_of(config).empty());
+  }
+  SECTION("ground rings") {
+    config.ground.ground_min_range = config.ground.ground_max_range = 40.0;
+    CHECK_THAT(error_of(config), ContainsSubstring("ground_min_range = 40") &&
+                                     ContainsSubstring("ground_max_range = 40"));
+  }
+  SECTION("map resolution") {
+    config.map.map_voxel = 0.004;
+    CHECK_THAT(error_of(config), ContainsSubstring("map_voxel = 0.004"));
+    config.map.map_voxel = 0.005;
+    CHECK(error_of(config).empty());
+    config.map.map_voxel = 0.0;
+    CHECK(error_of(config).empty());
+  }
+  SECTION("more voxels than memory can hold") {
+    config.clusterer.voxel_azimuth = 0.05;
+    config.clusterer.voxel_elevation = 0.1;
+    config.clusterer.voxel_range = 0.05;
+    CHECK_THAT(error_of(config), ContainsSubstring("voxel_range") && ContainsSubstring("cells"));
+  }
+}
+
+}  // namespace
+}  // namespace dynains::test

@@ -1,0 +1,218 @@
+#include "dynains/ground_segmenter.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "reference_ground.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+#include "support/scene.hpp"
+
+namespace dynains::test {
+namespace {
+
+using Config = GroundSegmenter::Config;
+
+// By point of the scan; checks on the way that the split is a permutation of the scan.
+std::vector<bool> ground_of(GroundSegmenter& segmenter, PointsView scan) {
+  GroundSplit split;
+  segmenter.segment(scan, split);
+  REQUIRE(split.count == scan.size());
+  REQUIRE(split.ground_count <= split.count);
+  std::vector<bool> result(scan.size());
+  std::vector<bool> seen(scan.size(), false);
+  for (std::size_t i = 0; i < split.count; ++i) {
+    const std::size_t from = split.source[i];
+    REQUIRE((from < scan.size() && !seen[from]));
+    seen[from] = true;
+    REQUIRE(split.points.x[i] == scan.x[from]);
+    REQUIRE(split.points.y[i] == scan.y[from]);
+    REQUIRE(split.points.z[i] == scan.z[from]);
+    result[from] = i < split.ground_count;
+  }
+  return result;
+}
+
+std::vector<bool> ground_of(const Config& config, PointsView scan) {
+  GroundSegmenter segmenter(config);
+  return ground_of(segmenter, scan);
+}
+
+PointBuffer buffer_of(const std::vector<Eigen::Vector3f>& points) {
+  PointBuffer result;
+  for (const Eigen::Vector3f& p : points) result.push_back(p.x(), p.y(), p.z());
+  return result;
+}
+
+// Ground with waves, noise and bushes.
+PointBuffer rough_terrain(std::uint64_t seed, std::size_t count) {
+  Random random(seed);
+  PointBuffer result;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double range = random.uniform(0.5, 110.0);
+    const double azimuth = random.uniform(-M_PI, M_PI);
+    const double x = range * std::cos(azimuth);
+    const double y = range * std::sin(azimuth);
+    double z = -kSensorHeight + 0.02 * x + 0.8 * std::sin(0.1 * y) + random.uniform(-0.05, 0.05);
+    if (random.index(5) == 0) z += random.uniform(0.0, 3.0);
+    if (random.index(50) == 0) z -= random.uniform(0.0, 2.0);
+    result.push_back(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
+  }
+  return result;
+}
+
+double share_of_differences(const std::vector<bool>& a, const std::vector<bool>& b) {
+  std::size_t different = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) different += a[i] != b[i] ? 1U : 0U;
+  return static_cast<double>(different) / static_cast<double>(a.size());
+}
+
+// Only points on a border of a patch or of a plane may differ: moments and angles are floats.
+constexpr double kOnBorders = 1e-3;
+
+TEST_CASE("ground is what Patchwork in double precision calls ground") {
+  GroundSegmenter segmenter;  // one object for all, as in the pipeline
+  const auto compare = [&](PointsView scan) {
+    const std::vector<bool> expected = reference_ground(segmenter.config(), scan);
+    const auto ground = std::count(expected.begin(), expected.end(), true);
+    REQUIRE(ground > static_cast<std::ptrdiff_t>(scan.size() / 4));  // else nothing is compared
+    REQUIRE(share_of_differences(ground_of(segmenter, scan), expected) < kOnBorders);
+  };
+  for (const double yaw : {0.0, 2.0}) {
+    compare(buffer_of(yard_with(van(10.0, 3.0)).scan(sensor_at(0.0, 0.0, yaw), 0.0).points));
+  }
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) compare(rough_terrain(seed, 60000));
+}
+
+TEST_CASE("ground is what Patchwork says for other parameters, too") {
+  Config config;
+  config.sensor_height = 0.6;
+  config.ground_min_range = 2.0;
+  config.ground_max_range = 60.0;
+  config.ground_iterations = 1;
+  config.ground_lowest_points = 64;
+  config.ground_min_points = 3;
+  config.ground_seed_margin = 0.2;
+  config.ground_distance = 0.3;
+  config.ground_uprightness = 0.99;
+  config.ground_elevation = {0.1, 0.1, 0.1, 0.1};
+  config.ground_flatness = {1e-2, 1e-2, 1e-2, 1e-2};
+  const PointBuffer scan = rough_terrain(9, 60000);
+  CHECK(share_of_differences(ground_of(config, scan), reference_ground(config, scan)) < kOnBorders);
+}
+
+TEST_CASE("a flat floor is ground, pillars and vans are not") {
+  const Scan scan = yard_with(van(10.0, 3.0)).scan(sensor_at(0.0), 0.0);
+  const std::vector<bool> ground = ground_of(Config(), buffer_of(scan.points));
+  std::size_t missed = 0;
+  std::size_t wrong = 0;
+  std::size_t high = 0;
+  for (std::size_t i = 0; i < ground.size(); ++i) {
+    const bool is_floor = scan.object[i] == kGroundObject;
+    if (is_floor && !ground[i]) ++missed;
+    if (!is_floor && scan.points[i].z() > -kSensorHeight + 0.3) {
+      ++high;
+      if (ground[i]) ++wrong;
+    }
+  }
+  REQUIRE(high > 5000);
+  CHECK(missed < ground.size() / 100);
+  CHECK(wrong < high / 1000);
+}
+
+// 400 points of the plane z = -h + slope * (x - 10) in one patch, about (10, 0.6).
+PointBuffer patch_of_plane(double slope, std::size_t count = 400, double lift = 0.0) {
+  Random random(3);
+  PointBuffer points;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double x = random.uniform(9.8, 10.8);
+    points.push_back(static_cast<float>(x), random.uniform_float(0.3, 0.9),
+                     static_cast<float>(-kSensorHeight + lift + slope * (x - 10.3)));
+  }
+  return points;
+}
+
+TEST_CASE("points are ground up to ground_distance over the plane") {
+  PointBuffer points = patch_of_plane(0.0);
+  points.push_back(10.3F, 0.6F, static_cast<float>(-kSensorHeight + 0.115));
+  points.push_back(10.3F, 0.6F, static_cast<float>(-kSensorHeight + 0.135));
+  points.push_back(10.3F, 0.6F, static_cast<float>(-kSensorHeight - 0.2));
+  const std::vector<bool> ground = ground_of(Config(), points);
+  CHECK(ground[0]);
+  CHECK(ground[400]);
+  CHECK_FALSE(ground[401]);
+  CHECK(ground[402]);  // no bound below
+}
+
+TEST_CASE("a patch needs ground_min_points") {
+  CHECK_FALSE(ground_of(Config(), patch_of_plane(0.0, 10))[0]);
+  CHECK(ground_of(Config(), patch_of_plane(0.0, 11))[0]);
+}
+
+TEST_CASE("a plane steeper than ground_uprightness is not ground") {
+  // Smallest vertical component 0.95: slope tan(acos(0.95)) = 0.3287.
+  Config config;
+  config.ground_uprightness = 0.95;
+  config.ground_elevation = {100, 100, 100, 100};
+  CHECK(ground_of(config, patch_of_plane(0.32))[0]);
+  CHECK_FALSE(ground_of(config, patch_of_plane(0.34))[0]);
+}
+
+TEST_CASE("a patch over ground_elevation is ground only if it is flat") {
+  // About 10 m away is ring 2 of the default zones.
+  Config config;
+  config.ground_elevation[1] = 0.7;
+  config.ground_flatness[1] = 1e-4;
+  CHECK(ground_of(config, patch_of_plane(0.0, 400, 0.69))[0]);
+  PointBuffer rough = patch_of_plane(0.0, 400, 0.71);
+  CHECK(ground_of(config, rough)[0]);
+  // Noise of 5 cm over about 1.0 x 0.6 m: variance 8e-4 of 0.11 in all.
+  Random random(4);
+  for (float& z : rough.z) z += random.uniform_float(-0.05, 0.05);
+  CHECK_FALSE(ground_of(config, rough)[0]);
+  config.ground_flatness[1] = 0.1;
+  CHECK(ground_of(config, rough)[0]);
+}
+
+TEST_CASE("points outside the rings are not ground") {
+  Config config;
+  config.ground_min_range = 5.0;
+  config.ground_max_range = 20.0;
+  PointBuffer points;
+  for (int i = 0; i < 40; ++i) {
+    const auto y = static_cast<float>(0.001 * i + 0.1);
+    for (const float x : {4.9F, 5.1F, 19.9F, 20.1F}) {
+      points.push_back(x, y, static_cast<float>(-kSensorHeight));
+    }
+  }
+  const std::vector<bool> ground = ground_of(config, points);
+  CHECK_FALSE(ground[0]);
+  CHECK(ground[1]);
+  CHECK(ground[2]);
+  CHECK_FALSE(ground[3]);
+}
+
+TEST_CASE("reflections under the floor do not pull the ground down near the sensor") {
+  PointBuffer points = patch_of_plane(0.0);
+  for (int i = 0; i < 2; ++i) points.push_back(10.3F, 0.6F, -3.0F);
+  Config config;
+  config.ground_lowest_points = 2;
+  CHECK(ground_of(config, points)[0]);
+  config.ground_below = 10.0;  // the two seed the plane, and nothing is near them
+  CHECK_FALSE(ground_of(config, points)[0]);
+}
+
+TEST_CASE("an empty scan, a single point and equal points are segmented") {
+  CHECK(ground_of(Config(), PointsView()).empty());
+  PointBuffer one;
+  one.push_back(10.0F, 0.0F, -1.7F);
+  CHECK_FALSE(ground_of(Config(), one)[0]);
+  PointBuffer equal;
+  for (int i = 0; i < 1000; ++i) equal.push_back(10.0F, 0.5F, -1.7F);
+  const std::vector<bool> ground = ground_of(Config(), equal);
+  CHECK(std::count(ground.begin(), ground.end(), true) == 1000);
+}
+
+}  // namespace
+}  // namespace dynains::test

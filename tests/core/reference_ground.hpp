@@ -1,0 +1,114 @@
+// Patchwork word for word, slow: double precision, libm, sorting and Eigen's eigenvalue solver.
+#pragma once
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <map>
+#include <vector>
+
+#include "dynains/ground_segmenter.hpp"
+
+namespace dynains::test {
+
+/// True for every point of the scan that is ground.
+inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config, PointsView scan) {
+  const double inner = config.ground_min_range;
+  const double outer = config.ground_max_range;
+  const double edges[5] = {inner, (7 * inner + outer) / 8, (3 * inner + outer) / 4,
+                           (inner + outer) / 2, outer};
+  struct Patch {
+    bool is_innermost_zone;
+    std::size_t ring;  // counted from the inside over all zones
+    std::vector<std::size_t> points;
+  };
+  std::map<std::vector<int>, Patch> patches;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const double range = std::hypot(scan.x[i], scan.y[i]);
+    if (range < inner || range > outer) continue;
+    int zone = 3;
+    while (range < edges[zone]) --zone;
+    const auto z = static_cast<std::size_t>(zone);
+    const int rings = GroundSegmenter::kRings[z];
+    const int sectors = GroundSegmenter::kSectors[z];
+    const double depth = (edges[zone + 1] - edges[zone]) / rings;
+    const double width = 2.0 * M_PI / sectors;
+    const int ring = std::min(static_cast<int>((range - edges[zone]) / depth), rings - 1);
+    const double azimuth = std::atan2(scan.y[i], scan.x[i]) + M_PI;
+    const int sector = std::min(static_cast<int>(azimuth / width), sectors - 1);
+    std::size_t ring_number = static_cast<std::size_t>(ring);
+    for (std::size_t k = 0; k < z; ++k) {
+      ring_number += static_cast<std::size_t>(GroundSegmenter::kRings[k]);
+    }
+    Patch& patch = patches[{zone, ring, sector}];
+    patch.is_innermost_zone = zone == 0;
+    patch.ring = ring_number;
+    patch.points.push_back(i);
+  }
+
+  std::vector<bool> result(scan.size(), false);
+  const double h = config.sensor_height;
+  for (const auto& [key, patch] : patches) {
+    if (patch.points.size() < static_cast<std::size_t>(config.ground_min_points)) continue;
+    const auto point = [&](std::size_t i) {
+      return Eigen::Vector3d(scan.x[i], scan.y[i], scan.z[i]);
+    };
+    std::vector<double> heights;
+    for (const std::size_t i : patch.points) {
+      const bool is_noise = patch.is_innermost_zone && scan.z[i] < -(1.0 + config.ground_below) * h;
+      if (!is_noise) heights.push_back(scan.z[i]);
+    }
+    std::sort(heights.begin(), heights.end());
+    heights.resize(
+        std::min(heights.size(), static_cast<std::size_t>(config.ground_lowest_points)));
+    double seed_height = -(1.0 + config.ground_below) * h;
+    if (!heights.empty()) {
+      seed_height = 0.0;
+      for (const double z : heights) seed_height += z / static_cast<double>(heights.size());
+    }
+
+    std::vector<std::size_t> members;
+    for (const std::size_t i : patch.points) {
+      if (scan.z[i] < seed_height + config.ground_seed_margin) members.push_back(i);
+    }
+    bool is_ground = true;
+    Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    Eigen::Vector3d eigenvalues = Eigen::Vector3d::Zero();
+    for (int iteration = 0; iteration < config.ground_iterations; ++iteration) {
+      if (members.size() < 3) {
+        is_ground = false;
+        break;
+      }
+      const auto count = static_cast<double>(members.size());
+      mean.setZero();
+      for (const std::size_t i : members) mean += point(i) / count;
+      Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+      for (const std::size_t i : members) {
+        covariance += (point(i) - mean) * (point(i) - mean).transpose() / count;
+      }
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
+      eigenvalues = solver.eigenvalues();
+      normal = solver.eigenvectors().col(0);
+      if (normal.z() < 0.0) normal = -normal;
+      members.clear();
+      for (const std::size_t i : patch.points) {
+        if (normal.dot(point(i) - mean) < config.ground_distance) members.push_back(i);
+      }
+    }
+    if (!is_ground || normal.z() < config.ground_uprightness) continue;
+    if (patch.ring < GroundSegmenter::kCheckedRings) {
+      const double flatness = eigenvalues[0] / eigenvalues.sum();
+      if (mean.z() + h > config.ground_elevation[patch.ring] &&
+          flatness >= config.ground_flatness[patch.ring]) {
+        continue;
+      }
+    }
+    for (const std::size_t i : members) result[i] = true;
+  }
+  return result;
+}
+
+}  // namespace dynains::test

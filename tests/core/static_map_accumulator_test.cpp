@@ -1,0 +1,202 @@
+#include "dynains/static_map_accumulator.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+namespace dynains::test {
+namespace {
+
+using Coordinates = std::array<double, 3>;
+
+StaticMapAccumulator make(double voxel) {
+  StaticMapAccumulator::Config config;
+  config.map_voxel = voxel;
+  return StaticMapAccumulator(config);
+}
+
+std::vector<Coordinates> sorted_points(const StaticMapAccumulator& map) {
+  std::vector<Coordinates> result;
+  map.for_each([&](const Eigen::Vector3d& p) { result.push_back({p.x(), p.y(), p.z()}); });
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
+// Eq. 1 on a grid: the first point of every voxel.
+class ReferenceMap {
+ public:
+  explicit ReferenceMap(double voxel) : voxel_(voxel) {}
+
+  void insert(PointsView points, Span<const std::uint8_t> keep, const Eigen::Isometry3d& T) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (!keep.empty() && keep[i] == 0) continue;
+      const Eigen::Vector3d p = T * Eigen::Vector3d(points.x[i], points.y[i], points.z[i]);
+      const auto at = [&](double value) { return static_cast<std::int64_t>(std::floor(value)); };
+      first_.try_emplace({at(p.x() / voxel_), at(p.y() / voxel_), at(p.z() / voxel_)},
+                         Coordinates{p.x(), p.y(), p.z()});
+    }
+  }
+
+  std::vector<Coordinates> sorted_points() const {
+    std::vector<Coordinates> result;
+    for (const auto& [key, point] : first_) result.push_back(point);
+    std::sort(result.begin(), result.end());
+    return result;
+  }
+
+ private:
+  double voxel_;
+  std::map<std::array<std::int64_t, 3>, Coordinates> first_;
+};
+
+// Multiples of 1/64 m: every sum and product below is exact in floats, on both sides.
+double grid_value(Random& random, double reach) {
+  return std::round(random.uniform(-reach, reach) * 64.0) / 64.0;
+}
+
+PointBuffer grid_points(Random& random, std::size_t count, double reach) {
+  PointBuffer points;
+  for (std::size_t i = 0; i < count; ++i) {
+    points.push_back(static_cast<float>(grid_value(random, reach)),
+                     static_cast<float>(grid_value(random, reach)),
+                     static_cast<float>(grid_value(random, 4.0)));
+  }
+  return points;
+}
+
+Eigen::Isometry3d quarter_turns(int count, const Eigen::Vector3d& translation) {
+  Eigen::Matrix3d quarter;
+  quarter << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  for (int i = 0; i < count; ++i) T.linear() = T.linear() * quarter;
+  T.translation() = translation;
+  return T;
+}
+
+TEST_CASE("the map holds the first measured point of every voxel, exactly, and nothing else") {
+  // The origin, negative coordinates, and UTM coordinates.
+  const Eigen::Vector3d origin = GENERATE(values<Eigen::Vector3d>(
+      {{0.0, 0.0, 0.0}, {-300.5, 17.25, -8.0}, {412345.25, 5654321.5, 312.75}}));
+  for (const double voxel : {0.125, 0.25, 1.0}) {
+    StaticMapAccumulator map = make(voxel);
+    ReferenceMap reference(voxel);
+    Random random(7);
+    for (int scan = 0; scan < 12; ++scan) {
+      const PointBuffer points = grid_points(random, 500 + random.index(17), 20.0);
+      std::vector<std::uint8_t> keep(points.size());
+      for (std::uint8_t& flag : keep) flag = random.index(4) == 0 ? 0 : 1;
+      if (scan % 3 == 0) keep.clear();  // all
+      const Eigen::Isometry3d T = quarter_turns(
+          scan, origin + Eigen::Vector3d(grid_value(random, 9.0), grid_value(random, 9.0), 0.0));
+      map.insert(points, keep, T);
+      reference.insert(points, keep, T);
+    }
+    const std::vector<Coordinates> expected = reference.sorted_points();
+    CHECK(map.size() == expected.size());
+    CHECK((sorted_points(map) == expected));
+  }
+}
+
+TEST_CASE("a point on a voxel border belongs to the upper voxel") {
+  StaticMapAccumulator map = make(0.5);
+  PointBuffer points;
+  for (const float x : {0.0F, 0.499F, 0.5F, -0.5F, -0.001F, 1.0F}) points.push_back(x, 0.0F, 0.0F);
+  map.insert(points, {}, Eigen::Isometry3d::Identity());
+  // [0, 0.5) [0.5, 1) [-0.5, 0) [1, 1.5)
+  CHECK((sorted_points(map) ==
+         std::vector<Coordinates>{{-0.5, 0, 0}, {0, 0, 0}, {0.5, 0, 0}, {1, 0, 0}}));
+}
+
+TEST_CASE("resolution 0 keeps every point") {
+  StaticMapAccumulator map = make(0.0);
+  Random random(5);
+  const PointBuffer points = grid_points(random, 3000, 3.0);
+  for (int i = 0; i < 3; ++i) map.insert(points, {}, Eigen::Isometry3d::Identity());
+  CHECK(map.size() == 9000);
+  std::size_t visited = 0;
+  map.for_each([&](const Eigen::Vector3d&) { ++visited; });
+  CHECK(visited == 9000);
+}
+
+TEST_CASE("at UTM coordinates the map keeps a tenth of a millimetre") {
+  StaticMapAccumulator map = make(0.0);
+  Random random(11);
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear() = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  T.translation() = Eigen::Vector3d(500123.4567, 5678901.2345, 321.9876);
+  for (int i = 0; i < 200; ++i) {
+    PointBuffer one;
+    one.push_back(random.uniform_float(-80, 80), random.uniform_float(-80, 80),
+                  random.uniform_float(-3, 3));
+    StaticMapAccumulator single = make(0.0);
+    single.insert(one, {}, T);
+    const Eigen::Vector3d expected = T * Eigen::Vector3d(one.x[0], one.y[0], one.z[0]);
+    single.for_each(
+        [&](const Eigen::Vector3d& p) { REQUIRE((p - expected).norm() < 1e-4); });
+    REQUIRE(single.size() == 1);
+  }
+}
+
+TEST_CASE("a region holds exactly the points that a filter over the map finds") {
+  StaticMapAccumulator map = make(0.25);
+  Random random(13);
+  for (int i = 0; i < 40; ++i) {
+    map.insert(grid_points(random, 300, 30.0), {},
+               quarter_turns(i, {grid_value(random, 200.0), grid_value(random, 200.0), 0.0}));
+  }
+  const auto compare = [&](const Eigen::AlignedBox3d& box) {
+    std::vector<Coordinates> expected;
+    for (const Coordinates& p : sorted_points(map)) {
+      if (box.contains(Eigen::Vector3d(p[0], p[1], p[2]))) expected.push_back(p);
+    }
+    std::vector<Coordinates> found;
+    map.for_each_in(
+        box, [&](const Eigen::Vector3d& p) { found.push_back({p.x(), p.y(), p.z()}); });
+    std::sort(found.begin(), found.end());
+    REQUIRE((found == expected));
+    return found.size();
+  };
+  std::size_t found = 0;
+  for (int i = 0; i < 60; ++i) {
+    const double size = i % 2 == 0 ? 5.0 : 150.0;  // fewer tiles than the map has, and more
+    const Eigen::Vector3d low(random.uniform(-230, 200), random.uniform(-230, 200), -5.0);
+    const Eigen::Vector3d high = low + Eigen::Vector3d(size, size, 10.0);
+    found += compare({low, high});
+  }
+  CHECK(found > 1000);
+
+  // Borders belong to the region: a box that is one stored point.
+  const Coordinates first = sorted_points(map).front();
+  const Eigen::Vector3d p(first[0], first[1], first[2]);
+  CHECK(compare({p, p}) == 1);
+  const Eigen::Vector3d everywhere = Eigen::Vector3d::Constant(1e300);
+  CHECK(compare({-everywhere, everywhere}) == map.size());
+  CHECK(compare({everywhere, everywhere}) == 0);
+  CHECK(compare(Eigen::AlignedBox3d()) == 0);
+}
+
+TEST_CASE("a cleared map is empty and can be filled again") {
+  StaticMapAccumulator map = make(0.25);
+  CHECK(map.empty());
+  Random random(17);
+  const PointBuffer points = grid_points(random, 500, 10.0);
+  map.insert(points, {}, Eigen::Isometry3d::Identity());
+  const std::vector<Coordinates> before = sorted_points(map);
+  CHECK(map.memory_bytes() > before.size() * 3 * sizeof(float));
+  map.clear();
+  CHECK(map.empty());
+  CHECK(map.memory_bytes() == 0);
+  CHECK(sorted_points(map).empty());
+  map.insert(points, {}, Eigen::Isometry3d::Identity());
+  CHECK((sorted_points(map) == before));
+}
+
+}  // namespace
+}  // namespace dynains::test
