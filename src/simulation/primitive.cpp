@@ -9,6 +9,8 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
+constexpr Interval kEmpty{kInfinity, -kInfinity};
+
 /// Keeps what satisfies a + t * b <= 0.
 void clip(float a, float b, Interval& interval) {
   if (b > 0) {
@@ -16,19 +18,19 @@ void clip(float a, float b, Interval& interval) {
   } else if (b < 0) {
     interval.enter = std::max(interval.enter, -a / b);
   } else if (a > 0) {
-    interval.leave = -kInfinity;
+    interval = kEmpty;
   }
 }
 
 /// Keeps what satisfies c + 2 b t + a t^2 <= 0 for a >= 0.
 void clip_quadratic(float a, float b, float c, Interval& interval) {
   if (a < 1e-12F) {
-    if (c > 0) interval.leave = -kInfinity;
+    if (c > 0) interval = kEmpty;
     return;
   }
   const float discriminant = b * b - a * c;
   if (discriminant < 0) {
-    interval.leave = -kInfinity;
+    interval = kEmpty;
     return;
   }
   const float root = std::sqrt(discriminant);

@@ -623,7 +623,7 @@ World urban(const Config& config) {
   const StreetLanes lanes = add_crossing_traffic(builder, crossings, speed, kBefore);
   const double end = kBefore + travel(config, speed) + 40;
   if (builder.lively()) {
-    add_parking_moves(builder, kBefore - 20, end, builder.count(8), 7);
+    if (half_width > 5) add_parking_moves(builder, kBefore - 20, end, builder.count(8), 7);
     fill_lane(builder, lanes.forward, 38, speed, 0.08, 0.05, 0.06);
     fill_lane(builder, lanes.backward, 30, speed, 0.08, 0.05, 0.06);
   }

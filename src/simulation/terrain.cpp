@@ -37,17 +37,39 @@ std::vector<Corridor> corridors_near(const std::vector<Street>& streets, Vec2 ce
     const auto& points = street.centre.points();
     const double reach = radius + kFar + street.half_width;
     for (std::size_t i = 1; i < points.size(); ++i) {
-      if (norm(points[i] - centre) < reach) corridor.segments.push_back({points[i - 1], points[i]});
+      if (distance_to_segment(centre, points[i - 1], points[i]) < reach) {
+        corridor.segments.push_back({points[i - 1], points[i]});
+      }
     }
     if (!corridor.segments.empty()) result.push_back(std::move(corridor));
   }
   return result;
 }
 
+/// Of the corridors, only what can be nearest to some point within `radius` of `centre`.
+std::vector<Corridor> nearest_within(const std::vector<Corridor>& corridors, Vec2 centre,
+                                     double radius) {
+  std::vector<Corridor> result;
+  for (const Corridor& corridor : corridors) {
+    double nearest = 1e9;
+    for (const auto& segment : corridor.segments) {
+      nearest = std::min(nearest, distance_to_segment(centre, segment.first, segment.second));
+    }
+    Corridor kept{corridor.street, {}};
+    for (const auto& segment : corridor.segments) {
+      if (distance_to_segment(centre, segment.first, segment.second) <= nearest + 2 * radius) {
+        kept.segments.push_back(segment);
+      }
+    }
+    result.push_back(std::move(kept));
+  }
+  return result;
+}
+
 struct Ground {
-  double edge = kFar;      ///< distance to the edge of the nearest carriageway
-  double half_width = 4;   ///< of that street
-  double pavement = 0;     ///< how far a pavement reaches beyond the point, positive if on it
+  double edge = kFar;     ///< distance to the edge of the nearest carriageway
+  double half_width = 4;  ///< of that street
+  double pavement = 0;    ///< how far a pavement reaches beyond the point, positive if on it
 };
 
 Ground ground_at(const std::vector<Corridor>& corridors, Vec2 p) {
@@ -55,8 +77,6 @@ Ground ground_at(const std::vector<Corridor>& corridors, Vec2 p) {
   for (const Corridor& corridor : corridors) {
     double distance = 1e9;
     for (const auto& segment : corridor.segments) {
-      const Vec2 d = p - segment.first;
-      if (std::abs(d.x) > distance + 4 || std::abs(d.y) > distance + 4) continue;
       distance = std::min(distance, distance_to_segment(p, segment.first, segment.second));
     }
     const double edge = distance - corridor.street->half_width;
@@ -114,10 +134,19 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
   const Vec2 corner{ix * kTile, iy * kTile};
   const Vec2 centre = corner + Vec2{kTile / 2, kTile / 2};
   const auto corridors = corridors_near(streets_, centre, kTile * 0.71);
+  // Block by block: few segments can be nearest within a block.
+  constexpr int kBlock = 16, kBlocks = kCells / kBlock + 1;
+  std::vector<std::vector<Corridor>> blocks;
+  for (int i = 0; i < kBlocks * kBlocks; ++i) {
+    const double half = kBlock / 2 * kCell;
+    const Vec2 middle = corner + Vec2{2 * half * (i % kBlocks) + half, 2 * half * (i / kBlocks) + half};
+    blocks.push_back(nearest_within(corridors, middle, 1.42 * half));
+  }
   for (int row = 0; row <= kCells; ++row) {
     for (int column = 0; column <= kCells; ++column) {
       const Vec2 p = corner + Vec2{column * kCell, row * kCell};
-      const Ground ground = ground_at(corridors, p);
+      const auto block = static_cast<std::size_t>(row / kBlock * kBlocks + column / kBlock);
+      const Ground ground = ground_at(blocks[block], p);
       const double off_street = smooth_step(ground.edge / 0.2);
       const double on_pavement = smooth_step(ground.pavement / 0.4);
       const double across = std::clamp(1 + ground.edge / ground.half_width, 0.0, 1.0);

@@ -1,0 +1,288 @@
+#include "dynains/simulation/simulator.hpp"
+
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <set>
+
+#include "support/catch.hpp"
+
+namespace dynains::simulation {
+
+namespace {
+
+/// FNV-1a over everything that reaches the disk.
+std::uint64_t hash_of(const SimulatedScan& scan) {
+  std::uint64_t hash = 14695981039346656037ULL;
+  auto add = [&hash](const void* data, std::size_t bytes) {
+    const auto* p = static_cast<const unsigned char*>(data);
+    for (std::size_t i = 0; i < bytes; ++i) hash = (hash ^ p[i]) * 1099511628211ULL;
+  };
+  add(scan.xyzi.data(), scan.xyzi.size() * sizeof(float));
+  add(scan.labels.data(), scan.labels.size() * sizeof(std::uint32_t));
+  add(scan.T_world_sensor_noisy.matrix().data(), 16 * sizeof(double));
+  return hash;
+}
+
+Config small(Scene scene, Sensor sensor, int scans, std::uint64_t seed) {
+  Config config;
+  config.scene = scene;
+  config.sensor = sensor;
+  config.scans = scans;
+  config.seed = seed;
+  return config;
+}
+
+std::uint32_t class_of(std::uint32_t label) { return label & 0xffff; }
+bool is_moving(std::uint32_t label) { return class_of(label) >= 252 && class_of(label) <= 259; }
+
+}  // namespace
+
+TEST_CASE("the same configuration gives the same bits, in any order of scans") {
+  const Config config = small(Scene::kUrban, Sensor::kVlp16, 4, 3);
+  Simulator a(config), b(config);
+  const std::uint64_t third = hash_of(b.scan(2));
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const std::uint64_t hash = hash_of(a.scan(i));
+    CHECK(hash == hash_of(b.scan(i)));
+    if (i == 2) CHECK(hash == third);
+  }
+  Config other = config;
+  other.seed = 4;
+  CHECK(hash_of(Simulator(other).scan(0)) != hash_of(a.scan(0)));
+}
+
+TEST_CASE("every scene gives points with every sensor") {
+  for (int scene = 0; scene < static_cast<int>(scene_names().size()); ++scene) {
+    for (int sensor = 0; sensor < static_cast<int>(sensor_names().size()); ++sensor) {
+      Simulator simulator(
+          small(static_cast<Scene>(scene), static_cast<Sensor>(sensor), 1, 5));
+      const SimulatedScan scan = simulator.scan(0);
+      INFO(scene_names()[static_cast<std::size_t>(scene)]
+           << ' ' << sensor_names()[static_cast<std::size_t>(sensor)]);
+      CHECK(scan.labels.size() > 5000);
+      CHECK(scan.xyzi.size() == 4 * scan.labels.size());
+      std::size_t bad = 0;
+      for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+        const float* p = &scan.xyzi[4 * i];
+        const float range = std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+        bad += !(range > 0.29F && range < 150.1F && p[3] >= 0 && p[3] <= 1);
+        bad += class_of(scan.labels[i]) == 0;
+      }
+      CHECK(bad == 0);
+    }
+  }
+}
+
+TEST_CASE("instant labels say who moves faster than half a metre per second") {
+  for (const Scene scene : {Scene::kUrban, Scene::kStopAndGo, Scene::kCrowd}) {
+    Config config = small(scene, Sensor::kVlp16, 40, 2);
+    config.labelling = Labelling::kInstant;
+    Simulator simulator(config);
+    std::size_t moving = 0, standing = 0;
+    for (std::size_t i = 0; i < simulator.size(); i += 5) {
+      const SimulatedScan scan = simulator.scan(i);
+      std::map<std::uint32_t, const ObjectState*> states;
+      for (const ObjectState& state : scan.objects) states[state.instance] = &state;
+      for (const std::uint32_t label : scan.labels) {
+        if (label >> 16 == 0) {
+          CHECK_FALSE(is_moving(label));
+          continue;
+        }
+        const ObjectState& state = *states.at(label >> 16);
+        CHECK_FALSE(is_moving(label) != (state.speed > 0.5));
+        ++(is_moving(label) ? moving : standing);
+      }
+    }
+    CHECK(moving > 100);
+    CHECK(standing > 100);
+  }
+}
+
+TEST_CASE("ever labels never change, and cover whoever moves at any time") {
+  Config config = small(Scene::kStopAndGo, Sensor::kVlp16, 60, 2);
+  Simulator ever(config);
+  config.labelling = Labelling::kInstant;
+  Simulator instant(config);
+  std::map<std::uint32_t, std::uint32_t> label_of;
+  std::set<std::uint32_t> moved;
+  bool stood_and_moved = false;
+  for (std::size_t i = 0; i < ever.size(); ++i) {
+    for (const ObjectState& state : ever.scan(i).objects) {
+      const auto inserted = label_of.emplace(state.instance, state.label);
+      CHECK(inserted.first->second == state.label);
+      if (state.speed > 0.5) moved.insert(state.instance);
+    }
+  }
+  for (const auto& entry : label_of) CHECK(is_moving(entry.second) == (moved.count(entry.first) > 0));
+  for (const ObjectState& state : instant.scan(0).objects) {
+    stood_and_moved = stood_and_moved || (!is_moving(state.label) && moved.count(state.instance));
+  }
+  CHECK(stood_and_moved);
+}
+
+TEST_CASE("movers move as fast as they say") {
+  Simulator simulator(small(Scene::kUrban, Sensor::kVlp16, 20, 7));
+  std::size_t compared = 0;
+  std::map<std::uint32_t, ObjectState> last;
+  for (std::size_t i = 0; i < simulator.size(); ++i) {
+    for (const ObjectState& state : simulator.scan(i).objects) {
+      const auto found = last.find(state.instance);
+      if (found != last.end()) {
+        const double step = (state.T_world_object.translation() -
+                             found->second.T_world_object.translation()).head<2>().norm();
+        const double speed = 0.5 * (state.speed + found->second.speed);
+        CHECK(step / 0.1 == Approx(speed).margin(0.8));
+        compared += speed > 1;
+      }
+      last[state.instance] = state;
+    }
+  }
+  CHECK(compared > 50);
+}
+
+TEST_CASE("nothing moves in the static scene") {
+  Simulator simulator(small(Scene::kStatic, Sensor::kVlp16, 20, 2));
+  bool parked = false;
+  for (std::size_t i = 0; i < simulator.size(); ++i) {
+    const SimulatedScan scan = simulator.scan(i);
+    for (const std::uint32_t label : scan.labels) CHECK_FALSE(is_moving(label));
+    for (const ObjectState& state : scan.objects) CHECK(state.speed == 0.0);
+    parked = parked || !scan.objects.empty();
+  }
+  CHECK(parked);
+}
+
+TEST_CASE("vehicles keep clear of one another and of the ego vehicle") {
+  for (const Scene scene : {Scene::kHighway, Scene::kHill, Scene::kStopAndGo}) {
+    Simulator simulator(small(scene, Sensor::kVlp16, 60, 3));
+    for (std::size_t i = 0; i < simulator.size(); i += 4) {
+      const SimulatedScan scan = simulator.scan(i);
+      for (const ObjectState& state : scan.objects) {
+        if (class_of(state.label) == 254 || class_of(state.label) == 30) continue;
+        // Not even the middle of one lies within the rectangle of the other.
+        const Eigen::Vector3d ego =
+            state.T_world_object.inverse() * scan.T_world_sensor.translation();
+        CHECK_FALSE((std::abs(ego.x()) < state.length / 2 && std::abs(ego.y()) < state.width / 2));
+        for (const ObjectState& other : scan.objects) {
+          if (&other == &state) continue;
+          const Eigen::Vector3d p =
+              state.T_world_object.inverse() * other.T_world_object.translation();
+          CHECK_FALSE((std::abs(p.x()) < state.length / 2 && std::abs(p.y()) < state.width / 2));
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("points of an object lie within its box") {
+  Simulator simulator(small(Scene::kUrban, Sensor::kHdl64, 3, 6));
+  const SimulatedScan scan = simulator.scan(1);
+  std::map<std::uint32_t, const ObjectState*> states;
+  for (const ObjectState& state : scan.objects) states[state.instance] = &state;
+  std::size_t inside = 0, outside = 0;
+  for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+    if (scan.labels[i] >> 16 == 0) continue;
+    const ObjectState& state = *states.at(scan.labels[i] >> 16);
+    const Eigen::Vector3d p = state.T_world_object.inverse() *
+                              (scan.T_world_sensor * Eigen::Map<const Eigen::Vector3f>(&scan.xyzi[4 * i]).cast<double>());
+    // Limbs swing and noise adds; wheels may stand in a bump.
+    const bool in = std::abs(p.x()) < state.length / 2 + 0.45 &&
+                    std::abs(p.y()) < state.width / 2 + 0.35 && p.z() > -0.3 &&
+                    p.z() < state.height + 0.3;
+    ++(in ? inside : outside);
+  }
+  CHECK(inside > 1000);
+  CHECK(outside <= inside / 500);
+}
+
+TEST_CASE("range noise has the asked deviation") {
+  Config config = small(Scene::kStatic, Sensor::kVlp16, 1, 4);
+  config.dropout = 0;
+  config.range_noise = 0;
+  const SimulatedScan exact = Simulator(config).scan(0);
+  config.range_noise = 0.05;
+  const SimulatedScan noisy = Simulator(config).scan(0);
+  // Without losses the same beams return, but for those at the end of the range.
+  double sum = 0, squares = 0;
+  std::size_t count = 0;
+  std::size_t j = 0;
+  for (std::size_t i = 0; i < exact.labels.size() && j < noisy.labels.size(); ++i) {
+    const Eigen::Vector3f a = Eigen::Map<const Eigen::Vector3f>(&exact.xyzi[4 * i]);
+    const Eigen::Vector3f b = Eigen::Map<const Eigen::Vector3f>(&noisy.xyzi[4 * j]);
+    if (a.normalized().dot(b.normalized()) < 0.999999F) continue;
+    ++j;
+    const auto error = static_cast<double>(b.norm() - a.norm());
+    sum += error;
+    squares += error * error;
+    ++count;
+  }
+  REQUIRE(count > exact.labels.size() * 9 / 10);
+  const auto n = static_cast<double>(count);
+  CHECK(sum / n == Approx(0).margin(0.002));
+  CHECK(std::sqrt(squares / n) == Approx(0.05).margin(0.003));
+}
+
+TEST_CASE("poses are rigid, smooth and as noisy as asked") {
+  Config config = small(Scene::kHill, Sensor::kVlp16, 60, 2);
+  config.pose_noise_translation = 0.03;
+  config.pose_noise_rotation = 0.1;
+  Simulator simulator(config);
+  double translation = 0, rotation = 0;
+  SimulatedScan last;
+  for (std::size_t i = 0; i < simulator.size(); ++i) {
+    SimulatedScan scan = simulator.scan(i);
+    CHECK(scan.time == Approx(0.1 * static_cast<double>(i)));
+    for (const Eigen::Isometry3d& T : {scan.T_world_sensor, scan.T_world_sensor_noisy}) {
+      const Eigen::Matrix3d R = T.linear();
+      CHECK((R.transpose() * R - Eigen::Matrix3d::Identity()).norm() < 1e-9);
+      CHECK(R.determinant() == Approx(1));
+    }
+    const Eigen::Isometry3d error = scan.T_world_sensor.inverse() * scan.T_world_sensor_noisy;
+    translation += error.translation().squaredNorm() / 3;
+    rotation += std::pow(Eigen::AngleAxisd(error.linear()).angle(), 2) / 3;
+    if (i > 0) {
+      const Eigen::Isometry3d step = last.T_world_sensor.inverse() * scan.T_world_sensor;
+      CHECK(step.translation().norm() < 1.2);                             // 12 m/s
+      CHECK(std::abs(step.translation().z()) < 0.12);
+      CHECK(Eigen::AngleAxisd(step.linear()).angle() < 0.035);            // 20 deg/s
+    }
+    last = std::move(scan);
+  }
+  const auto n = static_cast<double>(simulator.size());
+  CHECK(std::sqrt(translation / n) == Approx(0.03).epsilon(0.2));
+  CHECK(std::sqrt(rotation / n) * 57.29578 == Approx(0.1).epsilon(0.2));
+}
+
+TEST_CASE("the sensor stands at its height over the ground") {
+  Config config = small(Scene::kStatic, Sensor::kHdl64, 1, 2);
+  config.sensor_height = 2.2;
+  const SimulatedScan scan = Simulator(config).scan(0);
+  double lowest = 0;
+  for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+    const float* p = &scan.xyzi[4 * i];
+    if (p[0] * p[0] + p[1] * p[1] < 64 && class_of(scan.labels[i]) == 40) {
+      lowest = std::min(lowest, static_cast<double>(p[2]));
+    }
+  }
+  // The street may fall by a few percent; the usual 1.73 m is farther off.
+  CHECK(lowest == Approx(-2.2).margin(0.35));
+}
+
+TEST_CASE("names and bounds are checked") {
+  CHECK(scene_from_name("stop-and-go") == Scene::kStopAndGo);
+  CHECK(sensor_from_name("livox") == Sensor::kLivox);
+  CHECK(labelling_from_name("instant") == Labelling::kInstant);
+  CHECK_THROWS_AS(scene_from_name("Urban"), ConfigError);
+  CHECK_THROWS_AS(sensor_from_name(""), ConfigError);
+  Config config;
+  config.scans = 0;
+  CHECK_THROWS_AS(Simulator(config), ConfigError);
+  config.scans = 1;
+  config.range_noise = -0.01;
+  CHECK_THROWS_AS(Simulator(config), ConfigError);
+  config.range_noise = std::nan("");
+  CHECK_THROWS_AS(Simulator(config), ConfigError);
+}
+
+}  // namespace dynains::simulation
