@@ -10,6 +10,7 @@ namespace dynains::program {
 void add_run_command(CLI::App& app);
 void add_config_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);
+void add_statistics_command(CLI::App& app);
 
 /// Exit codes; an interrupted run exits with 128 + the number of the signal.
 inline constexpr int kExitFailure = 1;

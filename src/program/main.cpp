@@ -25,16 +25,20 @@ int main(int argc, char** argv) {
 
   CLI::App app("Removes moving objects from LiDAR scans and maps, scan by scan.", "dynains");
   app.set_version_flag("--version", std::string("dynains ") + dynains::kVersionString);
-  app.require_subcommand(1);
+  app.require_subcommand(0, 1);
   app.get_formatter()->column_width(36);
   add_run_command(app);
   add_config_command(app);
   add_simulate_command(app);
+  add_statistics_command(app);
   add_eval_command(app);
   add_experiment_command(app);
 
   try {
     app.parse(argc, argv);
+    if (app.get_subcommands().empty()) {
+      return fail(kExitUsage, "expected a command, for example run (see dynains --help)");
+    }
   } catch (const CLI::Success& success) {
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
