@@ -10,6 +10,8 @@ namespace dynains::program {
 
 struct Colour {
   std::uint8_t r = 0, g = 0, b = 0;
+
+  friend bool operator==(Colour a, Colour b) { return a.r == b.r && a.g == b.g && a.b == b.b; }
 };
 
 class Picture {

@@ -1,0 +1,282 @@
+// The evaluating commands, from the command line to the files they write.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/point_file.hpp"
+#include "eval.hpp"
+#include "experiment.hpp"
+#include "labelled_sequence.hpp"
+#include "sequences.hpp"
+#include "support/catch.hpp"
+#include "variants.hpp"
+
+namespace dynains::program {
+
+using namespace evaluation::testing;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// Standard output of `dynains <arguments>`; throws what the command throws.
+std::string call(std::vector<std::string> arguments) {
+  CLI::App app("test", "dynains");
+  add_eval_command(app);
+  add_experiment_command(app);
+  std::ostringstream output;
+  std::streambuf* const before = std::cout.rdbuf(output.rdbuf());
+  std::reverse(arguments.begin(), arguments.end());
+  try {
+    app.parse(arguments);
+  } catch (...) {
+    std::cout.rdbuf(before);
+    throw;
+  }
+  std::cout.rdbuf(before);
+  return output.str();
+}
+
+std::string message_of(const std::vector<std::string>& arguments) {
+  try {
+    call(arguments);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return {};
+}
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+}  // namespace
+
+TEST_CASE("eval judges a run beside identity and oracle") {
+  const TemporaryFolder folder;
+  const fs::path sequence = folder.path() / "street";
+  const auto scans = write_street(sequence, 4);
+  write_run(folder.path() / "perfect", scans, 0);
+  write_run(folder.path() / "half", scans, 240);  // of 480 points
+
+  const std::string json_path = (folder.path() / "eval.json").string();
+  const std::string csv_path = (folder.path() / "eval.csv").string();
+  const std::string text = call({"eval", sequence.string(), (folder.path() / "half").string(),
+                                 (folder.path() / "perfect").string(), "--errors", "--json",
+                                 json_path, "--csv", csv_path});
+  CHECK(has(text, "identity"));
+  CHECK(has(text, "moving-car"));
+  const auto json = nlohmann::json::parse(read_text(json_path));
+  REQUIRE(json["rows"].size() == 4);
+  CHECK(json["rows"][1]["points"]["ha"] == 100.0);
+  CHECK(json["rows"][2]["points"]["da"] == 50.0);
+  CHECK(json["rows"][2]["points"]["sa"] == 100.0);
+  CHECK(json["rows"][3]["voxels"]["f1"] == 1.0);
+  CHECK(json["errors"]["by_class"][2]["removed"] == 960);
+  CHECK(json["errors"]["by_instance"][0]["speed_mps"].get<double>() == Approx(10.0));
+  CHECK(has(read_text(csv_path), "identity"));
+
+  const std::string window = call({"eval", sequence.string(), "--start", "1", "--end", "2"});
+  CHECK(has(window, "2 scans, "));
+}
+
+TEST_CASE("eval judges map files of either format") {
+  const TemporaryFolder folder;
+  const fs::path sequence = folder.path() / "street";
+  const auto scans = write_street(sequence, 3);
+  for (const char* extension : {".ply", ".pcd"}) {
+    const fs::path path = folder.path() / (std::string("map") + extension);
+    PointFileWriter writer(path);
+    for (const auto& scan : scans) {
+      for (std::size_t i = 0; i < scan.truth.size(); ++i) {
+        FilePoint point;
+        point.position = scan.view().point(i);
+        if (evaluation::semantic_class(scan.truth[i]) != kMovingCar) writer.add(point);
+      }
+    }
+    writer.commit();
+    const std::string json_path = (folder.path() / "map.json").string();
+    call({"eval", sequence.string(), "--map", path.string(), "--json", json_path});
+    const auto json = nlohmann::json::parse(read_text(json_path));
+    REQUIRE(json["rows"].size() == 3);
+    CHECK(json["rows"][2]["voxels"]["f1"] == 1.0);
+    CHECK(json["rows"][2]["points"]["ha"] == 100.0);
+    CHECK(json["rows"][2]["foreign_points"] == 0);
+  }
+}
+
+TEST_CASE("eval says what is wrong with its input, and writes nothing then") {
+  const TemporaryFolder folder;
+  const fs::path sequence = folder.path() / "street";
+  const auto scans = write_street(sequence, 3);
+  const fs::path run = folder.path() / "run";
+  write_run(run, scans, 0);
+  const fs::path json = folder.path() / "eval.json";
+  const std::vector<std::string> good = {"eval", sequence.string(), run.string(), "--json",
+                                         json.string()};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), good.begin(), good.end());
+    return more;
+  };
+
+  CHECK(has(message_of(with({"--classes", "252-"})), "classes = \"252-\""));
+  CHECK(has(message_of(with({"--voxel", "0"})), "EvaluationConfig.voxel = 0 must be in"));
+  CHECK(has(message_of(with({"--max-range", "1"})), "crossed"));
+  CHECK(has(message_of(with({"--unlabeled", "maybe"})), "maybe"));
+  CHECK(has(message_of(with({"--start", "7"})), "no scan within the chosen window"));
+  CHECK(has(message_of(with({"--map", (folder.path() / "none.ply").string()})), "none.ply"));
+  CHECK(has(message_of({"eval", sequence.string(), (folder.path() / "nobody").string()}),
+            "no labels for any scan"));
+  CHECK(has(message_of({"eval", (folder.path() / "nowhere").string()}), "nowhere"));
+  CHECK(!fs::exists(json));
+
+  // A gap in the labels is not skipped silently.
+  const fs::path label = run / "labels" / "000001.label";
+  fs::rename(label, folder.path() / "aside");
+  CHECK(has(message_of(good), "000001.label"));
+  fs::rename(folder.path() / "aside", label);
+
+  const std::vector<std::uint32_t> short_by_one(scans[1].truth.size() - 1, 9);
+  write_labels(label, short_by_one);
+  CHECK(has(message_of(good), "000001.label"));
+  std::vector<std::uint32_t> strange(scans[1].truth.size(), 9);
+  strange[5] = 40;
+  write_labels(label, strange);
+  CHECK(has(message_of(good), "point 5 has class 40; expected 9 (static), 251 (moving)"));
+  write_run(run, scans, 0);
+
+  fs::create_directories(run / "causes");
+  std::ofstream(run / "causes" / "000002.cause") << "short";
+  CHECK(has(message_of(good), "000002.cause: 5 bytes; expected one for each"));
+  fs::remove_all(run / "causes");
+
+  fs::rename(sequence / "labels", sequence / "labels_aside");
+  CHECK(has(message_of(good), "no ground truth"));
+  CHECK(!fs::exists(json));
+  fs::rename(sequence / "labels_aside", sequence / "labels");
+  CHECK(message_of(good).empty());
+  CHECK(fs::exists(json));
+}
+
+TEST_CASE("Causes beside the labels of a run are counted") {
+  const TemporaryFolder folder;
+  const auto scans = write_street(folder.path() / "street", 2);
+  const fs::path run = folder.path() / "run";
+  write_run(run, scans, 100);
+  fs::create_directories(run / "causes");
+  for (std::size_t number = 0; number < scans.size(); ++number) {
+    std::string causes;
+    for (const std::uint32_t truth : scans[number].truth) {
+      causes += evaluation::semantic_class(truth) == kMovingCar ? '\1' : '\13';
+    }
+    std::ofstream(run / "causes" / (scan_name(number) + ".cause"), std::ios::binary) << causes;
+  }
+  const std::string json_path = (folder.path() / "eval.json").string();
+  call({"eval", (folder.path() / "street").string(), run.string(), "--json", json_path});
+  const auto json = nlohmann::json::parse(read_text(json_path));
+  CHECK(json["errors"]["by_cause"][1]["cause"] == "called ground");
+  CHECK(json["errors"]["by_cause"][1]["missed_dynamic"] == 200);
+  CHECK(json["errors"]["by_cause"][11]["lost_static"] == 0);
+}
+
+TEST_CASE("Variants judge every point once, each by its own configuration") {
+  const TemporaryFolder folder;
+  const auto scans = write_street(folder.path() / "street", 8);
+  std::vector<Variant> variants = {{"full", DynaInsRemover::Config::paper()},
+                                   {"IOC only", DynaInsRemover::Config::paper()}};
+  variants[1].config.use_belief = false;
+  LabelledSequence sequence(folder.path() / "street", {});
+  std::size_t calls = 0;
+  const VariantVerdicts both =
+      run_variants(sequence, variants, Answer::kFinal, [&](std::size_t) { ++calls; });
+  CHECK(calls == scans.size());
+  REQUIRE(both.in_map.size() == scans.size());
+  for (std::size_t v = 0; v < variants.size(); ++v) {
+    const VariantVerdicts alone = run_variants(sequence, {variants[v]}, Answer::kFinal, nullptr);
+    for (std::size_t i = 0; i < scans.size(); ++i) {
+      REQUIRE(both.in_map[i].size() == scans[i].truth.size());
+      for (std::size_t p = 0; p < both.in_map[i].size(); ++p) {
+        REQUIRE((both.in_map[i][p] >> v & 1U) == alone.in_map[i][p]);
+      }
+    }
+  }
+  const evaluation::Evaluation result =
+      evaluate_variants(sequence, variants, Answer::kFinal, {}, nullptr);
+  REQUIRE(result.rows.size() == 4);
+  // A box that moves 1 m per scan before an empty background is easy.
+  CHECK(result.rows[2].points.static_accuracy() > 95);
+  CHECK(result.rows[2].points.dynamic_accuracy() > 60);
+}
+
+TEST_CASE("The experiments run on any labelled sequence") {
+  const TemporaryFolder folder;
+  const std::string street = (folder.path() / "street").string();
+  write_street(street, 6);
+
+  SECTION("table1 on one sequence") {
+    const std::string json_path = (folder.path() / "table.json").string();
+    const std::string csv_path = (folder.path() / "table.csv").string();
+    const std::string text =
+        call({"experiment", "table1", street, "--quiet", "--json", json_path, "--csv", csv_path});
+    CHECK(has(text, "dynains, paper preset, IOC only"));
+    CHECK(has(text, "oracle"));
+    CHECK(!has(text, "published"));
+    CHECK(nlohmann::json::parse(read_text(json_path))[0]["sequence"] == "street");
+    CHECK(has(read_text(csv_path), "street,\"oracle\",100.000000,100.000000,1.000000,measured"));
+  }
+  SECTION("table1 on SemanticKITTI's layout") {
+    // The published window of 02 starts at scan 860.
+    const fs::path root = folder.path() / "kitti" / "sequences" / "02";
+    write_street(root, 3);
+    for (const char* kind : {"velodyne", "labels"}) {
+      const std::string end = std::string(kind) == "velodyne" ? ".bin" : ".label";
+      for (std::size_t number = 0; number < 3; ++number) {
+        fs::rename(root / kind / (scan_name(number) + end),
+                   root / kind / (scan_name(860 + number) + end));
+      }
+    }
+    const std::string text =
+        call({"experiment", "table1", (folder.path() / "kitti").string(), "--quiet"});
+    CHECK(has(text, "paper, full (published)"));
+    CHECK(has(text, "0.989"));
+    CHECK(has(text, "dynains, default preset"));
+    CHECK(has(message_of({"experiment", "table1", folder.path().string()}), "neither a sequence"));
+  }
+  SECTION("sweep") {
+    const std::string csv_path = (folder.path() / "sweep.csv").string();
+    const std::string svg_path = (folder.path() / "sweep.svg").string();
+    call({"experiment", "sweep", street, "--quiet", "--values", "0,0.1,0.2,0.4,0.6,0.8,1", "--csv",
+          csv_path, "--svg", svg_path});
+    const std::string csv = read_text(csv_path);
+    CHECK(std::count(csv.begin(), csv.end(), '\n') == 8);
+    CHECK(csv.rfind("tau-s,pr,rr,f1,sa,da,ha\n0,", 0) == 0);
+    CHECK(has(read_text(svg_path), "</svg>"));
+    CHECK(has(message_of({"experiment", "sweep", street, "--values", "2"}), "tau-s = 2"));
+    CHECK(has(message_of({"experiment", "sweep", street, "--parameter", "tau-x"}), "tau-x"));
+  }
+  SECTION("runtime") {
+    const std::string text = call({"experiment", "runtime", street, "--repeat", "2"});
+    CHECK(has(text, "12 frames (2 times 6)"));
+    CHECK(has(text, "descriptor"));
+    CHECK(has(text, "total"));
+  }
+  SECTION("figures") {
+    const fs::path out = folder.path() / "figures";
+    call({"experiment", "figures", street, "--out", out.string(), "--quiet", "--pixels", "200"});
+    for (const char* name :
+         {"raw_above.png", "raw_perspective.png", "cleaned_above.png", "cleaned_perspective.png"}) {
+      CHECK(read_text(out / name).substr(1, 3) == "PNG");
+    }
+    CHECK(read_points(out / "raw.ply").positions.size() ==
+          read_points(out / "cleaned.ply").positions.size());
+  }
+}
+
+}  // namespace dynains::program
