@@ -40,9 +40,7 @@ void create_folder(const fs::path& folder) {
   if (error) throw IoError(folder.string() + ": cannot be created: " + error.message());
 }
 
-void prepare_output_folder(const fs::path& folder, const OutputFiles& ours, bool force,
-                           const std::string& marker_text) {
-  create_folder(folder);
+void check_output_folder(const fs::path& folder, const OutputFiles& ours, bool force) {
   std::error_code error;
   const bool empty = fs::is_empty(folder, error);
   if (error) throw IoError(folder.string() + ": cannot be listed: " + error.message());
@@ -54,10 +52,15 @@ void prepare_output_folder(const fs::path& folder, const OutputFiles& ours, bool
     throw IoError(folder.string() +
                   ": holds earlier results; choose another folder, or replace them by --force");
   }
+}
+
+void clear_output_folder(const fs::path& folder, const OutputFiles& ours,
+                         const std::string& marker_text) {
   AtomicFile marker(folder / ours.marker);
   marker.stream() << marker_text;
   marker.commit();
   for (const std::string& name : ours.files) remove_file(folder / name);
+  std::error_code error;
   for (const std::string& name : ours.folders) {
     if (fs::is_directory(folder / name, error)) remove_files(folder / name, ours.extensions);
   }

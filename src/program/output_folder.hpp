@@ -18,11 +18,13 @@ struct OutputFiles {
   std::vector<std::string> extensions;
 };
 
-/// Makes `folder` ready for fresh results. A folder that is not empty is refused, unless `force` is
-/// given and it has our marker: then the earlier results are removed, and nothing else.
-/// `marker_text` replaces the marker first, so that a folder never claims what it does not hold.
+/// Refuses a folder that is not empty, unless `force` is given and it has our marker.
 /// Throws IoError.
-void prepare_output_folder(const std::filesystem::path& folder, const OutputFiles& ours, bool force,
-                           const std::string& marker_text);
+void check_output_folder(const std::filesystem::path& folder, const OutputFiles& ours, bool force);
+
+/// Removes earlier results, and nothing else. `marker_text` replaces the marker first, so that a
+/// folder never claims what it does not hold. Throws IoError.
+void clear_output_folder(const std::filesystem::path& folder, const OutputFiles& ours,
+                         const std::string& marker_text);
 
 }  // namespace dynains::program

@@ -15,9 +15,8 @@
 #include "evaluation_options.hpp"
 #include "interrupt.hpp"
 #include "output_folder.hpp"
-#include "parameter_flags.hpp"
-#include "preset.hpp"
 #include "progress.hpp"
+#include "remover_options.hpp"
 #include "run_report.hpp"
 #include "run_results.hpp"
 #include "run_sequence.hpp"
@@ -29,26 +28,17 @@ namespace fs = std::filesystem;
 using Config = DynaInsRemover::Config;
 
 struct RunOptions {
+  explicit RunOptions(CLI::App& command) : remover(command, "default") {}
+
   std::string sequence;
   std::string out;
-  std::string preset = "default";
-  std::string config_file;
   std::string map;
   ScanWindow window;
   bool write_online = false;
   bool force = false;
   bool quiet = false;
-  ParameterFlags flags;
+  RemoverOptions remover;
 };
-
-/// Preset, then config file, then flags.
-Config make_config(const RunOptions& options) {
-  Config config = preset(options.preset);
-  if (!options.config_file.empty()) read_config_file(options.config_file).apply(config);
-  options.flags.values().apply(config);
-  config.validate();
-  return config;
-}
 
 nlohmann::ordered_json to_json(const Config& config) {
   nlohmann::ordered_json json;
@@ -76,10 +66,13 @@ void check_scans(const KittiSequence& sequence, const ScanRange& range) {
   for (std::size_t i = range.first; i <= range.last; ++i) sequence.point_count(i);
 }
 
-OutputFiles files_of_a_run() {
+/// What an earlier run may have left in `folder`.
+OutputFiles files_of_a_run(const fs::path& folder) {
   OutputFiles files;
   files.marker = "report.json";
   files.files = {"timing.csv", "static_map.ply", "dynamic_points.ply"};
+  const std::string map = earlier_map(folder);
+  if (!map.empty()) files.files.push_back(map);
   files.folders = {"labels", "online"};
   files.extensions = {".label"};
   return files;
@@ -98,7 +91,29 @@ RunOutputs make_outputs(const RunOptions& options, const Config& config) {
     throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
   }
   outputs.map = options.map;
+  if (fs::weakly_canonical(outputs.map) ==
+      fs::weakly_canonical(outputs.folder / "dynamic_points.ply")) {
+    throw ConfigError("--map " + options.map + ": the moving points go there");
+  }
   return outputs;
+}
+
+/// The map's name for the report, so that the folder of results can be moved.
+std::string name_of_map(const RunOutputs& outputs) {
+  if (outputs.map.empty()) return {};
+  const fs::path map = fs::weakly_canonical(outputs.map);
+  return map.parent_path() == fs::weakly_canonical(outputs.folder) ? map.filename().string()
+                                                                   : map.string();
+}
+
+/// Clears the way for new results, once nothing but the disk can go wrong any more.
+void prepare(const RunOutputs& outputs, bool force) {
+  create_folder(outputs.folder);
+  const OutputFiles files = files_of_a_run(outputs.folder);
+  check_output_folder(outputs.folder, files, force);
+  // A map that cannot be written would otherwise be noticed when the old results are gone.
+  if (!outputs.map.empty()) PointFileWriter attempt(outputs.map);
+  clear_output_folder(outputs.folder, files, to_text(unfinished_report(name_of_map(outputs))));
 }
 
 void print_summary(const RunResults& results, const RunTiming& timing, const RunOutputs& outputs) {
@@ -129,14 +144,13 @@ void print_summary(const RunResults& results, const RunTiming& timing, const Run
 }
 
 void run(const RunOptions& options) {
-  const Config config = make_config(options);
+  const Config config = options.remover.config();
   const RunOutputs outputs = make_outputs(options, config);
   DynaInsRemover remover(config);
   const KittiSequence sequence(options.sequence);
   const ScanRange range = select_scans(sequence, options.window);
   check_scans(sequence, range);
-  prepare_output_folder(outputs.folder, files_of_a_run(), options.force,
-                        to_text(unfinished_report()));
+  prepare(outputs, options.force);
 
   RunResults results(sequence, range, outputs);
   const InterruptGuard interrupt;
@@ -154,9 +168,9 @@ void run(const RunOptions& options) {
   description.sequence = options.sequence;
   description.first_scan = sequence.name(range.first);
   description.last_scan = sequence.name(range.first + results.finished() - 1);
-  description.preset = options.preset;
+  description.preset = options.remover.preset_name();
   description.complete = results.finished() == range.size();
-  description.map = outputs.map;
+  description.map = name_of_map(outputs);
   description.configuration = to_json(config);
   write_timing(outputs.folder / "timing.csv", timing);
   write_report(outputs.folder / "report.json", make_report(description, results, timing));
@@ -168,7 +182,7 @@ void run(const RunOptions& options) {
 
 void add_run_command(CLI::App& app) {
   CLI::App& command = *app.add_subcommand("run", "Remove what moves from a recorded sequence");
-  auto options = std::make_shared<RunOptions>();
+  auto options = std::make_shared<RunOptions>(command);
   command
       .add_option("SEQ", options->sequence,
                   "KITTI or SemanticKITTI folder: velodyne/, poses.txt; optional calib.txt, "
@@ -186,26 +200,12 @@ void add_run_command(CLI::App& app) {
       "old and new files never mix. A folder that holds anything else is refused");
   add_window_options(command, options->window);
   command
-      .add_option("--preset", options->preset,
-                  "default, or paper: the paper to the letter [default]")
-      ->check(CLI::IsMember(preset_names()))
-      ->type_name("NAME");
-  command
-      .add_option("--config", options->config_file,
-                  "parameters, a line `name = value` each; dynains config prints one. Flags win")
-      ->type_name("FILE");
-  command
       .add_option("--map", options->map,
                   "static map, .ply or .pcd [static_map.ply in the folder of --out]")
       ->type_name("FILE");
   command.add_flag("--write-online", options->write_online,
                    "also write the verdicts without latency, to the folder online");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
-
-  const Config defaults = preset("default");
-  Config::visit_sections(defaults, [&](const char* name, const auto& section) {
-    options->flags.add_to(command, section, std::string("Parameters of ") + name);
-  });
   command.footer(
       "Writes labels/NNNNNN.label (uint32 a point: 251 moving, 9 static, 0 not judged; instance id "
       "above\nthe 16th bit), static_map.ply, dynamic_points.ply, report.json and timing.csv. Each "

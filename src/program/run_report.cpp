@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <fstream>
 #include <iomanip>
 #include <locale>
 
 #include "dynains/io/atomic_file.hpp"
+#include "dynains/io/point_file.hpp"
 #include "dynains/version.hpp"
 
 namespace dynains::program {
@@ -55,7 +57,7 @@ std::uint64_t peak_memory_bytes() {
 nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& results,
                                    const RunTiming& timing) {
   const LabelCounts& labels = results.labels();
-  nlohmann::ordered_json report = unfinished_report();
+  nlohmann::ordered_json report = unfinished_report(run.map);
   report["complete"] = run.complete;
   report["sequence"] = run.sequence;
   report["first_scan"] = run.first_scan;
@@ -67,11 +69,7 @@ nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& 
                       {"ground", labels[PointLabel::kGround]},
                       {"static", labels[PointLabel::kStatic]},
                       {"dynamic", labels[PointLabel::kDynamic]}};
-  if (results.map_points()) {
-    report["static_map"] = {{"file", run.map.string()}, {"points", *results.map_points()}};
-  } else {
-    report["static_map"] = nullptr;
-  }
+  if (results.map_points()) report["static_map"]["points"] = *results.map_points();
   report["milliseconds"] = times_to_json(timing);
   report["flush_milliseconds"] = timing.flush;
   report["peak_memory_bytes"] = peak_memory_bytes();
@@ -80,8 +78,22 @@ nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& 
   return report;
 }
 
-nlohmann::ordered_json unfinished_report() {
-  return {{"program", "dynains"}, {"version", kVersionString}, {"complete", false}};
+nlohmann::ordered_json unfinished_report(const std::string& map) {
+  nlohmann::ordered_json report = {
+      {"program", "dynains"}, {"version", kVersionString}, {"complete", false}};
+  report["static_map"] = nullptr;
+  if (!map.empty()) report["static_map"] = {{"file", map}};
+  return report;
+}
+
+std::string earlier_map(const std::filesystem::path& folder) {
+  std::ifstream file(folder / "report.json");
+  const auto report = nlohmann::json::parse(file, nullptr, false);
+  const nlohmann::json::json_pointer where("/static_map/file");
+  if (!report.is_object() || !report.contains(where) || !report[where].is_string()) return {};
+  const std::filesystem::path map(report[where].get<std::string>());
+  const bool is_inside = !map.has_parent_path() && is_point_file(map);
+  return is_inside ? map.string() : std::string();
 }
 
 std::string to_text(const nlohmann::ordered_json& report) {

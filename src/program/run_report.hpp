@@ -31,7 +31,7 @@ struct RunDescription {
   std::string last_scan;
   std::string preset;
   bool complete = true;  ///< false after a signal
-  std::filesystem::path map;
+  std::string map;       ///< file, relative to the folder of results if it lies there; empty: none
   nlohmann::ordered_json configuration;  ///< parameter name -> value
 };
 
@@ -39,7 +39,10 @@ nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& 
                                    const RunTiming& timing);
 
 /// What stands in the place of the report while the run is not finished.
-nlohmann::ordered_json unfinished_report();
+nlohmann::ordered_json unfinished_report(const std::string& map);
+
+/// Name of the map that an earlier run left in `folder`, from its report; empty if it left none.
+std::string earlier_map(const std::filesystem::path& folder);
 
 /// Text of a report, as in the file.
 std::string to_text(const nlohmann::ordered_json& report);

@@ -61,8 +61,9 @@ std::string describe(const SimulateOptions& options, const simulation::Config& c
 void simulate(const SimulateOptions& options) {
   const simulation::Config config = make_config(options);
   simulation::Simulator simulator(config);
-  prepare_output_folder(options.out, files_of_a_simulation(), options.force,
-                        describe(options, config));
+  create_folder(options.out);
+  check_output_folder(options.out, files_of_a_simulation(), options.force);
+  clear_output_folder(options.out, files_of_a_simulation(), describe(options, config));
   const InterruptGuard interrupt;
   bool complete = false;
   {
