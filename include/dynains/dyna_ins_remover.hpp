@@ -191,6 +191,7 @@ class BasicDynaInsRemover {
   /// Back to the state after construction; buffers keep their capacity.
   void reset() {
     map_.clear();
+    instance_ids_ = {};
     pushed_ = 0;
     finished_ = 0;
     segment_ = 0;
