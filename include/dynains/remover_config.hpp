@@ -13,7 +13,7 @@ struct RemoverConfig {
   bool use_belief = true;  ///< false: initial proposals are verdicts (the paper's IOC-only rows)
   int votes = 1;           ///< windows, of the K that see a scan, that must call a point dynamic
   double min_range = 2.7;  ///< m, horizontal; nearer points are the robot's own
-  double max_range = 250;  ///< m, horizontal; farther points are not measurements
+  double max_range = 250;  ///< m, horizontal and vertical; farther points are not measurements
   double max_gap = 1.0;    ///< s; a longer pause between scans starts a new window
   bool build_map = true;   ///< false: labels only, the map stays empty
 
@@ -28,7 +28,7 @@ struct RemoverConfig {
     visitor(Parameter{"min_range", self.min_range, closed(0, 100), "m",
                       "nearer points (horizontally) are the robot's own and not judged"});
     visitor(Parameter{"max_range", self.max_range, half_open_below(0, 10000), "m",
-                      "farther points (horizontally) are not judged"});
+                      "farther points (horizontally or vertically) are not judged"});
     visitor(Parameter{"max_gap", self.max_gap, half_open_below(0, 1e9), "s",
                       "a longer pause between two scans starts a new window"});
     visitor(Parameter{"build_map", self.build_map, Bounds(), "", "accumulate the static map"});

@@ -45,8 +45,8 @@ struct ScanSlot {
 /// Takes a foreign cloud in: valid points as floats, and a label for each of the others.
 class Ingest {
  public:
-  /// Points outside [min_range, max_range] (m, horizontal) or without finite coordinates stay out;
-  /// a point at the origin is a beam that did not return.
+  /// Points outside [min_range, max_range] (m, horizontal), higher or lower than max_range or
+  /// without finite coordinates stay out; a point at the origin is a beam that did not return.
   template <class Cloud>
   void read(const Cloud& cloud, float min_range, float max_range, std::vector<PointLabel>& labels) {
     using Traits = PointCloudTraits<Cloud>;
@@ -70,7 +70,7 @@ class Ingest {
       points_.z[count_] = z;
       input_[count_] = static_cast<std::uint32_t>(i);
       // Comparisons with NaN are false, so that one test admits only good points.
-      const bool good = squared >= min_squared && squared <= max_squared && z - z == 0.0F;
+      const bool good = squared >= min_squared && squared <= max_squared && z * z <= max_squared;
       if (good && (squared > 0.0F || z != 0.0F)) {
         ++count_;
       } else {
