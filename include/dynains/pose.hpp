@@ -14,7 +14,12 @@ namespace dynains {
 /// digits.
 inline constexpr double kRotationTolerance = 1e-3;
 
-/// Throws PoseError unless `T` is finite and rigid; `name` starts the message.
+/// Largest coordinate of a sensor in the world, in metres: more than any map grid on Earth has, and
+/// little enough for the indices of a map of any resolution.
+inline constexpr double kMaxTranslation = 5e7;
+
+/// Throws PoseError unless `T` is finite, rigid and within kMaxTranslation; `name` starts the
+/// message.
 inline void validate_pose(const std::string& name, const Eigen::Isometry3d& T) {
   if (!T.matrix().allFinite()) {
     throw PoseError(name + " has NaN or infinite entries");
@@ -29,6 +34,13 @@ inline void validate_pose(const std::string& name, const Eigen::Isometry3d& T) {
     std::ostringstream text;
     text << name << " is not rigid: R^T R differs from identity by " << error << " (at most "
          << kRotationTolerance << "), det R = " << R.determinant() << " (must be +1)";
+    throw PoseError(text.str());
+  }
+  const double farthest = T.translation().cwiseAbs().maxCoeff();
+  if (farthest > kMaxTranslation) {
+    std::ostringstream text;
+    text << name << " has a translation of " << farthest << " m (at most " << kMaxTranslation
+         << " along each axis)";
     throw PoseError(text.str());
   }
 }
