@@ -8,6 +8,7 @@
 #include <map>
 #include <vector>
 
+#include "dynains/pose.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 
@@ -141,6 +142,26 @@ TEST_CASE("at UTM coordinates the map keeps a tenth of a millimetre") {
     single.for_each(
         [&](const Eigen::Vector3d& p) { REQUIRE((p - expected).norm() < 1e-4); });
     REQUIRE(single.size() == 1);
+  }
+}
+
+TEST_CASE("the finest map reaches to the farthest pose that is accepted") {
+  PointBuffer point;
+  point.push_back(100.0F, -100.0F, 100.0F);
+  for (const double side : {-1.0, 1.0}) {
+    StaticMapAccumulator map = make(0.005);
+    Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+    T.translation().setConstant(side * kMaxTranslation);
+    CHECK_NOTHROW(validate_pose("T", T));
+    map.insert(point, {}, T);
+    const Eigen::Vector3d expected = T * Eigen::Vector3d(100.0, -100.0, 100.0);
+    std::size_t found = 0;
+    map.for_each_in({expected.array() - 0.001, expected.array() + 0.001},
+                    [&](const Eigen::Vector3d&) { ++found; });
+    CHECK(found == 1);
+
+    T.translation().x() = std::nextafter(side * kMaxTranslation, side * 1e9);
+    CHECK_THROWS_AS(validate_pose("T", T), PoseError);
   }
 }
 

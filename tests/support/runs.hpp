@@ -38,8 +38,8 @@ struct Run {
   std::vector<Verdict> final;   // in the order in which they were given out
 };
 
-template <class Remover>
-Run run(Remover& remover, const std::vector<Scan>& scans) {
+template <class Stages>
+Run run(BasicDynaInsRemover<Stages>& remover, const std::vector<Scan>& scans) {
   Run result;
   for (const Scan& scan : scans) {
     const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);

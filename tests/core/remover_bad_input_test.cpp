@@ -1,0 +1,230 @@
+// Whatever comes in: an exception or a label, and a remover that works on.
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "dynains/dyna_ins_remover.hpp"
+#include "support/catch.hpp"
+#include "support/runs.hpp"
+#include "support/scene.hpp"
+
+namespace dynains::test {
+namespace {
+
+using Config = DynaInsRemover::Config;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std::vector<Scan> good_scans() {
+  return drive(yard_with(van(22.0, 3.5, {-12.0, 0.0, 0.0})), 7, 5.0);
+}
+
+std::vector<PointLabel> labels_of(const std::vector<Eigen::Vector3f>& points) {
+  DynaInsRemover remover(Config::paper());
+  const FrameResult frame = remover.push(points, Eigen::Isometry3d::Identity());
+  return {frame.newest.labels.begin(), frame.newest.labels.end()};
+}
+
+Eigen::Isometry3d broken(const std::function<void(Eigen::Matrix4d&)>& damage) {
+  Eigen::Isometry3d T = sensor_at(1.0, 2.0, 0.3);
+  damage(T.matrix());
+  return T;
+}
+
+TEST_CASE("a pose that is none is refused with its reason, and the state stays as it was") {
+  struct Case {
+    const char* reason;
+    Eigen::Isometry3d pose;
+  };
+  const std::vector<Case> cases = {
+      {"NaN", broken([](Eigen::Matrix4d& m) { m(0, 3) = kNan; })},
+      {"NaN", broken([](Eigen::Matrix4d& m) { m(1, 1) = kNan; })},
+      {"infinite", broken([](Eigen::Matrix4d& m) { m(2, 3) = -kInfinity; })},
+      {"not rigid", broken([](Eigen::Matrix4d& m) { m.topLeftCorner<3, 3>() *= 2.0; })},
+      {"not rigid", broken([](Eigen::Matrix4d& m) { m(0, 1) += 0.1; })},
+      {"not rigid", broken([](Eigen::Matrix4d& m) { m.col(0) = -m.col(0); })},  // a mirror
+      {"not rigid", broken([](Eigen::Matrix4d& m) { m.topLeftCorner<3, 3>().setZero(); })},
+      {"last row", broken([](Eigen::Matrix4d& m) { m(3, 0) = 1.0; })},
+      {"last row", broken([](Eigen::Matrix4d& m) { m(3, 3) = 2.0; })},
+      {"translation", broken([](Eigen::Matrix4d& m) { m(0, 3) = -1e12; })},
+  };
+  const std::vector<Scan> scans = good_scans();
+  const Run expected = run_paper(scans);
+  DynaInsRemover remover(Config::paper());
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    for (const Case& c : cases) {
+      CHECK_THROWS_AS(remover.push(scans[s].points, c.pose, scans[s].time), PoseError);
+      if (s == 0) {
+        CHECK_THROWS_WITH(remover.push(scans[s].points, c.pose, scans[s].time),
+                          StartsWith("T_world_sensor") && ContainsSubstring(c.reason));
+      }
+    }
+    const FrameResult frame =
+        remover.push(scans[s].points, scans[s].T_world_sensor, scans[s].time);
+    REQUIRE((Verdict(frame.newest) == expected.newest[s]));
+  }
+  remover.flush([&](const ScanVerdict& verdict) {
+    REQUIRE((Verdict(verdict) == expected.final.at(verdict.scan)));
+  });
+}
+
+TEST_CASE("a time that does not increase is refused, and the state stays as it was") {
+  const std::vector<Scan> scans = good_scans();
+  const Run expected = run_paper(scans);
+  DynaInsRemover remover(Config::paper());
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    for (const double time : {kNan, kInfinity, -kInfinity}) {
+      CHECK_THROWS_AS(remover.push(scans[s].points, scans[s].T_world_sensor, time), PoseError);
+    }
+    if (s > 0) {
+      for (const double time : {scans[s - 1].time, scans[s - 1].time - 1.0}) {
+        CHECK_THROWS_WITH(remover.push(scans[s].points, scans[s].T_world_sensor, time),
+                          StartsWith("time = ") && ContainsSubstring("greater than"));
+      }
+    }
+    const FrameResult frame =
+        remover.push(scans[s].points, scans[s].T_world_sensor, scans[s].time);
+    REQUIRE((Verdict(frame.newest) == expected.newest[s]));
+  }
+}
+
+TEST_CASE("a rotation with the few digits of a text file is accepted") {
+  Eigen::Isometry3d T = sensor_at(1.0, 2.0, 0.3);
+  T.linear() = (T.linear() * 1e4).array().round() / 1e4;
+  DynaInsRemover remover(Config::paper());
+  const FrameResult frame = remover.push(good_scans()[0].points, T);
+  const Eigen::Matrix3d R = frame.newest.T_world_sensor.linear();
+  CHECK((R.transpose() * R - Eigen::Matrix3d::Identity()).norm() < 1e-12);
+}
+
+TEST_CASE("points that are no measurements get a label that says so") {
+  constexpr float kNanF = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kInf = std::numeric_limits<float>::infinity();
+  using L = PointLabel;
+  struct Case {
+    Eigen::Vector3f point;
+    PointLabel label;
+  };
+  const std::vector<Case> cases = {
+      {{kNanF, 0.0F, 0.0F}, L::kInvalid},   {{10.0F, kNanF, 0.0F}, L::kInvalid},
+      {{10.0F, 0.0F, kNanF}, L::kInvalid},  {{kNanF, kNanF, kNanF}, L::kInvalid},
+      {{kInf, 0.0F, 0.0F}, L::kInvalid},    {{10.0F, -kInf, 0.0F}, L::kInvalid},
+      {{10.0F, 0.0F, kInf}, L::kInvalid},   {{0.0F, 0.0F, 0.0F}, L::kInvalid},
+      {{-0.0F, 0.0F, -0.0F}, L::kInvalid},  {{1.0F, 1.0F, 0.0F}, L::kOutOfRange},
+      {{1e6F, 0.0F, 0.0F}, L::kOutOfRange}, {{3e38F, 3e38F, 0.0F}, L::kOutOfRange},
+      {{10.0F, 0.0F, 3e38F}, L::kOutOfRange}, {{10.0F, 0.0F, -1e6F}, L::kOutOfRange},
+      {{-10.0F, -0.0F, 0.0F}, L::kStatic},  {{-10.0F, 1e-45F, 1e-45F}, L::kStatic},
+  };
+  std::vector<Eigen::Vector3f> points;
+  for (const Case& c : cases) points.push_back(c.point);
+  const std::vector<PointLabel> labels = labels_of(points);
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    INFO(cases[i].point.transpose());
+    CHECK(labels[i] == cases[i].label);
+    CHECK(labels_of({cases[i].point}) == std::vector<PointLabel>{cases[i].label});
+  }
+}
+
+TEST_CASE("bad points among good ones change nothing for the good ones") {
+  std::vector<Scan> scans = good_scans();
+  const Run clean = run_paper(scans);
+  const std::vector<Eigen::Vector3f> bad = {
+      Eigen::Vector3f::Constant(std::nanf("")), Eigen::Vector3f::Zero(),
+      {std::numeric_limits<float>::infinity(), 1.0F, 2.0F}, {1e20F, 1e20F, 1e20F}};
+  std::vector<std::vector<bool>> is_bad;
+  for (Scan& scan : scans) {
+    std::vector<Eigen::Vector3f> mixed;
+    is_bad.emplace_back();
+    for (std::size_t i = 0; i < scan.points.size(); ++i) {
+      if (i % 5 == 0) {
+        mixed.push_back(bad[i / 5 % bad.size()]);
+        is_bad.back().push_back(true);
+      }
+      mixed.push_back(scan.points[i]);
+      is_bad.back().push_back(false);
+    }
+    scan.points = mixed;
+  }
+  const Run result = run_paper(scans);
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    std::vector<PointLabel> good;
+    for (std::size_t i = 0; i < is_bad[s].size(); ++i) {
+      if (is_bad[s][i]) {
+        REQUIRE(result.final[s].labels[i] <= PointLabel::kOutOfRange);
+        REQUIRE(result.final[s].instances[i] == kNoInstance);
+        REQUIRE(result.final[s].beliefs[i] == 0.0F);
+      } else {
+        good.push_back(result.final[s].labels[i]);
+      }
+    }
+    REQUIRE((good == clean.final[s].labels));
+  }
+}
+
+TEST_CASE("any cloud can come between good ones") {
+  struct Case {
+    const char* name;
+    std::vector<Eigen::Vector3f> points;
+  };
+  Random random(1);
+  std::vector<Case> cases = {
+      {"no point", {}},
+      {"one point", {{10.0F, 1.0F, 0.0F}}},
+      {"one point that is none", {Eigen::Vector3f::Constant(std::nanf(""))}},
+      {"nothing but NaN",
+       std::vector<Eigen::Vector3f>(1000, Eigen::Vector3f::Constant(std::nanf("")))},
+      {"nothing but zeros", std::vector<Eigen::Vector3f>(1000, Eigen::Vector3f::Zero())},
+      {"equal points", std::vector<Eigen::Vector3f>(20000, Eigen::Vector3f(8.0F, 3.0F, 0.5F))},
+      {"equal points on the floor",
+       std::vector<Eigen::Vector3f>(20000, Eigen::Vector3f(8.0F, 3.0F, -1.7F))},
+      {"500,000 points", {}},
+      {"a vertical line", {}},
+  };
+  for (int i = 0; i < 500000; ++i) {
+    cases[7].points.emplace_back(random.uniform_float(-60, 60), random.uniform_float(-60, 60),
+                                 random.uniform_float(-2, 5));
+  }
+  for (int i = 0; i < 2000; ++i) {
+    cases[8].points.emplace_back(5.0F, 5.0F, random.uniform_float(-200, 200));
+  }
+  const std::vector<Scan> scans = good_scans();
+  const Run expected = run_paper(scans);
+  for (const Case& c : cases) {
+    INFO(c.name);
+    DynaInsRemover remover(Config::paper());
+    // Strange clouds first, as many as a window holds, then good ones behind a pause.
+    for (int i = 0; i < 5; ++i) {
+      const FrameResult frame = remover.push(c.points, sensor_at(0.0), -100.0 + 0.1 * i);
+      REQUIRE(frame.newest.labels.size() == c.points.size());
+    }
+    for (std::size_t s = 0; s < scans.size(); ++s) {
+      const FrameResult frame =
+          remover.push(scans[s].points, scans[s].T_world_sensor, scans[s].time);
+      REQUIRE(std::vector<PointLabel>(frame.newest.labels.begin(), frame.newest.labels.end()) ==
+              expected.newest[s].labels);
+    }
+    // And one in the middle of a window.
+    remover.push(c.points, sensor_at(3.0), 50.0);
+    remover.push(scans[0].points, scans[0].T_world_sensor, 50.1);
+    std::size_t finished = 0;
+    remover.flush([&](const ScanVerdict&) { ++finished; });
+    REQUIRE(finished == remover.latency());
+  }
+}
+
+TEST_CASE("a pose that jumps away and back leaves no trace once it is out of the window") {
+  const std::vector<Scan> scans = drive(yard_with(van(22.0, 3.5, {-12.0, 0.0, 0.0})), 9, 0.0);
+  const Run expected = run_paper(scans);
+  DynaInsRemover remover(Config::paper());
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    Eigen::Isometry3d T = scans[s].T_world_sensor;
+    if (s == 2) T.translation() += Eigen::Vector3d(1e6, -3e5, 20.0);
+    const FrameResult frame = remover.push(scans[s].points, T, scans[s].time);
+    if (s >= 6) REQUIRE((Verdict(frame.newest).labels == expected.newest[s].labels));
+  }
+}
+
+}  // namespace
+}  // namespace dynains::test

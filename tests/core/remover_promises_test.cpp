@@ -1,0 +1,407 @@
+// What the facade promises, on scenes in which the right answer is obvious.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <set>
+#include <thread>
+#include <vector>
+
+#include "dynains/dyna_ins_remover.hpp"
+#include "support/catch.hpp"
+#include "support/runs.hpp"
+#include "support/scene.hpp"
+
+namespace dynains::test {
+namespace {
+
+using Config = DynaInsRemover::Config;
+
+// An oncoming van: 22 m ahead at first, 12 m/s.
+Scene oncoming() { return yard_with(van(22.0, 3.5, {-12.0, 0.0, 0.0})); }
+
+// Numbers of the dynamic points of one verdict.
+std::vector<std::size_t> dynamic_points(const Verdict& verdict) {
+  std::vector<std::size_t> result;
+  for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
+    if (verdict.labels[i] == PointLabel::kDynamic) result.push_back(i);
+  }
+  return result;
+}
+
+bool is_subset(const Verdict& a, const Verdict& b) {
+  const auto inner = dynamic_points(a);
+  const auto outer = dynamic_points(b);
+  return std::includes(outer.begin(), outer.end(), inner.begin(), inner.end());
+}
+
+std::size_t dynamic_count(const std::vector<Verdict>& verdicts) {
+  std::size_t result = 0;
+  for (const Verdict& verdict : verdicts) result += dynamic_points(verdict).size();
+  return result;
+}
+
+TEST_CASE("in a static scene at most 0.1 % is removed, moving or not, whatever the heading") {
+  const Config config = GENERATE(Config::paper(), Config());
+  const double speed = GENERATE(0.0, 5.0, 8.0);
+  const double yaw = GENERATE(0.0, 0.7, 3.1);
+  const std::vector<Scan> scans = drive(yard(), 12, speed, yaw);
+  INFO("speed " << speed << " m/s, yaw " << yaw);
+  CHECK(share(scans, run(config, scans).final, PointLabel::kDynamic).value() < 1e-3);
+}
+
+TEST_CASE("a moving van is removed, and what stands around it stays") {
+  const Config config = GENERATE(Config::paper(), Config());
+  const double speed = GENERATE(0.0, 5.0);
+  const double yaw = GENERATE(0.0, 0.7, 1.6, 3.1);  // across the azimuth seam too
+  const std::vector<Scan> scans = drive(oncoming(), 10, speed, yaw);
+  const std::vector<Verdict> verdicts = run(config, scans).final;
+  INFO("speed " << speed << " m/s, yaw " << yaw);
+  const Share moving = share(scans, verdicts, PointLabel::kDynamic, kAddedBox);
+  REQUIRE(moving.total > 5000);
+  CHECK(moving.value() > 0.9);
+  CHECK(share(scans, verdicts, PointLabel::kStatic, kAddedBox).value() < 0.02);
+  const Share all = share(scans, verdicts, PointLabel::kDynamic);
+  CHECK(all.labelled - moving.labelled < all.total / 200);
+}
+
+TEST_CASE("a van passes under a bridge: the van goes, the bridge stays") {
+  const Config config = GENERATE(Config::paper(), Config());
+  const double yaw = GENERATE(0.0, 0.7, 3.1);
+  Scene scene = oncoming();
+  scene.boxes.push_back({{14.0, -12.0, 4.2}, {18.0, 12.0, 5.2}});
+  const std::vector<Scan> scans = drive(scene, 10, 0.0, yaw);
+  const std::vector<Verdict> verdicts = run(config, scans).final;
+  CHECK(share(scans, verdicts, PointLabel::kDynamic, kAddedBox).value() > 0.9);
+  const Share bridge = share(scans, verdicts, PointLabel::kDynamic, kAddedBox + 1);
+  REQUIRE(bridge.total > 10000);
+  CHECK(bridge.value() < 0.01);
+}
+
+TEST_CASE("every scan gets one final verdict, in order, with one label per point") {
+  const int window = GENERATE(2, 4, 7);
+  const int votes = GENERATE(0, 1, 2);
+  Config config = Config::paper();
+  config.window = window;
+  config.votes = votes;
+  const std::vector<Scan> scans = drive(oncoming(), 9, 5.0);
+  DynaInsRemover remover(config);
+  CHECK(remover.latency() == (votes == 0 ? 0U : static_cast<std::size_t>(window) - 1U));
+  std::uint64_t next = 0;
+  const auto check = [&](const ScanVerdict& verdict) {
+    REQUIRE(verdict.scan == next);
+    const Scan& scan = scans[verdict.scan];
+    CHECK(verdict.time == scan.time);
+    CHECK(verdict.T_world_sensor.isApprox(scan.T_world_sensor));
+    CHECK(verdict.labels.size() == scan.points.size());
+    CHECK(verdict.instances.size() == scan.points.size());
+    CHECK(verdict.beliefs.size() == scan.points.size());
+    for (std::size_t i = 0; i < scan.points.size(); ++i) {
+      const bool is_near = std::hypot(scan.points[i].x(), scan.points[i].y()) < config.min_range;
+      REQUIRE((verdict.labels[i] == PointLabel::kOutOfRange) == is_near);
+      REQUIRE(verdict.labels[i] != PointLabel::kInvalid);
+      REQUIRE((verdict.beliefs[i] >= 0.0F && verdict.beliefs[i] <= 1.0F));
+    }
+    ++next;
+  };
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    const FrameResult frame =
+        remover.push(scans[i].points, scans[i].T_world_sensor, scans[i].time);
+    CHECK(frame.newest.scan == i);
+    CHECK(frame.newest.labels.size() == scans[i].points.size());
+    CHECK(frame.finished.has_value() == (i >= remover.latency()));
+    if (frame.finished) check(*frame.finished);
+  }
+  remover.flush(check);
+  CHECK(next == scans.size());
+  remover.flush([](const ScanVerdict&) { FAIL("a second flush has nothing to tell"); });
+}
+
+TEST_CASE("the map is exactly the points with a static final label, each once") {
+  const Config paper = GENERATE(Config::paper(), Config());
+  Config config = paper;
+  config.map.map_voxel = 0.0;
+  const std::vector<Scan> scans = drive(oncoming(), 7, 5.0, 0.4);
+  DynaInsRemover remover(config);
+  const Run result = run(remover, scans);
+  // Measured points by whole centimetres; each map point uses up the nearest.
+  using Key = std::array<long, 3>;
+  const auto key = [](const Eigen::Vector3d& p) {
+    return Key{std::lround(p.x() * 100.0), std::lround(p.y() * 100.0), std::lround(p.z() * 100.0)};
+  };
+  std::map<Key, std::vector<Eigen::Vector3d>> open;
+  std::size_t expected = 0;
+  for (const Verdict& verdict : result.final) {
+    const Scan& scan = scans[verdict.scan];
+    for (std::size_t i = 0; i < scan.points.size(); ++i) {
+      if (!is_static(verdict.labels[i])) continue;
+      const Eigen::Vector3d p = scan.T_world_sensor * scan.points[i].cast<double>();
+      open[key(p)].push_back(p);
+      ++expected;
+    }
+  }
+  REQUIRE(remover.map().size() == expected);
+  std::size_t unexplained = 0;
+  remover.map().for_each([&](const Eigen::Vector3d& p) {
+    Eigen::Vector3d* nearest = nullptr;
+    const Key k = key(p);
+    for (long dx = -1; dx <= 1; ++dx) {
+      for (long dy = -1; dy <= 1; ++dy) {
+        for (long dz = -1; dz <= 1; ++dz) {
+          const auto found = open.find({k[0] + dx, k[1] + dy, k[2] + dz});
+          if (found == open.end()) continue;
+          for (Eigen::Vector3d& q : found->second) {
+            if (nearest == nullptr || (q - p).norm() < (*nearest - p).norm()) nearest = &q;
+          }
+        }
+      }
+    }
+    if (nearest == nullptr || (*nearest - p).norm() > 1e-4) {
+      ++unexplained;
+    } else {
+      nearest->setConstant(1e9);  // used up
+    }
+  });
+  CHECK(unexplained == 0);
+}
+
+TEST_CASE("no point is on the map before its verdict is final, all are after flush") {
+  Config config = Config::paper();
+  config.map.map_voxel = 0.0;
+  const std::vector<Scan> scans = drive(yard(), 6, 0.0);
+  DynaInsRemover remover(config);
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    remover.push(scans[i].points, scans[i].T_world_sensor, scans[i].time);
+    CHECK(remover.map().empty() == (i < 3));
+  }
+  const std::size_t before = remover.map().size();
+  remover.flush([](const ScanVerdict&) {});
+  CHECK(remover.map().size() > before);
+}
+
+TEST_CASE("without a map the labels are the same") {
+  Config config = Config::paper();
+  const std::vector<Scan> scans = drive(oncoming(), 6, 0.0);
+  const Run with_map = run(config, scans);
+  config.build_map = false;
+  DynaInsRemover remover(config);
+  CHECK((run(remover, scans).final == with_map.final));
+  CHECK(remover.map().empty());
+}
+
+TEST_CASE("the first scan alone shows nothing to be dynamic; two scans do") {
+  const std::vector<Scan> scans = drive(oncoming(), 2, 0.0);
+  const Run result = run_paper(scans);
+  CHECK(dynamic_points(result.newest[0]).empty());
+  CHECK(share(scans, {result.newest[1]}, PointLabel::kDynamic, kAddedBox).value() > 0.5);
+  CHECK(dynamic_count(run_paper({scans[0]}).final) == 0);
+}
+
+TEST_CASE("what only one scan saw is static: nothing shows that it moved") {
+  std::vector<Scan> scans = drive(yard(), 9, 0.0);
+  scans[4] = yard_with(van(12.0, 3.0)).scan(sensor_at(0.0), scans[4].time);
+  const Run result = run_paper(scans);
+  REQUIRE(share({scans}, {result.final[4]}, PointLabel::kStatic, kAddedBox).total > 500);
+  CHECK(share({scans}, {result.final[4]}, PointLabel::kDynamic, kAddedBox).labelled == 0);
+}
+
+TEST_CASE("labels do not depend on where in the world the street is") {
+  const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
+  const std::vector<Verdict> here = run_paper(scans).final;
+  const Eigen::Vector3d offset = GENERATE(values<Eigen::Vector3d>(
+      {{3.0, -2.0, 1.0}, {412345.678, 5654321.987, 312.5}, {-1e6, 1e6, 1e3}}));
+  const Eigen::AngleAxisd turn(GENERATE(0.0, 1.234), Eigen::Vector3d(0.1, -0.2, 1.0).normalized());
+  const Eigen::Isometry3d T_there_here = Eigen::Translation3d(offset) * turn;
+  std::vector<Scan> moved = scans;
+  for (Scan& scan : moved) scan.T_world_sensor = T_there_here * scan.T_world_sensor;
+  // A pose product in double is right to about 1e-10 m: only points on a border may change sides.
+  CHECK(disagreement(run_paper(moved).final, here) < 1e-3);
+}
+
+TEST_CASE("labels do not depend on the order of the points") {
+  std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
+  const std::vector<Verdict> ordered = run_paper(scans).final;
+  std::vector<std::vector<std::size_t>> orders;
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    orders.push_back(Random(s + 1).permutation(scans[s].points.size()));
+    const std::vector<Eigen::Vector3f> points = scans[s].points;
+    for (std::size_t i = 0; i < points.size(); ++i) scans[s].points[i] = points[orders[s][i]];
+  }
+  std::vector<Verdict> shuffled = run_paper(scans).final;
+  for (std::size_t s = 0; s < shuffled.size(); ++s) {
+    const std::vector<PointLabel> labels = shuffled[s].labels;
+    for (std::size_t i = 0; i < labels.size(); ++i) shuffled[s].labels[orders[s][i]] = labels[i];
+  }
+  CHECK(disagreement(shuffled, ordered) < 1e-3);
+}
+
+TEST_CASE("the same input gives the same bits, also side by side in two threads") {
+  const Config config = GENERATE(Config::paper(), Config());
+  const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
+  const Run expected = run(config, scans);
+  Run a, b;
+  std::thread first([&] { a = run(config, scans); });
+  std::thread second([&] { b = run(config, scans); });
+  first.join();
+  second.join();
+  CHECK((a.final == expected.final));
+  CHECK((b.final == expected.final));
+  CHECK((a.newest == expected.newest));
+  CHECK((b.newest == expected.newest));
+}
+
+TEST_CASE("after reset a remover is as good as new") {
+  const Config config = GENERATE(Config::paper(), Config());
+  const std::vector<Scan> scans = drive(oncoming(), 6, 5.0);
+  DynaInsRemover remover(config);
+  const Run first = run(remover, scans);
+  const std::size_t map_size = remover.map().size();
+  remover.reset();
+  CHECK(remover.map().empty());
+  const Run second = run(remover, scans);
+  CHECK((second.final == first.final));
+  CHECK(remover.map().size() == map_size);
+}
+
+TEST_CASE("instance ids stay with an object and are never shared") {
+  const std::vector<Scan> scans = drive(oncoming(), 10, 5.0);
+  const Run result = run_paper(scans);
+  std::set<std::uint32_t> ids_of_van;
+  for (std::size_t s = 1; s < scans.size(); ++s) {
+    // Most frequent id of each object in this scan.
+    std::map<int, std::map<std::uint32_t, int>> votes;
+    for (std::size_t i = 0; i < scans[s].points.size(); ++i) {
+      const std::uint32_t id = result.newest[s].instances[i];
+      const bool is_ground = result.newest[s].labels[i] == PointLabel::kGround;
+      if (is_ground) REQUIRE(id == kNoInstance);
+      if (scans[s].object[i] != kGroundObject && !is_ground) ++votes[scans[s].object[i]][id];
+    }
+    std::set<std::uint32_t> ids;
+    for (const auto& [object, counts] : votes) {
+      const auto most = std::max_element(
+          counts.begin(), counts.end(),
+          [](const auto& a, const auto& b) { return a.second < b.second; });
+      CHECK(most->first != kNoInstance);
+      CHECK(ids.insert(most->first).second);
+      if (object == kAddedBox) ids_of_van.insert(most->first);
+    }
+  }
+  CHECK(ids_of_van.size() == 1);
+}
+
+TEST_CASE("votes: the more windows must agree, the less is removed") {
+  const std::vector<Scan> scans = drive(oncoming(), 10, 5.0);
+  Config config = Config::paper();
+  config.votes = 0;
+  const Run newest_alone = run(config, scans);
+  CHECK((newest_alone.final == newest_alone.newest));  // no latency: said once and for all
+  std::vector<Verdict> looser;
+  for (int votes = 1; votes <= config.window; ++votes) {
+    config.votes = votes;
+    const Run result = run(config, scans);
+    INFO(votes << " votes");
+    for (std::size_t s = 0; s < scans.size(); ++s) {
+      CHECK(result.newest[s].labels == newest_alone.newest[s].labels);
+      if (votes == 1) CHECK(is_subset(result.newest[s], result.final[s]));
+      if (votes > 1) CHECK(is_subset(result.final[s], looser[s]));
+    }
+    if (votes > 1) CHECK(dynamic_count(result.final) < dynamic_count(looser));
+    looser = result.final;
+  }
+  // The first and the last scan lie in fewer than K windows that compare: four votes never come.
+  CHECK(dynamic_points(looser.front()).empty());
+  CHECK(dynamic_points(looser.back()).empty());
+}
+
+TEST_CASE("without belief every proposal is a verdict; belief only takes proposals back") {
+  const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
+  Config config = Config::paper();
+  config.belief.tau_p = 0.95;
+  const Run with_belief = run(config, scans);
+  config.use_belief = false;
+  const Run proposals = run(config, scans);
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    CHECK(is_subset(with_belief.final[s], proposals.final[s]));
+    for (std::size_t i = 0; i < scans[s].points.size(); ++i) {
+      const bool dynamic = proposals.final[s].labels[i] == PointLabel::kDynamic;
+      REQUIRE(proposals.final[s].beliefs[i] == (dynamic ? 1.0F : 0.0F));
+      const float belief = with_belief.final[s].beliefs[i];
+      REQUIRE((with_belief.final[s].labels[i] == PointLabel::kDynamic) == (belief > 0.95F));
+    }
+  }
+  CHECK(dynamic_count(with_belief.final) < dynamic_count(proposals.final));
+}
+
+// Labels as known at once, from scan `first` on.
+std::vector<std::vector<PointLabel>> newest_labels(const Run& result, std::size_t first) {
+  std::vector<std::vector<PointLabel>> labels;
+  for (std::size_t s = first; s < result.newest.size(); ++s) {
+    labels.push_back(result.newest[s].labels);
+  }
+  return labels;
+}
+
+TEST_CASE("a pause longer than max_gap starts a new window, one of just max_gap does not") {
+  Config config = Config::paper();
+  config.max_gap = 2.0;
+  std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
+  const auto with_gap = [&](double gap) {
+    std::vector<Scan> paused = scans;
+    for (std::size_t i = 0; i < paused.size(); ++i) {
+      paused[i].time = 0.125 * static_cast<double>(i) + (i < 4 ? 0.0 : gap - 0.125);
+    }
+    return run(config, paused);
+  };
+  const Run whole = run(config, scans);
+  CHECK((newest_labels(with_gap(2.0), 0) == newest_labels(whole, 0)));
+
+  const Run broken = with_gap(2.125);
+  const Run second_half = run(config, {scans.begin() + 4, scans.end()});
+  CHECK((newest_labels(broken, 4) == newest_labels(second_half, 0)));
+  CHECK((newest_labels(broken, 4) != newest_labels(whole, 4)));
+  CHECK(broken.final.size() == scans.size());
+}
+
+TEST_CASE("flush in the middle finishes what is open, and the next scan starts a new window") {
+  const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
+  const std::vector<Scan> first(scans.begin(), scans.begin() + 4);
+  const std::vector<Scan> second(scans.begin() + 4, scans.end());
+  DynaInsRemover remover(Config::paper());
+  const Run a = run(remover, first);
+  const Run b = run(remover, second);
+  CHECK((a.final == run_paper(first).final));
+  CHECK((newest_labels(b, 0) == newest_labels(run_paper(second), 0)));
+  REQUIRE(b.final.size() == 4);
+  CHECK(b.final[0].scan == 4);
+}
+
+TEST_CASE("both sides of min_range and max_range, horizontally") {
+  Config config = Config::paper();
+  config.min_range = 3.0;
+  config.max_range = 50.0;
+  DynaInsRemover remover(config);
+  const std::vector<Eigen::Vector3f> points = {
+      {2.999F, 0.0F, 1.0F}, {3.0F, 0.0F, 1.0F}, {0.0F, -50.0F, 1.0F}, {0.0F, -50.01F, 1.0F},
+      {0.0F, 0.0F, 5.0F},   {2.0F, 2.3F, 40.0F}};
+  const FrameResult frame = remover.push(points, Eigen::Isometry3d::Identity());
+  using L = PointLabel;
+  CHECK((std::vector<L>(frame.newest.labels.begin(), frame.newest.labels.end()) ==
+         std::vector<L>{L::kOutOfRange, L::kStatic, L::kStatic, L::kOutOfRange, L::kOutOfRange,
+                        L::kStatic}));
+}
+
+TEST_CASE("times of the stages add up to the total") {
+  DynaInsRemover remover(Config::paper());
+  const Scan scan = yard().scan(sensor_at(0.0), 0.0);
+  const StageTimes times = remover.push(scan.points, scan.T_world_sensor).times;
+  double sum = 0.0;
+  StageTimes::visit(times, [&](const char*, double milliseconds) {
+    CHECK(milliseconds >= 0.0);
+    sum += milliseconds;
+  });
+  CHECK(times.total() == Approx(sum));
+  CHECK(times.ground > 0.0);
+}
+
+}  // namespace
+}  // namespace dynains::test
