@@ -120,9 +120,9 @@ void BeamTable::fill(const SensorModel& model, std::uint64_t seed, std::size_t s
         const double azimuth = kPi - step * (i + phase) + turn;
         const double x = cosines[k] * cos_turn - sines[k] * sin_turn;
         const double y = sines[k] * cos_turn + cosines[k] * sin_turn;
-        unordered_.push_back({static_cast<float>(c * x), static_cast<float>(c * y),
-                              static_cast<float>(s)});
-        const double wrapped = azimuth < -kPi ? azimuth + 2 * kPi
+        unordered_.push_back(
+            {static_cast<float>(c * x), static_cast<float>(c * y), static_cast<float>(s)});
+        const double wrapped = azimuth < -kPi   ? azimuth + 2 * kPi
                                : azimuth >= kPi ? azimuth - 2 * kPi
                                                 : azimuth;
         cells_.push_back(static_cast<std::uint32_t>(row * kColumns + column_of(wrapped)));

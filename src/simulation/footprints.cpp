@@ -25,7 +25,7 @@ bool axes_overlap(const Footprint& a, const Footprint& b) {
 double distance(const Footprint& footprint, Vec2 p) {
   const Vec2 q = local(footprint, p);
   return norm(Vec2{std::max(std::abs(q.x) - footprint.half_length, 0.0),
-               std::max(std::abs(q.y) - footprint.half_width, 0.0)});
+                   std::max(std::abs(q.y) - footprint.half_width, 0.0)});
 }
 
 bool overlap(const Footprint& a, const Footprint& b) {

@@ -17,13 +17,11 @@ Vec3 vec(double x, double y, double z) {
 /// Corner-to-corner box in the axes of the model.
 Primitive block(const Material& material, double x0, double x1, double y0, double y1, double z0,
                 double z1) {
-  return make_primitive(Shape::kBox, material,
-                        vec((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2),
+  return make_primitive(Shape::kBox, material, vec((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2),
                         vec((x1 - x0) / 2, (y1 - y0) / 2, (z1 - z0) / 2));
 }
 
-Primitive post(const Material& material, double x, double y, double z0, double z1,
-               double radius) {
+Primitive post(const Material& material, double x, double y, double z0, double z1, double radius) {
   return make_primitive(Shape::kCylinder, material, vec(x, y, (z0 + z1) / 2),
                         vec(radius, radius, (z1 - z0) / 2));
 }
@@ -34,8 +32,8 @@ Primitive ball(const Material& material, double x, double y, double z, double rx
 }
 
 /// A limb that hangs from (x, y, z), turned by `swing` about the y axis.
-Primitive limb(const Material& material, double x, double y, double z, double length,
-               double radius, double swing) {
+Primitive limb(const Material& material, double x, double y, double z, double length, double radius,
+               double swing) {
   return ball(material, x - 0.5 * length * std::sin(swing), y, z - 0.5 * length * std::cos(swing),
               radius, radius, 0.54 * length, rotation_y(swing));
 }
@@ -55,24 +53,34 @@ void add_wheels(Model& model, double front, double rear, double width, double ra
 
 std::uint16_t resting_label(Kind kind) {
   switch (kind) {
-    case Kind::kTruck: return semantic::kTruck;
-    case Kind::kBus: return semantic::kBus;
-    case Kind::kPedestrian: return semantic::kPerson;
-    case Kind::kCyclist: return semantic::kBicyclist;
+    case Kind::kTruck:
+      return semantic::kTruck;
+    case Kind::kBus:
+      return semantic::kBus;
+    case Kind::kPedestrian:
+      return semantic::kPerson;
+    case Kind::kCyclist:
+      return semantic::kBicyclist;
     case Kind::kCar:
-    case Kind::kVan: break;
+    case Kind::kVan:
+      break;
   }
   return semantic::kCar;
 }
 
 std::uint16_t moving_label(Kind kind) {
   switch (kind) {
-    case Kind::kTruck: return semantic::kMovingTruck;
-    case Kind::kBus: return semantic::kMovingBus;
-    case Kind::kPedestrian: return semantic::kMovingPerson;
-    case Kind::kCyclist: return semantic::kMovingBicyclist;
+    case Kind::kTruck:
+      return semantic::kMovingTruck;
+    case Kind::kBus:
+      return semantic::kMovingBus;
+    case Kind::kPedestrian:
+      return semantic::kMovingPerson;
+    case Kind::kCyclist:
+      return semantic::kMovingBicyclist;
     case Kind::kCar:
-    case Kind::kVan: break;
+    case Kind::kVan:
+      break;
   }
   return semantic::kMovingCar;
 }
@@ -80,12 +88,18 @@ std::uint16_t moving_label(Kind kind) {
 Size random_size(Kind kind, Random& random) {
   const double a = random.unit(), b = random.unit(), c = random.unit();
   switch (kind) {
-    case Kind::kCar: return {3.6 + 1.2 * a, 1.65 + 0.2 * b, 1.4 + 0.3 * c};
-    case Kind::kVan: return {4.8 + 1.4 * a, 1.9 + 0.15 * b, 2.0 + 0.6 * c};
-    case Kind::kTruck: return {7 + 8 * a, 2.4 + 0.15 * b, 3.1 + 0.7 * c};
-    case Kind::kBus: return {10.5 + 2 * a, 2.5, 3.0 + 0.2 * c};
-    case Kind::kPedestrian: return {0.5, 0.5 + 0.15 * b, 1.5 + 0.4 * c};
-    case Kind::kCyclist: return {1.75, 0.6, 1.65 + 0.2 * c};
+    case Kind::kCar:
+      return {3.6 + 1.2 * a, 1.65 + 0.2 * b, 1.4 + 0.3 * c};
+    case Kind::kVan:
+      return {4.8 + 1.4 * a, 1.9 + 0.15 * b, 2.0 + 0.6 * c};
+    case Kind::kTruck:
+      return {7 + 8 * a, 2.4 + 0.15 * b, 3.1 + 0.7 * c};
+    case Kind::kBus:
+      return {10.5 + 2 * a, 2.5, 3.0 + 0.2 * c};
+    case Kind::kPedestrian:
+      return {0.5, 0.5 + 0.15 * b, 1.5 + 0.4 * c};
+    case Kind::kCyclist:
+      return {1.75, 0.6, 1.65 + 0.2 * c};
   }
   return {};
 }
@@ -104,8 +118,8 @@ Model vehicle_model(Kind kind, const Size& size, Random& random) {
     model.push_back(make_tapered_box(
         materials::kGlass, vec((cabin_rear + cabin_front) / 2, 0, (belt + h - 0.06) / 2),
         vec((cabin_front - cabin_rear) / 2, w - 0.06, (h - 0.06 - belt) / 2), 0.42F, 0.14F));
-    model.push_back(block(paint, cabin_rear + 0.42, cabin_front - 0.42, -w + 0.2, w - 0.2,
-                          h - 0.07, h));
+    model.push_back(
+        block(paint, cabin_rear + 0.42, cabin_front - 0.42, -w + 0.2, w - 0.2, h - 0.07, h));
     // Roof pillars stop the glass from being all there is.
     for (const double side : {-1.0, 1.0}) {
       model.push_back(block(paint, cabin_rear + 0.25, cabin_rear + 0.55, side * (w - 0.14) - 0.04,
@@ -118,16 +132,16 @@ Model vehicle_model(Kind kind, const Size& size, Random& random) {
     add_wheels(model, 0.62 * l, -0.62 * l, size.width, 0.31);
   } else if (kind == Kind::kVan) {
     model.push_back(block(paint, -l, 0.55 * l, -w, w, 0.3, h));
-    model.push_back(make_tapered_box(paint, vec(0.75 * l, 0, 0.75), vec(0.25 * l, w, 0.45), 0.05F,
-                                     0.03F));
+    model.push_back(
+        make_tapered_box(paint, vec(0.75 * l, 0, 0.75), vec(0.25 * l, w, 0.45), 0.05F, 0.03F));
     model.push_back(make_tapered_box(materials::kGlass, vec(0.62 * l, 0, (1.2 + h) / 2),
                                      vec(0.2 * l, w - 0.03, (h - 1.2) / 2), 0.3F, 0.08F));
     add_wheels(model, 0.6 * l, -0.6 * l, size.width, 0.34);
   } else if (kind == Kind::kTruck) {
     const double cab = l - 2.0;
     model.push_back(block(paint, cab + 0.2, l, -w, w, 0.6, 0.62 * h));
-    model.push_back(block(materials::kGlass, l - 0.15, l + 0.01, -w + 0.15, w - 0.15, 0.62 * h,
-                          0.82 * h));
+    model.push_back(
+        block(materials::kGlass, l - 0.15, l + 0.01, -w + 0.15, w - 0.15, 0.62 * h, 0.82 * h));
     model.push_back(block(paint, cab + 0.2, l - 0.1, -w, w, 0.62 * h, 0.88 * h));
     if (shape < 0.75) {
       model.push_back(block(materials::kBrightPaint, -l, cab, -w, w, 1.1, h));
@@ -168,7 +182,8 @@ Model pedestrian_model(const Size& size, std::uint64_t seed, double phase, doubl
   model.push_back(limb(top, 0, w * 0.85, shoulder, 0.36 * h, 0.055, -0.8 * swing));
   model.push_back(limb(top, 0, -w * 0.85, shoulder, 0.36 * h, 0.055, 0.8 * swing));
   model.push_back(ball(materials::kSkin, 0.02, 0, 0.93 * h, 0.1, 0.085, 0.075 * h));
-  if (bag) model.push_back(block(materials::kDarkCloth, -0.3, -0.12, -0.15, 0.15, 0.55 * h, 0.8 * h));
+  if (bag)
+    model.push_back(block(materials::kDarkCloth, -0.3, -0.12, -0.15, 0.15, 0.55 * h, 0.8 * h));
   return model;
 }
 
@@ -197,10 +212,9 @@ Model tree_model(double height, double crown_radius, double clear_height, Random
   Model model;
   const double trunk = 0.08 + 0.018 * height * random.uniform(0.7, 1.3);
   const double lean = random.uniform(-0.04, 0.04);
-  model.push_back(make_primitive(Shape::kCylinder, materials::kTreeTrunk,
-                                 vec(0, 0, 0.5 * (clear_height + 1) - 0.3),
-                                 vec(trunk, trunk, 0.5 * (clear_height + 1) + 0.3),
-                                 rotation_y(lean)));
+  model.push_back(make_primitive(
+      Shape::kCylinder, materials::kTreeTrunk, vec(0, 0, 0.5 * (clear_height + 1) - 0.3),
+      vec(trunk, trunk, 0.5 * (clear_height + 1) + 0.3), rotation_y(lean)));
   const double middle = 0.5 * (clear_height + height);
   const double half = 0.5 * (height - clear_height);
   // Limbs inside the crown.
@@ -237,8 +251,8 @@ Model bush_model(double radius, double height, Random& random) {
   for (int i = 0; i < parts; ++i) {
     const double heading = random.uniform(0, 2 * kPi), out = radius * random.uniform(0.1, 0.5);
     const double r = radius * random.uniform(0.5, 0.8), h = height * random.uniform(0.35, 0.55);
-    model.push_back(ball(materials::kBush, out * std::cos(heading), out * std::sin(heading), h, r,
-                         r, h));
+    model.push_back(
+        ball(materials::kBush, out * std::cos(heading), out * std::sin(heading), h, r, r, h));
   }
   return model;
 }
@@ -253,8 +267,8 @@ Model pole_model(double height, bool lamp, bool sign, Random& random) {
   }
   if (sign) {
     const double half = random.uniform(0.25, 0.4);
-    model.push_back(block(materials::kSignPlate, -0.08, -0.05, -half, half, height - 2 * half,
-                          height));
+    model.push_back(
+        block(materials::kSignPlate, -0.08, -0.05, -half, half, height - 2 * half, height));
   }
   return model;
 }
@@ -263,8 +277,8 @@ Model building_model(double length, double depth, double height, Random& random)
   Model model;
   const double l = length / 2;
   const bool windows = random.chance(0.85);
-  model.push_back(block(windows ? materials::kFacade : materials::kWall, -l, l, 0, depth, -1.0,
-                        height));
+  model.push_back(
+      block(windows ? materials::kFacade : materials::kWall, -l, l, 0, depth, -1.0, height));
   if (random.chance(0.5)) {
     model.push_back(make_tapered_box(materials::kRoof, vec(0, depth / 2, height + 1.5),
                                      vec(l + 0.2, depth / 2 + 0.3, 1.5), 0.3F,
@@ -279,7 +293,8 @@ Model building_model(double length, double depth, double height, Random& random)
   if (random.chance(0.35)) {
     const double x = random.uniform(-l + 1.5, std::max(l - 1.5, -l + 1.6));
     for (int i = 1; i < floors; ++i) {
-      model.push_back(block(materials::kConcrete, x - 1.3, x + 1.3, -1.0, 0, 3.0 * i, 3.0 * i + 0.2));
+      model.push_back(
+          block(materials::kConcrete, x - 1.3, x + 1.3, -1.0, 0, 3.0 * i, 3.0 * i + 0.2));
       model.push_back(block(materials::kWireFence, x - 1.3, x + 1.3, -1.0, -0.95, 3.0 * i + 0.2,
                             3.0 * i + 1.1));
     }
@@ -330,8 +345,8 @@ Model bridge_model(double span, double width, double clearance) {
   for (const double side : {-1.0, 1.0}) {
     model.push_back(block(materials::kConcrete, side * w - 0.15, side * w + 0.15, -s - 12, s + 12,
                           clearance + 1, clearance + 2));
-    model.push_back(block(materials::kConcrete, -w, w, side * (s + 6) - 6, side * (s + 6) + 6, -1,
-                          clearance));
+    model.push_back(
+        block(materials::kConcrete, -w, w, side * (s + 6) - 6, side * (s + 6) + 6, -1, clearance));
   }
   return model;
 }

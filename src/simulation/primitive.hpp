@@ -10,20 +10,20 @@ namespace dynains::simulation {
 
 /// Unit shapes, all within [-1, 1]^3.
 enum class Shape : std::uint8_t {
-  kBox,        ///< the whole cube
+  kBox,         ///< the whole cube
   kTaperedBox,  ///< a box whose sides lean inwards towards the top
-  kCylinder,   ///< x^2 + y^2 <= 1, |z| <= 1
-  kEllipsoid,  ///< the unit ball
+  kCylinder,    ///< x^2 + y^2 <= 1, |z| <= 1
+  kEllipsoid,   ///< the unit ball
 };
 
 /// How a surface answers to light. Constants live in materials.hpp.
 struct Material {
-  std::uint16_t label = 0;     ///< SemanticKITTI class if the object has none of its own
-  float reflectivity = 0.3F;   ///< intensity at perpendicular incidence, [0, 1]
-  float loss = 0.0F;           ///< share of beams without a return
-  float density = 0.0F;        ///< 1/m; above 0 the shape is porous: beams end inside at random
-  float clump = 0.0F;          ///< m; size of lasting gaps in a porous shape, 0 for none
-  float roughness = 0.0F;      ///< m; extra range noise
+  std::uint16_t label = 0;      ///< SemanticKITTI class if the object has none of its own
+  float reflectivity = 0.3F;    ///< intensity at perpendicular incidence, [0, 1]
+  float loss = 0.0F;            ///< share of beams without a return
+  float density = 0.0F;         ///< 1/m; above 0 the shape is porous: beams end inside at random
+  float clump = 0.0F;           ///< m; size of lasting gaps in a porous shape, 0 for none
+  float roughness = 0.0F;       ///< m; extra range noise
   float window_spacing = 0.0F;  ///< m; above 0 the vertical faces carry recessed windows
 };
 
@@ -31,8 +31,8 @@ struct Primitive {
   Shape shape = Shape::kBox;
   const Material* material = nullptr;
   Vec3 centre;
-  Mat3 to_unit;    ///< p_unit = to_unit * (p - centre)
-  Mat3 from_unit;  ///< inverse of to_unit; columns are the half axes
+  Mat3 to_unit;                          ///< p_unit = to_unit * (p - centre)
+  Mat3 from_unit;                        ///< inverse of to_unit; columns are the half axes
   float taper_x = 0.0F, taper_y = 0.0F;  ///< tapered box: how far each side has moved at the top
 };
 

@@ -66,9 +66,9 @@ void look_through_window(const Primitive& primitive, std::uint64_t salt, Vec3 di
   if (part_u < 0.28F || part_u > 0.72F || part_v < 0.3F || part_v > 0.8F || up < 0.5F) return;
   const Vec3 normal = surface_normal(primitive, range * direction);
   const float cosine = std::max(0.05F, -dot(normal, direction));
-  const std::uint64_t room = mix(salt ^ mix(static_cast<std::uint64_t>(
-                                     static_cast<std::int64_t>(std::floor(u)) * 1009 +
-                                     static_cast<std::int64_t>(std::floor(v)))));
+  const std::uint64_t room =
+      mix(salt ^ mix(static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(u)) * 1009 +
+                                                static_cast<std::int64_t>(std::floor(v)))));
   const float which = unit_float(random);
   float deeper = 0.15F;
   if (which < 0.2F) {

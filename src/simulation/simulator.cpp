@@ -159,8 +159,8 @@ class Simulator::Implementation {
     const double roll = 0.004 * std::clamp(ego.speed * ego.turn_rate, -3.0, 3.0) +
                         sway * std::sin(2 * kPi * 0.93 * time + 1);
     const Eigen::Isometry3d T_ground_body = isometry(rotation(0, pitch, roll), 0, 0, 0);
-    const Eigen::Matrix3d tilt = rotation(0, config_.mounting_pitch * kPi / 180,
-                                          config_.mounting_roll * kPi / 180);
+    const Eigen::Matrix3d tilt =
+        rotation(0, config_.mounting_pitch * kPi / 180, config_.mounting_roll * kPi / 180);
     const Eigen::Isometry3d T_body_mount = isometry(tilt, 0, 0, model_.height);
     const Eigen::Isometry3d T_mount_sensor = isometry(rotation(model_.yaw, 0, 0), 0, 0, 0);
     return product(product(product(T_world_ground, T_ground_body), T_body_mount), T_mount_sensor);
@@ -183,19 +183,19 @@ class Simulator::Implementation {
     const Rigid turn{transposed(T_world_sensor.rotation), {}};
     const Vec3 origin = T_world_sensor.translation;
     const Vec2 centre{moment.T_world_sensor(0, 3), moment.T_world_sensor(1, 3)};
-    world_.statics.visit_near(
-        centre, model_.max_range, [&](const Primitive& primitive, std::uint64_t salt) {
-          // Subtract first: large coordinates must not cost precision.
-          Primitive near = primitive;
-          near.centre = near.centre - origin;
-          renderer_.add(transformed(turn, near), kNoObject, mix(salt, 1));
-        });
+    world_.statics.visit_near(centre, model_.max_range,
+                              [&](const Primitive& primitive, std::uint64_t salt) {
+                                // Subtract first: large coordinates must not cost precision.
+                                Primitive near = primitive;
+                                near.centre = near.centre - origin;
+                                renderer_.add(transformed(turn, near), kNoObject, mix(salt, 1));
+                              });
     for (const ObjectPose& pose : moment.objects) {
       const Object& object = world_.traffic.objects[pose.object];
       const bool person = object.kind == Kind::kPedestrian;
       const Eigen::Isometry3d T_world_object =
-          person ? isometry(rotation(pose.at.heading, 0, 0), pose.at.position.x,
-                            pose.at.position.y, world_.terrain.height(pose.at.position))
+          person ? isometry(rotation(pose.at.heading, 0, 0), pose.at.position.x, pose.at.position.y,
+                            world_.terrain.height(pose.at.position))
                  : stand_on(world_.terrain, pose.at, object.size.length, object.size.width);
       states.push_back({pose.object + 1, label_of(pose), T_world_object, pose.speed,
                         object.size.length, object.size.width, object.size.height});
@@ -215,8 +215,7 @@ class Simulator::Implementation {
     if (config_.ego_points) {
       renderer_.add(make_primitive(Shape::kBox, materials::kEgoRoof,
                                    {-0.6F, 0, -static_cast<float>(model_.height) + 0.75F},
-                                   {1.9F, 0.85F, 0.55F},
-                                   rotation_z(-model_.yaw)),
+                                   {1.9F, 0.85F, 0.55F}, rotation_z(-model_.yaw)),
                     kNoObject, 3);
     }
     renderer_.draw();

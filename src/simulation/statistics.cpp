@@ -13,9 +13,8 @@ constexpr int kCells = 256;  // of 1 m, around the sensor
 int cell_of(float x, float y) {
   const auto column = static_cast<int>(std::floor(x)) + kCells / 2;
   const auto row = static_cast<int>(std::floor(y)) + kCells / 2;
-  return column < 1 || row < 1 || column >= kCells - 1 || row >= kCells - 1
-             ? -1
-             : row * kCells + column;
+  return column < 1 || row < 1 || column >= kCells - 1 || row >= kCells - 1 ? -1
+                                                                            : row * kCells + column;
 }
 
 struct Car {

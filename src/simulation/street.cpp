@@ -52,8 +52,7 @@ double Route::nearest(Vec2 p) const {
   return arc_[best];
 }
 
-Route Route::shifted(double begin, double end,
-                     const std::function<double(double)>& lateral) const {
+Route Route::shifted(double begin, double end, const std::function<double(double)>& lateral) const {
   constexpr double kStep = 1.0;
   const auto count = static_cast<std::size_t>(std::max(1.0, std::abs(end - begin) / kStep));
   std::vector<Vec2> result;

@@ -139,7 +139,8 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
   std::vector<std::vector<Corridor>> blocks;
   for (int i = 0; i < kBlocks * kBlocks; ++i) {
     const double half = kBlock / 2 * kCell;
-    const Vec2 middle = corner + Vec2{2 * half * (i % kBlocks) + half, 2 * half * (i / kBlocks) + half};
+    const Vec2 middle =
+        corner + Vec2{2 * half * (i % kBlocks) + half, 2 * half * (i / kBlocks) + half};
     blocks.push_back(nearest_within(corridors, middle, 1.42 * half));
   }
   for (int row = 0; row <= kCells; ++row) {
@@ -158,7 +159,7 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
       tile.heights[static_cast<std::size_t>(row * (kCells + 1) + column)] =
           static_cast<float>(height);
       if (row < kCells && column < kCells) {
-        const std::uint16_t label = ground.edge < 0     ? config_.street_label
+        const std::uint16_t label = ground.edge < 0       ? config_.street_label
                                     : ground.pavement > 0 ? kPavementLabel
                                                           : config_.open_label;
         tile.labels[static_cast<std::size_t>(row * kCells + column)] =
@@ -244,8 +245,8 @@ float Terrain::height_near(float x, float y) const {
   const Tile* t = near_[static_cast<std::size_t>((row / kCells) * kSide + column / kCells)];
   if (t == nullptr) return -1e9F;
   const float fu = u - static_cast<float>(column), fv = v - static_cast<float>(row);
-  const float* s = &t->heights[static_cast<std::size_t>((row % kCells) * (kCells + 1) +
-                                                        column % kCells)];
+  const float* s =
+      &t->heights[static_cast<std::size_t>((row % kCells) * (kCells + 1) + column % kCells)];
   const float low = s[0] + fu * (s[1] - s[0]);
   const float high = s[kCells + 1] + fu * (s[kCells + 2] - s[kCells + 1]);
   return low + fv * (high - low);
@@ -272,8 +273,7 @@ Vec3 Terrain::normal_near(float x, float y) const {
 float Terrain::cast(Vec3 origin, Vec3 direction, float t_max) const {
   // Sphere tracing: below the steepest slope no crossing can be missed. Kerbs are steeper, so a
   // step may end below the ground; the crossing is then found by halving.
-  const float horizontal =
-      std::sqrt(direction.x * direction.x + direction.y * direction.y);
+  const float horizontal = std::sqrt(direction.x * direction.x + direction.y * direction.y);
   const float closing = steepest_ * horizontal - direction.z;
   if (closing <= 0.002F) return -1;
   float before = 0, t = 0;

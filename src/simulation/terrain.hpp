@@ -13,10 +13,10 @@
 namespace dynains::simulation {
 
 struct TerrainConfig {
-  double hill_slope = 0.015;   ///< steepest slope of the large-scale ground, about
-  double hill_length = 180.0;  ///< m, distance between crests, about
-  double roughness = 0.04;     ///< m, unevenness off the street; a third of it on the street
-  double kerb = 0.12;          ///< m, height of the pavement over the street
+  double hill_slope = 0.015;        ///< steepest slope of the large-scale ground, about
+  double hill_length = 180.0;       ///< m, distance between crests, about
+  double roughness = 0.04;          ///< m, unevenness off the street; a third of it on the street
+  double kerb = 0.12;               ///< m, height of the pavement over the street
   std::uint16_t open_label = 72;    ///< class where there is no street
   std::uint16_t street_label = 40;  ///< class of the carriageway
 };

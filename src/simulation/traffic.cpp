@@ -226,7 +226,8 @@ double Traffic::wanted_acceleration(const Driver& driver, std::size_t index) con
   if (blocked) {
     const double closing = v - speed_ahead;
     const double wanted =
-        driver.rest_gap + std::max(0.0, 1.1 * v + v * closing / (2 * std::sqrt(driver.comfort * 2.0)));
+        driver.rest_gap +
+        std::max(0.0, 1.1 * v + v * closing / (2 * std::sqrt(driver.comfort * 2.0)));
     const double share = wanted / std::max(gap, 0.1);
     acceleration -= driver.comfort * share * share;
   }
@@ -371,8 +372,10 @@ std::vector<ObjectPose> Traffic::around(Vec2 centre, double radius) const {
          driver.speed, 1.1 * driver.s});
   }
   for (const Walker& walker : walkers) {
-    add({static_cast<std::uint32_t>(walker.object), {walker.position, walker.heading},
-         norm(walker.velocity), walker.phase});
+    add({static_cast<std::uint32_t>(walker.object),
+         {walker.position, walker.heading},
+         norm(walker.velocity),
+         walker.phase});
   }
   return result;
 }

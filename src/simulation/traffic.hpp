@@ -28,7 +28,7 @@ struct ObjectPose {
   std::uint32_t object = 0;
   Waypoint at;
   double speed = 0;
-  double phase = 0;   ///< of the gait, rad
+  double phase = 0;  ///< of the gait, rad
 };
 
 struct EgoPose {
@@ -62,15 +62,15 @@ class Traffic {
   struct Driver {
     std::size_t object = 0;
     std::size_t lane = 0;
-    double s = 0;        ///< of the vehicle's middle
+    double s = 0;  ///< of the vehicle's middle
     double speed = 0;
-    double cruise = 10;  ///< m/s
-    double comfort = 1.5;  ///< m/s^2
-    bool stays_at_end = false;  ///< parks at the end of the route instead of leaving the world
+    double cruise = 10;          ///< m/s
+    double comfort = 1.5;        ///< m/s^2
+    bool stays_at_end = false;   ///< parks at the end of the route instead of leaving the world
     bool waits_for_gap = false;  ///< starts only when nobody comes from behind
-    bool yields = false;    ///< gives way to vehicles that are about to cross
-    double rest_gap = 2.0;  ///< m, kept to what is in front when standing
-    double foresight = 1.2;  ///< s, how early people are given way to
+    bool yields = false;         ///< gives way to vehicles that are about to cross
+    double rest_gap = 2.0;       ///< m, kept to what is in front when standing
+    double foresight = 1.2;      ///< s, how early people are given way to
     /// From `first` seconds on, `second` replaces `cruise`.
     std::vector<std::pair<double, double>> schedule;
     double acceleration = 0;
@@ -83,9 +83,9 @@ class Traffic {
     double heading = 0;
     std::vector<Vec2> goals;  ///< visited in order
     bool there_and_back = true;
-    double pace = 1.3;   ///< m/s
-    double start = 0;    ///< s; stands still before
-    double stop = 1e9;   ///< s; stands still from then on
+    double pace = 1.3;  ///< m/s
+    double start = 0;   ///< s; stands still before
+    double stop = 1e9;  ///< s; stands still from then on
     Vec2 velocity;
     std::size_t goal = 0;
     double phase = 0;
@@ -94,8 +94,8 @@ class Traffic {
   /// New vehicles enter a lane at its start.
   struct Flow {
     std::size_t lane = 0;
-    double spacing = 40;  ///< m, about
-    double speed = 12;    ///< m/s, about
+    double spacing = 40;                                           ///< m, about
+    double speed = 12;                                             ///< m/s, about
     double trucks = 0.1, buses = 0.05, vans = 0.15, cyclists = 0;  ///< shares
     double next_gap = 0;
   };

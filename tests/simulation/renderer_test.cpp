@@ -38,11 +38,10 @@ TEST_CASE("drawing by solid angle finds what brute force finds") {
       const auto a = static_cast<float>(random.uniform(0.05, 3));
       const auto b = static_cast<float>(random.uniform(0.05, 3));
       const auto c = static_cast<float>(random.uniform(0.05, 3));
-      primitives.push_back(make_primitive(
-          shape, kSolid,
-          {static_cast<float>(far * std::cos(azimuth)), static_cast<float>(far * std::sin(azimuth)),
-           up},
-          {a, b, c}, rotation_z(turn) * rotation_x(tilt)));
+      primitives.push_back(make_primitive(shape, kSolid,
+                                          {static_cast<float>(far * std::cos(azimuth)),
+                                           static_cast<float>(far * std::sin(azimuth)), up},
+                                          {a, b, c}, rotation_z(turn) * rotation_x(tilt)));
     }
     // One right above, and one across the seam at +-pi.
     primitives.push_back(make_primitive(Shape::kBox, kSolid, {0, 0, 6}, {8, 8, 0.2F}));
@@ -98,7 +97,8 @@ TEST_CASE("porous shapes let the expected share of beams through") {
     }
   }
   REQUIRE(met >= 1000);
-  CHECK(static_cast<double>(passed) / static_cast<double>(met) == Approx(std::exp(-2.0)).margin(0.02));
+  CHECK(static_cast<double>(passed) / static_cast<double>(met) ==
+        Approx(std::exp(-2.0)).margin(0.02));
 }
 
 TEST_CASE("beam patterns have the right size and never repeat") {

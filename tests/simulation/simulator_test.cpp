@@ -55,8 +55,7 @@ TEST_CASE("the same configuration gives the same bits, in any order of scans") {
 TEST_CASE("every scene gives points with every sensor") {
   for (int scene = 0; scene < static_cast<int>(scene_names().size()); ++scene) {
     for (int sensor = 0; sensor < static_cast<int>(sensor_names().size()); ++sensor) {
-      Simulator simulator(
-          small(static_cast<Scene>(scene), static_cast<Sensor>(sensor), 1, 5));
+      Simulator simulator(small(static_cast<Scene>(scene), static_cast<Sensor>(sensor), 1, 5));
       const SimulatedScan scan = simulator.scan(0);
       INFO(scene_names()[static_cast<std::size_t>(scene)]
            << ' ' << sensor_names()[static_cast<std::size_t>(sensor)]);
@@ -114,7 +113,8 @@ TEST_CASE("ever labels never change, and cover whoever moves at any time") {
       if (state.speed > 0.5) moved.insert(state.instance);
     }
   }
-  for (const auto& entry : label_of) CHECK(is_moving(entry.second) == (moved.count(entry.first) > 0));
+  for (const auto& entry : label_of)
+    CHECK(is_moving(entry.second) == (moved.count(entry.first) > 0));
   for (const ObjectState& state : instant.scan(0).objects) {
     stood_and_moved = stood_and_moved || (!is_moving(state.label) && moved.count(state.instance));
   }
@@ -129,8 +129,10 @@ TEST_CASE("movers move as fast as they say") {
     for (const ObjectState& state : simulator.scan(i).objects) {
       const auto found = last.find(state.instance);
       if (found != last.end()) {
-        const double step = (state.T_world_object.translation() -
-                             found->second.T_world_object.translation()).head<2>().norm();
+        const double step =
+            (state.T_world_object.translation() - found->second.T_world_object.translation())
+                .head<2>()
+                .norm();
         const double speed = 0.5 * (state.speed + found->second.speed);
         CHECK(step / 0.1 == Approx(speed).margin(0.8));
         compared += speed > 1;
@@ -184,8 +186,9 @@ TEST_CASE("points of an object lie within its box") {
   for (std::size_t i = 0; i < scan.labels.size(); ++i) {
     if (scan.labels[i] >> 16 == 0) continue;
     const ObjectState& state = *states.at(scan.labels[i] >> 16);
-    const Eigen::Vector3d p = state.T_world_object.inverse() *
-                              (scan.T_world_sensor * Eigen::Map<const Eigen::Vector3f>(&scan.xyzi[4 * i]).cast<double>());
+    const Eigen::Vector3d p =
+        state.T_world_object.inverse() *
+        (scan.T_world_sensor * Eigen::Map<const Eigen::Vector3f>(&scan.xyzi[4 * i]).cast<double>());
     // Limbs swing and noise adds; wheels may stand in a bump.
     const bool in = std::abs(p.x()) < state.length / 2 + 0.45 &&
                     std::abs(p.y()) < state.width / 2 + 0.35 && p.z() > -0.3 &&
@@ -243,9 +246,9 @@ TEST_CASE("poses are rigid, smooth and as noisy as asked") {
     rotation += std::pow(Eigen::AngleAxisd(error.linear()).angle(), 2) / 3;
     if (i > 0) {
       const Eigen::Isometry3d step = last.T_world_sensor.inverse() * scan.T_world_sensor;
-      CHECK(step.translation().norm() < 1.2);                             // 12 m/s
+      CHECK(step.translation().norm() < 1.2);  // 12 m/s
       CHECK(std::abs(step.translation().z()) < 0.12);
-      CHECK(Eigen::AngleAxisd(step.linear()).angle() < 0.035);            // 20 deg/s
+      CHECK(Eigen::AngleAxisd(step.linear()).angle() < 0.035);  // 20 deg/s
     }
     last = std::move(scan);
   }

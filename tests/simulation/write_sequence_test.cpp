@@ -33,11 +33,12 @@ TEST_CASE("a written sequence reads back") {
   const Folder folder("dynains_simulated_sequence");
   Simulator simulator(three_scans());
   std::size_t calls = 0;
-  const bool complete = write_sequence(simulator, folder.path, [&](std::size_t done, std::size_t n) {
-    CHECK(done == ++calls);
-    CHECK(n == 3);
-    return true;
-  });
+  const bool complete =
+      write_sequence(simulator, folder.path, [&](std::size_t done, std::size_t n) {
+        CHECK(done == ++calls);
+        CHECK(n == 3);
+        return true;
+      });
   CHECK(complete);
   CHECK(calls == 3);
   const KittiSequence sequence(folder.path);
@@ -56,7 +57,8 @@ TEST_CASE("a written sequence reads back") {
 TEST_CASE("a stopped sequence has no poses") {
   const Folder folder("dynains_simulated_stop");
   Simulator simulator(three_scans());
-  CHECK_FALSE(write_sequence(simulator, folder.path, [](std::size_t done, std::size_t) { return done < 2; }));
+  CHECK_FALSE(write_sequence(simulator, folder.path,
+                             [](std::size_t done, std::size_t) { return done < 2; }));
   CHECK(std::filesystem::exists(folder.path / "velodyne" / "000001.bin"));
   CHECK_FALSE(std::filesystem::exists(folder.path / "velodyne" / "000002.bin"));
   CHECK_FALSE(std::filesystem::exists(folder.path / "poses.txt"));

@@ -56,18 +56,18 @@ struct Config {
 
   int scans = 150;
   std::uint64_t seed = 1;
-  double rate = 10.0;                  ///< scans per second
-  double ego_speed = -1.0;             ///< m/s; negative: usual for the scene
-  double traffic = 1.0;                ///< 1 is usual, 0 is nobody moving
-  double sensor_height = 0.0;          ///< m over ground; 0: usual for the sensor
-  double max_range = 0.0;              ///< m; 0: usual for the sensor
-  double mounting_pitch = 0.0;         ///< deg, positive looks down
-  double mounting_roll = 0.0;          ///< deg
-  double range_noise = 0.02;           ///< m, standard deviation
-  double dropout = 1.0;                ///< scales all causes of lost returns; 0 loses none
+  double rate = 10.0;                   ///< scans per second
+  double ego_speed = -1.0;              ///< m/s; negative: usual for the scene
+  double traffic = 1.0;                 ///< 1 is usual, 0 is nobody moving
+  double sensor_height = 0.0;           ///< m over ground; 0: usual for the sensor
+  double max_range = 0.0;               ///< m; 0: usual for the sensor
+  double mounting_pitch = 0.0;          ///< deg, positive looks down
+  double mounting_roll = 0.0;           ///< deg
+  double range_noise = 0.02;            ///< m, standard deviation
+  double dropout = 1.0;                 ///< scales all causes of lost returns; 0 loses none
   double pose_noise_translation = 0.0;  ///< m, standard deviation per axis and scan
   double pose_noise_rotation = 0.0;     ///< deg, standard deviation per axis and scan
-  bool ego_points = false;             ///< whether the roof below the sensor is seen
+  bool ego_points = false;              ///< whether the roof below the sensor is seen
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {

@@ -13,8 +13,8 @@ namespace dynains::simulation {
 
 /// True state of an object at the time of a scan.
 struct ObjectState {
-  std::uint32_t instance;  ///< upper 16 bits of its labels, from 1
-  std::uint32_t label;     ///< lower 16 bits of its labels in this scan
+  std::uint32_t instance;            ///< upper 16 bits of its labels, from 1
+  std::uint32_t label;               ///< lower 16 bits of its labels in this scan
   Eigen::Isometry3d T_world_object;  ///< centre of the footprint on the ground, x forward
   double speed;                      ///< m/s
   double length, width, height;      ///< m
@@ -22,8 +22,8 @@ struct ObjectState {
 
 /// One scan and all that is true about it.
 struct SimulatedScan {
-  double time = 0.0;                 ///< s, 0 for the first scan
-  std::vector<float> xyzi;           ///< interleaved, sensor frame; metres and reflectivity in [0, 1]
+  double time = 0.0;        ///< s, 0 for the first scan
+  std::vector<float> xyzi;  ///< interleaved, sensor frame; metres and reflectivity in [0, 1]
   std::vector<std::uint32_t> labels;  ///< per point: SemanticKITTI class | instance << 16
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d T_world_sensor_noisy = Eigen::Isometry3d::Identity();

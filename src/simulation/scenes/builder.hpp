@@ -1,0 +1,116 @@
+// Puts a scene together: things that stand, things that move, and what keeps them apart.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include "simulation/scenes/layout.hpp"
+#include "simulation/world.hpp"
+
+namespace dynains::simulation {
+
+/// How one side of a street looks.
+struct Frontage {
+  double buildings = 0.8;  ///< share of plots that are built on
+  double setback = 1.0;    ///< m between pavement and facade, at most
+  double height = 12;      ///< m, about
+  double street_trees = 0.6;
+  double poles = 0.6;
+  double gardens = 0.85;  ///< hedges, fences, bushes and trees on open plots
+  double parked = 0.6;    ///< share of parking places in use
+  double furniture = 0.5;
+};
+
+class Builder {
+ public:
+  Builder(const Config& config, const TerrainConfig& ground, std::vector<Street> streets)
+      : config_(config),
+        random_(mix(config.seed, 1000 + static_cast<std::uint64_t>(config.scene))),
+        world_{Terrain(ground, std::move(streets), random_.fork(1)), {}, Traffic(random_.fork(2))} {
+  }
+
+  Random& random() { return random_; }
+  Traffic& traffic() { return world_.traffic; }
+  Terrain& terrain() { return world_.terrain; }
+  const Street& street(std::size_t i) const { return world_.terrain.streets()[i]; }
+  World finish() { return std::move(world_); }
+  bool lively() const { return config_.scene != Scene::kStatic && config_.traffic > 0; }
+  double traffic_scale() const { return std::max(config_.traffic, 1e-3); }
+  int count(double usual) const;
+
+  /// Puts a model on the ground unless its footprint is taken.
+  bool place(const Model& model, const Footprint& footprint, double margin = 0.1);
+
+  void place_anyway(const Model& model, const Waypoint& at);
+
+  /// Distance from every corner and the middle of the edges to the streets.
+  double clearance(const Footprint& f) const;
+
+  void tree(Vec2 at, double height, double radius, double clear);
+
+  void bush(Vec2 at, double radius, double height);
+
+  void park(const Waypoint& at, Kind kind);
+
+  Kind parked_kind();
+
+  /// Buildings, gardens, trees, poles and parked cars on one side (+1 left, -1 right).
+  void furnish(const Street& street, int side, const Frontage& look);
+
+  /// Hedges, fences, bushes and trees on an open plot.
+  void garden(const std::function<Waypoint(double, double, double)>& at, double s, double front,
+              double back, const Frontage& look);
+
+  /// Woods and meadows beside a street.
+  void plant(const Street& street, double from, double to, double trees_per_100_m,
+             double bushes_per_100_m);
+
+  /// A lane of a street: `lateral` to the left of the centre line; negative runs with it.
+  std::size_t lane(const Street& street, double lateral, std::vector<StopLine> lines = {}) {
+    const double length = street.centre.length();
+    const bool with = lateral < 0;
+    return world_.traffic.add_lane(street.centre.shifted(with ? 0 : length, with ? length : 0,
+                                                         [lateral](double) { return lateral; }),
+                                   std::move(lines));
+  }
+
+  /// The ego vehicle on a lane, `kBefore` metres from its start.
+  void ego(std::size_t lane, double s, double usual_speed);
+
+  /// Somebody who walks along `goals`, from `goals[0]`.
+  void walker(std::vector<Vec2> goals, double pace, double start = 0, double stop = 1e9,
+              Kind kind = Kind::kPedestrian);
+
+  /// People on the pavements of a street between arc lengths.
+  void pavement_walkers(const Street& street, double from, double to, int number);
+
+  /// People who cross the carriageway somewhere.
+  void crossing_walkers(const Street& street, double from, double to, int number);
+
+  /// A parked vehicle that pulls out into the lane at `start` seconds.
+  void leaving_car(const Street& street, double s, double lateral_place, double lateral_lane,
+                   double start, double cruise);
+
+  /// A moving vehicle that leaves its lane and parks at arc length `s`.
+  void arriving_car(const Street& street, double from, double s, double lateral_place,
+                    double lateral_lane, double cruise);
+
+  /// Lights of the main street along it and against it, from the start of those lanes.
+  std::vector<StopLine> main_lines[2];
+
+  /// The same for a route that begins at arc length `begin` of the main street.
+  std::vector<StopLine> lines_from(const Street& street, double begin, bool with) const;
+
+  bool is_free_of_drivers(const Waypoint& at, double half_length) const;
+
+ private:
+  Config config_;
+  Random random_;
+  World world_;
+};
+
+}  // namespace dynains::simulation

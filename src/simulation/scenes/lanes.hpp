@@ -1,0 +1,30 @@
+// Traffic that several scenes share.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "simulation/scenes/builder.hpp"
+
+namespace dynains::simulation {
+
+/// Two-way traffic with lights at the crossings, and vehicles that turn there.
+struct StreetLanes {
+  std::size_t forward, backward;
+};
+
+StreetLanes add_crossing_traffic(Builder& builder, const std::vector<Crossing>& crossings,
+                                 double speed, double ego_s);
+
+/// Vehicles all along a lane, `spacing` metres apart on average; shares of kinds.
+void fill_lane(Builder& builder, std::size_t lane, double spacing, double speed, double trucks,
+               double buses, double cyclists);
+
+/// Cars that leave their places and cars that park, along the stretch that is driven.
+void add_parking_moves(Builder& builder, double from, double to, int number, double speed);
+
+/// Rails, walls or hedges along a street at a fixed distance from its centre line.
+void add_barrier(Builder& builder, const Street& street, double lateral, double piece,
+                 const std::function<Model(Random&)>& model);
+
+}  // namespace dynains::simulation

@@ -1,0 +1,39 @@
+// Streets before anything stands on them.
+#pragma once
+
+#include <vector>
+
+#include "dynains/simulation/config.hpp"
+#include "simulation/random.hpp"
+#include "simulation/street.hpp"
+
+namespace dynains::simulation {
+
+inline constexpr double kPi = 3.14159265358979323846;
+inline constexpr double kBefore = 140.0;   ///< m of street behind the start and beyond the end
+inline constexpr double kLaneHalf = 1.75;  ///< m from the centre line to the middle of a lane
+
+/// Where the main street bends: constant curvature over a length.
+struct Bend {
+  double length, curvature;
+};
+
+Route route_of_bends(const std::vector<Bend>& bends);
+
+/// How far the ego vehicle drives, m. A negative speed in the configuration means `usual_speed`.
+double travel(const Config& config, double usual_speed);
+
+/// Gentle bends and now and then a corner, alternating so that the street never meets itself.
+std::vector<Bend> winding(Random& random, double length, double gentle, double corner_chance,
+                          double corner_radius);
+
+/// Straight streets across the main one, where that is straight.
+struct Crossing {
+  double main_s;
+  std::size_t street;
+};
+
+std::vector<Crossing> add_side_streets(Random& random, std::vector<Street>& streets, double spacing,
+                                       double half_width);
+
+}  // namespace dynains::simulation
