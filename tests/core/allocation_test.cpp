@@ -1,0 +1,61 @@
+// Counts what the global operator new hands out: an executable of its own.
+#include <atomic>
+#include <cstddef>
+#include <cstdlib>
+#include <new>
+#include <vector>
+
+#include "dynains/dyna_ins_remover.hpp"
+#include "support/catch.hpp"
+#include "support/runs.hpp"
+#include "support/scene.hpp"
+
+namespace {
+
+std::atomic<std::size_t> allocations{0};
+
+void* counted(std::size_t size) {
+  ++allocations;
+  if (void* const memory = std::malloc(size == 0 ? 1 : size)) return memory;
+  throw std::bad_alloc();
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) { return counted(size); }
+void* operator new[](std::size_t size) { return counted(size); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace dynains::test {
+namespace {
+
+TEST_CASE("a warm remover allocates nothing, but for the map when it grows") {
+  const auto base = GENERATE(DynaInsRemover::Config::paper(), DynaInsRemover::Config());
+  DynaInsRemover::Config config = base;
+  const bool build_map = GENERATE(false, true);
+  config.build_map = build_map;
+  // To and fro over the same ground: the second time, the map has it all.
+  std::vector<Scan> scans = drive(yard_with(van(14.0, 3.5, {-6.0, 0.0, 0.0})), 12, 0.0);
+  DynaInsRemover remover(config);
+  double start = 0.0;
+  std::size_t first = 0;
+  std::size_t last = 0;
+  for (int round = 0; round < 6; ++round) {
+    last = 0;
+    for (const Scan& scan : scans) {
+      const std::size_t before = allocations;
+      remover.push(scan.points, scan.T_world_sensor, start + scan.time);
+      last += allocations - before;
+    }
+    if (round == 0) first = last;
+    start += 1.2;
+  }
+  CHECK(first > 0);
+  CHECK(last == 0);
+}
+
+}  // namespace
+}  // namespace dynains::test

@@ -1,0 +1,60 @@
+// A recorded clip, where the machine has it.
+#include <filesystem>
+#include <iostream>
+#include <vector>
+
+#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/evaluation/evaluate.hpp"
+#include "dynains/io/kitti.hpp"
+#include "support/catch.hpp"
+
+namespace dynains::test {
+namespace {
+
+TEST_CASE("the paper's configuration removes a recorded oncoming van: F1 of 0.96 and more") {
+  const std::filesystem::path folder = std::filesystem::path(DYNAINS_SHARED_DATA) / "kitti_van";
+  if (!std::filesystem::is_directory(folder)) {
+    std::cout << "SKIPPED: no recording at " << folder << '\n';
+    return;
+  }
+  const KittiSequence sequence(folder);
+  REQUIRE(sequence.size() > 10);
+
+  std::vector<std::vector<std::uint8_t>> in_map(sequence.size());
+  const auto keep = [&](const ScanVerdict& verdict) {
+    std::vector<std::uint8_t>& flags = in_map.at(verdict.scan);
+    for (const PointLabel label : verdict.labels) flags.push_back(is_static(label) ? 1 : 0);
+  };
+  DynaInsRemover remover(DynaInsRemover::Config::paper());
+  for (std::size_t i = 0; i < sequence.size(); ++i) {
+    const std::vector<float> xyzi = sequence.read_scan(i);
+    const FrameResult frame =
+        remover.push(RawPoints{xyzi.data(), xyzi.size() / 4, std::size_t{4}},
+                     sequence.T_world_sensor(i), sequence.time(i));
+    if (frame.finished) keep(*frame.finished);
+  }
+  remover.flush(keep);
+
+  std::vector<float> xyzi;
+  std::vector<std::uint32_t> truth;
+  const auto source = [&](std::size_t i, evaluation::LabelledScan& scan) {
+    if (i == sequence.size()) return false;
+    sequence.read_scan(i, xyzi);
+    truth = sequence.read_labels(i);
+    scan.xyz = xyzi.data();
+    scan.stride = 4;
+    scan.T_world_sensor = sequence.T_world_sensor(i);
+    scan.time = sequence.time(i);
+    scan.truth = truth;
+    scan.in_map = in_map[i];
+    return true;
+  };
+  const evaluation::Evaluation result = evaluation::evaluate(source, {"paper"}, {});
+  REQUIRE(result.rows.size() == 3);
+  CHECK(result.rows[0].voxels.f1() < 0.01);
+  CHECK(result.rows[1].voxels.f1() > 0.99);
+  CHECK(result.rows[2].voxels.f1() >= 0.96);
+}
+
+}  // namespace
+}  // namespace dynains::test

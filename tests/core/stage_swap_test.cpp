@@ -1,0 +1,160 @@
+// Every stage can be replaced by one of one's own.
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/dyna_ins_remover.hpp"
+#include "support/catch.hpp"
+#include "support/runs.hpp"
+#include "support/scene.hpp"
+
+namespace dynains::test {
+namespace {
+
+// Ground is what lies under a height.
+class FlatGround {
+ public:
+  struct Config {
+    double flat_ground_below = -1.5;  // m
+
+    template <class Self, class Visitor>
+    static void visit(Self& self, Visitor&& visitor) {
+      visitor(Parameter{"flat_ground_below", self.flat_ground_below, closed(-100, 100), "m",
+                        "everything lower is ground"});
+    }
+    void validate() const { validate_parameters("FlatGround", *this); }
+  };
+  explicit FlatGround(const Config& config) : config_(config) {}
+
+  void segment(PointsView scan, GroundSplit& split) {
+    split.resize(scan.size());
+    std::size_t next = 0;
+    for (const bool wanted : {true, false}) {
+      for (std::size_t i = 0; i < scan.size(); ++i) {
+        if ((scan.z[i] < config_.flat_ground_below) != wanted) continue;
+        split.points.x[next] = scan.x[i];
+        split.points.y[next] = scan.y[i];
+        split.points.z[next] = scan.z[i];
+        split.source[next++] = static_cast<std::uint32_t>(i);
+      }
+      if (wanted) split.ground_count = next;
+    }
+  }
+
+ private:
+  Config config_;
+};
+
+// One cluster ahead of the sensor, one behind; nothing near the ground belongs to either.
+class HalvesClusterer {
+ public:
+  struct Config {
+    template <class Self, class Visitor>
+    static void visit(Self&, Visitor&&) {}
+    void validate() const {}
+  };
+  explicit HalvesClusterer(const Config&) {}
+
+  Span<const std::uint32_t> cluster(PolarView points) {
+    numbers_.resize(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      numbers_[i] = points.z[i] < -1.0F ? kNoCluster : std::abs(points.azimuth[i]) < 1.57F ? 0 : 1;
+    }
+    return numbers_;
+  }
+  std::size_t cluster_count() const { return 2; }
+
+ private:
+  std::vector<std::uint32_t> numbers_;
+};
+
+// Proposes every cluster.
+class Suspicious : public OccupancyDescriptor {
+ public:
+  using OccupancyDescriptor::OccupancyDescriptor;
+  bool proposes_dynamic() const { return true; }
+};
+
+// Believes every proposal.
+class Credulous : public BeliefUpdater {
+ public:
+  using BeliefUpdater::BeliefUpdater;
+  double posterior() const { return 0.875; }
+  bool is_dynamic() const { return true; }
+};
+
+// Counts.
+class CountingMap {
+ public:
+  struct Config {
+    template <class Self, class Visitor>
+    static void visit(Self&, Visitor&&) {}
+    void validate() const {}
+  };
+  explicit CountingMap(const Config&) {}
+  void insert(PointsView points, Span<const std::uint8_t> keep, const Eigen::Isometry3d&) {
+    count += keep.empty() ? points.size()
+                          : static_cast<std::size_t>(std::count_if(
+                                keep.begin(), keep.end(), [](std::uint8_t k) { return k != 0; }));
+  }
+  void clear() { count = 0; }
+
+  std::size_t count = 0;
+};
+
+struct OwnGround : DefaultStages {
+  using Ground = FlatGround;
+};
+struct OwnEverything {
+  using Ground = FlatGround;
+  using Clusterer = HalvesClusterer;
+  using Descriptor = Suspicious;
+  using Belief = Credulous;
+  using Map = CountingMap;
+};
+
+TEST_CASE("a ground stage of one's own decides what is ground, and its config is part of the whole") {
+  const std::vector<Scan> scans = drive(yard(), 5, 0.0);
+  BasicDynaInsRemover<OwnGround>::Config config;
+  config.ground.flat_ground_below = -1.25;
+  BasicDynaInsRemover<OwnGround> remover(config);
+  const Run result = run(remover, scans);
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    for (std::size_t i = 0; i < scans[s].points.size(); ++i) {
+      const PointLabel label = result.final[s].labels[i];
+      if (label == PointLabel::kOutOfRange) continue;
+      REQUIRE((label == PointLabel::kGround) == (scans[s].points[i].z() < -1.25));
+    }
+  }
+
+  bool is_listed = false;
+  BasicDynaInsRemover<OwnGround>::Config::visit(config, [&](const auto& parameter) {
+    is_listed = is_listed || std::string(parameter.name) == "flat_ground_below";
+  });
+  CHECK(is_listed);
+  config.ground.flat_ground_below = 1000.0;
+  CHECK_THROWS_WITH(BasicDynaInsRemover<OwnGround>(config), StartsWith("FlatGround."));
+}
+
+TEST_CASE("all stages can be one's own at the same time") {
+  const std::vector<Scan> scans = drive(yard(), 5, 0.0);
+  BasicDynaInsRemover<OwnEverything> remover;
+  const Run result = run(remover, scans);
+  std::size_t static_points = 0;
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    for (std::size_t i = 0; i < scans[s].points.size(); ++i) {
+      const float z = scans[s].points[i].z();
+      const PointLabel label = result.final[s].labels[i];
+      if (label == PointLabel::kOutOfRange) continue;
+      // Two clusters that every scan sees, each proposed and believed; the rest is static.
+      REQUIRE((label == PointLabel::kDynamic) == (z >= -1.0F));
+      REQUIRE(result.final[s].beliefs[i] == (z >= -1.0F ? 0.875F : 0.0F));
+      REQUIRE((result.final[s].instances[i] != kNoInstance) == (z >= -1.0F));
+      static_points += is_static(label) ? 1U : 0U;
+    }
+  }
+  CHECK(remover.map().count == static_points);
+}
+
+}  // namespace
+}  // namespace dynains::test
