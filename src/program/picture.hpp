@@ -11,7 +11,9 @@ namespace dynains::program {
 struct Colour {
   std::uint8_t r = 0, g = 0, b = 0;
 
-  friend bool operator==(Colour a, Colour b) { return a.r == b.r && a.g == b.g && a.b == b.b; }
+  friend bool operator==(Colour one, Colour other) {
+    return one.r == other.r && one.g == other.g && one.b == other.b;
+  }
 };
 
 class Picture {
