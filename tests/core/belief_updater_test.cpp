@@ -12,8 +12,8 @@ namespace {
 
 using Heights = std::vector<float>;
 
-double posterior_after(const BeliefUpdater::Config& config, const std::vector<Heights>& observations,
-                       const Heights& cluster) {
+double posterior_after(const BeliefUpdater::Config& config,
+                       const std::vector<Heights>& observations, const Heights& cluster) {
   BeliefUpdater belief(config);
   for (const Heights& observation : observations) belief.update(observation, cluster);
   return belief.posterior();
@@ -39,8 +39,9 @@ double bayes_in_probabilities(const BeliefUpdater::Config& config,
     }
     odds = cells == 0 ? 1.0 : std::pow(odds, 1.0 / cells);
     const double measured = odds / (1.0 + odds);
-    const double p = (1.0 - measured) / measured * (1.0 - previous) / previous;  // Eq. 14, p(m) = 0.5
-    previous = 1.0 / (1.0 + p);                                                  // Eq. 13
+    const double p =
+        (1.0 - measured) / measured * (1.0 - previous) / previous;  // Eq. 14, p(m) = 0.5
+    previous = 1.0 / (1.0 + p);                                     // Eq. 13
   }
   return previous;
 }

@@ -134,8 +134,8 @@ TEST_CASE("parameters that do not go together are refused by name") {
   Config config = Config::paper();
   SECTION("range") {
     config.min_range = config.max_range = 50.0;
-    CHECK_THAT(error_of(config), ContainsSubstring("min_range = 50") &&
-                                     ContainsSubstring("max_range = 50"));
+    CHECK_THAT(error_of(config),
+               ContainsSubstring("min_range = 50") && ContainsSubstring("max_range = 50"));
     config.max_range = 50.1;
     CHECK(error_of(config).empty());
   }

@@ -74,12 +74,18 @@ TEST_CASE("clusters are those of a breadth-first search over all 26 neighbours")
       {"the zenith alone", make(0.5, 30.0, 5.0), {3, 6, -180, 180, 80, 90}, 100},
       {"tiny voxels", make(0.05, 0.1, 0.5, 10.0), {5, 7, -5, 5, -5, 5}, 2000},
       {"huge voxels", make(20.0, 30.0, 45.0), {3, 90, -180, 180, -90, 90}, 40},
-      {"an azimuth size that does not divide the circle", make(1.0, 7.0, 3.0),
-       {3, 40, -180, 180, -25, 15}, 700},
-      {"an elevation size that does not divide the half circle", make(1.0, 5.0, 7.0),
-       {3, 40, -180, 180, -90, 90}, 700},
-      {"beyond the horizon of clustering", make(0.5, 2.0, 3.0, 30.0),
-       {25, 35, -180, 180, -10, 10}, 1500},
+      {"an azimuth size that does not divide the circle",
+       make(1.0, 7.0, 3.0),
+       {3, 40, -180, 180, -25, 15},
+       700},
+      {"an elevation size that does not divide the half circle",
+       make(1.0, 5.0, 7.0),
+       {3, 40, -180, 180, -90, 90},
+       700},
+      {"beyond the horizon of clustering",
+       make(0.5, 2.0, 3.0, 30.0),
+       {25, 35, -180, 180, -10, 10},
+       1500},
   }));
   INFO(c.why);
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
@@ -105,7 +111,8 @@ TEST_CASE("a clusterer forgets one scan before the next") {
 
 TEST_CASE("voxels that touch at a corner join, voxels one apart do not") {
   const Config config = make(1.0, 10.0, 10.0);
-  // Azimuth voxels begin at multiples of 10 deg, elevation voxels too, range voxels at whole metres.
+  // Azimuth voxels begin at multiples of 10 deg, elevation voxels too, range voxels at whole
+  // metres.
   const auto at = [](PolarBuffer& points, double distance, double azimuth, double elevation) {
     add(points, distance * std::cos(elevation * kRadiansPerDegree), azimuth,
         distance * std::sin(elevation * kRadiansPerDegree));
@@ -140,8 +147,7 @@ TEST_CASE("an object behind the sensor is one cluster, +180 and -180 degrees are
   points.z[3] = points.z[4] = 0.0F;
   points.azimuth[3] = detail::kPi;  // both ends of the interval of azimuths
   points.azimuth[4] = -detail::kPi;
-  CHECK(clusters(make(0.5, 0.5, 3.0), points.view()) ==
-        std::vector<std::uint32_t>{0, 0, 1, 0, 0});
+  CHECK(clusters(make(0.5, 0.5, 3.0), points.view()) == std::vector<std::uint32_t>{0, 0, 1, 0, 0});
 }
 
 TEST_CASE("a point at exactly the clustering range belongs to a cluster, the next float does not") {

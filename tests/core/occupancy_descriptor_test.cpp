@@ -82,7 +82,8 @@ TEST_CASE("Eq. 5-12 of a cluster worked by hand") {
 }
 
 TEST_CASE("a similarity of exactly tau_s is no proposal") {
-  // h_old = (3, 0, 4), h_new = (3, 0, 0) over a lowest point of its own cell: d = 9 / (5 * 3) = 0.6.
+  // h_old = (3, 0, 4), h_new = (3, 0, 0) over a lowest point of its own cell: d = 9 / (5 * 3) =
+  // 0.6.
   const auto make_cluster = [](double z) {
     return Cluster()
         .point(10.0, 0.0, 3.0)
@@ -173,9 +174,12 @@ TEST_CASE("turning a cluster about the sensor leaves its descriptor as it is") {
 
 TEST_CASE("a point on the outer border belongs to the last cell") {
   // Extent 1.0 m of 0.5 m cells: N_r = 2, and r_max would be in a third cell by Eq. 8.
-  const Cluster cluster =
-      Cluster().point(10.0, 0.0, 0.0).point(11.0, 0.0, 2.0).end_of_scan().point(10.0, 0.0, 1.0)
-          .end_of_scan();
+  const Cluster cluster = Cluster()
+                              .point(10.0, 0.0, 0.0)
+                              .point(11.0, 0.0, 2.0)
+                              .end_of_scan()
+                              .point(10.0, 0.0, 1.0)
+                              .end_of_scan();
   const OccupancyDescriptor descriptor = described(make(0.5, 10.0), cluster);
   CHECK(descriptor.radial_cells() == 2);
   check_heights(descriptor.heights(0), {0.0, 2.0});
@@ -213,9 +217,13 @@ TEST_CASE("tau_s = 0 proposes nothing, tau_s = 1 all that differ") {
                             .end_of_scan()
                             .point(14.0, 0.0, 1.0)
                             .end_of_scan();
-  const Cluster alike =
-      Cluster().point(10.0, 0.0, 0.0).point(12.0, 0.0, 1.0).end_of_scan().point(10.0, 0.0, 0.0)
-          .point(12.0, 0.0, 1.0).end_of_scan();
+  const Cluster alike = Cluster()
+                            .point(10.0, 0.0, 0.0)
+                            .point(12.0, 0.0, 1.0)
+                            .end_of_scan()
+                            .point(10.0, 0.0, 0.0)
+                            .point(12.0, 0.0, 1.0)
+                            .end_of_scan();
   CHECK(described(make(0.25, 1.5), apart).similarity() == 0.0);
   CHECK_FALSE(described(make(0.25, 1.5, 0.0), apart).proposes_dynamic());
   CHECK(described(make(0.25, 1.5, 1.0), apart).proposes_dynamic());

@@ -28,9 +28,8 @@ TEST_CASE("the paper's configuration removes a recorded oncoming van: F1 of 0.96
   DynaInsRemover remover(DynaInsRemover::Config::paper());
   for (std::size_t i = 0; i < sequence.size(); ++i) {
     const std::vector<float> xyzi = sequence.read_scan(i);
-    const FrameResult frame =
-        remover.push(RawPoints{xyzi.data(), xyzi.size() / 4, std::size_t{4}},
-                     sequence.T_world_sensor(i), sequence.time(i));
+    const FrameResult frame = remover.push(RawPoints{xyzi.data(), xyzi.size() / 4, std::size_t{4}},
+                                           sequence.T_world_sensor(i), sequence.time(i));
     if (frame.finished) keep(*frame.finished);
   }
   remover.flush(keep);

@@ -52,8 +52,8 @@ inline std::vector<std::uint32_t> reference_clusters(const CurvedVoxelClusterer:
         for (int r = -1; r <= 1; ++r) {
           for (int a = -1; a <= 1; ++a) {
             for (int e = -1; e <= 1; ++e) {
-              const auto next = cluster_of_voxel.find(
-                  {at[0] + r, (at[1] + a + azimuths) % azimuths, at[2] + e});
+              const auto next =
+                  cluster_of_voxel.find({at[0] + r, (at[1] + a + azimuths) % azimuths, at[2] + e});
               if (next == cluster_of_voxel.end() || next->second != kNoCluster) continue;
               next->second = count;
               open.push(next->first);

@@ -13,10 +13,10 @@
 namespace dynains::test {
 
 struct ReferenceDescriptor {
-  std::size_t radial_cells = 0;                // N_r
-  std::size_t azimuth_cells = 0;               // N_theta
-  std::vector<std::vector<double>> heights;    // H_k, one per scan, and that of the whole cluster
-  double similarity = 0.0;                     // d
+  std::size_t radial_cells = 0;              // N_r
+  std::size_t azimuth_cells = 0;             // N_theta
+  std::vector<std::vector<double>> heights;  // H_k, one per scan, and that of the whole cluster
+  double similarity = 0.0;                   // d
 };
 
 /// Empty if a point or an extent lies so near to a border that float and double may differ, or if
@@ -55,8 +55,8 @@ inline std::optional<ReferenceDescriptor> describe(const OccupancyDescriptor::Co
   const auto cells = [&](double extent) {
     return static_cast<std::size_t>(std::max(1.0, std::ceil(extent)));
   };
-  if (points.size() > 1 && (off_integer((r_max - r_min) / s_r) < kMargin ||
-                            off_integer(arc / s_theta) < kMargin)) {
+  if (points.size() > 1 &&
+      (off_integer((r_max - r_min) / s_r) < kMargin || off_integer(arc / s_theta) < kMargin)) {
     return {};
   }
   result.radial_cells = cells((r_max - r_min) / s_r);

@@ -61,8 +61,7 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
       if (!is_noise) heights.push_back(scan.z[i]);
     }
     std::sort(heights.begin(), heights.end());
-    heights.resize(
-        std::min(heights.size(), static_cast<std::size_t>(config.ground_lowest_points)));
+    heights.resize(std::min(heights.size(), static_cast<std::size_t>(config.ground_lowest_points)));
     double seed_height = -(1.0 + config.ground_below) * h;
     if (!heights.empty()) {
       seed_height = 0.0;

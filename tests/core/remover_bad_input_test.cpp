@@ -61,8 +61,7 @@ TEST_CASE("a pose that is none is refused with its reason, and the state stays a
                           StartsWith("T_world_sensor") && ContainsSubstring(c.reason));
       }
     }
-    const FrameResult frame =
-        remover.push(scans[s].points, scans[s].T_world_sensor, scans[s].time);
+    const FrameResult frame = remover.push(scans[s].points, scans[s].T_world_sensor, scans[s].time);
     REQUIRE((Verdict(frame.newest) == expected.newest[s]));
   }
   remover.flush([&](const ScanVerdict& verdict) {
@@ -84,8 +83,7 @@ TEST_CASE("a time that does not increase is refused, and the state stays as it w
                           StartsWith("time = ") && ContainsSubstring("greater than"));
       }
     }
-    const FrameResult frame =
-        remover.push(scans[s].points, scans[s].T_world_sensor, scans[s].time);
+    const FrameResult frame = remover.push(scans[s].points, scans[s].T_world_sensor, scans[s].time);
     REQUIRE((Verdict(frame.newest) == expected.newest[s]));
   }
 }
@@ -108,14 +106,14 @@ TEST_CASE("points that are no measurements get a label that says so") {
     PointLabel label;
   };
   const std::vector<Case> cases = {
-      {{kNanF, 0.0F, 0.0F}, L::kInvalid},   {{10.0F, kNanF, 0.0F}, L::kInvalid},
-      {{10.0F, 0.0F, kNanF}, L::kInvalid},  {{kNanF, kNanF, kNanF}, L::kInvalid},
-      {{kInf, 0.0F, 0.0F}, L::kInvalid},    {{10.0F, -kInf, 0.0F}, L::kInvalid},
-      {{10.0F, 0.0F, kInf}, L::kInvalid},   {{0.0F, 0.0F, 0.0F}, L::kInvalid},
-      {{-0.0F, 0.0F, -0.0F}, L::kInvalid},  {{1.0F, 1.0F, 0.0F}, L::kOutOfRange},
-      {{1e6F, 0.0F, 0.0F}, L::kOutOfRange}, {{3e38F, 3e38F, 0.0F}, L::kOutOfRange},
+      {{kNanF, 0.0F, 0.0F}, L::kInvalid},     {{10.0F, kNanF, 0.0F}, L::kInvalid},
+      {{10.0F, 0.0F, kNanF}, L::kInvalid},    {{kNanF, kNanF, kNanF}, L::kInvalid},
+      {{kInf, 0.0F, 0.0F}, L::kInvalid},      {{10.0F, -kInf, 0.0F}, L::kInvalid},
+      {{10.0F, 0.0F, kInf}, L::kInvalid},     {{0.0F, 0.0F, 0.0F}, L::kInvalid},
+      {{-0.0F, 0.0F, -0.0F}, L::kInvalid},    {{1.0F, 1.0F, 0.0F}, L::kOutOfRange},
+      {{1e6F, 0.0F, 0.0F}, L::kOutOfRange},   {{3e38F, 3e38F, 0.0F}, L::kOutOfRange},
       {{10.0F, 0.0F, 3e38F}, L::kOutOfRange}, {{10.0F, 0.0F, -1e6F}, L::kOutOfRange},
-      {{-10.0F, -0.0F, 0.0F}, L::kStatic},  {{-10.0F, 1e-45F, 1e-45F}, L::kStatic},
+      {{-10.0F, -0.0F, 0.0F}, L::kStatic},    {{-10.0F, 1e-45F, 1e-45F}, L::kStatic},
   };
   std::vector<Eigen::Vector3f> points;
   for (const Case& c : cases) points.push_back(c.point);
@@ -130,9 +128,10 @@ TEST_CASE("points that are no measurements get a label that says so") {
 TEST_CASE("bad points among good ones change nothing for the good ones") {
   std::vector<Scan> scans = good_scans();
   const Run clean = run_paper(scans);
-  const std::vector<Eigen::Vector3f> bad = {
-      Eigen::Vector3f::Constant(std::nanf("")), Eigen::Vector3f::Zero(),
-      {std::numeric_limits<float>::infinity(), 1.0F, 2.0F}, {1e20F, 1e20F, 1e20F}};
+  const std::vector<Eigen::Vector3f> bad = {Eigen::Vector3f::Constant(std::nanf("")),
+                                            Eigen::Vector3f::Zero(),
+                                            {std::numeric_limits<float>::infinity(), 1.0F, 2.0F},
+                                            {1e20F, 1e20F, 1e20F}};
   std::vector<std::vector<bool>> is_bad;
   for (Scan& scan : scans) {
     std::vector<Eigen::Vector3f> mixed;

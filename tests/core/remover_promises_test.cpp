@@ -105,8 +105,7 @@ TEST_CASE("every scan gets one final verdict, in order, with one label per point
     ++next;
   };
   for (std::size_t i = 0; i < scans.size(); ++i) {
-    const FrameResult frame =
-        remover.push(scans[i].points, scans[i].T_world_sensor, scans[i].time);
+    const FrameResult frame = remover.push(scans[i].points, scans[i].T_world_sensor, scans[i].time);
     CHECK(frame.newest.scan == i);
     CHECK(frame.newest.labels.size() == scans[i].points.size());
     CHECK(frame.finished.has_value() == (i >= remover.latency()));
@@ -278,9 +277,9 @@ TEST_CASE("instance ids stay with an object and are never shared") {
     }
     std::set<std::uint32_t> ids;
     for (const auto& [object, counts] : votes) {
-      const auto most = std::max_element(
-          counts.begin(), counts.end(),
-          [](const auto& a, const auto& b) { return a.second < b.second; });
+      const auto most =
+          std::max_element(counts.begin(), counts.end(),
+                           [](const auto& a, const auto& b) { return a.second < b.second; });
       CHECK(most->first != kNoInstance);
       CHECK(ids.insert(most->first).second);
       if (object == kAddedBox) ids_of_van.insert(most->first);
@@ -380,9 +379,9 @@ TEST_CASE("both sides of min_range and max_range, horizontally") {
   config.min_range = 3.0;
   config.max_range = 50.0;
   DynaInsRemover remover(config);
-  const std::vector<Eigen::Vector3f> points = {
-      {2.999F, 0.0F, 1.0F}, {3.0F, 0.0F, 1.0F}, {0.0F, -50.0F, 1.0F}, {0.0F, -50.01F, 1.0F},
-      {0.0F, 0.0F, 5.0F},   {2.0F, 2.3F, 40.0F}};
+  const std::vector<Eigen::Vector3f> points = {{2.999F, 0.0F, 1.0F}, {3.0F, 0.0F, 1.0F},
+                                               {0.0F, -50.0F, 1.0F}, {0.0F, -50.01F, 1.0F},
+                                               {0.0F, 0.0F, 5.0F},   {2.0F, 2.3F, 40.0F}};
   const FrameResult frame = remover.push(points, Eigen::Isometry3d::Identity());
   using L = PointLabel;
   CHECK((std::vector<L>(frame.newest.labels.begin(), frame.newest.labels.end()) ==

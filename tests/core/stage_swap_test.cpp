@@ -113,7 +113,8 @@ struct OwnEverything {
   using Map = CountingMap;
 };
 
-TEST_CASE("a ground stage of one's own decides what is ground, and its config is part of the whole") {
+TEST_CASE(
+    "a ground stage of one's own decides what is ground, and its config is part of the whole") {
   const std::vector<Scan> scans = drive(yard(), 5, 0.0);
   BasicDynaInsRemover<OwnGround>::Config config;
   config.ground.flat_ground_below = -1.25;

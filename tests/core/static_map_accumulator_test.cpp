@@ -139,8 +139,7 @@ TEST_CASE("at UTM coordinates the map keeps a tenth of a millimetre") {
     StaticMapAccumulator single = make(0.0);
     single.insert(one, {}, T);
     const Eigen::Vector3d expected = T * Eigen::Vector3d(one.x[0], one.y[0], one.z[0]);
-    single.for_each(
-        [&](const Eigen::Vector3d& p) { REQUIRE((p - expected).norm() < 1e-4); });
+    single.for_each([&](const Eigen::Vector3d& p) { REQUIRE((p - expected).norm() < 1e-4); });
     REQUIRE(single.size() == 1);
   }
 }
@@ -178,8 +177,7 @@ TEST_CASE("a region holds exactly the points that a filter over the map finds") 
       if (box.contains(Eigen::Vector3d(p[0], p[1], p[2]))) expected.push_back(p);
     }
     std::vector<Coordinates> found;
-    map.for_each_in(
-        box, [&](const Eigen::Vector3d& p) { found.push_back({p.x(), p.y(), p.z()}); });
+    map.for_each_in(box, [&](const Eigen::Vector3d& p) { found.push_back({p.x(), p.y(), p.z()}); });
     std::sort(found.begin(), found.end());
     REQUIRE((found == expected));
     return found.size();

@@ -59,7 +59,8 @@ inline Run run_paper(const std::vector<Scan>& scans) {
   return run(DynaInsRemover::Config::paper(), scans);
 }
 
-/// Points of one object (all objects if `object` is kAnyObject), and how many of them carry a label.
+/// Points of one object (all objects if `object` is kAnyObject), and how many of them carry a
+/// label.
 inline constexpr int kAnyObject = -2;
 struct Share {
   std::size_t labelled = 0;

@@ -1,0 +1,59 @@
+// Swap a stage: a ground segmentation of your own, everything else as it is.
+#include <algorithm>
+#include <cstdio>
+#include <dynains/dyna_ins_remover.hpp>
+#include <vector>
+
+// For flat halls: the floor is whatever lies lower than a threshold.
+class FloorByHeight {
+ public:
+  struct Config {
+    double floor_below = -1.5;  ///< m, sensor frame
+
+    template <class Self, class Visitor>
+    static void visit(Self& self, Visitor&& visitor) {  // bounds, config files, --help: all of it
+      visitor(dynains::Parameter{"floor_below", self.floor_below, dynains::closed(-50, 0), "m",
+                                 "points lower than this are the floor"});
+    }
+    void validate() const { dynains::validate_parameters("FloorByHeight", *this); }
+  };
+
+  explicit FloorByHeight(const Config& config) : config_(config) {}
+
+  // Ground first, everything else behind; `source` remembers where each point came from.
+  void segment(dynains::PointsView scan, dynains::GroundSplit& split) const {
+    split.resize(scan.size());
+    std::size_t next = 0;
+    const auto take = [&](bool ground) {
+      for (std::size_t i = 0; i < scan.size(); ++i) {
+        if ((scan.z[i] < config_.floor_below) != ground) continue;
+        split.points.x[next] = scan.x[i];
+        split.points.y[next] = scan.y[i];
+        split.points.z[next] = scan.z[i];
+        split.source[next++] = static_cast<std::uint32_t>(i);
+      }
+    };
+    take(true);
+    split.ground_count = next;
+    take(false);
+  }
+
+ private:
+  Config config_;
+};
+
+struct HallStages : dynains::DefaultStages {
+  using Ground = FloorByHeight;  // likewise Clusterer, Descriptor, Belief, Map
+};
+
+int main() {
+  dynains::BasicDynaInsRemover<HallStages>::Config config;
+  config.ground.floor_below = -0.9;
+  dynains::BasicDynaInsRemover<HallStages> remover(config);
+
+  const std::vector<Eigen::Vector3d> scan = {{5, 0, -1}, {5, 1, -1}, {5, 0, 0}, {5, 0, 1}};
+  const auto labels = remover.push(scan, Eigen::Isometry3d::Identity()).newest.labels;
+  const auto floor = std::count(labels.begin(), labels.end(), dynains::PointLabel::kGround);
+  std::printf("%d of %zu points are floor\n", static_cast<int>(floor), scan.size());
+  return floor == 2 ? 0 : 1;
+}
