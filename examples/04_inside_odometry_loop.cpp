@@ -16,8 +16,8 @@ Cloud read_scan(double x, double time) {
     }
   }
   for (double along = 0.0; along < 4.0; along += 0.1) {
-    for (double z = -1.0; z < 0.6; z += 0.2)
-      points.emplace_back(25.0 + along - 10.0 * time - x, 3.0, z);
+    const double car_x = 25.0 - 10.0 * time + along;
+    for (double z = -1.0; z < 0.6; z += 0.2) points.emplace_back(car_x - x, 3.0, z);
   }
   return points;
 }
@@ -29,7 +29,9 @@ Eigen::Isometry3d align(const Cloud& still, const Eigen::Isometry3d& T_world_pre
 }
 
 int main() {
-  dynains::DynaInsRemover remover;
+  dynains::DynaInsRemover::Config config;
+  config.build_map = false;  // poses are predictions here; the map of an odometry is its own
+  dynains::DynaInsRemover remover(config);
   const Eigen::Isometry3d T_last_newest(Eigen::Translation3d(0.5, 0.0, 0.0));  // constant speed
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
   std::size_t removed = 0;
@@ -55,7 +57,6 @@ int main() {
     T_world_sensor = align(still, T_world_sensor);
   }
 
-  remover.flush([](const dynains::ScanVerdict&) {});
-  std::printf("%zu points moved, %zu are on the map\n", removed, remover.map().size());
+  std::printf("%zu points moved and never reached the registration\n", removed);
   return removed > 0 ? 0 : 1;
 }
