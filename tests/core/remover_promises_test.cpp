@@ -196,6 +196,18 @@ TEST_CASE("the first scan alone shows nothing to be dynamic; two scans do") {
   CHECK(dynamic_count(run_paper({scans[0]}).final) == 0);
 }
 
+TEST_CASE("each window is judged on its own: nothing older than K scans has a say") {
+  const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
+  const Run whole = run_paper(scans);
+  for (std::ptrdiff_t last = 4; last < 8; ++last) {
+    const std::vector<Scan> window(scans.begin() + last - 3, scans.begin() + last + 1);
+    const Verdict newest = run_paper(window).newest.back();
+    const Verdict& expected = whole.newest[static_cast<std::size_t>(last)];
+    CHECK((newest.labels == expected.labels));
+    CHECK((newest.beliefs == expected.beliefs));
+  }
+}
+
 TEST_CASE("what only one scan saw is static: nothing shows that it moved") {
   std::vector<Scan> scans = drive(yard(), 9, 0.0);
   scans[4] = yard_with(van(12.0, 3.0)).scan(sensor_at(0.0), scans[4].time);
