@@ -59,7 +59,7 @@ SensorModel sensor_model(Sensor sensor) {
       model.yaw = kPi / 2;
       break;
     case Sensor::kLivox:
-      set(24000, 1.2, 100, 0.5, 60);
+      set(30000, 1.2, 100, 0.5, 60);
       break;
   }
   return model;

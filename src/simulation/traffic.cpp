@@ -71,7 +71,7 @@ void Traffic::enter(Flow& flow, double s) {
   const Waypoint at = lanes[flow.lane].route.at(s);
   footprint.centre = at.position;
   footprint.heading = at.heading;
-  footprint.half_length = objects[object].size.length / 2 + 3;
+  footprint.half_length = objects[object].size.length / 2 + 3 + 0.5 * speed;
   footprint.half_width = objects[object].size.width / 2;
   // Nobody appears inside somebody else.
   for (const Driver& driver : drivers) {

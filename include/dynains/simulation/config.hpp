@@ -30,7 +30,7 @@ enum class Sensor {
   kOs1_64,    ///< 64 beams, +-22.5 deg, 1024 columns
   kOs0_128,   ///< 128 beams, +-45 deg, 1024 columns
   kPandar64,  ///< 64 beams, dense around the horizon, 1800 columns; forward is -y
-  kLivox,     ///< non-repetitive rosette, 70 deg cone forward, 24,000 beams a scan
+  kLivox,     ///< non-repetitive rosette, 70 deg cone forward, 30,000 beams a scan
 };
 
 /// Which points of an object that moves at some time count as moving.
