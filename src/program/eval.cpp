@@ -73,8 +73,10 @@ void add_eval_command(CLI::App& program) {
   command.add_option("sequence", options->sequence, "labelled sequence (SemanticKITTI folder)")
       ->required();
   command.add_option("runs", options->runs, "output folders of `dynains run`");
-  command.add_option("--map", options->maps,
-                     "map file to judge (PLY or PCD, world frame of the poses); can be repeated");
+  command
+      .add_option("--map", options->maps,
+                  "map file to judge (PLY or PCD, world frame of the poses); can be repeated")
+      ->allow_extra_args(false);
   add_window_options(command, options->window);
   command.add_flag("--online", options->online, "judge the zero-latency labels, OUT/online");
   command.add_flag("--errors", options->errors,

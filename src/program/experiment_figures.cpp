@@ -55,6 +55,7 @@ VerdictCloud collect(const FiguresOptions& options) {
   }
   evaluation::LabelledScan scan;
   for (std::size_t i = 0; source(i, scan); ++i) cloud.add(scan);
+  cloud.drop_covered();
   return cloud;
 }
 

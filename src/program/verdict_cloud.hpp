@@ -5,7 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <unordered_set>
+#include <unordered_map>
 #include <vector>
 
 #include "dynains/evaluation/scan.hpp"
@@ -43,6 +43,10 @@ class VerdictCloud {
   /// Adds the points of a scan as estimate 0 judges them.
   void add(const evaluation::LabelledScan& scan);
 
+  /// After the last scan: drops what the map shows all the same, namely lost static points where
+  /// other scans kept some, and removed dynamic points where others were missed.
+  void drop_covered();
+
   /// Position of the first sensor in the world, m.
   const Eigen::Vector3d& origin() const { return origin_; }
   const std::vector<Point>& points() const { return points_; }
@@ -57,7 +61,8 @@ class VerdictCloud {
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   std::vector<Point> points_;
   std::vector<Eigen::Vector3d> path_;
-  std::unordered_set<std::uint64_t> taken_;
+  std::vector<std::uint64_t> voxels_;                      // of each point
+  std::unordered_map<std::uint64_t, std::uint8_t> fates_;  // per voxel, one bit each
 };
 
 }  // namespace dynains::program

@@ -96,6 +96,23 @@ TEST_CASE("A cloud of verdicts keeps one point per voxel and fate") {
   CHECK(cloud.origin().x() == 1e6);
 }
 
+TEST_CASE("What the map shows all the same is not lost") {
+  OwnedScan scan;
+  scan.add(10.01F, 0.01F, 0.01F, kRoad, 0);  // lost, but kept in the same voxel
+  scan.add(10.02F, 0.01F, 0.01F, kRoad, 1);
+  scan.add(12.01F, 0.01F, 0.01F, kRoad, 0);  // lost for good
+  scan.add(14.01F, 0.01F, 0.01F, kMovingCar, 1);
+  scan.add(14.02F, 0.01F, 0.01F, kMovingCar, 0);  // removed, but missed in the same voxel
+  VerdictCloud cloud(0.1, 2.7, 50, evaluation::TruthClasses());
+  cloud.add(scan.view());
+  CHECK(cloud.points().size() == 5);
+  cloud.drop_covered();
+  REQUIRE(cloud.points().size() == 3);
+  CHECK(cloud.points()[0].fate == Fate::kKeptStatic);
+  CHECK(cloud.points()[1].fate == Fate::kLostStatic);
+  CHECK(cloud.points()[2].fate == Fate::kMissedDynamic);
+}
+
 TEST_CASE("Figures show each fate where it is and in its colour") {
   const VerdictCloud cloud = four_fates();
   // 20 m by 20 m on 200 pixels: x to the right, y up.
