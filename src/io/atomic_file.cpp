@@ -47,8 +47,8 @@ class AtomicFile::Buffer : public std::streambuf {
   /// errno of the first failure, 0 if none.
   int error() const { return error_; }
 
-  void flush_to_disk() {
-    if (sync() != 0) return;
+  void flush(Sync when) {
+    if (sync() != 0 || when == Sync::kLater) return;
     // Without this, a power cut after the rename can leave an empty file under the final name.
     // Some file systems cannot sync single files (EINVAL); the rename is still atomic there.
     if (::fsync(descriptor_) != 0 && errno != EINVAL) error_ = errno;
@@ -110,14 +110,23 @@ AtomicFile::~AtomicFile() {
   fs::remove(temporary_, ignored);
 }
 
-void AtomicFile::commit() {
-  buffer_->flush_to_disk();
+void AtomicFile::commit(Sync sync) {
+  buffer_->flush(sync);
   buffer_->close();
   if (buffer_->error() != 0) fail_with(target_, "cannot be written to the end", buffer_->error());
   std::error_code error;
   fs::rename(temporary_, target_, error);
   if (error) fail_with(target_, "cannot be put in place", error.value());
   committed_ = true;
+}
+
+void sync_files(const fs::path& folder) {
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) fail_with(folder, "cannot be written to the disk", errno);
+  const int result = ::syncfs(descriptor);
+  const int error = errno;
+  ::close(descriptor);
+  if (result != 0) fail_with(folder, "cannot be written to the disk", error);
 }
 
 }  // namespace dynains

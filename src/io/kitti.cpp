@@ -57,7 +57,7 @@ void write_all(const fs::path& path, Span<const T> values) {
   AtomicFile file(path);
   file.stream().write(reinterpret_cast<const char*>(values.data()),
                       static_cast<std::streamsize>(values.size() * sizeof(T)));
-  file.commit();
+  file.commit(AtomicFile::Sync::kLater);
 }
 
 /// The numbers of a line, all finite, exactly as many as `values` has.

@@ -10,6 +10,7 @@
 #include "command.hpp"
 #include "dynains/dyna_ins_remover.hpp"
 #include "dynains/errors.hpp"
+#include "dynains/io/atomic_file.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "evaluation_options.hpp"
@@ -173,6 +174,8 @@ void run(const RunOptions& options) {
   description.map = name_of_map(outputs);
   description.configuration = to_json(config);
   write_timing(outputs.folder / "timing.csv", timing);
+  // The report must not claim what a power cut could still take.
+  sync_files(outputs.folder);
   write_report(outputs.folder / "report.json", make_report(description, results, timing));
   if (!options.quiet) print_summary(results, timing, outputs);
   if (!description.complete) throw Interrupted{InterruptGuard::signal()};

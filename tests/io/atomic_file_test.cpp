@@ -24,6 +24,17 @@ TEST_CASE("AtomicFile replaces the target at commit and not before") {
   CHECK(count_entries(folder.path()) == 1);
 }
 
+TEST_CASE("Files can be brought to the disk later, all at once") {
+  TemporaryFolder folder;
+  AtomicFile file(folder / "a.txt");
+  file.stream() << "new";
+  file.commit(AtomicFile::Sync::kLater);
+  CHECK(read_text(folder / "a.txt") == "new");
+  sync_files(folder.path());
+  CHECK_THAT(message_of<IoError>([&] { sync_files(folder / "none"); }),
+             ContainsSubstring("none: cannot be written to the disk: No such file"));
+}
+
 TEST_CASE("AtomicFile without commit leaves no trace") {
   TemporaryFolder folder;
   {

@@ -72,6 +72,7 @@ class KittiSequence {
 std::vector<std::uint32_t> read_labels(const std::filesystem::path& file, std::size_t count);
 
 /// Writers of the same layout. Each file appears whole or not at all; folders must exist.
+/// Scans and labels are many and not brought to the disk one by one: see `sync_files()`.
 /// Throw IoError.
 void write_scan(const std::filesystem::path& file, Span<const float> xyzi);
 void write_labels(const std::filesystem::path& file, Span<const std::uint32_t> labels);

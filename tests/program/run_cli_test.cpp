@@ -1,0 +1,402 @@
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/io/kitti.hpp"
+#include "dynains/io/point_file.hpp"
+#include "io/files.hpp"
+#include "program/start.hpp"
+#include "program/tiny_sequence.hpp"
+#include "support/catch.hpp"
+
+using namespace dynains;
+using namespace dynains::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A sequence, and a folder for the results that does not exist yet. Names have a blank.
+struct Fixture {
+  explicit Fixture(std::size_t scans = 12) : seq(folder / "a seq"), out(folder / "an out") {
+    write_tiny_sequence(seq, scans);
+  }
+  Outcome run(std::vector<std::string> more = {}) const {
+    std::vector<std::string> arguments = {"run", seq, "--out", out};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return start(arguments);
+  }
+  nlohmann::json report() const { return nlohmann::json::parse(read_text(out + "/report.json")); }
+  std::size_t labels() const { return count_entries(out + "/labels"); }
+
+  TemporaryFolder folder;
+  std::string seq;
+  std::string out;
+};
+
+std::size_t count_lines(const std::string& text) {
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+}  // namespace
+
+TEST_CASE("run writes labels, map, moving points, report and timing, and nothing else") {
+  const Fixture fixture;
+  const Outcome outcome = fixture.run();
+  CAPTURE(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK_THAT(outcome.out, ContainsSubstring("12 scans"));
+  CHECK(count_entries(fixture.out) == 5);
+  CHECK(fixture.labels() == 12);
+
+  std::uint64_t points = 0;
+  std::uint64_t moving = 0;
+  for (std::size_t i = 0; i < 12; ++i) {
+    const std::size_t count = tiny_scan(i).size() / 4;
+    points += count;
+    for (const std::uint32_t label :
+         read_labels(fixture.out + "/labels/" + scan_name(i) + ".label", count)) {
+      const std::uint32_t id = label & 0xFFFF;
+      CHECK((id == 251 || id == 9 || id == 0));
+      if (id == 251) ++moving;
+    }
+  }
+  const nlohmann::json report = fixture.report();
+  CHECK(report["program"] == "dynains");
+  CHECK(report["complete"] == true);
+  CHECK(report["first_scan"] == "000000");
+  CHECK(report["last_scan"] == "000011");
+  CHECK(report["scans"] == 12);
+  CHECK(report["points"] == points);
+  CHECK(report["labels"]["dynamic"] == moving);
+  CHECK(moving > 0);
+  CHECK(report["preset"] == "default");
+  CHECK(report["peak_memory_bytes"] > 1000000);
+  for (const char* stage : {"ingest", "ground", "cluster", "map", "total"}) {
+    const nlohmann::json& ms = report["milliseconds"][stage];
+    CHECK(ms["median"] <= ms["p95"]);
+    CHECK(ms["p95"] <= ms["p99"]);
+    CHECK(ms["p99"] <= ms["max"]);
+  }
+  CHECK(report["static_map"]["file"] == "static_map.ply");
+  CHECK(read_points(fixture.out + "/static_map.ply").positions.size() ==
+        report["static_map"]["points"]);
+  CHECK(read_points(fixture.out + "/dynamic_points.ply").positions.size() == moving);
+
+  const std::string timing = read_text(fixture.out + "/timing.csv");
+  CHECK_THAT(timing, StartsWith("scan,points,ingest_ms,"));
+  CHECK(count_lines(timing) == 13);
+}
+
+TEST_CASE("The same input gives the same bytes") {
+  const Fixture a;
+  const Fixture b;
+  REQUIRE(a.run({"--write-online"}).code == 0);
+  REQUIRE(b.run({"--write-online"}).code == 0);
+  for (const char* file : {"/static_map.ply", "/dynamic_points.ply", "/labels/000005.label",
+                           "/online/000005.label", "/labels/000011.label"}) {
+    CHECK(read_text(a.out + file) == read_text(b.out + file));
+  }
+}
+
+TEST_CASE("Progress is plain lines in a pipe, and silence with --quiet") {
+  const Fixture fixture;
+  const Outcome loud = fixture.run();
+  CHECK_THAT(loud.err, ContainsSubstring("12 of 12 scans\n"));
+  CHECK(loud.err.find('\r') == std::string::npos);
+  const Outcome quiet = fixture.run({"--quiet", "--force"});
+  CHECK(quiet.code == 0);
+  CHECK(quiet.out.empty());
+  CHECK(quiet.err.empty());
+}
+
+TEST_CASE("--start and --end are scan numbers, both included") {
+  const Fixture fixture;
+  REQUIRE(fixture.run({"--start", "3", "--end", "7"}).code == 0);
+  CHECK(fixture.labels() == 5);
+  CHECK(fs::exists(fixture.out + "/labels/000003.label"));
+  CHECK(fs::exists(fixture.out + "/labels/000007.label"));
+  CHECK(fixture.report()["scans"] == 5);
+}
+
+TEST_CASE("--map and --map-voxel") {
+  const Fixture fixture;
+  const std::string map = fixture.folder / "my map.pcd";
+  REQUIRE(fixture.run({"--map", map, "--map-voxel", "0"}).code == 0);
+  CHECK_FALSE(fs::exists(fixture.out + "/static_map.ply"));
+  const nlohmann::json report = fixture.report();
+  // Without voxels every point that is kept is in the map.
+  CHECK(read_points(map).positions.size() == report["labels"]["ground"].get<std::size_t>() +
+                                                 report["labels"]["static"].get<std::size_t>());
+
+  REQUIRE(fixture.run({"--force", "--map-voxel", "1"}).code == 0);
+  CHECK(read_points(fixture.out + "/static_map.ply").positions.size() <
+        read_points(map).positions.size() / 4);
+
+  REQUIRE(fixture.run({"--force", "--build-map", "false"}).code == 0);
+  CHECK_FALSE(fs::exists(fixture.out + "/static_map.ply"));
+  CHECK(fixture.report()["static_map"].is_null());
+}
+
+TEST_CASE("Preset, config file and flags: the later wins") {
+  const Fixture fixture;
+  const std::string config = fixture.folder / "run.cfg";
+  write_text(config, "tau-s = 0.5\nwindow = 5\n");
+  REQUIRE(fixture.run({"--preset", "paper", "--config", config, "--window", "6"}).code == 0);
+  const nlohmann::json report = fixture.report();
+  CHECK(report["preset"] == "paper");
+  CHECK(report["configuration"]["tau_s"] == 0.5);
+  CHECK(report["configuration"]["window"] == 6);
+  CHECK(report["configuration"]["p_inc"] == 0.7);
+}
+
+TEST_CASE("What config prints, run takes, for every parameter") {
+  const Fixture fixture;
+  const std::string preset = GENERATE("default", "paper");
+  const Outcome printed = start({"config", "--preset", preset});
+  REQUIRE(printed.code == 0);
+  const std::string config = fixture.folder / "run.cfg";
+  write_text(config, printed.out);
+  // The other preset, so that only the file can bring the values.
+  REQUIRE(
+      fixture.run({"--config", config, "--preset", preset == "paper" ? "default" : "paper"}).code ==
+      0);
+  const std::string help = start({"run", "--help"}).out;
+  const nlohmann::json configuration = fixture.report()["configuration"];
+  std::size_t parameters = 0;
+  const DynaInsRemover::Config expected =
+      preset == "paper" ? DynaInsRemover::Config::paper() : DynaInsRemover::Config();
+  DynaInsRemover::Config::visit(expected, [&](const auto& parameter) {
+    ++parameters;
+    std::string flag = parameter.name;
+    std::replace(flag.begin(), flag.end(), '_', '-');
+    CAPTURE(flag);
+    CHECK(configuration.at(parameter.name) == parameter.value);
+    CHECK_THAT(help, ContainsSubstring("--" + flag + " "));
+    CHECK_THAT(printed.out, ContainsSubstring("\n" + flag + " = "));
+  });
+  CHECK(configuration.size() == parameters);
+}
+
+TEST_CASE("Results replace earlier ones by --force only, and whole") {
+  const Fixture fixture;
+  const std::string map = fixture.out + "/first.pcd";
+  REQUIRE(fixture.run({"--write-online", "--map", map}).code == 0);
+  write_text(fixture.out + "/notes.txt", "mine");
+
+  const std::string before = read_text(fixture.out + "/report.json");
+  const Outcome refused = fixture.run();
+  CHECK(refused.code == 1);
+  CHECK_THAT(refused.err,
+             StartsWith("dynains: error: " + fixture.out) && ContainsSubstring("--force"));
+  CHECK(read_text(fixture.out + "/report.json") == before);
+
+  REQUIRE(fixture.run({"--force", "--end", "4"}).code == 0);
+  CHECK(fixture.labels() == 5);
+  CHECK_FALSE(fs::exists(fixture.out + "/online"));
+  CHECK_FALSE(fs::exists(map));
+  CHECK(fs::exists(fixture.out + "/static_map.ply"));
+  CHECK(read_text(fixture.out + "/notes.txt") == "mine");
+}
+
+TEST_CASE("A folder that is no result is never written to") {
+  const Fixture fixture;
+  fs::create_directory(fixture.seq + "/labels");
+  write_text(fixture.seq + "/labels/000000.label", "by hand");
+  const Outcome outcome = start({"run", fixture.seq, "--out", fixture.seq, "--force"});
+  CHECK(outcome.code == 1);
+  CHECK_THAT(outcome.err, ContainsSubstring("holds no earlier results"));
+  CHECK(read_text(fixture.seq + "/labels/000000.label") == "by hand");
+}
+
+TEST_CASE("Wrong flags: exit code 2, one line, nothing written") {
+  const Fixture fixture;
+  const std::string config = fixture.folder / "run.cfg";
+  write_text(config, "window = 4\n# more\ntau-x = 1\n");
+  struct Case {
+    std::vector<std::string> flags;
+    std::string expected;
+  };
+  const std::vector<Case> cases = {
+      {{"--tau-s", "7"}, "--tau-s = 7: expected FLOAT in [0, 1]"},
+      {{"--window", "many"}, "--window = many: expected INT in"},
+      {{"--votes", "9", "--window", "4"}, "votes = 9 must be at most window = 4"},
+      {{"--tau-x", "1"}, "--tau-x"},
+      {{"--config", config}, "run.cfg:3: tau-x: unknown parameter"},
+      {{"--preset", "best"}, "best not in"},
+      {{"--start", "12"}, "--start and --end leave no scan of 000000 to 000011"},
+      {{"--start", "5", "--end", "4"}, "--start and --end leave no scan"},
+      {{"--start", "-1"}, "--start"},
+      {{"--map", "a.las"}, "a.las: expected a name that ends in .ply or .pcd"},
+      {{"--map", "a.ply", "--build-map", "false"}, "--map needs --build-map true"},
+      {{"--map", fixture.out + "/dynamic_points.ply"}, "the moving points go there"},
+  };
+  for (const Case& wrong : cases) {
+    const Outcome outcome = fixture.run(wrong.flags);
+    CAPTURE(wrong.expected);
+    CHECK(outcome.code == 2);
+    CHECK_THAT(outcome.err, StartsWith("dynains: error: ") && ContainsSubstring(wrong.expected));
+    CHECK(count_lines(outcome.err) == 1);
+    CHECK_FALSE(fs::exists(fixture.out));
+  }
+}
+
+TEST_CASE("Broken input: exit code 1, one line, earlier results as they were") {
+  const Fixture fixture;
+  REQUIRE(fixture.run().code == 0);
+  const std::string before = read_text(fixture.out + "/report.json");
+  std::string expected;
+  std::vector<std::string> flags = {"--force"};
+  SECTION("truncated scan") {
+    write_text(fixture.seq + "/velodyne/000011.bin", std::string(33, '\0'));
+    expected = "000011.bin: truncated at byte 33";
+  }
+  SECTION("no poses") {
+    fs::remove(fixture.seq + "/poses.txt");
+    expected = "poses.txt: not found";
+  }
+  SECTION("short poses") {
+    write_text(fixture.seq + "/poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+    expected = "poses.txt:2: expected a row for each scan, at least 12, found 1";
+  }
+  SECTION("a pose that is not rigid") {
+    write_text(fixture.seq + "/poses.txt", "2 0 0 0 0 1 0 0 0 0 1 0\n");
+    expected = "poses.txt:1: expected a rigid transform";
+  }
+  SECTION("time that runs back") {
+    write_text(fixture.seq + "/times.txt", "0.2\n0.1\n");
+    expected = "times.txt:2: expected a time after";
+  }
+  SECTION("no scans") {
+    fs::remove_all(fixture.seq + "/velodyne");
+    expected = "velodyne: not found";
+  }
+  SECTION("no sequence") {
+    fs::remove_all(fixture.seq);
+    expected = "a seq: is not a folder";
+  }
+  SECTION("no config file") {
+    flags.insert(flags.end(), {"--config", "/no/such.cfg"});
+    expected = "/no/such.cfg: cannot be read";
+  }
+  SECTION("a map that cannot be written") {
+    flags.insert(flags.end(), {"--map", "/no/such/map.ply"});
+    expected = "/no/such/map.ply: cannot be written: No such file or directory";
+  }
+  const Outcome outcome = fixture.run(flags);
+  CHECK(outcome.code == 1);
+  CHECK_THAT(outcome.err, StartsWith("dynains: error: ") && ContainsSubstring(expected));
+  CHECK(count_lines(outcome.err) == 1);
+  CHECK(read_text(fixture.out + "/report.json") == before);
+  CHECK(fixture.labels() == 12);
+}
+
+TEST_CASE("An output folder that cannot be written") {
+  const Fixture fixture;
+  write_text(fixture.folder / "file", "");
+  const Outcome outcome = start({"run", fixture.seq, "--out", fixture.folder / "file/out"});
+  CHECK(outcome.code == 1);
+  CHECK_THAT(outcome.err,
+             StartsWith("dynains: error: ") && ContainsSubstring("file/out: cannot be created"));
+}
+
+TEST_CASE("Strange scans get labels like all others") {
+  const Fixture fixture;
+  const float nan = std::nanf("");
+  const float inf = std::numeric_limits<float>::infinity();
+  const fs::path velodyne = fs::path(fixture.seq) / "velodyne";
+  const std::vector<float> none;
+  const std::vector<float> one = {5.0F, 0.0F, 0.0F, 1.0F};
+  const std::vector<float> bad = {nan,   1.0F, 2.0F, 0.0F,  //
+                                  1.0F,  inf,  2.0F, nan,   //
+                                  0.0F,  0.0F, 0.0F, 0.0F,  //
+                                  1e30F, 0.0F, 0.0F, 0.0F};
+  write_scan(velodyne / "000003.bin", none);
+  write_scan(velodyne / "000004.bin", one);
+  write_scan(velodyne / "000005.bin", bad);
+  std::vector<float> same;
+  for (int i = 0; i < 5000; ++i) same.insert(same.end(), {8.0F, -0.0F, 0.5F, 0.0F});
+  write_scan(velodyne / "000006.bin", same);
+  const Outcome outcome = fixture.run();
+  CAPTURE(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK(read_labels(fixture.out + "/labels/000003.label", 0).empty());
+  CHECK(read_labels(fixture.out + "/labels/000004.label", 1).size() == 1);
+  CHECK(read_labels(fixture.out + "/labels/000005.label", 4) ==
+        std::vector<std::uint32_t>{0, 0, 0, 0});
+  CHECK(read_labels(fixture.out + "/labels/000006.label", 5000).size() == 5000);
+  CHECK(fixture.report()["labels"]["invalid"] == 3);
+}
+
+TEST_CASE("Maps far from the origin lose nothing") {
+  const Fixture near;
+  const Fixture far;
+  const Eigen::Vector3d utm(691234.5, 5334567.25, 512.0);
+  write_tiny_sequence(far.seq, 12, utm);
+  REQUIRE(near.run({"--map-voxel", "0"}).code == 0);
+  REQUIRE(far.run({"--map-voxel", "0"}).code == 0);
+  CHECK_THAT(read_text(near.out + "/static_map.ply").substr(0, 200),
+             ContainsSubstring("property float x"));
+  CHECK_THAT(read_text(far.out + "/static_map.ply").substr(0, 200),
+             ContainsSubstring("property double x"));
+  for (const char* file : {"/static_map.ply", "/dynamic_points.ply"}) {
+    const auto by_place = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+      return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+    };
+    std::vector<Eigen::Vector3d> a = read_points(near.out + file).positions;
+    std::vector<Eigen::Vector3d> b = read_points(far.out + file).positions;
+    REQUIRE(a.size() == b.size());
+    REQUIRE(!a.empty());
+    const auto mean = [](const std::vector<Eigen::Vector3d>& points,
+                         const Eigen::Vector3d& origin) {
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      for (const Eigen::Vector3d& point : points) sum += point - origin;
+      return Eigen::Vector3d(sum / static_cast<double>(points.size()));
+    };
+    CHECK((mean(a, Eigen::Vector3d::Zero()) - mean(b, utm)).norm() < 1e-5);
+    const auto low = std::min_element(a.begin(), a.end(), by_place);
+    const auto far_low = std::min_element(b.begin(), b.end(), by_place);
+    CHECK((*low + utm - *far_low).cwiseAbs().x() < 1e-4);
+  }
+}
+
+TEST_CASE("Ctrl-C: the scan at hand is finished, what is final is written, exit code 130") {
+  const Fixture fixture(400);
+  Process process({"run", fixture.seq, "--out", fixture.out});
+  for (int i = 0; i < 10000 && !fs::exists(fixture.out + "/labels/000000.label"); ++i) {
+    ::usleep(1000);
+  }
+  ::kill(process.id(), SIGINT);
+  const Outcome outcome = process.wait();
+  CAPTURE(outcome.err);
+  CHECK(outcome.code == 130);
+  const nlohmann::json report = fixture.report();
+  CHECK(report["complete"] == false);
+  const std::size_t scans = report["scans"];
+  CHECK(scans > 0);
+  CHECK(scans < 400);
+  CHECK(fixture.labels() == scans);
+  CHECK(report["last_scan"] == scan_name(scans - 1));
+  CHECK(read_points(fixture.out + "/static_map.ply").positions.size() ==
+        report["static_map"]["points"]);
+  CHECK(count_entries(fixture.out) == 5);
+}
+
+TEST_CASE("A real clip runs as published", "[data]") {
+  const fs::path clip = fs::path(DYNAINS_SHARED_DATA) / "kitti_van";
+  if (!fs::exists(clip)) {
+    WARN("skipped: no real recording at " << clip);
+    return;
+  }
+  TemporaryFolder folder;
+  const std::string out = folder / "out";
+  REQUIRE(start({"run", clip, "--out", out, "--preset", "paper"}).code == 0);
+  const Outcome outcome = start({"eval", clip, out, "--json", folder / "eval.json"});
+  CAPTURE(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK_THAT(outcome.out, ContainsSubstring("run"));
+}

@@ -1,0 +1,55 @@
+#include "run_report.hpp"
+
+#include "io/files.hpp"
+#include "support/catch.hpp"
+
+using namespace dynains::program;
+using namespace dynains::test;
+
+TEST_CASE("Quantiles are values that were measured") {
+  std::vector<double> hundred;
+  for (int i = 100; i >= 1; --i) hundred.push_back(i);
+  const TimeStatistics s = statistics(hundred);
+  CHECK(s.median == 50.0);
+  CHECK(s.p95 == 95.0);
+  CHECK(s.p99 == 99.0);
+  CHECK(s.max == 100.0);
+
+  const TimeStatistics one = statistics({7.0});
+  CHECK(one.median == 7.0);
+  CHECK(one.p99 == 7.0);
+  const TimeStatistics two = statistics({9.0, 3.0});
+  CHECK(two.median == 3.0);
+  CHECK(two.p95 == 9.0);
+  CHECK(statistics({}).max == 0.0);
+}
+
+TEST_CASE("timing.csv has a row for each scan") {
+  TemporaryFolder folder;
+  RunTiming timing;
+  timing.stages = {"ground", "map"};
+  timing.rows.push_back({"000007", 120000, {1.25, 0.5}, 2.0});
+  timing.rows.push_back({"000008", 0, {0.0, 0.0}, 0.00004});
+  write_timing(folder / "timing.csv", timing);
+  CHECK(read_text(folder / "timing.csv") ==
+        "scan,points,ground_ms,map_ms,total_ms\n"
+        "000007,120000,1.2500,0.5000,2.0000\n"
+        "000008,0,0.0000,0.0000,0.0000\n");
+}
+
+TEST_CASE("The map of an earlier run is known from its report, if it lies beside") {
+  TemporaryFolder folder;
+  const auto left_by = [&](const std::string& report) {
+    write_text(folder / "report.json", report);
+    return earlier_map(folder.path());
+  };
+  CHECK(earlier_map(folder.path()).empty());
+  CHECK(left_by(to_text(unfinished_report("my_map.pcd"))) == "my_map.pcd");
+  CHECK(left_by(to_text(unfinished_report(""))).empty());
+  CHECK(left_by(to_text(unfinished_report("/elsewhere/map.pcd"))).empty());
+  CHECK(left_by(to_text(unfinished_report("../map.pcd"))).empty());
+  CHECK(left_by(to_text(unfinished_report("notes.txt"))).empty());
+  CHECK(left_by("{").empty());
+  CHECK(left_by("[1]").empty());
+  CHECK(left_by("{\"static_map\": {\"file\": 3}}").empty());
+}

@@ -1,0 +1,75 @@
+#include <nlohmann/json.hpp>
+
+#include "dynains/io/kitti.hpp"
+#include "io/files.hpp"
+#include "program/start.hpp"
+#include "support/catch.hpp"
+
+using namespace dynains;
+using namespace dynains::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+Outcome simulate(const std::string& out, std::vector<std::string> more = {}) {
+  std::vector<std::string> arguments = {"simulate", out, "--sensor", "vlp16"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return start(arguments);
+}
+
+}  // namespace
+
+TEST_CASE("simulate makes a sequence that run and eval take, the same from the same seed") {
+  TemporaryFolder folder;
+  const std::string a = folder / "a";
+  const std::string b = folder / "b";
+  REQUIRE(simulate(a, {"--scans", "6", "--seed", "3"}).code == 0);
+  REQUIRE(simulate(b, {"--scans", "6", "--seed", "3", "--quiet"}).out.empty());
+  const KittiSequence sequence(a);
+  CHECK(sequence.size() == 6);
+  CHECK(sequence.read_labels(5).size() * 4 == sequence.read_scan(5).size());
+  for (const char* file : {"/velodyne/000005.bin", "/labels/000005.label", "/poses.txt",
+                           "/times.txt", "/simulation.json"}) {
+    CHECK(read_text(a + file) == read_text(b + file));
+  }
+  CHECK(nlohmann::json::parse(read_text(a + "/simulation.json"))["seed"] == 3);
+
+  const std::string out = folder / "out";
+  REQUIRE(start({"run", a, "--out", out}).code == 0);
+  const Outcome judged = start({"eval", a, out});
+  CAPTURE(judged.err);
+  CHECK(judged.code == 0);
+  CHECK_THAT(judged.out, ContainsSubstring("identity") && ContainsSubstring("oracle"));
+
+  // Labels that do not fit the scan.
+  write_text(a + "/labels/000002.label", "1234");
+  const Outcome refused = start({"eval", a, out});
+  CHECK(refused.code == 1);
+  CHECK_THAT(refused.err, StartsWith("dynains: error: ") &&
+                              ContainsSubstring("000002.label: has 4 bytes, expected"));
+}
+
+TEST_CASE("simulate replaces its own work by --force, and nobody else's") {
+  TemporaryFolder folder;
+  const std::string out = folder / "sim";
+  REQUIRE(simulate(out, {"--scans", "3"}).code == 0);
+  CHECK(simulate(out, {"--scans", "2"}).code == 1);
+  CHECK(KittiSequence(out).size() == 3);
+  REQUIRE(simulate(out, {"--scans", "2", "--force"}).code == 0);
+  CHECK(KittiSequence(out).size() == 2);
+
+  fs::remove(out + "/simulation.json");
+  const Outcome refused = simulate(out, {"--scans", "1", "--force"});
+  CHECK(refused.code == 1);
+  CHECK_THAT(refused.err, ContainsSubstring("no simulation.json"));
+  CHECK(KittiSequence(out).size() == 2);
+}
+
+TEST_CASE("simulate refuses what it does not know") {
+  TemporaryFolder folder;
+  const std::string out = folder / "sim";
+  CHECK_THAT(simulate(out, {"--scene", "moon"}).err, ContainsSubstring("moon not in"));
+  CHECK_THAT(simulate(out, {"--scans", "0"}).err, ContainsSubstring("--scans = 0: expected INT"));
+  CHECK(simulate(out, {"--scans", "0"}).code == 2);
+  CHECK_FALSE(fs::exists(out));
+}

@@ -1,0 +1,40 @@
+#include <algorithm>
+
+#include "dynains/version.hpp"
+#include "program/start.hpp"
+#include "support/catch.hpp"
+
+using namespace dynains::test;
+
+TEST_CASE("--version and --help") {
+  const Outcome version = start({"--version"});
+  CHECK(version.code == 0);
+  CHECK(version.out == std::string("dynains ") + dynains::kVersionString + "\n");
+  const Outcome help = start({"--help"});
+  CHECK(help.code == 0);
+  for (const char* command : {"run", "config", "simulate", "eval"}) {
+    CHECK_THAT(help.out, ContainsSubstring(command));
+    CHECK(start({command, "--help"}).code == 0);
+  }
+}
+
+TEST_CASE("Wrong usage is one line on standard error and exit code 2") {
+  struct Case {
+    std::vector<std::string> arguments;
+    std::string expected;
+  };
+  const std::vector<Case> cases = {
+      {{}, "expected a command"},         {{"walk"}, "walk"},
+      {{"run"}, "SEQ is required"},       {{"run", "seq"}, "--out is required"},
+      {{"run", "seq", "--out"}, "--out"}, {{"config", "--preset", "best"}, "best not in"},
+      {{"simulate"}, "OUT is required"},  {{"eval"}, "required"},
+  };
+  for (const Case& wrong : cases) {
+    const Outcome outcome = start(wrong.arguments);
+    CAPTURE(wrong.expected);
+    CHECK(outcome.code == 2);
+    CHECK(outcome.out.empty());
+    CHECK_THAT(outcome.err, StartsWith("dynains: error: ") && ContainsSubstring(wrong.expected));
+    CHECK(std::count(outcome.err.begin(), outcome.err.end(), '\n') == 1);
+  }
+}
