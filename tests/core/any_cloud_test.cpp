@@ -79,7 +79,7 @@ TEST_CASE("labels do not depend on the type of the cloud") {
   SECTION("raw numbers with a stride") {
     std::vector<float> floats;
     std::vector<double> doubles;
-    for (const std::size_t stride : {3, 4, 7}) {
+    for (const std::size_t stride : {std::size_t{3}, std::size_t{4}, std::size_t{7}}) {
       CHECK((verdicts_of(scans, [&](const Points& points) {
                floats = interleaved<float>(points, stride);
                return RawPoints{floats.data(), points.size(), stride};

@@ -50,7 +50,8 @@ TEST_CASE("the arc tangent never leaves [-pi, pi] and is defined for zeros of ei
   }
   Random random(1);
   for (int i = 0; i < 100000; ++i) {
-    const float a = angle(random.uniform_float(-1e-4, 1e-4), random.uniform_float(-100.0, 1.0));
+    const float y = random.uniform_float(-1e-4, 1e-4);
+    const float a = angle(y, random.uniform_float(-100.0, 1.0));
     REQUIRE(a >= -detail::kPi);
     REQUIRE(a <= detail::kPi);
   }

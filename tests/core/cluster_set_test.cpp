@@ -35,7 +35,8 @@ TEST_CASE("S_k of every comparable cluster holds exactly the points of Eq. 4, in
     for (std::size_t k = 0; k < scans; ++k) {
       const std::size_t points = random.index(60);
       for (std::size_t i = 0; i < points; ++i) {
-        add(window, random.uniform(1, 50), random.uniform(-180, 180), random.uniform(-2, 2));
+        const Eigen::Vector3d p = random.vector({1, -180, -2}, {50, 180, 2});
+        add(window, p.x(), p.y(), p.z());
         const std::size_t c = random.index(count + 1);
         cluster_of.push_back(c == count ? kNoCluster : static_cast<std::uint32_t>(c));
         if (c != count) expected[{c, k}].push_back(points_of(window.view()).back());

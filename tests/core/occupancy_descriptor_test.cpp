@@ -123,9 +123,11 @@ TEST_CASE("descriptors are those of Eq. 5-11 in double on random clusters") {
     Cluster cluster;
     for (int k = 0; k < scans; ++k) {
       for (std::size_t i = 0; i < c.points / static_cast<std::size_t>(scans); ++i) {
-        double azimuth = random.uniform(c.azimuth_min, c.azimuth_max);
+        const Eigen::Vector3d p =
+            random.vector({10.0, c.azimuth_min, -1.7}, {c.range_max, c.azimuth_max, 2.0});
+        double azimuth = p.y();
         if (azimuth > 180.0) azimuth -= 360.0;
-        cluster.point(random.uniform(10.0, c.range_max), azimuth, random.uniform(-1.7, 2.0));
+        cluster.point(p.x(), azimuth, p.z());
       }
       cluster.end_of_scan();
     }

@@ -11,12 +11,10 @@ namespace {
 
 Eigen::Isometry3d random_pose(Random& random, double reach) {
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.linear() = Eigen::Quaterniond(random.uniform(-1, 1), random.uniform(-1, 1),
-                                  random.uniform(-1, 1), random.uniform(-1, 1))
-                   .normalized()
-                   .toRotationMatrix();
-  T.translation() = Eigen::Vector3d(random.uniform(-reach, reach), random.uniform(-reach, reach),
-                                    random.uniform(-reach, reach));
+  const Eigen::Vector3d ones = Eigen::Vector3d::Ones();
+  const Eigen::Vector3d axis = random.vector(-ones, ones).normalized();
+  T.linear() = Eigen::AngleAxisd(random.uniform(0.0, 2.0 * M_PI), axis).toRotationMatrix();
+  T.translation() = random.vector(-reach * ones, reach * ones);
   return T;
 }
 
@@ -27,8 +25,8 @@ TEST_CASE("points of the window are where Eq. 3 puts them in double") {
     const Eigen::Isometry3d T = random_pose(random, 5.0);
     PointBuffer points;
     for (std::size_t i = 0; i < count; ++i) {
-      points.push_back(random.uniform_float(-60, 60), random.uniform_float(-60, 60),
-                       random.uniform_float(-5, 10));
+      const Eigen::Vector3f p = random.vector({-60, -60, -5}, {60, 60, 10}).cast<float>();
+      points.push_back(p.x(), p.y(), p.z());
     }
     PolarBuffer window;
     window.append(points, T.cast<float>());

@@ -182,8 +182,7 @@ TEST_CASE("any cloud can come between good ones") {
       {"a vertical line", {}},
   };
   for (int i = 0; i < 500000; ++i) {
-    cases[7].points.emplace_back(random.uniform_float(-60, 60), random.uniform_float(-60, 60),
-                                 random.uniform_float(-2, 5));
+    cases[7].points.push_back(random.vector({-60, -60, -2}, {60, 60, 5}).cast<float>());
   }
   for (int i = 0; i < 2000; ++i) {
     cases[8].points.emplace_back(5.0F, 5.0F, random.uniform_float(-200, 200));

@@ -58,16 +58,16 @@ class ReferenceMap {
 };
 
 // Multiples of 1/64 m: every sum and product below is exact in floats, on both sides.
-double grid_value(Random& random, double reach) {
-  return std::round(random.uniform(-reach, reach) * 64.0) / 64.0;
+Eigen::Vector3d grid_vector(Random& random, double reach, double height) {
+  const Eigen::Vector3d most(reach, reach, height);
+  return (random.vector(-most, most) * 64.0).array().round() / 64.0;
 }
 
 PointBuffer grid_points(Random& random, std::size_t count, double reach) {
   PointBuffer points;
   for (std::size_t i = 0; i < count; ++i) {
-    points.push_back(static_cast<float>(grid_value(random, reach)),
-                     static_cast<float>(grid_value(random, reach)),
-                     static_cast<float>(grid_value(random, 4.0)));
+    const Eigen::Vector3f p = grid_vector(random, reach, 4.0).cast<float>();
+    points.push_back(p.x(), p.y(), p.z());
   }
   return points;
 }
@@ -94,8 +94,7 @@ TEST_CASE("the map holds the first measured point of every voxel, exactly, and n
       std::vector<std::uint8_t> keep(points.size());
       for (std::uint8_t& flag : keep) flag = random.index(4) == 0 ? 0 : 1;
       if (scan % 3 == 0) keep.clear();  // all
-      const Eigen::Isometry3d T = quarter_turns(
-          scan, origin + Eigen::Vector3d(grid_value(random, 9.0), grid_value(random, 9.0), 0.0));
+      const Eigen::Isometry3d T = quarter_turns(scan, origin + grid_vector(random, 9.0, 0.0));
       map.insert(points, keep, T);
       reference.insert(points, keep, T);
     }
@@ -134,12 +133,12 @@ TEST_CASE("at UTM coordinates the map keeps a tenth of a millimetre") {
   T.translation() = Eigen::Vector3d(500123.4567, 5678901.2345, 321.9876);
   for (int i = 0; i < 200; ++i) {
     PointBuffer one;
-    one.push_back(random.uniform_float(-80, 80), random.uniform_float(-80, 80),
-                  random.uniform_float(-3, 3));
+    const Eigen::Vector3f p = random.vector({-80, -80, -3}, {80, 80, 3}).cast<float>();
+    one.push_back(p.x(), p.y(), p.z());
     StaticMapAccumulator single = make(0.0);
     single.insert(one, {}, T);
     const Eigen::Vector3d expected = T * Eigen::Vector3d(one.x[0], one.y[0], one.z[0]);
-    single.for_each([&](const Eigen::Vector3d& p) { REQUIRE((p - expected).norm() < 1e-4); });
+    single.for_each([&](const Eigen::Vector3d& q) { REQUIRE((q - expected).norm() < 1e-4); });
     REQUIRE(single.size() == 1);
   }
 }
@@ -168,8 +167,8 @@ TEST_CASE("a region holds exactly the points that a filter over the map finds") 
   StaticMapAccumulator map = make(0.25);
   Random random(13);
   for (int i = 0; i < 40; ++i) {
-    map.insert(grid_points(random, 300, 30.0), {},
-               quarter_turns(i, {grid_value(random, 200.0), grid_value(random, 200.0), 0.0}));
+    const PointBuffer points = grid_points(random, 300, 30.0);
+    map.insert(points, {}, quarter_turns(i, grid_vector(random, 200.0, 0.0)));
   }
   const auto compare = [&](const Eigen::AlignedBox3d& box) {
     std::vector<Coordinates> expected;
@@ -185,7 +184,7 @@ TEST_CASE("a region holds exactly the points that a filter over the map finds") 
   std::size_t found = 0;
   for (int i = 0; i < 60; ++i) {
     const double size = i % 2 == 0 ? 5.0 : 150.0;  // fewer tiles than the map has, and more
-    const Eigen::Vector3d low(random.uniform(-230, 200), random.uniform(-230, 200), -5.0);
+    const Eigen::Vector3d low = random.vector({-230, -230, -5}, {200, 200, -5});
     const Eigen::Vector3d high = low + Eigen::Vector3d(size, size, 10.0);
     found += compare({low, high});
   }

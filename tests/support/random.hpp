@@ -1,6 +1,7 @@
 // Random numbers that are the same with every standard library.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
 #include <random>
@@ -18,6 +19,13 @@ class Random {
     return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1p-53;
   }
   float uniform_float(double low, double high) { return static_cast<float>(uniform(low, high)); }
+  /// Uniform in a box, coordinate by coordinate: the order in which a compiler evaluates the
+  /// arguments of one call is its own.
+  Eigen::Vector3d vector(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+    Eigen::Vector3d result;
+    for (int i = 0; i < 3; ++i) result[i] = uniform(low[i], high[i]);
+    return result;
+  }
   /// Uniform in [0, count).
   std::size_t index(std::size_t count) { return static_cast<std::size_t>(engine_() % count); }
 
