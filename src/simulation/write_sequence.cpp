@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "dynains/errors.hpp"
+#include "dynains/io/atomic_file.hpp"
 #include "dynains/io/kitti.hpp"
 
 namespace dynains::simulation {
@@ -45,6 +46,7 @@ bool write_sequence(Simulator& simulator, const std::filesystem::path& folder,
     times.push_back(scan.time);
     if (progress && !progress(i + 1, simulator.size())) return false;
   }
+  sync_files(folder);
   write_calib(folder / "calib.txt", Tr);
   write_times(folder / "times.txt", times);
   const Config& config = simulator.config();
