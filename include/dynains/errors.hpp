@@ -18,6 +18,12 @@ class PoseError : public std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
 
+/// The description of a cloud does not fit its data, or lacks what is needed.
+class CloudError : public std::invalid_argument {
+ public:
+  using std::invalid_argument::invalid_argument;
+};
+
 /// A file cannot be read or written; the text gives path, position and what was expected.
 class IoError : public std::runtime_error {
  public:

@@ -1,0 +1,46 @@
+// Poses that come as plain arrays of numbers.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <string>
+#include <type_traits>
+
+#include "dynains/errors.hpp"
+#include "dynains/pose.hpp"
+
+namespace dynains {
+
+namespace detail {
+
+template <int kStorage, class Scalar>
+Eigen::Isometry3d pose_from_array(const Scalar* values, const char* order, const char* other) {
+  static_assert(std::is_floating_point_v<Scalar>, "poses are float or double");
+  Eigen::Isometry3d T;
+  T.matrix() =
+      Eigen::Map<const Eigen::Matrix<Scalar, 4, 4, kStorage>>(values).template cast<double>();
+  const Eigen::RowVector4d unit(0, 0, 0, 1);
+  if (T.matrix().row(3) != unit && T.matrix().col(3).transpose() == unit) {
+    throw PoseError(std::string("16 numbers read as a ") + order +
+                    " pose have the translation in the last row: they are " + other);
+  }
+  validate_pose(std::string(order) + " pose", T);
+  return T;
+}
+
+}  // namespace detail
+
+/// `values`: 16 numbers, row after row, as in C arrays and NumPy. Translation in metres.
+/// Throws PoseError unless they are a rigid transform; a transposed one is called by its name.
+template <class Scalar>
+Eigen::Isometry3d pose_from_row_major(const Scalar* values) {
+  return detail::pose_from_array<Eigen::RowMajor>(values, "row-major", "column-major");
+}
+
+/// `values`: 16 numbers, column after column, as in Eigen, OpenGL and MATLAB. Translation in
+/// metres. Throws PoseError as pose_from_row_major() does.
+template <class Scalar>
+Eigen::Isometry3d pose_from_column_major(const Scalar* values) {
+  return detail::pose_from_array<Eigen::ColMajor>(values, "column-major", "row-major");
+}
+
+}  // namespace dynains
