@@ -17,6 +17,7 @@
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/polar_points.hpp"
+#include "dynains/sensor_model.hpp"
 
 namespace dynains {
 
@@ -30,19 +31,40 @@ inline constexpr std::uint32_t kNoCluster = 0xFFFFFFFFU;
 class CurvedVoxelClusterer {
  public:
   struct Config {
-    double voxel_range = 0.5;      ///< m
-    double voxel_azimuth = 0.5;    ///< deg, rounded so that whole voxels fill the circle
-    double voxel_elevation = 3.0;  ///< deg
+    double voxel_range = 0.6;      ///< m
+    double voxel_azimuth = 0.0;    ///< deg, whole voxels fill the circle; 0: from the sensor
+    double voxel_elevation = 0.0;  ///< deg; 0: from the sensor
     double cluster_range = 90.0;   ///< m, points farther away belong to no cluster
+
+    /// The public implementation's voxels.
+    static Config paper() {
+      Config config;
+      config.voxel_range = 0.5;
+      config.voxel_azimuth = 0.5;
+      config.voxel_elevation = 3.0;
+      return config;
+    }
+
+    /// Copy with voxels that suit the sensor where they are not given: wide enough that
+    /// neighbouring beams fall into neighbouring voxels.
+    Config resolved(const SensorModel& sensor) const {
+      Config config = *this;
+      const double spacing = 0.75 * (sensor.azimuth_step + sensor.elevation_gap);
+      if (voxel_azimuth == 0.0) config.voxel_azimuth = std::clamp(spacing, 0.5, 30.0);
+      if (voxel_elevation == 0.0) {
+        config.voxel_elevation = std::clamp(std::max(spacing, sensor.elevation_gap_wide), 1.0, 45.0);
+      }
+      return config;
+    }
 
     template <class Self, class Visitor>
     static void visit(Self& self, Visitor&& visitor) {
       visitor(Parameter{"voxel_range", self.voxel_range, closed(0.05, 20), "m",
                         "depth of a curved voxel (public implementation of the paper)"});
-      visitor(Parameter{"voxel_azimuth", self.voxel_azimuth, closed(0.05, 30), "deg",
-                        "width of a curved voxel (public implementation of the paper)"});
-      visitor(Parameter{"voxel_elevation", self.voxel_elevation, closed(0.1, 45), "deg",
-                        "height of a curved voxel (public implementation of the paper)"});
+      visitor(Parameter{"voxel_azimuth", self.voxel_azimuth, closed(0, 30), "deg",
+                        "width of a curved voxel; 0: from the sensor"});
+      visitor(Parameter{"voxel_elevation", self.voxel_elevation, closed(0, 45), "deg",
+                        "height of a curved voxel; 0: from the sensor"});
       visitor(Parameter{"cluster_range", self.cluster_range, half_open_below(0, 1000), "m",
                         "points farther away belong to no cluster and stay static"});
     }
@@ -58,9 +80,10 @@ class CurvedVoxelClusterer {
     void validate() const {
       validate_parameters("CurvedVoxelClusterer", *this);
       constexpr double kMaxCells = 1 << 28;
-      if (cell_count() > kMaxCells) {
+      const double cells = resolved(SensorModel::typical()).cell_count();
+      if (!(cells <= kMaxCells)) {
         throw ConfigError("CurvedVoxelClusterer: voxel_range, voxel_azimuth, voxel_elevation and "
-                          "cluster_range make " + std::to_string(cell_count()) +
+                          "cluster_range make " + std::to_string(cells) +
                           " cells; at most " + std::to_string(kMaxCells) + " are possible");
       }
     }
@@ -69,11 +92,16 @@ class CurvedVoxelClusterer {
   CurvedVoxelClusterer() : CurvedVoxelClusterer(Config()) {}
 
   /// Throws ConfigError.
-  explicit CurvedVoxelClusterer(const Config& config) : config_(config) {
-    config_.validate();
-    azimuths_ = static_cast<std::int32_t>(std::round(360.0 / config_.voxel_azimuth));
+  explicit CurvedVoxelClusterer(const Config& config) : config_((config.validate(), config)) {
+    adapt(SensorModel::typical());
+  }
+
+  /// Sizes the voxels that were left to the sensor; a typical one until this is called.
+  void adapt(const SensorModel& sensor) {
+    resolved_ = config_.resolved(sensor);
+    azimuths_ = static_cast<std::int32_t>(std::round(360.0 / resolved_.voxel_azimuth));
     ranges_ = static_cast<std::int32_t>(std::floor(config_.cluster_range / config_.voxel_range)) + 1;
-    elevations_ = static_cast<std::int32_t>(std::ceil(180.0 / config_.voxel_elevation));
+    elevations_ = static_cast<std::int32_t>(std::ceil(180.0 / resolved_.voxel_elevation));
     row_bytes_ = (static_cast<std::size_t>(azimuths_) + 7) / 8 * 8;
   }
 
@@ -109,7 +137,7 @@ class CurvedVoxelClusterer {
     }
     constexpr double kRadians = M_PI / 180.0;
     const Float8 azimuth_scale(static_cast<float>(azimuths_ / (2.0 * M_PI)));
-    const Float8 elevation_scale(static_cast<float>(1.0 / (config_.voxel_elevation * kRadians)));
+    const Float8 elevation_scale(static_cast<float>(1.0 / (resolved_.voxel_elevation * kRadians)));
     const Float8 range_scale(static_cast<float>(1.0 / config_.voxel_range));
     const Float8 far(static_cast<float>(config_.cluster_range));
     const Float8 pi(detail::kPi);
@@ -310,6 +338,7 @@ class CurvedVoxelClusterer {
   }
 
   Config config_;
+  Config resolved_;  // without values left to the sensor
   std::int32_t azimuths_ = 0;
   std::int32_t ranges_ = 0;
   std::int32_t elevations_ = 0;

@@ -16,6 +16,7 @@
 #include "dynains/detail/instance_ids.hpp"
 #include "dynains/detail/scan_slot.hpp"
 #include "dynains/detail/stage_checks.hpp"
+#include "dynains/free_space_evidence.hpp"
 #include "dynains/ground_segmenter.hpp"
 #include "dynains/occupancy_descriptor.hpp"
 #include "dynains/parameters.hpp"
@@ -35,6 +36,7 @@ struct DefaultStages {
   using Clusterer = CurvedVoxelClusterer;
   using Descriptor = OccupancyDescriptor;
   using Belief = BeliefUpdater;
+  using Evidence = FreeSpaceEvidence;
   using Map = StaticMapAccumulator;
 };
 
@@ -49,6 +51,7 @@ class BasicDynaInsRemover {
   using Clusterer = typename Stages::Clusterer;
   using Descriptor = typename Stages::Descriptor;
   using Belief = typename Stages::Belief;
+  using Evidence = typename Stages::Evidence;
   using Map = typename Stages::Map;
 
   static_assert(detail::IsConfigurable<Ground>::value && detail::IsGround<Ground>::value,
@@ -62,6 +65,9 @@ class BasicDynaInsRemover {
   static_assert(detail::IsConfigurable<Belief>::value && detail::IsBelief<Belief>::value,
                 "Stages::Belief needs Config, reset(), update(heights, heights), posterior() and "
                 "is_dynamic()");
+  static_assert(detail::IsConfigurable<Evidence>::value && detail::IsEvidence<Evidence>::value,
+                "Stages::Evidence needs Config, adapt(SensorModel), observe(...), judge(...) and "
+                "horizon()");
   static_assert(detail::IsConfigurable<Map>::value && detail::IsMap<Map>::value,
                 "Stages::Map needs Config, insert(PointsView, flags, T_world_sensor) and clear()");
 
@@ -70,10 +76,17 @@ class BasicDynaInsRemover {
     typename Clusterer::Config clusterer;
     typename Descriptor::Config descriptor;
     typename Belief::Config belief;
+    typename Evidence::Config evidence;
     typename Map::Config map;
 
     /// The paper to the letter, with its published parameters.
-    static Config paper() { return Config(); }
+    static Config paper() {
+      Config config;
+      static_cast<RemoverConfig&>(config) = RemoverConfig::paper();
+      config.ground = detail::paper_config<typename Ground::Config>();
+      config.clusterer = detail::paper_config<typename Clusterer::Config>();
+      return config;
+    }
 
     /// Calls `visitor(name, config)` for the facade's own fields and for those of each stage.
     template <class Self, class Visitor>
@@ -84,6 +97,7 @@ class BasicDynaInsRemover {
       visitor("CurvedVoxelClusterer", self.clusterer);
       visitor("OccupancyDescriptor", self.descriptor);
       visitor("BeliefUpdater", self.belief);
+      visitor("FreeSpaceEvidence", self.evidence);
       visitor("StaticMapAccumulator", self.map);
     }
 
@@ -110,16 +124,22 @@ class BasicDynaInsRemover {
         clusterer_(config.clusterer),
         descriptor_(config.descriptor),
         belief_(config.belief),
+        evidence_(config.evidence),
         map_(config.map),
-        ring_(static_cast<std::size_t>(config.window)) {}
+        ring_(std::max(static_cast<std::size_t>(config.window), latency() + 1)) {}
 
   const Config& config() const { return config_; }
   const Map& map() const { return map_; }
 
   /// Scans between a push and the final verdict on it.
   std::size_t latency() const {
-    return config_.votes == 0 ? 0 : static_cast<std::size_t>(config_.window) - 1;
+    const std::size_t by_votes =
+        config_.votes == 0 ? 0 : static_cast<std::size_t>(config_.window) - 1;
+    return config_.use_free_space ? std::max(by_votes, evidence_.horizon()) : by_votes;
   }
+
+  /// What the first scan told about the sensor; not known() before.
+  const SensorModel& sensor() const { return sensor_; }
 
   /// Takes one scan in.
   ///
@@ -137,6 +157,7 @@ class BasicDynaInsRemover {
     ScanSlot& newest = begin_scan(T_world_sensor, time);
     ingest_.read(cloud, static_cast<float>(config_.min_range),
                  static_cast<float>(config_.max_range), newest.labels);
+    if (!sensor_.known()) adapt_to_sensor(newest);
     clock.lap(result.times.ingest);
 
     ground_.segment(ingest_.points(), newest.split);
@@ -157,15 +178,16 @@ class BasicDynaInsRemover {
     clock.lap(result.times.descriptor);
 
     record_verdicts(cluster_of);
-    write_verdict(newest, 1);
-    result.newest = newest.verdict();
     clock.lap(result.times.verdict);
-
-    if (pushed_ - finished_ > latency()) {
-      ScanSlot& oldest = finish_next(clock, result.times);
-      result.finished = oldest.verdict();
-      if (&oldest == &newest) result.newest = newest.verdict();
+    if (config_.use_free_space) {
+      evidence_.observe(newest.scan, newest.segment, newest.T_world_sensor, newest.split,
+                        newest.cluster, clusterer_.cluster_count());
     }
+    clock.lap(result.times.evidence);
+    decide(newest, 1, clock, result.times);
+    result.newest = newest.verdict();
+
+    if (pushed_ - finished_ > latency()) result.finished = finish_next(clock, result.times);
     return result;
   }
 
@@ -183,7 +205,7 @@ class BasicDynaInsRemover {
     while (finished_ < pushed_) {
       StageClock clock;
       StageTimes times;
-      sink(std::as_const(finish_next(clock, times)).verdict());
+      sink(finish_next(clock, times));
     }
     ++segment_;
   }
@@ -192,9 +214,10 @@ class BasicDynaInsRemover {
   void reset() {
     map_.clear();
     instance_ids_ = {};
+    sensor_ = {};
     pushed_ = 0;
     finished_ = 0;
-    segment_ = 0;
+    ++segment_;  // nothing that is remembered takes part any more
   }
 
  private:
@@ -296,39 +319,63 @@ class BasicDynaInsRemover {
     instance_ids_.assign(old_cluster, old_ids, cluster, clusters_.size(), newest.ids);
   }
 
-  // Labels, ids and beliefs by input point; a point with fewer dynamic votes than `votes` stays.
+  // What depends on the sensor, from the first scan that has enough points.
+  void adapt_to_sensor(ScanSlot& newest) {
+    sensor_ = estimate_sensor_model(ingest_.points());
+    if (newest.scan > 0 && sensor_.known()) newest.segment = ++segment_;
+    const SensorModel model = sensor_.known() ? sensor_ : SensorModel::typical();
+    detail::adapt_stage(ground_, model);
+    detail::adapt_stage(clusterer_, model);
+    evidence_.adapt(model);
+  }
+
+  // Verdict by point: at least `votes` windows said so, or the evidence does.
+  void decide(ScanSlot& scan, int votes, StageClock& clock, StageTimes& times) {
+    if (config_.use_free_space) {
+      evidence_.judge(scan.scan, scan.split, scan.dynamic, scan.evidence);
+    } else {
+      scan.dynamic.assign(scan.split.count, 0);
+      scan.evidence.assign(scan.split.count, 0.0F);
+    }
+    clock.lap(times.evidence);
+    write_verdict(scan, votes);
+    clock.lap(times.verdict);
+  }
+
   void write_verdict(ScanSlot& scan, int votes) {
     const std::size_t count = scan.labels.size();
     scan.instances.assign(count, kNoInstance);
     scan.beliefs.assign(count, 0.0F);
-    const std::vector<std::uint32_t>& input = scan.input;
-    for (std::size_t i = 0; i < scan.split.ground_count; ++i) {
-      scan.labels[input[i]] = PointLabel::kGround;
+    const std::size_t ground_count = scan.split.ground_count;
+    scan.is_kept.resize(scan.split.count);
+    for (std::size_t i = 0; i < ground_count; ++i) {
+      const std::uint32_t to = scan.input[i];
+      scan.is_kept[i] = scan.dynamic[i] != 0 ? 0 : 1;
+      scan.labels[to] = scan.dynamic[i] != 0 ? PointLabel::kDynamic : PointLabel::kGround;
+      scan.beliefs[to] = scan.evidence[i];
     }
-    const std::uint32_t* const source = input.data() + scan.split.ground_count;
-    scan.is_kept.resize(scan.non_ground_count());
     for (std::size_t i = 0; i < scan.non_ground_count(); ++i) {
-      const bool dynamic = scan.votes[i] >= votes;
-      const std::uint32_t to = source[i];
-      scan.is_kept[i] = dynamic ? 0 : 1;
+      const std::size_t at = ground_count + i;
+      const bool dynamic = scan.votes[i] >= votes || scan.dynamic[at] != 0;
+      const std::uint32_t to = scan.input[at];
+      scan.is_kept[at] = dynamic ? 0 : 1;
       scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
       scan.instances[to] =
           scan.cluster[i] == kNoCluster ? kNoInstance : scan.ids[scan.cluster[i]];
-      scan.beliefs[to] = scan.belief[i];
+      scan.beliefs[to] = std::max(scan.belief[i], scan.evidence[at]);
     }
   }
 
-  ScanSlot& finish_next(StageClock& clock, StageTimes& times) {
+  ScanVerdict finish_next(StageClock& clock, StageTimes& times) {
     ScanSlot& scan = slot(finished_);
-    write_verdict(scan, std::max(1, config_.votes));
-    clock.lap(times.verdict);
+    decide(scan, std::max(1, config_.votes), clock, times);
     if (config_.build_map) {
-      map_.insert(scan.split.ground(), {}, scan.T_world_sensor);
-      map_.insert(scan.split.non_ground(), scan.is_kept, scan.T_world_sensor);
+      const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
+      map_.insert(points, scan.is_kept, scan.T_world_sensor);
     }
     clock.lap(times.map);
     ++finished_;
-    return scan;
+    return scan.verdict();
   }
 
   struct ClusterVerdict {
@@ -341,7 +388,9 @@ class BasicDynaInsRemover {
   Clusterer clusterer_;
   Descriptor descriptor_;
   Belief belief_;
+  Evidence evidence_;
   Map map_;
+  SensorModel sensor_;
 
   detail::Ingest ingest_;
   std::vector<ScanSlot> ring_;

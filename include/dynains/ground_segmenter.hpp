@@ -16,6 +16,7 @@
 #include "dynains/detail/plane_fit.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
+#include "dynains/sensor_model.hpp"
 
 namespace dynains {
 
@@ -51,7 +52,7 @@ class GroundSegmenter {
   static constexpr std::size_t kCheckedRings = 4;
 
   struct Config {
-    double sensor_height = 1.723;        ///< m, sensor origin over the ground
+    double sensor_height = 0.0;          ///< m, sensor origin over the ground; 0: from the scans
     double ground_min_range = 1.0;       ///< m, inner edge of the first ring
     double ground_max_range = 100.0;     ///< m, outer edge of the last ring
     int ground_iterations = 3;           ///< plane fits per patch
@@ -66,10 +67,17 @@ class GroundSegmenter {
     /// Largest flatness that lets a patch above that height still be ground.
     std::array<double, kCheckedRings> ground_flatness = {0.0, 1.25e-4, 1.85e-4, 1.85e-4};
 
+    /// The height of KITTI's sensor, given.
+    static Config paper() {
+      Config config;
+      config.sensor_height = 1.723;
+      return config;
+    }
+
     template <class Self, class Visitor>
     static void visit(Self& self, Visitor&& visitor) {
-      visitor(Parameter{"sensor_height", self.sensor_height, half_open_below(0, 100), "m",
-                        "height of the sensor over the ground"});
+      visitor(Parameter{"sensor_height", self.sensor_height, closed(0, 100), "m",
+                        "height of the sensor over the ground; 0: from the scans"});
       visitor(Parameter{"ground_min_range", self.ground_min_range, closed(0, 100), "m",
                         "inner edge of the first ring of ground patches (Patchwork)"});
       visitor(Parameter{"ground_max_range", self.ground_max_range, closed(1, 1000), "m",
@@ -121,8 +129,8 @@ class GroundSegmenter {
   GroundSegmenter() : GroundSegmenter(Config()) {}
 
   /// Throws ConfigError.
-  explicit GroundSegmenter(const Config& config) : config_(config) {
-    config_.validate();
+  explicit GroundSegmenter(const Config& config) : config_((config.validate(), config)) {
+    adapt(SensorModel::typical());
     const double inner = config_.ground_min_range;
     const double outer = config_.ground_max_range;
     // Zone edges as in Patchwork: at 1/8, 1/4 and 1/2 of the way.
@@ -148,6 +156,11 @@ class GroundSegmenter {
   }
 
   const Config& config() const { return config_; }
+
+  /// Takes the sensor's height unless it was given; that of a typical sensor until then.
+  void adapt(const SensorModel& sensor) {
+    height_ = config_.sensor_height > 0.0 ? config_.sensor_height : sensor.height;
+  }
 
   /// Splits `scan` (metres, sensor frame, z up, finite coordinates). Points outside the rings and
   /// points of sparse patches are not ground. Order within `split` is by patch, then as scanned.
@@ -259,7 +272,7 @@ class GroundSegmenter {
     if (end - begin < static_cast<std::size_t>(config_.ground_min_points)) return reject();
 
     const bool innermost_zone = patch < static_cast<std::size_t>(kRings[0] * kSectors[0]);
-    const double h = config_.sensor_height;
+    const double h = height_;
     const float floor = innermost_zone ? static_cast<float>(-(1.0 + config_.ground_below) * h)
                                        : -std::numeric_limits<float>::infinity();
     const float seed_height = lowest_mean(begin, end, floor);
@@ -385,6 +398,7 @@ class GroundSegmenter {
   }
 
   Config config_;
+  double height_ = 0.0;  // m
   std::array<Zone, kZones> zones_{};
   std::array<std::int32_t, kPatches> ring_of_patch_{};
   std::array<std::size_t, kPatches + 2> patch_begin_{};

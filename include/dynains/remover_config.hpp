@@ -9,17 +9,27 @@ namespace dynains {
 
 /// How the window slides and which points take part.
 struct RemoverConfig {
-  int window = 4;          ///< scans in the sliding window, K
+  int window = 1;          ///< scans in the sliding window, K; 1 compares no descriptors
   bool use_belief = true;  ///< false: initial proposals are verdicts (the paper's IOC-only rows)
   int votes = 1;           ///< windows, of the K that see a scan, that must call a point dynamic
   double min_range = 2.7;  ///< m, horizontal; nearer points are the robot's own
   double max_range = 250;  ///< m, horizontal and vertical; farther points are not measurements
   double max_gap = 1.0;    ///< s; a longer pause between scans starts a new window
-  bool build_map = true;   ///< false: labels only, the map stays empty
+  bool use_free_space = true;  ///< evidence from what other scans saw through
+  bool build_map = true;       ///< false: labels only, the map stays empty
+
+  /// K = 4 and nothing but the paper's own verdict.
+  static RemoverConfig paper() {
+    RemoverConfig config;
+    config.window = 4;
+    config.use_free_space = false;
+    return config;
+  }
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
-    visitor(Parameter{"window", self.window, closed(2, 64), "scans", "sliding window K (Eq. 3)"});
+    visitor(Parameter{"window", self.window, closed(1, 64), "scans",
+                      "sliding window K (Eq. 3); 1 compares no descriptors"});
     visitor(Parameter{"use_belief", self.use_belief, Bounds(), "",
                       "revert proposals by belief (Eq. 13-19); off is the paper's IOC-only row"});
     visitor(Parameter{"votes", self.votes, closed(0, 64), "windows",
@@ -31,6 +41,8 @@ struct RemoverConfig {
                       "farther points (horizontally or vertically) are not judged"});
     visitor(Parameter{"max_gap", self.max_gap, half_open_below(0, 1e9), "s",
                       "a longer pause between two scans starts a new window"});
+    visitor(Parameter{"use_free_space", self.use_free_space, Bounds(), "",
+                      "remove what other scans saw through (beyond the paper)"});
     visitor(Parameter{"build_map", self.build_map, Bounds(), "", "accumulate the static map"});
   }
 

@@ -12,6 +12,7 @@ struct StageTimes {
   double window = 0.0;      ///< Eq. 3
   double cluster = 0.0;     ///< curved voxels and separation, Eq. 4
   double descriptor = 0.0;  ///< Eq. 5-12 and, for proposals, the belief of Eq. 13-19
+  double evidence = 0.0;    ///< free space seen by other scans
   double verdict = 0.0;     ///< from clusters to points
   double map = 0.0;         ///< Eq. 1
 
@@ -22,6 +23,7 @@ struct StageTimes {
     visitor("window", self.window);
     visitor("cluster", self.cluster);
     visitor("descriptor", self.descriptor);
+    visitor("evidence", self.evidence);
     visitor("verdict", self.verdict);
     visitor("map", self.map);
   }

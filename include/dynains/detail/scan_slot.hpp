@@ -27,9 +27,12 @@ struct ScanSlot {
   std::vector<std::uint8_t> votes;  // windows that called it dynamic
   std::vector<float> belief;        // highest posterior of any window that proposed it
   std::vector<std::uint32_t> cluster;  // in the window in which this scan was the newest
-  std::vector<std::uint8_t> is_kept;   // final verdict: static
   // By cluster of that window.
   std::vector<std::uint32_t> ids;
+  // By point of the split, ground first.
+  std::vector<std::uint8_t> dynamic;  // by the evidence of other scans
+  std::vector<float> evidence;        // belief by the same
+  std::vector<std::uint8_t> is_kept;  // verdict: static
   // By input point.
   std::vector<PointLabel> labels;
   std::vector<std::uint32_t> instances;

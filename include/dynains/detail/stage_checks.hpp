@@ -6,11 +6,13 @@
 #include <cstdint>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "dynains/cluster_set.hpp"
 #include "dynains/ground_segmenter.hpp"
 #include "dynains/points.hpp"
 #include "dynains/polar_points.hpp"
+#include "dynains/sensor_model.hpp"
 
 namespace dynains::detail {
 
@@ -65,11 +67,54 @@ struct IsBelief<
                                                  bool>>>> : std::true_type {};
 
 template <class Stage, class = void>
+struct IsEvidence : std::false_type {};
+template <class Stage>
+struct IsEvidence<
+    Stage,
+    std::void_t<decltype(std::declval<Stage&>().adapt(SensorModel())),
+                decltype(std::declval<Stage&>().observe(
+                    std::uint64_t{}, std::uint64_t{}, std::declval<const Eigen::Isometry3d&>(),
+                    std::declval<const GroundSplit&>(), Span<const std::uint32_t>(),
+                    std::size_t{})),
+                decltype(std::declval<Stage&>().judge(
+                    std::uint64_t{}, std::declval<const GroundSplit&>(),
+                    std::declval<std::vector<std::uint8_t>&>(),
+                    std::declval<std::vector<float>&>())),
+                std::enable_if_t<std::is_convertible_v<
+                    decltype(std::declval<const Stage&>().horizon()), std::size_t>>>>
+    : std::true_type {};
+
+template <class Stage, class = void>
 struct IsMap : std::false_type {};
 template <class Stage>
 struct IsMap<Stage, std::void_t<decltype(std::declval<Stage&>().insert(
                                     PointsView(), Span<const std::uint8_t>(),
                                     std::declval<const Eigen::Isometry3d&>())),
                                 decltype(std::declval<Stage&>().clear())>> : std::true_type {};
+
+/// Tells a stage about the sensor if it wants to know: `adapt(const SensorModel&)` is optional.
+template <class Stage, class = void>
+struct WantsSensor : std::false_type {};
+template <class Stage>
+struct WantsSensor<Stage, std::void_t<decltype(std::declval<Stage&>().adapt(SensorModel()))>>
+    : std::true_type {};
+template <class Stage>
+void adapt_stage(Stage& stage, const SensorModel& sensor) {
+  if constexpr (WantsSensor<Stage>::value) stage.adapt(sensor);
+}
+
+/// The paper's parameters of a stage; a stage without `Config::paper()` keeps its defaults.
+template <class Config, class = void>
+struct HasPaper : std::false_type {};
+template <class Config>
+struct HasPaper<Config, std::void_t<decltype(Config::paper())>> : std::true_type {};
+template <class Config>
+Config paper_config() {
+  if constexpr (HasPaper<Config>::value) {
+    return Config::paper();
+  } else {
+    return Config();
+  }
+}
 
 }  // namespace dynains::detail

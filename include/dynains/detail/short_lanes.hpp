@@ -1,0 +1,40 @@
+// Eight 16-bit integers side by side: what range images are made of.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
+namespace dynains::detail {
+
+using Short8 = std::int16_t __attribute__((vector_size(16)));
+
+inline Short8 load_shorts(const std::int16_t* from) {
+  Short8 result;
+  std::memcpy(&result, from, sizeof(result));
+  return result;
+}
+inline void store_shorts(std::int16_t* to, Short8 value) {
+  std::memcpy(to, &value, sizeof(value));
+}
+inline Short8 all_shorts(std::int16_t value) {
+  return Short8{value, value, value, value, value, value, value, value};
+}
+
+/// `a` where the mask (the result of a comparison) is set, else `b`.
+inline Short8 select_shorts(Short8 mask, Short8 a, Short8 b) {
+  return (mask & a) | (~mask & b);
+}
+inline Short8 min_shorts(Short8 a, Short8 b) {
+#if defined(__SSE2__)
+  return Short8(_mm_min_epi16(__m128i(a), __m128i(b)));
+#else
+  return select_shorts(a < b, a, b);
+#endif
+}
+
+}  // namespace dynains::detail

@@ -1,0 +1,68 @@
+// Parameters of the free-space evidence.
+#pragma once
+
+#include "dynains/parameters.hpp"
+
+namespace dynains {
+
+/// Goes beyond the paper: a place where an object stood and through which a beam of another scan
+/// passed was not static. Tested ranges and reasons stand in docs/accuracy.md.
+struct FreeSpaceConfig {
+  int horizon = 30;              ///< scans until the final verdict
+  int memory = 100;              ///< scans back that still give evidence
+  double evidence_range = 80.0;  ///< m, horizontal; points beyond are not tested
+  double sample_size = 0.2;      ///< m, one sample per voxel of an instance
+  double supervoxel = 0.6;       ///< m, samples that share a belief
+  double ground_sample = 0.3;    ///< m, one sample per voxel of ground beside removed instances
+  double ground_reach = 2.0;     ///< m, ground this near to removed points is tested
+  double margin = 0.25;          ///< m, a beam passes if it goes this much farther ...
+  double margin_slope = 0.01;    ///< ... plus this share of the range
+  double p_free = 0.7;           ///< update probability of a reference that sees through
+  double p_hit = 0.155;          ///< update probability of a reference that hits
+  double tau_free = 0.65;        ///< belief above which a place that no reference hit was free
+  double tau_contested = 0.9;    ///< the same if some reference hit it
+  double remove_share = 0.12;    ///< share of free supervoxels that removes the whole instance
+  double see_share = 0.5;        ///< share of an instance that one reference must see through
+  double footprint = 0.2;        ///< m, ground this near to removed points goes with them
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& visitor) {
+    visitor(Parameter{"horizon", self.horizon, closed(0, 100), "scans",
+                      "scans until a verdict is final"});
+    visitor(Parameter{"memory", self.memory, closed(0, 200), "scans",
+                      "scans back that still give evidence"});
+    visitor(Parameter{"evidence_range", self.evidence_range, closed(5, 300), "m",
+                      "points farther away (horizontally) are not tested for free space"});
+    visitor(Parameter{"sample_size", self.sample_size, closed(0.05, 2), "m",
+                      "one sample per voxel of this size and instance"});
+    visitor(Parameter{"supervoxel", self.supervoxel, closed(0.1, 5), "m",
+                      "samples in one voxel of this size share a belief"});
+    visitor(Parameter{"ground_sample", self.ground_sample, closed(0.05, 2), "m",
+                      "one ground sample per voxel of this size"});
+    visitor(Parameter{"ground_reach", self.ground_reach, closed(0, 10), "m",
+                      "ground this near to removed points is tested for free space; 0: none"});
+    visitor(Parameter{"margin", self.margin, closed(0.02, 2), "m",
+                      "a beam passes a sample if it returns from this much farther away"});
+    visitor(Parameter{"margin_slope", self.margin_slope, closed(0, 0.1), "m/m",
+                      "growth of the margin with range"});
+    visitor(Parameter{"p_free", self.p_free, open(0.5, 1), "",
+                      "update probability of a reference that sees through (form of Eq. 18)"});
+    visitor(Parameter{"p_hit", self.p_hit, open(0, 0.5), "",
+                      "update probability of a reference that hits (form of Eq. 18)"});
+    visitor(Parameter{"tau_free", self.tau_free, open(0.5, 1), "",
+                      "belief from which a place that no reference hit was free (form of Eq. 19)"});
+    visitor(Parameter{"tau_contested", self.tau_contested, open(0.5, 1), "",
+                      "the same for a place that some reference hit"});
+    visitor(Parameter{"remove_share", self.remove_share, half_open_below(0, 1), "",
+                      "share of free supervoxels from which the whole instance goes"});
+    visitor(Parameter{"see_share", self.see_share, half_open_below(0, 1), "",
+                      "share of an instance that one reference must see through to remove it"});
+    visitor(Parameter{"footprint", self.footprint, closed(0, 2), "m",
+                      "ground this near to removed points goes with them; 0: none"});
+  }
+
+  /// Throws ConfigError.
+  void validate() const { validate_parameters("FreeSpaceEvidence", *this); }
+};
+
+}  // namespace dynains

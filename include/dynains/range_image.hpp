@@ -1,0 +1,238 @@
+// Range image of a scan, kept for asking later how far a beam in some direction got.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/detail/arc_tangent.hpp"
+#include "dynains/detail/lanes.hpp"
+#include "dynains/detail/short_lanes.hpp"
+#include "dynains/points.hpp"
+#include "dynains/sensor_model.hpp"
+
+namespace dynains {
+
+/// Cells of equal angle, rows by elevation and columns by azimuth, that suit a sensor.
+struct RangeImageGrid {
+  std::int32_t rows = 0;
+  std::int32_t columns = 0;        ///< around the full circle
+  float elevation_min = 0.0F;      ///< rad, lower edge of row 0
+  float rows_per_radian = 0.0F;
+  float columns_per_radian = 0.0F;
+  std::int32_t hole_rows = 0;      ///< empty rows between two beams that are closed
+
+  /// Cells a little wider than the azimuth step and narrower than the usual gap between beams, so
+  /// that few cells between returns stay empty and few returns share a cell.
+  static RangeImageGrid for_sensor(const SensorModel& sensor) {
+    constexpr double kRadians = M_PI / 180.0;
+    constexpr double kBorder = 2.0;  // deg beyond the outer beams
+    const double width = std::clamp(1.2 * sensor.azimuth_step, 0.2, 0.6);
+    const double height = std::clamp(0.6 * sensor.elevation_gap, 0.2, 0.4);
+    const double span = sensor.elevation_max - sensor.elevation_min + 2.0 * kBorder;
+    RangeImageGrid grid;
+    grid.rows = static_cast<std::int32_t>(span / height) + 1;
+    grid.columns = static_cast<std::int32_t>(std::round(360.0 / width));
+    grid.elevation_min = static_cast<float>((sensor.elevation_min - kBorder) * kRadians);
+    grid.rows_per_radian = static_cast<float>(1.0 / (height * kRadians));
+    grid.columns_per_radian = static_cast<float>(grid.columns / (2.0 * M_PI));
+    grid.hole_rows = static_cast<std::int32_t>(1.2 * sensor.elevation_gap_wide / height + 0.5);
+    return grid;
+  }
+
+  /// Cells from the beginning of one row to the next: room for wide access past both ends.
+  std::size_t stride() const {
+    return (static_cast<std::size_t>(columns) + detail::kLanes - 1) / detail::kLanes *
+               detail::kLanes + 2 * detail::kLanes;
+  }
+  std::size_t cell_count() const { return static_cast<std::size_t>(rows) * stride(); }
+};
+
+/// Directions of eight points: where they fall in an image and how far they are.
+struct ImageLocation {
+  detail::Int8 cell;      ///< index into the image; 0 where `inside` is not set
+  detail::Mask8 inside;   ///< whether the image covers the direction
+  detail::Float8 range;   ///< m
+};
+
+inline ImageLocation locate(const RangeImageGrid& grid, detail::Float8 x, detail::Float8 y,
+                            detail::Float8 z) {
+  using detail::Float8;
+  using detail::Int8;
+  const Float8 zero(0.0F);
+  const Float8 planar_squared = x * x + y * y;
+  const Float8 row = (detail::arc_tangent2(z, sqrt(planar_squared)) - Float8(grid.elevation_min)) *
+                     Float8(grid.rows_per_radian);
+  const Int8 column =
+      min(detail::truncate((detail::arc_tangent2(y, x) + Float8(detail::kPi)) *
+                           Float8(grid.columns_per_radian)),
+          Int8(grid.columns - 1));
+  const detail::Mask8 inside =
+      (row >= zero) & (row < Float8(static_cast<float>(grid.rows)));
+  // Row times stride is exact in floats: images have fewer than 2^24 cells.
+  const Float8 first =
+      to_float(detail::truncate(keep(inside, row))) * Float8(static_cast<float>(grid.stride()));
+  const Int8 cell = detail::truncate(first) + column + Int8(detail::kLanes);
+  return {select(inside, cell, Int8(0)), inside, sqrt(planar_squared + z * z)};
+}
+
+/// Nearest return per cell, and the nearest return of the 3x3 cells around it.
+///
+/// The neighbourhood is the margin against grazing incidence: a beam just below a sample protects
+/// the ground, one beside it protects edges.
+class RangeImage {
+ public:
+  /// In centimetres, so that a cell takes four bytes.
+  struct Cell {
+    std::int16_t nearest;  ///< kNothing if no beam returned here
+    std::int16_t around;   ///< kUnknown if fewer than two of the 3x3 cells have a return
+  };
+  static constexpr std::int16_t kNothing = 32767;
+  static constexpr std::int16_t kUnknown = -1;
+
+  /// Buffers that building needs, shared by all images of one owner.
+  struct Scratch {
+    std::vector<std::int16_t> nearest;
+    std::vector<std::int16_t> below, below_age;
+    std::vector<std::int16_t> least, count;
+    std::vector<std::int16_t> border;
+  };
+
+  const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
+
+  /// Replaces the image by that of `points` (m, sensor frame).
+  void build(const RangeImageGrid& grid, PointsView points, Scratch& scratch) {
+    collect(grid, points, scratch);
+    close_holes(grid, scratch);
+    erode(grid, scratch);
+  }
+
+ private:
+  static constexpr float kCentimetres = 100.0F;
+  static constexpr float kFarthest = 320.0F;  // m
+
+  void collect(const RangeImageGrid& grid, PointsView points, Scratch& scratch) const {
+    using detail::Float8;
+    scratch.nearest.assign(grid.cell_count(), kNothing);
+    std::int16_t* const nearest = scratch.nearest.data();
+    const auto add = [&](Float8 x, Float8 y, Float8 z, std::size_t lanes) {
+      const ImageLocation at = locate(grid, x, y, z);
+      std::int32_t cell[detail::kLanes];
+      std::int32_t range[detail::kLanes];
+      at.cell.store(cell);
+      detail::truncate(min(at.range, Float8(kFarthest)) * Float8(kCentimetres)).store(range);
+      // Directions outside fall into cell 0, which lies in the border and is never read.
+      for (std::size_t lane = 0; lane < lanes; ++lane) {
+        std::int16_t& value = nearest[cell[lane]];
+        value = std::min(value, static_cast<std::int16_t>(range[lane]));
+      }
+    };
+    std::size_t i = 0;
+    for (; i + detail::kLanes <= points.size(); i += detail::kLanes) {
+      add(Float8::load(&points.x[i]), Float8::load(&points.y[i]), Float8::load(&points.z[i]),
+          detail::kLanes);
+    }
+    if (i < points.size()) {
+      float tail[3][detail::kLanes] = {};
+      const std::size_t lanes = points.size() - i;
+      std::copy_n(points.x.begin() + i, lanes, tail[0]);
+      std::copy_n(points.y.begin() + i, lanes, tail[1]);
+      std::copy_n(points.z.begin() + i, lanes, tail[2]);
+      add(Float8::load(tail[0]), Float8::load(tail[1]), Float8::load(tail[2]), lanes);
+    }
+  }
+
+  // Between two beams an image has rows that no beam can fill. Up to `hole_rows` of them take the
+  // nearer of the returns below and above.
+  static void close_holes(const RangeImageGrid& grid, Scratch& scratch) {
+    if (grid.hole_rows == 0) return;
+    using namespace detail;
+    const std::size_t stride = grid.stride();
+    const auto rows = static_cast<std::size_t>(grid.rows);
+    scratch.below.resize(grid.cell_count());
+    scratch.below_age.resize(grid.cell_count());
+    const Short8 one = all_shorts(1);
+    const Short8 nothing = all_shorts(kNothing);
+    const Short8 too_old = all_shorts(1000);
+    const Short8 limit = all_shorts(static_cast<std::int16_t>(grid.hole_rows + 1));
+    for (std::size_t column = kLanes; column + kLanes < stride; column += kLanes) {
+      Short8 value = nothing;
+      Short8 age = too_old;
+      for (std::size_t row = 0; row < rows; ++row) {
+        const std::size_t at = row * stride + column;
+        const Short8 here = load_shorts(&scratch.nearest[at]);
+        const Short8 returned = here < nothing;
+        value = select_shorts(returned, here, value);
+        age = select_shorts(returned, one - one, min_shorts(age + one, too_old));
+        store_shorts(&scratch.below[at], value);
+        store_shorts(&scratch.below_age[at], age);
+      }
+      value = nothing;
+      age = too_old;
+      for (std::size_t row = rows; row-- > 0;) {
+        const std::size_t at = row * stride + column;
+        const Short8 here = load_shorts(&scratch.nearest[at]);
+        const Short8 returned = here < nothing;
+        value = select_shorts(returned, here, value);
+        age = select_shorts(returned, one - one, min_shorts(age + one, too_old));
+        const Short8 between = age + load_shorts(&scratch.below_age[at]);
+        const Short8 closed = ~returned & (between <= limit);
+        const Short8 fill = min_shorts(value, load_shorts(&scratch.below[at]));
+        store_shorts(&scratch.nearest[at], select_shorts(closed, fill, here));
+      }
+    }
+  }
+
+  void erode(const RangeImageGrid& grid, Scratch& scratch) {
+    using namespace detail;
+    const std::size_t stride = grid.stride();
+    const auto rows = static_cast<std::size_t>(grid.rows);
+    const auto columns = static_cast<std::size_t>(grid.columns);
+    cells_.resize(grid.cell_count());
+    scratch.least.resize(stride);
+    scratch.count.resize(stride);
+    scratch.border.assign(stride, kNothing);
+    for (std::size_t row = 0; row < rows; ++row) wrap(&scratch.nearest[row * stride], columns);
+    const Short8 nothing = all_shorts(kNothing);
+    const Short8 unknown = all_shorts(kUnknown);
+    const Short8 one = all_shorts(1);
+    for (std::size_t row = 0; row < rows; ++row) {
+      const std::int16_t* const middle = &scratch.nearest[row * stride];
+      const std::int16_t* const low = row > 0 ? middle - stride : scratch.border.data();
+      const std::int16_t* const high =
+          row + 1 < rows ? middle + stride : scratch.border.data();
+      for (std::size_t column = 0; column < stride; column += kLanes) {
+        const Short8 a = load_shorts(low + column);
+        const Short8 b = load_shorts(middle + column);
+        const Short8 c = load_shorts(high + column);
+        store_shorts(&scratch.least[column], min_shorts(min_shorts(a, b), c));
+        store_shorts(&scratch.count[column],
+                     Short8(-(a < nothing) - (b < nothing) - (c < nothing)));
+      }
+      for (std::size_t column = kLanes; column + kLanes < stride; column += kLanes) {
+        const std::int16_t* const least = &scratch.least[column];
+        const std::int16_t* const count = &scratch.count[column];
+        const Short8 around = min_shorts(
+            min_shorts(load_shorts(least - 1), load_shorts(least)), load_shorts(least + 1));
+        const Short8 returns =
+            load_shorts(count - 1) + load_shorts(count) + load_shorts(count + 1);
+        const Short8 eroded = select_shorts(returns > one, around, unknown);
+        const Short8 here = load_shorts(middle + column);
+        Cell* const to = &cells_[row * stride + column];
+        for (std::size_t lane = 0; lane < kLanes; ++lane) to[lane] = {here[lane], eroded[lane]};
+      }
+    }
+  }
+
+  // Copies the ends of a row to its other side, so that neighbours across the seam are at hand.
+  static void wrap(std::int16_t* row, std::size_t columns) {
+    row[detail::kLanes - 1] = row[detail::kLanes + columns - 1];
+    row[detail::kLanes + columns] = row[detail::kLanes];
+  }
+
+  std::vector<Cell> cells_;
+};
+
+}  // namespace dynains
