@@ -16,7 +16,7 @@ inline constexpr double kRotationTolerance = 1e-3;
 
 /// Largest coordinate of a sensor in the world, in metres: more than any map grid on Earth has, and
 /// little enough for the indices of a map of any resolution.
-inline constexpr double kMaxTranslation = 5e7;
+inline constexpr double kMaxTranslation = 2.1e7;
 
 /// Throws PoseError unless `T` is finite, rigid and within kMaxTranslation; `name` starts the
 /// message.

@@ -3,14 +3,12 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
-#include <unordered_map>
+#include <string>
 #include <vector>
 
+#include "dynains/detail/chunked_vector.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
@@ -19,9 +17,11 @@ namespace dynains {
 
 /// Sparse voxel map that keeps the first measured point of each voxel, never a voxel centre.
 ///
-/// Voxels are grouped in blocks of 8^3 whose occupancy is one cache line, blocks in tiles of 8^3.
-/// Points are floats relative to their block, so that precision does not depend on how far the
-/// world origin is. Growing never moves stored points: there is no pause.
+/// Voxels are grouped in blocks of 8 x 4 x 2, whose occupancy is one word: flat, as ground is, and
+/// small, as far points are scattered. Blocks are found by linear hashing (Litwin, 1980): each new
+/// block splits one bucket, so that the table never has to be built anew. Nor do stored points ever
+/// move: growing makes no pause. Points are floats relative to their block, so that precision does
+/// not depend on how far the world origin is.
 class StaticMapAccumulator {
  public:
   struct Config {
@@ -57,26 +57,25 @@ class StaticMapAccumulator {
   /// `keep` adds all. Of several points in a voxel the first stays.
   void insert(PointsView points, Span<const std::uint8_t> keep,
               const Eigen::Isometry3d& T_world_sensor) {
-    // Floats relative to the corner of a block next to the sensor; whole blocks are exact.
-    const double block_size = voxel_ * kBlockEdge;
-    const Eigen::Vector3d corner = (T_world_sensor.translation() / block_size).array().floor();
+    // Floats relative to a corner of blocks next to the sensor; whole blocks are exact.
+    const double step = voxel_ * kBlockVoxels.maxCoeff();
+    const Eigen::Vector3d corner = (T_world_sensor.translation() / step).array().floor();
     Eigen::Isometry3d T_corner_sensor = T_world_sensor;
-    T_corner_sensor.translation() -= corner * block_size;
+    T_corner_sensor.translation() -= corner * step;
     const Eigen::Matrix<float, 3, 4> m = T_corner_sensor.matrix().topRows<3>().cast<float>();
-    Cursor cursor;
-    cursor.corner = corner.cast<std::int32_t>();
+    const auto blocks = [&](int axis) {
+      return static_cast<std::int32_t>(corner[axis]) *
+             (kBlockVoxels.maxCoeff() / kBlockVoxels[axis]);
+    };
+    const Index first = {blocks(0), blocks(1), blocks(2)};
 
-    constexpr std::size_t kBatch = detail::kLanes;
-    float local[3][kBatch];
-    std::int32_t voxel[3][kBatch];
-    for (std::size_t i = 0; i < points.size(); i += kBatch) {
-      const std::size_t lanes = std::min(kBatch, points.size() - i);
-      locate(points, i, lanes, m, local, voxel);
-      for (std::size_t lane = 0; lane < lanes; ++lane) {
-        if (!keep.empty() && keep[i + lane] == 0) continue;
-        insert_point(cursor, {voxel[0][lane], voxel[1][lane], voxel[2][lane]},
-                     {local[0][lane], local[1][lane], local[2][lane]});
-      }
+    recent_.resize(kRecent, kEnd);
+    Batch batch;
+    for (std::size_t begin = 0; begin < points.size(); begin += kBatch) {
+      const std::size_t count = std::min(kBatch, points.size() - begin);
+      locate(points.subview(begin, count), m, batch);
+      find_streaks(count, batch);
+      insert_batch(batch, first, keep.empty() ? keep : keep.subspan(begin, count));
     }
   }
 
@@ -85,194 +84,225 @@ class StaticMapAccumulator {
 
   /// Forgets all points and frees their memory.
   void clear() {
-    tiles_.clear();
-    tile_of_.clear();
+    buckets_ = {};
+    blocks_ = {};
+    points_ = {};
+    recent_ = {};
+    half_ = 1;
     size_ = 0;
-    block_count_ = 0;
-    chunk_count_ = 0;
   }
 
   /// Bytes held by the map, its index included.
   std::size_t memory_bytes() const {
-    return tiles_.size() * (sizeof(Tile) + kTileOverhead) + block_bytes() + chunk_bytes();
+    return points_.memory_bytes() + blocks_.memory_bytes() + buckets_.memory_bytes() +
+           recent_.size() * sizeof(recent_[0]);
   }
 
   /// Calls `visit(Eigen::Vector3d)` for every point, in metres, world frame.
   template <class Visitor>
   void for_each(Visitor&& visit) const {
-    for (const auto& tile : tiles_) visit_tile(*tile, visit);
+    for (std::uint32_t b = 0; b < blocks_.size(); ++b) visit_block(blocks_[b], visit);
   }
 
   /// Calls `visit(Eigen::Vector3d)` for every point inside `box` (world frame, borders included).
-  /// Cost is that of the tiles which the box touches.
+  /// Cost is that of the blocks which have room in the box, or of all blocks if these are fewer.
   template <class Visitor>
   void for_each_in(const Eigen::AlignedBox3d& box, Visitor&& visit) const {
     if (box.isEmpty()) return;
     const auto inside = [&](const Eigen::Vector3d& point) {
       if (box.contains(point)) visit(point);
     };
-    const double tile_size = voxel_ * kBlockEdge * kTileEdge;
-    const Eigen::Array3d low = (box.min() / tile_size).array().floor();
-    const Eigen::Array3d high = (box.max() / tile_size).array().floor();
-    const bool few = (high - low + 1.0).prod() < static_cast<double>(tiles_.size());
+    const Eigen::Array3d low = (box.min().array() / block_size()).floor();
+    const Eigen::Array3d high = (box.max().array() / block_size()).floor();
+    const bool few = (high - low + 1.0).prod() < static_cast<double>(blocks_.size());
     if (!few) {
-      for (const auto& tile : tiles_) {
-        const Eigen::Array3d at = tile->key.cast<double>().array();
-        if ((at >= low).all() && (at <= high).all()) visit_tile(*tile, inside);
+      for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
+        const Index& at = blocks_[b].at;
+        const Eigen::Array3d place(at.x, at.y, at.z);
+        if ((place >= low).all() && (place <= high).all()) visit_block(blocks_[b], inside);
       }
       return;
     }
-    const Eigen::Vector3i first = low.matrix().cast<std::int32_t>();
-    const Eigen::Vector3i last = high.matrix().cast<std::int32_t>();
+    const Eigen::Array3i first = low.cast<std::int32_t>();
+    const Eigen::Array3i last = high.cast<std::int32_t>();
     for (std::int32_t x = first.x(); x <= last.x(); ++x) {
       for (std::int32_t y = first.y(); y <= last.y(); ++y) {
         for (std::int32_t z = first.z(); z <= last.z(); ++z) {
-          const auto found = tile_of_.find({x, y, z});
-          if (found != tile_of_.end()) visit_tile(*tiles_[found->second], inside);
+          const std::uint32_t found = find_block({x, y, z}, hash({x, y, z}));
+          if (found != kEnd) visit_block(blocks_[found], inside);
         }
       }
     }
   }
 
  private:
-  static constexpr std::int32_t kBlockEdge = 8;  // voxels
-  static constexpr std::int32_t kTileEdge = 8;   // blocks
-  static constexpr std::size_t kTileOverhead = 64;
+  static constexpr std::uint32_t kEnd = 0xFFFFFFFFU;
+  static inline const Eigen::Array3i kBlockVoxels{8, 4, 2};
 
   struct Point {
     float x, y, z;       // m, relative to the corner of the block
-    std::uint32_t next;  // in the tile; kEnd behind the last
+    std::uint32_t next;  // in the block; kEnd behind the last
   };
-  static constexpr std::uint32_t kEnd = 0xFFFFFFFFU;
+
+  // Of a block in the world, counted in blocks.
+  struct Index {
+    std::int32_t x, y, z;
+    friend bool operator==(const Index& a, const Index& b) {
+      return ((a.x ^ b.x) | (a.y ^ b.y) | (a.z ^ b.z)) == 0;
+    }
+  };
 
   struct Block {
-    std::array<std::uint64_t, kBlockEdge> occupied{};  // a slice of constant z each
-    std::uint32_t first = kEnd;
-    std::uint32_t index = 0;  // place in the tile
+    std::uint64_t occupied;  // a bit per voxel
+    Index at;
+    std::uint32_t first;  // point
+    std::uint32_t next;   // in the bucket; kEnd behind the last
   };
 
-  // Grows by whole chunks that never move.
-  template <class T, std::size_t kChunk>
-  struct ChunkedVector {
-    std::vector<std::unique_ptr<T[]>> chunks;
-    std::uint32_t size = 0;
-    T& operator[](std::uint32_t i) { return chunks[i / kChunk][i % kChunk]; }
-    const T& operator[](std::uint32_t i) const { return chunks[i / kChunk][i % kChunk]; }
-    // True if a chunk was added.
-    bool grow() {
-      const bool full = size++ == chunks.size() * kChunk;
-      if (full) chunks.push_back(std::make_unique<T[]>(kChunk));
-      return full;
-    }
-  };
-  static constexpr std::size_t kPointChunk = 64;
-  static constexpr std::size_t kBlockChunk = 8;
-
-  struct Tile {
-    explicit Tile(const Eigen::Vector3i& at) : key(at) {}
-
-    Eigen::Vector3i key;
-    std::array<std::uint16_t, kTileEdge * kTileEdge * kTileEdge> block_of{};  // 0 = none, else + 1
-    ChunkedVector<Block, kBlockChunk> blocks;
-    ChunkedVector<Point, kPointChunk> points;
+  // Some points of a scan on their way into the map.
+  static constexpr std::size_t kRecent = 32 * 32 * 16;
+  static constexpr std::size_t kBatch = 512;
+  struct Batch {
+    float local[3][kBatch];  // m, relative to the corner next to the sensor
+    std::int32_t voxel[3][kBatch + detail::kLanes] = {};  // from that corner on
+    // Where points begin that share a voxel; neighbours in the scan often do.
+    std::uint32_t streak_begin[kBatch + detail::kLanes];
+    std::size_t streak_count = 0;
   };
 
-  struct KeyHash {
-    std::size_t operator()(const Eigen::Vector3i& key) const {
-      std::uint64_t h = static_cast<std::uint32_t>(key.x());
-      h = h * 0x9E3779B97F4A7C15ULL + static_cast<std::uint32_t>(key.y());
-      h = h * 0x9E3779B97F4A7C15ULL + static_cast<std::uint32_t>(key.z());
-      h *= 0x9E3779B97F4A7C15ULL;
-      return static_cast<std::size_t>(h ^ (h >> 32));
-    }
-  };
-
-  // Neighbouring points of a scan mostly fall into the same tile.
-  struct Cursor {
-    Eigen::Vector3i corner;  // block at the origin of the local frame
-    Eigen::Vector3i key = Eigen::Vector3i::Zero();
-    Tile* tile = nullptr;
-  };
-
-  std::size_t block_bytes() const { return block_count_ * kBlockChunk * sizeof(Block); }
-  std::size_t chunk_bytes() const { return chunk_count_ * kPointChunk * sizeof(Point); }
+  Eigen::Array3d block_size() const { return voxel_ * kBlockVoxels.cast<double>(); }
 
   // Points in the local frame, and their voxels there.
-  void locate(PointsView points, std::size_t begin, std::size_t lanes,
-              const Eigen::Matrix<float, 3, 4>& m, float (&local)[3][detail::kLanes],
-              std::int32_t (&voxel)[3][detail::kLanes]) const {
+  void locate(PointsView points, const Eigen::Matrix<float, 3, 4>& m, Batch& batch) const {
     using detail::Float8;
-    float p[3][detail::kLanes] = {};
-    std::copy_n(points.x.begin() + begin, lanes, p[0]);
-    std::copy_n(points.y.begin() + begin, lanes, p[1]);
-    std::copy_n(points.z.begin() + begin, lanes, p[2]);
-    const Float8 x = Float8::load(p[0]);
-    const Float8 y = Float8::load(p[1]);
-    const Float8 z = Float8::load(p[2]);
     const Float8 scale(static_cast<float>(1.0 / voxel_));
-    for (int row = 0; row < 3; ++row) {
-      const Float8 value = (Float8(m(row, 0)) * x + Float8(m(row, 1)) * y) +
-                           (Float8(m(row, 2)) * z + Float8(m(row, 3)));
-      value.store(local[row]);
-      const Float8 scaled = value * scale;
-      const detail::Int8 whole = truncate(scaled);
-      const detail::Mask8 above = to_float(whole) > scaled;  // truncated upwards: negative
-      (whole - select(above, detail::Int8(1), detail::Int8(0))).store(voxel[row]);
+    detail::for_lanes(points, [&](Float8 x, Float8 y, Float8 z, std::size_t to) {
+      for (int row = 0; row < 3; ++row) {
+        const Float8 value = (Float8(m(row, 0)) * x + Float8(m(row, 1)) * y) +
+                             (Float8(m(row, 2)) * z + Float8(m(row, 3)));
+        value.store(&batch.local[row][to]);
+        floor(value * scale).store(&batch.voxel[row][to]);
+      }
+    });
+  }
+
+  void find_streaks(std::size_t count, Batch& batch) const {
+    using detail::Int8;
+    std::size_t streaks = 1;
+    batch.streak_begin[0] = 0;
+    for (std::size_t i = 1; i < count; i += detail::kLanes) {
+      const auto same = [&](int axis) {
+        const std::int32_t* const voxel = &batch.voxel[axis][i];
+        return Int8::load(voxel) == Int8::load(voxel - 1);
+      };
+      const unsigned begins = keep_all_ ? 0xFFU : ~(same(0) & same(1) & same(2)).bits();
+      // Where a streak begins cannot be foretold: no branch depends on it.
+      for (std::size_t lane = 0; lane < detail::kLanes; ++lane) {
+        batch.streak_begin[streaks] = static_cast<std::uint32_t>(i + lane);
+        streaks += (begins >> lane) & 1U;
+      }
+    }
+    while (batch.streak_begin[streaks - 1] >= count) --streaks;
+    batch.streak_begin[streaks] = static_cast<std::uint32_t>(count);
+    batch.streak_count = streaks;
+  }
+
+  void insert_batch(const Batch& batch, const Index& corner, Span<const std::uint8_t> keep) {
+    const Eigen::Array3f size = block_size().cast<float>();
+    for (std::size_t s = 0; s < batch.streak_count; ++s) {
+      std::size_t i = batch.streak_begin[s];
+      if (!keep.empty()) {
+        const std::size_t end = batch.streak_begin[s + 1];
+        while (i < end && keep[i] == 0) ++i;
+        if (i == end) continue;
+      }
+      // Arithmetic shifts and masks are floor division and remainder.
+      const std::int32_t x = batch.voxel[0][i];
+      const std::int32_t y = batch.voxel[1][i];
+      const std::int32_t z = batch.voxel[2][i];
+      const Index in_frame = {x >> 3, y >> 2, z >> 1};
+      Block& block =
+          block_at({corner.x + in_frame.x, corner.y + in_frame.y, corner.z + in_frame.z});
+      const std::uint64_t bit = std::uint64_t{1} << ((x & 7) | (y & 3) << 3 | (z & 1) << 5);
+      if ((block.occupied & bit) != 0 && !keep_all_) continue;
+      block.occupied |= bit;
+      block.first = points_.push_back(
+          {batch.local[0][i] - static_cast<float>(in_frame.x) * size.x(),
+           batch.local[1][i] - static_cast<float>(in_frame.y) * size.y(),
+           batch.local[2][i] - static_cast<float>(in_frame.z) * size.z(), block.first});
+      ++size_;
     }
   }
 
-  Tile& tile_at(Cursor& cursor, const Eigen::Vector3i& key) {
-    if (cursor.tile == nullptr || key != cursor.key) {
-      const auto [found, added] = tile_of_.try_emplace(key, tiles_.size());
-      if (added) tiles_.push_back(std::make_unique<Tile>(key));
-      cursor.tile = tiles_[found->second].get();
-      cursor.key = key;
-    }
-    return *cursor.tile;
+  // Neighbouring points meet the same few blocks again and again: a table without collisions among
+  // neighbours spares most of them the walk through a bucket.
+  Block& block_at(const Index& at) {
+    const std::int32_t low = (at.x & 31) | (at.y & 31) << 5 | (at.z & 15) << 10;
+    std::uint32_t& recent = recent_[static_cast<std::size_t>(low)];
+    if (recent < blocks_.size() && blocks_[recent].at == at) return blocks_[recent];
+    const std::uint32_t h = hash(at);
+    recent = find_block(at, h);
+    if (recent == kEnd) recent = add_block(at, h);
+    return blocks_[recent];
   }
 
-  void insert_point(Cursor& cursor, const Eigen::Vector3i& voxel, const Eigen::Vector3f& local) {
-    // Arithmetic shifts and masks are floor division and remainder by 8.
-    const Eigen::Vector3i local_block(voxel.x() >> 3, voxel.y() >> 3, voxel.z() >> 3);
-    const Eigen::Vector3i block_key = local_block + cursor.corner;
-    Tile& tile =
-        tile_at(cursor, {block_key.x() >> 3, block_key.y() >> 3, block_key.z() >> 3});
-    const auto place = static_cast<std::size_t>(
-        ((block_key.z() & 7) * kTileEdge + (block_key.y() & 7)) * kTileEdge + (block_key.x() & 7));
-    std::uint16_t& block_number = tile.block_of[place];
-    if (block_number == 0) {
-      if (tile.blocks.grow()) ++block_count_;
-      block_number = static_cast<std::uint16_t>(tile.blocks.size);
-      tile.blocks[tile.blocks.size - 1].index = static_cast<std::uint32_t>(place);
+  static std::uint32_t hash(const Index& at) {
+    std::uint32_t h = static_cast<std::uint32_t>(at.x) * 0x9E3779B1U ^
+                      static_cast<std::uint32_t>(at.y) * 0x85EBCA77U ^
+                      static_cast<std::uint32_t>(at.z) * 0xC2B2AE3DU;
+    h ^= h >> 15;
+    h *= 0x2C1B3C6DU;
+    return h ^ (h >> 13);
+  }
+
+  // Buckets below `half_` have been there before this round; each split adds one behind them.
+  std::uint32_t bucket_of(std::uint32_t hash) const {
+    const std::uint32_t bucket = hash & (2 * half_ - 1);
+    return bucket < buckets_.size() ? bucket : bucket - half_;
+  }
+
+  std::uint32_t find_block(const Index& at, std::uint32_t hash) const {
+    if (buckets_.size() == 0) return kEnd;
+    std::uint32_t b = buckets_[bucket_of(hash)];
+    while (b != kEnd && !(blocks_[b].at == at)) b = blocks_[b].next;
+    return b;
+  }
+
+  // As many buckets as blocks: on average, a block is found at the first or second look.
+  std::uint32_t add_block(const Index& at, std::uint32_t hash) {
+    split_bucket();
+    std::uint32_t& first = buckets_[bucket_of(hash)];
+    first = blocks_.push_back({0, at, kEnd, first});
+    return first;
+  }
+
+  void split_bucket() {
+    if (buckets_.size() == 2 * half_) half_ *= 2;
+    const std::uint32_t added = buckets_.push_back(kEnd);
+    if (added == 0) return;
+    std::uint32_t* link = &buckets_[added - half_];
+    std::uint32_t* moved = &buckets_[added];
+    while (*link != kEnd) {
+      Block& block = blocks_[*link];
+      if (bucket_of(hash(block.at)) == added) {
+        *moved = *link;
+        *link = block.next;
+        block.next = kEnd;
+        moved = &block.next;
+      } else {
+        link = &block.next;
+      }
     }
-    Block& block = tile.blocks[block_number - 1U];
-    const std::uint64_t bit = std::uint64_t{1} << ((voxel.y() & 7) * kBlockEdge + (voxel.x() & 7));
-    std::uint64_t& slice = block.occupied[static_cast<std::size_t>(voxel.z() & 7)];
-    if ((slice & bit) != 0 && !keep_all_) return;
-    slice |= bit;
-    if (tile.points.grow()) ++chunk_count_;
-    const std::uint32_t number = tile.points.size - 1;
-    const auto block_size = static_cast<float>(voxel_ * kBlockEdge);
-    const Eigen::Vector3f offset = local - local_block.cast<float>() * block_size;
-    tile.points[number] = {offset.x(), offset.y(), offset.z(), block.first};
-    block.first = number;
-    ++size_;
   }
 
   template <class Visitor>
-  void visit_tile(const Tile& tile, Visitor&& visit) const {
-    const double block_size = voxel_ * kBlockEdge;
-    for (std::uint32_t b = 0; b < tile.blocks.size; ++b) {
-      const Block& block = tile.blocks[b];
-      const auto place = static_cast<std::int32_t>(block.index);
-      const Eigen::Vector3i block_key =
-          tile.key * kTileEdge + Eigen::Vector3i(place & 7, (place >> 3) & 7, place >> 6);
-      const Eigen::Vector3d corner = block_key.cast<double>() * block_size;
-      for (std::uint32_t i = block.first; i != kEnd; i = tile.points[i].next) {
-        const Point& point = tile.points[i];
-        const Eigen::Vector3d world = corner + Eigen::Vector3d(point.x, point.y, point.z);
-        visit(world);
-      }
+  void visit_block(const Block& block, Visitor&& visit) const {
+    const Eigen::Vector3d corner =
+        Eigen::Array3d(block.at.x, block.at.y, block.at.z) * block_size();
+    for (std::uint32_t i = block.first; i != kEnd; i = points_[i].next) {
+      const Point& point = points_[i];
+      const Eigen::Vector3d world = corner + Eigen::Vector3d(point.x, point.y, point.z);
+      visit(world);
     }
   }
 
@@ -280,10 +310,11 @@ class StaticMapAccumulator {
   double voxel_;
   bool keep_all_;
   std::size_t size_ = 0;
-  std::size_t block_count_ = 0;  // chunks of blocks
-  std::size_t chunk_count_ = 0;  // chunks of points
-  std::vector<std::unique_ptr<Tile>> tiles_;  // in the order of their first point
-  std::unordered_map<Eigen::Vector3i, std::size_t, KeyHash> tile_of_;
+  std::uint32_t half_ = 1;
+  detail::ChunkedVector<std::uint32_t, 4096> buckets_;  // first block of each
+  detail::ChunkedVector<Block, 1024> blocks_;           // in the order of their first point
+  detail::ChunkedVector<Point, 2048> points_;
+  std::vector<std::uint32_t> recent_;  // blocks, by the lowest bits of their coordinates
 };
 
 }  // namespace dynains

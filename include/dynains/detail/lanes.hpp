@@ -13,6 +13,8 @@
 #include <emmintrin.h>
 #endif
 
+#include "dynains/points.hpp"
+
 namespace dynains::detail {
 
 inline constexpr std::size_t kLanes = 8;
@@ -66,7 +68,10 @@ struct Int8 {
 
   friend Int8 operator+(Int8 a, Int8 b) { return {a.lo + b.lo, a.hi + b.hi}; }
   friend Int8 operator-(Int8 a, Int8 b) { return {a.lo - b.lo, a.hi - b.hi}; }
+  friend Int8 operator<<(Int8 a, int bits) { return {a.lo << bits, a.hi << bits}; }
+  friend Int8 operator>>(Int8 a, int bits) { return {a.lo >> bits, a.hi >> bits}; }  // of the sign
   friend Int8 operator&(Int8 a, Int8 b) { return {a.lo & b.lo, a.hi & b.hi}; }
+  friend Int8 operator^(Int8 a, Int8 b) { return {a.lo ^ b.lo, a.hi ^ b.hi}; }
   friend Mask8 operator<(Int8 a, Int8 b) { return {a.lo < b.lo, a.hi < b.hi}; }
   friend Mask8 operator>(Int8 a, Int8 b) { return {a.lo > b.lo, a.hi > b.hi}; }
   friend Mask8 operator==(Int8 a, Int8 b) { return {a.lo == b.lo, a.hi == b.hi}; }
@@ -159,6 +164,21 @@ inline Float8 to_float(Int8 a) {
   return {__builtin_convertvector(a.lo, Float4), __builtin_convertvector(a.hi, Float4)};
 }
 
+/// Product modulo 2^32.
+inline Int8 multiply(Int8 a, std::int32_t factor) {
+  using Unsigned4 =
+      std::uint32_t __attribute__((vector_size(16)));  // signed ones must not overflow
+  const auto f = static_cast<std::uint32_t>(factor);
+  return {Int4(Unsigned4(a.lo) * f), Int4(Unsigned4(a.hi) * f)};
+}
+
+/// Rounds down; lanes must lie within the range of int32.
+inline Int8 floor(Float8 a) {
+  const Int8 whole = truncate(a);
+  const Mask8 above = to_float(whole) > a;  // all bits set is -1
+  return whole + Int8(above.lo, above.hi);
+}
+
 /// Sum in a fixed order.
 inline float sum(Float8 a) {
   const Float4 s = a.lo + a.hi;
@@ -183,6 +203,25 @@ inline float max_lane(Float8 a) {
 inline Mask8 first_lanes(std::size_t count) {
   const Int8 index(Int4{0, 1, 2, 3}, Int4{4, 5, 6, 7});
   return index < Int8(static_cast<std::int32_t>(count));
+}
+
+/// Calls `body(x, y, z, i)` with eight points at a time, from point i on; the last ones are filled
+/// up with zeros.
+template <class Body>
+void for_lanes(PointsView points, Body&& body) {
+  const std::size_t count = points.size();
+  std::size_t i = 0;
+  for (; i + kLanes <= count; i += kLanes) {
+    body(Float8::load(&points.x[i]), Float8::load(&points.y[i]), Float8::load(&points.z[i]), i);
+  }
+  if (i == count) return;
+  float tail[3][kLanes] = {};
+  for (std::size_t k = i; k < count; ++k) {
+    tail[0][k - i] = points.x[k];
+    tail[1][k - i] = points.y[k];
+    tail[2][k - i] = points.z[k];
+  }
+  body(Float8::load(tail[0]), Float8::load(tail[1]), Float8::load(tail[2]), i);
 }
 
 }  // namespace dynains::detail

@@ -1,0 +1,36 @@
+// A vector that grows without moving what it holds.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+namespace dynains::detail {
+
+/// Grows by whole chunks that never move: references stay valid, and no push takes longer than it
+/// takes to get one chunk. `T` needs no constructor.
+template <class T, std::uint32_t kChunk>
+class ChunkedVector {
+ public:
+  std::uint32_t size() const { return size_; }
+  T& operator[](std::uint32_t i) { return chunks_[i / kChunk][i % kChunk]; }
+  const T& operator[](std::uint32_t i) const { return chunks_[i / kChunk][i % kChunk]; }
+
+  /// Returns the index of the new element.
+  std::uint32_t push_back(const T& value) {
+    if (size_ == chunks_.size() * kChunk) chunks_.emplace_back(new T[kChunk]);
+    (*this)[size_] = value;
+    return size_++;
+  }
+
+  std::size_t memory_bytes() const {
+    return chunks_.size() * kChunk * sizeof(T) + chunks_.capacity() * sizeof(chunks_[0]);
+  }
+
+ private:
+  std::vector<std::unique_ptr<T[]>> chunks_;
+  std::uint32_t size_ = 0;
+};
+
+}  // namespace dynains::detail
