@@ -23,9 +23,7 @@ struct Mounting {
 
   /// Angle between the z axis of the sensor and the normal of the ground, degrees. Above 90 the
   /// sensor hangs upside down.
-  double tilt() const {
-    return std::acos(std::clamp(up_sensor.z(), -1.0, 1.0)) * 180.0 / M_PI;
-  }
+  double tilt() const { return std::acos(std::clamp(up_sensor.z(), -1.0, 1.0)) * 180.0 / M_PI; }
 };
 
 namespace detail {
@@ -57,14 +55,14 @@ class MountingEstimator {
   }
 
  private:
-  static constexpr double kReach = 20.0;       // m; beyond, the ground is another one
-  static constexpr double kCell = 0.5;         // m; one point for each, whatever the density
-  static constexpr double kNearest = 0.4;      // m; nearer points are the housing
-  static constexpr double kLowest = 0.2;       // m, height of the sensor
-  static constexpr double kHighest = 5.0;      // m, height of the sensor
+  static constexpr double kReach = 20.0;         // m; beyond, the ground is another one
+  static constexpr double kCell = 0.5;           // m; one point for each, whatever the density
+  static constexpr double kNearest = 0.4;        // m; nearer points are the housing
+  static constexpr double kLowest = 0.2;         // m, height of the sensor
+  static constexpr double kHighest = 5.0;        // m, height of the sensor
   static constexpr double kLeastUpright = 0.64;  // cosine of a tilt of 50 deg
-  static constexpr double kOnGround = 0.12;    // m, off the plane
-  static constexpr double kBelow = 0.4;        // m under the plane: the ground is lower
+  static constexpr double kOnGround = 0.12;      // m, off the plane
+  static constexpr double kBelow = 0.4;          // m under the plane: the ground is lower
   static constexpr std::size_t kFewestCells = 60;
   static constexpr std::size_t kScored = 2000;  // cells by which hypotheses are compared
   static constexpr int kTrials = 3000;
@@ -196,7 +194,8 @@ class MountingEstimator {
 /// point anywhere around the vertical. Unknown if the scan shows too little ground. Points that are
 /// not finite are ignored.
 ///
-/// Allocates, about 10 ms; meant to be called once per sensor or on a few scans, not on each.
+/// Allocates and takes tens of milliseconds: meant for a few scans of a sensor, not for each. The
+/// median over several scans is steadier than one of them.
 inline Mounting estimate_mounting(PointsView points) {
   const detail::MountingEstimator estimator(points);
   for (const double side : {1.0, -1.0}) {

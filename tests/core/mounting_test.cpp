@@ -1,0 +1,180 @@
+#include "dynains/mounting.hpp"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "dynains/io/kitti.hpp"
+#include "dynains/simulation/simulator.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+namespace {
+
+using dynains::estimate_mounting;
+using dynains::Mounting;
+using dynains::PointBuffer;
+
+constexpr double kRadians = M_PI / 180.0;
+
+PointBuffer points_of(const std::vector<float>& xyzi) {
+  PointBuffer points;
+  for (std::size_t i = 0; i + 3 < xyzi.size(); i += 4) {
+    points.push_back(xyzi[i], xyzi[i + 1], xyzi[i + 2]);
+  }
+  return points;
+}
+
+double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) / kRadians;
+}
+
+/// A plane of 30 m by 30 m, `height` below the sensor, with a wall along it; turned into the frame
+/// of a sensor that is mounted with `R_level_sensor`.
+PointBuffer street(double height, const Eigen::Matrix3d& R_level_sensor) {
+  PointBuffer points;
+  const auto add = [&](double x, double y, double z) {
+    const Eigen::Vector3f p = (R_level_sensor.transpose() * Eigen::Vector3d(x, y, z)).cast<float>();
+    points.push_back(p.x(), p.y(), p.z());
+  };
+  for (double a = -15.0; a < 15.0; a += 0.23) {
+    for (double b = -15.0; b < 15.0; b += 0.23) add(a, b, -height);
+    for (double b = 0.0; b < 6.0; b += 0.23) add(a, 9.0, b - height);
+  }
+  return points;
+}
+
+TEST_CASE("A plane and a wall give exact height and tilt") {
+  for (const double height : {0.5, 1.2, 1.73, 2.5, 4.0}) {
+    for (const double pitch : {-30.0, 0.0, 20.0}) {
+      for (const double roll : {0.0, 30.0}) {
+        const Eigen::Matrix3d R_level_sensor =
+            (Eigen::AngleAxisd(pitch * kRadians, Eigen::Vector3d::UnitY()) *
+             Eigen::AngleAxisd(roll * kRadians, Eigen::Vector3d::UnitX()))
+                .toRotationMatrix();
+        const Mounting mounting = estimate_mounting(street(height, R_level_sensor));
+        CAPTURE(height, pitch, roll, mounting.height, mounting.up_sensor.transpose());
+        REQUIRE(mounting.known);
+        CHECK(std::abs(mounting.height - height) < 0.02);
+        CHECK(angle_between(mounting.up_sensor,
+                            R_level_sensor.transpose() * Eigen::Vector3d::UnitZ()) < 0.3);
+      }
+    }
+  }
+}
+
+TEST_CASE("A sensor that hangs upside down is known by its tilt") {
+  const Eigen::Matrix3d R_level_sensor =
+      Eigen::AngleAxisd(170.0 * kRadians, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  const Mounting mounting = estimate_mounting(street(2.0, R_level_sensor));
+  REQUIRE(mounting.known);
+  CHECK(std::abs(mounting.height - 2.0) < 0.02);
+  CHECK(std::abs(mounting.tilt() - 170.0) < 0.3);
+}
+
+TEST_CASE("A roof of the own vehicle and points that are not finite do not mislead") {
+  PointBuffer points = street(1.9, Eigen::Matrix3d::Identity());
+  for (double a = -2.0; a < 2.0; a += 0.05) {
+    for (double b = -0.8; b < 0.8; b += 0.05) {
+      points.push_back(static_cast<float>(a), static_cast<float>(b), -0.4F);
+    }
+  }
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  points.push_back(kNan, 0.0F, 0.0F);
+  points.push_back(1.0F, kInfinity, 0.0F);
+  points.push_back(0.0F, 0.0F, -kInfinity);
+  const Mounting mounting = estimate_mounting(points);
+  REQUIRE(mounting.known);
+  CHECK(std::abs(mounting.height - 1.9) < 0.03);
+}
+
+TEST_CASE("Without ground, the mounting is not known") {
+  CHECK_FALSE(estimate_mounting({}).known);
+
+  PointBuffer few;
+  for (int i = 0; i < 1000; ++i) few.push_back(5.0F, 0.001F * static_cast<float>(i), -1.7F);
+  CHECK_FALSE(estimate_mounting(few).known);
+
+  PointBuffer wall;
+  for (float a = -15.0F; a < 15.0F; a += 0.2F) {
+    for (float b = -3.0F; b < 6.0F; b += 0.2F) wall.push_back(6.0F, a, b);
+  }
+  CHECK_FALSE(estimate_mounting(wall).known);
+
+  dynains::test::Random random(5);
+  PointBuffer cloud;
+  for (int i = 0; i < 20000; ++i) {
+    const auto coordinate = [&] { return static_cast<float>(random.uniform(-15.0, 15.0)); };
+    const float x = coordinate(), y = coordinate();
+    cloud.push_back(x, y, coordinate());
+  }
+  CHECK_FALSE(estimate_mounting(cloud).known);
+}
+
+TEST_CASE("Height and tilt of every sensor in every simulated scene") {
+  namespace sim = dynains::simulation;
+  struct Mount {
+    double height, pitch, roll;
+  };
+  const Mount mounts[] = {{1.73, 0, 0},  {0.5, 0, 0},   {1.0, -20, 10}, {1.73, 30, 0},
+                          {2.5, 5, -25}, {0.7, 0, -30}, {2.0, -10, 0}};
+  const std::vector<std::string>& scenes = sim::scene_names();
+  const std::vector<std::string>& sensors = sim::sensor_names();
+  for (std::size_t i = 0; i < 2 * scenes.size(); ++i) {
+    const Mount& mount = mounts[(3 * i) % std::size(mounts)];
+    sim::Config config;
+    config.scene = sim::scene_from_name(scenes[i % scenes.size()]);
+    config.sensor = sim::sensor_from_name(sensors[i % sensors.size()]);
+    config.scans = 1;
+    config.seed = 11 + i;
+    config.sensor_height = mount.height;
+    config.mounting_pitch = mount.pitch;
+    config.mounting_roll = mount.roll;
+    config.ego_points = i % 2 == 0;
+    const Mounting mounting = estimate_mounting(points_of(sim::Simulator(config).scan(0).xyzi));
+
+    Eigen::Matrix3d R_body_sensor =
+        (Eigen::AngleAxisd(mount.pitch * kRadians, Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(mount.roll * kRadians, Eigen::Vector3d::UnitX()))
+            .toRotationMatrix();
+    if (config.sensor == sim::Sensor::kPandar64) {
+      R_body_sensor = R_body_sensor * Eigen::AngleAxisd(90 * kRadians, Eigen::Vector3d::UnitZ());
+    }
+    CAPTURE(scenes[i % scenes.size()], sensors[i % sensors.size()], mount.height, mount.pitch,
+            mount.roll, mounting.height, mounting.up_sensor.transpose());
+    REQUIRE(mounting.known);
+    CHECK(std::abs(mounting.height - mount.height) < 0.12);
+    // The vehicle does not stand parallel to the ground around it: crowned roads, unevenness.
+    CHECK(angle_between(mounting.up_sensor, R_body_sensor.transpose() * Eigen::Vector3d::UnitZ()) <
+          2.2);
+  }
+}
+
+TEST_CASE("Height and tilt on recorded streets") {
+  const std::filesystem::path data(DYNAINS_SHARED_DATA);
+  struct Expected {
+    const char* name;
+    double height, tilt;
+  };
+  // Height: of ground points around the vehicle, read off by hand.
+  for (const Expected& expected : {Expected{"kitti_van", 1.73, 1.5}, {"pandaset_street", 2.1, 2}}) {
+    if (!std::filesystem::is_directory(data / expected.name)) {
+      WARN("skipped: no recording " << expected.name);
+      continue;
+    }
+    const dynains::KittiSequence sequence(data / expected.name);
+    for (const std::size_t i : {std::size_t{0}, sequence.size() / 2, sequence.size() - 1}) {
+      const Mounting mounting = estimate_mounting(points_of(sequence.read_scan(i)));
+      CAPTURE(expected.name, i);
+      REQUIRE(mounting.known);
+      CHECK(std::abs(mounting.height - expected.height) < 0.1);
+      CHECK(std::abs(mounting.tilt() - expected.tilt) < 1.0);
+    }
+  }
+}
+
+}  // namespace
