@@ -68,6 +68,11 @@ class KittiSequence {
   bool has_labels_ = false;
 };
 
+/// Points of a scan NNNNNN.bin, from its size; throws if that is not a whole number of points.
+std::size_t count_scan_points(const std::filesystem::path& file);
+/// Reads x y z intensity of every point of a scan NNNNNN.bin, interleaved.
+void read_scan(const std::filesystem::path& file, std::vector<float>& xyzi);
+
 /// Reads a file of labels: one uint32 per point. `count` is the number of points it must have.
 std::vector<std::uint32_t> read_labels(const std::filesystem::path& file, std::size_t count);
 

@@ -1,0 +1,163 @@
+#include "kitti_files.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+#include <system_error>
+
+#include "failure.hpp"
+#include "text.hpp"
+
+namespace dynains {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kRotationTolerance = 1e-3;  // text with 4 digits passes, a scaled matrix does not
+
+/// The numbers of a line, all finite, exactly as many as `values` has.
+template <std::size_t kCount>
+std::array<double, kCount> parse_row(std::string_view line, const fs::path& path,
+                                     std::size_t number) {
+  const std::string expected = "expected " + std::to_string(kCount) +
+                               (kCount == 1 ? " finite number" : " finite numbers") + ", ";
+  std::array<double, kCount> values{};
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const std::string_view token = text::next_token(line);
+    if (token.empty()) fail_at_line(path, number, expected + "found " + std::to_string(i));
+    const std::optional<double> value = text::parse_number(token);
+    if (!value || !std::isfinite(*value)) {
+      fail_at_line(path, number, expected + "found \"" + std::string(token.substr(0, 40)) + "\"");
+    }
+    values[i] = *value;
+  }
+  if (!text::next_token(line).empty()) fail_at_line(path, number, expected + "found more");
+  return values;
+}
+
+/// Pose from 3x4 numbers, with the rotation nearest to the rounded one of the text.
+Eigen::Isometry3d parse_pose(std::string_view line, const fs::path& path, std::size_t number) {
+  const std::array<double, 12> row = parse_row<12>(line, path, number);
+  const std::optional<Eigen::Isometry3d> pose = nearest_rigid(row.data());
+  if (!pose) {
+    fail_at_line(path, number,
+                 "expected a rigid transform (columns 1-3 of the 3x4 matrix are a rotation)");
+  }
+  return *pose;
+}
+
+bool is_blank(std::string_view line) { return text::next_token(line).empty(); }
+
+/// Calls `parse(line, number)` for each line; blank lines are allowed at the end only.
+template <class Parse>
+void for_each_row(const fs::path& path, Parse&& parse) {
+  std::ifstream file = open_text(path);
+  std::size_t number = 0;
+  std::size_t blank = 0;
+  for (std::string line; std::getline(file, line);) {
+    ++number;
+    if (is_blank(line)) {
+      if (blank == 0) blank = number;
+      continue;
+    }
+    if (blank != 0) fail_at_line(path, blank, "expected a row, found a blank line");
+    parse(std::string_view(line), number);
+  }
+  if (file.bad()) fail(path, "reading stopped after line " + std::to_string(number));
+}
+
+}  // namespace
+
+std::ifstream open_text(const fs::path& path) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) fail(path, "is a folder, expected a file");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) fail(path, "cannot be opened for reading");
+  return file;
+}
+
+std::optional<Eigen::Isometry3d> nearest_rigid(const double* rows) {
+  using RowMajor34 = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
+  const RowMajor34 matrix = Eigen::Map<const RowMajor34>(rows);
+  const Eigen::Matrix3d rotation = matrix.leftCols<3>();
+  const Eigen::Matrix3d error = rotation.transpose() * rotation - Eigen::Matrix3d::Identity();
+  if (!(error.cwiseAbs().maxCoeff() <= kRotationTolerance) || !(rotation.determinant() > 0.0)) {
+    return std::nullopt;
+  }
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
+  pose.translation() = matrix.col(3);
+  return pose;
+}
+
+std::vector<Eigen::Isometry3d> read_kitti_poses(const fs::path& path) {
+  std::vector<Eigen::Isometry3d> poses;
+  for_each_row(path, [&](std::string_view line, std::size_t number) {
+    poses.push_back(parse_pose(line, path, number));
+  });
+  return poses;
+}
+
+std::vector<double> read_kitti_times(const fs::path& path) {
+  std::vector<double> times;
+  for_each_row(path, [&](std::string_view line, std::size_t number) {
+    const double time = parse_row<1>(line, path, number)[0];
+    if (!times.empty() && !(time > times.back())) {
+      fail_at_line(path, number, "expected a time after that of the row before");
+    }
+    times.push_back(time);
+  });
+  return times;
+}
+
+Eigen::Isometry3d read_kitti_calib(const fs::path& path) {
+  std::ifstream file = open_text(path);
+  std::size_t number = 0;
+  for (std::string text; std::getline(file, text);) {
+    ++number;
+    std::string_view line = text;
+    if (text::next_token(line) == "Tr:") return parse_pose(line, path, number);
+  }
+  fail(path,
+       "expected a line \"Tr: \" with 12 numbers (sensor to the frame of the poses); if the poses "
+       "are those of the sensor, remove this file");
+}
+
+std::vector<NumberedScan> list_kitti_scans(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) {
+    fail(folder, "not found: expected a folder with one NNNNNN.bin for each scan");
+  }
+  std::vector<NumberedScan> scans;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const fs::path file = entry->path();
+    if (file.extension() != ".bin" || file.filename().string().front() == '.') continue;
+    const std::string name = file.stem().string();
+    const bool digits = name.find_first_not_of("0123456789") == std::string::npos;
+    if (!digits || name.size() > 18) fail(file, "expected a number as name, such as 000123.bin");
+    scans.push_back({std::stoull(name), name});
+  }
+  if (error) fail(folder, "cannot be listed: " + error.message());
+  if (scans.empty()) fail(folder, "expected at least one scan NNNNNN.bin, found none");
+  std::sort(scans.begin(), scans.end(), [](const NumberedScan& x, const NumberedScan& y) {
+    return x.number != y.number ? x.number < y.number : x.name < y.name;
+  });
+  for (std::size_t i = 1; i < scans.size(); ++i) {
+    if (scans[i].number == scans[i - 1].number) {
+      fail(folder, "two scans with one number: " + scans[i - 1].name + ".bin and " + scans[i].name +
+                       ".bin");
+    }
+  }
+  return scans;
+}
+
+void check_rows(const fs::path& path, std::size_t rows, std::size_t needed) {
+  if (rows >= needed) return;
+  fail_at_line(path, rows + 1,
+               "expected a row for each scan, at least " + std::to_string(needed) + ", found " +
+                   std::to_string(rows));
+}
+
+}  // namespace dynains

@@ -1,0 +1,41 @@
+// The files of a KITTI folder, one by one.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace dynains {
+
+inline constexpr double kKittiPeriod = 0.1;  // s, the 10 Hz of KITTI
+
+struct NumberedScan {
+  std::uint64_t number;
+  std::string name;  ///< the digits, as in the name of the file
+};
+
+/// Scans NNNNNN.bin of a folder in the order of their numbers, at least one.
+std::vector<NumberedScan> list_kitti_scans(const std::filesystem::path& folder);
+
+std::vector<Eigen::Isometry3d> read_kitti_poses(const std::filesystem::path& path);
+/// Strictly increasing.
+std::vector<double> read_kitti_times(const std::filesystem::path& path);
+/// `Tr`, from the sensor to the frame of the poses.
+Eigen::Isometry3d read_kitti_calib(const std::filesystem::path& path);
+
+/// Throws unless a file of `rows` rows has those that are needed.
+void check_rows(const std::filesystem::path& path, std::size_t rows, std::size_t needed);
+
+/// The rigid transform nearest to 12 numbers, the upper 3x4 row by row; nothing if they are none
+/// but for rounding.
+std::optional<Eigen::Isometry3d> nearest_rigid(const double* rows);
+
+/// Opens a file to read; throws IoError, for folders too.
+std::ifstream open_text(const std::filesystem::path& path);
+
+}  // namespace dynains
