@@ -1,0 +1,96 @@
+// Between NumPy and the library: what comes in is read where it lies, what goes out is moved.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstring>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "dynains/adapters/matrix_pose.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/point_cloud_traits.hpp"
+
+namespace dynains::python {
+
+namespace py = pybind11;
+
+/// Coordinates in an array of any strides, a point per row.
+template <class Scalar>
+struct StridedPoints {
+  const char* data;
+  std::size_t count;
+  std::ptrdiff_t row, column;  // bytes
+
+  float coordinate(std::size_t i, std::ptrdiff_t k) const {
+    Scalar value;
+    std::memcpy(&value, data + static_cast<std::ptrdiff_t>(i) * row + k * column, sizeof value);
+    return static_cast<float>(value);
+  }
+};
+
+inline std::string shape_text(const py::array& array) {
+  return py::str(array.attr("shape")).cast<std::string>();
+}
+
+/// Calls `use` with a view of an (N, 3 or more) array of float32 or float64. Throws CloudError for
+/// another shape, TypeError for another type.
+template <class Use>
+auto with_points(const py::array& array, Use&& use) {
+  if (array.ndim() != 2 || array.shape(1) < 3) {
+    throw CloudError("points have shape " + shape_text(array) +
+                     ", expected (N, 3) or more columns, x y z first");
+  }
+  const auto* const data = static_cast<const char*>(array.data());
+  const auto count = static_cast<std::size_t>(array.shape(0));
+  const auto row = static_cast<std::ptrdiff_t>(array.strides(0));
+  const auto column = static_cast<std::ptrdiff_t>(array.strides(1));
+  if (py::isinstance<py::array_t<float>>(array)) {
+    return use(StridedPoints<float>{data, count, row, column});
+  }
+  if (py::isinstance<py::array_t<double>>(array)) {
+    return use(StridedPoints<double>{data, count, row, column});
+  }
+  throw py::type_error("points are " + py::str(array.dtype()).cast<std::string>() +
+                       ", expected float32 or float64 of this machine's byte order");
+}
+
+using PoseArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+/// Throws PoseError unless `array` is a 4 x 4 rigid transform.
+inline Eigen::Isometry3d to_pose(const PoseArray& array) {
+  if (array.ndim() != 2 || array.shape(0) != 4 || array.shape(1) != 4) {
+    throw PoseError("a pose has shape " + shape_text(array) + ", expected (4, 4)");
+  }
+  return pose_from_row_major(array.data());
+}
+
+inline py::array_t<double> to_array(const Eigen::Isometry3d& T) {
+  py::array_t<double> array({4, 4});
+  Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(array.mutable_data()) = T.matrix();
+  return array;
+}
+
+/// An array over the memory of `values`, with `columns` to a row; 0 columns make it flat.
+template <class T>
+py::array_t<T> to_array(std::vector<T>&& values, std::size_t columns = 0) {
+  auto* const owned = new std::vector<T>(std::move(values));
+  const py::capsule owner(owned, [](void* p) { delete static_cast<std::vector<T>*>(p); });
+  if (columns == 0) return py::array_t<T>(owned->size(), owned->data(), owner);
+  return py::array_t<T>({owned->size() / columns, columns}, owned->data(), owner);
+}
+
+}  // namespace dynains::python
+
+template <class Scalar>
+struct dynains::PointCloudTraits<dynains::python::StridedPoints<Scalar>> {
+  using Cloud = dynains::python::StridedPoints<Scalar>;
+  static std::size_t size(const Cloud& cloud) { return cloud.count; }
+  static Eigen::Vector3f point(const Cloud& cloud, std::size_t i) {
+    return {cloud.coordinate(i, 0), cloud.coordinate(i, 1), cloud.coordinate(i, 2)};
+  }
+};

@@ -1,0 +1,140 @@
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "dynains/evaluation/evaluate.hpp"
+#include "parameters.hpp"
+
+namespace dynains::python {
+namespace {
+
+using evaluation::EvaluationConfig;
+using evaluation::LabelledScan;
+
+template <class T>
+using Contiguous = py::array_t<T, py::array::c_style | py::array::forcecast>;
+
+// The arrays of one scan, and the view of them that the protocols see.
+struct Scan {
+  Contiguous<float> points;
+  Contiguous<std::uint32_t> truth;
+  Contiguous<std::uint8_t> kept;
+  LabelledScan view;
+};
+
+// Flags become SemanticKITTI's moving car and road.
+Contiguous<std::uint32_t> to_truth(const py::object& truth) {
+  if (!py::isinstance<py::array_t<bool>>(truth)) return truth;
+  constexpr std::uint32_t kMovingCar = 252;
+  constexpr std::uint32_t kRoad = 40;
+  return py::vectorize([](bool moving) { return moving ? kMovingCar : kRoad; })(
+      truth.cast<py::array_t<bool>>());
+}
+
+// One bit, whatever counted as true.
+Contiguous<std::uint8_t> to_kept(const Contiguous<bool>& kept) {
+  return py::vectorize([](bool value) { return static_cast<std::uint8_t>(value); })(kept);
+}
+
+void expect_length(const char* what, std::size_t scan, const py::array& array, py::ssize_t length) {
+  if (array.ndim() == 1 && array.shape(0) == length) return;
+  throw std::invalid_argument(std::string(what) + " of scan " + std::to_string(scan) + ": shape " +
+                              shape_text(array) + ", expected (" + std::to_string(length) + ",)");
+}
+
+Scan make_scan(std::size_t index, const py::handle& points, const py::handle& pose,
+               const py::handle& truth, const py::handle& kept) {
+  Scan scan{points.cast<Contiguous<float>>(),
+            to_truth(py::reinterpret_borrow<py::object>(truth)),
+            to_kept(kept.cast<Contiguous<bool>>()),
+            {}};
+  if (scan.points.ndim() != 2 || scan.points.shape(1) < 3) {
+    throw CloudError("points of scan " + std::to_string(index) + ": shape " +
+                     shape_text(scan.points) + ", expected (N, 3) or more columns");
+  }
+  const py::ssize_t count = scan.points.shape(0);
+  expect_length("truth", index, scan.truth, count);
+  expect_length("kept", index, scan.kept, count);
+  const auto size = static_cast<std::size_t>(count);
+  scan.view.xyz = scan.points.data();
+  scan.view.stride = static_cast<std::size_t>(scan.points.shape(1));
+  scan.view.T_world_sensor = to_pose(pose.cast<PoseArray>());
+  scan.view.truth = {scan.truth.data(), size};
+  scan.view.in_map = {scan.kept.data(), size};
+  return scan;
+}
+
+py::dict to_dict(const evaluation::EvaluationRow& row) {
+  py::dict result;
+  result["PR"] = row.voxels.preservation_rate();
+  result["RR"] = row.voxels.rejection_rate();
+  result["F1"] = row.voxels.f1();
+  result["SA"] = row.points.static_accuracy();
+  result["DA"] = row.points.dynamic_accuracy();
+  result["AA"] = row.points.associated_accuracy();
+  result["HA"] = row.points.harmonic_accuracy();
+  return result;
+}
+
+py::dict evaluate_arrays(const py::sequence& points, const py::sequence& poses,
+                         const py::sequence& truth, const py::sequence& kept,
+                         const std::string& dynamic_classes, const std::string& unlabeled,
+                         const py::kwargs& settings) {
+  if (poses.size() != points.size() || truth.size() != points.size() ||
+      kept.size() != points.size()) {
+    throw std::invalid_argument("evaluate: points, poses, truth and kept need as many scans each");
+  }
+  if (unlabeled != "ignore" && unlabeled != "static") {
+    throw ConfigError("unlabeled = '" + unlabeled + "': expected 'ignore' or 'static'");
+  }
+  EvaluationConfig config;
+  assign_all(config, settings);
+  config.truth = evaluation::TruthClasses(dynamic_classes, unlabeled == "static"
+                                                               ? evaluation::Unlabeled::kStatic
+                                                               : evaluation::Unlabeled::kIgnore);
+  std::vector<Scan> scans;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    scans.push_back(make_scan(i, points[i], poses[i], truth[i], kept[i]));
+  }
+  const auto source = [&scans](std::size_t index, LabelledScan& scan) {
+    if (index >= scans.size()) return false;
+    scan = scans[index].view;
+    return true;
+  };
+  evaluation::Evaluation result;
+  {
+    const py::gil_scoped_release release;
+    result = evaluation::evaluate(source, {"estimate"}, {}, config);
+  }
+  py::dict rows;
+  for (const evaluation::EvaluationRow& row : result.rows) rows[row.name.c_str()] = to_dict(row);
+  return rows;
+}
+
+}  // namespace
+
+void bind_evaluation(py::module_& module) {
+  std::string doc =
+      "Judges what was kept of each scan by its ground truth.\n\n"
+      "points, poses, truth, kept: sequences with an entry per scan. points: (N, 3 or more), "
+      "metres, sensor frame. poses: (4, 4), T_world_sensor. truth: (N,) labels of SemanticKITTI, "
+      "or bool (True moves). kept: (N,) bool, for example is_static(verdict.labels).\n"
+      "Returns {'identity': row, 'oracle': row, 'estimate': row}. A row has PR, RR (percent) and "
+      "F1 (0 to 1) after ERASOR, SA, DA, AA and HA (percent) after KTH's DynamicMap_Benchmark; "
+      "NaN is a share of nothing.\n"
+      "dynamic_classes: ids and ranges. unlabeled: 'ignore' or 'static' (classes 0 and 1).\n"
+      "Settings by name:\n";
+  EvaluationConfig defaults;
+  EvaluationConfig::visit(defaults, [&doc](const auto& parameter) {
+    doc += std::string("  ") + parameter.name + ": " + describe(parameter) + '\n';
+  });
+  module.def("evaluate", &evaluate_arrays, py::arg("points"), py::arg("poses"), py::arg("truth"),
+             py::arg("kept"), py::arg("dynamic_classes") = "252-259",
+             py::arg("unlabeled") = "ignore", doc.c_str());
+}
+
+}  // namespace dynains::python

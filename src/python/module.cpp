@@ -1,0 +1,29 @@
+#include <pybind11/pybind11.h>
+
+#include "bindings.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/version.hpp"
+
+PYBIND11_MODULE(dynains, module) {
+  namespace py = pybind11;
+  module.doc() =
+      "Removes moving objects from LiDAR scans and maps, scan by scan.\n\n"
+      "    remover = dynains.DynaInsRemover()\n"
+      "    frame = remover.push(points, T_world_sensor, time)\n"
+      "    moving = points[frame.newest.labels == dynains.Label.DYNAMIC]\n\n"
+      "Points are float32 or float64 arrays of shape (N, 3 or more), metres, sensor frame, read\n"
+      "where they lie. Poses are (4, 4). What is given out is the caller's own.";
+  module.attr("__version__") = dynains::kVersionString;
+
+  py::register_exception<dynains::ConfigError>(module, "ConfigError", PyExc_ValueError).doc() =
+      "A parameter is unknown or out of its bounds.";
+  py::register_exception<dynains::PoseError>(module, "PoseError", PyExc_ValueError).doc() =
+      "A pose is no rigid transform, or a time does not increase.";
+  py::register_exception<dynains::CloudError>(module, "CloudError", PyExc_ValueError).doc() =
+      "An array of points has the wrong shape.";
+
+  dynains::python::bind_config(module);
+  dynains::python::bind_remover(module);
+  dynains::python::bind_evaluation(module);
+  dynains::python::bind_simulation(module);
+}

@@ -1,0 +1,214 @@
+#include <pybind11/stl.h>
+
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "dynains/dyna_ins_remover.hpp"
+#include "parameters.hpp"
+
+namespace dynains::python {
+namespace {
+
+// Copies of what a ScanVerdict shows: the next call of the remover writes over it.
+struct OwnedVerdict {
+  std::uint64_t scan;
+  double time;
+  Eigen::Isometry3d T_world_sensor;
+  std::vector<std::uint8_t> labels;
+  std::vector<std::uint32_t> instances;
+  std::vector<float> beliefs;
+
+  explicit OwnedVerdict(const ScanVerdict& verdict)
+      : scan(verdict.scan),
+        time(verdict.time),
+        T_world_sensor(verdict.T_world_sensor),
+        instances(verdict.instances.begin(), verdict.instances.end()),
+        beliefs(verdict.beliefs.begin(), verdict.beliefs.end()) {
+    labels.reserve(verdict.labels.size());
+    for (const PointLabel label : verdict.labels) {
+      labels.push_back(static_cast<std::uint8_t>(label));
+    }
+  }
+};
+
+// The same as Python sees it.
+struct Verdict {
+  std::uint64_t scan;
+  double time;
+  py::array_t<double> T_world_sensor;
+  py::array_t<std::uint8_t> labels;
+  py::array_t<std::uint32_t> instances;
+  py::array_t<float> beliefs;
+
+  explicit Verdict(OwnedVerdict&& verdict)
+      : scan(verdict.scan),
+        time(verdict.time),
+        T_world_sensor(to_array(verdict.T_world_sensor)),
+        labels(to_array(std::move(verdict.labels))),
+        instances(to_array(std::move(verdict.instances))),
+        beliefs(to_array(std::move(verdict.beliefs))) {}
+};
+
+struct Frame {
+  py::object newest;
+  py::object finished;
+  py::dict times;
+};
+
+// The remover without the interpreter's lock: a mutex keeps threads that share it apart.
+class Remover {
+ public:
+  explicit Remover(const DynaInsRemover::Config& config) : remover_(config) {}
+
+  Frame push(const py::array& points, const PoseArray& pose, std::optional<double> time) {
+    const Eigen::Isometry3d T_world_sensor = to_pose(pose);
+    std::optional<OwnedVerdict> newest, finished;
+    StageTimes times;
+    with_points(points, [&](const auto& cloud) {
+      const py::gil_scoped_release release;
+      const std::lock_guard<std::mutex> lock(mutex_);
+      const FrameResult result =
+          time ? remover_.push(cloud, T_world_sensor, *time) : remover_.push(cloud, T_world_sensor);
+      newest.emplace(result.newest);
+      if (result.finished) finished.emplace(*result.finished);
+      times = result.times;
+    });
+    Frame frame;
+    frame.newest = py::cast(Verdict(std::move(*newest)));
+    if (finished) {
+      frame.finished = py::cast(Verdict(std::move(*finished)));
+    } else {
+      frame.finished = py::none();
+    }
+    StageTimes::visit(
+        times, [&](const char* stage, double milliseconds) { frame.times[stage] = milliseconds; });
+    return frame;
+  }
+
+  py::list flush() {
+    std::vector<OwnedVerdict> verdicts;
+    without_interpreter([&] {
+      remover_.flush([&](const ScanVerdict& verdict) { verdicts.emplace_back(verdict); });
+    });
+    py::list result;
+    for (OwnedVerdict& verdict : verdicts) result.append(Verdict(std::move(verdict)));
+    return result;
+  }
+
+  py::array_t<double> map_points() {
+    std::vector<double> xyz;
+    without_interpreter([&] {
+      xyz.reserve(3 * remover_.map().size());
+      remover_.map().for_each([&](const Eigen::Vector3d& p) {
+        xyz.insert(xyz.end(), {p.x(), p.y(), p.z()});
+      });
+    });
+    return to_array(std::move(xyz), 3);
+  }
+
+  std::size_t map_size() {
+    std::size_t size = 0;
+    without_interpreter([&] { size = remover_.map().size(); });
+    return size;
+  }
+
+  void reset() {
+    without_interpreter([&] { remover_.reset(); });
+  }
+
+  // Neither changes after construction.
+  const DynaInsRemover::Config& config() const { return remover_.config(); }
+  std::size_t latency() const { return remover_.latency(); }
+
+ private:
+  template <class Work>
+  void without_interpreter(Work&& work) {
+    const py::gil_scoped_release release;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    work();
+  }
+
+  std::mutex mutex_;
+  DynaInsRemover remover_;
+};
+
+void bind_label(py::module_& module) {
+  const auto value = [](PointLabel label) { return static_cast<int>(label); };
+  py::dict names;
+  names["INVALID"] = value(PointLabel::kInvalid);
+  names["OUT_OF_RANGE"] = value(PointLabel::kOutOfRange);
+  names["GROUND"] = value(PointLabel::kGround);
+  names["STATIC"] = value(PointLabel::kStatic);
+  names["DYNAMIC"] = value(PointLabel::kDynamic);
+  py::object label_enum = py::module_::import("enum").attr("IntEnum")(
+      "Label", names, py::arg("module") = module.attr("__name__"));
+  label_enum.attr("__doc__") =
+      "Verdict on a point: INVALID (NaN, infinite, no return), OUT_OF_RANGE, GROUND, STATIC, "
+      "DYNAMIC (part of a moving instance).";
+  module.attr("Label") = label_enum;
+
+  module.def(
+      "is_static",
+      [](const py::array_t<std::uint8_t>& labels) {
+        return py::array_t<bool>(py::vectorize(
+            [](std::uint8_t label) { return is_static(static_cast<PointLabel>(label)); })(labels));
+      },
+      py::arg("labels"), "True where a label is GROUND or STATIC: what belongs on a map.");
+}
+
+}  // namespace
+
+void bind_remover(py::module_& module) {
+  bind_label(module);
+
+  py::class_<Verdict>(module, "ScanVerdict",
+                      "Verdict on every point of one scan, in the order of the input.")
+      .def_readonly("scan", &Verdict::scan, "Number of the push, from 0.")
+      .def_readonly("time", &Verdict::time, "s, as pushed.")
+      .def_readonly("T_world_sensor", &Verdict::T_world_sensor, "(4, 4) float64, as pushed.")
+      .def_readonly("labels", &Verdict::labels, "(N,) uint8, see Label.")
+      .def_readonly("instances", &Verdict::instances, "(N,) uint32; 0 belongs to no instance.")
+      .def_readonly("beliefs", &Verdict::beliefs,
+                    "(N,) float32, probability of being dynamic; 0 if never proposed.");
+
+  py::class_<Frame>(module, "FrameResult", "Answer to one scan.")
+      .def_readonly("newest", &Frame::newest,
+                    "ScanVerdict: what the past alone says of the scan just pushed.")
+      .def_readonly("finished", &Frame::finished,
+                    "ScanVerdict of the scan whose verdict is now final, or None.")
+      .def_readonly("times", &Frame::times, "Milliseconds by stage.");
+
+  py::class_<Remover>(module, "DynaInsRemover",
+                      "Removes moving instances from a stream of scans, one scan at a time. "
+                      "Calls release the interpreter's lock.")
+      .def(py::init<const DynaInsRemover::Config&>(), py::arg("config"),
+           "Raises ConfigError if parameters contradict.")
+      .def(py::init([](const py::kwargs& values) {
+             DynaInsRemover::Config config;
+             assign_all(config, values);
+             return std::make_unique<Remover>(config);
+           }),
+           "Defaults, with the parameters that are named set.")
+      .def("push", &Remover::push, py::arg("points"), py::arg("T_world_sensor"),
+           py::arg("time") = py::none(),
+           "Takes one scan in and returns a FrameResult.\n\n"
+           "points: (N, 3 or more) float32 or float64, metres, sensor frame; any strides, never "
+           "copied as a whole. T_world_sensor: (4, 4). time: s, increasing; without it scans are "
+           "0.1 s apart. Raises CloudError, PoseError or TypeError, and then nothing has changed.")
+      .def("flush", &Remover::flush,
+           "Final verdicts on all scans still open, oldest first, as a list of ScanVerdict. The "
+           "next push starts a new window.")
+      .def("reset", &Remover::reset, "Back to the state after construction.")
+      .def("map_points", &Remover::map_points, "Static map as (N, 3) float64, metres, world frame.")
+      .def_property_readonly("map_size", &Remover::map_size, "Points on the static map.")
+      .def_property_readonly("latency", &Remover::latency,
+                             "Scans between a push and the final verdict on it.")
+      .def_property_readonly("config", &Remover::config, "A copy of the Config.",
+                             py::return_value_policy::copy);
+}
+
+}  // namespace dynains::python

@@ -1,0 +1,73 @@
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "dynains/simulation/simulator.hpp"
+#include "parameters.hpp"
+
+namespace dynains::python {
+namespace {
+
+using simulation::SimulatedScan;
+using simulation::Simulator;
+
+struct Scan {
+  double time;
+  py::array_t<float> points;
+  py::array_t<std::uint32_t> labels;
+  py::array_t<double> T_world_sensor;
+};
+
+Simulator make_simulator(const std::string& scene, const std::string& sensor,
+                         const std::string& labelling, const py::kwargs& parameters) {
+  simulation::Config config;
+  config.scene = simulation::scene_from_name(scene);
+  config.sensor = simulation::sensor_from_name(sensor);
+  config.labelling = simulation::labelling_from_name(labelling);
+  assign_all(config, parameters);
+  const py::gil_scoped_release release;
+  return Simulator(config);
+}
+
+Scan scan_of(Simulator& simulator, py::ssize_t index) {
+  const auto size = static_cast<py::ssize_t>(simulator.size());
+  if (index < 0) index += size;
+  if (index < 0 || index >= size) throw py::index_error("the sequence has no such scan");
+  SimulatedScan scan = simulator.scan(static_cast<std::size_t>(index));
+  return {scan.time, to_array(std::move(scan.xyzi), 4), to_array(std::move(scan.labels)),
+          to_array(scan.T_world_sensor_noisy)};
+}
+
+}  // namespace
+
+void bind_simulation(py::module_& module) {
+  py::class_<Scan>(module, "SimulatedScan", "One simulated scan.")
+      .def_readonly("time", &Scan::time, "s, 0 for the first scan.")
+      .def_readonly("points", &Scan::points,
+                    "(N, 4) float32: x y z (m, sensor frame), reflectivity.")
+      .def_readonly("labels", &Scan::labels, "(N,) uint32, class and instance of SemanticKITTI.")
+      .def_readonly("T_world_sensor", &Scan::T_world_sensor,
+                    "(4, 4) float64, with the noise that was asked for.");
+
+  std::string doc =
+      "A labelled street, measured by ray casting: simulator[i] is scan i.\n\nScenes:";
+  for (const std::string& name : simulation::scene_names()) doc += ' ' + name;
+  doc += "\nSensors:";
+  for (const std::string& name : simulation::sensor_names()) doc += ' ' + name;
+  doc += "\nLabelling:";
+  for (const std::string& name : simulation::labelling_names()) doc += ' ' + name;
+  doc += "\nParameters by name:\n";
+  simulation::Config defaults;
+  simulation::Config::visit(defaults, [&doc](const auto& parameter) {
+    doc += std::string("  ") + parameter.name + ": " + describe(parameter) + '\n';
+  });
+  py::class_<Simulator>(module, "Simulator", doc.c_str())
+      .def(py::init(&make_simulator), py::arg("scene") = "urban", py::arg("sensor") = "hdl64",
+           py::arg("labelling") = "ever", "Raises ConfigError for unknown names and values.")
+      .def("__len__", &Simulator::size)
+      .def("__getitem__", &scan_of, py::arg("index"), "Scan `index` as SimulatedScan.");
+}
+
+}  // namespace dynains::python

@@ -1,0 +1,89 @@
+import dynains
+import pytest
+
+
+def test_every_parameter_is_an_attribute_with_its_default_and_help():
+    config = dynains.Config()
+    parameters = dynains.Config.parameters()
+    names = [parameter["name"] for parameter in parameters]
+    assert {"window", "tau_s", "map_voxel", "use_belief"} <= set(names)
+    assert len(names) == len(set(names))
+    assert config.to_dict() == {p["name"]: p["default"] for p in parameters}
+    for parameter in parameters:
+        name = parameter["name"]
+        assert getattr(config, name) == parameter["default"]
+        assert parameter["help"] in getattr(dynains.Config, name).__doc__
+        assert parameter["section"]
+        setattr(config, name, parameter["default"])
+    assert config == dynains.Config()
+
+
+def test_parameters_are_set_by_name():
+    config = dynains.Config(window=6, use_belief=False)
+    config.tau_s = 0.25
+    assert (config.window, config.use_belief, config.tau_s) == (6, False, 0.25)
+    assert config != dynains.Config()
+    text = repr(config)
+    assert "window=6" in text and "tau_s=0.25" in text and "min_range" not in text
+    assert eval(text, {"dynains": dynains}) == config
+    assert dynains.DynaInsRemover(config).config == config
+    assert dynains.DynaInsRemover(window=6).config.window == 6
+
+
+def test_paper_has_the_published_parameters():
+    paper = dynains.Config.paper()
+    assert (paper.window, paper.tau_s, paper.p_inc, paper.p_dec) == (4, 0.6, 0.7, 0.4)
+    assert dynains.Config.paper(window=5).window == 5
+
+
+def test_the_configuration_of_a_remover_is_a_copy():
+    remover = dynains.DynaInsRemover()
+    remover.config.window = 9
+    assert remover.config.window == dynains.Config().window
+
+
+@pytest.mark.parametrize(
+    "values, error, text",
+    [
+        ({"tau_s": 1.5}, dynains.ConfigError, r"tau_s = 1.5 must be in \[0, 1\]"),
+        ({"tau_s": float("nan")}, dynains.ConfigError, "tau_s = nan"),
+        ({"window": 1000}, dynains.ConfigError, "window = 1000"),
+        ({"window": 4.5}, TypeError, "window = 4.5: expected int"),
+        ({"tau_s": "high"}, TypeError, "expected float"),
+        ({"tau": 0.5}, dynains.ConfigError, "unknown parameter tau"),
+    ],
+)
+def test_bad_values_are_refused(values, error, text):
+    with pytest.raises(error, match=text):
+        dynains.Config(**values)
+    with pytest.raises(error, match=text):
+        dynains.DynaInsRemover(**values)
+
+
+def test_contradictions_are_refused():
+    config = dynains.Config(min_range=50, max_range=40)
+    with pytest.raises(dynains.ConfigError, match="min_range"):
+        config.validate()
+    with pytest.raises(dynains.ConfigError, match="min_range"):
+        dynains.DynaInsRemover(config)
+
+
+def test_a_misspelt_attribute_is_an_error():
+    with pytest.raises(AttributeError):
+        dynains.Config().tau = 0.5
+
+
+def test_everything_public_has_a_docstring():
+    for name, thing in vars(dynains).items():
+        if name.startswith("_"):
+            continue
+        assert thing.__doc__, name
+        if isinstance(thing, type):
+            for member, value in vars(thing).items():
+                if not member.startswith("_") and not isinstance(value, thing):
+                    assert value.__doc__, f"{name}.{member}"
+
+
+def test_errors_are_value_errors():
+    for error in (dynains.ConfigError, dynains.PoseError, dynains.CloudError):
+        assert issubclass(error, ValueError)

@@ -1,0 +1,109 @@
+import math
+
+import dynains
+import numpy as np
+import pytest
+
+# Four points in four voxels: two static, two dynamic; 10 m ahead of the sensor.
+POINTS = np.array([[10, 0, 0], [10, 2, 0], [10, 4, 0], [10, 6, 0]], np.float32)
+MOVES = np.array([False, False, True, True])
+
+
+def score(kept, truth=MOVES, **settings):
+    rows = dynains.evaluate([POINTS], [np.eye(4)], [truth], [np.array(kept)], **settings)
+    return rows["estimate"]
+
+
+def test_scores_worked_by_hand():
+    perfect = score([True, True, False, False])
+    assert (perfect["PR"], perfect["RR"], perfect["F1"]) == (100, 100, 1)
+    assert (perfect["SA"], perfect["DA"], perfect["AA"], perfect["HA"]) == (100, 100, 100, 100)
+    half = score([True, False, False, True])
+    assert (half["PR"], half["RR"], half["F1"]) == (50, 50, 0.5)
+    most = score([True, True, False, True])
+    assert (most["PR"], most["RR"]) == (100, 50)
+    assert most["F1"] == pytest.approx(2 * 1.0 * 0.5 / 1.5)
+    assert most["AA"] == pytest.approx(math.sqrt(100 * 50))
+
+
+def test_rows_for_comparison():
+    rows = dynains.evaluate([POINTS], [np.eye(4)], [MOVES], [~MOVES])
+    assert set(rows) == {"identity", "oracle", "estimate"}
+    assert (rows["identity"]["PR"], rows["identity"]["RR"]) == (100, 0)
+    assert rows["oracle"] == rows["estimate"]
+
+
+def test_truth_is_flags_or_labels():
+    labels = np.array([40, 50 | 7 << 16, 252 | 3 << 16, 259], np.uint32)
+    kept = [True, False, True, False]
+    assert score(kept, labels) == score(kept)
+    # Without class 259 the last point is static, and lost.
+    assert score(kept, labels, dynamic_classes="252-258")["PR"] == pytest.approx(100 / 3)
+
+
+def test_unlabeled_points():
+    labels = np.array([0, 40, 252, 252], np.uint32)
+    kept = [False, True, False, False]
+    assert score(kept, labels)["PR"] == 100
+    assert score(kept, labels, unlabeled="static")["PR"] == 50
+
+
+def test_range_setting():
+    near = score([False, True, False, True], max_range=10.5)
+    assert near["PR"] == 50
+    assert near["RR"] != near["RR"]  # the dynamic points are too far: a share of nothing
+
+
+def test_poses_place_the_points():
+    """The second scan, 2 m further, sees the same four places: a kept copy preserves a voxel."""
+    forward = np.eye(4)
+    forward[0, 3] = 2.0
+    rows = dynains.evaluate(
+        [POINTS, POINTS - np.float32([2, 0, 0])],
+        [np.eye(4), forward],
+        [MOVES, MOVES],
+        [np.array([True, False, False, False]), np.array([False, True, False, False])],
+    )
+    assert rows["estimate"]["PR"] == 100
+    assert rows["estimate"]["SA"] == 50
+
+
+def test_nothing_removed_is_the_identity_on_a_street(street):
+    points = [scan.points for scan in street]
+    poses = [scan.T_world_sensor for scan in street]
+    truth = [scan.labels for scan in street]
+    rows = dynains.evaluate(points, poses, truth, [np.ones(len(p), bool) for p in points])
+    assert rows["estimate"] == rows["identity"]
+    assert rows["oracle"]["F1"] > 0.99
+
+
+@pytest.mark.parametrize(
+    "arguments, settings, error, text",
+    [
+        (([POINTS], [np.eye(4)], [MOVES], []), {}, ValueError, "as many scans"),
+        (([POINTS], [np.eye(4)], [MOVES[:3]], [MOVES]), {}, ValueError, r"truth of scan 0.*\(3,\)"),
+        (([POINTS], [np.eye(4)], [MOVES], [MOVES[:1]]), {}, ValueError, "kept of scan 0"),
+        (([POINTS[0]], [np.eye(4)], [MOVES], [MOVES]), {}, dynains.CloudError, "points of scan 0"),
+        (([POINTS], [np.eye(3)], [MOVES], [MOVES]), {}, dynains.PoseError, "shape"),
+        (([POINTS], [np.eye(4)], [MOVES], [MOVES]), {"voxel": 0}, dynains.ConfigError, "voxel = 0"),
+        (([POINTS], [np.eye(4)], [MOVES], [MOVES]), {"vxl": 1}, dynains.ConfigError, "vxl"),
+        (([POINTS], [np.eye(4)], [MOVES], [MOVES]), {"unlabeled": "x"}, dynains.ConfigError, "'x'"),
+    ],
+)
+def test_bad_input_is_refused(arguments, settings, error, text):
+    with pytest.raises(error, match=text):
+        dynains.evaluate(*arguments, **settings)
+
+
+def test_the_simulator_is_a_sequence():
+    simulator = dynains.Simulator("static", "vlp16", scans=3, seed=5)
+    assert len(simulator) == 3
+    assert len(list(simulator)) == 3
+    np.testing.assert_array_equal(simulator[-1].points, simulator[2].points)
+    assert simulator[0].points.shape == (len(simulator[0].labels), 4)
+    with pytest.raises(IndexError):
+        simulator[3]
+    with pytest.raises(dynains.ConfigError, match="urban"):
+        dynains.Simulator("moon")
+    with pytest.raises(dynains.ConfigError, match="unknown parameter"):
+        dynains.Simulator(scan=3)

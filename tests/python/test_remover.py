@@ -1,0 +1,173 @@
+import threading
+
+import dynains
+import numpy as np
+import pytest
+from dynains import Label
+
+
+def final_verdicts(scans, points_of=lambda scan: scan.points, **parameters):
+    remover = dynains.DynaInsRemover(**parameters)
+    verdicts = []
+    for scan in scans:
+        frame = remover.push(points_of(scan), scan.T_world_sensor, scan.time)
+        if frame.finished is not None:
+            verdicts.append(frame.finished)
+    return verdicts + remover.flush(), remover
+
+
+@pytest.fixture(scope="module")
+def verdicts(street):
+    return final_verdicts(street)[0]
+
+
+def test_every_scan_gets_one_final_verdict(street, verdicts):
+    assert [verdict.scan for verdict in verdicts] == list(range(len(street)))
+    for scan, verdict in zip(street, verdicts):
+        count = len(scan.points)
+        assert verdict.labels.shape == verdict.instances.shape == verdict.beliefs.shape == (count,)
+        assert verdict.labels.dtype == np.uint8
+        assert verdict.instances.dtype == np.uint32
+        assert verdict.beliefs.dtype == np.float32
+        assert verdict.time == scan.time
+        np.testing.assert_allclose(verdict.T_world_sensor, scan.T_world_sensor, atol=1e-9)
+
+
+def test_something_moves_and_most_does_not(verdicts):
+    labels = np.concatenate([verdict.labels for verdict in verdicts])
+    assert (labels == Label.DYNAMIC).any()
+    assert dynains.is_static(labels).mean() > 0.5
+
+
+@pytest.mark.parametrize(
+    "points_of",
+    [
+        lambda scan: scan.points.astype(np.float64),
+        lambda scan: np.asfortranarray(scan.points),
+        lambda scan: scan.points[:, :3],
+        lambda scan: np.repeat(scan.points, 2, axis=0)[::2],
+        lambda scan: np.flip(np.ascontiguousarray(np.flip(scan.points, 0)), 0),
+        lambda scan: np.flip(np.ascontiguousarray(np.flip(scan.points, 1)), 1),
+    ],
+    ids=["float64", "column-major", "3 of 4", "every second row", "rows back", "columns back"],
+)
+def test_labels_do_not_depend_on_type_and_strides(street, verdicts, points_of):
+    found = final_verdicts(street, points_of)[0]
+    for a, b in zip(verdicts, found):
+        np.testing.assert_array_equal(a.labels, b.labels)
+        np.testing.assert_array_equal(a.instances, b.instances)
+        np.testing.assert_array_equal(a.beliefs, b.beliefs)
+
+
+def test_results_outlive_the_next_call_and_the_remover(street):
+    remover = dynains.DynaInsRemover()
+    first = remover.push(street[0].points, street[0].T_world_sensor, 0.0).newest.labels
+    before = first.copy()
+    remover.push(np.zeros((len(before), 3)), street[0].T_world_sensor, 0.1)
+    points = remover.map_points()
+    del remover
+    np.testing.assert_array_equal(first, before)
+    assert points.shape[1] == 3
+
+
+def test_the_map_has_the_static_points(street):
+    _, remover = final_verdicts(street, map_voxel=0.0)
+    points = remover.map_points()
+    assert points.dtype == np.float64
+    assert points.shape == (remover.map_size, 3)
+    kept = []
+    for scan, verdict in zip(street, final_verdicts(street)[0]):
+        p = scan.points[dynains.is_static(verdict.labels), :3].astype(np.float64)
+        kept.append(p @ scan.T_world_sensor[:3, :3].T + scan.T_world_sensor[:3, 3])
+    kept = np.concatenate(kept)
+    assert len(points) == len(kept)
+    np.testing.assert_allclose(np.sort(points, axis=0), np.sort(kept, axis=0), atol=1e-3)
+
+
+def test_reset_starts_again(street, verdicts):
+    _, remover = final_verdicts(street)
+    remover.reset()
+    assert remover.map_size == 0
+    frame = remover.push(street[0].points, street[0].T_world_sensor, 0.0)
+    assert frame.newest.scan == 0
+
+
+def test_times_are_optional_and_stages_are_timed(identity):
+    remover = dynains.DynaInsRemover()
+    for _ in range(3):
+        frame = remover.push(np.ones((10, 3), np.float32), identity)
+    assert frame.newest.time == pytest.approx(0.2)
+    assert {"ingest", "ground", "cluster", "map"} <= set(frame.times)
+    assert all(milliseconds >= 0 for milliseconds in frame.times.values())
+
+
+def test_bad_points_get_a_label(identity):
+    nan, far = np.nan, 1e6
+    points = np.array([[nan, 0, 0], [0, 0, 0], [far, 0, 0], [1, 0, 0], [5, 0, 1]], np.float32)
+    labels = dynains.DynaInsRemover(min_range=2.0).push(points, identity).newest.labels
+    assert list(labels[:4]) == [Label.INVALID, Label.INVALID, Label.OUT_OF_RANGE, Label.OUT_OF_RANGE]
+    assert dynains.is_static(labels).tolist() == [False, False, False, False, True]
+
+
+def test_an_empty_scan_is_a_scan(identity):
+    frame = dynains.DynaInsRemover().push(np.empty((0, 3)), identity)
+    assert frame.newest.labels.shape == (0,)
+
+
+@pytest.mark.parametrize(
+    "points, error, text",
+    [
+        (np.zeros((3, 2), np.float32), dynains.CloudError, r"shape \(3, 2\)"),
+        (np.zeros(9, np.float32), dynains.CloudError, r"shape \(9,\)"),
+        (np.zeros((3, 3), np.int32), TypeError, "points are int32"),
+        (np.zeros((3, 3), ">f4"), TypeError, "points are >f4"),
+    ],
+)
+def test_bad_arrays_are_refused(identity, points, error, text):
+    with pytest.raises(error, match=text):
+        dynains.DynaInsRemover().push(points, identity)
+
+
+@pytest.mark.parametrize(
+    "pose, text",
+    [
+        (np.eye(3), r"shape \(3, 3\)"),
+        (2 * np.eye(4), "is no transform"),
+        (np.diag([1.0, 1, -1, 1]), "is not rigid"),
+        (np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [1, 2, 3, 1]]), "column-major"),
+    ],
+)
+def test_bad_poses_are_refused_and_change_nothing(pose, text):
+    remover = dynains.DynaInsRemover()
+    with pytest.raises(dynains.PoseError, match=text):
+        remover.push(np.ones((5, 3)), pose)
+    assert remover.push(np.ones((5, 3)), np.eye(4)).newest.scan == 0
+
+
+def test_time_must_increase(identity):
+    remover = dynains.DynaInsRemover()
+    remover.push(np.ones((5, 3)), identity, 1.0)
+    with pytest.raises(dynains.PoseError, match="greater than"):
+        remover.push(np.ones((5, 3)), identity, 1.0)
+
+
+def test_push_lets_other_threads_run(street, verdicts):
+    """Removers in threads of their own give what they give alone; one shared stays whole."""
+    shared = dynains.DynaInsRemover()
+    found = {}
+
+    def work(name):
+        found[name] = final_verdicts(street)[0]
+        for scan in street:
+            shared.push(scan.points, scan.T_world_sensor)
+
+    threads = [threading.Thread(target=work, args=(name,)) for name in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for name in range(3):
+        for a, b in zip(verdicts, found[name]):
+            np.testing.assert_array_equal(a.labels, b.labels)
+    next_scan = shared.push(street[0].points, street[0].T_world_sensor).newest.scan
+    assert next_scan == 3 * len(street)
