@@ -50,18 +50,19 @@ class GroundSegmenter {
   static constexpr std::size_t kPatches = 2 * 16 + 4 * 32 + 4 * 54 + 4 * 32;
   /// The innermost rings, where height and roughness of a patch are checked.
   static constexpr std::size_t kCheckedRings = 4;
+  static constexpr int kMaxLowest = 64;
 
   struct Config {
-    double sensor_height = 0.0;          ///< m, sensor origin over the ground; 0: from the scans
-    double ground_min_range = 1.0;       ///< m, inner edge of the first ring
-    double ground_max_range = 100.0;     ///< m, outer edge of the last ring
-    int ground_iterations = 3;           ///< plane fits per patch
-    int ground_lowest_points = 10;       ///< points whose mean height seeds the plane
-    int ground_min_points = 11;          ///< patches with fewer points are not ground
-    double ground_seed_margin = 0.5;     ///< m above the seed height
-    double ground_distance = 0.125;      ///< m, a ground point lies less than this above the plane
-    double ground_uprightness = 0.707;   ///< smallest z of the unit normal
-    double ground_below = 0.1;           ///< share of sensor_height below ground taken for noise
+    double sensor_height = 0.0;         ///< m, sensor origin over the ground; 0: from the scans
+    double ground_min_range = 1.0;      ///< m, inner edge of the first ring
+    double ground_max_range = 100.0;    ///< m, outer edge of the last ring
+    int ground_iterations = 3;          ///< plane fits per patch
+    int ground_lowest_points = 10;      ///< points whose mean height seeds the plane
+    int ground_min_points = 11;         ///< patches with fewer points are not ground
+    double ground_seed_margin = 0.5;    ///< m above the seed height
+    double ground_distance = 0.125;     ///< m, a ground point lies less than this above the plane
+    double ground_uprightness = 0.707;  ///< smallest z of the unit normal
+    double ground_below = 0.1;          ///< share of sensor_height below ground taken for noise
     /// Largest height (m over ground) of a patch in the four inner rings, unless it is flat.
     std::array<double, kCheckedRings> ground_elevation = {0.523, 0.7246, 0.872, 1.118};
     /// Largest flatness that lets a patch above that height still be ground.
@@ -84,12 +85,13 @@ class GroundSegmenter {
                         "outer edge of the last ring of ground patches (Patchwork)"});
       visitor(Parameter{"ground_iterations", self.ground_iterations, closed(1, 10), "",
                         "plane fits per patch (Patchwork)"});
-      visitor(Parameter{"ground_lowest_points", self.ground_lowest_points, closed(1, 64), "",
-                        "lowest points of a patch that seed its plane (Patchwork)"});
+      visitor(Parameter{"ground_lowest_points", self.ground_lowest_points, closed(1, kMaxLowest),
+                        "", "lowest points of a patch that seed its plane (Patchwork)"});
       visitor(Parameter{"ground_min_points", self.ground_min_points, closed(3, 1000), "",
                         "patches with fewer points are not ground (Patchwork)"});
-      visitor(Parameter{"ground_seed_margin", self.ground_seed_margin, half_open_below(0, 10), "m",
-                        "height over the seeds up to which points enter the first fit (Patchwork)"});
+      visitor(
+          Parameter{"ground_seed_margin", self.ground_seed_margin, half_open_below(0, 10), "m",
+                    "height over the seeds up to which points enter the first fit (Patchwork)"});
       visitor(Parameter{"ground_distance", self.ground_distance, half_open_below(0, 2), "m",
                         "height over the plane up to which points are ground (Patchwork)"});
       visitor(Parameter{"ground_uprightness", self.ground_uprightness, closed(0, 1), "",
@@ -97,8 +99,9 @@ class GroundSegmenter {
       visitor(Parameter{"ground_below", self.ground_below, closed(0, 10), "",
                         "depth under the ground, as a share of sensor_height, from which points "
                         "of the inner zone do not seed a plane (Patchwork)"});
-      visitor(Parameter{"ground_elevation_1", self.ground_elevation[0], closed(-100, 100), "m",
-                        "height over ground from which a patch of ring 1 must be flat (Patchwork)"});
+      visitor(
+          Parameter{"ground_elevation_1", self.ground_elevation[0], closed(-100, 100), "m",
+                    "height over ground from which a patch of ring 1 must be flat (Patchwork)"});
       visitor(Parameter{"ground_elevation_2", self.ground_elevation[1], closed(-100, 100), "m",
                         "the same for ring 2"});
       visitor(Parameter{"ground_elevation_3", self.ground_elevation[2], closed(-100, 100), "m",
@@ -119,9 +122,9 @@ class GroundSegmenter {
     void validate() const {
       validate_parameters("GroundSegmenter", *this);
       if (!(ground_min_range < ground_max_range)) {
-        throw ConfigError("GroundSegmenter.ground_min_range = " + std::to_string(ground_min_range) +
-                          " must be less than ground_max_range = " +
-                          std::to_string(ground_max_range));
+        throw ConfigError(
+            "GroundSegmenter.ground_min_range = " + std::to_string(ground_min_range) +
+            " must be less than ground_max_range = " + std::to_string(ground_max_range));
       }
     }
   };
@@ -134,21 +137,19 @@ class GroundSegmenter {
     const double inner = config_.ground_min_range;
     const double outer = config_.ground_max_range;
     // Zone edges as in Patchwork: at 1/8, 1/4 and 1/2 of the way.
-    const std::array<double, kZones + 1> edges = {inner, (7 * inner + outer) / 8,
-                                                  (3 * inner + outer) / 4, (inner + outer) / 2,
-                                                  outer};
+    const std::array<double, kZones + 1> edges = {
+        inner, (7 * inner + outer) / 8, (3 * inner + outer) / 4, (inner + outer) / 2, outer};
     std::int32_t first_patch = 0;
     std::int32_t first_ring = 0;
     for (std::size_t i = 0; i < kZones; ++i) {
       zones_[i] = {static_cast<float>(edges[i]),
                    static_cast<float>(kRings[i] / (edges[i + 1] - edges[i])),
                    static_cast<float>(kSectors[i] / (2.0 * M_PI)),
-                   first_patch,
-                   kRings[i] - 1,
-                   kSectors[i]};
+                   static_cast<float>(first_patch),
+                   static_cast<float>(kRings[i] - 1),
+                   static_cast<float>(kSectors[i])};
       for (std::int32_t p = 0; p < kRings[i] * kSectors[i]; ++p) {
-        ring_of_patch_[static_cast<std::size_t>(first_patch + p)] =
-            first_ring + p / kSectors[i];
+        ring_of_patch_[static_cast<std::size_t>(first_patch + p)] = first_ring + p / kSectors[i];
       }
       first_patch += kRings[i] * kSectors[i];
       first_ring += kRings[i];
@@ -166,109 +167,140 @@ class GroundSegmenter {
   /// points of sparse patches are not ground. Order within `split` is by patch, then as scanned.
   void segment(PointsView scan, GroundSplit& split) {
     sort_by_patch(scan);
-    std::size_t ground_count = 0;
-    for (std::size_t p = 0; p < kPatches; ++p) ground_count += segment_patch(p);
-    const std::size_t outside = patch_begin_[kPatches];
-    std::fill(is_ground_.begin() + static_cast<std::ptrdiff_t>(outside),
-              is_ground_.begin() + static_cast<std::ptrdiff_t>(scan.size()), std::uint8_t{0});
     split.resize(scan.size());
-    split.ground_count = ground_count;
-    partition(split);
+    rest_.resize(scan.size());
+    Output out = {split, rest_};
+    for (std::size_t p = 0; p < kPatches; ++p) segment_patch(p, out);
+    out.put_rest(sorted_, patch_begin_[kPatches], scan.size());
+    split.ground_count = out.ground_count;
+    copy(rest_, 0, out.rest_count, split, out.ground_count);
   }
 
  private:
+  // Constants of a zone; small whole numbers are exact in floats.
   struct Zone {
-    float inner;               // m
+    float inner;  // m
     float rings_per_metre;
     float sectors_per_radian;
-    std::int32_t first_patch;
-    std::int32_t last_ring;
-    std::int32_t sectors;
+    float first_patch;
+    float last_ring;
+    float sectors;
   };
 
-  void reserve(std::size_t count) {
-    const std::size_t padded = count + detail::kLanes;
-    if (patch_of_.size() >= padded) return;
-    patch_of_.resize(padded);
-    is_ground_.resize(padded);
-    sorted_.resize(padded);
-    source_.resize(padded);
+  static void copy(const GroundSplit& from, std::size_t begin, std::size_t count, GroundSplit& to,
+                   std::size_t at) {
+    detail::copy(&from.points.x[begin], count, &to.points.x[at]);
+    detail::copy(&from.points.y[begin], count, &to.points.y[at]);
+    detail::copy(&from.points.z[begin], count, &to.points.z[at]);
+    detail::copy(&from.source[begin], count, &to.source[at]);
   }
 
-  // Counting sort; stable, so that points keep the order of the scan within their patch.
-  void sort_by_patch(PointsView scan) {
-    reserve(scan.size());
-    const std::size_t count = scan.size();
-    const std::size_t whole = count - count % detail::kLanes;
-    for (std::size_t i = 0; i < whole; i += detail::kLanes) {
-      find_patches(detail::Float8::load(&scan.x[i]), detail::Float8::load(&scan.y[i]))
-          .store(&patch_of_[i]);
-    }
-    if (whole < count) {
-      float x[detail::kLanes] = {};
-      float y[detail::kLanes] = {};
-      std::copy(scan.x.begin() + whole, scan.x.end(), x);
-      std::copy(scan.y.begin() + whole, scan.y.end(), y);
-      find_patches(detail::Float8::load(x), detail::Float8::load(y)).store(&patch_of_[whole]);
-    }
+  // Ground goes straight to the front of the split, the rest into a buffer of its own, because it
+  // cannot be known yet where it begins.
+  struct Output {
+    GroundSplit& ground;
+    GroundSplit& rest;
+    std::size_t ground_count = 0;
+    std::size_t rest_count = 0;
 
-    patch_begin_.fill(0);
-    for (std::size_t i = 0; i < count; ++i) {
-      ++patch_begin_[static_cast<std::size_t>(patch_of_[i]) + 1];
+    void put_rest(const GroundSplit& from, std::size_t begin, std::size_t end) {
+      copy(from, begin, end - begin, rest, rest_count);
+      rest_count += end - begin;
     }
+    // Up to eight points; bit k of `is_ground` belongs to the k-th.
+    void put(const GroundSplit& from, std::size_t begin, std::size_t count, unsigned is_ground) {
+      if (is_ground == 0) return put_rest(from, begin, begin + count);
+      if (is_ground == (1U << count) - 1U) {
+        copy(from, begin, count, ground, ground_count);
+        ground_count += count;
+        return;
+      }
+      // Written to both places, since no branch could foretell the right one.
+      for (std::size_t k = 0; k < count; ++k) {
+        const unsigned bit = (is_ground >> k) & 1U;
+        put_one(from, begin + k, ground, ground_count);
+        put_one(from, begin + k, rest, rest_count);
+        ground_count += bit;
+        rest_count += 1U - bit;
+      }
+    }
+    static void put_one(const GroundSplit& from, std::size_t i, GroundSplit& to, std::size_t at) {
+      to.points.x[at] = from.points.x[i];
+      to.points.y[at] = from.points.y[i];
+      to.points.z[at] = from.points.z[i];
+      to.source[at] = from.source[i];
+    }
+  };
+
+  // Counting sort; stable, so that points keep the order of the scan within their patch. Neighbours
+  // in the scan mostly share a patch: what is counted and moved are streaks of points.
+  void sort_by_patch(PointsView scan) {
+    const std::size_t count = scan.size();
+    sorted_.resize(count);
+    if (patch_of_.size() < count + detail::kLanes) patch_of_.resize(count + detail::kLanes);
+    detail::for_lanes(scan, [&](detail::Float8 x, detail::Float8 y, detail::Float8, std::size_t i) {
+      find_patches(x, y).store(&patch_of_[i]);
+    });
+
+    streak_end_.clear();
+    patch_begin_.fill(0);
+    std::size_t begin = 0;
+    detail::for_each_change(patch_of_.data(), count, [&](std::size_t length) {
+      patch_begin_[static_cast<std::size_t>(patch_of_[begin]) + 1] += length;
+      begin += length;
+      streak_end_.push_back(static_cast<std::uint32_t>(begin));
+    });
     for (std::size_t p = 1; p < patch_begin_.size(); ++p) patch_begin_[p] += patch_begin_[p - 1];
+
     auto next = patch_begin_;
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t to = next[static_cast<std::size_t>(patch_of_[i])]++;
-      sorted_.x[to] = scan.x[i];
-      sorted_.y[to] = scan.y[i];
-      sorted_.z[to] = scan.z[i];
-      source_[to] = static_cast<std::uint32_t>(i);
+    begin = 0;
+    for (const std::uint32_t end : streak_end_) {
+      const std::size_t length = end - begin;
+      std::size_t& to = next[static_cast<std::size_t>(patch_of_[begin])];
+      detail::copy(&scan.x[begin], length, &sorted_.points.x[to]);
+      detail::copy(&scan.y[begin], length, &sorted_.points.y[to]);
+      detail::copy(&scan.z[begin], length, &sorted_.points.z[to]);
+      for (std::size_t k = 0; k < length; ++k) {
+        sorted_.source[to + k] = static_cast<std::uint32_t>(begin + k);
+      }
+      to += length;
+      begin = end;
     }
   }
 
   detail::Int8 find_patches(detail::Float8 x, detail::Float8 y) const {
     using detail::Float8;
-    using detail::Int8;
     const Float8 range = detail::sqrt(x * x + y * y);
     const Float8 azimuth = detail::arc_tangent2(y, x) + Float8(detail::kPi);
-    Float8 inner(zones_[0].inner);
-    Float8 rings_per_metre(zones_[0].rings_per_metre);
-    Float8 sectors_per_radian(zones_[0].sectors_per_radian);
-    Int8 first_patch(zones_[0].first_patch);
-    Int8 last_ring(zones_[0].last_ring);
-    Int8 sectors(zones_[0].sectors);
-    for (std::size_t i = 1; i < kZones; ++i) {
-      const detail::Mask8 beyond = range >= Float8(zones_[i].inner);
-      inner = select(beyond, Float8(zones_[i].inner), inner);
-      rings_per_metre = select(beyond, Float8(zones_[i].rings_per_metre), rings_per_metre);
-      sectors_per_radian = select(beyond, Float8(zones_[i].sectors_per_radian), sectors_per_radian);
-      first_patch = select(beyond, Int8(zones_[i].first_patch), first_patch);
-      last_ring = select(beyond, Int8(zones_[i].last_ring), last_ring);
-      sectors = select(beyond, Int8(zones_[i].sectors), sectors);
-    }
+    std::array<detail::Mask8, kZones> beyond;
+    for (std::size_t i = 1; i < kZones; ++i) beyond[i] = range >= Float8(zones_[i].inner);
+    // Constant of the zone that each point lies in: what is beyond a zone is beyond those before.
+    const auto of_zone = [&](float Zone::*constant) {
+      detail::Mask8 bits = bits_of(Float8(zones_[0].*constant));
+      for (std::size_t i = 1; i < kZones; ++i) {
+        bits = bits ^ (beyond[i] & (bits_of(Float8(zones_[i].*constant)) ^
+                                    bits_of(Float8(zones_[i - 1].*constant))));
+      }
+      return float_of(bits);
+    };
+    const auto whole = [](Float8 value) { return to_float(truncate(value)); };
     const Float8 limited = detail::min(range, Float8(static_cast<float>(config_.ground_max_range)));
-    const Int8 ring = detail::min(detail::truncate((limited - inner) * rings_per_metre), last_ring);
-    const Int8 sector =
-        detail::min(detail::truncate(azimuth * sectors_per_radian), sectors - Int8(1));
-    // ring * sectors, in floats: SSE2 has no 32-bit product, and these numbers are small.
-    const Int8 patch =
-        first_patch + detail::truncate(to_float(ring) * to_float(sectors)) + sector;
-    const detail::Mask8 inside =
-        (range >= Float8(static_cast<float>(config_.ground_min_range))) &
-        (range <= Float8(static_cast<float>(config_.ground_max_range)));
-    return select(inside, patch, Int8(static_cast<std::int32_t>(kPatches)));
+    const Float8 ring =
+        whole(detail::min((limited - of_zone(&Zone::inner)) * of_zone(&Zone::rings_per_metre),
+                          of_zone(&Zone::last_ring)));
+    const Float8 sectors = of_zone(&Zone::sectors);
+    const Float8 sector =
+        whole(detail::min(azimuth * of_zone(&Zone::sectors_per_radian), sectors - Float8(1.0F)));
+    const Float8 patch = of_zone(&Zone::first_patch) + ring * sectors + sector;
+    const detail::Mask8 inside = (range >= Float8(static_cast<float>(config_.ground_min_range))) &
+                                 (range <= Float8(static_cast<float>(config_.ground_max_range)));
+    return select(inside, truncate(patch), detail::Int8(static_cast<std::int32_t>(kPatches)));
   }
 
-  // Marks the ground points of one patch and returns how many there are.
-  std::size_t segment_patch(std::size_t patch) {
+  void segment_patch(std::size_t patch, Output& out) const {
     const std::size_t begin = patch_begin_[patch];
     const std::size_t end = patch_begin_[patch + 1];
-    std::uint8_t* const flags = is_ground_.data() + begin;
-    const auto reject = [&] {
-      std::fill(flags, flags + (end - begin), std::uint8_t{0});
-      return std::size_t{0};
-    };
+    const auto reject = [&] { out.put_rest(sorted_, begin, end); };
     if (end - begin < static_cast<std::size_t>(config_.ground_min_points)) return reject();
 
     const bool innermost_zone = patch < static_cast<std::size_t>(kRings[0] * kSectors[0]);
@@ -278,8 +310,8 @@ class GroundSegmenter {
     const float seed_height = lowest_mean(begin, end, floor);
 
     // First fit: the points near the seed height, as a horizontal half space; then the plane.
-    const float x0 = sorted_.x[begin];
-    const float y0 = sorted_.y[begin];
+    const float x0 = sorted_.points.x[begin];
+    const float y0 = sorted_.points.y[begin];
     HalfSpace below{0.0F, 0.0F, 1.0F, static_cast<float>(config_.ground_seed_margin)};
     detail::Plane plane;
     for (int i = 0; i < config_.ground_iterations; ++i) {
@@ -301,18 +333,11 @@ class GroundSegmenter {
       }
     }
 
-    std::size_t count = 0;
     for (std::size_t i = begin; i < end; i += detail::kLanes) {
       const std::size_t lanes = std::min(detail::kLanes, end - i);
-      const unsigned bits =
-          (inside(i, x0, y0, seed_height, below) & detail::first_lanes(lanes)).bits();
-      for (std::size_t lane = 0; lane < lanes; ++lane) {
-        const auto bit = static_cast<std::uint8_t>((bits >> lane) & 1U);
-        is_ground_[i + lane] = bit;
-        count += bit;
-      }
+      const detail::Mask8 mask = inside(i, x0, y0, seed_height, below) & detail::first_lanes(lanes);
+      out.put(sorted_, i, lanes, mask.bits());
     }
-    return count;
   }
 
   // Points with normal . (p - origin) < offset.
@@ -322,79 +347,115 @@ class GroundSegmenter {
 
   detail::Mask8 inside(std::size_t i, float x0, float y0, float z0, const HalfSpace& space) const {
     using detail::Float8;
-    const Float8 x = Float8::load(&sorted_.x[i]) - Float8(x0);
-    const Float8 y = Float8::load(&sorted_.y[i]) - Float8(y0);
-    const Float8 z = Float8::load(&sorted_.z[i]) - Float8(z0);
+    const Float8 x = Float8::load(&sorted_.points.x[i]) - Float8(x0);
+    const Float8 y = Float8::load(&sorted_.points.y[i]) - Float8(y0);
+    const Float8 z = Float8::load(&sorted_.points.z[i]) - Float8(z0);
     return Float8(space.x) * x + Float8(space.y) * y + Float8(space.z) * z < Float8(space.offset);
   }
 
-  detail::PlaneMoments sum_moments(std::size_t begin, std::size_t end, float x0, float y0,
-                                   float z0, const HalfSpace& space) const {
-    using detail::Float8;
-    Float8 count(0.0F);
-    Float8 sx(0.0F), sy(0.0F), sz(0.0F);
-    Float8 sxx(0.0F), sxy(0.0F), sxz(0.0F), syy(0.0F), syz(0.0F), szz(0.0F);
-    for (std::size_t i = begin; i < end; i += detail::kLanes) {
-      Float8 x = Float8::load(&sorted_.x[i]) - Float8(x0);
-      Float8 y = Float8::load(&sorted_.y[i]) - Float8(y0);
-      Float8 z = Float8::load(&sorted_.z[i]) - Float8(z0);
-      detail::Mask8 member =
-          Float8(space.x) * x + Float8(space.y) * y + Float8(space.z) * z < Float8(space.offset);
-      if (end - i < detail::kLanes) member = member & detail::first_lanes(end - i);
-      x = keep(member, x);
-      y = keep(member, y);
-      z = keep(member, z);
-      count = count + keep(member, Float8(1.0F));
-      sx = sx + x;
-      sy = sy + y;
-      sz = sz + z;
-      sxx = sxx + x * x;
-      sxy = sxy + x * y;
-      sxz = sxz + x * z;
-      syy = syy + y * y;
-      syz = syz + y * z;
-      szz = szz + z * z;
+  // The eight lanes are summed up four by four, so that all sums have room in registers.
+  detail::PlaneMoments sum_moments(std::size_t begin, std::size_t end, float x0, float y0, float z0,
+                                   const HalfSpace& space) const {
+    using detail::Float4;
+    using detail::Int4;
+    detail::Float8 sums[9];
+    std::int32_t count = 0;
+    for (std::size_t half = 0; half < 2; ++half) {
+      Int4 n = {};
+      Float4 sx = {}, sy = {}, sz = {}, sxx = {}, sxy = {}, sxz = {}, syy = {}, syz = {}, szz = {};
+      const auto add = [&](std::size_t i, Int4 admitted) {
+        Float4 x = detail::load4(&sorted_.points.x[i]) - x0;
+        Float4 y = detail::load4(&sorted_.points.y[i]) - y0;
+        Float4 z = detail::load4(&sorted_.points.z[i]) - z0;
+        const Int4 member = (space.x * x + space.y * y + space.z * z < space.offset) & admitted;
+        x = Float4(member & Int4(x));
+        y = Float4(member & Int4(y));
+        z = Float4(member & Int4(z));
+        n -= member;
+        sx += x;
+        sy += y;
+        sz += z;
+        sxx += x * x;
+        sxy += x * y;
+        sxz += x * z;
+        syy += y * y;
+        syz += y * z;
+        szz += z * z;
+      };
+      std::size_t i = begin + 4 * half;
+      for (; i + 4 <= end; i += detail::kLanes) add(i, Int4{-1, -1, -1, -1});
+      if (i < end) {
+        const auto left = static_cast<std::int32_t>(end - i);
+        add(i, Int4{0, 1, 2, 3} < left);
+      }
+      const Float4 parts[9] = {sx, sy, sz, sxx, sxy, sxz, syy, syz, szz};
+      for (std::size_t k = 0; k < 9; ++k) (half == 0 ? sums[k].lo : sums[k].hi) = parts[k];
+      count += n[0] + n[1] + n[2] + n[3];
     }
-    return {sum(count), sum(sx),  sum(sy),  sum(sz),  sum(sxx),
-            sum(sxy),   sum(sxz), sum(syy), sum(syz), sum(szz)};
+    return {static_cast<double>(count),
+            sum(sums[0]),
+            sum(sums[1]),
+            sum(sums[2]),
+            sum(sums[3]),
+            sum(sums[4]),
+            sum(sums[5]),
+            sum(sums[6]),
+            sum(sums[7]),
+            sum(sums[8])};
   }
+
+  // The lowest values met so far, in order.
+  struct Lowest {
+    std::size_t wanted;
+    std::size_t found = 0;
+    std::array<float, kMaxLowest> values{};
+
+    void add(float value) {
+      if (found == wanted && !(value < values[found - 1])) return;
+      std::size_t at = found < wanted ? found++ : wanted - 1;
+      for (; at > 0 && values[at - 1] > value; --at) values[at] = values[at - 1];
+      values[at] = value;
+    }
+    float limit() const {
+      return found == wanted ? values[found - 1] : std::numeric_limits<float>::infinity();
+    }
+  };
 
   // Mean height of the lowest points that are not below `floor`; all of them if there are fewer.
-  // Exact selection: a short sorted list, which hardly any point enters after the first few.
-  float lowest_mean(std::size_t begin, std::size_t end, float floor) {
-    const auto wanted = static_cast<std::size_t>(config_.ground_lowest_points);
-    std::array<float, 65> lowest;
-    std::size_t found = 0;
-    float limit = std::numeric_limits<float>::infinity();
+  // Points often come in the order of their height. So the lowest of each of some interleaved
+  // groups bound the result first, and only the few points within the bound are sorted in.
+  float lowest_mean(std::size_t begin, std::size_t end, float floor) const {
+    using detail::Float8;
+    Lowest lowest{static_cast<std::size_t>(config_.ground_lowest_points)};
+    const Float8 infinity(std::numeric_limits<float>::infinity());
+    const auto heights = [&](std::size_t i) {
+      const Float8 z = Float8::load(&sorted_.points.z[i]);
+      detail::Mask8 valid = z >= Float8(floor);
+      if (end - i < detail::kLanes) valid = valid & detail::first_lanes(end - i);
+      return select(valid, z, infinity);
+    };
+    const std::size_t groups = (lowest.wanted - 1) / detail::kLanes + 1;
+    for (std::size_t group = 0; group < groups; ++group) {
+      Float8 least = infinity;
+      for (std::size_t i = begin + group * detail::kLanes; i < end; i += groups * detail::kLanes) {
+        least = min(heights(i), least);
+      }
+      float values[detail::kLanes];
+      least.store(values);
+      for (const float value : values) lowest.add(value);
+    }
+    const Float8 bound(lowest.limit());
+    lowest.found = 0;
     for (std::size_t i = begin; i < end; i += detail::kLanes) {
-      const detail::Float8 z = detail::Float8::load(&sorted_.z[i]);
-      detail::Mask8 candidate = (z < detail::Float8(limit)) & (z >= detail::Float8(floor));
-      if (end - i < detail::kLanes) candidate = candidate & detail::first_lanes(end - i);
-      unsigned bits = candidate.bits();
-      for (; bits != 0; bits &= bits - 1) {
-        const float value = sorted_.z[i + static_cast<std::size_t>(__builtin_ctz(bits))];
-        if (!(value < limit)) continue;
-        std::size_t at = found < wanted ? found++ : wanted - 1;
-        for (; at > 0 && lowest[at - 1] > value; --at) lowest[at] = lowest[at - 1];
-        lowest[at] = value;
-        if (found == wanted) limit = lowest[wanted - 1];
+      const Float8 z = heights(i);
+      for (unsigned bits = ((z <= bound) & (z < infinity)).bits(); bits != 0; bits &= bits - 1) {
+        lowest.add(sorted_.points.z[i + static_cast<std::size_t>(__builtin_ctz(bits))]);
       }
     }
-    if (found == 0) return floor;
+    if (lowest.found == 0) return floor;
     float total = 0.0F;
-    for (std::size_t i = 0; i < found; ++i) total += lowest[i];
-    return total / static_cast<float>(found);
-  }
-
-  void partition(GroundSplit& split) const {
-    std::size_t next[2] = {split.ground_count, 0};
-    for (std::size_t i = 0; i < split.count; ++i) {
-      const std::size_t to = next[is_ground_[i]]++;
-      split.points.x[to] = sorted_.x[i];
-      split.points.y[to] = sorted_.y[i];
-      split.points.z[to] = sorted_.z[i];
-      split.source[to] = source_[i];
-    }
+    for (std::size_t i = 0; i < lowest.found; ++i) total += lowest.values[i];
+    return total / static_cast<float>(lowest.found);
   }
 
   Config config_;
@@ -403,9 +464,9 @@ class GroundSegmenter {
   std::array<std::int32_t, kPatches> ring_of_patch_{};
   std::array<std::size_t, kPatches + 2> patch_begin_{};
   std::vector<std::int32_t> patch_of_;
-  std::vector<std::uint8_t> is_ground_;
-  PointBuffer sorted_;
-  std::vector<std::uint32_t> source_;
+  std::vector<std::uint32_t> streak_end_;
+  GroundSplit sorted_;  // by patch
+  GroundSplit rest_;
 };
 
 }  // namespace dynains

@@ -47,36 +47,19 @@ class PolarBuffer {
   void append(PointsView points, const Eigen::Isometry3f& T_target_source) {
     using detail::Float8;
     const std::size_t begin = size_;
-    const std::size_t count = points.size();
-    resize(begin + count);
+    resize(begin + points.size());
     const auto& m = T_target_source.matrix();
     const Float8 m00(m(0, 0)), m01(m(0, 1)), m02(m(0, 2)), m03(m(0, 3));
     const Float8 m10(m(1, 0)), m11(m(1, 1)), m12(m(1, 2)), m13(m(1, 3));
     const Float8 m20(m(2, 0)), m21(m(2, 1)), m22(m(2, 2)), m23(m(2, 3));
-    const auto convert = [&](const float* px, const float* py, const float* pz, std::size_t to) {
-      const Float8 x = Float8::load(px);
-      const Float8 y = Float8::load(py);
-      const Float8 z_source = Float8::load(pz);
+    detail::for_lanes(points, [&](Float8 x, Float8 y, Float8 z_source, std::size_t i) {
       const Float8 x_target = (m00 * x + m01 * y) + (m02 * z_source + m03);
       const Float8 y_target = (m10 * x + m11 * y) + (m12 * z_source + m13);
       const Float8 z_target = (m20 * x + m21 * y) + (m22 * z_source + m23);
-      sqrt(x_target * x_target + y_target * y_target).store(&range[to]);
-      detail::arc_tangent2(y_target, x_target).store(&azimuth[to]);
-      z_target.store(&z[to]);
-    };
-    std::size_t i = 0;
-    for (; i + detail::kLanes <= count; i += detail::kLanes) {
-      convert(&points.x[i], &points.y[i], &points.z[i], begin + i);
-    }
-    if (i < count) {
-      float tail[3][detail::kLanes] = {};
-      for (std::size_t k = i; k < count; ++k) {
-        tail[0][k - i] = points.x[k];
-        tail[1][k - i] = points.y[k];
-        tail[2][k - i] = points.z[k];
-      }
-      convert(tail[0], tail[1], tail[2], begin + i);
-    }
+      sqrt(x_target * x_target + y_target * y_target).store(&range[begin + i]);
+      detail::arc_tangent2(y_target, x_target).store(&azimuth[begin + i]);
+      z_target.store(&z[begin + i]);
+    });
   }
 
   std::vector<float> range;

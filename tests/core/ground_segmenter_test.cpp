@@ -72,7 +72,7 @@ double share_of_differences(const std::vector<bool>& a, const std::vector<bool>&
 constexpr double kOnBorders = 1e-3;
 
 TEST_CASE("ground is what Patchwork in double precision calls ground") {
-  GroundSegmenter segmenter;  // one object for all, as in the pipeline
+  GroundSegmenter segmenter(Config::paper());  // one object for all, as in the pipeline
   const auto compare = [&](PointsView scan) {
     const std::vector<bool> expected = reference_ground(segmenter.config(), scan);
     const auto ground = std::count(expected.begin(), expected.end(), true);

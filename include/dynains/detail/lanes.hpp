@@ -27,6 +27,7 @@ struct Mask8 {
   Int4 lo, hi;
 
   friend Mask8 operator&(Mask8 a, Mask8 b) { return {a.lo & b.lo, a.hi & b.hi}; }
+  friend Mask8 operator^(Mask8 a, Mask8 b) { return {a.lo ^ b.lo, a.hi ^ b.hi}; }
   friend Mask8 operator|(Mask8 a, Mask8 b) { return {a.lo | b.lo, a.hi | b.hi}; }
   friend Mask8 operator~(Mask8 a) { return {~a.lo, ~a.hi}; }
 
@@ -105,7 +106,15 @@ struct Float8 {
   friend Mask8 operator>=(Float8 a, Float8 b) { return {a.lo >= b.lo, a.hi >= b.hi}; }
 };
 
+inline Float4 load4(const float* from) {
+  Float4 result;
+  std::memcpy(&result, from, sizeof(result));
+  return result;
+}
+
 inline Int4 bits_of(Float4 a) { return Int4(a); }
+inline Mask8 bits_of(Float8 a) { return {Int4(a.lo), Int4(a.hi)}; }
+inline Float8 float_of(Mask8 a) { return {Float4(a.lo), Float4(a.hi)}; }
 
 /// `a` where the mask is set, else `b`.
 inline Float8 select(Mask8 mask, Float8 a, Float8 b) {
@@ -203,6 +212,61 @@ inline float max_lane(Float8 a) {
 inline Mask8 first_lanes(std::size_t count) {
   const Int8 index(Int4{0, 1, 2, 3}, Int4{4, 5, 6, 7});
   return index < Int8(static_cast<std::int32_t>(count));
+}
+
+/// Bit i is set where byte i of the 64 that begin at `from` is not zero.
+inline std::uint64_t nonzero_bytes(const std::uint8_t* from) {
+  std::uint64_t result = 0;
+#if defined(__SSE2__)
+  for (int i = 0; i < 4; ++i) {
+    const __m128i bytes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(from) + i);
+    const int zero = _mm_movemask_epi8(_mm_cmpeq_epi8(bytes, _mm_setzero_si128()));
+    result |= static_cast<std::uint64_t>(~zero & 0xFFFF) << (16 * i);
+  }
+#else
+  for (int i = 0; i < 64; ++i) result |= std::uint64_t{from[i] != 0} << i;
+#endif
+  return result;
+}
+
+/// For short arrays, of which there are many: cheaper than a call of memcpy.
+template <class T>
+void copy(const T* from, std::size_t count, T* to) {
+  static_assert(sizeof(T) == 4);
+  std::size_t i = 0;
+  for (; i + kLanes <= count; i += kLanes) {
+    Int8 eight;
+    std::memcpy(&eight, from + i, sizeof(eight));
+    std::memcpy(to + i, &eight, sizeof(eight));
+  }
+  for (; i < count; ++i) to[i] = from[i];
+}
+
+/// Cuts the array into stretches of equal values and calls `body(length)` for one after the other.
+template <class T, class Body>
+void for_each_change(const T* values, std::size_t count, Body&& body) {
+  static_assert(sizeof(T) == 4);
+  const auto load = [](const T* from) {
+    Int8 result;
+    std::memcpy(&result, from, sizeof(result));
+    return result;
+  };
+  std::size_t begin = 0;
+  std::size_t i = 1;
+  for (; i + kLanes <= count; i += kLanes) {
+    unsigned bits = (~(load(values + i) == load(values + i - 1))).bits();
+    for (; bits != 0; bits &= bits - 1) {
+      const std::size_t end = i + static_cast<std::size_t>(__builtin_ctz(bits));
+      body(end - begin);
+      begin = end;
+    }
+  }
+  for (; i < count; ++i) {
+    if (values[i] == values[i - 1]) continue;
+    body(i - begin);
+    begin = i;
+  }
+  if (count > begin) body(count - begin);
 }
 
 /// Calls `body(x, y, z, i)` with eight points at a time, from point i on; the last ones are filled
