@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynains/curved_voxel_clusterer.hpp"
+#include "dynains/detail/lanes.hpp"
 #include "dynains/points.hpp"
 #include "dynains/polar_points.hpp"
 
@@ -25,8 +26,16 @@ struct ClusterView {
 
 /// Counting sort of a window. Only clusters that were seen by both the oldest and the newest scan
 /// can be compared (Eq. 11); the points of the others are left out of the order.
+///
+/// Neighbours in a scan mostly share a cluster: what is counted and moved are streaks of points.
 class ClusterSet {
  public:
+  /// Points [begin, end) of the window, neighbours in one scan that share a cluster.
+  struct Streak {
+    std::uint32_t begin, end;
+    std::uint32_t cluster;  ///< or kNoCluster
+  };
+
   /// `window` holds the scans one after another, oldest first; scan k is
   /// [scan_begin[k], scan_begin[k + 1]). `cluster_of` holds a number per point below
   /// `cluster_count`, or kNoCluster. Views returned later hold until the next build.
@@ -34,37 +43,19 @@ class ClusterSet {
              Span<const std::uint32_t> cluster_of, std::size_t cluster_count) {
     scan_count_ = scan_begin.size() - 1;
     cluster_count_ = cluster_count;
-    // Slot of (cluster, scan), shifted by one so that the counts turn into beginnings.
-    begin_.assign(cluster_count * scan_count_ + 1, 0);
-    for (std::size_t k = 0; k < scan_count_; ++k) {
-      std::uint32_t* const counts = begin_.data() + k;
-      for (std::size_t i = scan_begin[k]; i < scan_begin[k + 1]; ++i) {
-        if (cluster_of[i] != kNoCluster) ++counts[cluster_of[i] * scan_count_];
-      }
-    }
-    comparable_.assign(cluster_count, 0);
-    std::uint32_t next = 0;
-    for (std::size_t c = 0; c < cluster_count; ++c) {
-      std::uint32_t* const counts = begin_.data() + c * scan_count_;
-      comparable_[c] = scan_count_ > 1 && counts[0] > 0 && counts[scan_count_ - 1] > 0;
-      for (std::size_t k = 0; k < scan_count_; ++k) {
-        const std::uint32_t count = comparable_[c] != 0 ? counts[k] : 0;
-        counts[k] = next;
-        next += count;
-      }
-    }
-    begin_.back() = next;
-
-    ordered_.resize(next);
+    find_streaks(scan_begin, cluster_of);
+    count_points();
+    ordered_.resize(begin_.back());
     next_ = begin_;
     for (std::size_t k = 0; k < scan_count_; ++k) {
-      for (std::size_t i = scan_begin[k]; i < scan_begin[k + 1]; ++i) {
-        const std::uint32_t cluster = cluster_of[i];
-        if (cluster == kNoCluster || comparable_[cluster] == 0) continue;
-        const std::uint32_t to = next_[cluster * scan_count_ + k]++;
-        ordered_.range[to] = window.range[i];
-        ordered_.azimuth[to] = window.azimuth[i];
-        ordered_.z[to] = window.z[i];
+      for (const Streak& streak : streaks(k)) {
+        if (streak.cluster == kNoCluster || comparable_[streak.cluster] == 0) continue;
+        std::uint32_t& to = next_[streak.cluster * scan_count_ + k];
+        const std::size_t count = streak.end - streak.begin;
+        detail::copy(&window.range[streak.begin], count, &ordered_.range[to]);
+        detail::copy(&window.azimuth[streak.begin], count, &ordered_.azimuth[to]);
+        detail::copy(&window.z[streak.begin], count, &ordered_.z[to]);
+        to += static_cast<std::uint32_t>(count);
       }
     }
   }
@@ -73,6 +64,12 @@ class ClusterSet {
   std::size_t scan_count() const { return scan_count_; }
   /// Whether both the oldest and the newest scan saw the cluster.
   bool comparable(std::size_t cluster) const { return comparable_[cluster] != 0; }
+
+  /// All points of scan k, streak by streak.
+  Span<const Streak> streaks(std::size_t k) const {
+    return Span<const Streak>(streaks_).subspan(first_streak_[k],
+                                                first_streak_[k + 1] - first_streak_[k]);
+  }
 
   /// Points of a comparable cluster; empty for others.
   ClusterView operator[](std::size_t cluster) const {
@@ -83,8 +80,49 @@ class ClusterSet {
   }
 
  private:
+  void find_streaks(Span<const std::uint32_t> scan_begin, Span<const std::uint32_t> cluster_of) {
+    streaks_.clear();
+    first_streak_.clear();
+    for (std::size_t k = 0; k < scan_count_; ++k) {
+      first_streak_.push_back(streaks_.size());
+      const std::uint32_t end = scan_begin[k + 1];
+      std::uint32_t begin = scan_begin[k];
+      detail::for_each_change(cluster_of.data() + begin, end - begin, [&](std::size_t length) {
+        const auto next = begin + static_cast<std::uint32_t>(length);
+        streaks_.push_back({begin, next, cluster_of[begin]});
+        begin = next;
+      });
+    }
+    first_streak_.push_back(streaks_.size());
+  }
+
+  // Slot of (cluster, scan): counts first, which then turn into beginnings.
+  void count_points() {
+    begin_.assign(cluster_count_ * scan_count_ + 1, 0);
+    for (std::size_t k = 0; k < scan_count_; ++k) {
+      for (const Streak& streak : streaks(k)) {
+        if (streak.cluster == kNoCluster) continue;
+        begin_[streak.cluster * scan_count_ + k] += streak.end - streak.begin;
+      }
+    }
+    comparable_.assign(cluster_count_, 0);
+    std::uint32_t next = 0;
+    for (std::size_t c = 0; c < cluster_count_; ++c) {
+      std::uint32_t* const counts = begin_.data() + c * scan_count_;
+      comparable_[c] = scan_count_ > 1 && counts[0] > 0 && counts[scan_count_ - 1] > 0;
+      for (std::size_t k = 0; k < scan_count_; ++k) {
+        const std::uint32_t count = comparable_[c] != 0 ? counts[k] : 0;
+        counts[k] = next;
+        next += count;
+      }
+    }
+    begin_.back() = next;
+  }
+
   std::size_t scan_count_ = 0;
   std::size_t cluster_count_ = 0;
+  std::vector<Streak> streaks_;
+  std::vector<std::size_t> first_streak_;  // by scan
   std::vector<std::uint32_t> begin_;
   std::vector<std::uint32_t> next_;
   std::vector<std::uint8_t> comparable_;

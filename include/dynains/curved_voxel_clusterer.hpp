@@ -27,7 +27,8 @@ inline constexpr std::uint32_t kNoCluster = 0xFFFFFFFFU;
 /// Groups points whose curved voxels are connected in the 26-neighbourhood; azimuth wraps around.
 ///
 /// Occupied cells are bytes of a dense grid with azimuth running fastest. Each row is cut into
-/// runs of occupied cells, and runs of neighbouring rows that touch are joined by union-find.
+/// runs of occupied cells, 64 cells at a time, and runs of neighbouring rows that touch are joined
+/// by union-find.
 class CurvedVoxelClusterer {
  public:
   struct Config {
@@ -52,7 +53,8 @@ class CurvedVoxelClusterer {
       const double spacing = 0.75 * (sensor.azimuth_step + sensor.elevation_gap);
       if (voxel_azimuth == 0.0) config.voxel_azimuth = std::clamp(spacing, 0.5, 30.0);
       if (voxel_elevation == 0.0) {
-        config.voxel_elevation = std::clamp(std::max(spacing, sensor.elevation_gap_wide), 1.0, 45.0);
+        config.voxel_elevation =
+            std::clamp(std::max(spacing, sensor.elevation_gap_wide), 1.0, 45.0);
       }
       return config;
     }
@@ -69,22 +71,24 @@ class CurvedVoxelClusterer {
                         "points farther away belong to no cluster and stay static"});
     }
 
-    /// Number of cells of azimuth, elevation and range together. Rows of azimuth are padded to
-    /// whole words, at least 16 cells, so that a bound on cells is one on rows as well.
+    /// Number of cells of azimuth, elevation and range together, rows of azimuth padded to a
+    /// power of two.
     double cell_count() const {
-      return std::ceil(std::round(360.0 / voxel_azimuth) / 8.0) * 8.0 * std::ceil(180.0 / voxel_elevation) *
-             (std::floor(cluster_range / voxel_range) + 1.0);
+      return std::exp2(std::ceil(std::log2(std::max(64.0, std::round(360.0 / voxel_azimuth))))) *
+             std::ceil(180.0 / voxel_elevation) * (std::floor(cluster_range / voxel_range) + 1.0);
     }
 
     /// Throws ConfigError.
     void validate() const {
       validate_parameters("CurvedVoxelClusterer", *this);
-      constexpr double kMaxCells = 1 << 28;
+      constexpr double kMaxCells = 1 << 29;
       const double cells = resolved(SensorModel::typical()).cell_count();
       if (!(cells <= kMaxCells)) {
-        throw ConfigError("CurvedVoxelClusterer: voxel_range, voxel_azimuth, voxel_elevation and "
-                          "cluster_range make " + std::to_string(cells) +
-                          " cells; at most " + std::to_string(kMaxCells) + " are possible");
+        throw ConfigError(
+            "CurvedVoxelClusterer: voxel_range, voxel_azimuth, voxel_elevation and "
+            "cluster_range make " +
+            std::to_string(cells) + " cells; at most " + std::to_string(kMaxCells) +
+            " are possible");
       }
     }
   };
@@ -100,9 +104,11 @@ class CurvedVoxelClusterer {
   void adapt(const SensorModel& sensor) {
     resolved_ = config_.resolved(sensor);
     azimuths_ = static_cast<std::int32_t>(std::round(360.0 / resolved_.voxel_azimuth));
-    ranges_ = static_cast<std::int32_t>(std::floor(config_.cluster_range / config_.voxel_range)) + 1;
+    ranges_ =
+        static_cast<std::int32_t>(std::floor(config_.cluster_range / config_.voxel_range)) + 1;
     elevations_ = static_cast<std::int32_t>(std::ceil(180.0 / resolved_.voxel_elevation));
-    row_bytes_ = (static_cast<std::size_t>(azimuths_) + 7) / 8 * 8;
+    row_shift_ = 6;  // at least one block
+    while ((1 << row_shift_) < azimuths_) ++row_shift_;
   }
 
   const Config& config() const { return config_; }
@@ -115,18 +121,22 @@ class CurvedVoxelClusterer {
     find_runs();
     join_runs();
     number_clusters(points.size());
+    clear_cells();
     return {cluster_of_.data(), points.size()};
   }
 
   std::size_t cluster_count() const { return cluster_count_; }
 
  private:
+  static constexpr std::size_t kBlock = 64;  // cells, a word of bits
+
   struct Run {
     std::int32_t begin, end;  // azimuth cells, end not included
     std::uint32_t parent;     // union-find; the root is the smallest run number of its set
   };
 
-  // Cell of each point as (elevation * ranges + range) * row_bytes + azimuth; -1 if too far.
+  // Cell of each point as (elevation * ranges + range) * row + azimuth; -1 if too far. Rows have a
+  // power of two of cells: a shift is cheaper than a product.
   void find_cells(PolarView points) {
     using detail::Float8;
     using detail::Int8;
@@ -142,125 +152,90 @@ class CurvedVoxelClusterer {
     const Float8 far(static_cast<float>(config_.cluster_range));
     const Float8 pi(detail::kPi);
     const Float8 half_pi(0.5F * detail::kPi);
-    const Int8 last_azimuth(azimuths_ - 1);
-    const Int8 last_elevation(elevations_ - 1);
-    const Int8 last_range(ranges_ - 1);
-    const Int8 row_bytes(static_cast<std::int32_t>(row_bytes_));
-    const Int8 none(-1);
-    Int8 lowest(elevations_);
-    Int8 highest(-1);
-    const auto convert = [&](const float* range, const float* azimuth, const float* height,
-                             std::size_t to, detail::Mask8 valid) {
-      const Float8 r = Float8::load(range);
-      const Float8 z = Float8::load(height);
-      const Float8 distance = sqrt(r * r + z * z);
-      const detail::Mask8 near = (distance <= far) & valid;
-      const Int8 i_range = min(truncate(keep(near, distance) * range_scale), last_range);
-      const Int8 i_azimuth =
-          min(truncate((Float8::load(azimuth) + pi) * azimuth_scale), last_azimuth);
-      const Int8 i_elevation = min(
-          truncate((detail::arc_tangent2(z, r) + half_pi) * elevation_scale), last_elevation);
-      // Row numbers stay below 2^24 and are exact in floats; the product with the row length may
-      // not be, so it is taken in integers from two exact parts.
-      const Int8 i_row =
-          truncate(to_float(i_elevation) * Float8(static_cast<float>(ranges_))) + i_range;
-      select(near, multiply(i_row, row_bytes) + i_azimuth, none).store(&cell_of_[to]);
-      lowest = min(lowest, select(near, i_elevation, lowest));
-      highest = max(highest, select(near, i_elevation, highest));
-    };
-    const detail::Mask8 all = detail::first_lanes(detail::kLanes);
-    std::size_t i = 0;
-    for (; i + detail::kLanes <= count; i += detail::kLanes) {
-      convert(&points.range[i], &points.azimuth[i], &points.z[i], i, all);
-    }
-    if (i < count) {
-      float tail[3][detail::kLanes] = {};
-      for (std::size_t k = i; k < count; ++k) {
-        tail[0][k - i] = points.range[k];
-        tail[1][k - i] = points.azimuth[k];
-        tail[2][k - i] = points.z[k];
-      }
-      convert(tail[0], tail[1], tail[2], i, detail::first_lanes(count - i));
-    }
-    lowest_elevation_ = elevations_;
-    highest_elevation_ = -1;
-    std::int32_t low[detail::kLanes];
-    std::int32_t high[detail::kLanes];
-    lowest.store(low);
-    highest.store(high);
-    for (std::size_t k = 0; k < detail::kLanes; ++k) {
-      lowest_elevation_ = std::min(lowest_elevation_, low[k]);
-      highest_elevation_ = std::max(highest_elevation_, high[k]);
-    }
-  }
-
-  // Product of non-negative integers below 2^24 and 2^12 whose result fits int32, by two float
-  // products that are exact: SSE2 has no 32-bit integer product.
-  static detail::Int8 multiply(detail::Int8 a, detail::Int8 b) {
-    using detail::Int8;
-    const Int8 low = a & Int8(0xFFF);
-    const Int8 high = a - low;
-    return detail::truncate(to_float(low) * to_float(b)) +
-           detail::truncate(to_float(high) * to_float(b));
+    const Float8 last_azimuth(static_cast<float>(azimuths_ - 1));
+    const Float8 last_elevation(static_cast<float>(elevations_ - 1));
+    const Float8 last_range(static_cast<float>(ranges_ - 1));
+    const Float8 ranges(static_cast<float>(ranges_));
+    Float8 lowest(static_cast<float>(elevations_));
+    Float8 highest(-1.0F);
+    detail::for_lanes({points.range, points.azimuth, points.z}, [&](Float8 range, Float8 azimuth,
+                                                                    Float8 z, std::size_t to) {
+      const Float8 distance = sqrt(range * range + z * z);
+      const detail::Mask8 near = distance <= far;
+      const Float8 i_range = min(keep(near, distance) * range_scale, last_range);
+      const Float8 i_azimuth = min((azimuth + pi) * azimuth_scale, last_azimuth);
+      const Float8 i_elevation =
+          min((detail::arc_tangent2(z, range) + half_pi) * elevation_scale, last_elevation);
+      // Row numbers stay below 2^23 and are exact in floats.
+      const Int8 i_row = truncate(to_float(truncate(i_elevation)) * ranges) + truncate(i_range);
+      select(near, (i_row << row_shift_) + truncate(i_azimuth), Int8(-1)).store(&cell_of_[to]);
+      lowest = min(select(near, i_elevation, lowest), lowest);
+      highest = max(select(near, i_elevation, highest), highest);
+    });
+    lowest_elevation_ = static_cast<std::int32_t>(min_lane(lowest));
+    highest_elevation_ = static_cast<std::int32_t>(std::floor(max_lane(highest)));
   }
 
   // The grid covers only the elevations that occur. It is all zero between calls.
   void mark_cells(std::size_t count) {
     if (highest_elevation_ < 0) return;
-    first_cell_ = static_cast<std::size_t>(lowest_elevation_ * ranges_) * row_bytes_;
-    const std::size_t cells =
-        static_cast<std::size_t>((highest_elevation_ - lowest_elevation_ + 1) * ranges_) *
-        row_bytes_;
-    if (occupied_.size() < cells) {
-      occupied_.resize(cells);
-      run_of_.resize(cells);
+    first_cell_ = static_cast<std::size_t>(lowest_elevation_ * ranges_) << row_shift_;
+    const std::size_t blocks = row_count() * row_blocks();
+    if (is_used_.size() < blocks) {
+      is_used_.resize(blocks);
+      first_run_of_block_.resize(blocks);
+      cells_.resize(blocks * kBlock);
     }
     for (std::size_t i = 0; i < count; ++i) {
-      if (cell_of_[i] >= 0) {
-        occupied_[static_cast<std::size_t>(cell_of_[i]) - first_cell_] = 1;
-      }
+      if (cell_of_[i] < 0) continue;
+      const std::size_t cell = static_cast<std::size_t>(cell_of_[i]) - first_cell_;
+      cells_[cell] = 1;
+      is_used_[cell / kBlock] = 1;
     }
   }
 
+  std::size_t row_blocks() const { return (std::size_t{1} << row_shift_) / kBlock; }
   std::size_t row_count() const {
     return highest_elevation_ < 0
                ? 0
                : static_cast<std::size_t>((highest_elevation_ - lowest_elevation_ + 1) * ranges_);
   }
 
-  // Cuts rows into runs, notes the run of each occupied cell, and clears the grid behind itself.
+  // Cuts rows into runs. An occupied cell then holds the number of its run, counted from the first
+  // one of its block.
   void find_runs() {
     const std::size_t rows = row_count();
     runs_.clear();
+    used_blocks_.clear();
     first_run_.resize(rows + 1);
     for (std::size_t row = 0; row < rows; ++row) {
       first_run_[row] = static_cast<std::uint32_t>(runs_.size());
-      std::uint8_t* const cells = occupied_.data() + row * row_bytes_;
-      std::uint32_t* const run_of = run_of_.data() + row * row_bytes_;
-      bool open = false;
-      for (std::size_t block = 0; block < row_bytes_; block += 8) {
-        std::uint64_t eight;
-        std::memcpy(&eight, cells + block, 8);
-        if (eight == 0) {
-          open = false;
-          continue;
-        }
-        for (std::size_t i = block; i < block + 8; ++i) {
-          if (cells[i] == 0) {
-            open = false;
-            continue;
-          }
-          const auto azimuth = static_cast<std::int32_t>(i);
-          if (!open) {
-            const auto number = static_cast<std::uint32_t>(runs_.size());
-            runs_.push_back({azimuth, azimuth + 1, number});
-            open = true;
+      std::int32_t open_end = -1;  // of the last run in this row
+      for (std::size_t b = 0; b < row_blocks(); ++b) {
+        const std::size_t block = row * row_blocks() + b;
+        if (is_used_[block] == 0) continue;
+        used_blocks_.push_back(static_cast<std::uint32_t>(block));
+        std::uint8_t* const cells = &cells_[block * kBlock];
+        std::uint64_t occupied = detail::nonzero_bytes(cells);
+        const auto first_azimuth = static_cast<std::int32_t>(b * kBlock);
+        const bool goes_on = open_end == first_azimuth && (occupied & 1U) != 0;
+        const auto first = static_cast<std::uint32_t>(runs_.size() - (goes_on ? 1 : 0));
+        first_run_of_block_[block] = first;
+        while (occupied != 0) {
+          const int begin = __builtin_ctzll(occupied);
+          const std::uint64_t carried = occupied + (occupied & (~occupied + 1));
+          const int end = carried == 0 ? static_cast<int>(kBlock) : __builtin_ctzll(carried);
+          occupied &= carried;
+          open_end = first_azimuth + end;
+          if (goes_on && begin == 0) {
+            runs_.back().end = open_end;
           } else {
-            runs_.back().end = azimuth + 1;
+            runs_.push_back(
+                {first_azimuth + begin, open_end, static_cast<std::uint32_t>(runs_.size())});
           }
-          run_of[i] = static_cast<std::uint32_t>(runs_.size() - 1);
+          const auto in_block = static_cast<std::uint8_t>(runs_.size() - 1 - first);
+          std::fill(cells + begin, cells + end, in_block);
         }
-        std::memset(cells + block, 0, 8);
       }
     }
     first_run_[rows] = static_cast<std::uint32_t>(runs_.size());
@@ -323,17 +298,29 @@ class CurvedVoxelClusterer {
 
   void number_clusters(std::size_t count) {
     number_of_run_.assign(runs_.size(), kNoCluster);
-    for (std::uint32_t run = 0; run < runs_.size(); ++run) runs_[run].parent = root(run);
     cluster_count_ = 0;
     for (std::size_t i = 0; i < count; ++i) {
       if (cell_of_[i] < 0) {
         cluster_of_[i] = kNoCluster;
         continue;
       }
-      const std::uint32_t run = run_of_[static_cast<std::size_t>(cell_of_[i]) - first_cell_];
-      std::uint32_t& number = number_of_run_[runs_[run].parent];
-      if (number == kNoCluster) number = static_cast<std::uint32_t>(cluster_count_++);
+      const std::size_t cell = static_cast<std::size_t>(cell_of_[i]) - first_cell_;
+      const std::uint32_t run = first_run_of_block_[cell / kBlock] + cells_[cell];
+      std::uint32_t number = number_of_run_[run];
+      if (number == kNoCluster) {
+        std::uint32_t& of_root = number_of_run_[root(run)];
+        if (of_root == kNoCluster) of_root = static_cast<std::uint32_t>(cluster_count_++);
+        number = of_root;
+        number_of_run_[run] = number;
+      }
       cluster_of_[i] = number;
+    }
+  }
+
+  void clear_cells() {
+    for (const std::uint32_t block : used_blocks_) {
+      is_used_[block] = 0;
+      std::memset(&cells_[block * kBlock], 0, kBlock);
     }
   }
 
@@ -342,7 +329,7 @@ class CurvedVoxelClusterer {
   std::int32_t azimuths_ = 0;
   std::int32_t ranges_ = 0;
   std::int32_t elevations_ = 0;
-  std::size_t row_bytes_ = 0;
+  int row_shift_ = 0;  // log2 of the cells in a row
 
   std::int32_t lowest_elevation_ = 0;
   std::int32_t highest_elevation_ = -1;
@@ -350,8 +337,10 @@ class CurvedVoxelClusterer {
   std::size_t cluster_count_ = 0;
   std::vector<std::int32_t> cell_of_;
   std::vector<std::uint32_t> cluster_of_;
-  std::vector<std::uint8_t> occupied_;
-  std::vector<std::uint32_t> run_of_;
+  std::vector<std::uint8_t> cells_;
+  std::vector<std::uint8_t> is_used_;  // by block
+  std::vector<std::uint32_t> first_run_of_block_;
+  std::vector<std::uint32_t> used_blocks_;
   std::vector<Run> runs_;
   std::vector<std::uint32_t> first_run_;
   std::vector<std::uint32_t> number_of_run_;

@@ -10,6 +10,7 @@
 
 #include "dynains/cluster_set.hpp"
 #include "dynains/detail/arc_tangent.hpp"
+#include "dynains/detail/lanes.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/polar_points.hpp"
@@ -121,24 +122,39 @@ class OccupancyDescriptor {
 
  private:
   void lay_grid() {
+    using detail::Float8;
     const PolarView& points = cluster_.points;
-    float range_max = points.range[0];
-    range_min_ = range_max;
-    z_min_ = points.z[0];
+    Float8 range_low(points.range[0]), range_high = range_low;
+    Float8 z_low(points.z[0]);
     // Extents for the seam at +-pi and for the seam at 0: the smaller of the two is the smallest
     // arc if it is at most half a turn.
-    float low = points.azimuth[0], high = low;
-    float low_turned = turned(low), high_turned = low_turned;
-    for (std::size_t i = 1; i < points.size(); ++i) {
-      range_min_ = std::min(range_min_, points.range[i]);
-      range_max = std::max(range_max, points.range[i]);
-      z_min_ = std::min(z_min_, points.z[i]);
-      const float azimuth = points.azimuth[i];
-      low = std::min(low, azimuth);
-      high = std::max(high, azimuth);
-      low_turned = std::min(low_turned, turned(azimuth));
-      high_turned = std::max(high_turned, turned(azimuth));
-    }
+    Float8 azimuth_low(points.azimuth[0]), azimuth_high = azimuth_low;
+    Float8 turned_low(turned(points.azimuth[0])), turned_high = turned_low;
+    detail::for_lanes({points.range, points.azimuth, points.z}, [&](Float8 range, Float8 azimuth,
+                                                                    Float8 z, std::size_t i) {
+      if (points.size() - i < detail::kLanes) {
+        // The first point in place of those that are missing changes no extent.
+        const detail::Mask8 there = detail::first_lanes(points.size() - i);
+        range = select(there, range, Float8(points.range[0]));
+        azimuth = select(there, azimuth, Float8(points.azimuth[0]));
+        z = select(there, z, Float8(points.z[0]));
+      }
+      range_low = min(range_low, range);
+      range_high = max(range_high, range);
+      z_low = min(z_low, z);
+      azimuth_low = min(azimuth_low, azimuth);
+      azimuth_high = max(azimuth_high, azimuth);
+      const Float8 on = azimuth + keep(azimuth < Float8(0.0F), Float8(2.0F * detail::kPi));
+      turned_low = min(turned_low, on);
+      turned_high = max(turned_high, on);
+    });
+    range_min_ = min_lane(range_low);
+    const float range_max = max_lane(range_high);
+    z_min_ = min_lane(z_low);
+    const float low = min_lane(azimuth_low);
+    const float high = max_lane(azimuth_high);
+    const float low_turned = min_lane(turned_low);
+    const float high_turned = max_lane(turned_high);
     float extent = high - low;
     azimuth_min_ = low;
     if (high_turned - low_turned < extent) {
@@ -207,18 +223,28 @@ class OccupancyDescriptor {
     const std::size_t cells = cell_count();
     float* const heights = heights_.data() + k * cells;
     std::fill(heights, heights + cells, 0.0F);
+    using detail::Float8;
     const PolarView points = cluster_.scan(k);
-    for (std::size_t p = 0; p < points.size(); ++p) {
-      const float radial = (points.range[p] - range_min_) * cells_per_metre_;
-      float offset = points.azimuth[p] - azimuth_min_;
-      if (offset < -detail::kPi * 1e-4F) offset += 2.0F * detail::kPi;
-      const float angular = offset * cells_per_radian_;
-      const std::size_t i = std::min(static_cast<std::size_t>(radial), radial_cells_ - 1);
-      const std::size_t j =
-          std::min(static_cast<std::size_t>(std::max(angular, 0.0F)), azimuth_cells_ - 1);
-      float& height = heights[i * azimuth_cells_ + j];
-      height = std::max(height, points.z[p] - z_min_);
-    }
+    const Float8 last_radial(static_cast<float>(radial_cells_ - 1));
+    const Float8 last_azimuth(static_cast<float>(azimuth_cells_ - 1));
+    detail::for_lanes({points.range, points.azimuth, points.z}, [&](Float8 range, Float8 azimuth,
+                                                                    Float8 z, std::size_t begin) {
+      const Float8 radial = (range - Float8(range_min_)) * Float8(cells_per_metre_);
+      Float8 offset = azimuth - Float8(azimuth_min_);
+      offset = offset + keep(offset < Float8(-detail::kPi * 1e-4F), Float8(2.0F * detail::kPi));
+      const Float8 angular = max(offset * Float8(cells_per_radian_), Float8(0.0F));
+      std::int32_t cell[detail::kLanes];
+      float height[detail::kLanes];
+      (multiply(truncate(min(radial, last_radial)), static_cast<std::int32_t>(azimuth_cells_)) +
+       truncate(min(angular, last_azimuth)))
+          .store(cell);
+      (z - Float8(z_min_)).store(height);
+      const std::size_t lanes = std::min(detail::kLanes, points.size() - begin);
+      for (std::size_t i = 0; i < lanes; ++i) {
+        float& highest = heights[cell[i]];
+        highest = std::max(highest, height[i]);
+      }
+    });
   }
 
   Config config_;
