@@ -238,6 +238,7 @@ class BasicDynaInsRemover {
     ScanSlot& newest = slot(pushed_);
     newest.scan = pushed_;
     newest.segment = segment_;
+    newest.is_written = false;
     newest.time = time;
     newest.T_world_sensor = orthonormalized(T_world_sensor);
     last_time_ = time;
@@ -298,12 +299,15 @@ class BasicDynaInsRemover {
     for (std::uint64_t scan = window_first_; scan < pushed_; ++scan) {
       if (config_.votes == 0 && scan + 1 != pushed_) continue;
       ScanSlot& target = slot(scan);
-      const std::uint32_t* const clusters = cluster_of.data() + scan_begin_[scan - window_first_];
-      for (std::size_t i = 0; i < target.non_ground_count(); ++i) {
-        if (clusters[i] == kNoCluster) continue;
-        const ClusterVerdict& verdict = verdict_[clusters[i]];
-        target.votes[i] = static_cast<std::uint8_t>(target.votes[i] + verdict.dynamic);
-        target.belief[i] = std::max(target.belief[i], verdict.belief);
+      const std::size_t k = scan - window_first_;
+      for (const ClusterSet::Streak& streak : clusters_.streaks(k)) {
+        if (streak.cluster == kNoCluster) continue;
+        const ClusterVerdict& verdict = verdict_[streak.cluster];
+        if (verdict.dynamic == 0 && verdict.belief == 0.0F) continue;
+        for (std::size_t i = streak.begin - scan_begin_[k]; i < streak.end - scan_begin_[k]; ++i) {
+          target.votes[i] = static_cast<std::uint8_t>(target.votes[i] + verdict.dynamic);
+          target.belief[i] = std::max(target.belief[i], verdict.belief);
+        }
       }
     }
   }
@@ -333,36 +337,44 @@ class BasicDynaInsRemover {
   void decide(ScanSlot& scan, int votes, StageClock& clock, StageTimes& times) {
     if (config_.use_free_space) {
       evidence_.judge(scan.scan, scan.split, scan.dynamic, scan.evidence);
-    } else {
-      scan.dynamic.assign(scan.split.count, 0);
-      scan.evidence.assign(scan.split.count, 0.0F);
     }
     clock.lap(times.evidence);
     write_verdict(scan, votes);
     clock.lap(times.verdict);
   }
 
+  // By input point. The second time, without evidence of other scans, only points that some window
+  // believed in can have changed.
   void write_verdict(ScanSlot& scan, int votes) {
-    const std::size_t count = scan.labels.size();
-    scan.instances.assign(count, kNoInstance);
-    scan.beliefs.assign(count, 0.0F);
+    const bool evident = config_.use_free_space;
+    const bool all = evident || !scan.is_written;
+    scan.is_written = true;
     const std::size_t ground_count = scan.split.ground_count;
-    scan.is_kept.resize(scan.split.count);
-    for (std::size_t i = 0; i < ground_count; ++i) {
+    if (all) {
+      scan.instances.assign(scan.labels.size(), kNoInstance);
+      scan.beliefs.assign(scan.labels.size(), 0.0F);
+      scan.is_kept.assign(scan.split.count, 1);
+      for (std::size_t i = 0; i < ground_count; ++i) {
+        scan.labels[scan.input[i]] = PointLabel::kGround;
+      }
+    }
+    for (std::size_t i = 0; evident && i < ground_count; ++i) {
       const std::uint32_t to = scan.input[i];
-      scan.is_kept[i] = scan.dynamic[i] != 0 ? 0 : 1;
-      scan.labels[to] = scan.dynamic[i] != 0 ? PointLabel::kDynamic : PointLabel::kGround;
       scan.beliefs[to] = scan.evidence[i];
+      if (scan.dynamic[i] == 0) continue;
+      scan.is_kept[i] = 0;
+      scan.labels[to] = PointLabel::kDynamic;
     }
     for (std::size_t i = 0; i < scan.non_ground_count(); ++i) {
       const std::size_t at = ground_count + i;
-      const bool dynamic = scan.votes[i] >= votes || scan.dynamic[at] != 0;
+      if (!all && scan.votes[i] == 0 && scan.belief[i] == 0.0F) continue;
+      const bool dynamic = scan.votes[i] >= votes || (evident && scan.dynamic[at] != 0);
       const std::uint32_t to = scan.input[at];
       scan.is_kept[at] = dynamic ? 0 : 1;
       scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
       scan.instances[to] =
           scan.cluster[i] == kNoCluster ? kNoInstance : scan.ids[scan.cluster[i]];
-      scan.beliefs[to] = std::max(scan.belief[i], scan.evidence[at]);
+      scan.beliefs[to] = evident ? std::max(scan.belief[i], scan.evidence[at]) : scan.belief[i];
     }
   }
 

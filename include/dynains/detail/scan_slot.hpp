@@ -34,6 +34,7 @@ struct ScanSlot {
   std::vector<float> evidence;        // belief by the same
   std::vector<std::uint8_t> is_kept;  // verdict: static
   // By input point.
+  bool is_written = false;
   std::vector<PointLabel> labels;
   std::vector<std::uint32_t> instances;
   std::vector<float> beliefs;
