@@ -51,7 +51,7 @@ class BasicDynaInsRemover {
   using Clusterer = typename Stages::Clusterer;
   using Descriptor = typename Stages::Descriptor;
   using Belief = typename Stages::Belief;
-  using Evidence = typename Stages::Evidence;
+  using Evidence = typename detail::EvidenceOf<Stages, FreeSpaceEvidence>::type;
   using Map = typename Stages::Map;
 
   static_assert(detail::IsConfigurable<Ground>::value && detail::IsGround<Ground>::value,

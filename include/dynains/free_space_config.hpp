@@ -11,19 +11,28 @@ struct FreeSpaceConfig {
   int horizon = 30;              ///< scans until the final verdict
   int memory = 100;              ///< scans back that still give evidence
   double evidence_range = 80.0;  ///< m, horizontal; points beyond are not tested
-  double sample_size = 0.2;      ///< m, one sample per voxel of an instance
+  double sample_size = 0.3;      ///< m, one sample per voxel of an instance
   double supervoxel = 0.6;       ///< m, samples that share a belief
   double ground_sample = 0.3;    ///< m, one sample per voxel of ground beside removed instances
   double ground_reach = 2.0;     ///< m, ground this near to removed points is tested
   double margin = 0.25;          ///< m, a beam passes if it goes this much farther ...
   double margin_slope = 0.01;    ///< ... plus this share of the range
+  double lateral_margin = 0.05;  ///< m, returns protect what is this near beside them
   double p_free = 0.7;           ///< update probability of a reference that sees through
   double p_hit = 0.155;          ///< update probability of a reference that hits
   double tau_free = 0.65;        ///< belief above which a place that no reference hit was free
   double tau_contested = 0.9;    ///< the same if some reference hit it
-  double remove_share = 0.12;    ///< share of free supervoxels that removes the whole instance
-  double see_share = 0.5;        ///< share of an instance that one reference must see through
+  double remove_share = 0.25;    ///< share of free supervoxels that removes the whole instance
+  double see_share = 0.6;        ///< share of an instance that one reference must see through
   double footprint = 0.2;        ///< m, ground this near to removed points goes with them
+  bool use_tracks = true;        ///< carry beliefs along instances that overlap from scan to scan
+  double tau_track = 0.69;       ///< belief along its track from which an instance moved
+  double still_weight = 0.1;     ///< of an increment, for a scan in which an instance stood still
+  double track_cell = 0.8;       ///< m, cells whose overlap links instances
+  double track_overlap = 0.25;   ///< shared cells over all cells from which two are the same
+  double track_length = 18.0;    ///< m, longer instances are not carried
+  double track_height = 4.5;     ///< m, higher instances are not carried
+  bool presume_dynamic = true;   ///< zero latency: compact instances nobody has confirmed yet
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
@@ -45,6 +54,8 @@ struct FreeSpaceConfig {
                       "a beam passes a sample if it returns from this much farther away"});
     visitor(Parameter{"margin_slope", self.margin_slope, closed(0, 0.1), "m/m",
                       "growth of the margin with range"});
+    visitor(Parameter{"lateral_margin", self.lateral_margin, closed(0, 1), "m",
+                      "a return protects what is this near beside it, and at least its 3x3 cells"});
     visitor(Parameter{"p_free", self.p_free, open(0.5, 1), "",
                       "update probability of a reference that sees through (form of Eq. 18)"});
     visitor(Parameter{"p_hit", self.p_hit, open(0, 0.5), "",
@@ -59,6 +70,24 @@ struct FreeSpaceConfig {
                       "share of an instance that one reference must see through to remove it"});
     visitor(Parameter{"footprint", self.footprint, closed(0, 2), "m",
                       "ground this near to removed points goes with them; 0: none"});
+    visitor(Parameter{"use_tracks", self.use_tracks, Bounds(), "",
+                      "carry beliefs along instances that overlap from scan to scan"});
+    visitor(Parameter{"tau_track", self.tau_track, open(0.5, 1), "",
+                      "belief along its track from which an instance moved (form of Eq. 19)"});
+    visitor(Parameter{"still_weight", self.still_weight, closed(0, 10), "",
+                      "share of an increment that a scan in which an instance stood still takes "
+                      "from the belief along its track"});
+    visitor(Parameter{"track_cell", self.track_cell, closed(0.2, 5), "m",
+                      "cells whose overlap links instances of consecutive scans"});
+    visitor(Parameter{"track_overlap", self.track_overlap, half_open_below(0, 1), "",
+                      "shared cells over all cells from which two instances are the same object"});
+    visitor(Parameter{"track_length", self.track_length, closed(0, 100), "m",
+                      "longer instances are not carried through time"});
+    visitor(Parameter{"track_height", self.track_height, closed(0, 100), "m",
+                      "higher instances are not carried through time"});
+    visitor(Parameter{"presume_dynamic", self.presume_dynamic, Bounds(), "",
+                      "the zero-latency verdict calls compact instances dynamic whose place no "
+                      "earlier scan has seen"});
   }
 
   /// Throws ConfigError.

@@ -12,11 +12,12 @@
 #include <vector>
 
 #include "dynains/belief_updater.hpp"
-#include "dynains/detail/lanes.hpp"
+#include "dynains/detail/beam_test.hpp"
 #include "dynains/free_space_config.hpp"
 #include "dynains/ground_footprint.hpp"
 #include "dynains/ground_segmenter.hpp"
 #include "dynains/instance_samples.hpp"
+#include "dynains/instance_tracks.hpp"
 #include "dynains/points.hpp"
 #include "dynains/range_image.hpp"
 #include "dynains/sensor_model.hpp"
@@ -35,7 +36,7 @@ class FreeSpaceEvidence {
   using Config = FreeSpaceConfig;
 
   /// Scans back and ahead that are looked at: dense near the scan, sparse far from it.
-  static constexpr std::array<int, 19> kLags = {2,  4,  6,  8,  10, 13, 16,  20,  25, 30,
+  static constexpr std::array<int, 19> kLags = {2,  4,  6,  8,  10,  13,  16,  20,  25, 30,
                                                 40, 50, 65, 80, 100, 125, 150, 175, 200};
 
   FreeSpaceEvidence() : FreeSpaceEvidence(Config()) {}
@@ -51,8 +52,11 @@ class FreeSpaceEvidence {
         decrement_(static_cast<float>(log_odds(config.p_hit))),
         free_level_(static_cast<float>(log_odds(config.tau_free))),
         contested_level_(static_cast<float>(log_odds(config.tau_contested))),
+        track_level_(static_cast<float>(log_odds(config.tau_track))),
+        linker_(config.track_cell, config.track_length, config.track_height, config.track_overlap),
+        track_belief_(static_cast<float>(log_odds(config.p_free))),
         views_(static_cast<std::size_t>(std::max(config.memory, config.horizon)) + 1),
-        records_(static_cast<std::size_t>(config.horizon) + 1) {}
+        records_(static_cast<std::size_t>(config.horizon) + 2) {}
 
   const Config& config() const { return config_; }
 
@@ -70,39 +74,49 @@ class FreeSpaceEvidence {
                std::size_t instance_count) {
     newest_ = scan;
     View& view = views_[scan % views_.size()];
+    if (scan == 0 || views_[(scan - 1) % views_.size()].segment != segment) {
+      origin_ = T_world_sensor.translation();
+    }
     view.segment = segment;
     view.T_world_sensor = T_world_sensor;
-    view.image.build(grid_, PointsView(split.points).subview(0, split.count), image_scratch_);
+    view.image.build(grid_, split.ground(), split.non_ground(),
+                     static_cast<float>(config_.lateral_margin), image_scratch_);
 
-    Record& record = records_[scan % records_.size()];
+    Record& record = record_of(scan);
     record.segment = segment;
     record.T_world_sensor = T_world_sensor;
     sampler_.sample(split.non_ground(), instance_of, instance_count, record.samples);
     record.beliefs.assign(record.samples.supervoxel_count(), Belief());
-    record.seen_through.assign(instance_count, 0);
+    record.wholes.assign(instance_count, Belief());
+    if (config_.use_tracks) track(scan, record);
 
     for (const int lag : kLags) {
       const auto back = static_cast<std::uint64_t>(lag);
       if (lag > config_.memory || back > scan) break;
       const View& reference = views_[(scan - back) % views_.size()];
-      if (reference.segment == segment) refer(record, reference);
+      if (reference.segment == segment) refer(record, reference, -lag);
     }
     // What follows is summed apart from what was before.
     for (Belief& belief : record.beliefs) belief.level = 0.0F;
+    for (Belief& belief : record.wholes) belief.level = 0.0F;
+    weigh(record);
     for (const int lag : kLags) {
       const auto back = static_cast<std::uint64_t>(lag);
       if (lag > config_.horizon || back > scan) break;
-      Record& older = records_[(scan - back) % records_.size()];
-      if (older.segment == segment) refer(older, view);
+      Record& older = record_of(scan - back);
+      if (older.segment != segment) continue;
+      refer(older, view, lag);
+      weigh(older);
     }
+    if (config_.use_tracks) run_beliefs(scan);
   }
 
   /// Verdict on a scan that is at most `horizon()` old, as the evidence stands now: by point of
   /// `split`, whether it moved, and the belief that it did.
   void judge(std::uint64_t scan, const GroundSplit& split, std::vector<std::uint8_t>& dynamic,
              std::vector<float>& belief) {
-    const Record& record = records_[scan % records_.size()];
-    judge_instances(record);
+    const Record& record = record_of(scan);
+    judge_instances(scan, record);
     dynamic.resize(split.count);
     belief.resize(split.count);
     std::fill_n(dynamic.begin(), split.ground_count, std::uint8_t{0});
@@ -128,15 +142,25 @@ class FreeSpaceEvidence {
     reach_.clear();
   }
 
+  /// For each instance of the scan observed last, its number in the scan before, or kNoCluster.
+  /// Empty if instances are not carried.
+  Span<const std::uint32_t> predecessors() const { return predecessors_; }
+
  private:
   struct Belief {
-    float level = 0.0F;  // log-odds of the references summed up now; never negative
-    float peak = 0.0F;   // the highest it was
+    float level = 0.0F;          // log-odds of the references summed up now; never negative
+    float peak = 0.0F;           // the highest it was
     std::uint8_t contested = 0;  // whether some reference hit the place
   };
   struct Verdict {
     std::uint8_t dynamic;
     float belief;
+  };
+  // Samples of an instance.
+  struct Share {
+    std::uint32_t total = 0;
+    std::uint32_t moved = 0;    // in supervoxels that were free
+    std::uint32_t decided = 0;  // in supervoxels of which anything is known
   };
   struct View {
     std::uint64_t segment = kNoSegment;
@@ -147,63 +171,27 @@ class FreeSpaceEvidence {
     std::uint64_t segment = kNoSegment;
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
     InstanceSamples samples;
-    std::vector<Belief> beliefs;              // by supervoxel
-    std::vector<std::uint8_t> seen_through;   // by instance
+    std::vector<Belief> beliefs;  // by supervoxel
+    std::vector<Belief> wholes;   // by instance, of all its samples together
+    std::vector<Share> shares;    // by instance
+    TrackedInstances tracked;
   };
   static constexpr std::uint64_t kNoSegment = ~std::uint64_t{0};
 
-  // What one reference says of a set of samples; bits can be counted by adding.
-  struct Sight {
-    static constexpr std::uint8_t kUnknown = 0;
-    static constexpr std::uint8_t kFree = 1;
-    static constexpr std::uint8_t kHit = 2;
-  };
+  Record& record_of(std::uint64_t scan) { return records_[scan % records_.size()]; }
 
-  // Tests `count` samples (sensor frame of `T_world_sensor`, padded) against a reference.
-  void look(PointsView padded, std::size_t count, const Eigen::Isometry3d& T_world_sensor,
+  void look(const PointBuffer& samples, std::size_t count, const Eigen::Isometry3d& T_world_sensor,
             const View& reference) {
-    using detail::Float8;
-    const Eigen::Isometry3f T =
-        (reference.T_world_sensor.inverse() * T_world_sensor).cast<float>();
-    const auto& m = T.matrix();
-    sights_.resize(count + detail::kLanes);
-    const Float8 slope(static_cast<float>(100.0 * config_.margin_slope));
-    const Float8 margin(static_cast<float>(100.0 * config_.margin));
-    for (std::size_t i = 0; i < count; i += detail::kLanes) {
-      const Float8 px = Float8::load(&padded.x[i]);
-      const Float8 py = Float8::load(&padded.y[i]);
-      const Float8 pz = Float8::load(&padded.z[i]);
-      const Float8 x = (Float8(m(0, 0)) * px + Float8(m(0, 1)) * py) +
-                       (Float8(m(0, 2)) * pz + Float8(m(0, 3)));
-      const Float8 y = (Float8(m(1, 0)) * px + Float8(m(1, 1)) * py) +
-                       (Float8(m(1, 2)) * pz + Float8(m(1, 3)));
-      const Float8 z = (Float8(m(2, 0)) * px + Float8(m(2, 1)) * py) +
-                       (Float8(m(2, 2)) * pz + Float8(m(2, 3)));
-      const ImageLocation at = locate(grid_, x, y, z);
-      std::int32_t cell[detail::kLanes];
-      float range[detail::kLanes];
-      float tolerance[detail::kLanes];
-      at.cell.store(cell);
-      const Float8 centimetres = at.range * Float8(100.0F);
-      centimetres.store(range);
-      (at.range * slope + margin).store(tolerance);
-      const unsigned inside = at.inside.bits();
-      for (std::size_t lane = 0; lane < detail::kLanes; ++lane) {
-        const RangeImage::Cell seen = reference.image[static_cast<std::size_t>(cell[lane])];
-        const float around = static_cast<float>(seen.around) - range[lane];
-        const float nearest = static_cast<float>(seen.nearest) - range[lane];
-        const bool free = around > tolerance[lane];
-        const bool hit = !free && (std::abs(nearest) <= tolerance[lane] ||
-                                   std::abs(around) <= tolerance[lane]);
-        const unsigned sight = (free ? 1U : 0U) | (hit ? 2U : 0U);
-        sights_[i + lane] = static_cast<std::uint8_t>(((inside >> lane) & 1U) != 0U ? sight : 0U);
-      }
-    }
+    const Eigen::Isometry3d T_reference_sample =
+        reference.T_world_sensor.inverse() * T_world_sensor;
+    detail::test_beams(grid_, reference.image, T_reference_sample.cast<float>(), samples, count,
+                       static_cast<float>(config_.margin), static_cast<float>(config_.margin_slope),
+                       sights_);
   }
 
   // One reference for all samples of a scan: an update of every supervoxel's belief, and whether
-  // it saw through whole instances.
-  void refer(Record& record, const View& reference) {
+  // it saw through whole instances. `lag`: scans from the samples to the reference.
+  void refer(Record& record, const View& reference, int lag) {
     const InstanceSamples& samples = record.samples;
     look(samples.points, samples.size(), record.T_world_sensor, reference);
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
@@ -224,11 +212,20 @@ class FreeSpaceEvidence {
         instance_hit += hit;
         update(record.beliefs[s], free, hit, end - samples.sample_begin[s]);
       }
+      const auto count =
+          static_cast<float>(samples.sample_begin[last] - samples.sample_begin[first]);
       const auto seen = static_cast<float>(instance_free + instance_hit);
-      const auto count = static_cast<float>(samples.sample_begin[last] - samples.sample_begin[first]);
-      if (seen >= std::max(2.0F, kLeastView * count) &&
-          static_cast<float>(instance_free) >= static_cast<float>(config_.see_share) * seen) {
-        record.seen_through[instance] = 1;
+      if (seen < std::max(2.0F, kLeastView * count)) continue;
+      const float share = static_cast<float>(instance_free) / seen;
+      if (share >= static_cast<float>(config_.see_share)) {
+        raise(record.wholes[instance], share);
+      } else if (share <= kHitShare) {
+        lower(record.wholes[instance]);
+        const auto hits = static_cast<float>(instance_hit);
+        if (config_.use_tracks && hits >= kLeastKnown * count) {
+          TrackedInstances::Instance& tracked = record.tracked.instances[instance];
+          (lag < 0 ? tracked.hit_back : tracked.hit_ahead) = std::abs(lag);
+        }
       }
     }
   }
@@ -241,41 +238,141 @@ class FreeSpaceEvidence {
     const auto h = static_cast<float>(hit);
     const float share = f / (f + h);
     if (f >= kLeastFree * n && share >= kFreeShare) {
-      belief.level += (share > kWhollyFree ? 2.0F : 1.0F) * increment_;
-      belief.peak = std::max(belief.peak, belief.level);
+      raise(belief, share);
     } else if (h >= std::max(std::min(2.0F, n), kLeastHit * n) && share <= kHitShare) {
-      belief.contested = 1;
-      belief.level = std::max(0.0F, belief.level + decrement_);
+      lower(belief);
     }
   }
 
-  void judge_instances(const Record& record) {
+  void raise(Belief& belief, float share) const {
+    belief.level += (share > kWhollyFree ? 2.0F : 1.0F) * increment_;
+    belief.peak = std::max(belief.peak, belief.level);
+  }
+  void lower(Belief& belief) const {
+    belief.contested = 1;
+    belief.level = std::max(0.0F, belief.level + decrement_);
+  }
+
+  bool is_free(const Belief& belief) const {
+    return belief.peak >= (belief.contested != 0 ? contested_level_ : free_level_);
+  }
+
+  // What its own evidence says of each instance.
+  void weigh(Record& record) const {
+    const InstanceSamples& samples = record.samples;
+    record.shares.resize(samples.instance_count());
+    for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
+      Share share;
+      const std::uint32_t last = samples.supervoxel_begin[instance + 1];
+      for (std::uint32_t s = samples.supervoxel_begin[instance]; s < last; ++s) {
+        const Belief& belief = record.beliefs[s];
+        const std::uint32_t count = samples.sample_begin[s + 1] - samples.sample_begin[s];
+        const bool free = is_free(belief);
+        share.total += count;
+        if (free) share.moved += count;
+        if (free || belief.contested != 0) share.decided += count;
+      }
+      record.shares[instance] = share;
+    }
+    if (!config_.use_tracks) return;
+    for (std::size_t i = 0; i < samples.instance_count(); ++i) {
+      record.tracked.instances[i].own = own_belief(record, i);
+    }
+  }
+
+  float own_belief(const Record& record, std::size_t instance) const {
+    const Share& share = record.shares[instance];
+    if (removes_whole(record, instance)) {
+      return (2 * share.moved >= share.decided && share.moved > 0 ? 2.0F : 1.0F) * increment_;
+    }
+    const auto moved = static_cast<float>(share.moved);
+    const auto decided = static_cast<float>(share.decided);
+    const bool known = decided >= kLeastKnown * static_cast<float>(share.total) && decided > 0.0F;
+    return known && moved < kStillShare * decided
+               ? -static_cast<float>(config_.still_weight) * increment_
+               : 0.0F;
+  }
+
+  bool removes_whole(const Record& record, std::size_t instance) const {
+    const Share& share = record.shares[instance];
+    return is_free(record.wholes[instance]) ||
+           (share.moved > 0 &&
+            static_cast<float>(share.moved) >=
+                static_cast<float>(config_.remove_share) * static_cast<float>(share.decided));
+  }
+
+  // Finds the instances of the newest scan again in the scan before.
+  void track(std::uint64_t scan, Record& record) {
+    linker_.measure(record.samples, record.T_world_sensor, origin_, record.tracked);
+    if (scan > 0 && record_of(scan - 1).segment == record.segment && records_.size() > 1) {
+      linker_.link(record_of(scan - 1).tracked, record.tracked);
+    }
+    predecessors_.resize(record.tracked.instances.size());
+    for (std::size_t i = 0; i < predecessors_.size(); ++i) {
+      predecessors_[i] = record.tracked.instances[i].previous;
+    }
+  }
+
+  // Beliefs along tracks, with what is known now of every scan that is still open: a scan just
+  // behind the newest may meanwhile have been seen through.
+  void run_beliefs(std::uint64_t newest) {
+    const std::uint64_t open = std::min<std::uint64_t>(newest, records_.size() - 2);
+    for (std::uint64_t scan = newest - open; scan <= newest; ++scan) {
+      Record& record = record_of(scan);
+      const bool linked = scan > 0 && record_of(scan - 1).segment == record.segment;
+      track_belief_.run_forward(linked ? &record_of(scan - 1).tracked : nullptr, record.tracked);
+    }
+    for (std::uint64_t scan = newest + 1; scan-- > newest - open;) {
+      Record& record = record_of(scan);
+      const bool linked = scan < newest && record_of(scan + 1).segment == record.segment;
+      track_belief_.run_backward(linked ? &record_of(scan + 1).tracked : nullptr, record.tracked);
+    }
+  }
+
+  // Belief that an instance moved from its whole track, its own evidence counted once.
+  float track_belief(const TrackedInstances::Instance& instance) const {
+    const float before = std::max(0.0F, instance.forward - instance.own);
+    const float after = std::max(0.0F, instance.backward - instance.own);
+    return instance.own + before + after;
+  }
+
+  void judge_instances(std::uint64_t scan, const Record& record) {
     const InstanceSamples& samples = record.samples;
     verdicts_.resize(samples.supervoxel_count());
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
       const std::uint32_t first = samples.supervoxel_begin[instance];
       const std::uint32_t last = samples.supervoxel_begin[instance + 1];
-      std::uint32_t moved = 0;    // samples in supervoxels that were free
-      std::uint32_t decided = 0;  // samples in supervoxels of which anything is known
-      float peak = 0.0F;
+      float level = 0.0F;
       for (std::uint32_t s = first; s < last; ++s) {
         const Belief& belief = record.beliefs[s];
-        const bool dynamic =
-            belief.peak >= (belief.contested != 0 ? contested_level_ : free_level_);
-        const std::uint32_t count = samples.sample_begin[s + 1] - samples.sample_begin[s];
-        if (dynamic) moved += count;
-        if (dynamic || belief.contested != 0) decided += count;
-        peak = std::max(peak, belief.peak);
-        verdicts_[s] = {static_cast<std::uint8_t>(dynamic ? 1 : 0), as_probability(belief.peak)};
+        level = std::max(level, belief.peak);
+        verdicts_[s] = {static_cast<std::uint8_t>(is_free(belief) ? 1 : 0),
+                        as_probability(belief.peak)};
       }
-      const bool whole =
-          record.seen_through[instance] != 0 ||
-          (moved > 0 && static_cast<float>(moved) >=
-                            static_cast<float>(config_.remove_share) * static_cast<float>(decided));
+      bool whole = removes_whole(record, instance);
+      if (!whole && config_.use_tracks && record.tracked.instances[instance].carried) {
+        const TrackedInstances::Instance& tracked = record.tracked.instances[instance];
+        const float along = track_belief(tracked);
+        whole = along >= track_level_ || (scan == newest_ && presumed(scan, record, instance));
+        level = std::max(level, along);
+      }
       if (!whole) continue;
-      const Verdict verdict = {1, as_probability(std::max(peak, free_level_))};
+      const Verdict verdict = {1, as_probability(std::max(level, free_level_))};
       std::fill(verdicts_.begin() + first, verdicts_.begin() + last, verdict);
     }
+  }
+
+  // Zero latency: a compact instance in a place that no earlier scan has seen may be the lead
+  // vehicle as well as something static that came into view; the next scans will tell.
+  bool presumed(std::uint64_t scan, const Record& record, std::size_t instance) const {
+    constexpr std::uint32_t kLeastSamples = 5;
+    constexpr float kLargest = 15.0F, kHighest = 3.5F, kUnknown = 0.1F;
+    if (!config_.presume_dynamic || scan < 2) return false;
+    const Share& share = record.shares[instance];
+    const TrackedInstances::Instance& tracked = record.tracked.instances[instance];
+    return share.total >= kLeastSamples && tracked.length <= kLargest &&
+           tracked.height <= kHighest &&
+           static_cast<float>(share.decided) <= kUnknown * static_cast<float>(share.total);
   }
 
   static float as_probability(float level) { return 1.0F / (1.0F + std::exp(-level)); }
@@ -341,6 +438,8 @@ class FreeSpaceEvidence {
   static constexpr float kWhollyFree = 0.9F;   // of what is seen, to count twice
   static constexpr float kLeastHit = 0.25F;    // share of a supervoxel that must be hit
   static constexpr float kHitShare = 0.3F;     // free share up to which a place counts as hit
+  static constexpr float kLeastKnown = 0.3F;   // share of an instance, to speak of standing still
+  static constexpr float kStillShare = 0.02F;  // moved share of the known below which it stands
   static constexpr float kClearance = 0.4F;    // m between ground and what stands on it
   static constexpr std::uint8_t kGroundFree = 2;
   static constexpr float kGroundShare = 0.3F;
@@ -354,13 +453,18 @@ class FreeSpaceEvidence {
   float decrement_;
   float free_level_;
   float contested_level_;
+  float track_level_;
+  InstanceLinker linker_;
+  TrackBelief track_belief_;
   RangeImageGrid grid_;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();  // of the cells of tracks
   std::uint64_t newest_ = 0;
   std::vector<View> views_;
   std::vector<Record> records_;
   RangeImage::Scratch image_scratch_;
   std::vector<std::uint8_t> sights_;
   std::vector<Verdict> verdicts_;
+  std::vector<std::uint32_t> predecessors_;
   InstanceSamples ground_samples_;
   std::vector<std::uint32_t> ground_instance_;
   std::vector<std::uint8_t> ground_free_;

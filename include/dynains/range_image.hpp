@@ -18,11 +18,11 @@ namespace dynains {
 /// Cells of equal angle, rows by elevation and columns by azimuth, that suit a sensor.
 struct RangeImageGrid {
   std::int32_t rows = 0;
-  std::int32_t columns = 0;        ///< around the full circle
-  float elevation_min = 0.0F;      ///< rad, lower edge of row 0
+  std::int32_t columns = 0;    ///< around the full circle
+  float elevation_min = 0.0F;  ///< rad, lower edge of row 0
   float rows_per_radian = 0.0F;
   float columns_per_radian = 0.0F;
-  std::int32_t hole_rows = 0;      ///< empty rows between two beams that are closed
+  std::int32_t hole_rows = 0;  ///< empty rows between two beams that are closed
 
   /// Cells a little wider than the azimuth step and narrower than the usual gap between beams, so
   /// that few cells between returns stay empty and few returns share a cell.
@@ -45,16 +45,17 @@ struct RangeImageGrid {
   /// Cells from the beginning of one row to the next: room for wide access past both ends.
   std::size_t stride() const {
     return (static_cast<std::size_t>(columns) + detail::kLanes - 1) / detail::kLanes *
-               detail::kLanes + 2 * detail::kLanes;
+               detail::kLanes +
+           2 * detail::kLanes;
   }
   std::size_t cell_count() const { return static_cast<std::size_t>(rows) * stride(); }
 };
 
 /// Directions of eight points: where they fall in an image and how far they are.
 struct ImageLocation {
-  detail::Int8 cell;      ///< index into the image; 0 where `inside` is not set
-  detail::Mask8 inside;   ///< whether the image covers the direction
-  detail::Float8 range;   ///< m
+  detail::Int8 cell;     ///< index into the image; 0 where `inside` is not set
+  detail::Mask8 inside;  ///< whether the image covers the direction
+  detail::Float8 range;  ///< m
 };
 
 inline ImageLocation locate(const RangeImageGrid& grid, detail::Float8 x, detail::Float8 y,
@@ -65,12 +66,10 @@ inline ImageLocation locate(const RangeImageGrid& grid, detail::Float8 x, detail
   const Float8 planar_squared = x * x + y * y;
   const Float8 row = (detail::arc_tangent2(z, sqrt(planar_squared)) - Float8(grid.elevation_min)) *
                      Float8(grid.rows_per_radian);
-  const Int8 column =
-      min(detail::truncate((detail::arc_tangent2(y, x) + Float8(detail::kPi)) *
-                           Float8(grid.columns_per_radian)),
-          Int8(grid.columns - 1));
-  const detail::Mask8 inside =
-      (row >= zero) & (row < Float8(static_cast<float>(grid.rows)));
+  const Int8 column = min(detail::truncate((detail::arc_tangent2(y, x) + Float8(detail::kPi)) *
+                                           Float8(grid.columns_per_radian)),
+                          Int8(grid.columns - 1));
+  const detail::Mask8 inside = (row >= zero) & (row < Float8(static_cast<float>(grid.rows)));
   // Row times stride is exact in floats: images have fewer than 2^24 cells.
   const Float8 first =
       to_float(detail::truncate(keep(inside, row))) * Float8(static_cast<float>(grid.stride()));
@@ -84,7 +83,7 @@ inline ImageLocation locate(const RangeImageGrid& grid, detail::Float8 x, detail
 /// the ground, one beside it protects edges.
 class RangeImage {
  public:
-  /// In centimetres, so that a cell takes four bytes.
+  /// A cell in four bytes, both values in centimetres.
   struct Cell {
     std::int16_t nearest;  ///< kNothing if no beam returned here
     std::int16_t around;   ///< kUnknown if fewer than two of the 3x3 cells have a return
@@ -98,25 +97,38 @@ class RangeImage {
     std::vector<std::int16_t> below, below_age;
     std::vector<std::int16_t> least, count;
     std::vector<std::int16_t> border;
+    std::vector<std::int16_t> around;
+    std::vector<std::int16_t> reaching, widened;
   };
 
   const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
+  const Cell* data() const { return cells_.data(); }
 
-  /// Replaces the image by that of `points` (m, sensor frame).
-  void build(const RangeImageGrid& grid, PointsView points, Scratch& scratch) {
-    collect(grid, points, scratch);
+  /// Replaces the image by that of one scan (m, sensor frame). A return of an object protects what
+  /// lies within `reach` (m) beside it, at least its 3x3 cells: near the sensor these are a few
+  /// centimetres wide, less than what poses are good for.
+  void build(const RangeImageGrid& grid, PointsView ground, PointsView objects, float reach,
+             Scratch& scratch) {
+    scratch.nearest.assign(grid.cell_count(), kNothing);
+    collect(grid, objects, scratch.nearest.data());
+    scratch.reaching = scratch.nearest;
+    collect(grid, ground, scratch.nearest.data());
     close_holes(grid, scratch);
     erode(grid, scratch);
+    constexpr int kWidest = 4;  // cells
+    for (int cells = 1; cells <= kWidest; ++cells) {
+      const float limit = reach * grid.columns_per_radian / (static_cast<float>(cells) - 0.5F);
+      widen(grid, static_cast<std::int16_t>(std::min(limit, kFarthest) * kCentimetres), scratch);
+    }
+    interleave(grid, scratch);
   }
 
  private:
   static constexpr float kCentimetres = 100.0F;
   static constexpr float kFarthest = 320.0F;  // m
 
-  void collect(const RangeImageGrid& grid, PointsView points, Scratch& scratch) const {
+  static void collect(const RangeImageGrid& grid, PointsView points, std::int16_t* nearest) {
     using detail::Float8;
-    scratch.nearest.assign(grid.cell_count(), kNothing);
-    std::int16_t* const nearest = scratch.nearest.data();
     const auto add = [&](Float8 x, Float8 y, Float8 z, std::size_t lanes) {
       const ImageLocation at = locate(grid, x, y, z);
       std::int32_t cell[detail::kLanes];
@@ -185,12 +197,13 @@ class RangeImage {
     }
   }
 
-  void erode(const RangeImageGrid& grid, Scratch& scratch) {
+  // `around`: the nearest return of the 3x3 cells about each cell.
+  static void erode(const RangeImageGrid& grid, Scratch& scratch) {
     using namespace detail;
     const std::size_t stride = grid.stride();
     const auto rows = static_cast<std::size_t>(grid.rows);
     const auto columns = static_cast<std::size_t>(grid.columns);
-    cells_.resize(grid.cell_count());
+    scratch.around.resize(grid.cell_count());
     scratch.least.resize(stride);
     scratch.count.resize(stride);
     scratch.border.assign(stride, kNothing);
@@ -201,8 +214,7 @@ class RangeImage {
     for (std::size_t row = 0; row < rows; ++row) {
       const std::int16_t* const middle = &scratch.nearest[row * stride];
       const std::int16_t* const low = row > 0 ? middle - stride : scratch.border.data();
-      const std::int16_t* const high =
-          row + 1 < rows ? middle + stride : scratch.border.data();
+      const std::int16_t* const high = row + 1 < rows ? middle + stride : scratch.border.data();
       for (std::size_t column = 0; column < stride; column += kLanes) {
         const Short8 a = load_shorts(low + column);
         const Short8 b = load_shorts(middle + column);
@@ -214,15 +226,57 @@ class RangeImage {
       for (std::size_t column = kLanes; column + kLanes < stride; column += kLanes) {
         const std::int16_t* const least = &scratch.least[column];
         const std::int16_t* const count = &scratch.count[column];
-        const Short8 around = min_shorts(
-            min_shorts(load_shorts(least - 1), load_shorts(least)), load_shorts(least + 1));
-        const Short8 returns =
-            load_shorts(count - 1) + load_shorts(count) + load_shorts(count + 1);
-        const Short8 eroded = select_shorts(returns > one, around, unknown);
-        const Short8 here = load_shorts(middle + column);
-        Cell* const to = &cells_[row * stride + column];
-        for (std::size_t lane = 0; lane < kLanes; ++lane) to[lane] = {here[lane], eroded[lane]};
+        const Short8 around = min_shorts(min_shorts(load_shorts(least - 1), load_shorts(least)),
+                                         load_shorts(least + 1));
+        const Short8 returns = load_shorts(count - 1) + load_shorts(count) + load_shorts(count + 1);
+        store_shorts(&scratch.around[row * stride + column],
+                     select_shorts(returns > one, around, unknown));
       }
+    }
+  }
+
+  // Lets returns of objects that are nearer than `limit` (cm) reach one cell farther in every
+  // direction: `reaching` holds nothing else, and `around` takes the result in.
+  static void widen(const RangeImageGrid& grid, std::int16_t limit, Scratch& scratch) {
+    using namespace detail;
+    const std::size_t stride = grid.stride();
+    const auto rows = static_cast<std::size_t>(grid.rows);
+    const auto columns = static_cast<std::size_t>(grid.columns);
+    for (std::size_t row = 0; row < rows; ++row) wrap(&scratch.reaching[row * stride], columns);
+    scratch.widened.resize(grid.cell_count());
+    const Short8 nothing = all_shorts(kNothing);
+    const Short8 near = all_shorts(limit);
+    for (std::size_t row = 0; row < rows; ++row) {
+      const std::int16_t* const middle = &scratch.reaching[row * stride];
+      const std::int16_t* const low = row > 0 ? middle - stride : scratch.border.data();
+      const std::int16_t* const high = row + 1 < rows ? middle + stride : scratch.border.data();
+      for (std::size_t column = 0; column < stride; column += kLanes) {
+        const Short8 least =
+            min_shorts(min_shorts(load_shorts(low + column), load_shorts(middle + column)),
+                       load_shorts(high + column));
+        store_shorts(&scratch.least[column], select_shorts(least < near, least, nothing));
+      }
+      for (std::size_t column = kLanes; column + kLanes < stride; column += kLanes) {
+        const std::int16_t* const least = &scratch.least[column];
+        const Short8 reach = min_shorts(min_shorts(load_shorts(least - 1), load_shorts(least)),
+                                        load_shorts(least + 1));
+        store_shorts(&scratch.widened[row * stride + column], reach);
+        std::int16_t* const around = &scratch.around[row * stride + column];
+        const Short8 here = load_shorts(around);
+        const Short8 unknown = here < all_shorts(0);
+        store_shorts(around,
+                     select_shorts(unknown & (reach == nothing), here,
+                                   min_shorts(select_shorts(unknown, nothing, here), reach)));
+      }
+    }
+    scratch.reaching.swap(scratch.widened);
+  }
+
+  void interleave(const RangeImageGrid& grid, const Scratch& scratch) {
+    cells_.resize(grid.cell_count());
+    for (std::size_t i = 0; i < cells_.size(); i += detail::kLanes) {
+      detail::store_interleaved(&cells_[i].nearest, detail::load_shorts(&scratch.nearest[i]),
+                                detail::load_shorts(&scratch.around[i]));
     }
   }
 

@@ -37,4 +37,17 @@ inline Short8 min_shorts(Short8 a, Short8 b) {
 #endif
 }
 
+/// a0 b0 a1 b1 ... a7 b7.
+inline void store_interleaved(std::int16_t* to, Short8 a, Short8 b) {
+#if defined(__SSE2__)
+  store_shorts(to, Short8(_mm_unpacklo_epi16(__m128i(a), __m128i(b))));
+  store_shorts(to + 8, Short8(_mm_unpackhi_epi16(__m128i(a), __m128i(b))));
+#else
+  for (int i = 0; i < 8; ++i) {
+    to[2 * i] = a[i];
+    to[2 * i + 1] = b[i];
+  }
+#endif
+}
+
 }  // namespace dynains::detail

@@ -92,6 +92,16 @@ struct IsMap<Stage, std::void_t<decltype(std::declval<Stage&>().insert(
                                     std::declval<const Eigen::Isometry3d&>())),
                                 decltype(std::declval<Stage&>().clear())>> : std::true_type {};
 
+/// Stages::Evidence, or `Default` for sets of stages that name the paper's five only.
+template <class Stages, class Default, class = void>
+struct EvidenceOf {
+  using type = Default;
+};
+template <class Stages, class Default>
+struct EvidenceOf<Stages, Default, std::void_t<typename Stages::Evidence>> {
+  using type = typename Stages::Evidence;
+};
+
 /// Tells a stage about the sensor if it wants to know: `adapt(const SensorModel&)` is optional.
 template <class Stage, class = void>
 struct WantsSensor : std::false_type {};

@@ -1,0 +1,238 @@
+// Instances carried through time: what was shown to move stays dynamic when it stops, and what
+// moves later was dynamic before. Goes beyond the paper.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/curved_voxel_clusterer.hpp"
+#include "dynains/instance_samples.hpp"
+#include "dynains/points.hpp"
+
+namespace dynains {
+
+/// The instances of one scan as tracks see them.
+struct TrackedInstances {
+  struct Instance {
+    std::uint32_t samples = 0;
+    std::uint32_t cells = 0;              ///< world cells that it occupies
+    std::uint32_t previous = kNoCluster;  ///< the same object in the scan before
+    std::uint32_t next = kNoCluster;      ///< the same object in the scan after
+    float previous_overlap = 0.0F;
+    float next_overlap = 0.0F;
+    float length = 0.0F;     ///< m, horizontal diagonal
+    float height = 0.0F;     ///< m
+    float own = 0.0F;        ///< what this scan's own evidence says, log-odds
+    float forward = 0.0F;    ///< belief from this scan and those before it
+    float backward = 0.0F;   ///< belief from this scan and those after it
+    int hit_back = 0;        ///< scans to the oldest reference that hit most of it; 0: none
+    int hit_ahead = 0;       ///< scans to the latest reference that hit most of it; 0: none
+    int since_forward = 0;   ///< scans since its own evidence last said that it moved
+    int since_backward = 0;  ///< scans until its own evidence next says that it moves
+    bool carried = false;    ///< small enough to be one object
+  };
+  std::vector<Instance> instances;
+
+  /// Occupied cells of carried instances.
+  struct Cell {
+    std::int32_t x, y, z;
+    std::uint32_t instance;
+  };
+  std::vector<Cell> cells;
+};
+
+/// Links instances of consecutive scans that overlap in the world.
+class InstanceLinker {
+ public:
+  /// `cell`: m; `max_length`, `max_height`: m, larger instances are not carried; `overlap`: share
+  /// of cells (intersection over union) from which two instances are the same object.
+  InstanceLinker(double cell, double max_length, double max_height, double overlap)
+      : cell_(cell),
+        max_length_(static_cast<float>(max_length)),
+        max_height_(static_cast<float>(max_height)),
+        overlap_(static_cast<float>(overlap)) {}
+
+  /// Sizes and cells of the instances of one scan. Cells are relative to `origin` (world, m), which
+  /// must be the same for scans that are to be linked and should be near them.
+  void measure(const InstanceSamples& samples, const Eigen::Isometry3d& T_world_sensor,
+               const Eigen::Vector3d& origin, TrackedInstances& out) {
+    out.instances.assign(samples.instance_count(), TrackedInstances::Instance());
+    out.cells.clear();
+    Eigen::Isometry3d T_origin_sensor = T_world_sensor;
+    T_origin_sensor.translation() -= origin;
+    const Eigen::Matrix<float, 3, 4> T =
+        (Eigen::Scaling(1.0 / cell_) * T_origin_sensor.matrix().topRows<3>()).cast<float>();
+    table_.resize(kTable);
+    ++generation_;
+    for (std::uint32_t i = 0; i < samples.instance_count(); ++i) {
+      TrackedInstances::Instance& instance = out.instances[i];
+      const std::uint32_t begin = samples.sample_begin[samples.supervoxel_begin[i]];
+      const std::uint32_t end = samples.sample_begin[samples.supervoxel_begin[i + 1]];
+      instance.samples = end - begin;
+      measure_extent(samples.points, begin, end, instance);
+      if (!instance.carried) continue;
+      for (std::uint32_t p = begin; p < end; ++p) {
+        const Eigen::Vector3f at =
+            T * Eigen::Vector4f(samples.points.x[p], samples.points.y[p], samples.points.z[p], 1);
+        const TrackedInstances::Cell cell = {floor_to_int(at.x()), floor_to_int(at.y()),
+                                             floor_to_int(at.z()), i};
+        Slot& slot = table_[hash(cell) % kTable];
+        // Two cells that share a place in the table are counted twice: rare, and harmless.
+        if (slot.generation == generation_ && same_place(slot.cell, cell) &&
+            slot.cell.instance == i) {
+          continue;
+        }
+        slot = {cell, generation_};
+        out.cells.push_back(cell);
+        ++instance.cells;
+      }
+    }
+  }
+
+  /// Links the instances of two consecutive scans: each to the one of the other scan with which it
+  /// shares most.
+  void link(TrackedInstances& before, TrackedInstances& now) {
+    table_.resize(kTable);
+    ++generation_;
+    for (const TrackedInstances::Cell& cell : before.cells) {
+      table_[hash(cell) % kTable] = {cell, generation_};
+    }
+    shared_.assign(before.instances.size(), 0);
+    std::size_t at = 0;
+    for (std::uint32_t i = 0; i < now.instances.size(); ++i) {
+      touched_.clear();
+      for (; at < now.cells.size() && now.cells[at].instance == i; ++at) {
+        const Slot& slot = table_[hash(now.cells[at]) % kTable];
+        if (slot.generation != generation_ || !same_place(slot.cell, now.cells[at])) continue;
+        if (shared_[slot.cell.instance]++ == 0) touched_.push_back(slot.cell.instance);
+      }
+      for (const std::uint32_t other : touched_) {
+        connect(before.instances[other], other, now.instances[i], i,
+                static_cast<float>(shared_[other]));
+        shared_[other] = 0;
+      }
+    }
+  }
+
+ private:
+  struct Slot {
+    TrackedInstances::Cell cell;
+    std::uint32_t generation;
+  };
+  static constexpr std::size_t kTable = 1U << 14;
+  static constexpr std::uint32_t kLeastSamples = 2;  // what is smaller overlaps by chance
+
+  // Without the instance: cells of two scans meet in the same place.
+  static std::size_t hash(const TrackedInstances::Cell& cell) {
+    std::uint64_t h = static_cast<std::uint32_t>(cell.x);
+    h = h * 0x9E3779B97F4A7C15ULL + static_cast<std::uint32_t>(cell.y);
+    h = h * 0x9E3779B97F4A7C15ULL + static_cast<std::uint32_t>(cell.z);
+    h *= 0x9E3779B97F4A7C15ULL;
+    return static_cast<std::size_t>(h >> 40);
+  }
+  static bool same_place(const TrackedInstances::Cell& a, const TrackedInstances::Cell& b) {
+    return a.x == b.x && a.y == b.y && a.z == b.z;
+  }
+  static std::int32_t floor_to_int(float value) {
+    return static_cast<std::int32_t>(std::floor(value));
+  }
+
+  void measure_extent(const PointBuffer& points, std::uint32_t begin, std::uint32_t end,
+                      TrackedInstances::Instance& instance) const {
+    if (begin == end) return;
+    float low[3] = {points.x[begin], points.y[begin], points.z[begin]};
+    float high[3] = {low[0], low[1], low[2]};
+    for (std::uint32_t p = begin; p < end; ++p) {
+      const float at[3] = {points.x[p], points.y[p], points.z[p]};
+      for (int axis = 0; axis < 3; ++axis) {
+        low[axis] = std::min(low[axis], at[axis]);
+        high[axis] = std::max(high[axis], at[axis]);
+      }
+    }
+    instance.length = std::hypot(high[0] - low[0], high[1] - low[1]);
+    instance.height = high[2] - low[2];
+    instance.carried = end - begin >= kLeastSamples && instance.length <= max_length_ &&
+                       instance.height <= max_height_;
+  }
+
+  void connect(TrackedInstances::Instance& before, std::uint32_t before_number,
+               TrackedInstances::Instance& now, std::uint32_t now_number, float shared) const {
+    const float overlap =
+        shared / (static_cast<float>(before.cells) + static_cast<float>(now.cells) - shared);
+    if (overlap < overlap_) return;
+    if (overlap > now.previous_overlap) {
+      now.previous_overlap = overlap;
+      now.previous = before_number;
+    }
+    if (overlap > before.next_overlap) {
+      before.next_overlap = overlap;
+      before.next = now_number;
+    }
+  }
+
+  double cell_;
+  float max_length_;
+  float max_height_;
+  float overlap_;
+  std::uint32_t generation_ = 0;
+  std::vector<Slot> table_;
+  std::vector<std::uint32_t> shared_;
+  std::vector<std::uint32_t> touched_;
+};
+
+/// Beliefs that run along linked instances: a log-odds sum that fades from scan to scan.
+class TrackBelief {
+ public:
+  /// `unit`: log-odds of one clear observation.
+  explicit TrackBelief(float unit) : floor_(-1.0F * unit), ceiling_(4.0F * unit) {}
+
+  /// Forward beliefs of `now` from those of the scan before; null starts afresh.
+  void run_forward(const TrackedInstances* before, TrackedInstances& now) const {
+    for (TrackedInstances::Instance& instance : now.instances) {
+      float inherited = 0.0F;
+      instance.since_forward = 0;
+      if (before != nullptr && instance.previous != kNoCluster) {
+        const TrackedInstances::Instance& parent = before->instances[instance.previous];
+        inherited = inherit(parent.forward, parent.since_forward + 1, instance.own,
+                            instance.hit_back, instance.since_forward);
+      }
+      instance.forward = std::clamp(inherited + instance.own, floor_, ceiling_);
+    }
+  }
+
+  /// Backward beliefs of `now` from those of the scan after; null starts afresh.
+  void run_backward(const TrackedInstances* after, TrackedInstances& now) const {
+    for (TrackedInstances::Instance& instance : now.instances) {
+      float inherited = 0.0F;
+      instance.since_backward = 0;
+      if (after != nullptr && instance.next != kNoCluster) {
+        const TrackedInstances::Instance& child = after->instances[instance.next];
+        inherited = inherit(child.backward, child.since_backward + 1, instance.own,
+                            instance.hit_ahead, instance.since_backward);
+      }
+      instance.backward = std::clamp(inherited + instance.own, floor_, ceiling_);
+    }
+  }
+
+ private:
+  // What goes over from a neighbour in time. An instance that does not move itself is contradicted
+  // by references from well before (after) it can have come (gone) that hit its place; not wholly,
+  // since in a queue the one before it may have stood there.
+  static float inherit(float belief, int since, float own, int hit, int& own_since) {
+    constexpr float kFade = 0.95F;          // share of a belief that is left one scan later
+    constexpr int kSlack = 8;               // scans
+    constexpr float kContradicted = 0.85F;  // share of the belief that is left
+    own_since = own > 0.0F ? 0 : since;
+    const bool contradicted = own <= 0.0F && hit > since + kSlack;
+    return contradicted ? kContradicted * kFade * belief : kFade * belief;
+  }
+
+  float floor_;
+  float ceiling_;
+};
+
+}  // namespace dynains
