@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <vector>
 
 #include "dynains/detail/arc_tangent.hpp"
@@ -238,9 +239,7 @@ class GroundSegmenter {
     const std::size_t count = scan.size();
     sorted_.resize(count);
     if (patch_of_.size() < count + detail::kLanes) patch_of_.resize(count + detail::kLanes);
-    detail::for_lanes(scan, [&](detail::Float8 x, detail::Float8 y, detail::Float8, std::size_t i) {
-      find_patches(x, y).store(&patch_of_[i]);
-    });
+    find_patches(scan);
 
     streak_end_.clear();
     patch_begin_.fill(0);
@@ -260,41 +259,66 @@ class GroundSegmenter {
       detail::copy(&scan.x[begin], length, &sorted_.points.x[to]);
       detail::copy(&scan.y[begin], length, &sorted_.points.y[to]);
       detail::copy(&scan.z[begin], length, &sorted_.points.z[to]);
-      for (std::size_t k = 0; k < length; ++k) {
-        sorted_.source[to + k] = static_cast<std::uint32_t>(begin + k);
-      }
+      std::iota(&sorted_.source[to], &sorted_.source[to] + length,
+                static_cast<std::uint32_t>(begin));
       to += length;
       begin = end;
     }
   }
 
-  detail::Int8 find_patches(detail::Float8 x, detail::Float8 y) const {
+  void find_patches(PointsView scan) {
     using detail::Float8;
-    const Float8 range = detail::sqrt(x * x + y * y);
-    const Float8 azimuth = detail::arc_tangent2(y, x) + Float8(detail::kPi);
-    std::array<detail::Mask8, kZones> beyond;
-    for (std::size_t i = 1; i < kZones; ++i) beyond[i] = range >= Float8(zones_[i].inner);
-    // Constant of the zone that each point lies in: what is beyond a zone is beyond those before.
-    const auto of_zone = [&](float Zone::*constant) {
-      detail::Mask8 bits = bits_of(Float8(zones_[0].*constant));
-      for (std::size_t i = 1; i < kZones; ++i) {
-        bits = bits ^ (beyond[i] & (bits_of(Float8(zones_[i].*constant)) ^
-                                    bits_of(Float8(zones_[i - 1].*constant))));
+    using detail::Mask8;
+    // What is beyond the inner edge of a zone is beyond those before. So a constant of the zone in
+    // which a point lies is that of the first, with the differences to later ones flipped bit by
+    // bit.
+    struct OfZone {
+      Mask8 first;
+      std::array<Mask8, kZones> difference;
+
+      Float8 operator()(const std::array<Mask8, kZones>& beyond) const {
+        Mask8 bits = first;
+        for (std::size_t i = 1; i < kZones; ++i) bits = bits ^ (beyond[i] & difference[i]);
+        return float_of(bits);
       }
-      return float_of(bits);
     };
+    // Read once: the compiler cannot know that stores leave members alone.
+    const auto of_zone = [&](float Zone::*constant) {
+      OfZone result{bits_of(Float8(zones_[0].*constant)), {}};
+      for (std::size_t i = 1; i < kZones; ++i) {
+        result.difference[i] =
+            bits_of(Float8(zones_[i].*constant)) ^ bits_of(Float8(zones_[i - 1].*constant));
+      }
+      return result;
+    };
+    const OfZone inner = of_zone(&Zone::inner);
+    const OfZone rings_per_metre = of_zone(&Zone::rings_per_metre);
+    const OfZone sectors_per_radian = of_zone(&Zone::sectors_per_radian);
+    const OfZone first_patch = of_zone(&Zone::first_patch);
+    const OfZone last_ring = of_zone(&Zone::last_ring);
+    const OfZone sector_count = of_zone(&Zone::sectors);
+    std::array<Float8, kZones> edge;
+    for (std::size_t i = 0; i < kZones; ++i) edge[i] = Float8(zones_[i].inner);
+    const Float8 nearest(static_cast<float>(config_.ground_min_range));
+    const Float8 farthest(static_cast<float>(config_.ground_max_range));
     const auto whole = [](Float8 value) { return to_float(truncate(value)); };
-    const Float8 limited = detail::min(range, Float8(static_cast<float>(config_.ground_max_range)));
-    const Float8 ring =
-        whole(detail::min((limited - of_zone(&Zone::inner)) * of_zone(&Zone::rings_per_metre),
-                          of_zone(&Zone::last_ring)));
-    const Float8 sectors = of_zone(&Zone::sectors);
-    const Float8 sector =
-        whole(detail::min(azimuth * of_zone(&Zone::sectors_per_radian), sectors - Float8(1.0F)));
-    const Float8 patch = of_zone(&Zone::first_patch) + ring * sectors + sector;
-    const detail::Mask8 inside = (range >= Float8(static_cast<float>(config_.ground_min_range))) &
-                                 (range <= Float8(static_cast<float>(config_.ground_max_range)));
-    return select(inside, truncate(patch), detail::Int8(static_cast<std::int32_t>(kPatches)));
+    std::int32_t* const patches = patch_of_.data();
+
+    detail::for_lanes(scan, [&](Float8 x, Float8 y, Float8, std::size_t to) {
+      const Float8 range = sqrt(x * x + y * y);
+      const Float8 azimuth = detail::arc_tangent2(y, x) + Float8(detail::kPi);
+      std::array<Mask8, kZones> beyond;
+      for (std::size_t i = 1; i < kZones; ++i) beyond[i] = range >= edge[i];
+      const Float8 ring = whole(
+          min((min(range, farthest) - inner(beyond)) * rings_per_metre(beyond), last_ring(beyond)));
+      const Float8 sectors = sector_count(beyond);
+      const Float8 sector =
+          whole(min(azimuth * sectors_per_radian(beyond), sectors - Float8(1.0F)));
+      const Float8 patch = first_patch(beyond) + ring * sectors + sector;
+      const Mask8 inside = (range >= nearest) & (range <= farthest);
+      select(inside, truncate(patch), detail::Int8(static_cast<std::int32_t>(kPatches)))
+          .store(patches + to);
+    });
   }
 
   void segment_patch(std::size_t patch, Output& out) const {

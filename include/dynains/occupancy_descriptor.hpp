@@ -225,20 +225,23 @@ class OccupancyDescriptor {
     std::fill(heights, heights + cells, 0.0F);
     using detail::Float8;
     const PolarView points = cluster_.scan(k);
+    // Read once: the compiler cannot know that stores leave members alone.
+    const Float8 range_min(range_min_), azimuth_min(azimuth_min_), z_min(z_min_);
+    const Float8 cells_per_metre(cells_per_metre_), cells_per_radian(cells_per_radian_);
+    const auto row = static_cast<std::int32_t>(azimuth_cells_);
     const Float8 last_radial(static_cast<float>(radial_cells_ - 1));
     const Float8 last_azimuth(static_cast<float>(azimuth_cells_ - 1));
     detail::for_lanes({points.range, points.azimuth, points.z}, [&](Float8 range, Float8 azimuth,
                                                                     Float8 z, std::size_t begin) {
-      const Float8 radial = (range - Float8(range_min_)) * Float8(cells_per_metre_);
-      Float8 offset = azimuth - Float8(azimuth_min_);
+      const Float8 radial = (range - range_min) * cells_per_metre;
+      Float8 offset = azimuth - azimuth_min;
       offset = offset + keep(offset < Float8(-detail::kPi * 1e-4F), Float8(2.0F * detail::kPi));
-      const Float8 angular = max(offset * Float8(cells_per_radian_), Float8(0.0F));
+      const Float8 angular = max(offset * cells_per_radian, Float8(0.0F));
       std::int32_t cell[detail::kLanes];
       float height[detail::kLanes];
-      (multiply(truncate(min(radial, last_radial)), static_cast<std::int32_t>(azimuth_cells_)) +
-       truncate(min(angular, last_azimuth)))
+      (multiply(truncate(min(radial, last_radial)), row) + truncate(min(angular, last_azimuth)))
           .store(cell);
-      (z - Float8(z_min_)).store(height);
+      (z - z_min).store(height);
       const std::size_t lanes = std::min(detail::kLanes, points.size() - begin);
       for (std::size_t i = 0; i < lanes; ++i) {
         float& highest = heights[cell[i]];

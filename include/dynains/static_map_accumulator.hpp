@@ -176,10 +176,13 @@ class StaticMapAccumulator {
   void locate(PointsView points, const Eigen::Matrix<float, 3, 4>& m, Batch& batch) const {
     using detail::Float8;
     const Float8 scale(static_cast<float>(1.0 / voxel_));
+    Float8 t[3][4];
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 4; ++column) t[row][column] = Float8(m(row, column));
+    }
     detail::for_lanes(points, [&](Float8 x, Float8 y, Float8 z, std::size_t to) {
       for (int row = 0; row < 3; ++row) {
-        const Float8 value = (Float8(m(row, 0)) * x + Float8(m(row, 1)) * y) +
-                             (Float8(m(row, 2)) * z + Float8(m(row, 3)));
+        const Float8 value = (t[row][0] * x + t[row][1] * y) + (t[row][2] * z + t[row][3]);
         value.store(&batch.local[row][to]);
         floor(value * scale).store(&batch.voxel[row][to]);
       }
