@@ -66,8 +66,8 @@ class BasicDynaInsRemover {
                 "Stages::Belief needs Config, reset(), update(heights, heights), posterior() and "
                 "is_dynamic()");
   static_assert(detail::IsConfigurable<Evidence>::value && detail::IsEvidence<Evidence>::value,
-                "Stages::Evidence needs Config, adapt(SensorModel), observe(...), judge(...) and "
-                "horizon()");
+                "Stages::Evidence needs Config, adapt(SensorModel), observe(...), judge(...), "
+                "predecessors() and horizon()");
   static_assert(detail::IsConfigurable<Map>::value && detail::IsMap<Map>::value,
                 "Stages::Map needs Config, insert(PointsView, flags, T_world_sensor) and clear()");
 
@@ -182,6 +182,7 @@ class BasicDynaInsRemover {
     if (config_.use_free_space) {
       evidence_.observe(newest.scan, newest.segment, newest.T_world_sensor, newest.split,
                         newest.cluster, clusterer_.cluster_count());
+      if (evidence_tracks()) hand_on_ids(newest);
     }
     clock.lap(result.times.evidence);
     decide(newest, 1, clock, result.times);
@@ -249,7 +250,8 @@ class BasicDynaInsRemover {
   // Eq. 3: the non-ground points of the last K scans in the frame of the newest.
   void gather_window() {
     const ScanSlot& newest = slot(pushed_ - 1);
-    const auto length = std::min<std::uint64_t>(pushed_, static_cast<std::uint64_t>(config_.window));
+    const auto length =
+        std::min<std::uint64_t>(pushed_, static_cast<std::uint64_t>(config_.window));
     window_first_ = pushed_ - length;
     while (slot(window_first_).segment != newest.segment) ++window_first_;
     window_.clear();
@@ -294,7 +296,7 @@ class BasicDynaInsRemover {
     const Span<const std::uint32_t> newest_clusters =
         cluster_of.subspan(cluster_of.size() - count, count);
     newest.cluster.assign(newest_clusters.begin(), newest_clusters.end());
-    assign_ids(cluster_of, newest);
+    if (!evidence_tracks()) assign_ids(cluster_of, newest);
 
     for (std::uint64_t scan = window_first_; scan < pushed_; ++scan) {
       if (config_.votes == 0 && scan + 1 != pushed_) continue;
@@ -321,6 +323,18 @@ class BasicDynaInsRemover {
       cluster = cluster_of.subspan(scan_begin_[scan_begin_.size() - 3], old_cluster.size());
     }
     instance_ids_.assign(old_cluster, old_ids, cluster, clusters_.size(), newest.ids);
+  }
+
+  // A window of one scan cannot tell which instance was which; the evidence can.
+  bool evidence_tracks() const { return config_.use_free_space && config_.window == 1; }
+
+  void hand_on_ids(ScanSlot& newest) {
+    const bool alone = newest.scan == 0 || slot(newest.scan - 1).segment != newest.segment;
+    const Span<const std::uint32_t> predecessors = evidence_.predecessors();
+    instance_ids_.hand_on(
+        predecessors,
+        alone ? Span<const std::uint32_t>() : Span<const std::uint32_t>(slot(newest.scan - 1).ids),
+        newest.ids);
   }
 
   // What depends on the sensor, from the first scan that has enough points.
@@ -372,8 +386,7 @@ class BasicDynaInsRemover {
       const std::uint32_t to = scan.input[at];
       scan.is_kept[at] = dynamic ? 0 : 1;
       scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
-      scan.instances[to] =
-          scan.cluster[i] == kNoCluster ? kNoInstance : scan.ids[scan.cluster[i]];
+      scan.instances[to] = scan.cluster[i] == kNoCluster ? kNoInstance : scan.ids[scan.cluster[i]];
       scan.beliefs[to] = evident ? std::max(scan.belief[i], scan.evidence[at]) : scan.belief[i];
     }
   }

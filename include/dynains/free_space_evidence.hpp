@@ -16,11 +16,13 @@
 #include "dynains/free_space_config.hpp"
 #include "dynains/ground_footprint.hpp"
 #include "dynains/ground_segmenter.hpp"
+#include "dynains/instance_hull.hpp"
 #include "dynains/instance_samples.hpp"
 #include "dynains/instance_tracks.hpp"
 #include "dynains/points.hpp"
 #include "dynains/range_image.hpp"
 #include "dynains/sensor_model.hpp"
+#include "dynains/supervoxel_groups.hpp"
 
 namespace dynains {
 
@@ -53,6 +55,7 @@ class FreeSpaceEvidence {
         free_level_(static_cast<float>(log_odds(config.tau_free))),
         contested_level_(static_cast<float>(log_odds(config.tau_contested))),
         track_level_(static_cast<float>(log_odds(config.tau_track))),
+        hull_(2.0 * std::max(config.footprint, 0.05)),
         linker_(config.track_cell, config.track_length, config.track_height, config.track_overlap),
         track_belief_(static_cast<float>(log_odds(config.p_free))),
         views_(static_cast<std::size_t>(std::max(config.memory, config.horizon)) + 1),
@@ -88,6 +91,7 @@ class FreeSpaceEvidence {
     sampler_.sample(split.non_ground(), instance_of, instance_count, record.samples);
     record.beliefs.assign(record.samples.supervoxel_count(), Belief());
     record.wholes.assign(instance_count, Belief());
+    predecessors_.assign(instance_count, kNoCluster);
     if (config_.use_tracks) track(scan, record);
 
     for (const int lag : kLags) {
@@ -137,13 +141,12 @@ class FreeSpaceEvidence {
         reach_.add(points.x[i], points.y[i], points.z[i]);
       }
     }
-    if (!reach_.empty()) judge_ground(scan, record, split, dynamic, belief);
+    if (!reach_.empty() || !footprint_.empty()) judge_ground(scan, record, split, dynamic, belief);
     footprint_.clear();
     reach_.clear();
   }
 
   /// For each instance of the scan observed last, its number in the scan before, or kNoCluster.
-  /// Empty if instances are not carried.
   Span<const std::uint32_t> predecessors() const { return predecessors_; }
 
  private:
@@ -222,7 +225,8 @@ class FreeSpaceEvidence {
       } else if (share <= kHitShare) {
         lower(record.wholes[instance]);
         const auto hits = static_cast<float>(instance_hit);
-        if (config_.use_tracks && hits >= kLeastKnown * count) {
+        if (config_.use_tracks && share <= 1.0F - kContradictingHits &&
+            hits >= kLeastKnown * count) {
           TrackedInstances::Instance& tracked = record.tracked.instances[instance];
           (lag < 0 ? tracked.hit_back : tracked.hit_ahead) = std::abs(lag);
         }
@@ -307,7 +311,6 @@ class FreeSpaceEvidence {
     if (scan > 0 && record_of(scan - 1).segment == record.segment && records_.size() > 1) {
       linker_.link(record_of(scan - 1).tracked, record.tracked);
     }
-    predecessors_.resize(record.tracked.instances.size());
     for (std::size_t i = 0; i < predecessors_.size(); ++i) {
       predecessors_[i] = record.tracked.instances[i].previous;
     }
@@ -343,23 +346,47 @@ class FreeSpaceEvidence {
       const std::uint32_t first = samples.supervoxel_begin[instance];
       const std::uint32_t last = samples.supervoxel_begin[instance + 1];
       float level = 0.0F;
+      free_.clear();
       for (std::uint32_t s = first; s < last; ++s) {
         const Belief& belief = record.beliefs[s];
         level = std::max(level, belief.peak);
-        verdicts_[s] = {static_cast<std::uint8_t>(is_free(belief) ? 1 : 0),
-                        as_probability(belief.peak)};
+        verdicts_[s] = {0, as_probability(belief.peak)};
+        if (is_free(belief)) free_.push_back(s);
       }
-      bool whole = removes_whole(record, instance);
-      if (!whole && config_.use_tracks && record.tracked.instances[instance].carried) {
-        const TrackedInstances::Instance& tracked = record.tracked.instances[instance];
-        const float along = track_belief(tracked);
-        whole = along >= track_level_ || (scan == newest_ && presumed(scan, record, instance));
-        level = std::max(level, along);
+      if (moved_whole(scan, record, instance, level)) {
+        const Verdict verdict = {1, as_probability(std::max(level, free_level_))};
+        std::fill(verdicts_.begin() + first, verdicts_.begin() + last, verdict);
+        add_hull(record, instance);
+        continue;
       }
-      if (!whole) continue;
-      const Verdict verdict = {1, as_probability(std::max(level, free_level_))};
-      std::fill(verdicts_.begin() + first, verdicts_.begin() + last, verdict);
+      // Something that moves beside something that stays: single supervoxels may be chance.
+      groups_.keep_large(samples, kLeastGroup, kLeastGroupSamples, free_);
+      for (const std::uint32_t s : free_) verdicts_[s].dynamic = 1;
     }
+  }
+
+  // Whether an instance is removed as a whole; raises `level` to the belief along its track.
+  bool moved_whole(std::uint64_t scan, const Record& record, std::size_t instance,
+                   float& level) const {
+    if (removes_whole(record, instance)) return true;
+    if (!config_.use_tracks || !record.tracked.instances[instance].carried) return false;
+    const float along = track_belief(record.tracked.instances[instance]);
+    level = std::max(level, along);
+    return along >= track_level_ || (scan == newest_ && presumed(scan, record, instance));
+  }
+
+  // The ground below a compact instance.
+  void add_hull(const Record& record, std::size_t instance) {
+    constexpr float kLeastHeight = 0.3F;  // m
+    if (!config_.use_tracks || config_.footprint <= 0.0) return;
+    const TrackedInstances::Instance& tracked = record.tracked.instances[instance];
+    if (!tracked.carried || tracked.height < kLeastHeight) return;
+    const InstanceSamples& samples = record.samples;
+    const std::uint32_t begin = samples.sample_begin[samples.supervoxel_begin[instance]];
+    const std::uint32_t end = samples.sample_begin[samples.supervoxel_begin[instance + 1]];
+    const PointsView points = PointsView(samples.points).subview(begin, end - begin);
+    const float lowest = *std::min_element(points.z.begin(), points.z.end());
+    hull_.visit(points, [&](float x, float y) { footprint_.add(x, y, lowest); });
   }
 
   // Zero latency: a compact instance in a place that no earlier scan has seen may be the lead
@@ -432,15 +459,18 @@ class FreeSpaceEvidence {
     ground_sampler_.sample(ground, ground_instance_, 1, ground_samples_);
   }
 
-  static constexpr float kLeastView = 0.1F;    // share of an instance that a reference must see
-  static constexpr float kLeastFree = 0.15F;   // share of a supervoxel that must be seen free
-  static constexpr float kFreeShare = 0.6F;    // of what is seen, to speak for free space
-  static constexpr float kWhollyFree = 0.9F;   // of what is seen, to count twice
-  static constexpr float kLeastHit = 0.25F;    // share of a supervoxel that must be hit
-  static constexpr float kHitShare = 0.3F;     // free share up to which a place counts as hit
-  static constexpr float kLeastKnown = 0.3F;   // share of an instance, to speak of standing still
-  static constexpr float kStillShare = 0.02F;  // moved share of the known below which it stands
-  static constexpr float kClearance = 0.4F;    // m between ground and what stands on it
+  static constexpr float kLeastView = 0.1F;   // share of an instance that a reference must see
+  static constexpr float kLeastFree = 0.15F;  // share of a supervoxel that must be seen free
+  static constexpr float kFreeShare = 0.6F;   // of what is seen, to speak for free space
+  static constexpr float kWhollyFree = 0.9F;  // of what is seen, to count twice
+  static constexpr float kLeastHit = 0.25F;   // share of a supervoxel that must be hit
+  static constexpr float kHitShare = 0.3F;    // free share up to which a place counts as hit
+  static constexpr float kLeastKnown = 0.3F;  // share of an instance, to speak of standing still
+  static constexpr float kContradictingHits = 0.85F;  // of what is seen of an instance
+  static constexpr float kStillShare = 0.02F;    // moved share of the known below which it stands
+  static constexpr float kClearance = 0.4F;      // m between ground and what stands on it
+  static constexpr std::size_t kLeastGroup = 2;  // supervoxels that go without the rest
+  static constexpr std::size_t kLeastGroupSamples = 4;  // and their samples
   static constexpr std::uint8_t kGroundFree = 2;
   static constexpr float kGroundShare = 0.3F;
 
@@ -454,6 +484,8 @@ class FreeSpaceEvidence {
   float free_level_;
   float contested_level_;
   float track_level_;
+  InstanceHull hull_;
+  SupervoxelGroups groups_;
   InstanceLinker linker_;
   TrackBelief track_belief_;
   RangeImageGrid grid_;
@@ -464,6 +496,7 @@ class FreeSpaceEvidence {
   RangeImage::Scratch image_scratch_;
   std::vector<std::uint8_t> sights_;
   std::vector<Verdict> verdicts_;
+  std::vector<std::uint32_t> free_;
   std::vector<std::uint32_t> predecessors_;
   InstanceSamples ground_samples_;
   std::vector<std::uint32_t> ground_instance_;

@@ -16,16 +16,35 @@ namespace dynains {
 /// Supervoxel of points that were not sampled.
 inline constexpr std::uint32_t kNoSupervoxel = 0xFFFFFFFFU;
 
+/// Place of a supervoxel in its grid, packed: ordered by x, then y, then z.
+using SupervoxelPlace = std::uint64_t;
+
+inline SupervoxelPlace pack_place(std::int32_t x, std::int32_t y, std::int32_t z) {
+  constexpr std::int64_t kOffset = std::int64_t{1} << 20;
+  return static_cast<std::uint64_t>(x + kOffset) << 42 |
+         static_cast<std::uint64_t>(y + kOffset) << 21 | static_cast<std::uint64_t>(z + kOffset);
+}
+
+/// The place beside another, some steps along each axis.
+inline SupervoxelPlace neighbour(SupervoxelPlace place, int dx, int dy, int dz) {
+  return place + (static_cast<std::uint64_t>(static_cast<std::int64_t>(dx)) << 42) +
+         (static_cast<std::uint64_t>(static_cast<std::int64_t>(dy)) << 21) +
+         static_cast<std::uint64_t>(static_cast<std::int64_t>(dz));
+}
+
 /// The samples of one scan in its sensor frame: instance-major, then supervoxel-major, so that
 /// what belongs together is one range.
 struct InstanceSamples {
-  PointBuffer points;                         ///< padded for wide loads
-  std::vector<std::uint32_t> sample_begin;    ///< by supervoxel, one more than supervoxels
+  PointBuffer points;                           ///< padded for wide loads
+  std::vector<std::uint32_t> sample_begin;      ///< by supervoxel, one more than supervoxels
+  std::vector<SupervoxelPlace> place;           ///< by supervoxel
   std::vector<std::uint32_t> supervoxel_begin;  ///< by instance, one more than instances
-  std::vector<std::uint32_t> supervoxel_of;   ///< by point of the scan, or kNoSupervoxel
+  std::vector<std::uint32_t> supervoxel_of;     ///< by point of the scan, or kNoSupervoxel
 
   std::size_t size() const { return sample_begin.empty() ? 0 : sample_begin.back(); }
-  std::size_t supervoxel_count() const { return sample_begin.empty() ? 0 : sample_begin.size() - 1; }
+  std::size_t supervoxel_count() const {
+    return sample_begin.empty() ? 0 : sample_begin.size() - 1;
+  }
   std::size_t instance_count() const {
     return supervoxel_begin.empty() ? 0 : supervoxel_begin.size() - 1;
   }
@@ -143,10 +162,12 @@ class InstanceSampler {
     }
     next_.assign(out.supervoxel_begin.begin(), out.supervoxel_begin.end());
     place_.resize(supervoxels_.size());
+    out.place.resize(supervoxels_.size());
     out.sample_begin.assign(supervoxels_.size() + 1, 0);
     for (std::size_t s = 0; s < supervoxels_.size(); ++s) {
       place_[s] = next_[supervoxels_[s].instance]++;
       out.sample_begin[place_[s] + 1] = supervoxels_[s].samples;
+      out.place[place_[s]] = pack_place(supervoxels_[s].x, supervoxels_[s].y, supervoxels_[s].z);
     }
     for (std::size_t s = 1; s <= supervoxels_.size(); ++s) {
       out.sample_begin[s] += out.sample_begin[s - 1];

@@ -220,15 +220,13 @@ class TrackBelief {
 
  private:
   // What goes over from a neighbour in time. An instance that does not move itself is contradicted
-  // by references from well before (after) it can have come (gone) that hit its place; not wholly,
-  // since in a queue the one before it may have stood there.
+  // by references from well before (after) it can have come (gone) that hit its place.
   static float inherit(float belief, int since, float own, int hit, int& own_since) {
-    constexpr float kFade = 0.95F;          // share of a belief that is left one scan later
-    constexpr int kSlack = 8;               // scans
-    constexpr float kContradicted = 0.85F;  // share of the belief that is left
+    constexpr float kFade = 0.95F;  // share of a belief that is left one scan later
+    constexpr int kSlack = 8;       // scans
     own_since = own > 0.0F ? 0 : since;
     const bool contradicted = own <= 0.0F && hit > since + kSlack;
-    return contradicted ? kContradicted * kFade * belief : kFade * belief;
+    return contradicted ? 0.0F : kFade * belief;
   }
 
   float floor_;

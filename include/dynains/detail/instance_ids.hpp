@@ -33,10 +33,16 @@ class InstanceIds {
         --lead_[c];
       }
     }
+    hand_on(candidate_, old_ids, ids);
+  }
+
+  /// The same where it is known already which old cluster each cluster was (kNoCluster: none).
+  void hand_on(Span<const std::uint32_t> predecessors, Span<const std::uint32_t> old_ids,
+               std::vector<std::uint32_t>& ids) {
     taken_.assign(old_ids.size(), 0);
-    ids.resize(cluster_count);
-    for (std::size_t c = 0; c < cluster_count; ++c) {
-      const std::uint32_t old = candidate_[c];
+    ids.resize(predecessors.size());
+    for (std::size_t c = 0; c < predecessors.size(); ++c) {
+      const std::uint32_t old = predecessors[c];
       if (old != kNoCluster && taken_[old] == 0) {
         taken_[old] = 1;
         ids[c] = old_ids[old];

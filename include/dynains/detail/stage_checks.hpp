@@ -19,10 +19,10 @@ namespace dynains::detail {
 template <class Stage, class = void>
 struct IsConfigurable : std::false_type {};
 template <class Stage>
-struct IsConfigurable<Stage, std::void_t<typename Stage::Config,
-                                         decltype(Stage(std::declval<typename Stage::Config>())),
-                                         decltype(std::declval<typename Stage::Config>().validate())>>
-    : std::true_type {};
+struct IsConfigurable<
+    Stage,
+    std::void_t<typename Stage::Config, decltype(Stage(std::declval<typename Stage::Config>())),
+                decltype(std::declval<typename Stage::Config>().validate())>> : std::true_type {};
 
 template <class Stage, class = void>
 struct IsGround : std::false_type {};
@@ -34,10 +34,11 @@ template <class Stage, class = void>
 struct IsClusterer : std::false_type {};
 template <class Stage>
 struct IsClusterer<
-    Stage, std::enable_if_t<
-               std::is_convertible_v<decltype(std::declval<Stage&>().cluster(PolarView())),
-                                     Span<const std::uint32_t>> &&
-               std::is_convertible_v<decltype(std::declval<Stage&>().cluster_count()), std::size_t>>>
+    Stage,
+    std::enable_if_t<
+        std::is_convertible_v<decltype(std::declval<Stage&>().cluster(PolarView())),
+                              Span<const std::uint32_t>> &&
+        std::is_convertible_v<decltype(std::declval<Stage&>().cluster_count()), std::size_t>>>
     : std::true_type {};
 
 template <class Stage, class = void>
@@ -57,32 +58,31 @@ template <class Stage, class = void>
 struct IsBelief : std::false_type {};
 template <class Stage>
 struct IsBelief<
-    Stage, std::void_t<decltype(std::declval<Stage&>().reset()),
-                       decltype(std::declval<Stage&>().update(Span<const float>(),
-                                                              Span<const float>())),
-                       std::enable_if_t<
-                           std::is_convertible_v<decltype(std::declval<Stage&>().posterior()),
-                                                 double> &&
-                           std::is_convertible_v<decltype(std::declval<Stage&>().is_dynamic()),
-                                                 bool>>>> : std::true_type {};
+    Stage,
+    std::void_t<decltype(std::declval<Stage&>().reset()),
+                decltype(std::declval<Stage&>().update(Span<const float>(), Span<const float>())),
+                std::enable_if_t<
+                    std::is_convertible_v<decltype(std::declval<Stage&>().posterior()), double> &&
+                    std::is_convertible_v<decltype(std::declval<Stage&>().is_dynamic()), bool>>>>
+    : std::true_type {};
 
 template <class Stage, class = void>
 struct IsEvidence : std::false_type {};
 template <class Stage>
 struct IsEvidence<
     Stage,
-    std::void_t<decltype(std::declval<Stage&>().adapt(SensorModel())),
-                decltype(std::declval<Stage&>().observe(
-                    std::uint64_t{}, std::uint64_t{}, std::declval<const Eigen::Isometry3d&>(),
-                    std::declval<const GroundSplit&>(), Span<const std::uint32_t>(),
-                    std::size_t{})),
-                decltype(std::declval<Stage&>().judge(
-                    std::uint64_t{}, std::declval<const GroundSplit&>(),
-                    std::declval<std::vector<std::uint8_t>&>(),
-                    std::declval<std::vector<float>&>())),
-                std::enable_if_t<std::is_convertible_v<
-                    decltype(std::declval<const Stage&>().horizon()), std::size_t>>>>
-    : std::true_type {};
+    std::void_t<
+        decltype(std::declval<Stage&>().adapt(SensorModel())),
+        decltype(std::declval<Stage&>().observe(
+            std::uint64_t{}, std::uint64_t{}, std::declval<const Eigen::Isometry3d&>(),
+            std::declval<const GroundSplit&>(), Span<const std::uint32_t>(), std::size_t{})),
+        decltype(std::declval<Stage&>().judge(std::uint64_t{}, std::declval<const GroundSplit&>(),
+                                              std::declval<std::vector<std::uint8_t>&>(),
+                                              std::declval<std::vector<float>&>())),
+        std::enable_if_t<
+            std::is_convertible_v<decltype(std::declval<const Stage&>().horizon()), std::size_t> &&
+            std::is_convertible_v<decltype(std::declval<const Stage&>().predecessors()),
+                                  Span<const std::uint32_t>>>>> : std::true_type {};
 
 template <class Stage, class = void>
 struct IsMap : std::false_type {};
