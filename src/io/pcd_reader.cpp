@@ -329,4 +329,11 @@ PointFile read_pcd(const std::filesystem::path& path) {
   return std::move(sink.file());
 }
 
+PointFileHeader read_pcd_header(const std::filesystem::path& path) {
+  ByteReader reader(path);
+  PointSink sink;
+  read_header(reader, sink);
+  return {sink.file().viewpoint, sink.columns()};
+}
+
 }  // namespace dynains

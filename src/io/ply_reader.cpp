@@ -233,4 +233,11 @@ PointFile read_ply(const std::filesystem::path& path) {
   return std::move(sink.file());
 }
 
+PointFileHeader read_ply_header(const std::filesystem::path& path) {
+  ByteReader reader(path);
+  PointSink sink;
+  read_header(reader, sink);
+  return {sink.file().viewpoint, sink.columns()};
+}
+
 }  // namespace dynains

@@ -5,10 +5,12 @@
 #include <cstring>
 #include <limits>
 #include <ostream>
+#include <sstream>
 #include <string>
 
 #include "failure.hpp"
 #include "point_readers.hpp"
+#include "text.hpp"
 
 namespace dynains {
 namespace {
@@ -32,7 +34,8 @@ Format known_format_of(const fs::path& path) {
   return format;
 }
 
-std::string ply_header(std::size_t count, const PointColumns& columns, const std::string& padding) {
+std::string ply_header(std::size_t count, const PointColumns& columns, const std::string& padding,
+                       const Eigen::Isometry3d&) {
   const std::string coordinate = columns.double_xyz ? "double" : "float";
   std::string text = "ply\nformat binary_little_endian 1.0\ncomment dynains" + padding +
                      "\nelement vertex " + std::to_string(count) + '\n';
@@ -40,27 +43,43 @@ std::string ply_header(std::size_t count, const PointColumns& columns, const std
   if (columns.intensity) text += "property float intensity\n";
   if (columns.rgb) text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   if (columns.label) text += "property uint label\n";
+  if (columns.ring) text += "property ushort ring\n";
+  if (columns.time) text += "property double time\n";
   return text + "end_header\n";
 }
 
-std::string pcd_header(std::size_t count, const PointColumns& columns, const std::string& padding) {
+std::string viewpoint_line(const Eigen::Isometry3d& pose) {
+  const Eigen::Quaterniond q(pose.linear());
+  std::ostringstream line;
+  text::exact(line) << "VIEWPOINT";
+  for (const double value : {pose.translation().x(), pose.translation().y(), pose.translation().z(),
+                             q.w(), q.x(), q.y(), q.z()}) {
+    line << ' ' << value;
+  }
+  return line.str();
+}
+
+std::string pcd_header(std::size_t count, const PointColumns& columns, const std::string& padding,
+                       const Eigen::Isometry3d& viewpoint) {
   std::string fields = "FIELDS x y z";
   std::string sizes = columns.double_xyz ? "SIZE 8 8 8" : "SIZE 4 4 4";
   std::string types = "TYPE F F F";
   std::string counts = "COUNT 1 1 1";
-  const auto add = [&](const char* name, const char* type) {
+  const auto add = [&](const char* name, const char* type, int bytes = 4) {
     fields += std::string(" ") + name;
-    sizes += " 4";
+    sizes += ' ' + std::to_string(bytes);
     types += std::string(" ") + type;
     counts += " 1";
   };
   if (columns.intensity) add("intensity", "F");
   if (columns.rgb) add("rgb", "F");
   if (columns.label) add("label", "U");
+  if (columns.ring) add("ring", "U", 2);
+  if (columns.time) add("time", "F", 8);
   const std::string size = std::to_string(count);
   return "# .PCD v0.7 - Point Cloud Data file format\n# dynains" + padding + "\nVERSION 0.7\n" +
-         fields + '\n' + sizes + '\n' + types + '\n' + counts + "\nWIDTH " + size +
-         "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + size + "\nDATA binary\n";
+         fields + '\n' + sizes + '\n' + types + '\n' + counts + "\nWIDTH " + size + "\nHEIGHT 1\n" +
+         viewpoint_line(viewpoint) + "\nPOINTS " + size + "\nDATA binary\n";
 }
 
 /// One record, packed.
@@ -76,14 +95,18 @@ class Record {
   }
 
  private:
-  std::array<char, 40> bytes_{};
+  std::array<char, 64> bytes_{};
   std::size_t size_ = 0;
 };
 
 }  // namespace
 
-PointFileWriter::PointFileWriter(const fs::path& path, const PointColumns& columns)
-    : columns_(columns), pcd_(known_format_of(path) == Format::kPcd), file_(path) {
+PointFileWriter::PointFileWriter(const fs::path& path, const PointColumns& columns,
+                                 const Eigen::Isometry3d& viewpoint)
+    : columns_(columns),
+      viewpoint_(viewpoint),
+      pcd_(known_format_of(path) == Format::kPcd),
+      file_(path) {
   file_.stream() << header();
 }
 
@@ -91,8 +114,9 @@ PointFileWriter::PointFileWriter(const fs::path& path, const PointColumns& colum
 std::string PointFileWriter::header() const {
   const auto text = pcd_ ? pcd_header : ply_header;
   constexpr std::size_t kMost = std::numeric_limits<std::size_t>::max();
-  const std::size_t length = text(kMost, columns_, "").size();
-  return text(size_, columns_, std::string(length - text(size_, columns_, "").size(), '.'));
+  const std::size_t length = text(kMost, columns_, "", viewpoint_).size();
+  const std::size_t needed = text(size_, columns_, "", viewpoint_).size();
+  return text(size_, columns_, std::string(length - needed, '.'), viewpoint_);
 }
 
 void PointFileWriter::add(const FilePoint& point) {
@@ -113,20 +137,26 @@ void PointFileWriter::add(const FilePoint& point) {
     }
   }
   if (columns_.label) record.put(point.label);
+  if (columns_.ring) record.put(point.ring);
+  if (columns_.time) record.put(point.time);
   record.write_to(file_.stream());
   ++size_;
 }
 
-void PointFileWriter::commit() {
+void PointFileWriter::commit(AtomicFile::Sync sync) {
   file_.stream().seekp(0);
   file_.stream() << header();
-  file_.commit();
+  file_.commit(sync);
 }
 
 bool is_point_file(const fs::path& path) { return format_of(path) != Format::kUnknown; }
 
 PointFile read_points(const fs::path& path) {
   return known_format_of(path) == Format::kPly ? read_ply(path) : read_pcd(path);
+}
+
+PointFileHeader read_point_file_header(const fs::path& path) {
+  return known_format_of(path) == Format::kPly ? read_ply_header(path) : read_pcd_header(path);
 }
 
 }  // namespace dynains

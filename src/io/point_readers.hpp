@@ -10,4 +10,7 @@ namespace dynains {
 PointFile read_ply(const std::filesystem::path& path);
 PointFile read_pcd(const std::filesystem::path& path);
 
+PointFileHeader read_ply_header(const std::filesystem::path& path);
+PointFileHeader read_pcd_header(const std::filesystem::path& path);
+
 }  // namespace dynains

@@ -81,6 +81,16 @@ std::optional<std::string> PointSink::missing() const {
   return std::nullopt;
 }
 
+PointColumns PointSink::columns() const {
+  const auto claimed = [this](Role role) { return claimed_[static_cast<std::size_t>(role)]; };
+  PointColumns columns;
+  columns.intensity = claimed(Role::kIntensity);
+  columns.ring = claimed(Role::kRing);
+  columns.time = claimed(Role::kTime);
+  columns.label = claimed(Role::kLabel);
+  return columns;
+}
+
 void PointSink::resize(std::size_t count) {
   const auto claimed = [this](Role role) { return claimed_[static_cast<std::size_t>(role)]; };
   file_.positions.resize(count, Eigen::Vector3d::Zero());

@@ -26,6 +26,9 @@ class PointSink {
   /// Name of a coordinate that no column was claimed for.
   std::optional<std::string> missing() const;
 
+  /// The columns announced beside x y z.
+  PointColumns columns() const;
+
   /// Makes room; `count` must be backed by the size of the file.
   void resize(std::size_t count);
 

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -24,8 +26,32 @@ void print_config(const std::string& preset_name) {
                 << flag_name(parameter.name) << " = " << format_value(parameter.value) << '\n';
     });
   });
-  std::cout.flush();
-  if (!std::cout) throw IoError("standard output: cannot be written");
+}
+
+// The parameter table of the documentation.
+void print_markdown() {
+  std::map<std::string, std::string> paper;
+  const DynaInsRemover::Config published = DynaInsRemover::Config::paper();
+  DynaInsRemover::Config::visit(published, [&](const auto& parameter) {
+    paper[parameter.name] = format_value(parameter.value);
+  });
+  std::cout
+      << "# Parameters\n\n"
+         "Written by `dynains config --markdown`; a test compares. As flags and in config files "
+         "names have hyphens\n(`--tau-s 0.5`); in C++ and Python they are fields "
+         "(`config.belief.tau_p` and `config.tau_p`).\n";
+  const DynaInsRemover::Config config;
+  DynaInsRemover::Config::visit_sections(config, [&](const char* name, const auto& section) {
+    std::cout << "\n## " << name
+              << "\n\n| name | default | paper | range | meaning |\n|---|---|---|---|---|\n";
+    using Section = std::remove_const_t<std::remove_reference_t<decltype(section)>>;
+    Section::visit(section, [&](const auto& parameter) {
+      std::string range = describe_range(parameter);
+      std::replace(range.begin(), range.end(), '|', '/');  // a bar would start a column
+      std::cout << "| `" << parameter.name << "` | " << format_value(parameter.value) << " | "
+                << paper[parameter.name] << " | " << range << " | " << parameter.help << " |\n";
+    });
+  });
 }
 
 }  // namespace
@@ -36,7 +62,17 @@ void add_config_command(CLI::App& app) {
   command.add_option("--preset", *name, "default, or paper: the paper to the letter [default]")
       ->check(CLI::IsMember(preset_names()))
       ->type_name("NAME");
-  command.callback([name] { print_config(*name); });
+  auto markdown = std::make_shared<bool>(false);
+  command.add_flag("--markdown", *markdown, "Print all presets as a table instead");
+  command.callback([name, markdown] {
+    if (*markdown) {
+      print_markdown();
+    } else {
+      print_config(*name);
+    }
+    std::cout.flush();
+    if (!std::cout) throw IoError("standard output: cannot be written");
+  });
 }
 
 }  // namespace dynains::program

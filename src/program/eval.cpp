@@ -11,14 +11,16 @@
 #include "dynains/io/point_file.hpp"
 #include "evaluation_options.hpp"
 #include "labelled_sequence.hpp"
+#include "recording_options.hpp"
 
 namespace dynains::program {
 namespace {
 
 struct EvalOptions {
-  explicit EvalOptions(CLI::App& command) : evaluation(command, "ignore") {}
+  explicit EvalOptions(CLI::App& command)
+      : sequence(command, "labelled sequence"), evaluation(command, "ignore") {}
 
-  std::string sequence;
+  RecordingFlags sequence;
   std::vector<std::string> runs;
   std::vector<std::string> maps;
   ScanWindow window;
@@ -51,7 +53,7 @@ void eval(const EvalOptions& options) {
         {std::filesystem::path(options.maps[m]).filename().string(), map_files[m].positions});
   }
 
-  LabelledSequence sequence(options.sequence, options.window, runs);
+  LabelledSequence sequence(options.sequence.open(), options.window, runs);
   const auto source = [&](std::size_t i, evaluation::LabelledScan& scan) {
     return sequence.read(i, scan);
   };
@@ -70,8 +72,6 @@ void add_eval_command(CLI::App& program) {
       "eval",
       "Judge runs or maps of any tool by a labelled sequence: PR, RR, F1 and SA, DA, AA, HA");
   const auto options = std::make_shared<EvalOptions>(command);
-  command.add_option("sequence", options->sequence, "labelled sequence (SemanticKITTI folder)")
-      ->required();
   command.add_option("runs", options->runs, "output folders of `dynains run`");
   command
       .add_option("--map", options->maps,

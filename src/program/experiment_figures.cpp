@@ -11,6 +11,7 @@
 #include "figure.hpp"
 #include "labelled_sequence.hpp"
 #include "progress.hpp"
+#include "recording_options.hpp"
 #include "remover_options.hpp"
 #include "variants.hpp"
 #include "verdict_cloud.hpp"
@@ -22,9 +23,11 @@ namespace fs = std::filesystem;
 
 struct FiguresOptions {
   explicit FiguresOptions(CLI::App& command)
-      : remover(command, "default"), evaluation(command, "ignore", "eval-") {}
+      : sequence(command, "labelled sequence"),
+        remover(command, "default"),
+        evaluation(command, "ignore", "eval-") {}
 
-  std::string sequence;
+  RecordingFlags sequence;
   std::string out;
   std::string run;
   RemoverOptions remover;
@@ -42,7 +45,7 @@ VerdictCloud collect(const FiguresOptions& options) {
 
   std::vector<RunLabels> runs;
   if (!options.run.empty()) runs.push_back({options.run});
-  LabelledSequence sequence(options.sequence, options.window, runs);
+  LabelledSequence sequence(options.sequence.open(), options.window, runs);
   VariantVerdicts verdicts;
   evaluation::ScanSource source = [&](std::size_t i, evaluation::LabelledScan& scan) {
     return sequence.read(i, scan);
@@ -99,8 +102,6 @@ void add_figures_command(CLI::App& experiment) {
   CLI::App& command = *experiment.add_subcommand(
       "figures", "Fig. 1, 6 and 8: raw and cleaned map from above and in perspective, PNG and PLY");
   const auto options = std::make_shared<FiguresOptions>(command);
-  command.add_option("sequence", options->sequence, "labelled sequence (SemanticKITTI folder)")
-      ->required();
   command.add_option("--out", options->out, "folder to write to")->required();
   command.add_option("--run", options->run,
                      "draw the labels of this output folder of `dynains run` instead of running");

@@ -9,9 +9,10 @@
 #include "dynains/dyna_ins_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/text_table.hpp"
-#include "dynains/io/kitti.hpp"
+#include "dynains/io/recording.hpp"
 #include "evaluation_options.hpp"
 #include "experiment.hpp"
+#include "recording_options.hpp"
 #include "remover_options.hpp"
 
 namespace dynains::program {
@@ -20,9 +21,10 @@ namespace {
 using evaluation::format_number;
 
 struct RuntimeOptions {
-  explicit RuntimeOptions(CLI::App& command) : remover(command, "paper") {}
+  explicit RuntimeOptions(CLI::App& command)
+      : sequence(command, "recording (no labels needed)"), remover(command, "paper") {}
 
-  std::string sequence;
+  RecordingFlags sequence;
   RemoverOptions remover;
   std::size_t repeat = 5;
   std::string csv;
@@ -49,24 +51,21 @@ struct Component {
 
 /// Frames of all repetitions; each starts with an empty map and warm buffers.
 std::vector<Component> measure(const RuntimeOptions& options) {
-  const KittiSequence sequence(options.sequence);
-  if (sequence.size() == 0) throw IoError(options.sequence + ": no scans");
+  const Recording sequence = options.sequence.open();
   std::vector<Component> components;
   const StageTimes none;
-  StageTimes::visit(none, [&](const char* name, double) {
-    components.push_back({name, {}});
-  });
+  StageTimes::visit(none, [&](const char* name, double) { components.push_back({name, {}}); });
   components.push_back({"total", {}});
   components.push_back({"points", {}});
 
   DynaInsRemover remover(options.remover.config());
-  std::vector<float> scan;
+  RecordedScan scan;
   for (std::size_t repetition = 0; repetition < options.repeat; ++repetition) {
     remover.reset();
     for (std::size_t i = 0; i < sequence.size(); ++i) {
       sequence.read_scan(i, scan);
       const auto begin = std::chrono::steady_clock::now();
-      const FrameResult frame = remover.push(RawPoints<float>{scan.data(), scan.size() / 4, 4},
+      const FrameResult frame = remover.push(RawPoints<float>{scan.xyzi.data(), scan.size(), 4},
                                              sequence.T_world_sensor(i), sequence.time(i));
       const std::chrono::duration<double, std::milli> total =
           std::chrono::steady_clock::now() - begin;
@@ -74,7 +73,7 @@ std::vector<Component> measure(const RuntimeOptions& options) {
       StageTimes::visit(frame.times,
                         [&](const char*, double ms) { components[next++].times.push_back(ms); });
       components[next++].times.push_back(total.count());
-      components[next].times.push_back(static_cast<double>(scan.size() / 4));
+      components[next].times.push_back(static_cast<double>(scan.size()));
     }
   }
   return components;
@@ -112,8 +111,6 @@ void add_runtime_command(CLI::App& experiment) {
   CLI::App& command =
       *experiment.add_subcommand("runtime", "Fig. 7: time per component, without file reading");
   const auto options = std::make_shared<RuntimeOptions>(command);
-  command.add_option("sequence", options->sequence, "sequence (KITTI folder; no labels needed)")
-      ->required();
   command.add_option("--repeat", options->repeat, "how often to go through the sequence")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();

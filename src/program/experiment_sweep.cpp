@@ -12,6 +12,7 @@
 #include "labelled_sequence.hpp"
 #include "line_chart.hpp"
 #include "progress.hpp"
+#include "recording_options.hpp"
 #include "remover_options.hpp"
 #include "variants.hpp"
 
@@ -23,9 +24,11 @@ using evaluation::format_number;
 
 struct SweepOptions {
   explicit SweepOptions(CLI::App& command)
-      : remover(command, "paper"), evaluation(command, "ignore", "eval-") {}
+      : sequence(command, "labelled sequence"),
+        remover(command, "paper"),
+        evaluation(command, "ignore", "eval-") {}
 
-  std::string sequence;
+  RecordingFlags sequence;
   std::string parameter = "tau-s";
   std::vector<std::string> values = {"0.1", "0.2", "0.3", "0.4", "0.5", "0.6", "0.7", "0.8", "0.9"};
   RemoverOptions remover;
@@ -41,7 +44,7 @@ struct SweepOptions {
 std::vector<EvaluationRow> measure(const SweepOptions& options,
                                    const std::vector<Variant>& variants) {
   const evaluation::EvaluationConfig config = options.evaluation.config();
-  LabelledSequence sequence(options.sequence, options.window);
+  LabelledSequence sequence(options.sequence.open(), options.window);
   std::vector<EvaluationRow> rows;
   const std::size_t batches =
       (variants.size() + evaluation::kMaxEstimates - 1) / evaluation::kMaxEstimates;
@@ -105,8 +108,6 @@ void add_sweep_command(CLI::App& experiment) {
   CLI::App& command = *experiment.add_subcommand(
       "sweep", "Fig. 5: PR, RR and F1 against a parameter (the similarity threshold by default)");
   const auto options = std::make_shared<SweepOptions>(command);
-  command.add_option("sequence", options->sequence, "labelled sequence (SemanticKITTI folder)")
-      ->required();
   command.add_option("--parameter", options->parameter, "any parameter, see dynains config")
       ->capture_default_str();
   command.add_option("--values", options->values, "values, separated by commas")

@@ -43,7 +43,9 @@ struct Task {
 
 /// The sequence itself, or the published windows of whatever sequences lie below `root`.
 std::vector<Task> find_tasks(const fs::path& root, const ScanWindow& window) {
-  if (fs::exists(root / "velodyne")) {
+  const bool is_sequence = fs::exists(root / "velodyne") || fs::exists(root / "labels") ||
+                           fs::exists(root / "pcd") || fs::exists(root / "ply");
+  if (is_sequence) {
     const fs::path clean = fs::absolute(root).lexically_normal();
     const fs::path name = clean.has_filename() ? clean.filename() : clean.parent_path().filename();
     return {{name.string(), root, window}};
@@ -59,7 +61,8 @@ std::vector<Task> find_tasks(const fs::path& root, const ScanWindow& window) {
   }
   if (tasks.empty()) {
     throw IoError(root.string() +
-                  ": neither a sequence (no velodyne/) nor SemanticKITTI (no sequences/00, 01, 02, "
+                  ": neither a sequence (no velodyne/, pcd/, ply/ or labels/) nor SemanticKITTI "
+                  "(no sequences/00, 01, 02, "
                   "05 or 07 with velodyne/)");
   }
   return tasks;
@@ -90,7 +93,7 @@ void table1(const Table1Options& options) {
   };
 
   for (const Task& task : tasks) {
-    LabelledSequence sequence(task.folder, task.window);
+    LabelledSequence sequence(Recording(task.folder), task.window);
     Progress progress(sequence.size(), "scans of " + task.name, options.quiet);
     const evaluation::Evaluation result =
         evaluate_variants(sequence, variants, Answer::kFinal, config,

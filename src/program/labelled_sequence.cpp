@@ -5,20 +5,24 @@
 #include <utility>
 
 #include "dynains/errors.hpp"
+#include "dynains/io/kitti.hpp"
 
 namespace dynains::program {
 namespace fs = std::filesystem;
 
-LabelledSequence::LabelledSequence(const fs::path& folder, const ScanWindow& window,
+LabelledSequence::LabelledSequence(Recording recording, const ScanWindow& window,
                                    std::vector<RunLabels> runs)
-    : sequence_(folder), runs_(std::move(runs)) {
+    : sequence_(std::move(recording)), runs_(std::move(runs)) {
+  const fs::path& folder = sequence_.folder();
   if (!sequence_.has_labels()) {
-    throw IoError((folder / "labels").string() +
-                  ": no ground truth; expected one NNNNNN.label (uint32 a point) for each scan");
+    throw IoError(
+        (folder / "labels").string() +
+        ": no ground truth; expected one NNNNNN.label (uint32 a point) for each scan, or a column "
+        "\"label\"");
   }
   const bool chosen = window.start || window.end;
   const auto inside = [&](std::size_t index) {
-    const std::size_t number = std::stoul(sequence_.name(index));
+    const std::uint64_t number = sequence_.number(index);
     if (chosen) return number >= window.start.value_or(0) && number <= window.end.value_or(number);
     return every_run_has(index);
   };
@@ -41,7 +45,7 @@ bool LabelledSequence::every_run_has(std::size_t index) const {
 bool LabelledSequence::read(std::size_t i, evaluation::LabelledScan& scan) {
   if (i >= size()) return false;
   const std::size_t index = first_ + i;
-  sequence_.read_scan(index, xyzi_);
+  sequence_.read_scan(index, points_);
   truth_ = sequence_.read_labels(index);
   in_map_.assign(runs_.empty() ? 0 : truth_.size(), 0);
   instances_.clear();
@@ -49,7 +53,7 @@ bool LabelledSequence::read(std::size_t i, evaluation::LabelledScan& scan) {
   for (std::size_t run = 0; run < runs_.size(); ++run) read_run(run, sequence_.name(index));
   if (!runs_.empty() && runs_.front().kind == "labels") read_causes(sequence_.name(index));
 
-  scan.xyz = xyzi_.data();
+  scan.xyz = points_.xyzi.data();
   scan.stride = 4;
   scan.T_world_sensor = sequence_.T_world_sensor(index);
   scan.time = sequence_.time(index);

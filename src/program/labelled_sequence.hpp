@@ -1,4 +1,4 @@
-// A window of a KITTI sequence with ground truth and, optionally, the labels of runs over it, as
+// A window of a recording with ground truth and, optionally, the labels of runs over it, as
 // the evaluation wants it.
 #pragma once
 
@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "dynains/evaluation/scan.hpp"
-#include "dynains/io/kitti.hpp"
+#include "dynains/io/recording.hpp"
 
 namespace dynains::program {
 
@@ -34,13 +34,12 @@ struct RunLabels {
 /// Reads scan by scan; holds one scan at a time.
 class LabelledSequence {
  public:
-  /// Opens the sequence and chooses its scans: those within `window`; without a window, from the
+  /// Takes a recording and chooses its scans: those within `window`; without a window, from the
   /// first to the last scan that every run has labels for. Throws IoError if the sequence has no
   /// ground truth, or no scan is left.
-  LabelledSequence(const std::filesystem::path& folder, const ScanWindow& window,
-                   std::vector<RunLabels> runs = {});
+  LabelledSequence(Recording recording, const ScanWindow& window, std::vector<RunLabels> runs = {});
 
-  const KittiSequence& sequence() const { return sequence_; }
+  const Recording& sequence() const { return sequence_; }
   std::size_t size() const { return last_ - first_; }
   /// Index within sequence() of scan i of the window.
   std::size_t index(std::size_t i) const { return first_ + i; }
@@ -54,11 +53,11 @@ class LabelledSequence {
   void read_run(std::size_t run, const std::string& name);
   void read_causes(const std::string& name);
 
-  KittiSequence sequence_;
+  Recording sequence_;
   std::vector<RunLabels> runs_;
   std::size_t first_ = 0;  // half-open range within sequence_
   std::size_t last_ = 0;
-  std::vector<float> xyzi_;
+  RecordedScan points_;
   std::vector<std::uint32_t> truth_;
   std::vector<std::uint8_t> in_map_;
   std::vector<std::uint32_t> instances_;  // of run 0

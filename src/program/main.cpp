@@ -28,6 +28,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(0, 1);
   app.get_formatter()->column_width(36);
   add_run_command(app);
+  add_check_command(app);
   add_config_command(app);
   add_simulate_command(app);
   add_statistics_command(app);
@@ -45,6 +46,8 @@ int main(int argc, char** argv) {
     return fail(kExitUsage, (std::string(error.what()) + " (see dynains --help)").c_str());
   } catch (const dynains::ConfigError& error) {
     return fail(kExitUsage, error.what());
+  } catch (const Finding&) {
+    return kExitFailure;
   } catch (const Interrupted& interrupted) {
     return 128 + interrupted.signal;
   } catch (const std::bad_alloc&) {

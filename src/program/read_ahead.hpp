@@ -3,28 +3,27 @@
 
 #include <cstddef>
 #include <future>
-#include <vector>
 
-#include "dynains/io/kitti.hpp"
+#include "dynains/io/recording.hpp"
 
 namespace dynains::program {
 
 class ReadAhead {
  public:
-  /// Scans `first` to `last`, both inclusive, of a sequence that outlives this.
-  ReadAhead(const KittiSequence& sequence, std::size_t first, std::size_t last);
+  /// Scans `first` to `last`, both inclusive, of a recording that outlives this.
+  ReadAhead(const Recording& recording, std::size_t first, std::size_t last);
 
-  /// To be called once for each scan. The next one, x y z intensity interleaved; throws IoError if
-  /// it could not be read. `recycled` gives its memory to the scan after it.
-  std::vector<float> next(std::vector<float> recycled);
+  /// To be called once for each scan. The next one; throws IoError if it could not be read.
+  /// `recycled` gives its memory to the scan after it.
+  RecordedScan next(RecordedScan recycled);
 
  private:
-  void launch(std::vector<float> buffer);
+  void launch(RecordedScan buffer);
 
-  const KittiSequence& sequence_;
+  const Recording& recording_;
   std::size_t next_;
   std::size_t last_;
-  std::future<std::vector<float>> pending_;
+  std::future<RecordedScan> pending_;
 };
 
 }  // namespace dynains::program

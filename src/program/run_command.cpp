@@ -11,12 +11,13 @@
 #include "dynains/dyna_ins_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
-#include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
+#include "dynains/io/recording.hpp"
 #include "evaluation_options.hpp"
 #include "interrupt.hpp"
 #include "output_folder.hpp"
 #include "progress.hpp"
+#include "recording_options.hpp"
 #include "remover_options.hpp"
 #include "run_report.hpp"
 #include "run_results.hpp"
@@ -29,13 +30,15 @@ namespace fs = std::filesystem;
 using Config = DynaInsRemover::Config;
 
 struct RunOptions {
-  explicit RunOptions(CLI::App& command) : remover(command, "default") {}
+  explicit RunOptions(CLI::App& command)
+      : sequence(command, "recording"), remover(command, "default") {}
 
-  std::string sequence;
+  RecordingFlags sequence;
   std::string out;
   std::string map;
   ScanWindow window;
   bool write_online = false;
+  bool write_clean = false;
   bool force = false;
   bool quiet = false;
   RemoverOptions remover;
@@ -47,8 +50,8 @@ nlohmann::ordered_json to_json(const Config& config) {
   return json;
 }
 
-ScanRange select_scans(const KittiSequence& sequence, const ScanWindow& window) {
-  const auto number = [&](std::size_t i) { return std::stoull(sequence.name(i)); };
+ScanRange select_scans(const Recording& sequence, const ScanWindow& window) {
+  const auto number = [&](std::size_t i) { return sequence.number(i); };
   ScanRange range{0, sequence.size() - 1};
   while (range.first <= range.last && window.start && number(range.first) < *window.start) {
     ++range.first;
@@ -63,8 +66,8 @@ ScanRange select_scans(const KittiSequence& sequence, const ScanWindow& window) 
 }
 
 /// So that a broken file is noticed before anything is written.
-void check_scans(const KittiSequence& sequence, const ScanRange& range) {
-  for (std::size_t i = range.first; i <= range.last; ++i) sequence.point_count(i);
+void check_scans(const Recording& sequence, const ScanRange& range) {
+  for (std::size_t i = range.first; i <= range.last; ++i) sequence.check_scan(i);
 }
 
 /// What an earlier run may have left in `folder`.
@@ -74,8 +77,8 @@ OutputFiles files_of_a_run(const fs::path& folder) {
   files.files = {"timing.csv", "static_map.ply", "dynamic_points.ply"};
   const std::string map = earlier_map(folder);
   if (!map.empty()) files.files.push_back(map);
-  files.folders = {"labels", "online"};
-  files.extensions = {".label"};
+  files.folders = {"labels", "online", "clean"};
+  files.extensions = {".label", ".bin", ".pcd", ".ply"};
   return files;
 }
 
@@ -83,6 +86,7 @@ RunOutputs make_outputs(const RunOptions& options, const Config& config) {
   RunOutputs outputs;
   outputs.folder = options.out;
   outputs.write_online = options.write_online;
+  outputs.write_clean = options.write_clean;
   if (options.map.empty()) {
     if (config.build_map) outputs.map = outputs.folder / "static_map.ply";
     return outputs;
@@ -148,7 +152,7 @@ void run(const RunOptions& options) {
   const Config config = options.remover.config();
   const RunOutputs outputs = make_outputs(options, config);
   DynaInsRemover remover(config);
-  const KittiSequence sequence(options.sequence);
+  const Recording sequence = options.sequence.open();
   const ScanRange range = select_scans(sequence, options.window);
   check_scans(sequence, range);
   prepare(outputs, options.force);
@@ -166,7 +170,7 @@ void run(const RunOptions& options) {
   results.commit();
 
   RunDescription description;
-  description.sequence = options.sequence;
+  description.sequence = options.sequence.folder();
   description.first_scan = sequence.name(range.first);
   description.last_scan = sequence.name(range.first + results.finished() - 1);
   description.preset = options.remover.preset_name();
@@ -187,12 +191,6 @@ void add_run_command(CLI::App& app) {
   CLI::App& command = *app.add_subcommand("run", "Remove what moves from a recorded sequence");
   auto options = std::make_shared<RunOptions>(command);
   command
-      .add_option("SEQ", options->sequence,
-                  "KITTI or SemanticKITTI folder: velodyne/, poses.txt; optional calib.txt, "
-                  "times.txt")
-      ->required()
-      ->type_name("");
-  command
       .add_option("-o,--out", options->out,
                   "folder for the results; created, must be empty (see --force)")
       ->required()
@@ -208,6 +206,9 @@ void add_run_command(CLI::App& app) {
       ->type_name("FILE");
   command.add_flag("--write-online", options->write_online,
                    "also write the verdicts without latency, to the folder online");
+  command.add_flag("--write-clean", options->write_clean,
+                   "also write every scan without its moving points, to the folder clean, in the "
+                   "form it has in SEQ");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   command.footer(
       "Writes labels/NNNNNN.label (uint32 a point: 251 moving, 9 static, 0 not judged; instance id "

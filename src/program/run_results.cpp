@@ -7,10 +7,10 @@ namespace dynains::program {
 namespace {
 
 /// Points lie around the poses; near the limit doubles cost little and lose nothing.
-bool is_far(const KittiSequence& sequence, const ScanRange& range) {
+bool is_far(const Recording& recording, const ScanRange& range) {
   constexpr double kReach = 500.0;  // m, of any sensor
   for (std::size_t i = range.first; i <= range.last; ++i) {
-    const Eigen::Vector3d position = sequence.T_world_sensor(i).translation();
+    const Eigen::Vector3d position = recording.T_world_sensor(i).translation();
     if (position.cwiseAbs().maxCoeff() > kFloatCoordinateLimit - kReach) return true;
   }
   return false;
@@ -22,8 +22,8 @@ PointColumns map_columns(bool far) {
   return columns;
 }
 
-PointColumns dynamic_columns(bool far) {
-  PointColumns columns = map_columns(far);
+PointColumns dynamic_columns(bool far, PointColumns columns) {
+  columns.double_xyz = far;
   columns.intensity = true;
   columns.label = true;
   return columns;
@@ -31,38 +31,38 @@ PointColumns dynamic_columns(bool far) {
 
 }  // namespace
 
-RunResults::RunResults(const KittiSequence& sequence, const ScanRange& range,
+RunResults::RunResults(const Recording& recording, const ScanRange& range,
                        const RunOutputs& outputs)
-    : sequence_(sequence),
+    : recording_(recording),
       range_(range),
       final_labels_(outputs.folder / "labels"),
       dynamic_points_(outputs.folder / "dynamic_points.ply",
-                      dynamic_columns(is_far(sequence, range))) {
+                      dynamic_columns(is_far(recording, range), recording.columns())) {
   if (outputs.write_online) online_labels_.emplace(outputs.folder / "online");
+  if (outputs.write_clean) clean_scans_.emplace(outputs.folder / "clean", recording);
   if (!outputs.map.empty()) {
-    map_ = std::make_unique<PointFileWriter>(outputs.map, map_columns(is_far(sequence, range)));
+    map_ = std::make_unique<PointFileWriter>(outputs.map, map_columns(is_far(recording, range)));
   }
 }
 
-void RunResults::take_newest(std::vector<float> scan, const ScanVerdict& verdict) {
+void RunResults::take_newest(RecordedScan scan, const ScanVerdict& verdict) {
   points_ += verdict.labels.size();
   open_scans_.push_back(std::move(scan));
-  if (online_labels_) online_labels_->write(sequence_.name(range_.first + verdict.scan), verdict);
+  if (online_labels_) online_labels_->write(recording_.name(range_.first + verdict.scan), verdict);
 }
 
 void RunResults::take_final(const ScanVerdict& verdict) {
-  final_labels_.write(sequence_.name(range_.first + verdict.scan), verdict);
+  const std::size_t index = range_.first + verdict.scan;
+  final_labels_.write(recording_.name(index), verdict);
   labels_.add(verdict.labels);
 
-  std::vector<float> scan = std::move(open_scans_.front());
+  RecordedScan scan = std::move(open_scans_.front());
   open_scans_.pop_front();
+  if (clean_scans_) clean_scans_->write(index, scan, verdict.labels);
   for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
     if (verdict.labels[i] != PointLabel::kDynamic) continue;
-    const float* xyzi = scan.data() + 4 * i;
-    FilePoint point;
-    point.position =
-        verdict.T_world_sensor * Eigen::Vector3f(xyzi[0], xyzi[1], xyzi[2]).cast<double>();
-    point.intensity = xyzi[3];
+    FilePoint point = scan.point(i);
+    point.position = verdict.T_world_sensor * point.position;
     point.label = mos_label(verdict.labels[i], verdict.instances[i]);
     dynamic_points_.add(point);
   }
@@ -70,9 +70,9 @@ void RunResults::take_final(const ScanVerdict& verdict) {
   ++finished_;
 }
 
-std::vector<float> RunResults::recycle() {
+RecordedScan RunResults::recycle() {
   if (spare_.empty()) return {};
-  std::vector<float> scan = std::move(spare_.back());
+  RecordedScan scan = std::move(spare_.back());
   spare_.pop_back();
   return scan;
 }

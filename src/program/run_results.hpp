@@ -12,8 +12,9 @@
 #include <string>
 #include <vector>
 
-#include "dynains/io/kitti.hpp"
+#include "clean_writer.hpp"
 #include "dynains/io/point_file.hpp"
+#include "dynains/io/recording.hpp"
 #include "dynains/scan_verdict.hpp"
 #include "label_writer.hpp"
 
@@ -31,6 +32,7 @@ struct RunOutputs {
   std::filesystem::path folder;
   std::filesystem::path map;  ///< empty: no map
   bool write_online = false;
+  bool write_clean = false;
 };
 
 /// Counts of points by final label.
@@ -48,14 +50,14 @@ struct LabelCounts {
 class RunResults {
  public:
   /// Opens all files, so that a folder that cannot be written is noticed before the work.
-  /// The sequence outlives this. Throws IoError.
-  RunResults(const KittiSequence& sequence, const ScanRange& range, const RunOutputs& outputs);
+  /// The recording outlives this. Throws IoError.
+  RunResults(const Recording& recording, const ScanRange& range, const RunOutputs& outputs);
 
-  /// The scan just pushed (interleaved x y z intensity), which this keeps, and the verdict on it.
-  void take_newest(std::vector<float> scan, const ScanVerdict& verdict);
+  /// The scan just pushed, which this keeps, and the verdict on it.
+  void take_newest(RecordedScan scan, const ScanVerdict& verdict);
   void take_final(const ScanVerdict& verdict);
   /// Memory of a scan that is finished, for reading the next.
-  std::vector<float> recycle();
+  RecordedScan recycle();
 
   void add_map_point(const Eigen::Vector3d& point);
   /// Puts the map and the dynamic points in place.
@@ -67,14 +69,15 @@ class RunResults {
   std::optional<std::size_t> map_points() const;
 
  private:
-  const KittiSequence& sequence_;
+  const Recording& recording_;
   ScanRange range_;
   LabelWriter final_labels_;
   std::optional<LabelWriter> online_labels_;
+  std::optional<CleanWriter> clean_scans_;
   PointFileWriter dynamic_points_;
   std::unique_ptr<PointFileWriter> map_;
-  std::deque<std::vector<float>> open_scans_;  // oldest first
-  std::vector<std::vector<float>> spare_;
+  std::deque<RecordedScan> open_scans_;  // oldest first
+  std::vector<RecordedScan> spare_;
   std::size_t finished_ = 0;
   std::uint64_t points_ = 0;
   LabelCounts labels_;

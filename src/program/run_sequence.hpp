@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "dynains/errors.hpp"
-#include "dynains/io/kitti.hpp"
+#include "dynains/io/recording.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/scan_verdict.hpp"
 #include "dynains/stage_times.hpp"
@@ -19,13 +19,13 @@ namespace dynains::program {
 
 /// Pushes scan i. Throws PoseError that names the scan.
 template <class Remover>
-FrameResult push_scan(Remover& remover, const KittiSequence& sequence, std::size_t i,
-                      const std::vector<float>& xyzi) {
+FrameResult push_scan(Remover& remover, const Recording& recording, std::size_t i,
+                      const RecordedScan& scan) {
   try {
-    return remover.push(RawPoints<float>{xyzi.data(), xyzi.size() / 4, 4},
-                        sequence.T_world_sensor(i), sequence.time(i));
+    return remover.push(RawPoints<float>{scan.xyzi.data(), scan.size(), 4},
+                        recording.T_world_sensor(i), recording.time(i));
   } catch (const PoseError& error) {
-    throw PoseError("scan " + sequence.name(i) + ": " + error.what());
+    throw PoseError("scan " + recording.name(i) + ": " + error.what());
   }
 }
 
@@ -33,7 +33,7 @@ FrameResult push_scan(Remover& remover, const KittiSequence& sequence, std::size
 /// the map too. `keep_going(done)` is asked after each scan; if it says no, the scans so far are
 /// finished as if the sequence ended there.
 template <class Remover, class KeepGoing>
-RunTiming run_sequence(Remover& remover, const KittiSequence& sequence, const ScanRange& range,
+RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanRange& range,
                        RunResults& results, KeepGoing&& keep_going) {
   using Clock = std::chrono::steady_clock;
   const auto ms_since = [](Clock::time_point begin) {
@@ -43,12 +43,12 @@ RunTiming run_sequence(Remover& remover, const KittiSequence& sequence, const Sc
   const StageTimes no_times;
   StageTimes::visit(no_times, [&](const char* name, double) { timing.stages.push_back(name); });
 
-  ReadAhead scans(sequence, range.first, range.last);
+  ReadAhead scans(recording, range.first, range.last);
   for (std::size_t i = range.first; i <= range.last; ++i) {
-    std::vector<float> scan = scans.next(results.recycle());
+    RecordedScan scan = scans.next(results.recycle());
     const Clock::time_point begin = Clock::now();
-    const FrameResult frame = push_scan(remover, sequence, i, scan);
-    TimingRow row{sequence.name(i), scan.size() / 4, {}, ms_since(begin)};
+    const FrameResult frame = push_scan(remover, recording, i, scan);
+    TimingRow row{recording.name(i), scan.size(), {}, ms_since(begin)};
     StageTimes::visit(frame.times, [&](const char*, double ms) { row.stages.push_back(ms); });
     timing.rows.push_back(std::move(row));
     results.take_newest(std::move(scan), frame.newest);

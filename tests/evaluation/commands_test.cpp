@@ -192,7 +192,7 @@ TEST_CASE("Variants judge every point once, each by its own configuration") {
   std::vector<Variant> variants = {{"full", DynaInsRemover::Config::paper()},
                                    {"IOC only", DynaInsRemover::Config::paper()}};
   variants[1].config.use_belief = false;
-  LabelledSequence sequence(folder.path() / "street", {});
+  LabelledSequence sequence(Recording(folder.path() / "street"), {});
   std::size_t calls = 0;
   const VariantVerdicts both =
       run_variants(sequence, variants, Answer::kFinal, [&](std::size_t) { ++calls; });

@@ -16,7 +16,7 @@ TEST_CASE("Identity and oracle are exact on real recordings", "[shared]") {
       continue;
     }
     for (const auto unlabeled : {evaluation::Unlabeled::kIgnore, evaluation::Unlabeled::kStatic}) {
-      LabelledSequence sequence(folder, {});
+      LabelledSequence sequence(Recording(folder), {});
       evaluation::EvaluationConfig config;
       config.truth = evaluation::TruthClasses(unlabeled);
       const evaluation::Evaluation result = evaluation::evaluate(

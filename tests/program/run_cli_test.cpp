@@ -273,7 +273,7 @@ TEST_CASE("Broken input: exit code 1, one line, earlier results as they were") {
   }
   SECTION("no scans") {
     fs::remove_all(fixture.seq + "/velodyne");
-    expected = "velodyne: not found";
+    expected = "a seq: has no scans";
   }
   SECTION("no sequence") {
     fs::remove_all(fixture.seq);

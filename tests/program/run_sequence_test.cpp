@@ -87,10 +87,10 @@ struct Fixture {
     sequence.emplace(folder / "seq");
     fs::create_directory(folder / "out");
   }
-  RunOutputs outputs() const { return {folder / "out", folder / "out/map.ply", true}; }
+  RunOutputs outputs() const { return {folder / "out", folder / "out/map.ply", true, false}; }
 
   TemporaryFolder folder;
-  std::optional<KittiSequence> sequence;
+  std::optional<Recording> sequence;
   FakeRemover remover;
 };
 
@@ -120,7 +120,7 @@ TEST_CASE("Every scan gets its final labels, every dynamic point its place in th
   results.commit();
 
   CHECK(results.finished() == 4);
-  const std::size_t count = fixture.sequence->point_count(1);
+  const std::size_t count = fixture.sequence->read_scan(1).size();
   CHECK(results.points() == 4 * count);
   CHECK(results.labels()[PointLabel::kDynamic] == 4);
   CHECK(results.labels()[PointLabel::kInvalid] == 4);

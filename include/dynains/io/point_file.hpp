@@ -23,6 +23,8 @@ struct FilePoint {
   float intensity = 0.0F;
   std::array<std::uint8_t, 3> rgb{};
   std::uint32_t label = 0;
+  std::uint16_t ring = 0;
+  double time = 0.0;
 };
 
 /// Columns beside x y z.
@@ -31,6 +33,8 @@ struct PointColumns {
   bool intensity = false;   ///< float `intensity`
   bool rgb = false;         ///< PLY: uchar `red` `green` `blue`; PCD: packed `rgb`
   bool label = false;       ///< uint32 `label`
+  bool ring = false;        ///< uint16 `ring`
+  bool time = false;        ///< double `time`
 };
 
 /// Writes a binary point file, point by point: nothing is kept in memory, and the number of points
@@ -38,18 +42,21 @@ struct PointColumns {
 class PointFileWriter {
  public:
   /// The format follows from the extension, .ply or .pcd.
+  /// `viewpoint` goes into the header of PCD; PLY has no place for it.
   /// Throws IoError for another extension or if the folder cannot be written.
-  explicit PointFileWriter(const std::filesystem::path& path, const PointColumns& columns = {});
+  explicit PointFileWriter(const std::filesystem::path& path, const PointColumns& columns = {},
+                           const Eigen::Isometry3d& viewpoint = Eigen::Isometry3d::Identity());
 
   void add(const FilePoint& point);
   std::size_t size() const { return size_; }
   /// Throws IoError if the disk did not take everything.
-  void commit();
+  void commit(AtomicFile::Sync sync = AtomicFile::Sync::kNow);
 
  private:
   std::string header() const;
 
   PointColumns columns_;
+  Eigen::Isometry3d viewpoint_;
   bool pcd_;
   std::size_t size_ = 0;
   AtomicFile file_;
@@ -73,5 +80,12 @@ struct PointFile {
 /// Reads PLY (ascii, binary of both byte orders) and PCD (ascii, binary, binary_compressed); the
 /// format follows from the extension. Throws IoError with path, line or byte, and expectation.
 PointFile read_points(const std::filesystem::path& path);
+
+/// What the header of a point file says, without its points.
+struct PointFileHeader {
+  Eigen::Isometry3d viewpoint = Eigen::Isometry3d::Identity();  ///< as in PointFile
+  PointColumns columns;                                         ///< without rgb and double_xyz
+};
+PointFileHeader read_point_file_header(const std::filesystem::path& path);
 
 }  // namespace dynains

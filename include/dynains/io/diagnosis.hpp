@@ -1,0 +1,93 @@
+// Will this recording work? What its scans and poses say about each other.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "dynains/io/recording.hpp"
+#include "dynains/mounting.hpp"
+#include "dynains/points.hpp"
+
+namespace dynains {
+
+/// How well two scans agree where both stand up from the ground.
+struct Agreement {
+  double share = 0.0;      ///< part of the points that the other scan has a point within 0.3 m of
+  double gap = 1.0;        ///< mean distance to the nearest point of the other scan, at most 1, m
+  std::size_t points = 0;  ///< points compared; 0: nothing to compare
+};
+
+/// Points of one scan that say where it was taken: above the ground, one for every 0.25 m, between
+/// 2 and 40 m from the sensor.
+class Landmarks {
+ public:
+  /// Points in the frame of the sensor; ground is told by `mounting` if it is known.
+  Landmarks(PointsView points, const Mounting& mounting);
+
+  std::size_t size() const { return points_.size(); }
+  /// Agreement of `other` with this, placed by its pose in the frame of this. Symmetric but for
+  /// occlusion.
+  Agreement compare(const Landmarks& other, const Eigen::Isometry3d& T_this_other) const;
+
+ private:
+  double distance_to(const Eigen::Vector3d& p) const;
+
+  std::vector<std::uint64_t> cells_;  // of 1 m, ascending, one for each point
+  std::vector<Eigen::Vector3d> points_;
+};
+
+/// One reading of the poses.
+struct PoseReading {
+  std::string meaning;  ///< "the poses are inverse ..."
+  std::string option;   ///< flags of `dynains run` that choose it, such as "--invert-poses"
+  PoseConvention convention;
+  Agreement agreement;
+};
+
+enum class PoseVerdict {
+  kAgree,       ///< as given
+  kOtherwise,   ///< under another reading: `best`
+  kNoMotion,    ///< the sensor hardly moves or turns: nothing can be told
+  kDisagree,    ///< under no reading
+  kWorldFrame,  ///< points are in the world frame and agree there, whatever the poses
+  kUnknown      ///< too few points or scans
+};
+
+struct Diagnosis {
+  std::size_t scan_files = 0;
+  std::size_t pose_rows = 0;
+  std::size_t scans = 0;       ///< with a pose
+  double period = 0.0;         ///< median time from scan to scan, s
+  double points = 0.0;         ///< per scan
+  double invalid_share = 0.0;  ///< NaN, infinite or all zero
+  double ego_share = 0.0;      ///< nearer than 2 m, of the valid ones
+  double farthest = 0.0;       ///< 99th percentile of the ranges, m
+  double step = 0.0;           ///< median distance from scan to scan under the poses, m
+  double longest_step = 0.0;   ///< m
+  Mounting mounting;           ///< median over the scans that show their ground
+  Agreement as_given;
+  Agreement standing;                 ///< as if the sensor did not move at all
+  std::vector<PoseReading> readings;  ///< the usual mistakes, best first
+  PoseVerdict verdict = PoseVerdict::kUnknown;
+
+  /// Whether nothing speaks against a run.
+  bool sound() const {
+    return verdict == PoseVerdict::kAgree || verdict == PoseVerdict::kNoMotion ||
+           verdict == PoseVerdict::kWorldFrame;
+  }
+};
+
+/// Share of points of consecutive scans that agree, below which poses are wrong. Sound poses reach
+/// 0.7 and more even in dense traffic or vegetation.
+inline constexpr double kLeastAgreement = 0.5;
+
+/// Looks at a sample of scans; takes seconds, whatever the length. Throws IoError.
+Diagnosis diagnose(const Recording& recording);
+
+/// The verdict on the poses, and what to do, in one sentence.
+std::string advice(const Diagnosis& diagnosis);
+
+}  // namespace dynains

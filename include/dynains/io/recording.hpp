@@ -1,0 +1,163 @@
+// Recorded scans with their poses, whatever form they have on the disk.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dynains/io/point_file.hpp"
+#include "dynains/io/pose_convention.hpp"
+#include "dynains/io/trajectory.hpp"
+
+namespace dynains {
+
+/// Frame of the points in the files.
+enum class PointFrame {
+  kAuto,    ///< seen from the points: they lie around the origin, or around the sensor's position
+  kSensor,  ///< that of the sensor
+  kWorld    ///< that of the poses
+};
+
+struct RecordingOptions {
+  std::filesystem::path poses;  ///< trajectory file; empty: that of the recording
+  std::filesystem::path times;  ///< file with a time for each scan, s; empty: that of the recording
+  PointFrame frame = PointFrame::kAuto;
+  PoseConvention convention;
+};
+
+/// One scan. Columns that the recording lacks are empty; the others have a value for each point.
+struct RecordedScan {
+  std::vector<float> xyzi;          ///< x y z intensity, interleaved; sensor frame, m
+  std::vector<std::uint16_t> ring;  ///< number of the beam
+  std::vector<double> time;         ///< as in the file
+
+  std::size_t size() const { return xyzi.size() / 4; }
+
+  /// Point i < size() with all that is known of it, for writing.
+  FilePoint point(std::size_t i) const {
+    FilePoint point;
+    point.position = Eigen::Vector3f(xyzi[4 * i], xyzi[4 * i + 1], xyzi[4 * i + 2]).cast<double>();
+    point.intensity = xyzi[4 * i + 3];
+    if (!ring.empty()) point.ring = ring[i];
+    if (!time.empty()) point.time = time[i];
+    return point;
+  }
+};
+
+/// Kind of file that scans are in.
+enum class ScanFormat { kBin, kPcd, kPly };
+
+/// A folder of scans, one file each:
+///
+/// - KITTI and SemanticKITTI: see KittiSequence. With `poses` in the options, poses.txt may lack;
+/// - point files, .pcd or .ply, in the folder or in one below it (pcd, ply, scans, points, clouds,
+///   lidar, velodyne), ordered by name, numbers in names by value;
+/// - .bin files as in KITTI, directly in the folder.
+///
+/// Poses come from `options.poses`; else from VIEWPOINT, if any scan has one; else from a file
+/// poses.txt, poses.csv, poses.tum, trajectory.txt, trajectory.csv or trajectory.tum in the folder
+/// or beside the folder of the scans (see read_trajectory). Times come from `options.times`; else
+/// times.txt or timestamps.txt; else from names that are times (seconds with a point, or at least
+/// 10 digits: s, ms, us or ns since 1970; SECONDS_NANOSECONDS); else from the rows of the poses, if
+/// there is one for each scan; else they are 0.1 s apart. Rows without times belong to scans one by
+/// one (or by the number of the scan); rows with times are interpolated at the times of the scans.
+/// Scans without a pose are left out and told in `notes()`, unless they are more than half.
+///
+/// Labels (SemanticKITTI classes) come from labels/NAME.label or a column `label`.
+///
+/// All members throw IoError with path, position and what was expected.
+class Recording {
+ public:
+  /// Reads and checks everything but the points.
+  explicit Recording(const std::filesystem::path& folder, const RecordingOptions& options = {});
+
+  const std::filesystem::path& folder() const { return folder_; }
+  std::size_t size() const { return scans_.size(); }
+  ScanFormat format() const { return format_; }
+  PointFrame frame() const { return frame_; }
+  /// Columns of the scans beside x y z, by the first of them.
+  const PointColumns& columns() const { return columns_; }
+  /// Whether poses come from VIEWPOINT.
+  bool has_viewpoints() const { return has_viewpoints_; }
+  bool has_labels() const { return labels_ != Labels::kNone; }
+  /// What was taken for what, and what was left out; a sentence each.
+  const std::vector<std::string>& notes() const { return notes_; }
+
+  /// Name of the file of scan i without extension.
+  const std::string& name(std::size_t i) const { return scans_.at(i).name; }
+  /// The name, if the names of all scans are numbers; otherwise the place in the recording.
+  std::uint64_t number(std::size_t i) const { return scans_.at(i).number; }
+  /// Seconds, strictly increasing.
+  double time(std::size_t i) const { return scans_.at(i).time; }
+  const Eigen::Isometry3d& T_world_sensor(std::size_t i) const {
+    return scans_.at(i).T_world_sensor;
+  }
+
+  /// Throws unless the file of scan i can hold a scan; cheap.
+  void check_scan(std::size_t i) const;
+  /// Points of scan i. Values are as stored, but for the frame: NaN and infinity too. Memory of
+  /// `scan` is reused.
+  void read_scan(std::size_t i, RecordedScan& scan) const;
+  RecordedScan read_scan(std::size_t i) const;
+  /// One label per point of scan i.
+  std::vector<std::uint32_t> read_labels(std::size_t i) const;
+
+  // For those who try other conventions than the chosen one.
+  const PoseConvention& convention() const { return options_.convention; }
+  /// Pose that scan i has under another convention; nothing if its shift leads beyond the ends.
+  std::optional<Eigen::Isometry3d> pose_under(const PoseConvention& convention,
+                                              std::size_t i) const;
+  bool has_quaternions() const { return trajectory_.order != QuaternionOrder::kNone; }
+  QuaternionOrder quaternion_order() const { return trajectory_.order; }
+  bool has_calibration() const { return has_calibration_; }
+  /// Rows of the pose file, and scans on the disk: the first thing to compare.
+  std::size_t pose_count() const { return trajectory_.poses.size(); }
+  std::size_t scan_file_count() const { return matches_.size(); }
+
+ private:
+  struct Scan {
+    std::filesystem::path file;
+    std::string name;
+    std::uint64_t number = 0;
+    double time = 0.0;
+    std::size_t match = 0;  ///< index in matches_
+    Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+  };
+  enum class Labels { kNone, kFiles, kColumn };
+
+  void list_scans();
+  void read_poses();
+  void read_viewpoints();
+  std::filesystem::path find_poses() const;
+  std::optional<std::vector<double>> find_times() const;
+  std::optional<std::vector<double>> times_of_names() const;
+  void match_scans(const std::filesystem::path& poses_file);
+  void match_rows(const std::filesystem::path& poses_file);
+  void match_times(const std::filesystem::path& poses_file, const std::vector<double>& times);
+  void place_scans(const std::filesystem::path& poses_file);
+  void find_columns();
+  PointFrame guess_frame() const;
+
+  std::filesystem::path folder_;
+  std::filesystem::path scan_folder_;
+  RecordingOptions options_;
+  ScanFormat format_ = ScanFormat::kBin;
+  PointFrame frame_ = PointFrame::kSensor;
+  Labels labels_ = Labels::kNone;
+  PointColumns columns_;
+  bool numbered_ = false;  ///< all names are numbers
+  bool has_viewpoints_ = false;
+  bool has_calibration_ = false;
+  Eigen::Isometry3d Tr_ = Eigen::Isometry3d::Identity();  ///< of calib.txt
+  Trajectory trajectory_;
+  std::vector<std::optional<TrajectoryMatch>> matches_;  ///< per scan file
+  std::vector<Scan> scans_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace dynains

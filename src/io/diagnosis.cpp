@@ -1,0 +1,369 @@
+#include "dynains/io/diagnosis.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+
+namespace dynains {
+namespace {
+
+constexpr std::size_t kPairs = 8;       // compared
+constexpr std::size_t kStride = 5;      // scans from one to the other
+constexpr std::size_t kQueries = 1200;  // points of a scan that are looked up
+constexpr double kAgreeing = 0.3;       // m
+constexpr double kFarthestGap = 1.0;    // m
+constexpr double kFarthest = 40.0;      // m; farther, points are too thin
+
+/// Number of a cell of a grid around the sensor; z runs fastest.
+std::uint64_t cell_of(const Eigen::Vector3d& p, double edge) {
+  std::uint64_t key = 0;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    key = key << 16U | static_cast<std::uint64_t>(std::floor(p[axis] / edge) + 4096.0);
+  }
+  return key;
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+PointBuffer finite_points(const RecordedScan& scan) {
+  PointBuffer points;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const float* p = scan.xyzi.data() + 4 * i;
+    const bool finite = std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
+    if (!finite || (p[0] == 0.0F && p[1] == 0.0F && p[2] == 0.0F)) continue;
+    points.push_back(p[0], p[1], p[2]);
+  }
+  return points;
+}
+
+/// Two scans a few places apart.
+struct Pair {
+  std::size_t first;
+  std::size_t second;
+  Landmarks a;
+  Landmarks b;
+};
+
+/// Adds up what pairs say.
+class AgreementSum {
+ public:
+  void add(const Agreement& one) {
+    share_ += one.share * static_cast<double>(one.points);
+    gap_ += one.gap * static_cast<double>(one.points);
+    points_ += one.points;
+  }
+  Agreement mean() const {
+    if (points_ == 0) return {};
+    const auto count = static_cast<double>(points_);
+    return {share_ / count, gap_ / count, points_};
+  }
+
+ private:
+  double share_ = 0.0;
+  double gap_ = 0.0;
+  std::size_t points_ = 0;
+};
+
+Agreement agreement_under(const PoseConvention& convention, const Recording& recording,
+                          const std::vector<Pair>& pairs) {
+  AgreementSum sum;
+  for (const Pair& pair : pairs) {
+    const auto T_world_a = recording.pose_under(convention, pair.first);
+    const auto T_world_b = recording.pose_under(convention, pair.second);
+    if (!T_world_a || !T_world_b) continue;
+    sum.add(pair.a.compare(pair.b, T_world_a->inverse() * *T_world_b));
+  }
+  return sum.mean();
+}
+
+/// One way to change a convention; combined with the others.
+struct Change {
+  std::string meaning;
+  std::string option;
+  PoseConvention convention;
+};
+
+/// `changes` followed by each of them with `meaning` as well.
+template <class Edit>
+void add_change(std::vector<Change>& changes, const std::string& meaning, const std::string& option,
+                Edit&& edit) {
+  const std::size_t count = changes.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    Change change = changes[i];
+    change.meaning += (change.meaning.empty() ? "" : ", and ") + meaning;
+    change.option += (change.option.empty() ? "" : " ") + option;
+    edit(change.convention);
+    changes.push_back(std::move(change));
+  }
+}
+
+/// All combinations of the usual mistakes, but for those already chosen.
+std::vector<Change> usual_mistakes(const Recording& recording) {
+  const PoseConvention& given = recording.convention();
+  std::vector<Change> changes = {{"", "", given}};
+  if (!given.invert) {
+    add_change(changes, "the poses are inverse (from the world to the sensor)", "--invert-poses",
+               [](PoseConvention& c) { c.invert = true; });
+  }
+  if (recording.has_quaternions() && given.quaternion == QuaternionOrder::kNone) {
+    const bool to_wxyz = recording.quaternion_order() == QuaternionOrder::kXyzw;
+    add_change(
+        changes,
+        to_wxyz ? "quaternions are in the order w x y z" : "quaternions are in the order x y z w",
+        to_wxyz ? "--quaternion-order wxyz" : "--quaternion-order xyzw",
+        [to_wxyz](PoseConvention& c) {
+          c.quaternion = to_wxyz ? QuaternionOrder::kWxyz : QuaternionOrder::kXyzw;
+        });
+  }
+  if (!given.left_handed) {
+    add_change(changes, "the poses are left-handed", "--left-handed-poses",
+               [](PoseConvention& c) { c.left_handed = true; });
+  }
+  if (given.frame == PoseFrame::kAuto) {
+    const bool is_camera = recording.has_calibration() && !recording.has_quaternions();
+    if (is_camera) {
+      add_change(changes, "the poses are those of the lidar, not of the camera",
+                 "--pose-frame lidar", [](PoseConvention& c) { c.frame = PoseFrame::kLidar; });
+    } else {
+      add_change(changes, "the poses are those of a camera", "--pose-frame camera",
+                 [](PoseConvention& c) { c.frame = PoseFrame::kCamera; });
+    }
+  }
+  if (given.unit == 1.0) {
+    const std::size_t count = changes.size();
+    add_change(changes, "translations are in millimetres", "--pose-units mm",
+               [](PoseConvention& c) { c.unit = 0.001; });
+    for (std::size_t i = 0; i < count; ++i) {
+      Change change = changes[count + i];
+      const std::string millimetres = "translations are in millimetres";
+      change.meaning.replace(change.meaning.rfind(millimetres), millimetres.size(),
+                             "translations are in centimetres");
+      change.option.replace(change.option.rfind("mm"), 2, "cm");
+      change.convention.unit = 0.01;
+      changes.push_back(std::move(change));
+    }
+  }
+  changes.erase(changes.begin());
+  // A shift is not combined: what it changes is small.
+  for (const int shift : {1, -1}) {
+    Change change{"the poses are off by one scan",
+                  "--pose-shift " + std::to_string(given.shift + shift), given};
+    change.convention.shift = given.shift + shift;
+    changes.push_back(std::move(change));
+  }
+  std::stable_sort(changes.begin(), changes.end(), [](const Change& a, const Change& b) {
+    const auto flags = [](const Change& c) {
+      return std::count(c.option.begin(), c.option.end(), '-');
+    };
+    return flags(a) < flags(b);
+  });
+  return changes;
+}
+
+/// Whether `a` explains the scans clearly better than `b`.
+bool is_clearly_better(const Agreement& a, const Agreement& b) {
+  return a.gap < 0.85 * b.gap - 0.01;
+}
+
+PoseVerdict judge(const Recording& recording, const Diagnosis& d) {
+  if (d.as_given.points < 200) return PoseVerdict::kUnknown;
+  const bool given_fits = d.as_given.share >= kLeastAgreement;
+  if (recording.frame() == PointFrame::kWorld) {
+    return given_fits ? PoseVerdict::kWorldFrame : PoseVerdict::kDisagree;
+  }
+  const Agreement* best = d.readings.empty() ? &d.as_given : &d.readings.front().agreement;
+  if (is_clearly_better(*best, d.as_given) && best->share >= kLeastAgreement &&
+      !is_clearly_better(d.standing, *best)) {
+    return PoseVerdict::kOtherwise;
+  }
+  if (given_fits && !is_clearly_better(d.standing, d.as_given)) {
+    return is_clearly_better(d.as_given, d.standing) ? PoseVerdict::kAgree : PoseVerdict::kNoMotion;
+  }
+  return PoseVerdict::kDisagree;
+}
+
+}  // namespace
+
+Landmarks::Landmarks(PointsView points, const Mounting& mounting) {
+  constexpr double kNearest = 2.0;     // m; nearer is the own vehicle
+  constexpr double kOverGround = 0.5;  // m; the ground agrees with itself wherever it is moved
+  constexpr double kThinned = 0.25;    // m
+  std::vector<std::pair<std::uint64_t, Eigen::Vector3d>> kept;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d p(points.x[i], points.y[i], points.z[i]);
+    const double range = p.norm();
+    if (!(range > kNearest && range < kFarthest)) continue;
+    if (mounting.known && mounting.up_sensor.dot(p) + mounting.height < kOverGround) continue;
+    kept.emplace_back(cell_of(p, kThinned), p);
+  }
+  const auto by_cell = [](const auto& a, const auto& b) { return a.first < b.first; };
+  std::stable_sort(kept.begin(), kept.end(), by_cell);
+  kept.erase(std::unique(kept.begin(), kept.end(),
+                         [](const auto& a, const auto& b) { return a.first == b.first; }),
+             kept.end());
+  for (auto& [cell, p] : kept) cell = cell_of(p, kFarthestGap);
+  std::stable_sort(kept.begin(), kept.end(), by_cell);
+  for (const auto& [cell, p] : kept) {
+    cells_.push_back(cell);
+    points_.push_back(p);
+  }
+}
+
+/// Distance to the nearest point, at most kFarthestGap.
+double Landmarks::distance_to(const Eigen::Vector3d& p) const {
+  if (!(p.cwiseAbs().maxCoeff() < kFarthest + kFarthestGap)) return kFarthestGap;
+  double squared = kFarthestGap * kFarthestGap;
+  for (const double x : {-kFarthestGap, 0.0, kFarthestGap}) {
+    for (const double y : {-kFarthestGap, 0.0, kFarthestGap}) {
+      // Three cells on top of each other are one range.
+      const std::uint64_t middle = cell_of(p + Eigen::Vector3d(x, y, 0.0), kFarthestGap);
+      auto cell = std::lower_bound(cells_.begin(), cells_.end(), middle - 1);
+      for (; cell != cells_.end() && *cell <= middle + 1; ++cell) {
+        const Eigen::Vector3d& q = points_[static_cast<std::size_t>(cell - cells_.begin())];
+        squared = std::min(squared, (p - q).squaredNorm());
+      }
+    }
+  }
+  return std::sqrt(squared);
+}
+
+Agreement Landmarks::compare(const Landmarks& other, const Eigen::Isometry3d& T_this_other) const {
+  if (points_.empty() || other.points_.empty()) return {};
+  const std::size_t step = std::max<std::size_t>(1, other.points_.size() / kQueries);
+  std::size_t close = 0;
+  std::size_t count = 0;
+  double sum = 0.0;
+  for (std::size_t i = 0; i < other.points_.size(); i += step) {
+    const double gap = distance_to(T_this_other * other.points_[i]);
+    sum += gap;
+    if (gap < kAgreeing) ++close;
+    ++count;
+  }
+  return {static_cast<double>(close) / static_cast<double>(count), sum / static_cast<double>(count),
+          count};
+}
+
+Diagnosis diagnose(const Recording& recording) {
+  Diagnosis d;
+  d.scan_files = recording.scan_file_count();
+  d.pose_rows = recording.pose_count();
+  d.scans = recording.size();
+  std::vector<double> periods;
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < recording.size(); ++i) {
+    periods.push_back(recording.time(i) - recording.time(i - 1));
+    steps.push_back(
+        (recording.T_world_sensor(i).translation() - recording.T_world_sensor(i - 1).translation())
+            .norm());
+  }
+  d.period = median(periods);
+  d.step = median(steps);
+  if (!steps.empty()) d.longest_step = *std::max_element(steps.begin(), steps.end());
+
+  std::size_t all = 0;
+  std::size_t valid = 0;
+  std::size_t near = 0;
+  std::size_t read = 0;
+  std::vector<double> ranges;
+  std::vector<double> heights;
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  RecordedScan scan;
+  const auto load = [&](std::size_t i) {
+    recording.read_scan(i, scan);
+    const PointBuffer points = finite_points(scan);
+    all += scan.size();
+    valid += points.size();
+    ++read;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const double range = std::hypot(points.x[k], points.y[k], points.z[k]);
+      if (range < 2.0) ++near;
+      if (k % 37 == 0) ranges.push_back(range);
+    }
+    const Mounting mounting = estimate_mounting(points);
+    if (mounting.known) {
+      heights.push_back(mounting.height);
+      up += mounting.up_sensor;
+    }
+    return Landmarks(points, mounting);
+  };
+
+  std::vector<Pair> pairs;
+  const std::size_t stride = std::min(kStride, recording.size() - 1);
+  const std::size_t starts = stride == 0 ? 0 : recording.size() - stride;
+  const std::size_t count = std::min(kPairs, starts);
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t first = count == 1 ? 0 : k * (starts - 1) / (count - 1);
+    Landmarks a = load(first);
+    Landmarks b = load(first + stride);
+    pairs.push_back({first, first + stride, std::move(a), std::move(b)});
+  }
+  if (pairs.empty() && recording.size() > 0) load(0);
+
+  d.points = read == 0 ? 0.0 : static_cast<double>(all) / static_cast<double>(read);
+  if (all > 0) d.invalid_share = static_cast<double>(all - valid) / static_cast<double>(all);
+  if (valid > 0) d.ego_share = static_cast<double>(near) / static_cast<double>(valid);
+  if (!ranges.empty()) {
+    const auto at = ranges.begin() + static_cast<std::ptrdiff_t>(99 * (ranges.size() - 1) / 100);
+    std::nth_element(ranges.begin(), at, ranges.end());
+    d.farthest = *at;
+  }
+  if (2 * heights.size() > read) d.mounting = {median(heights), up.normalized(), true};
+
+  d.as_given = agreement_under(recording.convention(), recording, pairs);
+  AgreementSum standing;
+  for (const Pair& pair : pairs) {
+    standing.add(pair.a.compare(pair.b, Eigen::Isometry3d::Identity()));
+  }
+  d.standing = standing.mean();
+  if (recording.frame() == PointFrame::kSensor) {
+    for (const Change& change : usual_mistakes(recording)) {
+      d.readings.push_back({change.meaning, change.option, change.convention,
+                            agreement_under(change.convention, recording, pairs)});
+    }
+    // Simpler readings stay before others that are not clearly better.
+    for (std::size_t i = 1; i < d.readings.size(); ++i) {
+      if (is_clearly_better(d.readings[i].agreement, d.readings.front().agreement)) {
+        std::rotate(d.readings.begin(), d.readings.begin() + static_cast<std::ptrdiff_t>(i),
+                    d.readings.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+      }
+    }
+  }
+  d.verdict = judge(recording, d);
+  return d;
+}
+
+std::string advice(const Diagnosis& d) {
+  switch (d.verdict) {
+    case PoseVerdict::kAgree:
+      return "Scans and poses agree as they are; no option is needed.";
+    case PoseVerdict::kOtherwise:
+      return "Scans agree if " + d.readings.front().meaning + ": pass " +
+             d.readings.front().option + ".";
+    case PoseVerdict::kNoMotion:
+      return "The sensor hardly moves, so that scans agree whatever the poses mean; nothing speaks "
+             "against them.";
+    case PoseVerdict::kDisagree:
+      if (d.standing.share >= kLeastAgreement && is_clearly_better(d.standing, d.as_given)) {
+        return "Scans agree best as if the sensor stood still, though the poses move: if the "
+               "points are in the frame of the world, pass --frame world; if the sensor did stand "
+               "still, the poses are wrong.";
+      }
+      return "Scans do not agree under these poses, nor under any usual mistake: they belong to "
+             "another recording or clock, or are far too inexact.";
+    case PoseVerdict::kWorldFrame:
+      return "Points are in the frame of the world and agree there; no option is needed.";
+    case PoseVerdict::kUnknown:
+      return "There is too little to compare: at least two scans with walls, poles or trees within "
+             "40 m are needed.";
+  }
+  return {};
+}
+
+}  // namespace dynains

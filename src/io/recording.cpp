@@ -1,0 +1,450 @@
+#include "dynains/io/recording.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <sstream>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "dynains/io/kitti.hpp"
+#include "dynains/io/point_file.hpp"
+#include "failure.hpp"
+#include "kitti_files.hpp"
+#include "text.hpp"
+
+namespace dynains {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kAccepted =
+    "expected a KITTI folder (velodyne/NNNNNN.bin, poses.txt), or a folder of .pcd, .ply or .bin "
+    "scans (or with them in pcd/, ply/, scans/, points/, clouds/ or lidar/)";
+
+bool is_folder(const fs::path& path) {
+  std::error_code error;
+  return fs::is_directory(path, error);
+}
+
+bool is_file(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error);
+}
+
+std::optional<ScanFormat> format_of(const fs::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (extension == ".bin") return ScanFormat::kBin;
+  if (extension == ".pcd") return ScanFormat::kPcd;
+  if (extension == ".ply") return ScanFormat::kPly;
+  return std::nullopt;
+}
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+/// Runs of digits compare by value: scan2 comes before scan10.
+bool is_before(const std::string& a, const std::string& b) {
+  std::size_t i = 0;
+  std::size_t k = 0;
+  while (i < a.size() && k < b.size()) {
+    if (!is_digit(a[i]) || !is_digit(b[k])) {
+      if (a[i] != b[k]) return a[i] < b[k];
+      ++i;
+      ++k;
+      continue;
+    }
+    const auto run = [](const std::string& text, std::size_t& at) {
+      while (at < text.size() && text[at] == '0') ++at;
+      const std::size_t begin = at;
+      while (at < text.size() && is_digit(text[at])) ++at;
+      return std::string_view(text).substr(begin, at - begin);
+    };
+    const std::string_view x = run(a, i);
+    const std::string_view y = run(b, k);
+    if (x.size() != y.size()) return x.size() < y.size();
+    if (x != y) return x < y;
+  }
+  if (a.size() - i != b.size() - k) return a.size() - i < b.size() - k;
+  return a < b;
+}
+
+/// Scan files directly in `folder`, hidden ones apart.
+std::vector<fs::path> scan_files(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const fs::path& path = entry->path();
+    if (!format_of(path) || path.filename().string().front() == '.') continue;
+    files.push_back(path);
+  }
+  if (error) fail(folder, "cannot be listed: " + error.message());
+  std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
+    return is_before(a.filename().string(), b.filename().string());
+  });
+  return files;
+}
+
+/// Seconds, from a name that is a time.
+std::optional<double> time_of_name(const std::string& name) {
+  const auto digits = [](std::string_view text) {
+    return !text.empty() && std::all_of(text.begin(), text.end(), is_digit);
+  };
+  const std::size_t separator = name.find_first_of("._-");
+  if (separator == std::string::npos) {
+    if (!digits(name) || name.size() < 10 || name.size() > 19 || name.front() == '0') {
+      return std::nullopt;
+    }
+    return to_seconds(*text::parse_number(name));
+  }
+  const std::string whole = name.substr(0, separator);
+  const std::string part = name.substr(separator + 1);
+  if (!digits(whole) || !digits(part) || whole.size() > 12 || part.size() > 9) return std::nullopt;
+  if (name[separator] == '.') return text::parse_number(name);
+  // SECONDS_NANOSECONDS, as the stamps of ROS have it.
+  if (whole.size() != 10) return std::nullopt;
+  return *text::parse_number(whole) + 1e-9 * *text::parse_number(part);
+}
+
+bool is_identity(const Eigen::Isometry3d& pose) {
+  return pose.isApprox(Eigen::Isometry3d::Identity(), 1e-12);
+}
+
+std::string in_seconds(double time) {
+  std::ostringstream text;
+  text::exact(text);
+  text.precision(15);
+  text << time << " s";
+  return text.str();
+}
+
+std::string shown(const fs::path& path, const fs::path& folder) {
+  const fs::path shorter = path.lexically_relative(folder);
+  return shorter.empty() || *shorter.begin() == ".." ? path.string() : shorter.string();
+}
+
+}  // namespace
+
+Recording::Recording(const fs::path& folder, const RecordingOptions& options)
+    : folder_(folder), options_(options) {
+  if (!is_folder(folder)) fail(folder, std::string("is not a folder; ") + kAccepted);
+  list_scans();
+  read_poses();
+  find_columns();
+  frame_ = options.frame == PointFrame::kAuto ? guess_frame() : options.frame;
+  notes_.push_back(frame_ == PointFrame::kWorld ? "points are in the frame of the world"
+                                                : "points are in the frame of the sensor");
+}
+
+void Recording::list_scans() {
+  scan_folder_ = folder_;
+  for (const char* name : {"velodyne", "pcd", "ply", "scans", "points", "clouds", "lidar"}) {
+    if (is_folder(folder_ / name) &&
+        (!scan_files(folder_ / name).empty() || std::string_view(name) == "velodyne")) {
+      scan_folder_ = folder_ / name;
+      break;
+    }
+  }
+  const std::vector<fs::path> files = scan_files(scan_folder_);
+  if (files.empty()) fail(scan_folder_, std::string("has no scans; ") + kAccepted);
+  format_ = *format_of(files.front());
+  for (const fs::path& file : files) {
+    if (*format_of(file) == format_) continue;
+    fail(scan_folder_, "expected scans of one kind, found " + files.front().filename().string() +
+                           " and " + file.filename().string());
+  }
+
+  if (scan_folder_ == folder_ / "velodyne" && format_ == ScanFormat::kBin) {
+    numbered_ = true;
+    for (const NumberedScan& scan : list_kitti_scans(scan_folder_)) {
+      scans_.emplace_back();
+      scans_.back().file = scan_folder_ / (scan.name + ".bin");
+      scans_.back().name = scan.name;
+      scans_.back().number = scan.number;
+    }
+    return;
+  }
+  for (const fs::path& file : files) {
+    scans_.emplace_back();
+    scans_.back().file = file;
+    scans_.back().name = file.stem().string();
+  }
+  numbered_ = std::all_of(scans_.begin(), scans_.end(), [](const Scan& scan) {
+    return scan.name.size() <= 9 && std::all_of(scan.name.begin(), scan.name.end(), is_digit);
+  });
+  for (std::size_t i = 0; i < scans_.size(); ++i) {
+    scans_[i].number = numbered_ ? std::stoull(scans_[i].name) : i;
+    if (i > 0 && numbered_ && scans_[i].number == scans_[i - 1].number) {
+      fail(scan_folder_,
+           "two scans with one number: " + scans_[i - 1].name + " and " + scans_[i].name);
+    }
+  }
+}
+
+fs::path Recording::find_poses() const {
+  if (!options_.poses.empty()) return options_.poses;
+  std::vector<fs::path> folders = {folder_};
+  if (scan_folder_ != folder_) {
+    folders.push_back(scan_folder_);
+  } else {
+    folders.push_back(fs::absolute(folder_).lexically_normal() / "..");
+  }
+  for (const fs::path& folder : folders) {
+    for (const char* name : {"poses.txt", "poses.csv", "poses.tum", "trajectory.txt",
+                             "trajectory.csv", "trajectory.tum"}) {
+      if (is_file(folder / name)) return (folder / name).lexically_normal();
+    }
+  }
+  fail(folder_ / "poses.txt",
+       "not found: expected a pose for each scan, there (12 numbers a row, or time x y z qx qy qz "
+       "qw), in VIEWPOINT of .pcd scans, or in a file given by --poses");
+}
+
+void Recording::read_viewpoints() {
+  Trajectory viewpoints;
+  viewpoints.order = QuaternionOrder::kWxyz;
+  for (const Scan& scan : scans_) {
+    viewpoints.poses.push_back(read_point_file_header(scan.file).viewpoint);
+    has_viewpoints_ = has_viewpoints_ || !is_identity(viewpoints.poses.back());
+  }
+  if (has_viewpoints_) trajectory_ = std::move(viewpoints);
+}
+
+void Recording::read_poses() {
+  if (options_.poses.empty() && format_ == ScanFormat::kPcd) read_viewpoints();
+  fs::path file;
+  if (has_viewpoints_) {
+    notes_.push_back("poses from VIEWPOINT of the scans");
+  } else {
+    file = find_poses();
+    trajectory_ = read_trajectory(file);
+    notes_.push_back("poses from " + shown(file, folder_));
+  }
+  const fs::path calib = folder_ / "calib.txt";
+  has_calibration_ = is_file(calib);
+  if (has_calibration_) Tr_ = read_kitti_calib(calib);
+  match_scans(file);
+  place_scans(file);
+}
+
+std::optional<std::vector<double>> Recording::times_of_names() const {
+  std::vector<double> times;
+  for (const Scan& scan : scans_) {
+    const std::optional<double> time = time_of_name(scan.name);
+    if (!time) return std::nullopt;
+    times.push_back(*time);
+  }
+  return times;
+}
+
+/// Times of the scan files, if anything but the poses tells.
+std::optional<std::vector<double>> Recording::find_times() const {
+  fs::path file = options_.times;
+  for (const char* name : {"times.txt", "timestamps.txt"}) {
+    if (file.empty() && is_file(folder_ / name)) file = folder_ / name;
+  }
+  if (file.empty()) return times_of_names();
+  std::vector<double> rows = read_kitti_times(file);
+  for (double& time : rows) time = to_seconds(time);
+  if (rows.size() == scans_.size()) return rows;
+  if (!numbered_) {
+    fail_at_line(file, std::min(rows.size(), scans_.size()) + 1,
+                 "expected a row for each of " + std::to_string(scans_.size()) + " scans, found " +
+                     std::to_string(rows.size()));
+  }
+  check_rows(file, rows.size(), scans_.back().number + 1);
+  std::vector<double> times;
+  for (const Scan& scan : scans_) times.push_back(rows[scan.number]);
+  return times;
+}
+
+/// One row for each scan, by order; or one for each number.
+void Recording::match_rows(const fs::path& file) {
+  const std::size_t rows = trajectory_.poses.size();
+  const bool by_order = rows == scans_.size();
+  if (!by_order && !numbered_) {
+    fail_at_line(file, std::min(rows, scans_.size()) + 1,
+                 "expected a row for each of " + std::to_string(scans_.size()) +
+                     " scans, or rows and scans with times; found " + std::to_string(rows));
+  }
+  if (!by_order) check_rows(file, rows, scans_.back().number + 1);
+  for (std::size_t i = 0; i < scans_.size(); ++i) {
+    const std::size_t row = by_order ? i : static_cast<std::size_t>(scans_[i].number);
+    matches_.push_back(TrajectoryMatch{row, row, 0.0});
+  }
+}
+
+void Recording::match_times(const fs::path& file, const std::vector<double>& times) {
+  std::size_t found = 0;
+  for (const double time : times) {
+    matches_.push_back(match_time(trajectory_, time));
+    if (matches_.back()) ++found;
+  }
+  if (2 * found >= times.size()) return;
+  fail(file, "has poses from " + in_seconds(trajectory_.times.front()) + " to " +
+                 in_seconds(trajectory_.times.back()) + " for " + std::to_string(found) + " of " +
+                 std::to_string(times.size()) + " scans, which are from " +
+                 in_seconds(times.front()) + " to " + in_seconds(times.back()) +
+                 "; expected times of one clock, with gaps of at most 1 s");
+}
+
+void Recording::match_scans(const fs::path& file) {
+  const std::optional<std::vector<double>> times = find_times();
+  if (times) {
+    for (std::size_t i = 0; i < scans_.size(); ++i) {
+      scans_[i].time = (*times)[i];
+      if (i > 0 && !(scans_[i].time > scans_[i - 1].time)) {
+        fail(scans_[i].file, "expected a time after that of the scan before, " +
+                                 in_seconds(scans_[i - 1].time) + "; found " +
+                                 in_seconds(scans_[i].time));
+      }
+    }
+  }
+  if (!trajectory_.times.empty() && times) {
+    match_times(file, *times);
+    notes_.push_back("poses belong to scans by time, interpolated");
+    return;
+  }
+  match_rows(file);
+  notes_.push_back("poses belong to scans one by one");
+  for (std::size_t i = 0; i < scans_.size() && !times; ++i) {
+    const std::size_t row = matches_[i]->before;
+    scans_[i].time = trajectory_.times.empty() ? kKittiPeriod * static_cast<double>(row)
+                                               : trajectory_.times[row];
+  }
+  if (!times && trajectory_.times.empty()) notes_.push_back("no times: 0.1 s from scan to scan");
+}
+
+/// Gives each scan its pose and leaves out those without.
+void Recording::place_scans(const fs::path& file) {
+  const std::size_t all = scans_.size();
+  std::vector<Scan> placed;
+  std::string missing;
+  for (std::size_t i = 0; i < all; ++i) scans_[i].match = i;
+  for (std::size_t i = 0; i < all; ++i) {
+    const auto pose = pose_under(options_.convention, i);
+    if (pose) {
+      placed.push_back(scans_[i]);
+      placed.back().T_world_sensor = *pose;
+    } else if (missing.empty()) {
+      missing = scans_[i].name;
+    }
+  }
+  if (placed.empty()) fail(file, "has no pose for any scan; check --pose-shift");
+  if (placed.size() < all) {
+    notes_.push_back(std::to_string(all - placed.size()) + " of " + std::to_string(all) +
+                     " scans have no pose and are left out, " + missing + " first");
+  }
+  scans_ = std::move(placed);
+}
+
+std::optional<Eigen::Isometry3d> Recording::pose_under(const PoseConvention& convention,
+                                                       std::size_t i) const {
+  const auto at = static_cast<std::ptrdiff_t>(scans_.at(i).match) + convention.shift;
+  if (at < 0 || at >= static_cast<std::ptrdiff_t>(matches_.size())) return std::nullopt;
+  const std::optional<TrajectoryMatch>& match = matches_[static_cast<std::size_t>(at)];
+  if (!match) return std::nullopt;
+  const QuaternionOrder order = trajectory_.order;
+  const Eigen::Isometry3d pose =
+      interpolate(apply(convention, trajectory_.poses[match->before], order),
+                  apply(convention, trajectory_.poses[match->after], order), match->share);
+  const bool is_matrix = order == QuaternionOrder::kNone;
+  const bool is_camera = convention.frame == PoseFrame::kCamera ||
+                         (convention.frame == PoseFrame::kAuto && has_calibration_ && is_matrix);
+  if (!is_camera) return pose;
+  const Eigen::Isometry3d T_camera_sensor = has_calibration_ ? Tr_ : camera_axes();
+  return T_camera_sensor.inverse() * pose * T_camera_sensor;
+}
+
+void Recording::find_columns() {
+  if (format_ == ScanFormat::kBin) {
+    columns_.intensity = true;
+  } else {
+    columns_ = read_point_file_header(scans_.front().file).columns;
+  }
+  if (columns_.label) labels_ = Labels::kColumn;
+  if (is_folder(folder_ / "labels")) labels_ = Labels::kFiles;
+}
+
+/// Returns of a lidar are densest around it: compare what lies around the origin with what lies
+/// around the pose, far from the origin.
+PointFrame Recording::guess_frame() const {
+  constexpr double kNear = 8.0;      // m
+  constexpr double kFarPose = 20.0;  // m, so that the two do not overlap
+  const PointFrame usual = has_viewpoints_ ? PointFrame::kWorld : PointFrame::kSensor;
+  if (format_ == ScanFormat::kBin) return PointFrame::kSensor;
+  const auto farthest =
+      std::max_element(scans_.begin(), scans_.end(), [](const Scan& a, const Scan& b) {
+        return a.T_world_sensor.translation().norm() < b.T_world_sensor.translation().norm();
+      });
+  const Eigen::Vector3d position = farthest->T_world_sensor.translation();
+  if (position.norm() < kFarPose) return usual;
+  std::size_t around_origin = 0;
+  std::size_t around_pose = 0;
+  for (const Eigen::Vector3d& p : read_points(farthest->file).positions) {
+    if (p.norm() < kNear) ++around_origin;
+    if ((p - position).norm() < kNear) ++around_pose;
+  }
+  if (around_origin == around_pose) return usual;
+  return around_pose > around_origin ? PointFrame::kWorld : PointFrame::kSensor;
+}
+
+void Recording::check_scan(std::size_t i) const {
+  const fs::path& file = scans_.at(i).file;
+  if (format_ == ScanFormat::kBin) {
+    count_scan_points(file);
+  } else {
+    read_point_file_header(file);
+  }
+}
+
+void Recording::read_scan(std::size_t i, RecordedScan& scan) const {
+  const fs::path& file = scans_.at(i).file;
+  scan.ring.clear();
+  scan.time.clear();
+  const Eigen::Isometry3d T_sensor_world = T_world_sensor(i).inverse();
+  if (format_ == ScanFormat::kBin) {
+    dynains::read_scan(file, scan.xyzi);
+    if (frame_ != PointFrame::kWorld) return;
+    for (std::size_t k = 0; k < scan.size(); ++k) {
+      Eigen::Map<Eigen::Vector3f> p(scan.xyzi.data() + 4 * k);
+      p = (T_sensor_world * p.cast<double>()).cast<float>();
+    }
+    return;
+  }
+  PointFile points = read_points(file);
+  scan.xyzi.resize(4 * points.positions.size());
+  for (std::size_t k = 0; k < points.positions.size(); ++k) {
+    Eigen::Vector3d p = points.positions[k];
+    if (frame_ == PointFrame::kWorld) p = T_sensor_world * p;
+    float* xyzi = scan.xyzi.data() + 4 * k;
+    Eigen::Map<Eigen::Vector3f>(xyzi, 3) = p.cast<float>();
+    xyzi[3] = points.intensity.empty() ? 0.0F : points.intensity[k];
+  }
+  scan.ring = std::move(points.ring);
+  scan.time = std::move(points.time);
+}
+
+RecordedScan Recording::read_scan(std::size_t i) const {
+  RecordedScan scan;
+  read_scan(i, scan);
+  return scan;
+}
+
+std::vector<std::uint32_t> Recording::read_labels(std::size_t i) const {
+  const Scan& scan = scans_.at(i);
+  if (labels_ == Labels::kFiles) {
+    const std::size_t count = format_ == ScanFormat::kBin ? count_scan_points(scan.file)
+                                                          : read_points(scan.file).positions.size();
+    return dynains::read_labels(folder_ / "labels" / (scan.name + ".label"), count);
+  }
+  PointFile points = read_points(scan.file);
+  if (points.label.size() != points.positions.size()) {
+    fail(scan.file, "expected a column \"label\", as in the first scan");
+  }
+  return std::move(points.label);
+}
+
+}  // namespace dynains

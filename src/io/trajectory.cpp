@@ -1,0 +1,245 @@
+#include "dynains/io/trajectory.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <string>
+#include <string_view>
+
+#include "byte_reader.hpp"
+#include "kitti_files.hpp"
+#include "text.hpp"
+
+namespace dynains {
+namespace {
+
+constexpr std::size_t kNoColumn = static_cast<std::size_t>(-1);
+constexpr const char* kExpectedColumns =
+    "expected 12 numbers (KITTI), 8 (TUM: time x y z qx qy qz qw), 7, 13 or 16 numbers, or a first "
+    "line that names the columns time x y z qx qy qz qw";
+
+/// Where in a row the values stand.
+struct Columns {
+  std::size_t count = 0;
+  std::size_t time = kNoColumn;
+  std::size_t matrix = kNoColumn;  ///< first of 12 or 16 numbers
+  std::array<std::size_t, 3> position{kNoColumn, kNoColumn, kNoColumn};
+  std::array<std::size_t, 4> rotation{kNoColumn, kNoColumn, kNoColumn, kNoColumn};  ///< x y z w
+  QuaternionOrder order = QuaternionOrder::kNone;
+
+  bool complete() const {
+    const auto known = [](std::size_t column) { return column != kNoColumn; };
+    return std::all_of(position.begin(), position.end(), known) &&
+           std::all_of(rotation.begin(), rotation.end(), known);
+  }
+};
+
+bool is_separated(std::string_view line) {
+  return line.find_first_of(",;") != std::string_view::npos;
+}
+
+/// Columns of a line; empty ones count if commas or semicolons separate them.
+std::vector<std::string> split(std::string_view line) {
+  std::vector<std::string> cells;
+  if (!is_separated(line)) {
+    for (auto token = text::next_token(line); !token.empty(); token = text::next_token(line)) {
+      cells.emplace_back(token);
+    }
+    return cells;
+  }
+  for (;;) {
+    const std::size_t end = line.find_first_of(",;");
+    std::string_view cell = line.substr(0, end);
+    // Units after a name, such as "x [m]", are not part of it.
+    cells.emplace_back(text::next_token(cell));
+    if (end == std::string_view::npos) return cells;
+    line.remove_prefix(end + 1);
+  }
+}
+
+std::string lower_case(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+bool contains(const std::string& text, const char* part) {
+  return text.find(part) != std::string::npos;
+}
+
+/// Sorts a named column in; the first of two with one meaning counts.
+void add_column(const std::string& cell, std::size_t index, Columns& columns) {
+  const std::string name = lower_case(cell);
+  if (name.empty()) return;
+  const auto claim = [index](std::size_t& column) {
+    if (column == kNoColumn) column = index;
+  };
+  if (name == "t" || contains(name, "time") || contains(name, "stamp") || name == "sec") {
+    claim(columns.time);
+    return;
+  }
+  const std::size_t axis = std::string_view("xyzw").find(name.back());
+  if (axis == std::string_view::npos) return;
+  const bool is_rotation = name.front() == 'q' || contains(name, "quat") ||
+                           contains(name, "orient") || contains(name, "rot");
+  const std::string stem = name.substr(0, name.size() - 1);
+  const bool is_position =
+      stem.empty() || stem == "t" || stem.front() == 'p' || contains(stem, "trans") || stem == "t_";
+  if (is_rotation) {
+    claim(columns.rotation[axis]);
+  } else if (is_position && axis < 3) {
+    claim(columns.position[axis]);
+  }
+}
+
+Columns columns_of_header(std::string_view line) {
+  while (!line.empty() && (line.front() == '#' || line.front() == ' ')) line.remove_prefix(1);
+  Columns columns;
+  const std::vector<std::string> cells = split(line);
+  for (std::size_t i = 0; i < cells.size(); ++i) add_column(cells[i], i, columns);
+  columns.count = cells.size();
+  columns.order =
+      columns.rotation[3] < columns.rotation[0] ? QuaternionOrder::kWxyz : QuaternionOrder::kXyzw;
+  return columns;
+}
+
+Columns columns_of_count(const ByteReader& reader, std::size_t count) {
+  Columns columns;
+  columns.count = count;
+  if (count == 12 || count == 16) {
+    columns.matrix = 0;
+  } else if (count == 13) {
+    columns.time = 0;
+    columns.matrix = 1;
+  } else if (count == 7 || count == 8) {
+    const std::size_t first = count - 7;
+    if (first == 1) columns.time = 0;
+    for (std::size_t i = 0; i < 3; ++i) columns.position[i] = first + i;
+    for (std::size_t i = 0; i < 4; ++i) columns.rotation[i] = first + 3 + i;
+    columns.order = QuaternionOrder::kXyzw;
+  } else {
+    reader.fail_on_line(std::string(kExpectedColumns) + "; found " + std::to_string(count) +
+                        (count == 1 ? " column" : " columns"));
+  }
+  return columns;
+}
+
+double number_in(const ByteReader& reader, const std::vector<std::string>& cells,
+                 std::size_t column) {
+  const auto value = text::parse_number(cells[column]);
+  if (!value || !std::isfinite(*value)) {
+    reader.fail_on_line("expected a finite number in column " + std::to_string(column + 1) +
+                        ", found \"" + cells[column].substr(0, 40) + "\"");
+  }
+  return *value;
+}
+
+Eigen::Isometry3d pose_of(const ByteReader& reader, const std::vector<std::string>& cells,
+                          const Columns& columns) {
+  if (columns.matrix != kNoColumn) {
+    std::array<double, 12> rows{};
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      rows[i] = number_in(reader, cells, columns.matrix + i);
+    }
+    const std::optional<Eigen::Isometry3d> pose = nearest_rigid(rows.data());
+    if (!pose) {
+      reader.fail_on_line(
+          "expected a rigid transform (columns 1-3 of the matrix are a rotation that does not "
+          "mirror)");
+    }
+    return *pose;
+  }
+  std::array<double, 4> q{};
+  for (std::size_t i = 0; i < 4; ++i) q[i] = number_in(reader, cells, columns.rotation[i]);
+  const Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
+  if (!(std::abs(rotation.norm() - 1.0) < 0.01)) {
+    reader.fail_on_line("expected a quaternion of length 1, found one of length " +
+                        std::to_string(rotation.norm()));
+  }
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = rotation.normalized().toRotationMatrix();
+  for (std::size_t i = 0; i < 3; ++i) {
+    pose.translation()[static_cast<Eigen::Index>(i)] =
+        number_in(reader, cells, columns.position[i]);
+  }
+  return pose;
+}
+
+}  // namespace
+
+Trajectory read_trajectory(const std::filesystem::path& path) {
+  ByteReader reader(path);
+  Trajectory trajectory;
+  Columns columns;
+  for (std::string line; reader.read_line(line);) {
+    std::string_view rest = line;
+    const std::string_view first = text::next_token(rest);
+    if (first.empty()) continue;
+    const std::vector<std::string> cells = split(line);
+    const bool is_comment = first.front() == '#';
+    const bool is_start = trajectory.poses.empty() && !columns.complete();
+    if (is_comment || (is_start && !text::parse_number(cells.front()))) {
+      const Columns named = is_start ? columns_of_header(line) : Columns{};
+      if (named.complete()) columns = named;
+      if (!is_comment && !named.complete()) reader.fail_on_line(kExpectedColumns);
+      continue;
+    }
+    if (columns.count == 0) columns = columns_of_count(reader, cells.size());
+    if (cells.size() != columns.count) {
+      reader.fail_on_line("expected " + std::to_string(columns.count) +
+                          " columns as before, found " + std::to_string(cells.size()));
+    }
+    trajectory.poses.push_back(pose_of(reader, cells, columns));
+    if (columns.time == kNoColumn) continue;
+    const double time = to_seconds(number_in(reader, cells, columns.time));
+    if (!trajectory.times.empty() && !(time > trajectory.times.back())) {
+      reader.fail_on_line("expected a time after that of the row before");
+    }
+    trajectory.times.push_back(time);
+  }
+  if (trajectory.poses.empty()) reader.fail_on_line("file ends, expected at least one pose");
+  trajectory.order = columns.order;
+  return trajectory;
+}
+
+std::optional<TrajectoryMatch> match_time(const Trajectory& trajectory, double time) {
+  constexpr double kForgiven = 0.005;  // s, less than any sensor turns in
+  const std::vector<double>& times = trajectory.times;
+  if (times.empty() || time < times.front() - kForgiven || time > times.back() + kForgiven) {
+    return std::nullopt;
+  }
+  const auto upper = std::lower_bound(times.begin(), times.end(), time);
+  const auto after = static_cast<std::size_t>(upper - times.begin());
+  if (after == times.size()) return TrajectoryMatch{after - 1, after - 1, 0.0};
+  if (after == 0 || times[after] == time) return TrajectoryMatch{after, after, 0.0};
+  const double gap = times[after] - times[after - 1];
+  const double share = (time - times[after - 1]) / gap;
+  if (gap > kLongestPoseGap) {
+    if (time - times[after - 1] <= kForgiven) return TrajectoryMatch{after - 1, after - 1, 0.0};
+    if (times[after] - time <= kForgiven) return TrajectoryMatch{after, after, 0.0};
+    return std::nullopt;
+  }
+  return TrajectoryMatch{after - 1, after, share};
+}
+
+Eigen::Isometry3d interpolate(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b,
+                              double share) {
+  if (share <= 0.0) return a;
+  if (share >= 1.0) return b;
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  const Eigen::Quaterniond from(a.linear());
+  const Eigen::Quaterniond to(b.linear());
+  pose.linear() = from.slerp(share, to).normalized().toRotationMatrix();
+  pose.translation() = a.translation() + share * (b.translation() - a.translation());
+  return pose;
+}
+
+double to_seconds(double stamp) {
+  // Between 1973 and 5138 as seconds, milliseconds, microseconds or nanoseconds.
+  if (stamp > 1e17) return stamp * 1e-9;
+  if (stamp > 1e14) return stamp * 1e-6;
+  if (stamp > 1e11) return stamp * 1e-3;
+  return stamp;
+}
+
+}  // namespace dynains

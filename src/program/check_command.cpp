@@ -1,0 +1,98 @@
+#include <algorithm>
+#include <iomanip>
+#include <iostream>
+#include <memory>
+#include <sstream>
+#include <string>
+
+#include "command.hpp"
+#include "dynains/io/diagnosis.hpp"
+#include "recording_options.hpp"
+
+namespace dynains::program {
+namespace {
+
+std::string fixed(double value, int digits, const char* unit = "") {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(digits) << value << unit;
+  return text.str();
+}
+
+void print_line(const std::string& what, const std::string& value) {
+  std::cout << std::left << std::setw(20) << what << value << '\n';
+}
+
+std::string to_text(const Agreement& agreement) {
+  if (agreement.points == 0) return "nothing to compare";
+  return fixed(100.0 * agreement.share, 0, " %") + " of points agree, gap " +
+         fixed(100.0 * agreement.gap, 0, " cm");
+}
+
+std::string text_of(const Mounting& mounting) {
+  if (!mounting.known) return "no ground found";
+  std::string text =
+      fixed(mounting.height, 2, " m over ground, tilted by ") + fixed(mounting.tilt(), 1, " deg");
+  if (mounting.tilt() > 90.0) text += " (upside down)";
+  return text;
+}
+
+/// Sentences on what may trouble a run, poses apart.
+void print_remarks(const Diagnosis& d) {
+  if (d.invalid_share > 0.5) {
+    std::cout << "note: more than half of the points are NaN, infinite or zero\n";
+  }
+  if (d.farthest > 1000.0) {
+    std::cout << "note: ranges beyond 1 km: points seem not to be in metres, or not in the frame "
+                 "of the sensor (--frame world)\n";
+  } else if (d.farthest > 0.0 && d.farthest < 2.0) {
+    std::cout << "note: all ranges are below 2 m: points seem not to be in metres\n";
+  }
+  if (d.ego_share > 0.3) {
+    std::cout << "note: many points are nearer than 2 m; see --min-range\n";
+  }
+  if (!d.mounting.known) {
+    std::cout << "note: without ground in sight, height and tilt are not known\n";
+  }
+}
+
+void check(const RecordingFlags& flags) {
+  const Recording recording = flags.open();
+  const Diagnosis d = diagnose(recording);
+  print_line("scans", std::to_string(d.scan_files) + " files, " + std::to_string(d.pose_rows) +
+                          " poses, " + std::to_string(d.scans) + " scans with a pose");
+  for (const std::string& note : recording.notes()) print_line("", note);
+  print_line("time", fixed(d.period, 3, " s from scan to scan"));
+  print_line("points", fixed(d.points, 0, " a scan, ") + fixed(100.0 * d.invalid_share, 1) +
+                           " % invalid, " + fixed(100.0 * d.ego_share, 1) +
+                           " % nearer than 2 m, 99 % within " + fixed(d.farthest, 0, " m"));
+  print_line("sensor", text_of(d.mounting));
+  print_line("motion", "median " + fixed(d.step, 2, " m from scan to scan, longest ") +
+                           fixed(d.longest_step, 2, " m"));
+  std::cout << "\nscans five apart, placed by\n";
+  print_line("  poses as given", to_text(d.as_given));
+  print_line("  no motion at all", to_text(d.standing));
+  constexpr std::size_t kShown = 3;
+  for (std::size_t i = 0; i < std::min(kShown, d.readings.size()); ++i) {
+    print_line("  " + d.readings[i].option, "");
+    print_line("", to_text(d.readings[i].agreement));
+  }
+  std::cout << '\n';
+  print_remarks(d);
+  std::cout << advice(d) << std::endl;
+  if (!d.sound()) throw Finding{};
+}
+
+}  // namespace
+
+void add_check_command(CLI::App& app) {
+  CLI::App& command = *app.add_subcommand(
+      "check", "Tell in seconds whether a recording will work, and which option it needs");
+  const auto flags = std::make_shared<RecordingFlags>(command, "recording");
+  command.footer(
+      "Looks at a sample of scans: counts, units, invalid points, height and tilt of the sensor, "
+      "and whether\nscans agree under the poses or under the usual mistakes. Exits with 1 if the "
+      "poses need another option\nor fit under none.");
+  command.callback([flags] { check(*flags); });
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,66 @@
+#include "clean_writer.hpp"
+
+#include <utility>
+#include <vector>
+
+#include "dynains/io/kitti.hpp"
+#include "output_folder.hpp"
+
+namespace dynains::program {
+namespace {
+
+bool is_kept(PointLabel label) {
+  return label != PointLabel::kDynamic && label != PointLabel::kInvalid;
+}
+
+}  // namespace
+
+CleanWriter::CleanWriter(std::filesystem::path folder, const Recording& recording)
+    : folder_(std::move(folder)), recording_(recording) {
+  create_folder(folder_);
+}
+
+Eigen::Isometry3d CleanWriter::T_file_sensor(std::size_t i) const {
+  return recording_.frame() == PointFrame::kWorld ? recording_.T_world_sensor(i)
+                                                  : Eigen::Isometry3d::Identity();
+}
+
+void CleanWriter::write_bin(const std::filesystem::path& file, std::size_t i,
+                            const RecordedScan& scan, Span<const PointLabel> labels) const {
+  std::vector<float> xyzi;
+  for (std::size_t k = 0; k < labels.size(); ++k) {
+    if (!is_kept(labels[k])) continue;
+    const float* point = scan.xyzi.data() + 4 * k;
+    xyzi.insert(xyzi.end(), point, point + 4);
+    if (recording_.frame() != PointFrame::kWorld) continue;
+    Eigen::Map<Eigen::Vector3f> p(xyzi.data() + xyzi.size() - 4);
+    p = (T_file_sensor(i) * p.cast<double>()).cast<float>();
+  }
+  write_scan(file, xyzi);
+}
+
+void CleanWriter::write(std::size_t i, const RecordedScan& scan,
+                        Span<const PointLabel> labels) const {
+  const std::filesystem::path file = folder_ / recording_.name(i);
+  if (recording_.format() == ScanFormat::kBin) {
+    write_bin(file.string() + ".bin", i, scan, labels);
+    return;
+  }
+  const Eigen::Isometry3d T = T_file_sensor(i);
+  PointColumns columns = recording_.columns();
+  columns.label = false;
+  columns.double_xyz = T.translation().cwiseAbs().maxCoeff() > kFloatCoordinateLimit;
+  const bool has_pose = recording_.has_viewpoints() || recording_.frame() == PointFrame::kWorld;
+  PointFileWriter writer(
+      file.string() + (recording_.format() == ScanFormat::kPcd ? ".pcd" : ".ply"), columns,
+      has_pose ? recording_.T_world_sensor(i) : Eigen::Isometry3d::Identity());
+  for (std::size_t k = 0; k < labels.size(); ++k) {
+    if (!is_kept(labels[k])) continue;
+    FilePoint point = scan.point(k);
+    point.position = T * point.position;
+    writer.add(point);
+  }
+  writer.commit(AtomicFile::Sync::kLater);
+}
+
+}  // namespace dynains::program

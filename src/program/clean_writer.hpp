@@ -1,0 +1,30 @@
+// Scans without what moves, in the form of the recording they come from.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+
+#include "dynains/io/recording.hpp"
+#include "dynains/points.hpp"
+
+namespace dynains::program {
+
+class CleanWriter {
+ public:
+  /// Creates the folder. The recording outlives this. Throws IoError.
+  CleanWriter(std::filesystem::path folder, const Recording& recording);
+
+  /// Writes scan i of the recording: all finite points that are not dynamic, in their order, with
+  /// all their columns but labels, in the frame they had.
+  void write(std::size_t i, const RecordedScan& scan, Span<const PointLabel> labels) const;
+
+ private:
+  void write_bin(const std::filesystem::path& file, std::size_t i, const RecordedScan& scan,
+                 Span<const PointLabel> labels) const;
+  Eigen::Isometry3d T_file_sensor(std::size_t i) const;
+
+  std::filesystem::path folder_;
+  const Recording& recording_;
+};
+
+}  // namespace dynains::program

@@ -1,0 +1,77 @@
+#include "recording_options.hpp"
+
+namespace dynains::program {
+
+RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what) {
+  command
+      .add_option("SEQ", folder_,
+                  what +
+                      ": KITTI or SemanticKITTI folder (velodyne/, poses.txt; optional calib.txt, "
+                      "times.txt), or folder of .pcd, .ply or .bin scans with VIEWPOINT or a file "
+                      "of poses")
+      ->required()
+      ->type_name("");
+  const char* const kGroup = "What the files of SEQ mean (dynains check SEQ finds out)";
+  command
+      .add_option("--poses", poses_,
+                  "file of poses: 12 numbers a row (KITTI), time x y z qx qy qz qw (TUM), or CSV "
+                  "with named columns; interpolated if rows and scans have times [of SEQ]")
+      ->type_name("FILE")
+      ->group(kGroup);
+  command.add_option("--times", times_, "file with the time of each scan, s [of SEQ]")
+      ->type_name("FILE")
+      ->group(kGroup);
+  command.add_option("--frame", frame_, "frame of the points [auto]")
+      ->check(CLI::IsMember({"auto", "sensor", "world"}))
+      ->type_name("auto|sensor|world")
+      ->group(kGroup);
+  command
+      .add_flag("--invert-poses", invert_, "poses are from the world to the sensor, not from it")
+      ->group(kGroup);
+  command.add_option("--pose-units", units_, "unit of the translations [m]")
+      ->check(CLI::IsMember({"m", "cm", "mm"}))
+      ->type_name("m|cm|mm")
+      ->group(kGroup);
+  command
+      .add_option("--quaternion-order", quaternion_,
+                  "order of quaternions in the file [auto: as the form of the file has it]")
+      ->check(CLI::IsMember({"auto", "xyzw", "wxyz"}))
+      ->type_name("auto|xyzw|wxyz")
+      ->group(kGroup);
+  command
+      .add_option("--pose-frame", pose_frame_,
+                  "whose poses they are [auto: camera for 12 numbers a row beside calib.txt, else "
+                  "lidar]. A camera without calib.txt looks along the x axis of the lidar")
+      ->check(CLI::IsMember({"auto", "lidar", "camera"}))
+      ->type_name("auto|lidar|camera")
+      ->group(kGroup);
+  command
+      .add_flag("--left-handed-poses", left_handed_,
+                "poses have y to the right, as in some simulators")
+      ->group(kGroup);
+  command.add_option("--pose-shift", shift_, "scan i has the pose of scan i + N [0]")
+      ->check(CLI::Range(-1000000, 1000000))
+      ->type_name("N")
+      ->group(kGroup);
+}
+
+RecordingOptions RecordingFlags::options() const {
+  RecordingOptions options;
+  options.poses = poses_;
+  options.times = times_;
+  if (frame_ == "sensor") options.frame = PointFrame::kSensor;
+  if (frame_ == "world") options.frame = PointFrame::kWorld;
+  PoseConvention& convention = options.convention;
+  convention.invert = invert_;
+  convention.left_handed = left_handed_;
+  convention.shift = shift_;
+  if (units_ == "cm") convention.unit = 0.01;
+  if (units_ == "mm") convention.unit = 0.001;
+  if (quaternion_ == "xyzw") convention.quaternion = QuaternionOrder::kXyzw;
+  if (quaternion_ == "wxyz") convention.quaternion = QuaternionOrder::kWxyz;
+  if (pose_frame_ == "lidar") convention.frame = PoseFrame::kLidar;
+  if (pose_frame_ == "camera") convention.frame = PoseFrame::kCamera;
+  return options;
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,35 @@
+// How a recording is named on the command line.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "dynains/io/recording.hpp"
+
+namespace dynains::program {
+
+/// The argument SEQ and the flags that say what its files mean.
+class RecordingFlags {
+ public:
+  /// `what` starts the help of the argument, for example "labelled sequence".
+  RecordingFlags(CLI::App& command, const std::string& what);
+
+  const std::string& folder() const { return folder_; }
+  RecordingOptions options() const;
+  /// Throws IoError.
+  Recording open() const { return Recording(folder_, options()); }
+
+ private:
+  std::string folder_;
+  std::string poses_;
+  std::string times_;
+  std::string frame_ = "auto";
+  std::string pose_frame_ = "auto";
+  std::string units_ = "m";
+  std::string quaternion_ = "auto";
+  bool invert_ = false;
+  bool left_handed_ = false;
+  int shift_ = 0;
+};
+
+}  // namespace dynains::program
