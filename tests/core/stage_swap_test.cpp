@@ -139,7 +139,8 @@ TEST_CASE(
 
 TEST_CASE("all stages can be one's own at the same time") {
   const std::vector<Scan> scans = drive(yard(), 5, 0.0);
-  BasicDynaInsRemover<OwnEverything> remover;
+  using Remover = BasicDynaInsRemover<OwnEverything>;
+  Remover remover(Remover::Config::paper());
   const Run result = run(remover, scans);
   std::size_t static_points = 0;
   for (std::size_t s = 0; s < scans.size(); ++s) {
