@@ -1,0 +1,200 @@
+// A LiDAR odometry, complete and small: point-to-plane registration of each scan to a map of the
+// scans before. It drives through a simulated street twice, once with all points and once without
+// those that dynains says move, and compares the drift against the true poses.
+//
+//   odometry [scene] [sensor] [scans] [seed]        for example: odometry crowd os1-64 200 1
+#include <Eigen/Eigenvalues>
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <dynains/dyna_ins_remover.hpp>
+#include <dynains/simulation/simulator.hpp>
+#include <map>
+#include <nanoflann.hpp>
+#include <vector>
+
+using Points = std::vector<Eigen::Vector3d>;
+
+// One point per voxel of `edge` m: the first.
+Points thin_out(const Points& points, double edge) {
+  std::map<std::array<int, 3>, Eigen::Vector3d> voxels;
+  for (const Eigen::Vector3d& p : points) {
+    const Eigen::Vector3i v = (p / edge).array().floor().cast<int>();
+    voxels.try_emplace({v.x(), v.y(), v.z()}, p);
+  }
+  Points result;
+  for (const auto& [voxel, p] : voxels) result.push_back(p);
+  return result;
+}
+
+// Points around the sensor, world frame, with a search tree.
+class LocalMap {
+ public:
+  // nanoflann's view of the points.
+  std::size_t kdtree_get_point_count() const { return points_.size(); }
+  double kdtree_get_pt(std::size_t i, std::size_t k) const {
+    return points_[i][static_cast<Eigen::Index>(k)];
+  }
+  template <class Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+
+  bool empty() const { return points_.empty(); }
+
+  void insert(const Points& points_world, const Eigen::Vector3d& sensor) {
+    constexpr double kReach = 80.0;  // m
+    points_.insert(points_.end(), points_world.begin(), points_world.end());
+    points_ = thin_out(points_, 0.4);
+    const auto is_far = [&](const Eigen::Vector3d& p) { return (p - sensor).norm() > kReach; };
+    points_.erase(std::remove_if(points_.begin(), points_.end(), is_far), points_.end());
+    tree_.buildIndex();
+  }
+
+  // A plane through the neighbours of `p`: unit normal and signed distance of `p`, or false.
+  bool plane_at(const Eigen::Vector3d& p, Eigen::Vector3d& normal, double& distance) const {
+    constexpr std::size_t kNeighbours = 8;
+    constexpr double kFarthest = 1.5;   // m
+    constexpr double kThickness = 0.1;  // m, of what still is a plane
+    std::array<std::size_t, kNeighbours> near{};
+    std::array<double, kNeighbours> squared{};
+    const std::size_t found = tree_.knnSearch(p.data(), kNeighbours, near.data(), squared.data());
+    if (found < kNeighbours || squared.back() > kFarthest * kFarthest) return false;
+
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const std::size_t i : near) mean += points_[i] / double{kNeighbours};
+    Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+    for (const std::size_t i : near) {
+      scatter += (points_[i] - mean) * (points_[i] - mean).transpose() / double{kNeighbours};
+    }
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+    solver.computeDirect(scatter);
+    const Eigen::Vector3d spread = solver.eigenvalues();  // ascending
+    const bool is_line = spread[1] < 0.1 * spread[2];     // one ring of the sensor
+    if (spread[0] > kThickness * kThickness || is_line) return false;
+    normal = solver.eigenvectors().col(0);
+    distance = normal.dot(p - mean);
+    return true;
+  }
+
+ private:
+  using Distance = nanoflann::L2_Simple_Adaptor<double, LocalMap, double, std::size_t>;
+  Points points_;
+  nanoflann::KDTreeSingleIndexAdaptor<Distance, LocalMap, 3, std::size_t> tree_{3, *this};
+};
+
+// Gauss-Newton on point-to-plane distances, from a guess.
+Eigen::Isometry3d align(const Points& scan, const LocalMap& map, Eigen::Isometry3d T_world_sensor) {
+  constexpr int kIterations = 20;
+  constexpr double kScale = 0.2;  // m; farther planes count less (Geman-McClure)
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Identity() * 1e-6;
+    Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
+    for (const Eigen::Vector3d& p : scan) {
+      const Eigen::Vector3d rotated = T_world_sensor.linear() * p;
+      Eigen::Vector3d normal;
+      double distance;
+      if (!map.plane_at(rotated + T_world_sensor.translation(), normal, distance)) continue;
+      const double loss = kScale / (kScale + distance * distance / kScale);
+      Eigen::Matrix<double, 6, 1> J;
+      J << normal, rotated.cross(normal);
+      A += loss * loss * J * J.transpose();
+      b -= loss * loss * J * distance;
+    }
+    const Eigen::Matrix<double, 6, 1> step = A.ldlt().solve(b);
+    const Eigen::Vector3d turn = step.tail<3>();
+    T_world_sensor.translation() += step.head<3>();
+    const Eigen::Quaterniond turned = Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()) *
+                                      Eigen::Quaterniond(T_world_sensor.linear());
+    T_world_sensor.linear() = turned.normalized().toRotationMatrix();
+    if (step.norm() < 1e-4) break;
+  }
+  return T_world_sensor;
+}
+
+struct Drift {
+  double path = 0.0;               // m
+  double final = 0.0;              // m, distance from the true position at the end
+  double rms = 0.0;                // m, over all scans
+  double kept = 0.0, removed = 0;  // points
+};
+
+Points points_of(const dynains::simulation::SimulatedScan& scan) {
+  Points points;
+  for (std::size_t i = 0; i < scan.xyzi.size(); i += 4) {
+    points.push_back(Eigen::Map<const Eigen::Vector3f>(&scan.xyzi[i]).cast<double>());
+  }
+  return points;
+}
+
+Drift drive(const dynains::simulation::Config& street, bool remove_what_moves) {
+  dynains::simulation::Simulator simulator(street);
+  dynains::DynaInsRemover::Config config;
+  config.build_map = false;  // the map of an odometry is its own
+  dynains::DynaInsRemover remover(config);
+  LocalMap map;
+  Eigen::Isometry3d T_world_last = simulator.scan(0).T_world_sensor;
+  Eigen::Isometry3d T_last_newest = Eigen::Isometry3d::Identity();
+  Eigen::Vector3d true_last = T_world_last.translation();
+  Drift drift;
+
+  for (std::size_t i = 0; i < simulator.size(); ++i) {
+    const dynains::simulation::SimulatedScan scan = simulator.scan(i);
+
+    // 1. Predict at constant velocity, and register everything: the window of the remover needs a
+    // pose that is good to a few centimetres, which a mere prediction is not while speeds change.
+    Eigen::Isometry3d T_world_sensor = T_world_last * T_last_newest;
+    Points points = points_of(scan);
+    if (!map.empty()) T_world_sensor = align(thin_out(points, 1.0), map, T_world_sensor);
+
+    // 2. Ask what moves, with what is known now, and register the rest.
+    if (remove_what_moves) {
+      const dynains::RawPoints cloud{scan.xyzi.data(), points.size(), 4};
+      const auto labels = remover.push(cloud, T_world_sensor, scan.time).newest.labels;
+      Points still;
+      for (std::size_t k = 0; k < points.size(); ++k) {
+        if (labels[k] != dynains::PointLabel::kDynamic) still.push_back(points[k]);
+      }
+      drift.removed += static_cast<double>(points.size() - still.size());
+      points = still;
+      if (!map.empty()) T_world_sensor = align(thin_out(points, 1.0), map, T_world_sensor);
+    }
+    drift.kept += static_cast<double>(points.size());
+
+    // 3. Add it to the map.
+    Points in_world = thin_out(points, 0.4);
+    for (Eigen::Vector3d& p : in_world) p = T_world_sensor * p;
+    map.insert(in_world, T_world_sensor.translation());
+
+    T_last_newest = T_world_last.inverse() * T_world_sensor;
+    T_world_last = T_world_sensor;
+
+    const Eigen::Vector3d truth = scan.T_world_sensor.translation();
+    drift.path += (truth - true_last).norm();
+    drift.final = (T_world_sensor.translation() - truth).norm();
+    drift.rms += drift.final * drift.final / static_cast<double>(simulator.size());
+    true_last = truth;
+  }
+  drift.rms = std::sqrt(drift.rms);
+  return drift;
+}
+
+int main(int argc, char** argv) {
+  dynains::simulation::Config street;
+  street.scene = dynains::simulation::scene_from_name(argc > 1 ? argv[1] : "crowd");
+  street.sensor = dynains::simulation::sensor_from_name(argc > 2 ? argv[2] : "os1-64");
+  street.scans = argc > 3 ? std::atoi(argv[3]) : 100;
+  street.seed = argc > 4 ? std::strtoull(argv[4], nullptr, 10) : 1;
+
+  const auto report = [](const char* name, const Drift& drift) {
+    std::printf(
+        "%-22s %5.1f %% of points removed, drift %.3f m after %.1f m (%.2f %%), rms %.3f m\n", name,
+        100.0 * drift.removed / (drift.removed + drift.kept), drift.final, drift.path,
+        100.0 * drift.final / drift.path, drift.rms);
+  };
+  const Drift all = drive(street, false);
+  report("all points", all);
+  const Drift still = drive(street, true);
+  report("without what moves", still);
+  return std::isfinite(still.rms) ? 0 : 1;
+}
