@@ -1,0 +1,2 @@
+// What is built where the library is missing.
+int main() { return 0; }
