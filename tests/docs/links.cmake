@@ -1,0 +1,13 @@
+# Every relative link in README.md and docs/ names a file that exists.
+file(GLOB pages ${SOURCE_DIR}/README.md ${SOURCE_DIR}/docs/*.md)
+foreach(page IN LISTS pages)
+  get_filename_component(folder ${page} DIRECTORY)
+  file(READ ${page} text)
+  string(REGEX MATCHALL "\\]\\([^)#: ]+[)#]" links "${text}")
+  foreach(link IN LISTS links)
+    string(REGEX REPLACE "^\\]\\(|[)#]$" "" target "${link}")
+    if(NOT EXISTS ${folder}/${target})
+      message(SEND_ERROR "${page} links to ${target}, which does not exist")
+    endif()
+  endforeach()
+endforeach()

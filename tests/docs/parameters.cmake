@@ -1,0 +1,7 @@
+# The table of parameters says what the program says.
+execute_process(COMMAND ${PROGRAM} config --markdown
+  OUTPUT_VARIABLE expected RESULT_VARIABLE result)
+file(READ ${FILE} found)
+if(NOT result EQUAL 0 OR expected STREQUAL "" OR NOT found STREQUAL expected)
+  message(FATAL_ERROR "${FILE} is out of date: dynains config --markdown > docs/parameters.md")
+endif()
