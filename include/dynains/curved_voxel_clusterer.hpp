@@ -100,6 +100,11 @@ class CurvedVoxelClusterer {
     adapt(SensorModel::typical());
   }
 
+  /// Whether the size of the voxels was left to be found in the scans.
+  bool needs_sensor() const {
+    return config_.voxel_azimuth == 0.0 || config_.voxel_elevation == 0.0;
+  }
+
   /// Sizes the voxels that were left to the sensor; a typical one until this is called.
   void adapt(const SensorModel& sensor) {
     resolved_ = config_.resolved(sensor);

@@ -18,6 +18,7 @@
 #include "dynains/detail/stage_checks.hpp"
 #include "dynains/free_space_evidence.hpp"
 #include "dynains/ground_segmenter.hpp"
+#include "dynains/mounting.hpp"
 #include "dynains/occupancy_descriptor.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/point_cloud_traits.hpp"
@@ -138,7 +139,8 @@ class BasicDynaInsRemover {
     return config_.use_free_space ? std::max(by_votes, evidence_.horizon()) : by_votes;
   }
 
-  /// What the first scan told about the sensor; not known() before.
+  /// What the first scan told about the sensor; not known() before, or if all that depends on it
+  /// was given.
   const SensorModel& sensor() const { return sensor_; }
 
   /// Takes one scan in.
@@ -157,7 +159,7 @@ class BasicDynaInsRemover {
     ScanSlot& newest = begin_scan(T_world_sensor, time);
     ingest_.read(cloud, static_cast<float>(config_.min_range),
                  static_cast<float>(config_.max_range), newest.labels);
-    if (!sensor_.known()) adapt_to_sensor(newest);
+    if (needs_sensor() && !sensor_.known()) adapt_to_sensor(newest);
     clock.lap(result.times.ingest);
 
     ground_.segment(ingest_.points(), newest.split);
@@ -337,9 +339,17 @@ class BasicDynaInsRemover {
         newest.ids);
   }
 
+  // Whether anything was left to be found in the scans.
+  bool needs_sensor() const {
+    return config_.use_free_space || detail::needs_sensor(ground_) ||
+           detail::needs_sensor(clusterer_);
+  }
+
   // What depends on the sensor, from the first scan that has enough points.
   void adapt_to_sensor(ScanSlot& newest) {
     sensor_ = estimate_sensor_model(ingest_.points());
+    const Mounting mounting = estimate_mounting(ingest_.points());
+    if (mounting.known) sensor_.height = mounting.height;
     if (newest.scan > 0 && sensor_.known()) newest.segment = ++segment_;
     const SensorModel model = sensor_.known() ? sensor_ : SensorModel::typical();
     detail::adapt_stage(ground_, model);

@@ -22,6 +22,7 @@ struct FreeSpaceConfig {
   double p_hit = 0.155;          ///< update probability of a reference that hits
   double tau_free = 0.65;        ///< belief above which a place that no reference hit was free
   double tau_contested = 0.9;    ///< the same if some reference hit it
+  double tau_whole = 0.84;       ///< the same for a whole instance at once
   double remove_share = 0.25;    ///< share of free supervoxels that removes the whole instance
   double see_share = 0.6;        ///< share of an instance that one reference must see through
   double footprint = 0.2;        ///< m, ground this near to removed points goes with them
@@ -64,6 +65,8 @@ struct FreeSpaceConfig {
                       "belief from which a place that no reference hit was free (form of Eq. 19)"});
     visitor(Parameter{"tau_contested", self.tau_contested, open(0.5, 1), "",
                       "the same for a place that some reference hit"});
+    visitor(Parameter{"tau_whole", self.tau_whole, open(0.5, 1), "",
+                      "the same for all of an instance taken together"});
     visitor(Parameter{"remove_share", self.remove_share, half_open_below(0, 1), "",
                       "share of free supervoxels from which the whole instance goes"});
     visitor(Parameter{"see_share", self.see_share, half_open_below(0, 1), "",

@@ -50,10 +50,12 @@ class FreeSpaceEvidence {
         ground_sampler_(config.ground_sample, config.ground_sample, config.evidence_range),
         footprint_(std::max(config.footprint, 0.05), config.evidence_range),
         reach_(std::max(config.ground_reach, 0.5), config.evidence_range),
+        about_(std::max({config.ground_reach, config.footprint, 0.5}), config.evidence_range),
         increment_(static_cast<float>(log_odds(config.p_free))),
         decrement_(static_cast<float>(log_odds(config.p_hit))),
         free_level_(static_cast<float>(log_odds(config.tau_free))),
         contested_level_(static_cast<float>(log_odds(config.tau_contested))),
+        whole_level_(static_cast<float>(log_odds(config.tau_whole))),
         track_level_(static_cast<float>(log_odds(config.tau_track))),
         hull_(2.0 * std::max(config.footprint, 0.05)),
         linker_(config.track_cell, config.track_length, config.track_height, config.track_overlap),
@@ -91,6 +93,8 @@ class FreeSpaceEvidence {
     sampler_.sample(split.non_ground(), instance_of, instance_count, record.samples);
     record.beliefs.assign(record.samples.supervoxel_count(), Belief());
     record.wholes.assign(instance_count, Belief());
+    record.changed.assign(instance_count, 1);
+    record.shares.resize(instance_count);
     predecessors_.assign(instance_count, kNoCluster);
     if (config_.use_tracks) track(scan, record);
 
@@ -121,29 +125,29 @@ class FreeSpaceEvidence {
              std::vector<float>& belief) {
     const Record& record = record_of(scan);
     judge_instances(scan, record);
-    dynamic.resize(split.count);
-    belief.resize(split.count);
-    std::fill_n(dynamic.begin(), split.ground_count, std::uint8_t{0});
-    std::fill_n(belief.begin(), split.ground_count, 0.0F);
-    const PointsView points = split.points;
-    for (std::size_t i = split.ground_count; i < split.count; ++i) {
-      const std::uint32_t supervoxel = record.samples.supervoxel_of[i - split.ground_count];
-      if (supervoxel == kNoSupervoxel) {
-        dynamic[i] = 0;
-        belief[i] = 0.0F;
-        continue;
-      }
-      const Verdict& verdict = verdicts_[supervoxel];
-      dynamic[i] = verdict.dynamic;
-      belief[i] = verdict.belief;
-      if (verdict.dynamic != 0) {
-        footprint_.add(points.x[i], points.y[i], points.z[i]);
-        reach_.add(points.x[i], points.y[i], points.z[i]);
+    dynamic.assign(split.count, 0);
+    belief.assign(split.count, 0.0F);
+    const PointsView points = split.non_ground();
+    for (const InstanceSamples::Streak& streak : record.samples.streaks) {
+      const Verdict& verdict = verdicts_[streak.supervoxel];
+      const std::size_t begin = split.ground_count + streak.begin;
+      const std::size_t end = split.ground_count + streak.end;
+      for (std::size_t i = begin; i < end; ++i) belief[i] = verdict.belief;
+      if (verdict.dynamic == 0) continue;
+      for (std::size_t i = begin; i < end; ++i) dynamic[i] = 1;
+      for (std::size_t i = streak.begin; i < streak.end; ++i) {
+        const float x = points.x[i];
+        const float y = points.y[i];
+        const float z = points.z[i];
+        footprint_.add(x, y, z);
+        reach_.add(x, y, z);
+        about_.add(x, y, z);
       }
     }
-    if (!reach_.empty() || !footprint_.empty()) judge_ground(scan, record, split, dynamic, belief);
+    if (!about_.empty()) judge_ground(scan, record, split, dynamic, belief);
     footprint_.clear();
     reach_.clear();
+    about_.clear();
   }
 
   /// For each instance of the scan observed last, its number in the scan before, or kNoCluster.
@@ -177,6 +181,7 @@ class FreeSpaceEvidence {
     std::vector<Belief> beliefs;  // by supervoxel
     std::vector<Belief> wholes;   // by instance, of all its samples together
     std::vector<Share> shares;    // by instance
+    std::vector<std::uint8_t> changed;  // by instance: whether beliefs changed since it was weighed
     TrackedInstances tracked;
   };
   static constexpr std::uint64_t kNoSegment = ~std::uint64_t{0};
@@ -197,23 +202,31 @@ class FreeSpaceEvidence {
   void refer(Record& record, const View& reference, int lag) {
     const InstanceSamples& samples = record.samples;
     look(samples.points, samples.size(), record.T_world_sensor, reference);
+    seen_.resize(samples.size() + 1);
+    std::uint64_t sum = 0;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      seen_[i] = sum;
+      sum += (sights_[i] & 1U) | std::uint64_t{sights_[i] >> 1U} << 32U;
+    }
+    seen_[samples.size()] = sum;
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
-      std::uint32_t instance_free = 0;
-      std::uint32_t instance_hit = 0;
       const std::uint32_t first = samples.supervoxel_begin[instance];
       const std::uint32_t last = samples.supervoxel_begin[instance + 1];
+      const std::uint64_t all =
+          seen_[samples.sample_begin[last]] - seen_[samples.sample_begin[first]];
+      if (all == 0) continue;
+      record.changed[instance] = 1;
+      const auto instance_free = static_cast<std::uint32_t>(all);
+      const auto instance_hit = static_cast<std::uint32_t>(all >> 32U);
+      std::uint32_t begin = samples.sample_begin[first];
       for (std::uint32_t s = first; s < last; ++s) {
-        std::uint32_t free = 0;
-        std::uint32_t hit = 0;
         const std::uint32_t end = samples.sample_begin[s + 1];
-        for (std::uint32_t i = samples.sample_begin[s]; i < end; ++i) {
-          free += sights_[i] & 1U;
-          hit += sights_[i] >> 1U;
+        const std::uint64_t seen = seen_[end] - seen_[begin];
+        if (seen != 0) {
+          update(record.beliefs[s], static_cast<std::uint32_t>(seen),
+                 static_cast<std::uint32_t>(seen >> 32U), end - begin);
         }
-        if (free + hit == 0) continue;
-        instance_free += free;
-        instance_hit += hit;
-        update(record.beliefs[s], free, hit, end - samples.sample_begin[s]);
+        begin = end;
       }
       const auto count =
           static_cast<float>(samples.sample_begin[last] - samples.sample_begin[first]);
@@ -264,8 +277,9 @@ class FreeSpaceEvidence {
   // What its own evidence says of each instance.
   void weigh(Record& record) const {
     const InstanceSamples& samples = record.samples;
-    record.shares.resize(samples.instance_count());
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
+      if (record.changed[instance] == 0) continue;
+      record.changed[instance] = 0;
       Share share;
       const std::uint32_t last = samples.supervoxel_begin[instance + 1];
       for (std::uint32_t s = samples.supervoxel_begin[instance]; s < last; ++s) {
@@ -277,10 +291,9 @@ class FreeSpaceEvidence {
         if (free || belief.contested != 0) share.decided += count;
       }
       record.shares[instance] = share;
-    }
-    if (!config_.use_tracks) return;
-    for (std::size_t i = 0; i < samples.instance_count(); ++i) {
-      record.tracked.instances[i].own = own_belief(record, i);
+      if (config_.use_tracks) {
+        record.tracked.instances[instance].own = own_belief(record, instance);
+      }
     }
   }
 
@@ -299,7 +312,8 @@ class FreeSpaceEvidence {
 
   bool removes_whole(const Record& record, std::size_t instance) const {
     const Share& share = record.shares[instance];
-    return is_free(record.wholes[instance]) ||
+    const Belief& whole = record.wholes[instance];
+    return whole.peak >= (whole.contested != 0 ? whole_level_ : free_level_) ||
            (share.moved > 0 &&
             static_cast<float>(share.moved) >=
                 static_cast<float>(config_.remove_share) * static_cast<float>(share.decided));
@@ -386,7 +400,10 @@ class FreeSpaceEvidence {
     const std::uint32_t end = samples.sample_begin[samples.supervoxel_begin[instance + 1]];
     const PointsView points = PointsView(samples.points).subview(begin, end - begin);
     const float lowest = *std::min_element(points.z.begin(), points.z.end());
-    hull_.visit(points, [&](float x, float y) { footprint_.add(x, y, lowest); });
+    hull_.visit(points, [&](float x, float y) {
+      footprint_.add(x, y, lowest);
+      about_.add(x, y, lowest);
+    });
   }
 
   // Zero latency: a compact instance in a place that no earlier scan has seen may be the lead
@@ -408,32 +425,32 @@ class FreeSpaceEvidence {
   // references saw free was no ground.
   void judge_ground(std::uint64_t scan, const Record& record, const GroundSplit& split,
                     std::vector<std::uint8_t>& dynamic, std::vector<float>& belief) {
-    sample_ground(split);
+    find_ground(split.ground());
     const std::size_t count = ground_samples_.size();
     ground_free_.assign(count, 0);
     ground_hit_.assign(count, 0);
     for (const int lag : kLags) {
+      if (count == 0) break;
       const auto distance = static_cast<std::uint64_t>(lag);
       if (lag <= config_.memory && distance <= scan) count_ground(record, scan - distance);
       if (lag <= config_.horizon) count_ground(record, scan + distance);
     }
-    const auto removed_belief = static_cast<float>(config_.tau_free);
-    for (std::size_t i = 0; i < split.ground_count; ++i) {
-      const float x = split.points.x[i];
-      const float y = split.points.y[i];
-      const float z = split.points.z[i];
-      bool moved = config_.footprint > 0.0 && footprint_.lowest(x, y) < z + kClearance;
-      const std::uint32_t voxel = ground_samples_.supervoxel_of[i];
-      if (!moved && voxel != kNoSupervoxel) {
-        const std::uint32_t sample = ground_samples_.sample_begin[voxel];
-        const std::uint8_t free = ground_free_[sample];
-        moved = free >= kGroundFree &&
-                static_cast<float>(free) >= kGroundShare * static_cast<float>(ground_hit_[sample]);
+    const auto remove = [&](std::size_t candidate) {
+      dynamic[candidates_[candidate]] = 1;
+      belief[candidates_[candidate]] = static_cast<float>(config_.tau_free);
+    };
+    for (std::size_t i = 0; config_.footprint > 0.0 && i < candidates_.size(); ++i) {
+      const float lowest = footprint_.lowest(candidate_points_.x[i], candidate_points_.y[i]);
+      if (lowest < candidate_points_.z[i] + kClearance) remove(i);
+    }
+    for (const InstanceSamples::Streak& streak : ground_samples_.streaks) {
+      const std::uint32_t sample = ground_samples_.sample_begin[streak.supervoxel];
+      const std::uint32_t free = ground_free_[sample];
+      if (free < kGroundFree || static_cast<float>(free) <
+                                    kGroundShare * static_cast<float>(ground_hit_[sample])) {
+        continue;
       }
-      if (moved) {
-        dynamic[i] = 1;
-        belief[i] = removed_belief;
-      }
+      for (std::size_t i = streak.begin; i < streak.end; ++i) remove(i);
     }
   }
 
@@ -443,20 +460,26 @@ class FreeSpaceEvidence {
     if (view.segment != record.segment) return;
     look(ground_samples_.points, ground_samples_.size(), record.T_world_sensor, view);
     for (std::size_t i = 0; i < ground_samples_.size(); ++i) {
-      ground_free_[i] = static_cast<std::uint8_t>(ground_free_[i] + (sights_[i] & 1U));
-      ground_hit_[i] = static_cast<std::uint8_t>(ground_hit_[i] + (sights_[i] >> 1U));
+      ground_free_[i] += sights_[i] & 1U;
+      ground_hit_[i] += sights_[i] >> 1U;
     }
   }
 
-  void sample_ground(const GroundSplit& split) {
-    const PointsView ground = split.ground();
-    const float reach = static_cast<float>(config_.ground_reach);
-    ground_instance_.resize(ground.size());
-    for (std::size_t i = 0; i < ground.size(); ++i) {
-      ground_instance_[i] =
-          reach > 0.0F && std::isfinite(reach_.lowest(ground.x[i], ground.y[i])) ? 0 : kNoCluster;
+  // Ground points that may go with removed ones, and samples of those that are to be tested.
+  void find_ground(PointsView ground) {
+    about_.find(ground, candidates_);
+    candidate_points_.resize(candidates_.size());
+    candidate_instance_.resize(candidates_.size());
+    for (std::size_t i = 0; i < candidates_.size(); ++i) {
+      const float x = ground.x[candidates_[i]];
+      const float y = ground.y[candidates_[i]];
+      candidate_points_.x[i] = x;
+      candidate_points_.y[i] = y;
+      candidate_points_.z[i] = ground.z[candidates_[i]];
+      const bool tested = config_.ground_reach > 0.0 && std::isfinite(reach_.lowest(x, y));
+      candidate_instance_[i] = tested ? 0 : kNoCluster;
     }
-    ground_sampler_.sample(ground, ground_instance_, 1, ground_samples_);
+    ground_sampler_.sample(candidate_points_, candidate_instance_, 1, ground_samples_);
   }
 
   static constexpr float kLeastView = 0.1F;   // share of an instance that a reference must see
@@ -471,7 +494,7 @@ class FreeSpaceEvidence {
   static constexpr float kClearance = 0.4F;      // m between ground and what stands on it
   static constexpr std::size_t kLeastGroup = 2;  // supervoxels that go without the rest
   static constexpr std::size_t kLeastGroupSamples = 4;  // and their samples
-  static constexpr std::uint8_t kGroundFree = 2;
+  static constexpr std::uint32_t kGroundFree = 2;
   static constexpr float kGroundShare = 0.3F;
 
   Config config_;
@@ -479,10 +502,12 @@ class FreeSpaceEvidence {
   InstanceSampler ground_sampler_;
   GroundFootprint footprint_;
   GroundFootprint reach_;
+  GroundFootprint about_;  // what the other two may cover
   float increment_;
   float decrement_;
   float free_level_;
   float contested_level_;
+  float whole_level_;
   float track_level_;
   InstanceHull hull_;
   SupervoxelGroups groups_;
@@ -494,14 +519,17 @@ class FreeSpaceEvidence {
   std::vector<View> views_;
   std::vector<Record> records_;
   RangeImage::Scratch image_scratch_;
-  std::vector<std::uint8_t> sights_;
+  std::vector<std::uint32_t> sights_;
+  std::vector<std::uint64_t> seen_;  // by sample: free ones before it, and hit ones in the upper half
   std::vector<Verdict> verdicts_;
   std::vector<std::uint32_t> free_;
   std::vector<std::uint32_t> predecessors_;
   InstanceSamples ground_samples_;
-  std::vector<std::uint32_t> ground_instance_;
-  std::vector<std::uint8_t> ground_free_;
-  std::vector<std::uint8_t> ground_hit_;
+  std::vector<std::uint32_t> candidates_;  // numbers of ground points
+  PointBuffer candidate_points_;
+  std::vector<std::uint32_t> candidate_instance_;
+  std::vector<std::uint32_t> ground_free_;  // by sample, references that saw it so
+  std::vector<std::uint32_t> ground_hit_;
 };
 
 }  // namespace dynains

@@ -159,6 +159,9 @@ class GroundSegmenter {
 
   const Config& config() const { return config_; }
 
+  /// Whether the height of the sensor was left to be found in the scans.
+  bool needs_sensor() const { return config_.sensor_height == 0.0; }
+
   /// Takes the sensor's height unless it was given; that of a typical sensor until then.
   void adapt(const SensorModel& sensor) {
     height_ = config_.sensor_height > 0.0 ? config_.sensor_height : sensor.height;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include "dynains/points.hpp"
@@ -28,36 +27,8 @@ struct SensorModel {
   static SensorModel typical() { return {0.2, 0.35, 0.6, -25.0, 5.0, 1.723}; }
 };
 
-/// Height of the sensor over the ground about it (m): the most common height of the lowest points
-/// of one-metre cells near the sensor. 1.723 if hardly anything is near.
-inline double estimate_height(PointsView points) {
-  constexpr double kNear = 10.0;
-  constexpr std::int32_t kCells = 2 * static_cast<std::int32_t>(kNear);
-  constexpr float kNothing = std::numeric_limits<float>::infinity();
-  std::vector<float> lowest(static_cast<std::size_t>(kCells * kCells), kNothing);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const double column = std::floor(points.x[i] + kNear);
-    const double row = std::floor(points.y[i] + kNear);
-    if (!(column >= 0 && column < kCells && row >= 0 && row < kCells)) continue;
-    float& low = lowest[static_cast<std::size_t>(row * kCells + column)];
-    low = std::min(low, points.z[i]);
-  }
-  lowest.erase(std::remove(lowest.begin(), lowest.end(), kNothing), lowest.end());
-  if (lowest.size() < 10) return SensorModel::typical().height;
-  std::sort(lowest.begin(), lowest.end());
-  // The densest interval of 0.3 m.
-  std::size_t begin = 0, best_begin = 0, best_count = 0;
-  for (std::size_t end = 0; end < lowest.size(); ++end) {
-    while (lowest[end] - lowest[begin] > 0.3F) ++begin;
-    if (end - begin + 1 > best_count) {
-      best_count = end - begin + 1;
-      best_begin = begin;
-    }
-  }
-  return std::max(0.2, -static_cast<double>(lowest[best_begin + best_count / 2]));
-}
-
-/// Estimates the model from one scan (sensor frame). Unknown if there are fewer than 500 points.
+/// Estimates the sampling from one scan (sensor frame); the height is that of a typical sensor, see
+/// estimate_mounting. Unknown if there are fewer than 500 points.
 /// Allocates; meant to be called once per sensor, not per scan.
 inline SensorModel estimate_sensor_model(PointsView points) {
   constexpr std::size_t kFewest = 500;
@@ -82,7 +53,7 @@ inline SensorModel estimate_sensor_model(PointsView points) {
     std::nth_element(values.begin(), values.begin() + at, values.end());
     return static_cast<double>(values[static_cast<std::size_t>(at)]);
   };
-  model.height = estimate_height(points);
+  model.height = SensorModel::typical().height;
   model.elevation_min = percentile(sorted, 0.0005);
   model.elevation_max = percentile(sorted, 0.9995);
 

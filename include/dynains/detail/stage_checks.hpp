@@ -102,12 +102,24 @@ struct EvidenceOf<Stages, Default, std::void_t<typename Stages::Evidence>> {
   using type = typename Stages::Evidence;
 };
 
-/// Tells a stage about the sensor if it wants to know: `adapt(const SensorModel&)` is optional.
+/// Whether a stage wants to know the sensor: `needs_sensor()` and `adapt(const SensorModel&)` are
+/// optional.
 template <class Stage, class = void>
 struct WantsSensor : std::false_type {};
 template <class Stage>
-struct WantsSensor<Stage, std::void_t<decltype(std::declval<Stage&>().adapt(SensorModel()))>>
-    : std::true_type {};
+struct WantsSensor<
+    Stage, std::enable_if_t<std::is_convertible_v<
+               decltype(std::declval<Stage&>().adapt(SensorModel()),
+                        std::declval<const Stage&>().needs_sensor()),
+               bool>>> : std::true_type {};
+template <class Stage>
+bool needs_sensor(const Stage& stage) {
+  if constexpr (WantsSensor<Stage>::value) {
+    return stage.needs_sensor();
+  } else {
+    return false;
+  }
+}
 template <class Stage>
 void adapt_stage(Stage& stage, const SensorModel& sensor) {
   if constexpr (WantsSensor<Stage>::value) stage.adapt(sensor);
