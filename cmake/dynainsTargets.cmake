@@ -8,6 +8,9 @@ option(DYNAINS_WARNINGS_AS_ERRORS "Refuse warnings in our own targets" OFF)
 set(DYNAINS_SANITIZE "" CACHE STRING "Sanitizers for our own targets, as a list")
 option(DYNAINS_COVERAGE "Count executed lines in our own targets" OFF)
 
+#   CXX=clang++ cmake -B build-fuzz -DDYNAINS_BUILD_FUZZERS=ON   then ctest -R fuzz
+option(DYNAINS_BUILD_FUZZERS "Build the fuzzers (libFuzzer, Clang), with ASan and UBSan" OFF)
+
 set(dynains_warnings -Wall -Wextra -Wpedantic -Wconversion -Wshadow)
 
 # What code that links our instrumented targets has to be compiled and linked with as well.
@@ -21,6 +24,11 @@ if(dynains_top_level AND DYNAINS_COVERAGE)
   list(APPEND dynains_instrumentation --coverage)
 endif()
 
+if(dynains_top_level AND DYNAINS_BUILD_FUZZERS)
+  list(APPEND dynains_instrumentation
+    -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+endif()
+
 # Strict warnings, and no fused multiply-add: the same bits from every compiler.
 function(dynains_own_target target)
   target_compile_features(${target} PRIVATE cxx_std_17)
@@ -28,6 +36,8 @@ function(dynains_own_target target)
     ${dynains_warnings} -ffp-contract=off
     $<$<BOOL:${DYNAINS_WARNINGS_AS_ERRORS}>:-Werror>
     ${dynains_instrumentation}
+    # Checked operator[], iterators and preconditions of libstdc++; same layout as without.
+    $<$<CONFIG:Debug>:-D_GLIBCXX_ASSERTIONS>
     # Optimized enough to run the whole suite, yet lines stay apart.
     $<$<AND:$<BOOL:${dynains_top_level}>,$<BOOL:${DYNAINS_COVERAGE}>>:-O1>)
   target_link_options(${target} PRIVATE ${dynains_instrumentation})

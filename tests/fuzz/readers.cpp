@@ -1,0 +1,185 @@
+// Every reader of files: whatever the file holds, a value that makes sense or an IoError.
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/io/kitti.hpp"
+#include "dynains/io/point_file.hpp"
+#include "dynains/pose.hpp"
+#include "io/files.hpp"
+#include "kitti_files.hpp"
+#include "parameter_flags.hpp"
+#include "targets.hpp"
+
+namespace dynains::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A file of that name with these bytes, in a folder that lives as long as the process.
+fs::path file_of(const char* name, Bytes bytes) {
+  static const test::TemporaryFolder folder;
+  const fs::path path = folder / name;
+  std::ofstream file(path, std::ios::binary);
+  file.write(reinterpret_cast<const char*>(bytes.data()),
+             static_cast<std::streamsize>(bytes.size()));
+  require(static_cast<bool>(file.flush()), "the temporary folder is full");
+  return path;
+}
+
+/// Runs `read` on the file; an Error is fine if it names the file.
+template <class Error, class Read>
+void expect_value_or(const fs::path& path, Read&& read) {
+  try {
+    read(path);
+  } catch (const Error& error) {
+    require(std::string(error.what()).rfind(path.string(), 0) == 0, "the error names the file");
+  }
+}
+
+std::size_t column_size(std::size_t column, std::size_t points) {
+  return column == 0 ? points : column;
+}
+
+void read_point_file(const char* name, Bytes bytes) {
+  expect_value_or<IoError>(file_of(name, bytes), [&](const fs::path& path) {
+    const PointFile file = read_points(path);
+    const std::size_t count = file.positions.size();
+    require(count <= bytes.size() || bytes.size() > (1U << 16), "points come from bytes");
+    require(column_size(file.intensity.size(), count) == count, "an intensity for each point");
+    require(column_size(file.label.size(), count) == count, "a label for each point");
+  });
+}
+
+std::string pose_row(double x) { return "1 0 0 " + std::to_string(x) + " 0 1 0 -2.5 0 0 1 1e-3\n"; }
+
+std::string floats(std::initializer_list<float> values) {
+  std::string bytes;
+  for (const float value : values) {
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof(value));
+  }
+  return bytes;
+}
+
+std::string pcd(const std::string& data, const std::string& points) {
+  return "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z intensity label\nSIZE 4 4 4 4 4\nTYPE F F F F U\n"
+         "COUNT 1 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 1 2 3 1 0 0 0\nPOINTS 2\nDATA " +
+         data + "\n" + points;
+}
+
+std::string ply(const std::string& format, const std::string& points) {
+  return "ply\nformat " + format +
+         " 1.0\ncomment no\nelement camera 1\nproperty list uchar int views\nelement vertex 2\n"
+         "property float x\nproperty float y\nproperty float z\nproperty uchar intensity\n"
+         "element face 0\nproperty list uchar int vertex_indices\nend_header\n" +
+         points;
+}
+
+}  // namespace
+
+void run_scan(Bytes bytes) {
+  expect_value_or<IoError>(file_of("000000.bin", bytes), [&](const fs::path& path) {
+    std::vector<float> xyzi;
+    read_scan(path, xyzi);
+    require(xyzi.size() * sizeof(float) == bytes.size(), "every byte is read");
+    require(count_scan_points(path) * 4 == xyzi.size(), "the count is that of the points");
+  });
+}
+
+void run_labels(Bytes bytes) {
+  const std::size_t count = bytes.size() / sizeof(std::uint32_t);
+  expect_value_or<IoError>(file_of("000000.label", bytes), [&](const fs::path& path) {
+    require(read_labels(path, count).size() == count, "a label for each point");
+    require(count * sizeof(std::uint32_t) == bytes.size(), "no part of a label");
+  });
+}
+
+void run_poses(Bytes bytes) {
+  expect_value_or<IoError>(file_of("poses.txt", bytes), [](const fs::path& path) {
+    for (const Eigen::Isometry3d& pose : read_kitti_poses(path)) {
+      require(pose.matrix().allFinite(), "poses are finite");
+      const Eigen::Matrix3d R = pose.linear();
+      require((R.transpose() * R).isIdentity(1e-9), "poses are rigid");
+    }
+  });
+}
+
+void run_calib(Bytes bytes) {
+  expect_value_or<IoError>(file_of("calib.txt", bytes), [](const fs::path& path) {
+    require(read_kitti_calib(path).matrix().allFinite(), "calibration is finite");
+  });
+}
+
+void run_times(Bytes bytes) {
+  expect_value_or<IoError>(file_of("times.txt", bytes), [](const fs::path& path) {
+    const std::vector<double> times = read_kitti_times(path);
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      require(std::isfinite(times[i]) && (i == 0 || times[i] > times[i - 1]), "times increase");
+    }
+  });
+}
+
+void run_ply(Bytes bytes) { read_point_file("cloud.ply", bytes); }
+void run_pcd(Bytes bytes) { read_point_file("cloud.pcd", bytes); }
+
+void run_config(Bytes bytes) {
+  const fs::path path = file_of("run.cfg", bytes);
+  expect_value_or<ConfigError>(path, [](const fs::path& file) {
+    const program::ParameterValues values = program::read_config_file(file);
+    DynaInsRemover::Config config;
+    values.apply(config);
+    DynaInsRemover::Config::visit(config, [](const auto& parameter) {
+      using Value = std::remove_reference_t<decltype(parameter.value)>;
+      if constexpr (!std::is_same_v<Value, bool>) {
+        require(parameter.bounds.contain(static_cast<double>(parameter.value)),
+                "what a config file sets is within bounds");
+      }
+    });
+  });
+}
+
+std::vector<std::string> scan_seeds() {
+  return {"", floats({1.0F, 2.0F, 3.0F, 0.5F}), floats({1.0F, 2.0F, 3.0F})};
+}
+
+std::vector<std::string> label_seeds() { return {"", std::string("\xFB\0\1\0", 4), "abc"}; }
+
+std::vector<std::string> pose_seeds() {
+  return {pose_row(0.0) + pose_row(1e6), "0 -1 0 1 1 0 0 2 0 0 1 3\r\n\n", "1 0 0 nan 0 1 0 0 0\n"};
+}
+
+std::vector<std::string> calib_seeds() {
+  return {"P0: 1 2 3\nTr: " + pose_row(0.25), "Tr: 0 -1 0 0 0 0 -1 0 1 0 0 -0.08"};
+}
+
+std::vector<std::string> time_seeds() {
+  return {"0.0\n1.036e-01\n2.0\n", "-1\n+5\r\n\n", "1\n1\n", "inf"};
+}
+
+std::vector<std::string> ply_seeds() {
+  const std::string point = floats({1.0F, -2.0F, 3.0F}) + "\x7F";
+  const std::string list = std::string("\1\0\0\0\0", 5);
+  return {ply("ascii", "1 5\n1 2 3 4\n-1e3 nan 0.5 255\n"),
+          ply("binary_little_endian", list + point + point),
+          ply("binary_big_endian", list + point + point)};
+}
+
+std::vector<std::string> pcd_seeds() {
+  const std::string point = floats({1.0F, 2.0F, 3.0F, 0.5F}) + std::string("\xFB\0\0\0", 4);
+  // Two times 20 bytes column by column; a literal run of 32 bytes and one of 8, in LZF.
+  const std::string columns(40, '\0');
+  const std::string lzf = '\x1F' + columns.substr(0, 32) + '\x07' + columns.substr(0, 8);
+  const std::string sizes = std::string("\x2A\0\0\0\x28\0\0\0", 8);
+  return {pcd("ascii", "1 2 3 0.5 251\nnan -inf 0 1 9\n"), pcd("binary", point + point),
+          pcd("binary_compressed", sizes + lzf)};
+}
+
+std::vector<std::string> config_seeds() {
+  return {"# comment\nwindow = 4\ntau-s=0.6 # more\nuse_belief = off\n", "max-range = 1e3\n",
+          "window = 4\nwindow = 5\n", "tau-s =\n", "no-such = 1\n"};
+}
+
+}  // namespace dynains::fuzz

@@ -1,0 +1,29 @@
+#include "targets.hpp"
+
+#include <stdexcept>
+
+namespace dynains::fuzz {
+
+const std::vector<Target>& targets() {
+  static const std::vector<Target> all = {
+      {"scan", run_scan, scan_seeds},       {"labels", run_labels, label_seeds},
+      {"poses", run_poses, pose_seeds},     {"calib", run_calib, calib_seeds},
+      {"times", run_times, time_seeds},     {"ply", run_ply, ply_seeds},
+      {"pcd", run_pcd, pcd_seeds},          {"config", run_config, config_seeds},
+      {"facade", run_facade, facade_seeds},
+  };
+  return all;
+}
+
+const Target& target(const std::string& name) {
+  for (const Target& candidate : targets()) {
+    if (candidate.name == name) return candidate;
+  }
+  throw std::out_of_range("no target " + name);
+}
+
+void require(bool condition, const char* what) {
+  if (!condition) throw std::logic_error(what);
+}
+
+}  // namespace dynains::fuzz

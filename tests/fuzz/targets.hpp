@@ -1,0 +1,48 @@
+// What is fuzzed: functions of bytes. They return, or throw what is a bug.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "dynains/points.hpp"
+
+namespace dynains::fuzz {
+
+using Bytes = Span<const std::uint8_t>;
+
+struct Target {
+  const char* name;
+  void (*run)(Bytes);
+  std::vector<std::string> (*seeds)();  ///< inputs from which others are made
+};
+
+const std::vector<Target>& targets();
+/// Throws std::out_of_range.
+const Target& target(const std::string& name);
+
+/// Throws std::logic_error, which no target catches, unless `condition` holds.
+void require(bool condition, const char* what);
+
+// One function for each target, and one for its seeds.
+void run_scan(Bytes bytes);
+void run_labels(Bytes bytes);
+void run_poses(Bytes bytes);
+void run_calib(Bytes bytes);
+void run_times(Bytes bytes);
+void run_ply(Bytes bytes);
+void run_pcd(Bytes bytes);
+void run_config(Bytes bytes);
+void run_facade(Bytes bytes);
+
+std::vector<std::string> scan_seeds();
+std::vector<std::string> label_seeds();
+std::vector<std::string> pose_seeds();
+std::vector<std::string> calib_seeds();
+std::vector<std::string> time_seeds();
+std::vector<std::string> ply_seeds();
+std::vector<std::string> pcd_seeds();
+std::vector<std::string> config_seeds();
+std::vector<std::string> facade_seeds();
+
+}  // namespace dynains::fuzz
