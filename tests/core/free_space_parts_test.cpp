@@ -1,0 +1,328 @@
+// The parts of the free-space evidence, each against something slow and obvious.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <set>
+#include <tuple>
+#include <vector>
+
+#include "dynains/ground_footprint.hpp"
+#include "dynains/instance_hull.hpp"
+#include "dynains/instance_samples.hpp"
+#include "dynains/instance_tracks.hpp"
+#include "dynains/sensor_model.hpp"
+#include "dynains/supervoxel_groups.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+namespace dynains::test {
+namespace {
+
+std::int32_t voxel_of(float coordinate, float size) {
+  return static_cast<std::int32_t>(std::floor(coordinate * (1.0F / size)));
+}
+
+constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+
+// Supervoxel per point, from the streaks.
+std::vector<std::uint32_t> supervoxel_of(const InstanceSamples& samples, std::size_t points) {
+  std::vector<std::uint32_t> result(points, kNone);
+  for (const InstanceSamples::Streak& streak : samples.streaks) {
+    for (std::uint32_t i = streak.begin; i < streak.end; ++i) {
+      REQUIRE(i < points);
+      REQUIRE(result[i] == kNone);
+      result[i] = streak.supervoxel;
+    }
+  }
+  return result;
+}
+
+TEST_CASE("every voxel of every instance has a sample, and samples are points of it") {
+  Random random(7);
+  constexpr float kSize = 0.3F;
+  constexpr std::size_t kInstances = 5;
+  PointBuffer points;
+  std::vector<std::uint32_t> instance_of;
+  for (int i = 0; i < 4000; ++i) {
+    points.push_back(random.uniform_float(-12, 12), random.uniform_float(-12, 12),
+                     random.uniform_float(-2, 2));
+    const std::size_t number = random.index(kInstances + 1);
+    instance_of.push_back(number == kInstances ? kNoCluster : static_cast<std::uint32_t>(number));
+  }
+  InstanceSampler sampler(kSize, 0.9, 10.0);
+  InstanceSamples samples;
+  // Twice: buffers that were used before change nothing.
+  sampler.sample(points, instance_of, kInstances, samples);
+  sampler.sample(points, instance_of, kInstances, samples);
+
+  const std::vector<std::uint32_t> supervoxels = supervoxel_of(samples, points.size());
+  using Voxel = std::tuple<std::uint32_t, std::int32_t, std::int32_t, std::int32_t>;
+  std::set<Voxel> expected;
+  std::set<std::tuple<float, float, float>> measured;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    measured.insert({points.x[i], points.y[i], points.z[i]});
+    const bool near = points.x[i] * points.x[i] + points.y[i] * points.y[i] <= 100.0F;
+    REQUIRE((supervoxels[i] != kNone) == (near && instance_of[i] != kNoCluster));
+    if (!near || instance_of[i] == kNoCluster) continue;
+    expected.insert({instance_of[i], voxel_of(points.x[i], kSize), voxel_of(points.y[i], kSize),
+                     voxel_of(points.z[i], kSize)});
+  }
+  std::set<Voxel> found;
+  REQUIRE(samples.instance_count() == kInstances);
+  for (std::uint32_t instance = 0; instance < kInstances; ++instance) {
+    for (std::uint32_t s = samples.supervoxel_begin[instance];
+         s < samples.supervoxel_begin[instance + 1]; ++s) {
+      REQUIRE(samples.sample_begin[s] < samples.sample_begin[s + 1]);
+      for (std::uint32_t p = samples.sample_begin[s]; p < samples.sample_begin[s + 1]; ++p) {
+        const float x = samples.points.x[p], y = samples.points.y[p], z = samples.points.z[p];
+        REQUIRE(measured.count({x, y, z}) == 1);
+        found.insert({instance, voxel_of(x, kSize), voxel_of(y, kSize), voxel_of(z, kSize)});
+      }
+    }
+  }
+  CHECK(found == expected);
+}
+
+TEST_CASE("a point and its samples lie in the same supervoxel of the same instance") {
+  // One row of points along x, 0.1 m apart, in two instances; supervoxels are 3 samples wide:
+  // [-0.9, 0), [0, 0.9), [0.9, 1.8).
+  PointBuffer points;
+  std::vector<std::uint32_t> instance_of;
+  for (int i = -5; i < 15; ++i) {
+    points.push_back(0.1F * static_cast<float>(i) + 0.05F, 5.0F, 0.1F);
+    instance_of.push_back(i < 9 ? 0U : 1U);
+  }
+  InstanceSampler sampler(0.3, 0.9, 80.0);
+  InstanceSamples samples;
+  sampler.sample(points, instance_of, 2, samples);
+  REQUIRE(samples.supervoxel_count() == 3);
+  CHECK(samples.supervoxel_begin == std::vector<std::uint32_t>{0, 2, 3});
+  const std::vector<std::uint32_t> supervoxels = supervoxel_of(samples, points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    CHECK(supervoxels[i] == (points.x[i] < 0.0F ? 0U : points.x[i] < 0.9F ? 1U : 2U));
+  }
+}
+
+// Supervoxels with one sample each at the given places, all of one instance.
+InstanceSamples supervoxels_at(const std::vector<std::array<int, 3>>& places, int samples_each) {
+  InstanceSamples samples;
+  samples.sample_begin.push_back(0);
+  for (const auto& p : places) {
+    samples.place.push_back(pack_place(p[0], p[1], p[2]));
+    samples.sample_begin.push_back(samples.sample_begin.back() +
+                                   static_cast<std::uint32_t>(samples_each));
+  }
+  samples.supervoxel_begin = {0, static_cast<std::uint32_t>(places.size())};
+  return samples;
+}
+
+TEST_CASE("groups of supervoxels connect over faces, edges and corners, and only so") {
+  const InstanceSamples samples = supervoxels_at(
+      {{0, 0, 0}, {1, 1, 1}, {5, 0, 0}, {7, 0, 0}, {-1, -1, 1}, {0, 0, -40}, {0, 1, -40}}, 2);
+  SupervoxelGroups groups;
+  std::vector<std::uint32_t> members = {0, 1, 2, 3, 4, 5, 6};
+  groups.keep_large(samples, 2, 4, members);
+  std::sort(members.begin(), members.end());
+  CHECK(members == std::vector<std::uint32_t>{0, 1, 4, 5, 6});
+  // Three supervoxels of two samples reach six samples, two reach four.
+  members = {0, 1, 2, 3, 4, 5, 6};
+  groups.keep_large(samples, 2, 5, members);
+  std::sort(members.begin(), members.end());
+  CHECK(members == std::vector<std::uint32_t>{0, 1, 4});
+}
+
+TEST_CASE("groups of random supervoxels are those of a search over all pairs") {
+  Random random(3);
+  SupervoxelGroups groups;
+  for (int round = 0; round < 50; ++round) {
+    std::set<std::array<int, 3>> places;
+    for (int i = 0; i < 60; ++i) {
+      places.insert({static_cast<int>(random.index(8)) - 4, static_cast<int>(random.index(8)) - 4,
+                     static_cast<int>(random.index(4)) - 2});
+    }
+    const std::vector<std::array<int, 3>> all(places.begin(), places.end());
+    const InstanceSamples samples = supervoxels_at(all, 1);
+    std::vector<std::size_t> group(all.size());
+    for (std::size_t i = 0; i < all.size(); ++i) group[i] = i;
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        for (std::size_t j = 0; j < all.size(); ++j) {
+          const bool touch = std::abs(all[i][0] - all[j][0]) <= 1 &&
+                             std::abs(all[i][1] - all[j][1]) <= 1 &&
+                             std::abs(all[i][2] - all[j][2]) <= 1;
+          if (touch && group[i] < group[j]) {
+            group[j] = group[i];
+            changed = true;
+          }
+        }
+      }
+    }
+    std::map<std::size_t, std::size_t> sizes;
+    for (const std::size_t g : group) ++sizes[g];
+    std::vector<std::uint32_t> expected;
+    std::vector<std::uint32_t> members;
+    for (std::uint32_t i = 0; i < all.size(); ++i) {
+      members.push_back(i);
+      if (sizes[group[i]] >= 3) expected.push_back(i);
+    }
+    groups.keep_large(samples, 3, 1, members);
+    std::sort(members.begin(), members.end());
+    REQUIRE(members == expected);
+  }
+}
+
+TEST_CASE("a hull fills the ground between the sides of an object that were seen") {
+  // An L of points along the lower and the left side of a 2 m square, and its far corner.
+  PointBuffer points;
+  for (float t = 0.1F; t < 2.0F; t += 0.2F) {
+    points.push_back(t, 0.1F, 0.0F);
+    points.push_back(0.1F, t, 0.0F);
+  }
+  points.push_back(1.9F, 1.9F, 0.0F);
+  InstanceHull hull(0.4);
+  std::set<std::pair<int, int>> cells;
+  hull.visit(points, [&](float x, float y) {
+    CHECK(cells.insert({static_cast<int>(std::floor(x / 0.4F)),
+                        static_cast<int>(std::floor(y / 0.4F))}).second);
+  });
+  // 5 x 5 cells of 0.4 m. The lowest row reaches from side to side: 5 cells, as each of its columns
+  // begins there. The rows above hold the left column only: 3 cells. The top row reaches from side
+  // to side again, but the columns between end at the bottom: 2 cells.
+  CHECK(cells.size() == 5 + 3 + 2);
+  CHECK(cells.count({4, 4}) == 1);
+  CHECK(cells.count({2, 0}) == 1);
+  CHECK(cells.count({4, 2}) == 0);
+
+  // With the right side seen as well, the whole square is covered.
+  for (float t = 0.1F; t < 2.0F; t += 0.2F) points.push_back(1.9F, t, 0.0F);
+  for (float t = 0.1F; t < 2.0F; t += 0.2F) points.push_back(t, 1.9F, 0.0F);
+  cells.clear();
+  hull.visit(points, [&](float x, float y) {
+    cells.insert({static_cast<int>(std::floor(x / 0.4F)), static_cast<int>(std::floor(y / 0.4F))});
+  });
+  CHECK(cells.size() == 25);
+}
+
+TEST_CASE("a footprint remembers the lowest point of a cell and its neighbours, until cleared") {
+  GroundFootprint footprint(0.2, 50.0);
+  CHECK(footprint.empty());
+  footprint.add(10.05F, -3.05F, 0.7F);
+  footprint.add(10.05F, -3.05F, 0.4F);
+  CHECK_FALSE(footprint.empty());
+  CHECK(footprint.lowest(10.05F, -3.05F) == 0.4F);
+  CHECK(footprint.lowest(10.25F, -3.25F) == 0.4F);
+  CHECK(std::isinf(footprint.lowest(10.45F, -3.05F)));
+  footprint.clear();
+  CHECK(footprint.empty());
+  CHECK(std::isinf(footprint.lowest(10.05F, -3.05F)));
+  // Out of reach, NaN: neither remembered nor found.
+  footprint.add(60.0F, 0.0F, 0.0F);
+  footprint.add(std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.0F);
+  footprint.add(-1e30F, 1e30F, 0.0F);
+  CHECK(std::isinf(footprint.lowest(60.0F, 0.0F)));
+  CHECK(std::isinf(footprint.lowest(std::numeric_limits<float>::infinity(), 0.0F)));
+}
+
+// A box of points with its centre at (x, y).
+void add_box(PointBuffer& points, std::vector<std::uint32_t>& instance_of, std::uint32_t instance,
+             float x, float y, float length) {
+  for (float dx = -0.5F * length; dx < 0.5F * length; dx += 0.2F) {
+    for (float dz = 0.0F; dz < 1.4F; dz += 0.2F) {
+      points.push_back(x + dx, y, dz);
+      instance_of.push_back(instance);
+    }
+  }
+}
+
+TEST_CASE("instances of consecutive scans are linked where they overlap in the world") {
+  InstanceSampler sampler(0.3, 0.6, 80.0);
+  InstanceLinker linker(0.8, 18.0, 4.5, 0.25);
+  InstanceSamples samples[2];
+  TrackedInstances tracked[2];
+  const Eigen::Vector3d origin(1e6, -2e6, 0.0);
+  for (int scan = 0; scan < 2; ++scan) {
+    // The sensor drives 1 m ahead; the first box as well, the second stands, the third is new, the
+    // fourth is too long to be carried.
+    const float sensor = static_cast<float>(scan);
+    PointBuffer points;
+    std::vector<std::uint32_t> instance_of;
+    add_box(points, instance_of, 0, 10.0F + sensor - sensor, 4.0F, 4.0F);
+    add_box(points, instance_of, 1, 20.0F - sensor, -4.0F, 4.0F);
+    if (scan == 1) add_box(points, instance_of, 2, 30.0F, 12.0F, 4.0F);
+    add_box(points, instance_of, scan == 0 ? 2 : 3, 10.0F - sensor, 20.0F, 25.0F);
+    Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+    T_world_sensor.translation() = origin + Eigen::Vector3d(sensor, 0.0, 0.0);
+    sampler.sample(points, instance_of, scan == 0 ? 3 : 4, samples[scan]);
+    linker.measure(samples[scan], T_world_sensor, origin, tracked[scan]);
+  }
+  linker.link(tracked[0], tracked[1]);
+  CHECK(tracked[1].instances[0].previous == 0);
+  CHECK(tracked[1].instances[1].previous == 1);
+  CHECK(tracked[1].instances[2].previous == kNoCluster);
+  CHECK(tracked[1].instances[3].previous == kNoCluster);
+  CHECK(tracked[0].instances[0].next == 0);
+  CHECK(tracked[0].instances[1].next == 1);
+  CHECK_FALSE(tracked[1].instances[3].carried);
+  CHECK(tracked[1].instances[0].length == Approx(3.8).margin(0.3));
+}
+
+TEST_CASE("belief along a track fades by 0.95 a scan, and old hits contradict it") {
+  constexpr float kUnit = 0.8472979F;  // log-odds of 0.7
+  const TrackBelief belief(kUnit);
+  TrackedInstances before, now;
+  before.instances.resize(1);
+  before.instances[0].own = 2.0F * kUnit;
+  belief.run_forward(nullptr, before);
+  CHECK(before.instances[0].forward == Approx(2.0F * kUnit));
+  now.instances.resize(1);
+  now.instances[0].previous = 0;
+  belief.run_forward(&before, now);
+  CHECK(now.instances[0].forward == Approx(0.95F * 2.0F * kUnit));
+  CHECK(now.instances[0].since_forward == 1);
+  // It moved one scan ago: a hit up to nine scans back may have been itself, an older one not.
+  now.instances[0].hit_back = 9;
+  belief.run_forward(&before, now);
+  CHECK(now.instances[0].forward > 0.0F);
+  now.instances[0].hit_back = 10;
+  belief.run_forward(&before, now);
+  CHECK(now.instances[0].forward == 0.0F);
+  // Its own evidence outweighs that; the sum stops at four units.
+  now.instances[0].own = 4.0F * kUnit;
+  belief.run_forward(&before, now);
+  CHECK(now.instances[0].forward == Approx(4.0F * kUnit));
+  // Backwards it is the same with what comes after.
+  before.instances[0].next = 0;
+  belief.run_backward(nullptr, now);
+  before.instances[0].own = 0.0F;
+  belief.run_backward(&now, before);
+  CHECK(before.instances[0].backward == Approx(0.95F * 4.0F * kUnit));
+}
+
+TEST_CASE("the beams of a sensor are measured from one scan") {
+  // 40 beams 0.5 deg apart, a point every 0.3 deg, at 20 m.
+  PointBuffer points;
+  for (int beam = 0; beam < 40; ++beam) {
+    const double elevation = (-15.0 + 0.5 * beam) * M_PI / 180.0;
+    for (int column = 0; column < 1200; ++column) {
+      const double azimuth = (0.3 * column - 180.0) * M_PI / 180.0;
+      points.push_back(static_cast<float>(20.0 * std::cos(elevation) * std::cos(azimuth)),
+                       static_cast<float>(20.0 * std::cos(elevation) * std::sin(azimuth)),
+                       static_cast<float>(20.0 * std::sin(elevation)));
+    }
+  }
+  const SensorModel sensor = estimate_sensor_model(points);
+  REQUIRE(sensor.known());
+  CHECK(sensor.azimuth_step == Approx(0.3).margin(0.01));
+  CHECK(sensor.elevation_gap == Approx(0.5).margin(0.01));
+  CHECK(sensor.elevation_gap_wide == Approx(0.5).margin(0.01));
+  CHECK(sensor.elevation_min == Approx(-15.0).margin(0.1));
+  CHECK(sensor.elevation_max == Approx(4.5).margin(0.1));
+  CHECK_FALSE(estimate_sensor_model(PointsView(points).subview(0, 499)).known());
+}
+
+}  // namespace
+}  // namespace dynains::test
