@@ -10,7 +10,7 @@ namespace dynains {
 namespace {
 
 constexpr std::size_t kPairs = 8;       // compared
-constexpr std::size_t kStride = 5;      // scans from one to the other
+constexpr std::size_t kStride = 5;      // scans from one to the other, at first
 constexpr std::size_t kQueries = 1200;  // points of a scan that are looked up
 constexpr double kAgreeing = 0.3;       // m
 constexpr double kFarthestGap = 1.0;    // m
@@ -167,20 +167,15 @@ std::vector<Change> usual_mistakes(const Recording& recording) {
   return changes;
 }
 
-/// Whether `a` explains the scans clearly better than `b`.
-bool is_clearly_better(const Agreement& a, const Agreement& b) {
-  return a.gap < 0.85 * b.gap - 0.01;
-}
-
 PoseVerdict judge(const Recording& recording, const Diagnosis& d) {
   if (d.as_given.points < 200) return PoseVerdict::kUnknown;
-  const bool given_fits = d.as_given.share >= kLeastAgreement;
+  const bool given_fits = fits(d.as_given, d.standing);
   if (recording.frame() == PointFrame::kWorld) {
     return given_fits ? PoseVerdict::kWorldFrame : PoseVerdict::kDisagree;
   }
   const Agreement* best = d.readings.empty() ? &d.as_given : &d.readings.front().agreement;
-  if (is_clearly_better(*best, d.as_given) && best->share >= kLeastAgreement &&
-      !is_clearly_better(d.standing, *best)) {
+  if (is_clearly_better(*best, d.as_given) && fits(*best, d.standing) &&
+      is_clearly_better(*best, d.standing)) {
     return PoseVerdict::kOtherwise;
   }
   if (given_fits && !is_clearly_better(d.standing, d.as_given)) {
@@ -294,15 +289,25 @@ Diagnosis diagnose(const Recording& recording) {
     return Landmarks(points, mounting);
   };
 
+  // A slow sensor tells more from scans farther apart.
   std::vector<Pair> pairs;
-  const std::size_t stride = std::min(kStride, recording.size() - 1);
-  const std::size_t starts = stride == 0 ? 0 : recording.size() - stride;
-  const std::size_t count = std::min(kPairs, starts);
-  for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t first = count == 1 ? 0 : k * (starts - 1) / (count - 1);
-    Landmarks a = load(first);
-    Landmarks b = load(first + stride);
-    pairs.push_back({first, first + stride, std::move(a), std::move(b)});
+  for (const std::size_t wanted : {std::size_t{1}, kStride, 4 * kStride, 16 * kStride}) {
+    const std::size_t stride = std::min(wanted, recording.size() - 1);
+    if (stride == 0 || (!pairs.empty() && 2 * stride > recording.size())) break;
+    const std::size_t starts = recording.size() - stride;
+    const std::size_t count = std::min(kPairs, starts);
+    pairs.clear();
+    AgreementSum standing;
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t first = count == 1 ? 0 : k * (starts - 1) / (count - 1);
+      Landmarks a = load(first);
+      Landmarks b = load(first + stride);
+      standing.add(a.compare(b, Eigen::Isometry3d::Identity()));
+      pairs.push_back({first, first + stride, std::move(a), std::move(b)});
+    }
+    d.standing = standing.mean();
+    d.stride = stride;
+    if (d.standing.share < (stride == 1 ? 0.35 : kLeastAgreement)) break;
   }
   if (pairs.empty() && recording.size() > 0) load(0);
 
@@ -317,11 +322,6 @@ Diagnosis diagnose(const Recording& recording) {
   if (2 * heights.size() > read) d.mounting = {median(heights), up.normalized(), true};
 
   d.as_given = agreement_under(recording.convention(), recording, pairs);
-  AgreementSum standing;
-  for (const Pair& pair : pairs) {
-    standing.add(pair.a.compare(pair.b, Eigen::Isometry3d::Identity()));
-  }
-  d.standing = standing.mean();
   if (recording.frame() == PointFrame::kSensor) {
     for (const Change& change : usual_mistakes(recording)) {
       d.readings.push_back({change.meaning, change.option, change.convention,
@@ -337,6 +337,31 @@ Diagnosis diagnose(const Recording& recording) {
   }
   d.verdict = judge(recording, d);
   return d;
+}
+
+PoseAgreement pose_agreement(const Recording& recording, std::size_t first, std::size_t last) {
+  constexpr std::size_t kFewPairs = 4;
+  const std::size_t stride = std::min(kStride, last - first);
+  if (stride == 0) return {};
+  const std::size_t starts = last - first + 1 - stride;
+  const std::size_t count = std::min(kFewPairs, starts);
+  RecordedScan scan;
+  const auto load = [&](std::size_t i) {
+    recording.read_scan(i, scan);
+    const PointBuffer points = finite_points(scan);
+    return Landmarks(points, estimate_mounting(points));
+  };
+  AgreementSum as_given;
+  AgreementSum standing;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t i = first + (count == 1 ? 0 : k * (starts - 1) / (count - 1));
+    const Landmarks a = load(i);
+    const Landmarks b = load(i + stride);
+    standing.add(a.compare(b, Eigen::Isometry3d::Identity()));
+    as_given.add(
+        a.compare(b, recording.T_world_sensor(i).inverse() * recording.T_world_sensor(i + stride)));
+  }
+  return {as_given.mean(), standing.mean()};
 }
 
 std::string advice(const Diagnosis& d) {

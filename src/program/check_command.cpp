@@ -68,7 +68,7 @@ void check(const RecordingFlags& flags) {
   print_line("sensor", text_of(d.mounting));
   print_line("motion", "median " + fixed(d.step, 2, " m from scan to scan, longest ") +
                            fixed(d.longest_step, 2, " m"));
-  std::cout << "\nscans five apart, placed by\n";
+  std::cout << "\nscans " << d.stride << " apart, placed by\n";
   print_line("  poses as given", to_text(d.as_given));
   print_line("  no motion at all", to_text(d.standing));
   constexpr std::size_t kShown = 3;

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <iomanip>
@@ -11,6 +12,7 @@
 #include "dynains/dyna_ins_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
+#include "dynains/io/diagnosis.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
 #include "evaluation_options.hpp"
@@ -20,6 +22,7 @@
 #include "recording_options.hpp"
 #include "remover_options.hpp"
 #include "run_report.hpp"
+#include "run_request.hpp"
 #include "run_results.hpp"
 #include "run_sequence.hpp"
 
@@ -40,6 +43,7 @@ struct RunOptions {
   bool write_online = false;
   bool write_clean = false;
   bool force = false;
+  bool resume = false;
   bool quiet = false;
   RemoverOptions remover;
 };
@@ -111,14 +115,24 @@ std::string name_of_map(const RunOutputs& outputs) {
                                                                    : map.string();
 }
 
-/// Clears the way for new results, once nothing but the disk can go wrong any more.
-void prepare(const RunOutputs& outputs, bool force) {
+/// Clears the way for new results, once nothing but the disk can go wrong any more. False if all of
+/// them are there already.
+bool prepare(const RunOutputs& outputs, const RunOptions& options,
+             const nlohmann::ordered_json& request) {
   create_folder(outputs.folder);
   const OutputFiles files = files_of_a_run(outputs.folder);
-  check_output_folder(outputs.folder, files, force);
+  const EarlierRun earlier =
+      options.resume ? find_earlier_run(outputs.folder, request) : EarlierRun::kNone;
+  if (earlier == EarlierRun::kComplete) return false;
+  const bool resume = earlier == EarlierRun::kUnfinished;
+  check_output_folder(outputs.folder, files, options.force || resume);
   // A map that cannot be written would otherwise be noticed when the old results are gone.
   if (!outputs.map.empty()) PointFileWriter attempt(outputs.map);
-  clear_output_folder(outputs.folder, files, to_text(unfinished_report(name_of_map(outputs))));
+  nlohmann::ordered_json marker = unfinished_report(name_of_map(outputs));
+  marker["request"] = request;
+  // Files of the same run are replaced one by one: never is less there than before.
+  (resume ? mark_output_folder : clear_output_folder)(outputs.folder, files, to_text(marker));
+  return true;
 }
 
 void print_summary(const RunResults& results, const RunTiming& timing, const RunOutputs& outputs) {
@@ -148,6 +162,12 @@ void print_summary(const RunResults& results, const RunTiming& timing, const Run
             << "\nreport: " << (outputs.folder / "report.json").string() << std::endl;
 }
 
+void warn_of_poses(const std::string& sequence, const Agreement& agreement) {
+  std::cerr << "dynains: warning: only " << std::lround(100.0 * agreement.share)
+            << " % of the points of neighbouring scans agree under these poses; see: dynains check "
+            << sequence << std::endl;
+}
+
 void run(const RunOptions& options) {
   const Config config = options.remover.config();
   const RunOutputs outputs = make_outputs(options, config);
@@ -155,7 +175,14 @@ void run(const RunOptions& options) {
   const Recording sequence = options.sequence.open();
   const ScanRange range = select_scans(sequence, options.window);
   check_scans(sequence, range);
-  prepare(outputs, options.force);
+  const nlohmann::ordered_json request =
+      describe_request(sequence, range, outputs, to_json(config));
+  if (!prepare(outputs, options, request)) {
+    if (!options.quiet) std::cout << outputs.folder.string() << ": complete already" << std::endl;
+    return;
+  }
+  const PoseAgreement agreement = pose_agreement(sequence, range.first, range.last);
+  if (agreement.doubtful()) warn_of_poses(options.sequence.folder(), agreement.as_given);
 
   RunResults results(sequence, range, outputs);
   const InterruptGuard interrupt;
@@ -173,6 +200,7 @@ void run(const RunOptions& options) {
   description.sequence = options.sequence.folder();
   description.first_scan = sequence.name(range.first);
   description.last_scan = sequence.name(range.first + results.finished() - 1);
+  description.agreement = agreement.as_given;
   description.preset = options.remover.preset_name();
   description.complete = results.finished() == range.size();
   description.map = name_of_map(outputs);
@@ -180,7 +208,9 @@ void run(const RunOptions& options) {
   write_timing(outputs.folder / "timing.csv", timing);
   // The report must not claim what a power cut could still take.
   sync_files(outputs.folder);
-  write_report(outputs.folder / "report.json", make_report(description, results, timing));
+  nlohmann::ordered_json report = make_report(description, results, timing);
+  report["request"] = request;
+  write_report(outputs.folder / "report.json", report);
   if (!options.quiet) print_summary(results, timing, outputs);
   if (!description.complete) throw Interrupted{InterruptGuard::signal()};
 }
@@ -195,10 +225,16 @@ void add_run_command(CLI::App& app) {
                   "folder for the results; created, must be empty (see --force)")
       ->required()
       ->type_name("FOLDER");
-  command.add_flag(
+  CLI::Option* const force = command.add_flag(
       "--force", options->force,
       "replace the results of an earlier run in --out; they are removed first, so that "
       "old and new files never mix. A folder that holds anything else is refused");
+  command
+      .add_flag("--resume", options->resume,
+                "complete a run with the same flags that was interrupted or killed, if --out holds "
+                "one; nothing to do if it is complete. Scans are processed from the first on, for "
+                "verdicts depend on earlier scans")
+      ->excludes(force);
   add_window_options(command, options->window);
   command
       .add_option("--map", options->map,

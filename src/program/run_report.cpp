@@ -73,6 +73,8 @@ nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& 
   report["milliseconds"] = times_to_json(timing);
   report["flush_milliseconds"] = timing.flush;
   report["peak_memory_bytes"] = peak_memory_bytes();
+  report["pose_agreement"] = nullptr;
+  if (run.agreement.points > 0) report["pose_agreement"] = run.agreement.share;
   report["preset"] = run.preset;
   report["configuration"] = run.configuration;
   return report;

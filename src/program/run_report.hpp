@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "dynains/io/diagnosis.hpp"
 #include "run_results.hpp"
 #include "run_timing.hpp"
 
@@ -30,6 +31,7 @@ struct RunDescription {
   std::string first_scan;
   std::string last_scan;
   std::string preset;
+  Agreement agreement;   ///< of the scans under the poses, by a sample
   bool complete = true;  ///< false after a signal
   std::string map;       ///< file, relative to the folder of results if it lies there; empty: none
   nlohmann::ordered_json configuration;  ///< parameter name -> value

@@ -68,6 +68,7 @@ struct Diagnosis {
   double step = 0.0;           ///< median distance from scan to scan under the poses, m
   double longest_step = 0.0;   ///< m
   Mounting mounting;           ///< median over the scans that show their ground
+  std::size_t stride = 0;      ///< scans apart that were compared
   Agreement as_given;
   Agreement standing;                 ///< as if the sensor did not move at all
   std::vector<PoseReading> readings;  ///< the usual mistakes, best first
@@ -80,12 +81,36 @@ struct Diagnosis {
   }
 };
 
-/// Share of points of consecutive scans that agree, below which poses are wrong. Sound poses reach
-/// 0.7 and more even in dense traffic or vegetation.
+/// Share of agreeing points that no wrong pose reaches where the sensor moves.
 inline constexpr double kLeastAgreement = 0.5;
+
+/// Whether `a` explains the scans clearly better than `b`.
+inline bool is_clearly_better(const Agreement& a, const Agreement& b) {
+  return a.gap < 0.85 * b.gap - 0.01;
+}
+
+/// Whether scans agree well enough: most of the points, or, for few beams and fast motion, some of
+/// them and clearly more than if the sensor stood still.
+inline bool fits(const Agreement& agreement, const Agreement& standing) {
+  return agreement.share >= kLeastAgreement ||
+         (agreement.share >= 0.2 && is_clearly_better(agreement, standing));
+}
+
+/// Agreement of a sample of scans under the poses, and as if the sensor did not move.
+struct PoseAgreement {
+  Agreement as_given;
+  Agreement standing;
+
+  /// Whether the poses are wrong rather than the scans hard.
+  bool doubtful() const { return as_given.points >= 200 && !fits(as_given, standing); }
+};
 
 /// Looks at a sample of scans; takes seconds, whatever the length. Throws IoError.
 Diagnosis diagnose(const Recording& recording);
+
+/// The same for the poses as they are only, over a sample of the scans `first` to `last`
+/// (inclusive): cheap enough to start a run with. Throws IoError.
+PoseAgreement pose_agreement(const Recording& recording, std::size_t first, std::size_t last);
 
 /// The verdict on the poses, and what to do, in one sentence.
 std::string advice(const Diagnosis& diagnosis);

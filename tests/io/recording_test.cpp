@@ -1,0 +1,219 @@
+#include "dynains/io/recording.hpp"
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/kitti.hpp"
+#include "io/files.hpp"
+#include "support/catch.hpp"
+
+using namespace dynains;
+using namespace dynains::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A scan of points around `centre`, as PCD; `viewpoint` is the line after the keyword.
+std::string pcd(const Eigen::Vector3d& centre, const std::string& viewpoint = "0 0 0 1 0 0 0") {
+  std::string text =
+      "VERSION 0.7\nFIELDS x y z intensity ring time\nSIZE 8 8 8 4 2 8\nTYPE F F F F U F\n"
+      "COUNT 1 1 1 1 1 1\nWIDTH 3\nHEIGHT 1\nVIEWPOINT " +
+      viewpoint + "\nPOINTS 3\nDATA ascii\n";
+  for (const int i : {1, 2, 3}) {
+    text += std::to_string(centre.x() + i) + ' ' + std::to_string(centre.y()) + ' ' +
+            std::to_string(centre.z()) + " 0.5 " + std::to_string(i) + " 7.25\n";
+  }
+  return text;
+}
+
+std::string ply() {
+  return "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty "
+         "float z\nend_header\n1 2 3\n";
+}
+
+std::string tum(double time, double x) {
+  return std::to_string(time) + ' ' + std::to_string(x) + " 0 0 0 0 0 1\n";
+}
+
+std::string error_of(const fs::path& folder, const RecordingOptions& options = {}) {
+  return message_of<IoError>([&] { Recording recording(folder, options); });
+}
+
+}  // namespace
+
+TEST_CASE("Scans in the world frame with VIEWPOINT come back in the sensor frame") {
+  const TemporaryFolder folder;
+  // At (100, 0, 0) and (101, 0, 0), turned by 90 degrees around z.
+  write_text(folder / "pcd/000007.pcd", pcd({100, 0, 0}, "100 0 0 0.70710678 0 0 0.70710678"));
+  write_text(folder / "pcd/000009.pcd", pcd({101, 0, 0}, "101 0 0 0.70710678 0 0 0.70710678"));
+  write_text(folder / "gt_cloud.pcd", pcd({0, 0, 0}));
+  const Recording recording(folder.path());
+  REQUIRE(recording.size() == 2);
+  CHECK(recording.name(1) == "000009");
+  CHECK(recording.number(1) == 9);
+  CHECK(recording.frame() == PointFrame::kWorld);
+  CHECK(recording.has_viewpoints());
+  const RecordedScan scan = recording.read_scan(1);
+  REQUIRE(scan.size() == 3);
+  // One metre along x of the world is one metre along -y of the sensor.
+  CHECK(Eigen::Vector3f(scan.xyzi[0], scan.xyzi[1], scan.xyzi[2])
+            .isApprox(Eigen::Vector3f(0.0F, -1.0F, 0.0F), 1e-5F));
+  CHECK(scan.xyzi[3] == 0.5F);
+  CHECK(scan.ring == std::vector<std::uint16_t>{1, 2, 3});
+  CHECK(scan.time == std::vector<double>{7.25, 7.25, 7.25});
+}
+
+TEST_CASE("The frame of the points is seen, and can be forced") {
+  const TemporaryFolder folder;
+  write_text(folder / "a1.pcd", pcd({0, 0, 0}, "100 0 0 1 0 0 0"));
+  write_text(folder / "a2.pcd", pcd({0, 0, 0}, "101 0 0 1 0 0 0"));
+  CHECK(Recording(folder.path()).frame() == PointFrame::kSensor);
+  CHECK(Recording(folder.path()).read_scan(0).xyzi[0] == 1.0F);
+  RecordingOptions options;
+  options.frame = PointFrame::kWorld;
+  CHECK(Recording(folder.path(), options).read_scan(0).xyzi[0] == -99.0F);
+}
+
+TEST_CASE("Names are ordered by the numbers in them") {
+  const TemporaryFolder folder;
+  for (const char* name : {"scan10", "scan9", "scan1"}) {
+    write_text(folder / ("scans/" + std::string(name) + ".ply"), ply());
+  }
+  write_text(folder / "poses.txt", "0 0 0 0 0 0 1\n1 0 0 0 0 0 1\n2 0 0 0 0 0 1\n");
+  const Recording recording(folder.path());
+  CHECK(recording.name(0) == "scan1");
+  CHECK(recording.name(1) == "scan9");
+  CHECK(recording.name(2) == "scan10");
+  CHECK(recording.number(2) == 2);
+  CHECK(recording.T_world_sensor(2).translation().x() == 2.0);
+  CHECK(recording.time(2) == Approx(0.2));
+  CHECK(recording.read_scan(0).xyzi == std::vector<float>{1.0F, 2.0F, 3.0F, 0.0F});
+  CHECK(recording.read_scan(0).ring.empty());
+}
+
+TEST_CASE("Times of names find their poses by interpolation; scans without are left out") {
+  const TemporaryFolder folder;
+  for (const char* name : {"1600000000.00", "1600000000.25", "1600000000.50", "1600000009.00"}) {
+    write_text(folder / (std::string(name) + ".ply"), ply());
+  }
+  write_text(folder / "trajectory.tum",
+             tum(1600000000.0, 0.0) + tum(1600000000.5, 2.0) + tum(1600000000.9, 2.0));
+  const Recording recording(folder.path());
+  REQUIRE(recording.size() == 3);
+  CHECK(recording.scan_file_count() == 4);
+  CHECK(recording.time(1) == 1600000000.25);
+  CHECK(recording.T_world_sensor(1).translation().x() == Approx(1.0));
+  CHECK(recording.T_world_sensor(2).translation().x() == Approx(2.0));
+  bool told = false;
+  for (const std::string& note : recording.notes()) {
+    told = told || note == "1 of 4 scans have no pose and are left out, 1600000009.00 first";
+  }
+  CHECK(told);
+
+  write_text(folder / "trajectory.tum", tum(5.0, 0.0) + tum(6.0, 2.0));
+  CHECK_THAT(error_of(folder.path()),
+             ContainsSubstring("trajectory.tum: has poses from 5 s to 6 s for 0 of 4 scans"));
+}
+
+TEST_CASE("A shift gives every scan the pose of a neighbour") {
+  const TemporaryFolder folder;
+  for (const char* name : {"0", "1", "2"}) {
+    write_text(folder / ("velodyne/" + std::string(name) + ".bin"), std::string(16, '\0'));
+  }
+  write_text(folder / "poses.txt", tum(1, 10) + tum(2, 11) + tum(3, 12));
+  RecordingOptions options;
+  options.convention.shift = 1;
+  const Recording recording(folder.path(), options);
+  REQUIRE(recording.size() == 2);
+  CHECK(recording.name(0) == "0");
+  CHECK(recording.T_world_sensor(0).translation().x() == 11.0);
+  CHECK(recording.T_world_sensor(1).translation().x() == 12.0);
+  options.convention.shift = 3;
+  CHECK_THAT(error_of(folder.path(), options), ContainsSubstring("no pose for any scan"));
+}
+
+TEST_CASE("A KITTI folder is the same as a KittiSequence") {
+  const TemporaryFolder folder;
+  for (const char* name : {"000002", "000003"}) {
+    write_text(folder / ("velodyne/" + std::string(name) + ".bin"), std::string(32, 'a'));
+    write_text(folder / ("labels/" + std::string(name) + ".label"), std::string(8, 'b'));
+  }
+  write_text(folder / "calib.txt", "Tr: 0 -1 0 0.1 0 0 -1 -0.5 1 0 0 0\n");
+  std::string poses;
+  for (const int i : {0, 1, 2, 3, 4}) {
+    poses += "0.8 0 0.6 " + std::to_string(i) + " 0 1 0 2 -0.6 0 0.8 3\n";
+  }
+  write_text(folder / "poses.txt", poses);
+  write_text(folder / "times.txt", "0\n0.11\n0.21\n0.35\n0.4\n");
+  const KittiSequence expected(folder.path());
+  const Recording recording(folder.path());
+  REQUIRE(recording.size() == expected.size());
+  CHECK(recording.has_labels());
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    CHECK(recording.name(i) == expected.name(i));
+    CHECK(recording.time(i) == expected.time(i));
+    CHECK(recording.T_world_sensor(i).isApprox(expected.T_world_sensor(i), 1e-15));
+    CHECK(recording.read_scan(i).xyzi == expected.read_scan(i));
+    CHECK(recording.read_labels(i) == expected.read_labels(i));
+  }
+}
+
+TEST_CASE("Folders that are no recording are refused with a reason") {
+  const TemporaryFolder folder;
+  const fs::path seq = folder / "seq";
+  CHECK_THAT(error_of(seq), ContainsSubstring("is not a folder; expected a KITTI folder"));
+  fs::create_directory(seq);
+  CHECK_THAT(error_of(seq), ContainsSubstring("has no scans"));
+  fs::create_directory(seq / "velodyne");
+  CHECK_THAT(error_of(seq), ContainsSubstring("velodyne: has no scans"));
+
+  write_text(seq / "velodyne/a.ply", ply());
+  CHECK_THAT(error_of(seq), ContainsSubstring("poses.txt: not found: expected a pose"));
+  write_text(seq / "velodyne/b.pcd", pcd({0, 0, 0}));
+  CHECK_THAT(error_of(seq), ContainsSubstring("scans of one kind, found a.ply and b.pcd"));
+  fs::remove(seq / "velodyne/a.ply");
+  CHECK_THAT(error_of(seq), ContainsSubstring("poses.txt: not found"));
+
+  write_text(seq / "poses.txt", tum(1, 0) + tum(2, 0));
+  CHECK_THAT(error_of(seq), ContainsSubstring("poses.txt:2: expected a row for each of 1 scans"));
+  write_text(seq / "poses.txt", tum(1, 0));
+  CHECK(Recording(seq).size() == 1);
+  write_text(seq / "times.txt", "1\n2\n");
+  CHECK_THAT(error_of(seq), ContainsSubstring("times.txt:2: expected a row for each of 1 scans"));
+  fs::remove(seq / "times.txt");
+
+  write_text(seq / "velodyne/b.pcd",
+             "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH "
+             "99999999999\nDATA binary\n1234");
+  const Recording huge(seq);
+  CHECK_THAT(message_of<IoError>([&] { huge.read_scan(0); }),
+             ContainsSubstring("b.pcd: byte") && ContainsSubstring("99999999999 points"));
+  write_text(seq / "velodyne/b.pcd", "no header\n");
+  CHECK_THAT(error_of(seq), ContainsSubstring("b.pcd:1: expected a line of a PCD header"));
+}
+
+TEST_CASE("Names need not be UTF-8") {
+  const TemporaryFolder folder;
+  write_text(folder / "scan\xff\xfe 1.ply", ply());
+  write_text(folder / "poses.txt", tum(1, 0));
+  const Recording recording(folder.path());
+  CHECK(recording.name(0) == "scan\xff\xfe 1");
+  CHECK(recording.read_scan(0).size() == 1);
+}
+
+TEST_CASE("Values that are not finite pass; labels of a column are read") {
+  const TemporaryFolder folder;
+  write_text(
+      folder / "0.ply",
+      "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty "
+      "float z\nproperty uint label\nend_header\nnan inf 3 252\n1 2 3 40\n");
+  write_text(folder / "poses.txt", tum(1, 0));
+  const Recording recording(folder.path());
+  const RecordedScan scan = recording.read_scan(0);
+  CHECK(std::isnan(scan.xyzi[0]));
+  CHECK(std::isinf(scan.xyzi[1]));
+  CHECK(recording.has_labels());
+  CHECK(recording.read_labels(0) == std::vector<std::uint32_t>{252, 40});
+}
