@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "dynains/detail/lanes.hpp"
 #include "dynains/points.hpp"
 
 namespace dynains {
@@ -28,6 +29,9 @@ class GroundFootprint {
     const std::int32_t row = index(y);
     if (!inside(column, row)) return;
     const std::size_t centre = place(column, row);
+    // Neighbouring points mostly share a cell.
+    if (!touched_.empty() && touched_.back() == centre && last_lowest_ <= z) return;
+    last_lowest_ = z;
     touched_.push_back(static_cast<std::uint32_t>(centre));
     for (std::int32_t dy = -1; dy <= 1; ++dy) {
       for (std::int32_t dx = -1; dx <= 1; ++dx) {
@@ -42,6 +46,31 @@ class GroundFootprint {
     const std::int32_t column = index(x);
     const std::int32_t row = index(y);
     return inside(column, row) ? lowest_[place(column, row)] : kNothing;
+  }
+
+  /// Numbers of all points that have a removed point about them, and of some at the border of the
+  /// grid, into `found`; in order.
+  void find(PointsView points, std::vector<std::uint32_t>& found) const {
+    using namespace detail;
+    if (found.size() < points.size() + kLanes) found.resize(points.size() + kLanes);
+    const Float8 scale(cells_per_metre_);
+    const Float8 centre(static_cast<float>(half_width_));
+    const Float8 most(static_cast<float>(2 * half_width_ - 1));
+    const Float8 zero(0.0F);
+    const Float8 width(static_cast<float>(2 * half_width_));
+    const auto clamped = [&](Float8 scaled) { return to_float(truncate(min(max(scaled, zero), most))); };
+    std::size_t count = 0;
+    for_lanes(points, [&](Float8 x, Float8 y, Float8, std::size_t first) {
+      // Exact in floats: the grid has fewer than 2^24 cells.
+      std::int32_t cell[kLanes];
+      truncate(clamped(y * scale + centre) * width + clamped(x * scale + centre)).store(cell);
+      const std::size_t lanes = std::min(kLanes, points.size() - first);
+      for (std::size_t lane = 0; lane < lanes; ++lane) {
+        found[count] = static_cast<std::uint32_t>(first + lane);
+        count += lowest_[static_cast<std::size_t>(cell[lane])] < kNothing ? 1 : 0;
+      }
+    });
+    found.resize(count);
   }
 
   bool empty() const { return touched_.empty(); }
@@ -79,6 +108,7 @@ class GroundFootprint {
   std::int32_t half_width_;  // cells
   std::vector<float> lowest_;
   std::vector<std::uint32_t> touched_;
+  float last_lowest_ = kNothing;
 };
 
 }  // namespace dynains

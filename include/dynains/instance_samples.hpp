@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include "dynains/curved_voxel_clusterer.hpp"
@@ -12,9 +13,6 @@
 #include "dynains/points.hpp"
 
 namespace dynains {
-
-/// Supervoxel of points that were not sampled.
-inline constexpr std::uint32_t kNoSupervoxel = 0xFFFFFFFFU;
 
 /// Place of a supervoxel in its grid, packed: ordered by x, then y, then z.
 using SupervoxelPlace = std::uint64_t;
@@ -35,11 +33,16 @@ inline SupervoxelPlace neighbour(SupervoxelPlace place, int dx, int dy, int dz) 
 /// The samples of one scan in its sensor frame: instance-major, then supervoxel-major, so that
 /// what belongs together is one range.
 struct InstanceSamples {
+  /// Consecutive points of the scan in one supervoxel.
+  struct Streak {
+    std::uint32_t begin, end;
+    std::uint32_t supervoxel;
+  };
   PointBuffer points;                           ///< padded for wide loads
   std::vector<std::uint32_t> sample_begin;      ///< by supervoxel, one more than supervoxels
   std::vector<SupervoxelPlace> place;           ///< by supervoxel
   std::vector<std::uint32_t> supervoxel_begin;  ///< by instance, one more than instances
-  std::vector<std::uint32_t> supervoxel_of;     ///< by point of the scan, or kNoSupervoxel
+  std::vector<Streak> streaks;                  ///< all points of the scan that have a supervoxel
 
   std::size_t size() const { return sample_begin.empty() ? 0 : sample_begin.back(); }
   std::size_t supervoxel_count() const {
@@ -66,36 +69,41 @@ class InstanceSampler {
   void sample(PointsView points, Span<const std::uint32_t> instance_of, std::size_t instance_count,
               InstanceSamples& out) {
     find_samples(points, instance_of, out);
+    most_streaks_ = std::max(most_streaks_, out.streaks.size());
     order(instance_count, out);
   }
 
  private:
+  struct Voxel {
+    std::int32_t x, y, z;
+    std::uint32_t instance;
+
+    bool operator==(const Voxel& other) const {
+      return x == other.x && y == other.y && z == other.z && instance == other.instance;
+    }
+  };
   struct Sample {
+    Voxel voxel;
     float x, y, z;
     std::uint32_t supervoxel;
   };
   struct Supervoxel {
-    std::int32_t x, y, z;
-    std::uint32_t instance;
+    Voxel voxel;
     std::uint32_t samples;
   };
-  // Direct-mapped memory of the voxels met last. A voxel that was pushed out and comes back gets a
-  // second sample, which does no harm; nothing is ever searched.
-  struct Recent {
-    std::int32_t x, y, z;
-    std::uint32_t instance;
-    std::uint32_t supervoxel;
-    std::uint32_t generation;
-  };
+  // Direct-mapped memory of the voxels met last: their numbers. A voxel that was pushed out and
+  // comes back gets a second sample, which does no harm; nothing is ever searched.
   static constexpr std::size_t kRecent = 1U << 14;
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+  static constexpr unsigned kAllLanes = (1U << detail::kLanes) - 1;
 
-  static std::size_t hash(std::int32_t x, std::int32_t y, std::int32_t z, std::uint32_t instance) {
-    std::uint64_t h = static_cast<std::uint32_t>(x);
-    h = h * 0x9E3779B97F4A7C15ULL + static_cast<std::uint32_t>(y);
-    h = h * 0x9E3779B97F4A7C15ULL + static_cast<std::uint32_t>(z);
-    h = h * 0x9E3779B97F4A7C15ULL + instance;
+  static std::size_t hash(const Voxel& voxel) {
+    std::uint64_t h = static_cast<std::uint32_t>(voxel.x);
+    h = h * 0x9E3779B97F4A7C15ULL + static_cast<std::uint32_t>(voxel.y);
+    h = h * 0x9E3779B97F4A7C15ULL + static_cast<std::uint32_t>(voxel.z);
+    h = h * 0x9E3779B97F4A7C15ULL + voxel.instance;
     h *= 0x9E3779B97F4A7C15ULL;
-    return static_cast<std::size_t>(h >> 40);
+    return static_cast<std::size_t>(h >> 40) % kRecent;
   }
 
   static std::int32_t floor_divide(std::int32_t a, std::int32_t b) {
@@ -103,60 +111,101 @@ class InstanceSampler {
     return a % b < 0 ? quotient - 1 : quotient;
   }
 
+  // Beams that follow each other mostly end in the same voxel: eight points at a time are compared
+  // with those before them, and only where the voxel changes is it looked up.
   void find_samples(PointsView points, Span<const std::uint32_t> instance_of,
                     InstanceSamples& out) {
-    recent_.resize(kRecent);
-    table_.resize(kRecent);
-    ++generation_;
+    using namespace detail;
+    recent_samples_.assign(kRecent, kNone);
+    recent_supervoxels_.assign(kRecent, kNone);
     samples_.clear();
     supervoxels_.clear();
-    out.supervoxel_of.resize(points.size());
-    const float far_squared = max_range_ * max_range_;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const float px = points.x[i];
-      const float py = points.y[i];
-      const std::uint32_t instance = instance_of[i];
-      if (instance == kNoCluster || !(px * px + py * py <= far_squared)) {
-        out.supervoxel_of[i] = kNoSupervoxel;
-        continue;
+    out.streaks.clear();
+    out.streaks.reserve(most_streaks_);
+    const Float8 per_metre(samples_per_metre_);
+    const Float8 far_squared(max_range_ * max_range_);
+    const Int8 none(static_cast<std::int32_t>(kNoCluster));
+    // Each with the last one of the eight before in front.
+    std::int32_t x[kLanes + 1] = {};
+    std::int32_t y[kLanes + 1] = {};
+    std::int32_t z[kLanes + 1] = {};
+    std::int32_t instance[kLanes + 1] = {};
+    std::uint32_t open = kNone;  // of the point before
+    for_lanes(points, [&](Float8 px, Float8 py, Float8 pz, std::size_t first) {
+      const std::size_t lanes = std::min(kLanes, points.size() - first);
+      std::memcpy(&instance[1], &instance_of[first], lanes * sizeof(std::int32_t));
+      const Int8 instances = Int8::load(&instance[1]);
+      const Int8 vx = floor(px * per_metre);
+      const Int8 vy = floor(py * per_metre);
+      const Int8 vz = floor(pz * per_metre);
+      vx.store(&x[1]);
+      vy.store(&y[1]);
+      vz.store(&z[1]);
+      const unsigned taken = (first_lanes(lanes) & (px * px + py * py <= far_squared) &
+                              ~(instances == none))
+                                 .bits();
+      const unsigned same = ((vx == Int8::load(x)) & (vy == Int8::load(y)) &
+                             (vz == Int8::load(z)) & (instances == Int8::load(instance)))
+                                .bits();
+      const auto begin = static_cast<std::uint32_t>(first);
+      if ((taken & same) == kAllLanes && open != kNone) {
+        out.streaks.back().end += static_cast<std::uint32_t>(kLanes);
+      } else if (taken == 0) {
+        open = kNone;
+      } else {
+        for (std::uint32_t lane = 0; lane < lanes; ++lane) {
+          if ((taken >> lane & 1U) == 0) {
+            open = kNone;
+            continue;
+          }
+          const std::uint32_t before = open;
+          if (open == kNone || (same >> lane & 1U) == 0) {
+            const std::size_t i = first + lane;
+            const Voxel voxel = {x[lane + 1], y[lane + 1], z[lane + 1],
+                                 static_cast<std::uint32_t>(instance[lane + 1])};
+            open = find_voxel(voxel, points.x[i], points.y[i], points.z[i]);
+          }
+          if (open == before) {
+            ++out.streaks.back().end;
+          } else {
+            out.streaks.push_back({begin + lane, begin + lane + 1, open});
+          }
+        }
       }
-      const std::int32_t x = floor_to_int(px * samples_per_metre_);
-      const std::int32_t y = floor_to_int(py * samples_per_metre_);
-      const std::int32_t z = floor_to_int(points.z[i] * samples_per_metre_);
-      Recent& recent = recent_[hash(x, y, z, instance) % kRecent];
-      if (recent.generation != generation_ || recent.x != x || recent.y != y || recent.z != z ||
-          recent.instance != instance) {
-        recent = {x, y, z, instance, find_supervoxel(x, y, z, instance), generation_};
-        ++supervoxels_[recent.supervoxel].samples;
-        samples_.push_back({px, py, points.z[i], recent.supervoxel});
-      }
-      out.supervoxel_of[i] = recent.supervoxel;
-    }
+      x[0] = x[kLanes];
+      y[0] = y[kLanes];
+      z[0] = z[kLanes];
+      instance[0] = instance[kLanes];
+    });
   }
 
-  static std::int32_t floor_to_int(float value) {
-    const auto whole = static_cast<std::int32_t>(value);
-    return static_cast<float>(whole) > value ? whole - 1 : whole;
+  // Supervoxel of a point.
+  std::uint32_t find_voxel(const Voxel& voxel, float x, float y, float z) {
+    std::uint32_t& recent = recent_samples_[hash(voxel)];
+    if (recent == kNone || !(samples_[recent].voxel == voxel)) {
+      recent = static_cast<std::uint32_t>(samples_.size());
+      samples_.push_back({voxel, x, y, z, find_supervoxel(voxel)});
+      ++supervoxels_[samples_.back().supervoxel].samples;
+    }
+    return samples_[recent].supervoxel;
   }
 
-  std::uint32_t find_supervoxel(std::int32_t x, std::int32_t y, std::int32_t z,
-                                std::uint32_t instance) {
-    x = floor_divide(x, voxels_per_supervoxel_);
-    y = floor_divide(y, voxels_per_supervoxel_);
-    z = floor_divide(z, voxels_per_supervoxel_);
-    Recent& recent = table_[hash(x, y, z, instance) % kRecent];
-    if (recent.generation != generation_ || recent.x != x || recent.y != y || recent.z != z ||
-        recent.instance != instance) {
-      recent = {x, y, z, instance, static_cast<std::uint32_t>(supervoxels_.size()), generation_};
-      supervoxels_.push_back({x, y, z, instance, 0});
+  std::uint32_t find_supervoxel(const Voxel& sample) {
+    const Voxel voxel = {floor_divide(sample.x, voxels_per_supervoxel_),
+                         floor_divide(sample.y, voxels_per_supervoxel_),
+                         floor_divide(sample.z, voxels_per_supervoxel_), sample.instance};
+    std::uint32_t& recent = recent_supervoxels_[hash(voxel)];
+    if (recent == kNone || !(supervoxels_[recent].voxel == voxel)) {
+      recent = static_cast<std::uint32_t>(supervoxels_.size());
+      supervoxels_.push_back({voxel, 0});
     }
-    return recent.supervoxel;
+    return recent;
   }
 
   // Two counting sorts: supervoxels by instance, samples by supervoxel.
   void order(std::size_t instance_count, InstanceSamples& out) {
     out.supervoxel_begin.assign(instance_count + 1, 0);
-    for (const Supervoxel& s : supervoxels_) ++out.supervoxel_begin[s.instance + 1];
+    for (const Supervoxel& s : supervoxels_) ++out.supervoxel_begin[s.voxel.instance + 1];
     for (std::size_t i = 1; i <= instance_count; ++i) {
       out.supervoxel_begin[i] += out.supervoxel_begin[i - 1];
     }
@@ -165,15 +214,16 @@ class InstanceSampler {
     out.place.resize(supervoxels_.size());
     out.sample_begin.assign(supervoxels_.size() + 1, 0);
     for (std::size_t s = 0; s < supervoxels_.size(); ++s) {
-      place_[s] = next_[supervoxels_[s].instance]++;
+      place_[s] = next_[supervoxels_[s].voxel.instance]++;
       out.sample_begin[place_[s] + 1] = supervoxels_[s].samples;
-      out.place[place_[s]] = pack_place(supervoxels_[s].x, supervoxels_[s].y, supervoxels_[s].z);
+      const Voxel& voxel = supervoxels_[s].voxel;
+      out.place[place_[s]] = pack_place(voxel.x, voxel.y, voxel.z);
     }
     for (std::size_t s = 1; s <= supervoxels_.size(); ++s) {
       out.sample_begin[s] += out.sample_begin[s - 1];
     }
-    for (std::uint32_t& supervoxel : out.supervoxel_of) {
-      if (supervoxel != kNoSupervoxel) supervoxel = place_[supervoxel];
+    for (InstanceSamples::Streak& streak : out.streaks) {
+      streak.supervoxel = place_[streak.supervoxel];
     }
     const std::size_t padded = samples_.size() + detail::kLanes;
     if (out.points.size() < padded) out.points.resize(padded);
@@ -189,9 +239,9 @@ class InstanceSampler {
   float samples_per_metre_;
   std::int32_t voxels_per_supervoxel_;
   float max_range_;
-  std::uint32_t generation_ = 0;
-  std::vector<Recent> recent_;
-  std::vector<Recent> table_;
+  std::size_t most_streaks_ = 0;
+  std::vector<std::uint32_t> recent_samples_;
+  std::vector<std::uint32_t> recent_supervoxels_;
   std::vector<Sample> samples_;
   std::vector<Supervoxel> supervoxels_;
   std::vector<std::uint32_t> place_;

@@ -99,6 +99,7 @@ class RangeImage {
     std::vector<std::int16_t> border;
     std::vector<std::int16_t> around;
     std::vector<std::int16_t> reaching, widened;
+    std::vector<std::int16_t> row_least, widened_least;
   };
 
   const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
@@ -115,6 +116,7 @@ class RangeImage {
     collect(grid, ground, scratch.nearest.data());
     close_holes(grid, scratch);
     erode(grid, scratch);
+    find_row_least(grid, scratch);
     constexpr int kWidest = 4;  // cells
     for (int cells = 1; cells <= kWidest; ++cells) {
       const float limit = reach * grid.columns_per_radian / (static_cast<float>(cells) - 0.5F);
@@ -235,32 +237,60 @@ class RangeImage {
     }
   }
 
+  // Nearest of each row of `reaching`.
+  static void find_row_least(const RangeImageGrid& grid, Scratch& scratch) {
+    using namespace detail;
+    const std::size_t stride = grid.stride();
+    scratch.row_least.resize(static_cast<std::size_t>(grid.rows));
+    for (std::size_t row = 0; row < scratch.row_least.size(); ++row) {
+      Short8 least = all_shorts(kNothing);
+      for (std::size_t column = kLanes; column + kLanes < stride; column += kLanes) {
+        least = min_shorts(least, load_shorts(&scratch.reaching[row * stride + column]));
+      }
+      scratch.row_least[row] = least_short(least);
+    }
+  }
+
   // Lets returns of objects that are nearer than `limit` (cm) reach one cell farther in every
-  // direction: `reaching` holds nothing else, and `around` takes the result in.
+  // direction: `reaching` holds nothing else, and `around` takes the result in. Rows without such
+  // returns are not looked at.
   static void widen(const RangeImageGrid& grid, std::int16_t limit, Scratch& scratch) {
     using namespace detail;
     const std::size_t stride = grid.stride();
     const auto rows = static_cast<std::size_t>(grid.rows);
     const auto columns = static_cast<std::size_t>(grid.columns);
-    for (std::size_t row = 0; row < rows; ++row) wrap(&scratch.reaching[row * stride], columns);
     scratch.widened.resize(grid.cell_count());
+    scratch.widened_least.assign(rows, kNothing);
     const Short8 nothing = all_shorts(kNothing);
     const Short8 near = all_shorts(limit);
+    const auto line = [&](std::size_t row) {
+      return row < rows && scratch.row_least[row] < limit ? &scratch.reaching[row * stride]
+                                                          : nullptr;
+    };
     for (std::size_t row = 0; row < rows; ++row) {
-      const std::int16_t* const middle = &scratch.reaching[row * stride];
-      const std::int16_t* const low = row > 0 ? middle - stride : scratch.border.data();
-      const std::int16_t* const high = row + 1 < rows ? middle + stride : scratch.border.data();
+      if (line(row) != nullptr) wrap(line(row), columns);
+    }
+    for (std::size_t row = 0; row < rows; ++row) {
+      const std::int16_t* low = row > 0 ? line(row - 1) : nullptr;
+      const std::int16_t* middle = line(row);
+      const std::int16_t* high = line(row + 1);
+      if (low == nullptr && middle == nullptr && high == nullptr) continue;
+      if (low == nullptr) low = scratch.border.data();
+      if (middle == nullptr) middle = scratch.border.data();
+      if (high == nullptr) high = scratch.border.data();
       for (std::size_t column = 0; column < stride; column += kLanes) {
         const Short8 least =
             min_shorts(min_shorts(load_shorts(low + column), load_shorts(middle + column)),
                        load_shorts(high + column));
         store_shorts(&scratch.least[column], select_shorts(least < near, least, nothing));
       }
+      Short8 row_least = nothing;
       for (std::size_t column = kLanes; column + kLanes < stride; column += kLanes) {
         const std::int16_t* const least = &scratch.least[column];
         const Short8 reach = min_shorts(min_shorts(load_shorts(least - 1), load_shorts(least)),
                                         load_shorts(least + 1));
         store_shorts(&scratch.widened[row * stride + column], reach);
+        row_least = min_shorts(row_least, reach);
         std::int16_t* const around = &scratch.around[row * stride + column];
         const Short8 here = load_shorts(around);
         const Short8 unknown = here < all_shorts(0);
@@ -268,8 +298,10 @@ class RangeImage {
                      select_shorts(unknown & (reach == nothing), here,
                                    min_shorts(select_shorts(unknown, nothing, here), reach)));
       }
+      scratch.widened_least[row] = least_short(row_least);
     }
     scratch.reaching.swap(scratch.widened);
+    scratch.row_least.swap(scratch.widened_least);
   }
 
   void interleave(const RangeImageGrid& grid, const Scratch& scratch) {

@@ -37,6 +37,12 @@ inline Short8 min_shorts(Short8 a, Short8 b) {
 #endif
 }
 
+inline std::int16_t least_short(Short8 a) {
+  std::int16_t result = a[0];
+  for (int i = 1; i < 8; ++i) result = a[i] < result ? a[i] : result;
+  return result;
+}
+
 /// a0 b0 a1 b1 ... a7 b7.
 inline void store_interleaved(std::int16_t* to, Short8 a, Short8 b) {
 #if defined(__SSE2__)
