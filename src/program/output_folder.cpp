@@ -17,17 +17,39 @@ void remove_file(const fs::path& path) {
   if (error) throw IoError(path.string() + ": cannot be removed: " + error.message());
 }
 
-void remove_files(const fs::path& folder, const std::vector<std::string>& extensions) {
+/// What a killed run leaves beside its files, .NAME.PROCESS.tmp: see AtomicFile.
+bool is_leftover(const fs::path& path) {
+  const fs::path stem = path.stem();
+  const std::string process = stem.extension().string();
+  return path.extension() == ".tmp" && stem.string().front() == '.' && process.size() > 1 &&
+         process.find_first_not_of("0123456789", 1) == std::string::npos;
+}
+
+std::vector<fs::path> list(const fs::path& folder) {
   std::error_code error;
-  std::vector<fs::path> files;
+  std::vector<fs::path> entries;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
-    const std::string extension = entry->path().extension().string();
+    entries.push_back(entry->path());
+  }
+  if (error) throw IoError(folder.string() + ": cannot be listed: " + error.message());
+  return entries;
+}
+
+void remove_leftovers(const fs::path& folder) {
+  for (const fs::path& entry : list(folder)) {
+    if (is_leftover(entry)) remove_file(entry);
+  }
+}
+
+void remove_files(const fs::path& folder, const std::vector<std::string>& extensions) {
+  for (const fs::path& file : list(folder)) {
+    const std::string extension = file.extension().string();
     if (std::find(extensions.begin(), extensions.end(), extension) != extensions.end()) {
-      files.push_back(entry->path());
+      remove_file(file);
     }
   }
-  for (const fs::path& file : files) remove_file(file);
+  std::error_code error;
   // Stays if it holds anything else.
   fs::remove(folder, error);
 }
@@ -42,8 +64,8 @@ void create_folder(const fs::path& folder) {
 
 void check_output_folder(const fs::path& folder, const OutputFiles& ours, bool force) {
   std::error_code error;
-  const bool empty = fs::is_empty(folder, error);
-  if (error) throw IoError(folder.string() + ": cannot be listed: " + error.message());
+  const std::vector<fs::path> entries = list(folder);
+  const bool empty = std::all_of(entries.begin(), entries.end(), is_leftover);
   if (!empty && !fs::is_regular_file(folder / ours.marker, error)) {
     throw IoError(folder.string() + ": is not empty and holds no earlier results (no " +
                   ours.marker + "); choose another folder");
@@ -54,11 +76,21 @@ void check_output_folder(const fs::path& folder, const OutputFiles& ours, bool f
   }
 }
 
-void clear_output_folder(const fs::path& folder, const OutputFiles& ours,
-                         const std::string& marker_text) {
+void mark_output_folder(const fs::path& folder, const OutputFiles& ours,
+                        const std::string& marker_text) {
+  remove_leftovers(folder);
   AtomicFile marker(folder / ours.marker);
   marker.stream() << marker_text;
   marker.commit();
+  std::error_code error;
+  for (const std::string& name : ours.folders) {
+    if (fs::is_directory(folder / name, error)) remove_leftovers(folder / name);
+  }
+}
+
+void clear_output_folder(const fs::path& folder, const OutputFiles& ours,
+                         const std::string& marker_text) {
+  mark_output_folder(folder, ours, marker_text);
   for (const std::string& name : ours.files) remove_file(folder / name);
   std::error_code error;
   for (const std::string& name : ours.folders) {

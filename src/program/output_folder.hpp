@@ -19,8 +19,12 @@ struct OutputFiles {
 };
 
 /// Refuses a folder that is not empty, unless `force` is given and it has our marker.
-/// Throws IoError.
+/// What a killed run left half-written does not count. Throws IoError.
 void check_output_folder(const std::filesystem::path& folder, const OutputFiles& ours, bool force);
+
+/// Replaces the marker, and removes what a killed run left half-written. Throws IoError.
+void mark_output_folder(const std::filesystem::path& folder, const OutputFiles& ours,
+                        const std::string& marker_text);
 
 /// Removes earlier results, and nothing else. `marker_text` replaces the marker first, so that a
 /// folder never claims what it does not hold. Throws IoError.
