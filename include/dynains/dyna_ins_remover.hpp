@@ -371,10 +371,11 @@ class BasicDynaInsRemover {
   // believed in can have changed.
   void write_verdict(ScanSlot& scan, int votes) {
     const bool evident = config_.use_free_space;
-    const bool all = evident || !scan.is_written;
+    const bool first_time = !scan.is_written;
+    const bool all = evident || first_time;
     scan.is_written = true;
     const std::size_t ground_count = scan.split.ground_count;
-    if (all) {
+    if (first_time) {
       scan.instances.assign(scan.labels.size(), kNoInstance);
       scan.beliefs.assign(scan.labels.size(), 0.0F);
       scan.is_kept.assign(scan.split.count, 1);
@@ -383,11 +384,12 @@ class BasicDynaInsRemover {
       }
     }
     for (std::size_t i = 0; evident && i < ground_count; ++i) {
+      const bool dynamic = scan.dynamic[i] != 0;
+      if (!dynamic && scan.is_kept[i] != 0) continue;  // as written before
       const std::uint32_t to = scan.input[i];
+      scan.is_kept[i] = dynamic ? 0 : 1;
+      scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kGround;
       scan.beliefs[to] = scan.evidence[i];
-      if (scan.dynamic[i] == 0) continue;
-      scan.is_kept[i] = 0;
-      scan.labels[to] = PointLabel::kDynamic;
     }
     for (std::size_t i = 0; i < scan.non_ground_count(); ++i) {
       const std::size_t at = ground_count + i;
