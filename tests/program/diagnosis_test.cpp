@@ -1,0 +1,213 @@
+// What `dynains check` finds, on simulated streets whose poses are spoilt in every usual way.
+#include "dynains/io/diagnosis.hpp"
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "dynains/io/kitti.hpp"
+#include "dynains/simulation/simulator.hpp"
+#include "io/files.hpp"
+#include "program/start.hpp"
+#include "support/catch.hpp"
+
+using namespace dynains;
+using namespace dynains::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+using Poses = std::vector<Eigen::Isometry3d>;
+
+/// A drive around bends of a hilly street, whose poses can be written anew.
+class Street {
+ public:
+  Street() {
+    simulation::Config config;
+    config.scene = simulation::Scene::kHill;
+    config.sensor = simulation::Sensor::kVlp16;
+    config.scans = 24;
+    config.rate = 5.0;
+    config.seed = 4;
+    config.sensor_height = 1.9;
+    simulation::Simulator simulator(config);
+    fs::create_directories(folder_ / "velodyne");
+    for (std::size_t i = 0; i < simulator.size(); ++i) {
+      const simulation::SimulatedScan scan = simulator.scan(i);
+      write_scan(folder_ / ("velodyne/" + std::to_string(i) + ".bin"), scan.xyzi);
+      poses_.push_back(scan.T_world_sensor);
+    }
+  }
+
+  fs::path path() const { return folder_.path(); }
+  const Poses& poses() const { return poses_; }
+
+  Diagnosis diagnose(const std::function<Eigen::Isometry3d(Eigen::Isometry3d)>& spoil) const {
+    Poses rows;
+    for (const Eigen::Isometry3d& pose : poses_) rows.push_back(spoil(pose));
+    write_poses(folder_ / "poses.txt", rows);
+    return dynains::diagnose(Recording(folder_.path()));
+  }
+
+ private:
+  TemporaryFolder folder_;
+  Poses poses_;
+};
+
+Eigen::Isometry3d scaled(Eigen::Isometry3d pose, double factor) {
+  pose.translation() *= factor;
+  return pose;
+}
+
+}  // namespace
+
+TEST_CASE("check names the mistake in the poses and the option against it") {
+  const Street street;
+  const Diagnosis sound = street.diagnose([](const Eigen::Isometry3d& T) { return T; });
+  CHECK(sound.verdict == PoseVerdict::kAgree);
+  CHECK(sound.sound());
+  CHECK_THAT(advice(sound), ContainsSubstring("agree as they are"));
+  CHECK(sound.scan_files == 24);
+  CHECK(sound.pose_rows == 24);
+  REQUIRE(sound.mounting.known);
+  CHECK(std::abs(sound.mounting.height - 1.9) < 0.1);
+  CHECK(sound.invalid_share == 0.0);
+
+  const auto option_of = [&](auto&& spoil) {
+    const Diagnosis diagnosis = street.diagnose(spoil);
+    CHECK(diagnosis.verdict == PoseVerdict::kOtherwise);
+    return diagnosis.readings.empty() ? std::string() : diagnosis.readings.front().option;
+  };
+  const Eigen::Isometry3d axes = camera_axes();
+  CHECK(option_of([](const Eigen::Isometry3d& T) { return T.inverse(); }) == "--invert-poses");
+  CHECK(option_of([](const Eigen::Isometry3d& T) { return scaled(T, 1000.0); }) ==
+        "--pose-units mm");
+  CHECK(option_of([](const Eigen::Isometry3d& T) { return scaled(T, 100.0); }) ==
+        "--pose-units cm");
+  CHECK(option_of([&](const Eigen::Isometry3d& T) { return axes * T * axes.inverse(); }) ==
+        "--pose-frame camera");
+  CHECK(option_of([&](const Eigen::Isometry3d& T) {
+          return scaled((axes * T * axes.inverse()).inverse(), 1000.0);
+        }) == "--invert-poses --pose-frame camera --pose-units mm");
+
+  std::string rows;
+  for (std::size_t i = 0; i < street.poses().size(); ++i) {
+    const Eigen::Quaterniond q(street.poses()[i].linear());
+    const Eigen::Vector3d t = street.poses()[i].translation();
+    for (const double value :
+         {0.2 * static_cast<double>(i), t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z()}) {
+      rows += std::to_string(value) + ' ';
+    }
+    rows += '\n';
+  }
+  write_text(street.path() / "poses.txt", rows);
+  const Diagnosis quaternions = diagnose(Recording(street.path()));
+  CHECK(quaternions.verdict == PoseVerdict::kOtherwise);
+  CHECK(quaternions.readings.front().option == "--quaternion-order wxyz");
+
+  // The option heals it.
+  RecordingOptions options;
+  options.convention.quaternion = QuaternionOrder::kWxyz;
+  const Recording healed(street.path(), options);
+  CHECK(diagnose(healed).verdict == PoseVerdict::kAgree);
+  CHECK_FALSE(pose_agreement(healed, 0, 23).doubtful());
+  CHECK(pose_agreement(Recording(street.path()), 0, 23).doubtful());
+}
+
+TEST_CASE("check admits what it cannot tell") {
+  const Street street;
+  // As if every scan came from elsewhere.
+  std::size_t i = 0;
+  const Diagnosis chaos = street.diagnose([&](const Eigen::Isometry3d&) {
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.translation().x() = static_cast<double>((7919 * ++i) % 101);
+    return pose;
+  });
+  CHECK(chaos.verdict == PoseVerdict::kDisagree);
+  CHECK_FALSE(chaos.sound());
+
+  const TemporaryFolder folder;
+  write_text(folder / "velodyne/0.bin", std::string(16, '\0'));
+  write_text(folder / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  const Diagnosis one = diagnose(Recording(folder.path()));
+  CHECK(one.verdict == PoseVerdict::kUnknown);
+  CHECK(one.invalid_share == 1.0);
+  CHECK_FALSE(one.mounting.known);
+}
+
+TEST_CASE("check and run say what is wrong, in a sentence") {
+  const Street street;
+  Poses inverse;
+  for (const Eigen::Isometry3d& pose : street.poses()) inverse.push_back(pose.inverse());
+  write_poses(street.path() / "poses.txt", inverse);
+  const std::string seq = street.path();
+
+  const Outcome wrong = start({"check", seq});
+  CHECK(wrong.code == 1);
+  CHECK_THAT(wrong.out, ContainsSubstring("pass --invert-poses.\n"));
+  CHECK(wrong.err.empty());
+  const Outcome right = start({"check", seq, "--invert-poses"});
+  CHECK(right.code == 0);
+  CHECK_THAT(right.out, ContainsSubstring("agree as they are"));
+
+  const TemporaryFolder out;
+  const Outcome warned = start({"run", seq, "-o", out / "wrong", "-q"});
+  CHECK(warned.code == 0);
+  CHECK_THAT(warned.err, StartsWith("dynains: warning: only ") &&
+                             ContainsSubstring("see: dynains check " + seq));
+  const Outcome fine = start({"run", seq, "-o", out / "right", "-q", "--invert-poses"});
+  CHECK(fine.code == 0);
+  CHECK(fine.err.empty());
+}
+
+TEST_CASE("run takes PCD scans and writes them cleaned, to be read again") {
+  const Street street;
+  const TemporaryFolder folder;
+  write_poses(street.path() / "poses.txt", street.poses());
+  const Recording source(street.path());
+  fs::create_directories(folder / "seq/pcd");
+  PointColumns columns;
+  columns.intensity = columns.ring = columns.time = true;
+  for (std::size_t i = 0; i < 12; ++i) {
+    const RecordedScan scan = source.read_scan(i);
+    PointFileWriter file(folder / ("seq/pcd/" + std::to_string(i) + ".pcd"), columns,
+                         source.T_world_sensor(i));
+    for (std::size_t k = 0; k < scan.size(); ++k) {
+      FilePoint point = scan.point(k);
+      point.position = source.T_world_sensor(i) * point.position;
+      point.ring = 5;
+      point.time = 0.125;
+      file.add(point);
+    }
+    file.commit();
+  }
+  const Outcome outcome = start(
+      {"run", folder / "seq", "-o", folder / "out", "-q", "--write-clean", "--frame", "world"});
+  CAPTURE(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK(count_entries(folder / "out/labels") == 12);
+
+  RecordingOptions options;
+  options.frame = PointFrame::kWorld;
+  const Recording before(folder / "seq", options);
+  const Recording clean(folder / "out/clean", options);
+  REQUIRE(clean.size() == 12);
+  for (std::size_t i = 0; i < 12; ++i) {
+    const RecordedScan all = before.read_scan(i);
+    const RecordedScan kept = clean.read_scan(i);
+    const std::vector<std::uint32_t> labels =
+        read_labels(folder / ("out/labels/" + std::to_string(i) + ".label"), all.size());
+    std::size_t expected = 0;
+    for (const std::uint32_t label : labels) {
+      if ((label & 0xFFFF) != 251) ++expected;
+    }
+    CHECK(kept.size() == expected);
+    CHECK(clean.T_world_sensor(i).isApprox(before.T_world_sensor(i), 1e-9));
+    REQUIRE_FALSE(kept.ring.empty());
+    CHECK(kept.ring.front() == 5);
+    CHECK(kept.time.front() == 0.125);
+  }
+  const PointFile moving = read_points(folder / "out/dynamic_points.ply");
+  CHECK(moving.ring.size() == moving.positions.size());
+  CHECK(moving.time.size() == moving.positions.size());
+}
