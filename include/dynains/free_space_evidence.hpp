@@ -81,6 +81,7 @@ class FreeSpaceEvidence {
     View& view = views_[scan % views_.size()];
     if (scan == 0 || views_[(scan - 1) % views_.size()].segment != segment) {
       origin_ = T_world_sensor.translation();
+      segment_begin_ = scan;
     }
     view.segment = segment;
     view.T_world_sensor = T_world_sensor;
@@ -411,7 +412,8 @@ class FreeSpaceEvidence {
   bool presumed(std::uint64_t scan, const Record& record, std::size_t instance) const {
     constexpr std::uint32_t kLeastSamples = 5;
     constexpr float kLargest = 15.0F, kHighest = 3.5F, kUnknown = 0.1F;
-    if (!config_.presume_dynamic || scan < 2) return false;
+    // Where comparison has just begun, no place has been seen.
+    if (!config_.presume_dynamic || scan < segment_begin_ + 2) return false;
     const Share& share = record.shares[instance];
     const TrackedInstances::Instance& tracked = record.tracked.instances[instance];
     return share.total >= kLeastSamples && tracked.length <= kLargest &&
@@ -515,6 +517,7 @@ class FreeSpaceEvidence {
   TrackBelief track_belief_;
   RangeImageGrid grid_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();  // of the cells of tracks
+  std::uint64_t segment_begin_ = 0;  // first scan of the segment of the newest
   std::uint64_t newest_ = 0;
   std::vector<View> views_;
   std::vector<Record> records_;
