@@ -1,0 +1,109 @@
+// Hours, in small scans: memory and time stay flat, and what is long past has no say.
+//
+// DYNAINS_ENDURANCE_SCANS=100000 test_reliability "[endurance]"   is the long run.
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "dynains/dyna_ins_remover.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+#include "support/runs.hpp"
+#include "support/scene.hpp"
+
+namespace dynains::test {
+namespace {
+
+using Config = DynaInsRemover::Config;
+
+std::size_t scan_count() {
+  const char* const wanted = std::getenv("DYNAINS_ENDURANCE_SCANS");
+  constexpr std::size_t kShort = 600;
+  return wanted == nullptr ? kShort : static_cast<std::size_t>(std::stoul(wanted));
+}
+
+/// Every 60th point of a full scan, about 1,500; a car passes again and again.
+std::vector<Scan> small_round(std::size_t count) {
+  std::vector<Scan> scans;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double angle = 2.0 * M_PI * static_cast<double>(i) / static_cast<double>(count);
+    const Scene scene = yard_with(van(22.0 - 44.0 * static_cast<double>(i) / 40.0, 4.0));
+    const Scan full = scene.scan(sensor_at(2.0 * std::cos(angle), 2.0 * std::sin(angle)),
+                                 0.1 * static_cast<double>(i));
+    Scan small{full.T_world_sensor, full.time, {}, {}};
+    for (std::size_t k = i % 7; k < full.points.size(); k += 60) {
+      small.points.push_back(full.points[k]);
+    }
+    scans.push_back(small);
+  }
+  return scans;
+}
+
+double resident_megabytes() {
+  std::ifstream statm("/proc/self/statm");
+  double size = 0.0;
+  double resident = 0.0;
+  statm >> size >> resident;
+  return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + static_cast<long>(values.size() / 2),
+                   values.end());
+  return values[values.size() / 2];
+}
+
+TEST_CASE("hours at once: memory and time stay flat, the past is forgotten", "[endurance]") {
+  const bool paper = GENERATE(true, false);
+  const Config config = paper ? Config::paper() : Config();
+  const std::vector<Scan> round = small_round(40);
+  const std::size_t count = scan_count();
+  const auto push = [&](DynaInsRemover& remover, std::size_t i) {
+    const Scan& scan = round[i % round.size()];
+    return remover.push(scan.points, scan.T_world_sensor, 0.1 * static_cast<double>(i));
+  };
+
+  DynaInsRemover remover(config);
+  std::vector<double> first_times;
+  std::vector<double> last_times;
+  double memory_before = 0.0;
+  std::size_t map_before = 0;
+  for (std::size_t i = 0; i + 1 < count; ++i) {
+    const FrameResult frame = push(remover, i);
+    if (i > count / 4 && i <= count / 2) first_times.push_back(frame.times.total());
+    if (i > count / 4 * 3) last_times.push_back(frame.times.total());
+    if (i == count / 2) {
+      memory_before = resident_megabytes();
+      map_before = remover.map().memory_bytes();
+    }
+  }
+  const double growth = resident_megabytes() - memory_before -
+                        static_cast<double>(remover.map().memory_bytes() - map_before) / 1e6;
+  const double slower = median(last_times) / median(first_times);
+  WARN((paper ? "paper: " : "default: ")
+       << count << " scans, " << growth << " MB more in the second half without the map, time per "
+       << "scan " << median(last_times) << " ms, " << slower << " times that of the first half");
+  CHECK(growth < 8.0);
+  CHECK(slower < 3.0);
+
+  // A fresh object that was fed the last scans only says the same of the newest.
+  DynaInsRemover fresh(config);
+  const std::size_t reach = paper ? static_cast<std::size_t>(config.window) : 200;
+  for (std::size_t i = count - std::min(count, reach); i + 1 < count; ++i) push(fresh, i);
+  const Verdict expected(push(fresh, count - 1).newest);
+  const Verdict newest(push(remover, count - 1).newest);
+  if (paper) {
+    CHECK((newest.labels == expected.labels));
+  } else {
+    // Beliefs along tracks have no end; the sensor was judged by another first scan.
+    CHECK(disagreement({newest}, {expected}) < 0.01);
+  }
+}
+
+}  // namespace
+}  // namespace dynains::test

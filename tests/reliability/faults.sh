@@ -1,0 +1,135 @@
+#!/usr/bin/env bash
+# faults.sh PROGRAM [KILLS]: `dynains run` under kill -9, a full disk, a folder that cannot be
+# written and input that vanishes. Whatever happens, each file is absent or whole, report.json says
+# "complete": false until everything is there, and --resume comes to the bytes of an undisturbed
+# run.
+set -euo pipefail
+program=$1
+kills=${2:-12}
+work=$(mktemp -d)
+disk=$work/disk
+cleanup() {
+  if mountpoint -q "$disk" 2>/dev/null; then umount "$disk"; fi
+  rm -rf "$work"
+}
+trap cleanup EXIT
+failures=0
+fail() { echo "FAILED: $*"; failures=$((failures + 1)); }
+
+# Bytes that depend on nothing but the input: all but measured times and the report.
+results() { (cd "$1" && find labels static_map.ply dynamic_points.ply -type f | sort); }
+same() {
+  diff <(results "$1") <(results "$2") &&
+    while read -r file; do cmp "$1/$file" "$2/$file" || return 1; done < <(results "$2")
+}
+# Every label file under its final name is whole: as long as that of the undisturbed run.
+whole() {
+  local file
+  for file in "$1"/labels/*.label; do
+    [[ -e $file ]] || continue
+    [[ $(stat -c %s "$file") == $(stat -c %s "$work/expected/labels/${file##*/}") ]] || return 1
+  done
+  for file in static_map.ply dynamic_points.ply; do
+    [[ ! -e $1/$file ]] || cmp "$1/$file" "$work/expected/$file" || return 1
+  done
+}
+complete() { grep -q '"complete": true' "$1/report.json" 2>/dev/null; }
+
+seq=$work/seq
+"$program" simulate "$seq" --scans 24 --sensor vlp16 --quiet
+begin=$(date +%s%N)
+"$program" run "$seq" --out "$work/expected" --quiet
+span=$((($(date +%s%N) - begin) / 1000))  # us
+RANDOM=7
+
+echo "--- kill -9, $kills times within $((span / 1000)) ms"
+early=0
+broken=0
+for ((i = 0; i < kills; ++i)); do
+  out=$work/out
+  # A third of the time the next start resumes what the last left and is killed again.
+  if ((i % 3 == 0)); then rm -rf "$out"; fi
+  "$program" run "$seq" --out "$out" --resume --quiet &
+  pid=$!
+  delay=$(((RANDOM * 32768 + RANDOM) % span))
+  sleep "$((delay / 1000000)).$(printf %06d $((delay % 1000000)))"
+  kill -9 "$pid" 2>/dev/null || true
+  wait "$pid" 2>/dev/null || true
+  [[ -d $out ]] || { early=$((early + 1)); continue; }
+  complete "$out" || broken=$((broken + 1))
+  whole "$out" || fail "kill $i left a damaged file"
+  if complete "$out"; then
+    same "$work/expected" "$out" || fail "kill $i: report.json claims what is not there"
+  fi
+  if ((i % 3 == 2)); then
+    "$program" run "$seq" --out "$out" --resume --quiet || fail "kill $i: --resume"
+    complete "$out" || fail "kill $i: not complete after --resume"
+    same "$work/expected" "$out" || fail "kill $i: other bytes after --resume"
+    [[ -z $(find "$out" -name '.*.tmp') ]] || fail "kill $i: leftovers after --resume"
+  fi
+done
+echo "$early of them before there was a folder, $broken before the run was complete"
+((early + broken > 0)) || fail "no kill hit a run"
+
+echo "--- --resume after Ctrl-C; with other flags; when complete; --force after a kill"
+rm -rf "$work/out"
+"$program" run "$seq" --out "$work/out" --quiet &
+pid=$!
+for ((i = 0; i < 2000; ++i)); do [[ -d $work/out/labels ]] && break; sleep 0.005; done
+kill -INT "$pid"
+code=0
+wait "$pid" || code=$?
+[[ $code == 130 ]] || fail "Ctrl-C: exit code $code"
+if "$program" run "$seq" --out "$work/out" --resume --window 3 --quiet 2>"$work/err"; then
+  fail "--resume took the results of other flags"
+fi
+grep -q 'cannot be resumed' "$work/err" || fail "--resume with other flags: $(cat "$work/err")"
+"$program" run "$seq" --out "$work/out" --resume --quiet || fail "--resume after Ctrl-C"
+same "$work/expected" "$work/out" || fail "--resume after Ctrl-C: other bytes"
+"$program" run "$seq" --out "$work/out" --resume | grep -q 'complete already' ||
+  fail "--resume of a complete run has nothing to do"
+
+echo "--- input that vanishes in the middle"
+cp -r "$seq" "$work/vanishing"
+"$program" run "$work/vanishing" --out "$work/vanished" --quiet 2>"$work/err" &
+pid=$!
+for ((i = 0; i < 2000; ++i)); do [[ -d $work/vanished/labels ]] && break; sleep 0.005; done
+rm -rf "$work/vanishing/velodyne"
+code=0
+wait "$pid" || code=$?
+if [[ $code == 0 ]]; then
+  echo "it was read before it vanished"
+else
+  [[ $code == 1 ]] || fail "vanishing input: exit code $code"
+  grep -q 'dynains: error: .*bin' "$work/err" || fail "vanishing input: $(cat "$work/err")"
+  ! complete "$work/vanished" || fail "vanishing input: called complete"
+  whole "$work/vanished" || fail "vanishing input: damaged files"
+fi
+
+echo "--- a full disk"
+mkdir "$disk"
+if mount -t tmpfs -o size=600k tmpfs "$disk" 2>/dev/null; then
+  code=0
+  "$program" run "$seq" --out "$disk/out" --quiet 2>"$work/err" || code=$?
+  [[ $code == 1 ]] || fail "full disk: exit code $code"
+  grep -q 'No space left' "$work/err" || fail "full disk: $(cat "$work/err")"
+  [[ ! -d $disk/out ]] || { whole "$disk/out" && ! complete "$disk/out"; } ||
+    fail "full disk: damaged files"
+  [[ -z $(find "$disk" -name '.*.tmp') ]] || fail "full disk: leftovers"
+  mount -o remount,size=64m "$disk"
+  "$program" run "$seq" --out "$disk/out" --resume --quiet || fail "full disk: --resume"
+  same "$work/expected" "$disk/out" || fail "full disk: other bytes after --resume"
+
+  echo "--- a file system that is read-only"
+  mount -o remount,ro "$disk"
+  code=0
+  "$program" run "$seq" --out "$disk/out" --force --quiet 2>"$work/err" || code=$?
+  [[ $code == 1 ]] || fail "read-only: exit code $code"
+  grep -q 'Read-only' "$work/err" || fail "read-only: $(cat "$work/err")"
+  same "$work/expected" "$disk/out" || fail "read-only: earlier results changed"
+else
+  echo "skipped: a tmpfs cannot be mounted here (needs root)"
+fi
+
+if ((failures > 0)); then exit 1; fi
+echo "all held"

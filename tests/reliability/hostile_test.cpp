@@ -1,0 +1,103 @@
+// Poses and times as they come from a bad day: what happens is defined, for both presets.
+#include <cmath>
+#include <vector>
+
+#include "dynains/dyna_ins_remover.hpp"
+#include "support/catch.hpp"
+#include "support/runs.hpp"
+#include "support/scene.hpp"
+
+namespace dynains::test {
+namespace {
+
+using Config = DynaInsRemover::Config;
+
+Scene oncoming() { return yard_with(van(22.0, 3.5, {-12.0, 0.0, 0.0})); }
+
+double dynamic_share(const std::vector<Scan>& scans, const Run& result) {
+  return share(scans, result.final, PointLabel::kDynamic).value();
+}
+
+TEST_CASE("a pose that jumps far away and stays there removes nothing that stands") {
+  const Config config = GENERATE(Config::paper(), Config());
+  std::vector<Scan> scans = drive(yard(), 10, 5.0);
+  for (std::size_t i = 5; i < scans.size(); ++i) {
+    scans[i].T_world_sensor.pretranslate(Eigen::Vector3d(1e4, -3e3, 20.0));
+  }
+  const Run result = run(config, scans);
+  CHECK(result.final.size() == scans.size());
+  CHECK(dynamic_share(scans, result) < 1e-3);
+}
+
+TEST_CASE("after a gap nothing before it has a say, and before it nothing after") {
+  const Config config = GENERATE(Config::paper(), Config());
+  std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
+  for (std::size_t i = 4; i < scans.size(); ++i) scans[i].time += config.max_gap;
+  const Run whole = run(config, scans);
+  const Run before = run(config, {scans.begin(), scans.begin() + 4});
+  for (std::size_t i = 0; i < 3; ++i) CHECK((whole.final[i].labels == before.final[i].labels));
+  // The last scan of a recording keeps what is presumed of the newest one.
+  CHECK(disagreement({whole.final[3]}, {before.final[3]}) < 1e-3);
+
+  // The first scan tells what sensor it is, and nothing else that outlives the gap.
+  std::vector<Scan> after = {scans[0]};
+  after.insert(after.end(), scans.begin() + 4, scans.end());
+  const Run second = run(config, after);
+  for (std::size_t i = 4; i < 8; ++i) {
+    CHECK((whole.newest[i].labels == second.newest[i - 3].labels));
+    CHECK((whole.final[i].labels == second.final[i - 3].labels));
+  }
+  // And without the gap it is not the same: the test can fail.
+  const Run together = run(config, drive(oncoming(), 8, 5.0));
+  CHECK((whole.newest[4].labels != together.newest[4].labels));
+}
+
+TEST_CASE("one scan again and again shows no motion and adds nothing to the map") {
+  const Config config = GENERATE(Config::paper(), Config());
+  const std::vector<Scan> once = {oncoming().scan(sensor_at(0.0), 0.0)};
+  std::vector<Scan> again(12, once[0]);
+  for (std::size_t i = 0; i < again.size(); ++i) again[i].time = 0.1 * static_cast<double>(i);
+  DynaInsRemover first(config);
+  DynaInsRemover remover(config);
+  run(first, once);
+  const Run result = run(remover, again);
+  CHECK(dynamic_share(again, result) == 0.0);
+  CHECK(remover.map().size() == first.map().size());
+}
+
+TEST_CASE("stamps that run back or repeat are refused and change nothing") {
+  const Config config = GENERATE(Config::paper(), Config());
+  const std::vector<Scan> scans = drive(oncoming(), 6, 5.0);
+  const Run expected = run(config, scans);
+  DynaInsRemover remover(config);
+  std::vector<Verdict> final;
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    const Scan& scan = scans[i];
+    const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
+    CHECK((Verdict(frame.newest) == expected.newest[i]));
+    if (frame.finished) final.emplace_back(*frame.finished);
+    for (const double time : {scan.time, scan.time - 0.05, -1e9}) {
+      CHECK_THROWS_AS(remover.push(scans[0].points, scan.T_world_sensor, time), PoseError);
+    }
+  }
+  remover.flush([&](const ScanVerdict& verdict) { final.emplace_back(verdict); });
+  CHECK((final == expected.final));
+}
+
+TEST_CASE("every third scan dropped: what moves is still removed, what stands stays") {
+  const Config config = GENERATE(Config::paper(), Config());
+  std::vector<Scan> scans;
+  for (int i = 0; i < 13; ++i) {
+    if (i % 3 == 1) continue;
+    scans.push_back(oncoming().scan(sensor_at(0.5 * i), 0.1 * i));
+  }
+  const std::vector<Verdict> verdicts = run(config, scans).final;
+  const Share moving = share(scans, verdicts, PointLabel::kDynamic, kAddedBox);
+  REQUIRE(moving.total > 5000);
+  CHECK(moving.value() > 0.7);
+  const Share all = share(scans, verdicts, PointLabel::kDynamic);
+  CHECK(all.labelled - moving.labelled < all.total / 200);
+}
+
+}  // namespace
+}  // namespace dynains::test
