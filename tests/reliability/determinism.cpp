@@ -1,0 +1,85 @@
+// Prints a fingerprint of everything that the remover says of a small scene, for each preset.
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+
+#include "support/runs.hpp"
+#include "support/scene.hpp"
+
+namespace {
+
+using namespace dynains;
+using namespace dynains::test;
+
+/// FNV-1a, 64 bits.
+class Fingerprint {
+ public:
+  template <class T>
+  void add(const T& value) {
+    unsigned char bytes[sizeof(T)];
+    std::memcpy(bytes, &value, sizeof(T));
+    for (const unsigned char byte : bytes) value_ = (value_ ^ byte) * 0x100000001B3U;
+  }
+  template <class T>
+  void add_all(const std::vector<T>& values) {
+    for (const T& value : values) add(value);
+  }
+  unsigned long long value() const { return value_; }
+
+ private:
+  std::uint64_t value_ = 0xCBF29CE484222325U;
+};
+
+/// A floor and boxes, every other of which moves. Coordinates are exact in float: no rounding, no
+/// libm.
+std::vector<Scan> scene() {
+  std::vector<Scan> scans;
+  Random random(5);
+  for (int i = 0; i < 12; ++i) {
+    Scan scan{sensor_at(0.5 * i, 0.25 * i), 0.125 * i, {}, {}};
+    for (int x = -80; x < 80; ++x) {
+      for (int y = -80; y < 80; ++y) {
+        scan.points.emplace_back(0.375F * static_cast<float>(x), 0.375F * static_cast<float>(y),
+                                 -1.75F + 0.0625F * static_cast<float>(random.index(3)));
+      }
+    }
+    for (int object = 0; object < 6; ++object) {
+      const float left = 6.0F + 5.0F * static_cast<float>(object);
+      const float ahead = object % 2 == 0 ? 12.0F - 1.5F * static_cast<float>(i) : -6.0F;
+      for (int point = 0; point < 400; ++point) {
+        // One after the other: the order of arguments is the compiler's own.
+        const auto along = 0.125F * static_cast<float>(random.index(16));
+        const auto across = 0.125F * static_cast<float>(random.index(8));
+        const auto up = 0.125F * static_cast<float>(random.index(16));
+        scan.points.emplace_back(ahead + along, left + across, -1.25F + up);
+      }
+    }
+    scans.push_back(scan);
+  }
+  return scans;
+}
+
+}  // namespace
+
+int main() {
+  for (const auto& config : {DynaInsRemover::Config::paper(), DynaInsRemover::Config()}) {
+    DynaInsRemover remover(config);
+    const std::vector<Scan> scans = scene();
+    const Run result = run(remover, scans);
+    Fingerprint fingerprint;
+    for (const std::vector<Verdict>* verdicts : {&result.newest, &result.final}) {
+      for (const Verdict& verdict : *verdicts) {
+        fingerprint.add_all(verdict.labels);
+        fingerprint.add_all(verdict.instances);
+        fingerprint.add_all(verdict.beliefs);
+      }
+    }
+    remover.map().for_each([&](const Eigen::Vector3d& point) {
+      for (int axis = 0; axis < 3; ++axis) fingerprint.add(point[axis]);
+    });
+    const Share moving = share(scans, result.final, PointLabel::kDynamic);
+    std::printf("%016llx %zu moving points, map of %zu\n", fingerprint.value(), moving.labelled,
+                remover.map().size());
+  }
+  return 0;
+}
