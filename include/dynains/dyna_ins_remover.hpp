@@ -187,7 +187,7 @@ class BasicDynaInsRemover {
       if (evidence_tracks()) hand_on_ids(newest);
     }
     clock.lap(result.times.evidence);
-    decide(newest, 1, clock, result.times);
+    decide(newest, 1, false, clock, result.times);
     result.newest = newest.verdict();
 
     if (pushed_ - finished_ > latency()) result.finished = finish_next(clock, result.times);
@@ -358,9 +358,9 @@ class BasicDynaInsRemover {
   }
 
   // Verdict by point: at least `votes` windows said so, or the evidence does.
-  void decide(ScanSlot& scan, int votes, StageClock& clock, StageTimes& times) {
+  void decide(ScanSlot& scan, int votes, bool is_final, StageClock& clock, StageTimes& times) {
     if (config_.use_free_space) {
-      evidence_.judge(scan.scan, scan.split, scan.dynamic, scan.evidence);
+      evidence_.judge(scan.scan, is_final, scan.split, scan.dynamic, scan.evidence);
     }
     clock.lap(times.evidence);
     write_verdict(scan, votes);
@@ -405,7 +405,7 @@ class BasicDynaInsRemover {
 
   ScanVerdict finish_next(StageClock& clock, StageTimes& times) {
     ScanSlot& scan = slot(finished_);
-    decide(scan, std::max(1, config_.votes), clock, times);
+    decide(scan, std::max(1, config_.votes), true, clock, times);
     if (config_.build_map) {
       const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
       map_.insert(points, scan.is_kept, scan.T_world_sensor);

@@ -121,11 +121,11 @@ class FreeSpaceEvidence {
   }
 
   /// Verdict on a scan that is at most `horizon()` old, as the evidence stands now: by point of
-  /// `split`, whether it moved, and the belief that it did.
-  void judge(std::uint64_t scan, const GroundSplit& split, std::vector<std::uint8_t>& dynamic,
-             std::vector<float>& belief) {
+  /// `split`, whether it moved, and the belief that it did. Nothing is presumed in a final verdict.
+  void judge(std::uint64_t scan, bool is_final, const GroundSplit& split,
+             std::vector<std::uint8_t>& dynamic, std::vector<float>& belief) {
     const Record& record = record_of(scan);
-    judge_instances(scan, record);
+    judge_instances(scan, is_final, record);
     dynamic.assign(split.count, 0);
     belief.assign(split.count, 0.0F);
     const PointsView points = split.non_ground();
@@ -354,7 +354,7 @@ class FreeSpaceEvidence {
     return instance.own + before + after;
   }
 
-  void judge_instances(std::uint64_t scan, const Record& record) {
+  void judge_instances(std::uint64_t scan, bool is_final, const Record& record) {
     const InstanceSamples& samples = record.samples;
     verdicts_.resize(samples.supervoxel_count());
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
@@ -368,7 +368,7 @@ class FreeSpaceEvidence {
         verdicts_[s] = {0, as_probability(belief.peak)};
         if (is_free(belief)) free_.push_back(s);
       }
-      if (moved_whole(scan, record, instance, level)) {
+      if (moved_whole(scan, is_final, record, instance, level)) {
         const Verdict verdict = {1, as_probability(std::max(level, free_level_))};
         std::fill(verdicts_.begin() + first, verdicts_.begin() + last, verdict);
         add_hull(record, instance);
@@ -381,13 +381,13 @@ class FreeSpaceEvidence {
   }
 
   // Whether an instance is removed as a whole; raises `level` to the belief along its track.
-  bool moved_whole(std::uint64_t scan, const Record& record, std::size_t instance,
+  bool moved_whole(std::uint64_t scan, bool is_final, const Record& record, std::size_t instance,
                    float& level) const {
     if (removes_whole(record, instance)) return true;
     if (!config_.use_tracks || !record.tracked.instances[instance].carried) return false;
     const float along = track_belief(record.tracked.instances[instance]);
     level = std::max(level, along);
-    return along >= track_level_ || (scan == newest_ && presumed(scan, record, instance));
+    return along >= track_level_ || (!is_final && presumed(scan, record, instance));
   }
 
   // The ground below a compact instance.

@@ -76,7 +76,8 @@ struct IsEvidence<
         decltype(std::declval<Stage&>().observe(
             std::uint64_t{}, std::uint64_t{}, std::declval<const Eigen::Isometry3d&>(),
             std::declval<const GroundSplit&>(), Span<const std::uint32_t>(), std::size_t{})),
-        decltype(std::declval<Stage&>().judge(std::uint64_t{}, std::declval<const GroundSplit&>(),
+        decltype(std::declval<Stage&>().judge(std::uint64_t{}, bool{},
+                                              std::declval<const GroundSplit&>(),
                                               std::declval<std::vector<std::uint8_t>&>(),
                                               std::declval<std::vector<float>&>())),
         std::enable_if_t<
