@@ -114,7 +114,7 @@ TEST_CASE("Progress is plain lines in a pipe, and silence with --quiet") {
   CHECK(quiet.err.empty());
 }
 
-TEST_CASE("--start and --end are scan numbers, both included") {
+TEST_CASE("Flags --start and --end are scan numbers, both included") {
   const Fixture fixture;
   REQUIRE(fixture.run({"--start", "3", "--end", "7"}).code == 0);
   CHECK(fixture.labels() == 5);
@@ -123,7 +123,7 @@ TEST_CASE("--start and --end are scan numbers, both included") {
   CHECK(fixture.report()["scans"] == 5);
 }
 
-TEST_CASE("--map and --map-voxel") {
+TEST_CASE("Flags --map and --map-voxel") {
   const Fixture fixture;
   const std::string map = fixture.folder / "my map.pcd";
   REQUIRE(fixture.run({"--map", map, "--map-voxel", "0"}).code == 0);

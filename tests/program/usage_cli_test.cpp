@@ -6,7 +6,7 @@
 
 using namespace dynains::test;
 
-TEST_CASE("--version and --help") {
+TEST_CASE("Flags --version and --help") {
   const Outcome version = start({"--version"});
   CHECK(version.code == 0);
   CHECK(version.out == std::string("dynains ") + dynains::kVersionString + "\n");
