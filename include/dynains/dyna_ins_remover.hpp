@@ -348,9 +348,11 @@ class BasicDynaInsRemover {
   // What depends on the sensor, from the first scan that has enough points.
   void adapt_to_sensor(ScanSlot& newest) {
     sensor_ = estimate_sensor_model(ingest_.points());
-    const Mounting mounting = estimate_mounting(ingest_.points());
-    if (mounting.known) sensor_.height = mounting.height;
-    if (newest.scan > 0 && sensor_.known()) newest.segment = ++segment_;
+    if (sensor_.known()) {
+      const Mounting mounting = estimate_mounting(ingest_.points());
+      if (mounting.known) sensor_.height = mounting.height;
+      if (newest.scan > 0) newest.segment = ++segment_;
+    }
     const SensorModel model = sensor_.known() ? sensor_ : SensorModel::typical();
     detail::adapt_stage(ground_, model);
     detail::adapt_stage(clusterer_, model);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dynains/curved_voxel_clusterer.hpp"
+#include "dynains/detail/cell_hash.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/points.hpp"
 
@@ -98,12 +99,7 @@ class InstanceSampler {
   static constexpr unsigned kAllLanes = (1U << detail::kLanes) - 1;
 
   static std::size_t hash(const Voxel& voxel) {
-    std::uint64_t h = static_cast<std::uint32_t>(voxel.x);
-    h = h * 0x9E3779B97F4A7C15ULL + static_cast<std::uint32_t>(voxel.y);
-    h = h * 0x9E3779B97F4A7C15ULL + static_cast<std::uint32_t>(voxel.z);
-    h = h * 0x9E3779B97F4A7C15ULL + voxel.instance;
-    h *= 0x9E3779B97F4A7C15ULL;
-    return static_cast<std::size_t>(h >> 40) % kRecent;
+    return detail::cell_hash(voxel.x, voxel.y, voxel.z, voxel.instance) % kRecent;
   }
 
   static std::int32_t floor_divide(std::int32_t a, std::int32_t b) {

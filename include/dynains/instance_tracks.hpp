@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "dynains/curved_voxel_clusterer.hpp"
+#include "dynains/detail/cell_hash.hpp"
 #include "dynains/instance_samples.hpp"
 #include "dynains/points.hpp"
 
@@ -128,11 +129,7 @@ class InstanceLinker {
 
   // Without the instance: cells of two scans meet in the same place.
   static std::size_t hash(const TrackedInstances::Cell& cell) {
-    std::uint64_t h = static_cast<std::uint32_t>(cell.x);
-    h = h * 0x9E3779B97F4A7C15ULL + static_cast<std::uint32_t>(cell.y);
-    h = h * 0x9E3779B97F4A7C15ULL + static_cast<std::uint32_t>(cell.z);
-    h *= 0x9E3779B97F4A7C15ULL;
-    return static_cast<std::size_t>(h >> 40);
+    return detail::cell_hash(cell.x, cell.y, cell.z);
   }
   static bool same_place(const TrackedInstances::Cell& a, const TrackedInstances::Cell& b) {
     return a.x == b.x && a.y == b.y && a.z == b.z;
