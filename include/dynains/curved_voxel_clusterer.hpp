@@ -184,7 +184,8 @@ class CurvedVoxelClusterer {
   // The grid covers only the elevations that occur. It is all zero between calls.
   void mark_cells(std::size_t count) {
     if (highest_elevation_ < 0) return;
-    first_cell_ = static_cast<std::size_t>(lowest_elevation_ * ranges_) << row_shift_;
+    first_cell_ = (static_cast<std::size_t>(lowest_elevation_) * static_cast<std::size_t>(ranges_))
+                  << row_shift_;
     const std::size_t blocks = row_count() * row_blocks();
     if (is_used_.size() < blocks) {
       is_used_.resize(blocks);
@@ -201,9 +202,9 @@ class CurvedVoxelClusterer {
 
   std::size_t row_blocks() const { return (std::size_t{1} << row_shift_) / kBlock; }
   std::size_t row_count() const {
-    return highest_elevation_ < 0
-               ? 0
-               : static_cast<std::size_t>((highest_elevation_ - lowest_elevation_ + 1) * ranges_);
+    if (highest_elevation_ < 0) return 0;
+    const std::int32_t elevations = highest_elevation_ - lowest_elevation_ + 1;
+    return static_cast<std::size_t>(elevations) * static_cast<std::size_t>(ranges_);
   }
 
   // Cuts rows into runs. An occupied cell then holds the number of its run, counted from the first

@@ -20,8 +20,7 @@ class GroundFootprint {
   GroundFootprint(double cell, double max_range)
       : cells_per_metre_(static_cast<float>(1.0 / cell)),
         half_width_(static_cast<std::int32_t>(std::ceil(max_range / cell)) + 2),
-        lowest_(static_cast<std::size_t>(2 * half_width_) * static_cast<std::size_t>(2 * half_width_),
-                kNothing) {}
+        lowest_(row_length() * row_length(), kNothing) {}
 
   /// Remembers a removed point in its cell and the eight around it.
   void add(float x, float y, float z) {
@@ -58,7 +57,9 @@ class GroundFootprint {
     const Float8 most(static_cast<float>(2 * half_width_ - 1));
     const Float8 zero(0.0F);
     const Float8 width(static_cast<float>(2 * half_width_));
-    const auto clamped = [&](Float8 scaled) { return to_float(truncate(min(max(scaled, zero), most))); };
+    const auto clamped = [&](Float8 scaled) {
+      return to_float(truncate(min(max(scaled, zero), most)));
+    };
     std::size_t count = 0;
     for_lanes(points, [&](Float8 x, Float8 y, Float8, std::size_t first) {
       // Exact in floats: the grid has fewer than 2^24 cells.
@@ -77,7 +78,7 @@ class GroundFootprint {
 
   /// Forgets all points; costs as much as adding them.
   void clear() {
-    const std::size_t width = static_cast<std::size_t>(2 * half_width_);
+    const std::size_t width = row_length();
     for (const std::uint32_t centre : touched_) {
       for (std::size_t row = centre - width; row <= centre + width; row += width) {
         std::fill_n(&lowest_[row - 1], 3, kNothing);
@@ -99,9 +100,9 @@ class GroundFootprint {
   bool inside(std::int32_t column, std::int32_t row) const {
     return column > 0 && row > 0 && column + 1 < 2 * half_width_ && row + 1 < 2 * half_width_;
   }
+  std::size_t row_length() const { return 2 * static_cast<std::size_t>(half_width_); }
   std::size_t place(std::int32_t column, std::int32_t row) const {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(2 * half_width_) +
-           static_cast<std::size_t>(column);
+    return static_cast<std::size_t>(row) * row_length() + static_cast<std::size_t>(column);
   }
 
   float cells_per_metre_;

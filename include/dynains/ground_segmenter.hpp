@@ -150,7 +150,8 @@ class GroundSegmenter {
                    static_cast<float>(kRings[i] - 1),
                    static_cast<float>(kSectors[i])};
       for (std::int32_t p = 0; p < kRings[i] * kSectors[i]; ++p) {
-        ring_of_patch_[static_cast<std::size_t>(first_patch + p)] = first_ring + p / kSectors[i];
+        const auto patch = static_cast<std::size_t>(first_patch) + static_cast<std::size_t>(p);
+        ring_of_patch_[patch] = first_ring + p / kSectors[i];
       }
       first_patch += kRings[i] * kSectors[i];
       first_ring += kRings[i];
@@ -330,7 +331,7 @@ class GroundSegmenter {
     const auto reject = [&] { out.put_rest(sorted_, begin, end); };
     if (end - begin < static_cast<std::size_t>(config_.ground_min_points)) return reject();
 
-    const bool innermost_zone = patch < static_cast<std::size_t>(kRings[0] * kSectors[0]);
+    const bool innermost_zone = static_cast<std::int32_t>(patch) < kRings[0] * kSectors[0];
     const double h = height_;
     const float floor = innermost_zone ? static_cast<float>(-(1.0 + config_.ground_below) * h)
                                        : -std::numeric_limits<float>::infinity();

@@ -38,7 +38,8 @@ struct RangeImageGrid {
     grid.elevation_min = static_cast<float>((sensor.elevation_min - kBorder) * kRadians);
     grid.rows_per_radian = static_cast<float>(1.0 / (height * kRadians));
     grid.columns_per_radian = static_cast<float>(grid.columns / (2.0 * M_PI));
-    grid.hole_rows = static_cast<std::int32_t>(1.2 * sensor.elevation_gap_wide / height + 0.5);
+    grid.hole_rows =
+        static_cast<std::int32_t>(std::round(1.2 * sensor.elevation_gap_wide / height));
     return grid;
   }
 
@@ -167,6 +168,7 @@ class RangeImage {
     const auto rows = static_cast<std::size_t>(grid.rows);
     scratch.below.resize(grid.cell_count());
     scratch.below_age.resize(grid.cell_count());
+    const Short8 zero = all_shorts(0);
     const Short8 one = all_shorts(1);
     const Short8 nothing = all_shorts(kNothing);
     const Short8 too_old = all_shorts(1000);
@@ -179,7 +181,7 @@ class RangeImage {
         const Short8 here = load_shorts(&scratch.nearest[at]);
         const Short8 returned = here < nothing;
         value = select_shorts(returned, here, value);
-        age = select_shorts(returned, one - one, min_shorts(age + one, too_old));
+        age = select_shorts(returned, zero, min_shorts(age + one, too_old));
         store_shorts(&scratch.below[at], value);
         store_shorts(&scratch.below_age[at], age);
       }
@@ -190,7 +192,7 @@ class RangeImage {
         const Short8 here = load_shorts(&scratch.nearest[at]);
         const Short8 returned = here < nothing;
         value = select_shorts(returned, here, value);
-        age = select_shorts(returned, one - one, min_shorts(age + one, too_old));
+        age = select_shorts(returned, zero, min_shorts(age + one, too_old));
         const Short8 between = age + load_shorts(&scratch.below_age[at]);
         const Short8 closed = ~returned & (between <= limit);
         const Short8 fill = min_shorts(value, load_shorts(&scratch.below[at]));

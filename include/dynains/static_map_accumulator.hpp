@@ -160,7 +160,7 @@ class StaticMapAccumulator {
   };
 
   // Some points of a scan on their way into the map.
-  static constexpr std::size_t kRecent = 32 * 32 * 16;
+  static constexpr std::size_t kRecent = std::size_t{32} * 32 * 16;
   static constexpr std::size_t kBatch = 512;
   struct Batch {
     float local[3][kBatch];  // m, relative to the corner next to the sensor

@@ -34,6 +34,7 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
                        estimates.size());
   PointProtocol points({config.min_range, config.point_max_range, config.truth}, estimates.size());
   std::vector<MapProtocol> map_protocols;
+  map_protocols.reserve(maps.size());
   for (const MapEstimate& map : maps) {
     map_protocols.emplace_back(
         MapProtocol::Settings{config.voxel, config.min_range, config.max_range,

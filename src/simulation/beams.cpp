@@ -131,7 +131,7 @@ void BeamTable::fill(const SensorModel& model, std::uint64_t seed, std::size_t s
   }
 
   // Counting sort by cell, stable.
-  first_.assign(static_cast<std::size_t>(kRows * kColumns) + 1, 0);
+  first_.assign(grid_index(kRows, 0, kColumns) + 1, 0);
   for (const std::uint32_t cell : cells_) ++first_[cell + 1];
   for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
   std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);

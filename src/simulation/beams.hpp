@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dynains/simulation/config.hpp"
+#include "simulation/grid_index.hpp"
 #include "simulation/vector.hpp"
 
 namespace dynains::simulation {
@@ -40,10 +41,10 @@ class BeamTable {
   const std::vector<std::uint32_t>& measured_order() const { return slot_of_beam_; }
   /// First slot of a cell; cells of a row follow one another, azimuth from -pi.
   std::size_t first_slot(int row, int column) const {
-    return first_[static_cast<std::size_t>(row * kColumns + column)];
+    return first_[grid_index(row, column, kColumns)];
   }
   std::size_t last_slot(int row, int column) const {
-    return first_[static_cast<std::size_t>(row * kColumns + column) + 1];
+    return first_[grid_index(row, column, kColumns) + 1];
   }
   static int row_of(double elevation);
   static int column_of(double azimuth);

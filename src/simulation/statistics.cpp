@@ -5,10 +5,13 @@
 #include <limits>
 #include <unordered_map>
 
+#include "simulation/grid_index.hpp"
+
 namespace dynains::simulation {
 namespace {
 
 constexpr int kCells = 256;  // of 1 m, around the sensor
+constexpr float kReach = 0.5F * kCells;
 
 int cell_of(float x, float y) {
   const auto column = static_cast<int>(std::floor(x)) + kCells / 2;
@@ -31,8 +34,7 @@ double share(std::size_t part, std::size_t whole) {
 void ScanStatistics::add(Span<const float> xyzi, Span<const std::uint32_t> labels) {
   const std::size_t count = xyzi.size() / 4;
   ++scans_;
-  std::vector<float> lowest(static_cast<std::size_t>(kCells * kCells),
-                            std::numeric_limits<float>::infinity());
+  std::vector<float> lowest(grid_index(kCells, 0, kCells), std::numeric_limits<float>::infinity());
   std::unordered_map<std::uint32_t, Car> cars;
   for (std::size_t i = 0; i < count; ++i) {
     const float* p = xyzi.data() + 4 * i;
@@ -43,7 +45,7 @@ void ScanStatistics::add(Span<const float> xyzi, Span<const std::uint32_t> label
     ++points_;
     const auto bin = std::upper_bound(kRangeLimits.begin(), kRangeLimits.end(), range);
     ++ranges_[static_cast<std::size_t>(bin - kRangeLimits.begin())];
-    if (std::abs(p[0]) < kCells / 2 && std::abs(p[1]) < kCells / 2) {
+    if (std::abs(p[0]) < kReach && std::abs(p[1]) < kReach) {
       const int cell = cell_of(p[0], p[1]);
       if (cell >= 0) {
         float& low = lowest[static_cast<std::size_t>(cell)];
@@ -62,13 +64,14 @@ void ScanStatistics::add(Span<const float> xyzi, Span<const std::uint32_t> label
   }
   for (std::size_t i = 0; i < count; ++i) {
     const float* p = xyzi.data() + 4 * i;
-    if (!(std::abs(p[0]) < kCells / 2 && std::abs(p[1]) < kCells / 2)) continue;
+    if (!(std::abs(p[0]) < kReach && std::abs(p[1]) < kReach)) continue;
     const int cell = cell_of(p[0], p[1]);
     if (cell < 0) continue;
     float low = std::numeric_limits<float>::infinity();
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
-        low = std::min(low, lowest[static_cast<std::size_t>(cell + dy * kCells + dx)]);
+        const int beside = cell + dy * kCells + dx;
+        low = std::min(low, lowest[static_cast<std::size_t>(beside)]);
       }
     }
     const float range = std::sqrt(p[0] * p[0] + p[1] * p[1]);

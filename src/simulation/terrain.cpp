@@ -138,7 +138,7 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
   constexpr int kBlock = 16, kBlocks = kCells / kBlock + 1;
   std::vector<std::vector<Corridor>> blocks;
   for (int i = 0; i < kBlocks * kBlocks; ++i) {
-    const double half = kBlock / 2 * kCell;
+    const double half = 0.5 * kBlock * kCell;
     const Vec2 middle =
         corner + Vec2{2 * half * (i % kBlocks) + half, 2 * half * (i / kBlocks) + half};
     blocks.push_back(nearest_within(corridors, middle, 1.42 * half));
@@ -146,7 +146,7 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
   for (int row = 0; row <= kCells; ++row) {
     for (int column = 0; column <= kCells; ++column) {
       const Vec2 p = corner + Vec2{column * kCell, row * kCell};
-      const auto block = static_cast<std::size_t>(row / kBlock * kBlocks + column / kBlock);
+      const auto block = grid_index(row / kBlock, column / kBlock, kBlocks);
       const Ground ground = ground_at(blocks[block], p);
       const double off_street = smooth_step(ground.edge / 0.2);
       const double on_pavement = smooth_step(ground.pavement / 0.4);
@@ -156,14 +156,12 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
       double height = hills(p) + uneven * (0.6 * bumps(p, 4.0, 1) + 0.4 * bumps(p, 1.1, 2));
       height += config_.kerb * off_street * (0.5 + 0.5 * on_pavement);
       height -= 0.02 * ground.half_width * across * across * (1 - off_street);
-      tile.heights[static_cast<std::size_t>(row * (kCells + 1) + column)] =
-          static_cast<float>(height);
+      tile.heights[grid_index(row, column, kCells + 1)] = static_cast<float>(height);
       if (row < kCells && column < kCells) {
         const std::uint16_t label = ground.edge < 0       ? config_.street_label
                                     : ground.pavement > 0 ? kPavementLabel
                                                           : config_.open_label;
-        tile.labels[static_cast<std::size_t>(row * kCells + column)] =
-            static_cast<std::uint8_t>(label);
+        tile.labels[grid_index(row, column, kCells)] = static_cast<std::uint8_t>(label);
       }
     }
   }
@@ -192,7 +190,7 @@ double Terrain::height(Vec2 p) {
   const int row = std::clamp(static_cast<int>(v), 0, kCells - 1);
   const double fu = u - column, fv = v - row;
   auto sample = [&](int r, int c) {
-    return static_cast<double>(t.heights[static_cast<std::size_t>(r * (kCells + 1) + c)]);
+    return static_cast<double>(t.heights[grid_index(r, c, kCells + 1)]);
   };
   return (1 - fv) * ((1 - fu) * sample(row, column) + fu * sample(row, column + 1)) +
          fv * ((1 - fu) * sample(row + 1, column) + fu * sample(row + 1, column + 1));
@@ -202,7 +200,7 @@ std::uint16_t Terrain::label(Vec2 p) {
   const int ix = tile_index(p.x, kTile), iy = tile_index(p.y, kTile);
   const int column = std::clamp(static_cast<int>((p.x - ix * kTile) / kCell), 0, kCells - 1);
   const int row = std::clamp(static_cast<int>((p.y - iy * kTile) / kCell), 0, kCells - 1);
-  return tile(ix, iy).labels[static_cast<std::size_t>(row * kCells + column)];
+  return tile(ix, iy).labels[grid_index(row, column, kCells)];
 }
 
 void Terrain::prepare(Vec2 centre, double radius) {
@@ -217,7 +215,7 @@ void Terrain::prepare(Vec2 centre, double radius) {
       const double dy = (near_y_ + iy + 0.5) * kTile - centre.y;
       if (std::sqrt(dx * dx + dy * dy) > radius + 0.71 * kTile) continue;
       const Tile& t = tile(near_x_ + ix, near_y_ + iy);
-      near_[static_cast<std::size_t>(iy * kSide + ix)] = &t;
+      near_[grid_index(iy, ix, kSide)] = &t;
       for (std::size_t i = 0; i < t.heights.size(); i += 64) {
         low_ = std::min(low_, t.heights[i]);
         high_ = std::max(high_, t.heights[i]);
@@ -242,11 +240,10 @@ float Terrain::height_near(float x, float y) const {
   const float v = y * kInverse - static_cast<float>(near_y_ * kCells);
   const int column = static_cast<int>(u), row = static_cast<int>(v);
   if (u < 0 || v < 0 || column >= kSide * kCells || row >= kSide * kCells) return -1e9F;
-  const Tile* t = near_[static_cast<std::size_t>((row / kCells) * kSide + column / kCells)];
+  const Tile* t = near_[grid_index(row / kCells, column / kCells, kSide)];
   if (t == nullptr) return -1e9F;
   const float fu = u - static_cast<float>(column), fv = v - static_cast<float>(row);
-  const float* s =
-      &t->heights[static_cast<std::size_t>((row % kCells) * (kCells + 1) + column % kCells)];
+  const float* s = &t->heights[grid_index(row % kCells, column % kCells, kCells + 1)];
   const float low = s[0] + fu * (s[1] - s[0]);
   const float high = s[kCells + 1] + fu * (s[kCells + 2] - s[kCells + 1]);
   return low + fv * (high - low);
@@ -257,9 +254,9 @@ std::uint16_t Terrain::label_near(float x, float y) const {
   const int column = static_cast<int>(x * kInverse - static_cast<float>(near_x_ * kCells));
   const int row = static_cast<int>(y * kInverse - static_cast<float>(near_y_ * kCells));
   if (column < 0 || row < 0 || column >= kSide * kCells || row >= kSide * kCells) return 0;
-  const Tile* t = near_[static_cast<std::size_t>((row / kCells) * kSide + column / kCells)];
+  const Tile* t = near_[grid_index(row / kCells, column / kCells, kSide)];
   if (t == nullptr) return 0;
-  return t->labels[static_cast<std::size_t>((row % kCells) * kCells + column % kCells)];
+  return t->labels[grid_index(row % kCells, column % kCells, kCells)];
 }
 
 Vec3 Terrain::normal_near(float x, float y) const {

@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "simulation/grid_index.hpp"
 #include "simulation/random.hpp"
 #include "simulation/street.hpp"
 
@@ -49,8 +50,8 @@ class Terrain {
   static constexpr int kSide = 13;  ///< prepared tiles along each axis
 
   struct Tile {
-    std::array<float, (kCells + 1) * (kCells + 1)> heights;
-    std::array<std::uint8_t, kCells * kCells> labels;
+    std::array<float, grid_index(kCells + 1, 0, kCells + 1)> heights;
+    std::array<std::uint8_t, grid_index(kCells, 0, kCells)> labels;
   };
 
   const Tile& tile(int ix, int iy);
@@ -69,7 +70,7 @@ class Terrain {
   std::vector<Wave> waves_;
   float steepest_;
   std::unordered_map<std::uint64_t, std::unique_ptr<Tile>> tiles_;
-  std::array<const Tile*, kSide * kSide> near_{};
+  std::array<const Tile*, grid_index(kSide, 0, kSide)> near_{};
   int near_x_ = 0, near_y_ = 0;  ///< indices of the first prepared tile
   float low_ = 0, high_ = 0;
 };

@@ -55,10 +55,11 @@ Traffic::Driver& Traffic::add_driver(std::size_t object, std::size_t lane, doubl
 
 Kind Traffic::random_kind(const Flow& flow) {
   double u = random_.unit();
-  if ((u -= flow.trucks) < 0) return Kind::kTruck;
-  if ((u -= flow.buses) < 0) return Kind::kBus;
-  if ((u -= flow.vans) < 0) return Kind::kVan;
-  if ((u -= flow.cyclists) < 0) return Kind::kCyclist;
+  const auto is_among = [&u](double share) { return (u -= share) < 0; };
+  if (is_among(flow.trucks)) return Kind::kTruck;
+  if (is_among(flow.buses)) return Kind::kBus;
+  if (is_among(flow.vans)) return Kind::kVan;
+  if (is_among(flow.cyclists)) return Kind::kCyclist;
   return Kind::kCar;
 }
 
