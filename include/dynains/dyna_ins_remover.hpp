@@ -163,9 +163,9 @@ class BasicDynaInsRemover {
     clock.lap(result.times.ingest);
 
     ground_.segment(ingest_.points(), newest.split);
-    newest.input.resize(newest.split.count);
+    // From the points that were taken in to those of the input.
     for (std::size_t i = 0; i < newest.split.count; ++i) {
-      newest.input[i] = ingest_.input()[newest.split.source[i]];
+      newest.split.source[i] = ingest_.input()[newest.split.source[i]];
     }
     clock.lap(result.times.ground);
 
@@ -382,13 +382,13 @@ class BasicDynaInsRemover {
       scan.beliefs.assign(scan.labels.size(), 0.0F);
       scan.is_kept.assign(scan.split.count, 1);
       for (std::size_t i = 0; i < ground_count; ++i) {
-        scan.labels[scan.input[i]] = PointLabel::kGround;
+        scan.labels[scan.split.source[i]] = PointLabel::kGround;
       }
     }
     for (std::size_t i = 0; evident && i < ground_count; ++i) {
       const bool dynamic = scan.dynamic[i] != 0;
       if (!dynamic && scan.is_kept[i] != 0) continue;  // as written before
-      const std::uint32_t to = scan.input[i];
+      const std::uint32_t to = scan.split.source[i];
       scan.is_kept[i] = dynamic ? 0 : 1;
       scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kGround;
       scan.beliefs[to] = scan.evidence[i];
@@ -397,7 +397,7 @@ class BasicDynaInsRemover {
       const std::size_t at = ground_count + i;
       if (!all && scan.votes[i] == 0 && scan.belief[i] == 0.0F) continue;
       const bool dynamic = scan.votes[i] >= votes || (evident && scan.dynamic[at] != 0);
-      const std::uint32_t to = scan.input[at];
+      const std::uint32_t to = scan.split.source[at];
       scan.is_kept[at] = dynamic ? 0 : 1;
       scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
       scan.instances[to] = scan.cluster[i] == kNoCluster ? kNoInstance : scan.ids[scan.cluster[i]];
