@@ -48,9 +48,8 @@ class FreeSpaceEvidence {
       : config_((config.validate(), config)),
         sampler_(config.sample_size, config.supervoxel, config.evidence_range),
         ground_sampler_(config.ground_sample, config.ground_sample, config.evidence_range),
-        footprint_(std::max(config.footprint, 0.05), config.evidence_range),
-        reach_(std::max(config.ground_reach, 0.5), config.evidence_range),
-        about_(std::max({config.ground_reach, config.footprint, 0.5}), config.evidence_range),
+        footprint_(config.footprint > 0.0 ? std::max(config.footprint, 0.05) : kDefaultCell,
+                   std::max({config.ground_reach, config.footprint, 0.5}), config.evidence_range),
         increment_(static_cast<float>(log_odds(config.p_free))),
         decrement_(static_cast<float>(log_odds(config.p_hit))),
         free_level_(static_cast<float>(log_odds(config.tau_free))),
@@ -137,18 +136,13 @@ class FreeSpaceEvidence {
       if (verdict.dynamic == 0) continue;
       for (std::size_t i = begin; i < end; ++i) dynamic[i] = 1;
       for (std::size_t i = streak.begin; i < streak.end; ++i) {
-        const float x = points.x[i];
-        const float y = points.y[i];
-        const float z = points.z[i];
-        footprint_.add(x, y, z);
-        reach_.add(x, y, z);
-        about_.add(x, y, z);
+        footprint_.add(points.x[i], points.y[i], points.z[i]);
       }
     }
-    if (!about_.empty()) judge_ground(scan, record, split, dynamic, belief);
+    if (footprint_.empty()) return;
+    footprint_.spread();
+    judge_ground(scan, record, split, dynamic, belief);
     footprint_.clear();
-    reach_.clear();
-    about_.clear();
   }
 
   /// For each instance of the scan observed last, its number in the scan before, or kNoCluster.
@@ -179,9 +173,9 @@ class FreeSpaceEvidence {
     std::uint64_t segment = kNoSegment;
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
     InstanceSamples samples;
-    std::vector<Belief> beliefs;  // by supervoxel
-    std::vector<Belief> wholes;   // by instance, of all its samples together
-    std::vector<Share> shares;    // by instance
+    std::vector<Belief> beliefs;        // by supervoxel
+    std::vector<Belief> wholes;         // by instance, of all its samples together
+    std::vector<Share> shares;          // by instance
     std::vector<std::uint8_t> changed;  // by instance: whether beliefs changed since it was weighed
     TrackedInstances tracked;
   };
@@ -203,42 +197,31 @@ class FreeSpaceEvidence {
   void refer(Record& record, const View& reference, int lag) {
     const InstanceSamples& samples = record.samples;
     look(samples.points, samples.size(), record.T_world_sensor, reference);
-    seen_.resize(samples.size() + 1);
-    std::uint64_t sum = 0;
-    for (std::size_t i = 0; i < samples.size(); ++i) {
-      seen_[i] = sum;
-      sum += (sights_[i] & 1U) | std::uint64_t{sights_[i] >> 1U} << 32U;
-    }
-    seen_[samples.size()] = sum;
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
       const std::uint32_t first = samples.supervoxel_begin[instance];
       const std::uint32_t last = samples.supervoxel_begin[instance + 1];
-      const std::uint64_t all =
-          seen_[samples.sample_begin[last]] - seen_[samples.sample_begin[first]];
-      if (all == 0) continue;
-      record.changed[instance] = 1;
-      const auto instance_free = static_cast<std::uint32_t>(all);
-      const auto instance_hit = static_cast<std::uint32_t>(all >> 32U);
+      detail::Sights::Count all;
       std::uint32_t begin = samples.sample_begin[first];
       for (std::uint32_t s = first; s < last; ++s) {
         const std::uint32_t end = samples.sample_begin[s + 1];
-        const std::uint64_t seen = seen_[end] - seen_[begin];
-        if (seen != 0) {
-          update(record.beliefs[s], static_cast<std::uint32_t>(seen),
-                 static_cast<std::uint32_t>(seen >> 32U), end - begin);
-        }
+        const detail::Sights::Count seen = sights_.count(begin, end);
+        update(record.beliefs[s], seen, end - begin);
+        all.free += seen.free;
+        all.hit += seen.hit;
         begin = end;
       }
+      if (all.free + all.hit == 0) continue;
+      record.changed[instance] = 1;
       const auto count =
           static_cast<float>(samples.sample_begin[last] - samples.sample_begin[first]);
-      const auto seen = static_cast<float>(instance_free + instance_hit);
+      const auto seen = static_cast<float>(all.free + all.hit);
       if (seen < std::max(2.0F, kLeastView * count)) continue;
-      const float share = static_cast<float>(instance_free) / seen;
+      const float share = static_cast<float>(all.free) / seen;
       if (share >= static_cast<float>(config_.see_share)) {
         raise(record.wholes[instance], share);
       } else if (share <= kHitShare) {
         lower(record.wholes[instance]);
-        const auto hits = static_cast<float>(instance_hit);
+        const auto hits = static_cast<float>(all.hit);
         if (config_.use_tracks && share <= 1.0F - kContradictingHits &&
             hits >= kLeastKnown * count) {
           TrackedInstances::Instance& tracked = record.tracked.instances[instance];
@@ -250,14 +233,20 @@ class FreeSpaceEvidence {
 
   // Eq. 15 with three-way increments as in Eq. 18, by the share of samples seen free; shares that
   // say little, or are of few samples, change nothing.
-  void update(Belief& belief, std::uint32_t free, std::uint32_t hit, std::uint32_t samples) const {
-    const auto n = static_cast<float>(samples);
-    const auto f = static_cast<float>(free);
-    const auto h = static_cast<float>(hit);
-    const float share = f / (f + h);
-    if (f >= kLeastFree * n && share >= kFreeShare) {
+  void update(Belief& belief, detail::Sights::Count seen, std::uint32_t samples) const {
+    // The usual case: what was hit before and is not seen free stays as it is.
+    if (seen.free == 0 && belief.level == 0.0F && belief.contested != 0) return;
+    const bool hits =
+        seen.hit >= std::max(std::min(2U, samples), (samples + kLeastHit - 1) / kLeastHit);
+    if (seen.free == 0) {
+      if (hits) lower(belief);
+      return;
+    }
+    const auto free = static_cast<float>(seen.free);
+    const float share = free / static_cast<float>(seen.free + seen.hit);
+    if (free >= kLeastFree * static_cast<float>(samples) && share >= kFreeShare) {
       raise(belief, share);
-    } else if (h >= std::max(std::min(2.0F, n), kLeastHit * n) && share <= kHitShare) {
+    } else if (hits && share <= kHitShare) {
       lower(belief);
     }
   }
@@ -401,10 +390,7 @@ class FreeSpaceEvidence {
     const std::uint32_t end = samples.sample_begin[samples.supervoxel_begin[instance + 1]];
     const PointsView points = PointsView(samples.points).subview(begin, end - begin);
     const float lowest = *std::min_element(points.z.begin(), points.z.end());
-    hull_.visit(points, [&](float x, float y) {
-      footprint_.add(x, y, lowest);
-      about_.add(x, y, lowest);
-    });
+    hull_.visit(points, [&](float x, float y) { footprint_.add(x, y, lowest); });
   }
 
   // Zero latency: a compact instance in a place that no earlier scan has seen may be the lead
@@ -427,7 +413,36 @@ class FreeSpaceEvidence {
   // references saw free was no ground.
   void judge_ground(std::uint64_t scan, const Record& record, const GroundSplit& split,
                     std::vector<std::uint8_t>& dynamic, std::vector<float>& belief) {
-    find_ground(split.ground());
+    const PointsView ground = split.ground();
+    const auto remove = [&](std::size_t point) {
+      dynamic[point] = 1;
+      belief[point] = static_cast<float>(config_.tau_free);
+    };
+    footprint_.find(ground, near_ground_);
+    std::size_t tested = 0;
+    for (const std::uint32_t point : near_ground_) {
+      const float lowest = footprint_.lowest(ground.x[point], ground.y[point]);
+      if (config_.footprint > 0.0 && lowest < ground.z[point] + kClearance) {
+        remove(point);
+      } else {
+        near_ground_[tested++] = point;
+      }
+    }
+    near_ground_.resize(tested);
+    if (config_.ground_reach > 0.0) test_ground(scan, record, ground, remove);
+  }
+
+  // Ground that enough of all references saw free; `near_ground_` are the points to be tested.
+  template <class Remove>
+  void test_ground(std::uint64_t scan, const Record& record, PointsView ground, Remove&& remove) {
+    tested_points_.resize(near_ground_.size());
+    for (std::size_t i = 0; i < near_ground_.size(); ++i) {
+      tested_points_.x[i] = ground.x[near_ground_[i]];
+      tested_points_.y[i] = ground.y[near_ground_[i]];
+      tested_points_.z[i] = ground.z[near_ground_[i]];
+    }
+    one_instance_.assign(near_ground_.size(), 0);
+    ground_sampler_.sample(tested_points_, one_instance_, 1, ground_samples_);
     const std::size_t count = ground_samples_.size();
     ground_free_.assign(count, 0);
     ground_hit_.assign(count, 0);
@@ -437,22 +452,14 @@ class FreeSpaceEvidence {
       if (lag <= config_.memory && distance <= scan) count_ground(record, scan - distance);
       if (lag <= config_.horizon) count_ground(record, scan + distance);
     }
-    const auto remove = [&](std::size_t candidate) {
-      dynamic[candidates_[candidate]] = 1;
-      belief[candidates_[candidate]] = static_cast<float>(config_.tau_free);
-    };
-    for (std::size_t i = 0; config_.footprint > 0.0 && i < candidates_.size(); ++i) {
-      const float lowest = footprint_.lowest(candidate_points_.x[i], candidate_points_.y[i]);
-      if (lowest < candidate_points_.z[i] + kClearance) remove(i);
-    }
     for (const InstanceSamples::Streak& streak : ground_samples_.streaks) {
       const std::uint32_t sample = ground_samples_.sample_begin[streak.supervoxel];
       const std::uint32_t free = ground_free_[sample];
-      if (free < kGroundFree || static_cast<float>(free) <
-                                    kGroundShare * static_cast<float>(ground_hit_[sample])) {
+      if (free < kGroundFree ||
+          static_cast<float>(free) < kGroundShare * static_cast<float>(ground_hit_[sample])) {
         continue;
       }
-      for (std::size_t i = streak.begin; i < streak.end; ++i) remove(i);
+      for (std::size_t i = streak.begin; i < streak.end; ++i) remove(near_ground_[i]);
     }
   }
 
@@ -462,33 +469,17 @@ class FreeSpaceEvidence {
     if (view.segment != record.segment) return;
     look(ground_samples_.points, ground_samples_.size(), record.T_world_sensor, view);
     for (std::size_t i = 0; i < ground_samples_.size(); ++i) {
-      ground_free_[i] += sights_[i] & 1U;
-      ground_hit_[i] += sights_[i] >> 1U;
+      ground_free_[i] += sights_.is_free(i) ? 1 : 0;
+      ground_hit_[i] += sights_.is_hit(i) ? 1 : 0;
     }
-  }
-
-  // Ground points that may go with removed ones, and samples of those that are to be tested.
-  void find_ground(PointsView ground) {
-    about_.find(ground, candidates_);
-    candidate_points_.resize(candidates_.size());
-    candidate_instance_.resize(candidates_.size());
-    for (std::size_t i = 0; i < candidates_.size(); ++i) {
-      const float x = ground.x[candidates_[i]];
-      const float y = ground.y[candidates_[i]];
-      candidate_points_.x[i] = x;
-      candidate_points_.y[i] = y;
-      candidate_points_.z[i] = ground.z[candidates_[i]];
-      const bool tested = config_.ground_reach > 0.0 && std::isfinite(reach_.lowest(x, y));
-      candidate_instance_[i] = tested ? 0 : kNoCluster;
-    }
-    ground_sampler_.sample(candidate_points_, candidate_instance_, 1, ground_samples_);
   }
 
   static constexpr float kLeastView = 0.1F;   // share of an instance that a reference must see
   static constexpr float kLeastFree = 0.15F;  // share of a supervoxel that must be seen free
   static constexpr float kFreeShare = 0.6F;   // of what is seen, to speak for free space
   static constexpr float kWhollyFree = 0.9F;  // of what is seen, to count twice
-  static constexpr float kLeastHit = 0.25F;   // share of a supervoxel that must be hit
+  static constexpr std::uint32_t kLeastHit =
+      4;                                      // one of so many samples of a supervoxel must be hit
   static constexpr float kHitShare = 0.3F;    // free share up to which a place counts as hit
   static constexpr float kLeastKnown = 0.3F;  // share of an instance, to speak of standing still
   static constexpr float kContradictingHits = 0.85F;  // of what is seen of an instance
@@ -496,6 +487,7 @@ class FreeSpaceEvidence {
   static constexpr float kClearance = 0.4F;      // m between ground and what stands on it
   static constexpr std::size_t kLeastGroup = 2;  // supervoxels that go without the rest
   static constexpr std::size_t kLeastGroupSamples = 4;  // and their samples
+  static constexpr double kDefaultCell = 0.2;           // m, of the footprint if it is off
   static constexpr std::uint32_t kGroundFree = 2;
   static constexpr float kGroundShare = 0.3F;
 
@@ -503,8 +495,6 @@ class FreeSpaceEvidence {
   InstanceSampler sampler_;
   InstanceSampler ground_sampler_;
   GroundFootprint footprint_;
-  GroundFootprint reach_;
-  GroundFootprint about_;  // what the other two may cover
   float increment_;
   float decrement_;
   float free_level_;
@@ -517,20 +507,19 @@ class FreeSpaceEvidence {
   TrackBelief track_belief_;
   RangeImageGrid grid_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();  // of the cells of tracks
-  std::uint64_t segment_begin_ = 0;  // first scan of the segment of the newest
+  std::uint64_t segment_begin_ = 0;                   // first scan of the segment of the newest
   std::uint64_t newest_ = 0;
   std::vector<View> views_;
   std::vector<Record> records_;
   RangeImage::Scratch image_scratch_;
-  std::vector<std::uint32_t> sights_;
-  std::vector<std::uint64_t> seen_;  // by sample: free ones before it, and hit ones in the upper half
+  detail::Sights sights_;
   std::vector<Verdict> verdicts_;
   std::vector<std::uint32_t> free_;
   std::vector<std::uint32_t> predecessors_;
   InstanceSamples ground_samples_;
-  std::vector<std::uint32_t> candidates_;  // numbers of ground points
-  PointBuffer candidate_points_;
-  std::vector<std::uint32_t> candidate_instance_;
+  std::vector<std::uint32_t> near_ground_;  // numbers of ground points
+  PointBuffer tested_points_;
+  std::vector<std::uint32_t> one_instance_;
   std::vector<std::uint32_t> ground_free_;  // by sample, references that saw it so
   std::vector<std::uint32_t> ground_hit_;
 };

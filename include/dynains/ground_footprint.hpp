@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -13,62 +14,73 @@
 
 namespace dynains {
 
-/// Horizontal grid around the sensor that remembers where points were removed and how low.
+/// Horizontal grid around the sensor that remembers where points were removed and how low, and a
+/// coarse one beside it that tells quickly which points are near them.
 class GroundFootprint {
  public:
-  /// `cell`: m; `max_range`: m, points beyond are not remembered.
-  GroundFootprint(double cell, double max_range)
-      : cells_per_metre_(static_cast<float>(1.0 / cell)),
-        half_width_(static_cast<std::int32_t>(std::ceil(max_range / cell)) + 2),
-        lowest_(row_length() * row_length(), kNothing) {}
+  /// `cell`: m, points reach into the cells around theirs; `reach`: m, the same for what counts as
+  /// near; `max_range`: m, points beyond are not remembered.
+  GroundFootprint(double cell, double reach, double max_range)
+      : cell_(static_cast<float>(cell)),
+        fine_(cell, max_range),
+        coarse_(reach, max_range),
+        tile_of_((fine_.width() / kTile + 1) * (fine_.width() / kTile + 1), 0),
+        tiles_(1),
+        near_(coarse_.width() * coarse_.width(), 0) {
+    tiles_.reserve(tile_of_.size() + 1);  // takes address space only
+    used_.reserve(tile_of_.size());
+  }
 
-  /// Remembers a removed point in its cell and the eight around it.
+  /// Remembers a removed point; seen after spread().
   void add(float x, float y, float z) {
-    const std::int32_t column = index(x);
-    const std::int32_t row = index(y);
-    if (!inside(column, row)) return;
-    const std::size_t centre = place(column, row);
-    // Neighbouring points mostly share a cell.
-    if (!touched_.empty() && touched_.back() == centre && last_lowest_ <= z) return;
-    last_lowest_ = z;
-    touched_.push_back(static_cast<std::uint32_t>(centre));
-    for (std::int32_t dy = -1; dy <= 1; ++dy) {
-      for (std::int32_t dx = -1; dx <= 1; ++dx) {
-        float& lowest = lowest_[place(column + dx, row + dy)];
-        lowest = std::min(lowest, z);
-      }
+    const Place place = fine_.place(x, y);
+    if (!place.inside) return;
+    Cell& cell = cell_at(place.column, place.row);
+    if (!(z < cell.own)) return;
+    if (!(cell.own < kNothing)) touched_.push_back(place);
+    cell.own = z;
+  }
+
+  /// Lets what was added reach into the cells around.
+  void spread() {
+    for (const Place& place : touched_) {
+      const float own = cell_at(place.column, place.row).own;
+      for_around(place, [&](std::uint32_t column, std::uint32_t row) {
+        Cell& cell = cell_at(column, row);
+        cell.lowest = std::min(cell.lowest, own);
+      });
+      const Place near =
+          coarse_.place(fine_.centre(place.column) * cell_, fine_.centre(place.row) * cell_);
+      if (!near.inside) continue;
+      for_around(near, [&](std::uint32_t column, std::uint32_t row) {
+        near_[row * coarse_.width() + column] = 1;
+      });
     }
   }
 
   /// Height of the lowest point that was removed about here, or infinity.
   float lowest(float x, float y) const {
-    const std::int32_t column = index(x);
-    const std::int32_t row = index(y);
-    return inside(column, row) ? lowest_[place(column, row)] : kNothing;
+    const Place place = fine_.place(x, y);
+    if (!place.inside) return kNothing;
+    return tiles_[tile_of_[tile(place.column, place.row)]][within(place.column, place.row)].lowest;
   }
 
-  /// Numbers of all points that have a removed point about them, and of some at the border of the
-  /// grid, into `found`; in order.
+  /// Numbers of all points that are near a removed point, and of some at the border of the grid,
+  /// into `found`; in order.
   void find(PointsView points, std::vector<std::uint32_t>& found) const {
     using namespace detail;
     if (found.size() < points.size() + kLanes) found.resize(points.size() + kLanes);
-    const Float8 scale(cells_per_metre_);
-    const Float8 centre(static_cast<float>(half_width_));
-    const Float8 most(static_cast<float>(2 * half_width_ - 1));
-    const Float8 zero(0.0F);
-    const Float8 width(static_cast<float>(2 * half_width_));
-    const auto clamped = [&](Float8 scaled) {
-      return to_float(truncate(min(max(scaled, zero), most)));
-    };
     std::size_t count = 0;
     for_lanes(points, [&](Float8 x, Float8 y, Float8, std::size_t first) {
-      // Exact in floats: the grid has fewer than 2^24 cells.
       std::int32_t cell[kLanes];
-      truncate(clamped(y * scale + centre) * width + clamped(x * scale + centre)).store(cell);
+      coarse_.indices(x, y).store(cell);
+      unsigned any = 0;
+      for (std::size_t lane = 0; lane < kLanes; ++lane) any |= near_at(cell[lane]);
+      if (any == 0) return;
       const std::size_t lanes = std::min(kLanes, points.size() - first);
       for (std::size_t lane = 0; lane < lanes; ++lane) {
         found[count] = static_cast<std::uint32_t>(first + lane);
-        count += lowest_[static_cast<std::size_t>(cell[lane])] < kNothing ? 1 : 0;
+        count += near_at(cell[lane]);
       }
     });
     found.resize(count);
@@ -76,40 +88,102 @@ class GroundFootprint {
 
   bool empty() const { return touched_.empty(); }
 
-  /// Forgets all points; costs as much as adding them.
+  /// Forgets all points.
   void clear() {
-    const std::size_t width = row_length();
-    for (const std::uint32_t centre : touched_) {
-      for (std::size_t row = centre - width; row <= centre + width; row += width) {
-        std::fill_n(&lowest_[row - 1], 3, kNothing);
-      }
-    }
+    for (const std::uint32_t tile : used_) tile_of_[tile] = 0;
+    used_.clear();
     touched_.clear();
+    std::fill(near_.begin(), near_.end(), std::uint8_t{0});
   }
 
  private:
   static constexpr float kNothing = std::numeric_limits<float>::infinity();
+  static constexpr std::uint32_t kTile = 16;  // cells along a side
 
-  std::int32_t index(float coordinate) const {
-    const float scaled = coordinate * cells_per_metre_ + static_cast<float>(half_width_);
-    // Negative and huge values end up outside; truncation is floor for the rest.
-    return scaled >= 0.0F && scaled < static_cast<float>(2 * half_width_)
-               ? static_cast<std::int32_t>(scaled)
-               : 0;
-  }
-  bool inside(std::int32_t column, std::int32_t row) const {
-    return column > 0 && row > 0 && column + 1 < 2 * half_width_ && row + 1 < 2 * half_width_;
-  }
-  std::size_t row_length() const { return 2 * static_cast<std::size_t>(half_width_); }
-  std::size_t place(std::int32_t column, std::int32_t row) const {
-    return static_cast<std::size_t>(row) * row_length() + static_cast<std::size_t>(column);
+  struct Place {
+    std::uint32_t column, row;
+    bool inside;
+  };
+  struct Cell {
+    float own = kNothing;     // lowest point in it
+    float lowest = kNothing;  // the same with the cells around
+  };
+  // Few tiles are in use at a time, so that they stay in the nearest cache; tile 0 is empty.
+  using Tile = std::array<Cell, kTile * kTile>;
+
+  // Square cells about the sensor, within a border of cells that only their neighbours reach.
+  class Grid {
+   public:
+    Grid(double cell, double max_range)
+        : per_metre_(static_cast<float>(1.0 / cell)),
+          half_(static_cast<std::uint32_t>(std::ceil(max_range / cell)) + 2) {}
+
+    std::uint32_t width() const { return 2 * half_; }
+    Place place(float x, float y) const {
+      const auto centre = static_cast<float>(half_);
+      const auto last = static_cast<float>(width() - 1);
+      const float column = x * per_metre_ + centre;
+      const float row = y * per_metre_ + centre;
+      if (!(column >= 1.0F && column < last && row >= 1.0F && row < last)) return {0, 0, false};
+      return {static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row), true};
+    }
+    /// Row-major; what lies outside falls into the border.
+    detail::Int8 indices(detail::Float8 x, detail::Float8 y) const {
+      using detail::Float8;
+      const Float8 centre(static_cast<float>(half_));
+      const Float8 last(static_cast<float>(width() - 1));
+      const auto line = [&](Float8 coordinate) {
+        const Float8 scaled = coordinate * Float8(per_metre_) + centre;
+        return to_float(detail::truncate(min(max(scaled, Float8(0.0F)), last)));
+      };
+      // Exact in floats: coarse grids have fewer than 2^24 cells.
+      return detail::truncate(line(y) * Float8(static_cast<float>(width())) + line(x));
+    }
+    /// Of a row or column, in cells from the sensor.
+    float centre(std::uint32_t index) const {
+      return (static_cast<float>(index) + 0.5F) - static_cast<float>(half_);
+    }
+
+   private:
+    float per_metre_;
+    std::uint32_t half_;  // cells
+  };
+
+  template <class Visitor>
+  static void for_around(const Place& place, Visitor&& visitor) {
+    for (std::uint32_t row = place.row - 1; row <= place.row + 1; ++row) {
+      for (std::uint32_t column = place.column - 1; column <= place.column + 1; ++column) {
+        visitor(column, row);
+      }
+    }
   }
 
-  float cells_per_metre_;
-  std::int32_t half_width_;  // cells
-  std::vector<float> lowest_;
-  std::vector<std::uint32_t> touched_;
-  float last_lowest_ = kNothing;
+  std::size_t tile(std::uint32_t column, std::uint32_t row) const {
+    return row / kTile * (fine_.width() / kTile + 1) + column / kTile;
+  }
+  static std::size_t within(std::uint32_t column, std::uint32_t row) {
+    return row % kTile * kTile + column % kTile;
+  }
+  Cell& cell_at(std::uint32_t column, std::uint32_t row) {
+    std::uint32_t& number = tile_of_[tile(column, row)];
+    if (number == 0) {
+      used_.push_back(static_cast<std::uint32_t>(tile(column, row)));
+      number = static_cast<std::uint32_t>(used_.size());
+      if (number == tiles_.size()) tiles_.emplace_back();
+      tiles_[number].fill(Cell());
+    }
+    return tiles_[number][within(column, row)];
+  }
+  unsigned near_at(std::int32_t cell) const { return near_[static_cast<std::size_t>(cell)]; }
+
+  float cell_;
+  Grid fine_;
+  Grid coarse_;
+  std::vector<std::uint32_t> tile_of_;  // row-major; 0 where nothing is near
+  std::vector<std::uint32_t> used_;     // what is not 0 there
+  std::vector<Tile> tiles_;
+  std::vector<std::uint8_t> near_;  // by coarse cell
+  std::vector<Place> touched_;      // cells of points, each once
 };
 
 }  // namespace dynains

@@ -11,6 +11,7 @@
 
 #include "dynains/curved_voxel_clusterer.hpp"
 #include "dynains/detail/cell_hash.hpp"
+#include "dynains/detail/lanes.hpp"
 #include "dynains/instance_samples.hpp"
 #include "dynains/points.hpp"
 
@@ -40,7 +41,7 @@ struct TrackedInstances {
 
   /// Occupied cells of carried instances.
   struct Cell {
-    std::int32_t x, y, z;
+    SupervoxelPlace place;
     std::uint32_t instance;
   };
   std::vector<Cell> cells;
@@ -63,10 +64,7 @@ class InstanceLinker {
                const Eigen::Vector3d& origin, TrackedInstances& out) {
     out.instances.assign(samples.instance_count(), TrackedInstances::Instance());
     out.cells.clear();
-    Eigen::Isometry3d T_origin_sensor = T_world_sensor;
-    T_origin_sensor.translation() -= origin;
-    const Eigen::Matrix<float, 3, 4> T =
-        (Eigen::Scaling(1.0 / cell_) * T_origin_sensor.matrix().topRows<3>()).cast<float>();
+    find_cells(samples, T_world_sensor, origin);
     table_.resize(kTable);
     ++generation_;
     for (std::uint32_t i = 0; i < samples.instance_count(); ++i) {
@@ -77,13 +75,10 @@ class InstanceLinker {
       measure_extent(samples.points, begin, end, instance);
       if (!instance.carried) continue;
       for (std::uint32_t p = begin; p < end; ++p) {
-        const Eigen::Vector3f at =
-            T * Eigen::Vector4f(samples.points.x[p], samples.points.y[p], samples.points.z[p], 1);
-        const TrackedInstances::Cell cell = {floor_to_int(at.x()), floor_to_int(at.y()),
-                                             floor_to_int(at.z()), i};
-        Slot& slot = table_[hash(cell) % kTable];
+        const TrackedInstances::Cell cell = {place_[p], i};
+        Slot& slot = slot_of(cell);
         // Two cells that share a place in the table are counted twice: rare, and harmless.
-        if (slot.generation == generation_ && same_place(slot.cell, cell) &&
+        if (slot.generation == generation_ && slot.cell.place == cell.place &&
             slot.cell.instance == i) {
           continue;
         }
@@ -100,15 +95,15 @@ class InstanceLinker {
     table_.resize(kTable);
     ++generation_;
     for (const TrackedInstances::Cell& cell : before.cells) {
-      table_[hash(cell) % kTable] = {cell, generation_};
+      slot_of(cell) = {cell, generation_};
     }
     shared_.assign(before.instances.size(), 0);
     std::size_t at = 0;
     for (std::uint32_t i = 0; i < now.instances.size(); ++i) {
       touched_.clear();
       for (; at < now.cells.size() && now.cells[at].instance == i; ++at) {
-        const Slot& slot = table_[hash(now.cells[at]) % kTable];
-        if (slot.generation != generation_ || !same_place(slot.cell, now.cells[at])) continue;
+        const Slot& slot = slot_of(now.cells[at]);
+        if (slot.generation != generation_ || slot.cell.place != now.cells[at].place) continue;
         if (shared_[slot.cell.instance]++ == 0) touched_.push_back(slot.cell.instance);
       }
       for (const std::uint32_t other : touched_) {
@@ -128,14 +123,32 @@ class InstanceLinker {
   static constexpr std::uint32_t kLeastSamples = 2;  // what is smaller overlaps by chance
 
   // Without the instance: cells of two scans meet in the same place.
-  static std::size_t hash(const TrackedInstances::Cell& cell) {
-    return detail::cell_hash(cell.x, cell.y, cell.z);
+  Slot& slot_of(const TrackedInstances::Cell& cell) {
+    return table_[detail::place_hash(cell.place) % kTable];
   }
-  static bool same_place(const TrackedInstances::Cell& a, const TrackedInstances::Cell& b) {
-    return a.x == b.x && a.y == b.y && a.z == b.z;
-  }
-  static std::int32_t floor_to_int(float value) {
-    return static_cast<std::int32_t>(std::floor(value));
+
+  // World cell of each sample.
+  void find_cells(const InstanceSamples& samples, const Eigen::Isometry3d& T_world_sensor,
+                  const Eigen::Vector3d& origin) {
+    using namespace detail;
+    Eigen::Isometry3d T_origin_sensor = T_world_sensor;
+    T_origin_sensor.translation() -= origin;
+    const Eigen::Matrix<float, 3, 4> m =
+        (Eigen::Scaling(1.0 / cell_) * T_origin_sensor.matrix().topRows<3>()).cast<float>();
+    place_.resize(samples.size());
+    const PointsView points = PointsView(samples.points).subview(0, samples.size());
+    for_lanes(points, [&](Float8 x, Float8 y, Float8 z, std::size_t first) {
+      std::int32_t at[3][kLanes];
+      for (Eigen::Index axis = 0; axis < 3; ++axis) {
+        floor((Float8(m(axis, 0)) * x + Float8(m(axis, 1)) * y) +
+              (Float8(m(axis, 2)) * z + Float8(m(axis, 3))))
+            .store(at[axis]);
+      }
+      const std::size_t lanes = std::min(kLanes, points.size() - first);
+      for (std::size_t lane = 0; lane < lanes; ++lane) {
+        place_[first + lane] = pack_place(at[0][lane], at[1][lane], at[2][lane]);
+      }
+    });
   }
 
   void measure_extent(const PointBuffer& points, std::uint32_t begin, std::uint32_t end,
@@ -177,6 +190,7 @@ class InstanceLinker {
   float overlap_;
   std::uint32_t generation_ = 0;
   std::vector<Slot> table_;
+  std::vector<SupervoxelPlace> place_;  // by sample
   std::vector<std::uint32_t> shared_;
   std::vector<std::uint32_t> touched_;
 };

@@ -15,14 +15,21 @@
 
 namespace dynains {
 
-/// Cells of equal angle, rows by elevation and columns by azimuth, that suit a sensor.
+/// Cells of nearly equal angle, rows by elevation and columns by azimuth, that suit a sensor.
 struct RangeImageGrid {
   std::int32_t rows = 0;
-  std::int32_t columns = 0;    ///< around the full circle
-  float elevation_min = 0.0F;  ///< rad, lower edge of row 0
-  float rows_per_radian = 0.0F;
+  std::int32_t columns = 0;  ///< around the full circle
+  float lowest = 0.0F;       ///< level of the lower edge of row 0
+  float rows_per_level = 0.0F;
   float columns_per_radian = 0.0F;
   std::int32_t hole_rows = 0;  ///< empty rows between two beams that are closed
+
+  /// What rows count instead of the elevation, from its sine: a cubic that grows with the elevation
+  /// and is within 0.2 deg of it below 50 deg; beyond, rows become wider.
+  template <class Number>
+  static Number level(Number sine) {
+    return sine * (Number(0.9832868F) + Number(0.2594117F) * (sine * sine));
+  }
 
   /// Cells a little wider than the azimuth step and narrower than the usual gap between beams, so
   /// that few cells between returns stay empty and few returns share a cell.
@@ -31,12 +38,15 @@ struct RangeImageGrid {
     constexpr double kBorder = 2.0;  // deg beyond the outer beams
     const double width = std::clamp(1.2 * sensor.azimuth_step, 0.2, 0.6);
     const double height = std::clamp(0.6 * sensor.elevation_gap, 0.2, 0.4);
-    const double span = sensor.elevation_max - sensor.elevation_min + 2.0 * kBorder;
+    const auto level_at = [](double elevation) {
+      return level(static_cast<float>(std::sin(std::clamp(elevation, -90.0, 90.0) * kRadians)));
+    };
+    const float highest = level_at(sensor.elevation_max + kBorder);
     RangeImageGrid grid;
-    grid.rows = static_cast<std::int32_t>(span / height) + 1;
+    grid.lowest = level_at(sensor.elevation_min - kBorder);
+    grid.rows_per_level = static_cast<float>(1.0 / (height * kRadians));
+    grid.rows = static_cast<std::int32_t>((highest - grid.lowest) * grid.rows_per_level) + 1;
     grid.columns = static_cast<std::int32_t>(std::round(360.0 / width));
-    grid.elevation_min = static_cast<float>((sensor.elevation_min - kBorder) * kRadians);
-    grid.rows_per_radian = static_cast<float>(1.0 / (height * kRadians));
     grid.columns_per_radian = static_cast<float>(grid.columns / (2.0 * M_PI));
     grid.hole_rows =
         static_cast<std::int32_t>(std::round(1.2 * sensor.elevation_gap_wide / height));
@@ -59,23 +69,41 @@ struct ImageLocation {
   detail::Float8 range;  ///< m
 };
 
+/// Angle of (x, y) in [-pi, pi] within 1e-4 rad, for cells that are much wider; NaN for the origin.
+inline detail::Float8 coarse_azimuth(detail::Float8 x, detail::Float8 y) {
+  using detail::Float8;
+  const Float8 ax = abs(x);
+  const Float8 ay = abs(y);
+  // atan2(ay, ax) = pi/4 + atan(t); minimax fit of atan(t) / t in t^2 over [-1, 1].
+  const Float8 t = (ay - ax) / (ay + ax);
+  const Float8 u = t * t;
+  Float8 p(-3.898647e-02F);
+  p = p * u + Float8(1.462644e-01F);
+  p = p * u + Float8(-3.211750e-01F);
+  p = p * u + Float8(9.992138e-01F);
+  const Float8 from_y_axis = p * t - Float8(0.25F * detail::kPi);
+  return with_sign_of(y, with_sign_of(x, from_y_axis) + Float8(0.5F * detail::kPi));
+}
+
 inline ImageLocation locate(const RangeImageGrid& grid, detail::Float8 x, detail::Float8 y,
                             detail::Float8 z) {
   using detail::Float8;
   using detail::Int8;
-  const Float8 zero(0.0F);
-  const Float8 planar_squared = x * x + y * y;
-  const Float8 row = (detail::arc_tangent2(z, sqrt(planar_squared)) - Float8(grid.elevation_min)) *
-                     Float8(grid.rows_per_radian);
-  const Int8 column = min(detail::truncate((detail::arc_tangent2(y, x) + Float8(detail::kPi)) *
-                                           Float8(grid.columns_per_radian)),
-                          Int8(grid.columns - 1));
-  const detail::Mask8 inside = (row >= zero) & (row < Float8(static_cast<float>(grid.rows)));
+  const Float8 range = sqrt((x * x + y * y) + z * z);
+  const Float8 row =
+      (RangeImageGrid::level(z / range) - Float8(grid.lowest)) * Float8(grid.rows_per_level);
+  const Float8 column =
+      (coarse_azimuth(x, y) + Float8(detail::kPi)) * Float8(grid.columns_per_radian);
+  // False for the place of the sensor itself, whose row is NaN.
+  const detail::Mask8 inside =
+      (row >= Float8(0.0F)) & (row < Float8(static_cast<float>(grid.rows)));
   // Row times stride is exact in floats: images have fewer than 2^24 cells.
   const Float8 first =
       to_float(detail::truncate(keep(inside, row))) * Float8(static_cast<float>(grid.stride()));
-  const Int8 cell = detail::truncate(first) + column + Int8(detail::kLanes);
-  return {select(inside, cell, Int8(0)), inside, sqrt(planar_squared + z * z)};
+  const Float8 last_column(static_cast<float>(grid.columns) - 0.5F);
+  const Int8 cell = detail::truncate(first + Float8(static_cast<float>(detail::kLanes))) +
+                    detail::truncate(max(min(column, last_column), Float8(0.0F)));
+  return {keep(inside, cell), inside, range};
 }
 
 /// Nearest return per cell, and the nearest return of the 3x3 cells around it.
@@ -95,7 +123,7 @@ class RangeImage {
   /// Buffers that building needs, shared by all images of one owner.
   struct Scratch {
     std::vector<std::int16_t> nearest;
-    std::vector<std::int16_t> below, below_age;
+    std::vector<std::int16_t> below, gap;
     std::vector<std::int16_t> least, count;
     std::vector<std::int16_t> border;
     std::vector<std::int16_t> around;
@@ -162,41 +190,34 @@ class RangeImage {
   // Between two beams an image has rows that no beam can fill. Up to `hole_rows` of them take the
   // nearer of the returns below and above.
   static void close_holes(const RangeImageGrid& grid, Scratch& scratch) {
-    if (grid.hole_rows == 0) return;
     using namespace detail;
     const std::size_t stride = grid.stride();
-    const auto rows = static_cast<std::size_t>(grid.rows);
-    scratch.below.resize(grid.cell_count());
-    scratch.below_age.resize(grid.cell_count());
     const Short8 zero = all_shorts(0);
     const Short8 one = all_shorts(1);
     const Short8 nothing = all_shorts(kNothing);
-    const Short8 too_old = all_shorts(1000);
-    const Short8 limit = all_shorts(static_cast<std::int16_t>(grid.hole_rows + 1));
-    for (std::size_t column = kLanes; column + kLanes < stride; column += kLanes) {
-      Short8 value = nothing;
-      Short8 age = too_old;
-      for (std::size_t row = 0; row < rows; ++row) {
-        const std::size_t at = row * stride + column;
-        const Short8 here = load_shorts(&scratch.nearest[at]);
+    const Short8 widest = all_shorts(static_cast<std::int16_t>(grid.hole_rows));
+    // By column: the last return below, and how many rows are empty since; too many if there is
+    // none.
+    scratch.below.assign(stride, kNothing);
+    scratch.gap.assign(stride, static_cast<std::int16_t>(grid.hole_rows + 1));
+    for (std::size_t row = 0; row < static_cast<std::size_t>(grid.rows); ++row) {
+      for (std::size_t column = kLanes; column + kLanes < stride; column += kLanes) {
+        std::int16_t* const at = &scratch.nearest[row * stride + column];
+        const Short8 here = load_shorts(at);
+        const Short8 below = load_shorts(&scratch.below[column]);
+        const Short8 gap = load_shorts(&scratch.gap[column]);
         const Short8 returned = here < nothing;
-        value = select_shorts(returned, here, value);
-        age = select_shorts(returned, zero, min_shorts(age + one, too_old));
-        store_shorts(&scratch.below[at], value);
-        store_shorts(&scratch.below_age[at], age);
-      }
-      value = nothing;
-      age = too_old;
-      for (std::size_t row = rows; row-- > 0;) {
-        const std::size_t at = row * stride + column;
-        const Short8 here = load_shorts(&scratch.nearest[at]);
-        const Short8 returned = here < nothing;
-        value = select_shorts(returned, here, value);
-        age = select_shorts(returned, zero, min_shorts(age + one, too_old));
-        const Short8 between = age + load_shorts(&scratch.below_age[at]);
-        const Short8 closed = ~returned & (between <= limit);
-        const Short8 fill = min_shorts(value, load_shorts(&scratch.below[at]));
-        store_shorts(&scratch.nearest[at], select_shorts(closed, fill, here));
+        const Short8 closes = returned & (gap > zero) & (gap <= widest);
+        if (any_short(closes)) {
+          const Short8 fill = min_shorts(here, below);
+          std::int16_t* to = at;
+          for (Short8 left = closes & gap; any_short(left > zero); left = left - one) {
+            to -= stride;
+            store_shorts(to, select_shorts(left > zero, fill, load_shorts(to)));
+          }
+        }
+        store_shorts(&scratch.below[column], select_shorts(returned, here, below));
+        store_shorts(&scratch.gap[column], ~returned & min_shorts(gap + one, widest + one));
       }
     }
   }

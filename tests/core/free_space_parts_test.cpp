@@ -186,8 +186,10 @@ TEST_CASE("a hull fills the ground between the sides of an object that were seen
   InstanceHull hull(0.4);
   std::set<std::pair<int, int>> cells;
   hull.visit(points, [&](float x, float y) {
-    CHECK(cells.insert({static_cast<int>(std::floor(x / 0.4F)),
-                        static_cast<int>(std::floor(y / 0.4F))}).second);
+    CHECK(cells
+              .insert(
+                  {static_cast<int>(std::floor(x / 0.4F)), static_cast<int>(std::floor(y / 0.4F))})
+              .second);
   });
   // 5 x 5 cells of 0.4 m. The lowest row reaches from side to side: 5 cells, as each of its columns
   // begins there. The rows above hold the left column only: 3 cells. The top row reaches from side
@@ -208,10 +210,11 @@ TEST_CASE("a hull fills the ground between the sides of an object that were seen
 }
 
 TEST_CASE("a footprint remembers the lowest point of a cell and its neighbours, until cleared") {
-  GroundFootprint footprint(0.2, 50.0);
+  GroundFootprint footprint(0.2, 2.0, 50.0);
   CHECK(footprint.empty());
   footprint.add(10.05F, -3.05F, 0.7F);
   footprint.add(10.05F, -3.05F, 0.4F);
+  footprint.spread();
   CHECK_FALSE(footprint.empty());
   CHECK(footprint.lowest(10.05F, -3.05F) == 0.4F);
   CHECK(footprint.lowest(10.25F, -3.25F) == 0.4F);
@@ -223,8 +226,51 @@ TEST_CASE("a footprint remembers the lowest point of a cell and its neighbours, 
   footprint.add(60.0F, 0.0F, 0.0F);
   footprint.add(std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.0F);
   footprint.add(-1e30F, 1e30F, 0.0F);
+  footprint.spread();
+  CHECK(footprint.empty());
   CHECK(std::isinf(footprint.lowest(60.0F, 0.0F)));
   CHECK(std::isinf(footprint.lowest(std::numeric_limits<float>::infinity(), 0.0F)));
+}
+
+TEST_CASE("a footprint finds what a search over all removed points finds") {
+  Random random(11);
+  GroundFootprint footprint(0.25, 2.0, 40.0);
+  PointBuffer ground;
+  for (int i = 0; i < 3001; ++i) {
+    ground.push_back(random.uniform_float(-39, 39), random.uniform_float(-39, 39), 0.0F);
+  }
+  // Twice, so that nothing is left of the first time.
+  for (int round = 0; round < 2; ++round) {
+    PointBuffer removed;
+    for (int i = 0; i < 60; ++i) {
+      removed.push_back(random.uniform_float(-39, 39), random.uniform_float(-39, 39),
+                        random.uniform_float(0, 2));
+      footprint.add(removed.x.back(), removed.y.back(), removed.z.back());
+    }
+    footprint.spread();
+    std::vector<std::uint32_t> found;
+    footprint.find(ground, found);
+    std::vector<std::uint32_t> expected;
+    const auto cells_apart = [](float a, float b, float cell) {
+      return std::abs(std::floor(a / cell) - std::floor(b / cell));
+    };
+    for (std::uint32_t i = 0; i < ground.size(); ++i) {
+      bool near = false;
+      float lowest = std::numeric_limits<float>::infinity();
+      for (std::size_t k = 0; k < removed.size(); ++k) {
+        const auto touches = [&](float cell) {
+          return cells_apart(ground.x[i], removed.x[k], cell) <= 1.0F &&
+                 cells_apart(ground.y[i], removed.y[k], cell) <= 1.0F;
+        };
+        near = near || touches(2.0F);
+        if (touches(0.25F)) lowest = std::min(lowest, removed.z[k]);
+      }
+      if (near) expected.push_back(i);
+      REQUIRE(footprint.lowest(ground.x[i], ground.y[i]) == lowest);
+    }
+    REQUIRE(found == expected);
+    footprint.clear();
+  }
 }
 
 // A box of points with its centre at (x, y).

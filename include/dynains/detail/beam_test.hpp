@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -14,23 +15,68 @@
 
 namespace dynains::detail {
 
-/// What one reference says of one sample; bits, so that counting is adding.
-struct Sight {
-  static constexpr std::uint32_t kUnknown = 0;
-  static constexpr std::uint32_t kFree = 1;  ///< all beams about it went farther
-  static constexpr std::uint32_t kHit = 2;   ///< a beam ended there
-};
-
 /// Beams that are tested together.
 inline constexpr std::size_t kBeamBlock = 128;
 
-/// Tests `count` samples against a reference and writes a Sight each. `samples`: m, padded for wide
-/// loads; `T_reference_sample`: rigid. `margin` + `slope` * range: m, how much farther a beam must
-/// go to pass. `sights` is resized, padded.
+/// Set bits of every byte.
+inline constexpr std::array<std::uint8_t, 256> kOnes = [] {
+  std::array<std::uint8_t, 256> ones{};
+  for (std::size_t i = 1; i < ones.size(); ++i) {
+    ones[i] = static_cast<std::uint8_t>(ones[i / 2] + i % 2);
+  }
+  return ones;
+}();
+
+/// What one reference says of many samples, a bit each.
+class Sights {
+ public:
+  /// Room for `count` samples; their bits are to be written.
+  void resize(std::size_t count) {
+    // Counting reads nine bytes from that of the first bit on.
+    const std::size_t bytes = (count + kBeamBlock - 1) / kBeamBlock * kBeamBlock / 8 + 8;
+    if (free_.size() < bytes) {
+      free_.resize(bytes);
+      hit_.resize(bytes);
+    }
+  }
+  /// Of the eight samples from `first` on, a multiple of eight: which were seen free (all beams
+  /// about them went farther), and which were hit (a beam ended there).
+  void set(std::size_t first, Mask8 free, Mask8 hit) {
+    free_[first / 8] = static_cast<std::uint8_t>(free.bits());
+    hit_[first / 8] = static_cast<std::uint8_t>(hit.bits());
+  }
+
+  struct Count {
+    std::uint32_t free = 0;
+    std::uint32_t hit = 0;
+  };
+  Count count(std::size_t begin, std::size_t end) const {
+    Count result;
+    for (; end - begin > 8; begin += 8) add(begin, 0xFFU, result);
+    add(begin, (1U << (end - begin)) - 1, result);
+    return result;
+  }
+  bool is_free(std::size_t sample) const { return (free_[sample / 8] >> sample % 8 & 1U) != 0; }
+  bool is_hit(std::size_t sample) const { return (hit_[sample / 8] >> sample % 8 & 1U) != 0; }
+
+ private:
+  static unsigned eight_from(const std::vector<std::uint8_t>& bits, std::size_t first) {
+    const unsigned two = bits[first / 8] | unsigned{bits[first / 8 + 1]} << 8U;
+    return two >> first % 8;
+  }
+  void add(std::size_t begin, unsigned mask, Count& to) const {
+    to.free += kOnes[eight_from(free_, begin) & mask];
+    to.hit += kOnes[eight_from(hit_, begin) & mask];
+  }
+  std::vector<std::uint8_t> free_, hit_;
+};
+
+/// Tests `count` samples against a reference. `samples`: m, padded for wide loads;
+/// `T_reference_sample`: rigid. `margin` + `slope` * range: m, how much farther a beam must go to
+/// pass.
 inline void test_beams(const RangeImageGrid& grid, const RangeImage& image,
                        const Eigen::Isometry3f& T_reference_sample, const PointBuffer& samples,
-                       std::size_t count, float margin, float slope,
-                       std::vector<std::uint32_t>& sights) {
+                       std::size_t count, float margin, float slope, Sights& sights) {
   constexpr float kCentimetres = 100.0F;
   const auto& m = T_reference_sample.matrix();
   const Float8 m00(m(0, 0)), m01(m(0, 1)), m02(m(0, 2)), m03(m(0, 3));
@@ -39,11 +85,8 @@ inline void test_beams(const RangeImageGrid& grid, const RangeImage& image,
   const Float8 to_centimetres(kCentimetres);
   const Float8 base(margin * kCentimetres);
   const Float8 growth(slope * kCentimetres);
-  const Int8 free_bit(Sight::kFree);
-  const Int8 hit_bit(Sight::kHit);
   const Int8 none(0);
-  const std::size_t padded = (count + kBeamBlock - 1) / kBeamBlock * kBeamBlock;
-  if (sights.size() < padded) sights.resize(padded);
+  sights.resize(count);
   const RangeImage::Cell* const cells = image.data();
   // Images are larger than the caches near the core: all cells of a block are asked for before the
   // first is needed.
@@ -78,8 +121,7 @@ inline void test_beams(const RangeImageGrid& grid, const RangeImage& image,
       const Mask8 free = inside & (around - range > tolerance);
       const Mask8 hit = inside & ~free &
                         ((abs(nearest - range) <= tolerance) | (abs(around - range) <= tolerance));
-      const Int8 sight = select(free, free_bit, select(hit, hit_bit, none));
-      std::memcpy(&sights[begin + i], &sight, sizeof(sight));
+      sights.set(begin + i, free, hit);
     }
   }
 }

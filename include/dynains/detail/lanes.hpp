@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 
 #if defined(__SSE2__)
 #include <emmintrin.h>
@@ -129,6 +130,8 @@ inline Float8 keep(Mask8 mask, Float8 a) {
   return {Float4(mask.lo & bits_of(a.lo)), Float4(mask.hi & bits_of(a.hi))};
 }
 
+inline Int8 keep(Mask8 mask, Int8 a) { return {mask.lo & a.lo, mask.hi & a.hi}; }
+
 /// The second operand where either is NaN, as the SSE instruction has it.
 inline Float8 min(Float8 a, Float8 b) {
 #if defined(__SSE2__)
@@ -163,6 +166,14 @@ inline Float8 sqrt(Float8 a) {
 inline Float8 abs(Float8 a) {
   const Int4 magnitude = {0x7FFFFFFF, 0x7FFFFFFF, 0x7FFFFFFF, 0x7FFFFFFF};
   return {Float4(bits_of(a.lo) & magnitude), Float4(bits_of(a.hi) & magnitude)};
+}
+
+/// `a`, negated where `sign` is negative or -0.
+inline Float8 with_sign_of(Float8 sign, Float8 a) {
+  constexpr std::int32_t kSign = std::numeric_limits<std::int32_t>::min();
+  const Int4 mask = {kSign, kSign, kSign, kSign};
+  return {Float4(bits_of(a.lo) ^ (bits_of(sign.lo) & mask)),
+          Float4(bits_of(a.hi) ^ (bits_of(sign.hi) & mask))};
 }
 
 /// Rounds towards zero; lanes must lie within the range of int32.

@@ -18,22 +18,29 @@ inline Short8 load_shorts(const std::int16_t* from) {
   std::memcpy(&result, from, sizeof(result));
   return result;
 }
-inline void store_shorts(std::int16_t* to, Short8 value) {
-  std::memcpy(to, &value, sizeof(value));
-}
+inline void store_shorts(std::int16_t* to, Short8 value) { std::memcpy(to, &value, sizeof(value)); }
 inline Short8 all_shorts(std::int16_t value) {
   return Short8{value, value, value, value, value, value, value, value};
 }
 
 /// `a` where the mask (the result of a comparison) is set, else `b`.
-inline Short8 select_shorts(Short8 mask, Short8 a, Short8 b) {
-  return (mask & a) | (~mask & b);
-}
+inline Short8 select_shorts(Short8 mask, Short8 a, Short8 b) { return (mask & a) | (~mask & b); }
 inline Short8 min_shorts(Short8 a, Short8 b) {
 #if defined(__SSE2__)
   return Short8(_mm_min_epi16(__m128i(a), __m128i(b)));
 #else
   return select_shorts(a < b, a, b);
+#endif
+}
+
+/// Whether any lane of a mask is set.
+inline bool any_short(Short8 mask) {
+#if defined(__SSE2__)
+  return _mm_movemask_epi8(__m128i(mask)) != 0;
+#else
+  std::uint64_t halves[2];
+  std::memcpy(halves, &mask, sizeof(halves));
+  return (halves[0] | halves[1]) != 0;
 #endif
 }
 

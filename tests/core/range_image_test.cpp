@@ -1,0 +1,210 @@
+// Range images and the beams that are tested against them, each against the slow and obvious.
+#include "dynains/range_image.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <vector>
+
+#include "dynains/detail/beam_test.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+namespace dynains::test {
+namespace {
+
+constexpr double kDegrees = 180.0 / M_PI;
+
+RangeImageGrid small_grid() {
+  SensorModel sensor = SensorModel::typical();
+  sensor.azimuth_step = 0.5;
+  return RangeImageGrid::for_sensor(sensor);
+}
+
+std::int32_t cell_of(const RangeImageGrid& grid, float x, float y, float z) {
+  std::int32_t cells[detail::kLanes];
+  locate(grid, detail::Float8(x), detail::Float8(y), detail::Float8(z)).cell.store(cells);
+  return cells[0];
+}
+
+TEST_CASE("columns follow the azimuth within 1e-4 rad, rows the elevation within 0.2 deg") {
+  for (double azimuth = -179.9; azimuth < 180.0; azimuth += 0.37) {
+    float lanes[detail::kLanes];
+    const double angle = azimuth / kDegrees;
+    coarse_azimuth(detail::Float8(static_cast<float>(7.0 * std::cos(angle))),
+                   detail::Float8(static_cast<float>(7.0 * std::sin(angle))))
+        .store(lanes);
+    REQUIRE(std::abs(lanes[0] - angle) < 1e-4);
+  }
+  double before = -10.0;
+  for (double elevation = -90.0; elevation <= 90.0; elevation += 0.1) {
+    const double level = RangeImageGrid::level(std::sin(elevation / kDegrees));
+    REQUIRE(level > before);
+    if (std::abs(elevation) < 50.0) REQUIRE(std::abs(level * kDegrees - elevation) < 0.2);
+    before = level;
+  }
+}
+
+TEST_CASE("a direction that no image covers has cell 0") {
+  const RangeImageGrid grid = small_grid();
+  CHECK(cell_of(grid, 0.0F, 0.0F, 0.0F) == 0);
+  CHECK(cell_of(grid, 1.0F, 0.0F, 1.0F) == 0);
+  CHECK(cell_of(grid, 1.0F, 0.0F, -1.0F) == 0);
+  CHECK(cell_of(grid, 1.0F, 0.0F, 0.0F) > 0);
+  // Straight behind the sensor, on both sides of the seam.
+  const auto stride = static_cast<std::int32_t>(grid.stride());
+  const auto lanes = static_cast<std::int32_t>(detail::kLanes);
+  CHECK(cell_of(grid, -1.0F, 1e-9F, 0.0F) % stride == lanes + grid.columns - 1);
+  CHECK(cell_of(grid, -1.0F, -1e-9F, 0.0F) % stride == lanes);
+}
+
+// The image as its definition has it, in centimetres: nearest return per cell, holes between two
+// returns of a column closed, the nearest of 3x3 cells around.
+class ReferenceImage {
+ public:
+  ReferenceImage(const RangeImageGrid& grid, const PointBuffer& points)
+      : grid_(grid), cells_(grid.cell_count(), kNothing) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const float range = std::sqrt((points.x[i] * points.x[i] + points.y[i] * points.y[i]) +
+                                    points.z[i] * points.z[i]);
+      const std::int32_t cell = cell_of(grid, points.x[i], points.y[i], points.z[i]);
+      if (cell == 0) continue;
+      int& nearest = cells_[static_cast<std::size_t>(cell)];
+      nearest = std::min(nearest, static_cast<int>(range * 100.0F));
+    }
+    const std::vector<int> returns = cells_;
+    for (int column = 0; column < grid.columns; ++column) {
+      for (int low = 0; low < grid.rows; ++low) {
+        for (int high = low + 2; high < grid.rows; ++high) {
+          const int a = returns[at(low, column)], b = returns[at(high, column)];
+          bool empty = high - low - 1 <= grid.hole_rows && a != kNothing && b != kNothing;
+          for (int row = low + 1; row < high; ++row) {
+            empty = empty && returns[at(row, column)] == kNothing;
+          }
+          for (int row = low + 1; empty && row < high; ++row) {
+            cells_[at(row, column)] = std::min(a, b);
+          }
+        }
+      }
+    }
+  }
+
+  int nearest(int row, int column) const { return cells_[at(row, column)]; }
+  int around(int row, int column) const {
+    int least = kNothing;
+    int count = 0;
+    for (int r = std::max(0, row - 1); r <= std::min(grid_.rows - 1, row + 1); ++r) {
+      for (int c = column - 1; c <= column + 1; ++c) {
+        const int value = nearest(r, (c + grid_.columns) % grid_.columns);
+        least = std::min(least, value);
+        count += value != kNothing ? 1 : 0;
+      }
+    }
+    return count < 2 ? RangeImage::kUnknown : least;
+  }
+  std::size_t at(int row, int column) const {
+    return static_cast<std::size_t>(row) * grid_.stride() + detail::kLanes +
+           static_cast<std::size_t>(column);
+  }
+
+ private:
+  static constexpr int kNothing = RangeImage::kNothing;
+  const RangeImageGrid& grid_;
+  std::vector<int> cells_;
+};
+
+TEST_CASE("an image is what its definition says, cell by cell") {
+  Random random(5);
+  const RangeImageGrid grid = small_grid();
+  REQUIRE(grid.hole_rows >= 2);
+  RangeImage image;
+  RangeImage::Scratch scratch;
+  for (const int count : {3, 2000, 30000}) {
+    PointBuffer points;
+    for (int i = 0; i < count; ++i) {
+      const double azimuth = random.uniform(-M_PI, M_PI);
+      const double elevation = random.uniform(-35.0, 10.0) / kDegrees;
+      const double range = random.uniform(1.0, 60.0);
+      points.push_back(static_cast<float>(range * std::cos(elevation) * std::cos(azimuth)),
+                       static_cast<float>(range * std::cos(elevation) * std::sin(azimuth)),
+                       static_cast<float>(range * std::sin(elevation)));
+    }
+    // Without objects, whose returns would reach farther.
+    image.build(grid, points, PointsView(), 0.0F, scratch);
+    const ReferenceImage expected(grid, points);
+    for (int row = 0; row < grid.rows; ++row) {
+      for (int column = 0; column < grid.columns; ++column) {
+        const RangeImage::Cell cell = image[expected.at(row, column)];
+        REQUIRE(cell.nearest == expected.nearest(row, column));
+        REQUIRE(cell.around == expected.around(row, column));
+      }
+    }
+  }
+}
+
+TEST_CASE("bits of sights are counted over any range") {
+  Random random(9);
+  constexpr std::size_t kCount = 400;
+  detail::Sights sights;
+  sights.resize(kCount);
+  for (std::size_t first = 0; first < kCount; first += detail::kLanes) {
+    float values[detail::kLanes];
+    for (float& value : values) value = random.uniform_float(-1.0, 1.0);
+    const detail::Float8 random_values = detail::Float8::load(values);
+    sights.set(first, random_values > detail::Float8(0.5F), random_values < detail::Float8(-0.3F));
+  }
+  for (int round = 0; round < 2000; ++round) {
+    const std::size_t begin = random.index(kCount);
+    const std::size_t end = begin + random.index(std::min<std::size_t>(kCount - begin, 40) + 1);
+    std::uint32_t free = 0;
+    std::uint32_t hit = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      free += sights.is_free(i) ? 1 : 0;
+      hit += sights.is_hit(i) ? 1 : 0;
+    }
+    const detail::Sights::Count counted = sights.count(begin, end);
+    REQUIRE(counted.free == free);
+    REQUIRE(counted.hit == hit);
+  }
+}
+
+TEST_CASE(
+    "a sample is free where all beams about it go farther, hit where one ends, else unknown") {
+  // A wall 20 m ahead, seen by beams 0.2 deg apart in both directions.
+  const RangeImageGrid grid = RangeImageGrid::for_sensor(SensorModel::typical());
+  PointBuffer wall;
+  for (double azimuth = -20.0; azimuth <= 20.0; azimuth += 0.2) {
+    for (double elevation = -10.0; elevation <= 3.0; elevation += 0.2) {
+      const double y = 20.0 * std::tan(azimuth / kDegrees);
+      wall.push_back(20.0F, static_cast<float>(y),
+                     static_cast<float>(std::hypot(20.0, y) * std::tan(elevation / kDegrees)));
+    }
+  }
+  RangeImage image;
+  RangeImage::Scratch scratch;
+  image.build(grid, PointsView(), wall, 0.0F, scratch);
+
+  // The margin at 20 m is 0.25 + 0.01 * 20 = 0.45 m. Samples in the frame of a sensor that stands
+  // 5 m behind this one.
+  PointBuffer samples;
+  for (const float x : {24.4F, 24.6F, 25.0F, 25.4F, 25.6F, 15.0F}) samples.push_back(x, 0.0F, 0.0F);
+  samples.push_back(5.0F, 0.0F, 20.0F);  // above all beams
+  samples.push_back(0.0F, 20.0F, 0.0F);  // aside of all beams
+  const std::size_t count = samples.size();
+  samples.resize(count + detail::kLanes);
+  Eigen::Isometry3f T_reference_sample = Eigen::Isometry3f::Identity();
+  T_reference_sample.translation().x() = -5.0F;
+  detail::Sights sights;
+  detail::test_beams(grid, image, T_reference_sample, samples, count, 0.25F, 0.01F, sights);
+  const std::vector<int> free = {1, 0, 0, 0, 0, 1, 0, 0};
+  const std::vector<int> hit = {0, 1, 1, 1, 0, 0, 0, 0};
+  for (std::size_t i = 0; i < count; ++i) {
+    INFO("sample " << i);
+    CHECK(sights.is_free(i) == (free[i] != 0));
+    CHECK(sights.is_hit(i) == (hit[i] != 0));
+  }
+}
+
+}  // namespace
+}  // namespace dynains::test
