@@ -10,6 +10,7 @@
 #include <random>
 #include <vector>
 
+#include "dynains/detail/lanes.hpp"
 #include "dynains/detail/plane_fit.hpp"
 #include "dynains/points.hpp"
 
@@ -40,7 +41,12 @@ struct GroundHypothesis {
 /// below it.
 class MountingEstimator {
  public:
-  explicit MountingEstimator(PointsView points) : cells_(thin(points)) {}
+  explicit MountingEstimator(PointsView points) : cells_(thin(points)) {
+    for (std::size_t i = 0; i < std::min(kScored, cells_.size()); ++i) {
+      const Eigen::Vector3f p = cells_[i].cast<float>();
+      scored_.push_back(p.x(), p.y(), p.z());
+    }
+  }
 
   /// The ground below the sensor (`side` 1) or, for one that hangs upside down, above it (-1).
   std::optional<GroundHypothesis> find(double side) const {
@@ -64,50 +70,61 @@ class MountingEstimator {
   static constexpr double kOnGround = 0.12;      // m, off the plane
   static constexpr double kBelow = 0.4;          // m under the plane: the ground is lower
   static constexpr std::size_t kFewestCells = 60;
-  static constexpr std::size_t kScored = 2000;  // cells by which hypotheses are compared
   static constexpr int kTrials = 3000;
+  static constexpr std::size_t kScreened = 200;  // cells by which all hypotheses are compared
+  static constexpr std::size_t kFinalists = 40;
+  static constexpr std::size_t kScored = 2000;  // cells by which the best are compared
 
+  // One point for each cell that was hit, the mean of those in it.
   static std::vector<Eigen::Vector3d> thin(PointsView points) {
-    struct Keyed {
-      std::uint64_t key;
-      Eigen::Vector3f point;
+    constexpr auto kHalf = static_cast<std::int32_t>(kReach / kCell);
+    constexpr std::size_t kWidth = 2 * kHalf;
+    struct Sum {
+      std::size_t place;
+      Eigen::Vector3d sum;
+      double count;
     };
-    std::vector<Keyed> keyed;
+    std::vector<std::uint32_t> number(kWidth * kWidth * kWidth, 0);  // of a place, from 1
+    std::vector<Sum> sums;
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Eigen::Vector3f p(points.x[i], points.y[i], points.z[i]);
       const float range = p.norm();
       if (!(range > kNearest && range < kReach)) continue;
-      std::uint64_t key = 0;
+      std::size_t place = 0;
       for (Eigen::Index axis = 0; axis < 3; ++axis) {
-        key = key << 16U | static_cast<std::uint64_t>(std::floor(p[axis] / kCell) + 1024.0);
+        const auto cell =
+            static_cast<std::int32_t>(std::floor(p[axis] / static_cast<float>(kCell)));
+        place = place * kWidth + static_cast<std::size_t>(cell + kHalf);
       }
-      keyed.push_back({key, p});
+      if (number[place] == 0) {
+        sums.push_back({place, Eigen::Vector3d::Zero(), 0.0});
+        number[place] = static_cast<std::uint32_t>(sums.size());
+      }
+      Sum& sum = sums[number[place] - 1];
+      sum.sum += p.cast<double>();
+      sum.count += 1.0;
     }
-    // Stable, so that the sums below are the same for every standard library.
-    std::stable_sort(keyed.begin(), keyed.end(),
-                     [](const Keyed& a, const Keyed& b) { return a.key < b.key; });
+    // Whatever order the points come in.
+    std::sort(sums.begin(), sums.end(),
+              [](const Sum& a, const Sum& b) { return a.place < b.place; });
     std::vector<Eigen::Vector3d> cells;
-    for (std::size_t begin = 0; begin < keyed.size();) {
-      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-      std::size_t end = begin;
-      while (end < keyed.size() && keyed[end].key == keyed[begin].key) {
-        sum += keyed[end++].point.cast<double>();
-      }
-      cells.emplace_back(sum / static_cast<double>(end - begin));
-      begin = end;
-    }
+    cells.reserve(sums.size());
+    for (const Sum& sum : sums) cells.emplace_back(sum.sum / sum.count);
     // In random order, so that any part is a fair sample.
     std::mt19937_64 random(1);
     for (std::size_t i = cells.size(); i > 1; --i) std::swap(cells[i - 1], cells[random() % i]);
     return cells;
   }
 
-  /// Random planes through three cells.
+  /// Random planes through three cells: all are compared by a few cells, the best by many.
   std::optional<GroundHypothesis> search(double side) const {
-    const std::size_t scored = std::min(kScored, cells_.size());
+    struct Candidate {
+      GroundHypothesis ground;
+      float score;
+    };
+    const auto is_better = [](const Candidate& a, const Candidate& b) { return a.score > b.score; };
+    std::vector<Candidate> candidates;
     std::mt19937_64 random(2);
-    std::optional<GroundHypothesis> best;
-    double best_score = 0.0;
     for (int trial = 0; trial < kTrials; ++trial) {
       const Eigen::Vector3d& a = cells_[random() % cells_.size()];
       const Eigen::Vector3d& b = cells_[random() % cells_.size()];
@@ -118,23 +135,37 @@ class MountingEstimator {
       GroundHypothesis ground;
       ground.up = normal * ((normal.z() * side > 0.0 ? 1.0 : -1.0) / area);
       ground.height = -ground.up.dot(a);
-      if (!is_possible(ground, side)) continue;
-      double score = 0.0;
-      for (std::size_t i = 0; i < scored; ++i) {
-        const double distance = ground.distance(cells_[i]);
-        // Falls off smoothly, so that the middle of the ground wins over its edge.
-        if (std::abs(distance) < 2.0 * kOnGround) {
-          score += 1.0 - std::abs(distance) / (2.0 * kOnGround);
-        } else if (distance < -kBelow) {
-          score -= 0.5;
-        }
-      }
-      if (score > best_score) {
-        best_score = score;
-        best = ground;
-      }
+      if (is_possible(ground, side)) candidates.push_back({ground, score(ground, kScreened)});
     }
-    return best;
+    std::stable_sort(candidates.begin(), candidates.end(), is_better);
+    if (candidates.size() > kFinalists) candidates.resize(kFinalists);
+    for (Candidate& candidate : candidates) candidate.score = score(candidate.ground, kScored);
+    const auto best =
+        std::max_element(candidates.begin(), candidates.end(),
+                         [](const Candidate& a, const Candidate& b) { return a.score < b.score; });
+    if (best == candidates.end() || !(best->score > 0.0F)) return std::nullopt;
+    return best->ground;
+  }
+
+  /// How well the first `most` cells fit a plane.
+  float score(const GroundHypothesis& ground, std::size_t most) const {
+    const Float8 x(static_cast<float>(ground.up.x()));
+    const Float8 y(static_cast<float>(ground.up.y()));
+    const Float8 z(static_cast<float>(ground.up.z()));
+    const Float8 height(static_cast<float>(ground.height));
+    const Float8 zero(0.0F), one(1.0F), half(0.5F);
+    const Float8 slope(static_cast<float>(0.5 / kOnGround));
+    const Float8 below(static_cast<float>(-kBelow));
+    Float8 total(0.0F);
+    // Whole groups of lanes; there are many more cells than the few left over.
+    const std::size_t count = std::min(most, cells_.size()) / kLanes * kLanes;
+    for (std::size_t i = 0; i < count; i += kLanes) {
+      const Float8 distance = (x * Float8::load(&scored_.x[i]) + y * Float8::load(&scored_.y[i])) +
+                              (z * Float8::load(&scored_.z[i]) + height);
+      // Falls off smoothly, so that the middle of the ground wins over its edge.
+      total = total + max(one - abs(distance) * slope, zero) - keep(distance < below, half);
+    }
+    return sum(total);
   }
 
   static bool is_possible(const GroundHypothesis& ground, double side) {
@@ -184,6 +215,7 @@ class MountingEstimator {
   }
 
   std::vector<Eigen::Vector3d> cells_;  // sensor frame, m
+  PointBuffer scored_;                  // the first of them
 };
 
 }  // namespace detail
@@ -194,7 +226,7 @@ class MountingEstimator {
 /// point anywhere around the vertical. Unknown if the scan shows too little ground. Points that are
 /// not finite are ignored.
 ///
-/// Allocates and takes tens of milliseconds: meant for a few scans of a sensor, not for each. The
+/// Allocates and takes milliseconds: meant for a few scans of a sensor, not for each. The
 /// median over several scans is steadier than one of them.
 inline Mounting estimate_mounting(PointsView points) {
   const detail::MountingEstimator estimator(points);

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/detail/arc_tangent.hpp"
+#include "dynains/detail/lanes.hpp"
 #include "dynains/points.hpp"
 
 namespace dynains {
@@ -19,7 +21,7 @@ struct SensorModel {
   double elevation_min = 0.0;       ///< lowest beam
   double elevation_max = 0.0;       ///< highest beam
 
-  double height = 0.0;              ///< m over the ground
+  double height = 0.0;  ///< m over the ground
 
   bool known() const { return azimuth_step > 0.0; }
 
@@ -32,21 +34,20 @@ struct SensorModel {
 /// Allocates; meant to be called once per sensor, not per scan.
 inline SensorModel estimate_sensor_model(PointsView points) {
   constexpr std::size_t kFewest = 500;
-  constexpr double kDegrees = 180.0 / M_PI;
-  struct Direction {
-    std::int32_t band;
-    float along;
-  };
   SensorModel model;
   if (points.size() < kFewest) return model;
 
-  std::vector<float> azimuth(points.size());
-  std::vector<float> elevation(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const double x = points.x[i], y = points.y[i], z = points.z[i];
-    azimuth[i] = static_cast<float>(std::atan2(y, x) * kDegrees);
-    elevation[i] = static_cast<float>(std::atan2(z, std::hypot(x, y)) * kDegrees);
-  }
+  std::vector<float> azimuth(points.size() + detail::kLanes);
+  std::vector<float> elevation(points.size() + detail::kLanes);
+  detail::for_lanes(points,
+                    [&](detail::Float8 x, detail::Float8 y, detail::Float8 z, std::size_t first) {
+                      using detail::arc_tangent2;
+                      const detail::Float8 degrees(static_cast<float>(180.0 / M_PI));
+                      (arc_tangent2(y, x) * degrees).store(&azimuth[first]);
+                      (arc_tangent2(z, sqrt(x * x + y * y)) * degrees).store(&elevation[first]);
+                    });
+  azimuth.resize(points.size());
+  elevation.resize(points.size());
   std::vector<float> sorted = elevation;
   const auto percentile = [](std::vector<float>& values, double share) {
     const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
@@ -61,18 +62,23 @@ inline SensorModel estimate_sensor_model(PointsView points) {
   // of a degree are the same beam twice.
   const auto gaps_within = [&](const std::vector<float>& across, const std::vector<float>& along,
                                double band, double smallest) {
-    std::vector<Direction> directions(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      directions[i] = {static_cast<std::int32_t>(std::floor(across[i] / band)), along[i]};
-    }
-    std::sort(directions.begin(), directions.end(), [](const Direction& a, const Direction& b) {
-      return a.band != b.band ? a.band < b.band : a.along < b.along;
-    });
+    // Counting sort by band: angles lie within a half turn on either side.
+    const auto band_of = [&](float angle) {
+      return static_cast<std::size_t>((static_cast<double>(angle) + 181.0) / band);
+    };
+    std::vector<std::size_t> begin(band_of(181.0F) + 2, 0);
+    for (const float angle : across) ++begin[band_of(angle) + 1];
+    for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
+    std::vector<float> sorted(along.size());
+    std::vector<std::size_t> next = begin;
+    for (std::size_t i = 0; i < along.size(); ++i) sorted[next[band_of(across[i])]++] = along[i];
     std::vector<float> gaps;
-    for (std::size_t i = 1; i < directions.size(); ++i) {
-      const float gap = directions[i].along - directions[i - 1].along;
-      if (directions[i].band == directions[i - 1].band && static_cast<double>(gap) > smallest) {
-        gaps.push_back(gap);
+    gaps.reserve(along.size());
+    for (std::size_t i = 0; i + 1 < begin.size(); ++i) {
+      std::sort(&sorted[0] + begin[i], &sorted[0] + begin[i + 1]);
+      for (std::size_t k = begin[i] + 1; k < begin[i + 1]; ++k) {
+        const float gap = sorted[k] - sorted[k - 1];
+        if (static_cast<double>(gap) > smallest) gaps.push_back(gap);
       }
     }
     return gaps;
