@@ -14,6 +14,7 @@
 #include "dynains/cluster_set.hpp"
 #include "dynains/curved_voxel_clusterer.hpp"
 #include "dynains/detail/instance_ids.hpp"
+#include "dynains/detail/one_call.hpp"
 #include "dynains/detail/scan_slot.hpp"
 #include "dynains/detail/stage_checks.hpp"
 #include "dynains/free_space_evidence.hpp"
@@ -44,7 +45,10 @@ struct DefaultStages {
 /// Removes moving instances from a stream of scans, one scan at a time.
 ///
 /// Owns every buffer; once warm, a frame allocates nothing except when the map grows. Objects are
-/// independent of each other; one object serves one thread at a time.
+/// independent of each other. One object serves one thread at a time: `push`, `flush` and `reset`
+/// throw UsageError while another of these calls is at work. Everything that is read from it, the
+/// map and the spans of a verdict, is read between two calls: by the thread that makes them, or by
+/// others under a lock that these calls are made under as well.
 template <class Stages = DefaultStages>
 class BasicDynaInsRemover {
  public:
@@ -151,6 +155,47 @@ class BasicDynaInsRemover {
   /// the state as it was.
   template <class Cloud>
   FrameResult push(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor, double time) {
+    const detail::OneCall::Guard guard(one_call_);
+    return take_in(cloud, T_world_sensor, time);
+  }
+
+  /// The same with scan numbers for times: 0.1 s from scan to scan.
+  template <class Cloud>
+  FrameResult push(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor) {
+    const detail::OneCall::Guard guard(one_call_);
+    constexpr double kPeriod = 0.1;
+    return take_in(cloud, T_world_sensor, pushed_ == 0 ? 0.0 : last_time_ + kPeriod);
+  }
+
+  /// Makes the verdict on all scans final that are still open, oldest first; `sink` is called with
+  /// the ScanVerdict of each. The next push starts a new window.
+  template <class Sink>
+  void flush(Sink&& sink) {
+    const detail::OneCall::Guard guard(one_call_);
+    while (finished_ < pushed_) {
+      StageClock clock;
+      StageTimes times;
+      sink(finish_next(clock, times));
+    }
+    ++segment_;
+  }
+
+  /// Back to the state after construction; buffers keep their capacity.
+  void reset() {
+    const detail::OneCall::Guard guard(one_call_);
+    map_.clear();
+    instance_ids_ = {};
+    sensor_ = {};
+    pushed_ = 0;
+    finished_ = 0;
+    ++segment_;  // nothing that is remembered takes part any more
+  }
+
+ private:
+  using ScanSlot = detail::ScanSlot;
+
+  template <class Cloud>
+  FrameResult take_in(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor, double time) {
     validate_pose("T_world_sensor", T_world_sensor);
     validate_time(time);
     FrameResult result;
@@ -194,38 +239,6 @@ class BasicDynaInsRemover {
     return result;
   }
 
-  /// The same with scan numbers for times: 0.1 s from scan to scan.
-  template <class Cloud>
-  FrameResult push(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor) {
-    constexpr double kPeriod = 0.1;
-    return push(cloud, T_world_sensor, pushed_ == 0 ? 0.0 : last_time_ + kPeriod);
-  }
-
-  /// Makes the verdict on all scans final that are still open, oldest first; `sink` is called with
-  /// the ScanVerdict of each. The next push starts a new window.
-  template <class Sink>
-  void flush(Sink&& sink) {
-    while (finished_ < pushed_) {
-      StageClock clock;
-      StageTimes times;
-      sink(finish_next(clock, times));
-    }
-    ++segment_;
-  }
-
-  /// Back to the state after construction; buffers keep their capacity.
-  void reset() {
-    map_.clear();
-    instance_ids_ = {};
-    sensor_ = {};
-    pushed_ = 0;
-    finished_ = 0;
-    ++segment_;  // nothing that is remembered takes part any more
-  }
-
- private:
-  using ScanSlot = detail::ScanSlot;
-
   void validate_time(double time) const {
     if (!std::isfinite(time) || (pushed_ > 0 && !(time > last_time_))) {
       throw PoseError("time = " + std::to_string(time) + " s must be finite and greater than " +
@@ -237,7 +250,7 @@ class BasicDynaInsRemover {
   ScanSlot& slot(std::uint64_t scan) { return ring_[scan % ring_.size()]; }
 
   ScanSlot& begin_scan(const Eigen::Isometry3d& T_world_sensor, double time) {
-    if (pushed_ > 0 && time - last_time_ > config_.max_gap) ++segment_;
+    if (pushed_ > 0 && breaks_off(T_world_sensor, time)) ++segment_;
     ScanSlot& newest = slot(pushed_);
     newest.scan = pushed_;
     newest.segment = segment_;
@@ -247,6 +260,14 @@ class BasicDynaInsRemover {
     last_time_ = time;
     ++pushed_;
     return newest;
+  }
+
+  // Whether the scan before is too long ago, or too far away to be compared with.
+  bool breaks_off(const Eigen::Isometry3d& T_world_sensor, double time) {
+    const double pause = time - last_time_;
+    const Eigen::Vector3d before = slot(pushed_ - 1).T_world_sensor.translation();
+    const double way = (T_world_sensor.translation() - before).norm();
+    return pause > config_.max_gap || way > config_.max_speed * pause;
   }
 
   // Eq. 3: the non-ground points of the last K scans in the frame of the newest.
@@ -408,12 +429,12 @@ class BasicDynaInsRemover {
   ScanVerdict finish_next(StageClock& clock, StageTimes& times) {
     ScanSlot& scan = slot(finished_);
     decide(scan, std::max(1, config_.votes), true, clock, times);
+    ++finished_;  // also if a map throws that writes to a disk
     if (config_.build_map) {
       const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
       map_.insert(points, scan.is_kept, scan.T_world_sensor);
     }
     clock.lap(times.map);
-    ++finished_;
     return scan.verdict();
   }
 
@@ -439,6 +460,7 @@ class BasicDynaInsRemover {
   std::vector<ClusterVerdict> verdict_;
   detail::InstanceIds instance_ids_;
 
+  detail::OneCall one_call_;
   std::uint64_t pushed_ = 0;
   std::uint64_t finished_ = 0;
   std::uint64_t window_first_ = 0;

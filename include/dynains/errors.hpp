@@ -24,6 +24,12 @@ class CloudError : public std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
 
+/// An object is called while another call on it is at work: from a second thread, or from within.
+class UsageError : public std::logic_error {
+ public:
+  using std::logic_error::logic_error;
+};
+
 /// A file cannot be read or written; the text gives path, position and what was expected.
 class IoError : public std::runtime_error {
  public:

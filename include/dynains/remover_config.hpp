@@ -15,6 +15,7 @@ struct RemoverConfig {
   double min_range = 2.7;  ///< m, horizontal; nearer points are the robot's own
   double max_range = 250;  ///< m, horizontal and vertical; farther points are not measurements
   double max_gap = 1.0;    ///< s; a longer pause between scans starts a new window
+  double max_speed = 100;  ///< m/s; a pose that jumps farther than that starts a new window
   bool use_free_space = true;  ///< evidence from what other scans saw through
   bool build_map = true;       ///< false: labels only, the map stays empty
 
@@ -41,6 +42,8 @@ struct RemoverConfig {
                       "farther points (horizontally or vertically) are not judged"});
     visitor(Parameter{"max_gap", self.max_gap, half_open_below(0, 1e9), "s",
                       "a longer pause between two scans starts a new window"});
+    visitor(Parameter{"max_speed", self.max_speed, half_open_below(0, 1e9), "m/s",
+                      "a pose that is farther from the one before starts a new window"});
     visitor(Parameter{"use_free_space", self.use_free_space, Bounds(), "",
                       "remove what other scans saw through (beyond the paper)"});
     visitor(Parameter{"build_map", self.build_map, Bounds(), "", "accumulate the static map"});

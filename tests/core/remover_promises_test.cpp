@@ -373,6 +373,25 @@ TEST_CASE("a pause longer than max_gap starts a new window, one of just max_gap 
   CHECK(broken.final.size() == scans.size());
 }
 
+TEST_CASE("a pose that jumps farther than max_speed allows starts a new window") {
+  Config config = Config::paper();
+  config.max_speed = 64.0;
+  const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
+  const auto with_jump = [&](double jump) {
+    std::vector<Scan> jumped = scans;
+    for (std::size_t i = 0; i < jumped.size(); ++i) {
+      jumped[i].time = 0.125 * static_cast<double>(i);
+      const double x = 0.5 * static_cast<double>(i) + (i < 4 ? 0.0 : jump - 0.5);
+      jumped[i].T_world_sensor = sensor_at(x);
+    }
+    return run(config, jumped);
+  };
+  const Run second_half = run(config, {scans.begin() + 4, scans.end()});
+  CHECK((newest_labels(with_jump(8.125), 4) == newest_labels(second_half, 0)));
+  CHECK((newest_labels(with_jump(-8.125), 4) == newest_labels(second_half, 0)));
+  CHECK((newest_labels(with_jump(8.0), 4) != newest_labels(second_half, 0)));
+}
+
 TEST_CASE("flush in the middle finishes what is open, and the next scan starts a new window") {
   const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
   const std::vector<Scan> first(scans.begin(), scans.begin() + 4);
