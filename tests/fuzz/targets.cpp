@@ -6,10 +6,16 @@ namespace dynains::fuzz {
 
 const std::vector<Target>& targets() {
   static const std::vector<Target> all = {
-      {"scan", run_scan, scan_seeds},       {"labels", run_labels, label_seeds},
-      {"poses", run_poses, pose_seeds},     {"calib", run_calib, calib_seeds},
-      {"times", run_times, time_seeds},     {"ply", run_ply, ply_seeds},
-      {"pcd", run_pcd, pcd_seeds},          {"config", run_config, config_seeds},
+      {"scan", run_scan, scan_seeds},
+      {"labels", run_labels, label_seeds},
+      {"poses", run_poses, pose_seeds},
+      {"calib", run_calib, calib_seeds},
+      {"times", run_times, time_seeds},
+      {"ply", run_ply, ply_seeds},
+      {"pcd", run_pcd, pcd_seeds},
+      {"config", run_config, config_seeds},
+      {"trajectory", run_trajectory, trajectory_seeds},
+      {"recording", run_recording, recording_seeds},
       {"facade", run_facade, facade_seeds},
   };
   return all;

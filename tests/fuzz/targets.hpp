@@ -33,6 +33,8 @@ void run_times(Bytes bytes);
 void run_ply(Bytes bytes);
 void run_pcd(Bytes bytes);
 void run_config(Bytes bytes);
+void run_trajectory(Bytes bytes);
+void run_recording(Bytes bytes);
 void run_facade(Bytes bytes);
 
 std::vector<std::string> scan_seeds();
@@ -43,6 +45,8 @@ std::vector<std::string> time_seeds();
 std::vector<std::string> ply_seeds();
 std::vector<std::string> pcd_seeds();
 std::vector<std::string> config_seeds();
+std::vector<std::string> trajectory_seeds();
+std::vector<std::string> recording_seeds();
 std::vector<std::string> facade_seeds();
 
 }  // namespace dynains::fuzz
