@@ -4,7 +4,9 @@
 #include <iomanip>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -17,6 +19,7 @@
 #include "dynains/io/recording.hpp"
 #include "evaluation_options.hpp"
 #include "interrupt.hpp"
+#include "map_on_disk.hpp"
 #include "output_folder.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
@@ -32,6 +35,9 @@ namespace {
 namespace fs = std::filesystem;
 using Config = DynaInsRemover::Config;
 
+/// In the folder of results, while a run with --map-memory lasts.
+constexpr const char* kTileFolder = "map_tiles";
+
 struct RunOptions {
   explicit RunOptions(CLI::App& command)
       : sequence(command, "recording"), remover(command, "default") {}
@@ -39,6 +45,7 @@ struct RunOptions {
   RecordingFlags sequence;
   std::string out;
   std::string map;
+  std::optional<double> map_memory;  // MB
   ScanWindow window;
   bool write_online = false;
   bool write_clean = false;
@@ -81,8 +88,8 @@ OutputFiles files_of_a_run(const fs::path& folder) {
   files.files = {"timing.csv", "static_map.ply", "dynamic_points.ply"};
   const std::string map = earlier_map(folder);
   if (!map.empty()) files.files.push_back(map);
-  files.folders = {"labels", "online", "clean"};
-  files.extensions = {".label", ".bin", ".pcd", ".ply"};
+  files.folders = {"labels", "online", "clean", kTileFolder};
+  files.extensions = {".label", ".bin", ".pcd", ".ply", ".tile"};
   return files;
 }
 
@@ -171,12 +178,17 @@ void warn_of_poses(const std::string& sequence, const Agreement& agreement) {
 void run(const RunOptions& options) {
   const Config config = options.remover.config();
   const RunOutputs outputs = make_outputs(options, config);
-  DynaInsRemover remover(config);
+  nlohmann::ordered_json configuration = to_json(config);
+  std::optional<RemoverWithMapOnDisk::Config> on_disk;
+  if (options.map_memory) {
+    if (!config.build_map) throw ConfigError("--map-memory needs --build-map true");
+    on_disk = with_map_on_disk(config, outputs.folder / kTileFolder, *options.map_memory);
+    configuration["map_memory"] = *options.map_memory;
+  }
   const Recording sequence = options.sequence.open();
   const ScanRange range = select_scans(sequence, options.window);
   check_scans(sequence, range);
-  const nlohmann::ordered_json request =
-      describe_request(sequence, range, outputs, to_json(config));
+  const nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);
   if (!prepare(outputs, options, request)) {
     if (!options.quiet) std::cout << outputs.folder.string() << ": complete already" << std::endl;
     return;
@@ -187,12 +199,23 @@ void run(const RunOptions& options) {
   RunResults results(sequence, range, outputs);
   const InterruptGuard interrupt;
   RunTiming timing;
-  {
+  const auto work = [&](auto& remover) {
     Progress progress(range.size(), "scans", options.quiet);
     timing = run_sequence(remover, sequence, range, results, [&](std::size_t done) {
       progress.update(done);
       return InterruptGuard::signal() == 0;
     });
+  };
+  if (on_disk) {
+    RemoverWithMapOnDisk remover(*on_disk);
+    remover.reset();  // forgets the tiles of a run that was killed
+    work(remover);
+    remover.reset();
+    std::error_code ignored;
+    fs::remove(on_disk->map.map_folder, ignored);
+  } else {
+    DynaInsRemover remover(config);
+    work(remover);
   }
   results.commit();
 
@@ -204,7 +227,7 @@ void run(const RunOptions& options) {
   description.preset = options.remover.preset_name();
   description.complete = results.finished() == range.size();
   description.map = name_of_map(outputs);
-  description.configuration = to_json(config);
+  description.configuration = configuration;
   write_timing(outputs.folder / "timing.csv", timing);
   // The report must not claim what a power cut could still take.
   sync_files(outputs.folder);
@@ -240,6 +263,12 @@ void add_run_command(CLI::App& app) {
       .add_option("--map", options->map,
                   "static map, .ply or .pcd [static_map.ply in the folder of --out]")
       ->type_name("FILE");
+  command
+      .add_option(
+          "--map-memory", options->map_memory,
+          "bounds the memory of the map, for long drives: what is farthest goes to files in "
+          "--out until the run is complete [no bound]")
+      ->type_name("MB");
   command.add_flag("--write-online", options->write_online,
                    "also write the verdicts without latency, to the folder online");
   command.add_flag("--write-clean", options->write_clean,

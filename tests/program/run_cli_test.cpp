@@ -9,6 +9,7 @@
 #include "dynains/dyna_ins_remover.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
+#include "dynains/io/tiled_map.hpp"
 #include "io/files.hpp"
 #include "program/start.hpp"
 #include "program/tiny_sequence.hpp"
@@ -43,6 +44,49 @@ std::size_t count_lines(const std::string& text) {
 }
 
 }  // namespace
+
+TEST_CASE("with --map-memory the map waits on the disk, and the results are the same") {
+  const Fixture fixture;
+  REQUIRE(fixture.run().code == 0);
+  const std::size_t points = read_points(fixture.out + "/static_map.ply").positions.size();
+  const std::string labels = read_text(fixture.out + "/labels/" + scan_name(5) + ".label");
+  const Outcome outcome = fixture.run({"--map-memory", "0", "--force"});
+  CAPTURE(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK(count_entries(fixture.out) == 5);
+  CHECK(read_text(fixture.out + "/labels/" + scan_name(5) + ".label") == labels);
+  const auto size =
+      static_cast<double>(read_points(fixture.out + "/static_map.ply").positions.size());
+  CHECK(points > 0);
+  CHECK(std::abs(size - static_cast<double>(points)) <= 1e-3 * size);
+  CHECK(fixture.report()["configuration"]["map_memory"] == 0.0);
+  const std::string map = read_text(fixture.out + "/static_map.ply");
+
+  // Tiles of a run that was killed do not get into the map of the next.
+  nlohmann::json report = fixture.report();
+  report["complete"] = false;
+  write_text(fixture.out + "/report.json", report.dump());
+  {
+    TiledStaticMap::Config config;
+    config.map_folder = fixture.out + "/map_tiles";
+    const PointBuffer other{{1000.0F}, {1000.0F}, {1000.0F}};
+    TiledStaticMap(config).insert(other, {}, Eigen::Isometry3d::Identity());
+  }
+  REQUIRE(fixture.run({"--map-memory", "0", "--resume"}).code == 0);
+  CHECK(count_entries(fixture.out) == 5);
+  CHECK(read_text(fixture.out + "/static_map.ply") == map);
+}
+
+TEST_CASE("--map-memory needs a map and a size that can be") {
+  const Fixture fixture(3);
+  const Outcome no_map = fixture.run({"--map-memory", "10", "--build-map", "false"});
+  CHECK(no_map.code != 0);
+  CHECK_THAT(no_map.err, ContainsSubstring("--map-memory needs --build-map true"));
+  const Outcome negative = fixture.run({"--map-memory=-1"});
+  CHECK(negative.code != 0);
+  CHECK_THAT(negative.err, ContainsSubstring("TiledStaticMap.map_memory = -1"));
+  CHECK(!fs::exists(fixture.out));
+}
 
 TEST_CASE("run writes labels, map, moving points, report and timing, and nothing else") {
   const Fixture fixture;

@@ -22,15 +22,16 @@ same() {
   diff <(results "$1") <(results "$2") &&
     while read -r file; do cmp "$1/$file" "$2/$file" || return 1; done < <(results "$2")
 }
-# Every label file under its final name is whole: as long as that of the undisturbed run.
+# whole FOLDER [EXPECTED]: every label file under its final name is as long as that of the
+# undisturbed run, every cloud the same.
 whole() {
-  local file
+  local file expected=${2:-$work/expected}
   for file in "$1"/labels/*.label; do
     [[ -e $file ]] || continue
-    [[ $(stat -c %s "$file") == $(stat -c %s "$work/expected/labels/${file##*/}") ]] || return 1
+    [[ $(stat -c %s "$file") == $(stat -c %s "$expected/labels/${file##*/}") ]] || return 1
   done
   for file in static_map.ply dynamic_points.ply; do
-    [[ ! -e $1/$file ]] || cmp "$1/$file" "$work/expected/$file" || return 1
+    [[ ! -e $1/$file ]] || cmp "$1/$file" "$expected/$file" || return 1
   done
 }
 complete() { grep -q '"complete": true' "$1/report.json" 2>/dev/null; }
@@ -42,34 +43,43 @@ begin=$(date +%s%N)
 span=$((($(date +%s%N) - begin) / 1000))  # us
 RANDOM=7
 
-echo "--- kill -9, $kills times within $((span / 1000)) ms"
-early=0
-broken=0
-for ((i = 0; i < kills; ++i)); do
-  out=$work/out
-  # A third of the time the next start resumes what the last left and is killed again.
-  if ((i % 3 == 0)); then rm -rf "$out"; fi
-  "$program" run "$seq" --out "$out" --resume --quiet &
-  pid=$!
-  delay=$(((RANDOM * 32768 + RANDOM) % span))
-  sleep "$((delay / 1000000)).$(printf %06d $((delay % 1000000)))"
-  kill -9 "$pid" 2>/dev/null || true
-  wait "$pid" 2>/dev/null || true
-  [[ -d $out ]] || { early=$((early + 1)); continue; }
-  complete "$out" || broken=$((broken + 1))
-  whole "$out" || fail "kill $i left a damaged file"
-  if complete "$out"; then
-    same "$work/expected" "$out" || fail "kill $i: report.json claims what is not there"
-  fi
-  if ((i % 3 == 2)); then
-    "$program" run "$seq" --out "$out" --resume --quiet || fail "kill $i: --resume"
-    complete "$out" || fail "kill $i: not complete after --resume"
-    same "$work/expected" "$out" || fail "kill $i: other bytes after --resume"
-    [[ -z $(find "$out" -name '.*.tmp') ]] || fail "kill $i: leftovers after --resume"
-  fi
-done
-echo "$early of them before there was a folder, $broken before the run was complete"
-((early + broken > 0)) || fail "no kill hit a run"
+# kill_runs COUNT EXPECTED [FLAG...]: runs with these flags are killed at random moments.
+kill_runs() {
+  local count=$1 expected=$2 early=0 broken=0
+  shift 2
+  echo "--- kill -9, $count times within $((span / 1000)) ms${*:+, $*}"
+  for ((i = 0; i < count; ++i)); do
+    out=$work/out
+    # A third of the time the next start resumes what the last left and is killed again.
+    if ((i % 3 == 0)); then rm -rf "$out"; fi
+    "$program" run "$seq" --out "$out" --resume --quiet "$@" &
+    pid=$!
+    delay=$(((RANDOM * 32768 + RANDOM) % span))
+    sleep "$((delay / 1000000)).$(printf %06d $((delay % 1000000)))"
+    kill -9 "$pid" 2>/dev/null || true
+    wait "$pid" 2>/dev/null || true
+    [[ -d $out ]] || { early=$((early + 1)); continue; }
+    complete "$out" || broken=$((broken + 1))
+    whole "$out" "$expected" || fail "kill $i left a damaged file"
+    if complete "$out"; then
+      same "$expected" "$out" || fail "kill $i: report.json claims what is not there"
+    fi
+    if ((i % 3 == 2)); then
+      "$program" run "$seq" --out "$out" --resume --quiet "$@" || fail "kill $i: --resume"
+      complete "$out" || fail "kill $i: not complete after --resume"
+      same "$expected" "$out" || fail "kill $i: other bytes after --resume"
+      [[ -z $(find "$out" -name '.*.tmp' -o -name '*.tile') ]] ||
+        fail "kill $i: leftovers after --resume"
+    fi
+  done
+  echo "$early of them before there was a folder, $broken before the run was complete"
+  ((early + broken > 0)) || fail "no kill hit a run"
+}
+kill_runs "$kills" "$work/expected"
+"$program" run "$seq" --out "$work/expected_tiles" --map-memory 0 --quiet
+diff -r "$work/expected/labels" "$work/expected_tiles/labels" ||
+  fail "labels depend on where the map is"
+kill_runs "$((kills / 4))" "$work/expected_tiles" --map-memory 0
 
 echo "--- --resume after Ctrl-C; with other flags; when complete; --force after a kill"
 rm -rf "$work/out"
@@ -119,6 +129,20 @@ if mount -t tmpfs -o size=600k tmpfs "$disk" 2>/dev/null; then
   mount -o remount,size=64m "$disk"
   "$program" run "$seq" --out "$disk/out" --resume --quiet || fail "full disk: --resume"
   same "$work/expected" "$disk/out" || fail "full disk: other bytes after --resume"
+
+  echo "--- a full disk with the map on it"
+  rm -rf "$disk"/*
+  mount -o remount,size=600k "$disk"
+  code=0
+  "$program" run "$seq" --out "$disk/out" --map-memory 0 --quiet 2>"$work/err" || code=$?
+  [[ $code == 1 ]] || fail "full disk, map on it: exit code $code"
+  grep -q 'No space left' "$work/err" || fail "full disk, map on it: $(cat "$work/err")"
+  mount -o remount,size=64m "$disk"
+  "$program" run "$seq" --out "$disk/out" --map-memory 0 --resume --quiet ||
+    fail "full disk, map on it: --resume"
+  same "$work/expected_tiles" "$disk/out" || fail "full disk, map on it: other bytes"
+  rm -rf "$disk"/*
+  cp -r "$work/expected" "$disk/out"
 
   echo "--- a file system that is read-only"
   mount -o remount,ro "$disk"
