@@ -69,15 +69,15 @@ inline SensorModel estimate_sensor_model(PointsView points) {
     std::vector<std::size_t> begin(band_of(181.0F) + 2, 0);
     for (const float angle : across) ++begin[band_of(angle) + 1];
     for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
-    std::vector<float> sorted(along.size());
+    std::vector<float> by_band(along.size());
     std::vector<std::size_t> next = begin;
-    for (std::size_t i = 0; i < along.size(); ++i) sorted[next[band_of(across[i])]++] = along[i];
+    for (std::size_t i = 0; i < along.size(); ++i) by_band[next[band_of(across[i])]++] = along[i];
     std::vector<float> gaps;
     gaps.reserve(along.size());
     for (std::size_t i = 0; i + 1 < begin.size(); ++i) {
-      std::sort(&sorted[0] + begin[i], &sorted[0] + begin[i + 1]);
+      std::sort(&by_band[0] + begin[i], &by_band[0] + begin[i + 1]);
       for (std::size_t k = begin[i] + 1; k < begin[i + 1]; ++k) {
-        const float gap = sorted[k] - sorted[k - 1];
+        const float gap = by_band[k] - by_band[k - 1];
         if (static_cast<double>(gap) > smallest) gaps.push_back(gap);
       }
     }

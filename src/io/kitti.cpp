@@ -93,10 +93,10 @@ std::size_t KittiSequence::point_count(std::size_t i) const {
   return count_scan_points(scan_path(i));
 }
 
-std::size_t count_scan_points(const fs::path& path) {
-  const std::uintmax_t size = size_of(path);
+std::size_t count_scan_points(const fs::path& file) {
+  const std::uintmax_t size = size_of(file);
   if (size % kBytesPerPoint != 0) {
-    fail(path, "truncated at byte " + std::to_string(size) + ": expected a multiple of " +
+    fail(file, "truncated at byte " + std::to_string(size) + ": expected a multiple of " +
                    std::to_string(kBytesPerPoint) + " bytes (float32 x y z intensity)");
   }
   return static_cast<std::size_t>(size / kBytesPerPoint);

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <iostream>
 #include <memory>
 #include <sstream>
@@ -43,9 +44,8 @@ struct Component {
   double quantile(double share) const {
     std::vector<double> sorted = times;
     std::sort(sorted.begin(), sorted.end());
-    const auto rank =
-        static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1) + 0.5);
-    return sorted[rank];
+    const double rank = std::round(share * static_cast<double>(sorted.size() - 1));
+    return sorted[static_cast<std::size_t>(rank)];
   }
 };
 

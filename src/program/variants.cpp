@@ -69,6 +69,7 @@ evaluation::Evaluation evaluate_variants(LabelledSequence& sequence,
                                          const std::function<void(std::size_t)>& done) {
   const VariantVerdicts verdicts = run_variants(sequence, variants, answer, done);
   std::vector<std::string> names;
+  names.reserve(variants.size());
   for (const Variant& variant : variants) names.push_back(variant.name);
   return evaluation::evaluate(judged_source(sequence, verdicts), names, {}, config);
 }

@@ -137,11 +137,13 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
   // Block by block: few segments can be nearest within a block.
   constexpr int kBlock = 16, kBlocks = kCells / kBlock + 1;
   std::vector<std::vector<Corridor>> blocks;
-  for (int i = 0; i < kBlocks * kBlocks; ++i) {
-    const double half = 0.5 * kBlock * kCell;
-    const Vec2 middle =
-        corner + Vec2{2 * half * (i % kBlocks) + half, 2 * half * (i / kBlocks) + half};
-    blocks.push_back(nearest_within(corridors, middle, 1.42 * half));
+  blocks.reserve(grid_index(kBlocks, 0, kBlocks));
+  for (int row = 0; row < kBlocks; ++row) {
+    for (int column = 0; column < kBlocks; ++column) {
+      const double half = 0.5 * kBlock * kCell;
+      const Vec2 middle = corner + Vec2{2 * half * column + half, 2 * half * row + half};
+      blocks.push_back(nearest_within(corridors, middle, 1.42 * half));
+    }
   }
   for (int row = 0; row <= kCells; ++row) {
     for (int column = 0; column <= kCells; ++column) {
