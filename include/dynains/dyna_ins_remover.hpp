@@ -193,6 +193,7 @@ class BasicDynaInsRemover {
 
  private:
   using ScanSlot = detail::ScanSlot;
+  using Reach = detail::Reach;
 
   template <class Cloud>
   FrameResult take_in(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor, double time) {
@@ -291,13 +292,14 @@ class BasicDynaInsRemover {
 
   // Eq. 5-19 for each cluster that the oldest and the newest scan saw; silence means static.
   void judge_clusters() {
-    verdict_.assign(clusters_.size(), {0.0F, 0});
+    verdict_.assign(clusters_.size(), {0.0F, 0, Reach::kTooFewScans});
     for (std::size_t c = 0; c < clusters_.size(); ++c) {
       if (!clusters_.comparable(c)) continue;
+      verdict_[c].reach = Reach::kSimilar;
       descriptor_.describe(clusters_[c]);
       if (!descriptor_.proposes_dynamic()) continue;
       if (!config_.use_belief) {
-        verdict_[c] = {1.0F, 1};
+        verdict_[c] = {1.0F, 1, Reach::kProposed};
         continue;
       }
       descriptor_.describe_rest();
@@ -306,7 +308,7 @@ class BasicDynaInsRemover {
         belief_.update(descriptor_.heights(k), descriptor_.cluster_heights());
       }
       verdict_[c] = {static_cast<float>(belief_.posterior()),
-                     static_cast<std::uint8_t>(belief_.is_dynamic() ? 1 : 0)};
+                     static_cast<std::uint8_t>(belief_.is_dynamic() ? 1 : 0), Reach::kProposed};
     }
   }
 
@@ -316,11 +318,13 @@ class BasicDynaInsRemover {
     const std::size_t count = newest.non_ground_count();
     newest.votes.assign(count, 0);
     newest.belief.assign(count, 0.0F);
+    newest.reach.assign(count, Reach::kNoCluster);
     const Span<const std::uint32_t> newest_clusters =
         cluster_of.subspan(cluster_of.size() - count, count);
     newest.cluster.assign(newest_clusters.begin(), newest_clusters.end());
     if (!evidence_tracks()) assign_ids(cluster_of, newest);
 
+    const bool explain = !config_.use_free_space;  // else the evidence tells why a point stays
     for (std::uint64_t scan = window_first_; scan < pushed_; ++scan) {
       if (config_.votes == 0 && scan + 1 != pushed_) continue;
       ScanSlot& target = slot(scan);
@@ -328,8 +332,11 @@ class BasicDynaInsRemover {
       for (const ClusterSet::Streak& streak : clusters_.streaks(k)) {
         if (streak.cluster == kNoCluster) continue;
         const ClusterVerdict& verdict = verdict_[streak.cluster];
-        if (verdict.dynamic == 0 && verdict.belief == 0.0F) continue;
-        for (std::size_t i = streak.begin - scan_begin_[k]; i < streak.end - scan_begin_[k]; ++i) {
+        const std::size_t begin = streak.begin - scan_begin_[k];
+        const std::size_t end = streak.end - scan_begin_[k];
+        if (explain) detail::raise(target.reach.data() + begin, end - begin, verdict.reach);
+        if (verdict.reach != Reach::kProposed) continue;
+        for (std::size_t i = begin; i < end; ++i) {
           target.votes[i] = static_cast<std::uint8_t>(target.votes[i] + verdict.dynamic);
           target.belief[i] = std::max(target.belief[i], verdict.belief);
         }
@@ -383,46 +390,64 @@ class BasicDynaInsRemover {
   // Verdict by point: at least `votes` windows said so, or the evidence does.
   void decide(ScanSlot& scan, int votes, bool is_final, StageClock& clock, StageTimes& times) {
     if (config_.use_free_space) {
-      evidence_.judge(scan.scan, is_final, scan.split, scan.dynamic, scan.evidence);
+      evidence_.judge(scan.scan, is_final, scan.split, scan.proof, scan.evidence);
     }
     clock.lap(times.evidence);
     write_verdict(scan, votes);
     clock.lap(times.verdict);
   }
 
-  // By input point. The second time, without evidence of other scans, only points that some window
-  // believed in can have changed.
+  // By input point. Instances stay as written the first time, labels where the verdict did not
+  // change.
   void write_verdict(ScanSlot& scan, int votes) {
     const bool evident = config_.use_free_space;
-    const bool first_time = !scan.is_written;
-    const bool all = evident || first_time;
-    scan.is_written = true;
     const std::size_t ground_count = scan.split.ground_count;
-    if (first_time) {
-      scan.instances.assign(scan.labels.size(), kNoInstance);
-      scan.beliefs.assign(scan.labels.size(), 0.0F);
-      scan.is_kept.assign(scan.split.count, 1);
-      for (std::size_t i = 0; i < ground_count; ++i) {
-        scan.labels[scan.split.source[i]] = PointLabel::kGround;
-      }
-    }
+    if (!scan.is_written) begin_verdict(scan);
     for (std::size_t i = 0; evident && i < ground_count; ++i) {
-      const bool dynamic = scan.dynamic[i] != 0;
-      if (!dynamic && scan.is_kept[i] != 0) continue;  // as written before
+      const bool dynamic = is_dynamic(scan.proof[i]);
+      if (!dynamic && scan.is_kept[i] != 0) continue;
       const std::uint32_t to = scan.split.source[i];
       scan.is_kept[i] = dynamic ? 0 : 1;
       scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kGround;
+      scan.causes[to] = scan.proof[i];
       scan.beliefs[to] = scan.evidence[i];
     }
     for (std::size_t i = 0; i < scan.non_ground_count(); ++i) {
       const std::size_t at = ground_count + i;
-      if (!all && scan.votes[i] == 0 && scan.belief[i] == 0.0F) continue;
-      const bool dynamic = scan.votes[i] >= votes || (evident && scan.dynamic[at] != 0);
+      if (!evident) {
+        const Cause cause = cause_to_stay(scan.reach[i]);
+        if (cause == scan.proof[at] && scan.votes[i] == 0 && scan.belief[i] == 0.0F) continue;
+        scan.proof[at] = cause;
+      }
+      Cause cause = scan.proof[at];
+      if (scan.votes[i] >= votes && !is_dynamic(cause)) cause = Cause::kProposed;
       const std::uint32_t to = scan.split.source[at];
+      scan.causes[to] = cause;
+      scan.beliefs[to] = evident ? std::max(scan.belief[i], scan.evidence[at]) : scan.belief[i];
+      const bool dynamic = is_dynamic(cause);
+      if (dynamic == (scan.is_kept[at] == 0)) continue;
       scan.is_kept[at] = dynamic ? 0 : 1;
       scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
+    }
+  }
+
+  // Everything static and not judged.
+  void begin_verdict(ScanSlot& scan) const {
+    scan.is_written = true;
+    if (!config_.use_free_space) scan.proof.assign(scan.split.count, Cause::kNotJudged);
+    scan.instances.assign(scan.labels.size(), kNoInstance);
+    scan.beliefs.assign(scan.labels.size(), 0.0F);
+    scan.causes.assign(scan.labels.size(), Cause::kNotJudged);
+    scan.is_kept.assign(scan.split.count, 1);
+    const std::size_t ground_count = scan.split.ground_count;
+    for (std::size_t i = 0; i < ground_count; ++i) {
+      scan.labels[scan.split.source[i]] = PointLabel::kGround;
+      scan.causes[scan.split.source[i]] = Cause::kGround;
+    }
+    for (std::size_t i = 0; i < scan.non_ground_count(); ++i) {
+      const std::uint32_t to = scan.split.source[ground_count + i];
+      scan.labels[to] = PointLabel::kStatic;
       scan.instances[to] = scan.cluster[i] == kNoCluster ? kNoInstance : scan.ids[scan.cluster[i]];
-      scan.beliefs[to] = evident ? std::max(scan.belief[i], scan.evidence[at]) : scan.belief[i];
     }
   }
 
@@ -441,6 +466,7 @@ class BasicDynaInsRemover {
   struct ClusterVerdict {
     float belief;
     std::uint8_t dynamic;
+    Reach reach;
   };
 
   Config config_;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "dynains/belief_updater.hpp"
+#include "dynains/cause.hpp"
 #include "dynains/detail/beam_test.hpp"
 #include "dynains/free_space_config.hpp"
 #include "dynains/ground_footprint.hpp"
@@ -120,28 +121,34 @@ class FreeSpaceEvidence {
   }
 
   /// Verdict on a scan that is at most `horizon()` old, as the evidence stands now: by point of
-  /// `split`, whether it moved, and the belief that it did. Nothing is presumed in a final verdict.
+  /// `split`, why it moved or stayed (see is_dynamic), and the belief that it moved. Nothing is
+  /// presumed in a final verdict.
   void judge(std::uint64_t scan, bool is_final, const GroundSplit& split,
-             std::vector<std::uint8_t>& dynamic, std::vector<float>& belief) {
+             std::vector<Cause>& causes, std::vector<float>& belief) {
     const Record& record = record_of(scan);
     judge_instances(scan, is_final, record);
-    dynamic.assign(split.count, 0);
+    causes.resize(split.count);
+    const auto non_ground = causes.begin() + static_cast<std::ptrdiff_t>(split.ground_count);
+    std::fill(causes.begin(), non_ground, Cause::kGround);
+    std::fill(non_ground, causes.end(), Cause::kNotJudged);
     belief.assign(split.count, 0.0F);
     const PointsView points = split.non_ground();
     for (const InstanceSamples::Streak& streak : record.samples.streaks) {
       const Verdict& verdict = verdicts_[streak.supervoxel];
       const std::size_t begin = split.ground_count + streak.begin;
       const std::size_t end = split.ground_count + streak.end;
-      for (std::size_t i = begin; i < end; ++i) belief[i] = verdict.belief;
-      if (verdict.dynamic == 0) continue;
-      for (std::size_t i = begin; i < end; ++i) dynamic[i] = 1;
+      for (std::size_t i = begin; i < end; ++i) {
+        belief[i] = verdict.belief;
+        causes[i] = verdict.cause;
+      }
+      if (!is_dynamic(verdict.cause)) continue;
       for (std::size_t i = streak.begin; i < streak.end; ++i) {
         footprint_.add(points.x[i], points.y[i], points.z[i]);
       }
     }
     if (footprint_.empty()) return;
     footprint_.spread();
-    judge_ground(scan, record, split, dynamic, belief);
+    judge_ground(scan, record, split, causes, belief);
     footprint_.clear();
   }
 
@@ -155,7 +162,7 @@ class FreeSpaceEvidence {
     std::uint8_t contested = 0;  // whether some reference hit the place
   };
   struct Verdict {
-    std::uint8_t dynamic;
+    Cause cause;
     float belief;
   };
   // Samples of an instance.
@@ -354,29 +361,41 @@ class FreeSpaceEvidence {
       for (std::uint32_t s = first; s < last; ++s) {
         const Belief& belief = record.beliefs[s];
         level = std::max(level, belief.peak);
-        verdicts_[s] = {0, as_probability(belief.peak)};
+        verdicts_[s] = {cause_to_stay(belief), as_probability(belief.peak)};
         if (is_free(belief)) free_.push_back(s);
       }
-      if (moved_whole(scan, is_final, record, instance, level)) {
-        const Verdict verdict = {1, as_probability(std::max(level, free_level_))};
+      const Cause whole = cause_of_whole(scan, is_final, record, instance, level);
+      if (is_dynamic(whole)) {
+        const Verdict verdict = {whole, as_probability(std::max(level, free_level_))};
         std::fill(verdicts_.begin() + first, verdicts_.begin() + last, verdict);
+        for (const std::uint32_t s : free_) verdicts_[s].cause = Cause::kFreeSpace;
         add_hull(record, instance);
         continue;
       }
       // Something that moves beside something that stays: single supervoxels may be chance.
       groups_.keep_large(samples, kLeastGroup, kLeastGroupSamples, free_);
-      for (const std::uint32_t s : free_) verdicts_[s].dynamic = 1;
+      for (const std::uint32_t s : free_) verdicts_[s].cause = Cause::kFreeSpace;
     }
   }
 
-  // Whether an instance is removed as a whole; raises `level` to the belief along its track.
-  bool moved_whole(std::uint64_t scan, bool is_final, const Record& record, std::size_t instance,
-                   float& level) const {
-    if (removes_whole(record, instance)) return true;
-    if (!config_.use_tracks || !record.tracked.instances[instance].carried) return false;
+  // Of a supervoxel that stays.
+  static Cause cause_to_stay(const Belief& belief) {
+    if (belief.peak > 0.0F) return Cause::kTooLittleFree;
+    return belief.contested != 0 ? Cause::kOccupied : Cause::kNoEvidence;
+  }
+
+  // Why an instance is removed as a whole, or kNoEvidence if it is not; raises `level` to the
+  // belief along its track.
+  Cause cause_of_whole(std::uint64_t scan, bool is_final, const Record& record,
+                       std::size_t instance, float& level) const {
+    if (removes_whole(record, instance)) return Cause::kWithInstance;
+    if (!config_.use_tracks || !record.tracked.instances[instance].carried) {
+      return Cause::kNoEvidence;
+    }
     const float along = track_belief(record.tracked.instances[instance]);
     level = std::max(level, along);
-    return along >= track_level_ || (!is_final && presumed(scan, record, instance));
+    if (along >= track_level_) return Cause::kAlongTrack;
+    return !is_final && presumed(scan, record, instance) ? Cause::kPresumed : Cause::kNoEvidence;
   }
 
   // The ground below a compact instance.
@@ -412,10 +431,10 @@ class FreeSpaceEvidence {
   // Ground beside removed points: what stands within their footprint goes with them, and what two
   // references saw free was no ground.
   void judge_ground(std::uint64_t scan, const Record& record, const GroundSplit& split,
-                    std::vector<std::uint8_t>& dynamic, std::vector<float>& belief) {
+                    std::vector<Cause>& causes, std::vector<float>& belief) {
     const PointsView ground = split.ground();
-    const auto remove = [&](std::size_t point) {
-      dynamic[point] = 1;
+    const auto remove = [&](std::size_t point, Cause cause) {
+      causes[point] = cause;
       belief[point] = static_cast<float>(config_.tau_free);
     };
     footprint_.find(ground, near_ground_);
@@ -423,7 +442,7 @@ class FreeSpaceEvidence {
     for (const std::uint32_t point : near_ground_) {
       const float lowest = footprint_.lowest(ground.x[point], ground.y[point]);
       if (config_.footprint > 0.0 && lowest < ground.z[point] + kClearance) {
-        remove(point);
+        remove(point, Cause::kUnderInstance);
       } else {
         near_ground_[tested++] = point;
       }
@@ -459,7 +478,7 @@ class FreeSpaceEvidence {
           static_cast<float>(free) < kGroundShare * static_cast<float>(ground_hit_[sample])) {
         continue;
       }
-      for (std::size_t i = streak.begin; i < streak.end; ++i) remove(near_ground_[i]);
+      for (std::size_t i = streak.begin; i < streak.end; ++i) remove(near_ground_[i], Cause::kFreeSpace);
     }
   }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "dynains/cause.hpp"
 #include "dynains/points.hpp"
 #include "dynains/stage_times.hpp"
 
@@ -18,7 +19,8 @@ struct ScanVerdict {
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
   Span<const PointLabel> labels;
   Span<const std::uint32_t> instances;  ///< kNoInstance for ground and points without a cluster
-  Span<const float> beliefs;            ///< probability of being dynamic, [0, 1]; 0 if never proposed
+  Span<const float> beliefs;  ///< probability of being dynamic, [0, 1]; 0 if never proposed
+  Span<const Cause> causes;   ///< why the label is what it is
 };
 
 /// Answer to one scan.

@@ -1,4 +1,4 @@
-// Verdicts as SemanticKITTI-MOS labels, written behind the pipeline's back.
+// Verdicts as SemanticKITTI-MOS labels and their causes, written behind the pipeline's back.
 #pragma once
 
 #include <cstdint>
@@ -18,19 +18,23 @@ std::uint32_t mos_label(PointLabel label, std::uint32_t instance);
 /// One thread at most; one scan at most waits for the disk.
 class LabelWriter {
  public:
-  /// Creates the folder. Throws IoError.
-  explicit LabelWriter(std::filesystem::path folder);
+  /// Creates the folders. No causes are written if `causes` is empty. Throws IoError.
+  explicit LabelWriter(std::filesystem::path folder, std::filesystem::path causes = {});
   LabelWriter(const LabelWriter&) = delete;
   LabelWriter& operator=(const LabelWriter&) = delete;
 
-  /// Writes `folder`/`name`.label. Throws IoError, for the scan before as well.
+  /// Writes `folder`/`name`.label and `causes`/`name`.cause. Throws IoError, for the scan before as
+  /// well.
   void write(const std::string& name, const ScanVerdict& verdict);
   /// Waits for the last file. Throws IoError.
   void finish();
 
  private:
   std::filesystem::path folder_;
-  std::vector<std::uint32_t> labels_;  // the writing thread's, while pending_ is valid
+  std::filesystem::path cause_folder_;
+  // The writing thread's, while pending_ is valid.
+  std::vector<std::uint32_t> labels_;
+  std::vector<Cause> causes_;
   std::future<void> pending_;
 };
 

@@ -88,8 +88,8 @@ OutputFiles files_of_a_run(const fs::path& folder) {
   files.files = {"timing.csv", "static_map.ply", "dynamic_points.ply"};
   const std::string map = earlier_map(folder);
   if (!map.empty()) files.files.push_back(map);
-  files.folders = {"labels", "online", "clean", kTileFolder};
-  files.extensions = {".label", ".bin", ".pcd", ".ply", ".tile"};
+  files.folders = {"labels", "online", "causes", "clean", kTileFolder};
+  files.extensions = {".label", ".cause", ".bin", ".pcd", ".ply", ".tile"};
   return files;
 }
 
@@ -277,9 +277,11 @@ void add_run_command(CLI::App& app) {
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   command.footer(
       "Writes labels/NNNNNN.label (uint32 a point: 251 moving, 9 static, 0 not judged; instance id "
-      "above\nthe 16th bit), static_map.ply, dynamic_points.ply, report.json and timing.csv. Each "
-      "file appears\nwhole or not at all; report.json says \"complete\": false until the end. "
-      "Ctrl-C ends the run after the\nscan at hand, writes what is there and exits with 130.");
+      "above\nthe 16th bit), causes/NNNNNN.cause (uint8 a point: why, see `dynains eval "
+      "--errors`), "
+      "static_map.ply,\ndynamic_points.ply, report.json and timing.csv. Each file appears whole or "
+      "not at all; report.json says\n\"complete\": false until the end. Ctrl-C ends the run after "
+      "the scan at hand, writes what is there and exits\nwith 130.");
   command.callback([options] { run(*options); });
 }
 

@@ -35,7 +35,7 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
                        const RunOutputs& outputs)
     : recording_(recording),
       range_(range),
-      final_labels_(outputs.folder / "labels"),
+      final_labels_(outputs.folder / "labels", outputs.folder / "causes"),
       dynamic_points_(outputs.folder / "dynamic_points.ply",
                       dynamic_columns(is_far(recording, range), recording.columns())) {
   if (outputs.write_online) online_labels_.emplace(outputs.folder / "online");

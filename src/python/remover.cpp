@@ -21,6 +21,7 @@ struct OwnedVerdict {
   std::vector<std::uint8_t> labels;
   std::vector<std::uint32_t> instances;
   std::vector<float> beliefs;
+  std::vector<std::uint8_t> causes;
 
   explicit OwnedVerdict(const ScanVerdict& verdict)
       : scan(verdict.scan),
@@ -32,6 +33,8 @@ struct OwnedVerdict {
     for (const PointLabel label : verdict.labels) {
       labels.push_back(static_cast<std::uint8_t>(label));
     }
+    causes.reserve(verdict.causes.size());
+    for (const Cause cause : verdict.causes) causes.push_back(static_cast<std::uint8_t>(cause));
   }
 };
 
@@ -43,6 +46,7 @@ struct Verdict {
   py::array_t<std::uint8_t> labels;
   py::array_t<std::uint32_t> instances;
   py::array_t<float> beliefs;
+  py::array_t<std::uint8_t> causes;
 
   explicit Verdict(OwnedVerdict&& verdict)
       : scan(verdict.scan),
@@ -50,7 +54,8 @@ struct Verdict {
         T_world_sensor(to_array(verdict.T_world_sensor)),
         labels(to_array(std::move(verdict.labels))),
         instances(to_array(std::move(verdict.instances))),
-        beliefs(to_array(std::move(verdict.beliefs))) {}
+        beliefs(to_array(std::move(verdict.beliefs))),
+        causes(to_array(std::move(verdict.causes))) {}
 };
 
 struct Frame {
@@ -173,7 +178,10 @@ void bind_remover(py::module_& module) {
       .def_readonly("labels", &Verdict::labels, "(N,) uint8, see Label.")
       .def_readonly("instances", &Verdict::instances, "(N,) uint32; 0 belongs to no instance.")
       .def_readonly("beliefs", &Verdict::beliefs,
-                    "(N,) float32, probability of being dynamic; 0 if never proposed.");
+                    "(N,) float32, probability of being dynamic; 0 if never proposed.")
+      .def_readonly("causes", &Verdict::causes,
+                    "(N,) uint8, why the label is what it is; the numbers are those of "
+                    "dynains/cause.hpp.");
 
   py::class_<Frame>(module, "FrameResult", "Answer to one scan.")
       .def_readonly("newest", &Frame::newest,

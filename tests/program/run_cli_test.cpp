@@ -53,7 +53,7 @@ TEST_CASE("with --map-memory the map waits on the disk, and the results are the 
   const Outcome outcome = fixture.run({"--map-memory", "0", "--force"});
   CAPTURE(outcome.err);
   REQUIRE(outcome.code == 0);
-  CHECK(count_entries(fixture.out) == 5);
+  CHECK(count_entries(fixture.out) == 6);
   CHECK(read_text(fixture.out + "/labels/" + scan_name(5) + ".label") == labels);
   const auto size =
       static_cast<double>(read_points(fixture.out + "/static_map.ply").positions.size());
@@ -73,7 +73,7 @@ TEST_CASE("with --map-memory the map waits on the disk, and the results are the 
     TiledStaticMap(config).insert(other, {}, Eigen::Isometry3d::Identity());
   }
   REQUIRE(fixture.run({"--map-memory", "0", "--resume"}).code == 0);
-  CHECK(count_entries(fixture.out) == 5);
+  CHECK(count_entries(fixture.out) == 6);
   CHECK(read_text(fixture.out + "/static_map.ply") == map);
 }
 
@@ -88,14 +88,15 @@ TEST_CASE("--map-memory needs a map and a size that can be") {
   CHECK(!fs::exists(fixture.out));
 }
 
-TEST_CASE("run writes labels, map, moving points, report and timing, and nothing else") {
+TEST_CASE("run writes labels, causes, map, moving points, report and timing, and nothing else") {
   const Fixture fixture;
   const Outcome outcome = fixture.run();
   CAPTURE(outcome.err);
   REQUIRE(outcome.code == 0);
   CHECK_THAT(outcome.out, ContainsSubstring("12 scans"));
-  CHECK(count_entries(fixture.out) == 5);
+  CHECK(count_entries(fixture.out) == 6);
   CHECK(fixture.labels() == 12);
+  CHECK(count_entries(fixture.out + "/causes") == 12);
 
   std::uint64_t points = 0;
   std::uint64_t moving = 0;
@@ -427,7 +428,7 @@ TEST_CASE("Ctrl-C: the scan at hand is finished, what is final is written, exit 
   CHECK(report["last_scan"] == scan_name(scans - 1));
   CHECK(read_points(fixture.out + "/static_map.ply").positions.size() ==
         report["static_map"]["points"]);
-  CHECK(count_entries(fixture.out) == 5);
+  CHECK(count_entries(fixture.out) == 6);
 }
 
 TEST_CASE("A real clip runs as published", "[data]") {

@@ -38,6 +38,7 @@ class FakeRemover {
     scan.labels.assign(cloud.count, PointLabel::kStatic);
     scan.instances.assign(cloud.count, 0);
     scan.beliefs.assign(cloud.count, 0.0F);
+    scan.causes.assign(cloud.count, Cause::kOccupied);
     pushed_.push_back(scan);
     newest_ = pushed_.back();
     FrameResult result;
@@ -61,9 +62,10 @@ class FakeRemover {
     std::vector<PointLabel> labels;
     std::vector<std::uint32_t> instances;
     std::vector<float> beliefs;
+    std::vector<Cause> causes;
 
     ScanVerdict verdict(std::size_t i) const {
-      return {i, time, T_world_sensor, labels, instances, beliefs};
+      return {i, time, T_world_sensor, labels, instances, beliefs, causes};
     }
   };
 
@@ -136,6 +138,8 @@ TEST_CASE("Every scan gets its final labels, every dynamic point its place in th
     expected[2] = 0;
     CHECK(read_labels(fixture.folder / ("out/labels/" + scan_name(i) + ".label"), count) ==
           expected);
+    CHECK(test::read_text(fixture.folder / ("out/causes/" + scan_name(i) + ".cause")) ==
+          std::string(count, '\16'));
   }
 
   const PointFile moving = read_points(fixture.folder / "out/dynamic_points.ply");
@@ -178,8 +182,8 @@ TEST_CASE("A pose that is refused is named, and what was final stays") {
                ContainsSubstring("scan 000004: the pose jumps"));
   }
   CHECK(count_entries(fixture.folder / "out/labels") == 2);
-  // Labels and online labels; neither map nor moving points, nor anything temporary.
-  CHECK(count_entries(fixture.folder / "out") == 2);
+  // Labels, causes and online labels; neither map nor moving points, nor anything temporary.
+  CHECK(count_entries(fixture.folder / "out") == 3);
 }
 
 TEST_CASE("A scan that breaks during the run is reported") {

@@ -35,11 +35,34 @@ TEST_CASE("simulate makes a sequence that run and eval take, the same from the s
   CHECK(nlohmann::json::parse(read_text(a + "/simulation.json"))["seed"] == 3);
 
   const std::string out = folder / "out";
-  REQUIRE(start({"run", a, "--out", out}).code == 0);
-  const Outcome judged = start({"eval", a, out});
-  CAPTURE(judged.err);
-  CHECK(judged.code == 0);
-  CHECK_THAT(judged.out, ContainsSubstring("identity") && ContainsSubstring("oracle"));
+  for (const char* preset : {"paper", "default"}) {
+    REQUIRE(start({"run", a, "--out", out, "--preset", preset, "--force"}).code == 0);
+    const Outcome judged = start({"eval", a, out, "--errors", "--json", folder / "eval.json"});
+    CAPTURE(judged.err);
+    CHECK(judged.code == 0);
+    CHECK_THAT(judged.out, ContainsSubstring("identity") && ContainsSubstring("oracle") &&
+                               ContainsSubstring("called ground"));
+    // The causes account for every error and every right verdict.
+    const auto json = nlohmann::json::parse(read_text(folder / "eval.json"));
+    const auto& score = json["rows"][2]["points"];
+    std::int64_t missed = 0, lost = 0, right = 0;
+    for (const auto& cause : json["errors"]["by_cause"]) {
+      missed += cause["missed_dynamic"].get<std::int64_t>();
+      lost += cause["lost_static"].get<std::int64_t>();
+      right += cause["right"].get<std::int64_t>();
+      const std::string name = cause["cause"];
+      if (name == "unknown" || name == "presumed") {
+        CHECK(cause["right"] == 0);
+      }
+    }
+    CHECK(missed == score["dynamic_total"].get<std::int64_t>() -
+                        score["dynamic_removed"].get<std::int64_t>());
+    CHECK(lost ==
+          score["static_total"].get<std::int64_t>() - score["static_kept"].get<std::int64_t>());
+    CHECK(right ==
+          score["static_kept"].get<std::int64_t>() + score["dynamic_removed"].get<std::int64_t>());
+    CHECK(right > 1000);
+  }
 
   // Labels that do not fit the scan.
   write_text(a + "/labels/000002.label", "1234");

@@ -29,6 +29,8 @@ def test_every_scan_gets_one_final_verdict(street, verdicts):
         assert verdict.labels.dtype == np.uint8
         assert verdict.instances.dtype == np.uint32
         assert verdict.beliefs.dtype == np.float32
+        assert verdict.causes.shape == (count,)
+        assert verdict.causes.dtype == np.uint8
         assert verdict.time == scan.time
         np.testing.assert_allclose(verdict.T_world_sensor, scan.T_world_sensor, atol=1e-9)
 

@@ -18,6 +18,7 @@ struct Verdict {
   std::vector<PointLabel> labels;
   std::vector<std::uint32_t> instances;
   std::vector<float> beliefs;
+  std::vector<Cause> causes;
 
   Verdict() = default;
   explicit Verdict(const ScanVerdict& v)
@@ -25,11 +26,12 @@ struct Verdict {
         time(v.time),
         labels(v.labels.begin(), v.labels.end()),
         instances(v.instances.begin(), v.instances.end()),
-        beliefs(v.beliefs.begin(), v.beliefs.end()) {}
+        beliefs(v.beliefs.begin(), v.beliefs.end()),
+        causes(v.causes.begin(), v.causes.end()) {}
 
   friend bool operator==(const Verdict& a, const Verdict& b) {
     return a.scan == b.scan && a.time == b.time && a.labels == b.labels &&
-           a.instances == b.instances && a.beliefs == b.beliefs;
+           a.instances == b.instances && a.beliefs == b.beliefs && a.causes == b.causes;
   }
 };
 

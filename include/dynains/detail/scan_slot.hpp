@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/cause.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/ground_segmenter.hpp"
 #include "dynains/point_cloud_traits.hpp"
@@ -13,6 +14,29 @@
 #include "dynains/scan_verdict.hpp"
 
 namespace dynains::detail {
+
+/// How far a point came on its way to a verdict by windows (Eq. 11-19).
+enum class Reach : std::uint8_t { kNoCluster, kTooFewScans, kSimilar, kProposed };
+
+/// Points that came farther before stay as they are.
+inline void raise(Reach* reach, std::size_t count, Reach at_least) {
+  for (std::size_t i = 0; i < count; ++i) reach[i] = reach[i] < at_least ? at_least : reach[i];
+}
+
+/// Why it is static all the same.
+constexpr Cause cause_to_stay(Reach reach) {
+  switch (reach) {
+    case Reach::kNoCluster:
+      return Cause::kNotJudged;
+    case Reach::kTooFewScans:
+      return Cause::kTooFewScans;
+    case Reach::kSimilar:
+      return Cause::kSimilar;
+    case Reach::kProposed:
+      return Cause::kReverted;
+  }
+  return Cause::kUnknown;
+}
 
 /// A scan and all that is known of it. Reused from scan to scan.
 struct ScanSlot {
@@ -23,13 +47,14 @@ struct ScanSlot {
 
   GroundSplit split;  // `source` is the place in the input
   // By non-ground point, in the order of the split.
-  std::vector<std::uint8_t> votes;  // windows that called it dynamic
-  std::vector<float> belief;        // highest posterior of any window that proposed it
+  std::vector<std::uint8_t> votes;     // windows that called it dynamic
+  std::vector<float> belief;           // highest posterior of any window that proposed it
+  std::vector<Reach> reach;            // how far it came in the window in which it came farthest
   std::vector<std::uint32_t> cluster;  // in the window in which this scan was the newest
   // By cluster of that window.
   std::vector<std::uint32_t> ids;
   // By point of the split, ground first.
-  std::vector<std::uint8_t> dynamic;  // by the evidence of other scans
+  std::vector<Cause> proof;           // by the evidence of other scans
   std::vector<float> evidence;        // belief by the same
   std::vector<std::uint8_t> is_kept;  // verdict: static
   // By input point.
@@ -37,11 +62,12 @@ struct ScanSlot {
   std::vector<PointLabel> labels;
   std::vector<std::uint32_t> instances;
   std::vector<float> beliefs;
+  std::vector<Cause> causes;
 
   std::size_t non_ground_count() const { return split.count - split.ground_count; }
 
   ScanVerdict verdict() const {
-    return {scan, time, T_world_sensor, labels, instances, beliefs};
+    return {scan, time, T_world_sensor, labels, instances, beliefs, causes};
   }
 };
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/cause.hpp"
 #include "dynains/cluster_set.hpp"
 #include "dynains/ground_segmenter.hpp"
 #include "dynains/points.hpp"
@@ -78,7 +79,7 @@ struct IsEvidence<
             std::declval<const GroundSplit&>(), Span<const std::uint32_t>(), std::size_t{})),
         decltype(std::declval<Stage&>().judge(std::uint64_t{}, bool{},
                                               std::declval<const GroundSplit&>(),
-                                              std::declval<std::vector<std::uint8_t>&>(),
+                                              std::declval<std::vector<Cause>&>(),
                                               std::declval<std::vector<float>&>())),
         std::enable_if_t<
             std::is_convertible_v<decltype(std::declval<const Stage&>().horizon()), std::size_t> &&
