@@ -14,6 +14,7 @@
 
 #include "dynains/detail/arc_tangent.hpp"
 #include "dynains/detail/lanes.hpp"
+#include "dynains/detail/wide_lanes.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/polar_points.hpp"
@@ -143,39 +144,47 @@ class CurvedVoxelClusterer {
   // Cell of each point as (elevation * ranges + range) * row + azimuth; -1 if too far. Rows have a
   // power of two of cells: a shift is cheaper than a product.
   void find_cells(PolarView points) {
-    using detail::Float8;
-    using detail::Int8;
+    using detail::Constant8;
     const std::size_t count = points.size();
     if (cell_of_.size() < count + detail::kLanes) {
       cell_of_.resize(count + detail::kLanes);
       cluster_of_.resize(count + detail::kLanes);
     }
     constexpr double kRadians = M_PI / 180.0;
-    const Float8 azimuth_scale(static_cast<float>(azimuths_ / (2.0 * M_PI)));
-    const Float8 elevation_scale(static_cast<float>(1.0 / (resolved_.voxel_elevation * kRadians)));
-    const Float8 range_scale(static_cast<float>(1.0 / config_.voxel_range));
-    const Float8 far(static_cast<float>(config_.cluster_range));
-    const Float8 pi(detail::kPi);
-    const Float8 half_pi(0.5F * detail::kPi);
-    const Float8 last_azimuth(static_cast<float>(azimuths_ - 1));
-    const Float8 last_elevation(static_cast<float>(elevations_ - 1));
-    const Float8 last_range(static_cast<float>(ranges_ - 1));
-    const Float8 ranges(static_cast<float>(ranges_));
-    Float8 lowest(static_cast<float>(elevations_));
-    Float8 highest(-1.0F);
-    detail::for_lanes({points.range, points.azimuth, points.z}, [&](Float8 range, Float8 azimuth,
-                                                                    Float8 z, std::size_t to) {
-      const Float8 distance = sqrt(range * range + z * z);
-      const detail::Mask8 near = distance <= far;
-      const Float8 i_range = min(keep(near, distance) * range_scale, last_range);
-      const Float8 i_azimuth = min((azimuth + pi) * azimuth_scale, last_azimuth);
-      const Float8 i_elevation =
+    const Constant8 azimuth_scale(static_cast<float>(azimuths_ / (2.0 * M_PI)));
+    const Constant8 elevation_scale(
+        static_cast<float>(1.0 / (resolved_.voxel_elevation * kRadians)));
+    const Constant8 range_scale(static_cast<float>(1.0 / config_.voxel_range));
+    const Constant8 far(static_cast<float>(config_.cluster_range));
+    const Constant8 pi(detail::kPi);
+    const Constant8 half_pi(0.5F * detail::kPi);
+    const Constant8 last_azimuth(static_cast<float>(azimuths_ - 1));
+    const Constant8 last_elevation(static_cast<float>(elevations_ - 1));
+    const Constant8 last_range(static_cast<float>(ranges_ - 1));
+    const Constant8 ranges(static_cast<float>(ranges_));
+    const int row_shift = row_shift_;
+    std::int32_t* const cells = cell_of_.data();
+    Constant8 lowest(static_cast<float>(elevations_));
+    Constant8 highest(-1.0F);
+    detail::for_lanes(count, [&](auto at) {
+      using Float = typename decltype(at)::Float;
+      using Int = typename decltype(at)::Int;
+      const Float range = at.load(points.range.data());
+      const Float azimuth = at.load(points.azimuth.data());
+      const Float z = at.load(points.z.data());
+      const Float distance = sqrt(range * range + z * z);
+      const auto near = distance <= far;
+      const Float i_range = min(keep(near, distance) * range_scale, last_range);
+      const Float i_azimuth = min((azimuth + pi) * azimuth_scale, last_azimuth);
+      const Float i_elevation =
           min((detail::arc_tangent2(z, range) + half_pi) * elevation_scale, last_elevation);
       // Row numbers stay below 2^23 and are exact in floats.
-      const Int8 i_row = truncate(to_float(truncate(i_elevation)) * ranges) + truncate(i_range);
-      select(near, (i_row << row_shift_) + truncate(i_azimuth), Int8(-1)).store(&cell_of_[to]);
-      lowest = min(select(near, i_elevation, lowest), lowest);
-      highest = max(select(near, i_elevation, highest), highest);
+      const Int i_row = truncate(to_float(truncate(i_elevation)) * ranges) + truncate(i_range);
+      select(near, (i_row << row_shift) + truncate(i_azimuth), Int(-1)).store(cells + at.begin);
+      const Float low = lowest;
+      const Float high = highest;
+      min(at.there(select(near, i_elevation, low), low), low).store(lowest.values);
+      max(at.there(select(near, i_elevation, high), high), high).store(highest.values);
     });
     lowest_elevation_ = static_cast<std::int32_t>(min_lane(lowest));
     highest_elevation_ = static_cast<std::int32_t>(std::floor(max_lane(highest)));

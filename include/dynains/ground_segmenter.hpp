@@ -15,6 +15,7 @@
 #include "dynains/detail/arc_tangent.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/plane_fit.hpp"
+#include "dynains/detail/wide_lanes.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor_model.hpp"
@@ -192,6 +193,14 @@ class GroundSegmenter {
     float sectors;
   };
 
+  // What is beyond the inner edge of a zone is beyond those before. So a constant of the zone in
+  // which a point lies is that of the first, with the differences to later ones flipped bit by bit.
+  struct ZoneConstant {
+    std::array<detail::Constant8, kZones> of;
+    std::array<detail::Constant8, kZones> flip = {
+        of[0], of[0].bits_changed(of[1]), of[1].bits_changed(of[2]), of[2].bits_changed(of[3])};
+  };
+
   static void copy(const GroundSplit& from, std::size_t begin, std::size_t count, GroundSplit& to,
                    std::size_t at) {
     detail::copy(&from.points.x[begin], count, &to.points.x[at]);
@@ -271,57 +280,49 @@ class GroundSegmenter {
   }
 
   void find_patches(PointsView scan) {
-    using detail::Float8;
-    using detail::Mask8;
-    // What is beyond the inner edge of a zone is beyond those before. So a constant of the zone in
-    // which a point lies is that of the first, with the differences to later ones flipped bit by
-    // bit.
-    struct OfZone {
-      Mask8 first;
-      std::array<Mask8, kZones> difference;
-
-      Float8 operator()(const std::array<Mask8, kZones>& beyond) const {
-        Mask8 bits = first;
-        for (std::size_t i = 1; i < kZones; ++i) bits = bits ^ (beyond[i] & difference[i]);
-        return float_of(bits);
-      }
-    };
+    using detail::Constant8;
     // Read once: the compiler cannot know that stores leave members alone.
     const auto of_zone = [&](float Zone::*constant) {
-      OfZone result{bits_of(Float8(zones_[0].*constant)), {}};
-      for (std::size_t i = 1; i < kZones; ++i) {
-        result.difference[i] =
-            bits_of(Float8(zones_[i].*constant)) ^ bits_of(Float8(zones_[i - 1].*constant));
-      }
-      return result;
+      return ZoneConstant{
+          {zones_[0].*constant, zones_[1].*constant, zones_[2].*constant, zones_[3].*constant}};
     };
-    const OfZone inner = of_zone(&Zone::inner);
-    const OfZone rings_per_metre = of_zone(&Zone::rings_per_metre);
-    const OfZone sectors_per_radian = of_zone(&Zone::sectors_per_radian);
-    const OfZone first_patch = of_zone(&Zone::first_patch);
-    const OfZone last_ring = of_zone(&Zone::last_ring);
-    const OfZone sector_count = of_zone(&Zone::sectors);
-    std::array<Float8, kZones> edge;
-    for (std::size_t i = 0; i < kZones; ++i) edge[i] = Float8(zones_[i].inner);
-    const Float8 nearest(static_cast<float>(config_.ground_min_range));
-    const Float8 farthest(static_cast<float>(config_.ground_max_range));
-    const auto whole = [](Float8 value) { return to_float(truncate(value)); };
+    const ZoneConstant inner = of_zone(&Zone::inner);
+    const ZoneConstant rings_per_metre = of_zone(&Zone::rings_per_metre);
+    const ZoneConstant sectors_per_radian = of_zone(&Zone::sectors_per_radian);
+    const ZoneConstant first_patch = of_zone(&Zone::first_patch);
+    const ZoneConstant last_ring = of_zone(&Zone::last_ring);
+    const ZoneConstant sector_count = of_zone(&Zone::sectors);
+    const Constant8 nearest(static_cast<float>(config_.ground_min_range));
+    const Constant8 farthest(static_cast<float>(config_.ground_max_range));
+    const Constant8 pi(detail::kPi);
+    const Constant8 one(1.0F);
     std::int32_t* const patches = patch_of_.data();
 
-    detail::for_lanes(scan, [&](Float8 x, Float8 y, Float8, std::size_t to) {
-      const Float8 range = sqrt(x * x + y * y);
-      const Float8 azimuth = detail::arc_tangent2(y, x) + Float8(detail::kPi);
-      std::array<Mask8, kZones> beyond;
-      for (std::size_t i = 1; i < kZones; ++i) beyond[i] = range >= edge[i];
-      const Float8 ring = whole(
-          min((min(range, farthest) - inner(beyond)) * rings_per_metre(beyond), last_ring(beyond)));
-      const Float8 sectors = sector_count(beyond);
-      const Float8 sector =
-          whole(min(azimuth * sectors_per_radian(beyond), sectors - Float8(1.0F)));
-      const Float8 patch = first_patch(beyond) + ring * sectors + sector;
-      const Mask8 inside = (range >= nearest) & (range <= farthest);
-      select(inside, truncate(patch), detail::Int8(static_cast<std::int32_t>(kPatches)))
-          .store(patches + to);
+    detail::for_lanes(scan.size(), [&](auto at) {
+      using Float = typename decltype(at)::Float;
+      using Int = typename decltype(at)::Int;
+      const Float x = at.load(scan.x.data());
+      const Float y = at.load(scan.y.data());
+      const Float range = sqrt(x * x + y * y);
+      const Float azimuth = detail::arc_tangent2(y, x) + pi;
+      const auto beyond_1 = range >= inner.of[1];
+      const auto beyond_2 = range >= inner.of[2];
+      const auto beyond_3 = range >= inner.of[3];
+      const auto here = [&](const ZoneConstant& constant) {
+        return float_of(bits_of(Float(constant.of[0])) ^
+                        (beyond_1 & bits_of(Float(constant.flip[1]))) ^
+                        (beyond_2 & bits_of(Float(constant.flip[2]))) ^
+                        (beyond_3 & bits_of(Float(constant.flip[3]))));
+      };
+      const auto whole = [](const Float& value) { return to_float(truncate(value)); };
+      const Float ring =
+          whole(min((min(range, farthest) - here(inner)) * here(rings_per_metre), here(last_ring)));
+      const Float sectors = here(sector_count);
+      const Float sector = whole(min(azimuth * here(sectors_per_radian), sectors - one));
+      const Float patch = here(first_patch) + ring * sectors + sector;
+      const auto inside = (range >= nearest) & (range <= farthest);
+      select(inside, truncate(patch), Int(static_cast<std::int32_t>(kPatches)))
+          .store(patches + at.begin);
     });
   }
 
@@ -343,7 +344,8 @@ class GroundSegmenter {
     HalfSpace below{0.0F, 0.0F, 1.0F, static_cast<float>(config_.ground_seed_margin)};
     detail::Plane plane;
     for (int i = 0; i < config_.ground_iterations; ++i) {
-      const detail::PlaneMoments moments = sum_moments(begin, end, x0, y0, seed_height, below);
+      const detail::PlaneMoments moments =
+          sum_moments(begin, end, Admission(x0, y0, seed_height, below));
       if (moments.count < 3.0) return reject();
       plane = detail::fit_plane(moments);
       below = {static_cast<float>(plane.normal_x), static_cast<float>(plane.normal_y),
@@ -361,11 +363,16 @@ class GroundSegmenter {
       }
     }
 
-    for (std::size_t i = begin; i < end; i += detail::kLanes) {
-      const std::size_t lanes = std::min(detail::kLanes, end - i);
-      const detail::Mask8 mask = inside(i, x0, y0, seed_height, below) & detail::first_lanes(lanes);
-      out.put(sorted_, i, lanes, mask.bits());
-    }
+    const Admission admission(x0, y0, seed_height, below);
+    detail::run_lanes([&](auto lanes) {
+      using Lanes = decltype(lanes);
+      for (std::size_t i = begin; i < end; i += detail::kLanes) {
+        const unsigned bits =
+            admission.inside(admission.template local<Lanes>(sorted_.points, i)).bits();
+        const std::size_t count = std::min(detail::kLanes, end - i);
+        out.put(sorted_, i, count, bits & ((1U << count) - 1U));
+      }
+    });
   }
 
   // Points with normal . (p - origin) < offset.
@@ -373,63 +380,70 @@ class GroundSegmenter {
     float x, y, z, offset;
   };
 
-  detail::Mask8 inside(std::size_t i, float x0, float y0, float z0, const HalfSpace& space) const {
-    using detail::Float8;
-    const Float8 x = Float8::load(&sorted_.points.x[i]) - Float8(x0);
-    const Float8 y = Float8::load(&sorted_.points.y[i]) - Float8(y0);
-    const Float8 z = Float8::load(&sorted_.points.z[i]) - Float8(z0);
-    return Float8(space.x) * x + Float8(space.y) * y + Float8(space.z) * z < Float8(space.offset);
-  }
+  // The half space in the coordinates of the fit, whose origin is near the points.
+  struct Admission {
+    detail::Constant8 x0, y0, z0;
+    detail::Constant8 x, y, z, offset;
 
-  // The eight lanes are summed up four by four, so that all sums have room in registers.
-  detail::PlaneMoments sum_moments(std::size_t begin, std::size_t end, float x0, float y0, float z0,
-                                   const HalfSpace& space) const {
-    using detail::Float4;
-    using detail::Int4;
-    detail::Float8 sums[9];
-    std::int32_t count = 0;
-    for (std::size_t half = 0; half < 2; ++half) {
-      Int4 n = {};
-      Float4 sx = {}, sy = {}, sz = {}, sxx = {}, sxy = {}, sxz = {}, syy = {}, syz = {}, szz = {};
-      const auto add = [&](std::size_t i, Int4 admitted) {
-        Float4 x = detail::load4(&sorted_.points.x[i]) - x0;
-        Float4 y = detail::load4(&sorted_.points.y[i]) - y0;
-        Float4 z = detail::load4(&sorted_.points.z[i]) - z0;
-        const Int4 member = (space.x * x + space.y * y + space.z * z < space.offset) & admitted;
-        x = Float4(member & Int4(x));
-        y = Float4(member & Int4(y));
-        z = Float4(member & Int4(z));
-        n -= member;
-        sx += x;
-        sy += y;
-        sz += z;
-        sxx += x * x;
-        sxy += x * y;
-        sxz += x * z;
-        syy += y * y;
-        syz += y * z;
-        szz += z * z;
-      };
-      std::size_t i = begin + 4 * half;
-      for (; i + 4 <= end; i += detail::kLanes) add(i, Int4{-1, -1, -1, -1});
-      if (i < end) {
-        const auto left = static_cast<std::int32_t>(end - i);
-        add(i, Int4{0, 1, 2, 3} < left);
-      }
-      const Float4 parts[9] = {sx, sy, sz, sxx, sxy, sxz, syy, syz, szz};
-      for (std::size_t k = 0; k < 9; ++k) (half == 0 ? sums[k].lo : sums[k].hi) = parts[k];
-      count += n[0] + n[1] + n[2] + n[3];
+    Admission(float origin_x, float origin_y, float origin_z, const HalfSpace& space)
+        : x0(origin_x),
+          y0(origin_y),
+          z0(origin_z),
+          x(space.x),
+          y(space.y),
+          z(space.z),
+          offset(space.offset) {}
+
+    template <class Lanes>
+    std::array<typename Lanes::Float, 3> local(const PointBuffer& points, std::size_t i) const {
+      using Float = typename Lanes::Float;
+      return {Float::load(&points.x[i]) - x0, Float::load(&points.y[i]) - y0,
+              Float::load(&points.z[i]) - z0};
     }
-    return {static_cast<double>(count),
-            sum(sums[0]),
-            sum(sums[1]),
-            sum(sums[2]),
-            sum(sums[3]),
-            sum(sums[4]),
-            sum(sums[5]),
-            sum(sums[6]),
-            sum(sums[7]),
-            sum(sums[8])};
+    template <class Float>
+    auto inside(const std::array<Float, 3>& p) const {
+      return x * p[0] + y * p[1] + z * p[2] < offset;
+    }
+  };
+
+  detail::PlaneMoments sum_moments(std::size_t begin, std::size_t end,
+                                   const Admission& admission) const {
+    static constexpr detail::Constant8 kZero(0.0F), kOne(1.0F);
+    std::array<float, 10> sums;
+    detail::run_lanes([&](auto lanes) {
+      using Lanes = decltype(lanes);
+      using Float = typename Lanes::Float;
+      Float n = kZero, sx = kZero, sy = kZero, sz = kZero, sxx = kZero, sxy = kZero, sxz = kZero,
+            syy = kZero, syz = kZero, szz = kZero;
+      const auto add = [&](const std::array<Float, 3>& p, const typename Lanes::Mask& member) {
+        const Float x = keep(member, p[0]);
+        const Float y = keep(member, p[1]);
+        const Float z = keep(member, p[2]);
+        n = n + keep(member, Float(kOne));
+        sx = sx + x;
+        sy = sy + y;
+        sz = sz + z;
+        sxx = sxx + x * x;
+        sxy = sxy + x * y;
+        sxz = sxz + x * z;
+        syy = syy + y * y;
+        syz = syz + y * z;
+        szz = szz + z * z;
+      };
+      std::size_t i = begin;
+      for (; i + detail::kLanes <= end; i += detail::kLanes) {
+        const auto p = admission.template local<Lanes>(sorted_.points, i);
+        add(p, admission.inside(p));
+      }
+      if (i < end) {
+        const auto p = admission.template local<Lanes>(sorted_.points, i);
+        add(p, admission.inside(p) & detail::lanes_below<Lanes>(end - i));
+      }
+      sums = {sum(n),   sum(sx),  sum(sy),  sum(sz),  sum(sxx),
+              sum(sxy), sum(sxz), sum(syy), sum(syz), sum(szz)};
+    });
+    return {sums[0], sums[1], sums[2], sums[3], sums[4],
+            sums[5], sums[6], sums[7], sums[8], sums[9]};
   }
 
   // The lowest values met so far, in order.

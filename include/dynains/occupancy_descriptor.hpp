@@ -11,6 +11,7 @@
 #include "dynains/cluster_set.hpp"
 #include "dynains/detail/arc_tangent.hpp"
 #include "dynains/detail/lanes.hpp"
+#include "dynains/detail/wide_lanes.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/polar_points.hpp"
@@ -223,26 +224,27 @@ class OccupancyDescriptor {
     const std::size_t cells = cell_count();
     float* const heights = heights_.data() + k * cells;
     std::fill(heights, heights + cells, 0.0F);
-    using detail::Float8;
+    using detail::Constant8;
     const PolarView points = cluster_.scan(k);
     // Read once: the compiler cannot know that stores leave members alone.
-    const Float8 range_min(range_min_), azimuth_min(azimuth_min_), z_min(z_min_);
-    const Float8 cells_per_metre(cells_per_metre_), cells_per_radian(cells_per_radian_);
+    const Constant8 range_min(range_min_), azimuth_min(azimuth_min_), z_min(z_min_);
+    const Constant8 cells_per_metre(cells_per_metre_), cells_per_radian(cells_per_radian_);
+    const Constant8 zero(0.0F), just_below(-detail::kPi * 1e-4F), turn(2.0F * detail::kPi);
     const auto row = static_cast<std::int32_t>(azimuth_cells_);
-    const Float8 last_radial(static_cast<float>(radial_cells_ - 1));
-    const Float8 last_azimuth(static_cast<float>(azimuth_cells_ - 1));
-    detail::for_lanes({points.range, points.azimuth, points.z}, [&](Float8 range, Float8 azimuth,
-                                                                    Float8 z, std::size_t begin) {
-      const Float8 radial = (range - range_min) * cells_per_metre;
-      Float8 offset = azimuth - azimuth_min;
-      offset = offset + keep(offset < Float8(-detail::kPi * 1e-4F), Float8(2.0F * detail::kPi));
-      const Float8 angular = max(offset * cells_per_radian, Float8(0.0F));
+    const Constant8 last_radial(static_cast<float>(radial_cells_ - 1));
+    const Constant8 last_azimuth(static_cast<float>(azimuth_cells_ - 1));
+    detail::for_lanes(points.size(), [&](auto at) {
+      using Float = typename decltype(at)::Float;
+      const Float radial = (at.load(points.range.data()) - range_min) * cells_per_metre;
+      Float offset = at.load(points.azimuth.data()) - azimuth_min;
+      offset = offset + keep(offset < just_below, Float(turn));
+      const Float angular = max(offset * cells_per_radian, zero);
       std::int32_t cell[detail::kLanes];
       float height[detail::kLanes];
       (multiply(truncate(min(radial, last_radial)), row) + truncate(min(angular, last_azimuth)))
           .store(cell);
-      (z - z_min).store(height);
-      const std::size_t lanes = std::min(detail::kLanes, points.size() - begin);
+      (at.load(points.z.data()) - z_min).store(height);
+      const std::size_t lanes = at.size();
       for (std::size_t i = 0; i < lanes; ++i) {
         float& highest = heights[cell[i]];
         highest = std::max(highest, height[i]);

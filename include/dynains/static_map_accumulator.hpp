@@ -11,6 +11,7 @@
 
 #include "dynains/detail/chunked_vector.hpp"
 #include "dynains/detail/lanes.hpp"
+#include "dynains/detail/wide_lanes.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 
@@ -19,7 +20,7 @@ namespace dynains {
 /// Sparse voxel map that keeps the first measured point of each voxel, never a voxel centre.
 ///
 /// Voxels are grouped in blocks of 8 x 4 x 2, whose occupancy is one word: flat, as ground is, and
-/// small, as far points are scattered. Blocks are grouped in tiles of 4 x 4 x 2, which are found by
+/// small, as far points are scattered. Blocks are grouped in tiles of 4 x 2 x 2, which are found by
 /// linear hashing (Litwin, 1980): each new tile splits one bucket, so that the table never has to
 /// be built anew. Nor do stored points ever move: growing makes no pause. Points are floats
 /// relative to their block, so that precision does not depend on how far the world origin is.
@@ -146,9 +147,9 @@ class StaticMapAccumulator {
  private:
   static constexpr std::uint32_t kEnd = 0xFFFFFFFFU;
   static inline const Eigen::Array3i kBlockVoxels{8, 4, 2};
-  static inline const Eigen::Array3i kTileBlocks{4, 4, 2};
+  static inline const Eigen::Array3i kTileBlocks{4, 2, 2};
   static constexpr std::array<int, 3> kBlockBits = {3, 2, 1};  // log2 of the voxels
-  static constexpr std::uint32_t kBlocksPerTile = 32;
+  static constexpr std::uint32_t kBlocksPerTile = 16;
 
   struct Point {
     float x, y, z;       // m, relative to the corner of the block
@@ -191,27 +192,30 @@ class StaticMapAccumulator {
 
   // Points in the local frame, and their voxels there.
   void locate(PointsView points, const Eigen::Matrix<float, 3, 4>& m, Batch& batch) const {
-    using detail::Float8;
-    using detail::Int8;
-    const Float8 scale(static_cast<float>(1.0 / voxel_));
-    Float8 t[3][4];
-    for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 4; ++column) t[row][column] = Float8(m(row, column));
-    }
-    detail::for_lanes(points, [&](Float8 x, Float8 y, Float8 z, std::size_t to) {
-      Int8 bit(0);
+    using detail::Constant8;
+    const Constant8 scale(static_cast<float>(1.0 / voxel_));
+    const Constant8 t[3][4] = {{m(0, 0), m(0, 1), m(0, 2), m(0, 3)},
+                               {m(1, 0), m(1, 1), m(1, 2), m(1, 3)},
+                               {m(2, 0), m(2, 1), m(2, 2), m(2, 3)}};
+    detail::for_lanes(points.size(), [&](auto at) {
+      using Float = typename decltype(at)::Float;
+      using Int = typename decltype(at)::Int;
+      const Float x = at.load(points.x.data());
+      const Float y = at.load(points.y.data());
+      const Float z = at.load(points.z.data());
+      Int bit(0);
       int shift = 0;
-      for (int row = 0; row < 3; ++row) {
-        const Float8 value = (t[row][0] * x + t[row][1] * y) + (t[row][2] * z + t[row][3]);
-        const Int8 voxel = floor(value * scale);
+      for (std::size_t row = 0; row < 3; ++row) {
+        const Float value = (t[row][0] * x + t[row][1] * y) + (t[row][2] * z + t[row][3]);
+        const Int voxel = floor(value * scale);
         // Arithmetic shifts and masks are floor division and remainder.
-        const int bits = kBlockBits[static_cast<std::size_t>(row)];
-        value.store(&batch.local[row][to]);
-        (voxel >> bits).store(&batch.block[row][to]);
-        bit = bit + ((voxel & Int8((1 << bits) - 1)) << shift);
+        const int bits = kBlockBits[row];
+        value.store(&batch.local[row][at.begin]);
+        (voxel >> bits).store(&batch.block[row][at.begin]);
+        bit = bit + ((voxel & Int((1 << bits) - 1)) << shift);
         shift += bits;
       }
-      store_bytes(bit, &batch.bit[to]);
+      store_bytes(bit, &batch.bit[at.begin]);
     });
   }
 
@@ -242,35 +246,45 @@ class StaticMapAccumulator {
     const auto is_kept = [&](std::size_t i) {
       return std::uint64_t{keep.empty() || keep[i] != 0 ? 1U : 0U};
     };
+    std::array<std::uint32_t, 128> first_in{};  // of each voxel; dropped points go beyond
     for (std::size_t r = 0; r < batch.run_count; ++r) {
       const std::size_t begin = batch.run_begin[r];
       const std::size_t end = batch.run_begin[r + 1];
       std::uint64_t met = 0;
-      for (std::size_t i = begin; i < end; ++i) met |= is_kept(i) << batch.bit[i];
+      for (std::size_t i = end; i-- > begin;) {
+        const std::uint64_t kept = is_kept(i);
+        met |= kept << batch.bit[i];
+        first_in[batch.bit[i] + ((kept ^ 1U) << 6)] = static_cast<std::uint32_t>(i);
+      }
       if (met == 0) continue;
       const Eigen::Array3i in_frame(batch.block[0][begin], batch.block[1][begin],
                                     batch.block[2][begin]);
       Block& block = block_at(corner + in_frame);
-      std::uint64_t wanted = keep_all_ ? ~std::uint64_t{0} : met & ~block.occupied;
-      if (wanted == 0) continue;
-      block.occupied |= met;
-      for (std::size_t i = begin; i < end; ++i) {
-        if ((is_kept(i) << batch.bit[i] & wanted) == 0) continue;
-        if (!keep_all_) wanted &= ~(std::uint64_t{1} << batch.bit[i]);
+      const auto add = [&](std::size_t i) {
         block.first = points_.push_back(
             {batch.local[0][i] - static_cast<float>(in_frame.x()) * size.x(),
              batch.local[1][i] - static_cast<float>(in_frame.y()) * size.y(),
              batch.local[2][i] - static_cast<float>(in_frame.z()) * size.z(), block.first});
         ++size_;
+      };
+      if (keep_all_) {
+        for (std::size_t i = begin; i < end; ++i) {
+          if (is_kept(i) != 0) add(i);
+        }
+      } else {
+        for (std::uint64_t fresh = met & ~block.occupied; fresh != 0; fresh &= fresh - 1) {
+          add(first_in[static_cast<std::size_t>(__builtin_ctzll(fresh))]);
+        }
       }
+      block.occupied |= met;
     }
   }
 
   Block& block_at(const Eigen::Array3i& at) {
-    const Index in_tiles = {at.x() >> 2, at.y() >> 2, at.z() >> 1};
+    const Index in_tiles = {at.x() >> 2, at.y() >> 1, at.z() >> 1};
     const std::uint32_t tile = tile_at(in_tiles);
     const auto place =
-        static_cast<std::uint32_t>((at.x() & 3) | (at.y() & 3) << 2 | (at.z() & 1) << 4);
+        static_cast<std::uint32_t>((at.x() & 3) | (at.y() & 1) << 2 | (at.z() & 1) << 3);
     std::uint32_t& block = tiles_[tile].blocks[place];
     if (block == kEnd) block = blocks_.push_back({0, kEnd, tile * kBlocksPerTile + place});
     return blocks_[block];
@@ -343,8 +357,8 @@ class StaticMapAccumulator {
   void visit_block(const Block& block, Visitor&& visit) const {
     const Index& tile = tiles_[block.place / kBlocksPerTile].at;
     const auto place = static_cast<std::int32_t>(block.place % kBlocksPerTile);
-    const Eigen::Array3i at(tile.x * 4 + (place & 3), tile.y * 4 + (place >> 2 & 3),
-                            tile.z * 2 + (place >> 4));
+    const Eigen::Array3i at(tile.x * 4 + (place & 3), tile.y * 2 + (place >> 2 & 1),
+                            tile.z * 2 + (place >> 3));
     const Eigen::Vector3d corner = at.cast<double>() * block_size();
     for (std::uint32_t i = block.first; i != kEnd; i = points_[i].next) {
       const Point& point = points_[i];

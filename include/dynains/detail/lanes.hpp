@@ -79,11 +79,31 @@ struct Int8 {
   friend Mask8 operator==(Int8 a, Int8 b) { return {a.lo == b.lo, a.hi == b.hi}; }
 };
 
+/// The same value in all lanes, kept in memory: cheaper than to spread it anew in every round of a
+/// loop that has no register left for it.
+struct Constant8 {
+  alignas(32) float values[kLanes];
+  constexpr Constant8(float value)
+      : values{value, value, value, value, value, value, value, value} {}
+
+  /// What has to be flipped (operator^) to turn this one into `other`.
+  Constant8 bits_changed(const Constant8& other) const {
+    std::uint32_t a, b;
+    std::memcpy(&a, values, sizeof(a));
+    std::memcpy(&b, other.values, sizeof(b));
+    a ^= b;
+    float bits;
+    std::memcpy(&bits, &a, sizeof(bits));
+    return Constant8(bits);
+  }
+};
+
 struct Float8 {
   Float4 lo, hi;
 
   Float8() = default;
   Float8(Float4 low, Float4 high) : lo(low), hi(high) {}
+  Float8(const Constant8& constant) : Float8(load(constant.values)) {}
   explicit Float8(float value) : lo{value, value, value, value}, hi{value, value, value, value} {}
 
   static Float8 load(const float* from) {

@@ -1,0 +1,202 @@
+// The lanes of lanes.hpp in one register each, for processors that have AVX2, chosen at run time.
+//
+// A kernel is a generic function object that takes the kind of lanes and works with its types. It
+// is instantiated twice and gives the same bits both times. No vector passes the border of
+// run_wide_lanes, because the two sides of it would pass one differently.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#include "dynains/detail/lanes.hpp"
+
+namespace dynains::detail {
+
+struct WideMask8 {
+  using Vector = std::int32_t __attribute__((vector_size(32)));
+  Vector v;
+
+  friend WideMask8 operator&(const WideMask8& a, const WideMask8& b) { return {a.v & b.v}; }
+  friend WideMask8 operator^(const WideMask8& a, const WideMask8& b) { return {a.v ^ b.v}; }
+  friend WideMask8 operator|(const WideMask8& a, const WideMask8& b) { return {a.v | b.v}; }
+  friend WideMask8 operator~(const WideMask8& a) { return {~a.v}; }
+
+  Mask8 halves() const {
+    return {__builtin_shufflevector(v, v, 0, 1, 2, 3), __builtin_shufflevector(v, v, 4, 5, 6, 7)};
+  }
+  unsigned bits() const { return halves().bits(); }
+};
+
+struct WideInt8 {
+  using Vector = WideMask8::Vector;
+  Vector v;
+
+  WideInt8() = default;
+  explicit WideInt8(const Vector& vector) : v(vector) {}
+  explicit WideInt8(std::int32_t n) : v{n, n, n, n, n, n, n, n} {}
+
+  static WideInt8 load(const std::int32_t* from) {
+    WideInt8 result;
+    std::memcpy(&result.v, from, sizeof(Vector));
+    return result;
+  }
+  void store(std::int32_t* to) const { std::memcpy(to, &v, sizeof(Vector)); }
+
+  friend WideInt8 operator+(const WideInt8& a, const WideInt8& b) { return WideInt8(a.v + b.v); }
+  friend WideInt8 operator-(const WideInt8& a, const WideInt8& b) { return WideInt8(a.v - b.v); }
+  friend WideInt8 operator<<(const WideInt8& a, int bits) { return WideInt8(a.v << bits); }
+  friend WideInt8 operator>>(const WideInt8& a, int bits) { return WideInt8(a.v >> bits); }
+  friend WideInt8 operator&(const WideInt8& a, const WideInt8& b) { return WideInt8(a.v & b.v); }
+  friend WideMask8 operator<(const WideInt8& a, const WideInt8& b) { return {a.v < b.v}; }
+  friend WideMask8 operator==(const WideInt8& a, const WideInt8& b) { return {a.v == b.v}; }
+};
+
+struct WideFloat8 {
+  using Vector = float __attribute__((vector_size(32)));
+  Vector v;
+
+  WideFloat8() = default;
+  explicit WideFloat8(const Vector& vector) : v(vector) {}
+  WideFloat8(const Constant8& constant) { std::memcpy(&v, constant.values, sizeof(Vector)); }
+
+  static WideFloat8 load(const float* from) {
+    WideFloat8 result;
+    std::memcpy(&result.v, from, sizeof(Vector));
+    return result;
+  }
+  void store(float* to) const { std::memcpy(to, &v, sizeof(Vector)); }
+
+  using F = WideFloat8;
+  friend F operator+(const F& a, const F& b) { return F(a.v + b.v); }
+  friend F operator-(const F& a, const F& b) { return F(a.v - b.v); }
+  friend F operator*(const F& a, const F& b) { return F(a.v * b.v); }
+  friend F operator/(const F& a, const F& b) { return F(a.v / b.v); }
+  friend WideMask8 operator<(const F& a, const F& b) { return {a.v < b.v}; }
+  friend WideMask8 operator<=(const F& a, const F& b) { return {a.v <= b.v}; }
+  friend WideMask8 operator>(const F& a, const F& b) { return {a.v > b.v}; }
+  friend WideMask8 operator>=(const F& a, const F& b) { return {a.v >= b.v}; }
+
+  friend WideMask8 bits_of(const F& a) { return {WideMask8::Vector(a.v)}; }
+  friend F select(const WideMask8& mask, const F& a, const F& b) {
+    return float_of((mask & bits_of(a)) | (~mask & bits_of(b)));
+  }
+  friend F keep(const WideMask8& mask, const F& a) { return float_of(mask & bits_of(a)); }
+  friend F min(const F& a, const F& b) { return select(a < b, a, b); }
+  friend F max(const F& a, const F& b) { return select(a > b, a, b); }
+  friend F abs(const F& a) { return float_of(bits_of(a) & WideMask8{WideInt8(0x7FFFFFFF).v}); }
+  friend F sqrt(const F& a) {
+    const Float8 root = sqrt(Float8(__builtin_shufflevector(a.v, a.v, 0, 1, 2, 3),
+                                    __builtin_shufflevector(a.v, a.v, 4, 5, 6, 7)));
+    return F(__builtin_shufflevector(root.lo, root.hi, 0, 1, 2, 3, 4, 5, 6, 7));
+  }
+
+  static F float_of(const WideMask8& a) { return F(Vector(a.v)); }
+};
+
+inline WideFloat8 float_of(const WideMask8& a) { return WideFloat8::float_of(a); }
+
+inline WideInt8 select(const WideMask8& mask, const WideInt8& a, const WideInt8& b) {
+  return WideInt8((mask.v & a.v) | (~mask.v & b.v));
+}
+inline WideInt8 truncate(const WideFloat8& a) {
+  return WideInt8(__builtin_convertvector(a.v, WideInt8::Vector));
+}
+inline WideFloat8 to_float(const WideInt8& a) {
+  return WideFloat8(__builtin_convertvector(a.v, WideFloat8::Vector));
+}
+inline WideInt8 multiply(const WideInt8& a, std::int32_t factor) {
+  using Unsigned = std::uint32_t __attribute__((vector_size(32)));  // may overflow
+  return WideInt8(WideInt8::Vector(Unsigned(a.v) * static_cast<std::uint32_t>(factor)));
+}
+inline WideInt8 floor(const WideFloat8& a) {
+  const WideInt8 whole = truncate(a);
+  return WideInt8(whole.v + (to_float(whole) > a).v);  // all bits set is -1
+}
+inline float sum(const WideFloat8& a) {
+  return sum(Float8(__builtin_shufflevector(a.v, a.v, 0, 1, 2, 3),
+                    __builtin_shufflevector(a.v, a.v, 4, 5, 6, 7)));
+}
+inline void store_bytes(const WideInt8& a, std::uint8_t* to) {
+  const Mask8 halves = WideMask8{a.v}.halves();
+  store_bytes(Int8(halves.lo, halves.hi), to);
+}
+
+struct NarrowLanes {
+  using Float = Float8;
+  using Int = Int8;
+  using Mask = Mask8;
+};
+struct WideLanes {
+  using Float = WideFloat8;
+  using Int = WideInt8;
+  using Mask = WideMask8;
+};
+
+#if defined(__x86_64__) && defined(__SSE2__)
+template <class Kernel>
+[[gnu::target("avx2"), gnu::flatten]] void run_wide_lanes(Kernel& kernel) {
+  kernel(WideLanes());
+}
+inline bool has_wide_lanes() { return __builtin_cpu_supports("avx2") != 0; }
+#else
+template <class Kernel>
+void run_wide_lanes(Kernel& kernel) {
+  kernel(WideLanes());
+}
+inline bool has_wide_lanes() { return false; }
+#endif
+
+/// Calls `kernel` with WideLanes where the processor has registers for them, else with NarrowLanes.
+template <class Kernel>
+void run_lanes(Kernel&& kernel) {
+  if (has_wide_lanes()) return run_wide_lanes(kernel);
+  kernel(NarrowLanes());
+}
+
+/// True in the lanes below `count`.
+template <class Lanes>
+typename Lanes::Mask lanes_below(std::size_t count) {
+  alignas(32) static constexpr std::int32_t kIndex[kLanes] = {0, 1, 2, 3, 4, 5, 6, 7};
+  using Int = typename Lanes::Int;
+  return Int::load(kIndex) < Int(static_cast<std::int32_t>(count));
+}
+
+/// Eight neighbouring places of some arrays; fewer at their end, if `kTail`.
+template <class Lanes, bool kTail>
+struct Places : Lanes {
+  std::size_t begin;
+  std::size_t end;
+
+  Places(std::size_t first, std::size_t last) : begin(first), end(last) {}
+
+  std::size_t size() const { return kTail ? end - begin : kLanes; }
+  /// Zeros behind the end.
+  typename Lanes::Float load(const float* from) const {
+    if constexpr (!kTail) return Lanes::Float::load(from + begin);
+    alignas(32) float values[kLanes] = {};
+    for (std::size_t i = begin; i < end; ++i) values[i - begin] = from[i];
+    return Lanes::Float::load(values);
+  }
+  /// `a` in the lanes that have a place, else `b`.
+  typename Lanes::Float there(const typename Lanes::Float& a,
+                              const typename Lanes::Float& b) const {
+    if constexpr (!kTail) return a;
+    return select(lanes_below<Lanes>(size()), a, b);
+  }
+};
+
+/// Calls `kernel(Places)` for all of `count` places, eight by eight and from the first on.
+template <class Kernel>
+void for_lanes(std::size_t count, Kernel&& kernel) {
+  run_lanes([&](auto lanes) {
+    using Lanes = decltype(lanes);
+    std::size_t begin = 0;
+    for (; begin + kLanes <= count; begin += kLanes) {
+      kernel(Places<Lanes, false>(begin, begin + kLanes));
+    }
+    if (begin < count) kernel(Places<Lanes, true>(begin, count));
+  });
+}
+
+}  // namespace dynains::detail
