@@ -19,7 +19,7 @@ inline RemoverWithMapOnDisk::Config with_map_on_disk(const DynaInsRemover::Confi
                                                      const std::filesystem::path& folder,
                                                      double megabytes) {
   RemoverWithMapOnDisk::Config result;
-  static_cast<RemoverConfig&>(result) = config;
+  static_cast<RemoverConfig&>(result) = static_cast<const RemoverConfig&>(config);
   result.ground = config.ground;
   result.clusterer = config.clusterer;
   result.descriptor = config.descriptor;

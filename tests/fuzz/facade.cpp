@@ -71,16 +71,19 @@ Config read_config(Stream& stream) {
     config.clusterer.voxel_elevation = std::max(config.clusterer.voxel_elevation, 1.0);
   }
   config.clusterer.cluster_range = std::min(config.clusterer.cluster_range, 120.0);
+  config.evidence.horizon = std::min(config.evidence.horizon, 12);
+  config.evidence.memory = std::min(config.evidence.memory, 20);
   return config;
 }
 
-/// A floor around the sensor.
+/// A floor around the sensor: enough points to tell a sensor, one of few beams, whose range images
+/// are small.
 void add_floor(Stream& stream, std::vector<Point>& points) {
   const auto height = static_cast<float>(-1.7 + stream.number(1.0));
-  for (int ring = 0; ring < 4; ++ring) {
+  for (int ring = 0; ring < 14; ++ring) {
     for (int step = 0; step < 36; ++step) {
       const float angle = 0.1745F * static_cast<float>(step);
-      const float range = 4.0F + 3.0F * static_cast<float>(ring);
+      const float range = 3.5F + 1.5F * static_cast<float>(ring);
       points.emplace_back(range * std::cos(angle), range * std::sin(angle), height);
     }
   }
@@ -236,7 +239,7 @@ void run_facade(Bytes bytes) {
     return;
   }
   double time = 0.0;
-  constexpr int kMaxCalls = 20;
+  constexpr int kMaxCalls = 16;
   for (int call = 0; call < kMaxCalls && !stream.empty(); ++call) {
     const unsigned what = stream.byte() % 16;
     if (what == kFlush) {
