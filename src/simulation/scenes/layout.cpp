@@ -67,8 +67,8 @@ std::vector<Crossing> add_side_streets(Random& random, std::vector<Street>& stre
     bool meets = false;
     for (const Vec2 p : points) {
       if (norm(p - middle.position) < 25) continue;
-      for (std::size_t i = 0; i < streets.size(); ++i) {
-        const Waypoint near = streets[i].centre.at(streets[i].centre.nearest(p));
+      for (const Street& street : streets) {
+        const Waypoint near = street.centre.at(street.centre.nearest(p));
         meets = meets || norm(near.position - p) < 16;
       }
     }
