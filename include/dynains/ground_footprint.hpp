@@ -24,9 +24,9 @@ class GroundFootprint {
       : cell_(static_cast<float>(cell)),
         fine_(cell, max_range),
         coarse_(reach, max_range),
-        tile_of_((fine_.width() / kTile + 1) * (fine_.width() / kTile + 1), 0),
+        tile_of_(tile_count(fine_.width()), 0),
         tiles_(1),
-        near_(coarse_.width() * coarse_.width(), 0) {
+        near_(coarse_.cell_count(), 0) {
     tiles_.reserve(tile_of_.size() + 1);  // takes address space only
     used_.reserve(tile_of_.size());
   }
@@ -109,7 +109,12 @@ class GroundFootprint {
     float lowest = kNothing;  // the same with the cells around
   };
   // Few tiles are in use at a time, so that they stay in the nearest cache; tile 0 is empty.
-  using Tile = std::array<Cell, kTile * kTile>;
+  using Tile = std::array<Cell, std::size_t{kTile} * kTile>;
+
+  static std::size_t tile_count(std::uint32_t width) {
+    const std::size_t side = width / kTile + 1;
+    return side * side;
+  }
 
   // Square cells about the sensor, within a border of cells that only their neighbours reach.
   class Grid {
@@ -119,6 +124,7 @@ class GroundFootprint {
           half_(static_cast<std::uint32_t>(std::ceil(max_range / cell)) + 2) {}
 
     std::uint32_t width() const { return 2 * half_; }
+    std::size_t cell_count() const { return std::size_t{width()} * width(); }
     Place place(float x, float y) const {
       const auto centre = static_cast<float>(half_);
       const auto last = static_cast<float>(width() - 1);

@@ -78,7 +78,7 @@ class MountingEstimator {
   // One point for each cell that was hit, the mean of those in it.
   static std::vector<Eigen::Vector3d> thin(PointsView points) {
     constexpr auto kHalf = static_cast<std::int32_t>(kReach / kCell);
-    constexpr std::size_t kWidth = 2 * kHalf;
+    constexpr std::size_t kWidth = 2 * static_cast<std::size_t>(kHalf);
     struct Sum {
       std::size_t place;
       Eigen::Vector3d sum;
