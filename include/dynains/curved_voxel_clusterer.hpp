@@ -14,6 +14,7 @@
 
 #include "dynains/detail/arc_tangent.hpp"
 #include "dynains/detail/lanes.hpp"
+#include "dynains/detail/room.hpp"
 #include "dynains/detail/wide_lanes.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
@@ -146,10 +147,8 @@ class CurvedVoxelClusterer {
   void find_cells(PolarView points) {
     using detail::Constant8;
     const std::size_t count = points.size();
-    if (cell_of_.size() < count + detail::kLanes) {
-      cell_of_.resize(count + detail::kLanes);
-      cluster_of_.resize(count + detail::kLanes);
-    }
+    detail::grow(cell_of_, count + detail::kLanes);
+    detail::grow(cluster_of_, count + detail::kLanes);
     constexpr double kRadians = M_PI / 180.0;
     const Constant8 azimuth_scale(static_cast<float>(azimuths_ / (2.0 * M_PI)));
     const Constant8 elevation_scale(

@@ -205,6 +205,7 @@ class BasicDynaInsRemover {
     ScanSlot& newest = begin_scan(T_world_sensor, time);
     ingest_.read(cloud, static_cast<float>(config_.min_range),
                  static_cast<float>(config_.max_range), newest.labels);
+    newest.make_room(newest.labels.size());
     if (needs_sensor() && !sensor_.known()) adapt_to_sensor(newest);
     clock.lap(result.times.ingest);
 

@@ -15,6 +15,7 @@
 #include "dynains/detail/arc_tangent.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/plane_fit.hpp"
+#include "dynains/detail/room.hpp"
 #include "dynains/detail/wide_lanes.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
@@ -37,8 +38,8 @@ struct GroundSplit {
   void resize(std::size_t size) {
     count = size;
     const std::size_t padded = size + detail::kLanes;
-    if (points.size() < padded) points.resize(padded);
-    if (source.size() < padded) source.resize(padded);
+    points.grow(padded);
+    detail::grow(source, padded);
   }
 };
 
@@ -251,7 +252,7 @@ class GroundSegmenter {
   void sort_by_patch(PointsView scan) {
     const std::size_t count = scan.size();
     sorted_.resize(count);
-    if (patch_of_.size() < count + detail::kLanes) patch_of_.resize(count + detail::kLanes);
+    detail::grow(patch_of_, count + detail::kLanes);
     find_patches(scan);
 
     streak_end_.clear();

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/detail/room.hpp"
+
 namespace dynains {
 
 /// Verdict on one input point.
@@ -35,8 +37,7 @@ class Span {
   /// From any contiguous container, as std::span does.
   template <class Container,
             class = std::enable_if_t<std::is_convertible_v<
-                std::remove_pointer_t<decltype(std::declval<Container&>().data())> (*)[],
-                T (*)[]>>>
+                std::remove_pointer_t<decltype(std::declval<Container&>().data())> (*)[], T (*)[]>>>
   constexpr Span(Container& container) : data_(container.data()), size_(container.size()) {}
 
   constexpr T* data() const { return data_; }
@@ -83,6 +84,12 @@ struct PointBuffer {
     x.resize(size);
     y.resize(size);
     z.resize(size);
+  }
+  /// Makes the arrays longer, if they are shorter.
+  void grow(std::size_t size) {
+    detail::grow(x, size);
+    detail::grow(y, size);
+    detail::grow(z, size);
   }
   void push_back(float px, float py, float pz) {
     x.push_back(px);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynains/detail/arc_tangent.hpp"
+#include "dynains/detail/room.hpp"
 #include "dynains/detail/wide_lanes.hpp"
 #include "dynains/points.hpp"
 
@@ -33,10 +34,9 @@ class PolarBuffer {
   void resize(std::size_t size) {
     size_ = size;
     const std::size_t padded = size + detail::kLanes;
-    if (range.size() >= padded) return;
-    range.resize(padded);
-    azimuth.resize(padded);
-    z.resize(padded);
+    detail::grow(range, padded);
+    detail::grow(azimuth, padded);
+    detail::grow(z, padded);
   }
   PolarView view() const {
     return {{range.data(), size_}, {azimuth.data(), size_}, {z.data(), size_}};

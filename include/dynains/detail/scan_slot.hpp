@@ -8,6 +8,7 @@
 
 #include "dynains/cause.hpp"
 #include "dynains/detail/lanes.hpp"
+#include "dynains/detail/room.hpp"
 #include "dynains/ground_segmenter.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
@@ -64,6 +65,15 @@ struct ScanSlot {
   std::vector<float> beliefs;
   std::vector<Cause> causes;
 
+  /// For a scan of so many points.
+  void make_room(std::size_t points) {
+    const auto for_each_vector = [points](auto&... vectors) {
+      (detail::make_room(vectors, points), ...);
+    };
+    for_each_vector(votes, belief, reach, cluster, proof, evidence, is_kept, labels, instances,
+                    beliefs, causes);
+  }
+
   std::size_t non_ground_count() const { return split.count - split.ground_count; }
 
   ScanVerdict verdict() const {
@@ -80,11 +90,10 @@ class Ingest {
   void read(const Cloud& cloud, float min_range, float max_range, std::vector<PointLabel>& labels) {
     using Traits = PointCloudTraits<Cloud>;
     const std::size_t count = Traits::size(cloud);
+    make_room(labels, count);
     labels.resize(count);
-    if (input_.size() < count + kLanes) {
-      points_.resize(count + kLanes);
-      input_.resize(count + kLanes);
-    }
+    points_.grow(count + kLanes);
+    grow(input_, count + kLanes);
     const float min_squared = min_range * min_range;
     const float max_squared = max_range * max_range;
     count_ = 0;
