@@ -395,6 +395,7 @@ class BasicDynaInsRemover {
     }
     clock.lap(times.evidence);
     write_verdict(scan, votes);
+    explain(scan);
     clock.lap(times.verdict);
   }
 
@@ -410,45 +411,52 @@ class BasicDynaInsRemover {
       const std::uint32_t to = scan.split.source[i];
       scan.is_kept[i] = dynamic ? 0 : 1;
       scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kGround;
-      scan.causes[to] = scan.proof[i];
       scan.beliefs[to] = scan.evidence[i];
     }
     for (std::size_t i = 0; i < scan.non_ground_count(); ++i) {
+      if (!evident && scan.votes[i] == 0 && scan.belief[i] == 0.0F) continue;
       const std::size_t at = ground_count + i;
-      if (!evident) {
-        const Cause cause = cause_to_stay(scan.reach[i]);
-        if (cause == scan.proof[at] && scan.votes[i] == 0 && scan.belief[i] == 0.0F) continue;
-        scan.proof[at] = cause;
-      }
-      Cause cause = scan.proof[at];
-      if (scan.votes[i] >= votes && !is_dynamic(cause)) cause = Cause::kProposed;
+      const bool dynamic = scan.votes[i] >= votes || (evident && is_dynamic(scan.proof[at]));
       const std::uint32_t to = scan.split.source[at];
-      scan.causes[to] = cause;
       scan.beliefs[to] = evident ? std::max(scan.belief[i], scan.evidence[at]) : scan.belief[i];
-      const bool dynamic = is_dynamic(cause);
       if (dynamic == (scan.is_kept[at] == 0)) continue;
       scan.is_kept[at] = dynamic ? 0 : 1;
       scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
     }
   }
 
-  // Everything static and not judged.
+  // Everything static.
   void begin_verdict(ScanSlot& scan) const {
     scan.is_written = true;
-    if (!config_.use_free_space) scan.proof.assign(scan.split.count, Cause::kNotJudged);
     scan.instances.assign(scan.labels.size(), kNoInstance);
     scan.beliefs.assign(scan.labels.size(), 0.0F);
-    scan.causes.assign(scan.labels.size(), Cause::kNotJudged);
     scan.is_kept.assign(scan.split.count, 1);
     const std::size_t ground_count = scan.split.ground_count;
     for (std::size_t i = 0; i < ground_count; ++i) {
       scan.labels[scan.split.source[i]] = PointLabel::kGround;
-      scan.causes[scan.split.source[i]] = Cause::kGround;
     }
     for (std::size_t i = 0; i < scan.non_ground_count(); ++i) {
       const std::uint32_t to = scan.split.source[ground_count + i];
       scan.labels[to] = PointLabel::kStatic;
       scan.instances[to] = scan.cluster[i] == kNoCluster ? kNoInstance : scan.ids[scan.cluster[i]];
+    }
+  }
+
+  // Why each point got its verdict.
+  void explain(ScanSlot& scan) const {
+    scan.causes.resize(scan.labels.size());
+    for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+      scan.causes[i] = scan.labels[i] == PointLabel::kGround ? Cause::kGround : Cause::kNotJudged;
+    }
+    const std::size_t ground_count = scan.split.ground_count;
+    for (std::size_t at = 0; at < ground_count; ++at) {
+      if (scan.is_kept[at] == 0) scan.causes[scan.split.source[at]] = scan.proof[at];
+    }
+    for (std::size_t i = 0; i < scan.non_ground_count(); ++i) {
+      const std::size_t at = ground_count + i;
+      Cause cause = config_.use_free_space ? scan.proof[at] : cause_to_stay(scan.reach[i]);
+      if (scan.is_kept[at] == 0 && !is_dynamic(cause)) cause = Cause::kProposed;
+      scan.causes[scan.split.source[at]] = cause;
     }
   }
 

@@ -26,17 +26,9 @@ inline void raise(Reach* reach, std::size_t count, Reach at_least) {
 
 /// Why it is static all the same.
 constexpr Cause cause_to_stay(Reach reach) {
-  switch (reach) {
-    case Reach::kNoCluster:
-      return Cause::kNotJudged;
-    case Reach::kTooFewScans:
-      return Cause::kTooFewScans;
-    case Reach::kSimilar:
-      return Cause::kSimilar;
-    case Reach::kProposed:
-      return Cause::kReverted;
-  }
-  return Cause::kUnknown;
+  constexpr Cause kCauses[] = {Cause::kNotJudged, Cause::kTooFewScans, Cause::kSimilar,
+                               Cause::kReverted};
+  return kCauses[static_cast<std::size_t>(reach)];
 }
 
 /// A scan and all that is known of it. Reused from scan to scan.
