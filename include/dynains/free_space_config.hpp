@@ -13,7 +13,7 @@ struct FreeSpaceConfig {
   double evidence_range = 80.0;  ///< m, horizontal; points beyond are not tested
   double sample_size = 0.3;      ///< m, one sample per voxel of an instance
   double supervoxel = 0.6;       ///< m, samples that share a belief
-  double ground_sample = 0.3;    ///< m, one sample per voxel of ground beside removed instances
+  double ground_sample = 0.8;    ///< m, one sample per voxel of ground beside removed instances
   double ground_reach = 2.0;     ///< m, ground this near to removed points is tested
   double margin = 0.25;          ///< m, a beam passes if it goes this much farther ...
   double margin_slope = 0.01;    ///< ... plus this share of the range

@@ -207,18 +207,16 @@ class FreeSpaceEvidence {
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
       const std::uint32_t first = samples.supervoxel_begin[instance];
       const std::uint32_t last = samples.supervoxel_begin[instance + 1];
-      detail::Sights::Count all;
       std::uint32_t begin = samples.sample_begin[first];
+      const detail::Sights::Count all = sights_.count(begin, samples.sample_begin[last]);
+      if (all.free + all.hit == 0) continue;
       for (std::uint32_t s = first; s < last; ++s) {
         const std::uint32_t end = samples.sample_begin[s + 1];
-        const detail::Sights::Count seen = sights_.count(begin, end);
-        update(record.beliefs[s], seen, end - begin);
-        all.free += seen.free;
-        all.hit += seen.hit;
+        if (update(record.beliefs[s], sights_.count(begin, end), end - begin)) {
+          record.changed[instance] = 1;
+        }
         begin = end;
       }
-      if (all.free + all.hit == 0) continue;
-      record.changed[instance] = 1;
       const auto count =
           static_cast<float>(samples.sample_begin[last] - samples.sample_begin[first]);
       const auto seen = static_cast<float>(all.free + all.hit);
@@ -226,8 +224,10 @@ class FreeSpaceEvidence {
       const float share = static_cast<float>(all.free) / seen;
       if (share >= static_cast<float>(config_.see_share)) {
         raise(record.wholes[instance], share);
+        record.changed[instance] = 1;
       } else if (share <= kHitShare) {
         lower(record.wholes[instance]);
+        record.changed[instance] = 1;
         const auto hits = static_cast<float>(all.hit);
         if (config_.use_tracks && share <= 1.0F - kContradictingHits &&
             hits >= kLeastKnown * count) {
@@ -239,23 +239,23 @@ class FreeSpaceEvidence {
   }
 
   // Eq. 15 with three-way increments as in Eq. 18, by the share of samples seen free; shares that
-  // say little, or are of few samples, change nothing.
-  void update(Belief& belief, detail::Sights::Count seen, std::uint32_t samples) const {
+  // say little, or are of few samples, change nothing. Returns whether what weigh() looks at
+  // changed.
+  bool update(Belief& belief, detail::Sights::Count seen, std::uint32_t samples) const {
     // The usual case: what was hit before and is not seen free stays as it is.
-    if (seen.free == 0 && belief.level == 0.0F && belief.contested != 0) return;
+    if (seen.free == 0 && belief.level == 0.0F && belief.contested != 0) return false;
     const bool hits =
         seen.hit >= std::max(std::min(2U, samples), (samples + kLeastHit - 1) / kLeastHit);
-    if (seen.free == 0) {
-      if (hits) lower(belief);
-      return;
-    }
     const auto free = static_cast<float>(seen.free);
     const float share = free / static_cast<float>(seen.free + seen.hit);
     if (free >= kLeastFree * static_cast<float>(samples) && share >= kFreeShare) {
       raise(belief, share);
-    } else if (hits && share <= kHitShare) {
-      lower(belief);
+      return true;
     }
+    if (!hits || share > kHitShare) return false;
+    const bool first_hit = belief.contested == 0;
+    lower(belief);
+    return first_hit;
   }
 
   void raise(Belief& belief, float share) const {

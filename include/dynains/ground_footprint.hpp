@@ -98,7 +98,7 @@ class GroundFootprint {
 
  private:
   static constexpr float kNothing = std::numeric_limits<float>::infinity();
-  static constexpr std::uint32_t kTile = 16;  // cells along a side
+  static constexpr std::uint32_t kTile = 8;  // cells along a side
 
   struct Place {
     std::uint32_t column, row;

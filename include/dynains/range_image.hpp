@@ -126,7 +126,6 @@ class RangeImage {
     std::vector<std::int16_t> below, gap;
     std::vector<std::int16_t> least, count;
     std::vector<std::int16_t> border;
-    std::vector<std::int16_t> around;
     std::vector<std::int16_t> reaching, widened;
     std::vector<std::int16_t> row_least, widened_least;
   };
@@ -144,14 +143,13 @@ class RangeImage {
     scratch.reaching = scratch.nearest;
     collect(grid, ground, scratch.nearest.data());
     close_holes(grid, scratch);
-    erode(grid, scratch);
+    store_with_least_around(grid, scratch);
     find_row_least(grid, scratch);
     constexpr int kWidest = 4;  // cells
     for (int cells = 1; cells <= kWidest; ++cells) {
       const float limit = reach * grid.columns_per_radian / (static_cast<float>(cells) - 0.5F);
       widen(grid, static_cast<std::int16_t>(std::min(limit, kFarthest) * kCentimetres), scratch);
     }
-    interleave(grid, scratch);
   }
 
  private:
@@ -222,13 +220,13 @@ class RangeImage {
     }
   }
 
-  // `around`: the nearest return of the 3x3 cells about each cell.
-  static void erode(const RangeImageGrid& grid, Scratch& scratch) {
+  // The nearest return of the 3x3 cells about each cell, beside its own.
+  void store_with_least_around(const RangeImageGrid& grid, Scratch& scratch) {
     using namespace detail;
     const std::size_t stride = grid.stride();
     const auto rows = static_cast<std::size_t>(grid.rows);
     const auto columns = static_cast<std::size_t>(grid.columns);
-    scratch.around.resize(grid.cell_count());
+    cells_.resize(grid.cell_count());
     scratch.least.resize(stride);
     scratch.count.resize(stride);
     scratch.border.assign(stride, kNothing);
@@ -254,8 +252,8 @@ class RangeImage {
         const Short8 around = min_shorts(min_shorts(load_shorts(least - 1), load_shorts(least)),
                                          load_shorts(least + 1));
         const Short8 returns = load_shorts(count - 1) + load_shorts(count) + load_shorts(count + 1);
-        store_shorts(&scratch.around[row * stride + column],
-                     select_shorts(returns > one, around, unknown));
+        store_interleaved(&cells_[row * stride + column].nearest, load_shorts(middle + column),
+                          select_shorts(returns > one, around, unknown));
       }
     }
   }
@@ -275,9 +273,9 @@ class RangeImage {
   }
 
   // Lets returns of objects that are nearer than `limit` (cm) reach one cell farther in every
-  // direction: `reaching` holds nothing else, and `around` takes the result in. Rows without such
+  // direction: `reaching` holds nothing else, and the cells take the result in. Rows without such
   // returns are not looked at.
-  static void widen(const RangeImageGrid& grid, std::int16_t limit, Scratch& scratch) {
+  void widen(const RangeImageGrid& grid, std::int16_t limit, Scratch& scratch) {
     using namespace detail;
     const std::size_t stride = grid.stride();
     const auto rows = static_cast<std::size_t>(grid.rows);
@@ -314,12 +312,7 @@ class RangeImage {
                                         load_shorts(least + 1));
         store_shorts(&scratch.widened[row * stride + column], reach);
         row_least = min_shorts(row_least, reach);
-        std::int16_t* const around = &scratch.around[row * stride + column];
-        const Short8 here = load_shorts(around);
-        const Short8 unknown = here < all_shorts(0);
-        store_shorts(around,
-                     select_shorts(unknown & (reach == nothing), here,
-                                   min_shorts(select_shorts(unknown, nothing, here), reach)));
+        if (any_short(reach < nothing)) protect(&cells_[row * stride + column], reach);
       }
       scratch.widened_least[row] = least_short(row_least);
     }
@@ -327,11 +320,18 @@ class RangeImage {
     scratch.row_least.swap(scratch.widened_least);
   }
 
-  void interleave(const RangeImageGrid& grid, const Scratch& scratch) {
-    cells_.resize(grid.cell_count());
-    for (std::size_t i = 0; i < cells_.size(); i += detail::kLanes) {
-      detail::store_interleaved(&cells_[i].nearest, detail::load_shorts(&scratch.nearest[i]),
-                                detail::load_shorts(&scratch.around[i]));
+  // Lets `around` of eight cells be at most `reach`; kNothing changes nothing.
+  static void protect(Cell* cells, detail::Short8 reach) {
+    using namespace detail;
+    const Short8 nothing = all_shorts(kNothing);
+    std::int16_t limits[2 * kLanes];
+    store_interleaved(limits, nothing, reach);
+    for (std::size_t half = 0; half < 2; ++half) {
+      std::int16_t* const at = &cells[half * kLanes / 2].nearest;
+      const Short8 here = load_shorts(at);
+      const Short8 limit = load_shorts(limits + half * kLanes);
+      const Short8 known = select_shorts((here < all_shorts(0)) & (limit < nothing), nothing, here);
+      store_shorts(at, min_shorts(known, limit));
     }
   }
 
