@@ -20,8 +20,9 @@ class FloorByHeight {
 
   explicit FloorByHeight(const Config& config) : config_(config) {}
 
-  // Ground first, everything else behind; `source` remembers where each point came from.
-  void segment(dynains::PointsView scan, dynains::GroundSplit& split) const {
+  // Ground first, everything else behind, each point with its number in the input.
+  void segment(dynains::PointsView scan, dynains::Span<const std::uint32_t> input,
+               dynains::GroundSplit& split) const {
     split.resize(scan.size());
     std::size_t next = 0;
     const auto take = [&](bool ground) {
@@ -30,7 +31,7 @@ class FloorByHeight {
         split.points.x[next] = scan.x[i];
         split.points.y[next] = scan.y[i];
         split.points.z[next] = scan.z[i];
-        split.source[next++] = static_cast<std::uint32_t>(i);
+        split.input[next++] = input[i];
       }
     };
     take(true);

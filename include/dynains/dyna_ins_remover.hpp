@@ -60,7 +60,8 @@ class BasicDynaInsRemover {
   using Map = typename Stages::Map;
 
   static_assert(detail::IsConfigurable<Ground>::value && detail::IsGround<Ground>::value,
-                "Stages::Ground needs Config and segment(PointsView, GroundSplit&)");
+                "Stages::Ground needs Config and segment(PointsView, numbers, "
+                "GroundSplit&)");
   static_assert(detail::IsConfigurable<Clusterer>::value && detail::IsClusterer<Clusterer>::value,
                 "Stages::Clusterer needs Config, cluster(PolarView) and cluster_count()");
   static_assert(
@@ -209,11 +210,7 @@ class BasicDynaInsRemover {
     if (needs_sensor() && !sensor_.known()) adapt_to_sensor(newest);
     clock.lap(result.times.ingest);
 
-    ground_.segment(ingest_.points(), newest.split);
-    // From the points that were taken in to those of the input.
-    for (std::size_t i = 0; i < newest.split.count; ++i) {
-      newest.split.source[i] = ingest_.input()[newest.split.source[i]];
-    }
+    ground_.segment(ingest_.points(), ingest_.input(), newest.split);
     clock.lap(result.times.ground);
 
     gather_window();
@@ -395,7 +392,6 @@ class BasicDynaInsRemover {
     }
     clock.lap(times.evidence);
     write_verdict(scan, votes);
-    explain(scan);
     clock.lap(times.verdict);
   }
 
@@ -403,60 +399,51 @@ class BasicDynaInsRemover {
   // change.
   void write_verdict(ScanSlot& scan, int votes) {
     const bool evident = config_.use_free_space;
+    const bool first_time = !scan.is_written;
     const std::size_t ground_count = scan.split.ground_count;
-    if (!scan.is_written) begin_verdict(scan);
+    if (first_time) begin_verdict(scan);
     for (std::size_t i = 0; evident && i < ground_count; ++i) {
       const bool dynamic = is_dynamic(scan.proof[i]);
       if (!dynamic && scan.is_kept[i] != 0) continue;
-      const std::uint32_t to = scan.split.source[i];
+      const std::uint32_t to = scan.split.input[i];
       scan.is_kept[i] = dynamic ? 0 : 1;
       scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kGround;
+      scan.causes[to] = scan.proof[i];
       scan.beliefs[to] = scan.evidence[i];
     }
+    const bool all = evident || first_time;
     for (std::size_t i = 0; i < scan.non_ground_count(); ++i) {
-      if (!evident && scan.votes[i] == 0 && scan.belief[i] == 0.0F) continue;
       const std::size_t at = ground_count + i;
-      const bool dynamic = scan.votes[i] >= votes || (evident && is_dynamic(scan.proof[at]));
-      const std::uint32_t to = scan.split.source[at];
-      scan.beliefs[to] = evident ? std::max(scan.belief[i], scan.evidence[at]) : scan.belief[i];
-      if (dynamic == (scan.is_kept[at] == 0)) continue;
+      if (!evident) {
+        const Cause cause = cause_to_stay(scan.reach[i]);
+        if (!all && cause == scan.proof[at] && scan.votes[i] == 0 && scan.belief[i] == 0.0F) {
+          continue;
+        }
+        scan.proof[at] = cause;
+      }
+      Cause cause = scan.proof[at];
+      if (scan.votes[i] >= votes && !is_dynamic(cause)) cause = Cause::kProposed;
+      const bool dynamic = is_dynamic(cause);
+      const std::uint32_t to = scan.split.input[at];
       scan.is_kept[at] = dynamic ? 0 : 1;
       scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
+      scan.causes[to] = cause;
+      scan.instances[to] = scan.cluster[i] == kNoCluster ? kNoInstance : scan.ids[scan.cluster[i]];
+      scan.beliefs[to] = evident ? std::max(scan.belief[i], scan.evidence[at]) : scan.belief[i];
     }
   }
 
-  // Everything static.
+  // Ground, and nothing known of the rest.
   void begin_verdict(ScanSlot& scan) const {
     scan.is_written = true;
     scan.instances.assign(scan.labels.size(), kNoInstance);
     scan.beliefs.assign(scan.labels.size(), 0.0F);
+    scan.causes.assign(scan.labels.size(), Cause::kNotJudged);
     scan.is_kept.assign(scan.split.count, 1);
-    const std::size_t ground_count = scan.split.ground_count;
-    for (std::size_t i = 0; i < ground_count; ++i) {
-      scan.labels[scan.split.source[i]] = PointLabel::kGround;
-    }
-    for (std::size_t i = 0; i < scan.non_ground_count(); ++i) {
-      const std::uint32_t to = scan.split.source[ground_count + i];
-      scan.labels[to] = PointLabel::kStatic;
-      scan.instances[to] = scan.cluster[i] == kNoCluster ? kNoInstance : scan.ids[scan.cluster[i]];
-    }
-  }
-
-  // Why each point got its verdict.
-  void explain(ScanSlot& scan) const {
-    scan.causes.resize(scan.labels.size());
-    for (std::size_t i = 0; i < scan.labels.size(); ++i) {
-      scan.causes[i] = scan.labels[i] == PointLabel::kGround ? Cause::kGround : Cause::kNotJudged;
-    }
-    const std::size_t ground_count = scan.split.ground_count;
-    for (std::size_t at = 0; at < ground_count; ++at) {
-      if (scan.is_kept[at] == 0) scan.causes[scan.split.source[at]] = scan.proof[at];
-    }
-    for (std::size_t i = 0; i < scan.non_ground_count(); ++i) {
-      const std::size_t at = ground_count + i;
-      Cause cause = config_.use_free_space ? scan.proof[at] : cause_to_stay(scan.reach[i]);
-      if (scan.is_kept[at] == 0 && !is_dynamic(cause)) cause = Cause::kProposed;
-      scan.causes[scan.split.source[at]] = cause;
+    scan.proof.resize(scan.split.count);
+    for (std::size_t i = 0; i < scan.split.ground_count; ++i) {
+      scan.labels[scan.split.input[i]] = PointLabel::kGround;
+      scan.causes[scan.split.input[i]] = Cause::kGround;
     }
   }
 

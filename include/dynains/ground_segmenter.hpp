@@ -9,7 +9,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <numeric>
 #include <vector>
 
 #include "dynains/detail/arc_tangent.hpp"
@@ -26,8 +25,8 @@ namespace dynains {
 /// One scan, reordered: ground points first, all others behind. What follows works on ranges of
 /// it, never on copies.
 struct GroundSplit {
-  PointBuffer points;                 ///< may be longer than size(): padded for wide loads
-  std::vector<std::uint32_t> source;  ///< position of each point in the scan that was segmented
+  PointBuffer points;                ///< may be longer than size(): padded for wide loads
+  std::vector<std::uint32_t> input;  ///< number of each point in the input of the remover
   std::size_t ground_count = 0;
   std::size_t count = 0;
 
@@ -39,7 +38,7 @@ struct GroundSplit {
     count = size;
     const std::size_t padded = size + detail::kLanes;
     points.grow(padded);
-    detail::grow(source, padded);
+    detail::grow(input, padded);
   }
 };
 
@@ -170,10 +169,11 @@ class GroundSegmenter {
     height_ = config_.sensor_height > 0.0 ? config_.sensor_height : sensor.height;
   }
 
-  /// Splits `scan` (metres, sensor frame, z up, finite coordinates). Points outside the rings and
-  /// points of sparse patches are not ground. Order within `split` is by patch, then as scanned.
-  void segment(PointsView scan, GroundSplit& split) {
-    sort_by_patch(scan);
+  /// Splits `scan` (metres, sensor frame, z up, finite coordinates). `input` numbers its points and
+  /// is handed on with them. Points outside the rings and points of sparse patches are not ground.
+  /// Order within `split` is by patch, then as scanned.
+  void segment(PointsView scan, Span<const std::uint32_t> input, GroundSplit& split) {
+    sort_by_patch(scan, input);
     split.resize(scan.size());
     rest_.resize(scan.size());
     Output out = {split, rest_};
@@ -207,7 +207,7 @@ class GroundSegmenter {
     detail::copy(&from.points.x[begin], count, &to.points.x[at]);
     detail::copy(&from.points.y[begin], count, &to.points.y[at]);
     detail::copy(&from.points.z[begin], count, &to.points.z[at]);
-    detail::copy(&from.source[begin], count, &to.source[at]);
+    detail::copy(&from.input[begin], count, &to.input[at]);
   }
 
   // Ground goes straight to the front of the split, the rest into a buffer of its own, because it
@@ -243,13 +243,13 @@ class GroundSegmenter {
       to.points.x[at] = from.points.x[i];
       to.points.y[at] = from.points.y[i];
       to.points.z[at] = from.points.z[i];
-      to.source[at] = from.source[i];
+      to.input[at] = from.input[i];
     }
   };
 
   // Counting sort; stable, so that points keep the order of the scan within their patch. Neighbours
   // in the scan mostly share a patch: what is counted and moved are streaks of points.
-  void sort_by_patch(PointsView scan) {
+  void sort_by_patch(PointsView scan, Span<const std::uint32_t> input) {
     const std::size_t count = scan.size();
     sorted_.resize(count);
     detail::grow(patch_of_, count + detail::kLanes);
@@ -273,8 +273,7 @@ class GroundSegmenter {
       detail::copy(&scan.x[begin], length, &sorted_.points.x[to]);
       detail::copy(&scan.y[begin], length, &sorted_.points.y[to]);
       detail::copy(&scan.z[begin], length, &sorted_.points.z[to]);
-      std::iota(&sorted_.source[to], &sorted_.source[to] + length,
-                static_cast<std::uint32_t>(begin));
+      detail::copy(&input[begin], length, &sorted_.input[to]);
       to += length;
       begin = end;
     }

@@ -21,6 +21,12 @@ void count_points(benchmark::State& state, std::size_t points) {
   state.SetItemsProcessed(static_cast<std::int64_t>(points) * state.iterations());
 }
 
+std::vector<std::uint32_t> numbers(std::size_t count) {
+  std::vector<std::uint32_t> result(count);
+  for (std::size_t i = 0; i < count; ++i) result[i] = static_cast<std::uint32_t>(i);
+  return result;
+}
+
 // The non-ground points of some scans, as the facade gathers them (Eq. 3).
 struct Window {
   PolarBuffer points;
@@ -32,7 +38,8 @@ struct Window {
     const Eigen::Isometry3d T_newest_world = street_scans()[kWindow - 1].T_world_sensor.inverse();
     for (std::size_t k = 0; k < kWindow; ++k) {
       const test::Scan& scan = street_scans()[k];
-      ground.segment(buffer_of(scan), split);
+      const std::vector<std::uint32_t> input = numbers(scan.points.size());
+      ground.segment(buffer_of(scan), input, split);
       points.append(split.non_ground(), (T_newest_world * scan.T_world_sensor).cast<float>());
       scan_begin.push_back(static_cast<std::uint32_t>(points.size()));
     }
@@ -43,7 +50,8 @@ void BM_Ground(benchmark::State& state) {
   const PointBuffer scan = buffer_of(street_scans().front());
   GroundSegmenter ground(GroundSegmenter::Config::paper());
   GroundSplit split;
-  for (auto _ : state) ground.segment(scan, split);
+  const std::vector<std::uint32_t> input = numbers(scan.size());
+  for (auto _ : state) ground.segment(scan, input, split);
   count_points(state, scan.size());
 }
 BENCHMARK(BM_Ground)->Unit(benchmark::kMillisecond);

@@ -17,13 +17,16 @@ using Config = GroundSegmenter::Config;
 // By point of the scan; checks on the way that the split is a permutation of the scan.
 std::vector<bool> ground_of(GroundSegmenter& segmenter, PointsView scan) {
   GroundSplit split;
-  segmenter.segment(scan, split);
+  std::vector<std::uint32_t> numbers(scan.size());
+  for (std::size_t i = 0; i < scan.size(); ++i) numbers[i] = static_cast<std::uint32_t>(7 * i + 3);
+  segmenter.segment(scan, numbers, split);
   REQUIRE(split.count == scan.size());
   REQUIRE(split.ground_count <= split.count);
   std::vector<bool> result(scan.size());
   std::vector<bool> seen(scan.size(), false);
   for (std::size_t i = 0; i < split.count; ++i) {
-    const std::size_t from = split.source[i];
+    REQUIRE(split.input[i] % 7 == 3);
+    const std::size_t from = split.input[i] / 7;
     REQUIRE((from < scan.size() && !seen[from]));
     seen[from] = true;
     REQUIRE(split.points.x[i] == scan.x[from]);

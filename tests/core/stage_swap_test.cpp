@@ -26,7 +26,7 @@ class FlatGround {
   };
   explicit FlatGround(const Config& config) : config_(config) {}
 
-  void segment(PointsView scan, GroundSplit& split) {
+  void segment(PointsView scan, Span<const std::uint32_t> input, GroundSplit& split) {
     split.resize(scan.size());
     std::size_t next = 0;
     for (const bool wanted : {true, false}) {
@@ -35,7 +35,7 @@ class FlatGround {
         split.points.x[next] = scan.x[i];
         split.points.y[next] = scan.y[i];
         split.points.z[next] = scan.z[i];
-        split.source[next++] = static_cast<std::uint32_t>(i);
+        split.input[next++] = input[i];
       }
       if (wanted) split.ground_count = next;
     }

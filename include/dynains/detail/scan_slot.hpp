@@ -38,7 +38,7 @@ struct ScanSlot {
   double time = 0.0;
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
 
-  GroundSplit split;  // `source` is the place in the input
+  GroundSplit split;
   // By non-ground point, in the order of the split.
   std::vector<std::uint8_t> votes;     // windows that called it dynamic
   std::vector<float> belief;           // highest posterior of any window that proposed it

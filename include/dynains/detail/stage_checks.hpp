@@ -28,8 +28,10 @@ struct IsConfigurable<
 template <class Stage, class = void>
 struct IsGround : std::false_type {};
 template <class Stage>
-struct IsGround<Stage, std::void_t<decltype(std::declval<Stage&>().segment(
-                           PointsView(), std::declval<GroundSplit&>()))>> : std::true_type {};
+struct IsGround<Stage,
+                std::void_t<decltype(std::declval<Stage&>().segment(
+                    PointsView(), Span<const std::uint32_t>(), std::declval<GroundSplit&>()))>>
+    : std::true_type {};
 
 template <class Stage, class = void>
 struct IsClusterer : std::false_type {};
@@ -77,10 +79,9 @@ struct IsEvidence<
         decltype(std::declval<Stage&>().observe(
             std::uint64_t{}, std::uint64_t{}, std::declval<const Eigen::Isometry3d&>(),
             std::declval<const GroundSplit&>(), Span<const std::uint32_t>(), std::size_t{})),
-        decltype(std::declval<Stage&>().judge(std::uint64_t{}, bool{},
-                                              std::declval<const GroundSplit&>(),
-                                              std::declval<std::vector<Cause>&>(),
-                                              std::declval<std::vector<float>&>())),
+        decltype(std::declval<Stage&>().judge(
+            std::uint64_t{}, bool{}, std::declval<const GroundSplit&>(),
+            std::declval<std::vector<Cause>&>(), std::declval<std::vector<float>&>())),
         std::enable_if_t<
             std::is_convertible_v<decltype(std::declval<const Stage&>().horizon()), std::size_t> &&
             std::is_convertible_v<decltype(std::declval<const Stage&>().predecessors()),
@@ -110,10 +111,10 @@ template <class Stage, class = void>
 struct WantsSensor : std::false_type {};
 template <class Stage>
 struct WantsSensor<
-    Stage, std::enable_if_t<std::is_convertible_v<
-               decltype(std::declval<Stage&>().adapt(SensorModel()),
-                        std::declval<const Stage&>().needs_sensor()),
-               bool>>> : std::true_type {};
+    Stage,
+    std::enable_if_t<std::is_convertible_v<decltype(std::declval<Stage&>().adapt(SensorModel()),
+                                                    std::declval<const Stage&>().needs_sensor()),
+                                           bool>>> : std::true_type {};
 template <class Stage>
 bool needs_sensor(const Stage& stage) {
   if constexpr (WantsSensor<Stage>::value) {
