@@ -18,14 +18,15 @@ namespace dynains::detail {
 /// Beams that are tested together.
 inline constexpr std::size_t kBeamBlock = 128;
 
-/// Set bits of every byte.
-inline constexpr std::array<std::uint8_t, 256> kOnes = [] {
+constexpr std::array<std::uint8_t, 256> count_ones() {
   std::array<std::uint8_t, 256> ones{};
   for (std::size_t i = 1; i < ones.size(); ++i) {
     ones[i] = static_cast<std::uint8_t>(ones[i / 2] + i % 2);
   }
   return ones;
-}();
+}
+/// Set bits of every byte.
+inline constexpr std::array<std::uint8_t, 256> kOnes = count_ones();
 
 /// What one reference says of many samples, a bit each.
 class Sights {
