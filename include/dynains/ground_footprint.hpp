@@ -75,7 +75,7 @@ class GroundFootprint {
       std::int32_t cell[kLanes];
       coarse_.indices(x, y).store(cell);
       unsigned any = 0;
-      for (std::size_t lane = 0; lane < kLanes; ++lane) any |= near_at(cell[lane]);
+      for (const std::int32_t at : cell) any |= near_at(at);
       if (any == 0) return;
       const std::size_t lanes = std::min(kLanes, points.size() - first);
       for (std::size_t lane = 0; lane < lanes; ++lane) {
