@@ -204,10 +204,12 @@ class BasicDynaInsRemover {
     StageClock clock;
 
     ScanSlot& newest = begin_scan(T_world_sensor, time);
-    ingest_.read(cloud, static_cast<float>(config_.min_range),
-                 static_cast<float>(config_.max_range), newest.labels);
+    ingest(cloud, newest);
     newest.make_room(newest.labels.size());
-    if (needs_sensor() && !sensor_.known()) adapt_to_sensor(newest);
+    if (needs_sensor() && !sensor_.known()) {
+      adapt_to_sensor(newest);
+      if (!sensor_.is_level()) ingest(cloud, newest);
+    }
     clock.lap(result.times.ingest);
 
     ground_.segment(ingest_.points(), ingest_.input(), newest.split);
@@ -226,7 +228,7 @@ class BasicDynaInsRemover {
     record_verdicts(cluster_of);
     clock.lap(result.times.verdict);
     if (config_.use_free_space) {
-      evidence_.observe(newest.scan, newest.segment, newest.T_world_sensor, newest.split,
+      evidence_.observe(newest.scan, newest.segment, newest.T_world_level, newest.split,
                         newest.cluster, clusterer_.cluster_count());
       if (evidence_tracks()) hand_on_ids(newest);
     }
@@ -279,10 +281,10 @@ class BasicDynaInsRemover {
     window_.clear();
     scan_begin_.clear();
     scan_begin_.push_back(0);
-    const Eigen::Isometry3d T_newest_world = newest.T_world_sensor.inverse();
+    const Eigen::Isometry3d T_newest_world = newest.T_world_level.inverse();
     for (std::uint64_t scan = window_first_; scan < pushed_; ++scan) {
       const ScanSlot& source = slot(scan);
-      const Eigen::Isometry3d T_newest_source = T_newest_world * source.T_world_sensor;
+      const Eigen::Isometry3d T_newest_source = T_newest_world * source.T_world_level;
       window_.append(source.split.non_ground(), T_newest_source.cast<float>());
       scan_begin_.push_back(static_cast<std::uint32_t>(window_.size()));
     }
@@ -367,7 +369,7 @@ class BasicDynaInsRemover {
 
   // Whether anything was left to be found in the scans.
   bool needs_sensor() const {
-    return config_.use_free_space || detail::needs_sensor(ground_) ||
+    return config_.use_free_space || config_.level || detail::needs_sensor(ground_) ||
            detail::needs_sensor(clusterer_);
   }
 
@@ -377,12 +379,39 @@ class BasicDynaInsRemover {
     if (sensor_.known()) {
       const Mounting mounting = estimate_mounting(ingest_.points());
       if (mounting.known) sensor_.height = mounting.height;
+      if (config_.level) sensor_.R_level_sensor = level(mounting);
       if (newest.scan > 0) newest.segment = ++segment_;
     }
     const SensorModel model = sensor_.known() ? sensor_ : SensorModel::typical();
     detail::adapt_stage(ground_, model);
     detail::adapt_stage(clusterer_, model);
     evidence_.adapt(model);
+  }
+
+  // The turn that makes a tilted sensor level.
+  Eigen::Matrix3d level(Mounting mounting) const {
+    constexpr double kLevel = 4.0;  // deg; level sensors seem to be tilted by up to 2.6
+    if (config_.mounting_pitch != 0.0 || config_.mounting_roll != 0.0) {
+      mounting.up_sensor = up_of_mounting(config_.mounting_pitch, config_.mounting_roll);
+      return mounting.R_level_sensor();
+    }
+    return mounting.known && mounting.tilt() > kLevel ? mounting.R_level_sensor()
+                                                      : Eigen::Matrix3d::Identity();
+  }
+
+  // The points as a level sensor in the same place would see them.
+  template <class Cloud>
+  void ingest(const Cloud& cloud, ScanSlot& newest) {
+    const auto nearest = static_cast<float>(config_.min_range);
+    const auto farthest = static_cast<float>(config_.max_range);
+    newest.T_world_level = newest.T_world_sensor;
+    if (sensor_.is_level()) {
+      ingest_.read(cloud, nearest, farthest, newest.labels);
+      return;
+    }
+    newest.T_world_level.rotate(sensor_.R_level_sensor.transpose());
+    ingest_.read(cloud, sensor_.R_level_sensor.template cast<float>(), nearest, farthest,
+                 newest.labels);
   }
 
   // Verdict by point: at least `votes` windows said so, or the evidence does.
@@ -453,7 +482,7 @@ class BasicDynaInsRemover {
     ++finished_;  // also if a map throws that writes to a disk
     if (config_.build_map) {
       const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
-      map_.insert(points, scan.is_kept, scan.T_world_sensor);
+      map_.insert(points, scan.is_kept, scan.T_world_level);
     }
     clock.lap(times.map);
     return scan.verdict();

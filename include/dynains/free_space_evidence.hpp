@@ -9,11 +9,13 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "dynains/belief_updater.hpp"
 #include "dynains/cause.hpp"
 #include "dynains/detail/beam_test.hpp"
+#include "dynains/detail/turn.hpp"
 #include "dynains/free_space_config.hpp"
 #include "dynains/ground_footprint.hpp"
 #include "dynains/ground_segmenter.hpp"
@@ -68,8 +70,13 @@ class FreeSpaceEvidence {
   /// Scans after which a verdict is final.
   std::size_t horizon() const { return static_cast<std::size_t>(config_.horizon); }
 
-  /// Chooses the resolution of range images; to be called once before the first scan.
-  void adapt(const SensorModel& sensor) { grid_ = RangeImageGrid::for_sensor(sensor); }
+  /// Chooses the resolution of range images, which are those of the sensor as it is mounted; to be
+  /// called once before the first scan.
+  void adapt(const SensorModel& sensor) {
+    grid_ = RangeImageGrid::for_sensor(sensor);
+    R_sensor_level_.reset();
+    if (!sensor.is_level()) R_sensor_level_ = sensor.R_level_sensor.transpose();
+  }
 
   /// Takes scan number `scan` in: scans come in order, from 0. `instance_of` holds the instance of
   /// each non-ground point of `split`, below `instance_count` or kNoCluster. Only scans of the
@@ -84,9 +91,7 @@ class FreeSpaceEvidence {
       segment_begin_ = scan;
     }
     view.segment = segment;
-    view.T_world_sensor = T_world_sensor;
-    view.image.build(grid_, split.ground(), split.non_ground(),
-                     static_cast<float>(config_.lateral_margin), image_scratch_);
+    make_image(T_world_sensor, split, view);
 
     Record& record = record_of(scan);
     record.segment = segment;
@@ -187,6 +192,20 @@ class FreeSpaceEvidence {
     TrackedInstances tracked;
   };
   static constexpr std::uint64_t kNoSegment = ~std::uint64_t{0};
+
+  // Beams are rows of an image only in the frame of the sensor, tilted as it is.
+  void make_image(const Eigen::Isometry3d& T_world_level, const GroundSplit& split, View& view) {
+    const auto reach = static_cast<float>(config_.lateral_margin);
+    view.T_world_sensor = T_world_level;
+    if (!R_sensor_level_) {
+      view.image.build(grid_, split.ground(), split.non_ground(), reach, image_scratch_);
+      return;
+    }
+    view.T_world_sensor.rotate(R_sensor_level_->transpose());
+    detail::turn(split.ground(), R_sensor_level_->cast<float>(), turned_ground_);
+    detail::turn(split.non_ground(), R_sensor_level_->cast<float>(), turned_rest_);
+    view.image.build(grid_, turned_ground_, turned_rest_, reach, image_scratch_);
+  }
 
   Record& record_of(std::uint64_t scan) { return records_[scan % records_.size()]; }
 
@@ -525,6 +544,9 @@ class FreeSpaceEvidence {
   InstanceLinker linker_;
   TrackBelief track_belief_;
   RangeImageGrid grid_;
+  std::optional<Eigen::Matrix3d> R_sensor_level_;  // of a sensor that is tilted
+  PointBuffer turned_ground_;
+  PointBuffer turned_rest_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();  // of the cells of tracks
   std::uint64_t segment_begin_ = 0;                   // first scan of the segment of the newest
   std::uint64_t newest_ = 0;

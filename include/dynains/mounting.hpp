@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -25,7 +26,25 @@ struct Mounting {
   /// Angle between the z axis of the sensor and the normal of the ground, degrees. Above 90 the
   /// sensor hangs upside down.
   double tilt() const { return std::acos(std::clamp(up_sensor.z(), -1.0, 1.0)) * 180.0 / M_PI; }
+
+  /// The smallest turn that brings the normal of the ground to the z axis: from the frame of the
+  /// sensor to that of one mounted level in its place.
+  Eigen::Matrix3d R_level_sensor() const {
+    return Eigen::Quaterniond::FromTwoVectors(up_sensor, Eigen::Vector3d::UnitZ())
+        .toRotationMatrix();
+  }
 };
+
+/// Normal of the ground seen from a sensor that was pitched (about y, nose down) and rolled (about
+/// x, left side up) by so many degrees: R_level_sensor = R_y(pitch) R_x(roll).
+inline Eigen::Vector3d up_of_mounting(double pitch, double roll) {
+  constexpr double kRadians = M_PI / 180.0;
+  const Eigen::Matrix3d R_level_sensor =
+      (Eigen::AngleAxisd(pitch * kRadians, Eigen::Vector3d::UnitY()) *
+       Eigen::AngleAxisd(roll * kRadians, Eigen::Vector3d::UnitX()))
+          .toRotationMatrix();
+  return R_level_sensor.row(2);
+}
 
 namespace detail {
 

@@ -16,13 +16,17 @@ struct RemoverConfig {
   double max_range = 250;  ///< m, horizontal and vertical; farther points are not measurements
   double max_gap = 1.0;    ///< s; a longer pause between scans starts a new window
   double max_speed = 100;  ///< m/s; a pose that jumps farther than that starts a new window
-  bool use_free_space = true;  ///< evidence from what other scans saw through
-  bool build_map = true;       ///< false: labels only, the map stays empty
+  bool level = true;       ///< turn the scans of a tilted sensor level
+  double mounting_pitch = 0.0;  ///< deg, nose down; with the roll: 0, 0 is found in the first scan
+  double mounting_roll = 0.0;   ///< deg, left side up
+  bool use_free_space = true;   ///< evidence from what other scans saw through
+  bool build_map = true;        ///< false: labels only, the map stays empty
 
   /// K = 4 and nothing but the paper's own verdict.
   static RemoverConfig paper() {
     RemoverConfig config;
     config.window = 4;
+    config.level = false;
     config.use_free_space = false;
     return config;
   }
@@ -44,6 +48,13 @@ struct RemoverConfig {
                       "a longer pause between two scans starts a new window"});
     visitor(Parameter{"max_speed", self.max_speed, half_open_below(0, 1e9), "m/s",
                       "a pose that is farther from the one before starts a new window"});
+    visitor(Parameter{"level", self.level, Bounds(), "",
+                      "turn the scans of a tilted sensor level before they are judged"});
+    visitor(Parameter{"mounting_pitch", self.mounting_pitch, closed(-180, 180), "deg",
+                      "tilt of the sensor about its y axis, nose down (x forward), before the "
+                      "roll; if pitch and roll are 0, the tilt is found in the first scan"});
+    visitor(Parameter{"mounting_roll", self.mounting_roll, closed(-180, 180), "deg",
+                      "tilt of the sensor about its x axis, left side up"});
     visitor(Parameter{"use_free_space", self.use_free_space, Bounds(), "",
                       "remove what other scans saw through (beyond the paper)"});
     visitor(Parameter{"build_map", self.build_map, Bounds(), "", "accumulate the static map"});

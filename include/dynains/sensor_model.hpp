@@ -1,6 +1,7 @@
 // What a scan tells about the sensor that took it: how far apart its beams are.
 #pragma once
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -23,10 +24,15 @@ struct SensorModel {
 
   double height = 0.0;  ///< m over the ground
 
+  /// From the frame of the sensor, in which its beams are spaced like this, to that of a level one
+  /// in its place, in which its points are handed on.
+  Eigen::Matrix3d R_level_sensor = Eigen::Matrix3d::Identity();
+
   bool known() const { return azimuth_step > 0.0; }
+  bool is_level() const { return R_level_sensor.isIdentity(0.0); }
 
   /// A 64-beam sensor on the roof of a car: what is assumed until a scan says more.
-  static SensorModel typical() { return {0.2, 0.35, 0.6, -25.0, 5.0, 1.723}; }
+  static SensorModel typical() { return {0.2, 0.35, 0.6, -25.0, 5.0, 1.723, Eigen::Matrix3d::Identity()}; }
 };
 
 /// Estimates the sampling from one scan (sensor frame); the height is that of a typical sensor, see

@@ -2,11 +2,13 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <string>
 #include <vector>
 
+#include "dynains/dyna_ins_remover.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "support/catch.hpp"
@@ -174,6 +176,65 @@ TEST_CASE("Height and tilt on recorded streets") {
       CHECK(std::abs(mounting.height - expected.height) < 0.1);
       CHECK(std::abs(mounting.tilt() - expected.tilt) < 1.0);
     }
+  }
+}
+
+struct Accuracy {
+  double kept;     // share of static points
+  double removed;  // share of moving points
+};
+
+/// The default preset on a street seen by a sensor that is pitched by so many degrees.
+Accuracy accuracy_when_pitched(double pitch) {
+  dynains::simulation::Config config;
+  config.scene = dynains::simulation::Scene::kUrban;
+  config.sensor = dynains::simulation::Sensor::kOs1_64;
+  config.scans = 36;
+  config.seed = 41;
+  config.mounting_pitch = pitch;
+  dynains::simulation::Simulator simulator(config);
+  dynains::DynaInsRemover::Config remover_config;
+  remover_config.build_map = false;
+  dynains::DynaInsRemover remover(remover_config);
+  std::vector<std::vector<std::uint32_t>> truth;
+  std::vector<std::vector<float>> points;
+  std::size_t still = 0, kept = 0, moving = 0, removed = 0;
+  const auto count = [&](const dynains::ScanVerdict& verdict) {
+    const std::vector<float>& xyzi = points[verdict.scan];
+    for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
+      const double range = std::hypot(xyzi[4 * i], xyzi[4 * i + 1]);
+      if (range < 2.7 || range > 50.0) continue;
+      const std::uint32_t label = truth[verdict.scan][i] & 0xFFFFU;
+      const bool is_moving = label >= 252 && label <= 259;
+      const bool is_removed = verdict.labels[i] == dynains::PointLabel::kDynamic;
+      (is_moving ? moving : still) += 1;
+      (is_moving ? removed : kept) += is_moving == is_removed ? 1 : 0;
+    }
+  };
+  for (std::size_t i = 0; i < simulator.size(); ++i) {
+    const auto scan = simulator.scan(i);
+    truth.push_back(scan.labels);
+    points.push_back(scan.xyzi);
+    const auto frame =
+        remover.push(dynains::RawPoints<float>{points.back().data(), points.back().size() / 4, 4},
+                     scan.T_world_sensor, scan.time);
+    if (frame.finished) count(*frame.finished);
+  }
+  remover.flush(count);
+  return {static_cast<double>(kept) / static_cast<double>(still),
+          static_cast<double>(removed) / static_cast<double>(moving)};
+}
+
+TEST_CASE("A street is cleaned as well through a pitched sensor") {
+  const Accuracy level = accuracy_when_pitched(0.0);
+  CHECK(level.kept > 0.97);
+  CHECK(level.removed > 0.93);
+  for (const double pitch : {5.0, 15.0, 25.0}) {
+    const Accuracy pitched = accuracy_when_pitched(pitch);
+    INFO("pitched by " << pitch << " deg: " << pitched.kept << " kept, " << pitched.removed
+                       << " removed; level: " << level.kept << ", " << level.removed);
+    CHECK(pitched.kept > level.kept - 0.02);
+    CHECK(pitched.removed > level.removed - 0.02);
   }
 }
 

@@ -1,0 +1,22 @@
+// Points seen from a frame that is turned.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+
+#include "dynains/points.hpp"
+
+namespace dynains::detail {
+
+/// Points in another frame of the same origin.
+inline void turn(PointsView points, const Eigen::Matrix3f& R, PointBuffer& turned) {
+  turned.resize(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3f p = R * Eigen::Vector3f(points.x[i], points.y[i], points.z[i]);
+    turned.x[i] = p.x();
+    turned.y[i] = p.y();
+    turned.z[i] = p.z();
+  }
+}
+
+}  // namespace dynains::detail

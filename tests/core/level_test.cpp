@@ -1,0 +1,142 @@
+// Sensors that are mounted at a slant: the scans are turned level, and nobody notices.
+#include <Eigen/Geometry>
+#include <cmath>
+#include <vector>
+
+#include "dynains/dyna_ins_remover.hpp"
+#include "support/catch.hpp"
+#include "support/runs.hpp"
+#include "support/scene.hpp"
+
+namespace dynains::test {
+namespace {
+
+using Config = DynaInsRemover::Config;
+
+Eigen::Matrix3d slant(double pitch, double roll) {
+  constexpr double kRadians = M_PI / 180.0;
+  return (Eigen::AngleAxisd(pitch * kRadians, Eigen::Vector3d::UnitY()) *
+          Eigen::AngleAxisd(roll * kRadians, Eigen::Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+
+// At 5 m/s; a van comes from 22 m ahead at 12 m/s.
+std::vector<Scan> drive_slanted(double pitch, double roll) {
+  const Scene scene = yard_with(van(22.0, 3.5, {-12.0, 0.0, 0.0}));
+  std::vector<Scan> scans;
+  for (int i = 0; i < 10; ++i) {
+    Eigen::Isometry3d T_world_sensor = sensor_at(0.5 * i);
+    T_world_sensor.rotate(slant(pitch, roll));
+    scans.push_back(scene.scan(T_world_sensor, 0.1 * i));
+  }
+  return scans;
+}
+
+double kept_share(const std::vector<Scan>& scans, const std::vector<Verdict>& verdicts) {
+  const Share removed = share(scans, verdicts, PointLabel::kDynamic);
+  const Share van = share(scans, verdicts, PointLabel::kDynamic, kAddedBox);
+  return 1.0 - static_cast<double>(removed.labelled - van.labelled) /
+                   static_cast<double>(removed.total - van.total);
+}
+
+TEST_CASE("a slanted sensor sees what a level one sees") {
+  const auto [pitch, roll] =
+      GENERATE(std::pair(0.0, 0.0), std::pair(5.0, 0.0), std::pair(15.0, 0.0), std::pair(25.0, 0.0),
+               std::pair(-20.0, 10.0), std::pair(0.0, 30.0));
+  INFO("pitch " << pitch << " deg, roll " << roll << " deg");
+  const std::vector<Scan> scans = drive_slanted(pitch, roll);
+  const std::vector<Verdict> verdicts = run(Config(), scans).final;
+  const Share moving = share(scans, verdicts, PointLabel::kDynamic, kAddedBox);
+  REQUIRE(moving.total > 1500);
+  CHECK(moving.value() > 0.9);
+  CHECK(kept_share(scans, verdicts) > 0.99);
+  CHECK(share(scans, verdicts, PointLabel::kGround, kGroundObject).value() > 0.5);
+}
+
+TEST_CASE("a sensor that hangs upside down needs no option") {
+  const std::vector<Scan> scans = drive_slanted(175.0, 0.0);
+  const std::vector<Verdict> verdicts = run(Config(), scans).final;
+  CHECK(share(scans, verdicts, PointLabel::kDynamic, kAddedBox).value() > 0.9);
+  CHECK(kept_share(scans, verdicts) > 0.99);
+}
+
+TEST_CASE("poses and map stay those of the user") {
+  const std::vector<Scan> scans = drive_slanted(20.0, 5.0);
+  DynaInsRemover remover;
+  const auto check = [&](const ScanVerdict& verdict) {
+    CHECK(verdict.T_world_sensor.isApprox(scans[verdict.scan].T_world_sensor, 1e-12));
+  };
+  for (const Scan& scan : scans) {
+    const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
+    check(frame.newest);
+  }
+  remover.flush(check);
+  CHECK_FALSE(remover.sensor().is_level());
+  std::size_t count = 0;
+  std::size_t off = 0;
+  remover.map().for_each([&](const Eigen::Vector3d& p) {
+    ++count;
+    bool on_pillar = false;
+    for (const Box& box : yard().boxes) {
+      on_pillar |= p.x() > box.low.x() - 0.05 && p.x() < box.high.x() + 0.05 &&
+                   p.y() > box.low.y() - 0.05 && p.y() < box.high.y() + 0.05 && p.z() < 3.05;
+    }
+    if (!on_pillar && std::abs(p.z()) > 0.05) ++off;
+  });
+  REQUIRE(count > 3000);
+  CHECK(off < count / 100);  // what is left of the van
+}
+
+TEST_CASE("a level sensor is left as it is, to the bit") {
+  const double pitch = GENERATE(0.0, 2.0);
+  const std::vector<Scan> scans = drive_slanted(pitch, 0.0);
+  DynaInsRemover levelled;
+  Config config;
+  config.level = false;
+  DynaInsRemover plain(config);
+  CHECK((run(levelled, scans).final == run(plain, scans).final));
+  CHECK(levelled.sensor().is_level());
+}
+
+TEST_CASE("a given tilt is taken at its word") {
+  const std::vector<Scan> scans = drive_slanted(20.0, -10.0);
+  Config config;
+  config.mounting_pitch = 20.0;
+  config.mounting_roll = -10.0;
+  DynaInsRemover remover(config);
+  const std::vector<Verdict> verdicts = run(remover, scans).final;
+  const Eigen::Vector3d up = slant(20.0, -10.0).row(2);
+  CHECK((remover.sensor().R_level_sensor * up).isApprox(Eigen::Vector3d::UnitZ(), 1e-9));
+  CHECK(share(scans, verdicts, PointLabel::kDynamic, kAddedBox).value() > 0.9);
+
+  config.level = false;
+  DynaInsRemover as_it_is(config);
+  run(as_it_is, {scans[0]});
+  CHECK(as_it_is.sensor().is_level());
+}
+
+TEST_CASE("the range of points is that of the sensor, tilted or not") {
+  std::vector<Scan> scans = drive_slanted(25.0, 0.0);
+  const std::vector<Verdict> verdicts = run(Config(), scans).final;
+  for (const Verdict& verdict : verdicts) {
+    const Scan& scan = scans[verdict.scan];
+    for (std::size_t i = 0; i < scan.points.size(); ++i) {
+      const bool is_near = std::hypot(scan.points[i].x(), scan.points[i].y()) < 2.7;
+      REQUIRE((verdict.labels[i] == PointLabel::kOutOfRange) == is_near);
+    }
+  }
+}
+
+TEST_CASE("after reset another sensor may be mounted otherwise") {
+  const std::vector<Scan> slanted = drive_slanted(20.0, 0.0);
+  const std::vector<Scan> upright = drive_slanted(0.0, 0.0);
+  DynaInsRemover used;
+  run(used, slanted);
+  used.reset();
+  CHECK((run(used, upright).final == run(Config(), upright).final));
+  used.reset();
+  CHECK((run(used, slanted).final == run(Config(), slanted).final));
+}
+
+}  // namespace
+}  // namespace dynains::test
