@@ -1,7 +1,7 @@
 # One binary package of everything that is installed:  cd build && cpack -G DEB
 set(CPACK_PACKAGE_NAME dynains)
 set(CPACK_PACKAGE_VENDOR dynains)
-set(CPACK_PACKAGE_CONTACT "the dynains authors <dynains@localhost>")
+set(CPACK_PACKAGE_CONTACT "DynaInsRemover <noreply@dynains.invalid>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
 set(CPACK_PACKAGE_DESCRIPTION
     "C++ library, program and, if built, Python module that label the points of moving\nobjects in LiDAR scans and keep them out of maps.")

@@ -15,6 +15,7 @@
 #include "preset.hpp"
 #include "progress.hpp"
 #include "published_table.hpp"
+#include "recording_options.hpp"
 #include "variants.hpp"
 
 namespace dynains::program {
@@ -24,9 +25,13 @@ namespace fs = std::filesystem;
 using evaluation::format_number;
 
 struct Table1Options {
-  explicit Table1Options(CLI::App& command) : evaluation(command, "static") {}
+  explicit Table1Options(CLI::App& command)
+      : root(command,
+             "SemanticKITTI (the published windows of 00, 01, 02, 05, 07), or any one labelled "
+             "sequence"),
+        evaluation(command, "static") {}
 
-  std::string root;
+  RecordingFlags root;
   EvaluationOptions evaluation;
   ScanWindow window;
   bool quiet = false;
@@ -78,7 +83,10 @@ std::vector<Variant> table1_variants() {
 
 void table1(const Table1Options& options) {
   const evaluation::EvaluationConfig config = options.evaluation.config();
-  const std::vector<Task> tasks = find_tasks(options.root, options.window);
+  const std::vector<Task> tasks = find_tasks(options.root.folder(), options.window);
+  if (tasks.size() > 1 && options.root.names_files()) {
+    throw ConfigError("--poses and --times need one sequence, not " + std::to_string(tasks.size()));
+  }
   const std::vector<Variant> variants = table1_variants();
 
   evaluation::TextTable table({"Seq.", "Method", "PR [%]", "RR [%]", "F1 score"}, 2);
@@ -93,7 +101,7 @@ void table1(const Table1Options& options) {
   };
 
   for (const Task& task : tasks) {
-    LabelledSequence sequence(Recording(task.folder), task.window);
+    LabelledSequence sequence(Recording(task.folder, options.root.options()), task.window);
     Progress progress(sequence.size(), "scans of " + task.name, options.quiet);
     const evaluation::Evaluation result =
         evaluate_variants(sequence, variants, Answer::kFinal, config,
@@ -121,12 +129,6 @@ void add_table1_command(CLI::App& experiment) {
   CLI::App& command = *experiment.add_subcommand(
       "table1", "Table I: PR, RR and F1 with and without belief update, beside published numbers");
   const auto options = std::make_shared<Table1Options>(command);
-  command
-      .add_option(
-          "root", options->root,
-          "SemanticKITTI (the published windows of 00, 01, 02, 05, 07), or any one labelled "
-          "sequence")
-      ->required();
   add_window_options(command, options->window);
   command.add_flag("--quiet", options->quiet, "no progress");
   command.add_option("--json", options->json, "write everything to this file");

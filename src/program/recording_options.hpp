@@ -16,6 +16,8 @@ class RecordingFlags {
 
   const std::string& folder() const { return folder_; }
   RecordingOptions options() const;
+  /// Whether a file is named that belongs to one recording only.
+  bool names_files() const { return !poses_.empty() || !times_.empty(); }
   /// Throws IoError.
   Recording open() const { return Recording(folder_, options()); }
 

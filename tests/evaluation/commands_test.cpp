@@ -231,6 +231,15 @@ TEST_CASE("The experiments run on any labelled sequence") {
     CHECK(nlohmann::json::parse(read_text(json_path))[0]["sequence"] == "street");
     CHECK(has(read_text(csv_path), "street,\"oracle\",100.000000,100.000000,1.000000,measured"));
   }
+  SECTION("table1 takes poses as run does") {
+    const fs::path poses = folder.path() / "elsewhere.txt";
+    const std::string expected = call({"experiment", "table1", street, "--quiet"});
+    fs::rename(fs::path(street) / "poses.txt", poses);
+    CHECK(!message_of({"experiment", "table1", street, "--quiet"}).empty());
+    CHECK(call({"experiment", "table1", street, "--quiet", "--poses", poses.string()}) == expected);
+    CHECK(call({"experiment", "table1", street, "--quiet", "--poses", poses.string(),
+                "--pose-shift", "1"}) != expected);
+  }
   SECTION("table1 on SemanticKITTI's layout") {
     // The published window of 02 starts at scan 860.
     const fs::path root = folder.path() / "kitti" / "sequences" / "02";
@@ -248,6 +257,11 @@ TEST_CASE("The experiments run on any labelled sequence") {
     CHECK(has(text, "0.989"));
     CHECK(has(text, "dynains, default preset"));
     CHECK(has(message_of({"experiment", "table1", folder.path().string()}), "neither a sequence"));
+    // One file of poses cannot be that of two sequences.
+    fs::create_directories(folder.path() / "kitti" / "sequences" / "07" / "velodyne");
+    CHECK(has(message_of({"experiment", "table1", (folder.path() / "kitti").string(), "--poses",
+                          (root / "poses.txt").string()}),
+              "--poses and --times need one sequence, not 2"));
   }
   SECTION("sweep") {
     const std::string csv_path = (folder.path() / "sweep.csv").string();
