@@ -237,8 +237,6 @@ TEST_CASE("The experiments run on any labelled sequence") {
     fs::rename(fs::path(street) / "poses.txt", poses);
     CHECK(!message_of({"experiment", "table1", street, "--quiet"}).empty());
     CHECK(call({"experiment", "table1", street, "--quiet", "--poses", poses.string()}) == expected);
-    CHECK(call({"experiment", "table1", street, "--quiet", "--poses", poses.string(),
-                "--pose-shift", "1"}) != expected);
   }
   SECTION("table1 on SemanticKITTI's layout") {
     // The published window of 02 starts at scan 860.
