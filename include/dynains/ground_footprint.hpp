@@ -9,7 +9,7 @@
 #include <limits>
 #include <vector>
 
-#include "dynains/detail/lanes.hpp"
+#include "dynains/detail/wide_lanes.hpp"
 #include "dynains/points.hpp"
 
 namespace dynains {
@@ -71,15 +71,14 @@ class GroundFootprint {
     using namespace detail;
     if (found.size() < points.size() + kLanes) found.resize(points.size() + kLanes);
     std::size_t count = 0;
-    for_lanes(points, [&](Float8 x, Float8 y, Float8, std::size_t first) {
+    for_lanes(points.size(), [&](auto at) {
       std::int32_t cell[kLanes];
-      coarse_.indices(x, y).store(cell);
+      coarse_.indices(at.load(points.x.data()), at.load(points.y.data())).store(cell);
       unsigned any = 0;
       for (const std::int32_t at : cell) any |= near_at(at);
       if (any == 0) return;
-      const std::size_t lanes = std::min(kLanes, points.size() - first);
-      for (std::size_t lane = 0; lane < lanes; ++lane) {
-        found[count] = static_cast<std::uint32_t>(first + lane);
+      for (std::size_t lane = 0; lane < at.size(); ++lane) {
+        found[count] = static_cast<std::uint32_t>(at.begin + lane);
         count += near_at(cell[lane]);
       }
     });
@@ -134,16 +133,18 @@ class GroundFootprint {
       return {static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row), true};
     }
     /// Row-major; what lies outside falls into the border.
-    detail::Int8 indices(detail::Float8 x, detail::Float8 y) const {
-      using detail::Float8;
-      const Float8 centre(static_cast<float>(half_));
-      const Float8 last(static_cast<float>(width() - 1));
-      const auto line = [&](Float8 coordinate) {
-        const Float8 scaled = coordinate * Float8(per_metre_) + centre;
-        return to_float(detail::truncate(min(max(scaled, Float8(0.0F)), last)));
+    template <class Float>
+    auto indices(const Float& x, const Float& y) const {
+      static constexpr detail::Constant8 kZero(0.0F);
+      const Float centre(detail::Constant8(static_cast<float>(half_)));
+      const Float last(detail::Constant8(static_cast<float>(width() - 1)));
+      const Float per_metre = detail::Constant8(per_metre_);
+      const auto line = [&](const Float& coordinate) {
+        return to_float(truncate(min(max(coordinate * per_metre + centre, Float(kZero)), last)));
       };
       // Exact in floats: coarse grids have fewer than 2^24 cells.
-      return detail::truncate(line(y) * Float8(static_cast<float>(width())) + line(x));
+      const Float cells(detail::Constant8(static_cast<float>(width())));
+      return truncate(line(y) * cells + line(x));
     }
     /// Of a row or column, in cells from the sensor.
     float centre(std::uint32_t index) const {

@@ -11,7 +11,7 @@
 
 #include "dynains/curved_voxel_clusterer.hpp"
 #include "dynains/detail/cell_hash.hpp"
-#include "dynains/detail/lanes.hpp"
+#include "dynains/detail/wide_lanes.hpp"
 #include "dynains/points.hpp"
 
 namespace dynains {
@@ -129,9 +129,8 @@ class InstanceSampler {
     supervoxels_.clear();
     out.streaks.clear();
     out.streaks.reserve(most_streaks_);
-    const Float8 per_metre(samples_per_metre_);
-    const Float8 far_squared(max_range_ * max_range_);
-    const Int8 none(static_cast<std::int32_t>(kNoCluster));
+    const Constant8 per_metre(samples_per_metre_);
+    const Constant8 far_squared(max_range_ * max_range_);
     // Each with the last one of the eight before in front.
     std::int32_t x[kLanes + 1] = {};
     std::int32_t y[kLanes + 1] = {};
@@ -139,20 +138,25 @@ class InstanceSampler {
     std::int32_t instance[kLanes + 1] = {};
     unsigned is_open = 0;  // whether the point before belongs to the last run
     runs_ = 0;
-    for_lanes(points, [&](Float8 px, Float8 py, Float8 pz, std::size_t first) {
-      const std::size_t lanes = std::min(kLanes, points.size() - first);
-      std::memcpy(&instance[1], &instance_of[first], lanes * sizeof(std::int32_t));
-      const Int8 instances = Int8::load(&instance[1]);
-      const Int8 vx = floor(px * per_metre);
-      const Int8 vy = floor(py * per_metre);
-      const Int8 vz = floor(pz * per_metre);
+    for_lanes(points.size(), [&](auto at) {
+      using Float = typename decltype(at)::Float;
+      using Int = typename decltype(at)::Int;
+      const std::size_t first = at.begin;
+      std::memcpy(&instance[1], &instance_of[first], at.size() * sizeof(std::int32_t));
+      const Float px = at.load(points.x.data());
+      const Float py = at.load(points.y.data());
+      const Int instances = Int::load(&instance[1]);
+      const Int vx = floor(px * per_metre);
+      const Int vy = floor(py * per_metre);
+      const Int vz = floor(at.load(points.z.data()) * per_metre);
       vx.store(&x[1]);
       vy.store(&y[1]);
       vz.store(&z[1]);
-      const unsigned taken =
-          (first_lanes(lanes) & (px * px + py * py <= far_squared) & ~(instances == none)).bits();
-      const unsigned same = ((vx == Int8::load(x)) & (vy == Int8::load(y)) & (vz == Int8::load(z)) &
-                             (instances == Int8::load(instance)))
+      const Int none(static_cast<std::int32_t>(kNoCluster));
+      const unsigned taken = ((px * px + py * py <= far_squared) & ~(instances == none)).bits() &
+                             ((1U << at.size()) - 1);
+      const unsigned same = ((vx == Int::load(x)) & (vy == Int::load(y)) & (vz == Int::load(z)) &
+                             (instances == Int::load(instance)))
                                 .bits();
       // Lanes whose point lies in the voxel of the point before, and lanes where that ends.
       const unsigned follows = taken & same & (taken << 1U | is_open);

@@ -5,11 +5,13 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <vector>
 
 #include "dynains/detail/arc_tangent.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/short_lanes.hpp"
+#include "dynains/detail/wide_lanes.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor_model.hpp"
 
@@ -27,8 +29,11 @@ struct RangeImageGrid {
   /// What rows count instead of the elevation, from its sine: a cubic that grows with the elevation
   /// and is within 0.2 deg of it below 50 deg; beyond, rows become wider.
   template <class Number>
-  static Number level(Number sine) {
-    return sine * (Number(0.9832868F) + Number(0.2594117F) * (sine * sine));
+  static Number level(const Number& sine) {
+    return sine * (kLevel[0] + kLevel[1] * (sine * sine));
+  }
+  static float level(float sine) {
+    return sine * (kLevel[0].values[0] + kLevel[1].values[0] * (sine * sine));
   }
 
   /// Cells a little wider than the azimuth step and narrower than the usual gap between beams, so
@@ -60,51 +65,67 @@ struct RangeImageGrid {
            2 * detail::kLanes;
   }
   std::size_t cell_count() const { return static_cast<std::size_t>(rows) * stride(); }
+
+ private:
+  static constexpr detail::Constant8 kLevel[] = {0.9832868F, 0.2594117F};
 };
 
 /// Directions of eight points: where they fall in an image and how far they are.
+template <class Lanes>
 struct ImageLocation {
-  detail::Int8 cell;     ///< index into the image; 0 where `inside` is not set
-  detail::Mask8 inside;  ///< whether the image covers the direction
-  detail::Float8 range;  ///< m
+  typename Lanes::Int cell;     ///< index into the image; 0 where `inside` is not set
+  typename Lanes::Mask inside;  ///< whether the image covers the direction
+  typename Lanes::Float range;  ///< m
 };
 
 /// Angle of (x, y) in [-pi, pi] within 1e-4 rad, for cells that are much wider; NaN for the origin.
-inline detail::Float8 coarse_azimuth(detail::Float8 x, detail::Float8 y) {
-  using detail::Float8;
-  const Float8 ax = abs(x);
-  const Float8 ay = abs(y);
-  // atan2(ay, ax) = pi/4 + atan(t); minimax fit of atan(t) / t in t^2 over [-1, 1].
-  const Float8 t = (ay - ax) / (ay + ax);
-  const Float8 u = t * t;
-  Float8 p(-3.898647e-02F);
-  p = p * u + Float8(1.462644e-01F);
-  p = p * u + Float8(-3.211750e-01F);
-  p = p * u + Float8(9.992138e-01F);
-  const Float8 from_y_axis = p * t - Float8(0.25F * detail::kPi);
-  return with_sign_of(y, with_sign_of(x, from_y_axis) + Float8(0.5F * detail::kPi));
+template <class Float>
+Float coarse_azimuth(const Float& x, const Float& y) {
+  using detail::Constant8;
+  // atan2(|y|, |x|) = pi/4 + atan(t); minimax fit of atan(t) / t in t^2 over [-1, 1].
+  static constexpr Constant8 kFit[] = {-3.898647e-02F, 1.462644e-01F, -3.211750e-01F,
+                                       9.992138e-01F};
+  static constexpr Constant8 kQuarter(0.5F * detail::kPi), kEighth(0.25F * detail::kPi);
+  const Float ax = abs(x);
+  const Float ay = abs(y);
+  const Float t = (ay - ax) / (ay + ax);
+  const Float u = t * t;
+  Float p = kFit[0];
+  for (std::size_t i = 1; i < std::size(kFit); ++i) p = p * u + kFit[i];
+  const Float from_y_axis = p * t - kEighth;
+  return detail::with_sign_of(y, detail::with_sign_of(x, from_y_axis) + kQuarter);
 }
 
-inline ImageLocation locate(const RangeImageGrid& grid, detail::Float8 x, detail::Float8 y,
-                            detail::Float8 z) {
-  using detail::Float8;
-  using detail::Int8;
-  const Float8 range = sqrt((x * x + y * y) + z * z);
-  const Float8 row =
-      (RangeImageGrid::level(z / range) - Float8(grid.lowest)) * Float8(grid.rows_per_level);
-  const Float8 column =
-      (coarse_azimuth(x, y) + Float8(detail::kPi)) * Float8(grid.columns_per_radian);
-  // False for the place of the sensor itself, whose row is NaN.
-  const detail::Mask8 inside =
-      (row >= Float8(0.0F)) & (row < Float8(static_cast<float>(grid.rows)));
-  // Row times stride is exact in floats: images have fewer than 2^24 cells.
-  const Float8 first =
-      to_float(detail::truncate(keep(inside, row))) * Float8(static_cast<float>(grid.stride()));
-  const Float8 last_column(static_cast<float>(grid.columns) - 0.5F);
-  const Int8 cell = detail::truncate(first + Float8(static_cast<float>(detail::kLanes))) +
-                    detail::truncate(max(min(column, last_column), Float8(0.0F)));
-  return {keep(inside, cell), inside, range};
-}
+/// What locating needs of a grid, once for all points.
+struct ImageLocator {
+  explicit ImageLocator(const RangeImageGrid& grid)
+      : lowest(grid.lowest),
+        rows_per_level(grid.rows_per_level),
+        rows(static_cast<float>(grid.rows)),
+        stride(static_cast<float>(grid.stride())),
+        columns_per_radian(grid.columns_per_radian),
+        last_column(static_cast<float>(grid.columns) - 0.5F) {}
+
+  template <class Lanes>
+  ImageLocation<Lanes> locate(const typename Lanes::Float& x, const typename Lanes::Float& y,
+                              const typename Lanes::Float& z) const {
+    using Float = typename Lanes::Float;
+    static constexpr detail::Constant8 kZero(0.0F), kHalfTurn(detail::kPi),
+        kBorder(static_cast<float>(detail::kLanes));
+    const Float range = sqrt((x * x + y * y) + z * z);
+    const Float row = (RangeImageGrid::level(z / range) - lowest) * rows_per_level;
+    const Float column = (coarse_azimuth(x, y) + kHalfTurn) * columns_per_radian;
+    // False for the place of the sensor itself, whose row is NaN.
+    const typename Lanes::Mask inside = (row >= kZero) & (row < rows);
+    // Row times stride is exact in floats: images have fewer than 2^24 cells.
+    const Float first = to_float(truncate(keep(inside, row))) * stride;
+    const typename Lanes::Int cell =
+        truncate(first + kBorder) + truncate(max(min(column, Float(last_column)), Float(kZero)));
+    return {keep(inside, cell), inside, range};
+  }
+
+  detail::Constant8 lowest, rows_per_level, rows, stride, columns_per_radian, last_column;
+};
 
 /// Nearest return per cell, and the nearest return of the 3x3 cells around it.
 ///
@@ -157,32 +178,23 @@ class RangeImage {
   static constexpr float kFarthest = 320.0F;  // m
 
   static void collect(const RangeImageGrid& grid, PointsView points, std::int16_t* nearest) {
-    using detail::Float8;
-    const auto add = [&](Float8 x, Float8 y, Float8 z, std::size_t lanes) {
-      const ImageLocation at = locate(grid, x, y, z);
+    const ImageLocator locator(grid);
+    static constexpr detail::Constant8 kMost(kFarthest), kScale(kCentimetres);
+    detail::for_lanes(points.size(), [&](auto place) {
+      using Lanes = decltype(place);
+      using Float = typename Lanes::Float;
+      const ImageLocation<Lanes> at = locator.locate<Lanes>(
+          place.load(points.x.data()), place.load(points.y.data()), place.load(points.z.data()));
       std::int32_t cell[detail::kLanes];
       std::int32_t range[detail::kLanes];
       at.cell.store(cell);
-      detail::truncate(min(at.range, Float8(kFarthest)) * Float8(kCentimetres)).store(range);
+      truncate(min(at.range, Float(kMost)) * kScale).store(range);
       // Directions outside fall into cell 0, which lies in the border and is never read.
-      for (std::size_t lane = 0; lane < lanes; ++lane) {
+      for (std::size_t lane = 0; lane < place.size(); ++lane) {
         std::int16_t& value = nearest[cell[lane]];
         value = std::min(value, static_cast<std::int16_t>(range[lane]));
       }
-    };
-    std::size_t i = 0;
-    for (; i + detail::kLanes <= points.size(); i += detail::kLanes) {
-      add(Float8::load(&points.x[i]), Float8::load(&points.y[i]), Float8::load(&points.z[i]),
-          detail::kLanes);
-    }
-    if (i < points.size()) {
-      float tail[3][detail::kLanes] = {};
-      const std::size_t lanes = points.size() - i;
-      std::copy_n(points.x.begin() + i, lanes, tail[0]);
-      std::copy_n(points.y.begin() + i, lanes, tail[1]);
-      std::copy_n(points.z.begin() + i, lanes, tail[2]);
-      add(Float8::load(tail[0]), Float8::load(tail[1]), Float8::load(tail[2]), lanes);
-    }
+    });
   }
 
   // Between two beams an image has rows that no beam can fill. Up to `hole_rows` of them take the

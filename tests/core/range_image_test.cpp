@@ -24,7 +24,9 @@ RangeImageGrid small_grid() {
 
 std::int32_t cell_of(const RangeImageGrid& grid, float x, float y, float z) {
   std::int32_t cells[detail::kLanes];
-  locate(grid, detail::Float8(x), detail::Float8(y), detail::Float8(z)).cell.store(cells);
+  ImageLocator(grid)
+      .locate<detail::NarrowLanes>(detail::Float8(x), detail::Float8(y), detail::Float8(z))
+      .cell.store(cells);
   return cells[0];
 }
 
@@ -39,7 +41,7 @@ TEST_CASE("columns follow the azimuth within 1e-4 rad, rows the elevation within
   }
   double before = -10.0;
   for (double elevation = -90.0; elevation <= 90.0; elevation += 0.1) {
-    const double level = RangeImageGrid::level(std::sin(elevation / kDegrees));
+    const double level = RangeImageGrid::level(static_cast<float>(std::sin(elevation / kDegrees)));
     REQUIRE(level > before);
     if (std::abs(elevation) < 50.0) REQUIRE(std::abs(level * kDegrees - elevation) < 0.2);
     before = level;
@@ -152,7 +154,8 @@ TEST_CASE("bits of sights are counted over any range") {
     float values[detail::kLanes];
     for (float& value : values) value = random.uniform_float(-1.0, 1.0);
     const detail::Float8 random_values = detail::Float8::load(values);
-    sights.set(first, random_values > detail::Float8(0.5F), random_values < detail::Float8(-0.3F));
+    sights.set(first, (random_values > detail::Float8(0.5F)).bits(),
+               (random_values < detail::Float8(-0.3F)).bits());
   }
   for (int round = 0; round < 2000; ++round) {
     const std::size_t begin = random.index(kCount);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "dynains/detail/lanes.hpp"
+#include "dynains/detail/wide_lanes.hpp"
 #include "dynains/points.hpp"
 #include "dynains/range_image.hpp"
 
@@ -42,9 +43,9 @@ class Sights {
   }
   /// Of the eight samples from `first` on, a multiple of eight: which were seen free (all beams
   /// about them went farther), and which were hit (a beam ended there).
-  void set(std::size_t first, Mask8 free, Mask8 hit) {
-    free_[first / 8] = static_cast<std::uint8_t>(free.bits());
-    hit_[first / 8] = static_cast<std::uint8_t>(hit.bits());
+  void set(std::size_t first, unsigned free, unsigned hit) {
+    free_[first / 8] = static_cast<std::uint8_t>(free);
+    hit_[first / 8] = static_cast<std::uint8_t>(hit);
   }
 
   struct Count {
@@ -80,51 +81,55 @@ inline void test_beams(const RangeImageGrid& grid, const RangeImage& image,
                        std::size_t count, float margin, float slope, Sights& sights) {
   constexpr float kCentimetres = 100.0F;
   const auto& m = T_reference_sample.matrix();
-  const Float8 m00(m(0, 0)), m01(m(0, 1)), m02(m(0, 2)), m03(m(0, 3));
-  const Float8 m10(m(1, 0)), m11(m(1, 1)), m12(m(1, 2)), m13(m(1, 3));
-  const Float8 m20(m(2, 0)), m21(m(2, 1)), m22(m(2, 2)), m23(m(2, 3));
-  const Float8 to_centimetres(kCentimetres);
-  const Float8 base(margin * kCentimetres);
-  const Float8 growth(slope * kCentimetres);
-  const Int8 none(0);
-  sights.resize(count);
+  const Constant8 m00(m(0, 0)), m01(m(0, 1)), m02(m(0, 2)), m03(m(0, 3));
+  const Constant8 m10(m(1, 0)), m11(m(1, 1)), m12(m(1, 2)), m13(m(1, 3));
+  const Constant8 m20(m(2, 0)), m21(m(2, 1)), m22(m(2, 2)), m23(m(2, 3));
+  const Constant8 to_centimetres(kCentimetres);
+  const Constant8 base(margin * kCentimetres), growth(slope * kCentimetres);
+  const ImageLocator locator(grid);
   const RangeImage::Cell* const cells = image.data();
-  // Images are larger than the caches near the core: all cells of a block are asked for before the
-  // first is needed.
-  std::int32_t cell[kBeamBlock];
-  float ranges[kBeamBlock];
-  std::int32_t packed[kLanes];
-  for (std::size_t begin = 0; begin < count; begin += kBeamBlock) {
-    const std::size_t size = std::min(kBeamBlock, count - begin);
-    for (std::size_t i = 0; i < size; i += kLanes) {
-      const Float8 px = Float8::load(&samples.x[begin + i]);
-      const Float8 py = Float8::load(&samples.y[begin + i]);
-      const Float8 pz = Float8::load(&samples.z[begin + i]);
-      const ImageLocation at = locate(grid, (m00 * px + m01 * py) + (m02 * pz + m03),
-                                      (m10 * px + m11 * py) + (m12 * pz + m13),
-                                      (m20 * px + m21 * py) + (m22 * pz + m23));
-      at.cell.store(&cell[i]);
-      at.range.store(&ranges[i]);
-      for (std::size_t lane = i; lane < i + kLanes; ++lane) __builtin_prefetch(&cells[cell[lane]]);
-    }
-    for (std::size_t i = 0; i < size; i += kLanes) {
-      for (std::size_t lane = 0; lane < kLanes; ++lane) {
-        std::memcpy(&packed[lane], &cells[cell[i + lane]], sizeof(std::int32_t));
+  sights.resize(count);
+  run_lanes([&](auto lanes) {
+    using Lanes = decltype(lanes);
+    using Float = typename Lanes::Float;
+    using Int = typename Lanes::Int;
+    // Images are larger than the caches near the core: all cells of a block are asked for before
+    // the first is needed.
+    std::int32_t cell[kBeamBlock];
+    float ranges[kBeamBlock];
+    std::int32_t packed[kLanes];
+    for (std::size_t begin = 0; begin < count; begin += kBeamBlock) {
+      const std::size_t size = std::min(kBeamBlock, count - begin);
+      for (std::size_t i = 0; i < size; i += kLanes) {
+        const Float px = Float::load(&samples.x[begin + i]);
+        const Float py = Float::load(&samples.y[begin + i]);
+        const Float pz = Float::load(&samples.z[begin + i]);
+        const ImageLocation<Lanes> at = locator.template locate<Lanes>(
+            (m00 * px + m01 * py) + (m02 * pz + m03), (m10 * px + m11 * py) + (m12 * pz + m13),
+            (m20 * px + m21 * py) + (m22 * pz + m23));
+        at.cell.store(&cell[i]);
+        at.range.store(&ranges[i]);
+        for (std::size_t k = i; k < i + kLanes; ++k) __builtin_prefetch(&cells[cell[k]]);
       }
-      const Int8 both = Int8::load(packed);
-      // `nearest` is the lower half of a cell, `around` the upper.
-      const Float8 nearest = to_float(Int8((both.lo << 16) >> 16, (both.hi << 16) >> 16));
-      const Float8 around = to_float(Int8(both.lo >> 16, both.hi >> 16));
-      const Float8 metres = Float8::load(&ranges[i]);
-      const Float8 range = metres * to_centimetres;
-      const Float8 tolerance = metres * growth + base;
-      const Mask8 inside = Int8::load(&cell[i]) > none;
-      const Mask8 free = inside & (around - range > tolerance);
-      const Mask8 hit = inside & ~free &
-                        ((abs(nearest - range) <= tolerance) | (abs(around - range) <= tolerance));
-      sights.set(begin + i, free, hit);
+      for (std::size_t i = 0; i < size; i += kLanes) {
+        for (std::size_t k = 0; k < kLanes; ++k) {
+          std::memcpy(&packed[k], &cells[cell[i + k]], sizeof(std::int32_t));
+        }
+        const Int both = Int::load(packed);
+        // `nearest` is the lower half of a cell, `around` the upper.
+        const Float nearest = to_float((both << 16) >> 16);
+        const Float around = to_float(both >> 16);
+        const Float metres = Float::load(&ranges[i]);
+        const Float range = metres * to_centimetres;
+        const Float tolerance = metres * growth + base;
+        const auto inside = Int(0) < Int::load(&cell[i]);
+        const auto free = inside & (around - range > tolerance);
+        const auto hit = inside & ~free &
+                         ((abs(nearest - range) <= tolerance) | (abs(around - range) <= tolerance));
+        sights.set(begin + i, free.bits(), hit.bits());
+      }
     }
-  }
+  });
 }
 
 }  // namespace dynains::detail

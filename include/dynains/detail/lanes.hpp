@@ -8,7 +8,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <limits>
 
 #if defined(__SSE2__)
 #include <emmintrin.h>
@@ -189,11 +188,10 @@ inline Float8 abs(Float8 a) {
 }
 
 /// `a`, negated where `sign` is negative or -0.
-inline Float8 with_sign_of(Float8 sign, Float8 a) {
-  constexpr std::int32_t kSign = std::numeric_limits<std::int32_t>::min();
-  const Int4 mask = {kSign, kSign, kSign, kSign};
-  return {Float4(bits_of(a.lo) ^ (bits_of(sign.lo) & mask)),
-          Float4(bits_of(a.hi) ^ (bits_of(sign.hi) & mask))};
+template <class Float>
+Float with_sign_of(const Float& sign, const Float& a) {
+  static constexpr Constant8 kSign(-0.0F);
+  return float_of(bits_of(a) ^ (bits_of(sign) & bits_of(Float(kSign))));
 }
 
 /// Rounds towards zero; lanes must lie within the range of int32.

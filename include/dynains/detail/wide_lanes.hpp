@@ -99,6 +99,7 @@ inline WideFloat8 float_of(const WideMask8& a) { return WideFloat8::float_of(a);
 inline WideInt8 select(const WideMask8& mask, const WideInt8& a, const WideInt8& b) {
   return WideInt8((mask.v & a.v) | (~mask.v & b.v));
 }
+inline WideInt8 keep(const WideMask8& mask, const WideInt8& a) { return WideInt8(mask.v & a.v); }
 inline WideInt8 truncate(const WideFloat8& a) {
   return WideInt8(__builtin_convertvector(a.v, WideInt8::Vector));
 }
