@@ -1,0 +1,116 @@
+// What must not matter: where the world's origin is, which way the sensor's x axis points, and in
+// which order points come.
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/evaluation/evaluate.hpp"
+#include "dynains/simulation/simulator.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+namespace dynains::test {
+namespace {
+
+using simulation::SimulatedScan;
+
+std::vector<SimulatedScan> street() {
+  simulation::Config config;
+  config.scene = simulation::Scene::kUrban;
+  config.sensor = simulation::Sensor::kOs1_64;
+  config.scans = 50;
+  config.seed = 5;
+  simulation::Simulator simulator(config);
+  std::vector<SimulatedScan> scans;
+  for (std::size_t i = 0; i < simulator.size(); ++i) scans.push_back(simulator.scan(i));
+  return scans;
+}
+
+/// F1 of the final verdict, when the remover takes the poses moved by `T_moved_world`.
+double score(const std::vector<SimulatedScan>& scans, const Eigen::Isometry3d& T_moved_world) {
+  std::vector<std::vector<std::uint8_t>> in_map(scans.size());
+  const auto keep = [&](const ScanVerdict& verdict) {
+    for (const PointLabel label : verdict.labels) {
+      in_map.at(verdict.scan).push_back(is_static(label) ? 1 : 0);
+    }
+  };
+  DynaInsRemover remover;
+  for (const SimulatedScan& scan : scans) {
+    const RawPoints<float> points{scan.xyzi.data(), scan.xyzi.size() / 4, 4};
+    const FrameResult frame = remover.push(points, T_moved_world * scan.T_world_sensor, scan.time);
+    if (frame.finished) keep(*frame.finished);
+  }
+  remover.flush(keep);
+  const auto source = [&](std::size_t i, evaluation::LabelledScan& scan) {
+    if (i == scans.size()) return false;
+    scan.xyz = scans[i].xyzi.data();
+    scan.stride = 4;
+    scan.T_world_sensor = scans[i].T_world_sensor;
+    scan.time = scans[i].time;
+    scan.truth = scans[i].labels;
+    scan.in_map = in_map[i];
+    return true;
+  };
+  evaluation::EvaluationConfig config;
+  config.max_range = 50.0;
+  return evaluation::evaluate(source, {"final"}, {}, config).rows[2].voxels.f1();
+}
+
+double score(const std::vector<SimulatedScan>& scans) {
+  return score(scans, Eigen::Isometry3d::Identity());
+}
+
+/// The same scans of a sensor that is turned about its z axis.
+std::vector<SimulatedScan> turned(std::vector<SimulatedScan> scans, double angle) {
+  const Eigen::Isometry3d T_turned_sensor(
+      Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix());
+  for (SimulatedScan& scan : scans) {
+    scan.T_world_sensor = scan.T_world_sensor * T_turned_sensor.inverse();
+    for (std::size_t i = 0; i + 3 < scan.xyzi.size(); i += 4) {
+      const Eigen::Vector3d p(scan.xyzi[i], scan.xyzi[i + 1], scan.xyzi[i + 2]);
+      Eigen::Map<Eigen::Vector3f>(&scan.xyzi[i]) = (T_turned_sensor * p).cast<float>();
+    }
+  }
+  return scans;
+}
+
+std::vector<SimulatedScan> shuffled(const std::vector<SimulatedScan>& scans) {
+  Random random(3);
+  std::vector<SimulatedScan> result = scans;
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    const std::vector<std::size_t> order = random.permutation(scans[s].labels.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      result[s].labels[i] = scans[s].labels[order[i]];
+      for (std::size_t k = 0; k < 4; ++k) {
+        result[s].xyzi[4 * i + k] = scans[s].xyzi[4 * order[i] + k];
+      }
+    }
+  }
+  return result;
+}
+
+// A turned sensor lays its cells and sectors differently over the same street: single verdicts near
+// a threshold change, and with them F1 by more than rounding does.
+TEST_CASE(
+    "a moved world and shuffled points change F1 by at most 0.002, a turned sensor by 0.005") {
+  const std::vector<SimulatedScan> scans = street();
+  const double plain = score(scans);
+  INFO("F1 " << plain);
+  REQUIRE(plain > 0.9);
+
+  Eigen::Isometry3d T_moved_world = Eigen::Isometry3d::Identity();
+  T_moved_world.translate(Eigen::Vector3d(5.0e5, -4.2e6, 300.0));
+  T_moved_world.rotate(Eigen::AngleAxisd(1.1, Eigen::Vector3d(0.3, -0.2, 1.0).normalized()));
+  CHECK(std::abs(score(scans, T_moved_world) - plain) <= 0.002);
+  for (const double angle : {0.7, 2.9}) {
+    INFO("turned by " << angle);
+    CHECK(std::abs(score(turned(scans, angle)) - plain) <= 0.005);
+  }
+  CHECK(std::abs(score(shuffled(scans)) - plain) <= 0.002);
+}
+
+}  // namespace
+}  // namespace dynains::test
