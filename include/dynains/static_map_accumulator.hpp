@@ -372,10 +372,10 @@ class StaticMapAccumulator {
   bool keep_all_;
   std::size_t size_ = 0;
   std::uint32_t half_ = 1;
-  detail::ChunkedVector<std::uint32_t, 1024> buckets_;  // first tile of each
+  detail::ChunkedVector<std::uint32_t, 512> buckets_;  // first tile of each
   detail::ChunkedVector<Tile, 64> tiles_;
-  detail::ChunkedVector<Block, 1024> blocks_;  // in the order of their first point
-  detail::ChunkedVector<Point, 2048> points_;
+  detail::ChunkedVector<Block, 256> blocks_;  // in the order of their first point
+  detail::ChunkedVector<Point, 512> points_;
   std::vector<std::uint32_t> recent_;  // tiles, by the lowest bits of their coordinates
 };
 
