@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::size_t kPairs = 8;       // compared
 constexpr std::size_t kStride = 5;      // scans from one to the other, at first
+constexpr double kFast = 2.0;           // m from scan to scan: few have much in common
 constexpr std::size_t kQueries = 1200;  // points of a scan that are looked up
 constexpr double kAgreeing = 0.3;       // m
 constexpr double kFarthestGap = 1.0;    // m
@@ -80,6 +81,13 @@ Agreement agreement_under(const PoseConvention& convention, const Recording& rec
     if (!T_world_a || !T_world_b) continue;
     sum.add(pair.a.compare(pair.b, T_world_a->inverse() * *T_world_b));
   }
+  return sum.mean();
+}
+
+/// As if the sensor did not move.
+Agreement standing_agreement(const std::vector<Pair>& pairs) {
+  AgreementSum sum;
+  for (const Pair& pair : pairs) sum.add(pair.a.compare(pair.b, Eigen::Isometry3d::Identity()));
   return sum.mean();
 }
 
@@ -182,6 +190,35 @@ PoseVerdict judge(const Recording& recording, const Diagnosis& d) {
     return is_clearly_better(d.as_given, d.standing) ? PoseVerdict::kAgree : PoseVerdict::kNoMotion;
   }
   return PoseVerdict::kDisagree;
+}
+
+/// Whether nothing explains the scans clearly better than the poses do.
+bool is_best(const Diagnosis& d) {
+  return is_passable(d.as_given, d.standing) &&
+         (d.readings.empty() || !is_clearly_better(d.readings.front().agreement, d.as_given));
+}
+
+/// Places the scans of `pairs`, `stride` apart, under the poses and under the usual mistakes.
+void compare(const Recording& recording, const std::vector<Pair>& pairs, std::size_t stride,
+             Diagnosis& d) {
+  d.stride = stride;
+  d.standing = standing_agreement(pairs);
+  d.as_given = agreement_under(recording.convention(), recording, pairs);
+  d.readings.clear();
+  if (recording.frame() == PointFrame::kSensor) {
+    for (const Change& change : usual_mistakes(recording)) {
+      d.readings.push_back({change.meaning, change.option, change.convention,
+                            agreement_under(change.convention, recording, pairs)});
+    }
+    // Simpler readings stay before others that are not clearly better.
+    for (std::size_t i = 1; i < d.readings.size(); ++i) {
+      if (is_clearly_better(d.readings[i].agreement, d.readings.front().agreement)) {
+        std::rotate(d.readings.begin(), d.readings.begin() + static_cast<std::ptrdiff_t>(i),
+                    d.readings.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+      }
+    }
+  }
+  d.verdict = judge(recording, d);
 }
 
 }  // namespace
@@ -291,23 +328,23 @@ Diagnosis diagnose(const Recording& recording) {
 
   // A slow sensor tells more from scans farther apart.
   std::vector<Pair> pairs;
+  std::vector<Pair> neighbours;
+  std::size_t stride = 0;
   for (const std::size_t wanted : {std::size_t{1}, kStride, 4 * kStride, 16 * kStride}) {
-    const std::size_t stride = std::min(wanted, recording.size() - 1);
-    if (stride == 0 || (!pairs.empty() && 2 * stride > recording.size())) break;
+    const std::size_t next = std::min(wanted, recording.size() - 1);
+    if (next == 0 || (!pairs.empty() && 2 * next > recording.size())) break;
+    stride = next;
+    if (!pairs.empty() && neighbours.empty()) neighbours = std::move(pairs);
     const std::size_t starts = recording.size() - stride;
     const std::size_t count = std::min(kPairs, starts);
     pairs.clear();
-    AgreementSum standing;
     for (std::size_t k = 0; k < count; ++k) {
       const std::size_t first = count == 1 ? 0 : k * (starts - 1) / (count - 1);
       Landmarks a = load(first);
       Landmarks b = load(first + stride);
-      standing.add(a.compare(b, Eigen::Isometry3d::Identity()));
       pairs.push_back({first, first + stride, std::move(a), std::move(b)});
     }
-    d.standing = standing.mean();
-    d.stride = stride;
-    if (d.standing.share < (stride == 1 ? 0.35 : kLeastAgreement)) break;
+    if (standing_agreement(pairs).share < (stride == 1 ? 0.35 : kLeastAgreement)) break;
   }
   if (pairs.empty() && recording.size() > 0) load(0);
 
@@ -321,28 +358,26 @@ Diagnosis diagnose(const Recording& recording) {
   }
   if (2 * heights.size() > read) d.mounting = {median(heights), up.normalized(), true};
 
-  d.as_given = agreement_under(recording.convention(), recording, pairs);
-  if (recording.frame() == PointFrame::kSensor) {
-    for (const Change& change : usual_mistakes(recording)) {
-      d.readings.push_back({change.meaning, change.option, change.convention,
-                            agreement_under(change.convention, recording, pairs)});
+  compare(recording, pairs, stride, d);
+  if (d.verdict == PoseVerdict::kDisagree && stride > 1 && d.step > kFast) {
+    // Fast and with little beside the way, as on a motorway: scans that far apart may show nothing
+    // in common but the traffic. Neighbours do.
+    Diagnosis near_by = d;
+    compare(recording, neighbours, 1, near_by);
+    if (near_by.verdict == PoseVerdict::kDisagree && is_best(near_by)) {
+      near_by.verdict = PoseVerdict::kNoMotion;
     }
-    // Simpler readings stay before others that are not clearly better.
-    for (std::size_t i = 1; i < d.readings.size(); ++i) {
-      if (is_clearly_better(d.readings[i].agreement, d.readings.front().agreement)) {
-        std::rotate(d.readings.begin(), d.readings.begin() + static_cast<std::ptrdiff_t>(i),
-                    d.readings.begin() + static_cast<std::ptrdiff_t>(i) + 1);
-      }
-    }
+    if (near_by.sound()) return near_by;
   }
-  d.verdict = judge(recording, d);
   return d;
 }
 
-PoseAgreement pose_agreement(const Recording& recording, std::size_t first, std::size_t last) {
+namespace {
+
+/// Over few pairs of the scans `first` to `last`, `stride` apart.
+PoseAgreement agreement_at(const Recording& recording, std::size_t first, std::size_t last,
+                           std::size_t stride) {
   constexpr std::size_t kFewPairs = 4;
-  const std::size_t stride = std::min(kStride, last - first);
-  if (stride == 0) return {};
   const std::size_t starts = last - first + 1 - stride;
   const std::size_t count = std::min(kFewPairs, starts);
   RecordedScan scan;
@@ -361,7 +396,23 @@ PoseAgreement pose_agreement(const Recording& recording, std::size_t first, std:
     as_given.add(
         a.compare(b, recording.T_world_sensor(i).inverse() * recording.T_world_sensor(i + stride)));
   }
-  return {as_given.mean(), standing.mean()};
+  return {as_given.mean(), standing.mean(), stride};
+}
+
+}  // namespace
+
+PoseAgreement pose_agreement(const Recording& recording, std::size_t first, std::size_t last) {
+  const std::size_t stride = std::min(kStride, last - first);
+  if (stride == 0) return {};
+  const PoseAgreement agreement = agreement_at(recording, first, last, stride);
+  const double way = (recording.T_world_sensor(first + stride).translation() -
+                      recording.T_world_sensor(first).translation())
+                         .norm();
+  const bool is_fast = way > kFast * static_cast<double>(stride);
+  if (!agreement.doubtful() || stride == 1 || !is_fast) return agreement;
+  // As in diagnose(): neighbours have more in common.
+  const PoseAgreement of_neighbours = agreement_at(recording, first, last, 1);
+  return of_neighbours.doubtful() ? agreement : of_neighbours;
 }
 
 std::string advice(const Diagnosis& d) {
@@ -372,6 +423,10 @@ std::string advice(const Diagnosis& d) {
       return "Scans agree if " + d.readings.front().meaning + ": pass " +
              d.readings.front().option + ".";
     case PoseVerdict::kNoMotion:
+      if (d.step * static_cast<double>(d.stride) > 1.0) {
+        return "Too little stands beside the way to tell what the poses mean; nothing speaks "
+               "against them.";
+      }
       return "The sensor hardly moves, so that scans agree whatever the poses mean; nothing speaks "
              "against them.";
     case PoseVerdict::kDisagree:

@@ -48,10 +48,10 @@ struct PoseReading {
 };
 
 enum class PoseVerdict {
-  kAgree,       ///< as given
-  kOtherwise,   ///< under another reading: `best`
-  kNoMotion,    ///< the sensor hardly moves or turns: nothing can be told
-  kDisagree,    ///< under no reading
+  kAgree,      ///< as given
+  kOtherwise,  ///< under another reading: `best`
+  kNoMotion,   ///< the sensor hardly moves or turns, or too little is in sight: nothing can be told
+  kDisagree,   ///< under no reading
   kWorldFrame,  ///< points are in the world frame and agree there, whatever the poses
   kUnknown      ///< too few points or scans
 };
@@ -96,13 +96,23 @@ inline bool fits(const Agreement& agreement, const Agreement& standing) {
          (agreement.share >= 0.2 && is_clearly_better(agreement, standing));
 }
 
+/// Whether neighbouring scans agree passably, and not clearly better as if the sensor stood still:
+/// all that can be asked where little stands beside the way.
+inline bool is_passable(const Agreement& agreement, const Agreement& standing) {
+  return agreement.share >= 0.4 && !is_clearly_better(standing, agreement);
+}
+
 /// Agreement of a sample of scans under the poses, and as if the sensor did not move.
 struct PoseAgreement {
   Agreement as_given;
   Agreement standing;
+  std::size_t stride = 0;  ///< scans apart that were compared
 
   /// Whether the poses are wrong rather than the scans hard.
-  bool doubtful() const { return as_given.points >= 200 && !fits(as_given, standing); }
+  bool doubtful() const {
+    return as_given.points >= 200 && !fits(as_given, standing) &&
+           !(stride == 1 && is_passable(as_given, standing));
+  }
 };
 
 /// Looks at a sample of scans; takes seconds, whatever the length. Throws IoError.
