@@ -75,7 +75,7 @@ class GroundFootprint {
       std::int32_t cell[kLanes];
       coarse_.indices(at.load(points.x.data()), at.load(points.y.data())).store(cell);
       unsigned any = 0;
-      for (const std::int32_t at : cell) any |= near_at(at);
+      for (const std::int32_t index : cell) any |= near_at(index);
       if (any == 0) return;
       for (std::size_t lane = 0; lane < at.size(); ++lane) {
         found[count] = static_cast<std::uint32_t>(at.begin + lane);
