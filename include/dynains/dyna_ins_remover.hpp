@@ -150,10 +150,10 @@ class BasicDynaInsRemover {
 
   /// Takes one scan in.
   ///
-  /// `cloud`: metres, sensor frame, z up; see PointCloudTraits for what can be passed. Any size,
-  /// any content: bad points get a label of their own. `T_world_sensor`: pose of the sensor at
-  /// that scan. `time`: s, greater than that of the scan before. Throws PoseError, and then leaves
-  /// the state as it was.
+  /// `cloud`: metres, sensor frame, z up (tilts are found, see RemoverConfig::level); see
+  /// PointCloudTraits for what can be passed. Any size, any content: bad points get a label of
+  /// their own. `T_world_sensor`: pose of the sensor at that scan. `time`: s, greater than that of
+  /// the scan before. Throws PoseError, and then leaves the state as it was.
   template <class Cloud>
   FrameResult push(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor, double time) {
     const detail::OneCall::Guard guard(one_call_);

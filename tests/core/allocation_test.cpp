@@ -45,7 +45,11 @@ TEST_CASE("a warm remover allocates nothing, but for the map when it grows") {
   config.evidence.horizon = 6;
   config.evidence.memory = 20;
   // To and fro over the same ground: the second time, the map has it all.
-  std::vector<Scan> scans = drive(yard_with(van(14.0, 3.5, {-6.0, 0.0, 0.0})), 12, 0.0);
+  const Scene scene = yard_with(van(14.0, 3.5, {-6.0, 0.0, 0.0}));
+  Eigen::Isometry3d T_world_sensor = sensor_at(0.0);
+  T_world_sensor.rotate(Eigen::AngleAxisd(GENERATE(0.0, 0.3), Eigen::Vector3d::UnitY()));
+  std::vector<Scan> scans;
+  for (int i = 0; i < 12; ++i) scans.push_back(scene.scan(T_world_sensor, 0.1 * i));
   DynaInsRemover remover(config);
   double start = 0.0;
   std::size_t first = 0;
