@@ -77,7 +77,7 @@ TEST_CASE("with --map-memory the map waits on the disk, and the results are the 
   CHECK(read_text(fixture.out + "/static_map.ply") == map);
 }
 
-TEST_CASE("--map-memory needs a map and a size that can be") {
+TEST_CASE("The budget of the map needs a map and a size that can be") {
   const Fixture fixture(3);
   const Outcome no_map = fixture.run({"--map-memory", "10", "--build-map", "false"});
   CHECK(no_map.code != 0);
