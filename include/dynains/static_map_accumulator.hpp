@@ -3,7 +3,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -20,10 +19,10 @@ namespace dynains {
 /// Sparse voxel map that keeps the first measured point of each voxel, never a voxel centre.
 ///
 /// Voxels are grouped in blocks of 8 x 4 x 2, whose occupancy is one word: flat, as ground is, and
-/// small, as far points are scattered. Blocks are grouped in tiles of 4 x 2 x 2, which are found by
-/// linear hashing (Litwin, 1980): each new tile splits one bucket, so that the table never has to
-/// be built anew. Nor do stored points ever move: growing makes no pause. Points are floats
-/// relative to their block, so that precision does not depend on how far the world origin is.
+/// small, as far points are scattered. Blocks are found by linear hashing (Litwin, 1980): each new
+/// block splits one bucket, so that the table never has to be built anew. Nor do stored points ever
+/// move: growing makes no pause. Points are floats relative to their block, so that precision does
+/// not depend on how far the world origin is.
 class StaticMapAccumulator {
  public:
   struct Config {
@@ -69,14 +68,14 @@ class StaticMapAccumulator {
       return static_cast<std::int32_t>(corner[axis]) *
              (kBlockVoxels.maxCoeff() / kBlockVoxels[axis]);
     };
-    const Eigen::Array3i first(blocks(0), blocks(1), blocks(2));
+    const Index first = {blocks(0), blocks(1), blocks(2)};
 
     recent_.resize(kRecent, kEnd);
     Batch batch;
     for (std::size_t begin = 0; begin < points.size(); begin += kBatch) {
       const std::size_t count = std::min(kBatch, points.size() - begin);
       locate(points.subview(begin, count), m, batch);
-      find_runs(count, batch);
+      find_streaks(count, batch);
       insert_batch(batch, first, keep.empty() ? keep : keep.subspan(begin, count));
     }
   }
@@ -87,7 +86,6 @@ class StaticMapAccumulator {
   /// Forgets all points and frees their memory.
   void clear() {
     buckets_ = {};
-    tiles_ = {};
     blocks_ = {};
     points_ = {};
     recent_ = {};
@@ -97,8 +95,8 @@ class StaticMapAccumulator {
 
   /// Bytes held by the map, its index included.
   std::size_t memory_bytes() const {
-    return points_.memory_bytes() + blocks_.memory_bytes() + tiles_.memory_bytes() +
-           buckets_.memory_bytes() + recent_.size() * sizeof(recent_[0]);
+    return points_.memory_bytes() + blocks_.memory_bytes() + buckets_.memory_bytes() +
+           recent_.size() * sizeof(recent_[0]);
   }
 
   /// Calls `visit(Eigen::Vector3d)` for every point, in metres, world frame.
@@ -108,27 +106,21 @@ class StaticMapAccumulator {
   }
 
   /// Calls `visit(Eigen::Vector3d)` for every point inside `box` (world frame, borders included).
-  /// Cost is that of the tiles which have room in the box, or of all tiles if these are fewer.
+  /// Cost is that of the blocks which have room in the box, or of all blocks if these are fewer.
   template <class Visitor>
   void for_each_in(const Eigen::AlignedBox3d& box, Visitor&& visit) const {
     if (box.isEmpty()) return;
-    const auto visit_tile = [&](const Tile& tile) {
-      for (const std::uint32_t block : tile.blocks) {
-        if (block == kEnd) continue;
-        visit_block(blocks_[block], [&](const Eigen::Vector3d& point) {
-          if (box.contains(point)) visit(point);
-        });
-      }
+    const auto inside = [&](const Eigen::Vector3d& point) {
+      if (box.contains(point)) visit(point);
     };
-    const Eigen::Array3d tile_size = block_size() * kTileBlocks.cast<double>();
-    const Eigen::Array3d low = (box.min().array() / tile_size).floor();
-    const Eigen::Array3d high = (box.max().array() / tile_size).floor();
-    const bool few = (high - low + 1.0).prod() < static_cast<double>(tiles_.size());
+    const Eigen::Array3d low = (box.min().array() / block_size()).floor();
+    const Eigen::Array3d high = (box.max().array() / block_size()).floor();
+    const bool few = (high - low + 1.0).prod() < static_cast<double>(blocks_.size());
     if (!few) {
-      for (std::uint32_t t = 0; t < tiles_.size(); ++t) {
-        const Index& at = tiles_[t].at;
+      for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
+        const Index& at = blocks_[b].at;
         const Eigen::Array3d place(at.x, at.y, at.z);
-        if ((place >= low).all() && (place <= high).all()) visit_tile(tiles_[t]);
+        if ((place >= low).all() && (place <= high).all()) visit_block(blocks_[b], inside);
       }
       return;
     }
@@ -137,8 +129,8 @@ class StaticMapAccumulator {
     for (std::int32_t x = first.x(); x <= last.x(); ++x) {
       for (std::int32_t y = first.y(); y <= last.y(); ++y) {
         for (std::int32_t z = first.z(); z <= last.z(); ++z) {
-          const std::uint32_t found = find_tile({x, y, z}, hash({x, y, z}));
-          if (found != kEnd) visit_tile(tiles_[found]);
+          const std::uint32_t found = find_block({x, y, z}, hash({x, y, z}));
+          if (found != kEnd) visit_block(blocks_[found], inside);
         }
       }
     }
@@ -147,22 +139,13 @@ class StaticMapAccumulator {
  private:
   static constexpr std::uint32_t kEnd = 0xFFFFFFFFU;
   static inline const Eigen::Array3i kBlockVoxels{8, 4, 2};
-  static inline const Eigen::Array3i kTileBlocks{4, 2, 2};
-  static constexpr std::array<int, 3> kBlockBits = {3, 2, 1};  // log2 of the voxels
-  static constexpr std::uint32_t kBlocksPerTile = 16;
 
   struct Point {
     float x, y, z;       // m, relative to the corner of the block
     std::uint32_t next;  // in the block; kEnd behind the last
   };
 
-  struct Block {
-    std::uint64_t occupied;  // a bit per voxel
-    std::uint32_t first;     // point
-    std::uint32_t place;     // tile * kBlocksPerTile + place in the tile
-  };
-
-  // Of a tile in the world, counted in tiles.
+  // Of a block in the world, counted in blocks.
   struct Index {
     std::int32_t x, y, z;
     friend bool operator==(const Index& a, const Index& b) {
@@ -170,22 +153,22 @@ class StaticMapAccumulator {
     }
   };
 
-  struct Tile {
+  struct Block {
+    std::uint64_t occupied;  // a bit per voxel
     Index at;
-    std::uint32_t next;                                // in the bucket; kEnd behind the last
-    std::array<std::uint32_t, kBlocksPerTile> blocks;  // kEnd where nothing was met yet
+    std::uint32_t first;  // point
+    std::uint32_t next;   // in the bucket; kEnd behind the last
   };
 
   // Some points of a scan on their way into the map.
-  static constexpr std::size_t kRecent = std::size_t{16} * 16 * 16;
+  static constexpr std::size_t kRecent = std::size_t{32} * 32 * 16;
   static constexpr std::size_t kBatch = 512;
   struct Batch {
     float local[3][kBatch];  // m, relative to the corner next to the sensor
-    std::int32_t block[3][kBatch + detail::kLanes] = {};  // from that corner on
-    std::uint8_t bit[kBatch];                             // of the voxel in its block
-    // Where points begin that share a block; neighbours in the scan mostly do.
-    std::uint32_t run_begin[kBatch + detail::kLanes];
-    std::size_t run_count = 0;
+    std::int32_t voxel[3][kBatch + detail::kLanes] = {};  // from that corner on
+    // Where points begin that share a voxel; neighbours in the scan often do.
+    std::uint32_t streak_begin[kBatch + detail::kLanes];
+    std::size_t streak_count = 0;
   };
 
   Eigen::Array3d block_size() const { return voxel_ * kBlockVoxels.cast<double>(); }
@@ -199,107 +182,75 @@ class StaticMapAccumulator {
                                {m(2, 0), m(2, 1), m(2, 2), m(2, 3)}};
     detail::for_lanes(points.size(), [&](auto at) {
       using Float = typename decltype(at)::Float;
-      using Int = typename decltype(at)::Int;
       const Float x = at.load(points.x.data());
       const Float y = at.load(points.y.data());
       const Float z = at.load(points.z.data());
-      Int bit(0);
-      int shift = 0;
       for (std::size_t row = 0; row < 3; ++row) {
         const Float value = (t[row][0] * x + t[row][1] * y) + (t[row][2] * z + t[row][3]);
-        const Int voxel = floor(value * scale);
-        // Arithmetic shifts and masks are floor division and remainder.
-        const int bits = kBlockBits[row];
         value.store(&batch.local[row][at.begin]);
-        (voxel >> bits).store(&batch.block[row][at.begin]);
-        bit = bit + ((voxel & Int((1 << bits) - 1)) << shift);
-        shift += bits;
+        floor(value * scale).store(&batch.voxel[row][at.begin]);
       }
-      store_bytes(bit, &batch.bit[at.begin]);
     });
   }
 
-  void find_runs(std::size_t count, Batch& batch) const {
+  void find_streaks(std::size_t count, Batch& batch) const {
     using detail::Int8;
-    std::size_t runs = 1;
-    batch.run_begin[0] = 0;
+    std::size_t streaks = 1;
+    batch.streak_begin[0] = 0;
     for (std::size_t i = 1; i < count; i += detail::kLanes) {
       const auto same = [&](int axis) {
-        const std::int32_t* const block = &batch.block[axis][i];
-        return Int8::load(block) == Int8::load(block - 1);
+        const std::int32_t* const voxel = &batch.voxel[axis][i];
+        return Int8::load(voxel) == Int8::load(voxel - 1);
       };
-      for (unsigned begins = (~(same(0) & same(1) & same(2))).bits(); begins != 0;
-           begins &= begins - 1) {
-        batch.run_begin[runs++] =
-            static_cast<std::uint32_t>(i) + static_cast<std::uint32_t>(__builtin_ctz(begins));
+      const unsigned begins = keep_all_ ? 0xFFU : ~(same(0) & same(1) & same(2)).bits();
+      // Where a streak begins cannot be foretold: no branch depends on it.
+      for (std::size_t lane = 0; lane < detail::kLanes; ++lane) {
+        batch.streak_begin[streaks] = static_cast<std::uint32_t>(i + lane);
+        streaks += (begins >> lane) & 1U;
       }
     }
-    while (batch.run_begin[runs - 1] >= count) --runs;
-    batch.run_begin[runs] = static_cast<std::uint32_t>(count);
-    batch.run_count = runs;
+    while (batch.streak_begin[streaks - 1] >= count) --streaks;
+    batch.streak_begin[streaks] = static_cast<std::uint32_t>(count);
+    batch.streak_count = streaks;
   }
 
-  // Most runs meet only voxels that have their point: one look at the block is enough for all.
-  void insert_batch(const Batch& batch, const Eigen::Array3i& corner,
-                    Span<const std::uint8_t> keep) {
+  void insert_batch(const Batch& batch, const Index& corner, Span<const std::uint8_t> keep) {
     const Eigen::Array3f size = block_size().cast<float>();
-    const auto is_kept = [&](std::size_t i) {
-      return std::uint64_t{keep.empty() || keep[i] != 0 ? 1U : 0U};
-    };
-    std::array<std::uint32_t, 128> first_in{};  // of each voxel; dropped points go beyond
-    for (std::size_t r = 0; r < batch.run_count; ++r) {
-      const std::size_t begin = batch.run_begin[r];
-      const std::size_t end = batch.run_begin[r + 1];
-      std::uint64_t met = 0;
-      for (std::size_t i = end; i-- > begin;) {
-        const std::uint64_t kept = is_kept(i);
-        met |= kept << batch.bit[i];
-        first_in[batch.bit[i] + ((kept ^ 1U) << 6)] = static_cast<std::uint32_t>(i);
+    for (std::size_t s = 0; s < batch.streak_count; ++s) {
+      std::size_t i = batch.streak_begin[s];
+      if (!keep.empty()) {
+        const std::size_t end = batch.streak_begin[s + 1];
+        while (i < end && keep[i] == 0) ++i;
+        if (i == end) continue;
       }
-      if (met == 0) continue;
-      const Eigen::Array3i in_frame(batch.block[0][begin], batch.block[1][begin],
-                                    batch.block[2][begin]);
-      Block& block = block_at(corner + in_frame);
-      const auto add = [&](std::size_t i) {
-        block.first = points_.push_back(
-            {batch.local[0][i] - static_cast<float>(in_frame.x()) * size.x(),
-             batch.local[1][i] - static_cast<float>(in_frame.y()) * size.y(),
-             batch.local[2][i] - static_cast<float>(in_frame.z()) * size.z(), block.first});
-        ++size_;
-      };
-      if (keep_all_) {
-        for (std::size_t i = begin; i < end; ++i) {
-          if (is_kept(i) != 0) add(i);
-        }
-      } else {
-        for (std::uint64_t fresh = met & ~block.occupied; fresh != 0; fresh &= fresh - 1) {
-          add(first_in[static_cast<std::size_t>(__builtin_ctzll(fresh))]);
-        }
-      }
-      block.occupied |= met;
+      // Arithmetic shifts and masks are floor division and remainder.
+      const std::int32_t x = batch.voxel[0][i];
+      const std::int32_t y = batch.voxel[1][i];
+      const std::int32_t z = batch.voxel[2][i];
+      const Index in_frame = {x >> 3, y >> 2, z >> 1};
+      Block& block =
+          block_at({corner.x + in_frame.x, corner.y + in_frame.y, corner.z + in_frame.z});
+      const std::uint64_t bit = std::uint64_t{1} << ((x & 7) | (y & 3) << 3 | (z & 1) << 5);
+      if ((block.occupied & bit) != 0 && !keep_all_) continue;
+      block.occupied |= bit;
+      block.first = points_.push_back(
+          {batch.local[0][i] - static_cast<float>(in_frame.x) * size.x(),
+           batch.local[1][i] - static_cast<float>(in_frame.y) * size.y(),
+           batch.local[2][i] - static_cast<float>(in_frame.z) * size.z(), block.first});
+      ++size_;
     }
   }
 
-  Block& block_at(const Eigen::Array3i& at) {
-    const Index in_tiles = {at.x() >> 2, at.y() >> 1, at.z() >> 1};
-    const std::uint32_t tile = tile_at(in_tiles);
-    const auto place =
-        static_cast<std::uint32_t>((at.x() & 3) | (at.y() & 1) << 2 | (at.z() & 1) << 3);
-    std::uint32_t& block = tiles_[tile].blocks[place];
-    if (block == kEnd) block = blocks_.push_back({0, kEnd, tile * kBlocksPerTile + place});
-    return blocks_[block];
-  }
-
-  // Neighbouring points meet the same few tiles again and again: a table without collisions among
+  // Neighbouring points meet the same few blocks again and again: a table without collisions among
   // neighbours spares most of them the walk through a bucket.
-  std::uint32_t tile_at(const Index& at) {
-    const std::int32_t low = (at.x & 15) | (at.y & 15) << 4 | (at.z & 15) << 8;
+  Block& block_at(const Index& at) {
+    const std::int32_t low = (at.x & 31) | (at.y & 31) << 5 | (at.z & 15) << 10;
     std::uint32_t& recent = recent_[static_cast<std::size_t>(low)];
-    if (recent < tiles_.size() && tiles_[recent].at == at) return recent;
+    if (recent < blocks_.size() && blocks_[recent].at == at) return blocks_[recent];
     const std::uint32_t h = hash(at);
-    recent = find_tile(at, h);
-    if (recent == kEnd) recent = add_tile(at, h);
-    return recent;
+    recent = find_block(at, h);
+    if (recent == kEnd) recent = add_block(at, h);
+    return blocks_[recent];
   }
 
   static std::uint32_t hash(const Index& at) {
@@ -317,20 +268,18 @@ class StaticMapAccumulator {
     return bucket < buckets_.size() ? bucket : bucket - half_;
   }
 
-  std::uint32_t find_tile(const Index& at, std::uint32_t hash) const {
+  std::uint32_t find_block(const Index& at, std::uint32_t hash) const {
     if (buckets_.size() == 0) return kEnd;
-    std::uint32_t t = buckets_[bucket_of(hash)];
-    while (t != kEnd && !(tiles_[t].at == at)) t = tiles_[t].next;
-    return t;
+    std::uint32_t b = buckets_[bucket_of(hash)];
+    while (b != kEnd && !(blocks_[b].at == at)) b = blocks_[b].next;
+    return b;
   }
 
-  // As many buckets as tiles: on average, a tile is found at the first or second look.
-  std::uint32_t add_tile(const Index& at, std::uint32_t hash) {
+  // As many buckets as blocks: on average, a block is found at the first or second look.
+  std::uint32_t add_block(const Index& at, std::uint32_t hash) {
     split_bucket();
     std::uint32_t& first = buckets_[bucket_of(hash)];
-    Tile tile{at, first, {}};
-    tile.blocks.fill(kEnd);
-    first = tiles_.push_back(tile);
+    first = blocks_.push_back({0, at, kEnd, first});
     return first;
   }
 
@@ -341,25 +290,22 @@ class StaticMapAccumulator {
     std::uint32_t* link = &buckets_[added - half_];
     std::uint32_t* moved = &buckets_[added];
     while (*link != kEnd) {
-      Tile& tile = tiles_[*link];
-      if (bucket_of(hash(tile.at)) == added) {
+      Block& block = blocks_[*link];
+      if (bucket_of(hash(block.at)) == added) {
         *moved = *link;
-        *link = tile.next;
-        tile.next = kEnd;
-        moved = &tile.next;
+        *link = block.next;
+        block.next = kEnd;
+        moved = &block.next;
       } else {
-        link = &tile.next;
+        link = &block.next;
       }
     }
   }
 
   template <class Visitor>
   void visit_block(const Block& block, Visitor&& visit) const {
-    const Index& tile = tiles_[block.place / kBlocksPerTile].at;
-    const auto place = static_cast<std::int32_t>(block.place % kBlocksPerTile);
-    const Eigen::Array3i at(tile.x * 4 + (place & 3), tile.y * 2 + (place >> 2 & 1),
-                            tile.z * 2 + (place >> 3));
-    const Eigen::Vector3d corner = at.cast<double>() * block_size();
+    const Eigen::Vector3d corner =
+        Eigen::Array3d(block.at.x, block.at.y, block.at.z) * block_size();
     for (std::uint32_t i = block.first; i != kEnd; i = points_[i].next) {
       const Point& point = points_[i];
       const Eigen::Vector3d world = corner + Eigen::Vector3d(point.x, point.y, point.z);
@@ -372,11 +318,10 @@ class StaticMapAccumulator {
   bool keep_all_;
   std::size_t size_ = 0;
   std::uint32_t half_ = 1;
-  detail::ChunkedVector<std::uint32_t, 512> buckets_;  // first tile of each
-  detail::ChunkedVector<Tile, 64> tiles_;
-  detail::ChunkedVector<Block, 256> blocks_;  // in the order of their first point
+  detail::ChunkedVector<std::uint32_t, 1024> buckets_;  // first block of each
+  detail::ChunkedVector<Block, 512> blocks_;            // in the order of their first point
   detail::ChunkedVector<Point, 512> points_;
-  std::vector<std::uint32_t> recent_;  // tiles, by the lowest bits of their coordinates
+  std::vector<std::uint32_t> recent_;  // blocks, by the lowest bits of their coordinates
 };
 
 }  // namespace dynains

@@ -66,9 +66,6 @@ std::vector<std::uint32_t> results(const std::vector<float>& a, const std::vecto
     const float lanes_total = sum(small);
     std::memcpy(&total, &lanes_total, sizeof(total));
     out.push_back(total);
-    std::uint8_t bytes[kLanes];
-    store_bytes(truncate(small) & Int(127), bytes);
-    for (const std::uint8_t byte : bytes) out.push_back(byte);
   }
   return out;
 }

@@ -202,19 +202,6 @@ inline Float8 to_float(Int8 a) {
   return {__builtin_convertvector(a.lo, Float4), __builtin_convertvector(a.hi, Float4)};
 }
 
-/// One byte per lane; lanes must lie within [0, 127].
-inline void store_bytes(Int8 a, std::uint8_t* to) {
-#if defined(__SSE2__)
-  const __m128i words = _mm_packs_epi32(__m128i(a.lo), __m128i(a.hi));
-  _mm_storel_epi64(reinterpret_cast<__m128i*>(to), _mm_packs_epi16(words, words));
-#else
-  for (int i = 0; i < 4; ++i) {
-    to[i] = static_cast<std::uint8_t>(a.lo[i]);
-    to[i + 4] = static_cast<std::uint8_t>(a.hi[i]);
-  }
-#endif
-}
-
 /// Product modulo 2^32.
 inline Int8 multiply(Int8 a, std::int32_t factor) {
   using Unsigned4 =

@@ -118,10 +118,6 @@ inline float sum(const WideFloat8& a) {
   return sum(Float8(__builtin_shufflevector(a.v, a.v, 0, 1, 2, 3),
                     __builtin_shufflevector(a.v, a.v, 4, 5, 6, 7)));
 }
-inline void store_bytes(const WideInt8& a, std::uint8_t* to) {
-  const Mask8 halves = WideMask8{a.v}.halves();
-  store_bytes(Int8(halves.lo, halves.hi), to);
-}
 
 struct NarrowLanes {
   using Float = Float8;
