@@ -203,11 +203,14 @@ TEST_CASE("kill -9 at any moment leaves every scan in the files that was inserte
       ::_exit(0);
     }
     ::close(done[1]);
-    ::usleep(static_cast<useconds_t>(random.index(60000)));
-    ::kill(child, SIGKILL);
-    ::waitpid(child, nullptr, 0);
+    // Killed some time into the scan behind a random one, however fast the machine is.
+    const std::size_t before = random.index(scans.size() / 2);
     std::size_t inserted = 0;
     char byte = 0;
+    while (inserted < before && ::read(done[0], &byte, 1) == 1) ++inserted;
+    ::usleep(static_cast<useconds_t>(random.index(1000)));
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
     while (::read(done[0], &byte, 1) == 1) ++inserted;
     ::close(done[0]);
     if (inserted > 0 && inserted < scans.size()) ++interrupted;
