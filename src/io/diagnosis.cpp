@@ -52,6 +52,23 @@ struct Pair {
   Landmarks b;
 };
 
+/// At most `most` pairs of the scans `first` to `last`, `stride` apart and spread evenly; `load`
+/// gives the landmarks of a scan.
+template <class Load>
+std::vector<Pair> take_pairs(std::size_t first, std::size_t last, std::size_t stride,
+                             std::size_t most, Load&& load) {
+  const std::size_t starts = last - first + 1 - stride;
+  const std::size_t count = std::min(most, starts);
+  std::vector<Pair> pairs;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t at = first + (count == 1 ? 0 : k * (starts - 1) / (count - 1));
+    Landmarks a = load(at);
+    Landmarks b = load(at + stride);
+    pairs.push_back({at, at + stride, std::move(a), std::move(b)});
+  }
+  return pairs;
+}
+
 /// Adds up what pairs say.
 class AgreementSum {
  public:
@@ -335,15 +352,7 @@ Diagnosis diagnose(const Recording& recording) {
     if (next == 0 || (!pairs.empty() && 2 * next > recording.size())) break;
     stride = next;
     if (!pairs.empty() && neighbours.empty()) neighbours = std::move(pairs);
-    const std::size_t starts = recording.size() - stride;
-    const std::size_t count = std::min(kPairs, starts);
-    pairs.clear();
-    for (std::size_t k = 0; k < count; ++k) {
-      const std::size_t first = count == 1 ? 0 : k * (starts - 1) / (count - 1);
-      Landmarks a = load(first);
-      Landmarks b = load(first + stride);
-      pairs.push_back({first, first + stride, std::move(a), std::move(b)});
-    }
+    pairs = take_pairs(0, recording.size() - 1, stride, kPairs, load);
     if (standing_agreement(pairs).share < (stride == 1 ? 0.35 : kLeastAgreement)) break;
   }
   if (pairs.empty() && recording.size() > 0) load(0);
@@ -378,25 +387,19 @@ namespace {
 PoseAgreement agreement_at(const Recording& recording, std::size_t first, std::size_t last,
                            std::size_t stride) {
   constexpr std::size_t kFewPairs = 4;
-  const std::size_t starts = last - first + 1 - stride;
-  const std::size_t count = std::min(kFewPairs, starts);
   RecordedScan scan;
   const auto load = [&](std::size_t i) {
     recording.read_scan(i, scan);
     const PointBuffer points = finite_points(scan);
     return Landmarks(points, estimate_mounting(points));
   };
+  const std::vector<Pair> pairs = take_pairs(first, last, stride, kFewPairs, load);
   AgreementSum as_given;
-  AgreementSum standing;
-  for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t i = first + (count == 1 ? 0 : k * (starts - 1) / (count - 1));
-    const Landmarks a = load(i);
-    const Landmarks b = load(i + stride);
-    standing.add(a.compare(b, Eigen::Isometry3d::Identity()));
-    as_given.add(
-        a.compare(b, recording.T_world_sensor(i).inverse() * recording.T_world_sensor(i + stride)));
+  for (const Pair& pair : pairs) {
+    as_given.add(pair.a.compare(pair.b, recording.T_world_sensor(pair.first).inverse() *
+                                            recording.T_world_sensor(pair.second)));
   }
-  return {as_given.mean(), standing.mean(), stride};
+  return {as_given.mean(), standing_agreement(pairs), stride};
 }
 
 }  // namespace
