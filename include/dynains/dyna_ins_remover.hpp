@@ -424,13 +424,13 @@ class BasicDynaInsRemover {
     clock.lap(times.verdict);
   }
 
-  // By input point. Instances stay as written the first time, labels where the verdict did not
-  // change.
+  // By input point. The second time, without evidence of other scans, only points that some window
+  // believed in or brought farther can have changed.
   void write_verdict(ScanSlot& scan, int votes) {
     const bool evident = config_.use_free_space;
-    const bool first_time = !scan.is_written;
+    const bool all = evident || !scan.is_written;
     const std::size_t ground_count = scan.split.ground_count;
-    if (first_time) begin_verdict(scan);
+    if (!scan.is_written) begin_verdict(scan);
     for (std::size_t i = 0; evident && i < ground_count; ++i) {
       const bool dynamic = is_dynamic(scan.proof[i]);
       if (!dynamic && scan.is_kept[i] != 0) continue;
@@ -440,7 +440,6 @@ class BasicDynaInsRemover {
       scan.causes[to] = scan.proof[i];
       scan.beliefs[to] = scan.evidence[i];
     }
-    const bool all = evident || first_time;
     for (std::size_t i = 0; i < scan.non_ground_count(); ++i) {
       const std::size_t at = ground_count + i;
       if (!evident) {

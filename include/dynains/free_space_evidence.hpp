@@ -497,7 +497,8 @@ class FreeSpaceEvidence {
           static_cast<float>(free) < kGroundShare * static_cast<float>(ground_hit_[sample])) {
         continue;
       }
-      for (std::size_t i = streak.begin; i < streak.end; ++i) remove(near_ground_[i], Cause::kFreeSpace);
+      for (std::size_t i = streak.begin; i < streak.end; ++i)
+        remove(near_ground_[i], Cause::kFreeSpace);
     }
   }
 
