@@ -163,30 +163,33 @@ class CurvedVoxelClusterer {
     const Constant8 ranges(static_cast<float>(ranges_));
     const int row_shift = row_shift_;
     std::int32_t* const cells = cell_of_.data();
-    Constant8 lowest(static_cast<float>(elevations_));
-    Constant8 highest(-1.0F);
-    detail::for_lanes(count, [&](auto at) {
-      using Float = typename decltype(at)::Float;
-      using Int = typename decltype(at)::Int;
-      const Float range = at.load(points.range.data());
-      const Float azimuth = at.load(points.azimuth.data());
-      const Float z = at.load(points.z.data());
-      const Float distance = sqrt(range * range + z * z);
-      const auto near = distance <= far;
-      const Float i_range = min(keep(near, distance) * range_scale, last_range);
-      const Float i_azimuth = min((azimuth + pi) * azimuth_scale, last_azimuth);
-      const Float i_elevation =
-          min((detail::arc_tangent2(z, range) + half_pi) * elevation_scale, last_elevation);
-      // Row numbers stay below 2^23 and are exact in floats.
-      const Int i_row = truncate(to_float(truncate(i_elevation)) * ranges) + truncate(i_range);
-      select(near, (i_row << row_shift) + truncate(i_azimuth), Int(-1)).store(cells + at.begin);
-      const Float low = lowest;
-      const Float high = highest;
-      min(at.there(select(near, i_elevation, low), low), low).store(lowest.values);
-      max(at.there(select(near, i_elevation, high), high), high).store(highest.values);
+    const Constant8 above_all(static_cast<float>(elevations_));
+    const Constant8 below_all(-1.0F);
+    detail::run_lanes([&](auto lanes) {
+      using Lanes = decltype(lanes);
+      using Float = typename Lanes::Float;
+      using Int = typename Lanes::Int;
+      Float lowest = above_all;
+      Float highest = below_all;
+      detail::for_places<Lanes>(count, [&](const auto& at) {
+        const Float range = at.load(points.range.data());
+        const Float azimuth = at.load(points.azimuth.data());
+        const Float z = at.load(points.z.data());
+        const Float distance = sqrt(range * range + z * z);
+        const auto near = distance <= far;
+        const Float i_range = min(keep(near, distance) * range_scale, last_range);
+        const Float i_azimuth = min((azimuth + pi) * azimuth_scale, last_azimuth);
+        const Float i_elevation =
+            min((detail::arc_tangent2(z, range) + half_pi) * elevation_scale, last_elevation);
+        // Row numbers stay below 2^23 and are exact in floats.
+        const Int i_row = truncate(to_float(truncate(i_elevation)) * ranges) + truncate(i_range);
+        select(near, (i_row << row_shift) + truncate(i_azimuth), Int(-1)).store(cells + at.begin);
+        lowest = min(at.there(select(near, i_elevation, lowest), lowest), lowest);
+        highest = max(at.there(select(near, i_elevation, highest), highest), highest);
+      });
+      lowest_elevation_ = static_cast<std::int32_t>(min_lane(lowest));
+      highest_elevation_ = static_cast<std::int32_t>(std::floor(max_lane(highest)));
     });
-    lowest_elevation_ = static_cast<std::int32_t>(min_lane(lowest));
-    highest_elevation_ = static_cast<std::int32_t>(std::floor(max_lane(highest)));
   }
 
   // The grid covers only the elevations that occur. It is all zero between calls.

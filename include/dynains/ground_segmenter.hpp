@@ -341,17 +341,18 @@ class GroundSegmenter {
     // First fit: the points near the seed height, as a horizontal half space; then the plane.
     const float x0 = sorted_.points.x[begin];
     const float y0 = sorted_.points.y[begin];
-    HalfSpace below{0.0F, 0.0F, 1.0F, static_cast<float>(config_.ground_seed_margin)};
+    HalfSpace below(x0, y0, seed_height, static_cast<float>(config_.ground_seed_margin));
     detail::Plane plane;
     for (int i = 0; i < config_.ground_iterations; ++i) {
-      const detail::PlaneMoments moments =
-          sum_moments(begin, end, Admission(x0, y0, seed_height, below));
+      const detail::PlaneMoments moments = sum_moments(begin, end, below);
       if (moments.count < 3.0) return reject();
       plane = detail::fit_plane(moments);
-      below = {static_cast<float>(plane.normal_x), static_cast<float>(plane.normal_y),
-               static_cast<float>(plane.normal_z),
-               static_cast<float>(config_.ground_distance + plane.normal_x * plane.mean_x +
-                                  plane.normal_y * plane.mean_y + plane.normal_z * plane.mean_z)};
+      below.x = static_cast<float>(plane.normal_x);
+      below.y = static_cast<float>(plane.normal_y);
+      below.z = static_cast<float>(plane.normal_z);
+      below.offset =
+          static_cast<float>(config_.ground_distance + plane.normal_x * plane.mean_x +
+                             plane.normal_y * plane.mean_y + plane.normal_z * plane.mean_z);
     }
     if (plane.normal_z < config_.ground_uprightness) return reject();
     const auto ring = static_cast<std::size_t>(ring_of_patch_[patch]);
@@ -363,36 +364,23 @@ class GroundSegmenter {
       }
     }
 
-    const Admission admission(x0, y0, seed_height, below);
     detail::run_lanes([&](auto lanes) {
       using Lanes = decltype(lanes);
       for (std::size_t i = begin; i < end; i += detail::kLanes) {
-        const unsigned bits =
-            admission.inside(admission.template local<Lanes>(sorted_.points, i)).bits();
+        const unsigned bits = below.inside(below.template local<Lanes>(sorted_.points, i)).bits();
         const std::size_t count = std::min(detail::kLanes, end - i);
         out.put(sorted_, i, count, bits & ((1U << count) - 1U));
       }
     });
   }
 
-  // Points with normal . (p - origin) < offset.
+  // Points with normal . (p - origin) < offset; the origin of the fit is near the points.
   struct HalfSpace {
-    float x, y, z, offset;
-  };
+    HalfSpace(float origin_x, float origin_y, float origin_z, float distance)
+        : x0(origin_x), y0(origin_y), z0(origin_z), offset(distance) {}
 
-  // The half space in the coordinates of the fit, whose origin is near the points.
-  struct Admission {
     detail::Constant8 x0, y0, z0;
-    detail::Constant8 x, y, z, offset;
-
-    Admission(float origin_x, float origin_y, float origin_z, const HalfSpace& space)
-        : x0(origin_x),
-          y0(origin_y),
-          z0(origin_z),
-          x(space.x),
-          y(space.y),
-          z(space.z),
-          offset(space.offset) {}
+    detail::Constant8 x = 0.0F, y = 0.0F, z = 1.0F, offset;
 
     template <class Lanes>
     std::array<typename Lanes::Float, 3> local(const PointBuffer& points, std::size_t i) const {
@@ -407,7 +395,7 @@ class GroundSegmenter {
   };
 
   detail::PlaneMoments sum_moments(std::size_t begin, std::size_t end,
-                                   const Admission& admission) const {
+                                   const HalfSpace& space) const {
     static constexpr detail::Constant8 kZero(0.0F), kOne(1.0F);
     std::array<float, 10> sums;
     detail::run_lanes([&](auto lanes) {
@@ -432,12 +420,12 @@ class GroundSegmenter {
       };
       std::size_t i = begin;
       for (; i + detail::kLanes <= end; i += detail::kLanes) {
-        const auto p = admission.template local<Lanes>(sorted_.points, i);
-        add(p, admission.inside(p));
+        const auto p = space.template local<Lanes>(sorted_.points, i);
+        add(p, space.inside(p));
       }
       if (i < end) {
-        const auto p = admission.template local<Lanes>(sorted_.points, i);
-        add(p, admission.inside(p) & detail::lanes_below<Lanes>(end - i));
+        const auto p = space.template local<Lanes>(sorted_.points, i);
+        add(p, space.inside(p) & detail::lanes_below<Lanes>(end - i));
       }
       sums = {sum(n),   sum(sx),  sum(sy),  sum(sz),  sum(sxx),
               sum(sxy), sum(sxz), sum(syy), sum(syz), sum(szz)};
@@ -473,7 +461,9 @@ class GroundSegmenter {
     const auto heights = [&](std::size_t i) {
       const Float8 z = Float8::load(&sorted_.points.z[i]);
       detail::Mask8 valid = z >= Float8(floor);
-      if (end - i < detail::kLanes) valid = valid & detail::first_lanes(end - i);
+      if (end - i < detail::kLanes) {
+        valid = valid & detail::lanes_below<detail::NarrowLanes>(end - i);
+      }
       return select(valid, z, infinity);
     };
     const std::size_t groups = (lowest.wanted - 1) / detail::kLanes + 1;

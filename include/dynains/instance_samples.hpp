@@ -259,8 +259,7 @@ class InstanceSampler {
     for (InstanceSamples::Streak& streak : out.streaks) {
       streak.supervoxel = place_[streak.supervoxel];
     }
-    const std::size_t padded = samples_.size() + detail::kLanes;
-    if (out.points.size() < padded) out.points.resize(padded);
+    out.points.grow(samples_.size() + detail::kLanes);
     next_.assign(out.sample_begin.begin(), out.sample_begin.end());
     for (const Sample& sample : samples_) {
       const std::uint32_t to = next_[place_[sample.supervoxel]]++;

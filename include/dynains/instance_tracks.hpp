@@ -11,6 +11,7 @@
 
 #include "dynains/curved_voxel_clusterer.hpp"
 #include "dynains/detail/cell_hash.hpp"
+#include "dynains/detail/lane_transform.hpp"
 #include "dynains/detail/wide_lanes.hpp"
 #include "dynains/instance_samples.hpp"
 #include "dynains/points.hpp"
@@ -133,21 +134,16 @@ class InstanceLinker {
     using namespace detail;
     Eigen::Isometry3d T_origin_sensor = T_world_sensor;
     T_origin_sensor.translation() -= origin;
-    const Eigen::Matrix<float, 3, 4> m =
-        (Eigen::Scaling(1.0 / cell_) * T_origin_sensor.matrix().topRows<3>()).cast<float>();
+    const LaneTransform to_cells(
+        (Eigen::Scaling(1.0 / cell_) * T_origin_sensor.matrix().topRows<3>()).cast<float>());
     place_.resize(samples.size());
-    const Constant8 m00(m(0, 0)), m01(m(0, 1)), m02(m(0, 2)), m03(m(0, 3));
-    const Constant8 m10(m(1, 0)), m11(m(1, 1)), m12(m(1, 2)), m13(m(1, 3));
-    const Constant8 m20(m(2, 0)), m21(m(2, 1)), m22(m(2, 2)), m23(m(2, 3));
     for_lanes(samples.size(), [&](auto at) {
       using Float = typename decltype(at)::Float;
       const Float x = at.load(samples.points.x.data());
       const Float y = at.load(samples.points.y.data());
       const Float z = at.load(samples.points.z.data());
       std::int32_t cell[3][kLanes];
-      floor((m00 * x + m01 * y) + (m02 * z + m03)).store(cell[0]);
-      floor((m10 * x + m11 * y) + (m12 * z + m13)).store(cell[1]);
-      floor((m20 * x + m21 * y) + (m22 * z + m23)).store(cell[2]);
+      for (std::size_t axis = 0; axis < 3; ++axis) floor(to_cells(axis, x, y, z)).store(cell[axis]);
       for (std::size_t lane = 0; lane < at.size(); ++lane) {
         place_[at.begin + lane] = pack_place(cell[0][lane], cell[1][lane], cell[2][lane]);
       }

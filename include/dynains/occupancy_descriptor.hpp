@@ -123,39 +123,43 @@ class OccupancyDescriptor {
 
  private:
   void lay_grid() {
-    using detail::Float8;
+    using detail::Constant8;
     const PolarView& points = cluster_.points;
-    Float8 range_low(points.range[0]), range_high = range_low;
-    Float8 z_low(points.z[0]);
+    // In the place of those that are missing from the last eight, the first point changes no
+    // extent.
+    const Constant8 first_range(points.range[0]), first_azimuth(points.azimuth[0]);
+    const Constant8 first_z(points.z[0]), first_turned(turned(points.azimuth[0]));
+    const Constant8 zero(0.0F), turn(2.0F * detail::kPi);
     // Extents for the seam at +-pi and for the seam at 0: the smaller of the two is the smallest
     // arc if it is at most half a turn.
-    Float8 azimuth_low(points.azimuth[0]), azimuth_high = azimuth_low;
-    Float8 turned_low(turned(points.azimuth[0])), turned_high = turned_low;
-    detail::for_lanes({points.range, points.azimuth, points.z}, [&](Float8 range, Float8 azimuth,
-                                                                    Float8 z, std::size_t i) {
-      if (points.size() - i < detail::kLanes) {
-        // The first point in place of those that are missing changes no extent.
-        const detail::Mask8 there = detail::first_lanes(points.size() - i);
-        range = select(there, range, Float8(points.range[0]));
-        azimuth = select(there, azimuth, Float8(points.azimuth[0]));
-        z = select(there, z, Float8(points.z[0]));
-      }
-      range_low = min(range_low, range);
-      range_high = max(range_high, range);
-      z_low = min(z_low, z);
-      azimuth_low = min(azimuth_low, azimuth);
-      azimuth_high = max(azimuth_high, azimuth);
-      const Float8 on = azimuth + keep(azimuth < Float8(0.0F), Float8(2.0F * detail::kPi));
-      turned_low = min(turned_low, on);
-      turned_high = max(turned_high, on);
+    float range_max = 0.0F, low = 0.0F, high = 0.0F, low_turned = 0.0F, high_turned = 0.0F;
+    detail::run_lanes([&](auto lanes) {
+      using Lanes = decltype(lanes);
+      using Float = typename Lanes::Float;
+      Float range_low = first_range, range_high = first_range, z_low = first_z;
+      Float azimuth_low = first_azimuth, azimuth_high = first_azimuth;
+      Float turned_low = first_turned, turned_high = first_turned;
+      detail::for_places<Lanes>(points.size(), [&](const auto& at) {
+        const Float range = at.there(at.load(points.range.data()), first_range);
+        const Float azimuth = at.there(at.load(points.azimuth.data()), first_azimuth);
+        const Float z = at.there(at.load(points.z.data()), first_z);
+        range_low = min(range_low, range);
+        range_high = max(range_high, range);
+        z_low = min(z_low, z);
+        azimuth_low = min(azimuth_low, azimuth);
+        azimuth_high = max(azimuth_high, azimuth);
+        const Float on = azimuth + keep(azimuth < zero, Float(turn));
+        turned_low = min(turned_low, on);
+        turned_high = max(turned_high, on);
+      });
+      range_min_ = min_lane(range_low);
+      range_max = max_lane(range_high);
+      z_min_ = min_lane(z_low);
+      low = min_lane(azimuth_low);
+      high = max_lane(azimuth_high);
+      low_turned = min_lane(turned_low);
+      high_turned = max_lane(turned_high);
     });
-    range_min_ = min_lane(range_low);
-    const float range_max = max_lane(range_high);
-    z_min_ = min_lane(z_low);
-    const float low = min_lane(azimuth_low);
-    const float high = max_lane(azimuth_high);
-    const float low_turned = min_lane(turned_low);
-    const float high_turned = max_lane(turned_high);
     float extent = high - low;
     azimuth_min_ = low;
     if (high_turned - low_turned < extent) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynains/detail/arc_tangent.hpp"
+#include "dynains/detail/lane_transform.hpp"
 #include "dynains/detail/room.hpp"
 #include "dynains/detail/wide_lanes.hpp"
 #include "dynains/points.hpp"
@@ -45,13 +46,9 @@ class PolarBuffer {
   /// Appends `points` moved by the rigid transform `T_target_source`, which is applied in floats:
   /// multiply poses in double before.
   void append(PointsView points, const Eigen::Isometry3f& T_target_source) {
-    using detail::Constant8;
     const std::size_t begin = size_;
     resize(begin + points.size());
-    const auto& m = T_target_source.matrix();
-    const Constant8 m00(m(0, 0)), m01(m(0, 1)), m02(m(0, 2)), m03(m(0, 3));
-    const Constant8 m10(m(1, 0)), m11(m(1, 1)), m12(m(1, 2)), m13(m(1, 3));
-    const Constant8 m20(m(2, 0)), m21(m(2, 1)), m22(m(2, 2)), m23(m(2, 3));
+    const detail::LaneTransform transform(T_target_source.matrix().topRows<3>());
     float* const ranges = range.data() + begin;
     float* const azimuths = azimuth.data() + begin;
     float* const heights = z.data() + begin;
@@ -60,12 +57,11 @@ class PolarBuffer {
       const Float x = at.load(points.x.data());
       const Float y = at.load(points.y.data());
       const Float z_source = at.load(points.z.data());
-      const Float x_target = (m00 * x + m01 * y) + (m02 * z_source + m03);
-      const Float y_target = (m10 * x + m11 * y) + (m12 * z_source + m13);
-      const Float z_target = (m20 * x + m21 * y) + (m22 * z_source + m23);
+      const Float x_target = transform(0, x, y, z_source);
+      const Float y_target = transform(1, x, y, z_source);
       sqrt(x_target * x_target + y_target * y_target).store(ranges + at.begin);
       detail::arc_tangent2(y_target, x_target).store(azimuths + at.begin);
-      z_target.store(heights + at.begin);
+      transform(2, x, y, z_source).store(heights + at.begin);
     });
   }
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "dynains/detail/arc_tangent.hpp"
-#include "dynains/detail/lanes.hpp"
+#include "dynains/detail/wide_lanes.hpp"
 #include "dynains/points.hpp"
 
 namespace dynains {
@@ -32,7 +32,9 @@ struct SensorModel {
   bool is_level() const { return R_level_sensor.isIdentity(0.0); }
 
   /// A 64-beam sensor on the roof of a car: what is assumed until a scan says more.
-  static SensorModel typical() { return {0.2, 0.35, 0.6, -25.0, 5.0, 1.723, Eigen::Matrix3d::Identity()}; }
+  static SensorModel typical() {
+    return {0.2, 0.35, 0.6, -25.0, 5.0, 1.723, Eigen::Matrix3d::Identity()};
+  }
 };
 
 /// Estimates the sampling from one scan (sensor frame); the height is that of a typical sensor, see
@@ -45,13 +47,14 @@ inline SensorModel estimate_sensor_model(PointsView points) {
 
   std::vector<float> azimuth(points.size() + detail::kLanes);
   std::vector<float> elevation(points.size() + detail::kLanes);
-  detail::for_lanes(points,
-                    [&](detail::Float8 x, detail::Float8 y, detail::Float8 z, std::size_t first) {
-                      using detail::arc_tangent2;
-                      const detail::Float8 degrees(static_cast<float>(180.0 / M_PI));
-                      (arc_tangent2(y, x) * degrees).store(&azimuth[first]);
-                      (arc_tangent2(z, sqrt(x * x + y * y)) * degrees).store(&elevation[first]);
-                    });
+  static constexpr detail::Constant8 kDegrees(static_cast<float>(180.0 / M_PI));
+  detail::for_lanes(points.size(), [&](auto at) {
+    const auto x = at.load(points.x.data());
+    const auto y = at.load(points.y.data());
+    const auto z = at.load(points.z.data());
+    (detail::arc_tangent2(y, x) * kDegrees).store(&azimuth[at.begin]);
+    (detail::arc_tangent2(z, sqrt(x * x + y * y)) * kDegrees).store(&elevation[at.begin]);
+  });
   azimuth.resize(points.size());
   elevation.resize(points.size());
   std::vector<float> sorted = elevation;

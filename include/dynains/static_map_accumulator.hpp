@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dynains/detail/chunked_vector.hpp"
+#include "dynains/detail/lane_transform.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/wide_lanes.hpp"
 #include "dynains/parameters.hpp"
@@ -175,20 +176,17 @@ class StaticMapAccumulator {
 
   // Points in the local frame, and their voxels there.
   void locate(PointsView points, const Eigen::Matrix<float, 3, 4>& m, Batch& batch) const {
-    using detail::Constant8;
-    const Constant8 scale(static_cast<float>(1.0 / voxel_));
-    const Constant8 t[3][4] = {{m(0, 0), m(0, 1), m(0, 2), m(0, 3)},
-                               {m(1, 0), m(1, 1), m(1, 2), m(1, 3)},
-                               {m(2, 0), m(2, 1), m(2, 2), m(2, 3)}};
+    const detail::Constant8 scale(static_cast<float>(1.0 / voxel_));
+    const detail::LaneTransform to_corner(m);
     detail::for_lanes(points.size(), [&](auto at) {
       using Float = typename decltype(at)::Float;
       const Float x = at.load(points.x.data());
       const Float y = at.load(points.y.data());
       const Float z = at.load(points.z.data());
-      for (std::size_t row = 0; row < 3; ++row) {
-        const Float value = (t[row][0] * x + t[row][1] * y) + (t[row][2] * z + t[row][3]);
-        value.store(&batch.local[row][at.begin]);
-        floor(value * scale).store(&batch.voxel[row][at.begin]);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const Float value = to_corner(axis, x, y, z);
+        value.store(&batch.local[axis][at.begin]);
+        floor(value * scale).store(&batch.voxel[axis][at.begin]);
       }
     });
   }

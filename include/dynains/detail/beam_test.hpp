@@ -9,7 +9,9 @@
 #include <cstring>
 #include <vector>
 
+#include "dynains/detail/lane_transform.hpp"
 #include "dynains/detail/lanes.hpp"
+#include "dynains/detail/room.hpp"
 #include "dynains/detail/wide_lanes.hpp"
 #include "dynains/points.hpp"
 #include "dynains/range_image.hpp"
@@ -36,10 +38,8 @@ class Sights {
   void resize(std::size_t count) {
     // Counting reads nine bytes from that of the first bit on.
     const std::size_t bytes = (count + kBeamBlock - 1) / kBeamBlock * kBeamBlock / 8 + 8;
-    if (free_.size() < bytes) {
-      free_.resize(bytes);
-      hit_.resize(bytes);
-    }
+    grow(free_, bytes);
+    grow(hit_, bytes);
   }
   /// Of the eight samples from `first` on, a multiple of eight: which were seen free (all beams
   /// about them went farther), and which were hit (a beam ended there).
@@ -80,10 +80,7 @@ inline void test_beams(const RangeImageGrid& grid, const RangeImage& image,
                        const Eigen::Isometry3f& T_reference_sample, const PointBuffer& samples,
                        std::size_t count, float margin, float slope, Sights& sights) {
   constexpr float kCentimetres = 100.0F;
-  const auto& m = T_reference_sample.matrix();
-  const Constant8 m00(m(0, 0)), m01(m(0, 1)), m02(m(0, 2)), m03(m(0, 3));
-  const Constant8 m10(m(1, 0)), m11(m(1, 1)), m12(m(1, 2)), m13(m(1, 3));
-  const Constant8 m20(m(2, 0)), m21(m(2, 1)), m22(m(2, 2)), m23(m(2, 3));
+  const LaneTransform to_reference(T_reference_sample.matrix().topRows<3>());
   const Constant8 to_centimetres(kCentimetres);
   const Constant8 base(margin * kCentimetres), growth(slope * kCentimetres);
   const ImageLocator locator(grid);
@@ -105,8 +102,7 @@ inline void test_beams(const RangeImageGrid& grid, const RangeImage& image,
         const Float py = Float::load(&samples.y[begin + i]);
         const Float pz = Float::load(&samples.z[begin + i]);
         const ImageLocation<Lanes> at = locator.template locate<Lanes>(
-            (m00 * px + m01 * py) + (m02 * pz + m03), (m10 * px + m11 * py) + (m12 * pz + m13),
-            (m20 * px + m21 * py) + (m22 * pz + m23));
+            to_reference(0, px, py, pz), to_reference(1, px, py, pz), to_reference(2, px, py, pz));
         at.cell.store(&cell[i]);
         at.range.store(&ranges[i]);
         for (std::size_t k = i; k < i + kLanes; ++k) __builtin_prefetch(&cells[cell[k]]);

@@ -45,7 +45,6 @@ struct Mask8 {
     return result;
 #endif
   }
-  bool any() const { return bits() != 0; }
 };
 
 struct Int8 {
@@ -126,12 +125,6 @@ struct Float8 {
   friend Mask8 operator>=(Float8 a, Float8 b) { return {a.lo >= b.lo, a.hi >= b.hi}; }
 };
 
-inline Float4 load4(const float* from) {
-  Float4 result;
-  std::memcpy(&result, from, sizeof(result));
-  return result;
-}
-
 inline Int4 bits_of(Float4 a) { return Int4(a); }
 inline Mask8 bits_of(Float8 a) { return {Int4(a.lo), Int4(a.hi)}; }
 inline Float8 float_of(Mask8 a) { return {Float4(a.lo), Float4(a.hi)}; }
@@ -166,8 +159,6 @@ inline Float8 max(Float8 a, Float8 b) {
   return select(a > b, a, b);
 #endif
 }
-inline Int8 min(Int8 a, Int8 b) { return select(a < b, a, b); }
-inline Int8 max(Int8 a, Int8 b) { return select(a > b, a, b); }
 
 inline Float8 sqrt(Float8 a) {
 #if defined(__SSE2__)
@@ -222,25 +213,21 @@ inline float sum(Float8 a) {
   const Float4 s = a.lo + a.hi;
   return (s[0] + s[2]) + (s[1] + s[3]);
 }
-inline float min_lane(Float8 a) {
+template <class Float>
+float min_lane(const Float& a) {
   float v[kLanes];
   a.store(v);
   float result = v[0];
   for (std::size_t i = 1; i < kLanes; ++i) result = v[i] < result ? v[i] : result;
   return result;
 }
-inline float max_lane(Float8 a) {
+template <class Float>
+float max_lane(const Float& a) {
   float v[kLanes];
   a.store(v);
   float result = v[0];
   for (std::size_t i = 1; i < kLanes; ++i) result = v[i] > result ? v[i] : result;
   return result;
-}
-
-/// True in the lanes below `count`.
-inline Mask8 first_lanes(std::size_t count) {
-  const Int8 index(Int4{0, 1, 2, 3}, Int4{4, 5, 6, 7});
-  return index < Int8(static_cast<std::int32_t>(count));
 }
 
 /// Bit i is set where byte i of the 64 that begin at `from` is not zero.
@@ -296,25 +283,6 @@ void for_each_change(const T* values, std::size_t count, Body&& body) {
     begin = i;
   }
   if (count > begin) body(count - begin);
-}
-
-/// Calls `body(x, y, z, i)` with eight points at a time, from point i on; the last ones are filled
-/// up with zeros.
-template <class Body>
-void for_lanes(PointsView points, Body&& body) {
-  const std::size_t count = points.size();
-  std::size_t i = 0;
-  for (; i + kLanes <= count; i += kLanes) {
-    body(Float8::load(&points.x[i]), Float8::load(&points.y[i]), Float8::load(&points.z[i]), i);
-  }
-  if (i == count) return;
-  float tail[3][kLanes] = {};
-  for (std::size_t k = i; k < count; ++k) {
-    tail[0][k - i] = points.x[k];
-    tail[1][k - i] = points.y[k];
-    tail[2][k - i] = points.z[k];
-  }
-  body(Float8::load(tail[0]), Float8::load(tail[1]), Float8::load(tail[2]), i);
 }
 
 }  // namespace dynains::detail

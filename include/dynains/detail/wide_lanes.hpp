@@ -183,17 +183,21 @@ struct Places : Lanes {
   }
 };
 
-/// Calls `kernel(Places)` for all of `count` places, eight by eight and from the first on.
+/// Calls `kernel(Places)` for all of `count` places, eight by eight and from the first on; within a
+/// kernel that has its lanes already.
+template <class Lanes, class Kernel>
+void for_places(std::size_t count, Kernel&& kernel) {
+  std::size_t begin = 0;
+  for (; begin + kLanes <= count; begin += kLanes) {
+    kernel(Places<Lanes, false>(begin, begin + kLanes));
+  }
+  if (begin < count) kernel(Places<Lanes, true>(begin, count));
+}
+
+/// The same with the lanes that suit the processor.
 template <class Kernel>
 void for_lanes(std::size_t count, Kernel&& kernel) {
-  run_lanes([&](auto lanes) {
-    using Lanes = decltype(lanes);
-    std::size_t begin = 0;
-    for (; begin + kLanes <= count; begin += kLanes) {
-      kernel(Places<Lanes, false>(begin, begin + kLanes));
-    }
-    if (begin < count) kernel(Places<Lanes, true>(begin, count));
-  });
+  run_lanes([&](auto lanes) { for_places<decltype(lanes)>(count, kernel); });
 }
 
 }  // namespace dynains::detail
