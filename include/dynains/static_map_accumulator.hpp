@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -114,8 +115,11 @@ class StaticMapAccumulator {
     const auto inside = [&](const Eigen::Vector3d& point) {
       if (box.contains(point)) visit(point);
     };
-    const Eigen::Array3d low = (box.min().array() / block_size()).floor();
-    const Eigen::Array3d high = (box.max().array() / block_size()).floor();
+    // A place farther away has no block, and its number may not fit into one.
+    constexpr double kFarthest = std::numeric_limits<std::int32_t>::max() - 1;
+    const Eigen::Array3d low = (box.min().array() / block_size()).floor().max(-kFarthest);
+    const Eigen::Array3d high = (box.max().array() / block_size()).floor().min(kFarthest);
+    if ((low > high).any()) return;
     const bool few = (high - low + 1.0).prod() < static_cast<double>(blocks_.size());
     if (!few) {
       for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
