@@ -1,8 +1,10 @@
 #include "dynains/evaluation/evaluate.hpp"
 
 #include <nlohmann/json.hpp>
+#include <set>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynains/errors.hpp"
@@ -195,6 +197,33 @@ TEST_CASE("Class lists are ids and ranges") {
   for (const char* list : {"", "x", "5-3", "1,", "1;2", "65536", "-1", "1-"}) {
     CHECK_THROWS_AS(TruthClasses(list, Unlabeled::kIgnore), ConfigError);
   }
+}
+
+TEST_CASE("A list of dynamic classes is told in the shortest way, and reads back") {
+  for (const char* list : {"252-259", "3-5,9", "0", "65535", "1,3,5-6"}) {
+    CHECK(TruthClasses(list, Unlabeled::kIgnore).dynamic_classes() == list);
+  }
+  CHECK(TruthClasses("9,3,4,5,5", Unlabeled::kIgnore).dynamic_classes() == "3-5,9");
+}
+
+TEST_CASE("What moves is named after what it is") {
+  // The pairs by which SemanticKITTI maps moving classes to those that stand.
+  const std::vector<std::pair<std::uint16_t, std::uint16_t>> pairs = {
+      {252, 10}, {253, 31}, {254, 30}, {255, 32}, {256, 16}, {257, 13}, {258, 18}, {259, 20}};
+  for (const auto& [moving, still] : pairs) {
+    CHECK(semantic_class_name(moving) == "moving-" + semantic_class_name(still));
+  }
+}
+
+TEST_CASE("Every class has a name of its own, known or not") {
+  std::set<std::string> names;
+  for (std::uint16_t id = 0; id < 300; ++id) names.insert(semantic_class_name(id));
+  CHECK(names.size() == 300);
+  CHECK(semantic_class_name(40) == "road");
+  CHECK(semantic_class_name(50) == "building");
+  CHECK(semantic_class_name(70) == "vegetation");
+  CHECK(semantic_class_name(260) == "class 260");
+  CHECK(semantic_class_name(65535) == "class 65535");
 }
 
 }  // namespace dynains::evaluation::testing

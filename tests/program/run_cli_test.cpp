@@ -445,3 +445,72 @@ TEST_CASE("A real clip runs as published", "[data]") {
   REQUIRE(outcome.code == 0);
   CHECK_THAT(outcome.out, ContainsSubstring("run"));
 }
+
+TEST_CASE("run writes scans of KITTI cleaned, in the frame they came in") {
+  const TemporaryFolder folder;
+  const std::string seq = folder / "seq";
+  constexpr std::size_t kScans = 12;
+  const bool world = GENERATE(false, true);
+  CAPTURE(world);
+  const Eigen::Vector3d position = world ? Eigen::Vector3d(30, -20, 2) : Eigen::Vector3d::Zero();
+  write_tiny_sequence(seq, kScans, position);
+  if (world) {  // the same points, registered
+    for (std::size_t i = 0; i < kScans; ++i) {
+      std::vector<float> xyzi = tiny_scan(i);
+      for (std::size_t k = 0; k < xyzi.size(); k += 4) {
+        Eigen::Map<Eigen::Vector3f>(xyzi.data() + k) += position.cast<float>();
+      }
+      write_scan(seq + "/velodyne/" + scan_name(i) + ".bin", xyzi);
+    }
+  }
+  std::vector<std::string> arguments = {"run", seq, "-o", folder / "out", "-q", "--write-clean"};
+  if (world) arguments.insert(arguments.end(), {"--frame", "world"});
+  const Outcome outcome = start(arguments);
+  CAPTURE(outcome.err);
+  REQUIRE(outcome.code == 0);
+
+  std::size_t removed = 0;
+  float furthest = 0.0F;
+  for (std::size_t i = 0; i < kScans; ++i) {
+    std::vector<float> all, kept;
+    read_scan(seq + "/velodyne/" + scan_name(i) + ".bin", all);
+    read_scan(folder / ("out/clean/" + scan_name(i) + ".bin"), kept);
+    const std::vector<std::uint32_t> labels =
+        read_labels(folder / ("out/labels/" + scan_name(i) + ".label"), all.size() / 4);
+    std::vector<float> expected;
+    for (std::size_t k = 0; k < labels.size(); ++k) {
+      if ((labels[k] & 0xFFFF) == 251) {
+        ++removed;
+      } else {
+        expected.insert(expected.end(), all.data() + 4 * k, all.data() + 4 * k + 4);
+      }
+    }
+    REQUIRE(kept.size() == expected.size());
+    for (std::size_t k = 0; k < kept.size(); ++k) {
+      furthest = std::max(furthest, std::abs(kept[k] - expected[k]));
+    }
+  }
+  CHECK(removed > 0);
+  // Into the sensor's frame and back costs a rounding; without a frame to change, bytes stay.
+  CHECK(furthest <= (world ? 1e-5F : 0.0F));
+}
+
+TEST_CASE(
+    "Progress is a bar that redraws itself on a terminal, lines in a file, nothing if quiet") {
+  const Fixture fixture;
+  const std::vector<std::string> arguments = {"run", fixture.seq, "--out", fixture.out, "--force"};
+  const std::string shown = show_on_terminal(arguments);
+  CAPTURE(shown);
+  const std::string full = "\r[" + std::string(40, '#') + "] 12 of 12 scans";
+  const std::size_t end = shown.find(full);
+  REQUIRE(end != std::string::npos);
+  CHECK(end == shown.rfind(full));
+  // One line from the first bar to the full one, which the next output does not write into.
+  CHECK(shown.find('\n', shown.find("\r[")) == end + full.size() + 1);
+
+  const Outcome redirected = fixture.run({"--force"});
+  CHECK_THAT(redirected.err, ContainsSubstring("12 of 12 scans\n"));
+  CHECK(redirected.err.find('\r') == std::string::npos);
+  CHECK(count_lines(redirected.err) <= 10);
+  CHECK(fixture.run({"--force", "--quiet"}).err.empty());
+}

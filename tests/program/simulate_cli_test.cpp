@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "dynains/io/kitti.hpp"
@@ -95,4 +97,50 @@ TEST_CASE("simulate refuses what it does not know") {
   CHECK_THAT(simulate(out, {"--scans", "0"}).err, ContainsSubstring("--scans = 0: expected INT"));
   CHECK(simulate(out, {"--scans", "0"}).code == 2);
   CHECK_FALSE(fs::exists(out));
+}
+
+TEST_CASE("statistics is a table with one row for each sequence") {
+  TemporaryFolder folder;
+  const std::string seq = folder / "seq";
+  REQUIRE(simulate(seq, {"--scans", "3", "--seed", "5"}).code == 0);
+  const KittiSequence sequence(seq);
+  const auto row_of = [&](const Outcome& outcome) {
+    const std::size_t from = outcome.out.find("| " + seq);
+    return from == std::string::npos ? std::string() : outcome.out.substr(from);
+  };
+
+  // The mean over all scans; with --step 2 over the first and the third.
+  const auto mean = [&](std::vector<std::size_t> scans) {
+    double points = 0;
+    for (const std::size_t i : scans) points += static_cast<double>(sequence.read_labels(i).size());
+    return std::llround(points / static_cast<double>(scans.size()));
+  };
+  const Outcome all = start({"statistics", seq, seq});
+  CAPTURE(all.out, all.err);
+  REQUIRE(all.code == 0);
+  CHECK(std::count(all.out.begin(), all.out.end(), '\n') == 4);
+  CHECK_THAT(all.out, StartsWith("| sequence | points | <5 m |"));
+  CHECK_THAT(row_of(all), StartsWith("| " + seq + " | " + std::to_string(mean({0, 1, 2})) + " |"));
+  const Outcome some = start({"statistics", seq, "--step", "2"});
+  CHECK_THAT(row_of(some), StartsWith("| " + seq + " | " + std::to_string(mean({0, 2})) + " |"));
+
+  // Without labels nothing is known to move, and no car is known.
+  fs::remove_all(seq + "/labels");
+  const Outcome unlabelled = start({"statistics", seq});
+  CHECK(unlabelled.code == 0);
+  CHECK_THAT(row_of(unlabelled), ContainsSubstring(" | 0.0 % | - | - | - |"));
+}
+
+TEST_CASE("statistics refuses what it cannot read") {
+  TemporaryFolder folder;
+  const std::string seq = folder / "seq";
+  REQUIRE(simulate(seq, {"--scans", "2"}).code == 0);
+  CHECK(start({"statistics", seq, "--step", "0"}).code == 2);
+  const Outcome nowhere = start({"statistics", folder / "nowhere"});
+  CHECK(nowhere.code == 1);
+  CHECK_THAT(nowhere.err, StartsWith("dynains: error: ") && ContainsSubstring("nowhere"));
+  write_text(seq + "/labels/000001.label", "1234");
+  const Outcome refused = start({"statistics", seq});
+  CHECK(refused.code == 1);
+  CHECK_THAT(refused.err, ContainsSubstring("000001.label: has 4 bytes, expected"));
 }

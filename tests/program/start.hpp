@@ -68,4 +68,48 @@ inline Outcome start(const std::vector<std::string>& arguments) {
   return Process(arguments).wait();
 }
 
+/// What `dynains ARGUMENTS` shows on a terminal of its own; throws unless it ends with exit code 0.
+inline std::string show_on_terminal(std::vector<std::string> arguments) {
+  const int screen = ::posix_openpt(O_RDWR | O_NOCTTY);
+  if (screen < 0 || ::grantpt(screen) != 0 || ::unlockpt(screen) != 0) {
+    throw std::runtime_error("no pseudo terminal");
+  }
+  std::vector<char*> argv;
+  arguments.insert(arguments.begin(), DYNAINS_PROGRAM);
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  const std::string terminal = ::ptsname(screen);
+  const pid_t id = ::fork();
+  if (id < 0) throw std::runtime_error("fork failed");
+  if (id == 0) {
+    const int to = ::open(terminal.c_str(), O_RDWR | O_NOCTTY);
+    ::dup2(to, STDOUT_FILENO);
+    ::dup2(to, STDERR_FILENO);
+    ::close(to);
+    ::close(screen);
+    ::execv(DYNAINS_PROGRAM, argv.data());
+    ::_exit(127);
+  }
+  // Reading ends with an error when nobody has the other end any more; until the child has opened
+  // it, that is so as well.
+  std::string shown;
+  int status = 0;
+  bool ended = false;
+  while (true) {
+    char part[256];
+    const ssize_t count = ::read(screen, part, sizeof(part));
+    if (count > 0) {
+      shown.append(part, static_cast<std::size_t>(count));
+    } else if (ended) {
+      break;
+    } else {
+      ended = ::waitpid(id, &status, WNOHANG) == id;
+      ::usleep(1000);
+    }
+  }
+  ::close(screen);
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) throw std::runtime_error(shown);
+  return shown;
+}
+
 }  // namespace dynains::test
