@@ -19,6 +19,8 @@
 #include "dynains/detail/stage_checks.hpp"
 #include "dynains/free_space_evidence.hpp"
 #include "dynains/ground_segmenter.hpp"
+#include "dynains/heading.hpp"
+#include "dynains/map_revision.hpp"
 #include "dynains/mounting.hpp"
 #include "dynains/occupancy_descriptor.hpp"
 #include "dynains/parameters.hpp"
@@ -59,6 +61,9 @@ class BasicDynaInsRemover {
   using Evidence = typename detail::EvidenceOf<Stages, FreeSpaceEvidence>::type;
   using Map = typename Stages::Map;
 
+  /// Whether this map can be revised, see MapRevision.
+  static constexpr bool kRevisable = detail::IsRevisable<Map, Evidence>::value;
+
   static_assert(detail::IsConfigurable<Ground>::value && detail::IsGround<Ground>::value,
                 "Stages::Ground needs Config and segment(PointsView, numbers, "
                 "GroundSplit&)");
@@ -84,6 +89,7 @@ class BasicDynaInsRemover {
     typename Belief::Config belief;
     typename Evidence::Config evidence;
     typename Map::Config map;
+    MapRevision::Config revision;
 
     /// The paper to the letter, with its published parameters.
     static Config paper() {
@@ -105,6 +111,7 @@ class BasicDynaInsRemover {
       visitor("BeliefUpdater", self.belief);
       visitor("FreeSpaceEvidence", self.evidence);
       visitor("StaticMapAccumulator", self.map);
+      visitor("MapRevision", self.revision);
     }
 
     /// Calls `visitor` with the Parameter of every field; names are unique over all stages.
@@ -118,6 +125,13 @@ class BasicDynaInsRemover {
     /// Throws ConfigError.
     void validate() const {
       visit_sections(*this, [](const char*, const auto& section) { section.validate(); });
+      if (!revision.revise_map) return;
+      if (!this->use_free_space) {
+        throw ConfigError("MapRevision.revise_map = true needs use_free_space = true");
+      }
+      if (!kRevisable) {
+        throw ConfigError("MapRevision.revise_map = true needs a map that is kept in memory");
+      }
     }
   };
 
@@ -132,6 +146,7 @@ class BasicDynaInsRemover {
         belief_(config.belief),
         evidence_(config.evidence),
         map_(config.map),
+        revision_(config.revision),
         ring_(std::max(static_cast<std::size_t>(config.window), latency() + 1)) {}
 
   const Config& config() const { return config_; }
@@ -185,6 +200,7 @@ class BasicDynaInsRemover {
   void reset() {
     const detail::OneCall::Guard guard(one_call_);
     map_.clear();
+    revision_.clear();
     instance_ids_ = {};
     sensor_ = {};
     pushed_ = 0;
@@ -208,7 +224,7 @@ class BasicDynaInsRemover {
     newest.make_room(newest.labels.size());
     if (needs_sensor() && !sensor_.known()) {
       adapt_to_sensor(newest);
-      if (!sensor_.is_level()) ingest(cloud, newest);
+      if (turns()) turn(newest);
     }
     clock.lap(result.times.ingest);
 
@@ -237,6 +253,8 @@ class BasicDynaInsRemover {
     result.newest = newest.verdict();
 
     if (pushed_ - finished_ > latency()) result.finished = finish_next(clock, result.times);
+    if (config_.revision.revise_map) revise_map(newest);
+    clock.lap(result.times.revision);
     return result;
   }
 
@@ -375,11 +393,18 @@ class BasicDynaInsRemover {
 
   // What depends on the sensor, from the first scan that has enough points.
   void adapt_to_sensor(ScanSlot& newest) {
-    sensor_ = estimate_sensor_model(ingest_.points());
+    Eigen::Matrix3d R_headed_sensor = Eigen::Matrix3d::Identity();
+    if (config_.level) R_headed_sensor = R_headed(estimate_heading(ingest_.points()));
+    PointBuffer turned;
+    const PointsView points = detail::turn(ingest_.points(), R_headed_sensor.cast<float>(), turned);
+    sensor_ = estimate_sensor_model(points);
     if (sensor_.known()) {
-      const Mounting mounting = estimate_mounting(ingest_.points());
+      const Mounting mounting = estimate_mounting(points);
       if (mounting.known) sensor_.height = mounting.height;
-      if (config_.level) sensor_.R_level_sensor = level(mounting);
+      if (config_.level) {
+        sensor_.R_headed_sensor = R_headed_sensor;
+        sensor_.R_level_headed = level(mounting, R_headed_sensor);
+      }
       if (newest.scan > 0) newest.segment = ++segment_;
     }
     const SensorModel model = sensor_.known() ? sensor_ : SensorModel::typical();
@@ -388,30 +413,34 @@ class BasicDynaInsRemover {
     evidence_.adapt(model);
   }
 
-  // The turn that makes a tilted sensor level.
-  Eigen::Matrix3d level(Mounting mounting) const {
+  // The turn that makes a tilted sensor level; `mounting` as seen from the headed frame.
+  Eigen::Matrix3d level(Mounting mounting, const Eigen::Matrix3d& R_headed_sensor) const {
     constexpr double kLevel = 4.0;  // deg; level sensors seem to be tilted by up to 2.6
     if (config_.mounting_pitch != 0.0 || config_.mounting_roll != 0.0) {
-      mounting.up_sensor = up_of_mounting(config_.mounting_pitch, config_.mounting_roll);
+      mounting.up_sensor =
+          R_headed_sensor * up_of_mounting(config_.mounting_pitch, config_.mounting_roll);
       return mounting.R_level_sensor();
     }
     return mounting.known && mounting.tilt() > kLevel ? mounting.R_level_sensor()
                                                       : Eigen::Matrix3d::Identity();
   }
 
-  // The points as a level sensor in the same place would see them.
+  // The points as a level sensor in the same place would see them that looks along the scene.
   template <class Cloud>
   void ingest(const Cloud& cloud, ScanSlot& newest) {
     const auto nearest = static_cast<float>(config_.min_range);
     const auto farthest = static_cast<float>(config_.max_range);
     newest.T_world_level = newest.T_world_sensor;
-    if (sensor_.is_level()) {
-      ingest_.read(cloud, nearest, farthest, newest.labels);
-      return;
-    }
-    newest.T_world_level.rotate(sensor_.R_level_sensor.transpose());
-    ingest_.read(cloud, sensor_.R_level_sensor.template cast<float>(), nearest, farthest,
-                 newest.labels);
+    ingest_.read(cloud, nearest, farthest, newest.labels);
+    if (turns()) turn(newest);
+  }
+
+  bool turns() const { return sensor_.known() && config_.level; }
+
+  void turn(ScanSlot& newest) {
+    const Eigen::Matrix3d R_level_sensor = sensor_.R_level_sensor();
+    newest.T_world_level.rotate(R_level_sensor.transpose());
+    ingest_.turn(R_level_sensor.template cast<float>());
   }
 
   // Verdict by point: at least `votes` windows said so, or the evidence does.
@@ -487,6 +516,15 @@ class BasicDynaInsRemover {
     return scan.verdict();
   }
 
+  void revise_map(const ScanSlot& newest) {
+    if constexpr (kRevisable) {
+      revision_.revise(
+          map_, newest.scan, newest.T_world_sensor.translation(),
+          [this](const PointBuffer& points, std::size_t count, const Eigen::Isometry3d& T)
+              -> const auto& { return evidence_.see(points, count, T); });
+    }
+  }
+
   struct ClusterVerdict {
     float belief;
     std::uint8_t dynamic;
@@ -500,6 +538,7 @@ class BasicDynaInsRemover {
   Belief belief_;
   Evidence evidence_;
   Map map_;
+  MapRevision revision_;
   SensorModel sensor_;
 
   detail::Ingest ingest_;

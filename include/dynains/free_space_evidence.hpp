@@ -70,12 +70,12 @@ class FreeSpaceEvidence {
   /// Scans after which a verdict is final.
   std::size_t horizon() const { return static_cast<std::size_t>(config_.horizon); }
 
-  /// Chooses the resolution of range images, which are those of the sensor as it is mounted; to be
+  /// Chooses the resolution of range images, which are those of the sensor as it is tilted; to be
   /// called once before the first scan.
   void adapt(const SensorModel& sensor) {
     grid_ = RangeImageGrid::for_sensor(sensor);
-    R_sensor_level_.reset();
-    if (!sensor.is_level()) R_sensor_level_ = sensor.R_level_sensor.transpose();
+    R_beams_level_.reset();
+    if (!sensor.is_level()) R_beams_level_ = sensor.R_level_headed.transpose();
   }
 
   /// Takes scan number `scan` in: scans come in order, from 0. `instance_of` holds the instance of
@@ -157,6 +157,13 @@ class FreeSpaceEvidence {
     footprint_.clear();
   }
 
+  /// What the scan observed last saw of the first `count` points (m; padded for wide loads).
+  const detail::Sights& see(const PointBuffer& points, std::size_t count,
+                            const Eigen::Isometry3d& T_world_points) {
+    look(points, count, T_world_points, views_[newest_ % views_.size()]);
+    return sights_;
+  }
+
   /// For each instance of the scan observed last, its number in the scan before, or kNoCluster.
   Span<const std::uint32_t> predecessors() const { return predecessors_; }
 
@@ -197,14 +204,15 @@ class FreeSpaceEvidence {
   void make_image(const Eigen::Isometry3d& T_world_level, const GroundSplit& split, View& view) {
     const auto reach = static_cast<float>(config_.lateral_margin);
     view.T_world_sensor = T_world_level;
-    if (!R_sensor_level_) {
+    if (!R_beams_level_) {
       view.image.build(grid_, split.ground(), split.non_ground(), reach, image_scratch_);
       return;
     }
-    view.T_world_sensor.rotate(R_sensor_level_->transpose());
-    detail::turn(split.ground(), R_sensor_level_->cast<float>(), turned_ground_);
-    detail::turn(split.non_ground(), R_sensor_level_->cast<float>(), turned_rest_);
-    view.image.build(grid_, turned_ground_, turned_rest_, reach, image_scratch_);
+    view.T_world_sensor.rotate(R_beams_level_->transpose());
+    const Eigen::Matrix3f R = R_beams_level_->cast<float>();
+    const PointsView ground = detail::turn(split.ground(), R, turned_ground_);
+    const PointsView rest = detail::turn(split.non_ground(), R, turned_rest_);
+    view.image.build(grid_, ground, rest, reach, image_scratch_);
   }
 
   Record& record_of(std::uint64_t scan) { return records_[scan % records_.size()]; }
@@ -545,7 +553,7 @@ class FreeSpaceEvidence {
   InstanceLinker linker_;
   TrackBelief track_belief_;
   RangeImageGrid grid_;
-  std::optional<Eigen::Matrix3d> R_sensor_level_;  // of a sensor that is tilted
+  std::optional<Eigen::Matrix3d> R_beams_level_;  // of a sensor that is tilted
   PointBuffer turned_ground_;
   PointBuffer turned_rest_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();  // of the cells of tracks

@@ -24,16 +24,26 @@ struct SensorModel {
 
   double height = 0.0;  ///< m over the ground
 
-  /// From the frame of the sensor, in which its beams are spaced like this, to that of a level one
-  /// in its place, in which its points are handed on.
-  Eigen::Matrix3d R_level_sensor = Eigen::Matrix3d::Identity();
+  /// From the frame of the sensor to one that looks where estimate_heading says; the beams are
+  /// spaced alike in both.
+  Eigen::Matrix3d R_headed_sensor = Eigen::Matrix3d::Identity();
+  /// From there to the frame of a level sensor in its place, in which its points are handed on.
+  Eigen::Matrix3d R_level_headed = Eigen::Matrix3d::Identity();
 
+  Eigen::Matrix3d R_level_sensor() const { return R_level_headed * R_headed_sensor; }
   bool known() const { return azimuth_step > 0.0; }
-  bool is_level() const { return R_level_sensor.isIdentity(0.0); }
+  bool is_level() const { return R_level_headed.isIdentity(0.0); }
 
   /// A 64-beam sensor on the roof of a car: what is assumed until a scan says more.
   static SensorModel typical() {
-    return {0.2, 0.35, 0.6, -25.0, 5.0, 1.723, Eigen::Matrix3d::Identity()};
+    SensorModel model;
+    model.azimuth_step = 0.2;
+    model.elevation_gap = 0.35;
+    model.elevation_gap_wide = 0.6;
+    model.elevation_min = -25.0;
+    model.elevation_max = 5.0;
+    model.height = 1.723;
+    return model;
   }
 };
 

@@ -15,6 +15,7 @@ struct StageTimes {
   double evidence = 0.0;    ///< free space seen by other scans
   double verdict = 0.0;     ///< from clusters to points
   double map = 0.0;         ///< Eq. 1
+  double revision = 0.0;    ///< of the map, by what the newest scan sees
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
@@ -26,6 +27,7 @@ struct StageTimes {
     visitor("evidence", self.evidence);
     visitor("verdict", self.verdict);
     visitor("map", self.map);
+    visitor("revision", self.revision);
   }
 
   double total() const {

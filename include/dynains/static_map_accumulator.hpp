@@ -93,6 +93,7 @@ class StaticMapAccumulator {
     recent_ = {};
     half_ = 1;
     size_ = 0;
+    free_ = kEnd;
   }
 
   /// Bytes held by the map, its index included.
@@ -104,7 +105,7 @@ class StaticMapAccumulator {
   /// Calls `visit(Eigen::Vector3d)` for every point, in metres, world frame.
   template <class Visitor>
   void for_each(Visitor&& visit) const {
-    for (std::uint32_t b = 0; b < blocks_.size(); ++b) visit_block(blocks_[b], visit);
+    for (std::uint32_t b = 0; b < blocks_.size(); ++b) visit_block(b, visit);
   }
 
   /// Calls `visit(Eigen::Vector3d)` for every point inside `box` (world frame, borders included).
@@ -125,7 +126,7 @@ class StaticMapAccumulator {
       for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
         const Index& at = blocks_[b].at;
         const Eigen::Array3d place(at.x, at.y, at.z);
-        if ((place >= low).all() && (place <= high).all()) visit_block(blocks_[b], inside);
+        if ((place >= low).all() && (place <= high).all()) visit_block(b, inside);
       }
       return;
     }
@@ -135,10 +136,36 @@ class StaticMapAccumulator {
       for (std::int32_t y = first.y(); y <= last.y(); ++y) {
         for (std::int32_t z = first.z(); z <= last.z(); ++z) {
           const std::uint32_t found = find_block({x, y, z}, hash({x, y, z}));
-          if (found != kEnd) visit_block(blocks_[found], inside);
+          if (found != kEnd) visit_block(found, inside);
         }
       }
     }
+  }
+
+  /// Blocks of neighbouring voxels, numbered in the order in which their first points came.
+  std::uint32_t block_count() const { return blocks_.size(); }
+  /// The lowest corner of a block, in metres, world frame.
+  Eigen::Vector3d block_corner(std::uint32_t block) const {
+    const Index& at = blocks_[block].at;
+    return Eigen::Array3d(at.x, at.y, at.z) * block_size();
+  }
+  /// Calls `visit(x, y, z)` for every point of a block, in metres from its corner.
+  template <class Visitor>
+  void visit_in_block(std::uint32_t block, Visitor&& visit) const {
+    for (std::uint32_t i = blocks_[block].first; i != kEnd; i = points_[i].next) {
+      visit(points_[i].x, points_[i].y, points_[i].z);
+    }
+  }
+  /// Removes all points of a block; its voxels can be filled again.
+  void erase_block(std::uint32_t block) {
+    const std::uint32_t first = blocks_[block].first;
+    if (first == kEnd) return;
+    blocks_[block].occupied = 0;
+    std::uint32_t* link = &blocks_[block].first;
+    for (; *link != kEnd; link = &points_[*link].next) --size_;
+    *link = free_;
+    free_ = first;
+    blocks_[block].first = kEnd;
   }
 
  private:
@@ -235,12 +262,21 @@ class StaticMapAccumulator {
       const std::uint64_t bit = std::uint64_t{1} << ((x & 7) | (y & 3) << 3 | (z & 1) << 5);
       if ((block.occupied & bit) != 0 && !keep_all_) continue;
       block.occupied |= bit;
-      block.first = points_.push_back(
-          {batch.local[0][i] - static_cast<float>(in_frame.x) * size.x(),
-           batch.local[1][i] - static_cast<float>(in_frame.y) * size.y(),
-           batch.local[2][i] - static_cast<float>(in_frame.z) * size.z(), block.first});
-      ++size_;
+      block.first =
+          add_point({batch.local[0][i] - static_cast<float>(in_frame.x) * size.x(),
+                     batch.local[1][i] - static_cast<float>(in_frame.y) * size.y(),
+                     batch.local[2][i] - static_cast<float>(in_frame.z) * size.z(), block.first});
     }
+  }
+
+  // In the place of one that was erased, if there is any.
+  std::uint32_t add_point(const Point& point) {
+    ++size_;
+    if (free_ == kEnd) return points_.push_back(point);
+    const std::uint32_t place = free_;
+    free_ = points_[place].next;
+    points_[place] = point;
+    return place;
   }
 
   // Neighbouring points meet the same few blocks again and again: a table without collisions among
@@ -305,14 +341,12 @@ class StaticMapAccumulator {
   }
 
   template <class Visitor>
-  void visit_block(const Block& block, Visitor&& visit) const {
-    const Eigen::Vector3d corner =
-        Eigen::Array3d(block.at.x, block.at.y, block.at.z) * block_size();
-    for (std::uint32_t i = block.first; i != kEnd; i = points_[i].next) {
-      const Point& point = points_[i];
-      const Eigen::Vector3d world = corner + Eigen::Vector3d(point.x, point.y, point.z);
+  void visit_block(std::uint32_t block, Visitor&& visit) const {
+    const Eigen::Vector3d corner = block_corner(block);
+    visit_in_block(block, [&](float x, float y, float z) {
+      const Eigen::Vector3d world = corner + Eigen::Vector3d(x, y, z);
       visit(world);
-    }
+    });
   }
 
   Config config_;
@@ -323,6 +357,7 @@ class StaticMapAccumulator {
   detail::ChunkedVector<std::uint32_t, 1024> buckets_;  // first block of each
   detail::ChunkedVector<Block, 512> blocks_;            // in the order of their first point
   detail::ChunkedVector<Point, 512> points_;
+  std::uint32_t free_ = kEnd;          // first place of points that were erased
   std::vector<std::uint32_t> recent_;  // blocks, by the lowest bits of their coordinates
 };
 

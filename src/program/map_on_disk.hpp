@@ -25,6 +25,7 @@ inline RemoverWithMapOnDisk::Config with_map_on_disk(const DynaInsRemover::Confi
   result.descriptor = config.descriptor;
   result.belief = config.belief;
   result.evidence = config.evidence;
+  result.revision = config.revision;
   result.map.map_voxel = config.map.map_voxel;
   result.map.map_memory = megabytes;
   result.map.map_folder = folder;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dynains/dyna_ins_remover.hpp"
+#include "dynains/heading.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "support/catch.hpp"
@@ -47,6 +48,29 @@ PointBuffer street(double height, const Eigen::Matrix3d& R_level_sensor) {
     for (double b = 0.0; b < 6.0; b += 0.23) add(a, 9.0, b - height);
   }
   return points;
+}
+
+TEST_CASE("a heading turns with the points and runs along the scene, to its fuller end") {
+  dynains::test::Random random(11);
+  PointBuffer scan;
+  for (int i = 0; i < 2000; ++i) {
+    scan.push_back(static_cast<float>(random.uniform(-30.0, 50.0)),
+                   static_cast<float>(random.uniform(-9.0, 9.0)), 0.0F);
+  }
+  CHECK(std::abs(dynains::estimate_heading(scan)) < 0.05);
+  const double plain = dynains::estimate_heading(scan);
+  for (const double angle : {0.5, 1.6, 3.1, -2.0, -0.01}) {
+    INFO("turned by " << angle);
+    const Eigen::Matrix3f R = dynains::R_headed(-angle).cast<float>();
+    PointBuffer turned;
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+      const Eigen::Vector3f p = R * Eigen::Vector3f(scan.x[i], scan.y[i], scan.z[i]);
+      turned.push_back(p.x(), p.y(), p.z());
+    }
+    const double off = dynains::estimate_heading(turned) - plain - angle;
+    CHECK(std::abs(std::remainder(off, 2.0 * M_PI)) < 1e-5);
+  }
+  CHECK(dynains::estimate_heading(PointBuffer()) == 0.0);
 }
 
 TEST_CASE("A plane and a wall give exact height and tilt") {

@@ -47,10 +47,11 @@ std::size_t count_lines(const std::string& text) {
 
 TEST_CASE("with --map-memory the map waits on the disk, and the results are the same") {
   const Fixture fixture;
-  REQUIRE(fixture.run().code == 0);
+  // Walls of the tiny scans lie on borders of voxels: turned, they would fall to either side.
+  REQUIRE(fixture.run({"--level", "false"}).code == 0);
   const std::size_t points = read_points(fixture.out + "/static_map.ply").positions.size();
   const std::string labels = read_text(fixture.out + "/labels/" + scan_name(5) + ".label");
-  const Outcome outcome = fixture.run({"--map-memory", "0", "--force"});
+  const Outcome outcome = fixture.run({"--map-memory", "0", "--level", "false", "--force"});
   CAPTURE(outcome.err);
   REQUIRE(outcome.code == 0);
   CHECK(count_entries(fixture.out) == 6);
@@ -72,7 +73,7 @@ TEST_CASE("with --map-memory the map waits on the disk, and the results are the 
     const PointBuffer other{{1000.0F}, {1000.0F}, {1000.0F}};
     TiledStaticMap(config).insert(other, {}, Eigen::Isometry3d::Identity());
   }
-  REQUIRE(fixture.run({"--map-memory", "0", "--resume"}).code == 0);
+  REQUIRE(fixture.run({"--map-memory", "0", "--level", "false", "--resume"}).code == 0);
   CHECK(count_entries(fixture.out) == 6);
   CHECK(read_text(fixture.out + "/static_map.ply") == map);
 }
@@ -85,6 +86,9 @@ TEST_CASE("The budget of the map needs a map and a size that can be") {
   const Outcome negative = fixture.run({"--map-memory=-1"});
   CHECK(negative.code != 0);
   CHECK_THAT(negative.err, ContainsSubstring("TiledStaticMap.map_memory = -1"));
+  const Outcome revised = fixture.run({"--map-memory", "10", "--revise-map", "true"});
+  CHECK(revised.code != 0);
+  CHECK_THAT(revised.err, ContainsSubstring("revise_map = true needs a map that is kept in memory"));
   CHECK(!fs::exists(fixture.out));
 }
 

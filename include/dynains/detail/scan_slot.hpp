@@ -9,6 +9,7 @@
 #include "dynains/cause.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/room.hpp"
+#include "dynains/detail/turn.hpp"
 #include "dynains/ground_segmenter.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
@@ -81,33 +82,6 @@ class Ingest {
   /// without finite coordinates stay out; a point at the origin is a beam that did not return.
   template <class Cloud>
   void read(const Cloud& cloud, float min_range, float max_range, std::vector<PointLabel>& labels) {
-    take_in(cloud, min_range, max_range, labels, [this](float x, float y, float z) {
-      put({x, y, z});
-    });
-  }
-
-  /// The same, but points that were taken in are turned.
-  template <class Cloud>
-  void read(const Cloud& cloud, const Eigen::Matrix3f& R_level_sensor, float min_range,
-            float max_range, std::vector<PointLabel>& labels) {
-    take_in(cloud, min_range, max_range, labels,
-            [&](float x, float y, float z) { put(R_level_sensor * Eigen::Vector3f(x, y, z)); });
-  }
-
-  PointsView points() const { return PointsView(points_).subview(0, count_); }
-  /// Position in the input of each point that was taken in.
-  const std::vector<std::uint32_t>& input() const { return input_; }
-
- private:
-  void put(const Eigen::Vector3f& p) {
-    points_.x[count_] = p.x();
-    points_.y[count_] = p.y();
-    points_.z[count_] = p.z();
-  }
-
-  template <class Cloud, class Place>
-  void take_in(const Cloud& cloud, float min_range, float max_range,
-               std::vector<PointLabel>& labels, Place&& place) {
     using Traits = PointCloudTraits<Cloud>;
     const std::size_t count = Traits::size(cloud);
     make_room(labels, count);
@@ -123,7 +97,9 @@ class Ingest {
       const float y = p.y();
       const float z = p.z();
       const float squared = x * x + y * y;
-      place(x, y, z);
+      points_.x[count_] = x;
+      points_.y[count_] = y;
+      points_.z[count_] = z;
       input_[count_] = static_cast<std::uint32_t>(i);
       // Comparisons with NaN are false, so that one test admits only good points.
       const bool good = squared >= min_squared && squared <= max_squared && z * z <= max_squared;
@@ -137,6 +113,14 @@ class Ingest {
     }
   }
 
+  /// Turns the points that were taken in.
+  void turn(const Eigen::Matrix3f& R) { detail::turn(points(), R, points_); }
+
+  PointsView points() const { return PointsView(points_).subview(0, count_); }
+  /// Position in the input of each point that was taken in.
+  const std::vector<std::uint32_t>& input() const { return input_; }
+
+ private:
   std::size_t count_ = 0;
   PointBuffer points_;
   std::vector<std::uint32_t> input_;

@@ -95,6 +95,16 @@ struct IsMap<Stage, std::void_t<decltype(std::declval<Stage&>().insert(
                                     std::declval<const Eigen::Isometry3d&>())),
                                 decltype(std::declval<Stage&>().clear())>> : std::true_type {};
 
+/// Whether evidence can be held against the blocks of a map: both offer what MapRevision needs.
+template <class Map, class Evidence, class = void>
+struct IsRevisable : std::false_type {};
+template <class Map, class Evidence>
+struct IsRevisable<Map, Evidence,
+                   std::void_t<decltype(std::declval<Map&>().erase_block(std::uint32_t{})),
+                               decltype(std::declval<Evidence&>().see(
+                                   std::declval<const PointBuffer&>(), std::size_t{},
+                                   std::declval<const Eigen::Isometry3d&>()))>> : std::true_type {};
+
 /// Stages::Evidence, or `Default` for sets of stages that name the paper's five only.
 template <class Stages, class Default, class = void>
 struct EvidenceOf {

@@ -3,25 +3,29 @@
 
 #include <Eigen/Core>
 #include <cstddef>
-#include <vector>
 
-#include "dynains/detail/room.hpp"
+#include "dynains/detail/lane_transform.hpp"
+#include "dynains/detail/lanes.hpp"
+#include "dynains/detail/wide_lanes.hpp"
 #include "dynains/points.hpp"
 
 namespace dynains::detail {
 
-/// Points in another frame of the same origin.
-inline void turn(PointsView points, const Eigen::Matrix3f& R, PointBuffer& turned) {
-  for (std::vector<float>* const values : {&turned.x, &turned.y, &turned.z}) {
-    make_room(*values, points.size());
-  }
-  turned.resize(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3f p = R * Eigen::Vector3f(points.x[i], points.y[i], points.z[i]);
-    turned.x[i] = p.x();
-    turned.y[i] = p.y();
-    turned.z[i] = p.z();
-  }
+/// Points in another frame of the same origin; may be `points` of the same buffer.
+inline PointsView turn(PointsView points, const Eigen::Matrix3f& R, PointBuffer& turned) {
+  Eigen::Matrix<float, 3, 4> m = Eigen::Matrix<float, 3, 4>::Zero();
+  m.leftCols<3>() = R;
+  const LaneTransform transform(m);
+  turned.grow(points.size() + kLanes);
+  for_lanes(points.size(), [&](auto at) {
+    const auto x = at.load(points.x.data());
+    const auto y = at.load(points.y.data());
+    const auto z = at.load(points.z.data());
+    transform(0, x, y, z).store(&turned.x[at.begin]);
+    transform(1, x, y, z).store(&turned.y[at.begin]);
+    transform(2, x, y, z).store(&turned.z[at.begin]);
+  });
+  return PointsView(turned).subview(0, points.size());
 }
 
 }  // namespace dynains::detail

@@ -1,0 +1,231 @@
+// What is in the map and is later seen through leaves it again.
+#include "dynains/map_revision.hpp"
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "dynains/detail/beam_test.hpp"
+#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/static_map_accumulator.hpp"
+#include "support/catch.hpp"
+#include "support/runs.hpp"
+#include "support/scene.hpp"
+
+namespace dynains::test {
+namespace {
+
+/// A scan to which all places look alike: free, hit, or nothing at all.
+class Eyes {
+ public:
+  enum class Sight { kNothing, kFree, kHit };
+
+  explicit Eyes(Sight sight) : sight_(sight) {}
+  const detail::Sights& operator()(const PointBuffer&, std::size_t count,
+                                   const Eigen::Isometry3d&) {
+    sights_.resize(count);
+    for (std::size_t i = 0; i < count; i += 8) {
+      sights_.set(i, sight_ == Sight::kFree ? 0xFFU : 0U, sight_ == Sight::kHit ? 0xFFU : 0U);
+    }
+    return sights_;
+  }
+
+ private:
+  Sight sight_;
+  detail::Sights sights_;
+};
+using Sight = Eyes::Sight;
+
+PointBuffer three_points(float x) {
+  PointBuffer points;
+  points.push_back(x, 0.1F, 0.1F);
+  points.push_back(x, 0.3F, 0.1F);
+  points.push_back(x, 0.1F, 0.3F);
+  return points;
+}
+
+struct Watched {
+  MapRevision revision;
+  StaticMapAccumulator map;
+  std::uint64_t scan = 0;
+
+  explicit Watched(const MapRevision::Config& config = every_scan()) : revision(config) {
+    map.insert(three_points(5.1F), {}, Eigen::Isometry3d::Identity());
+  }
+  static MapRevision::Config every_scan() {
+    MapRevision::Config config;
+    config.revision_period = 1;
+    return config;
+  }
+  void look(Sight sight, const Eigen::Vector3d& sensor = Eigen::Vector3d::Zero()) {
+    revision.revise(map, scan++, sensor, Eyes(sight));
+  }
+};
+
+// log-odds of 0.7 is 0.847; wholly free counts twice: 1.69, then 3.39, over the 2.94 of 0.95.
+TEST_CASE("a block of the map is emptied by the second scan that sees it wholly free") {
+  Watched watched;
+  watched.look(Sight::kFree);
+  CHECK(watched.map.size() == 3);
+  watched.look(Sight::kFree);
+  CHECK(watched.map.empty());
+}
+
+// The hit takes 1.70 away: 1.69, 0, 1.69, 3.39.
+TEST_CASE("a hit takes back what was seen free before, and no more than that") {
+  Watched watched;
+  for (int i = 0; i < 50; ++i) watched.look(Sight::kHit);
+  watched.look(Sight::kFree);
+  watched.look(Sight::kHit);
+  watched.look(Sight::kFree);
+  CHECK(watched.map.size() == 3);
+  watched.look(Sight::kNothing);
+  CHECK(watched.map.size() == 3);
+  watched.look(Sight::kFree);
+  CHECK(watched.map.empty());
+}
+
+TEST_CASE("tau_revise says how much it takes") {
+  MapRevision::Config config = Watched::every_scan();
+  config.tau_revise = 0.84;  // log-odds 1.66
+  Watched sooner(config);
+  sooner.look(Sight::kFree);
+  CHECK(sooner.map.empty());
+  config.tau_revise = 0.97;  // log-odds 3.48
+  Watched later(config);
+  later.look(Sight::kFree);
+  later.look(Sight::kFree);
+  CHECK(later.map.size() == 3);
+  later.look(Sight::kFree);
+  CHECK(later.map.empty());
+}
+
+TEST_CASE("a block is looked at once in a period, and only within range") {
+  MapRevision::Config config;
+  config.revision_period = 5;
+  config.tau_revise = 0.84;
+  Watched watched(config);
+  for (int i = 0; i < 20; ++i) watched.look(Sight::kFree, {66.0, 0.0, 0.0});
+  CHECK(watched.map.size() == 3);
+  int looks = 0;
+  while (!watched.map.empty() && looks < 6) {
+    watched.look(Sight::kFree, {64.0, 0.0, 0.0});
+    ++looks;
+  }
+  CHECK(watched.map.empty());
+  CHECK(looks <= 5);
+}
+
+TEST_CASE("places that were emptied are filled again, with the memory of before") {
+  Watched watched;
+  const std::size_t memory = watched.map.memory_bytes();
+  for (int round = 0; round < 2000; ++round) {
+    watched.look(Sight::kFree);
+    watched.look(Sight::kFree);
+    REQUIRE(watched.map.empty());
+    watched.map.insert(three_points(5.1F), {}, Eigen::Isometry3d::Identity());
+    REQUIRE(watched.map.size() == 3);
+  }
+  CHECK(watched.map.memory_bytes() == memory);
+  std::size_t visited = 0;
+  watched.map.for_each([&](const Eigen::Vector3d& p) {
+    ++visited;
+    CHECK(std::abs(p.x() - 5.1) < 1e-5);
+  });
+  CHECK(visited == 3);
+}
+
+/// The sensor stands; a van is parked between it and a wall for 3 s and then leaves at 8 m/s.
+std::vector<Scan> departure() {
+  Scene parked = yard_with(van(9.0, 3.0));
+  Scene leaving = yard_with(van(9.0, 3.0 - 3.0 * 8.0, {0.0, 8.0, 0.0}));
+  for (Scene* const scene : {&parked, &leaving}) {
+    scene->boxes.push_back({{20.0, -30.0, 0.0}, {21.0, 30.0, 8.0}});
+  }
+  std::vector<Scan> scans;
+  for (int i = 0; i < 70; ++i) {
+    scans.push_back((i < 30 ? parked : leaving).scan(sensor_at(0.0), 0.1 * i));
+  }
+  return scans;
+}
+
+std::size_t points_of_van(const StaticMapAccumulator& map) {
+  std::size_t count = 0;
+  // Lower blocks are shared with the ground, which stays.
+  map.for_each_in({Eigen::Vector3d(6.7, 1.9, 0.41), Eigen::Vector3d(11.3, 4.1, 2.5)},
+                  [&](const Eigen::Vector3d&) { ++count; });
+  return count;
+}
+
+TEST_CASE("a van that leaves after the horizon leaves the map, too; verdicts stay as they were") {
+  const std::vector<Scan> scans = departure();
+  DynaInsRemover::Config config;
+  config.evidence.horizon = 5;
+  DynaInsRemover plain(config);
+  config.revision.revise_map = true;
+  DynaInsRemover revising(config);
+  CHECK(run(plain, scans).final == run(revising, scans).final);
+  CHECK(points_of_van(plain.map()) > 100);
+  CHECK(points_of_van(revising.map()) < 5);
+  // Nothing else is lost.
+  const std::size_t van = points_of_van(plain.map()) - points_of_van(revising.map());
+  CHECK(static_cast<double>(revising.map().size()) >
+        0.998 * static_cast<double>(plain.map().size() - van));
+}
+
+TEST_CASE("after a reset, a revised map comes out the same") {
+  const std::vector<Scan> scans = departure();
+  DynaInsRemover::Config config;
+  config.evidence.horizon = 5;
+  config.revision.revise_map = true;
+  DynaInsRemover remover(config);
+  const auto points = [&] {
+    std::vector<Eigen::Vector3d> result;
+    remover.map().for_each([&](const Eigen::Vector3d& p) { result.push_back(p); });
+    return result;
+  };
+  run(remover, scans);
+  const std::vector<Eigen::Vector3d> first = points();
+  remover.reset();
+  run(remover, scans);
+  CHECK(points() == first);
+}
+
+/// A map that cannot let go of points.
+class CountingMap {
+ public:
+  struct Config {
+    template <class Self, class Visitor>
+    static void visit(Self&, Visitor&&) {}
+    void validate() const {}
+  };
+  explicit CountingMap(const Config&) {}
+  void insert(PointsView points, Span<const std::uint8_t>, const Eigen::Isometry3d&) {
+    count_ += points.size();
+  }
+  void clear() { count_ = 0; }
+
+ private:
+  std::size_t count_ = 0;
+};
+struct CountingStages : DefaultStages {
+  using Map = CountingMap;
+};
+
+TEST_CASE("a map is revised by free-space evidence, and only one that can let go of points") {
+  DynaInsRemover::Config config = DynaInsRemover::Config::paper();
+  config.revision.revise_map = true;
+  CHECK_THROWS_WITH(DynaInsRemover(config),
+                    ContainsSubstring("MapRevision.revise_map = true needs use_free_space = true"));
+  BasicDynaInsRemover<CountingStages>::Config counting;
+  CHECK_NOTHROW(BasicDynaInsRemover<CountingStages>(counting));
+  counting.revision.revise_map = true;
+  CHECK_THROWS_WITH(
+      BasicDynaInsRemover<CountingStages>(counting),
+      ContainsSubstring("MapRevision.revise_map = true needs a map that is kept in memory"));
+}
+
+}  // namespace
+}  // namespace dynains::test
