@@ -203,11 +203,16 @@ class CurvedVoxelClusterer {
       first_run_of_block_.resize(blocks);
       cells_.resize(blocks * kBlock);
     }
+    // Read once: stores of bytes may change anything, as far as the compiler knows.
+    const std::int32_t* const cell_of = cell_of_.data();
+    std::uint8_t* const cells = cells_.data();
+    std::uint8_t* const is_used = is_used_.data();
+    const std::size_t first_cell = first_cell_;
     for (std::size_t i = 0; i < count; ++i) {
-      if (cell_of_[i] < 0) continue;
-      const std::size_t cell = static_cast<std::size_t>(cell_of_[i]) - first_cell_;
-      cells_[cell] = 1;
-      is_used_[cell / kBlock] = 1;
+      if (cell_of[i] < 0) continue;
+      const std::size_t cell = static_cast<std::size_t>(cell_of[i]) - first_cell;
+      cells[cell] = 1;
+      is_used[cell / kBlock] = 1;
     }
   }
 

@@ -458,39 +458,59 @@ class BasicDynaInsRemover {
   void write_verdict(ScanSlot& scan, int votes) {
     const bool evident = config_.use_free_space;
     const bool all = evident || !scan.is_written;
-    const std::size_t ground_count = scan.split.ground_count;
     if (!scan.is_written) begin_verdict(scan);
-    for (std::size_t i = 0; evident && i < ground_count; ++i) {
-      const bool dynamic = is_dynamic(scan.proof[i]);
-      if (!dynamic && scan.is_kept[i] != 0) continue;
-      const std::uint32_t to = scan.split.input[i];
-      scan.is_kept[i] = dynamic ? 0 : 1;
-      scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kGround;
-      scan.causes[to] = scan.proof[i];
-      scan.beliefs[to] = scan.evidence[i];
-    }
-    for (std::size_t i = 0; i < scan.non_ground_count(); ++i) {
-      const std::size_t at = ground_count + i;
+    if (evident) write_ground_verdict(scan);
+    // Read once: stores of bytes may change anything, as far as the compiler knows.
+    const std::size_t ground_count = scan.split.ground_count;
+    const Span<const std::uint32_t> input(&scan.split.input[0] + ground_count,
+                                          scan.non_ground_count());
+    const std::uint8_t* const voted = scan.votes.data();
+    const Reach* const reach = scan.reach.data();
+    const float* const windows = scan.belief.data();
+    const float* const evidence = scan.evidence.data() + ground_count;
+    Cause* const proof = scan.proof.data() + ground_count;
+    std::uint8_t* const is_kept = scan.is_kept.data() + ground_count;
+    PointLabel* const labels = scan.labels.data();
+    Cause* const causes = scan.causes.data();
+    float* const beliefs = scan.beliefs.data();
+    for (std::size_t i = 0; i < input.size(); ++i) {
       if (!evident) {
-        const Cause cause = cause_to_stay(scan.reach[i]);
-        if (!all && cause == scan.proof[at] && scan.votes[i] == 0 && scan.belief[i] == 0.0F) {
-          continue;
-        }
-        scan.proof[at] = cause;
+        const Cause cause = cause_to_stay(reach[i]);
+        if (!all && cause == proof[i] && voted[i] == 0 && windows[i] == 0.0F) continue;
+        proof[i] = cause;
       }
-      Cause cause = scan.proof[at];
-      if (scan.votes[i] >= votes && !is_dynamic(cause)) cause = Cause::kProposed;
+      Cause cause = proof[i];
+      if (voted[i] >= votes && !is_dynamic(cause)) cause = Cause::kProposed;
       const bool dynamic = is_dynamic(cause);
-      const std::uint32_t to = scan.split.input[at];
-      scan.is_kept[at] = dynamic ? 0 : 1;
-      scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
-      scan.causes[to] = cause;
-      scan.instances[to] = scan.cluster[i] == kNoCluster ? kNoInstance : scan.ids[scan.cluster[i]];
-      scan.beliefs[to] = evident ? std::max(scan.belief[i], scan.evidence[at]) : scan.belief[i];
+      const std::uint32_t to = input[i];
+      is_kept[i] = dynamic ? 0 : 1;
+      labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
+      causes[to] = cause;
+      beliefs[to] = evident ? std::max(windows[i], evidence[i]) : windows[i];
     }
   }
 
-  // Ground, and nothing known of the rest.
+  // Most ground stays, and is already known to.
+  void write_ground_verdict(ScanSlot& scan) const {
+    const std::size_t count = scan.split.ground_count;
+    for (std::size_t begin = 0; begin < count; begin += detail::kLanes) {
+      const std::size_t end = std::min(begin + detail::kLanes, count);
+      unsigned to_write = 0;
+      for (std::size_t i = begin; i < end; ++i) {
+        to_write |= is_dynamic(scan.proof[i]) || scan.is_kept[i] == 0 ? 1U : 0U;
+      }
+      for (std::size_t i = begin; to_write != 0 && i < end; ++i) {
+        const bool dynamic = is_dynamic(scan.proof[i]);
+        const std::uint32_t to = scan.split.input[i];
+        scan.is_kept[i] = dynamic ? 0 : 1;
+        scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kGround;
+        scan.causes[to] = scan.proof[i];
+        scan.beliefs[to] = dynamic ? scan.evidence[i] : 0.0F;
+      }
+    }
+  }
+
+  // What does not change any more: ground, and the instances of the rest.
   void begin_verdict(ScanSlot& scan) const {
     scan.is_written = true;
     scan.instances.assign(scan.labels.size(), kNoInstance);
@@ -498,9 +518,18 @@ class BasicDynaInsRemover {
     scan.causes.assign(scan.labels.size(), Cause::kNotJudged);
     scan.is_kept.assign(scan.split.count, 1);
     scan.proof.resize(scan.split.count);
-    for (std::size_t i = 0; i < scan.split.ground_count; ++i) {
-      scan.labels[scan.split.input[i]] = PointLabel::kGround;
-      scan.causes[scan.split.input[i]] = Cause::kGround;
+    scan.evidence.resize(scan.split.count);
+    const std::uint32_t* const input = scan.split.input.data();
+    PointLabel* const labels = scan.labels.data();
+    Cause* const causes = scan.causes.data();
+    const std::size_t ground_count = scan.split.ground_count;
+    for (std::size_t i = 0; i < ground_count; ++i) {
+      labels[input[i]] = PointLabel::kGround;
+      causes[input[i]] = Cause::kGround;
+    }
+    for (std::size_t i = 0; i < scan.cluster.size(); ++i) {
+      const std::uint32_t cluster = scan.cluster[i];
+      if (cluster != kNoCluster) scan.instances[input[ground_count + i]] = scan.ids[cluster];
     }
   }
 

@@ -126,8 +126,8 @@ class FreeSpaceEvidence {
   }
 
   /// Verdict on a scan that is at most `horizon()` old, as the evidence stands now: by point of
-  /// `split`, why it moved or stayed (see is_dynamic), and the belief that it moved. Nothing is
-  /// presumed in a final verdict.
+  /// `split`, why it moved or stayed (see is_dynamic), and the belief that it moved; of ground only
+  /// where it moved. Nothing is presumed in a final verdict.
   void judge(std::uint64_t scan, bool is_final, const GroundSplit& split,
              std::vector<Cause>& causes, std::vector<float>& belief) {
     const Record& record = record_of(scan);
@@ -136,7 +136,8 @@ class FreeSpaceEvidence {
     const auto non_ground = causes.begin() + static_cast<std::ptrdiff_t>(split.ground_count);
     std::fill(causes.begin(), non_ground, Cause::kGround);
     std::fill(non_ground, causes.end(), Cause::kNotJudged);
-    belief.assign(split.count, 0.0F);
+    belief.resize(split.count);
+    std::fill(belief.begin() + static_cast<std::ptrdiff_t>(split.ground_count), belief.end(), 0.0F);
     const PointsView points = split.non_ground();
     for (const InstanceSamples::Streak& streak : record.samples.streaks) {
       const Verdict& verdict = verdicts_[streak.supervoxel];

@@ -51,6 +51,7 @@ class GroundSegmenter {
   static constexpr std::array<std::int32_t, kZones> kSectors = {16, 32, 54, 32};
   static constexpr std::size_t kPatches = 2 * 16 + 4 * 32 + 4 * 54 + 4 * 32;
   /// The innermost rings, where height and roughness of a patch are checked.
+  static constexpr std::size_t kFewestInStreak = 4;  // points on average, to move them together
   static constexpr std::size_t kCheckedRings = 4;
   static constexpr int kMaxLowest = 64;
 
@@ -247,24 +248,57 @@ class GroundSegmenter {
     }
   };
 
-  // Counting sort; stable, so that points keep the order of the scan within their patch. Neighbours
-  // in the scan mostly share a patch: what is counted and moved are streaks of points.
+  // Counting sort; stable, so that points keep the order of the scan within their patch.
   void sort_by_patch(PointsView scan, Span<const std::uint32_t> input) {
     const std::size_t count = scan.size();
     sorted_.resize(count);
     detail::grow(patch_of_, count + detail::kLanes);
     find_patches(scan);
-
-    streak_end_.clear();
     patch_begin_.fill(0);
+    // Scans that come beam by beam have long streaks of points in one patch, those that come column
+    // by column have none.
+    if (detail::count_changes(patch_of_.data(), count) > count / kFewestInStreak) {
+      sort_points(scan, input);
+    } else {
+      sort_streaks(scan, input);
+    }
+  }
+
+  // From the sizes of patches, each in the place behind its own, to where they begin.
+  void add_up_sizes() {
+    for (std::size_t p = 1; p < patch_begin_.size(); ++p) patch_begin_[p] += patch_begin_[p - 1];
+  }
+
+  void sort_points(PointsView scan, Span<const std::uint32_t> input) {
+    const std::int32_t* const patch_of = patch_of_.data();
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+      ++patch_begin_[static_cast<std::size_t>(patch_of[i]) + 1];
+    }
+    add_up_sizes();
+    auto next = patch_begin_;
+    float* const x = sorted_.points.x.data();
+    float* const y = sorted_.points.y.data();
+    float* const z = sorted_.points.z.data();
+    std::uint32_t* const numbers = sorted_.input.data();
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+      const std::size_t to = next[static_cast<std::size_t>(patch_of[i])]++;
+      x[to] = scan.x[i];
+      y[to] = scan.y[i];
+      z[to] = scan.z[i];
+      numbers[to] = input[i];
+    }
+  }
+
+  // What is counted and moved are whole streaks: no counter waits for its own last increment.
+  void sort_streaks(PointsView scan, Span<const std::uint32_t> input) {
+    streak_end_.clear();
     std::size_t begin = 0;
-    detail::for_each_change(patch_of_.data(), count, [&](std::size_t length) {
+    detail::for_each_change(patch_of_.data(), scan.size(), [&](std::size_t length) {
       patch_begin_[static_cast<std::size_t>(patch_of_[begin]) + 1] += length;
       begin += length;
       streak_end_.push_back(static_cast<std::uint32_t>(begin));
     });
-    for (std::size_t p = 1; p < patch_begin_.size(); ++p) patch_begin_[p] += patch_begin_[p - 1];
-
+    add_up_sizes();
     auto next = patch_begin_;
     begin = 0;
     for (const std::uint32_t end : streak_end_) {

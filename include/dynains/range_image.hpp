@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <memory>
 #include <vector>
 
 #include "dynains/detail/arc_tangent.hpp"
@@ -152,7 +153,7 @@ class RangeImage {
   };
 
   const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
-  const Cell* data() const { return cells_.data(); }
+  const Cell* data() const { return cells_.get(); }
 
   /// Replaces the image by that of one scan (m, sensor frame). A return of an object protects what
   /// lies within `reach` (m) beside it, at least its 3x3 cells: near the sensor these are a few
@@ -238,7 +239,7 @@ class RangeImage {
     const std::size_t stride = grid.stride();
     const auto rows = static_cast<std::size_t>(grid.rows);
     const auto columns = static_cast<std::size_t>(grid.columns);
-    cells_.resize(grid.cell_count());
+    make_cells(grid.cell_count());
     scratch.least.resize(stride);
     scratch.count.resize(stride);
     scratch.border.assign(stride, kNothing);
@@ -353,7 +354,17 @@ class RangeImage {
     row[detail::kLanes + columns] = row[detail::kLanes];
   }
 
-  std::vector<Cell> cells_;
+  // Without values: an image is the largest buffer of all, and each of its cells is written before
+  // it is read but the first, which stands for all directions outside.
+  void make_cells(std::size_t count) {
+    if (count == cell_count_) return;
+    cells_.reset(new Cell[count]);
+    cells_[0] = {kNothing, kUnknown};
+    cell_count_ = count;
+  }
+
+  std::unique_ptr<Cell[]> cells_;
+  std::size_t cell_count_ = 0;
 };
 
 }  // namespace dynains

@@ -16,7 +16,7 @@ struct RemoverConfig {
   double max_range = 250;  ///< m, horizontal and vertical; farther points are not measurements
   double max_gap = 1.0;    ///< s; a longer pause between scans starts a new window
   double max_speed = 100;  ///< m/s; a pose that jumps farther than that starts a new window
-  bool level = true;       ///< turn the scans of a tilted sensor level
+  bool level = true;       ///< turn scans level, and along the scene
   double mounting_pitch = 0.0;  ///< deg, nose down; with the roll: 0, 0 is found in the first scan
   double mounting_roll = 0.0;   ///< deg, left side up
   bool use_free_space = true;   ///< evidence from what other scans saw through
@@ -49,7 +49,7 @@ struct RemoverConfig {
     visitor(Parameter{"max_speed", self.max_speed, half_open_below(0, 1e9), "m/s",
                       "a pose that is farther from the one before starts a new window"});
     visitor(Parameter{"level", self.level, Bounds(), "",
-                      "turn the scans of a tilted sensor level before they are judged"});
+                      "turn scans level, and along the scene, before they are judged"});
     visitor(Parameter{"mounting_pitch", self.mounting_pitch, closed(-180, 180), "deg",
                       "tilt of the sensor about its y axis, nose down (x forward), before the "
                       "roll; if pitch and roll are 0, the tilt is found in the first scan"});
