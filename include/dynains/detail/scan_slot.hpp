@@ -90,27 +90,32 @@ class Ingest {
     grow(input_, count + kLanes);
     const float min_squared = min_range * min_range;
     const float max_squared = max_range * max_range;
-    count_ = 0;
+    float* const xs = points_.x.data();
+    float* const ys = points_.y.data();
+    float* const zs = points_.z.data();
+    std::uint32_t* const input = input_.data();
+    std::size_t taken = 0;
     for (std::size_t i = 0; i < count; ++i) {
       const auto p = Traits::point(cloud, i);
       const float x = p.x();
       const float y = p.y();
       const float z = p.z();
       const float squared = x * x + y * y;
-      points_.x[count_] = x;
-      points_.y[count_] = y;
-      points_.z[count_] = z;
-      input_[count_] = static_cast<std::uint32_t>(i);
+      xs[taken] = x;
+      ys[taken] = y;
+      zs[taken] = z;
+      input[taken] = static_cast<std::uint32_t>(i);
       // Comparisons with NaN are false, so that one test admits only good points.
       const bool good = squared >= min_squared && squared <= max_squared && z * z <= max_squared;
       if (good && (squared > 0.0F || z != 0.0F)) {
-        ++count_;
+        ++taken;
       } else {
         const bool finite = x - x == 0.0F && y - y == 0.0F && z - z == 0.0F;
         const bool missing = x == 0.0F && y == 0.0F && z == 0.0F;
         labels[i] = finite && !missing ? PointLabel::kOutOfRange : PointLabel::kInvalid;
       }
     }
+    count_ = taken;
   }
 
   /// Turns the points that were taken in.
