@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <unordered_map>
 
+#include "dynains/errors.hpp"
 #include "simulation/grid_index.hpp"
 
 namespace dynains::simulation {
@@ -33,6 +35,10 @@ double share(std::size_t part, std::size_t whole) {
 
 void ScanStatistics::add(Span<const float> xyzi, Span<const std::uint32_t> labels) {
   const std::size_t count = xyzi.size() / 4;
+  if (!labels.empty() && labels.size() != count) {
+    throw CloudError("ScanStatistics: " + std::to_string(labels.size()) + " labels for " +
+                     std::to_string(count) + " points");
+  }
   ++scans_;
   std::vector<float> lowest(grid_index(kCells, 0, kCells), std::numeric_limits<float>::infinity());
   std::unordered_map<std::uint32_t, Car> cars;

@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "dynains/errors.hpp"
 #include "support/catch.hpp"
 
 namespace dynains::simulation {
@@ -53,6 +54,18 @@ TEST_CASE("A beam without return is no point, neither of a range nor of the grou
   // Scans of nothing count as scans.
   statistics.add({}, {});
   CHECK(statistics.points_per_scan() == 0.5);
+}
+
+TEST_CASE("Labels are one per point, or none at all") {
+  LabelledScan scan;
+  scan.add(10.0F, 0.0F, -1.7F);
+  scan.add(11.0F, 0.0F, -1.7F);
+  ScanStatistics statistics;
+  CHECK_THROWS_AS(statistics.add(scan.xyzi, Span<const std::uint32_t>(scan.labels).subspan(0, 1)),
+                  CloudError);
+  statistics.add(scan.xyzi, {});
+  CHECK(statistics.points_per_scan() == 2);
+  CHECK(statistics.moving_share() == 0.0);
 }
 
 TEST_CASE("Ground is what lies low around it and far below the sensor") {

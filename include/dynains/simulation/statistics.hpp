@@ -19,6 +19,7 @@ class ScanStatistics {
   static constexpr std::array<double, 3> kCarRanges{10, 20, 40};
 
   /// `xyzi` interleaved, sensor frame, z about upwards; `labels` SemanticKITTI, or empty.
+  /// Throws CloudError if there are not as many labels as points.
   void add(Span<const float> xyzi, Span<const std::uint32_t> labels);
 
   double points_per_scan() const;
