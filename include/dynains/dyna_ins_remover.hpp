@@ -222,6 +222,7 @@ class BasicDynaInsRemover {
     ScanSlot& newest = begin_scan(T_world_sensor, time);
     ingest(cloud, newest);
     newest.make_room(newest.labels.size());
+    detail::make_room(evident_belief_, newest.labels.size());
     if (needs_sensor() && !sensor_.known()) {
       adapt_to_sensor(newest);
       if (turns()) turn(newest);
@@ -235,18 +236,22 @@ class BasicDynaInsRemover {
     clock.lap(result.times.window);
 
     const Span<const std::uint32_t> cluster_of = clusterer_.cluster(window_.view());
-    clusters_.build(window_.view(), scan_begin_, cluster_of, clusterer_.cluster_count());
+    if (compares_windows()) {
+      clusters_.build(window_.view(), scan_begin_, cluster_of, clusterer_.cluster_count());
+    }
     clock.lap(result.times.cluster);
 
-    judge_clusters();
+    if (compares_windows()) judge_clusters();
     clock.lap(result.times.descriptor);
 
-    record_verdicts(cluster_of);
+    const std::size_t count = newest.non_ground_count();
+    newest_cluster_ = cluster_of.subspan(cluster_of.size() - count, count);
+    if (compares_windows()) record_verdicts(cluster_of);
     clock.lap(result.times.verdict);
     if (config_.use_free_space) {
       evidence_.observe(newest.scan, newest.segment, newest.T_world_level, newest.split,
-                        newest.cluster, clusterer_.cluster_count());
-      if (evidence_tracks()) hand_on_ids(newest);
+                        newest_cluster_, clusterer_.cluster_count());
+      if (!compares_windows()) hand_on_ids(newest);
     }
     clock.lap(result.times.evidence);
     decide(newest, 1, false, clock, result.times);
@@ -337,10 +342,8 @@ class BasicDynaInsRemover {
     newest.votes.assign(count, 0);
     newest.belief.assign(count, 0.0F);
     newest.reach.assign(count, Reach::kNoCluster);
-    const Span<const std::uint32_t> newest_clusters =
-        cluster_of.subspan(cluster_of.size() - count, count);
-    newest.cluster.assign(newest_clusters.begin(), newest_clusters.end());
-    if (!evidence_tracks()) assign_ids(cluster_of, newest);
+    newest.cluster.assign(newest_cluster_.begin(), newest_cluster_.end());
+    assign_ids(cluster_of, newest);
 
     const bool explain = !config_.use_free_space;  // else the evidence tells why a point stays
     for (std::uint64_t scan = window_first_; scan < pushed_; ++scan) {
@@ -373,8 +376,9 @@ class BasicDynaInsRemover {
     instance_ids_.assign(old_cluster, old_ids, cluster, clusters_.size(), newest.ids);
   }
 
-  // A window of one scan cannot tell which instance was which; the evidence can.
-  bool evidence_tracks() const { return config_.use_free_space && config_.window == 1; }
+  // A window of one scan compares nothing, nor can it tell which instance was which: the evidence
+  // does both.
+  bool compares_windows() const { return config_.window > 1 || !config_.use_free_space; }
 
   void hand_on_ids(ScanSlot& newest) {
     const bool alone = newest.scan == 0 || slot(newest.scan - 1).segment != newest.segment;
@@ -446,7 +450,7 @@ class BasicDynaInsRemover {
   // Verdict by point: at least `votes` windows said so, or the evidence does.
   void decide(ScanSlot& scan, int votes, bool is_final, StageClock& clock, StageTimes& times) {
     if (config_.use_free_space) {
-      evidence_.judge(scan.scan, is_final, scan.split, scan.proof, scan.evidence);
+      evidence_.judge(scan.scan, is_final, scan.split, scan.proof, evident_belief_);
     }
     clock.lap(times.evidence);
     write_verdict(scan, votes);
@@ -457,17 +461,18 @@ class BasicDynaInsRemover {
   // believed in or brought farther can have changed.
   void write_verdict(ScanSlot& scan, int votes) {
     const bool evident = config_.use_free_space;
+    const bool compared = compares_windows();
     const bool all = evident || !scan.is_written;
     if (!scan.is_written) begin_verdict(scan);
     if (evident) write_ground_verdict(scan);
     // Read once: stores of bytes may change anything, as far as the compiler knows.
     const std::size_t ground_count = scan.split.ground_count;
-    const Span<const std::uint32_t> input(&scan.split.input[0] + ground_count,
+    const Span<const std::uint32_t> input(scan.split.input.data() + ground_count,
                                           scan.non_ground_count());
     const std::uint8_t* const voted = scan.votes.data();
     const Reach* const reach = scan.reach.data();
     const float* const windows = scan.belief.data();
-    const float* const evidence = scan.evidence.data() + ground_count;
+    const float* const evidence = evident_belief_.data() + ground_count;
     Cause* const proof = scan.proof.data() + ground_count;
     std::uint8_t* const is_kept = scan.is_kept.data() + ground_count;
     PointLabel* const labels = scan.labels.data();
@@ -480,13 +485,14 @@ class BasicDynaInsRemover {
         proof[i] = cause;
       }
       Cause cause = proof[i];
-      if (voted[i] >= votes && !is_dynamic(cause)) cause = Cause::kProposed;
+      if (compared && voted[i] >= votes && !is_dynamic(cause)) cause = Cause::kProposed;
       const bool dynamic = is_dynamic(cause);
       const std::uint32_t to = input[i];
       is_kept[i] = dynamic ? 0 : 1;
       labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
       causes[to] = cause;
-      beliefs[to] = evident ? std::max(windows[i], evidence[i]) : windows[i];
+      const float by_windows = compared ? windows[i] : 0.0F;
+      beliefs[to] = evident ? std::max(by_windows, evidence[i]) : by_windows;
     }
   }
 
@@ -505,7 +511,7 @@ class BasicDynaInsRemover {
         scan.is_kept[i] = dynamic ? 0 : 1;
         scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kGround;
         scan.causes[to] = scan.proof[i];
-        scan.beliefs[to] = dynamic ? scan.evidence[i] : 0.0F;
+        scan.beliefs[to] = dynamic ? evident_belief_[i] : 0.0F;
       }
     }
   }
@@ -518,7 +524,6 @@ class BasicDynaInsRemover {
     scan.causes.assign(scan.labels.size(), Cause::kNotJudged);
     scan.is_kept.assign(scan.split.count, 1);
     scan.proof.resize(scan.split.count);
-    scan.evidence.resize(scan.split.count);
     const std::uint32_t* const input = scan.split.input.data();
     PointLabel* const labels = scan.labels.data();
     Cause* const causes = scan.causes.data();
@@ -527,8 +532,8 @@ class BasicDynaInsRemover {
       labels[input[i]] = PointLabel::kGround;
       causes[input[i]] = Cause::kGround;
     }
-    for (std::size_t i = 0; i < scan.cluster.size(); ++i) {
-      const std::uint32_t cluster = scan.cluster[i];
+    for (std::size_t i = 0; i < newest_cluster_.size(); ++i) {
+      const std::uint32_t cluster = newest_cluster_[i];
       if (cluster != kNoCluster) scan.instances[input[ground_count + i]] = scan.ids[cluster];
     }
   }
@@ -576,6 +581,8 @@ class BasicDynaInsRemover {
   std::vector<std::uint32_t> scan_begin_;
   ClusterSet clusters_;
   std::vector<ClusterVerdict> verdict_;
+  Span<const std::uint32_t> newest_cluster_;  // by non-ground point of the newest scan
+  std::vector<float> evident_belief_;         // by point of the split judged last
   detail::InstanceIds instance_ids_;
 
   detail::OneCall one_call_;

@@ -138,21 +138,11 @@ class Witness {
 
   void push(const std::vector<Point>& points, const Eigen::Isometry3d& T, double time) {
     const std::size_t map_before = remover_.map().size();
-    FrameResult frame;
     try {
-      frame = remover_.push(points, T, time);
+      take(remover_.push(points, T, time), points, time);
     } catch (const PoseError&) {
       require(remover_.map().size() == map_before, "a refused scan leaves the map as it was");
-      return;
     }
-    open_.push_back({points, time});
-    check(frame.newest, points, pushed_);
-    require(frame.newest.time == time, "the time is that of the push");
-    ++pushed_;
-    require(frame.finished.has_value() == (open_.size() > remover_.latency()),
-            "a scan is final after the latency");
-    if (frame.finished) finish(*frame.finished);
-    check_map();
   }
 
   void flush() {
@@ -175,6 +165,17 @@ class Witness {
     std::vector<Point> points;
     double time;
   };
+
+  void take(const FrameResult& frame, const std::vector<Point>& points, double time) {
+    open_.push_back({points, time});
+    check(frame.newest, points, pushed_);
+    require(frame.newest.time == time, "the time is that of the push");
+    ++pushed_;
+    require(frame.finished.has_value() == (open_.size() > remover_.latency()),
+            "a scan is final after the latency");
+    if (frame.finished) finish(*frame.finished);
+    check_map();
+  }
 
   static void check(const ScanVerdict& verdict, const std::vector<Point>& points,
                     std::uint64_t scan) {

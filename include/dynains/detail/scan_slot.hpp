@@ -41,7 +41,7 @@ struct ScanSlot {
   Eigen::Isometry3d T_world_level = Eigen::Isometry3d::Identity();  // of the points of the split
 
   GroundSplit split;
-  // By non-ground point, in the order of the split.
+  // By non-ground point, in the order of the split; empty if windows are not compared.
   std::vector<std::uint8_t> votes;     // windows that called it dynamic
   std::vector<float> belief;           // highest posterior of any window that proposed it
   std::vector<Reach> reach;            // how far it came in the window in which it came farthest
@@ -50,7 +50,6 @@ struct ScanSlot {
   std::vector<std::uint32_t> ids;
   // By point of the split, ground first.
   std::vector<Cause> proof;           // by the evidence of other scans
-  std::vector<float> evidence;        // belief by the same
   std::vector<std::uint8_t> is_kept;  // verdict: static
   // By input point.
   bool is_written = false;
@@ -64,8 +63,8 @@ struct ScanSlot {
     const auto for_each_vector = [points](auto&... vectors) {
       (detail::make_room(vectors, points), ...);
     };
-    for_each_vector(votes, belief, reach, cluster, proof, evidence, is_kept, labels, instances,
-                    beliefs, causes);
+    for_each_vector(votes, belief, reach, cluster, proof, is_kept, labels, instances, beliefs,
+                    causes);
   }
 
   std::size_t non_ground_count() const { return split.count - split.ground_count; }
