@@ -18,6 +18,7 @@ void prefer_large_pages() {
   constexpr int kRoom = 1 << 30;           // bytes of addresses; memory is taken as it is touched
   constexpr int kLargestInHeap = 1 << 25;  // bytes; the most that glibc allows
   constexpr int kUsualPad = 1 << 17;       // bytes; glibc's own
+  mallopt(M_ARENA_MAX, 1);                 // the thread that reads ahead takes from the same heap
   mallopt(M_MMAP_THRESHOLD, kLargestInHeap);
   mallopt(M_TRIM_THRESHOLD, std::numeric_limits<int>::max());
   // One block makes the heap grow by all of the room, which is asked for as large pages.

@@ -3,8 +3,8 @@
 
 namespace dynains::program {
 
-/// Lets buffers of the main thread lie in large pages: the first touch of each scan's buffers then
-/// costs a fraction. To be called before these are made. Where the system (Linux with glibc) has no
+/// Lets buffers lie in large pages: the first touch of each scan's buffers then costs a fraction. To
+/// be called before these are made, and before threads are started. Where the system (Linux with glibc) has no
 /// large pages, or no room, nothing happens.
 void prefer_large_pages();
 
