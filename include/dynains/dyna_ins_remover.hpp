@@ -47,10 +47,10 @@ struct DefaultStages {
 /// Removes moving instances from a stream of scans, one scan at a time.
 ///
 /// Owns every buffer; once warm, a frame allocates nothing except when the map grows. Objects are
-/// independent of each other. One object serves one thread at a time: `push`, `flush` and `reset`
-/// throw UsageError while another of these calls is at work. Everything that is read from it, the
-/// map and the spans of a verdict, is read between two calls: by the thread that makes them, or by
-/// others under a lock that these calls are made under as well.
+/// independent of each other. One object serves one thread at a time: `push`, `flush`, `reset` and
+/// `reserve` throw UsageError while another of these calls is at work. Everything that is read from
+/// it, the map and the spans of a verdict, is read between two calls: by the thread that makes
+/// them, or by others under a lock that these calls are made under as well.
 template <class Stages = DefaultStages>
 class BasicDynaInsRemover {
  public:
@@ -162,6 +162,16 @@ class BasicDynaInsRemover {
   /// What the first scan told about the sensor; not known() before, or if all that depends on it
   /// was given.
   const SensorModel& sensor() const { return sensor_; }
+
+  /// Gets memory for scans of up to `points` points and touches it, so that the first scans do not
+  /// wait for the system to give it: 26 to 36 bytes per point for each scan that is open at once,
+  /// window or latency() + 1 of them. Larger scans are welcome all the same. Results do not change.
+  /// Throws UsageError once a scan was pushed.
+  void reserve(std::size_t points) {
+    const detail::OneCall::Guard guard(one_call_);
+    if (pushed_ > 0) throw UsageError("reserve() comes before the first push");
+    for (ScanSlot& slot : ring_) slot.touch(points, compares_windows());
+  }
 
   /// Takes one scan in.
   ///

@@ -24,7 +24,8 @@ class CloudError : public std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
 
-/// An object is called while another call on it is at work: from a second thread, or from within.
+/// An object is called when it must not be: while another call on it is at work (from a second
+/// thread, or from within), or to be prepared when it has begun.
 class UsageError : public std::logic_error {
  public:
   using std::logic_error::logic_error;

@@ -51,7 +51,6 @@ class GroundSegmenter {
   static constexpr std::array<std::int32_t, kZones> kSectors = {16, 32, 54, 32};
   static constexpr std::size_t kPatches = 2 * 16 + 4 * 32 + 4 * 54 + 4 * 32;
   /// The innermost rings, where height and roughness of a patch are checked.
-  static constexpr std::size_t kFewestInStreak = 4;  // points on average, to move them together
   static constexpr std::size_t kCheckedRings = 4;
   static constexpr int kMaxLowest = 64;
 
@@ -185,6 +184,8 @@ class GroundSegmenter {
   }
 
  private:
+  static constexpr std::size_t kFewestInStreak = 4;  // points on average, to move them together
+
   // Constants of a zone; small whole numbers are exact in floats.
   struct Zone {
     float inner;  // m

@@ -7,7 +7,6 @@
 #include "dynains/version.hpp"
 #include "eval.hpp"
 #include "experiment.hpp"
-#include "large_pages.hpp"
 
 namespace {
 
@@ -23,7 +22,6 @@ int fail(int code, const char* what) {
 int main(int argc, char** argv) {
   // A closed pipe must not stop a run that writes files.
   std::signal(SIGPIPE, SIG_IGN);
-  prefer_large_pages();
 
   CLI::App app("Removes moving objects from LiDAR scans and maps, scan by scan.", "dynains");
   app.set_version_flag("--version", std::string("dynains ") + dynains::kVersionString);

@@ -71,6 +71,7 @@ nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& 
                       {"dynamic", labels[PointLabel::kDynamic]}};
   if (results.map_points()) report["static_map"]["points"] = *results.map_points();
   report["milliseconds"] = times_to_json(timing);
+  report["reserve_milliseconds"] = timing.reserve;
   report["flush_milliseconds"] = timing.flush;
   report["peak_memory_bytes"] = peak_memory_bytes();
   report["pose_agreement"] = nullptr;

@@ -46,6 +46,12 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
   ReadAhead scans(recording, range.first, range.last);
   for (std::size_t i = range.first; i <= range.last; ++i) {
     RecordedScan scan = scans.next(results.recycle());
+    if (i == range.first) {
+      // Scans of one sensor differ little in size.
+      const Clock::time_point begin = Clock::now();
+      remover.reserve(scan.size() + scan.size() / 16);
+      timing.reserve = ms_since(begin);
+    }
     const Clock::time_point begin = Clock::now();
     const FrameResult frame = push_scan(remover, recording, i, scan);
     TimingRow row{recording.name(i), scan.size(), {}, ms_since(begin)};

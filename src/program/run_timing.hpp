@@ -17,7 +17,8 @@ struct TimingRow {
 struct RunTiming {
   std::vector<std::string> stages;
   std::vector<TimingRow> rows;
-  double flush = 0.0;  ///< ms for the verdicts that were open after the last scan
+  double reserve = 0.0;  ///< ms before the first scan, for its memory
+  double flush = 0.0;    ///< ms for the verdicts that were open after the last scan
 };
 
 }  // namespace dynains::program

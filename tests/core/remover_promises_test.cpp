@@ -274,6 +274,23 @@ TEST_CASE("after reset a remover is as good as new") {
   CHECK(remover.map().size() == map_size);
 }
 
+TEST_CASE(
+    "memory that was reserved changes no result, and is reserved before the first scan only") {
+  const Config config = GENERATE(Config::paper(), Config());
+  const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
+  DynaInsRemover remover(config);
+  // Too little, and more than the scans need.
+  remover.reserve(GENERATE(std::size_t{0}, std::size_t{1000}, std::size_t{200000}));
+  const Run reserved = run(remover, scans);
+  const Run plain = run(config, scans);
+  CHECK(reserved.newest == plain.newest);
+  CHECK(reserved.final == plain.final);
+  CHECK_THROWS_AS(remover.reserve(1000), UsageError);
+  remover.reset();
+  CHECK_NOTHROW(remover.reserve(1000));
+  CHECK(run(remover, scans).final == plain.final);
+}
+
 TEST_CASE("instance ids stay with an object and are never shared") {
   const std::vector<Scan> scans = drive(oncoming(), 10, 5.0);
   const Run result = run_paper(scans);

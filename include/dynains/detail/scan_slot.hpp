@@ -60,17 +60,49 @@ struct ScanSlot {
 
   /// For a scan of so many points.
   void make_room(std::size_t points) {
-    const auto for_each_vector = [points](auto&... vectors) {
-      (detail::make_room(vectors, points), ...);
+    for_each_vector([points](auto& values) { detail::make_room(values, points); });
+  }
+
+  /// The same, and touches it, so that the system has given the memory before a scan needs it.
+  void touch(std::size_t points, bool compares_windows) {
+    split.resize(points);
+    split.resize(0);
+    const auto touch_one = [points](auto& values) {
+      detail::make_room(values, points);
+      values.resize(points);
+      values.clear();
     };
-    for_each_vector(votes, belief, reach, cluster, proof, is_kept, labels, instances, beliefs,
-                    causes);
+    for_each_always(touch_one);
+    if (compares_windows) for_each_compared(touch_one);
   }
 
   std::size_t non_ground_count() const { return split.count - split.ground_count; }
 
   ScanVerdict verdict() const {
     return {scan, time, T_world_sensor, labels, instances, beliefs, causes};
+  }
+
+ private:
+  template <class Visit>
+  void for_each_vector(Visit&& visit) {
+    for_each_compared(visit);
+    for_each_always(visit);
+  }
+  template <class Visit>
+  void for_each_compared(Visit&& visit) {
+    visit(votes);
+    visit(belief);
+    visit(reach);
+    visit(cluster);
+  }
+  template <class Visit>
+  void for_each_always(Visit&& visit) {
+    visit(proof);
+    visit(is_kept);
+    visit(labels);
+    visit(instances);
+    visit(beliefs);
+    visit(causes);
   }
 };
 
