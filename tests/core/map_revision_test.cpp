@@ -194,14 +194,14 @@ TEST_CASE("after a reset, a revised map comes out the same") {
 }
 
 /// A map that cannot let go of points.
-class CountingMap {
+class KeepingMap {
  public:
   struct Config {
     template <class Self, class Visitor>
     static void visit(Self&, Visitor&&) {}
     void validate() const {}
   };
-  explicit CountingMap(const Config&) {}
+  explicit KeepingMap(const Config&) {}
   void insert(PointsView points, Span<const std::uint8_t>, const Eigen::Isometry3d&) {
     count_ += points.size();
   }
@@ -210,8 +210,8 @@ class CountingMap {
  private:
   std::size_t count_ = 0;
 };
-struct CountingStages : DefaultStages {
-  using Map = CountingMap;
+struct KeepingStages : DefaultStages {
+  using Map = KeepingMap;
 };
 
 TEST_CASE("a map is revised by free-space evidence, and only one that can let go of points") {
@@ -219,11 +219,11 @@ TEST_CASE("a map is revised by free-space evidence, and only one that can let go
   config.revision.revise_map = true;
   CHECK_THROWS_WITH(DynaInsRemover(config),
                     ContainsSubstring("MapRevision.revise_map = true needs use_free_space = true"));
-  BasicDynaInsRemover<CountingStages>::Config counting;
-  CHECK_NOTHROW(BasicDynaInsRemover<CountingStages>(counting));
-  counting.revision.revise_map = true;
+  BasicDynaInsRemover<KeepingStages>::Config keeping;
+  CHECK_NOTHROW(BasicDynaInsRemover<KeepingStages>(keeping));
+  keeping.revision.revise_map = true;
   CHECK_THROWS_WITH(
-      BasicDynaInsRemover<CountingStages>(counting),
+      BasicDynaInsRemover<KeepingStages>(keeping),
       ContainsSubstring("MapRevision.revise_map = true needs a map that is kept in memory"));
 }
 
