@@ -358,7 +358,7 @@ class RangeImage {
   // it is read but the first, which stands for all directions outside.
   void make_cells(std::size_t count) {
     if (count == cell_count_) return;
-    cells_.reset(new Cell[count]);
+    cells_ = std::unique_ptr<Cell[]>(new Cell[count]);
     cells_[0] = {kNothing, kUnknown};
     cell_count_ = count;
   }
