@@ -15,6 +15,7 @@
 #include "dynains/belief_updater.hpp"
 #include "dynains/cause.hpp"
 #include "dynains/detail/beam_test.hpp"
+#include "dynains/detail/free_space_sum.hpp"
 #include "dynains/detail/turn.hpp"
 #include "dynains/free_space_config.hpp"
 #include "dynains/ground_footprint.hpp"
@@ -53,8 +54,7 @@ class FreeSpaceEvidence {
         ground_sampler_(config.ground_sample, config.ground_sample, config.evidence_range),
         footprint_(config.footprint > 0.0 ? std::max(config.footprint, 0.05) : kDefaultCell,
                    std::max({config.ground_reach, config.footprint, 0.5}), config.evidence_range),
-        increment_(static_cast<float>(log_odds(config.p_free))),
-        decrement_(static_cast<float>(log_odds(config.p_hit))),
+        sum_(config.p_free, config.p_hit),
         free_level_(static_cast<float>(log_odds(config.tau_free))),
         contested_level_(static_cast<float>(log_odds(config.tau_contested))),
         whole_level_(static_cast<float>(log_odds(config.tau_whole))),
@@ -253,7 +253,7 @@ class FreeSpaceEvidence {
       if (share >= static_cast<float>(config_.see_share)) {
         raise(record.wholes[instance], share);
         record.changed[instance] = 1;
-      } else if (share <= kHitShare) {
+      } else if (share <= detail::FreeSpaceSum::kHitShare) {
         lower(record.wholes[instance]);
         record.changed[instance] = 1;
         const auto hits = static_cast<float>(all.hit);
@@ -276,23 +276,24 @@ class FreeSpaceEvidence {
         seen.hit >= std::max(std::min(2U, samples), (samples + kLeastHit - 1) / kLeastHit);
     const auto free = static_cast<float>(seen.free);
     const float share = free / static_cast<float>(seen.free + seen.hit);
-    if (free >= kLeastFree * static_cast<float>(samples) && share >= kFreeShare) {
+    if (free >= kLeastFree * static_cast<float>(samples) &&
+        share >= detail::FreeSpaceSum::kFreeShare) {
       raise(belief, share);
       return true;
     }
-    if (!hits || share > kHitShare) return false;
+    if (!hits || share > detail::FreeSpaceSum::kHitShare) return false;
     const bool first_hit = belief.contested == 0;
     lower(belief);
     return first_hit;
   }
 
   void raise(Belief& belief, float share) const {
-    belief.level += (share > kWhollyFree ? 2.0F : 1.0F) * increment_;
+    sum_.raise(belief.level, share);
     belief.peak = std::max(belief.peak, belief.level);
   }
   void lower(Belief& belief) const {
     belief.contested = 1;
-    belief.level = std::max(0.0F, belief.level + decrement_);
+    sum_.lower(belief.level);
   }
 
   bool is_free(const Belief& belief) const {
@@ -325,13 +326,13 @@ class FreeSpaceEvidence {
   float own_belief(const Record& record, std::size_t instance) const {
     const Share& share = record.shares[instance];
     if (removes_whole(record, instance)) {
-      return (2 * share.moved >= share.decided && share.moved > 0 ? 2.0F : 1.0F) * increment_;
+      return (2 * share.moved >= share.decided && share.moved > 0 ? 2.0F : 1.0F) * sum_.increment();
     }
     const auto moved = static_cast<float>(share.moved);
     const auto decided = static_cast<float>(share.decided);
     const bool known = decided >= kLeastKnown * static_cast<float>(share.total) && decided > 0.0F;
     return known && moved < kStillShare * decided
-               ? -static_cast<float>(config_.still_weight) * increment_
+               ? -static_cast<float>(config_.still_weight) * sum_.increment()
                : 0.0F;
   }
 
@@ -524,11 +525,8 @@ class FreeSpaceEvidence {
 
   static constexpr float kLeastView = 0.1F;   // share of an instance that a reference must see
   static constexpr float kLeastFree = 0.15F;  // share of a supervoxel that must be seen free
-  static constexpr float kFreeShare = 0.6F;   // of what is seen, to speak for free space
-  static constexpr float kWhollyFree = 0.9F;  // of what is seen, to count twice
   static constexpr std::uint32_t kLeastHit =
       4;                                      // one of so many samples of a supervoxel must be hit
-  static constexpr float kHitShare = 0.3F;    // free share up to which a place counts as hit
   static constexpr float kLeastKnown = 0.3F;  // share of an instance, to speak of standing still
   static constexpr float kContradictingHits = 0.85F;  // of what is seen of an instance
   static constexpr float kStillShare = 0.02F;    // moved share of the known below which it stands
@@ -543,8 +541,7 @@ class FreeSpaceEvidence {
   InstanceSampler sampler_;
   InstanceSampler ground_sampler_;
   GroundFootprint footprint_;
-  float increment_;
-  float decrement_;
+  detail::FreeSpaceSum sum_;
   float free_level_;
   float contested_level_;
   float whole_level_;

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "dynains/belief_updater.hpp"
+#include "dynains/detail/chunked_vector.hpp"
+#include "dynains/detail/free_space_sum.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
@@ -60,8 +62,7 @@ class MapRevision {
   /// Throws ConfigError.
   explicit MapRevision(const Config& config)
       : config_((config.validate(), config)),
-        increment_(static_cast<float>(log_odds(config.revision_free))),
-        decrement_(static_cast<float>(log_odds(config.revision_hit))),
+        sum_(config.revision_free, config.revision_hit),
         level_(static_cast<float>(log_odds(config.tau_revise))) {}
 
   const Config& config() const { return config_; }
@@ -88,25 +89,13 @@ class MapRevision {
   /// Forgets all blocks.
   void clear() {
     tiles_.clear();
-    levels_.clear();
-  }
-
-  /// Bytes held, beside the map's own.
-  std::size_t memory_bytes() const {
-    std::size_t bytes = levels_.capacity() * sizeof(levels_[0]);
-    for (const auto& tile : tiles_) {
-      bytes += sizeof(tile) + tile.second.capacity() * sizeof(std::uint32_t);
-    }
-    return bytes;
+    levels_ = {};
   }
 
  private:
   static constexpr double kTile = 25.0;             // m
   static constexpr std::uint32_t kMostSamples = 8;  // of a block
   static constexpr float kLeastSeen = 0.3F;         // share of the samples
-  static constexpr float kFreeShare = 0.6F;         // of what is seen, to speak for free space
-  static constexpr float kWhollyFree = 0.9F;        // of what is seen, to count twice
-  static constexpr float kHitShare = 0.3F;          // free share up to which a block counts as hit
 
   static std::int64_t tile_of(double metres) {
     return static_cast<std::int64_t>(std::floor(metres / kTile));
@@ -117,7 +106,7 @@ class MapRevision {
 
   template <class Map>
   void take_in_new_blocks(const Map& map) {
-    for (auto b = static_cast<std::uint32_t>(levels_.size()); b < map.block_count(); ++b) {
+    for (std::uint32_t b = levels_.size(); b < map.block_count(); ++b) {
       const Eigen::Vector3d corner = map.block_corner(b);
       tiles_[key(tile_of(corner.x()), tile_of(corner.y()))].push_back(b);
       levels_.push_back(0.0F);
@@ -169,18 +158,17 @@ class MapRevision {
     const auto least = static_cast<float>(std::min(2U, samples));
     if (seen < std::max(least, kLeastSeen * static_cast<float>(samples))) return;
     const float share = static_cast<float>(free) / seen;
-    if (share >= kFreeShare) level += (share > kWhollyFree ? 2.0F : 1.0F) * increment_;
-    if (share <= kHitShare) level = std::max(0.0F, level + decrement_);
+    if (share >= detail::FreeSpaceSum::kFreeShare) sum_.raise(level, share);
+    if (share <= detail::FreeSpaceSum::kHitShare) sum_.lower(level);
   }
 
   Config config_;
-  float increment_;
-  float decrement_;
+  detail::FreeSpaceSum sum_;
   float level_;
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> tiles_;  // blocks by place
-  std::vector<float> levels_;          // by block: log-odds that it is free
-  std::vector<std::uint32_t> blocks_;  // of which samples are
-  std::vector<std::uint32_t> begin_;   // by these blocks, one more
+  detail::ChunkedVector<float, 1024> levels_;  // by block: log-odds that it is free
+  std::vector<std::uint32_t> blocks_;          // of which samples are
+  std::vector<std::uint32_t> begin_;           // by these blocks, one more
   PointBuffer samples_;
 };
 

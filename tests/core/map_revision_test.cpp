@@ -11,6 +11,7 @@
 #include "dynains/dyna_ins_remover.hpp"
 #include "dynains/static_map_accumulator.hpp"
 #include "support/catch.hpp"
+#include "support/counting_map.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 
@@ -193,25 +194,8 @@ TEST_CASE("after a reset, a revised map comes out the same") {
   CHECK(points() == first);
 }
 
-/// A map that cannot let go of points.
-class KeepingMap {
- public:
-  struct Config {
-    template <class Self, class Visitor>
-    static void visit(Self&, Visitor&&) {}
-    void validate() const {}
-  };
-  explicit KeepingMap(const Config&) {}
-  void insert(PointsView points, Span<const std::uint8_t>, const Eigen::Isometry3d&) {
-    count_ += points.size();
-  }
-  void clear() { count_ = 0; }
-
- private:
-  std::size_t count_ = 0;
-};
-struct KeepingStages : DefaultStages {
-  using Map = KeepingMap;
+struct CountingStages : DefaultStages {
+  using Map = CountingMap;
 };
 
 TEST_CASE("a map is revised by free-space evidence, and only one that can let go of points") {
@@ -219,11 +203,11 @@ TEST_CASE("a map is revised by free-space evidence, and only one that can let go
   config.revision.revise_map = true;
   CHECK_THROWS_WITH(DynaInsRemover(config),
                     ContainsSubstring("MapRevision.revise_map = true needs use_free_space = true"));
-  BasicDynaInsRemover<KeepingStages>::Config keeping;
-  CHECK_NOTHROW(BasicDynaInsRemover<KeepingStages>(keeping));
+  BasicDynaInsRemover<CountingStages>::Config keeping;
+  CHECK_NOTHROW(BasicDynaInsRemover<CountingStages>(keeping));
   keeping.revision.revise_map = true;
   CHECK_THROWS_WITH(
-      BasicDynaInsRemover<KeepingStages>(keeping),
+      BasicDynaInsRemover<CountingStages>(keeping),
       ContainsSubstring("MapRevision.revise_map = true needs a map that is kept in memory"));
 }
 

@@ -1,10 +1,10 @@
 // Every stage can be replaced by one of one's own.
-#include <algorithm>
 #include <cstdint>
 #include <vector>
 
 #include "dynains/dyna_ins_remover.hpp"
 #include "support/catch.hpp"
+#include "support/counting_map.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 
@@ -81,25 +81,6 @@ class Credulous : public BeliefUpdater {
   using BeliefUpdater::BeliefUpdater;
   double posterior() const { return 0.875; }
   bool is_dynamic() const { return true; }
-};
-
-// Counts.
-class CountingMap {
- public:
-  struct Config {
-    template <class Self, class Visitor>
-    static void visit(Self&, Visitor&&) {}
-    void validate() const {}
-  };
-  explicit CountingMap(const Config&) {}
-  void insert(PointsView points, Span<const std::uint8_t> keep, const Eigen::Isometry3d&) {
-    count += keep.empty() ? points.size()
-                          : static_cast<std::size_t>(std::count_if(
-                                keep.begin(), keep.end(), [](std::uint8_t k) { return k != 0; }));
-  }
-  void clear() { count = 0; }
-
-  std::size_t count = 0;
 };
 
 struct OwnGround : DefaultStages {
