@@ -179,8 +179,8 @@ class CurvedVoxelClusterer {
         const auto near = distance <= far;
         const Float i_range = min(keep(near, distance) * range_scale, last_range);
         const Float i_azimuth = min((azimuth + pi) * azimuth_scale, last_azimuth);
-        const Float i_elevation =
-            min((detail::arc_tangent2(z, range) + half_pi) * elevation_scale, last_elevation);
+        const Float i_elevation = min(
+            (detail::elevation_of(z, range, distance) + half_pi) * elevation_scale, last_elevation);
         // Row numbers stay below 2^23 and are exact in floats.
         const Int i_row = truncate(to_float(truncate(i_elevation)) * ranges) + truncate(i_range);
         select(near, (i_row << row_shift) + truncate(i_azimuth), Int(-1)).store(cells + at.begin);

@@ -339,7 +339,7 @@ class GroundSegmenter {
       const Float x = at.load(scan.x.data());
       const Float y = at.load(scan.y.data());
       const Float range = sqrt(x * x + y * y);
-      const Float azimuth = detail::arc_tangent2(y, x) + pi;
+      const Float azimuth = detail::azimuth_of(y, x, range) + pi;
       const auto beyond_1 = range >= inner.of[1];
       const auto beyond_2 = range >= inner.of[2];
       const auto beyond_3 = range >= inner.of[3];

@@ -59,8 +59,9 @@ class PolarBuffer {
       const Float z_source = at.load(points.z.data());
       const Float x_target = transform(0, x, y, z_source);
       const Float y_target = transform(1, x, y, z_source);
-      sqrt(x_target * x_target + y_target * y_target).store(ranges + at.begin);
-      detail::arc_tangent2(y_target, x_target).store(azimuths + at.begin);
+      const Float range_target = sqrt(x_target * x_target + y_target * y_target);
+      range_target.store(ranges + at.begin);
+      detail::azimuth_of(y_target, x_target, range_target).store(azimuths + at.begin);
       transform(2, x, y, z_source).store(heights + at.begin);
     });
   }

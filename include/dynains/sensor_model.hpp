@@ -62,8 +62,10 @@ inline SensorModel estimate_sensor_model(PointsView points) {
     const auto x = at.load(points.x.data());
     const auto y = at.load(points.y.data());
     const auto z = at.load(points.z.data());
-    (detail::arc_tangent2(y, x) * kDegrees).store(&azimuth[at.begin]);
-    (detail::arc_tangent2(z, sqrt(x * x + y * y)) * kDegrees).store(&elevation[at.begin]);
+    const auto range = sqrt(x * x + y * y);
+    const auto distance = sqrt(range * range + z * z);
+    (detail::azimuth_of(y, x, range) * kDegrees).store(&azimuth[at.begin]);
+    (detail::elevation_of(z, range, distance) * kDegrees).store(&elevation[at.begin]);
   });
   azimuth.resize(points.size());
   elevation.resize(points.size());

@@ -49,7 +49,7 @@ std::vector<std::uint32_t> results(const std::vector<float>& a, const std::vecto
     put(select(x <= y, x, y));
     put(select(x > y, x, y));
     put(float_of((bits_of(x) & bits_of(y)) ^ (bits_of(x) | ~bits_of(y))));
-    put(detail::arc_tangent2(y, x));
+    put(detail::azimuth_of(y, x, sqrt(x * x + y * y)));
     out.push_back((x >= y).bits());
     const detail::Constant8 limit(1e6F);
     const detail::Constant8 lower(-1e6F);

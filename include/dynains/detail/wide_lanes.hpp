@@ -78,12 +78,10 @@ struct WideFloat8 {
   friend WideMask8 operator>=(const F& a, const F& b) { return {a.v >= b.v}; }
 
   friend WideMask8 bits_of(const F& a) { return {WideMask8::Vector(a.v)}; }
-  friend F select(const WideMask8& mask, const F& a, const F& b) {
-    return float_of((mask & bits_of(a)) | (~mask & bits_of(b)));
-  }
+  friend F select(const WideMask8& mask, const F& a, const F& b) { return F(mask.v ? a.v : b.v); }
   friend F keep(const WideMask8& mask, const F& a) { return float_of(mask & bits_of(a)); }
-  friend F min(const F& a, const F& b) { return select(a < b, a, b); }
-  friend F max(const F& a, const F& b) { return select(a > b, a, b); }
+  friend F min(const F& a, const F& b) { return F(a.v < b.v ? a.v : b.v); }
+  friend F max(const F& a, const F& b) { return F(a.v > b.v ? a.v : b.v); }
   friend F abs(const F& a) { return float_of(bits_of(a) & WideMask8{WideInt8(0x7FFFFFFF).v}); }
   friend F sqrt(const F& a) {
     const Float8 root = sqrt(Float8(__builtin_shufflevector(a.v, a.v, 0, 1, 2, 3),
@@ -97,7 +95,7 @@ struct WideFloat8 {
 inline WideFloat8 float_of(const WideMask8& a) { return WideFloat8::float_of(a); }
 
 inline WideInt8 select(const WideMask8& mask, const WideInt8& a, const WideInt8& b) {
-  return WideInt8((mask.v & a.v) | (~mask.v & b.v));
+  return WideInt8(mask.v ? a.v : b.v);
 }
 inline WideInt8 keep(const WideMask8& mask, const WideInt8& a) { return WideInt8(mask.v & a.v); }
 inline WideInt8 truncate(const WideFloat8& a) {
