@@ -72,13 +72,12 @@ class StaticMapAccumulator {
     };
     const Index first = {blocks(0), blocks(1), blocks(2)};
 
-    recent_.resize(kRecent, kEnd);
+    recent_.resize(kRecent, nullptr);
     Batch batch;
     for (std::size_t begin = 0; begin < points.size(); begin += kBatch) {
       const std::size_t count = std::min(kBatch, points.size() - begin);
-      locate(points.subview(begin, count), m, batch);
-      find_streaks(count, batch);
-      insert_batch(batch, first, keep.empty() ? keep : keep.subspan(begin, count));
+      locate(points.subview(begin, count), m, first, batch);
+      insert_batch(batch, count, keep.empty() ? keep : keep.subspan(begin, count));
     }
   }
 
@@ -192,80 +191,80 @@ class StaticMapAccumulator {
     std::uint32_t next;   // in the bucket; kEnd behind the last
   };
 
+  // The last block that was met in each of so many places, which repeat every 25.6 m (6.4 m in
+  // height) at 0.2 m: neighbouring points meet the same few blocks again and again, and have them
+  // without a walk through a bucket.
+  static constexpr std::size_t kRecent = std::size_t{16} * 32 * 16;
+
   // Some points of a scan on their way into the map.
-  static constexpr std::size_t kRecent = std::size_t{32} * 32 * 16;
   static constexpr std::size_t kBatch = 512;
   struct Batch {
-    float local[3][kBatch];  // m, relative to the corner next to the sensor
-    std::int32_t voxel[3][kBatch + detail::kLanes] = {};  // from that corner on
-    // Where points begin that share a voxel; neighbours in the scan often do.
-    std::uint32_t streak_begin[kBatch + detail::kLanes];
-    std::size_t streak_count = 0;
+    float point[3][kBatch];         // m, relative to the corner of the block
+    std::int32_t block[3][kBatch];  // in the world, counted in blocks
+    std::int32_t bit[kBatch];       // of the voxel, in its block
+    std::int32_t recent[kBatch];    // place of the block among the recent ones
   };
+
+  template <int kValue>
+  using Constant = std::integral_constant<int, kValue>;
 
   Eigen::Array3d block_size() const { return voxel_ * kBlockVoxels.cast<double>(); }
 
-  // Points in the local frame, and their voxels there.
-  void locate(PointsView points, const Eigen::Matrix<float, 3, 4>& m, Batch& batch) const {
-    const detail::Constant8 scale(static_cast<float>(1.0 / voxel_));
+  // `corner`: the block in which the frame of `m` begins.
+  void locate(PointsView points, const Eigen::Matrix<float, 3, 4>& m, const Index& corner,
+              Batch& batch) const {
+    using detail::Constant8;
+    const Constant8 scale(static_cast<float>(1.0 / voxel_));
+    const Eigen::Array3f block_size = this->block_size().cast<float>();
+    const Constant8 size[3] = {block_size.x(), block_size.y(), block_size.z()};
+    alignas(32) std::int32_t first[3][detail::kLanes];
+    std::fill_n(first[0], detail::kLanes, corner.x);
+    std::fill_n(first[1], detail::kLanes, corner.y);
+    std::fill_n(first[2], detail::kLanes, corner.z);
     const detail::LaneTransform to_corner(m);
     detail::for_lanes(points.size(), [&](auto at) {
       using Float = typename decltype(at)::Float;
+      using Int = typename decltype(at)::Int;
       const Float x = at.load(points.x.data());
       const Float y = at.load(points.y.data());
       const Float z = at.load(points.z.data());
-      for (std::size_t axis = 0; axis < 3; ++axis) {
+      Int bit(0), recent(0);
+      const auto add_axis = [&](auto axis, auto voxel_bits, auto recent_bits) {
         const Float value = to_corner(axis, x, y, z);
-        value.store(&batch.local[axis][at.begin]);
-        floor(value * scale).store(&batch.voxel[axis][at.begin]);
-      }
+        const Int voxel = floor(value * scale);
+        // Arithmetic shifts and masks are floor division and remainder.
+        const Int block = voxel >> voxel_bits;
+        const Int block_in_world = block + Int::load(first[axis]);
+        (value - to_float(block) * size[axis]).store(&batch.point[axis][at.begin]);
+        block_in_world.store(&batch.block[axis][at.begin]);
+        bit = (bit << voxel_bits) + (voxel & Int((1 << voxel_bits) - 1));
+        recent = (recent << recent_bits) + (block_in_world & Int((1 << recent_bits) - 1));
+      };
+      add_axis(Constant<2>(), Constant<1>(), Constant<4>());
+      add_axis(Constant<1>(), Constant<2>(), Constant<5>());
+      add_axis(Constant<0>(), Constant<3>(), Constant<4>());
+      bit.store(&batch.bit[at.begin]);
+      recent.store(&batch.recent[at.begin]);
     });
   }
 
-  void find_streaks(std::size_t count, Batch& batch) const {
-    using detail::Int8;
-    std::size_t streaks = 1;
-    batch.streak_begin[0] = 0;
-    for (std::size_t i = 1; i < count; i += detail::kLanes) {
-      const auto same = [&](int axis) {
-        const std::int32_t* const voxel = &batch.voxel[axis][i];
-        return Int8::load(voxel) == Int8::load(voxel - 1);
-      };
-      const unsigned begins = keep_all_ ? 0xFFU : ~(same(0) & same(1) & same(2)).bits();
-      // Where a streak begins cannot be foretold: no branch depends on it.
-      for (std::size_t lane = 0; lane < detail::kLanes; ++lane) {
-        batch.streak_begin[streaks] = static_cast<std::uint32_t>(i + lane);
-        streaks += (begins >> lane) & 1U;
+  void insert_batch(const Batch& batch, std::size_t count, Span<const std::uint8_t> keep) {
+    Block** const recent = recent_.data();
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!keep.empty() && keep[i] == 0) continue;
+      const std::int32_t x = batch.block[0][i];
+      const std::int32_t y = batch.block[1][i];
+      const std::int32_t z = batch.block[2][i];
+      Block*& place = recent[batch.recent[i]];
+      if (place == nullptr || ((place->at.x ^ x) | (place->at.y ^ y) | (place->at.z ^ z)) != 0) {
+        place = &block_at({x, y, z});
       }
-    }
-    while (batch.streak_begin[streaks - 1] >= count) --streaks;
-    batch.streak_begin[streaks] = static_cast<std::uint32_t>(count);
-    batch.streak_count = streaks;
-  }
-
-  void insert_batch(const Batch& batch, const Index& corner, Span<const std::uint8_t> keep) {
-    const Eigen::Array3f size = block_size().cast<float>();
-    for (std::size_t s = 0; s < batch.streak_count; ++s) {
-      std::size_t i = batch.streak_begin[s];
-      if (!keep.empty()) {
-        const std::size_t end = batch.streak_begin[s + 1];
-        while (i < end && keep[i] == 0) ++i;
-        if (i == end) continue;
-      }
-      // Arithmetic shifts and masks are floor division and remainder.
-      const std::int32_t x = batch.voxel[0][i];
-      const std::int32_t y = batch.voxel[1][i];
-      const std::int32_t z = batch.voxel[2][i];
-      const Index in_frame = {x >> 3, y >> 2, z >> 1};
-      Block& block =
-          block_at({corner.x + in_frame.x, corner.y + in_frame.y, corner.z + in_frame.z});
-      const std::uint64_t bit = std::uint64_t{1} << ((x & 7) | (y & 3) << 3 | (z & 1) << 5);
+      Block& block = *place;
+      const std::uint64_t bit = std::uint64_t{1} << batch.bit[i];
       if ((block.occupied & bit) != 0 && !keep_all_) continue;
       block.occupied |= bit;
       block.first =
-          add_point({batch.local[0][i] - static_cast<float>(in_frame.x) * size.x(),
-                     batch.local[1][i] - static_cast<float>(in_frame.y) * size.y(),
-                     batch.local[2][i] - static_cast<float>(in_frame.z) * size.z(), block.first});
+          add_point({batch.point[0][i], batch.point[1][i], batch.point[2][i], block.first});
     }
   }
 
@@ -279,16 +278,10 @@ class StaticMapAccumulator {
     return place;
   }
 
-  // Neighbouring points meet the same few blocks again and again: a table without collisions among
-  // neighbours spares most of them the walk through a bucket.
   Block& block_at(const Index& at) {
-    const std::int32_t low = (at.x & 31) | (at.y & 31) << 5 | (at.z & 15) << 10;
-    std::uint32_t& recent = recent_[static_cast<std::size_t>(low)];
-    if (recent < blocks_.size() && blocks_[recent].at == at) return blocks_[recent];
     const std::uint32_t h = hash(at);
-    recent = find_block(at, h);
-    if (recent == kEnd) recent = add_block(at, h);
-    return blocks_[recent];
+    const std::uint32_t found = find_block(at, h);
+    return blocks_[found == kEnd ? add_block(at, h) : found];
   }
 
   static std::uint32_t hash(const Index& at) {
@@ -357,8 +350,8 @@ class StaticMapAccumulator {
   detail::ChunkedVector<std::uint32_t, 1024> buckets_;  // first block of each
   detail::ChunkedVector<Block, 512> blocks_;            // in the order of their first point
   detail::ChunkedVector<Point, 512> points_;
-  std::uint32_t free_ = kEnd;          // first place of points that were erased
-  std::vector<std::uint32_t> recent_;  // blocks, by the lowest bits of their coordinates
+  std::uint32_t free_ = kEnd;   // first place of points that were erased
+  std::vector<Block*> recent_;  // by the lowest bits of their coordinates; they never move
 };
 
 }  // namespace dynains

@@ -34,7 +34,8 @@ struct WideInt8 {
 
   WideInt8() = default;
   explicit WideInt8(const Vector& vector) : v(vector) {}
-  explicit WideInt8(std::int32_t n) : v{n, n, n, n, n, n, n, n} {}
+  // A sum, because GCC puts a list together number by number.
+  explicit WideInt8(std::int32_t n) : v(Vector{} + n) {}
 
   static WideInt8 load(const std::int32_t* from) {
     WideInt8 result;
