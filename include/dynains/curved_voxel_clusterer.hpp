@@ -77,7 +77,7 @@ class CurvedVoxelClusterer {
     /// power of two.
     double cell_count() const {
       return std::exp2(std::ceil(std::log2(std::max(64.0, std::round(360.0 / voxel_azimuth))))) *
-             std::ceil(180.0 / voxel_elevation) * (std::floor(cluster_range / voxel_range) + 1.0);
+             std::ceil(180.0 / voxel_elevation) * (std::floor(cluster_range / voxel_range) + 2.0);
     }
 
     /// Throws ConfigError.
@@ -120,14 +120,15 @@ class CurvedVoxelClusterer {
 
   const Config& config() const { return config_; }
 
-  /// Cluster number per point, 0 to cluster_count() - 1 in the order in which clusters first
-  /// appear among the points, or kNoCluster. The view holds until the next call.
+  /// Cluster number per point, 0 to cluster_count() - 1, or kNoCluster; numbers go by place, not by
+  /// the order of the points. The view holds until the next call.
   Span<const std::uint32_t> cluster(PolarView points) {
     find_cells(points);
     mark_cells(points.size());
     find_runs();
     join_runs();
-    number_clusters(points.size());
+    number_runs();
+    number_points(points.size());
     clear_cells();
     return {cluster_of_.data(), points.size()};
   }
@@ -142,8 +143,9 @@ class CurvedVoxelClusterer {
     std::uint32_t parent;     // union-find; the root is the smallest run number of its set
   };
 
-  // Cell of each point as (elevation * ranges + range) * row + azimuth; -1 if too far. Rows have a
-  // power of two of cells: a shift is cheaper than a product.
+  // Cell of each point as (elevation * columns + range) * row + azimuth. Points too far away share
+  // a column behind the last range. Rows have a power of two of cells: a shift is cheaper than a
+  // product.
   void find_cells(PolarView points) {
     using detail::Constant8;
     const std::size_t count = points.size();
@@ -160,7 +162,8 @@ class CurvedVoxelClusterer {
     const Constant8 last_azimuth(static_cast<float>(azimuths_ - 1));
     const Constant8 last_elevation(static_cast<float>(elevations_ - 1));
     const Constant8 last_range(static_cast<float>(ranges_ - 1));
-    const Constant8 ranges(static_cast<float>(ranges_));
+    const Constant8 beyond(static_cast<float>(ranges_));
+    const Constant8 columns(static_cast<float>(ranges_ + 1));
     const int row_shift = row_shift_;
     std::int32_t* const cells = cell_of_.data();
     const Constant8 above_all(static_cast<float>(elevations_));
@@ -176,16 +179,16 @@ class CurvedVoxelClusterer {
         const Float azimuth = at.load(points.azimuth.data());
         const Float z = at.load(points.z.data());
         const Float distance = sqrt(range * range + z * z);
-        const auto near = distance <= far;
-        const Float i_range = min(keep(near, distance) * range_scale, last_range);
+        const Float i_range =
+            select(distance <= far, min(distance * range_scale, last_range), Float(beyond));
         const Float i_azimuth = min((azimuth + pi) * azimuth_scale, last_azimuth);
         const Float i_elevation = min(
             (detail::elevation_of(z, range, distance) + half_pi) * elevation_scale, last_elevation);
         // Row numbers stay below 2^23 and are exact in floats.
-        const Int i_row = truncate(to_float(truncate(i_elevation)) * ranges) + truncate(i_range);
-        select(near, (i_row << row_shift) + truncate(i_azimuth), Int(-1)).store(cells + at.begin);
-        lowest = min(at.there(select(near, i_elevation, lowest), lowest), lowest);
-        highest = max(at.there(select(near, i_elevation, highest), highest), highest);
+        const Int i_row = truncate(to_float(truncate(i_elevation)) * columns) + truncate(i_range);
+        ((i_row << row_shift) + truncate(i_azimuth)).store(cells + at.begin);
+        lowest = min(lowest, at.there(i_elevation, lowest));
+        highest = max(highest, at.there(i_elevation, highest));
       });
       lowest_elevation_ = static_cast<std::int32_t>(min_lane(lowest));
       highest_elevation_ = static_cast<std::int32_t>(std::floor(max_lane(highest)));
@@ -195,8 +198,7 @@ class CurvedVoxelClusterer {
   // The grid covers only the elevations that occur. It is all zero between calls.
   void mark_cells(std::size_t count) {
     if (highest_elevation_ < 0) return;
-    first_cell_ = (static_cast<std::size_t>(lowest_elevation_) * static_cast<std::size_t>(ranges_))
-                  << row_shift_;
+    first_cell_ = (static_cast<std::size_t>(lowest_elevation_) * columns()) << row_shift_;
     const std::size_t blocks = row_count() * row_blocks();
     if (is_used_.size() < blocks) {
       is_used_.resize(blocks);
@@ -209,18 +211,19 @@ class CurvedVoxelClusterer {
     std::uint8_t* const is_used = is_used_.data();
     const std::size_t first_cell = first_cell_;
     for (std::size_t i = 0; i < count; ++i) {
-      if (cell_of[i] < 0) continue;
       const std::size_t cell = static_cast<std::size_t>(cell_of[i]) - first_cell;
       cells[cell] = 1;
       is_used[cell / kBlock] = 1;
     }
   }
 
+  // Rows of one elevation: one for each range, and one for what is too far away.
+  std::size_t columns() const { return static_cast<std::size_t>(ranges_) + 1; }
   std::size_t row_blocks() const { return (std::size_t{1} << row_shift_) / kBlock; }
   std::size_t row_count() const {
     if (highest_elevation_ < 0) return 0;
     const std::int32_t elevations = highest_elevation_ - lowest_elevation_ + 1;
-    return static_cast<std::size_t>(elevations) * static_cast<std::size_t>(ranges_);
+    return static_cast<std::size_t>(elevations) * columns();
   }
 
   // Cuts rows into runs. An occupied cell then holds the number of its run, counted from the first
@@ -264,21 +267,21 @@ class CurvedVoxelClusterer {
   }
 
   void join_runs() {
-    const auto ranges = static_cast<std::size_t>(ranges_);
     const std::size_t rows = row_count();
     for (std::size_t row = 0; row < rows; ++row) {
-      if (first_run_[row] == first_run_[row + 1]) continue;
+      if (first_run_[row] == first_run_[row + 1] || is_beyond(row)) continue;
       join_rows(row, row);
-      const std::size_t range = row % ranges;
-      if (range > 0) join_rows(row, row - 1);
-      if (row >= ranges) {
-        const std::size_t below = row - ranges;
-        if (range > 0) join_rows(row, below - 1);
-        join_rows(row, below);
-        if (range + 1 < ranges) join_rows(row, below + 1);
-      }
+      const bool has_nearer = row % columns() > 0;
+      if (has_nearer) join_rows(row, row - 1);
+      if (row < columns()) continue;
+      const std::size_t below = row - columns();
+      if (has_nearer) join_rows(row, below - 1);
+      join_rows(row, below);
+      if (!is_beyond(below + 1)) join_rows(row, below + 1);
     }
   }
+
+  bool is_beyond(std::size_t row) const { return row % columns() + 1 == columns(); }
 
   // Joins the runs of two rows that overlap or touch at a corner, also across the azimuth seam.
   void join_rows(std::size_t row_a, std::size_t row_b) {
@@ -318,24 +321,35 @@ class CurvedVoxelClusterer {
     }
   }
 
-  void number_clusters(std::size_t count) {
-    number_of_run_.assign(runs_.size(), kNoCluster);
+  // A root comes before the other runs of its set.
+  void number_runs() {
+    number_of_run_.resize(runs_.size());
     cluster_count_ = 0;
+    const std::size_t rows = row_count();
+    for (std::size_t row = 0; row < rows; ++row) {
+      const std::uint32_t end = first_run_[row + 1];
+      for (std::uint32_t run = first_run_[row]; run < end; ++run) {
+        if (is_beyond(row)) {
+          number_of_run_[run] = kNoCluster;
+        } else if (runs_[run].parent == run) {
+          number_of_run_[run] = static_cast<std::uint32_t>(cluster_count_++);
+        } else {
+          number_of_run_[run] = number_of_run_[root(run)];
+        }
+      }
+    }
+  }
+
+  void number_points(std::size_t count) {
+    const std::int32_t* const cell_of = cell_of_.data();
+    const std::uint8_t* const cells = cells_.data();
+    const std::uint32_t* const first_run_of_block = first_run_of_block_.data();
+    const std::uint32_t* const number_of_run = number_of_run_.data();
+    std::uint32_t* const cluster_of = cluster_of_.data();
+    const std::size_t first_cell = first_cell_;
     for (std::size_t i = 0; i < count; ++i) {
-      if (cell_of_[i] < 0) {
-        cluster_of_[i] = kNoCluster;
-        continue;
-      }
-      const std::size_t cell = static_cast<std::size_t>(cell_of_[i]) - first_cell_;
-      const std::uint32_t run = first_run_of_block_[cell / kBlock] + cells_[cell];
-      std::uint32_t number = number_of_run_[run];
-      if (number == kNoCluster) {
-        std::uint32_t& of_root = number_of_run_[root(run)];
-        if (of_root == kNoCluster) of_root = static_cast<std::uint32_t>(cluster_count_++);
-        number = of_root;
-        number_of_run_[run] = number;
-      }
-      cluster_of_[i] = number;
+      const std::size_t cell = static_cast<std::size_t>(cell_of[i]) - first_cell;
+      cluster_of[i] = number_of_run[first_run_of_block[cell / kBlock] + cells[cell]];
     }
   }
 
