@@ -17,6 +17,7 @@
 #include "dynains/detail/one_call.hpp"
 #include "dynains/detail/scan_slot.hpp"
 #include "dynains/detail/stage_checks.hpp"
+#include "dynains/detail/write_verdict.hpp"
 #include "dynains/free_space_evidence.hpp"
 #include "dynains/ground_segmenter.hpp"
 #include "dynains/heading.hpp"
@@ -220,7 +221,6 @@ class BasicDynaInsRemover {
 
  private:
   using ScanSlot = detail::ScanSlot;
-  using Reach = detail::Reach;
 
   template <class Cloud>
   FrameResult take_in(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor, double time) {
@@ -254,17 +254,24 @@ class BasicDynaInsRemover {
     if (compares_windows()) judge_clusters();
     clock.lap(result.times.descriptor);
 
-    const std::size_t count = newest.non_ground_count();
-    newest_cluster_ = cluster_of.subspan(cluster_of.size() - count, count);
-    if (compares_windows()) record_verdicts(cluster_of);
+    if (compares_windows()) record_verdicts(newest);
     clock.lap(result.times.verdict);
+    const std::size_t count = newest.non_ground_count();
+    const auto newest_cluster = cluster_of.subspan(cluster_of.size() - count, count);
     if (config_.use_free_space) {
       evidence_.observe(newest.scan, newest.segment, newest.T_world_level, newest.split,
-                        newest_cluster_, clusterer_.cluster_count());
+                        newest_cluster, clusterer_.cluster_count());
       if (!compares_windows()) hand_on_ids(newest);
     }
     clock.lap(result.times.evidence);
-    decide(newest, 1, false, clock, result.times);
+    detail::begin_verdict(newest);
+    if (config_.use_free_space) {
+      detail::write_instances(newest, newest_cluster);
+      decide(newest, 1, false, clock, result.times);
+    } else {
+      detail::write_by_windows(newest, verdict_);
+      clock.lap(result.times.verdict);
+    }
     result.newest = newest.verdict();
 
     if (pushed_ - finished_ > latency()) result.finished = finish_next(clock, result.times);
@@ -288,7 +295,6 @@ class BasicDynaInsRemover {
     ScanSlot& newest = slot(pushed_);
     newest.scan = pushed_;
     newest.segment = segment_;
-    newest.is_written = false;
     newest.time = time;
     newest.T_world_sensor = orthonormalized(T_world_sensor);
     last_time_ = time;
@@ -325,14 +331,14 @@ class BasicDynaInsRemover {
 
   // Eq. 5-19 for each cluster that the oldest and the newest scan saw; silence means static.
   void judge_clusters() {
-    verdict_.assign(clusters_.size(), {0.0F, 0, Reach::kTooFewScans});
+    verdict_.assign(clusters_.size(), {0.0F, 0, detail::Reach::kTooFewScans});
     for (std::size_t c = 0; c < clusters_.size(); ++c) {
       if (!clusters_.comparable(c)) continue;
-      verdict_[c].reach = Reach::kSimilar;
+      verdict_[c].reach = detail::Reach::kSimilar;
       descriptor_.describe(clusters_[c]);
       if (!descriptor_.proposes_dynamic()) continue;
       if (!config_.use_belief) {
-        verdict_[c] = {1.0F, 1, Reach::kProposed};
+        verdict_[c] = {1.0F, 1, detail::Reach::kProposed};
         continue;
       }
       descriptor_.describe_rest();
@@ -341,49 +347,33 @@ class BasicDynaInsRemover {
         belief_.update(descriptor_.heights(k), descriptor_.cluster_heights());
       }
       verdict_[c] = {static_cast<float>(belief_.posterior()),
-                     static_cast<std::uint8_t>(belief_.is_dynamic() ? 1 : 0), Reach::kProposed};
+                     static_cast<std::uint8_t>(belief_.is_dynamic() ? 1 : 0),
+                     detail::Reach::kProposed};
     }
   }
 
   // From clusters to the points of every scan in the window.
-  void record_verdicts(Span<const std::uint32_t> cluster_of) {
-    ScanSlot& newest = slot(pushed_ - 1);
-    const std::size_t count = newest.non_ground_count();
-    newest.votes.assign(count, 0);
-    newest.belief.assign(count, 0.0F);
-    newest.reach.assign(count, Reach::kNoCluster);
-    newest.cluster.assign(newest_cluster_.begin(), newest_cluster_.end());
-    assign_ids(cluster_of, newest);
-
-    const bool explain = !config_.use_free_space;  // else the evidence tells why a point stays
-    for (std::uint64_t scan = window_first_; scan < pushed_; ++scan) {
-      if (config_.votes == 0 && scan + 1 != pushed_) continue;
-      ScanSlot& target = slot(scan);
-      const std::size_t k = scan - window_first_;
-      for (const ClusterSet::Streak& streak : clusters_.streaks(k)) {
-        if (streak.cluster == kNoCluster) continue;
-        const ClusterVerdict& verdict = verdict_[streak.cluster];
-        const std::size_t begin = streak.begin - scan_begin_[k];
-        const std::size_t end = streak.end - scan_begin_[k];
-        if (explain) detail::raise(target.reach.data() + begin, end - begin, verdict.reach);
-        if (verdict.reach != Reach::kProposed) continue;
-        for (std::size_t i = begin; i < end; ++i) {
-          target.votes[i] = static_cast<std::uint8_t>(target.votes[i] + verdict.dynamic);
-          target.belief[i] = std::max(target.belief[i], verdict.belief);
-        }
-      }
+  void record_verdicts(ScanSlot& newest) {
+    const auto streaks = clusters_.streaks(clusters_.scan_count() - 1);
+    newest.streaks.assign(streaks.begin(), streaks.end());
+    assign_ids(newest);
+    detail::record_first(newest, verdict_);
+    if (config_.votes == 0) return;
+    for (std::uint64_t scan = window_first_; scan + 1 < pushed_; ++scan) {
+      detail::record_again(slot(scan), clusters_.streaks(scan - window_first_), verdict_);
     }
   }
 
-  void assign_ids(Span<const std::uint32_t> cluster_of, ScanSlot& newest) {
-    Span<const std::uint32_t> old_cluster, old_ids, cluster;
+  void assign_ids(ScanSlot& newest) {
+    detail::InstanceIds::Streaks old_streaks, streaks;
+    Span<const std::uint32_t> old_ids;
     if (window_first_ + 1 < pushed_) {
       const ScanSlot& before = slot(pushed_ - 2);
-      old_cluster = before.cluster;
+      old_streaks = before.streaks;
       old_ids = before.ids;
-      cluster = cluster_of.subspan(scan_begin_[scan_begin_.size() - 3], old_cluster.size());
+      streaks = clusters_.streaks(clusters_.scan_count() - 2);
     }
-    instance_ids_.assign(old_cluster, old_ids, cluster, clusters_.size(), newest.ids);
+    instance_ids_.assign(old_streaks, old_ids, streaks, clusters_.size(), newest.ids);
   }
 
   // A window of one scan compares nothing, nor can it tell which instance was which: the evidence
@@ -461,91 +451,12 @@ class BasicDynaInsRemover {
   void decide(ScanSlot& scan, int votes, bool is_final, StageClock& clock, StageTimes& times) {
     if (config_.use_free_space) {
       evidence_.judge(scan.scan, is_final, scan.split, scan.proof, evident_belief_);
+      clock.lap(times.evidence);
+      detail::write_by_evidence(scan, evident_belief_, compares_windows(), votes);
+    } else {
+      detail::rewrite_by_windows(scan, votes);
     }
-    clock.lap(times.evidence);
-    write_verdict(scan, votes);
     clock.lap(times.verdict);
-  }
-
-  // By input point. The second time, without evidence of other scans, only points that some window
-  // believed in or brought farther can have changed.
-  void write_verdict(ScanSlot& scan, int votes) {
-    const bool evident = config_.use_free_space;
-    const bool compared = compares_windows();
-    const bool all = evident || !scan.is_written;
-    if (!scan.is_written) begin_verdict(scan);
-    if (evident) write_ground_verdict(scan);
-    // Read once: stores of bytes may change anything, as far as the compiler knows.
-    const std::size_t ground_count = scan.split.ground_count;
-    const Span<const std::uint32_t> input(scan.split.input.data() + ground_count,
-                                          scan.non_ground_count());
-    const std::uint8_t* const voted = scan.votes.data();
-    const Reach* const reach = scan.reach.data();
-    const float* const windows = scan.belief.data();
-    const float* const evidence = evident_belief_.data() + ground_count;
-    Cause* const proof = scan.proof.data() + ground_count;
-    std::uint8_t* const is_kept = scan.is_kept.data() + ground_count;
-    PointLabel* const labels = scan.labels.data();
-    Cause* const causes = scan.causes.data();
-    float* const beliefs = scan.beliefs.data();
-    for (std::size_t i = 0; i < input.size(); ++i) {
-      if (!evident) {
-        const Cause cause = cause_to_stay(reach[i]);
-        if (!all && cause == proof[i] && voted[i] == 0 && windows[i] == 0.0F) continue;
-        proof[i] = cause;
-      }
-      Cause cause = proof[i];
-      if (compared && voted[i] >= votes && !is_dynamic(cause)) cause = Cause::kProposed;
-      const bool dynamic = is_dynamic(cause);
-      const std::uint32_t to = input[i];
-      is_kept[i] = dynamic ? 0 : 1;
-      labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
-      causes[to] = cause;
-      const float by_windows = compared ? windows[i] : 0.0F;
-      beliefs[to] = evident ? std::max(by_windows, evidence[i]) : by_windows;
-    }
-  }
-
-  // Most ground stays, and is already known to.
-  void write_ground_verdict(ScanSlot& scan) const {
-    const std::size_t count = scan.split.ground_count;
-    for (std::size_t begin = 0; begin < count; begin += detail::kLanes) {
-      const std::size_t end = std::min(begin + detail::kLanes, count);
-      unsigned to_write = 0;
-      for (std::size_t i = begin; i < end; ++i) {
-        to_write |= is_dynamic(scan.proof[i]) || scan.is_kept[i] == 0 ? 1U : 0U;
-      }
-      for (std::size_t i = begin; to_write != 0 && i < end; ++i) {
-        const bool dynamic = is_dynamic(scan.proof[i]);
-        const std::uint32_t to = scan.split.input[i];
-        scan.is_kept[i] = dynamic ? 0 : 1;
-        scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kGround;
-        scan.causes[to] = scan.proof[i];
-        scan.beliefs[to] = dynamic ? evident_belief_[i] : 0.0F;
-      }
-    }
-  }
-
-  // What does not change any more: ground, and the instances of the rest.
-  void begin_verdict(ScanSlot& scan) const {
-    scan.is_written = true;
-    scan.instances.assign(scan.labels.size(), kNoInstance);
-    scan.beliefs.assign(scan.labels.size(), 0.0F);
-    scan.causes.assign(scan.labels.size(), Cause::kNotJudged);
-    scan.is_kept.assign(scan.split.count, 1);
-    scan.proof.resize(scan.split.count);
-    const std::uint32_t* const input = scan.split.input.data();
-    PointLabel* const labels = scan.labels.data();
-    Cause* const causes = scan.causes.data();
-    const std::size_t ground_count = scan.split.ground_count;
-    for (std::size_t i = 0; i < ground_count; ++i) {
-      labels[input[i]] = PointLabel::kGround;
-      causes[input[i]] = Cause::kGround;
-    }
-    for (std::size_t i = 0; i < newest_cluster_.size(); ++i) {
-      const std::uint32_t cluster = newest_cluster_[i];
-      if (cluster != kNoCluster) scan.instances[input[ground_count + i]] = scan.ids[cluster];
-    }
   }
 
   ScanVerdict finish_next(StageClock& clock, StageTimes& times) {
@@ -569,12 +480,6 @@ class BasicDynaInsRemover {
     }
   }
 
-  struct ClusterVerdict {
-    float belief;
-    std::uint8_t dynamic;
-    Reach reach;
-  };
-
   Config config_;
   Ground ground_;
   Clusterer clusterer_;
@@ -590,9 +495,8 @@ class BasicDynaInsRemover {
   PolarBuffer window_;
   std::vector<std::uint32_t> scan_begin_;
   ClusterSet clusters_;
-  std::vector<ClusterVerdict> verdict_;
-  Span<const std::uint32_t> newest_cluster_;  // by non-ground point of the newest scan
-  std::vector<float> evident_belief_;         // by point of the split judged last
+  std::vector<detail::ClusterVerdict> verdict_;
+  std::vector<float> evident_belief_;  // by point of the split judged last
   detail::InstanceIds instance_ids_;
 
   detail::OneCall one_call_;

@@ -1,11 +1,12 @@
 // Instance ids that stay with an object from scan to scan.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
-#include "dynains/curved_voxel_clusterer.hpp"
+#include "dynains/cluster_set.hpp"
 #include "dynains/points.hpp"
 
 namespace dynains::detail {
@@ -13,24 +14,24 @@ namespace dynains::detail {
 /// Hands the ids of the previous scan's clusters on to the clusters of the current window.
 class InstanceIds {
  public:
-  /// Fills `ids` with an id per cluster of this window. Each point of the previous scan gives its
-  /// old cluster (`old_cluster`, an index into `old_ids`) and its cluster in this window
-  /// (`cluster`). A cluster takes the id that most of its points had; if two clusters want the
+  using Streaks = Span<const ClusterSet::Streak>;
+
+  /// Fills `ids` with an id per cluster of this window. The points of the previous scan give their
+  /// old clusters (`old_streaks`, with indices into `old_ids`) and their clusters in this window
+  /// (`streaks`). A cluster takes the id that most of its points had; if two clusters want the
   /// same id, the first keeps it and the other gets a new one.
-  void assign(Span<const std::uint32_t> old_cluster, Span<const std::uint32_t> old_ids,
-              Span<const std::uint32_t> cluster, std::size_t cluster_count,
-              std::vector<std::uint32_t>& ids) {
-    // Majority vote of Boyer and Moore: one candidate and one counter per cluster.
+  void assign(Streaks old_streaks, Span<const std::uint32_t> old_ids, Streaks streaks,
+              std::size_t cluster_count, std::vector<std::uint32_t>& ids) {
     candidate_.assign(cluster_count, kNoCluster);
     lead_.assign(cluster_count, 0);
-    for (std::size_t i = 0; i < cluster.size(); ++i) {
-      const std::uint32_t c = cluster[i];
-      if (c == kNoCluster || old_cluster[i] == kNoCluster) continue;
-      if (lead_[c] == 0) candidate_[c] = old_cluster[i];
-      if (candidate_[c] == old_cluster[i]) {
-        ++lead_[c];
-      } else {
-        --lead_[c];
+    const ClusterSet::Streak* old = old_streaks.begin();
+    for (const ClusterSet::Streak& streak : streaks) {
+      std::uint32_t begin = streak.begin;
+      while (begin < streak.end) {
+        const std::uint32_t end = std::min(old->end, streak.end);
+        vote(streak.cluster, old->cluster, end - begin);
+        begin = end;
+        if (old->end == end) ++old;
       }
     }
     hand_on(candidate_, old_ids, ids);
@@ -53,6 +54,20 @@ class InstanceIds {
   }
 
  private:
+  // Majority vote of Boyer and Moore: one candidate and one counter per cluster.
+  void vote(std::uint32_t cluster, std::uint32_t old_cluster, std::uint32_t points) {
+    if (cluster == kNoCluster || old_cluster == kNoCluster) return;
+    std::uint32_t& lead = lead_[cluster];
+    if (candidate_[cluster] == old_cluster) {
+      lead += points;
+    } else if (points <= lead) {
+      lead -= points;
+    } else {
+      candidate_[cluster] = old_cluster;
+      lead = points - lead;
+    }
+  }
+
   std::uint32_t last_id_ = kNoInstance;
   std::vector<std::uint32_t> candidate_;
   std::vector<std::uint32_t> lead_;

@@ -245,16 +245,21 @@ inline std::uint64_t nonzero_bytes(const std::uint8_t* from) {
   return result;
 }
 
+/// Eight values, wherever they lie.
+template <class T>
+void copy_lanes(const T* from, T* to) {
+  static_assert(sizeof(T) == 4);
+  Int8 eight;
+  std::memcpy(&eight, from, sizeof(eight));
+  std::memcpy(to, &eight, sizeof(eight));
+}
+
 /// For short arrays, of which there are many: cheaper than a call of memcpy.
 template <class T>
 void copy(const T* from, std::size_t count, T* to) {
   static_assert(sizeof(T) == 4);
   std::size_t i = 0;
-  for (; i + kLanes <= count; i += kLanes) {
-    Int8 eight;
-    std::memcpy(&eight, from + i, sizeof(eight));
-    std::memcpy(to + i, &eight, sizeof(eight));
-  }
+  for (; i + kLanes <= count; i += kLanes) copy_lanes(from + i, to + i);
   for (; i < count; ++i) to[i] = from[i];
 }
 

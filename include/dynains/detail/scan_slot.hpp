@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynains/cause.hpp"
+#include "dynains/cluster_set.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/room.hpp"
 #include "dynains/detail/turn.hpp"
@@ -42,17 +43,17 @@ struct ScanSlot {
 
   GroundSplit split;
   // By non-ground point, in the order of the split; empty if windows are not compared.
-  std::vector<std::uint8_t> votes;     // windows that called it dynamic
-  std::vector<float> belief;           // highest posterior of any window that proposed it
-  std::vector<Reach> reach;            // how far it came in the window in which it came farthest
-  std::vector<std::uint32_t> cluster;  // in the window in which this scan was the newest
-  // By cluster of that window.
+  std::vector<Reach> reach;         // how far it came in the window in which it came farthest
+  std::vector<Reach> first_reach;   // the same, of its first window
+  std::vector<std::uint8_t> votes;  // if it was proposed: windows that called it dynamic
+  std::vector<float> belief;        // if it was proposed: highest posterior of any window
+  // Of the window in which this scan was the newest: its points, and ids by cluster.
+  std::vector<ClusterSet::Streak> streaks;
   std::vector<std::uint32_t> ids;
   // By point of the split, ground first.
   std::vector<Cause> proof;           // by the evidence of other scans
   std::vector<std::uint8_t> is_kept;  // verdict: static
   // By input point.
-  bool is_written = false;
   std::vector<PointLabel> labels;
   std::vector<std::uint32_t> instances;
   std::vector<float> beliefs;
@@ -90,10 +91,10 @@ struct ScanSlot {
   }
   template <class Visit>
   void for_each_compared(Visit&& visit) {
+    visit(reach);
+    visit(first_reach);
     visit(votes);
     visit(belief);
-    visit(reach);
-    visit(cluster);
   }
   template <class Visit>
   void for_each_always(Visit&& visit) {

@@ -1,0 +1,181 @@
+// From verdicts on clusters, and from the evidence of other scans, to the points of a scan.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+#include "dynains/cause.hpp"
+#include "dynains/cluster_set.hpp"
+#include "dynains/detail/lanes.hpp"
+#include "dynains/detail/scan_slot.hpp"
+#include "dynains/points.hpp"
+
+namespace dynains::detail {
+
+/// What a window says of one cluster.
+struct ClusterVerdict {
+  float belief = 0.0F;
+  std::uint8_t dynamic = 0;
+  Reach reach = Reach::kNoCluster;
+};
+
+/// What does not change any more: ground, and the points that are no part of the split.
+inline void begin_verdict(ScanSlot& scan) {
+  scan.instances.assign(scan.labels.size(), kNoInstance);
+  scan.beliefs.assign(scan.labels.size(), 0.0F);
+  scan.causes.assign(scan.labels.size(), Cause::kNotJudged);
+  scan.is_kept.assign(scan.split.count, 1);
+  const std::uint32_t* const input = scan.split.input.data();
+  PointLabel* const labels = scan.labels.data();
+  Cause* const causes = scan.causes.data();
+  const std::size_t ground_count = scan.split.ground_count;
+  for (std::size_t i = 0; i < ground_count; ++i) {
+    labels[input[i]] = PointLabel::kGround;
+    causes[input[i]] = Cause::kGround;
+  }
+}
+
+/// Each point above the ground gets the instance of its cluster.
+inline void write_instances(ScanSlot& scan, Span<const std::uint32_t> cluster_of) {
+  const std::uint32_t* const input = scan.split.input.data() + scan.split.ground_count;
+  for (std::size_t i = 0; i < cluster_of.size(); ++i) {
+    if (cluster_of[i] != kNoCluster) scan.instances[input[i]] = scan.ids[cluster_of[i]];
+  }
+}
+
+/// Takes in what the window in which the scan is the newest says of it. Its streaks and ids are
+/// known.
+inline void record_first(ScanSlot& scan, Span<const ClusterVerdict> verdicts) {
+  const std::size_t count = scan.non_ground_count();
+  scan.votes.resize(count);
+  scan.belief.resize(count);
+  scan.reach.resize(count);
+  for (const ClusterSet::Streak& streak : scan.streaks) {
+    const std::size_t length = streak.end - streak.begin;
+    const bool clustered = streak.cluster != kNoCluster;
+    const ClusterVerdict verdict = clustered ? verdicts[streak.cluster] : ClusterVerdict();
+    std::fill_n(scan.reach.data() + streak.begin, length, verdict.reach);
+    if (verdict.reach != Reach::kProposed) continue;
+    std::fill_n(scan.votes.data() + streak.begin, length, verdict.dynamic);
+    std::fill_n(scan.belief.data() + streak.begin, length, verdict.belief);
+  }
+  scan.first_reach = scan.reach;
+}
+
+/// Takes in what a later window says of the scan, whose points are cut into other streaks there.
+inline void record_again(ScanSlot& scan, Span<const ClusterSet::Streak> streaks,
+                         Span<const ClusterVerdict> verdicts) {
+  for (const ClusterSet::Streak& streak : streaks) {
+    if (streak.cluster == kNoCluster) continue;
+    const ClusterVerdict verdict = verdicts[streak.cluster];
+    if (verdict.reach != Reach::kProposed) {
+      raise(scan.reach.data() + streak.begin, streak.end - streak.begin, verdict.reach);
+      continue;
+    }
+    for (std::size_t i = streak.begin; i < streak.end; ++i) {
+      const bool first = scan.reach[i] != Reach::kProposed;
+      scan.reach[i] = Reach::kProposed;
+      scan.votes[i] = static_cast<std::uint8_t>((first ? 0 : scan.votes[i]) + verdict.dynamic);
+      scan.belief[i] = first ? verdict.belief : std::max(scan.belief[i], verdict.belief);
+    }
+  }
+}
+
+/// The first verdict by windows, streak by streak.
+inline void write_by_windows(ScanSlot& scan, Span<const ClusterVerdict> verdicts) {
+  const std::size_t ground_count = scan.split.ground_count;
+  const std::uint32_t* const input = scan.split.input.data() + ground_count;
+  PointLabel* const labels = scan.labels.data();
+  Cause* const causes = scan.causes.data();
+  std::uint32_t* const instances = scan.instances.data();
+  for (const ClusterSet::Streak& streak : scan.streaks) {
+    const bool clustered = streak.cluster != kNoCluster;
+    const ClusterVerdict verdict = clustered ? verdicts[streak.cluster] : ClusterVerdict();
+    const bool dynamic = verdict.dynamic != 0;
+    const PointLabel label = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
+    const Cause cause = dynamic ? Cause::kProposed : cause_to_stay(verdict.reach);
+    const std::uint32_t id = clustered ? scan.ids[streak.cluster] : kNoInstance;
+    for (std::size_t i = streak.begin; i < streak.end; ++i) {
+      labels[input[i]] = label;
+      causes[input[i]] = cause;
+      instances[input[i]] = id;
+    }
+    if (verdict.reach != Reach::kProposed) continue;
+    for (std::size_t i = streak.begin; i < streak.end; ++i) {
+      scan.beliefs[input[i]] = verdict.belief;
+      scan.is_kept[ground_count + i] = dynamic ? 0 : 1;
+    }
+  }
+}
+
+/// The final verdict by windows: dynamic is what at least `votes` of them said it is. Only points
+/// that some window believed in or brought farther can have changed.
+inline void rewrite_by_windows(ScanSlot& scan, int votes) {
+  const std::size_t ground_count = scan.split.ground_count;
+  const std::uint32_t* const input = scan.split.input.data() + ground_count;
+  const Reach* const reach = scan.reach.data();
+  const Reach* const first_reach = scan.first_reach.data();
+  const std::size_t count = scan.reach.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (reach[i] == first_reach[i] && reach[i] != Reach::kProposed) continue;
+    const bool proposed = reach[i] == Reach::kProposed;
+    const bool dynamic = proposed && scan.votes[i] >= votes;
+    scan.is_kept[ground_count + i] = dynamic ? 0 : 1;
+    scan.labels[input[i]] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
+    scan.causes[input[i]] = dynamic ? Cause::kProposed : cause_to_stay(reach[i]);
+    if (proposed) scan.beliefs[input[i]] = scan.belief[i];
+  }
+}
+
+/// Most ground stays, and is already known to. `belief`: by point of the split.
+inline void write_ground_by_evidence(ScanSlot& scan, Span<const float> belief) {
+  const std::size_t count = scan.split.ground_count;
+  for (std::size_t begin = 0; begin < count; begin += kLanes) {
+    const std::size_t end = std::min(begin + kLanes, count);
+    unsigned to_write = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      to_write |= is_dynamic(scan.proof[i]) || scan.is_kept[i] == 0 ? 1U : 0U;
+    }
+    for (std::size_t i = begin; to_write != 0 && i < end; ++i) {
+      const bool dynamic = is_dynamic(scan.proof[i]);
+      const std::uint32_t to = scan.split.input[i];
+      scan.is_kept[i] = dynamic ? 0 : 1;
+      scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kGround;
+      scan.causes[to] = scan.proof[i];
+      scan.beliefs[to] = dynamic ? belief[i] : 0.0F;
+    }
+  }
+}
+
+/// The verdict by the evidence of other scans (`proof` and `belief`, by point of the split), and by
+/// windows where `compared`.
+inline void write_by_evidence(ScanSlot& scan, Span<const float> belief, bool compared, int votes) {
+  write_ground_by_evidence(scan, belief);
+  // Read once: stores of bytes may change anything, as far as the compiler knows.
+  const std::size_t ground_count = scan.split.ground_count;
+  const std::size_t count = scan.non_ground_count();
+  const std::uint32_t* const input = scan.split.input.data() + ground_count;
+  const Cause* const proof = scan.proof.data() + ground_count;
+  const float* const evidence = belief.data() + ground_count;
+  std::uint8_t* const is_kept = scan.is_kept.data() + ground_count;
+  PointLabel* const labels = scan.labels.data();
+  Cause* const causes = scan.causes.data();
+  float* const beliefs = scan.beliefs.data();
+  for (std::size_t i = 0; i < count; ++i) {
+    Cause cause = proof[i];
+    float by_windows = 0.0F;
+    if (compared && scan.reach[i] == Reach::kProposed) {
+      by_windows = scan.belief[i];
+      if (scan.votes[i] >= votes && !is_dynamic(cause)) cause = Cause::kProposed;
+    }
+    const bool dynamic = is_dynamic(cause);
+    const std::uint32_t to = input[i];
+    is_kept[i] = dynamic ? 0 : 1;
+    labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
+    causes[to] = cause;
+    beliefs[to] = std::max(by_windows, evidence[i]);
+  }
+}
+
+}  // namespace dynains::detail
