@@ -72,7 +72,7 @@ class StaticMapAccumulator {
     };
     const Index first = {blocks(0), blocks(1), blocks(2)};
 
-    recent_.resize(kRecent, nullptr);
+    recent_.resize(kRecent, kEnd);
     Batch batch;
     for (std::size_t begin = 0; begin < points.size(); begin += kBatch) {
       const std::size_t count = std::min(kBatch, points.size() - begin);
@@ -189,12 +189,16 @@ class StaticMapAccumulator {
     Index at;
     std::uint32_t first;  // point
     std::uint32_t next;   // in the bucket; kEnd behind the last
+
+    bool is_at(std::int32_t x, std::int32_t y, std::int32_t z) const {
+      return ((at.x ^ x) | (at.y ^ y) | (at.z ^ z)) == 0;
+    }
   };
 
-  // The last block that was met in each of so many places, which repeat every 25.6 m (6.4 m in
+  // The last block that was met in each of so many places, which repeat every 51.2 m (6.4 m in
   // height) at 0.2 m: neighbouring points meet the same few blocks again and again, and have them
   // without a walk through a bucket.
-  static constexpr std::size_t kRecent = std::size_t{16} * 32 * 16;
+  static constexpr std::size_t kRecent = std::size_t{32} * 64 * 16;
 
   // Some points of a scan on their way into the map.
   static constexpr std::size_t kBatch = 512;
@@ -241,25 +245,23 @@ class StaticMapAccumulator {
         recent = (recent << recent_bits) + (block_in_world & Int((1 << recent_bits) - 1));
       };
       add_axis(Constant<2>(), Constant<1>(), Constant<4>());
-      add_axis(Constant<1>(), Constant<2>(), Constant<5>());
-      add_axis(Constant<0>(), Constant<3>(), Constant<4>());
+      add_axis(Constant<1>(), Constant<2>(), Constant<6>());
+      add_axis(Constant<0>(), Constant<3>(), Constant<5>());
       bit.store(&batch.bit[at.begin]);
       recent.store(&batch.recent[at.begin]);
     });
   }
 
   void insert_batch(const Batch& batch, std::size_t count, Span<const std::uint8_t> keep) {
-    Block** const recent = recent_.data();
+    std::uint32_t* const recent = recent_.data();
     for (std::size_t i = 0; i < count; ++i) {
       if (!keep.empty() && keep[i] == 0) continue;
       const std::int32_t x = batch.block[0][i];
       const std::int32_t y = batch.block[1][i];
       const std::int32_t z = batch.block[2][i];
-      Block*& place = recent[batch.recent[i]];
-      if (place == nullptr || ((place->at.x ^ x) | (place->at.y ^ y) | (place->at.z ^ z)) != 0) {
-        place = &block_at({x, y, z});
-      }
-      Block& block = *place;
+      std::uint32_t& known = recent[batch.recent[i]];
+      if (known >= blocks_.size() || !blocks_[known].is_at(x, y, z)) known = block_at({x, y, z});
+      Block& block = blocks_[known];
       const std::uint64_t bit = std::uint64_t{1} << batch.bit[i];
       if ((block.occupied & bit) != 0 && !keep_all_) continue;
       block.occupied |= bit;
@@ -278,10 +280,10 @@ class StaticMapAccumulator {
     return place;
   }
 
-  Block& block_at(const Index& at) {
+  std::uint32_t block_at(const Index& at) {
     const std::uint32_t h = hash(at);
     const std::uint32_t found = find_block(at, h);
-    return blocks_[found == kEnd ? add_block(at, h) : found];
+    return found == kEnd ? add_block(at, h) : found;
   }
 
   static std::uint32_t hash(const Index& at) {
@@ -350,8 +352,8 @@ class StaticMapAccumulator {
   detail::ChunkedVector<std::uint32_t, 1024> buckets_;  // first block of each
   detail::ChunkedVector<Block, 512> blocks_;            // in the order of their first point
   detail::ChunkedVector<Point, 512> points_;
-  std::uint32_t free_ = kEnd;   // first place of points that were erased
-  std::vector<Block*> recent_;  // by the lowest bits of their coordinates; they never move
+  std::uint32_t free_ = kEnd;          // first place of points that were erased
+  std::vector<std::uint32_t> recent_;  // blocks, by the lowest bits of their coordinates
 };
 
 }  // namespace dynains
