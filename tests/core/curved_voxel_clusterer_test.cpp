@@ -13,10 +13,24 @@ namespace {
 
 using Config = CurvedVoxelClusterer::Config;
 
+// Numbers in the order in which clusters first appear, as the reference has them. Numbers of the
+// clusterer itself go by place, from 0 on.
+std::vector<std::uint32_t> clusters(CurvedVoxelClusterer& clusterer, PolarView points) {
+  const auto result = clusterer.cluster(points);
+  std::vector<std::uint32_t> renumbered(clusterer.cluster_count(), kNoCluster);
+  std::vector<std::uint32_t> cluster_of;
+  std::uint32_t count = 0;
+  for (const std::uint32_t number : result) {
+    if (number != kNoCluster && renumbered.at(number) == kNoCluster) renumbered[number] = count++;
+    cluster_of.push_back(number == kNoCluster ? kNoCluster : renumbered[number]);
+  }
+  REQUIRE(count == clusterer.cluster_count());
+  return cluster_of;
+}
+
 std::vector<std::uint32_t> clusters(const Config& config, PolarView points) {
   CurvedVoxelClusterer clusterer(config);
-  const auto result = clusterer.cluster(points);
-  return {result.begin(), result.end()};
+  return clusters(clusterer, points);
 }
 
 Config make(double range, double azimuth, double elevation, double reach = 90.0) {
@@ -103,9 +117,26 @@ TEST_CASE("a clusterer forgets one scan before the next") {
     const double half = seed % 2 == 0 ? 2.0 : 60.0;
     const PolarBuffer points =
         random_points(config, {3, 40, -180, 180, -half, half}, 100 * seed, seed);
-    const auto result = clusterer.cluster(points.view());
-    REQUIRE((std::vector<std::uint32_t>(result.begin(), result.end()) ==
-             reference_clusters(config, points.view())));
+    REQUIRE((clusters(clusterer, points.view()) == reference_clusters(config, points.view())));
+  }
+}
+
+TEST_CASE("cluster numbers do not depend on the order of the points") {
+  const Config config = make(0.5, 1.0, 3.0);
+  const PolarBuffer points = random_points(config, {3, 40, -180, 180, -20, 20}, 500, 1);
+  const auto order = Random(1).permutation(points.size());
+  PolarBuffer shuffled;
+  shuffled.resize(points.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    shuffled.range[i] = points.range[order[i]];
+    shuffled.azimuth[i] = points.azimuth[order[i]];
+    shuffled.z[i] = points.z[order[i]];
+  }
+  CurvedVoxelClusterer clusterer(config), of_shuffled(config);
+  const auto numbers = clusterer.cluster(points.view());
+  const auto shuffled_numbers = of_shuffled.cluster(shuffled.view());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    REQUIRE(shuffled_numbers[i] == numbers[order[i]]);
   }
 }
 
