@@ -36,9 +36,10 @@ class ClusterSet {
     std::uint32_t cluster;  ///< or kNoCluster
   };
 
-  /// `window` holds the scans one after another, oldest first; scan k is
-  /// [scan_begin[k], scan_begin[k + 1]). `cluster_of` holds a number per point below
-  /// `cluster_count`, or kNoCluster. Views returned later hold until the next build.
+  /// `window` holds the scans one after another, oldest first, and is of a PolarBuffer, which can
+  /// be read a few places beyond its end; scan k is [scan_begin[k], scan_begin[k + 1]).
+  /// `cluster_of` holds a number per point below `cluster_count`, or kNoCluster. Views returned
+  /// later hold until the next build.
   void build(PolarView window, Span<const std::uint32_t> scan_begin,
              Span<const std::uint32_t> cluster_of, std::size_t cluster_count) {
     scan_count_ = scan_begin.size() - 1;
