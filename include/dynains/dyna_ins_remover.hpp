@@ -8,12 +8,14 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynains/belief_updater.hpp"
 #include "dynains/cluster_set.hpp"
 #include "dynains/curved_voxel_clusterer.hpp"
 #include "dynains/detail/instance_ids.hpp"
+#include "dynains/detail/made_up_scan.hpp"
 #include "dynains/detail/one_call.hpp"
 #include "dynains/detail/scan_slot.hpp"
 #include "dynains/detail/stage_checks.hpp"
@@ -166,12 +168,18 @@ class BasicDynaInsRemover {
 
   /// Gets memory for scans of up to `points` points and touches it, so that the first scans do not
   /// wait for the system to give it: 26 to 36 bytes per point for each scan that is open at once,
-  /// window or latency() + 1 of them. Larger scans are welcome all the same. Results do not change.
-  /// Throws UsageError once a scan was pushed.
+  /// window or latency() + 1 of them, and what the stages keep, for which some made-up scans are
+  /// taken in and forgotten. Takes as long as these. Larger scans are welcome all the same. Results
+  /// do not change. Throws UsageError once a scan was pushed.
   void reserve(std::size_t points) {
     const detail::OneCall::Guard guard(one_call_);
     if (pushed_ > 0) throw UsageError("reserve() comes before the first push");
     for (ScanSlot& slot : ring_) slot.touch(points, compares_windows());
+    const std::vector<float> xyz = detail::made_up_scan(points);
+    const Rehearsal rehearsal(*this);
+    for (int i = 0; i < std::max(config_.window, 2); ++i) {
+      take_in(RawPoints<float>{xyz.data(), points}, Eigen::Isometry3d::Identity(), 0.1 * i);
+    }
   }
 
   /// Takes one scan in.
@@ -211,6 +219,30 @@ class BasicDynaInsRemover {
   void reset() {
     const detail::OneCall::Guard guard(one_call_);
     map_.clear();
+    forget();
+  }
+
+ private:
+  using ScanSlot = detail::ScanSlot;
+
+  // While it lives, scans leave no trace, and none on the map, which may be on a disk.
+  class Rehearsal {
+   public:
+    explicit Rehearsal(BasicDynaInsRemover& remover)
+        : remover_(remover), build_map_(std::exchange(remover.config_.build_map, false)) {}
+    Rehearsal(const Rehearsal&) = delete;
+    Rehearsal& operator=(const Rehearsal&) = delete;
+    ~Rehearsal() {
+      remover_.config_.build_map = build_map_;
+      remover_.forget();
+    }
+
+   private:
+    BasicDynaInsRemover& remover_;
+    bool build_map_;
+  };
+
+  void forget() {
     revision_.clear();
     instance_ids_ = {};
     sensor_ = {};
@@ -218,9 +250,6 @@ class BasicDynaInsRemover {
     finished_ = 0;
     ++segment_;  // nothing that is remembered takes part any more
   }
-
- private:
-  using ScanSlot = detail::ScanSlot;
 
   template <class Cloud>
   FrameResult take_in(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor, double time) {
