@@ -226,6 +226,18 @@ class CurvedVoxelClusterer {
     return static_cast<std::size_t>(elevations) * columns();
   }
 
+  // The first block from `block` on that was marked, or `end`. Most are not: eight at a time.
+  std::size_t next_used(std::size_t block, std::size_t end) const {
+    std::uint64_t eight;
+    while (block + sizeof(eight) <= end) {
+      std::memcpy(&eight, &is_used_[block], sizeof(eight));
+      if (eight != 0) break;
+      block += sizeof(eight);
+    }
+    while (block < end && is_used_[block] == 0) ++block;
+    return block;
+  }
+
   // Cuts rows into runs. An occupied cell then holds the number of its run, counted from the first
   // one of its block.
   void find_runs() {
@@ -236,13 +248,14 @@ class CurvedVoxelClusterer {
     for (std::size_t row = 0; row < rows; ++row) {
       first_run_[row] = static_cast<std::uint32_t>(runs_.size());
       std::int32_t open_end = -1;  // of the last run in this row
-      for (std::size_t b = 0; b < row_blocks(); ++b) {
-        const std::size_t block = row * row_blocks() + b;
-        if (is_used_[block] == 0) continue;
+      const std::size_t begin_of_row = row * row_blocks();
+      const std::size_t end_of_row = begin_of_row + row_blocks();
+      for (std::size_t block = next_used(begin_of_row, end_of_row); block < end_of_row;
+           block = next_used(block + 1, end_of_row)) {
         used_blocks_.push_back(static_cast<std::uint32_t>(block));
         std::uint8_t* const cells = &cells_[block * kBlock];
         std::uint64_t occupied = detail::nonzero_bytes(cells);
-        const auto first_azimuth = static_cast<std::int32_t>(b * kBlock);
+        const auto first_azimuth = static_cast<std::int32_t>((block - begin_of_row) * kBlock);
         const bool goes_on = open_end == first_azimuth && (occupied & 1U) != 0;
         const auto first = static_cast<std::uint32_t>(runs_.size() - (goes_on ? 1 : 0));
         first_run_of_block_[block] = first;
