@@ -174,7 +174,7 @@ class BasicDynaInsRemover {
   void reserve(std::size_t points) {
     const detail::OneCall::Guard guard(one_call_);
     if (pushed_ > 0) throw UsageError("reserve() comes before the first push");
-    for (ScanSlot& slot : ring_) slot.touch(points, compares_windows());
+    for (ScanSlot& slot : ring_) slot.touch(points, config_.use_free_space);
     const std::vector<float> xyz = detail::made_up_scan(points);
     const Rehearsal rehearsal(*this);
     for (int i = 0; i < std::max(config_.window, 2); ++i) {

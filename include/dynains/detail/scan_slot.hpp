@@ -61,20 +61,28 @@ struct ScanSlot {
 
   /// For a scan of so many points.
   void make_room(std::size_t points) {
-    for_each_vector([points](auto& values) { detail::make_room(values, points); });
+    const auto make_room_in = [points](auto& values) { detail::make_room(values, points); };
+    for_each_verdict(make_room_in);
+    make_room_in(proof);
+    make_room_in(reach);
+    make_room_in(first_reach);
+    make_room_in(votes);
+    make_room_in(belief);
+    detail::make_room(streaks, points / kFewestInStreak);
   }
 
-  /// The same, and touches it, so that the system has given the memory before a scan needs it.
-  void touch(std::size_t points, bool compares_windows) {
+  /// The same, and touches what every scan writes, so that the system has given that memory before
+  /// a scan needs it. `evident`: proof is written, too.
+  void touch(std::size_t points, bool evident) {
+    make_room(points);
     split.resize(points);
     split.resize(0);
     const auto touch_one = [points](auto& values) {
-      detail::make_room(values, points);
       values.resize(points);
       values.clear();
     };
-    for_each_always(touch_one);
-    if (compares_windows) for_each_compared(touch_one);
+    for_each_verdict(touch_one);
+    if (evident) touch_one(proof);
   }
 
   std::size_t non_ground_count() const { return split.count - split.ground_count; }
@@ -84,21 +92,10 @@ struct ScanSlot {
   }
 
  private:
+  static constexpr std::size_t kFewestInStreak = 4;  // points on average, else streaks grow later
+
   template <class Visit>
-  void for_each_vector(Visit&& visit) {
-    for_each_compared(visit);
-    for_each_always(visit);
-  }
-  template <class Visit>
-  void for_each_compared(Visit&& visit) {
-    visit(reach);
-    visit(first_reach);
-    visit(votes);
-    visit(belief);
-  }
-  template <class Visit>
-  void for_each_always(Visit&& visit) {
-    visit(proof);
+  void for_each_verdict(Visit&& visit) {
     visit(is_kept);
     visit(labels);
     visit(instances);
