@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 #include "dynains/cause.hpp"
 #include "dynains/cluster_set.hpp"
@@ -128,16 +129,23 @@ inline void rewrite_by_windows(ScanSlot& scan, int votes) {
   }
 }
 
-/// Most ground stays, and is already known to. `belief`: by point of the split.
+/// Most ground stays, and is already known to: eight points at a time. `belief`: by point of the
+/// split.
 inline void write_ground_by_evidence(ScanSlot& scan, Span<const float> belief) {
+  constexpr std::uint64_t kOnes = 0x0101010101010101U;
+  constexpr auto kGround = static_cast<std::uint8_t>(Cause::kGround);
+  const auto eight = [](const auto* bytes) {
+    std::uint64_t word;
+    static_assert(sizeof(*bytes) == 1 && sizeof(word) == kLanes);
+    std::memcpy(&word, bytes, sizeof(word));
+    return word;
+  };
   const std::size_t count = scan.split.ground_count;
   for (std::size_t begin = 0; begin < count; begin += kLanes) {
     const std::size_t end = std::min(begin + kLanes, count);
-    unsigned to_write = 0;
-    for (std::size_t i = begin; i < end; ++i) {
-      to_write |= is_dynamic(scan.proof[i]) || scan.is_kept[i] == 0 ? 1U : 0U;
-    }
-    for (std::size_t i = begin; to_write != 0 && i < end; ++i) {
+    const bool stays = end - begin == kLanes && eight(&scan.is_kept[begin]) == kOnes &&
+                       eight(&scan.proof[begin]) == kOnes * kGround;
+    for (std::size_t i = begin; !stays && i < end; ++i) {
       const bool dynamic = is_dynamic(scan.proof[i]);
       const std::uint32_t to = scan.split.input[i];
       scan.is_kept[i] = dynamic ? 0 : 1;
