@@ -8,12 +8,15 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <vector>
 
 #include "dynains/detail/arc_tangent.hpp"
 #include "dynains/detail/lanes.hpp"
+#include "dynains/detail/patch_sort.hpp"
 #include "dynains/detail/plane_fit.hpp"
+#include "dynains/detail/point_record.hpp"
 #include "dynains/detail/room.hpp"
 #include "dynains/detail/wide_lanes.hpp"
 #include "dynains/parameters.hpp"
@@ -173,19 +176,25 @@ class GroundSegmenter {
   /// is handed on with them. Points outside the rings and points of sparse patches are not ground.
   /// Order within `split` is by patch, then as scanned.
   void segment(PointsView scan, Span<const std::uint32_t> input, GroundSplit& split) {
-    sort_by_patch(scan, input);
+    detail::grow(patch_of_, scan.size() + detail::kLanes);
+    find_patches(scan);
+    sorted_.sort(scan, input.data(), patch_of_.data());
+    patch_.grow(scan.size() + detail::kLanes);
     split.resize(scan.size());
-    rest_.resize(scan.size());
-    Output out = {split, rest_};
-    for (std::size_t p = 0; p < kPatches; ++p) segment_patch(p, out);
-    out.put_rest(sorted_, patch_begin_[kPatches], scan.size());
-    split.ground_count = out.ground_count;
-    copy(rest_, 0, out.rest_count, split, out.ground_count);
+    detail::run_lanes([&](auto lanes) {
+      using Lanes = decltype(lanes);
+      Output<Lanes> out(sorted_.records(), split);
+      for (std::size_t p = 0; p < kPatches; ++p) {
+        segment_patch(p, sorted_.records() + sorted_.begin(p), sorted_.end(p) - sorted_.begin(p),
+                      out);
+      }
+      out.put_rest(sorted_.records() + sorted_.begin(kPatches),
+                   sorted_.end(kPatches) - sorted_.begin(kPatches));
+      out.finish();
+    });
   }
 
  private:
-  static constexpr std::size_t kFewestInStreak = 4;  // points on average, to move them together
-
   // Constants of a zone; small whole numbers are exact in floats.
   struct Zone {
     float inner;  // m
@@ -204,140 +213,104 @@ class GroundSegmenter {
         of[0], of[0].bits_changed(of[1]), of[1].bits_changed(of[2]), of[2].bits_changed(of[3])};
   };
 
-  static void copy(const GroundSplit& from, std::size_t begin, std::size_t count, GroundSplit& to,
-                   std::size_t at) {
-    detail::copy(&from.points.x[begin], count, &to.points.x[at]);
-    detail::copy(&from.points.y[begin], count, &to.points.y[at]);
-    detail::copy(&from.points.z[begin], count, &to.points.z[at]);
-    detail::copy(&from.input[begin], count, &to.input[at]);
-  }
+  // Ground goes straight to its place. Where the rest begins is known in the end; until then it
+  // closes up at the front of the sorted points.
+  template <class Lanes>
+  class Output {
+   public:
+    Output(detail::PointRecord* sorted, GroundSplit& split)
+        : rest_(sorted),
+          x_(split.points.x.data()),
+          y_(split.points.y.data()),
+          z_(split.points.z.data()),
+          input_(split.input.data()),
+          split_(split) {}
 
-  // Ground goes straight to the front of the split, the rest into a buffer of its own, because it
-  // cannot be known yet where it begins.
-  struct Output {
-    GroundSplit& ground;
-    GroundSplit& rest;
-    std::size_t ground_count = 0;
-    std::size_t rest_count = 0;
+    void put_rest(const detail::PointRecord* from, std::size_t count) {
+      if (from != rest_ + rest_count_) {
+        std::memmove(rest_ + rest_count_, from, count * sizeof(detail::PointRecord));
+      }
+      rest_count_ += count;
+    }
 
-    void put_rest(const GroundSplit& from, std::size_t begin, std::size_t end) {
-      copy(from, begin, end - begin, rest, rest_count);
-      rest_count += end - begin;
-    }
-    // Up to eight points; bit k of `is_ground` belongs to the k-th.
-    void put(const GroundSplit& from, std::size_t begin, std::size_t count, unsigned is_ground) {
-      if (is_ground == 0) return put_rest(from, begin, begin + count);
-      if (is_ground == (1U << count) - 1U) {
-        copy(from, begin, count, ground, ground_count);
-        ground_count += count;
-        return;
+    // Up to eight points, padded; bit k of `is_ground` belongs to the k-th.
+    void put(const detail::PointRecord* from, std::size_t count, unsigned is_ground) {
+      if (is_ground == 0) {
+        for (std::size_t k = 0; k < count; ++k) rest_[rest_count_ + k] = from[k];
+        rest_count_ += count;
+      } else if (is_ground == (1U << count) - 1U) {
+        lay_out(from, ground_count_);
+        ground_count_ += count;
+      } else {
+        // Written to both places, since no branch could foretell the right one.
+        detail::PointRecord ground[2 * detail::kLanes];
+        std::size_t grounds = 0;
+        for (std::size_t k = 0; k < count; ++k) {
+          const detail::PointRecord record = from[k];
+          const unsigned bit = (is_ground >> k) & 1U;
+          ground[grounds] = record;
+          rest_[rest_count_] = record;
+          grounds += bit;
+          rest_count_ += 1U - bit;
+        }
+        lay_out(ground, ground_count_);
+        ground_count_ += grounds;
       }
-      // Written to both places, since no branch could foretell the right one.
-      for (std::size_t k = 0; k < count; ++k) {
-        const unsigned bit = (is_ground >> k) & 1U;
-        put_one(from, begin + k, ground, ground_count);
-        put_one(from, begin + k, rest, rest_count);
-        ground_count += bit;
-        rest_count += 1U - bit;
+    }
+
+    void finish() {
+      split_.ground_count = ground_count_;
+      for (std::size_t i = 0; i < rest_count_; i += detail::kLanes) {
+        lay_out(rest_ + i, ground_count_ + i);
       }
     }
-    static void put_one(const GroundSplit& from, std::size_t i, GroundSplit& to, std::size_t at) {
-      to.points.x[at] = from.points.x[i];
-      to.points.y[at] = from.points.y[i];
-      to.points.z[at] = from.points.z[i];
-      to.input[at] = from.input[i];
+
+   private:
+    void lay_out(const detail::PointRecord* from, std::size_t at) {
+      const auto columns = detail::load_columns<Lanes>(from);
+      columns[0].store(x_ + at);
+      columns[1].store(y_ + at);
+      columns[2].store(z_ + at);
+      columns[3].store(reinterpret_cast<float*>(input_ + at));
     }
+
+    detail::PointRecord* const rest_;
+    std::size_t rest_count_ = 0;
+    std::size_t ground_count_ = 0;
+    float* const x_;
+    float* const y_;
+    float* const z_;
+    std::uint32_t* const input_;
+    GroundSplit& split_;
   };
 
-  // Counting sort; stable, so that points keep the order of the scan within their patch.
-  void sort_by_patch(PointsView scan, Span<const std::uint32_t> input) {
-    const std::size_t count = scan.size();
-    sorted_.resize(count);
-    detail::grow(patch_of_, count + detail::kLanes);
-    find_patches(scan);
-    patch_begin_.fill(0);
-    // Scans that come beam by beam have long streaks of points in one patch, those that come column
-    // by column have none.
-    if (detail::count_changes(patch_of_.data(), count) > count / kFewestInStreak) {
-      sort_points(scan, input);
-    } else {
-      sort_streaks(scan, input);
-    }
-  }
-
-  // From the sizes of patches, each in the place behind its own, to where they begin.
-  void add_up_sizes() {
-    for (std::size_t p = 1; p < patch_begin_.size(); ++p) patch_begin_[p] += patch_begin_[p - 1];
-  }
-
-  void sort_points(PointsView scan, Span<const std::uint32_t> input) {
-    const std::int32_t* const patch_of = patch_of_.data();
-    for (std::size_t i = 0; i < scan.size(); ++i) {
-      ++patch_begin_[static_cast<std::size_t>(patch_of[i]) + 1];
-    }
-    add_up_sizes();
-    auto next = patch_begin_;
-    float* const x = sorted_.points.x.data();
-    float* const y = sorted_.points.y.data();
-    float* const z = sorted_.points.z.data();
-    std::uint32_t* const numbers = sorted_.input.data();
-    for (std::size_t i = 0; i < scan.size(); ++i) {
-      const std::size_t to = next[static_cast<std::size_t>(patch_of[i])]++;
-      x[to] = scan.x[i];
-      y[to] = scan.y[i];
-      z[to] = scan.z[i];
-      numbers[to] = input[i];
-    }
-  }
-
-  // What is counted and moved are whole streaks: no counter waits for its own last increment.
-  void sort_streaks(PointsView scan, Span<const std::uint32_t> input) {
-    streak_end_.clear();
-    std::size_t begin = 0;
-    detail::for_each_change(patch_of_.data(), scan.size(), [&](std::size_t length) {
-      patch_begin_[static_cast<std::size_t>(patch_of_[begin]) + 1] += length;
-      begin += length;
-      streak_end_.push_back(static_cast<std::uint32_t>(begin));
-    });
-    add_up_sizes();
-    auto next = patch_begin_;
-    begin = 0;
-    for (const std::uint32_t end : streak_end_) {
-      const std::size_t length = end - begin;
-      std::size_t& to = next[static_cast<std::size_t>(patch_of_[begin])];
-      detail::copy(&scan.x[begin], length, &sorted_.points.x[to]);
-      detail::copy(&scan.y[begin], length, &sorted_.points.y[to]);
-      detail::copy(&scan.z[begin], length, &sorted_.points.z[to]);
-      detail::copy(&input[begin], length, &sorted_.input[to]);
-      to += length;
-      begin = end;
-    }
-  }
-
   void find_patches(PointsView scan) {
-    using detail::Constant8;
-    // Read once: the compiler cannot know that stores leave members alone.
-    const auto of_zone = [&](float Zone::*constant) {
-      return ZoneConstant{
-          {zones_[0].*constant, zones_[1].*constant, zones_[2].*constant, zones_[3].*constant}};
-    };
-    const ZoneConstant inner = of_zone(&Zone::inner);
-    const ZoneConstant rings_per_metre = of_zone(&Zone::rings_per_metre);
-    const ZoneConstant sectors_per_radian = of_zone(&Zone::sectors_per_radian);
-    const ZoneConstant first_patch = of_zone(&Zone::first_patch);
-    const ZoneConstant last_ring = of_zone(&Zone::last_ring);
-    const ZoneConstant sector_count = of_zone(&Zone::sectors);
-    const Constant8 nearest(static_cast<float>(config_.ground_min_range));
-    const Constant8 farthest(static_cast<float>(config_.ground_max_range));
-    const Constant8 pi(detail::kPi);
-    const Constant8 one(1.0F);
-    std::int32_t* const patches = patch_of_.data();
-
-    detail::for_lanes(scan.size(), [&](auto at) {
-      using Float = typename decltype(at)::Float;
-      using Int = typename decltype(at)::Int;
-      const Float x = at.load(scan.x.data());
-      const Float y = at.load(scan.y.data());
+    detail::run_lanes([&](auto lanes) {
+      using Lanes = decltype(lanes);
+      using Float = typename Lanes::Float;
+      using Int = typename Lanes::Int;
+      // Read once: the compiler cannot know that stores leave members alone.
+      using detail::Constant8;
+      const auto of_zone = [&](float Zone::*constant) {
+        return ZoneConstant{
+            {zones_[0].*constant, zones_[1].*constant, zones_[2].*constant, zones_[3].*constant}};
+      };
+      const ZoneConstant inner = of_zone(&Zone::inner);
+      const ZoneConstant rings_per_metre = of_zone(&Zone::rings_per_metre);
+      const ZoneConstant sectors_per_radian = of_zone(&Zone::sectors_per_radian);
+      const ZoneConstant first_patch = of_zone(&Zone::first_patch);
+      const ZoneConstant last_ring = of_zone(&Zone::last_ring);
+      const ZoneConstant sector_count = of_zone(&Zone::sectors);
+      const Constant8 nearest(static_cast<float>(config_.ground_min_range));
+      const Constant8 farthest(static_cast<float>(config_.ground_max_range));
+      const Constant8 pi(detail::kPi);
+      const Constant8 one(1.0F);
+      const float* const xs = scan.x.data();
+      const float* const ys = scan.y.data();
+      std::int32_t* const patches = patch_of_.data();
+      detail::for_places<Lanes>(scan.size(), [&](auto at) {
+      const Float x = at.load(xs);
+      const Float y = at.load(ys);
       const Float range = sqrt(x * x + y * y);
       const Float azimuth = detail::azimuth_of(y, x, range) + pi;
       const auto beyond_1 = range >= inner.of[1];
@@ -358,28 +331,30 @@ class GroundSegmenter {
       const auto inside = (range >= nearest) & (range <= farthest);
       select(inside, truncate(patch), Int(static_cast<std::int32_t>(kPatches)))
           .store(patches + at.begin);
+      });
     });
   }
 
-  void segment_patch(std::size_t patch, Output& out) const {
-    const std::size_t begin = patch_begin_[patch];
-    const std::size_t end = patch_begin_[patch + 1];
-    const auto reject = [&] { out.put_rest(sorted_, begin, end); };
-    if (end - begin < static_cast<std::size_t>(config_.ground_min_points)) return reject();
+  template <class Lanes>
+  void segment_patch(std::size_t patch, const detail::PointRecord* records, std::size_t count,
+                     Output<Lanes>& out) {
+    const auto reject = [&] { out.put_rest(records, count); };
+    if (count < static_cast<std::size_t>(config_.ground_min_points)) return reject();
+    const float x0 = records->x;
+    const float y0 = records->y;
+    lay_out<Lanes>(records, count, x0, y0);
 
     const bool innermost_zone = static_cast<std::int32_t>(patch) < kRings[0] * kSectors[0];
     const double h = height_;
     const float floor = innermost_zone ? static_cast<float>(-(1.0 + config_.ground_below) * h)
                                        : -std::numeric_limits<float>::infinity();
-    const float seed_height = lowest_mean(begin, end, floor);
+    const float seed_height = lowest_mean<Lanes>(patch_.z.data(), count, floor);
 
     // First fit: the points near the seed height, as a horizontal half space; then the plane.
-    const float x0 = sorted_.points.x[begin];
-    const float y0 = sorted_.points.y[begin];
-    HalfSpace below(x0, y0, seed_height, static_cast<float>(config_.ground_seed_margin));
+    HalfSpace below(seed_height, static_cast<float>(config_.ground_seed_margin));
     detail::Plane plane;
     for (int i = 0; i < config_.ground_iterations; ++i) {
-      const detail::PlaneMoments moments = sum_moments(begin, end, below);
+      const detail::PlaneMoments moments = sum_moments<Lanes>(patch_, count, below);
       if (moments.count < 3.0) return reject();
       plane = detail::fit_plane(moments);
       below.x = static_cast<float>(plane.normal_x);
@@ -399,28 +374,24 @@ class GroundSegmenter {
       }
     }
 
-    detail::run_lanes([&](auto lanes) {
-      using Lanes = decltype(lanes);
-      for (std::size_t i = begin; i < end; i += detail::kLanes) {
-        const unsigned bits = below.inside(below.template local<Lanes>(sorted_.points, i)).bits();
-        const std::size_t count = std::min(detail::kLanes, end - i);
-        out.put(sorted_, i, count, bits & ((1U << count) - 1U));
-      }
-    });
+    for (std::size_t i = 0; i < count; i += detail::kLanes) {
+      const unsigned bits = below.inside(below.template local<Lanes>(patch_, i)).bits();
+      const std::size_t length = std::min(detail::kLanes, count - i);
+      out.put(records + i, length, bits & ((1U << length) - 1U));
+    }
   }
 
   // Points with normal . (p - origin) < offset; the origin of the fit is near the points.
   struct HalfSpace {
-    HalfSpace(float origin_x, float origin_y, float origin_z, float distance)
-        : x0(origin_x), y0(origin_y), z0(origin_z), offset(distance) {}
+    HalfSpace(float origin_z, float distance) : z0(origin_z), offset(distance) {}
 
-    detail::Constant8 x0, y0, z0;
+    detail::Constant8 z0;
     detail::Constant8 x = 0.0F, y = 0.0F, z = 1.0F, offset;
 
     template <class Lanes>
     std::array<typename Lanes::Float, 3> local(const PointBuffer& points, std::size_t i) const {
       using Float = typename Lanes::Float;
-      return {Float::load(&points.x[i]) - x0, Float::load(&points.y[i]) - y0,
+      return {Float::load(&points.x[i]), Float::load(&points.y[i]),
               Float::load(&points.z[i]) - z0};
     }
     template <class Float>
@@ -429,44 +400,54 @@ class GroundSegmenter {
     }
   };
 
-  detail::PlaneMoments sum_moments(std::size_t begin, std::size_t end,
-                                   const HalfSpace& space) const {
+  // The points of a patch; x and y relative to an origin near them.
+  template <class Lanes>
+  void lay_out(const detail::PointRecord* records, std::size_t count, float x0, float y0) {
+    using Float = typename Lanes::Float;
+    float* const x = patch_.x.data();
+    float* const y = patch_.y.data();
+    float* const z = patch_.z.data();
+    for (std::size_t i = 0; i < count; i += detail::kLanes) {
+      const auto columns = detail::load_columns<Lanes>(records + i);
+      (columns[0] - Float(x0)).store(x + i);
+      (columns[1] - Float(y0)).store(y + i);
+      columns[2].store(z + i);
+    }
+  }
+
+  template <class Lanes>
+  static detail::PlaneMoments sum_moments(const PointBuffer& points, std::size_t count,
+                                          const HalfSpace& space) {
     static constexpr detail::Constant8 kZero(0.0F), kOne(1.0F);
-    std::array<float, 10> sums;
-    detail::run_lanes([&](auto lanes) {
-      using Lanes = decltype(lanes);
-      using Float = typename Lanes::Float;
-      Float n = kZero, sx = kZero, sy = kZero, sz = kZero, sxx = kZero, sxy = kZero, sxz = kZero,
-            syy = kZero, syz = kZero, szz = kZero;
-      const auto add = [&](const std::array<Float, 3>& p, const typename Lanes::Mask& member) {
-        const Float x = keep(member, p[0]);
-        const Float y = keep(member, p[1]);
-        const Float z = keep(member, p[2]);
-        n = n + keep(member, Float(kOne));
-        sx = sx + x;
-        sy = sy + y;
-        sz = sz + z;
-        sxx = sxx + x * x;
-        sxy = sxy + x * y;
-        sxz = sxz + x * z;
-        syy = syy + y * y;
-        syz = syz + y * z;
-        szz = szz + z * z;
-      };
-      std::size_t i = begin;
-      for (; i + detail::kLanes <= end; i += detail::kLanes) {
-        const auto p = space.template local<Lanes>(sorted_.points, i);
-        add(p, space.inside(p));
-      }
-      if (i < end) {
-        const auto p = space.template local<Lanes>(sorted_.points, i);
-        add(p, space.inside(p) & detail::lanes_below<Lanes>(end - i));
-      }
-      sums = {sum(n),   sum(sx),  sum(sy),  sum(sz),  sum(sxx),
-              sum(sxy), sum(sxz), sum(syy), sum(syz), sum(szz)};
-    });
-    return {sums[0], sums[1], sums[2], sums[3], sums[4],
-            sums[5], sums[6], sums[7], sums[8], sums[9]};
+    using Float = typename Lanes::Float;
+    Float n = kZero, sx = kZero, sy = kZero, sz = kZero, sxx = kZero, sxy = kZero, sxz = kZero,
+          syy = kZero, syz = kZero, szz = kZero;
+    const auto add = [&](const std::array<Float, 3>& p, const typename Lanes::Mask& member) {
+      const Float x = keep(member, p[0]);
+      const Float y = keep(member, p[1]);
+      const Float z = keep(member, p[2]);
+      n = n + keep(member, Float(kOne));
+      sx = sx + x;
+      sy = sy + y;
+      sz = sz + z;
+      sxx = sxx + x * x;
+      sxy = sxy + x * y;
+      sxz = sxz + x * z;
+      syy = syy + y * y;
+      syz = syz + y * z;
+      szz = szz + z * z;
+    };
+    std::size_t i = 0;
+    for (; i + detail::kLanes <= count; i += detail::kLanes) {
+      const auto p = space.template local<Lanes>(points, i);
+      add(p, space.inside(p));
+    }
+    if (i < count) {
+      const auto p = space.template local<Lanes>(points, i);
+      add(p, space.inside(p) & detail::lanes_below<Lanes>(count - i));
+    }
+    return {sum(n),   sum(sx),  sum(sy),  sum(sz),  sum(sxx),
+            sum(sxy), sum(sxz), sum(syy), sum(syz), sum(szz)};
   }
 
   // The lowest values met so far, in order.
@@ -489,34 +470,34 @@ class GroundSegmenter {
   // Mean height of the lowest points that are not below `floor`; all of them if there are fewer.
   // Points often come in the order of their height. So the lowest of each of some interleaved
   // groups bound the result first, and only the few points within the bound are sorted in.
-  float lowest_mean(std::size_t begin, std::size_t end, float floor) const {
-    using detail::Float8;
+  template <class Lanes>
+  float lowest_mean(const float* z, std::size_t count, float floor) const {
+    using Float = typename Lanes::Float;
     Lowest lowest{static_cast<std::size_t>(config_.ground_lowest_points)};
-    const Float8 infinity(std::numeric_limits<float>::infinity());
+    const Float infinity(std::numeric_limits<float>::infinity());
     const auto heights = [&](std::size_t i) {
-      const Float8 z = Float8::load(&sorted_.points.z[i]);
-      detail::Mask8 valid = z >= Float8(floor);
-      if (end - i < detail::kLanes) {
-        valid = valid & detail::lanes_below<detail::NarrowLanes>(end - i);
-      }
-      return select(valid, z, infinity);
+      const Float height = Float::load(z + i);
+      auto valid = height >= Float(floor);
+      if (count - i < detail::kLanes) valid = valid & detail::lanes_below<Lanes>(count - i);
+      return select(valid, height, infinity);
     };
     const std::size_t groups = (lowest.wanted - 1) / detail::kLanes + 1;
     for (std::size_t group = 0; group < groups; ++group) {
-      Float8 least = infinity;
-      for (std::size_t i = begin + group * detail::kLanes; i < end; i += groups * detail::kLanes) {
+      Float least = infinity;
+      for (std::size_t i = group * detail::kLanes; i < count; i += groups * detail::kLanes) {
         least = min(heights(i), least);
       }
       float values[detail::kLanes];
       least.store(values);
       for (const float value : values) lowest.add(value);
     }
-    const Float8 bound(lowest.limit());
+    const Float bound(lowest.limit());
     lowest.found = 0;
-    for (std::size_t i = begin; i < end; i += detail::kLanes) {
-      const Float8 z = heights(i);
-      for (unsigned bits = ((z <= bound) & (z < infinity)).bits(); bits != 0; bits &= bits - 1) {
-        lowest.add(sorted_.points.z[i + static_cast<std::size_t>(__builtin_ctz(bits))]);
+    for (std::size_t i = 0; i < count; i += detail::kLanes) {
+      const Float height = heights(i);
+      for (unsigned bits = ((height <= bound) & (height < infinity)).bits(); bits != 0;
+           bits &= bits - 1) {
+        lowest.add(z[i + static_cast<std::size_t>(__builtin_ctz(bits))]);
       }
     }
     if (lowest.found == 0) return floor;
@@ -529,11 +510,9 @@ class GroundSegmenter {
   double height_ = 0.0;  // m
   std::array<Zone, kZones> zones_{};
   std::array<std::int32_t, kPatches> ring_of_patch_{};
-  std::array<std::size_t, kPatches + 2> patch_begin_{};
   std::vector<std::int32_t> patch_of_;
-  std::vector<std::uint32_t> streak_end_;
-  GroundSplit sorted_;  // by patch
-  GroundSplit rest_;
+  detail::PatchSort<kPatches + 1> sorted_;  // the last for points that are in no patch
+  PointBuffer patch_;                       // the points of one patch
 };
 
 }  // namespace dynains

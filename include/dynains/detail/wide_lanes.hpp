@@ -149,12 +149,18 @@ void run_lanes(Kernel&& kernel) {
   kernel(NarrowLanes());
 }
 
+/// 0 to 7.
+template <class Int>
+Int lane_numbers() {
+  alignas(32) static constexpr std::int32_t kNumbers[kLanes] = {0, 1, 2, 3, 4, 5, 6, 7};
+  return Int::load(kNumbers);
+}
+
 /// True in the lanes below `count`.
 template <class Lanes>
 typename Lanes::Mask lanes_below(std::size_t count) {
-  alignas(32) static constexpr std::int32_t kIndex[kLanes] = {0, 1, 2, 3, 4, 5, 6, 7};
   using Int = typename Lanes::Int;
-  return Int::load(kIndex) < Int(static_cast<std::int32_t>(count));
+  return lane_numbers<Int>() < Int(static_cast<std::int32_t>(count));
 }
 
 /// Eight neighbouring places of some arrays; fewer at their end, if `kTail`.
