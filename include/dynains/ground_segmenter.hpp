@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <limits>
 #include <vector>
 
@@ -183,14 +182,17 @@ class GroundSegmenter {
     split.resize(scan.size());
     detail::run_lanes([&](auto lanes) {
       using Lanes = decltype(lanes);
-      Output<Lanes> out(sorted_.records(), split);
-      for (std::size_t p = 0; p < kPatches; ++p) {
-        segment_patch(p, sorted_.records() + sorted_.begin(p), sorted_.end(p) - sorted_.begin(p),
-                      out);
+      Output<Lanes> out(split);
+      std::array<std::size_t, kPatches + 1> rest{};
+      for (std::size_t p = 0; p <= kPatches; ++p) {
+        detail::PointRecord* const records = sorted_.records() + sorted_.begin(p);
+        const std::size_t count = sorted_.end(p) - sorted_.begin(p);
+        rest[p] = p < kPatches ? segment_patch(p, records, count, out) : count;
       }
-      out.put_rest(sorted_.records() + sorted_.begin(kPatches),
-                   sorted_.end(kPatches) - sorted_.begin(kPatches));
-      out.finish();
+      split.ground_count = out.count();
+      for (std::size_t p = 0; p <= kPatches; ++p) {
+        out.put(sorted_.records() + sorted_.begin(p), rest[p]);
+      }
     });
   }
 
@@ -213,75 +215,38 @@ class GroundSegmenter {
         of[0], of[0].bits_changed(of[1]), of[1].bits_changed(of[2]), of[2].bits_changed(of[3])};
   };
 
-  // Ground goes straight to its place. Where the rest begins is known in the end; until then it
-  // closes up at the front of the sorted points.
+  // Writes points to the split, one behind the other.
   template <class Lanes>
   class Output {
    public:
-    Output(detail::PointRecord* sorted, GroundSplit& split)
-        : rest_(sorted),
-          x_(split.points.x.data()),
+    explicit Output(GroundSplit& split)
+        : x_(split.points.x.data()),
           y_(split.points.y.data()),
           z_(split.points.z.data()),
-          input_(split.input.data()),
-          split_(split) {}
+          input_(reinterpret_cast<float*>(split.input.data())) {}
 
-    void put_rest(const detail::PointRecord* from, std::size_t count) {
-      if (from != rest_ + rest_count_) {
-        std::memmove(rest_ + rest_count_, from, count * sizeof(detail::PointRecord));
-      }
-      rest_count_ += count;
-    }
+    std::size_t count() const { return count_; }
 
-    // Up to eight points, padded; bit k of `is_ground` belongs to the k-th.
-    void put(const detail::PointRecord* from, std::size_t count, unsigned is_ground) {
-      if (is_ground == 0) {
-        for (std::size_t k = 0; k < count; ++k) rest_[rest_count_ + k] = from[k];
-        rest_count_ += count;
-      } else if (is_ground == (1U << count) - 1U) {
-        lay_out(from, ground_count_);
-        ground_count_ += count;
-      } else {
-        // Written to both places, since no branch could foretell the right one.
-        detail::PointRecord ground[2 * detail::kLanes];
-        std::size_t grounds = 0;
-        for (std::size_t k = 0; k < count; ++k) {
-          const detail::PointRecord record = from[k];
-          const unsigned bit = (is_ground >> k) & 1U;
-          ground[grounds] = record;
-          rest_[rest_count_] = record;
-          grounds += bit;
-          rest_count_ += 1U - bit;
-        }
-        lay_out(ground, ground_count_);
-        ground_count_ += grounds;
-      }
-    }
-
-    void finish() {
-      split_.ground_count = ground_count_;
-      for (std::size_t i = 0; i < rest_count_; i += detail::kLanes) {
-        lay_out(rest_ + i, ground_count_ + i);
-      }
+    void put(const detail::PointRecord* from, std::size_t count) {
+      for (std::size_t i = 0; i < count; i += detail::kLanes) put_eight(from + i, i);
+      count_ += count;
     }
 
    private:
-    void lay_out(const detail::PointRecord* from, std::size_t at) {
+    void put_eight(const detail::PointRecord* from, std::size_t ahead) {
       const auto columns = detail::load_columns<Lanes>(from);
+      const std::size_t at = count_ + ahead;
       columns[0].store(x_ + at);
       columns[1].store(y_ + at);
       columns[2].store(z_ + at);
-      columns[3].store(reinterpret_cast<float*>(input_ + at));
+      columns[3].store(input_ + at);
     }
 
-    detail::PointRecord* const rest_;
-    std::size_t rest_count_ = 0;
-    std::size_t ground_count_ = 0;
+    std::size_t count_ = 0;
     float* const x_;
     float* const y_;
     float* const z_;
-    std::uint32_t* const input_;
-    GroundSplit& split_;
+    float* const input_;
   };
 
   void find_patches(PointsView scan) {
@@ -335,52 +300,6 @@ class GroundSegmenter {
     });
   }
 
-  template <class Lanes>
-  void segment_patch(std::size_t patch, const detail::PointRecord* records, std::size_t count,
-                     Output<Lanes>& out) {
-    const auto reject = [&] { out.put_rest(records, count); };
-    if (count < static_cast<std::size_t>(config_.ground_min_points)) return reject();
-    const float x0 = records->x;
-    const float y0 = records->y;
-    lay_out<Lanes>(records, count, x0, y0);
-
-    const bool innermost_zone = static_cast<std::int32_t>(patch) < kRings[0] * kSectors[0];
-    const double h = height_;
-    const float floor = innermost_zone ? static_cast<float>(-(1.0 + config_.ground_below) * h)
-                                       : -std::numeric_limits<float>::infinity();
-    const float seed_height = lowest_mean<Lanes>(patch_.z.data(), count, floor);
-
-    // First fit: the points near the seed height, as a horizontal half space; then the plane.
-    HalfSpace below(seed_height, static_cast<float>(config_.ground_seed_margin));
-    detail::Plane plane;
-    for (int i = 0; i < config_.ground_iterations; ++i) {
-      const detail::PlaneMoments moments = sum_moments<Lanes>(patch_, count, below);
-      if (moments.count < 3.0) return reject();
-      plane = detail::fit_plane(moments);
-      below.x = static_cast<float>(plane.normal_x);
-      below.y = static_cast<float>(plane.normal_y);
-      below.z = static_cast<float>(plane.normal_z);
-      below.offset =
-          static_cast<float>(config_.ground_distance + plane.normal_x * plane.mean_x +
-                             plane.normal_y * plane.mean_y + plane.normal_z * plane.mean_z);
-    }
-    if (plane.normal_z < config_.ground_uprightness) return reject();
-    const auto ring = static_cast<std::size_t>(ring_of_patch_[patch]);
-    if (ring < kCheckedRings) {
-      const double elevation = plane.mean_z + static_cast<double>(seed_height) + h;
-      if (elevation > config_.ground_elevation[ring] &&
-          plane.flatness >= config_.ground_flatness[ring]) {
-        return reject();
-      }
-    }
-
-    for (std::size_t i = 0; i < count; i += detail::kLanes) {
-      const unsigned bits = below.inside(below.template local<Lanes>(patch_, i)).bits();
-      const std::size_t length = std::min(detail::kLanes, count - i);
-      out.put(records + i, length, bits & ((1U << length) - 1U));
-    }
-  }
-
   // Points with normal . (p - origin) < offset; the origin of the fit is near the points.
   struct HalfSpace {
     HalfSpace(float origin_z, float distance) : z0(origin_z), offset(distance) {}
@@ -400,17 +319,87 @@ class GroundSegmenter {
     }
   };
 
+  // Puts the ground of a patch; the rest closes up at its front. Returns the size of the rest.
+  template <class Lanes>
+  std::size_t segment_patch(std::size_t patch, detail::PointRecord* records, std::size_t count,
+                            Output<Lanes>& ground) {
+    if (count < static_cast<std::size_t>(config_.ground_min_points)) return count;
+    lay_out<Lanes>(records, count);
+    const float seed_height = lowest_mean<Lanes>(count, floor_of(patch));
+    HalfSpace below(seed_height, static_cast<float>(config_.ground_seed_margin));
+    if (!fit_ground<Lanes>(patch, count, seed_height, below)) return count;
+
+    std::size_t rest = 0;
+    for (std::size_t i = 0; i < count; i += detail::kLanes) {
+      const std::size_t length = std::min(detail::kLanes, count - i);
+      const unsigned all = (1U << length) - 1U;
+      const unsigned bits = below.inside(below.template local<Lanes>(patch_, i)).bits() & all;
+      if (bits == all) {
+        ground.put(records + i, length);
+      } else if (bits == 0) {
+        detail::move_to_front(records + i, length, records + rest);
+        rest += length;
+      } else {
+        // Written to both places, since no branch could foretell the right one.
+        detail::PointRecord inside[detail::kLanes];
+        std::size_t found = 0;
+        for (std::size_t k = 0; k < length; ++k) {
+          const unsigned bit = (bits >> k) & 1U;
+          detail::copy_record(records + i + k, inside + found);
+          detail::copy_record(records + i + k, records + rest);
+          found += bit;
+          rest += 1U - bit;
+        }
+        ground.put(inside, found);
+      }
+    }
+    return rest;
+  }
+
+  // Height below which points of the patch are noise.
+  float floor_of(std::size_t patch) const {
+    const bool innermost_zone = static_cast<std::int32_t>(patch) < kRings[0] * kSectors[0];
+    return innermost_zone ? static_cast<float>(-(1.0 + config_.ground_below) * height_)
+                          : -std::numeric_limits<float>::infinity();
+  }
+
+  // From the points near the seed height, a horizontal half space, to those near the plane. Returns
+  // whether these are ground.
+  template <class Lanes>
+  bool fit_ground(std::size_t patch, std::size_t count, float seed_height, HalfSpace& below) const {
+    detail::Plane plane;
+    for (int i = 0; i < config_.ground_iterations; ++i) {
+      const detail::PlaneMoments moments = sum_moments<Lanes>(patch_, count, below);
+      if (moments.count < 3.0) return false;
+      plane = detail::fit_plane(moments);
+      below.x = static_cast<float>(plane.normal_x);
+      below.y = static_cast<float>(plane.normal_y);
+      below.z = static_cast<float>(plane.normal_z);
+      below.offset =
+          static_cast<float>(config_.ground_distance + plane.normal_x * plane.mean_x +
+                             plane.normal_y * plane.mean_y + plane.normal_z * plane.mean_z);
+    }
+    if (plane.normal_z < config_.ground_uprightness) return false;
+    const auto ring = static_cast<std::size_t>(ring_of_patch_[patch]);
+    if (ring >= kCheckedRings) return true;
+    const double elevation = plane.mean_z + static_cast<double>(seed_height) + height_;
+    return !(elevation > config_.ground_elevation[ring] &&
+             plane.flatness >= config_.ground_flatness[ring]);
+  }
+
   // The points of a patch; x and y relative to an origin near them.
   template <class Lanes>
-  void lay_out(const detail::PointRecord* records, std::size_t count, float x0, float y0) {
+  void lay_out(const detail::PointRecord* records, std::size_t count) {
     using Float = typename Lanes::Float;
+    const Float x0(records->x);
+    const Float y0(records->y);
     float* const x = patch_.x.data();
     float* const y = patch_.y.data();
     float* const z = patch_.z.data();
     for (std::size_t i = 0; i < count; i += detail::kLanes) {
       const auto columns = detail::load_columns<Lanes>(records + i);
-      (columns[0] - Float(x0)).store(x + i);
-      (columns[1] - Float(y0)).store(y + i);
+      (columns[0] - x0).store(x + i);
+      (columns[1] - y0).store(y + i);
       columns[2].store(z + i);
     }
   }
@@ -471,7 +460,8 @@ class GroundSegmenter {
   // Points often come in the order of their height. So the lowest of each of some interleaved
   // groups bound the result first, and only the few points within the bound are sorted in.
   template <class Lanes>
-  float lowest_mean(const float* z, std::size_t count, float floor) const {
+  float lowest_mean(std::size_t count, float floor) const {
+    const float* const z = patch_.z.data();
     using Float = typename Lanes::Float;
     Lowest lowest{static_cast<std::size_t>(config_.ground_lowest_points)};
     const Float infinity(std::numeric_limits<float>::infinity());

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <type_traits>
 
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/wide_lanes.hpp"
@@ -44,6 +45,17 @@ inline Float4 load_four(const void* from) {
   Float4 result;
   std::memcpy(&result, from, sizeof(result));
   return result;
+}
+
+inline void copy_record(const PointRecord* from, PointRecord* to) {
+  const Float4 record = load_four(from);
+  std::memcpy(to, &record, sizeof(record));
+}
+
+/// `to` is not behind `from`, but may be less than `count` before it.
+inline void move_to_front(const PointRecord* from, std::size_t count, PointRecord* to) {
+  if (to == from) return;
+  for (std::size_t k = 0; k < count; ++k) copy_record(from + k, to + k);
 }
 
 /// Four points from the i-th on, as records.
