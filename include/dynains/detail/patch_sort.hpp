@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <vector>
 
 #include "dynains/detail/point_record.hpp"
@@ -75,7 +74,7 @@ class PatchSort {
         for (std::size_t k = 0; k < kStep; ++k) {
           PointRecord*& to = next_[s][static_cast<std::size_t>(patch_of[first + k])];
           PointRecord* const here = to;
-          std::memcpy(here, &records[k], sizeof(PointRecord));
+          store_four(records[k], here);
           to = here + 1;
           __builtin_prefetch(here + kAhead, 1);
         }

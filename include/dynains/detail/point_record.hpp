@@ -47,9 +47,10 @@ inline Float4 load_four(const void* from) {
   return result;
 }
 
+inline void store_four(const Float4& four, void* to) { std::memcpy(to, &four, sizeof(four)); }
+
 inline void copy_record(const PointRecord* from, PointRecord* to) {
-  const Float4 record = load_four(from);
-  std::memcpy(to, &record, sizeof(record));
+  store_four(load_four(from), to);
 }
 
 /// `to` is not behind `from`, but may be less than `count` before it.
