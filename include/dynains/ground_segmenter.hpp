@@ -13,6 +13,7 @@
 
 #include "dynains/detail/arc_tangent.hpp"
 #include "dynains/detail/lanes.hpp"
+#include "dynains/detail/lowest_mean.hpp"
 #include "dynains/detail/patch_sort.hpp"
 #include "dynains/detail/plane_fit.hpp"
 #include "dynains/detail/point_record.hpp"
@@ -325,7 +326,9 @@ class GroundSegmenter {
                             Output<Lanes>& ground) {
     if (count < static_cast<std::size_t>(config_.ground_min_points)) return count;
     lay_out<Lanes>(records, count);
-    const float seed_height = lowest_mean<Lanes>(count, floor_of(patch));
+    detail::LowestMean<kMaxLowest, Lanes> lowest(
+        static_cast<std::size_t>(config_.ground_lowest_points));
+    const float seed_height = lowest.of(patch_.z.data(), count, floor_of(patch));
     HalfSpace below(seed_height, static_cast<float>(config_.ground_seed_margin));
     if (!fit_ground<Lanes>(patch, count, seed_height, below)) return count;
 
@@ -333,7 +336,7 @@ class GroundSegmenter {
     for (std::size_t i = 0; i < count; i += detail::kLanes) {
       const std::size_t length = std::min(detail::kLanes, count - i);
       const unsigned all = (1U << length) - 1U;
-      const unsigned bits = below.inside(below.template local<Lanes>(patch_, i)).bits() & all;
+      const unsigned bits = below.inside(below.template local<Lanes>(patch_, i)).bits();
       if (bits == all) {
         ground.put(records + i, length);
       } else if (bits == 0) {
@@ -402,6 +405,8 @@ class GroundSegmenter {
       (columns[1] - y0).store(y + i);
       columns[2].store(z + i);
     }
+    // Behind the last one, there is nothing that is low or below a plane.
+    Float(std::numeric_limits<float>::infinity()).store(z + count);
   }
 
   template <class Lanes>
@@ -411,7 +416,9 @@ class GroundSegmenter {
     using Float = typename Lanes::Float;
     Float n = kZero, sx = kZero, sy = kZero, sz = kZero, sxx = kZero, sxy = kZero, sxz = kZero,
           syy = kZero, syz = kZero, szz = kZero;
-    const auto add = [&](const std::array<Float, 3>& p, const typename Lanes::Mask& member) {
+    for (std::size_t i = 0; i < count; i += detail::kLanes) {
+      const auto p = space.template local<Lanes>(points, i);
+      const auto member = space.inside(p);
       const Float x = keep(member, p[0]);
       const Float y = keep(member, p[1]);
       const Float z = keep(member, p[2]);
@@ -425,75 +432,9 @@ class GroundSegmenter {
       syy = syy + y * y;
       syz = syz + y * z;
       szz = szz + z * z;
-    };
-    std::size_t i = 0;
-    for (; i + detail::kLanes <= count; i += detail::kLanes) {
-      const auto p = space.template local<Lanes>(points, i);
-      add(p, space.inside(p));
-    }
-    if (i < count) {
-      const auto p = space.template local<Lanes>(points, i);
-      add(p, space.inside(p) & detail::lanes_below<Lanes>(count - i));
     }
     return {sum(n),   sum(sx),  sum(sy),  sum(sz),  sum(sxx),
             sum(sxy), sum(sxz), sum(syy), sum(syz), sum(szz)};
-  }
-
-  // The lowest values met so far, in order.
-  struct Lowest {
-    std::size_t wanted;
-    std::size_t found = 0;
-    std::array<float, kMaxLowest> values{};
-
-    void add(float value) {
-      if (found == wanted && !(value < values[found - 1])) return;
-      std::size_t at = found < wanted ? found++ : wanted - 1;
-      for (; at > 0 && values[at - 1] > value; --at) values[at] = values[at - 1];
-      values[at] = value;
-    }
-    float limit() const {
-      return found == wanted ? values[found - 1] : std::numeric_limits<float>::infinity();
-    }
-  };
-
-  // Mean height of the lowest points that are not below `floor`; all of them if there are fewer.
-  // Points often come in the order of their height. So the lowest of each of some interleaved
-  // groups bound the result first, and only the few points within the bound are sorted in.
-  template <class Lanes>
-  float lowest_mean(std::size_t count, float floor) const {
-    const float* const z = patch_.z.data();
-    using Float = typename Lanes::Float;
-    Lowest lowest{static_cast<std::size_t>(config_.ground_lowest_points)};
-    const Float infinity(std::numeric_limits<float>::infinity());
-    const auto heights = [&](std::size_t i) {
-      const Float height = Float::load(z + i);
-      auto valid = height >= Float(floor);
-      if (count - i < detail::kLanes) valid = valid & detail::lanes_below<Lanes>(count - i);
-      return select(valid, height, infinity);
-    };
-    const std::size_t groups = (lowest.wanted - 1) / detail::kLanes + 1;
-    for (std::size_t group = 0; group < groups; ++group) {
-      Float least = infinity;
-      for (std::size_t i = group * detail::kLanes; i < count; i += groups * detail::kLanes) {
-        least = min(heights(i), least);
-      }
-      float values[detail::kLanes];
-      least.store(values);
-      for (const float value : values) lowest.add(value);
-    }
-    const Float bound(lowest.limit());
-    lowest.found = 0;
-    for (std::size_t i = 0; i < count; i += detail::kLanes) {
-      const Float height = heights(i);
-      for (unsigned bits = ((height <= bound) & (height < infinity)).bits(); bits != 0;
-           bits &= bits - 1) {
-        lowest.add(z[i + static_cast<std::size_t>(__builtin_ctz(bits))]);
-      }
-    }
-    if (lowest.found == 0) return floor;
-    float total = 0.0F;
-    for (std::size_t i = 0; i < lowest.found; ++i) total += lowest.values[i];
-    return total / static_cast<float>(lowest.found);
   }
 
   Config config_;
