@@ -19,6 +19,7 @@
 #include "dynains/detail/point_record.hpp"
 #include "dynains/detail/room.hpp"
 #include "dynains/detail/wide_lanes.hpp"
+#include "dynains/detail/zone_table.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor_model.hpp"
@@ -48,7 +49,7 @@ struct GroundSplit {
 /// Splits a scan into ground and the rest.
 class GroundSegmenter {
  public:
-  static constexpr std::size_t kZones = 4;
+  static constexpr std::size_t kZones = detail::kZoneCount;
   /// Rings and sectors of each zone, from the inside out (Patchwork).
   static constexpr std::array<std::int32_t, kZones> kRings = {2, 4, 4, 4};
   static constexpr std::array<std::int32_t, kZones> kSectors = {16, 32, 54, 32};
@@ -208,14 +209,6 @@ class GroundSegmenter {
     float sectors;
   };
 
-  // What is beyond the inner edge of a zone is beyond those before. So a constant of the zone in
-  // which a point lies is that of the first, with the differences to later ones flipped bit by bit.
-  struct ZoneConstant {
-    std::array<detail::Constant8, kZones> of;
-    std::array<detail::Constant8, kZones> flip = {
-        of[0], of[0].bits_changed(of[1]), of[1].bits_changed(of[2]), of[2].bits_changed(of[3])};
-  };
-
   // Writes points to the split, one behind the other.
   template <class Lanes>
   class Output {
@@ -258,15 +251,17 @@ class GroundSegmenter {
       // Read once: the compiler cannot know that stores leave members alone.
       using detail::Constant8;
       const auto of_zone = [&](float Zone::*constant) {
-        return ZoneConstant{
-            {zones_[0].*constant, zones_[1].*constant, zones_[2].*constant, zones_[3].*constant}};
+        return detail::ZoneTable(
+            {zones_[0].*constant, zones_[1].*constant, zones_[2].*constant, zones_[3].*constant});
       };
-      const ZoneConstant inner = of_zone(&Zone::inner);
-      const ZoneConstant rings_per_metre = of_zone(&Zone::rings_per_metre);
-      const ZoneConstant sectors_per_radian = of_zone(&Zone::sectors_per_radian);
-      const ZoneConstant first_patch = of_zone(&Zone::first_patch);
-      const ZoneConstant last_ring = of_zone(&Zone::last_ring);
-      const ZoneConstant sector_count = of_zone(&Zone::sectors);
+      const detail::ZoneTable inner = of_zone(&Zone::inner);
+      const detail::ZoneTable rings_per_metre = of_zone(&Zone::rings_per_metre);
+      const detail::ZoneTable sectors_per_radian = of_zone(&Zone::sectors_per_radian);
+      const detail::ZoneTable first_patch = of_zone(&Zone::first_patch);
+      const detail::ZoneTable last_ring = of_zone(&Zone::last_ring);
+      const detail::ZoneTable sector_count = of_zone(&Zone::sectors);
+      const std::array<Constant8, kZones - 1> edges = {zones_[1].inner, zones_[2].inner,
+                                                       zones_[3].inner};
       const Constant8 nearest(static_cast<float>(config_.ground_min_range));
       const Constant8 farthest(static_cast<float>(config_.ground_max_range));
       const Constant8 pi(detail::kPi);
@@ -275,28 +270,22 @@ class GroundSegmenter {
       const float* const ys = scan.y.data();
       std::int32_t* const patches = patch_of_.data();
       detail::for_places<Lanes>(scan.size(), [&](auto at) {
-      const Float x = at.load(xs);
-      const Float y = at.load(ys);
-      const Float range = sqrt(x * x + y * y);
-      const Float azimuth = detail::azimuth_of(y, x, range) + pi;
-      const auto beyond_1 = range >= inner.of[1];
-      const auto beyond_2 = range >= inner.of[2];
-      const auto beyond_3 = range >= inner.of[3];
-      const auto here = [&](const ZoneConstant& constant) {
-        return float_of(bits_of(Float(constant.of[0])) ^
-                        (beyond_1 & bits_of(Float(constant.flip[1]))) ^
-                        (beyond_2 & bits_of(Float(constant.flip[2]))) ^
-                        (beyond_3 & bits_of(Float(constant.flip[3]))));
-      };
-      const auto whole = [](const Float& value) { return to_float(truncate(value)); };
-      const Float ring =
-          whole(min((min(range, farthest) - here(inner)) * here(rings_per_metre), here(last_ring)));
-      const Float sectors = here(sector_count);
-      const Float sector = whole(min(azimuth * here(sectors_per_radian), sectors - one));
-      const Float patch = here(first_patch) + ring * sectors + sector;
-      const auto inside = (range >= nearest) & (range <= farthest);
-      select(inside, truncate(patch), Int(static_cast<std::int32_t>(kPatches)))
-          .store(patches + at.begin);
+        const Float x = at.load(xs);
+        const Float y = at.load(ys);
+        const Float range = sqrt(x * x + y * y);
+        const Float azimuth = detail::azimuth_of(y, x, range) + pi;
+        const detail::BeyondEdges<typename Lanes::Mask> beyond = {
+            range >= edges[0], range >= edges[1], range >= edges[2]};
+        const auto here = [&](const detail::ZoneTable& table) { return table.at(beyond); };
+        const auto whole = [](const Float& value) { return to_float(truncate(value)); };
+        const Float ring = whole(
+            min((min(range, farthest) - here(inner)) * here(rings_per_metre), here(last_ring)));
+        const Float sectors = here(sector_count);
+        const Float sector = whole(min(azimuth * here(sectors_per_radian), sectors - one));
+        const Float patch = here(first_patch) + ring * sectors + sector;
+        const auto inside = (range >= nearest) & (range <= farthest);
+        select(inside, truncate(patch), Int(static_cast<std::int32_t>(kPatches)))
+            .store(patches + at.begin);
       });
     });
   }
@@ -311,8 +300,7 @@ class GroundSegmenter {
     template <class Lanes>
     std::array<typename Lanes::Float, 3> local(const PointBuffer& points, std::size_t i) const {
       using Float = typename Lanes::Float;
-      return {Float::load(&points.x[i]), Float::load(&points.y[i]),
-              Float::load(&points.z[i]) - z0};
+      return {Float::load(&points.x[i]), Float::load(&points.y[i]), Float::load(&points.z[i]) - z0};
     }
     template <class Float>
     auto inside(const std::array<Float, 3>& p) const {

@@ -34,7 +34,8 @@ class Ingest {
     for (std::size_t begin = 0; begin < count; begin += kPiece) {
       const std::size_t length = std::min(kPiece, count - begin);
       copy(cloud, begin, length);
-      count_ += sort_out(begin, length, min_range * min_range, max_range * max_range, labels.data());
+      count_ +=
+          sort_out(begin, length, min_range * min_range, max_range * max_range, labels.data());
     }
   }
 
@@ -46,7 +47,8 @@ class Ingest {
   const std::vector<std::uint32_t>& input() const { return input_; }
 
  private:
-  static constexpr std::size_t kPiece = 128;  // few enough that reading ahead goes on beside the tests
+  static constexpr std::size_t kPiece =
+      128;  // few enough that reading ahead goes on beside the tests
 
   // Puts points behind those that were taken in, whatever they are.
   template <class Cloud>
@@ -109,8 +111,8 @@ class Ingest {
         const Float squared = x * x + y * y;
         // Comparisons with NaN are false, so that one test admits only good points; zeros behind
         // the end are bad.
-        const unsigned good = ((squared >= nearest) & (squared <= farthest) &
-                               (z * z <= farthest) & (squared + abs(z) > zero))
+        const unsigned good = ((squared >= nearest) & (squared <= farthest) & (z * z <= farthest) &
+                               (squared + abs(z) > zero))
                                   .bits();
         const std::size_t first = begin + at.begin;
         if (good == (1U << kLanes) - 1U) {
@@ -123,17 +125,17 @@ class Ingest {
           return;
         }
         const Float infinity(std::numeric_limits<float>::infinity());
-        const unsigned returns =
-            ((abs(x) < infinity) & (abs(y) < infinity) & (abs(z) < infinity) &
-             (abs(x) + abs(y) + abs(z) > zero))
-                .bits();
+        const unsigned returns = ((abs(x) < infinity) & (abs(y) < infinity) & (abs(z) < infinity) &
+                                  (abs(x) + abs(y) + abs(z) > zero))
+                                     .bits();
         for (std::size_t k = 0; k < at.size(); ++k) {
           xs[taken] = xs[at.begin + k];
           ys[taken] = ys[at.begin + k];
           zs[taken] = zs[at.begin + k];
           input[taken] = static_cast<std::uint32_t>(first + k);
           taken += (good >> k) & 1U;
-          labels[first + k] = ((returns >> k) & 1U) != 0 ? PointLabel::kOutOfRange : PointLabel::kInvalid;
+          labels[first + k] =
+              ((returns >> k) & 1U) != 0 ? PointLabel::kOutOfRange : PointLabel::kInvalid;
         }
       });
       result = taken;

@@ -38,7 +38,7 @@ class PatchSort {
 
  private:
   static constexpr std::size_t kStrands = 4;
-  static constexpr std::size_t kStep = 4;  // points of a strand in turn
+  static constexpr std::size_t kStep = 4;   // points of a strand in turn
   static constexpr std::size_t kAhead = 8;  // records: where the next but one line begins
 
   void count_points(const std::int32_t* patch_of, std::size_t count) {

@@ -117,6 +117,15 @@ inline float sum(const WideFloat8& a) {
                     __builtin_shufflevector(a.v, a.v, 4, 5, 6, 7)));
 }
 
+/// Lane i is lane `from[i]` of `a`, modulo eight.
+inline WideFloat8 permuted(const WideFloat8& a, const WideInt8& from) {
+#if defined(__clang__)
+  return WideFloat8(__builtin_shufflevector(a.v, from.v));
+#else
+  return WideFloat8(__builtin_shuffle(a.v, from.v));
+#endif
+}
+
 struct NarrowLanes {
   using Float = Float8;
   using Int = Int8;
