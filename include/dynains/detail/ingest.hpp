@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "dynains/detail/lane_transform.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/point_record.hpp"
 #include "dynains/detail/room.hpp"
@@ -23,8 +24,11 @@ class Ingest {
  public:
   /// Points outside [min_range, max_range] (m, horizontal), higher or lower than max_range or
   /// without finite coordinates stay out; a point at the origin is a beam that did not return.
+  /// What is taken in is turned by `R`, unless there is none.
   template <class Cloud>
-  void read(const Cloud& cloud, float min_range, float max_range, std::vector<PointLabel>& labels) {
+  void read(const Cloud& cloud, float min_range, float max_range, const Eigen::Matrix3f* R,
+            std::vector<PointLabel>& labels) {
+    const LaneTransform turned = turning(R != nullptr ? *R : Eigen::Matrix3f::Identity());
     const std::size_t count = PointCloudTraits<Cloud>::size(cloud);
     make_room(labels, count);
     labels.resize(count);
@@ -34,8 +38,12 @@ class Ingest {
     for (std::size_t begin = 0; begin < count; begin += kPiece) {
       const std::size_t length = std::min(kPiece, count - begin);
       copy(cloud, begin, length);
-      count_ +=
+      const std::size_t taken =
           sort_out(begin, length, min_range * min_range, max_range * max_range, labels.data());
+      if (R != nullptr) {
+        detail::turn(PointsView(points_).subview(count_, taken), turned, points_, count_);
+      }
+      count_ += taken;
     }
   }
 
@@ -47,8 +55,9 @@ class Ingest {
   const std::vector<std::uint32_t>& input() const { return input_; }
 
  private:
-  static constexpr std::size_t kPiece =
-      128;  // few enough that reading ahead goes on beside the tests
+  // Points that are worked off at once: they stay in the nearest cache, and are so few that reading
+  // ahead goes on meanwhile.
+  static constexpr std::size_t kPiece = 128;
 
   // Puts points behind those that were taken in, whatever they are.
   template <class Cloud>
