@@ -106,7 +106,7 @@ class LowestMean {
 
   std::size_t wanted_;
   std::size_t found_ = 0;
-  std::array<float, kRoom> found_values_;
+  std::array<float, kRoom> found_values_{};
 };
 
 }  // namespace dynains::detail
