@@ -14,11 +14,13 @@
 #include "dynains/belief_updater.hpp"
 #include "dynains/cluster_set.hpp"
 #include "dynains/curved_voxel_clusterer.hpp"
+#include "dynains/detail/ingest.hpp"
 #include "dynains/detail/instance_ids.hpp"
 #include "dynains/detail/made_up_scan.hpp"
 #include "dynains/detail/one_call.hpp"
 #include "dynains/detail/scan_slot.hpp"
 #include "dynains/detail/stage_checks.hpp"
+#include "dynains/detail/turn.hpp"
 #include "dynains/detail/write_verdict.hpp"
 #include "dynains/free_space_evidence.hpp"
 #include "dynains/ground_segmenter.hpp"
@@ -264,7 +266,7 @@ class BasicDynaInsRemover {
     detail::make_room(evident_belief_, newest.labels.size());
     if (needs_sensor() && !sensor_.known()) {
       adapt_to_sensor(newest);
-      if (turns()) turn(newest);
+      if (turns()) ingest_.turn(turn_pose(newest));
     }
     clock.lap(result.times.ingest);
 
@@ -464,16 +466,21 @@ class BasicDynaInsRemover {
     const auto nearest = static_cast<float>(config_.min_range);
     const auto farthest = static_cast<float>(config_.max_range);
     newest.T_world_level = newest.T_world_sensor;
-    ingest_.read(cloud, nearest, farthest, newest.labels);
-    if (turns()) turn(newest);
+    if (turns()) {
+      const Eigen::Matrix3f R_level_sensor = turn_pose(newest);
+      ingest_.read(cloud, nearest, farthest, &R_level_sensor, newest.labels);
+    } else {
+      ingest_.read(cloud, nearest, farthest, nullptr, newest.labels);
+    }
   }
 
   bool turns() const { return sensor_.known() && config_.level; }
 
-  void turn(ScanSlot& newest) {
+  // The turn of the points that makes the sensor level; done to the scan's pose.
+  Eigen::Matrix3f turn_pose(ScanSlot& newest) const {
     const Eigen::Matrix3d R_level_sensor = sensor_.R_level_sensor();
     newest.T_world_level.rotate(R_level_sensor.transpose());
-    ingest_.turn(R_level_sensor.template cast<float>());
+    return R_level_sensor.cast<float>();
   }
 
   // Verdict by point: at least `votes` windows said so, or the evidence does.

@@ -13,9 +13,13 @@
 
 #include "dynains/detail/arc_tangent.hpp"
 #include "dynains/detail/lanes.hpp"
+#include "dynains/detail/lowest_mean.hpp"
+#include "dynains/detail/patch_sort.hpp"
 #include "dynains/detail/plane_fit.hpp"
+#include "dynains/detail/point_record.hpp"
 #include "dynains/detail/room.hpp"
 #include "dynains/detail/wide_lanes.hpp"
+#include "dynains/detail/zone_table.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor_model.hpp"
@@ -45,7 +49,7 @@ struct GroundSplit {
 /// Splits a scan into ground and the rest.
 class GroundSegmenter {
  public:
-  static constexpr std::size_t kZones = 4;
+  static constexpr std::size_t kZones = detail::kZoneCount;
   /// Rings and sectors of each zone, from the inside out (Patchwork).
   static constexpr std::array<std::int32_t, kZones> kRings = {2, 4, 4, 4};
   static constexpr std::array<std::int32_t, kZones> kSectors = {16, 32, 54, 32};
@@ -173,19 +177,28 @@ class GroundSegmenter {
   /// is handed on with them. Points outside the rings and points of sparse patches are not ground.
   /// Order within `split` is by patch, then as scanned.
   void segment(PointsView scan, Span<const std::uint32_t> input, GroundSplit& split) {
-    sort_by_patch(scan, input);
+    detail::grow(patch_of_, scan.size() + detail::kLanes);
+    find_patches(scan);
+    sorted_.sort(scan, input.data(), patch_of_.data());
+    patch_.grow(scan.size() + detail::kLanes);
     split.resize(scan.size());
-    rest_.resize(scan.size());
-    Output out = {split, rest_};
-    for (std::size_t p = 0; p < kPatches; ++p) segment_patch(p, out);
-    out.put_rest(sorted_, patch_begin_[kPatches], scan.size());
-    split.ground_count = out.ground_count;
-    copy(rest_, 0, out.rest_count, split, out.ground_count);
+    detail::run_lanes([&](auto lanes) {
+      using Lanes = decltype(lanes);
+      Output<Lanes> out(split);
+      std::array<std::size_t, kPatches + 1> rest{};
+      for (std::size_t p = 0; p <= kPatches; ++p) {
+        detail::PointRecord* const records = sorted_.records() + sorted_.begin(p);
+        const std::size_t count = sorted_.end(p) - sorted_.begin(p);
+        rest[p] = p < kPatches ? segment_patch(p, records, count, out) : count;
+      }
+      split.ground_count = out.count();
+      for (std::size_t p = 0; p <= kPatches; ++p) {
+        out.put(sorted_.records() + sorted_.begin(p), rest[p]);
+      }
+    });
   }
 
  private:
-  static constexpr std::size_t kFewestInStreak = 4;  // points on average, to move them together
-
   // Constants of a zone; small whole numbers are exact in floats.
   struct Zone {
     float inner;  // m
@@ -196,191 +209,159 @@ class GroundSegmenter {
     float sectors;
   };
 
-  // What is beyond the inner edge of a zone is beyond those before. So a constant of the zone in
-  // which a point lies is that of the first, with the differences to later ones flipped bit by bit.
-  struct ZoneConstant {
-    std::array<detail::Constant8, kZones> of;
-    std::array<detail::Constant8, kZones> flip = {
-        of[0], of[0].bits_changed(of[1]), of[1].bits_changed(of[2]), of[2].bits_changed(of[3])};
+  // Writes points to the split, one behind the other.
+  template <class Lanes>
+  class Output {
+   public:
+    explicit Output(GroundSplit& split)
+        : x_(split.points.x.data()),
+          y_(split.points.y.data()),
+          z_(split.points.z.data()),
+          input_(reinterpret_cast<float*>(split.input.data())) {}
+
+    std::size_t count() const { return count_; }
+
+    void put(const detail::PointRecord* from, std::size_t count) {
+      for (std::size_t i = 0; i < count; i += detail::kLanes) put_eight(from + i, i);
+      count_ += count;
+    }
+
+   private:
+    void put_eight(const detail::PointRecord* from, std::size_t ahead) {
+      const auto columns = detail::load_columns<Lanes>(from);
+      const std::size_t at = count_ + ahead;
+      columns[0].store(x_ + at);
+      columns[1].store(y_ + at);
+      columns[2].store(z_ + at);
+      columns[3].store(input_ + at);
+    }
+
+    std::size_t count_ = 0;
+    float* const x_;
+    float* const y_;
+    float* const z_;
+    float* const input_;
   };
-
-  static void copy(const GroundSplit& from, std::size_t begin, std::size_t count, GroundSplit& to,
-                   std::size_t at) {
-    detail::copy(&from.points.x[begin], count, &to.points.x[at]);
-    detail::copy(&from.points.y[begin], count, &to.points.y[at]);
-    detail::copy(&from.points.z[begin], count, &to.points.z[at]);
-    detail::copy(&from.input[begin], count, &to.input[at]);
-  }
-
-  // Ground goes straight to the front of the split, the rest into a buffer of its own, because it
-  // cannot be known yet where it begins.
-  struct Output {
-    GroundSplit& ground;
-    GroundSplit& rest;
-    std::size_t ground_count = 0;
-    std::size_t rest_count = 0;
-
-    void put_rest(const GroundSplit& from, std::size_t begin, std::size_t end) {
-      copy(from, begin, end - begin, rest, rest_count);
-      rest_count += end - begin;
-    }
-    // Up to eight points; bit k of `is_ground` belongs to the k-th.
-    void put(const GroundSplit& from, std::size_t begin, std::size_t count, unsigned is_ground) {
-      if (is_ground == 0) return put_rest(from, begin, begin + count);
-      if (is_ground == (1U << count) - 1U) {
-        copy(from, begin, count, ground, ground_count);
-        ground_count += count;
-        return;
-      }
-      // Written to both places, since no branch could foretell the right one.
-      for (std::size_t k = 0; k < count; ++k) {
-        const unsigned bit = (is_ground >> k) & 1U;
-        put_one(from, begin + k, ground, ground_count);
-        put_one(from, begin + k, rest, rest_count);
-        ground_count += bit;
-        rest_count += 1U - bit;
-      }
-    }
-    static void put_one(const GroundSplit& from, std::size_t i, GroundSplit& to, std::size_t at) {
-      to.points.x[at] = from.points.x[i];
-      to.points.y[at] = from.points.y[i];
-      to.points.z[at] = from.points.z[i];
-      to.input[at] = from.input[i];
-    }
-  };
-
-  // Counting sort; stable, so that points keep the order of the scan within their patch.
-  void sort_by_patch(PointsView scan, Span<const std::uint32_t> input) {
-    const std::size_t count = scan.size();
-    sorted_.resize(count);
-    detail::grow(patch_of_, count + detail::kLanes);
-    find_patches(scan);
-    patch_begin_.fill(0);
-    // Scans that come beam by beam have long streaks of points in one patch, those that come column
-    // by column have none.
-    if (detail::count_changes(patch_of_.data(), count) > count / kFewestInStreak) {
-      sort_points(scan, input);
-    } else {
-      sort_streaks(scan, input);
-    }
-  }
-
-  // From the sizes of patches, each in the place behind its own, to where they begin.
-  void add_up_sizes() {
-    for (std::size_t p = 1; p < patch_begin_.size(); ++p) patch_begin_[p] += patch_begin_[p - 1];
-  }
-
-  void sort_points(PointsView scan, Span<const std::uint32_t> input) {
-    const std::int32_t* const patch_of = patch_of_.data();
-    for (std::size_t i = 0; i < scan.size(); ++i) {
-      ++patch_begin_[static_cast<std::size_t>(patch_of[i]) + 1];
-    }
-    add_up_sizes();
-    auto next = patch_begin_;
-    float* const x = sorted_.points.x.data();
-    float* const y = sorted_.points.y.data();
-    float* const z = sorted_.points.z.data();
-    std::uint32_t* const numbers = sorted_.input.data();
-    for (std::size_t i = 0; i < scan.size(); ++i) {
-      const std::size_t to = next[static_cast<std::size_t>(patch_of[i])]++;
-      x[to] = scan.x[i];
-      y[to] = scan.y[i];
-      z[to] = scan.z[i];
-      numbers[to] = input[i];
-    }
-  }
-
-  // What is counted and moved are whole streaks: no counter waits for its own last increment.
-  void sort_streaks(PointsView scan, Span<const std::uint32_t> input) {
-    streak_end_.clear();
-    std::size_t begin = 0;
-    detail::for_each_change(patch_of_.data(), scan.size(), [&](std::size_t length) {
-      patch_begin_[static_cast<std::size_t>(patch_of_[begin]) + 1] += length;
-      begin += length;
-      streak_end_.push_back(static_cast<std::uint32_t>(begin));
-    });
-    add_up_sizes();
-    auto next = patch_begin_;
-    begin = 0;
-    for (const std::uint32_t end : streak_end_) {
-      const std::size_t length = end - begin;
-      std::size_t& to = next[static_cast<std::size_t>(patch_of_[begin])];
-      detail::copy(&scan.x[begin], length, &sorted_.points.x[to]);
-      detail::copy(&scan.y[begin], length, &sorted_.points.y[to]);
-      detail::copy(&scan.z[begin], length, &sorted_.points.z[to]);
-      detail::copy(&input[begin], length, &sorted_.input[to]);
-      to += length;
-      begin = end;
-    }
-  }
 
   void find_patches(PointsView scan) {
-    using detail::Constant8;
-    // Read once: the compiler cannot know that stores leave members alone.
-    const auto of_zone = [&](float Zone::*constant) {
-      return ZoneConstant{
-          {zones_[0].*constant, zones_[1].*constant, zones_[2].*constant, zones_[3].*constant}};
-    };
-    const ZoneConstant inner = of_zone(&Zone::inner);
-    const ZoneConstant rings_per_metre = of_zone(&Zone::rings_per_metre);
-    const ZoneConstant sectors_per_radian = of_zone(&Zone::sectors_per_radian);
-    const ZoneConstant first_patch = of_zone(&Zone::first_patch);
-    const ZoneConstant last_ring = of_zone(&Zone::last_ring);
-    const ZoneConstant sector_count = of_zone(&Zone::sectors);
-    const Constant8 nearest(static_cast<float>(config_.ground_min_range));
-    const Constant8 farthest(static_cast<float>(config_.ground_max_range));
-    const Constant8 pi(detail::kPi);
-    const Constant8 one(1.0F);
-    std::int32_t* const patches = patch_of_.data();
-
-    detail::for_lanes(scan.size(), [&](auto at) {
-      using Float = typename decltype(at)::Float;
-      using Int = typename decltype(at)::Int;
-      const Float x = at.load(scan.x.data());
-      const Float y = at.load(scan.y.data());
-      const Float range = sqrt(x * x + y * y);
-      const Float azimuth = detail::azimuth_of(y, x, range) + pi;
-      const auto beyond_1 = range >= inner.of[1];
-      const auto beyond_2 = range >= inner.of[2];
-      const auto beyond_3 = range >= inner.of[3];
-      const auto here = [&](const ZoneConstant& constant) {
-        return float_of(bits_of(Float(constant.of[0])) ^
-                        (beyond_1 & bits_of(Float(constant.flip[1]))) ^
-                        (beyond_2 & bits_of(Float(constant.flip[2]))) ^
-                        (beyond_3 & bits_of(Float(constant.flip[3]))));
+    detail::run_lanes([&](auto lanes) {
+      using Lanes = decltype(lanes);
+      using Float = typename Lanes::Float;
+      using Int = typename Lanes::Int;
+      // Read once: the compiler cannot know that stores leave members alone.
+      using detail::Constant8;
+      const auto of_zone = [&](float Zone::*constant) {
+        return detail::ZoneTable(
+            {zones_[0].*constant, zones_[1].*constant, zones_[2].*constant, zones_[3].*constant});
       };
-      const auto whole = [](const Float& value) { return to_float(truncate(value)); };
-      const Float ring =
-          whole(min((min(range, farthest) - here(inner)) * here(rings_per_metre), here(last_ring)));
-      const Float sectors = here(sector_count);
-      const Float sector = whole(min(azimuth * here(sectors_per_radian), sectors - one));
-      const Float patch = here(first_patch) + ring * sectors + sector;
-      const auto inside = (range >= nearest) & (range <= farthest);
-      select(inside, truncate(patch), Int(static_cast<std::int32_t>(kPatches)))
-          .store(patches + at.begin);
+      const detail::ZoneTable inner = of_zone(&Zone::inner);
+      const detail::ZoneTable rings_per_metre = of_zone(&Zone::rings_per_metre);
+      const detail::ZoneTable sectors_per_radian = of_zone(&Zone::sectors_per_radian);
+      const detail::ZoneTable first_patch = of_zone(&Zone::first_patch);
+      const detail::ZoneTable last_ring = of_zone(&Zone::last_ring);
+      const detail::ZoneTable sector_count = of_zone(&Zone::sectors);
+      const std::array<Constant8, kZones - 1> edges = {zones_[1].inner, zones_[2].inner,
+                                                       zones_[3].inner};
+      const Constant8 nearest(static_cast<float>(config_.ground_min_range));
+      const Constant8 farthest(static_cast<float>(config_.ground_max_range));
+      const Constant8 pi(detail::kPi);
+      const Constant8 one(1.0F);
+      const float* const xs = scan.x.data();
+      const float* const ys = scan.y.data();
+      std::int32_t* const patches = patch_of_.data();
+      detail::for_places<Lanes>(scan.size(), [&](auto at) {
+        const Float x = at.load(xs);
+        const Float y = at.load(ys);
+        const Float range = sqrt(x * x + y * y);
+        const Float azimuth = detail::azimuth_of(y, x, range) + pi;
+        const detail::BeyondEdges<typename Lanes::Mask> beyond = {
+            range >= edges[0], range >= edges[1], range >= edges[2]};
+        const auto here = [&](const detail::ZoneTable& table) { return table.at(beyond); };
+        const auto whole = [](const Float& value) { return to_float(truncate(value)); };
+        const Float ring = whole(
+            min((min(range, farthest) - here(inner)) * here(rings_per_metre), here(last_ring)));
+        const Float sectors = here(sector_count);
+        const Float sector = whole(min(azimuth * here(sectors_per_radian), sectors - one));
+        const Float patch = here(first_patch) + ring * sectors + sector;
+        const auto inside = (range >= nearest) & (range <= farthest);
+        select(inside, truncate(patch), Int(static_cast<std::int32_t>(kPatches)))
+            .store(patches + at.begin);
+      });
     });
   }
 
-  void segment_patch(std::size_t patch, Output& out) const {
-    const std::size_t begin = patch_begin_[patch];
-    const std::size_t end = patch_begin_[patch + 1];
-    const auto reject = [&] { out.put_rest(sorted_, begin, end); };
-    if (end - begin < static_cast<std::size_t>(config_.ground_min_points)) return reject();
+  // Points with normal . (p - origin) < offset; the origin of the fit is near the points.
+  struct HalfSpace {
+    HalfSpace(float origin_z, float distance) : z0(origin_z), offset(distance) {}
 
+    detail::Constant8 z0;
+    detail::Constant8 x = 0.0F, y = 0.0F, z = 1.0F, offset;
+
+    template <class Lanes>
+    std::array<typename Lanes::Float, 3> local(const PointBuffer& points, std::size_t i) const {
+      using Float = typename Lanes::Float;
+      return {Float::load(&points.x[i]), Float::load(&points.y[i]), Float::load(&points.z[i]) - z0};
+    }
+    template <class Float>
+    auto inside(const std::array<Float, 3>& p) const {
+      return x * p[0] + y * p[1] + z * p[2] < offset;
+    }
+  };
+
+  // Puts the ground of a patch; the rest closes up at its front. Returns the size of the rest.
+  template <class Lanes>
+  std::size_t segment_patch(std::size_t patch, detail::PointRecord* records, std::size_t count,
+                            Output<Lanes>& ground) {
+    if (count < static_cast<std::size_t>(config_.ground_min_points)) return count;
+    lay_out<Lanes>(records, count);
+    detail::LowestMean<kMaxLowest, Lanes> lowest(
+        static_cast<std::size_t>(config_.ground_lowest_points));
+    const float seed_height = lowest.of(patch_.z.data(), count, floor_of(patch));
+    HalfSpace below(seed_height, static_cast<float>(config_.ground_seed_margin));
+    if (!fit_ground<Lanes>(patch, count, seed_height, below)) return count;
+
+    std::size_t rest = 0;
+    for (std::size_t i = 0; i < count; i += detail::kLanes) {
+      const std::size_t length = std::min(detail::kLanes, count - i);
+      const unsigned all = (1U << length) - 1U;
+      const unsigned bits = below.inside(below.template local<Lanes>(patch_, i)).bits();
+      if (bits == all) {
+        ground.put(records + i, length);
+      } else if (bits == 0) {
+        detail::move_to_front(records + i, length, records + rest);
+        rest += length;
+      } else {
+        // Written to both places, since no branch could foretell the right one.
+        detail::PointRecord inside[detail::kLanes];
+        std::size_t found = 0;
+        for (std::size_t k = 0; k < length; ++k) {
+          const unsigned bit = (bits >> k) & 1U;
+          detail::copy_record(records + i + k, inside + found);
+          detail::copy_record(records + i + k, records + rest);
+          found += bit;
+          rest += 1U - bit;
+        }
+        ground.put(inside, found);
+      }
+    }
+    return rest;
+  }
+
+  // Height below which points of the patch are noise.
+  float floor_of(std::size_t patch) const {
     const bool innermost_zone = static_cast<std::int32_t>(patch) < kRings[0] * kSectors[0];
-    const double h = height_;
-    const float floor = innermost_zone ? static_cast<float>(-(1.0 + config_.ground_below) * h)
-                                       : -std::numeric_limits<float>::infinity();
-    const float seed_height = lowest_mean(begin, end, floor);
+    return innermost_zone ? static_cast<float>(-(1.0 + config_.ground_below) * height_)
+                          : -std::numeric_limits<float>::infinity();
+  }
 
-    // First fit: the points near the seed height, as a horizontal half space; then the plane.
-    const float x0 = sorted_.points.x[begin];
-    const float y0 = sorted_.points.y[begin];
-    HalfSpace below(x0, y0, seed_height, static_cast<float>(config_.ground_seed_margin));
+  // From the points near the seed height, a horizontal half space, to those near the plane. Returns
+  // whether these are ground.
+  template <class Lanes>
+  bool fit_ground(std::size_t patch, std::size_t count, float seed_height, HalfSpace& below) const {
     detail::Plane plane;
     for (int i = 0; i < config_.ground_iterations; ++i) {
-      const detail::PlaneMoments moments = sum_moments(begin, end, below);
-      if (moments.count < 3.0) return reject();
+      const detail::PlaneMoments moments = sum_moments<Lanes>(patch_, count, below);
+      if (moments.count < 3.0) return false;
       plane = detail::fit_plane(moments);
       below.x = static_cast<float>(plane.normal_x);
       below.y = static_cast<float>(plane.normal_y);
@@ -389,151 +370,68 @@ class GroundSegmenter {
           static_cast<float>(config_.ground_distance + plane.normal_x * plane.mean_x +
                              plane.normal_y * plane.mean_y + plane.normal_z * plane.mean_z);
     }
-    if (plane.normal_z < config_.ground_uprightness) return reject();
+    if (plane.normal_z < config_.ground_uprightness) return false;
     const auto ring = static_cast<std::size_t>(ring_of_patch_[patch]);
-    if (ring < kCheckedRings) {
-      const double elevation = plane.mean_z + static_cast<double>(seed_height) + h;
-      if (elevation > config_.ground_elevation[ring] &&
-          plane.flatness >= config_.ground_flatness[ring]) {
-        return reject();
-      }
-    }
-
-    detail::run_lanes([&](auto lanes) {
-      using Lanes = decltype(lanes);
-      for (std::size_t i = begin; i < end; i += detail::kLanes) {
-        const unsigned bits = below.inside(below.template local<Lanes>(sorted_.points, i)).bits();
-        const std::size_t count = std::min(detail::kLanes, end - i);
-        out.put(sorted_, i, count, bits & ((1U << count) - 1U));
-      }
-    });
+    if (ring >= kCheckedRings) return true;
+    const double elevation = plane.mean_z + static_cast<double>(seed_height) + height_;
+    return !(elevation > config_.ground_elevation[ring] &&
+             plane.flatness >= config_.ground_flatness[ring]);
   }
 
-  // Points with normal . (p - origin) < offset; the origin of the fit is near the points.
-  struct HalfSpace {
-    HalfSpace(float origin_x, float origin_y, float origin_z, float distance)
-        : x0(origin_x), y0(origin_y), z0(origin_z), offset(distance) {}
-
-    detail::Constant8 x0, y0, z0;
-    detail::Constant8 x = 0.0F, y = 0.0F, z = 1.0F, offset;
-
-    template <class Lanes>
-    std::array<typename Lanes::Float, 3> local(const PointBuffer& points, std::size_t i) const {
-      using Float = typename Lanes::Float;
-      return {Float::load(&points.x[i]) - x0, Float::load(&points.y[i]) - y0,
-              Float::load(&points.z[i]) - z0};
+  // The points of a patch; x and y relative to an origin near them.
+  template <class Lanes>
+  void lay_out(const detail::PointRecord* records, std::size_t count) {
+    using Float = typename Lanes::Float;
+    const Float x0(records->x);
+    const Float y0(records->y);
+    float* const x = patch_.x.data();
+    float* const y = patch_.y.data();
+    float* const z = patch_.z.data();
+    for (std::size_t i = 0; i < count; i += detail::kLanes) {
+      const auto columns = detail::load_columns<Lanes>(records + i);
+      (columns[0] - x0).store(x + i);
+      (columns[1] - y0).store(y + i);
+      columns[2].store(z + i);
     }
-    template <class Float>
-    auto inside(const std::array<Float, 3>& p) const {
-      return x * p[0] + y * p[1] + z * p[2] < offset;
-    }
-  };
+    // Behind the last one, there is nothing that is low or below a plane.
+    Float(std::numeric_limits<float>::infinity()).store(z + count);
+  }
 
-  detail::PlaneMoments sum_moments(std::size_t begin, std::size_t end,
-                                   const HalfSpace& space) const {
+  template <class Lanes>
+  static detail::PlaneMoments sum_moments(const PointBuffer& points, std::size_t count,
+                                          const HalfSpace& space) {
     static constexpr detail::Constant8 kZero(0.0F), kOne(1.0F);
-    std::array<float, 10> sums;
-    detail::run_lanes([&](auto lanes) {
-      using Lanes = decltype(lanes);
-      using Float = typename Lanes::Float;
-      Float n = kZero, sx = kZero, sy = kZero, sz = kZero, sxx = kZero, sxy = kZero, sxz = kZero,
-            syy = kZero, syz = kZero, szz = kZero;
-      const auto add = [&](const std::array<Float, 3>& p, const typename Lanes::Mask& member) {
-        const Float x = keep(member, p[0]);
-        const Float y = keep(member, p[1]);
-        const Float z = keep(member, p[2]);
-        n = n + keep(member, Float(kOne));
-        sx = sx + x;
-        sy = sy + y;
-        sz = sz + z;
-        sxx = sxx + x * x;
-        sxy = sxy + x * y;
-        sxz = sxz + x * z;
-        syy = syy + y * y;
-        syz = syz + y * z;
-        szz = szz + z * z;
-      };
-      std::size_t i = begin;
-      for (; i + detail::kLanes <= end; i += detail::kLanes) {
-        const auto p = space.template local<Lanes>(sorted_.points, i);
-        add(p, space.inside(p));
-      }
-      if (i < end) {
-        const auto p = space.template local<Lanes>(sorted_.points, i);
-        add(p, space.inside(p) & detail::lanes_below<Lanes>(end - i));
-      }
-      sums = {sum(n),   sum(sx),  sum(sy),  sum(sz),  sum(sxx),
-              sum(sxy), sum(sxz), sum(syy), sum(syz), sum(szz)};
-    });
-    return {sums[0], sums[1], sums[2], sums[3], sums[4],
-            sums[5], sums[6], sums[7], sums[8], sums[9]};
-  }
-
-  // The lowest values met so far, in order.
-  struct Lowest {
-    std::size_t wanted;
-    std::size_t found = 0;
-    std::array<float, kMaxLowest> values{};
-
-    void add(float value) {
-      if (found == wanted && !(value < values[found - 1])) return;
-      std::size_t at = found < wanted ? found++ : wanted - 1;
-      for (; at > 0 && values[at - 1] > value; --at) values[at] = values[at - 1];
-      values[at] = value;
+    using Float = typename Lanes::Float;
+    Float n = kZero, sx = kZero, sy = kZero, sz = kZero, sxx = kZero, sxy = kZero, sxz = kZero,
+          syy = kZero, syz = kZero, szz = kZero;
+    for (std::size_t i = 0; i < count; i += detail::kLanes) {
+      const auto p = space.template local<Lanes>(points, i);
+      const auto member = space.inside(p);
+      const Float x = keep(member, p[0]);
+      const Float y = keep(member, p[1]);
+      const Float z = keep(member, p[2]);
+      n = n + keep(member, Float(kOne));
+      sx = sx + x;
+      sy = sy + y;
+      sz = sz + z;
+      sxx = sxx + x * x;
+      sxy = sxy + x * y;
+      sxz = sxz + x * z;
+      syy = syy + y * y;
+      syz = syz + y * z;
+      szz = szz + z * z;
     }
-    float limit() const {
-      return found == wanted ? values[found - 1] : std::numeric_limits<float>::infinity();
-    }
-  };
-
-  // Mean height of the lowest points that are not below `floor`; all of them if there are fewer.
-  // Points often come in the order of their height. So the lowest of each of some interleaved
-  // groups bound the result first, and only the few points within the bound are sorted in.
-  float lowest_mean(std::size_t begin, std::size_t end, float floor) const {
-    using detail::Float8;
-    Lowest lowest{static_cast<std::size_t>(config_.ground_lowest_points)};
-    const Float8 infinity(std::numeric_limits<float>::infinity());
-    const auto heights = [&](std::size_t i) {
-      const Float8 z = Float8::load(&sorted_.points.z[i]);
-      detail::Mask8 valid = z >= Float8(floor);
-      if (end - i < detail::kLanes) {
-        valid = valid & detail::lanes_below<detail::NarrowLanes>(end - i);
-      }
-      return select(valid, z, infinity);
-    };
-    const std::size_t groups = (lowest.wanted - 1) / detail::kLanes + 1;
-    for (std::size_t group = 0; group < groups; ++group) {
-      Float8 least = infinity;
-      for (std::size_t i = begin + group * detail::kLanes; i < end; i += groups * detail::kLanes) {
-        least = min(heights(i), least);
-      }
-      float values[detail::kLanes];
-      least.store(values);
-      for (const float value : values) lowest.add(value);
-    }
-    const Float8 bound(lowest.limit());
-    lowest.found = 0;
-    for (std::size_t i = begin; i < end; i += detail::kLanes) {
-      const Float8 z = heights(i);
-      for (unsigned bits = ((z <= bound) & (z < infinity)).bits(); bits != 0; bits &= bits - 1) {
-        lowest.add(sorted_.points.z[i + static_cast<std::size_t>(__builtin_ctz(bits))]);
-      }
-    }
-    if (lowest.found == 0) return floor;
-    float total = 0.0F;
-    for (std::size_t i = 0; i < lowest.found; ++i) total += lowest.values[i];
-    return total / static_cast<float>(lowest.found);
+    return {sum(n),   sum(sx),  sum(sy),  sum(sz),  sum(sxx),
+            sum(sxy), sum(sxz), sum(syy), sum(syz), sum(szz)};
   }
 
   Config config_;
   double height_ = 0.0;  // m
   std::array<Zone, kZones> zones_{};
   std::array<std::int32_t, kPatches> ring_of_patch_{};
-  std::array<std::size_t, kPatches + 2> patch_begin_{};
   std::vector<std::int32_t> patch_of_;
-  std::vector<std::uint32_t> streak_end_;
-  GroundSplit sorted_;  // by patch
-  GroundSplit rest_;
+  detail::PatchSort<kPatches + 1> sorted_;  // the last for points that are in no patch
+  PointBuffer patch_;                       // the points of one patch
 };
 
 }  // namespace dynains

@@ -263,15 +263,6 @@ void copy(const T* from, std::size_t count, T* to) {
   for (; i < count; ++i) to[i] = from[i];
 }
 
-/// How many values differ from the one before them.
-template <class T>
-std::size_t count_changes(const T* values, std::size_t count) {
-  static_assert(sizeof(T) == 4);
-  std::size_t changes = 0;
-  for (std::size_t i = 1; i < count; ++i) changes += values[i] != values[i - 1] ? 1 : 0;
-  return changes;
-}
-
 /// Cuts the array into stretches of equal values and calls `body(length)` for one after the other.
 template <class T, class Body>
 void for_each_change(const T* values, std::size_t count, Body&& body) {

@@ -8,11 +8,8 @@
 
 #include "dynains/cause.hpp"
 #include "dynains/cluster_set.hpp"
-#include "dynains/detail/lanes.hpp"
 #include "dynains/detail/room.hpp"
-#include "dynains/detail/turn.hpp"
 #include "dynains/ground_segmenter.hpp"
-#include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
 #include "dynains/scan_verdict.hpp"
 
@@ -102,62 +99,6 @@ struct ScanSlot {
     visit(beliefs);
     visit(causes);
   }
-};
-
-/// Takes a foreign cloud in: valid points as floats, and a label for each of the others.
-class Ingest {
- public:
-  /// Points outside [min_range, max_range] (m, horizontal), higher or lower than max_range or
-  /// without finite coordinates stay out; a point at the origin is a beam that did not return.
-  template <class Cloud>
-  void read(const Cloud& cloud, float min_range, float max_range, std::vector<PointLabel>& labels) {
-    using Traits = PointCloudTraits<Cloud>;
-    const std::size_t count = Traits::size(cloud);
-    make_room(labels, count);
-    labels.resize(count);
-    points_.grow(count + kLanes);
-    grow(input_, count + kLanes);
-    const float min_squared = min_range * min_range;
-    const float max_squared = max_range * max_range;
-    float* const xs = points_.x.data();
-    float* const ys = points_.y.data();
-    float* const zs = points_.z.data();
-    std::uint32_t* const input = input_.data();
-    std::size_t taken = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-      const auto p = Traits::point(cloud, i);
-      const float x = p.x();
-      const float y = p.y();
-      const float z = p.z();
-      const float squared = x * x + y * y;
-      xs[taken] = x;
-      ys[taken] = y;
-      zs[taken] = z;
-      input[taken] = static_cast<std::uint32_t>(i);
-      // Comparisons with NaN are false, so that one test admits only good points.
-      const bool good = squared >= min_squared && squared <= max_squared && z * z <= max_squared;
-      if (good && (squared > 0.0F || z != 0.0F)) {
-        ++taken;
-      } else {
-        const bool finite = x - x == 0.0F && y - y == 0.0F && z - z == 0.0F;
-        const bool missing = x == 0.0F && y == 0.0F && z == 0.0F;
-        labels[i] = finite && !missing ? PointLabel::kOutOfRange : PointLabel::kInvalid;
-      }
-    }
-    count_ = taken;
-  }
-
-  /// Turns the points that were taken in.
-  void turn(const Eigen::Matrix3f& R) { detail::turn(points(), R, points_); }
-
-  PointsView points() const { return PointsView(points_).subview(0, count_); }
-  /// Position in the input of each point that was taken in.
-  const std::vector<std::uint32_t>& input() const { return input_; }
-
- private:
-  std::size_t count_ = 0;
-  PointBuffer points_;
-  std::vector<std::uint32_t> input_;
 };
 
 }  // namespace dynains::detail

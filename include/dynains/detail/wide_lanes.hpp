@@ -118,6 +118,15 @@ inline float sum(const WideFloat8& a) {
                     __builtin_shufflevector(a.v, a.v, 4, 5, 6, 7)));
 }
 
+/// Lane i is lane `from[i]` of `a`, modulo eight.
+inline WideFloat8 permuted(const WideFloat8& a, const WideInt8& from) {
+#if defined(__clang__)
+  return WideFloat8(__builtin_shufflevector(a.v, from.v));
+#else
+  return WideFloat8(__builtin_shuffle(a.v, from.v));
+#endif
+}
+
 struct NarrowLanes {
   using Float = Float8;
   using Int = Int8;
@@ -150,12 +159,18 @@ void run_lanes(Kernel&& kernel) {
   kernel(NarrowLanes());
 }
 
+/// 0 to 7.
+template <class Int>
+Int lane_numbers() {
+  alignas(32) static constexpr std::int32_t kNumbers[kLanes] = {0, 1, 2, 3, 4, 5, 6, 7};
+  return Int::load(kNumbers);
+}
+
 /// True in the lanes below `count`.
 template <class Lanes>
 typename Lanes::Mask lanes_below(std::size_t count) {
-  alignas(32) static constexpr std::int32_t kIndex[kLanes] = {0, 1, 2, 3, 4, 5, 6, 7};
   using Int = typename Lanes::Int;
-  return Int::load(kIndex) < Int(static_cast<std::int32_t>(count));
+  return lane_numbers<Int>() < Int(static_cast<std::int32_t>(count));
 }
 
 /// Eight neighbouring places of some arrays; fewer at their end, if `kTail`.

@@ -1,0 +1,91 @@
+// Points side by side with their numbers: what is moved one by one, by one load and one store.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+
+#include "dynains/detail/lanes.hpp"
+#include "dynains/detail/wide_lanes.hpp"
+#include "dynains/points.hpp"
+
+namespace dynains::detail {
+
+struct alignas(16) PointRecord {
+  float x, y, z;
+  std::uint32_t input;
+};
+
+/// The columns of four rows of four values.
+inline std::array<Float4, 4> transposed(const std::array<Float4, 4>& row) {
+  const Float4 a = __builtin_shufflevector(row[0], row[1], 0, 4, 1, 5);
+  const Float4 b = __builtin_shufflevector(row[2], row[3], 0, 4, 1, 5);
+  const Float4 c = __builtin_shufflevector(row[0], row[1], 2, 6, 3, 7);
+  const Float4 d = __builtin_shufflevector(row[2], row[3], 2, 6, 3, 7);
+  return {__builtin_shufflevector(a, b, 0, 1, 4, 5), __builtin_shufflevector(a, b, 2, 3, 6, 7),
+          __builtin_shufflevector(c, d, 0, 1, 4, 5), __builtin_shufflevector(c, d, 2, 3, 6, 7)};
+}
+
+/// The same for two times four rows side by side.
+inline std::array<WideFloat8, 4> transposed(const std::array<WideFloat8, 4>& row) {
+  using Vector = WideFloat8::Vector;
+  const Vector a = __builtin_shufflevector(row[0].v, row[1].v, 0, 8, 1, 9, 4, 12, 5, 13);
+  const Vector b = __builtin_shufflevector(row[2].v, row[3].v, 0, 8, 1, 9, 4, 12, 5, 13);
+  const Vector c = __builtin_shufflevector(row[0].v, row[1].v, 2, 10, 3, 11, 6, 14, 7, 15);
+  const Vector d = __builtin_shufflevector(row[2].v, row[3].v, 2, 10, 3, 11, 6, 14, 7, 15);
+  return {WideFloat8(__builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13)),
+          WideFloat8(__builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15)),
+          WideFloat8(__builtin_shufflevector(c, d, 0, 1, 8, 9, 4, 5, 12, 13)),
+          WideFloat8(__builtin_shufflevector(c, d, 2, 3, 10, 11, 6, 7, 14, 15))};
+}
+
+inline Float4 load_four(const void* from) {
+  Float4 result;
+  std::memcpy(&result, from, sizeof(result));
+  return result;
+}
+
+inline void store_four(const Float4& four, void* to) { std::memcpy(to, &four, sizeof(four)); }
+
+inline void copy_record(const PointRecord* from, PointRecord* to) {
+  store_four(load_four(from), to);
+}
+
+/// `to` is not behind `from`, but may be less than `count` before it.
+inline void move_to_front(const PointRecord* from, std::size_t count, PointRecord* to) {
+  if (to == from) return;
+  for (std::size_t k = 0; k < count; ++k) copy_record(from + k, to + k);
+}
+
+/// Four points from the i-th on, as records.
+inline std::array<Float4, 4> load_records(PointsView points, const std::uint32_t* input,
+                                          std::size_t i) {
+  return transposed({load_four(points.x.data() + i), load_four(points.y.data() + i),
+                     load_four(points.z.data() + i), load_four(input + i)});
+}
+
+/// Eight records as lanes of x, y, z and, bit by bit, numbers.
+template <class Lanes>
+std::array<typename Lanes::Float, 4> load_columns(const PointRecord* from) {
+  std::array<typename Lanes::Float, 4> result;
+  if constexpr (std::is_same_v<typename Lanes::Float, WideFloat8>) {
+    for (std::size_t k = 0; k < 4; ++k) {
+      result[k] = WideFloat8(__builtin_shufflevector(load_four(from + k), load_four(from + k + 4),
+                                                     0, 1, 2, 3, 4, 5, 6, 7));
+    }
+    return transposed(result);
+  } else {
+    const auto four = [](const PointRecord* rows) {
+      return transposed(
+          {load_four(rows), load_four(rows + 1), load_four(rows + 2), load_four(rows + 3)});
+    };
+    const std::array<Float4, 4> lo = four(from);
+    const std::array<Float4, 4> hi = four(from + 4);
+    for (std::size_t k = 0; k < 4; ++k) result[k] = {lo[k], hi[k]};
+    return result;
+  }
+}
+
+}  // namespace dynains::detail
