@@ -133,25 +133,10 @@ class FreeSpaceEvidence {
     const Record& record = record_of(scan);
     judge_instances(scan, is_final, record);
     causes.resize(split.count);
-    const auto non_ground = causes.begin() + static_cast<std::ptrdiff_t>(split.ground_count);
-    std::fill(causes.begin(), non_ground, Cause::kGround);
-    std::fill(non_ground, causes.end(), Cause::kNotJudged);
     belief.resize(split.count);
-    std::fill(belief.begin() + static_cast<std::ptrdiff_t>(split.ground_count), belief.end(), 0.0F);
-    const PointsView points = split.non_ground();
-    for (const InstanceSamples::Streak& streak : record.samples.streaks) {
-      const Verdict& verdict = verdicts_[streak.supervoxel];
-      const std::size_t begin = split.ground_count + streak.begin;
-      const std::size_t end = split.ground_count + streak.end;
-      for (std::size_t i = begin; i < end; ++i) {
-        belief[i] = verdict.belief;
-        causes[i] = verdict.cause;
-      }
-      if (!is_dynamic(verdict.cause)) continue;
-      for (std::size_t i = streak.begin; i < streak.end; ++i) {
-        footprint_.add(points.x[i], points.y[i], points.z[i]);
-      }
-    }
+    std::fill_n(causes.begin(), split.ground_count, Cause::kGround);
+    spread(record.samples, split, causes.data() + split.ground_count,
+           belief.data() + split.ground_count);
     if (footprint_.empty()) return;
     footprint_.spread();
     judge_ground(scan, record, split, causes, belief);
@@ -455,6 +440,31 @@ class FreeSpaceEvidence {
            static_cast<float>(share.decided) <= kUnknown * static_cast<float>(share.total);
   }
 
+  // From supervoxels to points.
+  void spread(const InstanceSamples& samples, const GroundSplit& split, Cause* causes,
+              float* belief) {
+    by_met_.resize(samples.met.size() + 1);
+    by_met_[0] = {Cause::kNotJudged, 0.0F};
+    for (std::size_t i = 0; i < samples.met.size(); ++i) by_met_[i + 1] = verdicts_[samples.met[i]];
+    const PointsView points = split.non_ground();
+    const Verdict* const verdicts = by_met_.data();
+    const std::uint32_t* const met_of = samples.met_of.data();
+    for (std::size_t begin = 0; begin < points.size(); begin += detail::kLanes) {
+      const std::size_t end = std::min(begin + detail::kLanes, points.size());
+      bool any = false;
+      for (std::size_t i = begin; i < end; ++i) {
+        const Verdict& verdict = verdicts[met_of[i]];
+        causes[i] = verdict.cause;
+        belief[i] = verdict.belief;
+        any |= is_dynamic(verdict.cause);
+      }
+      if (!any) continue;
+      for (std::size_t i = begin; i < end; ++i) {
+        if (is_dynamic(causes[i])) footprint_.add(points.x[i], points.y[i], points.z[i]);
+      }
+    }
+  }
+
   static float as_probability(float level) { return 1.0F / (1.0F + std::exp(-level)); }
 
   // Ground beside removed points: what stands within their footprint goes with them, and what two
@@ -500,15 +510,16 @@ class FreeSpaceEvidence {
       if (lag <= config_.memory && distance <= scan) count_ground(record, scan - distance);
       if (lag <= config_.horizon) count_ground(record, scan + distance);
     }
-    for (const InstanceSamples::Streak& streak : ground_samples_.streaks) {
-      const std::uint32_t sample = ground_samples_.sample_begin[streak.supervoxel];
+    for (std::size_t i = 0; i < near_ground_.size(); ++i) {
+      const std::uint32_t met = ground_samples_.met_of[i];
+      if (met == 0) continue;
+      const std::uint32_t sample = ground_samples_.sample_begin[ground_samples_.met[met - 1]];
       const std::uint32_t free = ground_free_[sample];
       if (free < kGroundFree ||
           static_cast<float>(free) < kGroundShare * static_cast<float>(ground_hit_[sample])) {
         continue;
       }
-      for (std::size_t i = streak.begin; i < streak.end; ++i)
-        remove(near_ground_[i], Cause::kFreeSpace);
+      remove(near_ground_[i], Cause::kFreeSpace);
     }
   }
 
@@ -561,7 +572,8 @@ class FreeSpaceEvidence {
   std::vector<Record> records_;
   RangeImage::Scratch image_scratch_;
   detail::Sights sights_;
-  std::vector<Verdict> verdicts_;
+  std::vector<Verdict> verdicts_;  // by supervoxel
+  std::vector<Verdict> by_met_;    // as InstanceSamples::met_of counts them
   std::vector<std::uint32_t> free_;
   std::vector<std::uint32_t> predecessors_;
   InstanceSamples ground_samples_;

@@ -27,15 +27,13 @@ std::int32_t voxel_of(float coordinate, float size) {
 
 constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
-// Supervoxel per point, from the streaks.
+// Supervoxel per point.
 std::vector<std::uint32_t> supervoxel_of(const InstanceSamples& samples, std::size_t points) {
-  std::vector<std::uint32_t> result(points, kNone);
-  for (const InstanceSamples::Streak& streak : samples.streaks) {
-    for (std::uint32_t i = streak.begin; i < streak.end; ++i) {
-      REQUIRE(i < points);
-      REQUIRE(result[i] == kNone);
-      result[i] = streak.supervoxel;
-    }
+  REQUIRE(samples.met_of.size() == points);
+  std::vector<std::uint32_t> result;
+  for (const std::uint32_t met : samples.met_of) {
+    REQUIRE(met <= samples.met.size());
+    result.push_back(met == 0 ? kNone : samples.met[met - 1]);
   }
   return result;
 }
