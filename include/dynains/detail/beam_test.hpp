@@ -101,10 +101,12 @@ inline void test_beams(const RangeImageGrid& grid, const RangeImage& image,
         const Float px = Float::load(&samples.x[begin + i]);
         const Float py = Float::load(&samples.y[begin + i]);
         const Float pz = Float::load(&samples.z[begin + i]);
-        const ImageLocation<Lanes> at = locator.template locate<Lanes>(
-            to_reference(0, px, py, pz), to_reference(1, px, py, pz), to_reference(2, px, py, pz));
-        at.cell.store(&cell[i]);
-        at.range.store(&ranges[i]);
+        const Float x = to_reference(0, px, py, pz);
+        const Float y = to_reference(1, px, py, pz);
+        const Float z = to_reference(2, px, py, pz);
+        const Float range = sqrt((x * x + y * y) + z * z);
+        locator.template locate<Lanes>(x, y, z, range).store(&cell[i]);
+        range.store(&ranges[i]);
         for (std::size_t k = i; k < i + kLanes; ++k) __builtin_prefetch(&cells[cell[k]]);
       }
       for (std::size_t i = 0; i < size; i += kLanes) {
