@@ -101,6 +101,10 @@ class FreeSpaceEvidence {
     record.wholes.assign(instance_count, Belief());
     record.changed.assign(instance_count, 1);
     record.shares.resize(instance_count);
+    for (std::size_t instance = 0; instance < instance_count; ++instance) {
+      record.shares[instance] = {record.samples.count(instance), 0, 0};
+    }
+    record.open.assign(record.samples.size() / 64 + 1, ~std::uint64_t{0});
     predecessors_.assign(instance_count, kNoCluster);
     if (config_.use_tracks) track(scan, record);
 
@@ -111,7 +115,11 @@ class FreeSpaceEvidence {
       if (reference.segment == segment) refer(record, reference, -lag);
     }
     // What follows is summed apart from what was before.
-    for (Belief& belief : record.beliefs) belief.level = 0.0F;
+    for (std::uint32_t s = 0; s < record.beliefs.size(); ++s) {
+      Belief& belief = record.beliefs[s];
+      if (belief.contested != 0 && belief.level > 0.0F) set_open(record, s, false);
+      belief.level = 0.0F;
+    }
     for (Belief& belief : record.wholes) belief.level = 0.0F;
     weigh(record);
     for (const int lag : kLags) {
@@ -178,9 +186,10 @@ class FreeSpaceEvidence {
     std::uint64_t segment = kNoSegment;
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
     InstanceSamples samples;
-    std::vector<Belief> beliefs;        // by supervoxel
-    std::vector<Belief> wholes;         // by instance, of all its samples together
-    std::vector<Share> shares;          // by instance
+    std::vector<Belief> beliefs;      // by supervoxel
+    std::vector<Belief> wholes;       // by instance, of all its samples together
+    std::vector<Share> shares;        // by instance
+    std::vector<std::uint64_t> open;  // by sample, a bit each: whether a hit may change its belief
     std::vector<std::uint8_t> changed;  // by instance: whether beliefs changed since it was weighed
     TrackedInstances tracked;
   };
@@ -212,26 +221,75 @@ class FreeSpaceEvidence {
                        sights_);
   }
 
-  // One reference for all samples of a scan: an update of every supervoxel's belief, and whether
-  // it saw through whole instances. `lag`: scans from the samples to the reference.
+  // One reference for all samples of a scan. `lag`: scans from the samples to the reference.
   void refer(Record& record, const View& reference, int lag) {
+    look(record.samples.points, record.samples.size(), record.T_world_sensor, reference);
+    update_supervoxels(record);
+    update_wholes(record, lag);
+  }
+
+  // What the reference saw may change supervoxels of which something was seen free, or was hit
+  // while they are open: few, once a scan has met some references.
+  void update_supervoxels(Record& record) {
+    constexpr std::size_t kBits = 64;
     const InstanceSamples& samples = record.samples;
-    look(samples.points, samples.size(), record.T_world_sensor, reference);
-    for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
-      const std::uint32_t first = samples.supervoxel_begin[instance];
-      const std::uint32_t last = samples.supervoxel_begin[instance + 1];
-      std::uint32_t begin = samples.sample_begin[first];
-      const detail::Sights::Count all = sights_.count(begin, samples.sample_begin[last]);
-      if (all.free + all.hit == 0) continue;
-      for (std::uint32_t s = first; s < last; ++s) {
-        const std::uint32_t end = samples.sample_begin[s + 1];
-        if (update(record.beliefs[s], sights_.count(begin, end), end - begin)) {
-          record.changed[instance] = 1;
-        }
-        begin = end;
+    std::size_t done = 0;  // samples
+    for (std::size_t begin = 0; begin < samples.size(); begin += kBits) {
+      const std::uint64_t open = record.open[begin / kBits];
+      std::uint64_t seen = sights_.free_word(begin) | (sights_.hit_word(begin) & open);
+      const std::size_t end = std::min(begin + kBits, samples.size());
+      if (end - begin < kBits) seen &= (std::uint64_t{1} << (end - begin)) - 1;
+      while (done < end) {
+        if (done > begin) seen &= ~std::uint64_t{0} << (done - begin);
+        if (seen == 0) break;
+        const std::size_t sample = begin + static_cast<std::size_t>(__builtin_ctzll(seen));
+        const std::uint32_t s = samples.supervoxel_of[sample];
+        update_supervoxel(record, s);
+        done = samples.sample_begin[s + 1];
       }
-      const auto count =
-          static_cast<float>(samples.sample_begin[last] - samples.sample_begin[first]);
+    }
+  }
+
+  void update_supervoxel(Record& record, std::uint32_t s) {
+    const InstanceSamples& samples = record.samples;
+    const std::uint32_t begin = samples.sample_begin[s];
+    const std::uint32_t end = samples.sample_begin[s + 1];
+    Belief& belief = record.beliefs[s];
+    const bool was_open = is_open(belief);
+    const bool was_free = is_free(belief);
+    const bool was_decided = was_free || belief.contested != 0;
+    const bool changed = update(belief, sights_.count(begin, end), end - begin);
+    if (is_open(belief) != was_open) set_open(record, s, !was_open);
+    if (!changed) return;
+    const std::uint32_t instance = samples.instance_of[s];
+    Share& share = record.shares[instance];
+    const bool free = is_free(belief);
+    const bool decided = free || belief.contested != 0;
+    share.moved += (free ? end - begin : 0) - (was_free ? end - begin : 0);
+    share.decided += (decided ? end - begin : 0) - (was_decided ? end - begin : 0);
+    record.changed[instance] = 1;
+  }
+
+  // Whether hits may change it: what was hit before and is not seen free stays as it is.
+  static bool is_open(const Belief& belief) { return belief.contested == 0 || belief.level > 0.0F; }
+  static void set_open(Record& record, std::uint32_t s, bool open) {
+    const std::uint32_t end = record.samples.sample_begin[s + 1];
+    for (std::uint32_t sample = record.samples.sample_begin[s]; sample < end; ++sample) {
+      const std::uint64_t bit = std::uint64_t{1} << sample % 64;
+      record.open[sample / 64] =
+          open ? record.open[sample / 64] | bit : record.open[sample / 64] & ~bit;
+    }
+  }
+
+  // Whether the reference saw through whole instances.
+  void update_wholes(Record& record, int lag) {
+    const InstanceSamples& samples = record.samples;
+    std::uint32_t end = 0;
+    for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
+      const std::uint32_t begin = end;
+      end += samples.count(instance);
+      const detail::Sights::Count all = sights_.count(begin, end);
+      const auto count = static_cast<float>(end - begin);
       const auto seen = static_cast<float>(all.free + all.hit);
       if (seen < std::max(2.0F, kLeastView * count)) continue;
       const float share = static_cast<float>(all.free) / seen;
@@ -251,12 +309,10 @@ class FreeSpaceEvidence {
     }
   }
 
-  // Eq. 15 with three-way increments as in Eq. 18, by the share of samples seen free; shares that
-  // say little, or are of few samples, change nothing. Returns whether what weigh() looks at
-  // changed.
+  // For something that was seen. Eq. 15 with three-way increments as in Eq. 18, by the share of
+  // samples seen free; shares that say little, or are of few samples, change nothing. Returns
+  // whether what weigh() looks at changed.
   bool update(Belief& belief, detail::Sights::Count seen, std::uint32_t samples) const {
-    // The usual case: what was hit before and is not seen free stays as it is.
-    if (seen.free == 0 && belief.level == 0.0F && belief.contested != 0) return false;
     const bool hits =
         seen.hit >= std::max(std::min(2U, samples), (samples + kLeastHit - 1) / kLeastHit);
     const auto free = static_cast<float>(seen.free);
@@ -287,24 +343,11 @@ class FreeSpaceEvidence {
 
   // What its own evidence says of each instance.
   void weigh(Record& record) const {
-    const InstanceSamples& samples = record.samples;
-    for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
+    if (!config_.use_tracks) return;
+    for (std::size_t instance = 0; instance < record.changed.size(); ++instance) {
       if (record.changed[instance] == 0) continue;
       record.changed[instance] = 0;
-      Share share;
-      const std::uint32_t last = samples.supervoxel_begin[instance + 1];
-      for (std::uint32_t s = samples.supervoxel_begin[instance]; s < last; ++s) {
-        const Belief& belief = record.beliefs[s];
-        const std::uint32_t count = samples.sample_begin[s + 1] - samples.sample_begin[s];
-        const bool free = is_free(belief);
-        share.total += count;
-        if (free) share.moved += count;
-        if (free || belief.contested != 0) share.decided += count;
-      }
-      record.shares[instance] = share;
-      if (config_.use_tracks) {
-        record.tracked.instances[instance].own = own_belief(record, instance);
-      }
+      record.tracked.instances[instance].own = own_belief(record, instance);
     }
   }
 
@@ -465,7 +508,10 @@ class FreeSpaceEvidence {
     }
   }
 
-  static float as_probability(float level) { return 1.0F / (1.0F + std::exp(-level)); }
+  // Most supervoxels were never seen free: they need no exponential.
+  static float as_probability(float level) {
+    return level == 0.0F ? 0.5F : 1.0F / (1.0F + std::exp(-level));
+  }
 
   // Ground beside removed points: what stands within their footprint goes with them, and what two
   // references saw free was no ground.

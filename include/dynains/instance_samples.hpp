@@ -47,6 +47,8 @@ struct InstanceSamples {
   std::vector<std::uint32_t> sample_begin;      ///< by supervoxel, one more than supervoxels
   std::vector<SupervoxelPlace> place;           ///< by supervoxel
   std::vector<std::uint32_t> supervoxel_begin;  ///< by instance, one more than instances
+  std::vector<std::uint32_t> supervoxel_of;     ///< by sample
+  std::vector<std::uint32_t> instance_of;       ///< by supervoxel
   /// By point of the scan: 0 if it has no supervoxel, else one more than the position of its
   /// supervoxel in `met`.
   std::vector<std::uint32_t> met_of;
@@ -58,6 +60,10 @@ struct InstanceSamples {
   }
   std::size_t instance_count() const {
     return supervoxel_begin.empty() ? 0 : supervoxel_begin.size() - 1;
+  }
+  /// Samples of an instance.
+  std::uint32_t count(std::size_t instance) const {
+    return sample_begin[supervoxel_begin[instance + 1]] - sample_begin[supervoxel_begin[instance]];
   }
 };
 
@@ -244,20 +250,25 @@ class InstanceSampler {
     next_.assign(out.supervoxel_begin.begin(), out.supervoxel_begin.end());
     out.met.resize(supervoxels_.size());
     out.place.resize(supervoxels_.size());
+    out.instance_of.resize(supervoxels_.size());
     out.sample_begin.assign(supervoxels_.size() + 1, 0);
     for (std::size_t s = 0; s < supervoxels_.size(); ++s) {
       const std::uint32_t to = next_[supervoxels_[s].voxel.instance]++;
       out.met[s] = to;
       out.sample_begin[to + 1] = supervoxels_[s].samples;
       out.place[to] = supervoxels_[s].voxel.place;
+      out.instance_of[to] = supervoxels_[s].voxel.instance;
     }
     for (std::size_t s = 1; s <= supervoxels_.size(); ++s) {
       out.sample_begin[s] += out.sample_begin[s - 1];
     }
     out.points.grow(samples_.size() + detail::kLanes);
+    out.supervoxel_of.resize(samples_.size());
     next_.assign(out.sample_begin.begin(), out.sample_begin.end());
     for (const Sample& sample : samples_) {
-      const std::uint32_t to = next_[out.met[sample.supervoxel]]++;
+      const std::uint32_t supervoxel = out.met[sample.supervoxel];
+      const std::uint32_t to = next_[supervoxel]++;
+      out.supervoxel_of[to] = supervoxel;
       out.points.x[to] = points.x[sample.point];
       out.points.y[to] = points.y[sample.point];
       out.points.z[to] = points.z[sample.point];

@@ -76,6 +76,7 @@ class InstanceLinker {
       measure_extent(samples.points, begin, end, instance);
       if (!instance.carried) continue;
       for (std::uint32_t p = begin; p < end; ++p) {
+        if (p > begin && place_[p] == place_[p - 1]) continue;
         const TrackedInstances::Cell cell = {place_[p], i};
         Slot& slot = slot_of(cell);
         // Two cells that share a place in the table are counted twice: rare, and harmless.

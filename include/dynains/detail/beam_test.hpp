@@ -49,26 +49,36 @@ class Sights {
   }
 
   struct Count {
-    std::uint32_t free = 0;
-    std::uint32_t hit = 0;
+    std::uint32_t free;
+    std::uint32_t hit;
   };
   Count count(std::size_t begin, std::size_t end) const {
-    Count result;
-    for (; end - begin > 8; begin += 8) add(begin, 0xFFU, result);
-    add(begin, (1U << (end - begin)) - 1, result);
-    return result;
+    std::uint32_t free = 0;
+    std::uint32_t hit = 0;
+    for (; end - begin > 8; begin += 8) {
+      free += kOnes[eight_from(free_, begin) & 0xFFU];
+      hit += kOnes[eight_from(hit_, begin) & 0xFFU];
+    }
+    const unsigned left = (1U << (end - begin)) - 1;
+    return {free + kOnes[eight_from(free_, begin) & left],
+            hit + kOnes[eight_from(hit_, begin) & left]};
   }
+  /// Of the 64 samples from `first` on, a multiple of 64; of those behind the last it may say
+  /// anything.
+  std::uint64_t free_word(std::size_t first) const { return word_at(free_, first); }
+  std::uint64_t hit_word(std::size_t first) const { return word_at(hit_, first); }
   bool is_free(std::size_t sample) const { return (free_[sample / 8] >> sample % 8 & 1U) != 0; }
   bool is_hit(std::size_t sample) const { return (hit_[sample / 8] >> sample % 8 & 1U) != 0; }
 
  private:
+  static std::uint64_t word_at(const std::vector<std::uint8_t>& bits, std::size_t first) {
+    std::uint64_t word;
+    std::memcpy(&word, &bits[first / 8], sizeof(word));
+    return word;
+  }
   static unsigned eight_from(const std::vector<std::uint8_t>& bits, std::size_t first) {
     const unsigned two = bits[first / 8] | unsigned{bits[first / 8 + 1]} << 8U;
     return two >> first % 8;
-  }
-  void add(std::size_t begin, unsigned mask, Count& to) const {
-    to.free += kOnes[eight_from(free_, begin) & mask];
-    to.hit += kOnes[eight_from(hit_, begin) & mask];
   }
   std::vector<std::uint8_t> free_, hit_;
 };
