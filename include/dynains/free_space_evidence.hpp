@@ -492,8 +492,7 @@ class FreeSpaceEvidence {
     const PointsView points = split.non_ground();
     const Verdict* const verdicts = by_met_.data();
     const std::uint32_t* const met_of = samples.met_of.data();
-    for (std::size_t begin = 0; begin < points.size(); begin += detail::kLanes) {
-      const std::size_t end = std::min(begin + detail::kLanes, points.size());
+    const auto spread_to = [&](std::size_t begin, std::size_t end) {
       bool any = false;
       for (std::size_t i = begin; i < end; ++i) {
         const Verdict& verdict = verdicts[met_of[i]];
@@ -501,11 +500,15 @@ class FreeSpaceEvidence {
         belief[i] = verdict.belief;
         any |= is_dynamic(verdict.cause);
       }
-      if (!any) continue;
-      for (std::size_t i = begin; i < end; ++i) {
+      for (std::size_t i = begin; any && i < end; ++i) {
         if (is_dynamic(causes[i])) footprint_.add(points.x[i], points.y[i], points.z[i]);
       }
+    };
+    std::size_t begin = 0;
+    for (; begin + detail::kLanes <= points.size(); begin += detail::kLanes) {
+      spread_to(begin, begin + detail::kLanes);
     }
+    spread_to(begin, points.size());
   }
 
   // Most supervoxels were never seen free: they need no exponential.
@@ -522,31 +525,31 @@ class FreeSpaceEvidence {
       causes[point] = cause;
       belief[point] = static_cast<float>(config_.tau_free);
     };
-    footprint_.find(ground, near_ground_);
-    std::size_t tested = 0;
-    for (const std::uint32_t point : near_ground_) {
-      const float lowest = footprint_.lowest(ground.x[point], ground.y[point]);
+    const bool tests = config_.ground_reach > 0.0;
+    detail::grow(near_ground_, ground.size());
+    tested_points_.grow(ground.size());
+    tested_ = 0;
+    footprint_.visit_near(ground, [&](std::size_t point, float lowest) {
       if (config_.footprint > 0.0 && lowest < ground.z[point] + kClearance) {
         remove(point, Cause::kUnderInstance);
-      } else {
-        near_ground_[tested++] = point;
+      } else if (tests) {
+        near_ground_[tested_] = static_cast<std::uint32_t>(point);
+        tested_points_.x[tested_] = ground.x[point];
+        tested_points_.y[tested_] = ground.y[point];
+        tested_points_.z[tested_] = ground.z[point];
+        ++tested_;
       }
-    }
-    near_ground_.resize(tested);
-    if (config_.ground_reach > 0.0) test_ground(scan, record, ground, remove);
+    });
+    if (tests) test_ground(scan, record, remove);
   }
 
-  // Ground that enough of all references saw free; `near_ground_` are the points to be tested.
+  // Ground that enough of all references saw free, of the first `tested_` of `tested_points_`.
   template <class Remove>
-  void test_ground(std::uint64_t scan, const Record& record, PointsView ground, Remove&& remove) {
-    tested_points_.resize(near_ground_.size());
-    for (std::size_t i = 0; i < near_ground_.size(); ++i) {
-      tested_points_.x[i] = ground.x[near_ground_[i]];
-      tested_points_.y[i] = ground.y[near_ground_[i]];
-      tested_points_.z[i] = ground.z[near_ground_[i]];
-    }
-    one_instance_.assign(near_ground_.size(), 0);
-    ground_sampler_.sample(tested_points_, one_instance_, 1, ground_samples_);
+  void test_ground(std::uint64_t scan, const Record& record, Remove&& remove) {
+    detail::grow(one_instance_, tested_);
+    ground_sampler_.sample(PointsView(tested_points_).subview(0, tested_),
+                           Span<const std::uint32_t>(one_instance_).subspan(0, tested_), 1,
+                           ground_samples_);
     const std::size_t count = ground_samples_.size();
     ground_free_.assign(count, 0);
     ground_hit_.assign(count, 0);
@@ -556,7 +559,7 @@ class FreeSpaceEvidence {
       if (lag <= config_.memory && distance <= scan) count_ground(record, scan - distance);
       if (lag <= config_.horizon) count_ground(record, scan + distance);
     }
-    for (std::size_t i = 0; i < near_ground_.size(); ++i) {
+    for (std::size_t i = 0; i < tested_; ++i) {
       const std::uint32_t met = ground_samples_.met_of[i];
       if (met == 0) continue;
       const std::uint32_t sample = ground_samples_.sample_begin[ground_samples_.met[met - 1]];
@@ -623,10 +626,11 @@ class FreeSpaceEvidence {
   std::vector<std::uint32_t> free_;
   std::vector<std::uint32_t> predecessors_;
   InstanceSamples ground_samples_;
-  std::vector<std::uint32_t> near_ground_;  // numbers of ground points
-  PointBuffer tested_points_;
-  std::vector<std::uint32_t> one_instance_;
-  std::vector<std::uint32_t> ground_free_;  // by sample, references that saw it so
+  std::vector<std::uint32_t> near_ground_;  // numbers of ground points that are tested
+  PointBuffer tested_points_;               // of these
+  std::size_t tested_ = 0;
+  std::vector<std::uint32_t> one_instance_;  // zeros
+  std::vector<std::uint32_t> ground_free_;   // by sample, references that saw it so
   std::vector<std::uint32_t> ground_hit_;
 };
 
