@@ -486,9 +486,9 @@ class FreeSpaceEvidence {
   // From supervoxels to points.
   void spread(const InstanceSamples& samples, const GroundSplit& split, Cause* causes,
               float* belief) {
-    by_met_.resize(samples.met.size() + 1);
-    by_met_[0] = {Cause::kNotJudged, 0.0F};
-    for (std::size_t i = 0; i < samples.met.size(); ++i) by_met_[i + 1] = verdicts_[samples.met[i]];
+    by_met_.assign(1, {Cause::kNotJudged, 0.0F});
+    by_met_.resize(samples.met.size());
+    for (std::size_t i = 1; i < by_met_.size(); ++i) by_met_[i] = verdicts_[samples.met[i]];
     const PointsView points = split.non_ground();
     const Verdict* const verdicts = by_met_.data();
     const std::uint32_t* const met_of = samples.met_of.data();
@@ -562,7 +562,7 @@ class FreeSpaceEvidence {
     for (std::size_t i = 0; i < tested_; ++i) {
       const std::uint32_t met = ground_samples_.met_of[i];
       if (met == 0) continue;
-      const std::uint32_t sample = ground_samples_.sample_begin[ground_samples_.met[met - 1]];
+      const std::uint32_t sample = ground_samples_.sample_begin[ground_samples_.met[met]];
       const std::uint32_t free = ground_free_[sample];
       if (free < kGroundFree ||
           static_cast<float>(free) < kGroundShare * static_cast<float>(ground_hit_[sample])) {
@@ -622,7 +622,7 @@ class FreeSpaceEvidence {
   RangeImage::Scratch image_scratch_;
   detail::Sights sights_;
   std::vector<Verdict> verdicts_;  // by supervoxel
-  std::vector<Verdict> by_met_;    // as InstanceSamples::met_of counts them
+  std::vector<Verdict> by_met_;    // by position in InstanceSamples::met
   std::vector<std::uint32_t> free_;
   std::vector<std::uint32_t> predecessors_;
   InstanceSamples ground_samples_;

@@ -49,10 +49,8 @@ struct InstanceSamples {
   std::vector<std::uint32_t> supervoxel_begin;  ///< by instance, one more than instances
   std::vector<std::uint32_t> supervoxel_of;     ///< by sample
   std::vector<std::uint32_t> instance_of;       ///< by supervoxel
-  /// By point of the scan: 0 if it has no supervoxel, else one more than the position of its
-  /// supervoxel in `met`.
-  std::vector<std::uint32_t> met_of;
-  std::vector<std::uint32_t> met;  ///< supervoxels in the order in which the scan meets them
+  std::vector<std::uint32_t> met_of;  ///< by point of the scan: its supervoxel's position in `met`
+  std::vector<std::uint32_t> met;     ///< supervoxels as the scan meets them, behind one for none
 
   std::size_t size() const { return sample_begin.empty() ? 0 : sample_begin.back(); }
   std::size_t supervoxel_count() const {
@@ -99,10 +97,6 @@ class InstanceSampler {
   struct Voxel {
     SupervoxelPlace place;
     std::uint32_t instance;
-
-    bool operator==(const Voxel& other) const {
-      return place == other.place && instance == other.instance;
-    }
   };
   // Consecutive points in one voxel, or without instance.
   struct Run {
@@ -111,18 +105,25 @@ class InstanceSampler {
     std::uint32_t slot;
   };
   struct Sample {
-    Voxel voxel;
-    std::uint32_t supervoxel;
+    std::uint32_t met;  // its supervoxel, as InstanceSamples::met_of counts them
     std::uint32_t point;
   };
+  // Number 0 stands for none.
   struct Supervoxel {
-    Voxel voxel;
+    SupervoxelPlace place;
+    std::uint32_t instance;
     std::uint32_t samples;
   };
-  // Direct-mapped memory of the voxels met last: where they stand in an array. A voxel that was
-  // pushed out and comes back gets a second sample, which does no harm; nothing is ever searched.
+  // Direct-mapped memory of the voxels met last, with their supervoxels. A voxel that was pushed
+  // out and comes back gets a second sample, which does no harm; nothing is ever searched.
+  struct Recent {
+    SupervoxelPlace place = 0;
+    std::uint32_t instance = kNoCluster;
+    std::uint32_t met = 0;
+
+    bool is(const Voxel& voxel) const { return place == voxel.place && instance == voxel.instance; }
+  };
   static constexpr std::size_t kSlots = 1U << 14;
-  static constexpr std::uint32_t kEmpty = 0xFFFFFFFFU;
   // Points are looked up in blocks, so that the memory has time to answer; one bit of a word each.
   static constexpr std::size_t kBlock = 64;
 
@@ -131,10 +132,10 @@ class InstanceSampler {
   }
 
   void begin_scan() {
-    slots_.assign(kSlots, kEmpty);
-    supervoxel_slots_.assign(kSlots, kEmpty);
+    recent_.assign(kSlots, Recent());
+    supervoxel_slots_.assign(kSlots, 0);
     samples_.clear();
-    supervoxels_.clear();
+    supervoxels_.assign(1, {0, kNoCluster, 0});
     instance_[0] = static_cast<std::int32_t>(kNoCluster);
     met_of_run_[0] = 0;
     runs_ = 0;
@@ -189,7 +190,7 @@ class InstanceSampler {
                    static_cast<std::uint32_t>(instance_[i + 1])};
       run.begin = static_cast<std::uint32_t>(first + i);
       run.slot = slot_of(run.voxel);
-      __builtin_prefetch(&slots_[run.slot]);
+      __builtin_prefetch(&recent_[run.slot]);
     }
     for (auto* const values : {&x_, &y_, &z_, &instance_}) (*values)[0] = (*values)[kBlock];
   }
@@ -197,15 +198,25 @@ class InstanceSampler {
   // What `met_of` says of the points of a run; takes a sample if its voxel has none.
   std::uint32_t take_run(const Run& run) {
     if (run.voxel.instance == kNoCluster) return 0;
-    std::uint32_t& number = slots_[run.slot];
-    if (number == kEmpty || !(samples_[number].voxel == run.voxel)) {
-      number = static_cast<std::uint32_t>(samples_.size());
-      const std::uint32_t s =
+    Recent& recent = recent_[run.slot];
+    if (!recent.is(run.voxel)) {
+      const std::uint32_t met =
           find_supervoxel({supervoxel_place(run.voxel.place), run.voxel.instance});
-      ++supervoxels_[s].samples;
-      samples_.push_back({run.voxel, s, run.begin});
+      recent = {run.voxel.place, run.voxel.instance, met};
+      ++supervoxels_[met].samples;
+      samples_.push_back({met, run.begin});
     }
-    return samples_[number].supervoxel + 1;
+    return recent.met;
+  }
+
+  std::uint32_t find_supervoxel(const Voxel& voxel) {
+    std::uint32_t& number = supervoxel_slots_[slot_of(voxel)];
+    const Supervoxel& known = supervoxels_[number];
+    if (known.place != voxel.place || known.instance != voxel.instance) {
+      number = static_cast<std::uint32_t>(supervoxels_.size());
+      supervoxels_.push_back({voxel.place, voxel.instance, 0});
+    }
+    return number;
   }
 
   void spread_runs(std::size_t size, std::uint32_t* met_of) const {
@@ -231,42 +242,39 @@ class InstanceSampler {
     return whole - (static_cast<float>(whole) > quotient ? 1 : 0);
   }
 
-  std::uint32_t find_supervoxel(const Voxel& voxel) {
-    std::uint32_t& number = supervoxel_slots_[slot_of(voxel)];
-    if (number == kEmpty || !(supervoxels_[number].voxel == voxel)) {
-      number = static_cast<std::uint32_t>(supervoxels_.size());
-      supervoxels_.push_back({voxel, 0});
-    }
-    return number;
-  }
-
   // Two counting sorts: supervoxels by instance, samples by supervoxel.
   void order(PointsView points, std::size_t instance_count, InstanceSamples& out) {
+    const std::size_t supervoxel_count = supervoxels_.size() - 1;
+    const std::size_t sample_count = samples_.size();
     out.supervoxel_begin.assign(instance_count + 1, 0);
-    for (const Supervoxel& s : supervoxels_) ++out.supervoxel_begin[s.voxel.instance + 1];
+    for (std::size_t met = 1; met <= supervoxel_count; ++met) {
+      ++out.supervoxel_begin[supervoxels_[met].instance + 1];
+    }
     for (std::size_t i = 1; i <= instance_count; ++i) {
       out.supervoxel_begin[i] += out.supervoxel_begin[i - 1];
     }
     next_.assign(out.supervoxel_begin.begin(), out.supervoxel_begin.end());
-    out.met.resize(supervoxels_.size());
-    out.place.resize(supervoxels_.size());
-    out.instance_of.resize(supervoxels_.size());
-    out.sample_begin.assign(supervoxels_.size() + 1, 0);
-    for (std::size_t s = 0; s < supervoxels_.size(); ++s) {
-      const std::uint32_t to = next_[supervoxels_[s].voxel.instance]++;
-      out.met[s] = to;
-      out.sample_begin[to + 1] = supervoxels_[s].samples;
-      out.place[to] = supervoxels_[s].voxel.place;
-      out.instance_of[to] = supervoxels_[s].voxel.instance;
+    out.met.resize(supervoxel_count + 1);
+    out.met[0] = kNoCluster;
+    out.place.resize(supervoxel_count);
+    out.instance_of.resize(supervoxel_count);
+    out.sample_begin.assign(supervoxel_count + 1, 0);
+    for (std::size_t met = 1; met <= supervoxel_count; ++met) {
+      const Supervoxel& supervoxel = supervoxels_[met];
+      const std::uint32_t to = next_[supervoxel.instance]++;
+      out.met[met] = to;
+      out.sample_begin[to + 1] = supervoxel.samples;
+      out.place[to] = supervoxel.place;
+      out.instance_of[to] = supervoxel.instance;
     }
-    for (std::size_t s = 1; s <= supervoxels_.size(); ++s) {
+    for (std::size_t s = 1; s <= supervoxel_count; ++s) {
       out.sample_begin[s] += out.sample_begin[s - 1];
     }
-    out.points.grow(samples_.size() + detail::kLanes);
-    out.supervoxel_of.resize(samples_.size());
+    out.points.grow(sample_count + detail::kLanes);
+    out.supervoxel_of.resize(sample_count);
     next_.assign(out.sample_begin.begin(), out.sample_begin.end());
     for (const Sample& sample : samples_) {
-      const std::uint32_t supervoxel = out.met[sample.supervoxel];
+      const std::uint32_t supervoxel = out.met[sample.met];
       const std::uint32_t to = next_[supervoxel]++;
       out.supervoxel_of[to] = supervoxel;
       out.points.x[to] = points.x[sample.point];
@@ -285,7 +293,7 @@ class InstanceSampler {
   std::array<Run, kBlock + 1> run_;
   std::array<std::uint32_t, kBlock + 1> met_of_run_ = {};
   std::size_t runs_ = 0;
-  std::vector<std::uint32_t> slots_;             // into samples_
+  std::vector<Recent> recent_;
   std::vector<std::uint32_t> supervoxel_slots_;  // into supervoxels_
   std::vector<Sample> samples_;
   std::vector<Supervoxel> supervoxels_;
