@@ -551,8 +551,8 @@ class FreeSpaceEvidence {
                            Span<const std::uint32_t>(one_instance_).subspan(0, tested_), 1,
                            ground_samples_);
     const std::size_t count = ground_samples_.size();
-    ground_free_.assign(count, 0);
-    ground_hit_.assign(count, 0);
+    ground_free_.assign((count + 7) / 8 * 8, 0);
+    ground_hit_.assign((count + 7) / 8 * 8, 0);
     for (const int lag : kLags) {
       if (count == 0) break;
       const auto distance = static_cast<std::uint64_t>(lag);
@@ -563,7 +563,7 @@ class FreeSpaceEvidence {
       const std::uint32_t met = ground_samples_.met_of[i];
       if (met == 0) continue;
       const std::uint32_t sample = ground_samples_.sample_begin[ground_samples_.met[met]];
-      const std::uint32_t free = ground_free_[sample];
+      const std::uint8_t free = ground_free_[sample];
       if (free < kGroundFree ||
           static_cast<float>(free) < kGroundShare * static_cast<float>(ground_hit_[sample])) {
         continue;
@@ -577,10 +577,7 @@ class FreeSpaceEvidence {
     const View& view = views_[reference % views_.size()];
     if (view.segment != record.segment) return;
     look(ground_samples_.points, ground_samples_.size(), record.T_world_sensor, view);
-    for (std::size_t i = 0; i < ground_samples_.size(); ++i) {
-      ground_free_[i] += sights_.is_free(i) ? 1 : 0;
-      ground_hit_[i] += sights_.is_hit(i) ? 1 : 0;
-    }
+    sights_.add_to(ground_samples_.size(), ground_free_.data(), ground_hit_.data());
   }
 
   static constexpr float kLeastView = 0.1F;   // share of an instance that a reference must see
@@ -630,8 +627,8 @@ class FreeSpaceEvidence {
   PointBuffer tested_points_;               // of these
   std::size_t tested_ = 0;
   std::vector<std::uint32_t> one_instance_;  // zeros
-  std::vector<std::uint32_t> ground_free_;   // by sample, references that saw it so
-  std::vector<std::uint32_t> ground_hit_;
+  std::vector<std::uint8_t> ground_free_;    // by sample, references that saw it so
+  std::vector<std::uint8_t> ground_hit_;
 };
 
 }  // namespace dynains

@@ -31,6 +31,16 @@ constexpr std::array<std::uint8_t, 256> count_ones() {
 /// Set bits of every byte.
 inline constexpr std::array<std::uint8_t, 256> kOnes = count_ones();
 
+constexpr std::array<std::array<std::uint8_t, 8>, 256> spread_bits() {
+  std::array<std::array<std::uint8_t, 8>, 256> bytes{};
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    for (std::size_t bit = 0; bit < 8; ++bit) bytes[i][bit] = i >> bit & 1U;
+  }
+  return bytes;
+}
+/// Every bit of a byte as a byte.
+inline constexpr std::array<std::array<std::uint8_t, 8>, 256> kBytesOfBits = spread_bits();
+
 /// What one reference says of many samples, a bit each.
 class Sights {
  public:
@@ -63,6 +73,17 @@ class Sights {
     return {free + kOnes[eight_from(free_, begin) & left],
             hit + kOnes[eight_from(hit_, begin) & left]};
   }
+  /// Counts up, for each of the first `count` samples, how many references saw it free or hit it:
+  /// fewer than 256. Both have room for a multiple of eight.
+  void add_to(std::size_t count, std::uint8_t* free, std::uint8_t* hit) const {
+    for (std::size_t i = 0; i < count; i += 8) {
+      for (std::size_t k = 0; k < 8; ++k) {
+        free[i + k] = static_cast<std::uint8_t>(free[i + k] + kBytesOfBits[free_[i / 8]][k]);
+        hit[i + k] = static_cast<std::uint8_t>(hit[i + k] + kBytesOfBits[hit_[i / 8]][k]);
+      }
+    }
+  }
+
   /// Of the 64 samples from `first` on, a multiple of 64; of those behind the last it may say
   /// anything.
   std::uint64_t free_word(std::size_t first) const { return word_at(free_, first); }
