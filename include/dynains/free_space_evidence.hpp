@@ -101,6 +101,10 @@ class FreeSpaceEvidence {
     record.wholes.assign(instance_count, Belief());
     record.changed.assign(instance_count, 1);
     record.shares.resize(instance_count);
+    for (std::size_t instance = 0; instance < instance_count; ++instance) {
+      record.shares[instance] = {record.samples.count(instance), 0, 0};
+    }
+    record.open.assign(record.samples.size() / 64 + 1, ~std::uint64_t{0});
     predecessors_.assign(instance_count, kNoCluster);
     if (config_.use_tracks) track(scan, record);
 
@@ -111,7 +115,11 @@ class FreeSpaceEvidence {
       if (reference.segment == segment) refer(record, reference, -lag);
     }
     // What follows is summed apart from what was before.
-    for (Belief& belief : record.beliefs) belief.level = 0.0F;
+    for (std::uint32_t s = 0; s < record.beliefs.size(); ++s) {
+      Belief& belief = record.beliefs[s];
+      if (belief.contested != 0 && belief.level > 0.0F) set_open(record, s, false);
+      belief.level = 0.0F;
+    }
     for (Belief& belief : record.wholes) belief.level = 0.0F;
     weigh(record);
     for (const int lag : kLags) {
@@ -133,25 +141,10 @@ class FreeSpaceEvidence {
     const Record& record = record_of(scan);
     judge_instances(scan, is_final, record);
     causes.resize(split.count);
-    const auto non_ground = causes.begin() + static_cast<std::ptrdiff_t>(split.ground_count);
-    std::fill(causes.begin(), non_ground, Cause::kGround);
-    std::fill(non_ground, causes.end(), Cause::kNotJudged);
     belief.resize(split.count);
-    std::fill(belief.begin() + static_cast<std::ptrdiff_t>(split.ground_count), belief.end(), 0.0F);
-    const PointsView points = split.non_ground();
-    for (const InstanceSamples::Streak& streak : record.samples.streaks) {
-      const Verdict& verdict = verdicts_[streak.supervoxel];
-      const std::size_t begin = split.ground_count + streak.begin;
-      const std::size_t end = split.ground_count + streak.end;
-      for (std::size_t i = begin; i < end; ++i) {
-        belief[i] = verdict.belief;
-        causes[i] = verdict.cause;
-      }
-      if (!is_dynamic(verdict.cause)) continue;
-      for (std::size_t i = streak.begin; i < streak.end; ++i) {
-        footprint_.add(points.x[i], points.y[i], points.z[i]);
-      }
-    }
+    std::fill_n(causes.begin(), split.ground_count, Cause::kGround);
+    spread(record.samples, split, causes.data() + split.ground_count,
+           belief.data() + split.ground_count);
     if (footprint_.empty()) return;
     footprint_.spread();
     judge_ground(scan, record, split, causes, belief);
@@ -193,9 +186,10 @@ class FreeSpaceEvidence {
     std::uint64_t segment = kNoSegment;
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
     InstanceSamples samples;
-    std::vector<Belief> beliefs;        // by supervoxel
-    std::vector<Belief> wholes;         // by instance, of all its samples together
-    std::vector<Share> shares;          // by instance
+    std::vector<Belief> beliefs;      // by supervoxel
+    std::vector<Belief> wholes;       // by instance, of all its samples together
+    std::vector<Share> shares;        // by instance
+    std::vector<std::uint64_t> open;  // by sample, a bit each: whether a hit may change its belief
     std::vector<std::uint8_t> changed;  // by instance: whether beliefs changed since it was weighed
     TrackedInstances tracked;
   };
@@ -227,26 +221,75 @@ class FreeSpaceEvidence {
                        sights_);
   }
 
-  // One reference for all samples of a scan: an update of every supervoxel's belief, and whether
-  // it saw through whole instances. `lag`: scans from the samples to the reference.
+  // One reference for all samples of a scan. `lag`: scans from the samples to the reference.
   void refer(Record& record, const View& reference, int lag) {
+    look(record.samples.points, record.samples.size(), record.T_world_sensor, reference);
+    update_supervoxels(record);
+    update_wholes(record, lag);
+  }
+
+  // What the reference saw may change supervoxels of which something was seen free, or was hit
+  // while they are open: few, once a scan has met some references.
+  void update_supervoxels(Record& record) {
+    constexpr std::size_t kBits = 64;
     const InstanceSamples& samples = record.samples;
-    look(samples.points, samples.size(), record.T_world_sensor, reference);
-    for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
-      const std::uint32_t first = samples.supervoxel_begin[instance];
-      const std::uint32_t last = samples.supervoxel_begin[instance + 1];
-      std::uint32_t begin = samples.sample_begin[first];
-      const detail::Sights::Count all = sights_.count(begin, samples.sample_begin[last]);
-      if (all.free + all.hit == 0) continue;
-      for (std::uint32_t s = first; s < last; ++s) {
-        const std::uint32_t end = samples.sample_begin[s + 1];
-        if (update(record.beliefs[s], sights_.count(begin, end), end - begin)) {
-          record.changed[instance] = 1;
-        }
-        begin = end;
+    std::size_t done = 0;  // samples
+    for (std::size_t begin = 0; begin < samples.size(); begin += kBits) {
+      const std::uint64_t open = record.open[begin / kBits];
+      std::uint64_t seen = sights_.free_word(begin) | (sights_.hit_word(begin) & open);
+      const std::size_t end = std::min(begin + kBits, samples.size());
+      if (end - begin < kBits) seen &= (std::uint64_t{1} << (end - begin)) - 1;
+      while (done < end) {
+        if (done > begin) seen &= ~std::uint64_t{0} << (done - begin);
+        if (seen == 0) break;
+        const std::size_t sample = begin + static_cast<std::size_t>(__builtin_ctzll(seen));
+        const std::uint32_t s = samples.supervoxel_of[sample];
+        update_supervoxel(record, s);
+        done = samples.sample_begin[s + 1];
       }
-      const auto count =
-          static_cast<float>(samples.sample_begin[last] - samples.sample_begin[first]);
+    }
+  }
+
+  void update_supervoxel(Record& record, std::uint32_t s) {
+    const InstanceSamples& samples = record.samples;
+    const std::uint32_t begin = samples.sample_begin[s];
+    const std::uint32_t end = samples.sample_begin[s + 1];
+    Belief& belief = record.beliefs[s];
+    const bool was_open = is_open(belief);
+    const bool was_free = is_free(belief);
+    const bool was_decided = was_free || belief.contested != 0;
+    const bool changed = update(belief, sights_.count(begin, end), end - begin);
+    if (is_open(belief) != was_open) set_open(record, s, !was_open);
+    if (!changed) return;
+    const std::uint32_t instance = samples.instance_of[s];
+    Share& share = record.shares[instance];
+    const bool free = is_free(belief);
+    const bool decided = free || belief.contested != 0;
+    share.moved += (free ? end - begin : 0) - (was_free ? end - begin : 0);
+    share.decided += (decided ? end - begin : 0) - (was_decided ? end - begin : 0);
+    record.changed[instance] = 1;
+  }
+
+  // Whether hits may change it: what was hit before and is not seen free stays as it is.
+  static bool is_open(const Belief& belief) { return belief.contested == 0 || belief.level > 0.0F; }
+  static void set_open(Record& record, std::uint32_t s, bool open) {
+    const std::uint32_t end = record.samples.sample_begin[s + 1];
+    for (std::uint32_t sample = record.samples.sample_begin[s]; sample < end; ++sample) {
+      const std::uint64_t bit = std::uint64_t{1} << sample % 64;
+      record.open[sample / 64] =
+          open ? record.open[sample / 64] | bit : record.open[sample / 64] & ~bit;
+    }
+  }
+
+  // Whether the reference saw through whole instances.
+  void update_wholes(Record& record, int lag) {
+    const InstanceSamples& samples = record.samples;
+    std::uint32_t end = 0;
+    for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
+      const std::uint32_t begin = end;
+      end += samples.count(instance);
+      const detail::Sights::Count all = sights_.count(begin, end);
+      const auto count = static_cast<float>(end - begin);
       const auto seen = static_cast<float>(all.free + all.hit);
       if (seen < std::max(2.0F, kLeastView * count)) continue;
       const float share = static_cast<float>(all.free) / seen;
@@ -266,12 +309,10 @@ class FreeSpaceEvidence {
     }
   }
 
-  // Eq. 15 with three-way increments as in Eq. 18, by the share of samples seen free; shares that
-  // say little, or are of few samples, change nothing. Returns whether what weigh() looks at
-  // changed.
+  // For something that was seen. Eq. 15 with three-way increments as in Eq. 18, by the share of
+  // samples seen free; shares that say little, or are of few samples, change nothing. Returns
+  // whether what weigh() looks at changed.
   bool update(Belief& belief, detail::Sights::Count seen, std::uint32_t samples) const {
-    // The usual case: what was hit before and is not seen free stays as it is.
-    if (seen.free == 0 && belief.level == 0.0F && belief.contested != 0) return false;
     const bool hits =
         seen.hit >= std::max(std::min(2U, samples), (samples + kLeastHit - 1) / kLeastHit);
     const auto free = static_cast<float>(seen.free);
@@ -302,24 +343,11 @@ class FreeSpaceEvidence {
 
   // What its own evidence says of each instance.
   void weigh(Record& record) const {
-    const InstanceSamples& samples = record.samples;
-    for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
+    if (!config_.use_tracks) return;
+    for (std::size_t instance = 0; instance < record.changed.size(); ++instance) {
       if (record.changed[instance] == 0) continue;
       record.changed[instance] = 0;
-      Share share;
-      const std::uint32_t last = samples.supervoxel_begin[instance + 1];
-      for (std::uint32_t s = samples.supervoxel_begin[instance]; s < last; ++s) {
-        const Belief& belief = record.beliefs[s];
-        const std::uint32_t count = samples.sample_begin[s + 1] - samples.sample_begin[s];
-        const bool free = is_free(belief);
-        share.total += count;
-        if (free) share.moved += count;
-        if (free || belief.contested != 0) share.decided += count;
-      }
-      record.shares[instance] = share;
-      if (config_.use_tracks) {
-        record.tracked.instances[instance].own = own_belief(record, instance);
-      }
+      record.tracked.instances[instance].own = own_belief(record, instance);
     }
   }
 
@@ -455,7 +483,38 @@ class FreeSpaceEvidence {
            static_cast<float>(share.decided) <= kUnknown * static_cast<float>(share.total);
   }
 
-  static float as_probability(float level) { return 1.0F / (1.0F + std::exp(-level)); }
+  // From supervoxels to points.
+  void spread(const InstanceSamples& samples, const GroundSplit& split, Cause* causes,
+              float* belief) {
+    by_met_.assign(1, {Cause::kNotJudged, 0.0F});
+    by_met_.resize(samples.met.size());
+    for (std::size_t i = 1; i < by_met_.size(); ++i) by_met_[i] = verdicts_[samples.met[i]];
+    const PointsView points = split.non_ground();
+    const Verdict* const verdicts = by_met_.data();
+    const std::uint32_t* const met_of = samples.met_of.data();
+    const auto spread_to = [&](std::size_t begin, std::size_t end) {
+      bool any = false;
+      for (std::size_t i = begin; i < end; ++i) {
+        const Verdict& verdict = verdicts[met_of[i]];
+        causes[i] = verdict.cause;
+        belief[i] = verdict.belief;
+        any |= is_dynamic(verdict.cause);
+      }
+      for (std::size_t i = begin; any && i < end; ++i) {
+        if (is_dynamic(causes[i])) footprint_.add(points.x[i], points.y[i], points.z[i]);
+      }
+    };
+    std::size_t begin = 0;
+    for (; begin + detail::kLanes <= points.size(); begin += detail::kLanes) {
+      spread_to(begin, begin + detail::kLanes);
+    }
+    spread_to(begin, points.size());
+  }
+
+  // Most supervoxels were never seen free: they need no exponential.
+  static float as_probability(float level) {
+    return level == 0.0F ? 0.5F : 1.0F / (1.0F + std::exp(-level));
+  }
 
   // Ground beside removed points: what stands within their footprint goes with them, and what two
   // references saw free was no ground.
@@ -466,49 +525,50 @@ class FreeSpaceEvidence {
       causes[point] = cause;
       belief[point] = static_cast<float>(config_.tau_free);
     };
-    footprint_.find(ground, near_ground_);
-    std::size_t tested = 0;
-    for (const std::uint32_t point : near_ground_) {
-      const float lowest = footprint_.lowest(ground.x[point], ground.y[point]);
+    const bool tests = config_.ground_reach > 0.0;
+    detail::grow(near_ground_, ground.size());
+    tested_points_.grow(ground.size());
+    tested_ = 0;
+    footprint_.visit_near(ground, [&](std::size_t point, float lowest) {
       if (config_.footprint > 0.0 && lowest < ground.z[point] + kClearance) {
         remove(point, Cause::kUnderInstance);
-      } else {
-        near_ground_[tested++] = point;
+      } else if (tests) {
+        near_ground_[tested_] = static_cast<std::uint32_t>(point);
+        tested_points_.x[tested_] = ground.x[point];
+        tested_points_.y[tested_] = ground.y[point];
+        tested_points_.z[tested_] = ground.z[point];
+        ++tested_;
       }
-    }
-    near_ground_.resize(tested);
-    if (config_.ground_reach > 0.0) test_ground(scan, record, ground, remove);
+    });
+    if (tests) test_ground(scan, record, remove);
   }
 
-  // Ground that enough of all references saw free; `near_ground_` are the points to be tested.
+  // Ground that enough of all references saw free, of the first `tested_` of `tested_points_`.
   template <class Remove>
-  void test_ground(std::uint64_t scan, const Record& record, PointsView ground, Remove&& remove) {
-    tested_points_.resize(near_ground_.size());
-    for (std::size_t i = 0; i < near_ground_.size(); ++i) {
-      tested_points_.x[i] = ground.x[near_ground_[i]];
-      tested_points_.y[i] = ground.y[near_ground_[i]];
-      tested_points_.z[i] = ground.z[near_ground_[i]];
-    }
-    one_instance_.assign(near_ground_.size(), 0);
-    ground_sampler_.sample(tested_points_, one_instance_, 1, ground_samples_);
+  void test_ground(std::uint64_t scan, const Record& record, Remove&& remove) {
+    detail::grow(one_instance_, tested_);
+    ground_sampler_.sample(PointsView(tested_points_).subview(0, tested_),
+                           Span<const std::uint32_t>(one_instance_).subspan(0, tested_), 1,
+                           ground_samples_);
     const std::size_t count = ground_samples_.size();
-    ground_free_.assign(count, 0);
-    ground_hit_.assign(count, 0);
+    ground_free_.assign((count + 7) / 8 * 8, 0);
+    ground_hit_.assign((count + 7) / 8 * 8, 0);
     for (const int lag : kLags) {
       if (count == 0) break;
       const auto distance = static_cast<std::uint64_t>(lag);
       if (lag <= config_.memory && distance <= scan) count_ground(record, scan - distance);
       if (lag <= config_.horizon) count_ground(record, scan + distance);
     }
-    for (const InstanceSamples::Streak& streak : ground_samples_.streaks) {
-      const std::uint32_t sample = ground_samples_.sample_begin[streak.supervoxel];
-      const std::uint32_t free = ground_free_[sample];
+    for (std::size_t i = 0; i < tested_; ++i) {
+      const std::uint32_t met = ground_samples_.met_of[i];
+      if (met == 0) continue;
+      const std::uint32_t sample = ground_samples_.sample_begin[ground_samples_.met[met]];
+      const std::uint8_t free = ground_free_[sample];
       if (free < kGroundFree ||
           static_cast<float>(free) < kGroundShare * static_cast<float>(ground_hit_[sample])) {
         continue;
       }
-      for (std::size_t i = streak.begin; i < streak.end; ++i)
-        remove(near_ground_[i], Cause::kFreeSpace);
+      remove(near_ground_[i], Cause::kFreeSpace);
     }
   }
 
@@ -517,10 +577,7 @@ class FreeSpaceEvidence {
     const View& view = views_[reference % views_.size()];
     if (view.segment != record.segment) return;
     look(ground_samples_.points, ground_samples_.size(), record.T_world_sensor, view);
-    for (std::size_t i = 0; i < ground_samples_.size(); ++i) {
-      ground_free_[i] += sights_.is_free(i) ? 1 : 0;
-      ground_hit_[i] += sights_.is_hit(i) ? 1 : 0;
-    }
+    sights_.add_to(ground_samples_.size(), ground_free_.data(), ground_hit_.data());
   }
 
   static constexpr float kLeastView = 0.1F;   // share of an instance that a reference must see
@@ -561,15 +618,17 @@ class FreeSpaceEvidence {
   std::vector<Record> records_;
   RangeImage::Scratch image_scratch_;
   detail::Sights sights_;
-  std::vector<Verdict> verdicts_;
+  std::vector<Verdict> verdicts_;  // by supervoxel
+  std::vector<Verdict> by_met_;    // by position in InstanceSamples::met
   std::vector<std::uint32_t> free_;
   std::vector<std::uint32_t> predecessors_;
   InstanceSamples ground_samples_;
-  std::vector<std::uint32_t> near_ground_;  // numbers of ground points
-  PointBuffer tested_points_;
-  std::vector<std::uint32_t> one_instance_;
-  std::vector<std::uint32_t> ground_free_;  // by sample, references that saw it so
-  std::vector<std::uint32_t> ground_hit_;
+  std::vector<std::uint32_t> near_ground_;  // numbers of ground points that are tested
+  PointBuffer tested_points_;               // of these
+  std::size_t tested_ = 0;
+  std::vector<std::uint32_t> one_instance_;  // zeros
+  std::vector<std::uint8_t> ground_free_;    // by sample, references that saw it so
+  std::vector<std::uint8_t> ground_hit_;
 };
 
 }  // namespace dynains

@@ -58,31 +58,26 @@ class GroundFootprint {
     }
   }
 
-  /// Height of the lowest point that was removed about here, or infinity.
-  float lowest(float x, float y) const {
-    const Place place = fine_.place(x, y);
-    if (!place.inside) return kNothing;
-    return tiles_[tile_of_[tile(place.column, place.row)]][within(place.column, place.row)].lowest;
-  }
-
-  /// Numbers of all points that are near a removed point, and of some at the border of the grid,
-  /// into `found`; in order.
-  void find(PointsView points, std::vector<std::uint32_t>& found) const {
-    using namespace detail;
-    if (found.size() < points.size() + kLanes) found.resize(points.size() + kLanes);
-    std::size_t count = 0;
-    for_lanes(points.size(), [&](auto at) {
-      std::int32_t cell[kLanes];
-      coarse_.indices(at.load(points.x.data()), at.load(points.y.data())).store(cell);
-      unsigned any = 0;
-      for (const std::int32_t index : cell) any |= near_at(index);
-      if (any == 0) return;
-      for (std::size_t lane = 0; lane < at.size(); ++lane) {
-        found[count] = static_cast<std::uint32_t>(at.begin + lane);
-        count += near_at(cell[lane]);
+  /// Calls `visit(i, lowest)` for all points that are near a removed point, and for some at the
+  /// border of the grid, in order; `lowest` is the height of the lowest point that was removed
+  /// about there, or infinity.
+  template <class Visitor>
+  void visit_near(PointsView points, Visitor&& visit) const {
+    std::int32_t column[kBlock];
+    std::int32_t row[kBlock];
+    for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
+      const PointsView block = points.subview(begin, std::min(kBlock, points.size() - begin));
+      std::uint64_t near = find_near(block);
+      if (near == 0) continue;
+      detail::for_lanes(block.size(), [&](auto at) {
+        fine_.line(at.load(block.x.data())).store(&column[at.begin]);
+        fine_.line(at.load(block.y.data())).store(&row[at.begin]);
+      });
+      for (; near != 0; near &= near - 1) {
+        const auto i = static_cast<std::size_t>(__builtin_ctzll(near));
+        visit(begin + i, lowest(column[i], row[i]));
       }
-    });
-    found.resize(count);
+    }
   }
 
   bool empty() const { return touched_.empty(); }
@@ -98,6 +93,7 @@ class GroundFootprint {
  private:
   static constexpr float kNothing = std::numeric_limits<float>::infinity();
   static constexpr std::uint32_t kTile = 8;  // cells along a side
+  static constexpr std::size_t kBlock = 64;  // points that are looked at together, a bit each
 
   struct Place {
     std::uint32_t column, row;
@@ -132,19 +128,21 @@ class GroundFootprint {
       if (!(column >= 1.0F && column < last && row >= 1.0F && row < last)) return {0, 0, false};
       return {static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row), true};
     }
-    /// Row-major; what lies outside falls into the border.
+    /// Rows or columns of eight points; what lies outside falls into the border.
     template <class Float>
-    auto indices(const Float& x, const Float& y) const {
+    auto line(const Float& coordinate) const {
       static constexpr detail::Constant8 kZero(0.0F);
       const Float centre(detail::Constant8(static_cast<float>(half_)));
       const Float last(detail::Constant8(static_cast<float>(width() - 1)));
       const Float per_metre = detail::Constant8(per_metre_);
-      const auto line = [&](const Float& coordinate) {
-        return to_float(truncate(min(max(coordinate * per_metre + centre, Float(kZero)), last)));
-      };
+      return truncate(min(max(coordinate * per_metre + centre, Float(kZero)), last));
+    }
+    /// Row-major.
+    template <class Float>
+    auto indices(const Float& x, const Float& y) const {
       // Exact in floats: coarse grids have fewer than 2^24 cells.
       const Float cells(detail::Constant8(static_cast<float>(width())));
-      return truncate(line(y) * cells + line(x));
+      return truncate(to_float(line(y)) * cells + to_float(line(x)));
     }
     /// Of a row or column, in cells from the sensor.
     float centre(std::uint32_t index) const {
@@ -165,6 +163,27 @@ class GroundFootprint {
     }
   }
 
+  // Which points of a block are near.
+  std::uint64_t find_near(PointsView block) const {
+    std::int32_t cell[kBlock];
+    detail::for_lanes(block.size(), [&](auto at) {
+      coarse_.indices(at.load(block.x.data()), at.load(block.y.data())).store(&cell[at.begin]);
+    });
+    std::uint64_t near = 0;
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      near |= std::uint64_t{near_[static_cast<std::size_t>(cell[i])]} << i;
+    }
+    return near;
+  }
+
+  float lowest(std::int32_t column, std::int32_t row) const {
+    const auto last = static_cast<std::int32_t>(fine_.width()) - 1;
+    if (column < 1 || row < 1 || column >= last || row >= last) return kNothing;
+    const auto c = static_cast<std::uint32_t>(column);
+    const auto r = static_cast<std::uint32_t>(row);
+    return tiles_[tile_of_[tile(c, r)]][within(c, r)].lowest;
+  }
+
   std::size_t tile(std::uint32_t column, std::uint32_t row) const {
     return row / kTile * (fine_.width() / kTile + 1) + column / kTile;
   }
@@ -181,7 +200,6 @@ class GroundFootprint {
     }
     return tiles_[number][within(column, row)];
   }
-  unsigned near_at(std::int32_t cell) const { return near_[static_cast<std::size_t>(cell)]; }
 
   float cell_;
   Grid fine_;

@@ -43,16 +43,14 @@ inline SupervoxelPlace neighbour(SupervoxelPlace place, int dx, int dy, int dz) 
 /// The samples of one scan in its sensor frame: instance-major, then supervoxel-major, so that
 /// what belongs together is one range.
 struct InstanceSamples {
-  /// Consecutive points of the scan in one supervoxel.
-  struct Streak {
-    std::uint32_t begin, end;
-    std::uint32_t supervoxel;
-  };
   PointBuffer points;                           ///< padded for wide loads
   std::vector<std::uint32_t> sample_begin;      ///< by supervoxel, one more than supervoxels
   std::vector<SupervoxelPlace> place;           ///< by supervoxel
   std::vector<std::uint32_t> supervoxel_begin;  ///< by instance, one more than instances
-  std::vector<Streak> streaks;                  ///< all points of the scan that have a supervoxel
+  std::vector<std::uint32_t> supervoxel_of;     ///< by sample
+  std::vector<std::uint32_t> instance_of;       ///< by supervoxel
+  std::vector<std::uint32_t> met_of;  ///< by point of the scan: its supervoxel's position in `met`
+  std::vector<std::uint32_t> met;     ///< supervoxels as the scan meets them, behind one for none
 
   std::size_t size() const { return sample_begin.empty() ? 0 : sample_begin.back(); }
   std::size_t supervoxel_count() const {
@@ -60,6 +58,10 @@ struct InstanceSamples {
   }
   std::size_t instance_count() const {
     return supervoxel_begin.empty() ? 0 : supervoxel_begin.size() - 1;
+  }
+  /// Samples of an instance.
+  std::uint32_t count(std::size_t instance) const {
+    return sample_begin[supervoxel_begin[instance + 1]] - sample_begin[supervoxel_begin[instance]];
   }
 };
 
@@ -78,8 +80,16 @@ class InstanceSampler {
   /// kNoCluster. Points beyond the range and without instance get no sample.
   void sample(PointsView points, Span<const std::uint32_t> instance_of, std::size_t instance_count,
               InstanceSamples& out) {
-    find_samples(points, instance_of, out);
-    most_streaks_ = std::max(most_streaks_, out.streaks.size());
+    begin_scan();
+    detail::make_room(out.met_of, points.size());
+    out.met_of.resize(points.size());
+    for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
+      const std::size_t size = std::min(kBlock, points.size() - begin);
+      find_voxels(points.subview(begin, size), instance_of.data() + begin);
+      find_runs(begin, size);
+      for (std::size_t run = 1; run <= runs_; ++run) met_of_run_[run] = take_run(run_[run]);
+      spread_runs(size, out.met_of.data() + begin);
+    }
     order(points, instance_count, out);
   }
 
@@ -88,17 +98,20 @@ class InstanceSampler {
     SupervoxelPlace place;
     std::uint32_t instance;
   };
-  // Consecutive points in one voxel.
+  // Consecutive points in one voxel, or without instance.
   struct Run {
     Voxel voxel;
-    std::uint32_t begin, end;
+    std::uint32_t begin;
+    std::uint32_t slot;
   };
   struct Sample {
-    std::uint32_t supervoxel;
+    std::uint32_t met;  // its supervoxel, as InstanceSamples::met_of counts them
     std::uint32_t point;
   };
+  // Number 0 stands for none.
   struct Supervoxel {
-    Voxel voxel;
+    SupervoxelPlace place;
+    std::uint32_t instance;
     std::uint32_t samples;
   };
   // Direct-mapped memory of the voxels met last, with their supervoxels. A voxel that was pushed
@@ -106,113 +119,114 @@ class InstanceSampler {
   struct Recent {
     SupervoxelPlace place = 0;
     std::uint32_t instance = kNoCluster;
-    std::uint32_t supervoxel = 0;
+    std::uint32_t met = 0;
 
     bool is(const Voxel& voxel) const { return place == voxel.place && instance == voxel.instance; }
   };
-  static constexpr std::size_t kRecent = 1U << 14;
-  // Runs are looked up in groups, so that the memory has time to answer.
-  static constexpr std::size_t kRuns = 64;
+  static constexpr std::size_t kSlots = 1U << 14;
+  // Points are looked up in blocks, so that the memory has time to answer; one bit of a word each.
+  static constexpr std::size_t kBlock = 64;
 
-  static std::size_t hash(const Voxel& voxel) {
-    return detail::place_hash(voxel.place, voxel.instance) % kRecent;
+  static std::uint32_t slot_of(const Voxel& voxel) {
+    return static_cast<std::uint32_t>(detail::place_hash(voxel.place, voxel.instance) % kSlots);
   }
 
-  // Beams that follow each other mostly end in the same voxel: eight points at a time are compared
-  // with those before them, and only where the voxel changes does a run begin.
-  void find_samples(PointsView points, Span<const std::uint32_t> instance_of,
-                    InstanceSamples& out) {
-    using namespace detail;
-    recent_samples_.assign(kRecent, Recent());
-    recent_supervoxels_.assign(kRecent, Recent());
+  void begin_scan() {
+    recent_.assign(kSlots, Recent());
+    supervoxel_slots_.assign(kSlots, 0);
     samples_.clear();
-    supervoxels_.clear();
-    out.streaks.clear();
-    out.streaks.reserve(most_streaks_);
+    supervoxels_.assign(1, {0, kNoCluster, 0});
+    instance_[0] = static_cast<std::int32_t>(kNoCluster);
+    met_of_run_[0] = 0;
+    runs_ = 0;
+  }
+
+  // Voxels of a block, behind that of the last point before it. Points that are not to be sampled
+  // have no instance.
+  void find_voxels(PointsView points, const std::uint32_t* instance_of) {
+    using namespace detail;
     const Constant8 per_metre(samples_per_metre_);
     const Constant8 far_squared(max_range_ * max_range_);
-    // Each with the last one of the eight before in front.
-    std::int32_t x[kLanes + 1] = {};
-    std::int32_t y[kLanes + 1] = {};
-    std::int32_t z[kLanes + 1] = {};
-    std::int32_t instance[kLanes + 1] = {};
-    unsigned is_open = 0;  // whether the point before belongs to the last run
-    runs_ = 0;
     for_lanes(points.size(), [&](auto at) {
       using Float = typename decltype(at)::Float;
       using Int = typename decltype(at)::Int;
-      const std::size_t first = at.begin;
-      std::memcpy(&instance[1], &instance_of[first], at.size() * sizeof(std::int32_t));
+      std::int32_t* const instance = &instance_[at.begin + 1];
+      std::memcpy(instance, &instance_of[at.begin], at.size() * sizeof(std::int32_t));
       const Float px = at.load(points.x.data());
       const Float py = at.load(points.y.data());
-      const Int instances = Int::load(&instance[1]);
-      const Int vx = floor(px * per_metre);
-      const Int vy = floor(py * per_metre);
-      const Int vz = floor(at.load(points.z.data()) * per_metre);
-      vx.store(&x[1]);
-      vy.store(&y[1]);
-      vz.store(&z[1]);
+      const Float pz = at.load(points.z.data());
+      floor(px * per_metre).store(&x_[at.begin + 1]);
+      floor(py * per_metre).store(&y_[at.begin + 1]);
+      floor(pz * per_metre).store(&z_[at.begin + 1]);
       const Int none(static_cast<std::int32_t>(kNoCluster));
-      const unsigned taken = ((px * px + py * py <= far_squared) & ~(instances == none)).bits() &
-                             ((1U << at.size()) - 1);
-      const unsigned same = ((vx == Int::load(x)) & (vy == Int::load(y)) & (vz == Int::load(z)) &
-                             (instances == Int::load(instance)))
-                                .bits();
-      // Lanes whose point lies in the voxel of the point before, and lanes where that ends.
-      const unsigned follows = taken & same & (taken << 1U | is_open);
-      const unsigned ends = ~follows | 1U << kLanes;
-      if ((follows & 1U) != 0) run_[runs_ - 1].end += count_zeros(ends);
-      for (unsigned begins = taken & ends; begins != 0; begins &= begins - 1) {
-        const std::uint32_t lane = count_zeros(begins);
-        const auto begin = static_cast<std::uint32_t>(first) + lane;
-        Run& run = run_[runs_++];
-        run.voxel = {pack_place(x[lane + 1], y[lane + 1], z[lane + 1]),
-                     static_cast<std::uint32_t>(instance[lane + 1])};
-        run.begin = begin;
-        run.end = begin + 1 + count_zeros(ends >> (lane + 1));
-        __builtin_prefetch(&recent_samples_[hash(run.voxel)]);
-      }
-      if (runs_ > kRuns - kLanes) take_runs(1, out);
-      is_open = taken >> (kLanes - 1);
-      x[0] = x[kLanes];
-      y[0] = y[kLanes];
-      z[0] = z[kLanes];
-      instance[0] = instance[kLanes];
+      select(px * px + py * py <= far_squared, Int::load(instance), none).store(instance);
     });
-    take_runs(0, out);
   }
 
-  static std::uint32_t count_zeros(unsigned bits) {
-    return static_cast<std::uint32_t>(__builtin_ctz(bits));
-  }
-
-  // Streaks and samples from all runs but the last `left`, which may grow.
-  void take_runs(std::size_t left, InstanceSamples& out) {
-    for (std::size_t i = 0; i + left < runs_; ++i) {
-      const Run& run = run_[i];
-      const std::uint32_t supervoxel = find_voxel(run.voxel, run.begin);
-      if (!out.streaks.empty() && out.streaks.back().end == run.begin &&
-          out.streaks.back().supervoxel == supervoxel) {
-        out.streaks.back().end = run.end;
-      } else {
-        out.streaks.push_back({run.begin, run.end, supervoxel});
+  // Beams that follow each other mostly end in the same voxel: only where the voxel changes does a
+  // run begin. The last run of the block before goes on as number 0.
+  void find_runs(std::size_t first, std::size_t size) {
+    using namespace detail;
+    std::uint64_t begins = 0;
+    run_lanes([&](auto lanes) {
+      using Int = typename decltype(lanes)::Int;
+      for (std::size_t i = 0; i < kBlock; i += kLanes) {
+        const auto same = [i](const std::int32_t* values) {
+          return Int::load(&values[i]) == Int::load(&values[i + 1]);
+        };
+        const auto follows =
+            same(x_.data()) & same(y_.data()) & same(z_.data()) & same(instance_.data());
+        begins |= std::uint64_t{~follows.bits() & 0xFFU} << i;
       }
+    });
+    if (size < kBlock) begins &= (std::uint64_t{1} << size) - 1;
+    begins_ = begins;
+    met_of_run_[0] = met_of_run_[runs_];
+    runs_ = 0;
+    for (std::uint64_t left = begins; left != 0; left &= left - 1) {
+      const auto i = static_cast<std::size_t>(__builtin_ctzll(left));
+      Run& run = run_[++runs_];
+      run.voxel = {pack_place(x_[i + 1], y_[i + 1], z_[i + 1]),
+                   static_cast<std::uint32_t>(instance_[i + 1])};
+      run.begin = static_cast<std::uint32_t>(first + i);
+      run.slot = slot_of(run.voxel);
+      __builtin_prefetch(&recent_[run.slot]);
     }
-    if (left < runs_)
-      std::copy_n(run_.begin() + static_cast<std::ptrdiff_t>(runs_ - left), left, run_.begin());
-    runs_ = std::min(runs_, left);
+    for (auto* const values : {&x_, &y_, &z_, &instance_}) (*values)[0] = (*values)[kBlock];
   }
 
-  // Supervoxel of the voxel in which a point lies.
-  std::uint32_t find_voxel(const Voxel& voxel, std::uint32_t point) {
-    Recent& recent = recent_samples_[hash(voxel)];
-    if (!recent.is(voxel)) {
-      recent = {voxel.place, voxel.instance,
-                find_supervoxel({supervoxel_place(voxel.place), voxel.instance})};
-      ++supervoxels_[recent.supervoxel].samples;
-      samples_.push_back({recent.supervoxel, point});
+  // What `met_of` says of the points of a run; takes a sample if its voxel has none.
+  std::uint32_t take_run(const Run& run) {
+    if (run.voxel.instance == kNoCluster) return 0;
+    Recent& recent = recent_[run.slot];
+    if (!recent.is(run.voxel)) {
+      const std::uint32_t met =
+          find_supervoxel({supervoxel_place(run.voxel.place), run.voxel.instance});
+      recent = {run.voxel.place, run.voxel.instance, met};
+      ++supervoxels_[met].samples;
+      samples_.push_back({met, run.begin});
     }
-    return recent.supervoxel;
+    return recent.met;
+  }
+
+  std::uint32_t find_supervoxel(const Voxel& voxel) {
+    std::uint32_t& number = supervoxel_slots_[slot_of(voxel)];
+    const Supervoxel& known = supervoxels_[number];
+    if (known.place != voxel.place || known.instance != voxel.instance) {
+      number = static_cast<std::uint32_t>(supervoxels_.size());
+      supervoxels_.push_back({voxel.place, voxel.instance, 0});
+    }
+    return number;
+  }
+
+  void spread_runs(std::size_t size, std::uint32_t* met_of) const {
+    std::uint64_t begins = begins_;
+    std::size_t run = 0;
+    for (std::size_t i = 0; i < size; ++i) {
+      run += begins & 1U;
+      begins >>= 1U;
+      met_of[i] = met_of_run_[run];
+    }
   }
 
   SupervoxelPlace supervoxel_place(SupervoxelPlace sample) const {
@@ -228,41 +242,41 @@ class InstanceSampler {
     return whole - (static_cast<float>(whole) > quotient ? 1 : 0);
   }
 
-  std::uint32_t find_supervoxel(const Voxel& voxel) {
-    Recent& recent = recent_supervoxels_[hash(voxel)];
-    if (!recent.is(voxel)) {
-      recent = {voxel.place, voxel.instance, static_cast<std::uint32_t>(supervoxels_.size())};
-      supervoxels_.push_back({voxel, 0});
-    }
-    return recent.supervoxel;
-  }
-
   // Two counting sorts: supervoxels by instance, samples by supervoxel.
   void order(PointsView points, std::size_t instance_count, InstanceSamples& out) {
+    const std::size_t supervoxel_count = supervoxels_.size() - 1;
+    const std::size_t sample_count = samples_.size();
     out.supervoxel_begin.assign(instance_count + 1, 0);
-    for (const Supervoxel& s : supervoxels_) ++out.supervoxel_begin[s.voxel.instance + 1];
+    for (std::size_t met = 1; met <= supervoxel_count; ++met) {
+      ++out.supervoxel_begin[supervoxels_[met].instance + 1];
+    }
     for (std::size_t i = 1; i <= instance_count; ++i) {
       out.supervoxel_begin[i] += out.supervoxel_begin[i - 1];
     }
     next_.assign(out.supervoxel_begin.begin(), out.supervoxel_begin.end());
-    place_.resize(supervoxels_.size());
-    out.place.resize(supervoxels_.size());
-    out.sample_begin.assign(supervoxels_.size() + 1, 0);
-    for (std::size_t s = 0; s < supervoxels_.size(); ++s) {
-      place_[s] = next_[supervoxels_[s].voxel.instance]++;
-      out.sample_begin[place_[s] + 1] = supervoxels_[s].samples;
-      out.place[place_[s]] = supervoxels_[s].voxel.place;
+    out.met.resize(supervoxel_count + 1);
+    out.met[0] = kNoCluster;
+    out.place.resize(supervoxel_count);
+    out.instance_of.resize(supervoxel_count);
+    out.sample_begin.assign(supervoxel_count + 1, 0);
+    for (std::size_t met = 1; met <= supervoxel_count; ++met) {
+      const Supervoxel& supervoxel = supervoxels_[met];
+      const std::uint32_t to = next_[supervoxel.instance]++;
+      out.met[met] = to;
+      out.sample_begin[to + 1] = supervoxel.samples;
+      out.place[to] = supervoxel.place;
+      out.instance_of[to] = supervoxel.instance;
     }
-    for (std::size_t s = 1; s <= supervoxels_.size(); ++s) {
+    for (std::size_t s = 1; s <= supervoxel_count; ++s) {
       out.sample_begin[s] += out.sample_begin[s - 1];
     }
-    for (InstanceSamples::Streak& streak : out.streaks) {
-      streak.supervoxel = place_[streak.supervoxel];
-    }
-    out.points.grow(samples_.size() + detail::kLanes);
+    out.points.grow(sample_count + detail::kLanes);
+    out.supervoxel_of.resize(sample_count);
     next_.assign(out.sample_begin.begin(), out.sample_begin.end());
     for (const Sample& sample : samples_) {
-      const std::uint32_t to = next_[place_[sample.supervoxel]]++;
+      const std::uint32_t supervoxel = out.met[sample.met];
+      const std::uint32_t to = next_[supervoxel]++;
+      out.supervoxel_of[to] = supervoxel;
       out.points.x[to] = points.x[sample.point];
       out.points.y[to] = points.y[sample.point];
       out.points.z[to] = points.z[sample.point];
@@ -272,14 +286,17 @@ class InstanceSampler {
   float samples_per_metre_;
   float supervoxels_per_voxel_;
   float max_range_;
-  std::size_t most_streaks_ = 0;
-  std::array<Run, kRuns> run_;
+  // By point of a block, behind the last one before it.
+  std::array<std::int32_t, kBlock + 1> x_ = {}, y_ = {}, z_ = {}, instance_ = {};
+  std::uint64_t begins_ = 0;  // points of the block with which a run begins
+  // From 1 on; 0 is the last run of the block before.
+  std::array<Run, kBlock + 1> run_;
+  std::array<std::uint32_t, kBlock + 1> met_of_run_ = {};
   std::size_t runs_ = 0;
-  std::vector<Recent> recent_samples_;
-  std::vector<Recent> recent_supervoxels_;
+  std::vector<Recent> recent_;
+  std::vector<std::uint32_t> supervoxel_slots_;  // into supervoxels_
   std::vector<Sample> samples_;
   std::vector<Supervoxel> supervoxels_;
-  std::vector<std::uint32_t> place_;
   std::vector<std::uint32_t> next_;
 };
 

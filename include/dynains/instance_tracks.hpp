@@ -66,8 +66,7 @@ class InstanceLinker {
     out.instances.assign(samples.instance_count(), TrackedInstances::Instance());
     out.cells.clear();
     find_cells(samples, T_world_sensor, origin);
-    table_.resize(kTable);
-    ++generation_;
+    table_.assign(kTable, kEmpty);
     for (std::uint32_t i = 0; i < samples.instance_count(); ++i) {
       TrackedInstances::Instance& instance = out.instances[i];
       const std::uint32_t begin = samples.sample_begin[samples.supervoxel_begin[i]];
@@ -76,14 +75,15 @@ class InstanceLinker {
       measure_extent(samples.points, begin, end, instance);
       if (!instance.carried) continue;
       for (std::uint32_t p = begin; p < end; ++p) {
+        if (p > begin && place_[p] == place_[p - 1]) continue;
         const TrackedInstances::Cell cell = {place_[p], i};
-        Slot& slot = slot_of(cell);
+        std::uint32_t& slot = slot_of(cell);
         // Two cells that share a place in the table are counted twice: rare, and harmless.
-        if (slot.generation == generation_ && slot.cell.place == cell.place &&
-            slot.cell.instance == i) {
+        if (slot != kEmpty && out.cells[slot].place == cell.place &&
+            out.cells[slot].instance == i) {
           continue;
         }
-        slot = {cell, generation_};
+        slot = static_cast<std::uint32_t>(out.cells.size());
         out.cells.push_back(cell);
         ++instance.cells;
       }
@@ -93,19 +93,17 @@ class InstanceLinker {
   /// Links the instances of two consecutive scans: each to the one of the other scan with which it
   /// shares most.
   void link(TrackedInstances& before, TrackedInstances& now) {
-    table_.resize(kTable);
-    ++generation_;
-    for (const TrackedInstances::Cell& cell : before.cells) {
-      slot_of(cell) = {cell, generation_};
-    }
+    table_.assign(kTable, kEmpty);
+    for (std::uint32_t i = 0; i < before.cells.size(); ++i) slot_of(before.cells[i]) = i;
     shared_.assign(before.instances.size(), 0);
     std::size_t at = 0;
     for (std::uint32_t i = 0; i < now.instances.size(); ++i) {
       touched_.clear();
       for (; at < now.cells.size() && now.cells[at].instance == i; ++at) {
-        const Slot& slot = slot_of(now.cells[at]);
-        if (slot.generation != generation_ || slot.cell.place != now.cells[at].place) continue;
-        if (shared_[slot.cell.instance]++ == 0) touched_.push_back(slot.cell.instance);
+        const std::uint32_t slot = slot_of(now.cells[at]);
+        if (slot == kEmpty || before.cells[slot].place != now.cells[at].place) continue;
+        const std::uint32_t other = before.cells[slot].instance;
+        if (shared_[other]++ == 0) touched_.push_back(other);
       }
       for (const std::uint32_t other : touched_) {
         connect(before.instances[other], other, now.instances[i], i,
@@ -116,15 +114,12 @@ class InstanceLinker {
   }
 
  private:
-  struct Slot {
-    TrackedInstances::Cell cell;
-    std::uint32_t generation;
-  };
   static constexpr std::size_t kTable = 1U << 14;
+  static constexpr std::uint32_t kEmpty = 0xFFFFFFFFU;
   static constexpr std::uint32_t kLeastSamples = 2;  // what is smaller overlaps by chance
 
   // Without the instance: cells of two scans meet in the same place.
-  Slot& slot_of(const TrackedInstances::Cell& cell) {
+  std::uint32_t& slot_of(const TrackedInstances::Cell& cell) {
     return table_[detail::place_hash(cell.place) % kTable];
   }
 
@@ -187,8 +182,7 @@ class InstanceLinker {
   float max_length_;
   float max_height_;
   float overlap_;
-  std::uint32_t generation_ = 0;
-  std::vector<Slot> table_;
+  std::vector<std::uint32_t> table_;    // numbers of cells, direct-mapped
   std::vector<SupervoxelPlace> place_;  // by sample
   std::vector<std::uint32_t> shared_;
   std::vector<std::uint32_t> touched_;

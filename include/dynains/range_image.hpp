@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -61,22 +62,14 @@ struct RangeImageGrid {
 
   /// Cells from the beginning of one row to the next: room for wide access past both ends.
   std::size_t stride() const {
-    return (static_cast<std::size_t>(columns) + detail::kLanes - 1) / detail::kLanes *
-               detail::kLanes +
+    return (static_cast<std::size_t>(columns) + detail::kShortLanes - 1) / detail::kShortLanes *
+               detail::kShortLanes +
            2 * detail::kLanes;
   }
   std::size_t cell_count() const { return static_cast<std::size_t>(rows) * stride(); }
 
  private:
   static constexpr detail::Constant8 kLevel[] = {0.9832868F, 0.2594117F};
-};
-
-/// Directions of eight points: where they fall in an image and how far they are.
-template <class Lanes>
-struct ImageLocation {
-  typename Lanes::Int cell;     ///< index into the image; 0 where `inside` is not set
-  typename Lanes::Mask inside;  ///< whether the image covers the direction
-  typename Lanes::Float range;  ///< m
 };
 
 /// Angle of (x, y) in [-pi, pi] within 1e-4 rad, for cells that are much wider; NaN for the origin.
@@ -107,22 +100,23 @@ struct ImageLocator {
         columns_per_radian(grid.columns_per_radian),
         last_column(static_cast<float>(grid.columns) - 0.5F) {}
 
+  /// Cells into which the directions of eight points fall; 0 where the image does not cover them.
+  /// `range`: distances of the points.
   template <class Lanes>
-  ImageLocation<Lanes> locate(const typename Lanes::Float& x, const typename Lanes::Float& y,
-                              const typename Lanes::Float& z) const {
+  typename Lanes::Int locate(const typename Lanes::Float& x, const typename Lanes::Float& y,
+                             const typename Lanes::Float& z,
+                             const typename Lanes::Float& range) const {
     using Float = typename Lanes::Float;
     static constexpr detail::Constant8 kZero(0.0F), kHalfTurn(detail::kPi),
         kBorder(static_cast<float>(detail::kLanes));
-    const Float range = sqrt((x * x + y * y) + z * z);
     const Float row = (RangeImageGrid::level(z / range) - lowest) * rows_per_level;
     const Float column = (coarse_azimuth(x, y) + kHalfTurn) * columns_per_radian;
     // False for the place of the sensor itself, whose row is NaN.
     const typename Lanes::Mask inside = (row >= kZero) & (row < rows);
     // Row times stride is exact in floats: images have fewer than 2^24 cells.
     const Float first = to_float(truncate(keep(inside, row))) * stride;
-    const typename Lanes::Int cell =
-        truncate(first + kBorder) + truncate(max(min(column, Float(last_column)), Float(kZero)));
-    return {keep(inside, cell), inside, range};
+    return keep(inside, truncate(first + kBorder) +
+                            truncate(max(min(column, Float(last_column)), Float(kZero))));
   }
 
   detail::Constant8 lowest, rows_per_level, rows, stride, columns_per_radian, last_column;
@@ -142,14 +136,19 @@ class RangeImage {
   static constexpr std::int16_t kNothing = 32767;
   static constexpr std::int16_t kUnknown = -1;
 
+  /// Cells that a return of an object protects at most, in every direction.
+  static constexpr std::size_t kWidest = 4;
+
   /// Buffers that building needs, shared by all images of one owner.
   struct Scratch {
     std::vector<std::int16_t> nearest;
+    std::vector<std::int16_t> objects;  // the same of objects only, holes and all
+    std::vector<std::uint8_t> reach;    // by row and group of columns: cells that objects reach
+    std::vector<std::uint8_t> nearby;   // the same about one row, by group of columns
+    std::array<std::vector<std::int16_t>, kWidest> lines;  // by column, for one row
     std::vector<std::int16_t> below, gap;
     std::vector<std::int16_t> least, count;
     std::vector<std::int16_t> border;
-    std::vector<std::int16_t> reaching, widened;
-    std::vector<std::int16_t> row_least, widened_least;
   };
 
   const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
@@ -160,40 +159,98 @@ class RangeImage {
   /// centimetres wide, less than what poses are good for.
   void build(const RangeImageGrid& grid, PointsView ground, PointsView objects, float reach,
              Scratch& scratch) {
+    const Reaches reaches(grid, reach);
     scratch.nearest.assign(grid.cell_count(), kNothing);
+    scratch.border.assign(grid.stride(), kNothing);
     collect(grid, objects, scratch.nearest.data());
-    scratch.reaching = scratch.nearest;
+    keep_objects(grid, reaches, scratch);
     collect(grid, ground, scratch.nearest.data());
     close_holes(grid, scratch);
-    store_with_least_around(grid, scratch);
-    find_row_least(grid, scratch);
-    constexpr int kWidest = 4;  // cells
-    for (int cells = 1; cells <= kWidest; ++cells) {
-      const float limit = reach * grid.columns_per_radian / (static_cast<float>(cells) - 0.5F);
-      widen(grid, static_cast<std::int16_t>(std::min(limit, kFarthest) * kCentimetres), scratch);
-    }
+    store_with_least_around(grid, reaches, scratch);
+    widen(grid, reaches, scratch);
   }
 
  private:
   static constexpr float kCentimetres = 100.0F;
   static constexpr float kFarthest = 320.0F;  // m
 
+  // How far returns of objects reach: those nearer than limit[k] (cm) protect k + 1 cells in every
+  // direction.
+  struct Reaches {
+    std::array<std::int16_t, kWidest> limit;
+
+    Reaches(const RangeImageGrid& grid, float reach) {
+      for (std::size_t k = 0; k < kWidest; ++k) {
+        const float metres = reach * grid.columns_per_radian / (static_cast<float>(k) + 0.5F);
+        limit[k] = static_cast<std::int16_t>(std::min(metres, kFarthest) * kCentimetres);
+      }
+    }
+  };
+
+  // Cells and ranges of a block of points first: their stores then find them in memory, which is
+  // cheaper than to take lanes apart.
   static void collect(const RangeImageGrid& grid, PointsView points, std::int16_t* nearest) {
+    constexpr std::size_t kBlock = 128;
     const ImageLocator locator(grid);
     static constexpr detail::Constant8 kMost(kFarthest), kScale(kCentimetres);
-    detail::for_lanes(points.size(), [&](auto place) {
-      using Lanes = decltype(place);
+    detail::run_lanes([&](auto lanes) {
+      using Lanes = decltype(lanes);
       using Float = typename Lanes::Float;
-      const ImageLocation<Lanes> at = locator.locate<Lanes>(
-          place.load(points.x.data()), place.load(points.y.data()), place.load(points.z.data()));
-      std::int32_t cell[detail::kLanes];
-      std::int32_t range[detail::kLanes];
-      at.cell.store(cell);
-      truncate(min(at.range, Float(kMost)) * kScale).store(range);
-      // Directions outside fall into cell 0, which lies in the border and is never read.
-      for (std::size_t lane = 0; lane < place.size(); ++lane) {
-        std::int16_t& value = nearest[cell[lane]];
-        value = std::min(value, static_cast<std::int16_t>(range[lane]));
+      std::int32_t cell[kBlock];
+      std::int32_t range[kBlock];
+      for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
+        const std::size_t size = std::min(kBlock, points.size() - begin);
+        detail::for_places<Lanes>(size, [&](auto place) {
+          const Float x = place.load(points.x.data() + begin);
+          const Float y = place.load(points.y.data() + begin);
+          const Float z = place.load(points.z.data() + begin);
+          const Float metres = sqrt((x * x + y * y) + z * z);
+          locator.template locate<Lanes>(x, y, z, metres).store(&cell[place.begin]);
+          truncate(min(metres, Float(kMost)) * kScale).store(&range[place.begin]);
+        });
+        // Directions outside fall into cell 0, which lies in the border and is never read.
+        for (std::size_t i = 0; i < size; ++i) {
+          std::int16_t& value = nearest[cell[i]];
+          value = std::min(value, static_cast<std::int16_t>(range[i]));
+        }
+      }
+    });
+  }
+
+  // Columns are looked at in groups; `group_stride` leaves room for one across the seam on each
+  // side.
+  static std::size_t group_count(const RangeImageGrid& grid) {
+    return (grid.stride() - 2 * detail::kLanes) / detail::kShortLanes;
+  }
+  static std::size_t group_stride(const RangeImageGrid& grid) { return group_count(grid) + 2; }
+  static std::size_t column_of(std::size_t group) {
+    return detail::kLanes + group * detail::kShortLanes;
+  }
+
+  // Copies the image while it holds nothing but objects, and notes how far these reach where it is
+  // more than one cell.
+  static void keep_objects(const RangeImageGrid& grid, const Reaches& reaches, Scratch& scratch) {
+    const std::size_t stride = grid.stride();
+    const std::size_t groups = group_count(grid);
+    const auto rows = static_cast<std::size_t>(grid.rows);
+    scratch.objects.resize(grid.cell_count());
+    scratch.reach.assign(rows * group_stride(grid), 0);
+    detail::run_lanes([&](auto lanes) {
+      using Short = typename detail::ShortsOf<decltype(lanes)>::Type;
+      const Short far(reaches.limit[1]);
+      for (std::size_t row = 0; row < rows; ++row) {
+        const std::int16_t* const from = &scratch.nearest[row * stride];
+        std::int16_t* const to = &scratch.objects[row * stride];
+        std::uint8_t* const reach = &scratch.reach[row * group_stride(grid) + 1];
+        for (std::size_t group = 0; group < groups; ++group) {
+          const Short here = Short::load(from + column_of(group));
+          here.store(to + column_of(group));
+          if (!(here < far).any()) continue;
+          std::size_t cells = 2;
+          while (cells < kWidest && (here < Short(reaches.limit[cells])).any()) ++cells;
+          reach[group] = static_cast<std::uint8_t>(cells);
+        }
+        wrap(to, static_cast<std::size_t>(grid.columns), 1);
       }
     });
   }
@@ -203,155 +260,199 @@ class RangeImage {
   static void close_holes(const RangeImageGrid& grid, Scratch& scratch) {
     using namespace detail;
     const std::size_t stride = grid.stride();
-    const Short8 zero = all_shorts(0);
-    const Short8 one = all_shorts(1);
-    const Short8 nothing = all_shorts(kNothing);
-    const Short8 widest = all_shorts(static_cast<std::int16_t>(grid.hole_rows));
     // By column: the last return below, and how many rows are empty since; too many if there is
     // none.
     scratch.below.assign(stride, kNothing);
     scratch.gap.assign(stride, static_cast<std::int16_t>(grid.hole_rows + 1));
-    for (std::size_t row = 0; row < static_cast<std::size_t>(grid.rows); ++row) {
-      for (std::size_t column = kLanes; column + kLanes < stride; column += kLanes) {
-        std::int16_t* const at = &scratch.nearest[row * stride + column];
-        const Short8 here = load_shorts(at);
-        const Short8 below = load_shorts(&scratch.below[column]);
-        const Short8 gap = load_shorts(&scratch.gap[column]);
-        const Short8 returned = here < nothing;
-        const Short8 closes = returned & (gap > zero) & (gap <= widest);
-        if (any_short(closes)) {
-          const Short8 fill = min_shorts(here, below);
-          std::int16_t* to = at;
-          for (Short8 left = closes & gap; any_short(left > zero); left = left - one) {
-            to -= stride;
-            store_shorts(to, select_shorts(left > zero, fill, load_shorts(to)));
+    run_lanes([&](auto lanes) {
+      using Short = typename ShortsOf<decltype(lanes)>::Type;
+      const Short zero(0), one(1), nothing(kNothing);
+      const Short widest(static_cast<std::int16_t>(grid.hole_rows));
+      std::int16_t* const belows = scratch.below.data();
+      std::int16_t* const gaps = scratch.gap.data();
+      for (std::size_t row = 0; row < static_cast<std::size_t>(grid.rows); ++row) {
+        std::int16_t* const line = &scratch.nearest[row * stride];
+        for (std::size_t column = kLanes; column + kLanes < stride; column += kShortLanes) {
+          std::int16_t* const at = line + column;
+          const Short here = Short::load(at);
+          const Short below = Short::load(belows + column);
+          const Short gap = Short::load(gaps + column);
+          const Short returned = here < nothing;
+          const Short closes = returned & (zero < gap) & (gap < widest + one);
+          if (closes.any()) {
+            const Short fill = min(here, below);
+            std::int16_t* to = at;
+            for (Short left = closes & gap; (zero < left).any(); left = left - one) {
+              to -= stride;
+              select(zero < left, fill, Short::load(to)).store(to);
+            }
           }
+          select(returned, here, below).store(belows + column);
+          (~returned & min(gap + one, widest + one)).store(gaps + column);
         }
-        store_shorts(&scratch.below[column], select_shorts(returned, here, below));
-        store_shorts(&scratch.gap[column], ~returned & min_shorts(gap + one, widest + one));
       }
-    }
+    });
   }
 
-  // The nearest return of the 3x3 cells about each cell, beside its own.
-  void store_with_least_around(const RangeImageGrid& grid, Scratch& scratch) {
+  // The nearest return of the 3x3 cells about each cell, beside its own. A single return says
+  // nothing, unless it is that of a near object.
+  void store_with_least_around(const RangeImageGrid& grid, const Reaches& reaches,
+                               Scratch& scratch) {
     using namespace detail;
     const std::size_t stride = grid.stride();
     const auto rows = static_cast<std::size_t>(grid.rows);
-    const auto columns = static_cast<std::size_t>(grid.columns);
     make_cells(grid.cell_count());
     scratch.least.resize(stride);
     scratch.count.resize(stride);
-    scratch.border.assign(stride, kNothing);
-    for (std::size_t row = 0; row < rows; ++row) wrap(&scratch.nearest[row * stride], columns);
-    const Short8 nothing = all_shorts(kNothing);
-    const Short8 unknown = all_shorts(kUnknown);
-    const Short8 one = all_shorts(1);
     for (std::size_t row = 0; row < rows; ++row) {
-      const std::int16_t* const middle = &scratch.nearest[row * stride];
-      const std::int16_t* const low = row > 0 ? middle - stride : scratch.border.data();
-      const std::int16_t* const high = row + 1 < rows ? middle + stride : scratch.border.data();
-      for (std::size_t column = 0; column < stride; column += kLanes) {
-        const Short8 a = load_shorts(low + column);
-        const Short8 b = load_shorts(middle + column);
-        const Short8 c = load_shorts(high + column);
-        store_shorts(&scratch.least[column], min_shorts(min_shorts(a, b), c));
-        store_shorts(&scratch.count[column],
-                     Short8(-(a < nothing) - (b < nothing) - (c < nothing)));
-      }
-      for (std::size_t column = kLanes; column + kLanes < stride; column += kLanes) {
-        const std::int16_t* const least = &scratch.least[column];
-        const std::int16_t* const count = &scratch.count[column];
-        const Short8 around = min_shorts(min_shorts(load_shorts(least - 1), load_shorts(least)),
-                                         load_shorts(least + 1));
-        const Short8 returns = load_shorts(count - 1) + load_shorts(count) + load_shorts(count + 1);
-        store_interleaved(&cells_[row * stride + column].nearest, load_shorts(middle + column),
-                          select_shorts(returns > one, around, unknown));
-      }
+      wrap(&scratch.nearest[row * stride], static_cast<std::size_t>(grid.columns), 1);
     }
+    run_lanes([&](auto lanes) {
+      using Short = typename ShortsOf<decltype(lanes)>::Type;
+      const Short nothing(kNothing), unknown(kUnknown), near(reaches.limit[0]);
+      std::int16_t* const leasts = scratch.least.data();
+      std::int16_t* const counts = scratch.count.data();
+      for (std::size_t row = 0; row < rows; ++row) {
+        const auto line = [&](const std::vector<std::int16_t>& image, std::size_t number) {
+          return number < rows ? &image[number * stride] : scratch.border.data();
+        };
+        const std::int16_t* const low = line(scratch.nearest, row - 1);
+        const std::int16_t* const middle = line(scratch.nearest, row);
+        const std::int16_t* const high = line(scratch.nearest, row + 1);
+        Cell* const cells = &cells_[row * stride];
+        for (std::size_t column = 0; column < stride; column += kShortLanes) {
+          const Short a = Short::load(low + column);
+          const Short b = Short::load(middle + column);
+          const Short c = Short::load(high + column);
+          min(min(a, b), c).store(leasts + column);
+          // Set lanes are -1.
+          ((a < nothing) + (b < nothing) + (c < nothing)).store(counts + column);
+        }
+        for (std::size_t column = kLanes; column + kLanes < stride; column += kShortLanes) {
+          const auto least_of_three = [](const std::int16_t* at) {
+            return min(min(Short::load(at - 1), Short::load(at)), Short::load(at + 1));
+          };
+          const std::int16_t* const count = counts + column;
+          const Short returns =
+              Short::load(count - 1) + Short::load(count) + Short::load(count + 1);
+          Short alone = unknown;
+          const Short single = returns == unknown;
+          if (single.any()) {
+            const Short object = min(min(least_of_three(line(scratch.objects, row - 1) + column),
+                                         least_of_three(line(scratch.objects, row) + column)),
+                                     least_of_three(line(scratch.objects, row + 1) + column));
+            alone = select(single & (object < near), object, unknown);
+          }
+          const Short around = select(returns < unknown, least_of_three(leasts + column), alone);
+          Short::load(middle + column).store_interleaved_with(around, &cells[column].nearest);
+        }
+      }
+    });
   }
 
-  // Nearest of each row of `reaching`.
-  static void find_row_least(const RangeImageGrid& grid, Scratch& scratch) {
-    using namespace detail;
-    const std::size_t stride = grid.stride();
-    scratch.row_least.resize(static_cast<std::size_t>(grid.rows));
-    for (std::size_t row = 0; row < scratch.row_least.size(); ++row) {
-      Short8 least = all_shorts(kNothing);
-      for (std::size_t column = kLanes; column + kLanes < stride; column += kLanes) {
-        least = min_shorts(least, load_shorts(&scratch.reaching[row * stride + column]));
+  // Lets near objects protect more cells about their returns.
+  void widen(const RangeImageGrid& grid, const Reaches& reaches, Scratch& scratch) {
+    const auto rows = static_cast<std::size_t>(grid.rows);
+    for (std::vector<std::int16_t>& line : scratch.lines) line.resize(grid.stride());
+    detail::run_lanes([&](auto lanes) {
+      using Short = typename detail::ShortsOf<decltype(lanes)>::Type;
+      for (std::size_t row = 0; row < rows; ++row) {
+        if (!find_nearby(grid, row, scratch)) continue;
+        widen_upwards<Short>(grid, reaches, row, scratch);
+        widen_sideways<Short>(grid, row, scratch);
       }
-      scratch.row_least[row] = least_short(least);
-    }
+    });
   }
 
-  // Lets returns of objects that are nearer than `limit` (cm) reach one cell farther in every
-  // direction: `reaching` holds nothing else, and the cells take the result in. Rows without such
-  // returns are not looked at.
-  void widen(const RangeImageGrid& grid, std::int16_t limit, Scratch& scratch) {
-    using namespace detail;
+  // How many cells objects reach about a row, by group, as far as they reach the row itself; false
+  // if they do not.
+  static bool find_nearby(const RangeImageGrid& grid, std::size_t row, Scratch& scratch) {
+    const auto rows = static_cast<std::size_t>(grid.rows);
+    const std::size_t groups = group_count(grid);
+    const std::size_t stride = group_stride(grid);
+    scratch.nearby.assign(stride, 0);
+    std::uint8_t* const nearby = scratch.nearby.data();
+    for (std::size_t r = row - std::min(row, kWidest); r < std::min(row + kWidest + 1, rows); ++r) {
+      const auto distance = static_cast<std::uint8_t>(r < row ? row - r : r - row);
+      const std::uint8_t* const reach = &scratch.reach[r * stride];
+      for (std::size_t i = 0; i < stride; ++i) {
+        const std::uint8_t cells = reach[i] >= distance ? reach[i] : std::uint8_t{0};
+        nearby[i] = std::max(nearby[i], cells);
+      }
+    }
+    // Across the seam: the last group may be narrower than the reach.
+    nearby[0] = std::max(nearby[groups], nearby[groups - 1]);
+    nearby[groups + 1] = nearby[1];
+    return *std::max_element(nearby, nearby + stride) > 0;
+  }
+
+  // For each reach, the nearest of the objects above and below that reach so far.
+  template <class Short>
+  static void widen_upwards(const RangeImageGrid& grid, const Reaches& reaches, std::size_t row,
+                            Scratch& scratch) {
     const std::size_t stride = grid.stride();
     const auto rows = static_cast<std::size_t>(grid.rows);
-    const auto columns = static_cast<std::size_t>(grid.columns);
-    scratch.widened.resize(grid.cell_count());
-    scratch.widened_least.assign(rows, kNothing);
-    const Short8 nothing = all_shorts(kNothing);
-    const Short8 near = all_shorts(limit);
-    const auto line = [&](std::size_t row) {
-      return row < rows && scratch.row_least[row] < limit ? &scratch.reaching[row * stride]
-                                                          : nullptr;
-    };
-    for (std::size_t row = 0; row < rows; ++row) {
-      if (line(row) != nullptr) wrap(line(row), columns);
-    }
-    for (std::size_t row = 0; row < rows; ++row) {
-      const std::int16_t* low = row > 0 ? line(row - 1) : nullptr;
-      const std::int16_t* middle = line(row);
-      const std::int16_t* high = line(row + 1);
-      if (low == nullptr && middle == nullptr && high == nullptr) continue;
-      if (low == nullptr) low = scratch.border.data();
-      if (middle == nullptr) middle = scratch.border.data();
-      if (high == nullptr) high = scratch.border.data();
-      for (std::size_t column = 0; column < stride; column += kLanes) {
-        const Short8 least =
-            min_shorts(min_shorts(load_shorts(low + column), load_shorts(middle + column)),
-                       load_shorts(high + column));
-        store_shorts(&scratch.least[column], select_shorts(least < near, least, nothing));
+    const Short nothing(kNothing);
+    for (std::size_t group = 0; group < group_count(grid); ++group) {
+      const std::size_t column = column_of(group);
+      const auto load = [&](std::size_t r) {
+        return r < rows ? Short::load(&scratch.objects[r * stride + column]) : nothing;
+      };
+      const std::size_t farthest = scratch.nearby[group + 1];
+      Short least = nothing;
+      if (farthest > 0) least = min(load(row), min(load(row - 1), load(row + 1)));
+      for (std::size_t cells = 2; cells <= kWidest; ++cells) {
+        Short line = nothing;
+        if (cells <= farthest) {
+          least = min(least, min(load(row - cells), load(row + cells)));
+          line = select(least < Short(reaches.limit[cells - 1]), least, nothing);
+        }
+        line.store(&scratch.lines[cells - 1][column]);
       }
-      Short8 row_least = nothing;
-      for (std::size_t column = kLanes; column + kLanes < stride; column += kLanes) {
-        const std::int16_t* const least = &scratch.least[column];
-        const Short8 reach = min_shorts(min_shorts(load_shorts(least - 1), load_shorts(least)),
-                                        load_shorts(least + 1));
-        store_shorts(&scratch.widened[row * stride + column], reach);
-        row_least = min_shorts(row_least, reach);
-        if (any_short(reach < nothing)) protect(&cells_[row * stride + column], reach);
-      }
-      scratch.widened_least[row] = least_short(row_least);
     }
-    scratch.reaching.swap(scratch.widened);
-    scratch.row_least.swap(scratch.widened_least);
+    for (std::size_t cells = 2; cells <= kWidest; ++cells) {
+      wrap(scratch.lines[cells - 1].data(), static_cast<std::size_t>(grid.columns), cells);
+    }
   }
 
-  // Lets `around` of eight cells be at most `reach`; kNothing changes nothing.
-  static void protect(Cell* cells, detail::Short8 reach) {
+  template <class Short>
+  void widen_sideways(const RangeImageGrid& grid, std::size_t row, const Scratch& scratch) {
+    for (std::size_t group = 0; group < group_count(grid); ++group) {
+      const std::uint8_t* const nearby = &scratch.nearby[group];
+      const std::size_t farthest = std::max({nearby[0], nearby[1], nearby[2]});
+      if (farthest == 0) continue;
+      const std::size_t column = column_of(group);
+      Short least(kNothing);
+      for (std::size_t cells = 2; cells <= farthest; ++cells) {
+        const std::int16_t* const line = &scratch.lines[cells - 1][column - cells];
+        for (std::size_t i = 0; i <= 2 * cells; ++i) least = min(least, Short::load(line + i));
+      }
+      if ((least < Short(kNothing)).any()) protect(&cells_[row * grid.stride() + column], least);
+    }
+  }
+
+  // Lets `around` of sixteen cells be at most `reach`; kNothing changes nothing.
+  template <class Short>
+  static void protect(Cell* cells, const Short& reach) {
     using namespace detail;
-    const Short8 nothing = all_shorts(kNothing);
-    std::int16_t limits[2 * kLanes];
-    store_interleaved(limits, nothing, reach);
+    const Short nothing(kNothing);
+    std::int16_t limits[2 * kShortLanes];
+    nothing.store_interleaved_with(reach, limits);
     for (std::size_t half = 0; half < 2; ++half) {
-      std::int16_t* const at = &cells[half * kLanes / 2].nearest;
-      const Short8 here = load_shorts(at);
-      const Short8 limit = load_shorts(limits + half * kLanes);
-      const Short8 known = select_shorts((here < all_shorts(0)) & (limit < nothing), nothing, here);
-      store_shorts(at, min_shorts(known, limit));
+      std::int16_t* const at = &cells[half * kShortLanes / 2].nearest;
+      const Short here = Short::load(at);
+      const Short limit = Short::load(limits + half * kShortLanes);
+      min(select((here < Short(0)) & (limit < nothing), nothing, here), limit).store(at);
     }
   }
 
   // Copies the ends of a row to its other side, so that neighbours across the seam are at hand.
-  static void wrap(std::int16_t* row, std::size_t columns) {
-    row[detail::kLanes - 1] = row[detail::kLanes + columns - 1];
-    row[detail::kLanes + columns] = row[detail::kLanes];
+  static void wrap(std::int16_t* row, std::size_t columns, std::size_t width) {
+    std::int16_t* const first = row + detail::kLanes;
+    for (std::size_t i = 0; i < width; ++i) {
+      first[-1 - static_cast<std::ptrdiff_t>(i)] = first[columns - 1 - i];
+      first[columns + i] = first[i];
+    }
   }
 
   // Without values: an image is the largest buffer of all, and each of its cells is written before

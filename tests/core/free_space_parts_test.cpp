@@ -27,15 +27,13 @@ std::int32_t voxel_of(float coordinate, float size) {
 
 constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
-// Supervoxel per point, from the streaks.
+// Supervoxel per point.
 std::vector<std::uint32_t> supervoxel_of(const InstanceSamples& samples, std::size_t points) {
-  std::vector<std::uint32_t> result(points, kNone);
-  for (const InstanceSamples::Streak& streak : samples.streaks) {
-    for (std::uint32_t i = streak.begin; i < streak.end; ++i) {
-      REQUIRE(i < points);
-      REQUIRE(result[i] == kNone);
-      result[i] = streak.supervoxel;
-    }
+  REQUIRE(samples.met_of.size() == points);
+  std::vector<std::uint32_t> result;
+  for (const std::uint32_t met : samples.met_of) {
+    REQUIRE(met < samples.met.size());
+    result.push_back(met == 0 ? kNone : samples.met[met]);
   }
   return result;
 }
@@ -209,6 +207,15 @@ TEST_CASE("a hull fills the ground between the sides of an object that were seen
   CHECK(cells.size() == 25);
 }
 
+// Lowest removed point about a place, or infinity.
+float lowest_at(const GroundFootprint& footprint, float x, float y) {
+  PointBuffer point;
+  point.push_back(x, y, 0.0F);
+  float result = std::numeric_limits<float>::infinity();
+  footprint.visit_near(point, [&](std::size_t, float lowest) { result = lowest; });
+  return result;
+}
+
 TEST_CASE("a footprint remembers the lowest point of a cell and its neighbours, until cleared") {
   GroundFootprint footprint(0.2, 2.0, 50.0);
   CHECK(footprint.empty());
@@ -216,20 +223,20 @@ TEST_CASE("a footprint remembers the lowest point of a cell and its neighbours, 
   footprint.add(10.05F, -3.05F, 0.4F);
   footprint.spread();
   CHECK_FALSE(footprint.empty());
-  CHECK(footprint.lowest(10.05F, -3.05F) == 0.4F);
-  CHECK(footprint.lowest(10.25F, -3.25F) == 0.4F);
-  CHECK(std::isinf(footprint.lowest(10.45F, -3.05F)));
+  CHECK(lowest_at(footprint, 10.05F, -3.05F) == 0.4F);
+  CHECK(lowest_at(footprint, 10.25F, -3.25F) == 0.4F);
+  CHECK(std::isinf(lowest_at(footprint, 10.45F, -3.05F)));
   footprint.clear();
   CHECK(footprint.empty());
-  CHECK(std::isinf(footprint.lowest(10.05F, -3.05F)));
+  CHECK(std::isinf(lowest_at(footprint, 10.05F, -3.05F)));
   // Out of reach, NaN: neither remembered nor found.
   footprint.add(60.0F, 0.0F, 0.0F);
   footprint.add(std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.0F);
   footprint.add(-1e30F, 1e30F, 0.0F);
   footprint.spread();
   CHECK(footprint.empty());
-  CHECK(std::isinf(footprint.lowest(60.0F, 0.0F)));
-  CHECK(std::isinf(footprint.lowest(std::numeric_limits<float>::infinity(), 0.0F)));
+  CHECK(std::isinf(lowest_at(footprint, 60.0F, 0.0F)));
+  CHECK(std::isinf(lowest_at(footprint, std::numeric_limits<float>::infinity(), 0.0F)));
 }
 
 TEST_CASE("a footprint finds what a search over all removed points finds") {
@@ -249,7 +256,11 @@ TEST_CASE("a footprint finds what a search over all removed points finds") {
     }
     footprint.spread();
     std::vector<std::uint32_t> found;
-    footprint.find(ground, found);
+    std::vector<float> lowest_found(ground.size(), std::numeric_limits<float>::infinity());
+    footprint.visit_near(ground, [&](std::size_t i, float lowest) {
+      found.push_back(static_cast<std::uint32_t>(i));
+      lowest_found[i] = lowest;
+    });
     std::vector<std::uint32_t> expected;
     const auto cells_apart = [](float a, float b, float cell) {
       return std::abs(std::floor(a / cell) - std::floor(b / cell));
@@ -266,7 +277,7 @@ TEST_CASE("a footprint finds what a search over all removed points finds") {
         if (touches(0.25F)) lowest = std::min(lowest, removed.z[k]);
       }
       if (near) expected.push_back(i);
-      REQUIRE(footprint.lowest(ground.x[i], ground.y[i]) == lowest);
+      REQUIRE(lowest_found[i] == lowest);
     }
     REQUIRE(found == expected);
     footprint.clear();

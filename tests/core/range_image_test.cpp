@@ -24,9 +24,10 @@ RangeImageGrid small_grid() {
 
 std::int32_t cell_of(const RangeImageGrid& grid, float x, float y, float z) {
   std::int32_t cells[detail::kLanes];
+  const detail::Float8 px(x), py(y), pz(z);
   ImageLocator(grid)
-      .locate<detail::NarrowLanes>(detail::Float8(x), detail::Float8(y), detail::Float8(z))
-      .cell.store(cells);
+      .locate<detail::NarrowLanes>(px, py, pz, sqrt((px * px + py * py) + pz * pz))
+      .store(cells);
   return cells[0];
 }
 
@@ -140,6 +141,68 @@ TEST_CASE("an image is what its definition says, cell by cell") {
         const RangeImage::Cell cell = image[expected.at(row, column)];
         REQUIRE(cell.nearest == expected.nearest(row, column));
         REQUIRE(cell.around == expected.around(row, column));
+      }
+    }
+  }
+}
+
+// Objects nearer than reach / (k - 1/2) cells (in rad) protect k cells in every direction.
+int around_with_objects(const RangeImageGrid& grid, const ReferenceImage& all,
+                        const std::vector<int>& objects, float reach, int row, int column) {
+  int result = all.around(row, column);
+  for (int k = 1; k <= 4; ++k) {
+    const float limit = reach * grid.columns_per_radian / (static_cast<float>(k) - 0.5F);
+    for (int r = std::max(0, row - k); r <= std::min(grid.rows - 1, row + k); ++r) {
+      for (int c = column - k; c <= column + k; ++c) {
+        const int value = objects[all.at(r, (c + grid.columns) % grid.columns)];
+        if (value >= static_cast<int>(std::min(limit, 320.0F) * 100.0F)) continue;
+        if (result == RangeImage::kUnknown || value < result) result = value;
+      }
+    }
+  }
+  return result;
+}
+
+TEST_CASE("near objects protect more cells about them, across the seam and the edges as well") {
+  Random random(6);
+  SensorModel sensor = SensorModel::typical();
+  sensor.elevation_min = -10.0;
+  RangeImage image;
+  RangeImage::Scratch scratch;
+  for (const double step : {0.25, 0.3, 0.35, 0.5}) {  // other numbers of columns in the last group
+    sensor.azimuth_step = step;
+    const RangeImageGrid grid = RangeImageGrid::for_sensor(sensor);
+    PointBuffer points[3];  // ground, objects, both
+    for (int i = 0; i < 6000; ++i) {
+      const bool object = i % 3 == 0;
+      const double azimuth = random.uniform(-M_PI, M_PI);
+      const double elevation = random.uniform(-14.0, 8.0) / kDegrees;
+      const double range = object ? random.uniform(0.5, 40.0) : random.uniform(3.0, 300.0);
+      const auto x = static_cast<float>(range * std::cos(elevation) * std::cos(azimuth));
+      const auto y = static_cast<float>(range * std::cos(elevation) * std::sin(azimuth));
+      const auto z = static_cast<float>(range * std::sin(elevation));
+      points[object ? 1 : 0].push_back(x, y, z);
+      points[2].push_back(x, y, z);
+    }
+    const ReferenceImage all(grid, points[2]);
+    std::vector<int> objects(grid.cell_count(), RangeImage::kNothing);
+    for (std::size_t i = 0; i < points[1].size(); ++i) {
+      const float x = points[1].x[i], y = points[1].y[i], z = points[1].z[i];
+      const auto cell = static_cast<std::size_t>(cell_of(grid, x, y, z));
+      const float range = std::sqrt((x * x + y * y) + z * z);
+      objects[cell] = std::min(objects[cell], static_cast<int>(range * 100.0F));
+    }
+    for (const float reach : {0.0F, 0.05F, 0.4F, 1.0F}) {
+      image.build(grid, points[0], points[1], reach, scratch);
+      for (int row = 0; row < grid.rows; ++row) {
+        for (int column = 0; column < grid.columns; ++column) {
+          const RangeImage::Cell cell = image[all.at(row, column)];
+          const int expected = around_with_objects(grid, all, objects, reach, row, column);
+          if (cell.nearest != all.nearest(row, column) || cell.around != expected) {
+            FAIL("step " << step << " reach " << reach << " row " << row << " column " << column
+                         << ": " << cell.around << " instead of " << expected);
+          }
+        }
       }
     }
   }

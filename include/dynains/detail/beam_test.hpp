@@ -31,6 +31,16 @@ constexpr std::array<std::uint8_t, 256> count_ones() {
 /// Set bits of every byte.
 inline constexpr std::array<std::uint8_t, 256> kOnes = count_ones();
 
+constexpr std::array<std::array<std::uint8_t, 8>, 256> spread_bits() {
+  std::array<std::array<std::uint8_t, 8>, 256> bytes{};
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    for (std::size_t bit = 0; bit < 8; ++bit) bytes[i][bit] = i >> bit & 1U;
+  }
+  return bytes;
+}
+/// Every bit of a byte as a byte.
+inline constexpr std::array<std::array<std::uint8_t, 8>, 256> kBytesOfBits = spread_bits();
+
 /// What one reference says of many samples, a bit each.
 class Sights {
  public:
@@ -49,26 +59,47 @@ class Sights {
   }
 
   struct Count {
-    std::uint32_t free = 0;
-    std::uint32_t hit = 0;
+    std::uint32_t free;
+    std::uint32_t hit;
   };
   Count count(std::size_t begin, std::size_t end) const {
-    Count result;
-    for (; end - begin > 8; begin += 8) add(begin, 0xFFU, result);
-    add(begin, (1U << (end - begin)) - 1, result);
-    return result;
+    std::uint32_t free = 0;
+    std::uint32_t hit = 0;
+    for (; end - begin > 8; begin += 8) {
+      free += kOnes[eight_from(free_, begin) & 0xFFU];
+      hit += kOnes[eight_from(hit_, begin) & 0xFFU];
+    }
+    const unsigned left = (1U << (end - begin)) - 1;
+    return {free + kOnes[eight_from(free_, begin) & left],
+            hit + kOnes[eight_from(hit_, begin) & left]};
   }
+  /// Counts up, for each of the first `count` samples, how many references saw it free or hit it:
+  /// fewer than 256. Both have room for a multiple of eight.
+  void add_to(std::size_t count, std::uint8_t* free, std::uint8_t* hit) const {
+    for (std::size_t i = 0; i < count; i += 8) {
+      for (std::size_t k = 0; k < 8; ++k) {
+        free[i + k] = static_cast<std::uint8_t>(free[i + k] + kBytesOfBits[free_[i / 8]][k]);
+        hit[i + k] = static_cast<std::uint8_t>(hit[i + k] + kBytesOfBits[hit_[i / 8]][k]);
+      }
+    }
+  }
+
+  /// Of the 64 samples from `first` on, a multiple of 64; of those behind the last it may say
+  /// anything.
+  std::uint64_t free_word(std::size_t first) const { return word_at(free_, first); }
+  std::uint64_t hit_word(std::size_t first) const { return word_at(hit_, first); }
   bool is_free(std::size_t sample) const { return (free_[sample / 8] >> sample % 8 & 1U) != 0; }
   bool is_hit(std::size_t sample) const { return (hit_[sample / 8] >> sample % 8 & 1U) != 0; }
 
  private:
+  static std::uint64_t word_at(const std::vector<std::uint8_t>& bits, std::size_t first) {
+    std::uint64_t word;
+    std::memcpy(&word, &bits[first / 8], sizeof(word));
+    return word;
+  }
   static unsigned eight_from(const std::vector<std::uint8_t>& bits, std::size_t first) {
     const unsigned two = bits[first / 8] | unsigned{bits[first / 8 + 1]} << 8U;
     return two >> first % 8;
-  }
-  void add(std::size_t begin, unsigned mask, Count& to) const {
-    to.free += kOnes[eight_from(free_, begin) & mask];
-    to.hit += kOnes[eight_from(hit_, begin) & mask];
   }
   std::vector<std::uint8_t> free_, hit_;
 };
@@ -101,10 +132,12 @@ inline void test_beams(const RangeImageGrid& grid, const RangeImage& image,
         const Float px = Float::load(&samples.x[begin + i]);
         const Float py = Float::load(&samples.y[begin + i]);
         const Float pz = Float::load(&samples.z[begin + i]);
-        const ImageLocation<Lanes> at = locator.template locate<Lanes>(
-            to_reference(0, px, py, pz), to_reference(1, px, py, pz), to_reference(2, px, py, pz));
-        at.cell.store(&cell[i]);
-        at.range.store(&ranges[i]);
+        const Float x = to_reference(0, px, py, pz);
+        const Float y = to_reference(1, px, py, pz);
+        const Float z = to_reference(2, px, py, pz);
+        const Float range = sqrt((x * x + y * y) + z * z);
+        locator.template locate<Lanes>(x, y, z, range).store(&cell[i]);
+        range.store(&ranges[i]);
         for (std::size_t k = i; k < i + kLanes; ++k) __builtin_prefetch(&cells[cell[k]]);
       }
       for (std::size_t i = 0; i < size; i += kLanes) {

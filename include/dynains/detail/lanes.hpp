@@ -160,18 +160,16 @@ inline Float8 max(Float8 a, Float8 b) {
 #endif
 }
 
-inline Float8 sqrt(Float8 a) {
+inline Float4 sqrt(Float4 a) {
 #if defined(__SSE2__)
-  return {_mm_sqrt_ps(a.lo), _mm_sqrt_ps(a.hi)};
+  return _mm_sqrt_ps(a);
 #else
-  Float8 result;
-  for (int i = 0; i < 4; ++i) {
-    result.lo[i] = std::sqrt(a.lo[i]);
-    result.hi[i] = std::sqrt(a.hi[i]);
-  }
+  Float4 result;
+  for (int i = 0; i < 4; ++i) result[i] = std::sqrt(a[i]);
   return result;
 #endif
 }
+inline Float8 sqrt(Float8 a) { return {sqrt(a.lo), sqrt(a.hi)}; }
 
 inline Float8 abs(Float8 a) {
   const Int4 magnitude = {0x7FFFFFFF, 0x7FFFFFFF, 0x7FFFFFFF, 0x7FFFFFFF};

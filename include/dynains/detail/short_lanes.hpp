@@ -1,4 +1,5 @@
-// Eight 16-bit integers side by side: what range images are made of.
+// Sixteen 16-bit integers side by side: what range images are made of. As with floats, there are
+// two kinds: two vectors of eight that every processor holds in registers, and one of sixteen.
 #pragma once
 
 #include <cstddef>
@@ -9,31 +10,21 @@
 #include <emmintrin.h>
 #endif
 
+#include "dynains/detail/wide_lanes.hpp"
+
 namespace dynains::detail {
+
+inline constexpr std::size_t kShortLanes = 16;
 
 using Short8 = std::int16_t __attribute__((vector_size(16)));
 
-inline Short8 load_shorts(const std::int16_t* from) {
-  Short8 result;
-  std::memcpy(&result, from, sizeof(result));
-  return result;
-}
-inline void store_shorts(std::int16_t* to, Short8 value) { std::memcpy(to, &value, sizeof(value)); }
-inline Short8 all_shorts(std::int16_t value) {
-  return Short8{value, value, value, value, value, value, value, value};
-}
-
-/// `a` where the mask (the result of a comparison) is set, else `b`.
-inline Short8 select_shorts(Short8 mask, Short8 a, Short8 b) { return (mask & a) | (~mask & b); }
 inline Short8 min_shorts(Short8 a, Short8 b) {
 #if defined(__SSE2__)
   return Short8(_mm_min_epi16(__m128i(a), __m128i(b)));
 #else
-  return select_shorts(a < b, a, b);
+  return a < b ? a : b;
 #endif
 }
-
-/// Whether any lane of a mask is set.
 inline bool any_short(Short8 mask) {
 #if defined(__SSE2__)
   return _mm_movemask_epi8(__m128i(mask)) != 0;
@@ -43,24 +34,100 @@ inline bool any_short(Short8 mask) {
   return (halves[0] | halves[1]) != 0;
 #endif
 }
-
-inline std::int16_t least_short(Short8 a) {
-  std::int16_t result = a[0];
-  for (int i = 1; i < 8; ++i) result = a[i] < result ? a[i] : result;
-  return result;
-}
-
 /// a0 b0 a1 b1 ... a7 b7.
 inline void store_interleaved(std::int16_t* to, Short8 a, Short8 b) {
-#if defined(__SSE2__)
-  store_shorts(to, Short8(_mm_unpacklo_epi16(__m128i(a), __m128i(b))));
-  store_shorts(to + 8, Short8(_mm_unpackhi_epi16(__m128i(a), __m128i(b))));
-#else
-  for (int i = 0; i < 8; ++i) {
-    to[2 * i] = a[i];
-    to[2 * i + 1] = b[i];
-  }
-#endif
+  const Short8 low = __builtin_shufflevector(a, b, 0, 8, 1, 9, 2, 10, 3, 11);
+  const Short8 high = __builtin_shufflevector(a, b, 4, 12, 5, 13, 6, 14, 7, 15);
+  std::memcpy(to, &low, sizeof(low));
+  std::memcpy(to + 8, &high, sizeof(high));
 }
+
+/// Comparisons give lanes of all bits set, which is -1, or of none.
+struct NarrowShort {
+  Short8 lo, hi;
+
+  NarrowShort() = default;
+  NarrowShort(Short8 low, Short8 high) : lo(low), hi(high) {}
+  explicit NarrowShort(std::int16_t n) : lo{n, n, n, n, n, n, n, n}, hi(lo) {}
+
+  static NarrowShort load(const std::int16_t* from) {
+    NarrowShort result;
+    std::memcpy(&result.lo, from, sizeof(Short8));
+    std::memcpy(&result.hi, from + 8, sizeof(Short8));
+    return result;
+  }
+  void store(std::int16_t* to) const {
+    std::memcpy(to, &lo, sizeof(Short8));
+    std::memcpy(to + 8, &hi, sizeof(Short8));
+  }
+  void store_interleaved_with(const NarrowShort& other, std::int16_t* to) const {
+    store_interleaved(to, lo, other.lo);
+    store_interleaved(to + 16, hi, other.hi);
+  }
+  bool any() const { return any_short(lo | hi); }
+
+  using S = NarrowShort;
+  friend S operator+(const S& a, const S& b) { return {a.lo + b.lo, a.hi + b.hi}; }
+  friend S operator-(const S& a, const S& b) { return {a.lo - b.lo, a.hi - b.hi}; }
+  friend S operator&(const S& a, const S& b) { return {a.lo & b.lo, a.hi & b.hi}; }
+  friend S operator~(const S& a) { return {~a.lo, ~a.hi}; }
+  friend S operator<(const S& a, const S& b) { return {a.lo < b.lo, a.hi < b.hi}; }
+  friend S operator==(const S& a, const S& b) { return {a.lo == b.lo, a.hi == b.hi}; }
+  friend S min(const S& a, const S& b) { return {min_shorts(a.lo, b.lo), min_shorts(a.hi, b.hi)}; }
+  friend S select(const S& mask, const S& a, const S& b) {
+    return {(mask.lo & a.lo) | (~mask.lo & b.lo), (mask.hi & a.hi) | (~mask.hi & b.hi)};
+  }
+};
+
+struct WideShort {
+  using Vector = std::int16_t __attribute__((vector_size(32)));
+  Vector v;
+
+  WideShort() = default;
+  explicit WideShort(const Vector& vector) : v(vector) {}
+  explicit WideShort(std::int16_t n) : v{n, n, n, n, n, n, n, n, n, n, n, n, n, n, n, n} {}
+
+  static WideShort load(const std::int16_t* from) {
+    WideShort result;
+    std::memcpy(&result.v, from, sizeof(Vector));
+    return result;
+  }
+  void store(std::int16_t* to) const { std::memcpy(to, &v, sizeof(Vector)); }
+  void store_interleaved_with(const WideShort& other, std::int16_t* to) const {
+    store_interleaved(to, low(v), low(other.v));
+    store_interleaved(to + 16, high(v), high(other.v));
+  }
+  bool any() const { return any_short(low(v) | high(v)); }
+
+  using S = WideShort;
+  friend S operator+(const S& a, const S& b) { return S(a.v + b.v); }
+  friend S operator-(const S& a, const S& b) { return S(a.v - b.v); }
+  friend S operator&(const S& a, const S& b) { return S(a.v & b.v); }
+  friend S operator~(const S& a) { return S(~a.v); }
+  friend S operator<(const S& a, const S& b) { return S(a.v < b.v); }
+  friend S operator==(const S& a, const S& b) { return S(a.v == b.v); }
+  friend S min(const S& a, const S& b) { return S(a.v < b.v ? a.v : b.v); }
+  friend S select(const S& mask, const S& a, const S& b) { return S(mask.v ? a.v : b.v); }
+
+ private:
+  static Short8 low(const Vector& a) {
+    return __builtin_shufflevector(a, a, 0, 1, 2, 3, 4, 5, 6, 7);
+  }
+  static Short8 high(const Vector& a) {
+    return __builtin_shufflevector(a, a, 8, 9, 10, 11, 12, 13, 14, 15);
+  }
+};
+
+/// The sixteen that go with a kind of lanes.
+template <class Lanes>
+struct ShortsOf;
+template <>
+struct ShortsOf<NarrowLanes> {
+  using Type = NarrowShort;
+};
+template <>
+struct ShortsOf<WideLanes> {
+  using Type = WideShort;
+};
 
 }  // namespace dynains::detail

@@ -84,10 +84,11 @@ struct WideFloat8 {
   friend F min(const F& a, const F& b) { return F(a.v < b.v ? a.v : b.v); }
   friend F max(const F& a, const F& b) { return F(a.v > b.v ? a.v : b.v); }
   friend F abs(const F& a) { return float_of(bits_of(a) & WideMask8{WideInt8(0x7FFFFFFF).v}); }
+  // Halves as vectors of their own: as a pair, they would pass through memory.
   friend F sqrt(const F& a) {
-    const Float8 root = sqrt(Float8(__builtin_shufflevector(a.v, a.v, 0, 1, 2, 3),
-                                    __builtin_shufflevector(a.v, a.v, 4, 5, 6, 7)));
-    return F(__builtin_shufflevector(root.lo, root.hi, 0, 1, 2, 3, 4, 5, 6, 7));
+    const Float4 low = sqrt(Float4(__builtin_shufflevector(a.v, a.v, 0, 1, 2, 3)));
+    const Float4 high = sqrt(Float4(__builtin_shufflevector(a.v, a.v, 4, 5, 6, 7)));
+    return F(__builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7));
   }
 
   static F float_of(const WideMask8& a) { return F(Vector(a.v)); }
