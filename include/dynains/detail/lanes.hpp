@@ -252,15 +252,6 @@ void copy_lanes(const T* from, T* to) {
   std::memcpy(to, &eight, sizeof(eight));
 }
 
-/// For short arrays, of which there are many: cheaper than a call of memcpy.
-template <class T>
-void copy(const T* from, std::size_t count, T* to) {
-  static_assert(sizeof(T) == 4);
-  std::size_t i = 0;
-  for (; i + kLanes <= count; i += kLanes) copy_lanes(from + i, to + i);
-  for (; i < count; ++i) to[i] = from[i];
-}
-
 /// Cuts the array into stretches of equal values and calls `body(length)` for one after the other.
 template <class T, class Body>
 void for_each_change(const T* values, std::size_t count, Body&& body) {
