@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -168,20 +169,33 @@ class BasicDynaInsRemover {
   /// was given.
   const SensorModel& sensor() const { return sensor_; }
 
-  /// Gets memory for scans of up to `points` points and touches it, so that the first scans do not
+  /// Gets the memory that scans like `example` need and touches it, so that the first scans do not
   /// wait for the system to give it: 26 to 36 bytes per point for each scan that is open at once,
-  /// window or latency() + 1 of them, and what the stages keep, for which some made-up scans are
-  /// taken in and forgotten. Takes as long as these. Larger scans are welcome all the same. Results
-  /// do not change. Throws UsageError once a scan was pushed.
-  void reserve(std::size_t points) {
+  /// window or latency() + 1 of them, and what the stages keep, for which the example is taken in
+  /// some times and forgotten. `scans`: how many will come, if that is known. Other scans are
+  /// welcome all the same, and results do not change. Throws UsageError once a scan was pushed.
+  template <class Cloud>
+  void reserve_like(const Cloud& example,
+                    std::size_t scans = std::numeric_limits<std::size_t>::max()) {
     const detail::OneCall::Guard guard(one_call_);
-    if (pushed_ > 0) throw UsageError("reserve() comes before the first push");
-    for (ScanSlot& slot : ring_) slot.touch(points, config_.use_free_space);
-    const std::vector<float> xyz = detail::made_up_scan(points);
+    if (pushed_ > 0) throw UsageError("memory is reserved before the first push");
+    if (scans == 0) return;
+    const std::size_t points = PointCloudTraits<Cloud>::size(example);
+    const std::size_t more = points + points / 16;  // scans of one sensor differ a little in size
+    for (std::size_t i = 0; i < std::min(scans, ring_.size()); ++i) {
+      ring_[i].touch(more, config_.use_free_space);
+    }
     const Rehearsal rehearsal(*this);
     for (int i = 0; i < std::max(config_.window, 2); ++i) {
-      take_in(RawPoints<float>{xyz.data(), points}, Eigen::Isometry3d::Identity(), 0.1 * i);
+      take_in(example, Eigen::Isometry3d::Identity(), 0.1 * i);
     }
+    if (config_.use_free_space) detail::reserve_stage(evidence_, scans);
+  }
+
+  /// The same for scans of that many points, of a 64-beam sensor in a street.
+  void reserve(std::size_t points) {
+    const std::vector<float> xyz = detail::made_up_scan(points);
+    reserve_like(RawPoints<float>{xyz.data(), points});
   }
 
   /// Takes one scan in.

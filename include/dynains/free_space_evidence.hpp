@@ -78,6 +78,13 @@ class FreeSpaceEvidence {
     if (!sensor.is_level()) R_beams_level_ = sensor.R_level_headed.transpose();
   }
 
+  /// Gets the memory of images for that many scans of the sensor that adapt() was told, or for as
+  /// many as are ever kept.
+  void reserve(std::size_t scans) {
+    const std::size_t images = grid_.rows > 0 ? std::min(scans, views_.size()) : 0;
+    for (std::size_t i = 0; i < images; ++i) views_[i].image.reserve(grid_);
+  }
+
   /// Takes scan number `scan` in: scans come in order, from 0. `instance_of` holds the instance of
   /// each non-ground point of `split`, below `instance_count` or kNoCluster. Only scans of the
   /// same `segment` are compared.

@@ -154,6 +154,13 @@ class RangeImage {
   const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
   const Cell* data() const { return cells_.get(); }
 
+  /// Gets the memory of an image and touches it, so that the system has given it before a scan needs
+  /// it.
+  void reserve(const RangeImageGrid& grid) {
+    make_cells(grid.cell_count());
+    std::fill_n(cells_.get(), cell_count_, Cell{kNothing, kUnknown});
+  }
+
   /// Replaces the image by that of one scan (m, sensor frame). A return of an object protects what
   /// lies within `reach` (m) beside it, at least its 3x3 cells: near the sensor these are a few
   /// centimetres wide, less than what poses are good for.

@@ -17,13 +17,16 @@
 
 namespace dynains::program {
 
+inline RawPoints<float> points_of(const RecordedScan& scan) {
+  return {scan.xyzi.data(), scan.size(), 4};
+}
+
 /// Pushes scan i. Throws PoseError that names the scan.
 template <class Remover>
 FrameResult push_scan(Remover& remover, const Recording& recording, std::size_t i,
                       const RecordedScan& scan) {
   try {
-    return remover.push(RawPoints<float>{scan.xyzi.data(), scan.size(), 4},
-                        recording.T_world_sensor(i), recording.time(i));
+    return remover.push(points_of(scan), recording.T_world_sensor(i), recording.time(i));
   } catch (const PoseError& error) {
     throw PoseError("scan " + recording.name(i) + ": " + error.what());
   }
@@ -47,9 +50,8 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
   for (std::size_t i = range.first; i <= range.last; ++i) {
     RecordedScan scan = scans.next(results.recycle());
     if (i == range.first) {
-      // Scans of one sensor differ little in size.
       const Clock::time_point begin = Clock::now();
-      remover.reserve(scan.size() + scan.size() / 16);
+      remover.reserve_like(points_of(scan), range.last - range.first + 1);
       timing.reserve = ms_since(begin);
     }
     const Clock::time_point begin = Clock::now();

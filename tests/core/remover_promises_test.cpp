@@ -279,8 +279,13 @@ TEST_CASE(
   const Config config = GENERATE(Config::paper(), Config());
   const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
   DynaInsRemover remover(config);
-  // Too little, and more than the scans need.
-  remover.reserve(GENERATE(std::size_t{0}, std::size_t{1000}, std::size_t{200000}));
+  // Too little, more than the scans need, and what they need.
+  const std::size_t points = GENERATE(std::size_t{0}, std::size_t{1000}, std::size_t{200000});
+  if (points > 0) {
+    remover.reserve(points);
+  } else {
+    remover.reserve_like(scans[0].points, GENERATE(std::size_t{0}, std::size_t{3}, scans.size()));
+  }
   const Run reserved = run(remover, scans);
   const Run plain = run(config, scans);
   CHECK(reserved.newest == plain.newest);

@@ -138,6 +138,18 @@ void adapt_stage(Stage& stage, const SensorModel& sensor) {
   if constexpr (WantsSensor<Stage>::value) stage.adapt(sensor);
 }
 
+/// Whether a stage has memory of its own for scans to come: `reserve(std::size_t scans)` is
+/// optional.
+template <class Stage, class = void>
+struct CanReserve : std::false_type {};
+template <class Stage>
+struct CanReserve<Stage, std::void_t<decltype(std::declval<Stage&>().reserve(std::size_t{}))>>
+    : std::true_type {};
+template <class Stage>
+void reserve_stage(Stage& stage, std::size_t scans) {
+  if constexpr (CanReserve<Stage>::value) stage.reserve(scans);
+}
+
 /// The paper's parameters of a stage; a stage without `Config::paper()` keeps its defaults.
 template <class Config, class = void>
 struct HasPaper : std::false_type {};
