@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -191,7 +190,8 @@ class CurvedVoxelClusterer {
         highest = max(highest, at.there(i_elevation, highest));
       });
       lowest_elevation_ = static_cast<std::int32_t>(min_lane(lowest));
-      highest_elevation_ = static_cast<std::int32_t>(std::floor(max_lane(highest)));
+      // Straight down may be a rounding error below 0; truncated, that is 0.
+      highest_elevation_ = static_cast<std::int32_t>(max_lane(highest));
     });
   }
 

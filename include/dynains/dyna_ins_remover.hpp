@@ -7,8 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -53,10 +53,11 @@ struct DefaultStages {
 /// Removes moving instances from a stream of scans, one scan at a time.
 ///
 /// Owns every buffer; once warm, a frame allocates nothing except when the map grows. Objects are
-/// independent of each other. One object serves one thread at a time: `push`, `flush`, `reset` and
-/// `reserve` throw UsageError while another of these calls is at work. Everything that is read from
-/// it, the map and the spans of a verdict, is read between two calls: by the thread that makes
-/// them, or by others under a lock that these calls are made under as well.
+/// independent of each other. One object serves one thread at a time: `push`, `flush`, `reset`,
+/// `reserve` and `reserve_like` throw UsageError while another of these calls is at work.
+/// Everything that is read from it, the map and the spans of a verdict, is read between two calls:
+/// by the thread that makes them, or by others under a lock that these calls are made under as
+/// well.
 template <class Stages = DefaultStages>
 class BasicDynaInsRemover {
  public:
@@ -170,7 +171,7 @@ class BasicDynaInsRemover {
   const SensorModel& sensor() const { return sensor_; }
 
   /// Gets the memory that scans like `example` need and touches it, so that the first scans do not
-  /// wait for the system to give it: 26 to 36 bytes per point for each scan that is open at once,
+  /// wait for the system to give it: 27 to 38 bytes per point for each scan that is open at once,
   /// window or latency() + 1 of them, and what the stages keep, for which the example is taken in
   /// some times and forgotten. `scans`: how many will come, if that is known. Other scans are
   /// welcome all the same, and results do not change. Throws UsageError once a scan was pushed.
@@ -186,8 +187,9 @@ class BasicDynaInsRemover {
       ring_[i].touch(more, config_.use_free_space);
     }
     const Rehearsal rehearsal(*this);
-    for (int i = 0; i < std::max(config_.window, 2); ++i) {
-      take_in(example, Eigen::Isometry3d::Identity(), 0.1 * i);
+    const auto enough = static_cast<std::size_t>(std::max(config_.window, 2));
+    for (std::size_t i = 0; i < std::min(scans, enough); ++i) {
+      take_in(example, Eigen::Isometry3d::Identity(), 0.1 * static_cast<double>(i));
     }
     if (config_.use_free_space) detail::reserve_stage(evidence_, scans);
   }
@@ -260,7 +262,7 @@ class BasicDynaInsRemover {
 
   void forget() {
     revision_.clear();
-    instance_ids_ = {};
+    instance_ids_.clear();
     sensor_ = {};
     pushed_ = 0;
     finished_ = 0;

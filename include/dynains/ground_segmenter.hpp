@@ -332,7 +332,7 @@ class GroundSegmenter {
         rest += length;
       } else {
         // Written to both places, since no branch could foretell the right one.
-        detail::PointRecord inside[detail::kLanes];
+        detail::PointRecord inside[detail::kLanes] = {};
         std::size_t found = 0;
         for (std::size_t k = 0; k < length; ++k) {
           const unsigned bit = (bits >> k) & 1U;

@@ -154,8 +154,8 @@ class RangeImage {
   const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
   const Cell* data() const { return cells_.get(); }
 
-  /// Gets the memory of an image and touches it, so that the system has given it before a scan needs
-  /// it.
+  /// Gets the memory of an image and touches it, so that the system has given it before a scan
+  /// needs it.
   void reserve(const RangeImageGrid& grid) {
     make_cells(grid.cell_count());
     std::fill_n(cells_.get(), cell_count_, Cell{kNothing, kUnknown});

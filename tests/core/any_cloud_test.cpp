@@ -76,6 +76,16 @@ TEST_CASE("labels do not depend on the type of the cloud") {
              return cloud;
            }) == expected));
   }
+  SECTION("raw numbers of which the coordinates come last") {
+    std::vector<float> floats;
+    CHECK((verdicts_of(scans, [&](const Points& points) {
+             floats.assign(1, -99.0F);
+             const std::vector<float> values = interleaved<float>(points, 4);
+             floats.insert(floats.end(), values.begin(), values.end() - 1);
+             floats.shrink_to_fit();  // nothing behind the last coordinate
+             return RawPoints<float>{floats.data() + 1, points.size(), 4};
+           }) == expected));
+  }
   SECTION("raw numbers with a stride") {
     std::vector<float> floats;
     std::vector<double> doubles;

@@ -190,6 +190,20 @@ TEST_CASE("a point at exactly the clustering range belongs to a cluster, the nex
   CHECK(clusters(make(0.5, 0.5, 3.0), points.view()) == std::vector<std::uint32_t>{0, kNoCluster});
 }
 
+TEST_CASE(
+    "a point straight below or above the sensor is a cluster, whatever was clustered before") {
+  const Config config = make(0.5, 0.5, 3.0);
+  CurvedVoxelClusterer clusterer(config);
+  for (const double z : {-5.0, 5.0, -0.1}) {
+    PolarBuffer points;
+    add(points, 0.0, 0.0, z);
+    CHECK(clusters(clusterer, points.view()) == std::vector<std::uint32_t>{0});
+    CHECK(clusters(config, points.view()) == std::vector<std::uint32_t>{0});
+    const PolarBuffer others = random_points(config, {3, 40, -180, 180, -20, 20}, 200, 1);
+    clusters(clusterer, others.view());
+  }
+}
+
 TEST_CASE("points that are not numbers belong to no cluster and disturb none") {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinity = std::numeric_limits<float>::infinity();

@@ -81,7 +81,8 @@ class Ingest {
     float* const z = points_.z.data() + count_;
     const auto point = [&cloud](std::size_t i) { return cloud.data + i * cloud.stride; };
     std::size_t i = 0;
-    for (; cloud.stride >= 4 && i + 4 <= length; i += 4) {
+    // Nothing need lie behind the coordinates of the last point.
+    for (; cloud.stride >= 4 && i + 4 <= length && begin + i + 4 < cloud.count; i += 4) {
       const std::size_t at = begin + i;
       __builtin_prefetch(point(std::min(at + kAhead, cloud.count - 1)));
       const auto columns = transposed({load_four(point(at)), load_four(point(at + 1)),

@@ -16,6 +16,9 @@ class InstanceIds {
  public:
   using Streaks = Span<const ClusterSet::Streak>;
 
+  /// Begins with the first id again.
+  void clear() { last_id_ = kNoInstance; }
+
   /// Fills `ids` with an id per cluster of this window. The points of the previous scan give their
   /// old clusters (`old_streaks`, with indices into `old_ids`) and their clusters in this window
   /// (`streaks`). A cluster takes the id that most of its points had; if two clusters want the

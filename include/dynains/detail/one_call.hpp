@@ -24,8 +24,8 @@ class OneCall {
     explicit Guard(OneCall& owner) : owner_(owner) {
       if (owner_.at_work_.exchange(true, std::memory_order_acquire)) {
         throw UsageError(
-            "DynaInsRemover: push, flush and reset must not be called while one of them is at "
-            "work; take one object for each thread, or a lock");
+            "DynaInsRemover: push, flush, reset and reserve must not be called while one of them "
+            "is at work; take one object for each thread, or a lock");
       }
     }
     ~Guard() { owner_.at_work_.store(false, std::memory_order_release); }

@@ -68,8 +68,8 @@ struct ScanSlot {
     detail::make_room(streaks, points / kFewestInStreak);
   }
 
-  /// The same, and touches what every scan writes, so that the system has given that memory before
-  /// a scan needs it. `evident`: proof is written, too.
+  /// The same, and touches what a verdict is written to, so that the system has given that memory
+  /// before a scan needs it. `evident`: proof is part of that.
   void touch(std::size_t points, bool evident) {
     make_room(points);
     split.resize(points);
