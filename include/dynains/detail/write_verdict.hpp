@@ -132,7 +132,7 @@ inline void rewrite_by_windows(ScanSlot& scan, int votes) {
 /// Most ground stays, and is already known to: eight points at a time. `belief`: by point of the
 /// split.
 inline void write_ground_by_evidence(ScanSlot& scan, Span<const float> belief) {
-  constexpr std::uint64_t kOnes = 0x0101010101010101U;
+  constexpr std::uint64_t kInEachByte = 0x0101010101010101U;
   constexpr auto kGround = static_cast<std::uint8_t>(Cause::kGround);
   const auto eight = [](const auto* bytes) {
     std::uint64_t word;
@@ -143,8 +143,8 @@ inline void write_ground_by_evidence(ScanSlot& scan, Span<const float> belief) {
   const std::size_t count = scan.split.ground_count;
   for (std::size_t begin = 0; begin < count; begin += kLanes) {
     const std::size_t end = std::min(begin + kLanes, count);
-    const bool stays = end - begin == kLanes && eight(&scan.is_kept[begin]) == kOnes &&
-                       eight(&scan.proof[begin]) == kOnes * kGround;
+    const bool stays = end - begin == kLanes && eight(&scan.is_kept[begin]) == kInEachByte &&
+                       eight(&scan.proof[begin]) == kInEachByte * kGround;
     for (std::size_t i = begin; !stays && i < end; ++i) {
       const bool dynamic = is_dynamic(scan.proof[i]);
       const std::uint32_t to = scan.split.input[i];
