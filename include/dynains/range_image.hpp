@@ -153,6 +153,8 @@ class RangeImage {
 
   const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
   const Cell* data() const { return cells_.get(); }
+  /// That of the grid by which it was built; 0 before.
+  std::size_t cell_count() const { return cell_count_; }
 
   /// Gets the memory of an image and touches it, so that the system has given it before a scan
   /// needs it.

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -104,12 +105,14 @@ class Sights {
   std::vector<std::uint8_t> free_, hit_;
 };
 
-/// Tests `count` samples against a reference. `samples`: m, padded for wide loads;
+/// Tests `count` samples against a reference, whose image is of that grid. `samples`: m, padded for
+/// wide loads;
 /// `T_reference_sample`: rigid. `margin` + `slope` * range: m, how much farther a beam must go to
 /// pass.
 inline void test_beams(const RangeImageGrid& grid, const RangeImage& image,
                        const Eigen::Isometry3f& T_reference_sample, const PointBuffer& samples,
                        std::size_t count, float margin, float slope, Sights& sights) {
+  assert(image.cell_count() == grid.cell_count());
   constexpr float kCentimetres = 100.0F;
   const LaneTransform to_reference(T_reference_sample.matrix().topRows<3>());
   const Constant8 to_centimetres(kCentimetres);

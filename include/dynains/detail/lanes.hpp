@@ -164,9 +164,7 @@ inline Float4 sqrt(Float4 a) {
 #if defined(__SSE2__)
   return _mm_sqrt_ps(a);
 #else
-  Float4 result;
-  for (int i = 0; i < 4; ++i) result[i] = std::sqrt(a[i]);
-  return result;
+  return Float4{std::sqrt(a[0]), std::sqrt(a[1]), std::sqrt(a[2]), std::sqrt(a[3])};
 #endif
 }
 inline Float8 sqrt(Float8 a) { return {sqrt(a.lo), sqrt(a.hi)}; }
