@@ -47,7 +47,10 @@ class FakeRemover {
     result.times.map = 0.5;
     return result;
   }
-  void reserve(std::size_t points) { reserved = points; }
+  void reserve_like(const RawPoints<float>& example, std::size_t scans) {
+    reserved_points = example.count;
+    reserved_scans = scans;
+  }
   template <class Sink>
   void flush(Sink&& sink) {
     while (finished_ < pushed_.size()) sink(finish());
@@ -55,7 +58,8 @@ class FakeRemover {
   Map map() const { return {}; }
 
   std::size_t fail_at = 1000;
-  std::size_t reserved = 0;
+  std::size_t reserved_points = 0;
+  std::size_t reserved_scans = 0;
 
  private:
   struct Scan {
@@ -126,7 +130,8 @@ TEST_CASE("Every scan gets its final labels, every dynamic point its place in th
   CHECK(results.finished() == 4);
   const std::size_t count = fixture.sequence->read_scan(1).size();
   CHECK(results.points() == 4 * count);
-  CHECK(fixture.remover.reserved >= count);
+  CHECK(fixture.remover.reserved_points == count);
+  CHECK(fixture.remover.reserved_scans == 4);
   CHECK(results.labels()[PointLabel::kDynamic] == 4);
   CHECK(results.labels()[PointLabel::kInvalid] == 4);
   CHECK(results.labels()[PointLabel::kStatic] == 4 * (count - 4));
