@@ -187,7 +187,6 @@ class FreeSpaceEvidence {
   struct View {
     std::uint64_t segment = kNoSegment;
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
-    RangeImageGrid grid;  // that of the sensor as it was known then
     RangeImage image;
   };
   struct Record {
@@ -207,7 +206,6 @@ class FreeSpaceEvidence {
   void make_image(const Eigen::Isometry3d& T_world_level, const GroundSplit& split, View& view) {
     const auto reach = static_cast<float>(config_.lateral_margin);
     view.T_world_sensor = T_world_level;
-    view.grid = grid_;
     if (!R_beams_level_) {
       view.image.build(grid_, split.ground(), split.non_ground(), reach, image_scratch_);
       return;
@@ -225,9 +223,9 @@ class FreeSpaceEvidence {
             const View& reference) {
     const Eigen::Isometry3d T_reference_sample =
         reference.T_world_sensor.inverse() * T_world_sensor;
-    detail::test_beams(reference.grid, reference.image, T_reference_sample.cast<float>(), samples,
-                       count, static_cast<float>(config_.margin),
-                       static_cast<float>(config_.margin_slope), sights_);
+    detail::test_beams(reference.image, T_reference_sample.cast<float>(), samples, count,
+                       static_cast<float>(config_.margin), static_cast<float>(config_.margin_slope),
+                       sights_);
   }
 
   // One reference for all samples of a scan. `lag`: scans from the samples to the reference.

@@ -153,14 +153,14 @@ class RangeImage {
 
   const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
   const Cell* data() const { return cells_.get(); }
-  /// That of the grid by which it was built; 0 before.
-  std::size_t cell_count() const { return cell_count_; }
+  /// The grid by which it was built; empty before.
+  const RangeImageGrid& grid() const { return grid_; }
 
   /// Gets the memory of an image and touches it, so that the system has given it before a scan
   /// needs it.
   void reserve(const RangeImageGrid& grid) {
-    make_cells(grid.cell_count());
-    std::fill_n(cells_.get(), cell_count_, Cell{kNothing, kUnknown});
+    make_cells(grid);
+    std::fill_n(cells_.get(), grid.cell_count(), Cell{kNothing, kUnknown});
   }
 
   /// Replaces the image by that of one scan (m, sensor frame). A return of an object protects what
@@ -310,7 +310,7 @@ class RangeImage {
     using namespace detail;
     const std::size_t stride = grid.stride();
     const auto rows = static_cast<std::size_t>(grid.rows);
-    make_cells(grid.cell_count());
+    make_cells(grid);
     scratch.least.resize(stride);
     scratch.count.resize(stride);
     for (std::size_t row = 0; row < rows; ++row) {
@@ -466,15 +466,17 @@ class RangeImage {
 
   // Without values: an image is the largest buffer of all, and each of its cells is written before
   // it is read but the first, which stands for all directions outside.
-  void make_cells(std::size_t count) {
-    if (count == cell_count_) return;
-    cells_ = std::unique_ptr<Cell[]>(new Cell[count]);
-    cells_[0] = {kNothing, kUnknown};
-    cell_count_ = count;
+  void make_cells(const RangeImageGrid& grid) {
+    const bool fits = grid.cell_count() == grid_.cell_count();
+    if (!fits) {
+      cells_ = std::unique_ptr<Cell[]>(new Cell[grid.cell_count()]);
+      cells_[0] = {kNothing, kUnknown};
+    }
+    grid_ = grid;
   }
 
   std::unique_ptr<Cell[]> cells_;
-  std::size_t cell_count_ = 0;
+  RangeImageGrid grid_;
 };
 
 }  // namespace dynains

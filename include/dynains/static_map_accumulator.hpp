@@ -192,7 +192,7 @@ class StaticMapAccumulator {
     std::uint32_t next;   // in the bucket; kEnd behind the last
 
     bool is_at(std::int32_t x, std::int32_t y, std::int32_t z) const {
-      return ((at.x ^ x) | (at.y ^ y) | (at.z ^ z)) == 0;
+      return at == Index{x, y, z};
     }
   };
 

@@ -13,6 +13,7 @@
 #include "dynains/io/recording.hpp"
 #include "evaluation_options.hpp"
 #include "experiment.hpp"
+#include "points_of.hpp"
 #include "recording_options.hpp"
 #include "remover_options.hpp"
 
@@ -65,8 +66,8 @@ std::vector<Component> measure(const RuntimeOptions& options) {
     for (std::size_t i = 0; i < sequence.size(); ++i) {
       sequence.read_scan(i, scan);
       const auto begin = std::chrono::steady_clock::now();
-      const FrameResult frame = remover.push(RawPoints<float>{scan.xyzi.data(), scan.size(), 4},
-                                             sequence.T_world_sensor(i), sequence.time(i));
+      const FrameResult frame =
+          remover.push(points_of(scan), sequence.T_world_sensor(i), sequence.time(i));
       const std::chrono::duration<double, std::milli> total =
           std::chrono::steady_clock::now() - begin;
       std::size_t next = 0;

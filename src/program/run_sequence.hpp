@@ -8,18 +8,14 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
-#include "dynains/point_cloud_traits.hpp"
 #include "dynains/scan_verdict.hpp"
 #include "dynains/stage_times.hpp"
+#include "points_of.hpp"
 #include "read_ahead.hpp"
 #include "run_results.hpp"
 #include "run_timing.hpp"
 
 namespace dynains::program {
-
-inline RawPoints<float> points_of(const RecordedScan& scan) {
-  return {scan.xyzi.data(), scan.size(), 4};
-}
 
 /// Pushes scan i. Throws PoseError that names the scan.
 template <class Remover>

@@ -262,7 +262,7 @@ TEST_CASE(
   Eigen::Isometry3f T_reference_sample = Eigen::Isometry3f::Identity();
   T_reference_sample.translation().x() = -5.0F;
   detail::Sights sights;
-  detail::test_beams(grid, image, T_reference_sample, samples, count, 0.25F, 0.01F, sights);
+  detail::test_beams(image, T_reference_sample, samples, count, 0.25F, 0.01F, sights);
   const std::vector<int> free = {1, 0, 0, 0, 0, 1, 0, 0};
   const std::vector<int> hit = {0, 1, 1, 1, 0, 0, 0, 0};
   for (std::size_t i = 0; i < count; ++i) {

@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
-#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -105,19 +104,17 @@ class Sights {
   std::vector<std::uint8_t> free_, hit_;
 };
 
-/// Tests `count` samples against a reference, whose image is of that grid. `samples`: m, padded for
-/// wide loads;
+/// Tests `count` samples against a reference. `samples`: m, padded for wide loads;
 /// `T_reference_sample`: rigid. `margin` + `slope` * range: m, how much farther a beam must go to
 /// pass.
-inline void test_beams(const RangeImageGrid& grid, const RangeImage& image,
-                       const Eigen::Isometry3f& T_reference_sample, const PointBuffer& samples,
-                       std::size_t count, float margin, float slope, Sights& sights) {
-  assert(image.cell_count() == grid.cell_count());
+inline void test_beams(const RangeImage& image, const Eigen::Isometry3f& T_reference_sample,
+                       const PointBuffer& samples, std::size_t count, float margin, float slope,
+                       Sights& sights) {
   constexpr float kCentimetres = 100.0F;
   const LaneTransform to_reference(T_reference_sample.matrix().topRows<3>());
   const Constant8 to_centimetres(kCentimetres);
   const Constant8 base(margin * kCentimetres), growth(slope * kCentimetres);
-  const ImageLocator locator(grid);
+  const ImageLocator locator(image.grid());
   const RangeImage::Cell* const cells = image.data();
   sights.resize(count);
   run_lanes([&](auto lanes) {

@@ -21,6 +21,12 @@ struct ClusterVerdict {
   Reach reach = Reach::kNoCluster;
 };
 
+/// Of the cluster of a streak; points without a cluster never come far.
+inline ClusterVerdict verdict_on(const ClusterSet::Streak& streak,
+                                 Span<const ClusterVerdict> verdicts) {
+  return streak.cluster != kNoCluster ? verdicts[streak.cluster] : ClusterVerdict();
+}
+
 /// What does not change any more: ground, and the points that are no part of the split.
 inline void begin_verdict(ScanSlot& scan) {
   scan.instances.assign(scan.labels.size(), kNoInstance);
@@ -54,8 +60,7 @@ inline void record_first(ScanSlot& scan, Span<const ClusterVerdict> verdicts) {
   scan.reach.resize(count);
   for (const ClusterSet::Streak& streak : scan.streaks) {
     const std::size_t length = streak.end - streak.begin;
-    const bool clustered = streak.cluster != kNoCluster;
-    const ClusterVerdict verdict = clustered ? verdicts[streak.cluster] : ClusterVerdict();
+    const ClusterVerdict verdict = verdict_on(streak, verdicts);
     std::fill_n(scan.reach.data() + streak.begin, length, verdict.reach);
     if (verdict.reach != Reach::kProposed) continue;
     std::fill_n(scan.votes.data() + streak.begin, length, verdict.dynamic);
@@ -91,12 +96,11 @@ inline void write_by_windows(ScanSlot& scan, Span<const ClusterVerdict> verdicts
   Cause* const causes = scan.causes.data();
   std::uint32_t* const instances = scan.instances.data();
   for (const ClusterSet::Streak& streak : scan.streaks) {
-    const bool clustered = streak.cluster != kNoCluster;
-    const ClusterVerdict verdict = clustered ? verdicts[streak.cluster] : ClusterVerdict();
+    const ClusterVerdict verdict = verdict_on(streak, verdicts);
     const bool dynamic = verdict.dynamic != 0;
     const PointLabel label = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
     const Cause cause = dynamic ? Cause::kProposed : cause_to_stay(verdict.reach);
-    const std::uint32_t id = clustered ? scan.ids[streak.cluster] : kNoInstance;
+    const std::uint32_t id = streak.cluster != kNoCluster ? scan.ids[streak.cluster] : kNoInstance;
     for (std::size_t i = streak.begin; i < streak.end; ++i) {
       labels[input[i]] = label;
       causes[input[i]] = cause;
