@@ -8,10 +8,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <numeric>
 #include <string>
 #include <vector>
 
 #include "dynains/detail/arc_tangent.hpp"
+#include "dynains/detail/bit_tables.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/room.hpp"
 #include "dynains/detail/wide_lanes.hpp"
@@ -135,12 +137,8 @@ class CurvedVoxelClusterer {
   std::size_t cluster_count() const { return cluster_count_; }
 
  private:
-  static constexpr std::size_t kBlock = 64;  // cells, a word of bits
-
-  struct Run {
-    std::int32_t begin, end;  // azimuth cells, end not included
-    std::uint32_t parent;     // union-find; the root is the smallest run number of its set
-  };
+  static constexpr int kBlockShift = 6;
+  static constexpr std::size_t kBlock = 1U << kBlockShift;  // cells, a word of bits
 
   // Cell of each point as (elevation * columns + range) * row + azimuth. Points too far away share
   // a column behind the last range. Rows have a power of two of cells: a shift is cheaper than a
@@ -202,7 +200,8 @@ class CurvedVoxelClusterer {
     const std::size_t blocks = row_count() * row_blocks();
     if (is_used_.size() < blocks) {
       is_used_.resize(blocks);
-      first_run_of_block_.resize(blocks);
+      occupied_.resize(blocks);
+      run_before_.resize(blocks);
       cells_.resize(blocks * kBlock);
     }
     // Read once: stores of bytes may change anything, as far as the compiler knows.
@@ -219,7 +218,7 @@ class CurvedVoxelClusterer {
 
   // Rows of one elevation: one for each range, and one for what is too far away.
   std::size_t columns() const { return static_cast<std::size_t>(ranges_) + 1; }
-  std::size_t row_blocks() const { return (std::size_t{1} << row_shift_) / kBlock; }
+  std::size_t row_blocks() const { return std::size_t{1} << (row_shift_ - kBlockShift); }
   std::size_t row_count() const {
     if (highest_elevation_ < 0) return 0;
     const std::int32_t elevations = highest_elevation_ - lowest_elevation_ + 1;
@@ -238,117 +237,140 @@ class CurvedVoxelClusterer {
     return block;
   }
 
-  // Cuts rows into runs. An occupied cell then holds the number of its run, counted from the first
-  // one of its block.
+  // Cuts rows into runs. A cell then holds how many runs of its block began up to there; 0 is the
+  // run that goes on from the block before.
   void find_runs() {
-    const std::size_t rows = row_count();
-    runs_.clear();
     used_blocks_.clear();
-    first_run_.resize(rows + 1);
-    for (std::size_t row = 0; row < rows; ++row) {
-      first_run_[row] = static_cast<std::uint32_t>(runs_.size());
-      std::int32_t open_end = -1;  // of the last run in this row
-      const std::size_t begin_of_row = row * row_blocks();
-      const std::size_t end_of_row = begin_of_row + row_blocks();
-      for (std::size_t block = next_used(begin_of_row, end_of_row); block < end_of_row;
-           block = next_used(block + 1, end_of_row)) {
-        used_blocks_.push_back(static_cast<std::uint32_t>(block));
-        std::uint8_t* const cells = &cells_[block * kBlock];
-        std::uint64_t occupied = detail::nonzero_bytes(cells);
-        const auto first_azimuth = static_cast<std::int32_t>((block - begin_of_row) * kBlock);
-        const bool goes_on = open_end == first_azimuth && (occupied & 1U) != 0;
-        const auto first = static_cast<std::uint32_t>(runs_.size() - (goes_on ? 1 : 0));
-        first_run_of_block_[block] = first;
-        while (occupied != 0) {
-          const int begin = __builtin_ctzll(occupied);
-          const std::uint64_t carried = occupied + (occupied & (~occupied + 1));
-          const int end = carried == 0 ? static_cast<int>(kBlock) : __builtin_ctzll(carried);
-          occupied &= carried;
-          open_end = first_azimuth + end;
-          if (goes_on && begin == 0) {
-            runs_.back().end = open_end;
-          } else {
-            runs_.push_back(
-                {first_azimuth + begin, open_end, static_cast<std::uint32_t>(runs_.size())});
-          }
-          const auto in_block = static_cast<std::uint8_t>(runs_.size() - 1 - first);
-          std::fill(cells + begin, cells + end, in_block);
-        }
-      }
+    const std::size_t blocks = row_count() * row_blocks();
+    std::uint32_t runs = 0;
+    for (std::size_t block = next_used(0, blocks); block < blocks;
+         block = next_used(block + 1, blocks)) {
+      used_blocks_.push_back(static_cast<std::uint32_t>(block));
+      occupied_[block] = detail::nonzero_bytes(&cells_[block * kBlock]);
+      run_before_[block] = runs - 1;
+      runs += detail::count_up_to(starts_in(block), &cells_[block * kBlock]);
     }
-    first_run_[rows] = static_cast<std::uint32_t>(runs_.size());
+    parent_.resize(runs);
+    std::iota(parent_.begin(), parent_.end(), 0U);
   }
 
+  // Of the runs of two rows that touch, also across the azimuth seam, one begins in the other, or
+  // just behind it.
   void join_runs() {
-    const std::size_t rows = row_count();
-    for (std::size_t row = 0; row < rows; ++row) {
-      if (first_run_[row] == first_run_[row + 1] || is_beyond(row)) continue;
-      join_rows(row, row);
-      const bool has_nearer = row % columns() > 0;
-      if (has_nearer) join_rows(row, row - 1);
-      if (row < columns()) continue;
+    std::size_t first_row = 0;  // of an elevation
+    for (const std::uint32_t block : used_blocks_) {
+      const std::size_t row = block >> (row_shift_ - kBlockShift);
+      while (row >= first_row + columns()) first_row += columns();
+      if (is_beyond(row - first_row)) {
+        leave_alone(block);
+        continue;
+      }
+      join_seam(block, row);
+      const bool has_nearer = row > first_row;
+      if (has_nearer) join_block(block, row - 1);
+      if (first_row == 0) continue;
       const std::size_t below = row - columns();
-      if (has_nearer) join_rows(row, below - 1);
-      join_rows(row, below);
-      if (!is_beyond(below + 1)) join_rows(row, below + 1);
+      if (has_nearer) join_block(block, below - 1);
+      join_block(block, below);
+      if (!is_beyond(row + 1 - first_row)) join_block(block, below + 1);
     }
   }
 
-  bool is_beyond(std::size_t row) const { return row % columns() + 1 == columns(); }
-
-  // Joins the runs of two rows that overlap or touch at a corner, also across the azimuth seam.
-  void join_rows(std::size_t row_a, std::size_t row_b) {
-    const std::uint32_t end_a = first_run_[row_a + 1];
-    const std::uint32_t end_b = first_run_[row_b + 1];
-    std::uint32_t a = first_run_[row_a];
-    std::uint32_t b = first_run_[row_b];
-    if (b == end_b) return;
-    if (runs_[a].begin == 0 && runs_[end_b - 1].end == azimuths_) join(a, end_b - 1);
-    if (runs_[b].begin == 0 && runs_[end_a - 1].end == azimuths_) join(b, end_a - 1);
-    if (row_a == row_b) return;
-    while (a < end_a && b < end_b) {
-      if (runs_[a].begin <= runs_[b].end && runs_[b].begin <= runs_[a].end) join(a, b);
-      if (runs_[a].end < runs_[b].end) {
-        ++a;
-      } else {
-        ++b;
-      }
+  bool is_beyond(std::size_t column) const { return column + 1 == columns(); }
+  void leave_alone(std::size_t block) {
+    for (std::uint64_t left = starts_in(block); left != 0; left &= left - 1) {
+      parent_[run_of(block * kBlock + static_cast<std::size_t>(__builtin_ctzll(left)))] =
+          kNoCluster;
     }
+  }
+
+  // Joins the runs in a block with those of another row that overlap or touch at a corner.
+  void join_block(std::size_t block, std::size_t row) {
+    join_seam(block, row);
+    const std::size_t other = row * row_blocks() + place_in_row(block);
+    const std::uint64_t here = occupied_[block];
+    const std::uint64_t there = occupied_[other];
+    const std::uint64_t carried_here = carried_into(block);
+    const std::uint64_t carried_there = carried_into(other);
+    const std::uint64_t up_to_here = here | here << 1U | carried_here;
+    const std::uint64_t up_to_there = there | there << 1U | carried_there;
+    const std::uint64_t starts_here = here & ~(here << 1U | carried_here);
+    const std::uint64_t starts_there = there & ~(there << 1U | carried_there);
+    for (std::uint64_t left = (starts_here & up_to_there) | (starts_there & up_to_here); left != 0;
+         left &= left - 1) {
+      const auto at = static_cast<std::size_t>(__builtin_ctzll(left));
+      join(run_at_or_before(block, at), run_at_or_before(other, at));
+    }
+    // The block behind this one may hold nothing.
+    if (here >> (kBlock - 1) != 0 && place_in_row(other + 1) != 0 &&
+        (occupied_[other + 1] & 1U) != 0) {
+      join(run_of(block * kBlock + kBlock - 1), run_of((other + 1) * kBlock));
+    }
+  }
+
+  // The same across the seam.
+  void join_seam(std::size_t block, std::size_t row) {
+    const std::size_t first = row * row_blocks() * kBlock;
+    const std::size_t last = first + static_cast<std::size_t>(azimuths_) - 1;
+    const std::size_t in_row = place_in_row(block);
+    const std::size_t last_here = static_cast<std::size_t>(azimuths_) - 1 - in_row * kBlock;
+    if (in_row == 0 && is_occupied(block * kBlock) && is_occupied(last)) {
+      join(run_of(block * kBlock), run_of(last));
+    }
+    if (last_here < kBlock && is_occupied(block * kBlock + last_here) && is_occupied(first)) {
+      join(run_of(block * kBlock + last_here), run_of(first));
+    }
+  }
+
+  // Rows have a power of two of blocks.
+  std::size_t place_in_row(std::size_t block) const { return block & (row_blocks() - 1); }
+  bool is_occupied(std::size_t cell) const {
+    return (occupied_[cell / kBlock] >> cell % kBlock & 1U) != 0;
+  }
+  // Whether the last cell before a block is occupied.
+  std::uint64_t carried_into(std::size_t block) const {
+    return place_in_row(block) == 0 ? 0 : occupied_[block - 1] >> (kBlock - 1);
+  }
+  // Cells of a block with which a run begins.
+  std::uint64_t starts_in(std::size_t block) const {
+    const std::uint64_t occupied = occupied_[block];
+    return occupied & ~(occupied << 1U | carried_into(block));
+  }
+
+  // Of an occupied cell.
+  std::uint32_t run_of(std::size_t cell) const { return run_before_[cell / kBlock] + cells_[cell]; }
+  // Of a cell or of the one before it.
+  std::uint32_t run_at_or_before(std::size_t block, std::size_t at) const {
+    const std::size_t cell = block * kBlock + at;
+    return run_of((occupied_[block] >> at & 1U) != 0 ? cell : cell - 1);
   }
 
   std::uint32_t root(std::uint32_t run) {
-    while (runs_[run].parent != run) {
-      runs_[run].parent = runs_[runs_[run].parent].parent;
-      run = runs_[run].parent;
+    while (parent_[run] != run) {
+      parent_[run] = parent_[parent_[run]];
+      run = parent_[run];
     }
     return run;
   }
 
+  // The root of a set is its first run.
   void join(std::uint32_t a, std::uint32_t b) {
+    if (parent_[a] == parent_[b]) return;
     a = root(a);
     b = root(b);
-    if (a < b) {
-      runs_[b].parent = a;
-    } else {
-      runs_[a].parent = b;
-    }
+    parent_[std::max(a, b)] = std::min(a, b);
   }
 
-  // A root comes before the other runs of its set.
+  // Parents come first.
   void number_runs() {
-    number_of_run_.resize(runs_.size());
+    number_of_run_.resize(parent_.size());
     cluster_count_ = 0;
-    const std::size_t rows = row_count();
-    for (std::size_t row = 0; row < rows; ++row) {
-      const std::uint32_t end = first_run_[row + 1];
-      for (std::uint32_t run = first_run_[row]; run < end; ++run) {
-        if (is_beyond(row)) {
-          number_of_run_[run] = kNoCluster;
-        } else if (runs_[run].parent == run) {
-          number_of_run_[run] = static_cast<std::uint32_t>(cluster_count_++);
-        } else {
-          number_of_run_[run] = number_of_run_[root(run)];
-        }
+    for (std::size_t run = 0; run < parent_.size(); ++run) {
+      const std::uint32_t parent = parent_[run];
+      if (parent == run) {
+        number_of_run_[run] = static_cast<std::uint32_t>(cluster_count_++);
+      } else {
+        number_of_run_[run] = parent == kNoCluster ? kNoCluster : number_of_run_[parent];
       }
     }
   }
@@ -356,19 +378,20 @@ class CurvedVoxelClusterer {
   void number_points(std::size_t count) {
     const std::int32_t* const cell_of = cell_of_.data();
     const std::uint8_t* const cells = cells_.data();
-    const std::uint32_t* const first_run_of_block = first_run_of_block_.data();
+    const std::uint32_t* const run_before = run_before_.data();
     const std::uint32_t* const number_of_run = number_of_run_.data();
     std::uint32_t* const cluster_of = cluster_of_.data();
     const std::size_t first_cell = first_cell_;
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t cell = static_cast<std::size_t>(cell_of[i]) - first_cell;
-      cluster_of[i] = number_of_run[first_run_of_block[cell / kBlock] + cells[cell]];
+      cluster_of[i] = number_of_run[run_before[cell / kBlock] + cells[cell]];
     }
   }
 
   void clear_cells() {
     for (const std::uint32_t block : used_blocks_) {
       is_used_[block] = 0;
+      occupied_[block] = 0;
       std::memset(&cells_[block * kBlock], 0, kBlock);
     }
   }
@@ -387,11 +410,12 @@ class CurvedVoxelClusterer {
   std::vector<std::int32_t> cell_of_;
   std::vector<std::uint32_t> cluster_of_;
   std::vector<std::uint8_t> cells_;
-  std::vector<std::uint8_t> is_used_;  // by block
-  std::vector<std::uint32_t> first_run_of_block_;
+  // By block.
+  std::vector<std::uint8_t> is_used_;
+  std::vector<std::uint64_t> occupied_;  // a bit for each cell
+  std::vector<std::uint32_t> run_before_;
   std::vector<std::uint32_t> used_blocks_;
-  std::vector<Run> runs_;
-  std::vector<std::uint32_t> first_run_;
+  std::vector<std::uint32_t> parent_;  // by run; the root is the first run of its set
   std::vector<std::uint32_t> number_of_run_;
 };
 

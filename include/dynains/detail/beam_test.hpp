@@ -3,12 +3,12 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <vector>
 
+#include "dynains/detail/bit_tables.hpp"
 #include "dynains/detail/lane_transform.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/room.hpp"
@@ -20,26 +20,6 @@ namespace dynains::detail {
 
 /// Beams that are tested together.
 inline constexpr std::size_t kBeamBlock = 128;
-
-constexpr std::array<std::uint8_t, 256> count_ones() {
-  std::array<std::uint8_t, 256> ones{};
-  for (std::size_t i = 1; i < ones.size(); ++i) {
-    ones[i] = static_cast<std::uint8_t>(ones[i / 2] + i % 2);
-  }
-  return ones;
-}
-/// Set bits of every byte.
-inline constexpr std::array<std::uint8_t, 256> kOnes = count_ones();
-
-constexpr std::array<std::array<std::uint8_t, 8>, 256> spread_bits() {
-  std::array<std::array<std::uint8_t, 8>, 256> bytes{};
-  for (std::size_t i = 0; i < bytes.size(); ++i) {
-    for (std::size_t bit = 0; bit < 8; ++bit) bytes[i][bit] = i >> bit & 1U;
-  }
-  return bytes;
-}
-/// Every bit of a byte as a byte.
-inline constexpr std::array<std::array<std::uint8_t, 8>, 256> kBytesOfBits = spread_bits();
 
 /// What one reference says of many samples, a bit each.
 class Sights {
