@@ -184,7 +184,7 @@ class BasicDynaInsRemover {
     const std::size_t points = PointCloudTraits<Cloud>::size(example);
     const std::size_t more = points + points / 16;  // scans of one sensor differ a little in size
     for (std::size_t i = 0; i < std::min(scans, ring_.size()); ++i) {
-      ring_[i].touch(more, config_.use_free_space);
+      ring_[i].touch(more);
     }
     const Rehearsal rehearsal(*this);
     const auto enough = static_cast<std::size_t>(std::max(config_.window, 2));
@@ -279,7 +279,6 @@ class BasicDynaInsRemover {
     ScanSlot& newest = begin_scan(T_world_sensor, time);
     ingest(cloud, newest);
     newest.make_room(newest.labels.size());
-    detail::make_room(evident_belief_, newest.labels.size());
     if (needs_sensor() && !sensor_.known()) {
       adapt_to_sensor(newest);
       if (turns()) ingest_.turn(turn_pose(newest));
@@ -502,9 +501,9 @@ class BasicDynaInsRemover {
   // Verdict by point: at least `votes` windows said so, or the evidence does.
   void decide(ScanSlot& scan, int votes, bool is_final, StageClock& clock, StageTimes& times) {
     if (config_.use_free_space) {
-      evidence_.judge(scan.scan, is_final, scan.split, scan.proof, evident_belief_);
+      const EvidenceVerdict said = evidence_.judge(scan.scan, is_final, scan.split);
       clock.lap(times.evidence);
-      detail::write_by_evidence(scan, evident_belief_, compares_windows(), votes);
+      detail::write_by_evidence(scan, said, compares_windows(), votes, of_group_);
     } else {
       detail::rewrite_by_windows(scan, votes);
     }
@@ -548,7 +547,7 @@ class BasicDynaInsRemover {
   std::vector<std::uint32_t> scan_begin_;
   ClusterSet clusters_;
   std::vector<detail::ClusterVerdict> verdict_;
-  std::vector<float> evident_belief_;  // by point of the split judged last
+  std::vector<detail::GroupVerdict> of_group_;
   detail::InstanceIds instance_ids_;
 
   detail::OneCall one_call_;

@@ -17,6 +17,7 @@
 #include "dynains/detail/beam_test.hpp"
 #include "dynains/detail/free_space_sum.hpp"
 #include "dynains/detail/turn.hpp"
+#include "dynains/evidence_verdict.hpp"
 #include "dynains/free_space_config.hpp"
 #include "dynains/ground_footprint.hpp"
 #include "dynains/ground_segmenter.hpp"
@@ -140,22 +141,25 @@ class FreeSpaceEvidence {
     if (config_.use_tracks) run_beliefs(scan);
   }
 
-  /// Verdict on a scan that is at most `horizon()` old, as the evidence stands now: by point of
-  /// `split`, why it moved or stayed (see is_dynamic), and the belief that it moved; of ground only
-  /// where it moved. Nothing is presumed in a final verdict.
-  void judge(std::uint64_t scan, bool is_final, const GroundSplit& split,
-             std::vector<Cause>& causes, std::vector<float>& belief) {
+  /// Verdict on a scan that is at most `horizon()` old, as the evidence stands now. Nothing is
+  /// presumed in a final verdict. `split`: that of the scan. The spans hold until the next call.
+  EvidenceVerdict judge(std::uint64_t scan, bool is_final, const GroundSplit& split) {
     const Record& record = record_of(scan);
     judge_instances(scan, is_final, record);
-    causes.resize(split.count);
-    belief.resize(split.count);
-    std::fill_n(causes.begin(), split.ground_count, Cause::kGround);
-    spread(record.samples, split, causes.data() + split.ground_count,
-           belief.data() + split.ground_count);
-    if (footprint_.empty()) return;
-    footprint_.spread();
-    judge_ground(scan, record, split, causes, belief);
-    footprint_.clear();
+    const InstanceSamples& samples = record.samples;
+    groups_of_points_.assign(1, {Cause::kNotJudged, 0.0F});
+    groups_of_points_.resize(samples.met.size());
+    for (std::size_t i = 1; i < samples.met.size(); ++i) {
+      groups_of_points_[i] = verdicts_[samples.met[i]];
+    }
+    moved_ground_.clear();
+    add_footprint(split.non_ground(), samples.met_of);
+    if (!footprint_.empty()) {
+      footprint_.spread();
+      judge_ground(scan, record, split.ground());
+      footprint_.clear();
+    }
+    return {groups_of_points_, samples.met_of, moved_ground_};
   }
 
   /// What the scan observed last saw of the first `count` points (m; padded for wide loads).
@@ -174,10 +178,7 @@ class FreeSpaceEvidence {
     float peak = 0.0F;           // the highest it was
     std::uint8_t contested = 0;  // whether some reference hit the place
   };
-  struct Verdict {
-    Cause cause;
-    float belief;
-  };
+  using Verdict = EvidenceVerdict::Group;
   // Samples of an instance.
   struct Share {
     std::uint32_t total = 0;
@@ -490,32 +491,26 @@ class FreeSpaceEvidence {
            static_cast<float>(share.decided) <= kUnknown * static_cast<float>(share.total);
   }
 
-  // From supervoxels to points.
-  void spread(const InstanceSamples& samples, const GroundSplit& split, Cause* causes,
-              float* belief) {
-    by_met_.assign(1, {Cause::kNotJudged, 0.0F});
-    by_met_.resize(samples.met.size());
-    for (std::size_t i = 1; i < by_met_.size(); ++i) by_met_[i] = verdicts_[samples.met[i]];
-    const PointsView points = split.non_ground();
-    const Verdict* const verdicts = by_met_.data();
-    const std::uint32_t* const met_of = samples.met_of.data();
-    const auto spread_to = [&](std::size_t begin, std::size_t end) {
-      bool any = false;
-      for (std::size_t i = begin; i < end; ++i) {
-        const Verdict& verdict = verdicts[met_of[i]];
-        causes[i] = verdict.cause;
-        belief[i] = verdict.belief;
-        any |= is_dynamic(verdict.cause);
-      }
-      for (std::size_t i = begin; any && i < end; ++i) {
-        if (is_dynamic(causes[i])) footprint_.add(points.x[i], points.y[i], points.z[i]);
-      }
-    };
-    std::size_t begin = 0;
-    for (; begin + detail::kLanes <= points.size(); begin += detail::kLanes) {
-      spread_to(begin, begin + detail::kLanes);
+  // What points of removed groups stand on.
+  void add_footprint(PointsView points, Span<const std::uint32_t> group_of) {
+    detail::grow(moved_, groups_of_points_.size());
+    bool any = false;
+    for (std::size_t i = 0; i < groups_of_points_.size(); ++i) {
+      const bool moved = is_dynamic(groups_of_points_[i].cause);
+      moved_[i] = moved ? 1 : 0;
+      any |= moved;
     }
-    spread_to(begin, points.size());
+    if (!any) return;
+    const std::uint8_t* const moved = moved_.data();
+    const std::uint32_t* const group = group_of.data();
+    for (std::size_t begin = 0; begin < points.size(); begin += detail::kLanes) {
+      const std::size_t end = std::min(begin + detail::kLanes, points.size());
+      unsigned some = 0;
+      for (std::size_t i = begin; i < end; ++i) some |= moved[group[i]];
+      for (std::size_t i = begin; some != 0 && i < end; ++i) {
+        if (moved[group[i]] != 0) footprint_.add(points.x[i], points.y[i], points.z[i]);
+      }
+    }
   }
 
   // Most supervoxels were never seen free: they need no exponential.
@@ -525,12 +520,10 @@ class FreeSpaceEvidence {
 
   // Ground beside removed points: what stands within their footprint goes with them, and what two
   // references saw free was no ground.
-  void judge_ground(std::uint64_t scan, const Record& record, const GroundSplit& split,
-                    std::vector<Cause>& causes, std::vector<float>& belief) {
-    const PointsView ground = split.ground();
+  void judge_ground(std::uint64_t scan, const Record& record, PointsView ground) {
     const auto remove = [&](std::size_t point, Cause cause) {
-      causes[point] = cause;
-      belief[point] = static_cast<float>(config_.tau_free);
+      moved_ground_.push_back(
+          {static_cast<std::uint32_t>(point), {cause, static_cast<float>(config_.tau_free)}});
     };
     const bool tests = config_.ground_reach > 0.0;
     detail::grow(near_ground_, ground.size());
@@ -553,6 +546,7 @@ class FreeSpaceEvidence {
   // Ground that enough of all references saw free, of the first `tested_` of `tested_points_`.
   template <class Remove>
   void test_ground(std::uint64_t scan, const Record& record, Remove&& remove) {
+    if (tested_ == 0) return;
     detail::grow(one_instance_, tested_);
     ground_sampler_.sample(PointsView(tested_points_).subview(0, tested_),
                            Span<const std::uint32_t>(one_instance_).subspan(0, tested_), 1,
@@ -561,7 +555,6 @@ class FreeSpaceEvidence {
     ground_free_.assign((count + 7) / 8 * 8, 0);
     ground_hit_.assign((count + 7) / 8 * 8, 0);
     for (const int lag : kLags) {
-      if (count == 0) break;
       const auto distance = static_cast<std::uint64_t>(lag);
       if (lag <= config_.memory && distance <= scan) count_ground(record, scan - distance);
       if (lag <= config_.horizon) count_ground(record, scan + distance);
@@ -626,7 +619,10 @@ class FreeSpaceEvidence {
   RangeImage::Scratch image_scratch_;
   detail::Sights sights_;
   std::vector<Verdict> verdicts_;  // by supervoxel
-  std::vector<Verdict> by_met_;    // by position in InstanceSamples::met
+  // By position in InstanceSamples::met.
+  std::vector<Verdict> groups_of_points_;
+  std::vector<std::uint8_t> moved_;
+  std::vector<EvidenceVerdict::GroundPoint> moved_ground_;
   std::vector<std::uint32_t> free_;
   std::vector<std::uint32_t> predecessors_;
   InstanceSamples ground_samples_;

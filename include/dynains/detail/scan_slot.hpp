@@ -9,6 +9,7 @@
 #include "dynains/cause.hpp"
 #include "dynains/cluster_set.hpp"
 #include "dynains/detail/room.hpp"
+#include "dynains/evidence_verdict.hpp"
 #include "dynains/ground_segmenter.hpp"
 #include "dynains/points.hpp"
 #include "dynains/scan_verdict.hpp"
@@ -47,8 +48,10 @@ struct ScanSlot {
   // Of the window in which this scan was the newest: its points, and ids by cluster.
   std::vector<ClusterSet::Streak> streaks;
   std::vector<std::uint32_t> ids;
+  // What the evidence of other scans said last: by group, and which points of the ground moved.
+  std::vector<EvidenceVerdict::Group> proof;
+  std::vector<std::uint32_t> moved_ground;
   // By point of the split, ground first.
-  std::vector<Cause> proof;           // by the evidence of other scans
   std::vector<std::uint8_t> is_kept;  // verdict: static
   // By input point.
   std::vector<PointLabel> labels;
@@ -60,7 +63,6 @@ struct ScanSlot {
   void make_room(std::size_t points) {
     const auto make_room_in = [points](auto& values) { detail::make_room(values, points); };
     for_each_verdict(make_room_in);
-    make_room_in(proof);
     make_room_in(reach);
     make_room_in(first_reach);
     make_room_in(votes);
@@ -69,8 +71,8 @@ struct ScanSlot {
   }
 
   /// The same, and touches what a verdict is written to, so that the system has given that memory
-  /// before a scan needs it. `evident`: proof is part of that.
-  void touch(std::size_t points, bool evident) {
+  /// before a scan needs it.
+  void touch(std::size_t points) {
     make_room(points);
     split.resize(points);
     split.resize(0);
@@ -79,7 +81,6 @@ struct ScanSlot {
       values.clear();
     };
     for_each_verdict(touch_one);
-    if (evident) touch_one(proof);
   }
 
   std::size_t non_ground_count() const { return split.count - split.ground_count; }

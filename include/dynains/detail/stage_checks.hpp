@@ -10,6 +10,7 @@
 
 #include "dynains/cause.hpp"
 #include "dynains/cluster_set.hpp"
+#include "dynains/evidence_verdict.hpp"
 #include "dynains/ground_segmenter.hpp"
 #include "dynains/points.hpp"
 #include "dynains/polar_points.hpp"
@@ -79,10 +80,10 @@ struct IsEvidence<
         decltype(std::declval<Stage&>().observe(
             std::uint64_t{}, std::uint64_t{}, std::declval<const Eigen::Isometry3d&>(),
             std::declval<const GroundSplit&>(), Span<const std::uint32_t>(), std::size_t{})),
-        decltype(std::declval<Stage&>().judge(
-            std::uint64_t{}, bool{}, std::declval<const GroundSplit&>(),
-            std::declval<std::vector<Cause>&>(), std::declval<std::vector<float>&>())),
         std::enable_if_t<
+            std::is_convertible_v<decltype(std::declval<Stage&>().judge(
+                                      std::uint64_t{}, bool{}, std::declval<const GroundSplit&>())),
+                                  EvidenceVerdict> &&
             std::is_convertible_v<decltype(std::declval<const Stage&>().horizon()), std::size_t> &&
             std::is_convertible_v<decltype(std::declval<const Stage&>().predecessors()),
                                   Span<const std::uint32_t>>>>> : std::true_type {};

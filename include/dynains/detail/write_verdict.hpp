@@ -4,12 +4,13 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
+#include <vector>
 
 #include "dynains/cause.hpp"
 #include "dynains/cluster_set.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/scan_slot.hpp"
+#include "dynains/evidence_verdict.hpp"
 #include "dynains/points.hpp"
 
 namespace dynains::detail {
@@ -33,6 +34,8 @@ inline void begin_verdict(ScanSlot& scan) {
   scan.beliefs.assign(scan.labels.size(), 0.0F);
   scan.causes.assign(scan.labels.size(), Cause::kNotJudged);
   scan.is_kept.assign(scan.split.count, 1);
+  scan.proof.clear();
+  scan.moved_ground.clear();
   const std::uint32_t* const input = scan.split.input.data();
   PointLabel* const labels = scan.labels.data();
   Cause* const causes = scan.causes.data();
@@ -133,60 +136,76 @@ inline void rewrite_by_windows(ScanSlot& scan, int votes) {
   }
 }
 
-/// Most ground stays, and is already known to: eight points at a time. `belief`: by point of the
-/// split.
-inline void write_ground_by_evidence(ScanSlot& scan, Span<const float> belief) {
-  constexpr std::uint64_t kInEachByte = 0x0101010101010101U;
-  constexpr auto kGround = static_cast<std::uint8_t>(Cause::kGround);
-  const auto eight = [](const auto* bytes) {
-    std::uint64_t word;
-    static_assert(sizeof(*bytes) == 1 && sizeof(word) == kLanes);
-    std::memcpy(&word, bytes, sizeof(word));
-    return word;
+/// Ground moved where the evidence says so now; `said` of it only.
+inline void write_ground_by_evidence(ScanSlot& scan,
+                                     Span<const EvidenceVerdict::GroundPoint> said) {
+  const auto write = [&scan](std::uint32_t point, PointLabel label,
+                             EvidenceVerdict::Group verdict) {
+    const std::uint32_t to = scan.split.input[point];
+    scan.is_kept[point] = label == PointLabel::kGround ? 1 : 0;
+    scan.labels[to] = label;
+    scan.causes[to] = verdict.cause;
+    scan.beliefs[to] = verdict.belief;
   };
-  const std::size_t count = scan.split.ground_count;
-  for (std::size_t begin = 0; begin < count; begin += kLanes) {
-    const std::size_t end = std::min(begin + kLanes, count);
-    const bool stays = end - begin == kLanes && eight(&scan.is_kept[begin]) == kInEachByte &&
-                       eight(&scan.proof[begin]) == kInEachByte * kGround;
-    for (std::size_t i = begin; !stays && i < end; ++i) {
-      const bool dynamic = is_dynamic(scan.proof[i]);
-      const std::uint32_t to = scan.split.input[i];
-      scan.is_kept[i] = dynamic ? 0 : 1;
-      scan.labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kGround;
-      scan.causes[to] = scan.proof[i];
-      scan.beliefs[to] = dynamic ? belief[i] : 0.0F;
-    }
+  for (const std::uint32_t point : scan.moved_ground) {
+    write(point, PointLabel::kGround, {Cause::kGround, 0.0F});
+  }
+  scan.moved_ground.clear();
+  for (const EvidenceVerdict::GroundPoint& moved : said) {
+    write(moved.point, PointLabel::kDynamic, moved.verdict);
+    scan.moved_ground.push_back(moved.point);
   }
 }
 
-/// The verdict by the evidence of other scans (`proof` and `belief`, by point of the split), and by
-/// windows where `compared`.
-inline void write_by_evidence(ScanSlot& scan, Span<const float> belief, bool compared, int votes) {
-  write_ground_by_evidence(scan, belief);
+/// What a group's points get.
+struct GroupVerdict {
+  float belief;
+  PointLabel label;
+  Cause cause;
+  std::uint8_t is_kept;
+  std::uint8_t is_news;  // not what was said of it before
+};
+
+/// The verdict by the evidence of other scans, and by windows where `compared`. `of_group`:
+/// scratch.
+inline void write_by_evidence(ScanSlot& scan, const EvidenceVerdict& said, bool compared, int votes,
+                              std::vector<GroupVerdict>& of_group) {
+  write_ground_by_evidence(scan, said.ground);
+  const auto verdict_of = [](EvidenceVerdict::Group group, bool is_news) -> GroupVerdict {
+    const bool dynamic = is_dynamic(group.cause);
+    return {group.belief, dynamic ? PointLabel::kDynamic : PointLabel::kStatic, group.cause,
+            static_cast<std::uint8_t>(dynamic ? 0 : 1), static_cast<std::uint8_t>(is_news ? 1 : 0)};
+  };
+  const bool is_first = scan.proof.empty();
+  of_group.resize(said.groups.size());
+  for (std::size_t g = 0; g < of_group.size(); ++g) {
+    of_group[g] = verdict_of(said.groups[g], is_first || !(said.groups[g] == scan.proof[g]));
+  }
+  scan.proof.assign(said.groups.begin(), said.groups.end());
+
   // Read once: stores of bytes may change anything, as far as the compiler knows.
   const std::size_t ground_count = scan.split.ground_count;
   const std::size_t count = scan.non_ground_count();
   const std::uint32_t* const input = scan.split.input.data() + ground_count;
-  const Cause* const proof = scan.proof.data() + ground_count;
-  const float* const evidence = belief.data() + ground_count;
+  const std::uint32_t* const group = said.group_of.data();
+  const GroupVerdict* const verdicts = of_group.data();
   std::uint8_t* const is_kept = scan.is_kept.data() + ground_count;
   PointLabel* const labels = scan.labels.data();
   Cause* const causes = scan.causes.data();
   float* const beliefs = scan.beliefs.data();
   for (std::size_t i = 0; i < count; ++i) {
-    Cause cause = proof[i];
-    float by_windows = 0.0F;
+    GroupVerdict verdict = verdicts[group[i]];
     if (compared && scan.reach[i] == Reach::kProposed) {
-      by_windows = scan.belief[i];
-      if (scan.votes[i] >= votes && !is_dynamic(cause)) cause = Cause::kProposed;
+      const bool voted = scan.votes[i] >= votes && verdict.is_kept != 0;
+      const float belief = std::max(scan.belief[i], verdict.belief);
+      verdict = verdict_of({voted ? Cause::kProposed : verdict.cause, belief}, true);
     }
-    const bool dynamic = is_dynamic(cause);
+    if (verdict.is_news == 0) continue;
     const std::uint32_t to = input[i];
-    is_kept[i] = dynamic ? 0 : 1;
-    labels[to] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
-    causes[to] = cause;
-    beliefs[to] = std::max(by_windows, evidence[i]);
+    is_kept[i] = verdict.is_kept;
+    labels[to] = verdict.label;
+    causes[to] = verdict.cause;
+    beliefs[to] = verdict.belief;
   }
 }
 
