@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "dynains/curved_voxel_clusterer.hpp"
-#include "dynains/detail/cell_hash.hpp"
+#include "dynains/detail/cell_memory.hpp"
 #include "dynains/detail/wide_lanes.hpp"
 #include "dynains/points.hpp"
 
@@ -86,24 +86,14 @@ class InstanceSampler {
     for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
       const std::size_t size = std::min(kBlock, points.size() - begin);
       find_voxels(points.subview(begin, size), instance_of.data() + begin);
-      find_runs(begin, size);
-      for (std::size_t run = 1; run <= runs_; ++run) met_of_run_[run] = take_run(run_[run]);
-      spread_runs(size, out.met_of.data() + begin);
+      find_new_voxels(size);
+      find_supervoxels();
+      take_samples(begin, size, out.met_of.data() + begin);
     }
     order(points, instance_count, out);
   }
 
  private:
-  struct Voxel {
-    SupervoxelPlace place;
-    std::uint32_t instance;
-  };
-  // Consecutive points in one voxel, or without instance.
-  struct Run {
-    Voxel voxel;
-    std::uint32_t begin;
-    std::uint32_t slot;
-  };
   struct Sample {
     std::uint32_t met;  // its supervoxel, as InstanceSamples::met_of counts them
     std::uint32_t point;
@@ -114,35 +104,18 @@ class InstanceSampler {
     std::uint32_t instance;
     std::uint32_t samples;
   };
-  // Direct-mapped memory of the voxels met last, with their supervoxels. A voxel that was pushed
-  // out and comes back gets a second sample, which does no harm; nothing is ever searched.
-  struct Recent {
-    SupervoxelPlace place = 0;
-    std::uint32_t instance = kNoCluster;
-    std::uint32_t met = 0;
+  static constexpr std::size_t kBlock = 64;  // points that are worked off together
+  using Block = detail::CellBlock<kBlock>;
 
-    bool is(const Voxel& voxel) const { return place == voxel.place && instance == voxel.instance; }
-  };
-  static constexpr std::size_t kSlots = 1U << 14;
-  // Points are looked up in blocks, so that the memory has time to answer; one bit of a word each.
-  static constexpr std::size_t kBlock = 64;
-
-  static std::uint32_t slot_of(const Voxel& voxel) {
-    return static_cast<std::uint32_t>(detail::place_hash(voxel.place, voxel.instance) % kSlots);
-  }
-
+  // Points come in the order of small patches, so that little has to be remembered: a voxel that
+  // was forgotten and comes back gets a second sample, which does no harm.
   void begin_scan() {
-    recent_.assign(kSlots, Recent());
-    supervoxel_slots_.assign(kSlots, 0);
+    voxels_met_.clear();
+    supervoxels_met_.clear();
     samples_.clear();
     supervoxels_.assign(1, {0, kNoCluster, 0});
-    instance_[0] = static_cast<std::int32_t>(kNoCluster);
-    met_of_run_[0] = 0;
-    runs_ = 0;
   }
 
-  // Voxels of a block, behind that of the last point before it. Points that are not to be sampled
-  // have no instance.
   void find_voxels(PointsView points, const std::uint32_t* instance_of) {
     using namespace detail;
     const Constant8 per_metre(samples_per_metre_);
@@ -150,96 +123,87 @@ class InstanceSampler {
     for_lanes(points.size(), [&](auto at) {
       using Float = typename decltype(at)::Float;
       using Int = typename decltype(at)::Int;
-      std::int32_t* const instance = &instance_[at.begin + 1];
-      std::memcpy(instance, &instance_of[at.begin], at.size() * sizeof(std::int32_t));
       const Float px = at.load(points.x.data());
       const Float py = at.load(points.y.data());
       const Float pz = at.load(points.z.data());
-      floor(px * per_metre).store(&x_[at.begin + 1]);
-      floor(py * per_metre).store(&y_[at.begin + 1]);
-      floor(pz * per_metre).store(&z_[at.begin + 1]);
-      const Int none(static_cast<std::int32_t>(kNoCluster));
-      select(px * px + py * py <= far_squared, Int::load(instance), none).store(instance);
+      const Int instance = at.load(instance_of);
+      const auto is_sampled = (px * px + py * py <= far_squared) &
+                              ~(instance == Int(static_cast<std::int32_t>(kNoCluster)));
+      CellMemory::put(is_sampled, floor(px * per_metre), floor(py * per_metre),
+                      floor(pz * per_metre), instance, at.begin, voxels_);
     });
   }
 
-  // Beams that follow each other mostly end in the same voxel: only where the voxel changes does a
-  // run begin. The last run of the block before goes on as number 0.
-  void find_runs(std::size_t first, std::size_t size) {
+  // Which voxels are not remembered, in the order of their first points.
+  void find_new_voxels(std::size_t size) {
+    std::array<std::uint8_t, kBlock> unknown;
+    std::size_t unknown_count = 0;
+    for (std::size_t i = 0; i < size; ++i) {
+      unknown[unknown_count] = static_cast<std::uint8_t>(i);
+      unknown_count += voxels_met_.at(voxels_, i).is_other(voxels_, i) ? 1 : 0;
+    }
+    std::size_t count = 0;
+    for (std::size_t k = 0; k < unknown_count; ++k) {
+      const std::size_t i = unknown[k];
+      detail::CellMemory::Entry& entry = voxels_met_.at(voxels_, i);
+      if (!entry.is_other(voxels_, i)) continue;  // another point of it came before
+      entry = {voxels_.xy[i], voxels_.z[i], voxels_.instance[i], 0};
+      new_[count] = static_cast<std::uint8_t>(i);
+      supervoxels_of_new_.xy[count] = entry.xy;
+      supervoxels_of_new_.z[count] = entry.z;
+      supervoxels_of_new_.instance[count] = entry.instance;
+      ++count;
+    }
+    new_count_ = count;
+  }
+
+  void find_supervoxels() {
     using namespace detail;
-    std::uint64_t begins = 0;
+    const Constant8 per_voxel(supervoxels_per_voxel_);
     run_lanes([&](auto lanes) {
+      using Float = typename decltype(lanes)::Float;
       using Int = typename decltype(lanes)::Int;
-      for (std::size_t i = 0; i < kBlock; i += kLanes) {
-        const auto same = [i](const std::int32_t* values) {
-          return Int::load(&values[i]) == Int::load(&values[i + 1]);
-        };
-        const auto follows =
-            same(x_.data()) & same(y_.data()) & same(z_.data()) & same(instance_.data());
-        begins |= std::uint64_t{~follows.bits() & 0xFFU} << i;
+      // The half keeps the quotient so far from whole numbers that the product of floats rounds to
+      // the right side for all indices below 2^20.
+      static constexpr Constant8 kCentre(0.5F);
+      const auto supervoxel = [&](const Int& voxel) {
+        return floor((to_float(voxel) + Float(kCentre)) * Float(per_voxel));
+      };
+      Block& cells = supervoxels_of_new_;
+      for (std::size_t i = 0; i < new_count_; i += kLanes) {
+        const Int xy = Int::load(&cells.xy[i]);
+        const Int x = xy >> CellMemory::kHalf;
+        const Int y = (xy << CellMemory::kHalf) >> CellMemory::kHalf;
+        const Int instance = Int::load(&cells.instance[i]);
+        CellMemory::put(instance == instance, supervoxel(x), supervoxel(y),
+                        supervoxel(Int::load(&cells.z[i])), instance, i, cells);
       }
     });
-    if (size < kBlock) begins &= (std::uint64_t{1} << size) - 1;
-    begins_ = begins;
-    met_of_run_[0] = met_of_run_[runs_];
-    runs_ = 0;
-    for (std::uint64_t left = begins; left != 0; left &= left - 1) {
-      const auto i = static_cast<std::size_t>(__builtin_ctzll(left));
-      Run& run = run_[++runs_];
-      run.voxel = {pack_place(x_[i + 1], y_[i + 1], z_[i + 1]),
-                   static_cast<std::uint32_t>(instance_[i + 1])};
-      run.begin = static_cast<std::uint32_t>(first + i);
-      run.slot = slot_of(run.voxel);
-      __builtin_prefetch(&recent_[run.slot]);
-    }
-    for (auto* const values : {&x_, &y_, &z_, &instance_}) (*values)[0] = (*values)[kBlock];
   }
 
-  // What `met_of` says of the points of a run; takes a sample if its voxel has none.
-  std::uint32_t take_run(const Run& run) {
-    if (run.voxel.instance == kNoCluster) return 0;
-    Recent& recent = recent_[run.slot];
-    if (!recent.is(run.voxel)) {
-      const std::uint32_t met =
-          find_supervoxel({supervoxel_place(run.voxel.place), run.voxel.instance});
-      recent = {run.voxel.place, run.voxel.instance, met};
+  // One of each new voxel; what `met_of` says of the points of a block.
+  void take_samples(std::size_t first, std::size_t size, std::uint32_t* met_of) {
+    for (std::size_t k = 0; k < new_count_; ++k) {
+      const std::size_t i = new_[k];
+      const std::uint32_t met = number_of_supervoxel(k);
+      voxels_met_.at(voxels_, i).number = met;
       ++supervoxels_[met].samples;
-      samples_.push_back({met, run.begin});
+      samples_.push_back({met, static_cast<std::uint32_t>(first + i)});
     }
-    return recent.met;
+    for (std::size_t i = 0; i < size; ++i) met_of[i] = voxels_met_.at(voxels_, i).number;
   }
 
-  std::uint32_t find_supervoxel(const Voxel& voxel) {
-    std::uint32_t& number = supervoxel_slots_[slot_of(voxel)];
-    const Supervoxel& known = supervoxels_[number];
-    if (known.place != voxel.place || known.instance != voxel.instance) {
-      number = static_cast<std::uint32_t>(supervoxels_.size());
-      supervoxels_.push_back({voxel.place, voxel.instance, 0});
+  std::uint32_t number_of_supervoxel(std::size_t k) {
+    const Block& cells = supervoxels_of_new_;
+    detail::CellMemory::Entry& entry = supervoxels_met_.at(cells, k);
+    if (entry.is_other(cells, k)) {
+      entry = {cells.xy[k], cells.z[k], cells.instance[k],
+               static_cast<std::uint32_t>(supervoxels_.size())};
+      const auto y = static_cast<std::int16_t>(cells.xy[k]);
+      supervoxels_.push_back({pack_place(cells.xy[k] >> detail::CellMemory::kHalf, y, cells.z[k]),
+                              static_cast<std::uint32_t>(cells.instance[k]), 0});
     }
-    return number;
-  }
-
-  void spread_runs(std::size_t size, std::uint32_t* met_of) const {
-    std::uint64_t begins = begins_;
-    std::size_t run = 0;
-    for (std::size_t i = 0; i < size; ++i) {
-      run += begins & 1U;
-      begins >>= 1U;
-      met_of[i] = met_of_run_[run];
-    }
-  }
-
-  SupervoxelPlace supervoxel_place(SupervoxelPlace sample) const {
-    const std::array<std::int32_t, 3> at = unpack_place(sample);
-    return pack_place(supervoxel_index(at[0]), supervoxel_index(at[1]), supervoxel_index(at[2]));
-  }
-
-  // Floor of the quotient. The half keeps it so far from whole numbers that the product of floats
-  // rounds to the right side for all indices below 2^20.
-  std::int32_t supervoxel_index(std::int32_t sample_index) const {
-    const float quotient = (static_cast<float>(sample_index) + 0.5F) * supervoxels_per_voxel_;
-    const auto whole = static_cast<std::int32_t>(quotient);
-    return whole - (static_cast<float>(whole) > quotient ? 1 : 0);
+    return entry.number;
   }
 
   // Two counting sorts: supervoxels by instance, samples by supervoxel.
@@ -286,15 +250,14 @@ class InstanceSampler {
   float samples_per_metre_;
   float supervoxels_per_voxel_;
   float max_range_;
-  // By point of a block, behind the last one before it.
-  std::array<std::int32_t, kBlock + 1> x_ = {}, y_ = {}, z_ = {}, instance_ = {};
-  std::uint64_t begins_ = 0;  // points of the block with which a run begins
-  // From 1 on; 0 is the last run of the block before.
-  std::array<Run, kBlock + 1> run_;
-  std::array<std::uint32_t, kBlock + 1> met_of_run_ = {};
-  std::size_t runs_ = 0;
-  std::vector<Recent> recent_;
-  std::vector<std::uint32_t> supervoxel_slots_;  // into supervoxels_
+  detail::CellMemory voxels_met_;  // with their supervoxels, as met_of counts them
+  detail::CellMemory supervoxels_met_;
+  // Of a block: voxels of its points, which of these are met for the first time, and supervoxels of
+  // the latter.
+  Block voxels_ = {};
+  std::array<std::uint8_t, kBlock> new_ = {};
+  std::size_t new_count_ = 0;
+  Block supervoxels_of_new_ = {};
   std::vector<Sample> samples_;
   std::vector<Supervoxel> supervoxels_;
   std::vector<std::uint32_t> next_;

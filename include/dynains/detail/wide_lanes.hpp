@@ -49,6 +49,7 @@ struct WideInt8 {
   friend WideInt8 operator<<(const WideInt8& a, int bits) { return WideInt8(a.v << bits); }
   friend WideInt8 operator>>(const WideInt8& a, int bits) { return WideInt8(a.v >> bits); }
   friend WideInt8 operator&(const WideInt8& a, const WideInt8& b) { return WideInt8(a.v & b.v); }
+  friend WideInt8 operator^(const WideInt8& a, const WideInt8& b) { return WideInt8(a.v ^ b.v); }
   friend WideMask8 operator<(const WideInt8& a, const WideInt8& b) { return {a.v < b.v}; }
   friend WideMask8 operator==(const WideInt8& a, const WideInt8& b) { return {a.v == b.v}; }
 };
@@ -185,16 +186,25 @@ struct Places : Lanes {
   std::size_t size() const { return kTail ? end - begin : kLanes; }
   /// Zeros behind the end.
   typename Lanes::Float load(const float* from) const {
-    if constexpr (!kTail) return Lanes::Float::load(from + begin);
-    alignas(32) float values[kLanes] = {};
-    for (std::size_t i = begin; i < end; ++i) values[i - begin] = from[i];
-    return Lanes::Float::load(values);
+    return load_as<typename Lanes::Float>(from);
+  }
+  typename Lanes::Int load(const std::uint32_t* from) const {
+    return load_as<typename Lanes::Int>(reinterpret_cast<const std::int32_t*>(from));
   }
   /// `a` in the lanes that have a place, else `b`.
   typename Lanes::Float there(const typename Lanes::Float& a,
                               const typename Lanes::Float& b) const {
     if constexpr (!kTail) return a;
     return select(lanes_below<Lanes>(size()), a, b);
+  }
+
+ private:
+  template <class Vector, class Value>
+  Vector load_as(const Value* from) const {
+    if constexpr (!kTail) return Vector::load(from + begin);
+    alignas(32) Value values[kLanes] = {};
+    for (std::size_t i = begin; i < end; ++i) values[i - begin] = from[i];
+    return Vector::load(values);
   }
 };
 
