@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -105,6 +106,7 @@ class FreeSpaceEvidence {
     record.segment = segment;
     record.T_world_sensor = T_world_sensor;
     sampler_.sample(split.non_ground(), instance_of, instance_count, record.samples);
+    GroundFootprint::bound(split.ground(), record.ground_boxes);
     record.beliefs.assign(record.samples.supervoxel_count(), Belief());
     record.wholes.assign(instance_count, Belief());
     record.changed.assign(instance_count, 1);
@@ -200,6 +202,7 @@ class FreeSpaceEvidence {
     std::vector<std::uint64_t> open;  // by sample, a bit each: whether a hit may change its belief
     std::vector<std::uint8_t> changed;  // by instance: whether beliefs changed since it was weighed
     TrackedInstances tracked;
+    std::vector<GroundBox> ground_boxes;  // by 64 points of the ground
   };
   static constexpr std::uint64_t kNoSegment = ~std::uint64_t{0};
 
@@ -525,28 +528,52 @@ class FreeSpaceEvidence {
       moved_ground_.push_back(
           {static_cast<std::uint32_t>(point), {cause, static_cast<float>(config_.tau_free)}});
     };
-    const bool tests = config_.ground_reach > 0.0;
-    detail::grow(near_ground_, ground.size());
-    tested_points_.grow(ground.size());
+    const float clearance =
+        config_.footprint > 0.0 ? kClearance : -std::numeric_limits<float>::infinity();
+    detail::grow(near_ground_, ground.size() + detail::kLanes);
+    tested_points_.grow(ground.size() + detail::kLanes);
     tested_ = 0;
-    footprint_.visit_near(ground, [&](std::size_t point, float lowest) {
-      if (config_.footprint > 0.0 && lowest < ground.z[point] + kClearance) {
-        remove(point, Cause::kUnderInstance);
-      } else if (tests) {
-        near_ground_[tested_] = static_cast<std::uint32_t>(point);
-        tested_points_.x[tested_] = ground.x[point];
-        tested_points_.y[tested_] = ground.y[point];
-        tested_points_.z[tested_] = ground.z[point];
-        ++tested_;
+    footprint_.visit_near(ground, record.ground_boxes, clearance,
+                          [&](std::size_t begin, std::uint64_t near, std::uint64_t under) {
+                            for (std::uint64_t left = under; left != 0; left &= left - 1) {
+                              remove(begin + static_cast<std::size_t>(__builtin_ctzll(left)),
+                                     Cause::kUnderInstance);
+                            }
+                            add_tested(ground, begin, near & ~under);
+                          });
+    if (config_.ground_reach > 0.0 && tested_ > 0) test_ground(scan, record, remove);
+  }
+
+  // Of the 64 points from `begin` on, those whose bits are set. Mostly, whole bytes are.
+  void add_tested(PointsView ground, std::size_t begin, std::uint64_t which) {
+    const auto add = [&](std::size_t point) {
+      near_ground_[tested_] = static_cast<std::uint32_t>(point);
+      tested_points_.x[tested_] = ground.x[point];
+      tested_points_.y[tested_] = ground.y[point];
+      tested_points_.z[tested_] = ground.z[point];
+      ++tested_;
+    };
+    for (; which != 0; which >>= detail::kLanes, begin += detail::kLanes) {
+      constexpr std::uint64_t kAll = (1U << detail::kLanes) - 1;
+      if ((which & kAll) == kAll) {
+        detail::copy_lanes(&ground.x[begin], &tested_points_.x[tested_]);
+        detail::copy_lanes(&ground.y[begin], &tested_points_.y[tested_]);
+        detail::copy_lanes(&ground.z[begin], &tested_points_.z[tested_]);
+        for (std::size_t i = 0; i < detail::kLanes; ++i) {
+          near_ground_[tested_ + i] = static_cast<std::uint32_t>(begin + i);
+        }
+        tested_ += detail::kLanes;
+      } else {
+        for (std::uint64_t left = which & kAll; left != 0; left &= left - 1) {
+          add(begin + static_cast<std::size_t>(__builtin_ctzll(left)));
+        }
       }
-    });
-    if (tests) test_ground(scan, record, remove);
+    }
   }
 
   // Ground that enough of all references saw free, of the first `tested_` of `tested_points_`.
   template <class Remove>
   void test_ground(std::uint64_t scan, const Record& record, Remove&& remove) {
-    if (tested_ == 0) return;
     detail::grow(one_instance_, tested_);
     ground_sampler_.sample(PointsView(tested_points_).subview(0, tested_),
                            Span<const std::uint32_t>(one_instance_).subspan(0, tested_), 1,
@@ -559,16 +586,21 @@ class FreeSpaceEvidence {
       if (lag <= config_.memory && distance <= scan) count_ground(record, scan - distance);
       if (lag <= config_.horizon) count_ground(record, scan + distance);
     }
-    for (std::size_t i = 0; i < tested_; ++i) {
-      const std::uint32_t met = ground_samples_.met_of[i];
-      if (met == 0) continue;
+    // Most of the time there is none.
+    bool any = false;
+    detail::grow(moved_, ground_samples_.met.size());
+    moved_[0] = 0;
+    for (std::size_t met = 1; met < ground_samples_.met.size(); ++met) {
       const std::uint32_t sample = ground_samples_.sample_begin[ground_samples_.met[met]];
       const std::uint8_t free = ground_free_[sample];
-      if (free < kGroundFree ||
-          static_cast<float>(free) < kGroundShare * static_cast<float>(ground_hit_[sample])) {
-        continue;
-      }
-      remove(near_ground_[i], Cause::kFreeSpace);
+      const bool moved =
+          free >= kGroundFree &&
+          static_cast<float>(free) >= kGroundShare * static_cast<float>(ground_hit_[sample]);
+      moved_[met] = moved ? 1 : 0;
+      any |= moved;
+    }
+    for (std::size_t i = 0; any && i < tested_; ++i) {
+      if (moved_[ground_samples_.met_of[i]] != 0) remove(near_ground_[i], Cause::kFreeSpace);
     }
   }
 

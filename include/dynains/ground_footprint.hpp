@@ -14,6 +14,11 @@
 
 namespace dynains {
 
+/// Horizontal extent of some points, m.
+struct GroundBox {
+  float x_min, x_max, y_min, y_max;
+};
+
 /// Horizontal grid around the sensor that remembers where points were removed and how low, and a
 /// coarse one beside it that tells quickly which points are near them.
 class GroundFootprint {
@@ -36,9 +41,9 @@ class GroundFootprint {
     const Place place = fine_.place(x, y);
     if (!place.inside) return;
     Cell& cell = cell_at(place.column, place.row);
-    if (!(z < cell.own)) return;
-    if (!(cell.own < kNothing)) touched_.push_back(place);
-    cell.own = z;
+    const bool is_first = !(cell.own < kNothing);
+    cell.own = std::min(cell.own, z);
+    if (is_first && cell.own < kNothing) touched_.push_back(place);
   }
 
   /// Lets what was added reach into the cells around.
@@ -58,25 +63,42 @@ class GroundFootprint {
     }
   }
 
-  /// Calls `visit(i, lowest)` for all points that are near a removed point, and for some at the
-  /// border of the grid, in order; `lowest` is the height of the lowest point that was removed
-  /// about there, or infinity.
-  template <class Visitor>
-  void visit_near(PointsView points, Visitor&& visit) const {
-    std::int32_t column[kBlock];
-    std::int32_t row[kBlock];
-    for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
-      const PointsView block = points.subview(begin, std::min(kBlock, points.size() - begin));
-      std::uint64_t near = find_near(block);
-      if (near == 0) continue;
-      detail::for_lanes(block.size(), [&](auto at) {
-        fine_.line(at.load(block.x.data())).store(&column[at.begin]);
-        fine_.line(at.load(block.y.data())).store(&row[at.begin]);
-      });
-      for (; near != 0; near &= near - 1) {
-        const auto i = static_cast<std::size_t>(__builtin_ctzll(near));
-        visit(begin + i, lowest(column[i], row[i]));
+  /// The extent of every 64 points, to be found once for all calls of visit_near().
+  static void bound(PointsView points, std::vector<GroundBox>& boxes) {
+    boxes.resize((points.size() + kBlock - 1) / kBlock);
+    detail::run_lanes([&](auto lanes) {
+      using Lanes = decltype(lanes);
+      using Float = typename Lanes::Float;
+      for (std::size_t b = 0; b < boxes.size(); ++b) {
+        const std::size_t begin = b * kBlock;
+        const PointsView block = points.subview(begin, std::min(kBlock, points.size() - begin));
+        const detail::Constant8 first_x(block.x[0]), first_y(block.y[0]);
+        Float x_min = first_x, x_max = first_x, y_min = first_y, y_max = first_y;
+        detail::for_places<Lanes>(block.size(), [&](const auto& at) {
+          const Float x = at.there(at.load(block.x.data()), first_x);
+          const Float y = at.there(at.load(block.y.data()), first_y);
+          x_min = min(x_min, x);
+          x_max = max(x_max, x);
+          y_min = min(y_min, y);
+          y_max = max(y_max, y);
+        });
+        boxes[b] = {min_lane(x_min), max_lane(x_max), min_lane(y_min), max_lane(y_max)};
       }
+    });
+  }
+
+  /// Calls `visit(begin, near, under)` for up to 64 points from `begin` on at a time, a bit each:
+  /// those near a removed point (and some at the border of the grid), and which of these lie under
+  /// one, less than `clearance` (m) below the lowest that was removed about there. `boxes`: of
+  /// bound().
+  template <class Visitor>
+  void visit_near(PointsView points, Span<const GroundBox> boxes, float clearance,
+                  Visitor&& visit) const {
+    for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
+      if (!is_near(boxes[begin / kBlock])) continue;
+      const PointsView block = points.subview(begin, std::min(kBlock, points.size() - begin));
+      const std::uint64_t near = find_near(block);
+      if (near != 0) visit(begin, near, near & find_under(block, clearance));
     }
   }
 
@@ -92,7 +114,8 @@ class GroundFootprint {
 
  private:
   static constexpr float kNothing = std::numeric_limits<float>::infinity();
-  static constexpr std::uint32_t kTile = 8;  // cells along a side
+  static constexpr int kTileShift = 3;
+  static constexpr std::uint32_t kTile = 1U << kTileShift;  // cells along a side
   static constexpr std::size_t kBlock = 64;  // points that are looked at together, a bit each
 
   struct Place {
@@ -137,6 +160,12 @@ class GroundFootprint {
       const Float per_metre = detail::Constant8(per_metre_);
       return truncate(min(max(coordinate * per_metre + centre, Float(kZero)), last));
     }
+    /// The same of one point.
+    std::size_t index(float coordinate) const {
+      const float place = coordinate * per_metre_ + static_cast<float>(half_);
+      return static_cast<std::size_t>(
+          std::min(std::max(place, 0.0F), static_cast<float>(width() - 1)));
+    }
     /// Row-major.
     template <class Float>
     auto indices(const Float& x, const Float& y) const {
@@ -163,6 +192,19 @@ class GroundFootprint {
     }
   }
 
+  // Whether some point within may be near: rows of the coarse grid, a few cells long.
+  bool is_near(const GroundBox& box) const {
+    const std::size_t first = coarse_.index(box.x_min);
+    const std::size_t last = coarse_.index(box.x_max);
+    for (std::size_t row = coarse_.index(box.y_min); row <= coarse_.index(box.y_max); ++row) {
+      const std::uint8_t* const cells = &near_[row * coarse_.width()];
+      for (std::size_t column = first; column <= last; ++column) {
+        if (cells[column] != 0) return true;
+      }
+    }
+    return false;
+  }
+
   // Which points of a block are near.
   std::uint64_t find_near(PointsView block) const {
     std::int32_t cell[kBlock];
@@ -176,16 +218,39 @@ class GroundFootprint {
     return near;
   }
 
-  float lowest(std::int32_t column, std::int32_t row) const {
-    const auto last = static_cast<std::int32_t>(fine_.width()) - 1;
-    if (column < 1 || row < 1 || column >= last || row >= last) return kNothing;
-    const auto c = static_cast<std::uint32_t>(column);
-    const auto r = static_cast<std::uint32_t>(row);
-    return tiles_[tile_of_[tile(c, r)]][within(c, r)].lowest;
+  // Which points of a block lie under something removed.
+  std::uint64_t find_under(PointsView block, float clearance) const {
+    static constexpr detail::Constant8 kNever(-kNothing);
+    const detail::Constant8 above(clearance);
+    const auto side = static_cast<std::int32_t>(tiles_along_side());
+    const auto border = static_cast<std::int32_t>(fine_.width()) - 1;
+    std::int32_t tile_of_point[kBlock];
+    std::int32_t cell[kBlock];
+    float height[kBlock];
+    detail::for_lanes(block.size(), [&](auto at) {
+      using Int = typename decltype(at)::Int;
+      using Float = typename decltype(at)::Float;
+      const Int column = fine_.line(at.load(block.x.data()));
+      const Int row = fine_.line(at.load(block.y.data()));
+      const Int last(static_cast<std::int32_t>(kTile) - 1);
+      (multiply(row >> kTileShift, side) + (column >> kTileShift)).store(&tile_of_point[at.begin]);
+      (((row & last) << kTileShift) + (column & last)).store(&cell[at.begin]);
+      const Int zero(0), end(border);
+      const auto inside = (zero < column) & (column < end) & (zero < row) & (row < end);
+      select(inside, at.load(block.z.data()) + Float(above), Float(kNever))
+          .store(&height[at.begin]);
+    });
+    std::uint64_t under = 0;
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const Tile& tile = tiles_[tile_of_[static_cast<std::size_t>(tile_of_point[i])]];
+      under |= std::uint64_t{tile[static_cast<std::size_t>(cell[i])].lowest < height[i]} << i;
+    }
+    return under;
   }
 
+  std::size_t tiles_along_side() const { return fine_.width() / kTile + 1; }
   std::size_t tile(std::uint32_t column, std::uint32_t row) const {
-    return row / kTile * (fine_.width() / kTile + 1) + column / kTile;
+    return row / kTile * tiles_along_side() + column / kTile;
   }
   static std::size_t within(std::uint32_t column, std::uint32_t row) {
     return row % kTile * kTile + column % kTile;

@@ -62,9 +62,9 @@ class CellMemory {
   template <class Int>
   static Int slot_of(const Int& xy, const Int& z, const Int& instance) {
     const auto factor = [](std::uint32_t odd) { return static_cast<std::int32_t>(odd); };
-    const Int sum = multiply(xy, factor(0x9E3779B1U)) + multiply(z, factor(0x85EBCA77U)) +
+    const Int all = multiply(xy, factor(0x9E3779B1U)) ^ multiply(z, factor(0x85EBCA77U)) ^
                     multiply(instance, factor(0xC2B2AE3DU));
-    return (multiply(sum ^ (sum >> 15), factor(0x2C1B3C6DU)) >> 18) & Int(kSlots - 1);
+    return (multiply(all ^ (all >> 15), factor(0x2C1B3C6DU)) >> 18) & Int(kSlots - 1);
   }
 
   std::vector<Entry> entries_;
