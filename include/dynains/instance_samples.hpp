@@ -86,9 +86,9 @@ class InstanceSampler {
     for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
       const std::size_t size = std::min(kBlock, points.size() - begin);
       find_voxels(points.subview(begin, size), instance_of.data() + begin);
-      find_new_voxels(size);
+      find_new_voxels(size, out.met_of.data() + begin);
       find_supervoxels();
-      take_samples(begin, size, out.met_of.data() + begin);
+      take_samples(begin, out.met_of.data() + begin);
     }
     order(points, instance_count, out);
   }
@@ -134,26 +134,31 @@ class InstanceSampler {
     });
   }
 
-  // Which voxels are not remembered, in the order of their first points.
-  void find_new_voxels(std::size_t size) {
-    std::array<std::uint8_t, kBlock> unknown;
+  // What `met_of` says of points whose voxels are remembered; the voxels of the others, in the
+  // order of their first points. Until their supervoxels are known, they are remembered by number.
+  void find_new_voxels(std::size_t size, std::uint32_t* met_of) {
     std::size_t unknown_count = 0;
     for (std::size_t i = 0; i < size; ++i) {
-      unknown[unknown_count] = static_cast<std::uint8_t>(i);
-      unknown_count += voxels_met_.at(voxels_, i).is_other(voxels_, i) ? 1 : 0;
+      const detail::CellMemory::Entry& entry = voxels_met_.at(voxels_, i);
+      met_of[i] = entry.number;
+      unknown_[unknown_count] = static_cast<std::uint8_t>(i);
+      unknown_count += entry.is_other(voxels_, i) ? 1 : 0;
     }
-    std::size_t count = 0;
+    std::uint32_t count = 0;
     for (std::size_t k = 0; k < unknown_count; ++k) {
-      const std::size_t i = unknown[k];
+      const std::size_t i = unknown_[k];
       detail::CellMemory::Entry& entry = voxels_met_.at(voxels_, i);
-      if (!entry.is_other(voxels_, i)) continue;  // another point of it came before
-      entry = {voxels_.xy[i], voxels_.z[i], voxels_.instance[i], 0};
-      new_[count] = static_cast<std::uint8_t>(i);
-      supervoxels_of_new_.xy[count] = entry.xy;
-      supervoxels_of_new_.z[count] = entry.z;
-      supervoxels_of_new_.instance[count] = entry.instance;
-      ++count;
+      if (entry.is_other(voxels_, i)) {
+        entry = {voxels_.xy[i], voxels_.z[i], voxels_.instance[i], count};
+        new_[count] = static_cast<std::uint8_t>(i);
+        supervoxels_of_new_.xy[count] = entry.xy;
+        supervoxels_of_new_.z[count] = entry.z;
+        supervoxels_of_new_.instance[count] = entry.instance;
+        ++count;
+      }
+      voxel_of_unknown_[k] = static_cast<std::uint8_t>(entry.number);
     }
+    unknown_count_ = unknown_count;
     new_count_ = count;
   }
 
@@ -181,16 +186,20 @@ class InstanceSampler {
     });
   }
 
-  // One of each new voxel; what `met_of` says of the points of a block.
-  void take_samples(std::size_t first, std::size_t size, std::uint32_t* met_of) {
+  // One of each new voxel. Of new voxels that share an entry, the last one stays there.
+  void take_samples(std::size_t first, std::uint32_t* met_of) {
     for (std::size_t k = 0; k < new_count_; ++k) {
       const std::size_t i = new_[k];
       const std::uint32_t met = number_of_supervoxel(k);
-      voxels_met_.at(voxels_, i).number = met;
+      detail::CellMemory::Entry& entry = voxels_met_.at(voxels_, i);
+      if (!entry.is_other(voxels_, i)) entry.number = met;
       ++supervoxels_[met].samples;
       samples_.push_back({met, static_cast<std::uint32_t>(first + i)});
+      met_of_new_[k] = met;
     }
-    for (std::size_t i = 0; i < size; ++i) met_of[i] = voxels_met_.at(voxels_, i).number;
+    for (std::size_t k = 0; k < unknown_count_; ++k) {
+      met_of[unknown_[k]] = met_of_new_[voxel_of_unknown_[k]];
+    }
   }
 
   std::uint32_t number_of_supervoxel(std::size_t k) {
@@ -252,12 +261,16 @@ class InstanceSampler {
   float max_range_;
   detail::CellMemory voxels_met_;  // with their supervoxels, as met_of counts them
   detail::CellMemory supervoxels_met_;
-  // Of a block: voxels of its points, which of these are met for the first time, and supervoxels of
-  // the latter.
+  // Of a block: voxels of its points; which of these were not remembered, and which new voxel each
+  // of the latter is; first points, supervoxels and their numbers of the new ones.
   Block voxels_ = {};
-  std::array<std::uint8_t, kBlock> new_ = {};
+  std::size_t unknown_count_ = 0;
+  std::array<std::uint8_t, kBlock> unknown_ = {};
+  std::array<std::uint8_t, kBlock> voxel_of_unknown_ = {};
   std::size_t new_count_ = 0;
+  std::array<std::uint8_t, kBlock> new_ = {};
   Block supervoxels_of_new_ = {};
+  std::array<std::uint32_t, kBlock> met_of_new_ = {};
   std::vector<Sample> samples_;
   std::vector<Supervoxel> supervoxels_;
   std::vector<std::uint32_t> next_;

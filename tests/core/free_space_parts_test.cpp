@@ -65,8 +65,16 @@ TEST_CASE("every voxel of every instance has a sample, and samples are points of
     const bool near = points.x[i] * points.x[i] + points.y[i] * points.y[i] <= 100.0F;
     REQUIRE((supervoxels[i] != kNone) == (near && instance_of[i] != kNoCluster));
     if (!near || instance_of[i] == kNoCluster) continue;
-    expected.insert({instance_of[i], voxel_of(points.x[i], kSize), voxel_of(points.y[i], kSize),
-                     voxel_of(points.z[i], kSize)});
+    const std::int32_t x = voxel_of(points.x[i], kSize), y = voxel_of(points.y[i], kSize),
+                       z = voxel_of(points.z[i], kSize);
+    expected.insert({instance_of[i], x, y, z});
+    // Each point is of the supervoxel that it lies in, three voxels wide.
+    const auto supervoxel = [](std::int32_t voxel) {
+      return static_cast<std::int32_t>(std::floor(voxel / 3.0));
+    };
+    REQUIRE(samples.place[supervoxels[i]] ==
+            pack_place(supervoxel(x), supervoxel(y), supervoxel(z)));
+    REQUIRE(samples.instance_of[supervoxels[i]] == instance_of[i]);
   }
   std::set<Voxel> found;
   REQUIRE(samples.instance_count() == kInstances);

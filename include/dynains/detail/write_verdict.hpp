@@ -117,6 +117,17 @@ inline void write_by_windows(ScanSlot& scan, Span<const ClusterVerdict> verdicts
   }
 }
 
+/// Of eight points from `i` on: whether some window believed in one or brought one farther than the
+/// first one did.
+inline bool any_news(const Reach* reach, const Reach* first_reach, std::size_t i) {
+  constexpr std::uint64_t kInEachByte = 0x0101010101010101U;
+  static_assert(static_cast<unsigned>(Reach::kProposed) == 3, "the only one with both bits set");
+  std::uint64_t now, before;
+  std::memcpy(&now, reach + i, sizeof(now));
+  std::memcpy(&before, first_reach + i, sizeof(before));
+  return now != before || (now & now >> 1U & kInEachByte) != 0;
+}
+
 /// The final verdict by windows: dynamic is what at least `votes` of them said it is. Only points
 /// that some window believed in or brought farther can have changed.
 inline void rewrite_by_windows(ScanSlot& scan, int votes) {
@@ -125,14 +136,18 @@ inline void rewrite_by_windows(ScanSlot& scan, int votes) {
   const Reach* const reach = scan.reach.data();
   const Reach* const first_reach = scan.first_reach.data();
   const std::size_t count = scan.reach.size();
-  for (std::size_t i = 0; i < count; ++i) {
-    if (reach[i] == first_reach[i] && reach[i] != Reach::kProposed) continue;
-    const bool proposed = reach[i] == Reach::kProposed;
-    const bool dynamic = proposed && scan.votes[i] >= votes;
-    scan.is_kept[ground_count + i] = dynamic ? 0 : 1;
-    scan.labels[input[i]] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
-    scan.causes[input[i]] = dynamic ? Cause::kProposed : cause_to_stay(reach[i]);
-    if (proposed) scan.beliefs[input[i]] = scan.belief[i];
+  for (std::size_t begin = 0; begin < count; begin += kLanes) {
+    const std::size_t end = std::min(begin + kLanes, count);
+    if (end - begin == kLanes && !any_news(reach, first_reach, begin)) continue;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (reach[i] == first_reach[i] && reach[i] != Reach::kProposed) continue;
+      const bool proposed = reach[i] == Reach::kProposed;
+      const bool dynamic = proposed && scan.votes[i] >= votes;
+      scan.is_kept[ground_count + i] = dynamic ? 0 : 1;
+      scan.labels[input[i]] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
+      scan.causes[input[i]] = dynamic ? Cause::kProposed : cause_to_stay(reach[i]);
+      if (proposed) scan.beliefs[input[i]] = scan.belief[i];
+    }
   }
 }
 
