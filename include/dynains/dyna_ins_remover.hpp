@@ -313,6 +313,7 @@ class BasicDynaInsRemover {
     detail::begin_verdict(newest);
     if (config_.use_free_space) {
       detail::write_instances(newest, newest_cluster);
+      clock.lap(result.times.verdict);
       decide(newest, 1, false, clock, result.times);
     } else {
       detail::write_by_windows(newest, verdict_);
@@ -502,7 +503,7 @@ class BasicDynaInsRemover {
   void decide(ScanSlot& scan, int votes, bool is_final, StageClock& clock, StageTimes& times) {
     if (config_.use_free_space) {
       const EvidenceVerdict said = evidence_.judge(scan.scan, is_final, scan.split);
-      clock.lap(times.evidence);
+      clock.lap(times.judge);
       detail::write_by_evidence(scan, said, compares_windows(), votes, of_group_);
     } else {
       detail::rewrite_by_windows(scan, votes);

@@ -13,7 +13,8 @@ struct StageTimes {
   double cluster = 0.0;     ///< curved voxels and separation, Eq. 4
   double descriptor = 0.0;  ///< Eq. 5-12 and, for proposals, the belief of Eq. 13-19
   double evidence = 0.0;    ///< free space seen by other scans
-  double verdict = 0.0;     ///< from clusters to points
+  double judge = 0.0;       ///< from that to verdicts, of the ground beside them as well
+  double verdict = 0.0;     ///< from clusters and groups to points
   double map = 0.0;         ///< Eq. 1
   double revision = 0.0;    ///< of the map, by what the newest scan sees
 
@@ -25,6 +26,7 @@ struct StageTimes {
     visitor("cluster", self.cluster);
     visitor("descriptor", self.descriptor);
     visitor("evidence", self.evidence);
+    visitor("judge", self.judge);
     visitor("verdict", self.verdict);
     visitor("map", self.map);
     visitor("revision", self.revision);

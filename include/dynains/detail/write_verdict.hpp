@@ -49,8 +49,12 @@ inline void begin_verdict(ScanSlot& scan) {
 /// Each point above the ground gets the instance of its cluster.
 inline void write_instances(ScanSlot& scan, Span<const std::uint32_t> cluster_of) {
   const std::uint32_t* const input = scan.split.input.data() + scan.split.ground_count;
-  for (std::size_t i = 0; i < cluster_of.size(); ++i) {
-    if (cluster_of[i] != kNoCluster) scan.instances[input[i]] = scan.ids[cluster_of[i]];
+  const std::uint32_t* const clusters = cluster_of.data();
+  const std::uint32_t* const ids = scan.ids.data();
+  std::uint32_t* const instances = scan.instances.data();
+  const std::size_t count = cluster_of.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (clusters[i] != kNoCluster) instances[input[i]] = ids[clusters[i]];
   }
 }
 
