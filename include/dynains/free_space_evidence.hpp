@@ -100,13 +100,13 @@ class FreeSpaceEvidence {
       segment_begin_ = scan;
     }
     view.segment = segment;
-    make_image(T_world_sensor, split, view);
-
     Record& record = record_of(scan);
     record.segment = segment;
     record.T_world_sensor = T_world_sensor;
-    sampler_.sample(split.non_ground(), instance_of, instance_count, record.samples);
+    // Points that were sampled are at hand when the image is made.
     GroundFootprint::bound(split.ground(), record.ground_boxes);
+    sampler_.sample(split.non_ground(), instance_of, instance_count, record.samples);
+    make_image(T_world_sensor, split, view);
     record.beliefs.assign(record.samples.supervoxel_count(), Belief());
     record.wholes.assign(instance_count, Belief());
     record.changed.assign(instance_count, 1);

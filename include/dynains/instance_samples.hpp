@@ -88,20 +88,19 @@ class InstanceSampler {
       find_voxels(points.subview(begin, size), instance_of.data() + begin);
       find_new_voxels(size, out.met_of.data() + begin);
       find_supervoxels();
-      take_samples(begin, out.met_of.data() + begin);
+      take_samples(points.subview(begin, size), out.met_of.data() + begin);
     }
-    order(points, instance_count, out);
+    order(instance_count, out);
   }
 
  private:
   struct Sample {
+    float x, y, z;
     std::uint32_t met;  // its supervoxel, as InstanceSamples::met_of counts them
-    std::uint32_t point;
   };
   // Number 0 stands for none.
   struct Supervoxel {
-    SupervoxelPlace place;
-    std::uint32_t instance;
+    std::int32_t xy, z, instance;  // as CellBlock has them
     std::uint32_t samples;
   };
   static constexpr std::size_t kBlock = 64;  // points that are worked off together
@@ -112,8 +111,8 @@ class InstanceSampler {
   void begin_scan() {
     voxels_met_.clear();
     supervoxels_met_.clear();
-    samples_.clear();
-    supervoxels_.assign(1, {0, kNoCluster, 0});
+    sample_count_ = 0;
+    supervoxel_count_ = 1;
   }
 
   void find_voxels(PointsView points, const std::uint32_t* instance_of) {
@@ -187,14 +186,16 @@ class InstanceSampler {
   }
 
   // One of each new voxel. Of new voxels that share an entry, the last one stays there.
-  void take_samples(std::size_t first, std::uint32_t* met_of) {
+  void take_samples(PointsView points, std::uint32_t* met_of) {
+    detail::grow(samples_, sample_count_ + kBlock);
+    detail::grow(supervoxels_, supervoxel_count_ + kBlock);
     for (std::size_t k = 0; k < new_count_; ++k) {
       const std::size_t i = new_[k];
       const std::uint32_t met = number_of_supervoxel(k);
       detail::CellMemory::Entry& entry = voxels_met_.at(voxels_, i);
       if (!entry.is_other(voxels_, i)) entry.number = met;
       ++supervoxels_[met].samples;
-      samples_.push_back({met, static_cast<std::uint32_t>(first + i)});
+      samples_[sample_count_++] = {points.x[i], points.y[i], points.z[i], met};
       met_of_new_[k] = met;
     }
     for (std::size_t k = 0; k < unknown_count_; ++k) {
@@ -202,26 +203,30 @@ class InstanceSampler {
     }
   }
 
+  // Writes a new one in any case, since no branch could foretell whether it is one.
   std::uint32_t number_of_supervoxel(std::size_t k) {
     const Block& cells = supervoxels_of_new_;
     detail::CellMemory::Entry& entry = supervoxels_met_.at(cells, k);
-    if (entry.is_other(cells, k)) {
-      entry = {cells.xy[k], cells.z[k], cells.instance[k],
-               static_cast<std::uint32_t>(supervoxels_.size())};
-      const auto y = static_cast<std::int16_t>(cells.xy[k]);
-      supervoxels_.push_back({pack_place(cells.xy[k] >> detail::CellMemory::kHalf, y, cells.z[k]),
-                              static_cast<std::uint32_t>(cells.instance[k]), 0});
-    }
+    const bool is_new = entry.is_other(cells, k);
+    const std::uint32_t next = supervoxel_count_;
+    supervoxels_[next] = {cells.xy[k], cells.z[k], cells.instance[k], 0};
+    supervoxel_count_ = next + (is_new ? 1 : 0);
+    entry = {cells.xy[k], cells.z[k], cells.instance[k], is_new ? next : entry.number};
     return entry.number;
   }
 
+  static SupervoxelPlace place_of(const Supervoxel& cell) {
+    return pack_place(cell.xy >> detail::CellMemory::kHalf, static_cast<std::int16_t>(cell.xy),
+                      cell.z);
+  }
+
   // Two counting sorts: supervoxels by instance, samples by supervoxel.
-  void order(PointsView points, std::size_t instance_count, InstanceSamples& out) {
-    const std::size_t supervoxel_count = supervoxels_.size() - 1;
-    const std::size_t sample_count = samples_.size();
+  void order(std::size_t instance_count, InstanceSamples& out) {
+    const std::size_t supervoxel_count = supervoxel_count_ - 1;
+    const std::size_t sample_count = sample_count_;
     out.supervoxel_begin.assign(instance_count + 1, 0);
     for (std::size_t met = 1; met <= supervoxel_count; ++met) {
-      ++out.supervoxel_begin[supervoxels_[met].instance + 1];
+      ++out.supervoxel_begin[static_cast<std::uint32_t>(supervoxels_[met].instance) + 1];
     }
     for (std::size_t i = 1; i <= instance_count; ++i) {
       out.supervoxel_begin[i] += out.supervoxel_begin[i - 1];
@@ -234,11 +239,12 @@ class InstanceSampler {
     out.sample_begin.assign(supervoxel_count + 1, 0);
     for (std::size_t met = 1; met <= supervoxel_count; ++met) {
       const Supervoxel& supervoxel = supervoxels_[met];
-      const std::uint32_t to = next_[supervoxel.instance]++;
+      const auto instance = static_cast<std::uint32_t>(supervoxel.instance);
+      const std::uint32_t to = next_[instance]++;
       out.met[met] = to;
       out.sample_begin[to + 1] = supervoxel.samples;
-      out.place[to] = supervoxel.place;
-      out.instance_of[to] = supervoxel.instance;
+      out.place[to] = place_of(supervoxel);
+      out.instance_of[to] = instance;
     }
     for (std::size_t s = 1; s <= supervoxel_count; ++s) {
       out.sample_begin[s] += out.sample_begin[s - 1];
@@ -246,13 +252,14 @@ class InstanceSampler {
     out.points.grow(sample_count + detail::kLanes);
     out.supervoxel_of.resize(sample_count);
     next_.assign(out.sample_begin.begin(), out.sample_begin.end());
-    for (const Sample& sample : samples_) {
+    for (std::size_t i = 0; i < sample_count; ++i) {
+      const Sample& sample = samples_[i];
       const std::uint32_t supervoxel = out.met[sample.met];
       const std::uint32_t to = next_[supervoxel]++;
       out.supervoxel_of[to] = supervoxel;
-      out.points.x[to] = points.x[sample.point];
-      out.points.y[to] = points.y[sample.point];
-      out.points.z[to] = points.z[sample.point];
+      out.points.x[to] = sample.x;
+      out.points.y[to] = sample.y;
+      out.points.z[to] = sample.z;
     }
   }
 
@@ -271,7 +278,10 @@ class InstanceSampler {
   std::array<std::uint8_t, kBlock> new_ = {};
   Block supervoxels_of_new_ = {};
   std::array<std::uint32_t, kBlock> met_of_new_ = {};
+  // Longer than what is in use.
+  std::size_t sample_count_ = 0;
   std::vector<Sample> samples_;
+  std::uint32_t supervoxel_count_ = 1;
   std::vector<Supervoxel> supervoxels_;
   std::vector<std::uint32_t> next_;
 };
