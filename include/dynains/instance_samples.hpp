@@ -179,7 +179,7 @@ class InstanceSampler {
         const Int x = xy >> CellMemory::kHalf;
         const Int y = (xy << CellMemory::kHalf) >> CellMemory::kHalf;
         const Int instance = Int::load(&cells.instance[i]);
-        CellMemory::put(instance == instance, supervoxel(x), supervoxel(y),
+        CellMemory::put(~(instance == Int(-1)), supervoxel(x), supervoxel(y),
                         supervoxel(Int::load(&cells.z[i])), instance, i, cells);
       }
     });

@@ -13,7 +13,7 @@ namespace dynains::detail {
 /// Cells of some points, each with the instance that it belongs to, and where they are remembered.
 template <std::size_t kCount>
 struct CellBlock {
-  alignas(32) std::array<std::int32_t, kCount> xy, z, instance, slot;
+  std::array<std::int32_t, kCount> xy, z, instance, slot;
 };
 
 /// Gives cells back the number that was noted for them, unless another cell took their place.

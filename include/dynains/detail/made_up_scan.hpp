@@ -19,7 +19,8 @@ inline std::vector<float> made_up_scan(std::size_t points) {
   for (std::size_t i = 0; i < points; ++i) {
     const double azimuth =
         2.0 * M_PI * static_cast<double>(i % in_ring) / static_cast<double>(in_ring);
-    const double share = static_cast<double>(i / in_ring) / static_cast<double>(kRings);
+    const std::size_t ring = i / in_ring;
+    const double share = static_cast<double>(ring) / static_cast<double>(kRings);
     const double slope = 0.1 - 0.5 * share;  // of the beam
     const double to_wall = std::min(kHalfStreet / std::abs(std::sin(azimuth)), kFarthest);
     const double to_ground = slope < 0.0 ? -kHeight / slope : kFarthest;
