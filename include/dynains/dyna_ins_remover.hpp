@@ -154,7 +154,9 @@ class BasicDynaInsRemover {
         evidence_(config.evidence),
         map_(config.map),
         revision_(config.revision),
-        ring_(std::max(static_cast<std::size_t>(config.window), latency() + 1)) {}
+        ring_(std::max({static_cast<std::size_t>(config.window), latency() + 1, kFewestSlots})) {
+    if (config_.use_free_space) detail::keep_in_stage(evidence_, latency());
+  }
 
   const Config& config() const { return config_; }
   const Map& map() const { return map_; }
@@ -242,6 +244,7 @@ class BasicDynaInsRemover {
 
  private:
   using ScanSlot = detail::ScanSlot;
+  static constexpr std::size_t kFewestSlots = 2;  // ids go from scan to scan
 
   // While it lives, scans leave no trace, and none on the map, which may be on a disk.
   class Rehearsal {

@@ -8,7 +8,8 @@
 
 namespace dynains {
 
-/// Points above the ground share the verdict of their group; of the ground only what moved is told.
+/// Points above the ground share the verdict of their group, which is the same group in every
+/// verdict on a scan; of the ground only what moved is told.
 struct EvidenceVerdict {
   struct Group {
     Cause cause = Cause::kNotJudged;  ///< why it moved or stays (see is_dynamic)

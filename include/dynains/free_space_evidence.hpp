@@ -80,6 +80,11 @@ class FreeSpaceEvidence {
     if (!sensor.is_level()) R_beams_level_ = sensor.R_level_headed.transpose();
   }
 
+  /// Lets judge() be asked about scans up to that many behind the newest, if these are more than
+  /// horizon(): what happened later than that says nothing about them. To be called before the
+  /// first scan.
+  void keep(std::size_t scans) { records_.resize(std::max(records_.size(), scans + 2)); }
+
   /// Gets the memory of images for that many scans of the sensor that adapt() was told, or for as
   /// many as are ever kept.
   void reserve(std::size_t scans) {
@@ -143,8 +148,9 @@ class FreeSpaceEvidence {
     if (config_.use_tracks) run_beliefs(scan);
   }
 
-  /// Verdict on a scan that is at most `horizon()` old, as the evidence stands now. Nothing is
-  /// presumed in a final verdict. `split`: that of the scan. The spans hold until the next call.
+  /// Verdict on a scan that is at most `horizon()` old, or what keep() was told, as the evidence
+  /// stands now. Nothing is presumed in a final verdict. `split`: that of the scan. The spans hold
+  /// until the next call.
   EvidenceVerdict judge(std::uint64_t scan, bool is_final, const GroundSplit& split) {
     const Record& record = record_of(scan);
     judge_instances(scan, is_final, record);
@@ -398,7 +404,7 @@ class FreeSpaceEvidence {
   // Beliefs along tracks, with what is known now of every scan that is still open: a scan just
   // behind the newest may meanwhile have been seen through.
   void run_beliefs(std::uint64_t newest) {
-    const std::uint64_t open = std::min<std::uint64_t>(newest, records_.size() - 2);
+    const std::uint64_t open = std::min<std::uint64_t>(newest, horizon());
     for (std::uint64_t scan = newest - open; scan <= newest; ++scan) {
       Record& record = record_of(scan);
       const bool linked = scan > 0 && record_of(scan - 1).segment == record.segment;

@@ -9,6 +9,7 @@
 #include <limits>
 #include <vector>
 
+#include "dynains/detail/room.hpp"
 #include "dynains/detail/wide_lanes.hpp"
 #include "dynains/points.hpp"
 
@@ -65,7 +66,9 @@ class GroundFootprint {
 
   /// The extent of every 64 points, to be found once for all calls of visit_near().
   static void bound(PointsView points, std::vector<GroundBox>& boxes) {
-    boxes.resize((points.size() + kBlock - 1) / kBlock);
+    const std::size_t count = (points.size() + kBlock - 1) / kBlock;
+    detail::make_room(boxes, count);
+    boxes.resize(count);
     detail::run_lanes([&](auto lanes) {
       using Lanes = decltype(lanes);
       using Float = typename Lanes::Float;

@@ -389,6 +389,38 @@ TEST_CASE("votes: the more windows must agree, the less is removed") {
   CHECK(dynamic_points(looser.back()).empty());
 }
 
+TEST_CASE("windows may decide later than the evidence, which then has no say") {
+  std::vector<Scan> scans = drive(oncoming(), 12, 5.0);
+  for (std::size_t s = 1; s < scans.size(); s += 2) {
+    scans[s].points.resize(scans[s].points.size() / 3);  // every other one has fewer points
+  }
+  Config config;
+  config.window = 5;
+  config.votes = 2;
+  config.use_free_space = false;
+  const Run by_windows = run(config, scans);
+  config.use_free_space = true;
+  config.evidence.horizon = 0;
+  config.evidence.memory = 0;
+  config.evidence.presume_dynamic = false;
+  const Run with_evidence = run(config, scans);
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    CHECK(with_evidence.final[s].labels == by_windows.final[s].labels);
+  }
+  CHECK(dynamic_count(by_windows.final) > 0);
+}
+
+TEST_CASE("instance ids go from scan to scan, however soon a verdict is final") {
+  const std::vector<Scan> scans = drive(oncoming(), 10, 5.0);
+  Config config;
+  const Run late = run(config, scans);
+  config.evidence.horizon = 0;
+  const Run at_once = run(config, scans);
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    CHECK(at_once.newest[s].instances == late.newest[s].instances);
+  }
+}
+
 TEST_CASE("without belief every proposal is a verdict; belief only takes proposals back") {
   const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
   Config config = Config::paper();

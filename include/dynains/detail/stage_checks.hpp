@@ -151,6 +151,18 @@ void reserve_stage(Stage& stage, std::size_t scans) {
   if constexpr (CanReserve<Stage>::value) stage.reserve(scans);
 }
 
+/// Whether a stage has to be told how old the scans are that it is asked about:
+/// `keep(std::size_t scans)` is optional.
+template <class Stage, class = void>
+struct CanKeep : std::false_type {};
+template <class Stage>
+struct CanKeep<Stage, std::void_t<decltype(std::declval<Stage&>().keep(std::size_t{}))>>
+    : std::true_type {};
+template <class Stage>
+void keep_in_stage(Stage& stage, std::size_t scans) {
+  if constexpr (CanKeep<Stage>::value) stage.keep(scans);
+}
+
 /// The paper's parameters of a stage; a stage without `Config::paper()` keeps its defaults.
 template <class Config, class = void>
 struct HasPaper : std::false_type {};

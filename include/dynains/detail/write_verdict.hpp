@@ -9,6 +9,7 @@
 #include "dynains/cause.hpp"
 #include "dynains/cluster_set.hpp"
 #include "dynains/detail/lanes.hpp"
+#include "dynains/detail/room.hpp"
 #include "dynains/detail/scan_slot.hpp"
 #include "dynains/evidence_verdict.hpp"
 #include "dynains/points.hpp"
@@ -170,6 +171,7 @@ inline void write_ground_by_evidence(ScanSlot& scan,
     write(point, PointLabel::kGround, {Cause::kGround, 0.0F});
   }
   scan.moved_ground.clear();
+  make_room(scan.moved_ground, said.size());
   for (const EvidenceVerdict::GroundPoint& moved : said) {
     write(moved.point, PointLabel::kDynamic, moved.verdict);
     scan.moved_ground.push_back(moved.point);
@@ -195,11 +197,12 @@ inline void write_by_evidence(ScanSlot& scan, const EvidenceVerdict& said, bool 
     return {group.belief, dynamic ? PointLabel::kDynamic : PointLabel::kStatic, group.cause,
             static_cast<std::uint8_t>(dynamic ? 0 : 1), static_cast<std::uint8_t>(is_news ? 1 : 0)};
   };
-  const bool is_first = scan.proof.empty();
+  const bool is_first = scan.proof.size() != said.groups.size();
   of_group.resize(said.groups.size());
   for (std::size_t g = 0; g < of_group.size(); ++g) {
     of_group[g] = verdict_of(said.groups[g], is_first || !(said.groups[g] == scan.proof[g]));
   }
+  make_room(scan.proof, said.groups.size());
   scan.proof.assign(said.groups.begin(), said.groups.end());
 
   // Read once: stores of bytes may change anything, as far as the compiler knows.
