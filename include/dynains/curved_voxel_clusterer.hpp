@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "dynains/detail/arc_tangent.hpp"
-#include "dynains/detail/bit_tables.hpp"
+#include "dynains/detail/bits.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/room.hpp"
 #include "dynains/detail/wide_lanes.hpp"
@@ -278,10 +278,9 @@ class CurvedVoxelClusterer {
 
   bool is_beyond(std::size_t column) const { return column + 1 == columns(); }
   void leave_alone(std::size_t block) {
-    for (std::uint64_t left = starts_in(block); left != 0; left &= left - 1) {
-      parent_[run_of(block * kBlock + static_cast<std::size_t>(__builtin_ctzll(left)))] =
-          kNoCluster;
-    }
+    detail::for_each_bit(starts_in(block), [&](std::size_t at) {
+      parent_[run_of(block * kBlock + at)] = kNoCluster;
+    });
   }
 
   // Joins the runs in a block with those of another row that overlap or touch at a corner.
@@ -290,17 +289,13 @@ class CurvedVoxelClusterer {
     const std::size_t other = row * row_blocks() + place_in_row(block);
     const std::uint64_t here = occupied_[block];
     const std::uint64_t there = occupied_[other];
-    const std::uint64_t carried_here = carried_into(block);
-    const std::uint64_t carried_there = carried_into(other);
-    const std::uint64_t up_to_here = here | here << 1U | carried_here;
-    const std::uint64_t up_to_there = there | there << 1U | carried_there;
-    const std::uint64_t starts_here = here & ~(here << 1U | carried_here);
-    const std::uint64_t starts_there = there & ~(there << 1U | carried_there);
-    for (std::uint64_t left = (starts_here & up_to_there) | (starts_there & up_to_here); left != 0;
-         left &= left - 1) {
-      const auto at = static_cast<std::size_t>(__builtin_ctzll(left));
+    const std::uint64_t up_to_here = here | occupied_before(block);
+    const std::uint64_t up_to_there = there | occupied_before(other);
+    const std::uint64_t begins_there = starts_in(block) & up_to_there;
+    const std::uint64_t begins_here = starts_in(other) & up_to_here;
+    detail::for_each_bit(begins_there | begins_here, [&](std::size_t at) {
       join(run_at_or_before(block, at), run_at_or_before(other, at));
-    }
+    });
     // The block behind this one may hold nothing.
     if (here >> (kBlock - 1) != 0 && place_in_row(other + 1) != 0 &&
         (occupied_[other + 1] & 1U) != 0) {
@@ -327,14 +322,15 @@ class CurvedVoxelClusterer {
   bool is_occupied(std::size_t cell) const {
     return (occupied_[cell / kBlock] >> cell % kBlock & 1U) != 0;
   }
-  // Whether the last cell before a block is occupied.
-  std::uint64_t carried_into(std::size_t block) const {
-    return place_in_row(block) == 0 ? 0 : occupied_[block - 1] >> (kBlock - 1);
+  // Cells of a block behind an occupied one.
+  std::uint64_t occupied_before(std::size_t block) const {
+    const std::uint64_t carried =
+        place_in_row(block) == 0 ? 0 : occupied_[block - 1] >> (kBlock - 1);
+    return occupied_[block] << 1U | carried;
   }
   // Cells of a block with which a run begins.
   std::uint64_t starts_in(std::size_t block) const {
-    const std::uint64_t occupied = occupied_[block];
-    return occupied & ~(occupied << 1U | carried_into(block));
+    return occupied_[block] & ~occupied_before(block);
   }
 
   // Of an occupied cell.

@@ -16,6 +16,7 @@
 #include "dynains/belief_updater.hpp"
 #include "dynains/cause.hpp"
 #include "dynains/detail/beam_test.hpp"
+#include "dynains/detail/bits.hpp"
 #include "dynains/detail/free_space_sum.hpp"
 #include "dynains/detail/turn.hpp"
 #include "dynains/evidence_verdict.hpp"
@@ -539,15 +540,15 @@ class FreeSpaceEvidence {
     detail::grow(near_ground_, ground.size() + detail::kLanes);
     tested_points_.grow(ground.size() + detail::kLanes);
     tested_ = 0;
+    const bool tests = config_.ground_reach > 0.0;
     footprint_.visit_near(ground, record.ground_boxes, clearance,
                           [&](std::size_t begin, std::uint64_t near, std::uint64_t under) {
-                            for (std::uint64_t left = under; left != 0; left &= left - 1) {
-                              remove(begin + static_cast<std::size_t>(__builtin_ctzll(left)),
-                                     Cause::kUnderInstance);
-                            }
-                            add_tested(ground, begin, near & ~under);
+                            detail::for_each_bit(under, [&](std::size_t i) {
+                              remove(begin + i, Cause::kUnderInstance);
+                            });
+                            if (tests) add_tested(ground, begin, near & ~under);
                           });
-    if (config_.ground_reach > 0.0 && tested_ > 0) test_ground(scan, record, remove);
+    if (tested_ > 0) test_ground(scan, record, remove);
   }
 
   // Of the 64 points from `begin` on, those whose bits are set. Mostly, whole bytes are.
@@ -570,9 +571,7 @@ class FreeSpaceEvidence {
         }
         tested_ += detail::kLanes;
       } else {
-        for (std::uint64_t left = which & kAll; left != 0; left &= left - 1) {
-          add(begin + static_cast<std::size_t>(__builtin_ctzll(left)));
-        }
+        detail::for_each_bit(which & kAll, [&](std::size_t i) { add(begin + i); });
       }
     }
   }

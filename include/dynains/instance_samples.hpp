@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <vector>
 
 #include "dynains/curved_voxel_clusterer.hpp"
@@ -23,14 +22,6 @@ inline SupervoxelPlace pack_place(std::int32_t x, std::int32_t y, std::int32_t z
   constexpr std::int64_t kOffset = std::int64_t{1} << 20;
   return static_cast<std::uint64_t>(x + kOffset) << 42 |
          static_cast<std::uint64_t>(y + kOffset) << 21 | static_cast<std::uint64_t>(z + kOffset);
-}
-
-inline std::array<std::int32_t, 3> unpack_place(SupervoxelPlace place) {
-  constexpr std::uint64_t kField = (std::uint64_t{1} << 21) - 1;
-  constexpr std::int32_t kOffset = 1 << 20;
-  return {static_cast<std::int32_t>(place >> 42) - kOffset,
-          static_cast<std::int32_t>(place >> 21 & kField) - kOffset,
-          static_cast<std::int32_t>(place & kField) - kOffset};
 }
 
 /// The place beside another, some steps along each axis.

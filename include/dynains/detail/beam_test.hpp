@@ -8,7 +8,7 @@
 #include <cstring>
 #include <vector>
 
-#include "dynains/detail/bit_tables.hpp"
+#include "dynains/detail/bits.hpp"
 #include "dynains/detail/lane_transform.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/room.hpp"

@@ -139,28 +139,24 @@ void adapt_stage(Stage& stage, const SensorModel& sensor) {
   if constexpr (WantsSensor<Stage>::value) stage.adapt(sensor);
 }
 
-/// Whether a stage has memory of its own for scans to come: `reserve(std::size_t scans)` is
-/// optional.
-template <class Stage, class = void>
-struct CanReserve : std::false_type {};
-template <class Stage>
-struct CanReserve<Stage, std::void_t<decltype(std::declval<Stage&>().reserve(std::size_t{}))>>
-    : std::true_type {};
-template <class Stage>
-void reserve_stage(Stage& stage, std::size_t scans) {
-  if constexpr (CanReserve<Stage>::value) stage.reserve(scans);
+/// Calls a method that a stage may have or not: `call` takes the stage, and its return type is that
+/// of the method.
+template <class Stage, class Call>
+void call_if_there(Stage& stage, const Call& call) {
+  if constexpr (std::is_invocable_v<const Call&, Stage&>) call(stage);
 }
 
-/// Whether a stage has to be told how old the scans are that it is asked about:
-/// `keep(std::size_t scans)` is optional.
-template <class Stage, class = void>
-struct CanKeep : std::false_type {};
+/// Lets a stage get its own memory for scans to come; `reserve(std::size_t scans)` is optional.
 template <class Stage>
-struct CanKeep<Stage, std::void_t<decltype(std::declval<Stage&>().keep(std::size_t{}))>>
-    : std::true_type {};
+void reserve_stage(Stage& stage, std::size_t scans) {
+  call_if_there(stage, [scans](auto& s) -> decltype(s.reserve(scans)) { return s.reserve(scans); });
+}
+
+/// Tells a stage how old the scans are that it is asked about; `keep(std::size_t scans)` is
+/// optional.
 template <class Stage>
 void keep_in_stage(Stage& stage, std::size_t scans) {
-  if constexpr (CanKeep<Stage>::value) stage.keep(scans);
+  call_if_there(stage, [scans](auto& s) -> decltype(s.keep(scans)) { return s.keep(scans); });
 }
 
 /// The paper's parameters of a stage; a stage without `Config::paper()` keeps its defaults.

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include "dynains/cause.hpp"
 #include "dynains/cluster_set.hpp"
+#include "dynains/detail/bits.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/room.hpp"
 #include "dynains/detail/scan_slot.hpp"
@@ -125,7 +127,6 @@ inline void write_by_windows(ScanSlot& scan, Span<const ClusterVerdict> verdicts
 /// Of eight points from `i` on: whether some window believed in one or brought one farther than the
 /// first one did.
 inline bool any_news(const Reach* reach, const Reach* first_reach, std::size_t i) {
-  constexpr std::uint64_t kInEachByte = 0x0101010101010101U;
   static_assert(static_cast<unsigned>(Reach::kProposed) == 3, "the only one with both bits set");
   std::uint64_t now, before;
   std::memcpy(&now, reach + i, sizeof(now));

@@ -1,4 +1,5 @@
-// Tables by byte, for what processors without instructions of their own do bit by bit.
+// Words of bits: tables by byte, for what processors without instructions of their own do bit by
+// bit, and loops.
 #pragma once
 
 #include <array>
@@ -7,6 +8,9 @@
 #include <cstring>
 
 namespace dynains::detail {
+
+/// A one in each of eight bytes: what it is multiplied by is in all of them.
+inline constexpr std::uint64_t kInEachByte = 0x0101010101010101U;
 
 using BytesByByte = std::array<std::array<std::uint8_t, 8>, 256>;
 
@@ -42,7 +46,6 @@ inline constexpr std::array<std::uint8_t, 256> kOnes = count_ones();
 
 /// Writes how many of the 64 bits are set up to each of them, and returns how many are set.
 inline std::uint32_t count_up_to(std::uint64_t bits, std::uint8_t* counts) {
-  constexpr std::uint64_t kInEachByte = 0x0101010101010101U;
   std::uint32_t before = 0;
   for (std::size_t i = 0; i < 8; ++i) {
     const auto& ones = kOnesUpTo[bits >> 8 * i & 0xFFU];
@@ -53,6 +56,12 @@ inline std::uint32_t count_up_to(std::uint64_t bits, std::uint8_t* counts) {
     before += ones[7];
   }
   return before;
+}
+
+/// Calls `body(number)` for each bit that is set, from the lowest on.
+template <class Body>
+void for_each_bit(std::uint64_t bits, Body&& body) {
+  for (; bits != 0; bits &= bits - 1) body(static_cast<std::size_t>(__builtin_ctzll(bits)));
 }
 
 }  // namespace dynains::detail
