@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "dynains/detail/bits.hpp"
 #include "dynains/detail/chunked_vector.hpp"
 #include "dynains/detail/lane_transform.hpp"
 #include "dynains/detail/lanes.hpp"
@@ -78,7 +79,8 @@ class StaticMapAccumulator {
     for (std::size_t begin = 0; begin < points.size(); begin += kBatch) {
       const std::size_t count = std::min(kBatch, points.size() - begin);
       locate(points.subview(begin, count), m, first, batch);
-      insert_batch(batch, count, keep.empty() ? keep : keep.subspan(begin, count));
+      choose(count, keep.empty() ? keep : keep.subspan(begin, count), batch);
+      insert_chosen(batch);
     }
   }
 
@@ -201,14 +203,19 @@ class StaticMapAccumulator {
   // without a walk through a bucket.
   static constexpr std::size_t kRecent = std::size_t{32} * 64 * 16;
 
-  // Some points of a scan on their way into the map.
+  // Some points of a scan on their way into the map. Where their voxels are begins at number 1:
+  // behind number 0, which is nowhere, all have a predecessor.
   static constexpr std::size_t kBatch = 512;
   struct Batch {
-    float point[3][kBatch];         // m, relative to the corner of the block
-    std::int32_t block[3][kBatch];  // in the world, counted in blocks
-    std::int32_t bit[kBatch];       // of the voxel, in its block
-    std::int32_t recent[kBatch];    // place of the block among the recent ones
+    static constexpr std::size_t kRoom = kBatch + detail::kLanes;
+    float point[3][kBatch];        // m, relative to the corner of the block
+    std::int32_t block[3][kRoom];  // in the world, counted in blocks
+    std::int32_t voxel[kRoom];     // in its block
+    std::int32_t recent[kBatch];   // place of the block among the recent ones
+    std::uint16_t chosen[kRoom];   // numbers of points that may be added
+    std::size_t chosen_count;
   };
+  static constexpr std::int32_t kNowhere = -1;
 
   template <int kValue>
   using Constant = std::integral_constant<int, kValue>;
@@ -233,7 +240,7 @@ class StaticMapAccumulator {
       const Float x = at.load(points.x.data());
       const Float y = at.load(points.y.data());
       const Float z = at.load(points.z.data());
-      Int bit(0), recent(0);
+      Int voxel_in_block(0), recent(0);
       const auto add_axis = [&](auto axis, auto voxel_bits, auto recent_bits) {
         const Float value = to_corner(axis, x, y, z);
         const Int voxel = floor(value * scale);
@@ -241,29 +248,58 @@ class StaticMapAccumulator {
         const Int block = voxel >> voxel_bits;
         const Int block_in_world = block + Int::load(first[axis]);
         (value - to_float(block) * size[axis]).store(&batch.point[axis][at.begin]);
-        block_in_world.store(&batch.block[axis][at.begin]);
-        bit = (bit << voxel_bits) + (voxel & Int((1 << voxel_bits) - 1));
-        recent = (recent << recent_bits) + (block_in_world & Int((1 << recent_bits) - 1));
+        block_in_world.store(&batch.block[axis][at.begin + 1]);
+        voxel_in_block = (voxel_in_block << voxel_bits) | (voxel & Int((1 << voxel_bits) - 1));
+        recent = (recent << recent_bits) | (block_in_world & Int((1 << recent_bits) - 1));
       };
       add_axis(Constant<2>(), Constant<1>(), Constant<4>());
       add_axis(Constant<1>(), Constant<2>(), Constant<6>());
       add_axis(Constant<0>(), Constant<3>(), Constant<5>());
-      bit.store(&batch.bit[at.begin]);
+      voxel_in_block.store(&batch.voxel[at.begin + 1]);
       recent.store(&batch.recent[at.begin]);
     });
   }
 
-  void insert_batch(const Batch& batch, std::size_t count, Span<const std::uint8_t> keep) {
+  // The points that are kept, but none in the voxel of a kept predecessor, as neighbours in a scan
+  // often are; without a branch on single points.
+  void choose(std::size_t count, Span<const std::uint8_t> keep, Batch& batch) const {
+    batch.voxel[0] = kNowhere;
+    for (auto& block : batch.block) block[0] = 0;
+    std::size_t chosen = 0;
+    detail::run_lanes([&](auto lanes) {
+      using Int = typename decltype(lanes)::Int;
+      const auto change = [](const std::int32_t* of) { return Int::load(of) ^ Int::load(of + 1); };
+      unsigned was_kept = 0;
+      for (std::size_t i = 0; i < count; i += detail::kLanes) {
+        const std::size_t size = std::min(detail::kLanes, count - i);
+        const unsigned kept =
+            keep.empty() ? (1U << size) - 1U : detail::bits_of_bytes(keep.data() + i, size);
+        const auto stays = ((change(batch.block[0] + i) | change(batch.block[1] + i)) |
+                            (change(batch.block[2] + i) | change(batch.voxel + i))) == Int(0);
+        const unsigned repeats = keep_all_ ? 0 : stays.bits() & (kept << 1U | was_kept);
+        was_kept = kept >> (detail::kLanes - 1);
+        const unsigned which = kept & ~repeats;
+        for (std::size_t k = 0; k < detail::kLanes; ++k) {
+          batch.chosen[chosen + k] =
+              static_cast<std::uint16_t>(i + detail::kPlacesOfBits[which][k]);
+        }
+        chosen += detail::kOnesUpTo[which].back();
+      }
+    });
+    batch.chosen_count = chosen;
+  }
+
+  void insert_chosen(const Batch& batch) {
     std::uint32_t* const recent = recent_.data();
-    for (std::size_t i = 0; i < count; ++i) {
-      if (!keep.empty() && keep[i] == 0) continue;
-      const std::int32_t x = batch.block[0][i];
-      const std::int32_t y = batch.block[1][i];
-      const std::int32_t z = batch.block[2][i];
+    for (std::size_t k = 0; k < batch.chosen_count; ++k) {
+      const std::size_t i = batch.chosen[k];
+      const std::int32_t x = batch.block[0][i + 1];
+      const std::int32_t y = batch.block[1][i + 1];
+      const std::int32_t z = batch.block[2][i + 1];
       std::uint32_t& known = recent[batch.recent[i]];
       if (known >= blocks_.size() || !blocks_[known].is_at(x, y, z)) known = block_at({x, y, z});
       Block& block = blocks_[known];
-      const std::uint64_t bit = std::uint64_t{1} << batch.bit[i];
+      const std::uint64_t bit = std::uint64_t{1} << batch.voxel[i + 1];
       if ((block.occupied & bit) != 0 && !keep_all_) continue;
       block.occupied |= bit;
       block.first =

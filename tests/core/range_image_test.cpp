@@ -222,7 +222,7 @@ TEST_CASE("bits of sights are counted over any range") {
   }
   for (int round = 0; round < 2000; ++round) {
     const std::size_t begin = random.index(kCount);
-    const std::size_t end = begin + random.index(std::min<std::size_t>(kCount - begin, 40) + 1);
+    const std::size_t end = begin + random.index(std::min<std::size_t>(kCount - begin, 130) + 1);
     std::uint32_t free = 0;
     std::uint32_t hit = 0;
     for (std::size_t i = begin; i < end; ++i) {

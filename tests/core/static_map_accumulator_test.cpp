@@ -63,10 +63,14 @@ Eigen::Vector3d grid_vector(Random& random, double reach, double height) {
   return (random.vector(-most, most) * 64.0).array().round() / 64.0;
 }
 
+// Half of them lie beside their predecessor, as neighbours in a scan do.
 PointBuffer grid_points(Random& random, std::size_t count, double reach) {
   PointBuffer points;
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < count; ++i) {
-    const Eigen::Vector3f p = grid_vector(random, reach, 4.0).cast<float>();
+    place = random.index(2) == 0 ? grid_vector(random, reach, 4.0)
+                                 : place + grid_vector(random, 0.125, 0.125);
+    const Eigen::Vector3f p = place.cast<float>();
     points.push_back(p.x(), p.y(), p.z());
   }
   return points;

@@ -26,7 +26,7 @@ class Sights {
  public:
   /// Room for `count` samples; their bits are to be written.
   void resize(std::size_t count) {
-    // Counting reads nine bytes from that of the first bit on.
+    // Counting reads eight bytes from that of the first bit on.
     const std::size_t bytes = (count + kBeamBlock - 1) / kBeamBlock * kBeamBlock / 8 + 8;
     grow(free_, bytes);
     grow(hit_, bytes);
@@ -43,15 +43,17 @@ class Sights {
     std::uint32_t hit;
   };
   Count count(std::size_t begin, std::size_t end) const {
-    std::uint32_t free = 0;
-    std::uint32_t hit = 0;
-    for (; end - begin > 8; begin += 8) {
-      free += kOnes[eight_from(free_, begin) & 0xFFU];
-      hit += kOnes[eight_from(hit_, begin) & 0xFFU];
+    constexpr std::size_t kAtOnce = 56;  // what a word has at least, from any bit of its first byte
+    constexpr std::uint64_t kAll = (std::uint64_t{1} << kAtOnce) - 1;
+    Count seen = {0, 0};
+    for (; end - begin > kAtOnce; begin += kAtOnce) {
+      seen.free += count_ones(word_from(free_, begin) & kAll);
+      seen.hit += count_ones(word_from(hit_, begin) & kAll);
     }
-    const unsigned left = (1U << (end - begin)) - 1;
-    return {free + kOnes[eight_from(free_, begin) & left],
-            hit + kOnes[eight_from(hit_, begin) & left]};
+    const std::uint64_t left = (std::uint64_t{1} << (end - begin)) - 1;
+    seen.free += count_ones(word_from(free_, begin) & left);
+    seen.hit += count_ones(word_from(hit_, begin) & left);
+    return seen;
   }
   /// Counts up, for each of the first `count` samples, how many references saw it free or hit it:
   /// fewer than 256. Both have room for a multiple of eight.
@@ -72,14 +74,14 @@ class Sights {
   bool is_hit(std::size_t sample) const { return (hit_[sample / 8] >> sample % 8 & 1U) != 0; }
 
  private:
+  // From the byte on that holds the first bit.
   static std::uint64_t word_at(const std::vector<std::uint8_t>& bits, std::size_t first) {
     std::uint64_t word;
     std::memcpy(&word, &bits[first / 8], sizeof(word));
     return word;
   }
-  static unsigned eight_from(const std::vector<std::uint8_t>& bits, std::size_t first) {
-    const unsigned two = bits[first / 8] | unsigned{bits[first / 8 + 1]} << 8U;
-    return two >> first % 8;
+  static std::uint64_t word_from(const std::vector<std::uint8_t>& bits, std::size_t first) {
+    return word_at(bits, first) >> first % 8;
   }
   std::vector<std::uint8_t> free_, hit_;
 };

@@ -36,13 +36,40 @@ constexpr BytesByByte sum_bits() {
 /// How many bits of a byte are set up to each of them.
 inline constexpr BytesByByte kOnesUpTo = sum_bits();
 
-constexpr std::array<std::uint8_t, 256> count_ones() {
-  std::array<std::uint8_t, 256> ones{};
-  for (std::size_t i = 0; i < ones.size(); ++i) ones[i] = kOnesUpTo[i][7];
-  return ones;
+/// How many bits are set.
+constexpr std::uint32_t count_ones(std::uint64_t bits) {
+  bits -= bits >> 1U & 0x5555555555555555U;
+  bits = (bits & 0x3333333333333333U) + (bits >> 2U & 0x3333333333333333U);
+  bits = (bits + (bits >> 4U)) & 0x0F0F0F0F0F0F0F0FU;
+  return static_cast<std::uint32_t>(bits * kInEachByte >> 56U);
 }
-/// Set bits of every byte, close together.
-inline constexpr std::array<std::uint8_t, 256> kOnes = count_ones();
+
+constexpr BytesByByte find_bits() {
+  BytesByByte places{};
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    std::size_t found = 0;
+    for (std::uint8_t bit = 0; bit < 8; ++bit) {
+      if ((i >> bit & 1U) != 0) places[i][found++] = bit;
+    }
+  }
+  return places;
+}
+/// Which bits of a byte are set, from the lowest on.
+inline constexpr BytesByByte kPlacesOfBits = find_bits();
+
+/// A bit for each of up to eight bytes: whether it is not zero.
+inline unsigned bits_of_bytes(const std::uint8_t* bytes, std::size_t count) {
+  constexpr std::uint64_t kHighest = 0x80 * kInEachByte;
+  constexpr std::uint64_t kGather = 0x0102040810204080U;  // of bit 0 of each byte, into the last
+  std::uint64_t eight = 0;
+  if (count == sizeof(eight)) {
+    std::memcpy(&eight, bytes, sizeof(eight));
+  } else {
+    std::memcpy(&eight, bytes, count);
+  }
+  const std::uint64_t is_set = (((eight & ~kHighest) + ~kHighest) | eight) & kHighest;
+  return static_cast<unsigned>((is_set >> 7U) * kGather >> 56U);
+}
 
 /// Writes how many of the 64 bits are set up to each of them, and returns how many are set.
 inline std::uint32_t count_up_to(std::uint64_t bits, std::uint8_t* counts) {

@@ -71,6 +71,7 @@ struct Int8 {
   friend Int8 operator<<(Int8 a, int bits) { return {a.lo << bits, a.hi << bits}; }
   friend Int8 operator>>(Int8 a, int bits) { return {a.lo >> bits, a.hi >> bits}; }  // of the sign
   friend Int8 operator&(Int8 a, Int8 b) { return {a.lo & b.lo, a.hi & b.hi}; }
+  friend Int8 operator|(Int8 a, Int8 b) { return {a.lo | b.lo, a.hi | b.hi}; }
   friend Int8 operator^(Int8 a, Int8 b) { return {a.lo ^ b.lo, a.hi ^ b.hi}; }
   friend Mask8 operator<(Int8 a, Int8 b) { return {a.lo < b.lo, a.hi < b.hi}; }
   friend Mask8 operator>(Int8 a, Int8 b) { return {a.lo > b.lo, a.hi > b.hi}; }
