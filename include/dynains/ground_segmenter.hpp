@@ -318,7 +318,12 @@ class GroundSegmenter {
         static_cast<std::size_t>(config_.ground_lowest_points));
     const float seed_height = lowest.of(patch_.z.data(), count, floor_of(patch));
     HalfSpace below(seed_height, static_cast<float>(config_.ground_seed_margin));
-    if (!fit_ground<Lanes>(patch, count, seed_height, below)) return count;
+    bool is_whole = false;
+    if (!fit_ground<Lanes>(patch, count, seed_height, below, is_whole)) return count;
+    if (is_whole) {
+      ground.put(records, count);
+      return 0;
+    }
 
     std::size_t rest = 0;
     for (std::size_t i = 0; i < count; i += detail::kLanes) {
@@ -355,9 +360,10 @@ class GroundSegmenter {
   }
 
   // From the points near the seed height, a horizontal half space, to those near the plane. Returns
-  // whether these are ground.
+  // whether these are ground; `is_whole`: whether they are all points of the patch.
   template <class Lanes>
-  bool fit_ground(std::size_t patch, std::size_t count, float seed_height, HalfSpace& below) const {
+  bool fit_ground(std::size_t patch, std::size_t count, float seed_height, HalfSpace& below,
+                  bool& is_whole) const {
     detail::Plane plane;
     for (int i = 0; i < config_.ground_iterations; ++i) {
       const detail::PlaneMoments moments = sum_moments<Lanes>(patch_, count, below);
@@ -369,6 +375,9 @@ class GroundSegmenter {
       below.offset =
           static_cast<float>(config_.ground_distance + plane.normal_x * plane.mean_x +
                              plane.normal_y * plane.mean_y + plane.normal_z * plane.mean_z);
+      // From the same points, the next plane would be the same.
+      is_whole = moments.count == static_cast<double>(count) && contains<Lanes>(below, count);
+      if (is_whole) break;
     }
     if (plane.normal_z < config_.ground_uprightness) return false;
     const auto ring = static_cast<std::size_t>(ring_of_patch_[patch]);
@@ -376,6 +385,16 @@ class GroundSegmenter {
     const double elevation = plane.mean_z + static_cast<double>(seed_height) + height_;
     return !(elevation > config_.ground_elevation[ring] &&
              plane.flatness >= config_.ground_flatness[ring]);
+  }
+
+  // Whether all points of the patch are inside.
+  template <class Lanes>
+  bool contains(const HalfSpace& space, std::size_t count) const {
+    for (std::size_t i = 0; i < count; i += detail::kLanes) {
+      const unsigned all = (1U << std::min(detail::kLanes, count - i)) - 1U;
+      if (space.inside(space.template local<Lanes>(patch_, i)).bits() != all) return false;
+    }
+    return true;
   }
 
   // The points of a patch; x and y relative to an origin near them.
