@@ -22,7 +22,8 @@
 #include "dynains/detail/scan_slot.hpp"
 #include "dynains/detail/stage_checks.hpp"
 #include "dynains/detail/turn.hpp"
-#include "dynains/detail/write_verdict.hpp"
+#include "dynains/detail/write_by_evidence.hpp"
+#include "dynains/detail/write_by_windows.hpp"
 #include "dynains/free_space_evidence.hpp"
 #include "dynains/ground_segmenter.hpp"
 #include "dynains/heading.hpp"
@@ -313,15 +314,16 @@ class BasicDynaInsRemover {
       if (!compares_windows()) hand_on_ids(newest);
     }
     clock.lap(result.times.evidence);
-    detail::begin_verdict(newest);
     if (config_.use_free_space) {
+      const EvidenceVerdict said = evidence_.judge(newest.scan, false, newest.split);
+      clock.lap(result.times.judge);
       detail::write_instances(newest, newest_cluster);
-      clock.lap(result.times.verdict);
-      decide(newest, 1, false, clock, result.times);
+      detail::write_by_evidence(newest, said, compares_windows(), verdict_scratch_);
     } else {
+      detail::begin_verdict(newest);
       detail::write_by_windows(newest, verdict_);
-      clock.lap(result.times.verdict);
     }
+    clock.lap(result.times.verdict);
     result.newest = newest.verdict();
 
     if (pushed_ - finished_ > latency()) result.finished = finish_next(clock, result.times);
@@ -502,12 +504,12 @@ class BasicDynaInsRemover {
     return R_level_sensor.cast<float>();
   }
 
-  // Verdict by point: at least `votes` windows said so, or the evidence does.
-  void decide(ScanSlot& scan, int votes, bool is_final, StageClock& clock, StageTimes& times) {
+  // Final verdict by point: at least `votes` windows said so, or the evidence does.
+  void decide(ScanSlot& scan, int votes, StageClock& clock, StageTimes& times) {
     if (config_.use_free_space) {
-      const EvidenceVerdict said = evidence_.judge(scan.scan, is_final, scan.split);
+      const EvidenceVerdict said = evidence_.judge(scan.scan, true, scan.split);
       clock.lap(times.judge);
-      detail::write_by_evidence(scan, said, compares_windows(), votes, of_group_);
+      detail::rewrite_by_evidence(scan, said, compares_windows(), votes, verdict_scratch_);
     } else {
       detail::rewrite_by_windows(scan, votes);
     }
@@ -516,7 +518,7 @@ class BasicDynaInsRemover {
 
   ScanVerdict finish_next(StageClock& clock, StageTimes& times) {
     ScanSlot& scan = slot(finished_);
-    decide(scan, std::max(1, config_.votes), true, clock, times);
+    decide(scan, std::max(1, config_.votes), clock, times);
     ++finished_;  // also if a map throws that writes to a disk
     if (config_.build_map) {
       const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
@@ -551,7 +553,7 @@ class BasicDynaInsRemover {
   std::vector<std::uint32_t> scan_begin_;
   ClusterSet clusters_;
   std::vector<detail::ClusterVerdict> verdict_;
-  std::vector<detail::GroupVerdict> of_group_;
+  detail::VerdictScratch verdict_scratch_;
   detail::InstanceIds instance_ids_;
 
   detail::OneCall one_call_;

@@ -1,10 +1,13 @@
-#include "dynains/detail/write_verdict.hpp"
-
+// What is written in order and by streak, against what it means point by point.
 #include <algorithm>
 #include <map>
+#include <numeric>
+#include <utility>
 #include <vector>
 
 #include "dynains/detail/instance_ids.hpp"
+#include "dynains/detail/write_by_evidence.hpp"
+#include "dynains/detail/write_by_windows.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 
@@ -135,6 +138,121 @@ TEST_CASE("verdicts by streak are those by point, at once and after more windows
     const int votes = 1 + static_cast<int>(random.index(3));
     detail::rewrite_by_windows(scan, votes);
     check(votes);
+  }
+}
+
+constexpr std::uint32_t kGroups = 9;
+
+// Scans of some points of which some are in no cluster and some in no group, as far ones are.
+struct JudgedScan {
+  detail::ScanSlot slot;
+  std::size_t ground;
+  std::vector<std::uint32_t> cluster_of, group_of;
+
+  explicit JudgedScan(Random& random) : ground(random.index(40)) {
+    const std::size_t above = random.index(200);
+    const std::size_t all = ground + above + random.index(20);
+    std::vector<std::uint32_t> order(all);
+    std::iota(order.begin(), order.end(), 0U);
+    for (std::size_t i = all; i > 1; --i) std::swap(order[i - 1], order[random.index(i)]);
+    slot.split.resize(ground + above);
+    slot.split.ground_count = ground;
+    std::copy_n(order.begin(), ground + above, slot.split.input.begin());
+    slot.labels.assign(all, PointLabel::kOutOfRange);
+    for (std::uint32_t c = 0; c < kClusters; ++c) slot.ids.push_back(100 + c);
+    for (std::size_t i = 0; i < above; ++i) {
+      const std::size_t cluster = random.index(kClusters + 1);
+      cluster_of.push_back(cluster == kClusters ? kNoCluster : static_cast<std::uint32_t>(cluster));
+      group_of.push_back(static_cast<std::uint32_t>(random.index(kGroups)));
+    }
+  }
+};
+
+EvidenceVerdict::Group random_group(Random& random) {
+  constexpr Cause kCauses[] = {Cause::kOccupied, Cause::kNoEvidence, Cause::kFreeSpace,
+                               Cause::kWithInstance};
+  return {kCauses[random.index(4)], random.index(2) == 0 ? 0.5F : random.uniform_float(0.5, 1.0)};
+}
+
+TEST_CASE("verdicts by evidence are those of the point's group, at once and again") {
+  detail::VerdictScratch scratch;
+  for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+    INFO("seed " << seed);
+    Random random(seed);
+    JudgedScan scan(random);
+    detail::ScanSlot& slot = scan.slot;
+    const bool compared = random.index(2) == 0;
+    const std::size_t above = scan.group_of.size();
+    if (compared) {
+      for (std::size_t i = 0; i < above; ++i) {
+        slot.reach.push_back(static_cast<Reach>(random.index(4)));
+        slot.votes.push_back(static_cast<std::uint8_t>(random.index(4)));
+        slot.belief.push_back(random.uniform_float(0.0, 1.0));
+      }
+    }
+    std::vector<EvidenceVerdict::Group> groups(kGroups);
+    groups[0] = {Cause::kNotJudged, 0.0F};
+    std::vector<EvidenceVerdict::GroundPoint> moved;
+    const auto change = [&] {
+      for (std::uint32_t g = 1; g < kGroups; ++g) {
+        if (random.index(2) == 0) groups[g] = random_group(random);
+      }
+      moved.clear();
+      for (std::uint32_t i = 0; i < scan.ground; ++i) {
+        if (random.index(5) == 0) moved.push_back({i, {Cause::kUnderInstance, 0.75F}});
+      }
+    };
+    const auto check = [&](int votes, bool is_final) {
+      for (std::size_t i = 0; i < above; ++i) {
+        const std::uint32_t to = slot.split.input[scan.ground + i];
+        EvidenceVerdict::Group expected = groups[scan.group_of[i]];
+        if (compared && slot.reach[i] == Reach::kProposed) {
+          expected.belief = std::max(expected.belief, slot.belief[i]);
+          if (!is_dynamic(expected.cause) && slot.votes[i] >= votes) {
+            expected.cause = Cause::kProposed;
+          }
+        }
+        const bool dynamic = is_dynamic(expected.cause);
+        REQUIRE(slot.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kStatic));
+        REQUIRE(slot.causes[to] == expected.cause);
+        REQUIRE(slot.beliefs[to] == expected.belief);
+        REQUIRE(slot.instances[to] ==
+                (scan.cluster_of[i] == kNoCluster ? kNoInstance : 100 + scan.cluster_of[i]));
+        if (is_final) REQUIRE(slot.is_kept[scan.ground + i] == (dynamic ? 0 : 1));
+      }
+      for (std::uint32_t i = 0; i < scan.ground; ++i) {
+        const std::uint32_t to = slot.split.input[i];
+        const bool dynamic = std::any_of(moved.begin(), moved.end(),
+                                         [i](const auto& point) { return point.point == i; });
+        REQUIRE(slot.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kGround));
+        REQUIRE(slot.causes[to] == (dynamic ? Cause::kUnderInstance : Cause::kGround));
+        REQUIRE(slot.beliefs[to] == (dynamic ? 0.75F : 0.0F));
+        REQUIRE(slot.instances[to] == kNoInstance);
+        if (is_final) REQUIRE(slot.is_kept[i] == (dynamic ? 0 : 1));
+      }
+      std::size_t outside = 0;
+      for (std::size_t i = 0; i < slot.labels.size(); ++i) {
+        if (slot.labels[i] != PointLabel::kOutOfRange) continue;
+        ++outside;
+        REQUIRE(slot.causes[i] == Cause::kNotJudged);
+        REQUIRE(slot.beliefs[i] == 0.0F);
+        REQUIRE(slot.instances[i] == kNoInstance);
+      }
+      REQUIRE(outside == slot.labels.size() - slot.split.count);
+    };
+
+    change();
+    detail::write_instances(slot, scan.cluster_of);
+    detail::write_by_evidence(slot, {groups, scan.group_of, moved}, compared, scratch);
+    check(1, false);
+    for (int again = 0; again < 2; ++again) {
+      change();
+      for (std::size_t i = 0; i < slot.reach.size(); ++i) {
+        if (random.index(4) == 0) slot.reach[i] = Reach::kProposed;
+      }
+      detail::rewrite_by_evidence(slot, {groups, scan.group_of, moved}, compared, 2, scratch);
+      check(2, true);
+    }
   }
 }
 

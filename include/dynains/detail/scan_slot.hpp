@@ -52,7 +52,7 @@ struct ScanSlot {
   std::vector<EvidenceVerdict::Group> proof;
   std::vector<std::uint32_t> moved_ground;
   // By point of the split, ground first.
-  std::vector<std::uint8_t> is_kept;  // verdict: static
+  std::vector<std::uint8_t> is_kept;  // final verdict: static
   // By input point.
   std::vector<PointLabel> labels;
   std::vector<std::uint32_t> instances;

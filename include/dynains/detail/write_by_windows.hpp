@@ -1,4 +1,4 @@
-// From verdicts on clusters, and from the evidence of other scans, to the points of a scan.
+// From verdicts of windows on clusters to the points of a scan.
 #pragma once
 
 #include <algorithm>
@@ -11,9 +11,7 @@
 #include "dynains/cluster_set.hpp"
 #include "dynains/detail/bits.hpp"
 #include "dynains/detail/lanes.hpp"
-#include "dynains/detail/room.hpp"
 #include "dynains/detail/scan_slot.hpp"
-#include "dynains/evidence_verdict.hpp"
 #include "dynains/points.hpp"
 
 namespace dynains::detail {
@@ -29,36 +27,6 @@ struct ClusterVerdict {
 inline ClusterVerdict verdict_on(const ClusterSet::Streak& streak,
                                  Span<const ClusterVerdict> verdicts) {
   return streak.cluster != kNoCluster ? verdicts[streak.cluster] : ClusterVerdict();
-}
-
-/// What does not change any more: ground, and the points that are no part of the split.
-inline void begin_verdict(ScanSlot& scan) {
-  scan.instances.assign(scan.labels.size(), kNoInstance);
-  scan.beliefs.assign(scan.labels.size(), 0.0F);
-  scan.causes.assign(scan.labels.size(), Cause::kNotJudged);
-  scan.is_kept.assign(scan.split.count, 1);
-  scan.proof.clear();
-  scan.moved_ground.clear();
-  const std::uint32_t* const input = scan.split.input.data();
-  PointLabel* const labels = scan.labels.data();
-  Cause* const causes = scan.causes.data();
-  const std::size_t ground_count = scan.split.ground_count;
-  for (std::size_t i = 0; i < ground_count; ++i) {
-    labels[input[i]] = PointLabel::kGround;
-    causes[input[i]] = Cause::kGround;
-  }
-}
-
-/// Each point above the ground gets the instance of its cluster.
-inline void write_instances(ScanSlot& scan, Span<const std::uint32_t> cluster_of) {
-  const std::uint32_t* const input = scan.split.input.data() + scan.split.ground_count;
-  const std::uint32_t* const clusters = cluster_of.data();
-  const std::uint32_t* const ids = scan.ids.data();
-  std::uint32_t* const instances = scan.instances.data();
-  const std::size_t count = cluster_of.size();
-  for (std::size_t i = 0; i < count; ++i) {
-    if (clusters[i] != kNoCluster) instances[input[i]] = ids[clusters[i]];
-  }
 }
 
 /// Takes in what the window in which the scan is the newest says of it. Its streaks and ids are
@@ -95,6 +63,22 @@ inline void record_again(ScanSlot& scan, Span<const ClusterSet::Streak> streaks,
       scan.votes[i] = static_cast<std::uint8_t>((first ? 0 : scan.votes[i]) + verdict.dynamic);
       scan.belief[i] = first ? verdict.belief : std::max(scan.belief[i], verdict.belief);
     }
+  }
+}
+
+/// What does not change any more: ground, and the points that are no part of the split.
+inline void begin_verdict(ScanSlot& scan) {
+  scan.instances.assign(scan.labels.size(), kNoInstance);
+  scan.beliefs.assign(scan.labels.size(), 0.0F);
+  scan.causes.assign(scan.labels.size(), Cause::kNotJudged);
+  scan.is_kept.assign(scan.split.count, 1);
+  const std::uint32_t* const input = scan.split.input.data();
+  PointLabel* const labels = scan.labels.data();
+  Cause* const causes = scan.causes.data();
+  const std::size_t ground_count = scan.split.ground_count;
+  for (std::size_t i = 0; i < ground_count; ++i) {
+    labels[input[i]] = PointLabel::kGround;
+    causes[input[i]] = Cause::kGround;
   }
 }
 
@@ -154,81 +138,6 @@ inline void rewrite_by_windows(ScanSlot& scan, int votes) {
       scan.causes[input[i]] = dynamic ? Cause::kProposed : cause_to_stay(reach[i]);
       if (proposed) scan.beliefs[input[i]] = scan.belief[i];
     }
-  }
-}
-
-/// Ground moved where the evidence says so now; `said` of it only.
-inline void write_ground_by_evidence(ScanSlot& scan,
-                                     Span<const EvidenceVerdict::GroundPoint> said) {
-  const auto write = [&scan](std::uint32_t point, PointLabel label,
-                             EvidenceVerdict::Group verdict) {
-    const std::uint32_t to = scan.split.input[point];
-    scan.is_kept[point] = label == PointLabel::kGround ? 1 : 0;
-    scan.labels[to] = label;
-    scan.causes[to] = verdict.cause;
-    scan.beliefs[to] = verdict.belief;
-  };
-  for (const std::uint32_t point : scan.moved_ground) {
-    write(point, PointLabel::kGround, {Cause::kGround, 0.0F});
-  }
-  scan.moved_ground.clear();
-  make_room(scan.moved_ground, said.size());
-  for (const EvidenceVerdict::GroundPoint& moved : said) {
-    write(moved.point, PointLabel::kDynamic, moved.verdict);
-    scan.moved_ground.push_back(moved.point);
-  }
-}
-
-/// What a group's points get.
-struct GroupVerdict {
-  float belief;
-  PointLabel label;
-  Cause cause;
-  std::uint8_t is_kept;
-  std::uint8_t is_news;  // not what was said of it before
-};
-
-/// The verdict by the evidence of other scans, and by windows where `compared`. `of_group`:
-/// scratch.
-inline void write_by_evidence(ScanSlot& scan, const EvidenceVerdict& said, bool compared, int votes,
-                              std::vector<GroupVerdict>& of_group) {
-  write_ground_by_evidence(scan, said.ground);
-  const auto verdict_of = [](EvidenceVerdict::Group group, bool is_news) -> GroupVerdict {
-    const bool dynamic = is_dynamic(group.cause);
-    return {group.belief, dynamic ? PointLabel::kDynamic : PointLabel::kStatic, group.cause,
-            static_cast<std::uint8_t>(dynamic ? 0 : 1), static_cast<std::uint8_t>(is_news ? 1 : 0)};
-  };
-  const bool is_first = scan.proof.size() != said.groups.size();
-  of_group.resize(said.groups.size());
-  for (std::size_t g = 0; g < of_group.size(); ++g) {
-    of_group[g] = verdict_of(said.groups[g], is_first || !(said.groups[g] == scan.proof[g]));
-  }
-  make_room(scan.proof, said.groups.size());
-  scan.proof.assign(said.groups.begin(), said.groups.end());
-
-  // Read once: stores of bytes may change anything, as far as the compiler knows.
-  const std::size_t ground_count = scan.split.ground_count;
-  const std::size_t count = scan.non_ground_count();
-  const std::uint32_t* const input = scan.split.input.data() + ground_count;
-  const std::uint32_t* const group = said.group_of.data();
-  const GroupVerdict* const verdicts = of_group.data();
-  std::uint8_t* const is_kept = scan.is_kept.data() + ground_count;
-  PointLabel* const labels = scan.labels.data();
-  Cause* const causes = scan.causes.data();
-  float* const beliefs = scan.beliefs.data();
-  for (std::size_t i = 0; i < count; ++i) {
-    GroupVerdict verdict = verdicts[group[i]];
-    if (compared && scan.reach[i] == Reach::kProposed) {
-      const bool voted = scan.votes[i] >= votes && verdict.is_kept != 0;
-      const float belief = std::max(scan.belief[i], verdict.belief);
-      verdict = verdict_of({voted ? Cause::kProposed : verdict.cause, belief}, true);
-    }
-    if (verdict.is_news == 0) continue;
-    const std::uint32_t to = input[i];
-    is_kept[i] = verdict.is_kept;
-    labels[to] = verdict.label;
-    causes[to] = verdict.cause;
-    beliefs[to] = verdict.belief;
   }
 }
 

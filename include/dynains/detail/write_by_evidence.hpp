@@ -1,0 +1,181 @@
+// From the evidence of other scans to the points of a scan.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/cause.hpp"
+#include "dynains/curved_voxel_clusterer.hpp"
+#include "dynains/detail/room.hpp"
+#include "dynains/detail/scan_slot.hpp"
+#include "dynains/evidence_verdict.hpp"
+#include "dynains/points.hpp"
+
+namespace dynains::detail {
+
+/// What the points of a group get.
+struct GroupVerdict {
+  float belief;
+  PointLabel label;
+  Cause cause;
+  std::uint8_t is_kept;
+  std::uint8_t is_news;  // not what was said of it before
+};
+
+inline GroupVerdict verdict_of(EvidenceVerdict::Group group, bool is_news) {
+  const bool dynamic = is_dynamic(group.cause);
+  return {group.belief, dynamic ? PointLabel::kDynamic : PointLabel::kStatic, group.cause,
+          static_cast<std::uint8_t>(dynamic ? 0 : 1), static_cast<std::uint8_t>(is_news ? 1 : 0)};
+}
+
+/// The same of a point in which some window believed: at least `votes` of them have to.
+inline GroupVerdict with_windows(const ScanSlot& scan, std::size_t point, int votes,
+                                 const GroupVerdict& verdict) {
+  const bool voted = scan.votes[point] >= votes && verdict.is_kept != 0;
+  return verdict_of(
+      {voted ? Cause::kProposed : verdict.cause, std::max(scan.belief[point], verdict.belief)},
+      true);
+}
+
+/// Room for verdicts by group, which are numbered behind two groups that never change.
+struct VerdictScratch {
+  static constexpr std::uint32_t kOutside = 0;  // no part of the split
+  static constexpr std::uint32_t kGround = 1;
+  static constexpr std::uint32_t kFirst = 2;
+
+  std::vector<std::uint32_t> group_of;  // by input point
+  std::vector<GroupVerdict> verdicts;   // by group
+};
+
+/// Each point above the ground gets the instance of its cluster.
+inline void write_instances(ScanSlot& scan, Span<const std::uint32_t> cluster_of) {
+  scan.instances.assign(scan.labels.size(), kNoInstance);
+  const std::uint32_t* const input = scan.split.input.data() + scan.split.ground_count;
+  const std::uint32_t* const clusters = cluster_of.data();
+  const std::uint32_t* const ids = scan.ids.data();
+  std::uint32_t* const instances = scan.instances.data();
+  const std::size_t count = cluster_of.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (clusters[i] != kNoCluster) instances[input[i]] = ids[clusters[i]];
+  }
+}
+
+/// The groups of all points, in the order of the input.
+inline void order_groups(const ScanSlot& scan, Span<const std::uint32_t> groups,
+                         std::vector<std::uint32_t>& ordered) {
+  grow(ordered, scan.labels.size());
+  std::uint32_t* const group_of = ordered.data();
+  std::fill_n(group_of, scan.labels.size(), VerdictScratch::kOutside);
+  const std::uint32_t* const input = scan.split.input.data();
+  const std::size_t ground_count = scan.split.ground_count;
+  for (std::size_t i = 0; i < ground_count; ++i) group_of[input[i]] = VerdictScratch::kGround;
+  const std::size_t count = groups.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    group_of[input[ground_count + i]] = VerdictScratch::kFirst + groups[i];
+  }
+}
+
+/// Points of the ground that moved, and those of which that was said before but is not any more.
+inline void write_ground(ScanSlot& scan, Span<const EvidenceVerdict::GroundPoint> moved) {
+  const auto write = [&scan](std::uint32_t point, PointLabel label,
+                             EvidenceVerdict::Group verdict) {
+    const std::uint32_t to = scan.split.input[point];
+    scan.is_kept[point] = label == PointLabel::kGround ? 1 : 0;
+    scan.labels[to] = label;
+    scan.causes[to] = verdict.cause;
+    scan.beliefs[to] = verdict.belief;
+  };
+  for (const std::uint32_t point : scan.moved_ground) {
+    write(point, PointLabel::kGround, {Cause::kGround, 0.0F});
+  }
+  scan.moved_ground.clear();
+  make_room(scan.moved_ground, moved.size());
+  for (const EvidenceVerdict::GroundPoint& ground : moved) {
+    write(ground.point, PointLabel::kDynamic, ground.verdict);
+    scan.moved_ground.push_back(ground.point);
+  }
+}
+
+/// The first verdict by the evidence of other scans, and by windows where `compared`. What is kept
+/// is told by the last one alone. Groups are brought into the order of the input first, so that
+/// verdicts are written from front to back: some arrays at once by random access cost more.
+inline void write_by_evidence(ScanSlot& scan, const EvidenceVerdict& said, bool compared,
+                              VerdictScratch& scratch) {
+  order_groups(scan, said.group_of, scratch.group_of);
+  scratch.verdicts.resize(VerdictScratch::kFirst + said.groups.size());
+  scratch.verdicts[VerdictScratch::kOutside] = verdict_of({Cause::kNotJudged, 0.0F}, true);
+  scratch.verdicts[VerdictScratch::kGround] = {0.0F, PointLabel::kGround, Cause::kGround, 1, 1};
+  for (std::size_t g = 0; g < said.groups.size(); ++g) {
+    scratch.verdicts[VerdictScratch::kFirst + g] = verdict_of(said.groups[g], true);
+  }
+  make_room(scan.proof, said.groups.size());
+  scan.proof.assign(said.groups.begin(), said.groups.end());
+
+  const std::size_t count = scan.labels.size();
+  scan.beliefs.resize(count);
+  scan.causes.resize(count);
+  scan.is_kept.resize(scan.split.count);
+  scan.moved_ground.clear();
+  // Read once: stores of bytes may change anything, as far as the compiler knows.
+  const std::uint32_t* const group_of = scratch.group_of.data();
+  const GroupVerdict* const verdicts = scratch.verdicts.data();
+  PointLabel* const labels = scan.labels.data();
+  Cause* const causes = scan.causes.data();
+  float* const beliefs = scan.beliefs.data();
+  for (std::size_t i = 0; i < count; ++i) {
+    const GroupVerdict verdict = verdicts[group_of[i]];
+    beliefs[i] = verdict.belief;
+    causes[i] = verdict.cause;
+    // What is outside has its label already.
+    labels[i] = group_of[i] == VerdictScratch::kOutside ? labels[i] : verdict.label;
+  }
+  write_ground(scan, said.ground);
+  if (!compared) return;
+  const std::uint32_t* const input = scan.split.input.data() + scan.split.ground_count;
+  for (std::size_t i = 0; i < scan.reach.size(); ++i) {
+    if (scan.reach[i] != Reach::kProposed) continue;
+    const std::uint32_t to = input[i];
+    const GroupVerdict verdict = with_windows(scan, i, 1, verdicts[group_of[to]]);
+    labels[to] = verdict.label;
+    causes[to] = verdict.cause;
+    beliefs[to] = verdict.belief;
+  }
+}
+
+/// A later verdict, of which only news are written, and by windows where `compared`.
+inline void rewrite_by_evidence(ScanSlot& scan, const EvidenceVerdict& said, bool compared,
+                                int votes, VerdictScratch& scratch) {
+  std::fill_n(scan.is_kept.begin(), scan.split.ground_count, std::uint8_t{1});
+  write_ground(scan, said.ground);
+  scratch.verdicts.resize(said.groups.size());
+  for (std::size_t g = 0; g < said.groups.size(); ++g) {
+    scratch.verdicts[g] = verdict_of(said.groups[g], !(said.groups[g] == scan.proof[g]));
+  }
+  scan.proof.assign(said.groups.begin(), said.groups.end());
+
+  const std::size_t ground_count = scan.split.ground_count;
+  const std::size_t count = scan.non_ground_count();
+  const std::uint32_t* const input = scan.split.input.data() + ground_count;
+  const std::uint32_t* const group_of = said.group_of.data();
+  const GroupVerdict* const verdicts = scratch.verdicts.data();
+  std::uint8_t* const is_kept = scan.is_kept.data() + ground_count;
+  PointLabel* const labels = scan.labels.data();
+  Cause* const causes = scan.causes.data();
+  float* const beliefs = scan.beliefs.data();
+  for (std::size_t i = 0; i < count; ++i) {
+    GroupVerdict verdict = verdicts[group_of[i]];
+    if (compared && scan.reach[i] == Reach::kProposed) {
+      verdict = with_windows(scan, i, votes, verdict);
+    }
+    is_kept[i] = verdict.is_kept;
+    if (verdict.is_news == 0) continue;
+    const std::uint32_t to = input[i];
+    labels[to] = verdict.label;
+    causes[to] = verdict.cause;
+    beliefs[to] = verdict.belief;
+  }
+}
+
+}  // namespace dynains::detail
