@@ -110,7 +110,7 @@ class FreeSpaceEvidence {
     record.segment = segment;
     record.T_world_sensor = T_world_sensor;
     // Points that were sampled are at hand when the image is made.
-    GroundFootprint::bound(split.ground(), record.ground_boxes);
+    footprint_.bound(split.ground(), record.ground_boxes);
     sampler_.sample(split.non_ground(), instance_of, instance_count, record.samples);
     make_image(T_world_sensor, split, view);
     record.beliefs.assign(record.samples.supervoxel_count(), Belief());
@@ -133,7 +133,7 @@ class FreeSpaceEvidence {
     // What follows is summed apart from what was before.
     for (std::uint32_t s = 0; s < record.beliefs.size(); ++s) {
       Belief& belief = record.beliefs[s];
-      if (belief.contested != 0 && belief.level > 0.0F) set_open(record, s, false);
+      if (belief.contested != 0 && belief.level > 0.0F) flip_open(record, s);
       belief.level = 0.0F;
     }
     for (Belief& belief : record.wholes) belief.level = 0.0F;
@@ -211,6 +211,13 @@ class FreeSpaceEvidence {
     TrackedInstances tracked;
     std::vector<GroundBox> ground_boxes;  // by 64 points of the ground
   };
+  // Points of a block of the ground that are tested, a bit each.
+  struct TestedBlock {
+    std::size_t begin;     // point
+    std::uint64_t points;  // which
+    std::uint64_t first;   // of these, the first of a run
+    std::size_t run;       // number of the first run
+  };
   static constexpr std::uint64_t kNoSegment = ~std::uint64_t{0};
 
   // Beams are rows of an image only in the frame of the sensor, tilted as it is.
@@ -277,7 +284,7 @@ class FreeSpaceEvidence {
     const bool was_free = is_free(belief);
     const bool was_decided = was_free || belief.contested != 0;
     const bool changed = update(belief, sights_.count(begin, end), end - begin);
-    if (is_open(belief) != was_open) set_open(record, s, !was_open);
+    if (is_open(belief) != was_open) flip_open(record, s);
     if (!changed) return;
     const std::uint32_t instance = samples.instance_of[s];
     Share& share = record.shares[instance];
@@ -290,12 +297,13 @@ class FreeSpaceEvidence {
 
   // Whether hits may change it: what was hit before and is not seen free stays as it is.
   static bool is_open(const Belief& belief) { return belief.contested == 0 || belief.level > 0.0F; }
-  static void set_open(Record& record, std::uint32_t s, bool open) {
+  static void flip_open(Record& record, std::uint32_t s) {
+    std::uint32_t begin = record.samples.sample_begin[s];
     const std::uint32_t end = record.samples.sample_begin[s + 1];
-    for (std::uint32_t sample = record.samples.sample_begin[s]; sample < end; ++sample) {
-      const std::uint64_t bit = std::uint64_t{1} << sample % 64;
-      record.open[sample / 64] =
-          open ? record.open[sample / 64] | bit : record.open[sample / 64] & ~bit;
+    while (begin < end) {
+      const std::uint32_t last = std::min(end - 1, begin | 63U);  // in this word
+      record.open[begin / 64] ^= ~std::uint64_t{0} >> (63 - (last - begin)) << begin % 64;
+      begin = last + 1;
     }
   }
 
@@ -305,7 +313,7 @@ class FreeSpaceEvidence {
     std::uint32_t end = 0;
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
       const std::uint32_t begin = end;
-      end += samples.count(instance);
+      end += record.shares[instance].total;
       const detail::Sights::Count all = sights_.count(begin, end);
       const auto count = static_cast<float>(end - begin);
       const auto seen = static_cast<float>(all.free + all.hit);
@@ -321,7 +329,8 @@ class FreeSpaceEvidence {
         if (config_.use_tracks && share <= 1.0F - kContradictingHits &&
             hits >= kLeastKnown * count) {
           TrackedInstances::Instance& tracked = record.tracked.instances[instance];
-          (lag < 0 ? tracked.hit_back : tracked.hit_ahead) = std::abs(lag);
+          (lag < 0 ? tracked.hit_back : tracked.hit_ahead) =
+              static_cast<std::int16_t>(std::abs(lag));
         }
       }
     }
@@ -464,7 +473,7 @@ class FreeSpaceEvidence {
   Cause cause_of_whole(std::uint64_t scan, bool is_final, const Record& record,
                        std::size_t instance, float& level) const {
     if (removes_whole(record, instance)) return Cause::kWithInstance;
-    if (!config_.use_tracks || !record.tracked.instances[instance].carried) {
+    if (!config_.use_tracks || !record.tracked.shapes[instance].carried) {
       return Cause::kNoEvidence;
     }
     const float along = track_belief(record.tracked.instances[instance]);
@@ -477,8 +486,8 @@ class FreeSpaceEvidence {
   void add_hull(const Record& record, std::size_t instance) {
     constexpr float kLeastHeight = 0.3F;  // m
     if (!config_.use_tracks || config_.footprint <= 0.0) return;
-    const TrackedInstances::Instance& tracked = record.tracked.instances[instance];
-    if (!tracked.carried || tracked.height < kLeastHeight) return;
+    const TrackedInstances::Shape& shape = record.tracked.shapes[instance];
+    if (!shape.carried || shape.height < kLeastHeight) return;
     const InstanceSamples& samples = record.samples;
     const std::uint32_t begin = samples.sample_begin[samples.supervoxel_begin[instance]];
     const std::uint32_t end = samples.sample_begin[samples.supervoxel_begin[instance + 1]];
@@ -495,9 +504,8 @@ class FreeSpaceEvidence {
     // Where comparison has just begun, no place has been seen.
     if (!config_.presume_dynamic || scan < segment_begin_ + 2) return false;
     const Share& share = record.shares[instance];
-    const TrackedInstances::Instance& tracked = record.tracked.instances[instance];
-    return share.total >= kLeastSamples && tracked.length <= kLargest &&
-           tracked.height <= kHighest &&
+    const TrackedInstances::Shape& shape = record.tracked.shapes[instance];
+    return share.total >= kLeastSamples && shape.length <= kLargest && shape.height <= kHighest &&
            static_cast<float>(share.decided) <= kUnknown * static_cast<float>(share.total);
   }
 
@@ -513,13 +521,14 @@ class FreeSpaceEvidence {
     if (!any) return;
     const std::uint8_t* const moved = moved_.data();
     const std::uint32_t* const group = group_of.data();
-    for (std::size_t begin = 0; begin < points.size(); begin += detail::kLanes) {
-      const std::size_t end = std::min(begin + detail::kLanes, points.size());
-      unsigned some = 0;
-      for (std::size_t i = begin; i < end; ++i) some |= moved[group[i]];
-      for (std::size_t i = begin; some != 0 && i < end; ++i) {
-        if (moved[group[i]] != 0) footprint_.add(points.x[i], points.y[i], points.z[i]);
+    constexpr std::size_t kBlock = GroundFootprint::kBlock;
+    for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
+      const PointsView block = points.subview(begin, std::min(kBlock, points.size() - begin));
+      std::uint64_t which = 0;
+      for (std::size_t i = 0; i < block.size(); ++i) {
+        which |= std::uint64_t{moved[group[begin + i]]} << i;
       }
+      if (which != 0) footprint_.add(block, which);
     }
   }
 
@@ -537,8 +546,9 @@ class FreeSpaceEvidence {
     };
     const float clearance =
         config_.footprint > 0.0 ? kClearance : -std::numeric_limits<float>::infinity();
-    detail::grow(near_ground_, ground.size() + detail::kLanes);
-    tested_points_.grow(ground.size() + detail::kLanes);
+    tested_points_.grow(ground.size());
+    detail::make_room(tested_blocks_, record.ground_boxes.size());
+    tested_blocks_.clear();
     tested_ = 0;
     const bool tests = config_.ground_reach > 0.0;
     footprint_.visit_near(ground, record.ground_boxes, clearance,
@@ -551,29 +561,20 @@ class FreeSpaceEvidence {
     if (tested_ > 0) test_ground(scan, record, remove);
   }
 
-  // Of the 64 points from `begin` on, those whose bits are set. Mostly, whole bytes are.
+  // Of a block of points from `begin` on, those whose bits are set: runs of points that share a
+  // voxel of the samples, by their first points.
   void add_tested(PointsView ground, std::size_t begin, std::uint64_t which) {
-    const auto add = [&](std::size_t point) {
-      near_ground_[tested_] = static_cast<std::uint32_t>(point);
-      tested_points_.x[tested_] = ground.x[point];
-      tested_points_.y[tested_] = ground.y[point];
-      tested_points_.z[tested_] = ground.z[point];
+    if (which == 0) return;
+    const std::size_t size = std::min(GroundFootprint::kBlock, ground.size() - begin);
+    const std::uint64_t changes = ground_sampler_.find_changes(ground.subview(begin, size));
+    const std::uint64_t first = which & (changes | ~(which << 1U));
+    tested_blocks_.push_back({begin, which, first, tested_});
+    detail::for_each_bit(first, [&](std::size_t i) {
+      tested_points_.x[tested_] = ground.x[begin + i];
+      tested_points_.y[tested_] = ground.y[begin + i];
+      tested_points_.z[tested_] = ground.z[begin + i];
       ++tested_;
-    };
-    for (; which != 0; which >>= detail::kLanes, begin += detail::kLanes) {
-      constexpr std::uint64_t kAll = (1U << detail::kLanes) - 1;
-      if ((which & kAll) == kAll) {
-        detail::copy_lanes(&ground.x[begin], &tested_points_.x[tested_]);
-        detail::copy_lanes(&ground.y[begin], &tested_points_.y[tested_]);
-        detail::copy_lanes(&ground.z[begin], &tested_points_.z[tested_]);
-        for (std::size_t i = 0; i < detail::kLanes; ++i) {
-          near_ground_[tested_ + i] = static_cast<std::uint32_t>(begin + i);
-        }
-        tested_ += detail::kLanes;
-      } else {
-        detail::for_each_bit(which & kAll, [&](std::size_t i) { add(begin + i); });
-      }
-    }
+    });
   }
 
   // Ground that enough of all references saw free, of the first `tested_` of `tested_points_`.
@@ -604,8 +605,17 @@ class FreeSpaceEvidence {
       moved_[met] = moved ? 1 : 0;
       any |= moved;
     }
-    for (std::size_t i = 0; any && i < tested_; ++i) {
-      if (moved_[ground_samples_.met_of[i]] != 0) remove(near_ground_[i], Cause::kFreeSpace);
+    if (!any) return;
+    const auto lowest = [](std::uint64_t bits) { return bits & (~bits + 1); };
+    for (const TestedBlock& block : tested_blocks_) {
+      const std::uint32_t* met = &ground_samples_.met_of[block.run];
+      for (std::uint64_t left = block.first; left != 0; left &= left - 1) {
+        if (moved_[*met++] == 0) continue;
+        const std::uint64_t first = lowest(left);
+        const std::uint64_t next = lowest(left ^ first);  // 0 behind the last run
+        detail::for_each_bit(block.points & (next - 1) & ~(first - 1),
+                             [&](std::size_t i) { remove(block.begin + i, Cause::kFreeSpace); });
+      }
     }
   }
 
@@ -663,9 +673,10 @@ class FreeSpaceEvidence {
   std::vector<std::uint32_t> free_;
   std::vector<std::uint32_t> predecessors_;
   InstanceSamples ground_samples_;
-  std::vector<std::uint32_t> near_ground_;  // numbers of ground points that are tested
-  PointBuffer tested_points_;               // of these
-  std::size_t tested_ = 0;
+  // Ground points that are tested, in runs that share a voxel.
+  std::vector<TestedBlock> tested_blocks_;
+  std::size_t tested_ = 0;                   // runs
+  PointBuffer tested_points_;                // their first points
   std::vector<std::uint32_t> one_instance_;  // zeros
   std::vector<std::uint8_t> ground_free_;    // by sample, references that saw it so
   std::vector<std::uint8_t> ground_hit_;

@@ -9,21 +9,29 @@
 #include <limits>
 #include <vector>
 
+#include "dynains/detail/bits.hpp"
 #include "dynains/detail/room.hpp"
 #include "dynains/detail/wide_lanes.hpp"
 #include "dynains/points.hpp"
 
 namespace dynains {
 
-/// Horizontal extent of some points, m.
+/// Where in the grids of a footprint some points lie: their first and last columns and rows.
 struct GroundBox {
-  float x_min, x_max, y_min, y_max;
+  struct Range {
+    std::uint16_t first, last;
+  };
+  Range coarse_columns, coarse_rows;
+  Range tile_columns, tile_rows;
 };
 
 /// Horizontal grid around the sensor that remembers where points were removed and how low, and a
 /// coarse one beside it that tells quickly which points are near them.
 class GroundFootprint {
  public:
+  /// Points that are looked at together, a bit each.
+  static constexpr std::size_t kBlock = 64;
+
   /// `cell`: m, points reach into the cells around theirs; `reach`: m, the same for what counts as
   /// near; `max_range`: m, points beyond are not remembered.
   GroundFootprint(double cell, double reach, double max_range)
@@ -40,32 +48,42 @@ class GroundFootprint {
   /// Remembers a removed point; seen after spread().
   void add(float x, float y, float z) {
     const Place place = fine_.place(x, y);
-    if (!place.inside) return;
-    Cell& cell = cell_at(place.column, place.row);
-    const bool is_first = !(cell.own < kNothing);
-    cell.own = std::min(cell.own, z);
-    if (is_first && cell.own < kNothing) touched_.push_back(place);
+    if (place.inside) add_to(tile(place), within(place), z);
+  }
+
+  /// Remembers those points of a block whose bits are set.
+  void add(PointsView block, std::uint64_t which) {
+    const Located located = locate(block);
+    detail::for_each_bit(which & located.inside, [&](std::size_t i) {
+      add_to(static_cast<std::uint32_t>(located.tile[i]),
+             static_cast<std::uint32_t>(located.cell[i]), block.z[i]);
+    });
   }
 
   /// Lets what was added reach into the cells around.
   void spread() {
-    for (const Place& place : touched_) {
-      const float own = cell_at(place.column, place.row).own;
-      for_around(place, [&](std::uint32_t column, std::uint32_t row) {
-        Cell& cell = cell_at(column, row);
+    for (const Touched& touched : touched_) {
+      const Place place = place_of(touched);
+      const float own = cell_at(touched.tile, touched.cell).own;
+      for_around(place, [&](const Place& around) {
+        Cell& cell = cell_at(tile(around), within(around));
         cell.lowest = std::min(cell.lowest, own);
       });
       const Place near =
           coarse_.place(fine_.centre(place.column) * cell_, fine_.centre(place.row) * cell_);
       if (!near.inside) continue;
-      for_around(near, [&](std::uint32_t column, std::uint32_t row) {
-        near_[row * coarse_.width() + column] = 1;
+      // Many cells lie in one of the coarse grid.
+      std::uint8_t& centre = near_[near.row * coarse_.width() + near.column];
+      if (centre == kHolds) continue;
+      for_around(near, [&](const Place& around) {
+        near_[around.row * coarse_.width() + around.column] |= kNear;
       });
+      centre = kHolds;
     }
   }
 
-  /// The extent of every 64 points, to be found once for all calls of visit_near().
-  static void bound(PointsView points, std::vector<GroundBox>& boxes) {
+  /// Where every 64 points lie, to be found once for all calls of visit_near().
+  void bound(PointsView points, std::vector<GroundBox>& boxes) const {
     const std::size_t count = (points.size() + kBlock - 1) / kBlock;
     detail::make_room(boxes, count);
     boxes.resize(count);
@@ -85,7 +103,7 @@ class GroundFootprint {
           y_min = min(y_min, y);
           y_max = max(y_max, y);
         });
-        boxes[b] = {min_lane(x_min), max_lane(x_max), min_lane(y_min), max_lane(y_max)};
+        boxes[b] = box(min_lane(x_min), max_lane(x_max), min_lane(y_min), max_lane(y_max));
       }
     });
   }
@@ -98,10 +116,13 @@ class GroundFootprint {
   void visit_near(PointsView points, Span<const GroundBox> boxes, float clearance,
                   Visitor&& visit) const {
     for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
-      if (!is_near(boxes[begin / kBlock])) continue;
+      const Share share = share_near(boxes[begin / kBlock]);
+      if (share == Share::kNone) continue;
       const PointsView block = points.subview(begin, std::min(kBlock, points.size() - begin));
-      const std::uint64_t near = find_near(block);
-      if (near != 0) visit(begin, near, near & find_under(block, clearance));
+      const std::uint64_t near =
+          share == Share::kAll ? ~std::uint64_t{0} >> (kBlock - block.size()) : find_near(block);
+      if (near == 0) continue;
+      visit(begin, near, holds(boxes[begin / kBlock]) ? near & find_under(block, clearance) : 0);
     }
   }
 
@@ -119,7 +140,12 @@ class GroundFootprint {
   static constexpr float kNothing = std::numeric_limits<float>::infinity();
   static constexpr int kTileShift = 3;
   static constexpr std::uint32_t kTile = 1U << kTileShift;  // cells along a side
-  static constexpr std::size_t kBlock = 64;  // points that are looked at together, a bit each
+
+  enum class Share { kNone, kSome, kAll };
+
+  // Of a coarse cell: a removed point is in it or in one beside it; in itself, too.
+  static constexpr std::uint8_t kNear = 1;
+  static constexpr std::uint8_t kHolds = 3;
 
   struct Place {
     std::uint32_t column, row;
@@ -128,6 +154,9 @@ class GroundFootprint {
   struct Cell {
     float own = kNothing;     // lowest point in it
     float lowest = kNothing;  // the same with the cells around
+  };
+  struct Touched {
+    std::uint32_t tile, cell;
   };
   // Few tiles are in use at a time, so that they stay in the nearest cache; tile 0 is empty.
   using Tile = std::array<Cell, std::size_t{kTile} * kTile>;
@@ -190,22 +219,32 @@ class GroundFootprint {
   static void for_around(const Place& place, Visitor&& visitor) {
     for (std::uint32_t row = place.row - 1; row <= place.row + 1; ++row) {
       for (std::uint32_t column = place.column - 1; column <= place.column + 1; ++column) {
-        visitor(column, row);
+        visitor(Place{column, row, true});
       }
     }
   }
 
-  // Whether some point within may be near: rows of the coarse grid, a few cells long.
-  bool is_near(const GroundBox& box) const {
-    const std::size_t first = coarse_.index(box.x_min);
-    const std::size_t last = coarse_.index(box.x_max);
-    for (std::size_t row = coarse_.index(box.y_min); row <= coarse_.index(box.y_max); ++row) {
+  GroundBox box(float x_min, float x_max, float y_min, float y_max) const {
+    const auto range = [](const Grid& grid, float low, float high, std::uint32_t cells) {
+      return GroundBox::Range{static_cast<std::uint16_t>(grid.index(low) / cells),
+                              static_cast<std::uint16_t>(grid.index(high) / cells)};
+    };
+    return {range(coarse_, x_min, x_max, 1), range(coarse_, y_min, y_max, 1),
+            range(fine_, x_min, x_max, kTile), range(fine_, y_min, y_max, kTile)};
+  }
+
+  // What is near of all places within: rows of the coarse grid, a few cells long.
+  Share share_near(const GroundBox& box) const {
+    unsigned some = 0;
+    unsigned all = kNear;
+    for (std::size_t row = box.coarse_rows.first; row <= box.coarse_rows.last; ++row) {
       const std::uint8_t* const cells = &near_[row * coarse_.width()];
-      for (std::size_t column = first; column <= last; ++column) {
-        if (cells[column] != 0) return true;
+      for (std::size_t i = box.coarse_columns.first; i <= box.coarse_columns.last; ++i) {
+        some |= cells[i];
+        all &= cells[i];
       }
     }
-    return false;
+    return some == 0 ? Share::kNone : all != 0 ? Share::kAll : Share::kSome;
   }
 
   // Which points of a block are near.
@@ -216,57 +255,85 @@ class GroundFootprint {
     });
     std::uint64_t near = 0;
     for (std::size_t i = 0; i < block.size(); ++i) {
-      near |= std::uint64_t{near_[static_cast<std::size_t>(cell[i])]} << i;
+      near |= (std::uint64_t{near_[static_cast<std::size_t>(cell[i])]} & kNear) << i;
     }
     return near;
   }
 
-  // Which points of a block lie under something removed.
-  std::uint64_t find_under(PointsView block, float clearance) const {
-    static constexpr detail::Constant8 kNever(-kNothing);
-    const detail::Constant8 above(clearance);
+  // Whether some cell within may hold anything.
+  bool holds(const GroundBox& box) const {
+    for (std::size_t row = box.tile_rows.first; row <= box.tile_rows.last; ++row) {
+      const std::uint32_t* const tiles = &tile_of_[row * tiles_along_side()];
+      for (std::size_t i = box.tile_columns.first; i <= box.tile_columns.last; ++i) {
+        if (tiles[i] != 0) return true;
+      }
+    }
+    return false;
+  }
+
+  // Tiles and cells of the points of a block, and which of them are inside, a bit each.
+  struct Located {
+    std::array<std::int32_t, kBlock> tile, cell;
+    std::uint64_t inside;
+  };
+  Located locate(PointsView block) const {
+    Located located;
+    located.inside = 0;
     const auto side = static_cast<std::int32_t>(tiles_along_side());
     const auto border = static_cast<std::int32_t>(fine_.width()) - 1;
-    std::int32_t tile_of_point[kBlock];
-    std::int32_t cell[kBlock];
-    float height[kBlock];
     detail::for_lanes(block.size(), [&](auto at) {
       using Int = typename decltype(at)::Int;
-      using Float = typename decltype(at)::Float;
       const Int column = fine_.line(at.load(block.x.data()));
       const Int row = fine_.line(at.load(block.y.data()));
       const Int last(static_cast<std::int32_t>(kTile) - 1);
-      (multiply(row >> kTileShift, side) + (column >> kTileShift)).store(&tile_of_point[at.begin]);
-      (((row & last) << kTileShift) + (column & last)).store(&cell[at.begin]);
+      (multiply(row >> kTileShift, side) + (column >> kTileShift)).store(&located.tile[at.begin]);
+      (((row & last) << kTileShift) + (column & last)).store(&located.cell[at.begin]);
       const Int zero(0), end(border);
       const auto inside = (zero < column) & (column < end) & (zero < row) & (row < end);
-      select(inside, at.load(block.z.data()) + Float(above), Float(kNever))
-          .store(&height[at.begin]);
+      located.inside |= std::uint64_t{inside.bits()} << at.begin;
     });
-    std::uint64_t under = 0;
-    for (std::size_t i = 0; i < block.size(); ++i) {
-      const Tile& tile = tiles_[tile_of_[static_cast<std::size_t>(tile_of_point[i])]];
-      under |= std::uint64_t{tile[static_cast<std::size_t>(cell[i])].lowest < height[i]} << i;
-    }
-    return under;
+    return located;
   }
 
-  std::size_t tiles_along_side() const { return fine_.width() / kTile + 1; }
-  std::size_t tile(std::uint32_t column, std::uint32_t row) const {
-    return row / kTile * tiles_along_side() + column / kTile;
+  // Which points of a block lie under something removed.
+  std::uint64_t find_under(PointsView block, float clearance) const {
+    const Located located = locate(block);
+    std::uint64_t under = 0;
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const Tile& tile = tiles_[tile_of_[static_cast<std::size_t>(located.tile[i])]];
+      const float lowest = tile[static_cast<std::size_t>(located.cell[i])].lowest;
+      under |= std::uint64_t{lowest < block.z[i] + clearance} << i;
+    }
+    return under & located.inside;
   }
-  static std::size_t within(std::uint32_t column, std::uint32_t row) {
-    return row % kTile * kTile + column % kTile;
+
+  std::uint32_t tiles_along_side() const { return fine_.width() / kTile + 1; }
+  std::uint32_t tile(const Place& place) const {
+    return place.row / kTile * tiles_along_side() + place.column / kTile;
   }
-  Cell& cell_at(std::uint32_t column, std::uint32_t row) {
-    std::uint32_t& number = tile_of_[tile(column, row)];
+  static std::uint32_t within(const Place& place) {
+    return place.row % kTile * kTile + place.column % kTile;
+  }
+  Place place_of(const Touched& touched) const {
+    const std::uint32_t side = tiles_along_side();
+    return {touched.tile % side * kTile + touched.cell % kTile,
+            touched.tile / side * kTile + touched.cell / kTile, true};
+  }
+  void add_to(std::uint32_t tile, std::uint32_t within, float z) {
+    Cell& cell = cell_at(tile, within);
+    const bool is_first = !(cell.own < kNothing);
+    cell.own = std::min(cell.own, z);
+    if (is_first && cell.own < kNothing) touched_.push_back({tile, within});
+  }
+  Cell& cell_at(std::uint32_t tile, std::uint32_t within) {
+    std::uint32_t& number = tile_of_[tile];
     if (number == 0) {
-      used_.push_back(static_cast<std::uint32_t>(tile(column, row)));
+      used_.push_back(tile);
       number = static_cast<std::uint32_t>(used_.size());
       if (number == tiles_.size()) tiles_.emplace_back();
       tiles_[number].fill(Cell());
     }
-    return tiles_[number][within(column, row)];
+    return tiles_[number][within];
   }
 
   float cell_;
@@ -276,7 +343,7 @@ class GroundFootprint {
   std::vector<std::uint32_t> used_;     // what is not 0 there
   std::vector<Tile> tiles_;
   std::vector<std::uint8_t> near_;  // by coarse cell
-  std::vector<Place> touched_;      // cells of points, each once
+  std::vector<Touched> touched_;    // cells of points, each once
 };
 
 }  // namespace dynains

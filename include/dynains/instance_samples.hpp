@@ -67,6 +67,33 @@ class InstanceSampler {
             static_cast<float>(1.0 / std::max(1.0, std::round(supervoxel_size / sample_size)))),
         max_range_(static_cast<float>(max_range)) {}
 
+  /// Which of up to 64 points, a bit each, lie in another voxel than their predecessor; the first
+  /// does.
+  std::uint64_t find_changes(PointsView points) const {
+    using namespace detail;
+    const Constant8 per_metre(samples_per_metre_);
+    std::array<std::array<std::int32_t, kBlock + kLanes>, 3> voxel;
+    std::uint64_t changes = 0;
+    run_lanes([&](auto lanes) {
+      using Lanes = decltype(lanes);
+      using Int = typename Lanes::Int;
+      for_places<Lanes>(points.size(), [&](const auto& at) {
+        floor(at.load(points.x.data()) * per_metre).store(&voxel[0][at.begin + 1]);
+        floor(at.load(points.y.data()) * per_metre).store(&voxel[1][at.begin + 1]);
+        floor(at.load(points.z.data()) * per_metre).store(&voxel[2][at.begin + 1]);
+      });
+      for (auto& line : voxel) line[0] = 0;
+      for (std::size_t i = 0; i < points.size(); i += kLanes) {
+        const auto stays = [&](const auto& line) {
+          return Int::load(&line[i]) == Int::load(&line[i + 1]);
+        };
+        const auto same = stays(voxel[0]) & stays(voxel[1]) & stays(voxel[2]);
+        changes |= std::uint64_t{(~same).bits()} << i;
+      }
+    });
+    return changes | 1;
+  }
+
   /// `points`: one scan, sensor frame; `instance_of`: its instances below `instance_count`, or
   /// kNoCluster. Points beyond the range and without instance get no sample.
   void sample(PointsView points, Span<const std::uint32_t> instance_of, std::size_t instance_count,

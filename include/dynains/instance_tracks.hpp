@@ -20,25 +20,30 @@ namespace dynains {
 
 /// The instances of one scan as tracks see them.
 struct TrackedInstances {
+  /// An instance as a part of its track.
   struct Instance {
-    std::uint32_t samples = 0;
-    std::uint32_t cells = 0;              ///< world cells that it occupies
     std::uint32_t previous = kNoCluster;  ///< the same object in the scan before
     std::uint32_t next = kNoCluster;      ///< the same object in the scan after
-    float previous_overlap = 0.0F;
-    float next_overlap = 0.0F;
-    float length = 0.0F;     ///< m, horizontal diagonal
-    float height = 0.0F;     ///< m
-    float own = 0.0F;        ///< what this scan's own evidence says, log-odds
-    float forward = 0.0F;    ///< belief from this scan and those before it
-    float backward = 0.0F;   ///< belief from this scan and those after it
-    int hit_back = 0;        ///< scans to the oldest reference that hit most of it; 0: none
-    int hit_ahead = 0;       ///< scans to the latest reference that hit most of it; 0: none
-    int since_forward = 0;   ///< scans since its own evidence last said that it moved
-    int since_backward = 0;  ///< scans until its own evidence next says that it moves
-    bool carried = false;    ///< small enough to be one object
+    float own = 0.0F;                     ///< what this scan's own evidence says, log-odds
+    float forward = 0.0F;                 ///< belief from this scan and those before it
+    float backward = 0.0F;                ///< belief from this scan and those after it
+    int since_forward = 0;                ///< scans since its own evidence last said that it moved
+    int since_backward = 0;               ///< scans until its own evidence next says that it moves
+    std::int16_t hit_back = 0;   ///< scans to the oldest reference that hit most of it; 0: none
+    std::int16_t hit_ahead = 0;  ///< scans to the latest reference that hit most of it; 0: none
   };
   std::vector<Instance> instances;
+
+  /// What it looks like: apart, because beliefs run along all open scans again and again.
+  struct Shape {
+    float length = 0.0F;      ///< m, horizontal diagonal
+    float height = 0.0F;      ///< m
+    std::uint32_t cells = 0;  ///< world cells that it occupies
+    float previous_overlap = 0.0F;
+    float next_overlap = 0.0F;
+    bool carried = false;  ///< small enough to be one object
+  };
+  std::vector<Shape> shapes;  ///< by instance
 
   /// Occupied cells of carried instances.
   struct Cell {
@@ -64,16 +69,16 @@ class InstanceLinker {
   void measure(const InstanceSamples& samples, const Eigen::Isometry3d& T_world_sensor,
                const Eigen::Vector3d& origin, TrackedInstances& out) {
     out.instances.assign(samples.instance_count(), TrackedInstances::Instance());
+    out.shapes.assign(samples.instance_count(), TrackedInstances::Shape());
     out.cells.clear();
     find_cells(samples, T_world_sensor, origin);
     table_.assign(kTable, kEmpty);
     for (std::uint32_t i = 0; i < samples.instance_count(); ++i) {
-      TrackedInstances::Instance& instance = out.instances[i];
+      TrackedInstances::Shape& shape = out.shapes[i];
       const std::uint32_t begin = samples.sample_begin[samples.supervoxel_begin[i]];
       const std::uint32_t end = samples.sample_begin[samples.supervoxel_begin[i + 1]];
-      instance.samples = end - begin;
-      measure_extent(samples.points, begin, end, instance);
-      if (!instance.carried) continue;
+      measure_extent(samples.points, begin, end, shape);
+      if (!shape.carried) continue;
       for (std::uint32_t p = begin; p < end; ++p) {
         if (p > begin && place_[p] == place_[p - 1]) continue;
         const TrackedInstances::Cell cell = {place_[p], i};
@@ -85,7 +90,7 @@ class InstanceLinker {
         }
         slot = static_cast<std::uint32_t>(out.cells.size());
         out.cells.push_back(cell);
-        ++instance.cells;
+        ++shape.cells;
       }
     }
   }
@@ -106,8 +111,7 @@ class InstanceLinker {
         if (shared_[other]++ == 0) touched_.push_back(other);
       }
       for (const std::uint32_t other : touched_) {
-        connect(before.instances[other], other, now.instances[i], i,
-                static_cast<float>(shared_[other]));
+        connect(before, other, now, i, static_cast<float>(shared_[other]));
         shared_[other] = 0;
       }
     }
@@ -146,7 +150,7 @@ class InstanceLinker {
   }
 
   void measure_extent(const PointBuffer& points, std::uint32_t begin, std::uint32_t end,
-                      TrackedInstances::Instance& instance) const {
+                      TrackedInstances::Shape& shape) const {
     if (begin == end) return;
     float low[3] = {points.x[begin], points.y[begin], points.z[begin]};
     float high[3] = {low[0], low[1], low[2]};
@@ -157,24 +161,26 @@ class InstanceLinker {
         high[axis] = std::max(high[axis], at[axis]);
       }
     }
-    instance.length = std::hypot(high[0] - low[0], high[1] - low[1]);
-    instance.height = high[2] - low[2];
-    instance.carried = end - begin >= kLeastSamples && instance.length <= max_length_ &&
-                       instance.height <= max_height_;
+    shape.length = std::hypot(high[0] - low[0], high[1] - low[1]);
+    shape.height = high[2] - low[2];
+    shape.carried =
+        end - begin >= kLeastSamples && shape.length <= max_length_ && shape.height <= max_height_;
   }
 
-  void connect(TrackedInstances::Instance& before, std::uint32_t before_number,
-               TrackedInstances::Instance& now, std::uint32_t now_number, float shared) const {
-    const float overlap =
-        shared / (static_cast<float>(before.cells) + static_cast<float>(now.cells) - shared);
+  void connect(TrackedInstances& before, std::uint32_t from, TrackedInstances& now,
+               std::uint32_t to, float shared) const {
+    TrackedInstances::Shape& from_shape = before.shapes[from];
+    TrackedInstances::Shape& to_shape = now.shapes[to];
+    const float overlap = shared / (static_cast<float>(from_shape.cells) +
+                                    static_cast<float>(to_shape.cells) - shared);
     if (overlap < overlap_) return;
-    if (overlap > now.previous_overlap) {
-      now.previous_overlap = overlap;
-      now.previous = before_number;
+    if (overlap > to_shape.previous_overlap) {
+      to_shape.previous_overlap = overlap;
+      now.instances[to].previous = from;
     }
-    if (overlap > before.next_overlap) {
-      before.next_overlap = overlap;
-      before.next = now_number;
+    if (overlap > from_shape.next_overlap) {
+      from_shape.next_overlap = overlap;
+      before.instances[from].next = to;
     }
   }
 

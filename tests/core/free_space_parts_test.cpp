@@ -125,6 +125,32 @@ InstanceSamples supervoxels_at(const std::vector<std::array<int, 3>>& places, in
   return samples;
 }
 
+TEST_CASE("a point that lies in another voxel than its predecessor is a change") {
+  Random random(5);
+  InstanceSampler sampler(0.5, 0.5, 80.0);
+  for (const std::size_t count : {1, 7, 8, 9, 63, 64}) {
+    for (int round = 0; round < 50; ++round) {
+      PointBuffer points;
+      for (std::size_t i = 0; i < count; ++i) {
+        // Within one voxel, or a few about the sensor.
+        const float reach = random.index(3) == 0 ? 0.6F : 0.1F;
+        points.push_back(random.uniform_float(-0.05F, reach), random.uniform_float(-0.05F, reach),
+                         random.uniform_float(-0.05F, reach));
+      }
+      std::uint64_t expected = 1;
+      const auto voxel = [&](std::size_t i) {
+        return std::array<float, 3>{std::floor(points.x[i] / 0.5F), std::floor(points.y[i] / 0.5F),
+                                    std::floor(points.z[i] / 0.5F)};
+      };
+      for (std::size_t i = 1; i < count; ++i) {
+        if (voxel(i) != voxel(i - 1)) expected |= std::uint64_t{1} << i;
+      }
+      const std::uint64_t all = ~std::uint64_t{0} >> (64 - count);
+      REQUIRE((sampler.find_changes(points) & all) == expected);
+    }
+  }
+}
+
 TEST_CASE("groups of supervoxels connect over faces, edges and corners, and only so") {
   const InstanceSamples samples = supervoxels_at(
       {{0, 0, 0}, {1, 1, 1}, {5, 0, 0}, {7, 0, 0}, {-1, -1, 1}, {0, 0, -40}, {0, 1, -40}}, 2);
@@ -222,7 +248,7 @@ struct Found {
 
 Found search(const GroundFootprint& footprint, const PointBuffer& ground, float clearance) {
   std::vector<GroundBox> boxes;
-  GroundFootprint::bound(ground, boxes);
+  footprint.bound(ground, boxes);
   Found found;
   footprint.visit_near(ground, boxes, clearance,
                        [&](std::size_t begin, std::uint64_t near, std::uint64_t under) {
@@ -284,12 +310,19 @@ TEST_CASE("a footprint finds what a search over all removed points finds") {
   }
   // Twice, so that nothing is left of the first time.
   for (int round = 0; round < 2; ++round) {
-    PointBuffer removed;
-    for (int i = 0; i < 60; ++i) {
-      removed.push_back(random.uniform_float(-39, 39), random.uniform_float(-39, 39),
-                        random.uniform_float(0, 2));
-      footprint.add(removed.x.back(), removed.y.back(), removed.z.back());
+    // Some alone, the others of a block of which only they were removed.
+    PointBuffer removed, block;
+    std::uint64_t which = 0;
+    for (int i = 0; i < 90; ++i) {
+      const float x = random.uniform_float(-39, 39), y = random.uniform_float(-39, 39);
+      const float z = random.uniform_float(0, 2);
+      const std::size_t way = block.size() < 64 ? random.index(3) : 0;
+      if (way == 0) footprint.add(x, y, z);
+      if (way == 1) which |= std::uint64_t{1} << block.size();
+      if (way <= 1) removed.push_back(x, y, z);
+      if (way >= 1) block.push_back(x, y, z);
     }
+    footprint.add(block, which);
     footprint.spread();
     constexpr float kClearance = 0.4F;
     const Found found = search(footprint, ground, kClearance);
@@ -358,8 +391,8 @@ TEST_CASE("instances of consecutive scans are linked where they overlap in the w
   CHECK(tracked[1].instances[3].previous == kNoCluster);
   CHECK(tracked[0].instances[0].next == 0);
   CHECK(tracked[0].instances[1].next == 1);
-  CHECK_FALSE(tracked[1].instances[3].carried);
-  CHECK(tracked[1].instances[0].length == Approx(3.8).margin(0.3));
+  CHECK_FALSE(tracked[1].shapes[3].carried);
+  CHECK(tracked[1].shapes[0].length == Approx(3.8).margin(0.3));
 }
 
 TEST_CASE("belief along a track fades by 0.95 a scan, and old hits contradict it") {
