@@ -203,8 +203,8 @@ class StaticMapAccumulator {
   // without a walk through a bucket.
   static constexpr std::size_t kRecent = std::size_t{32} * 64 * 16;
 
-  // Some points of a scan on their way into the map. Where their voxels are begins at number 1:
-  // behind number 0, which is nowhere, all have a predecessor.
+  // Some points of a scan on their way into the map. Where their voxels are begins at number 1, so
+  // that all have a predecessor.
   static constexpr std::size_t kBatch = 512;
   struct Batch {
     static constexpr std::size_t kRoom = kBatch + detail::kLanes;
@@ -215,7 +215,6 @@ class StaticMapAccumulator {
     std::uint16_t chosen[kRoom];   // numbers of points that may be added
     std::size_t chosen_count;
   };
-  static constexpr std::int32_t kNowhere = -1;
 
   template <int kValue>
   using Constant = std::integral_constant<int, kValue>;
@@ -263,7 +262,7 @@ class StaticMapAccumulator {
   // The points that are kept, but none in the voxel of a kept predecessor, as neighbours in a scan
   // often are; without a branch on single points.
   void choose(std::size_t count, Span<const std::uint8_t> keep, Batch& batch) const {
-    batch.voxel[0] = kNowhere;
+    batch.voxel[0] = 0;
     for (auto& block : batch.block) block[0] = 0;
     std::size_t chosen = 0;
     detail::run_lanes([&](auto lanes) {

@@ -88,6 +88,28 @@ TEST_CASE("ground is what Patchwork in double precision calls ground") {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) compare(rough_terrain(seed, 60000));
 }
 
+// A patch whose lowest points give a plane above all others is not fitted to all of them yet.
+TEST_CASE("a slope that flattens within its patch is fitted again") {
+  Config config = Config::paper();
+  const double depth = (config.ground_max_range - config.ground_min_range) / 8.0;  // outer rings
+  const double begin = 0.5 * (config.ground_min_range + config.ground_max_range);
+  Random random(3);
+  PointBuffer scan;
+  for (int i = 0; i < 40000; ++i) {
+    const double range = random.uniform(begin, config.ground_max_range);
+    const double azimuth = random.uniform(-M_PI, M_PI);
+    const double ahead = std::fmod(range - begin, depth);
+    const double z = -kSensorHeight + 0.48 * ahead - 0.02 * ahead * ahead;
+    scan.push_back(static_cast<float>(range * std::cos(azimuth)),
+                   static_cast<float>(range * std::sin(azimuth)), static_cast<float>(z));
+  }
+  const std::vector<bool> expected = reference_ground(config, scan);
+  const auto ground = std::count(expected.begin(), expected.end(), true);
+  REQUIRE(ground > 10000);
+  REQUIRE(ground < 35000);
+  CHECK(share_of_differences(ground_of(config, scan), expected) < kOnBorders);
+}
+
 TEST_CASE("ground is what Patchwork says for other parameters, too") {
   Config config;
   config.sensor_height = 0.6;
