@@ -308,6 +308,9 @@ class GroundSegmenter {
     }
   };
 
+  // Points of a patch that are ground.
+  enum class Found { kNone, kSome, kAll };
+
   // Puts the ground of a patch; the rest closes up at its front. Returns the size of the rest.
   template <class Lanes>
   std::size_t segment_patch(std::size_t patch, detail::PointRecord* records, std::size_t count,
@@ -318,9 +321,9 @@ class GroundSegmenter {
         static_cast<std::size_t>(config_.ground_lowest_points));
     const float seed_height = lowest.of(patch_.z.data(), count, floor_of(patch));
     HalfSpace below(seed_height, static_cast<float>(config_.ground_seed_margin));
-    bool is_whole = false;
-    if (!fit_ground<Lanes>(patch, count, seed_height, below, is_whole)) return count;
-    if (is_whole) {
+    const Found found_ground = fit_ground<Lanes>(patch, count, seed_height, below);
+    if (found_ground == Found::kNone) return count;
+    if (found_ground == Found::kAll) {
       ground.put(records, count);
       return 0;
     }
@@ -360,14 +363,15 @@ class GroundSegmenter {
   }
 
   // From the points near the seed height, a horizontal half space, to those near the plane. Returns
-  // whether these are ground; `is_whole`: whether they are all points of the patch.
+  // how many of the patch these are if they are ground.
   template <class Lanes>
-  bool fit_ground(std::size_t patch, std::size_t count, float seed_height, HalfSpace& below,
-                  bool& is_whole) const {
+  Found fit_ground(std::size_t patch, std::size_t count, float seed_height,
+                   HalfSpace& below) const {
     detail::Plane plane;
+    bool is_whole = false;
     for (int i = 0; i < config_.ground_iterations; ++i) {
       const detail::PlaneMoments moments = sum_moments<Lanes>(patch_, count, below);
-      if (moments.count < 3.0) return false;
+      if (moments.count < 3.0) return Found::kNone;
       plane = detail::fit_plane(moments);
       below.x = static_cast<float>(plane.normal_x);
       below.y = static_cast<float>(plane.normal_y);
@@ -379,6 +383,12 @@ class GroundSegmenter {
       is_whole = moments.count == static_cast<double>(count) && contains<Lanes>(below, count);
       if (is_whole) break;
     }
+    return is_ground(patch, plane, seed_height) ? (is_whole ? Found::kAll : Found::kSome)
+                                                : Found::kNone;
+  }
+
+  // Of a plane over the seed height; high ones must be flat near the sensor.
+  bool is_ground(std::size_t patch, const detail::Plane& plane, float seed_height) const {
     if (plane.normal_z < config_.ground_uprightness) return false;
     const auto ring = static_cast<std::size_t>(ring_of_patch_[patch]);
     if (ring >= kCheckedRings) return true;

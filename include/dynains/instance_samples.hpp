@@ -84,10 +84,8 @@ class InstanceSampler {
       });
       for (auto& line : voxel) line[0] = 0;
       for (std::size_t i = 0; i < points.size(); i += kLanes) {
-        const auto stays = [&](const auto& line) {
-          return Int::load(&line[i]) == Int::load(&line[i + 1]);
-        };
-        const auto same = stays(voxel[0]) & stays(voxel[1]) & stays(voxel[2]);
+        const auto same = same_as_next<Int>(&voxel[0][i]) & same_as_next<Int>(&voxel[1][i]) &
+                          same_as_next<Int>(&voxel[2][i]);
         changes |= std::uint64_t{(~same).bits()} << i;
       }
     });

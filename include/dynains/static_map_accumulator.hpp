@@ -248,8 +248,8 @@ class StaticMapAccumulator {
         const Int block_in_world = block + Int::load(first[axis]);
         (value - to_float(block) * size[axis]).store(&batch.point[axis][at.begin]);
         block_in_world.store(&batch.block[axis][at.begin + 1]);
-        voxel_in_block = (voxel_in_block << voxel_bits) | (voxel & Int((1 << voxel_bits) - 1));
-        recent = (recent << recent_bits) | (block_in_world & Int((1 << recent_bits) - 1));
+        voxel_in_block = (voxel_in_block << voxel_bits) + (voxel & Int((1 << voxel_bits) - 1));
+        recent = (recent << recent_bits) + (block_in_world & Int((1 << recent_bits) - 1));
       };
       add_axis(Constant<2>(), Constant<1>(), Constant<4>());
       add_axis(Constant<1>(), Constant<2>(), Constant<6>());
@@ -267,22 +267,31 @@ class StaticMapAccumulator {
     std::size_t chosen = 0;
     detail::run_lanes([&](auto lanes) {
       using Int = typename decltype(lanes)::Int;
-      const auto change = [](const std::int32_t* of) { return Int::load(of) ^ Int::load(of + 1); };
-      unsigned was_kept = 0;
-      for (std::size_t i = 0; i < count; i += detail::kLanes) {
-        const std::size_t size = std::min(detail::kLanes, count - i);
-        const unsigned kept =
-            keep.empty() ? (1U << size) - 1U : detail::bits_of_bytes(keep.data() + i, size);
-        const auto stays = ((change(batch.block[0] + i) | change(batch.block[1] + i)) |
-                            (change(batch.block[2] + i) | change(batch.voxel + i))) == Int(0);
-        const unsigned repeats = keep_all_ ? 0 : stays.bits() & (kept << 1U | was_kept);
-        was_kept = kept >> (detail::kLanes - 1);
-        const unsigned which = kept & ~repeats;
-        for (std::size_t k = 0; k < detail::kLanes; ++k) {
-          batch.chosen[chosen + k] =
-              static_cast<std::uint16_t>(i + detail::kPlacesOfBits[which][k]);
+      constexpr std::size_t kWord = 64;
+      std::uint64_t was_kept = 0;
+      for (std::size_t begin = 0; begin < count; begin += kWord) {
+        const std::size_t size = std::min(kWord, count - begin);
+        const std::uint64_t kept = keep.empty() ? ~std::uint64_t{0} >> (kWord - size)
+                                                : detail::nonzero_bytes(keep.data() + begin, size);
+        std::uint64_t stays = 0;
+        for (std::size_t i = 0; i < size; i += detail::kLanes) {
+          const auto same = [&](const std::int32_t* of) {
+            return detail::same_as_next<Int>(of + begin + i);
+          };
+          const auto all_same = same(batch.block[0]) & same(batch.block[1]) & same(batch.block[2]) &
+                                same(batch.voxel);
+          stays |= std::uint64_t{all_same.bits()} << i;
         }
-        chosen += detail::kOnesUpTo[which].back();
+        const std::uint64_t repeats = keep_all_ ? 0 : stays & (kept << 1U | was_kept);
+        was_kept = kept >> (kWord - 1);
+        for (std::size_t i = 0; i < size; i += detail::kLanes) {
+          const std::size_t which = (kept & ~repeats) >> i & 0xFFU;
+          for (std::size_t k = 0; k < detail::kLanes; ++k) {
+            batch.chosen[chosen + k] =
+                static_cast<std::uint16_t>(begin + i + detail::kPlacesOfBits[which][k]);
+          }
+          chosen += detail::kOnesUpTo[which].back();
+        }
       }
     });
     batch.chosen_count = chosen;

@@ -57,20 +57,6 @@ constexpr BytesByByte find_bits() {
 /// Which bits of a byte are set, from the lowest on.
 inline constexpr BytesByByte kPlacesOfBits = find_bits();
 
-/// A bit for each of up to eight bytes: whether it is not zero.
-inline unsigned bits_of_bytes(const std::uint8_t* bytes, std::size_t count) {
-  constexpr std::uint64_t kHighest = 0x80 * kInEachByte;
-  constexpr std::uint64_t kGather = 0x0102040810204080U;  // of bit 0 of each byte, into the last
-  std::uint64_t eight = 0;
-  if (count == sizeof(eight)) {
-    std::memcpy(&eight, bytes, sizeof(eight));
-  } else {
-    std::memcpy(&eight, bytes, count);
-  }
-  const std::uint64_t is_set = (((eight & ~kHighest) + ~kHighest) | eight) & kHighest;
-  return static_cast<unsigned>((is_set >> 7U) * kGather >> 56U);
-}
-
 /// Writes how many of the 64 bits are set up to each of them, and returns how many are set.
 inline std::uint32_t count_up_to(std::uint64_t bits, std::uint8_t* counts) {
   std::uint32_t before = 0;

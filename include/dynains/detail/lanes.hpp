@@ -71,7 +71,6 @@ struct Int8 {
   friend Int8 operator<<(Int8 a, int bits) { return {a.lo << bits, a.hi << bits}; }
   friend Int8 operator>>(Int8 a, int bits) { return {a.lo >> bits, a.hi >> bits}; }  // of the sign
   friend Int8 operator&(Int8 a, Int8 b) { return {a.lo & b.lo, a.hi & b.hi}; }
-  friend Int8 operator|(Int8 a, Int8 b) { return {a.lo | b.lo, a.hi | b.hi}; }
   friend Int8 operator^(Int8 a, Int8 b) { return {a.lo ^ b.lo, a.hi ^ b.hi}; }
   friend Mask8 operator<(Int8 a, Int8 b) { return {a.lo < b.lo, a.hi < b.hi}; }
   friend Mask8 operator>(Int8 a, Int8 b) { return {a.lo > b.lo, a.hi > b.hi}; }
@@ -240,6 +239,21 @@ inline std::uint64_t nonzero_bytes(const std::uint8_t* from) {
   for (int i = 0; i < 64; ++i) result |= std::uint64_t{from[i] != 0} << i;
 #endif
   return result;
+}
+
+/// The same of up to 64 bytes; zeros behind them.
+inline std::uint64_t nonzero_bytes(const std::uint8_t* from, std::size_t count) {
+  constexpr std::size_t kAll = 64;
+  if (count == kAll) return nonzero_bytes(from);
+  std::uint8_t padded[kAll] = {};
+  std::memcpy(padded, from, count);
+  return nonzero_bytes(padded);
+}
+
+/// Which of eight values equal the next one; reads nine.
+template <class Int>
+auto same_as_next(const std::int32_t* values) {
+  return Int::load(values) == Int::load(values + 1);
 }
 
 /// Eight values, wherever they lie.

@@ -49,7 +49,6 @@ struct WideInt8 {
   friend WideInt8 operator<<(const WideInt8& a, int bits) { return WideInt8(a.v << bits); }
   friend WideInt8 operator>>(const WideInt8& a, int bits) { return WideInt8(a.v >> bits); }
   friend WideInt8 operator&(const WideInt8& a, const WideInt8& b) { return WideInt8(a.v & b.v); }
-  friend WideInt8 operator|(const WideInt8& a, const WideInt8& b) { return WideInt8(a.v | b.v); }
   friend WideInt8 operator^(const WideInt8& a, const WideInt8& b) { return WideInt8(a.v ^ b.v); }
   friend WideMask8 operator<(const WideInt8& a, const WideInt8& b) { return {a.v < b.v}; }
   friend WideMask8 operator==(const WideInt8& a, const WideInt8& b) { return {a.v == b.v}; }

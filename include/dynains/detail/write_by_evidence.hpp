@@ -24,6 +24,8 @@ struct GroupVerdict {
   std::uint8_t is_news;  // not what was said of it before
 };
 
+inline constexpr GroupVerdict kStaysGround = {0.0F, PointLabel::kGround, Cause::kGround, 1, 1};
+
 inline GroupVerdict verdict_of(EvidenceVerdict::Group group, bool is_news) {
   const bool dynamic = is_dynamic(group.cause);
   return {group.belief, dynamic ? PointLabel::kDynamic : PointLabel::kStatic, group.cause,
@@ -37,6 +39,13 @@ inline GroupVerdict with_windows(const ScanSlot& scan, std::size_t point, int vo
   return verdict_of(
       {voted ? Cause::kProposed : verdict.cause, std::max(scan.belief[point], verdict.belief)},
       true);
+}
+
+/// Of one input point.
+inline void write_one(ScanSlot& scan, std::uint32_t input, const GroupVerdict& verdict) {
+  scan.labels[input] = verdict.label;
+  scan.causes[input] = verdict.cause;
+  scan.beliefs[input] = verdict.belief;
 }
 
 /// Room for verdicts by group, which are numbered behind two groups that never change.
@@ -79,21 +88,15 @@ inline void order_groups(const ScanSlot& scan, Span<const std::uint32_t> groups,
 
 /// Points of the ground that moved, and those of which that was said before but is not any more.
 inline void write_ground(ScanSlot& scan, Span<const EvidenceVerdict::GroundPoint> moved) {
-  const auto write = [&scan](std::uint32_t point, PointLabel label,
-                             EvidenceVerdict::Group verdict) {
-    const std::uint32_t to = scan.split.input[point];
-    scan.is_kept[point] = label == PointLabel::kGround ? 1 : 0;
-    scan.labels[to] = label;
-    scan.causes[to] = verdict.cause;
-    scan.beliefs[to] = verdict.belief;
+  const auto write = [&scan](std::uint32_t point, const GroupVerdict& verdict) {
+    scan.is_kept[point] = verdict.is_kept;
+    write_one(scan, scan.split.input[point], verdict);
   };
-  for (const std::uint32_t point : scan.moved_ground) {
-    write(point, PointLabel::kGround, {Cause::kGround, 0.0F});
-  }
+  for (const std::uint32_t point : scan.moved_ground) write(point, kStaysGround);
   scan.moved_ground.clear();
   make_room(scan.moved_ground, moved.size());
   for (const EvidenceVerdict::GroundPoint& ground : moved) {
-    write(ground.point, PointLabel::kDynamic, ground.verdict);
+    write(ground.point, {ground.verdict.belief, PointLabel::kDynamic, ground.verdict.cause, 0, 1});
     scan.moved_ground.push_back(ground.point);
   }
 }
@@ -106,7 +109,7 @@ inline void write_by_evidence(ScanSlot& scan, const EvidenceVerdict& said, bool 
   order_groups(scan, said.group_of, scratch.group_of);
   scratch.verdicts.resize(VerdictScratch::kFirst + said.groups.size());
   scratch.verdicts[VerdictScratch::kOutside] = verdict_of({Cause::kNotJudged, 0.0F}, true);
-  scratch.verdicts[VerdictScratch::kGround] = {0.0F, PointLabel::kGround, Cause::kGround, 1, 1};
+  scratch.verdicts[VerdictScratch::kGround] = kStaysGround;
   for (std::size_t g = 0; g < said.groups.size(); ++g) {
     scratch.verdicts[VerdictScratch::kFirst + g] = verdict_of(said.groups[g], true);
   }
@@ -136,11 +139,7 @@ inline void write_by_evidence(ScanSlot& scan, const EvidenceVerdict& said, bool 
   const std::uint32_t* const input = scan.split.input.data() + scan.split.ground_count;
   for (std::size_t i = 0; i < scan.reach.size(); ++i) {
     if (scan.reach[i] != Reach::kProposed) continue;
-    const std::uint32_t to = input[i];
-    const GroupVerdict verdict = with_windows(scan, i, 1, verdicts[group_of[to]]);
-    labels[to] = verdict.label;
-    causes[to] = verdict.cause;
-    beliefs[to] = verdict.belief;
+    write_one(scan, input[i], with_windows(scan, i, 1, verdicts[group_of[input[i]]]));
   }
 }
 
