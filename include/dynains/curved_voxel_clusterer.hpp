@@ -126,8 +126,8 @@ class CurvedVoxelClusterer {
   Span<const std::uint32_t> cluster(PolarView points) {
     find_cells(points);
     mark_cells(points.size());
-    find_runs();
-    join_runs();
+    detail::run_lanes([&](auto) { find_runs(); });
+    detail::run_lanes([&](auto) { join_runs(); });
     number_runs();
     number_points(points.size());
     clear_cells();
@@ -193,27 +193,31 @@ class CurvedVoxelClusterer {
     });
   }
 
-  // The grid covers only the elevations that occur. It is all zero between calls.
+  // The grid covers only the elevations that occur. It is all zero between calls. Neighbours in a
+  // scan mostly mark the same word, which would have to wait for its own last change: four
+  // stretches of the points take turns.
   void mark_cells(std::size_t count) {
     if (highest_elevation_ < 0) return;
     first_cell_ = (static_cast<std::size_t>(lowest_elevation_) * columns()) << row_shift_;
     const std::size_t blocks = row_count() * row_blocks();
-    if (is_used_.size() < blocks) {
-      is_used_.resize(blocks);
+    if (occupied_.size() < blocks) {
       occupied_.resize(blocks);
+      starts_.resize(blocks);
       run_before_.resize(blocks);
-      cells_.resize(blocks * kBlock);
     }
-    // Read once: stores of bytes may change anything, as far as the compiler knows.
     const std::int32_t* const cell_of = cell_of_.data();
-    std::uint8_t* const cells = cells_.data();
-    std::uint8_t* const is_used = is_used_.data();
+    std::uint64_t* const occupied = occupied_.data();
     const std::size_t first_cell = first_cell_;
-    for (std::size_t i = 0; i < count; ++i) {
+    const auto mark = [&](std::size_t i) {
       const std::size_t cell = static_cast<std::size_t>(cell_of[i]) - first_cell;
-      cells[cell] = 1;
-      is_used[cell / kBlock] = 1;
+      occupied[cell / kBlock] |= std::uint64_t{1} << cell % kBlock;
+    };
+    constexpr std::size_t kStretches = 4;
+    const std::size_t length = count / kStretches;
+    for (std::size_t i = 0; i < length; ++i) {
+      for (std::size_t k = 0; k < kStretches; ++k) mark(i + k * length);
     }
+    for (std::size_t i = kStretches * length; i < count; ++i) mark(i);
   }
 
   // Rows of one elevation: one for each range, and one for what is too far away.
@@ -225,20 +229,19 @@ class CurvedVoxelClusterer {
     return static_cast<std::size_t>(elevations) * columns();
   }
 
-  // The first block from `block` on that was marked, or `end`. Most are not: eight at a time.
+  // The first block from `block` on that holds anything, or `end`. Most do not: eight at a time.
   std::size_t next_used(std::size_t block, std::size_t end) const {
-    std::uint64_t eight;
-    while (block + sizeof(eight) <= end) {
-      std::memcpy(&eight, &is_used_[block], sizeof(eight));
-      if (eight != 0) break;
-      block += sizeof(eight);
+    constexpr std::size_t kAtOnce = 8;
+    for (; block + kAtOnce <= end; block += kAtOnce) {
+      std::uint64_t any = 0;
+      for (std::size_t i = 0; i < kAtOnce; ++i) any |= occupied_[block + i];
+      if (any != 0) break;
     }
-    while (block < end && is_used_[block] == 0) ++block;
+    while (block < end && occupied_[block] == 0) ++block;
     return block;
   }
 
-  // Cuts rows into runs. A cell then holds how many runs of its block began up to there; 0 is the
-  // run that goes on from the block before.
+  // Cuts rows into runs, numbered in the order of their cells.
   void find_runs() {
     used_blocks_.clear();
     const std::size_t blocks = row_count() * row_blocks();
@@ -246,9 +249,9 @@ class CurvedVoxelClusterer {
     for (std::size_t block = next_used(0, blocks); block < blocks;
          block = next_used(block + 1, blocks)) {
       used_blocks_.push_back(static_cast<std::uint32_t>(block));
-      occupied_[block] = detail::nonzero_bytes(&cells_[block * kBlock]);
+      starts_[block] = occupied_[block] & ~occupied_before(block);
       run_before_[block] = runs - 1;
-      runs += detail::count_up_to(starts_in(block), &cells_[block * kBlock]);
+      runs += detail::count_ones(starts_[block]);
     }
     parent_.resize(runs);
     std::iota(parent_.begin(), parent_.end(), 0U);
@@ -328,13 +331,13 @@ class CurvedVoxelClusterer {
         place_in_row(block) == 0 ? 0 : occupied_[block - 1] >> (kBlock - 1);
     return occupied_[block] << 1U | carried;
   }
-  // Cells of a block with which a run begins.
-  std::uint64_t starts_in(std::size_t block) const {
-    return occupied_[block] & ~occupied_before(block);
-  }
+  std::uint64_t starts_in(std::size_t block) const { return starts_[block]; }
 
-  // Of an occupied cell.
-  std::uint32_t run_of(std::size_t cell) const { return run_before_[cell / kBlock] + cells_[cell]; }
+  // Of an occupied cell: the run that began last, there or before it.
+  std::uint32_t run_of(std::size_t cell) const {
+    const std::uint64_t up_to_it = starts_[cell / kBlock] << (~cell % kBlock);
+    return run_before_[cell / kBlock] + detail::count_ones(up_to_it);
+  }
   // Of a cell or of the one before it.
   std::uint32_t run_at_or_before(std::size_t block, std::size_t at) const {
     const std::size_t cell = block * kBlock + at;
@@ -371,24 +374,27 @@ class CurvedVoxelClusterer {
     }
   }
 
+  // Where there are wide lanes, ones are counted by one instruction.
   void number_points(std::size_t count) {
     const std::int32_t* const cell_of = cell_of_.data();
-    const std::uint8_t* const cells = cells_.data();
+    const std::uint64_t* const starts = starts_.data();
     const std::uint32_t* const run_before = run_before_.data();
     const std::uint32_t* const number_of_run = number_of_run_.data();
     std::uint32_t* const cluster_of = cluster_of_.data();
-    const std::size_t first_cell = first_cell_;
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t cell = static_cast<std::size_t>(cell_of[i]) - first_cell;
-      cluster_of[i] = number_of_run[run_before[cell / kBlock] + cells[cell]];
-    }
+    const auto first_cell = static_cast<std::uint32_t>(first_cell_);
+    detail::run_lanes([&](auto) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::uint32_t cell = static_cast<std::uint32_t>(cell_of[i]) - first_cell;
+        const std::uint64_t up_to_it = starts[cell / kBlock] << (~cell % kBlock);
+        cluster_of[i] = number_of_run[run_before[cell / kBlock] + detail::count_ones(up_to_it)];
+      }
+    });
   }
 
   void clear_cells() {
     for (const std::uint32_t block : used_blocks_) {
-      is_used_[block] = 0;
       occupied_[block] = 0;
-      std::memset(&cells_[block * kBlock], 0, kBlock);
+      starts_[block] = 0;
     }
   }
 
@@ -405,10 +411,9 @@ class CurvedVoxelClusterer {
   std::size_t cluster_count_ = 0;
   std::vector<std::int32_t> cell_of_;
   std::vector<std::uint32_t> cluster_of_;
-  std::vector<std::uint8_t> cells_;
   // By block.
-  std::vector<std::uint8_t> is_used_;
   std::vector<std::uint64_t> occupied_;  // a bit for each cell
+  std::vector<std::uint64_t> starts_;    // those with which a run begins
   std::vector<std::uint32_t> run_before_;
   std::vector<std::uint32_t> used_blocks_;
   std::vector<std::uint32_t> parent_;  // by run; the root is the first run of its set

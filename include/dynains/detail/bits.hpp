@@ -57,20 +57,6 @@ constexpr BytesByByte find_bits() {
 /// Which bits of a byte are set, from the lowest on.
 inline constexpr BytesByByte kPlacesOfBits = find_bits();
 
-/// Writes how many of the 64 bits are set up to each of them, and returns how many are set.
-inline std::uint32_t count_up_to(std::uint64_t bits, std::uint8_t* counts) {
-  std::uint32_t before = 0;
-  for (std::size_t i = 0; i < 8; ++i) {
-    const auto& ones = kOnesUpTo[bits >> 8 * i & 0xFFU];
-    std::uint64_t eight;
-    std::memcpy(&eight, ones.data(), sizeof(eight));
-    eight += before * kInEachByte;
-    std::memcpy(counts + 8 * i, &eight, sizeof(eight));
-    before += ones[7];
-  }
-  return before;
-}
-
 /// Calls `body(number)` for each bit that is set, from the lowest on.
 template <class Body>
 void for_each_bit(std::uint64_t bits, Body&& body) {
