@@ -249,30 +249,44 @@ class FreeSpaceEvidence {
   // One reference for all samples of a scan. `lag`: scans from the samples to the reference.
   void refer(Record& record, const View& reference, int lag) {
     look(record.samples.points, record.samples.size(), record.T_world_sensor, reference);
-    update_supervoxels(record);
-    update_wholes(record, lag);
+    // Processors with wide lanes find and count bits by one instruction.
+    detail::run_lanes([&](auto) {
+      update_supervoxels(record);
+      update_wholes(record, lag);
+    });
   }
 
   // What the reference saw may change supervoxels of which something was seen free, or was hit
-  // while they are open: few, once a scan has met some references.
+  // while they are open: few, once a scan has met some references. All are asked for before the
+  // first is needed: what is known of an older scan lies far away by now.
   void update_supervoxels(Record& record) {
+    const std::size_t count = find_touched(record);
+    for (std::size_t i = 0; i < count; ++i) update_supervoxel(record, touched_[i]);
+  }
+
+  // Leaves their numbers in `touched_`, in order, and returns how many there are.
+  std::size_t find_touched(const Record& record) {
     constexpr std::size_t kBits = 64;
     const InstanceSamples& samples = record.samples;
-    std::size_t done = 0;  // samples
+    detail::grow(touched_, samples.supervoxel_count() + 1);
+    std::size_t count = 0;
+    std::uint32_t last = kNoCluster;
     for (std::size_t begin = 0; begin < samples.size(); begin += kBits) {
-      const std::uint64_t open = record.open[begin / kBits];
-      std::uint64_t seen = sights_.free_word(begin) | (sights_.hit_word(begin) & open);
-      const std::size_t end = std::min(begin + kBits, samples.size());
-      if (end - begin < kBits) seen &= (std::uint64_t{1} << (end - begin)) - 1;
-      while (done < end) {
-        if (done > begin) seen &= ~std::uint64_t{0} << (done - begin);
-        if (seen == 0) break;
-        const std::size_t sample = begin + static_cast<std::size_t>(__builtin_ctzll(seen));
-        const std::uint32_t s = samples.supervoxel_of[sample];
-        update_supervoxel(record, s);
-        done = samples.sample_begin[s + 1];
-      }
+      std::uint64_t seen =
+          sights_.free_word(begin) | (sights_.hit_word(begin) & record.open[begin / kBits]);
+      const std::size_t left = samples.size() - begin;
+      if (left < kBits) seen &= (std::uint64_t{1} << left) - 1;
+      detail::for_each_bit(seen, [&](std::size_t i) {
+        const std::uint32_t s = samples.supervoxel_of[begin + i];
+        touched_[count] = s;
+        count += s != last ? 1 : 0;
+        last = s;
+        __builtin_prefetch(&record.beliefs[s]);
+        __builtin_prefetch(&samples.sample_begin[s]);
+        __builtin_prefetch(&samples.instance_of[s]);
+      });
     }
+    return count;
   }
 
   void update_supervoxel(Record& record, std::uint32_t s) {
@@ -665,7 +679,8 @@ class FreeSpaceEvidence {
   std::vector<Record> records_;
   RangeImage::Scratch image_scratch_;
   detail::Sights sights_;
-  std::vector<Verdict> verdicts_;  // by supervoxel
+  std::vector<std::uint32_t> touched_;  // supervoxels of which a reference saw something
+  std::vector<Verdict> verdicts_;       // by supervoxel
   // By position in InstanceSamples::met.
   std::vector<Verdict> groups_of_points_;
   std::vector<std::uint8_t> moved_;

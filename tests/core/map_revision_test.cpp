@@ -28,7 +28,8 @@ class Eyes {
                                    const Eigen::Isometry3d&) {
     sights_.resize(count);
     for (std::size_t i = 0; i < count; i += 8) {
-      sights_.set(i, sight_ == Sight::kFree ? 0xFFU : 0U, sight_ == Sight::kHit ? 0xFFU : 0U);
+      sights_.bytes().free[i / 8] = sight_ == Sight::kFree ? 0xFFU : 0U;
+      sights_.bytes().hit[i / 8] = sight_ == Sight::kHit ? 0xFFU : 0U;
     }
     return sights_;
   }

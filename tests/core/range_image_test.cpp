@@ -217,8 +217,11 @@ TEST_CASE("bits of sights are counted over any range") {
     float values[detail::kLanes];
     for (float& value : values) value = random.uniform_float(-1.0, 1.0);
     const detail::Float8 random_values = detail::Float8::load(values);
-    sights.set(first, (random_values > detail::Float8(0.5F)).bits(),
-               (random_values < detail::Float8(-0.3F)).bits());
+    const detail::Sights::Bytes bytes = sights.bytes();
+    bytes.free[first / 8] =
+        static_cast<std::uint8_t>((random_values > detail::Float8(0.5F)).bits());
+    bytes.hit[first / 8] =
+        static_cast<std::uint8_t>((random_values < detail::Float8(-0.3F)).bits());
   }
   for (int round = 0; round < 2000; ++round) {
     const std::size_t begin = random.index(kCount);

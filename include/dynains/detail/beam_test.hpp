@@ -31,12 +31,12 @@ class Sights {
     grow(free_, bytes);
     grow(hit_, bytes);
   }
-  /// Of the eight samples from `first` on, a multiple of eight: which were seen free (all beams
-  /// about them went farther), and which were hit (a beam ended there).
-  void set(std::size_t first, unsigned free, unsigned hit) {
-    free_[first / 8] = static_cast<std::uint8_t>(free);
-    hit_[first / 8] = static_cast<std::uint8_t>(hit);
-  }
+  /// To be written: a byte for eight samples.
+  struct Bytes {
+    std::uint8_t* free;  ///< all beams about the sample went farther
+    std::uint8_t* hit;   ///< a beam ended there
+  };
+  Bytes bytes() { return {free_.data(), hit_.data()}; }
 
   struct Count {
     std::uint32_t free;
@@ -97,12 +97,15 @@ inline void test_beams(const RangeImage& image, const Eigen::Isometry3f& T_refer
   const Constant8 to_centimetres(kCentimetres);
   const Constant8 base(margin * kCentimetres), growth(slope * kCentimetres);
   const ImageLocator locator(image.grid());
-  const RangeImage::Cell* const cells = image.data();
   sights.resize(count);
   run_lanes([&](auto lanes) {
     using Lanes = decltype(lanes);
     using Float = typename Lanes::Float;
     using Int = typename Lanes::Int;
+    // Read once: stores of bytes may change anything, as far as the compiler knows.
+    const Sights::Bytes seen = sights.bytes();
+    const RangeImage::Cell* const cells = image.data();
+    const Float scale(to_centimetres), least(base), slope_per_metre(growth);
     // Images are larger than the caches near the core: all cells of a block are asked for before
     // the first is needed.
     std::int32_t cell[kBeamBlock];
@@ -131,13 +134,14 @@ inline void test_beams(const RangeImage& image, const Eigen::Isometry3f& T_refer
         const Float nearest = to_float((both << 16) >> 16);
         const Float around = to_float(both >> 16);
         const Float metres = Float::load(&ranges[i]);
-        const Float range = metres * to_centimetres;
-        const Float tolerance = metres * growth + base;
+        const Float range = metres * scale;
+        const Float tolerance = metres * slope_per_metre + least;
         const auto inside = Int(0) < Int::load(&cell[i]);
         const auto free = inside & (around - range > tolerance);
         const auto hit = inside & ~free &
                          ((abs(nearest - range) <= tolerance) | (abs(around - range) <= tolerance));
-        sights.set(begin + i, free.bits(), hit.bits());
+        seen.free[(begin + i) / 8] = static_cast<std::uint8_t>(free.bits());
+        seen.hit[(begin + i) / 8] = static_cast<std::uint8_t>(hit.bits());
       }
     }
   });
