@@ -300,6 +300,10 @@ class StaticMapAccumulator {
   void insert_chosen(const Batch& batch) {
     std::uint32_t* const recent = recent_.data();
     for (std::size_t k = 0; k < batch.chosen_count; ++k) {
+      const std::uint32_t known = recent[batch.recent[batch.chosen[k]]];
+      if (known < blocks_.size()) __builtin_prefetch(&blocks_[known]);
+    }
+    for (std::size_t k = 0; k < batch.chosen_count; ++k) {
       const std::size_t i = batch.chosen[k];
       const std::int32_t x = batch.block[0][i + 1];
       const std::int32_t y = batch.block[1][i + 1];
