@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 #include <vector>
 
 #include "dynains/cluster_set.hpp"
@@ -54,7 +55,8 @@ class OccupancyDescriptor {
   const Config& config() const { return config_; }
 
   /// Lays the grid of Eq. 5-8 over a cluster and describes its oldest and newest observation.
-  /// The cluster must be comparable (ClusterSet) and outlive the calls that follow.
+  /// The cluster must be comparable (ClusterSet), and outlive the calls that follow with its
+  /// window.
   void describe(const ClusterView& cluster) {
     cluster_ = cluster;
     lay_grid();
@@ -124,11 +126,12 @@ class OccupancyDescriptor {
  private:
   void lay_grid() {
     using detail::Constant8;
-    const PolarView& points = cluster_.points;
+    const PolarView& points = cluster_.window;
     // In the place of those that are missing from the last eight, the first point changes no
     // extent.
-    const Constant8 first_range(points.range[0]), first_azimuth(points.azimuth[0]);
-    const Constant8 first_z(points.z[0]), first_turned(turned(points.azimuth[0]));
+    const std::size_t first = cluster_.ranges[0].begin;
+    const Constant8 first_range(points.range[first]), first_azimuth(points.azimuth[first]);
+    const Constant8 first_z(points.z[first]), first_turned(turned(points.azimuth[first]));
     const Constant8 zero(0.0F), turn(2.0F * detail::kPi);
     // Extents for the seam at +-pi and for the seam at 0: the smaller of the two is the smallest
     // arc if it is at most half a turn.
@@ -139,7 +142,7 @@ class OccupancyDescriptor {
       Float range_low = first_range, range_high = first_range, z_low = first_z;
       Float azimuth_low = first_azimuth, azimuth_high = first_azimuth;
       Float turned_low = first_turned, turned_high = first_turned;
-      detail::for_places<Lanes>(points.size(), [&](const auto& at) {
+      const auto extend = [&](const auto& at) {
         const Float range = at.there(at.load(points.range.data()), first_range);
         const Float azimuth = at.there(at.load(points.azimuth.data()), first_azimuth);
         const Float z = at.there(at.load(points.z.data()), first_z);
@@ -151,7 +154,10 @@ class OccupancyDescriptor {
         const Float on = azimuth + keep(azimuth < zero, Float(turn));
         turned_low = min(turned_low, on);
         turned_high = max(turned_high, on);
-      });
+      };
+      for (const PointRange& part : cluster_.ranges) {
+        detail::for_places_again<Lanes>(part.begin, part.end, extend);
+      }
       range_min_ = min_lane(range_low);
       range_max = max_lane(range_high);
       z_min_ = min_lane(z_low);
@@ -188,10 +194,12 @@ class OccupancyDescriptor {
     constexpr std::size_t kBins = 1024;
     constexpr float kBinsPerRadian = static_cast<float>(kBins) / (2.0F * detail::kPi);
     taken_.assign(kBins, 0);
-    const PolarView& points = cluster_.points;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const auto bin = static_cast<std::size_t>(turned(points.azimuth[i]) * kBinsPerRadian);
-      taken_[std::min(bin, kBins - 1)] = 1;
+    const float* const azimuth = cluster_.window.azimuth.data();
+    for (const PointRange& part : cluster_.ranges) {
+      for (std::size_t i = part.begin; i < part.end; ++i) {
+        const auto bin = static_cast<std::size_t>(turned(azimuth[i]) * kBinsPerRadian);
+        taken_[std::min(bin, kBins - 1)] = 1;
+      }
     }
     std::size_t widest = 0;
     std::size_t seam = kBins;  // first taken bin behind the widest gap
@@ -211,11 +219,13 @@ class OccupancyDescriptor {
     const float origin = static_cast<float>(seam) / kBinsPerRadian;
     float low = 2.0F * detail::kPi;
     float high = 0.0F;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      float offset = turned(points.azimuth[i]) - origin;
-      if (offset < -0.5F / kBinsPerRadian) offset += 2.0F * detail::kPi;
-      low = std::min(low, offset);
-      high = std::max(high, offset);
+    for (const PointRange& part : cluster_.ranges) {
+      for (std::size_t i = part.begin; i < part.end; ++i) {
+        float offset = turned(azimuth[i]) - origin;
+        if (offset < -0.5F / kBinsPerRadian) offset += 2.0F * detail::kPi;
+        low = std::min(low, offset);
+        high = std::max(high, offset);
+      }
     }
     azimuth_min_ = origin + low;
     // Back into the interval of azimuths, so that no point is more than one turn away.
@@ -229,7 +239,7 @@ class OccupancyDescriptor {
     float* const heights = heights_.data() + k * cells;
     std::fill(heights, heights + cells, 0.0F);
     using detail::Constant8;
-    const PolarView points = cluster_.scan(k);
+    const PolarView points = cluster_.window;
     // Read once: the compiler cannot know that stores leave members alone.
     const Constant8 range_min(range_min_), azimuth_min(azimuth_min_), z_min(z_min_);
     const Constant8 cells_per_metre(cells_per_metre_), cells_per_radian(cells_per_radian_);
@@ -237,8 +247,8 @@ class OccupancyDescriptor {
     const auto row = static_cast<std::int32_t>(azimuth_cells_);
     const Constant8 last_radial(static_cast<float>(radial_cells_ - 1));
     const Constant8 last_azimuth(static_cast<float>(azimuth_cells_ - 1));
-    detail::for_lanes(points.size(), [&](auto at) {
-      using Float = typename decltype(at)::Float;
+    const auto raise = [&](const auto& at) {
+      using Float = typename std::decay_t<decltype(at)>::Float;
       const Float radial = (at.load(points.range.data()) - range_min) * cells_per_metre;
       Float offset = at.load(points.azimuth.data()) - azimuth_min;
       offset = offset + keep(offset < just_below, Float(turn));
@@ -252,6 +262,11 @@ class OccupancyDescriptor {
       for (std::size_t i = 0; i < lanes; ++i) {
         float& highest = heights[cell[i]];
         highest = std::max(highest, height[i]);
+      }
+    };
+    detail::run_lanes([&](auto lanes) {
+      for (const PointRange& part : cluster_.scan(k)) {
+        detail::for_places_again<decltype(lanes)>(part.begin, part.end, raise);
       }
     });
   }

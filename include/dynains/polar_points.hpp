@@ -27,7 +27,7 @@ struct PolarView {
   }
 };
 
-/// Owner of polar points, reused from scan to scan; padded for wide stores.
+/// Owner of polar points, reused from scan to scan; padded for wide loads and stores.
 class PolarBuffer {
  public:
   std::size_t size() const { return size_; }

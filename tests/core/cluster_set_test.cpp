@@ -21,6 +21,10 @@ std::vector<Point> points_of(PolarView view) {
   return result;
 }
 
+std::vector<Point> points_of(PolarView window, Span<const PointRange> ranges) {
+  return points_of(gathered(window, ranges).view());
+}
+
 TEST_CASE("S_k of every comparable cluster holds exactly the points of Eq. 4, in input order") {
   ClusterSet clusters;  // the same object for all, as in the pipeline
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
@@ -51,16 +55,16 @@ TEST_CASE("S_k of every comparable cluster holds exactly the points of Eq. 4, in
           scans > 1 && !expected[{c, 0}].empty() && !expected[{c, scans - 1}].empty();
       REQUIRE(clusters.comparable(c) == comparable);
       if (!comparable) {
-        REQUIRE(clusters[c].points.empty());
+        REQUIRE(clusters[c].ranges.empty());
         continue;
       }
       std::vector<Point> all;
       for (std::size_t k = 0; k < scans; ++k) {
         const auto& part = expected[{c, k}];
-        REQUIRE((points_of(clusters[c].scan(k)) == part));
+        REQUIRE((points_of(clusters[c].window, clusters[c].scan(k)) == part));
         all.insert(all.end(), part.begin(), part.end());
       }
-      REQUIRE((points_of(clusters[c].points) == all));
+      REQUIRE((points_of(clusters[c].window, clusters[c].ranges) == all));
     }
   }
 }

@@ -11,23 +11,38 @@
 namespace dynains::test {
 namespace {
 
-// A cluster that owns its points; scans are added oldest first.
+// A cluster that owns its window; scans are added oldest first. Its points come in ranges of 1, 2,
+// 3 and so on up to 19, between which lie points of another cluster.
 class Cluster {
  public:
   Cluster& point(double range, double azimuth_degrees, double z) {
-    add(points_, range, azimuth_degrees, z);
+    if (left_ == 0) begin_range();
+    add(window_, range, azimuth_degrees, z);
+    ++ranges_.back().end;
+    --left_;
     return *this;
   }
   Cluster& end_of_scan() {
-    scan_begin_.push_back(static_cast<std::uint32_t>(points_.size()));
+    first_range_.push_back(static_cast<std::uint32_t>(ranges_.size()));
+    left_ = 0;
     return *this;
   }
-  std::size_t size() const { return points_.size(); }
-  ClusterView view() const { return {points_.view(), scan_begin_}; }
+  ClusterView view() const { return {window_.view(), ranges_, first_range_}; }
 
  private:
-  PolarBuffer points_;
-  std::vector<std::uint32_t> scan_begin_ = {0};
+  void begin_range() {
+    add(window_, 99.0, -123.0, -40.0);
+    const auto begin = static_cast<std::uint32_t>(window_.size());
+    ranges_.push_back({begin, begin});
+    length_ = length_ % 19 + 1;
+    left_ = length_;
+  }
+
+  PolarBuffer window_;
+  std::vector<PointRange> ranges_;
+  std::vector<std::uint32_t> first_range_ = {0};
+  int length_ = 0;
+  int left_ = 0;  // points until the range ends
 };
 
 OccupancyDescriptor::Config make(double cell_range, double cell_azimuth, double tau_s = 0.6) {

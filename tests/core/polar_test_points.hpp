@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "dynains/cluster_set.hpp"
 #include "dynains/polar_points.hpp"
 
 namespace dynains::test {
@@ -17,6 +18,21 @@ inline void add(PolarBuffer& points, double range, double azimuth_degrees, doubl
   points.range[at] = static_cast<float>(range);
   points.azimuth[at] = static_cast<float>(azimuth_degrees * kRadiansPerDegree);
   points.z[at] = static_cast<float>(z);
+}
+
+/// Points of some ranges, one behind the other.
+inline PolarBuffer gathered(PolarView window, Span<const PointRange> ranges) {
+  PolarBuffer result;
+  for (const PointRange& part : ranges) {
+    for (std::size_t i = part.begin; i < part.end; ++i) {
+      const std::size_t at = result.size();
+      result.resize(at + 1);
+      result.range[at] = window.range[i];
+      result.azimuth[at] = window.azimuth[i];
+      result.z[at] = window.z[i];
+    }
+  }
+  return result;
 }
 
 /// Distance of `value` from the nearest whole number.

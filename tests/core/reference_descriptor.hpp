@@ -26,7 +26,8 @@ inline std::optional<ReferenceDescriptor> describe(const OccupancyDescriptor::Co
   constexpr double kMargin = 1e-3;
   const double s_r = config.cell_range;
   const double s_theta = config.cell_azimuth * kRadiansPerDegree;
-  const PolarView& points = cluster.points;
+  const PolarBuffer all = gathered(cluster.window, cluster.ranges);
+  const PolarView points = all.view();
   const double r_min = *std::min_element(points.range.begin(), points.range.end());
   const double r_max = *std::max_element(points.range.begin(), points.range.end());
   const double z_min = *std::min_element(points.z.begin(), points.z.end());
@@ -65,7 +66,8 @@ inline std::optional<ReferenceDescriptor> describe(const OccupancyDescriptor::Co
   const std::size_t scans = cluster.scan_count();
   result.heights.assign(scans + 1, std::vector<double>(count, 0.0));
   for (std::size_t k = 0; k < scans; ++k) {
-    const PolarView scan = cluster.scan(k);
+    const PolarBuffer observed = gathered(cluster.window, cluster.scan(k));
+    const PolarView scan = observed.view();
     for (std::size_t p = 0; p < scan.size(); ++p) {
       double offset = scan.azimuth[p] - theta_min;
       if (offset < 0.0) offset += 2.0 * M_PI;

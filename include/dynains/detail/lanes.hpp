@@ -256,15 +256,6 @@ auto same_as_next(const std::int32_t* values) {
   return Int::load(values) == Int::load(values + 1);
 }
 
-/// Eight values, wherever they lie.
-template <class T>
-void copy_lanes(const T* from, T* to) {
-  static_assert(sizeof(T) == 4);
-  Int8 eight;
-  std::memcpy(&eight, from, sizeof(eight));
-  std::memcpy(to, &eight, sizeof(eight));
-}
-
 /// Cuts the array into stretches of equal values and calls `body(length)` for one after the other.
 template <class T, class Body>
 void for_each_change(const T* values, std::size_t count, Body&& body) {

@@ -219,7 +219,28 @@ void for_places(std::size_t count, Kernel&& kernel) {
   if (begin < count) kernel(Places<Lanes, true>(begin, count));
 }
 
-/// The same with the lanes that suit the processor.
+/// Neighbouring places of arrays that can be read beyond their ends.
+template <class Lanes, bool kTail>
+struct PaddedPlaces : Places<Lanes, kTail> {
+  using Places<Lanes, kTail>::Places;
+  /// Whatever is there behind the end.
+  typename Lanes::Float load(const float* from) const {
+    return Lanes::Float::load(from + this->begin);
+  }
+};
+
+/// Calls `kernel(PaddedPlaces)` for the places from `begin` to `end`, for some of them twice: what
+/// does not fill eight lanes begins earlier if it can.
+template <class Lanes, class Kernel>
+void for_places_again(std::size_t begin, std::size_t end, Kernel&& kernel) {
+  if (end - begin < kLanes) return kernel(PaddedPlaces<Lanes, true>(begin, end));
+  for (; begin + kLanes < end; begin += kLanes) {
+    kernel(PaddedPlaces<Lanes, false>(begin, begin + kLanes));
+  }
+  kernel(PaddedPlaces<Lanes, false>(end - kLanes, end));
+}
+
+/// As for_places, with the lanes that suit the processor.
 template <class Kernel>
 void for_lanes(std::size_t count, Kernel&& kernel) {
   run_lanes([&](auto lanes) { for_places<decltype(lanes)>(count, kernel); });
