@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -126,6 +125,7 @@ class CurvedVoxelClusterer {
   Span<const std::uint32_t> cluster(PolarView points) {
     find_cells(points);
     mark_cells(points.size());
+    // Processors with wide lanes count ones by one instruction.
     detail::run_lanes([&](auto) { find_runs(); });
     detail::run_lanes([&](auto) { join_runs(); });
     number_runs();
@@ -281,9 +281,8 @@ class CurvedVoxelClusterer {
 
   bool is_beyond(std::size_t column) const { return column + 1 == columns(); }
   void leave_alone(std::size_t block) {
-    detail::for_each_bit(starts_in(block), [&](std::size_t at) {
-      parent_[run_of(block * kBlock + at)] = kNoCluster;
-    });
+    detail::for_each_bit(
+        starts_[block], [&](std::size_t at) { parent_[run_of(block * kBlock + at)] = kNoCluster; });
   }
 
   // Joins the runs in a block with those of another row that overlap or touch at a corner.
@@ -294,8 +293,8 @@ class CurvedVoxelClusterer {
     const std::uint64_t there = occupied_[other];
     const std::uint64_t up_to_here = here | occupied_before(block);
     const std::uint64_t up_to_there = there | occupied_before(other);
-    const std::uint64_t begins_there = starts_in(block) & up_to_there;
-    const std::uint64_t begins_here = starts_in(other) & up_to_here;
+    const std::uint64_t begins_there = starts_[block] & up_to_there;
+    const std::uint64_t begins_here = starts_[other] & up_to_here;
     detail::for_each_bit(begins_there | begins_here, [&](std::size_t at) {
       join(run_at_or_before(block, at), run_at_or_before(other, at));
     });
@@ -331,7 +330,6 @@ class CurvedVoxelClusterer {
         place_in_row(block) == 0 ? 0 : occupied_[block - 1] >> (kBlock - 1);
     return occupied_[block] << 1U | carried;
   }
-  std::uint64_t starts_in(std::size_t block) const { return starts_[block]; }
 
   // Of an occupied cell: the run that began last, there or before it.
   std::uint32_t run_of(std::size_t cell) const {
@@ -374,7 +372,6 @@ class CurvedVoxelClusterer {
     }
   }
 
-  // Where there are wide lanes, ones are counted by one instruction.
   void number_points(std::size_t count) {
     const std::int32_t* const cell_of = cell_of_.data();
     const std::uint64_t* const starts = starts_.data();
