@@ -373,17 +373,10 @@ class CurvedVoxelClusterer {
   }
 
   void number_points(std::size_t count) {
-    const std::int32_t* const cell_of = cell_of_.data();
-    const std::uint64_t* const starts = starts_.data();
-    const std::uint32_t* const run_before = run_before_.data();
-    const std::uint32_t* const number_of_run = number_of_run_.data();
-    std::uint32_t* const cluster_of = cluster_of_.data();
-    const auto first_cell = static_cast<std::uint32_t>(first_cell_);
     detail::run_lanes([&](auto) {
       for (std::size_t i = 0; i < count; ++i) {
-        const std::uint32_t cell = static_cast<std::uint32_t>(cell_of[i]) - first_cell;
-        const std::uint64_t up_to_it = starts[cell / kBlock] << (~cell % kBlock);
-        cluster_of[i] = number_of_run[run_before[cell / kBlock] + detail::count_ones(up_to_it)];
+        const std::size_t cell = static_cast<std::size_t>(cell_of_[i]) - first_cell_;
+        cluster_of_[i] = number_of_run_[run_of(cell)];
       }
     });
   }

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <type_traits>
 #include <vector>
 
 #include "dynains/cluster_set.hpp"
@@ -247,8 +246,8 @@ class OccupancyDescriptor {
     const auto row = static_cast<std::int32_t>(azimuth_cells_);
     const Constant8 last_radial(static_cast<float>(radial_cells_ - 1));
     const Constant8 last_azimuth(static_cast<float>(azimuth_cells_ - 1));
-    const auto raise = [&](const auto& at) {
-      using Float = typename std::decay_t<decltype(at)>::Float;
+    const auto raise = [&](auto at) {
+      using Float = typename decltype(at)::Float;
       const Float radial = (at.load(points.range.data()) - range_min) * cells_per_metre;
       Float offset = at.load(points.azimuth.data()) - azimuth_min;
       offset = offset + keep(offset < just_below, Float(turn));
