@@ -111,7 +111,7 @@ TEST_CASE("Ingest takes good points in order and labels the others, however they
           const std::array<float, 3>& p = kinds[is_bad ? kind : 0];
           std::copy(p.begin(), p.end(), cloud.begin() + static_cast<std::ptrdiff_t>(stride * i));
         }
-        std::vector<PointLabel> labels;
+        std::vector<PointLabel> labels(count / 2, PointLabel::kDynamic);  // of the scan before
         const RawPoints<float> points{cloud.data(), count, stride};
         ingest.read(points, min_range, 50.0F, nullptr, labels);
 
@@ -126,6 +126,7 @@ TEST_CASE("Ingest takes good points in order and labels the others, however they
             REQUIRE(labels[i] == (is_missing ? PointLabel::kInvalid : PointLabel::kOutOfRange));
             continue;
           }
+          REQUIRE(labels[i] == PointLabel::kGround);
           REQUIRE(taken < ingest.points().size());
           REQUIRE(ingest.input()[taken] == i);
           REQUIRE(ingest.points().x[taken] == p.x());

@@ -82,6 +82,7 @@ TEST_CASE("verdicts by streak are those by point, at once and after more windows
     const std::vector<std::size_t> order = random.permutation(ground + points + bad);
     for (std::size_t i = 0; i < ground + points; ++i) {
       scan.split.input[i] = static_cast<std::uint32_t>(order[i]);
+      scan.labels[order[i]] = PointLabel::kGround;  // as good points come
     }
     scan.ids.resize(kClusters);
     for (std::uint32_t c = 0; c < kClusters; ++c) scan.ids[c] = 100 + c;
@@ -159,6 +160,7 @@ struct JudgedScan {
     slot.split.ground_count = ground;
     std::copy_n(order.begin(), ground + above, slot.split.input.begin());
     slot.labels.assign(all, PointLabel::kOutOfRange);
+    for (std::size_t i = 0; i < ground + above; ++i) slot.labels[order[i]] = PointLabel::kGround;
     for (std::uint32_t c = 0; c < kClusters; ++c) slot.ids.push_back(100 + c);
     for (std::size_t i = 0; i < above; ++i) {
       const std::size_t cluster = random.index(kClusters + 1);

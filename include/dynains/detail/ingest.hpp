@@ -19,7 +19,8 @@
 
 namespace dynains::detail {
 
-/// Takes a foreign cloud in: valid points as floats, and a label for each of the others.
+/// Takes a foreign cloud in: good points as floats, and a label for each of all points. Good ones
+/// count as ground until something else is known of them.
 class Ingest {
  public:
   /// Points outside [min_range, max_range] (m, horizontal), higher or lower than max_range or
@@ -131,6 +132,7 @@ class Ingest {
           z.store(zs + taken);
           (lane_numbers<Int>() + Int(static_cast<std::int32_t>(first)))
               .store(reinterpret_cast<std::int32_t*>(input + taken));
+          std::fill_n(labels + first, kLanes, PointLabel::kGround);
           taken += kLanes;
           return;
         }
@@ -143,9 +145,11 @@ class Ingest {
           ys[taken] = ys[at.begin + k];
           zs[taken] = zs[at.begin + k];
           input[taken] = static_cast<std::uint32_t>(first + k);
-          taken += (good >> k) & 1U;
-          labels[first + k] =
+          const unsigned is_good = (good >> k) & 1U;
+          taken += is_good;
+          const PointLabel bad =
               ((returns >> k) & 1U) != 0 ? PointLabel::kOutOfRange : PointLabel::kInvalid;
+          labels[first + k] = is_good != 0 ? PointLabel::kGround : bad;
         }
       });
       result = taken;

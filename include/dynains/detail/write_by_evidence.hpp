@@ -71,18 +71,20 @@ inline void write_instances(ScanSlot& scan, Span<const std::uint32_t> cluster_of
   }
 }
 
-/// The groups of all points, in the order of the input.
+/// The groups of all points, in the order of the input. Good points are labelled as ground.
 inline void order_groups(const ScanSlot& scan, Span<const std::uint32_t> groups,
                          std::vector<std::uint32_t>& ordered) {
-  grow(ordered, scan.labels.size());
+  const std::size_t count = scan.labels.size();
+  grow(ordered, count);
   std::uint32_t* const group_of = ordered.data();
-  std::fill_n(group_of, scan.labels.size(), VerdictScratch::kOutside);
-  const std::uint32_t* const input = scan.split.input.data();
-  const std::size_t ground_count = scan.split.ground_count;
-  for (std::size_t i = 0; i < ground_count; ++i) group_of[input[i]] = VerdictScratch::kGround;
-  const std::size_t count = groups.size();
+  const PointLabel* const labels = scan.labels.data();
   for (std::size_t i = 0; i < count; ++i) {
-    group_of[input[ground_count + i]] = VerdictScratch::kFirst + groups[i];
+    group_of[i] =
+        labels[i] == PointLabel::kGround ? VerdictScratch::kGround : VerdictScratch::kOutside;
+  }
+  const std::uint32_t* const input = scan.split.input.data() + scan.split.ground_count;
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    group_of[input[i]] = VerdictScratch::kFirst + groups[i];
   }
 }
 

@@ -66,19 +66,17 @@ inline void record_again(ScanSlot& scan, Span<const ClusterSet::Streak> streaks,
   }
 }
 
-/// What does not change any more: ground, and the points that are no part of the split.
+/// What holds unless a later stage says something else: good points are labelled as ground.
 inline void begin_verdict(ScanSlot& scan) {
-  scan.instances.assign(scan.labels.size(), kNoInstance);
-  scan.beliefs.assign(scan.labels.size(), 0.0F);
-  scan.causes.assign(scan.labels.size(), Cause::kNotJudged);
+  const std::size_t count = scan.labels.size();
+  scan.instances.assign(count, kNoInstance);
+  scan.beliefs.assign(count, 0.0F);
   scan.is_kept.assign(scan.split.count, 1);
-  const std::uint32_t* const input = scan.split.input.data();
-  PointLabel* const labels = scan.labels.data();
+  scan.causes.resize(count);
+  const PointLabel* const labels = scan.labels.data();
   Cause* const causes = scan.causes.data();
-  const std::size_t ground_count = scan.split.ground_count;
-  for (std::size_t i = 0; i < ground_count; ++i) {
-    labels[input[i]] = PointLabel::kGround;
-    causes[input[i]] = Cause::kGround;
+  for (std::size_t i = 0; i < count; ++i) {
+    causes[i] = labels[i] == PointLabel::kGround ? Cause::kGround : Cause::kNotJudged;
   }
 }
 
