@@ -34,6 +34,8 @@ whole() {
     [[ ! -e $1/$file ]] || cmp "$1/$file" "$expected/$file" || return 1
   done
 }
+# Returns when the folder is there, or after ten seconds.
+await() { local i; for ((i = 0; i < 2000; ++i)); do [[ -d $1 ]] && break; sleep 0.005; done; }
 complete() { grep -q '"complete": true' "$1/report.json" 2>/dev/null; }
 
 seq=$work/seq
@@ -89,7 +91,7 @@ for ((attempt = 0; attempt < 20 && code == 0; ++attempt)); do
   rm -rf "$work/out"
   "$program" run "$seq" --out "$work/out" --quiet &
   pid=$!
-  for ((i = 0; i < 2000; ++i)); do [[ -d $work/out/labels ]] && break; sleep 0.005; done
+  await "$work/out/labels"
   kill -INT "$pid"
   wait "$pid" || code=$?
 done
@@ -107,7 +109,7 @@ echo "--- input that vanishes in the middle"
 cp -r "$seq" "$work/vanishing"
 "$program" run "$work/vanishing" --out "$work/vanished" --quiet 2>"$work/err" &
 pid=$!
-for ((i = 0; i < 2000; ++i)); do [[ -d $work/vanished/labels ]] && break; sleep 0.005; done
+await "$work/vanished/labels"
 rm -rf "$work/vanishing/velodyne"
 code=0
 wait "$pid" || code=$?
