@@ -28,10 +28,20 @@ struct Mounting {
   double tilt() const { return std::acos(std::clamp(up_sensor.z(), -1.0, 1.0)) * 180.0 / M_PI; }
 
   /// The smallest turn that brings the normal of the ground to the z axis: from the frame of the
-  /// sensor to that of one mounted level in its place.
+  /// sensor to that of one mounted level in its place; half a turn about x if it hangs upside down.
   Eigen::Matrix3d R_level_sensor() const {
-    return Eigen::Quaterniond::FromTwoVectors(up_sensor, Eigen::Vector3d::UnitZ())
-        .toRotationMatrix();
+    // In closed form: that of Eigen, which any two vectors do for, takes seconds to compile.
+    constexpr double kTiny = 1e-200;
+    const double x = up_sensor.x(), y = up_sensor.y(), z = up_sensor.z();
+    const double across = x * x + y * y;
+    if (z < 0.0 && across < kTiny) return Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
+    // 1 / (1 + z), also where next to nothing is left of 1 + z.
+    const double k = z < 0.0 ? (1.0 - z) / across : 1.0 / (1.0 + z);
+    Eigen::Matrix3d R;
+    R << 1.0 - k * x * x, -k * x * y, -x,  //
+        -k * x * y, 1.0 - k * y * y, -y,   //
+        x, y, z;
+    return R;
   }
 };
 

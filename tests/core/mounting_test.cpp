@@ -101,6 +101,29 @@ TEST_CASE("A sensor that hangs upside down is known by its tilt") {
   CHECK(std::abs(mounting.tilt() - 170.0) < 0.3);
 }
 
+TEST_CASE("What makes a sensor level is the smallest turn that does, upside down or not") {
+  Mounting mounting;
+  for (const double tilt : {0.0, 1e-9, 5.0, 89.9, 90.0, 90.1, 179.0, 180.0 - 1e-4, 180.0 - 1e-9}) {
+    for (const double heading : {0.0, 0.3, 2.0, -1.7}) {
+      CAPTURE(tilt, heading);
+      const double angle = tilt * kRadians;
+      mounting.up_sensor = {std::sin(angle) * std::cos(heading),
+                            std::sin(angle) * std::sin(heading), std::cos(angle)};
+      const Eigen::Matrix3d R = mounting.R_level_sensor();
+      CHECK((R * mounting.up_sensor - Eigen::Vector3d::UnitZ()).norm() < 1e-9);
+      CHECK((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-9);
+      CHECK(std::abs(R.determinant() - 1.0) < 1e-9);
+      if (tilt > 179.5) continue;  // Eigen's gives any half turn there
+      const auto slow =
+          Eigen::Quaterniond::FromTwoVectors(mounting.up_sensor, Eigen::Vector3d::UnitZ());
+      CHECK((R - slow.toRotationMatrix()).norm() < 1e-12);
+    }
+  }
+  mounting.up_sensor = -Eigen::Vector3d::UnitZ();
+  CHECK(mounting.R_level_sensor() ==
+        Eigen::Matrix3d(Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal()));
+}
+
 TEST_CASE("A roof of the own vehicle and points that are not finite do not mislead") {
   PointBuffer points = street(1.9, Eigen::Matrix3d::Identity());
   for (double a = -2.0; a < 2.0; a += 0.05) {
