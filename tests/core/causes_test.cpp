@@ -15,9 +15,6 @@ namespace {
 
 using Config = DynaInsRemover::Config;
 
-// An oncoming van: 22 m ahead at first, 12 m/s.
-Scene oncoming() { return yard_with(van(22.0, 3.5, {-12.0, 0.0, 0.0})); }
-
 // How many points of `object` have each cause.
 struct Causes {
   std::array<std::size_t, kCauseCount> of{};

@@ -17,9 +17,6 @@ namespace {
 
 using Config = DynaInsRemover::Config;
 
-// An oncoming van: 22 m ahead at first, 12 m/s.
-Scene oncoming() { return yard_with(van(22.0, 3.5, {-12.0, 0.0, 0.0})); }
-
 // Numbers of the dynamic points of one verdict.
 std::vector<std::size_t> dynamic_points(const Verdict& verdict) {
   std::vector<std::size_t> result;

@@ -125,4 +125,7 @@ inline Scene yard_with(const Box& box) {
 }
 inline constexpr int kAddedBox = 8;  ///< its index
 
+/// yard() with an oncoming van: 22 m ahead at first, 12 m/s.
+inline Scene oncoming() { return yard_with(van(22.0, 3.5, {-12.0, 0.0, 0.0})); }
+
 }  // namespace dynains::test
