@@ -35,7 +35,7 @@ std::vector<Verdict> verdicts_of(const std::vector<Scan>& scans) {
 }
 
 TEST_CASE("PCL clouds of any point type get the labels of their points") {
-  const std::vector<Scan> scans = drive(yard_with(van(22.0, 3.5, {-12.0, 0.0, 0.0})), 6, 5.0);
+  const std::vector<Scan> scans = drive(oncoming(), 6, 5.0);
   const std::vector<Verdict> expected = run_paper(scans).final;
   CHECK((verdicts_of<pcl::PointXYZ>(scans) == expected));
   CHECK((verdicts_of<pcl::PointXYZI>(scans) == expected));

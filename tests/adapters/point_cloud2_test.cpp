@@ -133,7 +133,7 @@ TEST_CASE("a message that cannot be read is refused with the reason") {
 }
 
 TEST_CASE("labels of messages are those of the points in them") {
-  const std::vector<Scan> scans = drive(yard_with(van(22.0, 3.5, {-12.0, 0.0, 0.0})), 6, 5.0);
+  const std::vector<Scan> scans = drive(oncoming(), 6, 5.0);
   const std::vector<Verdict> expected = run_paper(scans).final;
   CHECK(share(scans, expected, PointLabel::kDynamic).labelled > 0);
 

@@ -61,7 +61,7 @@ std::vector<Scalar> interleaved(const std::vector<Eigen::Vector3f>& points, std:
 
 TEST_CASE("labels do not depend on the type of the cloud") {
   using Points = std::vector<Eigen::Vector3f>;
-  const std::vector<Scan> scans = drive(yard_with(van(22.0, 3.5, {-12.0, 0.0, 0.0})), 6, 5.0);
+  const std::vector<Scan> scans = drive(oncoming(), 6, 5.0);
   const std::vector<Verdict> expected = run_paper(scans).final;
 
   SECTION("vectors of Eigen vectors") {

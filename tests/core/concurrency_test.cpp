@@ -17,9 +17,7 @@ namespace {
 
 using Config = DynaInsRemover::Config;
 
-std::vector<Scan> passing_van() {
-  return drive(yard_with(van(22.0, 3.5, {-12.0, 0.0, 0.0})), 6, 5.0);
-}
+std::vector<Scan> passing_van() { return drive(oncoming(), 6, 5.0); }
 
 FrameResult push(DynaInsRemover& remover, const Scan& scan) {
   return remover.push(scan.points, scan.T_world_sensor, scan.time);

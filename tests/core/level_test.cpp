@@ -20,9 +20,9 @@ Eigen::Matrix3d slant(double pitch, double roll) {
       .toRotationMatrix();
 }
 
-// At 5 m/s; a van comes from 22 m ahead at 12 m/s.
+// At 5 m/s.
 std::vector<Scan> drive_slanted(double pitch, double roll) {
-  const Scene scene = yard_with(van(22.0, 3.5, {-12.0, 0.0, 0.0}));
+  const Scene scene = oncoming();
   std::vector<Scan> scans;
   for (int i = 0; i < 10; ++i) {
     Eigen::Isometry3d T_world_sensor = sensor_at(0.5 * i);

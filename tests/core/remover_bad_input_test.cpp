@@ -17,9 +17,7 @@ using Config = DynaInsRemover::Config;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-std::vector<Scan> good_scans() {
-  return drive(yard_with(van(22.0, 3.5, {-12.0, 0.0, 0.0})), 7, 5.0);
-}
+std::vector<Scan> good_scans() { return drive(oncoming(), 7, 5.0); }
 
 std::vector<PointLabel> labels_of(const std::vector<Eigen::Vector3f>& points) {
   DynaInsRemover remover(Config::paper());
@@ -213,7 +211,7 @@ TEST_CASE("any cloud can come between good ones") {
 }
 
 TEST_CASE("a pose that jumps away and back leaves no trace once it is out of the window") {
-  const std::vector<Scan> scans = drive(yard_with(van(22.0, 3.5, {-12.0, 0.0, 0.0})), 9, 0.0);
+  const std::vector<Scan> scans = drive(oncoming(), 9, 0.0);
   const Run expected = run_paper(scans);
   DynaInsRemover remover(Config::paper());
   for (std::size_t s = 0; s < scans.size(); ++s) {

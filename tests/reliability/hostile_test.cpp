@@ -13,8 +13,6 @@ namespace {
 
 using Config = DynaInsRemover::Config;
 
-Scene oncoming() { return yard_with(van(22.0, 3.5, {-12.0, 0.0, 0.0})); }
-
 double dynamic_share(const std::vector<Scan>& scans, const Run& result) {
   return share(scans, result.final, PointLabel::kDynamic).value();
 }
