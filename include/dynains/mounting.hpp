@@ -28,7 +28,8 @@ struct Mounting {
   double tilt() const { return std::acos(std::clamp(up_sensor.z(), -1.0, 1.0)) * 180.0 / M_PI; }
 
   /// The smallest turn that brings the normal of the ground to the z axis: from the frame of the
-  /// sensor to that of one mounted level in its place; half a turn about x if it hangs upside down.
+  /// sensor to that of one mounted level in its place. Of all half turns that do for a normal that
+  /// points straight down, it is the one about x.
   Eigen::Matrix3d R_level_sensor() const {
     // In closed form: that of Eigen, which any two vectors do for, takes seconds to compile.
     constexpr double kTiny = 1e-200;
