@@ -1,6 +1,7 @@
 // Ground segmentation by concentric zones (Patchwork, Lim et al., RA-L 2021), the "off-the-shelf
 // ground segmentation" of the paper: the plane is divided into rings and sectors, each patch gets
-// its own plane, and a patch whose plane is steep, high or rough is not ground.
+// its own plane, and a patch whose plane is steep, high or rough is not ground. Beyond Patchwork,
+// neither is one that lies far over the patches around it: the side of a truck, seen by one beam.
 #pragma once
 
 #include <algorithm>
@@ -14,6 +15,7 @@
 #include "dynains/detail/arc_tangent.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/lowest_mean.hpp"
+#include "dynains/detail/patch_heights.hpp"
 #include "dynains/detail/patch_sort.hpp"
 #include "dynains/detail/plane_fit.hpp"
 #include "dynains/detail/point_record.hpp"
@@ -56,6 +58,9 @@ class GroundSegmenter {
   static constexpr std::size_t kPatches = 2 * 16 + 4 * 32 + 4 * 54 + 4 * 32;
   /// The innermost rings, where height and roughness of a patch are checked.
   static constexpr std::size_t kCheckedRings = 4;
+  /// Patches that are compared with those around them: all but those of the outermost zone, where a
+  /// slope of a few percent is a step from ring to ring.
+  static constexpr std::size_t kSteppedPatches = kPatches - 4 * 32;
   static constexpr int kMaxLowest = 64;
 
   struct Config {
@@ -69,15 +74,17 @@ class GroundSegmenter {
     double ground_distance = 0.125;     ///< m, a ground point lies less than this above the plane
     double ground_uprightness = 0.707;  ///< smallest z of the unit normal
     double ground_below = 0.1;          ///< share of sensor_height below ground taken for noise
+    double ground_step = 0.5;           ///< m, a patch so far over those around it is not ground
     /// Largest height (m over ground) of a patch in the four inner rings, unless it is flat.
     std::array<double, kCheckedRings> ground_elevation = {0.523, 0.7246, 0.872, 1.118};
     /// Largest flatness that lets a patch above that height still be ground.
     std::array<double, kCheckedRings> ground_flatness = {0.0, 1.25e-4, 1.85e-4, 1.85e-4};
 
-    /// The height of KITTI's sensor, given.
+    /// Patchwork as it is, with the height of KITTI's sensor.
     static Config paper() {
       Config config;
       config.sensor_height = 1.723;
+      config.ground_step = 0.0;
       return config;
     }
 
@@ -105,6 +112,9 @@ class GroundSegmenter {
       visitor(Parameter{"ground_below", self.ground_below, closed(0, 10), "",
                         "depth under the ground, as a share of sensor_height, from which points "
                         "of the inner zone do not seed a plane (Patchwork)"});
+      visitor(Parameter{"ground_step", self.ground_step, closed(0, 100), "m",
+                        "a patch that lies more than this over most of the patches around it is "
+                        "not ground, but in the outermost zone; 0: whatever they say"});
       visitor(
           Parameter{"ground_elevation_1", self.ground_elevation[0], closed(-100, 100), "m",
                     "height over ground from which a patch of ring 1 must be flat (Patchwork)"});
@@ -175,7 +185,8 @@ class GroundSegmenter {
 
   /// Splits `scan` (metres, sensor frame, z up, finite coordinates). `input` numbers its points and
   /// is handed on with them. Points outside the rings and points of sparse patches are not ground.
-  /// Order within `split` is by patch, then as scanned.
+  /// Order within `split` is by patch, then as scanned; but where a patch turned out not to be
+  /// ground, the last of the ground take its place.
   void segment(PointsView scan, Span<const std::uint32_t> input, GroundSplit& split) {
     detail::grow(patch_of_, scan.size() + detail::kLanes);
     find_patches(scan);
@@ -185,11 +196,23 @@ class GroundSegmenter {
     detail::run_lanes([&](auto lanes) {
       using Lanes = decltype(lanes);
       Output<Lanes> out(split);
+      // By patch: where its ground begins in the split, and how many points are left of it.
+      std::array<std::size_t, kPatches + 1> begin{};
       std::array<std::size_t, kPatches + 1> rest{};
-      for (std::size_t p = 0; p <= kPatches; ++p) {
-        detail::PointRecord* const records = sorted_.records() + sorted_.begin(p);
-        const std::size_t count = sorted_.end(p) - sorted_.begin(p);
-        rest[p] = p < kPatches ? segment_patch(p, records, count, out) : count;
+      for (std::size_t p = 0; p < kPatches; ++p) {
+        begin[p] = out.count();
+        rest[p] = segment_patch(p, sorted_.records() + sorted_.begin(p), size_of(p), out);
+      }
+      begin[kPatches] = out.count();
+      rest[kPatches] = size_of(kPatches);
+      if (config_.ground_step > 0.0) {
+        // From the last one on, so that what takes the place of a patch is ground for good.
+        for (std::size_t p = kSteppedPatches; p-- > 0;) {
+          const std::size_t found = begin[p + 1] - begin[p];
+          if (found == 0 || !heights_.hangs(p, static_cast<float>(config_.ground_step))) continue;
+          out.take_back(begin[p], found, sorted_.records() + sorted_.begin(p) + rest[p]);
+          rest[p] += found;
+        }
       }
       split.ground_count = out.count();
       for (std::size_t p = 0; p <= kPatches; ++p) {
@@ -217,13 +240,26 @@ class GroundSegmenter {
         : x_(split.points.x.data()),
           y_(split.points.y.data()),
           z_(split.points.z.data()),
-          input_(reinterpret_cast<float*>(split.input.data())) {}
+          input_(split.input.data()) {}
 
     std::size_t count() const { return count_; }
 
     void put(const detail::PointRecord* from, std::size_t count) {
       for (std::size_t i = 0; i < count; i += detail::kLanes) put_eight(from + i, i);
       count_ += count;
+    }
+
+    // The points from `begin` on; the last ones take their place.
+    void take_back(std::size_t begin, std::size_t count, detail::PointRecord* to) {
+      for (std::size_t i = begin; i < begin + count; ++i) {
+        to[i - begin] = {x_[i], y_[i], z_[i], input_[i]};
+      }
+      const std::size_t moved = std::min(count, count_ - (begin + count));
+      for (float* const values : {x_, y_, z_}) {
+        std::copy_n(values + count_ - moved, moved, values + begin);
+      }
+      std::copy_n(input_ + count_ - moved, moved, input_ + begin);
+      count_ -= count;
     }
 
    private:
@@ -233,14 +269,14 @@ class GroundSegmenter {
       columns[0].store(x_ + at);
       columns[1].store(y_ + at);
       columns[2].store(z_ + at);
-      columns[3].store(input_ + at);
+      columns[3].store(reinterpret_cast<float*>(input_) + at);
     }
 
     std::size_t count_ = 0;
     float* const x_;
     float* const y_;
     float* const z_;
-    float* const input_;
+    std::uint32_t* const input_;
   };
 
   void find_patches(PointsView scan) {
@@ -308,6 +344,8 @@ class GroundSegmenter {
     }
   };
 
+  std::size_t size_of(std::size_t patch) const { return sorted_.end(patch) - sorted_.begin(patch); }
+
   // Points of a patch that are ground.
   enum class Found { kNone, kSome, kAll };
 
@@ -315,6 +353,7 @@ class GroundSegmenter {
   template <class Lanes>
   std::size_t segment_patch(std::size_t patch, detail::PointRecord* records, std::size_t count,
                             Output<Lanes>& ground) {
+    heights_.set_none(patch);
     if (count < static_cast<std::size_t>(config_.ground_min_points)) return count;
     lay_out<Lanes>(records, count);
     detail::LowestMean<kMaxLowest, Lanes> lowest(
@@ -365,8 +404,7 @@ class GroundSegmenter {
   // From the points near the seed height, a horizontal half space, to those near the plane. Returns
   // how many of the patch these are if they are ground.
   template <class Lanes>
-  Found fit_ground(std::size_t patch, std::size_t count, float seed_height,
-                   HalfSpace& below) const {
+  Found fit_ground(std::size_t patch, std::size_t count, float seed_height, HalfSpace& below) {
     detail::Plane plane;
     bool is_whole = false;
     for (int i = 0; i < config_.ground_iterations; ++i) {
@@ -383,8 +421,9 @@ class GroundSegmenter {
       is_whole = moments.count == static_cast<double>(count) && contains<Lanes>(below, count);
       if (is_whole) break;
     }
-    return is_ground(patch, plane, seed_height) ? (is_whole ? Found::kAll : Found::kSome)
-                                                : Found::kNone;
+    if (!is_ground(patch, plane, seed_height)) return Found::kNone;
+    heights_.set(patch, static_cast<float>(plane.mean_z + static_cast<double>(seed_height)));
+    return is_whole ? Found::kAll : Found::kSome;
   }
 
   // Of a plane over the seed height; high ones must be flat near the sensor.
@@ -461,6 +500,7 @@ class GroundSegmenter {
   std::vector<std::int32_t> patch_of_;
   detail::PatchSort<kPatches + 1> sorted_;  // the last for points that are in no patch
   PointBuffer patch_;                       // the points of one patch
+  detail::PatchHeights<kPatches> heights_{kRings, kSectors};
 };
 
 }  // namespace dynains

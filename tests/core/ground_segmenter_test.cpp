@@ -127,6 +127,29 @@ TEST_CASE("ground is what Patchwork says for other parameters, too") {
   CHECK(share_of_differences(ground_of(config, scan), reference_ground(config, scan)) < kOnBorders);
 }
 
+// Terraces of a few patches each on a slope.
+TEST_CASE("ground is what the patches around it say, too") {
+  Random random(5);
+  std::vector<double> terrace(13 * 10);
+  for (double& height : terrace) height = random.index(3) == 0 ? random.uniform(0.3, 1.0) : 0.0;
+  PointBuffer scan;
+  for (int i = 0; i < 80000; ++i) {
+    const double range = random.uniform(0.5, 110.0);
+    const double azimuth = random.uniform(-M_PI, M_PI);
+    const double x = range * std::cos(azimuth), y = range * std::sin(azimuth);
+    const auto place = static_cast<std::size_t>((azimuth + M_PI) / 0.5) * 10 +
+                       static_cast<std::size_t>(range / 11.5);
+    scan.push_back(static_cast<float>(x), static_cast<float>(y),
+                   static_cast<float>(-kSensorHeight + 0.02 * x + terrace[place]));
+  }
+  Config config = Config::paper();
+  const std::vector<bool> patchwork = ground_of(config, scan);
+  config.ground_step = 0.5;
+  const std::vector<bool> expected = reference_ground(config, scan);
+  REQUIRE(share_of_differences(patchwork, expected) > 10 * kOnBorders);
+  CHECK(share_of_differences(ground_of(config, scan), expected) < kOnBorders);
+}
+
 TEST_CASE("a flat floor is ground, pillars and vans are not") {
   const Scan scan = yard_with(van(10.0, 3.0)).scan(sensor_at(0.0), 0.0);
   const std::vector<bool> ground = ground_of(Config(), buffer_of(scan.points));
@@ -198,6 +221,51 @@ TEST_CASE("a patch over ground_elevation is ground only if it is flat") {
   CHECK_FALSE(ground_of(config, rough)[0]);
   config.ground_flatness[1] = 0.1;
   CHECK(ground_of(config, rough)[0]);
+}
+
+// Forty points in the middle of a patch of the third or the fourth zone, `lift` over a floor that
+// rises along x.
+void add_patch(int zone, int ring, int sector, double lift, double slope, PointBuffer& points) {
+  const double range = zone == 2 ? 25.75 + 6.1875 * (ring + 0.5) : 50.5 + 12.375 * (ring + 0.5);
+  const double azimuth = 2.0 * M_PI / (zone == 2 ? 54.0 : 32.0) * (sector + 0.5) - M_PI;
+  for (int i = 0; i < 40; ++i) {
+    const double x = range * std::cos(azimuth) + 0.1 * (i % 7);
+    const double y = range * std::sin(azimuth) + 0.1 * (i / 7);
+    points.push_back(static_cast<float>(x), static_cast<float>(y),
+                     static_cast<float>(-kSensorHeight + lift + slope * x));
+  }
+}
+
+TEST_CASE("a patch more than ground_step over most of those around it is not ground") {
+  const auto is_ground = [](double lift, double slope, int first_ring, double step = 0.5,
+                            int zone = 2) {
+    PointBuffer points;
+    add_patch(zone, 1, 20, lift, slope, points);
+    for (int ring = first_ring; ring <= 2; ++ring) {
+      for (const int sector : {19, 20, 21}) {
+        if (ring != 1 || sector != 20) add_patch(zone, ring, sector, 0.0, slope, points);
+      }
+    }
+    Config config;
+    config.ground_step = step;
+    const std::vector<bool> ground = ground_of(config, points);
+    CHECK(std::count(ground.begin() + 40, ground.end(), true) ==
+          static_cast<std::ptrdiff_t>(ground.size() - 40));
+    return ground[0];
+  };
+  CHECK(is_ground(0.49, 0.0, 0));
+  CHECK_FALSE(is_ground(0.51, 0.0, 0));
+  CHECK(is_ground(0.51, 0.0, 0, 0.52));
+  CHECK(is_ground(0.51, 0.0, 0, 0.0));
+  // What lies low is ground.
+  CHECK(is_ground(-3.0, 0.0, 0));
+  // On a slope of 10 %, patches around it lie up to 0.7 m lower, as many as higher.
+  CHECK(is_ground(0.0, 0.1, 0));
+  CHECK_FALSE(is_ground(1.2, 0.1, 0));
+  // Three patches around it say nothing.
+  CHECK(is_ground(1.0, 0.0, 2));
+  // In the outermost zone, they are too far apart.
+  CHECK(is_ground(1.0, 0.0, 0, 0.5, 3));
 }
 
 TEST_CASE("points outside the rings are not ground") {

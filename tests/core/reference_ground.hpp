@@ -1,4 +1,5 @@
 // Patchwork word for word, slow: double precision, libm, sorting and Eigen's eigenvalue solver.
+// Then what goes beyond it: patches that lie far over those around them.
 #pragma once
 
 #include <Eigen/Dense>
@@ -20,11 +21,14 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
   const double edges[5] = {inner, (7 * inner + outer) / 8, (3 * inner + outer) / 4,
                            (inner + outer) / 2, outer};
   struct Patch {
-    bool is_innermost_zone;
-    std::size_t ring;  // counted from the inside over all zones
+    bool is_innermost_zone = false;
+    std::size_t ring = 0;  // counted from the inside over all zones
     std::vector<std::size_t> points;
+    bool is_ground = false;
+    double height = 0.0;  // of its ground
+    std::vector<std::size_t> members;
   };
-  std::map<std::vector<int>, Patch> patches;
+  std::map<std::vector<int>, Patch> patches;  // by zone, ring in it and sector
   for (std::size_t i = 0; i < scan.size(); ++i) {
     const double range = std::hypot(scan.x[i], scan.y[i]);
     if (range < inner || range > outer) continue;
@@ -48,9 +52,8 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
     patch.points.push_back(i);
   }
 
-  std::vector<bool> result(scan.size(), false);
   const double h = config.sensor_height;
-  for (const auto& [key, patch] : patches) {
+  for (auto& [key, patch] : patches) {
     if (patch.points.size() < static_cast<std::size_t>(config.ground_min_points)) continue;
     const auto point = [&](std::size_t i) {
       return Eigen::Vector3d(scan.x[i], scan.y[i], scan.z[i]);
@@ -105,7 +108,52 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
         continue;
       }
     }
-    for (const std::size_t i : members) result[i] = true;
+    patch.is_ground = true;
+    patch.height = mean.z();
+    patch.members = members;
+  }
+
+  // Patches beside one of a ring, or in the next rings where its middle is, and those beside these.
+  const auto heights_around = [&](const std::vector<int>& key) {
+    const int zone = key[0], ring = key[1], sector = key[2];
+    std::vector<double> heights;
+    const auto add = [&](int z, int r, int s) {
+      const int sectors = GroundSegmenter::kSectors[static_cast<std::size_t>(z)];
+      const auto found = patches.find({z, r, (s + sectors) % sectors});
+      if (found != patches.end() && found->second.is_ground)
+        heights.push_back(found->second.height);
+    };
+    const auto add_beside = [&](int z, int r) {
+      const double share =
+          (sector + 0.5) / GroundSegmenter::kSectors[static_cast<std::size_t>(zone)];
+      const int s =
+          static_cast<int>(share * GroundSegmenter::kSectors[static_cast<std::size_t>(z)]);
+      for (const int step : {-1, 0, 1}) add(z, r, s + step);
+    };
+    const auto rings = [](int z) { return GroundSegmenter::kRings[static_cast<std::size_t>(z)]; };
+    add(zone, ring, sector - 1);
+    add(zone, ring, sector + 1);
+    if (ring > 0) {
+      add_beside(zone, ring - 1);
+    } else if (zone > 0) {
+      add_beside(zone - 1, rings(zone - 1) - 1);
+    }
+    if (ring + 1 < rings(zone)) {
+      add_beside(zone, ring + 1);
+    } else if (zone < 3) {
+      add_beside(zone + 1, 0);
+    }
+    return heights;
+  };
+  std::vector<bool> result(scan.size(), false);
+  for (const auto& [key, patch] : patches) {
+    if (!patch.is_ground) continue;
+    std::vector<double> heights = heights_around(key);
+    std::sort(heights.begin(), heights.end());
+    const bool hangs = config.ground_step > 0.0 && key[0] < 3 && heights.size() >= 4 &&
+                       heights[heights.size() / 2] < patch.height - config.ground_step;
+    if (hangs) continue;
+    for (const std::size_t i : patch.members) result[i] = true;
   }
   return result;
 }
