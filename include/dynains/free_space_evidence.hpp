@@ -9,7 +9,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <vector>
 
@@ -77,6 +76,8 @@ class FreeSpaceEvidence {
   /// called before the first scan, and again once more is known of the sensor.
   void adapt(const SensorModel& sensor) {
     grid_ = RangeImageGrid::for_sensor(sensor);
+    // The next beam over one that ended at the foot of something may be the first to hit it.
+    clearance_.slope = static_cast<float>(std::tan(sensor.elevation_gap_wide * M_PI / 180.0));
     R_beams_level_.reset();
     if (!sensor.is_level()) R_beams_level_ = sensor.R_level_headed.transpose();
   }
@@ -558,15 +559,14 @@ class FreeSpaceEvidence {
       moved_ground_.push_back(
           {static_cast<std::uint32_t>(point), {cause, static_cast<float>(config_.tau_free)}});
     };
-    const float clearance =
-        config_.footprint > 0.0 ? kClearance : -std::numeric_limits<float>::infinity();
     tested_points_.grow(ground.size());
     detail::make_room(tested_blocks_, record.ground_boxes.size());
     tested_blocks_.clear();
     tested_ = 0;
     const bool tests = config_.ground_reach > 0.0;
-    footprint_.visit_near(ground, record.ground_boxes, clearance,
-                          [&](std::size_t begin, std::uint64_t near, std::uint64_t under) {
+    footprint_.visit_near(ground, record.ground_boxes, clearance_,
+                          [&](std::size_t begin, std::uint64_t near, std::uint64_t below) {
+                            const std::uint64_t under = config_.footprint > 0.0 ? below : 0;
                             detail::for_each_bit(under, [&](std::size_t i) {
                               remove(begin + i, Cause::kUnderInstance);
                             });
@@ -648,7 +648,6 @@ class FreeSpaceEvidence {
   static constexpr float kLeastKnown = 0.3F;  // share of an instance, to speak of standing still
   static constexpr float kContradictingHits = 0.85F;  // of what is seen of an instance
   static constexpr float kStillShare = 0.02F;    // moved share of the known below which it stands
-  static constexpr float kClearance = 0.4F;      // m between ground and what stands on it
   static constexpr std::size_t kLeastGroup = 2;  // supervoxels that go without the rest
   static constexpr std::size_t kLeastGroupSamples = 4;  // and their samples
   static constexpr double kDefaultCell = 0.2;           // m, of the footprint if it is off
@@ -669,6 +668,7 @@ class FreeSpaceEvidence {
   InstanceLinker linker_;
   TrackBelief track_belief_;
   RangeImageGrid grid_;
+  Clearance clearance_ = {0.4F, 0.0F};            // between ground and what stands on it
   std::optional<Eigen::Matrix3d> R_beams_level_;  // of a sensor that is tilted
   PointBuffer turned_ground_;
   PointBuffer turned_rest_;

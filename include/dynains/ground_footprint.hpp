@@ -16,6 +16,13 @@
 
 namespace dynains {
 
+/// How far what stands on the ground may begin over it: `least` (m), and `slope` (m per metre of
+/// horizontal range) where the beams of a sensor are wider apart.
+struct Clearance {
+  float least;
+  float slope;
+};
+
 /// Where in the grids of a footprint some points lie: their first and last columns and rows.
 struct GroundBox {
   struct Range {
@@ -110,10 +117,10 @@ class GroundFootprint {
 
   /// Calls `visit(begin, near, under)` for up to 64 points from `begin` on at a time, a bit each:
   /// those near a removed point (and some at the border of the grid), and which of these lie under
-  /// one, less than `clearance` (m) below the lowest that was removed about there. `boxes`: of
+  /// one, less than `clearance` below the lowest that was removed about there. `boxes`: of
   /// bound().
   template <class Visitor>
-  void visit_near(PointsView points, Span<const GroundBox> boxes, float clearance,
+  void visit_near(PointsView points, Span<const GroundBox> boxes, const Clearance& clearance,
                   Visitor&& visit) const {
     for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
       const Share share = share_near(boxes[begin / kBlock]);
@@ -296,13 +303,22 @@ class GroundFootprint {
   }
 
   // Which points of a block lie under something removed.
-  std::uint64_t find_under(PointsView block, float clearance) const {
+  std::uint64_t find_under(PointsView block, const Clearance& clearance) const {
     const Located located = locate(block);
+    float top[kBlock];
+    const detail::Constant8 least(clearance.least), slope(clearance.slope);
+    detail::for_lanes(block.size(), [&](auto at) {
+      using Float = typename decltype(at)::Float;
+      const Float x = at.load(block.x.data());
+      const Float y = at.load(block.y.data());
+      const Float gap = sqrt(x * x + y * y) * slope;
+      (at.load(block.z.data()) + max(gap, Float(least))).store(&top[at.begin]);
+    });
     std::uint64_t under = 0;
     for (std::size_t i = 0; i < block.size(); ++i) {
       const Tile& tile = tiles_[tile_of_[static_cast<std::size_t>(located.tile[i])]];
       const float lowest = tile[static_cast<std::size_t>(located.cell[i])].lowest;
-      under |= std::uint64_t{lowest < block.z[i] + clearance} << i;
+      under |= std::uint64_t{lowest < top[i]} << i;
     }
     return under & located.inside;
   }
