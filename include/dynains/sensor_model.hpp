@@ -79,8 +79,8 @@ inline SensorModel estimate_sensor_model(PointsView points) {
   model.elevation_min = percentile(sorted, 0.0005);
   model.elevation_max = percentile(sorted, 0.9995);
 
-  // Gaps between neighbours within thin bands across the wanted direction; steps below a hundredth
-  // of a degree are the same beam twice.
+  // Gaps between neighbours within thin bands across the wanted direction, in as many bands as hold
+  // a quarter of the points; steps below a hundredth of a degree are the same beam twice.
   const auto gaps_within = [&](const std::vector<float>& across, const std::vector<float>& along,
                                double band, double smallest) {
     // Counting sort by band: angles lie within a half turn on either side.
@@ -93,9 +93,13 @@ inline SensorModel estimate_sensor_model(PointsView points) {
     std::vector<float> by_band(along.size());
     std::vector<std::size_t> next = begin;
     for (std::size_t i = 0; i < along.size(); ++i) by_band[next[band_of(across[i])]++] = along[i];
+    constexpr std::size_t kOneOf = 4;
+    std::size_t looked_at = 0;
     std::vector<float> gaps;
     gaps.reserve(along.size());
     for (std::size_t i = 0; i + 1 < begin.size(); ++i) {
+      if (looked_at * kOneOf > begin[i]) continue;
+      looked_at += begin[i + 1] - begin[i];
       std::sort(&by_band[0] + begin[i], &by_band[0] + begin[i + 1]);
       for (std::size_t k = begin[i] + 1; k < begin[i + 1]; ++k) {
         const float gap = by_band[k] - by_band[k - 1];
