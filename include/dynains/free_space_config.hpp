@@ -16,7 +16,7 @@ struct FreeSpaceConfig {
   double ground_sample = 0.8;    ///< m, one sample per voxel of ground beside removed instances
   double ground_reach = 2.0;     ///< m, ground this near to removed points is tested
   double margin = 0.25;          ///< m, a beam passes if it goes this much farther ...
-  double margin_slope = 0.01;    ///< ... plus this share of the range
+  double margin_slope = 0.0075;  ///< ... plus this share of the range
   double lateral_margin = 0.05;  ///< m, returns protect what is this near beside them
   double p_free = 0.7;           ///< update probability of a reference that sees through
   double p_hit = 0.155;          ///< update probability of a reference that hits
@@ -27,9 +27,9 @@ struct FreeSpaceConfig {
   double see_share = 0.6;        ///< share of an instance that one reference must see through
   double footprint = 0.2;        ///< m, ground this near to removed points goes with them
   bool use_tracks = true;        ///< carry beliefs along instances that overlap from scan to scan
-  double tau_track = 0.75;       ///< belief along its track from which an instance moved
+  double tau_track = 0.85;       ///< belief along its track from which an instance moved
   double still_weight = 0.1;     ///< of an increment, for a scan in which an instance stood still
-  double track_cell = 0.8;       ///< m, cells whose overlap links instances
+  double track_cell = 1.2;       ///< m, cells whose overlap links instances
   double track_overlap = 0.25;   ///< shared cells over all cells from which two are the same
   double track_length = 18.0;    ///< m, longer instances are not carried
   double track_height = 4.5;     ///< m, higher instances are not carried
