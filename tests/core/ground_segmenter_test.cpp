@@ -237,35 +237,47 @@ void add_patch(int zone, int ring, int sector, double lift, double slope, PointB
 }
 
 TEST_CASE("a patch more than ground_step over most of those around it is not ground") {
-  const auto is_ground = [](double lift, double slope, int first_ring, double step = 0.5,
-                            int zone = 2) {
+  struct Scene {
+    double lift;  // of the patch in the middle
+    double slope = 0.0;
+    double step = 0.5;
+    std::size_t around = 8;  // patches around it
+    std::size_t low = 8;     // of these, as many lie on the floor, and the others as high as it
+    int zone = 2;
+  };
+  const auto is_ground = [](const Scene& scene) {
+    constexpr int kAround[8][2] = {{2, 19}, {2, 20}, {2, 21}, {1, 19},
+                                   {1, 21}, {0, 19}, {0, 20}, {0, 21}};  // ring, sector
     PointBuffer points;
-    add_patch(zone, 1, 20, lift, slope, points);
-    for (int ring = first_ring; ring <= 2; ++ring) {
-      for (const int sector : {19, 20, 21}) {
-        if (ring != 1 || sector != 20) add_patch(zone, ring, sector, 0.0, slope, points);
-      }
+    add_patch(scene.zone, 1, 20, scene.lift, scene.slope, points);
+    for (std::size_t i = 0; i < scene.around; ++i) {
+      const double lift = i < scene.low ? 0.0 : scene.lift;
+      add_patch(scene.zone, kAround[i][0], kAround[i][1], lift, scene.slope, points);
     }
     Config config;
-    config.ground_step = step;
+    config.ground_step = scene.step;
     const std::vector<bool> ground = ground_of(config, points);
     CHECK(std::count(ground.begin() + 40, ground.end(), true) ==
           static_cast<std::ptrdiff_t>(ground.size() - 40));
     return ground[0];
   };
-  CHECK(is_ground(0.49, 0.0, 0));
-  CHECK_FALSE(is_ground(0.51, 0.0, 0));
-  CHECK(is_ground(0.51, 0.0, 0, 0.52));
-  CHECK(is_ground(0.51, 0.0, 0, 0.0));
+  CHECK(is_ground({0.49}));
+  CHECK_FALSE(is_ground({0.51}));
+  CHECK(is_ground({0.51, 0.0, 0.52}));
+  CHECK(is_ground({0.51, 0.0, 0.0}));
   // What lies low is ground.
-  CHECK(is_ground(-3.0, 0.0, 0));
+  CHECK(is_ground({-3.0}));
   // On a slope of 10 %, patches around it lie up to 0.7 m lower, as many as higher.
-  CHECK(is_ground(0.0, 0.1, 0));
-  CHECK_FALSE(is_ground(1.2, 0.1, 0));
+  CHECK(is_ground({0.0, 0.1}));
+  CHECK_FALSE(is_ground({1.2, 0.1}));
+  // Half of them are not most of them.
+  CHECK(is_ground({1.0, 0.0, 0.5, 8, 4}));
+  CHECK_FALSE(is_ground({1.0, 0.0, 0.5, 8, 5}));
   // Three patches around it say nothing.
-  CHECK(is_ground(1.0, 0.0, 2));
+  CHECK(is_ground({1.0, 0.0, 0.5, 3}));
+  CHECK_FALSE(is_ground({1.0, 0.0, 0.5, 4}));
   // In the outermost zone, they are too far apart.
-  CHECK(is_ground(1.0, 0.0, 0, 0.5, 3));
+  CHECK(is_ground({1.0, 0.0, 0.5, 8, 8, 3}));
 }
 
 TEST_CASE("points outside the rings are not ground") {
