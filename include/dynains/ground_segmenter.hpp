@@ -60,7 +60,8 @@ class GroundSegmenter {
   static constexpr std::size_t kCheckedRings = 4;
   /// Patches that are compared with those around them: all but those of the outermost zone, where a
   /// slope of a few percent is a step from ring to ring.
-  static constexpr std::size_t kSteppedPatches = kPatches - 4 * 32;
+  static constexpr std::size_t kSteppedPatches =
+      kPatches - static_cast<std::size_t>(kRings.back() * kSectors.back());
   static constexpr int kMaxLowest = 64;
 
   struct Config {
@@ -192,28 +193,21 @@ class GroundSegmenter {
     find_patches(scan);
     sorted_.sort(scan, input.data(), patch_of_.data());
     patch_.grow(scan.size() + detail::kLanes);
+    heights_.clear();
     split.resize(scan.size());
     detail::run_lanes([&](auto lanes) {
       using Lanes = decltype(lanes);
       Output<Lanes> out(split);
       // By patch: where its ground begins in the split, and how many points are left of it.
-      std::array<std::size_t, kPatches + 1> begin{};
-      std::array<std::size_t, kPatches + 1> rest{};
+      PatchCounts begin{};
+      PatchCounts rest{};
       for (std::size_t p = 0; p < kPatches; ++p) {
         begin[p] = out.count();
         rest[p] = segment_patch(p, sorted_.records() + sorted_.begin(p), size_of(p), out);
       }
       begin[kPatches] = out.count();
       rest[kPatches] = size_of(kPatches);
-      if (config_.ground_step > 0.0) {
-        // From the last one on, so that what takes the place of a patch is ground for good.
-        for (std::size_t p = kSteppedPatches; p-- > 0;) {
-          const std::size_t found = begin[p + 1] - begin[p];
-          if (found == 0 || !heights_.hangs(p, static_cast<float>(config_.ground_step))) continue;
-          out.take_back(begin[p], found, sorted_.records() + sorted_.begin(p) + rest[p]);
-          rest[p] += found;
-        }
-      }
+      if (config_.ground_step > 0.0) take_back_hanging(begin, rest, out);
       split.ground_count = out.count();
       for (std::size_t p = 0; p <= kPatches; ++p) {
         out.put(sorted_.records() + sorted_.begin(p), rest[p]);
@@ -344,7 +338,22 @@ class GroundSegmenter {
     }
   };
 
+  using PatchCounts = std::array<std::size_t, kPatches + 1>;
+
   std::size_t size_of(std::size_t patch) const { return sorted_.end(patch) - sorted_.begin(patch); }
+
+  // Ground that hangs goes back to the rest of its patch. From the last one on, so that what takes
+  // the place of a patch is ground for good.
+  template <class Lanes>
+  void take_back_hanging(const PatchCounts& begin, PatchCounts& rest, Output<Lanes>& ground) {
+    const auto step = static_cast<float>(config_.ground_step);
+    for (std::size_t p = kSteppedPatches; p-- > 0;) {
+      const std::size_t found = begin[p + 1] - begin[p];
+      if (found == 0 || !heights_.hangs(p, step)) continue;
+      ground.take_back(begin[p], found, sorted_.records() + sorted_.begin(p) + rest[p]);
+      rest[p] += found;
+    }
+  }
 
   // Points of a patch that are ground.
   enum class Found { kNone, kSome, kAll };
@@ -353,7 +362,6 @@ class GroundSegmenter {
   template <class Lanes>
   std::size_t segment_patch(std::size_t patch, detail::PointRecord* records, std::size_t count,
                             Output<Lanes>& ground) {
-    heights_.set_none(patch);
     if (count < static_cast<std::size_t>(config_.ground_min_points)) return count;
     lay_out<Lanes>(records, count);
     detail::LowestMean<kMaxLowest, Lanes> lowest(

@@ -114,23 +114,20 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
   }
 
   // Patches beside one of a ring, or in the next rings where its middle is, and those beside these.
+  const auto rings = [](int z) { return GroundSegmenter::kRings[static_cast<std::size_t>(z)]; };
+  const auto sectors = [](int z) { return GroundSegmenter::kSectors[static_cast<std::size_t>(z)]; };
   const auto heights_around = [&](const std::vector<int>& key) {
     const int zone = key[0], ring = key[1], sector = key[2];
     std::vector<double> heights;
     const auto add = [&](int z, int r, int s) {
-      const int sectors = GroundSegmenter::kSectors[static_cast<std::size_t>(z)];
-      const auto found = patches.find({z, r, (s + sectors) % sectors});
-      if (found != patches.end() && found->second.is_ground)
-        heights.push_back(found->second.height);
+      const auto found = patches.find({z, r, (s + sectors(z)) % sectors(z)});
+      if (found == patches.end() || !found->second.is_ground) return;
+      heights.push_back(found->second.height);
     };
     const auto add_beside = [&](int z, int r) {
-      const double share =
-          (sector + 0.5) / GroundSegmenter::kSectors[static_cast<std::size_t>(zone)];
-      const int s =
-          static_cast<int>(share * GroundSegmenter::kSectors[static_cast<std::size_t>(z)]);
+      const int s = static_cast<int>((sector + 0.5) / sectors(zone) * sectors(z));
       for (const int step : {-1, 0, 1}) add(z, r, s + step);
     };
-    const auto rings = [](int z) { return GroundSegmenter::kRings[static_cast<std::size_t>(z)]; };
     add(zone, ring, sector - 1);
     add(zone, ring, sector + 1);
     if (ring > 0) {

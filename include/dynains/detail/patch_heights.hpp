@@ -27,7 +27,7 @@ class PatchHeights {
         first += sectors[zone];
       }
     }
-    heights_.fill(kNone);
+    clear();
     for (std::size_t ring = 0; ring < all.size(); ++ring) {
       for (std::int32_t sector = 0; sector < all[ring].sectors; ++sector) {
         Around& around = around_[all[ring].patch(sector)];
@@ -44,9 +44,9 @@ class PatchHeights {
     }
   }
 
-  /// Both set what is known of a patch in this scan.
+  /// Nothing is known of any patch.
+  void clear() { heights_.fill(kNone); }
   void set(std::size_t patch, float height) { heights_[patch] = height; }
-  void set_none(std::size_t patch) { heights_[patch] = kNone; }
 
   /// Whether a patch lies more than `step` (m) over most of the patches around it: those beside it
   /// in its ring, and three in each of the next rings. On a slope, as many are higher as are lower.
