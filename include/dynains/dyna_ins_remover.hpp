@@ -140,6 +140,14 @@ class BasicDynaInsRemover {
       if (!kRevisable) {
         throw ConfigError("MapRevision.revise_map = true needs a map that is kept in memory");
       }
+      // A reference must not count twice.
+      detail::call_if_there(evidence, [this](const auto& e) -> decltype(void(e.reference_step)) {
+        if (revision.revision_period >= e.reference_step) return;
+        throw ConfigError("MapRevision.revision_period = " +
+                          std::to_string(revision.revision_period) +
+                          " must not be below FreeSpaceEvidence.reference_step = " +
+                          std::to_string(e.reference_step));
+      });
     }
   };
 

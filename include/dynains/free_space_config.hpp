@@ -10,9 +10,11 @@ namespace dynains {
 struct FreeSpaceConfig {
   int horizon = 30;              ///< scans until the final verdict
   int memory = 100;              ///< scans back that still give evidence
+  int reference_step = 2;        ///< scans from one that gives evidence to the next
   double evidence_range = 80.0;  ///< m, horizontal; points beyond are not tested
   double sample_size = 0.3;      ///< m, one sample per voxel of an instance
   double supervoxel = 0.6;       ///< m, samples that share a belief
+  int supervoxel_samples = 4;    ///< samples of a supervoxel at most
   double ground_sample = 0.8;    ///< m, one sample per voxel of ground beside removed instances
   double ground_reach = 2.0;     ///< m, ground this near to removed points is tested
   double margin = 0.25;          ///< m, a beam passes if it goes this much farther ...
@@ -27,7 +29,7 @@ struct FreeSpaceConfig {
   double see_share = 0.6;        ///< share of an instance that one reference must see through
   double footprint = 0.2;        ///< m, ground this near to removed points goes with them
   bool use_tracks = true;        ///< carry beliefs along instances that overlap from scan to scan
-  double tau_track = 0.85;       ///< belief along its track from which an instance moved
+  double tau_track = 0.9;        ///< belief along its track from which an instance moved
   double still_weight = 0.1;     ///< of an increment, for a scan in which an instance stood still
   double track_cell = 1.2;       ///< m, cells whose overlap links instances
   double track_overlap = 0.25;   ///< shared cells over all cells from which two are the same
@@ -41,12 +43,16 @@ struct FreeSpaceConfig {
                       "scans until a verdict is final"});
     visitor(Parameter{"memory", self.memory, closed(0, 200), "scans",
                       "scans back that still give evidence"});
+    visitor(Parameter{"reference_step", self.reference_step, closed(1, 10), "scans",
+                      "one of so many scans is kept as a reference that gives evidence on others"});
     visitor(Parameter{"evidence_range", self.evidence_range, closed(5, 300), "m",
                       "points farther away (horizontally) are not tested for free space"});
     visitor(Parameter{"sample_size", self.sample_size, closed(0.05, 2), "m",
                       "one sample per voxel of this size and instance"});
     visitor(Parameter{"supervoxel", self.supervoxel, closed(0.1, 5), "m",
                       "samples in one voxel of this size share a belief"});
+    visitor(Parameter{"supervoxel_samples", self.supervoxel_samples, closed(1, 1000), "",
+                      "samples of a supervoxel at most; beyond, they say little that is new"});
     visitor(Parameter{"ground_sample", self.ground_sample, closed(0.05, 2), "m",
                       "one ground sample per voxel of this size"});
     visitor(Parameter{"ground_reach", self.ground_reach, closed(0, 10), "m",

@@ -5,7 +5,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -27,6 +26,7 @@
 #include "dynains/instance_tracks.hpp"
 #include "dynains/points.hpp"
 #include "dynains/range_image.hpp"
+#include "dynains/reference_lags.hpp"
 #include "dynains/sensor_model.hpp"
 #include "dynains/supervoxel_groups.hpp"
 
@@ -43,17 +43,14 @@ class FreeSpaceEvidence {
  public:
   using Config = FreeSpaceConfig;
 
-  /// Scans back and ahead that are looked at: dense near the scan, sparse far from it.
-  static constexpr std::array<int, 19> kLags = {2,  4,  6,  8,  10,  13,  16,  20,  25, 30,
-                                                40, 50, 65, 80, 100, 125, 150, 175, 200};
-
   FreeSpaceEvidence() : FreeSpaceEvidence(Config()) {}
 
   /// Throws ConfigError.
   explicit FreeSpaceEvidence(const Config& config)
       : config_((config.validate(), config)),
-        sampler_(config.sample_size, config.supervoxel, config.evidence_range),
-        ground_sampler_(config.ground_sample, config.ground_sample, config.evidence_range),
+        sampler_(config.sample_size, config.supervoxel, config.evidence_range,
+                 static_cast<std::uint32_t>(config.supervoxel_samples)),
+        ground_sampler_(config.ground_sample, config.ground_sample, config.evidence_range, 1),
         footprint_(config.footprint > 0.0 ? std::max(config.footprint, 0.05) : kDefaultCell,
                    std::max({config.ground_reach, config.footprint, 0.5}), config.evidence_range),
         sum_(config.p_free, config.p_hit),
@@ -64,8 +61,16 @@ class FreeSpaceEvidence {
         hull_(2.0 * std::max(config.footprint, 0.05)),
         linker_(config.track_cell, config.track_length, config.track_height, config.track_overlap),
         track_belief_(static_cast<float>(log_odds(config.p_free))),
-        views_(static_cast<std::size_t>(std::max(config.memory, config.horizon)) + 1),
-        records_(static_cast<std::size_t>(config.horizon) + 2) {}
+        step_(static_cast<std::uint64_t>(config.reference_step)),
+        views_(static_cast<std::size_t>(std::max(config.memory, config.horizon)) / step_ + 1),
+        records_(static_cast<std::size_t>(config.horizon) + 2) {
+    const int step = config.reference_step;
+    for (int phase = 0; phase < step; ++phase) {
+      const auto turn = static_cast<int>(turn_of(static_cast<std::uint64_t>(phase)));
+      before_.push_back(reference_lags(config.memory, phase, step));
+      after_.push_back(reference_lags(config.horizon - turn, step - phase, step));
+    }
+  }
 
   const Config& config() const { return config_; }
 
@@ -90,7 +95,7 @@ class FreeSpaceEvidence {
   /// Gets the memory of images for that many scans of the sensor that adapt() was told, or for as
   /// many as are ever kept.
   void reserve(std::size_t scans) {
-    const std::size_t images = grid_.rows > 0 ? std::min(scans, views_.size()) : 0;
+    const std::size_t images = grid_.rows > 0 ? std::min(scans / step_ + 1, views_.size()) : 0;
     for (std::size_t i = 0; i < images; ++i) views_[i].image.reserve(grid_);
   }
 
@@ -101,19 +106,17 @@ class FreeSpaceEvidence {
                const GroundSplit& split, Span<const std::uint32_t> instance_of,
                std::size_t instance_count) {
     newest_ = scan;
-    View& view = views_[scan % views_.size()];
-    if (scan == 0 || views_[(scan - 1) % views_.size()].segment != segment) {
+    if (scan == 0 || record_of(scan - 1).segment != segment) {
       origin_ = T_world_sensor.translation();
       segment_begin_ = scan;
     }
-    view.segment = segment;
     Record& record = record_of(scan);
     record.segment = segment;
     record.T_world_sensor = T_world_sensor;
     // Points that were sampled are at hand when the image is made.
     footprint_.bound(split.ground(), record.ground_boxes);
     sampler_.sample(split.non_ground(), instance_of, instance_count, record.samples);
-    make_image(T_world_sensor, split, view);
+    if (scan % step_ == 0) make_image(scan, segment, T_world_sensor, split);
     record.beliefs.assign(record.samples.supervoxel_count(), Belief());
     record.wholes.assign(instance_count, Belief());
     record.changed.assign(instance_count, 1);
@@ -125,11 +128,12 @@ class FreeSpaceEvidence {
     predecessors_.assign(instance_count, kNoCluster);
     if (config_.use_tracks) track(scan, record);
 
-    for (const int lag : kLags) {
+    const std::uint64_t phase = scan % step_;
+    for (const int lag : before_[phase]) {
       const auto back = static_cast<std::uint64_t>(lag);
-      if (lag > config_.memory || back > scan) break;
-      const View& reference = views_[(scan - back) % views_.size()];
-      if (reference.segment == segment) refer(record, reference, -lag);
+      if (back > scan) break;
+      const View* const reference = view_of(scan - back, segment);
+      if (reference != nullptr) refer(record, *reference, -lag);
     }
     // What follows is summed apart from what was before.
     for (std::uint32_t s = 0; s < record.beliefs.size(); ++s) {
@@ -139,13 +143,10 @@ class FreeSpaceEvidence {
     }
     for (Belief& belief : record.wholes) belief.level = 0.0F;
     weigh(record);
-    for (const int lag : kLags) {
-      const auto back = static_cast<std::uint64_t>(lag);
-      if (lag > config_.horizon || back > scan) break;
-      Record& older = record_of(scan - back);
-      if (older.segment != segment) continue;
-      refer(older, view, lag);
-      weigh(older);
+    if (const View* const image = view_of(scan - phase, segment)) {
+      for (std::uint64_t older = 0; older < step_; ++older) {
+        if (turn_of(older) == phase) refer_older(scan - phase, older, *image);
+      }
     }
     if (config_.use_tracks) run_beliefs(scan);
   }
@@ -172,10 +173,11 @@ class FreeSpaceEvidence {
     return {groups_of_points_, samples.met_of, moved_ground_};
   }
 
-  /// What the scan observed last saw of the first `count` points (m; padded for wide loads).
+  /// What the newest reference, one of the last `reference_step` scans, saw of the first `count`
+  /// points (m; padded for wide loads).
   const detail::Sights& see(const PointBuffer& points, std::size_t count,
                             const Eigen::Isometry3d& T_world_points) {
-    look(points, count, T_world_points, views_[newest_ % views_.size()]);
+    look(points, count, T_world_points, views_[newest_ / step_ % views_.size()]);
     return sights_;
   }
 
@@ -196,6 +198,7 @@ class FreeSpaceEvidence {
     std::uint32_t decided = 0;  // in supervoxels of which anything is known
   };
   struct View {
+    std::uint64_t scan = 0;
     std::uint64_t segment = kNoSegment;
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
     RangeImage image;
@@ -222,7 +225,11 @@ class FreeSpaceEvidence {
   static constexpr std::uint64_t kNoSegment = ~std::uint64_t{0};
 
   // Beams are rows of an image only in the frame of the sensor, tilted as it is.
-  void make_image(const Eigen::Isometry3d& T_world_level, const GroundSplit& split, View& view) {
+  void make_image(std::uint64_t scan, std::uint64_t segment, const Eigen::Isometry3d& T_world_level,
+                  const GroundSplit& split) {
+    View& view = views_[scan / step_ % views_.size()];
+    view.scan = scan;
+    view.segment = segment;
     const auto reach = static_cast<float>(config_.lateral_margin);
     view.T_world_sensor = T_world_level;
     if (!R_beams_level_) {
@@ -234,6 +241,12 @@ class FreeSpaceEvidence {
     const PointsView ground = detail::turn(split.ground(), R, turned_ground_);
     const PointsView rest = detail::turn(split.non_ground(), R, turned_rest_);
     view.image.build(grid_, ground, rest, reach, image_scratch_);
+  }
+
+  // The image of a scan; null if there is none, or if it is of another segment.
+  const View* view_of(std::uint64_t scan, std::uint64_t segment) const {
+    const View& view = views_[scan / step_ % views_.size()];
+    return view.scan == scan && view.segment == segment ? &view : nullptr;
   }
 
   Record& record_of(std::uint64_t scan) { return records_[scan % records_.size()]; }
@@ -255,6 +268,23 @@ class FreeSpaceEvidence {
       update_supervoxels(record);
       update_wholes(record, lag);
     });
+  }
+
+  // Scans of one phase are held against a new image after the other, for each new scan to bring as
+  // much work; those of the image's own phase have to wait for the next scan, as making it was work
+  // enough.
+  std::uint64_t turn_of(std::uint64_t phase) const { return phase == 0 && step_ > 1 ? 1 : phase; }
+
+  // Holds the image of a scan against those before it that are of a phase.
+  void refer_older(std::uint64_t scan, std::uint64_t phase, const View& image) {
+    for (const int lag : after_[phase]) {
+      const auto back = static_cast<std::uint64_t>(lag);
+      if (back > scan) break;
+      Record& older = record_of(scan - back);
+      if (older.segment != image.segment) continue;
+      refer(older, image, lag);
+      weigh(older);
+    }
   }
 
   // What the reference saw may change supervoxels of which something was seen free, or was hit
@@ -601,10 +631,12 @@ class FreeSpaceEvidence {
     const std::size_t count = ground_samples_.size();
     ground_free_.assign((count + 7) / 8 * 8, 0);
     ground_hit_.assign((count + 7) / 8 * 8, 0);
-    for (const int lag : kLags) {
+    for (const int lag : before_[scan % step_]) {
       const auto distance = static_cast<std::uint64_t>(lag);
-      if (lag <= config_.memory && distance <= scan) count_ground(record, scan - distance);
-      if (lag <= config_.horizon) count_ground(record, scan + distance);
+      if (distance <= scan) count_ground(record, scan - distance);
+    }
+    for (const int lag : after_[scan % step_]) {
+      count_ground(record, scan + static_cast<std::uint64_t>(lag));
     }
     // Most of the time there is none.
     bool any = false;
@@ -634,10 +666,9 @@ class FreeSpaceEvidence {
   }
 
   void count_ground(const Record& record, std::uint64_t reference) {
-    if (reference > newest_ || newest_ - reference >= views_.size()) return;
-    const View& view = views_[reference % views_.size()];
-    if (view.segment != record.segment) return;
-    look(ground_samples_.points, ground_samples_.size(), record.T_world_sensor, view);
+    const View* const view = view_of(reference, record.segment);
+    if (view == nullptr) return;
+    look(ground_samples_.points, ground_samples_.size(), record.T_world_sensor, *view);
     sights_.add_to(ground_samples_.size(), ground_free_.data(), ground_hit_.data());
   }
 
@@ -675,7 +706,10 @@ class FreeSpaceEvidence {
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();  // of the cells of tracks
   std::uint64_t segment_begin_ = 0;                   // first scan of the segment of the newest
   std::uint64_t newest_ = 0;
+  std::uint64_t step_;  // scans from one image to the next
   std::vector<View> views_;
+  // By phase, which is the scan number modulo `step_`: scans to the references before and after.
+  std::vector<std::vector<int>> before_, after_;
   std::vector<Record> records_;
   RangeImage::Scratch image_scratch_;
   detail::Sights sights_;

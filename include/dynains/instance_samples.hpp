@@ -56,16 +56,18 @@ struct InstanceSamples {
   }
 };
 
-/// Takes one sample per voxel and instance.
+/// Takes one sample per voxel and instance, up to some per supervoxel.
 class InstanceSampler {
  public:
   /// `sample_size`, `supervoxel_size`, `max_range`: metres; a supervoxel is a whole number of
-  /// sample voxels wide.
-  InstanceSampler(double sample_size, double supervoxel_size, double max_range)
+  /// sample voxels wide and has at most `most_samples`, at least 1.
+  InstanceSampler(double sample_size, double supervoxel_size, double max_range,
+                  std::uint32_t most_samples)
       : samples_per_metre_(static_cast<float>(1.0 / sample_size)),
-        supervoxels_per_voxel_(
-            static_cast<float>(1.0 / std::max(1.0, std::round(supervoxel_size / sample_size)))),
-        max_range_(static_cast<float>(max_range)) {}
+        voxels_per_supervoxel_(
+            static_cast<float>(std::max(1.0, std::round(supervoxel_size / sample_size)))),
+        max_range_(static_cast<float>(max_range)),
+        most_samples_(most_samples) {}
 
   /// Which of up to 64 points, a bit each, lie in another voxel than their predecessor; the first
   /// does.
@@ -100,11 +102,9 @@ class InstanceSampler {
     detail::make_room(out.met_of, points.size());
     out.met_of.resize(points.size());
     for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
-      const std::size_t size = std::min(kBlock, points.size() - begin);
-      find_voxels(points.subview(begin, size), instance_of.data() + begin);
-      find_new_voxels(size, out.met_of.data() + begin);
-      find_supervoxels();
-      take_samples(points.subview(begin, size), out.met_of.data() + begin);
+      const PointsView block = points.subview(begin, std::min(kBlock, points.size() - begin));
+      find_supervoxels(block, instance_of.data() + begin);
+      take_samples(block, out.met_of.data() + begin);
     }
     order(instance_count, out);
   }
@@ -120,21 +120,23 @@ class InstanceSampler {
     std::uint32_t samples;
   };
   static constexpr std::size_t kBlock = 64;  // points that are worked off together
-  using Block = detail::CellBlock<kBlock>;
 
-  // Points come in the order of small patches, so that little has to be remembered: a voxel that
-  // was forgotten and comes back gets a second sample, which does no harm.
+  // Points come in the order of small patches, so that little has to be remembered: a supervoxel
+  // that was forgotten and comes back counts as another, which does no harm.
   void begin_scan() {
-    voxels_met_.clear();
-    supervoxels_met_.clear();
+    memory_.clear();
     sample_count_ = 0;
     supervoxel_count_ = 1;
   }
 
-  void find_voxels(PointsView points, const std::uint32_t* instance_of) {
+  // The supervoxel of each point, and which of its voxels the point lies in.
+  void find_supervoxels(PointsView points, const std::uint32_t* instance_of) {
     using namespace detail;
-    const Constant8 per_metre(samples_per_metre_);
-    const Constant8 far_squared(max_range_ * max_range_);
+    const Constant8 per_metre(samples_per_metre_), per_voxel(1.0F / voxels_per_supervoxel_);
+    const Constant8 voxels(voxels_per_supervoxel_), far_squared(max_range_ * max_range_);
+    // The half keeps the quotient so far from whole numbers that the product of floats rounds to
+    // the right side for all indices below 2^20.
+    static constexpr Constant8 kCentre(0.5F);
     for_lanes(points.size(), [&](auto at) {
       using Float = typename decltype(at)::Float;
       using Int = typename decltype(at)::Int;
@@ -144,91 +146,58 @@ class InstanceSampler {
       const Int instance = at.load(instance_of);
       const auto is_sampled = (px * px + py * py <= far_squared) &
                               ~(instance == Int(static_cast<std::int32_t>(kNoCluster)));
-      CellMemory::put(is_sampled, floor(px * per_metre), floor(py * per_metre),
-                      floor(pz * per_metre), instance, at.begin, voxels_);
-    });
-  }
-
-  // What `met_of` says of points whose voxels are remembered; the voxels of the others, in the
-  // order of their first points. Until their supervoxels are known, they are remembered by number.
-  void find_new_voxels(std::size_t size, std::uint32_t* met_of) {
-    std::size_t unknown_count = 0;
-    for (std::size_t i = 0; i < size; ++i) {
-      const detail::CellMemory::Entry& entry = voxels_met_.at(voxels_, i);
-      met_of[i] = entry.number;
-      unknown_[unknown_count] = static_cast<std::uint8_t>(i);
-      unknown_count += entry.is_other(voxels_, i) ? 1 : 0;
-    }
-    std::uint32_t count = 0;
-    for (std::size_t k = 0; k < unknown_count; ++k) {
-      const std::size_t i = unknown_[k];
-      detail::CellMemory::Entry& entry = voxels_met_.at(voxels_, i);
-      if (entry.is_other(voxels_, i)) {
-        entry = {voxels_.xy[i], voxels_.z[i], voxels_.instance[i], count};
-        new_[count] = static_cast<std::uint8_t>(i);
-        supervoxels_of_new_.xy[count] = entry.xy;
-        supervoxels_of_new_.z[count] = entry.z;
-        supervoxels_of_new_.instance[count] = entry.instance;
-        ++count;
-      }
-      voxel_of_unknown_[k] = static_cast<std::uint8_t>(entry.number);
-    }
-    unknown_count_ = unknown_count;
-    new_count_ = count;
-  }
-
-  void find_supervoxels() {
-    using namespace detail;
-    const Constant8 per_voxel(supervoxels_per_voxel_);
-    run_lanes([&](auto lanes) {
-      using Float = typename decltype(lanes)::Float;
-      using Int = typename decltype(lanes)::Int;
-      // The half keeps the quotient so far from whole numbers that the product of floats rounds to
-      // the right side for all indices below 2^20.
-      static constexpr Constant8 kCentre(0.5F);
-      const auto supervoxel = [&](const Int& voxel) {
-        return floor((to_float(voxel) + Float(kCentre)) * Float(per_voxel));
+      const auto split = [&](const Float& coordinate, Int& place) {
+        const Float voxel = to_float(floor(coordinate * per_metre));
+        place = floor((voxel + Float(kCentre)) * Float(per_voxel));
+        return truncate(voxel - to_float(place) * voxels) & Int(CellMemory::kParts - 1);
       };
-      Block& cells = supervoxels_of_new_;
-      for (std::size_t i = 0; i < new_count_; i += kLanes) {
-        const Int xy = Int::load(&cells.xy[i]);
-        const Int x = xy >> CellMemory::kHalf;
-        const Int y = (xy << CellMemory::kHalf) >> CellMemory::kHalf;
-        const Int instance = Int::load(&cells.instance[i]);
-        CellMemory::put(~(instance == Int(-1)), supervoxel(x), supervoxel(y),
-                        supervoxel(Int::load(&cells.z[i])), instance, i, cells);
-      }
+      Int x, y, z;
+      const Int part_x = split(px, x);
+      const Int part_y = split(py, y);
+      const Int part_z = split(pz, z);
+      const Int part =
+          part_x + (part_y << CellMemory::kPartBits) + (part_z << 2 * CellMemory::kPartBits);
+      CellMemory::put(is_sampled, x, y, z, instance, part, at.begin, cells_);
     });
   }
 
-  // One of each new voxel. Of new voxels that share an entry, the last one stays there.
+  // The first point of each voxel, of supervoxels that have room. Most points are of voxels that
+  // are remembered: the others are listed first, in order, without a branch.
   void take_samples(PointsView points, std::uint32_t* met_of) {
+    std::array<std::uint8_t, kBlock> unknown;
+    std::size_t unknown_count = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const detail::CellMemory::Entry& entry = memory_.at(cells_, i);
+      met_of[i] = entry.number;
+      unknown[unknown_count] = static_cast<std::uint8_t>(i);
+      unknown_count += entry.is_other(cells_, i) || !entry.has_part(cells_, i) ? 1 : 0;
+    }
     detail::grow(samples_, sample_count_ + kBlock);
     detail::grow(supervoxels_, supervoxel_count_ + kBlock);
-    for (std::size_t k = 0; k < new_count_; ++k) {
-      const std::size_t i = new_[k];
-      const std::uint32_t met = number_of_supervoxel(k);
-      detail::CellMemory::Entry& entry = voxels_met_.at(voxels_, i);
-      if (!entry.is_other(voxels_, i)) entry.number = met;
-      ++supervoxels_[met].samples;
-      samples_[sample_count_++] = {points.x[i], points.y[i], points.z[i], met};
-      met_of_new_[k] = met;
-    }
-    for (std::size_t k = 0; k < unknown_count_; ++k) {
-      met_of[unknown_[k]] = met_of_new_[voxel_of_unknown_[k]];
+    for (std::size_t k = 0; k < unknown_count; ++k) {
+      const std::size_t i = unknown[k];
+      met_of[i] = take_sample(points, i);
     }
   }
 
-  // Writes a new one in any case, since no branch could foretell whether it is one.
-  std::uint32_t number_of_supervoxel(std::size_t k) {
-    const Block& cells = supervoxels_of_new_;
-    detail::CellMemory::Entry& entry = supervoxels_met_.at(cells, k);
-    const bool is_new = entry.is_other(cells, k);
-    const std::uint32_t next = supervoxel_count_;
-    supervoxels_[next] = {cells.xy[k], cells.z[k], cells.instance[k], 0};
-    supervoxel_count_ = next + (is_new ? 1 : 0);
-    entry = {cells.xy[k], cells.z[k], cells.instance[k], is_new ? next : entry.number};
-    return entry.number;
+  // Returns its supervoxel. Writes new ones in any case, since no branch could foretell whether
+  // they are new.
+  std::uint32_t take_sample(PointsView points, std::size_t i) {
+    detail::CellMemory::Entry& entry = memory_.at(cells_, i);
+    const bool is_new = entry.is_other(cells_, i);
+    const std::uint32_t met = is_new ? supervoxel_count_ : entry.number;
+    supervoxels_[supervoxel_count_] = {cells_.xy[i], cells_.z[i], cells_.instance[i], 0};
+    supervoxel_count_ += is_new ? 1 : 0;
+    const bool takes = is_new || !entry.has_part(cells_, i);
+    samples_[sample_count_] = {points.x[i], points.y[i], points.z[i], met};
+    sample_count_ += takes ? 1 : 0;
+    supervoxels_[met].samples += takes ? 1 : 0;
+    const std::uint64_t parts =
+        (is_new ? 0 : entry.parts) | std::uint64_t{1} << static_cast<unsigned>(cells_.part[i]);
+    const bool is_full = supervoxels_[met].samples >= most_samples_;
+    entry = {cells_.xy[i], cells_.z[i], cells_.instance[i], met,
+             is_full ? detail::CellMemory::kAllParts : parts};
+    return met;
   }
 
   static SupervoxelPlace place_of(const Supervoxel& cell) {
@@ -280,20 +249,11 @@ class InstanceSampler {
   }
 
   float samples_per_metre_;
-  float supervoxels_per_voxel_;
+  float voxels_per_supervoxel_;
   float max_range_;
-  detail::CellMemory voxels_met_;  // with their supervoxels, as met_of counts them
-  detail::CellMemory supervoxels_met_;
-  // Of a block: voxels of its points; which of these were not remembered, and which new voxel each
-  // of the latter is; first points, supervoxels and their numbers of the new ones.
-  Block voxels_ = {};
-  std::size_t unknown_count_ = 0;
-  std::array<std::uint8_t, kBlock> unknown_ = {};
-  std::array<std::uint8_t, kBlock> voxel_of_unknown_ = {};
-  std::size_t new_count_ = 0;
-  std::array<std::uint8_t, kBlock> new_ = {};
-  Block supervoxels_of_new_ = {};
-  std::array<std::uint32_t, kBlock> met_of_new_ = {};
+  std::uint32_t most_samples_;
+  detail::CellMemory memory_;             // of supervoxels, numbered as met_of counts them
+  detail::CellBlock<kBlock> cells_ = {};  // of the points of a block
   // Longer than what is in use.
   std::size_t sample_count_ = 0;
   std::vector<Sample> samples_;

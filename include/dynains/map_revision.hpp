@@ -36,7 +36,7 @@ struct MapRevisionConfig {
     visitor(Parameter{"revision_range", self.revision_range, closed(5, 300), "m",
                       "places of the map farther away (horizontally) are not looked at again"});
     visitor(Parameter{"revision_period", self.revision_period, closed(1, 100), "scans",
-                      "from one look at a place of the map to the next"});
+                      "from one look at a place of the map to the next; not below reference_step"});
     visitor(Parameter{"revision_free", self.revision_free, open(0.5, 1), "",
                       "update probability of a scan that sees through a place (form of Eq. 18)"});
     visitor(Parameter{"revision_hit", self.revision_hit, open(0, 0.5), "",

@@ -184,11 +184,11 @@ TEST_CASE("evidence: a lead vehicle is presumed to move until its place was seen
 
 // Scans behind the newest have meanwhile been seen through.
 TEST_CASE("evidence: a vehicle whose sides overlap from scan to scan is known along its track") {
-  const std::vector<Scan> scans = drive(yard_with(van(9.0, 2.0, {5.0, 0.0, 0.0})), 4, 5.0);
+  const std::vector<Scan> scans = drive(yard_with(van(9.0, 2.0, {5.0, 0.0, 0.0})), 6, 5.0);
   Config config;
-  CHECK(Causes(scans[3], run(config, scans).newest[3], kAddedBox).share(Cause::kAlongTrack) > 0.8);
+  CHECK(Causes(scans[5], run(config, scans).newest[5], kAddedBox).share(Cause::kAlongTrack) > 0.8);
   config.evidence.use_tracks = false;
-  CHECK(Causes(scans[3], run(config, scans).newest[3], kAddedBox)[Cause::kAlongTrack] == 0);
+  CHECK(Causes(scans[5], run(config, scans).newest[5], kAddedBox)[Cause::kAlongTrack] == 0);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "dynains/instance_hull.hpp"
 #include "dynains/instance_samples.hpp"
 #include "dynains/instance_tracks.hpp"
+#include "dynains/reference_lags.hpp"
 #include "dynains/sensor_model.hpp"
 #include "dynains/supervoxel_groups.hpp"
 #include "support/catch.hpp"
@@ -38,6 +39,8 @@ std::vector<std::uint32_t> supervoxel_of(const InstanceSamples& samples, std::si
   return result;
 }
 
+constexpr std::uint32_t kNoLimit = 1000;
+
 TEST_CASE("every voxel of every instance has a sample, and samples are points of it") {
   Random random(7);
   constexpr float kSize = 0.3F;
@@ -50,7 +53,7 @@ TEST_CASE("every voxel of every instance has a sample, and samples are points of
     const std::size_t number = random.index(kInstances + 1);
     instance_of.push_back(number == kInstances ? kNoCluster : static_cast<std::uint32_t>(number));
   }
-  InstanceSampler sampler(kSize, 0.9, 10.0);
+  InstanceSampler sampler(kSize, 0.9, 10.0, kNoLimit);
   InstanceSamples samples;
   // Twice: buffers that were used before change nothing.
   sampler.sample(points, instance_of, kInstances, samples);
@@ -92,6 +95,82 @@ TEST_CASE("every voxel of every instance has a sample, and samples are points of
   CHECK(found == expected);
 }
 
+TEST_CASE("a supervoxel has the first points of its voxels as samples, up to a limit") {
+  // Two voxels wide: eight voxels each. Points come supervoxel by supervoxel, so that none is
+  // forgotten before its last point.
+  constexpr float kSize = 0.5F;
+  Random random(11);
+  PointBuffer points;
+  for (int corner = 0; corner < 108; ++corner) {
+    const auto low = [&](int place) { return static_cast<float>(place - 3); };
+    const float x = low(corner % 6), y = low(corner / 6 % 6), z = low(corner / 36);
+    for (int i = 0; i < 20; ++i) {
+      points.push_back(random.uniform_float(x, x + 0.999F), random.uniform_float(y, y + 0.999F),
+                       random.uniform_float(z, z + 0.999F));
+    }
+  }
+  const std::vector<std::uint32_t> instance_of(points.size(), 0);
+  using Place = std::array<std::int32_t, 3>;
+  using Sample = std::array<float, 3>;
+  for (const std::uint32_t limit : {1U, 3U, 7U, 8U, 9U}) {
+    std::map<Place, std::vector<Sample>> expected;
+    std::set<Place> met;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Sample point = {points.x[i], points.y[i], points.z[i]};
+      Place voxel, supervoxel;
+      for (std::size_t k = 0; k < 3; ++k) {
+        voxel[k] = voxel_of(point[k], kSize);
+        supervoxel[k] = static_cast<std::int32_t>(std::floor(voxel[k] / 2.0));
+      }
+      std::vector<Sample>& samples = expected[supervoxel];
+      if (samples.size() < limit && met.insert(voxel).second) samples.push_back(point);
+    }
+    InstanceSampler sampler(kSize, 1.0, 80.0, limit);
+    InstanceSamples samples;
+    sampler.sample(points, instance_of, 1, samples);
+    REQUIRE(samples.supervoxel_count() == expected.size());
+    for (const auto& [place, wanted] : expected) {
+      const auto at = std::find(samples.place.begin(), samples.place.end(),
+                                pack_place(place[0], place[1], place[2]));
+      REQUIRE(at != samples.place.end());
+      const auto s = static_cast<std::size_t>(at - samples.place.begin());
+      std::vector<Sample> found;
+      for (std::uint32_t p = samples.sample_begin[s]; p < samples.sample_begin[s + 1]; ++p) {
+        found.push_back({samples.points.x[p], samples.points.y[p], samples.points.z[p]});
+        CHECK(samples.supervoxel_of[p] == s);
+      }
+      CHECK(found == wanted);
+    }
+  }
+}
+
+TEST_CASE("references are the scans that can be looked at nearest behind those wanted") {
+  using Lags = std::vector<int>;
+  CHECK(reference_lags(30, 0, 1) == Lags{2, 4, 6, 8, 10, 13, 16, 20, 25, 30});
+  CHECK(reference_lags(29, 0, 1) == Lags{2, 4, 6, 8, 10, 13, 16, 20, 25});
+  // One scan of three is an image. 30 scans behind scan 31 is scan 1: scan 0 is the next.
+  CHECK(reference_lags(31, 1, 3) == Lags{4, 7, 10, 13, 16, 22, 25, 31});
+  CHECK(reference_lags(30, 1, 3) == Lags{4, 7, 10, 13, 16, 22, 25, 28});
+  // Two lags that meet in one scan count once.
+  CHECK(reference_lags(25, 0, 10) == Lags{10, 20});
+  CHECK(reference_lags(0, 0, 1).empty());
+  CHECK(reference_lags(2, 0, 3).empty());
+  CHECK(reference_lags(-2, 1, 3).empty());
+  for (int step = 1; step <= 10; ++step) {
+    for (int remainder = 0; remainder <= step; ++remainder) {
+      for (int most = 0; most <= 200; ++most) {
+        int last = 0;
+        for (const int lag : reference_lags(most, remainder, step)) {
+          REQUIRE(lag > last);
+          REQUIRE(lag <= most);
+          REQUIRE(lag % step == remainder % step);
+          last = lag;
+        }
+      }
+    }
+  }
+}
+
 TEST_CASE("a point and its samples lie in the same supervoxel of the same instance") {
   // One row of points along x, 0.1 m apart, in two instances; supervoxels are 3 samples wide:
   // [-0.9, 0), [0, 0.9), [0.9, 1.8).
@@ -101,7 +180,7 @@ TEST_CASE("a point and its samples lie in the same supervoxel of the same instan
     points.push_back(0.1F * static_cast<float>(i) + 0.05F, 5.0F, 0.1F);
     instance_of.push_back(i < 9 ? 0U : 1U);
   }
-  InstanceSampler sampler(0.3, 0.9, 80.0);
+  InstanceSampler sampler(0.3, 0.9, 80.0, kNoLimit);
   InstanceSamples samples;
   sampler.sample(points, instance_of, 2, samples);
   REQUIRE(samples.supervoxel_count() == 3);
@@ -127,7 +206,7 @@ InstanceSamples supervoxels_at(const std::vector<std::array<int, 3>>& places, in
 
 TEST_CASE("a point that lies in another voxel than its predecessor is a change") {
   Random random(5);
-  InstanceSampler sampler(0.5, 0.5, 80.0);
+  InstanceSampler sampler(0.5, 0.5, 80.0, 1);
   for (const std::size_t count : {1, 7, 8, 9, 63, 64}) {
     for (int round = 0; round < 50; ++round) {
       PointBuffer points;
@@ -367,7 +446,7 @@ void add_box(PointBuffer& points, std::vector<std::uint32_t>& instance_of, std::
 }
 
 TEST_CASE("instances of consecutive scans are linked where they overlap in the world") {
-  InstanceSampler sampler(0.3, 0.6, 80.0);
+  InstanceSampler sampler(0.3, 0.6, 80.0, kNoLimit);
   InstanceLinker linker(0.8, 18.0, 4.5, 0.25);
   InstanceSamples samples[2];
   TrackedInstances tracked[2];

@@ -212,5 +212,18 @@ TEST_CASE("a map is revised by free-space evidence, and only one that can let go
       ContainsSubstring("MapRevision.revise_map = true needs a map that is kept in memory"));
 }
 
+TEST_CASE("a block of the map meets a reference once: its period is not below the step") {
+  DynaInsRemover::Config config;
+  config.evidence.reference_step = 3;
+  config.revision.revision_period = 2;
+  CHECK_NOTHROW(config.validate());
+  config.revision.revise_map = true;
+  CHECK_THROWS_WITH(config.validate(),
+                    ContainsSubstring("MapRevision.revision_period = 2 must not be below "
+                                      "FreeSpaceEvidence.reference_step = 3"));
+  config.revision.revision_period = 3;
+  CHECK_NOTHROW(config.validate());
+}
+
 }  // namespace
 }  // namespace dynains::test

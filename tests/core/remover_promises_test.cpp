@@ -62,6 +62,19 @@ TEST_CASE("a moving van is removed, and what stands around it stays") {
   CHECK(all.labelled - moving.labelled < all.total / 200);
 }
 
+TEST_CASE("however few scans are references, the van is removed, and only it") {
+  Config config;
+  config.evidence.reference_step = GENERATE(1, 2, 3, 4);
+  const std::vector<Scan> scans = drive(oncoming(), 10, 5.0);
+  const std::vector<Verdict> verdicts = run(config, scans).final;
+  INFO("reference_step " << config.evidence.reference_step);
+  const Share moving = share(scans, verdicts, PointLabel::kDynamic, kAddedBox);
+  REQUIRE(moving.total > 5000);
+  CHECK(moving.value() > 0.9);
+  const Share all = share(scans, verdicts, PointLabel::kDynamic);
+  CHECK(all.labelled - moving.labelled < all.total / 200);
+}
+
 TEST_CASE("a van passes under a bridge: the van goes, the bridge stays") {
   const Config config = GENERATE(Config::paper(), Config());
   const double yaw = GENERATE(0.0, 0.7, 3.1);

@@ -10,27 +10,36 @@
 
 namespace dynains::detail {
 
-/// Cells of some points, each with the instance that it belongs to, and where they are remembered.
+/// Cells of some points, each with the instance that it belongs to, where they are remembered, and
+/// the part of the cell in which the point lies.
 template <std::size_t kCount>
 struct CellBlock {
-  std::array<std::int32_t, kCount> xy, z, instance, slot;
+  std::array<std::int32_t, kCount> xy, z, instance, slot, part;
 };
 
-/// Gives cells back the number that was noted for them, unless another cell took their place.
+/// Gives cells back what was noted for them, unless another cell took their place.
 class CellMemory {
  public:
-  static constexpr int kHalf = 16;  ///< bits of x and of y, which share a number
+  static constexpr int kHalf = 16;     ///< bits of x and of y, which share a number
+  static constexpr int kPartBits = 2;  ///< of a part's place along each axis
+  static constexpr int kParts = 1 << kPartBits;  ///< per axis; beyond, they begin again
+  static constexpr std::uint64_t kAllParts = ~std::uint64_t{0};
 
   struct Entry {
     std::int32_t xy = 0;
     std::int32_t z = 0;
     std::int32_t instance = -1;
     std::uint32_t number = 0;
+    std::uint64_t parts = kAllParts;  ///< that need not be looked at again, a bit each
 
     /// Whether it is of another cell than the i-th one of a block.
     template <std::size_t kCount>
     bool is_other(const CellBlock<kCount>& cells, std::size_t i) const {
       return ((xy ^ cells.xy[i]) | (z ^ cells.z[i]) | (instance ^ cells.instance[i])) != 0;
+    }
+    template <std::size_t kCount>
+    bool has_part(const CellBlock<kCount>& cells, std::size_t i) const {
+      return (parts >> static_cast<unsigned>(cells.part[i]) & 1U) != 0;
     }
   };
 
@@ -42,17 +51,19 @@ class CellMemory {
     return entries_[static_cast<std::size_t>(cells.slot[i])];
   }
 
-  /// Puts eight cells to a block: `x` and `y` within 16 bits. Where `is_cell` is false, they stand
-  /// for none.
+  /// Puts eight cells to a block: `x` and `y` within 16 bits, `part` below 64. Where `is_cell` is
+  /// false, they stand for none.
   template <class Mask, class Int, std::size_t kCount>
   static void put(const Mask& is_cell, const Int& x, const Int& y, const Int& z,
-                  const Int& instance, std::size_t i, CellBlock<kCount>& cells) {
+                  const Int& instance, const Int& part, std::size_t i,
+                  CellBlock<kCount>& cells) {
     const Int xy = keep(is_cell, (x << kHalf) + (y & Int((1 << kHalf) - 1)));
     const Int z_kept = keep(is_cell, z);
     xy.store(&cells.xy[i]);
     z_kept.store(&cells.z[i]);
     select(is_cell, instance, Int(-1)).store(&cells.instance[i]);
     select(is_cell, slot_of(xy, z_kept, instance), Int(kSlots)).store(&cells.slot[i]);
+    part.store(&cells.part[i]);
   }
 
  private:
