@@ -29,7 +29,7 @@ struct FreeSpaceConfig {
   double see_share = 0.6;        ///< share of an instance that one reference must see through
   double footprint = 0.2;        ///< m, ground this near to removed points goes with them
   bool use_tracks = true;        ///< carry beliefs along instances that overlap from scan to scan
-  double tau_track = 0.9;        ///< belief along its track from which an instance moved
+  double tau_track = 0.87;       ///< belief along its track from which an instance moved
   double still_weight = 0.1;     ///< of an increment, for a scan in which an instance stood still
   double track_cell = 1.2;       ///< m, cells whose overlap links instances
   double track_overlap = 0.25;   ///< shared cells over all cells from which two are the same
