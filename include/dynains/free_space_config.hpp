@@ -51,7 +51,7 @@ struct FreeSpaceConfig {
                       "one sample per voxel of this size and instance"});
     visitor(Parameter{"supervoxel", self.supervoxel, closed(0.1, 5), "m",
                       "samples in one voxel of this size share a belief"});
-    visitor(Parameter{"supervoxel_samples", self.supervoxel_samples, closed(1, 1000), "",
+    visitor(Parameter{"supervoxel_samples", self.supervoxel_samples, closed(1, 64), "",
                       "samples of a supervoxel at most; beyond, they say little that is new"});
     visitor(Parameter{"ground_sample", self.ground_sample, closed(0.05, 2), "m",
                       "one ground sample per voxel of this size"});

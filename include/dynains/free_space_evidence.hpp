@@ -33,7 +33,8 @@
 namespace dynains {
 
 /// Tests samples of each scan against range images of scans before and after it, and accumulates
-/// what they show as belief per supervoxel.
+/// what they show as belief per supervoxel. One of `reference_step` scans has such an image, by its
+/// number.
 ///
 /// The belief is a log-odds sum that starts again whenever it falls to zero (Page's test for a
 /// change, 1954): a place that is hit for long and then seen free has changed, and hits never

@@ -60,7 +60,8 @@ struct InstanceSamples {
 class InstanceSampler {
  public:
   /// `sample_size`, `supervoxel_size`, `max_range`: metres; a supervoxel is a whole number of
-  /// sample voxels wide and has at most `most_samples`, at least 1.
+  /// sample voxels wide and has at most `most_samples`, 1 to 64: voxels of wider ones than four
+  /// share their place among the parts of CellMemory.
   InstanceSampler(double sample_size, double supervoxel_size, double max_range,
                   std::uint32_t most_samples)
       : samples_per_metre_(static_cast<float>(1.0 / sample_size)),

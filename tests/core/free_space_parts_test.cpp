@@ -39,7 +39,7 @@ std::vector<std::uint32_t> supervoxel_of(const InstanceSamples& samples, std::si
   return result;
 }
 
-constexpr std::uint32_t kNoLimit = 1000;
+constexpr std::uint32_t kNoLimit = 64;
 
 TEST_CASE("every voxel of every instance has a sample, and samples are points of it") {
   Random random(7);
