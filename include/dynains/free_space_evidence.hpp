@@ -33,8 +33,8 @@
 namespace dynains {
 
 /// Tests samples of each scan against range images of scans before and after it, and accumulates
-/// what they show as belief per supervoxel. One of `reference_step` scans has such an image, by its
-/// number.
+/// what they show as belief per supervoxel. Of each segment, the first scan and every
+/// `reference_step`-th after it have such an image.
 ///
 /// The belief is a log-odds sum that starts again whenever it falls to zero (Page's test for a
 /// change, 1954): a place that is hit for long and then seen free has changed, and hits never
@@ -114,10 +114,13 @@ class FreeSpaceEvidence {
     Record& record = record_of(scan);
     record.segment = segment;
     record.T_world_sensor = T_world_sensor;
+    record.phase = (scan - segment_begin_) % step_;
+    if (record.phase == 0) ++images_;
+    record.image = images_;
     // Points that were sampled are at hand when the image is made.
     footprint_.bound(split.ground(), record.ground_boxes);
     sampler_.sample(split.non_ground(), instance_of, instance_count, record.samples);
-    if (scan % step_ == 0) make_image(scan, segment, T_world_sensor, split);
+    if (record.phase == 0) make_image(scan, segment, T_world_sensor, split);
     record.beliefs.assign(record.samples.supervoxel_count(), Belief());
     record.wholes.assign(instance_count, Belief());
     record.changed.assign(instance_count, 1);
@@ -129,11 +132,8 @@ class FreeSpaceEvidence {
     predecessors_.assign(instance_count, kNoCluster);
     if (config_.use_tracks) track(scan, record);
 
-    const std::uint64_t phase = scan % step_;
-    for (const int lag : before_[phase]) {
-      const auto back = static_cast<std::uint64_t>(lag);
-      if (back > scan) break;
-      const View* const reference = view_of(scan - back, segment);
+    for (const int lag : before_[record.phase]) {
+      const View* const reference = reference_of(record, scan, -lag);
       if (reference != nullptr) refer(record, *reference, -lag);
     }
     // What follows is summed apart from what was before.
@@ -144,9 +144,9 @@ class FreeSpaceEvidence {
     }
     for (Belief& belief : record.wholes) belief.level = 0.0F;
     weigh(record);
-    if (const View* const image = view_of(scan - phase, segment)) {
-      for (std::uint64_t older = 0; older < step_; ++older) {
-        if (turn_of(older) == phase) refer_older(scan - phase, older, *image);
+    for (std::uint64_t older = 0; older < step_; ++older) {
+      if (turn_of(older) == record.phase) {
+        refer_older(scan - record.phase, older, views_[images_ % views_.size()]);
       }
     }
     if (config_.use_tracks) run_beliefs(scan);
@@ -178,7 +178,7 @@ class FreeSpaceEvidence {
   /// points (m; padded for wide loads).
   const detail::Sights& see(const PointBuffer& points, std::size_t count,
                             const Eigen::Isometry3d& T_world_points) {
-    look(points, count, T_world_points, views_[newest_ / step_ % views_.size()]);
+    look(points, count, T_world_points, views_[images_ % views_.size()]);
     return sights_;
   }
 
@@ -207,6 +207,8 @@ class FreeSpaceEvidence {
   struct Record {
     std::uint64_t segment = kNoSegment;
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+    std::uint64_t phase = 0;  // scans since the newest image of that time ...
+    std::uint64_t image = 0;  // ... and its number
     InstanceSamples samples;
     std::vector<Belief> beliefs;      // by supervoxel
     std::vector<Belief> wholes;       // by instance, of all its samples together
@@ -228,7 +230,7 @@ class FreeSpaceEvidence {
   // Beams are rows of an image only in the frame of the sensor, tilted as it is.
   void make_image(std::uint64_t scan, std::uint64_t segment, const Eigen::Isometry3d& T_world_level,
                   const GroundSplit& split) {
-    View& view = views_[scan / step_ % views_.size()];
+    View& view = views_[images_ % views_.size()];
     view.scan = scan;
     view.segment = segment;
     const auto reach = static_cast<float>(config_.lateral_margin);
@@ -244,10 +246,15 @@ class FreeSpaceEvidence {
     view.image.build(grid_, ground, rest, reach, image_scratch_);
   }
 
-  // The image of a scan; null if there is none, or if it is of another segment.
-  const View* view_of(std::uint64_t scan, std::uint64_t segment) const {
-    const View& view = views_[scan / step_ % views_.size()];
-    return view.scan == scan && view.segment == segment ? &view : nullptr;
+  // The image that was made `lag` scans after a scan, or before it; null if there is none.
+  const View* reference_of(const Record& record, std::uint64_t scan, int lag) const {
+    const auto signed_step = static_cast<std::int64_t>(step_);
+    const std::int64_t to_image = lag + static_cast<std::int64_t>(record.phase);
+    const std::uint64_t image =
+        record.image + static_cast<std::uint64_t>(to_image / signed_step);  // exact
+    const View& view = views_[image % views_.size()];
+    const std::uint64_t at = scan + static_cast<std::uint64_t>(std::int64_t{lag});
+    return view.scan == at && view.segment == record.segment ? &view : nullptr;
   }
 
   Record& record_of(std::uint64_t scan) { return records_[scan % records_.size()]; }
@@ -632,13 +639,8 @@ class FreeSpaceEvidence {
     const std::size_t count = ground_samples_.size();
     ground_free_.assign((count + 7) / 8 * 8, 0);
     ground_hit_.assign((count + 7) / 8 * 8, 0);
-    for (const int lag : before_[scan % step_]) {
-      const auto distance = static_cast<std::uint64_t>(lag);
-      if (distance <= scan) count_ground(record, scan - distance);
-    }
-    for (const int lag : after_[scan % step_]) {
-      count_ground(record, scan + static_cast<std::uint64_t>(lag));
-    }
+    for (const int lag : before_[record.phase]) count_ground(record, scan, -lag);
+    for (const int lag : after_[record.phase]) count_ground(record, scan, lag);
     // Most of the time there is none.
     bool any = false;
     detail::grow(moved_, ground_samples_.met.size());
@@ -666,8 +668,8 @@ class FreeSpaceEvidence {
     }
   }
 
-  void count_ground(const Record& record, std::uint64_t reference) {
-    const View* const view = view_of(reference, record.segment);
+  void count_ground(const Record& record, std::uint64_t scan, int lag) {
+    const View* const view = reference_of(record, scan, lag);
     if (view == nullptr) return;
     look(ground_samples_.points, ground_samples_.size(), record.T_world_sensor, *view);
     sights_.add_to(ground_samples_.size(), ground_free_.data(), ground_hit_.data());
@@ -709,7 +711,8 @@ class FreeSpaceEvidence {
   std::uint64_t newest_ = 0;
   std::uint64_t step_;  // scans from one image to the next
   std::vector<View> views_;
-  // By phase, which is the scan number modulo `step_`: scans to the references before and after.
+  std::uint64_t images_ = 0;  // number of the newest
+  // By phase: scans to the references before and after.
   std::vector<std::vector<int>> before_, after_;
   std::vector<Record> records_;
   RangeImage::Scratch image_scratch_;
