@@ -93,11 +93,18 @@ class FreeSpaceEvidence {
   /// first scan.
   void keep(std::size_t scans) { records_.resize(std::max(records_.size(), scans + 2)); }
 
-  /// Gets the memory of images for that many scans of the sensor that adapt() was told, or for as
-  /// many as are ever kept.
+  /// Gets the memory of images for that many scans of the sensor that adapt() was told, and of what
+  /// else is kept of scans if one was observed already; or for as many as are ever kept.
   void reserve(std::size_t scans) {
     const std::size_t images = grid_.rows > 0 ? std::min(scans / step_ + 1, views_.size()) : 0;
     for (std::size_t i = 0; i < images; ++i) views_[i].image.reserve(grid_);
+    const auto largest =
+        std::max_element(records_.begin(), records_.end(), [](const Record& a, const Record& b) {
+          return a.samples.size() < b.samples.size();
+        });
+    for (std::size_t i = 0; i < std::min(scans, records_.size()); ++i) {
+      if (records_[i].samples.size() < largest->samples.size()) records_[i] = *largest;
+    }
   }
 
   /// Takes scan number `scan` in: scans come in order, from 0. `instance_of` holds the instance of
@@ -106,6 +113,7 @@ class FreeSpaceEvidence {
   void observe(std::uint64_t scan, std::uint64_t segment, const Eigen::Isometry3d& T_world_sensor,
                const GroundSplit& split, Span<const std::uint32_t> instance_of,
                std::size_t instance_count) {
+    if (scan == 0) forget();
     newest_ = scan;
     if (scan == 0 || record_of(scan - 1).segment != segment) {
       origin_ = T_world_sensor.translation();
@@ -226,6 +234,12 @@ class FreeSpaceEvidence {
     std::size_t run;       // number of the first run
   };
   static constexpr std::uint64_t kNoSegment = ~std::uint64_t{0};
+
+  // Numbers of scans begin again: what is kept is of others.
+  void forget() {
+    for (View& view : views_) view.segment = kNoSegment;
+    for (Record& record : records_) record.segment = kNoSegment;
+  }
 
   // Beams are rows of an image only in the frame of the sensor, tilted as it is.
   void make_image(std::uint64_t scan, std::uint64_t segment, const Eigen::Isometry3d& T_world_level,

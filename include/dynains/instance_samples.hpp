@@ -165,39 +165,26 @@ class InstanceSampler {
   // The first point of each voxel, of supervoxels that have room. Most points are of voxels that
   // are remembered: the others are listed first, in order, without a branch.
   void take_samples(PointsView points, std::uint32_t* met_of) {
-    std::array<std::uint8_t, kBlock> unknown;
-    std::size_t unknown_count = 0;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const detail::CellMemory::Entry& entry = memory_.at(cells_, i);
-      met_of[i] = entry.number;
-      unknown[unknown_count] = static_cast<std::uint8_t>(i);
-      unknown_count += entry.is_other(cells_, i) || !entry.has_part(cells_, i) ? 1 : 0;
-    }
     detail::grow(samples_, sample_count_ + kBlock);
     detail::grow(supervoxels_, supervoxel_count_ + kBlock);
-    for (std::size_t k = 0; k < unknown_count; ++k) {
-      const std::size_t i = unknown[k];
-      met_of[i] = take_sample(points, i);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const detail::CellMemory::Entry& entry = memory_.at(cells_, i);
+      const bool known = !entry.is_other(cells_, i) && entry.has_part(cells_, i);
+      met_of[i] = known ? entry.number : take_sample(points, i);
     }
   }
 
-  // Returns its supervoxel. Writes new ones in any case, since no branch could foretell whether
-  // they are new.
+  // Returns its supervoxel.
   std::uint32_t take_sample(PointsView points, std::size_t i) {
     detail::CellMemory::Entry& entry = memory_.at(cells_, i);
-    const bool is_new = entry.is_other(cells_, i);
-    const std::uint32_t met = is_new ? supervoxel_count_ : entry.number;
-    supervoxels_[supervoxel_count_] = {cells_.xy[i], cells_.z[i], cells_.instance[i], 0};
-    supervoxel_count_ += is_new ? 1 : 0;
-    const bool takes = is_new || !entry.has_part(cells_, i);
-    samples_[sample_count_] = {points.x[i], points.y[i], points.z[i], met};
-    sample_count_ += takes ? 1 : 0;
-    supervoxels_[met].samples += takes ? 1 : 0;
-    const std::uint64_t parts =
-        (is_new ? 0 : entry.parts) | std::uint64_t{1} << static_cast<unsigned>(cells_.part[i]);
-    const bool is_full = supervoxels_[met].samples >= most_samples_;
-    entry = {cells_.xy[i], cells_.z[i], cells_.instance[i], met,
-             is_full ? detail::CellMemory::kAllParts : parts};
+    if (entry.is_other(cells_, i)) {
+      supervoxels_[supervoxel_count_] = {cells_.xy[i], cells_.z[i], cells_.instance[i], 0};
+      entry = {cells_.xy[i], cells_.z[i], cells_.instance[i], supervoxel_count_++, 0};
+    }
+    const std::uint32_t met = entry.number;
+    samples_[sample_count_++] = {points.x[i], points.y[i], points.z[i], met};
+    entry.parts |= std::uint64_t{1} << static_cast<unsigned>(cells_.part[i]);
+    if (++supervoxels_[met].samples >= most_samples_) entry.parts = detail::CellMemory::kAllParts;
     return met;
   }
 
