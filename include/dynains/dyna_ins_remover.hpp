@@ -198,10 +198,12 @@ class BasicDynaInsRemover {
       ring_[i].touch(more);
     }
     const Rehearsal rehearsal(*this);
-    const auto enough = static_cast<std::size_t>(std::max(config_.window, 2));
+    // The fourth scan has been held against another one, too.
+    const auto enough = static_cast<std::size_t>(std::max(config_.window, 4));
     for (std::size_t i = 0; i < std::min(scans, enough); ++i) {
       take_in(example, Eigen::Isometry3d::Identity(), 0.1 * static_cast<double>(i));
     }
+    for (ScanSlot& other : ring_) other.make_room_like(slot(pushed_ - 1));
     if (config_.use_free_space) detail::reserve_stage(evidence_, scans);
   }
 

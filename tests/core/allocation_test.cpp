@@ -69,5 +69,25 @@ TEST_CASE("a warm remover allocates nothing, but for the map when it grows") {
   CHECK(last == 0);
 }
 
+TEST_CASE("a remover with reserved memory allocates nothing from the second scan on") {
+  // The first one tells what the sensor is like.
+  DynaInsRemover::Config config =
+      GENERATE(DynaInsRemover::Config::paper(), DynaInsRemover::Config());
+  config.build_map = false;
+  const Scene scene = yard_with(van(14.0, 3.5, {-6.0, 0.0, 0.0}));
+  const Scan scan = scene.scan(sensor_at(0.0), 0.0);
+  const auto allocations_of_later_scans = [&](DynaInsRemover& remover) {
+    remover.push(scan.points, scan.T_world_sensor, 0.0);
+    const std::size_t before = allocations;
+    for (int i = 1; i < 40; ++i) remover.push(scan.points, scan.T_world_sensor, 0.1 * i);
+    return allocations - before;
+  };
+  DynaInsRemover unprepared(config);
+  CHECK(allocations_of_later_scans(unprepared) > 0);
+  DynaInsRemover remover(config);
+  remover.reserve_like(scan.points);
+  CHECK(allocations_of_later_scans(remover) == 0);
+}
+
 }  // namespace
 }  // namespace dynains::test

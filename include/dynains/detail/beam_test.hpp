@@ -19,7 +19,7 @@
 namespace dynains::detail {
 
 /// Beams that are tested together.
-inline constexpr std::size_t kBeamBlock = 128;
+inline constexpr std::size_t kBeamBlock = 256;
 
 /// What one reference says of many samples, a bit each.
 class Sights {

@@ -83,6 +83,13 @@ struct ScanSlot {
     for_each_verdict(touch_one);
   }
 
+  /// Room for as much as is known of another scan, beyond what goes by the number of points.
+  void make_room_like(const ScanSlot& other) {
+    detail::make_room(ids, other.ids.size());
+    detail::make_room(proof, other.proof.size());
+    detail::make_room(moved_ground, other.moved_ground.size());
+  }
+
   std::size_t non_ground_count() const { return split.count - split.ground_count; }
 
   ScanVerdict verdict() const {
