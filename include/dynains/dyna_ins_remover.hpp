@@ -143,10 +143,10 @@ class BasicDynaInsRemover {
       // A reference must not count twice.
       detail::call_if_there(evidence, [this](const auto& e) -> decltype(void(e.reference_step)) {
         if (revision.revision_period >= e.reference_step) return;
-        throw ConfigError("MapRevision.revision_period = " +
-                          std::to_string(revision.revision_period) +
-                          " must not be below FreeSpaceEvidence.reference_step = " +
-                          std::to_string(e.reference_step));
+        throw ConfigError(
+            "MapRevision.revision_period = " + std::to_string(revision.revision_period) +
+            " must not be below FreeSpaceEvidence.reference_step = " +
+            std::to_string(e.reference_step));
       });
     }
   };

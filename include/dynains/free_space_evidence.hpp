@@ -98,10 +98,9 @@ class FreeSpaceEvidence {
   void reserve(std::size_t scans) {
     const std::size_t images = grid_.rows > 0 ? std::min(scans / step_ + 1, views_.size()) : 0;
     for (std::size_t i = 0; i < images; ++i) views_[i].image.reserve(grid_);
-    const auto largest =
-        std::max_element(records_.begin(), records_.end(), [](const Record& a, const Record& b) {
-          return a.samples.size() < b.samples.size();
-        });
+    const auto largest = std::max_element(
+        records_.begin(), records_.end(),
+        [](const Record& a, const Record& b) { return a.samples.size() < b.samples.size(); });
     for (std::size_t i = 0; i < std::min(scans, records_.size()); ++i) {
       if (records_[i].samples.size() < largest->samples.size()) records_[i] = *largest;
     }

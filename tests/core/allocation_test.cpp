@@ -42,7 +42,7 @@ TEST_CASE("a warm remover allocates nothing, but for the map when it grows") {
   config.revision.revise_map = config.use_free_space;
   const bool build_map = GENERATE(false, true);
   config.build_map = build_map;
-  // Short rings, so that after seven rounds of twelve scans every place in them has held every scan.
+  // Short rings: after seven rounds of twelve scans, every place in them has held every scan.
   config.evidence.horizon = 6;
   config.evidence.memory = 20;
   // To and fro over the same ground: the second time, the map has it all.

@@ -20,8 +20,8 @@ struct CellBlock {
 /// Gives cells back what was noted for them, unless another cell took their place.
 class CellMemory {
  public:
-  static constexpr int kHalf = 16;     ///< bits of x and of y, which share a number
-  static constexpr int kPartBits = 2;  ///< of a part's place along each axis
+  static constexpr int kHalf = 16;               ///< bits of x and of y, which share a number
+  static constexpr int kPartBits = 2;            ///< of a part's place along each axis
   static constexpr int kParts = 1 << kPartBits;  ///< per axis; beyond, they begin again
   static constexpr std::uint64_t kAllParts = ~std::uint64_t{0};
 
@@ -55,8 +55,7 @@ class CellMemory {
   /// false, they stand for none.
   template <class Mask, class Int, std::size_t kCount>
   static void put(const Mask& is_cell, const Int& x, const Int& y, const Int& z,
-                  const Int& instance, const Int& part, std::size_t i,
-                  CellBlock<kCount>& cells) {
+                  const Int& instance, const Int& part, std::size_t i, CellBlock<kCount>& cells) {
     const Int xy = keep(is_cell, (x << kHalf) + (y & Int((1 << kHalf) - 1)));
     const Int z_kept = keep(is_cell, z);
     xy.store(&cells.xy[i]);
