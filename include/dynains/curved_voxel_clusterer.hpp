@@ -131,7 +131,7 @@ class CurvedVoxelClusterer {
     number_runs();
     number_points(points.size());
     clear_cells();
-    return {cluster_of_.data(), points.size()};
+    return {of_points_.data(), points.size()};
   }
 
   std::size_t cluster_count() const { return cluster_count_; }
@@ -146,8 +146,7 @@ class CurvedVoxelClusterer {
   void find_cells(PolarView points) {
     using detail::Constant8;
     const std::size_t count = points.size();
-    detail::grow(cell_of_, count + detail::kLanes);
-    detail::grow(cluster_of_, count + detail::kLanes);
+    detail::grow(of_points_, count + detail::kLanes);
     constexpr double kRadians = M_PI / 180.0;
     const Constant8 azimuth_scale(static_cast<float>(azimuths_ / (2.0 * M_PI)));
     const Constant8 elevation_scale(
@@ -162,7 +161,7 @@ class CurvedVoxelClusterer {
     const Constant8 beyond(static_cast<float>(ranges_));
     const Constant8 columns(static_cast<float>(ranges_ + 1));
     const int row_shift = row_shift_;
-    std::int32_t* const cells = cell_of_.data();
+    auto* const cells = reinterpret_cast<std::int32_t*>(of_points_.data());
     const Constant8 above_all(static_cast<float>(elevations_));
     const Constant8 below_all(-1.0F);
     detail::run_lanes([&](auto lanes) {
@@ -205,11 +204,11 @@ class CurvedVoxelClusterer {
       starts_.resize(blocks);
       run_before_.resize(blocks);
     }
-    const std::int32_t* const cell_of = cell_of_.data();
+    const std::uint32_t* const cell_of = of_points_.data();
     std::uint64_t* const occupied = occupied_.data();
     const std::size_t first_cell = first_cell_;
     const auto mark = [&](std::size_t i) {
-      const std::size_t cell = static_cast<std::size_t>(cell_of[i]) - first_cell;
+      const std::size_t cell = cell_of[i] - first_cell;
       occupied[cell / kBlock] |= std::uint64_t{1} << cell % kBlock;
     };
     constexpr std::size_t kStretches = 4;
@@ -375,8 +374,7 @@ class CurvedVoxelClusterer {
   void number_points(std::size_t count) {
     detail::run_lanes([&](auto) {
       for (std::size_t i = 0; i < count; ++i) {
-        const std::size_t cell = static_cast<std::size_t>(cell_of_[i]) - first_cell_;
-        cluster_of_[i] = number_of_run_[run_of(cell)];
+        of_points_[i] = number_of_run_[run_of(of_points_[i] - first_cell_)];
       }
     });
   }
@@ -399,8 +397,7 @@ class CurvedVoxelClusterer {
   std::int32_t highest_elevation_ = -1;
   std::size_t first_cell_ = 0;
   std::size_t cluster_count_ = 0;
-  std::vector<std::int32_t> cell_of_;
-  std::vector<std::uint32_t> cluster_of_;
+  std::vector<std::uint32_t> of_points_;  // cells of points, and in their place clusters
   // By block.
   std::vector<std::uint64_t> occupied_;  // a bit for each cell
   std::vector<std::uint64_t> starts_;    // those with which a run begins
