@@ -115,7 +115,7 @@ class FreeSpaceEvidence {
     if (scan == 0) forget();
     newest_ = scan;
     if (scan == 0 || record_of(scan - 1).segment != segment) {
-      origin_ = T_world_sensor.translation();
+      T_origin_world_ = T_world_sensor.inverse();
       segment_begin_ = scan;
     }
     Record& record = record_of(scan);
@@ -468,7 +468,7 @@ class FreeSpaceEvidence {
 
   // Finds the instances of the newest scan again in the scan before.
   void track(std::uint64_t scan, Record& record) {
-    linker_.measure(record.samples, record.T_world_sensor, origin_, record.tracked);
+    linker_.measure(record.samples, T_origin_world_ * record.T_world_sensor, record.tracked);
     if (scan > 0 && record_of(scan - 1).segment == record.segment && records_.size() > 1) {
       linker_.link(record_of(scan - 1).tracked, record.tracked);
     }
@@ -719,8 +719,9 @@ class FreeSpaceEvidence {
   std::optional<Eigen::Matrix3d> R_beams_level_;  // of a sensor that is tilted
   PointBuffer turned_ground_;
   PointBuffer turned_rest_;
-  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();  // of the cells of tracks
-  std::uint64_t segment_begin_ = 0;                   // first scan of the segment of the newest
+  // The first sensor of the segment, in whose frame cells of tracks lie wherever the world begins.
+  Eigen::Isometry3d T_origin_world_ = Eigen::Isometry3d::Identity();
+  std::uint64_t segment_begin_ = 0;  // first scan of the segment of the newest
   std::uint64_t newest_ = 0;
   std::uint64_t step_;  // scans from one image to the next
   std::vector<View> views_;

@@ -64,14 +64,14 @@ class InstanceLinker {
         max_height_(static_cast<float>(max_height)),
         overlap_(static_cast<float>(overlap)) {}
 
-  /// Sizes and cells of the instances of one scan. Cells are relative to `origin` (world, m), which
-  /// must be the same for scans that are to be linked and should be near them.
-  void measure(const InstanceSamples& samples, const Eigen::Isometry3d& T_world_sensor,
-               const Eigen::Vector3d& origin, TrackedInstances& out) {
+  /// Sizes and cells of the instances of one scan. Cells lie in the frame `origin` (m), which must
+  /// be the same for scans that are to be linked and should be near them.
+  void measure(const InstanceSamples& samples, const Eigen::Isometry3d& T_origin_sensor,
+               TrackedInstances& out) {
     out.instances.assign(samples.instance_count(), TrackedInstances::Instance());
     out.shapes.assign(samples.instance_count(), TrackedInstances::Shape());
     out.cells.clear();
-    find_cells(samples, T_world_sensor, origin);
+    find_cells(samples, T_origin_sensor);
     table_.assign(kTable, kEmpty);
     for (std::uint32_t i = 0; i < samples.instance_count(); ++i) {
       TrackedInstances::Shape& shape = out.shapes[i];
@@ -127,12 +127,9 @@ class InstanceLinker {
     return table_[detail::place_hash(cell.place) % kTable];
   }
 
-  // World cell of each sample.
-  void find_cells(const InstanceSamples& samples, const Eigen::Isometry3d& T_world_sensor,
-                  const Eigen::Vector3d& origin) {
+  // Cell of each sample.
+  void find_cells(const InstanceSamples& samples, const Eigen::Isometry3d& T_origin_sensor) {
     using namespace detail;
-    Eigen::Isometry3d T_origin_sensor = T_world_sensor;
-    T_origin_sensor.translation() -= origin;
     const LaneTransform to_cells(
         (Eigen::Scaling(1.0 / cell_) * T_origin_sensor.matrix().topRows<3>()).cast<float>());
     place_.resize(samples.size());

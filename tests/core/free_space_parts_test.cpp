@@ -445,12 +445,11 @@ void add_box(PointBuffer& points, std::vector<std::uint32_t>& instance_of, std::
   }
 }
 
-TEST_CASE("instances of consecutive scans are linked where they overlap in the world") {
+TEST_CASE("instances of consecutive scans are linked where they overlap") {
   InstanceSampler sampler(0.3, 0.6, 80.0, kNoLimit);
   InstanceLinker linker(0.8, 18.0, 4.5, 0.25);
   InstanceSamples samples[2];
   TrackedInstances tracked[2];
-  const Eigen::Vector3d origin(1e6, -2e6, 0.0);
   for (int scan = 0; scan < 2; ++scan) {
     // The sensor drives 1 m ahead; the first box as well, the second stands, the third is new, the
     // fourth is too long to be carried.
@@ -461,10 +460,10 @@ TEST_CASE("instances of consecutive scans are linked where they overlap in the w
     add_box(points, instance_of, 1, 20.0F - sensor, -4.0F, 4.0F);
     if (scan == 1) add_box(points, instance_of, 2, 30.0F, 12.0F, 4.0F);
     add_box(points, instance_of, scan == 0 ? 2 : 3, 10.0F - sensor, 20.0F, 25.0F);
-    Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
-    T_world_sensor.translation() = origin + Eigen::Vector3d(sensor, 0.0, 0.0);
+    Eigen::Isometry3d T_origin_sensor = Eigen::Isometry3d::Identity();
+    T_origin_sensor.translation().x() = static_cast<double>(sensor);
     sampler.sample(points, instance_of, scan == 0 ? 3 : 4, samples[scan]);
-    linker.measure(samples[scan], T_world_sensor, origin, tracked[scan]);
+    linker.measure(samples[scan], T_origin_sensor, tracked[scan]);
   }
   linker.link(tracked[0], tracked[1]);
   CHECK(tracked[1].instances[0].previous == 0);
