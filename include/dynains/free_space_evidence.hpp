@@ -113,7 +113,6 @@ class FreeSpaceEvidence {
                const GroundSplit& split, Span<const std::uint32_t> instance_of,
                std::size_t instance_count) {
     if (scan == 0) forget();
-    newest_ = scan;
     if (scan == 0 || record_of(scan - 1).segment != segment) {
       T_origin_world_ = T_world_sensor.inverse();
       segment_begin_ = scan;
@@ -153,7 +152,7 @@ class FreeSpaceEvidence {
     weigh(record);
     for (std::uint64_t older = 0; older < step_; ++older) {
       if (turn_of(older) == record.phase) {
-        refer_older(scan - record.phase, older, views_[images_ % views_.size()]);
+        refer_older(older, newest_view());
       }
     }
     if (config_.use_tracks) run_beliefs(scan);
@@ -185,7 +184,7 @@ class FreeSpaceEvidence {
   /// points (m; padded for wide loads).
   const detail::Sights& see(const PointBuffer& points, std::size_t count,
                             const Eigen::Isometry3d& T_world_points) {
-    look(points, count, T_world_points, views_[images_ % views_.size()]);
+    look(points, count, T_world_points, newest_view());
     return sights_;
   }
 
@@ -243,7 +242,7 @@ class FreeSpaceEvidence {
   // Beams are rows of an image only in the frame of the sensor, tilted as it is.
   void make_image(std::uint64_t scan, std::uint64_t segment, const Eigen::Isometry3d& T_world_level,
                   const GroundSplit& split) {
-    View& view = views_[images_ % views_.size()];
+    View& view = newest_view();
     view.scan = scan;
     view.segment = segment;
     const auto reach = static_cast<float>(config_.lateral_margin);
@@ -269,6 +268,8 @@ class FreeSpaceEvidence {
     const std::uint64_t at = scan + static_cast<std::uint64_t>(std::int64_t{lag});
     return view.scan == at && view.segment == record.segment ? &view : nullptr;
   }
+
+  View& newest_view() { return views_[images_ % views_.size()]; }
 
   Record& record_of(std::uint64_t scan) { return records_[scan % records_.size()]; }
 
@@ -297,11 +298,11 @@ class FreeSpaceEvidence {
   std::uint64_t turn_of(std::uint64_t phase) const { return phase == 0 && step_ > 1 ? 1 : phase; }
 
   // Holds the image of a scan against those before it that are of a phase.
-  void refer_older(std::uint64_t scan, std::uint64_t phase, const View& image) {
+  void refer_older(std::uint64_t phase, const View& image) {
     for (const int lag : after_[phase]) {
       const auto back = static_cast<std::uint64_t>(lag);
-      if (back > scan) break;
-      Record& older = record_of(scan - back);
+      if (back > image.scan) break;
+      Record& older = record_of(image.scan - back);
       if (older.segment != image.segment) continue;
       refer(older, image, lag);
       weigh(older);
@@ -469,7 +470,7 @@ class FreeSpaceEvidence {
   // Finds the instances of the newest scan again in the scan before.
   void track(std::uint64_t scan, Record& record) {
     linker_.measure(record.samples, T_origin_world_ * record.T_world_sensor, record.tracked);
-    if (scan > 0 && record_of(scan - 1).segment == record.segment && records_.size() > 1) {
+    if (scan > segment_begin_) {
       linker_.link(record_of(scan - 1).tracked, record.tracked);
     }
     for (std::size_t i = 0; i < predecessors_.size(); ++i) {
@@ -722,8 +723,7 @@ class FreeSpaceEvidence {
   // The first sensor of the segment, in whose frame cells of tracks lie wherever the world begins.
   Eigen::Isometry3d T_origin_world_ = Eigen::Isometry3d::Identity();
   std::uint64_t segment_begin_ = 0;  // first scan of the segment of the newest
-  std::uint64_t newest_ = 0;
-  std::uint64_t step_;  // scans from one image to the next
+  std::uint64_t step_;               // scans from one image to the next
   std::vector<View> views_;
   std::uint64_t images_ = 0;  // number of the newest
   // By phase: scans to the references before and after.

@@ -163,20 +163,19 @@ class InstanceSampler {
   }
 
   // The first point of each voxel, of supervoxels that have room. Most points are of voxels that
-  // are remembered: the others are listed first, in order, without a branch.
+  // are remembered.
   void take_samples(PointsView points, std::uint32_t* met_of) {
     detail::grow(samples_, sample_count_ + kBlock);
     detail::grow(supervoxels_, supervoxel_count_ + kBlock);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const detail::CellMemory::Entry& entry = memory_.at(cells_, i);
+      detail::CellMemory::Entry& entry = memory_.at(cells_, i);
       const bool known = !entry.is_other(cells_, i) && entry.has_part(cells_, i);
-      met_of[i] = known ? entry.number : take_sample(points, i);
+      met_of[i] = known ? entry.number : take_sample(points, i, entry);
     }
   }
 
-  // Returns its supervoxel.
-  std::uint32_t take_sample(PointsView points, std::size_t i) {
-    detail::CellMemory::Entry& entry = memory_.at(cells_, i);
+  // Returns its supervoxel. `entry`: where its cell is remembered, or will be.
+  std::uint32_t take_sample(PointsView points, std::size_t i, detail::CellMemory::Entry& entry) {
     if (entry.is_other(cells_, i)) {
       supervoxels_[supervoxel_count_] = {cells_.xy[i], cells_.z[i], cells_.instance[i], 0};
       entry = {cells_.xy[i], cells_.z[i], cells_.instance[i], supervoxel_count_++, 0};
