@@ -523,8 +523,8 @@ class FreeSpaceEvidence {
         add_hull(record, instance);
         continue;
       }
-      // Something that moves beside something that stays: single supervoxels may be chance.
-      groups_.keep_large(samples, kLeastGroup, kLeastGroupSamples, free_);
+      // Something that moves beside something that stays: a few samples may be chance.
+      groups_.keep_large(samples, kLeastGroup, free_);
       for (const std::uint32_t s : free_) verdicts_[s].cause = Cause::kFreeSpace;
     }
   }
@@ -696,9 +696,8 @@ class FreeSpaceEvidence {
   static constexpr float kLeastKnown = 0.3F;  // share of an instance, to speak of standing still
   static constexpr float kContradictingHits = 0.85F;  // of what is seen of an instance
   static constexpr float kStillShare = 0.02F;    // moved share of the known below which it stands
-  static constexpr std::size_t kLeastGroup = 2;  // supervoxels that go without the rest
-  static constexpr std::size_t kLeastGroupSamples = 4;  // and their samples
-  static constexpr double kDefaultCell = 0.2;           // m, of the footprint if it is off
+  static constexpr std::size_t kLeastGroup = 4;  // samples that go without the rest
+  static constexpr double kDefaultCell = 0.2;    // m, of the footprint if it is off
   static constexpr std::uint32_t kGroundFree = 2;
   static constexpr float kGroundShare = 0.3F;
 

@@ -14,9 +14,9 @@ namespace dynains {
 class SupervoxelGroups {
  public:
   /// Keeps of `members` (supervoxels of one instance, numbers into `samples`) those whose group
-  /// has at least `least_members` supervoxels and `least_samples` samples.
-  void keep_large(const InstanceSamples& samples, std::size_t least_members,
-                  std::size_t least_samples, std::vector<std::uint32_t>& members) {
+  /// has at least `least_samples` samples.
+  void keep_large(const InstanceSamples& samples, std::size_t least_samples,
+                  std::vector<std::uint32_t>& members) {
     entries_.clear();
     for (const std::uint32_t member : members) {
       entries_.push_back({samples.place[member], member, false});
@@ -33,7 +33,7 @@ class SupervoxelGroups {
         const std::uint32_t s = entries_[entry].member;
         count += samples.sample_begin[s + 1] - samples.sample_begin[s];
       }
-      if (group_.size() < least_members || count < least_samples) continue;
+      if (count < least_samples) continue;
       for (const std::size_t entry : group_) members.push_back(entries_[entry].member);
     }
   }

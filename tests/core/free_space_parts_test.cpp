@@ -235,12 +235,12 @@ TEST_CASE("groups of supervoxels connect over faces, edges and corners, and only
       {{0, 0, 0}, {1, 1, 1}, {5, 0, 0}, {7, 0, 0}, {-1, -1, 1}, {0, 0, -40}, {0, 1, -40}}, 2);
   SupervoxelGroups groups;
   std::vector<std::uint32_t> members = {0, 1, 2, 3, 4, 5, 6};
-  groups.keep_large(samples, 2, 4, members);
+  groups.keep_large(samples, 4, members);
   std::sort(members.begin(), members.end());
   CHECK(members == std::vector<std::uint32_t>{0, 1, 4, 5, 6});
   // Three supervoxels of two samples reach six samples, two reach four.
   members = {0, 1, 2, 3, 4, 5, 6};
-  groups.keep_large(samples, 2, 5, members);
+  groups.keep_large(samples, 5, members);
   std::sort(members.begin(), members.end());
   CHECK(members == std::vector<std::uint32_t>{0, 1, 4});
 }
@@ -280,7 +280,7 @@ TEST_CASE("groups of random supervoxels are those of a search over all pairs") {
       members.push_back(i);
       if (sizes[group[i]] >= 3) expected.push_back(i);
     }
-    groups.keep_large(samples, 3, 1, members);
+    groups.keep_large(samples, 3, members);
     std::sort(members.begin(), members.end());
     REQUIRE(members == expected);
   }

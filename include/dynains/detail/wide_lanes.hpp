@@ -13,8 +13,32 @@
 
 namespace dynains::detail {
 
+using WideInts = std::int32_t __attribute__((vector_size(32)));
+using WideFloats = float __attribute__((vector_size(32)));
+
+// What vectors have no operator for. By reference: no vector passes the border to code that is
+// compiled for other registers. Clang does not inline a function for AVX2 into a lambda that is
+// not, and does better by halves.
+#if defined(__x86_64__) && defined(__SSE2__) && !defined(__clang__)
+[[gnu::target("avx2")]] inline unsigned sign_bits(const WideInts& of) {
+  return static_cast<unsigned>(__builtin_ia32_movmskps256(WideFloats(of)));
+}
+[[gnu::target("avx2")]] inline void take_root(WideFloats& of) { of = __builtin_ia32_sqrtps256(of); }
+#else
+inline unsigned sign_bits(const WideInts& of) {
+  return Mask8{__builtin_shufflevector(of, of, 0, 1, 2, 3),
+               __builtin_shufflevector(of, of, 4, 5, 6, 7)}
+      .bits();
+}
+inline void take_root(WideFloats& of) {
+  const Float4 low = sqrt(Float4(__builtin_shufflevector(of, of, 0, 1, 2, 3)));
+  const Float4 high = sqrt(Float4(__builtin_shufflevector(of, of, 4, 5, 6, 7)));
+  of = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+#endif
+
 struct WideMask8 {
-  using Vector = std::int32_t __attribute__((vector_size(32)));
+  using Vector = WideInts;
   Vector v;
 
   friend WideMask8 operator&(const WideMask8& a, const WideMask8& b) { return {a.v & b.v}; }
@@ -22,14 +46,12 @@ struct WideMask8 {
   friend WideMask8 operator|(const WideMask8& a, const WideMask8& b) { return {a.v | b.v}; }
   friend WideMask8 operator~(const WideMask8& a) { return {~a.v}; }
 
-  Mask8 halves() const {
-    return {__builtin_shufflevector(v, v, 0, 1, 2, 3), __builtin_shufflevector(v, v, 4, 5, 6, 7)};
-  }
-  unsigned bits() const { return halves().bits(); }
+  /// Lane i as bit i.
+  unsigned bits() const { return sign_bits(v); }
 };
 
 struct WideInt8 {
-  using Vector = WideMask8::Vector;
+  using Vector = WideInts;
   Vector v;
 
   WideInt8() = default;
@@ -55,7 +77,7 @@ struct WideInt8 {
 };
 
 struct WideFloat8 {
-  using Vector = float __attribute__((vector_size(32)));
+  using Vector = WideFloats;
   Vector v;
 
   WideFloat8() = default;
@@ -85,11 +107,10 @@ struct WideFloat8 {
   friend F min(const F& a, const F& b) { return F(a.v < b.v ? a.v : b.v); }
   friend F max(const F& a, const F& b) { return F(a.v > b.v ? a.v : b.v); }
   friend F abs(const F& a) { return float_of(bits_of(a) & WideMask8{WideInt8(0x7FFFFFFF).v}); }
-  // Halves as vectors of their own: as a pair, they would pass through memory.
   friend F sqrt(const F& a) {
-    const Float4 low = sqrt(Float4(__builtin_shufflevector(a.v, a.v, 0, 1, 2, 3)));
-    const Float4 high = sqrt(Float4(__builtin_shufflevector(a.v, a.v, 4, 5, 6, 7)));
-    return F(__builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7));
+    F root = a;
+    take_root(root.v);
+    return root;
   }
 
   static F float_of(const WideMask8& a) { return F(Vector(a.v)); }
