@@ -27,7 +27,7 @@ struct FreeSpaceConfig {
   double tau_whole = 0.84;       ///< the same for a whole instance at once
   double remove_share = 0.2;     ///< share of free supervoxels that removes the whole instance
   double see_share = 0.6;        ///< share of an instance that one reference must see through
-  double footprint = 0.25;       ///< m, ground this near to removed points goes with them
+  double footprint = 0.2;        ///< m, ground this near to removed points goes with them
   bool use_tracks = true;        ///< carry beliefs along instances that overlap from scan to scan
   double tau_track = 0.87;       ///< belief along its track from which an instance moved
   double still_weight = 0.1;     ///< of an increment, for a scan in which an instance stood still
