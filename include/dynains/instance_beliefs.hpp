@@ -1,0 +1,251 @@
+// What references say of the instances of one scan, as belief per supervoxel and per instance.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/belief_updater.hpp"
+#include "dynains/detail/beam_test.hpp"
+#include "dynains/detail/bits.hpp"
+#include "dynains/detail/free_space_sum.hpp"
+#include "dynains/detail/room.hpp"
+#include "dynains/detail/wide_lanes.hpp"
+#include "dynains/free_space_config.hpp"
+#include "dynains/instance_samples.hpp"
+
+namespace dynains {
+
+/// Beliefs on the samples of one scan.
+struct InstanceBeliefs {
+  /// That a place was free: a log-odds sum that starts again whenever it falls to zero (Page's test
+  /// for a change, 1954). A place that is hit for long and then seen free has changed, and hits
+  /// never cancel what was seen free; yet thin things, which single beams miss, are hit too often
+  /// in between for the sum to grow.
+  struct Belief {
+    float level = 0.0F;          ///< of the references summed up now; never negative
+    float peak = 0.0F;           ///< the highest it was
+    std::uint8_t contested = 0;  ///< whether some reference hit the place
+  };
+  /// Samples of an instance.
+  struct Share {
+    std::uint32_t total = 0;
+    std::uint32_t moved = 0;    ///< in supervoxels that were free
+    std::uint32_t decided = 0;  ///< in supervoxels of which anything is known
+  };
+
+  std::vector<Belief> supervoxels;
+  std::vector<Belief> wholes;         ///< by instance, of all its samples together
+  std::vector<Share> shares;          ///< by instance
+  std::vector<std::uint64_t> open;    ///< by sample, a bit: whether a hit may change its belief
+  std::vector<std::uint8_t> changed;  ///< by instance: whether any of this did; for the caller
+};
+
+/// Takes in what references see, and says what follows from it.
+class InstanceBeliefUpdater {
+ public:
+  using Belief = InstanceBeliefs::Belief;
+  using Share = InstanceBeliefs::Share;
+
+  static constexpr float kLeastKnown = 0.3F;  ///< share of an instance, to say that it stands still
+
+  explicit InstanceBeliefUpdater(const FreeSpaceConfig& config)
+      : see_share_(static_cast<float>(config.see_share)),
+        remove_share_(static_cast<float>(config.remove_share)),
+        sum_(config.p_free, config.p_hit),
+        free_level_(static_cast<float>(log_odds(config.tau_free))),
+        contested_level_(static_cast<float>(log_odds(config.tau_contested))),
+        whole_level_(static_cast<float>(log_odds(config.tau_whole))) {}
+
+  /// Log-odds of one observation of free space.
+  float increment() const { return sum_.increment(); }
+  /// Log-odds from which a place that no reference hit was free.
+  float free_level() const { return free_level_; }
+
+  /// Nothing is known yet.
+  void begin(const InstanceSamples& samples, InstanceBeliefs& out) const {
+    const std::size_t instances = samples.instance_count();
+    out.supervoxels.assign(samples.supervoxel_count(), Belief());
+    out.wholes.assign(instances, Belief());
+    out.changed.assign(instances, 1);
+    out.shares.resize(instances);
+    for (std::size_t instance = 0; instance < instances; ++instance) {
+      out.shares[instance] = {samples.count(instance), 0, 0};
+    }
+    out.open.assign(samples.size() / 64 + 1, ~std::uint64_t{0});
+  }
+
+  /// What follows is summed apart from what was before.
+  void begin_other_side(const InstanceSamples& samples, InstanceBeliefs& beliefs) const {
+    for (std::uint32_t s = 0; s < beliefs.supervoxels.size(); ++s) {
+      Belief& belief = beliefs.supervoxels[s];
+      if (belief.contested != 0 && belief.level > 0.0F) flip_open(samples, s, beliefs);
+      belief.level = 0.0F;
+    }
+    for (Belief& belief : beliefs.wholes) belief.level = 0.0F;
+  }
+
+  /// Takes in what one reference saw of the samples. Calls `on_hit(instance)` for those of which
+  /// enough was seen, and nearly all of it still there.
+  template <class OnHit>
+  void update(const InstanceSamples& samples, const detail::Sights& sights,
+              InstanceBeliefs& beliefs, OnHit&& on_hit) {
+    // Processors with wide lanes find and count bits by one instruction.
+    detail::run_lanes([&](auto) {
+      update_supervoxels(samples, sights, beliefs);
+      update_wholes(samples, sights, beliefs, on_hit);
+    });
+  }
+
+  bool is_free(const Belief& belief) const {
+    return belief.peak >= (belief.contested != 0 ? contested_level_ : free_level_);
+  }
+
+  /// Whether an instance was seen through as a whole, or enough of what is known of it was free.
+  bool removes_whole(const InstanceBeliefs& beliefs, std::size_t instance) const {
+    const Share& share = beliefs.shares[instance];
+    const Belief& whole = beliefs.wholes[instance];
+    return whole.peak >= (whole.contested != 0 ? whole_level_ : free_level_) ||
+           (share.moved > 0 &&
+            static_cast<float>(share.moved) >= remove_share_ * static_cast<float>(share.decided));
+  }
+
+ private:
+  static constexpr float kLeastView = 0.1F;   // share of an instance that a reference must see
+  static constexpr float kLeastFree = 0.15F;  // share of a supervoxel that must be seen free
+  static constexpr std::uint32_t kLeastHit =
+      4;  // one of so many samples of a supervoxel must be hit
+  static constexpr float kContradictingHits = 0.85F;  // of what is seen of an instance
+
+  // What the reference saw may change supervoxels of which something was seen free, or was hit
+  // while they are open: few, once a scan has met some references. All are asked for before the
+  // first is needed: what is known of an older scan lies far away by now.
+  void update_supervoxels(const InstanceSamples& samples, const detail::Sights& sights,
+                          InstanceBeliefs& beliefs) {
+    const std::size_t count = find_touched(samples, sights, beliefs);
+    for (std::size_t i = 0; i < count; ++i) {
+      update_supervoxel(samples, sights, touched_[i], beliefs);
+    }
+  }
+
+  // Leaves their numbers in `touched_`, in order, and returns how many there are.
+  std::size_t find_touched(const InstanceSamples& samples, const detail::Sights& sights,
+                           const InstanceBeliefs& beliefs) {
+    constexpr std::size_t kBits = 64;
+    detail::grow(touched_, samples.supervoxel_count() + 1);
+    std::size_t count = 0;
+    std::uint32_t last = kNoCluster;
+    for (std::size_t begin = 0; begin < samples.size(); begin += kBits) {
+      std::uint64_t seen =
+          sights.free_word(begin) | (sights.hit_word(begin) & beliefs.open[begin / kBits]);
+      const std::size_t left = samples.size() - begin;
+      if (left < kBits) seen &= (std::uint64_t{1} << left) - 1;
+      detail::for_each_bit(seen, [&](std::size_t i) {
+        const std::uint32_t s = samples.supervoxel_of[begin + i];
+        touched_[count] = s;
+        count += s != last ? 1 : 0;
+        last = s;
+        __builtin_prefetch(&beliefs.supervoxels[s]);
+        __builtin_prefetch(&samples.sample_begin[s]);
+        __builtin_prefetch(&samples.instance_of[s]);
+      });
+    }
+    return count;
+  }
+
+  void update_supervoxel(const InstanceSamples& samples, const detail::Sights& sights,
+                         std::uint32_t s, InstanceBeliefs& beliefs) const {
+    const std::uint32_t begin = samples.sample_begin[s];
+    const std::uint32_t end = samples.sample_begin[s + 1];
+    Belief& belief = beliefs.supervoxels[s];
+    const bool was_open = is_open(belief);
+    const bool was_free = is_free(belief);
+    const bool was_decided = was_free || belief.contested != 0;
+    const bool changed = update(belief, sights.count(begin, end), end - begin);
+    if (is_open(belief) != was_open) flip_open(samples, s, beliefs);
+    if (!changed) return;
+    const std::uint32_t instance = samples.instance_of[s];
+    Share& share = beliefs.shares[instance];
+    const bool free = is_free(belief);
+    const bool decided = free || belief.contested != 0;
+    share.moved += (free ? end - begin : 0) - (was_free ? end - begin : 0);
+    share.decided += (decided ? end - begin : 0) - (was_decided ? end - begin : 0);
+    beliefs.changed[instance] = 1;
+  }
+
+  // Whether hits may change it: what was hit before and is not seen free stays as it is.
+  static bool is_open(const Belief& belief) { return belief.contested == 0 || belief.level > 0.0F; }
+  static void flip_open(const InstanceSamples& samples, std::uint32_t s, InstanceBeliefs& beliefs) {
+    std::uint32_t begin = samples.sample_begin[s];
+    const std::uint32_t end = samples.sample_begin[s + 1];
+    while (begin < end) {
+      const std::uint32_t last = std::min(end - 1, begin | 63U);  // in this word
+      beliefs.open[begin / 64] ^= ~std::uint64_t{0} >> (63 - (last - begin)) << begin % 64;
+      begin = last + 1;
+    }
+  }
+
+  // Whether the reference saw through whole instances.
+  template <class OnHit>
+  void update_wholes(const InstanceSamples& samples, const detail::Sights& sights,
+                     InstanceBeliefs& beliefs, OnHit&& on_hit) const {
+    std::uint32_t end = 0;
+    for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
+      const std::uint32_t begin = end;
+      end += beliefs.shares[instance].total;
+      const detail::Sights::Count all = sights.count(begin, end);
+      const auto count = static_cast<float>(end - begin);
+      const auto seen = static_cast<float>(all.free + all.hit);
+      if (seen < std::max(2.0F, kLeastView * count)) continue;
+      const float share = static_cast<float>(all.free) / seen;
+      if (share >= see_share_) {
+        raise(beliefs.wholes[instance], share);
+        beliefs.changed[instance] = 1;
+      } else if (share <= detail::FreeSpaceSum::kHitShare) {
+        lower(beliefs.wholes[instance]);
+        beliefs.changed[instance] = 1;
+        const auto hits = static_cast<float>(all.hit);
+        if (share <= 1.0F - kContradictingHits && hits >= kLeastKnown * count) on_hit(instance);
+      }
+    }
+  }
+
+  // For something that was seen. Eq. 15 with three-way increments as in Eq. 18, by the share of
+  // samples seen free; shares that say little, or are of few samples, change nothing. Returns
+  // whether anything changed that verdicts look at.
+  bool update(Belief& belief, detail::Sights::Count seen, std::uint32_t samples) const {
+    const bool hits =
+        seen.hit >= std::max(std::min(2U, samples), (samples + kLeastHit - 1) / kLeastHit);
+    const auto free = static_cast<float>(seen.free);
+    const float share = free / static_cast<float>(seen.free + seen.hit);
+    if (free >= kLeastFree * static_cast<float>(samples) &&
+        share >= detail::FreeSpaceSum::kFreeShare) {
+      raise(belief, share);
+      return true;
+    }
+    if (!hits || share > detail::FreeSpaceSum::kHitShare) return false;
+    const bool first_hit = belief.contested == 0;
+    lower(belief);
+    return first_hit;
+  }
+
+  void raise(Belief& belief, float share) const {
+    sum_.raise(belief.level, share);
+    belief.peak = std::max(belief.peak, belief.level);
+  }
+  void lower(Belief& belief) const {
+    belief.contested = 1;
+    sum_.lower(belief.level);
+  }
+
+  float see_share_;
+  float remove_share_;
+  detail::FreeSpaceSum sum_;
+  float free_level_;
+  float contested_level_;
+  float whole_level_;
+  std::vector<std::uint32_t> touched_;  // supervoxels of which a reference saw something
+};
+
+}  // namespace dynains
