@@ -1,0 +1,380 @@
+// Beliefs of the free-space evidence: by hand, and against a sum without short cuts.
+#include "dynains/instance_beliefs.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/reference_views.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+namespace dynains::test {
+namespace {
+
+using Belief = InstanceBeliefs::Belief;
+
+constexpr float kFreeStep = 0.8472979F;  // log-odds of p_free = 0.7
+constexpr float kHitStep = -1.6959109F;  // log-odds of p_hit = 0.155
+
+// Supervoxels of each instance, by their numbers of samples.
+using Instances = std::vector<std::vector<std::uint32_t>>;
+
+InstanceSamples samples_of(const Instances& instances) {
+  InstanceSamples samples;
+  samples.sample_begin = {0};
+  samples.supervoxel_begin = {0};
+  std::uint32_t instance = 0;
+  for (const std::vector<std::uint32_t>& supervoxels : instances) {
+    for (const std::uint32_t count : supervoxels) {
+      samples.supervoxel_of.insert(samples.supervoxel_of.end(), count,
+                                   static_cast<std::uint32_t>(samples.supervoxel_count()));
+      samples.sample_begin.push_back(samples.sample_begin.back() + count);
+      samples.instance_of.push_back(instance);
+    }
+    samples.supervoxel_begin.push_back(static_cast<std::uint32_t>(samples.supervoxel_count()));
+    ++instance;
+  }
+  return samples;
+}
+
+enum class Sight : std::uint8_t { kNothing, kFree, kHit };
+
+detail::Sights sights_of(const std::vector<Sight>& seen) {
+  detail::Sights sights;
+  sights.resize(seen.size());
+  const detail::Sights::Bytes bytes = sights.bytes();
+  for (std::size_t byte = 0; byte * 8 < seen.size(); ++byte) {
+    bytes.free[byte] = 0;
+    bytes.hit[byte] = 0;
+    for (std::size_t k = 0; k < std::min<std::size_t>(8, seen.size() - byte * 8); ++k) {
+      const Sight sight = seen[byte * 8 + k];
+      bytes.free[byte] =
+          static_cast<std::uint8_t>(bytes.free[byte] | (sight == Sight::kFree ? 1U << k : 0U));
+      bytes.hit[byte] =
+          static_cast<std::uint8_t>(bytes.hit[byte] | (sight == Sight::kHit ? 1U << k : 0U));
+    }
+  }
+  return sights;
+}
+
+// One scan and what references say of it.
+struct Scan {
+  explicit Scan(const Instances& instances)
+      : updater(FreeSpaceConfig()), samples(samples_of(instances)) {
+    updater.begin(samples, beliefs);
+  }
+
+  // By supervoxel: samples seen free, then samples hit, of the first ones.
+  struct Seen {
+    std::size_t free, hit;
+  };
+  void see(const std::vector<Seen>& seen) {
+    std::vector<Sight> sights(samples.size(), Sight::kNothing);
+    for (std::size_t s = 0; s < seen.size(); ++s) {
+      const auto begin = sights.begin() + samples.sample_begin[s];
+      std::fill_n(begin, seen[s].free, Sight::kFree);
+      std::fill_n(begin + static_cast<std::ptrdiff_t>(seen[s].free), seen[s].hit, Sight::kHit);
+    }
+    hits.clear();
+    updater.update(samples, sights_of(sights), beliefs,
+                   [&](std::size_t instance) { hits.push_back(instance); });
+  }
+  const Belief& belief(std::size_t supervoxel = 0) const { return beliefs.supervoxels[supervoxel]; }
+  bool is_free(std::size_t supervoxel = 0) const { return updater.is_free(belief(supervoxel)); }
+  bool removes(std::size_t instance = 0) const { return updater.removes_whole(beliefs, instance); }
+
+  InstanceBeliefUpdater updater;
+  InstanceSamples samples;
+  InstanceBeliefs beliefs;
+  std::vector<std::size_t> hits;
+};
+
+TEST_CASE("what one reference says of a supervoxel changes its belief by one of three steps") {
+  struct Case {
+    std::uint32_t samples;
+    Scan::Seen seen;
+    float level;
+    bool contested;
+  };
+  for (const Case& c : {
+           Case{4, {4, 0}, 2.0F * kFreeStep, false},  // wholly free
+           Case{10, {9, 1}, kFreeStep, false},        // 0.9 is not more than 0.9
+           Case{20, {19, 1}, 2.0F * kFreeStep, false},
+           Case{5, {3, 2}, kFreeStep, false},          // 0.6 speaks for free space
+           Case{9, {5, 4}, 0.0F, false},               // 0.56 says nothing
+           Case{10, {2, 0}, 2.0F * kFreeStep, false},  // two of ten are a view of it
+           Case{10, {1, 0}, 0.0F, false},              // one is not
+           Case{10, {3, 7}, 0.0F, true},               // 0.3 is a hit
+           Case{9, {3, 6}, 0.0F, false},               // 0.33 is not
+           Case{4, {0, 2}, 0.0F, true},                // two hits
+           Case{4, {0, 1}, 0.0F, false},               // one is chance ...
+           Case{1, {0, 1}, 0.0F, true},                // ... unless there is no other sample
+           Case{12, {0, 3}, 0.0F, true},               // a quarter of many
+           Case{12, {0, 2}, 0.0F, false}, Case{4, {0, 0}, 0.0F, false},  // not seen
+       }) {
+    Scan scan(Instances{{c.samples}});
+    scan.see({c.seen});
+    INFO(c.samples << " samples, " << c.seen.free << " free, " << c.seen.hit << " hit");
+    CHECK(scan.belief().level == Approx(c.level));
+    CHECK(scan.belief().peak == Approx(c.level));
+    CHECK((scan.belief().contested != 0) == c.contested);
+  }
+}
+
+TEST_CASE("a place that was hit needs more evidence, and starts again from zero") {
+  Scan scan(Instances{{4}});
+  scan.see({{4, 0}});
+  CHECK(scan.is_free());  // 1.69 is above the 0.62 of tau_free
+  scan.see({{0, 2}});
+  CHECK_FALSE(scan.is_free());  // below the 2.20 of tau_contested
+  CHECK(scan.belief().level == Approx(std::max(0.0F, 2.0F * kFreeStep + kHitStep)).margin(1e-6));
+  scan.see({{0, 4}});
+  CHECK(scan.belief().level == 0.0F);  // never below zero
+  CHECK(scan.belief().peak == Approx(2.0F * kFreeStep));
+  scan.see({{3, 1}});
+  CHECK_FALSE(scan.is_free());
+  scan.see({{4, 0}});
+  CHECK(scan.is_free());  // 2.54
+  scan.see({{0, 4}});
+  CHECK(scan.is_free());  // what was seen free stays
+  CHECK(scan.belief().level == Approx(3.0F * kFreeStep + kHitStep));
+}
+
+TEST_CASE("references before and after a scan do not add up, but the higher side counts") {
+  Scan scan(Instances{{4}});
+  scan.see({{0, 4}});
+  scan.see({{4, 0}});
+  CHECK(scan.belief().peak == Approx(2.0F * kFreeStep));
+  scan.updater.begin_other_side(scan.samples, scan.beliefs);
+  CHECK(scan.belief().level == 0.0F);
+  scan.see({{3, 1}});
+  CHECK(scan.belief().peak == Approx(2.0F * kFreeStep));
+  CHECK_FALSE(scan.is_free());
+  scan.see({{4, 0}});
+  CHECK(scan.is_free());
+}
+
+TEST_CASE("a fifth of what is known of an instance removes it") {
+  Scan enough(Instances{{2, 8}});
+  enough.see({{2, 0}, {0, 8}});
+  CHECK(enough.beliefs.shares[0].moved == 2);
+  CHECK(enough.beliefs.shares[0].decided == 10);
+  CHECK(enough.removes());
+
+  Scan too_little(Instances{{2, 9}});
+  too_little.see({{2, 0}, {0, 9}});
+  CHECK(too_little.beliefs.shares[0].decided == 11);
+  CHECK_FALSE(too_little.removes());
+
+  // What nobody saw is not known.
+  Scan hidden(Instances{{2, 9, 20}});
+  hidden.see({{2, 0}, {0, 8}, {0, 0}});
+  CHECK(hidden.beliefs.shares[0].decided == 11);
+  CHECK(hidden.beliefs.shares[0].total == 31);
+}
+
+TEST_CASE("an instance that one reference saw through as a whole is removed") {
+  // Two samples of twenty are too little for any of its supervoxels.
+  const std::vector<std::uint32_t> supervoxels(5, 20);
+  Scan scan(Instances{supervoxels});
+  scan.see({{2, 1}, {2, 1}, {2, 2}, {2, 2}, {2, 0}});  // 10 of 16: 0.63
+  CHECK(scan.beliefs.wholes[0].level == Approx(kFreeStep));
+  CHECK(scan.beliefs.shares[0].moved == 0);
+  CHECK(scan.removes());
+
+  Scan half(Instances{supervoxels});
+  half.see({{2, 2}, {2, 2}, {2, 2}, {2, 1}, {2, 1}});  // 10 of 18: 0.56
+  CHECK(half.beliefs.wholes[0].level == 0.0F);
+  CHECK_FALSE(half.removes());
+
+  // Nine of a hundred samples are no view of it, ten are.
+  Scan few(Instances{supervoxels});
+  few.see({{2, 0}, {2, 0}, {2, 0}, {2, 0}, {1, 0}});
+  CHECK(few.beliefs.wholes[0].level == 0.0F);
+  few.see({{2, 0}, {2, 0}, {2, 0}, {2, 0}, {2, 0}});
+  CHECK(few.beliefs.wholes[0].level == Approx(2.0F * kFreeStep));
+}
+
+TEST_CASE("an instance is told to be still there where nearly all that is seen of it is") {
+  Scan scan(Instances{{10}, {10}, {10}, {10}});
+  // Of the second too little is seen, of the third too much is free, of the last nothing is seen.
+  scan.see({{0, 3}, {0, 2}, {1, 5}, {0, 0}});
+  CHECK(scan.hits == std::vector<std::size_t>{0});
+}
+
+// The same sums, each supervoxel and instance anew for every reference.
+void add_slowly(const InstanceSamples& samples, const std::vector<Sight>& sights,
+                std::vector<Belief>& supervoxels, std::vector<Belief>& wholes) {
+  const FreeSpaceConfig config;
+  const auto increment = static_cast<float>(log_odds(config.p_free));
+  const auto decrement = static_cast<float>(log_odds(config.p_hit));
+  const auto count = [&](std::size_t begin, std::size_t end, Sight sight) {
+    return static_cast<float>(std::count(sights.begin() + static_cast<std::ptrdiff_t>(begin),
+                                         sights.begin() + static_cast<std::ptrdiff_t>(end), sight));
+  };
+  const auto add = [&](Belief& belief, float share, bool raises, bool lowers) {
+    if (raises) {
+      belief.level += share > 0.9F ? 2.0F * increment : increment;
+      belief.peak = std::max(belief.peak, belief.level);
+    } else if (lowers) {
+      belief.contested = 1;
+      belief.level = std::max(0.0F, belief.level + decrement);
+    }
+  };
+  for (std::size_t s = 0; s < supervoxels.size(); ++s) {
+    const std::size_t begin = samples.sample_begin[s], end = samples.sample_begin[s + 1];
+    const auto size = static_cast<float>(end - begin);
+    const float free = count(begin, end, Sight::kFree), hit = count(begin, end, Sight::kHit);
+    if (free + hit == 0.0F) continue;
+    const float share = free / (free + hit);
+    add(supervoxels[s], share, free >= 0.15F * size && share >= 0.6F,
+        share <= 0.3F && hit >= std::min(2.0F, size) && 4.0F * hit >= size);
+  }
+  for (std::size_t i = 0; i < wholes.size(); ++i) {
+    const std::size_t begin = samples.sample_begin[samples.supervoxel_begin[i]];
+    const std::size_t end = samples.sample_begin[samples.supervoxel_begin[i + 1]];
+    const float free = count(begin, end, Sight::kFree), hit = count(begin, end, Sight::kHit);
+    if (free + hit < std::max(2.0F, 0.1F * static_cast<float>(end - begin))) continue;
+    const float share = free / (free + hit);
+    add(wholes[i], share, share >= 0.6F, share <= 0.3F);
+  }
+}
+
+TEST_CASE("beliefs are those of a sum that passes nothing over") {
+  Random random(29);
+  for (int round = 0; round < 40; ++round) {
+    Instances instances(1 + random.index(12));
+    for (std::vector<std::uint32_t>& supervoxels : instances) {
+      supervoxels.resize(random.index(20));  // some have none
+      for (std::uint32_t& count : supervoxels) {
+        count = static_cast<std::uint32_t>(1 + random.index(round % 2 == 0 ? 4 : 70));
+      }
+    }
+    Scan scan(instances);
+    std::vector<Belief> supervoxels(scan.samples.supervoxel_count()), wholes(instances.size());
+    for (int reference = 0; reference < 24; ++reference) {
+      if (reference == 12) {
+        scan.updater.begin_other_side(scan.samples, scan.beliefs);
+        for (Belief& belief : supervoxels) belief.level = 0.0F;
+        for (Belief& belief : wholes) belief.level = 0.0F;
+      }
+      // Whole supervoxels look alike, as they do.
+      std::vector<Sight> sights(scan.samples.size());
+      for (std::size_t s = 0; s < scan.samples.supervoxel_count(); ++s) {
+        const double free = random.uniform(-0.5, 1.5), seen = random.uniform(-0.5, 1.5);
+        for (std::size_t i = scan.samples.sample_begin[s]; i < scan.samples.sample_begin[s + 1];
+             ++i) {
+          const bool is_seen = random.uniform(0.0, 1.0) < seen;
+          const bool is_free = random.uniform(0.0, 1.0) < free;
+          sights[i] = !is_seen ? Sight::kNothing : is_free ? Sight::kFree : Sight::kHit;
+        }
+      }
+      scan.updater.update(scan.samples, sights_of(sights), scan.beliefs, [](std::size_t) {});
+      add_slowly(scan.samples, sights, supervoxels, wholes);
+    }
+    for (std::size_t s = 0; s < supervoxels.size(); ++s) {
+      REQUIRE(scan.belief(s).level == supervoxels[s].level);
+      REQUIRE(scan.belief(s).peak == supervoxels[s].peak);
+      REQUIRE(scan.belief(s).contested == supervoxels[s].contested);
+    }
+    for (std::size_t i = 0; i < wholes.size(); ++i) {
+      REQUIRE(scan.beliefs.wholes[i].peak == wholes[i].peak);
+      REQUIRE(scan.beliefs.wholes[i].contested == wholes[i].contested);
+      std::uint32_t total = 0, moved = 0, decided = 0;
+      for (std::uint32_t s = scan.samples.supervoxel_begin[i];
+           s < scan.samples.supervoxel_begin[i + 1]; ++s) {
+        const std::uint32_t size = scan.samples.sample_begin[s + 1] - scan.samples.sample_begin[s];
+        total += size;
+        moved += scan.is_free(s) ? size : 0;
+        decided += scan.is_free(s) || supervoxels[s].contested != 0 ? size : 0;
+      }
+      REQUIRE(scan.beliefs.shares[i].total == total);
+      REQUIRE(scan.beliefs.shares[i].moved == moved);
+      REQUIRE(scan.beliefs.shares[i].decided == decided);
+    }
+  }
+}
+
+// A wall in all directions, so far away (m).
+GroundSplit wall(float range) {
+  constexpr std::size_t kColumns = 360, kRows = 3;
+  GroundSplit split;
+  split.resize(kColumns * kRows);
+  for (std::size_t i = 0; i < split.count; ++i) {
+    const double angle = static_cast<double>(i / kRows) * M_PI / 180.0;
+    split.points.x[i] = range * static_cast<float>(std::cos(angle));
+    split.points.y[i] = range * static_cast<float>(std::sin(angle));
+    split.points.z[i] = 0.05F * range * (static_cast<float>(i % kRows) - 1.0F);
+  }
+  return split;
+}
+
+TEST_CASE("a reference is found by the scan it is asked from, until its image is needed again") {
+  for (const int step : {1, 2, 3}) {
+    FreeSpaceConfig config;
+    config.reference_step = step;
+    config.memory = 12;
+    config.horizon = 6;
+    ReferenceViews views(config);
+    SensorModel sensor = SensorModel::typical();
+    sensor.azimuth_step = 1.0;
+    sensor.elevation_gap = sensor.elevation_gap_wide = 3.0;
+    views.adapt(sensor);
+    std::vector<ReferencePhase> phases;
+    constexpr std::uint64_t kScans = 40, kBreak = 17;  // where another segment begins
+    const auto segment_of = [](std::uint64_t scan) { return scan < kBreak ? 0U : 1U; };
+    const auto begin_of = [](std::uint64_t scan) { return scan < kBreak ? 0U : kBreak; };
+    for (std::uint64_t scan = 0; scan < kScans; ++scan) {
+      phases.push_back(views.advance(scan - begin_of(scan)));
+      REQUIRE(phases.back().phase == (scan - begin_of(scan)) % static_cast<std::uint64_t>(step));
+      if (phases.back().phase == 0) {
+        views.make_image(scan, segment_of(scan), Eigen::Isometry3d::Identity(),
+                         wall(5.0F + static_cast<float>(scan)));
+        REQUIRE(views.newest().scan == scan);
+      }
+      for (std::uint64_t from = scan >= 6 ? scan - 6 : 0; from <= scan; ++from) {
+        for (std::uint64_t other = from >= 12 ? from - 12 : 0; other <= scan; ++other) {
+          const bool is_reference =
+              segment_of(other) == segment_of(from) &&
+              (other - begin_of(other)) % static_cast<std::uint64_t>(step) == 0;
+          // Only lags that lead to a scan which may be a reference are ever asked for.
+          if ((other - begin_of(from)) % static_cast<std::uint64_t>(step) != 0) continue;
+          const int lag = static_cast<int>(other) - static_cast<int>(from);
+          const ReferenceView* const found = views.find(from, segment_of(from), phases[from], lag);
+          if (!is_reference) {
+            REQUIRE(found == nullptr);
+          } else if (scan - other <= 12) {
+            REQUIRE(found != nullptr);
+            REQUIRE(found->scan == other);
+          } else {
+            REQUIRE((found == nullptr || found->scan == other));
+          }
+        }
+      }
+    }
+    // What a beam of the last reference passed: nearer than its wall; hit: at it.
+    PointBuffer points;
+    const auto newest = 5.0F + static_cast<float>(views.newest().scan);
+    points.push_back(newest - 2.0F, 0.0F, 0.0F);
+    points.push_back(newest, 0.0F, 0.0F);
+    points.push_back(newest + 2.0F, 0.0F, 0.0F);
+    points.grow(3 + detail::kLanes);
+    const detail::Sights& sights =
+        views.look(points, 3, Eigen::Isometry3d::Identity(), views.newest());
+    CHECK(sights.is_free(0));
+    CHECK_FALSE(sights.is_hit(0));
+    CHECK(sights.is_hit(1));
+    CHECK_FALSE(sights.is_free(1));
+    CHECK_FALSE(sights.is_hit(2));
+    CHECK_FALSE(sights.is_free(2));
+    views.forget();
+    CHECK(views.find(kScans - 1, 1, phases.back(), -static_cast<int>(phases.back().phase)) ==
+          nullptr);
+  }
+}
+
+}  // namespace
+}  // namespace dynains::test
