@@ -207,7 +207,7 @@ InstanceSamples supervoxels_at(const std::vector<std::array<int, 3>>& places, in
 TEST_CASE("a point that lies in another voxel than its predecessor is a change") {
   Random random(5);
   InstanceSampler sampler(0.5, 0.5, 80.0, 1);
-  for (const std::size_t count : {1, 7, 8, 9, 63, 64}) {
+  for (const std::size_t count : {1U, 7U, 8U, 9U, 63U, 64U}) {
     for (int round = 0; round < 50; ++round) {
       PointBuffer points;
       for (std::size_t i = 0; i < count; ++i) {

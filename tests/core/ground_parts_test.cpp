@@ -18,7 +18,7 @@ TEST_CASE("PatchSort is a stable sort by patch, whatever the number of points") 
   constexpr std::size_t kPatches = 5;
   Random random(1);
   detail::PatchSort<kPatches> sort;
-  for (const std::size_t count : {0, 1, 3, 15, 16, 17, 31, 64, 1000, 10}) {
+  for (const std::size_t count : {0U, 1U, 3U, 15U, 16U, 17U, 31U, 64U, 1000U, 10U}) {
     PointBuffer points;
     std::vector<std::uint32_t> input(count);
     std::vector<std::int32_t> patch_of(count);
@@ -61,8 +61,8 @@ float mean_by_sorting(std::vector<float> values, std::size_t wanted, float floor
 TEST_CASE("LowestMean gives the bits of sorting: few values, ties, rising and falling ones") {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   Random random(2);
-  for (const std::size_t count : {1, 7, 8, 9, 40, 129, 3000}) {
-    for (const std::size_t wanted : {1, 8, 10, 64}) {
+  for (const std::size_t count : {1U, 7U, 8U, 9U, 40U, 129U, 3000U}) {
+    for (const std::size_t wanted : {1U, 8U, 10U, 64U}) {
       for (int kind = 0; kind < 5; ++kind) {
         std::vector<float> values(count);
         for (std::size_t i = 0; i < count; ++i) {
@@ -100,9 +100,9 @@ TEST_CASE("Ingest takes good points in order and labels the others, however they
       {1e30F, 1e30F, 0.0F}, {0.0F, -kInfinity, 0.0F}, {0.0F, 0.0F, -2.0F}};
   Random random(3);
   detail::Ingest ingest;
-  for (const std::size_t stride : {3, 4, 6}) {
+  for (const std::size_t stride : {3U, 4U, 6U}) {
     for (const float min_range : {0.0F, 1.0F}) {
-      for (const std::size_t count : {0, 1, 7, 8, 200, 1000}) {
+      for (const std::size_t count : {0U, 1U, 7U, 8U, 200U, 1000U}) {
         const double share_of_bad = random.uniform(0.0, 1.0) < 0.5 ? 0.02 : 0.7;
         std::vector<float> cloud(stride * count, kNan);
         for (std::size_t i = 0; i < count; ++i) {
