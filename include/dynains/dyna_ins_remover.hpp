@@ -17,18 +17,16 @@
 #include "dynains/curved_voxel_clusterer.hpp"
 #include "dynains/detail/ingest.hpp"
 #include "dynains/detail/instance_ids.hpp"
+#include "dynains/detail/level_frame.hpp"
 #include "dynains/detail/made_up_scan.hpp"
 #include "dynains/detail/one_call.hpp"
 #include "dynains/detail/scan_slot.hpp"
 #include "dynains/detail/stage_checks.hpp"
-#include "dynains/detail/turn.hpp"
 #include "dynains/detail/write_by_evidence.hpp"
 #include "dynains/detail/write_by_windows.hpp"
 #include "dynains/free_space_evidence.hpp"
 #include "dynains/ground_segmenter.hpp"
-#include "dynains/heading.hpp"
 #include "dynains/map_revision.hpp"
-#include "dynains/mounting.hpp"
 #include "dynains/occupancy_descriptor.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/point_cloud_traits.hpp"
@@ -37,6 +35,7 @@
 #include "dynains/pose.hpp"
 #include "dynains/remover_config.hpp"
 #include "dynains/scan_verdict.hpp"
+#include "dynains/sensor_model.hpp"
 #include "dynains/static_map_accumulator.hpp"
 
 namespace dynains {
@@ -163,6 +162,7 @@ class BasicDynaInsRemover {
         evidence_(config.evidence),
         map_(config.map),
         revision_(config.revision),
+        frame_(config),
         ring_(std::max({static_cast<std::size_t>(config.window), latency() + 1, kFewestSlots})) {
     if (config_.use_free_space) detail::keep_in_stage(evidence_, latency());
   }
@@ -179,7 +179,7 @@ class BasicDynaInsRemover {
 
   /// What the first scan told about the sensor; not known() before, or if all that depends on it
   /// was given.
-  const SensorModel& sensor() const { return sensor_; }
+  const SensorModel& sensor() const { return frame_.sensor(); }
 
   /// Gets the memory that scans like `example` need and touches it, so that the first scans do not
   /// wait for the system to give it: 27 to 38 bytes per point for each scan that is open at once,
@@ -277,7 +277,7 @@ class BasicDynaInsRemover {
   void forget() {
     revision_.clear();
     instance_ids_.clear();
-    sensor_ = {};
+    frame_.forget();
     pushed_ = 0;
     finished_ = 0;
     ++segment_;  // nothing that is remembered takes part any more
@@ -293,9 +293,9 @@ class BasicDynaInsRemover {
     ScanSlot& newest = begin_scan(T_world_sensor, time);
     ingest(cloud, newest);
     newest.make_room(newest.labels.size());
-    if (needs_sensor() && !sensor_.known()) {
+    if (needs_sensor() && !sensor().known()) {
       adapt_to_sensor(newest);
-      if (turns()) ingest_.turn(turn_pose(newest));
+      if (frame_.turns()) ingest_.turn(turn_pose(newest));
     }
     clock.lap(result.times.ingest);
 
@@ -459,36 +459,12 @@ class BasicDynaInsRemover {
 
   // What depends on the sensor, from the first scan that has enough points.
   void adapt_to_sensor(ScanSlot& newest) {
-    Eigen::Matrix3d R_headed_sensor = Eigen::Matrix3d::Identity();
-    if (config_.level) R_headed_sensor = R_headed(estimate_heading(ingest_.points()));
-    PointBuffer turned;
-    const PointsView points = detail::turn(ingest_.points(), R_headed_sensor.cast<float>(), turned);
-    sensor_ = estimate_sensor_model(points);
-    if (sensor_.known()) {
-      const Mounting mounting = estimate_mounting(points);
-      if (mounting.known) sensor_.height = mounting.height;
-      if (config_.level) {
-        sensor_.R_headed_sensor = R_headed_sensor;
-        sensor_.R_level_headed = level(mounting, R_headed_sensor);
-      }
-      if (newest.scan > 0) newest.segment = ++segment_;
-    }
-    const SensorModel model = sensor_.known() ? sensor_ : SensorModel::typical();
+    frame_.estimate(ingest_.points());
+    if (sensor().known() && newest.scan > 0) newest.segment = ++segment_;
+    const SensorModel model = sensor().known() ? sensor() : SensorModel::typical();
     detail::adapt_stage(ground_, model);
     detail::adapt_stage(clusterer_, model);
     evidence_.adapt(model);
-  }
-
-  // The turn that makes a tilted sensor level; `mounting` as seen from the headed frame.
-  Eigen::Matrix3d level(Mounting mounting, const Eigen::Matrix3d& R_headed_sensor) const {
-    constexpr double kLevel = 4.0;  // deg; level sensors seem to be tilted by up to 2.6
-    if (config_.mounting_pitch != 0.0 || config_.mounting_roll != 0.0) {
-      mounting.up_sensor =
-          R_headed_sensor * up_of_mounting(config_.mounting_pitch, config_.mounting_roll);
-      return mounting.R_level_sensor();
-    }
-    return mounting.known && mounting.tilt() > kLevel ? mounting.R_level_sensor()
-                                                      : Eigen::Matrix3d::Identity();
   }
 
   // The points as a level sensor in the same place would see them that looks along the scene.
@@ -497,7 +473,7 @@ class BasicDynaInsRemover {
     const auto nearest = static_cast<float>(config_.min_range);
     const auto farthest = static_cast<float>(config_.max_range);
     newest.T_world_level = newest.T_world_sensor;
-    if (turns()) {
+    if (frame_.turns()) {
       const Eigen::Matrix3f R_level_sensor = turn_pose(newest);
       ingest_.read(cloud, nearest, farthest, &R_level_sensor, newest.labels);
     } else {
@@ -505,11 +481,9 @@ class BasicDynaInsRemover {
     }
   }
 
-  bool turns() const { return sensor_.known() && config_.level; }
-
   // The turn of the points that makes the sensor level; done to the scan's pose.
   Eigen::Matrix3f turn_pose(ScanSlot& newest) const {
-    const Eigen::Matrix3d R_level_sensor = sensor_.R_level_sensor();
+    const Eigen::Matrix3d R_level_sensor = frame_.R_level_sensor();
     newest.T_world_level.rotate(R_level_sensor.transpose());
     return R_level_sensor.cast<float>();
   }
@@ -555,7 +529,7 @@ class BasicDynaInsRemover {
   Evidence evidence_;
   Map map_;
   MapRevision revision_;
-  SensorModel sensor_;
+  detail::LevelFrame frame_;
 
   detail::Ingest ingest_;
   std::vector<ScanSlot> ring_;
