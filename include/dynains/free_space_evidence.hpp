@@ -15,7 +15,7 @@
 #include "dynains/cause.hpp"
 #include "dynains/evidence_verdict.hpp"
 #include "dynains/free_space_config.hpp"
-#include "dynains/ground_segmenter.hpp"
+#include "dynains/ground_split.hpp"
 #include "dynains/instance_beliefs.hpp"
 #include "dynains/instance_samples.hpp"
 #include "dynains/instance_tracks.hpp"

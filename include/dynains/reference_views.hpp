@@ -11,7 +11,7 @@
 #include "dynains/detail/beam_test.hpp"
 #include "dynains/detail/turn.hpp"
 #include "dynains/free_space_config.hpp"
-#include "dynains/ground_segmenter.hpp"
+#include "dynains/ground_split.hpp"
 #include "dynains/points.hpp"
 #include "dynains/range_image.hpp"
 #include "dynains/sensor_model.hpp"

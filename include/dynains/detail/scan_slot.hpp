@@ -10,7 +10,7 @@
 #include "dynains/cluster_set.hpp"
 #include "dynains/detail/room.hpp"
 #include "dynains/evidence_verdict.hpp"
-#include "dynains/ground_segmenter.hpp"
+#include "dynains/ground_split.hpp"
 #include "dynains/points.hpp"
 #include "dynains/scan_verdict.hpp"
 

@@ -11,7 +11,7 @@
 #include "dynains/cause.hpp"
 #include "dynains/cluster_set.hpp"
 #include "dynains/evidence_verdict.hpp"
-#include "dynains/ground_segmenter.hpp"
+#include "dynains/ground_split.hpp"
 #include "dynains/points.hpp"
 #include "dynains/polar_points.hpp"
 #include "dynains/sensor_model.hpp"
