@@ -483,7 +483,7 @@ class BasicDynaInsRemover {
 
   // The turn of the points that makes the sensor level; done to the scan's pose.
   Eigen::Matrix3f turn_pose(ScanSlot& newest) const {
-    const Eigen::Matrix3d R_level_sensor = frame_.R_level_sensor();
+    const Eigen::Matrix3d R_level_sensor = sensor().R_level_sensor();
     newest.T_world_level.rotate(R_level_sensor.transpose());
     return R_level_sensor.cast<float>();
   }

@@ -114,9 +114,9 @@ class InstanceBeliefUpdater {
  private:
   static constexpr float kLeastView = 0.1F;   // share of an instance that a reference must see
   static constexpr float kLeastFree = 0.15F;  // share of a supervoxel that must be seen free
-  static constexpr std::uint32_t kLeastHit =
-      4;  // one of so many samples of a supervoxel must be hit
   static constexpr float kContradictingHits = 0.85F;  // of what is seen of an instance
+  // One of so many samples of a supervoxel must be hit.
+  static constexpr std::uint32_t kLeastHit = 4;
 
   // What the reference saw may change supervoxels of which something was seen free, or was hit
   // while they are open: few, once a scan has met some references. All are asked for before the

@@ -10,6 +10,7 @@
 #include "dynains/reference_views.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
+#include "support/sights.hpp"
 
 namespace dynains::test {
 namespace {
@@ -38,26 +39,6 @@ InstanceSamples samples_of(const Instances& instances) {
     ++instance;
   }
   return samples;
-}
-
-enum class Sight : std::uint8_t { kNothing, kFree, kHit };
-
-detail::Sights sights_of(const std::vector<Sight>& seen) {
-  detail::Sights sights;
-  sights.resize(seen.size());
-  const detail::Sights::Bytes bytes = sights.bytes();
-  for (std::size_t byte = 0; byte * 8 < seen.size(); ++byte) {
-    bytes.free[byte] = 0;
-    bytes.hit[byte] = 0;
-    for (std::size_t k = 0; k < std::min<std::size_t>(8, seen.size() - byte * 8); ++k) {
-      const Sight sight = seen[byte * 8 + k];
-      bytes.free[byte] =
-          static_cast<std::uint8_t>(bytes.free[byte] | (sight == Sight::kFree ? 1U << k : 0U));
-      bytes.hit[byte] =
-          static_cast<std::uint8_t>(bytes.hit[byte] | (sight == Sight::kHit ? 1U << k : 0U));
-    }
-  }
-  return sights;
 }
 
 // One scan and what references say of it.

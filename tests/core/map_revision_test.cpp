@@ -14,6 +14,7 @@
 #include "support/counting_map.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
+#include "support/sights.hpp"
 
 namespace dynains::test {
 namespace {
@@ -21,16 +22,10 @@ namespace {
 /// A scan to which all places look alike: free, hit, or nothing at all.
 class Eyes {
  public:
-  enum class Sight { kNothing, kFree, kHit };
-
   explicit Eyes(Sight sight) : sight_(sight) {}
   const detail::Sights& operator()(const PointBuffer&, std::size_t count,
                                    const Eigen::Isometry3d&) {
-    sights_.resize(count);
-    for (std::size_t i = 0; i < count; i += 8) {
-      sights_.bytes().free[i / 8] = sight_ == Sight::kFree ? 0xFFU : 0U;
-      sights_.bytes().hit[i / 8] = sight_ == Sight::kHit ? 0xFFU : 0U;
-    }
+    sights_ = sights_of(std::vector<Sight>(count, sight_));
     return sights_;
   }
 
@@ -38,7 +33,6 @@ class Eyes {
   Sight sight_;
   detail::Sights sights_;
 };
-using Sight = Eyes::Sight;
 
 PointBuffer three_points(float x) {
   PointBuffer points;

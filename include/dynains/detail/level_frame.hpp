@@ -40,10 +40,8 @@ class LevelFrame {
     sensor_.R_level_headed = level(mounting, R_headed_sensor);
   }
 
+  /// Whether scans are turned: by R_level_sensor() of the sensor.
   bool turns() const { return sensor_.known() && is_wanted_; }
-
-  /// From the frame of the sensor; if it turns().
-  Eigen::Matrix3d R_level_sensor() const { return sensor_.R_level_sensor(); }
 
  private:
   // The turn that makes a tilted sensor level; `mounting` as seen from the headed frame.
