@@ -9,7 +9,8 @@
 
 namespace dynains {
 
-/// Patchwork's own, with a check beyond it (`ground_step`).
+/// Patchwork's own, with a check beyond it (`ground_step`) and planes that are fitted to some of
+/// the points where there are many (`ground_fit_points`).
 struct GroundConfig {
   /// The innermost rings, where height and roughness of a patch are checked.
   static constexpr std::size_t kCheckedRings = 4;
@@ -21,6 +22,7 @@ struct GroundConfig {
   int ground_iterations = 3;          ///< plane fits per patch
   int ground_lowest_points = 10;      ///< points whose mean height seeds the plane
   int ground_min_points = 11;         ///< patches with fewer points are not ground
+  int ground_fit_points = 512;        ///< points of a patch, at most, that its plane is fitted to
   double ground_seed_margin = 0.5;    ///< m above the seed height
   double ground_distance = 0.125;     ///< m, a ground point lies less than this above the plane
   double ground_uprightness = 0.707;  ///< smallest z of the unit normal
@@ -31,7 +33,7 @@ struct GroundConfig {
   /// Largest flatness that lets a patch above that height still be ground.
   std::array<double, kCheckedRings> ground_flatness = {0.0, 1.25e-4, 1.85e-4, 1.85e-4};
 
-  /// Patchwork as it is, with the height of KITTI's sensor.
+  /// Without the check, and with the height of KITTI's sensor.
   static GroundConfig paper() {
     GroundConfig config;
     config.sensor_height = 1.723;
@@ -53,6 +55,9 @@ struct GroundConfig {
                       "lowest points of a patch that seed its plane (Patchwork)"});
     visitor(Parameter{"ground_min_points", self.ground_min_points, closed(3, 1000), "",
                       "patches with fewer points are not ground (Patchwork)"});
+    visitor(
+        Parameter{"ground_fit_points", self.ground_fit_points, closed(64, 1000000), "",
+                  "points of a patch, at most, that its plane is fitted to; more say the same"});
     visitor(Parameter{"ground_seed_margin", self.ground_seed_margin, half_open_below(0, 10), "m",
                       "height over the seeds up to which points enter the first fit (Patchwork)"});
     visitor(Parameter{"ground_distance", self.ground_distance, half_open_below(0, 2), "m",

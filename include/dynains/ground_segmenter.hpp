@@ -13,9 +13,11 @@
 #include <vector>
 
 #include "dynains/detail/arc_tangent.hpp"
+#include "dynains/detail/half_space.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/lowest_mean.hpp"
 #include "dynains/detail/patch_heights.hpp"
+#include "dynains/detail/patch_sample.hpp"
 #include "dynains/detail/patch_sort.hpp"
 #include "dynains/detail/plane_fit.hpp"
 #include "dynains/detail/point_record.hpp"
@@ -91,7 +93,7 @@ class GroundSegmenter {
     detail::grow(patch_of_, scan.size() + detail::kLanes);
     find_patches(scan);
     sorted_.sort(scan, input.data(), patch_of_.data());
-    patch_.grow(scan.size() + detail::kLanes);
+    sample_.reserve(std::min(scan.size(), static_cast<std::size_t>(config_.ground_fit_points)));
     heights_.clear();
     split.resize(scan.size());
     detail::run_lanes([&](auto lanes) {
@@ -129,6 +131,8 @@ class GroundSegmenter {
   template <class Lanes>
   class Output {
    public:
+    using Columns = std::array<typename Lanes::Float, 4>;
+
     explicit Output(GroundSplit& split)
         : x_(split.points.x.data()),
           y_(split.points.y.data()),
@@ -137,8 +141,16 @@ class GroundSegmenter {
 
     std::size_t count() const { return count_; }
 
+    // The first of eight points.
+    void put(const Columns& eight, std::size_t count) {
+      store(eight, count_);
+      count_ += count;
+    }
+
     void put(const detail::PointRecord* from, std::size_t count) {
-      for (std::size_t i = 0; i < count; i += detail::kLanes) put_eight(from + i, i);
+      for (std::size_t i = 0; i < count; i += detail::kLanes) {
+        store(detail::load_columns<Lanes>(from + i), count_ + i);
+      }
       count_ += count;
     }
 
@@ -156,13 +168,11 @@ class GroundSegmenter {
     }
 
    private:
-    void put_eight(const detail::PointRecord* from, std::size_t ahead) {
-      const auto columns = detail::load_columns<Lanes>(from);
-      const std::size_t at = count_ + ahead;
-      columns[0].store(x_ + at);
-      columns[1].store(y_ + at);
-      columns[2].store(z_ + at);
-      columns[3].store(reinterpret_cast<float*>(input_) + at);
+    void store(const Columns& eight, std::size_t at) {
+      eight[0].store(x_ + at);
+      eight[1].store(y_ + at);
+      eight[2].store(z_ + at);
+      eight[3].store(reinterpret_cast<float*>(input_) + at);
     }
 
     std::size_t count_ = 0;
@@ -219,24 +229,6 @@ class GroundSegmenter {
     });
   }
 
-  // Points with normal . (p - origin) < offset; the origin of the fit is near the points.
-  struct HalfSpace {
-    HalfSpace(float origin_z, float distance) : z0(origin_z), offset(distance) {}
-
-    detail::Constant8 z0;
-    detail::Constant8 x = 0.0F, y = 0.0F, z = 1.0F, offset;
-
-    template <class Lanes>
-    std::array<typename Lanes::Float, 3> local(const PointBuffer& points, std::size_t i) const {
-      using Float = typename Lanes::Float;
-      return {Float::load(&points.x[i]), Float::load(&points.y[i]), Float::load(&points.z[i]) - z0};
-    }
-    template <class Float>
-    auto inside(const std::array<Float, 3>& p) const {
-      return x * p[0] + y * p[1] + z * p[2] < offset;
-    }
-  };
-
   using PatchCounts = std::array<std::size_t, kPatches + 1>;
 
   std::size_t size_of(std::size_t patch) const { return sorted_.end(patch) - sorted_.begin(patch); }
@@ -254,48 +246,44 @@ class GroundSegmenter {
     }
   }
 
-  // Points of a patch that are ground.
-  enum class Found { kNone, kSome, kAll };
-
   // Puts the ground of a patch; the rest closes up at its front. Returns the size of the rest.
   template <class Lanes>
   std::size_t segment_patch(std::size_t patch, detail::PointRecord* records, std::size_t count,
                             Output<Lanes>& ground) {
     if (count < static_cast<std::size_t>(config_.ground_min_points)) return count;
-    lay_out<Lanes>(records, count);
+    sample_.take<Lanes>(records, count, static_cast<std::size_t>(config_.ground_fit_points));
     detail::LowestMean<GroundConfig::kMaxLowest, Lanes> lowest(
         static_cast<std::size_t>(config_.ground_lowest_points));
-    const float seed_height = lowest.of(patch_.z.data(), count, floor_of(patch));
-    HalfSpace below(seed_height, static_cast<float>(config_.ground_seed_margin));
-    const Found found_ground = fit_ground<Lanes>(patch, count, seed_height, below);
-    if (found_ground == Found::kNone) return count;
-    if (found_ground == Found::kAll) {
-      ground.put(records, count);
-      return 0;
-    }
+    const float seed_height = lowest.of(sample_.heights(), sample_.size(), floor_of(patch));
+    detail::HalfSpace below(records->x, records->y, seed_height,
+                            static_cast<float>(config_.ground_seed_margin));
+    if (!fit_ground<Lanes>(patch, seed_height, below)) return count;
 
     std::size_t rest = 0;
     for (std::size_t i = 0; i < count; i += detail::kLanes) {
       const std::size_t length = std::min(detail::kLanes, count - i);
       const unsigned all = (1U << length) - 1U;
-      const unsigned bits = below.inside(below.template local<Lanes>(patch_, i)).bits();
+      const auto eight = detail::load_columns<Lanes>(records + i);
+      const auto inside =
+          below.contains(eight[0] - below.x0, eight[1] - below.y0, eight[2] - below.z0);
+      const unsigned bits = inside.bits() & all;
       if (bits == all) {
-        ground.put(records + i, length);
+        ground.put(eight, length);
       } else if (bits == 0) {
         detail::move_to_front(records + i, length, records + rest);
         rest += length;
       } else {
         // Written to both places, since no branch could foretell the right one.
-        detail::PointRecord inside[detail::kLanes] = {};
-        std::size_t found = 0;
+        detail::PointRecord found[detail::kLanes] = {};
+        std::size_t found_count = 0;
         for (std::size_t k = 0; k < length; ++k) {
           const unsigned bit = (bits >> k) & 1U;
-          detail::copy_record(records + i + k, inside + found);
+          detail::copy_record(records + i + k, found + found_count);
           detail::copy_record(records + i + k, records + rest);
-          found += bit;
+          found_count += bit;
           rest += 1U - bit;
         }
-        ground.put(inside, found);
+        ground.put(detail::load_columns<Lanes>(found), found_count);
       }
     }
     return rest;
@@ -309,28 +297,22 @@ class GroundSegmenter {
   }
 
   // From the points near the seed height, a horizontal half space, to those near the plane. Returns
-  // how many of the patch these are if they are ground.
+  // whether these are ground.
   template <class Lanes>
-  Found fit_ground(std::size_t patch, std::size_t count, float seed_height, HalfSpace& below) {
+  bool fit_ground(std::size_t patch, float seed_height, detail::HalfSpace& below) {
     detail::Plane plane;
-    bool is_whole = false;
     for (int i = 0; i < config_.ground_iterations; ++i) {
-      const detail::PlaneMoments moments = sum_moments<Lanes>(patch_, count, below);
-      if (moments.count < 3.0) return Found::kNone;
+      const detail::PlaneMoments moments = sample_.moments<Lanes>(below);
+      if (moments.count < 3.0) return false;
       plane = detail::fit_plane(moments);
-      below.x = static_cast<float>(plane.normal_x);
-      below.y = static_cast<float>(plane.normal_y);
-      below.z = static_cast<float>(plane.normal_z);
-      below.offset =
-          static_cast<float>(config_.ground_distance + plane.normal_x * plane.mean_x +
-                             plane.normal_y * plane.mean_y + plane.normal_z * plane.mean_z);
+      below.end_above(plane, config_.ground_distance);
       // From the same points, the next plane would be the same.
-      is_whole = moments.count == static_cast<double>(count) && contains<Lanes>(below, count);
-      if (is_whole) break;
+      const bool had_all = moments.count == static_cast<double>(sample_.size());
+      if (had_all && sample_.is_inside<Lanes>(below)) break;
     }
-    if (!is_ground(patch, plane, seed_height)) return Found::kNone;
+    if (!is_ground(patch, plane, seed_height)) return false;
     heights_.set(patch, static_cast<float>(plane.mean_z + static_cast<double>(seed_height)));
-    return is_whole ? Found::kAll : Found::kSome;
+    return true;
   }
 
   // Of a plane over the seed height; high ones must be flat near the sensor.
@@ -343,70 +325,13 @@ class GroundSegmenter {
              plane.flatness >= config_.ground_flatness[ring]);
   }
 
-  // Whether all points of the patch are inside.
-  template <class Lanes>
-  bool contains(const HalfSpace& space, std::size_t count) const {
-    for (std::size_t i = 0; i < count; i += detail::kLanes) {
-      const unsigned all = (1U << std::min(detail::kLanes, count - i)) - 1U;
-      if (space.inside(space.template local<Lanes>(patch_, i)).bits() != all) return false;
-    }
-    return true;
-  }
-
-  // The points of a patch; x and y relative to an origin near them.
-  template <class Lanes>
-  void lay_out(const detail::PointRecord* records, std::size_t count) {
-    using Float = typename Lanes::Float;
-    const Float x0(records->x);
-    const Float y0(records->y);
-    float* const x = patch_.x.data();
-    float* const y = patch_.y.data();
-    float* const z = patch_.z.data();
-    for (std::size_t i = 0; i < count; i += detail::kLanes) {
-      const auto columns = detail::load_columns<Lanes>(records + i);
-      (columns[0] - x0).store(x + i);
-      (columns[1] - y0).store(y + i);
-      columns[2].store(z + i);
-    }
-    // Behind the last one, there is nothing that is low or below a plane.
-    Float(std::numeric_limits<float>::infinity()).store(z + count);
-  }
-
-  template <class Lanes>
-  static detail::PlaneMoments sum_moments(const PointBuffer& points, std::size_t count,
-                                          const HalfSpace& space) {
-    static constexpr detail::Constant8 kZero(0.0F), kOne(1.0F);
-    using Float = typename Lanes::Float;
-    Float n = kZero, sx = kZero, sy = kZero, sz = kZero, sxx = kZero, sxy = kZero, sxz = kZero,
-          syy = kZero, syz = kZero, szz = kZero;
-    for (std::size_t i = 0; i < count; i += detail::kLanes) {
-      const auto p = space.template local<Lanes>(points, i);
-      const auto member = space.inside(p);
-      const Float x = keep(member, p[0]);
-      const Float y = keep(member, p[1]);
-      const Float z = keep(member, p[2]);
-      n = n + keep(member, Float(kOne));
-      sx = sx + x;
-      sy = sy + y;
-      sz = sz + z;
-      sxx = sxx + x * x;
-      sxy = sxy + x * y;
-      sxz = sxz + x * z;
-      syy = syy + y * y;
-      syz = syz + y * z;
-      szz = szz + z * z;
-    }
-    return {sum(n),   sum(sx),  sum(sy),  sum(sz),  sum(sxx),
-            sum(sxy), sum(sxz), sum(syy), sum(syz), sum(szz)};
-  }
-
   Config config_;
   double height_ = 0.0;  // m
   std::array<Zone, kZones> zones_{};
   std::array<std::int32_t, kPatches> ring_of_patch_{};
   std::vector<std::int32_t> patch_of_;
   detail::PatchSort<kPatches + 1> sorted_;  // the last for points that are in no patch
-  PointBuffer patch_;                       // the points of one patch
+  detail::PatchSample sample_;              // of the patch at hand
   detail::PatchHeights<kPatches> heights_{kRings, kSectors};
 };
 

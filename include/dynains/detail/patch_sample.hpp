@@ -1,0 +1,100 @@
+// The points of a patch that its plane is fitted to.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+
+#include "dynains/detail/half_space.hpp"
+#include "dynains/detail/plane_fit.hpp"
+#include "dynains/detail/point_record.hpp"
+#include "dynains/detail/wide_lanes.hpp"
+#include "dynains/points.hpp"
+
+namespace dynains::detail {
+
+/// All points of a patch if they are few, else runs of eight that are spread over them: arrays that
+/// stay in the nearest cache.
+class PatchSample {
+ public:
+  /// Gets the memory for that many points.
+  void reserve(std::size_t points) { points_.grow(points + 2 * kLanes); }
+
+  /// Takes all of `count` points, or `most` of them, rounded down to runs of eight. What was
+  /// reserved suffices, and the records are padded for wide loads; x and y become relative to the
+  /// first one.
+  template <class Lanes>
+  void take(const PointRecord* records, std::size_t count, std::size_t most) {
+    using Float = typename Lanes::Float;
+    const bool is_whole = count <= most;
+    const std::size_t runs = is_whole ? (count + kLanes - 1) / kLanes : most / kLanes;
+    size_ = is_whole ? count : runs * kLanes;
+    const Float x0(records->x);
+    const Float y0(records->y);
+    float* const x = points_.x.data();
+    float* const y = points_.y.data();
+    float* const z = points_.z.data();
+    for (std::size_t run = 0; run < runs; ++run) {
+      const std::size_t from = is_whole ? run * kLanes : run * count / runs;
+      const auto columns = load_columns<Lanes>(records + from);
+      (columns[0] - x0).store(x + run * kLanes);
+      (columns[1] - y0).store(y + run * kLanes);
+      columns[2].store(z + run * kLanes);
+    }
+    // Behind the last one, there is nothing that is low or below a plane.
+    Float(std::numeric_limits<float>::infinity()).store(z + size_);
+  }
+
+  std::size_t size() const { return size_; }
+  /// Heights (m), with infinite ones behind the last to fill up eight lanes.
+  const float* heights() const { return points_.z.data(); }
+
+  /// Moments of the points in a half space whose origin is above or below the first record.
+  template <class Lanes>
+  PlaneMoments moments(const HalfSpace& space) const {
+    static constexpr Constant8 kZero(0.0F), kOne(1.0F);
+    using Float = typename Lanes::Float;
+    Float n = kZero, sx = kZero, sy = kZero, sz = kZero, sxx = kZero, sxy = kZero, sxz = kZero,
+          syy = kZero, syz = kZero, szz = kZero;
+    for (std::size_t i = 0; i < size_; i += kLanes) {
+      const Float all_x = Float::load(&points_.x[i]);
+      const Float all_y = Float::load(&points_.y[i]);
+      const Float all_z = Float::load(&points_.z[i]) - space.z0;
+      const auto member = space.contains(all_x, all_y, all_z);
+      const Float x = keep(member, all_x);
+      const Float y = keep(member, all_y);
+      const Float z = keep(member, all_z);
+      n = n + keep(member, Float(kOne));
+      sx = sx + x;
+      sy = sy + y;
+      sz = sz + z;
+      sxx = sxx + x * x;
+      sxy = sxy + x * y;
+      sxz = sxz + x * z;
+      syy = syy + y * y;
+      syz = syz + y * z;
+      szz = szz + z * z;
+    }
+    return {sum(n),   sum(sx),  sum(sy),  sum(sz),  sum(sxx),
+            sum(sxy), sum(sxz), sum(syy), sum(syz), sum(szz)};
+  }
+
+  /// Whether all points are in such a half space.
+  template <class Lanes>
+  bool is_inside(const HalfSpace& space) const {
+    using Float = typename Lanes::Float;
+    for (std::size_t i = 0; i < size_; i += kLanes) {
+      const unsigned all = (1U << std::min(kLanes, size_ - i)) - 1U;
+      const auto inside = space.contains(Float::load(&points_.x[i]), Float::load(&points_.y[i]),
+                                         Float::load(&points_.z[i]) - space.z0);
+      if (inside.bits() != all) return false;
+    }
+    return true;
+  }
+
+ private:
+  PointBuffer points_;
+  std::size_t size_ = 0;
+};
+
+}  // namespace dynains::detail
