@@ -26,7 +26,8 @@ struct InstanceBeliefs {
   struct Belief {
     float level = 0.0F;          ///< of the references summed up now; never negative
     float peak = 0.0F;           ///< the highest it was
-    std::uint8_t contested = 0;  ///< whether some reference hit the place
+    std::uint8_t contested = 0;  ///< whether some reference hit any of the place
+    std::uint8_t occupied = 0;   ///< whether some reference hit enough of it to say what it was
   };
   /// Samples of an instance.
   struct Share {
@@ -80,7 +81,7 @@ class InstanceBeliefUpdater {
   void begin_other_side(const InstanceSamples& samples, InstanceBeliefs& beliefs) const {
     for (std::uint32_t s = 0; s < beliefs.supervoxels.size(); ++s) {
       Belief& belief = beliefs.supervoxels[s];
-      if (belief.contested != 0 && belief.level > 0.0F) flip_open(samples, s, beliefs);
+      if (belief.occupied != 0 && belief.level > 0.0F) flip_open(samples, s, beliefs);
       belief.level = 0.0F;
     }
     for (Belief& belief : beliefs.wholes) belief.level = 0.0F;
@@ -115,7 +116,7 @@ class InstanceBeliefUpdater {
   static constexpr float kLeastView = 0.1F;   // share of an instance that a reference must see
   static constexpr float kLeastFree = 0.15F;  // share of a supervoxel that must be seen free
   static constexpr float kContradictingHits = 0.85F;  // of what is seen of an instance
-  // One of so many samples of a supervoxel must be hit.
+  // One of so many samples of a supervoxel must be hit, and two, for it to be occupied.
   static constexpr std::uint32_t kLeastHit = 4;
 
   // What the reference saw may change supervoxels of which something was seen free, or was hit
@@ -161,21 +162,21 @@ class InstanceBeliefUpdater {
     Belief& belief = beliefs.supervoxels[s];
     const bool was_open = is_open(belief);
     const bool was_free = is_free(belief);
-    const bool was_decided = was_free || belief.contested != 0;
+    const bool was_decided = was_free || belief.occupied != 0;
     const bool changed = update(belief, sights.count(begin, end), end - begin);
     if (is_open(belief) != was_open) flip_open(samples, s, beliefs);
     if (!changed) return;
     const std::uint32_t instance = samples.instance_of[s];
     Share& share = beliefs.shares[instance];
     const bool free = is_free(belief);
-    const bool decided = free || belief.contested != 0;
+    const bool decided = free || belief.occupied != 0;
     share.moved += (free ? end - begin : 0) - (was_free ? end - begin : 0);
     share.decided += (decided ? end - begin : 0) - (was_decided ? end - begin : 0);
     beliefs.changed[instance] = 1;
   }
 
-  // Whether hits may change it: what was hit before and is not seen free stays as it is.
-  static bool is_open(const Belief& belief) { return belief.contested == 0 || belief.level > 0.0F; }
+  // Whether hits may change it: what was occupied before and is not seen free stays as it is.
+  static bool is_open(const Belief& belief) { return belief.occupied == 0 || belief.level > 0.0F; }
   static void flip_open(const InstanceSamples& samples, std::uint32_t s, InstanceBeliefs& beliefs) {
     std::uint32_t begin = samples.sample_begin[s];
     const std::uint32_t end = samples.sample_begin[s + 1];
@@ -212,11 +213,10 @@ class InstanceBeliefUpdater {
   }
 
   // For something that was seen. Eq. 15 with three-way increments as in Eq. 18, by the share of
-  // samples seen free; shares that say little, or are of few samples, change nothing. Returns
+  // samples seen free; shares that say little, and few samples seen free, change nothing. A single
+  // hit contests what others see free, but does not say that something stands there. Returns
   // whether anything changed that verdicts look at.
   bool update(Belief& belief, detail::Sights::Count seen, std::uint32_t samples) const {
-    const bool hits =
-        seen.hit >= std::max(std::min(2U, samples), (samples + kLeastHit - 1) / kLeastHit);
     const auto free = static_cast<float>(seen.free);
     const float share = free / static_cast<float>(seen.free + seen.hit);
     if (free >= kLeastFree * static_cast<float>(samples) &&
@@ -224,10 +224,13 @@ class InstanceBeliefUpdater {
       raise(belief, share);
       return true;
     }
-    if (!hits || share > detail::FreeSpaceSum::kHitShare) return false;
-    const bool first_hit = belief.contested == 0;
+    if (seen.hit == 0 || share > detail::FreeSpaceSum::kHitShare) return false;
+    const Belief before = belief;
     lower(belief);
-    return first_hit;
+    if (seen.hit >= std::max(std::min(2U, samples), (samples + kLeastHit - 1) / kLeastHit)) {
+      belief.occupied = 1;
+    }
+    return belief.contested != before.contested || belief.occupied != before.occupied;
   }
 
   void raise(Belief& belief, float share) const {

@@ -74,35 +74,50 @@ struct Scan {
 };
 
 TEST_CASE("what one reference says of a supervoxel changes its belief by one of three steps") {
+  enum Hit { kNone, kContested, kOccupied };
   struct Case {
     std::uint32_t samples;
     Scan::Seen seen;
     float level;
-    bool contested;
+    Hit hit;
   };
   for (const Case& c : {
-           Case{4, {4, 0}, 2.0F * kFreeStep, false},  // wholly free
-           Case{10, {9, 1}, kFreeStep, false},        // 0.9 is not more than 0.9
-           Case{20, {19, 1}, 2.0F * kFreeStep, false},
-           Case{5, {3, 2}, kFreeStep, false},          // 0.6 speaks for free space
-           Case{9, {5, 4}, 0.0F, false},               // 0.56 says nothing
-           Case{10, {2, 0}, 2.0F * kFreeStep, false},  // two of ten are a view of it
-           Case{10, {1, 0}, 0.0F, false},              // one is not
-           Case{10, {3, 7}, 0.0F, true},               // 0.3 is a hit
-           Case{9, {3, 6}, 0.0F, false},               // 0.33 is not
-           Case{4, {0, 2}, 0.0F, true},                // two hits
-           Case{4, {0, 1}, 0.0F, false},               // one is chance ...
-           Case{1, {0, 1}, 0.0F, true},                // ... unless there is no other sample
-           Case{12, {0, 3}, 0.0F, true},               // a quarter of many
-           Case{12, {0, 2}, 0.0F, false}, Case{4, {0, 0}, 0.0F, false},  // not seen
+           Case{4, {4, 0}, 2.0F * kFreeStep, kNone},  // wholly free
+           Case{10, {9, 1}, kFreeStep, kNone},        // 0.9 is not more than 0.9
+           Case{20, {19, 1}, 2.0F * kFreeStep, kNone},
+           Case{5, {3, 2}, kFreeStep, kNone},          // 0.6 speaks for free space
+           Case{9, {5, 4}, 0.0F, kNone},               // 0.56 says nothing
+           Case{10, {2, 0}, 2.0F * kFreeStep, kNone},  // two of ten are a view of it
+           Case{10, {1, 0}, 0.0F, kNone},              // one is not
+           Case{10, {3, 7}, 0.0F, kOccupied},          // 0.3 is a hit
+           Case{9, {3, 6}, 0.0F, kNone},               // 0.33 is not
+           Case{4, {0, 2}, 0.0F, kOccupied},           // two hits
+           Case{4, {0, 1}, 0.0F, kContested},          // one may be chance ...
+           Case{1, {0, 1}, 0.0F, kOccupied},           // ... unless there is no other sample
+           Case{12, {0, 3}, 0.0F, kOccupied},          // a quarter of many
+           Case{12, {0, 2}, 0.0F, kContested}, Case{4, {0, 0}, 0.0F, kNone},  // not seen
        }) {
     Scan scan(Instances{{c.samples}});
     scan.see({c.seen});
     INFO(c.samples << " samples, " << c.seen.free << " free, " << c.seen.hit << " hit");
     CHECK(scan.belief().level == Approx(c.level));
     CHECK(scan.belief().peak == Approx(c.level));
-    CHECK((scan.belief().contested != 0) == c.contested);
+    CHECK((scan.belief().contested != 0) == (c.hit != kNone));
+    CHECK((scan.belief().occupied != 0) == (c.hit == kOccupied));
   }
+}
+
+TEST_CASE("a single hit contests what is seen free, and alone it tells nothing") {
+  Scan scan(Instances{{4, 4}});
+  scan.see({{0, 1}});
+  CHECK(scan.beliefs.shares[0].decided == 0);
+  scan.see({{1, 0}});
+  CHECK_FALSE(scan.is_free());  // as it would be otherwise: 1.69
+  CHECK(scan.beliefs.shares[0].decided == 0);
+  scan.see({{0, 1}});
+  CHECK(scan.belief().level == Approx(std::max(0.0F, 2.0F * kFreeStep + kHitStep)).margin(1e-6));
+  scan.see({{0, 2}});
+  CHECK(scan.beliefs.shares[0].decided == 4);
 }
 
 TEST_CASE("a place that was hit needs more evidence, and starts again from zero") {
@@ -211,8 +226,10 @@ void add_slowly(const InstanceSamples& samples, const std::vector<Sight>& sights
     const float free = count(begin, end, Sight::kFree), hit = count(begin, end, Sight::kHit);
     if (free + hit == 0.0F) continue;
     const float share = free / (free + hit);
-    add(supervoxels[s], share, free >= 0.15F * size && share >= 0.6F,
-        share <= 0.3F && hit >= std::min(2.0F, size) && 4.0F * hit >= size);
+    add(supervoxels[s], share, free >= 0.15F * size && share >= 0.6F, share <= 0.3F);
+    if (share <= 0.3F && hit >= std::min(2.0F, size) && 4.0F * hit >= size) {
+      supervoxels[s].occupied = 1;
+    }
   }
   for (std::size_t i = 0; i < wholes.size(); ++i) {
     const std::size_t begin = samples.sample_begin[samples.supervoxel_begin[i]];
@@ -260,6 +277,7 @@ TEST_CASE("beliefs are those of a sum that passes nothing over") {
       REQUIRE(scan.belief(s).level == supervoxels[s].level);
       REQUIRE(scan.belief(s).peak == supervoxels[s].peak);
       REQUIRE(scan.belief(s).contested == supervoxels[s].contested);
+      REQUIRE(scan.belief(s).occupied == supervoxels[s].occupied);
     }
     for (std::size_t i = 0; i < wholes.size(); ++i) {
       REQUIRE(scan.beliefs.wholes[i].peak == wholes[i].peak);
@@ -270,7 +288,7 @@ TEST_CASE("beliefs are those of a sum that passes nothing over") {
         const std::uint32_t size = scan.samples.sample_begin[s + 1] - scan.samples.sample_begin[s];
         total += size;
         moved += scan.is_free(s) ? size : 0;
-        decided += scan.is_free(s) || supervoxels[s].contested != 0 ? size : 0;
+        decided += scan.is_free(s) || supervoxels[s].occupied != 0 ? size : 0;
       }
       REQUIRE(scan.beliefs.shares[i].total == total);
       REQUIRE(scan.beliefs.shares[i].moved == moved);
