@@ -264,9 +264,9 @@ class GroundSegmenter {
       const std::size_t length = std::min(detail::kLanes, count - i);
       const unsigned all = (1U << length) - 1U;
       const auto eight = detail::load_columns<Lanes>(records + i);
-      const auto inside =
-          below.contains(eight[0] - below.x0, eight[1] - below.y0, eight[2] - below.z0);
-      const unsigned bits = inside.bits() & all;
+      const std::array<typename Lanes::Float, 3> local = {eight[0] - below.x0, eight[1] - below.y0,
+                                                          eight[2] - below.z0};
+      const unsigned bits = below.contains(local).bits() & all;
       if (bits == all) {
         ground.put(eight, length);
       } else if (bits == 0) {

@@ -116,7 +116,7 @@ class InstanceBeliefUpdater {
   static constexpr float kLeastView = 0.1F;   // share of an instance that a reference must see
   static constexpr float kLeastFree = 0.15F;  // share of a supervoxel that must be seen free
   static constexpr float kContradictingHits = 0.85F;  // of what is seen of an instance
-  // One of so many samples of a supervoxel must be hit, and two, for it to be occupied.
+  // Two samples of a supervoxel must be hit, and one of so many, for it to be occupied.
   static constexpr std::uint32_t kLeastHit = 4;
 
   // What the reference saw may change supervoxels of which something was seen free, or was hit

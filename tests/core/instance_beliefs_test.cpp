@@ -108,7 +108,7 @@ TEST_CASE("what one reference says of a supervoxel changes its belief by one of 
 }
 
 TEST_CASE("a single hit contests what is seen free, and alone it tells nothing") {
-  Scan scan(Instances{{4, 4}});
+  Scan scan(Instances{{4}});
   scan.see({{0, 1}});
   CHECK(scan.beliefs.shares[0].decided == 0);
   scan.see({{1, 0}});

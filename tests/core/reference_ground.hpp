@@ -95,6 +95,13 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
     Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     Eigen::Vector3d eigenvalues = Eigen::Vector3d::Zero();
+    const auto members_of = [&](const std::vector<std::size_t>& points) {
+      std::vector<std::size_t> result;
+      for (const std::size_t i : points) {
+        if (normal.dot(point(i) - mean) < config.ground_distance) result.push_back(i);
+      }
+      return result;
+    };
     for (int iteration = 0; iteration < config.ground_iterations; ++iteration) {
       if (members.size() < 3) {
         is_ground = false;
@@ -111,15 +118,7 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
       eigenvalues = solver.eigenvalues();
       normal = solver.eigenvectors().col(0);
       if (normal.z() < 0.0) normal = -normal;
-      const auto members_of = [&](const std::vector<std::size_t>& points) {
-        std::vector<std::size_t> result;
-        for (const std::size_t i : points) {
-          if (normal.dot(point(i) - mean) < config.ground_distance) result.push_back(i);
-        }
-        return result;
-      };
       members = members_of(fitted);
-      patch.members = members_of(patch.points);
     }
     if (!is_ground || normal.z() < config.ground_uprightness) continue;
     if (patch.ring < GroundSegmenter::kCheckedRings) {
@@ -131,6 +130,7 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
     }
     patch.is_ground = true;
     patch.height = mean.z();
+    patch.members = members_of(patch.points);
   }
 
   // Patches beside one of a ring, or in the next rings where its middle is, and those beside these.

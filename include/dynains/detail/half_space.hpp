@@ -1,6 +1,8 @@
 // What lies below a plane near some points.
 #pragma once
 
+#include <array>
+
 #include "dynains/detail/plane_fit.hpp"
 #include "dynains/detail/wide_lanes.hpp"
 
@@ -24,8 +26,8 @@ struct HalfSpace {
 
   /// Of points relative to the origin.
   template <class Float>
-  auto contains(const Float& local_x, const Float& local_y, const Float& local_z) const {
-    return x * local_x + y * local_y + z * local_z < offset;
+  auto contains(const std::array<Float, 3>& local) const {
+    return x * local[0] + y * local[1] + z * local[2] < offset;
   }
 
   Constant8 x0, y0, z0;                    // origin

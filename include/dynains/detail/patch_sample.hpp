@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <limits>
 
@@ -18,7 +19,7 @@ namespace dynains::detail {
 class PatchSample {
  public:
   /// Gets the memory for that many points.
-  void reserve(std::size_t points) { points_.grow(points + 2 * kLanes); }
+  void reserve(std::size_t points) { points_.grow(points + kLanes); }
 
   /// Takes all of `count` points, or `most` of them, rounded down to runs of eight. What was
   /// reserved suffices, and the records are padded for wide loads; x and y become relative to the
@@ -57,13 +58,11 @@ class PatchSample {
     Float n = kZero, sx = kZero, sy = kZero, sz = kZero, sxx = kZero, sxy = kZero, sxz = kZero,
           syy = kZero, syz = kZero, szz = kZero;
     for (std::size_t i = 0; i < size_; i += kLanes) {
-      const Float all_x = Float::load(&points_.x[i]);
-      const Float all_y = Float::load(&points_.y[i]);
-      const Float all_z = Float::load(&points_.z[i]) - space.z0;
-      const auto member = space.contains(all_x, all_y, all_z);
-      const Float x = keep(member, all_x);
-      const Float y = keep(member, all_y);
-      const Float z = keep(member, all_z);
+      const auto p = local<Lanes>(space, i);
+      const auto member = space.contains(p);
+      const Float x = keep(member, p[0]);
+      const Float y = keep(member, p[1]);
+      const Float z = keep(member, p[2]);
       n = n + keep(member, Float(kOne));
       sx = sx + x;
       sy = sy + y;
@@ -82,17 +81,22 @@ class PatchSample {
   /// Whether all points are in such a half space.
   template <class Lanes>
   bool is_inside(const HalfSpace& space) const {
-    using Float = typename Lanes::Float;
     for (std::size_t i = 0; i < size_; i += kLanes) {
       const unsigned all = (1U << std::min(kLanes, size_ - i)) - 1U;
-      const auto inside = space.contains(Float::load(&points_.x[i]), Float::load(&points_.y[i]),
-                                         Float::load(&points_.z[i]) - space.z0);
-      if (inside.bits() != all) return false;
+      if (space.contains(local<Lanes>(space, i)).bits() != all) return false;
     }
     return true;
   }
 
  private:
+  // Eight points, relative to the origin of the half space.
+  template <class Lanes>
+  std::array<typename Lanes::Float, 3> local(const HalfSpace& space, std::size_t i) const {
+    using Float = typename Lanes::Float;
+    return {Float::load(&points_.x[i]), Float::load(&points_.y[i]),
+            Float::load(&points_.z[i]) - space.z0};
+  }
+
   PointBuffer points_;
   std::size_t size_ = 0;
 };
