@@ -10,6 +10,7 @@
 #include "detail/cell_groups.hpp"
 #include "detail/nearest.hpp"
 #include "detail/preservation.hpp"
+#include "detail/radius_lookup.hpp"
 #include "detail/range_gate.hpp"
 #include "detail/scan_voxels.hpp"
 #include "detail/voxel_grid.hpp"
@@ -24,14 +25,6 @@ using detail::VoxelKey;
 
 namespace {
 
-/// Some finite point of the map, so that keys reach as far as possible around the map.
-Eigen::Vector3d anchor_of(Span<const Eigen::Vector3d> points) {
-  for (const Eigen::Vector3d& p : points) {
-    if (p.allFinite() && p.cwiseAbs().maxCoeff() < 1e9) return p;
-  }
-  return Eigen::Vector3d::Zero();
-}
-
 double positive(double value, const char* name) {
   if (value > 0 && std::isfinite(value)) return value;
   throw ConfigError("MapProtocol." + std::string(name) + " = " + std::to_string(value) +
@@ -44,44 +37,6 @@ double squared_distance(const Eigen::Vector3d& p, const Eigen::Vector3d& corner,
   return (local - local.cwiseMax(0.0).cwiseMin(edge)).squaredNorm();
 }
 
-/// Whether some map point lies within a radius.
-class RadiusLookup {
- public:
-  /// Cells are two radii wide: the eight cells around a point's nearest corner cover its ball.
-  RadiusLookup(double radius, Span<const Eigen::Vector3d> points)
-      : squared_radius_(radius * radius),
-        points_(points),
-        grid_(2 * radius, anchor_of(points)),
-        groups_(grid_, points) {}
-
-  bool contains(const Eigen::Vector3d& p) const {
-    const VoxelKey key = grid_.key(p);
-    if (key == detail::kNoKey) return false;
-    const Eigen::Vector3d center =
-        grid_.corner(key) + Eigen::Vector3d::Constant(0.5 * grid_.edge());
-    for (unsigned corner = 0; corner < 8; ++corner) {
-      VoxelKey neighbour = key;
-      for (int axis = 0; axis < 3; ++axis) {
-        if ((corner >> axis & 1U) == 0) continue;
-        const VoxelKey step = VoxelKey{1} << (axis * detail::kKeyBits);
-        neighbour = p[axis] < center[axis] ? neighbour - step : neighbour + step;
-      }
-      const std::uint32_t cell = groups_.index().find(neighbour);
-      if (cell == VoxelIndex::kNone) continue;
-      for (const std::uint32_t i : groups_.points(cell)) {
-        if ((points_[i] - p).squaredNorm() <= squared_radius_) return true;
-      }
-    }
-    return false;
-  }
-
- private:
-  double squared_radius_;
-  Span<const Eigen::Vector3d> points_;
-  detail::VoxelGrid grid_;
-  detail::CellGroups groups_;
-};
-
 }  // namespace
 
 class MapProtocol::Impl {
@@ -91,7 +46,7 @@ class MapProtocol::Impl {
         gate_(settings.min_range, settings.max_range),
         point_gate_(settings.min_range, settings.point_max_range),
         map_(map),
-        grid_(positive(settings.voxel, "voxel"), anchor_of(map)),
+        grid_(positive(settings.voxel, "voxel"), detail::anchor_of(map)),
         groups_(grid_, map),
         lookup_(positive(settings.point_radius, "point_radius"), map) {}
 
@@ -256,7 +211,7 @@ class MapProtocol::Impl {
   Span<const Eigen::Vector3d> map_;
   detail::VoxelGrid grid_;
   detail::CellGroups groups_;
-  RadiusLookup lookup_;
+  detail::RadiusLookup lookup_;
   PointScore point_score_;
 
   VoxelIndex measured_;  // voxels with measured points

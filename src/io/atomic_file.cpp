@@ -17,10 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void fail_with(const fs::path& path, const std::string& what, int error) {
-  fail(path, what + ": " + std::generic_category().message(error));
-}
-
 /// The file that will be replaced: renaming over a link would cut it off from its target.
 fs::path follow_links(fs::path path) {
   std::error_code error;
@@ -99,7 +95,7 @@ AtomicFile::AtomicFile(fs::path target)
   temporary_.replace_filename("." + target_.filename().string() + "." + std::to_string(::getpid()) +
                               ".tmp");
   buffer_ = std::make_unique<Buffer>(temporary_);
-  if (buffer_->error() != 0) fail_with(target_, "cannot be written", buffer_->error());
+  if (buffer_->error() != 0) fail_by_system(target_, "cannot be written", buffer_->error());
   stream_.rdbuf(buffer_.get());
 }
 
@@ -113,20 +109,21 @@ AtomicFile::~AtomicFile() {
 void AtomicFile::commit(Sync sync) {
   buffer_->flush(sync);
   buffer_->close();
-  if (buffer_->error() != 0) fail_with(target_, "cannot be written to the end", buffer_->error());
+  if (buffer_->error() != 0)
+    fail_by_system(target_, "cannot be written to the end", buffer_->error());
   std::error_code error;
   fs::rename(temporary_, target_, error);
-  if (error) fail_with(target_, "cannot be put in place", error.value());
+  if (error) fail_by_system(target_, "cannot be put in place", error.value());
   committed_ = true;
 }
 
 void sync_files(const fs::path& folder) {
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) fail_with(folder, "cannot be written to the disk", errno);
+  if (descriptor < 0) fail_by_system(folder, "cannot be written to the disk", errno);
   const int result = ::syncfs(descriptor);
   const int error = errno;
   ::close(descriptor);
-  if (result != 0) fail_with(folder, "cannot be written to the disk", error);
+  if (result != 0) fail_by_system(folder, "cannot be written to the disk", error);
 }
 
 }  // namespace dynains

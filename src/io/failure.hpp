@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <system_error>
 
 #include "dynains/errors.hpp"
 
@@ -11,6 +12,12 @@ namespace dynains {
 
 [[noreturn]] inline void fail(const std::filesystem::path& path, const std::string& what) {
   throw IoError(path.string() + ": " + what);
+}
+
+/// The same with the system's own words for `error`, a value of errno. Throws IoError.
+[[noreturn]] inline void fail_by_system(const std::filesystem::path& path, const std::string& what,
+                                        int error) {
+  fail(path, what + ": " + std::generic_category().message(error));
 }
 
 [[noreturn]] inline void fail_at_line(const std::filesystem::path& path, std::uint64_t line,

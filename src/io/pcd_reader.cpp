@@ -29,16 +29,16 @@ struct Field {
   std::size_t bytes() const { return size * count; }
 };
 
-enum class Encoding : std::uint8_t { kAscii, kBinary, kCompressed };
+enum class PcdEncoding : std::uint8_t { kAscii, kBinary, kCompressed };
 
-struct Header {
+struct PcdHeader {
   std::vector<Field> fields;
   std::uint64_t width = 0;
   std::uint64_t height = 1;
   std::uint64_t points = 0;
   bool has_width = false;
   bool has_points = false;
-  Encoding encoding = Encoding::kAscii;
+  PcdEncoding encoding = PcdEncoding::kAscii;
 
   std::size_t record_bytes() const {
     std::size_t bytes = 0;
@@ -63,7 +63,7 @@ std::uint64_t parse_unsigned(const ByteReader& reader, std::string_view token,
 
 /// Calls `parse(field, token)` for each field; the line must have a token for each.
 template <class Parse>
-void for_each_field(const ByteReader& reader, Header& header, std::string_view line,
+void for_each_field(const ByteReader& reader, PcdHeader& header, std::string_view line,
                     Parse&& parse) {
   if (header.fields.empty()) reader.fail_on_line("expected FIELDS before this line");
   for (Field& field : header.fields) {
@@ -96,11 +96,11 @@ Eigen::Isometry3d parse_viewpoint(const ByteReader& reader, std::string_view lin
   return pose;
 }
 
-Encoding parse_encoding(const ByteReader& reader, std::string_view line) {
+PcdEncoding parse_encoding(const ByteReader& reader, std::string_view line) {
   const std::string_view name = text::next_token(line);
-  if (name == "ascii") return Encoding::kAscii;
-  if (name == "binary") return Encoding::kBinary;
-  if (name == "binary_compressed") return Encoding::kCompressed;
+  if (name == "ascii") return PcdEncoding::kAscii;
+  if (name == "binary") return PcdEncoding::kBinary;
+  if (name == "binary_compressed") return PcdEncoding::kCompressed;
   reader.fail_on_line("expected DATA ascii, binary or binary_compressed");
 }
 
@@ -119,7 +119,7 @@ Scalar scalar_of(const ByteReader& reader, const Field& field) {
 }
 
 void parse_header_line(const ByteReader& reader, std::string_view keyword, std::string_view line,
-                       Header& header, PointSink& sink) {
+                       PcdHeader& header, PointSink& sink) {
   if (keyword == "VERSION") return;
   if (keyword == "FIELDS" || keyword == "COLUMNS") {
     if (!header.fields.empty()) reader.fail_on_line("expected FIELDS once");
@@ -167,7 +167,7 @@ void parse_header_line(const ByteReader& reader, std::string_view keyword, std::
   }
 }
 
-void finish_header(const ByteReader& reader, Header& header, PointSink& sink) {
+void finish_header(const ByteReader& reader, PcdHeader& header, PointSink& sink) {
   for (Field& field : header.fields) {
     if (field.size == 0) reader.fail_on_line("expected SIZE before DATA");
     if (field.type_letter == 0) reader.fail_on_line("expected TYPE before DATA");
@@ -189,8 +189,8 @@ void finish_header(const ByteReader& reader, Header& header, PointSink& sink) {
   header.points = product;
 }
 
-Header read_header(ByteReader& reader, PointSink& sink) {
-  Header header;
+PcdHeader parse_pcd_header(ByteReader& reader, PointSink& sink) {
+  PcdHeader header;
   std::string line;
   for (std::size_t i = 0; i < kMaxHeaderLines; ++i) {
     if (!reader.read_line(line)) reader.fail_on_line("file ends, expected a line DATA");
@@ -207,7 +207,7 @@ Header read_header(ByteReader& reader, PointSink& sink) {
   reader.fail_on_line("expected a line DATA before this line");
 }
 
-void check_backed(const ByteReader& reader, const Header& header, std::uint64_t available,
+void check_backed(const ByteReader& reader, const PcdHeader& header, std::uint64_t available,
                   std::uint64_t each) {
   if (header.points <= available / each) return;
   reader.fail_here("expected " + std::to_string(header.points) + " points of at least " +
@@ -220,7 +220,7 @@ void check_backed(const ByteReader& reader, const Header& header, std::uint64_t 
                    std::to_string(i));
 }
 
-void read_ascii(ByteReader& reader, const Header& header, PointSink& sink) {
+void read_ascii(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
   std::uint64_t values = 0;
   for (const Field& field : header.fields) values += field.count;
   check_backed(reader, header, reader.remaining() + 1, 2 * values);
@@ -249,7 +249,7 @@ void read_ascii(ByteReader& reader, const Header& header, PointSink& sink) {
   }
 }
 
-void read_binary(ByteReader& reader, const Header& header, PointSink& sink) {
+void read_binary(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
   check_backed(reader, header, reader.remaining(), header.record_bytes());
   if (header.points == 0) return;
   std::vector<char> record(header.record_bytes());
@@ -268,7 +268,7 @@ void read_binary(ByteReader& reader, const Header& header, PointSink& sink) {
 }
 
 /// The points are stored field after field, and compressed in one block.
-void read_compressed(ByteReader& reader, const Header& header, PointSink& sink) {
+void read_compressed(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
   std::array<std::uint32_t, 2> sizes{};
   std::array<char, sizeof(sizes)> bytes{};
   reader.read(bytes.data(), bytes.size(), "the sizes of the compressed block");
@@ -314,15 +314,15 @@ void read_compressed(ByteReader& reader, const Header& header, PointSink& sink) 
 PointFile read_pcd(const std::filesystem::path& path) {
   ByteReader reader(path);
   PointSink sink;
-  const Header header = read_header(reader, sink);
+  const PcdHeader header = parse_pcd_header(reader, sink);
   switch (header.encoding) {
-    case Encoding::kAscii:
+    case PcdEncoding::kAscii:
       read_ascii(reader, header, sink);
       break;
-    case Encoding::kBinary:
+    case PcdEncoding::kBinary:
       read_binary(reader, header, sink);
       break;
-    case Encoding::kCompressed:
+    case PcdEncoding::kCompressed:
       read_compressed(reader, header, sink);
       break;
   }
@@ -332,7 +332,7 @@ PointFile read_pcd(const std::filesystem::path& path) {
 PointFileHeader read_pcd_header(const std::filesystem::path& path) {
   ByteReader reader(path);
   PointSink sink;
-  read_header(reader, sink);
+  parse_pcd_header(reader, sink);
   return {sink.file().viewpoint, sink.columns()};
 }
 

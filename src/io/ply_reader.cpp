@@ -27,10 +27,10 @@ struct Element {
   std::vector<Property> properties;
 };
 
-enum class Encoding : std::uint8_t { kAscii, kLittleEndian, kBigEndian };
+enum class PlyEncoding : std::uint8_t { kAscii, kLittleEndian, kBigEndian };
 
-struct Header {
-  Encoding encoding = Encoding::kAscii;
+struct PlyHeader {
+  PlyEncoding encoding = PlyEncoding::kAscii;
   std::vector<Element> elements;  ///< up to and with the vertices
 };
 
@@ -64,12 +64,12 @@ std::uint64_t parse_count(const ByteReader& reader, std::string_view token) {
   return count;
 }
 
-Encoding parse_format(const ByteReader& reader, std::string_view line) {
+PlyEncoding parse_format(const ByteReader& reader, std::string_view line) {
   const std::string_view name = text::next_token(line);
   if (text::next_token(line) != "1.0") reader.fail_on_line("expected format version 1.0");
-  if (name == "ascii") return Encoding::kAscii;
-  if (name == "binary_little_endian") return Encoding::kLittleEndian;
-  if (name == "binary_big_endian") return Encoding::kBigEndian;
+  if (name == "ascii") return PlyEncoding::kAscii;
+  if (name == "binary_little_endian") return PlyEncoding::kLittleEndian;
+  if (name == "binary_big_endian") return PlyEncoding::kBigEndian;
   reader.fail_on_line("expected ascii, binary_little_endian or binary_big_endian");
 }
 
@@ -87,12 +87,12 @@ Property parse_property(const ByteReader& reader, std::string_view line) {
   return property;
 }
 
-Header read_header(ByteReader& reader, PointSink& sink) {
+PlyHeader parse_ply_header(ByteReader& reader, PointSink& sink) {
   std::string line;
   if (!reader.read_line(line) || line != "ply") {
     reader.fail_on_line("expected \"ply\" as first line");
   }
-  Header header;
+  PlyHeader header;
   bool has_format = false;
   bool has_vertices = false;
   bool past_vertices = false;
@@ -185,8 +185,8 @@ void read_ascii_element(ByteReader& reader, const Element& element, std::string&
 }
 
 /// Fewest bytes that one element takes in the file.
-std::uint64_t min_bytes(const Element& element, Encoding encoding) {
-  if (encoding == Encoding::kAscii) return 2 * element.properties.size();
+std::uint64_t min_bytes(const Element& element, PlyEncoding encoding) {
+  if (encoding == PlyEncoding::kAscii) return 2 * element.properties.size();
   std::uint64_t bytes = 0;
   for (const Property& property : element.properties) {
     bytes += size_of(property.is_list ? property.length_type : property.type);
@@ -194,10 +194,10 @@ std::uint64_t min_bytes(const Element& element, Encoding encoding) {
   return bytes;
 }
 
-void check_count(const ByteReader& reader, const Element& element, Encoding encoding) {
+void check_count(const ByteReader& reader, const Element& element, PlyEncoding encoding) {
   const std::uint64_t each = min_bytes(element, encoding);
   // The last line of a text may lack its end.
-  const std::uint64_t available = reader.remaining() + (encoding == Encoding::kAscii ? 1 : 0);
+  const std::uint64_t available = reader.remaining() + (encoding == PlyEncoding::kAscii ? 1 : 0);
   if (each != 0 && element.count > available / each) {
     reader.fail_here("expected " + std::to_string(element.count) + " elements of at least " +
                      std::to_string(each) + " bytes, the file has " +
@@ -210,8 +210,8 @@ void check_count(const ByteReader& reader, const Element& element, Encoding enco
 PointFile read_ply(const std::filesystem::path& path) {
   ByteReader reader(path);
   PointSink sink;
-  const Header header = read_header(reader, sink);
-  const bool swap = header.encoding == Encoding::kBigEndian;
+  const PlyHeader header = parse_ply_header(reader, sink);
+  const bool swap = header.encoding == PlyEncoding::kBigEndian;
   std::string line;
   for (const Element& element : header.elements) {
     check_count(reader, element, header.encoding);
@@ -221,9 +221,9 @@ PointFile read_ply(const std::filesystem::path& path) {
       const auto store = [&](const Property& property, double value) {
         if (sink.set(i, property.role, value)) return;
         const std::string what = "expected a whole number that " + property.name + " can have";
-        header.encoding == Encoding::kAscii ? reader.fail_on_line(what) : reader.fail_here(what);
+        header.encoding == PlyEncoding::kAscii ? reader.fail_on_line(what) : reader.fail_here(what);
       };
-      if (header.encoding == Encoding::kAscii) {
+      if (header.encoding == PlyEncoding::kAscii) {
         read_ascii_element(reader, element, line, store);
       } else {
         read_binary_element(reader, element, swap, store);
@@ -236,7 +236,7 @@ PointFile read_ply(const std::filesystem::path& path) {
 PointFileHeader read_ply_header(const std::filesystem::path& path) {
   ByteReader reader(path);
   PointSink sink;
-  read_header(reader, sink);
+  parse_ply_header(reader, sink);
   return {sink.file().viewpoint, sink.columns()};
 }
 

@@ -33,7 +33,7 @@ bool is_file(const fs::path& path) {
   return fs::is_regular_file(path, error);
 }
 
-std::optional<ScanFormat> format_of(const fs::path& path) {
+std::optional<ScanFormat> scan_format_of(const fs::path& path) {
   std::string extension = path.extension().string();
   for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   if (extension == ".bin") return ScanFormat::kBin;
@@ -77,7 +77,7 @@ std::vector<fs::path> scan_files(const fs::path& folder) {
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
     const fs::path& path = entry->path();
-    if (!format_of(path) || path.filename().string().front() == '.') continue;
+    if (!scan_format_of(path) || path.filename().string().front() == '.') continue;
     files.push_back(path);
   }
   if (error) fail(folder, "cannot be listed: " + error.message());
@@ -149,9 +149,9 @@ void Recording::list_scans() {
   }
   const std::vector<fs::path> files = scan_files(scan_folder_);
   if (files.empty()) fail(scan_folder_, std::string("has no scans; ") + kAccepted);
-  format_ = *format_of(files.front());
+  format_ = *scan_format_of(files.front());
   for (const fs::path& file : files) {
-    if (*format_of(file) == format_) continue;
+    if (*scan_format_of(file) == format_) continue;
     fail(scan_folder_, "expected scans of one kind, found " + files.front().filename().string() +
                            " and " + file.filename().string());
   }

@@ -28,7 +28,7 @@ constexpr int kHeightBits = 16;      // z
 const char* const kExtension = ".tile";
 
 /// What a file of a tile begins with; points follow.
-struct Header {
+struct TileHeader {
   char magic[8] = {'D', 'Y', 'N', 'A', 'T', 'I', 'L', 'E'};
   std::uint64_t version = 1;
   double map_voxel = 0.0;
@@ -52,14 +52,10 @@ std::optional<std::array<std::int64_t, 3>> place_of(const fs::path& path) {
   return place;
 }
 
-[[noreturn]] void fail_with(const fs::path& path, const std::string& what, int error) {
-  fail(path, what + ": " + std::generic_category().message(error));
-}
-
 /// Writes into a file that is there. Throws IoError.
 void write_at(const fs::path& path, std::size_t offset, const void* data, std::size_t size) {
   const int descriptor = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
-  if (descriptor < 0) fail_with(path, "cannot be written", errno);
+  if (descriptor < 0) fail_by_system(path, "cannot be written", errno);
   const char* next = static_cast<const char*>(data);
   int error = 0;
   while (size > 0 && error == 0) {
@@ -73,7 +69,7 @@ void write_at(const fs::path& path, std::size_t offset, const void* data, std::s
     size -= static_cast<std::size_t>(count);
   }
   if (::close(descriptor) != 0 && error == 0) error = errno;
-  if (error != 0) fail_with(path, "cannot be written to the end", error);
+  if (error != 0) fail_by_system(path, "cannot be written to the end", error);
 }
 
 }  // namespace
@@ -93,7 +89,7 @@ TiledStaticMap::TiledStaticMap(const Config& config)
   const fs::path& folder = config_.map_folder;
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) fail_with(folder, "cannot be created", error.value());
+  if (error) fail_by_system(folder, "cannot be created", error.value());
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
     const auto place = place_of(entry->path());
@@ -101,7 +97,7 @@ TiledStaticMap::TiledStaticMap(const Config& config)
     stored_[*place] = count_stored(*place);
     size_ += stored_[*place];
   }
-  if (error) fail_with(folder, "cannot be listed", error.value());
+  if (error) fail_by_system(folder, "cannot be listed", error.value());
 }
 
 void TiledStaticMap::insert(PointsView points, Span<const std::uint8_t> keep,
@@ -136,7 +132,7 @@ void TiledStaticMap::clear() {
     const fs::path path = path_of(tile->first);
     std::error_code error;
     fs::remove(path, error);
-    if (error) fail_with(path, "cannot be removed", error.value());
+    if (error) fail_by_system(path, "cannot be removed", error.value());
     const auto in_memory = tiles_.find(tile->first);
     size_ -= in_memory == tiles_.end() ? tile->second : in_memory->second.points.size();
     if (in_memory != tiles_.end()) tiles_.erase(in_memory);
@@ -210,9 +206,9 @@ TiledStaticMap::Tile& TiledStaticMap::tile_at(const Place& place) {
 std::size_t TiledStaticMap::count_stored(const Place& place) const {
   const fs::path path = path_of(place);
   std::ifstream file(path, std::ios::binary);
-  Header header;
+  TileHeader header;
   file.read(reinterpret_cast<char*>(&header), sizeof(header));
-  const Header ours;
+  const TileHeader ours;
   if (!file || std::memcmp(header.magic, ours.magic, sizeof(ours.magic)) != 0) {
     fail_at_byte(path, 0, "expected a tile of a static map");
   }
@@ -229,8 +225,8 @@ std::size_t TiledStaticMap::count_stored(const Place& place) const {
   if (header.place != place) fail_at_byte(path, 24, "expected the place that is in its name");
   std::error_code error;
   const std::uintmax_t size = fs::file_size(path, error);
-  if (error) fail_with(path, "cannot be read", error.value());
-  return (static_cast<std::size_t>(size) - sizeof(Header)) / sizeof(Point);
+  if (error) fail_by_system(path, "cannot be read", error.value());
+  return (static_cast<std::size_t>(size) - sizeof(TileHeader)) / sizeof(Point);
 }
 
 std::vector<TiledStaticMap::Point> TiledStaticMap::read(const Place& place,
@@ -239,7 +235,7 @@ std::vector<TiledStaticMap::Point> TiledStaticMap::read(const Place& place,
   if (count == 0) return points;
   const fs::path path = path_of(place);
   std::ifstream file(path, std::ios::binary);
-  file.seekg(sizeof(Header));
+  file.seekg(sizeof(TileHeader));
   file.read(reinterpret_cast<char*>(points.data()),
             static_cast<std::streamsize>(count * sizeof(Point)));
   if (!file) fail(path, "cannot be read: expected " + std::to_string(count) + " points");
@@ -250,7 +246,7 @@ std::vector<TiledStaticMap::Point> TiledStaticMap::read(const Place& place,
   });
   if (outside != points.end()) {
     const auto index = static_cast<std::size_t>(outside - points.begin());
-    fail_at_byte(path, sizeof(Header) + index * sizeof(Point), "expected a point in its voxel");
+    fail_at_byte(path, sizeof(TileHeader) + index * sizeof(Point), "expected a point in its voxel");
   }
   return points;
 }
@@ -261,14 +257,14 @@ void TiledStaticMap::write_new_points() {
     if (stored == tile.points.size()) continue;
     const fs::path path = path_of(place);
     if (stored == 0) {
-      Header header;
+      TileHeader header;
       header.map_voxel = config_.map_voxel;
       header.place = place;
       AtomicFile file(path);
       file.stream().write(reinterpret_cast<const char*>(&header), sizeof(header));
       file.commit(AtomicFile::Sync::kLater);
     }
-    write_at(path, sizeof(Header) + stored * sizeof(Point), &tile.points[stored],
+    write_at(path, sizeof(TileHeader) + stored * sizeof(Point), &tile.points[stored],
              (tile.points.size() - stored) * sizeof(Point));
     stored = tile.points.size();
   }

@@ -19,7 +19,7 @@ template <class T>
 using Contiguous = py::array_t<T, py::array::c_style | py::array::forcecast>;
 
 // The arrays of one scan, and the view of them that the protocols see.
-struct Scan {
+struct JudgedScan {
   Contiguous<float> points;
   Contiguous<std::uint32_t> truth;
   Contiguous<std::uint8_t> kept;
@@ -46,12 +46,12 @@ void expect_length(const char* what, std::size_t scan, const py::array& array, p
                               shape_text(array) + ", expected (" + std::to_string(length) + ",)");
 }
 
-Scan make_scan(std::size_t index, const py::handle& points, const py::handle& pose,
-               const py::handle& truth, const py::handle& kept) {
-  Scan scan{points.cast<Contiguous<float>>(),
-            to_truth(py::reinterpret_borrow<py::object>(truth)),
-            to_kept(kept.cast<Contiguous<bool>>()),
-            {}};
+JudgedScan make_scan(std::size_t index, const py::handle& points, const py::handle& pose,
+                     const py::handle& truth, const py::handle& kept) {
+  JudgedScan scan{points.cast<Contiguous<float>>(),
+                  to_truth(py::reinterpret_borrow<py::object>(truth)),
+                  to_kept(kept.cast<Contiguous<bool>>()),
+                  {}};
   if (scan.points.ndim() != 2 || scan.points.shape(1) < 3) {
     throw CloudError("points of scan " + std::to_string(index) + ": shape " +
                      shape_text(scan.points) + ", expected (N, 3) or more columns");
@@ -96,7 +96,7 @@ py::dict evaluate_arrays(const py::sequence& points, const py::sequence& poses,
   config.truth = evaluation::TruthClasses(dynamic_classes, unlabeled == "static"
                                                                ? evaluation::Unlabeled::kStatic
                                                                : evaluation::Unlabeled::kIgnore);
-  std::vector<Scan> scans;
+  std::vector<JudgedScan> scans;
   for (std::size_t i = 0; i < points.size(); ++i) {
     scans.push_back(make_scan(i, points[i], poses[i], truth[i], kept[i]));
   }

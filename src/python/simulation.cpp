@@ -13,7 +13,7 @@ namespace {
 using simulation::SimulatedScan;
 using simulation::Simulator;
 
-struct Scan {
+struct ScanOfArrays {
   double time;
   py::array_t<float> points;
   py::array_t<std::uint32_t> labels;
@@ -31,7 +31,7 @@ Simulator make_simulator(const std::string& scene, const std::string& sensor,
   return Simulator(config);
 }
 
-Scan scan_of(Simulator& simulator, py::ssize_t index) {
+ScanOfArrays scan_of(Simulator& simulator, py::ssize_t index) {
   const auto size = static_cast<py::ssize_t>(simulator.size());
   if (index < 0) index += size;
   if (index < 0 || index >= size) throw py::index_error("the sequence has no such scan");
@@ -43,12 +43,13 @@ Scan scan_of(Simulator& simulator, py::ssize_t index) {
 }  // namespace
 
 void bind_simulation(py::module_& module) {
-  py::class_<Scan>(module, "SimulatedScan", "One simulated scan.")
-      .def_readonly("time", &Scan::time, "s, 0 for the first scan.")
-      .def_readonly("points", &Scan::points,
+  py::class_<ScanOfArrays>(module, "SimulatedScan", "One simulated scan.")
+      .def_readonly("time", &ScanOfArrays::time, "s, 0 for the first scan.")
+      .def_readonly("points", &ScanOfArrays::points,
                     "(N, 4) float32: x y z (m, sensor frame), reflectivity.")
-      .def_readonly("labels", &Scan::labels, "(N,) uint32, class and instance of SemanticKITTI.")
-      .def_readonly("T_world_sensor", &Scan::T_world_sensor,
+      .def_readonly("labels", &ScanOfArrays::labels,
+                    "(N,) uint32, class and instance of SemanticKITTI.")
+      .def_readonly("T_world_sensor", &ScanOfArrays::T_world_sensor,
                     "(4, 4) float64, with the noise that was asked for.");
 
   std::string doc =

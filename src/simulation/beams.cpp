@@ -8,7 +8,6 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kDegree = kPi / 180;
 
 /// `count` elevations from `top` downwards, degrees.

@@ -8,8 +8,6 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 Vec3 vec(double x, double y, double z) {
   return {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
 }

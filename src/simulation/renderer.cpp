@@ -8,10 +8,6 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
-double wrap(double angle) { return angle - 2 * kPi * std::floor((angle + kPi) / (2 * kPi)); }
-
 /// Distance from the origin that no part of the primitive undercuts.
 float nearest_distance(const Primitive& primitive) {
   const Vec3 p = primitive.to_unit * (-1.0F * primitive.centre);

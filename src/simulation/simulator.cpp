@@ -12,7 +12,6 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kMovingSpeed = 0.5;  // m/s
 
 /// Rotation Rz(yaw) Ry(pitch) Rx(roll) in doubles, without vector instructions that might differ.
@@ -69,13 +68,6 @@ Eigen::Isometry3d isometry(const Eigen::Matrix3d& r, double x, double y, double 
   return result;
 }
 
-/// What is remembered of every scan.
-struct Moment {
-  double time = 0;
-  Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
-  std::vector<ObjectPose> objects;
-};
-
 /// A body of the given length and width on uneven ground.
 Eigen::Isometry3d stand_on(Terrain& terrain, const Waypoint& at, double length, double width) {
   const Vec2 u = direction(at.heading), v = left_of(u);
@@ -129,6 +121,13 @@ class Simulator::Implementation {
   }
 
  private:
+  /// What is remembered of every scan.
+  struct Moment {
+    double time = 0;
+    Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+    std::vector<ObjectPose> objects;
+  };
+
   /// Moves everybody through the whole sequence.
   void play() {
     const double interval = 1 / config_.rate;

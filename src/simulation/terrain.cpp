@@ -6,7 +6,6 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kFar = 30.0;
 constexpr std::uint16_t kPavementLabel = 48;
 

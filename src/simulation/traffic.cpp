@@ -7,11 +7,8 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kActiveRadius = 260.0;  // m around the ego vehicle; nobody moves beyond
 constexpr std::size_t kNobody = std::numeric_limits<std::size_t>::max();
-
-double wrap(double angle) { return angle - 2 * kPi * std::floor((angle + kPi) / (2 * kPi)); }
 
 }  // namespace
 

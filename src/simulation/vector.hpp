@@ -1,9 +1,14 @@
-// Small vectors of the ray caster. Written out so that every compiler does the same additions.
+// Small vectors and angles of the ray caster. Written out so that every compiler does the same
+// additions.
 #pragma once
 
 #include <cmath>
 
 namespace dynains::simulation {
+
+inline constexpr double kPi = 3.14159265358979323846;
+/// The same direction in [-pi, pi).
+inline double wrap(double angle) { return angle - 2 * kPi * std::floor((angle + kPi) / (2 * kPi)); }
 
 struct Vec2 {
   double x = 0, y = 0;

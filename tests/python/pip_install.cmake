@@ -14,7 +14,7 @@ file(WRITE ${WORK_DIR}/pip.cfg
   "[build]\nbuild_base = ${WORK_DIR}/pip_build\n[egg_info]\negg_base = ${WORK_DIR}/pip_build\n")
 set(ENV{DIST_EXTRA_CONFIG} ${WORK_DIR}/pip.cfg)
 # What is proved is that it builds: speed of the result would cost minutes.
-set(ENV{CMAKE_ARGS} "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER} -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O0")
+set(ENV{CMAKE_ARGS} "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER} -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O0 -DCMAKE_UNITY_BUILD=ON")
 set(ENV{PIP_DISABLE_PIP_VERSION_CHECK} 1)
 execute_process(
   COMMAND ${PYTHON} -m pip install --no-build-isolation --no-index --no-deps

@@ -10,7 +10,6 @@ namespace dynains::simulation {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 const Material kSolid{50, 0.3F, 0, 0, 0, 0, 0};
 
 void require_interval(const Interval& interval, double enter, double leave) {

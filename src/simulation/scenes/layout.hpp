@@ -9,7 +9,6 @@
 
 namespace dynains::simulation {
 
-inline constexpr double kPi = 3.14159265358979323846;
 inline constexpr double kBefore = 140.0;   ///< m of street behind the start and beyond the end
 inline constexpr double kLaneHalf = 1.75;  ///< m from the centre line to the middle of a lane
 

@@ -1,0 +1,59 @@
+// Whether a map has a point near a place.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "detail/cell_groups.hpp"
+#include "detail/voxel_grid.hpp"
+#include "dynains/points.hpp"
+
+namespace dynains::evaluation::detail {
+
+/// Some finite point of the map, so that keys reach as far as possible around the map.
+inline Eigen::Vector3d anchor_of(Span<const Eigen::Vector3d> points) {
+  for (const Eigen::Vector3d& p : points) {
+    if (p.allFinite() && p.cwiseAbs().maxCoeff() < 1e9) return p;
+  }
+  return Eigen::Vector3d::Zero();
+}
+
+/// Whether some map point lies within a radius.
+class RadiusLookup {
+ public:
+  /// Cells are two radii wide: the eight cells around a point's nearest corner cover its ball.
+  RadiusLookup(double radius, Span<const Eigen::Vector3d> points)
+      : squared_radius_(radius * radius),
+        points_(points),
+        grid_(2 * radius, anchor_of(points)),
+        groups_(grid_, points) {}
+
+  bool contains(const Eigen::Vector3d& p) const {
+    const VoxelKey key = grid_.key(p);
+    if (key == kNoKey) return false;
+    const Eigen::Vector3d center =
+        grid_.corner(key) + Eigen::Vector3d::Constant(0.5 * grid_.edge());
+    for (unsigned corner = 0; corner < 8; ++corner) {
+      VoxelKey neighbour = key;
+      for (int axis = 0; axis < 3; ++axis) {
+        if ((corner >> axis & 1U) == 0) continue;
+        const VoxelKey step = VoxelKey{1} << (axis * kKeyBits);
+        neighbour = p[axis] < center[axis] ? neighbour - step : neighbour + step;
+      }
+      const std::uint32_t cell = groups_.index().find(neighbour);
+      if (cell == VoxelIndex::kNone) continue;
+      for (const std::uint32_t i : groups_.points(cell)) {
+        if ((points_[i] - p).squaredNorm() <= squared_radius_) return true;
+      }
+    }
+    return false;
+  }
+
+ private:
+  double squared_radius_;
+  Span<const Eigen::Vector3d> points_;
+  VoxelGrid grid_;
+  CellGroups groups_;
+};
+
+}  // namespace dynains::evaluation::detail
