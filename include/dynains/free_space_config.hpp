@@ -27,7 +27,8 @@ struct FreeSpaceConfig {
   double tau_whole = 0.84;       ///< the same for a whole instance at once
   double remove_share = 0.2;     ///< share of free supervoxels that removes the whole instance
   double see_share = 0.6;        ///< share of an instance that one reference must see through
-  double footprint = 0.2;        ///< m, ground this near to removed points goes with them
+  double footprint = 0.3;        ///< m, ground this near to removed points goes with them ...
+  double footprint_rise = 0.03;  ///< ... if it rises so much (m) over the ground around; 0: all
   bool use_tracks = true;        ///< carry beliefs along instances that overlap from scan to scan
   double tau_track = 0.87;       ///< belief along its track from which an instance moved
   double still_weight = 0.1;     ///< of an increment, for a scan in which an instance stood still
@@ -79,6 +80,9 @@ struct FreeSpaceConfig {
                       "share of an instance that one reference must see through to remove it"});
     visitor(Parameter{"footprint", self.footprint, closed(0, 2), "m",
                       "ground this near to removed points goes with them; 0: none"});
+    visitor(Parameter{"footprint_rise", self.footprint_rise, closed(0, 1), "m",
+                      "only what rises so much over the ground around goes, with what shares its "
+                      "cell of the footprint; 0: all of it"});
     visitor(Parameter{"use_tracks", self.use_tracks, Bounds(), "",
                       "carry beliefs along instances that overlap from scan to scan"});
     visitor(Parameter{"tau_track", self.tau_track, open(0.5, 1), "",

@@ -133,6 +133,20 @@ class GroundFootprint {
     }
   }
 
+  /// Marks the cells of those points of a block whose bits are set: they lie under removed ones.
+  void mark(PointsView block, std::uint64_t which) {
+    const Located located = locate(block);
+    detail::for_each_bit(which, [&](std::size_t i) { cell_of(located, i).marked = true; });
+  }
+  /// Which of these points lie in marked cells.
+  std::uint64_t find_marked(PointsView block, std::uint64_t which) {
+    const Located located = locate(block);
+    std::uint64_t marked = 0;
+    detail::for_each_bit(
+        which, [&](std::size_t i) { marked |= std::uint64_t{cell_of(located, i).marked} << i; });
+    return marked;
+  }
+
   bool empty() const { return touched_.empty(); }
 
   /// Forgets all points.
@@ -161,6 +175,7 @@ class GroundFootprint {
   struct Cell {
     float own = kNothing;     // lowest point in it
     float lowest = kNothing;  // the same with the cells around
+    bool marked = false;
   };
   struct Touched {
     std::uint32_t tile, cell;
@@ -340,6 +355,11 @@ class GroundFootprint {
     const bool is_first = !(cell.own < kNothing);
     cell.own = std::min(cell.own, z);
     if (is_first && cell.own < kNothing) touched_.push_back({tile, within});
+  }
+  // Of a point under a removed one.
+  Cell& cell_of(const Located& located, std::size_t i) {
+    return tiles_[tile_of_[static_cast<std::size_t>(located.tile[i])]]
+                 [static_cast<std::size_t>(located.cell[i])];
   }
   Cell& cell_at(std::uint32_t tile, std::uint32_t within) {
     std::uint32_t& number = tile_of_[tile];

@@ -19,6 +19,7 @@
 #include "dynains/instance_samples.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor_model.hpp"
+#include "dynains/surrounding_ground.hpp"
 
 namespace dynains {
 
@@ -30,9 +31,11 @@ class MovedGround {
   explicit MovedGround(const FreeSpaceConfig& config)
       : takes_footprint_(config.footprint > 0.0),
         tests_(config.ground_reach > 0.0),
+        rise_(static_cast<float>(config.footprint_rise)),
         belief_(static_cast<float>(config.tau_free)),
         footprint_(takes_footprint_ ? std::max(config.footprint, kLeastCell) : kDefaultCell,
                    std::max({config.ground_reach, config.footprint, 0.5}), config.evidence_range),
+        around_(config.evidence_range),
         hull_(2.0 * std::max(config.footprint, kLeastCell)),
         sampler_(config.ground_sample, config.ground_sample, config.evidence_range, 1) {}
 
@@ -89,18 +92,26 @@ class MovedGround {
     detail::make_room(tested_blocks_, boxes.size());
     tested_blocks_.clear();
     tested_ = 0;
+    detail::make_room(under_, boxes.size());
+    under_.clear();
     footprint_.visit_near(ground, boxes, clearance_,
                           [&](std::size_t begin, std::uint64_t near, std::uint64_t below) {
                             const std::uint64_t under = takes_footprint_ ? below : 0;
-                            remove(begin, under, Cause::kUnderInstance);
+                            if (under != 0) under_.push_back({begin, under});
                             if (tests_) add_tested(ground, begin, near & ~under);
                           });
+    remove_under(ground);
     if (tested_ > 0) test(for_each_reference);
     footprint_.clear();
     return found_;
   }
 
  private:
+  // Some points of a block of the ground, a bit each.
+  struct Block {
+    std::size_t begin;     // point
+    std::uint64_t points;  // which
+  };
   // Points of a block of the ground that are tested, a bit each.
   struct TestedBlock {
     std::size_t begin;     // point
@@ -112,6 +123,35 @@ class MovedGround {
   static constexpr double kDefaultCell = 0.2;  // m, the same if the footprint is off
   static constexpr std::uint32_t kLeastFree = 2;
   static constexpr float kLeastShare = 0.3F;
+
+  // What lies under removed points and rises over the ground around, with what shares its cell: the
+  // foot of something. All of it where nobody knows how that ground lies.
+  void remove_under(PointsView ground) {
+    if (rise_ > 0.0F && !under_.empty()) keep_flat(ground);
+    for (const Block& block : under_) {
+      remove(block.begin, block.points, Cause::kUnderInstance);
+    }
+  }
+
+  void keep_flat(PointsView ground) {
+    around_.take(PointsView(tested_points_).subview(0, tested_), rise_);
+    const auto points_of = [&](const Block& block) {
+      constexpr std::size_t kBlock = GroundFootprint::kBlock;
+      return ground.subview(block.begin, std::min(kBlock, ground.size() - block.begin));
+    };
+    for (const Block& block : under_) {
+      const PointsView points = points_of(block);
+      std::uint64_t rising = 0;
+      detail::for_each_bit(block.points, [&](std::size_t i) {
+        const bool rises = around_.height(points.x[i], points.y[i], points.z[i]) >= rise_;
+        rising |= std::uint64_t{rises} << i;
+      });
+      if (rising != 0) footprint_.mark(points, rising);
+    }
+    for (Block& block : under_) {
+      block.points = footprint_.find_marked(points_of(block), block.points);
+    }
+  }
 
   // Of a block of points from `begin` on, those whose bits are set.
   void remove(std::size_t begin, std::uint64_t which, Cause cause) {
@@ -174,8 +214,11 @@ class MovedGround {
 
   bool takes_footprint_;
   bool tests_;
+  float rise_;
   float belief_;
   GroundFootprint footprint_;
+  SurroundingGround around_;
+  std::vector<Block> under_;  // of what lies under removed points
   InstanceHull hull_;
   InstanceSampler sampler_;
   Clearance clearance_ = {0.4F, 0.0F};  // between ground and what stands on it

@@ -1,0 +1,244 @@
+// Ground under removed instances: what stands on it goes, the ground itself stays.
+#include "dynains/moved_ground.hpp"
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <set>
+#include <vector>
+
+#include "dynains/surrounding_ground.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+namespace dynains::test {
+namespace {
+
+constexpr float kUnknown = SurroundingGround::kUnknown;
+constexpr float kAnyRise = 100.0F;  // m, so that every point is kept
+
+// A street that falls to the right and rises ahead.
+float street(float x, float y) { return -1.7F + 0.1F * x - 0.05F * y; }
+
+// Points of the street, one in 0.5 m, but for those that `leave_out(x, y)`.
+template <class LeaveOut>
+PointBuffer street_about(float x, float y, float reach, LeaveOut&& leave_out) {
+  PointBuffer points;
+  for (float px = x - reach; px <= x + reach; px += 0.5F) {
+    for (float py = y - reach; py <= y + reach; py += 0.5F) {
+      if (!leave_out(px, py)) points.push_back(px, py, street(px, py));
+    }
+  }
+  return points;
+}
+constexpr auto kNothing = [](float, float) { return false; };
+
+TEST_CASE("heights over a slope are told from the ground around, whatever stands on it") {
+  SurroundingGround ground(80.0);
+  PointBuffer points = street_about(21.0F, -9.0F, 4.0F, kNothing);
+  const auto off = [&] { return std::abs(ground.height(21.0F, -9.0F, street(21.0F, -9.0F))); };
+  ground.take(points, 0.03F);
+  CHECK(off() < 1e-4F);
+  CHECK(ground.height(20.5F, -8.5F, street(20.5F, -8.5F) + 0.1F) == Approx(0.1F).margin(1e-4));
+  CHECK(ground.height(20.5F, -8.5F, street(20.5F, -8.5F) - 0.1F) == Approx(-0.1F).margin(1e-4));
+
+  for (int i = 0; i < 12; ++i) points.push_back(21.2F, -9.2F, street(21.2F, -9.2F) + 0.5F);
+  ground.take(points, kAnyRise);
+  CHECK(off() > 0.03F);
+  ground.take(points, 0.1F);
+  CHECK(off() < 1e-4F);
+}
+
+TEST_CASE("too few points, or points on a line, tell nothing of how the ground lies") {
+  SurroundingGround ground(80.0);
+  PointBuffer points;
+  ground.take(points, 0.03F);
+  CHECK(ground.height(1.0F, 1.0F, 0.0F) == kUnknown);
+
+  for (int i = 0; i < 7; ++i) {
+    points.push_back(0.3F + static_cast<float>(i % 2) * 3.0F, 0.4F * static_cast<float>(i), 0.0F);
+  }
+  ground.take(points, 0.03F);
+  CHECK(ground.height(1.0F, 1.0F, 0.0F) == kUnknown);
+  points.push_back(3.3F, 0.0F, 0.0F);
+  ground.take(points, 0.03F);
+  CHECK(ground.height(1.0F, 1.0F, 0.25F) == Approx(0.25F).margin(1e-5));
+
+  // Two lines: 0.5 m^2 of variance across them are at a distance of sqrt(2) m.
+  for (const float apart : {0.0F, 1.40F, 1.43F}) {
+    PointBuffer lines;
+    for (int i = 0; i < 20; ++i) {
+      const float x = 0.2F * static_cast<float>(i);
+      lines.push_back(x, 0.5F, 0.0F);
+      lines.push_back(x, 0.5F + apart, 0.0F);
+    }
+    ground.take(lines, 0.03F);
+    CAPTURE(apart);
+    CHECK((ground.height(1.0F, 1.0F, 0.0F) == kUnknown) == (apart < 1.41F));
+  }
+}
+
+TEST_CASE("points beyond the range of the ground around change nothing within") {
+  SurroundingGround ground(20.0);
+  PointBuffer points = street_about(5.0F, 5.0F, 3.0F, kNothing);
+  for (const float far : {1e3F, -1e3F, 1e30F}) {
+    for (int i = 0; i < 20; ++i) points.push_back(far, -far, far);
+  }
+  ground.take(points, 0.03F);
+  CHECK(ground.height(5.0F, 5.0F, street(5.0F, 5.0F)) == Approx(0.0F).margin(1e-4));
+  CHECK_NOTHROW(ground.height(-1e30F, 1e30F, 0.0F));
+}
+
+// Height over the plane through all points in the nine cells about a place, by Eigen.
+float reference_height(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& at) {
+  const auto cell = [](double coordinate) { return std::floor(coordinate / 2.0); };
+  std::vector<Eigen::Vector3d> around;
+  for (const Eigen::Vector3d& p : points) {
+    if (std::abs(cell(p.x()) - cell(at.x())) <= 1 && std::abs(cell(p.y()) - cell(at.y())) <= 1) {
+      around.push_back(p);
+    }
+  }
+  if (around.size() < 8) return kUnknown;
+  Eigen::MatrixX3d rows(around.size(), 3);
+  Eigen::VectorXd heights(around.size());
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (std::size_t i = 0; i < around.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    rows.row(row) << around[i].x(), around[i].y(), 1.0;
+    heights[row] = around[i].z();
+    mean += around[i].head<2>() / static_cast<double>(around.size());
+  }
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+  for (const Eigen::Vector3d& p : around) {
+    const Eigen::Vector2d off = p.head<2>() - mean;
+    covariance += off * off.transpose() / static_cast<double>(around.size());
+  }
+  if (Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance).eigenvalues()[0] < 0.5) {
+    return kUnknown;
+  }
+  const Eigen::Vector3d plane = rows.colPivHouseholderQr().solve(heights);
+  return static_cast<float>(at.z() - plane.dot(Eigen::Vector3d(at.x(), at.y(), 1.0)));
+}
+
+TEST_CASE("heights are those of a least-squares fit to what does not rise itself") {
+  Random random(71);
+  SurroundingGround ground(80.0);
+  std::size_t known = 0, unknown = 0, rising = 0;
+  for (int round = 0; round < 40; ++round) {
+    const double x = random.uniform(-60.0, 60.0), y = random.uniform(-60.0, 60.0);
+    const double reach = random.uniform(0.5, 6.0);
+    const std::size_t count = 4 + random.index(60);
+    PointBuffer points;
+    std::vector<Eigen::Vector3d> all;
+    for (std::size_t i = 0; i < count; ++i) {
+      Eigen::Vector3d p =
+          random.vector({x - reach, y - reach, -0.02}, {x + reach, y + reach, 0.02});
+      p.z() += 0.08 * p.x() + (random.index(5) == 0 ? 0.2 : 0.0);
+      points.push_back(static_cast<float>(p.x()), static_cast<float>(p.y()),
+                       static_cast<float>(p.z()));
+      all.emplace_back(static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
+                       static_cast<double>(points.z[i]));
+    }
+    ground.take(points, 0.03F);
+    std::vector<Eigen::Vector3d> kept;
+    for (const Eigen::Vector3d& p : all) {
+      const float over = reference_height(all, p);
+      if (over < 0.03F) kept.push_back(p);
+    }
+    rising += all.size() - kept.size();
+    for (int query = 0; query < 20; ++query) {
+      const Eigen::Vector3d at =
+          random.vector({x - reach, y - reach, -3.0}, {x + reach, y + reach, 3.0});
+      const auto qx = static_cast<float>(at.x()), qy = static_cast<float>(at.y()),
+                 qz = static_cast<float>(at.z());
+      const float expected = reference_height(
+          kept, {static_cast<double>(qx), static_cast<double>(qy), static_cast<double>(qz)});
+      const float height = ground.height(qx, qy, qz);
+      (expected == kUnknown ? unknown : known) += 1;
+      if (expected == kUnknown) {
+        CHECK(height == kUnknown);
+      } else {
+        CHECK(height == Approx(expected).margin(2e-4));
+      }
+    }
+  }
+  CHECK(known > 200);
+  CHECK(unknown > 100);
+  CHECK(rising > 50);
+}
+
+// A box of 2 m that was removed from the street, 0.2 m over it.
+struct RemovedBox {
+  RemovedBox() {
+    for (float x = 19.0F; x <= 21.0F; x += 0.1F) {
+      for (float y = -1.0F; y <= 1.0F; y += 0.1F) {
+        points.push_back(x, y, street(x, y) + 0.2F);
+      }
+    }
+    group_of.assign(points.size(), 1);
+  }
+  static bool is_below(float x, float y) { return x > 18.9F && x < 21.1F && y > -1.1F && y < 1.1F; }
+
+  PointBuffer points;
+  std::vector<std::uint32_t> group_of;
+  std::vector<EvidenceVerdict::Group> groups = {{}, {Cause::kWithInstance, 0.9F}};
+};
+
+// Numbers of the ground points that go with the box; no other scan has a say.
+std::set<std::uint32_t> ground_that_goes(const FreeSpaceConfig& config, const PointBuffer& ground) {
+  MovedGround moved(config);
+  const RemovedBox box;
+  moved.add(box.points, box.group_of, box.groups);
+  std::vector<GroundBox> boxes;
+  moved.bound(ground, boxes);
+  std::set<std::uint32_t> found;
+  for (const EvidenceVerdict::GroundPoint& point :
+       moved.find(ground, boxes, [](const PointBuffer&, std::size_t, auto&&) {})) {
+    CHECK(point.verdict.cause == Cause::kUnderInstance);
+    CHECK(found.insert(point.point).second);
+  }
+  return found;
+}
+
+TEST_CASE("under a removed box the foot of something goes with its cell, the street stays") {
+  FreeSpaceConfig config;
+  PointBuffer ground = street_about(20.0F, 0.0F, 5.0F, kNothing);
+  const auto street_size = static_cast<std::uint32_t>(ground.size());
+  CHECK(ground_that_goes(config, ground).empty());
+
+  const auto rise = static_cast<float>(config.footprint_rise);
+  // In cells of their own, as the sides of cells are whole multiples of 0.3 m from the sensor.
+  ground.push_back(20.25F, 0.15F, street(20.25F, 0.15F) + rise + 0.005F);
+  ground.push_back(20.20F, 0.10F, street(20.20F, 0.10F));
+  ground.push_back(19.65F, 0.75F, street(19.65F, 0.75F) + rise - 0.005F);
+  // As high, but with nothing over it.
+  ground.push_back(24.15F, 0.15F, street(24.15F, 0.15F) + rise + 0.005F);
+  CHECK(ground_that_goes(config, ground) == std::set<std::uint32_t>{street_size, street_size + 1});
+
+  // Without a look at heights, whatever lies below goes.
+  config.footprint_rise = 0.0;
+  const std::set<std::uint32_t> all = ground_that_goes(config, ground);
+  CHECK(all.count(street_size + 2) == 1);
+  CHECK(all.count(street_size + 3) == 0);
+  for (std::uint32_t i = 0; i < street_size; ++i) {
+    const bool below = RemovedBox::is_below(ground.x[i], ground.y[i]);
+    if (below) CHECK(all.count(i) == 1);
+  }
+}
+
+TEST_CASE("where the ground around is not known, all of it goes from under a removed box") {
+  FreeSpaceConfig config;
+  // The ground shows below the box only.
+  const PointBuffer ground =
+      street_about(20.0F, 0.0F, 5.0F, [](float x, float y) { return !RemovedBox::is_below(x, y); });
+  CHECK(ground_that_goes(config, ground).size() == ground.size());
+
+  // Nobody is asked how the ground around lies.
+  config.ground_reach = 0.0;
+  const PointBuffer street = street_about(20.0F, 0.0F, 5.0F, kNothing);
+  CHECK(ground_that_goes(config, street).size() >= ground.size());
+}
+
+}  // namespace
+}  // namespace dynains::test
