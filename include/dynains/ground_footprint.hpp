@@ -136,10 +136,14 @@ class GroundFootprint {
   /// Marks the cells of those points of a block whose bits are set: they lie under removed ones.
   void mark(PointsView block, std::uint64_t which) {
     const Located located = locate(block);
-    detail::for_each_bit(which, [&](std::size_t i) { cell_of(located, i).marked = true; });
+    detail::for_each_bit(which, [&](std::size_t i) {
+      cell_at(static_cast<std::uint32_t>(located.tile[i]),
+              static_cast<std::uint32_t>(located.cell[i]))
+          .marked = true;
+    });
   }
   /// Which of these points lie in marked cells.
-  std::uint64_t find_marked(PointsView block, std::uint64_t which) {
+  std::uint64_t find_marked(PointsView block, std::uint64_t which) const {
     const Located located = locate(block);
     std::uint64_t marked = 0;
     detail::for_each_bit(
@@ -331,9 +335,7 @@ class GroundFootprint {
     });
     std::uint64_t under = 0;
     for (std::size_t i = 0; i < block.size(); ++i) {
-      const Tile& tile = tiles_[tile_of_[static_cast<std::size_t>(located.tile[i])]];
-      const float lowest = tile[static_cast<std::size_t>(located.cell[i])].lowest;
-      under |= std::uint64_t{lowest < top[i]} << i;
+      under |= std::uint64_t{cell_of(located, i).lowest < top[i]} << i;
     }
     return under & located.inside;
   }
@@ -356,8 +358,8 @@ class GroundFootprint {
     cell.own = std::min(cell.own, z);
     if (is_first && cell.own < kNothing) touched_.push_back({tile, within});
   }
-  // Of a point under a removed one.
-  Cell& cell_of(const Located& located, std::size_t i) {
+  // Of a located point; an empty one where its tile is not in use.
+  const Cell& cell_of(const Located& located, std::size_t i) const {
     return tiles_[tile_of_[static_cast<std::size_t>(located.tile[i])]]
                  [static_cast<std::size_t>(located.cell[i])];
   }

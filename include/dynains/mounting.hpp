@@ -214,16 +214,7 @@ class MountingEstimator {
       const double off = distance / band;
       const double far = p.squaredNorm() / (reach * reach);
       const double w = (1.0 - off * off) * (1.0 - off * off) / (1.0 + far * far);
-      m.count += w;
-      m.x += w * p.x();
-      m.y += w * p.y();
-      m.z += w * p.z();
-      m.xx += w * p.x() * p.x();
-      m.xy += w * p.x() * p.y();
-      m.xz += w * p.x() * p.z();
-      m.yy += w * p.y() * p.y();
-      m.yz += w * p.y() * p.z();
-      m.zz += w * p.z() * p.z();
+      m.add(p.x(), p.y(), p.z(), w);
     }
     if (!(m.count >= 10.0)) return false;
     const Plane plane = fit_plane(m);

@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "dynains/detail/plane_fit.hpp"
 #include "dynains/detail/room.hpp"
 #include "dynains/points.hpp"
 
@@ -35,20 +36,14 @@ class SurroundingGround {
   /// around.
   void take(PointsView points, float rise) {
     forget();
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      cell_at(index_of(points.x[i], points.y[i]))
-          .sums.add(points.x[i], points.y[i], points.z[i], 1);
-    }
+    for (std::size_t i = 0; i < points.size(); ++i) add(points, i, 1.0);
     detail::make_room(rising_, points.size());
     rising_.clear();
     for (std::size_t i = 0; i < points.size(); ++i) {
       const float over = height(points.x[i], points.y[i], points.z[i]);
       if (over >= rise) rising_.push_back(static_cast<std::uint32_t>(i));
     }
-    for (const std::uint32_t i : rising_) {
-      cell_at(index_of(points.x[i], points.y[i]))
-          .sums.add(points.x[i], points.y[i], points.z[i], -1);
-    }
+    for (const std::uint32_t i : rising_) add(points, i, -1.0);
     for (Cell& cell : cells_) cell.has_plane = false;
   }
 
@@ -66,35 +61,8 @@ class SurroundingGround {
   static constexpr double kLeastPoints = 8.0;
   static constexpr double kLeastVariance = 0.5;  // m^2, along any horizontal direction
 
-  // Sums over points.
-  struct Sums {
-    double count = 0.0;
-    double x = 0.0, y = 0.0, z = 0.0;
-    double xx = 0.0, xy = 0.0, yy = 0.0, xz = 0.0, yz = 0.0;
-
-    // `times` is -1 to take a point out again.
-    void add(float px, float py, float pz, double times) {
-      const double dx = static_cast<double>(px), dy = static_cast<double>(py);
-      const double dz = static_cast<double>(pz);
-      const double tx = times * dx, ty = times * dy;
-      *this += Sums{times, tx, ty, times * dz, tx * dx, tx * dy, ty * dy, tx * dz, ty * dz};
-    }
-    Sums& operator+=(const Sums& other) {
-      count += other.count;
-      x += other.x;
-      y += other.y;
-      z += other.z;
-      xx += other.xx;
-      xy += other.xy;
-      yy += other.yy;
-      xz += other.xz;
-      yz += other.yz;
-      return *this;
-    }
-  };
-
   struct Cell {
-    Sums sums;
+    detail::PlaneMoments moments;
     // Of its plane: z = slope_x * x + slope_y * y + offset.
     float slope_x = 0.0F, slope_y = 0.0F, offset = -kUnknown;
     bool has_plane = false;
@@ -129,13 +97,22 @@ class SurroundingGround {
     return cells_[number];
   }
 
+  void add(PointsView points, std::size_t i, double weight) {
+    const float x = points.x[i], y = points.y[i], z = points.z[i];
+    cell_at(index_of(x, y))
+        .moments.add(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z),
+                     weight);
+  }
+
   // Least squares in z.
   void find_plane(std::size_t index, Cell& cell) const {
     cell.has_plane = true;
     cell.offset = -kUnknown;
-    Sums sum;
+    detail::PlaneMoments sum;
     for (const std::size_t row : {index - width_, index, index + width_}) {
-      for (const std::size_t place : {row - 1, row, row + 1}) sum += cells_[number_of_[place]].sums;
+      for (const std::size_t place : {row - 1, row, row + 1}) {
+        sum += cells_[number_of_[place]].moments;
+      }
     }
     if (sum.count < kLeastPoints) return;
     const double share = 1.0 / sum.count;

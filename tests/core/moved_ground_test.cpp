@@ -4,7 +4,6 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <set>
 #include <vector>
 

@@ -10,6 +10,27 @@ struct PlaneMoments {
   double count = 0.0;
   double x = 0.0, y = 0.0, z = 0.0;
   double xx = 0.0, xy = 0.0, xz = 0.0, yy = 0.0, yz = 0.0, zz = 0.0;
+
+  /// Adds a point; the same with the opposite weight takes it out again.
+  void add(double px, double py, double pz, double weight) {
+    const double wx = weight * px;
+    const double wy = weight * py;
+    const double wz = weight * pz;
+    *this += {weight, wx, wy, wz, wx * px, wx * py, wx * pz, wy * py, wy * pz, wz * pz};
+  }
+  PlaneMoments& operator+=(const PlaneMoments& other) {
+    count += other.count;
+    x += other.x;
+    y += other.y;
+    z += other.z;
+    xx += other.xx;
+    xy += other.xy;
+    xz += other.xz;
+    yy += other.yy;
+    yz += other.yz;
+    zz += other.zz;
+    return *this;
+  }
 };
 
 /// Plane `normal . p = offset` with an upward unit normal, in the frame of the moments.
