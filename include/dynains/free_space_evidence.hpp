@@ -218,14 +218,14 @@ class FreeSpaceEvidence {
     for (std::size_t instance = 0; instance < changed.size(); ++instance) {
       if (changed[instance] == 0) continue;
       changed[instance] = 0;
-      record.tracked.instances[instance].own = own_belief(record.beliefs, instance);
+      record.tracked.instances[instance].own = own_belief(record, instance);
     }
   }
 
-  float own_belief(const InstanceBeliefs& beliefs, std::size_t instance) const {
-    const InstanceBeliefs::Share& share = beliefs.shares[instance];
+  float own_belief(const Record& record, std::size_t instance) const {
+    const InstanceBeliefs::Share& share = record.beliefs.shares[instance];
     const float unit = updater_.increment();
-    if (updater_.removes_whole(beliefs, instance)) {
+    if (updater_.removes_whole(record.samples, record.beliefs, instance)) {
       return (2 * share.moved >= share.decided && share.moved > 0 ? 2.0F : 1.0F) * unit;
     }
     const auto moved = static_cast<float>(share.moved);
@@ -309,7 +309,7 @@ class FreeSpaceEvidence {
   // belief along its track.
   Cause cause_of_whole(std::uint64_t scan, bool is_final, const Record& record,
                        std::size_t instance, float& level) const {
-    if (updater_.removes_whole(record.beliefs, instance)) return Cause::kWithInstance;
+    if (updater_.removes_whole(record.samples, record.beliefs, instance)) return Cause::kWithInstance;
     if (!config_.use_tracks || !record.tracked.shapes[instance].carried) {
       return Cause::kNoEvidence;
     }

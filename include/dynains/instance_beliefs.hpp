@@ -28,6 +28,7 @@ struct InstanceBeliefs {
     float peak = 0.0F;           ///< the highest it was
     std::uint8_t contested = 0;  ///< whether some reference hit any of the place
     std::uint8_t occupied = 0;   ///< whether some reference hit enough of it to say what it was
+    std::uint8_t hit_again = 0;  ///< whether one hit it beyond others that had seen it free
   };
   /// Samples of an instance.
   struct Share {
@@ -103,13 +104,17 @@ class InstanceBeliefUpdater {
     return belief.peak >= (belief.contested != 0 ? contested_level_ : free_level_);
   }
 
-  /// Whether an instance was seen through as a whole, or enough of what is known of it was free.
-  bool removes_whole(const InstanceBeliefs& beliefs, std::size_t instance) const {
-    const Share& share = beliefs.shares[instance];
+  /// Whether an instance was seen through as a whole, or enough of what is known of it was free. If
+  /// less than half, and some of that was hit again, enough of its lower half must be, too: beams
+  /// pass the windows of what stands there at some angles, but not what carries them.
+  bool removes_whole(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
+                     std::size_t instance) const {
     const Belief& whole = beliefs.wholes[instance];
-    return whole.peak >= (whole.contested != 0 ? whole_level_ : free_level_) ||
-           (share.moved > 0 &&
-            static_cast<float>(share.moved) >= remove_share_ * static_cast<float>(share.decided));
+    if (whole.peak >= (whole.contested != 0 ? whole_level_ : free_level_)) return true;
+    const Share& share = beliefs.shares[instance];
+    if (share.moved == 0 || !is_enough(share)) return false;
+    return 2 * share.moved >= share.decided || !was_hit_again(samples, beliefs, instance) ||
+           is_enough(share_of_lower_half(samples, beliefs, instance));
   }
 
  private:
@@ -118,6 +123,46 @@ class InstanceBeliefUpdater {
   static constexpr float kContradictingHits = 0.85F;  // of what is seen of an instance
   // Two samples of a supervoxel must be hit, and one of so many, for it to be occupied.
   static constexpr std::uint32_t kLeastHit = 4;
+
+  bool is_enough(const Share& share) const {
+    return static_cast<float>(share.moved) >= remove_share_ * static_cast<float>(share.decided);
+  }
+
+  // Whether any supervoxel of an instance was that counts as free.
+  bool was_hit_again(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
+                     std::size_t instance) const {
+    const auto* const all = beliefs.supervoxels.data();
+    return std::any_of(all + samples.supervoxel_begin[instance],
+                       all + samples.supervoxel_begin[instance + 1], [&](const Belief& belief) {
+                         return belief.hit_again != 0 && is_free(belief);
+                       });
+  }
+
+  // Of the supervoxels that lie in the lower half of the layers of an instance.
+  Share share_of_lower_half(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
+                            std::size_t instance) const {
+    const std::uint32_t begin = samples.supervoxel_begin[instance];
+    const std::uint32_t end = samples.supervoxel_begin[instance + 1];
+    std::int32_t lowest = layer_of(samples.place[begin]);
+    std::int32_t highest = lowest;
+    for (std::uint32_t s = begin; s < end; ++s) {
+      lowest = std::min(lowest, layer_of(samples.place[s]));
+      highest = std::max(highest, layer_of(samples.place[s]));
+    }
+    Share share;
+    for (std::uint32_t s = begin; s < end; ++s) {
+      if (2 * layer_of(samples.place[s]) > lowest + highest) continue;
+      add_to(share, beliefs.supervoxels[s], samples.sample_begin[s + 1] - samples.sample_begin[s]);
+    }
+    return share;
+  }
+
+  void add_to(Share& share, const Belief& belief, std::uint32_t samples) const {
+    const bool free = is_free(belief);
+    share.total += samples;
+    share.moved += free ? samples : 0;
+    share.decided += free || belief.occupied != 0 ? samples : 0;
+  }
 
   // What the reference saw may change supervoxels of which something was seen free, or was hit
   // while they are open: few, once a scan has met some references. All are asked for before the
@@ -230,7 +275,8 @@ class InstanceBeliefUpdater {
     if (seen.hit >= std::max(std::min(2U, samples), (samples + kLeastHit - 1) / kLeastHit)) {
       belief.occupied = 1;
     }
-    return belief.contested != before.contested || belief.occupied != before.occupied;
+    return belief.contested != before.contested || belief.occupied != before.occupied ||
+           belief.hit_again != before.hit_again;
   }
 
   void raise(Belief& belief, float share) const {
@@ -239,6 +285,7 @@ class InstanceBeliefUpdater {
   }
   void lower(Belief& belief) const {
     belief.contested = 1;
+    if (belief.level > 0.0F) belief.hit_again = 1;
     sum_.lower(belief.level);
   }
 

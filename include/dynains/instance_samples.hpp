@@ -24,6 +24,11 @@ inline SupervoxelPlace pack_place(std::int32_t x, std::int32_t y, std::int32_t z
          static_cast<std::uint64_t>(y + kOffset) << 21 | static_cast<std::uint64_t>(z + kOffset);
 }
 
+/// Its place along z, up to a constant.
+inline std::int32_t layer_of(SupervoxelPlace place) {
+  return static_cast<std::int32_t>(place & ((std::uint64_t{1} << 21) - 1));
+}
+
 /// The place beside another, some steps along each axis.
 inline SupervoxelPlace neighbour(SupervoxelPlace place, int dx, int dy, int dz) {
   return place + (static_cast<std::uint64_t>(static_cast<std::int64_t>(dx)) << 42) +

@@ -59,7 +59,7 @@ class SurroundingGround {
   static constexpr double kCell = 2.0;  // m
   // With less, points are too few, or too much on a line, to tell how a plane lies.
   static constexpr double kLeastPoints = 8.0;
-  static constexpr double kLeastVariance = 0.5;  // m^2, along any horizontal direction
+  static constexpr double kLeastVariance = 0.4;  // m^2, along any horizontal direction
 
   struct Cell {
     detail::PlaneMoments moments;
