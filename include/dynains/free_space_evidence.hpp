@@ -309,7 +309,9 @@ class FreeSpaceEvidence {
   // belief along its track.
   Cause cause_of_whole(std::uint64_t scan, bool is_final, const Record& record,
                        std::size_t instance, float& level) const {
-    if (updater_.removes_whole(record.samples, record.beliefs, instance)) return Cause::kWithInstance;
+    if (updater_.removes_whole(record.samples, record.beliefs, instance)) {
+      return Cause::kWithInstance;
+    }
     if (!config_.use_tracks || !record.tracked.shapes[instance].carried) {
       return Cause::kNoEvidence;
     }

@@ -105,21 +105,24 @@ class InstanceBeliefUpdater {
   }
 
   /// Whether an instance was seen through as a whole, or enough of what is known of it was free. If
-  /// less than half, and some of that was hit again, enough of its lower half must be, too: beams
-  /// pass the windows of what stands there at some angles, but not what carries them.
+  /// less than half, and some of that was hit again, enough of its lower half must be, too, unless
+  /// little is known of that: beams pass the windows of what stands there at some angles, but not
+  /// what carries them.
   bool removes_whole(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
                      std::size_t instance) const {
     const Belief& whole = beliefs.wholes[instance];
     if (whole.peak >= (whole.contested != 0 ? whole_level_ : free_level_)) return true;
     const Share& share = beliefs.shares[instance];
     if (share.moved == 0 || !is_enough(share)) return false;
-    return 2 * share.moved >= share.decided || !was_hit_again(samples, beliefs, instance) ||
-           is_enough(share_of_lower_half(samples, beliefs, instance));
+    if (2 * share.moved >= share.decided || !was_hit_again(samples, beliefs, instance)) return true;
+    const Share lower_half = share_of_lower_half(samples, beliefs, instance);
+    return lower_half.decided < kLeastBody || is_enough(lower_half);
   }
 
  private:
-  static constexpr float kLeastView = 0.1F;   // share of an instance that a reference must see
-  static constexpr float kLeastFree = 0.15F;  // share of a supervoxel that must be seen free
+  static constexpr float kLeastView = 0.1F;        // share of an instance that a reference must see
+  static constexpr float kLeastFree = 0.15F;       // share of a supervoxel that must be seen free
+  static constexpr std::uint32_t kLeastBody = 12;  // known samples of what could carry windows
   static constexpr float kContradictingHits = 0.85F;  // of what is seen of an instance
   // Two samples of a supervoxel must be hit, and one of so many, for it to be occupied.
   static constexpr std::uint32_t kLeastHit = 4;
@@ -132,10 +135,9 @@ class InstanceBeliefUpdater {
   bool was_hit_again(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
                      std::size_t instance) const {
     const auto* const all = beliefs.supervoxels.data();
-    return std::any_of(all + samples.supervoxel_begin[instance],
-                       all + samples.supervoxel_begin[instance + 1], [&](const Belief& belief) {
-                         return belief.hit_again != 0 && is_free(belief);
-                       });
+    return std::any_of(
+        all + samples.supervoxel_begin[instance], all + samples.supervoxel_begin[instance + 1],
+        [&](const Belief& belief) { return belief.hit_again != 0 && is_free(belief); });
   }
 
   // Of the supervoxels that lie in the lower half of the layers of an instance.

@@ -34,6 +34,7 @@ InstanceSamples samples_of(const Instances& instances) {
                                    static_cast<std::uint32_t>(samples.supervoxel_count()));
       samples.sample_begin.push_back(samples.sample_begin.back() + count);
       samples.instance_of.push_back(instance);
+      samples.place.push_back(pack_place(0, 0, 0));
     }
     samples.supervoxel_begin.push_back(static_cast<std::uint32_t>(samples.supervoxel_count()));
     ++instance;
@@ -65,7 +66,9 @@ struct Scan {
   }
   const Belief& belief(std::size_t supervoxel = 0) const { return beliefs.supervoxels[supervoxel]; }
   bool is_free(std::size_t supervoxel = 0) const { return updater.is_free(belief(supervoxel)); }
-  bool removes(std::size_t instance = 0) const { return updater.removes_whole(beliefs, instance); }
+  bool removes(std::size_t instance = 0) const {
+    return updater.removes_whole(samples, beliefs, instance);
+  }
 
   InstanceBeliefUpdater updater;
   InstanceSamples samples;
@@ -172,6 +175,99 @@ TEST_CASE("a fifth of what is known of an instance removes it") {
   CHECK(hidden.beliefs.shares[0].total == 31);
 }
 
+// A parked car: four layers of supervoxels of four samples each, `per_layer` in each.
+Scan scan_of_layers(std::size_t per_layer) {
+  Scan scan(Instances{std::vector<std::uint32_t>(4 * per_layer, 4)});
+  for (std::size_t s = 0; s < scan.samples.place.size(); ++s) {
+    const auto layer = static_cast<std::int32_t>(s / per_layer) - 2;  // below the sensor, too
+    scan.samples.place[s] = pack_place(static_cast<std::int32_t>(s % per_layer), 0, layer);
+  }
+  return scan;
+}
+
+// One reference sees some supervoxels free, another hits them again, and both hit the rest.
+void see_free_and_hit(Scan& scan, const std::vector<std::size_t>& free, bool again) {
+  std::vector<Scan::Seen> seen(scan.samples.supervoxel_count(), {0, 4});
+  scan.see(seen);
+  for (const std::size_t s : free) seen[s] = {4, 0};
+  scan.see(seen);
+  scan.see(seen);
+  if (again) scan.see(std::vector<Scan::Seen>(seen.size(), {0, 4}));
+}
+
+TEST_CASE("windows alone remove nothing: where beams hit again, the lower half must have moved") {
+  // Five supervoxels a layer; numbers 0 to 9 are the lower half.
+  const std::vector<std::size_t> windows = {10, 12, 16, 19};  // 0.2 of all
+  Scan left = scan_of_layers(5);
+  see_free_and_hit(left, windows, false);
+  CHECK(left.removes());  // nobody says that anything stands there still
+
+  Scan parked = scan_of_layers(5);
+  see_free_and_hit(parked, windows, true);
+  CHECK(parked.beliefs.shares[0].moved == 16);  // these go nevertheless
+  CHECK(parked.belief(10).hit_again != 0);
+  CHECK(parked.belief(11).hit_again == 0);
+  CHECK_FALSE(parked.removes());
+
+  // Of the lower half, one tenth is too little, and two are enough.
+  Scan little = scan_of_layers(5);
+  see_free_and_hit(little, {10, 12, 16, 9}, true);
+  CHECK_FALSE(little.removes());
+  Scan enough = scan_of_layers(5);
+  see_free_and_hit(enough, {10, 12, 0, 9}, true);
+  CHECK(enough.removes());
+
+  // Who lost half moved, whichever half it was.
+  Scan nearly = scan_of_layers(5);
+  see_free_and_hit(nearly, {10, 11, 12, 13, 14, 15, 16, 17, 18}, true);
+  CHECK_FALSE(nearly.removes());
+  Scan half = scan_of_layers(5);
+  see_free_and_hit(half, {10, 11, 12, 13, 14, 15, 16, 17, 18, 19}, true);
+  CHECK(half.removes());
+}
+
+TEST_CASE("what is too small to carry windows goes as before") {
+  // Two supervoxels a layer, 16 samples in the lower half, of some of which nothing is known.
+  const Scan small = scan_of_layers(2);
+  std::vector<Scan::Seen> seen(8, {0, 4});
+  seen[0].hit = 0;
+  for (const bool is_known : {false, true}) {
+    Scan scan = small;
+    std::vector<Scan::Seen> hit = seen;
+    hit[1].hit = is_known ? 4 : 0;
+    scan.see(hit);
+    std::vector<Scan::Seen> free = hit;
+    free[4] = free[5] = {4, 0};
+    scan.see(free);
+    scan.see(free);
+    scan.see(hit);
+    INFO((is_known ? 12 : 8) << " samples of the lower half are known");
+    CHECK(scan.belief(4).hit_again != 0);
+    CHECK(scan.removes() == !is_known);
+  }
+}
+
+TEST_CASE("of an odd number of layers the middle belongs to the lower half") {
+  Scan scan(Instances{std::vector<std::uint32_t>(10, 4)});
+  for (std::size_t s = 0; s < 10; ++s) {
+    scan.samples.place[s] = pack_place(0, 0, static_cast<std::int32_t>(s / 2) - 3);
+  }
+  Scan above = scan;
+  see_free_and_hit(above, {6, 7}, true);
+  CHECK_FALSE(above.removes());
+  see_free_and_hit(scan, {4, 5}, true);
+  CHECK(scan.removes());
+}
+
+TEST_CASE("a hit before a place was seen free, or on the other side, is none again") {
+  Scan scan = scan_of_layers(5);
+  see_free_and_hit(scan, {10, 12, 16, 19}, false);
+  scan.updater.begin_other_side(scan.samples, scan.beliefs);
+  scan.see(std::vector<Scan::Seen>(20, {0, 4}));
+  CHECK(scan.belief(10).hit_again == 0);
+  CHECK(scan.removes());
+}
+
 TEST_CASE("an instance that one reference saw through as a whole is removed") {
   // Two samples of twenty are too little for any of its supervoxels.
   const std::vector<std::uint32_t> supervoxels(5, 20);
@@ -217,6 +313,7 @@ void add_slowly(const InstanceSamples& samples, const std::vector<Sight>& sights
       belief.peak = std::max(belief.peak, belief.level);
     } else if (lowers) {
       belief.contested = 1;
+      if (belief.level > 0.0F) belief.hit_again = 1;
       belief.level = std::max(0.0F, belief.level + decrement);
     }
   };
@@ -278,6 +375,7 @@ TEST_CASE("beliefs are those of a sum that passes nothing over") {
       REQUIRE(scan.belief(s).peak == supervoxels[s].peak);
       REQUIRE(scan.belief(s).contested == supervoxels[s].contested);
       REQUIRE(scan.belief(s).occupied == supervoxels[s].occupied);
+      REQUIRE(scan.belief(s).hit_again == supervoxels[s].hit_again);
     }
     for (std::size_t i = 0; i < wholes.size(); ++i) {
       REQUIRE(scan.beliefs.wholes[i].peak == wholes[i].peak);

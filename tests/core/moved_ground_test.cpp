@@ -64,8 +64,8 @@ TEST_CASE("too few points, or points on a line, tell nothing of how the ground l
   ground.take(points, 0.03F);
   CHECK(ground.height(1.0F, 1.0F, 0.25F) == Approx(0.25F).margin(1e-5));
 
-  // Two lines: 0.5 m^2 of variance across them are at a distance of sqrt(2) m.
-  for (const float apart : {0.0F, 1.40F, 1.43F}) {
+  // Two lines: 0.4 m^2 of variance across them are at a distance of 1.265 m.
+  for (const float apart : {0.0F, 1.26F, 1.27F}) {
     PointBuffer lines;
     for (int i = 0; i < 20; ++i) {
       const float x = 0.2F * static_cast<float>(i);
@@ -74,7 +74,7 @@ TEST_CASE("too few points, or points on a line, tell nothing of how the ground l
     }
     ground.take(lines, 0.03F);
     CAPTURE(apart);
-    CHECK((ground.height(1.0F, 1.0F, 0.0F) == kUnknown) == (apart < 1.41F));
+    CHECK((ground.height(1.0F, 1.0F, 0.0F) == kUnknown) == (apart < 1.265F));
   }
 }
 
@@ -113,7 +113,7 @@ float reference_height(const std::vector<Eigen::Vector3d>& points, const Eigen::
     const Eigen::Vector2d off = p.head<2>() - mean;
     covariance += off * off.transpose() / static_cast<double>(around.size());
   }
-  if (Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance).eigenvalues()[0] < 0.5) {
+  if (Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance).eigenvalues()[0] < 0.4) {
     return kUnknown;
   }
   const Eigen::Vector3d plane = rows.colPivHouseholderQr().solve(heights);
