@@ -105,16 +105,18 @@ class InstanceBeliefUpdater {
   }
 
   /// Whether an instance was seen through as a whole, or enough of what is known of it was free. If
-  /// less than half, and some of that was hit again, enough of its lower half must be, too, unless
-  /// little is known of that: beams pass the windows of what stands there at some angles, but not
-  /// what carries them.
+  /// less than half of that was, and some was hit again, enough of its lower half must be, too,
+  /// unless little is known of that: beams pass the windows of what stands there at some angles,
+  /// but not what carries them.
   bool removes_whole(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
                      std::size_t instance) const {
-    const Belief& whole = beliefs.wholes[instance];
-    if (whole.peak >= (whole.contested != 0 ? whole_level_ : free_level_)) return true;
     const Share& share = beliefs.shares[instance];
-    if (share.moved == 0 || !is_enough(share)) return false;
-    if (2 * share.moved >= share.decided || !was_hit_again(samples, beliefs, instance)) return true;
+    const Belief& whole = beliefs.wholes[instance];
+    const bool seen_through = whole.peak >= (whole.contested != 0 ? whole_level_ : free_level_);
+    if (!seen_through && !is_enough(share)) return false;
+    const bool hit_again =
+        seen_through ? whole.hit_again != 0 : was_hit_again(samples, beliefs, instance);
+    if (2 * share.moved >= share.decided || !hit_again) return true;
     const Share lower_half = share_of_lower_half(samples, beliefs, instance);
     return lower_half.decided < kLeastBody || is_enough(lower_half);
   }
@@ -128,10 +130,11 @@ class InstanceBeliefUpdater {
   static constexpr std::uint32_t kLeastHit = 4;
 
   bool is_enough(const Share& share) const {
-    return static_cast<float>(share.moved) >= remove_share_ * static_cast<float>(share.decided);
+    return share.moved > 0 &&
+           static_cast<float>(share.moved) >= remove_share_ * static_cast<float>(share.decided);
   }
 
-  // Whether any supervoxel of an instance was that counts as free.
+  // Whether any supervoxel of an instance was hit again that counts as free.
   bool was_hit_again(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
                      std::size_t instance) const {
     const auto* const all = beliefs.supervoxels.data();

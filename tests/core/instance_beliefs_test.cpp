@@ -226,6 +226,30 @@ TEST_CASE("windows alone remove nothing: where beams hit again, the lower half m
   CHECK(half.removes());
 }
 
+TEST_CASE(
+    "who was seen through as a whole goes unless that was hit again and its lower half stayed") {
+  // Two references see nothing but windows, all of them free: a fifth of all samples.
+  const auto see_windows = [](std::size_t windows_below) {
+    Scan scan = scan_of_layers(5);
+    const std::vector<Scan::Seen> standing(20, {0, 4});
+    std::vector<Scan::Seen> windows(20, {0, 0});
+    for (std::size_t s = 0; s < 4; ++s) windows[s < windows_below ? s : 16 + s] = {4, 0};
+    for (const auto& seen : {standing, windows, windows}) scan.see(seen);
+    return scan;
+  };
+  Scan parked = see_windows(0);
+  CHECK(parked.beliefs.wholes[0].peak == Approx(4.0F * kFreeStep));
+  CHECK(parked.beliefs.wholes[0].hit_again == 0);
+  CHECK(parked.removes());
+  parked.see(std::vector<Scan::Seen>(20, {0, 4}));
+  CHECK(parked.beliefs.wholes[0].hit_again != 0);
+  CHECK_FALSE(parked.removes());
+
+  Scan moved = see_windows(2);
+  moved.see(std::vector<Scan::Seen>(20, {0, 4}));
+  CHECK(moved.removes());
+}
+
 TEST_CASE("what is too small to carry windows goes as before") {
   // Two supervoxels a layer, 16 samples in the lower half, of some of which nothing is known.
   const Scan small = scan_of_layers(2);
@@ -380,6 +404,7 @@ TEST_CASE("beliefs are those of a sum that passes nothing over") {
     for (std::size_t i = 0; i < wholes.size(); ++i) {
       REQUIRE(scan.beliefs.wholes[i].peak == wholes[i].peak);
       REQUIRE(scan.beliefs.wholes[i].contested == wholes[i].contested);
+      REQUIRE(scan.beliefs.wholes[i].hit_again == wholes[i].hit_again);
       std::uint32_t total = 0, moved = 0, decided = 0;
       for (std::uint32_t s = scan.samples.supervoxel_begin[i];
            s < scan.samples.supervoxel_begin[i + 1]; ++s) {
