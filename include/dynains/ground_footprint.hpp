@@ -39,6 +39,11 @@ class GroundFootprint {
   /// Points that are looked at together, a bit each.
   static constexpr std::size_t kBlock = 64;
 
+  /// The block of `points` that begins at a point; the last one may be shorter.
+  static PointsView block_of(PointsView points, std::size_t begin) {
+    return points.subview(begin, std::min(kBlock, points.size() - begin));
+  }
+
   /// `cell`: m, points reach into the cells around theirs; `reach`: m, the same for what counts as
   /// near; `max_range`: m, points beyond are not remembered.
   GroundFootprint(double cell, double reach, double max_range)
@@ -98,8 +103,7 @@ class GroundFootprint {
       using Lanes = decltype(lanes);
       using Float = typename Lanes::Float;
       for (std::size_t b = 0; b < boxes.size(); ++b) {
-        const std::size_t begin = b * kBlock;
-        const PointsView block = points.subview(begin, std::min(kBlock, points.size() - begin));
+        const PointsView block = block_of(points, b * kBlock);
         const detail::Constant8 first_x(block.x[0]), first_y(block.y[0]);
         Float x_min = first_x, x_max = first_x, y_min = first_y, y_max = first_y;
         detail::for_places<Lanes>(block.size(), [&](const auto& at) {
@@ -125,7 +129,7 @@ class GroundFootprint {
     for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
       const Share share = share_near(boxes[begin / kBlock]);
       if (share == Share::kNone) continue;
-      const PointsView block = points.subview(begin, std::min(kBlock, points.size() - begin));
+      const PointsView block = block_of(points, begin);
       const std::uint64_t near =
           share == Share::kAll ? ~std::uint64_t{0} >> (kBlock - block.size()) : find_near(block);
       if (near == 0) continue;

@@ -114,9 +114,10 @@ class InstanceBeliefUpdater {
     const Belief& whole = beliefs.wholes[instance];
     const bool seen_through = whole.peak >= (whole.contested != 0 ? whole_level_ : free_level_);
     if (!seen_through && !is_enough(share)) return false;
+    if (2 * share.moved >= share.decided) return true;
     const bool hit_again =
         seen_through ? whole.hit_again != 0 : was_hit_again(samples, beliefs, instance);
-    if (2 * share.moved >= share.decided || !hit_again) return true;
+    if (!hit_again) return true;
     const Share lower_half = share_of_lower_half(samples, beliefs, instance);
     return lower_half.decided < kLeastBody || is_enough(lower_half);
   }
@@ -154,19 +155,22 @@ class InstanceBeliefUpdater {
       lowest = std::min(lowest, layer_of(samples.place[s]));
       highest = std::max(highest, layer_of(samples.place[s]));
     }
-    Share share;
+    Share sum;
     for (std::uint32_t s = begin; s < end; ++s) {
       if (2 * layer_of(samples.place[s]) > lowest + highest) continue;
-      add_to(share, beliefs.supervoxels[s], samples.sample_begin[s + 1] - samples.sample_begin[s]);
+      const Share share =
+          share_of(beliefs.supervoxels[s], samples.sample_begin[s + 1] - samples.sample_begin[s]);
+      sum.total += share.total;
+      sum.moved += share.moved;
+      sum.decided += share.decided;
     }
-    return share;
+    return sum;
   }
 
-  void add_to(Share& share, const Belief& belief, std::uint32_t samples) const {
+  // Of one supervoxel, with so many samples.
+  Share share_of(const Belief& belief, std::uint32_t samples) const {
     const bool free = is_free(belief);
-    share.total += samples;
-    share.moved += free ? samples : 0;
-    share.decided += free || belief.occupied != 0 ? samples : 0;
+    return {samples, free ? samples : 0, free || belief.occupied != 0 ? samples : 0};
   }
 
   // What the reference saw may change supervoxels of which something was seen free, or was hit
@@ -211,17 +215,15 @@ class InstanceBeliefUpdater {
     const std::uint32_t end = samples.sample_begin[s + 1];
     Belief& belief = beliefs.supervoxels[s];
     const bool was_open = is_open(belief);
-    const bool was_free = is_free(belief);
-    const bool was_decided = was_free || belief.occupied != 0;
+    const Share before = share_of(belief, end - begin);
     const bool changed = update(belief, sights.count(begin, end), end - begin);
     if (is_open(belief) != was_open) flip_open(samples, s, beliefs);
     if (!changed) return;
     const std::uint32_t instance = samples.instance_of[s];
     Share& share = beliefs.shares[instance];
-    const bool free = is_free(belief);
-    const bool decided = free || belief.occupied != 0;
-    share.moved += (free ? end - begin : 0) - (was_free ? end - begin : 0);
-    share.decided += (decided ? end - begin : 0) - (was_decided ? end - begin : 0);
+    const Share now = share_of(belief, end - begin);
+    share.moved += now.moved - before.moved;
+    share.decided += now.decided - before.decided;
     beliefs.changed[instance] = 1;
   }
 

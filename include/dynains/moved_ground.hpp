@@ -68,9 +68,8 @@ class MovedGround {
     if (!any) return;
     const std::uint8_t* const moved = moved_.data();
     const std::uint32_t* const group = group_of.data();
-    constexpr std::size_t kBlock = GroundFootprint::kBlock;
-    for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
-      const PointsView block = points.subview(begin, std::min(kBlock, points.size() - begin));
+    for (std::size_t begin = 0; begin < points.size(); begin += GroundFootprint::kBlock) {
+      const PointsView block = GroundFootprint::block_of(points, begin);
       std::uint64_t which = 0;
       for (std::size_t i = 0; i < block.size(); ++i) {
         which |= std::uint64_t{moved[group[begin + i]]} << i;
@@ -135,12 +134,8 @@ class MovedGround {
 
   void keep_flat(PointsView ground) {
     around_.take(PointsView(tested_points_).subview(0, tested_), rise_);
-    const auto points_of = [&](const Block& block) {
-      constexpr std::size_t kBlock = GroundFootprint::kBlock;
-      return ground.subview(block.begin, std::min(kBlock, ground.size() - block.begin));
-    };
     for (const Block& block : under_) {
-      const PointsView points = points_of(block);
+      const PointsView points = GroundFootprint::block_of(ground, block.begin);
       std::uint64_t rising = 0;
       detail::for_each_bit(block.points, [&](std::size_t i) {
         const bool rises = around_.height(points.x[i], points.y[i], points.z[i]) >= rise_;
@@ -149,7 +144,8 @@ class MovedGround {
       if (rising != 0) footprint_.mark(points, rising);
     }
     for (Block& block : under_) {
-      block.points = footprint_.find_marked(points_of(block), block.points);
+      block.points =
+          footprint_.find_marked(GroundFootprint::block_of(ground, block.begin), block.points);
     }
   }
 
@@ -163,8 +159,7 @@ class MovedGround {
   // The same to be tested: runs of points that share a voxel of the samples, by their first points.
   void add_tested(PointsView ground, std::size_t begin, std::uint64_t which) {
     if (which == 0) return;
-    const std::size_t size = std::min(GroundFootprint::kBlock, ground.size() - begin);
-    const std::uint64_t changes = sampler_.find_changes(ground.subview(begin, size));
+    const std::uint64_t changes = sampler_.find_changes(GroundFootprint::block_of(ground, begin));
     const std::uint64_t first = which & (changes | ~(which << 1U));
     tested_blocks_.push_back({begin, which, first, tested_});
     detail::for_each_bit(first, [&](std::size_t i) {

@@ -185,7 +185,7 @@ Scan scan_of_layers(std::size_t per_layer) {
   return scan;
 }
 
-// One reference sees some supervoxels free, another hits them again, and both hit the rest.
+// Two references see some supervoxels free, another may hit them again, and all hit the rest.
 void see_free_and_hit(Scan& scan, const std::vector<std::size_t>& free, bool again) {
   std::vector<Scan::Seen> seen(scan.samples.supervoxel_count(), {0, 4});
   scan.see(seen);
