@@ -256,8 +256,7 @@ class CurvedVoxelClusterer {
     std::iota(parent_.begin(), parent_.end(), 0U);
   }
 
-  // Of the runs of two rows that touch, also across the azimuth seam, one begins in the other, or
-  // just behind it.
+  // Runs of neighbouring rows that touch, also across the azimuth seam.
   void join_runs() {
     std::size_t first_row = 0;  // of an elevation
     for (const std::uint32_t block : used_blocks_) {
@@ -267,14 +266,19 @@ class CurvedVoxelClusterer {
         leave_alone(block);
         continue;
       }
-      join_seam(block, row);
+      const bool at_seam = is_at_seam(block);
+      const auto join_with = [&](std::size_t other_row) {
+        join_block(block, other_row);
+        if (at_seam) join_seam(block, other_row);
+      };
+      if (at_seam) join_seam(block, row);
       const bool has_nearer = row > first_row;
-      if (has_nearer) join_block(block, row - 1);
+      if (has_nearer) join_with(row - 1);
       if (first_row == 0) continue;
       const std::size_t below = row - columns();
-      if (has_nearer) join_block(block, below - 1);
-      join_block(block, below);
-      if (!is_beyond(row + 1 - first_row)) join_block(block, below + 1);
+      if (has_nearer) join_with(below - 1);
+      join_with(below);
+      if (!is_beyond(row + 1 - first_row)) join_with(below + 1);
     }
   }
 
@@ -284,27 +288,44 @@ class CurvedVoxelClusterer {
         starts_[block], [&](std::size_t at) { parent_[run_of(block * kBlock + at)] = kNoCluster; });
   }
 
-  // Joins the runs in a block with those of another row that overlap or touch at a corner.
+  // Joins the runs in a block with those of another row that overlap or touch at a corner: of two
+  // such runs, one begins in the other, or just behind it.
   void join_block(std::size_t block, std::size_t row) {
-    join_seam(block, row);
     const std::size_t other = row * row_blocks() + place_in_row(block);
     const std::uint64_t here = occupied_[block];
     const std::uint64_t there = occupied_[other];
-    const std::uint64_t up_to_here = here | occupied_before(block);
-    const std::uint64_t up_to_there = there | occupied_before(other);
-    const std::uint64_t begins_there = starts_[block] & up_to_there;
-    const std::uint64_t begins_here = starts_[other] & up_to_here;
-    detail::for_each_bit(begins_there | begins_here, [&](std::size_t at) {
-      join(run_at_or_before(block, at), run_at_or_before(other, at));
-    });
-    // The block behind this one may hold nothing.
+    if (there != 0) {
+      const std::uint64_t starts_here = starts_[block];
+      const std::uint64_t starts_there = starts_[other];
+      const std::uint32_t before_here = run_before_[block];
+      const std::uint32_t before_there = run_before_[other];
+      const std::uint64_t begins =
+          (starts_here & (there | there << 1U)) | (starts_there & (here | here << 1U));
+      detail::for_each_bit(begins, [&](std::size_t at) {
+        const std::uint64_t up_to_it = ~std::uint64_t{0} >> (kBlock - 1 - at);
+        join(before_here + detail::count_ones(starts_here & up_to_it),
+             before_there + detail::count_ones(starts_there & up_to_it));
+      });
+    }
+    // At a corner, across the border of a block.
+    const std::size_t first = block * kBlock;
+    const std::size_t first_there = other * kBlock;
+    if ((here & 1U) != 0 && place_in_row(other) != 0 && is_occupied(first_there - 1)) {
+      join(run_of(first), run_of(first_there - 1));
+    }
     if (here >> (kBlock - 1) != 0 && place_in_row(other + 1) != 0 &&
-        (occupied_[other + 1] & 1U) != 0) {
-      join(run_of(block * kBlock + kBlock - 1), run_of((other + 1) * kBlock));
+        is_occupied(first_there + kBlock)) {
+      join(run_of(first + kBlock - 1), run_of(first_there + kBlock));
     }
   }
 
-  // The same across the seam.
+  // Whether a block holds the first or the last azimuth.
+  bool is_at_seam(std::size_t block) const {
+    const std::size_t in_row = place_in_row(block);
+    return in_row == 0 || in_row == (static_cast<std::size_t>(azimuths_) - 1) / kBlock;
+  }
+
+  // The same as join_block() across the seam.
   void join_seam(std::size_t block, std::size_t row) {
     const std::size_t first = row * row_blocks() * kBlock;
     const std::size_t last = first + static_cast<std::size_t>(azimuths_) - 1;
@@ -335,12 +356,6 @@ class CurvedVoxelClusterer {
     const std::uint64_t up_to_it = starts_[cell / kBlock] << (~cell % kBlock);
     return run_before_[cell / kBlock] + detail::count_ones(up_to_it);
   }
-  // Of a cell or of the one before it.
-  std::uint32_t run_at_or_before(std::size_t block, std::size_t at) const {
-    const std::size_t cell = block * kBlock + at;
-    return run_of((occupied_[block] >> at & 1U) != 0 ? cell : cell - 1);
-  }
-
   std::uint32_t root(std::uint32_t run) {
     while (parent_[run] != run) {
       parent_[run] = parent_[parent_[run]];
