@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "simulation/beams.hpp"
 #include "simulation/materials.hpp"
@@ -13,6 +14,7 @@ namespace dynains::simulation {
 namespace {
 
 constexpr double kMovingSpeed = 0.5;  // m/s
+constexpr double kMovedWay = 0.5;     // m
 
 /// Rotation Rz(yaw) Ry(pitch) Rx(roll) in doubles, without vector instructions that might differ.
 Eigen::Matrix3d rotation(double yaw, double pitch, double roll) {
@@ -133,6 +135,7 @@ class Simulator::Implementation {
     const double interval = 1 / config_.rate;
     const int steps = std::max(1, static_cast<int>(std::ceil(interval / 0.05)));
     const double dt = interval / steps;
+    std::map<std::uint32_t, Vec2> first_seen;
     ever_moved_.assign(world_.traffic.objects.size(), false);
     for (int i = 0; i < config_.scans; ++i) {
       const EgoPose ego = world_.traffic.ego();
@@ -142,7 +145,9 @@ class Simulator::Implementation {
       moment.objects = world_.traffic.around(ego.at.position, model_.max_range + 8);
       ever_moved_.resize(world_.traffic.objects.size(), false);
       for (const ObjectPose& pose : moment.objects) {
-        if (pose.speed > kMovingSpeed) ever_moved_[pose.object] = true;
+        const Vec2 first = first_seen.emplace(pose.object, pose.at.position).first->second;
+        const bool has_moved = norm(pose.at.position - first) > kMovedWay;
+        if (pose.speed > kMovingSpeed || has_moved) ever_moved_[pose.object] = true;
       }
       moments_.push_back(std::move(moment));
       for (int k = 0; k < steps; ++k) world_.traffic.step(dt);

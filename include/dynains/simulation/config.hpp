@@ -35,7 +35,9 @@ enum class Sensor {
 
 /// Which points of an object that moves at some time count as moving.
 enum class Labelling {
-  kEver,     ///< all, if it moves at any time while within the sensor's range (SemanticKITTI)
+  /// All, if within the sensor's range it is ever faster than 0.5 m/s, or ever half a metre from
+  /// where it was first: who creeps leaves a trail, too (SemanticKITTI).
+  kEver,
   kInstant,  ///< those of scans in which it moves faster than 0.5 m/s
 };
 
