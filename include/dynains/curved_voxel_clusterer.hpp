@@ -301,6 +301,7 @@ class CurvedVoxelClusterer {
       const std::uint32_t before_there = run_before_[other];
       const std::uint64_t begins =
           (starts_here & (there | there << 1U)) | (starts_there & (here | here << 1U));
+      // An empty cell begins no run: counted up to there, the last one is that of the cell before.
       detail::for_each_bit(begins, [&](std::size_t at) {
         const std::uint64_t up_to_it = ~std::uint64_t{0} >> (kBlock - 1 - at);
         join(before_here + detail::count_ones(starts_here & up_to_it),
@@ -356,6 +357,7 @@ class CurvedVoxelClusterer {
     const std::uint64_t up_to_it = starts_[cell / kBlock] << (~cell % kBlock);
     return run_before_[cell / kBlock] + detail::count_ones(up_to_it);
   }
+
   std::uint32_t root(std::uint32_t run) {
     while (parent_[run] != run) {
       parent_[run] = parent_[parent_[run]];
