@@ -266,19 +266,14 @@ class CurvedVoxelClusterer {
         leave_alone(block);
         continue;
       }
-      const bool at_seam = is_at_seam(block);
-      const auto join_with = [&](std::size_t other_row) {
-        join_block(block, other_row);
-        if (at_seam) join_seam(block, other_row);
-      };
-      if (at_seam) join_seam(block, row);
+      join_seam(block, row);
       const bool has_nearer = row > first_row;
-      if (has_nearer) join_with(row - 1);
+      if (has_nearer) join_block(block, row - 1);
       if (first_row == 0) continue;
       const std::size_t below = row - columns();
-      if (has_nearer) join_with(below - 1);
-      join_with(below);
-      if (!is_beyond(row + 1 - first_row)) join_with(below + 1);
+      if (has_nearer) join_block(block, below - 1);
+      join_block(block, below);
+      if (!is_beyond(row + 1 - first_row)) join_block(block, below + 1);
     }
   }
 
@@ -291,6 +286,7 @@ class CurvedVoxelClusterer {
   // Joins the runs in a block with those of another row that overlap or touch at a corner: of two
   // such runs, one begins in the other, or just behind it.
   void join_block(std::size_t block, std::size_t row) {
+    join_seam(block, row);
     const std::size_t other = row * row_blocks() + place_in_row(block);
     const std::uint64_t here = occupied_[block];
     const std::uint64_t there = occupied_[other];
@@ -320,13 +316,7 @@ class CurvedVoxelClusterer {
     }
   }
 
-  // Whether a block holds the first or the last azimuth.
-  bool is_at_seam(std::size_t block) const {
-    const std::size_t in_row = place_in_row(block);
-    return in_row == 0 || in_row == (static_cast<std::size_t>(azimuths_) - 1) / kBlock;
-  }
-
-  // The same as join_block() across the seam.
+  // The same across the seam.
   void join_seam(std::size_t block, std::size_t row) {
     const std::size_t first = row * row_blocks() * kBlock;
     const std::size_t last = first + static_cast<std::size_t>(azimuths_) - 1;
