@@ -45,6 +45,14 @@ function(dynains_own_target target)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)
 endfunction()
 
+# dynains_quick_target(<name>): one of ours that is not optimized as much as it could be: as fast as a
+# test or an example needs, in less time. What is tested of optimized code is tested by the facade
+# that tests share and by programs (core_contraction, reliability, program).
+function(dynains_quick_target name)
+  dynains_own_target(${name})
+  target_compile_options(${name} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1>)
+endfunction()
+
 # A compiled component: library dynains_<name>, alias and export name dynains::<name>. Its public
 # headers live in include/dynains/<name>. Whatever it links as Package::target is found again by
 # the package's config file (see dynainsInstall.cmake).

@@ -287,60 +287,13 @@ class BasicDynaInsRemover {
   FrameResult take_in(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor, double time) {
     validate_pose("T_world_sensor", T_world_sensor);
     validate_time(time);
-    FrameResult result;
     StageClock clock;
-
     ScanSlot& newest = begin_scan(T_world_sensor, time);
     ingest(cloud, newest);
-    newest.make_room(newest.labels.size());
-    if (needs_sensor() && !sensor().known()) {
-      adapt_to_sensor(newest);
-      if (frame_.turns()) ingest_.turn(turn_pose(newest));
-    }
-    clock.lap(result.times.ingest);
-
-    ground_.segment(ingest_.points(), ingest_.input(), newest.split);
-    clock.lap(result.times.ground);
-
-    gather_window();
-    clock.lap(result.times.window);
-
-    const Span<const std::uint32_t> cluster_of = clusterer_.cluster(window_.view());
-    if (compares_windows()) {
-      clusters_.build(window_.view(), scan_begin_, cluster_of, clusterer_.cluster_count());
-    }
-    clock.lap(result.times.cluster);
-
-    if (compares_windows()) judge_clusters();
-    clock.lap(result.times.descriptor);
-
-    if (compares_windows()) record_verdicts(newest);
-    clock.lap(result.times.verdict);
-    const std::size_t count = newest.non_ground_count();
-    const auto newest_cluster = cluster_of.subspan(cluster_of.size() - count, count);
-    if (config_.use_free_space) {
-      evidence_.observe(newest.scan, newest.segment, newest.T_world_level, newest.split,
-                        newest_cluster, clusterer_.cluster_count());
-      if (!compares_windows()) hand_on_ids(newest);
-    }
-    clock.lap(result.times.evidence);
-    if (config_.use_free_space) {
-      const EvidenceVerdict said = evidence_.judge(newest.scan, false, newest.split);
-      clock.lap(result.times.judge);
-      detail::write_instances(newest, newest_cluster);
-      detail::write_by_evidence(newest, said, compares_windows(), verdict_scratch_);
-    } else {
-      detail::begin_verdict(newest);
-      detail::write_by_windows(newest, verdict_);
-    }
-    clock.lap(result.times.verdict);
-    result.newest = newest.verdict();
-
-    if (pushed_ - finished_ > latency()) result.finished = finish_next(clock, result.times);
-    if (config_.revision.revise_map) revise_map(newest);
-    clock.lap(result.times.revision);
-    return result;
+    return clean(newest, clock);
   }
+
+  FrameResult clean(ScanSlot& newest, StageClock& clock);
 
   void validate_time(double time) const {
     if (!std::isfinite(time) || (pushed_ > 0 && !(time > last_time_))) {
@@ -500,17 +453,7 @@ class BasicDynaInsRemover {
     clock.lap(times.verdict);
   }
 
-  ScanVerdict finish_next(StageClock& clock, StageTimes& times) {
-    ScanSlot& scan = slot(finished_);
-    decide(scan, std::max(1, config_.votes), clock, times);
-    ++finished_;  // also if a map throws that writes to a disk
-    if (config_.build_map) {
-      const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
-      map_.insert(points, scan.is_kept, scan.T_world_level);
-    }
-    clock.lap(times.map);
-    return scan.verdict();
-  }
+  ScanVerdict finish_next(StageClock& clock, StageTimes& times);
 
   void revise_map(const ScanSlot& newest) {
     if constexpr (kRevisable) {
@@ -547,6 +490,76 @@ class BasicDynaInsRemover {
   std::uint64_t segment_ = 0;
   double last_time_ = 0.0;
 };
+
+// What calls the stages is defined outside of the class: a unit that declares
+// `extern template class BasicDynaInsRemover<>` leaves it out, and two thirds of its compile time.
+
+// Everything behind the foreign cloud: its points have been taken in.
+template <class Stages>
+FrameResult BasicDynaInsRemover<Stages>::clean(ScanSlot& newest, StageClock& clock) {
+  FrameResult result;
+  newest.make_room(newest.labels.size());
+  if (needs_sensor() && !sensor().known()) {
+    adapt_to_sensor(newest);
+    if (frame_.turns()) ingest_.turn(turn_pose(newest));
+  }
+  clock.lap(result.times.ingest);
+
+  ground_.segment(ingest_.points(), ingest_.input(), newest.split);
+  clock.lap(result.times.ground);
+
+  gather_window();
+  clock.lap(result.times.window);
+
+  const Span<const std::uint32_t> cluster_of = clusterer_.cluster(window_.view());
+  if (compares_windows()) {
+    clusters_.build(window_.view(), scan_begin_, cluster_of, clusterer_.cluster_count());
+  }
+  clock.lap(result.times.cluster);
+
+  if (compares_windows()) judge_clusters();
+  clock.lap(result.times.descriptor);
+
+  if (compares_windows()) record_verdicts(newest);
+  clock.lap(result.times.verdict);
+  const std::size_t count = newest.non_ground_count();
+  const auto newest_cluster = cluster_of.subspan(cluster_of.size() - count, count);
+  if (config_.use_free_space) {
+    evidence_.observe(newest.scan, newest.segment, newest.T_world_level, newest.split,
+                      newest_cluster, clusterer_.cluster_count());
+    if (!compares_windows()) hand_on_ids(newest);
+  }
+  clock.lap(result.times.evidence);
+  if (config_.use_free_space) {
+    const EvidenceVerdict said = evidence_.judge(newest.scan, false, newest.split);
+    clock.lap(result.times.judge);
+    detail::write_instances(newest, newest_cluster);
+    detail::write_by_evidence(newest, said, compares_windows(), verdict_scratch_);
+  } else {
+    detail::begin_verdict(newest);
+    detail::write_by_windows(newest, verdict_);
+  }
+  clock.lap(result.times.verdict);
+  result.newest = newest.verdict();
+
+  if (pushed_ - finished_ > latency()) result.finished = finish_next(clock, result.times);
+  if (config_.revision.revise_map) revise_map(newest);
+  clock.lap(result.times.revision);
+  return result;
+}
+
+template <class Stages>
+ScanVerdict BasicDynaInsRemover<Stages>::finish_next(StageClock& clock, StageTimes& times) {
+  ScanSlot& scan = slot(finished_);
+  decide(scan, std::max(1, config_.votes), clock, times);
+  ++finished_;  // also if a map throws that writes to a disk
+  if (config_.build_map) {
+    const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
+    map_.insert(points, scan.is_kept, scan.T_world_level);
+  }
+  clock.lap(times.map);
+  return scan.verdict();
+}
 
 using DynaInsRemover = BasicDynaInsRemover<>;
 

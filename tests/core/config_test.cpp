@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "dynains/dyna_ins_remover.hpp"
 #include "support/catch.hpp"
+#include "support/remover.hpp"
 
 namespace dynains::test {
 namespace {

@@ -6,11 +6,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/dyna_ins_remover.hpp"
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
+#include "support/remover.hpp"
 
 namespace dynains::test {
 namespace {

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <vector>
 
-#include "dynains/dyna_ins_remover.hpp"
 #include "support/catch.hpp"
+#include "support/remover.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 

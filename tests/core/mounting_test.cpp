@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "dynains/dyna_ins_remover.hpp"
 #include "dynains/heading.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
+#include "support/remover.hpp"
 
 namespace {
 

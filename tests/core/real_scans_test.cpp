@@ -3,10 +3,10 @@
 #include <iostream>
 #include <vector>
 
-#include "dynains/dyna_ins_remover.hpp"
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/io/kitti.hpp"
 #include "support/catch.hpp"
+#include "support/remover.hpp"
 
 namespace dynains::test {
 namespace {

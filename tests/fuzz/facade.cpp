@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "dynains/dyna_ins_remover.hpp"
 #include "dynains/errors.hpp"
+#include "support/remover.hpp"
 #include "targets.hpp"
 
 namespace dynains::fuzz {

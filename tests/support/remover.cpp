@@ -1,0 +1,3 @@
+#include "support/remover.hpp"
+
+template class dynains::BasicDynaInsRemover<>;
