@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <limits>
 #include <string>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -28,7 +27,7 @@
 #include "dynains/ground_segmenter.hpp"
 #include "dynains/map_revision.hpp"
 #include "dynains/occupancy_descriptor.hpp"
-#include "dynains/parameters.hpp"
+#include "dynains/pipeline_config.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
 #include "dynains/polar_points.hpp"
@@ -89,66 +88,8 @@ class BasicDynaInsRemover {
   static_assert(detail::IsConfigurable<Map>::value && detail::IsMap<Map>::value,
                 "Stages::Map needs Config, insert(PointsView, flags, T_world_sensor) and clear()");
 
-  struct Config : RemoverConfig {
-    typename Ground::Config ground;
-    typename Clusterer::Config clusterer;
-    typename Descriptor::Config descriptor;
-    typename Belief::Config belief;
-    typename Evidence::Config evidence;
-    typename Map::Config map;
-    MapRevision::Config revision;
-
-    /// The paper to the letter, with its published parameters.
-    static Config paper() {
-      Config config;
-      static_cast<RemoverConfig&>(config) = RemoverConfig::paper();
-      config.ground = detail::paper_config<typename Ground::Config>();
-      config.clusterer = detail::paper_config<typename Clusterer::Config>();
-      return config;
-    }
-
-    /// Calls `visitor(name, config)` for the facade's own fields and for those of each stage.
-    template <class Self, class Visitor>
-    static void visit_sections(Self& self, Visitor&& visitor) {
-      using Own = std::conditional_t<std::is_const_v<Self>, const RemoverConfig, RemoverConfig>;
-      visitor("DynaInsRemover", static_cast<Own&>(self));
-      visitor("GroundSegmenter", self.ground);
-      visitor("CurvedVoxelClusterer", self.clusterer);
-      visitor("OccupancyDescriptor", self.descriptor);
-      visitor("BeliefUpdater", self.belief);
-      visitor("FreeSpaceEvidence", self.evidence);
-      visitor("StaticMapAccumulator", self.map);
-      visitor("MapRevision", self.revision);
-    }
-
-    /// Calls `visitor` with the Parameter of every field; names are unique over all stages.
-    template <class Self, class Visitor>
-    static void visit(Self& self, Visitor&& visitor) {
-      visit_sections(self, [&visitor](const char*, auto& section) {
-        std::remove_const_t<std::remove_reference_t<decltype(section)>>::visit(section, visitor);
-      });
-    }
-
-    /// Throws ConfigError.
-    void validate() const {
-      visit_sections(*this, [](const char*, const auto& section) { section.validate(); });
-      if (!revision.revise_map) return;
-      if (!this->use_free_space) {
-        throw ConfigError("MapRevision.revise_map = true needs use_free_space = true");
-      }
-      if (!kRevisable) {
-        throw ConfigError("MapRevision.revise_map = true needs a map that is kept in memory");
-      }
-      // A reference must not count twice.
-      detail::call_if_there(evidence, [this](const auto& e) -> decltype(void(e.reference_step)) {
-        if (revision.revision_period >= e.reference_step) return;
-        throw ConfigError(
-            "MapRevision.revision_period = " + std::to_string(revision.revision_period) +
-            " must not be below FreeSpaceEvidence.reference_step = " +
-            std::to_string(e.reference_step));
-      });
-    }
-  };
+  /// All parameters, see RemoverConfig and the Config of each stage.
+  using Config = PipelineConfig<Stages>;
 
   BasicDynaInsRemover() : BasicDynaInsRemover(Config()) {}
 

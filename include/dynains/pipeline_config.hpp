@@ -1,0 +1,80 @@
+// All parameters of a remover: the facade's own and those of its stages.
+#pragma once
+
+#include <string>
+#include <type_traits>
+
+#include "dynains/detail/stage_checks.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/free_space_evidence.hpp"
+#include "dynains/map_revision.hpp"
+#include "dynains/remover_config.hpp"
+
+namespace dynains {
+
+/// `BasicDynaInsRemover<Stages>::Config`.
+template <class Stages>
+struct PipelineConfig : RemoverConfig {
+  using Evidence = typename detail::EvidenceOf<Stages, FreeSpaceEvidence>::type;
+
+  typename Stages::Ground::Config ground;
+  typename Stages::Clusterer::Config clusterer;
+  typename Stages::Descriptor::Config descriptor;
+  typename Stages::Belief::Config belief;
+  typename Evidence::Config evidence;
+  typename Stages::Map::Config map;
+  MapRevision::Config revision;
+
+  /// The paper to the letter, with its published parameters.
+  static PipelineConfig paper() {
+    PipelineConfig config;
+    static_cast<RemoverConfig&>(config) = RemoverConfig::paper();
+    config.ground = detail::paper_config<typename Stages::Ground::Config>();
+    config.clusterer = detail::paper_config<typename Stages::Clusterer::Config>();
+    return config;
+  }
+
+  /// Calls `visitor(name, config)` for the facade's own fields and for those of each stage.
+  template <class Self, class Visitor>
+  static void visit_sections(Self& self, Visitor&& visitor) {
+    using Own = std::conditional_t<std::is_const_v<Self>, const RemoverConfig, RemoverConfig>;
+    visitor("DynaInsRemover", static_cast<Own&>(self));
+    visitor("GroundSegmenter", self.ground);
+    visitor("CurvedVoxelClusterer", self.clusterer);
+    visitor("OccupancyDescriptor", self.descriptor);
+    visitor("BeliefUpdater", self.belief);
+    visitor("FreeSpaceEvidence", self.evidence);
+    visitor("StaticMapAccumulator", self.map);
+    visitor("MapRevision", self.revision);
+  }
+
+  /// Calls `visitor` with the Parameter of every field; names are unique over all stages.
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& visitor) {
+    visit_sections(self, [&visitor](const char*, auto& section) {
+      std::remove_const_t<std::remove_reference_t<decltype(section)>>::visit(section, visitor);
+    });
+  }
+
+  /// Throws ConfigError.
+  void validate() const {
+    visit_sections(*this, [](const char*, const auto& section) { section.validate(); });
+    if (!revision.revise_map) return;
+    if (!use_free_space) {
+      throw ConfigError("MapRevision.revise_map = true needs use_free_space = true");
+    }
+    if (!detail::IsRevisable<typename Stages::Map, Evidence>::value) {
+      throw ConfigError("MapRevision.revise_map = true needs a map that is kept in memory");
+    }
+    // A reference must not count twice.
+    detail::call_if_there(evidence, [this](const auto& e) -> decltype(void(e.reference_step)) {
+      if (revision.revision_period >= e.reference_step) return;
+      throw ConfigError(
+          "MapRevision.revision_period = " + std::to_string(revision.revision_period) +
+          " must not be below FreeSpaceEvidence.reference_step = " +
+          std::to_string(e.reference_step));
+    });
+  }
+};
+
+}  // namespace dynains
