@@ -67,13 +67,12 @@ struct PipelineConfig : RemoverConfig {
       throw ConfigError("MapRevision.revise_map = true needs a map that is kept in memory");
     }
     // A reference must not count twice.
-    detail::call_if_there(evidence, [this](const auto& e) -> decltype(void(e.reference_step)) {
-      if (revision.revision_period >= e.reference_step) return;
+    const int step = detail::reference_step(evidence);
+    if (revision.revision_period < step) {
       throw ConfigError(
           "MapRevision.revision_period = " + std::to_string(revision.revision_period) +
-          " must not be below FreeSpaceEvidence.reference_step = " +
-          std::to_string(e.reference_step));
-    });
+          " must not be below FreeSpaceEvidence.reference_step = " + std::to_string(step));
+    }
   }
 };
 

@@ -70,7 +70,8 @@ class PatchHeights {
     std::int32_t first;  // patch
     std::int32_t sectors;
     std::size_t patch(std::int32_t sector) const {
-      return static_cast<std::size_t>(first + (sector + sectors) % sectors);
+      const std::int32_t number = first + (sector + sectors) % sectors;
+      return static_cast<std::size_t>(number);
     }
   };
   using Around = std::array<std::size_t, 8>;  // kPatches stands for none

@@ -139,24 +139,42 @@ void adapt_stage(Stage& stage, const SensorModel& sensor) {
   if constexpr (WantsSensor<Stage>::value) stage.adapt(sensor);
 }
 
-/// Calls a method that a stage may have or not: `call` takes the stage, and its return type is that
-/// of the method.
-template <class Stage, class Call>
-void call_if_there(Stage& stage, const Call& call) {
-  if constexpr (std::is_invocable_v<const Call&, Stage&>) call(stage);
-}
-
 /// Lets a stage get its own memory for scans to come; `reserve(std::size_t scans)` is optional.
+template <class Stage, class = void>
+struct HasReserve : std::false_type {};
+template <class Stage>
+struct HasReserve<Stage, std::void_t<decltype(std::declval<Stage&>().reserve(std::size_t{}))>>
+    : std::true_type {};
 template <class Stage>
 void reserve_stage(Stage& stage, std::size_t scans) {
-  call_if_there(stage, [scans](auto& s) -> decltype(s.reserve(scans)) { return s.reserve(scans); });
+  if constexpr (HasReserve<Stage>::value) stage.reserve(scans);
 }
 
 /// Tells a stage how old the scans are that it is asked about; `keep(std::size_t scans)` is
 /// optional.
+template <class Stage, class = void>
+struct HasKeep : std::false_type {};
+template <class Stage>
+struct HasKeep<Stage, std::void_t<decltype(std::declval<Stage&>().keep(std::size_t{}))>>
+    : std::true_type {};
 template <class Stage>
 void keep_in_stage(Stage& stage, std::size_t scans) {
-  call_if_there(stage, [scans](auto& s) -> decltype(s.keep(scans)) { return s.keep(scans); });
+  if constexpr (HasKeep<Stage>::value) stage.keep(scans);
+}
+
+/// Scans from one reference of an evidence to the next; one that does not say so keeps them all.
+template <class Config, class = void>
+struct HasReferenceStep : std::false_type {};
+template <class Config>
+struct HasReferenceStep<Config, std::void_t<decltype(std::declval<Config&>().reference_step)>>
+    : std::true_type {};
+template <class Config>
+int reference_step(const Config& config) {
+  if constexpr (HasReferenceStep<Config>::value) {
+    return config.reference_step;
+  } else {
+    return 1;
+  }
 }
 
 /// The paper's parameters of a stage; a stage without `Config::paper()` keeps its defaults.
