@@ -23,6 +23,7 @@
 #include "dynains/detail/stage_checks.hpp"
 #include "dynains/detail/write_by_evidence.hpp"
 #include "dynains/detail/write_by_windows.hpp"
+#include "dynains/errors.hpp"
 #include "dynains/free_space_evidence.hpp"
 #include "dynains/ground_segmenter.hpp"
 #include "dynains/map_revision.hpp"

@@ -139,38 +139,35 @@ void adapt_stage(Stage& stage, const SensorModel& sensor) {
   if constexpr (WantsSensor<Stage>::value) stage.adapt(sensor);
 }
 
+/// Whether `Operation<T>` can be named: whether T offers what may be there or not.
+template <template <class> class Operation, class T, class = void>
+struct Offers : std::false_type {};
+template <template <class> class Operation, class T>
+struct Offers<Operation, T, std::void_t<Operation<T>>> : std::true_type {};
+
 /// Lets a stage get its own memory for scans to come; `reserve(std::size_t scans)` is optional.
-template <class Stage, class = void>
-struct HasReserve : std::false_type {};
 template <class Stage>
-struct HasReserve<Stage, std::void_t<decltype(std::declval<Stage&>().reserve(std::size_t{}))>>
-    : std::true_type {};
+using Reserve = decltype(std::declval<Stage&>().reserve(std::size_t{}));
 template <class Stage>
 void reserve_stage(Stage& stage, std::size_t scans) {
-  if constexpr (HasReserve<Stage>::value) stage.reserve(scans);
+  if constexpr (Offers<Reserve, Stage>::value) stage.reserve(scans);
 }
 
 /// Tells a stage how old the scans are that it is asked about; `keep(std::size_t scans)` is
 /// optional.
-template <class Stage, class = void>
-struct HasKeep : std::false_type {};
 template <class Stage>
-struct HasKeep<Stage, std::void_t<decltype(std::declval<Stage&>().keep(std::size_t{}))>>
-    : std::true_type {};
+using Keep = decltype(std::declval<Stage&>().keep(std::size_t{}));
 template <class Stage>
 void keep_in_stage(Stage& stage, std::size_t scans) {
-  if constexpr (HasKeep<Stage>::value) stage.keep(scans);
+  if constexpr (Offers<Keep, Stage>::value) stage.keep(scans);
 }
 
 /// Scans from one reference of an evidence to the next; one that does not say so keeps them all.
-template <class Config, class = void>
-struct HasReferenceStep : std::false_type {};
 template <class Config>
-struct HasReferenceStep<Config, std::void_t<decltype(std::declval<Config&>().reference_step)>>
-    : std::true_type {};
+using ReferenceStep = decltype(std::declval<Config&>().reference_step);
 template <class Config>
 int reference_step(const Config& config) {
-  if constexpr (HasReferenceStep<Config>::value) {
+  if constexpr (Offers<ReferenceStep, Config>::value) {
     return config.reference_step;
   } else {
     return 1;
@@ -178,13 +175,11 @@ int reference_step(const Config& config) {
 }
 
 /// The paper's parameters of a stage; a stage without `Config::paper()` keeps its defaults.
-template <class Config, class = void>
-struct HasPaper : std::false_type {};
 template <class Config>
-struct HasPaper<Config, std::void_t<decltype(Config::paper())>> : std::true_type {};
+using Paper = decltype(Config::paper());
 template <class Config>
 Config paper_config() {
-  if constexpr (HasPaper<Config>::value) {
+  if constexpr (Offers<Paper, Config>::value) {
     return Config::paper();
   } else {
     return Config();
