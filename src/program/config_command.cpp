@@ -28,6 +28,22 @@ void print_config(const std::string& preset_name) {
   });
 }
 
+// How C++ gets at a section of `config`. Asked by address, so that no name here can be out of date:
+// a member that is renamed does not compile, a section that is missing throws.
+std::string member_of(const DynaInsRemover::Config& config, const void* section) {
+  const std::map<const void*, std::string> members = {
+      {static_cast<const RemoverConfig*>(&config), "config"},
+      {&config.ground, "config.ground"},
+      {&config.clusterer, "config.clusterer"},
+      {&config.descriptor, "config.descriptor"},
+      {&config.belief, "config.belief"},
+      {&config.evidence, "config.evidence"},
+      {&config.map, "config.map"},
+      {&config.revision, "config.revision"},
+  };
+  return members.at(section);
+}
+
 // The parameter table of the documentation.
 void print_markdown() {
   std::map<std::string, std::string> paper;
@@ -38,11 +54,12 @@ void print_markdown() {
   std::cout
       << "# Parameters\n\n"
          "Written by `dynains config --markdown`; a test compares. As flags and in config files "
-         "names have hyphens\n(`--tau-s 0.5`); in C++ and Python they are fields "
-         "(`config.belief.tau_p` and `config.tau_p`).\n";
+         "names have hyphens\n(`--tau-s 0.5`); in C++ they are fields of the member that the "
+         "heading names (`config.belief.tau_p`), in\nPython of the configuration itself "
+         "(`config.tau_p`).\n";
   const DynaInsRemover::Config config;
   DynaInsRemover::Config::visit_sections(config, [&](const char* name, const auto& section) {
-    std::cout << "\n## " << name
+    std::cout << "\n## " << name << ": `" << member_of(config, &section) << '`'
               << "\n\n| name | default | paper | range | meaning |\n|---|---|---|---|---|\n";
     using Section = std::remove_const_t<std::remove_reference_t<decltype(section)>>;
     Section::visit(section, [&](const auto& parameter) {
