@@ -22,41 +22,51 @@ Cloud read_scan(double x, double time) {
   return points;
 }
 
-// Stands for your registration: here it simply trusts the prediction. Yours gets a scan in which
-// nothing moves, to be aligned with what it knows.
-Eigen::Isometry3d align(const Cloud& still, const Eigen::Isometry3d& T_world_predicted) {
-  return still.empty() ? Eigen::Isometry3d::Identity() : T_world_predicted;
+// Stands for your registration. Yours gets a scan in which nothing moves, to be aligned with a map
+// in which nothing moves.
+Eigen::Isometry3d align(const Cloud& /*still*/, const Cloud& /*map*/,
+                        const Eigen::Isometry3d& T_world_predicted) {
+  return T_world_predicted;
 }
 
 int main() {
+  using dynains::PointLabel;
   dynains::DynaInsRemover::Config config;
-  config.build_map = false;  // poses are predictions here; the map of an odometry is its own
+  config.build_map = false;  // what is pushed is not yet final; the map of an odometry is its own
   dynains::DynaInsRemover remover(config);
   const Eigen::Isometry3d T_last_newest(Eigen::Translation3d(0.5, 0.0, 0.0));  // constant speed
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+  Cloud map;  // stands for yours
   std::size_t removed = 0;
 
   for (int i = 0; i < 12; ++i) {
     const double time = 0.1 * i;
     const Cloud scan = read_scan(5.0 * time, time);
 
-    // 1. Predict. The window needs a pose to within the size of a voxel, not the final one.
+    // 1. A pose good to a few centimetres: an IMU's prediction, or a first registration with all
+    // points (docs/embedding.md). Here the prediction is exact.
     if (i > 0) T_world_sensor = T_world_sensor * T_last_newest;
 
-    // 2. Ask what moves, known now, without latency.
+    // 2. Ask what moves, known now, without latency. What is out of range was not judged and stays;
+    // kInvalid is no measurement (NaN, no return).
     const dynains::FrameResult frame = remover.push(scan, T_world_sensor, time);
     Cloud still;
     for (std::size_t k = 0; k < scan.size(); ++k) {
-      if (dynains::is_static(frame.newest.labels[k])) still.push_back(scan[k]);
+      const PointLabel label = frame.newest.labels[k];
+      if (label != PointLabel::kDynamic && label != PointLabel::kInvalid) still.push_back(scan[k]);
     }
     removed += scan.size() - still.size();
     std::printf("scan %2d: %zu points, %zu of them for registration, %.1f ms\n", i, scan.size(),
                 still.size(), frame.times.total());
 
-    // 3. Register what stands still.
-    T_world_sensor = align(still, T_world_sensor);
+    // 3. Register the rest from there.
+    T_world_sensor = align(still, map, T_world_sensor);
+
+    // 4. Insert the rest into the map.
+    for (const Eigen::Vector3d& p : still) map.push_back(T_world_sensor * p);
   }
 
-  std::printf("%zu points moved and never reached the registration\n", removed);
+  std::printf("%zu points moved and reached neither the registration nor the map of %zu\n", removed,
+              map.size());
   return removed > 0 ? 0 : 1;
 }
