@@ -188,7 +188,9 @@ class BasicDynaInsRemover {
     ++segment_;
   }
 
-  /// Back to the state after construction; buffers keep their capacity.
+  /// Back to the state after construction, with an empty map; buffers keep their capacity. The map
+  /// is cleared: a TiledStaticMap removes its files, those of earlier runs, too. To start again and
+  /// keep it, construct a new remover.
   void reset() {
     const detail::OneCall::Guard guard(one_call_);
     map_.clear();

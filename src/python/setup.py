@@ -1,7 +1,7 @@
 """pip install --no-build-isolation ./src/python
 
-Needs nothing from the network: setuptools, CMake, a compiler, Eigen, nlohmann-json, nanoflann,
-pybind11 and NumPy as installed on the system. CMAKE_ARGS adds arguments for CMake.
+Needs nothing from the network: setuptools, CMake, a compiler, Eigen, nlohmann-json, pybind11
+and NumPy as installed on the system. CMAKE_ARGS adds arguments for CMake.
 """
 
 import os

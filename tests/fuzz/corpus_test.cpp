@@ -1,5 +1,4 @@
-// The fuzzing targets without a fuzzer: their seeds, mutations of these, and every input that once
-// broke something.
+// The fuzzing targets without a fuzzer: their seeds and mutations of these.
 #include <algorithm>
 #include <string>
 
