@@ -28,7 +28,7 @@ inline constexpr std::uint32_t kNoCluster = 0xFFFFFFFFU;
 
 /// Groups points whose curved voxels are connected in the 26-neighbourhood; azimuth wraps around.
 ///
-/// Occupied cells are bytes of a dense grid with azimuth running fastest. Each row is cut into
+/// Occupied cells are bits of a dense grid with azimuth running fastest. Each row is cut into
 /// runs of occupied cells, 64 cells at a time, and runs of neighbouring rows that touch are joined
 /// by union-find.
 class CurvedVoxelClusterer {

@@ -57,7 +57,7 @@ struct DefaultStages {
 /// `reserve` and `reserve_like` throw UsageError while another of these calls is at work.
 /// Everything that is read from it, the map and the spans of a verdict, is read between two calls:
 /// by the thread that makes them, or by others under a lock that these calls are made under as
-/// well.
+/// well. Can be moved; what was moved from can only be assigned to or destroyed.
 template <class Stages = DefaultStages>
 class BasicDynaInsRemover {
  public:
@@ -160,7 +160,11 @@ class BasicDynaInsRemover {
   /// `cloud`: metres, sensor frame, z up (tilts are found, see RemoverConfig::level); see
   /// PointCloudTraits for what can be passed. Any size, any content: bad points get a label of
   /// their own. `T_world_sensor`: pose of the sensor at that scan. `time`: s, greater than that of
-  /// the scan before. Throws PoseError, and then leaves the state as it was.
+  /// the scan before. Throws PoseError, and then leaves the state as it was; so does what the cloud
+  /// throws. Where a stage throws (std::bad_alloc), the scan is not taken in, and the next one
+  /// begins a new window, as behind a gap; evidence that it gave on older scans may remain. What is
+  /// thrown while a scan becomes final, by the map above all, is of that scan: its final verdict is
+  /// lost, and nothing else.
   template <class Cloud>
   FrameResult push(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor, double time) {
     const detail::OneCall::Guard guard(one_call_);
@@ -232,10 +236,41 @@ class BasicDynaInsRemover {
     validate_pose("T_world_sensor", T_world_sensor);
     validate_time(time);
     StageClock clock;
-    ScanSlot& newest = begin_scan(T_world_sensor, time);
+    // Until its points are in, a scan only fills a slot that is free: a foreign cloud may throw.
+    ScanSlot& newest = slot(pushed_);
+    newest.scan = pushed_;
+    newest.segment = segment_ + (pushed_ > 0 && breaks_off(T_world_sensor, time) ? 1 : 0);
+    newest.time = time;
+    newest.T_world_sensor = orthonormalized(T_world_sensor);
     ingest(cloud, newest);
     return clean(newest, clock);
   }
+
+  // Counts a scan in, and out again if a stage throws before it is kept: stages may have seen it,
+  // so that the next one begins a new window.
+  class Taking {
+   public:
+    Taking(BasicDynaInsRemover& remover, const ScanSlot& newest)
+        : remover_(remover), time_before_(remover.last_time_) {
+      ++remover_.pushed_;
+      remover_.segment_ = newest.segment;
+      remover_.last_time_ = newest.time;
+    }
+    Taking(const Taking&) = delete;
+    Taking& operator=(const Taking&) = delete;
+    ~Taking() {
+      if (kept_) return;
+      --remover_.pushed_;
+      ++remover_.segment_;
+      remover_.last_time_ = time_before_;
+    }
+    void keep() { kept_ = true; }
+
+   private:
+    BasicDynaInsRemover& remover_;
+    double time_before_;
+    bool kept_ = false;
+  };
 
   FrameResult clean(ScanSlot& newest, StageClock& clock);
 
@@ -248,18 +283,6 @@ class BasicDynaInsRemover {
   }
 
   ScanSlot& slot(std::uint64_t scan) { return ring_[scan % ring_.size()]; }
-
-  ScanSlot& begin_scan(const Eigen::Isometry3d& T_world_sensor, double time) {
-    if (pushed_ > 0 && breaks_off(T_world_sensor, time)) ++segment_;
-    ScanSlot& newest = slot(pushed_);
-    newest.scan = pushed_;
-    newest.segment = segment_;
-    newest.time = time;
-    newest.T_world_sensor = orthonormalized(T_world_sensor);
-    last_time_ = time;
-    ++pushed_;
-    return newest;
-  }
 
   // Whether the scan before is too long ago, or too far away to be compared with.
   bool breaks_off(const Eigen::Isometry3d& T_world_sensor, double time) {
@@ -359,9 +382,14 @@ class BasicDynaInsRemover {
     frame_.estimate(ingest_.points());
     if (sensor().known() && newest.scan > 0) newest.segment = ++segment_;
     const SensorModel model = sensor().known() ? sensor() : SensorModel::typical();
-    detail::adapt_stage(ground_, model);
-    detail::adapt_stage(clusterer_, model);
-    evidence_.adapt(model);
+    try {
+      detail::adapt_stage(ground_, model);
+      detail::adapt_stage(clusterer_, model);
+      evidence_.adapt(model);
+    } catch (...) {
+      frame_.forget();  // so that all of them are told by the next scan
+      throw;
+    }
   }
 
   // The points as a level sensor in the same place would see them that looks along the scene.
@@ -442,6 +470,7 @@ class BasicDynaInsRemover {
 template <class Stages>
 FrameResult BasicDynaInsRemover<Stages>::clean(ScanSlot& newest, StageClock& clock) {
   FrameResult result;
+  Taking taking(*this, newest);
   newest.make_room(newest.labels.size());
   if (needs_sensor() && !sensor().known()) {
     adapt_to_sensor(newest);
@@ -485,6 +514,7 @@ FrameResult BasicDynaInsRemover<Stages>::clean(ScanSlot& newest, StageClock& clo
   }
   clock.lap(result.times.verdict);
   result.newest = newest.verdict();
+  taking.keep();
 
   if (pushed_ - finished_ > latency()) result.finished = finish_next(clock, result.times);
   if (config_.revision.revise_map) revise_map(newest);
@@ -494,9 +524,8 @@ FrameResult BasicDynaInsRemover<Stages>::clean(ScanSlot& newest, StageClock& clo
 
 template <class Stages>
 ScanVerdict BasicDynaInsRemover<Stages>::finish_next(StageClock& clock, StageTimes& times) {
-  ScanSlot& scan = slot(finished_);
+  ScanSlot& scan = slot(finished_++);  // also if something throws: its slot is needed by then
   decide(scan, std::max(1, config_.votes), clock, times);
-  ++finished_;  // also if a map throws that writes to a disk
   if (config_.build_map) {
     const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
     map_.insert(points, scan.is_kept, scan.T_world_level);

@@ -57,7 +57,8 @@ struct FreeSpaceConfig {
     visitor(Parameter{"ground_sample", self.ground_sample, closed(0.05, 2), "m",
                       "one ground sample per voxel of this size"});
     visitor(Parameter{"ground_reach", self.ground_reach, closed(0, 10), "m",
-                      "ground this near to removed points is tested for free space; 0: none"});
+                      "ground this near to removed points is tested for free space, and tells how "
+                      "high that under them rises (footprint_rise); 0: none, all of that goes"});
     visitor(Parameter{"margin", self.margin, closed(0.02, 2), "m",
                       "a beam passes a sample if it returns from this much farther away"});
     visitor(Parameter{"margin_slope", self.margin_slope, closed(0, 0.1), "m/m",
@@ -100,7 +101,7 @@ struct FreeSpaceConfig {
                       "higher instances are not carried through time"});
     visitor(Parameter{"presume_dynamic", self.presume_dynamic, Bounds(), "",
                       "the zero-latency verdict calls compact instances dynamic whose place no "
-                      "earlier scan has seen"});
+                      "earlier scan has seen; without effect where that is final (horizon 0)"});
   }
 
   /// Throws ConfigError.

@@ -12,7 +12,7 @@ namespace dynains {
 /// Angle about z (rad, from the x axis of the sensor) of the direction in which one scan extends
 /// farthest, and of its two ends that to which more of the scan lies. It turns with the points: all
 /// cells and sectors that are laid along it fall on the same points whichever way a sensor is
-/// mounted. 0 for a scan without points.
+/// mounted. 0 for a scan without points; coordinates are finite.
 inline double estimate_heading(PointsView points) {
   double x = 0.0, y = 0.0;           // sums
   double along = 0.0, across = 0.0;  // of second order, as a vector at twice the angle

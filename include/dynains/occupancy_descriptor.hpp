@@ -43,7 +43,19 @@ class OccupancyDescriptor {
     }
 
     /// Throws ConfigError.
-    void validate() const { validate_parameters("OccupancyDescriptor", *this); }
+    void validate() const {
+      validate_parameters("OccupancyDescriptor", *this);
+      // A cluster may reach round the sensor, and as far as any cluster_range.
+      constexpr double kFarthest = 1000.0;  // m
+      constexpr double kMaxCells = 1 << 26;
+      const double cells = 360.0 / cell_azimuth * (kFarthest / cell_range);
+      if (!(cells <= kMaxCells)) {
+        throw ConfigError("OccupancyDescriptor: cell_range = " + std::to_string(cell_range) +
+                          " and cell_azimuth = " + std::to_string(cell_azimuth) + " make " +
+                          std::to_string(cells) + " cells up to " + std::to_string(kFarthest) +
+                          " m; at most " + std::to_string(kMaxCells) + " are possible");
+      }
+    }
   };
 
   OccupancyDescriptor() : OccupancyDescriptor(Config()) {}

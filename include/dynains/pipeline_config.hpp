@@ -31,6 +31,9 @@ struct PipelineConfig : RemoverConfig {
     static_cast<RemoverConfig&>(config) = RemoverConfig::paper();
     config.ground = detail::paper_config<typename Stages::Ground::Config>();
     config.clusterer = detail::paper_config<typename Stages::Clusterer::Config>();
+    config.descriptor = detail::paper_config<typename Stages::Descriptor::Config>();
+    config.belief = detail::paper_config<typename Stages::Belief::Config>();
+    config.map = detail::paper_config<typename Stages::Map::Config>();
     return config;
   }
 
@@ -63,6 +66,7 @@ struct PipelineConfig : RemoverConfig {
     if (!use_free_space) {
       throw ConfigError("MapRevision.revise_map = true needs use_free_space = true");
     }
+    if (!build_map) throw ConfigError("MapRevision.revise_map = true needs build_map = true");
     if (!detail::IsRevisable<typename Stages::Map, Evidence>::value) {
       throw ConfigError("MapRevision.revise_map = true needs a map that is kept in memory");
     }

@@ -75,18 +75,19 @@ class ReferenceViews {
   void make_image(std::uint64_t scan, std::uint64_t segment, const Eigen::Isometry3d& T_world_level,
                   const GroundSplit& split) {
     ReferenceView& view = views_[images_ % views_.size()];
+    view.segment = ReferenceView::kNoSegment;  // until it is whole
     view.scan = scan;
-    view.segment = segment;
     view.T_world_beams = T_world_level;
-    if (!R_beams_level_) {
-      view.image.build(grid_, split.ground(), split.non_ground(), lateral_margin_, scratch_);
-      return;
+    PointsView ground = split.ground();
+    PointsView rest = split.non_ground();
+    if (R_beams_level_) {
+      view.T_world_beams.rotate(R_beams_level_->transpose());
+      const Eigen::Matrix3f R = R_beams_level_->cast<float>();
+      ground = detail::turn(ground, R, turned_ground_);
+      rest = detail::turn(rest, R, turned_rest_);
     }
-    view.T_world_beams.rotate(R_beams_level_->transpose());
-    const Eigen::Matrix3f R = R_beams_level_->cast<float>();
-    const PointsView ground = detail::turn(split.ground(), R, turned_ground_);
-    const PointsView rest = detail::turn(split.non_ground(), R, turned_rest_);
     view.image.build(grid_, ground, rest, lateral_margin_, scratch_);
+    view.segment = segment;
   }
 
   const ReferenceView& newest() const { return views_[images_ % views_.size()]; }

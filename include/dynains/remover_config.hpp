@@ -12,11 +12,12 @@ struct RemoverConfig {
   int window = 1;          ///< scans in the sliding window, K; 1 compares no descriptors
   bool use_belief = true;  ///< false: initial proposals are verdicts (the paper's IOC-only rows)
   int votes = 1;           ///< windows, of the K that see a scan, that must call a point dynamic
-  double min_range = 2.7;  ///< m, horizontal; nearer points are the robot's own
-  double max_range = 250;  ///< m, horizontal and vertical; farther points are not measurements
+  double min_range = 2.7;  ///< m, in the sensor's x-y plane; nearer points are the robot's own
+  double max_range = 250;  ///< m, there and along its z axis; farther points are no measurements
   double max_gap = 1.0;    ///< s; a longer pause between scans starts a new window
   double max_speed = 100;  ///< m/s; a pose that jumps farther than that starts a new window
-  bool level = true;       ///< turn scans level, and along the scene
+  bool level = true;       ///< turn scans level, and along the scene; from the first one that has
+                           ///< enough points to tell (SensorModel::known())
   double mounting_pitch = 0.0;  ///< deg, nose down; with the roll: 0, 0 is found in the first scan
   double mounting_roll = 0.0;   ///< deg, left side up
   bool use_free_space = true;   ///< evidence from what other scans saw through
@@ -40,10 +41,13 @@ struct RemoverConfig {
     visitor(Parameter{"votes", self.votes, closed(0, 64), "windows",
                       "windows that must call a point dynamic for the final verdict; 0: the newest "
                       "window alone decides, without latency"});
-    visitor(Parameter{"min_range", self.min_range, closed(0, 100), "m",
-                      "nearer points (horizontally) are the robot's own and not judged"});
+    visitor(
+        Parameter{"min_range", self.min_range, closed(0, 100), "m",
+                  "nearer points (in the sensor's own x-y plane, tilted or not) are the robot's "
+                  "own and not judged"});
     visitor(Parameter{"max_range", self.max_range, half_open_below(0, 10000), "m",
-                      "farther points (horizontally or vertically) are not judged"});
+                      "farther points (in the sensor's own x-y plane, or along its z axis) are not "
+                      "judged"});
     visitor(Parameter{"max_gap", self.max_gap, half_open_below(0, 1e9), "s",
                       "a longer pause between two scans starts a new window"});
     visitor(Parameter{"max_speed", self.max_speed, half_open_below(0, 1e9), "m/s",

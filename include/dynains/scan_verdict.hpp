@@ -19,13 +19,18 @@ struct ScanVerdict {
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
   Span<const PointLabel> labels;
   Span<const std::uint32_t> instances;  ///< kNoInstance for ground and points without a cluster
-  Span<const float> beliefs;  ///< probability of being dynamic, [0, 1]; 0 if never proposed
-  Span<const Cause> causes;   ///< why the label is what it is
+  /// Probability of being dynamic, [0, 1]; 0 for what was not judged: ground that stays, points
+  /// without a cluster and, under the paper's rules, whatever was not proposed. By free space, what
+  /// was judged has at least 0.5: so much is left to a place that stands, and to one that nobody
+  /// saw.
+  Span<const float> beliefs;
+  Span<const Cause> causes;  ///< why the label is what it is
 };
 
 /// Answer to one scan.
 struct FrameResult {
-  ScanVerdict newest;                   ///< what the past alone says of the scan just pushed
+  /// What the past alone says of the scan just pushed; without latency, the final verdict on it.
+  ScanVerdict newest;
   std::optional<ScanVerdict> finished;  ///< the scan, if any, whose verdict is now final
   StageTimes times;
 };

@@ -47,9 +47,9 @@ struct SensorModel {
   }
 };
 
-/// Estimates the sampling from one scan (sensor frame); the height is that of a typical sensor, see
-/// estimate_mounting. Unknown if there are fewer than 500 points.
-/// Allocates; meant to be called once per sensor, not per scan.
+/// Estimates the sampling from one scan (sensor frame, finite coordinates); the height is that of a
+/// typical sensor, see estimate_mounting. Unknown if there are fewer than 500 points, or none beside
+/// another. Allocates; meant to be called once per sensor, not per scan.
 inline SensorModel estimate_sensor_model(PointsView points) {
   constexpr std::size_t kFewest = 500;
   SensorModel model;
@@ -109,7 +109,8 @@ inline SensorModel estimate_sensor_model(PointsView points) {
     return gaps;
   };
   std::vector<float> steps = gaps_within(elevation, azimuth, 0.1, 0.01);
-  model.azimuth_step = steps.empty() ? 1.0 : std::clamp(percentile(steps, 0.5), 0.05, 2.0);
+  if (steps.empty()) return {};
+  model.azimuth_step = std::clamp(percentile(steps, 0.5), 0.05, 2.0);
   std::vector<float> gaps = gaps_within(azimuth, elevation, model.azimuth_step, 0.08);
   model.elevation_gap = gaps.empty() ? 1.0 : std::clamp(percentile(gaps, 0.3), 0.1, 5.0);
   model.elevation_gap_wide = gaps.empty() ? 1.0 : std::clamp(percentile(gaps, 0.9), 0.1, 5.0);

@@ -120,8 +120,10 @@ class StaticMapAccumulator {
     };
     // A place farther away has no block, and its number may not fit into one.
     constexpr double kFarthest = std::numeric_limits<std::int32_t>::max() - 1;
-    const Eigen::Array3d low = (box.min().array() / block_size()).floor().max(-kFarthest);
-    const Eigen::Array3d high = (box.max().array() / block_size()).floor().min(kFarthest);
+    // By the rounding of floats, a point may lie a little beside the block that has it.
+    const Eigen::Array3d slack = 1e-3 * block_size();
+    const Eigen::Array3d low = ((box.min().array() - slack) / block_size()).floor().max(-kFarthest);
+    const Eigen::Array3d high = ((box.max().array() + slack) / block_size()).floor().min(kFarthest);
     if ((low > high).any()) return;
     const bool few = (high - low + 1.0).prod() < static_cast<double>(blocks_.size());
     if (!few) {
@@ -313,19 +315,22 @@ class StaticMapAccumulator {
       Block& block = blocks_[known];
       const std::uint64_t bit = std::uint64_t{1} << batch.voxel[i + 1];
       if ((block.occupied & bit) != 0 && !keep_all_) continue;
-      block.occupied |= bit;
       block.first =
           add_point({batch.point[0][i], batch.point[1][i], batch.point[2][i], block.first});
+      block.occupied |= bit;
     }
   }
 
   // In the place of one that was erased, if there is any.
   std::uint32_t add_point(const Point& point) {
+    std::uint32_t place = free_;
+    if (place == kEnd) {
+      place = points_.push_back(point);
+    } else {
+      free_ = points_[place].next;
+      points_[place] = point;
+    }
     ++size_;
-    if (free_ == kEnd) return points_.push_back(point);
-    const std::uint32_t place = free_;
-    free_ = points_[place].next;
-    points_[place] = point;
     return place;
   }
 

@@ -2,6 +2,7 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/point_cloud_traits.hpp"
+#include "naming_scan.hpp"
 
 namespace dynains::program {
 
@@ -30,14 +31,17 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
   for (const Variant& variant : variants) {
     DynaInsRemover::Config config = variant.config;
     config.build_map = false;
+    config.revision.revise_map = false;
     removers.emplace_back(config);
   }
   evaluation::LabelledScan scan;
   for (std::size_t i = 0; sequence.read(i, scan); ++i) {
     verdicts.in_map[i].assign(scan.size(), 0);
     for (std::size_t v = 0; v < removers.size(); ++v) {
-      const FrameResult frame = removers[v].push(
-          RawPoints<float>{scan.xyz, scan.size(), scan.stride}, scan.T_world_sensor, scan.time);
+      const FrameResult frame = naming_scan(sequence.sequence(), sequence.index(i), [&] {
+        return removers[v].push(RawPoints<float>{scan.xyz, scan.size(), scan.stride},
+                                scan.T_world_sensor, scan.time);
+      });
       if (answer == Answer::kNewest) {
         take(v, frame.newest);
       } else if (frame.finished) {

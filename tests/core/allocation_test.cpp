@@ -39,9 +39,9 @@ namespace {
 TEST_CASE("a warm remover allocates nothing, but for the map when it grows") {
   const auto base = GENERATE(DynaInsRemover::Config::paper(), DynaInsRemover::Config());
   DynaInsRemover::Config config = base;
-  config.revision.revise_map = config.use_free_space;
   const bool build_map = GENERATE(false, true);
   config.build_map = build_map;
+  config.revision.revise_map = build_map && config.use_free_space;
   // Short rings: after seven rounds of twelve scans, every place in them has held every scan.
   config.evidence.horizon = 6;
   config.evidence.memory = 20;

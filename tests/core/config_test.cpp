@@ -73,6 +73,16 @@ TEST_CASE("the paper's configuration has the published parameters") {
   CHECK(config.map.map_voxel == 0.2);
 }
 
+TEST_CASE("cells of a descriptor are bounded, since a cluster may reach all around the sensor") {
+  Config config = Config::paper();
+  config.descriptor.cell_azimuth = 0.125;  // 2880 sectors, of up to 1 km
+  config.descriptor.cell_range = 1000.0 * 2880.0 / (1 << 26) * 1.001;
+  CHECK_NOTHROW(config.validate());
+  config.descriptor.cell_range *= 0.998;
+  CHECK_THAT(error_of(config), StartsWith("OccupancyDescriptor: cell_range = 0.04") &&
+                                   ContainsSubstring("at most 67108864"));
+}
+
 TEST_CASE("the default and the paper's configuration are valid") {
   CHECK_NOTHROW(Config().validate());
   CHECK_NOTHROW(Config::paper().validate());

@@ -198,6 +198,11 @@ TEST_CASE("a map is revised by free-space evidence, and only one that can let go
   config.revision.revise_map = true;
   CHECK_THROWS_WITH(DynaInsRemover(config),
                     ContainsSubstring("MapRevision.revise_map = true needs use_free_space = true"));
+  config.use_free_space = true;
+  CHECK_NOTHROW(config.validate());
+  config.build_map = false;
+  CHECK_THROWS_WITH(config.validate(),
+                    ContainsSubstring("MapRevision.revise_map = true needs build_map = true"));
   BasicDynaInsRemover<CountingStages>::Config keeping;
   CHECK_NOTHROW(BasicDynaInsRemover<CountingStages>(keeping));
   keeping.revision.revise_map = true;

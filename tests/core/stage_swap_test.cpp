@@ -83,6 +83,28 @@ class Credulous : public BeliefUpdater {
   bool is_dynamic() const { return true; }
 };
 
+// Has parameters of its own for the paper.
+class PaperBelief : public BeliefUpdater {
+ public:
+  struct Config : BeliefUpdater::Config {
+    static Config paper() {
+      Config config;
+      config.tau_p = 0.625;
+      return config;
+    }
+  };
+  using BeliefUpdater::BeliefUpdater;
+};
+struct OwnBelief : DefaultStages {
+  using Belief = PaperBelief;
+};
+
+TEST_CASE("the paper's parameters of a stage of one's own are its own") {
+  using Remover = BasicDynaInsRemover<OwnBelief>;
+  CHECK(Remover::Config::paper().belief.tau_p == 0.625);
+  CHECK(Remover::Config().belief.tau_p == BeliefUpdater::Config().tau_p);
+}
+
 struct OwnGround : DefaultStages {
   using Ground = FlatGround;
 };

@@ -204,6 +204,33 @@ TEST_CASE("a region holds exactly the points that a filter over the map finds") 
   CHECK(compare(Eigen::AlignedBox3d()) == 0);
 }
 
+TEST_CASE("every point that is stored is found where it lies, whatever the rounding of floats") {
+  StaticMapAccumulator map = make(0.05);
+  Random random(14);
+  for (int i = 0; i < 20; ++i) {
+    PointBuffer points;
+    points.resize(5000);
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const Eigen::Vector3f p = random.vector({-60, -60, -3}, {60, 60, 6}).cast<float>();
+      points.x[k] = p.x();
+      points.y[k] = p.y();
+      points.z[k] = p.z();
+    }
+    Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+    T.rotate(Eigen::AngleAxisd(0.3 * i, random.vector({-1, -1, 1}, {1, 1, 2}).normalized()));
+    T.translation() = random.vector({-500, -500, -10}, {500, 500, 10});
+    map.insert(points, {}, T);
+  }
+  std::size_t lost = 0;
+  map.for_each([&](const Eigen::Vector3d& point) {
+    std::size_t found = 0;
+    map.for_each_in({point, point}, [&](const Eigen::Vector3d&) { ++found; });
+    if (found == 0) ++lost;
+  });
+  CHECK(map.size() > 90000);
+  CHECK(lost == 0);
+}
+
 TEST_CASE("a cleared map is empty and can be filled again") {
   StaticMapAccumulator map = make(0.25);
   CHECK(map.empty());

@@ -3,7 +3,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
+#include <stdexcept>
 #include <vector>
 
 namespace dynains::detail {
@@ -17,9 +19,10 @@ class ChunkedVector {
   T& operator[](std::uint32_t i) { return chunks_[i / kChunk][i % kChunk]; }
   const T& operator[](std::uint32_t i) const { return chunks_[i / kChunk][i % kChunk]; }
 
-  /// Returns the index of the new element.
+  /// Returns the index of the new element, at most 2^32 - 2. Throws std::length_error if there is
+  /// none left, and std::bad_alloc; then nothing has changed.
   std::uint32_t push_back(const T& value) {
-    if (size_ == chunks_.size() * kChunk) chunks_.emplace_back(new T[kChunk]);
+    if (size_ == chunks_.size() * kChunk) add_chunk();
     (*this)[size_] = value;
     return size_++;
   }
@@ -29,6 +32,12 @@ class ChunkedVector {
   }
 
  private:
+  void add_chunk() {
+    constexpr std::size_t kMostChunks = std::numeric_limits<std::uint32_t>::max() / kChunk;
+    if (chunks_.size() == kMostChunks) throw std::length_error("2^32 - 1 elements are too many");
+    chunks_.emplace_back(new T[kChunk]);
+  }
+
   std::vector<std::unique_ptr<T[]>> chunks_;
   std::uint32_t size_ = 0;
 };

@@ -23,9 +23,9 @@ namespace dynains::detail {
 /// count as ground until something else is known of them.
 class Ingest {
  public:
-  /// Points outside [min_range, max_range] (m, horizontal), higher or lower than max_range or
-  /// without finite coordinates stay out; a point at the origin is a beam that did not return.
-  /// What is taken in is turned by `R`, unless there is none.
+  /// Points outside [min_range, max_range] (m, in the sensor's x-y plane), higher or lower than
+  /// max_range or without finite coordinates stay out; a point at the origin is a beam that did not
+  /// return. What is taken in is turned by `R`, unless there is none.
   template <class Cloud>
   void read(const Cloud& cloud, float min_range, float max_range, const Eigen::Matrix3f* R,
             std::vector<PointLabel>& labels) {

@@ -51,7 +51,8 @@ class InstanceIds {
         taken_[old] = 1;
         ids[c] = old_ids[old];
       } else {
-        ids[c] = ++last_id_;
+        if (++last_id_ == kNoInstance) ++last_id_;  // all have been given out: begin again
+        ids[c] = last_id_;
       }
     }
   }

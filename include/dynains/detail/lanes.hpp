@@ -73,7 +73,6 @@ struct Int8 {
   friend Int8 operator&(Int8 a, Int8 b) { return {a.lo & b.lo, a.hi & b.hi}; }
   friend Int8 operator^(Int8 a, Int8 b) { return {a.lo ^ b.lo, a.hi ^ b.hi}; }
   friend Mask8 operator<(Int8 a, Int8 b) { return {a.lo < b.lo, a.hi < b.hi}; }
-  friend Mask8 operator>(Int8 a, Int8 b) { return {a.lo > b.lo, a.hi > b.hi}; }
   friend Mask8 operator==(Int8 a, Int8 b) { return {a.lo == b.lo, a.hi == b.hi}; }
 };
 

@@ -31,13 +31,15 @@ class LevelFrame {
     if (is_wanted_) R_headed_sensor = R_headed(estimate_heading(scan));
     PointBuffer turned;
     const PointsView points = turn(scan, R_headed_sensor.cast<float>(), turned);
-    sensor_ = estimate_sensor_model(points);
-    if (!sensor_.known()) return;
+    SensorModel sensor = estimate_sensor_model(points);
+    if (!sensor.known()) return;
     const Mounting mounting = estimate_mounting(points);
-    if (mounting.known) sensor_.height = mounting.height;
-    if (!is_wanted_) return;
-    sensor_.R_headed_sensor = R_headed_sensor;
-    sensor_.R_level_headed = level(mounting, R_headed_sensor);
+    if (mounting.known) sensor.height = mounting.height;
+    if (is_wanted_) {
+      sensor.R_headed_sensor = R_headed_sensor;
+      sensor.R_level_headed = level(mounting, R_headed_sensor);
+    }
+    sensor_ = sensor;
   }
 
   /// Whether scans are turned: by R_level_sensor() of the sensor.

@@ -102,6 +102,10 @@ struct IsRevisable : std::false_type {};
 template <class Map, class Evidence>
 struct IsRevisable<Map, Evidence,
                    std::void_t<decltype(std::declval<Map&>().erase_block(std::uint32_t{})),
+                               decltype(std::declval<const Map&>().block_count()),
+                               decltype(std::declval<const Map&>().block_corner(std::uint32_t{})),
+                               decltype(std::declval<const Map&>().visit_in_block(
+                                   std::uint32_t{}, std::declval<void (*)(float, float, float)>())),
                                decltype(std::declval<Evidence&>().see(
                                    std::declval<const PointBuffer&>(), std::size_t{},
                                    std::declval<const Eigen::Isometry3d&>()))>> : std::true_type {};
