@@ -227,7 +227,8 @@ std::string to_json(const Evaluation& evaluation) {
                      {"points", evaluation.points},
                      {"rows", rows},
                      {"errors", evaluation.errors ? to_json(*evaluation.errors) : Json()}};
-  return json.dump(2) + '\n';
+  // Names of files need not be UTF-8.
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 
 std::string to_csv(const Evaluation& evaluation) {

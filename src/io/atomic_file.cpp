@@ -25,6 +25,15 @@ fs::path follow_links(fs::path path) {
   return error ? path : resolved;
 }
 
+/// A rename is on the disk when its folder is. Where folders cannot be synced (EINVAL), or not be
+/// opened, the file is whole either way.
+void sync_folder(const fs::path& folder) {
+  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
+}
+
 }  // namespace
 
 /// std::filebuf hides why a write failed and cannot sync; this one knows its descriptor.
@@ -115,6 +124,7 @@ void AtomicFile::commit(Sync sync) {
   fs::rename(temporary_, target_, error);
   if (error) fail_by_system(target_, "cannot be put in place", error.value());
   committed_ = true;
+  if (sync == Sync::kNow) sync_folder(target_.parent_path());
 }
 
 void sync_files(const fs::path& folder) {

@@ -8,6 +8,7 @@
 #include <system_error>
 #include <utility>
 
+#include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "failure.hpp"
@@ -212,6 +213,34 @@ void Recording::read_viewpoints() {
   if (has_viewpoints_) trajectory_ = std::move(viewpoints);
 }
 
+/// The first of these files that is there, in the folder or beside the poses; empty if none is.
+fs::path Recording::find_beside(const fs::path& poses_file,
+                                const std::vector<const char*>& names) const {
+  std::vector<fs::path> folders = {folder_};
+  if (!poses_file.empty()) folders.push_back(poses_file.parent_path());
+  for (const fs::path& folder : folders) {
+    for (const char* name : names) {
+      if (is_file(folder / name)) return folder / name;
+    }
+  }
+  return {};
+}
+
+/// Needed for poses of a camera, and to try whether they are; other poses do without.
+void Recording::read_calibration(const fs::path& poses_file) {
+  const fs::path file = find_beside(poses_file, {"calib.txt"});
+  if (file.empty()) return;
+  const PoseFrame frame = options_.convention.frame;
+  const bool is_matrix = trajectory_.order == QuaternionOrder::kNone;
+  try {
+    Tr_ = read_kitti_calib(file);
+    has_calibration_ = true;
+  } catch (const IoError& error) {
+    if (frame == PoseFrame::kCamera || (frame == PoseFrame::kAuto && is_matrix)) throw;
+    notes_.push_back(std::string("not used: ") + error.what());
+  }
+}
+
 void Recording::read_poses() {
   if (options_.poses.empty() && format_ == ScanFormat::kPcd) read_viewpoints();
   fs::path file;
@@ -222,9 +251,7 @@ void Recording::read_poses() {
     trajectory_ = read_trajectory(file);
     notes_.push_back("poses from " + shown(file, folder_));
   }
-  const fs::path calib = folder_ / "calib.txt";
-  has_calibration_ = is_file(calib);
-  if (has_calibration_) Tr_ = read_kitti_calib(calib);
+  read_calibration(file);
   match_scans(file);
   place_scans(file);
 }
@@ -240,15 +267,20 @@ std::optional<std::vector<double>> Recording::times_of_names() const {
 }
 
 /// Times of the scan files, if anything but the poses tells.
-std::optional<std::vector<double>> Recording::find_times() const {
-  fs::path file = options_.times;
-  for (const char* name : {"times.txt", "timestamps.txt"}) {
-    if (file.empty() && is_file(folder_ / name)) file = folder_ / name;
-  }
+std::optional<std::vector<double>> Recording::find_times(const fs::path& poses_file) {
+  const fs::path file = options_.times.empty()
+                            ? find_beside(poses_file, {"times.txt", "timestamps.txt"})
+                            : options_.times;
   if (file.empty()) return times_of_names();
   std::vector<double> rows = read_kitti_times(file);
   for (double& time : rows) time = to_seconds(time);
   if (rows.size() == scans_.size()) return rows;
+  const bool is_ours = !options_.times.empty() || file.parent_path() == folder_;
+  if (!is_ours && (!numbered_ || rows.size() <= scans_.back().number)) {
+    notes_.push_back("not used: " + shown(file, folder_) + " has " + std::to_string(rows.size()) +
+                     " rows for " + std::to_string(scans_.size()) + " scans");
+    return times_of_names();
+  }
   if (!numbered_) {
     fail_at_line(file, std::min(rows.size(), scans_.size()) + 1,
                  "expected a row for each of " + std::to_string(scans_.size()) + " scans, found " +
@@ -291,7 +323,9 @@ void Recording::match_times(const fs::path& file, const std::vector<double>& tim
 }
 
 void Recording::match_scans(const fs::path& file) {
-  const std::optional<std::vector<double>> times = find_times();
+  // What lies beside poses from elsewhere may be of another recording.
+  const std::optional<std::vector<double>> times =
+      find_times(options_.poses.empty() ? file : fs::path());
   if (times) {
     for (std::size_t i = 0; i < scans_.size(); ++i) {
       scans_[i].time = (*times)[i];

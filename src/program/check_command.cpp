@@ -56,7 +56,7 @@ void print_remarks(const Diagnosis& d) {
 }
 
 void check(const RecordingFlags& flags) {
-  const Recording recording = flags.open();
+  const Recording recording(flags.folder(), flags.options());
   const Diagnosis d = diagnose(recording);
   print_line("scans", std::to_string(d.scan_files) + " files, " + std::to_string(d.pose_rows) +
                           " poses, " + std::to_string(d.scans) + " scans with a pose");

@@ -20,6 +20,18 @@ CleanWriter::CleanWriter(std::filesystem::path folder, const Recording& recordin
   create_folder(folder_);
 }
 
+std::string CleanWriter::name(const Recording& recording, std::size_t i) {
+  switch (recording.format()) {
+    case ScanFormat::kBin:
+      return recording.name(i) + ".bin";
+    case ScanFormat::kPcd:
+      return recording.name(i) + ".pcd";
+    case ScanFormat::kPly:
+      break;
+  }
+  return recording.name(i) + ".ply";
+}
+
 Eigen::Isometry3d CleanWriter::T_file_sensor(std::size_t i) const {
   return recording_.frame() == PointFrame::kWorld ? recording_.T_world_sensor(i)
                                                   : Eigen::Isometry3d::Identity();
@@ -41,9 +53,9 @@ void CleanWriter::write_bin(const std::filesystem::path& file, std::size_t i,
 
 void CleanWriter::write(std::size_t i, const RecordedScan& scan,
                         Span<const PointLabel> labels) const {
-  const std::filesystem::path file = folder_ / recording_.name(i);
+  const std::filesystem::path file = folder_ / name(recording_, i);
   if (recording_.format() == ScanFormat::kBin) {
-    write_bin(file.string() + ".bin", i, scan, labels);
+    write_bin(file, i, scan, labels);
     return;
   }
   const Eigen::Isometry3d T = T_file_sensor(i);
@@ -51,9 +63,8 @@ void CleanWriter::write(std::size_t i, const RecordedScan& scan,
   columns.label = false;
   columns.double_xyz = T.translation().cwiseAbs().maxCoeff() > kFloatCoordinateLimit;
   const bool has_pose = recording_.has_viewpoints() || recording_.frame() == PointFrame::kWorld;
-  PointFileWriter writer(
-      file.string() + (recording_.format() == ScanFormat::kPcd ? ".pcd" : ".ply"), columns,
-      has_pose ? recording_.T_world_sensor(i) : Eigen::Isometry3d::Identity());
+  PointFileWriter writer(file, columns,
+                         has_pose ? recording_.T_world_sensor(i) : Eigen::Isometry3d::Identity());
   for (std::size_t k = 0; k < labels.size(); ++k) {
     if (!is_kept(labels[k])) continue;
     FilePoint point = scan.point(k);

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <string>
 
 #include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
@@ -13,6 +14,9 @@ class CleanWriter {
  public:
   /// Creates the folder. The recording outlives this. Throws IoError.
   CleanWriter(std::filesystem::path folder, const Recording& recording);
+
+  /// Of the file of scan i.
+  static std::string name(const Recording& recording, std::size_t i);
 
   /// Writes scan i of the recording: all finite points that are not dynamic, in their order, with
   /// all their columns but labels, in the frame they had.

@@ -87,8 +87,6 @@ void add_config_command(CLI::App& app) {
     } else {
       print_config(*name);
     }
-    std::cout.flush();
-    if (!std::cout) throw IoError("standard output: cannot be written");
   });
 }
 

@@ -38,6 +38,8 @@ void eval(const EvalOptions& options) {
                       " runs can be evaluated at once, not " + std::to_string(options.runs.size()));
   }
 
+  TextFile json(options.json);
+  TextFile csv(options.csv);
   std::vector<RunLabels> runs;
   std::vector<std::string> names;
   for (const std::string& folder : options.runs) {
@@ -49,8 +51,11 @@ void eval(const EvalOptions& options) {
   std::vector<evaluation::MapEstimate> maps;
   for (const std::string& path : options.maps) map_files.push_back(read_points(path));
   for (std::size_t m = 0; m < map_files.size(); ++m) {
-    maps.push_back(
-        {std::filesystem::path(options.maps[m]).filename().string(), map_files[m].positions});
+    // Maps of several runs mostly have one name.
+    const std::string name = map_files.size() > 1
+                                 ? options.maps[m]
+                                 : std::filesystem::path(options.maps[m]).filename().string();
+    maps.push_back({name, map_files[m].positions});
   }
 
   LabelledSequence sequence(options.sequence.open(), options.window, runs);
@@ -59,10 +64,10 @@ void eval(const EvalOptions& options) {
   };
   const evaluation::Evaluation result = evaluation::evaluate(source, names, maps, config);
 
-  if (!options.json.empty()) write_text_file(options.json, evaluation::to_json(result));
-  if (!options.csv.empty()) write_text_file(options.csv, evaluation::to_csv(result));
   std::cout << evaluation::to_table(result);
   if (options.errors) std::cout << '\n' << evaluation::errors_to_table(result);
+  json.write(evaluation::to_json(result));
+  csv.write(evaluation::to_csv(result));
 }
 
 }  // namespace

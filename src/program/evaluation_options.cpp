@@ -1,10 +1,9 @@
 #include "evaluation_options.hpp"
 
 #include <algorithm>
+#include <tuple>
 #include <type_traits>
 #include <utility>
-
-#include "dynains/io/atomic_file.hpp"
 
 namespace dynains::program {
 
@@ -46,14 +45,29 @@ evaluation::EvaluationConfig EvaluationOptions::config() const {
 }
 
 void add_window_options(CLI::App& command, ScanWindow& window) {
-  command.add_option("--start", window.start, "number of the first scan");
-  command.add_option("--end", window.end, "number of the last scan (inclusive)");
+  // Taken as a number, -1 would be the largest one.
+  const CLI::Validator is_number(
+      [](const std::string& text) {
+        const bool is_digits = !text.empty() && text.size() <= 18 &&
+                               text.find_first_not_of("0123456789") == std::string::npos;
+        return is_digits ? std::string() : "expected the number of a scan, found " + text;
+      },
+      "UINT");
+  for (const auto& [name, value, help] :
+       {std::tuple("--start", &window.start, "number of the first scan"),
+        std::tuple("--end", &window.end, "number of the last scan (inclusive)")}) {
+    command.add_option(name, *value, help)->check(is_number)->type_name("");
+  }
 }
 
-void write_text_file(const std::string& path, const std::string& text) {
-  AtomicFile file(path);
-  file.stream() << text;
-  file.commit();
+TextFile::TextFile(const std::string& path) {
+  if (!path.empty()) file_.emplace(path);
+}
+
+void TextFile::write(const std::string& text) {
+  if (!file_) return;
+  file_->stream() << text;
+  file_->commit();
 }
 
 }  // namespace dynains::program

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "dynains/evaluation/evaluate.hpp"
+#include "dynains/io/atomic_file.hpp"
 #include "labelled_sequence.hpp"
 
 namespace dynains::program {
@@ -30,7 +31,17 @@ class EvaluationOptions {
 /// `--start` and `--end`.
 void add_window_options(CLI::App& command, ScanWindow& window);
 
-/// Writes text to a file, whole or not at all. Throws IoError.
-void write_text_file(const std::string& path, const std::string& text);
+/// A file for text that takes long to find out: whether it can be written is known before.
+class TextFile {
+ public:
+  /// Opens it unless `path` is empty: then there is none. Throws IoError.
+  explicit TextFile(const std::string& path);
+
+  /// Puts the file in place, whole or not at all. Throws IoError.
+  void write(const std::string& text);
+
+ private:
+  std::optional<AtomicFile> file_;
+};
 
 }  // namespace dynains::program

@@ -10,6 +10,7 @@
 #include "experiment.hpp"
 #include "figure.hpp"
 #include "labelled_sequence.hpp"
+#include "output_folder.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "remover_options.hpp"
@@ -39,6 +40,9 @@ struct FiguresOptions {
 };
 
 VerdictCloud collect(const FiguresOptions& options) {
+  if (!options.run.empty() && options.remover.given()) {
+    throw ConfigError("--run draws what a run found: flags of the remover change nothing there");
+  }
   const evaluation::EvaluationConfig config = options.evaluation.config();
   const double max_range = config.point_max_range > 0 ? config.point_max_range : 1e6;
   VerdictCloud cloud(options.resolution, config.min_range, max_range, config.truth);
@@ -78,11 +82,9 @@ void write_ply(const VerdictCloud& cloud, Content content, const fs::path& path)
 }
 
 void figures(const FiguresOptions& options) {
-  const VerdictCloud cloud = collect(options);
   const fs::path folder = options.out;
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw IoError(folder.string() + ": cannot be created: " + error.message());
+  create_folder(folder);
+  const VerdictCloud cloud = collect(options);
   for (const Content content : {Content::kRaw, Content::kVerdict}) {
     const std::string name = content == Content::kRaw ? "raw" : "cleaned";
     draw_from_above(cloud, content, options.pixels).write_png(folder / (name + "_above.png"));

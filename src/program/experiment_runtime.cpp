@@ -13,9 +13,9 @@
 #include "dynains/io/recording.hpp"
 #include "evaluation_options.hpp"
 #include "experiment.hpp"
-#include "points_of.hpp"
 #include "recording_options.hpp"
 #include "remover_options.hpp"
+#include "run_sequence.hpp"
 
 namespace dynains::program {
 namespace {
@@ -66,8 +66,7 @@ std::vector<Component> measure(const RuntimeOptions& options) {
     for (std::size_t i = 0; i < sequence.size(); ++i) {
       sequence.read_scan(i, scan);
       const auto begin = std::chrono::steady_clock::now();
-      const FrameResult frame =
-          remover.push(points_of(scan), sequence.T_world_sensor(i), sequence.time(i));
+      const FrameResult frame = push_scan(remover, sequence, i, scan);
       const std::chrono::duration<double, std::milli> total =
           std::chrono::steady_clock::now() - begin;
       std::size_t next = 0;
@@ -81,6 +80,7 @@ std::vector<Component> measure(const RuntimeOptions& options) {
 }
 
 void runtime(const RuntimeOptions& options) {
+  TextFile csv_file(options.csv);
   const std::vector<Component> components = measure(options);
   evaluation::TextTable table({"component", "mean ms", "median", "p95", "p99", "max"});
   std::ostringstream csv;
@@ -98,12 +98,12 @@ void runtime(const RuntimeOptions& options) {
     csv << '\n';
     table.add(row);
   }
-  if (!options.csv.empty()) write_text_file(options.csv, csv.str());
   const Component& points = components.back();
   std::cout << points.times.size() << " frames (" << options.repeat << " times "
             << points.times.size() / options.repeat << "), " << format_number(points.mean(), 0)
             << " points on average, preset " << options.remover.preset_name() << '\n'
             << table.to_string();
+  csv_file.write(csv.str());
 }
 
 }  // namespace

@@ -74,6 +74,8 @@ void sweep(const SweepOptions& options) {
     variant.config.validate();
     variants.push_back(variant);
   }
+  TextFile csv_file(options.csv);
+  TextFile svg_file(options.svg);
   const std::vector<EvaluationRow> rows = measure(options, variants);
 
   evaluation::TextTable table({name, "PR %", "RR %", "F1", "SA %", "DA %", "HA %"});
@@ -97,9 +99,9 @@ void sweep(const SweepOptions& options) {
     csv << '\n';
     chart.add(row.name, {pr, rr, 100 * f1});
   }
-  if (!options.csv.empty()) write_text_file(options.csv, csv.str());
-  if (!options.svg.empty()) write_text_file(options.svg, chart.to_svg());
   std::cout << table.to_string();
+  csv_file.write(csv.str());
+  svg_file.write(chart.to_svg());
 }
 
 }  // namespace

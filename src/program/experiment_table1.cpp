@@ -46,15 +46,9 @@ struct Task {
   ScanWindow window;
 };
 
-/// The sequence itself, or the published windows of whatever sequences lie below `root`.
+/// The published windows of whatever sequences of SemanticKITTI lie below `root`; if there are
+/// none, `root` is the sequence.
 std::vector<Task> find_tasks(const fs::path& root, const ScanWindow& window) {
-  const bool is_sequence = fs::exists(root / "velodyne") || fs::exists(root / "labels") ||
-                           fs::exists(root / "pcd") || fs::exists(root / "ply");
-  if (is_sequence) {
-    const fs::path clean = fs::absolute(root).lexically_normal();
-    const fs::path name = clean.has_filename() ? clean.filename() : clean.parent_path().filename();
-    return {{name.string(), root, window}};
-  }
   std::vector<Task> tasks;
   for (const PublishedWindow& published : kPublishedWindows) {
     for (const fs::path& below : {root / "sequences", root / "dataset" / "sequences", root}) {
@@ -64,13 +58,10 @@ std::vector<Task> find_tasks(const fs::path& root, const ScanWindow& window) {
       break;
     }
   }
-  if (tasks.empty()) {
-    throw IoError(root.string() +
-                  ": neither a sequence (no velodyne/, pcd/, ply/ or labels/) nor SemanticKITTI "
-                  "(no sequences/00, 01, 02, "
-                  "05 or 07 with velodyne/)");
-  }
-  return tasks;
+  if (!tasks.empty()) return tasks;
+  const fs::path clean = fs::absolute(root).lexically_normal();
+  const fs::path name = clean.has_filename() ? clean.filename() : clean.parent_path().filename();
+  return {{name.string(), root, window}};
 }
 
 std::vector<Variant> table1_variants() {
@@ -88,6 +79,8 @@ void table1(const Table1Options& options) {
     throw ConfigError("--poses and --times need one sequence, not " + std::to_string(tasks.size()));
   }
   const std::vector<Variant> variants = table1_variants();
+  TextFile json_file(options.json);
+  TextFile csv_file(options.csv);
 
   evaluation::TextTable table({"Seq.", "Method", "PR [%]", "RR [%]", "F1 score"}, 2);
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
@@ -101,7 +94,7 @@ void table1(const Table1Options& options) {
   };
 
   for (const Task& task : tasks) {
-    LabelledSequence sequence(Recording(task.folder, options.root.options()), task.window);
+    LabelledSequence sequence(options.root.open(task.folder), task.window);
     Progress progress(sequence.size(), "scans of " + task.name, options.quiet);
     const evaluation::Evaluation result =
         evaluate_variants(sequence, variants, Answer::kFinal, config,
@@ -118,9 +111,10 @@ void table1(const Table1Options& options) {
                     {"evaluation", nlohmann::ordered_json::parse(evaluation::to_json(result))}});
   }
 
-  if (!options.json.empty()) write_text_file(options.json, json.dump(2) + '\n');
-  if (!options.csv.empty()) write_text_file(options.csv, csv.str());
   std::cout << table.to_string();
+  json_file.write(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+                  '\n');
+  csv_file.write(csv.str());
 }
 
 }  // namespace

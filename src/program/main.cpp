@@ -1,3 +1,6 @@
+#include <poll.h>
+#include <unistd.h>
+
 #include <csignal>
 #include <exception>
 #include <iostream>
@@ -11,6 +14,13 @@
 namespace {
 
 using namespace dynains::program;
+
+// Whether standard output is a pipe that nobody reads any more, as behind `head`: that is no
+// failure.
+bool reader_has_left() {
+  pollfd output{STDOUT_FILENO, POLLOUT, 0};
+  return ::poll(&output, 1, 0) > 0 && (output.revents & POLLERR) != 0;
+}
 
 int fail(int code, const char* what) {
   std::cerr << "dynains: error: " << what << '\n';
@@ -37,6 +47,9 @@ int main(int argc, char** argv) {
 
   try {
     app.parse(argc, argv);
+    if (!std::cout.flush() && !reader_has_left()) {
+      throw dynains::IoError("standard output: cannot be written");
+    }
     if (app.get_subcommands().empty()) {
       return fail(kExitUsage, "expected a command, for example run (see dynains --help)");
     }

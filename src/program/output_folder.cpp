@@ -56,6 +56,11 @@ void remove_files(const fs::path& folder, const std::vector<std::string>& extens
 
 }  // namespace
 
+fs::path whole_path(const fs::path& path) {
+  const fs::path whole = fs::weakly_canonical(fs::absolute(path)).lexically_normal();
+  return whole.has_filename() ? whole : whole.parent_path();
+}
+
 void create_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
@@ -85,6 +90,13 @@ void mark_output_folder(const fs::path& folder, const OutputFiles& ours,
   std::error_code error;
   for (const std::string& name : ours.folders) {
     if (fs::is_directory(folder / name, error)) remove_leftovers(folder / name);
+  }
+}
+
+void remove_leftovers_of(const fs::path& file) {
+  for (const fs::path& entry : list(whole_path(file).parent_path())) {
+    const bool is_of_file = entry.stem().stem() == "." + file.filename().string();
+    if (is_of_file && is_leftover(entry)) remove_file(entry);
   }
 }
 

@@ -7,6 +7,10 @@
 
 namespace dynains::program {
 
+/// Absolute, links followed as far as there are any, and nothing behind the last name: two paths
+/// are of one place if these are equal, whether it is there yet or not.
+std::filesystem::path whole_path(const std::filesystem::path& path);
+
 /// Creates a folder and those above it. Throws IoError.
 void create_folder(const std::filesystem::path& folder);
 
@@ -25,6 +29,9 @@ void check_output_folder(const std::filesystem::path& folder, const OutputFiles&
 /// Replaces the marker, and removes what a killed run left half-written. Throws IoError.
 void mark_output_folder(const std::filesystem::path& folder, const OutputFiles& ours,
                         const std::string& marker_text);
+
+/// Removes what a killed run left half-written of one file. Throws IoError.
+void remove_leftovers_of(const std::filesystem::path& file);
 
 /// Removes earlier results, and nothing else. `marker_text` replaces the marker first, so that a
 /// folder never claims what it does not hold. Throws IoError.

@@ -80,6 +80,8 @@ class ParameterValues {
     values_[name] = {text, where};
   }
 
+  bool empty() const { return values_.empty(); }
+
   /// Assigns all values to the parameters of `config`. Throws ConfigError, for unknown names too.
   template <class Config>
   void apply(Config& config) const {

@@ -1,5 +1,7 @@
 #include "recording_options.hpp"
 
+#include <iostream>
+
 namespace dynains::program {
 
 RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what) {
@@ -72,6 +74,16 @@ RecordingOptions RecordingFlags::options() const {
   if (pose_frame_ == "lidar") convention.frame = PoseFrame::kLidar;
   if (pose_frame_ == "camera") convention.frame = PoseFrame::kCamera;
   return options;
+}
+
+Recording RecordingFlags::open(const std::filesystem::path& folder) const {
+  Recording recording(folder, options());
+  if (recording.missing_pose_count() > 0) {
+    std::cerr << "dynains: warning: " << recording.missing_pose_count() << " of "
+              << recording.scan_file_count() << " scans have no pose and are left out; see: dynains"
+              << " check " << folder.string() << std::endl;
+  }
+  return recording;
 }
 
 }  // namespace dynains::program

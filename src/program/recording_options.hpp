@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <string>
 
 #include "dynains/io/recording.hpp"
@@ -18,8 +19,10 @@ class RecordingFlags {
   RecordingOptions options() const;
   /// Whether a file is named that belongs to one recording only.
   bool names_files() const { return !poses_.empty() || !times_.empty(); }
-  /// Throws IoError.
-  Recording open() const { return Recording(folder_, options()); }
+  /// Throws IoError. Warns of scans that are left out for want of a pose.
+  Recording open() const { return open(folder_); }
+  /// The same flags for another folder.
+  Recording open(const std::filesystem::path& folder) const;
 
  private:
   std::string folder_;

@@ -17,9 +17,11 @@
 #include "dynains/io/diagnosis.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
+#include "dynains/pose.hpp"
 #include "evaluation_options.hpp"
 #include "interrupt.hpp"
 #include "map_on_disk.hpp"
+#include "naming_scan.hpp"
 #include "output_folder.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
@@ -76,9 +78,12 @@ ScanRange select_scans(const Recording& sequence, const ScanWindow& window) {
   return range;
 }
 
-/// So that a broken file is noticed before anything is written.
+/// So that a broken file or pose is noticed before anything is written.
 void check_scans(const Recording& sequence, const ScanRange& range) {
-  for (std::size_t i = range.first; i <= range.last; ++i) sequence.check_scan(i);
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    sequence.check_scan(i);
+    naming_scan(sequence, i, [&] { validate_pose("T_world_sensor", sequence.T_world_sensor(i)); });
+  }
 }
 
 /// What an earlier run may have left in `folder`.
@@ -107,39 +112,54 @@ RunOutputs make_outputs(const RunOptions& options, const Config& config) {
     throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
   }
   outputs.map = options.map;
-  if (fs::weakly_canonical(outputs.map) ==
-      fs::weakly_canonical(outputs.folder / "dynamic_points.ply")) {
+  if (whole_path(outputs.map) == whole_path(outputs.folder / "dynamic_points.ply")) {
     throw ConfigError("--map " + options.map + ": the moving points go there");
   }
   return outputs;
 }
 
-/// The map's name for the report, so that the folder of results can be moved.
-std::string name_of_map(const RunOutputs& outputs) {
-  if (outputs.map.empty()) return {};
-  const fs::path map = fs::weakly_canonical(outputs.map);
-  return map.parent_path() == fs::weakly_canonical(outputs.folder) ? map.filename().string()
-                                                                   : map.string();
+/// Whether every file of a complete run is still there.
+bool is_whole(const RunOutputs& outputs, const Recording& sequence, const ScanRange& range) {
+  if (!outputs.map.empty() && !fs::exists(outputs.map)) return false;
+  for (const char* name : {"dynamic_points.ply", "timing.csv"}) {
+    if (!fs::exists(outputs.folder / name)) return false;
+  }
+  const auto has = [&](const char* folder, const std::string& file) {
+    return fs::exists(outputs.folder / folder / file);
+  };
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    const std::string& name = sequence.name(i);
+    if (!has("labels", name + ".label") || !has("causes", name + ".cause")) return false;
+    if (outputs.write_online && !has("online", name + ".label")) return false;
+    if (outputs.write_clean && !has("clean", CleanWriter::name(sequence, i))) return false;
+  }
+  return true;
 }
 
-/// Clears the way for new results, once nothing but the disk can go wrong any more. False if all of
-/// them are there already.
-bool prepare(const RunOutputs& outputs, const RunOptions& options,
-             const nlohmann::ordered_json& request) {
-  create_folder(outputs.folder);
-  const OutputFiles files = files_of_a_run(outputs.folder);
-  const EarlierRun earlier =
-      options.resume ? find_earlier_run(outputs.folder, request) : EarlierRun::kNone;
-  if (earlier == EarlierRun::kComplete) return false;
-  const bool resume = earlier == EarlierRun::kUnfinished;
-  check_output_folder(outputs.folder, files, options.force || resume);
+/// Refuses whatever must not be replaced. Throws IoError.
+void check_outputs(const RunOutputs& outputs, const Recording& sequence, bool replace) {
+  check_output_folder(outputs.folder, files_of_a_run(outputs.folder), replace);
+  if (outputs.map.empty()) return;
+  const fs::path map = whole_path(outputs.map);
+  if (map.parent_path() == whole_path(sequence.scan_folder())) {
+    throw IoError(outputs.map.string() + ": the scans are there; choose another folder for --map");
+  }
+  if (fs::exists(map) && !replace) {
+    throw IoError(outputs.map.string() + ": exists; choose another name for --map, or replace it " +
+                  "by --force");
+  }
   // A map that cannot be written would otherwise be noticed when the old results are gone.
-  if (!outputs.map.empty()) PointFileWriter attempt(outputs.map);
-  nlohmann::ordered_json marker = unfinished_report(name_of_map(outputs));
+  PointFileWriter attempt(outputs.map);
+}
+
+/// Clears the way for new results, once nothing but the points and the disk can go wrong any more.
+void prepare(const RunOutputs& outputs, bool resume, const nlohmann::ordered_json& request) {
+  nlohmann::ordered_json marker = unfinished_report(outputs.map_name());
   marker["request"] = request;
+  if (!outputs.map.empty()) remove_leftovers_of(outputs.map);
   // Files of the same run are replaced one by one: never is less there than before.
-  (resume ? mark_output_folder : clear_output_folder)(outputs.folder, files, to_text(marker));
-  return true;
+  (resume ? mark_output_folder : clear_output_folder)(
+      outputs.folder, files_of_a_run(outputs.folder), to_text(marker));
 }
 
 void print_summary(const RunResults& results, const RunTiming& timing, const RunOutputs& outputs) {
@@ -189,12 +209,18 @@ void run(const RunOptions& options) {
   const ScanRange range = select_scans(sequence, options.window);
   check_scans(sequence, range);
   const nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);
-  if (!prepare(outputs, options, request)) {
+  create_folder(outputs.folder);
+  const EarlierRun earlier =
+      options.resume ? find_earlier_run(outputs.folder, request) : EarlierRun::kNone;
+  if (earlier == EarlierRun::kComplete && is_whole(outputs, sequence, range)) {
     if (!options.quiet) std::cout << outputs.folder.string() << ": complete already" << std::endl;
     return;
   }
+  const bool resume = earlier != EarlierRun::kNone;
+  check_outputs(outputs, sequence, options.force || resume);
   const PoseAgreement agreement = pose_agreement(sequence, range.first, range.last);
   if (agreement.doubtful()) warn_of_poses(options.sequence.folder(), agreement.as_given);
+  prepare(outputs, resume, request);
 
   RunResults results(sequence, range, outputs);
   const InterruptGuard interrupt;
@@ -223,10 +249,11 @@ void run(const RunOptions& options) {
   description.sequence = options.sequence.folder();
   description.first_scan = sequence.name(range.first);
   description.last_scan = sequence.name(range.first + results.finished() - 1);
+  description.missing_poses = sequence.missing_pose_count();
   description.agreement = agreement.as_given;
   description.preset = options.remover.preset_name();
   description.complete = results.finished() == range.size();
-  description.map = name_of_map(outputs);
+  description.map = outputs.map_name();
   description.configuration = configuration;
   write_timing(outputs.folder / "timing.csv", timing);
   // The report must not claim what a power cut could still take.
@@ -250,8 +277,8 @@ void add_run_command(CLI::App& app) {
       ->type_name("FOLDER");
   CLI::Option* const force = command.add_flag(
       "--force", options->force,
-      "replace the results of an earlier run in --out; they are removed first, so that "
-      "old and new files never mix. A folder that holds anything else is refused");
+      "replace the results of an earlier run in --out, and the file of --map; results are removed "
+      "first, so that old and new files never mix. A folder that holds anything else is refused");
   command
       .add_flag("--resume", options->resume,
                 "complete a run with the same flags that was interrupted or killed, if --out holds "

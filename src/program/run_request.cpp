@@ -46,7 +46,8 @@ nlohmann::ordered_json describe_request(const Recording& recording, const ScanRa
           {"first_scan", recording.name(range.first)},
           {"last_scan", recording.name(range.last)},
           {"poses_and_times", fingerprint(recording, range)},
-          {"map", outputs.map.filename().string()},
+          {"points_in_world", recording.frame() == PointFrame::kWorld},
+          {"map", outputs.map_name()},
           {"write_online", outputs.write_online},
           {"write_clean", outputs.write_clean},
           {"configuration", configuration}};

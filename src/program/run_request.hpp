@@ -10,8 +10,8 @@
 
 namespace dynains::program {
 
-/// Version, configuration, kinds of output, and a fingerprint of names, poses and times of the
-/// scans; their points are not read.
+/// Version, configuration, outputs, the frame of the points, and a fingerprint of names, poses and
+/// times of the scans; their points are not read.
 nlohmann::ordered_json describe_request(const Recording& recording, const ScanRange& range,
                                         const RunOutputs& outputs,
                                         const nlohmann::ordered_json& configuration);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "output_folder.hpp"
+
 namespace dynains::program {
 namespace {
 
@@ -30,6 +32,13 @@ PointColumns dynamic_columns(bool far, PointColumns columns) {
 }
 
 }  // namespace
+
+std::string RunOutputs::map_name() const {
+  if (map.empty()) return {};
+  const std::filesystem::path whole = whole_path(map);
+  const bool is_inside = whole.parent_path() == whole_path(folder);
+  return (is_inside ? whole.filename() : whole).string();
+}
 
 RunResults::RunResults(const Recording& recording, const ScanRange& range,
                        const RunOutputs& outputs)

@@ -33,6 +33,10 @@ struct RunOutputs {
   std::filesystem::path map;  ///< empty: no map
   bool write_online = false;
   bool write_clean = false;
+
+  /// The map relative to the folder if it lies there, so that the folder can be moved; else
+  /// absolute. Empty if there is none.
+  std::string map_name() const;
 };
 
 /// Counts of points by final label.

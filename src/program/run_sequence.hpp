@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/scan_verdict.hpp"
 #include "dynains/stage_times.hpp"
+#include "naming_scan.hpp"
 #include "points_of.hpp"
 #include "read_ahead.hpp"
 #include "run_results.hpp"
@@ -21,11 +21,9 @@ namespace dynains::program {
 template <class Remover>
 FrameResult push_scan(Remover& remover, const Recording& recording, std::size_t i,
                       const RecordedScan& scan) {
-  try {
+  return naming_scan(recording, i, [&] {
     return remover.push(points_of(scan), recording.T_world_sensor(i), recording.time(i));
-  } catch (const PoseError& error) {
-    throw PoseError("scan " + recording.name(i) + ": " + error.what());
-  }
+  });
 }
 
 /// Pushes the scans of `range` and hands every verdict to `results`; at the end the open ones and

@@ -87,6 +87,67 @@ TEST_CASE("eval judges a run beside identity and oracle") {
   CHECK(has(window, "2 scans, "));
 }
 
+TEST_CASE("eval --online judges the verdicts without latency, and only these") {
+  const TemporaryFolder folder;
+  const fs::path sequence = folder.path() / "street";
+  const auto scans = write_street(sequence, 3);
+  const fs::path run = folder.path() / "run";
+  write_run(run, scans, 0);
+  const std::string json_path = (folder.path() / "eval.json").string();
+  const auto accuracy = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"eval", sequence.string(), run.string(), "--json",
+                                          json_path};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    call(arguments);
+    return nlohmann::json::parse(read_text(json_path))["rows"][2]["points"]["da"].get<double>();
+  };
+  CHECK(!message_of({"eval", sequence.string(), run.string(), "--online"}).empty());
+  write_run(run, scans, 120, "online");  // of 480 points
+  CHECK(accuracy({}) == 100.0);
+  CHECK(accuracy({"--online"}) == 75.0);
+}
+
+TEST_CASE("Maps of several runs are told apart by their paths") {
+  const TemporaryFolder folder;
+  const fs::path sequence = folder.path() / "street";
+  write_street(sequence, 2);
+  std::vector<std::string> maps;
+  for (const char* run : {"a", "b"}) {
+    fs::create_directories(folder.path() / run);
+    maps.push_back((folder.path() / run / "static_map.ply").string());
+    PointFileWriter(maps.back()).commit();
+  }
+  const std::string one = call({"eval", sequence.string(), "--map", maps[0]});
+  CHECK(has(one, "static_map.ply"));
+  CHECK(!has(one, maps[0]));
+  const std::string two = call({"eval", sequence.string(), "--map", maps[0], "--map", maps[1]});
+  CHECK(has(two, maps[0]));
+  CHECK(has(two, maps[1]));
+}
+
+TEST_CASE("A file that cannot be written is noticed before the work") {
+  const TemporaryFolder folder;
+  const fs::path sequence = folder.path() / "street";
+  write_street(sequence, 2);
+  // Noticed after it, the missing run would be the complaint.
+  const std::string file = (folder.path() / "nowhere" / "file").string();
+  const std::string broken = (folder.path() / "no run").string();
+  for (const char* flag : {"--json", "--csv"}) {
+    CHECK(has(message_of({"eval", sequence.string(), broken, flag, file}), file));
+  }
+  fs::remove(sequence / "labels" / "000001.label");
+  for (const char* flag : {"--csv", "--svg"}) {
+    CHECK(has(message_of({"experiment", "sweep", sequence.string(), "--quiet", flag, file}), file));
+  }
+  for (const char* flag : {"--csv", "--json"}) {
+    CHECK(
+        has(message_of({"experiment", "table1", sequence.string(), "--quiet", flag, file}), file));
+  }
+  CHECK(has(message_of({"experiment", "figures", sequence.string(), "--quiet", "--out",
+                        (sequence / "poses.txt" / "out").string()}),
+            "cannot be created"));
+}
+
 TEST_CASE("eval judges map files of either format") {
   const TemporaryFolder folder;
   const fs::path sequence = folder.path() / "street";
@@ -207,6 +268,22 @@ TEST_CASE("Variants judge every point once, each by its own configuration") {
       }
     }
   }
+  // The newest verdicts, as a remover gives them.
+  const VariantVerdicts newest = run_variants(sequence, {variants[0]}, Answer::kNewest, nullptr);
+  DynaInsRemover remover(variants[0].config);
+  bool differs = false;
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    const evaluation::LabelledScan scan = scans[i].view();
+    const FrameResult frame = remover.push(RawPoints<float>{scan.xyz, scan.size(), scan.stride},
+                                           scan.T_world_sensor, scan.time);
+    REQUIRE(newest.in_map[i].size() == scan.size());
+    for (std::size_t p = 0; p < scan.size(); ++p) {
+      REQUIRE((newest.in_map[i][p] != 0) == is_static(frame.newest.labels[p]));
+    }
+    differs = differs || newest.in_map[i] != both.in_map[i];
+  }
+  CHECK(differs);
+
   const evaluation::Evaluation result =
       evaluate_variants(sequence, variants, Answer::kFinal, {}, nullptr);
   REQUIRE(result.rows.size() == 4);
@@ -231,6 +308,10 @@ TEST_CASE("The experiments run on any labelled sequence") {
     CHECK(nlohmann::json::parse(read_text(json_path))[0]["sequence"] == "street");
     CHECK(has(read_text(csv_path), "street,\"oracle\",100.000000,100.000000,1.000000,measured"));
   }
+  SECTION("table1 takes every layout that is a recording") {
+    fs::rename(fs::path(street) / "velodyne", fs::path(street) / "scans");
+    CHECK(has(call({"experiment", "table1", street, "--quiet"}), "dynains, default preset"));
+  }
   SECTION("table1 takes poses as run does") {
     const fs::path poses = folder.path() / "elsewhere.txt";
     const std::string expected = call({"experiment", "table1", street, "--quiet"});
@@ -254,7 +335,8 @@ TEST_CASE("The experiments run on any labelled sequence") {
     CHECK(has(text, "paper, full (published)"));
     CHECK(has(text, "0.989"));
     CHECK(has(text, "dynains, default preset"));
-    CHECK(has(message_of({"experiment", "table1", folder.path().string()}), "neither a sequence"));
+    CHECK(has(message_of({"experiment", "table1", folder.path().string()}),
+              "has no scans; expected a KITTI folder"));
     // One file of poses cannot be that of two sequences.
     fs::create_directories(folder.path() / "kitti" / "sequences" / "07" / "velodyne");
     CHECK(has(message_of({"experiment", "table1", (folder.path() / "kitti").string(), "--poses",
@@ -269,6 +351,17 @@ TEST_CASE("The experiments run on any labelled sequence") {
     const std::string csv = read_text(csv_path);
     CHECK(std::count(csv.begin(), csv.end(), '\n') == 8);
     CHECK(csv.rfind("tau-s,pr,rr,f1,sa,da,ha\n0,", 0) == 0);
+    // Nothing is below a similarity of 0, nearly everything that changes below 1.
+    const auto scores = [&](const std::string& value) {
+      const std::size_t begin = csv.find('\n' + value + ',') + 1 + value.size();
+      return csv.substr(begin, csv.find('\n', begin) - begin);
+    };
+    CHECK(has(scores("0"), ",100.000000,0.000000,0.000000,"));
+    CHECK(scores("0.6") != scores("0"));
+    const std::string online = (folder.path() / "online.csv").string();
+    call(
+        {"experiment", "sweep", street, "--quiet", "--values", "0.6", "--csv", online, "--online"});
+    CHECK(!has(read_text(online), scores("0.6")));
     CHECK(has(read_text(svg_path), "</svg>"));
     CHECK(has(message_of({"experiment", "sweep", street, "--values", "2"}), "tau-s = 2"));
     CHECK(has(message_of({"experiment", "sweep", street, "--parameter", "tau-x"}), "tau-x"));
@@ -288,6 +381,17 @@ TEST_CASE("The experiments run on any labelled sequence") {
     }
     CHECK(read_points(out / "raw.ply").positions.size() ==
           read_points(out / "cleaned.ply").positions.size());
+    // Of an earlier run, whose labels decide: flags of the remover would change nothing.
+    const fs::path run = folder.path() / "run";
+    write_run(run, write_street(street, 6), 240);  // half of what moves is missed
+    const std::vector<std::string> of_run = {
+        "experiment", "figures",  street, "--out", (folder.path() / "of run").string(),
+        "--quiet",    "--pixels", "200",  "--run", run.string()};
+    call(of_run);
+    CHECK(read_text(folder.path() / "of run" / "cleaned.ply") != read_text(out / "cleaned.ply"));
+    std::vector<std::string> with_flag = of_run;
+    with_flag.insert(with_flag.end(), {"--tau-s", "0.5"});
+    CHECK(has(message_of(with_flag), "flags of the remover change nothing"));
   }
 }
 

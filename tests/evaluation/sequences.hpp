@@ -75,10 +75,11 @@ inline std::vector<OwnedScan> write_street(const std::filesystem::path& folder, 
   return result;
 }
 
-/// Labels of a run that is right but for the first `missed` moving points of each scan.
+/// Labels of a run that is right but for the first `missed` moving points of each scan; final ones,
+/// or the verdicts without latency ("online").
 inline void write_run(const std::filesystem::path& out, const std::vector<OwnedScan>& scans,
-                      std::size_t missed) {
-  std::filesystem::create_directories(out / "labels");
+                      std::size_t missed, const std::string& kind = "labels") {
+  std::filesystem::create_directories(out / kind);
   for (std::size_t number = 0; number < scans.size(); ++number) {
     std::vector<std::uint32_t> labels;
     std::size_t moving = 0;
@@ -86,7 +87,7 @@ inline void write_run(const std::filesystem::path& out, const std::vector<OwnedS
       const bool found = semantic_class(truth) == kMovingCar && moving++ >= missed;
       labels.push_back(found ? 251 : 9);
     }
-    write_labels(out / "labels" / (scan_name(number) + ".label"), labels);
+    write_labels(out / kind / (scan_name(number) + ".label"), labels);
   }
 }
 

@@ -160,6 +160,66 @@ TEST_CASE("A KITTI folder is the same as a KittiSequence") {
   }
 }
 
+TEST_CASE("calib.txt and times.txt lie with the poses, or in the folder") {
+  const TemporaryFolder folder;
+  const fs::path scans = folder / "velodyne";
+  for (const char* name : {"000000", "000001"}) {
+    write_text(scans / (std::string(name) + ".bin"), std::string(32, 'a'));
+  }
+  write_text(folder / "calib.txt", "Tr: 0 -1 0 0.1 0 0 -1 -0.5 1 0 0 0\n");
+  write_text(folder / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 2\n");
+  write_text(folder / "times.txt", "0\n0.25\n");
+  const Recording whole(folder.path());
+  // A camera that moves along its z axis is a sensor that moves along its x axis.
+  REQUIRE(whole.T_world_sensor(1).translation().isApprox(Eigen::Vector3d(2, 0, 0), 1e-12));
+
+  const Recording inner(scans);
+  CHECK(inner.has_calibration());
+  CHECK(inner.time(1) == 0.25);
+  CHECK(inner.T_world_sensor(1).isApprox(whole.T_world_sensor(1), 1e-15));
+
+  // Times beside the poses that fit other scans are not ours.
+  write_text(folder / "times.txt", "0\n");
+  const Recording without(scans);
+  CHECK(without.time(1) == 0.1);
+  bool told = false;
+  for (const std::string& note : without.notes()) {
+    told =
+        told || note == "not used: " + (folder / "times.txt").string() + " has 1 rows for 2 scans";
+  }
+  CHECK(told);
+  CHECK_THAT(error_of(folder.path()), ContainsSubstring("times.txt"));
+
+  // Poses from elsewhere bring their calibration; times may be those of other scans.
+  const fs::path copy = folder / "elsewhere/scans";
+  fs::create_directories(copy);
+  for (const auto& file : fs::directory_iterator(scans)) fs::copy(file, copy);
+  RecordingOptions options;
+  options.poses = folder / "poses.txt";
+  const Recording other(copy, options);
+  CHECK(other.T_world_sensor(1).isApprox(whole.T_world_sensor(1), 1e-15));
+  CHECK(other.time(1) == 0.1);
+}
+
+TEST_CASE("A calib.txt that cannot be read stops poses of a camera only") {
+  const TemporaryFolder folder;
+  write_text(folder / "velodyne/000000.bin", std::string(32, 'a'));
+  write_text(folder / "calib.txt", "of another kind\n");
+  write_text(folder / "poses.txt", tum(1, 7));
+  const Recording recording(folder.path());
+  CHECK_FALSE(recording.has_calibration());
+  CHECK(recording.T_world_sensor(0).translation().x() == 7.0);
+  CHECK_THAT(recording.notes()[1], StartsWith("not used: ") && ContainsSubstring("calib.txt"));
+
+  RecordingOptions options;
+  options.convention.frame = PoseFrame::kCamera;
+  CHECK_THAT(error_of(folder.path(), options), ContainsSubstring("calib.txt"));
+  write_text(folder / "poses.txt", "1 0 0 7 0 1 0 0 0 0 1 0\n");
+  CHECK_THAT(error_of(folder.path()), ContainsSubstring("calib.txt"));
+  options.convention.frame = PoseFrame::kLidar;
+  CHECK(Recording(folder.path(), options).T_world_sensor(0).translation().x() == 7.0);
+}
+
 TEST_CASE("Folders that are no recording are refused with a reason") {
   const TemporaryFolder folder;
   const fs::path seq = folder / "seq";

@@ -14,6 +14,7 @@
 #include "program/start.hpp"
 #include "program/tiny_sequence.hpp"
 #include "support/catch.hpp"
+#include "support/recordings.hpp"
 
 using namespace dynains;
 using namespace dynains::test;
@@ -88,7 +89,8 @@ TEST_CASE("The budget of the map needs a map and a size that can be") {
   CHECK_THAT(negative.err, ContainsSubstring("TiledStaticMap.map_memory = -1"));
   const Outcome revised = fixture.run({"--map-memory", "10", "--revise-map", "true"});
   CHECK(revised.code != 0);
-  CHECK_THAT(revised.err, ContainsSubstring("revise_map = true needs a map that is kept in memory"));
+  CHECK_THAT(revised.err,
+             ContainsSubstring("revise_map = true needs a map that is kept in memory"));
   CHECK(!fs::exists(fixture.out));
 }
 
@@ -135,6 +137,15 @@ TEST_CASE("run writes labels, causes, map, moving points, report and timing, and
   CHECK(read_points(fixture.out + "/static_map.ply").positions.size() ==
         report["static_map"]["points"]);
   CHECK(read_points(fixture.out + "/dynamic_points.ply").positions.size() == moving);
+
+  const std::string page = read_text(std::string(DYNAINS_DOCS) + "/results.md");
+  for (const auto& [field, value] : report.items())
+    CHECK_THAT(page, ContainsSubstring('`' + field + '`'));
+  for (const auto& entry : fs::directory_iterator(fixture.out)) {
+    const bool is_folder = entry.is_directory();
+    CHECK_THAT(page, ContainsSubstring('`' + entry.path().filename().string() +
+                                       (is_folder ? "/NAME" : "`")));
+  }
 
   const std::string timing = read_text(fixture.out + "/timing.csv");
   CHECK_THAT(timing, StartsWith("scan,points,ingest_ms,"));
@@ -252,6 +263,118 @@ TEST_CASE("Results replace earlier ones by --force only, and whole") {
   CHECK(read_text(fixture.out + "/notes.txt") == "mine");
 }
 
+TEST_CASE("A map elsewhere is replaced by --force only, and never a scan") {
+  const Fixture fixture;
+  const std::string map = fixture.folder / "maps/of all.ply";
+  write_text(map, "of another run");
+  const Outcome refused = fixture.run({"--map", map});
+  CHECK(refused.code == 1);
+  CHECK_THAT(refused.err, ContainsSubstring(map + ": exists") && ContainsSubstring("--force"));
+  CHECK(read_text(map) == "of another run");
+
+  // What a killed run left of it goes, what belongs to others stays.
+  const std::string leftover = fixture.folder / "maps/.of all.ply.123.tmp";
+  const std::string foreign = fixture.folder / "maps/.of some.ply.123.tmp";
+  write_text(leftover, "half");
+  write_text(foreign, "half");
+  REQUIRE(fixture.run({"--map", map, "--force"}).code == 0);
+  CHECK(read_points(map).positions.size() == fixture.report()["static_map"]["points"]);
+  CHECK_FALSE(fs::exists(leftover));
+  CHECK(fs::exists(foreign));
+
+  const std::string among_scans = fixture.seq + "/velodyne/000003.ply";
+  const Outcome never = fixture.run({"--map", among_scans, "--force"});
+  CHECK(never.code == 1);
+  CHECK_THAT(never.err, ContainsSubstring("the scans are there"));
+  CHECK_FALSE(fs::exists(among_scans));
+}
+
+TEST_CASE("Flag --resume completes the run that it was asked for, and no other") {
+  const Fixture fixture;
+  const std::string map = fixture.folder / "a/map.ply";
+  fs::create_directories(fixture.folder / "a");
+  fs::create_directories(fixture.folder / "b");
+  REQUIRE(fixture.run({"--map", map, "--write-clean"}).code == 0);
+  const Outcome again = fixture.run({"--map", map, "--write-clean", "--resume"});
+  CHECK(again.code == 0);
+  CHECK_THAT(again.out, ContainsSubstring("complete already"));
+
+  for (const std::vector<std::string>& other :
+       {std::vector<std::string>{"--map", fixture.folder / "b/map.ply", "--write-clean"},
+        std::vector<std::string>{"--map", map, "--write-clean", "--frame", "world"}}) {
+    std::vector<std::string> flags = other;
+    flags.push_back("--resume");
+    const Outcome refused = fixture.run(flags);
+    CHECK(refused.code == 1);
+    CHECK_THAT(refused.err, ContainsSubstring("results of other flags"));
+  }
+  CHECK(count_entries(fixture.folder / "b") == 0);
+
+  // Whatever is missing is made again.
+  for (const std::string& lost :
+       {map, fixture.out + "/labels/000003.label", fixture.out + "/causes/000004.cause",
+        fixture.out + "/clean/000005.bin", fixture.out + "/timing.csv",
+        fixture.out + "/dynamic_points.ply"}) {
+    CAPTURE(lost);
+    fs::remove(lost);
+    const Outcome healed = fixture.run({"--map", map, "--write-clean", "--resume"});
+    CHECK(healed.code == 0);
+    CHECK_THAT(healed.out, ContainsSubstring("12 scans"));
+    CHECK(fs::exists(lost));
+  }
+}
+
+TEST_CASE("Paths are those of one place, however they are written") {
+  const Fixture fixture;
+  struct Here {
+    explicit Here(const fs::path& folder) : before(fs::current_path()) { fs::current_path(folder); }
+    ~Here() { fs::current_path(before); }
+    fs::path before;
+  };
+  const Here here(fixture.folder.path());
+  for (const std::vector<std::string>& flags :
+       {std::vector<std::string>{"--out", "trailing/"},
+        std::vector<std::string>{"--out", "beside", "--map", "map.ply"},
+        std::vector<std::string>{"--out", "within", "--map", fixture.folder / "within/own.ply"}}) {
+    CAPTURE(flags);
+    std::vector<std::string> arguments = {"run", "a seq", "--quiet"};
+    arguments.insert(arguments.end(), flags.begin(), flags.end());
+    REQUIRE(start(arguments).code == 0);
+    arguments.push_back("--resume");
+    const Outcome resumed = start(arguments);
+    CAPTURE(resumed.err);
+    CHECK(resumed.code == 0);
+  }
+  const auto map_of = [](const std::string& folder) {
+    return nlohmann::json::parse(read_text(folder + "/report.json"))["static_map"]["file"];
+  };
+  CHECK(map_of("trailing") == "static_map.ply");
+  CHECK(map_of("within") == "own.ply");
+  CHECK(map_of("beside") == (fs::current_path() / "map.ply").string());
+
+  const Here among_scans(fixture.seq + "/velodyne");
+  const Outcome never = start({"run", "..", "--out", "../../other", "--map", "map.ply"});
+  CHECK(never.code == 1);
+  CHECK_THAT(never.err, ContainsSubstring("the scans are there"));
+  CHECK_FALSE(fs::exists("map.ply"));
+}
+
+TEST_CASE("Scans without a pose are left out with a warning, and counted in the report") {
+  const Fixture fixture;
+  std::string poses;
+  std::string times;
+  for (int i = 0; i < 12; ++i) times += std::to_string(100.0 + 0.1 * i) + '\n';
+  for (int i = 0; i < 7; ++i) poses += std::to_string(100.0 + 0.1 * i) + " 0 0 0 0 0 0 1\n";
+  write_text(fixture.seq + "/times.txt", times);
+  write_text(fixture.seq + "/poses.txt", poses);
+  const Outcome outcome = fixture.run();
+  REQUIRE(outcome.code == 0);
+  CHECK_THAT(outcome.err,
+             ContainsSubstring("warning: 5 of 12 scans have no pose and are left out"));
+  CHECK(fixture.report()["scans"] == 7);
+  CHECK(fixture.report()["scans_without_pose"] == 5);
+}
+
 TEST_CASE("A folder that is no result is never written to") {
   const Fixture fixture;
   fs::create_directory(fixture.seq + "/labels");
@@ -279,7 +402,9 @@ TEST_CASE("Wrong flags: exit code 2, one line, nothing written") {
       {{"--preset", "best"}, "best not in"},
       {{"--start", "12"}, "--start and --end leave no scan of 000000 to 000011"},
       {{"--start", "5", "--end", "4"}, "--start and --end leave no scan"},
-      {{"--start", "-1"}, "--start"},
+      {{"--start", "-1"}, "--start: expected the number of a scan, found -1"},
+      {{"--end", "-1"}, "--end: expected the number of a scan, found -1"},
+      {{"--end", "18446744073709551616"}, "--end: expected the number of a scan"},
       {{"--map", "a.las"}, "a.las: expected a name that ends in .ply or .pcd"},
       {{"--map", "a.ply", "--build-map", "false"}, "--map needs --build-map true"},
       {{"--map", fixture.out + "/dynamic_points.ply"}, "the moving points go there"},
@@ -315,6 +440,13 @@ TEST_CASE("Broken input: exit code 1, one line, earlier results as they were") {
   SECTION("a pose that is not rigid") {
     write_text(fixture.seq + "/poses.txt", "2 0 0 0 0 1 0 0 0 0 1 0\n");
     expected = "poses.txt:1: expected a rigid transform";
+  }
+  SECTION("a pose too far away") {
+    std::string rows;
+    for (int i = 0; i < 12; ++i)
+      rows += i == 5 ? "1 0 0 3e7 0 1 0 0 0 0 1 0\n" : "1 0 0 0 0 1 0 0 0 0 1 0\n";
+    write_text(fixture.seq + "/poses.txt", rows);
+    expected = "scan 000005: T_world_sensor has a translation of";
   }
   SECTION("time that runs back") {
     write_text(fixture.seq + "/times.txt", "0.2\n0.1\n");
@@ -435,16 +567,13 @@ TEST_CASE("Ctrl-C: the scan at hand is finished, what is final is written, exit 
   CHECK(count_entries(fixture.out) == 6);
 }
 
-TEST_CASE("A real clip runs as published", "[data]") {
-  const fs::path clip = fs::path(DYNAINS_SHARED_DATA) / "kitti_van";
-  if (!fs::exists(clip)) {
-    WARN("skipped: no real recording at " << clip);
-    return;
-  }
+TEST_CASE("A real clip runs as published") {
+  const auto clip = recording_or_skip("kitti_van");
+  if (!clip) return;
   TemporaryFolder folder;
   const std::string out = folder / "out";
-  REQUIRE(start({"run", clip, "--out", out, "--preset", "paper"}).code == 0);
-  const Outcome outcome = start({"eval", clip, out, "--json", folder / "eval.json"});
+  REQUIRE(start({"run", *clip, "--out", out, "--preset", "paper"}).code == 0);
+  const Outcome outcome = start({"eval", *clip, out, "--json", folder / "eval.json"});
   CAPTURE(outcome.err);
   REQUIRE(outcome.code == 0);
   CHECK_THAT(outcome.out, ContainsSubstring("run"));

@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <cstdlib>
+#include <string>
 
 #include "dynains/version.hpp"
 #include "program/start.hpp"
@@ -37,4 +39,15 @@ TEST_CASE("Wrong usage is one line on standard error and exit code 2") {
     CHECK_THAT(outcome.err, StartsWith("dynains: error: ") && ContainsSubstring(wrong.expected));
     CHECK(std::count(outcome.err.begin(), outcome.err.end(), '\n') == 1);
   }
+}
+
+TEST_CASE("Results that cannot be shown are a failure, a reader who leaves is none") {
+  const std::string program = std::string("'") + DYNAINS_PROGRAM + "' config";
+  const auto code_of = [](const std::string& command) {
+    return WEXITSTATUS(
+        std::system(("bash -o pipefail -c \"" + command + "\" 2> /dev/null").c_str()));
+  };
+  CHECK(code_of(program + " > /dev/full") == 1);
+  CHECK(code_of(program + " > /dev/null") == 0);
+  CHECK(code_of("(sleep 0.2; " + program + ") | true") == 0);
 }

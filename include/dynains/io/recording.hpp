@@ -62,11 +62,14 @@ enum class ScanFormat { kBin, kPcd, kPly };
 /// Poses come from `options.poses`; else from VIEWPOINT, if any scan has one; else from a file
 /// poses.txt, poses.csv, poses.tum, trajectory.txt, trajectory.csv or trajectory.tum in the folder
 /// or beside the folder of the scans (see read_trajectory). Times come from `options.times`; else
-/// times.txt or timestamps.txt; else from names that are times (seconds with a point, or at least
-/// 10 digits: s, ms, us or ns since 1970; SECONDS_NANOSECONDS); else from the rows of the poses, if
-/// there is one for each scan; else they are 0.1 s apart. Rows without times belong to scans one by
-/// one (or by the number of the scan); rows with times are interpolated at the times of the scans.
-/// Scans without a pose are left out and told in `notes()`, unless they are more than half.
+/// times.txt or timestamps.txt in the folder or beside the file of poses, if that was found there;
+/// else from names that are times (seconds with a point, or at least 10 digits: s, ms, us or ns
+/// since 1970; SECONDS_NANOSECONDS); else from the rows of the poses, if there is one for each
+/// scan; else they are 0.1 s apart. calib.txt is taken from the folder or from beside the file of
+/// poses; one that cannot be read matters only to poses of a camera. Rows without times belong to
+/// scans one by one (or by the number of the scan); rows with times are interpolated at the times
+/// of the scans. Scans without a pose are left out and told in `notes()`, unless they are more than
+/// half.
 ///
 /// Labels (SemanticKITTI classes) come from labels/NAME.label or a column `label`.
 ///
@@ -77,6 +80,8 @@ class Recording {
   explicit Recording(const std::filesystem::path& folder, const RecordingOptions& options = {});
 
   const std::filesystem::path& folder() const { return folder_; }
+  /// The one that holds the scans: folder() or one below it.
+  const std::filesystem::path& scan_folder() const { return scan_folder_; }
   std::size_t size() const { return scans_.size(); }
   ScanFormat format() const { return format_; }
   PointFrame frame() const { return frame_; }
@@ -118,6 +123,8 @@ class Recording {
   /// Rows of the pose file, and scans on the disk: the first thing to compare.
   std::size_t pose_count() const { return trajectory_.poses.size(); }
   std::size_t scan_file_count() const { return matches_.size(); }
+  /// How many scans were left out for want of a pose.
+  std::size_t missing_pose_count() const { return scan_file_count() - size(); }
 
  private:
   struct Scan {
@@ -133,8 +140,11 @@ class Recording {
   void list_scans();
   void read_poses();
   void read_viewpoints();
+  void read_calibration(const std::filesystem::path& poses_file);
   std::filesystem::path find_poses() const;
-  std::optional<std::vector<double>> find_times() const;
+  std::filesystem::path find_beside(const std::filesystem::path& poses_file,
+                                    const std::vector<const char*>& names) const;
+  std::optional<std::vector<double>> find_times(const std::filesystem::path& poses_file);
   std::optional<std::vector<double>> times_of_names() const;
   void match_scans(const std::filesystem::path& poses_file);
   void match_rows(const std::filesystem::path& poses_file);
