@@ -47,8 +47,15 @@ void bind_config(py::module_& module) {
         return result;
       },
       "Name, section, default, bounds, unit and help of every parameter.");
-  config.def("__eq__",
-             [](const Config& a, const Config& b) { return to_dict(a).equal(to_dict(b)); });
+  config.def(
+      "__eq__", [](const Config& a, const Config& b) { return to_dict(a).equal(to_dict(b)); },
+      py::is_operator());  // with anything else: not equal
+  config.def(py::pickle([](const Config& self) { return to_dict(self); },
+                        [](const py::dict& values) {
+                          Config result;
+                          assign_all(result, values);
+                          return result;
+                        }));
   config.def("__repr__", [](const Config& self) {
     const py::dict defaults = to_dict(Config());
     std::string text = "dynains.Config(";

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <stdexcept>
@@ -26,18 +27,40 @@ struct JudgedScan {
   LabelledScan view;
 };
 
-// Flags become SemanticKITTI's moving car and road.
-Contiguous<std::uint32_t> to_truth(const py::object& truth) {
-  if (!py::isinstance<py::array_t<bool>>(truth)) return truth;
-  constexpr std::uint32_t kMovingCar = 252;
-  constexpr std::uint32_t kRoad = 40;
-  return py::vectorize([](bool moving) { return moving ? kMovingCar : kRoad; })(
-      truth.cast<py::array_t<bool>>());
+[[noreturn]] void refuse(const char* what, std::size_t scan, const std::string& expected) {
+  throw py::type_error(std::string(what) + " of scan " + std::to_string(scan) + ": expected " +
+                       expected);
 }
 
-// One bit, whatever counted as true.
-Contiguous<std::uint8_t> to_kept(const Contiguous<bool>& kept) {
-  return py::vectorize([](bool value) { return static_cast<std::uint8_t>(value); })(kept);
+// Whole numbers up to `most`, or flags as 0 and 1. `expected` says so if they are something else.
+template <class T>
+Contiguous<T> to_numbers(const char* what, std::size_t scan, const py::handle& values,
+                         std::int64_t most, const std::string& expected) {
+  const py::array array = py::array::ensure(py::reinterpret_borrow<py::object>(values));
+  if (!array) {
+    PyErr_Clear();
+    refuse(what, scan, expected);
+  }
+  const bool is_whole = std::string("biu").find(array.dtype().kind()) != std::string::npos;
+  if (!is_whole && array.size() > 0) refuse(what, scan, expected);
+  const Contiguous<std::int64_t> numbers = array;
+  const Span<const std::int64_t> all(numbers.data(), static_cast<std::size_t>(numbers.size()));
+  const auto is_wrong = [most](std::int64_t number) { return number < 0 || number > most; };
+  if (std::any_of(all.begin(), all.end(), is_wrong)) refuse(what, scan, expected);
+  return py::vectorize([](std::int64_t number) { return static_cast<T>(number); })(numbers);
+}
+
+// Flags become SemanticKITTI's moving car and road.
+Contiguous<std::uint32_t> to_truth(std::size_t scan, const py::handle& truth) {
+  const auto labels = to_numbers<std::uint32_t>(
+      "truth", scan, truth, std::numeric_limits<std::uint32_t>::max(),
+      "labels of SemanticKITTI (whole numbers of 32 bits) or bool (True moves)");
+  const py::array given = py::array::ensure(py::reinterpret_borrow<py::object>(truth));
+  if (given.dtype().kind() != 'b') return labels;
+  constexpr std::uint32_t kMovingCar = 252;
+  constexpr std::uint32_t kRoad = 40;
+  return py::vectorize([](std::uint32_t moving) { return moving != 0 ? kMovingCar : kRoad; })(
+      labels);
 }
 
 void expect_length(const char* what, std::size_t scan, const py::array& array, py::ssize_t length) {
@@ -49,8 +72,9 @@ void expect_length(const char* what, std::size_t scan, const py::array& array, p
 JudgedScan make_scan(std::size_t index, const py::handle& points, const py::handle& pose,
                      const py::handle& truth, const py::handle& kept) {
   JudgedScan scan{points.cast<Contiguous<float>>(),
-                  to_truth(py::reinterpret_borrow<py::object>(truth)),
-                  to_kept(kept.cast<Contiguous<bool>>()),
+                  to_truth(index, truth),
+                  to_numbers<std::uint8_t>("kept", index, kept, 1,
+                                           "bool, for example is_static(verdict.labels)"),
                   {}};
   if (scan.points.ndim() != 2 || scan.points.shape(1) < 3) {
     throw CloudError("points of scan " + std::to_string(index) + ": shape " +

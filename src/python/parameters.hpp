@@ -25,6 +25,11 @@ template <class T>
 void assign(const Parameter<T>& parameter, const py::handle& value) {
   T wanted{};
   try {
+    // Nearly everything in Python is true or false, None too.
+    if (std::is_same_v<T, bool> && !value.equal(py::bool_(true)) &&
+        !value.equal(py::bool_(false))) {
+      throw py::cast_error();
+    }
     wanted = value.cast<T>();
   } catch (const py::cast_error&) {
     const char* type = std::is_same_v<T, bool> ? "bool" : std::is_integral_v<T> ? "int" : "float";

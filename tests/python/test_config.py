@@ -1,4 +1,8 @@
+import copy
+import pickle
+
 import dynains
+import numpy as np
 import pytest
 
 
@@ -50,6 +54,8 @@ def test_the_configuration_of_a_remover_is_a_copy():
         ({"window": 1000}, dynains.ConfigError, "window = 1000"),
         ({"window": 4.5}, TypeError, "window = 4.5: expected int"),
         ({"tau_s": "high"}, TypeError, "expected float"),
+        ({"level": None}, TypeError, "level = None: expected bool"),
+        ({"level": 0.5}, TypeError, "level = 0.5: expected bool"),
         ({"tau": 0.5}, dynains.ConfigError, "unknown parameter tau"),
     ],
 )
@@ -66,6 +72,17 @@ def test_contradictions_are_refused():
         config.validate()
     with pytest.raises(dynains.ConfigError, match="min_range"):
         dynains.DynaInsRemover(config)
+
+
+def test_configs_are_compared_and_copied_as_values():
+    config = dynains.Config(window=6, level=np.bool_(False))
+    assert config == dynains.Config(window=6, level=False)
+    assert config != dynains.Config(window=6)
+    assert config != 6
+    assert config != None  # noqa: E711
+    assert config not in [None, "window"]
+    assert copy.deepcopy(config) == config
+    assert pickle.loads(pickle.dumps(config)) == config
 
 
 def test_a_misspelt_attribute_is_an_error():

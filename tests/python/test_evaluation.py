@@ -37,6 +37,8 @@ def test_truth_is_flags_or_labels():
     labels = np.array([40, 50 | 7 << 16, 252 | 3 << 16, 259], np.uint32)
     kept = [True, False, True, False]
     assert score(kept, labels) == score(kept)
+    assert score(kept, labels.tolist()) == score(kept)
+    assert score(kept, MOVES.tolist()) == score(kept)
     # Without class 259 the last point is static, and lost.
     assert score(kept, labels, dynamic_classes="252-258")["PR"] == pytest.approx(100 / 3)
 
@@ -85,6 +87,11 @@ def test_nothing_removed_is_the_identity_on_a_street(street):
         (([POINTS], [np.eye(4)], [MOVES], [MOVES[:1]]), {}, ValueError, "kept of scan 0"),
         (([POINTS[0]], [np.eye(4)], [MOVES], [MOVES]), {}, dynains.CloudError, "points of scan 0"),
         (([POINTS], [np.eye(3)], [MOVES], [MOVES]), {}, dynains.PoseError, "shape"),
+        # Labels of a verdict where is_static() of them is meant; classes that are none.
+        (([POINTS], [np.eye(4)], [MOVES], [np.uint8([3, 3, 4, 4])]), {}, TypeError, "is_static"),
+        (([POINTS], [np.eye(4)], [MOVES], [[1.0, 0.5, 0, 0]]), {}, TypeError, "kept of scan 0"),
+        (([POINTS], [np.eye(4)], [[40, 40, -1, 252]], [MOVES]), {}, TypeError, "truth of scan 0"),
+        (([POINTS], [np.eye(4)], [[40, 40, 2**32 + 252, 252]], [MOVES]), {}, TypeError, "32 bits"),
         (([POINTS], [np.eye(4)], [MOVES], [MOVES]), {"voxel": 0}, dynains.ConfigError, "voxel = 0"),
         (([POINTS], [np.eye(4)], [MOVES], [MOVES]), {"vxl": 1}, dynains.ConfigError, "vxl"),
         (([POINTS], [np.eye(4)], [MOVES], [MOVES]), {"unlabeled": "x"}, dynains.ConfigError, "'x'"),

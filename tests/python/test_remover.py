@@ -1,3 +1,4 @@
+import sys
 import threading
 
 import dynains
@@ -153,7 +154,26 @@ def test_time_must_increase(identity):
         remover.push(np.ones((5, 3)), identity, 1.0)
 
 
-def test_push_lets_other_threads_run(street, verdicts):
+def test_push_lets_other_threads_run(street):
+    remover = dynains.DynaInsRemover()
+    started, ran = threading.Event(), []
+    thread = threading.Thread(target=lambda: (started.wait(), ran.append(1)))
+    thread.start()
+    interval = sys.getswitchinterval()
+    try:
+        sys.setswitchinterval(1000)  # nobody has to give way: whoever waits runs only if push does
+        started.set()
+        for scan in 100 * street:  # on a busy machine it may take some
+            remover.push(scan.points, scan.T_world_sensor)
+            if ran:
+                break
+        assert ran
+    finally:
+        sys.setswitchinterval(interval)
+        thread.join()
+
+
+def test_removers_in_threads_and_one_shared(street, verdicts):
     """Removers in threads of their own give what they give alone; one shared stays whole."""
     shared = dynains.DynaInsRemover()
     found = {}
