@@ -82,6 +82,10 @@ install(FILES ${PROJECT_BINARY_DIR}/dynainsConfig.cmake
 file(RELATIVE_PATH dynains_pc_to_prefix
   ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
 string(REGEX REPLACE "/$" "" dynains_pc_to_prefix "${dynains_pc_to_prefix}")
+set(dynains_pc_includedir "\${prefix}/${CMAKE_INSTALL_INCLUDEDIR}")
+if(IS_ABSOLUTE "${CMAKE_INSTALL_INCLUDEDIR}")
+  set(dynains_pc_includedir "${CMAKE_INSTALL_INCLUDEDIR}")
+endif()
 configure_file(${PROJECT_SOURCE_DIR}/cmake/dynains.pc.in ${PROJECT_BINARY_DIR}/dynains.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/dynains.pc
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT dynains_core)

@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "dynains/detail/lanes.hpp"
+#include "dynains/detail/shuffle.hpp"
 #include "dynains/detail/wide_lanes.hpp"
 #include "dynains/points.hpp"
 
@@ -20,25 +21,32 @@ struct alignas(16) PointRecord {
 
 /// The columns of four rows of four values.
 inline std::array<Float4, 4> transposed(const std::array<Float4, 4>& row) {
-  const Float4 a = __builtin_shufflevector(row[0], row[1], 0, 4, 1, 5);
-  const Float4 b = __builtin_shufflevector(row[2], row[3], 0, 4, 1, 5);
-  const Float4 c = __builtin_shufflevector(row[0], row[1], 2, 6, 3, 7);
-  const Float4 d = __builtin_shufflevector(row[2], row[3], 2, 6, 3, 7);
-  return {__builtin_shufflevector(a, b, 0, 1, 4, 5), __builtin_shufflevector(a, b, 2, 3, 6, 7),
-          __builtin_shufflevector(c, d, 0, 1, 4, 5), __builtin_shufflevector(c, d, 2, 3, 6, 7)};
+  Float4 a, b, c, d;
+  shuffle<0, 4, 1, 5>(row[0], row[1], a);
+  shuffle<0, 4, 1, 5>(row[2], row[3], b);
+  shuffle<2, 6, 3, 7>(row[0], row[1], c);
+  shuffle<2, 6, 3, 7>(row[2], row[3], d);
+  std::array<Float4, 4> columns;
+  shuffle<0, 1, 4, 5>(a, b, columns[0]);
+  shuffle<2, 3, 6, 7>(a, b, columns[1]);
+  shuffle<0, 1, 4, 5>(c, d, columns[2]);
+  shuffle<2, 3, 6, 7>(c, d, columns[3]);
+  return columns;
 }
 
 /// The same for two times four rows side by side.
 inline std::array<WideFloat8, 4> transposed(const std::array<WideFloat8, 4>& row) {
-  using Vector = WideFloat8::Vector;
-  const Vector a = __builtin_shufflevector(row[0].v, row[1].v, 0, 8, 1, 9, 4, 12, 5, 13);
-  const Vector b = __builtin_shufflevector(row[2].v, row[3].v, 0, 8, 1, 9, 4, 12, 5, 13);
-  const Vector c = __builtin_shufflevector(row[0].v, row[1].v, 2, 10, 3, 11, 6, 14, 7, 15);
-  const Vector d = __builtin_shufflevector(row[2].v, row[3].v, 2, 10, 3, 11, 6, 14, 7, 15);
-  return {WideFloat8(__builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13)),
-          WideFloat8(__builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15)),
-          WideFloat8(__builtin_shufflevector(c, d, 0, 1, 8, 9, 4, 5, 12, 13)),
-          WideFloat8(__builtin_shufflevector(c, d, 2, 3, 10, 11, 6, 7, 14, 15))};
+  WideFloat8::Vector a, b, c, d;
+  shuffle<0, 8, 1, 9, 4, 12, 5, 13>(row[0].v, row[1].v, a);
+  shuffle<0, 8, 1, 9, 4, 12, 5, 13>(row[2].v, row[3].v, b);
+  shuffle<2, 10, 3, 11, 6, 14, 7, 15>(row[0].v, row[1].v, c);
+  shuffle<2, 10, 3, 11, 6, 14, 7, 15>(row[2].v, row[3].v, d);
+  std::array<WideFloat8, 4> columns;
+  shuffle<0, 1, 8, 9, 4, 5, 12, 13>(a, b, columns[0].v);
+  shuffle<2, 3, 10, 11, 6, 7, 14, 15>(a, b, columns[1].v);
+  shuffle<0, 1, 8, 9, 4, 5, 12, 13>(c, d, columns[2].v);
+  shuffle<2, 3, 10, 11, 6, 7, 14, 15>(c, d, columns[3].v);
+  return columns;
 }
 
 inline Float4 load_four(const void* from) {
@@ -72,8 +80,7 @@ std::array<typename Lanes::Float, 4> load_columns(const PointRecord* from) {
   std::array<typename Lanes::Float, 4> result;
   if constexpr (std::is_same_v<typename Lanes::Float, WideFloat8>) {
     for (std::size_t k = 0; k < 4; ++k) {
-      result[k] = WideFloat8(__builtin_shufflevector(load_four(from + k), load_four(from + k + 4),
-                                                     0, 1, 2, 3, 4, 5, 6, 7));
+      shuffle<0, 1, 2, 3, 4, 5, 6, 7>(load_four(from + k), load_four(from + k + 4), result[k].v);
     }
     return transposed(result);
   } else {

@@ -10,6 +10,7 @@
 #include <emmintrin.h>
 #endif
 
+#include "dynains/detail/shuffle.hpp"
 #include "dynains/detail/wide_lanes.hpp"
 
 namespace dynains::detail {
@@ -36,8 +37,9 @@ inline bool any_short(Short8 mask) {
 }
 /// a0 b0 a1 b1 ... a7 b7.
 inline void store_interleaved(std::int16_t* to, Short8 a, Short8 b) {
-  const Short8 low = __builtin_shufflevector(a, b, 0, 8, 1, 9, 2, 10, 3, 11);
-  const Short8 high = __builtin_shufflevector(a, b, 4, 12, 5, 13, 6, 14, 7, 15);
+  Short8 low, high;
+  shuffle<0, 8, 1, 9, 2, 10, 3, 11>(a, b, low);
+  shuffle<4, 12, 5, 13, 6, 14, 7, 15>(a, b, high);
   std::memcpy(to, &low, sizeof(low));
   std::memcpy(to + 8, &high, sizeof(high));
 }
@@ -111,10 +113,14 @@ struct WideShort {
 
  private:
   static Short8 low(const Vector& a) {
-    return __builtin_shufflevector(a, a, 0, 1, 2, 3, 4, 5, 6, 7);
+    Short8 result;
+    shuffle<0, 1, 2, 3, 4, 5, 6, 7>(a, a, result);
+    return result;
   }
   static Short8 high(const Vector& a) {
-    return __builtin_shufflevector(a, a, 8, 9, 10, 11, 12, 13, 14, 15);
+    Short8 result;
+    shuffle<8, 9, 10, 11, 12, 13, 14, 15>(a, a, result);
+    return result;
   }
 };
 

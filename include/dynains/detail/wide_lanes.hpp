@@ -10,6 +10,7 @@
 #include <cstring>
 
 #include "dynains/detail/lanes.hpp"
+#include "dynains/detail/shuffle.hpp"
 
 namespace dynains::detail {
 
@@ -26,14 +27,16 @@ using WideFloats = float __attribute__((vector_size(32)));
 [[gnu::target("avx2")]] inline void take_root(WideFloats& of) { of = __builtin_ia32_sqrtps256(of); }
 #else
 inline unsigned sign_bits(const WideInts& of) {
-  return Mask8{__builtin_shufflevector(of, of, 0, 1, 2, 3),
-               __builtin_shufflevector(of, of, 4, 5, 6, 7)}
-      .bits();
+  Mask8 halves;
+  shuffle<0, 1, 2, 3>(of, of, halves.lo);
+  shuffle<4, 5, 6, 7>(of, of, halves.hi);
+  return halves.bits();
 }
 inline void take_root(WideFloats& of) {
-  const Float4 low = sqrt(Float4(__builtin_shufflevector(of, of, 0, 1, 2, 3)));
-  const Float4 high = sqrt(Float4(__builtin_shufflevector(of, of, 4, 5, 6, 7)));
-  of = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+  Float4 low, high;
+  shuffle<0, 1, 2, 3>(of, of, low);
+  shuffle<4, 5, 6, 7>(of, of, high);
+  shuffle<0, 1, 2, 3, 4, 5, 6, 7>(sqrt(low), sqrt(high), of);
 }
 #endif
 
@@ -137,8 +140,10 @@ inline WideInt8 floor(const WideFloat8& a) {
   return WideInt8(whole.v + (to_float(whole) > a).v);  // all bits set is -1
 }
 inline float sum(const WideFloat8& a) {
-  return sum(Float8(__builtin_shufflevector(a.v, a.v, 0, 1, 2, 3),
-                    __builtin_shufflevector(a.v, a.v, 4, 5, 6, 7)));
+  Float8 halves;
+  shuffle<0, 1, 2, 3>(a.v, a.v, halves.lo);
+  shuffle<4, 5, 6, 7>(a.v, a.v, halves.hi);
+  return sum(halves);
 }
 
 /// Lane i is lane `from[i]` of `a`, modulo eight.
