@@ -1,23 +1,19 @@
 // A recorded clip, where the machine has it.
-#include <filesystem>
-#include <iostream>
 #include <vector>
 
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/io/kitti.hpp"
 #include "support/catch.hpp"
+#include "support/recordings.hpp"
 #include "support/remover.hpp"
 
 namespace dynains::test {
 namespace {
 
 TEST_CASE("the paper's configuration removes a recorded oncoming van: F1 of 0.96 and more") {
-  const std::filesystem::path folder = std::filesystem::path(DYNAINS_SHARED_DATA) / "kitti_van";
-  if (!std::filesystem::is_directory(folder)) {
-    std::cout << "SKIPPED: no recording at " << folder << '\n';
-    return;
-  }
-  const KittiSequence sequence(folder);
+  const auto folder = recording_or_skip("kitti_van");
+  if (!folder) return;
+  const KittiSequence sequence(*folder);
   REQUIRE(sequence.size() > 10);
 
   std::vector<std::vector<std::uint8_t>> in_map(sequence.size());

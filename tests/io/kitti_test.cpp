@@ -6,6 +6,7 @@
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
+#include "support/recordings.hpp"
 
 namespace fs = std::filesystem;
 using namespace dynains;
@@ -254,13 +255,10 @@ TEST_CASE("A writer that fails leaves the old file") {
   CHECK(read_text(folder / "velodyne/000000.bin") == bytes(32));
 }
 
-TEST_CASE("Real recordings open", "[data]") {
-  const fs::path clip = fs::path(DYNAINS_SHARED_DATA) / "kitti_van";
-  if (!fs::exists(clip)) {
-    WARN("skipped: no real recording at " << clip);
-    return;
-  }
-  const KittiSequence sequence(clip);
+TEST_CASE("A real recording opens") {
+  const auto clip = recording_or_skip("kitti_van");
+  if (!clip) return;
+  const KittiSequence sequence(*clip);
   REQUIRE(sequence.size() > 1);
   const std::size_t last = sequence.size() - 1;
   CHECK(sequence.read_labels(last).size() * 4 == sequence.read_scan(last).size());
