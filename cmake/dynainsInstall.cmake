@@ -61,6 +61,17 @@ foreach(name IN LISTS dynains_components)
   endif()
 endforeach()
 
+# Shared libraries find each other, and the program finds them, wherever the tree is put.
+if(BUILD_SHARED_LIBS AND NOT DEFINED CMAKE_INSTALL_RPATH)
+  foreach(name IN LISTS dynains_components)
+    set_target_properties(dynains_${name} PROPERTIES INSTALL_RPATH "$ORIGIN")
+  endforeach()
+  if(TARGET dynains_program)
+    file(RELATIVE_PATH dynains_bin_to_lib ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR})
+    set_target_properties(dynains_program PROPERTIES INSTALL_RPATH "$ORIGIN/${dynains_bin_to_lib}")
+  endif()
+endif()
+
 # Headers of components stay out of the core, also of those that are not built.
 set(dynains_not_core "")
 foreach(room IN LISTS dynains_rooms)
