@@ -275,8 +275,9 @@ std::optional<std::vector<double>> Recording::find_times(const fs::path& poses_f
   std::vector<double> rows = read_kitti_times(file);
   for (double& time : rows) time = to_seconds(time);
   if (rows.size() == scans_.size()) return rows;
+  const bool has_all_numbers = numbered_ && rows.size() > scans_.back().number;
   const bool is_ours = !options_.times.empty() || file.parent_path() == folder_;
-  if (!is_ours && (!numbered_ || rows.size() <= scans_.back().number)) {
+  if (!is_ours && !has_all_numbers) {
     notes_.push_back("not used: " + shown(file, folder_) + " has " + std::to_string(rows.size()) +
                      " rows for " + std::to_string(scans_.size()) + " scans");
     return times_of_names();

@@ -1,7 +1,6 @@
 #include "evaluation_options.hpp"
 
 #include <algorithm>
-#include <tuple>
 #include <type_traits>
 #include <utility>
 
@@ -53,11 +52,11 @@ void add_window_options(CLI::App& command, ScanWindow& window) {
         return is_digits ? std::string() : "expected the number of a scan, found " + text;
       },
       "UINT");
-  for (const auto& [name, value, help] :
-       {std::tuple("--start", &window.start, "number of the first scan"),
-        std::tuple("--end", &window.end, "number of the last scan (inclusive)")}) {
-    command.add_option(name, *value, help)->check(is_number)->type_name("");
-  }
+  const auto add = [&](const char* name, std::optional<std::size_t>& value, const char* help) {
+    command.add_option(name, value, help)->check(is_number)->type_name("");
+  };
+  add("--start", window.start, "number of the first scan");
+  add("--end", window.end, "number of the last scan (inclusive)");
 }
 
 TextFile::TextFile(const std::string& path) {

@@ -137,8 +137,9 @@ bool is_whole(const RunOutputs& outputs, const Recording& sequence, const ScanRa
 }
 
 /// Refuses whatever must not be replaced. Throws IoError.
-void check_outputs(const RunOutputs& outputs, const Recording& sequence, bool replace) {
-  check_output_folder(outputs.folder, files_of_a_run(outputs.folder), replace);
+void check_outputs(const RunOutputs& outputs, const OutputFiles& files, const Recording& sequence,
+                   bool replace) {
+  check_output_folder(outputs.folder, files, replace);
   if (outputs.map.empty()) return;
   const fs::path map = whole_path(outputs.map);
   if (map.parent_path() == whole_path(sequence.scan_folder())) {
@@ -153,13 +154,13 @@ void check_outputs(const RunOutputs& outputs, const Recording& sequence, bool re
 }
 
 /// Clears the way for new results, once nothing but the points and the disk can go wrong any more.
-void prepare(const RunOutputs& outputs, bool resume, const nlohmann::ordered_json& request) {
+void prepare(const RunOutputs& outputs, const OutputFiles& files, bool resume,
+             const nlohmann::ordered_json& request) {
   nlohmann::ordered_json marker = unfinished_report(outputs.map_name());
   marker["request"] = request;
   if (!outputs.map.empty()) remove_leftovers_of(outputs.map);
   // Files of the same run are replaced one by one: never is less there than before.
-  (resume ? mark_output_folder : clear_output_folder)(
-      outputs.folder, files_of_a_run(outputs.folder), to_text(marker));
+  (resume ? mark_output_folder : clear_output_folder)(outputs.folder, files, to_text(marker));
 }
 
 void print_summary(const RunResults& results, const RunTiming& timing, const RunOutputs& outputs) {
@@ -217,10 +218,11 @@ void run(const RunOptions& options) {
     return;
   }
   const bool resume = earlier != EarlierRun::kNone;
-  check_outputs(outputs, sequence, options.force || resume);
+  const OutputFiles files = files_of_a_run(outputs.folder);
+  check_outputs(outputs, files, sequence, options.force || resume);
   const PoseAgreement agreement = pose_agreement(sequence, range.first, range.last);
   if (agreement.doubtful()) warn_of_poses(options.sequence.folder(), agreement.as_given);
-  prepare(outputs, resume, request);
+  prepare(outputs, files, resume, request);
 
   RunResults results(sequence, range, outputs);
   const InterruptGuard interrupt;

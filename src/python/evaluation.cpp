@@ -32,15 +32,18 @@ struct JudgedScan {
                        expected);
 }
 
+// As NumPy sees it; null if that makes no array of it.
+py::array to_array(const py::handle& values) {
+  py::array array = py::array::ensure(py::reinterpret_borrow<py::object>(values));
+  if (!array) PyErr_Clear();
+  return array;
+}
+
 // Whole numbers up to `most`, or flags as 0 and 1. `expected` says so if they are something else.
 template <class T>
-Contiguous<T> to_numbers(const char* what, std::size_t scan, const py::handle& values,
+Contiguous<T> to_numbers(const char* what, std::size_t scan, const py::array& array,
                          std::int64_t most, const std::string& expected) {
-  const py::array array = py::array::ensure(py::reinterpret_borrow<py::object>(values));
-  if (!array) {
-    PyErr_Clear();
-    refuse(what, scan, expected);
-  }
+  if (!array) refuse(what, scan, expected);
   const bool is_whole = std::string("biu").find(array.dtype().kind()) != std::string::npos;
   if (!is_whole && array.size() > 0) refuse(what, scan, expected);
   const Contiguous<std::int64_t> numbers = array;
@@ -51,12 +54,11 @@ Contiguous<T> to_numbers(const char* what, std::size_t scan, const py::handle& v
 }
 
 // Flags become SemanticKITTI's moving car and road.
-Contiguous<std::uint32_t> to_truth(std::size_t scan, const py::handle& truth) {
+Contiguous<std::uint32_t> to_truth(std::size_t scan, const py::array& truth) {
   const auto labels = to_numbers<std::uint32_t>(
       "truth", scan, truth, std::numeric_limits<std::uint32_t>::max(),
       "labels of SemanticKITTI (whole numbers of 32 bits) or bool (True moves)");
-  const py::array given = py::array::ensure(py::reinterpret_borrow<py::object>(truth));
-  if (given.dtype().kind() != 'b') return labels;
+  if (truth.dtype().kind() != 'b') return labels;
   constexpr std::uint32_t kMovingCar = 252;
   constexpr std::uint32_t kRoad = 40;
   return py::vectorize([](std::uint32_t moving) { return moving != 0 ? kMovingCar : kRoad; })(
@@ -72,8 +74,8 @@ void expect_length(const char* what, std::size_t scan, const py::array& array, p
 JudgedScan make_scan(std::size_t index, const py::handle& points, const py::handle& pose,
                      const py::handle& truth, const py::handle& kept) {
   JudgedScan scan{points.cast<Contiguous<float>>(),
-                  to_truth(index, truth),
-                  to_numbers<std::uint8_t>("kept", index, kept, 1,
+                  to_truth(index, to_array(truth)),
+                  to_numbers<std::uint8_t>("kept", index, to_array(kept), 1,
                                            "bool, for example is_static(verdict.labels)"),
                   {}};
   if (scan.points.ndim() != 2 || scan.points.shape(1) < 3) {

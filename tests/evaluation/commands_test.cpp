@@ -57,6 +57,23 @@ bool has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
+/// A street of three scans, and a run over it that is right, to be judged into `json`.
+struct JudgedStreet {
+  JudgedStreet() { write_run(run, scans, 0); }
+  std::vector<std::string> eval(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> arguments = {"eval", sequence.string(), run.string(), "--json",
+                                          json.string()};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+
+  TemporaryFolder folder;
+  fs::path sequence = folder.path() / "street";
+  std::vector<OwnedScan> scans = write_street(sequence, 3);
+  fs::path run = folder.path() / "run";
+  fs::path json = folder.path() / "eval.json";
+};
+
 }  // namespace
 
 TEST_CASE("eval judges a run beside identity and oracle") {
@@ -88,21 +105,13 @@ TEST_CASE("eval judges a run beside identity and oracle") {
 }
 
 TEST_CASE("eval --online judges the verdicts without latency, and only these") {
-  const TemporaryFolder folder;
-  const fs::path sequence = folder.path() / "street";
-  const auto scans = write_street(sequence, 3);
-  const fs::path run = folder.path() / "run";
-  write_run(run, scans, 0);
-  const std::string json_path = (folder.path() / "eval.json").string();
+  const JudgedStreet street;
   const auto accuracy = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> arguments = {"eval", sequence.string(), run.string(), "--json",
-                                          json_path};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    call(arguments);
-    return nlohmann::json::parse(read_text(json_path))["rows"][2]["points"]["da"].get<double>();
+    call(street.eval(more));
+    return nlohmann::json::parse(read_text(street.json))["rows"][2]["points"]["da"].get<double>();
   };
-  CHECK(!message_of({"eval", sequence.string(), run.string(), "--online"}).empty());
-  write_run(run, scans, 120, "online");  // of 480 points
+  CHECK(!message_of(street.eval({"--online"})).empty());
+  write_run(street.run, street.scans, 120, "online");  // of 480 points
   CHECK(accuracy({}) == 100.0);
   CHECK(accuracy({"--online"}) == 75.0);
 }
@@ -174,25 +183,15 @@ TEST_CASE("eval judges map files of either format") {
 }
 
 TEST_CASE("eval says what is wrong with its input, and writes nothing then") {
-  const TemporaryFolder folder;
-  const fs::path sequence = folder.path() / "street";
-  const auto scans = write_street(sequence, 3);
-  const fs::path run = folder.path() / "run";
-  write_run(run, scans, 0);
-  const fs::path json = folder.path() / "eval.json";
-  const std::vector<std::string> good = {"eval", sequence.string(), run.string(), "--json",
-                                         json.string()};
-  const auto with = [&](std::vector<std::string> more) {
-    more.insert(more.begin(), good.begin(), good.end());
-    return more;
-  };
-
-  CHECK(has(message_of(with({"--classes", "252-"})), "classes = \"252-\""));
-  CHECK(has(message_of(with({"--voxel", "0"})), "EvaluationConfig.voxel = 0 must be in"));
-  CHECK(has(message_of(with({"--max-range", "1"})), "crossed"));
-  CHECK(has(message_of(with({"--unlabeled", "maybe"})), "maybe"));
-  CHECK(has(message_of(with({"--start", "7"})), "no scan within the chosen window"));
-  CHECK(has(message_of(with({"--map", (folder.path() / "none.ply").string()})), "none.ply"));
+  const JudgedStreet street;
+  const auto& [folder, sequence, scans, run, json] = street;
+  const std::vector<std::string> good = street.eval();
+  CHECK(has(message_of(street.eval({"--classes", "252-"})), "classes = \"252-\""));
+  CHECK(has(message_of(street.eval({"--voxel", "0"})), "EvaluationConfig.voxel = 0 must be in"));
+  CHECK(has(message_of(street.eval({"--max-range", "1"})), "crossed"));
+  CHECK(has(message_of(street.eval({"--unlabeled", "maybe"})), "maybe"));
+  CHECK(has(message_of(street.eval({"--start", "7"})), "no scan within the chosen window"));
+  CHECK(has(message_of(street.eval({"--map", (folder.path() / "none.ply").string()})), "none.ply"));
   CHECK(has(message_of({"eval", sequence.string(), (folder.path() / "nobody").string()}),
             "no labels for any scan"));
   CHECK(has(message_of({"eval", (folder.path() / "nowhere").string()}), "nowhere"));

@@ -1,5 +1,6 @@
 #include "dynains/io/recording.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -39,6 +40,11 @@ std::string tum(double time, double x) {
 
 std::string error_of(const fs::path& folder, const RecordingOptions& options = {}) {
   return message_of<IoError>([&] { Recording recording(folder, options); });
+}
+
+bool tells(const Recording& recording, const std::string& note) {
+  const std::vector<std::string>& notes = recording.notes();
+  return std::find(notes.begin(), notes.end(), note) != notes.end();
 }
 
 }  // namespace
@@ -106,11 +112,7 @@ TEST_CASE("Times of names find their poses by interpolation; scans without are l
   CHECK(recording.time(1) == 1600000000.25);
   CHECK(recording.T_world_sensor(1).translation().x() == Approx(1.0));
   CHECK(recording.T_world_sensor(2).translation().x() == Approx(2.0));
-  bool told = false;
-  for (const std::string& note : recording.notes()) {
-    told = told || note == "1 of 4 scans have no pose and are left out, 1600000009.00 first";
-  }
-  CHECK(told);
+  CHECK(tells(recording, "1 of 4 scans have no pose and are left out, 1600000009.00 first"));
 
   write_text(folder / "trajectory.tum", tum(5.0, 0.0) + tum(6.0, 2.0));
   CHECK_THAT(error_of(folder.path()),
@@ -182,12 +184,8 @@ TEST_CASE("calib.txt and times.txt lie with the poses, or in the folder") {
   write_text(folder / "times.txt", "0\n");
   const Recording without(scans);
   CHECK(without.time(1) == 0.1);
-  bool told = false;
-  for (const std::string& note : without.notes()) {
-    told =
-        told || note == "not used: " + (folder / "times.txt").string() + " has 1 rows for 2 scans";
-  }
-  CHECK(told);
+  const std::string times = folder / "times.txt";
+  CHECK(tells(without, "not used: " + times + " has 1 rows for 2 scans"));
   CHECK_THAT(error_of(folder.path()), ContainsSubstring("times.txt"));
 
   // Poses from elsewhere bring their calibration; times may be those of other scans.

@@ -443,8 +443,9 @@ TEST_CASE("Broken input: exit code 1, one line, earlier results as they were") {
   }
   SECTION("a pose too far away") {
     std::string rows;
-    for (int i = 0; i < 12; ++i)
+    for (int i = 0; i < 12; ++i) {
       rows += i == 5 ? "1 0 0 3e7 0 1 0 0 0 0 1 0\n" : "1 0 0 0 0 1 0 0 0 0 1 0\n";
+    }
     write_text(fixture.seq + "/poses.txt", rows);
     expected = "scan 000005: T_world_sensor has a translation of";
   }
