@@ -26,16 +26,18 @@ enum class Cause : std::uint8_t {
   kPresumed = 13,       ///< dynamic until the next scans tell: no scan before saw its place
   kOccupied = 14,       ///< static: other scans saw its place occupied
   kTooLittleFree = 15,  ///< static: its place was seen free, but not often or not widely enough
+  kInPassage = 16,      ///< dynamic: nearly all else that was met in its place moved
 };
 
-inline constexpr std::size_t kCauseCount = 16;
+inline constexpr std::size_t kCauseCount = 17;
 
 /// Whether a point with this cause is removed.
 constexpr bool is_dynamic(Cause cause) {
   constexpr auto bit = [](Cause c) { return 1U << static_cast<unsigned>(c); };
   constexpr unsigned kDynamic = bit(Cause::kProposed) | bit(Cause::kFreeSpace) |
                                 bit(Cause::kWithInstance) | bit(Cause::kUnderInstance) |
-                                bit(Cause::kAlongTrack) | bit(Cause::kPresumed);
+                                bit(Cause::kAlongTrack) | bit(Cause::kPresumed) |
+                                bit(Cause::kInPassage);
   return (kDynamic >> static_cast<unsigned>(cause) & 1U) != 0;
 }
 

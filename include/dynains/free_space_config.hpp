@@ -36,6 +36,8 @@ struct FreeSpaceConfig {
   double track_overlap = 0.25;   ///< shared cells over all cells from which two are the same
   double track_length = 18.0;    ///< m, longer instances are not carried
   double track_height = 4.5;     ///< m, higher instances are not carried
+  double passage_cell = 0.6;     ///< m, cells in which is counted how much of what is met moves
+  double passage_share = 0.65;   ///< share of that from which the rest moves, too; 1: never
   bool presume_dynamic = true;   ///< zero latency: compact instances nobody has confirmed yet
 
   template <class Self, class Visitor>
@@ -99,6 +101,11 @@ struct FreeSpaceConfig {
                       "longer instances are not carried through time"});
     visitor(Parameter{"track_height", self.track_height, closed(0, 100), "m",
                       "higher instances are not carried through time"});
+    visitor(Parameter{"passage_cell", self.passage_cell, closed(0.1, 5), "m",
+                      "cells in which is counted how much of what is met there moves"});
+    visitor(Parameter{"passage_share", self.passage_share, half_open_below(0, 1), "",
+                      "share of what is met in a place that moves, from which the rest goes, too; "
+                      "1: never"});
     visitor(Parameter{"presume_dynamic", self.presume_dynamic, Bounds(), "",
                       "the zero-latency verdict calls compact instances dynamic whose place no "
                       "earlier scan has seen; without effect where that is final (horizon 0)"});

@@ -20,6 +20,7 @@
 #include "dynains/instance_samples.hpp"
 #include "dynains/instance_tracks.hpp"
 #include "dynains/moved_ground.hpp"
+#include "dynains/passages.hpp"
 #include "dynains/points.hpp"
 #include "dynains/reference_lags.hpp"
 #include "dynains/reference_views.hpp"
@@ -47,6 +48,7 @@ class FreeSpaceEvidence {
         track_level_(static_cast<float>(log_odds(config.tau_track))),
         linker_(config.track_cell, config.track_length, config.track_height, config.track_overlap),
         track_belief_(updater_.increment()),
+        passages_(config),
         moved_ground_(config),
         records_(static_cast<std::size_t>(config.horizon) + 2) {
     const int step = config.reference_step;
@@ -96,6 +98,7 @@ class FreeSpaceEvidence {
     if (scan == 0 || record_of(scan - 1).segment != segment) {
       T_origin_world_ = T_world_sensor.inverse();
       segment_begin_ = scan;
+      passages_.forget();
     }
     Record& record = record_of(scan);
     record.segment = segment;
@@ -106,6 +109,7 @@ class FreeSpaceEvidence {
     sampler_.sample(split.non_ground(), instance_of, instance_count, record.samples);
     if (record.at.phase == 0) views_.make_image(scan, segment, T_world_sensor, split);
     updater_.begin(record.samples, record.beliefs);
+    record.counted.assign(record.samples.supervoxel_count(), Passages::Count::kNone);
     predecessors_.assign(instance_count, kNoCluster);
     if (config_.use_tracks) track(scan, record);
 
@@ -125,9 +129,14 @@ class FreeSpaceEvidence {
   /// stands now. Nothing is presumed in a final verdict. `split`: that of the scan. The spans hold
   /// until the next call.
   EvidenceVerdict judge(std::uint64_t scan, bool is_final, const GroundSplit& split) {
-    const Record& record = record_of(scan);
+    Record& record = record_of(scan);
     judge_instances(scan, is_final, record);
     const InstanceSamples& samples = record.samples;
+    // Cells lie in the frame of the newest segment.
+    if (scan >= segment_begin_) {
+      passages_.judge(scan, samples, T_origin_world_ * record.T_world_sensor, record.counted,
+                      verdicts_);
+    }
     groups_.assign(1, {Cause::kNotJudged, 0.0F});
     groups_.resize(samples.met.size());
     for (std::size_t i = 1; i < samples.met.size(); ++i) groups_[i] = verdicts_[samples.met[i]];
@@ -165,7 +174,8 @@ class FreeSpaceEvidence {
     InstanceSamples samples;
     InstanceBeliefs beliefs;
     TrackedInstances tracked;
-    std::vector<GroundBox> ground_boxes;  // by 64 points of the ground
+    std::vector<Passages::Count> counted;  // by supervoxel
+    std::vector<GroundBox> ground_boxes;   // by 64 points of the ground
   };
 
   // Numbers of scans begin again: what is kept is of others.
@@ -361,9 +371,11 @@ class FreeSpaceEvidence {
   float track_level_;
   InstanceLinker linker_;
   TrackBelief track_belief_;
+  Passages passages_;
   MovedGround moved_ground_;
   SupervoxelGroups supervoxel_groups_;
-  // The first sensor of the segment, in whose frame cells of tracks lie wherever the world begins.
+  // The first sensor of the segment, in whose frame cells of tracks and passages lie wherever the
+  // world begins.
   Eigen::Isometry3d T_origin_world_ = Eigen::Isometry3d::Identity();
   std::uint64_t segment_begin_ = 0;  // first scan of the segment of the newest
   // By phase: scans to the references before and after.

@@ -11,8 +11,7 @@
 
 #include "dynains/curved_voxel_clusterer.hpp"
 #include "dynains/detail/cell_hash.hpp"
-#include "dynains/detail/lane_transform.hpp"
-#include "dynains/detail/wide_lanes.hpp"
+#include "dynains/detail/sample_places.hpp"
 #include "dynains/instance_samples.hpp"
 #include "dynains/points.hpp"
 
@@ -71,7 +70,7 @@ class InstanceLinker {
     out.instances.assign(samples.instance_count(), TrackedInstances::Instance());
     out.shapes.assign(samples.instance_count(), TrackedInstances::Shape());
     out.cells.clear();
-    find_cells(samples, T_origin_sensor);
+    detail::find_places(samples, cell_, T_origin_sensor, place_);
     table_.assign(kTable, kEmpty);
     for (std::uint32_t i = 0; i < samples.instance_count(); ++i) {
       TrackedInstances::Shape& shape = out.shapes[i];
@@ -125,25 +124,6 @@ class InstanceLinker {
   // Without the instance: cells of two scans meet in the same place.
   std::uint32_t& slot_of(const TrackedInstances::Cell& cell) {
     return table_[detail::place_hash(cell.place) % kTable];
-  }
-
-  // Cell of each sample.
-  void find_cells(const InstanceSamples& samples, const Eigen::Isometry3d& T_origin_sensor) {
-    using namespace detail;
-    const LaneTransform to_cells(
-        (Eigen::Scaling(1.0 / cell_) * T_origin_sensor.matrix().topRows<3>()).cast<float>());
-    place_.resize(samples.size());
-    for_lanes(samples.size(), [&](auto at) {
-      using Float = typename decltype(at)::Float;
-      const Float x = at.load(samples.points.x.data());
-      const Float y = at.load(samples.points.y.data());
-      const Float z = at.load(samples.points.z.data());
-      std::int32_t cell[3][kLanes];
-      for (std::size_t axis = 0; axis < 3; ++axis) floor(to_cells(axis, x, y, z)).store(cell[axis]);
-      for (std::size_t lane = 0; lane < at.size(); ++lane) {
-        place_[at.begin + lane] = pack_place(cell[0][lane], cell[1][lane], cell[2][lane]);
-      }
-    });
   }
 
   void measure_extent(const PointBuffer& points, std::uint32_t begin, std::uint32_t end,

@@ -67,7 +67,7 @@ TEST_CASE("a cause is one of movement if and only if the label is, at once and f
 TEST_CASE("which causes remove a point") {
   std::size_t count = 0;
   for (std::size_t i = 0; i < kCauseCount; ++i) count += is_dynamic(static_cast<Cause>(i)) ? 1 : 0;
-  CHECK(count == 6);
+  CHECK(count == 7);
   CHECK(is_dynamic(Cause::kProposed));
   CHECK_FALSE(is_dynamic(Cause::kReverted));
 }

@@ -25,6 +25,7 @@ inline constexpr std::array<const char*, kCauseCount> kCauseNames = {"unknown",
                                                                      "along its track",
                                                                      "presumed",
                                                                      "seen occupied",
-                                                                     "seen free too little"};
+                                                                     "seen free too little",
+                                                                     "in a passage"};
 
 }  // namespace dynains::evaluation

@@ -1,0 +1,218 @@
+// Places that movers pass, against counts that are never forgotten, and by hand.
+#include "dynains/passages.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <tuple>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+namespace dynains::test {
+namespace {
+
+using Count = Passages::Count;
+using Verdict = Passages::Verdict;
+
+// A scan of single points, each a supervoxel of its own, and what is said of them.
+struct SparseScan {
+  InstanceSamples samples;
+  std::vector<Count> counted;
+  std::vector<Verdict> verdicts;
+
+  explicit SparseScan(const std::vector<Eigen::Vector3f>& points) {
+    PointBuffer buffer;
+    for (const Eigen::Vector3f& p : points) buffer.push_back(p.x(), p.y(), p.z());
+    std::vector<std::uint32_t> instance_of(points.size());
+    for (std::uint32_t i = 0; i < instance_of.size(); ++i) instance_of[i] = i;
+    InstanceSampler(0.3, 0.9, 80.0, 4).sample(buffer, instance_of, points.size(), samples);
+    counted.assign(samples.supervoxel_count(), Count::kNone);
+  }
+
+  void say(Cause cause, float belief = 0.5F) { verdicts.assign(counted.size(), {cause, belief}); }
+};
+
+constexpr float kBelief = 0.625F;
+
+FreeSpaceConfig three_quarters() {
+  FreeSpaceConfig config;
+  config.passage_share = 0.75;
+  return config;
+}
+
+// The cause of a point that stays, if so many in its place moved and stayed before.
+Verdict verdict_behind(int moved, int stayed, FreeSpaceConfig config = three_quarters(),
+                       std::uint64_t later = 1, Cause cause_of_moved = Cause::kFreeSpace) {
+  Passages passages(config);
+  const Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  const std::vector<Eigen::Vector3f> place(1, {10.1F, 5.2F, 0.3F});
+  std::uint64_t scan = 0;
+  for (int i = 0; i < moved + stayed; ++i) {
+    SparseScan one(place);
+    one.say(i < moved ? cause_of_moved : Cause::kOccupied);
+    passages.judge(scan++, one.samples, T, one.counted, one.verdicts);
+  }
+  SparseScan last(place);
+  last.say(Cause::kOccupied, kBelief);
+  passages.judge(scan - 1 + later, last.samples, T, last.counted, last.verdicts);
+  return last.verdicts[0];
+}
+
+TEST_CASE("what stays where nearly all else moved goes, too") {
+  // The point itself is one that stays.
+  CHECK(verdict_behind(4, 0).cause == Cause::kInPassage);  // 4 of 5
+  CHECK(verdict_behind(3, 0).cause == Cause::kOccupied);   // 3 of 4: not above the share
+  CHECK(verdict_behind(7, 1).cause == Cause::kInPassage);  // 7 of 9
+  CHECK(verdict_behind(6, 1).cause == Cause::kOccupied);   // 6 of 8
+  FreeSpaceConfig half = three_quarters();
+  half.passage_share = 0.5;
+  CHECK(verdict_behind(3, 0, half).cause == Cause::kInPassage);
+  CHECK(verdict_behind(2, 0, half).cause == Cause::kOccupied);  // two samples may be chance
+}
+
+TEST_CASE("the belief in a passage is the share that moved, unless more was known") {
+  CHECK(verdict_behind(4, 0).belief == Approx(0.8F));
+  CHECK(verdict_behind(3, 0).belief == kBelief);
+}
+
+TEST_CASE("passages are forgotten when no scan met them for as long as anything is remembered") {
+  FreeSpaceConfig config = three_quarters();
+  config.memory = 20;
+  CHECK(verdict_behind(8, 0, config, 20).cause == Cause::kInPassage);
+  CHECK(verdict_behind(8, 0, config, 21).cause == Cause::kOccupied);
+}
+
+TEST_CASE("what is presumed to move makes no passage, and a share of 1 knows none") {
+  CHECK(verdict_behind(8, 0, three_quarters(), 1, Cause::kPresumed).cause == Cause::kOccupied);
+  FreeSpaceConfig never;
+  never.passage_share = 1.0;
+  CHECK(verdict_behind(100, 0, never).cause == Cause::kOccupied);
+}
+
+TEST_CASE("a later verdict on a scan counts in the place of the one before") {
+  Passages passages(three_quarters());
+  const Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  const std::vector<Eigen::Vector3f> place(1, {-3.0F, 4.0F, 1.0F});
+  std::vector<SparseScan> scans(5, SparseScan(place));
+  const auto judge = [&](std::uint64_t scan, Cause cause) {
+    SparseScan& one = scans[scan];
+    one.say(cause);
+    passages.judge(scan, one.samples, T, one.counted, one.verdicts);
+    return one.verdicts[0].cause;
+  };
+  for (std::uint64_t scan = 0; scan < 4; ++scan) judge(scan, Cause::kFreeSpace);
+  // Asked again and again, it counts once: 4 of 5.
+  for (int i = 0; i < 10; ++i) CHECK(judge(4, Cause::kOccupied) == Cause::kInPassage);
+  // One of those that moved did not: 3 of 5. And then it did.
+  CHECK(judge(0, Cause::kOccupied) == Cause::kOccupied);
+  CHECK(judge(4, Cause::kOccupied) == Cause::kOccupied);
+  CHECK(judge(0, Cause::kAlongTrack) == Cause::kAlongTrack);
+  CHECK(judge(4, Cause::kOccupied) == Cause::kInPassage);
+  passages.forget();
+  scans[4].counted.assign(1, Count::kNone);
+  CHECK(judge(4, Cause::kOccupied) == Cause::kOccupied);
+}
+
+TEST_CASE("passages lie in the world: a sensor that moves and turns finds them again") {
+  FreeSpaceConfig config;
+  config.passage_share = 0.5;
+  Passages passages(config);
+  const Eigen::Vector3f place(20.3F, -7.7F, 0.3F);  // the middle of a cell
+  for (std::uint64_t scan = 0; scan < 10; ++scan) {
+    Eigen::Isometry3d T_origin_sensor = Eigen::Isometry3d::Identity();
+    T_origin_sensor.translate(Eigen::Vector3d(1.5 * static_cast<double>(scan), 0.3, 0.1));
+    T_origin_sensor.rotate(
+        Eigen::AngleAxisd(0.3 * static_cast<double>(scan), Eigen::Vector3d::UnitZ()));
+    const std::vector<Eigen::Vector3f> seen(1, T_origin_sensor.inverse().cast<float>() * place);
+    SparseScan one(seen);
+    one.say(scan < 9 ? Cause::kFreeSpace : Cause::kOccupied);
+    passages.judge(scan, one.samples, T_origin_sensor, one.counted, one.verdicts);
+    if (scan == 9) CHECK(one.verdicts[0].cause == Cause::kInPassage);
+  }
+}
+
+TEST_CASE("passages are those of slow counts") {
+  Random random(11);
+  FreeSpaceConfig config;
+  config.passage_share = 0.6;
+  Passages passages(config);
+  struct Counts {
+    int moved = 0, stayed = 0;
+  };
+  std::map<std::tuple<int, int, int>, Counts> cells;
+  std::size_t in_passages = 0, stay = 0;
+  for (std::uint64_t scan = 0; scan < 40; ++scan) {
+    std::vector<Eigen::Vector3f> points;
+    for (int i = 0; i < 300; ++i) {
+      points.push_back(random.vector({-5, -5, -1}, {5, 5, 1}).cast<float>());
+    }
+    SparseScan one(points);
+    const auto cell_of = [&](std::size_t s) {
+      const std::uint32_t i = one.samples.sample_begin[s];
+      const auto index = [](float coordinate) {
+        return static_cast<int>(std::floor(coordinate * (1.0F / 0.6F)));
+      };
+      return std::make_tuple(index(one.samples.points.x[i]), index(one.samples.points.y[i]),
+                             index(one.samples.points.z[i]));
+    };
+    one.say(Cause::kOccupied);
+    for (std::size_t s = 0; s < one.counted.size(); ++s) {
+      // Movers pass on one side more often than on the other.
+      const double chance = one.samples.points.x[one.samples.sample_begin[s]] > 0 ? 0.75 : 0.3;
+      if (random.uniform(0, 1) < chance) one.verdicts[s].cause = Cause::kWithInstance;
+      Counts& counts = cells[cell_of(s)];
+      ++(is_dynamic(one.verdicts[s].cause) ? counts.moved : counts.stayed);
+    }
+    const std::vector<Verdict> said = one.verdicts;
+    passages.judge(scan, one.samples, Eigen::Isometry3d::Identity(), one.counted, one.verdicts);
+    for (std::size_t s = 0; s < said.size(); ++s) {
+      if (is_dynamic(said[s].cause)) {
+        REQUIRE(one.verdicts[s] == said[s]);
+        continue;
+      }
+      const Counts& counts = cells[cell_of(s)];
+      const bool expected =
+          counts.moved >= 3 && 10 * counts.moved > 6 * (counts.moved + counts.stayed);
+      REQUIRE((one.verdicts[s].cause == Cause::kInPassage) == expected);
+      ++(expected ? in_passages : stay);
+    }
+  }
+  CHECK(in_passages > 500);
+  CHECK(stay > 500);
+}
+
+TEST_CASE("of a supervoxel of many samples, a quarter must lie in a passage") {
+  FreeSpaceConfig config;
+  config.passage_share = 0.5;
+  Passages passages(config);
+  const Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  const std::vector<Eigen::Vector3f> passed(1, {0.15F, 0.15F, 0.15F});
+  std::uint64_t scan = 0;
+  for (; scan < 20; ++scan) {
+    SparseScan one(passed);
+    one.say(Cause::kFreeSpace);
+    passages.judge(scan, one.samples, T, one.counted, one.verdicts);
+  }
+  // In a row, one sample in 0.3 m: the first two of them lie in the cell that was passed.
+  const auto cause_of_row = [&](int length) {
+    PointBuffer points;
+    for (int i = 0; i < length; ++i)
+      points.push_back(0.15F + 0.3F * static_cast<float>(i), 0.15F, 0.15F);
+    const std::vector<std::uint32_t> one_instance(static_cast<std::size_t>(length), 0);
+    InstanceSamples samples;
+    InstanceSampler(0.3, 4.8, 80.0, 64).sample(points, one_instance, 1, samples);
+    REQUIRE(samples.supervoxel_count() == 1);
+    REQUIRE(samples.size() == static_cast<std::size_t>(length));
+    std::vector<Count> counted(1, Count::kNone);
+    std::vector<Verdict> verdicts(1, {Cause::kOccupied, 0.5F});
+    passages.judge(scan++, samples, T, counted, verdicts);
+    return verdicts[0].cause;
+  };
+  CHECK(cause_of_row(8) == Cause::kInPassage);
+  CHECK(cause_of_row(9) == Cause::kOccupied);
+}
+
+}  // namespace
+}  // namespace dynains::test
