@@ -180,6 +180,27 @@ TEST_CASE("what stands and is seen to stand is no evidence for a movement, howev
   }
 }
 
+TEST_CASE("what a later scan shows of an instance is known of it in the scans beside, too") {
+  FreeSpaceConfig config = every_scan_a_reference();
+  const auto causes = [&config] {
+    Watch watch(config);
+    watch.see(PointBuffer(), PointBuffer());
+    watch.see(car(), PointBuffer()).see(car(), PointBuffer());
+    CHECK(watch.causes(1) == Causes{Cause::kNoEvidence});
+    watch.see(PointBuffer());  // two scans behind the first of both
+    CHECK(watch.removes(1));
+    return watch.causes(2);
+  };
+  // Two units of 0.847, faded by 0.95: 1.61, a belief of 0.833.
+  config.tau_track = 0.83;
+  CHECK(causes() == Causes{Cause::kAlongTrack});
+  config.tau_track = 0.84;
+  CHECK(causes() == Causes{Cause::kNoEvidence});
+  config.tau_track = 0.83;
+  config.use_tracks = false;
+  CHECK(causes() == Causes{Cause::kNoEvidence});
+}
+
 // For one scan, both are one instance.
 TEST_CASE("what stood long before does not go with what was seen to pass beside it") {
   FreeSpaceConfig config = every_scan_a_reference();
