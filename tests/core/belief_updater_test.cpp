@@ -98,6 +98,11 @@ TEST_CASE("the prior enters once") {
   CHECK(posterior_after(config, {{1.0F}}, {2.0F}) == Approx(7.0 / 19.0).epsilon(1e-12));
   CHECK(posterior_after(config, {{1.0F}, {2.0F}}, {2.0F}) ==
         Approx(7.0 / 25.0).epsilon(1e-12));  // and the odds 2/3 of one like cell: 7/18
+  BeliefUpdater belief(config);
+  const Heights half = {1.0F}, whole = {2.0F};
+  belief.update(half, whole);
+  belief.reset();
+  CHECK(belief.posterior() == Approx(0.2).epsilon(1e-12));
 }
 
 TEST_CASE("a cell of exactly tau_rho agrees, one just below differs") {

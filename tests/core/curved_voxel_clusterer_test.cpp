@@ -100,6 +100,10 @@ TEST_CASE("clusters are those of a breadth-first search over all 26 neighbours")
        make(0.5, 2.0, 3.0, 30.0),
        {25, 35, -180, 180, -10, 10},
        1500},
+      {"a horizon in the middle of a voxel",
+       make(0.5, 2.0, 3.0, 30.3),
+       {25, 35, -180, 180, -10, 10},
+       1500},
   }));
   INFO(c.why);
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
@@ -215,6 +219,37 @@ TEST_CASE("points that are not numbers belong to no cluster and disturb none") {
   CHECK(clusters(make(0.5, 0.5, 3.0), points.view()) ==
         std::vector<std::uint32_t>{0, kNoCluster, kNoCluster, kNoCluster, 0});
   CHECK(clusters(Config(), PolarView()).empty());
+}
+
+TEST_CASE("voxels that are left to the sensor suit its beams, those that are given stay") {
+  SensorModel sensor;
+  sensor.azimuth_step = 0.4;
+  sensor.elevation_gap = 2.0;
+  sensor.elevation_gap_wide = 3.0;
+  // 0.75 * (0.4 + 2.0) = 1.8.
+  CHECK(Config().resolved(sensor).voxel_azimuth == Approx(1.8));
+  CHECK(Config().resolved(sensor).voxel_elevation == Approx(3.0));
+  sensor.elevation_gap_wide = 1.0;
+  CHECK(Config().resolved(sensor).voxel_elevation == Approx(1.8));
+  const Config dense = Config().resolved(SensorModel());
+  CHECK(dense.voxel_azimuth == 0.5);
+  CHECK(dense.voxel_elevation == 1.0);
+  const Config given = make(0.5, 0.7, 4.0).resolved(sensor);
+  CHECK(given.voxel_azimuth == 0.7);
+  CHECK(given.voxel_elevation == 4.0);
+
+  CHECK(CurvedVoxelClusterer(make(0.5, 0.7, 0.0)).needs_sensor());
+  CHECK(CurvedVoxelClusterer(make(0.5, 0.0, 4.0)).needs_sensor());
+  CHECK_FALSE(CurvedVoxelClusterer(make(0.5, 0.7, 4.0)).needs_sensor());
+
+  // Neighbouring voxels of 1.8 deg, but not of the 0.5 deg that suit a typical sensor.
+  PolarBuffer points;
+  add(points, 10.0, 0.9, 0.0);
+  add(points, 10.0, 2.7, 0.0);
+  CurvedVoxelClusterer clusterer;
+  CHECK(clusters(clusterer, points.view()) == std::vector<std::uint32_t>{0, 1});
+  clusterer.adapt(sensor);
+  CHECK(clusters(clusterer, points.view()) == std::vector<std::uint32_t>{0, 0});
 }
 
 TEST_CASE("voxels of the largest grid that is allowed are told apart") {

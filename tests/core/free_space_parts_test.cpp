@@ -476,6 +476,87 @@ TEST_CASE("instances of consecutive scans are linked where they overlap") {
   CHECK(tracked[1].shapes[0].length == Approx(3.8).margin(0.3));
 }
 
+// Instances that occupy some cells of a row.
+TrackedInstances tracked_in(const std::vector<std::vector<int>>& cells_of) {
+  TrackedInstances tracked;
+  tracked.instances.resize(cells_of.size());
+  tracked.shapes.resize(cells_of.size());
+  for (std::uint32_t i = 0; i < cells_of.size(); ++i) {
+    for (const int x : cells_of[i]) tracked.cells.push_back({pack_place(x, 0, 0), i});
+    tracked.shapes[i].cells = static_cast<std::uint32_t>(cells_of[i].size());
+  }
+  return tracked;
+}
+
+TEST_CASE("of several that it overlaps, an instance is linked to that with which it shares most") {
+  InstanceLinker linker(0.8, 18.0, 4.5, 0.25);
+  const TrackedInstances whole = tracked_in({{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}});
+  const TrackedInstances parts = tracked_in({{0, 1, 2}, {3, 4, 5, 6, 7, 8}, {9, 10, 11}, {40}});
+  TrackedInstances before = whole, now = parts;
+  linker.link(before, now);
+  CHECK(before.instances[0].next == 1);
+  for (const std::size_t i : {0U, 1U, 2U}) CHECK(now.instances[i].previous == 0);
+  CHECK(now.instances[3].previous == kNoCluster);
+
+  before = parts;
+  now = whole;
+  linker.link(before, now);
+  CHECK(now.instances[0].previous == 1);
+  for (const std::size_t i : {0U, 1U, 2U}) CHECK(before.instances[i].next == 0);
+
+  // Two of eleven cells are less than a quarter, and nothing is left of the scans before.
+  before = tracked_in({{0, 1}});
+  now = tracked_in({{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10}});
+  linker.link(before, now);
+  CHECK(now.instances[0].previous == kNoCluster);
+  before = tracked_in({});
+  now = whole;
+  linker.link(before, now);
+  CHECK(now.instances[0].previous == kNoCluster);
+}
+
+TEST_CASE("instances without a common cell are not linked, however many cells they have") {
+  InstanceLinker linker(0.8, 18.0, 4.5, 0.25);
+  Random random(17);
+  std::vector<int> some, others;
+  for (int i = 0; i < 100000; ++i) (random.index(2) == 0 ? some : others).push_back(i);
+  TrackedInstances before = tracked_in({some}), now = tracked_in({others});
+  linker.link(before, now);
+  CHECK(now.instances[0].previous == kNoCluster);
+  CHECK(before.instances[0].next == kNoCluster);
+}
+
+TEST_CASE("what is too long, too high or a single sample is not carried") {
+  struct Case {
+    float length, height;
+    int samples;
+    bool carried;
+  };
+  for (const Case& c : {
+           Case{2.9F, 3.9F, 2, true},
+           Case{3.1F, 3.9F, 2, false},
+           Case{2.9F, 4.1F, 2, false},
+           Case{0.0F, 0.0F, 1, false},
+       }) {
+    PointBuffer points;
+    points.push_back(10.0F, 5.0F, -1.0F);
+    // The diagonal counts: 3, 4, 5.
+    if (c.samples > 1) {
+      points.push_back(10.0F + 0.6F * c.length, 5.0F - 0.8F * c.length, c.height - 1.0F);
+    }
+    InstanceSampler sampler(0.3, 0.6, 80.0, kNoLimit);
+    InstanceSamples samples;
+    const std::vector<std::uint32_t> instance_of(points.size(), 0);
+    sampler.sample(points, instance_of, 1, samples);
+    InstanceLinker linker(0.8, 3.0, 4.0, 0.25);
+    TrackedInstances tracked;
+    linker.measure(samples, Eigen::Isometry3d::Identity(), tracked);
+    CAPTURE(c.length, c.height, c.samples);
+    CHECK(tracked.shapes[0].carried == c.carried);
+    CHECK(tracked.cells.empty() == !c.carried);
+  }
+}
+
 TEST_CASE("belief along a track fades by 0.95 a scan, and old hits contradict it") {
   constexpr float kUnit = 0.8472979F;  // log-odds of 0.7
   const TrackBelief belief(kUnit);
@@ -496,7 +577,14 @@ TEST_CASE("belief along a track fades by 0.95 a scan, and old hits contradict it
   now.instances[0].hit_back = 10;
   belief.run_forward(&before, now);
   CHECK(now.instances[0].forward == 0.0F);
-  // Its own evidence outweighs that; the sum stops at four units.
+  // Its own evidence outweighs that; the sum stops at four units, and one below zero.
+  now.instances[0].own = kUnit;
+  belief.run_forward(&before, now);
+  CHECK(now.instances[0].forward == Approx((1.0F + 0.95F * 2.0F) * kUnit));
+  CHECK(now.instances[0].since_forward == 0);
+  now.instances[0].own = -9.0F * kUnit;
+  belief.run_forward(&before, now);
+  CHECK(now.instances[0].forward == Approx(-kUnit));
   now.instances[0].own = 4.0F * kUnit;
   belief.run_forward(&before, now);
   CHECK(now.instances[0].forward == Approx(4.0F * kUnit));
@@ -504,8 +592,14 @@ TEST_CASE("belief along a track fades by 0.95 a scan, and old hits contradict it
   before.instances[0].next = 0;
   belief.run_backward(nullptr, now);
   before.instances[0].own = 0.0F;
+  before.instances[0].hit_back = 100;
+  before.instances[0].hit_ahead = 9;
   belief.run_backward(&now, before);
   CHECK(before.instances[0].backward == Approx(0.95F * 4.0F * kUnit));
+  CHECK(before.instances[0].since_backward == 1);
+  before.instances[0].hit_ahead = 10;
+  belief.run_backward(&now, before);
+  CHECK(before.instances[0].backward == 0.0F);
 }
 
 TEST_CASE("the beams of a sensor are measured from one scan") {
@@ -528,6 +622,29 @@ TEST_CASE("the beams of a sensor are measured from one scan") {
   CHECK(sensor.elevation_min == Approx(-15.0).margin(0.1));
   CHECK(sensor.elevation_max == Approx(4.5).margin(0.1));
   CHECK_FALSE(estimate_sensor_model(PointsView(points).subview(0, 499)).known());
+  CHECK(estimate_sensor_model(PointsView(points).subview(0, 500)).known());
+}
+
+TEST_CASE("of a sensor whose beams are not evenly spaced, dense and wide gaps are told apart") {
+  // 24 gaps: ten of 0.3 deg, eight of 0.6 deg, six of 1.2 deg. Each beam is measured twice.
+  PointBuffer points;
+  double elevation = -10.0;
+  for (int beam = 0; beam < 25; ++beam) {
+    for (int column = 0; column < 1800; ++column) {
+      for (const double again : {0.0, 0.002}) {
+        const double azimuth = (0.2 * column - 180.0 + again) * M_PI / 180.0;
+        const double up = elevation * M_PI / 180.0;
+        points.push_back(static_cast<float>(20.0 * std::cos(up) * std::cos(azimuth)),
+                         static_cast<float>(20.0 * std::cos(up) * std::sin(azimuth)),
+                         static_cast<float>(20.0 * std::sin(up)));
+      }
+    }
+    elevation += beam < 10 ? 0.3 : beam < 18 ? 0.6 : 1.2;
+  }
+  const SensorModel sensor = estimate_sensor_model(points);
+  CHECK(sensor.azimuth_step == Approx(0.2).margin(0.01));
+  CHECK(sensor.elevation_gap == Approx(0.3).margin(0.01));
+  CHECK(sensor.elevation_gap_wide == Approx(1.2).margin(0.01));
 }
 
 }  // namespace

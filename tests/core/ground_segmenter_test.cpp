@@ -276,15 +276,16 @@ TEST_CASE("a patch more than ground_step over most of those around it is not gro
     std::size_t around = 8;  // patches around it
     std::size_t low = 8;     // of these, as many lie on the floor, and the others as high as it
     int zone = 2;
+    int sector = 20;
   };
   const auto is_ground = [](const Scene& scene) {
-    constexpr int kAround[8][2] = {{2, 19}, {2, 20}, {2, 21}, {1, 19},
-                                   {1, 21}, {0, 19}, {0, 20}, {0, 21}};  // ring, sector
+    constexpr int kAround[8][2] = {{2, -1}, {1, -1}, {0, -1}, {2, 0},
+                                   {0, 0},  {2, 1},  {1, 1},  {0, 1}};  // ring, sectors beside
     PointBuffer points;
-    add_patch(scene.zone, 1, 20, scene.lift, scene.slope, points);
+    add_patch(scene.zone, 1, scene.sector, scene.lift, scene.slope, points);
     for (std::size_t i = 0; i < scene.around; ++i) {
       const double lift = i < scene.low ? 0.0 : scene.lift;
-      add_patch(scene.zone, kAround[i][0], kAround[i][1], lift, scene.slope, points);
+      add_patch(scene.zone, kAround[i][0], scene.sector + kAround[i][1], lift, scene.slope, points);
     }
     Config config;
     config.ground_step = scene.step;
@@ -310,6 +311,40 @@ TEST_CASE("a patch more than ground_step over most of those around it is not gro
   CHECK_FALSE(is_ground({1.0, 0.0, 0.5, 4}));
   // In the outermost zone, they are too far apart.
   CHECK(is_ground({1.0, 0.0, 0.5, 8, 8, 3}));
+  // The first sector lies beside the last one: four patches, three of them across the seam.
+  CHECK(is_ground({1.0, 0.0, 0.5, 3, 8, 2, 0}));
+  CHECK_FALSE(is_ground({1.0, 0.0, 0.5, 4, 8, 2, 0}));
+}
+
+TEST_CASE("whether a patch hangs is told by the scan at hand, not by the one before") {
+  PointBuffer around, alone;
+  for (const int ring : {0, 2}) {
+    for (const int sector : {19, 20, 21}) add_patch(2, ring, sector, 0.0, 0.0, around);
+  }
+  add_patch(2, 1, 20, 1.0, 0.0, alone);
+  GroundSegmenter segmenter;
+  CHECK(ground_of(segmenter, around)[0]);
+  CHECK(ground_of(segmenter, alone)[0]);
+}
+
+TEST_CASE("the height of a patch is that over the ground of the sensor, found or given") {
+  // 0.6 m over the ground of a sensor as high as kSensorHeight, 0.1 m under that of a lower one.
+  const PointBuffer points = patch_of_plane(0.0, 400, 0.6);
+  Config config;
+  config.ground_elevation[1] = 0.5;
+  config.ground_flatness[1] = 0.0;
+  SensorModel low = SensorModel::typical();
+  low.height = kSensorHeight - 0.7;
+  GroundSegmenter found(config);
+  CHECK(found.needs_sensor());
+  CHECK_FALSE(ground_of(found, points)[0]);
+  found.adapt(low);
+  CHECK(ground_of(found, points)[0]);
+  config.sensor_height = kSensorHeight;
+  GroundSegmenter given(config);
+  CHECK_FALSE(given.needs_sensor());
+  given.adapt(low);
+  CHECK_FALSE(ground_of(given, points)[0]);
 }
 
 TEST_CASE("points outside the rings are not ground") {

@@ -314,6 +314,45 @@ TEST_CASE("an instance that one reference saw through as a whole is removed") {
   CHECK(few.beliefs.wholes[0].level == Approx(2.0F * kFreeStep));
 }
 
+TEST_CASE("to remove an instance that was hit, one reference has to see through nearly all of it") {
+  const std::vector<std::uint32_t> supervoxels(5, 20);
+  const std::vector<Scan::Seen> standing(5, {0, 2}), wholly(5, {2, 0});
+  Scan scan(Instances{supervoxels});
+  scan.see(standing);
+  scan.see({{2, 1}, {2, 1}, {2, 2}, {2, 2}, {2, 0}});
+  CHECK(scan.beliefs.wholes[0].peak == Approx(kFreeStep));
+  CHECK_FALSE(scan.removes());  // below the 1.66 of tau_whole
+
+  Scan gone(Instances{supervoxels});
+  gone.see(standing);
+  gone.see(wholly);
+  CHECK(gone.beliefs.wholes[0].peak == Approx(2.0F * kFreeStep));
+  CHECK(gone.beliefs.shares[0].moved == 0);
+  CHECK(gone.removes());  // 1.69, though below the 2.20 of tau_contested
+}
+
+TEST_CASE("the caller is told of which instances anything changed") {
+  Scan scan(Instances{{4, 4}, {20, 20, 20, 20, 20}, {20, 20, 20, 20, 20}, {4}});
+  for (int round = 0; round < 2; ++round) {
+    std::fill(scan.beliefs.changed.begin(), scan.beliefs.changed.end(), std::uint8_t{0});
+    // Of the first a part alone, of the last nothing, and when the others are seen like that again,
+    // the whole alone.
+    scan.see({{4, 0},
+              {0, 4},
+              {2, 0},
+              {2, 0},
+              {2, 0},
+              {2, 0},
+              {2, 0},
+              {0, 2},
+              {0, 2},
+              {0, 2},
+              {0, 2},
+              {0, 2}});
+    CHECK(scan.beliefs.changed == std::vector<std::uint8_t>{1, 1, 1, 0});
+  }
+}
+
 TEST_CASE("an instance is told to be still there where nearly all that is seen of it is") {
   Scan scan(Instances{{10}, {10}, {10}, {10}});
   // Of the second too little is seen, of the third too much is free, of the last nothing is seen.

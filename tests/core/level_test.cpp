@@ -105,14 +105,31 @@ TEST_CASE(
   CHECK(plain.sensor().R_level_sensor().isIdentity(0.0));
 }
 
+TEST_CASE("a tilt of more than four degrees is levelled, and the height of the sensor is found") {
+  for (const double pitch : {3.0, 5.0}) {
+    for (const double height : {1.2, 2.6}) {
+      Eigen::Isometry3d T_world_sensor = sensor_at(0.0);
+      T_world_sensor.translation().z() = height;
+      T_world_sensor.rotate(slant(pitch, 0.0));
+      DynaInsRemover remover;
+      run(remover, {yard().scan(T_world_sensor, 0.0)});
+      CAPTURE(pitch, height);
+      CHECK(remover.sensor().is_level() == (pitch < 4.0));
+      CHECK(remover.sensor().height == Approx(height).margin(0.03));
+    }
+  }
+}
+
 TEST_CASE("a given tilt is taken at its word") {
-  const std::vector<Scan> scans = drive_slanted(20.0, -10.0);
+  const auto [pitch, roll] =
+      GENERATE(std::pair(20.0, -10.0), std::pair(20.0, 0.0), std::pair(0.0, -20.0));
+  const std::vector<Scan> scans = drive_slanted(pitch, roll);
   Config config;
-  config.mounting_pitch = 20.0;
-  config.mounting_roll = -10.0;
+  config.mounting_pitch = pitch;
+  config.mounting_roll = roll;
   DynaInsRemover remover(config);
   const std::vector<Verdict> verdicts = run(remover, scans).final;
-  const Eigen::Vector3d up = slant(20.0, -10.0).row(2);
+  const Eigen::Vector3d up = slant(pitch, roll).row(2);
   CHECK((remover.sensor().R_level_sensor() * up).isApprox(Eigen::Vector3d::UnitZ(), 1e-9));
   CHECK(share(scans, verdicts, PointLabel::kDynamic, kAddedBox).value() > 0.9);
 

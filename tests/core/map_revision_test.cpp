@@ -2,6 +2,7 @@
 #include "dynains/map_revision.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -31,6 +32,23 @@ class Eyes {
 
  private:
   Sight sight_;
+  detail::Sights sights_;
+};
+
+/// A scan that sees no more than the first points, and these free.
+class NarrowEyes {
+ public:
+  explicit NarrowEyes(std::size_t most) : most_(most) {}
+  const detail::Sights& operator()(const PointBuffer&, std::size_t count,
+                                   const Eigen::Isometry3d&) {
+    std::vector<Sight> seen(count, Sight::kNothing);
+    std::fill_n(seen.begin(), std::min(count, most_), Sight::kFree);
+    sights_ = sights_of(seen);
+    return sights_;
+  }
+
+ private:
+  std::size_t most_;
   detail::Sights sights_;
 };
 
@@ -83,6 +101,36 @@ TEST_CASE("a hit takes back what was seen free before, and no more than that") {
   CHECK(watched.map.empty());
 }
 
+TEST_CASE("a scan that sees little of a block says nothing of it") {
+  PointBuffer eight;
+  for (int i = 0; i < 8; ++i) {
+    eight.push_back(5.1F + 0.2F * static_cast<float>(i % 4), 0.1F,
+                    0.1F + 0.2F * static_cast<float>(i / 4));
+  }
+  struct Case {
+    PointBuffer points;
+    std::size_t seen;
+    bool enough;
+  };
+  for (const Case& c : {
+           Case{three_points(5.1F), 1, false},
+           Case{three_points(5.1F), 2, true},
+           Case{eight, 2, false},  // a quarter
+           Case{eight, 3, true},
+       }) {
+    MapRevision revision(Watched::every_scan());
+    StaticMapAccumulator map;
+    map.insert(c.points, {}, Eigen::Isometry3d::Identity());
+    REQUIRE(map.size() == c.points.size());
+    REQUIRE(map.block_count() == 1);
+    for (std::uint64_t scan = 0; scan < 2; ++scan) {
+      revision.revise(map, scan, Eigen::Vector3d::Zero(), NarrowEyes(c.seen));
+    }
+    INFO(c.seen << " of " << c.points.size());
+    CHECK(map.empty() == c.enough);
+  }
+}
+
 TEST_CASE("tau_revise says how much it takes") {
   MapRevision::Config config = Watched::every_scan();
   config.tau_revise = 0.84;  // log-odds 1.66
@@ -119,6 +167,7 @@ TEST_CASE("places that were emptied are filled again, with the memory of before"
   const std::size_t memory = watched.map.memory_bytes();
   for (int round = 0; round < 2000; ++round) {
     watched.look(Sight::kFree);
+    REQUIRE(watched.map.size() == 3);
     watched.look(Sight::kFree);
     REQUIRE(watched.map.empty());
     watched.map.insert(three_points(5.1F), {}, Eigen::Isometry3d::Identity());

@@ -120,6 +120,8 @@ TEST_CASE("What makes a sensor level is the smallest turn that does, upside down
       CHECK((R - slow.toRotationMatrix()).norm() < 1e-12);
     }
   }
+  mounting.up_sensor = {0.0, 0.0, std::nextafter(1.0, 2.0)};  // as normals round
+  CHECK(mounting.tilt() == 0.0);
   mounting.up_sensor = -Eigen::Vector3d::UnitZ();
   CHECK(mounting.R_level_sensor() ==
         Eigen::Matrix3d(Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal()));
@@ -163,6 +165,42 @@ TEST_CASE("Without ground, the mounting is not known") {
     cloud.push_back(x, y, coordinate());
   }
   CHECK_FALSE(estimate_mounting(cloud).known);
+}
+
+TEST_CASE("Of two planes, that is the ground which has nothing below it, even if it is smaller") {
+  PointBuffer points;
+  for (float b = -9.0F; b < 9.0F; b += 0.23F) {
+    for (float a = -9.0F; a < 0.0F; a += 0.23F) points.push_back(a, b, -1.0F);
+    for (float a = 0.0F; a < 8.0F; a += 0.23F) points.push_back(a, b, -2.5F);
+  }
+  const Mounting mounting = estimate_mounting(points);
+  REQUIRE(mounting.known);
+  CHECK(std::abs(mounting.height - 2.5) < 0.02);
+}
+
+TEST_CASE(
+    "A plane is no ground if more lies below it than on it, or if it is a small part of all") {
+  const auto is_known = [](std::size_t below, std::size_t above) {
+    PointBuffer points;
+    for (float a = -2.5F; a < 2.5F; a += 0.23F) {  // a platform of a hundred cells
+      for (float b = -2.5F; b < 2.5F; b += 0.23F) points.push_back(a, b, -1.0F);
+    }
+    dynains::test::Random random(7);
+    const auto scatter = [&](std::size_t count, float low, float high) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const float x = random.uniform_float(-9.0, 9.0), y = random.uniform_float(-9.0, 9.0);
+        points.push_back(x, y, random.uniform_float(low, high));
+      }
+    };
+    scatter(below, -9.0F, -1.6F);
+    scatter(above, 0.0F, 14.0F);
+    return estimate_mounting(points).known;
+  };
+  CHECK(is_known(0, 0));
+  CHECK(is_known(60, 0));
+  CHECK_FALSE(is_known(150, 0));
+  CHECK(is_known(0, 1000));
+  CHECK_FALSE(is_known(0, 4000));
 }
 
 TEST_CASE("Height and tilt of every sensor in every simulated scene") {

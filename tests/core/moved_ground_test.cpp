@@ -4,12 +4,14 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <set>
 #include <vector>
 
 #include "dynains/surrounding_ground.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
+#include "support/sights.hpp"
 
 namespace dynains::test {
 namespace {
@@ -167,12 +169,12 @@ TEST_CASE("heights are those of a least-squares fit to what does not rise itself
   CHECK(rising > 50);
 }
 
-// A box of 2 m that was removed from the street, 0.2 m over it.
+// A box of 2 m that was removed from the street, so far over it (m).
 struct RemovedBox {
-  RemovedBox() {
+  explicit RemovedBox(float over = 0.2F) {
     for (float x = 19.0F; x <= 21.0F; x += 0.1F) {
       for (float y = -1.0F; y <= 1.0F; y += 0.1F) {
-        points.push_back(x, y, street(x, y) + 0.2F);
+        points.push_back(x, y, street(x, y) + over);
       }
     }
     group_of.assign(points.size(), 1);
@@ -224,6 +226,76 @@ TEST_CASE("under a removed box the foot of something goes with its cell, the str
     const bool below = RemovedBox::is_below(ground.x[i], ground.y[i]);
     if (below) CHECK(all.count(i) == 1);
   }
+}
+
+TEST_CASE("what stands on the ground may begin higher over it where beams are farther apart") {
+  FreeSpaceConfig config;
+  config.footprint_rise = 0.0;
+  const PointBuffer ground = street_about(20.0F, 0.0F, 5.0F, kNothing);
+  // At 20 m, beams 2 deg apart are 0.70 m apart, and beams 3 deg apart 1.05 m.
+  for (const double gap : {0.0, 2.0, 3.0}) {
+    MovedGround moved(config);
+    SensorModel sensor = SensorModel::typical();
+    sensor.elevation_gap_wide = gap;
+    moved.adapt(sensor);
+    const RemovedBox box(0.85F);
+    moved.add(box.points, box.group_of, box.groups);
+    std::vector<GroundBox> boxes;
+    moved.bound(ground, boxes);
+    const auto found = moved.find(ground, boxes, [](const PointBuffer&, std::size_t, auto&&) {});
+    CAPTURE(gap);
+    CHECK(found.empty() == (gap < 2.5));
+  }
+}
+
+// What a reference saw of the ground, by x.
+using Reference = std::function<Sight(float x)>;
+
+// Numbers of the ground points beside a removed box that go with it by what references saw.
+std::set<std::uint32_t> ground_seen_free(const PointBuffer& ground,
+                                         const std::vector<Reference>& references) {
+  MovedGround moved{FreeSpaceConfig()};
+  const RemovedBox box;
+  moved.add(box.points, box.group_of, box.groups);
+  std::vector<GroundBox> boxes;
+  moved.bound(ground, boxes);
+  const auto ask = [&](const PointBuffer& points, std::size_t count, auto&& visit) {
+    for (const Reference& reference : references) {
+      std::vector<Sight> seen;
+      for (std::size_t i = 0; i < count; ++i) seen.push_back(reference(points.x[i]));
+      visit(sights_of(seen));
+    }
+  };
+  std::set<std::uint32_t> found;
+  for (const EvidenceVerdict::GroundPoint& point : moved.find(ground, boxes, ask)) {
+    CHECK(point.verdict.cause == Cause::kFreeSpace);
+    CHECK(found.insert(point.point).second);
+  }
+  return found;
+}
+
+TEST_CASE("ground beside a removed box goes if two references saw it free and few hit it") {
+  // Two voxels of 1.2 m beside the box, from one to the other and back, and one point far from it.
+  PointBuffer ground;
+  for (const float x : {22.1F, 22.2F, 22.3F, 23.1F, 23.2F, 23.3F, 22.4F, 22.5F, 30.0F}) {
+    ground.push_back(x, 0.1F, street(x, 0.1F));
+  }
+  const std::set<std::uint32_t> near = {0, 1, 2, 6, 7}, far = {3, 4, 5};
+  std::set<std::uint32_t> both = near;
+  both.insert(far.begin(), far.end());
+  const Reference free = [](float) { return Sight::kFree; };
+  const Reference hit = [](float) { return Sight::kHit; };
+  CHECK(ground_seen_free(ground, {}).empty());
+  CHECK(ground_seen_free(ground, {free}).empty());
+  CHECK(ground_seen_free(ground, {free, free}) == both);
+  std::vector<Reference> references = {free, hit, hit, hit, hit, hit, hit, free};
+  CHECK(ground_seen_free(ground, references) == both);  // 2 are more than 0.3 of 6 ...
+  references.push_back(hit);
+  CHECK(ground_seen_free(ground, references).empty());  // ... but not of 7
+  const Reference near_free = [](float x) { return x < 22.8F ? Sight::kFree : Sight::kNothing; };
+  const Reference far_free = [](float x) { return x < 22.8F ? Sight::kNothing : Sight::kFree; };
+  CHECK(ground_seen_free(ground, {near_free, near_free}) == near);
+  CHECK(ground_seen_free(ground, {far_free, near_free, far_free}) == far);
 }
 
 TEST_CASE("where the ground around is not known, all of it goes from under a removed box") {

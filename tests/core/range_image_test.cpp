@@ -49,6 +49,28 @@ TEST_CASE("columns follow the azimuth within 1e-4 rad, rows the elevation within
   }
 }
 
+TEST_CASE("an image has cells that suit the beams of a sensor, within limits") {
+  SensorModel sensor;
+  sensor.azimuth_step = 0.3;
+  sensor.elevation_gap = 0.5;
+  sensor.elevation_gap_wide = 1.0;
+  sensor.elevation_min = -20.0;
+  sensor.elevation_max = 10.0;
+  const RangeImageGrid grid = RangeImageGrid::for_sensor(sensor);
+  CHECK(grid.columns == 1000);                    // 0.36 deg
+  CHECK(std::abs(grid.rows - 34.0 / 0.3) < 2.0);  // 2 deg more than the beams on either side
+  CHECK(std::abs(grid.lowest * kDegrees + 22.0) < 0.2);
+  CHECK(grid.hole_rows == 4);  // 1.2 deg
+  sensor.azimuth_step = 0.05;
+  CHECK(RangeImageGrid::for_sensor(sensor).columns == 1800);
+  sensor.azimuth_step = 2.0;
+  CHECK(RangeImageGrid::for_sensor(sensor).columns == 600);
+  sensor.elevation_gap = 0.1;
+  CHECK(std::abs(RangeImageGrid::for_sensor(sensor).rows - 34.0 / 0.2) < 3.0);
+  sensor.elevation_gap = 3.0;
+  CHECK(std::abs(RangeImageGrid::for_sensor(sensor).rows - 34.0 / 0.4) < 2.0);
+}
+
 TEST_CASE("a direction that no image covers has cell 0") {
   const RangeImageGrid grid = small_grid();
   CHECK(cell_of(grid, 0.0F, 0.0F, 0.0F) == 0);

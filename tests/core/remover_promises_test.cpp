@@ -297,7 +297,9 @@ TEST_CASE(
     remover.reserve_like(scans[0].points, GENERATE(std::size_t{0}, std::size_t{3}, std::size_t{8}));
   }
   const Run reserved = run(remover, scans);
-  const Run plain = run(config, scans);
+  DynaInsRemover unprepared(config);
+  const Run plain = run(unprepared, scans);
+  CHECK(remover.map().size() == unprepared.map().size());
   CHECK(reserved.newest == plain.newest);
   CHECK(reserved.final == plain.final);
   CHECK_THROWS_AS(remover.reserve(1000), UsageError);
@@ -497,6 +499,16 @@ TEST_CASE("a pose that jumps farther than max_speed allows starts a new window")
   CHECK((newest_labels(with_jump(8.125), 4) == newest_labels(second_half, 0)));
   CHECK((newest_labels(with_jump(-8.125), 4) == newest_labels(second_half, 0)));
   CHECK((newest_labels(with_jump(8.0), 4) != newest_labels(second_half, 0)));
+}
+
+TEST_CASE("a scan that comes without a time comes 0.1 s after the one before") {
+  const std::vector<Eigen::Vector3f> points = {{10.0F, 0.0F, 1.0F}};
+  DynaInsRemover remover;
+  const auto T = Eigen::Isometry3d::Identity();
+  CHECK(remover.push(points, T).newest.time == 0.0);
+  CHECK(remover.push(points, T).newest.time == Approx(0.1));
+  CHECK(remover.push(points, T, 5.0).newest.time == 5.0);
+  CHECK(remover.push(points, T).newest.time == Approx(5.1));
 }
 
 TEST_CASE("flush in the middle finishes what is open, and the next scan starts a new window") {

@@ -105,6 +105,45 @@ TEST_CASE("the paper's parameters of a stage of one's own are its own") {
   CHECK(Remover::Config().belief.tau_p == BeliefUpdater::Config().tau_p);
 }
 
+// Take down of which sensor they are told.
+class ToldGround : public GroundSegmenter {
+ public:
+  using GroundSegmenter::GroundSegmenter;
+  void adapt(const SensorModel& sensor) { height = sensor.height; }
+  static inline double height = 0.0;
+};
+class ToldClusterer : public CurvedVoxelClusterer {
+ public:
+  using CurvedVoxelClusterer::CurvedVoxelClusterer;
+  void adapt(const SensorModel& sensor) { gap = sensor.elevation_gap; }
+  static inline double gap = 0.0;
+};
+class ToldEvidence : public FreeSpaceEvidence {
+ public:
+  using FreeSpaceEvidence::FreeSpaceEvidence;
+  void adapt(const SensorModel& sensor) {
+    step = sensor.azimuth_step;
+    FreeSpaceEvidence::adapt(sensor);
+  }
+  static inline double step = 0.0;
+};
+struct ToldStages : DefaultStages {
+  using Ground = ToldGround;
+  using Clusterer = ToldClusterer;
+  using Evidence = ToldEvidence;
+};
+
+TEST_CASE("stages are told of the sensor by the first scan that shows it") {
+  Eigen::Isometry3d T_world_sensor = sensor_at(0.0);
+  T_world_sensor.translation().z() = 2.6;
+  BasicDynaInsRemover<ToldStages> remover;
+  CHECK(ToldGround::height == 0.0);
+  run(remover, {yard().scan(T_world_sensor, 0.0)});
+  CHECK(ToldGround::height == Approx(2.6).margin(0.03));
+  CHECK(ToldClusterer::gap == Approx(36.8 / 79.0).margin(0.02));
+  CHECK(ToldEvidence::step == Approx(0.25).margin(0.01));
+}
+
 struct OwnGround : DefaultStages {
   using Ground = FlatGround;
 };

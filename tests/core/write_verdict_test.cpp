@@ -244,6 +244,9 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
     };
 
     change();
+    // Left in its slot by an earlier scan.
+    for (std::uint32_t i = 0; i < slot.split.count; i += 3) slot.moved_ground.push_back(i);
+    slot.proof.assign(random.index(2 * kGroups), random_group(random));
     detail::write_instances(slot, scan.cluster_of);
     detail::write_by_evidence(slot, {groups, scan.group_of, moved}, compared, scratch);
     check(1, false);

@@ -1,0 +1,221 @@
+// The evidence of a few scans as a whole, on panels before a wall.
+#include "dynains/free_space_evidence.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <set>
+#include <vector>
+
+#include "support/catch.hpp"
+
+namespace dynains::test {
+namespace {
+
+// Points across the line of sight, so far away (m).
+PointBuffer panel(float x, float y_low, float y_high, float z_low, float z_high) {
+  const float step = 0.006F * x;  // less than a cell of the images
+  PointBuffer points;
+  for (float y = y_low; y < y_high; y += step) {
+    for (float z = z_low; z < z_high; z += step) points.push_back(x, y, z);
+  }
+  return points;
+}
+PointBuffer wall() { return panel(20.0F, -7.0F, 7.0F, -3.5F, 1.5F); }
+PointBuffer car() { return panel(10.0F, -1.0F, 1.0F, -1.5F, 0.5F); }
+
+PointBuffer both(const PointBuffer& a, const PointBuffer& b) {
+  PointBuffer points = a;
+  for (std::size_t i = 0; i < b.size(); ++i) points.push_back(b.x[i], b.y[i], b.z[i]);
+  return points;
+}
+
+// What a sensor that does not move sees: at most one instance, and a wall that is none.
+class Watch {
+ public:
+  explicit Watch(const FreeSpaceConfig& config) : evidence_(config) {
+    SensorModel sensor = SensorModel::typical();
+    sensor.azimuth_step = sensor.elevation_gap = sensor.elevation_gap_wide = 0.5;
+    evidence_.adapt(sensor);
+  }
+
+  Watch& see(const PointBuffer& instance, const PointBuffer& background = wall(),
+             std::uint64_t segment = 0) {
+    const PointBuffer points = both(instance, background);
+    GroundSplit split;
+    split.resize(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      split.points.x[i] = points.x[i];
+      split.points.y[i] = points.y[i];
+      split.points.z[i] = points.z[i];
+    }
+    std::vector<std::uint32_t> instance_of(points.size(), kNoCluster);
+    std::fill_n(instance_of.begin(), instance.size(), 0U);
+    evidence_.observe(splits_.size(), segment, Eigen::Isometry3d::Identity(), split, instance_of,
+                      instance.size() > 0 ? 1 : 0);
+    splits_.push_back(split);
+    sizes_.push_back(instance.size());
+    return *this;
+  }
+
+  // Of all points of the instance.
+  std::set<Cause> causes(std::size_t scan, bool is_final = true) {
+    const EvidenceVerdict said = evidence_.judge(scan, is_final, splits_[scan]);
+    std::set<Cause> result;
+    for (std::size_t i = 0; i < sizes_[scan]; ++i) {
+      result.insert(said.groups[said.group_of[i]].cause);
+    }
+    return result;
+  }
+  bool removes(std::size_t scan) {
+    const std::set<Cause> all = causes(scan);
+    return std::all_of(all.begin(), all.end(), is_dynamic);
+  }
+  std::uint32_t predecessor() const { return evidence_.predecessors()[0]; }
+
+ private:
+  FreeSpaceEvidence evidence_;
+  std::vector<GroundSplit> splits_;
+  std::vector<std::size_t> sizes_;
+};
+
+using Causes = std::set<Cause>;
+
+FreeSpaceConfig every_scan_a_reference() {
+  FreeSpaceConfig config;
+  config.reference_step = 1;
+  return config;
+}
+
+TEST_CASE("only compact instances are presumed to move, and where places were seen before") {
+  struct Case {
+    float length, height;
+    std::size_t scan = 2;
+    std::size_t begin = 0;  // of its segment
+    bool presumed = false;
+  };
+  FreeSpaceConfig config = every_scan_a_reference();
+  const auto causes = [&config](const Case& c, bool is_final) {
+    Watch watch(config);
+    for (std::size_t scan = 0; scan < c.scan; ++scan) {
+      watch.see(PointBuffer(), PointBuffer(), scan < c.begin ? 0 : 1);
+    }
+    watch.see(panel(10.05F, 0.05F, c.length, 0.05F, c.height), PointBuffer(), 1);
+    return watch.causes(c.scan, is_final);
+  };
+  const auto is_presumed = [&causes](const Case& c) {
+    const Causes at_once = causes(c, false);
+    CHECK(at_once.size() == 1);
+    return at_once == Causes{Cause::kPresumed};
+  };
+  for (const Case& c : {
+           Case{2.0F, 1.5F, 2, 0, true},
+           Case{2.0F, 1.5F, 1, 0, false},  // nothing is compared with yet
+           Case{2.0F, 1.5F, 6, 5, false}, Case{2.0F, 1.5F, 7, 5, true},
+           Case{14.7F, 1.5F, 2, 0, true}, Case{15.6F, 1.5F, 2, 0, false},
+           Case{2.0F, 3.4F, 2, 0, true}, Case{2.0F, 4.1F, 2, 0, false},
+           Case{1.15F, 0.2F, 2, 0, false},  // four samples
+           Case{1.35F, 0.2F, 2, 0, true},   // five
+       }) {
+    CAPTURE(c.length, c.height, c.scan, c.begin);
+    CHECK(is_presumed(c) == c.presumed);
+    CHECK(causes(c, true) == Causes{Cause::kNoEvidence});
+  }
+  // Nor what is not carried along tracks.
+  config.track_length = 12.0;
+  config.track_height = 3.0;
+  CHECK(is_presumed({11.7F, 2.9F}));
+  CHECK_FALSE(is_presumed({12.6F, 2.9F}));
+  CHECK_FALSE(is_presumed({11.7F, 3.6F}));
+  config.use_tracks = false;
+  CHECK_FALSE(is_presumed({2.0F, 1.5F}));
+}
+
+TEST_CASE("what scans before an instance saw, and what scans behind it saw, is told apart") {
+  FreeSpaceConfig config = every_scan_a_reference();
+  config.memory = config.horizon = 2;
+  // The only references are the first scan and the last: each may see the place free, or nothing.
+  const auto causes = [&config](bool before, bool after) {
+    Watch watch(config);
+    watch.see(PointBuffer(), before ? wall() : PointBuffer());
+    watch.see(PointBuffer(), PointBuffer());
+    watch.see(car(), PointBuffer());
+    watch.see(PointBuffer(), PointBuffer());
+    watch.see(PointBuffer(), after ? wall() : PointBuffer());
+    return watch.causes(2);
+  };
+  // Once wholly free is twice 0.847, a belief of 0.845.
+  config.tau_free = 0.84;
+  CHECK(causes(false, false) == Causes{Cause::kNoEvidence});
+  CHECK(causes(true, false).count(Cause::kFreeSpace) == 1);
+  CHECK(causes(false, true).count(Cause::kFreeSpace) == 1);
+  config.tau_free = 0.86;
+  CHECK(causes(true, false) == Causes{Cause::kTooLittleFree});
+  CHECK(causes(false, true) == Causes{Cause::kTooLittleFree});
+  CHECK(causes(true, true) == Causes{Cause::kTooLittleFree});
+}
+
+TEST_CASE("scans of another segment tell nothing of an instance, nor which one it was") {
+  for (const std::uint64_t segment : {0U, 1U}) {
+    Watch left(every_scan_a_reference());
+    left.see(car());
+    for (int i = 0; i < 5; ++i) left.see(PointBuffer(), wall(), segment);
+    CAPTURE(segment);
+    CHECK(left.removes(0) == (segment == 0));
+    if (segment != 0) CHECK(left.causes(0) == Causes{Cause::kNoEvidence});
+
+    Watch stays(every_scan_a_reference());
+    stays.see(car()).see(car(), wall(), segment);
+    CHECK(stays.predecessor() == (segment == 0 ? 0 : kNoCluster));
+  }
+}
+
+TEST_CASE("what stands and is seen to stand is no evidence for a movement, however long") {
+  FreeSpaceConfig config = every_scan_a_reference();
+  config.still_weight = 1.0;
+  Watch watch(config);
+  for (int i = 0; i < 12; ++i) watch.see(car());
+  for (const std::size_t scan : {0U, 6U, 11U}) {
+    CHECK(watch.causes(scan) == Causes{Cause::kOccupied});
+  }
+}
+
+TEST_CASE("what a later scan shows of an instance is known of it in the scans beside, too") {
+  FreeSpaceConfig config = every_scan_a_reference();
+  const auto causes = [&config] {
+    Watch watch(config);
+    watch.see(PointBuffer(), PointBuffer());
+    watch.see(car(), PointBuffer()).see(car(), PointBuffer());
+    CHECK(watch.causes(1) == Causes{Cause::kNoEvidence});
+    watch.see(PointBuffer());  // two scans behind the first of both
+    CHECK(watch.removes(1));
+    return watch.causes(2);
+  };
+  // Two units of 0.847, faded by 0.95: 1.61, a belief of 0.833.
+  config.tau_track = 0.83;
+  CHECK(causes() == Causes{Cause::kAlongTrack});
+  config.tau_track = 0.84;
+  CHECK(causes() == Causes{Cause::kNoEvidence});
+  config.tau_track = 0.83;
+  config.use_tracks = false;
+  CHECK(causes() == Causes{Cause::kNoEvidence});
+}
+
+// For one scan, both are one instance.
+TEST_CASE("what stood long before does not go with what was seen to pass beside it") {
+  FreeSpaceConfig config = every_scan_a_reference();
+  config.horizon = 0;
+  config.tau_track = 0.6;
+  config.still_weight = 0.0;
+  const PointBuffer passing = panel(10.0F, 1.2F, 3.2F, -1.5F, 0.5F);
+  Watch watch(config);
+  for (int i = 0; i < 21; ++i) watch.see(car());
+  watch.see(both(car(), passing));
+  CHECK(watch.removes(21));
+  watch.see(car());
+  CHECK(watch.predecessor() == 0);
+  CHECK(watch.causes(22) == Causes{Cause::kOccupied});
+}
+
+}  // namespace
+}  // namespace dynains::test
