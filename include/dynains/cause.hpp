@@ -12,8 +12,8 @@ namespace dynains {
 enum class Cause : std::uint8_t {
   kUnknown = 0,
   kGround = 1,          ///< static: called ground
-  kSimilar = 2,         ///< static: occupancy hardly changed (similarity above tau_s)
-  kReverted = 3,        ///< static: proposed as dynamic, reverted by the belief update
+  kSimilar = 2,         ///< static: occupancy hardly changed (similarity not below tau_s)
+  kReverted = 3,        ///< static: proposed as dynamic, reverted by belief or for want of votes
   kTooFewPoints = 4,    ///< static: cluster too small to be judged (not by this pipeline)
   kTooFewScans = 5,     ///< static: cluster not seen in the scans that it takes to be judged
   kNotJudged = 6,       ///< invalid, out of range, or static because beyond the range of clusters

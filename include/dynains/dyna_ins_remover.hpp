@@ -57,7 +57,8 @@ struct DefaultStages {
 /// `reserve` and `reserve_like` throw UsageError while another of these calls is at work.
 /// Everything that is read from it, the map and the spans of a verdict, is read between two calls:
 /// by the thread that makes them, or by others under a lock that these calls are made under as
-/// well. Can be moved; what was moved from can only be assigned to or destroyed.
+/// well. Can be moved; what was moved from can only be assigned to or destroyed, and throws
+/// UsageError if it is asked to push or flush.
 template <class Stages = DefaultStages>
 class BasicDynaInsRemover {
  public:
@@ -184,6 +185,7 @@ class BasicDynaInsRemover {
   template <class Sink>
   void flush(Sink&& sink) {
     const detail::OneCall::Guard guard(one_call_);
+    check_owned();
     while (finished_ < pushed_) {
       StageClock clock;
       StageTimes times;
@@ -233,6 +235,7 @@ class BasicDynaInsRemover {
 
   template <class Cloud>
   FrameResult take_in(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor, double time) {
+    check_owned();
     validate_pose("T_world_sensor", T_world_sensor);
     validate_time(time);
     StageClock clock;
@@ -274,6 +277,10 @@ class BasicDynaInsRemover {
 
   FrameResult clean(ScanSlot& newest, StageClock& clock);
 
+  void check_owned() const {
+    if (ring_.empty()) throw UsageError("this remover was moved from");
+  }
+
   void validate_time(double time) const {
     if (!std::isfinite(time) || (pushed_ > 0 && !(time > last_time_))) {
       throw PoseError("time = " + std::to_string(time) + " s must be finite and greater than " +
@@ -286,10 +293,8 @@ class BasicDynaInsRemover {
 
   // Whether the scan before is too long ago, or too far away to be compared with.
   bool breaks_off(const Eigen::Isometry3d& T_world_sensor, double time) {
-    const double pause = time - last_time_;
     const Eigen::Vector3d before = slot(pushed_ - 1).T_world_sensor.translation();
-    const double way = (T_world_sensor.translation() - before).norm();
-    return pause > config_.max_gap || way > config_.max_speed * pause;
+    return config_.breaks_off(time - last_time_, (T_world_sensor.translation() - before).norm());
   }
 
   // Eq. 3: the non-ground points of the last K scans in the frame of the newest.
@@ -485,6 +490,10 @@ FrameResult BasicDynaInsRemover<Stages>::clean(ScanSlot& newest, StageClock& clo
   clock.lap(result.times.window);
 
   const Span<const std::uint32_t> cluster_of = clusterer_.cluster(window_.view());
+  if (cluster_of.size() != window_.size()) {
+    throw UsageError("Stages::Clusterer gave " + std::to_string(cluster_of.size()) +
+                     " cluster numbers for " + std::to_string(window_.size()) + " points");
+  }
   if (compares_windows()) {
     clusters_.build(window_.view(), scan_begin_, cluster_of, clusterer_.cluster_count());
   }

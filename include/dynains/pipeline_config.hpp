@@ -25,7 +25,8 @@ struct PipelineConfig : RemoverConfig {
   typename Stages::Map::Config map;
   MapRevision::Config revision;
 
-  /// The paper to the letter, with its published parameters.
+  /// The paper to the letter, with its parameters; voxels, cells and ground, which it gives no
+  /// numbers for, are those of its public implementation. Ranges differ, see docs/algorithm.md.
   static PipelineConfig paper() {
     PipelineConfig config;
     static_cast<RemoverConfig&>(config) = RemoverConfig::paper();

@@ -64,6 +64,11 @@ struct RemoverConfig {
     visitor(Parameter{"build_map", self.build_map, Bounds(), "", "accumulate the static map"});
   }
 
+  /// Whether a scan begins a new window: `pause` s and `way` m behind the one before.
+  bool breaks_off(double pause, double way) const {
+    return pause > max_gap || way > max_speed * pause;
+  }
+
   /// Throws ConfigError.
   void validate() const {
     validate_parameters("DynaInsRemover", *this);

@@ -2,11 +2,14 @@
 #include <iomanip>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <string>
 
 #include "command.hpp"
 #include "dynains/io/diagnosis.hpp"
+#include "dynains/remover_config.hpp"
+#include "lone_scans.hpp"
 #include "recording_options.hpp"
 
 namespace dynains::program {
@@ -78,8 +81,13 @@ void check(const RecordingFlags& flags) {
   }
   std::cout << '\n';
   print_remarks(d);
+  std::optional<std::string> lone;
+  if (recording.size() > 1) {
+    lone = remark_on_lone_scans(recording, 0, recording.size() - 1, RemoverConfig());
+  }
+  if (lone) std::cout << "note: " << *lone << '\n';
   std::cout << advice(d) << std::endl;
-  if (!d.sound()) throw Finding{};
+  if (lone || !d.sound()) throw Finding{};
 }
 
 }  // namespace
@@ -91,7 +99,8 @@ void add_check_command(CLI::App& app) {
   command.footer(
       "Looks at a sample of scans: counts, units, invalid points, height and tilt of the sensor, "
       "and whether\nscans agree under the poses or under the usual mistakes. Exits with 1 if the "
-      "poses need another option\nor fit under none.");
+      "poses need another option\nor fit under none, or if scans are too far apart to be "
+      "compared.");
   command.callback([flags] { check(*flags); });
 }
 

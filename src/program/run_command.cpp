@@ -20,6 +20,7 @@
 #include "dynains/pose.hpp"
 #include "evaluation_options.hpp"
 #include "interrupt.hpp"
+#include "lone_scans.hpp"
 #include "map_on_disk.hpp"
 #include "naming_scan.hpp"
 #include "output_folder.hpp"
@@ -222,6 +223,9 @@ void run(const RunOptions& options) {
   check_outputs(outputs, files, sequence, options.force || resume);
   const PoseAgreement agreement = pose_agreement(sequence, range.first, range.last);
   if (agreement.doubtful()) warn_of_poses(options.sequence.folder(), agreement.as_given);
+  if (const auto lone = remark_on_lone_scans(sequence, range.first, range.last, config)) {
+    std::cerr << "dynains: warning: " << *lone << std::endl;
+  }
   prepare(outputs, files, resume, request);
 
   RunResults results(sequence, range, outputs);

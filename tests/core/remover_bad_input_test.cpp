@@ -394,6 +394,18 @@ TEST_CASE("a remover that could not adapt to its sensor does so with the next sc
   CHECK((result.final == expected.final));
 }
 
+TEST_CASE("a remover that was moved from says so, and can be assigned to") {
+  const std::vector<Scan> scans = drive(yard(), 3, 5.0);
+  DynaInsRemover first;
+  first.push(scans[0].points, scans[0].T_world_sensor);
+  DynaInsRemover second = std::move(first);
+  CHECK_THROWS_AS(first.push(scans[1].points, scans[1].T_world_sensor), UsageError);
+  CHECK_THROWS_AS(first.flush([](const ScanVerdict&) {}), UsageError);
+  CHECK(second.push(scans[1].points, scans[1].T_world_sensor).newest.scan == 1);
+  first = std::move(second);
+  CHECK(first.push(scans[2].points, scans[2].T_world_sensor).newest.scan == 2);
+}
+
 TEST_CASE("a pose that jumps away and back leaves no trace once it is out of the window") {
   const std::vector<Scan> scans = drive(oncoming(), 9, 0.0);
   const Run expected = run_paper(scans);

@@ -68,6 +68,16 @@ class HalvesClusterer {
   std::vector<std::uint32_t> numbers_;
 };
 
+// Forgets the last point.
+class ShortClusterer : public HalvesClusterer {
+ public:
+  using HalvesClusterer::HalvesClusterer;
+  Span<const std::uint32_t> cluster(PolarView points) {
+    const Span<const std::uint32_t> all = HalvesClusterer::cluster(points);
+    return all.subspan(0, all.size() - 1);
+  }
+};
+
 // Proposes every cluster.
 class Suspicious : public OccupancyDescriptor {
  public:
@@ -147,6 +157,9 @@ TEST_CASE("stages are told of the sensor by the first scan that shows it") {
 struct OwnGround : DefaultStages {
   using Ground = FlatGround;
 };
+struct OwnShortClusterer : DefaultStages {
+  using Clusterer = ShortClusterer;
+};
 struct OwnEverything {
   using Ground = FlatGround;
   using Clusterer = HalvesClusterer;
@@ -154,6 +167,13 @@ struct OwnEverything {
   using Belief = Credulous;
   using Map = CountingMap;
 };
+
+TEST_CASE("a clusterer that leaves points out is refused with a reason") {
+  const std::vector<Scan> scans = drive(yard(), 1, 0.0);
+  BasicDynaInsRemover<OwnShortClusterer> remover;
+  CHECK_THROWS_WITH(remover.push(scans[0].points, scans[0].T_world_sensor),
+                    StartsWith("Stages::Clusterer gave "));
+}
 
 TEST_CASE(
     "a ground stage of one's own decides what is ground, and its config is part of the whole") {

@@ -184,6 +184,28 @@ TEST_CASE("check and run say what is wrong, in a sentence") {
   CHECK(fine.err.empty());
 }
 
+TEST_CASE("check and run notice scans that are too far apart in time to be compared") {
+  const Street street;
+  write_poses(street.path() / "poses.txt", street.poses());
+  std::string milliseconds;
+  for (std::size_t i = 0; i < street.poses().size(); ++i) {
+    milliseconds += std::to_string(200 * i) + '\n';
+  }
+  write_text(street.path() / "times.txt", milliseconds);
+  const std::string seq = street.path();
+  const TemporaryFolder out;
+  const Outcome check = start({"check", seq});
+  CHECK(check.code == 1);
+  CHECK_THAT(check.out, ContainsSubstring("note: 23 of 24 scans come so long after") &&
+                            ContainsSubstring("--max-gap"));
+  const Outcome warned = start({"run", seq, "-o", out / "alone", "-q"});
+  CHECK(warned.code == 0);
+  CHECK_THAT(warned.err, StartsWith("dynains: warning: 23 of 24 scans come so long after"));
+  const Outcome told = start({"run", seq, "-o", out / "told", "-q", "--max-gap", "200"});
+  CHECK(told.code == 0);
+  CHECK(told.err.empty());
+}
+
 TEST_CASE("run takes PCD scans and writes them cleaned, to be read again") {
   const Street street;
   const TemporaryFolder folder;

@@ -21,8 +21,9 @@ class InstanceIds {
 
   /// Fills `ids` with an id per cluster of this window. The points of the previous scan give their
   /// old clusters (`old_streaks`, with indices into `old_ids`) and their clusters in this window
-  /// (`streaks`). A cluster takes the id that most of its points had; if two clusters want the
-  /// same id, the first keeps it and the other gets a new one.
+  /// (`streaks`). A cluster takes the id that more than half of its points had, or without such a
+  /// majority one of those that some had; if two clusters want the same id, the first keeps it and
+  /// the other gets a new one.
   void assign(Streaks old_streaks, Span<const std::uint32_t> old_ids, Streaks streaks,
               std::size_t cluster_count, std::vector<std::uint32_t>& ids) {
     candidate_.assign(cluster_count, kNoCluster);
