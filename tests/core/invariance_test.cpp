@@ -6,11 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/evaluation/evaluate.hpp"
-#include "dynains/simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
-#include "support/remover.hpp"
+#include "support/simulated_runs.hpp"
 
 namespace dynains::test {
 namespace {
@@ -23,51 +21,13 @@ std::vector<SimulatedScan> street() {
   config.sensor = simulation::Sensor::kOs1_64;
   config.scans = 50;
   config.seed = 5;
-  simulation::Simulator simulator(config);
-  std::vector<SimulatedScan> scans;
-  for (std::size_t i = 0; i < simulator.size(); ++i) scans.push_back(simulator.scan(i));
-  return scans;
+  return simulate(config);
 }
 
-/// By scan: whether each point is static by its final verdict.
-using StaticPoints = std::vector<std::vector<std::uint8_t>>;
-
-/// The remover takes the poses moved by `T_moved_world`.
-StaticPoints static_points(const std::vector<SimulatedScan>& scans,
-                           const Eigen::Isometry3d& T_moved_world = Eigen::Isometry3d::Identity()) {
-  StaticPoints result(scans.size());
-  const auto keep = [&](const ScanVerdict& verdict) {
-    for (const PointLabel label : verdict.labels) {
-      result.at(verdict.scan).push_back(is_static(label) ? 1 : 0);
-    }
-  };
-  DynaInsRemover remover;
-  for (const SimulatedScan& scan : scans) {
-    const RawPoints<float> points{scan.xyzi.data(), scan.xyzi.size() / 4, 4};
-    const FrameResult frame = remover.push(points, T_moved_world * scan.T_world_sensor, scan.time);
-    if (frame.finished) keep(*frame.finished);
-  }
-  remover.flush(keep);
-  return result;
+double f1(const std::vector<SimulatedScan>& scans, const StaticPoints& in_map) {
+  return score(scans, in_map).f1();
 }
-
-double score(const std::vector<SimulatedScan>& scans, const StaticPoints& in_map) {
-  const auto source = [&](std::size_t i, evaluation::LabelledScan& scan) {
-    if (i == scans.size()) return false;
-    scan.xyz = scans[i].xyzi.data();
-    scan.stride = 4;
-    scan.T_world_sensor = scans[i].T_world_sensor;
-    scan.time = scans[i].time;
-    scan.truth = scans[i].labels;
-    scan.in_map = in_map[i];
-    return true;
-  };
-  evaluation::EvaluationConfig config;
-  config.max_range = 50.0;
-  return evaluation::evaluate(source, {"final"}, {}, config).rows[2].voxels.f1();
-}
-
-double score(const std::vector<SimulatedScan>& scans) { return score(scans, static_points(scans)); }
+double f1(const std::vector<SimulatedScan>& scans) { return f1(scans, static_points(scans).final); }
 
 /// The same scans of a sensor that is turned about its z axis.
 std::vector<SimulatedScan> turned(std::vector<SimulatedScan> scans, double angle) {
@@ -100,16 +60,16 @@ std::vector<SimulatedScan> shuffled(const std::vector<SimulatedScan>& scans) {
 
 TEST_CASE("a moved world, a turned sensor and shuffled points change F1 by at most 0.002") {
   const std::vector<SimulatedScan> scans = street();
-  const StaticPoints in_map = static_points(scans);
-  const double plain = score(scans, in_map);
+  const StaticPoints in_map = static_points(scans).final;
+  const double plain = f1(scans, in_map);
   INFO("F1 " << plain);
   REQUIRE(plain > 0.9);
 
   Eigen::Isometry3d T_moved_world = Eigen::Isometry3d::Identity();
   T_moved_world.translate(Eigen::Vector3d(5.0e5, -4.2e6, 300.0));
   T_moved_world.rotate(Eigen::AngleAxisd(1.1, Eigen::Vector3d(0.3, -0.2, 1.0).normalized()));
-  const StaticPoints in_moved_map = static_points(scans, T_moved_world);
-  CHECK(std::abs(score(scans, in_moved_map) - plain) <= 0.002);
+  const StaticPoints in_moved_map = static_points(scans, {}, T_moved_world).final;
+  CHECK(std::abs(f1(scans, in_moved_map) - plain) <= 0.002);
   // Not even a label changes, but where rounding decides.
   std::size_t count = 0, different = 0;
   for (std::size_t s = 0; s < scans.size(); ++s) {
@@ -122,9 +82,9 @@ TEST_CASE("a moved world, a turned sensor and shuffled points change F1 by at mo
   CHECK(10000 * different <= count);
   for (const double angle : {0.7, 2.9, -1.3}) {
     INFO("turned by " << angle);
-    CHECK(std::abs(score(turned(scans, angle)) - plain) <= 0.002);
+    CHECK(std::abs(f1(turned(scans, angle)) - plain) <= 0.002);
   }
-  CHECK(std::abs(score(shuffled(scans)) - plain) <= 0.002);
+  CHECK(std::abs(f1(shuffled(scans)) - plain) <= 0.002);
 }
 
 }  // namespace

@@ -195,23 +195,27 @@ TEST_CASE("of a supervoxel of many samples, a quarter must lie in a passage") {
     one.say(Cause::kFreeSpace);
     passages.judge(scan, one.samples, T, one.counted, one.verdicts);
   }
-  // In a row, one sample in 0.3 m: the first two of them lie in the cell that was passed.
-  const auto cause_of_row = [&](int length) {
+  // Four by four samples, 0.3 m apart: those of the corner, two by two, lie in the cell.
+  const auto cause_of = [&](int inside, int outside) {
     PointBuffer points;
-    for (int i = 0; i < length; ++i)
-      points.push_back(0.15F + 0.3F * static_cast<float>(i), 0.15F, 0.15F);
-    const std::vector<std::uint32_t> one_instance(static_cast<std::size_t>(length), 0);
+    for (int i = 0; i < 16; ++i) {
+      int& left = i % 4 < 2 && i / 4 < 2 ? inside : outside;
+      if (left-- <= 0) continue;
+      points.push_back(0.15F + 0.3F * static_cast<float>(i % 4),
+                       0.15F + 0.3F * static_cast<float>(i / 4), 0.15F);
+    }
+    const std::vector<std::uint32_t> one_instance(points.size(), 0);
     InstanceSamples samples;
-    InstanceSampler(0.3, 4.8, 80.0, 64).sample(points, one_instance, 1, samples);
+    InstanceSampler(0.3, 1.2, 80.0, 64).sample(points, one_instance, 1, samples);
     REQUIRE(samples.supervoxel_count() == 1);
-    REQUIRE(samples.size() == static_cast<std::size_t>(length));
+    REQUIRE(samples.size() == points.size());
     std::vector<Count> counted(1, Count::kNone);
     std::vector<Verdict> verdicts(1, {Cause::kOccupied, 0.5F});
     passages.judge(scan++, samples, T, counted, verdicts);
     return verdicts[0].cause;
   };
-  CHECK(cause_of_row(8) == Cause::kInPassage);
-  CHECK(cause_of_row(9) == Cause::kOccupied);
+  CHECK(cause_of(2, 6) == Cause::kInPassage);
+  CHECK(cause_of(2, 7) == Cause::kOccupied);
 }
 
 }  // namespace

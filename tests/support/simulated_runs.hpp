@@ -1,0 +1,68 @@
+// Simulated sequences through the remover, and their score.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/evaluation/evaluate.hpp"
+#include "dynains/simulation/simulator.hpp"
+#include "support/remover.hpp"
+
+namespace dynains::test {
+
+inline std::vector<simulation::SimulatedScan> simulate(const simulation::Config& config) {
+  simulation::Simulator simulator(config);
+  std::vector<simulation::SimulatedScan> scans;
+  for (std::size_t i = 0; i < simulator.size(); ++i) scans.push_back(simulator.scan(i));
+  return scans;
+}
+
+/// By scan: whether each point is static.
+using StaticPoints = std::vector<std::vector<std::uint8_t>>;
+
+struct StaticByVerdict {
+  StaticPoints newest, final;
+};
+
+/// The remover takes the poses moved by `T_moved_world`.
+inline StaticByVerdict static_points(
+    const std::vector<simulation::SimulatedScan>& scans, const DynaInsRemover::Config& config = {},
+    const Eigen::Isometry3d& T_moved_world = Eigen::Isometry3d::Identity()) {
+  StaticByVerdict result{StaticPoints(scans.size()), StaticPoints(scans.size())};
+  const auto keep = [](const ScanVerdict& verdict, StaticPoints& points) {
+    for (const PointLabel label : verdict.labels) {
+      points.at(verdict.scan).push_back(is_static(label) ? 1 : 0);
+    }
+  };
+  DynaInsRemover remover(config);
+  for (const simulation::SimulatedScan& scan : scans) {
+    const RawPoints<float> points{scan.xyzi.data(), scan.xyzi.size() / 4, 4};
+    const FrameResult frame = remover.push(points, T_moved_world * scan.T_world_sensor, scan.time);
+    keep(frame.newest, result.newest);
+    if (frame.finished) keep(*frame.finished, result.final);
+  }
+  remover.flush([&](const ScanVerdict& verdict) { keep(verdict, result.final); });
+  return result;
+}
+
+/// PR, RR and F1 of ERASOR within 50 m.
+inline evaluation::VoxelScore score(const std::vector<simulation::SimulatedScan>& scans,
+                                    const StaticPoints& in_map) {
+  const auto source = [&](std::size_t i, evaluation::LabelledScan& scan) {
+    if (i == scans.size()) return false;
+    scan.xyz = scans[i].xyzi.data();
+    scan.stride = 4;
+    scan.T_world_sensor = scans[i].T_world_sensor;
+    scan.time = scans[i].time;
+    scan.truth = scans[i].labels;
+    scan.in_map = in_map[i];
+    return true;
+  };
+  evaluation::EvaluationConfig config;
+  config.max_range = 50.0;
+  return evaluation::evaluate(source, {"run"}, {}, config).rows[2].voxels;
+}
+
+}  // namespace dynains::test
