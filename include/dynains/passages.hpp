@@ -32,10 +32,14 @@ class Passages {
       : cell_(config.passage_cell),
         share_(static_cast<float>(config.passage_share)),
         memory_(config.memory),
-        lines_(config.passage_share < 1.0 ? kLines : 0) {}
+        lines_(config.passage_share < 1.0 ? kLines : 0),
+        passed_(lines_.size() / 64) {}
 
   /// Forgets all cells; to be called before the frame `origin` changes.
-  void forget() { std::fill(lines_.begin(), lines_.end(), Line()); }
+  void forget() {
+    std::fill(lines_.begin(), lines_.end(), Line());
+    std::fill(passed_.begin(), passed_.end(), 0);
+  }
 
   /// Takes in what is said of scan number `scan`, by supervoxel, in the place of what was `counted`
   /// of it before, and says of what stays in a passage that it moves. `origin`: a frame near the
@@ -44,18 +48,19 @@ class Passages {
              const Eigen::Isometry3d& T_origin_sensor, std::vector<Count>& counted,
              std::vector<Verdict>& verdicts) {
     if (lines_.empty()) return;
-    find_cells(static_cast<std::uint32_t>(scan) + 1, samples, T_origin_sensor);
+    detail::find_places(samples, cell_, T_origin_sensor, places_);
+    const std::uint32_t now = static_cast<std::uint32_t>(scan) + 1;
     for (std::size_t s = 0; s < samples.supervoxel_count(); ++s) {
-      const Count now = count_of(verdicts[s].cause);
-      if (now == counted[s]) continue;
+      const Count count = count_of(verdicts[s].cause);
+      if (count == counted[s]) continue;
       for (std::uint32_t i = samples.sample_begin[s]; i < samples.sample_begin[s + 1]; ++i) {
-        take_back(*cells_[i], counted[s]);
-        add(*cells_[i], now);
+        if (i + kAhead < places_.size()) __builtin_prefetch(&lines_[line_of(places_[i + kAhead])]);
+        recount(places_[i], now, counted[s], count);
       }
-      counted[s] = now;
+      counted[s] = count;
     }
     for (std::size_t s = 0; s < samples.supervoxel_count(); ++s) {
-      if (counted[s] == Count::kStayed) judge_supervoxel(samples, s, verdicts[s]);
+      if (counted[s] == Count::kStayed) judge_supervoxel(samples, s, now, verdicts[s]);
     }
   }
 
@@ -75,6 +80,7 @@ class Passages {
   static constexpr std::uint16_t kMostCounted = 1000;  // beyond, what is older counts half
   static constexpr std::uint16_t kLeastMoved = 3;      // samples
   static constexpr std::uint32_t kPart = 4;            // one of so many samples in a passage
+  static constexpr std::size_t kAhead = 16;            // samples whose cells are asked for
 
   // What is presumed was not seen to move.
   static Count count_of(Cause cause) {
@@ -82,19 +88,19 @@ class Passages {
     return is_dynamic(cause) ? Count::kMoved : Count::kStayed;
   }
 
-  void find_cells(std::uint32_t now, const InstanceSamples& samples,
-                  const Eigen::Isometry3d& T_origin_sensor) {
-    detail::find_places(samples, cell_, T_origin_sensor, places_);
-    cells_.resize(places_.size());
-    for (const SupervoxelPlace place : places_) __builtin_prefetch(&line_of(place));
-    for (std::size_t i = 0; i < places_.size(); ++i) cells_[i] = &cell_of(places_[i], now);
+  static std::size_t line_of(SupervoxelPlace place) { return detail::place_hash(place) % kLines; }
+
+  // The cell of a place if it was met lately.
+  const Cell* find(SupervoxelPlace place, std::uint32_t now) const {
+    for (const Cell& cell : lines_[line_of(place)].cells) {
+      if (cell.place == place) return age(cell, now) <= memory_ ? &cell : nullptr;
+    }
+    return nullptr;
   }
 
-  Line& line_of(SupervoxelPlace place) { return lines_[detail::place_hash(place) % kLines]; }
-
   // The cell of a place, which may be a new one instead of that which was met longest ago.
-  Cell& cell_of(SupervoxelPlace place, std::uint32_t now) {
-    Line& line = line_of(place);
+  Cell& meet(SupervoxelPlace place, std::uint32_t now) {
+    Line& line = lines_[line_of(place)];
     for (Cell& cell : line.cells) {
       if (cell.place != place) continue;
       if (age(cell, now) > memory_) cell = {place, now, 0, 0};
@@ -103,7 +109,11 @@ class Passages {
     }
     Cell& oldest = *std::min_element(line.cells.begin(), line.cells.end(),
                                      [](const Cell& a, const Cell& b) { return a.met < b.met; });
-    return oldest = {place, now, 0, 0};
+    oldest = {place, now, 0, 0};
+    const bool passed = std::any_of(line.cells.begin(), line.cells.end(),
+                                    [](const Cell& cell) { return cell.moved >= kLeastMoved; });
+    if (!passed) passed_[line_of(place) / 64] &= ~bit_of(place);
+    return oldest;
   }
 
   // Scans since a cell was met; negative if a later scan met it.
@@ -111,32 +121,44 @@ class Passages {
     return static_cast<std::int32_t>(now - cell.met);
   }
 
-  static void add(Cell& cell, Count count) {
-    if (count == Count::kNone) return;
-    ++(count == Count::kMoved ? cell.moved : cell.stayed);
+  // Counts a sample as something else than before.
+  void recount(SupervoxelPlace place, std::uint32_t now, Count before, Count count) {
+    Cell& cell = meet(place, now);
+    if (before == Count::kMoved && cell.moved > 0) --cell.moved;
+    if (before == Count::kStayed && cell.stayed > 0) --cell.stayed;
+    if (count == Count::kMoved) ++cell.moved;
+    if (count == Count::kStayed) ++cell.stayed;
+    if (cell.moved >= kLeastMoved) passed_[line_of(place) / 64] |= bit_of(place);
     if (cell.moved + cell.stayed < kMostCounted) return;
     cell.moved /= 2;
     cell.stayed /= 2;
   }
-  static void take_back(Cell& cell, Count count) {
-    if (count == Count::kMoved && cell.moved > 0) --cell.moved;
-    if (count == Count::kStayed && cell.stayed > 0) --cell.stayed;
+
+  static std::uint64_t bit_of(SupervoxelPlace place) {
+    return std::uint64_t{1} << line_of(place) % 64;
+  }
+  bool may_be_passage(SupervoxelPlace place) const {
+    return (passed_[line_of(place) / 64] & bit_of(place)) != 0;
   }
 
   static float moved_share(const Cell& cell) {
     return static_cast<float>(cell.moved) / static_cast<float>(cell.moved + cell.stayed);
   }
 
-  void judge_supervoxel(const InstanceSamples& samples, std::size_t s, Verdict& verdict) const {
+  void judge_supervoxel(const InstanceSamples& samples, std::size_t s, std::uint32_t now,
+                        Verdict& verdict) const {
     const std::uint32_t begin = samples.sample_begin[s];
     const std::uint32_t end = samples.sample_begin[s + 1];
     std::uint32_t inside = 0;
     float highest = 0.0F;
     for (std::uint32_t i = begin; i < end; ++i) {
-      const Cell& cell = *cells_[i];
-      if (cell.moved < kLeastMoved || !(moved_share(cell) > share_)) continue;
+      if (!may_be_passage(places_[i])) continue;
+      const Cell* const cell = find(places_[i], now);
+      if (cell == nullptr || cell->moved < kLeastMoved) continue;
+      const float share = moved_share(*cell);
+      if (!(share > share_)) continue;
       ++inside;
-      highest = std::max(highest, moved_share(cell));
+      highest = std::max(highest, share);
     }
     if (inside == 0 || kPart * inside < end - begin) return;
     verdict = {Cause::kInPassage, std::max(verdict.belief, highest)};
@@ -146,8 +168,10 @@ class Passages {
   float share_;
   std::int32_t memory_;
   std::vector<Line> lines_;
+  // A bit by line: whether any of its cells may be a passage. Few are, and most samples need no
+  // look at their cell.
+  std::vector<std::uint64_t> passed_;
   std::vector<SupervoxelPlace> places_;  // by sample
-  std::vector<Cell*> cells_;             // the same
 };
 
 }  // namespace dynains
