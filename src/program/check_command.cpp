@@ -85,8 +85,8 @@ void check(const RecordingFlags& flags) {
   if (recording.size() > 1) {
     lone = remark_on_lone_scans(recording, 0, recording.size() - 1, RemoverConfig());
   }
-  if (lone) std::cout << "note: " << *lone << '\n';
-  std::cout << advice(d) << std::endl;
+  if (!lone || !d.sound()) std::cout << advice(d) << std::endl;
+  if (lone) std::cout << *lone << '.' << std::endl;
   if (lone || !d.sound()) throw Finding{};
 }
 
