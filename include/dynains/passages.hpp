@@ -33,12 +33,12 @@ class Passages {
         share_(static_cast<float>(config.passage_share)),
         memory_(config.memory),
         lines_(config.passage_share < 1.0 ? kLines : 0),
-        passed_(lines_.size() / 64) {}
+        passed_(lines_.size()) {}
 
   /// Forgets all cells; to be called before the frame `origin` changes.
   void forget() {
     std::fill(lines_.begin(), lines_.end(), Line());
-    std::fill(passed_.begin(), passed_.end(), 0);
+    std::fill(passed_.begin(), passed_.end(), false);
   }
 
   /// Takes in what is said of scan number `scan`, by supervoxel, in the place of what was `counted`
@@ -112,7 +112,7 @@ class Passages {
     oldest = {place, now, 0, 0};
     const bool passed = std::any_of(line.cells.begin(), line.cells.end(),
                                     [](const Cell& cell) { return cell.moved >= kLeastMoved; });
-    if (!passed) passed_[line_of(place) / 64] &= ~bit_of(place);
+    passed_[line_of(place)] = passed;
     return oldest;
   }
 
@@ -128,17 +128,10 @@ class Passages {
     if (before == Count::kStayed && cell.stayed > 0) --cell.stayed;
     if (count == Count::kMoved) ++cell.moved;
     if (count == Count::kStayed) ++cell.stayed;
-    if (cell.moved >= kLeastMoved) passed_[line_of(place) / 64] |= bit_of(place);
+    if (cell.moved >= kLeastMoved) passed_[line_of(place)] = true;
     if (cell.moved + cell.stayed < kMostCounted) return;
     cell.moved /= 2;
     cell.stayed /= 2;
-  }
-
-  static std::uint64_t bit_of(SupervoxelPlace place) {
-    return std::uint64_t{1} << line_of(place) % 64;
-  }
-  bool may_be_passage(SupervoxelPlace place) const {
-    return (passed_[line_of(place) / 64] & bit_of(place)) != 0;
   }
 
   static float moved_share(const Cell& cell) {
@@ -152,7 +145,7 @@ class Passages {
     std::uint32_t inside = 0;
     float highest = 0.0F;
     for (std::uint32_t i = begin; i < end; ++i) {
-      if (!may_be_passage(places_[i])) continue;
+      if (!passed_[line_of(places_[i])]) continue;
       const Cell* const cell = find(places_[i], now);
       if (cell == nullptr || cell->moved < kLeastMoved) continue;
       const float share = moved_share(*cell);
@@ -168,9 +161,9 @@ class Passages {
   float share_;
   std::int32_t memory_;
   std::vector<Line> lines_;
-  // A bit by line: whether any of its cells may be a passage. Few are, and most samples need no
-  // look at their cell.
-  std::vector<std::uint64_t> passed_;
+  // By line: whether any of its cells may be a passage. Few are, and most samples need no look at
+  // their cell.
+  std::vector<bool> passed_;
   std::vector<SupervoxelPlace> places_;  // by sample
 };
 
