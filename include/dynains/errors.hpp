@@ -25,7 +25,8 @@ class CloudError : public std::invalid_argument {
 };
 
 /// An object is called when it must not be: while another call on it is at work (from a second
-/// thread, or from within), or to be prepared when it has begun.
+/// thread, or from within), or to be prepared when it has begun. Or a folder is to be written to
+/// while somebody else does.
 class UsageError : public std::logic_error {
  public:
   using std::logic_error::logic_error;

@@ -72,6 +72,14 @@ void write_at(const fs::path& path, std::size_t offset, const void* data, std::s
   if (error != 0) fail_by_system(path, "cannot be written to the end", error);
 }
 
+/// Created if it lacks. Throws IoError.
+const fs::path& made(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) fail_by_system(folder, "cannot be created", error.value());
+  return folder;
+}
+
 }  // namespace
 
 void TiledStaticMap::Config::validate() const {
@@ -85,11 +93,10 @@ void TiledStaticMap::Config::validate() const {
 
 TiledStaticMap::TiledStaticMap(const Config& config)
     : config_((config.validate(), config)),
+      lock_(made(config_.map_folder)),
       voxel_(config.map_voxel > 0.0 ? config.map_voxel : kVoxelOfAll) {
   const fs::path& folder = config_.map_folder;
   std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) fail_by_system(folder, "cannot be created", error.value());
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
     const auto place = place_of(entry->path());

@@ -6,7 +6,8 @@
 namespace dynains::program {
 
 // Each adds a subcommand whose callback does the work and throws what goes wrong: ConfigError for
-// wrong flags, anything else for failures, Interrupted after a signal. main() prints.
+// wrong flags, UsageError for a folder that is in use, anything else for failures, Interrupted
+// after a signal. main() prints.
 void add_run_command(CLI::App& app);
 void add_check_command(CLI::App& app);
 void add_config_command(CLI::App& app);

@@ -59,6 +59,8 @@ int main(int argc, char** argv) {
     return fail(kExitUsage, (std::string(error.what()) + " (see dynains --help)").c_str());
   } catch (const dynains::ConfigError& error) {
     return fail(kExitUsage, error.what());
+  } catch (const dynains::UsageError& error) {
+    return fail(kExitUsage, error.what());
   } catch (const Finding&) {
     return kExitFailure;
   } catch (const Interrupted& interrupted) {

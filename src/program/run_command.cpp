@@ -15,6 +15,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/io/diagnosis.hpp"
+#include "dynains/io/folder_lock.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/pose.hpp"
@@ -212,6 +213,7 @@ void run(const RunOptions& options) {
   check_scans(sequence, range);
   const nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);
   create_folder(outputs.folder);
+  const FolderLock lock(outputs.folder);
   const EarlierRun earlier =
       options.resume ? find_earlier_run(outputs.folder, request) : EarlierRun::kNone;
   if (earlier == EarlierRun::kComplete && is_whole(outputs, sequence, range)) {

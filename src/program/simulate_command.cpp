@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "command.hpp"
+#include "dynains/io/folder_lock.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
 #include "dynains/version.hpp"
@@ -62,6 +63,7 @@ void simulate(const SimulateOptions& options) {
   const simulation::Config config = make_config(options);
   simulation::Simulator simulator(config);
   create_folder(options.out);
+  const FolderLock lock(options.out);
   check_output_folder(options.out, files_of_a_simulation(), options.force);
   clear_output_folder(options.out, files_of_a_simulation(), describe(options, config));
   const InterruptGuard interrupt;

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <csignal>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynains/errors.hpp"
@@ -299,6 +300,25 @@ TEST_CASE("a folder or a tile that cannot be used is an error with its path") {
   fs::remove(tile);
   CHECK_THAT(message_of<IoError>([&] { points_of(map); }),
              StartsWith(tile.string() + ": cannot be read: expected "));
+}
+
+TEST_CASE("a folder of tiles belongs to one map at a time, also if that moves") {
+  const TemporaryFolder folder;
+  const MapScan scan = loop()[0];
+  const auto refusal = [&] {
+    return message_of<UsageError>([&] { TiledStaticMap(config_of(folder / "map", 1)); });
+  };
+  std::size_t size = 0;
+  {
+    TiledStaticMap map(config_of(folder / "map", 1));
+    CHECK_THAT(refusal(), StartsWith((folder / "map").string() + ": is in use"));
+    TiledStaticMap moved = std::move(map);
+    CHECK_THAT(refusal(), ContainsSubstring("is in use"));
+    insert(moved, scan);
+    size = moved.size();
+  }
+  CHECK(TiledStaticMap(config_of(folder / "map", 1)).size() == size);
+  CHECK(size > 0);
 }
 
 TEST_CASE("the configuration of a map in tiles is checked") {

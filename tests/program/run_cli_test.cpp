@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynains/dyna_ins_remover.hpp"
+#include "dynains/io/folder_lock.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/tiled_map.hpp"
@@ -373,6 +374,29 @@ TEST_CASE("Scans without a pose are left out with a warning, and counted in the 
              ContainsSubstring("warning: 5 of 12 scans have no pose and are left out"));
   CHECK(fixture.report()["scans"] == 7);
   CHECK(fixture.report()["scans_without_pose"] == 5);
+}
+
+TEST_CASE("A folder that another run writes to is refused, and stays as it is") {
+  const Fixture fixture;
+  REQUIRE(fixture.run().code == 0);
+  const std::string before = read_text(fixture.out + "/report.json");
+  {
+    const FolderLock other(fixture.out);
+    for (const std::vector<std::string>& flags : {std::vector<std::string>{},
+                                                  {"--force"},
+                                                  {"--resume"},
+                                                  {"--force", "--map-memory", "0"}}) {
+      CAPTURE(flags);
+      const Outcome refused = fixture.run(flags);
+      CHECK(refused.code == 2);
+      CHECK_THAT(refused.err, StartsWith("dynains: error: " + fixture.out + ": is in use"));
+      CHECK(count_lines(refused.err) == 1);
+    }
+    CHECK(read_text(fixture.out + "/report.json") == before);
+    CHECK(fixture.labels() == 12);
+  }
+  CHECK(fixture.run({"--force"}).code == 0);
+  CHECK(count_entries(fixture.out) == 6);
 }
 
 TEST_CASE("A folder that is no result is never written to") {

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "dynains/io/folder_lock.hpp"
 #include "dynains/io/kitti.hpp"
 #include "io/files.hpp"
 #include "program/start.hpp"
@@ -88,6 +89,15 @@ TEST_CASE("simulate replaces its own work by --force, and nobody else's") {
   CHECK(refused.code == 1);
   CHECK_THAT(refused.err, ContainsSubstring("no simulation.json"));
   CHECK(KittiSequence(out).size() == 2);
+}
+
+TEST_CASE("simulate refuses a folder that another run writes to") {
+  const TemporaryFolder folder;
+  const FolderLock other(folder.path());
+  const Outcome refused = simulate(folder.path(), {"--scans", "1"});
+  CHECK(refused.code == 2);
+  CHECK_THAT(refused.err, ContainsSubstring(folder.path().string() + ": is in use"));
+  CHECK(fs::is_empty(folder.path()));
 }
 
 TEST_CASE("simulate refuses what it does not know") {

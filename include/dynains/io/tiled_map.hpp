@@ -9,6 +9,7 @@
 #include <map>
 #include <vector>
 
+#include "dynains/io/folder_lock.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 
@@ -21,6 +22,8 @@ namespace dynains {
 /// every `insert`, also if the process is killed then; of a kill in between they lose some of the
 /// newest points and nothing else. Tiles that are farthest from the sensor leave the memory first,
 /// and come back when a point falls into them. The result does not depend on the budget.
+///
+/// A folder belongs to one map at a time, in this process or another, as long as that lives.
 ///
 /// Takes the place of the map in memory by `Stages::Map`:
 ///
@@ -49,7 +52,8 @@ class TiledStaticMap {
     void validate() const;
   };
 
-  /// Throws ConfigError; IoError if the folder cannot be used, or holds a map of other voxels.
+  /// Throws ConfigError; UsageError while another map has the folder; IoError if the folder cannot
+  /// be used, or holds a map of other voxels.
   explicit TiledStaticMap(const Config& config);
 
   const Config& config() const { return config_; }
@@ -111,6 +115,7 @@ class TiledStaticMap {
   void free_far_tiles(const Eigen::Vector3d& sensor);
 
   Config config_;
+  FolderLock lock_;
   double voxel_;  // m, also if every point is kept
   std::size_t size_ = 0;
   std::map<Place, std::size_t> stored_;  // points of every tile that are in its file

@@ -1,0 +1,28 @@
+// One user at a time for a folder of files.
+#pragma once
+
+#include <filesystem>
+
+namespace dynains {
+
+/// Keeps a folder for itself, from construction to destruction, among all who take a FolderLock of
+/// it: of this process or of another one on this machine.
+///
+/// The lock lies on the folder itself (flock): it leaves no file behind, and ends with the process,
+/// whatever ends that. File systems that cannot lock folders, as some of those behind a network,
+/// give every lock at once.
+class FolderLock {
+ public:
+  /// Throws UsageError if somebody else has the folder, IoError if it cannot be opened.
+  explicit FolderLock(const std::filesystem::path& folder);
+  ~FolderLock();
+  FolderLock(FolderLock&& other) noexcept;
+  FolderLock& operator=(FolderLock&& other) noexcept;
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  int descriptor_;  // -1: moved from
+};
+
+}  // namespace dynains
