@@ -201,17 +201,17 @@ void warn_of_poses(const std::string& sequence, const Agreement& agreement) {
 void run(const RunOptions& options) {
   const Config config = options.remover.config();
   const RunOutputs outputs = make_outputs(options, config);
-  nlohmann::ordered_json configuration = to_json(config);
   std::optional<RemoverWithMapOnDisk::Config> on_disk;
   if (options.map_memory) {
     if (!config.build_map) throw ConfigError("--map-memory needs --build-map true");
     on_disk = with_map_on_disk(config, outputs.folder / kTileFolder, *options.map_memory);
-    configuration["map_memory"] = *options.map_memory;
   }
   const Recording sequence = options.sequence.open();
   const ScanRange range = select_scans(sequence, options.window);
   check_scans(sequence, range);
-  const nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);
+  const nlohmann::ordered_json configuration = to_json(config);
+  const nlohmann::ordered_json request =
+      describe_request(sequence, range, outputs, on_disk.has_value(), configuration);
   create_folder(outputs.folder);
   const FolderLock lock(outputs.folder);
   const EarlierRun earlier =
@@ -263,6 +263,7 @@ void run(const RunOptions& options) {
   description.complete = results.finished() == range.size();
   description.map = outputs.map_name();
   description.configuration = configuration;
+  if (on_disk) description.configuration["map_memory"] = on_disk->map.map_memory;
   write_timing(outputs.folder / "timing.csv", timing);
   // The report must not claim what a power cut could still take.
   sync_files(outputs.folder);

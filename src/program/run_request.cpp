@@ -11,6 +11,8 @@
 namespace dynains::program {
 namespace {
 
+constexpr const char* kPosesAndTimes = "poses_and_times";
+
 /// FNV-1a, 64 bits.
 class Fingerprint {
  public:
@@ -37,17 +39,49 @@ std::string fingerprint(const Recording& recording, const ScanRange& range) {
   return result.text();
 }
 
+using Json = nlohmann::ordered_json;
+
+/// Which fields of two requests differ, the first few with both values; empty if none does.
+std::string differences(const Json& earlier, const Json& now) {
+  constexpr std::size_t kShown = 3;
+  const Json before = earlier.flatten();
+  const Json after = now.flatten();
+  std::size_t count = 0;
+  std::string text;
+  const auto add = [&](const std::string& path, const std::string& was, const std::string& is) {
+    if (++count > kShown) return;
+    const std::string name = path.substr(path.rfind('/') + 1);
+    if (count > 1) text += ", ";
+    // A fingerprint tells nobody anything.
+    text += name == kPosesAndTimes ? "poses or times differ" : name + " was " + was + ", is " + is;
+  };
+  for (const auto& [path, value] : after.items()) {
+    const auto found = before.find(path);
+    if (found == before.end()) {
+      add(path, "not known", value.dump());
+    } else if (*found != value) {
+      add(path, found->dump(), value.dump());
+    }
+  }
+  for (const auto& [path, value] : before.items()) {
+    if (!after.contains(path)) add(path, value.dump(), "not known");
+  }
+  if (count > kShown) text += ", and " + std::to_string(count - kShown) + " more";
+  return text;
+}
+
 }  // namespace
 
 nlohmann::ordered_json describe_request(const Recording& recording, const ScanRange& range,
-                                        const RunOutputs& outputs,
+                                        const RunOutputs& outputs, bool map_on_disk,
                                         const nlohmann::ordered_json& configuration) {
   return {{"version", kVersionString},
           {"first_scan", recording.name(range.first)},
           {"last_scan", recording.name(range.last)},
-          {"poses_and_times", fingerprint(recording, range)},
+          {kPosesAndTimes, fingerprint(recording, range)},
           {"points_in_world", recording.frame() == PointFrame::kWorld},
           {"map", outputs.map_name()},
+          {"map_on_disk", map_on_disk},
           {"write_online", outputs.write_online},
           {"write_clean", outputs.write_clean},
           {"configuration", configuration}};
@@ -57,13 +91,16 @@ EarlierRun find_earlier_run(const std::filesystem::path& folder,
                             const nlohmann::ordered_json& request) {
   std::ifstream file(folder / "report.json");
   if (!file) return EarlierRun::kNone;
-  const auto report = nlohmann::json::parse(file, nullptr, false);
-  const auto replace = nlohmann::ordered_json::error_handler_t::replace;
-  const auto expected = nlohmann::json::parse(request.dump(-1, ' ', false, replace));
-  if (!report.is_object() || report.value("request", nlohmann::json()) != expected) {
+  const auto report = Json::parse(file, nullptr, false);
+  const auto expected = Json::parse(request.dump(-1, ' ', false, Json::error_handler_t::replace));
+  const bool has_request = report.is_object() && report.contains("request");
+  const std::string differing =
+      has_request ? differences(report["request"], expected) : "report.json does not tell of them";
+  if (!differing.empty()) {
     throw IoError(folder.string() +
                   ": holds results of other flags, scans, poses or another version, which cannot "
-                  "be resumed; choose another folder, or replace them by --force");
+                  "be resumed (" +
+                  differing + "); choose another folder, or replace them by --force");
   }
   return report.value("complete", false) ? EarlierRun::kComplete : EarlierRun::kUnfinished;
 }

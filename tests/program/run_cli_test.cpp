@@ -302,12 +302,14 @@ TEST_CASE("Flag --resume completes the run that it was asked for, and no other")
 
   for (const std::vector<std::string>& other :
        {std::vector<std::string>{"--map", fixture.folder / "b/map.ply", "--write-clean"},
-        std::vector<std::string>{"--map", map, "--write-clean", "--frame", "world"}}) {
+        std::vector<std::string>{"--map", map, "--write-clean", "--frame", "world"},
+        std::vector<std::string>{"--map", map, "--write-clean", "--map-memory", "10"}}) {
     std::vector<std::string> flags = other;
     flags.push_back("--resume");
     const Outcome refused = fixture.run(flags);
     CHECK(refused.code == 1);
     CHECK_THAT(refused.err, ContainsSubstring("results of other flags"));
+    CHECK(count_lines(refused.err) == 1);
   }
   CHECK(count_entries(fixture.folder / "b") == 0);
 
@@ -323,6 +325,43 @@ TEST_CASE("Flag --resume completes the run that it was asked for, and no other")
     CHECK_THAT(healed.out, ContainsSubstring("12 scans"));
     CHECK(fs::exists(lost));
   }
+}
+
+TEST_CASE("Flag --resume names what differs, with both values") {
+  const Fixture fixture;
+  REQUIRE(fixture.run({"--window", "5"}).code == 0);
+  const auto refusal = [&](std::vector<std::string> flags) {
+    flags.push_back("--resume");
+    const Outcome refused = fixture.run(flags);
+    CHECK(refused.code == 1);
+    return refused.err;
+  };
+  CHECK_THAT(refusal({}), ContainsSubstring("(window was 5, is "));
+  CHECK_THAT(refusal({"--window", "5", "--end", "8", "--map", fixture.out + "/a.ply"}),
+             ContainsSubstring("(last_scan was \"000011\", is \"000008\", poses or times differ, "
+                               "map was \"static_map.ply\", is \"a.ply\");"));
+  CHECK_THAT(
+      refusal({"--window", "6", "--end", "8", "--map", fixture.out + "/a.ply", "--write-clean"}),
+      ContainsSubstring(", is \"a.ply\", and 2 more);"));
+  nlohmann::json report = fixture.report();
+  report.erase("request");
+  write_text(fixture.out + "/report.json", report.dump());
+  CHECK_THAT(refusal({"--window", "5"}), ContainsSubstring("(report.json does not tell of them)"));
+}
+
+TEST_CASE("Flag --resume goes on with another budget for the map, which changes no result") {
+  const Fixture fixture;
+  REQUIRE(fixture.run({"--map-memory", "10"}).code == 0);
+  const std::string map = read_text(fixture.out + "/static_map.ply");
+  fs::remove(fixture.out + "/static_map.ply");
+  const Outcome resumed = fixture.run({"--map-memory", "0", "--resume"});
+  CAPTURE(resumed.err);
+  REQUIRE(resumed.code == 0);
+  CHECK(read_text(fixture.out + "/static_map.ply") == map);
+  CHECK(fixture.report()["configuration"]["map_memory"] == 0.0);
+  const Outcome in_memory = fixture.run({"--resume"});
+  CHECK(in_memory.code == 1);
+  CHECK_THAT(in_memory.err, ContainsSubstring("(map_on_disk was true, is false);"));
 }
 
 TEST_CASE("Paths are those of one place, however they are written") {
