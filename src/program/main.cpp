@@ -10,6 +10,7 @@
 #include "dynains/version.hpp"
 #include "eval.hpp"
 #include "experiment.hpp"
+#include "unknown_command.hpp"
 
 namespace {
 
@@ -56,7 +57,8 @@ int main(int argc, char** argv) {
   } catch (const CLI::Success& success) {
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
-    return fail(kExitUsage, (std::string(error.what()) + " (see dynains --help)").c_str());
+    const std::string what = remark_on_unknown_command(app).value_or(error.what());
+    return fail(kExitUsage, (what + " (see dynains --help)").c_str());
   } catch (const dynains::ConfigError& error) {
     return fail(kExitUsage, error.what());
   } catch (const dynains::UsageError& error) {

@@ -41,6 +41,34 @@ TEST_CASE("Wrong usage is one line on standard error and exit code 2") {
   }
 }
 
+TEST_CASE("A command that there is not: which there are, and the nearest of them") {
+  struct Case {
+    std::vector<std::string> arguments;
+    std::string expected;
+  };
+  const std::string all =
+      "xpected one of run, check, config, simulate, statistics, eval, experiment (";
+  const std::vector<Case> cases = {
+      {{"runn", "seq", "--out", "out"}, "\"runn\" is no command; did you mean run? E" + all},
+      {{"sim", "out"}, "\"sim\" is no command; did you mean simulate? E" + all},
+      {{"statistic"}, "did you mean statistics?"},
+      {{"chekc", "seq"}, "did you mean check?"},
+      {{"remove", "seq"}, "\"remove\" is no command; e" + all},
+      {{""}, "\"\" is no command; e" + all},
+      {{"experiment", "tabel1"}, "\"tabel1\" is no command; did you mean table1? Expected one of "},
+  };
+  for (const Case& wrong : cases) {
+    const Outcome outcome = start(wrong.arguments);
+    CAPTURE(wrong.expected);
+    CHECK(outcome.code == 2);
+    CHECK_THAT(outcome.err, StartsWith("dynains: error: ") && ContainsSubstring(wrong.expected));
+    CHECK(std::count(outcome.err.begin(), outcome.err.end(), '\n') == 1);
+  }
+  // Elsewhere words that nobody expects are no commands.
+  CHECK_THAT(start({"config", "runn"}).err, !ContainsSubstring("no command"));
+  CHECK_THAT(start({"--runn"}).err, !ContainsSubstring("no command"));
+}
+
 TEST_CASE("Results that cannot be shown are a failure, a reader who leaves is none") {
   const std::string program = std::string("'") + DYNAINS_PROGRAM + "' config";
   const auto code_of = [](const std::string& command) {
