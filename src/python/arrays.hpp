@@ -37,14 +37,31 @@ inline std::string shape_text(const py::array& array) {
   return py::str(array.attr("shape")).cast<std::string>();
 }
 
+inline std::string type_text(const py::handle& object) {
+  return py::str(py::type::handle_of(object).attr("__name__")).cast<std::string>();
+}
+
+/// Throws CloudError unless `array` has a point in each row. Scans that were handed in by columns
+/// have some thousand of them, which no record of a point has.
+inline void expect_rows_of_points(const std::string& what, const py::array& array) {
+  constexpr py::ssize_t kMostColumns = 64;
+  if (array.ndim() == 2 && array.shape(1) >= 3 && array.shape(1) <= kMostColumns) return;
+  std::string text = what + shape_text(array) + ", expected (N, 3), or (N, 4) and more up to " +
+                     std::to_string(kMostColumns) + " columns, x y z first";
+  if (array.ndim() == 2 && array.shape(1) > kMostColumns) text += ": transpose it, or slice it";
+  throw CloudError(text);
+}
+
 /// Calls `use` with a view of an (N, 3 or more) array of float32 or float64. Throws CloudError for
-/// another shape, TypeError for another type.
+/// another shape, TypeError for what is another type or no array.
 template <class Use>
-auto with_points(const py::array& array, Use&& use) {
-  if (array.ndim() != 2 || array.shape(1) < 3) {
-    throw CloudError("points have shape " + shape_text(array) +
-                     ", expected (N, 3) or more columns, x y z first");
+auto with_points(const py::object& points, Use&& use) {
+  if (!py::isinstance<py::array>(points)) {
+    throw py::type_error("points are " + type_text(points) +
+                         ", expected a NumPy array (N, 3) or (N, 4) of float32 or float64");
   }
+  const auto array = py::reinterpret_borrow<py::array>(points);
+  expect_rows_of_points("points have shape ", array);
   const auto* const data = static_cast<const char*>(array.data());
   const auto count = static_cast<std::size_t>(array.shape(0));
   const auto row = static_cast<std::ptrdiff_t>(array.strides(0));
@@ -61,8 +78,11 @@ auto with_points(const py::array& array, Use&& use) {
 
 using PoseArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-/// Throws PoseError unless `array` is a 4 x 4 rigid transform.
-inline Eigen::Isometry3d to_pose(const PoseArray& array) {
+/// Throws PoseError unless `pose` is a 4 x 4 rigid transform, TypeError if it is no array of
+/// numbers nor what NumPy makes one of.
+inline Eigen::Isometry3d to_pose(const py::handle& pose) {
+  const PoseArray array = PoseArray::ensure(pose);
+  if (!array) throw py::type_error("a pose is " + type_text(pose) + ", expected (4, 4) numbers");
   if (array.ndim() != 2 || array.shape(0) != 4 || array.shape(1) != 4) {
     throw PoseError("a pose has shape " + shape_text(array) + ", expected (4, 4)");
   }

@@ -73,22 +73,20 @@ void expect_length(const char* what, std::size_t scan, const py::array& array, p
 
 JudgedScan make_scan(std::size_t index, const py::handle& points, const py::handle& pose,
                      const py::handle& truth, const py::handle& kept) {
-  JudgedScan scan{points.cast<Contiguous<float>>(),
+  JudgedScan scan{Contiguous<float>::ensure(points),
                   to_truth(index, to_array(truth)),
                   to_numbers<std::uint8_t>("kept", index, to_array(kept), 1,
                                            "bool, for example is_static(verdict.labels)"),
                   {}};
-  if (scan.points.ndim() != 2 || scan.points.shape(1) < 3) {
-    throw CloudError("points of scan " + std::to_string(index) + ": shape " +
-                     shape_text(scan.points) + ", expected (N, 3) or more columns");
-  }
+  if (!scan.points) refuse("points", index, "an array (N, 3) or (N, 4) of numbers");
+  expect_rows_of_points("points of scan " + std::to_string(index) + ": shape ", scan.points);
   const py::ssize_t count = scan.points.shape(0);
   expect_length("truth", index, scan.truth, count);
   expect_length("kept", index, scan.kept, count);
   const auto size = static_cast<std::size_t>(count);
   scan.view.xyz = scan.points.data();
   scan.view.stride = static_cast<std::size_t>(scan.points.shape(1));
-  scan.view.T_world_sensor = to_pose(pose.cast<PoseArray>());
+  scan.view.T_world_sensor = to_pose(pose);
   scan.view.truth = {scan.truth.data(), size};
   scan.view.in_map = {scan.kept.data(), size};
   return scan;
@@ -146,7 +144,7 @@ py::dict evaluate_arrays(const py::sequence& points, const py::sequence& poses,
 void bind_evaluation(py::module_& module) {
   std::string doc =
       "Judges what was kept of each scan by its ground truth.\n\n"
-      "points, poses, truth, kept: sequences with an entry per scan. points: (N, 3 or more), "
+      "points, poses, truth, kept: sequences with an entry per scan. points: (N, 3 to 64), "
       "metres, sensor frame. poses: (4, 4), T_world_sensor. truth: (N,) labels of SemanticKITTI, "
       "or bool (True moves). kept: (N,) bool, for example is_static(verdict.labels).\n"
       "Returns {'identity': row, 'oracle': row, 'estimate': row}. A row has PR, RR (percent) and "

@@ -11,7 +11,7 @@ PYBIND11_MODULE(dynains, module) {
       "    remover = dynains.DynaInsRemover()\n"
       "    frame = remover.push(points, T_world_sensor, time)\n"
       "    moving = points[frame.newest.labels == dynains.Label.DYNAMIC]\n\n"
-      "Points are float32 or float64 arrays of shape (N, 3 or more), metres, sensor frame, read\n"
+      "Points are float32 or float64 arrays of shape (N, 3 to 64), metres, sensor frame, read\n"
       "where they lie. Poses are (4, 4). What is given out is the caller's own.";
   module.attr("__version__") = dynains::kVersionString;
 

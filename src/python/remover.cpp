@@ -69,7 +69,7 @@ class Remover {
  public:
   explicit Remover(const DynaInsRemover::Config& config) : remover_(config) {}
 
-  Frame push(const py::array& points, const PoseArray& pose, std::optional<double> time) {
+  Frame push(const py::object& points, const py::object& pose, std::optional<double> time) {
     const Eigen::Isometry3d T_world_sensor = to_pose(pose);
     std::optional<OwnedVerdict> newest, finished;
     StageTimes times;
@@ -204,7 +204,7 @@ void bind_remover(py::module_& module) {
       .def("push", &Remover::push, py::arg("points"), py::arg("T_world_sensor"),
            py::arg("time") = py::none(),
            "Takes one scan in and returns a FrameResult.\n\n"
-           "points: (N, 3 or more) float32 or float64, metres, sensor frame; any strides, never "
+           "points: (N, 3 to 64) float32 or float64, metres, sensor frame; any strides, never "
            "copied as a whole. T_world_sensor: (4, 4). time: s, increasing; without it scans are "
            "0.1 s apart. Raises CloudError, PoseError or TypeError, and then nothing has changed.")
       .def("flush", &Remover::flush,

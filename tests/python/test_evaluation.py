@@ -86,7 +86,10 @@ def test_nothing_removed_is_the_identity_on_a_street(street):
         (([POINTS], [np.eye(4)], [MOVES[:3]], [MOVES]), {}, ValueError, r"truth of scan 0.*\(3,\)"),
         (([POINTS], [np.eye(4)], [MOVES], [MOVES[:1]]), {}, ValueError, "kept of scan 0"),
         (([POINTS[0]], [np.eye(4)], [MOVES], [MOVES]), {}, dynains.CloudError, "points of scan 0"),
+        (([np.ones((3, 99))], [np.eye(4)], [MOVES], [MOVES]), {}, dynains.CloudError, "transpose"),
+        (([[[1, 2, 3], [1]]], [np.eye(4)], [MOVES], [MOVES]), {}, TypeError, "points of scan 0"),
         (([POINTS], [np.eye(3)], [MOVES], [MOVES]), {}, dynains.PoseError, "shape"),
+        (([POINTS], ["north"], [MOVES], [MOVES]), {}, TypeError, "a pose is str"),
         # Labels of a verdict where is_static() of them is meant; classes that are none.
         (([POINTS], [np.eye(4)], [MOVES], [np.uint8([3, 3, 4, 4])]), {}, TypeError, "is_static"),
         (([POINTS], [np.eye(4)], [MOVES], [[1.0, 0.5, 0, 0]]), {}, TypeError, "kept of scan 0"),

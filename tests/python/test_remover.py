@@ -122,6 +122,12 @@ def test_an_empty_scan_is_a_scan(identity):
     [
         (np.zeros((3, 2), np.float32), dynains.CloudError, r"shape \(3, 2\)"),
         (np.zeros(9, np.float32), dynains.CloudError, r"shape \(9,\)"),
+        (np.zeros((9, 2)), dynains.CloudError, r"shape \(9, 2\), expected \(N, 3\), or \(N, 4\)"),
+        (np.zeros((3, 900)), dynains.CloudError, r"shape \(3, 900\), expected \(N, 3\).*transpose"),
+        (np.zeros((4, 65)), dynains.CloudError, r"shape \(4, 65\), expected \(N, 3\).*transpose"),
+        (np.zeros((2, 3, 3)), dynains.CloudError, r"shape \(2, 3, 3\)"),
+        ([[1.0, 2.0, 3.0]], TypeError, "^points are list, expected a NumPy array"),
+        (None, TypeError, "^points are NoneType, expected a NumPy array"),
         (np.zeros((3, 3), np.int32), TypeError, "points are int32"),
         (np.zeros((3, 3), ">f4"), TypeError, "points are >f4"),
     ],
@@ -145,6 +151,20 @@ def test_bad_poses_are_refused_and_change_nothing(pose, text):
     with pytest.raises(dynains.PoseError, match=text):
         remover.push(np.ones((5, 3)), pose)
     assert remover.push(np.ones((5, 3)), np.eye(4)).newest.scan == 0
+
+
+def test_a_point_may_have_many_columns(identity):
+    for columns in 3, 4, 10, 64:
+        points = np.ones((4, columns), np.float32)
+        assert dynains.DynaInsRemover().push(points, identity).newest.labels.shape == (4,)
+
+
+def test_poses_may_be_lists_but_nothing_else_than_numbers():
+    remover = dynains.DynaInsRemover()
+    remover.push(np.ones((5, 3)), np.eye(4).tolist())
+    for pose in "north", [[1, 0], [0]]:
+        with pytest.raises(TypeError, match=r"^a pose is (str|list), expected \(4, 4\) numbers"):
+            remover.push(np.ones((5, 3)), pose)
 
 
 def test_time_must_increase(identity):
