@@ -220,10 +220,38 @@ void check_backed(const ByteReader& reader, const PcdHeader& header, std::uint64
                    std::to_string(i));
 }
 
-void read_ascii(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
+void check_ascii(const ByteReader& reader, const PcdHeader& header) {
   std::uint64_t values = 0;
   for (const Field& field : header.fields) values += field.count;
+  // The last line may lack its end.
   check_backed(reader, header, reader.remaining() + 1, 2 * values);
+}
+
+void check_binary(const ByteReader& reader, const PcdHeader& header) {
+  check_backed(reader, header, reader.remaining(), header.record_bytes());
+}
+
+struct BlockSizes {
+  std::uint32_t compressed;
+  std::uint32_t plain;
+};
+
+/// What stands before a compressed block, if the file can hold that.
+BlockSizes read_block_sizes(ByteReader& reader) {
+  std::array<std::uint32_t, 2> sizes{};
+  std::array<char, sizeof(sizes)> bytes{};
+  reader.read(bytes.data(), bytes.size(), "the sizes of the compressed block");
+  std::memcpy(sizes.data(), bytes.data(), bytes.size());
+  if (sizes[0] > reader.remaining()) {
+    reader.fail_here("expected " + std::to_string(sizes[0]) +
+                     " bytes of compressed points, the file has " +
+                     std::to_string(reader.remaining()) + " bytes left");
+  }
+  return {sizes[0], sizes[1]};
+}
+
+void read_ascii(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
+  check_ascii(reader, header);
   sink.resize(static_cast<std::size_t>(header.points));
   std::string line;
   for (std::size_t i = 0; i < header.points; ++i) {
@@ -250,7 +278,7 @@ void read_ascii(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
 }
 
 void read_binary(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
-  check_backed(reader, header, reader.remaining(), header.record_bytes());
+  check_binary(reader, header);
   if (header.points == 0) return;
   std::vector<char> record(header.record_bytes());
   sink.resize(static_cast<std::size_t>(header.points));
@@ -269,16 +297,7 @@ void read_binary(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
 
 /// The points are stored field after field, and compressed in one block.
 void read_compressed(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
-  std::array<std::uint32_t, 2> sizes{};
-  std::array<char, sizeof(sizes)> bytes{};
-  reader.read(bytes.data(), bytes.size(), "the sizes of the compressed block");
-  std::memcpy(sizes.data(), bytes.data(), bytes.size());
-  const auto [compressed_size, plain_size] = sizes;
-  if (compressed_size > reader.remaining()) {
-    reader.fail_here("expected " + std::to_string(compressed_size) +
-                     " bytes of compressed points, the file has " +
-                     std::to_string(reader.remaining()) + " bytes left");
-  }
+  const auto [compressed_size, plain_size] = read_block_sizes(reader);
   const std::uint64_t each = header.record_bytes();
   if (plain_size % each != 0 || plain_size / each != header.points) {
     reader.fail_here("expected a block of " + std::to_string(header.points) + " points of " +
@@ -334,6 +353,23 @@ PointFileHeader read_pcd_header(const std::filesystem::path& path) {
   PointSink sink;
   parse_pcd_header(reader, sink);
   return {sink.file().viewpoint, sink.columns()};
+}
+
+void check_pcd(const std::filesystem::path& path) {
+  ByteReader reader(path);
+  PointSink sink;
+  const PcdHeader header = parse_pcd_header(reader, sink);
+  switch (header.encoding) {
+    case PcdEncoding::kAscii:
+      check_ascii(reader, header);
+      break;
+    case PcdEncoding::kBinary:
+      check_binary(reader, header);
+      break;
+    case PcdEncoding::kCompressed:
+      read_block_sizes(reader);
+      break;
+  }
 }
 
 }  // namespace dynains

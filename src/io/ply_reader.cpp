@@ -240,4 +240,11 @@ PointFileHeader read_ply_header(const std::filesystem::path& path) {
   return {sink.file().viewpoint, sink.columns()};
 }
 
+void check_ply(const std::filesystem::path& path) {
+  ByteReader reader(path);
+  PointSink sink;
+  const PlyHeader header = parse_ply_header(reader, sink);
+  for (const Element& element : header.elements) check_count(reader, element, header.encoding);
+}
+
 }  // namespace dynains

@@ -159,4 +159,8 @@ PointFileHeader read_point_file_header(const fs::path& path) {
   return known_format_of(path) == Format::kPly ? read_ply_header(path) : read_pcd_header(path);
 }
 
+void check_point_file(const fs::path& path) {
+  (known_format_of(path) == Format::kPly ? check_ply : check_pcd)(path);
+}
+
 }  // namespace dynains

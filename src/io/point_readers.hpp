@@ -13,4 +13,7 @@ PointFile read_pcd(const std::filesystem::path& path);
 PointFileHeader read_ply_header(const std::filesystem::path& path);
 PointFileHeader read_pcd_header(const std::filesystem::path& path);
 
+void check_ply(const std::filesystem::path& path);
+void check_pcd(const std::filesystem::path& path);
+
 }  // namespace dynains

@@ -431,7 +431,7 @@ void Recording::check_scan(std::size_t i) const {
   if (format_ == ScanFormat::kBin) {
     count_scan_points(file);
   } else {
-    read_point_file_header(file);
+    check_point_file(file);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "command.hpp"
+#include "dynains/errors.hpp"
 #include "dynains/io/diagnosis.hpp"
 #include "dynains/remover_config.hpp"
 #include "lone_scans.hpp"
@@ -58,8 +59,27 @@ void print_remarks(const Diagnosis& d) {
   }
 }
 
+/// The diagnosis reads a sample; this looks at every file, for scans that were cut off. Throws
+/// IoError of the first and counts the others.
+void check_files(const Recording& recording) {
+  std::string first;
+  std::size_t broken = 0;
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    try {
+      recording.check_scan(i);
+    } catch (const IoError& error) {
+      if (broken == 0) first = error.what();
+      ++broken;
+    }
+  }
+  if (broken == 0) return;
+  if (broken > 1) first += "; " + std::to_string(broken - 1) + " more scan files are broken";
+  throw IoError(first);
+}
+
 void check(const RecordingFlags& flags) {
   const Recording recording(flags.folder(), flags.options());
+  check_files(recording);
   const Diagnosis d = diagnose(recording);
   print_line("scans", std::to_string(d.scan_files) + " files, " + std::to_string(d.pose_rows) +
                           " poses, " + std::to_string(d.scans) + " scans with a pose");
@@ -97,10 +117,11 @@ void add_check_command(CLI::App& app) {
       "check", "Tell in seconds whether a recording will work, and which option it needs");
   const auto flags = std::make_shared<RecordingFlags>(command, "recording");
   command.footer(
-      "Looks at a sample of scans: counts, units, invalid points, height and tilt of the sensor, "
-      "and whether\nscans agree under the poses or under the usual mistakes. Exits with 1 if the "
-      "poses need another option\nor fit under none, or if scans are too far apart to be "
-      "compared.");
+      "Looks at the size of every scan file, and at a sample of scans: counts, units, invalid "
+      "points, height\nand tilt of the sensor, and whether scans agree under the poses or under "
+      "the "
+      "usual mistakes. Exits with 1\nif a file is cut off, if the poses need another option or fit "
+      "under none, or if scans are too far apart\nto be compared.");
   command.callback([flags] { check(*flags); });
 }
 

@@ -360,6 +360,33 @@ TEST_CASE("Malformed point files are refused with position and expectation") {
   }
 }
 
+TEST_CASE("A point file that was cut off is noticed without reading its points") {
+  const TemporaryFolder folder;
+  struct Case {
+    std::string name;
+    std::string header;
+    std::string data;
+    std::string expected;
+  };
+  const std::string block = pack(std::uint32_t{13}, std::uint32_t{12}) + std::string(13, '\0');
+  for (const Case& whole : std::vector<Case>{
+           {"a.pcd", pcd_header("2", "ascii"), "1 2 3\n1 2 3", "expected 2 points"},
+           {"a.pcd", pcd_header("2", "binary"), std::string(24, 'x'), "expected 2 points"},
+           {"a.pcd", pcd_header("1", "binary_compressed"), block, "expected 13 bytes"},
+           {"a.ply", "ply\nformat binary_little_endian 1.0\nelement vertex 2\n" + kPlyXyz,
+            std::string(24, 'x'), "expected 2 elements"}}) {
+    CAPTURE(whole.name, whole.header);
+    const auto refusal = [&](const std::string& content) {
+      write_text(folder / whole.name, content);
+      return message_of<IoError>([&] { check_point_file(folder / whole.name); });
+    };
+    CHECK(refusal(whole.header + whole.data) == "(nothing was thrown)");
+    const std::string half = whole.data.substr(0, whole.data.size() / 2 + 4);
+    CHECK_THAT(refusal(whole.header + half),
+               StartsWith((folder / whole.name).string()) && ContainsSubstring(whole.expected));
+  }
+}
+
 TEST_CASE("Any prefix of a point file is read or refused, never more") {
   TemporaryFolder folder;
   const std::string extension = GENERATE(".ply", ".pcd");

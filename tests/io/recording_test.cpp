@@ -248,6 +248,8 @@ TEST_CASE("Folders that are no recording are refused with a reason") {
   const Recording huge(seq);
   CHECK_THAT(message_of<IoError>([&] { huge.read_scan(0); }),
              ContainsSubstring("b.pcd: byte") && ContainsSubstring("99999999999 points"));
+  CHECK_THAT(message_of<IoError>([&] { huge.check_scan(0); }),
+             ContainsSubstring("b.pcd: byte") && ContainsSubstring("99999999999 points"));
   write_text(seq / "velodyne/b.pcd", "no header\n");
   CHECK_THAT(error_of(seq), ContainsSubstring("b.pcd:1: expected a line of a PCD header"));
 }

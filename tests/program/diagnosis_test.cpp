@@ -184,6 +184,25 @@ TEST_CASE("check and run say what is wrong, in a sentence") {
   CHECK(fine.err.empty());
 }
 
+TEST_CASE("check looks at the size of every scan file") {
+  const Street street;
+  write_poses(street.path() / "poses.txt", street.poses());
+  const fs::path scans = street.path() / "velodyne";
+  const std::string seq = street.path();
+  fs::resize_file(scans / "21.bin", fs::file_size(scans / "21.bin") - 3);
+  const std::string first =
+      "dynains: error: " + (scans / "21.bin").string() + ": truncated at byte " +
+      std::to_string(fs::file_size(scans / "21.bin")) + ": expected a multiple of 16 bytes";
+  const Outcome one = start({"check", seq});
+  CHECK(one.code == 1);
+  CHECK_THAT(one.err, StartsWith(first) && !ContainsSubstring("more scan files"));
+  fs::resize_file(scans / "22.bin", 7);
+  fs::resize_file(scans / "23.bin", 17);
+  const Outcome three = start({"check", seq});
+  CHECK(three.code == 1);
+  CHECK_THAT(three.err, StartsWith(first) && ContainsSubstring("; 2 more scan files are broken\n"));
+}
+
 TEST_CASE("check and run notice scans that are too far apart in time to be compared") {
   const Street street;
   write_poses(street.path() / "poses.txt", street.poses());

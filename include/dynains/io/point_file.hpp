@@ -88,4 +88,8 @@ struct PointFileHeader {
 };
 PointFileHeader read_point_file_header(const std::filesystem::path& path);
 
+/// Throws IoError unless the header is sound and the file large enough for the points that it tells
+/// of; cheap, for the points are not read.
+void check_point_file(const std::filesystem::path& path);
+
 }  // namespace dynains
