@@ -4,7 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
+#include <optional>
 #include <utility>
+
+#include "pose_shift.hpp"
 
 namespace dynains {
 namespace {
@@ -42,6 +46,12 @@ PointBuffer finite_points(const RecordedScan& scan) {
     points.push_back(p[0], p[1], p[2]);
   }
   return points;
+}
+
+Landmarks landmarks_of(const Recording& recording, std::size_t i, RecordedScan& scan) {
+  recording.read_scan(i, scan);
+  const PointBuffer points = finite_points(scan);
+  return Landmarks(points, estimate_mounting(points));
 }
 
 /// Two scans a few places apart.
@@ -177,9 +187,10 @@ std::vector<Change> usual_mistakes(const Recording& recording) {
   }
   changes.erase(changes.begin());
   // A shift is not combined: what it changes is small.
-  for (const int shift : {1, -1}) {
-    Change change{"the poses are off by one scan",
-                  "--pose-shift " + std::to_string(given.shift + shift), given};
+  for (const int shift : {1, -1, 2, -2}) {
+    Change change{
+        std::abs(shift) == 1 ? "the poses are off by one scan" : "the poses are off by two scans",
+        "--pose-shift " + std::to_string(given.shift + shift), given};
     change.convention.shift = given.shift + shift;
     changes.push_back(std::move(change));
   }
@@ -236,6 +247,45 @@ void compare(const Recording& recording, const std::vector<Pair>& pairs, std::si
     }
   }
   d.verdict = judge(recording, d);
+}
+
+/// Gaps of a pair under shifted poses; nothing if one of these is missing.
+std::optional<ShiftedGaps> shifted_gaps(const Recording& recording, const Pair& pair) {
+  ShiftedGaps gaps{};
+  PoseConvention convention = recording.convention();
+  convention.shift -= kFarthestShift;
+  for (double& gap : gaps) {
+    const auto T_world_a = recording.pose_under(convention, pair.first);
+    const auto T_world_b = recording.pose_under(convention, pair.second);
+    if (!T_world_a || !T_world_b) return std::nullopt;
+    gap = pair.a.compare(pair.b, T_world_a->inverse() * *T_world_b).gap;
+    ++convention.shift;
+  }
+  return gaps;
+}
+
+/// Scans agree nearly as well under poses that are off by a scan or two; many pairs can tell.
+void look_for_shift(const Recording& recording, Diagnosis& d) {
+  constexpr std::size_t kManyPairs = 24;
+  const auto margin = static_cast<std::size_t>(kFarthestShift);
+  if (recording.size() < kLeastShiftPairs + kStride + 2 * margin) return;
+  RecordedScan scan;
+  const std::vector<Pair> pairs =
+      take_pairs(margin, recording.size() - 1 - margin, kStride, kManyPairs,
+                 [&](std::size_t i) { return landmarks_of(recording, i, scan); });
+  std::vector<ShiftedGaps> gaps;
+  for (const Pair& pair : pairs) {
+    if (const auto of_pair = shifted_gaps(recording, pair)) gaps.push_back(*of_pair);
+  }
+  const int shift = best_shift(gaps);
+  if (shift == 0) return;
+  // All that is shown of the readings then comes from the same scans.
+  compare(recording, pairs, kStride, d);
+  const auto found = std::find_if(d.readings.begin(), d.readings.end(), [&](const PoseReading& r) {
+    return r.convention.shift == recording.convention().shift + shift;
+  });
+  std::rotate(d.readings.begin(), found, found + 1);
+  d.verdict = PoseVerdict::kOtherwise;
 }
 
 }  // namespace
@@ -378,6 +428,7 @@ Diagnosis diagnose(const Recording& recording) {
     }
     if (near_by.sound()) return near_by;
   }
+  if (d.verdict == PoseVerdict::kAgree) look_for_shift(recording, d);
   return d;
 }
 
@@ -388,11 +439,7 @@ PoseAgreement agreement_at(const Recording& recording, std::size_t first, std::s
                            std::size_t stride) {
   constexpr std::size_t kFewPairs = 4;
   RecordedScan scan;
-  const auto load = [&](std::size_t i) {
-    recording.read_scan(i, scan);
-    const PointBuffer points = finite_points(scan);
-    return Landmarks(points, estimate_mounting(points));
-  };
+  const auto load = [&](std::size_t i) { return landmarks_of(recording, i, scan); };
   const std::vector<Pair> pairs = take_pairs(first, last, stride, kFewPairs, load);
   AgreementSum as_given;
   for (const Pair& pair : pairs) {
@@ -423,8 +470,8 @@ std::string advice(const Diagnosis& d) {
     case PoseVerdict::kAgree:
       return "Scans and poses agree as they are; no option is needed.";
     case PoseVerdict::kOtherwise:
-      return "Scans agree if " + d.readings.front().meaning + ": pass " +
-             d.readings.front().option + ".";
+      return (fits(d.as_given, d.standing) ? "Scans agree better if " : "Scans agree if ") +
+             d.readings.front().meaning + ": pass " + d.readings.front().option + ".";
     case PoseVerdict::kNoMotion:
       if (d.step * static_cast<double>(d.stride) > 1.0) {
         return "Too little stands beside the way to tell what the poses mean; nothing speaks "

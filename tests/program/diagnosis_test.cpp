@@ -119,6 +119,28 @@ TEST_CASE("check names the mistake in the poses and the option against it") {
   CHECK(pose_agreement(Recording(street.path()), 0, 23).doubtful());
 }
 
+TEST_CASE("check names poses that belong to the scan before or behind, if the drive shows it") {
+  simulation::Config config = bends();
+  config.scene = simulation::Scene::kUrban;
+  const Street street(config);
+  write_poses(street.path() / "poses.txt", street.poses());
+  const auto diagnosis_of = [&](int shift) {
+    RecordingOptions options;
+    options.convention.shift = shift;
+    return diagnose(Recording(street.path(), options));
+  };
+  CHECK(diagnosis_of(0).verdict == PoseVerdict::kAgree);
+  for (const int shift : {-2, 1, 2}) {
+    CAPTURE(shift);
+    const Diagnosis shifted = diagnosis_of(shift);
+    CHECK(shifted.verdict == PoseVerdict::kOtherwise);
+    CHECK_THAT(advice(shifted), StartsWith("Scans agree better if the poses are off by "));
+    REQUIRE(!shifted.readings.empty());
+    CHECK(shifted.readings.front().option == "--pose-shift 0");
+    CHECK(shifted.readings.front().agreement.gap < shifted.as_given.gap);
+  }
+}
+
 TEST_CASE("few beams that look ahead on a fast empty road are no reason to doubt the poses") {
   simulation::Config config;
   config.scene = simulation::Scene::kHighway;
