@@ -38,6 +38,7 @@ struct FreeSpaceConfig {
   double track_height = 4.5;     ///< m, higher instances are not carried
   double passage_cell = 0.6;     ///< m, cells in which is counted how much of what is met moves
   double passage_share = 0.65;   ///< share of that from which the rest moves, too; 1: never
+  bool see_past_movers = true;   ///< returns of what moves protect nothing about them
   bool presume_dynamic = true;   ///< zero latency: compact instances nobody has confirmed yet
 
   template <class Self, class Visitor>
@@ -106,6 +107,9 @@ struct FreeSpaceConfig {
     visitor(Parameter{"passage_share", self.passage_share, half_open_below(0, 1), "",
                       "share of what is met in a place that moves, from which the rest goes, too; "
                       "1: never"});
+    visitor(Parameter{"see_past_movers", self.see_past_movers, Bounds(), "",
+                      "returns of what surely moves neither show that its place is occupied nor "
+                      "protect what is beside them"});
     visitor(Parameter{"presume_dynamic", self.presume_dynamic, Bounds(), "",
                       "the zero-latency verdict calls compact instances dynamic whose place no "
                       "earlier scan has seen; without effect where that is final (horizon 0)"});

@@ -100,14 +100,13 @@ class FreeSpaceEvidence {
       segment_begin_ = scan;
       passages_.forget();
     }
+    newest_ = scan;
     Record& record = record_of(scan);
     record.segment = segment;
     record.T_world_sensor = T_world_sensor;
     record.at = views_.advance(scan - segment_begin_);
-    // Points that were sampled are at hand when the image is made.
     moved_ground_.bound(split.ground(), record.ground_boxes);
     sampler_.sample(split.non_ground(), instance_of, instance_count, record.samples);
-    if (record.at.phase == 0) views_.make_image(scan, segment, T_world_sensor, split);
     updater_.begin(record.samples, record.beliefs);
     record.counted.assign(record.samples.supervoxel_count(), Passages::Count::kNone);
     predecessors_.assign(instance_count, kNoCluster);
@@ -119,15 +118,15 @@ class FreeSpaceEvidence {
     }
     updater_.begin_other_side(record.samples, record.beliefs);
     weigh(record);
-    for (std::uint64_t phase = 0; phase < before_.size(); ++phase) {
-      if (turn_of(phase) == record.at.phase) refer_older(phase, views_.newest());
-    }
+    awaits_image_ = record.at.phase == 0;
+    if (!awaits_image_) refer_older(record.at.phase);
     if (config_.use_tracks) run_beliefs(scan);
   }
 
   /// Verdict on a scan that is at most `horizon()` old, or what keep() was told, as the evidence
   /// stands now. Nothing is presumed in a final verdict. `split`: that of the scan. The spans hold
-  /// until the next call.
+  /// until the next call. The first verdict on the scan observed last makes it a reference for
+  /// others, if it is one; without, it is none.
   EvidenceVerdict judge(std::uint64_t scan, bool is_final, const GroundSplit& split) {
     Record& record = record_of(scan);
     judge_instances(scan, is_final, record);
@@ -137,6 +136,7 @@ class FreeSpaceEvidence {
       passages_.judge(scan, samples, T_origin_world_ * record.T_world_sensor, record.counted,
                       verdicts_);
     }
+    if (awaits_image_ && scan == newest_) become_reference(record, split);
     groups_.assign(1, {Cause::kNotJudged, 0.0F});
     groups_.resize(samples.met.size());
     for (std::size_t i = 1; i < samples.met.size(); ++i) groups_[i] = verdicts_[samples.met[i]];
@@ -209,7 +209,46 @@ class FreeSpaceEvidence {
     return phase == 0 && config_.reference_step > 1 ? 1 : phase;
   }
 
-  // Holds the image of a scan against those before it that are of a phase.
+  // Makes the image of the newest scan, and holds it against older ones whose turn it is. What
+  // moves protects nothing: what it hits again may be another, and beside it beams may pass.
+  void become_reference(const Record& record, const GroundSplit& split) {
+    awaits_image_ = false;
+    moving_.clear();
+    if (config_.see_past_movers) {
+      const InstanceSamples& samples = record.samples;
+      moving_groups_.assign(samples.met.size(), 0);
+      for (std::size_t i = 1; i < samples.met.size(); ++i) {
+        moving_groups_[i] = surely_moves(record, samples.met[i]) ? 1 : 0;
+      }
+      moving_.resize(samples.met_of.size());
+      for (std::size_t i = 0; i < moving_.size(); ++i) {
+        moving_[i] = moving_groups_[samples.met_of[i]];
+      }
+    }
+    views_.make_image(newest_, record.segment, record.T_world_sensor, split, moving_);
+    if (turn_of(0) != 0) return;
+    refer_older(0);
+    if (config_.use_tracks) run_beliefs(newest_);
+  }
+
+  // Whether a supervoxel goes, and not only because some of its instance was seen free: that may be
+  // foliage, or stand beside what moves.
+  bool surely_moves(const Record& record, std::uint32_t supervoxel) const {
+    const Cause cause = verdicts_[supervoxel].cause;
+    if (cause == Cause::kFreeSpace || cause == Cause::kInPassage) return true;
+    if (!config_.use_tracks || !is_dynamic(cause) || cause == Cause::kPresumed) return false;
+    const std::uint32_t instance = record.samples.instance_of[supervoxel];
+    const InstanceBeliefs::Share& share = record.beliefs.shares[instance];
+    return 2 * share.moved >= share.decided &&
+           track_belief(record.tracked.instances[instance]) >= track_level_;
+  }
+
+  // Holds the newest image against older scans, those of the phases whose turn it is.
+  void refer_older(std::uint64_t turn) {
+    for (std::uint64_t phase = 0; phase < before_.size(); ++phase) {
+      if (turn_of(phase) == turn) refer_older(phase, views_.newest());
+    }
+  }
   void refer_older(std::uint64_t phase, const ReferenceView& image) {
     for (const int lag : after_[phase]) {
       const auto back = static_cast<std::uint64_t>(lag);
@@ -378,11 +417,15 @@ class FreeSpaceEvidence {
   // world begins.
   Eigen::Isometry3d T_origin_world_ = Eigen::Isometry3d::Identity();
   std::uint64_t segment_begin_ = 0;  // first scan of the segment of the newest
+  std::uint64_t newest_ = 0;
+  bool awaits_image_ = false;  // the newest scan
   // By phase: scans to the references before and after.
   std::vector<std::vector<int>> before_, after_;
   std::vector<Record> records_;
-  std::vector<Verdict> verdicts_;  // by supervoxel
-  std::vector<Verdict> groups_;    // by position in InstanceSamples::met
+  std::vector<Verdict> verdicts_;            // by supervoxel
+  std::vector<Verdict> groups_;              // by position in InstanceSamples::met
+  std::vector<std::uint8_t> moving_groups_;  // by position in InstanceSamples::met
+  std::vector<std::uint8_t> moving_;         // by point above the ground
   std::vector<std::uint32_t> free_;
   std::vector<std::uint32_t> predecessors_;
 };

@@ -123,7 +123,7 @@ class InstanceBeliefUpdater {
   }
 
  private:
-  static constexpr float kLeastView = 0.1F;        // share of an instance that a reference must see
+  static constexpr float kLeastView = 0.25F;       // share of an instance that a reference must see
   static constexpr float kLeastFree = 0.15F;       // share of a supervoxel that must be seen free
   static constexpr std::uint32_t kLeastBody = 12;  // known samples of what could carry windows
   static constexpr float kContradictingHits = 0.85F;  // of what is seen of an instance

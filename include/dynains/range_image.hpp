@@ -19,16 +19,25 @@ namespace dynains {
 /// Nearest return per cell, and the nearest return of the 3x3 cells around it.
 ///
 /// The neighbourhood is the margin against grazing incidence: a beam just below a sample protects
-/// the ground, one beside it protects edges.
+/// the ground, one beside it protects edges. What moved needs no such margin: it hides what lies
+/// behind it in its own cells, and no more.
 class RangeImage {
  public:
-  /// A cell in four bytes, both values in centimetres.
+  /// A cell in four bytes, both values in centimetres: even ones, as odd ones mark what moved.
   struct Cell {
-    std::int16_t nearest;  ///< kNothing if no beam returned here
-    std::int16_t around;   ///< kUnknown if fewer than two of the 3x3 cells have a return
+    /// The nearest return of what moved in the 3x3 cells, or else the nearest return in this one;
+    /// kNothing if there is neither.
+    std::int16_t nearest;
+    /// The nearest return of the 3x3 cells, without what moved in those beside this one; kUnknown
+    /// if fewer than two of them have such a return.
+    std::int16_t around;
+
+    bool is_beside_moving() const { return (nearest & kMoving) != 0; }
+    bool is_moving() const { return (around & kMoving) != 0; }
   };
-  static constexpr std::int16_t kNothing = 32767;
-  static constexpr std::int16_t kUnknown = -1;
+  static constexpr std::int16_t kMoving = 1;  ///< bit of a range: a return of what moved
+  static constexpr std::int16_t kNothing = 32766;
+  static constexpr std::int16_t kUnknown = -2;
 
   /// Cells that a return of an object protects at most, in every direction.
   static constexpr std::size_t kWidest = 4;
@@ -36,12 +45,12 @@ class RangeImage {
   /// Buffers that building needs, shared by all images of one owner.
   struct Scratch {
     std::vector<std::int16_t> nearest;
-    std::vector<std::int16_t> objects;  // the same of objects only, holes and all
+    std::vector<std::int16_t> objects;  // the same of objects that stay only, holes and all
     std::vector<std::uint8_t> reach;    // by row and group of columns: cells that objects reach
     std::vector<std::uint8_t> nearby;   // the same about one row, by group of columns
     std::array<std::vector<std::int16_t>, kWidest> lines;  // by column, for one row
     std::vector<std::int16_t> below, gap;
-    std::vector<std::int16_t> least, count;
+    std::vector<std::int16_t> least, least_moving, count;
     std::vector<std::int16_t> border;
   };
 
@@ -59,15 +68,16 @@ class RangeImage {
 
   /// Replaces the image by that of one scan (m, sensor frame). A return of an object protects what
   /// lies within `reach` (m) beside it, at least its 3x3 cells: near the sensor these are a few
-  /// centimetres wide, less than what poses are good for.
-  void build(const RangeImageGrid& grid, PointsView ground, PointsView objects, float reach,
-             Scratch& scratch) {
+  /// centimetres wide, less than what poses are good for. `moving`: by object, 1 if it moved, else
+  /// 0; empty if none did.
+  void build(const RangeImageGrid& grid, PointsView ground, PointsView objects,
+             Span<const std::uint8_t> moving, float reach, Scratch& scratch) {
     const Reaches reaches(grid, reach);
     scratch.nearest.assign(grid.cell_count(), kNothing);
     scratch.border.assign(grid.stride(), kNothing);
-    collect(grid, objects, scratch.nearest.data());
+    collect(grid, objects, moving, scratch.nearest.data());
     keep_objects(grid, reaches, scratch);
-    collect(grid, ground, scratch.nearest.data());
+    collect(grid, ground, {}, scratch.nearest.data());
     close_holes(grid, scratch);
     store_with_least_around(grid, reaches, scratch);
     widen(grid, reaches, scratch);
@@ -92,13 +102,15 @@ class RangeImage {
 
   // Cells and ranges of a block of points first: their stores then find them in memory, which is
   // cheaper than to take lanes apart.
-  static void collect(const RangeImageGrid& grid, PointsView points, std::int16_t* nearest) {
+  static void collect(const RangeImageGrid& grid, PointsView points,
+                      Span<const std::uint8_t> moving, std::int16_t* nearest) {
     constexpr std::size_t kBlock = 128;
     const ImageLocator locator(grid);
     static constexpr detail::Constant8 kMost(kFarthest), kScale(kCentimetres);
     detail::run_lanes([&](auto lanes) {
       using Lanes = decltype(lanes);
       using Float = typename Lanes::Float;
+      using Int = typename Lanes::Int;
       std::int32_t cell[kBlock];
       std::int32_t range[kBlock];
       for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
@@ -109,8 +121,12 @@ class RangeImage {
           const Float z = place.load(points.z.data() + begin);
           const Float metres = sqrt((x * x + y * y) + z * z);
           locator.template locate<Lanes>(x, y, z, metres).store(&cell[place.begin]);
-          truncate(min(metres, Float(kMost)) * kScale).store(&range[place.begin]);
+          const Int centimetres = truncate(min(metres, Float(kMost)) * kScale);
+          (centimetres & Int(~kMoving)).store(&range[place.begin]);
         });
+        if (!moving.empty()) {
+          for (std::size_t i = 0; i < size; ++i) range[i] |= moving[begin + i];
+        }
         // Directions outside fall into cell 0, which lies in the border and is never read.
         for (std::size_t i = 0; i < size; ++i) {
           std::int16_t& value = nearest[cell[i]];
@@ -130,8 +146,13 @@ class RangeImage {
     return detail::kLanes + group * detail::kShortLanes;
   }
 
-  // Copies the image while it holds nothing but objects, and notes how far these reach where it is
-  // more than one cell.
+  template <class Short>
+  static Short is_moving(const Short& range) {
+    return (range & Short(kMoving)) == Short(kMoving);
+  }
+
+  // Copies what stays of the image while it holds nothing but objects, and notes how far that
+  // reaches where it is more than one cell.
   static void keep_objects(const RangeImageGrid& grid, const Reaches& reaches, Scratch& scratch) {
     const std::size_t stride = grid.stride();
     const std::size_t groups = group_count(grid);
@@ -140,13 +161,14 @@ class RangeImage {
     scratch.reach.assign(rows * group_stride(grid), 0);
     detail::run_lanes([&](auto lanes) {
       using Short = typename detail::ShortsOf<decltype(lanes)>::Type;
-      const Short far(reaches.limit[1]);
+      const Short far(reaches.limit[1]), nothing(kNothing);
       for (std::size_t row = 0; row < rows; ++row) {
         const std::int16_t* const from = &scratch.nearest[row * stride];
         std::int16_t* const to = &scratch.objects[row * stride];
         std::uint8_t* const reach = &scratch.reach[row * group_stride(grid) + 1];
         for (std::size_t group = 0; group < groups; ++group) {
-          const Short here = Short::load(from + column_of(group));
+          const Short object = Short::load(from + column_of(group));
+          const Short here = select(is_moving(object), nothing, object);
           here.store(to + column_of(group));
           if (!(here < far).any()) continue;
           std::size_t cells = 2;
@@ -197,8 +219,8 @@ class RangeImage {
     });
   }
 
-  // The nearest return of the 3x3 cells about each cell, beside its own. A single return says
-  // nothing, unless it is that of a near object.
+  // The nearest returns of the 3x3 cells about each cell, beside its own: of what moved and of what
+  // stays. A single one of these says nothing, unless it is that of a near object.
   void store_with_least_around(const RangeImageGrid& grid, const Reaches& reaches,
                                Scratch& scratch) {
     using namespace detail;
@@ -206,14 +228,16 @@ class RangeImage {
     const auto rows = static_cast<std::size_t>(grid.rows);
     make_cells(grid);
     scratch.least.resize(stride);
+    scratch.least_moving.resize(stride);
     scratch.count.resize(stride);
     for (std::size_t row = 0; row < rows; ++row) {
       wrap(&scratch.nearest[row * stride], static_cast<std::size_t>(grid.columns), 1);
     }
     run_lanes([&](auto lanes) {
       using Short = typename ShortsOf<decltype(lanes)>::Type;
-      const Short nothing(kNothing), unknown(kUnknown), near(reaches.limit[0]);
+      const Short nothing(kNothing), unknown(kUnknown), near(reaches.limit[0]), zero(0), one(-1);
       std::int16_t* const leasts = scratch.least.data();
+      std::int16_t* const moving_leasts = scratch.least_moving.data();
       std::int16_t* const counts = scratch.count.data();
       for (std::size_t row = 0; row < rows; ++row) {
         const auto line = [&](const std::vector<std::int16_t>& image, std::size_t number) {
@@ -227,9 +251,17 @@ class RangeImage {
           const Short a = Short::load(low + column);
           const Short b = Short::load(middle + column);
           const Short c = Short::load(high + column);
-          min(min(a, b), c).store(leasts + column);
+          const Short a_moves = is_moving(a), b_moves = is_moving(b), c_moves = is_moving(c);
+          const Short least_moving =
+              min(min(select(a_moves, a, nothing), select(b_moves, b, nothing)),
+                  select(c_moves, c, nothing));
+          const Short a_stays = select(a_moves, nothing, a);
+          const Short b_stays = select(b_moves, nothing, b);
+          const Short c_stays = select(c_moves, nothing, c);
+          least_moving.store(moving_leasts + column);
+          min(min(a_stays, b_stays), c_stays).store(leasts + column);
           // Set lanes are -1.
-          ((a < nothing) + (b < nothing) + (c < nothing)).store(counts + column);
+          ((a_stays < nothing) + (b_stays < nothing) + (c_stays < nothing)).store(counts + column);
         }
         for (std::size_t column = kLanes; column + kLanes < stride; column += kShortLanes) {
           const auto least_of_three = [](const std::int16_t* at) {
@@ -239,15 +271,21 @@ class RangeImage {
           const Short returns =
               Short::load(count - 1) + Short::load(count) + Short::load(count + 1);
           Short alone = unknown;
-          const Short single = returns == unknown;
+          const Short single = returns == one;
           if (single.any()) {
             const Short object = min(min(least_of_three(line(scratch.objects, row - 1) + column),
                                          least_of_three(line(scratch.objects, row) + column)),
                                      least_of_three(line(scratch.objects, row + 1) + column));
             alone = select(single & (object < near), object, unknown);
           }
-          const Short around = select(returns < unknown, least_of_three(leasts + column), alone);
-          Short::load(middle + column).store_interleaved_with(around, &cells[column].nearest);
+          const Short staying = select(returns < one, least_of_three(leasts + column), alone);
+          // What moved in the cell itself hides what lies behind it.
+          const Short here = Short::load(middle + column);
+          const Short hiding = min(select(staying < zero, nothing, staying), here);
+          const Short around = select(is_moving(here), hiding, staying);
+          const Short moving = least_of_three(moving_leasts + column);
+          const Short nearest = select(moving < nothing, moving, here);
+          nearest.store_interleaved_with(around, &cells[column].nearest);
         }
       }
     });

@@ -66,15 +66,19 @@ class ReferenceViews {
   /// whose image is to be made, if its phase is 0.
   ReferencePhase advance(std::uint64_t since_begin) {
     const std::uint64_t phase = since_begin % step_;
-    if (phase == 0) ++images_;
+    if (phase == 0) {
+      ++images_;
+      view().segment = ReferenceView::kNoSegment;  // until its image is made
+    }
     return {phase, images_};
   }
 
   /// Makes the image of a reference. Beams are rows of it only in the frame of the sensor, tilted
-  /// as it is; `T_world_level`: pose of the frame of `split`.
+  /// as it is; `T_world_level`: pose of the frame of `split`; `moving`: as RangeImage::build has
+  /// it, by point above the ground.
   void make_image(std::uint64_t scan, std::uint64_t segment, const Eigen::Isometry3d& T_world_level,
-                  const GroundSplit& split) {
-    ReferenceView& view = views_[images_ % views_.size()];
+                  const GroundSplit& split, Span<const std::uint8_t> moving) {
+    ReferenceView& view = this->view();
     view.segment = ReferenceView::kNoSegment;  // until it is whole
     view.scan = scan;
     view.T_world_beams = T_world_level;
@@ -86,7 +90,7 @@ class ReferenceViews {
       ground = detail::turn(ground, R, turned_ground_);
       rest = detail::turn(rest, R, turned_rest_);
     }
-    view.image.build(grid_, ground, rest, lateral_margin_, scratch_);
+    view.image.build(grid_, ground, rest, moving, lateral_margin_, scratch_);
     view.segment = segment;
   }
 
@@ -117,6 +121,8 @@ class ReferenceViews {
   }
 
  private:
+  ReferenceView& view() { return views_[images_ % views_.size()]; }
+
   float margin_;
   float margin_slope_;
   float lateral_margin_;

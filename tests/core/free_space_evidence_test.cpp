@@ -53,6 +53,7 @@ class Watch {
     std::fill_n(instance_of.begin(), instance.size(), 0U);
     evidence_.observe(splits_.size(), segment, Eigen::Isometry3d::Identity(), split, instance_of,
                       instance.size() > 0 ? 1 : 0);
+    evidence_.judge(splits_.size(), false, split);
     splits_.push_back(split);
     sizes_.push_back(instance.size());
     return *this;
@@ -215,6 +216,36 @@ TEST_CASE("what stood long before does not go with what was seen to pass beside 
   watch.see(car());
   CHECK(watch.predecessor() == 0);
   CHECK(watch.causes(22) == Causes{Cause::kOccupied});
+}
+
+// Only two scans are asked: those two and four back.
+TEST_CASE("what moved and is met again contests nothing") {
+  FreeSpaceConfig config = every_scan_a_reference();
+  config.memory = 4;
+  config.horizon = 0;
+  config.tau_whole = 0.9;
+  config.use_tracks = false;
+  config.passage_share = 1.0;
+  for (const bool see_past_movers : {false, true}) {
+    config.see_past_movers = see_past_movers;
+    Watch watch(config);
+    for (int i = 0; i < 4; ++i) watch.see(PointBuffer());
+    watch.see(car());
+    CHECK(watch.causes(4) == Causes{Cause::kFreeSpace});
+    for (int i = 0; i < 3; ++i) watch.see(PointBuffer());
+    watch.see(car());
+    CHECK(watch.causes(8) == Causes{see_past_movers ? Cause::kFreeSpace : Cause::kTooLittleFree});
+  }
+}
+
+TEST_CASE("what stays and is met again contests, even if it was presumed to move") {
+  Watch watch(every_scan_a_reference());
+  for (int i = 0; i < 2; ++i) watch.see(PointBuffer(), PointBuffer());
+  watch.see(car(), PointBuffer());
+  CHECK(watch.causes(2, false) == Causes{Cause::kPresumed});
+  for (int i = 0; i < 4; ++i) watch.see(car(), PointBuffer());
+  CHECK(watch.causes(2) == Causes{Cause::kOccupied});
+  CHECK(watch.causes(6) == Causes{Cause::kOccupied});
 }
 
 }  // namespace

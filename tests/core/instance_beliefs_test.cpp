@@ -228,12 +228,12 @@ TEST_CASE("windows alone remove nothing: where beams hit again, the lower half m
 
 TEST_CASE(
     "who was seen through as a whole goes unless that was hit again and its lower half stayed") {
-  // Two references see nothing but windows, all of them free: a fifth of all samples.
+  // Two references see nothing but windows, all of them free: three of ten samples.
   const auto see_windows = [](std::size_t windows_below) {
     Scan scan = scan_of_layers(5);
     const std::vector<Scan::Seen> standing(20, {0, 4});
     std::vector<Scan::Seen> windows(20, {0, 0});
-    for (std::size_t s = 0; s < 4; ++s) windows[s < windows_below ? s : 16 + s] = {4, 0};
+    for (std::size_t s = 0; s < 6; ++s) windows[s < windows_below ? s : 14 + s] = {4, 0};
     for (const auto& seen : {standing, windows, windows}) scan.see(seen);
     return scan;
   };
@@ -293,33 +293,36 @@ TEST_CASE("a hit before a place was seen free, or on the other side, is none aga
 }
 
 TEST_CASE("an instance that one reference saw through as a whole is removed") {
-  // Two samples of twenty are too little for any of its supervoxels.
+  // A hit each contests all supervoxels; five samples of a hundred are no view of the whole.
   const std::vector<std::uint32_t> supervoxels(5, 20);
+  const std::vector<Scan::Seen> contesting(5, {0, 1});
   Scan scan(Instances{supervoxels});
-  scan.see({{2, 1}, {2, 1}, {2, 2}, {2, 2}, {2, 0}});  // 10 of 16: 0.63
+  scan.see(contesting);
+  scan.see({{5, 3}, {5, 3}, {5, 3}, {5, 3}, {5, 3}});  // 25 of 40: 0.63
   CHECK(scan.beliefs.wholes[0].level == Approx(kFreeStep));
   CHECK(scan.beliefs.shares[0].moved == 0);
   CHECK(scan.removes());
 
   Scan half(Instances{supervoxels});
-  half.see({{2, 2}, {2, 2}, {2, 2}, {2, 1}, {2, 1}});  // 10 of 18: 0.56
+  half.see(contesting);
+  half.see({{5, 4}, {5, 4}, {5, 4}, {5, 4}, {5, 4}});  // 25 of 45: 0.56
   CHECK(half.beliefs.wholes[0].level == 0.0F);
   CHECK_FALSE(half.removes());
 
-  // Nine of a hundred samples are no view of it, ten are.
+  // 24 of a hundred samples are no view of it, 25 are.
   Scan few(Instances{supervoxels});
-  few.see({{2, 0}, {2, 0}, {2, 0}, {2, 0}, {1, 0}});
+  few.see({{5, 0}, {5, 0}, {5, 0}, {5, 0}, {4, 0}});
   CHECK(few.beliefs.wholes[0].level == 0.0F);
-  few.see({{2, 0}, {2, 0}, {2, 0}, {2, 0}, {2, 0}});
+  few.see({{5, 0}, {5, 0}, {5, 0}, {5, 0}, {5, 0}});
   CHECK(few.beliefs.wholes[0].level == Approx(2.0F * kFreeStep));
 }
 
 TEST_CASE("to remove an instance that was hit, one reference has to see through nearly all of it") {
   const std::vector<std::uint32_t> supervoxels(5, 20);
-  const std::vector<Scan::Seen> standing(5, {0, 2}), wholly(5, {2, 0});
+  const std::vector<Scan::Seen> standing(5, {0, 6}), wholly(5, {6, 0});
   Scan scan(Instances{supervoxels});
   scan.see(standing);
-  scan.see({{2, 1}, {2, 1}, {2, 2}, {2, 2}, {2, 0}});
+  scan.see({{5, 3}, {5, 3}, {5, 3}, {5, 3}, {5, 3}});
   CHECK(scan.beliefs.wholes[0].peak == Approx(kFreeStep));
   CHECK_FALSE(scan.removes());  // below the 1.66 of tau_whole
 
@@ -335,20 +338,20 @@ TEST_CASE("the caller is told of which instances anything changed") {
   Scan scan(Instances{{4, 4}, {20, 20, 20, 20, 20}, {20, 20, 20, 20, 20}, {4}});
   for (int round = 0; round < 2; ++round) {
     std::fill(scan.beliefs.changed.begin(), scan.beliefs.changed.end(), std::uint8_t{0});
-    // Of the first a part alone, of the last nothing, and when the others are seen like that again,
+    // Of the first a part alone, of the last nothing, and when the third is hit like that again,
     // the whole alone.
     scan.see({{4, 0},
               {0, 4},
-              {2, 0},
-              {2, 0},
-              {2, 0},
-              {2, 0},
-              {2, 0},
-              {0, 2},
-              {0, 2},
-              {0, 2},
-              {0, 2},
-              {0, 2}});
+              {5, 0},
+              {5, 0},
+              {5, 0},
+              {5, 0},
+              {5, 0},
+              {0, 5},
+              {0, 5},
+              {0, 5},
+              {0, 5},
+              {0, 5}});
     CHECK(scan.beliefs.changed == std::vector<std::uint8_t>{1, 1, 1, 0});
   }
 }
@@ -395,7 +398,7 @@ void add_slowly(const InstanceSamples& samples, const std::vector<Sight>& sights
     const std::size_t begin = samples.sample_begin[samples.supervoxel_begin[i]];
     const std::size_t end = samples.sample_begin[samples.supervoxel_begin[i + 1]];
     const float free = count(begin, end, Sight::kFree), hit = count(begin, end, Sight::kHit);
-    if (free + hit < std::max(2.0F, 0.1F * static_cast<float>(end - begin))) continue;
+    if (free + hit < std::max(2.0F, 0.25F * static_cast<float>(end - begin))) continue;
     const float share = free / (free + hit);
     add(wholes[i], share, share >= 0.6F, share <= 0.3F);
   }
@@ -493,7 +496,7 @@ TEST_CASE("a reference is found by the scan it is asked from, until its image is
       REQUIRE(phases.back().phase == (scan - begin_of(scan)) % static_cast<std::uint64_t>(step));
       if (phases.back().phase == 0) {
         views.make_image(scan, segment_of(scan), Eigen::Isometry3d::Identity(),
-                         wall(5.0F + static_cast<float>(scan)));
+                         wall(5.0F + static_cast<float>(scan)), {});
         REQUIRE(views.newest().scan == scan);
       }
       for (std::uint64_t from = scan >= 6 ? scan - 6 : 0; from <= scan; ++from) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <string>
 #include <vector>
 
 #include "dynains/detail/beam_test.hpp"
@@ -84,19 +85,26 @@ TEST_CASE("a direction that no image covers has cell 0") {
   CHECK(cell_of(grid, -1.0F, -1e-9F, 0.0F) % stride == lanes);
 }
 
-// The image as its definition has it, in centimetres: nearest return per cell, holes between two
-// returns of a column closed, the nearest of 3x3 cells around.
+// In centimetres, even: odd are those of what moved.
+int marked_range(float x, float y, float z, bool moving) {
+  const float range = std::sqrt((x * x + y * y) + z * z);
+  return (static_cast<int>(range * 100.0F) & ~1) | (moving ? 1 : 0);
+}
+bool is_moving(int range) { return range % 2 != 0; }
+
+// The image as its definition has it: nearest return per cell, holes between two returns of a
+// column closed, the nearest of 3x3 cells around. `moving`: by point; none did if it is empty.
 class ReferenceImage {
  public:
-  ReferenceImage(const RangeImageGrid& grid, const PointBuffer& points)
+  ReferenceImage(const RangeImageGrid& grid, const PointBuffer& points,
+                 const std::vector<std::uint8_t>& moving = {})
       : grid_(grid), cells_(grid.cell_count(), kNothing) {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const float range = std::sqrt((points.x[i] * points.x[i] + points.y[i] * points.y[i]) +
-                                    points.z[i] * points.z[i]);
       const std::int32_t cell = cell_of(grid, points.x[i], points.y[i], points.z[i]);
       if (cell == 0) continue;
       int& nearest = cells_[static_cast<std::size_t>(cell)];
-      nearest = std::min(nearest, static_cast<int>(range * 100.0F));
+      nearest = std::min(nearest, marked_range(points.x[i], points.y[i], points.z[i],
+                                               !moving.empty() && moving[i] != 0));
     }
     const std::vector<int> returns = cells_;
     for (int column = 0; column < grid.columns; ++column) {
@@ -115,18 +123,24 @@ class ReferenceImage {
     }
   }
 
-  int nearest(int row, int column) const { return cells_[at(row, column)]; }
+  int nearest(int row, int column) const {
+    int result = kNothing;
+    for (const int value : about(row, column)) {
+      if (is_moving(value)) result = std::min(result, value);
+    }
+    return result == kNothing ? cells_[at(row, column)] : result;
+  }
   int around(int row, int column) const {
     int least = kNothing;
     int count = 0;
-    for (int r = std::max(0, row - 1); r <= std::min(grid_.rows - 1, row + 1); ++r) {
-      for (int c = column - 1; c <= column + 1; ++c) {
-        const int value = nearest(r, (c + grid_.columns) % grid_.columns);
-        least = std::min(least, value);
-        count += value != kNothing ? 1 : 0;
-      }
+    for (const int value : about(row, column)) {
+      if (value == kNothing || is_moving(value)) continue;
+      least = std::min(least, value);
+      ++count;
     }
-    return count < 2 ? RangeImage::kUnknown : least;
+    const int here = cells_[at(row, column)];
+    if (count < 2) return is_moving(here) ? here : RangeImage::kUnknown;
+    return is_moving(here) ? std::min(least, here) : least;
   }
   std::size_t at(int row, int column) const {
     return static_cast<std::size_t>(row) * grid_.stride() + detail::kLanes +
@@ -135,6 +149,18 @@ class ReferenceImage {
 
  private:
   static constexpr int kNothing = RangeImage::kNothing;
+
+  // The 3x3 cells.
+  std::vector<int> about(int row, int column) const {
+    std::vector<int> values;
+    for (int r = std::max(0, row - 1); r <= std::min(grid_.rows - 1, row + 1); ++r) {
+      for (int c = column - 1; c <= column + 1; ++c) {
+        values.push_back(cells_[at(r, (c + grid_.columns) % grid_.columns)]);
+      }
+    }
+    return values;
+  }
+
   const RangeImageGrid& grid_;
   std::vector<int> cells_;
 };
@@ -155,14 +181,22 @@ TEST_CASE("an image is what its definition says, cell by cell") {
                        static_cast<float>(range * std::cos(elevation) * std::sin(azimuth)),
                        static_cast<float>(range * std::sin(elevation)));
     }
-    // Without objects, whose returns would reach farther.
-    image.build(grid, points, PointsView(), 0.0F, scratch);
-    const ReferenceImage expected(grid, points);
-    for (int row = 0; row < grid.rows; ++row) {
-      for (int column = 0; column < grid.columns; ++column) {
-        const RangeImage::Cell cell = image[expected.at(row, column)];
-        REQUIRE(cell.nearest == expected.nearest(row, column));
-        REQUIRE(cell.around == expected.around(row, column));
+    for (const double share : {0.0, 0.1, 0.6}) {
+      std::vector<std::uint8_t> moving(points.size());
+      for (auto& value : moving) value = random.uniform(0.0, 1.0) < share ? 1 : 0;
+      // With a reach of nothing, objects are like ground.
+      if (share > 0) {
+        image.build(grid, PointsView(), points, moving, 0.0F, scratch);
+      } else {
+        image.build(grid, points, PointsView(), {}, 0.0F, scratch);
+      }
+      const ReferenceImage expected(grid, points, moving);
+      for (int row = 0; row < grid.rows; ++row) {
+        for (int column = 0; column < grid.columns; ++column) {
+          const RangeImage::Cell cell = image[expected.at(row, column)];
+          REQUIRE(cell.nearest == expected.nearest(row, column));
+          REQUIRE(cell.around == expected.around(row, column));
+        }
       }
     }
   }
@@ -195,6 +229,7 @@ TEST_CASE("near objects protect more cells about them, across the seam and the e
     sensor.azimuth_step = step;
     const RangeImageGrid grid = RangeImageGrid::for_sensor(sensor);
     PointBuffer points[3];  // ground, objects, both
+    std::vector<std::uint8_t> moving_objects, moving;
     for (int i = 0; i < 6000; ++i) {
       const bool object = i % 3 == 0;
       const double azimuth = random.uniform(-M_PI, M_PI);
@@ -205,17 +240,19 @@ TEST_CASE("near objects protect more cells about them, across the seam and the e
       const auto z = static_cast<float>(range * std::sin(elevation));
       points[object ? 1 : 0].push_back(x, y, z);
       points[2].push_back(x, y, z);
+      moving.push_back(object && random.index(4) == 0 ? 1 : 0);
+      if (object) moving_objects.push_back(moving.back());
     }
-    const ReferenceImage all(grid, points[2]);
+    const ReferenceImage all(grid, points[2], moving);
     std::vector<int> objects(grid.cell_count(), RangeImage::kNothing);
     for (std::size_t i = 0; i < points[1].size(); ++i) {
       const float x = points[1].x[i], y = points[1].y[i], z = points[1].z[i];
       const auto cell = static_cast<std::size_t>(cell_of(grid, x, y, z));
-      const float range = std::sqrt((x * x + y * y) + z * z);
-      objects[cell] = std::min(objects[cell], static_cast<int>(range * 100.0F));
+      objects[cell] = std::min(objects[cell], marked_range(x, y, z, moving_objects[i] != 0));
     }
+    for (int& range : objects) range = is_moving(range) ? RangeImage::kNothing : range;
     for (const float reach : {0.0F, 0.05F, 0.4F, 1.0F}) {
-      image.build(grid, points[0], points[1], reach, scratch);
+      image.build(grid, points[0], points[1], moving_objects, reach, scratch);
       for (int row = 0; row < grid.rows; ++row) {
         for (int column = 0; column < grid.columns; ++column) {
           const RangeImage::Cell cell = image[all.at(row, column)];
@@ -228,6 +265,56 @@ TEST_CASE("near objects protect more cells about them, across the seam and the e
       }
     }
   }
+}
+
+// A wall 20 m ahead and before it, at 10 m, a board of 1 m, seen by beams 0.2 deg apart.
+TEST_CASE("what moved hides what is behind it, protects nothing and says nothing of its place") {
+  const RangeImageGrid grid = RangeImageGrid::for_sensor(SensorModel::typical());
+  PointBuffer points;
+  std::vector<std::uint8_t> board;
+  for (double azimuth = -20.0; azimuth <= 20.0; azimuth += 0.2) {
+    for (double elevation = -10.0; elevation <= 3.0; elevation += 0.2) {
+      const double slope = std::tan(azimuth / kDegrees);
+      board.push_back(std::abs(10.0 * slope) < 0.5 ? 1 : 0);
+      const double x = board.back() != 0 ? 10.0 : 20.0;
+      const double y = x * slope;
+      points.push_back(static_cast<float>(x), static_cast<float>(y),
+                       static_cast<float>(std::hypot(x, y) * std::tan(elevation / kDegrees)));
+    }
+  }
+  // Before and behind the board; in the column beside its last return, at 2.8 deg; far beside it.
+  const double column = 2.0 * M_PI / grid.columns;
+  const double behind = 1.5 / kDegrees, far_beside = 4.5 / kDegrees;
+  const double beside = (std::floor((M_PI + 2.8 / kDegrees) / column) + 1.5) * column - M_PI;
+  PointBuffer samples;
+  const auto add = [&samples](double range, double azimuth) {
+    samples.push_back(static_cast<float>(range * std::cos(azimuth)),
+                      static_cast<float>(range * std::sin(azimuth)), 0.0F);
+  };
+  add(7.0, behind);
+  add(10.0, behind);
+  add(15.0, behind);
+  add(10.0, beside);
+  add(15.0, beside);
+  add(10.0, far_beside);
+  add(15.0, far_beside);
+  add(20.0, far_beside);
+  const std::size_t count = samples.size();
+  samples.resize(count + detail::kLanes);
+  const auto look = [&](Span<const std::uint8_t> moving) {
+    RangeImage image;
+    RangeImage::Scratch scratch;
+    image.build(grid, PointsView(), points, moving, 0.0F, scratch);
+    detail::Sights sights;
+    detail::test_beams(image, Eigen::Isometry3f::Identity(), samples, count, 0.25F, 0.01F, sights);
+    std::string seen;
+    for (std::size_t i = 0; i < count; ++i) {
+      seen += sights.is_free(i) ? 'F' : sights.is_hit(i) ? 'H' : '-';
+    }
+    return seen;
+  };
+  CHECK(look({}) == "FH-H-FFH");
+  CHECK(look(board) == "F---FFFH");
 }
 
 TEST_CASE("bits of sights are counted over any range") {
@@ -274,7 +361,7 @@ TEST_CASE(
   }
   RangeImage image;
   RangeImage::Scratch scratch;
-  image.build(grid, PointsView(), wall, 0.0F, scratch);
+  image.build(grid, PointsView(), wall, {}, 0.0F, scratch);
 
   // The margin at 20 m is 0.25 + 0.01 * 20 = 0.45 m. Samples in the frame of a sensor that stands
   // 5 m behind this one.

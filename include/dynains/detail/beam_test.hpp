@@ -34,7 +34,7 @@ class Sights {
   /// To be written: a byte for eight samples.
   struct Bytes {
     std::uint8_t* free;  ///< all beams about the sample went farther
-    std::uint8_t* hit;   ///< a beam ended there
+    std::uint8_t* hit;   ///< a beam ended there, at something that stays
   };
   Bytes bytes() { return {free_.data(), hit_.data()}; }
 
@@ -88,7 +88,7 @@ class Sights {
 
 /// Tests `count` samples against a reference. `samples`: m, padded for wide loads;
 /// `T_reference_sample`: rigid. `margin` + `slope` * range: m, how much farther a beam must go to
-/// pass.
+/// pass. What moved and was met again says nothing of its place.
 inline void test_beams(const RangeImage& image, const Eigen::Isometry3f& T_reference_sample,
                        const PointBuffer& samples, std::size_t count, float margin, float slope,
                        Sights& sights) {
@@ -137,9 +137,14 @@ inline void test_beams(const RangeImage& image, const Eigen::Isometry3f& T_refer
         const Float range = metres * scale;
         const Float tolerance = metres * slope_per_metre + least;
         const auto inside = Int(0) < Int::load(&cell[i]);
-        const auto free = inside & (around - range > tolerance);
-        const auto hit = inside & ~free &
-                         ((abs(nearest - range) <= tolerance) | (abs(around - range) <= tolerance));
+        const auto is_at = [&](const Float& value) { return abs(value - range) <= tolerance; };
+        const auto marks = [&](std::int32_t bit) { return (both & Int(bit)) == Int(bit); };
+        const auto is_nearest = is_at(nearest);
+        const auto is_moving_beside = marks(RangeImage::kMoving);
+        const auto is_moving = marks(RangeImage::kMoving << 16);
+        const auto free = inside & (around - range > tolerance) & ~(is_nearest & is_moving_beside);
+        const auto hit =
+            inside & ~free & ((is_nearest & ~is_moving_beside) | (is_at(around) & ~is_moving));
         seen.free[(begin + i) / 8] = static_cast<std::uint8_t>(free.bits());
         seen.hit[(begin + i) / 8] = static_cast<std::uint8_t>(hit.bits());
       }
