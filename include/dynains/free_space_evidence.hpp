@@ -13,6 +13,7 @@
 
 #include "dynains/belief_updater.hpp"
 #include "dynains/cause.hpp"
+#include "dynains/detail/room.hpp"
 #include "dynains/evidence_verdict.hpp"
 #include "dynains/free_space_config.hpp"
 #include "dynains/ground_split.hpp"
@@ -220,6 +221,7 @@ class FreeSpaceEvidence {
       for (std::size_t i = 1; i < samples.met.size(); ++i) {
         moving_groups_[i] = surely_moves(record, samples.met[i]) ? 1 : 0;
       }
+      detail::make_room(moving_, samples.met_of.size());
       moving_.resize(samples.met_of.size());
       for (std::size_t i = 0; i < moving_.size(); ++i) {
         moving_[i] = moving_groups_[samples.met_of[i]];
