@@ -120,7 +120,7 @@ class FreeSpaceEvidence {
     updater_.begin_other_side(record.samples, record.beliefs);
     weigh(record);
     awaits_image_ = record.at.phase == 0;
-    if (!awaits_image_) refer_older(record.at.phase);
+    if (!awaits_image_) refer_turn(record.at.phase);
     if (config_.use_tracks) run_beliefs(scan);
   }
 
@@ -229,7 +229,7 @@ class FreeSpaceEvidence {
     }
     views_.make_image(newest_, record.segment, record.T_world_sensor, split, moving_);
     if (turn_of(0) != 0) return;
-    refer_older(0);
+    refer_turn(0);
     if (config_.use_tracks) run_beliefs(newest_);
   }
 
@@ -246,9 +246,11 @@ class FreeSpaceEvidence {
   }
 
   // Holds the newest image against older scans, those of the phases whose turn it is.
-  void refer_older(std::uint64_t turn) {
+  void refer_turn(std::uint64_t turn) {
+    const ReferenceView& image = views_.newest();
+    if (image.segment == ReferenceView::kNoSegment) return;
     for (std::uint64_t phase = 0; phase < before_.size(); ++phase) {
-      if (turn_of(phase) == turn) refer_older(phase, views_.newest());
+      if (turn_of(phase) == turn) refer_older(phase, image);
     }
   }
   void refer_older(std::uint64_t phase, const ReferenceView& image) {

@@ -31,9 +31,6 @@ class RangeImage {
     /// The nearest return of the 3x3 cells, without what moved in those beside this one; kUnknown
     /// if fewer than two of them have such a return.
     std::int16_t around;
-
-    bool is_beside_moving() const { return (nearest & kMoving) != 0; }
-    bool is_moving() const { return (around & kMoving) != 0; }
   };
   static constexpr std::int16_t kMoving = 1;  ///< bit of a range: a return of what moved
   static constexpr std::int16_t kNothing = 32766;
@@ -235,7 +232,8 @@ class RangeImage {
     }
     run_lanes([&](auto lanes) {
       using Short = typename ShortsOf<decltype(lanes)>::Type;
-      const Short nothing(kNothing), unknown(kUnknown), near(reaches.limit[0]), zero(0), one(-1);
+      const Short nothing(kNothing), unknown(kUnknown), near(reaches.limit[0]);
+      const Short zero(0), one_return(-1);
       std::int16_t* const leasts = scratch.least.data();
       std::int16_t* const moving_leasts = scratch.least_moving.data();
       std::int16_t* const counts = scratch.count.data();
@@ -271,14 +269,15 @@ class RangeImage {
           const Short returns =
               Short::load(count - 1) + Short::load(count) + Short::load(count + 1);
           Short alone = unknown;
-          const Short single = returns == one;
+          const Short single = returns == one_return;
           if (single.any()) {
             const Short object = min(min(least_of_three(line(scratch.objects, row - 1) + column),
                                          least_of_three(line(scratch.objects, row) + column)),
                                      least_of_three(line(scratch.objects, row + 1) + column));
             alone = select(single & (object < near), object, unknown);
           }
-          const Short staying = select(returns < one, least_of_three(leasts + column), alone);
+          const Short staying =
+              select(returns < one_return, least_of_three(leasts + column), alone);
           // What moved in the cell itself hides what lies behind it.
           const Short here = Short::load(middle + column);
           const Short hiding = min(select(staying < zero, nothing, staying), here);

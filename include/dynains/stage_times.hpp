@@ -13,7 +13,7 @@ struct StageTimes {
   double cluster = 0.0;     ///< curved voxels and separation, Eq. 4
   double descriptor = 0.0;  ///< Eq. 5-12 and, for proposals, the belief of Eq. 13-19
   double evidence = 0.0;    ///< free space seen by other scans
-  double judge = 0.0;       ///< from that to verdicts, of the ground beside them as well
+  double judge = 0.0;       ///< from that to verdicts, also of ground; images of references
   double verdict = 0.0;     ///< from clusters and groups to points
   double map = 0.0;         ///< Eq. 1
   double revision = 0.0;    ///< of the map, by what the newest scan sees

@@ -118,10 +118,13 @@ void add_check_command(CLI::App& app) {
   const auto flags = std::make_shared<RecordingFlags>(command, "recording");
   command.footer(
       "Looks at the size of every scan file, and at a sample of scans: counts, units, invalid "
-      "points, height\nand tilt of the sensor, and whether scans agree under the poses or under "
-      "the "
-      "usual mistakes. Exits with 1\nif a file is cut off, if the poses need another option or fit "
-      "under none, or if scans are too far apart\nto be compared.");
+      "points, height\n"
+      "and tilt of the sensor, and whether scans agree under the poses or under the usual "
+      "mistakes. "
+      "Exits with 1\n"
+      "if a file is cut off, if the poses need another option or fit under none, or if scans are "
+      "too far apart\n"
+      "to be compared.");
   command.callback([flags] { check(*flags); });
 }
 

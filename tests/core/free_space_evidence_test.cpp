@@ -238,6 +238,22 @@ TEST_CASE("what moved and is met again contests nothing") {
   }
 }
 
+// Something comes to stand beside a hedge, for one scan; only the scan two back is asked.
+TEST_CASE("what goes with a fifth that was seen free still contests where it is met again") {
+  FreeSpaceConfig config = every_scan_a_reference();
+  config.memory = 2;
+  config.horizon = 0;
+  config.passage_share = 1.0;
+  const PointBuffer hedge = panel(10.0F, -3.0F, 1.4F, -1.5F, 0.5F);
+  const PointBuffer passing = panel(10.0F, 1.4F, 3.0F, -1.5F, 0.5F);
+  Watch watch(config);
+  for (int i = 0; i < 6; ++i) watch.see(hedge);
+  watch.see(both(hedge, passing));
+  CHECK(watch.causes(6) == Causes{Cause::kFreeSpace, Cause::kWithInstance});
+  watch.see(hedge).see(hedge);
+  CHECK(watch.causes(8) == Causes{Cause::kOccupied});
+}
+
 TEST_CASE("what stays and is met again contests, even if it was presumed to move") {
   Watch watch(every_scan_a_reference());
   for (int i = 0; i < 2; ++i) watch.see(PointBuffer(), PointBuffer());
