@@ -119,8 +119,7 @@ class FreeSpaceEvidence {
     }
     updater_.begin_other_side(record.samples, record.beliefs);
     weigh(record);
-    awaits_image_ = record.at.phase == 0;
-    if (!awaits_image_) refer_turn(record.at.phase);
+    if (record.at.phase != 0) refer_turn(record.at.phase);
     if (config_.use_tracks) run_beliefs(scan);
   }
 
@@ -137,7 +136,9 @@ class FreeSpaceEvidence {
       passages_.judge(scan, samples, T_origin_world_ * record.T_world_sensor, record.counted,
                       verdicts_);
     }
-    if (awaits_image_ && scan == newest_) become_reference(record, split);
+    if (scan == newest_ && record.at.phase == 0 && views_.awaits_image()) {
+      become_reference(record, split);
+    }
     groups_.assign(1, {Cause::kNotJudged, 0.0F});
     groups_.resize(samples.met.size());
     for (std::size_t i = 1; i < samples.met.size(); ++i) groups_[i] = verdicts_[samples.met[i]];
@@ -213,7 +214,6 @@ class FreeSpaceEvidence {
   // Makes the image of the newest scan, and holds it against older ones whose turn it is. What
   // moves protects nothing: what it hits again may be another, and beside it beams may pass.
   void become_reference(const Record& record, const GroundSplit& split) {
-    awaits_image_ = false;
     moving_.clear();
     if (config_.see_past_movers) {
       const InstanceSamples& samples = record.samples;
@@ -247,10 +247,9 @@ class FreeSpaceEvidence {
 
   // Holds the newest image against older scans, those of the phases whose turn it is.
   void refer_turn(std::uint64_t turn) {
-    const ReferenceView& image = views_.newest();
-    if (image.segment == ReferenceView::kNoSegment) return;
+    if (views_.awaits_image()) return;
     for (std::uint64_t phase = 0; phase < before_.size(); ++phase) {
-      if (turn_of(phase) == turn) refer_older(phase, image);
+      if (turn_of(phase) == turn) refer_older(phase, views_.newest());
     }
   }
   void refer_older(std::uint64_t phase, const ReferenceView& image) {
@@ -422,7 +421,6 @@ class FreeSpaceEvidence {
   Eigen::Isometry3d T_origin_world_ = Eigen::Isometry3d::Identity();
   std::uint64_t segment_begin_ = 0;  // first scan of the segment of the newest
   std::uint64_t newest_ = 0;
-  bool awaits_image_ = false;  // the newest scan
   // By phase: scans to the references before and after.
   std::vector<std::vector<int>> before_, after_;
   std::vector<Record> records_;

@@ -147,6 +147,15 @@ class RangeImage {
   static Short is_moving(const Short& range) {
     return (range & Short(kMoving)) == Short(kMoving);
   }
+  // Ranges of what moved, or of what stays; the others become nothing.
+  template <class Short>
+  static Short only_moving(const Short& range) {
+    return select(is_moving(range), range, Short(kNothing));
+  }
+  template <class Short>
+  static Short only_staying(const Short& range) {
+    return select(is_moving(range), Short(kNothing), range);
+  }
 
   // Copies what stays of the image while it holds nothing but objects, and notes how far that
   // reaches where it is more than one cell.
@@ -158,14 +167,13 @@ class RangeImage {
     scratch.reach.assign(rows * group_stride(grid), 0);
     detail::run_lanes([&](auto lanes) {
       using Short = typename detail::ShortsOf<decltype(lanes)>::Type;
-      const Short far(reaches.limit[1]), nothing(kNothing);
+      const Short far(reaches.limit[1]);
       for (std::size_t row = 0; row < rows; ++row) {
         const std::int16_t* const from = &scratch.nearest[row * stride];
         std::int16_t* const to = &scratch.objects[row * stride];
         std::uint8_t* const reach = &scratch.reach[row * group_stride(grid) + 1];
         for (std::size_t group = 0; group < groups; ++group) {
-          const Short object = Short::load(from + column_of(group));
-          const Short here = select(is_moving(object), nothing, object);
+          const Short here = only_staying(Short::load(from + column_of(group)));
           here.store(to + column_of(group));
           if (!(here < far).any()) continue;
           std::size_t cells = 2;
@@ -246,20 +254,17 @@ class RangeImage {
         const std::int16_t* const high = line(scratch.nearest, row + 1);
         Cell* const cells = &cells_[row * stride];
         for (std::size_t column = 0; column < stride; column += kShortLanes) {
-          const Short a = Short::load(low + column);
-          const Short b = Short::load(middle + column);
-          const Short c = Short::load(high + column);
-          const Short a_moves = is_moving(a), b_moves = is_moving(b), c_moves = is_moving(c);
-          const Short least_moving =
-              min(min(select(a_moves, a, nothing), select(b_moves, b, nothing)),
-                  select(c_moves, c, nothing));
-          const Short a_stays = select(a_moves, nothing, a);
-          const Short b_stays = select(b_moves, nothing, b);
-          const Short c_stays = select(c_moves, nothing, c);
-          least_moving.store(moving_leasts + column);
-          min(min(a_stays, b_stays), c_stays).store(leasts + column);
+          const Short below = Short::load(low + column);
+          const Short here = Short::load(middle + column);
+          const Short above = Short::load(high + column);
+          min(min(only_moving(below), only_moving(here)), only_moving(above))
+              .store(moving_leasts + column);
+          const Short a = only_staying(below);
+          const Short b = only_staying(here);
+          const Short c = only_staying(above);
+          min(min(a, b), c).store(leasts + column);
           // Set lanes are -1.
-          ((a_stays < nothing) + (b_stays < nothing) + (c_stays < nothing)).store(counts + column);
+          ((a < nothing) + (b < nothing) + (c < nothing)).store(counts + column);
         }
         for (std::size_t column = kLanes; column + kLanes < stride; column += kShortLanes) {
           const auto least_of_three = [](const std::int16_t* at) {

@@ -68,7 +68,7 @@ class ReferenceViews {
     const std::uint64_t phase = since_begin % step_;
     if (phase == 0) {
       ++images_;
-      view().segment = ReferenceView::kNoSegment;  // until its image is made
+      view().segment = ReferenceView::kNoSegment;  // until its image is whole
     }
     return {phase, images_};
   }
@@ -79,7 +79,6 @@ class ReferenceViews {
   void make_image(std::uint64_t scan, std::uint64_t segment, const Eigen::Isometry3d& T_world_level,
                   const GroundSplit& split, Span<const std::uint8_t> moving) {
     ReferenceView& view = this->view();
-    view.segment = ReferenceView::kNoSegment;  // until it is whole
     view.scan = scan;
     view.T_world_beams = T_world_level;
     PointsView ground = split.ground();
@@ -94,6 +93,8 @@ class ReferenceViews {
     view.segment = segment;
   }
 
+  /// Whether the newest reference has no image yet.
+  bool awaits_image() const { return newest().segment == ReferenceView::kNoSegment; }
   const ReferenceView& newest() const { return views_[images_ % views_.size()]; }
 
   /// The image that was made `lag` scans after a scan, or before it; null if there is none.
