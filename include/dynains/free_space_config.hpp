@@ -12,8 +12,7 @@ struct FreeSpaceConfig {
   int memory = 100;              ///< scans back that still give evidence
   int reference_step = 2;        ///< scans from one that gives evidence to the next
   double evidence_range = 80.0;  ///< m, horizontal; points beyond are not tested
-  double sample_size = 0.3;      ///< m, one sample per voxel of an instance
-  double supervoxel = 0.9;       ///< m, samples that share a belief
+  double supervoxel = 0.75;      ///< m, samples that share a belief
   int supervoxel_samples = 4;    ///< samples of a supervoxel at most
   double ground_sample = 1.2;    ///< m, one sample per voxel of ground beside removed instances
   double ground_reach = 2.0;     ///< m, ground this near to removed points is tested
@@ -51,8 +50,6 @@ struct FreeSpaceConfig {
                       "one of so many scans is kept as a reference that gives evidence on others"});
     visitor(Parameter{"evidence_range", self.evidence_range, closed(5, 300), "m",
                       "points farther away (horizontally) are not tested for free space"});
-    visitor(Parameter{"sample_size", self.sample_size, closed(0.05, 2), "m",
-                      "one sample per voxel of this size and instance"});
     visitor(Parameter{"supervoxel", self.supervoxel, closed(0.1, 5), "m",
                       "samples in one voxel of this size share a belief"});
     visitor(Parameter{"supervoxel_samples", self.supervoxel_samples, closed(1, 64), "",

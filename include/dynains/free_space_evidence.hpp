@@ -42,7 +42,7 @@ class FreeSpaceEvidence {
   /// Throws ConfigError.
   explicit FreeSpaceEvidence(const Config& config)
       : config_((config.validate(), config)),
-        sampler_(config.sample_size, config.supervoxel, config.evidence_range,
+        sampler_(config.supervoxel, config.evidence_range,
                  static_cast<std::uint32_t>(config.supervoxel_samples)),
         views_(config),
         updater_(config),

@@ -10,6 +10,7 @@
 
 #include "dynains/curved_voxel_clusterer.hpp"
 #include "dynains/detail/cell_memory.hpp"
+#include "dynains/detail/least_ranks.hpp"
 #include "dynains/detail/wide_lanes.hpp"
 #include "dynains/points.hpp"
 
@@ -61,25 +62,22 @@ struct InstanceSamples {
   }
 };
 
-/// Takes one sample per voxel and instance, up to some per supervoxel.
+/// Takes up to some samples per supervoxel and instance: those of its points that come first in an
+/// order by hash of their places, whatever their order in the scan.
 class InstanceSampler {
  public:
-  /// `sample_size`, `supervoxel_size`, `max_range`: metres; a supervoxel is a whole number of
-  /// sample voxels wide and has at most `most_samples`, 1 to 64: voxels of wider ones than four
-  /// share their place among the parts of CellMemory.
-  InstanceSampler(double sample_size, double supervoxel_size, double max_range,
-                  std::uint32_t most_samples)
-      : samples_per_metre_(static_cast<float>(1.0 / sample_size)),
-        voxels_per_supervoxel_(
-            static_cast<float>(std::max(1.0, std::round(supervoxel_size / sample_size)))),
+  /// `supervoxel_size`, `max_range`: metres; `most_samples`: of a supervoxel.
+  InstanceSampler(double supervoxel_size, double max_range, std::uint32_t most_samples)
+      : supervoxels_per_metre_(static_cast<float>(1.0 / supervoxel_size)),
         max_range_(static_cast<float>(max_range)),
-        most_samples_(most_samples) {}
+        samples_(most_samples) {}
 
-  /// Which of up to 64 points, a bit each, lie in another voxel than their predecessor; the first
+  /// Which of up to 64 points, a bit each, lie in another supervoxel than their
+  /// predecessor; the first
   /// does.
   std::uint64_t find_changes(PointsView points) const {
     using namespace detail;
-    const Constant8 per_metre(samples_per_metre_);
+    const Constant8 per_metre(supervoxels_per_metre_);
     std::array<std::array<std::int32_t, kBlock + kLanes>, 3> voxel;
     std::uint64_t changes = 0;
     run_lanes([&](auto lanes) {
@@ -110,39 +108,33 @@ class InstanceSampler {
     for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
       const PointsView block = points.subview(begin, std::min(kBlock, points.size() - begin));
       find_supervoxels(block, instance_of.data() + begin);
-      take_samples(block, out.met_of.data() + begin);
+      meet_supervoxels(block.size(), out.met_of.data() + begin);
+      rank_points(begin, block.size(), out.met_of.data() + begin);
     }
-    order(instance_count, out);
+    order(points, instance_count, out);
   }
 
  private:
-  struct Sample {
-    float x, y, z;
-    std::uint32_t met;  // its supervoxel, as InstanceSamples::met_of counts them
-  };
   // Number 0 stands for none.
   struct Supervoxel {
     std::int32_t xy, z, instance;  // as CellBlock has them
-    std::uint32_t samples;
   };
   static constexpr std::size_t kBlock = 64;  // points that are worked off together
+  // Points of one place of this size have one rank: it must not change with the last bit of a
+  // coordinate, which turns of the sensor do.
+  static constexpr float kPlacesPerMetre = 64.0F;
 
-  // Points come in the order of small patches, so that little has to be remembered: a supervoxel
-  // that was forgotten and comes back counts as another, which does no harm.
   void begin_scan() {
     memory_.clear();
-    sample_count_ = 0;
     supervoxel_count_ = 1;
+    samples_.clear();
   }
 
-  // The supervoxel of each point, and which of its voxels the point lies in.
+  // The supervoxel of each point, and its rank there.
   void find_supervoxels(PointsView points, const std::uint32_t* instance_of) {
     using namespace detail;
-    const Constant8 per_metre(samples_per_metre_), per_voxel(1.0F / voxels_per_supervoxel_);
-    const Constant8 voxels(voxels_per_supervoxel_), far_squared(max_range_ * max_range_);
-    // The half keeps the quotient so far from whole numbers that the product of floats rounds to
-    // the right side for all indices below 2^20.
-    static constexpr Constant8 kCentre(0.5F);
+    const Constant8 per_metre(supervoxels_per_metre_), far_squared(max_range_ * max_range_);
+    static constexpr Constant8 kPlaces(kPlacesPerMetre);
     for_lanes(points.size(), [&](auto at) {
       using Float = typename decltype(at)::Float;
       using Int = typename decltype(at)::Int;
@@ -152,44 +144,37 @@ class InstanceSampler {
       const Int instance = at.load(instance_of);
       const auto is_sampled = (px * px + py * py <= far_squared) &
                               ~(instance == Int(static_cast<std::int32_t>(kNoCluster)));
-      const auto split = [&](const Float& coordinate, Int& place) {
-        const Float voxel = to_float(floor(coordinate * per_metre));
-        place = floor((voxel + Float(kCentre)) * Float(per_voxel));
-        return truncate(voxel - to_float(place) * voxels) & Int(CellMemory::kParts - 1);
-      };
-      Int x, y, z;
-      const Int part_x = split(px, x);
-      const Int part_y = split(py, y);
-      const Int part_z = split(pz, z);
-      const Int part =
-          part_x + (part_y << CellMemory::kPartBits) + (part_z << 2 * CellMemory::kPartBits);
-      CellMemory::put(is_sampled, x, y, z, instance, part, at.begin, cells_);
+      const Int rank = CellMemory::hash_of(truncate(px * kPlaces), truncate(py * kPlaces),
+                                           truncate(pz * kPlaces));
+      rank.store(&rank_[at.begin]);
+      CellMemory::put(is_sampled, floor(px * per_metre), floor(py * per_metre),
+                      floor(pz * per_metre), instance, at.begin, cells_);
     });
   }
 
-  // The first point of each voxel, of supervoxels that have room. Most points are of voxels that
-  // are remembered.
-  void take_samples(PointsView points, std::uint32_t* met_of) {
-    detail::grow(samples_, sample_count_ + kBlock);
+  // Most points are of supervoxels that are remembered.
+  void meet_supervoxels(std::size_t count, std::uint32_t* met_of) {
     detail::grow(supervoxels_, supervoxel_count_ + kBlock);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      detail::CellMemory::Entry& entry = memory_.at(cells_, i);
-      const bool known = !entry.is_other(cells_, i) && entry.has_part(cells_, i);
-      met_of[i] = known ? entry.number : take_sample(points, i, entry);
+    memory_.make_room_for(kBlock);
+    for (std::size_t i = 0; i < count; ++i) {
+      const detail::CellMemory::Entry& entry = memory_.at(cells_, i);
+      met_of[i] = entry.is_other(cells_, i) ? meet_supervoxel(i) : entry.number;
     }
   }
 
-  // Returns its supervoxel. `entry`: where its cell is remembered, or will be.
-  std::uint32_t take_sample(PointsView points, std::size_t i, detail::CellMemory::Entry& entry) {
-    if (entry.is_other(cells_, i)) {
-      supervoxels_[supervoxel_count_] = {cells_.xy[i], cells_.z[i], cells_.instance[i], 0};
-      entry = {cells_.xy[i], cells_.z[i], cells_.instance[i], supervoxel_count_++, 0};
+  std::uint32_t meet_supervoxel(std::size_t i) {
+    const std::uint32_t number = memory_.find(cells_, i, supervoxel_count_).number;
+    supervoxels_[supervoxel_count_] = {cells_.xy[i], cells_.z[i], cells_.instance[i]};
+    if (number == supervoxel_count_) ++supervoxel_count_;
+    return number;
+  }
+
+  void rank_points(std::size_t begin, std::size_t count, const std::uint32_t* met_of) {
+    samples_.make_rows(supervoxel_count_);
+    for (std::size_t i = 0; i < count; ++i) {
+      samples_.add(met_of[i], static_cast<std::uint32_t>(rank_[i]),
+                   static_cast<std::uint32_t>(begin + i));
     }
-    const std::uint32_t met = entry.number;
-    samples_[sample_count_++] = {points.x[i], points.y[i], points.z[i], met};
-    entry.parts |= std::uint64_t{1} << static_cast<unsigned>(cells_.part[i]);
-    if (++supervoxels_[met].samples >= most_samples_) entry.parts = detail::CellMemory::kAllParts;
-    return met;
   }
 
   static SupervoxelPlace place_of(const Supervoxel& cell) {
@@ -197,10 +182,9 @@ class InstanceSampler {
                       cell.z);
   }
 
-  // Two counting sorts: supervoxels by instance, samples by supervoxel.
-  void order(std::size_t instance_count, InstanceSamples& out) {
+  // A counting sort: supervoxels by instance, and their samples with them.
+  void order(PointsView points, std::size_t instance_count, InstanceSamples& out) {
     const std::size_t supervoxel_count = supervoxel_count_ - 1;
-    const std::size_t sample_count = sample_count_;
     out.supervoxel_begin.assign(instance_count + 1, 0);
     for (std::size_t met = 1; met <= supervoxel_count; ++met) {
       ++out.supervoxel_begin[static_cast<std::uint32_t>(supervoxels_[met].instance) + 1];
@@ -219,38 +203,38 @@ class InstanceSampler {
       const auto instance = static_cast<std::uint32_t>(supervoxel.instance);
       const std::uint32_t to = next_[instance]++;
       out.met[met] = to;
-      out.sample_begin[to + 1] = supervoxel.samples;
+      out.sample_begin[to + 1] = static_cast<std::uint32_t>(samples_.count(met));
       out.place[to] = place_of(supervoxel);
       out.instance_of[to] = instance;
     }
     for (std::size_t s = 1; s <= supervoxel_count; ++s) {
       out.sample_begin[s] += out.sample_begin[s - 1];
     }
+    const std::size_t sample_count = out.sample_begin.back();
     out.points.grow(sample_count + detail::kLanes);
     out.supervoxel_of.resize(sample_count);
-    next_.assign(out.sample_begin.begin(), out.sample_begin.end());
-    for (std::size_t i = 0; i < sample_count; ++i) {
-      const Sample& sample = samples_[i];
-      const std::uint32_t supervoxel = out.met[sample.met];
-      const std::uint32_t to = next_[supervoxel]++;
-      out.supervoxel_of[to] = supervoxel;
-      out.points.x[to] = sample.x;
-      out.points.y[to] = sample.y;
-      out.points.z[to] = sample.z;
+    for (std::size_t met = 1; met <= supervoxel_count; ++met) {
+      const std::uint32_t supervoxel = out.met[met];
+      const std::uint32_t first = out.sample_begin[supervoxel];
+      for (std::uint32_t to = first; to < out.sample_begin[supervoxel + 1]; ++to) {
+        const std::size_t i = samples_.number(met, to - first);
+        out.supervoxel_of[to] = supervoxel;
+        out.points.x[to] = points.x[i];
+        out.points.y[to] = points.y[i];
+        out.points.z[to] = points.z[i];
+      }
     }
   }
 
-  float samples_per_metre_;
-  float voxels_per_supervoxel_;
+  float supervoxels_per_metre_;
   float max_range_;
-  std::uint32_t most_samples_;
-  detail::CellMemory memory_;             // of supervoxels, numbered as met_of counts them
-  detail::CellBlock<kBlock> cells_ = {};  // of the points of a block
-  // Longer than what is in use.
-  std::size_t sample_count_ = 0;
-  std::vector<Sample> samples_;
+  detail::CellMemory memory_;  // of supervoxels, numbered as met_of counts them
+  // Of the points of a block.
+  detail::CellBlock<kBlock> cells_ = {};
+  std::array<std::int32_t, kBlock> rank_ = {};
+  detail::LeastRanks samples_;  // by supervoxel
   std::uint32_t supervoxel_count_ = 1;
-  std::vector<Supervoxel> supervoxels_;
+  std::vector<Supervoxel> supervoxels_;  // longer than what is in use
   std::vector<std::uint32_t> next_;
 };
 

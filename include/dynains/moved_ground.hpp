@@ -37,7 +37,7 @@ class MovedGround {
                    std::max({config.ground_reach, config.footprint, 0.5}), config.evidence_range),
         around_(config.evidence_range),
         hull_(2.0 * std::max(config.footprint, kLeastCell)),
-        sampler_(config.ground_sample, config.ground_sample, config.evidence_range, 1) {}
+        sampler_(config.ground_sample, config.evidence_range, 1) {}
 
   void adapt(const SensorModel& sensor) {
     // The next beam over one that ended at the foot of something may be the first to hit it.

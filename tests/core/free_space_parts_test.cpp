@@ -22,127 +22,7 @@
 namespace dynains::test {
 namespace {
 
-std::int32_t voxel_of(float coordinate, float size) {
-  return static_cast<std::int32_t>(std::floor(coordinate * (1.0F / size)));
-}
-
-constexpr std::uint32_t kNone = 0xFFFFFFFFU;
-
-// Supervoxel per point.
-std::vector<std::uint32_t> supervoxel_of(const InstanceSamples& samples, std::size_t points) {
-  REQUIRE(samples.met_of.size() == points);
-  std::vector<std::uint32_t> result;
-  for (const std::uint32_t met : samples.met_of) {
-    REQUIRE(met < samples.met.size());
-    result.push_back(met == 0 ? kNone : samples.met[met]);
-  }
-  return result;
-}
-
 constexpr std::uint32_t kNoLimit = 64;
-
-TEST_CASE("every voxel of every instance has a sample, and samples are points of it") {
-  Random random(7);
-  constexpr float kSize = 0.3F;
-  constexpr std::size_t kInstances = 5;
-  PointBuffer points;
-  std::vector<std::uint32_t> instance_of;
-  for (int i = 0; i < 4000; ++i) {
-    points.push_back(random.uniform_float(-12, 12), random.uniform_float(-12, 12),
-                     random.uniform_float(-2, 2));
-    const std::size_t number = random.index(kInstances + 1);
-    instance_of.push_back(number == kInstances ? kNoCluster : static_cast<std::uint32_t>(number));
-  }
-  InstanceSampler sampler(kSize, 0.9, 10.0, kNoLimit);
-  InstanceSamples samples;
-  // Twice: buffers that were used before change nothing.
-  sampler.sample(points, instance_of, kInstances, samples);
-  sampler.sample(points, instance_of, kInstances, samples);
-
-  const std::vector<std::uint32_t> supervoxels = supervoxel_of(samples, points.size());
-  using Voxel = std::tuple<std::uint32_t, std::int32_t, std::int32_t, std::int32_t>;
-  std::set<Voxel> expected;
-  std::set<std::tuple<float, float, float>> measured;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    measured.insert({points.x[i], points.y[i], points.z[i]});
-    const bool near = points.x[i] * points.x[i] + points.y[i] * points.y[i] <= 100.0F;
-    REQUIRE((supervoxels[i] != kNone) == (near && instance_of[i] != kNoCluster));
-    if (!near || instance_of[i] == kNoCluster) continue;
-    const std::int32_t x = voxel_of(points.x[i], kSize), y = voxel_of(points.y[i], kSize),
-                       z = voxel_of(points.z[i], kSize);
-    expected.insert({instance_of[i], x, y, z});
-    // Each point is of the supervoxel that it lies in, three voxels wide.
-    const auto supervoxel = [](std::int32_t voxel) {
-      return static_cast<std::int32_t>(std::floor(voxel / 3.0));
-    };
-    REQUIRE(samples.place[supervoxels[i]] ==
-            pack_place(supervoxel(x), supervoxel(y), supervoxel(z)));
-    REQUIRE(samples.instance_of[supervoxels[i]] == instance_of[i]);
-  }
-  std::set<Voxel> found;
-  REQUIRE(samples.instance_count() == kInstances);
-  for (std::uint32_t instance = 0; instance < kInstances; ++instance) {
-    for (std::uint32_t s = samples.supervoxel_begin[instance];
-         s < samples.supervoxel_begin[instance + 1]; ++s) {
-      REQUIRE(samples.sample_begin[s] < samples.sample_begin[s + 1]);
-      for (std::uint32_t p = samples.sample_begin[s]; p < samples.sample_begin[s + 1]; ++p) {
-        const float x = samples.points.x[p], y = samples.points.y[p], z = samples.points.z[p];
-        REQUIRE(measured.count({x, y, z}) == 1);
-        found.insert({instance, voxel_of(x, kSize), voxel_of(y, kSize), voxel_of(z, kSize)});
-      }
-    }
-  }
-  CHECK(found == expected);
-}
-
-TEST_CASE("a supervoxel has the first points of its voxels as samples, up to a limit") {
-  // Two voxels wide: eight voxels each. Points come supervoxel by supervoxel, so that none is
-  // forgotten before its last point.
-  constexpr float kSize = 0.5F;
-  Random random(11);
-  PointBuffer points;
-  for (int corner = 0; corner < 108; ++corner) {
-    const auto low = [&](int place) { return static_cast<float>(place - 3); };
-    const float x = low(corner % 6), y = low(corner / 6 % 6), z = low(corner / 36);
-    for (int i = 0; i < 20; ++i) {
-      points.push_back(random.uniform_float(x, x + 0.999F), random.uniform_float(y, y + 0.999F),
-                       random.uniform_float(z, z + 0.999F));
-    }
-  }
-  const std::vector<std::uint32_t> instance_of(points.size(), 0);
-  using Place = std::array<std::int32_t, 3>;
-  using Sample = std::array<float, 3>;
-  for (const std::uint32_t limit : {1U, 3U, 7U, 8U, 9U}) {
-    std::map<Place, std::vector<Sample>> expected;
-    std::set<Place> met;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const Sample point = {points.x[i], points.y[i], points.z[i]};
-      Place voxel, supervoxel;
-      for (std::size_t k = 0; k < 3; ++k) {
-        voxel[k] = voxel_of(point[k], kSize);
-        supervoxel[k] = static_cast<std::int32_t>(std::floor(voxel[k] / 2.0));
-      }
-      std::vector<Sample>& samples = expected[supervoxel];
-      if (samples.size() < limit && met.insert(voxel).second) samples.push_back(point);
-    }
-    InstanceSampler sampler(kSize, 1.0, 80.0, limit);
-    InstanceSamples samples;
-    sampler.sample(points, instance_of, 1, samples);
-    REQUIRE(samples.supervoxel_count() == expected.size());
-    for (const auto& [place, wanted] : expected) {
-      const auto at = std::find(samples.place.begin(), samples.place.end(),
-                                pack_place(place[0], place[1], place[2]));
-      REQUIRE(at != samples.place.end());
-      const auto s = static_cast<std::size_t>(at - samples.place.begin());
-      std::vector<Sample> found;
-      for (std::uint32_t p = samples.sample_begin[s]; p < samples.sample_begin[s + 1]; ++p) {
-        found.push_back({samples.points.x[p], samples.points.y[p], samples.points.z[p]});
-        CHECK(samples.supervoxel_of[p] == s);
-      }
-      CHECK(found == wanted);
-    }
-  }
-}
 
 TEST_CASE("references are the scans that can be looked at nearest behind those wanted") {
   using Lags = std::vector<int>;
@@ -171,26 +51,6 @@ TEST_CASE("references are the scans that can be looked at nearest behind those w
   }
 }
 
-TEST_CASE("a point and its samples lie in the same supervoxel of the same instance") {
-  // One row of points along x, 0.1 m apart, in two instances; supervoxels are 3 samples wide:
-  // [-0.9, 0), [0, 0.9), [0.9, 1.8).
-  PointBuffer points;
-  std::vector<std::uint32_t> instance_of;
-  for (int i = -5; i < 15; ++i) {
-    points.push_back(0.1F * static_cast<float>(i) + 0.05F, 5.0F, 0.1F);
-    instance_of.push_back(i < 9 ? 0U : 1U);
-  }
-  InstanceSampler sampler(0.3, 0.9, 80.0, kNoLimit);
-  InstanceSamples samples;
-  sampler.sample(points, instance_of, 2, samples);
-  REQUIRE(samples.supervoxel_count() == 3);
-  CHECK(samples.supervoxel_begin == std::vector<std::uint32_t>{0, 2, 3});
-  const std::vector<std::uint32_t> supervoxels = supervoxel_of(samples, points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    CHECK(supervoxels[i] == (points.x[i] < 0.0F ? 0U : points.x[i] < 0.9F ? 1U : 2U));
-  }
-}
-
 // Supervoxels with one sample each at the given places, all of one instance.
 InstanceSamples supervoxels_at(const std::vector<std::array<int, 3>>& places, int samples_each) {
   InstanceSamples samples;
@@ -202,32 +62,6 @@ InstanceSamples supervoxels_at(const std::vector<std::array<int, 3>>& places, in
   }
   samples.supervoxel_begin = {0, static_cast<std::uint32_t>(places.size())};
   return samples;
-}
-
-TEST_CASE("a point that lies in another voxel than its predecessor is a change") {
-  Random random(5);
-  InstanceSampler sampler(0.5, 0.5, 80.0, 1);
-  for (const std::size_t count : {1U, 7U, 8U, 9U, 63U, 64U}) {
-    for (int round = 0; round < 50; ++round) {
-      PointBuffer points;
-      for (std::size_t i = 0; i < count; ++i) {
-        // Within one voxel, or a few about the sensor.
-        const float reach = random.index(3) == 0 ? 0.6F : 0.1F;
-        points.push_back(random.uniform_float(-0.05F, reach), random.uniform_float(-0.05F, reach),
-                         random.uniform_float(-0.05F, reach));
-      }
-      std::uint64_t expected = 1;
-      const auto voxel = [&](std::size_t i) {
-        return std::array<float, 3>{std::floor(points.x[i] / 0.5F), std::floor(points.y[i] / 0.5F),
-                                    std::floor(points.z[i] / 0.5F)};
-      };
-      for (std::size_t i = 1; i < count; ++i) {
-        if (voxel(i) != voxel(i - 1)) expected |= std::uint64_t{1} << i;
-      }
-      const std::uint64_t all = ~std::uint64_t{0} >> (64 - count);
-      REQUIRE((sampler.find_changes(points) & all) == expected);
-    }
-  }
 }
 
 TEST_CASE("groups of supervoxels connect over faces, edges and corners, and only so") {
@@ -446,7 +280,7 @@ void add_box(PointBuffer& points, std::vector<std::uint32_t>& instance_of, std::
 }
 
 TEST_CASE("instances of consecutive scans are linked where they overlap") {
-  InstanceSampler sampler(0.3, 0.6, 80.0, kNoLimit);
+  InstanceSampler sampler(0.6, 80.0, kNoLimit);
   InstanceLinker linker(0.8, 18.0, 4.5, 0.25);
   InstanceSamples samples[2];
   TrackedInstances tracked[2];
@@ -544,7 +378,7 @@ TEST_CASE("what is too long, too high or a single sample is not carried") {
     if (c.samples > 1) {
       points.push_back(10.0F + 0.6F * c.length, 5.0F - 0.8F * c.length, c.height - 1.0F);
     }
-    InstanceSampler sampler(0.3, 0.6, 80.0, kNoLimit);
+    InstanceSampler sampler(0.6, 80.0, kNoLimit);
     InstanceSamples samples;
     const std::vector<std::uint32_t> instance_of(points.size(), 0);
     sampler.sample(points, instance_of, 1, samples);

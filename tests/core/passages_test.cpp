@@ -27,7 +27,7 @@ struct SparseScan {
     for (const Eigen::Vector3f& p : points) buffer.push_back(p.x(), p.y(), p.z());
     std::vector<std::uint32_t> instance_of(points.size());
     for (std::uint32_t i = 0; i < instance_of.size(); ++i) instance_of[i] = i;
-    InstanceSampler(0.3, 0.9, 80.0, 4).sample(buffer, instance_of, points.size(), samples);
+    InstanceSampler(0.9, 80.0, 4).sample(buffer, instance_of, points.size(), samples);
     counted.assign(samples.supervoxel_count(), Count::kNone);
   }
 
@@ -206,7 +206,7 @@ TEST_CASE("of a supervoxel of many samples, a quarter must lie in a passage") {
     }
     const std::vector<std::uint32_t> one_instance(points.size(), 0);
     InstanceSamples samples;
-    InstanceSampler(0.3, 1.2, 80.0, 64).sample(points, one_instance, 1, samples);
+    InstanceSampler(1.2, 80.0, 64).sample(points, one_instance, 1, samples);
     REQUIRE(samples.supervoxel_count() == 1);
     REQUIRE(samples.size() == points.size());
     std::vector<Count> counted(1, Count::kNone);

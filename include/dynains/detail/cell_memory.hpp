@@ -1,82 +1,124 @@
-// A direct-mapped memory of grid cells met lately: nothing is ever searched.
+// A memory of the grid cells of one scan.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <utility>
 #include <vector>
 
 #include "dynains/detail/wide_lanes.hpp"
 
 namespace dynains::detail {
 
-/// Cells of some points, each with the instance that it belongs to, where they are remembered, and
-/// the part of the cell in which the point lies.
+/// Cells of some points, each with the instance that it belongs to.
 template <std::size_t kCount>
 struct CellBlock {
-  std::array<std::int32_t, kCount> xy, z, instance, slot, part;
+  std::array<std::int32_t, kCount> xy, z, instance, hash;
 };
 
-/// Gives cells back what was noted for them, unless another cell took their place.
+/// A hash table of cells, by open addressing. What was met last stands in its first place, so that
+/// points that come in the order of small patches find it there.
 class CellMemory {
  public:
-  static constexpr int kHalf = 16;               ///< bits of x and of y, which share a number
-  static constexpr int kPartBits = 2;            ///< of a part's place along each axis
-  static constexpr int kParts = 1 << kPartBits;  ///< per axis; beyond, they begin again
-  static constexpr std::uint64_t kAllParts = ~std::uint64_t{0};
+  static constexpr int kHalf = 16;  ///< bits of x and of y, which share a number
 
   struct Entry {
     std::int32_t xy = 0;
     std::int32_t z = 0;
     std::int32_t instance = -1;
+    std::int32_t hash = 0;
     std::uint32_t number = 0;
-    std::uint64_t parts = kAllParts;  ///< that need not be looked at again, a bit each
 
     /// Whether it is of another cell than the i-th one of a block.
     template <std::size_t kCount>
     bool is_other(const CellBlock<kCount>& cells, std::size_t i) const {
       return ((xy ^ cells.xy[i]) | (z ^ cells.z[i]) | (instance ^ cells.instance[i])) != 0;
     }
-    template <std::size_t kCount>
-    bool has_part(const CellBlock<kCount>& cells, std::size_t i) const {
-      return (parts >> static_cast<unsigned>(cells.part[i]) & 1U) != 0;
-    }
   };
 
   /// Forgets all. What stands for no cell shares an entry of its own, which stays as it is.
-  void clear() { entries_.assign(kSlots + 1, Entry()); }
-
-  template <std::size_t kCount>
-  Entry& at(const CellBlock<kCount>& cells, std::size_t i) {
-    return entries_[static_cast<std::size_t>(cells.slot[i])];
+  void clear() {
+    entries_.assign((std::size_t{1} << bits_) + 1, Entry());
+    count_ = 0;
   }
 
-  /// Puts eight cells to a block: `x` and `y` within 16 bits, `part` below 64. Where `is_cell` is
-  /// false, they stand for none.
+  /// Makes sure that so many more cells leave half of the table empty.
+  void make_room_for(std::size_t cells) {
+    while (2 * (count_ + cells) > std::size_t{1} << bits_) grow();
+  }
+
+  /// Where the i-th cell of a block stands if it was met last of those that share its place.
+  template <std::size_t kCount>
+  const Entry& at(const CellBlock<kCount>& cells, std::size_t i) const {
+    return entries_[place_of(cells.hash[i])];
+  }
+
+  /// Its entry, which stands in the first place from now on; made with `number` if it is new.
+  template <std::size_t kCount>
+  const Entry& find(const CellBlock<kCount>& cells, std::size_t i, std::uint32_t number) {
+    Entry& first = entries_[place_of(cells.hash[i])];
+    std::size_t place = place_of(cells.hash[i]);
+    while (entries_[place].instance >= 0 && entries_[place].is_other(cells, i)) {
+      place = next(place);
+    }
+    std::swap(first, entries_[place]);
+    if (first.instance < 0) {
+      first = {cells.xy[i], cells.z[i], cells.instance[i], cells.hash[i], number};
+      ++count_;
+    }
+    return first;
+  }
+
+  /// Puts eight cells to a block: `x` and `y` within 16 bits. Where `is_cell` is false, they stand
+  /// for none.
   template <class Mask, class Int, std::size_t kCount>
   static void put(const Mask& is_cell, const Int& x, const Int& y, const Int& z,
-                  const Int& instance, const Int& part, std::size_t i, CellBlock<kCount>& cells) {
+                  const Int& instance, std::size_t i, CellBlock<kCount>& cells) {
     const Int xy = keep(is_cell, (x << kHalf) + (y & Int((1 << kHalf) - 1)));
     const Int z_kept = keep(is_cell, z);
     xy.store(&cells.xy[i]);
     z_kept.store(&cells.z[i]);
     select(is_cell, instance, Int(-1)).store(&cells.instance[i]);
-    select(is_cell, slot_of(xy, z_kept, instance), Int(kSlots)).store(&cells.slot[i]);
-    part.store(&cells.part[i]);
+    select(is_cell, hash_of(xy, z_kept, instance) & Int(kMost), Int(kNone)).store(&cells.hash[i]);
+  }
+
+  /// 32 bits of three numbers, of which the upper ones are mixed best.
+  template <class Int>
+  static Int hash_of(const Int& a, const Int& b, const Int& c) {
+    const auto factor = [](std::uint32_t odd) { return static_cast<std::int32_t>(odd); };
+    const Int all = multiply(a, factor(0x9E3779B1U)) ^ multiply(b, factor(0x85EBCA77U)) ^
+                    multiply(c, factor(0xC2B2AE3DU));
+    return multiply(all ^ (all >> 15), factor(0x2C1B3C6DU));
   }
 
  private:
-  static constexpr std::int32_t kSlots = 1 << 12;
+  static constexpr std::int32_t kMost = std::numeric_limits<std::int32_t>::max();
+  static constexpr std::int32_t kNone = std::numeric_limits<std::int32_t>::min();
 
-  // The products of odd numbers differ most in their upper bits.
-  template <class Int>
-  static Int slot_of(const Int& xy, const Int& z, const Int& instance) {
-    const auto factor = [](std::uint32_t odd) { return static_cast<std::int32_t>(odd); };
-    const Int all = multiply(xy, factor(0x9E3779B1U)) ^ multiply(z, factor(0x85EBCA77U)) ^
-                    multiply(instance, factor(0xC2B2AE3DU));
-    return (multiply(all ^ (all >> 15), factor(0x2C1B3C6DU)) >> 18) & Int(kSlots - 1);
+  // The upper bits of 31; one behind the table for kNone.
+  std::size_t place_of(std::int32_t hash) const {
+    return static_cast<std::uint32_t>(hash) >> (31 - bits_);
+  }
+  std::size_t next(std::size_t place) const {
+    return (place + 1) & ((std::size_t{1} << bits_) - 1);
   }
 
+  void grow() {
+    std::vector<Entry> entries = std::move(entries_);
+    ++bits_;
+    entries_.assign((std::size_t{1} << bits_) + 1, Entry());
+    for (const Entry& entry : entries) {
+      if (entry.instance < 0) continue;
+      std::size_t place = place_of(entry.hash);
+      while (entries_[place].instance >= 0) place = next(place);
+      entries_[place] = entry;
+    }
+  }
+
+  int bits_ = 13;
+  std::size_t count_ = 0;
   std::vector<Entry> entries_;
 };
 

@@ -1,0 +1,292 @@
+// Samples of instances, against something slow and obvious.
+#include "dynains/instance_samples.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <map>
+#include <set>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "dynains/detail/least_ranks.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+namespace dynains::test {
+namespace {
+
+using Place = std::tuple<std::uint32_t, std::int32_t, std::int32_t, std::int32_t>;
+using Point = std::array<float, 3>;
+
+struct Scan {
+  PointBuffer points;
+  std::vector<std::uint32_t> instance_of;
+
+  void add(const Point& p, std::uint32_t instance) {
+    points.push_back(p[0], p[1], p[2]);
+    instance_of.push_back(instance);
+  }
+  Point point(std::size_t i) const { return {points.x[i], points.y[i], points.z[i]}; }
+};
+
+constexpr std::size_t kInstances = 5;
+
+// Points of some instances, and some of none, in a box about the sensor.
+Scan random_scan(std::uint64_t seed, std::size_t count, double reach) {
+  Random random(seed);
+  Scan scan;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3f p =
+        random.vector({-reach, -reach, -2.0}, {reach, reach, 2.0}).cast<float>();
+    const std::size_t number = random.index(kInstances + 1);
+    scan.add({p.x(), p.y(), p.z()},
+             number == kInstances ? kNoCluster : static_cast<std::uint32_t>(number));
+  }
+  return scan;
+}
+
+Scan shuffled(const Scan& scan, std::uint64_t seed) {
+  Scan result;
+  for (const std::size_t i : Random(seed).permutation(scan.points.size())) {
+    result.add(scan.point(i), scan.instance_of[i]);
+  }
+  return result;
+}
+
+// The samples of each supervoxel of each instance.
+std::map<Place, std::multiset<Point>> by_supervoxel(const InstanceSamples& samples, float size) {
+  std::map<Place, std::multiset<Point>> result;
+  const auto cell = [size](float coordinate) {
+    return static_cast<std::int32_t>(std::floor(coordinate * (1.0F / size)));
+  };
+  for (std::uint32_t instance = 0; instance < samples.instance_count(); ++instance) {
+    for (std::uint32_t s = samples.supervoxel_begin[instance];
+         s < samples.supervoxel_begin[instance + 1]; ++s) {
+      REQUIRE(samples.instance_of[s] == instance);
+      std::multiset<Point> points;
+      for (std::uint32_t p = samples.sample_begin[s]; p < samples.sample_begin[s + 1]; ++p) {
+        REQUIRE(samples.supervoxel_of[p] == s);
+        points.insert({samples.points.x[p], samples.points.y[p], samples.points.z[p]});
+      }
+      REQUIRE(!points.empty());
+      const Point& first = *points.begin();
+      const Place place = {instance, cell(first[0]), cell(first[1]), cell(first[2])};
+      REQUIRE(samples.place[s] ==
+              pack_place(std::get<1>(place), std::get<2>(place), std::get<3>(place)));
+      // Never twice, however many supervoxels there are.
+      REQUIRE(result.insert({place, points}).second);
+    }
+  }
+  return result;
+}
+
+constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+
+// Supervoxel per point.
+std::vector<std::uint32_t> supervoxel_of(const InstanceSamples& samples, std::size_t points) {
+  REQUIRE(samples.met_of.size() == points);
+  std::vector<std::uint32_t> result;
+  for (const std::uint32_t met : samples.met_of) {
+    REQUIRE(met < samples.met.size());
+    result.push_back(met == 0 ? kNone : samples.met[met]);
+  }
+  return result;
+}
+
+TEST_CASE("a supervoxel has so many of its points as samples as it may, and every point has one") {
+  constexpr float kSize = 0.9F;
+  constexpr float kRange = 10.0F;
+  const Scan scan = random_scan(7, 4000, 12.0);
+  for (const std::uint32_t most : {1U, 2U, 3U, 4U, 64U}) {
+    CAPTURE(most);
+    InstanceSampler sampler(kSize, kRange, most);
+    InstanceSamples samples;
+    // Twice: buffers that were used before change nothing.
+    sampler.sample(scan.points, scan.instance_of, kInstances, samples);
+    sampler.sample(scan.points, scan.instance_of, kInstances, samples);
+    REQUIRE(samples.instance_count() == kInstances);
+
+    const std::vector<std::uint32_t> supervoxels = supervoxel_of(samples, scan.points.size());
+    std::map<Place, std::multiset<Point>> points;
+    for (std::size_t i = 0; i < scan.points.size(); ++i) {
+      const Point p = scan.point(i);
+      const bool is_near = p[0] * p[0] + p[1] * p[1] <= kRange * kRange;
+      const std::uint32_t instance = scan.instance_of[i];
+      REQUIRE((supervoxels[i] != kNone) == (is_near && instance != kNoCluster));
+      if (supervoxels[i] == kNone) continue;
+      std::array<std::int32_t, 3> at;
+      for (std::size_t k = 0; k < 3; ++k) {
+        at[k] = static_cast<std::int32_t>(std::floor(p[k] * (1.0F / kSize)));
+      }
+      REQUIRE(samples.place[supervoxels[i]] == pack_place(at[0], at[1], at[2]));
+      REQUIRE(samples.instance_of[supervoxels[i]] == instance);
+      points[{instance, at[0], at[1], at[2]}].insert(p);
+    }
+    const auto found = by_supervoxel(samples, kSize);
+    REQUIRE(found.size() == points.size());
+    for (const auto& [place, chosen] : found) {
+      const std::multiset<Point>& all = points.at(place);
+      CHECK(chosen.size() == std::min<std::size_t>(most, all.size()));
+      CHECK(std::includes(all.begin(), all.end(), chosen.begin(), chosen.end()));
+    }
+  }
+}
+
+TEST_CASE("which points are samples does not depend on the order of the scan") {
+  // Near and crowded, and so wide that memory has to grow while points come.
+  for (const double reach : {6.0, 60.0}) {
+    CAPTURE(reach);
+    const Scan scan = random_scan(21, 30000, reach);
+    InstanceSamples samples, other;
+    InstanceSampler sampler(0.9, 100.0, 4);
+    sampler.sample(scan.points, scan.instance_of, kInstances, samples);
+    const auto expected = by_supervoxel(samples, 0.9F);
+    for (const std::uint64_t seed : {1U, 2U, 3U}) {
+      const Scan again = shuffled(scan, seed);
+      sampler.sample(again.points, again.instance_of, kInstances, other);
+      CHECK((by_supervoxel(other, 0.9F) == expected));
+    }
+  }
+}
+
+TEST_CASE("what changes the last bit of a coordinate changes few samples") {
+  const Scan scan = random_scan(5, 30000, 30.0);
+  Scan moved;
+  Random random(6);
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    Point p = scan.point(i);
+    for (float& x : p) x *= 1.0F + random.uniform_float(-1e-7, 1e-7);
+    moved.add(p, scan.instance_of[i]);
+  }
+  InstanceSamples samples, other;
+  InstanceSampler sampler(0.9, 100.0, 4);
+  sampler.sample(scan.points, scan.instance_of, kInstances, samples);
+  sampler.sample(moved.points, moved.instance_of, kInstances, other);
+  const auto number = [](const Scan& of, const InstanceSamples& which) {
+    std::map<Point, std::size_t> at;
+    for (std::size_t i = 0; i < of.points.size(); ++i) at[of.point(i)] = i;
+    std::set<std::size_t> chosen;
+    for (std::size_t p = 0; p < which.size(); ++p) {
+      chosen.insert(at.at({which.points.x[p], which.points.y[p], which.points.z[p]}));
+    }
+    return chosen;
+  };
+  const std::set<std::size_t> before = number(scan, samples), after = number(moved, other);
+  std::vector<std::size_t> both;
+  std::set_intersection(before.begin(), before.end(), after.begin(), after.end(),
+                        std::back_inserter(both));
+  REQUIRE(before.size() > 5000);
+  CHECK(1000 * both.size() > 998 * before.size());
+  CHECK(1000 * both.size() > 998 * after.size());
+}
+
+TEST_CASE("every part of a supervoxel gives as many samples as it has points") {
+  // Points of one supervoxel at a time, twice as many in its right half as in its left half.
+  Random random(9);
+  Scan scan;
+  for (int corner = 0; corner < 2000; ++corner) {
+    const float x = static_cast<float>(corner % 50), y = static_cast<float>(corner / 50);
+    for (int i = 0; i < 30; ++i) {
+      const double low = i < 10 ? 0.0 : 0.5;
+      scan.add({x + random.uniform_float(low, low + 0.499), y + random.uniform_float(0.0, 0.999),
+                random.uniform_float(0.0, 0.999)},
+               0);
+    }
+  }
+  InstanceSampler sampler(1.0, 100.0, 4);
+  InstanceSamples samples;
+  sampler.sample(scan.points, scan.instance_of, 1, samples);
+  REQUIRE(samples.size() == 8000);
+  std::array<int, 2> halves = {};
+  for (std::size_t p = 0; p < samples.size(); ++p) {
+    const float x = samples.points.x[p];
+    ++halves[x - std::floor(x) < 0.5F ? 0 : 1];
+  }
+  // 2667 of 8000, give or take four standard deviations.
+  CHECK(halves[0] > 2667 - 170);
+  CHECK(halves[0] < 2667 + 170);
+}
+
+TEST_CASE("rows of ranks keep the least of all that they were given, in order") {
+  Random random(3);
+  for (const std::size_t most : {1U, 2U, 3U, 4U, 5U, 64U}) {
+    detail::LeastRanks ranks(most);
+    for (int round = 0; round < 3; ++round) {
+      ranks.clear();
+      std::map<std::size_t, std::vector<std::pair<std::uint32_t, std::uint32_t>>> rows;
+      std::size_t row_count = 1;
+      for (std::uint32_t i = 0; i < 2000; ++i) {
+        const std::size_t row = random.index(row_count + 1);
+        row_count = std::max(row_count, row + 1);
+        ranks.make_rows(row_count);
+        // Ranks differ in more than their last three bits, or not at all.
+        const auto rank = static_cast<std::uint32_t>(random.index(500)) * 8589930U;
+        const std::uint32_t number = i * 2147479U;
+        ranks.add(row, rank, number);
+        rows[row].push_back({rank, number});
+      }
+      for (auto& [row, expected] : rows) {
+        std::sort(expected.begin(), expected.end());
+        REQUIRE(ranks.count(row) == std::min(most, expected.size()));
+        for (std::size_t k = 0; k < ranks.count(row); ++k) {
+          CHECK(ranks.number(row, k) == expected[k].second);
+        }
+      }
+      ranks.make_rows(row_count + 1);
+      CHECK(ranks.count(row_count) == 0);
+    }
+  }
+}
+
+TEST_CASE("a point and its samples lie in the same supervoxel of the same instance") {
+  // One row of points along x, 0.1 m apart, in two instances; supervoxels are
+  // [-0.9, 0), [0, 0.9), [0.9, 1.8).
+  PointBuffer points;
+  std::vector<std::uint32_t> instance_of;
+  for (int i = -5; i < 15; ++i) {
+    points.push_back(0.1F * static_cast<float>(i) + 0.05F, 5.0F, 0.1F);
+    instance_of.push_back(i < 9 ? 0U : 1U);
+  }
+  InstanceSampler sampler(0.9, 80.0, 64);
+  InstanceSamples samples;
+  sampler.sample(points, instance_of, 2, samples);
+  REQUIRE(samples.supervoxel_count() == 3);
+  CHECK(samples.supervoxel_begin == std::vector<std::uint32_t>{0, 2, 3});
+  const std::vector<std::uint32_t> supervoxels = supervoxel_of(samples, points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    CHECK(supervoxels[i] == (points.x[i] < 0.0F ? 0U : points.x[i] < 0.9F ? 1U : 2U));
+  }
+}
+
+TEST_CASE("a point that lies in another supervoxel than its predecessor is a change") {
+  Random random(5);
+  InstanceSampler sampler(0.5, 80.0, 1);
+  for (const std::size_t count : {1U, 7U, 8U, 9U, 63U, 64U}) {
+    for (int round = 0; round < 50; ++round) {
+      PointBuffer points;
+      for (std::size_t i = 0; i < count; ++i) {
+        // Within one voxel, or a few about the sensor.
+        const float reach = random.index(3) == 0 ? 0.6F : 0.1F;
+        points.push_back(random.uniform_float(-0.05F, reach), random.uniform_float(-0.05F, reach),
+                         random.uniform_float(-0.05F, reach));
+      }
+      std::uint64_t expected = 1;
+      const auto voxel = [&](std::size_t i) {
+        return std::array<float, 3>{std::floor(points.x[i] / 0.5F), std::floor(points.y[i] / 0.5F),
+                                    std::floor(points.z[i] / 0.5F)};
+      };
+      for (std::size_t i = 1; i < count; ++i) {
+        if (voxel(i) != voxel(i - 1)) expected |= std::uint64_t{1} << i;
+      }
+      const std::uint64_t all = ~std::uint64_t{0} >> (64 - count);
+      REQUIRE((sampler.find_changes(points) & all) == expected);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dynains::test
