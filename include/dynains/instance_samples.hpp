@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dynains/curved_voxel_clusterer.hpp"
+#include "dynains/detail/cell_hash.hpp"
 #include "dynains/detail/cell_memory.hpp"
 #include "dynains/detail/least_ranks.hpp"
 #include "dynains/detail/wide_lanes.hpp"
@@ -72,9 +73,8 @@ class InstanceSampler {
         max_range_(static_cast<float>(max_range)),
         samples_(most_samples) {}
 
-  /// Which of up to 64 points, a bit each, lie in another supervoxel than their
-  /// predecessor; the first
-  /// does.
+  /// Which of up to 64 points, a bit each, lie in another supervoxel than their predecessor; the
+  /// first does.
   std::uint64_t find_changes(PointsView points) const {
     using namespace detail;
     const Constant8 per_metre(supervoxels_per_metre_);
@@ -120,8 +120,8 @@ class InstanceSampler {
     std::int32_t xy, z, instance;  // as CellBlock has them
   };
   static constexpr std::size_t kBlock = 64;  // points that are worked off together
-  // Points of one place of this size have one rank: it must not change with the last bit of a
-  // coordinate, which turns of the sensor do.
+  // Ranks are of places of this size: a turn of the sensor, which changes the last bits of all
+  // coordinates, must not change them.
   static constexpr float kPlacesPerMetre = 64.0F;
 
   void begin_scan() {
@@ -144,8 +144,8 @@ class InstanceSampler {
       const Int instance = at.load(instance_of);
       const auto is_sampled = (px * px + py * py <= far_squared) &
                               ~(instance == Int(static_cast<std::int32_t>(kNoCluster)));
-      const Int rank = CellMemory::hash_of(truncate(px * kPlaces), truncate(py * kPlaces),
-                                           truncate(pz * kPlaces));
+      const Int rank =
+          mixed_hash(truncate(px * kPlaces), truncate(py * kPlaces), truncate(pz * kPlaces));
       rank.store(&rank_[at.begin]);
       CellMemory::put(is_sampled, floor(px * per_metre), floor(py * per_metre),
                       floor(pz * per_metre), instance, at.begin, cells_);

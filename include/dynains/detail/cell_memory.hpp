@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/detail/cell_hash.hpp"
 #include "dynains/detail/wide_lanes.hpp"
 
 namespace dynains::detail {
@@ -81,16 +82,8 @@ class CellMemory {
     xy.store(&cells.xy[i]);
     z_kept.store(&cells.z[i]);
     select(is_cell, instance, Int(-1)).store(&cells.instance[i]);
-    select(is_cell, hash_of(xy, z_kept, instance) & Int(kMost), Int(kNone)).store(&cells.hash[i]);
-  }
-
-  /// 32 bits of three numbers, of which the upper ones are mixed best.
-  template <class Int>
-  static Int hash_of(const Int& a, const Int& b, const Int& c) {
-    const auto factor = [](std::uint32_t odd) { return static_cast<std::int32_t>(odd); };
-    const Int all = multiply(a, factor(0x9E3779B1U)) ^ multiply(b, factor(0x85EBCA77U)) ^
-                    multiply(c, factor(0xC2B2AE3DU));
-    return multiply(all ^ (all >> 15), factor(0x2C1B3C6DU));
+    select(is_cell, mixed_hash(xy, z_kept, instance) & Int(kMost), Int(kNone))
+        .store(&cells.hash[i]);
   }
 
  private:

@@ -21,14 +21,15 @@ class LeastRanks {
   /// Leaves all rows empty.
   void clear() { pairs_.assign(pairs_.size(), kEmpty); }
 
+  /// Makes sure that there are so many rows; new ones are empty.
   void make_rows(std::size_t count) {
     const std::size_t pairs = count * pairs_per_row_;
     if (pairs_.size() < pairs) pairs_.resize(pairs + pairs / 8, kEmpty);
   }
 
-  // In an ordered row, what stands behind a new key is the greater of it and what stood there
-  // before, and what stands before it stays. A branch would be taken by every third point of a
-  // scan, and never foreseen.
+  /// Adds a number to a row, whose last one goes if it was full. Each place takes the lesser of
+  /// what stands there and the greater of the new one and what stood before it: no branch, which
+  /// would be taken for every third point of a scan, and never foreseen.
   void add(std::size_t row, std::uint32_t rank, std::uint32_t number) {
     const double key = key_of(rank, number);
     const Pair keys = {key, key};
