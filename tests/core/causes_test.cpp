@@ -185,10 +185,9 @@ TEST_CASE("evidence: a lead vehicle is presumed to move until its place was seen
 // Scans behind the newest have meanwhile been seen through; of the newest itself, too little was,
 // if supervoxels are this small.
 TEST_CASE("evidence: a vehicle whose sides overlap from scan to scan is known along its track") {
-  const std::vector<Scan> scans = drive(yard_with(van(9.0, 2.0, {5.0, 0.0, 0.0})), 6, 5.0);
+  const std::vector<Scan> scans = drive(yard_with(van(9.0, 2.0, {4.0, 0.0, 0.0})), 6, 4.0);
   Config config;
-  config.evidence.supervoxel = 0.6;
-  config.evidence.remove_share = 0.25;
+  config.evidence.supervoxel = 0.4;
   CHECK(Causes(scans[5], run(config, scans).newest[5], kAddedBox).share(Cause::kAlongTrack) > 0.8);
   config.evidence.use_tracks = false;
   CHECK(Causes(scans[5], run(config, scans).newest[5], kAddedBox)[Cause::kAlongTrack] == 0);

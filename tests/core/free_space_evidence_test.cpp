@@ -115,8 +115,8 @@ TEST_CASE("only compact instances are presumed to move, and where places were se
            Case{2.0F, 1.5F, 6, 5, false}, Case{2.0F, 1.5F, 7, 5, true},
            Case{14.7F, 1.5F, 2, 0, true}, Case{15.6F, 1.5F, 2, 0, false},
            Case{2.0F, 3.4F, 2, 0, true}, Case{2.0F, 4.1F, 2, 0, false},
-           Case{1.15F, 0.2F, 2, 0, false},  // four samples
-           Case{1.35F, 0.2F, 2, 0, true},   // five
+           Case{0.75F, 0.1F, 2, 0, false},  // twelve points of one supervoxel: four samples
+           Case{0.78F, 0.1F, 2, 0, true},   // one more beyond it: five
        }) {
     CAPTURE(c.length, c.height, c.scan, c.begin);
     CHECK(is_presumed(c) == c.presumed);
