@@ -6,7 +6,6 @@
 #include <limits>
 #include <map>
 #include <set>
-#include <tuple>
 #include <vector>
 
 #include "dynains/ground_footprint.hpp"
