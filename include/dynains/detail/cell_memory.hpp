@@ -59,8 +59,8 @@ class CellMemory {
   /// Its entry, which stands in the first place from now on; made with `number` if it is new.
   template <std::size_t kCount>
   const Entry& find(const CellBlock<kCount>& cells, std::size_t i, std::uint32_t number) {
-    Entry& first = entries_[place_of(cells.hash[i])];
     std::size_t place = place_of(cells.hash[i]);
+    Entry& first = entries_[place];
     while (entries_[place].instance >= 0 && entries_[place].is_other(cells, i)) {
       place = next(place);
     }
