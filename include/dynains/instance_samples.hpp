@@ -125,7 +125,6 @@ class InstanceSampler {
 
   void begin_scan() {
     memory_.clear();
-    supervoxel_count_ = 1;
     samples_.clear();
   }
 
@@ -153,7 +152,7 @@ class InstanceSampler {
 
   // Most points are of supervoxels that are remembered.
   void meet_supervoxels(std::size_t count, std::uint32_t* met_of) {
-    detail::grow(supervoxels_, supervoxel_count_ + kBlock);
+    detail::grow(supervoxels_, memory_.count() + 1 + kBlock);
     memory_.make_room_for(kBlock);
     for (std::size_t i = 0; i < count; ++i) {
       const detail::CellMemory::Entry& entry = memory_.at(cells_, i);
@@ -162,14 +161,13 @@ class InstanceSampler {
   }
 
   std::uint32_t meet_supervoxel(std::size_t i) {
-    const std::uint32_t number = memory_.find(cells_, i, supervoxel_count_).number;
-    supervoxels_[supervoxel_count_] = {cells_.xy[i], cells_.z[i], cells_.instance[i]};
-    if (number == supervoxel_count_) ++supervoxel_count_;
+    const std::uint32_t number = memory_.find(cells_, i);
+    supervoxels_[number] = {cells_.xy[i], cells_.z[i], cells_.instance[i]};
     return number;
   }
 
   void rank_points(std::size_t begin, std::size_t count, const std::uint32_t* met_of) {
-    samples_.make_rows(supervoxel_count_);
+    samples_.make_rows(memory_.count() + 1);
     for (std::size_t i = 0; i < count; ++i) {
       samples_.add(met_of[i], static_cast<std::uint32_t>(rank_[i]),
                    static_cast<std::uint32_t>(begin + i));
@@ -183,7 +181,7 @@ class InstanceSampler {
 
   // A counting sort: supervoxels by instance, and their samples with them.
   void order(PointsView points, std::size_t instance_count, InstanceSamples& out) {
-    const std::size_t supervoxel_count = supervoxel_count_ - 1;
+    const std::size_t supervoxel_count = memory_.count();
     out.supervoxel_begin.assign(instance_count + 1, 0);
     for (std::size_t met = 1; met <= supervoxel_count; ++met) {
       ++out.supervoxel_begin[static_cast<std::uint32_t>(supervoxels_[met].instance) + 1];
@@ -231,8 +229,7 @@ class InstanceSampler {
   // Of the points of a block.
   detail::CellBlock<kBlock> cells_ = {};
   std::array<std::int32_t, kBlock> rank_ = {};
-  detail::LeastRanks samples_;  // by supervoxel
-  std::uint32_t supervoxel_count_ = 1;
+  detail::LeastRanks samples_;           // by supervoxel
   std::vector<Supervoxel> supervoxels_;  // longer than what is in use
   std::vector<std::uint32_t> next_;
 };

@@ -57,12 +57,20 @@ Scan shuffled(const Scan& scan, std::uint64_t seed) {
   return result;
 }
 
-// The samples of each supervoxel of each instance.
-std::map<Place, std::multiset<Point>> by_supervoxel(const InstanceSamples& samples, float size) {
-  std::map<Place, std::multiset<Point>> result;
+// The supervoxel in which a point of an instance lies.
+Place place_of(std::uint32_t instance, const Point& p, float size) {
   const auto cell = [size](float coordinate) {
     return static_cast<std::int32_t>(std::floor(coordinate * (1.0F / size)));
   };
+  return {instance, cell(p[0]), cell(p[1]), cell(p[2])};
+}
+SupervoxelPlace packed(const Place& place) {
+  return pack_place(std::get<1>(place), std::get<2>(place), std::get<3>(place));
+}
+
+// The samples of each supervoxel of each instance.
+std::map<Place, std::multiset<Point>> by_supervoxel(const InstanceSamples& samples, float size) {
+  std::map<Place, std::multiset<Point>> result;
   for (std::uint32_t instance = 0; instance < samples.instance_count(); ++instance) {
     for (std::uint32_t s = samples.supervoxel_begin[instance];
          s < samples.supervoxel_begin[instance + 1]; ++s) {
@@ -73,10 +81,8 @@ std::map<Place, std::multiset<Point>> by_supervoxel(const InstanceSamples& sampl
         points.insert({samples.points.x[p], samples.points.y[p], samples.points.z[p]});
       }
       REQUIRE(!points.empty());
-      const Point& first = *points.begin();
-      const Place place = {instance, cell(first[0]), cell(first[1]), cell(first[2])};
-      REQUIRE(samples.place[s] ==
-              pack_place(std::get<1>(place), std::get<2>(place), std::get<3>(place)));
+      const Place place = place_of(instance, *points.begin(), size);
+      REQUIRE(samples.place[s] == packed(place));
       // Never twice, however many supervoxels there are.
       REQUIRE(result.insert({place, points}).second);
     }
@@ -118,13 +124,10 @@ TEST_CASE("a supervoxel has so many of its points as samples as it may, and ever
       const std::uint32_t instance = scan.instance_of[i];
       REQUIRE((supervoxels[i] != kNone) == (is_near && instance != kNoCluster));
       if (supervoxels[i] == kNone) continue;
-      std::array<std::int32_t, 3> at;
-      for (std::size_t k = 0; k < 3; ++k) {
-        at[k] = static_cast<std::int32_t>(std::floor(p[k] * (1.0F / kSize)));
-      }
-      REQUIRE(samples.place[supervoxels[i]] == pack_place(at[0], at[1], at[2]));
+      const Place place = place_of(instance, p, kSize);
+      REQUIRE(samples.place[supervoxels[i]] == packed(place));
       REQUIRE(samples.instance_of[supervoxels[i]] == instance);
-      points[{instance, at[0], at[1], at[2]}].insert(p);
+      points[place].insert(p);
     }
     const auto found = by_supervoxel(samples, kSize);
     REQUIRE(found.size() == points.size());

@@ -19,8 +19,8 @@ struct CellBlock {
   std::array<std::int32_t, kCount> xy, z, instance, hash;
 };
 
-/// A hash table of cells, by open addressing. What was met last stands in its first place, so that
-/// points that come in the order of small patches find it there.
+/// A hash table of cells, by open addressing, which numbers them as they are met. What was met last
+/// stands in its first place, so that points that come in the order of small patches find it there.
 class CellMemory {
  public:
   static constexpr int kHalf = 16;  ///< bits of x and of y, which share a number
@@ -41,13 +41,16 @@ class CellMemory {
 
   /// Forgets all. What stands for no cell shares an entry of its own, which stays as it is.
   void clear() {
-    entries_.assign((std::size_t{1} << bits_) + 1, Entry());
+    entries_.assign(size() + 1, Entry());
     count_ = 0;
   }
 
+  /// How many cells there are, numbered from 1 on.
+  std::uint32_t count() const { return count_; }
+
   /// Makes sure that so many more cells leave half of the table empty.
   void make_room_for(std::size_t cells) {
-    while (2 * (count_ + cells) > std::size_t{1} << bits_) grow();
+    while (2 * (count_ + cells) > size()) grow();
   }
 
   /// Where the i-th cell of a block stands if it was met last of those that share its place.
@@ -56,9 +59,9 @@ class CellMemory {
     return entries_[place_of(cells.hash[i])];
   }
 
-  /// Its entry, which stands in the first place from now on; made with `number` if it is new.
+  /// Its number; it stands in the first place from now on.
   template <std::size_t kCount>
-  const Entry& find(const CellBlock<kCount>& cells, std::size_t i, std::uint32_t number) {
+  std::uint32_t find(const CellBlock<kCount>& cells, std::size_t i) {
     std::size_t place = place_of(cells.hash[i]);
     Entry& first = entries_[place];
     while (entries_[place].instance >= 0 && entries_[place].is_other(cells, i)) {
@@ -66,10 +69,9 @@ class CellMemory {
     }
     std::swap(first, entries_[place]);
     if (first.instance < 0) {
-      first = {cells.xy[i], cells.z[i], cells.instance[i], cells.hash[i], number};
-      ++count_;
+      first = {cells.xy[i], cells.z[i], cells.instance[i], cells.hash[i], ++count_};
     }
-    return first;
+    return first.number;
   }
 
   /// Puts eight cells to a block: `x` and `y` within 16 bits. Where `is_cell` is false, they stand
@@ -90,18 +92,17 @@ class CellMemory {
   static constexpr std::int32_t kMost = std::numeric_limits<std::int32_t>::max();
   static constexpr std::int32_t kNone = std::numeric_limits<std::int32_t>::min();
 
+  std::size_t size() const { return std::size_t{1} << bits_; }
   // The upper bits of 31; one behind the table for kNone.
   std::size_t place_of(std::int32_t hash) const {
     return static_cast<std::uint32_t>(hash) >> (31 - bits_);
   }
-  std::size_t next(std::size_t place) const {
-    return (place + 1) & ((std::size_t{1} << bits_) - 1);
-  }
+  std::size_t next(std::size_t place) const { return (place + 1) & (size() - 1); }
 
   void grow() {
     std::vector<Entry> entries = std::move(entries_);
     ++bits_;
-    entries_.assign((std::size_t{1} << bits_) + 1, Entry());
+    entries_.assign(size() + 1, Entry());
     for (const Entry& entry : entries) {
       if (entry.instance < 0) continue;
       std::size_t place = place_of(entry.hash);
@@ -111,7 +112,7 @@ class CellMemory {
   }
 
   int bits_ = 13;
-  std::size_t count_ = 0;
+  std::uint32_t count_ = 0;
   std::vector<Entry> entries_;
 };
 
