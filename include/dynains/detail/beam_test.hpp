@@ -138,10 +138,11 @@ inline void test_beams(const RangeImage& image, const Eigen::Isometry3f& T_refer
         const Float tolerance = metres * slope_per_metre + least;
         const auto inside = Int(0) < Int::load(&cell[i]);
         const auto is_at = [&](const Float& value) { return abs(value - range) <= tolerance; };
-        const auto marks = [&](std::int32_t bit) { return (both & Int(bit)) == Int(bit); };
+        const auto is_odd = [](const Int& value) { return (value << 31) < Int(0); };
         const auto is_nearest = is_at(nearest);
-        const auto is_moving_beside = marks(RangeImage::kMoving);
-        const auto is_moving = marks(RangeImage::kMoving << 16);
+        static_assert(RangeImage::kMoving == 1);
+        const auto is_moving_beside = is_odd(both);
+        const auto is_moving = is_odd(both >> 16);
         const auto free = inside & (around - range > tolerance) & ~(is_nearest & is_moving_beside);
         const auto hit =
             inside & ~free & ((is_nearest & ~is_moving_beside) | (is_at(around) & ~is_moving));

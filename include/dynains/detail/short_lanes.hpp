@@ -81,13 +81,23 @@ struct NarrowShort {
   }
 };
 
+using WideShorts = std::int16_t __attribute__((vector_size(32)));
+
+#if defined(__x86_64__) && defined(__SSE2__) && !defined(__clang__)
+[[gnu::target("avx2")]] inline void spread(std::int16_t n, WideShorts& to) {
+  to = WideShorts{} + n;
+}
+#else
+inline void spread(std::int16_t n, WideShorts& to) { to = WideShorts{} + n; }
+#endif
+
 struct WideShort {
-  using Vector = std::int16_t __attribute__((vector_size(32)));
+  using Vector = WideShorts;
   Vector v;
 
   WideShort() = default;
   explicit WideShort(const Vector& vector) : v(vector) {}
-  explicit WideShort(std::int16_t n) : v{n, n, n, n, n, n, n, n, n, n, n, n, n, n, n, n} {}
+  explicit WideShort(std::int16_t n) { spread(n, v); }
 
   static WideShort load(const std::int16_t* from) {
     WideShort result;

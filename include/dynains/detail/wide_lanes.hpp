@@ -25,6 +25,8 @@ using WideFloats = float __attribute__((vector_size(32)));
   return static_cast<unsigned>(__builtin_ia32_movmskps256(WideFloats(of)));
 }
 [[gnu::target("avx2")]] inline void take_root(WideFloats& of) { of = __builtin_ia32_sqrtps256(of); }
+// Elsewhere, GCC puts equal numbers together one by one.
+[[gnu::target("avx2")]] inline void spread(std::int32_t n, WideInts& to) { to = WideInts{} + n; }
 #else
 inline unsigned sign_bits(const WideInts& of) {
   Mask8 halves;
@@ -38,6 +40,7 @@ inline void take_root(WideFloats& of) {
   shuffle<4, 5, 6, 7>(of, of, high);
   shuffle<0, 1, 2, 3, 4, 5, 6, 7>(sqrt(low), sqrt(high), of);
 }
+inline void spread(std::int32_t n, WideInts& to) { to = WideInts{} + n; }
 #endif
 
 struct WideMask8 {
@@ -59,8 +62,7 @@ struct WideInt8 {
 
   WideInt8() = default;
   explicit WideInt8(const Vector& vector) : v(vector) {}
-  // A sum, because GCC puts a list together number by number.
-  explicit WideInt8(std::int32_t n) : v(Vector{} + n) {}
+  explicit WideInt8(std::int32_t n) { spread(n, v); }
 
   static WideInt8 load(const std::int32_t* from) {
     WideInt8 result;
