@@ -78,15 +78,18 @@ class FreeSpaceEvidence {
   void keep(std::size_t scans) { records_.resize(std::max(records_.size(), scans + 2)); }
 
   /// Gets the memory of images for that many scans of the sensor that adapt() was told, and of what
-  /// else is kept of scans if one was observed already; or for as many as are ever kept.
+  /// else is kept of scans if one was observed already; or for as many as are ever kept. What was
+  /// observed is lost: to be called before scan 0, or before it comes again.
   void reserve(std::size_t scans) {
     views_.reserve(scans);
     const auto largest = std::max_element(
         records_.begin(), records_.end(),
         [](const Record& a, const Record& b) { return a.samples.size() < b.samples.size(); });
-    for (std::size_t i = 0; i < std::min(scans, records_.size()); ++i) {
-      if (records_[i].samples.size() < largest->samples.size()) records_[i] = *largest;
-    }
+    // A copy has room for what it holds and no more, and scans of one sensor differ a little.
+    Record roomy = *largest;
+    std::vector<std::uint32_t>& by_point = roomy.samples.met_of;
+    by_point.resize(by_point.size() + by_point.size() / 8);
+    for (std::size_t i = 0; i < std::min(scans, records_.size()); ++i) records_[i] = roomy;
   }
 
   /// Takes scan number `scan` in: scans come in order, from 0. `instance_of` holds the instance of

@@ -55,7 +55,9 @@ class ReferenceViews {
   /// Gets the memory of the images of that many scans, or of as many as are ever kept.
   void reserve(std::size_t scans) {
     const std::size_t images = grid_.rows > 0 ? std::min(scans / step_ + 1, views_.size()) : 0;
-    for (std::size_t i = 0; i < images; ++i) views_[i].image.reserve(grid_);
+    for (std::size_t i = 1; i <= images; ++i) {
+      views_[(images_ + i) % views_.size()].image.reserve(grid_);
+    }
   }
 
   void forget() {
