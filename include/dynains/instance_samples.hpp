@@ -194,33 +194,48 @@ class InstanceSampler {
     out.met[0] = kNoCluster;
     out.place.resize(supervoxel_count);
     out.instance_of.resize(supervoxel_count);
-    out.sample_begin.assign(supervoxel_count + 1, 0);
+    detail::grow(ordered_, supervoxel_count);
     for (std::size_t met = 1; met <= supervoxel_count; ++met) {
       const Supervoxel& supervoxel = supervoxels_[met];
       const auto instance = static_cast<std::uint32_t>(supervoxel.instance);
       const std::uint32_t to = next_[instance]++;
       out.met[met] = to;
-      out.sample_begin[to + 1] = static_cast<std::uint32_t>(samples_.count(met));
       out.place[to] = place_of(supervoxel);
       out.instance_of[to] = instance;
+      ordered_[to] = static_cast<std::uint32_t>(met);
     }
-    for (std::size_t s = 1; s <= supervoxel_count; ++s) {
-      out.sample_begin[s] += out.sample_begin[s - 1];
-    }
-    const std::size_t sample_count = out.sample_begin.back();
-    out.points.grow(sample_count + detail::kLanes);
-    out.supervoxel_of.resize(sample_count);
-    for (std::size_t met = 1; met <= supervoxel_count; ++met) {
-      const std::uint32_t supervoxel = out.met[met];
-      const std::uint32_t first = out.sample_begin[supervoxel];
-      for (std::uint32_t to = first; to < out.sample_begin[supervoxel + 1]; ++to) {
-        const std::size_t i = samples_.number(met, to - first);
-        out.supervoxel_of[to] = supervoxel;
-        out.points.x[to] = points.x[i];
-        out.points.y[to] = points.y[i];
-        out.points.z[to] = points.z[i];
+    copy_samples(points, supervoxel_count, out);
+  }
+
+  // As many of each supervoxel as it may have, with no branch on how many it has: what is too much
+  // is written over by the next one.
+  void copy_samples(PointsView points, std::size_t supervoxel_count, InstanceSamples& out) {
+    const std::size_t most = samples_.most();
+    const std::size_t room =
+        std::min(supervoxel_count * most, points.size() + most) + detail::kLanes;
+    out.points.grow(room);
+    detail::make_room(out.supervoxel_of, room);
+    out.supervoxel_of.resize(room);
+    out.sample_begin.resize(supervoxel_count + 1);
+    float* const x = out.points.x.data();
+    float* const y = out.points.y.data();
+    float* const z = out.points.z.data();
+    std::uint32_t* const supervoxel_of = out.supervoxel_of.data();
+    std::size_t to = 0;
+    for (std::size_t s = 0; s < supervoxel_count; ++s) {
+      out.sample_begin[s] = static_cast<std::uint32_t>(to);
+      const std::uint32_t met = ordered_[s];
+      for (std::size_t k = 0; k < most; ++k) {
+        const std::size_t i = samples_.number(met, k);
+        x[to + k] = points.x[i];
+        y[to + k] = points.y[i];
+        z[to + k] = points.z[i];
+        supervoxel_of[to + k] = static_cast<std::uint32_t>(s);
       }
+      to += samples_.count(met);
     }
+    out.sample_begin[supervoxel_count] = static_cast<std::uint32_t>(to);
+    out.supervoxel_of.resize(to);
   }
 
   float supervoxels_per_metre_;
@@ -232,6 +247,7 @@ class InstanceSampler {
   detail::LeastRanks samples_;           // by supervoxel
   std::vector<Supervoxel> supervoxels_;  // longer than what is in use
   std::vector<std::uint32_t> next_;
+  std::vector<std::uint32_t> ordered_;  // as they were met, by instance; longer than what is in use
 };
 
 }  // namespace dynains

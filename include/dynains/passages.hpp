@@ -80,7 +80,7 @@ class Passages {
   static constexpr std::uint16_t kMostCounted = 1000;  // beyond, what is older counts half
   static constexpr std::uint16_t kLeastMoved = 3;      // samples
   static constexpr std::uint32_t kPart = 4;            // one of so many samples in a passage
-  static constexpr std::size_t kAhead = 16;            // samples whose cells are asked for
+  static constexpr std::size_t kAhead = 32;            // samples whose cells are asked for
 
   // What is presumed was not seen to move.
   static Count count_of(Cause cause) {

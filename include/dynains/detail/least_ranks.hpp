@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <limits>
 #include <vector>
 
 #include "dynains/detail/shuffle.hpp"
@@ -45,14 +44,17 @@ class LeastRanks {
     }
   }
 
+  /// How many numbers a row has at most.
+  std::size_t most() const { return most_; }
+
   /// How many numbers the row has.
   std::size_t count(std::size_t row) const {
     std::size_t count = 0;
-    while (count < most_ && key(row, count) < kNone) ++count;
+    for (std::size_t k = 0; k < most_; ++k) count += key(row, k) < kNone ? 1 : 0;
     return count;
   }
 
-  /// The k-th number of a row, below its count.
+  /// The k-th number of a row; 0 if there are not so many.
   std::uint32_t number(std::size_t row, std::size_t k) const {
     const double wanted = key(row, k);
     std::uint64_t bits;
@@ -62,7 +64,7 @@ class LeastRanks {
 
  private:
   using Pair = double __attribute__((vector_size(16)));
-  static constexpr double kNone = std::numeric_limits<double>::max();
+  static constexpr double kNone = 2.0;  // above all keys, and zeros where a number would be
   static constexpr Pair kEmpty = {kNone, kNone};
 
   // Doubles, since baseline x86-64 finds the lesser of no other numbers of 64 bits. The rank, but
