@@ -44,7 +44,7 @@ struct InstanceSamples {
   std::vector<std::uint32_t> sample_begin;      ///< by supervoxel, one more than supervoxels
   std::vector<SupervoxelPlace> place;           ///< by supervoxel
   std::vector<std::uint32_t> supervoxel_begin;  ///< by instance, one more than instances
-  std::vector<std::uint32_t> supervoxel_of;     ///< by sample
+  std::vector<std::uint32_t> supervoxel_of;     ///< by sample; longer than there are any
   std::vector<std::uint32_t> instance_of;       ///< by supervoxel
   std::vector<std::uint32_t> met_of;  ///< by point of the scan: its supervoxel's position in `met`
   std::vector<std::uint32_t> met;     ///< supervoxels as the scan meets them, behind one for none
@@ -224,8 +224,7 @@ class InstanceSampler {
     const std::size_t room =
         std::min(supervoxel_count * most, points.size() + most) + detail::kLanes;
     out.points.grow(room);
-    detail::make_room(out.supervoxel_of, room);
-    out.supervoxel_of.resize(room);
+    detail::grow(out.supervoxel_of, room);
     out.sample_begin.resize(supervoxel_count + 1);
     float* const x = out.points.x.data();
     float* const y = out.points.y.data();
@@ -245,7 +244,6 @@ class InstanceSampler {
       to += samples_.count(met);
     }
     out.sample_begin[supervoxel_count] = static_cast<std::uint32_t>(to);
-    out.supervoxel_of.resize(to);
   }
 
   float supervoxels_per_metre_;
