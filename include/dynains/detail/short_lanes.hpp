@@ -81,18 +81,8 @@ struct NarrowShort {
   }
 };
 
-using WideShorts = std::int16_t __attribute__((vector_size(32)));
-
-#if defined(__x86_64__) && defined(__SSE2__) && !defined(__clang__)
-[[gnu::target("avx2")]] inline void spread(std::int16_t n, WideShorts& to) {
-  to = WideShorts{} + n;
-}
-#else
-inline void spread(std::int16_t n, WideShorts& to) { to = WideShorts{} + n; }
-#endif
-
 struct WideShort {
-  using Vector = WideShorts;
+  using Vector = std::int16_t __attribute__((vector_size(32)));
   Vector v;
 
   WideShort() = default;

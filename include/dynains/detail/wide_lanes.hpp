@@ -26,7 +26,10 @@ using WideFloats = float __attribute__((vector_size(32)));
 }
 [[gnu::target("avx2")]] inline void take_root(WideFloats& of) { of = __builtin_ia32_sqrtps256(of); }
 // Elsewhere, GCC puts equal numbers together one by one.
-[[gnu::target("avx2")]] inline void spread(std::int32_t n, WideInts& to) { to = WideInts{} + n; }
+template <class Number, class Vector>
+[[gnu::target("avx2")]] void spread(Number n, Vector& to) {
+  to = Vector{} + n;
+}
 #else
 inline unsigned sign_bits(const WideInts& of) {
   Mask8 halves;
@@ -40,7 +43,10 @@ inline void take_root(WideFloats& of) {
   shuffle<4, 5, 6, 7>(of, of, high);
   shuffle<0, 1, 2, 3, 4, 5, 6, 7>(sqrt(low), sqrt(high), of);
 }
-inline void spread(std::int32_t n, WideInts& to) { to = WideInts{} + n; }
+template <class Number, class Vector>
+void spread(Number n, Vector& to) {
+  to = Vector{} + n;
+}
 #endif
 
 struct WideMask8 {
