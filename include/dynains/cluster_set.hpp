@@ -2,12 +2,15 @@
 // time stamp of Eq. 4. Points stay where they are; what is ordered are ranges of them.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "dynains/curved_voxel_clusterer.hpp"
-#include "dynains/detail/lanes.hpp"
+#include "dynains/detail/bits.hpp"
+#include "dynains/detail/room.hpp"
+#include "dynains/detail/wide_lanes.hpp"
 #include "dynains/points.hpp"
 #include "dynains/polar_points.hpp"
 
@@ -80,20 +83,35 @@ class ClusterSet {
 
  private:
   void find_streaks(Span<const std::uint32_t> scan_begin, Span<const std::uint32_t> cluster_of) {
-    streaks_.clear();
+    streak_count_ = 0;
     first_streak_.clear();
-    for (std::size_t k = 0; k < scan_count_; ++k) {
-      first_streak_.push_back(streaks_.size());
-      const std::uint32_t end = scan_begin[k + 1];
-      const std::uint32_t first = scan_begin[k];
-      std::uint32_t begin = first;
-      detail::for_each_change(cluster_of.data() + begin, end - begin, [&](std::size_t length) {
-        const auto next = begin + static_cast<std::uint32_t>(length);
-        streaks_.push_back({begin - first, next - first, cluster_of[begin]});
-        begin = next;
-      });
+    detail::run_most_lanes([&](auto lanes) {
+      for (std::size_t k = 0; k < scan_count_; ++k) {
+        first_streak_.push_back(streak_count_);
+        cut<decltype(lanes)>(cluster_of.subspan(scan_begin[k], scan_begin[k + 1] - scan_begin[k]));
+      }
+    });
+    first_streak_.push_back(streak_count_);
+  }
+
+  // One scan, 64 points at a time.
+  template <class Lanes>
+  void cut(Span<const std::uint32_t> cluster_of) {
+    constexpr std::size_t kWord = 64;
+    std::size_t begin = 0;
+    const auto end_at = [&](std::size_t end) {
+      streaks_[streak_count_++] = {static_cast<std::uint32_t>(begin),
+                                   static_cast<std::uint32_t>(end), cluster_of[begin]};
+      begin = end;
+    };
+    for (std::size_t i = 1; i < cluster_of.size(); i += kWord) {
+      detail::grow(streaks_, streak_count_ + kWord + 1);
+      const std::uint64_t changes = detail::find_changes<Lanes>(
+          cluster_of.data() + i, std::min(kWord, cluster_of.size() - i));
+      detail::for_each_bit(changes, [&](std::size_t at) { end_at(i + at); });
     }
-    first_streak_.push_back(streaks_.size());
+    detail::grow(streaks_, streak_count_ + 1);
+    if (!cluster_of.empty()) end_at(cluster_of.size());
   }
 
   // Slot of (cluster, scan): counts first, which then turn into beginnings. Behind the slots of
@@ -135,7 +153,8 @@ class ClusterSet {
   PolarView window_;
   std::size_t scan_count_ = 0;
   std::size_t cluster_count_ = 0;
-  std::vector<Streak> streaks_;
+  std::size_t streak_count_ = 0;
+  std::vector<Streak> streaks_;            // may be more
   std::vector<std::size_t> first_streak_;  // by scan
   std::vector<std::uint32_t> begin_;       // range, by slot
   std::vector<std::uint32_t> next_;

@@ -144,27 +144,27 @@ class CurvedVoxelClusterer {
   // a column behind the last range. Rows have a power of two of cells: a shift is cheaper than a
   // product.
   void find_cells(PolarView points) {
-    using detail::Constant8;
+    using detail::LaneConstant;
     const std::size_t count = points.size();
-    detail::grow(of_points_, count + detail::kLanes);
+    detail::grow(of_points_, count + detail::kMostLanes);
     constexpr double kRadians = M_PI / 180.0;
-    const Constant8 azimuth_scale(static_cast<float>(azimuths_ / (2.0 * M_PI)));
-    const Constant8 elevation_scale(
+    const LaneConstant azimuth_scale(static_cast<float>(azimuths_ / (2.0 * M_PI)));
+    const LaneConstant elevation_scale(
         static_cast<float>(1.0 / (resolved_.voxel_elevation * kRadians)));
-    const Constant8 range_scale(static_cast<float>(1.0 / config_.voxel_range));
-    const Constant8 far(static_cast<float>(config_.cluster_range));
-    const Constant8 pi(detail::kPi);
-    const Constant8 half_pi(0.5F * detail::kPi);
-    const Constant8 last_azimuth(static_cast<float>(azimuths_ - 1));
-    const Constant8 last_elevation(static_cast<float>(elevations_ - 1));
-    const Constant8 last_range(static_cast<float>(ranges_ - 1));
-    const Constant8 beyond(static_cast<float>(ranges_));
-    const Constant8 columns(static_cast<float>(ranges_ + 1));
+    const LaneConstant range_scale(static_cast<float>(1.0 / config_.voxel_range));
+    const LaneConstant far(static_cast<float>(config_.cluster_range));
+    const LaneConstant pi(detail::kPi);
+    const LaneConstant half_pi(0.5F * detail::kPi);
+    const LaneConstant last_azimuth(static_cast<float>(azimuths_ - 1));
+    const LaneConstant last_elevation(static_cast<float>(elevations_ - 1));
+    const LaneConstant last_range(static_cast<float>(ranges_ - 1));
+    const LaneConstant beyond(static_cast<float>(ranges_));
+    const LaneConstant columns(static_cast<float>(ranges_ + 1));
     const int row_shift = row_shift_;
     auto* const cells = reinterpret_cast<std::int32_t*>(of_points_.data());
-    const Constant8 above_all(static_cast<float>(elevations_));
-    const Constant8 below_all(-1.0F);
-    detail::run_lanes([&](auto lanes) {
+    const LaneConstant above_all(static_cast<float>(elevations_));
+    const LaneConstant below_all(-1.0F);
+    detail::run_most_lanes([&](auto lanes) {
       using Lanes = decltype(lanes);
       using Float = typename Lanes::Float;
       using Int = typename Lanes::Int;

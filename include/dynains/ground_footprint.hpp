@@ -104,7 +104,7 @@ class GroundFootprint {
       using Float = typename Lanes::Float;
       for (std::size_t b = 0; b < boxes.size(); ++b) {
         const PointsView block = block_of(points, b * kBlock);
-        const detail::Constant8 first_x(block.x[0]), first_y(block.y[0]);
+        const detail::LaneConstant first_x(block.x[0]), first_y(block.y[0]);
         Float x_min = first_x, x_max = first_x, y_min = first_y, y_max = first_y;
         detail::for_places<Lanes>(block.size(), [&](const auto& at) {
           const Float x = at.there(at.load(block.x.data()), first_x);
@@ -216,10 +216,10 @@ class GroundFootprint {
     /// Rows or columns of eight points; what lies outside falls into the border.
     template <class Float>
     auto line(const Float& coordinate) const {
-      static constexpr detail::Constant8 kZero(0.0F);
-      const Float centre(detail::Constant8(static_cast<float>(half_)));
-      const Float last(detail::Constant8(static_cast<float>(width() - 1)));
-      const Float per_metre = detail::Constant8(per_metre_);
+      static constexpr detail::LaneConstant kZero(0.0F);
+      const Float centre(detail::LaneConstant(static_cast<float>(half_)));
+      const Float last(detail::LaneConstant(static_cast<float>(width() - 1)));
+      const Float per_metre = detail::LaneConstant(per_metre_);
       return truncate(min(max(coordinate * per_metre + centre, Float(kZero)), last));
     }
     /// The same of one point.
@@ -232,7 +232,7 @@ class GroundFootprint {
     template <class Float>
     auto indices(const Float& x, const Float& y) const {
       // Exact in floats: coarse grids have fewer than 2^24 cells.
-      const Float cells(detail::Constant8(static_cast<float>(width())));
+      const Float cells(detail::LaneConstant(static_cast<float>(width())));
       return truncate(to_float(line(y)) * cells + to_float(line(x)));
     }
     /// Of a row or column, in cells from the sensor.
@@ -329,7 +329,7 @@ class GroundFootprint {
   std::uint64_t find_under(PointsView block, const Clearance& clearance) const {
     const Located located = locate(block);
     float top[kBlock];
-    const detail::Constant8 least(clearance.least), slope(clearance.slope);
+    const detail::LaneConstant least(clearance.least), slope(clearance.slope);
     detail::for_lanes(block.size(), [&](auto at) {
       using Float = typename decltype(at)::Float;
       const Float x = at.load(block.x.data());

@@ -10,9 +10,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "dynains/detail/arc_tangent.hpp"
+#include "dynains/detail/bits.hpp"
 #include "dynains/detail/half_space.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/lowest_mean.hpp"
@@ -90,13 +92,13 @@ class GroundSegmenter {
   /// Order within `split` is by patch, then as scanned; but where a patch turned out not to be
   /// ground, the last of the ground take its place.
   void segment(PointsView scan, Span<const std::uint32_t> input, GroundSplit& split) {
-    detail::grow(patch_of_, scan.size() + detail::kLanes);
+    detail::grow(patch_of_, scan.size() + detail::kMostLanes);
     find_patches(scan);
     sorted_.sort(scan, input.data(), patch_of_.data());
     sample_.reserve(std::min(scan.size(), static_cast<std::size_t>(config_.ground_fit_points)));
     heights_.clear();
     split.resize(scan.size());
-    detail::run_lanes([&](auto lanes) {
+    detail::run_most_lanes([&](auto lanes) {
       using Lanes = decltype(lanes);
       Output<Lanes> out(split);
       // By patch: where its ground begins in the split, and how many points are left of it.
@@ -141,14 +143,14 @@ class GroundSegmenter {
 
     std::size_t count() const { return count_; }
 
-    // The first of eight points.
-    void put(const Columns& eight, std::size_t count) {
-      store(eight, count_);
+    // The first ones of as many points as there are lanes.
+    void put(const Columns& points, std::size_t count) {
+      store(points, count_);
       count_ += count;
     }
 
     void put(const detail::PointRecord* from, std::size_t count) {
-      for (std::size_t i = 0; i < count; i += detail::kLanes) {
+      for (std::size_t i = 0; i < count; i += Lanes::kCount) {
         store(detail::load_columns<Lanes>(from + i), count_ + i);
       }
       count_ += count;
@@ -168,11 +170,11 @@ class GroundSegmenter {
     }
 
    private:
-    void store(const Columns& eight, std::size_t at) {
-      eight[0].store(x_ + at);
-      eight[1].store(y_ + at);
-      eight[2].store(z_ + at);
-      eight[3].store(reinterpret_cast<float*>(input_) + at);
+    void store(const Columns& points, std::size_t at) {
+      points[0].store(x_ + at);
+      points[1].store(y_ + at);
+      points[2].store(z_ + at);
+      points[3].store(reinterpret_cast<float*>(input_) + at);
     }
 
     std::size_t count_ = 0;
@@ -183,12 +185,12 @@ class GroundSegmenter {
   };
 
   void find_patches(PointsView scan) {
-    detail::run_lanes([&](auto lanes) {
+    detail::run_most_lanes([&](auto lanes) {
       using Lanes = decltype(lanes);
       using Float = typename Lanes::Float;
       using Int = typename Lanes::Int;
       // Read once: the compiler cannot know that stores leave members alone.
-      using detail::Constant8;
+      using detail::LaneConstant;
       const auto of_zone = [&](float Zone::*constant) {
         return detail::ZoneTable(
             {zones_[0].*constant, zones_[1].*constant, zones_[2].*constant, zones_[3].*constant});
@@ -199,12 +201,12 @@ class GroundSegmenter {
       const detail::ZoneTable first_patch = of_zone(&Zone::first_patch);
       const detail::ZoneTable last_ring = of_zone(&Zone::last_ring);
       const detail::ZoneTable sector_count = of_zone(&Zone::sectors);
-      const std::array<Constant8, kZones - 1> edges = {zones_[1].inner, zones_[2].inner,
-                                                       zones_[3].inner};
-      const Constant8 nearest(static_cast<float>(config_.ground_min_range));
-      const Constant8 farthest(static_cast<float>(config_.ground_max_range));
-      const Constant8 pi(detail::kPi);
-      const Constant8 one(1.0F);
+      const std::array<LaneConstant, kZones - 1> edges = {zones_[1].inner, zones_[2].inner,
+                                                          zones_[3].inner};
+      const LaneConstant nearest(static_cast<float>(config_.ground_min_range));
+      const LaneConstant farthest(static_cast<float>(config_.ground_max_range));
+      const LaneConstant pi(detail::kPi);
+      const LaneConstant one(1.0F);
       const float* const xs = scan.x.data();
       const float* const ys = scan.y.data();
       std::int32_t* const patches = patch_of_.data();
@@ -251,42 +253,48 @@ class GroundSegmenter {
   std::size_t segment_patch(std::size_t patch, detail::PointRecord* records, std::size_t count,
                             Output<Lanes>& ground) {
     if (count < static_cast<std::size_t>(config_.ground_min_points)) return count;
-    sample_.take<Lanes>(records, count, static_cast<std::size_t>(config_.ground_fit_points));
-    detail::LowestMean<GroundConfig::kMaxLowest, Lanes> lowest(
-        static_cast<std::size_t>(config_.ground_lowest_points));
-    const float seed_height = lowest.of(sample_.heights(), sample_.size(), floor_of(patch));
-    detail::HalfSpace below(records->x, records->y, seed_height,
-                            static_cast<float>(config_.ground_seed_margin));
-    if (!fit_ground<Lanes>(patch, seed_height, below)) return count;
+    const std::optional<detail::HalfSpace> ground_below = find_ground(patch, records, count);
+    if (!ground_below) return count;
+    const detail::HalfSpace& below = *ground_below;
 
     std::size_t rest = 0;
-    for (std::size_t i = 0; i < count; i += detail::kLanes) {
-      const std::size_t length = std::min(detail::kLanes, count - i);
+    for (std::size_t i = 0; i < count; i += Lanes::kCount) {
+      const std::size_t length = std::min(Lanes::kCount, count - i);
       const unsigned all = (1U << length) - 1U;
-      const auto eight = detail::load_columns<Lanes>(records + i);
-      const std::array<typename Lanes::Float, 3> local = {eight[0] - below.x0, eight[1] - below.y0,
-                                                          eight[2] - below.z0};
+      const auto points = detail::load_columns<Lanes>(records + i);
+      const std::array<typename Lanes::Float, 3> local = {
+          points[0] - below.x0, points[1] - below.y0, points[2] - below.z0};
       const unsigned bits = below.contains(local).bits() & all;
       if (bits == all) {
-        ground.put(eight, length);
+        ground.put(points, length);
       } else if (bits == 0) {
         detail::move_to_front(records + i, length, records + rest);
         rest += length;
       } else {
-        // Written to both places, since no branch could foretell the right one.
-        detail::PointRecord found[detail::kLanes] = {};
-        std::size_t found_count = 0;
-        for (std::size_t k = 0; k < length; ++k) {
-          const unsigned bit = (bits >> k) & 1U;
-          detail::copy_record(records + i + k, found + found_count);
-          detail::copy_record(records + i + k, records + rest);
-          found_count += bit;
-          rest += 1U - bit;
-        }
-        ground.put(detail::load_columns<Lanes>(found), found_count);
+        ground.put(detail::pick<Lanes>(records + i, bits, points), detail::count_ones(bits));
+        rest += detail::move_some_to_front<Lanes>(records + i, length, ~bits, records + rest);
       }
     }
     return rest;
+  }
+
+  // Where the ground of a patch lies, if it has any. A function of its own: within one for sixteen
+  // lanes, the compiler may contract products and sums of single numbers if nobody forbids it.
+  [[gnu::noinline]] std::optional<detail::HalfSpace> find_ground(std::size_t patch,
+                                                                 const detail::PointRecord* records,
+                                                                 std::size_t count) {
+    std::optional<detail::HalfSpace> result;
+    detail::run_lanes([&](auto lanes) {
+      using Lanes = decltype(lanes);
+      sample_.take<Lanes>(records, count, static_cast<std::size_t>(config_.ground_fit_points));
+      detail::LowestMean<GroundConfig::kMaxLowest, Lanes> lowest(
+          static_cast<std::size_t>(config_.ground_lowest_points));
+      const float seed_height = lowest.of(sample_.heights(), sample_.size(), floor_of(patch));
+      detail::HalfSpace below(records->x, records->y, seed_height,
+                              static_cast<float>(config_.ground_seed_margin));
+      if (fit_ground<Lanes>(patch, seed_height, below)) result = below;
+    });
+    return result;
   }
 
   // Height below which points of the patch are noise.

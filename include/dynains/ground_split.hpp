@@ -25,7 +25,7 @@ struct GroundSplit {
   }
   void resize(std::size_t size) {
     count = size;
-    const std::size_t padded = size + detail::kLanes;
+    const std::size_t padded = size + detail::kMostLanes;
     points.grow(padded);
     detail::grow(input, padded);
   }

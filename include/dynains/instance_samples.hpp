@@ -76,7 +76,7 @@ class InstanceSampler {
   /// first does.
   std::uint64_t find_changes(PointsView points) const {
     using namespace detail;
-    const Constant8 per_metre(supervoxels_per_metre_);
+    const LaneConstant per_metre(supervoxels_per_metre_);
     std::array<std::array<std::int32_t, kBlock + kLanes>, 3> voxel;
     std::uint64_t changes = 0;
     run_lanes([&](auto lanes) {
@@ -131,8 +131,8 @@ class InstanceSampler {
   // The supervoxel of each point, and its rank there.
   void find_supervoxels(PointsView points, const std::uint32_t* instance_of) {
     using namespace detail;
-    const Constant8 per_metre(supervoxels_per_metre_), far_squared(max_range_ * max_range_);
-    static constexpr Constant8 kPlaces(kPlacesPerMetre);
+    const LaneConstant per_metre(supervoxels_per_metre_), far_squared(max_range_ * max_range_);
+    static constexpr LaneConstant kPlaces(kPlacesPerMetre);
     for_lanes(points.size(), [&](auto at) {
       using Float = typename decltype(at)::Float;
       using Int = typename decltype(at)::Int;
@@ -222,7 +222,7 @@ class InstanceSampler {
   void copy_samples(PointsView points, std::size_t supervoxel_count, InstanceSamples& out) {
     const std::size_t most = samples_.most();
     const std::size_t room =
-        std::min(supervoxel_count * most, points.size() + most) + detail::kLanes;
+        std::min(supervoxel_count * most, points.size() + most) + detail::kMostLanes;
     out.points.grow(room);
     detail::grow(out.supervoxel_of, room);
     out.sample_begin.resize(supervoxel_count + 1);

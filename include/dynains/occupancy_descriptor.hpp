@@ -136,14 +136,14 @@ class OccupancyDescriptor {
 
  private:
   void lay_grid() {
-    using detail::Constant8;
+    using detail::LaneConstant;
     const PolarView& points = cluster_.window;
     // In the place of those that are missing from the last eight, the first point changes no
     // extent.
     const std::size_t first = cluster_.ranges[0].begin;
-    const Constant8 first_range(points.range[first]), first_azimuth(points.azimuth[first]);
-    const Constant8 first_z(points.z[first]), first_turned(turned(points.azimuth[first]));
-    const Constant8 zero(0.0F), turn(2.0F * detail::kPi);
+    const LaneConstant first_range(points.range[first]), first_azimuth(points.azimuth[first]);
+    const LaneConstant first_z(points.z[first]), first_turned(turned(points.azimuth[first]));
+    const LaneConstant zero(0.0F), turn(2.0F * detail::kPi);
     // Extents for the seam at +-pi and for the seam at 0: the smaller of the two is the smallest
     // arc if it is at most half a turn.
     float range_max = 0.0F, low = 0.0F, high = 0.0F, low_turned = 0.0F, high_turned = 0.0F;
@@ -249,15 +249,15 @@ class OccupancyDescriptor {
     const std::size_t cells = cell_count();
     float* const heights = heights_.data() + k * cells;
     std::fill(heights, heights + cells, 0.0F);
-    using detail::Constant8;
+    using detail::LaneConstant;
     const PolarView points = cluster_.window;
     // Read once: the compiler cannot know that stores leave members alone.
-    const Constant8 range_min(range_min_), azimuth_min(azimuth_min_), z_min(z_min_);
-    const Constant8 cells_per_metre(cells_per_metre_), cells_per_radian(cells_per_radian_);
-    const Constant8 zero(0.0F), just_below(-detail::kPi * 1e-4F), turn(2.0F * detail::kPi);
+    const LaneConstant range_min(range_min_), azimuth_min(azimuth_min_), z_min(z_min_);
+    const LaneConstant cells_per_metre(cells_per_metre_), cells_per_radian(cells_per_radian_);
+    const LaneConstant zero(0.0F), just_below(-detail::kPi * 1e-4F), turn(2.0F * detail::kPi);
     const auto row = static_cast<std::int32_t>(azimuth_cells_);
-    const Constant8 last_radial(static_cast<float>(radial_cells_ - 1));
-    const Constant8 last_azimuth(static_cast<float>(azimuth_cells_ - 1));
+    const LaneConstant last_radial(static_cast<float>(radial_cells_ - 1));
+    const LaneConstant last_azimuth(static_cast<float>(azimuth_cells_ - 1));
     const auto raise = [&](auto at) {
       using Float = typename decltype(at)::Float;
       const Float radial = (at.load(points.range.data()) - range_min) * cells_per_metre;

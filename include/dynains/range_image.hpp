@@ -103,7 +103,7 @@ class RangeImage {
                       Span<const std::uint8_t> moving, std::int16_t* nearest) {
     constexpr std::size_t kBlock = 128;
     const ImageLocator locator(grid);
-    static constexpr detail::Constant8 kMost(kFarthest), kScale(kCentimetres);
+    static constexpr detail::LaneConstant kMost(kFarthest), kScale(kCentimetres);
     detail::run_lanes([&](auto lanes) {
       using Lanes = decltype(lanes);
       using Float = typename Lanes::Float;

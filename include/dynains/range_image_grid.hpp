@@ -65,17 +65,17 @@ struct RangeImageGrid {
   std::size_t cell_count() const { return static_cast<std::size_t>(rows) * stride(); }
 
  private:
-  static constexpr detail::Constant8 kLevel[] = {0.9832868F, 0.2594117F};
+  static constexpr detail::LaneConstant kLevel[] = {0.9832868F, 0.2594117F};
 };
 
 /// Angle of (x, y) in [-pi, pi] within 1e-4 rad, for cells that are much wider; NaN for the origin.
 template <class Float>
 Float coarse_azimuth(const Float& x, const Float& y) {
-  using detail::Constant8;
+  using detail::LaneConstant;
   // atan2(|y|, |x|) = pi/4 + atan(t); minimax fit of atan(t) / t in t^2 over [-1, 1].
-  static constexpr Constant8 kFit[] = {-3.898647e-02F, 1.462644e-01F, -3.211750e-01F,
-                                       9.992138e-01F};
-  static constexpr Constant8 kQuarter(0.5F * detail::kPi), kEighth(0.25F * detail::kPi);
+  static constexpr LaneConstant kFit[] = {-3.898647e-02F, 1.462644e-01F, -3.211750e-01F,
+                                          9.992138e-01F};
+  static constexpr LaneConstant kQuarter(0.5F * detail::kPi), kEighth(0.25F * detail::kPi);
   const Float ax = abs(x);
   const Float ay = abs(y);
   const Float t = (ay - ax) / (ay + ax);
@@ -103,7 +103,7 @@ struct ImageLocator {
                              const typename Lanes::Float& z,
                              const typename Lanes::Float& range) const {
     using Float = typename Lanes::Float;
-    static constexpr detail::Constant8 kZero(0.0F), kHalfTurn(detail::kPi),
+    static constexpr detail::LaneConstant kZero(0.0F), kHalfTurn(detail::kPi),
         kBorder(static_cast<float>(detail::kLanes));
     const Float row = (RangeImageGrid::level(z / range) - lowest) * rows_per_level;
     const Float column = (coarse_azimuth(x, y) + kHalfTurn) * columns_per_radian;
@@ -115,7 +115,7 @@ struct ImageLocator {
                             truncate(max(min(column, Float(last_column)), Float(kZero))));
   }
 
-  detail::Constant8 lowest, rows_per_level, rows, stride, columns_per_radian, last_column;
+  detail::LaneConstant lowest, rows_per_level, rows, stride, columns_per_radian, last_column;
 };
 
 }  // namespace dynains

@@ -48,16 +48,16 @@ struct SensorModel {
 };
 
 /// Estimates the sampling from one scan (sensor frame, finite coordinates); the height is that of a
-/// typical sensor, see estimate_mounting. Unknown if there are fewer than 500 points, or none beside
-/// another. Allocates; meant to be called once per sensor, not per scan.
+/// typical sensor, see estimate_mounting. Unknown if there are fewer than 500 points, or none
+/// beside another. Allocates; meant to be called once per sensor, not per scan.
 inline SensorModel estimate_sensor_model(PointsView points) {
   constexpr std::size_t kFewest = 500;
   SensorModel model;
   if (points.size() < kFewest) return model;
 
-  std::vector<float> azimuth(points.size() + detail::kLanes);
-  std::vector<float> elevation(points.size() + detail::kLanes);
-  static constexpr detail::Constant8 kDegrees(static_cast<float>(180.0 / M_PI));
+  std::vector<float> azimuth(points.size() + detail::kMostLanes);
+  std::vector<float> elevation(points.size() + detail::kMostLanes);
+  static constexpr detail::LaneConstant kDegrees(static_cast<float>(180.0 / M_PI));
   detail::for_lanes(points.size(), [&](auto at) {
     const auto x = at.load(points.x.data());
     const auto y = at.load(points.y.data());

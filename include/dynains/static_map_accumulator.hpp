@@ -78,7 +78,7 @@ class StaticMapAccumulator {
     Batch batch;
     for (std::size_t begin = 0; begin < points.size(); begin += kBatch) {
       const std::size_t count = std::min(kBatch, points.size() - begin);
-      locate(points.subview(begin, count), m, first, batch);
+      locate(points, begin, count, m, first, batch);
       choose(count, keep.empty() ? keep : keep.subspan(begin, count), batch);
       insert_chosen(batch);
     }
@@ -205,16 +205,17 @@ class StaticMapAccumulator {
   // without a walk through a bucket.
   static constexpr std::size_t kRecent = std::size_t{32} * 64 * 16;
 
-  // Some points of a scan on their way into the map. Where their voxels are begins at number 1, so
-  // that all have a predecessor.
+  // Some points of a scan on their way into the map. Where their voxels are begins at number
+  // kFirst, so that all have a predecessor.
   static constexpr std::size_t kBatch = 512;
   struct Batch {
-    static constexpr std::size_t kRoom = kBatch + detail::kLanes;
-    float point[3][kBatch];        // m, relative to the corner of the block
-    std::int32_t block[3][kRoom];  // in the world, counted in blocks
-    std::int32_t voxel[kRoom];     // in its block
-    std::int32_t recent[kBatch];   // place of the block among the recent ones
-    std::uint16_t chosen[kRoom];   // numbers of points that may be added
+    static constexpr std::size_t kFirst = detail::kMostLanes;
+    static constexpr std::size_t kRoom = kFirst + kBatch;
+    alignas(64) float point[3][kBatch];        // m, relative to the corner of the block
+    alignas(64) std::int32_t block[3][kRoom];  // in the world, counted in blocks
+    alignas(64) std::int32_t voxel[kRoom];     // in its block
+    alignas(64) std::int32_t recent[kBatch];   // place of the block among the recent ones
+    std::uint32_t chosen[kRoom];               // numbers of points that may be added
     std::size_t chosen_count;
   };
 
@@ -223,24 +224,28 @@ class StaticMapAccumulator {
 
   Eigen::Array3d block_size() const { return voxel_ * kBlockVoxels.cast<double>(); }
 
-  // `corner`: the block in which the frame of `m` begins.
-  void locate(PointsView points, const Eigen::Matrix<float, 3, 4>& m, const Index& corner,
-              Batch& batch) const {
-    using detail::Constant8;
-    const Constant8 scale(static_cast<float>(1.0 / voxel_));
+  // Of `count` points from `begin` on. `corner`: the block in which the frame of `m` begins.
+  void locate(PointsView scan, std::size_t begin, std::size_t count,
+              const Eigen::Matrix<float, 3, 4>& m, const Index& corner, Batch& batch) const {
+    using detail::LaneConstant;
+    const LaneConstant scale(static_cast<float>(1.0 / voxel_));
     const Eigen::Array3f block_size = this->block_size().cast<float>();
-    const Constant8 size[3] = {block_size.x(), block_size.y(), block_size.z()};
-    alignas(32) std::int32_t first[3][detail::kLanes];
-    std::fill_n(first[0], detail::kLanes, corner.x);
-    std::fill_n(first[1], detail::kLanes, corner.y);
-    std::fill_n(first[2], detail::kLanes, corner.z);
+    const LaneConstant size[3] = {block_size.x(), block_size.y(), block_size.z()};
+    alignas(64) std::int32_t first[3][detail::kMostLanes];
+    std::fill_n(first[0], detail::kMostLanes, corner.x);
+    std::fill_n(first[1], detail::kMostLanes, corner.y);
+    std::fill_n(first[2], detail::kMostLanes, corner.z);
     const detail::LaneTransform to_corner(m);
-    detail::for_lanes(points.size(), [&](auto at) {
+    const PointsView points = scan.subview(begin, count);
+    detail::for_lanes(count, [&](auto at) {
       using Float = typename decltype(at)::Float;
       using Int = typename decltype(at)::Int;
       const Float x = at.load(points.x.data());
       const Float y = at.load(points.y.data());
       const Float z = at.load(points.z.data());
+      // What the next batch needs has to come from far away.
+      const std::size_t ahead = std::min(begin + at.begin + kBatch, scan.size() - 1);
+      for (const auto& axis : {scan.x, scan.y, scan.z}) __builtin_prefetch(&axis[ahead]);
       Int voxel_in_block(0), recent(0);
       const auto add_axis = [&](auto axis, auto voxel_bits, auto recent_bits) {
         const Float value = to_corner(axis, x, y, z);
@@ -249,14 +254,14 @@ class StaticMapAccumulator {
         const Int block = voxel >> voxel_bits;
         const Int block_in_world = block + Int::load(first[axis]);
         (value - to_float(block) * size[axis]).store(&batch.point[axis][at.begin]);
-        block_in_world.store(&batch.block[axis][at.begin + 1]);
+        block_in_world.store(&batch.block[axis][Batch::kFirst + at.begin]);
         voxel_in_block = (voxel_in_block << voxel_bits) + (voxel & Int((1 << voxel_bits) - 1));
         recent = (recent << recent_bits) + (block_in_world & Int((1 << recent_bits) - 1));
       };
       add_axis(Constant<2>(), Constant<1>(), Constant<4>());
       add_axis(Constant<1>(), Constant<2>(), Constant<6>());
       add_axis(Constant<0>(), Constant<3>(), Constant<5>());
-      voxel_in_block.store(&batch.voxel[at.begin + 1]);
+      voxel_in_block.store(&batch.voxel[Batch::kFirst + at.begin]);
       recent.store(&batch.recent[at.begin]);
     });
   }
@@ -264,11 +269,13 @@ class StaticMapAccumulator {
   // The points that are kept, but none in the voxel of a kept predecessor, as neighbours in a scan
   // often are; without a branch on single points.
   void choose(std::size_t count, Span<const std::uint8_t> keep, Batch& batch) const {
-    batch.voxel[0] = 0;
-    for (auto& block : batch.block) block[0] = 0;
+    constexpr std::size_t kBefore = Batch::kFirst - 1;
+    batch.voxel[kBefore] = 0;
+    for (auto& block : batch.block) block[kBefore] = 0;
     std::size_t chosen = 0;
-    detail::run_lanes([&](auto lanes) {
-      using Int = typename decltype(lanes)::Int;
+    detail::run_most_lanes([&](auto lanes) {
+      using Lanes = decltype(lanes);
+      using Int = typename Lanes::Int;
       constexpr std::size_t kWord = 64;
       std::uint64_t was_kept = 0;
       for (std::size_t begin = 0; begin < count; begin += kWord) {
@@ -276,9 +283,9 @@ class StaticMapAccumulator {
         const std::uint64_t kept = keep.empty() ? ~std::uint64_t{0} >> (kWord - size)
                                                 : detail::nonzero_bytes(keep.data() + begin, size);
         std::uint64_t stays = 0;
-        for (std::size_t i = 0; i < size; i += detail::kLanes) {
+        for (std::size_t i = 0; i < size; i += Lanes::kCount) {
           const auto same = [&](const std::int32_t* of) {
-            return detail::same_as_next<Int>(of + begin + i);
+            return detail::same_as_next<Int>(of + kBefore + begin + i);
           };
           const auto all_same = same(batch.block[0]) & same(batch.block[1]) & same(batch.block[2]) &
                                 same(batch.voxel);
@@ -286,13 +293,9 @@ class StaticMapAccumulator {
         }
         const std::uint64_t repeats = keep_all_ ? 0 : stays & (kept << 1U | was_kept);
         was_kept = kept >> (kWord - 1);
-        for (std::size_t i = 0; i < size; i += detail::kLanes) {
-          const std::size_t which = (kept & ~repeats) >> i & 0xFFU;
-          for (std::size_t k = 0; k < detail::kLanes; ++k) {
-            batch.chosen[chosen + k] =
-                static_cast<std::uint16_t>(begin + i + detail::kPlacesOfBits[which][k]);
-          }
-          chosen += detail::kOnesUpTo[which].back();
+        for (std::size_t i = 0; i < size; i += Lanes::kCount) {
+          const auto which = static_cast<unsigned>((kept & ~repeats) >> i & Lanes::kAll);
+          chosen += detail::put_places<Lanes>(which, begin + i, &batch.chosen[chosen]);
         }
       }
     });
@@ -307,13 +310,13 @@ class StaticMapAccumulator {
     }
     for (std::size_t k = 0; k < batch.chosen_count; ++k) {
       const std::size_t i = batch.chosen[k];
-      const std::int32_t x = batch.block[0][i + 1];
-      const std::int32_t y = batch.block[1][i + 1];
-      const std::int32_t z = batch.block[2][i + 1];
+      const std::int32_t x = batch.block[0][Batch::kFirst + i];
+      const std::int32_t y = batch.block[1][Batch::kFirst + i];
+      const std::int32_t z = batch.block[2][Batch::kFirst + i];
       std::uint32_t& known = recent[batch.recent[i]];
       if (known >= blocks_.size() || !blocks_[known].is_at(x, y, z)) known = block_at({x, y, z});
       Block& block = blocks_[known];
-      const std::uint64_t bit = std::uint64_t{1} << batch.voxel[i + 1];
+      const std::uint64_t bit = std::uint64_t{1} << batch.voxel[Batch::kFirst + i];
       if ((block.occupied & bit) != 0 && !keep_all_) continue;
       block.first =
           add_point({batch.point[0][i], batch.point[1][i], batch.point[2][i], block.first});

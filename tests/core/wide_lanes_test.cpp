@@ -1,11 +1,14 @@
 #include "dynains/detail/wide_lanes.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <limits>
 #include <vector>
 
 #include "dynains/detail/arc_tangent.hpp"
+#include "dynains/detail/point_record.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 
@@ -14,27 +17,41 @@ namespace {
 
 using detail::kLanes;
 
-// Every operation on the same pairs of numbers, with one kind of lanes.
+// Every operation on the same pairs of numbers, with one kind of lanes: a row of results for each
+// operation, a number for each pair.
 template <class Lanes>
-std::vector<std::uint32_t> results(const std::vector<float>& a, const std::vector<float>& b) {
+std::vector<std::vector<std::uint32_t>> results(const std::vector<float>& a,
+                                                const std::vector<float>& b) {
   using Float = typename Lanes::Float;
   using Int = typename Lanes::Int;
-  std::vector<std::uint32_t> out;
+  std::vector<std::vector<std::uint32_t>> out;
+  std::size_t row = 0;
+  const auto put_number = [&](std::uint32_t number) {
+    if (row == out.size()) out.emplace_back();
+    out[row].push_back(number);
+  };
   const auto put = [&](const Float& value) {
-    float lanes[kLanes];
+    float lanes[Lanes::kCount];
     value.store(lanes);
     for (const float lane : lanes) {
       std::uint32_t bits;
       std::memcpy(&bits, &lane, sizeof(bits));
-      out.push_back(bits);
+      put_number(bits);
     }
+    ++row;
   };
   const auto put_int = [&](const Int& value) {
-    std::int32_t lanes[kLanes];
+    std::int32_t lanes[Lanes::kCount];
     value.store(lanes);
-    for (const std::int32_t lane : lanes) out.push_back(static_cast<std::uint32_t>(lane));
+    for (const std::int32_t lane : lanes) put_number(static_cast<std::uint32_t>(lane));
+    ++row;
   };
-  for (std::size_t i = 0; i < a.size(); i += kLanes) {
+  const auto put_bits = [&](unsigned bits) {
+    for (std::size_t k = 0; k < Lanes::kCount; ++k) put_number(bits >> k & 1U);
+    ++row;
+  };
+  for (std::size_t i = 0; i < a.size(); i += Lanes::kCount) {
+    row = 0;
     const Float x = Float::load(&a[i]);
     const Float y = Float::load(&b[i]);
     put(x + y);
@@ -50,9 +67,12 @@ std::vector<std::uint32_t> results(const std::vector<float>& a, const std::vecto
     put(select(x > y, x, y));
     put(float_of((bits_of(x) & bits_of(y)) ^ (bits_of(x) | ~bits_of(y))));
     put(detail::azimuth_of(y, x, sqrt(x * x + y * y)));
-    out.push_back((x >= y).bits());
-    const detail::Constant8 limit(1e6F);
-    const detail::Constant8 lower(-1e6F);
+    put_bits((x >= y).bits());
+    put_bits((x > y).bits());
+    put_bits((x < y).bits());
+    put_bits(((x <= y) & ~(x < y)).bits());
+    const detail::LaneConstant limit(1e6F);
+    const detail::LaneConstant lower(-1e6F);
     const Float small = max(min(x, limit), lower);
     put_int(truncate(small));
     put_int(floor(small));
@@ -61,16 +81,39 @@ std::vector<std::uint32_t> results(const std::vector<float>& a, const std::vecto
     put_int((truncate(small) << 3) + (truncate(small) >> 2) - (truncate(small) & Int(77)));
     put_int(multiply(truncate(small), 1234567));
     put_int(select(truncate(small) < Int(5), truncate(small), Int(-1)));
+    put_bits((truncate(small) == truncate(max(min(y, limit), lower))).bits());
     put(to_float(truncate(small)));
-    std::uint32_t total;
-    const float lanes_total = sum(small);
-    std::memcpy(&total, &lanes_total, sizeof(total));
-    out.push_back(total);
   }
   return out;
 }
 
-TEST_CASE("narrow and wide lanes give the same bits") {
+// The sums of eight and eight numbers.
+template <class Lanes>
+std::vector<float> sums(const std::vector<float>& a) {
+  std::vector<float> out;
+  for (std::size_t i = 0; i < a.size(); i += kLanes) {
+    out.push_back(sum(Lanes::Float::load(&a[i])));
+  }
+  return out;
+}
+
+// Calls `test` with the kinds of lanes that this processor has registers for, and within functions
+// for them.
+template <class Test>
+void with_wider_lanes(Test&& test) {
+  if (detail::has_wide_lanes()) {
+    INFO("eight lanes in one register");
+    detail::run_wide_lanes(test);
+  }
+  if constexpr (detail::kHasSixteen) {
+    if (detail::has_widest_lanes()) {
+      INFO("sixteen lanes");
+      detail::run_widest_lanes(test);
+    }
+  }
+}
+
+TEST_CASE("all kinds of lanes give the same bits") {
   Random random(20);
   std::vector<float> a, b;
   const float special[] = {0.0F, -0.0F, 1.0F, -1.0F, 1e-40F, -1e-40F,  1e30F,     -1e30F,
@@ -86,16 +129,44 @@ TEST_CASE("narrow and wide lanes give the same bits") {
     b.push_back(static_cast<float>(random.uniform(-100.0, 100.0)));
   }
   // What a comparison with NaN says must not depend on the width either.
-  for (std::size_t i = 0; i < 2 * kLanes; ++i) {
+  constexpr std::size_t kMost = detail::kMostLanes;
+  a.resize(a.size() / kMost * kMost);
+  b.resize(a.size());
+  for (std::size_t i = 0; i < 2 * kMost; ++i) {
     a.push_back(i % 2 == 0 ? std::numeric_limits<float>::quiet_NaN() : 1.0F);
     b.push_back(i % 4 < 2 ? 2.0F : std::numeric_limits<float>::quiet_NaN());
   }
-  a.resize(a.size() / kLanes * kLanes);
-  b.resize(a.size());
-  const std::size_t sure = a.size() - 2 * kLanes;  // conversions of NaN to integers are anything
+  const std::size_t sure = a.size() - 2 * kMost;  // conversions of NaN to integers are anything
   const std::vector<float> sure_a(a.data(), a.data() + sure);
   const std::vector<float> sure_b(b.data(), b.data() + sure);
-  CHECK(results<detail::NarrowLanes>(sure_a, sure_b) == results<detail::WideLanes>(sure_a, sure_b));
+  const auto expected = results<detail::NarrowLanes>(sure_a, sure_b);
+  CHECK(results<detail::WideLanes>(sure_a, sure_b) == expected);
+  CHECK(sums<detail::WideLanes>(sure_a) == sums<detail::NarrowLanes>(sure_a));
+  with_wider_lanes([&](auto lanes) {
+    using Lanes = decltype(lanes);
+    CHECK(results<Lanes>(sure_a, sure_b) == expected);
+    for (std::size_t i = sure; i < a.size(); i += Lanes::kCount) {
+      const auto x = Lanes::Float::load(&a[i]);
+      const auto y = Lanes::Float::load(&b[i]);
+      float least[Lanes::kCount], most[Lanes::kCount];
+      min(x, y).store(least);
+      max(x, y).store(most);
+      const unsigned less = (x < y).bits();
+      const unsigned at_least = (x >= y).bits();
+      for (std::size_t k = 0; k < Lanes::kCount; ++k) {
+        CAPTURE(a[i + k], b[i + k]);
+        CHECK((less >> k & 1U) == (a[i + k] < b[i + k] ? 1U : 0U));
+        CHECK((at_least >> k & 1U) == (a[i + k] >= b[i + k] ? 1U : 0U));
+        // The second one where either is NaN.
+        const bool any = std::isnan(a[i + k]) || std::isnan(b[i + k]);
+        CHECK((least[k] == std::min(a[i + k], b[i + k]) || any));
+        if (any) {
+          CHECK(std::memcmp(&least[k], &b[i + k], sizeof(float)) == 0);
+          CHECK(std::memcmp(&most[k], &b[i + k], sizeof(float)) == 0);
+        }
+      }
+    }
+  });
   for (std::size_t i = sure; i < a.size(); i += kLanes) {
     const auto narrow_a = detail::Float8::load(&a[i]);
     const auto narrow_b = detail::Float8::load(&b[i]);
@@ -108,17 +179,104 @@ TEST_CASE("narrow and wide lanes give the same bits") {
   }
 }
 
+TEST_CASE("places are put by bits, and changes are found, as value by value") {
+  Random random(21);
+  const auto check = [&](auto lanes) {
+    using Lanes = decltype(lanes);
+    for (int round = 0; round < 200; ++round) {
+      const auto bits = static_cast<unsigned>(random.uniform(0.0, Lanes::kAll + 0.999));
+      std::vector<std::uint32_t> expected;
+      for (std::uint32_t k = 0; k < Lanes::kCount; ++k) {
+        if ((bits >> k & 1U) != 0) expected.push_back(100 + k);
+      }
+      std::vector<std::uint32_t> places(Lanes::kCount);
+      places.resize(detail::put_places<Lanes>(bits, 100, places.data()));
+      CHECK(places == expected);
+
+      const auto count = static_cast<std::size_t>(random.uniform(0.0, 64.999));
+      std::vector<std::uint32_t> values(count + 1);
+      for (std::uint32_t& value : values) {
+        value = static_cast<std::uint32_t>(random.uniform(0.0, 2.5));
+      }
+      std::uint64_t changes = 0;
+      for (std::size_t i = 0; i < count; ++i) {
+        changes |= std::uint64_t{values[i + 1] != values[i]} << i;
+      }
+      CHECK(detail::find_changes<Lanes>(values.data() + 1, count) == changes);
+    }
+  };
+  check(detail::NarrowLanes());
+  with_wider_lanes(check);
+}
+
+TEST_CASE("records turn into columns and close up at the front, whatever the lanes") {
+  Random random(22);
+  const auto check = [&](auto lanes) {
+    using Lanes = decltype(lanes);
+    constexpr std::size_t kCount = Lanes::kCount;
+    for (int round = 0; round < 200; ++round) {
+      const std::size_t count =
+          round % 2 == 0 ? kCount : 1 + static_cast<std::size_t>(random.uniform(0.0, kCount - 1.0));
+      const unsigned all = (1U << count) - 1U;
+      const unsigned bits = static_cast<unsigned>(random.uniform(0.0, Lanes::kAll + 0.999)) & all;
+      const std::size_t gap = static_cast<std::size_t>(random.uniform(0.0, 5.0));
+      // In front of the records there is room for them; behind them is somebody else's.
+      std::vector<detail::PointRecord> records(gap + 2 * kCount);
+      for (std::uint32_t i = 0; i < records.size(); ++i) {
+        const auto number = static_cast<float>(i);
+        records[i] = {number, number + 0.25F, -number, 1000 + i};
+      }
+      const auto before = records;
+      const auto numbers = [](const std::vector<detail::PointRecord>& of, std::size_t n) {
+        std::vector<std::uint32_t> inputs;
+        for (std::size_t i = 0; i < n; ++i) inputs.push_back(of[i].input);
+        return inputs;
+      };
+      std::vector<detail::PointRecord> some;
+      for (std::size_t k = 0; k < count; ++k) {
+        if ((bits >> k & 1U) != 0) some.push_back(records[gap + k]);
+      }
+
+      const auto columns = detail::load_columns<Lanes>(&records[gap]);
+      for (std::size_t axis = 0; axis < 4; ++axis) {
+        float values[kCount], picked[kCount];
+        columns[axis].store(values);
+        detail::pick<Lanes>(&records[gap], bits, columns)[axis].store(picked);
+        for (std::size_t k = 0; k < kCount; ++k) {
+          float expected[4];
+          std::memcpy(expected, &before[gap + k], sizeof(expected));
+          CHECK(std::memcmp(&values[k], &expected[axis], sizeof(float)) == 0);
+        }
+        for (std::size_t k = 0; k < some.size(); ++k) {
+          float expected[4];
+          std::memcpy(expected, &some[k], sizeof(expected));
+          CHECK(std::memcmp(&picked[k], &expected[axis], sizeof(float)) == 0);
+        }
+      }
+
+      CHECK(detail::move_some_to_front<Lanes>(&records[gap], count, bits, records.data()) ==
+            some.size());
+      CHECK(numbers(records, some.size()) == numbers(some, some.size()));
+      for (std::size_t i = gap + count; i < records.size(); ++i) {
+        CHECK(records[i].input == before[i].input);
+      }
+    }
+  };
+  check(detail::NarrowLanes());
+  with_wider_lanes(check);
+}
+
 TEST_CASE("a kernel meets each place once, in order, whatever the count") {
-  for (std::size_t count = 0; count <= 3 * kLanes; ++count) {
+  for (std::size_t count = 0; count <= 3 * detail::kMostLanes; ++count) {
     CAPTURE(count);
     std::vector<float> from(count);
     for (std::size_t i = 0; i < count; ++i) from[i] = static_cast<float>(i + 1);
-    std::vector<float> to(count + kLanes, -1.0F);
+    std::vector<float> to(count + detail::kMostLanes, -1.0F);
     std::size_t next = 0;
     std::size_t places = 0;
     detail::for_lanes(count, [&](auto at) {
       CHECK(at.begin == next);
-      next += kLanes;
+      next += decltype(at)::kCount;
       places += at.size();
       at.load(from.data()).store(&to[at.begin]);
     });

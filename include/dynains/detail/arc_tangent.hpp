@@ -15,11 +15,11 @@ inline constexpr float kPi = 3.14159265358979323846F;
 /// Twice the angle whose tangent is y / x, for x >= |y|; next to 0 where x is below 1e-18.
 template <class Float>
 Float twice_arc_tangent(const Float& y, const Float& x) {
-  static constexpr Constant8 kTiny(1e-18F);
+  static constexpr LaneConstant kTiny(1e-18F);
   // Minimax fit of 2 atan(t) / t in t^2 over [0, 1]; error 6.6e-7 including float rounding.
-  static constexpr Constant8 kFit[] = {1.3623585925e-02F,  -6.7208439112e-02F, 1.5924733877e-01F,
-                                       -2.6466685534e-01F, 3.9615631104e-01F,  -6.6634738445e-01F,
-                                       1.9999922514F};
+  static constexpr LaneConstant kFit[] = {
+      1.3623585925e-02F, -6.7208439112e-02F, 1.5924733877e-01F, -2.6466685534e-01F,
+      3.9615631104e-01F, -6.6634738445e-01F, 1.9999922514F};
   const Float t = y / max(x, Float(kTiny));
   const Float u = t * t;
   Float p = kFit[0];
@@ -32,7 +32,7 @@ Float twice_arc_tangent(const Float& y, const Float& x) {
 /// zeros are treated as positive: (-1, -0.0) gives +pi, never -pi.
 template <class Float>
 Float azimuth_of(const Float& y, const Float& x, const Float& length) {
-  static constexpr Constant8 kZero(0.0F), kHalfTurn(kPi);
+  static constexpr LaneConstant kZero(0.0F), kHalfTurn(kPi);
   const Float from_axis = twice_arc_tangent(y, length + abs(x));
   return select(x < kZero, with_sign_of(y + kZero, Float(kHalfTurn)) - from_axis, from_axis);
 }

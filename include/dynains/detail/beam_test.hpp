@@ -94,8 +94,8 @@ inline void test_beams(const RangeImage& image, const Eigen::Isometry3f& T_refer
                        Sights& sights) {
   constexpr float kCentimetres = 100.0F;
   const LaneTransform to_reference(T_reference_sample.matrix().topRows<3>());
-  const Constant8 to_centimetres(kCentimetres);
-  const Constant8 base(margin * kCentimetres), growth(slope * kCentimetres);
+  const LaneConstant to_centimetres(kCentimetres);
+  const LaneConstant base(margin * kCentimetres), growth(slope * kCentimetres);
   const ImageLocator locator(image.grid());
   sights.resize(count);
   run_lanes([&](auto lanes) {

@@ -30,9 +30,9 @@ struct HalfSpace {
     return x * local[0] + y * local[1] + z * local[2] < offset;
   }
 
-  Constant8 x0, y0, z0;                    // origin
-  Constant8 x = 0.0F, y = 0.0F, z = 1.0F;  // normal
-  Constant8 offset;
+  LaneConstant x0, y0, z0;                    // origin
+  LaneConstant x = 0.0F, y = 0.0F, z = 1.0F;  // normal
+  LaneConstant offset;
 };
 
 }  // namespace dynains::detail

@@ -33,8 +33,8 @@ class Ingest {
     const std::size_t count = PointCloudTraits<Cloud>::size(cloud);
     make_room(labels, count);
     labels.resize(count);
-    points_.grow(count + kLanes);
-    grow(input_, count + kLanes);
+    points_.grow(count + kMostLanes);
+    grow(input_, count + kMostLanes);
     count_ = 0;
     for (std::size_t begin = 0; begin < count; begin += kPiece) {
       const std::size_t length = std::min(kPiece, count - begin);
@@ -100,13 +100,14 @@ class Ingest {
   }
 
   // Labels the bad ones among these and closes the gaps that they leave; counts the good ones.
-  // Mostly, all of eight points are good.
+  // Mostly, all of them are.
   std::size_t sort_out(std::size_t begin, std::size_t length, float min_squared, float max_squared,
                        PointLabel* label_of) {
     std::size_t result = 0;
-    run_lanes([&](auto lanes) {
-      using Float = typename decltype(lanes)::Float;
-      using Int = typename decltype(lanes)::Int;
+    run_most_lanes([&](auto lanes) {
+      using Lanes = decltype(lanes);
+      using Float = typename Lanes::Float;
+      using Int = typename Lanes::Int;
       // Read once: stores may change anything, as far as the compiler knows.
       const Float nearest(min_squared), farthest(max_squared), zero(0.0F);
       float* const xs = points_.x.data() + count_;
@@ -115,7 +116,7 @@ class Ingest {
       std::uint32_t* const input = input_.data() + count_;
       PointLabel* const labels = label_of;
       std::size_t taken = 0;
-      for_places<decltype(lanes)>(length, [&](auto at) {
+      for_places<Lanes>(length, [&](auto at) {
         const Float x = at.load(xs);
         const Float y = at.load(ys);
         const Float z = at.load(zs);
@@ -126,14 +127,14 @@ class Ingest {
                                (squared + abs(z) > zero))
                                   .bits();
         const std::size_t first = begin + at.begin;
-        if (good == (1U << kLanes) - 1U) {
+        if (good == Lanes::kAll) {
           x.store(xs + taken);
           y.store(ys + taken);
           z.store(zs + taken);
           (lane_numbers<Int>() + Int(static_cast<std::int32_t>(first)))
               .store(reinterpret_cast<std::int32_t*>(input + taken));
-          std::fill_n(labels + first, kLanes, PointLabel::kGround);
-          taken += kLanes;
+          std::fill_n(labels + first, Lanes::kCount, PointLabel::kGround);
+          taken += Lanes::kCount;
           return;
         }
         const Float infinity(std::numeric_limits<float>::infinity());

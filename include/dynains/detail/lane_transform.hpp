@@ -21,7 +21,7 @@ struct LaneTransform {
     return (row[axis][0] * x + row[axis][1] * y) + (row[axis][2] * z + row[axis][3]);
   }
 
-  Constant8 row[3][4];
+  LaneConstant row[3][4];
 };
 
 }  // namespace dynains::detail

@@ -18,6 +18,8 @@
 namespace dynains::detail {
 
 inline constexpr std::size_t kLanes = 8;
+/// Of those in wide_lanes.hpp: so many places behind their end, buffers are read and written.
+inline constexpr std::size_t kMostLanes = 16;
 
 using Float4 = float __attribute__((vector_size(16)));
 using Int4 = std::int32_t __attribute__((vector_size(16)));
@@ -78,20 +80,21 @@ struct Int8 {
 
 /// The same value in all lanes, kept in memory: cheaper than to spread it anew in every round of a
 /// loop that has no register left for it.
-struct Constant8 {
-  alignas(32) float values[kLanes];
-  constexpr Constant8(float value)
-      : values{value, value, value, value, value, value, value, value} {}
+struct LaneConstant {
+  alignas(64) float values[kMostLanes];
+  constexpr LaneConstant(float value)
+      : values{value, value, value, value, value, value, value, value,
+               value, value, value, value, value, value, value, value} {}
 
   /// What has to be flipped (operator^) to turn this one into `other`.
-  Constant8 bits_changed(const Constant8& other) const {
+  LaneConstant bits_changed(const LaneConstant& other) const {
     std::uint32_t a, b;
     std::memcpy(&a, values, sizeof(a));
     std::memcpy(&b, other.values, sizeof(b));
     a ^= b;
     float bits;
     std::memcpy(&bits, &a, sizeof(bits));
-    return Constant8(bits);
+    return LaneConstant(bits);
   }
 };
 
@@ -100,7 +103,7 @@ struct Float8 {
 
   Float8() = default;
   Float8(Float4 low, Float4 high) : lo(low), hi(high) {}
-  Float8(const Constant8& constant) : Float8(load(constant.values)) {}
+  Float8(const LaneConstant& constant) : Float8(load(constant.values)) {}
   explicit Float8(float value) : lo{value, value, value, value}, hi{value, value, value, value} {}
 
   static Float8 load(const float* from) {
@@ -176,7 +179,7 @@ inline Float8 abs(Float8 a) {
 /// `a`, negated where `sign` is negative or -0.
 template <class Float>
 Float with_sign_of(const Float& sign, const Float& a) {
-  static constexpr Constant8 kSign(-0.0F);
+  static constexpr LaneConstant kSign(-0.0F);
   return float_of(bits_of(a) ^ (bits_of(sign) & bits_of(Float(kSign))));
 }
 
@@ -210,18 +213,20 @@ inline float sum(Float8 a) {
 }
 template <class Float>
 float min_lane(const Float& a) {
-  float v[kLanes];
+  float v[sizeof(Float) / sizeof(float)];
   a.store(v);
   float result = v[0];
-  for (std::size_t i = 1; i < kLanes; ++i) result = v[i] < result ? v[i] : result;
+  for (std::size_t i = 1; i < sizeof(Float) / sizeof(float); ++i)
+    result = v[i] < result ? v[i] : result;
   return result;
 }
 template <class Float>
 float max_lane(const Float& a) {
-  float v[kLanes];
+  float v[sizeof(Float) / sizeof(float)];
   a.store(v);
   float result = v[0];
-  for (std::size_t i = 1; i < kLanes; ++i) result = v[i] > result ? v[i] : result;
+  for (std::size_t i = 1; i < sizeof(Float) / sizeof(float); ++i)
+    result = v[i] > result ? v[i] : result;
   return result;
 }
 
@@ -253,33 +258,6 @@ inline std::uint64_t nonzero_bytes(const std::uint8_t* from, std::size_t count) 
 template <class Int>
 auto same_as_next(const std::int32_t* values) {
   return Int::load(values) == Int::load(values + 1);
-}
-
-/// Cuts the array into stretches of equal values and calls `body(length)` for one after the other.
-template <class T, class Body>
-void for_each_change(const T* values, std::size_t count, Body&& body) {
-  static_assert(sizeof(T) == 4);
-  const auto load = [](const T* from) {
-    Int8 result;
-    std::memcpy(&result, from, sizeof(result));
-    return result;
-  };
-  std::size_t begin = 0;
-  std::size_t i = 1;
-  for (; i + kLanes <= count; i += kLanes) {
-    unsigned bits = (~(load(values + i) == load(values + i - 1))).bits();
-    for (; bits != 0; bits &= bits - 1) {
-      const std::size_t end = i + static_cast<std::size_t>(__builtin_ctz(bits));
-      body(end - begin);
-      begin = end;
-    }
-  }
-  for (; i < count; ++i) {
-    if (values[i] == values[i - 1]) continue;
-    body(i - begin);
-    begin = i;
-  }
-  if (count > begin) body(count - begin);
 }
 
 }  // namespace dynains::detail

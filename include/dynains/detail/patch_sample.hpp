@@ -53,7 +53,7 @@ class PatchSample {
   /// Moments of the points in a half space whose origin is above or below the first record.
   template <class Lanes>
   PlaneMoments moments(const HalfSpace& space) const {
-    static constexpr Constant8 kZero(0.0F), kOne(1.0F);
+    static constexpr LaneConstant kZero(0.0F), kOne(1.0F);
     using Float = typename Lanes::Float;
     Float n = kZero, sx = kZero, sy = kZero, sz = kZero, sxx = kZero, sxy = kZero, sxz = kZero,
           syy = kZero, syz = kZero, szz = kZero;

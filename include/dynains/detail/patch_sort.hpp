@@ -24,7 +24,7 @@ class PatchSort {
   /// `patch_of` gives the patch of each point, less than kPatches. Numbers are those of `input`.
   void sort(PointsView points, const std::uint32_t* input, const std::int32_t* patch_of) {
     const std::size_t count = points.size();
-    grow(sorted_, count + kLanes);
+    grow(sorted_, count + kMostLanes);
     strand_length_ = count / (kStrands * kStep) * kStep;
     count_points(patch_of, count);
     add_up_counts();

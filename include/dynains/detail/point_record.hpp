@@ -7,6 +7,7 @@
 #include <cstring>
 #include <type_traits>
 
+#include "dynains/detail/bits.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/shuffle.hpp"
 #include "dynains/detail/wide_lanes.hpp"
@@ -18,6 +19,9 @@ struct alignas(16) PointRecord {
   float x, y, z;
   std::uint32_t input;
 };
+
+/// In a vector of sixteen numbers.
+inline constexpr std::size_t kRecordsInSixteen = 4;
 
 /// The columns of four rows of four values.
 inline std::array<Float4, 4> transposed(const std::array<Float4, 4>& row) {
@@ -74,11 +78,31 @@ inline std::array<Float4, 4> load_records(PointsView points, const std::uint32_t
                      load_four(points.z.data() + i), load_four(input + i)});
 }
 
-/// Eight records as lanes of x, y, z and, bit by bit, numbers.
+/// The same for four times four rows, one behind the other.
+inline std::array<WideFloat<16>, 4> transposed(const std::array<WideFloat<16>, 4>& row) {
+  Floats16 a, b, c, d;
+  shuffle<0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29>(row[0].v, row[1].v, a);
+  shuffle<0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29>(row[2].v, row[3].v, b);
+  shuffle<2, 6, 10, 14, 18, 22, 26, 30, 3, 7, 11, 15, 19, 23, 27, 31>(row[0].v, row[1].v, c);
+  shuffle<2, 6, 10, 14, 18, 22, 26, 30, 3, 7, 11, 15, 19, 23, 27, 31>(row[2].v, row[3].v, d);
+  std::array<WideFloat<16>, 4> columns;
+  shuffle<0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23>(a, b, columns[0].v);
+  shuffle<8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31>(a, b, columns[1].v);
+  shuffle<0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23>(c, d, columns[2].v);
+  shuffle<8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31>(c, d, columns[3].v);
+  return columns;
+}
+
+/// Records as lanes of x, y, z and, bit by bit, numbers.
 template <class Lanes>
 std::array<typename Lanes::Float, 4> load_columns(const PointRecord* from) {
   std::array<typename Lanes::Float, 4> result;
-  if constexpr (std::is_same_v<typename Lanes::Float, WideFloat8>) {
+  if constexpr (std::is_same_v<Lanes, WidestLanes>) {
+    for (std::size_t k = 0; k < 4; ++k) {
+      std::memcpy(&result[k].v, from + kRecordsInSixteen * k, sizeof(Floats16));
+    }
+    return transposed(result);
+  } else if constexpr (std::is_same_v<Lanes, WideLanes>) {
     for (std::size_t k = 0; k < 4; ++k) {
       shuffle<0, 1, 2, 3, 4, 5, 6, 7>(load_four(from + k), load_four(from + k + 4), result[k].v);
     }
@@ -92,6 +116,52 @@ std::array<typename Lanes::Float, 4> load_columns(const PointRecord* from) {
     const std::array<Float4, 4> hi = four(from + 4);
     for (std::size_t k = 0; k < 4; ++k) result[k] = {lo[k], hi[k]};
     return result;
+  }
+}
+
+/// Of up to as many records as there are lanes, those whose bits are set; as move_to_front, and
+/// without a branch on single ones. Returns how many there are.
+template <class Lanes>
+std::size_t move_some_to_front(const PointRecord* from, std::size_t count, unsigned bits,
+                               PointRecord* to) {
+  std::size_t moved = 0;
+  if constexpr (std::is_same_v<Lanes, WidestLanes>) {
+    // By the bits of four records: those of their numbers.
+    static constexpr std::array<std::uint16_t, 16> kNumbers = {
+        0x0000, 0x000F, 0x00F0, 0x00FF, 0x0F00, 0x0F0F, 0x0FF0, 0x0FFF,
+        0xF000, 0xF00F, 0xF0F0, 0xF0FF, 0xFF00, 0xFF0F, 0xFFF0, 0xFFFF};
+    if (count == Lanes::kCount) {
+      for (std::size_t k = 0; k < count; k += kRecordsInSixteen) {
+        const unsigned which = bits >> k & 0xFU;
+        Floats16 four;
+        std::memcpy(&four, from + k, sizeof(four));
+        compress(kNumbers[which], four);
+        std::memcpy(static_cast<void*>(to + moved), &four, sizeof(four));
+        moved += count_ones(which);
+      }
+      return moved;
+    }
+  }
+  for (std::size_t k = 0; k < count; ++k) {
+    copy_record(from + k, to + moved);
+    moved += bits >> k & 1U;
+  }
+  return moved;
+}
+
+/// Columns of the records whose bits are set, of as many as there are lanes; behind them is
+/// anything. `columns` are those of all.
+template <class Lanes>
+std::array<typename Lanes::Float, 4> pick(const PointRecord* from, unsigned bits,
+                                          const std::array<typename Lanes::Float, 4>& columns) {
+  if constexpr (std::is_same_v<Lanes, WidestLanes>) {
+    std::array<typename Lanes::Float, 4> result = columns;
+    for (auto& column : result) compress(bits, column.v);
+    return result;
+  } else {
+    PointRecord picked[Lanes::kCount] = {};
+    move_some_to_front<Lanes>(from, Lanes::kCount, bits, picked);
+    return load_columns<Lanes>(picked);
   }
 }
 

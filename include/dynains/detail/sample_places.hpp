@@ -25,7 +25,7 @@ inline void find_places(const InstanceSamples& samples, double cell,
     const Float x = at.load(samples.points.x.data());
     const Float y = at.load(samples.points.y.data());
     const Float z = at.load(samples.points.z.data());
-    std::int32_t index[3][kLanes];
+    std::int32_t index[3][decltype(at)::kCount];
     for (std::size_t axis = 0; axis < 3; ++axis) floor(to_cells(axis, x, y, z)).store(index[axis]);
     for (std::size_t lane = 0; lane < at.size(); ++lane) {
       place[at.begin + lane] = pack_place(index[0][lane], index[1][lane], index[2][lane]);

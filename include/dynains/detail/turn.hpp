@@ -33,7 +33,7 @@ inline void turn(PointsView points, const LaneTransform& turning, PointBuffer& t
 
 /// Points in another frame of the same origin; may be `points` of the same buffer.
 inline PointsView turn(PointsView points, const Eigen::Matrix3f& R, PointBuffer& turned) {
-  turned.grow(points.size() + kLanes);
+  turned.grow(points.size() + kMostLanes);
   turn(points, turning(R), turned, 0);
   return PointsView(turned).subview(0, points.size());
 }

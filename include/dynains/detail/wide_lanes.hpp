@@ -1,152 +1,181 @@
-// The lanes of lanes.hpp in one register each, for processors that have AVX2, chosen at run time.
+// The lanes of lanes.hpp in one register each, for processors that have AVX2, and sixteen of them
+// where there is AVX-512; chosen at run time.
 //
 // A kernel is a generic function object that takes the kind of lanes and works with its types. It
-// is instantiated twice and gives the same bits both times. No vector passes the border of
+// is instantiated for each kind and gives the same bits every time. No vector passes the border of
 // run_wide_lanes, because the two sides of it would pass one differently.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <type_traits>
 
+#include "dynains/detail/bits.hpp"
 #include "dynains/detail/lanes.hpp"
 #include "dynains/detail/shuffle.hpp"
+#include "dynains/detail/vector_operations.hpp"
 
 namespace dynains::detail {
 
-using WideInts = std::int32_t __attribute__((vector_size(32)));
-using WideFloats = float __attribute__((vector_size(32)));
-
-// What vectors have no operator for. By reference: no vector passes the border to code that is
-// compiled for other registers. Clang does not inline a function for AVX2 into a lambda that is
-// not, and does better by halves.
-#if defined(__x86_64__) && defined(__SSE2__) && !defined(__clang__)
-[[gnu::target("avx2")]] inline unsigned sign_bits(const WideInts& of) {
-  return static_cast<unsigned>(__builtin_ia32_movmskps256(WideFloats(of)));
-}
-[[gnu::target("avx2")]] inline void take_root(WideFloats& of) { of = __builtin_ia32_sqrtps256(of); }
-// Elsewhere, GCC puts equal numbers together one by one.
-template <class Number, class Vector>
-[[gnu::target("avx2")]] void spread(Number n, Vector& to) {
-  to = Vector{} + n;
-}
-#else
-inline unsigned sign_bits(const WideInts& of) {
-  Mask8 halves;
-  shuffle<0, 1, 2, 3>(of, of, halves.lo);
-  shuffle<4, 5, 6, 7>(of, of, halves.hi);
-  return halves.bits();
-}
-inline void take_root(WideFloats& of) {
-  Float4 low, high;
-  shuffle<0, 1, 2, 3>(of, of, low);
-  shuffle<4, 5, 6, 7>(of, of, high);
-  shuffle<0, 1, 2, 3, 4, 5, 6, 7>(sqrt(low), sqrt(high), of);
-}
-template <class Number, class Vector>
-void spread(Number n, Vector& to) {
-  to = Vector{} + n;
-}
-#endif
-
-struct WideMask8 {
-  using Vector = WideInts;
+template <int kCount>
+struct WideMask {
+  using Vector = typename Vectors<kCount>::Ints;
   Vector v;
 
-  friend WideMask8 operator&(const WideMask8& a, const WideMask8& b) { return {a.v & b.v}; }
-  friend WideMask8 operator^(const WideMask8& a, const WideMask8& b) { return {a.v ^ b.v}; }
-  friend WideMask8 operator|(const WideMask8& a, const WideMask8& b) { return {a.v | b.v}; }
-  friend WideMask8 operator~(const WideMask8& a) { return {~a.v}; }
+  using M = WideMask;
+  friend M operator&(const M& a, const M& b) { return {a.v & b.v}; }
+  friend M operator^(const M& a, const M& b) { return {a.v ^ b.v}; }
+  friend M operator|(const M& a, const M& b) { return {a.v | b.v}; }
+  friend M operator~(const M& a) { return {~a.v}; }
 
   /// Lane i as bit i.
   unsigned bits() const { return sign_bits(v); }
 };
 
-struct WideInt8 {
-  using Vector = WideInts;
+template <int kCount>
+struct WideInt {
+  using Vector = typename Vectors<kCount>::Ints;
   Vector v;
 
-  WideInt8() = default;
-  explicit WideInt8(const Vector& vector) : v(vector) {}
-  explicit WideInt8(std::int32_t n) { spread(n, v); }
+  WideInt() = default;
+  explicit WideInt(const Vector& vector) : v(vector) {}
+  explicit WideInt(std::int32_t n) { spread(n, v); }
 
-  static WideInt8 load(const std::int32_t* from) {
-    WideInt8 result;
+  static WideInt load(const std::int32_t* from) {
+    WideInt result;
     std::memcpy(&result.v, from, sizeof(Vector));
     return result;
   }
   void store(std::int32_t* to) const { std::memcpy(to, &v, sizeof(Vector)); }
 
-  friend WideInt8 operator+(const WideInt8& a, const WideInt8& b) { return WideInt8(a.v + b.v); }
-  friend WideInt8 operator-(const WideInt8& a, const WideInt8& b) { return WideInt8(a.v - b.v); }
-  friend WideInt8 operator<<(const WideInt8& a, int bits) { return WideInt8(a.v << bits); }
-  friend WideInt8 operator>>(const WideInt8& a, int bits) { return WideInt8(a.v >> bits); }
-  friend WideInt8 operator&(const WideInt8& a, const WideInt8& b) { return WideInt8(a.v & b.v); }
-  friend WideInt8 operator^(const WideInt8& a, const WideInt8& b) { return WideInt8(a.v ^ b.v); }
-  friend WideMask8 operator<(const WideInt8& a, const WideInt8& b) { return {a.v < b.v}; }
-  friend WideMask8 operator==(const WideInt8& a, const WideInt8& b) { return {a.v == b.v}; }
+  using I = WideInt;
+  using M = WideMask<kCount>;
+  friend I operator+(const I& a, const I& b) { return I(a.v + b.v); }
+  friend I operator-(const I& a, const I& b) { return I(a.v - b.v); }
+  friend I operator<<(const I& a, int bits) { return I(a.v << bits); }
+  friend I operator>>(const I& a, int bits) { return I(a.v >> bits); }
+  friend I operator&(const I& a, const I& b) { return I(a.v & b.v); }
+  friend I operator^(const I& a, const I& b) { return I(a.v ^ b.v); }
+  friend M operator<(const I& a, const I& b) {
+    M result;
+    compare_less(a.v, b.v, result.v);
+    return result;
+  }
+  friend M operator==(const I& a, const I& b) {
+    M result;
+    compare_equal(a.v, b.v, result.v);
+    return result;
+  }
+
+  friend I select(const M& mask, const I& a, const I& b) {
+    I result;
+    choose(mask.v, a.v, b.v, result.v);
+    return result;
+  }
+  friend I keep(const M& mask, const I& a) { return I(mask.v & a.v); }
+  friend I multiply(const I& a, std::int32_t factor) {
+    using Unsigned = typename Vectors<kCount>::Unsigned;  // may overflow
+    return I(Vector(Unsigned(a.v) * static_cast<std::uint32_t>(factor)));
+  }
 };
 
-struct WideFloat8 {
-  using Vector = WideFloats;
+template <int kCount>
+struct WideFloat {
+  using Vector = typename Vectors<kCount>::Floats;
   Vector v;
 
-  WideFloat8() = default;
-  explicit WideFloat8(const Vector& vector) : v(vector) {}
-  WideFloat8(const Constant8& constant) { std::memcpy(&v, constant.values, sizeof(Vector)); }
+  WideFloat() = default;
+  explicit WideFloat(const Vector& vector) : v(vector) {}
+  explicit WideFloat(float value) { spread(value, v); }
+  WideFloat(const LaneConstant& constant) { std::memcpy(&v, constant.values, sizeof(Vector)); }
 
-  static WideFloat8 load(const float* from) {
-    WideFloat8 result;
+  static WideFloat load(const float* from) {
+    WideFloat result;
     std::memcpy(&result.v, from, sizeof(Vector));
     return result;
   }
   void store(float* to) const { std::memcpy(to, &v, sizeof(Vector)); }
 
-  using F = WideFloat8;
+  using F = WideFloat;
+  using I = WideInt<kCount>;
+  using M = WideMask<kCount>;
   friend F operator+(const F& a, const F& b) { return F(a.v + b.v); }
   friend F operator-(const F& a, const F& b) { return F(a.v - b.v); }
-  friend F operator*(const F& a, const F& b) { return F(a.v * b.v); }
+  friend F operator*(const F& a, const F& b) {
+    F product = a;
+    multiply_by(b.v, product.v);
+    return product;
+  }
   friend F operator/(const F& a, const F& b) { return F(a.v / b.v); }
-  friend WideMask8 operator<(const F& a, const F& b) { return {a.v < b.v}; }
-  friend WideMask8 operator<=(const F& a, const F& b) { return {a.v <= b.v}; }
-  friend WideMask8 operator>(const F& a, const F& b) { return {a.v > b.v}; }
-  friend WideMask8 operator>=(const F& a, const F& b) { return {a.v >= b.v}; }
+  friend M operator<(const F& a, const F& b) {
+    M result;
+    compare_less(a.v, b.v, result.v);
+    return result;
+  }
+  friend M operator<=(const F& a, const F& b) {
+    M result;
+    compare_at_most(a.v, b.v, result.v);
+    return result;
+  }
+  friend M operator>(const F& a, const F& b) { return b < a; }
+  friend M operator>=(const F& a, const F& b) { return b <= a; }
 
-  friend WideMask8 bits_of(const F& a) { return {WideMask8::Vector(a.v)}; }
-  friend F select(const WideMask8& mask, const F& a, const F& b) { return F(mask.v ? a.v : b.v); }
-  friend F keep(const WideMask8& mask, const F& a) { return float_of(mask & bits_of(a)); }
-  friend F min(const F& a, const F& b) { return F(a.v < b.v ? a.v : b.v); }
-  friend F max(const F& a, const F& b) { return F(a.v > b.v ? a.v : b.v); }
-  friend F abs(const F& a) { return float_of(bits_of(a) & WideMask8{WideInt8(0x7FFFFFFF).v}); }
+  friend M bits_of(const F& a) { return {typename M::Vector(a.v)}; }
+  static F float_of(const M& a) { return F(Vector(a.v)); }
+  friend F select(const M& mask, const F& a, const F& b) {
+    F result;
+    choose(mask.v, a.v, b.v, result.v);
+    return result;
+  }
+  friend F keep(const M& mask, const F& a) { return float_of(mask & bits_of(a)); }
+  friend F min(const F& a, const F& b) {
+    F result;
+    take_lesser(a.v, b.v, result.v);
+    return result;
+  }
+  friend F max(const F& a, const F& b) {
+    F result;
+    take_greater(a.v, b.v, result.v);
+    return result;
+  }
+  friend F abs(const F& a) { return float_of(bits_of(a) & M{I(0x7FFFFFFF).v}); }
   friend F sqrt(const F& a) {
     F root = a;
     take_root(root.v);
     return root;
   }
-
-  static F float_of(const WideMask8& a) { return F(Vector(a.v)); }
+  friend I truncate(const F& a) { return I(__builtin_convertvector(a.v, typename I::Vector)); }
+  friend I floor(const F& a) {
+    const I whole = truncate(a);
+    return I(whole.v + (a < F(__builtin_convertvector(whole.v, Vector))).v);  // all bits set is -1
+  }
+  /// Lane i is lane `from[i]` of `a`, modulo their number.
+  friend F permuted(const F& a, const I& from) {
+#if defined(__clang__)
+    return F(__builtin_shufflevector(a.v, from.v));
+#else
+    return F(__builtin_shuffle(a.v, from.v));
+#endif
+  }
 };
 
-inline WideFloat8 float_of(const WideMask8& a) { return WideFloat8::float_of(a); }
+/// Of the same bits.
+template <int kCount>
+WideFloat<kCount> float_of(const WideMask<kCount>& a) {
+  return WideFloat<kCount>::float_of(a);
+}
 
-inline WideInt8 select(const WideMask8& mask, const WideInt8& a, const WideInt8& b) {
-  return WideInt8(mask.v ? a.v : b.v);
+template <int kCount>
+WideFloat<kCount> to_float(const WideInt<kCount>& a) {
+  using Floats = typename Vectors<kCount>::Floats;
+  return WideFloat<kCount>(__builtin_convertvector(a.v, Floats));
 }
-inline WideInt8 keep(const WideMask8& mask, const WideInt8& a) { return WideInt8(mask.v & a.v); }
-inline WideInt8 truncate(const WideFloat8& a) {
-  return WideInt8(__builtin_convertvector(a.v, WideInt8::Vector));
-}
-inline WideFloat8 to_float(const WideInt8& a) {
-  return WideFloat8(__builtin_convertvector(a.v, WideFloat8::Vector));
-}
-inline WideInt8 multiply(const WideInt8& a, std::int32_t factor) {
-  using Unsigned = std::uint32_t __attribute__((vector_size(32)));  // may overflow
-  return WideInt8(WideInt8::Vector(Unsigned(a.v) * static_cast<std::uint32_t>(factor)));
-}
-inline WideInt8 floor(const WideFloat8& a) {
-  const WideInt8 whole = truncate(a);
-  return WideInt8(whole.v + (to_float(whole) > a).v);  // all bits set is -1
-}
+
+using WideMask8 = WideMask<8>;
+using WideInt8 = WideInt<8>;
+using WideFloat8 = WideFloat<8>;
+
 inline float sum(const WideFloat8& a) {
   Float8 halves;
   shuffle<0, 1, 2, 3>(a.v, a.v, halves.lo);
@@ -154,52 +183,107 @@ inline float sum(const WideFloat8& a) {
   return sum(halves);
 }
 
-/// Lane i is lane `from[i]` of `a`, modulo eight.
-inline WideFloat8 permuted(const WideFloat8& a, const WideInt8& from) {
-#if defined(__clang__)
-  return WideFloat8(__builtin_shufflevector(a.v, from.v));
-#else
-  return WideFloat8(__builtin_shuffle(a.v, from.v));
-#endif
-}
-
+/// The kinds of lanes: types, and how many there are.
 struct NarrowLanes {
   using Float = Float8;
   using Int = Int8;
   using Mask = Mask8;
+  static constexpr std::size_t kCount = kLanes;
+  static constexpr unsigned kAll = 0xFF;  ///< a bit for each
 };
-struct WideLanes {
-  using Float = WideFloat8;
-  using Int = WideInt8;
-  using Mask = WideMask8;
+template <int kLaneCount>
+struct RegisterLanes {
+  using Float = WideFloat<kLaneCount>;
+  using Int = WideInt<kLaneCount>;
+  using Mask = WideMask<kLaneCount>;
+  static constexpr std::size_t kCount = kLaneCount;
+  static constexpr unsigned kAll = (1U << kCount) - 1U;
 };
+using WideLanes = RegisterLanes<8>;
+using WidestLanes = RegisterLanes<16>;
 
 #if defined(__x86_64__) && defined(__SSE2__)
 template <class Kernel>
 [[gnu::target("avx2"), gnu::flatten]] void run_wide_lanes(Kernel& kernel) {
   kernel(WideLanes());
 }
+template <class Kernel>
+[[gnu::target("avx512f,avx512bw,avx512dq,avx512vl"), gnu::flatten]] void run_widest_lanes(
+    Kernel& kernel) {
+  kernel(WidestLanes());
+}
 inline bool has_wide_lanes() { return __builtin_cpu_supports("avx2") != 0; }
+/// Not where they slow the processor down, as they did when they were new: VBMI2 came later.
+inline bool has_widest_lanes() { return kHasSixteen && __builtin_cpu_supports("avx512vbmi2") != 0; }
 #else
 template <class Kernel>
 void run_wide_lanes(Kernel& kernel) {
   kernel(WideLanes());
 }
+template <class Kernel>
+void run_widest_lanes(Kernel& kernel) {
+  kernel(WidestLanes());
+}
 inline bool has_wide_lanes() { return false; }
+inline bool has_widest_lanes() { return false; }
 #endif
 
-/// Calls `kernel` with WideLanes where the processor has registers for them, else with NarrowLanes.
+/// Calls `kernel`, which needs eight lanes, with WideLanes where the processor has registers for
+/// them, else with NarrowLanes.
 template <class Kernel>
 void run_lanes(Kernel&& kernel) {
   if (has_wide_lanes()) return run_wide_lanes(kernel);
   kernel(NarrowLanes());
 }
 
-/// 0 to 7.
+/// Calls `kernel` with as many lanes as the processor has registers for.
+template <class Kernel>
+void run_most_lanes(Kernel&& kernel) {
+  if constexpr (kHasSixteen) {
+    if (has_widest_lanes()) return run_widest_lanes(kernel);
+  }
+  run_lanes(kernel);
+}
+
+/// 0 to 7, or to 15.
 template <class Int>
 Int lane_numbers() {
-  alignas(32) static constexpr std::int32_t kNumbers[kLanes] = {0, 1, 2, 3, 4, 5, 6, 7};
+  alignas(64) static constexpr std::int32_t kNumbers[] = {0, 1, 2,  3,  4,  5,  6,  7,
+                                                          8, 9, 10, 11, 12, 13, 14, 15};
   return Int::load(kNumbers);
+}
+
+/// Writes `first` plus the number of each lane whose bit is set, and whatever is behind these, as
+/// many as there are lanes. Returns how many bits are set.
+template <class Lanes>
+std::size_t put_places(unsigned bits, std::size_t first, std::uint32_t* to) {
+  if constexpr (std::is_same_v<Lanes, WidestLanes>) {
+    using Int = typename Lanes::Int;
+    Int places = lane_numbers<Int>() + Int(static_cast<std::int32_t>(first));
+    compress(bits, places.v);
+    places.store(reinterpret_cast<std::int32_t*>(to));
+    return count_ones(bits);
+  } else {
+    for (std::size_t k = 0; k < Lanes::kCount; ++k) {
+      to[k] = static_cast<std::uint32_t>(first + kPlacesOfBits[bits][k]);
+    }
+    return kOnesUpTo[bits].back();
+  }
+}
+
+/// Which of up to 64 values, a bit each, differ from the one before them, that of the first
+/// included.
+template <class Lanes>
+std::uint64_t find_changes(const std::uint32_t* values, std::size_t count) {
+  using Int = typename Lanes::Int;
+  const auto* const from = reinterpret_cast<const std::int32_t*>(values);
+  std::uint64_t changes = 0;
+  std::size_t i = 0;
+  for (; i + Lanes::kCount <= count; i += Lanes::kCount) {
+    changes |= std::uint64_t{(~same_as_next<Int>(from + i - 1)).bits()} << i;
+  }
+  for (; i < count; ++i) changes |= std::uint64_t{values[i] != *(values + i - 1)} << i;
+  return changes;
 }
 
 /// True in the lanes below `count`.
@@ -217,7 +301,7 @@ struct Places : Lanes {
 
   Places(std::size_t first, std::size_t last) : begin(first), end(last) {}
 
-  std::size_t size() const { return kTail ? end - begin : kLanes; }
+  std::size_t size() const { return kTail ? end - begin : Lanes::kCount; }
   /// Zeros behind the end.
   typename Lanes::Float load(const float* from) const {
     return load_as<typename Lanes::Float>(from);
@@ -236,7 +320,7 @@ struct Places : Lanes {
   template <class Vector, class Value>
   Vector load_as(const Value* from) const {
     if constexpr (!kTail) return Vector::load(from + begin);
-    alignas(32) Value values[kLanes] = {};
+    alignas(64) Value values[Lanes::kCount] = {};
     for (std::size_t i = begin; i < end; ++i) values[i - begin] = from[i];
     return Vector::load(values);
   }
@@ -247,8 +331,8 @@ struct Places : Lanes {
 template <class Lanes, class Kernel>
 void for_places(std::size_t count, Kernel&& kernel) {
   std::size_t begin = 0;
-  for (; begin + kLanes <= count; begin += kLanes) {
-    kernel(Places<Lanes, false>(begin, begin + kLanes));
+  for (; begin + Lanes::kCount <= count; begin += Lanes::kCount) {
+    kernel(Places<Lanes, false>(begin, begin + Lanes::kCount));
   }
   if (begin < count) kernel(Places<Lanes, true>(begin, count));
 }
@@ -267,17 +351,17 @@ struct PaddedPlaces : Places<Lanes, kTail> {
 /// does not fill eight lanes begins earlier if it can.
 template <class Lanes, class Kernel>
 void for_places_again(std::size_t begin, std::size_t end, Kernel&& kernel) {
-  if (end - begin < kLanes) return kernel(PaddedPlaces<Lanes, true>(begin, end));
-  for (; begin + kLanes < end; begin += kLanes) {
-    kernel(PaddedPlaces<Lanes, false>(begin, begin + kLanes));
+  if (end - begin < Lanes::kCount) return kernel(PaddedPlaces<Lanes, true>(begin, end));
+  for (; begin + Lanes::kCount < end; begin += Lanes::kCount) {
+    kernel(PaddedPlaces<Lanes, false>(begin, begin + Lanes::kCount));
   }
-  kernel(PaddedPlaces<Lanes, false>(end - kLanes, end));
+  kernel(PaddedPlaces<Lanes, false>(end - Lanes::kCount, end));
 }
 
 /// As for_places, with the lanes that suit the processor.
 template <class Kernel>
 void for_lanes(std::size_t count, Kernel&& kernel) {
-  run_lanes([&](auto lanes) { for_places<decltype(lanes)>(count, kernel); });
+  run_most_lanes([&](auto lanes) { for_places<decltype(lanes)>(count, kernel); });
 }
 
 }  // namespace dynains::detail

@@ -50,18 +50,22 @@ inline void record_first(ScanSlot& scan, Span<const ClusterVerdict> verdicts) {
 /// Takes in what a later window says of the scan, whose points are cut into other streaks there.
 inline void record_again(ScanSlot& scan, Span<const ClusterSet::Streak> streaks,
                          Span<const ClusterVerdict> verdicts) {
+  // Read once: the compiler cannot know that stores leave members alone.
+  Reach* const reach = scan.reach.data();
+  std::uint8_t* const votes = scan.votes.data();
+  float* const belief = scan.belief.data();
   for (const ClusterSet::Streak& streak : streaks) {
     if (streak.cluster == kNoCluster) continue;
     const ClusterVerdict verdict = verdicts[streak.cluster];
     if (verdict.reach != Reach::kProposed) {
-      raise(scan.reach.data() + streak.begin, streak.end - streak.begin, verdict.reach);
+      raise(reach + streak.begin, streak.end - streak.begin, verdict.reach);
       continue;
     }
     for (std::size_t i = streak.begin; i < streak.end; ++i) {
-      const bool first = scan.reach[i] != Reach::kProposed;
-      scan.reach[i] = Reach::kProposed;
-      scan.votes[i] = static_cast<std::uint8_t>((first ? 0 : scan.votes[i]) + verdict.dynamic);
-      scan.belief[i] = first ? verdict.belief : std::max(scan.belief[i], verdict.belief);
+      const bool first = reach[i] != Reach::kProposed;
+      reach[i] = Reach::kProposed;
+      votes[i] = static_cast<std::uint8_t>((first ? 0 : votes[i]) + verdict.dynamic);
+      belief[i] = first ? verdict.belief : std::max(belief[i], verdict.belief);
     }
   }
 }
@@ -87,6 +91,8 @@ inline void write_by_windows(ScanSlot& scan, Span<const ClusterVerdict> verdicts
   PointLabel* const labels = scan.labels.data();
   Cause* const causes = scan.causes.data();
   std::uint32_t* const instances = scan.instances.data();
+  float* const beliefs = scan.beliefs.data();
+  std::uint8_t* const is_kept = scan.is_kept.data() + ground_count;
   for (const ClusterSet::Streak& streak : scan.streaks) {
     const ClusterVerdict verdict = verdict_on(streak, verdicts);
     const bool dynamic = verdict.dynamic != 0;
@@ -100,8 +106,8 @@ inline void write_by_windows(ScanSlot& scan, Span<const ClusterVerdict> verdicts
     }
     if (verdict.reach != Reach::kProposed) continue;
     for (std::size_t i = streak.begin; i < streak.end; ++i) {
-      scan.beliefs[input[i]] = verdict.belief;
-      scan.is_kept[ground_count + i] = dynamic ? 0 : 1;
+      beliefs[input[i]] = verdict.belief;
+      is_kept[i] = dynamic ? 0 : 1;
     }
   }
 }
@@ -123,6 +129,12 @@ inline void rewrite_by_windows(ScanSlot& scan, int votes) {
   const std::uint32_t* const input = scan.split.input.data() + ground_count;
   const Reach* const reach = scan.reach.data();
   const Reach* const first_reach = scan.first_reach.data();
+  const std::uint8_t* const said = scan.votes.data();
+  const float* const belief = scan.belief.data();
+  std::uint8_t* const is_kept = scan.is_kept.data() + ground_count;
+  PointLabel* const labels = scan.labels.data();
+  Cause* const causes = scan.causes.data();
+  float* const beliefs = scan.beliefs.data();
   const std::size_t count = scan.reach.size();
   for (std::size_t begin = 0; begin < count; begin += kLanes) {
     const std::size_t end = std::min(begin + kLanes, count);
@@ -130,11 +142,11 @@ inline void rewrite_by_windows(ScanSlot& scan, int votes) {
     for (std::size_t i = begin; i < end; ++i) {
       if (reach[i] == first_reach[i] && reach[i] != Reach::kProposed) continue;
       const bool proposed = reach[i] == Reach::kProposed;
-      const bool dynamic = proposed && scan.votes[i] >= votes;
-      scan.is_kept[ground_count + i] = dynamic ? 0 : 1;
-      scan.labels[input[i]] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
-      scan.causes[input[i]] = dynamic ? Cause::kProposed : cause_to_stay(reach[i]);
-      if (proposed) scan.beliefs[input[i]] = scan.belief[i];
+      const bool dynamic = proposed && said[i] >= votes;
+      is_kept[i] = dynamic ? 0 : 1;
+      labels[input[i]] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
+      causes[input[i]] = dynamic ? Cause::kProposed : cause_to_stay(reach[i]);
+      if (proposed) beliefs[input[i]] = belief[i];
     }
   }
 }

@@ -22,8 +22,8 @@ class ZoneTable {
   explicit ZoneTable(const std::array<float, kZoneCount>& values)
       : first_(values[0]), steps_{values[0], values[0], values[0]}, places_(values[0]) {
     for (std::size_t i = 1; i < kZoneCount; ++i) {
-      steps_[i - 1] = Constant8(values[i - 1]).bits_changed(Constant8(values[i]));
-      places_.values[kLanes - i] = values[i];
+      steps_[i - 1] = LaneConstant(values[i - 1]).bits_changed(LaneConstant(values[i]));
+      for (const std::size_t lanes : {kLanes, kMostLanes}) places_.values[lanes - i] = values[i];
     }
   }
 
@@ -34,14 +34,16 @@ class ZoneTable {
                     (beyond[2] & bits_of(Float8(steps_[2]))));
   }
   /// A mask counts as -1, so that later zones have their places from the end of the table on.
-  WideFloat8 at(const BeyondEdges<WideMask8>& beyond) const {
-    return permuted(WideFloat8(places_), WideInt8(beyond[0].v + beyond[1].v + beyond[2].v));
+  template <int kCount>
+  WideFloat<kCount> at(const BeyondEdges<WideMask<kCount>>& beyond) const {
+    return permuted(WideFloat<kCount>(places_),
+                    WideInt<kCount>(beyond[0].v + beyond[1].v + beyond[2].v));
   }
 
  private:
-  Constant8 first_;
-  std::array<Constant8, kZoneCount - 1> steps_;
-  Constant8 places_;
+  LaneConstant first_;
+  std::array<LaneConstant, kZoneCount - 1> steps_;
+  LaneConstant places_;
 };
 
 }  // namespace dynains::detail
