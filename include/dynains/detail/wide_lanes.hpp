@@ -214,7 +214,11 @@ template <class Kernel>
 }
 inline bool has_wide_lanes() { return __builtin_cpu_supports("avx2") != 0; }
 /// Not where they slow the processor down, as they did when they were new: VBMI2 came later.
-inline bool has_widest_lanes() { return kHasSixteen && __builtin_cpu_supports("avx512vbmi2") != 0; }
+inline bool has_widest_lanes() {
+  return kHasSixteen && __builtin_cpu_supports("avx512vbmi2") != 0 &&
+         __builtin_cpu_supports("avx512bw") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
+         __builtin_cpu_supports("avx512vl") != 0;
+}
 #else
 template <class Kernel>
 void run_wide_lanes(Kernel& kernel) {
@@ -293,7 +297,7 @@ typename Lanes::Mask lanes_below(std::size_t count) {
   return lane_numbers<Int>() < Int(static_cast<std::int32_t>(count));
 }
 
-/// Eight neighbouring places of some arrays; fewer at their end, if `kTail`.
+/// Neighbouring places of some arrays, as many as there are lanes; fewer at their end, if `kTail`.
 template <class Lanes, bool kTail>
 struct Places : Lanes {
   std::size_t begin;
@@ -326,8 +330,8 @@ struct Places : Lanes {
   }
 };
 
-/// Calls `kernel(Places)` for all of `count` places, eight by eight and from the first on; within a
-/// kernel that has its lanes already.
+/// Calls `kernel(Places)` for all of `count` places, from the first on; within a kernel that has
+/// its lanes already.
 template <class Lanes, class Kernel>
 void for_places(std::size_t count, Kernel&& kernel) {
   std::size_t begin = 0;
@@ -348,7 +352,7 @@ struct PaddedPlaces : Places<Lanes, kTail> {
 };
 
 /// Calls `kernel(PaddedPlaces)` for the places from `begin` to `end`, for some of them twice: what
-/// does not fill eight lanes begins earlier if it can.
+/// does not fill all lanes begins earlier if it can.
 template <class Lanes, class Kernel>
 void for_places_again(std::size_t begin, std::size_t end, Kernel&& kernel) {
   if (end - begin < Lanes::kCount) return kernel(PaddedPlaces<Lanes, true>(begin, end));
