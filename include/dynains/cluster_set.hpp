@@ -107,7 +107,7 @@ class ClusterSet {
     for (std::size_t i = 1; i < cluster_of.size(); i += kWord) {
       detail::grow(streaks_, streak_count_ + kWord + 1);
       const std::uint64_t changes = detail::find_changes<Lanes>(
-          cluster_of.data() + i, std::min(kWord, cluster_of.size() - i));
+          std::min(kWord, cluster_of.size() - i), cluster_of.data() + i);
       detail::for_each_bit(changes, [&](std::size_t at) { end_at(i + at); });
     }
     detail::grow(streaks_, streak_count_ + 1);

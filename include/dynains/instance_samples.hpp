@@ -81,18 +81,14 @@ class InstanceSampler {
     std::uint64_t changes = 0;
     run_lanes([&](auto lanes) {
       using Lanes = decltype(lanes);
-      using Int = typename Lanes::Int;
       for_places<Lanes>(points.size(), [&](const auto& at) {
         floor(at.load(points.x.data()) * per_metre).store(&voxel[0][at.begin + 1]);
         floor(at.load(points.y.data()) * per_metre).store(&voxel[1][at.begin + 1]);
         floor(at.load(points.z.data()) * per_metre).store(&voxel[2][at.begin + 1]);
       });
       for (auto& line : voxel) line[0] = 0;
-      for (std::size_t i = 0; i < points.size(); i += kLanes) {
-        const auto same = same_as_next<Int>(&voxel[0][i]) & same_as_next<Int>(&voxel[1][i]) &
-                          same_as_next<Int>(&voxel[2][i]);
-        changes |= std::uint64_t{(~same).bits()} << i;
-      }
+      changes =
+          detail::find_changes<Lanes>(points.size(), &voxel[0][1], &voxel[1][1], &voxel[2][1]);
     });
     return changes | 1;
   }

@@ -275,23 +275,16 @@ class StaticMapAccumulator {
     std::size_t chosen = 0;
     detail::run_most_lanes([&](auto lanes) {
       using Lanes = decltype(lanes);
-      using Int = typename Lanes::Int;
       constexpr std::size_t kWord = 64;
       std::uint64_t was_kept = 0;
       for (std::size_t begin = 0; begin < count; begin += kWord) {
         const std::size_t size = std::min(kWord, count - begin);
         const std::uint64_t kept = keep.empty() ? ~std::uint64_t{0} >> (kWord - size)
                                                 : detail::nonzero_bytes(keep.data() + begin, size);
-        std::uint64_t stays = 0;
-        for (std::size_t i = 0; i < size; i += Lanes::kCount) {
-          const auto same = [&](const std::int32_t* of) {
-            return detail::same_as_next<Int>(of + kBefore + begin + i);
-          };
-          const auto all_same = same(batch.block[0]) & same(batch.block[1]) & same(batch.block[2]) &
-                                same(batch.voxel);
-          stays |= std::uint64_t{all_same.bits()} << i;
-        }
-        const std::uint64_t repeats = keep_all_ ? 0 : stays & (kept << 1U | was_kept);
+        const std::size_t at = Batch::kFirst + begin;
+        const std::uint64_t changes = detail::find_changes<Lanes>(
+            size, &batch.block[0][at], &batch.block[1][at], &batch.block[2][at], &batch.voxel[at]);
+        const std::uint64_t repeats = keep_all_ ? 0 : ~changes & (kept << 1U | was_kept);
         was_kept = kept >> (kWord - 1);
         for (std::size_t i = 0; i < size; i += Lanes::kCount) {
           const auto which = static_cast<unsigned>((kept & ~repeats) >> i & Lanes::kAll);

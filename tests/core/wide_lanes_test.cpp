@@ -202,7 +202,7 @@ TEST_CASE("places are put by bits, and changes are found, as value by value") {
       for (std::size_t i = 0; i < count; ++i) {
         changes |= std::uint64_t{values[i + 1] != values[i]} << i;
       }
-      CHECK(detail::find_changes<Lanes>(values.data() + 1, count) == changes);
+      CHECK(detail::find_changes<Lanes>(count, values.data() + 1) == changes);
     }
   };
   check(detail::NarrowLanes());

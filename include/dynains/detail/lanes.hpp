@@ -254,10 +254,4 @@ inline std::uint64_t nonzero_bytes(const std::uint8_t* from, std::size_t count) 
   return nonzero_bytes(padded);
 }
 
-/// Which of eight values equal the next one; reads nine.
-template <class Int>
-auto same_as_next(const std::int32_t* values) {
-  return Int::load(values) == Int::load(values + 1);
-}
-
 }  // namespace dynains::detail

@@ -3,7 +3,6 @@
 // for other registers.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 
 #include "dynains/detail/lanes.hpp"
@@ -65,14 +64,9 @@ void multiply_by(const Vector& factor, Vector& of) {
   of *= factor;
 }
 
-/// Brings the numbers whose bits are set to the front; behind them is anything.
+/// Brings the numbers whose bits are set to the front; behind them is anything. For sixteen only.
 template <class Vector>
-void compress(unsigned bits, Vector& of) {
-  for (std::size_t from = 0, to = 0; from < sizeof(Vector) / sizeof(of[0]); ++from) {
-    of[to] = of[from];
-    to += bits >> from & 1U;
-  }
-}
+void compress(unsigned bits, Vector& of);
 
 #if defined(__x86_64__) && defined(__SSE2__) && !defined(__clang__)
 [[gnu::target("avx2")]] inline unsigned sign_bits(const Ints8& of) {

@@ -189,7 +189,7 @@ struct NarrowLanes {
   using Int = Int8;
   using Mask = Mask8;
   static constexpr std::size_t kCount = kLanes;
-  static constexpr unsigned kAll = 0xFF;  ///< a bit for each
+  static constexpr unsigned kAll = (1U << kCount) - 1U;  ///< a bit for each
 };
 template <int kLaneCount>
 struct RegisterLanes {
@@ -275,18 +275,23 @@ std::size_t put_places(unsigned bits, std::size_t first, std::uint32_t* to) {
   }
 }
 
-/// Which of up to 64 values, a bit each, differ from the one before them, that of the first
-/// included.
-template <class Lanes>
-std::uint64_t find_changes(const std::uint32_t* values, std::size_t count) {
+/// Which of up to 64 places, a bit each, differ from the one before them in any of some arrays of
+/// 32 bits a value; that before the first is read, too.
+template <class Lanes, class... Values>
+std::uint64_t find_changes(std::size_t count, const Values*... values) {
   using Int = typename Lanes::Int;
-  const auto* const from = reinterpret_cast<const std::int32_t*>(values);
   std::uint64_t changes = 0;
   std::size_t i = 0;
   for (; i + Lanes::kCount <= count; i += Lanes::kCount) {
-    changes |= std::uint64_t{(~same_as_next<Int>(from + i - 1)).bits()} << i;
+    const auto load = [i](const auto* from) {
+      return Int::load(reinterpret_cast<const std::int32_t*>(from + i));
+    };
+    const auto same = ((load(values) == load(values - 1)) & ...);
+    changes |= std::uint64_t{(~same).bits()} << i;
   }
-  for (; i < count; ++i) changes |= std::uint64_t{values[i] != *(values + i - 1)} << i;
+  for (; i < count; ++i) {
+    changes |= std::uint64_t{((*(values + i) != *(values + i - 1)) || ...)} << i;
+  }
   return changes;
 }
 
