@@ -347,7 +347,7 @@ class BasicDynaInsRemover {
     detail::record_first(newest, verdict_);
     if (config_.votes == 0) return;
     for (std::uint64_t scan = window_first_; scan + 1 < pushed_; ++scan) {
-      detail::record_again(slot(scan), clusters_.streaks(scan - window_first_), verdict_);
+      detail::record_again(slot(scan), clusters_.streaks(scan - window_first_), verdict_, said_);
     }
   }
 
@@ -457,6 +457,7 @@ class BasicDynaInsRemover {
   std::vector<std::uint32_t> scan_begin_;
   ClusterSet clusters_;
   std::vector<detail::ClusterVerdict> verdict_;
+  std::vector<detail::Reach> said_;  // of one scan, by the window at hand
   detail::VerdictScratch verdict_scratch_;
   detail::InstanceIds instance_ids_;
 

@@ -1,5 +1,6 @@
 // What is written in order and by streak, against what it means point by point.
 #include <algorithm>
+#include <array>
 #include <map>
 #include <numeric>
 #include <utility>
@@ -20,11 +21,14 @@ using Streak = ClusterSet::Streak;
 
 constexpr std::uint32_t kClusters = 6;
 
-// Streaks of random length, a cluster each or none.
+constexpr std::array<Reach, 4> kReaches = {Reach::kNoCluster, Reach::kTooFewScans, Reach::kSimilar,
+                                           Reach::kProposed};
+
+// Streaks of random length, mostly short, a cluster each or none.
 std::vector<Streak> random_streaks(Random& random, std::uint32_t points) {
   std::vector<Streak> streaks;
   for (std::uint32_t begin = 0; begin < points;) {
-    const auto length = static_cast<std::uint32_t>(1 + random.index(9));
+    const auto length = static_cast<std::uint32_t>(1 + random.index(random.index(4) == 0 ? 50 : 9));
     const std::uint32_t end = std::min(points, begin + length);
     const std::size_t cluster = random.index(kClusters + 1);
     streaks.push_back(
@@ -45,7 +49,7 @@ std::vector<std::uint32_t> by_point(const std::vector<Streak>& streaks) {
 std::vector<ClusterVerdict> random_verdicts(Random& random) {
   std::vector<ClusterVerdict> verdicts(kClusters);
   for (ClusterVerdict& verdict : verdicts) {
-    verdict.reach = static_cast<Reach>(1 + random.index(3));
+    verdict.reach = kReaches[1 + random.index(3)];
     if (verdict.reach != Reach::kProposed) continue;
     verdict.dynamic = static_cast<std::uint8_t>(random.index(2));
     verdict.belief = random.uniform_float(0.0, 1.0);
@@ -69,7 +73,8 @@ struct Said {
 };
 
 TEST_CASE("verdicts by streak are those by point, at once and after more windows") {
-  detail::ScanSlot scan;  // the same object for all, as in the pipeline
+  detail::ScanSlot scan;    // the same object for all, as in the pipeline
+  std::vector<Reach> room;  // the same, too
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     INFO("seed " << seed);
     Random random(seed);
@@ -134,7 +139,7 @@ TEST_CASE("verdicts by streak are those by point, at once and after more windows
       const std::vector<Streak> streaks = random_streaks(random, points);
       const std::vector<ClusterVerdict> verdicts = random_verdicts(random);
       hear(streaks, verdicts);
-      detail::record_again(scan, streaks, verdicts);
+      detail::record_again(scan, streaks, verdicts, room);
     }
     const int votes = 1 + static_cast<int>(random.index(3));
     detail::rewrite_by_windows(scan, votes);
@@ -187,7 +192,7 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
     const std::size_t above = scan.group_of.size();
     if (compared) {
       for (std::size_t i = 0; i < above; ++i) {
-        slot.reach.push_back(static_cast<Reach>(random.index(4)));
+        slot.reach.push_back(kReaches[random.index(4)]);
         slot.votes.push_back(static_cast<std::uint8_t>(random.index(4)));
         slot.belief.push_back(random.uniform_float(0.0, 1.0));
       }

@@ -16,19 +16,23 @@
 
 namespace dynains::detail {
 
-/// How far a point came on its way to a verdict by windows (Eq. 11-19).
-enum class Reach : std::uint8_t { kNoCluster, kTooFewScans, kSimilar, kProposed };
-
-/// Points that came farther before stay as they are.
-inline void raise(Reach* reach, std::size_t count, Reach at_least) {
-  for (std::size_t i = 0; i < count; ++i) reach[i] = reach[i] < at_least ? at_least : reach[i];
-}
+/// How far a point came on its way to a verdict by windows (Eq. 11-19). Each has the bits of those
+/// before it: the farther of two is their bitwise or.
+enum class Reach : std::uint8_t { kNoCluster = 0, kTooFewScans = 1, kSimilar = 3, kProposed = 7 };
 
 /// Why it is static all the same.
 constexpr Cause cause_to_stay(Reach reach) {
-  constexpr Cause kCauses[] = {Cause::kNotJudged, Cause::kTooFewScans, Cause::kSimilar,
-                               Cause::kReverted};
-  return kCauses[static_cast<std::size_t>(reach)];
+  switch (reach) {
+    case Reach::kTooFewScans:
+      return Cause::kTooFewScans;
+    case Reach::kSimilar:
+      return Cause::kSimilar;
+    case Reach::kProposed:
+      return Cause::kReverted;
+    case Reach::kNoCluster:
+      break;
+  }
+  return Cause::kNotJudged;
 }
 
 /// A scan and all that is known of it. Reused from scan to scan.
@@ -40,7 +44,8 @@ struct ScanSlot {
   Eigen::Isometry3d T_world_level = Eigen::Isometry3d::Identity();  // of the points of the split
 
   GroundSplit split;
-  // By non-ground point, in the order of the split; empty if windows are not compared.
+  // By non-ground point, in the order of the split; empty if windows are not compared. Of `reach`,
+  // some more are written.
   std::vector<Reach> reach;         // how far it came in the window in which it came farthest
   std::vector<Reach> first_reach;   // the same, of its first window
   std::vector<std::uint8_t> votes;  // if it was proposed: windows that called it dynamic

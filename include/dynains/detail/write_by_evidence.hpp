@@ -139,7 +139,7 @@ inline void write_by_evidence(ScanSlot& scan, const EvidenceVerdict& said, bool 
   write_ground(scan, said.ground);
   if (!compared) return;
   const std::uint32_t* const input = scan.split.input.data() + scan.split.ground_count;
-  for (std::size_t i = 0; i < scan.reach.size(); ++i) {
+  for (std::size_t i = 0; i < said.group_of.size(); ++i) {
     if (scan.reach[i] != Reach::kProposed) continue;
     write_one(scan, input[i], with_windows(scan, i, 1, verdicts[group_of[input[i]]]));
   }

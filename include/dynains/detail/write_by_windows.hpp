@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -11,6 +12,7 @@
 #include "dynains/cluster_set.hpp"
 #include "dynains/detail/bits.hpp"
 #include "dynains/detail/lanes.hpp"
+#include "dynains/detail/room.hpp"
 #include "dynains/detail/scan_slot.hpp"
 #include "dynains/points.hpp"
 
@@ -29,45 +31,75 @@ inline ClusterVerdict verdict_on(const ClusterSet::Streak& streak,
   return streak.cluster != kNoCluster ? verdicts[streak.cluster] : ClusterVerdict();
 }
 
+/// Points that are written at once.
+inline constexpr std::size_t kReachPiece = 16;
+
+/// Writes to each point how far the cluster of its streak came, and to some more behind the last
+/// one. Most streaks are short: they are written in pieces that reach over the next one, which
+/// takes back what is its own, so that the processor need not foretell lengths.
+inline void spread_reach(Span<const ClusterSet::Streak> streaks,
+                         Span<const ClusterVerdict> verdicts, Reach* reach) {
+  for (const ClusterSet::Streak& streak : streaks) {
+    std::array<Reach, kReachPiece> piece;
+    piece.fill(verdict_on(streak, verdicts).reach);
+    for (std::size_t i = streak.begin; i < streak.end; i += kReachPiece) {
+      std::memcpy(reach + i, piece.data(), sizeof(piece));
+    }
+  }
+}
+
+/// Each point has come as far as either says. Pieces are read and written as a whole.
+inline void join_reach(const Reach* said, std::size_t count, Reach* reach) {
+  for (std::size_t i = 0; i < count; i += kReachPiece) {
+    for (std::size_t word = i; word < i + kReachPiece; word += sizeof(std::uint64_t)) {
+      std::uint64_t a, b;
+      std::memcpy(&a, reach + word, sizeof(a));
+      std::memcpy(&b, said + word, sizeof(b));
+      a |= b;
+      std::memcpy(reach + word, &a, sizeof(a));
+    }
+  }
+}
+
 /// Takes in what the window in which the scan is the newest says of it. Its streaks and ids are
 /// known.
 inline void record_first(ScanSlot& scan, Span<const ClusterVerdict> verdicts) {
   const std::size_t count = scan.non_ground_count();
   scan.votes.resize(count);
   scan.belief.resize(count);
-  scan.reach.resize(count);
+  scan.reach.resize(count + kReachPiece);
+  spread_reach(scan.streaks, verdicts, scan.reach.data());
+  scan.first_reach = scan.reach;
   for (const ClusterSet::Streak& streak : scan.streaks) {
-    const std::size_t length = streak.end - streak.begin;
     const ClusterVerdict verdict = verdict_on(streak, verdicts);
-    std::fill_n(scan.reach.data() + streak.begin, length, verdict.reach);
     if (verdict.reach != Reach::kProposed) continue;
+    const std::size_t length = streak.end - streak.begin;
     std::fill_n(scan.votes.data() + streak.begin, length, verdict.dynamic);
     std::fill_n(scan.belief.data() + streak.begin, length, verdict.belief);
   }
-  scan.first_reach = scan.reach;
 }
 
 /// Takes in what a later window says of the scan, whose points are cut into other streaks there.
+/// `said` is overwritten: by streak, with nothing read back that was just written, and then joined
+/// with what was known as a whole.
 inline void record_again(ScanSlot& scan, Span<const ClusterSet::Streak> streaks,
-                         Span<const ClusterVerdict> verdicts) {
+                         Span<const ClusterVerdict> verdicts, std::vector<Reach>& said) {
   // Read once: the compiler cannot know that stores leave members alone.
   Reach* const reach = scan.reach.data();
   std::uint8_t* const votes = scan.votes.data();
   float* const belief = scan.belief.data();
   for (const ClusterSet::Streak& streak : streaks) {
-    if (streak.cluster == kNoCluster) continue;
-    const ClusterVerdict verdict = verdicts[streak.cluster];
-    if (verdict.reach != Reach::kProposed) {
-      raise(reach + streak.begin, streak.end - streak.begin, verdict.reach);
-      continue;
-    }
+    const ClusterVerdict verdict = verdict_on(streak, verdicts);
+    if (verdict.reach != Reach::kProposed) continue;
     for (std::size_t i = streak.begin; i < streak.end; ++i) {
       const bool first = reach[i] != Reach::kProposed;
-      reach[i] = Reach::kProposed;
       votes[i] = static_cast<std::uint8_t>((first ? 0 : votes[i]) + verdict.dynamic);
       belief[i] = first ? verdict.belief : std::max(belief[i], verdict.belief);
     }
   }
+  grow(said, scan.reach.size());
+  spread_reach(streaks, verdicts, said.data());
+  join_reach(said.data(), scan.non_ground_count(), reach);
 }
 
 /// What holds unless a later stage says something else: good points are labelled as ground.
@@ -115,11 +147,11 @@ inline void write_by_windows(ScanSlot& scan, Span<const ClusterVerdict> verdicts
 /// Of eight points from `i` on: whether some window believed in one or brought one farther than the
 /// first one did.
 inline bool any_news(const Reach* reach, const Reach* first_reach, std::size_t i) {
-  static_assert(static_cast<unsigned>(Reach::kProposed) == 3, "the only one with both bits set");
+  static_assert(static_cast<unsigned>(Reach::kProposed) == 7, "the only one with that bit");
   std::uint64_t now, before;
   std::memcpy(&now, reach + i, sizeof(now));
   std::memcpy(&before, first_reach + i, sizeof(before));
-  return now != before || (now & now >> 1U & kInEachByte) != 0;
+  return now != before || (now & kInEachByte << 2U) != 0;
 }
 
 /// The final verdict by windows: dynamic is what at least `votes` of them said it is. Only points
@@ -135,18 +167,20 @@ inline void rewrite_by_windows(ScanSlot& scan, int votes) {
   PointLabel* const labels = scan.labels.data();
   Cause* const causes = scan.causes.data();
   float* const beliefs = scan.beliefs.data();
-  const std::size_t count = scan.reach.size();
+  const std::size_t count = scan.non_ground_count();
   for (std::size_t begin = 0; begin < count; begin += kLanes) {
     const std::size_t end = std::min(begin + kLanes, count);
     if (end - begin == kLanes && !any_news(reach, first_reach, begin)) continue;
     for (std::size_t i = begin; i < end; ++i) {
-      if (reach[i] == first_reach[i] && reach[i] != Reach::kProposed) continue;
-      const bool proposed = reach[i] == Reach::kProposed;
-      const bool dynamic = proposed && said[i] >= votes;
+      if (reach[i] != Reach::kProposed) {
+        if (reach[i] != first_reach[i]) causes[input[i]] = cause_to_stay(reach[i]);
+        continue;
+      }
+      const bool dynamic = said[i] >= votes;
       is_kept[i] = dynamic ? 0 : 1;
       labels[input[i]] = dynamic ? PointLabel::kDynamic : PointLabel::kStatic;
-      causes[input[i]] = dynamic ? Cause::kProposed : cause_to_stay(reach[i]);
-      if (proposed) beliefs[input[i]] = belief[i];
+      causes[input[i]] = dynamic ? Cause::kProposed : Cause::kReverted;
+      beliefs[input[i]] = belief[i];
     }
   }
 }
