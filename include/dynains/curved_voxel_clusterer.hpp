@@ -193,7 +193,7 @@ class CurvedVoxelClusterer {
   }
 
   // The grid covers only the elevations that occur. It is all zero between calls. Neighbours in a
-  // scan mostly mark the same word, which would have to wait for its own last change: four
+  // scan mostly mark the same word, which would have to wait for its own last change: six
   // stretches of the points take turns.
   void mark_cells(std::size_t count) {
     if (highest_elevation_ < 0) return;
@@ -211,7 +211,7 @@ class CurvedVoxelClusterer {
       const std::size_t cell = cell_of[i] - first_cell;
       occupied[cell / kBlock] |= std::uint64_t{1} << cell % kBlock;
     };
-    constexpr std::size_t kStretches = 4;
+    constexpr std::size_t kStretches = 6;
     const std::size_t length = count / kStretches;
     for (std::size_t i = 0; i < length; ++i) {
       for (std::size_t k = 0; k < kStretches; ++k) mark(i + k * length);

@@ -38,18 +38,21 @@ class PatchSort {
 
  private:
   static constexpr std::size_t kStrands = 4;
+  static constexpr std::size_t kHalves = 2 * kStrands;
   static constexpr std::size_t kStep = 4;   // points of a strand in turn
   static constexpr std::size_t kAhead = 8;  // records: where the next but one line begins
 
+  // By halves of strands.
   void count_points(const std::int32_t* patch_of, std::size_t count) {
     for (auto& counts : count_) counts.fill(0);
-    const auto add = [&](std::size_t strand, std::size_t i) {
-      ++count_[strand][static_cast<std::size_t>(patch_of[i])];
+    const auto add = [&](std::size_t half, std::size_t i) {
+      ++count_[half][static_cast<std::size_t>(patch_of[i])];
     };
-    for (std::size_t i = 0; i < strand_length_; ++i) {
-      for (std::size_t s = 0; s < kStrands; ++s) add(s, i + s * strand_length_);
+    const std::size_t length = strand_length_ / 2;
+    for (std::size_t i = 0; i < length; ++i) {
+      for (std::size_t h = 0; h < kHalves; ++h) add(h, i + h * length);
     }
-    for (std::size_t i = kStrands * strand_length_; i < count; ++i) add(kStrands - 1, i);
+    for (std::size_t i = kHalves * length; i < count; ++i) add(kHalves - 1, i);
   }
 
   // Where the points of each strand begin within their patch.
@@ -59,7 +62,7 @@ class PatchSort {
       begin_[p] = static_cast<std::size_t>(to - sorted_.data());
       for (std::size_t s = 0; s < kStrands; ++s) {
         next_[s][p] = to;
-        to += count_[s][p];
+        to += count_[2 * s][p] + count_[2 * s + 1][p];
       }
     }
     begin_[kPatches] = static_cast<std::size_t>(to - sorted_.data());
@@ -87,7 +90,7 @@ class PatchSort {
   }
 
   std::size_t strand_length_ = 0;
-  std::array<std::array<std::uint32_t, kPatches>, kStrands> count_{};
+  std::array<std::array<std::uint32_t, kPatches>, kHalves> count_{};
   std::array<std::array<PointRecord*, kPatches>, kStrands> next_{};
   std::array<std::size_t, kPatches + 1> begin_{};
   std::vector<PointRecord> sorted_;
