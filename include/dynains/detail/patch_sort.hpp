@@ -43,6 +43,7 @@ class PatchSort {
   static constexpr std::size_t kAhead = 8;  // records: where the next but one line begins
 
   // By halves of strands.
+  static_assert(kStep % 2 == 0, "strands have halves");
   void count_points(const std::int32_t* patch_of, std::size_t count) {
     for (auto& counts : count_) counts.fill(0);
     const auto add = [&](std::size_t half, std::size_t i) {

@@ -44,8 +44,8 @@ struct ScanSlot {
   Eigen::Isometry3d T_world_level = Eigen::Isometry3d::Identity();  // of the points of the split
 
   GroundSplit split;
-  // By non-ground point, in the order of the split; empty if windows are not compared. Of `reach`,
-  // some more are written.
+  // By non-ground point, in the order of the split; empty if windows are not compared. Reach is
+  // written in pieces, and has room for some more points.
   std::vector<Reach> reach;         // how far it came in the window in which it came farthest
   std::vector<Reach> first_reach;   // the same, of its first window
   std::vector<std::uint8_t> votes;  // if it was proposed: windows that called it dynamic
