@@ -41,8 +41,10 @@ struct Mask8 {
 #else
     unsigned result = 0;
     for (int i = 0; i < 4; ++i) {
-      result |= (lo[i] != 0 ? 1U : 0U) << i;
-      result |= (hi[i] != 0 ? 1U : 0U) << (i + 4);
+      // By themselves: in one expression, UBSan of GCC 12 reads another lane than it shifts by.
+      const bool low = lo[i] != 0;
+      const bool high = hi[i] != 0;
+      result |= unsigned{low} << i | unsigned{high} << (i + 4);
     }
     return result;
 #endif
