@@ -367,7 +367,10 @@ void Recording::place_scans(const fs::path& file) {
       missing = scans_[i].name;
     }
   }
-  if (placed.empty()) fail(file, "has no pose for any scan; check --pose-shift");
+  if (placed.empty()) {
+    // Those of VIEWPOINT have no file of their own.
+    fail(file.empty() ? scan_folder_ : file, "has no pose for any scan; check --pose-shift");
+  }
   if (placed.size() < all) {
     notes_.push_back(std::to_string(all - placed.size()) + " of " + std::to_string(all) +
                      " scans have no pose and are left out, " + missing + " first");

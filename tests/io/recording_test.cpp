@@ -136,6 +136,19 @@ TEST_CASE("A shift gives every scan the pose of a neighbour") {
   CHECK_THAT(error_of(folder.path(), options), ContainsSubstring("no pose for any scan"));
 }
 
+TEST_CASE("If a shift leaves no pose, the message names where poses are") {
+  const TemporaryFolder folder;
+  write_text(folder / "pcd/1.pcd", pcd({1, 0, 0}, "1 2 3 1 0 0 0"));
+  RecordingOptions options;
+  options.convention.shift = 1;
+  const std::string scans = (folder / "pcd").string();
+  CHECK_THAT(error_of(folder.path(), options), StartsWith(scans + ": has no pose for any scan"));
+  write_text(folder / "poses.txt", tum(1, 10));
+  options.poses = folder / "poses.txt";
+  CHECK_THAT(error_of(folder.path(), options),
+             StartsWith(options.poses.string() + ": has no pose for any scan"));
+}
+
 TEST_CASE("A KITTI folder is the same as a KittiSequence") {
   const TemporaryFolder folder;
   for (const char* name : {"000002", "000003"}) {
