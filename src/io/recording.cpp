@@ -253,7 +253,7 @@ void Recording::read_poses() {
   }
   read_calibration(file);
   match_scans(file);
-  place_scans(file);
+  place_scans(has_viewpoints_ ? scan_folder_ : file);
 }
 
 std::optional<std::vector<double>> Recording::times_of_names() const {
@@ -352,8 +352,8 @@ void Recording::match_scans(const fs::path& file) {
   if (!times && trajectory_.times.empty()) notes_.push_back("no times: 0.1 s from scan to scan");
 }
 
-/// Gives each scan its pose and leaves out those without.
-void Recording::place_scans(const fs::path& file) {
+/// Gives each scan its pose and leaves out those without. `poses`: file or folder that has them.
+void Recording::place_scans(const fs::path& poses) {
   const std::size_t all = scans_.size();
   std::vector<Scan> placed;
   std::string missing;
@@ -367,10 +367,7 @@ void Recording::place_scans(const fs::path& file) {
       missing = scans_[i].name;
     }
   }
-  if (placed.empty()) {
-    // Those of VIEWPOINT have no file of their own.
-    fail(file.empty() ? scan_folder_ : file, "has no pose for any scan; check --pose-shift");
-  }
+  if (placed.empty()) fail(poses, "has no pose for any scan; check --pose-shift");
   if (placed.size() < all) {
     notes_.push_back(std::to_string(all - placed.size()) + " of " + std::to_string(all) +
                      " scans have no pose and are left out, " + missing + " first");

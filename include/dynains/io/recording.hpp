@@ -149,7 +149,7 @@ class Recording {
   void match_scans(const std::filesystem::path& poses_file);
   void match_rows(const std::filesystem::path& poses_file);
   void match_times(const std::filesystem::path& poses_file, const std::vector<double>& times);
-  void place_scans(const std::filesystem::path& poses_file);
+  void place_scans(const std::filesystem::path& poses);
   void find_columns();
   PointFrame guess_frame() const;
 
