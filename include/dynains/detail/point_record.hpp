@@ -99,7 +99,7 @@ std::array<typename Lanes::Float, 4> load_columns(const PointRecord* from) {
   std::array<typename Lanes::Float, 4> result;
   if constexpr (std::is_same_v<Lanes, WidestLanes>) {
     for (std::size_t k = 0; k < 4; ++k) {
-      std::memcpy(&result[k].v, from + kRecordsInSixteen * k, sizeof(Floats16));
+      load_vector(from + kRecordsInSixteen * k, result[k].v);
     }
     return transposed(result);
   } else if constexpr (std::is_same_v<Lanes, WideLanes>) {
@@ -134,9 +134,9 @@ std::size_t move_some_to_front(const PointRecord* from, std::size_t count, unsig
       for (std::size_t k = 0; k < count; k += kRecordsInSixteen) {
         const unsigned which = bits >> k & 0xFU;
         Floats16 four;
-        std::memcpy(&four, from + k, sizeof(four));
+        load_vector(from + k, four);
         compress(kNumbers[which], four);
-        std::memcpy(static_cast<void*>(to + moved), &four, sizeof(four));
+        store_vector(four, to + moved);
         moved += count_ones(which);
       }
       return moved;

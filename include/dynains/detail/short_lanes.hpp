@@ -91,10 +91,10 @@ struct WideShort {
 
   static WideShort load(const std::int16_t* from) {
     WideShort result;
-    std::memcpy(&result.v, from, sizeof(Vector));
+    load_vector(from, result.v);
     return result;
   }
-  void store(std::int16_t* to) const { std::memcpy(to, &v, sizeof(Vector)); }
+  void store(std::int16_t* to) const { store_vector(v, to); }
   void store_interleaved_with(const WideShort& other, std::int16_t* to) const {
     store_interleaved(to, low(v), low(other.v));
     store_interleaved(to + 16, high(v), high(other.v));

@@ -32,6 +32,21 @@ struct Vectors<16> {
   using Floats = Floats16;
 };
 
+// Bytes that are copied, as by memcpy, go by halves over the stack wherever GCC may use AVX2 all
+// over: what is loaded as a whole then waits for both. So vectors are read and written as such.
+template <class Vector>
+struct [[gnu::packed, gnu::may_alias]] AnyPlace {
+  Vector vector;
+};
+template <class Vector>
+void load_vector(const void* from, Vector& to) {
+  to = static_cast<const AnyPlace<Vector>*>(from)->vector;
+}
+template <class Vector>
+void store_vector(const Vector& from, void* to) {
+  static_cast<AnyPlace<Vector>*>(to)->vector = from;
+}
+
 // Comparisons set all bits of a lane, or none. These are for any vector; where GCC makes something
 // else of them than one instruction, there are others below.
 template <class Vector, class Mask>

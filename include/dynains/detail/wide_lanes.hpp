@@ -8,7 +8,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <type_traits>
 
 #include "dynains/detail/bits.hpp"
@@ -44,10 +43,10 @@ struct WideInt {
 
   static WideInt load(const std::int32_t* from) {
     WideInt result;
-    std::memcpy(&result.v, from, sizeof(Vector));
+    load_vector(from, result.v);
     return result;
   }
-  void store(std::int32_t* to) const { std::memcpy(to, &v, sizeof(Vector)); }
+  void store(std::int32_t* to) const { store_vector(v, to); }
 
   using I = WideInt;
   using M = WideMask<kCount>;
@@ -88,14 +87,14 @@ struct WideFloat {
   WideFloat() = default;
   explicit WideFloat(const Vector& vector) : v(vector) {}
   explicit WideFloat(float value) { spread(value, v); }
-  WideFloat(const LaneConstant& constant) { std::memcpy(&v, constant.values, sizeof(Vector)); }
+  WideFloat(const LaneConstant& constant) { load_vector(constant.values, v); }
 
   static WideFloat load(const float* from) {
     WideFloat result;
-    std::memcpy(&result.v, from, sizeof(Vector));
+    load_vector(from, result.v);
     return result;
   }
-  void store(float* to) const { std::memcpy(to, &v, sizeof(Vector)); }
+  void store(float* to) const { store_vector(v, to); }
 
   using F = WideFloat;
   using I = WideInt<kCount>;
