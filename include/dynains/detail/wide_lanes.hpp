@@ -248,6 +248,15 @@ void run_most_lanes(Kernel&& kernel) {
   run_lanes(kernel);
 }
 
+#if defined(__clang__)
+// Clang takes into run_wide_lanes what is called there, and more only if told to.
+template <class Lanes, class Kernel>
+[[gnu::always_inline, gnu::flatten]] void for_places(std::size_t count, Kernel&& kernel);
+template <class Lanes, class Kernel>
+[[gnu::always_inline, gnu::flatten]] void for_places_again(std::size_t begin, std::size_t end,
+                                                           Kernel&& kernel);
+#endif
+
 /// 0 to 7, or to 15.
 template <class Int>
 Int lane_numbers() {
