@@ -70,5 +70,20 @@ TEST_CASE("without wide vectors, and without SSE, labels are the same byte for b
   CHECK(bytes_of("instructions.plain") == wide);
 }
 
+TEST_CASE("with AVX2 wherever the compiler likes it, labels are the same byte for byte") {
+  const std::string scans = "avx2.scans";
+  const std::size_t count = write_scans(scans);
+  REQUIRE(label(DYNAINS_LABELS_EXACT, scans, "avx2.chosen") == 0);
+  const int all_over = label(DYNAINS_LABELS_AVX2, scans, "avx2.all_over");
+  if (all_over == 77) {
+    std::cout << "SKIPPED: this processor has no AVX2\n";
+    return;
+  }
+  REQUIRE(all_over == 0);
+  const std::vector<char> chosen = bytes_of("avx2.chosen");
+  REQUIRE(chosen.size() == count);
+  CHECK(bytes_of("avx2.all_over") == chosen);
+}
+
 }  // namespace
 }  // namespace dynains::test

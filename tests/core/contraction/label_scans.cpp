@@ -1,5 +1,6 @@
 // Reads scans, writes the final labels of their points, one byte each. Built with and without fused
-// multiply-add, so that both can be compared. Exits with 77 where the processor has no such thing.
+// multiply-add and AVX2, so that all can be compared. Exits with 77 where the processor lacks what
+// it was built with.
 #include <cstdint>
 #include <fstream>
 #include <vector>
@@ -9,6 +10,9 @@
 int main(int count, char** arguments) {
 #if defined(__FMA__)
   if (!__builtin_cpu_supports("fma")) return 77;
+#endif
+#if defined(__AVX2__)
+  if (!__builtin_cpu_supports("avx2")) return 77;
 #endif
   if (count != 3) return 2;
   std::ifstream scans(arguments[1], std::ios::binary);
