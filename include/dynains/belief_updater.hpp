@@ -82,9 +82,10 @@ class BeliefUpdater {
     }
     const std::size_t cells = vanished + changed + alike;
     if (cells == 0) return;
-    log_odds_ += ((2.0 * static_cast<double>(vanished) + static_cast<double>(changed)) * increment_ +
-                  static_cast<double>(alike) * decrement_) /
-                 static_cast<double>(cells);
+    log_odds_ +=
+        ((2.0 * static_cast<double>(vanished) + static_cast<double>(changed)) * increment_ +
+         static_cast<double>(alike) * decrement_) /
+        static_cast<double>(cells);
   }
 
   double log_odds_value() const { return log_odds_; }

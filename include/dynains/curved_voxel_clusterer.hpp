@@ -11,15 +11,15 @@
 #include <string>
 #include <vector>
 
-#include "dynains/detail/arc_tangent.hpp"
-#include "dynains/detail/bits.hpp"
-#include "dynains/detail/lanes.hpp"
-#include "dynains/detail/room.hpp"
-#include "dynains/detail/wide_lanes.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
-#include "dynains/polar_points.hpp"
-#include "dynains/sensor_model.hpp"
+#include "dynains/sensor/sensor_model.hpp"
+#include "dynains/simd/arc_tangent.hpp"
+#include "dynains/simd/bits.hpp"
+#include "dynains/simd/capacity.hpp"
+#include "dynains/simd/lanes.hpp"
+#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/stage/polar_points.hpp"
 
 namespace dynains {
 
@@ -126,8 +126,8 @@ class CurvedVoxelClusterer {
     find_cells(points);
     mark_cells(points.size());
     // Processors with wide lanes count ones by one instruction.
-    detail::run_lanes([&](auto) { find_runs(); });
-    detail::run_lanes([&](auto) { join_runs(); });
+    detail::run_packs([&](auto) { find_runs(); });
+    detail::run_packs([&](auto) { join_runs(); });
     number_runs();
     number_points(points.size());
     clear_cells();
@@ -144,33 +144,33 @@ class CurvedVoxelClusterer {
   // a column behind the last range. Rows have a power of two of cells: a shift is cheaper than a
   // product.
   void find_cells(PolarView points) {
-    using detail::LaneConstant;
+    using detail::PackConstant;
     const std::size_t count = points.size();
-    detail::grow(of_points_, count + detail::kMostLanes);
+    detail::grow(of_points_, count + detail::kMaxPackWidth);
     constexpr double kRadians = M_PI / 180.0;
-    const LaneConstant azimuth_scale(static_cast<float>(azimuths_ / (2.0 * M_PI)));
-    const LaneConstant elevation_scale(
+    const PackConstant azimuth_scale(static_cast<float>(azimuths_ / (2.0 * M_PI)));
+    const PackConstant elevation_scale(
         static_cast<float>(1.0 / (resolved_.voxel_elevation * kRadians)));
-    const LaneConstant range_scale(static_cast<float>(1.0 / config_.voxel_range));
-    const LaneConstant far(static_cast<float>(config_.cluster_range));
-    const LaneConstant pi(detail::kPi);
-    const LaneConstant half_pi(0.5F * detail::kPi);
-    const LaneConstant last_azimuth(static_cast<float>(azimuths_ - 1));
-    const LaneConstant last_elevation(static_cast<float>(elevations_ - 1));
-    const LaneConstant last_range(static_cast<float>(ranges_ - 1));
-    const LaneConstant beyond(static_cast<float>(ranges_));
-    const LaneConstant columns(static_cast<float>(ranges_ + 1));
+    const PackConstant range_scale(static_cast<float>(1.0 / config_.voxel_range));
+    const PackConstant far(static_cast<float>(config_.cluster_range));
+    const PackConstant pi(detail::kPi);
+    const PackConstant half_pi(0.5F * detail::kPi);
+    const PackConstant last_azimuth(static_cast<float>(azimuths_ - 1));
+    const PackConstant last_elevation(static_cast<float>(elevations_ - 1));
+    const PackConstant last_range(static_cast<float>(ranges_ - 1));
+    const PackConstant beyond(static_cast<float>(ranges_));
+    const PackConstant columns(static_cast<float>(ranges_ + 1));
     const int row_shift = row_shift_;
     auto* const cells = reinterpret_cast<std::int32_t*>(of_points_.data());
-    const LaneConstant above_all(static_cast<float>(elevations_));
-    const LaneConstant below_all(-1.0F);
-    detail::run_most_lanes([&](auto lanes) {
-      using Lanes = decltype(lanes);
-      using Float = typename Lanes::Float;
-      using Int = typename Lanes::Int;
+    const PackConstant above_all(static_cast<float>(elevations_));
+    const PackConstant below_all(-1.0F);
+    detail::run_max_packs([&](auto packs) {
+      using Packs = decltype(packs);
+      using Float = typename Packs::Float;
+      using Int = typename Packs::Int;
       Float lowest = above_all;
       Float highest = below_all;
-      detail::for_places<Lanes>(count, [&](const auto& at) {
+      detail::for_slices<Packs>(count, [&](const auto& at) {
         const Float range = at.load(points.range.data());
         const Float azimuth = at.load(points.azimuth.data());
         const Float z = at.load(points.z.data());
@@ -379,7 +379,7 @@ class CurvedVoxelClusterer {
   }
 
   void number_points(std::size_t count) {
-    detail::run_lanes([&](auto) {
+    detail::run_packs([&](auto) {
       for (std::size_t i = 0; i < count; ++i) {
         of_points_[i] = number_of_run_[run_of(of_points_[i] - first_cell_)];
       }

@@ -12,31 +12,31 @@
 #include <vector>
 
 #include "dynains/belief_updater.hpp"
-#include "dynains/cluster_set.hpp"
+#include "dynains/config.hpp"
 #include "dynains/curved_voxel_clusterer.hpp"
-#include "dynains/detail/ingest.hpp"
-#include "dynains/detail/instance_ids.hpp"
-#include "dynains/detail/level_frame.hpp"
-#include "dynains/detail/made_up_scan.hpp"
-#include "dynains/detail/one_call.hpp"
-#include "dynains/detail/scan_slot.hpp"
-#include "dynains/detail/stage_checks.hpp"
-#include "dynains/detail/write_by_evidence.hpp"
-#include "dynains/detail/write_by_windows.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/free_space_evidence.hpp"
 #include "dynains/ground_segmenter.hpp"
-#include "dynains/map_revision.hpp"
+#include "dynains/map/map_revision.hpp"
 #include "dynains/occupancy_descriptor.hpp"
-#include "dynains/pipeline_config.hpp"
+#include "dynains/pipeline/ingest.hpp"
+#include "dynains/pipeline/instance_ids.hpp"
+#include "dynains/pipeline/reentrancy_guard.hpp"
+#include "dynains/pipeline/remover_config.hpp"
+#include "dynains/pipeline/scan_slot.hpp"
+#include "dynains/pipeline/synthetic_scan.hpp"
+#include "dynains/pipeline/write_by_evidence.hpp"
+#include "dynains/pipeline/write_by_windows.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
-#include "dynains/polar_points.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/remover_config.hpp"
-#include "dynains/scan_verdict.hpp"
-#include "dynains/sensor_model.hpp"
+#include "dynains/sensor/level_frame.hpp"
+#include "dynains/sensor/sensor_model.hpp"
+#include "dynains/stage/cluster_set.hpp"
+#include "dynains/stage/contracts.hpp"
+#include "dynains/stage/polar_points.hpp"
 #include "dynains/static_map_accumulator.hpp"
+#include "dynains/verdict.hpp"
 
 namespace dynains {
 
@@ -132,7 +132,7 @@ class BasicDynaInsRemover {
   template <class Cloud>
   void reserve_like(const Cloud& example,
                     std::size_t scans = std::numeric_limits<std::size_t>::max()) {
-    const detail::OneCall::Guard guard(one_call_);
+    const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
     if (pushed_ > 0) throw UsageError("memory is reserved before the first push");
     if (scans == 0) return;
     const std::size_t points = PointCloudTraits<Cloud>::size(example);
@@ -140,19 +140,19 @@ class BasicDynaInsRemover {
     for (std::size_t i = 0; i < std::min(scans, ring_.size()); ++i) {
       ring_[i].touch(more);
     }
-    const Rehearsal rehearsal(*this);
+    const WarmUp rehearsal(*this);
     // The fourth scan has been held against another one, too.
     const auto enough = static_cast<std::size_t>(std::max(config_.window, 4));
     for (std::size_t i = 0; i < std::min(scans, enough); ++i) {
       take_in(example, Eigen::Isometry3d::Identity(), 0.1 * static_cast<double>(i));
     }
-    for (ScanSlot& other : ring_) other.make_room_like(slot(pushed_ - 1));
+    for (ScanSlot& other : ring_) other.ensure_capacity_like(slot(pushed_ - 1));
     if (config_.use_free_space) detail::reserve_stage(evidence_, scans);
   }
 
   /// The same for scans of that many points, of a 64-beam sensor in a street.
   void reserve(std::size_t points) {
-    const std::vector<float> xyz = detail::made_up_scan(points);
+    const std::vector<float> xyz = detail::synthetic_scan(points);
     reserve_like(RawPoints<float>{xyz.data(), points});
   }
 
@@ -168,14 +168,14 @@ class BasicDynaInsRemover {
   /// lost, and nothing else.
   template <class Cloud>
   FrameResult push(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor, double time) {
-    const detail::OneCall::Guard guard(one_call_);
+    const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
     return take_in(cloud, T_world_sensor, time);
   }
 
   /// The same with scan numbers for times: 0.1 s from scan to scan.
   template <class Cloud>
   FrameResult push(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor) {
-    const detail::OneCall::Guard guard(one_call_);
+    const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
     constexpr double kPeriod = 0.1;
     return take_in(cloud, T_world_sensor, pushed_ == 0 ? 0.0 : last_time_ + kPeriod);
   }
@@ -184,7 +184,7 @@ class BasicDynaInsRemover {
   /// the ScanVerdict of each. The next push starts a new window.
   template <class Sink>
   void flush(Sink&& sink) {
-    const detail::OneCall::Guard guard(one_call_);
+    const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
     check_owned();
     while (finished_ < pushed_) {
       StageClock clock;
@@ -198,7 +198,7 @@ class BasicDynaInsRemover {
   /// is cleared: a TiledStaticMap removes its files, those of earlier runs, too. To start again and
   /// keep it, construct a new remover.
   void reset() {
-    const detail::OneCall::Guard guard(one_call_);
+    const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
     map_.clear();
     forget();
   }
@@ -208,13 +208,13 @@ class BasicDynaInsRemover {
   static constexpr std::size_t kFewestSlots = 2;  // ids go from scan to scan
 
   // While it lives, scans leave no trace, and none on the map, which may be on a disk.
-  class Rehearsal {
+  class WarmUp {
    public:
-    explicit Rehearsal(BasicDynaInsRemover& remover)
+    explicit WarmUp(BasicDynaInsRemover& remover)
         : remover_(remover), build_map_(std::exchange(remover.config_.build_map, false)) {}
-    Rehearsal(const Rehearsal&) = delete;
-    Rehearsal& operator=(const Rehearsal&) = delete;
-    ~Rehearsal() {
+    WarmUp(const WarmUp&) = delete;
+    WarmUp& operator=(const WarmUp&) = delete;
+    ~WarmUp() {
       remover_.config_.build_map = build_map_;
       remover_.forget();
     }
@@ -251,17 +251,17 @@ class BasicDynaInsRemover {
 
   // Counts a scan in, and out again if a stage throws before it is kept: stages may have seen it,
   // so that the next one begins a new window.
-  class Taking {
+  class PushTransaction {
    public:
-    Taking(BasicDynaInsRemover& remover, const ScanSlot& newest)
+    PushTransaction(BasicDynaInsRemover& remover, const ScanSlot& newest)
         : remover_(remover), time_before_(remover.last_time_) {
       ++remover_.pushed_;
       remover_.segment_ = newest.segment;
       remover_.last_time_ = newest.time;
     }
-    Taking(const Taking&) = delete;
-    Taking& operator=(const Taking&) = delete;
-    ~Taking() {
+    PushTransaction(const PushTransaction&) = delete;
+    PushTransaction& operator=(const PushTransaction&) = delete;
+    ~PushTransaction() {
       if (kept_) return;
       --remover_.pushed_;
       ++remover_.segment_;
@@ -341,36 +341,36 @@ class BasicDynaInsRemover {
 
   // From clusters to the points of every scan in the window.
   void record_verdicts(ScanSlot& newest) {
-    const auto streaks = clusters_.streaks(clusters_.scan_count() - 1);
-    newest.streaks.assign(streaks.begin(), streaks.end());
+    const auto point_runs = clusters_.point_runs(clusters_.scan_count() - 1);
+    newest.point_runs.assign(point_runs.begin(), point_runs.end());
     assign_ids(newest);
     detail::record_first(newest, verdict_);
     if (config_.votes == 0) return;
     for (std::uint64_t scan = window_first_; scan + 1 < pushed_; ++scan) {
-      detail::record_again(slot(scan), clusters_.streaks(scan - window_first_), verdict_, said_);
+      detail::record_again(slot(scan), clusters_.point_runs(scan - window_first_), verdict_, said_);
     }
   }
 
   void assign_ids(ScanSlot& newest) {
-    detail::InstanceIds::Streaks old_streaks, streaks;
+    detail::InstanceIds::PointRuns old_runs, point_runs;
     Span<const std::uint32_t> old_ids;
     if (window_first_ + 1 < pushed_) {
       const ScanSlot& before = slot(pushed_ - 2);
-      old_streaks = before.streaks;
+      old_runs = before.point_runs;
       old_ids = before.ids;
-      streaks = clusters_.streaks(clusters_.scan_count() - 2);
+      point_runs = clusters_.point_runs(clusters_.scan_count() - 2);
     }
-    instance_ids_.assign(old_streaks, old_ids, streaks, clusters_.size(), newest.ids);
+    instance_ids_.assign(old_runs, old_ids, point_runs, clusters_.size(), newest.ids);
   }
 
   // A window of one scan compares nothing, nor can it tell which instance was which: the evidence
   // does both.
   bool compares_windows() const { return config_.window > 1 || !config_.use_free_space; }
 
-  void hand_on_ids(ScanSlot& newest) {
+  void propagate_ids(ScanSlot& newest) {
     const bool alone = newest.scan == 0 || slot(newest.scan - 1).segment != newest.segment;
     const Span<const std::uint32_t> predecessors = evidence_.predecessors();
-    instance_ids_.hand_on(
+    instance_ids_.propagate(
         predecessors,
         alone ? Span<const std::uint32_t>() : Span<const std::uint32_t>(slot(newest.scan - 1).ids),
         newest.ids);
@@ -461,7 +461,7 @@ class BasicDynaInsRemover {
   detail::VerdictScratch verdict_scratch_;
   detail::InstanceIds instance_ids_;
 
-  detail::OneCall one_call_;
+  detail::ReentrancyGuard reentrancy_guard_;
   std::uint64_t pushed_ = 0;
   std::uint64_t finished_ = 0;
   std::uint64_t window_first_ = 0;
@@ -476,8 +476,8 @@ class BasicDynaInsRemover {
 template <class Stages>
 FrameResult BasicDynaInsRemover<Stages>::clean(ScanSlot& newest, StageClock& clock) {
   FrameResult result;
-  Taking taking(*this, newest);
-  newest.make_room(newest.labels.size());
+  PushTransaction taking(*this, newest);
+  newest.ensure_capacity(newest.labels.size());
   if (needs_sensor() && !sensor().known()) {
     adapt_to_sensor(newest);
     if (frame_.turns()) ingest_.turn(turn_pose(newest));
@@ -510,7 +510,7 @@ FrameResult BasicDynaInsRemover<Stages>::clean(ScanSlot& newest, StageClock& clo
   if (config_.use_free_space) {
     evidence_.observe(newest.scan, newest.segment, newest.T_world_level, newest.split,
                       newest_cluster, clusterer_.cluster_count());
-    if (!compares_windows()) hand_on_ids(newest);
+    if (!compares_windows()) propagate_ids(newest);
   }
   clock.lap(result.times.evidence);
   if (config_.use_free_space) {

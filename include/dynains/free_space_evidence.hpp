@@ -13,20 +13,20 @@
 
 #include "dynains/belief_updater.hpp"
 #include "dynains/cause.hpp"
-#include "dynains/detail/room.hpp"
-#include "dynains/evidence_verdict.hpp"
-#include "dynains/free_space_config.hpp"
-#include "dynains/ground_split.hpp"
-#include "dynains/instance_beliefs.hpp"
-#include "dynains/instance_samples.hpp"
-#include "dynains/instance_tracks.hpp"
-#include "dynains/moved_ground.hpp"
-#include "dynains/passages.hpp"
+#include "dynains/evidence/instance_beliefs.hpp"
+#include "dynains/evidence/instance_samples.hpp"
+#include "dynains/evidence/instance_tracks.hpp"
+#include "dynains/evidence/moved_ground.hpp"
+#include "dynains/evidence/passages.hpp"
+#include "dynains/evidence/reference_lags.hpp"
+#include "dynains/evidence/reference_views.hpp"
+#include "dynains/evidence/supervoxel_groups.hpp"
 #include "dynains/points.hpp"
-#include "dynains/reference_lags.hpp"
-#include "dynains/reference_views.hpp"
-#include "dynains/sensor_model.hpp"
-#include "dynains/supervoxel_groups.hpp"
+#include "dynains/sensor/sensor_model.hpp"
+#include "dynains/simd/capacity.hpp"
+#include "dynains/stage/evidence_verdict.hpp"
+#include "dynains/stage/free_space_config.hpp"
+#include "dynains/stage/ground_split.hpp"
 
 namespace dynains {
 
@@ -224,7 +224,7 @@ class FreeSpaceEvidence {
       for (std::size_t i = 1; i < samples.met.size(); ++i) {
         moving_groups_[i] = surely_moves(record, samples.met[i]) ? 1 : 0;
       }
-      detail::make_room(moving_, samples.met_of.size());
+      detail::ensure_capacity(moving_, samples.met_of.size());
       moving_.resize(samples.met_of.size());
       for (std::size_t i = 0; i < moving_.size(); ++i) {
         moving_[i] = moving_groups_[samples.met_of[i]];

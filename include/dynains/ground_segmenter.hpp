@@ -13,23 +13,23 @@
 #include <optional>
 #include <vector>
 
-#include "dynains/detail/arc_tangent.hpp"
-#include "dynains/detail/bits.hpp"
-#include "dynains/detail/half_space.hpp"
-#include "dynains/detail/lanes.hpp"
-#include "dynains/detail/lowest_mean.hpp"
-#include "dynains/detail/patch_heights.hpp"
-#include "dynains/detail/patch_sample.hpp"
-#include "dynains/detail/patch_sort.hpp"
-#include "dynains/detail/plane_fit.hpp"
-#include "dynains/detail/point_record.hpp"
-#include "dynains/detail/room.hpp"
-#include "dynains/detail/wide_lanes.hpp"
-#include "dynains/detail/zone_table.hpp"
-#include "dynains/ground_config.hpp"
-#include "dynains/ground_split.hpp"
+#include "dynains/ground/half_space.hpp"
+#include "dynains/ground/lowest_mean.hpp"
+#include "dynains/ground/patch_heights.hpp"
+#include "dynains/ground/patch_sample.hpp"
+#include "dynains/ground/patch_sort.hpp"
+#include "dynains/ground/plane_fit.hpp"
+#include "dynains/ground/point_record.hpp"
+#include "dynains/ground/zone_table.hpp"
 #include "dynains/points.hpp"
-#include "dynains/sensor_model.hpp"
+#include "dynains/sensor/sensor_model.hpp"
+#include "dynains/simd/arc_tangent.hpp"
+#include "dynains/simd/bits.hpp"
+#include "dynains/simd/capacity.hpp"
+#include "dynains/simd/lanes.hpp"
+#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/stage/ground_config.hpp"
+#include "dynains/stage/ground_split.hpp"
 
 namespace dynains {
 
@@ -92,15 +92,15 @@ class GroundSegmenter {
   /// Order within `split` is by patch, then as scanned; but where a patch turned out not to be
   /// ground, the last of the ground take its place.
   void segment(PointsView scan, Span<const std::uint32_t> input, GroundSplit& split) {
-    detail::grow(patch_of_, scan.size() + detail::kMostLanes);
+    detail::grow(patch_of_, scan.size() + detail::kMaxPackWidth);
     find_patches(scan);
     sorted_.sort(scan, input.data(), patch_of_.data());
     sample_.reserve(std::min(scan.size(), static_cast<std::size_t>(config_.ground_fit_points)));
     heights_.clear();
     split.resize(scan.size());
-    detail::run_most_lanes([&](auto lanes) {
-      using Lanes = decltype(lanes);
-      Output<Lanes> out(split);
+    detail::run_max_packs([&](auto packs) {
+      using Packs = decltype(packs);
+      Output<Packs> out(split);
       // By patch: where its ground begins in the split, and how many points are left of it.
       PatchCounts begin{};
       PatchCounts rest{};
@@ -130,10 +130,10 @@ class GroundSegmenter {
   };
 
   // Writes points to the split, one behind the other.
-  template <class Lanes>
+  template <class Packs>
   class Output {
    public:
-    using Columns = std::array<typename Lanes::Float, 4>;
+    using Columns = std::array<typename Packs::Float, 4>;
 
     explicit Output(GroundSplit& split)
         : x_(split.points.x.data()),
@@ -150,8 +150,8 @@ class GroundSegmenter {
     }
 
     void put(const detail::PointRecord* from, std::size_t count) {
-      for (std::size_t i = 0; i < count; i += Lanes::kCount) {
-        store(detail::load_columns<Lanes>(from + i), count_ + i);
+      for (std::size_t i = 0; i < count; i += Packs::kCount) {
+        store(detail::load_columns<Packs>(from + i), count_ + i);
       }
       count_ += count;
     }
@@ -185,12 +185,12 @@ class GroundSegmenter {
   };
 
   void find_patches(PointsView scan) {
-    detail::run_most_lanes([&](auto lanes) {
-      using Lanes = decltype(lanes);
-      using Float = typename Lanes::Float;
-      using Int = typename Lanes::Int;
+    detail::run_max_packs([&](auto packs) {
+      using Packs = decltype(packs);
+      using Float = typename Packs::Float;
+      using Int = typename Packs::Int;
       // Read once: the compiler cannot know that stores leave members alone.
-      using detail::LaneConstant;
+      using detail::PackConstant;
       const auto of_zone = [&](float Zone::*constant) {
         return detail::ZoneTable(
             {zones_[0].*constant, zones_[1].*constant, zones_[2].*constant, zones_[3].*constant});
@@ -201,21 +201,21 @@ class GroundSegmenter {
       const detail::ZoneTable first_patch = of_zone(&Zone::first_patch);
       const detail::ZoneTable last_ring = of_zone(&Zone::last_ring);
       const detail::ZoneTable sector_count = of_zone(&Zone::sectors);
-      const std::array<LaneConstant, kZones - 1> edges = {zones_[1].inner, zones_[2].inner,
+      const std::array<PackConstant, kZones - 1> edges = {zones_[1].inner, zones_[2].inner,
                                                           zones_[3].inner};
-      const LaneConstant nearest(static_cast<float>(config_.ground_min_range));
-      const LaneConstant farthest(static_cast<float>(config_.ground_max_range));
-      const LaneConstant pi(detail::kPi);
-      const LaneConstant one(1.0F);
+      const PackConstant nearest(static_cast<float>(config_.ground_min_range));
+      const PackConstant farthest(static_cast<float>(config_.ground_max_range));
+      const PackConstant pi(detail::kPi);
+      const PackConstant one(1.0F);
       const float* const xs = scan.x.data();
       const float* const ys = scan.y.data();
       std::int32_t* const patches = patch_of_.data();
-      detail::for_places<Lanes>(scan.size(), [&](auto at) {
+      detail::for_slices<Packs>(scan.size(), [&](auto at) {
         const Float x = at.load(xs);
         const Float y = at.load(ys);
         const Float range = sqrt(x * x + y * y);
         const Float azimuth = detail::azimuth_of(y, x, range) + pi;
-        const detail::BeyondEdges<typename Lanes::Mask> beyond = {
+        const detail::BeyondEdges<typename Packs::Mask> beyond = {
             range >= edges[0], range >= edges[1], range >= edges[2]};
         const auto here = [&](const detail::ZoneTable& table) { return table.at(beyond); };
         const auto whole = [](const Float& value) { return to_float(truncate(value)); };
@@ -237,8 +237,8 @@ class GroundSegmenter {
 
   // Ground that hangs goes back to the rest of its patch. From the last one on, so that what takes
   // the place of a patch is ground for good.
-  template <class Lanes>
-  void take_back_hanging(const PatchCounts& begin, PatchCounts& rest, Output<Lanes>& ground) {
+  template <class Packs>
+  void take_back_hanging(const PatchCounts& begin, PatchCounts& rest, Output<Packs>& ground) {
     const auto step = static_cast<float>(config_.ground_step);
     for (std::size_t p = kSteppedPatches; p-- > 0;) {
       const std::size_t found = begin[p + 1] - begin[p];
@@ -249,20 +249,20 @@ class GroundSegmenter {
   }
 
   // Puts the ground of a patch; the rest closes up at its front. Returns the size of the rest.
-  template <class Lanes>
+  template <class Packs>
   std::size_t segment_patch(std::size_t patch, detail::PointRecord* records, std::size_t count,
-                            Output<Lanes>& ground) {
+                            Output<Packs>& ground) {
     if (count < static_cast<std::size_t>(config_.ground_min_points)) return count;
     const std::optional<detail::HalfSpace> ground_below = find_ground(patch, records, count);
     if (!ground_below) return count;
     const detail::HalfSpace& below = *ground_below;
 
     std::size_t rest = 0;
-    for (std::size_t i = 0; i < count; i += Lanes::kCount) {
-      const std::size_t length = std::min(Lanes::kCount, count - i);
+    for (std::size_t i = 0; i < count; i += Packs::kCount) {
+      const std::size_t length = std::min(Packs::kCount, count - i);
       const unsigned all = (1U << length) - 1U;
-      const auto points = detail::load_columns<Lanes>(records + i);
-      const std::array<typename Lanes::Float, 3> local = {
+      const auto points = detail::load_columns<Packs>(records + i);
+      const std::array<typename Packs::Float, 3> local = {
           points[0] - below.x0, points[1] - below.y0, points[2] - below.z0};
       const unsigned bits = below.contains(local).bits() & all;
       if (bits == all) {
@@ -271,8 +271,8 @@ class GroundSegmenter {
         detail::move_to_front(records + i, length, records + rest);
         rest += length;
       } else {
-        ground.put(detail::pick<Lanes>(records + i, bits, points), detail::count_ones(bits));
-        rest += detail::move_some_to_front<Lanes>(records + i, length, ~bits, records + rest);
+        ground.put(detail::pick<Packs>(records + i, bits, points), detail::count_ones(bits));
+        rest += detail::move_some_to_front<Packs>(records + i, length, ~bits, records + rest);
       }
     }
     return rest;
@@ -284,15 +284,15 @@ class GroundSegmenter {
                                                                  const detail::PointRecord* records,
                                                                  std::size_t count) {
     std::optional<detail::HalfSpace> result;
-    detail::run_lanes([&](auto lanes) {
-      using Lanes = decltype(lanes);
-      sample_.take<Lanes>(records, count, static_cast<std::size_t>(config_.ground_fit_points));
-      detail::LowestMean<GroundConfig::kMaxLowest, Lanes> lowest(
+    detail::run_packs([&](auto packs) {
+      using Packs = decltype(packs);
+      sample_.take<Packs>(records, count, static_cast<std::size_t>(config_.ground_fit_points));
+      detail::LowestMean<GroundConfig::kMaxLowest, Packs> lowest(
           static_cast<std::size_t>(config_.ground_lowest_points));
       const float seed_height = lowest.of(sample_.heights(), sample_.size(), floor_of(patch));
       detail::HalfSpace below(records->x, records->y, seed_height,
                               static_cast<float>(config_.ground_seed_margin));
-      if (fit_ground<Lanes>(patch, seed_height, below)) result = below;
+      if (fit_ground<Packs>(patch, seed_height, below)) result = below;
     });
     return result;
   }
@@ -306,17 +306,17 @@ class GroundSegmenter {
 
   // From the points near the seed height, a horizontal half space, to those near the plane. Returns
   // whether these are ground.
-  template <class Lanes>
+  template <class Packs>
   bool fit_ground(std::size_t patch, float seed_height, detail::HalfSpace& below) {
     detail::Plane plane;
     for (int i = 0; i < config_.ground_iterations; ++i) {
-      const detail::PlaneMoments moments = sample_.moments<Lanes>(below);
+      const detail::PlaneMoments moments = sample_.moments<Packs>(below);
       if (moments.count < 3.0) return false;
       plane = detail::fit_plane(moments);
       below.end_above(plane, config_.ground_distance);
       // From the same points, the next plane would be the same.
       const bool had_all = moments.count == static_cast<double>(sample_.size());
-      if (had_all && sample_.is_inside<Lanes>(below)) break;
+      if (had_all && sample_.is_inside<Packs>(below)) break;
     }
     if (!is_ground(patch, plane, seed_height)) return false;
     heights_.set(patch, static_cast<float>(plane.mean_z + static_cast<double>(seed_height)));

@@ -8,13 +8,13 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/cluster_set.hpp"
-#include "dynains/detail/arc_tangent.hpp"
-#include "dynains/detail/lanes.hpp"
-#include "dynains/detail/wide_lanes.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
-#include "dynains/polar_points.hpp"
+#include "dynains/simd/arc_tangent.hpp"
+#include "dynains/simd/lanes.hpp"
+#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/stage/cluster_set.hpp"
+#include "dynains/stage/polar_points.hpp"
 
 namespace dynains {
 
@@ -111,7 +111,7 @@ class OccupancyDescriptor {
     const Span<const float> b = heights(scan_count() - 1);
     detail::Float8 dot(0.0F), aa(0.0F), bb(0.0F);
     std::size_t i = 0;
-    for (; i + detail::kLanes <= a.size(); i += detail::kLanes) {
+    for (; i + detail::kPackWidth <= a.size(); i += detail::kPackWidth) {
       const detail::Float8 ai = detail::Float8::load(&a[i]);
       const detail::Float8 bi = detail::Float8::load(&b[i]);
       dot = dot + ai * bi;
@@ -136,20 +136,20 @@ class OccupancyDescriptor {
 
  private:
   void lay_grid() {
-    using detail::LaneConstant;
+    using detail::PackConstant;
     const PolarView& points = cluster_.window;
     // In the place of those that are missing from the last eight, the first point changes no
     // extent.
     const std::size_t first = cluster_.ranges[0].begin;
-    const LaneConstant first_range(points.range[first]), first_azimuth(points.azimuth[first]);
-    const LaneConstant first_z(points.z[first]), first_turned(turned(points.azimuth[first]));
-    const LaneConstant zero(0.0F), turn(2.0F * detail::kPi);
+    const PackConstant first_range(points.range[first]), first_azimuth(points.azimuth[first]);
+    const PackConstant first_z(points.z[first]), first_turned(turned(points.azimuth[first]));
+    const PackConstant zero(0.0F), turn(2.0F * detail::kPi);
     // Extents for the seam at +-pi and for the seam at 0: the smaller of the two is the smallest
     // arc if it is at most half a turn.
     float range_max = 0.0F, low = 0.0F, high = 0.0F, low_turned = 0.0F, high_turned = 0.0F;
-    detail::run_lanes([&](auto lanes) {
-      using Lanes = decltype(lanes);
-      using Float = typename Lanes::Float;
+    detail::run_packs([&](auto packs) {
+      using Packs = decltype(packs);
+      using Float = typename Packs::Float;
       Float range_low = first_range, range_high = first_range, z_low = first_z;
       Float azimuth_low = first_azimuth, azimuth_high = first_azimuth;
       Float turned_low = first_turned, turned_high = first_turned;
@@ -167,7 +167,7 @@ class OccupancyDescriptor {
         turned_high = max(turned_high, on);
       };
       for (const PointRange& part : cluster_.ranges) {
-        detail::for_places_again<Lanes>(part.begin, part.end, extend);
+        detail::for_overlapping_slices<Packs>(part.begin, part.end, extend);
       }
       range_min_ = min_lane(range_low);
       range_max = max_lane(range_high);
@@ -249,23 +249,23 @@ class OccupancyDescriptor {
     const std::size_t cells = cell_count();
     float* const heights = heights_.data() + k * cells;
     std::fill(heights, heights + cells, 0.0F);
-    using detail::LaneConstant;
+    using detail::PackConstant;
     const PolarView points = cluster_.window;
     // Read once: the compiler cannot know that stores leave members alone.
-    const LaneConstant range_min(range_min_), azimuth_min(azimuth_min_), z_min(z_min_);
-    const LaneConstant cells_per_metre(cells_per_metre_), cells_per_radian(cells_per_radian_);
-    const LaneConstant zero(0.0F), just_below(-detail::kPi * 1e-4F), turn(2.0F * detail::kPi);
+    const PackConstant range_min(range_min_), azimuth_min(azimuth_min_), z_min(z_min_);
+    const PackConstant cells_per_metre(cells_per_metre_), cells_per_radian(cells_per_radian_);
+    const PackConstant zero(0.0F), just_below(-detail::kPi * 1e-4F), turn(2.0F * detail::kPi);
     const auto row = static_cast<std::int32_t>(azimuth_cells_);
-    const LaneConstant last_radial(static_cast<float>(radial_cells_ - 1));
-    const LaneConstant last_azimuth(static_cast<float>(azimuth_cells_ - 1));
+    const PackConstant last_radial(static_cast<float>(radial_cells_ - 1));
+    const PackConstant last_azimuth(static_cast<float>(azimuth_cells_ - 1));
     const auto raise = [&](auto at) {
       using Float = typename decltype(at)::Float;
       const Float radial = (at.load(points.range.data()) - range_min) * cells_per_metre;
       Float offset = at.load(points.azimuth.data()) - azimuth_min;
       offset = offset + keep(offset < just_below, Float(turn));
       const Float angular = max(offset * cells_per_radian, zero);
-      std::int32_t cell[detail::kLanes];
-      float height[detail::kLanes];
+      std::int32_t cell[detail::kPackWidth];
+      float height[detail::kPackWidth];
       (multiply(truncate(min(radial, last_radial)), row) + truncate(min(angular, last_azimuth)))
           .store(cell);
       (at.load(points.z.data()) - z_min).store(height);
@@ -275,9 +275,9 @@ class OccupancyDescriptor {
         highest = std::max(highest, height[i]);
       }
     };
-    detail::run_lanes([&](auto lanes) {
+    detail::run_packs([&](auto packs) {
       for (const PointRange& part : cluster_.scan(k)) {
-        detail::for_places_again<decltype(lanes)>(part.begin, part.end, raise);
+        detail::for_overlapping_slices<decltype(packs)>(part.begin, part.end, raise);
       }
     });
   }

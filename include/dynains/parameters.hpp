@@ -5,7 +5,8 @@
 //
 //   template <class Self, class Visitor>
 //   static void visit(Self& self, Visitor&& visitor) {
-//     visitor(Parameter{"tau_s", self.tau_s, closed(0.0, 1.0), "", "similarity threshold (Eq. 12)"});
+//     visitor(Parameter{"tau_s", self.tau_s, closed(0.0, 1.0), "", "similarity threshold (Eq.
+//     12)"});
 //   }
 //
 // `Self` is the struct, const or not, so that one list serves readers and writers.

@@ -66,8 +66,7 @@ struct IsPointMatrix<Cloud, std::enable_if_t<std::is_base_of_v<Eigen::MatrixBase
 /// time, else a point per row if there are 3 or 4 columns. A fourth coordinate is ignored.
 template <class Matrix>
 struct PointCloudTraits<Matrix, std::enable_if_t<detail::IsPointMatrix<Matrix>::value>> {
-  static constexpr bool kColumns =
-      Matrix::RowsAtCompileTime == 3 || Matrix::RowsAtCompileTime == 4;
+  static constexpr bool kColumns = Matrix::RowsAtCompileTime == 3 || Matrix::RowsAtCompileTime == 4;
 
   static std::size_t size(const Matrix& cloud) {
     return static_cast<std::size_t>(kColumns ? cloud.cols() : cloud.rows());

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "dynains/detail/room.hpp"
+#include "dynains/simd/capacity.hpp"
 
 namespace dynains {
 

@@ -10,13 +10,13 @@
 #include <type_traits>
 #include <vector>
 
-#include "dynains/detail/bits.hpp"
-#include "dynains/detail/chunked_vector.hpp"
-#include "dynains/detail/lane_transform.hpp"
-#include "dynains/detail/lanes.hpp"
-#include "dynains/detail/wide_lanes.hpp"
+#include "dynains/map/chunked_vector.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
+#include "dynains/simd/bits.hpp"
+#include "dynains/simd/lanes.hpp"
+#include "dynains/simd/pack_transform.hpp"
+#include "dynains/simd/wide_lanes.hpp"
 
 namespace dynains {
 
@@ -209,7 +209,7 @@ class StaticMapAccumulator {
   // kFirst, so that all have a predecessor.
   static constexpr std::size_t kBatch = 512;
   struct Batch {
-    static constexpr std::size_t kFirst = detail::kMostLanes;
+    static constexpr std::size_t kFirst = detail::kMaxPackWidth;
     static constexpr std::size_t kRoom = kFirst + kBatch;
     alignas(64) float point[3][kBatch];        // m, relative to the corner of the block
     alignas(64) std::int32_t block[3][kRoom];  // in the world, counted in blocks
@@ -227,17 +227,17 @@ class StaticMapAccumulator {
   // Of `count` points from `begin` on. `corner`: the block in which the frame of `m` begins.
   void locate(PointsView scan, std::size_t begin, std::size_t count,
               const Eigen::Matrix<float, 3, 4>& m, const Index& corner, Batch& batch) const {
-    using detail::LaneConstant;
-    const LaneConstant scale(static_cast<float>(1.0 / voxel_));
+    using detail::PackConstant;
+    const PackConstant scale(static_cast<float>(1.0 / voxel_));
     const Eigen::Array3f block_size = this->block_size().cast<float>();
-    const LaneConstant size[3] = {block_size.x(), block_size.y(), block_size.z()};
-    alignas(64) std::int32_t first[3][detail::kMostLanes];
-    std::fill_n(first[0], detail::kMostLanes, corner.x);
-    std::fill_n(first[1], detail::kMostLanes, corner.y);
-    std::fill_n(first[2], detail::kMostLanes, corner.z);
-    const detail::LaneTransform to_corner(m);
+    const PackConstant size[3] = {block_size.x(), block_size.y(), block_size.z()};
+    alignas(64) std::int32_t first[3][detail::kMaxPackWidth];
+    std::fill_n(first[0], detail::kMaxPackWidth, corner.x);
+    std::fill_n(first[1], detail::kMaxPackWidth, corner.y);
+    std::fill_n(first[2], detail::kMaxPackWidth, corner.z);
+    const detail::PackTransform to_corner(m);
     const PointsView points = scan.subview(begin, count);
-    detail::for_lanes(count, [&](auto at) {
+    detail::for_packs(count, [&](auto at) {
       using Float = typename decltype(at)::Float;
       using Int = typename decltype(at)::Int;
       const Float x = at.load(points.x.data());
@@ -273,8 +273,8 @@ class StaticMapAccumulator {
     batch.voxel[kBefore] = 0;
     for (auto& block : batch.block) block[kBefore] = 0;
     std::size_t chosen = 0;
-    detail::run_most_lanes([&](auto lanes) {
-      using Lanes = decltype(lanes);
+    detail::run_max_packs([&](auto packs) {
+      using Packs = decltype(packs);
       constexpr std::size_t kWord = 64;
       std::uint64_t was_kept = 0;
       for (std::size_t begin = 0; begin < count; begin += kWord) {
@@ -282,13 +282,13 @@ class StaticMapAccumulator {
         const std::uint64_t kept = keep.empty() ? ~std::uint64_t{0} >> (kWord - size)
                                                 : detail::nonzero_bytes(keep.data() + begin, size);
         const std::size_t at = Batch::kFirst + begin;
-        const std::uint64_t changes = detail::find_changes<Lanes>(
+        const std::uint64_t changes = detail::find_changes<Packs>(
             size, &batch.block[0][at], &batch.block[1][at], &batch.block[2][at], &batch.voxel[at]);
         const std::uint64_t repeats = keep_all_ ? 0 : ~changes & (kept << 1U | was_kept);
         was_kept = kept >> (kWord - 1);
-        for (std::size_t i = 0; i < size; i += Lanes::kCount) {
-          const auto which = static_cast<unsigned>((kept & ~repeats) >> i & Lanes::kAll);
-          chosen += detail::put_places<Lanes>(which, begin + i, &batch.chosen[chosen]);
+        for (std::size_t i = 0; i < size; i += Packs::kCount) {
+          const auto which = static_cast<unsigned>((kept & ~repeats) >> i & Packs::kAll);
+          chosen += detail::put_places<Packs>(which, begin + i, &batch.chosen[chosen]);
         }
       }
     });

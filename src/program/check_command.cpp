@@ -9,7 +9,7 @@
 #include "command.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/diagnosis.hpp"
-#include "dynains/remover_config.hpp"
+#include "dynains/pipeline/remover_config.hpp"
 #include "lone_scans.hpp"
 #include "recording_options.hpp"
 

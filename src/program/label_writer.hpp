@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "dynains/scan_verdict.hpp"
+#include "dynains/verdict.hpp"
 
 namespace dynains::program {
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "dynains/io/recording.hpp"
-#include "dynains/remover_config.hpp"
+#include "dynains/pipeline/remover_config.hpp"
 
 namespace dynains::program {
 

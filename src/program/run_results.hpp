@@ -15,7 +15,7 @@
 #include "clean_writer.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
-#include "dynains/scan_verdict.hpp"
+#include "dynains/verdict.hpp"
 #include "label_writer.hpp"
 
 namespace dynains::program {

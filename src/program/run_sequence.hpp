@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "dynains/io/recording.hpp"
-#include "dynains/scan_verdict.hpp"
-#include "dynains/stage_times.hpp"
+#include "dynains/pipeline/stage_times.hpp"
+#include "dynains/verdict.hpp"
 #include "naming_scan.hpp"
 #include "points_of.hpp"
 #include "read_ahead.hpp"

@@ -7,7 +7,7 @@
 
 #include "dynains/dyna_ins_remover.hpp"
 #include "dynains/evaluation/evaluate.hpp"
-#include "dynains/stage_times.hpp"
+#include "dynains/pipeline/stage_times.hpp"
 #include "labelled_sequence.hpp"
 
 namespace dynains::program {

@@ -5,11 +5,11 @@
 #include <vector>
 
 #include "bench/street.hpp"
-#include "dynains/cluster_set.hpp"
 #include "dynains/curved_voxel_clusterer.hpp"
 #include "dynains/ground_segmenter.hpp"
 #include "dynains/occupancy_descriptor.hpp"
-#include "dynains/polar_points.hpp"
+#include "dynains/stage/cluster_set.hpp"
+#include "dynains/stage/polar_points.hpp"
 #include "dynains/static_map_accumulator.hpp"
 
 namespace dynains::bench {

@@ -1,4 +1,4 @@
-#include "dynains/detail/arc_tangent.hpp"
+#include "dynains/simd/arc_tangent.hpp"
 
 #include <cmath>
 #include <limits>
@@ -10,7 +10,7 @@ namespace dynains::test {
 namespace {
 
 float angle(float y, float x) {
-  float lanes[detail::kLanes];
+  float lanes[detail::kPackWidth];
   const detail::Float8 ys(y), xs(x);
   detail::azimuth_of(ys, xs, sqrt(xs * xs + ys * ys)).store(lanes);
   return lanes[3];

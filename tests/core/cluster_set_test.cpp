@@ -1,4 +1,4 @@
-#include "dynains/cluster_set.hpp"
+#include "dynains/stage/cluster_set.hpp"
 
 #include <map>
 #include <tuple>

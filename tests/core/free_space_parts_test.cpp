@@ -8,13 +8,13 @@
 #include <set>
 #include <vector>
 
-#include "dynains/ground_footprint.hpp"
-#include "dynains/instance_hull.hpp"
-#include "dynains/instance_samples.hpp"
-#include "dynains/instance_tracks.hpp"
-#include "dynains/reference_lags.hpp"
-#include "dynains/sensor_model.hpp"
-#include "dynains/supervoxel_groups.hpp"
+#include "dynains/evidence/ground_footprint.hpp"
+#include "dynains/evidence/instance_hull.hpp"
+#include "dynains/evidence/instance_samples.hpp"
+#include "dynains/evidence/instance_tracks.hpp"
+#include "dynains/evidence/reference_lags.hpp"
+#include "dynains/evidence/supervoxel_groups.hpp"
+#include "dynains/sensor/sensor_model.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 

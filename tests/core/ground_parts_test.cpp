@@ -5,9 +5,9 @@
 #include <numeric>
 #include <vector>
 
-#include "dynains/detail/ingest.hpp"
-#include "dynains/detail/lowest_mean.hpp"
-#include "dynains/detail/patch_sort.hpp"
+#include "dynains/ground/lowest_mean.hpp"
+#include "dynains/ground/patch_sort.hpp"
+#include "dynains/pipeline/ingest.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 
@@ -72,17 +72,17 @@ TEST_CASE("LowestMean gives the bits of sorting: few values, ties, rising and fa
                                            -at}[static_cast<std::size_t>(kind)];
         }
         std::vector<float> padded = values;
-        padded.resize(count + detail::kLanes, kInfinity);
+        padded.resize(count + detail::kPackWidth, kInfinity);
         for (const float floor : {-kInfinity, -1.0F, 5000.0F}) {
           const float expected = mean_by_sorting(values, wanted, floor);
           CAPTURE(count, wanted, kind, floor);
           float found = 0.0F;
-          detail::run_lanes([&](auto lanes) {
-            detail::LowestMean<64, decltype(lanes)> lowest(wanted);
+          detail::run_packs([&](auto packs) {
+            detail::LowestMean<64, decltype(packs)> lowest(wanted);
             found = lowest.of(padded.data(), count, floor);
           });
           REQUIRE(found == expected);
-          detail::LowestMean<64, detail::NarrowLanes> lowest(wanted);
+          detail::LowestMean<64, detail::NarrowPacks> lowest(wanted);
           REQUIRE(lowest.of(padded.data(), count, floor) == expected);
         }
       }

@@ -1,5 +1,5 @@
 // Beliefs of the free-space evidence: by hand, and against a sum without short cuts.
-#include "dynains/instance_beliefs.hpp"
+#include "dynains/evidence/instance_beliefs.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/reference_views.hpp"
+#include "dynains/evidence/reference_views.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 #include "support/sights.hpp"
@@ -525,7 +525,7 @@ TEST_CASE("a reference is found by the scan it is asked from, until its image is
     points.push_back(newest - 2.0F, 0.0F, 0.0F);
     points.push_back(newest, 0.0F, 0.0F);
     points.push_back(newest + 2.0F, 0.0F, 0.0F);
-    points.grow(3 + detail::kLanes);
+    points.grow(3 + detail::kPackWidth);
     const detail::Sights& sights =
         views.look(points, 3, Eigen::Isometry3d::Identity(), views.newest());
     CHECK(sights.is_free(0));

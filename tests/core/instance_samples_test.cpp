@@ -1,5 +1,5 @@
 // Samples of instances, against something slow and obvious.
-#include "dynains/instance_samples.hpp"
+#include "dynains/evidence/instance_samples.hpp"
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "dynains/detail/least_ranks.hpp"
+#include "dynains/evidence/smallest_k.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 
@@ -217,7 +217,7 @@ TEST_CASE("every part of a supervoxel gives as many samples as it has points") {
 TEST_CASE("rows of ranks keep the least of all that they were given, in order") {
   Random random(3);
   for (const std::size_t most : {1U, 2U, 3U, 4U, 5U, 64U}) {
-    detail::LeastRanks ranks(most);
+    detail::SmallestK ranks(most);
     for (int round = 0; round < 3; ++round) {
       ranks.clear();
       std::map<std::size_t, std::vector<std::pair<std::uint32_t, std::uint32_t>>> rows;

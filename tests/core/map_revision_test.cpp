@@ -1,5 +1,5 @@
 // What is in the map and is later seen through leaves it again.
-#include "dynains/map_revision.hpp"
+#include "dynains/map/map_revision.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "dynains/detail/beam_test.hpp"
+#include "dynains/evidence/beam_test.hpp"
 #include "dynains/static_map_accumulator.hpp"
 #include "support/catch.hpp"
 #include "support/counting_map.hpp"

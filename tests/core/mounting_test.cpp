@@ -1,4 +1,4 @@
-#include "dynains/mounting.hpp"
+#include "dynains/sensor/mounting.hpp"
 
 #include <Eigen/Geometry>
 #include <cmath>
@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "dynains/heading.hpp"
 #include "dynains/io/kitti.hpp"
+#include "dynains/sensor/heading.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"

@@ -1,5 +1,5 @@
 // Ground under removed instances: what stands on it goes, the ground itself stays.
-#include "dynains/moved_ground.hpp"
+#include "dynains/evidence/moved_ground.hpp"
 
 #include <Eigen/Dense>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <set>
 #include <vector>
 
-#include "dynains/surrounding_ground.hpp"
+#include "dynains/evidence/surrounding_ground.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 #include "support/sights.hpp"

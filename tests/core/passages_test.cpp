@@ -1,5 +1,5 @@
 // Places that movers pass, against counts that are never forgotten, and by hand.
-#include "dynains/passages.hpp"
+#include "dynains/evidence/passages.hpp"
 
 #include <cmath>
 #include <cstdint>

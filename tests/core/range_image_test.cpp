@@ -1,5 +1,5 @@
 // Range images and the beams that are tested against them, each against the slow and obvious.
-#include "dynains/range_image.hpp"
+#include "dynains/evidence/range_image.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "dynains/detail/beam_test.hpp"
+#include "dynains/evidence/beam_test.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 
@@ -24,17 +24,17 @@ RangeImageGrid small_grid() {
 }
 
 std::int32_t cell_of(const RangeImageGrid& grid, float x, float y, float z) {
-  std::int32_t cells[detail::kLanes];
+  std::int32_t cells[detail::kPackWidth];
   const detail::Float8 px(x), py(y), pz(z);
   ImageLocator(grid)
-      .locate<detail::NarrowLanes>(px, py, pz, sqrt((px * px + py * py) + pz * pz))
+      .locate<detail::NarrowPacks>(px, py, pz, sqrt((px * px + py * py) + pz * pz))
       .store(cells);
   return cells[0];
 }
 
 TEST_CASE("columns follow the azimuth within 1e-4 rad, rows the elevation within 0.2 deg") {
   for (double azimuth = -179.9; azimuth < 180.0; azimuth += 0.37) {
-    float lanes[detail::kLanes];
+    float lanes[detail::kPackWidth];
     const double angle = azimuth / kDegrees;
     coarse_azimuth(detail::Float8(static_cast<float>(7.0 * std::cos(angle))),
                    detail::Float8(static_cast<float>(7.0 * std::sin(angle))))
@@ -80,7 +80,7 @@ TEST_CASE("a direction that no image covers has cell 0") {
   CHECK(cell_of(grid, 1.0F, 0.0F, 0.0F) > 0);
   // Straight behind the sensor, on both sides of the seam.
   const auto stride = static_cast<std::int32_t>(grid.stride());
-  const auto lanes = static_cast<std::int32_t>(detail::kLanes);
+  const auto lanes = static_cast<std::int32_t>(detail::kPackWidth);
   CHECK(cell_of(grid, -1.0F, 1e-9F, 0.0F) % stride == lanes + grid.columns - 1);
   CHECK(cell_of(grid, -1.0F, -1e-9F, 0.0F) % stride == lanes);
 }
@@ -143,7 +143,7 @@ class ReferenceImage {
     return is_moving(here) ? std::min(least, here) : least;
   }
   std::size_t at(int row, int column) const {
-    return static_cast<std::size_t>(row) * grid_.stride() + detail::kLanes +
+    return static_cast<std::size_t>(row) * grid_.stride() + detail::kPackWidth +
            static_cast<std::size_t>(column);
   }
 
@@ -300,7 +300,7 @@ TEST_CASE("what moved hides what is behind it, protects nothing and says nothing
   add(15.0, far_beside);
   add(20.0, far_beside);
   const std::size_t count = samples.size();
-  samples.resize(count + detail::kLanes);
+  samples.resize(count + detail::kPackWidth);
   const auto look = [&](Span<const std::uint8_t> moving) {
     RangeImage image;
     RangeImage::Scratch scratch;
@@ -322,8 +322,8 @@ TEST_CASE("bits of sights are counted over any range") {
   constexpr std::size_t kCount = 400;
   detail::Sights sights;
   sights.resize(kCount);
-  for (std::size_t first = 0; first < kCount; first += detail::kLanes) {
-    float values[detail::kLanes];
+  for (std::size_t first = 0; first < kCount; first += detail::kPackWidth) {
+    float values[detail::kPackWidth];
     for (float& value : values) value = random.uniform_float(-1.0, 1.0);
     const detail::Float8 random_values = detail::Float8::load(values);
     const detail::Sights::Bytes bytes = sights.bytes();
@@ -370,7 +370,7 @@ TEST_CASE(
   samples.push_back(5.0F, 0.0F, 20.0F);  // above all beams
   samples.push_back(0.0F, 20.0F, 0.0F);  // aside of all beams
   const std::size_t count = samples.size();
-  samples.resize(count + detail::kLanes);
+  samples.resize(count + detail::kPackWidth);
   Eigen::Isometry3f T_reference_sample = Eigen::Isometry3f::Identity();
   T_reference_sample.translation().x() = -5.0F;
   detail::Sights sights;

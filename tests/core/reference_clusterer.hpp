@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "dynains/curved_voxel_clusterer.hpp"
-#include "dynains/polar_points.hpp"
+#include "dynains/stage/polar_points.hpp"
 #include "polar_test_points.hpp"
 
 namespace dynains::test {

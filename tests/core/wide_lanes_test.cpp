@@ -1,4 +1,4 @@
-#include "dynains/detail/wide_lanes.hpp"
+#include "dynains/simd/wide_lanes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,23 +7,23 @@
 #include <limits>
 #include <vector>
 
-#include "dynains/detail/arc_tangent.hpp"
-#include "dynains/detail/point_record.hpp"
+#include "dynains/ground/point_record.hpp"
+#include "dynains/simd/arc_tangent.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 
 namespace dynains::test {
 namespace {
 
-using detail::kLanes;
+using detail::kPackWidth;
 
 // Every operation on the same pairs of numbers, with one kind of lanes: a row of results for each
 // operation, a number for each pair.
-template <class Lanes>
+template <class Packs>
 std::vector<std::vector<std::uint32_t>> results(const std::vector<float>& a,
                                                 const std::vector<float>& b) {
-  using Float = typename Lanes::Float;
-  using Int = typename Lanes::Int;
+  using Float = typename Packs::Float;
+  using Int = typename Packs::Int;
   std::vector<std::vector<std::uint32_t>> out;
   std::size_t row = 0;
   const auto put_number = [&](std::uint32_t number) {
@@ -31,7 +31,7 @@ std::vector<std::vector<std::uint32_t>> results(const std::vector<float>& a,
     out[row].push_back(number);
   };
   const auto put = [&](const Float& value) {
-    float lanes[Lanes::kCount];
+    float lanes[Packs::kCount];
     value.store(lanes);
     for (const float lane : lanes) {
       std::uint32_t bits;
@@ -41,16 +41,16 @@ std::vector<std::vector<std::uint32_t>> results(const std::vector<float>& a,
     ++row;
   };
   const auto put_int = [&](const Int& value) {
-    std::int32_t lanes[Lanes::kCount];
+    std::int32_t lanes[Packs::kCount];
     value.store(lanes);
     for (const std::int32_t lane : lanes) put_number(static_cast<std::uint32_t>(lane));
     ++row;
   };
   const auto put_bits = [&](unsigned bits) {
-    for (std::size_t k = 0; k < Lanes::kCount; ++k) put_number(bits >> k & 1U);
+    for (std::size_t k = 0; k < Packs::kCount; ++k) put_number(bits >> k & 1U);
     ++row;
   };
-  for (std::size_t i = 0; i < a.size(); i += Lanes::kCount) {
+  for (std::size_t i = 0; i < a.size(); i += Packs::kCount) {
     row = 0;
     const Float x = Float::load(&a[i]);
     const Float y = Float::load(&b[i]);
@@ -71,8 +71,8 @@ std::vector<std::vector<std::uint32_t>> results(const std::vector<float>& a,
     put_bits((x > y).bits());
     put_bits((x < y).bits());
     put_bits(((x <= y) & ~(x < y)).bits());
-    const detail::LaneConstant limit(1e6F);
-    const detail::LaneConstant lower(-1e6F);
+    const detail::PackConstant limit(1e6F);
+    const detail::PackConstant lower(-1e6F);
     const Float small = max(min(x, limit), lower);
     put_int(truncate(small));
     put_int(floor(small));
@@ -88,11 +88,11 @@ std::vector<std::vector<std::uint32_t>> results(const std::vector<float>& a,
 }
 
 // The sums of eight and eight numbers.
-template <class Lanes>
+template <class Packs>
 std::vector<float> sums(const std::vector<float>& a) {
   std::vector<float> out;
-  for (std::size_t i = 0; i < a.size(); i += kLanes) {
-    out.push_back(sum(Lanes::Float::load(&a[i])));
+  for (std::size_t i = 0; i < a.size(); i += kPackWidth) {
+    out.push_back(sum(Packs::Float::load(&a[i])));
   }
   return out;
 }
@@ -129,7 +129,7 @@ TEST_CASE("all kinds of lanes give the same bits") {
     b.push_back(static_cast<float>(random.uniform(-100.0, 100.0)));
   }
   // What a comparison with NaN says must not depend on the width either.
-  constexpr std::size_t kMost = detail::kMostLanes;
+  constexpr std::size_t kMost = detail::kMaxPackWidth;
   a.resize(a.size() / kMost * kMost);
   b.resize(a.size());
   for (std::size_t i = 0; i < 2 * kMost; ++i) {
@@ -139,21 +139,21 @@ TEST_CASE("all kinds of lanes give the same bits") {
   const std::size_t sure = a.size() - 2 * kMost;  // conversions of NaN to integers are anything
   const std::vector<float> sure_a(a.data(), a.data() + sure);
   const std::vector<float> sure_b(b.data(), b.data() + sure);
-  const auto expected = results<detail::NarrowLanes>(sure_a, sure_b);
-  CHECK(results<detail::WideLanes>(sure_a, sure_b) == expected);
-  CHECK(sums<detail::WideLanes>(sure_a) == sums<detail::NarrowLanes>(sure_a));
-  with_wider_lanes([&](auto lanes) {
-    using Lanes = decltype(lanes);
-    CHECK(results<Lanes>(sure_a, sure_b) == expected);
-    for (std::size_t i = sure; i < a.size(); i += Lanes::kCount) {
-      const auto x = Lanes::Float::load(&a[i]);
-      const auto y = Lanes::Float::load(&b[i]);
-      float least[Lanes::kCount], most[Lanes::kCount];
+  const auto expected = results<detail::NarrowPacks>(sure_a, sure_b);
+  CHECK(results<detail::WidePacks>(sure_a, sure_b) == expected);
+  CHECK(sums<detail::WidePacks>(sure_a) == sums<detail::NarrowPacks>(sure_a));
+  with_wider_lanes([&](auto packs) {
+    using Packs = decltype(packs);
+    CHECK(results<Packs>(sure_a, sure_b) == expected);
+    for (std::size_t i = sure; i < a.size(); i += Packs::kCount) {
+      const auto x = Packs::Float::load(&a[i]);
+      const auto y = Packs::Float::load(&b[i]);
+      float least[Packs::kCount], most[Packs::kCount];
       min(x, y).store(least);
       max(x, y).store(most);
       const unsigned less = (x < y).bits();
       const unsigned at_least = (x >= y).bits();
-      for (std::size_t k = 0; k < Lanes::kCount; ++k) {
+      for (std::size_t k = 0; k < Packs::kCount; ++k) {
         CAPTURE(a[i + k], b[i + k]);
         CHECK((less >> k & 1U) == (a[i + k] < b[i + k] ? 1U : 0U));
         CHECK((at_least >> k & 1U) == (a[i + k] >= b[i + k] ? 1U : 0U));
@@ -167,7 +167,7 @@ TEST_CASE("all kinds of lanes give the same bits") {
       }
     }
   });
-  for (std::size_t i = sure; i < a.size(); i += kLanes) {
+  for (std::size_t i = sure; i < a.size(); i += kPackWidth) {
     const auto narrow_a = detail::Float8::load(&a[i]);
     const auto narrow_b = detail::Float8::load(&b[i]);
     const auto wide_a = detail::WideFloat8::load(&a[i]);
@@ -181,16 +181,16 @@ TEST_CASE("all kinds of lanes give the same bits") {
 
 TEST_CASE("places are put by bits, and changes are found, as value by value") {
   Random random(21);
-  const auto check = [&](auto lanes) {
-    using Lanes = decltype(lanes);
+  const auto check = [&](auto packs) {
+    using Packs = decltype(packs);
     for (int round = 0; round < 200; ++round) {
-      const auto bits = static_cast<unsigned>(random.uniform(0.0, Lanes::kAll + 0.999));
+      const auto bits = static_cast<unsigned>(random.uniform(0.0, Packs::kAll + 0.999));
       std::vector<std::uint32_t> expected;
-      for (std::uint32_t k = 0; k < Lanes::kCount; ++k) {
+      for (std::uint32_t k = 0; k < Packs::kCount; ++k) {
         if ((bits >> k & 1U) != 0) expected.push_back(100 + k);
       }
-      std::vector<std::uint32_t> places(Lanes::kCount);
-      places.resize(detail::put_places<Lanes>(bits, 100, places.data()));
+      std::vector<std::uint32_t> places(Packs::kCount);
+      places.resize(detail::put_places<Packs>(bits, 100, places.data()));
       CHECK(places == expected);
 
       const auto count = static_cast<std::size_t>(random.uniform(0.0, 64.999));
@@ -202,23 +202,23 @@ TEST_CASE("places are put by bits, and changes are found, as value by value") {
       for (std::size_t i = 0; i < count; ++i) {
         changes |= std::uint64_t{values[i + 1] != values[i]} << i;
       }
-      CHECK(detail::find_changes<Lanes>(count, values.data() + 1) == changes);
+      CHECK(detail::find_changes<Packs>(count, values.data() + 1) == changes);
     }
   };
-  check(detail::NarrowLanes());
+  check(detail::NarrowPacks());
   with_wider_lanes(check);
 }
 
 TEST_CASE("records turn into columns and close up at the front, whatever the lanes") {
   Random random(22);
-  const auto check = [&](auto lanes) {
-    using Lanes = decltype(lanes);
-    constexpr std::size_t kCount = Lanes::kCount;
+  const auto check = [&](auto packs) {
+    using Packs = decltype(packs);
+    constexpr std::size_t kCount = Packs::kCount;
     for (int round = 0; round < 200; ++round) {
       const std::size_t count =
           round % 2 == 0 ? kCount : 1 + static_cast<std::size_t>(random.uniform(0.0, kCount - 1.0));
       const unsigned all = (1U << count) - 1U;
-      const unsigned bits = static_cast<unsigned>(random.uniform(0.0, Lanes::kAll + 0.999)) & all;
+      const unsigned bits = static_cast<unsigned>(random.uniform(0.0, Packs::kAll + 0.999)) & all;
       const std::size_t gap = static_cast<std::size_t>(random.uniform(0.0, 5.0));
       // In front of the records there is room for them; behind them is somebody else's.
       std::vector<detail::PointRecord> records(gap + 2 * kCount);
@@ -237,11 +237,11 @@ TEST_CASE("records turn into columns and close up at the front, whatever the lan
         if ((bits >> k & 1U) != 0) some.push_back(records[gap + k]);
       }
 
-      const auto columns = detail::load_columns<Lanes>(&records[gap]);
+      const auto columns = detail::load_columns<Packs>(&records[gap]);
       for (std::size_t axis = 0; axis < 4; ++axis) {
         float values[kCount], picked[kCount];
         columns[axis].store(values);
-        detail::pick<Lanes>(&records[gap], bits, columns)[axis].store(picked);
+        detail::pick<Packs>(&records[gap], bits, columns)[axis].store(picked);
         for (std::size_t k = 0; k < kCount; ++k) {
           float expected[4];
           std::memcpy(expected, &before[gap + k], sizeof(expected));
@@ -254,7 +254,7 @@ TEST_CASE("records turn into columns and close up at the front, whatever the lan
         }
       }
 
-      CHECK(detail::move_some_to_front<Lanes>(&records[gap], count, bits, records.data()) ==
+      CHECK(detail::move_some_to_front<Packs>(&records[gap], count, bits, records.data()) ==
             some.size());
       CHECK(numbers(records, some.size()) == numbers(some, some.size()));
       for (std::size_t i = gap + count; i < records.size(); ++i) {
@@ -262,19 +262,19 @@ TEST_CASE("records turn into columns and close up at the front, whatever the lan
       }
     }
   };
-  check(detail::NarrowLanes());
+  check(detail::NarrowPacks());
   with_wider_lanes(check);
 }
 
 TEST_CASE("a kernel meets each place once, in order, whatever the count") {
-  for (std::size_t count = 0; count <= 3 * detail::kMostLanes; ++count) {
+  for (std::size_t count = 0; count <= 3 * detail::kMaxPackWidth; ++count) {
     CAPTURE(count);
     std::vector<float> from(count);
     for (std::size_t i = 0; i < count; ++i) from[i] = static_cast<float>(i + 1);
-    std::vector<float> to(count + detail::kMostLanes, -1.0F);
+    std::vector<float> to(count + detail::kMaxPackWidth, -1.0F);
     std::size_t next = 0;
     std::size_t places = 0;
-    detail::for_lanes(count, [&](auto at) {
+    detail::for_packs(count, [&](auto at) {
       CHECK(at.begin == next);
       next += decltype(at)::kCount;
       places += at.size();

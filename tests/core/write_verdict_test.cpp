@@ -1,4 +1,4 @@
-// What is written in order and by streak, against what it means point by point.
+// What is written in order and by point_run, against what it means point by point.
 #include <algorithm>
 #include <array>
 #include <map>
@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "dynains/detail/instance_ids.hpp"
-#include "dynains/detail/write_by_evidence.hpp"
-#include "dynains/detail/write_by_windows.hpp"
+#include "dynains/pipeline/instance_ids.hpp"
+#include "dynains/pipeline/write_by_evidence.hpp"
+#include "dynains/pipeline/write_by_windows.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 
@@ -17,31 +17,31 @@ namespace {
 
 using detail::ClusterVerdict;
 using detail::Reach;
-using Streak = ClusterSet::Streak;
+using PointRun = ClusterSet::PointRun;
 
 constexpr std::uint32_t kClusters = 6;
 
 constexpr std::array<Reach, 4> kReaches = {Reach::kNoCluster, Reach::kTooFewScans, Reach::kSimilar,
                                            Reach::kProposed};
 
-// Streaks of random length, mostly short, a cluster each or none.
-std::vector<Streak> random_streaks(Random& random, std::uint32_t points) {
-  std::vector<Streak> streaks;
+// PointRuns of random length, mostly short, a cluster each or none.
+std::vector<PointRun> random_runs(Random& random, std::uint32_t points) {
+  std::vector<PointRun> point_runs;
   for (std::uint32_t begin = 0; begin < points;) {
     const auto length = static_cast<std::uint32_t>(1 + random.index(random.index(4) == 0 ? 50 : 9));
     const std::uint32_t end = std::min(points, begin + length);
     const std::size_t cluster = random.index(kClusters + 1);
-    streaks.push_back(
+    point_runs.push_back(
         {begin, end, cluster == kClusters ? kNoCluster : static_cast<std::uint32_t>(cluster)});
     begin = end;
   }
-  return streaks;
+  return point_runs;
 }
 
-std::vector<std::uint32_t> by_point(const std::vector<Streak>& streaks) {
+std::vector<std::uint32_t> by_point(const std::vector<PointRun>& point_runs) {
   std::vector<std::uint32_t> cluster_of;
-  for (const Streak& streak : streaks) {
-    cluster_of.insert(cluster_of.end(), streak.end - streak.begin, streak.cluster);
+  for (const PointRun& point_run : point_runs) {
+    cluster_of.insert(cluster_of.end(), point_run.end - point_run.begin, point_run.cluster);
   }
   return cluster_of;
 }
@@ -72,7 +72,7 @@ struct Said {
   }
 };
 
-TEST_CASE("verdicts by streak are those by point, at once and after more windows") {
+TEST_CASE("verdicts by point_run are those by point, at once and after more windows") {
   detail::ScanSlot scan;    // the same object for all, as in the pipeline
   std::vector<Reach> room;  // the same, too
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
@@ -92,12 +92,12 @@ TEST_CASE("verdicts by streak are those by point, at once and after more windows
     scan.ids.resize(kClusters);
     for (std::uint32_t c = 0; c < kClusters; ++c) scan.ids[c] = 100 + c;
 
-    scan.streaks = random_streaks(random, points);
-    const std::vector<std::uint32_t> first_cluster = by_point(scan.streaks);
+    scan.point_runs = random_runs(random, points);
+    const std::vector<std::uint32_t> first_cluster = by_point(scan.point_runs);
     std::vector<Said> said(points);
-    const auto hear = [&](const std::vector<Streak>& streaks,
+    const auto hear = [&](const std::vector<PointRun>& point_runs,
                           const std::vector<ClusterVerdict>& verdicts) {
-      const std::vector<std::uint32_t> cluster_of = by_point(streaks);
+      const std::vector<std::uint32_t> cluster_of = by_point(point_runs);
       for (std::size_t i = 0; i < points; ++i) said[i].hear(cluster_of[i], verdicts);
     };
     const auto check = [&](int votes) {
@@ -128,7 +128,7 @@ TEST_CASE("verdicts by streak are those by point, at once and after more windows
     };
 
     const std::vector<ClusterVerdict> first = random_verdicts(random);
-    hear(scan.streaks, first);
+    hear(scan.point_runs, first);
     detail::record_first(scan, first);
     detail::begin_verdict(scan);
     detail::write_by_windows(scan, first);
@@ -136,10 +136,10 @@ TEST_CASE("verdicts by streak are those by point, at once and after more windows
 
     const std::size_t windows = random.index(4);
     for (std::size_t k = 0; k < windows; ++k) {
-      const std::vector<Streak> streaks = random_streaks(random, points);
+      const std::vector<PointRun> point_runs = random_runs(random, points);
       const std::vector<ClusterVerdict> verdicts = random_verdicts(random);
-      hear(streaks, verdicts);
-      detail::record_again(scan, streaks, verdicts, room);
+      hear(point_runs, verdicts);
+      detail::record_again(scan, point_runs, verdicts, room);
     }
     const int votes = 1 + static_cast<int>(random.index(3));
     detail::rewrite_by_windows(scan, votes);
@@ -266,21 +266,21 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
   }
 }
 
-TEST_CASE("ids go to the cluster that got most points, whatever the streaks") {
+TEST_CASE("ids go to the cluster that got most points, whatever the point_runs") {
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     INFO("seed " << seed);
     Random random(seed);
     const auto points = static_cast<std::uint32_t>(random.index(200));
-    const std::vector<Streak> old_streaks = random_streaks(random, points);
-    const std::vector<Streak> streaks = random_streaks(random, points);
+    const std::vector<PointRun> old_runs = random_runs(random, points);
+    const std::vector<PointRun> point_runs = random_runs(random, points);
     const std::vector<std::uint32_t> old_ids = {11, 12, 13, 14, 15, 16};
     detail::InstanceIds instance_ids;
     std::vector<std::uint32_t> ids;
-    instance_ids.assign(old_streaks, old_ids, streaks, kClusters, ids);
+    instance_ids.assign(old_runs, old_ids, point_runs, kClusters, ids);
     REQUIRE(ids.size() == kClusters);
 
-    const std::vector<std::uint32_t> old_cluster = by_point(old_streaks);
-    const std::vector<std::uint32_t> cluster = by_point(streaks);
+    const std::vector<std::uint32_t> old_cluster = by_point(old_runs);
+    const std::vector<std::uint32_t> cluster = by_point(point_runs);
     std::vector<bool> taken(kClusters, false);
     for (std::uint32_t c = 0; c < kClusters; ++c) {
       std::map<std::uint32_t, std::size_t> votes;

@@ -7,7 +7,6 @@ using Catch::Approx;
 using Catch::Matchers::ContainsSubstring;
 #else
 #include <catch2/catch.hpp>
-
 #include <string>
 inline auto ContainsSubstring(const std::string& part) { return Catch::Contains(part); }
 #endif

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/detail/beam_test.hpp"
+#include "dynains/evidence/beam_test.hpp"
 
 namespace dynains::test {
 

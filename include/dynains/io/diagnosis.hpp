@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "dynains/io/recording.hpp"
-#include "dynains/mounting.hpp"
 #include "dynains/points.hpp"
+#include "dynains/sensor/mounting.hpp"
 
 namespace dynains {
 

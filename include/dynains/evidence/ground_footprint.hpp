@@ -1,0 +1,391 @@
+// Which ground points lie below or beside removed points.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "dynains/points.hpp"
+#include "dynains/simd/bits.hpp"
+#include "dynains/simd/capacity.hpp"
+#include "dynains/simd/wide_lanes.hpp"
+
+namespace dynains {
+
+/// How far what stands on the ground may begin over it: `least` (m), and `slope` (m per metre of
+/// horizontal range) where the beams of a sensor are wider apart.
+struct Clearance {
+  float least;
+  float slope;
+};
+
+/// Where in the grids of a footprint some points lie: their first and last columns and rows.
+struct GroundBox {
+  struct Range {
+    std::uint16_t first, last;
+  };
+  Range coarse_columns, coarse_rows;
+  Range tile_columns, tile_rows;
+};
+
+/// Horizontal grid around the sensor that remembers where points were removed and how low, and a
+/// coarse one beside it that tells quickly which points are near them.
+class GroundFootprint {
+ public:
+  /// Points that are looked at together, a bit each.
+  static constexpr std::size_t kBlock = 64;
+
+  /// The block of `points` that begins at a point; the last one may be shorter.
+  static PointsView block_of(PointsView points, std::size_t begin) {
+    return points.subview(begin, std::min(kBlock, points.size() - begin));
+  }
+
+  /// `cell`: m, points reach into the cells around theirs; `reach`: m, the same for what counts as
+  /// near; `max_range`: m, points beyond are not remembered.
+  GroundFootprint(double cell, double reach, double max_range)
+      : cell_(static_cast<float>(cell)),
+        fine_(cell, max_range),
+        coarse_(reach, max_range),
+        tile_of_(tile_count(fine_.width()), 0),
+        tiles_(1),
+        near_(coarse_.cell_count(), 0) {
+    tiles_.reserve(tile_of_.size() + 1);  // takes address space only
+    used_.reserve(tile_of_.size());
+  }
+
+  /// Remembers a removed point; seen after spread().
+  void add(float x, float y, float z) {
+    const Place place = fine_.place(x, y);
+    if (place.inside) add_to(tile(place), within(place), z);
+  }
+
+  /// Remembers those points of a block whose bits are set.
+  void add(PointsView block, std::uint64_t which) {
+    const Located located = locate(block);
+    detail::for_each_bit(which & located.inside, [&](std::size_t i) {
+      add_to(static_cast<std::uint32_t>(located.tile[i]),
+             static_cast<std::uint32_t>(located.cell[i]), block.z[i]);
+    });
+  }
+
+  /// Lets what was added reach into the cells around.
+  void spread() {
+    for (const Touched& touched : touched_) {
+      const Place place = place_of(touched);
+      const float own = cell_at(touched.tile, touched.cell).own;
+      for_around(place, [&](const Place& around) {
+        Cell& cell = cell_at(tile(around), within(around));
+        cell.lowest = std::min(cell.lowest, own);
+      });
+      const Place near =
+          coarse_.place(fine_.centre(place.column) * cell_, fine_.centre(place.row) * cell_);
+      if (!near.inside) continue;
+      // Many cells lie in one of the coarse grid.
+      std::uint8_t& centre = near_[near.row * coarse_.width() + near.column];
+      if (centre == kHolds) continue;
+      for_around(near, [&](const Place& around) {
+        near_[around.row * coarse_.width() + around.column] |= kNear;
+      });
+      centre = kHolds;
+    }
+  }
+
+  /// Where every 64 points lie, to be found once for all calls of visit_near().
+  void bound(PointsView points, std::vector<GroundBox>& boxes) const {
+    const std::size_t count = (points.size() + kBlock - 1) / kBlock;
+    detail::ensure_capacity(boxes, count);
+    boxes.resize(count);
+    detail::run_packs([&](auto packs) {
+      using Packs = decltype(packs);
+      using Float = typename Packs::Float;
+      for (std::size_t b = 0; b < boxes.size(); ++b) {
+        const PointsView block = block_of(points, b * kBlock);
+        const detail::PackConstant first_x(block.x[0]), first_y(block.y[0]);
+        Float x_min = first_x, x_max = first_x, y_min = first_y, y_max = first_y;
+        detail::for_slices<Packs>(block.size(), [&](const auto& at) {
+          const Float x = at.there(at.load(block.x.data()), first_x);
+          const Float y = at.there(at.load(block.y.data()), first_y);
+          x_min = min(x_min, x);
+          x_max = max(x_max, x);
+          y_min = min(y_min, y);
+          y_max = max(y_max, y);
+        });
+        boxes[b] = box(min_lane(x_min), max_lane(x_max), min_lane(y_min), max_lane(y_max));
+      }
+    });
+  }
+
+  /// Calls `visit(begin, near, under)` for up to 64 points from `begin` on at a time, a bit each:
+  /// those near a removed point (and some at the border of the grid), and which of these lie under
+  /// one, less than `clearance` below the lowest that was removed about there. `boxes`: of
+  /// bound().
+  template <class Visitor>
+  void visit_near(PointsView points, Span<const GroundBox> boxes, const Clearance& clearance,
+                  Visitor&& visit) const {
+    for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
+      const Share share = share_near(boxes[begin / kBlock]);
+      if (share == Share::kNone) continue;
+      const PointsView block = block_of(points, begin);
+      const std::uint64_t near =
+          share == Share::kAll ? ~std::uint64_t{0} >> (kBlock - block.size()) : find_near(block);
+      if (near == 0) continue;
+      visit(begin, near, holds(boxes[begin / kBlock]) ? near & find_under(block, clearance) : 0);
+    }
+  }
+
+  /// Marks the cells of those points of a block whose bits are set: they lie under removed ones.
+  void mark(PointsView block, std::uint64_t which) {
+    const Located located = locate(block);
+    detail::for_each_bit(which, [&](std::size_t i) {
+      cell_at(static_cast<std::uint32_t>(located.tile[i]),
+              static_cast<std::uint32_t>(located.cell[i]))
+          .marked = true;
+    });
+  }
+  /// Which of these points lie in marked cells.
+  std::uint64_t find_marked(PointsView block, std::uint64_t which) const {
+    const Located located = locate(block);
+    std::uint64_t marked = 0;
+    detail::for_each_bit(
+        which, [&](std::size_t i) { marked |= std::uint64_t{cell_of(located, i).marked} << i; });
+    return marked;
+  }
+
+  bool empty() const { return touched_.empty(); }
+
+  /// Forgets all points.
+  void clear() {
+    for (const std::uint32_t tile : used_) tile_of_[tile] = 0;
+    used_.clear();
+    touched_.clear();
+    std::fill(near_.begin(), near_.end(), std::uint8_t{0});
+  }
+
+ private:
+  static constexpr float kNothing = std::numeric_limits<float>::infinity();
+  static constexpr int kTileShift = 3;
+  static constexpr std::uint32_t kTile = 1U << kTileShift;  // cells along a side
+
+  enum class Share { kNone, kSome, kAll };
+
+  // Of a coarse cell: a removed point is in it or in one beside it; in itself, too.
+  static constexpr std::uint8_t kNear = 1;
+  static constexpr std::uint8_t kHolds = 3;
+
+  struct Place {
+    std::uint32_t column, row;
+    bool inside;
+  };
+  struct Cell {
+    float own = kNothing;     // lowest point in it
+    float lowest = kNothing;  // the same with the cells around
+    bool marked = false;
+  };
+  struct Touched {
+    std::uint32_t tile, cell;
+  };
+  // Few tiles are in use at a time, so that they stay in the nearest cache; tile 0 is empty.
+  using Tile = std::array<Cell, std::size_t{kTile} * kTile>;
+
+  static std::size_t tile_count(std::uint32_t width) {
+    const std::size_t side = width / kTile + 1;
+    return side * side;
+  }
+
+  // Square cells about the sensor, within a border of cells that only their neighbours reach.
+  class Grid {
+   public:
+    Grid(double cell, double max_range)
+        : per_metre_(static_cast<float>(1.0 / cell)),
+          half_(static_cast<std::uint32_t>(std::ceil(max_range / cell)) + 2) {}
+
+    std::uint32_t width() const { return 2 * half_; }
+    std::size_t cell_count() const { return std::size_t{width()} * width(); }
+    Place place(float x, float y) const {
+      const auto centre = static_cast<float>(half_);
+      const auto last = static_cast<float>(width() - 1);
+      const float column = x * per_metre_ + centre;
+      const float row = y * per_metre_ + centre;
+      if (!(column >= 1.0F && column < last && row >= 1.0F && row < last)) return {0, 0, false};
+      return {static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row), true};
+    }
+    /// Rows or columns of eight points; what lies outside falls into the border.
+    template <class Float>
+    auto line(const Float& coordinate) const {
+      static constexpr detail::PackConstant kZero(0.0F);
+      const Float centre(detail::PackConstant(static_cast<float>(half_)));
+      const Float last(detail::PackConstant(static_cast<float>(width() - 1)));
+      const Float per_metre = detail::PackConstant(per_metre_);
+      return truncate(min(max(coordinate * per_metre + centre, Float(kZero)), last));
+    }
+    /// The same of one point.
+    std::size_t index(float coordinate) const {
+      const float place = coordinate * per_metre_ + static_cast<float>(half_);
+      return static_cast<std::size_t>(
+          std::min(std::max(place, 0.0F), static_cast<float>(width() - 1)));
+    }
+    /// Row-major.
+    template <class Float>
+    auto indices(const Float& x, const Float& y) const {
+      // Exact in floats: coarse grids have fewer than 2^24 cells.
+      const Float cells(detail::PackConstant(static_cast<float>(width())));
+      return truncate(to_float(line(y)) * cells + to_float(line(x)));
+    }
+    /// Of a row or column, in cells from the sensor.
+    float centre(std::uint32_t index) const {
+      return (static_cast<float>(index) + 0.5F) - static_cast<float>(half_);
+    }
+
+   private:
+    float per_metre_;
+    std::uint32_t half_;  // cells
+  };
+
+  template <class Visitor>
+  static void for_around(const Place& place, Visitor&& visitor) {
+    for (std::uint32_t row = place.row - 1; row <= place.row + 1; ++row) {
+      for (std::uint32_t column = place.column - 1; column <= place.column + 1; ++column) {
+        visitor(Place{column, row, true});
+      }
+    }
+  }
+
+  GroundBox box(float x_min, float x_max, float y_min, float y_max) const {
+    const auto range = [](const Grid& grid, float low, float high, std::uint32_t cells) {
+      return GroundBox::Range{static_cast<std::uint16_t>(grid.index(low) / cells),
+                              static_cast<std::uint16_t>(grid.index(high) / cells)};
+    };
+    return {range(coarse_, x_min, x_max, 1), range(coarse_, y_min, y_max, 1),
+            range(fine_, x_min, x_max, kTile), range(fine_, y_min, y_max, kTile)};
+  }
+
+  // What is near of all places within: rows of the coarse grid, a few cells long.
+  Share share_near(const GroundBox& box) const {
+    unsigned some = 0;
+    unsigned all = kNear;
+    for (std::size_t row = box.coarse_rows.first; row <= box.coarse_rows.last; ++row) {
+      const std::uint8_t* const cells = &near_[row * coarse_.width()];
+      for (std::size_t i = box.coarse_columns.first; i <= box.coarse_columns.last; ++i) {
+        some |= cells[i];
+        all &= cells[i];
+      }
+    }
+    return some == 0 ? Share::kNone : all != 0 ? Share::kAll : Share::kSome;
+  }
+
+  // Which points of a block are near.
+  std::uint64_t find_near(PointsView block) const {
+    std::int32_t cell[kBlock];
+    detail::for_packs(block.size(), [&](auto at) {
+      coarse_.indices(at.load(block.x.data()), at.load(block.y.data())).store(&cell[at.begin]);
+    });
+    std::uint64_t near = 0;
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      near |= (std::uint64_t{near_[static_cast<std::size_t>(cell[i])]} & kNear) << i;
+    }
+    return near;
+  }
+
+  // Whether some cell within may hold anything.
+  bool holds(const GroundBox& box) const {
+    for (std::size_t row = box.tile_rows.first; row <= box.tile_rows.last; ++row) {
+      const std::uint32_t* const tiles = &tile_of_[row * tiles_along_side()];
+      for (std::size_t i = box.tile_columns.first; i <= box.tile_columns.last; ++i) {
+        if (tiles[i] != 0) return true;
+      }
+    }
+    return false;
+  }
+
+  // Tiles and cells of the points of a block, and which of them are inside, a bit each.
+  struct Located {
+    std::array<std::int32_t, kBlock> tile, cell;
+    std::uint64_t inside;
+  };
+  Located locate(PointsView block) const {
+    Located located;
+    located.inside = 0;
+    const auto side = static_cast<std::int32_t>(tiles_along_side());
+    const auto border = static_cast<std::int32_t>(fine_.width()) - 1;
+    detail::for_packs(block.size(), [&](auto at) {
+      using Int = typename decltype(at)::Int;
+      const Int column = fine_.line(at.load(block.x.data()));
+      const Int row = fine_.line(at.load(block.y.data()));
+      const Int last(static_cast<std::int32_t>(kTile) - 1);
+      (multiply(row >> kTileShift, side) + (column >> kTileShift)).store(&located.tile[at.begin]);
+      (((row & last) << kTileShift) + (column & last)).store(&located.cell[at.begin]);
+      const Int zero(0), end(border);
+      const auto inside = (zero < column) & (column < end) & (zero < row) & (row < end);
+      located.inside |= std::uint64_t{inside.bits()} << at.begin;
+    });
+    return located;
+  }
+
+  // Which points of a block lie under something removed.
+  std::uint64_t find_under(PointsView block, const Clearance& clearance) const {
+    const Located located = locate(block);
+    float top[kBlock];
+    const detail::PackConstant least(clearance.least), slope(clearance.slope);
+    detail::for_packs(block.size(), [&](auto at) {
+      using Float = typename decltype(at)::Float;
+      const Float x = at.load(block.x.data());
+      const Float y = at.load(block.y.data());
+      const Float gap = sqrt(x * x + y * y) * slope;
+      (at.load(block.z.data()) + max(gap, Float(least))).store(&top[at.begin]);
+    });
+    std::uint64_t under = 0;
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      under |= std::uint64_t{cell_of(located, i).lowest < top[i]} << i;
+    }
+    return under & located.inside;
+  }
+
+  std::uint32_t tiles_along_side() const { return fine_.width() / kTile + 1; }
+  std::uint32_t tile(const Place& place) const {
+    return place.row / kTile * tiles_along_side() + place.column / kTile;
+  }
+  static std::uint32_t within(const Place& place) {
+    return place.row % kTile * kTile + place.column % kTile;
+  }
+  Place place_of(const Touched& touched) const {
+    const std::uint32_t side = tiles_along_side();
+    return {touched.tile % side * kTile + touched.cell % kTile,
+            touched.tile / side * kTile + touched.cell / kTile, true};
+  }
+  void add_to(std::uint32_t tile, std::uint32_t within, float z) {
+    Cell& cell = cell_at(tile, within);
+    const bool is_first = !(cell.own < kNothing);
+    cell.own = std::min(cell.own, z);
+    if (is_first && cell.own < kNothing) touched_.push_back({tile, within});
+  }
+  // Of a located point; an empty one where its tile is not in use.
+  const Cell& cell_of(const Located& located, std::size_t i) const {
+    return tiles_[tile_of_[static_cast<std::size_t>(located.tile[i])]]
+                 [static_cast<std::size_t>(located.cell[i])];
+  }
+  Cell& cell_at(std::uint32_t tile, std::uint32_t within) {
+    std::uint32_t& number = tile_of_[tile];
+    if (number == 0) {
+      used_.push_back(tile);
+      number = static_cast<std::uint32_t>(used_.size());
+      if (number == tiles_.size()) tiles_.emplace_back();
+      tiles_[number].fill(Cell());
+    }
+    return tiles_[number][within];
+  }
+
+  float cell_;
+  Grid fine_;
+  Grid coarse_;
+  std::vector<std::uint32_t> tile_of_;  // row-major; 0 where nothing is near
+  std::vector<std::uint32_t> used_;     // what is not 0 there
+  std::vector<Tile> tiles_;
+  std::vector<std::uint8_t> near_;  // by coarse cell
+  std::vector<Touched> touched_;    // cells of points, each once
+};
+
+}  // namespace dynains

@@ -1,0 +1,257 @@
+// Few points that stand for many: samples of the instances of one scan, grouped in supervoxels.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/curved_voxel_clusterer.hpp"
+#include "dynains/evidence/smallest_k.hpp"
+#include "dynains/evidence/voxel_hash.hpp"
+#include "dynains/evidence/voxel_hash_table.hpp"
+#include "dynains/points.hpp"
+#include "dynains/simd/wide_lanes.hpp"
+
+namespace dynains {
+
+/// Place of a supervoxel in its grid, packed: ordered by x, then y, then z.
+using SupervoxelPlace = std::uint64_t;
+
+inline SupervoxelPlace pack_place(std::int32_t x, std::int32_t y, std::int32_t z) {
+  constexpr std::int64_t kOffset = std::int64_t{1} << 20;
+  return static_cast<std::uint64_t>(x + kOffset) << 42 |
+         static_cast<std::uint64_t>(y + kOffset) << 21 | static_cast<std::uint64_t>(z + kOffset);
+}
+
+/// Its place along z, up to a constant.
+inline std::int32_t layer_of(SupervoxelPlace place) {
+  return static_cast<std::int32_t>(place & ((std::uint64_t{1} << 21) - 1));
+}
+
+/// The place beside another, some steps along each axis.
+inline SupervoxelPlace neighbour(SupervoxelPlace place, int dx, int dy, int dz) {
+  return place + (static_cast<std::uint64_t>(static_cast<std::int64_t>(dx)) << 42) +
+         (static_cast<std::uint64_t>(static_cast<std::int64_t>(dy)) << 21) +
+         static_cast<std::uint64_t>(static_cast<std::int64_t>(dz));
+}
+
+/// The samples of one scan in its sensor frame: instance-major, then supervoxel-major, so that
+/// what belongs together is one range.
+struct InstanceSamples {
+  PointBuffer points;                           ///< padded for wide loads
+  std::vector<std::uint32_t> sample_begin;      ///< by supervoxel, one more than supervoxels
+  std::vector<SupervoxelPlace> place;           ///< by supervoxel
+  std::vector<std::uint32_t> supervoxel_begin;  ///< by instance, one more than instances
+  std::vector<std::uint32_t> supervoxel_of;     ///< by sample; longer than there are any
+  std::vector<std::uint32_t> instance_of;       ///< by supervoxel
+  std::vector<std::uint32_t> met_of;  ///< by point of the scan: its supervoxel's position in `met`
+  std::vector<std::uint32_t> met;     ///< supervoxels as the scan meets them, behind one for none
+
+  std::size_t size() const { return sample_begin.empty() ? 0 : sample_begin.back(); }
+  std::size_t supervoxel_count() const {
+    return sample_begin.empty() ? 0 : sample_begin.size() - 1;
+  }
+  std::size_t instance_count() const {
+    return supervoxel_begin.empty() ? 0 : supervoxel_begin.size() - 1;
+  }
+  /// Samples of an instance.
+  std::uint32_t count(std::size_t instance) const {
+    return sample_begin[supervoxel_begin[instance + 1]] - sample_begin[supervoxel_begin[instance]];
+  }
+};
+
+/// Takes up to some samples per supervoxel and instance: those of its points that come first in an
+/// order by hash of their places, whatever their order in the scan.
+class InstanceSampler {
+ public:
+  /// `supervoxel_size`, `max_range`: metres; `most_samples`: of a supervoxel.
+  InstanceSampler(double supervoxel_size, double max_range, std::uint32_t most_samples)
+      : supervoxels_per_metre_(static_cast<float>(1.0 / supervoxel_size)),
+        max_range_(static_cast<float>(max_range)),
+        samples_(most_samples) {}
+
+  /// Which of up to 64 points, a bit each, lie in another supervoxel than their predecessor; the
+  /// first does.
+  std::uint64_t find_changes(PointsView points) const {
+    using namespace detail;
+    const PackConstant per_metre(supervoxels_per_metre_);
+    std::array<std::array<std::int32_t, kBlock + kPackWidth>, 3> voxel;
+    std::uint64_t changes = 0;
+    run_packs([&](auto packs) {
+      using Packs = decltype(packs);
+      for_slices<Packs>(points.size(), [&](const auto& at) {
+        floor(at.load(points.x.data()) * per_metre).store(&voxel[0][at.begin + 1]);
+        floor(at.load(points.y.data()) * per_metre).store(&voxel[1][at.begin + 1]);
+        floor(at.load(points.z.data()) * per_metre).store(&voxel[2][at.begin + 1]);
+      });
+      for (auto& line : voxel) line[0] = 0;
+      changes =
+          detail::find_changes<Packs>(points.size(), &voxel[0][1], &voxel[1][1], &voxel[2][1]);
+    });
+    return changes | 1;
+  }
+
+  /// `points`: one scan, sensor frame; `instance_of`: its instances below `instance_count`, or
+  /// kNoCluster. Points beyond the range and without instance get no sample.
+  void sample(PointsView points, Span<const std::uint32_t> instance_of, std::size_t instance_count,
+              InstanceSamples& out) {
+    begin_scan();
+    detail::ensure_capacity(out.met_of, points.size());
+    out.met_of.resize(points.size());
+    for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
+      const PointsView block = points.subview(begin, std::min(kBlock, points.size() - begin));
+      find_supervoxels(block, instance_of.data() + begin);
+      meet_supervoxels(block.size(), out.met_of.data() + begin);
+      rank_points(begin, block.size(), out.met_of.data() + begin);
+    }
+    order(points, instance_count, out);
+  }
+
+ private:
+  // Number 0 stands for none.
+  struct Supervoxel {
+    std::int32_t xy, z, instance;  // as CellBlock has them
+  };
+  static constexpr std::size_t kBlock = 64;  // points that are worked off together
+  // Ranks are of places of this size: a turn of the sensor, which changes the last bits of all
+  // coordinates, must not change them.
+  static constexpr float kPlacesPerMetre = 64.0F;
+
+  void begin_scan() {
+    memory_.clear();
+    samples_.clear();
+  }
+
+  // The supervoxel of each point, and its rank there.
+  void find_supervoxels(PointsView points, const std::uint32_t* instance_of) {
+    using namespace detail;
+    const PackConstant per_metre(supervoxels_per_metre_), far_squared(max_range_ * max_range_);
+    static constexpr PackConstant kPlaces(kPlacesPerMetre);
+    for_packs(points.size(), [&](auto at) {
+      using Float = typename decltype(at)::Float;
+      using Int = typename decltype(at)::Int;
+      const Float px = at.load(points.x.data());
+      const Float py = at.load(points.y.data());
+      const Float pz = at.load(points.z.data());
+      const Int instance = at.load(instance_of);
+      const auto is_sampled = (px * px + py * py <= far_squared) &
+                              ~(instance == Int(static_cast<std::int32_t>(kNoCluster)));
+      const Int rank =
+          mixed_hash(truncate(px * kPlaces), truncate(py * kPlaces), truncate(pz * kPlaces));
+      rank.store(&rank_[at.begin]);
+      VoxelHashTable::put(is_sampled, floor(px * per_metre), floor(py * per_metre),
+                          floor(pz * per_metre), instance, at.begin, cells_);
+    });
+  }
+
+  // Most points are of supervoxels that are remembered.
+  void meet_supervoxels(std::size_t count, std::uint32_t* met_of) {
+    detail::grow(supervoxels_, memory_.count() + 1 + kBlock);
+    memory_.make_room_for(kBlock);
+    for (std::size_t i = 0; i < count; ++i) {
+      const detail::VoxelHashTable::Entry& entry = memory_.at(cells_, i);
+      met_of[i] = entry.is_other(cells_, i) ? meet_supervoxel(i) : entry.number;
+    }
+  }
+
+  std::uint32_t meet_supervoxel(std::size_t i) {
+    const std::uint32_t number = memory_.find(cells_, i);
+    supervoxels_[number] = {cells_.xy[i], cells_.z[i], cells_.instance[i]};
+    return number;
+  }
+
+  // Neighbours mostly share a row, which would have to wait for its own last change: stretches of
+  // the points take turns.
+  void rank_points(std::size_t begin, std::size_t count, const std::uint32_t* met_of) {
+    constexpr std::size_t kStretches = 4, kLength = kBlock / kStretches;
+    samples_.make_rows(memory_.count() + 1);
+    const auto rank = [&](std::size_t i) {
+      samples_.add(met_of[i], static_cast<std::uint32_t>(rank_[i]),
+                   static_cast<std::uint32_t>(begin + i));
+    };
+    if (count < kBlock) {
+      for (std::size_t i = 0; i < count; ++i) rank(i);
+      return;
+    }
+    for (std::size_t i = 0; i < kLength; ++i) {
+      for (std::size_t k = 0; k < kStretches; ++k) rank(i + k * kLength);
+    }
+  }
+
+  static SupervoxelPlace place_of(const Supervoxel& cell) {
+    return pack_place(cell.xy >> detail::VoxelHashTable::kHalf, static_cast<std::int16_t>(cell.xy),
+                      cell.z);
+  }
+
+  // A counting sort: supervoxels by instance, and their samples with them.
+  void order(PointsView points, std::size_t instance_count, InstanceSamples& out) {
+    const std::size_t supervoxel_count = memory_.count();
+    out.supervoxel_begin.assign(instance_count + 1, 0);
+    for (std::size_t met = 1; met <= supervoxel_count; ++met) {
+      ++out.supervoxel_begin[static_cast<std::uint32_t>(supervoxels_[met].instance) + 1];
+    }
+    for (std::size_t i = 1; i <= instance_count; ++i) {
+      out.supervoxel_begin[i] += out.supervoxel_begin[i - 1];
+    }
+    next_.assign(out.supervoxel_begin.begin(), out.supervoxel_begin.end());
+    out.met.resize(supervoxel_count + 1);
+    out.met[0] = kNoCluster;
+    out.place.resize(supervoxel_count);
+    out.instance_of.resize(supervoxel_count);
+    detail::grow(ordered_, supervoxel_count);
+    for (std::size_t met = 1; met <= supervoxel_count; ++met) {
+      const Supervoxel& supervoxel = supervoxels_[met];
+      const auto instance = static_cast<std::uint32_t>(supervoxel.instance);
+      const std::uint32_t to = next_[instance]++;
+      out.met[met] = to;
+      out.place[to] = place_of(supervoxel);
+      out.instance_of[to] = instance;
+      ordered_[to] = static_cast<std::uint32_t>(met);
+    }
+    copy_samples(points, supervoxel_count, out);
+  }
+
+  // As many of each supervoxel as it may have, with no branch on how many it has: what is too much
+  // is written over by the next one.
+  void copy_samples(PointsView points, std::size_t supervoxel_count, InstanceSamples& out) {
+    const std::size_t most = samples_.most();
+    const std::size_t room =
+        std::min(supervoxel_count * most, points.size() + most) + detail::kMaxPackWidth;
+    out.points.grow(room);
+    detail::grow(out.supervoxel_of, room);
+    out.sample_begin.resize(supervoxel_count + 1);
+    float* const x = out.points.x.data();
+    float* const y = out.points.y.data();
+    float* const z = out.points.z.data();
+    std::uint32_t* const supervoxel_of = out.supervoxel_of.data();
+    std::size_t to = 0;
+    for (std::size_t s = 0; s < supervoxel_count; ++s) {
+      out.sample_begin[s] = static_cast<std::uint32_t>(to);
+      const std::uint32_t met = ordered_[s];
+      for (std::size_t k = 0; k < most; ++k) {
+        const std::size_t i = samples_.number(met, k);
+        x[to + k] = points.x[i];
+        y[to + k] = points.y[i];
+        z[to + k] = points.z[i];
+        supervoxel_of[to + k] = static_cast<std::uint32_t>(s);
+      }
+      to += samples_.count(met);
+    }
+    out.sample_begin[supervoxel_count] = static_cast<std::uint32_t>(to);
+  }
+
+  float supervoxels_per_metre_;
+  float max_range_;
+  detail::VoxelHashTable memory_;  // of supervoxels, numbered as met_of counts them
+  // Of the points of a block.
+  detail::CellBlock<kBlock> cells_ = {};
+  std::array<std::int32_t, kBlock> rank_ = {};
+  detail::SmallestK samples_;            // by supervoxel
+  std::vector<Supervoxel> supervoxels_;  // longer than what is in use
+  std::vector<std::uint32_t> next_;
+  std::vector<std::uint32_t> ordered_;  // as they were met, by instance; longer than what is in use
+};
+
+}  // namespace dynains

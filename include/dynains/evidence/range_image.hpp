@@ -1,0 +1,420 @@
+// Range image of a scan, kept for asking later how far a beam in some direction got.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "dynains/evidence/range_image_grid.hpp"
+#include "dynains/points.hpp"
+#include "dynains/simd/lanes.hpp"
+#include "dynains/simd/short_lanes.hpp"
+#include "dynains/simd/wide_lanes.hpp"
+
+namespace dynains {
+
+/// Nearest return per cell, and the nearest return of the 3x3 cells around it.
+///
+/// The neighbourhood is the margin against grazing incidence: a beam just below a sample protects
+/// the ground, one beside it protects edges. What moved needs no such margin: it hides what lies
+/// behind it in its own cells, and no more.
+class RangeImage {
+ public:
+  /// A cell in four bytes, both values in centimetres: even ones, as odd ones mark what moved.
+  struct Cell {
+    /// The nearest return of what moved in the 3x3 cells, or else the nearest return in this one;
+    /// kNothing if there is neither.
+    std::int16_t nearest;
+    /// The nearest return of the 3x3 cells, without what moved in those beside this one; kUnknown
+    /// if fewer than two of them have such a return.
+    std::int16_t around;
+  };
+  static constexpr std::int16_t kMoving = 1;  ///< bit of a range: a return of what moved
+  static constexpr std::int16_t kNothing = 32766;
+  static constexpr std::int16_t kUnknown = -2;
+
+  /// Cells that a return of an object protects at most, in every direction.
+  static constexpr std::size_t kWidest = 4;
+
+  /// Buffers that building needs, shared by all images of one owner.
+  struct Scratch {
+    std::vector<std::int16_t> nearest;
+    std::vector<std::int16_t> objects;  // the same of objects that stay only, holes and all
+    std::vector<std::uint8_t> reach;    // by row and group of columns: cells that objects reach
+    std::vector<std::uint8_t> nearby;   // the same about one row, by group of columns
+    std::array<std::vector<std::int16_t>, kWidest> lines;  // by column, for one row
+    std::vector<std::int16_t> below, gap;
+    std::vector<std::int16_t> least, least_moving, count;
+    std::vector<std::int16_t> border;
+  };
+
+  const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
+  const Cell* data() const { return cells_.get(); }
+  /// The grid by which it was built; empty before.
+  const RangeImageGrid& grid() const { return grid_; }
+
+  /// Gets the memory of an image and touches it, so that the system has given it before a scan
+  /// needs it.
+  void reserve(const RangeImageGrid& grid) {
+    make_cells(grid);
+    std::fill_n(cells_.get(), grid.cell_count(), Cell{kNothing, kUnknown});
+  }
+
+  /// Replaces the image by that of one scan (m, sensor frame). A return of an object protects what
+  /// lies within `reach` (m) beside it, at least its 3x3 cells: near the sensor these are a few
+  /// centimetres wide, less than what poses are good for. `moving`: by object, 1 if it moved, else
+  /// 0; empty if none did.
+  void build(const RangeImageGrid& grid, PointsView ground, PointsView objects,
+             Span<const std::uint8_t> moving, float reach, Scratch& scratch) {
+    const Reaches reaches(grid, reach);
+    scratch.nearest.assign(grid.cell_count(), kNothing);
+    scratch.border.assign(grid.stride(), kNothing);
+    collect(grid, objects, moving, scratch.nearest.data());
+    keep_objects(grid, reaches, scratch);
+    collect(grid, ground, {}, scratch.nearest.data());
+    close_holes(grid, scratch);
+    store_with_least_around(grid, reaches, scratch);
+    widen(grid, reaches, scratch);
+  }
+
+ private:
+  static constexpr float kCentimetres = 100.0F;
+  static constexpr float kFarthest = 320.0F;  // m
+
+  // How far returns of objects reach: those nearer than limit[k] (cm) protect k + 1 cells in every
+  // direction.
+  struct Reaches {
+    std::array<std::int16_t, kWidest> limit;
+
+    Reaches(const RangeImageGrid& grid, float reach) {
+      for (std::size_t k = 0; k < kWidest; ++k) {
+        const float metres = reach * grid.columns_per_radian / (static_cast<float>(k) + 0.5F);
+        limit[k] = static_cast<std::int16_t>(std::min(metres, kFarthest) * kCentimetres);
+      }
+    }
+  };
+
+  // Cells and ranges of a block of points first: their stores then find them in memory, which is
+  // cheaper than to take lanes apart.
+  static void collect(const RangeImageGrid& grid, PointsView points,
+                      Span<const std::uint8_t> moving, std::int16_t* nearest) {
+    constexpr std::size_t kBlock = 128;
+    const ImageLocator locator(grid);
+    static constexpr detail::PackConstant kMost(kFarthest), kScale(kCentimetres);
+    detail::run_packs([&](auto packs) {
+      using Packs = decltype(packs);
+      using Float = typename Packs::Float;
+      using Int = typename Packs::Int;
+      std::int32_t cell[kBlock];
+      std::int32_t range[kBlock];
+      for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
+        const std::size_t size = std::min(kBlock, points.size() - begin);
+        detail::for_slices<Packs>(size, [&](auto place) {
+          const Float x = place.load(points.x.data() + begin);
+          const Float y = place.load(points.y.data() + begin);
+          const Float z = place.load(points.z.data() + begin);
+          const Float metres = sqrt((x * x + y * y) + z * z);
+          locator.template locate<Packs>(x, y, z, metres).store(&cell[place.begin]);
+          const Int centimetres = truncate(min(metres, Float(kMost)) * kScale);
+          (centimetres & Int(~kMoving)).store(&range[place.begin]);
+        });
+        if (!moving.empty()) {
+          for (std::size_t i = 0; i < size; ++i) range[i] |= moving[begin + i];
+        }
+        // Directions outside fall into cell 0, which lies in the border and is never read.
+        for (std::size_t i = 0; i < size; ++i) {
+          std::int16_t& value = nearest[cell[i]];
+          value = std::min(value, static_cast<std::int16_t>(range[i]));
+        }
+      }
+    });
+  }
+
+  // Columns are looked at in groups; `group_stride` leaves room for one across the seam on each
+  // side.
+  static std::size_t group_count(const RangeImageGrid& grid) {
+    return (grid.stride() - 2 * detail::kPackWidth) / detail::kShortPackWidth;
+  }
+  static std::size_t group_stride(const RangeImageGrid& grid) { return group_count(grid) + 2; }
+  static std::size_t column_of(std::size_t group) {
+    return detail::kPackWidth + group * detail::kShortPackWidth;
+  }
+
+  template <class Short>
+  static Short is_moving(const Short& range) {
+    return (range & Short(kMoving)) == Short(kMoving);
+  }
+  // Ranges of what moved, or of what stays; the others become nothing.
+  template <class Short>
+  static Short only_moving(const Short& range) {
+    return select(is_moving(range), range, Short(kNothing));
+  }
+  template <class Short>
+  static Short only_staying(const Short& range) {
+    return select(is_moving(range), Short(kNothing), range);
+  }
+
+  // Copies what stays of the image while it holds nothing but objects, and notes how far that
+  // reaches where it is more than one cell.
+  static void keep_objects(const RangeImageGrid& grid, const Reaches& reaches, Scratch& scratch) {
+    const std::size_t stride = grid.stride();
+    const std::size_t groups = group_count(grid);
+    const auto rows = static_cast<std::size_t>(grid.rows);
+    scratch.objects.resize(grid.cell_count());
+    scratch.reach.assign(rows * group_stride(grid), 0);
+    detail::run_packs([&](auto packs) {
+      using Short = typename detail::ShortsOf<decltype(packs)>::Type;
+      const Short far(reaches.limit[1]);
+      for (std::size_t row = 0; row < rows; ++row) {
+        const std::int16_t* const from = &scratch.nearest[row * stride];
+        std::int16_t* const to = &scratch.objects[row * stride];
+        std::uint8_t* const reach = &scratch.reach[row * group_stride(grid) + 1];
+        for (std::size_t group = 0; group < groups; ++group) {
+          const Short here = only_staying(Short::load(from + column_of(group)));
+          here.store(to + column_of(group));
+          if (!(here < far).any()) continue;
+          std::size_t cells = 2;
+          while (cells < kWidest && (here < Short(reaches.limit[cells])).any()) ++cells;
+          reach[group] = static_cast<std::uint8_t>(cells);
+        }
+        wrap(to, static_cast<std::size_t>(grid.columns), 1);
+      }
+    });
+  }
+
+  // Between two beams an image has rows that no beam can fill. Up to `hole_rows` of them take the
+  // nearer of the returns below and above.
+  static void close_holes(const RangeImageGrid& grid, Scratch& scratch) {
+    using namespace detail;
+    const std::size_t stride = grid.stride();
+    // By column: the last return below, and how many rows are empty since; too many if there is
+    // none.
+    scratch.below.assign(stride, kNothing);
+    scratch.gap.assign(stride, static_cast<std::int16_t>(grid.hole_rows + 1));
+    run_packs([&](auto packs) {
+      using Short = typename ShortsOf<decltype(packs)>::Type;
+      const Short zero(0), one(1), nothing(kNothing);
+      const Short widest(static_cast<std::int16_t>(grid.hole_rows));
+      std::int16_t* const belows = scratch.below.data();
+      std::int16_t* const gaps = scratch.gap.data();
+      for (std::size_t row = 0; row < static_cast<std::size_t>(grid.rows); ++row) {
+        std::int16_t* const line = &scratch.nearest[row * stride];
+        for (std::size_t column = kPackWidth; column + kPackWidth < stride;
+             column += kShortPackWidth) {
+          std::int16_t* const at = line + column;
+          const Short here = Short::load(at);
+          const Short below = Short::load(belows + column);
+          const Short gap = Short::load(gaps + column);
+          const Short returned = here < nothing;
+          const Short closes = returned & (zero < gap) & (gap < widest + one);
+          if (closes.any()) {
+            const Short fill = min(here, below);
+            std::int16_t* to = at;
+            for (Short left = closes & gap; (zero < left).any(); left = left - one) {
+              to -= stride;
+              select(zero < left, fill, Short::load(to)).store(to);
+            }
+          }
+          select(returned, here, below).store(belows + column);
+          (~returned & min(gap + one, widest + one)).store(gaps + column);
+        }
+      }
+    });
+  }
+
+  // The nearest returns of the 3x3 cells about each cell, beside its own: of what moved and of what
+  // stays. A single one of these says nothing, unless it is that of a near object.
+  void store_with_least_around(const RangeImageGrid& grid, const Reaches& reaches,
+                               Scratch& scratch) {
+    using namespace detail;
+    const std::size_t stride = grid.stride();
+    const auto rows = static_cast<std::size_t>(grid.rows);
+    make_cells(grid);
+    scratch.least.resize(stride);
+    scratch.least_moving.resize(stride);
+    scratch.count.resize(stride);
+    for (std::size_t row = 0; row < rows; ++row) {
+      wrap(&scratch.nearest[row * stride], static_cast<std::size_t>(grid.columns), 1);
+    }
+    run_packs([&](auto packs) {
+      using Short = typename ShortsOf<decltype(packs)>::Type;
+      const Short nothing(kNothing), unknown(kUnknown), near(reaches.limit[0]);
+      const Short zero(0), one_return(-1);
+      std::int16_t* const leasts = scratch.least.data();
+      std::int16_t* const moving_leasts = scratch.least_moving.data();
+      std::int16_t* const counts = scratch.count.data();
+      for (std::size_t row = 0; row < rows; ++row) {
+        const auto line = [&](const std::vector<std::int16_t>& image, std::size_t number) {
+          return number < rows ? &image[number * stride] : scratch.border.data();
+        };
+        const std::int16_t* const low = line(scratch.nearest, row - 1);
+        const std::int16_t* const middle = line(scratch.nearest, row);
+        const std::int16_t* const high = line(scratch.nearest, row + 1);
+        Cell* const cells = &cells_[row * stride];
+        for (std::size_t column = 0; column < stride; column += kShortPackWidth) {
+          const Short below = Short::load(low + column);
+          const Short here = Short::load(middle + column);
+          const Short above = Short::load(high + column);
+          min(min(only_moving(below), only_moving(here)), only_moving(above))
+              .store(moving_leasts + column);
+          const Short a = only_staying(below);
+          const Short b = only_staying(here);
+          const Short c = only_staying(above);
+          min(min(a, b), c).store(leasts + column);
+          // Set lanes are -1.
+          ((a < nothing) + (b < nothing) + (c < nothing)).store(counts + column);
+        }
+        for (std::size_t column = kPackWidth; column + kPackWidth < stride;
+             column += kShortPackWidth) {
+          const auto least_of_three = [](const std::int16_t* at) {
+            return min(min(Short::load(at - 1), Short::load(at)), Short::load(at + 1));
+          };
+          const std::int16_t* const count = counts + column;
+          const Short returns =
+              Short::load(count - 1) + Short::load(count) + Short::load(count + 1);
+          Short alone = unknown;
+          const Short single = returns == one_return;
+          if (single.any()) {
+            const Short object = min(min(least_of_three(line(scratch.objects, row - 1) + column),
+                                         least_of_three(line(scratch.objects, row) + column)),
+                                     least_of_three(line(scratch.objects, row + 1) + column));
+            alone = select(single & (object < near), object, unknown);
+          }
+          const Short staying =
+              select(returns < one_return, least_of_three(leasts + column), alone);
+          // What moved in the cell itself hides what lies behind it.
+          const Short here = Short::load(middle + column);
+          const Short hiding = min(select(staying < zero, nothing, staying), here);
+          const Short around = select(is_moving(here), hiding, staying);
+          const Short moving = least_of_three(moving_leasts + column);
+          const Short nearest = select(moving < nothing, moving, here);
+          nearest.store_interleaved_with(around, &cells[column].nearest);
+        }
+      }
+    });
+  }
+
+  // Lets near objects protect more cells about their returns.
+  void widen(const RangeImageGrid& grid, const Reaches& reaches, Scratch& scratch) {
+    const auto rows = static_cast<std::size_t>(grid.rows);
+    for (std::vector<std::int16_t>& line : scratch.lines) line.resize(grid.stride());
+    detail::run_packs([&](auto packs) {
+      using Short = typename detail::ShortsOf<decltype(packs)>::Type;
+      for (std::size_t row = 0; row < rows; ++row) {
+        if (!find_nearby(grid, row, scratch)) continue;
+        widen_upwards<Short>(grid, reaches, row, scratch);
+        widen_sideways<Short>(grid, row, scratch);
+      }
+    });
+  }
+
+  // How many cells objects reach about a row, by group, as far as they reach the row itself; false
+  // if they do not.
+  static bool find_nearby(const RangeImageGrid& grid, std::size_t row, Scratch& scratch) {
+    const auto rows = static_cast<std::size_t>(grid.rows);
+    const std::size_t groups = group_count(grid);
+    const std::size_t stride = group_stride(grid);
+    scratch.nearby.assign(stride, 0);
+    std::uint8_t* const nearby = scratch.nearby.data();
+    for (std::size_t r = row - std::min(row, kWidest); r < std::min(row + kWidest + 1, rows); ++r) {
+      const auto distance = static_cast<std::uint8_t>(r < row ? row - r : r - row);
+      const std::uint8_t* const reach = &scratch.reach[r * stride];
+      for (std::size_t i = 0; i < stride; ++i) {
+        const std::uint8_t cells = reach[i] >= distance ? reach[i] : std::uint8_t{0};
+        nearby[i] = std::max(nearby[i], cells);
+      }
+    }
+    // Across the seam: the last group may be narrower than the reach.
+    nearby[0] = std::max(nearby[groups], nearby[groups - 1]);
+    nearby[groups + 1] = nearby[1];
+    return *std::max_element(nearby, nearby + stride) > 0;
+  }
+
+  // For each reach, the nearest of the objects above and below that reach so far.
+  template <class Short>
+  static void widen_upwards(const RangeImageGrid& grid, const Reaches& reaches, std::size_t row,
+                            Scratch& scratch) {
+    const std::size_t stride = grid.stride();
+    const auto rows = static_cast<std::size_t>(grid.rows);
+    const Short nothing(kNothing);
+    for (std::size_t group = 0; group < group_count(grid); ++group) {
+      const std::size_t column = column_of(group);
+      const auto load = [&](std::size_t r) {
+        return r < rows ? Short::load(&scratch.objects[r * stride + column]) : nothing;
+      };
+      const std::size_t farthest = scratch.nearby[group + 1];
+      Short least = nothing;
+      if (farthest > 0) least = min(load(row), min(load(row - 1), load(row + 1)));
+      for (std::size_t cells = 2; cells <= kWidest; ++cells) {
+        Short line = nothing;
+        if (cells <= farthest) {
+          least = min(least, min(load(row - cells), load(row + cells)));
+          line = select(least < Short(reaches.limit[cells - 1]), least, nothing);
+        }
+        line.store(&scratch.lines[cells - 1][column]);
+      }
+    }
+    for (std::size_t cells = 2; cells <= kWidest; ++cells) {
+      wrap(scratch.lines[cells - 1].data(), static_cast<std::size_t>(grid.columns), cells);
+    }
+  }
+
+  template <class Short>
+  void widen_sideways(const RangeImageGrid& grid, std::size_t row, const Scratch& scratch) {
+    for (std::size_t group = 0; group < group_count(grid); ++group) {
+      const std::uint8_t* const nearby = &scratch.nearby[group];
+      const std::size_t farthest = std::max({nearby[0], nearby[1], nearby[2]});
+      if (farthest == 0) continue;
+      const std::size_t column = column_of(group);
+      Short least(kNothing);
+      for (std::size_t cells = 2; cells <= farthest; ++cells) {
+        const std::int16_t* const line = &scratch.lines[cells - 1][column - cells];
+        for (std::size_t i = 0; i <= 2 * cells; ++i) least = min(least, Short::load(line + i));
+      }
+      if ((least < Short(kNothing)).any()) protect(&cells_[row * grid.stride() + column], least);
+    }
+  }
+
+  // Lets `around` of sixteen cells be at most `reach`; kNothing changes nothing.
+  template <class Short>
+  static void protect(Cell* cells, const Short& reach) {
+    using namespace detail;
+    const Short nothing(kNothing);
+    std::int16_t limits[2 * kShortPackWidth];
+    nothing.store_interleaved_with(reach, limits);
+    for (std::size_t half = 0; half < 2; ++half) {
+      std::int16_t* const at = &cells[half * kShortPackWidth / 2].nearest;
+      const Short here = Short::load(at);
+      const Short limit = Short::load(limits + half * kShortPackWidth);
+      min(select((here < Short(0)) & (limit < nothing), nothing, here), limit).store(at);
+    }
+  }
+
+  // Copies the ends of a row to its other side, so that neighbours across the seam are at hand.
+  static void wrap(std::int16_t* row, std::size_t columns, std::size_t width) {
+    std::int16_t* const first = row + detail::kPackWidth;
+    for (std::size_t i = 0; i < width; ++i) {
+      first[-1 - static_cast<std::ptrdiff_t>(i)] = first[columns - 1 - i];
+      first[columns + i] = first[i];
+    }
+  }
+
+  // Without values: an image is the largest buffer of all, and each of its cells is written before
+  // it is read but the first, which stands for all directions outside.
+  void make_cells(const RangeImageGrid& grid) {
+    const bool fits = grid.cell_count() == grid_.cell_count();
+    if (!fits) {
+      cells_ = std::unique_ptr<Cell[]>(new Cell[grid.cell_count()]);
+      cells_[0] = {kNothing, kUnknown};
+    }
+    grid_ = grid;
+  }
+
+  std::unique_ptr<Cell[]> cells_;
+  RangeImageGrid grid_;
+};
+
+}  // namespace dynains

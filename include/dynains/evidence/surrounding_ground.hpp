@@ -1,0 +1,144 @@
+// How high ground points stand over the ground around them.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "dynains/ground/plane_fit.hpp"
+#include "dynains/points.hpp"
+#include "dynains/simd/capacity.hpp"
+
+namespace dynains {
+
+/// Planes through some points of the ground, by horizontal cells in the sensor frame: each through
+/// the points of its cell and of the eight around it.
+class SurroundingGround {
+ public:
+  /// Height where too little of the ground is known.
+  static constexpr float kUnknown = std::numeric_limits<float>::infinity();
+
+  /// `max_range`: m; points beyond share the cells at the border.
+  explicit SurroundingGround(double max_range)
+      : half_(std::ceil(static_cast<float>(max_range / kCell)) + 2.0F),
+        width_(2 * static_cast<std::size_t>(half_)),
+        number_of_(width_ * width_, 0) {
+    cells_.reserve(number_of_.size() + 1);  // takes address space only
+    used_.reserve(number_of_.size());
+    forget();
+  }
+
+  /// Forgets what it knew and takes in ground points (m), but for those that lie `rise` (m) or more
+  /// over planes through all of them, as something may stand there, or of which too little lies
+  /// around.
+  void take(PointsView points, float rise) {
+    forget();
+    for (std::size_t i = 0; i < points.size(); ++i) add(points, i, 1.0);
+    detail::ensure_capacity(rising_, points.size());
+    rising_.clear();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const float over = height(points.x[i], points.y[i], points.z[i]);
+      if (over >= rise) rising_.push_back(static_cast<std::uint32_t>(i));
+    }
+    for (const std::uint32_t i : rising_) add(points, i, -1.0);
+    for (Cell& cell : cells_) cell.has_plane = false;
+  }
+
+  /// Of a point (m): vertical distance (m) from the ground around it, or kUnknown.
+  float height(float x, float y, float z) {
+    const std::size_t index = index_of(x, y);
+    Cell& cell = cell_at(index);
+    if (!cell.has_plane) find_plane(index, cell);
+    return z - (cell.slope_x * x + cell.slope_y * y + cell.offset);
+  }
+
+ private:
+  static constexpr double kCell = 2.0;  // m
+  // With less, points are too few, or too much on a line, to tell how a plane lies.
+  static constexpr double kLeastPoints = 8.0;
+  static constexpr double kLeastVariance = 0.4;  // m^2, along any horizontal direction
+
+  struct Cell {
+    detail::PlaneMoments moments;
+    // Of its plane: z = slope_x * x + slope_y * y + offset.
+    float slope_x = 0.0F, slope_y = 0.0F, offset = -kUnknown;
+    bool has_plane = false;
+  };
+
+  // Number 0 is that of no cell.
+  void forget() {
+    for (const std::size_t index : used_) number_of_[index] = 0;
+    used_.clear();
+    cells_.assign(1, Cell());
+  }
+
+  // Cells at the border of the grid are nothing but neighbours.
+  std::size_t index_of(float x, float y) const {
+    constexpr auto kPerMetre = static_cast<float>(1.0 / kCell);
+    const float last = 2.0F * half_ - 2.0F;
+    const auto line = [&](float coordinate) {
+      const float place = coordinate * kPerMetre + half_;
+      return static_cast<std::size_t>(
+          static_cast<std::int32_t>(std::min(std::max(place, 1.0F), last)));
+    };
+    return line(y) * width_ + line(x);
+  }
+
+  Cell& cell_at(std::size_t index) {
+    std::uint32_t& number = number_of_[index];
+    if (number == 0) {
+      number = static_cast<std::uint32_t>(cells_.size());
+      used_.push_back(index);
+      cells_.emplace_back();
+    }
+    return cells_[number];
+  }
+
+  void add(PointsView points, std::size_t i, double weight) {
+    const float x = points.x[i], y = points.y[i], z = points.z[i];
+    cell_at(index_of(x, y))
+        .moments.add(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z),
+                     weight);
+  }
+
+  // Least squares in z.
+  void find_plane(std::size_t index, Cell& cell) const {
+    cell.has_plane = true;
+    cell.offset = -kUnknown;
+    detail::PlaneMoments sum;
+    for (const std::size_t row : {index - width_, index, index + width_}) {
+      for (const std::size_t place : {row - 1, row, row + 1}) {
+        sum += cells_[number_of_[place]].moments;
+      }
+    }
+    if (sum.count < kLeastPoints) return;
+    const double share = 1.0 / sum.count;
+    const double mean_x = sum.x * share, mean_y = sum.y * share, mean_z = sum.z * share;
+    const double xx = sum.xx * share - mean_x * mean_x;
+    const double xy = sum.xy * share - mean_x * mean_y;
+    const double yy = sum.yy * share - mean_y * mean_y;
+    const double xz = sum.xz * share - mean_x * mean_z;
+    const double yz = sum.yz * share - mean_y * mean_z;
+    const double half = 0.5 * (xx - yy);
+    const double least_variance = 0.5 * (xx + yy) - std::sqrt(half * half + xy * xy);
+    if (!(least_variance >= kLeastVariance)) return;
+    const double inverse = 1.0 / (xx * yy - xy * xy);
+    const double slope_x = (xz * yy - yz * xy) * inverse;
+    const double slope_y = (yz * xx - xz * xy) * inverse;
+    cell.slope_x = static_cast<float>(slope_x);
+    cell.slope_y = static_cast<float>(slope_y);
+    cell.offset = static_cast<float>(mean_z - slope_x * mean_x - slope_y * mean_y);
+  }
+
+  float half_;                            // cells from the sensor to the border
+  std::size_t width_;                     // of the grid, in cells
+  std::vector<std::uint32_t> number_of_;  // row-major: of cells in use, in `cells_`
+  std::vector<std::size_t> used_;         // what is not 0 there
+  std::vector<Cell> cells_;
+  std::vector<std::uint32_t> rising_;  // of the points that are taken in
+};
+
+}  // namespace dynains

@@ -1,0 +1,175 @@
+// Second thoughts on the static map: what later scans see through is taken out again.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
+
+#include "dynains/belief_updater.hpp"
+#include "dynains/evidence/free_space_sum.hpp"
+#include "dynains/map/chunked_vector.hpp"
+#include "dynains/parameters.hpp"
+#include "dynains/points.hpp"
+#include "dynains/simd/lanes.hpp"
+
+namespace dynains {
+
+/// Goes beyond the paper: a car that stood for longer than the horizon is in the map before it
+/// leaves; the scans after that see through its place.
+struct MapRevisionConfig {
+  bool revise_map = false;      ///< take back points whose place later scans see free
+  double revision_range = 60;   ///< m, horizontal; blocks farther from the sensor are not looked at
+  int revision_period = 4;      ///< scans from one look at a block to the next
+  double revision_free = 0.7;   ///< update probability of a scan that sees through a block
+  double revision_hit = 0.155;  ///< update probability of a scan that hits it
+  double tau_revise = 0.95;     ///< belief from which a block is emptied
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& visitor) {
+    visitor(Parameter{"revise_map", self.revise_map, Bounds(), "",
+                      "take points out of the static map again if later scans see their place "
+                      "free; needs use_free_space and a map in memory"});
+    visitor(Parameter{"revision_range", self.revision_range, closed(5, 300), "m",
+                      "places of the map farther away (horizontally) are not looked at again"});
+    visitor(Parameter{"revision_period", self.revision_period, closed(1, 100), "scans",
+                      "from one look at a place of the map to the next; not below reference_step"});
+    visitor(Parameter{"revision_free", self.revision_free, open(0.5, 1), "",
+                      "update probability of a scan that sees through a place (form of Eq. 18)"});
+    visitor(Parameter{"revision_hit", self.revision_hit, open(0, 0.5), "",
+                      "update probability of a scan that hits it (form of Eq. 18)"});
+    visitor(Parameter{"tau_revise", self.tau_revise, open(0.5, 1), "",
+                      "belief from which a place is emptied (form of Eq. 19)"});
+  }
+
+  /// Throws ConfigError.
+  void validate() const { validate_parameters("MapRevision", *this); }
+};
+
+/// Looks at the blocks of a map around the sensor again and again, some in each scan, and sums up
+/// for each how often it was seen free: the log-odds of Eq. 15 with the three-way increments of Eq.
+/// 18, never below zero (Page's test), as a place that was hit for long may be left by what stood
+/// there. Cost depends on the density of the map around the sensor, not on its size.
+class MapRevision {
+ public:
+  using Config = MapRevisionConfig;
+
+  MapRevision() : MapRevision(Config()) {}
+
+  /// Throws ConfigError.
+  explicit MapRevision(const Config& config)
+      : config_((config.validate(), config)),
+        sum_(config.revision_free, config.revision_hit),
+        level_(static_cast<float>(log_odds(config.tau_revise))) {}
+
+  const Config& config() const { return config_; }
+
+  /// One scan's say on the blocks whose turn it is. `see(points, T_world_points)` tells what that
+  /// scan saw of points (padded for wide loads): FreeSpaceEvidence::see. Empties blocks of `map`.
+  template <class Map, class See>
+  void revise(Map& map, std::uint64_t scan, const Eigen::Vector3d& sensor_world, See&& see) {
+    take_in_new_blocks(map);
+    gather(map, scan, sensor_world);
+    if (blocks_.empty()) return;
+    const auto& sights =
+        see(samples_, begin_.back(), Eigen::Isometry3d(Eigen::Translation3d(sensor_world)));
+    for (std::size_t i = 0; i < blocks_.size(); ++i) {
+      const auto seen = sights.count(begin_[i], begin_[i + 1]);
+      float& level = levels_[blocks_[i]];
+      update(seen.free, seen.hit, begin_[i + 1] - begin_[i], level);
+      if (level < level_) continue;
+      map.erase_block(blocks_[i]);
+      level = 0.0F;
+    }
+  }
+
+  /// Forgets all blocks.
+  void clear() {
+    tiles_.clear();
+    levels_ = {};
+  }
+
+ private:
+  static constexpr double kTile = 25.0;             // m
+  static constexpr std::uint32_t kMostSamples = 8;  // of a block
+  static constexpr float kLeastSeen = 0.3F;         // share of the samples
+
+  static std::int64_t tile_of(double metres) {
+    return static_cast<std::int64_t>(std::floor(metres / kTile));
+  }
+  static std::uint64_t key(std::int64_t x, std::int64_t y) {
+    return static_cast<std::uint64_t>(x) << 32U ^ (static_cast<std::uint64_t>(y) & 0xFFFFFFFFU);
+  }
+
+  template <class Map>
+  void take_in_new_blocks(const Map& map) {
+    for (std::uint32_t b = levels_.size(); b < map.block_count(); ++b) {
+      const Eigen::Vector3d corner = map.block_corner(b);
+      tiles_[key(tile_of(corner.x()), tile_of(corner.y()))].push_back(b);
+      levels_.push_back(0.0F);
+    }
+  }
+
+  // Samples of the blocks of every tile around the sensor whose turn it is, relative to the sensor.
+  template <class Map>
+  void gather(const Map& map, std::uint64_t scan, const Eigen::Vector3d& sensor_world) {
+    blocks_.clear();
+    begin_.assign(1, 0);
+    const double range = config_.revision_range;
+    const std::int64_t last_x = tile_of(sensor_world.x() + range);
+    const std::int64_t last_y = tile_of(sensor_world.y() + range);
+    const auto period = static_cast<std::uint64_t>(config_.revision_period);
+    for (std::int64_t x = tile_of(sensor_world.x() - range); x <= last_x; ++x) {
+      for (std::int64_t y = tile_of(sensor_world.y() - range); y <= last_y; ++y) {
+        const auto found = tiles_.find(key(x, y));
+        if (found == tiles_.end()) continue;
+        const std::vector<std::uint32_t>& tile = found->second;
+        for (std::size_t i = (scan + key(x, y)) % period; i < tile.size(); i += period) {
+          gather_block(map, tile[i], sensor_world);
+        }
+      }
+    }
+  }
+
+  template <class Map>
+  void gather_block(const Map& map, std::uint32_t block, const Eigen::Vector3d& sensor_world) {
+    const Eigen::Vector3d corner = map.block_corner(block) - sensor_world;
+    if (corner.head<2>().norm() > config_.revision_range) return;
+    std::uint32_t count = begin_.back();
+    const std::uint32_t most = count + kMostSamples;
+    samples_.grow(most + detail::kPackWidth);
+    map.visit_in_block(block, [&](float x, float y, float z) {
+      if (count == most) return;
+      samples_.x[count] = static_cast<float>(corner.x()) + x;
+      samples_.y[count] = static_cast<float>(corner.y()) + y;
+      samples_.z[count] = static_cast<float>(corner.z()) + z;
+      ++count;
+    });
+    if (count == begin_.back()) return;
+    blocks_.push_back(block);
+    begin_.push_back(count);
+  }
+
+  void update(std::uint32_t free, std::uint32_t hit, std::uint32_t samples, float& level) const {
+    const auto seen = static_cast<float>(free + hit);
+    const auto least = static_cast<float>(std::min(2U, samples));
+    if (seen < std::max(least, kLeastSeen * static_cast<float>(samples))) return;
+    const float share = static_cast<float>(free) / seen;
+    if (share >= detail::FreeSpaceSum::kFreeShare) sum_.raise(level, share);
+    if (share <= detail::FreeSpaceSum::kHitShare) sum_.lower(level);
+  }
+
+  Config config_;
+  detail::FreeSpaceSum sum_;
+  float level_;
+  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> tiles_;  // blocks by place
+  detail::ChunkedVector<float, 1024> levels_;  // by block: log-odds that it is free
+  std::vector<std::uint32_t> blocks_;          // of which samples are
+  std::vector<std::uint32_t> begin_;           // by these blocks, one more
+  PointBuffer samples_;
+};
+
+}  // namespace dynains

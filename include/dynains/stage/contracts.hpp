@@ -1,0 +1,193 @@
+// Compile-time contracts of the stages: a stage that does not fit fails with one readable line.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "dynains/cause.hpp"
+#include "dynains/points.hpp"
+#include "dynains/sensor/sensor_model.hpp"
+#include "dynains/stage/cluster_set.hpp"
+#include "dynains/stage/evidence_verdict.hpp"
+#include "dynains/stage/ground_split.hpp"
+#include "dynains/stage/polar_points.hpp"
+
+namespace dynains::detail {
+
+template <class Stage, class = void>
+struct IsConfigurable : std::false_type {};
+template <class Stage>
+struct IsConfigurable<
+    Stage,
+    std::void_t<typename Stage::Config, decltype(Stage(std::declval<typename Stage::Config>())),
+                decltype(std::declval<typename Stage::Config>().validate())>> : std::true_type {};
+
+template <class Stage, class = void>
+struct IsGround : std::false_type {};
+template <class Stage>
+struct IsGround<Stage,
+                std::void_t<decltype(std::declval<Stage&>().segment(
+                    PointsView(), Span<const std::uint32_t>(), std::declval<GroundSplit&>()))>>
+    : std::true_type {};
+
+template <class Stage, class = void>
+struct IsClusterer : std::false_type {};
+template <class Stage>
+struct IsClusterer<
+    Stage,
+    std::enable_if_t<
+        std::is_convertible_v<decltype(std::declval<Stage&>().cluster(PolarView())),
+                              Span<const std::uint32_t>> &&
+        std::is_convertible_v<decltype(std::declval<Stage&>().cluster_count()), std::size_t>>>
+    : std::true_type {};
+
+template <class Stage, class = void>
+struct IsDescriptor : std::false_type {};
+template <class Stage>
+struct IsDescriptor<
+    Stage,
+    std::void_t<decltype(std::declval<Stage&>().describe(std::declval<const ClusterView&>())),
+                decltype(std::declval<Stage&>().describe_rest()),
+                decltype(std::declval<Stage&>().heights(std::size_t{})),
+                decltype(std::declval<Stage&>().cluster_heights()),
+                std::enable_if_t<std::is_convertible_v<
+                    decltype(std::declval<Stage&>().proposes_dynamic()), bool>>>> : std::true_type {
+};
+
+template <class Stage, class = void>
+struct IsBelief : std::false_type {};
+template <class Stage>
+struct IsBelief<
+    Stage,
+    std::void_t<decltype(std::declval<Stage&>().reset()),
+                decltype(std::declval<Stage&>().update(Span<const float>(), Span<const float>())),
+                std::enable_if_t<
+                    std::is_convertible_v<decltype(std::declval<Stage&>().posterior()), double> &&
+                    std::is_convertible_v<decltype(std::declval<Stage&>().is_dynamic()), bool>>>>
+    : std::true_type {};
+
+template <class Stage, class = void>
+struct IsEvidence : std::false_type {};
+template <class Stage>
+struct IsEvidence<
+    Stage,
+    std::void_t<
+        decltype(std::declval<Stage&>().adapt(SensorModel())),
+        decltype(std::declval<Stage&>().observe(
+            std::uint64_t{}, std::uint64_t{}, std::declval<const Eigen::Isometry3d&>(),
+            std::declval<const GroundSplit&>(), Span<const std::uint32_t>(), std::size_t{})),
+        std::enable_if_t<
+            std::is_convertible_v<decltype(std::declval<Stage&>().judge(
+                                      std::uint64_t{}, bool{}, std::declval<const GroundSplit&>())),
+                                  EvidenceVerdict> &&
+            std::is_convertible_v<decltype(std::declval<const Stage&>().horizon()), std::size_t> &&
+            std::is_convertible_v<decltype(std::declval<const Stage&>().predecessors()),
+                                  Span<const std::uint32_t>>>>> : std::true_type {};
+
+template <class Stage, class = void>
+struct IsMap : std::false_type {};
+template <class Stage>
+struct IsMap<Stage, std::void_t<decltype(std::declval<Stage&>().insert(
+                                    PointsView(), Span<const std::uint8_t>(),
+                                    std::declval<const Eigen::Isometry3d&>())),
+                                decltype(std::declval<Stage&>().clear())>> : std::true_type {};
+
+/// Whether evidence can be held against the blocks of a map: both offer what MapRevision needs.
+template <class Map, class Evidence, class = void>
+struct IsRevisable : std::false_type {};
+template <class Map, class Evidence>
+struct IsRevisable<Map, Evidence,
+                   std::void_t<decltype(std::declval<Map&>().erase_block(std::uint32_t{})),
+                               decltype(std::declval<const Map&>().block_count()),
+                               decltype(std::declval<const Map&>().block_corner(std::uint32_t{})),
+                               decltype(std::declval<const Map&>().visit_in_block(
+                                   std::uint32_t{}, std::declval<void (*)(float, float, float)>())),
+                               decltype(std::declval<Evidence&>().see(
+                                   std::declval<const PointBuffer&>(), std::size_t{},
+                                   std::declval<const Eigen::Isometry3d&>()))>> : std::true_type {};
+
+/// Stages::Evidence, or `Default` for sets of stages that name the paper's five only.
+template <class Stages, class Default, class = void>
+struct EvidenceOf {
+  using type = Default;
+};
+template <class Stages, class Default>
+struct EvidenceOf<Stages, Default, std::void_t<typename Stages::Evidence>> {
+  using type = typename Stages::Evidence;
+};
+
+/// Whether a stage wants to know the sensor: `needs_sensor()` and `adapt(const SensorModel&)` are
+/// optional.
+template <class Stage, class = void>
+struct WantsSensor : std::false_type {};
+template <class Stage>
+struct WantsSensor<
+    Stage,
+    std::enable_if_t<std::is_convertible_v<decltype(std::declval<Stage&>().adapt(SensorModel()),
+                                                    std::declval<const Stage&>().needs_sensor()),
+                                           bool>>> : std::true_type {};
+template <class Stage>
+bool needs_sensor(const Stage& stage) {
+  if constexpr (WantsSensor<Stage>::value) {
+    return stage.needs_sensor();
+  } else {
+    return false;
+  }
+}
+template <class Stage>
+void adapt_stage(Stage& stage, const SensorModel& sensor) {
+  if constexpr (WantsSensor<Stage>::value) stage.adapt(sensor);
+}
+
+/// Whether `Operation<T>` can be named: whether T offers what may be there or not.
+template <template <class> class Operation, class T, class = void>
+struct Offers : std::false_type {};
+template <template <class> class Operation, class T>
+struct Offers<Operation, T, std::void_t<Operation<T>>> : std::true_type {};
+
+/// Lets a stage get its own memory for scans to come; `reserve(std::size_t scans)` is optional.
+template <class Stage>
+using Reserve = decltype(std::declval<Stage&>().reserve(std::size_t{}));
+template <class Stage>
+void reserve_stage(Stage& stage, std::size_t scans) {
+  if constexpr (Offers<Reserve, Stage>::value) stage.reserve(scans);
+}
+
+/// Tells a stage how old the scans are that it is asked about; `keep(std::size_t scans)` is
+/// optional.
+template <class Stage>
+using Keep = decltype(std::declval<Stage&>().keep(std::size_t{}));
+template <class Stage>
+void keep_in_stage(Stage& stage, std::size_t scans) {
+  if constexpr (Offers<Keep, Stage>::value) stage.keep(scans);
+}
+
+/// Scans from one reference of an evidence to the next; one that does not say so keeps them all.
+template <class Config>
+using ReferenceStep = decltype(std::declval<Config&>().reference_step);
+template <class Config>
+int reference_step(const Config& config) {
+  if constexpr (Offers<ReferenceStep, Config>::value) {
+    return config.reference_step;
+  } else {
+    return 1;
+  }
+}
+
+/// The paper's parameters of a stage; a stage without `Config::paper()` keeps its defaults.
+template <class Config>
+using Paper = decltype(Config::paper());
+template <class Config>
+Config paper_config() {
+  if constexpr (Offers<Paper, Config>::value) {
+    return Config::paper();
+  } else {
+    return Config();
+  }
+}
+
+}  // namespace dynains::detail

@@ -1,0 +1,77 @@
+// Points in cylindrical coordinates about the vertical axis of a sensor: what clustering and
+// descriptors work on.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <vector>
+
+#include "dynains/points.hpp"
+#include "dynains/simd/arc_tangent.hpp"
+#include "dynains/simd/capacity.hpp"
+#include "dynains/simd/pack_transform.hpp"
+#include "dynains/simd/wide_lanes.hpp"
+
+namespace dynains {
+
+/// Points as three arrays of equal length.
+struct PolarView {
+  Span<const float> range;    ///< m, horizontal distance r(p) (Eq. 8)
+  Span<const float> azimuth;  ///< rad, theta(p) in [-pi, pi] (Eq. 8)
+  Span<const float> z;        ///< m, height in the sensor frame
+
+  std::size_t size() const { return range.size(); }
+  bool empty() const { return range.empty(); }
+  PolarView subview(std::size_t offset, std::size_t count) const {
+    return {range.subspan(offset, count), azimuth.subspan(offset, count), z.subspan(offset, count)};
+  }
+};
+
+/// Owner of polar points, reused from scan to scan; padded for wide loads and stores.
+class PolarBuffer {
+ public:
+  std::size_t size() const { return size_; }
+  void clear() { size_ = 0; }
+  void resize(std::size_t size) {
+    size_ = size;
+    const std::size_t padded = size + detail::kMaxPackWidth;
+    detail::grow(range, padded);
+    detail::grow(azimuth, padded);
+    detail::grow(z, padded);
+  }
+  PolarView view() const {
+    return {{range.data(), size_}, {azimuth.data(), size_}, {z.data(), size_}};
+  }
+
+  /// Appends `points` moved by the rigid transform `T_target_source`, which is applied in floats:
+  /// multiply poses in double before.
+  void append(PointsView points, const Eigen::Isometry3f& T_target_source) {
+    const std::size_t begin = size_;
+    resize(begin + points.size());
+    const detail::PackTransform transform(T_target_source.matrix().topRows<3>());
+    float* const ranges = range.data() + begin;
+    float* const azimuths = azimuth.data() + begin;
+    float* const heights = z.data() + begin;
+    detail::for_packs(points.size(), [&](auto at) {
+      using Float = typename decltype(at)::Float;
+      const Float x = at.load(points.x.data());
+      const Float y = at.load(points.y.data());
+      const Float z_source = at.load(points.z.data());
+      const Float x_target = transform(0, x, y, z_source);
+      const Float y_target = transform(1, x, y, z_source);
+      const Float range_target = sqrt(x_target * x_target + y_target * y_target);
+      range_target.store(ranges + at.begin);
+      detail::azimuth_of(y_target, x_target, range_target).store(azimuths + at.begin);
+      transform(2, x, y, z_source).store(heights + at.begin);
+    });
+  }
+
+  std::vector<float> range;
+  std::vector<float> azimuth;
+  std::vector<float> z;
+
+ private:
+  std::size_t size_ = 0;
+};
+
+}  // namespace dynains
