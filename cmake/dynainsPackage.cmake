@@ -1,4 +1,26 @@
-# One binary package of everything that is installed:  cd build && cpack -G DEB
+# One Debian package of everything that is installed:
+#   cmake --build build --target dynains_installed && (cd build && cpack)
+if(NOT DYNAINS_INSTALL)
+  return()
+endif()
+
+# Builds all that is installed, and nothing else. cpack then does not build tests and examples.
+get_property(dynains_components GLOBAL PROPERTY DYNAINS_COMPONENTS)
+add_custom_target(dynains_installed)
+foreach(part ${dynains_components} program python)
+  if(TARGET dynains_${part})
+    add_dependencies(dynains_installed dynains_${part})
+  endif()
+endforeach()
+set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON)
+file(WRITE ${PROJECT_BINARY_DIR}/build_installed.cmake
+  "execute_process(COMMAND \"${CMAKE_COMMAND}\" --build \"${PROJECT_BINARY_DIR}\"
+    --target dynains_installed RESULT_VARIABLE failed)
+  if(failed)
+    message(FATAL_ERROR \"The target dynains_installed was not built\")
+  endif()\n")
+set(CPACK_INSTALL_SCRIPTS ${PROJECT_BINARY_DIR}/build_installed.cmake)
+
 set(CPACK_PACKAGE_NAME dynains)
 set(CPACK_PACKAGE_VENDOR dynains)
 set(CPACK_PACKAGE_CONTACT "DynaInsRemover <noreply@dynains.invalid>")
@@ -16,7 +38,7 @@ set(CPACK_DEBIAN_PACKAGE_DEPENDS libeigen3-dev)
 if(TARGET dynains_python)
   string(APPEND CPACK_DEBIAN_PACKAGE_DEPENDS ", python3-numpy")
 endif()
-# Libraries of the program, found by dpkg-shlibdeps where it is installed.
+# dpkg-shlibdeps, where it is installed, finds the libraries that the program needs.
 find_program(dynains_shlibdeps dpkg-shlibdeps)
 if(dynains_shlibdeps)
   set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)

@@ -1,0 +1,66 @@
+# Which optional parts are built. Each part has an option with three values:
+#   AUTO   build the part if this is the top-level project and all needs of the part are found
+#   ON     build the part; a missing need is an error
+#   OFF    leave the part out
+# The result is dynains_has_<part>. One status line for each part names what is missing.
+
+# dynains_part(<part> <option> <description> <need>...); a need is written package=debian-package. A
+# macro, because packages set variables for the folder that looks for them.
+macro(dynains_part part option description)
+  if(NOT DEFINED ${option})
+    set(${option} AUTO CACHE STRING "Build the ${description}: AUTO, ON or OFF")
+    set_property(CACHE ${option} PROPERTY STRINGS AUTO ON OFF)
+  endif()
+  set(wanted ${${option}})
+  if(wanted STREQUAL "AUTO")
+    set(wanted ${dynains_top_level})
+  endif()
+
+  set(missing "")
+  if(wanted)
+    foreach(need ${ARGN})
+      string(REGEX MATCH "^(.+)=(.+)$" need ${need})
+      set(package ${CMAKE_MATCH_1})
+      set(debian_package ${CMAKE_MATCH_2})
+      if(NOT ${package}_FOUND)
+        find_package(${package} QUIET)
+      endif()
+      if(NOT ${package}_FOUND)
+        list(APPEND missing "${package} (Debian: ${debian_package})")
+      endif()
+    endforeach()
+    string(REPLACE ";" ", " missing "${missing}")
+  endif()
+
+  set(dynains_has_${part} OFF)
+  if(missing AND NOT ${option} STREQUAL "AUTO")
+    message(FATAL_ERROR "${option} = ${${option}}, but this was not found: ${missing}")
+  elseif(missing)
+    message(STATUS "dynains: no ${description}: not found: ${missing}")
+  elseif(wanted)
+    message(STATUS "dynains: ${description}: yes")
+    set(dynains_has_${part} ON)
+  elseif(dynains_top_level OR ${part} STREQUAL "components")
+    message(STATUS "dynains: no ${description}: set ${option} to ON to build it")
+  endif()
+endmacro()
+
+set(json nlohmann_json=nlohmann-json3-dev)
+dynains_part(program DYNAINS_BUILD_PROGRAM "program" CLI11=libcli11-dev PNG=libpng-dev ${json})
+if(NOT DYNAINS_BUILD_PYTHON STREQUAL "OFF")
+  find_package(Python3 QUIET COMPONENTS Interpreter Development.Module)
+endif()
+dynains_part(python DYNAINS_BUILD_PYTHON "Python module"
+  Python3=python3-dev pybind11=pybind11-dev ${json})
+if(dynains_has_program OR dynains_has_python)
+  set(dynains_has_components ON)
+  set(dynains_has_evaluation ON)
+else()
+  dynains_part(components DYNAINS_BUILD_COMPONENTS "io and simulation components")
+  dynains_part(evaluation DYNAINS_BUILD_COMPONENTS "evaluation component" ${json})
+endif()
+dynains_part(tests DYNAINS_BUILD_TESTS "tests" Catch2=catch2)
+dynains_part(examples DYNAINS_BUILD_EXAMPLES "examples")
+
+# Folders of src/ and include/dynains/ that belong to one compiled component each.
+set(dynains_component_folders io evaluation simulation)

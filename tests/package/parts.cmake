@@ -1,0 +1,43 @@
+# Configures the project without any optional package and expects one status line for each part that
+# is left out; then as part of a parent project, and expects the option that builds the components.
+set(common -G "${GENERATOR}" -DCMAKE_CXX_COMPILER=${COMPILER} -DEigen3_DIR=${EIGEN_DIR})
+set(without "")
+foreach(package Catch2 CLI11 PNG nlohmann_json pybind11 Python3)
+  list(APPEND without -DCMAKE_DISABLE_FIND_PACKAGE_${package}=ON)
+endforeach()
+
+# expect(<expression>...): the output of the last call matches each expression.
+function(expect)
+  foreach(expression IN LISTS ARGN)
+    if(NOT output MATCHES "${expression}")
+      message(SEND_ERROR "expected '${expression}' in:\n${output}")
+    endif()
+  endforeach()
+endfunction()
+
+file(REMOVE_RECURSE ${WORK_DIR}/parts)
+execute_process(
+  COMMAND ${CMAKE_COMMAND} -S ${SOURCE_DIR} -B ${WORK_DIR}/parts/eigen_alone ${common} ${without}
+  RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+if(NOT result EQUAL 0)
+  message(FATAL_ERROR "cannot be configured with Eigen and a compiler alone:\n${output}")
+endif()
+expect("no program: not found: CLI11 .Debian: libcli11-dev." "no Python module: not found: "
+  "no evaluation component: not found: nlohmann_json" "no tests: not found: Catch2")
+
+execute_process(
+  COMMAND ${CMAKE_COMMAND} -S ${SOURCE_DIR} -B ${WORK_DIR}/parts/required ${common} ${without}
+    -DDYNAINS_BUILD_PYTHON=ON
+  RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+if(result EQUAL 0)
+  message(SEND_ERROR "a part that was asked for was left out without an error:\n${output}")
+endif()
+expect("DYNAINS_BUILD_PYTHON = ON" "pybind11")
+
+file(WRITE ${WORK_DIR}/parts/parent/CMakeLists.txt
+  "cmake_minimum_required(VERSION 3.16)\nproject(parent LANGUAGES CXX)\n"
+  "add_subdirectory(${SOURCE_DIR} dynains)\n")
+execute_process(
+  COMMAND ${CMAKE_COMMAND} -S ${WORK_DIR}/parts/parent -B ${WORK_DIR}/parts/parent/build ${common}
+  RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+expect("set DYNAINS_BUILD_COMPONENTS to ON to build it")
