@@ -2,6 +2,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynains/errors.hpp"
@@ -72,6 +73,7 @@ void write_ply(const VerdictCloud& cloud, Content content, const fs::path& path)
   columns.double_xyz = cloud.origin().cwiseAbs().maxCoeff() > kFloatCoordinateLimit;
   PointFileWriter writer(path, columns);
   for (const VerdictCloud::Point& point : cloud.points()) {
+    if (!is_shown(point.fate, content)) continue;
     const Colour colour = colour_of(point.fate, content);
     FilePoint out;
     out.position = cloud.origin() + point.local.cast<double>();
@@ -85,24 +87,27 @@ void figures(const FiguresOptions& options) {
   const fs::path folder = options.out;
   create_folder(folder);
   const VerdictCloud cloud = collect(options);
-  for (const Content content : {Content::kRaw, Content::kVerdict}) {
-    const std::string name = content == Content::kRaw ? "raw" : "cleaned";
+  const std::pair<Content, std::string> kinds[] = {
+      {Content::kRaw, "raw"}, {Content::kVerdict, "cleaned"}, {Content::kMap, "map"}};
+  for (const auto& [content, name] : kinds) {
     draw_from_above(cloud, content, options.pixels).write_png(folder / (name + "_above.png"));
     draw_perspective(cloud, content, options.pixels)
         .write_png(folder / (name + "_perspective.png"));
     write_ply(cloud, content, folder / (name + ".ply"));
   }
-  std::cout << cloud.points().size() << " points in " << folder.string()
-            << ": raw and cleaned, _above.png, _perspective.png and .ply\n"
-               "raw: static grey, dynamic blue; cleaned: kept static grey, removed dynamic green, "
-               "missed dynamic red, lost static orange\n";
+  std::cout
+      << cloud.points().size() << " points in " << folder.string()
+      << ": raw, cleaned and map, each as _above.png, _perspective.png and .ply\n"
+         "raw: static grey, dynamic blue; cleaned: kept static grey, removed dynamic green, "
+         "missed dynamic red, lost static orange; map: kept static grey, missed dynamic red\n";
 }
 
 }  // namespace
 
 void add_figures_command(CLI::App& experiment) {
   CLI::App& command = *experiment.add_subcommand(
-      "figures", "Fig. 1, 6 and 8: raw and cleaned map from above and in perspective, PNG and PLY");
+      "figures",
+      "Fig. 1, 6 and 8: raw map, verdicts and map from above and in perspective, PNG and PLY");
   const auto options = std::make_shared<FiguresOptions>(command);
   command.add_option("--out", options->out, "folder to write to")->required();
   command.add_option("--run", options->run,

@@ -39,7 +39,7 @@ void draw_layers(const VerdictCloud& cloud, Content content, Picture& picture, S
   for (std::size_t layer = 0; layer < kFateCount; ++layer) {
     picture.begin_layer();
     for (const VerdictCloud::Point& point : cloud.points()) {
-      if (layer_of(point.fate, content) != layer) continue;
+      if (!is_shown(point.fate, content) || layer_of(point.fate, content) != layer) continue;
       const Colour colour = colour_of(point.fate, content);
       const bool plain = layer == 0;
       splat(point.local.cast<double>(), plain ? 0 : 1,
@@ -64,8 +64,12 @@ Eigen::Vector3d viewing_direction(const VerdictCloud& cloud) {
 
 }  // namespace
 
+bool is_shown(Fate fate, Content content) {
+  return content != Content::kMap || fate == Fate::kKeptStatic || fate == Fate::kMissedDynamic;
+}
+
 Colour colour_of(Fate fate, Content content) {
-  if (content == Content::kVerdict) return kFateColours[static_cast<std::size_t>(fate)];
+  if (content != Content::kRaw) return kFateColours[static_cast<std::size_t>(fate)];
   return is_dynamic(fate) ? kRawDynamicColour
                           : kFateColours[static_cast<std::size_t>(Fate::kKeptStatic)];
 }

@@ -9,7 +9,11 @@ namespace dynains::program {
 enum class Content {
   kRaw,      ///< every point: static grey, dynamic blue (Fig. 1, top)
   kVerdict,  ///< kept grey, removed dynamic green, lost static orange, missed dynamic red
+  kMap,      ///< the points that stay: kept grey, missed dynamic red (Fig. 1, bottom)
 };
+
+/// Whether points of this fate are part of the figure.
+bool is_shown(Fate fate, Content content);
 
 Colour colour_of(Fate fate, Content content);
 

@@ -40,6 +40,31 @@ VerdictCloud four_fates() {
 
 }  // namespace
 
+TEST_CASE("A figure of the map shows the points that stay, and no others") {
+  VerdictCloud cloud = four_fates();
+  OwnedScan scan;
+  scan.T_world_sensor.translation() = Eigen::Vector3d(1e6, 0, 0);
+  scan.add(5.0F, 0.0F, 0.0F, kRoad, 1);
+  cloud.add(scan.view());
+  const Picture map = draw_from_above(cloud, Content::kMap, 200);
+  std::size_t kept = 0, missed = 0, others = 0;
+  for (int y = 0; y < map.height(); ++y) {
+    for (int x = 0; x < map.width(); ++x) {
+      const Colour colour = map.at(x, y);
+      if (colour == kFateColours[static_cast<std::size_t>(Fate::kMissedDynamic)]) {
+        ++missed;
+      } else if (colour.r == colour.g && colour.g == colour.b) {
+        kept += colour == kWhite ? 0 : 1;
+      } else {
+        ++others;
+      }
+    }
+  }
+  CHECK(kept > 0);
+  CHECK(missed > 0);
+  CHECK(others == 0);
+}
+
 TEST_CASE("Within a layer the nearest point is seen, and later layers cover") {
   Picture picture(10, 5);
   CHECK(picture.at(3, 2) == kWhite);
