@@ -3,7 +3,7 @@
 #include <dynains/dyna_ins_remover.hpp>
 #include <vector>
 
-// Stands for your driver: a wall 10 m ahead, and a box that moves to the left at 5 m/s.
+// In place of your driver: a wall 10 m ahead, and a box that moves to the left at 5 m/s.
 std::vector<float> read_scan(int i) {
   std::vector<float> xyzi;  // x y z intensity
   for (float y = -5.0F; y < 5.0F; y += 0.05F) {

@@ -4,14 +4,14 @@
 #include <dynains/dyna_ins_remover.hpp>
 #include <vector>
 
-// For flat halls: the floor is whatever lies lower than a threshold.
+// For flat halls: points below a threshold are the floor.
 class FloorByHeight {
  public:
   struct Config {
     double floor_below = -1.5;  ///< m, sensor frame
 
     template <class Self, class Visitor>
-    static void visit(Self& self, Visitor&& visitor) {  // bounds, config files, --help: all of it
+    static void visit(Self& self, Visitor&& visitor) {  // bounds, config files and --help follow
       visitor(dynains::Parameter{"floor_below", self.floor_below, dynains::closed(-50, 0), "m",
                                  "points lower than this are the floor"});
     }

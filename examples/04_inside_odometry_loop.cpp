@@ -1,12 +1,12 @@
-// Inside an odometry: what moves is taken out of the newest scan before it is registered.
+// Inside an odometry: moving points leave the newest scan before it is registered.
 #include <cstdio>
 #include <dynains/dyna_ins_remover.hpp>
 #include <vector>
 
 using Cloud = std::vector<Eigen::Vector3d>;
 
-// Stands for your sensor: two house fronts along the street and a car that comes towards us.
-// `x` is where the sensor really is.
+// In place of your sensor: two house fronts along the street and a car that comes towards us.
+// `x` (m) is the true position of the sensor.
 Cloud read_scan(double x, double time) {
   Cloud points;
   for (double along = -20.0; along < 40.0; along += 0.1) {
@@ -22,8 +22,8 @@ Cloud read_scan(double x, double time) {
   return points;
 }
 
-// Stands for your registration. Yours gets a scan in which nothing moves, to be aligned with a map
-// in which nothing moves.
+// In place of your registration, which aligns a scan without moving points with a map without
+// moving points.
 Eigen::Isometry3d align(const Cloud& /*still*/, const Cloud& /*map*/,
                         const Eigen::Isometry3d& T_world_predicted) {
   return T_world_predicted;
@@ -32,11 +32,11 @@ Eigen::Isometry3d align(const Cloud& /*still*/, const Cloud& /*map*/,
 int main() {
   using dynains::PointLabel;
   dynains::DynaInsRemover::Config config;
-  config.build_map = false;  // what is pushed is not yet final; the map of an odometry is its own
+  config.build_map = false;  // pushed poses are not final, and an odometry has its own map
   dynains::DynaInsRemover remover(config);
   const Eigen::Isometry3d T_last_newest(Eigen::Translation3d(0.5, 0.0, 0.0));  // constant speed
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
-  Cloud map;  // stands for yours
+  Cloud map;  // in place of yours
   std::size_t removed = 0;
 
   for (int i = 0; i < 12; ++i) {
@@ -47,7 +47,7 @@ int main() {
     // points (docs/embedding.md). Here the prediction is exact.
     if (i > 0) T_world_sensor = T_world_sensor * T_last_newest;
 
-    // 2. Ask what moves, known now, without latency. What is out of range was not judged and stays;
+    // 2. Push the scan for a verdict without latency. Points out of range are not judged and stay;
     // kInvalid is no measurement (NaN, no return).
     const dynains::FrameResult frame = remover.push(scan, T_world_sensor, time);
     Cloud still;

@@ -1,6 +1,6 @@
 // A LiDAR odometry, complete and small: point-to-plane registration of each scan to a map of the
 // scans before. It drives through a simulated street twice, once with all points and once without
-// those that dynains says move, and compares the drift against the true poses.
+// those that dynains labels as dynamic, and compares the drift with the true poses.
 //
 //   example_odometry [scene] [sensor] [scans] [seed]
 //
@@ -59,7 +59,7 @@ class LocalMap {
   bool plane_at(const Eigen::Vector3d& p, Eigen::Vector3d& normal, double& distance) const {
     constexpr std::size_t kNeighbours = 8;
     constexpr double kFarthest = 1.5;   // m
-    constexpr double kThickness = 0.1;  // m, of what still is a plane
+    constexpr double kThickness = 0.1;  // m, largest thickness of a plane
     std::array<std::size_t, kNeighbours> near{};
     std::array<double, kNeighbours> squared{};
     const std::size_t found = tree_.knnSearch(p.data(), kNeighbours, near.data(), squared.data());
@@ -151,7 +151,7 @@ Drift drive(const dynains::simulation::Config& street, bool remove_what_moves) {
     Points points = points_of(scan);
     if (!map.empty()) T_world_sensor = align(thin_out(points, 1.0), map, T_world_sensor);
 
-    // 2. Ask what moves, with what is known now.
+    // 2. Push the scan for the verdict without latency.
     if (remove_what_moves) {
       const dynains::RawPoints cloud{scan.xyzi.data(), points.size(), 4};
       const auto labels = remover.push(cloud, T_world_sensor, scan.time).newest.labels;

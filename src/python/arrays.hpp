@@ -1,4 +1,4 @@
-// Between NumPy and the library: what comes in is read where it lies, what goes out is moved.
+// Conversion between NumPy and the library: inputs are read in place, results are moved.
 #pragma once
 
 #include <pybind11/numpy.h>

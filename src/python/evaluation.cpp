@@ -32,14 +32,14 @@ struct JudgedScan {
                        expected);
 }
 
-// As NumPy sees it; null if that makes no array of it.
+// The object as a NumPy array; null if NumPy cannot convert it.
 py::array to_array(const py::handle& values) {
   py::array array = py::array::ensure(py::reinterpret_borrow<py::object>(values));
   if (!array) PyErr_Clear();
   return array;
 }
 
-// Whole numbers up to `most`, or flags as 0 and 1. `expected` says so if they are something else.
+// Integers up to `most`, or flags as 0 and 1. `expected` describes them in the error message.
 template <class T>
 Contiguous<T> to_numbers(const char* what, std::size_t scan, const py::array& array,
                          std::int64_t most, const std::string& expected) {

@@ -69,7 +69,7 @@ py::dict to_dict(const Config& config) {
   return result;
 }
 
-/// Help, interval and unit: what docstrings say.
+/// Docstring of a parameter: description, interval and unit.
 template <class T>
 std::string describe(const Parameter<T>& parameter) {
   std::ostringstream text;

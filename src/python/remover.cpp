@@ -13,7 +13,7 @@
 namespace dynains::python {
 namespace {
 
-// Copies of what a ScanVerdict shows: the next call of the remover writes over it.
+// Copies of the spans of a ScanVerdict, which the next call of the remover overwrites.
 struct OwnedVerdict {
   std::uint64_t scan;
   double time;
@@ -38,7 +38,7 @@ struct OwnedVerdict {
   }
 };
 
-// The same as Python sees it.
+// FrameResult with arrays that Python owns.
 struct Verdict {
   std::uint64_t scan;
   double time;

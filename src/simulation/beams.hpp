@@ -11,7 +11,7 @@
 
 namespace dynains::simulation {
 
-/// What a sensor type fixes; angles in radians.
+/// Constants of a sensor type; angles in radians.
 struct SensorModel {
   std::vector<double> elevations;  ///< of the rings, from the top; empty for the rosette
   int columns = 0;                 ///< per turn; beams per scan for the rosette

@@ -11,7 +11,7 @@ Vec2 local(const Footprint& footprint, Vec2 p) {
   return {dot(d, u), dot(d, left_of(u))};
 }
 
-/// Whether no axis of `a` separates the two.
+/// True if no axis of `a` separates the two rectangles.
 bool axes_overlap(const Footprint& a, const Footprint& b) {
   const Vec2 centre = local(a, b.centre);
   const double c = std::abs(std::cos(b.heading - a.heading));

@@ -1,4 +1,4 @@
-// What stands where, seen from above.
+// Rectangles on the ground that objects occupy.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ bool overlap(const Footprint& a, const Footprint& b);
 class FootprintSet {
  public:
   void add(const Footprint& footprint);
-  /// Whether the rectangle, grown by `margin`, touches none of the set.
+  /// True if the rectangle, grown by `margin` (m), touches no rectangle of the set.
   bool is_free(const Footprint& footprint, double margin = 0.1) const;
   /// Rectangles whose surroundings contain `p`; the nearest 12 m at least.
   template <class Visitor>

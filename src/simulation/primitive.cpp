@@ -11,7 +11,7 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 constexpr Interval kEmpty{kInfinity, -kInfinity};
 
-/// Keeps what satisfies a + t * b <= 0.
+/// Cuts the interval of t to a + t * b <= 0.
 void clip(float a, float b, Interval& interval) {
   if (b > 0) {
     interval.leave = std::min(interval.leave, -a / b);
@@ -22,7 +22,7 @@ void clip(float a, float b, Interval& interval) {
   }
 }
 
-/// Keeps what satisfies c + 2 b t + a t^2 <= 0 for a >= 0.
+/// Cuts the interval of t to c + 2 b t + a t^2 <= 0, for a >= 0.
 void clip_quadratic(float a, float b, float c, Interval& interval) {
   if (a < 1e-12F) {
     if (c > 0) interval = kEmpty;

@@ -1,4 +1,4 @@
-// What the world is made of: convex shapes, each an affine image of a unit shape.
+// Convex shapes that make up the world, each an affine image of a unit shape.
 #pragma once
 
 #include <cstdint>

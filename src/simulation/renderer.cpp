@@ -24,8 +24,8 @@ std::uint64_t cell_hash(Vec3 p, float size, std::uint64_t salt) {
   return mix(key ^ salt);
 }
 
-/// Where a beam ends within a porous shape, or a negative number. Beams collide at random with
-/// constant density; collisions in lasting gaps are void (Woodcock tracking).
+/// Range (m) at which a beam ends within a porous shape, or a negative number. Beams collide at
+/// random with constant density; collisions in lasting gaps are void (Woodcock tracking).
 float porous_hit(const Primitive& primitive, std::uint64_t salt, Vec3 direction, float enter,
                  float leave, std::uint64_t random) {
   const Material& material = *primitive.material;

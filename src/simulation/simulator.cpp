@@ -123,7 +123,7 @@ class Simulator::Implementation {
   }
 
  private:
-  /// What is remembered of every scan.
+  /// Record of one scan.
   struct Moment {
     double time = 0;
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
@@ -281,7 +281,7 @@ class Simulator::Implementation {
         continue;
       }
       const std::uint64_t random = mix(scan_seed, slot);
-      // Received power over what is needed: 1 where a dark surface is found nine times in ten.
+      // Received over required power: 1 where nine of ten beams detect a dark surface.
       const float reach = dark_range / range;
       const float power = reflectivity * (0.08F + 0.92F * cosine) * 10 * reach * reach;
       loss += 1 / (1 + 9 * power);

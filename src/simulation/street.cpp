@@ -74,7 +74,7 @@ Route Route::shifted(double begin, double end, const std::function<double(double
 std::vector<Vec2> turn_points(const Waypoint& from, const Waypoint& to) {
   const Vec2 a = from.position, c = to.position;
   const Vec2 u = direction(from.heading), v = direction(to.heading);
-  // Where the two tangents meet, or the middle if they are parallel.
+  // Intersection of the two tangents, or the middle if they are parallel.
   const double cross = u.x * v.y - u.y * v.x;
   Vec2 b = 0.5 * (a + c);
   if (std::abs(cross) > 0.2) {

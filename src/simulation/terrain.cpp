@@ -45,7 +45,7 @@ std::vector<Corridor> corridors_near(const std::vector<Street>& streets, Vec2 ce
   return result;
 }
 
-/// Of the corridors, only what can be nearest to some point within `radius` of `centre`.
+/// Corridors that can be nearest to a point within `radius` of `centre`.
 std::vector<Corridor> nearest_within(const std::vector<Corridor>& corridors, Vec2 centre,
                                      double radius) {
   std::vector<Corridor> result;

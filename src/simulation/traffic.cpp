@@ -7,7 +7,7 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr double kActiveRadius = 260.0;  // m around the ego vehicle; nobody moves beyond
+constexpr double kActiveRadius = 260.0;  // m around the ego vehicle; objects beyond stand still
 constexpr std::size_t kNobody = std::numeric_limits<std::size_t>::max();
 
 }  // namespace
@@ -144,7 +144,7 @@ double Traffic::free_distance(const Driver& driver, std::size_t index, double re
       Footprint footprint = body->footprint;
       bool blocked = distance(footprint, at.position) < clearance;
       if (!blocked && body->person && d > 1) {
-        // People are given way to before they are in the way.
+        // Vehicles brake for people before these step onto the lane.
         footprint.centre = footprint.centre + driver.foresight * body->velocity;
         blocked = distance(footprint, at.position) < clearance;
       }
@@ -346,7 +346,7 @@ void Traffic::step(double dt) {
   time_ += dt;
   const double heading = lanes[drivers[0].lane].route.at(drivers[0].s).heading;
   if (time_ > 1.5 * dt) {
-    // What a body that cannot turn at once would feel.
+    // Acceleration of a body with a bounded turn rate.
     turn_rate_ += 0.2 * (wrap(heading - last_heading_) / dt - turn_rate_);
   }
   last_heading_ = heading;

@@ -1,4 +1,4 @@
-// Everybody's motion: vehicles follow routes and brake for what is in front; people walk to their
+// Motion of objects: vehicles follow routes and brake for obstacles; people walk to their
 // goals and give way to one another.
 #pragma once
 
@@ -23,7 +23,7 @@ struct Object {
   Model model;  ///< empty for people, whose shape changes
 };
 
-/// Where an object is at the time of one scan.
+/// Pose of an object at the time of one scan.
 struct ObjectPose {
   std::uint32_t object = 0;
   Waypoint at;
@@ -67,9 +67,9 @@ class Traffic {
     double cruise = 10;          ///< m/s
     double comfort = 1.5;        ///< m/s^2
     bool stays_at_end = false;   ///< parks at the end of the route instead of leaving the world
-    bool waits_for_gap = false;  ///< starts only when nobody comes from behind
+    bool waits_for_gap = false;  ///< starts only if no vehicle comes from behind
     bool yields = false;         ///< gives way to vehicles that are about to cross
-    double rest_gap = 2.0;       ///< m, kept to what is in front when standing
+    double rest_gap = 2.0;       ///< m, gap to the vehicle in front at rest
     double foresight = 1.2;      ///< s, how early people are given way to
     /// From `first` seconds on, `second` replaces `cruise`.
     std::vector<std::pair<double, double>> schedule;
@@ -102,7 +102,7 @@ class Traffic {
 
   explicit Traffic(Random random) : random_(random) {}
 
-  FootprintSet fixed;  ///< what walkers walk around
+  FootprintSet fixed;  ///< obstacles that walkers avoid
   std::vector<Object> objects;
   std::vector<ObjectPose> parked;
   std::vector<Lane> lanes;

@@ -7,7 +7,7 @@
 namespace dynains::simulation {
 
 inline constexpr double kPi = 3.14159265358979323846;
-/// The same direction in [-pi, pi).
+/// The angle, moved to [-pi, pi).
 inline double wrap(double angle) { return angle - 2 * kPi * std::floor((angle + kPi) / (2 * kPi)); }
 
 struct Vec2 {

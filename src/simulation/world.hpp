@@ -43,7 +43,7 @@ struct World {
   Traffic traffic;
 };
 
-/// Builds the scene; nobody has moved yet.
+/// Builds the scene at its start time.
 World build_world(const Config& config);
 
 }  // namespace dynains::simulation

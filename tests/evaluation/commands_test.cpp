@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Standard output of `dynains <arguments>`; throws what the command throws.
+/// Standard output of `dynains <arguments>`; passes on exceptions of the command.
 std::string call(std::vector<std::string> arguments) {
   CLI::App app("test", "dynains");
   add_eval_command(app);
@@ -380,9 +380,9 @@ TEST_CASE("The experiments run on any labelled sequence") {
     }
     CHECK(read_points(out / "raw.ply").positions.size() ==
           read_points(out / "cleaned.ply").positions.size());
-    // Of an earlier run, whose labels decide: flags of the remover would change nothing.
+    // The labels of an earlier run decide, so flags of the remover are refused.
     const fs::path run = folder.path() / "run";
-    write_run(run, write_street(street, 6), 240);  // half of what moves is missed
+    write_run(run, write_street(street, 6), 240);  // half of the moving points are missed
     const std::vector<std::string> of_run = {
         "experiment", "figures",  street, "--out", (folder.path() / "of run").string(),
         "--quiet",    "--pixels", "200",  "--run", run.string()};

@@ -41,7 +41,7 @@ inline std::vector<VoxelPoint> voxelise(const std::vector<VoxelPoint>& points, d
   return result;
 }
 
-/// Whether a point takes part, by its place in the sensor frame.
+/// True if a point takes part, by its position in the sensor frame.
 inline bool in_range(const Eigen::Vector3d& p, double min_range, double max_range) {
   const double range = p.head<2>().norm();
   return p.allFinite() && p != Eigen::Vector3d::Zero() && range >= min_range &&

@@ -51,7 +51,7 @@ inline ScanSource source_of(const std::vector<OwnedScan>& scans) {
   };
 }
 
-/// The same numbers from every standard library.
+/// Random numbers that do not depend on the standard library.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : engine_(seed) {}

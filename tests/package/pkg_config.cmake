@@ -1,4 +1,4 @@
-# Compiles SOURCE with nothing but what pkg-config says.
+# Compiles SOURCE with the flags of pkg-config alone.
 if(NOT PKG_CONFIG)
   message("SKIPPED: pkg-config is not installed")
   return()

@@ -75,7 +75,7 @@ TEST_CASE("Ground is what lies low around it and far below the sensor") {
   scan.add(10.5F, 0.5F, -1.4F);    // 0.3 m above it
   scan.add(30.0F, 0.0F, 1.0F);     // a roof, with nothing below it
   scan.add(0.0F, 60.0F, 0.5F);     // ground of a hill: it may rise with the distance
-  scan.add(500.0F, 0.0F, -20.0F);  // beyond what is looked at
+  scan.add(500.0F, 0.0F, -20.0F);  // beyond the range of the statistics
   ScanStatistics statistics;
   statistics.add(scan.xyzi, {});
   CHECK(statistics.ground_share() == Approx(3.0 / 6.0));

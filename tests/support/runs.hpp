@@ -1,4 +1,4 @@
-// Runs a remover over scans and keeps what it says.
+// Runs a remover over scans and keeps the verdicts.
 #pragma once
 
 #include <algorithm>

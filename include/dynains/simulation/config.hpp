@@ -1,4 +1,4 @@
-// What is simulated: the place, the sensor and their disturbances.
+// Configuration of the simulation: scene, sensor and disturbances.
 #pragma once
 
 #include <cstdint>
@@ -60,7 +60,7 @@ struct Config {
   std::uint64_t seed = 1;
   double rate = 10.0;                   ///< scans per second
   double ego_speed = -1.0;              ///< m/s; negative: usual for the scene
-  double traffic = 1.0;                 ///< 1 is usual, 0 is nobody moving
+  double traffic = 1.0;                 ///< ratio to the usual number of movers
   double sensor_height = 0.0;           ///< m over ground; 0: usual for the sensor
   double max_range = 0.0;               ///< m; 0: usual for the sensor
   double mounting_pitch = 0.0;          ///< deg, positive looks down

@@ -1,4 +1,4 @@
-// What scans look like in numbers, to compare simulated with real ones.
+// Statistics of scans, to compare simulated with real ones.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Puts a scene together: things that stand, things that move, and what keeps them apart.
+// Builds a scene from static and moving objects that keep their distance.
 #pragma once
 
 #include <algorithm>
@@ -102,7 +102,7 @@ class Builder {
   /// Lights of the main street along it and against it, from the start of those lanes.
   std::vector<StopLine> main_lines[2];
 
-  /// The same for a route that begins at arc length `begin` of the main street.
+  /// As above, for a route that begins at arc length `begin` (m) of the main street.
   std::vector<StopLine> lines_from(const Street& street, double begin, bool with) const;
 
   bool is_free_of_drivers(const Waypoint& at, double half_length) const;

@@ -12,7 +12,7 @@ namespace dynains::simulation {
 inline constexpr double kBefore = 140.0;   ///< m of street behind the start and beyond the end
 inline constexpr double kLaneHalf = 1.75;  ///< m from the centre line to the middle of a lane
 
-/// Where the main street bends: constant curvature over a length.
+/// One bend of the main street: constant curvature over a length.
 struct Bend {
   double length, curvature;
 };

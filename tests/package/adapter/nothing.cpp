@@ -1,2 +1,2 @@
-// What is built where the library is missing.
+// The program where the library is missing.
 int main() { return 0; }

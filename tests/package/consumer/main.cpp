@@ -1,4 +1,4 @@
-// What a stranger would write first: a few scans of a still street through the package.
+// A first program of a consumer: a few scans of a static street.
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
