@@ -66,24 +66,24 @@ Kind Builder::parked_kind() {
 }
 
 void Builder::furnish(const Street& street, int side, const Frontage& look) {
-  const double edge = street.half_width, back = edge + street.pavement;
-  const double length = street.centre.length();
-  auto at = [&](double s, double lateral, double turn = 0) {
+  const PlaceBeside at = [&street, side](double s, double lateral, double turn) {
     Waypoint p = street.centre.beside(s, side * lateral);
     p.heading += (side > 0 ? 0 : kPi) + turn;
     return p;
   };
-  auto near_other_street = [&](Vec2 p, double lateral) {
-    return world_.terrain.distance_to_street(p) < lateral - edge - 0.6;
-  };
+  build_plots(at, street, look);
+  furnish_kerb(at, street, look);
+  if (look.parked > 0 && street.half_width > 4.5) park_along(at, street, look);
+}
 
-  // Plots.
+void Builder::build_plots(const PlaceBeside& at, const Street& street, const Frontage& look) {
+  const double back = street.half_width + street.pavement, length = street.centre.length();
   for (double s = 2; s < length - 8;) {
     const double front = random_.uniform(8, 20);
     const double deep = random_.uniform(8, 14);
     const double gap = random_.chance(0.4) ? 0.05 : random_.uniform(1, 8);
     const double setback = 0.2 + look.setback * random_.unit();
-    const Waypoint middle = at(s + front / 2, back + setback);
+    const Waypoint middle = at(s + front / 2, back + setback, 0);
     const bool built = random_.chance(look.buildings);
     const double height = look.height * random_.uniform(0.6, 1.4);
     // The front faces the street: building models extend to their left.
@@ -101,10 +101,12 @@ void Builder::furnish(const Street& street, int side, const Frontage& look) {
     }
     s += front + gap;
   }
+}
 
-  // The strip along the kerb.
+void Builder::furnish_kerb(const PlaceBeside& at, const Street& street, const Frontage& look) {
+  const double edge = street.half_width, length = street.centre.length();
   for (double s = random_.uniform(3, 9); s < length - 3;) {
-    const Waypoint kerb = at(s, edge + 0.55);
+    const Waypoint kerb = at(s, edge + 0.55, 0);
     const bool tree_here = random_.chance(look.street_trees);
     const bool pole_here = random_.chance(look.poles);
     const bool furniture_here = random_.chance(look.furniture);
@@ -112,7 +114,8 @@ void Builder::furnish(const Street& street, int side, const Frontage& look) {
     const double clear = random_.uniform(2.3, 3.6);
     const bool lamp = random_.chance(0.4), sign = random_.chance(0.5);
     Random model_random = random_.fork(random_.bits());
-    if (street.pavement > 1.5 && !near_other_street(kerb.position, edge + 0.55)) {
+    const bool near_other_street = world_.terrain.distance_to_street(kerb.position) < 0.55 - 0.6;
+    if (street.pavement > 1.5 && !near_other_street) {
       if (tree_here) {
         tree(kerb.position, tree_height, radius, clear);
       } else if (pole_here) {
@@ -124,30 +127,30 @@ void Builder::furnish(const Street& street, int side, const Frontage& look) {
     }
     s += random_.uniform(5, 11);
   }
+}
 
-  // Parked vehicles.
-  if (look.parked > 0 && edge > 4.5) {
-    for (double s = random_.uniform(2, 8); s < length - 5; s += random_.uniform(6, 7.5)) {
-      const Kind kind = parked_kind();
-      const double turn = 0.02 * random_.normal();
-      const double lateral = edge - 1.12 + 0.08 * random_.normal();
-      const bool used = random_.chance(look.parked);
-      const Waypoint p = at(s, lateral, turn + kPi);
-      if (!used || kind == Kind::kTruck) continue;
-      const Footprint f{p.position, p.heading, 3.5, 1.0};
-      bool crossing = false;
-      for (const Street& other : world_.terrain.streets()) {
-        if (&other == &street) continue;
-        const Waypoint q = other.centre.at(other.centre.nearest(p.position));
-        crossing = crossing || norm(q.position - p.position) < other.half_width + 7;
-      }
-      if (!crossing && clearance(f) < 0.6) park(p, kind);
+void Builder::park_along(const PlaceBeside& at, const Street& street, const Frontage& look) {
+  const double edge = street.half_width, length = street.centre.length();
+  for (double s = random_.uniform(2, 8); s < length - 5; s += random_.uniform(6, 7.5)) {
+    const Kind kind = parked_kind();
+    const double turn = 0.02 * random_.normal();
+    const double lateral = edge - 1.12 + 0.08 * random_.normal();
+    const bool used = random_.chance(look.parked);
+    const Waypoint p = at(s, lateral, turn + kPi);
+    if (!used || kind == Kind::kTruck) continue;
+    const Footprint f{p.position, p.heading, 3.5, 1.0};
+    bool crossing = false;
+    for (const Street& other : world_.terrain.streets()) {
+      if (&other == &street) continue;
+      const Waypoint q = other.centre.at(other.centre.nearest(p.position));
+      crossing = crossing || norm(q.position - p.position) < other.half_width + 7;
     }
+    if (!crossing && clearance(f) < 0.6) park(p, kind);
   }
 }
 
-void Builder::garden(const std::function<Waypoint(double, double, double)>& at, double s,
-                     double front, double back, const Frontage& look) {
+void Builder::garden(const PlaceBeside& at, double s, double front, double back,
+                     const Frontage& look) {
   if (!random_.chance(look.gardens)) return;
   const double which = random_.unit();
   const double height = random_.uniform(0.9, 2.0);

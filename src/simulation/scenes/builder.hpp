@@ -61,10 +61,6 @@ class Builder {
   /// Buildings, gardens, trees, poles and parked cars on one side (+1 left, -1 right).
   void furnish(const Street& street, int side, const Frontage& look);
 
-  /// Hedges, fences, bushes and trees on an open plot.
-  void garden(const std::function<Waypoint(double, double, double)>& at, double s, double front,
-              double back, const Frontage& look);
-
   /// Woods and meadows beside a street.
   void plant(const Street& street, double from, double to, double trees_per_100_m,
              double bushes_per_100_m);
@@ -81,14 +77,14 @@ class Builder {
   /// The ego vehicle on a lane, `kBefore` metres from its start.
   void ego(std::size_t lane, double s, double usual_speed);
 
-  /// Somebody who walks along `goals`, from `goals[0]`.
+  /// A person who walks along `goals`, from `goals[0]`.
   void walker(std::vector<Vec2> goals, double pace, double start = 0, double stop = 1e9,
               Kind kind = Kind::kPedestrian);
 
   /// People on the pavements of a street between arc lengths.
   void pavement_walkers(const Street& street, double from, double to, int number);
 
-  /// People who cross the carriageway somewhere.
+  /// People who cross the carriageway.
   void crossing_walkers(const Street& street, double from, double to, int number);
 
   /// A parked vehicle that pulls out into the lane at `start` seconds.
@@ -108,6 +104,16 @@ class Builder {
   bool is_free_of_drivers(const Waypoint& at, double half_length) const;
 
  private:
+  /// Waypoint at arc length s (m), `lateral` (m) beside the street, turned by `turn` (rad).
+  using PlaceBeside = std::function<Waypoint(double s, double lateral, double turn)>;
+
+  void build_plots(const PlaceBeside& at, const Street& street, const Frontage& look);
+  /// Hedges, fences, bushes and trees on an open plot.
+  void garden(const PlaceBeside& at, double s, double front, double back, const Frontage& look);
+  /// Trees, poles and furniture along the kerb.
+  void furnish_kerb(const PlaceBeside& at, const Street& street, const Frontage& look);
+  void park_along(const PlaceBeside& at, const Street& street, const Frontage& look);
+
   Config config_;
   Random random_;
   World world_;

@@ -8,6 +8,35 @@
 
 namespace dynains::simulation {
 
+namespace {
+
+Model gantry_model(double edge) {
+  Model gantry{
+      make_primitive(Shape::kBox, materials::kSteelPole, {0, 0, 6.2F},
+                     {0.15F, static_cast<float>(edge + 1), 0.15F}),
+      make_primitive(Shape::kBox, materials::kSignPlate, {0.2F, -6, 6.6F}, {0.05F, 2.5F, 1.2F})};
+  for (const float side : {-1.0F, 1.0F}) {
+    gantry.push_back(make_primitive(Shape::kCylinder, materials::kSteelPole,
+                                    {0, side * static_cast<float>(edge + 1), 3},
+                                    {0.15F, 0.15F, 3.3F}));
+  }
+  return gantry;
+}
+
+/// Gantries and bridges over both carriageways; `edge` (m) is their outer border.
+void add_overpasses(Builder& builder, Random& random, const Street& street, double edge) {
+  for (double s = random.uniform(60, 160); s < street.centre.length() - 20;
+       s += random.uniform(150, 320)) {
+    if (random.chance(0.4)) {
+      builder.place_anyway(bridge_model(2 * edge + 4, 10, 5.5), street.centre.at(s));
+    } else {
+      builder.place_anyway(gantry_model(edge), street.centre.at(s));
+    }
+  }
+}
+
+}  // namespace
+
 World highway(const Config& config) {
   const double speed = 25;
   Random random(mix(config.seed, 77));
@@ -51,24 +80,7 @@ World highway(const Config& config) {
                   [wall_height](Random&) { return fence_model(5, wall_height, false); });
     }
   }
-  // Gantries, poles and bridges.
-  for (double s = random.uniform(60, 160); s < street.centre.length() - 20;
-       s += random.uniform(150, 320)) {
-    if (random.chance(0.4)) {
-      builder.place_anyway(bridge_model(2 * edge + 4, 10, 5.5), street.centre.at(s));
-    } else {
-      Model gantry{make_primitive(Shape::kBox, materials::kSteelPole, {0, 0, 6.2F},
-                                  {0.15F, static_cast<float>(edge + 1), 0.15F}),
-                   make_primitive(Shape::kBox, materials::kSignPlate, {0.2F, -6, 6.6F},
-                                  {0.05F, 2.5F, 1.2F})};
-      for (const float side : {-1.0F, 1.0F}) {
-        gantry.push_back(make_primitive(Shape::kCylinder, materials::kSteelPole,
-                                        {0, side * static_cast<float>(edge + 1), 3},
-                                        {0.15F, 0.15F, 3.3F}));
-      }
-      builder.place_anyway(gantry, street.centre.at(s));
-    }
-  }
+  add_overpasses(builder, random, street, edge);
   const double trees = random.uniform(4, 14), bushes = random.uniform(6, 25);
   builder.plant(street, edge + 4.5, edge + 45, trees, bushes);
   for (double s = random.uniform(5, 20); s < street.centre.length(); s += 50) {

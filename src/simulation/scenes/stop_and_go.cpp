@@ -8,6 +8,48 @@
 
 namespace dynains::simulation {
 
+namespace {
+
+/// Vehicles ahead of the ego vehicle on one lane; the head waits, goes and waits again.
+void add_queue_ahead(Traffic& traffic, Random& random, std::size_t lane, bool ego_lane,
+                     double cruise, double end) {
+  const auto ahead = static_cast<int>(3 + random.index(4));
+  double s = kBefore + (ego_lane ? 9 : random.uniform(-4, 4));
+  for (int i = 0; i < ahead; ++i) {
+    const double kind = random.unit();
+    const std::size_t object = traffic.add_object(kind < 0.75  ? Kind::kCar
+                                                  : kind < 0.9 ? Kind::kVan
+                                                               : Kind::kTruck);
+    s += traffic.objects[object].size.length / 2;
+    traffic.add_driver(object, lane, s, cruise).speed = 0;
+    s += traffic.objects[object].size.length / 2 + random.uniform(1.8, 3.5);
+    if (i == 0) s += 0.5;
+  }
+  Traffic::Driver& head = traffic.drivers.back();
+  double t = random.uniform(1, 4);
+  head.schedule = {{0, 0}};
+  while (t < end) {
+    head.schedule.push_back({t, random.uniform(5, 9)});
+    t += random.uniform(4, 9);
+    head.schedule.push_back({t, 0});
+    t += random.uniform(3, 6);
+  }
+}
+
+/// Vehicles behind the ego vehicle, or behind the head of the queue beside it.
+void add_queue_behind(Traffic& traffic, Random& random, std::size_t lane, bool ego_lane,
+                      double cruise) {
+  double behind = kBefore - (ego_lane ? 2.2 : 6.0);
+  for (int i = 0; i < 4; ++i) {
+    const std::size_t object = traffic.add_object(random.chance(0.8) ? Kind::kCar : Kind::kVan);
+    behind -= traffic.objects[object].size.length / 2 + random.uniform(2, 4);
+    traffic.add_driver(object, lane, behind, cruise).speed = 0;
+    behind -= traffic.objects[object].size.length / 2;
+  }
+}
+
+}  // namespace
+
 World stop_and_go(const Config& config) {
   const double speed = 8;
   Random random(mix(config.seed, 77));
@@ -27,41 +69,10 @@ World stop_and_go(const Config& config) {
   builder.ego(lanes[mine], kBefore, speed);
   if (builder.lively()) {
     traffic.drivers[0].speed = 0;
+    const double end = config.scans / config.rate + 5;
     for (std::size_t lane = 0; lane < 2; ++lane) {
-      // A queue whose head waits, goes and waits again.
-      const auto ahead = static_cast<int>(3 + random.index(4));
-      double s = kBefore + (lane == mine ? 9 : random.uniform(-4, 4));
-      const auto first = traffic.drivers.size();
-      for (int i = 0; i < ahead; ++i) {
-        const double kind = random.unit();
-        const std::size_t object = traffic.add_object(kind < 0.75  ? Kind::kCar
-                                                      : kind < 0.9 ? Kind::kVan
-                                                                   : Kind::kTruck);
-        s += traffic.objects[object].size.length / 2;
-        traffic.add_driver(object, lanes[lane], s, speed).speed = 0;
-        s += traffic.objects[object].size.length / 2 + random.uniform(1.8, 3.5);
-        if (i == 0) s += 0.5;
-      }
-      if (traffic.drivers.size() > first) {
-        Traffic::Driver& head = traffic.drivers.back();
-        double t = random.uniform(1, 4);
-        head.schedule = {{0, 0}};
-        const double end = config.scans / config.rate + 5;
-        while (t < end) {
-          head.schedule.push_back({t, random.uniform(5, 9)});
-          t += random.uniform(4, 9);
-          head.schedule.push_back({t, 0});
-          t += random.uniform(3, 6);
-        }
-      }
-      // And those behind.
-      double behind = kBefore - (lane == mine ? 2.2 : 6.0);
-      for (int i = 0; i < 4; ++i) {
-        const std::size_t object = traffic.add_object(random.chance(0.8) ? Kind::kCar : Kind::kVan);
-        behind -= traffic.objects[object].size.length / 2 + random.uniform(2, 4);
-        traffic.add_driver(object, lanes[lane], behind, speed).speed = 0;
-        behind -= traffic.objects[object].size.length / 2;
-      }
+      add_queue_ahead(traffic, random, lanes[lane], lane == mine, speed, end);
+      add_queue_behind(traffic, random, lanes[lane], lane == mine, speed);
     }
     for (int i = 0; i < builder.count(9); ++i) {
       const int side = random.chance(0.5) ? 1 : -1;
