@@ -163,15 +163,13 @@ double Traffic::free_distance(const Driver& driver, std::size_t index, double re
   return reach;
 }
 
-double Traffic::wanted_acceleration(const Driver& driver, std::size_t index) const {
+double Traffic::wanted_speed(const Driver& driver, std::size_t index) const {
   const Lane& lane = lanes[driver.lane];
-  const Size& size = objects[driver.object].size;
   double cruise = driver.cruise;
   for (const auto& change : driver.schedule) {
     if (time_ >= change.first) cruise = change.second;
   }
-  const double v = driver.speed;
-  if (driver.waits_for_gap && v < 0.1 && cruise > 0) {
+  if (driver.waits_for_gap && driver.speed < 0.1 && cruise > 0) {
     const Waypoint at = lane.route.at(driver.s);
     for (const Body& body : bodies_) {
       if (body.driver == index || norm(body.velocity) < 1) continue;
@@ -192,6 +190,14 @@ double Traffic::wanted_acceleration(const Driver& driver, std::size_t index) con
       cruise = std::min(cruise, std::sqrt(bend_speed * bend_speed + 2 * 1.5 * ahead));
     }
   }
+  return cruise;
+}
+
+double Traffic::wanted_acceleration(const Driver& driver, std::size_t index) const {
+  const Lane& lane = lanes[driver.lane];
+  const Size& size = objects[driver.object].size;
+  const double cruise = wanted_speed(driver, index);
+  const double v = driver.speed;
   if (cruise <= 0.01) return v > 0.05 ? -2.0 : -v / 0.1;
 
   const double reach = v * v / 4 + 2.0 * v + 8;

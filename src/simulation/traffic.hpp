@@ -139,6 +139,8 @@ class Traffic {
   void collect_bodies(Vec2 centre, double radius);
   double free_distance(const Driver& driver, std::size_t index, double reach,
                        double& speed_ahead) const;
+  /// Speed (m/s) on a free road: schedule, gaps in cross traffic, bends.
+  double wanted_speed(const Driver& driver, std::size_t index) const;
   double wanted_acceleration(const Driver& driver, std::size_t index) const;
   void walk(Walker& walker, double dt);
 

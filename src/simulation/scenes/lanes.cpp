@@ -6,6 +6,49 @@
 
 namespace dynains::simulation {
 
+namespace {
+
+/// A stream that turns from the side street into the main street at arc length `crossing_s` (m).
+void add_turning_car(Builder& builder, const Street& side, double crossing_s, std::size_t signal,
+                     double speed) {
+  Traffic& traffic = builder.traffic();
+  Random& random = builder.random();
+  const Street& main = builder.street(0);
+  const double middle = side.centre.length() / 2;
+  const bool from_left = random.chance(0.5);
+  const Waypoint stop =
+      side.centre.beside(middle + (from_left ? main.half_width + 3 : -main.half_width - 3),
+                         from_left ? kLaneHalf : -kLaneHalf);
+  Waypoint before = stop;
+  if (from_left) before.heading += kPi;
+  const double s_exit = crossing_s + (random.chance(0.5) ? 14.0 : -14.0);
+  const bool exit_forward = s_exit > crossing_s;
+  Waypoint after = main.centre.beside(s_exit, exit_forward ? -kLaneHalf : kLaneHalf);
+  if (!exit_forward) after.heading += kPi;
+  std::vector<Vec2> points;
+  const double run = 60;
+  for (double d = -run; d < -1; d += 1.5) {
+    points.push_back(before.position + d * direction(before.heading));
+  }
+  for (const Vec2 p : turn_points(before, after)) points.push_back(p);
+  for (double d = 1.5; d < 70; d += 1.5) {
+    const double s = s_exit + (exit_forward ? d : -d);
+    if (s < 1 || s > main.centre.length() - 1) break;
+    points.push_back(main.centre.beside(s, exit_forward ? -kLaneHalf : kLaneHalf).position);
+  }
+  const std::size_t turning =
+      traffic.add_lane(Route(std::move(points)), {StopLine{run, signal, 1}});
+  const std::size_t object = traffic.add_object(Kind::kCar);
+  const double s = random.uniform(8, run - 8);
+  if (builder.is_free_of_drivers(traffic.lanes[turning].route.at(s), 5)) {
+    traffic.add_driver(object, turning, s, speed * 0.7).yields = true;
+  } else {
+    traffic.objects.pop_back();
+  }
+}
+
+}  // namespace
+
 StreetLanes add_crossing_traffic(Builder& builder, const std::vector<Crossing>& crossings,
                                  double speed, double ego_s) {
   Traffic& traffic = builder.traffic();
@@ -41,36 +84,7 @@ StreetLanes add_crossing_traffic(Builder& builder, const std::vector<Crossing>& 
       flow.trucks = 0.05;
       traffic.fill(flow);
     }
-    // One stream turns from the side street into the main street.
-    const bool from_left = random.chance(0.5);
-    const Waypoint stop =
-        side.centre.beside(middle + (from_left ? main.half_width + 3 : -main.half_width - 3),
-                           from_left ? kLaneHalf : -kLaneHalf);
-    Waypoint before = stop;
-    if (from_left) before.heading += kPi;
-    const double s_exit = crossings[i].main_s + (random.chance(0.5) ? 14.0 : -14.0);
-    const bool exit_forward = s_exit > crossings[i].main_s;
-    Waypoint after = main.centre.beside(s_exit, exit_forward ? -kLaneHalf : kLaneHalf);
-    if (!exit_forward) after.heading += kPi;
-    std::vector<Vec2> points;
-    const double run = 60;
-    for (double d = -run; d < -1; d += 1.5) {
-      points.push_back(before.position + d * direction(before.heading));
-    }
-    for (const Vec2 p : turn_points(before, after)) points.push_back(p);
-    for (double d = 1.5; d < 70; d += 1.5) {
-      const double s = s_exit + (exit_forward ? d : -d);
-      if (s < 1 || s > main_length - 1) break;
-      points.push_back(main.centre.beside(s, exit_forward ? -kLaneHalf : kLaneHalf).position);
-    }
-    const std::size_t turning = traffic.add_lane(Route(std::move(points)), {StopLine{run, i, 1}});
-    const std::size_t object = traffic.add_object(Kind::kCar);
-    const double s = random.uniform(8, run - 8);
-    if (builder.is_free_of_drivers(traffic.lanes[turning].route.at(s), 5)) {
-      traffic.add_driver(object, turning, s, speed * 0.7).yields = true;
-    } else {
-      traffic.objects.pop_back();
-    }
+    add_turning_car(builder, side, crossings[i].main_s, i, speed);
   }
   return lanes;
 }
