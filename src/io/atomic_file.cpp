@@ -1,11 +1,17 @@
 #include "dynains/io/atomic_file.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
+#include <sys/random.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
+#include <cstdint>
 #include <streambuf>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -25,10 +31,60 @@ fs::path follow_links(fs::path path) {
   return error ? path : resolved;
 }
 
+constexpr std::string_view kHexDigits = "0123456789abcdef";
+constexpr std::string_view kTemporaryEnd = ".tmp";
+constexpr std::size_t kRandomDigits = 16;
+
+/// False if another open file has the lock. File systems without locks give every lock.
+bool lock_file(int descriptor) {
+  int result = 0;
+  do {
+    result = ::flock(descriptor, LOCK_EX | LOCK_NB);
+  } while (result != 0 && errno == EINTR);
+  return result == 0 || errno != EWOULDBLOCK;
+}
+
+std::string random_digits() {
+  std::array<std::uint8_t, kRandomDigits> random{};
+  if (::getrandom(random.data(), random.size(), 0) != static_cast<ssize_t>(random.size())) {
+    throw std::system_error(errno, std::generic_category(), "getrandom");
+  }
+  std::string digits;
+  for (const std::uint8_t number : random) digits += kHexDigits[number % kHexDigits.size()];
+  return digits;
+}
+
+struct OpenTemporary {
+  fs::path path;
+  int descriptor;
+};
+
+/// A new file, locked before anybody can take it for a leftover. Throws IoError.
+OpenTemporary open_temporary(const fs::path& target) {
+  const std::string name = target.filename().string();
+  constexpr int kAttempts = 100;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    OpenTemporary file{target, -1};
+    file.path.replace_filename('.' + name + '.' + random_digits() + std::string(kTemporaryEnd));
+    file.descriptor =
+        ::open(file.path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+    if (file.descriptor < 0 && errno == EEXIST) continue;
+    if (file.descriptor < 0) fail_by_system(target, "cannot be written", errno);
+    struct stat status {};
+    if (lock_file(file.descriptor) && ::fstat(file.descriptor, &status) == 0 &&
+        status.st_nlink > 0) {
+      return file;
+    }
+    ::close(file.descriptor);
+  }
+  fail(target, "cannot be written: another process removes its temporary files");
+}
+
 /// A rename is on the disk when its folder is. Where folders cannot be synced (EINVAL), or not be
 /// opened, the file is whole either way.
 void sync_folder(const fs::path& folder) {
-  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY);
+  const int descriptor =
+      ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return;
   ::fsync(descriptor);
   ::close(descriptor);
@@ -39,10 +95,7 @@ void sync_folder(const fs::path& folder) {
 /// std::filebuf hides why a write failed and cannot sync; this one knows its descriptor.
 class AtomicFile::Buffer : public std::streambuf {
  public:
-  explicit Buffer(const fs::path& path)
-      : descriptor_(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)),
-        bytes_(std::size_t{1} << 16) {
-    if (descriptor_ < 0) error_ = errno;
+  explicit Buffer(int descriptor) : descriptor_(descriptor), bytes_(std::size_t{1} << 16) {
     setp(bytes_.data(), bytes_.data() + bytes_.size());
   }
   ~Buffer() override { close(); }
@@ -59,8 +112,14 @@ class AtomicFile::Buffer : public std::streambuf {
     if (::fsync(descriptor_) != 0 && errno != EINVAL) error_ = errno;
   }
 
+  /// Some file systems report a failed write only to close(). The lock stays with descriptor_.
+  void check_close() {
+    const int copy = ::fcntl(descriptor_, F_DUPFD_CLOEXEC, 0);
+    if ((copy < 0 || ::close(copy) != 0) && error_ == 0) error_ = errno;
+  }
+
   void close() {
-    if (descriptor_ >= 0 && ::close(descriptor_) != 0 && error_ == 0) error_ = errno;
+    if (descriptor_ >= 0) ::close(descriptor_);
     descriptor_ = -1;
   }
 
@@ -95,36 +154,75 @@ class AtomicFile::Buffer : public std::streambuf {
 };
 
 AtomicFile::AtomicFile(fs::path target)
-    : target_(follow_links(std::move(target))), temporary_(target_), stream_(nullptr) {
+    : target_(follow_links(std::move(target))), stream_(nullptr) {
   std::error_code error;
   const fs::file_status status = fs::status(target_, error);
   if (fs::exists(status) && !fs::is_regular_file(status)) {
     fail(target_, "cannot be replaced: expected a regular file or none");
   }
-  temporary_.replace_filename("." + target_.filename().string() + "." + std::to_string(::getpid()) +
-                              ".tmp");
-  buffer_ = std::make_unique<Buffer>(temporary_);
-  if (buffer_->error() != 0) fail_by_system(target_, "cannot be written", buffer_->error());
+  OpenTemporary file = open_temporary(target_);
+  temporary_ = std::move(file.path);
+  buffer_ = std::make_unique<Buffer>(file.descriptor);
   stream_.rdbuf(buffer_.get());
 }
 
 AtomicFile::~AtomicFile() {
   if (committed_) return;
-  buffer_->close();
   std::error_code ignored;
   fs::remove(temporary_, ignored);
 }
 
 void AtomicFile::commit(Sync sync) {
   buffer_->flush(sync);
-  buffer_->close();
+  buffer_->check_close();
   if (buffer_->error() != 0)
     fail_by_system(target_, "cannot be written to the end", buffer_->error());
   std::error_code error;
   fs::rename(temporary_, target_, error);
   if (error) fail_by_system(target_, "cannot be put in place", error.value());
   committed_ = true;
+  buffer_->close();
   if (sync == Sync::kNow) sync_folder(target_.parent_path());
+}
+
+std::string target_of_temporary(const std::string& name) {
+  const std::size_t end_size = 1 + kRandomDigits + kTemporaryEnd.size();
+  if (name.size() < end_size + 2 || name.front() != '.') return {};
+  const std::size_t point = name.size() - end_size;
+  const std::string_view digits = std::string_view(name).substr(point + 1, kRandomDigits);
+  const bool is_temporary =
+      name[point] == '.' &&
+      name.compare(point + 1 + kRandomDigits, name.npos, kTemporaryEnd) == 0 &&
+      digits.find_first_not_of(kHexDigits) == digits.npos;
+  return is_temporary ? name.substr(1, point - 1) : std::string();
+}
+
+std::size_t remove_leftovers(const fs::path& folder,
+                             const std::function<bool(const std::string&)>& is_ours) {
+  std::size_t written = 0;
+  std::error_code error;
+  if (fs::is_symlink(folder, error)) fail(folder, "is a link: expected a folder");
+  std::vector<fs::path> temporaries;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string target = target_of_temporary(entry->path().filename().string());
+    if (!target.empty() && is_ours(target)) temporaries.push_back(entry->path());
+  }
+  if (error) fail_by_system(folder, "cannot be listed", error.value());
+  for (const fs::path& path : temporaries) {
+    const int descriptor = ::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    struct stat status {};
+    const bool is_file =
+        descriptor >= 0 && ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
+    if (is_file && !lock_file(descriptor)) {
+      ++written;
+    } else if (is_file && ::unlink(path.c_str()) != 0 && errno != ENOENT) {
+      error = std::error_code(errno, std::generic_category());
+    }
+    if (descriptor >= 0) ::close(descriptor);
+    if (error) fail_by_system(path, "cannot be removed", error.value());
+  }
+  return written;
 }
 
 void sync_files(const fs::path& folder) {

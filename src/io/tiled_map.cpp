@@ -54,7 +54,7 @@ std::optional<std::array<std::int64_t, 3>> place_of(const fs::path& path) {
 
 /// Writes into a file that is there. Throws IoError.
 void write_at(const fs::path& path, std::size_t offset, const void* data, std::size_t size) {
-  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+  const int descriptor = ::open(path.c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC);
   if (descriptor < 0) fail_by_system(path, "cannot be written", errno);
   const char* next = static_cast<const char*>(data);
   int error = 0;

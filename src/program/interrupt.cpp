@@ -1,7 +1,5 @@
 #include "interrupt.hpp"
 
-#include <csignal>
-
 namespace dynains::program {
 namespace {
 
@@ -10,26 +8,30 @@ volatile std::sig_atomic_t received = 0;
 
 void remember(int signal) { received = signal; }
 
-void handle(int signal, void (*handler)(int), int flags) {
+/// Returns the action before.
+struct sigaction listen_to(int signal) {
+  struct sigaction before {};
+  sigaction(signal, nullptr, &before);
+  if (before.sa_handler == SIG_IGN) return before;
   struct sigaction action {};
-  action.sa_handler = handler;
-  action.sa_flags = flags;
+  action.sa_handler = remember;
+  action.sa_flags = static_cast<int>(SA_RESTART | SA_RESETHAND);
   sigemptyset(&action.sa_mask);
   sigaction(signal, &action, nullptr);
+  return before;
 }
 
 }  // namespace
 
 InterruptGuard::InterruptGuard() {
   received = 0;
-  const int flags = static_cast<int>(SA_RESTART | SA_RESETHAND);
-  handle(SIGINT, remember, flags);
-  handle(SIGTERM, remember, flags);
+  interrupt_before_ = listen_to(SIGINT);
+  termination_before_ = listen_to(SIGTERM);
 }
 
 InterruptGuard::~InterruptGuard() {
-  handle(SIGINT, SIG_DFL, 0);
-  handle(SIGTERM, SIG_DFL, 0);
+  sigaction(SIGINT, &interrupt_before_, nullptr);
+  sigaction(SIGTERM, &termination_before_, nullptr);
 }
 
 int InterruptGuard::signal() { return received; }

@@ -1,3 +1,4 @@
+#include <fcntl.h>
 #include <poll.h>
 #include <unistd.h>
 
@@ -16,6 +17,16 @@ namespace {
 
 using namespace dynains::program;
 
+// A file that is opened later must never get the number of a standard stream: what is printed would
+// go into it.
+void open_standard_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    // The lowest free number, which is that of the stream.
+    if (::fcntl(stream, F_GETFD) < 0 && ::open("/dev/null", O_RDWR) != stream)
+      ::_exit(kExitFailure);
+  }
+}
+
 // Whether standard output is a pipe that nobody reads any more, as behind `head`: that is no
 // failure.
 bool reader_has_left() {
@@ -31,6 +42,7 @@ int fail(int code, const char* what) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  open_standard_streams();
   // A closed pipe must not stop a run that writes files.
   std::signal(SIGPIPE, SIG_IGN);
 

@@ -17,12 +17,8 @@ void remove_file(const fs::path& path) {
   if (error) throw IoError(path.string() + ": cannot be removed: " + error.message());
 }
 
-/// What a killed run leaves beside its files, .NAME.PROCESS.tmp: see AtomicFile.
 bool is_leftover(const fs::path& path) {
-  const fs::path stem = path.stem();
-  const std::string process = stem.extension().string();
-  return path.extension() == ".tmp" && stem.string().front() == '.' && process.size() > 1 &&
-         process.find_first_not_of("0123456789", 1) == std::string::npos;
+  return !target_of_temporary(path.filename().string()).empty();
 }
 
 std::vector<fs::path> list(const fs::path& folder) {

@@ -1,6 +1,9 @@
 #include "dynains/io/atomic_file.hpp"
 
-#include <iostream>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <memory>
 
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
@@ -75,23 +78,80 @@ TEST_CASE("AtomicFile refuses targets that it cannot replace, and names them") {
   CHECK_THAT(device, ContainsSubstring("/dev/null") && ContainsSubstring("regular file"));
 }
 
-TEST_CASE("AtomicFile reports a full disk and keeps the target") {
-  // Every write to /dev/full fails; a link in the place of the temporary leads there.
-  if (!fs::exists("/dev/full")) {
-    std::cout << "SKIPPED: no /dev/full here" << std::endl;
-    return;
-  }
+TEST_CASE("AtomicFile tells why a file could not be written, and keeps the target") {
   TemporaryFolder folder;
   const fs::path target = folder / "a.txt";
   write_text(target, "old");
-  const fs::path temporary = folder / (".a.txt." + std::to_string(::getpid()) + ".tmp");
-  fs::create_symlink("/dev/full", temporary);
+  rlimit before{};
+  REQUIRE(::getrlimit(RLIMIT_FSIZE, &before) == 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{1000, before.rlim_max};
+  REQUIRE(::setrlimit(RLIMIT_FSIZE, &small) == 0);
   const std::string text = message_of<IoError>([&] {
     AtomicFile file(target);
     file.stream() << std::string(100000, 'x');
     file.commit();
   });
-  CHECK_THAT(text, ContainsSubstring("a.txt") && ContainsSubstring("No space left on device"));
+  ::setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  CHECK_THAT(text, ContainsSubstring("a.txt: cannot be written to the end: File too large"));
   CHECK(read_text(target) == "old");
   CHECK(count_entries(folder.path()) == 1);
+}
+
+TEST_CASE("Two writers of one file never share a temporary, and links in its place lead nowhere") {
+  TemporaryFolder folder;
+  const fs::path victim = folder / "victim";
+  write_text(victim, "precious");
+  fs::create_symlink(victim, folder / (".a.txt." + std::to_string(::getpid()) + ".tmp"));
+  auto first = std::make_unique<AtomicFile>(folder / "a.txt");
+  {
+    AtomicFile second(folder / "a.txt");
+    first->stream() << "first";
+    second.stream() << "second";
+    second.commit();
+  }
+  CHECK(read_text(folder / "a.txt") == "second");
+  first->commit();
+  CHECK(read_text(folder / "a.txt") == "first");
+  CHECK(read_text(victim) == "precious");
+  CHECK(count_entries(folder.path()) == 3);
+}
+
+TEST_CASE("Names of temporaries tell the file, and no other name does") {
+  CHECK(target_of_temporary(".a.txt.0123456789abcdef.tmp") == "a.txt");
+  CHECK(target_of_temporary("..x.0123456789abcdef.tmp") == ".x");
+  for (const char* other :
+       {".notes.2024.tmp", "a.txt.0123456789abcdef.tmp", ".a.txt.0123456789abcdeg.tmp",
+        ".a.txt.0123456789abcde.tmp", ".a.txt.0123456789abcdef.temp", ".0123456789abcdef.tmp",
+        "..0123456789abcdef.tmp", "", ".tmp", "."}) {
+    CAPTURE(other);
+    CHECK(target_of_temporary(other).empty());
+  }
+}
+
+TEST_CASE("Only temporaries that nobody writes, and of files that are named, are removed") {
+  TemporaryFolder folder;
+  const fs::path leftover = folder / ".a.txt.0123456789abcdef.tmp";
+  const fs::path foreign = folder / ".b.txt.0123456789abcdef.tmp";
+  const fs::path link = folder / ".a.txt.00000000000000ff.tmp";
+  write_text(leftover, "half");
+  write_text(foreign, "half");
+  fs::create_symlink(foreign, link);
+  const auto is_a = [](const std::string& name) { return name == "a.txt"; };
+  {
+    AtomicFile file(folder / "a.txt");
+    CHECK(remove_leftovers(folder.path(), is_a) == 1);
+    file.stream() << "whole";
+    file.commit();
+  }
+  CHECK(read_text(folder / "a.txt") == "whole");
+  CHECK_FALSE(fs::exists(leftover));
+  CHECK(fs::exists(foreign));
+  CHECK(fs::is_symlink(link));
+  CHECK(remove_leftovers(folder.path(), is_a) == 0);
+
+  fs::create_directory_symlink(folder.path(), folder / "elsewhere");
+  CHECK_THAT(message_of<IoError>([&] { remove_leftovers(folder / "elsewhere", is_a); }),
+             ContainsSubstring("elsewhere: is a link"));
 }

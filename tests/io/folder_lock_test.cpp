@@ -53,6 +53,20 @@ TEST_CASE("a lock goes where it is moved") {
   CHECK_THAT(refusal(folder.path()), ContainsSubstring("is in use"));
 }
 
+TEST_CASE("shared locks exclude an exclusive one, not each other") {
+  const TemporaryFolder folder;
+  std::optional<FolderLock> first(std::in_place, folder.path(), FolderLock::Mode::kShared);
+  std::optional<FolderLock> second(std::in_place, folder.path(), FolderLock::Mode::kShared);
+  first.reset();
+  CHECK_THAT(refusal(folder.path()), ContainsSubstring("is in use"));
+  second.reset();
+  const FolderLock exclusive(folder.path());
+  CHECK_THAT(message_of<UsageError>([&] {
+               FolderLock{folder.path(), FolderLock::Mode::kShared};
+             }),
+             ContainsSubstring("is in use"));
+}
+
 TEST_CASE("a lock ends with its process, also by kill -9") {
   const TemporaryFolder folder;
   int locked[2];

@@ -274,8 +274,8 @@ TEST_CASE("A map elsewhere is replaced by --force only, and never a scan") {
   CHECK(read_text(map) == "of another run");
 
   // What a killed run left of it goes, what belongs to others stays.
-  const std::string leftover = fixture.folder / "maps/.of all.ply.123.tmp";
-  const std::string foreign = fixture.folder / "maps/.of some.ply.123.tmp";
+  const std::string leftover = fixture.folder / "maps/.of all.ply.0123456789abcdef.tmp";
+  const std::string foreign = fixture.folder / "maps/.of some.ply.0123456789abcdef.tmp";
   write_text(leftover, "half");
   write_text(foreign, "half");
   REQUIRE(fixture.run({"--map", map, "--force"}).code == 0);
@@ -629,6 +629,37 @@ TEST_CASE("Ctrl-C: the scan at hand is finished, what is final is written, exit 
   CHECK(read_points(fixture.out + "/static_map.ply").positions.size() ==
         report["static_map"]["points"]);
   CHECK(count_entries(fixture.out) == 6);
+}
+
+TEST_CASE("A signal that was ignored from the start does not end a run") {
+  const Fixture fixture(40);
+  const int signal = GENERATE(SIGINT, SIGTERM);
+  Process process({"run", fixture.seq, "--out", fixture.out},
+                  [signal] { std::signal(signal, SIG_IGN); });
+  for (int i = 0; i < 10000 && !fs::exists(fixture.out + "/labels/000000.label"); ++i) {
+    ::usleep(1000);
+  }
+  ::kill(process.id(), signal);
+  CHECK(process.wait().code == 0);
+  CHECK(fixture.report()["complete"] == true);
+}
+
+TEST_CASE("Closed standard streams change no result") {
+  const Fixture fixture;
+  REQUIRE(fixture.run().code == 0);
+  const std::string expected = fixture.folder / "expected";
+  fs::rename(fixture.out, expected);
+  for (const std::vector<int>& closed : {std::vector<int>{0}, {1, 2}, {0, 1, 2}}) {
+    CAPTURE(closed);
+    const Outcome outcome = start({"run", fixture.seq, "--out", fixture.out}, [&] {
+      for (const int stream : closed) ::close(stream);
+    });
+    CHECK(outcome.code == 0);
+    for (const char* file : {"/static_map.ply", "/dynamic_points.ply", "/labels/000005.label"}) {
+      CHECK(read_text(fixture.out + file) == read_text(expected + file));
+    }
+    fs::remove_all(fixture.out);
+  }
 }
 
 TEST_CASE("A real clip runs as published") {

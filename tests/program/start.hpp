@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <functional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -19,10 +20,12 @@ struct Outcome {
   std::string err;  ///< standard error
 };
 
-/// A running `dynains ARGUMENTS`, both outputs piped into files.
+/// A running `dynains ARGUMENTS`, both outputs piped into files. `prepare` is called in the new
+/// process, before the program starts.
 class Process {
  public:
-  explicit Process(std::vector<std::string> arguments) {
+  explicit Process(
+      std::vector<std::string> arguments, const std::function<void()>& prepare = [] {}) {
     std::vector<char*> argv;
     arguments.insert(arguments.begin(), DYNAINS_PROGRAM);
     for (std::string& argument : arguments) argv.push_back(argument.data());
@@ -34,6 +37,7 @@ class Process {
     if (id_ > 0) return;
     redirect(out, STDOUT_FILENO);
     redirect(err, STDERR_FILENO);
+    prepare();
     ::execv(DYNAINS_PROGRAM, argv.data());
     ::_exit(127);
   }
@@ -64,8 +68,9 @@ class Process {
   pid_t id_ = 0;
 };
 
-inline Outcome start(const std::vector<std::string>& arguments) {
-  return Process(arguments).wait();
+inline Outcome start(
+    const std::vector<std::string>& arguments, const std::function<void()>& prepare = [] {}) {
+  return Process(arguments, prepare).wait();
 }
 
 /// What `dynains ARGUMENTS` shows on a terminal of its own; throws unless it ends with exit code 0.

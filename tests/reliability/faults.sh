@@ -89,7 +89,8 @@ echo "--- --resume after Ctrl-C; with other flags; when complete; --force after 
 code=0
 for ((attempt = 0; attempt < 20 && code == 0; ++attempt)); do
   rm -rf "$work/out"
-  "$program" run "$seq" --out "$work/out" --quiet &
+  # In a script `&` ignores SIGINT.
+  env --default-signal=INT "$program" run "$seq" --out "$work/out" --quiet &
   pid=$!
   await "$work/out/labels"
   kill -INT "$pid"

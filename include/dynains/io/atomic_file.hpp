@@ -1,14 +1,19 @@
 // Files that appear whole or not at all.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <ostream>
+#include <string>
 
 namespace dynains {
 
-/// Writes to a temporary name beside the target and renames it on `commit()`. Until then the
-/// target, if it exists, stays as it was; without a commit the temporary is removed.
+/// Writes to a temporary beside the target, `.NAME.0123456789abcdef.tmp` with random digits, and
+/// renames it on `commit()`. Until then the target, if it exists, stays as it was; without a commit
+/// the temporary is removed. The temporary is always a new file, never one that a link leads to,
+/// and bears a lock (flock) until the file is in place: see `remove_leftovers()`.
 class AtomicFile {
  public:
   /// Opens the temporary. A symbolic link is followed: the file that it names is replaced.
@@ -40,6 +45,15 @@ class AtomicFile {
   std::ostream stream_;
   bool committed_ = false;
 };
+
+/// Name of the file that `name` is a temporary of, by its form; empty if it is none.
+std::string target_of_temporary(const std::string& name);
+
+/// Removes temporaries that killed processes left in `folder`, which must not be a link. Only those
+/// of files for which `is_ours(NAME)` holds are looked at. Returns how many of them are still being
+/// written, by this process or another one; they stay. Throws IoError.
+std::size_t remove_leftovers(const std::filesystem::path& folder,
+                             const std::function<bool(const std::string&)>& is_ours);
 
 /// Brings everything written to the file system of `folder` to its disk. Throws IoError.
 void sync_files(const std::filesystem::path& folder);

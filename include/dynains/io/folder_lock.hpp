@@ -1,4 +1,4 @@
-// One user at a time for a folder of files.
+// One writer at a time for a folder of files.
 #pragma once
 
 #include <filesystem>
@@ -6,15 +6,18 @@
 namespace dynains {
 
 /// Keeps a folder for itself, from construction to destruction, among all who take a FolderLock of
-/// it: of this process or of another one on this machine.
+/// it: of this process or of another one on this machine. Shared locks exclude exclusive ones, not
+/// each other.
 ///
 /// The lock lies on the folder itself (flock): it leaves no file behind, and ends with the process,
 /// whatever ends that. File systems that cannot lock folders, as some of those behind a network,
 /// give every lock at once.
 class FolderLock {
  public:
+  enum class Mode { kExclusive, kShared };
+
   /// Throws UsageError if somebody else has the folder, IoError if it cannot be opened.
-  explicit FolderLock(const std::filesystem::path& folder);
+  explicit FolderLock(const std::filesystem::path& folder, Mode mode = Mode::kExclusive);
   ~FolderLock();
   FolderLock(FolderLock&& other) noexcept;
   FolderLock& operator=(FolderLock&& other) noexcept;
