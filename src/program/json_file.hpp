@@ -1,0 +1,51 @@
+// JSON files from untrusted sources.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "dynains/errors.hpp"
+
+namespace dynains::program {
+
+/// Arrays and objects within each other that a JSON file may have.
+inline constexpr int kMaxJsonDepth = 64;
+/// Bytes that a JSON file may have.
+inline constexpr std::uint64_t kMaxJsonBytes = std::uint64_t{64} << 20U;
+
+/// Reads a JSON file. Throws IoError with path, line, column and expectation.
+nlohmann::ordered_json read_json_file(const std::filesystem::path& path);
+
+/// The field of `json` that `pointer` ("/static_map/file") names; nothing if there is none or if it
+/// is null. Throws IoError with path, pointer and expected type for a value of another type. T is
+/// bool, std::uint64_t, double or std::string. `path` is the file that `json` was read from.
+template <class T>
+std::optional<T> json_field(const std::filesystem::path& path, const nlohmann::ordered_json& json,
+                            const std::string& pointer);
+template <>
+std::optional<bool> json_field(const std::filesystem::path& path,
+                               const nlohmann::ordered_json& json, const std::string& pointer);
+template <>
+std::optional<std::uint64_t> json_field(const std::filesystem::path& path,
+                                        const nlohmann::ordered_json& json,
+                                        const std::string& pointer);
+template <>
+std::optional<double> json_field(const std::filesystem::path& path,
+                                 const nlohmann::ordered_json& json, const std::string& pointer);
+template <>
+std::optional<std::string> json_field(const std::filesystem::path& path,
+                                      const nlohmann::ordered_json& json,
+                                      const std::string& pointer);
+
+/// The same for a field that must be there.
+template <class T>
+T required_json_field(const std::filesystem::path& path, const nlohmann::ordered_json& json,
+                      const std::string& pointer) {
+  if (std::optional<T> value = json_field<T>(path, json, pointer)) return *std::move(value);
+  throw IoError(path.string() + ": " + pointer + ": not found; expected a value");
+}
+
+}  // namespace dynains::program
