@@ -150,6 +150,7 @@ void Recording::list_scans() {
   }
   const std::vector<fs::path> files = scan_files(scan_folder_);
   if (files.empty()) fail(scan_folder_, std::string("has no scans; ") + kAccepted);
+  files_ = files;
   format_ = *scan_format_of(files.front());
   for (const fs::path& file : files) {
     if (*scan_format_of(file) == format_) continue;
@@ -230,6 +231,7 @@ fs::path Recording::find_beside(const fs::path& poses_file,
 void Recording::read_calibration(const fs::path& poses_file) {
   const fs::path file = find_beside(poses_file, {"calib.txt"});
   if (file.empty()) return;
+  files_.push_back(file);
   const PoseFrame frame = options_.convention.frame;
   const bool is_matrix = trajectory_.order == QuaternionOrder::kNone;
   try {
@@ -248,6 +250,7 @@ void Recording::read_poses() {
     notes_.push_back("poses from VIEWPOINT of the scans");
   } else {
     file = find_poses();
+    files_.push_back(file);
     trajectory_ = read_trajectory(file);
     notes_.push_back("poses from " + shown(file, folder_));
   }
@@ -272,6 +275,7 @@ std::optional<std::vector<double>> Recording::find_times(const fs::path& poses_f
                             ? find_beside(poses_file, {"times.txt", "timestamps.txt"})
                             : options_.times;
   if (file.empty()) return times_of_names();
+  files_.push_back(file);
   std::vector<double> rows = read_kitti_times(file);
   for (double& time : rows) time = to_seconds(time);
   if (rows.size() == scans_.size()) return rows;
@@ -373,6 +377,13 @@ void Recording::place_scans(const fs::path& poses) {
                      " scans have no pose and are left out, " + missing + " first");
   }
   scans_ = std::move(placed);
+}
+
+std::vector<fs::path> Recording::files() const {
+  std::vector<fs::path> files = files_;
+  if (labels_ != Labels::kFiles) return files;
+  for (const Scan& scan : scans_) files.push_back(folder_ / "labels" / (scan.name + ".label"));
+  return files;
 }
 
 std::optional<Eigen::Isometry3d> Recording::pose_under(const PoseConvention& convention,

@@ -15,6 +15,9 @@ class RemoverOptions {
 
   const std::string& preset_name() const { return preset_; }
 
+  /// Empty if none was named.
+  const std::string& config_file() const { return config_file_; }
+
   /// Whether anything but the preset was named.
   bool given() const { return !config_file_.empty() || !flags_.values().empty(); }
 

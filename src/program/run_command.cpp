@@ -4,7 +4,6 @@
 #include <iomanip>
 #include <iostream>
 #include <memory>
-#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -12,24 +11,15 @@
 
 #include "command.hpp"
 #include "dynains/dyna_ins_remover.hpp"
-#include "dynains/errors.hpp"
-#include "dynains/io/atomic_file.hpp"
 #include "dynains/io/diagnosis.hpp"
 #include "dynains/io/folder_lock.hpp"
-#include "dynains/io/point_file.hpp"
-#include "dynains/io/recording.hpp"
-#include "dynains/pose.hpp"
 #include "evaluation_options.hpp"
 #include "interrupt.hpp"
 #include "lone_scans.hpp"
-#include "map_on_disk.hpp"
-#include "naming_scan.hpp"
 #include "output_folder.hpp"
 #include "progress.hpp"
-#include "recording_options.hpp"
-#include "remover_options.hpp"
+#include "run_plan.hpp"
 #include "run_report.hpp"
-#include "run_request.hpp"
 #include "run_results.hpp"
 #include "run_sequence.hpp"
 
@@ -37,132 +27,31 @@ namespace dynains::program {
 namespace {
 
 namespace fs = std::filesystem;
-using Config = DynaInsRemover::Config;
 
-/// In the folder of results, while a run with --map-memory lasts.
-constexpr const char* kTileFolder = "map_tiles";
-
-struct RunOptions {
-  explicit RunOptions(CLI::App& command)
-      : sequence(command, "recording"), remover(command, "default") {}
-
-  RecordingFlags sequence;
-  std::string out;
-  std::string map;
-  std::optional<double> map_memory;  // MB
-  ScanWindow window;
-  bool write_online = false;
-  bool write_clean = false;
-  bool force = false;
-  bool resume = false;
-  bool quiet = false;
-  RemoverOptions remover;
-};
-
-nlohmann::ordered_json to_json(const Config& config) {
-  nlohmann::ordered_json json;
-  Config::visit(config, [&](const auto& parameter) { json[parameter.name] = parameter.value; });
-  return json;
-}
-
-ScanRange select_scans(const Recording& sequence, const ScanWindow& window) {
-  const auto number = [&](std::size_t i) { return sequence.number(i); };
-  ScanRange range{0, sequence.size() - 1};
-  while (range.first <= range.last && window.start && number(range.first) < *window.start) {
-    ++range.first;
-  }
-  while (range.last > range.first && window.end && number(range.last) > *window.end) --range.last;
-  const bool none = range.first > range.last || (window.end && number(range.last) > *window.end);
-  if (none) {
-    throw ConfigError("--start and --end leave no scan of " + sequence.name(0) + " to " +
-                      sequence.name(sequence.size() - 1));
-  }
-  return range;
-}
-
-/// So that a broken file or pose is noticed before anything is written.
-void check_scans(const Recording& sequence, const ScanRange& range) {
-  for (std::size_t i = range.first; i <= range.last; ++i) {
-    sequence.check_scan(i);
-    naming_scan(sequence, i, [&] { validate_pose("T_world_sensor", sequence.T_world_sensor(i)); });
-  }
-}
-
-/// What an earlier run may have left in `folder`.
-OutputFiles files_of_a_run(const fs::path& folder) {
-  OutputFiles files;
-  files.marker = "report.json";
-  files.files = {"timing.csv", "static_map.ply", "dynamic_points.ply"};
-  const std::string map = earlier_map(folder);
-  if (!map.empty()) files.files.push_back(map);
-  files.folders = {"labels", "online", "causes", "clean", kTileFolder};
-  files.extensions = {".label", ".cause", ".bin", ".pcd", ".ply", ".tile"};
-  return files;
-}
-
-RunOutputs make_outputs(const RunOptions& options, const Config& config) {
-  RunOutputs outputs;
-  outputs.folder = options.out;
-  outputs.write_online = options.write_online;
-  outputs.write_clean = options.write_clean;
-  if (options.map.empty()) {
-    if (config.build_map) outputs.map = outputs.folder / "static_map.ply";
-    return outputs;
-  }
-  if (!config.build_map) throw ConfigError("--map needs --build-map true");
-  if (!is_point_file(options.map)) {
-    throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
-  }
-  outputs.map = options.map;
-  if (whole_path(outputs.map) == whole_path(outputs.folder / "dynamic_points.ply")) {
-    throw ConfigError("--map " + options.map + ": the moving points go there");
-  }
-  return outputs;
-}
-
-/// Whether every file of a complete run is still there.
-bool is_whole(const RunOutputs& outputs, const Recording& sequence, const ScanRange& range) {
-  if (!outputs.map.empty() && !fs::exists(outputs.map)) return false;
-  for (const char* name : {"dynamic_points.ply", "timing.csv"}) {
-    if (!fs::exists(outputs.folder / name)) return false;
-  }
-  const auto has = [&](const char* folder, const std::string& file) {
-    return fs::exists(outputs.folder / folder / file);
+/// Processes all scans, or those that come before a signal. Returns the times.
+RunTiming process(const RunPlan& plan, const RunOptions& options, const fs::path& folder,
+                  RunResults& results) {
+  RunTiming timing;
+  const auto work = [&](auto& remover) {
+    Progress progress(plan.range.size(), "scans", options.quiet);
+    timing = run_sequence(remover, plan.sequence, plan.range, results, [&](std::size_t done) {
+      progress.update(done);
+      return InterruptGuard::signal() == 0;
+    });
   };
-  for (std::size_t i = range.first; i <= range.last; ++i) {
-    const std::string& name = sequence.name(i);
-    if (!has("labels", name + ".label") || !has("causes", name + ".cause")) return false;
-    if (outputs.write_online && !has("online", name + ".label")) return false;
-    if (outputs.write_clean && !has("clean", CleanWriter::name(sequence, i))) return false;
+  if (plan.map_on_disk) {
+    RemoverWithMapOnDisk::Config config = *plan.map_on_disk;
+    config.map.map_folder = folder / kTileFolder;
+    RemoverWithMapOnDisk remover(config);
+    work(remover);
+    remover.reset();
+    std::error_code ignored;
+    fs::remove(config.map.map_folder, ignored);
+  } else {
+    DynaInsRemover remover(plan.config);
+    work(remover);
   }
-  return true;
-}
-
-/// Refuses whatever must not be replaced. Throws IoError.
-void check_outputs(const RunOutputs& outputs, const OutputFiles& files, const Recording& sequence,
-                   bool replace) {
-  check_output_folder(outputs.folder, files, replace);
-  if (outputs.map.empty()) return;
-  const fs::path map = whole_path(outputs.map);
-  if (map.parent_path() == whole_path(sequence.scan_folder())) {
-    throw IoError(outputs.map.string() + ": the scans are there; choose another folder for --map");
-  }
-  if (fs::exists(map) && !replace) {
-    throw IoError(outputs.map.string() + ": exists; choose another name for --map, or replace it " +
-                  "by --force");
-  }
-  // A map that cannot be written would otherwise be noticed when the old results are gone.
-  PointFileWriter attempt(outputs.map);
-}
-
-/// Clears the way for new results, once nothing but the points and the disk can go wrong any more.
-void prepare(const RunOutputs& outputs, const OutputFiles& files, bool resume,
-             const nlohmann::ordered_json& request) {
-  nlohmann::ordered_json marker = unfinished_report(outputs.map_name());
-  marker["request"] = request;
-  if (!outputs.map.empty()) remove_leftovers_of(outputs.map);
-  // Files of the same run are replaced one by one: never is less there than before.
-  (resume ? mark_output_folder : clear_output_folder)(outputs.folder, files, to_text(marker));
+  return timing;
 }
 
 void print_summary(const RunResults& results, const RunTiming& timing, const RunOutputs& outputs) {
@@ -198,80 +87,82 @@ void warn_of_poses(const std::string& sequence, const Agreement& agreement) {
             << sequence << std::endl;
 }
 
-void run(const RunOptions& options) {
-  const Config config = options.remover.config();
-  const RunOutputs outputs = make_outputs(options, config);
-  std::optional<RemoverWithMapOnDisk::Config> on_disk;
-  if (options.map_memory) {
-    if (!config.build_map) throw ConfigError("--map-memory needs --build-map true");
-    on_disk = with_map_on_disk(config, outputs.folder / kTileFolder, *options.map_memory);
-  }
-  const Recording sequence = options.sequence.open();
-  const ScanRange range = select_scans(sequence, options.window);
-  check_scans(sequence, range);
-  const nlohmann::ordered_json configuration = to_json(config);
-  const nlohmann::ordered_json request =
-      describe_request(sequence, range, outputs, on_disk.has_value(), configuration);
-  create_folder(outputs.folder);
-  const FolderLock lock(outputs.folder);
-  const EarlierRun earlier =
-      options.resume ? find_earlier_run(outputs.folder, request) : EarlierRun::kNone;
-  if (earlier == EarlierRun::kComplete && is_whole(outputs, sequence, range)) {
-    if (!options.quiet) std::cout << outputs.folder.string() << ": complete already" << std::endl;
-    return;
-  }
-  const bool resume = earlier != EarlierRun::kNone;
-  const OutputFiles files = files_of_a_run(outputs.folder);
-  check_outputs(outputs, files, sequence, options.force || resume);
-  const PoseAgreement agreement = pose_agreement(sequence, range.first, range.last);
+void warn_of_doubts(const RunPlan& plan, const RunOptions& options,
+                    const PoseAgreement& agreement) {
   if (agreement.doubtful()) warn_of_poses(options.sequence.folder(), agreement.as_given);
-  if (const auto lone = remark_on_lone_scans(sequence, range.first, range.last, config)) {
-    std::cerr << "dynains: warning: " << *lone << std::endl;
-  }
-  prepare(outputs, files, resume, request);
+  const auto lone =
+      remark_on_lone_scans(plan.sequence, plan.range.first, plan.range.last, plan.config);
+  if (lone) std::cerr << "dynains: warning: " << *lone << std::endl;
+}
 
-  RunResults results(sequence, range, outputs);
-  const InterruptGuard interrupt;
-  RunTiming timing;
-  const auto work = [&](auto& remover) {
-    Progress progress(range.size(), "scans", options.quiet);
-    timing = run_sequence(remover, sequence, range, results, [&](std::size_t done) {
-      progress.update(done);
-      return InterruptGuard::signal() == 0;
-    });
-  };
-  if (on_disk) {
-    RemoverWithMapOnDisk remover(*on_disk);
-    remover.reset();  // forgets the tiles of a run that was killed
-    work(remover);
-    remover.reset();
-    std::error_code ignored;
-    fs::remove(on_disk->map.map_folder, ignored);
-  } else {
-    DynaInsRemover remover(config);
-    work(remover);
-  }
-  results.commit();
-
+RunDescription describe(const RunPlan& plan, const RunOptions& options,
+                        const PoseAgreement& agreement, const RunResults& results) {
+  const Recording& sequence = plan.sequence;
   RunDescription description;
   description.sequence = options.sequence.folder();
-  description.first_scan = sequence.name(range.first);
-  description.last_scan = sequence.name(range.first + results.finished() - 1);
+  description.first_scan = sequence.name(plan.range.first);
+  description.last_scan = sequence.name(plan.range.first + results.finished() - 1);
   description.missing_poses = sequence.missing_pose_count();
   description.agreement = agreement.as_given;
   description.preset = options.remover.preset_name();
-  description.complete = results.finished() == range.size();
-  description.map = outputs.map_name();
-  description.configuration = configuration;
-  if (on_disk) description.configuration["map_memory"] = on_disk->map.map_memory;
+  description.complete = results.finished() == plan.range.size();
+  description.map = plan.outputs.map_name();
+  description.configuration = plan.configuration;
+  if (plan.map_on_disk) {
+    description.configuration["map_memory"] = plan.map_on_disk->map.map_memory;
+  }
+  return description;
+}
+
+/// Writes the results into `out`, from the first scan on, or until a signal comes.
+void write_results(const RunPlan& plan, const RunOptions& options, OutputFolder& out,
+                   OutputChange::Mode mode, OutsideMap& outside_map) {
+  const PoseAgreement agreement = pose_agreement(plan.sequence, plan.range.first, plan.range.last);
+  warn_of_doubts(plan, options, agreement);
+
+  const InterruptGuard interrupt;
+  nlohmann::ordered_json marker = unfinished_report(plan.outputs.map_name());
+  marker["request"] = plan.request;
+  OutputChange change(out, mode, marker, plan.listing);
+  if (!change.is_staged()) out.remove_folder_results(kTileFolder);
+  RunOutputs outputs = plan.outputs;
+  outputs.folder = change.folder();
+  RunResults results(plan.sequence, plan.range, outputs, outside_map.take_writer());
+  const RunTiming timing = process(plan, options, outputs.folder, results);
+  const RunDescription description = describe(plan, options, agreement, results);
+  if (change.is_staged() && !description.complete) {
+    std::cerr << "dynains: interrupted; the earlier results in " << out.path().string()
+              << " stay as they were" << std::endl;
+    throw Interrupted{InterruptGuard::signal()};
+  }
+  results.commit();
   write_timing(outputs.folder / "timing.csv", timing);
-  // The report must not claim what a power cut could still take.
-  sync_files(outputs.folder);
+  change.put_in_place([&] { results.commit_outside_map(); });
   nlohmann::ordered_json report = make_report(description, results, timing);
-  report["request"] = request;
-  write_report(outputs.folder / "report.json", report);
-  if (!options.quiet) print_summary(results, timing, outputs);
+  report["request"] = plan.request;
+  change.finish(report, plan.outputs.listing(plan.sequence, plan.range, false));
+  if (!options.quiet) print_summary(results, timing, plan.outputs);
   if (!description.complete) throw Interrupted{InterruptGuard::signal()};
+}
+
+void run(const RunOptions& options) {
+  const RunPlan plan = make_plan(options);
+  create_folder(plan.outputs.folder);
+  const FolderLock lock(plan.outputs.folder);
+  OutputFolder out(Folder(plan.outputs.folder), run_output_kind());
+  const RunTask task = choose_task(plan, options, out);
+  if (task == RunTask::kNothing) {
+    out.discard_staging();
+    if (!options.quiet) std::cout << out.path().string() << ": complete already" << std::endl;
+    return;
+  }
+  out.check(plan.listing, plan.inputs);
+  if (task == RunTask::kReplace) check_space(plan);
+  OutsideMap outside_map(plan, options.force || out.has_results());
+  write_results(
+      plan, options, out,
+      task == RunTask::kReplace ? OutputChange::Mode::kStaged : OutputChange::Mode::kInPlace,
+      outside_map);
 }
 
 }  // namespace
@@ -286,8 +177,9 @@ void add_run_command(CLI::App& app) {
       ->type_name("FOLDER");
   CLI::Option* const force = command.add_flag(
       "--force", options->force,
-      "replace the results of an earlier run in --out, and the file of --map; results are removed "
-      "first, so that old and new files never mix. A folder that holds anything else is refused");
+      "replace the results of an earlier run in --out, and the file of --map, when the new ones "
+      "are "
+      "complete: until then the earlier ones stay. A folder without results is refused");
   command
       .add_flag("--resume", options->resume,
                 "complete a run with the same flags that was interrupted or killed, if --out holds "

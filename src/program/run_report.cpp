@@ -5,12 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <fstream>
 #include <iomanip>
 #include <locale>
 
 #include "dynains/io/atomic_file.hpp"
-#include "dynains/io/point_file.hpp"
 #include "dynains/version.hpp"
 
 namespace dynains::program {
@@ -83,32 +81,18 @@ nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& 
 }
 
 nlohmann::ordered_json unfinished_report(const std::string& map) {
-  nlohmann::ordered_json report = {
-      {"program", "dynains"}, {"version", kVersionString}, {"complete", false}};
+  nlohmann::ordered_json report = {{"program", "dynains"},
+                                   {"version", kVersionString},
+                                   {"command", run_output_kind().command},
+                                   {"complete", false}};
   report["static_map"] = nullptr;
   if (!map.empty()) report["static_map"] = {{"file", map}};
   return report;
 }
 
-std::string earlier_map(const std::filesystem::path& folder) {
-  std::ifstream file(folder / "report.json");
-  const auto report = nlohmann::json::parse(file, nullptr, false);
-  const nlohmann::json::json_pointer where("/static_map/file");
-  if (!report.is_object() || !report.contains(where) || !report[where].is_string()) return {};
-  const std::filesystem::path map(report[where].get<std::string>());
-  const bool is_inside = !map.has_parent_path() && is_point_file(map);
-  return is_inside ? map.string() : std::string();
-}
-
 std::string to_text(const nlohmann::ordered_json& report) {
   // Paths need not be UTF-8.
   return report.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
-}
-
-void write_report(const std::filesystem::path& path, const nlohmann::ordered_json& report) {
-  AtomicFile file(path);
-  file.stream() << to_text(report);
-  file.commit();
 }
 
 void write_timing(const std::filesystem::path& path, const RunTiming& timing) {

@@ -44,14 +44,10 @@ nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& 
 /// What stands in the place of the report while the run is not finished.
 nlohmann::ordered_json unfinished_report(const std::string& map);
 
-/// Name of the map that an earlier run left in `folder`, from its report; empty if it left none.
-std::string earlier_map(const std::filesystem::path& folder);
-
 /// Text of a report, as in the file.
 std::string to_text(const nlohmann::ordered_json& report);
 
-/// Both throw IoError.
-void write_report(const std::filesystem::path& path, const nlohmann::ordered_json& report);
+/// Throws IoError.
 void write_timing(const std::filesystem::path& path, const RunTiming& timing);
 
 }  // namespace dynains::program

@@ -2,10 +2,8 @@
 
 #include <cstdint>
 #include <cstring>
-#include <fstream>
 #include <string>
 
-#include "dynains/errors.hpp"
 #include "dynains/version.hpp"
 
 namespace dynains::program {
@@ -73,7 +71,7 @@ std::string differences(const Json& earlier, const Json& now) {
 }  // namespace
 
 nlohmann::ordered_json describe_request(const Recording& recording, const ScanRange& range,
-                                        const RunOutputs& outputs, bool map_on_disk,
+                                        const RunOutputs& outputs,
                                         const nlohmann::ordered_json& configuration) {
   return {{"version", kVersionString},
           {"first_scan", recording.name(range.first)},
@@ -81,28 +79,18 @@ nlohmann::ordered_json describe_request(const Recording& recording, const ScanRa
           {kPosesAndTimes, fingerprint(recording, range)},
           {"points_in_world", recording.frame() == PointFrame::kWorld},
           {"map", outputs.map_name()},
-          {"map_on_disk", map_on_disk},
+          {"map_on_disk", outputs.map_on_disk},
           {"write_online", outputs.write_online},
           {"write_clean", outputs.write_clean},
           {"configuration", configuration}};
 }
 
-EarlierRun find_earlier_run(const std::filesystem::path& folder,
-                            const nlohmann::ordered_json& request) {
-  std::ifstream file(folder / "report.json");
-  if (!file) return EarlierRun::kNone;
-  const auto report = Json::parse(file, nullptr, false);
+std::string request_differences(const nlohmann::ordered_json& report,
+                                const nlohmann::ordered_json& request) {
   const auto expected = Json::parse(request.dump(-1, ' ', false, Json::error_handler_t::replace));
   const bool has_request = report.is_object() && report.contains("request");
-  const std::string differing =
-      has_request ? differences(report["request"], expected) : "report.json does not tell of them";
-  if (!differing.empty()) {
-    throw IoError(folder.string() +
-                  ": holds results of other flags, scans, poses or another version, which cannot "
-                  "be resumed (" +
-                  differing + "); choose another folder, or replace them by --force");
-  }
-  return report.value("complete", false) ? EarlierRun::kComplete : EarlierRun::kUnfinished;
+  return has_request ? differences(report["request"], expected)
+                     : "report.json does not tell of them";
 }
 
 }  // namespace dynains::program

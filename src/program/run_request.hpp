@@ -1,8 +1,8 @@
 // What the results of a run follow from, so that another run can tell whether they are its own.
 #pragma once
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "dynains/dyna_ins_remover.hpp"
 #include "dynains/io/recording.hpp"
@@ -14,14 +14,12 @@ namespace dynains::program {
 /// times of the scans; their points are not read. A map on the disk takes its points in another
 /// order than one in memory, whatever its budget.
 nlohmann::ordered_json describe_request(const Recording& recording, const ScanRange& range,
-                                        const RunOutputs& outputs, bool map_on_disk,
+                                        const RunOutputs& outputs,
                                         const nlohmann::ordered_json& configuration);
 
-enum class EarlierRun { kNone, kUnfinished, kComplete };
-
-/// What report.json in `folder` says of an earlier run. Throws IoError that names what differs, if
-/// that was another one.
-EarlierRun find_earlier_run(const std::filesystem::path& folder,
-                            const nlohmann::ordered_json& request);
+/// Which fields of `request` an earlier run with this report had otherwise, the first few with both
+/// values; empty if none differs.
+std::string request_differences(const nlohmann::ordered_json& report,
+                                const nlohmann::ordered_json& request);
 
 }  // namespace dynains::program

@@ -33,24 +33,61 @@ PointColumns dynamic_columns(bool far, PointColumns columns) {
 
 }  // namespace
 
+const OutputKind& run_output_kind() {
+  static const OutputKind kind = {"run",
+                                  "report.json",
+                                  {"timing.csv", "dynamic_points.ply"},
+                                  true,
+                                  {{"labels", {".label"}},
+                                   {"online", {".label"}},
+                                   {"causes", {".cause"}},
+                                   {"clean", {".bin", ".pcd", ".ply"}},
+                                   {kTileFolder, {kTileExtension}}}};
+  return kind;
+}
+
+bool RunOutputs::has_outside_map() const {
+  return !map.empty() && map.parent_path() != whole_path(folder);
+}
+
 std::string RunOutputs::map_name() const {
-  if (map.empty()) return {};
-  const std::filesystem::path whole = whole_path(map);
-  const bool is_inside = whole.parent_path() == whole_path(folder);
-  return (is_inside ? whole.filename() : whole).string();
+  return (has_outside_map() ? map : map.filename()).string();
+}
+
+OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& range,
+                                  bool lasts) const {
+  OutputListing listing;
+  listing.files = {"timing.csv", "dynamic_points.ply"};
+  if (!map.empty() && !has_outside_map()) listing.files.insert(map_name());
+  listing.folders = {{"labels", ".label"}, {"causes", ".cause"}};
+  if (write_online) listing.folders["online"] = ".label";
+  if (write_clean) {
+    listing.folders["clean"] =
+        std::filesystem::path(CleanWriter::name(recording, range.first)).extension().string();
+  }
+  if (map_on_disk && lasts) listing.folders[kTileFolder] = kTileExtension;
+  for (std::size_t i = range.first; i <= range.last; ++i) listing.scans.insert(recording.name(i));
+  return listing;
+}
+
+std::unique_ptr<PointFileWriter> open_map(const std::filesystem::path& file,
+                                          const Recording& recording, const ScanRange& range) {
+  return std::make_unique<PointFileWriter>(file, map_columns(is_far(recording, range)));
 }
 
 RunResults::RunResults(const Recording& recording, const ScanRange& range,
-                       const RunOutputs& outputs)
+                       const RunOutputs& outputs, std::unique_ptr<PointFileWriter> outside_map)
     : recording_(recording),
       range_(range),
       final_labels_(outputs.folder / "labels", outputs.folder / "causes"),
       dynamic_points_(outputs.folder / "dynamic_points.ply",
-                      dynamic_columns(is_far(recording, range), recording.columns())) {
+                      dynamic_columns(is_far(recording, range), recording.columns())),
+      map_(std::move(outside_map)),
+      map_is_outside_(map_ != nullptr) {
   if (outputs.write_online) online_labels_.emplace(outputs.folder / "online");
   if (outputs.write_clean) clean_scans_.emplace(outputs.folder / "clean", recording);
-  if (!outputs.map.empty()) {
-    map_ = std::make_unique<PointFileWriter>(outputs.map, map_columns(is_far(recording, range)));
+  if (!outputs.map.empty() && !map_is_outside_) {
+    map_ = open_map(outputs.folder / outputs.map.filename(), recording, range);
   }
 }
 
@@ -96,7 +133,11 @@ void RunResults::commit() {
   final_labels_.finish();
   if (online_labels_) online_labels_->finish();
   dynamic_points_.commit();
-  if (map_) map_->commit();
+  if (map_ && !map_is_outside_) map_->commit();
+}
+
+void RunResults::commit_outside_map() {
+  if (map_ && map_is_outside_) map_->commit();
 }
 
 std::optional<std::size_t> RunResults::map_points() const {

@@ -17,6 +17,7 @@
 #include "dynains/io/recording.hpp"
 #include "dynains/verdict.hpp"
 #include "label_writer.hpp"
+#include "output_listing.hpp"
 
 namespace dynains::program {
 
@@ -28,16 +29,30 @@ struct ScanRange {
   std::size_t size() const { return last - first + 1; }
 };
 
+/// In the folder of results, while a run with --map-memory lasts.
+inline constexpr const char* kTileFolder = "map_tiles";
+
+/// The names that `dynains run` may use in its folder.
+const OutputKind& run_output_kind();
+
 struct RunOutputs {
   std::filesystem::path folder;
-  std::filesystem::path map;  ///< empty: no map
+  std::filesystem::path map;  ///< by whole_path(); empty: no map
   bool write_online = false;
   bool write_clean = false;
+  bool map_on_disk = false;
 
+  bool has_outside_map() const;
   /// The map relative to the folder if it lies there, so that the folder can be moved; else
   /// absolute. Empty if there is none.
   std::string map_name() const;
+  /// Files in the folder of a run over these scans; with map tiles while it lasts.
+  OutputListing listing(const Recording& recording, const ScanRange& range, bool lasts) const;
 };
+
+/// Opens a file for the map of these scans. Throws IoError.
+std::unique_ptr<PointFileWriter> open_map(const std::filesystem::path& file,
+                                          const Recording& recording, const ScanRange& range);
 
 /// Counts of points by final label.
 struct LabelCounts {
@@ -54,8 +69,10 @@ struct LabelCounts {
 class RunResults {
  public:
   /// Opens all files, so that a folder that cannot be written is noticed before the work.
-  /// The recording outlives this. Throws IoError.
-  RunResults(const Recording& recording, const ScanRange& range, const RunOutputs& outputs);
+  /// `outside_map` is that of open_map(); if it is null, the map goes into `outputs.folder`. The
+  /// recording outlives this. Throws IoError.
+  RunResults(const Recording& recording, const ScanRange& range, const RunOutputs& outputs,
+             std::unique_ptr<PointFileWriter> outside_map = nullptr);
 
   /// The scan just pushed, which this keeps, and the verdict on it.
   void take_newest(RecordedScan scan, const ScanVerdict& verdict);
@@ -64,8 +81,9 @@ class RunResults {
   RecordedScan recycle();
 
   void add_map_point(const Eigen::Vector3d& point);
-  /// Puts the map and the dynamic points in place.
+  /// Puts all files in place, but for a map outside of the folder.
   void commit();
+  void commit_outside_map();
 
   std::size_t finished() const { return finished_; }
   std::uint64_t points() const { return points_; }
@@ -80,6 +98,7 @@ class RunResults {
   std::optional<CleanWriter> clean_scans_;
   PointFileWriter dynamic_points_;
   std::unique_ptr<PointFileWriter> map_;
+  bool map_is_outside_;
   std::deque<RecordedScan> open_scans_;  // oldest first
   std::vector<RecordedScan> spare_;
   std::size_t finished_ = 0;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "command.hpp"
+#include "dynains/errors.hpp"
 #include "dynains/io/folder_lock.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
@@ -38,25 +39,52 @@ simulation::Config make_config(const SimulateOptions& options) {
   return config;
 }
 
-OutputFiles files_of_a_simulation() {
-  OutputFiles files;
-  files.marker = "simulation.json";
-  files.files = {"poses.txt", "poses_true.txt", "times.txt", "calib.txt"};
-  files.folders = {"velodyne", "labels"};
-  files.extensions = {".bin", ".label"};
-  return files;
+const OutputKind& simulation_output_kind() {
+  static const OutputKind kind = {"simulate",
+                                  "simulation.json",
+                                  {"poses.txt", "poses_true.txt", "times.txt", "calib.txt"},
+                                  false,
+                                  {{"velodyne", {".bin"}}, {"labels", {".label"}}}};
+  return kind;
+}
+
+OutputListing listing_of(const simulation::Simulator& simulator) {
+  const simulation::Config& config = simulator.config();
+  OutputListing listing;
+  listing.files = {"poses.txt", "times.txt", "calib.txt"};
+  if (config.pose_noise_translation > 0 || config.pose_noise_rotation > 0) {
+    listing.files.insert("poses_true.txt");
+  }
+  listing.folders = {{"velodyne", ".bin"}, {"labels", ".label"}};
+  for (std::size_t i = 0; i < simulator.size(); ++i) {
+    listing.scans.insert(simulation::scan_name(i));
+  }
+  return listing;
 }
 
 /// What makes the same sequence again.
-std::string describe(const SimulateOptions& options, const simulation::Config& config) {
+nlohmann::ordered_json describe(const SimulateOptions& options, const simulation::Config& config,
+                                bool complete) {
   nlohmann::ordered_json json = {{"program", "dynains"},
                                  {"version", kVersionString},
+                                 {"command", simulation_output_kind().command},
+                                 {"complete", complete},
                                  {"scene", options.scene},
                                  {"sensor", options.sensor},
                                  {"labelling", options.labelling}};
   simulation::Config::visit(config,
                             [&](const auto& parameter) { json[parameter.name] = parameter.value; });
-  return to_text(json);
+  return json;
+}
+
+/// False if a signal came first.
+bool write_scans(simulation::Simulator& simulator, const std::filesystem::path& folder,
+                 bool quiet) {
+  Progress progress(simulator.size(), "scans", quiet);
+  return simulation::write_sequence(simulator, folder, [&](std::size_t done, std::size_t) {
+    progress.update(done);
+    return InterruptGuard::signal() == 0;
+  });
 }
 
 void simulate(const SimulateOptions& options) {
@@ -64,19 +92,25 @@ void simulate(const SimulateOptions& options) {
   simulation::Simulator simulator(config);
   create_folder(options.out);
   const FolderLock lock(options.out);
-  check_output_folder(options.out, files_of_a_simulation(), options.force);
-  clear_output_folder(options.out, files_of_a_simulation(), describe(options, config));
-  const InterruptGuard interrupt;
-  bool complete = false;
-  {
-    Progress progress(simulator.size(), "scans", options.quiet);
-    complete =
-        simulation::write_sequence(simulator, options.out, [&](std::size_t done, std::size_t) {
-          progress.update(done);
-          return InterruptGuard::signal() == 0;
-        });
+  OutputFolder out(Folder(options.out), simulation_output_kind());
+  if (out.has_results() && !options.force) {
+    throw IoError(out.path().string() +
+                  ": holds earlier results; choose another folder, or replace them by --force");
   }
-  if (!complete) throw Interrupted{InterruptGuard::signal()};
+  const OutputListing listing = listing_of(simulator);
+  out.check(listing, InputFiles());
+  const InterruptGuard interrupt;
+  const auto mode = out.has_results() ? OutputChange::Mode::kStaged : OutputChange::Mode::kInPlace;
+  OutputChange change(out, mode, describe(options, config, false), listing);
+  if (!write_scans(simulator, change.folder(), options.quiet)) {
+    if (change.is_staged()) {
+      std::cerr << "dynains: interrupted; the earlier results in " << out.path().string()
+                << " stay as they were" << std::endl;
+    }
+    throw Interrupted{InterruptGuard::signal()};
+  }
+  change.put_in_place();
+  change.finish(describe(options, config, true), listing);
   if (!options.quiet) std::cout << simulator.size() << " scans: " << options.out << std::endl;
 }
 
@@ -108,7 +142,9 @@ void add_simulate_command(CLI::App& app) {
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   options->flags.add_to(command, simulation::Config(), "Parameters");
   command.footer(
-      "The same flags give the same files. simulation.json keeps them; poses.txt is written last.");
+      "The same flags give the same files. simulation.json keeps them, and says \"complete\": "
+      "false until "
+      "the end.");
   command.callback([options] { simulate(*options); });
 }
 

@@ -27,6 +27,12 @@ void make_folder(const std::filesystem::path& folder) {
 
 }  // namespace
 
+std::string scan_name(std::size_t i) {
+  std::string name = std::to_string(i);
+  name.insert(0, name.size() < 6 ? 6 - name.size() : 0, '0');
+  return name;
+}
+
 bool write_sequence(Simulator& simulator, const std::filesystem::path& folder,
                     const std::function<bool(std::size_t, std::size_t)>& progress) {
   make_folder(folder / "velodyne");
@@ -37,8 +43,7 @@ bool write_sequence(Simulator& simulator, const std::filesystem::path& folder,
   std::vector<double> times;
   for (std::size_t i = 0; i < simulator.size(); ++i) {
     const SimulatedScan scan = simulator.scan(i);
-    std::string name = std::to_string(i);
-    name.insert(0, name.size() < 6 ? 6 - name.size() : 0, '0');
+    const std::string name = scan_name(i);
     write_scan(folder / "velodyne" / (name + ".bin"), scan.xyzi);
     write_labels(folder / "labels" / (name + ".label"), scan.labels);
     poses.push_back(Tr * scan.T_world_sensor_noisy * Tr_inverse);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynains/dyna_ins_remover.hpp"
+#include "dynains/io/atomic_file.hpp"
 #include "dynains/io/folder_lock.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
@@ -68,6 +69,7 @@ TEST_CASE("with --map-memory the map waits on the disk, and the results are the 
   // Tiles of a run that was killed do not get into the map of the next.
   nlohmann::json report = fixture.report();
   report["complete"] = false;
+  report["outputs"]["folders"]["map_tiles"] = ".tile";
   write_text(fixture.out + "/report.json", report.dump());
   {
     TiledStaticMap::Config config;
@@ -75,6 +77,9 @@ TEST_CASE("with --map-memory the map waits on the disk, and the results are the 
     const PointBuffer other{{1000.0F}, {1000.0F}, {1000.0F}};
     TiledStaticMap(config).insert(other, {}, Eigen::Isometry3d::Identity());
   }
+  // One that a power cut tore, and what a kill left of another.
+  write_text(fixture.out + "/map_tiles/0_0_0.tile", "");
+  write_text(fixture.out + "/map_tiles/.0_-1_0.tile.0123456789abcdef.tmp", "half");
   REQUIRE(fixture.run({"--map-memory", "0", "--level", "false", "--resume"}).code == 0);
   CHECK(count_entries(fixture.out) == 6);
   CHECK(read_text(fixture.out + "/static_map.ply") == map);
@@ -119,6 +124,12 @@ TEST_CASE("run writes labels, causes, map, moving points, report and timing, and
   }
   const nlohmann::json report = fixture.report();
   CHECK(report["program"] == "dynains");
+  CHECK(report["command"] == "run");
+  CHECK(report["outputs"]["files"] ==
+        nlohmann::json({"dynamic_points.ply", "static_map.ply", "timing.csv"}));
+  CHECK(report["outputs"]["folders"] ==
+        nlohmann::json({{"labels", ".label"}, {"causes", ".cause"}}));
+  CHECK(report["outputs"]["scans"].size() == 12);
   CHECK(report["complete"] == true);
   CHECK(report["first_scan"] == "000000");
   CHECK(report["last_scan"] == "000011");
@@ -288,6 +299,165 @@ TEST_CASE("A map elsewhere is replaced by --force only, and never a scan") {
   CHECK(never.code == 1);
   CHECK_THAT(never.err, ContainsSubstring("the scans are there"));
   CHECK_FALSE(fs::exists(among_scans));
+}
+
+TEST_CASE("A run never removes or replaces a file that it reads") {
+  const Fixture fixture;
+  REQUIRE(fixture.run({"--write-clean"}).code == 0);
+  const auto refusal = [&](const std::vector<std::string>& arguments) {
+    const Outcome refused = start(arguments);
+    CHECK(refused.code == 1);
+    CHECK(count_lines(refused.err) == 1);
+    return refused.err;
+  };
+  const std::string clean = fixture.out + "/clean";
+  const std::string poses = fixture.seq + "/poses.txt";
+  CHECK_THAT(refusal({"run", clean, "--poses", poses, "--out", fixture.out, "--force"}),
+             ContainsSubstring(clean + ": is read by this command, as " + clean));
+
+  // Through links: of the folder, of one scan, and of the poses.
+  const std::string link = fixture.folder / "link";
+  fs::create_directory_symlink(clean, link);
+  CHECK_THAT(refusal({"run", link, "--poses", poses, "--out", fixture.out, "--force"}),
+             ContainsSubstring(clean + ": is read by this command, as " + link));
+  const std::string scan = fixture.seq + "/velodyne/000003.bin";
+  const std::string real = fixture.folder / "real.ply";
+  fs::rename(scan, real);
+  fs::create_symlink(real, scan);
+  CHECK_THAT(
+      refusal({"run", fixture.seq, "--out", fixture.folder / "new", "--map", real, "--force"}),
+      ContainsSubstring(real + ": is read by this command, as " + scan));
+  fs::remove(scan);
+  fs::create_symlink(clean + "/000003.bin", scan);
+  CHECK_THAT(refusal({"run", fixture.seq, "--out", fixture.out, "--force"}),
+             ContainsSubstring(clean + "/000003.bin: is read by this command, as " + scan));
+  fs::remove(scan);
+  fs::rename(real, scan);
+  const std::string config = fixture.out + "/timing.csv";
+  write_text(config, "window = 4\n");
+  CHECK_THAT(refusal({"run", fixture.seq, "--out", fixture.out, "--force", "--config", config}),
+             ContainsSubstring("timing.csv: is read by this command"));
+  CHECK(fixture.report()["complete"] == true);
+  CHECK(count_entries(clean) == 12);
+}
+
+TEST_CASE("A folder with a report that run did not write belongs to somebody else") {
+  const Fixture fixture;
+  const std::string precious = fixture.out + "/labels/000000.label";
+  write_text(precious, "by hand");
+  for (const char* report : {"{}", R"({"program": "dynains", "complete": true})"}) {
+    write_text(fixture.out + "/report.json", report);
+    for (const char* flag : {"--force", "--resume", "--quiet"}) {
+      CAPTURE(report, flag);
+      const Outcome refused = fixture.run({flag});
+      CHECK(refused.code == 1);
+      CHECK_THAT(refused.err, ContainsSubstring("report.json: "));
+      CHECK(read_text(precious) == "by hand");
+    }
+  }
+}
+
+TEST_CASE("Two runs never write one map at a time") {
+  const Fixture fixture;
+  const std::string map = fixture.folder / "maps/map.ply";
+  fs::create_directories(fixture.folder / "maps");
+  {
+    AtomicFile other(map);
+    other.stream() << "of another run";
+    const Outcome refused = fixture.run({"--map", map});
+    CHECK(refused.code == 2);
+    CHECK_THAT(refused.err, ContainsSubstring(map + ": is being written by another run"));
+    CHECK(fs::is_empty(fixture.out));
+    other.commit();
+    CHECK(read_text(map) == "of another run");
+  }
+  {
+    const FolderLock other(fixture.folder / "maps");
+    const Outcome refused = fixture.run({"--map", map, "--force"});
+    CHECK(refused.code == 2);
+    CHECK_THAT(refused.err, ContainsSubstring("maps: is in use"));
+  }
+  CHECK(read_text(map) == "of another run");
+  CHECK(count_entries(fixture.folder / "maps") == 1);
+  const FolderLock beside(fixture.folder / "maps", FolderLock::Mode::kShared);
+  CHECK(fixture.run({"--map", map, "--force"}).code == 0);
+}
+
+TEST_CASE("Until the results of --force are complete, the earlier ones stay as they are") {
+  const Fixture fixture(200);
+  const std::string map = fixture.folder / "map.ply";
+  const std::vector<std::string> earlier_flags = {"--end", "9", "--map", map};
+  REQUIRE(fixture.run(earlier_flags).code == 0);
+  const auto contents = [&] {
+    std::vector<std::string> files = {read_text(map)};
+    for (const auto& entry : fs::recursive_directory_iterator(fixture.out)) {
+      if (entry.path().string().find(".dynains_staging") != std::string::npos) continue;
+      files.push_back(entry.path().string());
+      if (entry.is_regular_file()) files.push_back(read_text(entry.path()));
+    }
+    std::sort(files.begin(), files.end());
+    return files;
+  };
+  const std::vector<std::string> before = contents();
+  const std::string staging = fixture.out + "/.dynains_staging";
+  const auto end_by = [&](int signal) {
+    Process process({"run", fixture.seq, "--out", fixture.out, "--map", map, "--force"});
+    for (int i = 0; i < 10000 && !fs::exists(staging + "/labels/000000.label"); ++i) {
+      ::usleep(1000);
+    }
+    ::kill(process.id(), signal);
+    return process.wait();
+  };
+
+  const Outcome interrupted = end_by(SIGINT);
+  CHECK(interrupted.code == 130);
+  CHECK_THAT(interrupted.err, ContainsSubstring("interrupted; the earlier results in " +
+                                                fixture.out + " stay as they were"));
+  CHECK(contents() == before);
+  CHECK_FALSE(fs::exists(staging));
+  CHECK(count_entries(fixture.folder.path()) == 3);
+
+  // A run that was killed is resumed by its own flags; those of the earlier run find nothing to do.
+  CHECK(end_by(SIGKILL).code == 128 + SIGKILL);
+  CHECK(contents() == before);
+  CHECK(fs::exists(staging));
+  CHECK_THAT(fixture.run({"--map", map, "--window", "3", "--resume"}).err,
+             ContainsSubstring("results of other flags"));
+  REQUIRE(fixture.run({"--map", map, "--resume"}).code == 0);
+  CHECK(fixture.report()["scans"] == 200);
+  CHECK(fixture.labels() == 200);
+  CHECK_FALSE(fs::exists(staging));
+  CHECK(count_entries(fixture.folder.path()) == 3);
+  CHECK(end_by(SIGKILL).code == 128 + SIGKILL);
+  CHECK_THAT(fixture.run({"--map", map, "--resume"}).out, ContainsSubstring("complete already"));
+  CHECK_FALSE(fs::exists(staging));
+}
+
+TEST_CASE("A run that was killed while it replaced results is completed by --resume") {
+  const Fixture fixture;
+  REQUIRE(fixture.run({"--window", "5", "--write-online"}).code == 0);
+  const nlohmann::json earlier = fixture.report();
+  REQUIRE(fixture.run({"--force", "--end", "8"}).code == 0);
+  const nlohmann::json report = fixture.report();
+  const std::string map = read_text(fixture.out + "/static_map.ply");
+
+  // The marker has the new request and lists the earlier files, some of which are there.
+  nlohmann::json marker = report;
+  marker["complete"] = false;
+  marker["outputs"] = earlier["outputs"];
+  write_text(fixture.out + "/report.json", marker.dump());
+  fs::remove(fixture.out + "/static_map.ply");
+  write_text(fixture.out + "/online/000003.label", "earlier");
+  write_text(fixture.out + "/labels/000011.label", "earlier");
+  write_text(fixture.out + "/.dynains_staging/report.json", report.dump());
+  write_text(fixture.out + "/.dynains_staging/static_map.ply", map);
+  const Outcome resumed = fixture.run({"--resume", "--end", "8"});
+  CAPTURE(resumed.err);
+  REQUIRE(resumed.code == 0);
+  CHECK(read_text(fixture.out + "/static_map.ply") == map);
+  CHECK(fixture.labels() == 9);
+  CHECK(count_entries(fixture.out) == 6);
+  CHECK(fixture.report()["outputs"] == report["outputs"]);
 }
 
 TEST_CASE("Flag --resume completes the run that it was asked for, and no other") {
@@ -471,6 +641,7 @@ TEST_CASE("Wrong flags: exit code 2, one line, nothing written") {
       {{"--map", "a.las"}, "a.las: expected a name that ends in .ply or .pcd"},
       {{"--map", "a.ply", "--build-map", "false"}, "--map needs --build-map true"},
       {{"--map", fixture.out + "/dynamic_points.ply"}, "the moving points go there"},
+      {{"--map", fixture.out + "/clean/a.ply"}, "other results go into that folder"},
   };
   for (const Case& wrong : cases) {
     const Outcome outcome = fixture.run(wrong.flags);

@@ -36,20 +36,3 @@ TEST_CASE("timing.csv has a row for each scan") {
         "000007,120000,1.2500,0.5000,2.0000\n"
         "000008,0,0.0000,0.0000,0.0000\n");
 }
-
-TEST_CASE("The map of an earlier run is known from its report, if it lies beside") {
-  TemporaryFolder folder;
-  const auto left_by = [&](const std::string& report) {
-    write_text(folder / "report.json", report);
-    return earlier_map(folder.path());
-  };
-  CHECK(earlier_map(folder.path()).empty());
-  CHECK(left_by(to_text(unfinished_report("my_map.pcd"))) == "my_map.pcd");
-  CHECK(left_by(to_text(unfinished_report(""))).empty());
-  CHECK(left_by(to_text(unfinished_report("/elsewhere/map.pcd"))).empty());
-  CHECK(left_by(to_text(unfinished_report("../map.pcd"))).empty());
-  CHECK(left_by(to_text(unfinished_report("notes.txt"))).empty());
-  CHECK(left_by("{").empty());
-  CHECK(left_by("[1]").empty());
-  CHECK(left_by("{\"static_map\": {\"file\": 3}}").empty());
-}

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <nlohmann/json.hpp>
 
 #include "dynains/io/folder_lock.hpp"
@@ -84,11 +85,46 @@ TEST_CASE("simulate replaces its own work by --force, and nobody else's") {
   REQUIRE(simulate(out, {"--scans", "2", "--force"}).code == 0);
   CHECK(KittiSequence(out).size() == 2);
 
+  CHECK_FALSE(fs::exists(out + "/.dynains_staging"));
+
+  // Not even by a marker that lists nothing, or by that of a run.
+  REQUIRE(start({"run", out, "--out", folder / "run"}).code == 0);
+  for (const std::string& marker : {std::string("{}"), read_text(folder / "run/report.json")}) {
+    write_text(out + "/simulation.json", marker);
+    const Outcome refused = simulate(out, {"--scans", "1", "--force"});
+    CHECK(refused.code == 1);
+    CHECK_THAT(refused.err, ContainsSubstring("simulation.json: was not written by dynains sim"));
+    CHECK(KittiSequence(out).size() == 2);
+  }
   fs::remove(out + "/simulation.json");
   const Outcome refused = simulate(out, {"--scans", "1", "--force"});
   CHECK(refused.code == 1);
   CHECK_THAT(refused.err, ContainsSubstring("no simulation.json"));
   CHECK(KittiSequence(out).size() == 2);
+}
+
+TEST_CASE("Until a simulation by --force is complete, the earlier one stays as it is") {
+  TemporaryFolder folder;
+  const std::string out = folder / "sim";
+  REQUIRE(simulate(out, {"--scans", "3"}).code == 0);
+  const std::string staging = out + "/.dynains_staging";
+  for (const int signal : {SIGINT, SIGKILL}) {
+    Process process({"simulate", out, "--sensor", "vlp16", "--scans", "1000", "--force"});
+    for (int i = 0; i < 10000 && !fs::exists(staging + "/labels/000000.label"); ++i) {
+      ::usleep(1000);
+    }
+    ::kill(process.id(), signal);
+    const Outcome outcome = process.wait();
+    CHECK(outcome.code == 128 + signal);
+    CHECK(KittiSequence(out).size() == 3);
+    CHECK(fs::exists(staging) == (signal == SIGKILL));
+  }
+  const auto marker = [&] { return nlohmann::json::parse(read_text(out + "/simulation.json")); };
+  CHECK(marker()["complete"] == true);
+  REQUIRE(simulate(out, {"--scans", "2", "--force"}).code == 0);
+  CHECK(KittiSequence(out).size() == 2);
+  CHECK(marker()["outputs"]["scans"] == nlohmann::json({"000000", "000001"}));
+  CHECK_FALSE(fs::exists(staging));
 }
 
 TEST_CASE("simulate refuses a folder that another run writes to") {

@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <functional>
 #include <stdexcept>
 #include <string>
@@ -37,6 +38,8 @@ class Process {
     if (id_ > 0) return;
     redirect(out, STDOUT_FILENO);
     redirect(err, STDERR_FILENO);
+    // A script that starts tests by `&` makes them ignore Ctrl-C.
+    for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
     prepare();
     ::execv(DYNAINS_PROGRAM, argv.data());
     ::_exit(127);

@@ -83,6 +83,35 @@ diff -r "$work/expected/labels" "$work/expected_tiles/labels" ||
   fail "labels depend on where the map is"
 kill_runs "$((kills / 4))" "$work/expected_tiles" --map-memory 0
 
+echo "--- kill -9 of --force: the earlier results, whole, or unfinished ones that --resume completes"
+"$program" run "$seq" --out "$work/earlier" --end 9 --write-online --quiet
+kept=0
+for ((i = 0; i < kills; ++i)); do
+  rm -rf "$work/out"
+  cp -r "$work/earlier" "$work/out"
+  "$program" run "$seq" --out "$work/out" --force --quiet &
+  pid=$!
+  # One of three at any time, the others near the end, where the new files replace the earlier ones.
+  delay=$(((RANDOM * 32768 + RANDOM) % span))
+  ((i % 3 == 0)) || delay=$((span - delay / 8))
+  sleep "$((delay / 1000000)).$(printf %06d $((delay % 1000000)))"
+  kill -9 "$pid" 2>/dev/null || true
+  wait "$pid" 2>/dev/null || true
+  if complete "$work/out" && [[ -d $work/out/online ]]; then
+    kept=$((kept + 1))
+    diff -r -x .dynains_staging "$work/earlier" "$work/out" || fail "kill $i of --force: changed"
+    "$program" run "$seq" --out "$work/out" --end 9 --write-online --resume --quiet ||
+      fail "kill $i of --force: earlier results are not complete"
+    [[ ! -e $work/out/.dynains_staging ]] || fail "kill $i of --force: staging folder remains"
+    continue
+  fi
+  "$program" run "$seq" --out "$work/out" --resume --quiet || fail "kill $i of --force: --resume"
+  same "$work/expected" "$work/out" || fail "kill $i of --force: other bytes after --resume"
+  [[ -z $(find "$work/out" -name '.*.tmp' -o -name '.dynains_staging' -o -name online) ]] ||
+    fail "kill $i of --force: leftovers after --resume"
+done
+echo "$kept of them left the earlier results"
+
 echo "--- --resume after Ctrl-C; with other flags; when complete; --force after a kill"
 # On a busy machine a run may be over before the signal reaches it: such a one says nothing and is
 # done again. A program that does not hear the signal is over first every time.

@@ -82,6 +82,9 @@ class Recording {
   const std::filesystem::path& folder() const { return folder_; }
   /// The one that holds the scans: folder() or one below it.
   const std::filesystem::path& scan_folder() const { return scan_folder_; }
+  /// Every file of the recording: scans, also those without a pose, poses, times, calibration and
+  /// files of labels.
+  std::vector<std::filesystem::path> files() const;
   std::size_t size() const { return scans_.size(); }
   ScanFormat format() const { return format_; }
   PointFrame frame() const { return frame_; }
@@ -95,6 +98,7 @@ class Recording {
 
   /// Name of the file of scan i without extension.
   const std::string& name(std::size_t i) const { return scans_.at(i).name; }
+  const std::filesystem::path& file(std::size_t i) const { return scans_.at(i).file; }
   /// The name, if the names of all scans are numbers; otherwise the place in the recording.
   std::uint64_t number(std::size_t i) const { return scans_.at(i).number; }
   /// Seconds, strictly increasing.
@@ -167,6 +171,7 @@ class Recording {
   Trajectory trajectory_;
   std::vector<std::optional<TrajectoryMatch>> matches_;  ///< per scan file
   std::vector<Scan> scans_;
+  std::vector<std::filesystem::path> files_;  ///< but for labels
   std::vector<std::string> notes_;
 };
 

@@ -4,10 +4,14 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <string>
 
 #include "dynains/simulation/simulator.hpp"
 
 namespace dynains::simulation {
+
+/// Name of the files of scan i without extension, at least six digits.
+std::string scan_name(std::size_t i);
 
 /// Writes velodyne/, labels/, calib.txt, times.txt and, last, poses.txt, so that a folder with
 /// poses is complete. poses.txt holds the noisy poses in camera axes (Tr in calib.txt, as in

@@ -1,0 +1,26 @@
+// Files and folders that a command reads, so that it never changes them.
+#pragma once
+
+#include <filesystem>
+#include <map>
+
+#include "folder.hpp"
+
+namespace dynains::program {
+
+class InputFiles {
+ public:
+  /// A file, or a folder whose list of entries is read. A path that leads nowhere is left out.
+  void add(const std::filesystem::path& path) {
+    if (const auto identity = identity_of(path)) paths_.emplace(*identity, path);
+  }
+
+  /// Throws IoError that names both paths if `output`, the file or folder with this identity, is
+  /// read.
+  void refuse(const FileIdentity& identity, const std::filesystem::path& output) const;
+
+ private:
+  std::map<FileIdentity, std::filesystem::path> paths_;
+};
+
+}  // namespace dynains::program

@@ -1,0 +1,179 @@
+#include "run_plan.hpp"
+
+#include <utility>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/atomic_file.hpp"
+#include "dynains/io/kitti.hpp"
+#include "dynains/io/point_file.hpp"
+#include "dynains/pose.hpp"
+#include "naming_scan.hpp"
+#include "run_request.hpp"
+
+namespace dynains::program {
+namespace {
+
+namespace fs = std::filesystem;
+
+nlohmann::ordered_json parameters_of(const DynaInsRemover::Config& config) {
+  nlohmann::ordered_json json;
+  DynaInsRemover::Config::visit(
+      config, [&](const auto& parameter) { json[parameter.name] = parameter.value; });
+  return json;
+}
+
+ScanRange select_scans(const Recording& sequence, const ScanWindow& window) {
+  const auto number = [&](std::size_t i) { return sequence.number(i); };
+  ScanRange range{0, sequence.size() - 1};
+  while (range.first <= range.last && window.start && number(range.first) < *window.start) {
+    ++range.first;
+  }
+  while (range.last > range.first && window.end && number(range.last) > *window.end) --range.last;
+  const bool none = range.first > range.last || (window.end && number(range.last) > *window.end);
+  if (none) {
+    throw ConfigError("--start and --end leave no scan of " + sequence.name(0) + " to " +
+                      sequence.name(sequence.size() - 1));
+  }
+  return range;
+}
+
+/// So that a broken file or pose is noticed before anything is written.
+void check_scans(const Recording& sequence, const ScanRange& range) {
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    sequence.check_scan(i);
+    naming_scan(sequence, i, [&] { validate_pose("T_world_sensor", sequence.T_world_sensor(i)); });
+  }
+}
+
+/// Where the map goes; empty if there is none. Throws ConfigError.
+fs::path choose_map(const RunOptions& options, const DynaInsRemover::Config& config) {
+  const fs::path out = whole_path(options.out);
+  if (options.map.empty()) return config.build_map ? out / "static_map.ply" : fs::path();
+  if (!config.build_map) throw ConfigError("--map needs --build-map true");
+  const fs::path map = whole_path(options.map);
+  if (!is_point_file(options.map) || !is_point_file(map)) {
+    throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
+  }
+  if (map == out / "dynamic_points.ply") {
+    throw ConfigError("--map " + options.map + ": the moving points go there");
+  }
+  const bool is_beside_results =
+      map.parent_path().parent_path() == out &&
+      (run_output_kind().folders.count(map.parent_path().filename().string()) > 0 ||
+       map.parent_path().filename() == kStagingFolder);
+  if (is_beside_results) {
+    throw ConfigError("--map " + options.map + ": other results go into that folder");
+  }
+  return map;
+}
+
+InputFiles inputs_of(const RunOptions& options, const Recording& sequence) {
+  InputFiles inputs;
+  for (const fs::path& file : sequence.files()) inputs.add(file);
+  inputs.add(sequence.scan_folder());
+  inputs.add(sequence.folder() / "labels");
+  if (!options.remover.config_file().empty()) inputs.add(options.remover.config_file());
+  return inputs;
+}
+
+/// Whether every file of complete results is still there.
+bool is_whole(const RunPlan& plan, const OutputFolder& out) {
+  const RunOutputs& outputs = plan.outputs;
+  if (outputs.has_outside_map() && !fs::exists(outputs.map)) return false;
+  const OutputListing listing = outputs.listing(plan.sequence, plan.range, false);
+  for (const std::string& name : listing.files) {
+    if (!out.folder().find(name)) return false;
+  }
+  for (const auto& [name, extension] : listing.folders) {
+    if (!out.folder().find(name)) return false;
+    const Folder folder(out.folder(), name);
+    for (const std::string& scan : listing.scans) {
+      if (!folder.find(scan + extension)) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+RunPlan make_plan(const RunOptions& options) {
+  const DynaInsRemover::Config config = options.remover.config();
+  RunOutputs outputs;
+  outputs.folder = options.out;
+  outputs.map = choose_map(options, config);
+  outputs.write_online = options.write_online;
+  outputs.write_clean = options.write_clean;
+  outputs.map_on_disk = options.map_memory.has_value();
+  std::optional<RemoverWithMapOnDisk::Config> map_on_disk;
+  if (options.map_memory) {
+    if (!config.build_map) throw ConfigError("--map-memory needs --build-map true");
+    map_on_disk = with_map_on_disk(config, outputs.folder / kTileFolder, *options.map_memory);
+  }
+  Recording sequence = options.sequence.open();
+  const ScanRange range = select_scans(sequence, options.window);
+  check_scans(sequence, range);
+  const nlohmann::ordered_json configuration = parameters_of(config);
+  const nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);
+  OutputListing listing = outputs.listing(sequence, range, true);
+  InputFiles inputs = inputs_of(options, sequence);
+  return {config,  map_on_disk,        std::move(sequence), range,
+          outputs, std::move(listing), std::move(inputs),   configuration,
+          request};
+}
+
+RunTask choose_task(const RunPlan& plan, const RunOptions& options, const OutputFolder& out) {
+  if (!out.has_results()) return RunTask::kWrite;
+  if (options.force) return RunTask::kReplace;
+  if (!options.resume) {
+    throw IoError(out.path().string() +
+                  ": holds earlier results; choose another folder, or replace them by --force");
+  }
+  const std::string differing = request_differences(out.marker(), plan.request);
+  if (differing.empty()) {
+    return out.is_complete() && is_whole(plan, out) ? RunTask::kNothing : RunTask::kWrite;
+  }
+  const bool was_replacing = out.staging() != nullptr &&
+                             request_differences(out.staging()->marker(), plan.request).empty();
+  if (was_replacing) return RunTask::kReplace;
+  throw IoError(out.path().string() +
+                ": holds results of other flags, scans, poses or another version, which cannot be "
+                "resumed (" +
+                differing + "); choose another folder, or replace them by --force");
+}
+
+void check_space(const RunPlan& plan) {
+  if (plan.sequence.format() != ScanFormat::kBin) return;
+  const std::uint64_t bytes_per_point = 5 + (plan.outputs.write_online ? 4 : 0);
+  std::uint64_t needed = 0;
+  for (std::size_t i = plan.range.first; i <= plan.range.last; ++i) {
+    needed += bytes_per_point * count_scan_points(plan.sequence.file(i));
+  }
+  std::error_code error;
+  const fs::space_info space = fs::space(plan.outputs.folder, error);
+  if (error || needed <= space.available) return;
+  throw IoError(plan.outputs.folder.string() + ": No space left: labels take " +
+                std::to_string(needed) + " bytes, " + std::to_string(space.available) +
+                " are free; earlier results stay until the new ones are complete");
+}
+
+OutsideMap::OutsideMap(const RunPlan& plan, bool may_replace) {
+  if (!plan.outputs.has_outside_map()) return;
+  const fs::path& map = plan.outputs.map;
+  const fs::path folder = map.parent_path();
+  if (const auto identity = identity_of(map)) plan.inputs.refuse(*identity, map);
+  if (identity_of(folder) == identity_of(plan.sequence.scan_folder())) {
+    throw IoError(map.string() + ": the scans are there; choose another folder for --map");
+  }
+  if (fs::exists(fs::symlink_status(map)) && !may_replace) {
+    throw IoError(map.string() +
+                  ": exists; choose another name for --map, or replace it by "
+                  "--force");
+  }
+  writer_ = open_map(map, plan.sequence, plan.range);
+  lock_.emplace(folder, FolderLock::Mode::kShared);
+  const std::size_t writers = remove_leftovers(
+      folder, [&](const std::string& name) { return name == map.filename().string(); });
+  if (writers > 1) throw UsageError(map.string() + ": is being written by another run");
+}
+
+}  // namespace dynains::program

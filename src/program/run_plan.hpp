@@ -1,0 +1,84 @@
+// Everything about a run that is known before anything is written.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "dynains/io/folder_lock.hpp"
+#include "dynains/io/recording.hpp"
+#include "input_files.hpp"
+#include "labelled_sequence.hpp"
+#include "map_on_disk.hpp"
+#include "output_folder.hpp"
+#include "recording_options.hpp"
+#include "remover_options.hpp"
+#include "run_results.hpp"
+
+namespace dynains::program {
+
+/// Flags of `dynains run`.
+struct RunOptions {
+  explicit RunOptions(CLI::App& command)
+      : sequence(command, "recording"), remover(command, "default") {}
+
+  RecordingFlags sequence;
+  std::string out;
+  std::string map;
+  std::optional<double> map_memory;  // MB
+  ScanWindow window;
+  bool write_online = false;
+  bool write_clean = false;
+  bool force = false;
+  bool resume = false;
+  bool quiet = false;
+  RemoverOptions remover;
+};
+
+struct RunPlan {
+  DynaInsRemover::Config config;
+  std::optional<RemoverWithMapOnDisk::Config> map_on_disk;  ///< its folder is not known yet
+  Recording sequence;
+  ScanRange range;
+  RunOutputs outputs;
+  OutputListing listing;  ///< while the run lasts
+  InputFiles inputs;
+  nlohmann::ordered_json configuration;  ///< parameter name -> value
+  nlohmann::ordered_json request;        ///< see describe_request()
+};
+
+/// Opens the recording and checks everything but the points. Throws ConfigError, IoError,
+/// PoseError.
+RunPlan make_plan(const RunOptions& options);
+
+/// What is to be done with a folder of results.
+enum class RunTask { kNothing, kWrite, kReplace };
+
+/// kNothing if the folder holds the complete results of this run already, and --resume is given;
+/// kReplace if it holds results that stay until new ones are complete. Throws IoError if it holds
+/// results that the flags do not allow to change.
+RunTask choose_task(const RunPlan& plan, const RunOptions& options, const OutputFolder& out);
+
+/// Throws IoError if the free space cannot hold even labels and causes of the scans. Points of
+/// .pcd and .ply scans are not counted.
+void check_space(const RunPlan& plan);
+
+/// The file of a map outside of the folder of results, opened before anything is changed. Nobody
+/// else writes it, and no other run has its folder as a folder of results, while this lives.
+class OutsideMap {
+ public:
+  /// Throws IoError if the map cannot be written or is in the way, UsageError if another run writes
+  /// it or has its folder.
+  OutsideMap(const RunPlan& plan, bool may_replace);
+
+  std::unique_ptr<PointFileWriter> take_writer() { return std::move(writer_); }
+
+ private:
+  std::optional<FolderLock> lock_;
+  std::unique_ptr<PointFileWriter> writer_;
+};
+
+}  // namespace dynains::program
