@@ -86,14 +86,18 @@ kill_runs "$((kills / 4))" "$work/expected_tiles" --map-memory 0
 echo "--- kill -9 of --force: the earlier results, whole, or unfinished ones that --resume completes"
 "$program" run "$seq" --out "$work/earlier" --end 9 --write-online --quiet
 kept=0
+broken=0
 for ((i = 0; i < kills; ++i)); do
   rm -rf "$work/out"
   cp -r "$work/earlier" "$work/out"
   "$program" run "$seq" --out "$work/out" --force --quiet &
   pid=$!
-  # One of three at any time, the others near the end, where the new files replace the earlier ones.
+  # One of three at any time, the others while the new files replace the earlier ones.
   delay=$(((RANDOM * 32768 + RANDOM) % span))
-  ((i % 3 == 0)) || delay=$((span - delay / 8))
+  if ((i % 3 > 0)); then
+    while complete "$work/out" && kill -0 "$pid" 2>/dev/null; do :; done
+    delay=$((RANDOM % 10000))
+  fi
   sleep "$((delay / 1000000)).$(printf %06d $((delay % 1000000)))"
   kill -9 "$pid" 2>/dev/null || true
   wait "$pid" 2>/dev/null || true
@@ -105,12 +109,14 @@ for ((i = 0; i < kills; ++i)); do
     [[ ! -e $work/out/.dynains_staging ]] || fail "kill $i of --force: staging folder remains"
     continue
   fi
+  complete "$work/out" || broken=$((broken + 1))
   "$program" run "$seq" --out "$work/out" --resume --quiet || fail "kill $i of --force: --resume"
   same "$work/expected" "$work/out" || fail "kill $i of --force: other bytes after --resume"
   [[ -z $(find "$work/out" -name '.*.tmp' -o -name '.dynains_staging' -o -name online) ]] ||
     fail "kill $i of --force: leftovers after --resume"
 done
-echo "$kept of them left the earlier results"
+echo "$kept of them left the earlier results, $broken unfinished ones"
+((kept > 0 && broken > 0)) || fail "no kill of --force hit both"
 
 echo "--- --resume after Ctrl-C; with other flags; when complete; --force after a kill"
 # On a busy machine a run may be over before the signal reaches it: such a one says nothing and is
