@@ -8,9 +8,11 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <string>
 #include <type_traits>
 #include <vector>
 
+#include "dynains/errors.hpp"
 #include "dynains/points.hpp"
 
 namespace dynains {
@@ -36,7 +38,14 @@ RawPoints(const Scalar*, std::size_t) -> RawPoints<Scalar>;
 
 template <class Scalar>
 struct PointCloudTraits<RawPoints<Scalar>> {
-  static std::size_t size(const RawPoints<Scalar>& cloud) { return cloud.count; }
+  /// Throws CloudError.
+  static std::size_t size(const RawPoints<Scalar>& cloud) {
+    if (cloud.stride < 3) {
+      throw CloudError("RawPoints.stride = " + std::to_string(cloud.stride) +
+                       " must be at least 3 scalars");
+    }
+    return cloud.count;
+  }
   static Eigen::Vector3f point(const RawPoints<Scalar>& cloud, std::size_t i) {
     const Scalar* const p = cloud.data + i * cloud.stride;
     return {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
@@ -45,7 +54,15 @@ struct PointCloudTraits<RawPoints<Scalar>> {
 
 template <>
 struct PointCloudTraits<PointsView> {
-  static std::size_t size(const PointsView& cloud) { return cloud.size(); }
+  /// Throws CloudError.
+  static std::size_t size(const PointsView& cloud) {
+    if (cloud.y.size() != cloud.x.size() || cloud.z.size() != cloud.x.size()) {
+      throw CloudError("PointsView has " + std::to_string(cloud.x.size()) + " x, " +
+                       std::to_string(cloud.y.size()) + " y and " + std::to_string(cloud.z.size()) +
+                       " z; expected equal numbers");
+    }
+    return cloud.size();
+  }
   static Eigen::Vector3f point(const PointsView& cloud, std::size_t i) {
     return {cloud.x[i], cloud.y[i], cloud.z[i]};
   }

@@ -237,9 +237,7 @@ std::string to_csv(const Evaluation& evaluation) {
           "dynamic_voxels_preserved,static_points,static_points_kept,dynamic_points,"
           "dynamic_points_removed\n";
   for (const EvaluationRow& row : evaluation.rows) {
-    std::string quoted;
-    for (const char c : row.name) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-    text << '"' << quoted << '"';
+    text << csv_field(row.name);
     for (const double value :
          {row.voxels.preservation_rate(), row.voxels.rejection_rate(), row.voxels.f1(),
           row.points.static_accuracy(), row.points.dynamic_accuracy(),

@@ -38,6 +38,13 @@ std::string TextTable::to_string() const {
   return text.str();
 }
 
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + '"';
+}
+
 std::string format_number(double value, int decimals, const char* missing) {
   if (!std::isfinite(value)) return missing;
   std::ostringstream text;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <map>
 #include <sstream>
 #include <string_view>
 #include <system_error>
@@ -173,6 +174,7 @@ void Recording::list_scans() {
     scans_.back().file = file;
     scans_.back().name = file.stem().string();
   }
+  check_names();
   numbered_ = std::all_of(scans_.begin(), scans_.end(), [](const Scan& scan) {
     return scan.name.size() <= 9 && std::all_of(scan.name.begin(), scan.name.end(), is_digit);
   });
@@ -182,6 +184,18 @@ void Recording::list_scans() {
       fail(scan_folder_,
            "two scans with one number: " + scans_[i - 1].name + " and " + scans_[i].name);
     }
+  }
+}
+
+/// Results of a scan are named like the scan, so no two scans may have one name.
+void Recording::check_names() const {
+  std::map<std::string, fs::path> files;
+  for (const Scan& scan : scans_) {
+    const auto [other, is_new] = files.emplace(scan.name, scan.file);
+    if (is_new) continue;
+    fail(scan_folder_, "expected scans of different names, found " +
+                           other->second.filename().string() + " and " +
+                           scan.file.filename().string());
   }
 }
 

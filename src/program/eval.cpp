@@ -27,6 +27,7 @@ struct EvalOptions {
   EvaluationOptions evaluation;
   bool online = false;
   bool errors = false;
+  bool unfinished = false;
   std::string json;
   std::string csv;
 };
@@ -43,6 +44,7 @@ void eval(const EvalOptions& options) {
   std::vector<RunLabels> runs;
   std::vector<std::string> names;
   for (const std::string& folder : options.runs) {
+    if (!options.unfinished) require_complete(folder);
     runs.push_back({folder, options.online ? "online" : "labels"});
     names.push_back(options.runs.size() > 1 ? folder : options.online ? "online" : "run");
   }
@@ -86,6 +88,7 @@ void add_eval_command(CLI::App& program) {
   command.add_flag("--online", options->online, "judge the zero-latency labels, OUT/online");
   command.add_flag("--errors", options->errors,
                    "also tell where the first run went wrong: by class, instance, range and cause");
+  command.add_flag("--unfinished", options->unfinished, "also score runs that are not complete");
   command.add_option("--json", options->json, "write everything to this file, errors included");
   command.add_option("--csv", options->csv, "write the table to this file");
   command.callback([options] { eval(*options); });

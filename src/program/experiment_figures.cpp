@@ -49,7 +49,10 @@ VerdictCloud collect(const FiguresOptions& options) {
   VerdictCloud cloud(options.resolution, config.min_range, max_range, config.truth);
 
   std::vector<RunLabels> runs;
-  if (!options.run.empty()) runs.push_back({options.run});
+  if (!options.run.empty()) {
+    require_complete(options.run);
+    runs.push_back({options.run});
+  }
   LabelledSequence sequence(options.sequence.open(), options.window, runs);
   VariantVerdicts verdicts;
   evaluation::ScanSource source = [&](std::size_t i, evaluation::LabelledScan& scan) {

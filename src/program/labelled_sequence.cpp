@@ -6,6 +6,7 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
+#include "json_file.hpp"
 
 namespace dynains::program {
 namespace fs = std::filesystem;
@@ -34,6 +35,15 @@ LabelledSequence::LabelledSequence(Recording recording, const ScanWindow& window
                          : (runs_.front().folder / runs_.front().kind).string() +
                                ": no labels for any scan of " + folder.string());
   }
+}
+
+void require_complete(const fs::path& run) {
+  const fs::path report = run / "report.json";
+  if (!fs::exists(report)) return;
+  if (json_field<bool>(report, read_json_file(report), "/complete").value_or(false)) return;
+  throw IoError(report.string() +
+                ": the run is not complete; finish it by dynains run --resume, or score the scans "
+                "that are there by --unfinished");
 }
 
 bool LabelledSequence::every_run_has(std::size_t index) const {

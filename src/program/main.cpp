@@ -11,6 +11,7 @@
 #include "dynains/version.hpp"
 #include "eval.hpp"
 #include "experiment.hpp"
+#include "printable.hpp"
 #include "unknown_command.hpp"
 
 namespace {
@@ -34,8 +35,25 @@ bool reader_has_left() {
   return ::poll(&output, 1, 0) > 0 && (output.revents & POLLERR) != 0;
 }
 
-int fail(int code, const char* what) {
-  std::cerr << "dynains: error: " << what << '\n';
+/// Throws IoError if standard output cannot take all that was printed.
+void flush_output() {
+  if (!std::cout.flush() && !reader_has_left()) {
+    throw dynains::IoError("standard output: cannot be written");
+  }
+}
+
+int fail(int code, const std::string& what) {
+  std::cerr << "dynains: error: " << on_one_line(what) << '\n';
+  return code;
+}
+
+int print_help(const CLI::App& app, const CLI::Success& success) {
+  const int code = app.exit(success);
+  try {
+    flush_output();
+  } catch (const dynains::IoError& error) {
+    return fail(kExitFailure, error.what());
+  }
   return code;
 }
 
@@ -45,6 +63,8 @@ int main(int argc, char** argv) {
   open_standard_streams();
   // A closed pipe must not stop a run that writes files.
   std::signal(SIGPIPE, SIG_IGN);
+  const PrintableStream printable_output(std::cout);
+  const PrintableStream printable_errors(std::cerr);
 
   CLI::App app("Removes moving objects from LiDAR scans and maps, scan by scan.", "dynains");
   app.set_version_flag("--version", std::string("dynains ") + dynains::kVersionString);
@@ -60,17 +80,15 @@ int main(int argc, char** argv) {
 
   try {
     app.parse(argc, argv);
-    if (!std::cout.flush() && !reader_has_left()) {
-      throw dynains::IoError("standard output: cannot be written");
-    }
+    flush_output();
     if (app.get_subcommands().empty()) {
       return fail(kExitUsage, "expected a command, for example run (see dynains --help)");
     }
   } catch (const CLI::Success& success) {
-    return app.exit(success);
+    return print_help(app, success);
   } catch (const CLI::ParseError& error) {
     const std::string what = remark_on_unknown_command(app).value_or(error.what());
-    return fail(kExitUsage, (what + " (see dynains --help)").c_str());
+    return fail(kExitUsage, what + " (see dynains --help)");
   } catch (const dynains::ConfigError& error) {
     return fail(kExitUsage, error.what());
   } catch (const dynains::UsageError& error) {

@@ -92,6 +92,10 @@ ParameterValues read_config_file(const std::filesystem::path& path) {
   std::size_t number = 0;
   for (std::string line; std::getline(file, line);) {
     ++number;
+    if (line.find('\0') != std::string::npos) {
+      throw ConfigError(path.string() + ":" + std::to_string(number) +
+                        ": expected a line of text, found a NUL byte");
+    }
     line = trim(line.substr(0, line.find('#')));
     if (line.empty()) continue;
     const std::string where = path.string() + ":" + std::to_string(number) + ": ";

@@ -15,7 +15,7 @@ Progress::Progress(std::size_t total, std::string unit, bool quiet)
                                             : Style::kLines) {}
 
 Progress::~Progress() {
-  if (drawn_) std::cerr << std::endl;
+  if (drawn_) std::clog << std::endl;
 }
 
 void Progress::update(std::size_t done) {
@@ -36,7 +36,8 @@ void Progress::draw_bar(std::size_t done) {
   drawn_ = true;
   constexpr std::size_t kWidth = 40;
   const std::size_t filled = total_ == 0 ? kWidth : done * kWidth / total_;
-  std::cerr << "\r[" << std::string(filled, '#') << std::string(kWidth - filled, ' ') << "] "
+  // The bar needs carriage returns, which the filter of std::cerr escapes.
+  std::clog << "\r[" << std::string(filled, '#') << std::string(kWidth - filled, ' ') << "] "
             << done << " of " << total_ << ' ' << unit_ << std::flush;
 }
 

@@ -8,6 +8,7 @@
 #include <iomanip>
 #include <locale>
 
+#include "dynains/evaluation/text_table.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/version.hpp"
 
@@ -103,7 +104,7 @@ void write_timing(const std::filesystem::path& path, const RunTiming& timing) {
   for (const std::string& stage : timing.stages) out << ',' << stage << "_ms";
   out << ",total_ms\n";
   for (const TimingRow& row : timing.rows) {
-    out << row.scan << ',' << row.points;
+    out << evaluation::csv_field(row.scan) << ',' << row.points;
     for (const double ms : row.stages) out << ',' << ms;
     out << ',' << row.total << '\n';
   }

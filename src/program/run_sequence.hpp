@@ -1,8 +1,10 @@
 // The loop of `dynains run`, over any remover.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
+#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -26,6 +28,18 @@ FrameResult push_scan(Remover& remover, const Recording& recording, std::size_t 
   });
 }
 
+/// The scan of median size among the first (`first`), the middle and the last of the range: one odd
+/// scan does not decide how much memory is reserved.
+inline RecordedScan typical_scan(const Recording& recording, const ScanRange& range,
+                                 const RecordedScan& first) {
+  RecordedScan scans[] = {first, recording.read_scan((range.first + range.last) / 2),
+                          recording.read_scan(range.last)};
+  std::nth_element(
+      std::begin(scans), scans + 1, std::end(scans),
+      [](const RecordedScan& a, const RecordedScan& b) { return a.size() < b.size(); });
+  return std::move(scans[1]);
+}
+
 /// Pushes the scans of `range` and hands every verdict to `results`; at the end the open ones and
 /// the map too. `keep_going(done)` is asked after each scan; if it says no, the scans so far are
 /// finished as if the sequence ended there.
@@ -44,8 +58,9 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
   for (std::size_t i = range.first; i <= range.last; ++i) {
     RecordedScan scan = scans.next(results.recycle());
     if (i == range.first) {
+      const RecordedScan example = typical_scan(recording, range, scan);
       const Clock::time_point begin = Clock::now();
-      remover.reserve_like(points_of(scan), range.last - range.first + 1);
+      remover.reserve_like(points_of(example), range.size());
       timing.reserve = ms_since(begin);
     }
     const Clock::time_point begin = Clock::now();

@@ -57,6 +57,24 @@ Eigen::Isometry3d broken(const std::function<void(Eigen::Matrix4d&)>& damage) {
   return T;
 }
 
+TEST_CASE("A cloud whose arrays do not fit together is refused, and the state stays") {
+  DynaInsRemover remover;
+  const std::vector<float> values(30, 1.0F);
+  const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  for (const std::size_t stride : {0, 1, 2}) {
+    const RawPoints<float> cloud{values.data(), 10, stride};
+    CHECK_THROWS_AS(remover.push(cloud, pose), CloudError);
+  }
+  PointsView view;
+  view.x = {values.data(), 10};
+  view.y = {values.data(), 10};
+  view.z = {values.data(), 9};
+  CHECK_THROWS_AS(remover.push(view, pose), CloudError);
+  const auto frame = remover.push(RawPoints<float>{values.data(), 10, 3}, pose);
+  CHECK(frame.newest.scan == 0);
+  CHECK(frame.newest.labels.size() == 10);
+}
+
 TEST_CASE("a pose that is none is refused with its reason, and the state stays as it was") {
   struct Case {
     const char* reason;

@@ -225,6 +225,18 @@ TEST_CASE("eval says what is wrong with its input, and writes nothing then") {
   CHECK(fs::exists(json));
 }
 
+TEST_CASE("eval refuses a run that is not complete") {
+  const JudgedStreet street;
+  const auto& [folder, sequence, scans, run, json] = street;
+  test::write_text(run / "report.json", "{\"program\": \"dynains\", \"complete\": false}");
+  const std::string error = message_of(street.eval());
+  CHECK(error.rfind((run / "report.json").string(), 0) == 0);
+  CHECK(has(error, "--unfinished"));
+  CHECK(has(call(street.eval({"--unfinished"})), "oracle"));
+  test::write_text(run / "report.json", "{\"program\": \"dynains\", \"complete\": true}");
+  CHECK(has(call(street.eval()), "oracle"));
+}
+
 TEST_CASE("Causes beside the labels of a run are counted") {
   const TemporaryFolder folder;
   const auto scans = write_street(folder.path() / "street", 2);

@@ -290,3 +290,15 @@ TEST_CASE("Values that are not finite pass; labels of a column are read") {
   CHECK(recording.has_labels());
   CHECK(recording.read_labels(0) == std::vector<std::uint32_t>{252, 40});
 }
+
+TEST_CASE("Two scans with one name are refused") {
+  const TemporaryFolder folder;
+  const std::string pcd =
+      "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\n"
+      "VIEWPOINT 1 0 0 1 0 0 0\nPOINTS 1\nDATA ascii\n1 2 3\n";
+  for (const char* const name : {"a.pcd", "a.PCD", "b.pcd"}) write_text(folder / name, pcd);
+  const std::string error = message_of<IoError>([&] { Recording(folder.path()); });
+  CHECK(error.find("expected scans of different names, found ") != std::string::npos);
+  CHECK(error.find("a.pcd") != std::string::npos);
+  CHECK(error.find("a.PCD") != std::string::npos);
+}

@@ -748,6 +748,44 @@ TEST_CASE("Strange scans get labels like all others") {
   CHECK(fixture.report()["labels"]["invalid"] == 3);
 }
 
+TEST_CASE("One odd scan does not decide how much memory a run takes") {
+  const TemporaryFolder folder;
+  const std::filesystem::path scans = folder / "scans";
+  constexpr int kPoints = 1000000;
+  const std::string head =
+      "VERSION .7\nFIELDS x y z\nSIZE 1 1 1\nTYPE I I I\nCOUNT 1 1 1\nHEIGHT 1\n";
+  const auto size_lines = [](int points) {
+    return "WIDTH " + std::to_string(points) + "\nPOINTS " + std::to_string(points) + "\n";
+  };
+  // LZF: the byte 5, and then copies of 264 bytes from one byte before. 34 KB hold all points.
+  std::string lzf("\0\5", 2);
+  int made = 1;
+  for (; made + 264 <= 3 * kPoints; made += 264) lzf += std::string("\xE0\xFF\0", 3);
+  for (; made < 3 * kPoints; ++made) lzf += std::string("\0\5", 2);
+  std::string odd = head + size_lines(kPoints) + "DATA binary_compressed\n";
+  for (const std::uint32_t size : {static_cast<std::uint32_t>(lzf.size()), 3U * kPoints}) {
+    odd.append(reinterpret_cast<const char*>(&size), sizeof(size));
+  }
+  write_text(scans / "000000.pcd", odd + lzf);
+  std::string poses;
+  for (int i = 0; i < 40; ++i) {
+    poses += "1 0 0 0 0 1 0 0 0 0 1 0\n";
+    if (i == 0) continue;
+    std::string usual = head + size_lines(3000) + "DATA ascii\n";
+    for (int k = 0; k < 3000; ++k) {
+      usual += std::to_string(5 + k % 100) + ' ' + std::to_string(k / 100) + " -1\n";
+    }
+    write_text(scans / (scan_name(static_cast<std::size_t>(i)) + ".pcd"), usual);
+  }
+  write_text(scans / "poses.txt", poses);
+  const Outcome outcome = start({"run", scans, "--out", folder / "out", "-q"});
+  REQUIRE(outcome.code == 0);
+  const std::string report = read_text(folder / "out/report.json");
+  const std::size_t at = report.find("\"peak_memory_bytes\": ") + 21;
+  // The open scan itself, its file in memory, and what its verdict needs: 300 bytes a point.
+  CHECK(std::stoull(report.substr(at)) < 100'000'000U + 300U * kPoints);
+}
+
 TEST_CASE("Maps far from the origin lose nothing") {
   const Fixture near;
   const Fixture far;

@@ -35,4 +35,9 @@ TEST_CASE("timing.csv has a row for each scan") {
         "scan,points,ground_ms,map_ms,total_ms\n"
         "000007,120000,1.2500,0.5000,2.0000\n"
         "000008,0,0.0000,0.0000,0.0000\n");
+
+  timing.rows = {{"a,b\n\"c\"", 1, {0.0, 0.0}, 0.0}};
+  write_timing(folder / "timing.csv", timing);
+  CHECK(read_text(folder / "timing.csv").find("\n\"a,b\n\"\"c\"\"\",1,0.0000") !=
+        std::string::npos);
 }

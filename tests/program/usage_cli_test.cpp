@@ -1,3 +1,6 @@
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <string>
@@ -78,4 +81,39 @@ TEST_CASE("Results that cannot be shown are a failure, a reader who leaves is no
   CHECK(code_of(program + " > /dev/full") == 1);
   CHECK(code_of(program + " > /dev/null") == 0);
   CHECK(code_of("(sleep 0.2; " + program + ") | true") == 0);
+}
+
+TEST_CASE("Help that cannot be shown is a failure") {
+  const auto to_full = [] {
+    const int full = ::open("/dev/full", O_WRONLY);
+    ::dup2(full, STDOUT_FILENO);
+  };
+  for (const char* const flag : {"--help", "--version"}) {
+    const Outcome outcome = start({flag}, to_full);
+    CHECK(outcome.code == 1);
+    CHECK(outcome.err == "dynains: error: standard output: cannot be written\n");
+  }
+  CHECK(start({"run", "--help"}, to_full).code == 1);
+}
+
+TEST_CASE("File names cannot steer the terminal") {
+  const TemporaryFolder folder;
+  const std::string name =
+      "evil\x1b]0;title\x07\x1b[2J\nline\xc2\x9b"
+      "2J\xc3\xa4";
+  const Outcome outcome = start({"run", folder / name, "--out", folder / "out"});
+  CHECK(outcome.code == 1);
+  CHECK(outcome.err.find("evil\\x1B]0;title\\x07\\x1B[2J\\nline\\xC2\\x9B"
+                         "2J\xc3\xa4") != std::string::npos);
+  CHECK(outcome.err.find('\x1b') == std::string::npos);
+}
+
+TEST_CASE("A NUL byte in a config file is named with its line") {
+  const TemporaryFolder folder;
+  write_text(folder / "config", std::string("tau-s = 0.6\nmargin = 0.2\0 5\n", 28));
+  const Outcome outcome =
+      start({"run", folder / "seq", "--out", folder / "out", "--config", folder / "config"});
+  CHECK(outcome.code == 2);
+  CHECK(outcome.err == "dynains: error: " + (folder / "config").string() +
+                           ":2: expected a line of text, found a NUL byte\n");
 }

@@ -4,15 +4,20 @@
 #include <filesystem>
 #include <iostream>
 #include <optional>
+#include <stdexcept>
 #include <string>
 
 namespace dynains::test {
 
-/// Folder of a recording in DYNAINS_SHARED_DATA. Where it is missing, says so in the words by which
-/// ctest knows that a test was skipped: then nothing may have been checked, nor be checked later.
+/// Folder of a recording in DYNAINS_SHARED_DATA. If it is missing, prints the words by which CTest
+/// counts the test as skipped; the caller must check nothing then. Throws if the folder of
+/// recordings exists, or is required (DYNAINS_REQUIRE_SHARED_DATA), and lacks the recording.
 inline std::optional<std::filesystem::path> recording_or_skip(const std::string& name) {
   const std::filesystem::path folder = std::filesystem::path(DYNAINS_SHARED_DATA) / name;
   if (std::filesystem::is_directory(folder)) return folder;
+  if (DYNAINS_REQUIRE_SHARED_DATA || std::filesystem::exists(DYNAINS_SHARED_DATA)) {
+    throw std::runtime_error("expected a recording at " + folder.string());
+  }
   std::cout << "SKIPPED: no recording at " << folder << std::endl;
   return std::nullopt;
 }

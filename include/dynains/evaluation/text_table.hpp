@@ -23,6 +23,9 @@ class TextTable {
   std::vector<std::vector<std::string>> rows_;
 };
 
+/// A field of a CSV file (RFC 4180): in quotes if it holds a comma, a quote or a line break.
+std::string csv_field(const std::string& text);
+
 /// Fixed number of decimals; `missing` for a value that is not finite.
 std::string format_number(double value, int decimals, const char* missing = "-");
 

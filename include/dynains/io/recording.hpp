@@ -142,6 +142,7 @@ class Recording {
   enum class Labels { kNone, kFiles, kColumn };
 
   void list_scans();
+  void check_names() const;
   void read_poses();
   void read_viewpoints();
   void read_calibration(const std::filesystem::path& poses_file);
