@@ -1,16 +1,111 @@
 // All parameters of a remover: the facade's own and those of its stages.
 #pragma once
 
+#include <array>
 #include <string>
 #include <type_traits>
 
 #include "dynains/errors.hpp"
 #include "dynains/free_space_evidence.hpp"
 #include "dynains/map/map_revision.hpp"
-#include "dynains/pipeline/remover_config.hpp"
+#include "dynains/parameters.hpp"
 #include "dynains/stage/contracts.hpp"
 
 namespace dynains {
+
+/// Evidence by which points are called dynamic.
+enum class Decision {
+  kWindow,     ///< occupancy of clusters within a sliding window of scans: the paper, Eq. 3-19
+  kFreeSpace,  ///< beams of other scans that passed through the place of a point; beyond the paper
+  kBoth,       ///< dynamic is what either of them calls dynamic
+};
+
+constexpr std::array<const char*, 3> value_names(Decision) {
+  return {"window", "free_space", "both"};
+}
+
+/// Parameters of the facade itself. visit() describes them.
+struct RemoverConfig {
+  Decision decision = Decision::kFreeSpace;
+  int window = 4;          ///< scans, K of Eq. 3
+  bool use_belief = true;  ///< Eq. 13-19
+  int votes = 1;           ///< windows
+  double min_range = 2.7;  ///< m, sensor's x-y plane
+  double max_range = 250;  ///< m, sensor's x-y plane and z axis
+  double max_gap = 1.0;    ///< s
+  double max_speed = 100;  ///< m/s
+  bool level = true;
+  double mounting_pitch = 0.0;  ///< deg, nose down
+  double mounting_roll = 0.0;   ///< deg, left side up
+  bool build_map = true;
+
+  /// The paper's own verdict.
+  static RemoverConfig paper() {
+    RemoverConfig config;
+    config.decision = Decision::kWindow;
+    config.level = false;
+    return config;
+  }
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& visitor) {
+    visitor(Parameter{"decision", self.decision, Bounds(), "",
+                      "evidence by which points are called dynamic: occupancy of clusters within a "
+                      "sliding window of scans (the paper), free space that beams of other scans "
+                      "passed through, or either of both"});
+    visitor(Parameter{"window", self.window, closed(2, 64), "scans",
+                      "sliding window K (Eq. 3); without effect on decision = free_space"});
+    visitor(Parameter{"use_belief", self.use_belief, Bounds(), "",
+                      "revert proposals of the window by belief (Eq. 13-19); off is the paper's "
+                      "IOC-only row"});
+    visitor(Parameter{"votes", self.votes, closed(0, 64), "windows",
+                      "windows that must call a point dynamic for the final verdict; 0: the newest "
+                      "window alone decides, without latency"});
+    visitor(
+        Parameter{"min_range", self.min_range, closed(0, 100), "m",
+                  "nearer points (in the sensor's own x-y plane, tilted or not) are the robot's "
+                  "own and not judged"});
+    visitor(Parameter{"max_range", self.max_range, half_open_below(0, 10000), "m",
+                      "farther points (in the sensor's own x-y plane, or along its z axis) are not "
+                      "judged"});
+    visitor(Parameter{"max_gap", self.max_gap, half_open_below(0, 1e9), "s",
+                      "a longer pause between two scans starts a new epoch: scans before and after "
+                      "it are not compared"});
+    visitor(Parameter{"max_speed", self.max_speed, half_open_below(0, 1e9), "m/s",
+                      "a pose that is farther from the one before starts a new epoch"});
+    visitor(Parameter{"level", self.level, Bounds(), "",
+                      "turn scans level, and along the scene, before they are judged"});
+    visitor(Parameter{"mounting_pitch", self.mounting_pitch, closed(-180, 180), "deg",
+                      "tilt of the sensor about its y axis, nose down (x forward), before the "
+                      "roll; if pitch and roll are 0, the tilt is found in the first scan"});
+    visitor(Parameter{"mounting_roll", self.mounting_roll, closed(-180, 180), "deg",
+                      "tilt of the sensor about its x axis, left side up"});
+    visitor(Parameter{"build_map", self.build_map, Bounds(), "", "accumulate the static map"});
+  }
+
+  /// Whether windows of scans are compared (decision window or both).
+  bool uses_window() const { return decision != Decision::kFreeSpace; }
+  /// Whether free space gives evidence (decision free_space or both).
+  bool uses_free_space() const { return decision != Decision::kWindow; }
+
+  /// Whether a scan starts a new epoch: `pause` s and `distance` m behind the one before.
+  bool starts_epoch(double pause, double distance) const {
+    return pause > max_gap || distance > max_speed * pause;
+  }
+
+  /// Throws ConfigError.
+  void validate() const {
+    validate_parameters("DynaInsRemover", *this);
+    if (!(min_range < max_range)) {
+      throw ConfigError("DynaInsRemover.min_range = " + std::to_string(min_range) +
+                        " must be less than max_range = " + std::to_string(max_range));
+    }
+    if (votes > window) {
+      throw ConfigError("DynaInsRemover.votes = " + std::to_string(votes) +
+                        " must be at most window = " + std::to_string(window));
+    }
+  }
+};
 
 /// `BasicDynaInsRemover<Stages>::Config`.
 template <class Stages>
@@ -64,8 +159,8 @@ struct PipelineConfig : RemoverConfig {
   void validate() const {
     visit_sections(*this, [](const char*, const auto& section) { section.validate(); });
     if (!revision.revise_map) return;
-    if (!use_free_space) {
-      throw ConfigError("MapRevision.revise_map = true needs use_free_space = true");
+    if (!uses_free_space()) {
+      throw ConfigError("MapRevision.revise_map = true needs decision = free_space or both");
     }
     if (!build_map) throw ConfigError("MapRevision.revise_map = true needs build_map = true");
     if (!detail::IsRevisable<typename Stages::Map, Evidence>::value) {

@@ -22,7 +22,6 @@
 #include "dynains/pipeline/ingest.hpp"
 #include "dynains/pipeline/instance_ids.hpp"
 #include "dynains/pipeline/reentrancy_guard.hpp"
-#include "dynains/pipeline/remover_config.hpp"
 #include "dynains/pipeline/scan_slot.hpp"
 #include "dynains/pipeline/synthetic_scan.hpp"
 #include "dynains/pipeline/write_by_evidence.hpp"
@@ -105,9 +104,9 @@ class BasicDynaInsRemover {
         evidence_(config.evidence),
         map_(config.map),
         revision_(config.revision),
-        frame_(config),
-        ring_(std::max({static_cast<std::size_t>(config.window), latency() + 1, kFewestSlots})) {
-    if (config_.use_free_space) detail::keep_in_stage(evidence_, latency());
+        frame_(config.level, config.mounting_pitch, config.mounting_roll),
+        ring_(std::max({window_length(), latency() + 1, kFewestSlots})) {
+    if (config_.uses_free_space()) detail::keep_in_stage(evidence_, latency());
   }
 
   const Config& config() const { return config_; }
@@ -115,9 +114,8 @@ class BasicDynaInsRemover {
 
   /// Scans between a push and the final verdict on it.
   std::size_t latency() const {
-    const std::size_t by_votes =
-        config_.votes == 0 ? 0 : static_cast<std::size_t>(config_.window) - 1;
-    return config_.use_free_space ? std::max(by_votes, evidence_.horizon()) : by_votes;
+    const std::size_t by_votes = config_.votes == 0 ? 0 : window_length() - 1;
+    return config_.uses_free_space() ? std::max(by_votes, evidence_.horizon()) : by_votes;
   }
 
   /// What the first scan told about the sensor; not known() before, or if all that depends on it
@@ -142,12 +140,12 @@ class BasicDynaInsRemover {
     }
     const WarmUp rehearsal(*this);
     // The fourth scan has been held against another one, too.
-    const auto enough = static_cast<std::size_t>(std::max(config_.window, 4));
+    const auto enough = std::max<std::size_t>(window_length(), 4);
     for (std::size_t i = 0; i < std::min(scans, enough); ++i) {
       take_in(example, Eigen::Isometry3d::Identity(), 0.1 * static_cast<double>(i));
     }
     for (ScanSlot& other : ring_) other.ensure_capacity_like(slot(pushed_ - 1));
-    if (config_.use_free_space) detail::reserve_stage(evidence_, scans);
+    if (config_.uses_free_space()) detail::reserve_stage(evidence_, scans);
   }
 
   /// The same for scans of that many points, of a 64-beam sensor in a street.
@@ -294,14 +292,13 @@ class BasicDynaInsRemover {
   // Whether the scan before is too long ago, or too far away to be compared with.
   bool breaks_off(const Eigen::Isometry3d& T_world_sensor, double time) {
     const Eigen::Vector3d before = slot(pushed_ - 1).T_world_sensor.translation();
-    return config_.breaks_off(time - last_time_, (T_world_sensor.translation() - before).norm());
+    return config_.starts_epoch(time - last_time_, (T_world_sensor.translation() - before).norm());
   }
 
   // Eq. 3: the non-ground points of the last K scans in the frame of the newest.
   void gather_window() {
     const ScanSlot& newest = slot(pushed_ - 1);
-    const auto length =
-        std::min<std::uint64_t>(pushed_, static_cast<std::uint64_t>(config_.window));
+    const auto length = std::min<std::uint64_t>(pushed_, window_length());
     window_first_ = pushed_ - length;
     while (slot(window_first_).segment != newest.segment) ++window_first_;
     window_.clear();
@@ -365,7 +362,10 @@ class BasicDynaInsRemover {
 
   // A window of one scan compares nothing, nor can it tell which instance was which: the evidence
   // does both.
-  bool compares_windows() const { return config_.window > 1 || !config_.use_free_space; }
+  bool compares_windows() const { return config_.uses_window(); }
+  std::size_t window_length() const {
+    return config_.uses_window() ? static_cast<std::size_t>(config_.window) : 1;
+  }
 
   void propagate_ids(ScanSlot& newest) {
     const bool alone = newest.scan == 0 || slot(newest.scan - 1).segment != newest.segment;
@@ -378,7 +378,7 @@ class BasicDynaInsRemover {
 
   // Whether anything was left to be found in the scans.
   bool needs_sensor() const {
-    return config_.use_free_space || config_.level || detail::needs_sensor(ground_) ||
+    return config_.uses_free_space() || config_.level || detail::needs_sensor(ground_) ||
            detail::needs_sensor(clusterer_);
   }
 
@@ -420,7 +420,7 @@ class BasicDynaInsRemover {
 
   // Final verdict by point: at least `votes` windows said so, or the evidence does.
   void decide(ScanSlot& scan, int votes, StageClock& clock, StageTimes& times) {
-    if (config_.use_free_space) {
+    if (config_.uses_free_space()) {
       const EvidenceVerdict said = evidence_.judge(scan.scan, true, scan.split);
       clock.lap(times.judge);
       detail::rewrite_by_evidence(scan, said, compares_windows(), votes, verdict_scratch_);
@@ -507,13 +507,13 @@ FrameResult BasicDynaInsRemover<Stages>::clean(ScanSlot& newest, StageClock& clo
   clock.lap(result.times.verdict);
   const std::size_t count = newest.non_ground_count();
   const auto newest_cluster = cluster_of.subspan(cluster_of.size() - count, count);
-  if (config_.use_free_space) {
+  if (config_.uses_free_space()) {
     evidence_.observe(newest.scan, newest.segment, newest.T_world_level, newest.split,
                       newest_cluster, clusterer_.cluster_count());
     if (!compares_windows()) propagate_ids(newest);
   }
   clock.lap(result.times.evidence);
-  if (config_.use_free_space) {
+  if (config_.uses_free_space()) {
     const EvidenceVerdict said = evidence_.judge(newest.scan, false, newest.split);
     clock.lap(result.times.judge);
     detail::write_instances(newest, newest_cluster);

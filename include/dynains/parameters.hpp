@@ -12,9 +12,9 @@
 // `Self` is the struct, const or not, so that one list serves readers and writers.
 #pragma once
 
-#include <cmath>
-#include <cstdint>
+#include <cstddef>
 #include <limits>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <type_traits>
@@ -46,16 +46,17 @@ struct Bounds {
 constexpr Bounds closed(double min, double max) { return {min, max, false, false}; }
 constexpr Bounds open(double min, double max) { return {min, max, true, true}; }
 constexpr Bounds half_open_below(double min, double max) { return {min, max, true, false}; }
-constexpr Bounds half_open_above(double min, double max) { return {min, max, false, true}; }
 
-/// One named field of a configuration. Booleans and numbers only.
+/// One named field of a configuration: a number, a boolean, or an enum whose values 0, 1, ... have
+/// the names that the array `value_names(T)` holds in the same order.
 template <class T>
 struct Parameter {
-  static_assert(std::is_arithmetic_v<T>, "parameters are numbers or booleans");
+  static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T>,
+                "parameters are numbers, booleans or enums");
 
   const char* name;  ///< snake_case, unique over all stages
   T& value;          ///< reference into the visited struct, const if the struct is
-  Bounds bounds;     ///< ignored for booleans
+  Bounds bounds;     ///< of numbers; ignored for booleans and enums
   const char* unit;  ///< "m", "deg", "s", "scans" or "" if dimensionless
   const char* help;  ///< one sentence with its source (equation or paper)
 };
@@ -63,22 +64,62 @@ struct Parameter {
 template <class T>
 Parameter(const char*, T&, Bounds, const char*, const char*) -> Parameter<T>;
 
+/// Whether the bounds of a parameter of type T mean anything.
+template <class T>
+inline constexpr bool kIsBounded =
+    std::is_arithmetic_v<T> && !std::is_same_v<std::remove_const_t<T>, bool>;
+
+/// The value as a number, a boolean or the name of an enum's value: what files and messages hold.
+template <class T>
+auto plain_value(T value) {
+  if constexpr (std::is_enum_v<T>) {
+    const auto index = static_cast<std::size_t>(value);
+    const auto& names = value_names(value);
+    return std::string(index < names.size() ? names[index] : "unknown");
+  } else {
+    return value;
+  }
+}
+
+/// Names of all values of an enum: "window|free_space|both".
+template <class Enum>
+std::string all_value_names() {
+  std::string result;
+  for (const char* name : value_names(Enum()))
+    result += (result.empty() ? "" : "|") + std::string(name);
+  return result;
+}
+
+/// The value of that name, if there is one.
+template <class Enum>
+std::optional<Enum> value_of_name(const std::string& name) {
+  const auto& names = value_names(Enum());
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (name == names[i]) return static_cast<Enum>(i);
+  }
+  return std::nullopt;
+}
+
 /// Throws ConfigError unless every field of `config` lies within its bounds.
 /// `owner` is the name that the message starts with, for example "BeliefUpdater".
 template <class Config>
 void validate_parameters(const char* owner, const Config& config) {
   Config::visit(config, [owner](const auto& parameter) {
     using Value = std::remove_const_t<std::remove_reference_t<decltype(parameter.value)>>;
-    if constexpr (!std::is_same_v<Value, bool>) {
-      if (!parameter.bounds.contain(static_cast<double>(parameter.value))) {
-        std::ostringstream text;
-        text << owner << '.' << parameter.name << " = " << +parameter.value << " must be in "
-             << parameter.bounds.to_string();
-        if (*parameter.unit != '\0') text << ' ' << parameter.unit;
-        text << ": " << parameter.help;
-        throw ConfigError(text.str());
-      }
+    std::ostringstream text;
+    text << owner << '.' << parameter.name << " = ";
+    if constexpr (std::is_enum_v<Value>) {
+      const auto number = static_cast<std::size_t>(parameter.value);
+      if (number < value_names(parameter.value).size()) return;
+      text << number << " must be " << all_value_names<Value>();
+    } else if constexpr (kIsBounded<Value>) {
+      if (parameter.bounds.contain(static_cast<double>(parameter.value))) return;
+      text << +parameter.value << " must be in " << parameter.bounds.to_string();
+      if (*parameter.unit != '\0') text << ' ' << parameter.unit;
+    } else {
+      return;
     }
+    throw ConfigError(text.str() + ": " + parameter.help);
   });
 }
 

@@ -7,9 +7,9 @@
 #include <string>
 
 #include "command.hpp"
+#include "dynains/config.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/diagnosis.hpp"
-#include "dynains/pipeline/remover_config.hpp"
 #include "lone_scans.hpp"
 #include "recording_options.hpp"
 

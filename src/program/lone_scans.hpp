@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
+#include "dynains/config.hpp"
 #include "dynains/io/recording.hpp"
-#include "dynains/pipeline/remover_config.hpp"
 
 namespace dynains::program {
 
@@ -21,7 +21,7 @@ inline std::optional<std::string> remark_on_lone_scans(const Recording& recordin
     const Eigen::Vector3d step =
         recording.T_world_sensor(i).translation() - recording.T_world_sensor(i - 1).translation();
     const double pause = recording.time(i) - recording.time(i - 1);
-    breaks += config.breaks_off(pause, step.norm()) ? 1 : 0;
+    breaks += config.starts_epoch(pause, step.norm()) ? 1 : 0;
   }
   if (2 * breaks <= last - first) return std::nullopt;
   return std::to_string(breaks) + " of " + std::to_string(last - first + 1) +

@@ -7,6 +7,8 @@
 #include <locale>
 #include <sstream>
 
+#include "dynains/renamed_parameters.hpp"
+
 namespace dynains::program {
 namespace {
 
@@ -116,12 +118,27 @@ ParameterValues read_config_file(const std::filesystem::path& path) {
   return values;
 }
 
+void ParameterValues::refuse(const std::string& name, const std::string& where) {
+  std::string former = name;
+  std::replace(former.begin(), former.end(), '-', '_');
+  const std::string renaming = renaming_of(former);
+  throw ConfigError(
+      where + (renaming.empty() ? ": unknown parameter, see dynains config" : ": " + renaming));
+}
+
+void ParameterFlags::add_former_names_to(CLI::App& command) {
+  for (const RenamedParameter& renamed : kRenamedParameters) {
+    options_.push_back(
+        command.add_option("--" + flag_name(renamed.former_name))->expected(0, 1)->group(""));
+  }
+}
+
 ParameterValues ParameterFlags::values() const {
   ParameterValues values;
   for (const CLI::Option* option : options_) {
     if (option->count() == 0) continue;
-    const std::string flag = option->get_name();
-    values.set(flag.substr(2), option->results().back(), flag);
+    const std::string& name = option->get_lnames().front();  // get_name() hides former names
+    values.set(name, option->results().empty() ? "" : option->results().back(), "--" + name);
   }
   return values;
 }

@@ -21,7 +21,9 @@ std::string flag_name(std::string parameter_name);
 
 /// Value of a parameter as text; nothing if it is none of that type.
 template <class T>
-std::optional<T> parse_value(const std::string& text);
+std::optional<T> parse_value(const std::string& text) {
+  return value_of_name<T>(text);
+}
 template <>
 std::optional<bool> parse_value(const std::string& text);
 template <>
@@ -37,9 +39,13 @@ std::optional<double> parse_value(const std::string& text);
 std::string format_value(double value);
 std::string format_value(float value);
 inline std::string format_value(bool value) { return value ? "true" : "false"; }
-template <class Integer, class = std::enable_if_t<std::is_integral_v<Integer>>>
+template <class Integer, std::enable_if_t<std::is_integral_v<Integer>, bool> = true>
 std::string format_value(Integer value) {
   return std::to_string(value);
+}
+template <class Enum, std::enable_if_t<std::is_enum_v<Enum>, bool> = true>
+std::string format_value(Enum value) {
+  return plain_value(value);
 }
 
 /// Kind of value that a parameter takes, for help texts: "true|false", "INT in [2, 64]" ...
@@ -48,6 +54,8 @@ std::string describe_range(const Parameter<T>& parameter) {
   using Value = std::remove_const_t<T>;
   if constexpr (std::is_same_v<Value, bool>) {
     return "true|false";
+  } else if constexpr (std::is_enum_v<Value>) {
+    return all_value_names<Value>();
   } else {
     std::string text = std::is_integral_v<Value> ? "INT" : "FLOAT";
     const Bounds& bounds = parameter.bounds;
@@ -63,7 +71,7 @@ void assign_parameter(const Parameter<T>& parameter, const std::string& text,
                       const std::string& where) {
   const std::optional<T> value = parse_value<T>(text);
   bool valid = value.has_value();
-  if constexpr (!std::is_same_v<T, bool>) {
+  if constexpr (kIsBounded<T>) {
     valid = valid && parameter.bounds.contain(static_cast<double>(*value));
   }
   if (!valid) {
@@ -82,7 +90,8 @@ class ParameterValues {
 
   bool empty() const { return values_.empty(); }
 
-  /// Assigns all values to the parameters of `config`. Throws ConfigError, for unknown names too.
+  /// Assigns all values to the parameters of `config`. Throws ConfigError, also for unknown and for
+  /// former names.
   template <class Config>
   void apply(Config& config) const {
     std::map<std::string, Value> left = values_;
@@ -93,10 +102,12 @@ class ParameterValues {
       left.erase(found);
     });
     if (left.empty()) return;
-    throw ConfigError(left.begin()->second.where + ": unknown parameter, see dynains config");
+    refuse(left.begin()->first, left.begin()->second.where);
   }
 
  private:
+  [[noreturn]] static void refuse(const std::string& name, const std::string& where);
+
   struct Value {
     std::string text;
     std::string where;
@@ -123,6 +134,9 @@ class ParameterFlags {
                              ->group(group));
     });
   }
+
+  /// Adds hidden flags of former names, which values() gives like others, to be refused by name.
+  void add_former_names_to(CLI::App& command);
 
   /// The flags that were given.
   ParameterValues values() const;

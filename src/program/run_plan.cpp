@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 nlohmann::ordered_json parameters_of(const DynaInsRemover::Config& config) {
   nlohmann::ordered_json json;
   DynaInsRemover::Config::visit(
-      config, [&](const auto& parameter) { json[parameter.name] = parameter.value; });
+      config, [&](const auto& parameter) { json[parameter.name] = plain_value(parameter.value); });
   return json;
 }
 

@@ -24,6 +24,7 @@ void bind_config(py::module_& module) {
       },
       "The paper to the letter, with its published parameters.");
   add_properties<Config>(config);
+  add_former_names(config);
   config.def("to_dict", &to_dict<Config>, "Values by name.");
   config.def("validate", &Config::validate, "Raises ConfigError if parameters contradict.");
   config.def_static(
@@ -39,6 +40,7 @@ void bind_config(py::module_& module) {
             entry["default"] = value_of(parameter);
             entry["min"] = parameter.bounds.min;
             entry["max"] = parameter.bounds.max;
+            entry["values"] = values_of(parameter);
             entry["unit"] = parameter.unit;
             entry["help"] = parameter.help;
             result.append(entry);
@@ -46,7 +48,7 @@ void bind_config(py::module_& module) {
         });
         return result;
       },
-      "Name, section, default, bounds, unit and help of every parameter.");
+      "Name, section, default, bounds or values, unit and help of every parameter.");
   config.def(
       "__eq__", [](const Config& a, const Config& b) { return to_dict(a).equal(to_dict(b)); },
       py::is_operator());  // with anything else: not equal

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
 
+#include <optional>
 #include <sstream>
 #include <string>
 #include <type_traits>
@@ -10,6 +12,7 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/parameters.hpp"
+#include "dynains/renamed_parameters.hpp"
 
 namespace dynains::python {
 
@@ -17,7 +20,41 @@ namespace py = pybind11;
 
 template <class T>
 py::object value_of(const Parameter<T>& parameter) {
-  return py::cast(parameter.value);
+  return py::cast(plain_value(parameter.value));
+}
+
+/// Names of the values of an enum, None for other parameters.
+template <class T>
+py::object values_of(const Parameter<T>&) {
+  if constexpr (std::is_enum_v<T>) {
+    return py::cast(value_names(std::remove_const_t<T>()));
+  } else {
+    return py::none();
+  }
+}
+
+/// Type and values that a parameter takes: "int", "str, one of a|b".
+template <class T>
+std::string type_name() {
+  if constexpr (std::is_enum_v<T>) return "str, one of " + all_value_names<T>();
+  return std::is_same_v<T, bool> ? "bool" : std::is_integral_v<T> ? "int" : "float";
+}
+
+/// Throws py::cast_error if `value` is of another type.
+template <class T>
+T cast_value(const py::handle& value) {
+  if constexpr (std::is_enum_v<T>) {
+    const std::optional<T> found = value_of_name<T>(value.cast<std::string>());
+    if (!found) throw py::cast_error();
+    return *found;
+  } else {
+    // Nearly everything in Python is true or false, None too.
+    if (std::is_same_v<T, bool> && !value.equal(py::bool_(true)) &&
+        !value.equal(py::bool_(false))) {
+      throw py::cast_error();
+    }
+    return value.cast<T>();
+  }
 }
 
 /// Throws ConfigError if `value` is out of bounds, TypeError if it is of another type.
@@ -25,18 +62,12 @@ template <class T>
 void assign(const Parameter<T>& parameter, const py::handle& value) {
   T wanted{};
   try {
-    // Nearly everything in Python is true or false, None too.
-    if (std::is_same_v<T, bool> && !value.equal(py::bool_(true)) &&
-        !value.equal(py::bool_(false))) {
-      throw py::cast_error();
-    }
-    wanted = value.cast<T>();
+    wanted = cast_value<T>(value);
   } catch (const py::cast_error&) {
-    const char* type = std::is_same_v<T, bool> ? "bool" : std::is_integral_v<T> ? "int" : "float";
     throw py::type_error(std::string(parameter.name) + " = " + py::repr(value).cast<std::string>() +
-                         ": expected " + type);
+                         ": expected " + type_name<T>());
   }
-  if constexpr (!std::is_same_v<T, bool>) {
+  if constexpr (kIsBounded<T>) {
     if (!parameter.bounds.contain(static_cast<double>(wanted))) {
       throw ConfigError(std::string(parameter.name) + " = " + py::repr(value).cast<std::string>() +
                         " must be in " + parameter.bounds.to_string() + ' ' + parameter.unit +
@@ -46,7 +77,13 @@ void assign(const Parameter<T>& parameter, const py::handle& value) {
   parameter.value = wanted;
 }
 
-/// Sets the parameters that `values` names. Throws ConfigError for a name that there is not.
+/// Throws ConfigError.
+[[noreturn]] inline void refuse(const std::string& name) {
+  const std::string renaming = renaming_of(name);
+  throw ConfigError(renaming.empty() ? "unknown parameter " + name : name + ' ' + renaming);
+}
+
+/// Sets the parameters that `values` names. Throws ConfigError for unknown and for former names.
 template <class Config>
 void assign_all(Config& config, const py::dict& values) {
   for (const std::pair<py::handle, py::handle> item : values) {
@@ -57,7 +94,7 @@ void assign_all(Config& config, const py::dict& values) {
       assign(parameter, item.second);
       found = true;
     });
-    if (!found) throw ConfigError("unknown parameter " + name);
+    if (!found) refuse(name);
   }
 }
 
@@ -74,7 +111,8 @@ template <class T>
 std::string describe(const Parameter<T>& parameter) {
   std::ostringstream text;
   text << parameter.help;
-  if constexpr (!std::is_same_v<std::remove_const_t<T>, bool>) {
+  if constexpr (std::is_enum_v<T>) text << "; " << all_value_names<std::remove_const_t<T>>();
+  if constexpr (kIsBounded<T>) {
     text << "; in " << parameter.bounds.to_string();
     if (*parameter.unit != '\0') text << ' ' << parameter.unit;
   }
@@ -97,6 +135,20 @@ void add_properties(Class& bound) {
         },
         describe(parameter).c_str());
   });
+}
+
+/// Properties of former names: reading and writing raises an AttributeError with the present name.
+template <class Class>
+void add_former_names(Class& bound) {
+  for (const RenamedParameter& renamed : kRenamedParameters) {
+    const std::string text =
+        std::string(renamed.former_name) + ' ' + renaming_of(renamed.former_name);
+    bound.def_property(
+        renamed.former_name,
+        [text](const py::object&) -> py::object { throw py::attribute_error(text); },
+        [text](const py::object&, const py::object&) { throw py::attribute_error(text); },
+        text.c_str());
+  }
 }
 
 }  // namespace dynains::python

@@ -41,7 +41,7 @@ TEST_CASE("a warm remover allocates nothing, but for the map when it grows") {
   DynaInsRemover::Config config = base;
   const bool build_map = GENERATE(false, true);
   config.build_map = build_map;
-  config.revision.revise_map = build_map && config.use_free_space;
+  config.revision.revise_map = build_map && config.uses_free_space();
   // Short rings: after seven rounds of twelve scans, every place in them has held every scan.
   config.evidence.horizon = 6;
   config.evidence.memory = 20;

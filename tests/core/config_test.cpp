@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "dynains/renamed_parameters.hpp"
 #include "support/catch.hpp"
 #include "support/remover.hpp"
 
@@ -29,7 +30,7 @@ std::vector<Field> fields_of(const Config& config) {
     Part::visit(part, [&](const auto& parameter) {
       using Value = std::remove_const_t<std::remove_reference_t<decltype(parameter.value)>>;
       result.push_back({section, parameter.name, parameter.help, parameter.bounds,
-                        static_cast<double>(parameter.value), !std::is_same_v<Value, bool>,
+                        static_cast<double>(parameter.value), kIsBounded<Value>,
                         std::is_integral_v<Value>});
     });
   });
@@ -56,6 +57,7 @@ std::string error_of(const Config& config) {
 
 TEST_CASE("the paper's configuration has the published parameters") {
   const Config config = Config::paper();
+  CHECK(config.decision == Decision::kWindow);
   CHECK(config.window == 4);
   CHECK(config.use_belief);
   CHECK(config.descriptor.tau_s == 0.6);
@@ -98,6 +100,25 @@ TEST_CASE("parameter names are unique, and every parameter is explained") {
     CHECK(field.help.size() > 10);
   }
   CHECK(names.size() > 30);
+}
+
+TEST_CASE("former names belong to no parameter, present names to one") {
+  std::set<std::string> names;
+  for (const Field& field : fields_of(Config())) names.insert(field.name);
+  for (const RenamedParameter& renamed : kRenamedParameters) {
+    INFO(renamed.former_name);
+    CHECK(names.count(renamed.former_name) == 0);
+    CHECK(names.count(renamed.present_name) == 1);
+    CHECK_THAT(renaming_of(renamed.former_name), ContainsSubstring(renamed.present_name));
+  }
+  CHECK(renaming_of("tau_s").empty());
+}
+
+TEST_CASE("an enum beyond its values is refused by field and names") {
+  Config config;
+  config.decision = static_cast<Decision>(3);
+  CHECK_THAT(error_of(config),
+             StartsWith("DynaInsRemover.decision = 3 must be window|free_space|both: "));
 }
 
 TEST_CASE("a value out of bounds is refused by field, value and bound") {

@@ -245,9 +245,10 @@ struct CountingStages : DefaultStages {
 TEST_CASE("a map is revised by free-space evidence, and only one that can let go of points") {
   DynaInsRemover::Config config = DynaInsRemover::Config::paper();
   config.revision.revise_map = true;
-  CHECK_THROWS_WITH(DynaInsRemover(config),
-                    ContainsSubstring("MapRevision.revise_map = true needs use_free_space = true"));
-  config.use_free_space = true;
+  CHECK_THROWS_WITH(
+      DynaInsRemover(config),
+      ContainsSubstring("MapRevision.revise_map = true needs decision = free_space or both"));
+  config.decision = Decision::kFreeSpace;
   CHECK_NOTHROW(config.validate());
   config.build_map = false;
   CHECK_THROWS_WITH(config.validate(),

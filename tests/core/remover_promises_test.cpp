@@ -409,9 +409,9 @@ TEST_CASE("windows may decide later than the evidence, which then has no say") {
   Config config;
   config.window = 5;
   config.votes = 2;
-  config.use_free_space = false;
+  config.decision = Decision::kWindow;
   const Run by_windows = run(config, scans);
-  config.use_free_space = true;
+  config.decision = Decision::kBoth;
   config.evidence.horizon = 0;
   config.evidence.memory = 0;
   config.evidence.presume_dynamic = false;

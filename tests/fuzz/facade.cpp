@@ -55,6 +55,8 @@ Config read_config(Stream& stream) {
     using Value = std::remove_reference_t<decltype(parameter.value)>;
     if constexpr (std::is_same_v<Value, bool>) {
       parameter.value = choice >= 128;
+    } else if constexpr (std::is_enum_v<Value>) {
+      parameter.value = static_cast<Value>(choice / 8 % (value_names(Value()).size() + 1));
     } else {
       const double share = 0.5 + stream.number(0.51);
       const double low = parameter.bounds.min;

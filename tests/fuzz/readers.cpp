@@ -135,7 +135,7 @@ void run_config(Bytes bytes) {
     values.apply(config);
     DynaInsRemover::Config::visit(config, [](const auto& parameter) {
       using Value = std::remove_reference_t<decltype(parameter.value)>;
-      if constexpr (!std::is_same_v<Value, bool>) {
+      if constexpr (kIsBounded<Value>) {
         require(parameter.bounds.contain(static_cast<double>(parameter.value)),
                 "what a config file sets is within bounds");
       }

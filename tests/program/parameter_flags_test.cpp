@@ -1,6 +1,7 @@
 #include "parameter_flags.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include "io/files.hpp"
 #include "support/catch.hpp"
@@ -11,11 +12,15 @@ using namespace dynains::test;
 
 namespace {
 
+enum class Kind { kFirst, kSecond };
+constexpr std::array<const char*, 2> value_names(Kind) { return {"first", "second"}; }
+
 struct Sample {
   double tau_s = 0.6;
   int window = 4;
   bool use_belief = true;
   std::uint64_t seed = 1;
+  Kind kind = Kind::kFirst;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
@@ -23,6 +28,7 @@ struct Sample {
     visitor(Parameter{"window", self.window, closed(2, 64), "scans", "length"});
     visitor(Parameter{"use_belief", self.use_belief, Bounds{}, "", "switch"});
     visitor(Parameter{"seed", self.seed, Bounds{}, "", "number"});
+    visitor(Parameter{"kind", self.kind, Bounds{}, "", "choice"});
   }
 };
 
@@ -54,6 +60,7 @@ TEST_CASE("Flags set what they name and leave the rest") {
   CHECK_FALSE(sample.use_belief);
   CHECK(parse({"--seed", "18446744073709551615"}).seed == 18446744073709551615U);
   CHECK(parse({"--window", "64"}).window == 64);
+  CHECK(parse({"--kind", "second"}).kind == Kind::kSecond);
 }
 
 TEST_CASE("Values that no parameter takes are refused by name, value and bounds") {
@@ -75,6 +82,8 @@ TEST_CASE("Values that no parameter takes are refused by name, value and bounds"
       {"--window", "99999999999", "expected INT"},
       {"--seed", "-1", "expected INT"},
       {"--use-belief", "maybe", "--use-belief = maybe: expected true|false (switch)"},
+      {"--kind", "third", "--kind = third: expected first|second (choice)"},
+      {"--kind", "1", "expected first|second"},
   };
   for (const Case& wrong : cases) {
     CAPTURE(wrong.flag, wrong.value);
@@ -101,6 +110,9 @@ TEST_CASE("Config files are refused by line") {
     return message_of<ConfigError>([&] { read(text); });
   };
   CHECK_THAT(error("\ntau-x = 1\n"), ContainsSubstring("a.cfg:2: tau-x: unknown parameter"));
+  CHECK_THAT(
+      error("\nuse-free-space = on\n"),
+      ContainsSubstring("a.cfg:2: use-free-space: is now called decision (true: free_space"));
   CHECK_THAT(error("window = 1\n"), ContainsSubstring("a.cfg:1: window = 1: expected INT in"));
   CHECK_THAT(error("window\n"), ContainsSubstring("a.cfg:1: expected a line such as"));
   CHECK_THAT(error("window =\n"), ContainsSubstring("a.cfg:1: expected a line such as"));
@@ -121,6 +133,7 @@ TEST_CASE("Values are printed short, and read back exactly") {
   CHECK(format_value(1.25e-4) == "0.000125");
   CHECK(format_value(true) == "true");
   CHECK(format_value(64) == "64");
+  CHECK(format_value(Kind::kSecond) == "second");
   for (const double value : {1.0 / 3.0, 0.1 + 0.2, 1e300, -5e-324, 1.723456789012345}) {
     CHECK(parse_value<double>(format_value(value)) == value);
   }

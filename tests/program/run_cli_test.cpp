@@ -247,7 +247,7 @@ TEST_CASE("What config prints, run takes, for every parameter") {
     std::string flag = parameter.name;
     std::replace(flag.begin(), flag.end(), '_', '-');
     CAPTURE(flag);
-    CHECK(configuration.at(parameter.name) == parameter.value);
+    CHECK(configuration.at(parameter.name) == plain_value(parameter.value));
     CHECK_THAT(help, ContainsSubstring("--" + flag + " "));
     CHECK_THAT(printed.out, ContainsSubstring("\n" + flag + " = "));
   });
@@ -631,6 +631,8 @@ TEST_CASE("Wrong flags: exit code 2, one line, nothing written") {
       {{"--window", "many"}, "--window = many: expected INT in"},
       {{"--votes", "9", "--window", "4"}, "votes = 9 must be at most window = 4"},
       {{"--tau-x", "1"}, "--tau-x"},
+      {{"--use-free-space", "false"}, "--use-free-space: is now called decision"},
+      {{"--decision", "paper"}, "--decision = paper: expected window|free_space|both"},
       {{"--config", config}, "run.cfg:3: tau-x: unknown parameter"},
       {{"--preset", "best"}, "best not in"},
       {{"--start", "12"}, "--start and --end leave no scan of 000000 to 000011"},

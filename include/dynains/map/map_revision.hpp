@@ -32,7 +32,7 @@ struct MapRevisionConfig {
   static void visit(Self& self, Visitor&& visitor) {
     visitor(Parameter{"revise_map", self.revise_map, Bounds(), "",
                       "take points out of the static map again if later scans see their place "
-                      "free; needs use_free_space and a map in memory"});
+                      "free; needs decision free_space or both, and a map in memory"});
     visitor(Parameter{"revision_range", self.revision_range, closed(5, 300), "m",
                       "places of the map farther away (horizontally) are not looked at again"});
     visitor(Parameter{"revision_period", self.revision_period, closed(1, 100), "scans",

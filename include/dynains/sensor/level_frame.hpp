@@ -3,7 +3,6 @@
 
 #include <Eigen/Geometry>
 
-#include "dynains/pipeline/remover_config.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor/heading.hpp"
 #include "dynains/sensor/mounting.hpp"
@@ -15,10 +14,12 @@ namespace dynains::detail {
 /// What one scan tells about the sensor, and the turn that makes it level.
 class LevelFrame {
  public:
-  explicit LevelFrame(const RemoverConfig& config)
-      : is_wanted_(config.level),
-        is_tilt_given_(config.mounting_pitch != 0.0 || config.mounting_roll != 0.0),
-        up_given_(up_of_mounting(config.mounting_pitch, config.mounting_roll)) {}
+  /// `level`: whether scans are turned at all. `pitch`, `roll`: deg, tilt of the sensor's mounting;
+  /// 0 and 0 if it is to be found.
+  LevelFrame(bool level, double pitch, double roll)
+      : is_wanted_(level),
+        is_tilt_given_(pitch != 0.0 || roll != 0.0),
+        up_given_(up_of_mounting(pitch, roll)) {}
 
   /// Not known() until some scan had enough points.
   const SensorModel& sensor() const { return sensor_; }

@@ -1,0 +1,31 @@
+// Former names of parameters. Flags, config files and the Python module refuse them with an error
+// that gives the present name.
+#pragma once
+
+#include <string>
+
+namespace dynains {
+
+struct RenamedParameter {
+  const char* former_name;  ///< snake_case
+  const char* present_name;
+  const char* note;  ///< how values translate; empty if they stay the same
+};
+
+inline constexpr RenamedParameter kRenamedParameters[] = {
+    {"use_free_space", "decision", "true: free_space or both, false: window"},
+};
+
+/// Text for an error message: the present name of `former_name`, or an empty text if no parameter
+/// ever had that name.
+inline std::string renaming_of(const std::string& former_name) {
+  for (const RenamedParameter& renamed : kRenamedParameters) {
+    if (former_name != renamed.former_name) continue;
+    const std::string note = renamed.note;
+    return std::string("is now called ") + renamed.present_name +
+           (note.empty() ? "" : " (" + note + ")");
+  }
+  return {};
+}
+
+}  // namespace dynains
