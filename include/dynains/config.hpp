@@ -6,10 +6,9 @@
 #include <type_traits>
 
 #include "dynains/errors.hpp"
-#include "dynains/free_space_evidence.hpp"
 #include "dynains/map/map_revision.hpp"
 #include "dynains/parameters.hpp"
-#include "dynains/stage/contracts.hpp"
+#include "dynains/stage/stage_configs.hpp"
 
 namespace dynains {
 
@@ -110,14 +109,14 @@ struct RemoverConfig {
 /// `BasicDynaInsRemover<Stages>::Config`.
 template <class Stages>
 struct PipelineConfig : RemoverConfig {
-  using Evidence = typename detail::EvidenceOf<Stages, FreeSpaceEvidence>::type;
+  using Evidence = typename detail::EvidenceOf<Stages>::type;
 
-  typename Stages::Ground::Config ground;
-  typename Stages::Clusterer::Config clusterer;
-  typename Stages::Descriptor::Config descriptor;
-  typename Stages::Belief::Config belief;
-  typename Evidence::Config evidence;
-  typename Stages::Map::Config map;
+  detail::ConfigOf<typename Stages::Ground> ground;
+  detail::ConfigOf<typename Stages::Clusterer> clusterer;
+  detail::ConfigOf<typename Stages::Descriptor> descriptor;
+  detail::ConfigOf<typename Stages::Belief> belief;
+  detail::ConfigOf<Evidence> evidence;
+  detail::ConfigOf<typename Stages::Map> map;
   MapRevision::Config revision;
 
   /// The paper to the letter, with its parameters; voxels, cells and ground, which it gives no
@@ -125,11 +124,11 @@ struct PipelineConfig : RemoverConfig {
   static PipelineConfig paper() {
     PipelineConfig config;
     static_cast<RemoverConfig&>(config) = RemoverConfig::paper();
-    config.ground = detail::paper_config<typename Stages::Ground::Config>();
-    config.clusterer = detail::paper_config<typename Stages::Clusterer::Config>();
-    config.descriptor = detail::paper_config<typename Stages::Descriptor::Config>();
-    config.belief = detail::paper_config<typename Stages::Belief::Config>();
-    config.map = detail::paper_config<typename Stages::Map::Config>();
+    config.ground = detail::paper_config<decltype(config.ground)>();
+    config.clusterer = detail::paper_config<decltype(config.clusterer)>();
+    config.descriptor = detail::paper_config<decltype(config.descriptor)>();
+    config.belief = detail::paper_config<decltype(config.belief)>();
+    config.map = detail::paper_config<decltype(config.map)>();
     return config;
   }
 
@@ -163,9 +162,6 @@ struct PipelineConfig : RemoverConfig {
       throw ConfigError("MapRevision.revise_map = true needs decision = free_space or both");
     }
     if (!build_map) throw ConfigError("MapRevision.revise_map = true needs build_map = true");
-    if (!detail::IsRevisable<typename Stages::Map, Evidence>::value) {
-      throw ConfigError("MapRevision.revise_map = true needs a map that is kept in memory");
-    }
     // A reference must not count twice.
     const int step = detail::reference_step(evidence);
     if (revision.revision_period < step) {

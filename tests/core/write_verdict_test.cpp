@@ -1,4 +1,4 @@
-// What is written in order and by point_run, against what it means point by point.
+// Verdicts that are written by runs and groups of points, against a simple model by point.
 #include <algorithm>
 #include <array>
 #include <map>
@@ -6,9 +6,10 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/pipeline/decisions.hpp"
 #include "dynains/pipeline/instance_ids.hpp"
-#include "dynains/pipeline/write_by_evidence.hpp"
-#include "dynains/pipeline/write_by_windows.hpp"
+#include "dynains/pipeline/verdict_writer.hpp"
+#include "dynains/pipeline/window_votes.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 
@@ -16,13 +17,14 @@ namespace dynains::test {
 namespace {
 
 using detail::ClusterVerdict;
-using detail::Reach;
+using detail::DecisionStage;
 using PointRun = ClusterSet::PointRun;
 
 constexpr std::uint32_t kClusters = 6;
 
-constexpr std::array<Reach, 4> kReaches = {Reach::kNoCluster, Reach::kTooFewScans, Reach::kSimilar,
-                                           Reach::kProposed};
+constexpr std::array<DecisionStage, 4> kStages = {
+    DecisionStage::kNoCluster, DecisionStage::kTooFewScans, DecisionStage::kSimilar,
+    DecisionStage::kProposed};
 
 // PointRuns of random length, mostly short, a cluster each or none.
 std::vector<PointRun> random_runs(Random& random, std::uint32_t points) {
@@ -49,32 +51,34 @@ std::vector<std::uint32_t> by_point(const std::vector<PointRun>& point_runs) {
 std::vector<ClusterVerdict> random_verdicts(Random& random) {
   std::vector<ClusterVerdict> verdicts(kClusters);
   for (ClusterVerdict& verdict : verdicts) {
-    verdict.reach = kReaches[1 + random.index(3)];
-    if (verdict.reach != Reach::kProposed) continue;
-    verdict.dynamic = static_cast<std::uint8_t>(random.index(2));
+    verdict.stage = kStages[1 + random.index(3)];
+    if (verdict.stage != DecisionStage::kProposed) continue;
+    verdict.is_dynamic = static_cast<std::uint8_t>(random.index(2));
     verdict.belief = random.uniform_float(0.0, 1.0);
   }
   return verdicts;
 }
 
-// What all windows so far said of one point, by the words of the documentation.
-struct Said {
-  Reach reach = Reach::kNoCluster;
+// Votes of all windows so far on one point, as the documentation describes them.
+struct Votes {
+  DecisionStage stage = DecisionStage::kNoCluster;
   int votes = 0;
   float belief = 0.0F;
 
-  void hear(std::uint32_t cluster, const std::vector<ClusterVerdict>& verdicts) {
+  void add(std::uint32_t cluster, const std::vector<ClusterVerdict>& verdicts) {
     if (cluster == kNoCluster) return;
     const ClusterVerdict& verdict = verdicts[cluster];
-    reach = std::max(reach, verdict.reach);
-    votes += verdict.dynamic;
+    stage = std::max(stage, verdict.stage);
+    votes += verdict.is_dynamic;
     belief = std::max(belief, verdict.belief);
   }
 };
 
 TEST_CASE("verdicts by point_run are those by point, at once and after more windows") {
-  detail::ScanSlot scan;    // the same object for all, as in the pipeline
-  std::vector<Reach> room;  // the same, too
+  // The same objects for all scans, as in the pipeline.
+  detail::ScanSlot scan;
+  detail::WindowVoter voter;
+  detail::VerdictWriter writer;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     INFO("seed " << seed);
     Random random(seed);
@@ -92,23 +96,23 @@ TEST_CASE("verdicts by point_run are those by point, at once and after more wind
     scan.ids.resize(kClusters);
     for (std::uint32_t c = 0; c < kClusters; ++c) scan.ids[c] = 100 + c;
 
-    scan.point_runs = random_runs(random, points);
-    const std::vector<std::uint32_t> first_cluster = by_point(scan.point_runs);
-    std::vector<Said> said(points);
-    const auto hear = [&](const std::vector<PointRun>& point_runs,
-                          const std::vector<ClusterVerdict>& verdicts) {
+    scan.windows.point_runs = random_runs(random, points);
+    const std::vector<std::uint32_t> first_cluster = by_point(scan.windows.point_runs);
+    std::vector<Votes> expected(points);
+    const auto add = [&](const std::vector<PointRun>& point_runs,
+                         const std::vector<ClusterVerdict>& verdicts) {
       const std::vector<std::uint32_t> cluster_of = by_point(point_runs);
-      for (std::size_t i = 0; i < points; ++i) said[i].hear(cluster_of[i], verdicts);
+      for (std::size_t i = 0; i < points; ++i) expected[i].add(cluster_of[i], verdicts);
     };
-    const auto check = [&](int votes) {
+    const auto check = [&](int votes, bool is_final) {
       for (std::size_t i = 0; i < points; ++i) {
         const std::uint32_t to = scan.split.input[ground + i];
-        const bool dynamic = said[i].votes >= votes;
+        const bool dynamic = expected[i].votes >= votes;
         REQUIRE(scan.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kStatic));
         REQUIRE(scan.causes[to] ==
-                (dynamic ? Cause::kProposed : detail::cause_to_stay(said[i].reach)));
-        REQUIRE(scan.beliefs[to] == said[i].belief);
-        REQUIRE(scan.is_kept[ground + i] == (dynamic ? 0 : 1));
+                (dynamic ? Cause::kProposed : detail::static_cause(expected[i].stage)));
+        REQUIRE(scan.beliefs[to] == expected[i].belief);
+        if (is_final) REQUIRE(writer.is_kept()[ground + i] == (dynamic ? 0 : 1));
         REQUIRE(scan.instances[to] ==
                 (first_cluster[i] == kNoCluster ? kNoInstance : 100 + first_cluster[i]));
       }
@@ -118,7 +122,7 @@ TEST_CASE("verdicts by point_run are those by point, at once and after more wind
         REQUIRE(scan.causes[to] == Cause::kGround);
         REQUIRE(scan.beliefs[to] == 0.0F);
         REQUIRE(scan.instances[to] == kNoInstance);
-        REQUIRE(scan.is_kept[i] == 1);
+        if (is_final) REQUIRE(writer.is_kept()[i] == 1);
       }
       for (std::size_t i = ground + points; i < order.size(); ++i) {
         REQUIRE(scan.labels[order[i]] == PointLabel::kInvalid);
@@ -128,22 +132,27 @@ TEST_CASE("verdicts by point_run are those by point, at once and after more wind
     };
 
     const std::vector<ClusterVerdict> first = random_verdicts(random);
-    hear(scan.point_runs, first);
-    detail::record_first(scan, first);
-    detail::begin_verdict(scan);
-    detail::write_by_windows(scan, first);
-    check(1);
+    add(scan.windows.point_runs, first);
+    detail::WindowVoter::record_first(points, first, scan.windows);
+    writer.begin(scan, first_cluster);
+    writer.write_runs(scan, scan.windows.point_runs, [&](std::uint32_t cluster) {
+      return cluster == kNoCluster ? detail::PointVerdict() : detail::point_verdict(first[cluster]);
+    });
+    check(1, false);
 
     const std::size_t windows = random.index(4);
     for (std::size_t k = 0; k < windows; ++k) {
       const std::vector<PointRun> point_runs = random_runs(random, points);
       const std::vector<ClusterVerdict> verdicts = random_verdicts(random);
-      hear(point_runs, verdicts);
-      detail::record_again(scan, point_runs, verdicts, room);
+      add(point_runs, verdicts);
+      voter.record_again(points, point_runs, verdicts, scan.windows);
     }
     const int votes = 1 + static_cast<int>(random.index(3));
-    detail::rewrite_by_windows(scan, votes);
-    check(votes);
+    writer.begin_final(scan);
+    detail::WindowVoter::for_each_unsettled(points, scan.windows, [&](std::size_t i) {
+      writer.points(scan).write(ground + i, detail::point_verdict(scan.windows, i, votes));
+    });
+    check(votes, true);
   }
 }
 
@@ -182,19 +191,19 @@ EvidenceVerdict::Group random_group(Random& random) {
 }
 
 TEST_CASE("verdicts by evidence are those of the point's group, at once and again") {
-  detail::VerdictScratch scratch;
+  detail::VerdictWriter writer;
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
     INFO("seed " << seed);
     Random random(seed);
     JudgedScan scan(random);
     detail::ScanSlot& slot = scan.slot;
-    const bool compared = random.index(2) == 0;
+    const bool has_windows = random.index(2) == 0;
     const std::size_t above = scan.group_of.size();
-    if (compared) {
+    if (has_windows) {
       for (std::size_t i = 0; i < above; ++i) {
-        slot.reach.push_back(kReaches[random.index(4)]);
-        slot.votes.push_back(static_cast<std::uint8_t>(random.index(4)));
-        slot.belief.push_back(random.uniform_float(0.0, 1.0));
+        slot.windows.stage.push_back(kStages[random.index(4)]);
+        slot.windows.votes.push_back(static_cast<std::uint8_t>(random.index(4)));
+        slot.windows.belief.push_back(random.uniform_float(0.0, 1.0));
       }
     }
     std::vector<EvidenceVerdict::Group> groups(kGroups);
@@ -213,9 +222,9 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
       for (std::size_t i = 0; i < above; ++i) {
         const std::uint32_t to = slot.split.input[scan.ground + i];
         EvidenceVerdict::Group expected = groups[scan.group_of[i]];
-        if (compared && slot.reach[i] == Reach::kProposed) {
-          expected.belief = std::max(expected.belief, slot.belief[i]);
-          if (!is_dynamic(expected.cause) && slot.votes[i] >= votes) {
+        if (has_windows && slot.windows.stage[i] == DecisionStage::kProposed) {
+          expected.belief = std::max(expected.belief, slot.windows.belief[i]);
+          if (!is_dynamic(expected.cause) && slot.windows.votes[i] >= votes) {
             expected.cause = Cause::kProposed;
           }
         }
@@ -225,7 +234,7 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
         REQUIRE(slot.beliefs[to] == expected.belief);
         REQUIRE(slot.instances[to] ==
                 (scan.cluster_of[i] == kNoCluster ? kNoInstance : 100 + scan.cluster_of[i]));
-        if (is_final) REQUIRE(slot.is_kept[scan.ground + i] == (dynamic ? 0 : 1));
+        if (is_final) REQUIRE(writer.is_kept()[scan.ground + i] == (dynamic ? 0 : 1));
       }
       for (std::uint32_t i = 0; i < scan.ground; ++i) {
         const std::uint32_t to = slot.split.input[i];
@@ -235,7 +244,7 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
         REQUIRE(slot.causes[to] == (dynamic ? Cause::kUnderInstance : Cause::kGround));
         REQUIRE(slot.beliefs[to] == (dynamic ? 0.75F : 0.0F));
         REQUIRE(slot.instances[to] == kNoInstance);
-        if (is_final) REQUIRE(slot.is_kept[i] == (dynamic ? 0 : 1));
+        if (is_final) REQUIRE(writer.is_kept()[i] == (dynamic ? 0 : 1));
       }
       std::size_t outside = 0;
       for (std::size_t i = 0; i < slot.labels.size(); ++i) {
@@ -251,19 +260,33 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
     change();
     // Left in its slot by an earlier scan.
     for (std::uint32_t i = 0; i < slot.split.count; i += 3) slot.moved_ground.push_back(i);
-    slot.proof.assign(random.index(2 * kGroups), random_group(random));
-    detail::write_instances(slot, scan.cluster_of);
-    detail::write_by_evidence(slot, {groups, scan.group_of, moved}, compared, scratch);
+    slot.written_groups.assign(random.index(2 * kGroups), random_group(random));
+    writer.begin(slot, scan.cluster_of);
+    writer.write_groups(slot, {groups, scan.group_of, moved});
+    if (has_windows) detail::add_proposals(slot, {groups, scan.group_of, moved}, 1, writer);
     check(1, false);
     for (int again = 0; again < 2; ++again) {
       change();
-      for (std::size_t i = 0; i < slot.reach.size(); ++i) {
-        if (random.index(4) == 0) slot.reach[i] = Reach::kProposed;
+      for (DecisionStage& stage : slot.windows.stage) {
+        if (random.index(4) == 0) stage = DecisionStage::kProposed;
       }
-      detail::rewrite_by_evidence(slot, {groups, scan.group_of, moved}, compared, 2, scratch);
+      writer.begin_final(slot);
+      writer.rewrite_groups(slot, {groups, scan.group_of, moved});
+      if (has_windows) detail::add_proposals(slot, {groups, scan.group_of, moved}, 2, writer);
       check(2, true);
     }
   }
+}
+
+TEST_CASE("of two verdicts dynamic wins, the first one's cause, and the higher belief") {
+  const EvidenceVerdict::Group stays = {Cause::kOccupied, 0.5F};
+  const EvidenceVerdict::Group goes = {Cause::kFreeSpace, 0.8F};
+  const EvidenceVerdict::Group proposed = {Cause::kProposed, 0.9F};
+  const EvidenceVerdict::Group reverted = {Cause::kReverted, 0.6F};
+  CHECK((detail::stronger(stays, proposed) == proposed));
+  CHECK((detail::stronger(goes, proposed) == EvidenceVerdict::Group{Cause::kFreeSpace, 0.9F}));
+  CHECK((detail::stronger(stays, reverted) == EvidenceVerdict::Group{Cause::kOccupied, 0.6F}));
+  CHECK((detail::stronger(goes, reverted) == goes));
 }
 
 TEST_CASE("ids go to the cluster that got most points, whatever the point_runs") {

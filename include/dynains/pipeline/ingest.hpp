@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dynains/ground/point_record.hpp"
+#include "dynains/pipeline/cloud_view.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor/rotation.hpp"
@@ -26,11 +27,10 @@ class Ingest {
   /// Points outside [min_range, max_range] (m, in the sensor's x-y plane), higher or lower than
   /// max_range or without finite coordinates stay out; a point at the origin is a beam that did not
   /// return. What is taken in is turned by `R`, unless there is none.
-  template <class Cloud>
-  void read(const Cloud& cloud, float min_range, float max_range, const Eigen::Matrix3f* R,
+  void read(const CloudView& cloud, float min_range, float max_range, const Eigen::Matrix3f* R,
             std::vector<PointLabel>& labels) {
     const PackTransform turned = turning(R != nullptr ? *R : Eigen::Matrix3f::Identity());
-    const std::size_t count = PointCloudTraits<Cloud>::size(cloud);
+    const std::size_t count = cloud.size();
     ensure_capacity(labels, count);
     labels.resize(count);
     points_.grow(count + kMaxPackWidth);
@@ -61,16 +61,12 @@ class Ingest {
   static constexpr std::size_t kPiece = 128;
 
   // Puts points behind those that were taken in, whatever they are.
-  template <class Cloud>
-  void copy(const Cloud& cloud, std::size_t begin, std::size_t length) {
-    float* const x = points_.x.data() + count_;
-    float* const y = points_.y.data() + count_;
-    float* const z = points_.z.data() + count_;
-    for (std::size_t i = 0; i < length; ++i) {
-      const auto p = PointCloudTraits<Cloud>::point(cloud, begin + i);
-      x[i] = p.x();
-      y[i] = p.y();
-      z[i] = p.z();
+  void copy(const CloudView& cloud, std::size_t begin, std::size_t length) {
+    if (cloud.raw_floats() != nullptr) {
+      copy(*cloud.raw_floats(), begin, length);
+    } else {
+      cloud.copy(begin, length, points_.x.data() + count_, points_.y.data() + count_,
+                 points_.z.data() + count_);
     }
   }
 

@@ -7,16 +7,16 @@ namespace dynains {
 
 /// Milliseconds per stage of one call.
 struct StageTimes {
-  double ingest = 0.0;      ///< copying the cloud, sorting out bad points
+  double ingest = 0.0;      ///< copy of the cloud, labels of bad points
   double ground = 0.0;      ///< ground segmentation
   double window = 0.0;      ///< Eq. 3
-  double cluster = 0.0;     ///< curved voxels and separation, Eq. 4
+  double cluster = 0.0;     ///< curved voxels and separation by scan, Eq. 4
   double descriptor = 0.0;  ///< Eq. 5-12 and, for proposals, the belief of Eq. 13-19
   double evidence = 0.0;    ///< free space seen by other scans
-  double judge = 0.0;       ///< from that to verdicts, also of ground; images of references
+  double judge = 0.0;       ///< verdicts from that, also on ground; images of references
   double verdict = 0.0;     ///< from clusters and groups to points
   double map = 0.0;         ///< Eq. 1
-  double revision = 0.0;    ///< of the map, by what the newest scan sees
+  double revision = 0.0;    ///< revision of the map by the newest scan
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
@@ -39,17 +39,26 @@ struct StageTimes {
   }
 };
 
-/// Adds the time since the last lap to a field of StageTimes.
-class StageClock {
+namespace detail {
+
+/// Measures the stages of one call.
+class StageTimer {
  public:
-  void lap(double& milliseconds) {
-    const auto now = std::chrono::steady_clock::now();
-    milliseconds += std::chrono::duration<double, std::milli>(now - last_).count();
-    last_ = now;
+  const StageTimes& times() const { return times_; }
+
+  /// Runs `work` and adds its time to a field of times().
+  template <class Work>
+  void measure(double StageTimes::*stage, Work&& work) {
+    const auto begin = std::chrono::steady_clock::now();
+    work();
+    const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - begin;
+    times_.*stage += time.count();
   }
 
  private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+  StageTimes times_;
 };
+
+}  // namespace detail
 
 }  // namespace dynains

@@ -15,6 +15,7 @@
 #include "dynains/stage/evidence_verdict.hpp"
 #include "dynains/stage/ground_split.hpp"
 #include "dynains/stage/polar_points.hpp"
+#include "dynains/stage/stage_configs.hpp"
 
 namespace dynains::detail {
 
@@ -110,16 +111,6 @@ struct IsRevisable<Map, Evidence,
                                    std::declval<const PointBuffer&>(), std::size_t{},
                                    std::declval<const Eigen::Isometry3d&>()))>> : std::true_type {};
 
-/// Stages::Evidence, or `Default` for sets of stages that name the paper's five only.
-template <class Stages, class Default, class = void>
-struct EvidenceOf {
-  using type = Default;
-};
-template <class Stages, class Default>
-struct EvidenceOf<Stages, Default, std::void_t<typename Stages::Evidence>> {
-  using type = typename Stages::Evidence;
-};
-
 /// Whether a stage wants to know the sensor: `needs_sensor()` and `adapt(const SensorModel&)` are
 /// optional.
 template <class Stage, class = void>
@@ -143,13 +134,7 @@ void adapt_stage(Stage& stage, const SensorModel& sensor) {
   if constexpr (WantsSensor<Stage>::value) stage.adapt(sensor);
 }
 
-/// Whether `Operation<T>` can be named: whether T offers what may be there or not.
-template <template <class> class Operation, class T, class = void>
-struct Offers : std::false_type {};
-template <template <class> class Operation, class T>
-struct Offers<Operation, T, std::void_t<Operation<T>>> : std::true_type {};
-
-/// Lets a stage get its own memory for scans to come; `reserve(std::size_t scans)` is optional.
+/// Lets a stage get its memory for so many scans; `reserve(std::size_t scans)` is optional.
 template <class Stage>
 using Reserve = decltype(std::declval<Stage&>().reserve(std::size_t{}));
 template <class Stage>
@@ -164,30 +149,6 @@ using Keep = decltype(std::declval<Stage&>().keep(std::size_t{}));
 template <class Stage>
 void keep_in_stage(Stage& stage, std::size_t scans) {
   if constexpr (Offers<Keep, Stage>::value) stage.keep(scans);
-}
-
-/// Scans from one reference of an evidence to the next; one that does not say so keeps them all.
-template <class Config>
-using ReferenceStep = decltype(std::declval<Config&>().reference_step);
-template <class Config>
-int reference_step(const Config& config) {
-  if constexpr (Offers<ReferenceStep, Config>::value) {
-    return config.reference_step;
-  } else {
-    return 1;
-  }
-}
-
-/// The paper's parameters of a stage; a stage without `Config::paper()` keeps its defaults.
-template <class Config>
-using Paper = decltype(Config::paper());
-template <class Config>
-Config paper_config() {
-  if constexpr (Offers<Paper, Config>::value) {
-    return Config::paper();
-  } else {
-    return Config();
-  }
 }
 
 }  // namespace dynains::detail

@@ -1,4 +1,4 @@
-// A scan that nobody took, for stages to get their memory by.
+// Scans that are pushed and forgotten, so that buffers have their sizes before the first real scan.
 #pragma once
 
 #include <algorithm>
@@ -8,8 +8,8 @@
 
 namespace dynains::detail {
 
-/// Coordinates of `points` points, one after another: a street between two walls, scanned ring by
-/// ring. Half of them are ground, as on most scans.
+/// Coordinates x, y, z of `points` points: a street between two walls, scanned ring by ring. Half
+/// of them are ground, as on most scans.
 inline std::vector<float> synthetic_scan(std::size_t points) {
   constexpr double kHeight = 1.7, kHalfStreet = 12.0, kFarthest = 60.0;  // m
   constexpr std::size_t kRings = 64;
@@ -31,5 +31,22 @@ inline std::vector<float> synthetic_scan(std::size_t points) {
   }
   return xyz;
 }
+
+/// While it lives, scans that are pushed do not enter the map, which may be on a disk; at its end
+/// the pipeline forgets them.
+template <class Pipeline>
+class WarmUp {
+ public:
+  explicit WarmUp(Pipeline& pipeline) : pipeline_(pipeline) { pipeline_.build_map_ = false; }
+  WarmUp(const WarmUp&) = delete;
+  WarmUp& operator=(const WarmUp&) = delete;
+  ~WarmUp() {
+    pipeline_.build_map_ = pipeline_.config_.build_map;
+    pipeline_.forget_scans();
+  }
+
+ private:
+  Pipeline& pipeline_;
+};
 
 }  // namespace dynains::detail

@@ -1,0 +1,231 @@
+// The pipeline of Section II of the paper: from a scan and its pose to verdicts and a static map.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "dynains/config.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/free_space_evidence.hpp"
+#include "dynains/ground_segmenter.hpp"
+#include "dynains/pipeline/cloud_view.hpp"
+#include "dynains/pipeline/decisions.hpp"
+#include "dynains/pipeline/ingest.hpp"
+#include "dynains/pipeline/scan_decision.hpp"
+#include "dynains/pipeline/scan_ring.hpp"
+#include "dynains/pipeline/scan_slot.hpp"
+#include "dynains/pipeline/scan_window.hpp"
+#include "dynains/pipeline/stage_times.hpp"
+#include "dynains/pipeline/verdict_writer.hpp"
+#include "dynains/pipeline/warm_up.hpp"
+#include "dynains/points.hpp"
+#include "dynains/sensor/level_frame.hpp"
+#include "dynains/sensor/sensor_model.hpp"
+#include "dynains/stage/contracts.hpp"
+#include "dynains/verdict.hpp"
+
+namespace dynains::detail {
+
+/// Owns the stages and every buffer. Calls and errors are those of BasicDynaInsRemover.
+template <class Stages>
+class Pipeline {
+ public:
+  using Config = PipelineConfig<Stages>;
+  using Ground = typename Stages::Ground;
+  using Clusterer = typename Stages::Clusterer;
+  using Descriptor = typename Stages::Descriptor;
+  using Belief = typename Stages::Belief;
+  using Evidence = typename Config::Evidence;
+  using Map = typename Stages::Map;
+
+  static_assert(IsConfigurable<Ground>::value && IsGround<Ground>::value,
+                "Stages::Ground needs Config and segment(PointsView, numbers, GroundSplit&)");
+  static_assert(IsConfigurable<Clusterer>::value && IsClusterer<Clusterer>::value,
+                "Stages::Clusterer needs Config, cluster(PolarView) and cluster_count()");
+  static_assert(IsConfigurable<Descriptor>::value && IsDescriptor<Descriptor>::value,
+                "Stages::Descriptor needs Config, describe(ClusterView), describe_rest(), "
+                "heights(k), cluster_heights() and proposes_dynamic()");
+  static_assert(IsConfigurable<Belief>::value && IsBelief<Belief>::value,
+                "Stages::Belief needs Config, reset(), update(heights, heights), posterior() and "
+                "is_dynamic()");
+  static_assert(IsConfigurable<Evidence>::value && IsEvidence<Evidence>::value,
+                "Stages::Evidence needs Config, adapt(SensorModel), observe(...), judge(...), "
+                "predecessors() and horizon()");
+  static_assert(IsConfigurable<Map>::value && IsMap<Map>::value,
+                "Stages::Map needs Config, insert(PointsView, flags, T_world_sensor) and clear()");
+
+  explicit Pipeline(const Config& config)
+      : config_(validated(config)),
+        build_map_(config.build_map),
+        frame_(config.level, config.mounting_pitch, config.mounting_roll),
+        ground_(config.ground),
+        clusterer_(config.clusterer),
+        decision_(make_decision<Stages>(config)),
+        map_(config.map),
+        scans_(std::max({decision_->window_length(), latency() + 1, kFewestSlots})) {}
+  // The clusters of window_ are those that clusterer_ holds.
+  Pipeline(const Pipeline&) = delete;
+  Pipeline& operator=(const Pipeline&) = delete;
+
+  const Config& config() const { return config_; }
+  const Map& map() const { return map_; }
+  std::size_t latency() const { return decision_->latency(); }
+  const SensorModel& sensor() const { return frame_.sensor(); }
+  double next_time() const { return scans_.next_time(); }
+
+  FrameResult push(const CloudView& cloud, const Eigen::Isometry3d& T_world_sensor, double time);
+
+  /// The final verdict on the oldest scan without one; nothing if all scans have one.
+  std::optional<ScanVerdict> finish_oldest() {
+    StageTimer timer;
+    if (scans_.open() == 0) return std::nullopt;
+    return finish_oldest(timer);
+  }
+
+  void start_epoch() { scans_.start_epoch(); }
+
+  void reserve_like(const CloudView& example, std::size_t scans);
+
+  void reset() {
+    map_.clear();
+    forget_scans();
+  }
+
+ private:
+  friend class WarmUp<Pipeline>;
+  static constexpr std::size_t kFewestSlots = 2;  // ids go from scan to scan
+
+  static const Config& validated(const Config& config) {
+    config.validate();
+    if (config.revision.revise_map && !IsRevisable<Map, Evidence>::value) {
+      throw ConfigError("MapRevision.revise_map = true needs a map that is kept in memory");
+    }
+    return config;
+  }
+
+  void ingest(const CloudView& cloud, ScanSlot& next);
+  void find_sensor(ScanSlot& newest);
+  Eigen::Matrix3f level(ScanSlot& scan) const;
+  ScanVerdict finish_oldest(StageTimer& timer);
+
+  // Keeps the map and the capacity of buffers.
+  void forget_scans() {
+    decision_->clear();
+    frame_.forget();
+    scans_.clear();
+  }
+
+  Config config_;
+  bool build_map_;
+  LevelFrame frame_;
+  Ingest ingest_;
+  Ground ground_;
+  ScanWindow window_;
+  Clusterer clusterer_;
+  std::unique_ptr<ScanDecision<Map>> decision_;
+  VerdictWriter writer_;
+  Map map_;
+  ScanRing scans_;
+};
+
+template <class Stages>
+FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Eigen::Isometry3d& T_world_sensor,
+                                   double time) {
+  StageTimer timer;
+  ScanSlot& newest = scans_.prepare(T_world_sensor, time, config_);
+  timer.measure(&StageTimes::ingest, [&] { ingest(cloud, newest); });
+  PushTransaction transaction(scans_, newest);
+  timer.measure(&StageTimes::ingest, [&] { find_sensor(newest); });
+  timer.measure(&StageTimes::ground,
+                [&] { ground_.segment(ingest_.points(), ingest_.input(), newest.split); });
+  timer.measure(&StageTimes::window,
+                [&] { window_.gather(scans_, decision_->window_length()); });  // Eq. 3
+  timer.measure(&StageTimes::cluster, [&] { window_.cluster(clusterer_); });   // Eq. 4
+  decision_->observe(scans_, window_, timer);                                  // Eq. 4-18
+  timer.measure(&StageTimes::verdict, [&] { writer_.begin(newest, window_.newest_cluster_of()); });
+  decision_->judge_newest(newest, writer_, timer);  // Eq. 19, 2
+  transaction.commit();
+  FrameResult result{newest.verdict(), {}, {}};
+  if (scans_.open() > latency()) result.finished = finish_oldest(timer);  // Eq. 1
+  timer.measure(&StageTimes::revision, [&] { decision_->revise(map_, newest); });
+  result.times = timer.times();
+  return result;
+}
+
+/// Eq. 2 and Eq. 1. If the map throws, the scan counts as final all the same: its slot is needed.
+template <class Stages>
+ScanVerdict Pipeline<Stages>::finish_oldest(StageTimer& timer) {
+  ScanSlot& scan = scans_.finish_oldest();
+  decision_->judge_final(scan, writer_, timer);
+  if (build_map_) {
+    const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
+    timer.measure(&StageTimes::map,
+                  [&] { map_.insert(points, writer_.is_kept(), scan.T_world_level); });
+  }
+  return scan.verdict();
+}
+
+/// Good points as a level sensor that looks along the scene sees them, and labels of bad points.
+template <class Stages>
+void Pipeline<Stages>::ingest(const CloudView& cloud, ScanSlot& next) {
+  const auto nearest = static_cast<float>(config_.min_range);
+  const auto farthest = static_cast<float>(config_.max_range);
+  if (frame_.turns()) {
+    const Eigen::Matrix3f R_level_sensor = level(next);
+    ingest_.read(cloud, nearest, farthest, &R_level_sensor, next.labels);
+  } else {
+    ingest_.read(cloud, nearest, farthest, nullptr, next.labels);
+  }
+  next.ensure_capacity(next.labels.size());
+}
+
+/// Adapts the stages to the sensor by the first scan that has enough points to estimate it.
+template <class Stages>
+void Pipeline<Stages>::find_sensor(ScanSlot& newest) {
+  const bool is_needed = decision_->needs_sensor() || config_.level || needs_sensor(ground_) ||
+                         needs_sensor(clusterer_);
+  if (!is_needed || sensor().known()) return;
+  frame_.estimate(ingest_.points());
+  if (sensor().known() && newest.scan > 0) newest.epoch = scans_.start_epoch();
+  const SensorModel model = sensor().known() ? sensor() : SensorModel::typical();
+  try {
+    adapt_stage(ground_, model);
+    adapt_stage(clusterer_, model);
+    decision_->adapt(model);
+  } catch (...) {
+    frame_.forget();  // so that the next scan adapts all of them
+    throw;
+  }
+  if (frame_.turns()) ingest_.turn(level(newest));
+}
+
+/// Levels the pose of the scan. Gives the rotation for its points.
+template <class Stages>
+Eigen::Matrix3f Pipeline<Stages>::level(ScanSlot& scan) const {
+  const Eigen::Matrix3d R_level_sensor = sensor().R_level_sensor();
+  scan.T_world_level.rotate(R_level_sensor.transpose());
+  return R_level_sensor.cast<float>();
+}
+
+template <class Stages>
+void Pipeline<Stages>::reserve_like(const CloudView& example, std::size_t scans) {
+  if (scans_.pushed() > 0) throw UsageError("memory is reserved before the first push");
+  if (scans == 0) return;
+  // Scans of one sensor differ a little in size.
+  const std::size_t points = example.size() + example.size() / 16;
+  for (std::size_t i = 0; i < std::min(scans, scans_.capacity()); ++i) scans_[i].touch(points);
+  const WarmUp<Pipeline> warm_up(*this);
+  // The fourth scan has been compared with another one, whatever the decision.
+  const std::size_t enough = std::max<std::size_t>(decision_->window_length(), 4);
+  for (std::size_t i = 0; i < std::min(scans, enough); ++i) {
+    push(example, Eigen::Isometry3d::Identity(), next_time());
+  }
+  for (ScanSlot& slot : scans_.slots()) slot.ensure_capacity_like(scans_.newest());
+  decision_->reserve(scans);
+}
+
+}  // namespace dynains::detail

@@ -1,0 +1,108 @@
+// The scans whose verdicts are open, and the count of all scans.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "dynains/config.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/pipeline/scan_slot.hpp"
+#include "dynains/pose.hpp"
+
+namespace dynains::detail {
+
+/// Ring of scans, numbered from 0. Scans become final in the order in which they came.
+class ScanRing {
+ public:
+  explicit ScanRing(std::size_t capacity) : slots_(capacity) {}
+
+  std::size_t capacity() const { return slots_.size(); }
+  std::uint64_t pushed() const { return pushed_; }
+  /// Scans without a final verdict.
+  std::uint64_t open() const { return pushed_ - finished_; }
+  /// Time for a scan that comes without one: 0.1 s after the scan before.
+  double next_time() const { return pushed_ == 0 ? 0.0 : last_time_ + 0.1; }
+
+  ScanSlot& operator[](std::uint64_t scan) { return slots_[scan % slots_.size()]; }
+  ScanSlot& newest() { return (*this)[pushed_ - 1]; }
+  std::vector<ScanSlot>& slots() { return slots_; }
+
+  /// The slot for the next scan, which does not count yet: see PushTransaction. Throws PoseError.
+  ScanSlot& prepare(const Eigen::Isometry3d& T_world_sensor, double time,
+                    const RemoverConfig& config) {
+    validate_pose("T_world_sensor", T_world_sensor);
+    validate_time(time);
+    ScanSlot& next = (*this)[pushed_];
+    next.scan = pushed_;
+    next.epoch = epoch_;
+    if (pushed_ > 0) {
+      const Eigen::Vector3d step =
+          T_world_sensor.translation() - newest().T_world_sensor.translation();
+      if (config.starts_epoch(time - last_time_, step.norm())) ++next.epoch;
+    }
+    next.time = time;
+    next.T_world_sensor = orthonormalized(T_world_sensor);
+    next.T_world_level = next.T_world_sensor;
+    return next;
+  }
+
+  /// The oldest scan without a final verdict, which from now on has one.
+  ScanSlot& finish_oldest() { return (*this)[finished_++]; }
+
+  /// Begins an epoch with the next scan. Gives its number.
+  std::uint64_t start_epoch() { return ++epoch_; }
+
+  void clear() {
+    pushed_ = 0;
+    finished_ = 0;
+    start_epoch();
+  }
+
+ private:
+  friend class PushTransaction;
+
+  void validate_time(double time) const {
+    if (std::isfinite(time) && (pushed_ == 0 || time > last_time_)) return;
+    throw PoseError("time = " + std::to_string(time) + " s must be finite and greater than " +
+                    (pushed_ > 0 ? std::to_string(last_time_) : std::string("-inf")) +
+                    ", the time of the scan before");
+  }
+
+  std::vector<ScanSlot> slots_;
+  std::uint64_t pushed_ = 0;
+  std::uint64_t finished_ = 0;
+  std::uint64_t epoch_ = 0;
+  double last_time_ = 0.0;  // s, of the newest scan
+};
+
+/// Counts a prepared scan in. Counts it out again unless commit() is called: stages may have seen
+/// it by then, so that the next scan begins an epoch.
+class PushTransaction {
+ public:
+  PushTransaction(ScanRing& ring, const ScanSlot& prepared)
+      : ring_(ring), time_before_(ring.last_time_) {
+    ++ring_.pushed_;
+    ring_.epoch_ = prepared.epoch;
+    ring_.last_time_ = prepared.time;
+  }
+  PushTransaction(const PushTransaction&) = delete;
+  PushTransaction& operator=(const PushTransaction&) = delete;
+  ~PushTransaction() {
+    if (committed_) return;
+    --ring_.pushed_;
+    ring_.start_epoch();
+    ring_.last_time_ = time_before_;
+  }
+  void commit() { committed_ = true; }
+
+ private:
+  ScanRing& ring_;
+  double time_before_;
+  bool committed_ = false;
+};
+
+}  // namespace dynains::detail

@@ -1,0 +1,162 @@
+// Verdicts of windows on clusters, and the votes that they make for each point of a scan.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#include "dynains/cause.hpp"
+#include "dynains/points.hpp"
+#include "dynains/simd/capacity.hpp"
+#include "dynains/stage/cluster_set.hpp"
+#include "dynains/stage/evidence_verdict.hpp"
+
+namespace dynains::detail {
+
+/// Cause and belief.
+using PointVerdict = EvidenceVerdict::Group;
+
+/// Step of the decision by windows at which the verdict on a cluster fell (Eq. 11-19), in order.
+enum class DecisionStage : std::uint8_t {
+  kNoCluster,    ///< the point belongs to no cluster
+  kTooFewScans,  ///< the cluster was not seen by both the oldest and the newest scan
+  kSimilar,      ///< similarity not below tau_s (Eq. 12)
+  kProposed,     ///< proposed as dynamic; belief and votes decide
+};
+
+/// What all windows so far decided on the non-ground points of one scan, in the order of its split.
+/// Stages are written in pieces: their arrays are longer than there are points.
+struct WindowVotes {
+  std::vector<DecisionStage> stage;    ///< latest stage reached in any window
+  std::vector<DecisionStage> settled;  ///< stage that the written verdict rests on for good;
+                                       ///< kNoCluster for proposed points, whose votes may change
+  std::vector<std::uint8_t> votes;     ///< of proposed points: windows that called them dynamic
+  std::vector<float> belief;           ///< of proposed points: highest posterior of any window
+  std::vector<ClusterSet::PointRun> point_runs;  ///< of the window in which the scan was the newest
+};
+
+/// Cause of a static verdict on a point whose cluster came to that stage.
+constexpr Cause static_cause(DecisionStage stage) {
+  constexpr std::array<Cause, 4> kCauses = {Cause::kNotJudged, Cause::kTooFewScans, Cause::kSimilar,
+                                            Cause::kReverted};
+  return kCauses[static_cast<std::size_t>(stage)];
+}
+
+/// Verdict of one window on one cluster.
+struct ClusterVerdict {
+  float belief = 0.0F;
+  std::uint8_t is_dynamic = 0;
+  DecisionStage stage = DecisionStage::kNoCluster;
+};
+
+inline PointVerdict point_verdict(const ClusterVerdict& verdict) {
+  return {verdict.is_dynamic != 0 ? Cause::kProposed : static_cause(verdict.stage), verdict.belief};
+}
+
+/// Verdict on non-ground point `i`: dynamic if at least `votes_needed` windows called it so.
+inline PointVerdict point_verdict(const WindowVotes& votes, std::size_t i, int votes_needed) {
+  const DecisionStage stage = votes.stage[i];
+  if (stage != DecisionStage::kProposed) return {static_cause(stage), 0.0F};
+  return {votes.votes[i] >= votes_needed ? Cause::kProposed : Cause::kReverted, votes.belief[i]};
+}
+
+/// Verdicts of the windows that see a scan, from clusters to votes by point.
+class WindowVoter {
+ public:
+  using PointRun = ClusterSet::PointRun;
+
+  /// First window, in which the scan is the newest and has the point runs `votes.point_runs`.
+  static void record_first(std::size_t point_count, Span<const ClusterVerdict> verdicts,
+                           WindowVotes& votes) {
+    votes.votes.resize(point_count);
+    votes.belief.resize(point_count);
+    votes.stage.resize(point_count + kPiece);
+    spread_stages(votes.point_runs, verdicts, votes.stage.data());
+    votes.settled = votes.stage;
+    for (const PointRun& run : votes.point_runs) {
+      const ClusterVerdict verdict = verdict_on(run, verdicts);
+      if (verdict.stage != DecisionStage::kProposed) continue;
+      const std::size_t length = run.end - run.begin;
+      std::fill_n(votes.votes.data() + run.begin, length, verdict.is_dynamic);
+      std::fill_n(votes.belief.data() + run.begin, length, verdict.belief);
+      std::fill_n(votes.settled.data() + run.begin, length, DecisionStage::kNoCluster);
+    }
+  }
+
+  /// A later window, which cuts the points of the scan into other runs.
+  void record_again(std::size_t point_count, Span<const PointRun> point_runs,
+                    Span<const ClusterVerdict> verdicts, WindowVotes& votes) {
+    for (const PointRun& run : point_runs) {
+      const ClusterVerdict verdict = verdict_on(run, verdicts);
+      if (verdict.stage == DecisionStage::kProposed) add_vote(run, verdict, votes);
+    }
+    grow(stage_in_window_, votes.stage.size());
+    spread_stages(point_runs, verdicts, stage_in_window_.data());
+    raise_stages(stage_in_window_.data(), point_count, votes.stage.data());
+  }
+
+  /// Calls `visit(i)` for each non-ground point whose final verdict may differ from the first one:
+  /// proposed points and those that a later window brought to a later stage.
+  template <class Visit>
+  static void for_each_unsettled(std::size_t point_count, const WindowVotes& votes, Visit&& visit) {
+    constexpr std::size_t kBlock = 8;
+    const DecisionStage* const stage = votes.stage.data();
+    const DecisionStage* const settled = votes.settled.data();
+    for (std::size_t begin = 0; begin < point_count; begin += kBlock) {
+      if (std::memcmp(stage + begin, settled + begin, kBlock) == 0) continue;
+      const std::size_t end = std::min(begin + kBlock, point_count);
+      for (std::size_t i = begin; i < end; ++i) {
+        if (stage[i] != settled[i]) visit(i);
+      }
+    }
+  }
+
+ private:
+  static constexpr std::size_t kPiece = 16;
+  using Piece = std::array<DecisionStage, kPiece>;
+
+  static ClusterVerdict verdict_on(const PointRun& run, Span<const ClusterVerdict> verdicts) {
+    return run.cluster != kNoCluster ? verdicts[run.cluster] : ClusterVerdict();
+  }
+
+  static void add_vote(const PointRun& run, const ClusterVerdict& verdict, WindowVotes& votes) {
+    for (std::size_t i = run.begin; i < run.end; ++i) {
+      const bool is_first = votes.stage[i] != DecisionStage::kProposed;
+      votes.votes[i] =
+          static_cast<std::uint8_t>((is_first ? 0 : votes.votes[i]) + verdict.is_dynamic);
+      votes.belief[i] = is_first ? verdict.belief : std::max(votes.belief[i], verdict.belief);
+      votes.settled[i] = DecisionStage::kNoCluster;
+    }
+  }
+
+  // The stage of each run's cluster by point. Most runs are short: they are written in pieces of
+  // constant length, of which the next run overwrites the end, up to kPiece places behind the last.
+  static void spread_stages(Span<const PointRun> point_runs, Span<const ClusterVerdict> verdicts,
+                            DecisionStage* stage) {
+    for (const PointRun& run : point_runs) {
+      Piece piece;
+      piece.fill(verdict_on(run, verdicts).stage);
+      for (std::size_t i = run.begin; i < run.end; i += kPiece) {
+        std::memcpy(stage + i, piece.data(), sizeof(piece));
+      }
+    }
+  }
+
+  // The later of two stages, by pieces that compilers hold in one register.
+  static void raise_stages(const DecisionStage* other, std::size_t count, DecisionStage* stage) {
+    for (std::size_t begin = 0; begin < count; begin += kPiece) {
+      Piece a, b;
+      std::memcpy(a.data(), stage + begin, kPiece);
+      std::memcpy(b.data(), other + begin, kPiece);
+      for (std::size_t k = 0; k < kPiece; ++k) a[k] = a[k] < b[k] ? b[k] : a[k];
+      std::memcpy(stage + begin, a.data(), kPiece);
+    }
+  }
+
+  std::vector<DecisionStage> stage_in_window_;  // of one scan in the window at hand
+};
+
+}  // namespace dynains::detail
