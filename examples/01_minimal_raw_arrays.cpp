@@ -1,6 +1,6 @@
 // Scans as plain arrays in, labels and a static map out.
 #include <cstdio>
-#include <dynains/dyna_ins_remover.hpp>
+#include <dynains/remover.hpp>
 #include <vector>
 
 // In place of your driver: a wall 10 m ahead, and a box that moves to the left at 5 m/s.

@@ -1,6 +1,6 @@
 // Your own cloud type goes in as it is: tell dynains how many points it has and where they are.
 #include <cstdio>
-#include <dynains/dyna_ins_remover.hpp>
+#include <dynains/remover.hpp>
 #include <vector>
 
 struct Return {

@@ -1,6 +1,6 @@
 // Inside an odometry: moving points leave the newest scan before it is registered.
 #include <cstdio>
-#include <dynains/dyna_ins_remover.hpp>
+#include <dynains/remover.hpp>
 #include <vector>
 
 using Cloud = std::vector<Eigen::Vector3d>;

@@ -11,7 +11,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <dynains/dyna_ins_remover.hpp>
+#include <dynains/remover.hpp>
 #include <dynains/simulation/simulator.hpp>
 #include <map>
 #include <nanoflann.hpp>

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "command.hpp"
-#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/remover.hpp"
 #include "parameter_flags.hpp"
 #include "preset.hpp"
 

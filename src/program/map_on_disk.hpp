@@ -3,8 +3,8 @@
 
 #include <filesystem>
 
-#include "dynains/dyna_ins_remover.hpp"
 #include "dynains/io/tiled_map.hpp"
+#include "dynains/remover.hpp"
 
 namespace dynains::program {
 
@@ -15,22 +15,10 @@ using RemoverWithMapOnDisk = BasicDynaInsRemover<StagesWithMapOnDisk>;
 
 /// The same configuration with the map in `folder` and no more than `megabytes` of it in memory.
 /// Throws ConfigError.
-inline RemoverWithMapOnDisk::Config with_map_on_disk(const DynaInsRemover::Config& config,
-                                                     const std::filesystem::path& folder,
-                                                     double megabytes) {
-  RemoverWithMapOnDisk::Config result;
-  static_cast<RemoverConfig&>(result) = static_cast<const RemoverConfig&>(config);
-  result.ground = config.ground;
-  result.clusterer = config.clusterer;
-  result.descriptor = config.descriptor;
-  result.belief = config.belief;
-  result.evidence = config.evidence;
-  result.revision = config.revision;
-  result.map.map_voxel = config.map.map_voxel;
-  result.map.map_memory = megabytes;
-  result.map.map_folder = folder;
-  result.validate();
-  return result;
-}
+RemoverWithMapOnDisk::Config with_map_on_disk(const DynaInsRemover::Config& config,
+                                              const std::filesystem::path& folder,
+                                              double megabytes);
 
 }  // namespace dynains::program
+
+extern template class dynains::BasicDynaInsRemover<dynains::program::StagesWithMapOnDisk>;

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/remover.hpp"
 
 namespace dynains::program {
 

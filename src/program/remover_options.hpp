@@ -4,7 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/remover.hpp"
 #include "parameter_flags.hpp"
 
 namespace dynains::program {

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "command.hpp"
-#include "dynains/dyna_ins_remover.hpp"
 #include "dynains/io/diagnosis.hpp"
 #include "dynains/io/folder_lock.hpp"
+#include "dynains/remover.hpp"
 #include "evaluation_options.hpp"
 #include "interrupt.hpp"
 #include "lone_scans.hpp"

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "dynains/dyna_ins_remover.hpp"
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/pipeline/stage_times.hpp"
+#include "dynains/remover.hpp"
 #include "labelled_sequence.hpp"
 
 namespace dynains::program {

@@ -1,5 +1,5 @@
 #include "bindings.hpp"
-#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/remover.hpp"
 #include "parameters.hpp"
 
 namespace dynains::python {

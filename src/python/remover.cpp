@@ -1,3 +1,5 @@
+#include "dynains/remover.hpp"
+
 #include <pybind11/stl.h>
 
 #include <cstdint>
@@ -7,7 +9,6 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
-#include "dynains/dyna_ins_remover.hpp"
 #include "parameters.hpp"
 
 namespace dynains::python {

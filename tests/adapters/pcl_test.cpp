@@ -6,8 +6,8 @@
 
 #include "adapters/message.hpp"
 #include "dynains/adapters/point_cloud2.hpp"
+#include "dynains/remover.hpp"
 #include "support/catch.hpp"
-#include "support/remover.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 

@@ -3,8 +3,8 @@
 #include <limits>
 
 #include "adapters/message.hpp"
+#include "dynains/remover.hpp"
 #include "support/catch.hpp"
-#include "support/remover.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 

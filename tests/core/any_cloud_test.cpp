@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "dynains/remover.hpp"
 #include "support/catch.hpp"
-#include "support/remover.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 

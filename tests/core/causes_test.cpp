@@ -5,8 +5,8 @@
 #include <limits>
 #include <vector>
 
+#include "dynains/remover.hpp"
 #include "support/catch.hpp"
-#include "support/remover.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "dynains/errors.hpp"
+#include "dynains/remover.hpp"
 #include "support/catch.hpp"
-#include "support/remover.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 

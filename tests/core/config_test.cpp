@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "dynains/remover.hpp"
 #include "dynains/renamed_parameters.hpp"
 #include "support/catch.hpp"
-#include "support/remover.hpp"
 
 namespace dynains::test {
 namespace {

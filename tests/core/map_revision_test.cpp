@@ -8,11 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "dynains/dyna_ins_remover.hpp"
 #include "dynains/evidence/beam_test.hpp"
+#include "dynains/remover.hpp"
 #include "dynains/static_map_accumulator.hpp"
 #include "support/catch.hpp"
 #include "support/counting_map.hpp"
-#include "support/remover.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 #include "support/sights.hpp"

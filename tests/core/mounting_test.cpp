@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "dynains/io/kitti.hpp"
+#include "dynains/remover.hpp"
 #include "dynains/sensor/heading.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 #include "support/recordings.hpp"
-#include "support/remover.hpp"
 
 namespace {
 

@@ -3,9 +3,9 @@
 
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/io/kitti.hpp"
+#include "dynains/remover.hpp"
 #include "support/catch.hpp"
 #include "support/recordings.hpp"
-#include "support/remover.hpp"
 
 namespace dynains::test {
 namespace {

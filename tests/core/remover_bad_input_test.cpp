@@ -8,8 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/remover.hpp"
 #include "support/catch.hpp"
-#include "support/remover.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 

@@ -7,8 +7,8 @@
 #include <thread>
 #include <vector>
 
+#include "dynains/remover.hpp"
 #include "support/catch.hpp"
-#include "support/remover.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 

@@ -2,9 +2,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/remover.hpp"
 #include "support/catch.hpp"
 #include "support/counting_map.hpp"
-#include "support/remover.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "dynains/errors.hpp"
-#include "support/remover.hpp"
+#include "dynains/remover.hpp"
 #include "targets.hpp"
 
 namespace dynains::fuzz {

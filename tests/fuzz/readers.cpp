@@ -5,12 +5,12 @@
 #include <optional>
 #include <string>
 
-#include "dynains/dyna_ins_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/tiled_map.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/remover.hpp"
 #include "io/files.hpp"
 #include "kitti_files.hpp"
 #include "parameter_flags.hpp"

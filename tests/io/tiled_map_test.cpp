@@ -12,12 +12,13 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/dyna_ins_remover.hpp"
 #include "dynains/errors.hpp"
+#include "dynains/remover.hpp"
 #include "dynains/static_map_accumulator.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
-#include "support/remover.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 

@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "dynains/remover.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
-#include "support/remover.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <vector>
 
+#include "dynains/remover.hpp"
 #include "support/catch.hpp"
-#include "support/remover.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/remover.hpp"
 #include "support/scene.hpp"
 
 namespace dynains::test {

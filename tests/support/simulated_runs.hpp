@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "dynains/evaluation/evaluate.hpp"
+#include "dynains/remover.hpp"
 #include "dynains/simulation/simulator.hpp"
-#include "support/remover.hpp"
 
 namespace dynains::test {
 

@@ -1,0 +1,5 @@
+#include "dynains/remover.hpp"
+
+#include "dynains/dyna_ins_remover.hpp"
+
+template class dynains::BasicDynaInsRemover<>;

@@ -1,3 +1,0 @@
-#include "support/remover.hpp"
-
-template class dynains::BasicDynaInsRemover<>;
