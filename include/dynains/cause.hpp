@@ -1,4 +1,4 @@
-// Why a point got its verdict: what tells the next engineer where to work.
+// The reason for the verdict on a point.
 #pragma once
 
 #include <cstddef>
@@ -6,27 +6,26 @@
 
 namespace dynains {
 
-/// Cause of the verdict on one point. The numbers are those of the files OUT/causes/NNNNNN.cause
-/// that `dynains run` writes (one uint8 per input point, in input order): new causes are added at
-/// the end.
+/// Cause of the verdict on one point. `dynains run` writes these numbers to the files
+/// OUT/causes/NNNNNN.cause (one uint8 per input point, in input order): new causes go to the end.
 enum class Cause : std::uint8_t {
   kUnknown = 0,
-  kGround = 1,          ///< static: called ground
-  kSimilar = 2,         ///< static: occupancy hardly changed (similarity not below tau_s)
-  kReverted = 3,        ///< static: proposed as dynamic, reverted by belief or for want of votes
-  kTooFewPoints = 4,    ///< static: cluster too small to be judged (not by this pipeline)
-  kTooFewScans = 5,     ///< static: cluster not seen in the scans that it takes to be judged
-  kNotJudged = 6,       ///< invalid, out of range, or static because beyond the range of clusters
-  kProposed = 7,        ///< dynamic: proposed by occupancy and not reverted
-  kFreeSpace = 8,       ///< dynamic: its place was seen free at another time
-  kWithInstance = 9,    ///< dynamic: belongs to an instance that was seen free elsewhere
-  kUnderInstance = 10,  ///< dynamic: called ground, but stands below a removed instance
+  kGround = 1,        ///< static: ground
+  kSimilar = 2,       ///< static: similarity of occupancy not below tau_s (Eq. 12)
+  kReverted = 3,      ///< static: proposed as dynamic, reverted by belief (Eq. 19) or too few votes
+  kTooFewPoints = 4,  ///< static: cluster too small (not used by this pipeline)
+  kTooFewScans = 5,   ///< static: cluster not in both the oldest and the newest scan (Eq. 11)
+  kNotJudged = 6,     ///< invalid, out of range, or static without a cluster
+  kProposed = 7,      ///< dynamic: proposed by occupancy and not reverted (Eq. 19)
+  kFreeSpace = 8,     ///< dynamic: another scan saw its place free
+  kWithInstance = 9,  ///< dynamic: other scans saw a part of its instance free
+  kUnderInstance = 10,  ///< dynamic: ground point below a removed instance
   kNoEvidence = 11,     ///< static: no other scan saw its place
-  kAlongTrack = 12,     ///< dynamic: its instance was seen to move in other scans
-  kPresumed = 13,       ///< dynamic until the next scans tell: no scan before saw its place
+  kAlongTrack = 12,     ///< dynamic: its instance moved in other scans
+  kPresumed = 13,       ///< dynamic, for the time being: no earlier scan saw its place
   kOccupied = 14,       ///< static: other scans saw its place occupied
-  kTooLittleFree = 15,  ///< static: its place was seen free, but not often or not widely enough
-  kInPassage = 16,      ///< dynamic: nearly all else that was met in its place moved
+  kTooLittleFree = 15,  ///< static: too few scans saw its place free, or too little of it
+  kInPassage = 16,      ///< dynamic: nearly all other points in its place moved
 };
 
 inline constexpr std::size_t kCauseCount = 17;

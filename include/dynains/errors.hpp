@@ -1,4 +1,4 @@
-// Exceptions that the library throws. Nothing in the library prints or aborts.
+// Exceptions of the library, which neither prints nor aborts.
 #pragma once
 
 #include <stdexcept>
@@ -18,15 +18,14 @@ class PoseError : public std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
 
-/// The description of a cloud does not fit its data, or lacks what is needed.
+/// The description of a cloud does not fit its data or lacks a field.
 class CloudError : public std::invalid_argument {
  public:
   using std::invalid_argument::invalid_argument;
 };
 
-/// An object is called when it must not be: while another call on it is at work (from a second
-/// thread, or from within), or to be prepared when it has begun. Or a folder is to be written to
-/// while somebody else does.
+/// A call at the wrong time: during another call on the same object (from a second thread or from
+/// within), reserve() after the first push, or a write to a folder that another process writes to.
 class UsageError : public std::logic_error {
  public:
   using std::logic_error::logic_error;

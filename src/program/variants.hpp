@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "dynains/evaluation/evaluate.hpp"
-#include "dynains/pipeline/stage_times.hpp"
 #include "dynains/remover.hpp"
+#include "dynains/stage/stage_times.hpp"
 #include "labelled_sequence.hpp"
 
 namespace dynains::program {

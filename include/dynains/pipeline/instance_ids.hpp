@@ -1,4 +1,4 @@
-// Instance ids that stay with an object from scan to scan.
+// Instance ids that follow an object from scan to scan.
 #pragma once
 
 #include <algorithm>
@@ -11,12 +11,12 @@
 
 namespace dynains::detail {
 
-/// Hands the ids of the previous scan's clusters on to the clusters of the current window.
+/// Propagates the ids of clusters of the previous scan to those of the current window.
 class InstanceIds {
  public:
   using PointRuns = Span<const ClusterSet::PointRun>;
 
-  /// Begins with the first id again.
+  /// Starts with the first id again.
   void clear() { last_id_ = kNoInstance; }
 
   /// Fills `ids` with an id per cluster of this window. The points of the previous scan give their
@@ -41,7 +41,7 @@ class InstanceIds {
     propagate(candidate_, old_ids, ids);
   }
 
-  /// The same where it is known already which old cluster each cluster was (kNoCluster: none).
+  /// The same with the old cluster of each cluster given, or kNoCluster.
   void propagate(Span<const std::uint32_t> predecessors, Span<const std::uint32_t> old_ids,
                  std::vector<std::uint32_t>& ids) {
     taken_.assign(old_ids.size(), 0);
@@ -52,7 +52,7 @@ class InstanceIds {
         taken_[old] = 1;
         ids[c] = old_ids[old];
       } else {
-        if (++last_id_ == kNoInstance) ++last_id_;  // all have been given out: begin again
+        if (++last_id_ == kNoInstance) ++last_id_;  // after an overflow
         ids[c] = last_id_;
       }
     }

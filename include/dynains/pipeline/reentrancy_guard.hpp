@@ -1,4 +1,4 @@
-// Notices two calls on one object at the same time.
+// Detects two calls on one object at the same time.
 #pragma once
 
 #include <atomic>
@@ -7,18 +7,18 @@
 
 namespace dynains::detail {
 
-/// Lets one call at a time through: a second one, from another thread or from within the first,
-/// throws before it touches anything. What one call wrote is visible to the next, whatever thread
-/// makes it.
+/// Admits one call at a time. A second one, from another thread or from within the first, throws
+/// before it changes anything. The next call sees the writes of the last one, also from another
+/// thread.
 class ReentrancyGuard {
  public:
   ReentrancyGuard() = default;
   ~ReentrancyGuard() = default;
-  // Only what is at rest may be moved.
+  // Objects are moved between calls only.
   ReentrancyGuard(ReentrancyGuard&&) noexcept {}
   ReentrancyGuard& operator=(ReentrancyGuard&&) noexcept { return *this; }
 
-  /// A call, from construction to destruction. Throws UsageError if there is one already.
+  /// One call, from construction to destruction. Throws UsageError during another one.
   class Guard {
    public:
     explicit Guard(ReentrancyGuard& owner) : owner_(owner) {

@@ -6,7 +6,7 @@
 #include "dynains/pipeline/scan_ring.hpp"
 #include "dynains/pipeline/scan_slot.hpp"
 #include "dynains/pipeline/scan_window.hpp"
-#include "dynains/pipeline/stage_times.hpp"
+#include "dynains/pipeline/stage_timer.hpp"
 #include "dynains/pipeline/verdict_writer.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 

@@ -71,6 +71,8 @@ struct IsBelief<
                     std::is_convertible_v<decltype(std::declval<Stage&>().is_dynamic()), bool>>>>
     : std::true_type {};
 
+/// observe(scan, epoch, T_world_sensor, split, instance_of, instance_count): scans come in order,
+/// only those of one epoch are compared. judge(scan, is_final, split).
 template <class Stage, class = void>
 struct IsEvidence : std::false_type {};
 template <class Stage>
@@ -97,7 +99,7 @@ struct IsMap<Stage, std::void_t<decltype(std::declval<Stage&>().insert(
                                     std::declval<const Eigen::Isometry3d&>())),
                                 decltype(std::declval<Stage&>().clear())>> : std::true_type {};
 
-/// Whether evidence can be held against the blocks of a map: both offer what MapRevision needs.
+/// Whether MapRevision can use the map and the evidence.
 template <class Map, class Evidence, class = void>
 struct IsRevisable : std::false_type {};
 template <class Map, class Evidence>
@@ -111,8 +113,7 @@ struct IsRevisable<Map, Evidence,
                                    std::declval<const PointBuffer&>(), std::size_t{},
                                    std::declval<const Eigen::Isometry3d&>()))>> : std::true_type {};
 
-/// Whether a stage wants to know the sensor: `needs_sensor()` and `adapt(const SensorModel&)` are
-/// optional.
+/// Whether a stage has the optional members `needs_sensor()` and `adapt(const SensorModel&)`.
 template <class Stage, class = void>
 struct WantsSensor : std::false_type {};
 template <class Stage>
@@ -142,8 +143,7 @@ void reserve_stage(Stage& stage, std::size_t scans) {
   if constexpr (Offers<Reserve, Stage>::value) stage.reserve(scans);
 }
 
-/// Tells a stage how old the scans are that it is asked about; `keep(std::size_t scans)` is
-/// optional.
+/// Lets a stage judge scans of that age; `keep(std::size_t scans)` is optional.
 template <class Stage>
 using Keep = decltype(std::declval<Stage&>().keep(std::size_t{}));
 template <class Stage>

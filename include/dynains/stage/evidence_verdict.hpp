@@ -1,4 +1,4 @@
-// What the evidence of other scans says of the points of one scan.
+// Verdict by free space on the points of one scan.
 #pragma once
 
 #include <cstdint>
@@ -8,12 +8,12 @@
 
 namespace dynains {
 
-/// Points above the ground share the verdict of their group, which is the same group in every
-/// verdict on a scan; of the ground only what moved is told.
+/// Non-ground points share the verdict of their group; groups are the same in every verdict on a
+/// scan. Ground points are static unless they are listed.
 struct EvidenceVerdict {
   struct Group {
-    Cause cause = Cause::kNotJudged;  ///< why it moved or stays (see is_dynamic)
-    float belief = 0.0F;              ///< that it moved, a probability
+    Cause cause = Cause::kNotJudged;  ///< see is_dynamic()
+    float belief = 0.0F;              ///< probability of being dynamic
 
     friend bool operator==(const Group& a, const Group& b) {
       return a.cause == b.cause && a.belief == b.belief;
@@ -25,8 +25,8 @@ struct EvidenceVerdict {
   };
 
   Span<const Group> groups;
-  Span<const std::uint32_t> group_of;  ///< by point above the ground, in the order of the split
-  Span<const GroundPoint> ground;      ///< each at most once
+  Span<const std::uint32_t> group_of;  ///< by non-ground point, in the order of the split
+  Span<const GroundPoint> ground;      ///< dynamic ground points, each at most once
 };
 
 }  // namespace dynains

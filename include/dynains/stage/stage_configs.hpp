@@ -40,13 +40,13 @@ struct EvidenceOf<Stages, std::void_t<typename Stages::Evidence>> {
   using type = typename Stages::Evidence;
 };
 
-/// Whether `Operation<T>` can be named: whether T offers what may be there or not.
+/// Whether `Operation<T>` is well-formed, for optional members of T.
 template <template <class> class Operation, class T, class = void>
 struct Offers : std::false_type {};
 template <template <class> class Operation, class T>
 struct Offers<Operation, T, std::void_t<Operation<T>>> : std::true_type {};
 
-/// Scans from one reference of an evidence to the next; one that does not say so keeps them all.
+/// Scans from one reference of the evidence to the next; 1 without the member `reference_step`.
 template <class Config>
 using ReferenceStep = decltype(std::declval<Config&>().reference_step);
 template <class Config>

@@ -1,8 +1,6 @@
 // Where the time of one frame went.
 #pragma once
 
-#include <chrono>
-
 namespace dynains {
 
 /// Milliseconds per stage of one call.
@@ -38,27 +36,5 @@ struct StageTimes {
     return result;
   }
 };
-
-namespace detail {
-
-/// Measures the stages of one call.
-class StageTimer {
- public:
-  const StageTimes& times() const { return times_; }
-
-  /// Runs `work` and adds its time to a field of times().
-  template <class Work>
-  void measure(double StageTimes::*stage, Work&& work) {
-    const auto begin = std::chrono::steady_clock::now();
-    work();
-    const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - begin;
-    times_.*stage += time.count();
-  }
-
- private:
-  StageTimes times_;
-};
-
-}  // namespace detail
 
 }  // namespace dynains
