@@ -99,12 +99,12 @@ class Rehearsal {
       return difference(end, state);  // refused, for an earlier result is whole
     }
     if (outcome.code != 0) return "exit code " + std::to_string(outcome.code) + ": " + outcome.err;
-    return difference(without_measurements(end), without_measurements(after_));
+    return difference_from_end(end);
   }
 
   /// The results of the state are whole and those that the command makes; empty if so.
   std::string difference_from_end(const Tree& state) const {
-    return difference(without_measurements(state), without_measurements(after_));
+    return difference(comparable(state), comparable(after_));
   }
 
  private:
@@ -125,6 +125,9 @@ class Rehearsal {
   }
   static Tree not_ours(const Tree& tree) {
     return select(tree, [](const std::string& path) { return !is_ours(path); });
+  }
+  static Tree comparable(const Tree& tree) {
+    return without_empty_folders(without_measurements(tree));
   }
   static Tree results(const Tree& tree) {
     return without_measurements(
