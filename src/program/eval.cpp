@@ -3,6 +3,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynains/errors.hpp"
@@ -10,7 +11,9 @@
 #include "dynains/evaluation/report.hpp"
 #include "dynains/io/point_file.hpp"
 #include "evaluation_options.hpp"
+#include "input_files.hpp"
 #include "labelled_sequence.hpp"
+#include "output_folder.hpp"
 #include "recording_options.hpp"
 
 namespace dynains::program {
@@ -32,6 +35,28 @@ struct EvalOptions {
   std::string csv;
 };
 
+/// Scores must not replace what they are made from. Throws ConfigError or IoError.
+void check_targets(const EvalOptions& options, const Recording& recording) {
+  if (!options.json.empty() && !options.csv.empty() &&
+      whole_path(options.json) == whole_path(options.csv)) {
+    throw ConfigError("--json and --csv name one file: " + options.json);
+  }
+  InputFiles inputs;
+  for (const std::filesystem::path& file : recording.files()) inputs.add(file);
+  for (const std::string& map : options.maps) inputs.add(map);
+  for (const std::filesystem::path run : options.runs) {
+    inputs.add(run / "report.json");
+    for (std::size_t i = 0; i < recording.size(); ++i) {
+      inputs.add(run / "labels" / (recording.name(i) + ".label"));
+      inputs.add(run / "online" / (recording.name(i) + ".label"));
+      inputs.add(run / "causes" / (recording.name(i) + ".cause"));
+    }
+  }
+  for (const std::string& target : {options.json, options.csv}) {
+    if (const auto identity = identity_of(target)) inputs.refuse(*identity, target);
+  }
+}
+
 void eval(const EvalOptions& options) {
   const evaluation::EvaluationConfig config = options.evaluation.config();
   if (options.runs.size() > evaluation::kMaxEstimates) {
@@ -39,6 +64,8 @@ void eval(const EvalOptions& options) {
                       " runs can be evaluated at once, not " + std::to_string(options.runs.size()));
   }
 
+  Recording recording = options.sequence.open();
+  check_targets(options, recording);
   TextFile json(options.json);
   TextFile csv(options.csv);
   std::vector<RunLabels> runs;
@@ -60,7 +87,7 @@ void eval(const EvalOptions& options) {
     maps.push_back({name, map_files[m].positions});
   }
 
-  LabelledSequence sequence(options.sequence.open(), options.window, runs);
+  LabelledSequence sequence(std::move(recording), options.window, runs);
   const auto source = [&](std::size_t i, evaluation::LabelledScan& scan) {
     return sequence.read(i, scan);
   };

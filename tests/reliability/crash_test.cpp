@@ -1,0 +1,95 @@
+// The power goes at any moment of a run. Whatever the file system kept (crash_model.hpp): a folder
+// of results is absent, whole or clearly unfinished, files of others are as they were, and one more
+// start gives the bytes of an undisturbed run.
+#include <algorithm>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "crash_model.hpp"
+#include "rehearsal.hpp"
+
+namespace dynains::test {
+namespace {
+
+struct State {
+  Crash crash;
+  Tree tree;
+};
+
+/// Different states only: for each moment the plain losses, then mixtures.
+std::vector<State> crash_states(const CrashModel& model) {
+  constexpr unsigned kMixtures = 128;
+  std::vector<State> states;
+  std::set<std::size_t> known;
+  const auto add = [&](const Crash& crash) {
+    Tree tree = model.after(crash);
+    if (known.insert(fingerprint(tree)).second) states.push_back({crash, std::move(tree)});
+  };
+  for (std::size_t length = 0; length <= model.size(); ++length) {
+    for (const NameLoss names : {NameLoss::kNothing, NameLoss::kAll, NameLoss::kTail}) {
+      for (const DataLoss data :
+           {DataLoss::kNothing, DataLoss::kAll, DataLoss::kZeros, DataLoss::kTorn}) {
+        add({length, names, data, static_cast<unsigned>(length)});
+      }
+    }
+    for (unsigned seed = 0; seed < kMixtures; ++seed) {
+      add({length, NameLoss::kMixed, DataLoss::kMixed, seed});
+    }
+  }
+  return states;
+}
+
+void check(const Scenario& scenario) {
+  Rehearsal rehearsal(scenario);
+  const CrashModel model(rehearsal.before(), rehearsal.events(), rehearsal.root());
+  // Else the shim missed a change.
+  const Tree end = model.after({model.size(), NameLoss::kNothing, DataLoss::kNothing, 0});
+  REQUIRE(difference(end, rehearsal.after()) == "");
+
+  const std::vector<State> states = crash_states(model);
+  const std::size_t step = std::max<std::size_t>(1, states.size() / DYNAINS_CRASH_STATES);
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    const Crash& crash = states[i].crash;
+    CAPTURE(crash.length, int(crash.names), int(crash.data), crash.seed);
+    CHECK(rehearsal.problem(states[i].tree) == "");
+    if (i % step == 0) CHECK(rehearsal.problem_after_restart(states[i].tree) == "");
+  }
+  WARN(model.size() << " events, " << states.size() << " different states, started again from "
+                    << (states.size() + step - 1) / step);
+}
+
+}  // namespace
+
+TEST_CASE("the power goes during a run") { check(fresh_run({})); }
+
+TEST_CASE("the power goes during a run that writes everything") {
+  check(fresh_run({"--write-online", "--write-clean"}));
+}
+
+TEST_CASE("the power goes during a run with its map elsewhere") {
+  check(fresh_run({"--map", "/maps/map.ply"}));
+}
+
+TEST_CASE("the power goes during a run with its map on the disk") {
+  check(fresh_run({"--map-memory", "0"}));
+}
+
+TEST_CASE("the power goes while a stopped run is resumed") {
+  check(resumed_run({"--write-clean"}));
+}
+
+TEST_CASE("the power goes while a result is replaced") {
+  check(replacing_run({"--write-online", "--write-clean"}, {}));
+}
+
+TEST_CASE("the power goes while a result with its map elsewhere is replaced") {
+  check(replacing_run({"--map", "/maps/map.ply"}, {"--map", "/maps/map.ply"}));
+}
+
+TEST_CASE("the power goes during a simulation") { check(simulation()); }
+
+TEST_CASE("the power goes while a simulation is replaced") { check(replacing_simulation()); }
+
+}  // namespace dynains::test
