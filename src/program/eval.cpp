@@ -3,7 +3,6 @@
 #include <iostream>
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "dynains/errors.hpp"
@@ -35,26 +34,16 @@ struct EvalOptions {
   std::string csv;
 };
 
-/// Scores must not replace what they are made from. Throws ConfigError or IoError.
-void check_targets(const EvalOptions& options, const Recording& recording) {
+/// Scores must not replace the files that they are made from. Throws ConfigError or IoError.
+void check_targets(const EvalOptions& options, const LabelledSequence& sequence) {
   if (!options.json.empty() && !options.csv.empty() &&
       whole_path(options.json) == whole_path(options.csv)) {
     throw ConfigError("--json and --csv name one file: " + options.json);
   }
   InputFiles inputs;
-  for (const std::filesystem::path& file : recording.files()) inputs.add(file);
+  for (const std::filesystem::path& file : sequence.files()) inputs.add(file);
   for (const std::string& map : options.maps) inputs.add(map);
-  for (const std::filesystem::path run : options.runs) {
-    inputs.add(run / "report.json");
-    for (std::size_t i = 0; i < recording.size(); ++i) {
-      inputs.add(run / "labels" / (recording.name(i) + ".label"));
-      inputs.add(run / "online" / (recording.name(i) + ".label"));
-      inputs.add(run / "causes" / (recording.name(i) + ".cause"));
-    }
-  }
-  for (const std::string& target : {options.json, options.csv}) {
-    if (const auto identity = identity_of(target)) inputs.refuse(*identity, target);
-  }
+  for (const std::string& target : {options.json, options.csv}) inputs.refuse(target);
 }
 
 void eval(const EvalOptions& options) {
@@ -64,10 +53,6 @@ void eval(const EvalOptions& options) {
                       " runs can be evaluated at once, not " + std::to_string(options.runs.size()));
   }
 
-  Recording recording = options.sequence.open();
-  check_targets(options, recording);
-  TextFile json(options.json);
-  TextFile csv(options.csv);
   std::vector<RunLabels> runs;
   std::vector<std::string> names;
   for (const std::string& folder : options.runs) {
@@ -75,6 +60,11 @@ void eval(const EvalOptions& options) {
     runs.push_back({folder, options.online ? "online" : "labels"});
     names.push_back(options.runs.size() > 1 ? folder : options.online ? "online" : "run");
   }
+
+  LabelledSequence sequence(options.sequence.open(), options.window, runs);
+  check_targets(options, sequence);
+  TextFile json(options.json);
+  TextFile csv(options.csv);
 
   std::vector<PointFile> map_files;
   std::vector<evaluation::MapEstimate> maps;
@@ -87,7 +77,6 @@ void eval(const EvalOptions& options) {
     maps.push_back({name, map_files[m].positions});
   }
 
-  LabelledSequence sequence(std::move(recording), options.window, runs);
   const auto source = [&](std::size_t i, evaluation::LabelledScan& scan) {
     return sequence.read(i, scan);
   };
