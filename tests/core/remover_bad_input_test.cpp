@@ -58,6 +58,16 @@ Eigen::Isometry3d broken(const std::function<void(Eigen::Matrix4d&)>& damage) {
   return T;
 }
 
+TEST_CASE("A push without a time works after any time") {
+  DynaInsRemover remover;
+  const std::vector<Eigen::Vector3f> cloud = {{5, 0, 0}};
+  const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  for (const double time : {1.0, 1e17, 1e300}) {
+    remover.push(cloud, pose, time);
+    CHECK(remover.push(cloud, pose).newest.time > time);
+  }
+}
+
 TEST_CASE("A cloud whose arrays do not fit together is refused, and the state stays") {
   DynaInsRemover remover;
   const std::vector<float> values(30, 1.0F);

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -25,7 +27,10 @@ class ScanRing {
   /// Scans without a final verdict.
   std::uint64_t open() const { return pushed_ - finished_; }
   /// Time for a scan that comes without one: 0.1 s after the scan before.
-  double next_time() const { return pushed_ == 0 ? 0.0 : last_time_ + 0.1; }
+  double next_time() const {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    return pushed_ == 0 ? 0.0 : std::max(last_time_ + 0.1, std::nextafter(last_time_, kInfinity));
+  }
 
   ScanSlot& operator[](std::uint64_t scan) { return slots_[scan % slots_.size()]; }
   ScanSlot& newest() { return (*this)[pushed_ - 1]; }
