@@ -2,8 +2,15 @@
 // default stages alone compiles faster with remover.hpp and the library dynains::remover.
 #pragma once
 
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <vector>
+
 #include "dynains/basic_remover.hpp"
+#include "dynains/errors.hpp"
 #include "dynains/pipeline/pipeline.hpp"
+#include "dynains/pipeline/warm_up.hpp"
 
 namespace dynains {
 
