@@ -1,0 +1,298 @@
+// What a file system may hold after the power has gone, given what a program did before.
+//
+// Names (files and folders created, renamed, removed): a folder loses its last changes, those from
+// some moment on since it was synced. A change of two folders is kept or lost in both; what is in a
+// lost folder is lost. Folders lose independently of each other: more than on ext4 and xfs, whose
+// journals have one order for a whole file system.
+//
+// Data (bytes and size of a file): every write since the file was synced is kept, lost, kept up to
+// some byte or leaves zeros, whatever becomes of other writes and of names. A new name can lead to
+// no data, also where it replaced a file that was whole.
+//
+// fsync of a file keeps its data, of a folder its names and itself; syncfs and sync keep all before
+// them. Each folder at the top of the root is a file system of its own.
+#pragma once
+
+#include <fcntl.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "shim/log.hpp"
+#include "tree.hpp"
+
+namespace dynains::test {
+
+/// What becomes of unsynced changes; kMixed: one of the others for each folder or file.
+enum class NameLoss { kNothing, kAll, kTail, kMixed };
+enum class DataLoss { kNothing, kAll, kZeros, kTorn, kMixed };
+
+struct Crash {
+  std::size_t length;  ///< events before the power went
+  NameLoss names;
+  DataLoss data;
+  unsigned seed;
+};
+
+class CrashModel {
+ public:
+  /// `before` was on the disk when the events began; these are below `root`.
+  CrashModel(const Tree& before, const std::vector<shim::Entry>& events, const std::string& root)
+      : root_(root) {
+    nodes_.push_back({Kind::kFolder, {}, 0, {}, {}});
+    for (const auto& [path, item] : before) {
+      const Place at = place_of(path);
+      set_name(names_, {at.folder, at.name, add_node(item.kind, item.bytes, at.folder)});
+    }
+    before_ = names_;
+    for (const shim::Entry& event : events) take(event);
+  }
+
+  /// Events that changed or synced something.
+  std::size_t size() const { return size_; }
+
+  Tree after(const Crash& crash) const {
+    std::mt19937 random(crash.seed);
+    const Names names = names_after(crash, random);
+    Tree tree;
+    add_contents(tree, names, 0, {}, [&](const Node& node) {
+      return node.kind == Kind::kFile ? data_after(node, crash, random) : node.bytes;
+    });
+    return tree;
+  }
+
+ private:
+  using NodeId = std::size_t;
+  static constexpr NodeId kNone = static_cast<NodeId>(-1);
+  using Names = std::map<NodeId, std::map<std::string, NodeId>>;  ///< contents of each folder
+
+  struct Write {
+    std::size_t at;
+    std::size_t offset;
+    std::string bytes;
+    bool cuts;  ///< the file ends at the offset
+  };
+  /// A file, a folder or a link, whatever its name.
+  struct Node {
+    Kind kind;
+    std::string bytes;  ///< before the first event
+    NodeId file_system;
+    std::vector<Write> writes;
+    std::vector<std::size_t> syncs;  ///< events
+  };
+  struct Place {
+    NodeId folder;
+    std::string name;
+  };
+  /// The name leads to the node, or to none any more.
+  struct Naming {
+    NodeId folder;
+    std::string name;
+    NodeId node;
+  };
+  struct NameChange {
+    std::size_t at;
+    std::vector<Naming> namings;
+    std::vector<NodeId> folders;  ///< that keep or lose it, all or none
+  };
+
+  static void set_name(Names& names, const Naming& naming) {
+    if (naming.node == kNone) {
+      names[naming.folder].erase(naming.name);
+    } else {
+      names[naming.folder][naming.name] = naming.node;
+    }
+  }
+
+  NodeId add_node(Kind kind, const std::string& bytes, NodeId folder) {
+    const NodeId id = nodes_.size();
+    nodes_.push_back({kind, bytes, folder == 0 ? id : nodes_[folder].file_system, {}, {}});
+    return id;
+  }
+
+  NodeId find(const std::string& path) {
+    if (path.empty()) return 0;
+    const Place at = place_of(path);
+    const auto found = names_[at.folder].find(at.name);
+    return found == names_[at.folder].end() ? kNone : found->second;
+  }
+  /// Relative to the root. Throws if the folder is not there.
+  Place place_of(const std::string& path) {
+    const std::size_t slash = path.rfind('/');
+    const NodeId folder = slash == std::string::npos ? 0 : find(path.substr(0, slash));
+    if (folder == kNone) throw std::runtime_error(path + " has no folder in the model");
+    return {folder, path.substr(slash + 1)};
+  }
+  std::string relative(const std::string& path) const {
+    if (path.compare(0, root_.size(), root_) != 0) throw std::runtime_error(path + ": not below");
+    return path.size() == root_.size() ? std::string() : path.substr(root_.size() + 1);
+  }
+
+  void take(const shim::Entry& event) {
+    switch (event.event) {
+      case shim::Event::kOpen:
+        return open(event);
+      case shim::Event::kWrite:
+      case shim::Event::kTruncate:
+        nodes_[open_.at(event.descriptor)].writes.push_back(
+            {size_++, static_cast<std::size_t>(event.number), event.second,
+             event.event == shim::Event::kTruncate});
+        return;
+      case shim::Event::kSync:
+        nodes_[open_.at(event.descriptor)].syncs.push_back(size_++);
+        return;
+      case shim::Event::kSyncAll:
+        for (Node& node : nodes_) {
+          const bool all = event.descriptor < 0;
+          if (all || node.file_system == nodes_[open_.at(event.descriptor)].file_system) {
+            node.syncs.push_back(size_);
+          }
+        }
+        ++size_;
+        return;
+      case shim::Event::kFault:
+        return;
+      default:
+        return change_names(event);
+    }
+  }
+
+  void open(const shim::Entry& event) {
+    const std::string path = relative(event.path);
+    NodeId node = find(path);
+    if (node == kNone) {
+      const Place at = place_of(path);
+      node = add_node(Kind::kFile, {}, at.folder);
+      record({{at.folder, at.name, node}}, {at.folder});
+    } else if ((event.number & O_TRUNC) != 0) {
+      nodes_[node].writes.push_back({size_++, 0, {}, true});
+    }
+    open_[event.descriptor] = node;
+  }
+
+  void change_names(const shim::Entry& event) {
+    const NodeId node = find(relative(event.path));
+    const Place at = place_of(relative(event.path));
+    if (event.event == shim::Event::kMakeFolder) {
+      const NodeId folder = add_node(Kind::kFolder, {}, at.folder);
+      return record({{at.folder, at.name, folder}}, {at.folder, folder});
+    }
+    if (event.event == shim::Event::kSymlink) {
+      const NodeId link = add_node(Kind::kLink, event.second, at.folder);
+      return record({{at.folder, at.name, link}}, {at.folder});
+    }
+    if (event.event == shim::Event::kRemove) {
+      return record({{at.folder, at.name, kNone}}, {at.folder, node});
+    }
+    const NodeId replaced = find(relative(event.second));
+    const Place to = place_of(relative(event.second));
+    if (event.event == shim::Event::kLink) {
+      return record({{to.folder, to.name, node}}, {to.folder});
+    }
+    const bool swaps = event.event == shim::Event::kExchange;
+    record({{at.folder, at.name, swaps ? replaced : kNone}, {to.folder, to.name, node}},
+           {at.folder, to.folder});
+  }
+
+  void record(const std::vector<Naming>& namings, const std::vector<NodeId>& folders) {
+    for (const Naming& naming : namings) set_name(names_, naming);
+    changes_.push_back({size_++, namings, folders});
+  }
+
+  /// Changes before this moment are on the disk for certain.
+  static std::size_t last_sync(const Node& node, const Crash& crash) {
+    const auto after = std::lower_bound(node.syncs.begin(), node.syncs.end(), crash.length);
+    return after == node.syncs.begin() ? 0 : *(after - 1);
+  }
+
+  /// The first change that each folder loses.
+  std::vector<std::size_t> cuts(const Crash& crash, std::mt19937& random) const {
+    std::vector<std::size_t> synced(nodes_.size());
+    std::transform(nodes_.begin(), nodes_.end(), synced.begin(),
+                   [&](const Node& node) { return last_sync(node, crash); });
+    // What one folder has for certain, the other folder of the change has, too.
+    for (auto change = changes_.rbegin(); change != changes_.rend(); ++change) {
+      const auto is_safe = [&](NodeId folder) { return synced[folder] > change->at; };
+      if (std::none_of(change->folders.begin(), change->folders.end(), is_safe)) continue;
+      for (const NodeId folder : change->folders) {
+        synced[folder] = std::max(synced[folder], change->at + 1);
+      }
+    }
+    for (std::size_t& cut : synced) {
+      NameLoss loss = crash.names;
+      if (loss == NameLoss::kMixed) loss = static_cast<NameLoss>(random() % 3);
+      if (loss == NameLoss::kNothing) cut = crash.length;
+      if (loss == NameLoss::kTail) cut += random() % (crash.length - cut + 1);
+    }
+    return synced;
+  }
+
+  Names names_after(const Crash& crash, std::mt19937& random) const {
+    Names names = before_;
+    std::vector<std::size_t> cut = cuts(crash, random);
+    for (const NameChange& change : changes_) {
+      const auto is_lost = [&](NodeId folder) { return cut[folder] <= change.at; };
+      if (std::any_of(change.folders.begin(), change.folders.end(), is_lost)) {
+        for (const NodeId folder : change.folders) cut[folder] = std::min(cut[folder], change.at);
+      } else {
+        for (const Naming& naming : change.namings) set_name(names, naming);
+      }
+    }
+    return names;
+  }
+
+  static std::string data_after(const Node& node, const Crash& crash, std::mt19937& random) {
+    const std::size_t synced = last_sync(node, crash);
+    DataLoss of_file = crash.data;
+    if (of_file == DataLoss::kMixed) of_file = static_cast<DataLoss>(random() % 4);
+    std::string bytes = node.bytes;
+    for (const Write& write : node.writes) {
+      if (write.at >= crash.length) break;
+      DataLoss loss = write.at < synced ? DataLoss::kNothing : of_file;
+      std::string written = write.bytes;
+      if (loss == DataLoss::kTorn) {
+        loss = static_cast<DataLoss>(random() % 4);
+        if (loss == DataLoss::kTorn) written.resize(random() % (written.size() + 1));
+      }
+      if (loss == DataLoss::kAll) continue;
+      if (loss == DataLoss::kZeros) written.assign(written.size(), '\0');
+      if (write.cuts) {
+        bytes.resize(write.offset);
+      } else {
+        bytes.resize(std::max(bytes.size(), write.offset + written.size()));
+        bytes.replace(write.offset, written.size(), written);
+      }
+    }
+    return bytes;
+  }
+
+  template <class BytesOf>
+  void add_contents(Tree& tree, const Names& names, NodeId folder, const std::string& prefix,
+                    const BytesOf& bytes_of) const {
+    const auto contents = names.find(folder);
+    if (contents == names.end()) return;
+    for (const auto& [name, id] : contents->second) {
+      const Node& node = nodes_[id];
+      tree[prefix + name] = {node.kind, bytes_of(node)};
+      if (node.kind == Kind::kFolder) {
+        add_contents(tree, names, id, prefix + name + '/', bytes_of);
+      }
+    }
+  }
+
+  std::string root_;
+  std::vector<Node> nodes_;  ///< the root first
+  std::vector<NameChange> changes_;
+  std::map<int, NodeId> open_;
+  Names before_;
+  Names names_;  ///< after the events taken so far
+  std::size_t size_ = 0;
+};
+
+}  // namespace dynains::test

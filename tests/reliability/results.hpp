@@ -1,0 +1,55 @@
+// What folders of results claim, and whether it holds.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tree.hpp"
+
+namespace dynains::test {
+
+inline bool ends_with(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+enum class Claim { kNone, kUnfinished, kComplete, kUnreadable };
+
+/// What report.json or simulation.json says; kNone: neither is there.
+inline Claim claim_of(const Tree& results) {
+  for (const char* marker : {"report.json", "simulation.json"}) {
+    const auto file = results.find(marker);
+    if (file == results.end()) continue;
+    const auto json = nlohmann::json::parse(file->second.bytes, nullptr, false);
+    if (!json.is_object() || json.value("program", "") != "dynains") return Claim::kUnreadable;
+    return json.value("complete", false) ? Claim::kComplete : Claim::kUnfinished;
+  }
+  return Claim::kNone;
+}
+
+/// The tree without what is measured: times and memory.
+inline Tree without_measurements(Tree tree) {
+  for (auto& [name, item] : tree) {
+    if (ends_with(name, "report.json")) {
+      auto json = nlohmann::json::parse(item.bytes, nullptr, false);
+      if (!json.is_object()) continue;
+      for (const char* field :
+           {"milliseconds", "reserve_milliseconds", "flush_milliseconds", "peak_memory_bytes"}) {
+        json.erase(field);
+      }
+      item.bytes = json.dump();
+    }
+    if (ends_with(name, "timing.csv")) {
+      std::istringstream rows(item.bytes);
+      std::string kept;
+      for (std::string row; std::getline(rows, row);) {
+        kept += row.substr(0, row.find(',', row.find(',') + 1)) + '\n';  // scan and points
+      }
+      item.bytes = kept;
+    }
+  }
+  return tree;
+}
+
+}  // namespace dynains::test

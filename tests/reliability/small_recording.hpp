@@ -1,0 +1,32 @@
+// A recording that the program is through with in milliseconds.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "dynains/io/kitti.hpp"
+#include "program/tiny_sequence.hpp"
+
+namespace dynains::test {
+
+/// Every twelfth point of the tiny sequence, some 440 a scan, with ground truth for the box.
+inline void write_small_recording(const std::filesystem::path& folder, std::size_t scans) {
+  write_tiny_sequence(folder, scans);
+  std::filesystem::create_directories(folder / "labels");
+  for (std::size_t i = 0; i < scans; ++i) {
+    const std::vector<float> all = tiny_scan(i);
+    std::vector<float> scan;
+    std::vector<std::uint32_t> labels;
+    const std::size_t box = all.size() / 4 - 192;
+    for (std::size_t k = i; k < all.size() / 4; k += 12) {
+      scan.insert(scan.end(), all.data() + 4 * k, all.data() + 4 * k + 4);
+      labels.push_back(k < box ? 9 : 251);
+    }
+    write_scan(folder / "velodyne" / (scan_name(i) + ".bin"), scan);
+    write_labels(folder / "labels" / (scan_name(i) + ".label"), labels);
+  }
+}
+
+}  // namespace dynains::test

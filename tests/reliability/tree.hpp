@@ -1,0 +1,84 @@
+// A folder and all that lies below it, as a value.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+
+#include "io/files.hpp"
+
+namespace dynains::test {
+
+enum class Kind { kFolder, kFile, kLink };
+
+/// Bytes of a file, target of a link, nothing for a folder.
+struct Item {
+  Kind kind;
+  std::string bytes;
+
+  bool operator==(const Item& other) const { return kind == other.kind && bytes == other.bytes; }
+  bool operator!=(const Item& other) const { return !(*this == other); }
+};
+
+/// Items by their path relative to the folder, which is not in it. A folder precedes its contents.
+using Tree = std::map<std::string, Item>;
+
+inline Tree read_tree(const std::filesystem::path& folder) {
+  namespace fs = std::filesystem;
+  Tree tree;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
+    Item item{Kind::kFile, {}};
+    if (entry.is_symlink()) {
+      item = {Kind::kLink, fs::read_symlink(entry.path()).string()};
+    } else if (entry.is_directory()) {
+      item.kind = Kind::kFolder;
+    } else if (entry.is_regular_file()) {
+      item.bytes = read_text(entry.path());
+    }
+    tree[entry.path().string().substr(folder.string().size() + 1)] = item;
+  }
+  return tree;
+}
+
+/// Makes the folder hold the tree and nothing else.
+inline void write_tree(const std::filesystem::path& folder, const Tree& tree) {
+  namespace fs = std::filesystem;
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  for (const auto& [name, item] : tree) {
+    if (item.kind == Kind::kFolder) fs::create_directory(folder / name);
+    if (item.kind == Kind::kLink) fs::create_symlink(item.bytes, folder / name);
+    if (item.kind == Kind::kFile) {
+      std::ofstream(folder / name, std::ios::binary) << item.bytes;
+    }
+  }
+}
+
+/// What lies below that folder of the tree, by path relative to it.
+inline Tree below(const Tree& tree, const std::string& folder) {
+  Tree part;
+  const std::string prefix = folder + '/';
+  for (auto item = tree.lower_bound(prefix);
+       item != tree.end() && item->first.compare(0, prefix.size(), prefix) == 0; ++item) {
+    part[item->first.substr(prefix.size())] = item->second;
+  }
+  return part;
+}
+
+/// The first difference, in words; empty if there is none.
+inline std::string difference(const Tree& found, const Tree& expected) {
+  for (const auto& [name, item] : expected) {
+    const auto other = found.find(name);
+    if (other == found.end()) return name + " is missing";
+    if (other->second != item) {
+      return name + " has other contents (" + std::to_string(other->second.bytes.size()) +
+             " bytes, not " + std::to_string(item.bytes.size()) + ')';
+    }
+  }
+  for (const auto& [name, item] : found) {
+    if (expected.count(name) == 0) return name + " should not be there";
+  }
+  return {};
+}
+
+}  // namespace dynains::test
