@@ -1,0 +1,201 @@
+// A command of the program that is disturbed again and again, and what must hold after that.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "results.hpp"
+#include "shim/preload.hpp"
+#include "small_recording.hpp"
+#include "support/catch.hpp"
+
+namespace dynains::test {
+
+using Arguments = std::vector<std::string>;
+
+inline Arguments operator+(Arguments left, const Arguments& right) {
+  left.insert(left.end(), right.begin(), right.end());
+  return left;
+}
+
+/// Arguments that begin with / are below the root: /seq is the input, /disk/out the results, /maps
+/// another disk.
+struct Scenario {
+  std::vector<Arguments> before;  ///< done first
+  Arguments stopped;              ///< done after them, and stopped in the middle; may be empty
+  Arguments command;              ///< is disturbed
+  Arguments again;                ///< completes it
+};
+
+class Rehearsal {
+ public:
+  /// Does all of the scenario once, undisturbed.
+  explicit Rehearsal(const Scenario& scenario) : scenario_(scenario) {
+    for (const char* disk : {"/disk", "/maps"}) std::filesystem::create_directories(root_ + disk);
+    write_small_recording(root_ + "/seq", 4);
+    write_text(root_ + "/seq/run.cfg", "window = 3\n");
+    for (const Arguments& arguments : scenario.before) {
+      REQUIRE(start(with_root(arguments)).code == 0);
+    }
+    if (!scenario.stopped.empty()) {
+      REQUIRE(disturb(scenario.stopped, "write 8 28 on").outcome.code == 1);
+    }
+    for (const char* folder : {"/maps", "/disk/out", "/disk/out/labels"}) {
+      if (std::filesystem::exists(root_ + folder)) write_text(root_ + folder + kForeign, "mine");
+    }
+    before_ = read_tree(root_);
+    const Recorded recorded = disturb(scenario.command, {});
+    CAPTURE(recorded.outcome.err);
+    REQUIRE(recorded.outcome.code == 0);
+    after_ = read_tree(root_);
+    events_ = recorded.events;
+  }
+
+  const std::string& root() const { return root_; }
+  const Tree& before() const { return before_; }
+  const Tree& after() const { return after_; }
+  const std::vector<shim::Entry>& events() const { return events_; }
+
+  /// The command from where it began, with a fault as in shim.cpp.
+  Recorded disturb(const std::string& fault) {
+    restore(before_);
+    return disturb(scenario_.command, fault);
+  }
+
+  /// What is wrong with a state that the command left; empty if nothing is.
+  std::string problem(const Tree& state) const {
+    const std::string foreign = difference(not_ours(state), not_ours(before_));
+    if (!foreign.empty()) return "not ours: " + foreign;
+    const Tree results = below(state, "disk/out");
+    switch (claim_of(results)) {
+      case Claim::kUnreadable:
+        return "the marker cannot be read";
+      case Claim::kUnfinished:
+        return {};
+      case Claim::kComplete: {
+        const std::string wrong = difference_of_results(state, after_);
+        if (wrong.empty() || is_earlier(state)) return {};
+        return "called complete, but " + wrong;
+      }
+      case Claim::kNone:
+        for (const auto& [path, item] : results) {
+          const bool hidden = is_hidden('/' + path) || is_foreign('/' + path);
+          if (item.kind == Kind::kFile && !hidden) return path + " without a marker";
+        }
+        return {};
+    }
+    return {};
+  }
+
+  /// Starts again from the state: what is wrong with the end of it; empty if nothing is.
+  std::string problem_after_restart(const Tree& state) {
+    restore(state);
+    const Outcome outcome = start(with_root(scenario_.again));
+    const Tree end = read_tree(root_);
+    if (outcome.code != 0 && is_earlier(state) && !before_.empty()) {
+      return difference(end, state);  // refused, for an earlier result is whole
+    }
+    if (outcome.code != 0) return "exit code " + std::to_string(outcome.code) + ": " + outcome.err;
+    return difference(without_measurements(end), without_measurements(after_));
+  }
+
+  /// The results of the state are whole and those that the command makes; empty if so.
+  std::string difference_from_end(const Tree& state) const {
+    return difference(without_measurements(state), without_measurements(after_));
+  }
+
+ private:
+  static constexpr const char* kForeign = "/notes.txt";
+
+  static bool is_foreign(const std::string& path) { return ends_with(path, kForeign); }
+  /// What a run has for itself until it is done: temporaries and what they lie in.
+  static bool is_hidden(const std::string& path) { return path.find("/.") != std::string::npos; }
+  static bool is_ours(const std::string& path) {
+    return (path.rfind("disk/out", 0) == 0 || path.rfind("maps/", 0) == 0) && !is_foreign(path);
+  }
+  static Tree select(const Tree& tree, const std::function<bool(const std::string&)>& wanted) {
+    Tree selected;
+    for (const auto& item : tree) {
+      if (wanted(item.first)) selected.insert(item);
+    }
+    return selected;
+  }
+  static Tree not_ours(const Tree& tree) {
+    return select(tree, [](const std::string& path) { return !is_ours(path); });
+  }
+  static Tree results(const Tree& tree) {
+    return without_measurements(
+        select(tree, [](const std::string& path) { return is_ours(path) && !is_hidden(path); }));
+  }
+  static std::string difference_of_results(const Tree& found, const Tree& expected) {
+    return difference(results(found), results(expected));
+  }
+  bool is_earlier(const Tree& state) const { return results(state) == results(before_); }
+
+  /// Makes the disks hold what the state says. The input is never written: a difference shows.
+  void restore(const Tree& state) const {
+    for (const char* disk : {"disk", "maps"}) write_tree(root_ + '/' + disk, below(state, disk));
+  }
+
+  Arguments with_root(Arguments arguments) const {
+    for (std::string& argument : arguments) {
+      if (argument.front() == '/') argument = root_ + argument;
+    }
+    return arguments;
+  }
+  Recorded disturb(const Arguments& arguments, const std::string& fault) const {
+    return start_with_shim(with_root(arguments), root_, fault);
+  }
+
+  Scenario scenario_;
+  TemporaryFolder folder_;
+  std::string root_ = std::filesystem::canonical(folder_.path()).string() + "/root";
+  Tree before_;
+  Tree after_;
+  std::vector<shim::Entry> events_;
+};
+
+inline Arguments run_with(const Arguments& flags) {
+  return Arguments{"run", "/seq", "--out", "/disk/out", "--quiet"} + flags;
+}
+
+/// A small one.
+inline Arguments simulate_with(const Arguments& flags) {
+  return Arguments{"simulate", "/disk/out",   "--quiet",  "--scans", "2",
+                   "--scene",  "crowd",       "--sensor", "vlp16",   "--traffic",
+                   "0",        "--max-range", "5"} +
+         flags;
+}
+
+/// A run of the first three scans in a folder that is not there, and again with --resume.
+inline Scenario fresh_run(const Arguments& flags) {
+  const Arguments command = run_with(Arguments{"--end", "2"} + flags);
+  return {{}, {}, command, command + Arguments{"--resume"}};
+}
+
+/// --force over the result of a longer run that wrote more; again with --resume.
+inline Scenario replacing_run(const Arguments& earlier, const Arguments& flags) {
+  Scenario scenario = fresh_run(flags);
+  scenario.before = {run_with(Arguments{"--window", "2"} + earlier)};
+  scenario.command.push_back("--force");
+  return scenario;
+}
+
+/// --resume of a run that was stopped.
+inline Scenario resumed_run(const Arguments& flags) {
+  Scenario scenario = fresh_run(flags);
+  scenario.stopped = scenario.command;
+  scenario.command = scenario.again;
+  return scenario;
+}
+
+inline Scenario simulation() { return {{}, {}, simulate_with({}), simulate_with({"--force"})}; }
+
+inline Scenario replacing_simulation() {
+  return {
+      {simulate_with({"--seed", "2"})}, {}, simulate_with({"--force"}), simulate_with({"--force"})};
+}
+
+}  // namespace dynains::test
