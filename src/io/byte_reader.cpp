@@ -4,6 +4,7 @@
 #include <system_error>
 
 #include "failure.hpp"
+#include "input_file.hpp"
 
 namespace dynains {
 namespace {
@@ -16,15 +17,16 @@ ByteReader::ByteReader(const std::filesystem::path& path) : path_(path) {
   std::error_code error;
   size_ = std::filesystem::file_size(path, error);
   if (error) fail(path, "cannot be read: " + error.message());
-  file_.open(path, std::ios::binary);
-  if (!file_) fail(path, "cannot be opened for reading");
+  file_ = open_input(path);
 }
 
 bool ByteReader::read_line(std::string& text) {
   text.clear();
   ++line_;
   if (remaining() == 0) return false;
-  for (int c = file_.get(); c != std::ifstream::traits_type::eof(); c = file_.get()) {
+  while (position_ < size_) {
+    const int c = file_.get();
+    if (c == std::ifstream::traits_type::eof()) fail_to_read(file_, path_, position_, size_);
     ++position_;
     if (c == '\n') break;
     if (text.size() == kMaxLine) fail_on_line("expected a line of text, found no end of line");
@@ -38,6 +40,7 @@ void ByteReader::read(char* target, std::size_t count, const char* purpose) {
   file_.read(target, static_cast<std::streamsize>(count));
   const auto got = static_cast<std::uint64_t>(file_.gcount());
   position_ += got;
+  if (got != count && position_ < size_) fail_to_read(file_, path_, position_, size_);
   if (got != count) fail_here(std::string("file ends, expected ") + purpose);
 }
 

@@ -5,6 +5,7 @@
 
 #include "dynains/io/atomic_file.hpp"
 #include "failure.hpp"
+#include "input_file.hpp"
 #include "kitti_files.hpp"
 #include "text.hpp"
 
@@ -29,12 +30,12 @@ std::uintmax_t size_of(const fs::path& path) {
 /// Fills `values` from a file that must have exactly that size.
 template <class T>
 void read_all(const fs::path& path, std::vector<T>& values) {
-  std::ifstream file = open_text(path);
+  std::ifstream file = open_input(path);
   const auto bytes = static_cast<std::streamsize>(values.size() * sizeof(T));
   file.read(reinterpret_cast<char*>(values.data()), bytes);
   if (file.gcount() != bytes) {
-    fail(path, "reading stopped at byte " + std::to_string(file.gcount()) + " of " +
-                   std::to_string(bytes));
+    fail_to_read(file, path, static_cast<std::uint64_t>(file.gcount()),
+                 static_cast<std::uint64_t>(bytes));
   }
 }
 

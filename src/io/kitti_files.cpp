@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
+#include <fstream>
 #include <string_view>
 #include <system_error>
 
 #include "failure.hpp"
+#include "input_file.hpp"
 #include "text.hpp"
 
 namespace dynains {
@@ -47,12 +50,16 @@ Eigen::Isometry3d parse_pose(std::string_view line, const fs::path& path, std::s
   return *pose;
 }
 
+[[noreturn]] void fail_after_line(const fs::path& path, std::size_t number, int error) {
+  fail_by_system(path, "reading stopped after line " + std::to_string(number), error);
+}
+
 bool is_blank(std::string_view line) { return text::next_token(line).empty(); }
 
 /// Calls `parse(line, number)` for each line; blank lines are allowed at the end only.
 template <class Parse>
 void for_each_row(const fs::path& path, Parse&& parse) {
-  std::ifstream file = open_text(path);
+  std::ifstream file = open_input(path);
   std::size_t number = 0;
   std::size_t blank = 0;
   for (std::string line; std::getline(file, line);) {
@@ -64,18 +71,10 @@ void for_each_row(const fs::path& path, Parse&& parse) {
     if (blank != 0) fail_at_line(path, blank, "expected a row, found a blank line");
     parse(std::string_view(line), number);
   }
-  if (file.bad()) fail(path, "reading stopped after line " + std::to_string(number));
+  if (file.bad()) fail_after_line(path, number, errno);
 }
 
 }  // namespace
-
-std::ifstream open_text(const fs::path& path) {
-  std::error_code error;
-  if (fs::is_directory(path, error)) fail(path, "is a folder, expected a file");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) fail(path, "cannot be opened for reading");
-  return file;
-}
 
 std::optional<Eigen::Isometry3d> nearest_rigid(const double* rows) {
   using RowMajor34 = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
@@ -112,13 +111,14 @@ std::vector<double> read_kitti_times(const fs::path& path) {
 }
 
 Eigen::Isometry3d read_kitti_calib(const fs::path& path) {
-  std::ifstream file = open_text(path);
+  std::ifstream file = open_input(path);
   std::size_t number = 0;
   for (std::string text; std::getline(file, text);) {
     ++number;
     std::string_view line = text;
     if (text::next_token(line) == "Tr:") return parse_pose(line, path, number);
   }
+  if (file.bad()) fail_after_line(path, number, errno);
   fail(path,
        "expected a line \"Tr: \" with 12 numbers (sensor to the frame of the poses); if the poses "
        "are those of the sensor, remove this file");

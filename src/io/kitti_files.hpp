@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,8 +33,5 @@ void check_rows(const std::filesystem::path& path, std::size_t rows, std::size_t
 /// The rigid transform nearest to 12 numbers, the upper 3x4 row by row; nothing if they are none
 /// but for rounding.
 std::optional<Eigen::Isometry3d> nearest_rigid(const double* rows);
-
-/// Opens a file to read; throws IoError, for folders too.
-std::ifstream open_text(const std::filesystem::path& path);
 
 }  // namespace dynains

@@ -37,7 +37,7 @@ class Rehearsal {
     write_small_recording(root_ + "/seq", 4);
     write_text(root_ + "/seq/run.cfg", "window = 3\n");
     for (const Arguments& arguments : scenario.before) {
-      REQUIRE(start(with_root(arguments)).code == 0);
+      REQUIRE(start_or_stop(with_root(arguments)).code == 0);
     }
     if (!scenario.stopped.empty()) {
       REQUIRE(disturb(scenario.stopped, "write 8 28 on").outcome.code == 1);
@@ -92,7 +92,7 @@ class Rehearsal {
   /// Starts again from the state: what is wrong with the end of it; empty if nothing is.
   std::string problem_after_restart(const Tree& state) {
     restore(state);
-    const Outcome outcome = start(with_root(scenario_.again));
+    const Outcome outcome = start_or_stop(with_root(scenario_.again));
     const Tree end = read_tree(root_);
     if (outcome.code != 0 && is_earlier(state) && !before_.empty()) {
       return difference(end, state);  // refused, for an earlier result is whole

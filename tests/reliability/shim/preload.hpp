@@ -30,6 +30,11 @@ class Environment {
   std::map<std::string, std::string> variables_;
 };
 
+/// `dynains ARGUMENTS`; ended by SIGALRM (exit code 142) if it hangs.
+inline Outcome start_or_stop(const std::vector<std::string>& arguments) {
+  return start(arguments, [] { ::alarm(20); });
+}
+
 struct Recorded {
   Outcome outcome;
   std::vector<shim::Entry> events;
@@ -47,7 +52,7 @@ inline Recorded start_with_shim(const std::vector<std::string>& arguments, const
                                  {"DYNAINS_SHIM_FAULT", fault},
                                  // A sanitizer's runtime may come after the shim.
                                  {"ASAN_OPTIONS", "verify_asan_link_order=0"}});
-  const Outcome outcome = start(arguments);
+  const Outcome outcome = start_or_stop(arguments);
   return {outcome, shim::parse_log(read_text(log))};
 }
 

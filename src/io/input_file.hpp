@@ -1,0 +1,18 @@
+// Files to read, with the system's reason where that fails.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+
+namespace dynains {
+
+/// Opens a file to read. Throws IoError, for folders too.
+std::ifstream open_input(const std::filesystem::path& path);
+
+/// For a read that gave fewer bytes than the file has. Call it before anything else sets errno.
+/// Throws IoError.
+[[noreturn]] void fail_to_read(const std::ifstream& file, const std::filesystem::path& path,
+                               std::uint64_t position, std::uint64_t size);
+
+}  // namespace dynains
