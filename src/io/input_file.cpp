@@ -8,17 +8,35 @@
 
 namespace dynains {
 
-std::ifstream open_input(const std::filesystem::path& path) {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::file_status status_of(const fs::path& path) {
   std::error_code error;
-  if (std::filesystem::is_directory(path, error)) fail(path, "is a folder, expected a file");
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::status_known(status)) fail_by_system(path, "cannot be read", error.value());
+  return status;
+}
+
+}  // namespace
+
+bool is_there(const fs::path& path) { return fs::exists(status_of(path)); }
+
+bool is_folder(const fs::path& path) { return fs::is_directory(status_of(path)); }
+
+bool is_file(const fs::path& path) { return fs::is_regular_file(status_of(path)); }
+
+std::ifstream open_input(const fs::path& path) {
+  if (is_folder(path)) fail(path, "is a folder, expected a file");
   errno = 0;
   std::ifstream file(path, std::ios::binary);
   if (!file) fail_by_system(path, "cannot be opened for reading", errno);
   return file;
 }
 
-void fail_to_read(const std::ifstream& file, const std::filesystem::path& path,
-                  std::uint64_t position, std::uint64_t size) {
+void fail_to_read(const std::ifstream& file, const fs::path& path, std::uint64_t position,
+                  std::uint64_t size) {
   const int reason = errno;
   const std::string what =
       "reading stopped at byte " + std::to_string(position) + " of " + std::to_string(size);

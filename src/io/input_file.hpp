@@ -7,6 +7,12 @@
 
 namespace dynains {
 
+/// Whether anything, a folder or a regular file is there; links are followed. Throw IoError if the
+/// system cannot tell.
+bool is_there(const std::filesystem::path& path);
+bool is_folder(const std::filesystem::path& path);
+bool is_file(const std::filesystem::path& path);
+
 /// Opens a file to read. Throws IoError, for folders too.
 std::ifstream open_input(const std::filesystem::path& path);
 

@@ -50,12 +50,11 @@ void write_all(const fs::path& path, Span<const T> values) {
 }  // namespace
 
 KittiSequence::KittiSequence(const fs::path& folder) : folder_(folder) {
-  std::error_code error;
-  if (!fs::is_directory(folder, error)) fail(folder, "is not a folder");
+  if (!is_folder(folder)) fail(folder, "is not a folder");
   const std::vector<NumberedScan> scans = list_kitti_scans(folder / "velodyne");
 
   const fs::path poses_path = folder / "poses.txt";
-  if (!fs::exists(poses_path, error)) {
+  if (!is_there(poses_path)) {
     fail(poses_path, "not found: expected a row of 12 numbers for each scan");
   }
   const std::vector<Eigen::Isometry3d> poses = read_kitti_poses(poses_path);
@@ -66,7 +65,7 @@ KittiSequence::KittiSequence(const fs::path& folder) : folder_(folder) {
 
   const fs::path times_path = folder / "times.txt";
   std::vector<double> times;
-  const bool has_times = fs::exists(times_path, error);
+  const bool has_times = is_there(times_path);
   if (has_times) {
     times = read_kitti_times(times_path);
     check_rows(times_path, times.size(), needed);
@@ -74,7 +73,7 @@ KittiSequence::KittiSequence(const fs::path& folder) : folder_(folder) {
 
   const fs::path calib_path = folder / "calib.txt";
   const Eigen::Isometry3d Tr =
-      fs::exists(calib_path, error) ? read_kitti_calib(calib_path) : Eigen::Isometry3d::Identity();
+      is_there(calib_path) ? read_kitti_calib(calib_path) : Eigen::Isometry3d::Identity();
 
   scans_.resize(scans.size());
   for (std::size_t i = 0; i < scans.size(); ++i) {
@@ -83,7 +82,7 @@ KittiSequence::KittiSequence(const fs::path& folder) : folder_(folder) {
     scans_[i].T_world_sensor = Tr.inverse() * poses[row] * Tr;
     scans_[i].time = has_times ? times[row] : kKittiPeriod * static_cast<double>(row);
   }
-  has_labels_ = fs::is_directory(folder / "labels", error);
+  has_labels_ = is_folder(folder / "labels");
 }
 
 fs::path KittiSequence::scan_path(std::size_t i) const {

@@ -125,11 +125,11 @@ Eigen::Isometry3d read_kitti_calib(const fs::path& path) {
 }
 
 std::vector<NumberedScan> list_kitti_scans(const fs::path& folder) {
-  std::error_code error;
-  if (!fs::is_directory(folder, error)) {
+  if (!is_folder(folder)) {
     fail(folder, "not found: expected a folder with one NNNNNN.bin for each scan");
   }
   std::vector<NumberedScan> scans;
+  std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
     const fs::path file = entry->path();

@@ -13,6 +13,7 @@
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "failure.hpp"
+#include "input_file.hpp"
 #include "kitti_files.hpp"
 #include "text.hpp"
 
@@ -24,16 +25,6 @@ namespace fs = std::filesystem;
 constexpr const char* kAccepted =
     "expected a KITTI folder (velodyne/NNNNNN.bin, poses.txt), or a folder of .pcd, .ply or .bin "
     "scans (or with them in pcd/, ply/, scans/, points/, clouds/ or lidar/)";
-
-bool is_folder(const fs::path& path) {
-  std::error_code error;
-  return fs::is_directory(path, error);
-}
-
-bool is_file(const fs::path& path) {
-  std::error_code error;
-  return fs::is_regular_file(path, error);
-}
 
 std::optional<ScanFormat> scan_format_of(const fs::path& path) {
   std::string extension = path.extension().string();

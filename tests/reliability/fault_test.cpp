@@ -84,8 +84,7 @@ TEST_CASE("every call of a run that is resumed fails once") { check(resumed_run(
 TEST_CASE("every call of a simulation fails once") { check(replacing_simulation()); }
 
 TEST_CASE("every call of an evaluation fails once") {
-  const Arguments command = {"eval",  "/seq",          "/disk/out", "--json", "/maps/eval.json",
-                             "--csv", "/maps/eval.csv"};
+  const Arguments command = {"eval", "/seq", "/disk/out", "--json", "/maps/eval.json"};
   check({{run_with({})}, {}, command, command});
 }
 

@@ -11,10 +11,12 @@
 
 namespace dynains::test {
 
-/// Every twelfth point of the tiny sequence, some 440 a scan, with ground truth for the box.
+/// Every twelfth point of the tiny sequence, some 440 a scan, with ground truth for the box, and
+/// times that differ from those of a recording without.
 inline void write_small_recording(const std::filesystem::path& folder, std::size_t scans) {
   write_tiny_sequence(folder, scans);
   std::filesystem::create_directories(folder / "labels");
+  std::vector<double> times;
   for (std::size_t i = 0; i < scans; ++i) {
     const std::vector<float> all = tiny_scan(i);
     std::vector<float> scan;
@@ -26,7 +28,9 @@ inline void write_small_recording(const std::filesystem::path& folder, std::size
     }
     write_scan(folder / "velodyne" / (scan_name(i) + ".bin"), scan);
     write_labels(folder / "labels" / (scan_name(i) + ".label"), labels);
+    times.push_back(0.2 * static_cast<double>(i));
   }
+  write_times(folder / "times.txt", times);
 }
 
 }  // namespace dynains::test
