@@ -2,7 +2,6 @@
 // of results is absent, whole or clearly unfinished, files of others are as they were, and one more
 // start gives the bytes of an undisturbed run.
 #include <algorithm>
-#include <functional>
 #include <set>
 #include <string>
 #include <utility>
@@ -26,11 +25,7 @@ std::vector<State> crash_states(const CrashModel& model) {
   std::set<std::size_t> known;
   const auto add = [&](const Crash& crash) {
     Tree tree = model.after(crash);
-    std::string all;
-    for (const auto& [path, item] : tree) all += path + '\0' + item.bytes + '\0';
-    if (known.insert(std::hash<std::string>()(all)).second) {
-      states.push_back({crash, std::move(tree)});
-    }
+    if (known.insert(fingerprint(tree)).second) states.push_back({crash, std::move(tree)});
   };
   for (std::size_t length = 0; length <= model.size(); ++length) {
     for (const NameLoss names : {NameLoss::kNothing, NameLoss::kAll, NameLoss::kTail}) {

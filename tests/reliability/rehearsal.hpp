@@ -163,9 +163,9 @@ inline Arguments run_with(const Arguments& flags) {
 
 /// A small one.
 inline Arguments simulate_with(const Arguments& flags) {
-  return Arguments{"simulate", "/disk/out",   "--quiet",  "--scans", "2",
+  return Arguments{"simulate", "/disk/out",   "--quiet",  "--scans", "1",
                    "--scene",  "crowd",       "--sensor", "vlp16",   "--traffic",
-                   "0",        "--max-range", "5"} +
+                   "0",        "--max-range", "1"} +
          flags;
 }
 

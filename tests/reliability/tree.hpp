@@ -1,7 +1,9 @@
 // A folder and all that lies below it, as a value.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 
@@ -63,6 +65,13 @@ inline Tree below(const Tree& tree, const std::string& folder) {
     part[item->first.substr(prefix.size())] = item->second;
   }
   return part;
+}
+
+/// Differs between trees that differ.
+inline std::size_t fingerprint(const Tree& tree) {
+  std::string all;
+  for (const auto& [name, item] : tree) all += name + '\0' + item.bytes + '\0';
+  return std::hash<std::string>()(all);
 }
 
 /// The first difference, in words; empty if there is none.
