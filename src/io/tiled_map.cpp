@@ -16,6 +16,7 @@
 
 #include "dynains/io/atomic_file.hpp"
 #include "failure.hpp"
+#include "input_file.hpp"
 
 namespace dynains {
 namespace {
@@ -212,9 +213,10 @@ TiledStaticMap::Tile& TiledStaticMap::tile_at(const Place& place) {
 /// Points in the file of a tile, whole ones: a write may have been interrupted.
 std::size_t TiledStaticMap::count_stored(const Place& place) const {
   const fs::path path = path_of(place);
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file = open_input(path);
   TileHeader header;
   file.read(reinterpret_cast<char*>(&header), sizeof(header));
+  if (file.bad()) fail_to_read(file, path, 0, sizeof(header));
   const TileHeader ours;
   if (!file || std::memcmp(header.magic, ours.magic, sizeof(ours.magic)) != 0) {
     fail_at_byte(path, 0, "expected a tile of a static map");
@@ -241,11 +243,14 @@ std::vector<TiledStaticMap::Point> TiledStaticMap::read(const Place& place,
   std::vector<Point> points(count);
   if (count == 0) return points;
   const fs::path path = path_of(place);
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file = open_input(path);
   file.seekg(sizeof(TileHeader));
-  file.read(reinterpret_cast<char*>(points.data()),
-            static_cast<std::streamsize>(count * sizeof(Point)));
-  if (!file) fail(path, "cannot be read: expected " + std::to_string(count) + " points");
+  const auto size = static_cast<std::streamsize>(count * sizeof(Point));
+  file.read(reinterpret_cast<char*>(points.data()), size);
+  if (file.gcount() != size) {
+    const std::size_t end = sizeof(TileHeader) + count * sizeof(Point);
+    fail_to_read(file, path, end - static_cast<std::size_t>(size - file.gcount()), end);
+  }
   const auto outside = std::find_if(points.begin(), points.end(), [this](const Point& point) {
     const Eigen::Array3f share =
         Eigen::Array3f(point.x, point.y, point.z) / static_cast<float>(voxel_);

@@ -1,7 +1,9 @@
 #include "labelled_sequence.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
+#include <system_error>
 #include <utility>
 
 #include "dynains/errors.hpp"
@@ -98,10 +100,11 @@ void LabelledSequence::read_causes(const std::string& name) {
                   " points");
   }
   causes_.resize(truth_.size());
+  errno = 0;
   std::ifstream stream(file, std::ios::binary);
   if (!stream.read(reinterpret_cast<char*>(causes_.data()),
                    static_cast<std::streamsize>(causes_.size()))) {
-    throw IoError(file.string() + ": cannot be read");
+    throw IoError(file.string() + ": cannot be read: " + std::generic_category().message(errno));
   }
 }
 

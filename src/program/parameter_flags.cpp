@@ -1,11 +1,13 @@
 #include "parameter_flags.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <fstream>
 #include <limits>
 #include <locale>
 #include <sstream>
+#include <system_error>
 
 namespace dynains::program {
 namespace {
@@ -82,11 +84,13 @@ std::string format_value(double value) { return format_real(value); }
 std::string format_value(float value) { return format_real(value); }
 
 ParameterValues read_config_file(const std::filesystem::path& path) {
-  std::error_code error;
+  const auto fail = [&](int reason) {
+    throw IoError(path.string() + ": cannot be read: " + std::generic_category().message(reason) +
+                  "; expected a config file, see dynains config");
+  };
+  errno = 0;
   std::ifstream file(path);
-  if (!file || std::filesystem::is_directory(path, error)) {
-    throw IoError(path.string() + ": cannot be read; expected a config file, see dynains config");
-  }
+  if (!file) fail(errno);
   ParameterValues values;
   std::map<std::string, std::size_t> seen;
   std::size_t number = 0;
@@ -112,7 +116,7 @@ ParameterValues read_config_file(const std::filesystem::path& path) {
     }
     values.set(name, value, where + name);
   }
-  if (file.bad()) throw IoError(path.string() + ": reading stopped");
+  if (file.bad()) fail(errno);
   return values;
 }
 

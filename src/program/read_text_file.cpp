@@ -1,8 +1,10 @@
 #include "read_text_file.hpp"
 
+#include <cerrno>
 #include <cstddef>
 #include <fstream>
 #include <ios>
+#include <string>
 #include <system_error>
 
 #include "dynains/errors.hpp"
@@ -26,11 +28,15 @@ std::string read_text_file(const fs::path& path, std::uint64_t max_bytes,
   if (size > max_bytes) {
     fail("has " + std::to_string(size) + " bytes, more than " + std::to_string(max_bytes));
   }
+  const auto reason = [] { return std::generic_category().message(errno); };
+  errno = 0;
   std::ifstream file(path, std::ios::binary);
-  if (!file) fail("cannot be opened");
+  if (!file) fail("cannot be opened: " + reason());
   std::string text(static_cast<std::size_t>(size), '\0');
   file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (file.gcount() != static_cast<std::streamsize>(text.size())) fail("cannot be read to its end");
+  if (file.gcount() != static_cast<std::streamsize>(text.size())) {
+    fail("cannot be read to its end" + (file.bad() ? ": " + reason() : ""));
+  }
   return text;
 }
 

@@ -50,6 +50,7 @@ class Rehearsal {
     CAPTURE(recorded.outcome.err);
     REQUIRE(recorded.outcome.code == 0);
     after_ = read_tree(root_);
+    REQUIRE(claim_of(below(after_, "disk/out")) == Claim::kComplete);
     events_ = recorded.events;
   }
 
@@ -164,7 +165,7 @@ inline Arguments run_with(const Arguments& flags) {
 /// A small one.
 inline Arguments simulate_with(const Arguments& flags) {
   return Arguments{"simulate", "/disk/out",   "--quiet",  "--scans", "1",
-                   "--scene",  "crowd",       "--sensor", "vlp16",   "--traffic",
+                   "--scene",  "car-park",    "--sensor", "vlp16",   "--traffic",
                    "0",        "--max-range", "1"} +
          flags;
 }

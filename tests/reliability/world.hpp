@@ -325,7 +325,7 @@ class WorldMaker {
 
   void simulate(const World& world, Start& start) {
     start.out = output(world);
-    start.arguments = {"simulate",       start.out,     "--scans=1",    "--scene=crowd",
+    start.arguments = {"simulate",       start.out,     "--scans=1",    "--scene=car-park",
                        "--sensor=vlp16", "--traffic=0", "--max-range=1"};
     start.replaces = chance(0.6);
     if (start.replaces) start.arguments.push_back("--force");

@@ -21,6 +21,7 @@
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <set>
 #include <string>
 
 #include "log.hpp"
@@ -102,12 +103,18 @@ class Shim {
   }
 
   void opened(int descriptor, const std::string& path, int flags) {
-    open_.erase(descriptor);
+    closed(descriptor);
     if (path.empty()) return;
     open_[descriptor] = path;
     record({Event::kOpen, descriptor, flags, path, {}});
   }
-  void closed(int descriptor) { open_.erase(descriptor); }
+  void closed(int descriptor) {
+    open_.erase(descriptor);
+    listed_.erase(descriptor);
+  }
+
+  /// Whether the system is asked: it gives many entries at once.
+  bool is_first_entry(int descriptor) { return listed_.insert(descriptor).second; }
 
  private:
   static fs::path path_of_folder(int descriptor) {
@@ -124,6 +131,7 @@ class Shim {
   int error_ = 0;
   bool stays_ = false;
   std::map<int, std::string> open_;
+  std::set<int> listed_;
 };
 
 /// Never destroyed: the program may close files until its very end.
@@ -250,7 +258,10 @@ int status_of(const char* name, int folder, const char* path, Status* status, in
 template <class Item>
 Item* next_item(const char* name, DIR* folder) {
   const auto held = lock();
-  if (shim().fails("list", shim().below_root(::dirfd(folder)))) return nullptr;
+  const int descriptor = ::dirfd(folder);
+  if (shim().is_first_entry(descriptor) && shim().fails("list", shim().below_root(descriptor))) {
+    return nullptr;
+  }
   return next<Item*(DIR*)>(name)(folder);
 }
 
