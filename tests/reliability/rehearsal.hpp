@@ -93,18 +93,21 @@ class Rehearsal {
   /// Starts again from the state: what is wrong with the end of it; empty if nothing is.
   std::string problem_after_restart(const Tree& state) {
     restore(state);
-    const Outcome outcome = start_or_stop(with_root(scenario_.again));
-    const Tree end = read_tree(root_);
-    if (outcome.code != 0 && is_earlier(state) && !before_.empty()) {
-      return difference(end, state);  // refused, for an earlier result is whole
+    Outcome outcome = start_or_stop(with_root(scenario_.again));
+    if (outcome.code != 0 && is_earlier(state)) {
+      // An earlier result is whole and stays; the command itself replaces it.
+      const std::string changed = difference(read_tree(root_), state);
+      if (!changed.empty()) return "refused, but changed: " + changed;
+      outcome = start_or_stop(with_root(scenario_.command));
     }
+    const Tree end = read_tree(root_);
     if (outcome.code != 0) return "exit code " + std::to_string(outcome.code) + ": " + outcome.err;
-    return difference(without_measurements(end), without_measurements(after_));
+    return difference_from_end(end);
   }
 
   /// The results of the state are whole and those that the command makes; empty if so.
   std::string difference_from_end(const Tree& state) const {
-    return difference(without_measurements(state), without_measurements(after_));
+    return difference(comparable(state), comparable(after_));
   }
 
  private:
@@ -125,6 +128,9 @@ class Rehearsal {
   }
   static Tree not_ours(const Tree& tree) {
     return select(tree, [](const std::string& path) { return !is_ours(path); });
+  }
+  static Tree comparable(const Tree& tree) {
+    return without_empty_folders(without_measurements(tree));
   }
   static Tree results(const Tree& tree) {
     return without_measurements(

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <string>
 
@@ -65,6 +66,15 @@ inline Tree below(const Tree& tree, const std::string& folder) {
     part[item->first.substr(prefix.size())] = item->second;
   }
   return part;
+}
+
+/// An empty folder is no result, and harms nobody where it cannot be removed.
+inline Tree without_empty_folders(Tree tree) {
+  for (auto item = tree.begin(); item != tree.end();) {
+    const bool empty = item->second.kind == Kind::kFolder && below(tree, item->first).empty();
+    item = empty ? tree.erase(item) : std::next(item);
+  }
+  return tree;
 }
 
 /// Differs between trees that differ.

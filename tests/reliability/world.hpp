@@ -86,11 +86,12 @@ class WorldMaker {
     }
     start.full = chance(0.05);
     if (chance(0.2)) {
+      const std::string error = pick<std::string>({"28", "5", "13", "24", "4"});
+      // A call that is interrupted for ever is tried for ever.
+      const std::string how = error == "4" ? "once" : pick<std::string>({"once", "on"});
       start.fault = pick<std::string>({"open", "write", "read", "sync", "rename", "remove", "mkdir",
                                        "stat", "list", "lock", "close"}) +
-                    ' ' + std::to_string(1 + random_.index(40)) + ' ' +
-                    pick<std::string>({"28", "5", "13", "24", "4"}) + ' ' +
-                    pick<std::string>({"once", "on"});
+                    ' ' + std::to_string(1 + random_.index(40)) + ' ' + error + ' ' + how;
     }
     return start;
   }
@@ -156,8 +157,10 @@ class WorldMaker {
       if (world.tree.count(folder) == 0) put(world, folder, {Kind::kFolder, {}});
       if (world.tree.count(folder) == 0 || world.tree[folder].kind != Kind::kFolder) return;
     }
+    const bool listed = item.kind == Kind::kFile && world.ours.count(path) > 0;
     erase(world, path);
     world.tree[path] = item;
+    if (listed) world.ours.insert(path);  // by its name
   }
 
   /// A name in OUT, of a file or folder of ours.
@@ -315,8 +318,10 @@ class WorldMaker {
   }
 
   void eval(const World& world, Start& start) {
-    start.inputs = {spelled(world.kitti), spelled(chance(0.8) ? world.out : world.other)};
-    start.arguments = {"eval", start.inputs[0], start.inputs[1]};
+    const std::string run = chance(0.8) ? world.out : world.other;
+    start.arguments = {"eval", spelled(world.kitti), spelled(run)};
+    start.inputs = {world.kitti + "/velodyne", world.kitti + "/labels", world.kitti + "/poses.txt",
+                    run + "/labels",           run + "/online",         run + "/causes"};
     if (chance(0.6)) add_target(world, start, "--json");
     if (chance(0.3)) add_target(world, start, "--csv");
     if (chance(0.2)) start.arguments.push_back("--errors");
