@@ -35,13 +35,17 @@ constexpr std::string_view kHexDigits = "0123456789abcdef";
 constexpr std::string_view kTemporaryEnd = ".tmp";
 constexpr std::size_t kRandomDigits = 16;
 
-/// False if another open file has the lock. File systems without locks give every lock.
-bool lock_file(int descriptor) {
+enum class LockState { kOurs, kOfAnother, kUnknown };
+
+/// Takes the lock of a file unless another open file has it. kUnknown: the file system has no
+/// locks.
+LockState lock_file(int descriptor) {
   int result = 0;
   do {
     result = ::flock(descriptor, LOCK_EX | LOCK_NB);
   } while (result != 0 && errno == EINTR);
-  return result == 0 || errno != EWOULDBLOCK;
+  if (result == 0) return LockState::kOurs;
+  return errno == EWOULDBLOCK ? LockState::kOfAnother : LockState::kUnknown;
 }
 
 std::string random_digits() {
@@ -71,8 +75,8 @@ OpenTemporary open_temporary(const fs::path& target) {
     if (file.descriptor < 0 && errno == EEXIST) continue;
     if (file.descriptor < 0) fail_by_system(target, "cannot be written", errno);
     struct stat status {};
-    if (lock_file(file.descriptor) && ::fstat(file.descriptor, &status) == 0 &&
-        status.st_nlink > 0) {
+    if (lock_file(file.descriptor) != LockState::kOfAnother &&
+        ::fstat(file.descriptor, &status) == 0 && status.st_nlink > 0) {
       return file;
     }
     ::close(file.descriptor);
@@ -80,14 +84,41 @@ OpenTemporary open_temporary(const fs::path& target) {
   fail(target, "cannot be written: another process removes its temporary files");
 }
 
-/// A rename is on the disk when its folder is. Where folders cannot be synced (EINVAL), or not be
-/// opened, the file is whole either way.
+/// A rename is on the disk when its folder is. Some file systems cannot sync folders (EINVAL), and
+/// some folders cannot be opened; the file is whole either way.
 void sync_folder(const fs::path& folder) {
   const int descriptor =
       ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return;
-  ::fsync(descriptor);
+  const int error = ::fsync(descriptor) == 0 ? 0 : errno;
   ::close(descriptor);
+  if (error != 0 && error != EINVAL) fail_by_system(folder, "cannot be written to the disk", error);
+}
+
+/// Throws IoError.
+std::vector<fs::path> temporaries_in(const fs::path& folder,
+                                     const std::function<bool(const std::string&)>& is_wanted) {
+  std::error_code error;
+  if (fs::is_symlink(folder, error)) fail(folder, "is a link: expected a folder");
+  std::vector<fs::path> temporaries;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string target = target_of_temporary(entry->path().filename().string());
+    if (!target.empty() && is_wanted(target)) temporaries.push_back(entry->path());
+  }
+  if (error) fail_by_system(folder, "cannot be listed", error.value());
+  return temporaries;
+}
+
+/// kUnknown unless the path is a file.
+LockState lock_state_of(const fs::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0) return LockState::kUnknown;
+  struct stat status {};
+  const bool is_file = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
+  const LockState state = is_file ? lock_file(descriptor) : LockState::kUnknown;
+  ::close(descriptor);
+  return state;
 }
 
 }  // namespace
@@ -115,7 +146,7 @@ class AtomicFile::Buffer : public std::streambuf {
   /// Some file systems report a failed write only to close(). The lock stays with descriptor_.
   void check_close() {
     const int copy = ::fcntl(descriptor_, F_DUPFD_CLOEXEC, 0);
-    if ((copy < 0 || ::close(copy) != 0) && error_ == 0) error_ = errno;
+    if (copy >= 0 && ::close(copy) != 0 && error_ == 0) error_ = errno;
   }
 
   void close() {
@@ -197,32 +228,22 @@ std::string target_of_temporary(const std::string& name) {
   return is_temporary ? name.substr(1, point - 1) : std::string();
 }
 
-std::size_t remove_leftovers(const fs::path& folder,
-                             const std::function<bool(const std::string&)>& is_ours) {
-  std::size_t written = 0;
-  std::error_code error;
-  if (fs::is_symlink(folder, error)) fail(folder, "is a link: expected a folder");
-  std::vector<fs::path> temporaries;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    const std::string target = target_of_temporary(entry->path().filename().string());
-    if (!target.empty() && is_ours(target)) temporaries.push_back(entry->path());
-  }
-  if (error) fail_by_system(folder, "cannot be listed", error.value());
-  for (const fs::path& path : temporaries) {
-    const int descriptor = ::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
-    struct stat status {};
-    const bool is_file =
-        descriptor >= 0 && ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
-    if (is_file && !lock_file(descriptor)) {
-      ++written;
-    } else if (is_file && ::unlink(path.c_str()) != 0 && errno != ENOENT) {
-      error = std::error_code(errno, std::generic_category());
+void remove_leftovers(const fs::path& folder,
+                      const std::function<bool(const std::string&)>& is_ours) {
+  for (const fs::path& path : temporaries_in(folder, is_ours)) {
+    if (lock_state_of(path) == LockState::kOurs && ::unlink(path.c_str()) != 0 && errno != ENOENT) {
+      fail_by_system(path, "cannot be removed", errno);
     }
-    if (descriptor >= 0) ::close(descriptor);
-    if (error) fail_by_system(path, "cannot be removed", error.value());
   }
-  return written;
+}
+
+std::size_t count_writers(const fs::path& target) {
+  const auto is_of_target = [&](const std::string& name) { return name == target.filename(); };
+  std::size_t writers = 0;
+  for (const fs::path& path : temporaries_in(target.parent_path(), is_of_target)) {
+    if (lock_state_of(path) == LockState::kOfAnother) ++writers;
+  }
+  return writers;
 }
 
 void sync_files(const fs::path& folder) {

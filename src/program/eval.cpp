@@ -10,6 +10,7 @@
 #include "dynains/evaluation/report.hpp"
 #include "dynains/io/point_file.hpp"
 #include "evaluation_options.hpp"
+#include "input_files.hpp"
 #include "labelled_sequence.hpp"
 #include "recording_options.hpp"
 
@@ -61,6 +62,10 @@ void eval(const EvalOptions& options) {
   }
 
   LabelledSequence sequence(options.sequence.open(), options.window, runs);
+  InputFiles inputs;
+  for (const std::filesystem::path& file : sequence.files()) inputs.add(file);
+  for (const std::string& file : options.maps) inputs.add(file);
+  for (const std::string& file : {options.json, options.csv}) inputs.refuse(file);
   const auto source = [&](std::size_t i, evaluation::LabelledScan& scan) {
     return sequence.read(i, scan);
   };

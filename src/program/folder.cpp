@@ -3,7 +3,6 @@
 #include <dirent.h>
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <sys/sysmacros.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -113,9 +112,9 @@ void Folder::check_removable(const std::string& name) const {
   const bool is_protected =
       (status.stx_attributes & (STATX_ATTR_IMMUTABLE | STATX_ATTR_APPEND)) != 0;
   if (is_of_others || is_protected) fail_with(path_ / name, "cannot be removed", EPERM);
-  const bool is_mounted = (status.stx_attributes & STATX_ATTR_MOUNT_ROOT) != 0 ||
-                          ::makedev(status.stx_dev_major, status.stx_dev_minor) != folder.st_dev;
-  if (is_mounted) fail_with(path_ / name, "cannot be replaced: something is mounted there", EBUSY);
+  if ((status.stx_attributes & STATX_ATTR_MOUNT_ROOT) != 0) {
+    fail_with(path_ / name, "cannot be replaced: something is mounted there", EBUSY);
+  }
 }
 
 void Folder::remove_file(const std::string& name) const {

@@ -8,7 +8,7 @@ void InputFiles::refuse(const FileIdentity& identity, const std::filesystem::pat
   const auto input = paths_.find(identity);
   if (input == paths_.end()) return;
   throw IoError(output.string() + ": is read by this command, as " + input->second.string() +
-                ", and would be changed; choose another place for the results");
+                ", and would be changed; choose another place to write to");
 }
 
 }  // namespace dynains::program

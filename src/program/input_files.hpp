@@ -18,6 +18,10 @@ class InputFiles {
   /// Throws IoError that names both paths if `output`, the file or folder with this identity, is
   /// read.
   void refuse(const FileIdentity& identity, const std::filesystem::path& output) const;
+  /// The same for the file or folder that `output` leads to, if there is one.
+  void refuse(const std::filesystem::path& output) const {
+    if (const auto identity = identity_of(output)) refuse(*identity, output);
+  }
 
  private:
   std::map<FileIdentity, std::filesystem::path> paths_;

@@ -241,9 +241,11 @@ const fs::path& OutputChange::folder() const {
   return is_staged() ? out_.staging()->path() : out_.path();
 }
 
-/// Their listing stays in the marker until they are gone for good.
+/// Their listing stays in the marker until they are gone for good. From the mark on, the staging
+/// folder is no longer removed in case of an error.
 void OutputChange::remove_earlier() {
   out_.mark(marker_, OutputListing(out_.listing()));
+  mode_ = Mode::kInPlace;
   out_.remove_results();
   sync_files(out_.path());
 }
@@ -251,7 +253,6 @@ void OutputChange::remove_earlier() {
 void OutputChange::put_in_place(const std::function<void()>& put_others) {
   if (is_staged()) {
     sync_files(out_.staging()->path());
-    mode_ = Mode::kInPlace;
     remove_earlier();
     out_.mark(marker_, planned_);
     put_others();

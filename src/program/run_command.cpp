@@ -72,8 +72,8 @@ void print_summary(const RunResults& results, const RunTiming& timing, const Run
             << "time per scan: median " << time.median << " ms, p95 " << time.p95 << " ms, max "
             << time.max << " ms\n";
   if (results.map_points()) {
-    std::cout << "static map: " << outputs.map.string() << " (" << *results.map_points()
-              << " points)\n";
+    std::cout << "static map: " << (outputs.folder / outputs.map_name()).string() << " ("
+              << *results.map_points() << " points)\n";
   }
   std::cout << "moving points: " << (outputs.folder / "dynamic_points.ply").string() << " ("
             << moving << " points)\n"

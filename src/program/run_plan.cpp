@@ -160,7 +160,7 @@ OutsideMap::OutsideMap(const RunPlan& plan, bool may_replace) {
   if (!plan.outputs.has_outside_map()) return;
   const fs::path& map = plan.outputs.map;
   const fs::path folder = map.parent_path();
-  if (const auto identity = identity_of(map)) plan.inputs.refuse(*identity, map);
+  plan.inputs.refuse(map);
   if (identity_of(folder) == identity_of(plan.sequence.scan_folder())) {
     throw IoError(map.string() + ": the scans are there; choose another folder for --map");
   }
@@ -169,11 +169,12 @@ OutsideMap::OutsideMap(const RunPlan& plan, bool may_replace) {
                   ": exists; choose another name for --map, or replace it by "
                   "--force");
   }
-  writer_ = open_map(map, plan.sequence, plan.range);
   lock_.emplace(folder, FolderLock::Mode::kShared);
-  const std::size_t writers = remove_leftovers(
-      folder, [&](const std::string& name) { return name == map.filename().string(); });
-  if (writers > 1) throw UsageError(map.string() + ": is being written by another run");
+  remove_leftovers(folder, [&](const std::string& name) { return name == map.filename(); });
+  writer_ = open_map(map, plan.sequence, plan.range);
+  if (count_writers(map) > 1) {
+    throw UsageError(map.string() + ": is being written by another run");
+  }
 }
 
 }  // namespace dynains::program

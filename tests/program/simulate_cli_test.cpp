@@ -68,6 +68,16 @@ TEST_CASE("simulate makes a sequence that run and eval take, the same from the s
     CHECK(right > 1000);
   }
 
+  // Nothing is written over what is read.
+  for (const std::string& input : {a + "/labels/000001.label", a + "/velodyne/000001.bin",
+                                   a + "/poses.txt", out + "/causes/000001.cause"}) {
+    const std::string before = read_text(input);
+    const Outcome refused = start({"eval", a, out, "--json", input});
+    CHECK(refused.code == 1);
+    CHECK_THAT(refused.err, ContainsSubstring(input + ": is read by this command"));
+    CHECK(read_text(input) == before);
+  }
+
   // Labels that do not fit the scan.
   write_text(a + "/labels/000002.label", "1234");
   const Outcome refused = start({"eval", a, out});

@@ -33,7 +33,8 @@ class AtomicFile {
   };
 
   /// Puts the file in place. Throws IoError if anything could not be written, with the reason of
-  /// the first failure; the target is then untouched.
+  /// the first failure; the target is then untouched. Throws IoError as well if the file is in
+  /// place, but its folder could not be brought to the disk.
   void commit(Sync sync = Sync::kNow);
 
  private:
@@ -49,11 +50,15 @@ class AtomicFile {
 /// Name of the file that `name` is a temporary of, by its form; empty if it is none.
 std::string target_of_temporary(const std::string& name);
 
-/// Removes temporaries that killed processes left in `folder`, which must not be a link. Only those
-/// of files for which `is_ours(NAME)` holds are looked at. Returns how many of them are still being
-/// written, by this process or another one; they stay. Throws IoError.
-std::size_t remove_leftovers(const std::filesystem::path& folder,
-                             const std::function<bool(const std::string&)>& is_ours);
+/// Removes temporaries that killed processes left in `folder`, which must not be a link: those of
+/// files for which `is_ours(NAME)` holds. A temporary that is being written stays, and so does any
+/// on a file system without locks. Throws IoError.
+void remove_leftovers(const std::filesystem::path& folder,
+                      const std::function<bool(const std::string&)>& is_ours);
+
+/// How many AtomicFiles of `target` are open, in this process and others; 0 on a file system
+/// without locks. Throws IoError.
+std::size_t count_writers(const std::filesystem::path& target);
 
 /// Brings everything written to the file system of `folder` to its disk. Throws IoError.
 void sync_files(const std::filesystem::path& folder);
