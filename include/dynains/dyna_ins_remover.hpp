@@ -172,12 +172,15 @@ class BasicDynaInsRemover {
     return take_in(cloud, T_world_sensor, time);
   }
 
-  /// The same with scan numbers for times: 0.1 s from scan to scan.
+  /// The same at 0.1 s after the scan before; later by the least step of a double where 0.1 s is
+  /// less than that (times beyond 1e15 s).
   template <class Cloud>
   FrameResult push(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor) {
     const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
     constexpr double kPeriod = 0.1;
-    return take_in(cloud, T_world_sensor, pushed_ == 0 ? 0.0 : last_time_ + kPeriod);
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    const double next = std::max(last_time_ + kPeriod, std::nextafter(last_time_, kInfinity));
+    return take_in(cloud, T_world_sensor, pushed_ == 0 ? 0.0 : next);
   }
 
   /// Makes the verdict on all scans final that are still open, oldest first; `sink` is called with

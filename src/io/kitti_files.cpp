@@ -70,8 +70,7 @@ void for_each_row(const fs::path& path, Parse&& parse) {
 }  // namespace
 
 std::ifstream open_text(const fs::path& path) {
-  std::error_code error;
-  if (fs::is_directory(path, error)) fail(path, "is a folder, expected a file");
+  check_is_file(path);
   std::ifstream file(path, std::ios::binary);
   if (!file) fail(path, "cannot be opened for reading");
   return file;
