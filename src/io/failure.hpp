@@ -1,4 +1,4 @@
-// The form of every file error: path, position, what was expected.
+// Errors of files: path, position, expectation.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,10 @@
 namespace dynains {
 
 [[noreturn]] inline void fail(const std::filesystem::path& path, const std::string& what) {
-  throw IoError(path.string() + ": " + what);
+  throw IoError((path.empty() ? "\"\"" : path.string()) + ": " + what);
 }
 
-/// The same with the system's own words for `error`, a value of errno. Throws IoError.
+/// Appends the system's message for `error`, a value of errno.
 [[noreturn]] inline void fail_by_system(const std::filesystem::path& path, const std::string& what,
                                         int error) {
   fail(path, what + ": " + std::generic_category().message(error));
@@ -28,6 +28,18 @@ namespace dynains {
 [[noreturn]] inline void fail_at_byte(const std::filesystem::path& path, std::uint64_t byte,
                                       const std::string& what) {
   throw IoError(path.string() + ": byte " + std::to_string(byte) + ": " + what);
+}
+
+/// Throws IoError unless `path` is a regular file: reading a device or a pipe may never end.
+inline void check_is_file(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::filesystem::file_type type = std::filesystem::status(path, error).type();
+  if (type == std::filesystem::file_type::not_found) fail(path, "not found, expected a file");
+  if (type == std::filesystem::file_type::directory) fail(path, "is a folder, expected a file");
+  if (error) fail(path, "cannot be read: " + error.message());
+  if (type != std::filesystem::file_type::regular) {
+    fail(path, "is a device or a pipe, expected a file");
+  }
 }
 
 }  // namespace dynains
