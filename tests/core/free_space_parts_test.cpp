@@ -55,7 +55,7 @@ InstanceSamples supervoxels_at(const std::vector<std::array<int, 3>>& places, in
   InstanceSamples samples;
   samples.sample_begin.push_back(0);
   for (const auto& p : places) {
-    samples.place.push_back(pack_place(p[0], p[1], p[2]));
+    samples.place.push_back(voxel_key(p[0], p[1], p[2]));
     samples.sample_begin.push_back(samples.sample_begin.back() +
                                    static_cast<std::uint32_t>(samples_each));
   }
@@ -315,7 +315,7 @@ TrackedInstances tracked_in(const std::vector<std::vector<int>>& cells_of) {
   tracked.instances.resize(cells_of.size());
   tracked.shapes.resize(cells_of.size());
   for (std::uint32_t i = 0; i < cells_of.size(); ++i) {
-    for (const int x : cells_of[i]) tracked.cells.push_back({pack_place(x, 0, 0), i});
+    for (const int x : cells_of[i]) tracked.cells.push_back({voxel_key(x, 0, 0), i});
     tracked.shapes[i].cells = static_cast<std::uint32_t>(cells_of[i].size());
   }
   return tracked;

@@ -34,7 +34,7 @@ InstanceSamples samples_of(const Instances& instances) {
                                    static_cast<std::uint32_t>(samples.supervoxel_count()));
       samples.sample_begin.push_back(samples.sample_begin.back() + count);
       samples.instance_of.push_back(instance);
-      samples.place.push_back(pack_place(0, 0, 0));
+      samples.place.push_back(voxel_key(0, 0, 0));
     }
     samples.supervoxel_begin.push_back(static_cast<std::uint32_t>(samples.supervoxel_count()));
     ++instance;
@@ -180,7 +180,7 @@ Scan scan_of_layers(std::size_t per_layer) {
   Scan scan(Instances{std::vector<std::uint32_t>(4 * per_layer, 4)});
   for (std::size_t s = 0; s < scan.samples.place.size(); ++s) {
     const auto layer = static_cast<std::int32_t>(s / per_layer) - 2;  // below the sensor, too
-    scan.samples.place[s] = pack_place(static_cast<std::int32_t>(s % per_layer), 0, layer);
+    scan.samples.place[s] = voxel_key(static_cast<std::int32_t>(s % per_layer), 0, layer);
   }
   return scan;
 }
@@ -274,7 +274,7 @@ TEST_CASE("what is too small to carry windows goes as before") {
 TEST_CASE("of an odd number of layers the middle belongs to the lower half") {
   Scan scan(Instances{std::vector<std::uint32_t>(10, 4)});
   for (std::size_t s = 0; s < 10; ++s) {
-    scan.samples.place[s] = pack_place(0, 0, static_cast<std::int32_t>(s / 2) - 3);
+    scan.samples.place[s] = voxel_key(0, 0, static_cast<std::int32_t>(s / 2) - 3);
   }
   Scan above = scan;
   see_free_and_hit(above, {6, 7}, true);

@@ -149,15 +149,15 @@ class InstanceBeliefUpdater {
                             std::size_t instance) const {
     const std::uint32_t begin = samples.supervoxel_begin[instance];
     const std::uint32_t end = samples.supervoxel_begin[instance + 1];
-    std::int32_t lowest = layer_of(samples.place[begin]);
-    std::int32_t highest = lowest;
+    std::int64_t lowest = voxel_index(samples.place[begin], 2);
+    std::int64_t highest = lowest;
     for (std::uint32_t s = begin; s < end; ++s) {
-      lowest = std::min(lowest, layer_of(samples.place[s]));
-      highest = std::max(highest, layer_of(samples.place[s]));
+      lowest = std::min(lowest, voxel_index(samples.place[s], 2));
+      highest = std::max(highest, voxel_index(samples.place[s], 2));
     }
     Share sum;
     for (std::uint32_t s = begin; s < end; ++s) {
-      if (2 * layer_of(samples.place[s]) > lowest + highest) continue;
+      if (2 * voxel_index(samples.place[s], 2) > lowest + highest) continue;
       const Share share =
           share_of(beliefs.supervoxels[s], samples.sample_begin[s + 1] - samples.sample_begin[s]);
       sum.total += share.total;

@@ -7,42 +7,20 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/curved_voxel_clusterer.hpp"
 #include "dynains/evidence/smallest_k.hpp"
-#include "dynains/evidence/voxel_hash.hpp"
-#include "dynains/evidence/voxel_hash_table.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/wide_lanes.hpp"
+#include "dynains/voxel/voxel_hash_table.hpp"
+#include "dynains/voxel/voxel_key.hpp"
 
 namespace dynains {
-
-/// Place of a supervoxel in its grid, packed: ordered by x, then y, then z.
-using SupervoxelPlace = std::uint64_t;
-
-inline SupervoxelPlace pack_place(std::int32_t x, std::int32_t y, std::int32_t z) {
-  constexpr std::int64_t kOffset = std::int64_t{1} << 20;
-  return static_cast<std::uint64_t>(x + kOffset) << 42 |
-         static_cast<std::uint64_t>(y + kOffset) << 21 | static_cast<std::uint64_t>(z + kOffset);
-}
-
-/// Its place along z, up to a constant.
-inline std::int32_t layer_of(SupervoxelPlace place) {
-  return static_cast<std::int32_t>(place & ((std::uint64_t{1} << 21) - 1));
-}
-
-/// The place beside another, some steps along each axis.
-inline SupervoxelPlace neighbour(SupervoxelPlace place, int dx, int dy, int dz) {
-  return place + (static_cast<std::uint64_t>(static_cast<std::int64_t>(dx)) << 42) +
-         (static_cast<std::uint64_t>(static_cast<std::int64_t>(dy)) << 21) +
-         static_cast<std::uint64_t>(static_cast<std::int64_t>(dz));
-}
 
 /// The samples of one scan in its sensor frame: instance-major, then supervoxel-major, so that
 /// what belongs together is one range.
 struct InstanceSamples {
   PointBuffer points;                           ///< padded for wide loads
   std::vector<std::uint32_t> sample_begin;      ///< by supervoxel, one more than supervoxels
-  std::vector<SupervoxelPlace> place;           ///< by supervoxel
+  std::vector<VoxelKey> place;                  ///< by supervoxel
   std::vector<std::uint32_t> supervoxel_begin;  ///< by instance, one more than instances
   std::vector<std::uint32_t> supervoxel_of;     ///< by sample; longer than there are any
   std::vector<std::uint32_t> instance_of;       ///< by supervoxel
@@ -110,17 +88,30 @@ class InstanceSampler {
   }
 
  private:
-  // Number 0 stands for none.
+  // Part of an instance that lies in one voxel. The indices along x and y have 16 bits each.
   struct Supervoxel {
-    std::int32_t xy, z, instance;  // as CellBlock has them
+    std::int32_t xy = 0;
+    std::int32_t z = 0;
+    std::int32_t instance = -2;  // -1: points that get no sample; -2: no supervoxel
+
+    static Supervoxel none() { return {0, 0, -1}; }
+    friend bool operator==(const Supervoxel& a, const Supervoxel& b) {
+      return ((a.xy ^ b.xy) | (a.z ^ b.z) | (a.instance ^ b.instance)) == 0;
+    }
+    friend std::uint32_t voxel_hash(const Supervoxel& s) {
+      return static_cast<std::uint32_t>(detail::mixed_hash(s.xy, s.z, s.instance));
+    }
   };
+  using SupervoxelTable = VoxelHashTable<Supervoxel>;
+  static constexpr int kHalf = 16;           // bits
   static constexpr std::size_t kBlock = 64;  // points that are worked off together
   // Ranks are of places of this size: a turn of the sensor, which changes the last bits of all
   // coordinates, must not change them.
   static constexpr float kPlacesPerMetre = 64.0F;
 
   void begin_scan() {
-    memory_.clear();
+    table_.clear();
+    table_.insert(Supervoxel::none());  // number 0
     samples_.clear();
   }
 
@@ -141,24 +132,31 @@ class InstanceSampler {
       const Int rank =
           mixed_hash(truncate(px * kPlaces), truncate(py * kPlaces), truncate(pz * kPlaces));
       rank.store(&rank_[at.begin]);
-      VoxelHashTable::put(is_sampled, floor(px * per_metre), floor(py * per_metre),
-                          floor(pz * per_metre), instance, at.begin, cells_);
+      const Int xy = keep(is_sampled, (floor(px * per_metre) << kHalf) +
+                                          (floor(py * per_metre) & Int((1 << kHalf) - 1)));
+      const Int z = keep(is_sampled, floor(pz * per_metre));
+      const Int kept_instance = select(is_sampled, instance, Int(-1));
+      xy.store(&xy_[at.begin]);
+      z.store(&z_[at.begin]);
+      kept_instance.store(&instance_[at.begin]);
+      mixed_hash(xy, z, kept_instance).store(&hash_[at.begin]);
     });
   }
 
-  // Most points are of supervoxels that are remembered.
+  // Most points lie in the supervoxel that was met last in the first slot of its hash.
   void meet_supervoxels(std::size_t count, std::uint32_t* met_of) {
-    detail::grow(supervoxels_, memory_.count() + 1 + kBlock);
-    memory_.make_room_for(kBlock);
+    detail::grow(supervoxels_, table_.size() + kBlock);
+    table_.reserve(table_.size() + kBlock);
     for (std::size_t i = 0; i < count; ++i) {
-      const detail::VoxelHashTable::Entry& entry = memory_.at(cells_, i);
-      met_of[i] = entry.is_other(cells_, i) ? meet_supervoxel(i) : entry.number;
+      const Supervoxel supervoxel = {xy_[i], z_[i], instance_[i]};
+      const SupervoxelTable::Slot& slot = table_.first_slot(static_cast<std::uint32_t>(hash_[i]));
+      met_of[i] = slot.key == supervoxel ? slot.number : meet_supervoxel(supervoxel, i);
     }
   }
 
-  std::uint32_t meet_supervoxel(std::size_t i) {
-    const std::uint32_t number = memory_.find(cells_, i);
-    supervoxels_[number] = {cells_.xy[i], cells_.z[i], cells_.instance[i]};
+  std::uint32_t meet_supervoxel(const Supervoxel& supervoxel, std::size_t i) {
+    const std::uint32_t number = table_.insert(supervoxel, static_cast<std::uint32_t>(hash_[i]));
+    supervoxels_[number] = supervoxel;
     return number;
   }
 
@@ -166,7 +164,7 @@ class InstanceSampler {
   // the points take turns.
   void rank_points(std::size_t begin, std::size_t count, const std::uint32_t* met_of) {
     constexpr std::size_t kStretches = 4, kLength = kBlock / kStretches;
-    samples_.make_rows(memory_.count() + 1);
+    samples_.make_rows(table_.size());
     const auto rank = [&](std::size_t i) {
       samples_.add(met_of[i], static_cast<std::uint32_t>(rank_[i]),
                    static_cast<std::uint32_t>(begin + i));
@@ -180,14 +178,13 @@ class InstanceSampler {
     }
   }
 
-  static SupervoxelPlace place_of(const Supervoxel& cell) {
-    return pack_place(cell.xy >> detail::VoxelHashTable::kHalf, static_cast<std::int16_t>(cell.xy),
-                      cell.z);
+  static VoxelKey place_of(const Supervoxel& cell) {
+    return voxel_key(cell.xy >> kHalf, static_cast<std::int16_t>(cell.xy), cell.z);
   }
 
   // A counting sort: supervoxels by instance, and their samples with them.
   void order(PointsView points, std::size_t instance_count, InstanceSamples& out) {
-    const std::size_t supervoxel_count = memory_.count();
+    const std::size_t supervoxel_count = table_.size() - 1;
     out.supervoxel_begin.assign(instance_count + 1, 0);
     for (std::size_t met = 1; met <= supervoxel_count; ++met) {
       ++out.supervoxel_begin[static_cast<std::uint32_t>(supervoxels_[met].instance) + 1];
@@ -244,10 +241,9 @@ class InstanceSampler {
 
   float supervoxels_per_metre_;
   float max_range_;
-  detail::VoxelHashTable memory_;  // of supervoxels, numbered as met_of counts them
-  // Of the points of a block.
-  detail::CellBlock<kBlock> cells_ = {};
-  std::array<std::int32_t, kBlock> rank_ = {};
+  SupervoxelTable table_{4096};  // numbers as met_of counts them; 0: no sample
+  // By point of a block.
+  std::array<std::int32_t, kBlock> xy_ = {}, z_ = {}, instance_ = {}, hash_ = {}, rank_ = {};
   detail::SmallestK samples_;            // by supervoxel
   std::vector<Supervoxel> supervoxels_;  // longer than what is in use
   std::vector<std::uint32_t> next_;

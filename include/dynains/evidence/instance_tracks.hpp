@@ -9,11 +9,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/curved_voxel_clusterer.hpp"
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/sample_places.hpp"
-#include "dynains/evidence/voxel_hash.hpp"
 #include "dynains/points.hpp"
+#include "dynains/voxel/voxel_key.hpp"
 
 namespace dynains {
 
@@ -46,7 +45,7 @@ struct TrackedInstances {
 
   /// Occupied cells of carried instances.
   struct Cell {
-    SupervoxelPlace place;
+    VoxelKey place;
     std::uint32_t instance;
   };
   std::vector<Cell> cells;
@@ -123,7 +122,7 @@ class InstanceLinker {
 
   // Without the instance: cells of two scans meet in the same place.
   std::uint32_t& slot_of(const TrackedInstances::Cell& cell) {
-    return table_[detail::place_hash(cell.place) % kTable];
+    return table_[voxel_hash(cell.place) >> 8 & (kTable - 1)];
   }
 
   void measure_extent(const PointBuffer& points, std::uint32_t begin, std::uint32_t end,
@@ -165,8 +164,8 @@ class InstanceLinker {
   float max_length_;
   float max_height_;
   float overlap_;
-  std::vector<std::uint32_t> table_;    // numbers of cells, direct-mapped
-  std::vector<SupervoxelPlace> place_;  // by sample
+  std::vector<std::uint32_t> table_;  // numbers of cells, direct-mapped
+  std::vector<VoxelKey> place_;       // by sample
   std::vector<std::uint32_t> shared_;
   std::vector<std::uint32_t> touched_;
 };

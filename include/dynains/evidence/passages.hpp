@@ -11,9 +11,9 @@
 #include "dynains/cause.hpp"
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/sample_places.hpp"
-#include "dynains/evidence/voxel_hash.hpp"
 #include "dynains/stage/evidence_verdict.hpp"
 #include "dynains/stage/free_space_config.hpp"
+#include "dynains/voxel/voxel_key.hpp"
 
 namespace dynains {
 
@@ -66,7 +66,7 @@ class Passages {
 
  private:
   struct Cell {
-    SupervoxelPlace place = 0;
+    VoxelKey place = 0;
     std::uint32_t met = 0;  // number of the latest scan that met it, from 1
     std::uint16_t stayed = 0;
     std::uint16_t moved = 0;
@@ -88,10 +88,10 @@ class Passages {
     return is_dynamic(cause) ? Count::kMoved : Count::kStayed;
   }
 
-  static std::size_t line_of(SupervoxelPlace place) { return detail::place_hash(place) % kLines; }
+  static std::size_t line_of(VoxelKey place) { return voxel_hash(place) >> 8 & (kLines - 1); }
 
   // The cell of a place if it was met lately.
-  const Cell* find(SupervoxelPlace place, std::uint32_t now) const {
+  const Cell* find(VoxelKey place, std::uint32_t now) const {
     for (const Cell& cell : lines_[line_of(place)].cells) {
       if (cell.place == place) return age(cell, now) <= memory_ ? &cell : nullptr;
     }
@@ -99,7 +99,7 @@ class Passages {
   }
 
   // The cell of a place, which may be a new one instead of that which was met longest ago.
-  Cell& meet(SupervoxelPlace place, std::uint32_t now) {
+  Cell& meet(VoxelKey place, std::uint32_t now) {
     Line& line = lines_[line_of(place)];
     for (Cell& cell : line.cells) {
       if (cell.place != place) continue;
@@ -122,7 +122,7 @@ class Passages {
   }
 
   // Counts a sample as something else than before.
-  void recount(SupervoxelPlace place, std::uint32_t now, Count before, Count count) {
+  void recount(VoxelKey place, std::uint32_t now, Count before, Count count) {
     Cell& cell = meet(place, now);
     if (before == Count::kMoved && cell.moved > 0) --cell.moved;
     if (before == Count::kStayed && cell.stayed > 0) --cell.stayed;
@@ -164,7 +164,7 @@ class Passages {
   // By line: whether any of its cells may be a passage. Few are, and most samples need no look at
   // their cell.
   std::vector<bool> passed_;
-  std::vector<SupervoxelPlace> places_;  // by sample
+  std::vector<VoxelKey> places_;  // by sample
 };
 
 }  // namespace dynains

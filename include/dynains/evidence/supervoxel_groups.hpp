@@ -40,7 +40,7 @@ class SupervoxelGroups {
 
  private:
   struct Entry {
-    SupervoxelPlace place;
+    VoxelKey place;
     std::uint32_t member;
     bool visited;
   };
@@ -50,15 +50,15 @@ class SupervoxelGroups {
     group_.assign(1, first);
     entries_[first].visited = true;
     for (std::size_t next = 0; next < group_.size(); ++next) {
-      const SupervoxelPlace place = entries_[group_[next]].place;
+      const VoxelKey place = entries_[group_[next]].place;
       for (int dx = -1; dx <= 1; ++dx) {
         for (int dy = -1; dy <= 1; ++dy) {
           // The three neighbours along z follow each other in the order of places.
-          const SupervoxelPlace low = neighbour(place, dx, dy, -1);
-          const SupervoxelPlace high = neighbour(place, dx, dy, 1);
+          const VoxelKey low = place + voxel_key_step(dx, dy, -1);
+          const VoxelKey high = place + voxel_key_step(dx, dy, 1);
           auto at = std::lower_bound(
               entries_.begin(), entries_.end(), low,
-              [](const Entry& entry, SupervoxelPlace value) { return entry.place < value; });
+              [](const Entry& entry, VoxelKey value) { return entry.place < value; });
           for (; at != entries_.end() && at->place <= high; ++at) {
             if (at->visited) continue;
             at->visited = true;
