@@ -13,13 +13,13 @@
 
 #include "dynains/belief_updater.hpp"
 #include "dynains/cause.hpp"
+#include "dynains/evidence/dynamic_occupancy_grid.hpp"
 #include "dynains/evidence/instance_beliefs.hpp"
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/instance_tracks.hpp"
 #include "dynains/evidence/moved_ground.hpp"
-#include "dynains/evidence/passages.hpp"
 #include "dynains/evidence/reference_lags.hpp"
-#include "dynains/evidence/reference_views.hpp"
+#include "dynains/evidence/reference_scans.hpp"
 #include "dynains/evidence/supervoxel_groups.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor/sensor_model.hpp"
@@ -44,44 +44,44 @@ class FreeSpaceEvidence {
       : config_((config.validate(), config)),
         sampler_(config.supervoxel, config.evidence_range,
                  static_cast<std::uint32_t>(config.supervoxel_samples)),
-        views_(config),
+        references_(config),
         updater_(config),
         track_level_(static_cast<float>(log_odds(config.tau_track))),
         linker_(config.track_cell, config.track_length, config.track_height, config.track_overlap),
         track_belief_(updater_.increment()),
-        passages_(config),
+        dynamic_grid_(config),
         moved_ground_(config),
-        records_(static_cast<std::size_t>(config.horizon) + 2) {
+        records_(static_cast<std::size_t>(config.lookahead_scans) + 2) {
     const int step = config.reference_step;
     for (int phase = 0; phase < step; ++phase) {
       const auto turn = static_cast<int>(turn_of(static_cast<std::uint64_t>(phase)));
-      before_.push_back(reference_lags(config.memory, phase, step));
-      after_.push_back(reference_lags(config.horizon - turn, step - phase, step));
+      before_.push_back(reference_lags(config.lookback_scans, phase, step));
+      after_.push_back(reference_lags(config.lookahead_scans - turn, step - phase, step));
     }
   }
 
   const Config& config() const { return config_; }
 
   /// Scans after which a verdict is final.
-  std::size_t horizon() const { return static_cast<std::size_t>(config_.horizon); }
+  std::size_t lookahead_scans() const { return static_cast<std::size_t>(config_.lookahead_scans); }
 
   /// Takes over what depends on the sensor; to be called before the first scan, and again once more
   /// is known of it.
   void adapt(const SensorModel& sensor) {
-    views_.adapt(sensor);
+    references_.adapt(sensor);
     moved_ground_.adapt(sensor);
   }
 
   /// Lets judge() be asked about scans up to that many behind the newest, if these are more than
-  /// horizon(): what happened later than that says nothing about them. To be called before the
-  /// first scan.
+  /// lookahead_scans(): what happened later than that says nothing about them. To be called before
+  /// the first scan.
   void keep(std::size_t scans) { records_.resize(std::max(records_.size(), scans + 2)); }
 
   /// Gets the memory of images for that many scans of the sensor that adapt() was told, and of what
   /// else is kept of scans if one was observed already; or for as many as are ever kept. What was
   /// observed is lost: to be called before scan 0, or before it comes again.
   void reserve(std::size_t scans) {
-    views_.reserve(scans);
+    references_.reserve(scans);
     const auto largest = std::max_element(
         records_.begin(), records_.end(),
         [](const Record& a, const Record& b) { return a.samples.size() < b.samples.size(); });
@@ -94,30 +94,30 @@ class FreeSpaceEvidence {
 
   /// Takes scan number `scan` in: scans come in order, from 0. `instance_of` holds the instance of
   /// each non-ground point of `split`, below `instance_count` or kNoCluster. Only scans of the
-  /// same `segment` are compared.
-  void observe(std::uint64_t scan, std::uint64_t segment, const Eigen::Isometry3d& T_world_sensor,
+  /// same `epoch` are compared.
+  void observe(std::uint64_t scan, std::uint64_t epoch, const Eigen::Isometry3d& T_world_sensor,
                const GroundSplit& split, Span<const std::uint32_t> instance_of,
                std::size_t instance_count) {
     if (scan == 0) forget();
-    if (scan == 0 || record_of(scan - 1).segment != segment) {
+    if (scan == 0 || record_of(scan - 1).epoch != epoch) {
       T_origin_world_ = T_world_sensor.inverse();
-      segment_begin_ = scan;
-      passages_.forget();
+      epoch_begin_ = scan;
+      dynamic_grid_.forget();
     }
     newest_ = scan;
     Record& record = record_of(scan);
-    record.segment = segment;
+    record.epoch = epoch;
     record.T_world_sensor = T_world_sensor;
-    record.at = views_.advance(scan - segment_begin_);
+    record.at = references_.advance(scan - epoch_begin_);
     moved_ground_.bound(split.ground(), record.ground_boxes);
     sampler_.sample(split.non_ground(), instance_of, instance_count, record.samples);
     updater_.begin(record.samples, record.beliefs);
-    record.counted.assign(record.samples.supervoxel_count(), Passages::Count::kNone);
+    record.counted.assign(record.samples.supervoxel_count(), DynamicOccupancyGrid::Count::kNone);
     predecessors_.assign(instance_count, kNoCluster);
     if (config_.use_tracks) track(scan, record);
 
     for (const int lag : before_[record.at.phase]) {
-      const ReferenceView* const reference = reference_of(record, scan, -lag);
+      const ReferenceScan* const reference = reference_of(record, scan, -lag);
       if (reference != nullptr) refer(record, *reference, -lag);
     }
     updater_.begin_other_side(record.samples, record.beliefs);
@@ -126,20 +126,20 @@ class FreeSpaceEvidence {
     if (config_.use_tracks) run_beliefs(scan);
   }
 
-  /// Verdict on a scan that is at most `horizon()` old, or what keep() was told, as the evidence
-  /// stands now. Nothing is presumed in a final verdict. `split`: that of the scan. The spans hold
-  /// until the next call. The first verdict on the scan observed last makes it a reference for
-  /// others, if it is one; without, it is none.
+  /// Verdict on a scan that is at most `lookahead_scans()` old, or what keep() was told, as the
+  /// evidence stands now. Nothing is presumed in a final verdict. `split`: that of the scan. The
+  /// spans hold until the next call. The first verdict on the scan observed last makes it a
+  /// reference for others, if it is one; without, it is none.
   EvidenceVerdict judge(std::uint64_t scan, bool is_final, const GroundSplit& split) {
     Record& record = record_of(scan);
     judge_instances(scan, is_final, record);
     const InstanceSamples& samples = record.samples;
-    // Cells lie in the frame of the newest segment.
-    if (scan >= segment_begin_) {
-      passages_.judge(scan, samples, T_origin_world_ * record.T_world_sensor, record.counted,
-                      verdicts_);
+    // Cells lie in the frame of the newest epoch.
+    if (scan >= epoch_begin_) {
+      dynamic_grid_.judge(scan, samples, T_origin_world_ * record.T_world_sensor, record.counted,
+                          verdicts_);
     }
-    if (scan == newest_ && record.at.phase == 0 && views_.awaits_image()) {
+    if (scan == newest_ && record.at.phase == 0 && references_.awaits_image()) {
       become_reference(record, split);
     }
     groups_.assign(1, {Cause::kNotJudged, 0.0F});
@@ -150,9 +150,9 @@ class FreeSpaceEvidence {
         split.ground(), record.ground_boxes,
         [&](const PointBuffer& points, std::size_t count, auto&& visit) {
           const auto look = [&](int lag) {
-            const ReferenceView* const reference = reference_of(record, scan, lag);
+            const ReferenceScan* const reference = reference_of(record, scan, lag);
             if (reference == nullptr) return;
-            visit(views_.look(points, count, record.T_world_sensor, *reference));
+            visit(references_.look(points, count, record.T_world_sensor, *reference));
           };
           for (const int lag : before_[record.at.phase]) look(-lag);
           for (const int lag : after_[record.at.phase]) look(lag);
@@ -162,9 +162,9 @@ class FreeSpaceEvidence {
 
   /// What the newest reference, one of the last `reference_step` scans, saw of the first `count`
   /// points (m; padded for wide loads).
-  const detail::Sights& see(const PointBuffer& points, std::size_t count,
-                            const Eigen::Isometry3d& T_world_points) {
-    return views_.look(points, count, T_world_points, views_.newest());
+  const detail::Visibility& see(const PointBuffer& points, std::size_t count,
+                                const Eigen::Isometry3d& T_world_points) {
+    return references_.look(points, count, T_world_points, references_.newest());
   }
 
   /// For each instance of the scan observed last, its number in the scan before, or kNoCluster.
@@ -173,34 +173,34 @@ class FreeSpaceEvidence {
  private:
   using Verdict = EvidenceVerdict::Group;
   struct Record {
-    std::uint64_t segment = ReferenceView::kNoSegment;
+    std::uint64_t epoch = ReferenceScan::kNoEpoch;
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
     ReferencePhase at;
     InstanceSamples samples;
     InstanceBeliefs beliefs;
     TrackedInstances tracked;
-    std::vector<Passages::Count> counted;  // by supervoxel
-    std::vector<GroundBox> ground_boxes;   // by 64 points of the ground
+    std::vector<DynamicOccupancyGrid::Count> counted;  // by supervoxel
+    std::vector<GroundBox> ground_boxes;               // by 64 points of the ground
   };
 
   // Numbers of scans begin again: what is kept is of others.
   void forget() {
-    views_.forget();
-    for (Record& record : records_) record.segment = ReferenceView::kNoSegment;
+    references_.forget();
+    for (Record& record : records_) record.epoch = ReferenceScan::kNoEpoch;
   }
 
-  const ReferenceView* reference_of(const Record& record, std::uint64_t scan, int lag) const {
-    return views_.find(scan, record.segment, record.at, lag);
+  const ReferenceScan* reference_of(const Record& record, std::uint64_t scan, int lag) const {
+    return references_.find(scan, record.epoch, record.at, lag);
   }
 
   Record& record_of(std::uint64_t scan) { return records_[scan % records_.size()]; }
 
   // One reference for all samples of a scan. `lag`: scans from the samples to the reference.
-  void refer(Record& record, const ReferenceView& reference, int lag) {
+  void refer(Record& record, const ReferenceScan& reference, int lag) {
     const InstanceSamples& samples = record.samples;
-    const detail::Sights& sights =
-        views_.look(samples.points, samples.size(), record.T_world_sensor, reference);
-    updater_.update(samples, sights, record.beliefs, [&](std::size_t instance) {
+    const detail::Visibility& visibility =
+        references_.look(samples.points, samples.size(), record.T_world_sensor, reference);
+    updater_.update(samples, visibility, record.beliefs, [&](std::size_t instance) {
       if (!config_.use_tracks) return;
       TrackedInstances::Instance& tracked = record.tracked.instances[instance];
       (lag < 0 ? tracked.hit_back : tracked.hit_ahead) = static_cast<std::int16_t>(std::abs(lag));
@@ -218,7 +218,7 @@ class FreeSpaceEvidence {
   // moves protects nothing: what it hits again may be another, and beside it beams may pass.
   void become_reference(const Record& record, const GroundSplit& split) {
     moving_.clear();
-    if (config_.see_past_movers) {
+    if (config_.ignore_dynamic_returns) {
       const InstanceSamples& samples = record.samples;
       moving_groups_.assign(samples.met.size(), 0);
       for (std::size_t i = 1; i < samples.met.size(); ++i) {
@@ -230,7 +230,7 @@ class FreeSpaceEvidence {
         moving_[i] = moving_groups_[samples.met_of[i]];
       }
     }
-    views_.make_image(newest_, record.segment, record.T_world_sensor, split, moving_);
+    references_.make_image(newest_, record.epoch, record.T_world_sensor, split, moving_);
     if (turn_of(0) != 0) return;
     refer_turn(0);
     if (config_.use_tracks) run_beliefs(newest_);
@@ -240,7 +240,7 @@ class FreeSpaceEvidence {
   // foliage, or stand beside what moves.
   bool surely_moves(const Record& record, std::uint32_t supervoxel) const {
     const Cause cause = verdicts_[supervoxel].cause;
-    if (cause == Cause::kFreeSpace || cause == Cause::kInPassage) return true;
+    if (cause == Cause::kFreeSpace || cause == Cause::kDynamicOccupancy) return true;
     if (!config_.use_tracks || !is_dynamic(cause) || cause == Cause::kPresumed) return false;
     const std::uint32_t instance = record.samples.instance_of[supervoxel];
     const InstanceBeliefs::Share& share = record.beliefs.shares[instance];
@@ -250,17 +250,17 @@ class FreeSpaceEvidence {
 
   // Holds the newest image against older scans, those of the phases whose turn it is.
   void refer_turn(std::uint64_t turn) {
-    if (views_.awaits_image()) return;
+    if (references_.awaits_image()) return;
     for (std::uint64_t phase = 0; phase < before_.size(); ++phase) {
-      if (turn_of(phase) == turn) refer_older(phase, views_.newest());
+      if (turn_of(phase) == turn) refer_older(phase, references_.newest());
     }
   }
-  void refer_older(std::uint64_t phase, const ReferenceView& image) {
+  void refer_older(std::uint64_t phase, const ReferenceScan& image) {
     for (const int lag : after_[phase]) {
       const auto back = static_cast<std::uint64_t>(lag);
       if (back > image.scan) break;
       Record& older = record_of(image.scan - back);
-      if (older.segment != image.segment) continue;
+      if (older.epoch != image.epoch) continue;
       refer(older, image, lag);
       weigh(older);
     }
@@ -295,7 +295,7 @@ class FreeSpaceEvidence {
   // Finds the instances of the newest scan again in the scan before.
   void track(std::uint64_t scan, Record& record) {
     linker_.measure(record.samples, T_origin_world_ * record.T_world_sensor, record.tracked);
-    if (scan > segment_begin_) {
+    if (scan > epoch_begin_) {
       linker_.link(record_of(scan - 1).tracked, record.tracked);
     }
     for (std::size_t i = 0; i < predecessors_.size(); ++i) {
@@ -306,15 +306,15 @@ class FreeSpaceEvidence {
   // Beliefs along tracks, with what is known now of every scan that is still open: a scan just
   // behind the newest may meanwhile have been seen through.
   void run_beliefs(std::uint64_t newest) {
-    const std::uint64_t open = std::min<std::uint64_t>(newest, horizon());
+    const std::uint64_t open = std::min<std::uint64_t>(newest, lookahead_scans());
     for (std::uint64_t scan = newest - open; scan <= newest; ++scan) {
       Record& record = record_of(scan);
-      const bool linked = scan > 0 && record_of(scan - 1).segment == record.segment;
+      const bool linked = scan > 0 && record_of(scan - 1).epoch == record.epoch;
       track_belief_.run_forward(linked ? &record_of(scan - 1).tracked : nullptr, record.tracked);
     }
     for (std::uint64_t scan = newest + 1; scan-- > newest - open;) {
       Record& record = record_of(scan);
-      const bool linked = scan < newest && record_of(scan + 1).segment == record.segment;
+      const bool linked = scan < newest && record_of(scan + 1).epoch == record.epoch;
       track_belief_.run_backward(linked ? &record_of(scan + 1).tracked : nullptr, record.tracked);
     }
   }
@@ -394,7 +394,7 @@ class FreeSpaceEvidence {
     constexpr std::uint32_t kLeastSamples = 5;
     constexpr float kLargest = 15.0F, kHighest = 3.5F, kUnknown = 0.1F;
     // Where comparison has just begun, no place has been seen.
-    if (!config_.presume_dynamic || scan < segment_begin_ + 2) return false;
+    if (!config_.presume_dynamic || scan < epoch_begin_ + 2) return false;
     const InstanceBeliefs::Share& share = record.beliefs.shares[instance];
     const TrackedInstances::Shape& shape = record.tracked.shapes[instance];
     return share.total >= kLeastSamples && shape.length <= kLargest && shape.height <= kHighest &&
@@ -411,18 +411,18 @@ class FreeSpaceEvidence {
 
   Config config_;
   InstanceSampler sampler_;
-  ReferenceViews views_;
+  ReferenceScans references_;
   InstanceBeliefUpdater updater_;
   float track_level_;
   InstanceLinker linker_;
   TrackBelief track_belief_;
-  Passages passages_;
+  DynamicOccupancyGrid dynamic_grid_;
   MovedGround moved_ground_;
   SupervoxelGroups supervoxel_groups_;
-  // The first sensor of the segment, in whose frame cells of tracks and passages lie wherever the
+  // The first sensor of the epoch, in whose frame cells of tracks and passages lie wherever the
   // world begins.
   Eigen::Isometry3d T_origin_world_ = Eigen::Isometry3d::Identity();
-  std::uint64_t segment_begin_ = 0;  // first scan of the segment of the newest
+  std::uint64_t epoch_begin_ = 0;  // first scan of the epoch of the newest
   std::uint64_t newest_ = 0;
   // By phase: scans to the references before and after.
   std::vector<std::vector<int>> before_, after_;

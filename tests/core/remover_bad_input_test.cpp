@@ -275,7 +275,7 @@ TEST_CASE("any cloud can come between good ones") {
 
 TEST_CASE("a cloud that throws is not taken in, and the state stays as it was") {
   const Config config = any_preset();
-  const std::vector<Scan> scans = drive(oncoming(), 40, 5.0);  // longer than the horizon
+  const std::vector<Scan> scans = drive(oncoming(), 40, 5.0);  // longer than lookahead_scans
   const Run expected = run(config, scans);
   DynaInsRemover remover(config);
   Run result;

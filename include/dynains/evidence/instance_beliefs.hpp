@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "dynains/belief_updater.hpp"
-#include "dynains/evidence/beam_test.hpp"
 #include "dynains/evidence/free_space_sum.hpp"
 #include "dynains/evidence/instance_samples.hpp"
+#include "dynains/evidence/visibility.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/capacity.hpp"
 #include "dynains/simd/wide_lanes.hpp"
@@ -53,8 +53,8 @@ class InstanceBeliefUpdater {
   static constexpr float kLeastKnown = 0.3F;  ///< share of an instance, to say that it stands still
 
   explicit InstanceBeliefUpdater(const FreeSpaceConfig& config)
-      : see_share_(static_cast<float>(config.see_share)),
-        remove_share_(static_cast<float>(config.remove_share)),
+      : pass_ratio_(static_cast<float>(config.pass_ratio)),
+        removal_ratio_(static_cast<float>(config.removal_ratio)),
         sum_(config.p_free, config.p_hit),
         free_level_(static_cast<float>(log_odds(config.tau_free))),
         contested_level_(static_cast<float>(log_odds(config.tau_contested))),
@@ -91,12 +91,12 @@ class InstanceBeliefUpdater {
   /// Takes in what one reference saw of the samples. Calls `on_hit(instance)` for those of which
   /// enough was seen, and nearly all of it still there.
   template <class OnHit>
-  void update(const InstanceSamples& samples, const detail::Sights& sights,
+  void update(const InstanceSamples& samples, const detail::Visibility& visibility,
               InstanceBeliefs& beliefs, OnHit&& on_hit) {
     // Processors with wide lanes find and count bits by one instruction.
     detail::run_packs([&](auto) {
-      update_supervoxels(samples, sights, beliefs);
-      update_wholes(samples, sights, beliefs, on_hit);
+      update_supervoxels(samples, visibility, beliefs);
+      update_wholes(samples, visibility, beliefs, on_hit);
     });
   }
 
@@ -132,7 +132,7 @@ class InstanceBeliefUpdater {
 
   bool is_enough(const Share& share) const {
     return share.moved > 0 &&
-           static_cast<float>(share.moved) >= remove_share_ * static_cast<float>(share.decided);
+           static_cast<float>(share.moved) >= removal_ratio_ * static_cast<float>(share.decided);
   }
 
   // Whether any supervoxel of an instance was hit again that counts as free.
@@ -176,16 +176,16 @@ class InstanceBeliefUpdater {
   // What the reference saw may change supervoxels of which something was seen free, or was hit
   // while they are open: few, once a scan has met some references. All are asked for before the
   // first is needed: what is known of an older scan lies far away by now.
-  void update_supervoxels(const InstanceSamples& samples, const detail::Sights& sights,
+  void update_supervoxels(const InstanceSamples& samples, const detail::Visibility& visibility,
                           InstanceBeliefs& beliefs) {
-    const std::size_t count = find_touched(samples, sights, beliefs);
+    const std::size_t count = find_touched(samples, visibility, beliefs);
     for (std::size_t i = 0; i < count; ++i) {
-      update_supervoxel(samples, sights, touched_[i], beliefs);
+      update_supervoxel(samples, visibility, touched_[i], beliefs);
     }
   }
 
   // Leaves their numbers in `touched_`, in order, and returns how many there are.
-  std::size_t find_touched(const InstanceSamples& samples, const detail::Sights& sights,
+  std::size_t find_touched(const InstanceSamples& samples, const detail::Visibility& visibility,
                            const InstanceBeliefs& beliefs) {
     constexpr std::size_t kBits = 64;
     detail::grow(touched_, samples.supervoxel_count() + 1);
@@ -193,7 +193,7 @@ class InstanceBeliefUpdater {
     std::uint32_t last = kNoCluster;
     for (std::size_t begin = 0; begin < samples.size(); begin += kBits) {
       std::uint64_t seen =
-          sights.free_word(begin) | (sights.hit_word(begin) & beliefs.open[begin / kBits]);
+          visibility.free_word(begin) | (visibility.hit_word(begin) & beliefs.open[begin / kBits]);
       const std::size_t left = samples.size() - begin;
       if (left < kBits) seen &= (std::uint64_t{1} << left) - 1;
       detail::for_each_bit(seen, [&](std::size_t i) {
@@ -209,14 +209,14 @@ class InstanceBeliefUpdater {
     return count;
   }
 
-  void update_supervoxel(const InstanceSamples& samples, const detail::Sights& sights,
+  void update_supervoxel(const InstanceSamples& samples, const detail::Visibility& visibility,
                          std::uint32_t s, InstanceBeliefs& beliefs) const {
     const std::uint32_t begin = samples.sample_begin[s];
     const std::uint32_t end = samples.sample_begin[s + 1];
     Belief& belief = beliefs.supervoxels[s];
     const bool was_open = is_open(belief);
     const Share before = share_of(belief, end - begin);
-    const bool changed = update(belief, sights.count(begin, end), end - begin);
+    const bool changed = update(belief, visibility.count(begin, end), end - begin);
     if (is_open(belief) != was_open) flip_open(samples, s, beliefs);
     if (!changed) return;
     const std::uint32_t instance = samples.instance_of[s];
@@ -241,21 +241,21 @@ class InstanceBeliefUpdater {
 
   // Whether the reference saw through whole instances.
   template <class OnHit>
-  void update_wholes(const InstanceSamples& samples, const detail::Sights& sights,
+  void update_wholes(const InstanceSamples& samples, const detail::Visibility& visibility,
                      InstanceBeliefs& beliefs, OnHit&& on_hit) const {
     std::uint32_t end = 0;
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
       const std::uint32_t begin = end;
       end += beliefs.shares[instance].total;
-      const detail::Sights::Count all = sights.count(begin, end);
+      const detail::Visibility::Count all = visibility.count(begin, end);
       const auto count = static_cast<float>(end - begin);
       const auto seen = static_cast<float>(all.free + all.hit);
       if (seen < std::max(2.0F, kLeastView * count)) continue;
       const float share = static_cast<float>(all.free) / seen;
-      if (share >= see_share_) {
+      if (share >= pass_ratio_) {
         raise(beliefs.wholes[instance], share);
         beliefs.changed[instance] = 1;
-      } else if (share <= detail::FreeSpaceSum::kHitShare) {
+      } else if (share <= detail::FreeSpaceSum::kHitRatio) {
         lower(beliefs.wholes[instance]);
         beliefs.changed[instance] = 1;
         const auto hits = static_cast<float>(all.hit);
@@ -268,15 +268,15 @@ class InstanceBeliefUpdater {
   // samples seen free; shares that say little, and few samples seen free, change nothing. A single
   // hit contests what others see free, but does not say that something stands there. Returns
   // whether anything changed that verdicts look at.
-  bool update(Belief& belief, detail::Sights::Count seen, std::uint32_t samples) const {
+  bool update(Belief& belief, detail::Visibility::Count seen, std::uint32_t samples) const {
     const auto free = static_cast<float>(seen.free);
     const float share = free / static_cast<float>(seen.free + seen.hit);
     if (free >= kLeastFree * static_cast<float>(samples) &&
-        share >= detail::FreeSpaceSum::kFreeShare) {
+        share >= detail::FreeSpaceSum::kFreeRatio) {
       raise(belief, share);
       return true;
     }
-    if (seen.hit == 0 || share > detail::FreeSpaceSum::kHitShare) return false;
+    if (seen.hit == 0 || share > detail::FreeSpaceSum::kHitRatio) return false;
     const Belief before = belief;
     lower(belief);
     if (seen.hit >= std::max(std::min(2U, samples), (samples + kLeastHit - 1) / kLeastHit)) {
@@ -296,8 +296,8 @@ class InstanceBeliefUpdater {
     sum_.lower(belief.level);
   }
 
-  float see_share_;
-  float remove_share_;
+  float pass_ratio_;
+  float removal_ratio_;
   detail::FreeSpaceSum sum_;
   float free_level_;
   float contested_level_;

@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "dynains/cause.hpp"
-#include "dynains/evidence/beam_test.hpp"
 #include "dynains/evidence/ground_footprint.hpp"
 #include "dynains/evidence/instance_hull.hpp"
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/surrounding_ground.hpp"
+#include "dynains/evidence/visibility.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/simd/bits.hpp"
@@ -30,11 +30,12 @@ class MovedGround {
 
   explicit MovedGround(const FreeSpaceConfig& config)
       : takes_footprint_(config.footprint > 0.0),
-        tests_(config.ground_reach > 0.0),
+        tests_(config.ground_test_distance > 0.0),
         rise_(static_cast<float>(config.footprint_rise)),
         belief_(static_cast<float>(config.tau_free)),
         footprint_(takes_footprint_ ? std::max(config.footprint, kLeastCell) : kDefaultCell,
-                   std::max({config.ground_reach, config.footprint, 0.5}), config.evidence_range),
+                   std::max({config.ground_test_distance, config.footprint, 0.5}),
+                   config.evidence_range),
         around_(config.evidence_range),
         hull_(2.0 * std::max(config.footprint, kLeastCell)),
         sampler_(config.ground_sample, config.evidence_range, 1) {}
@@ -79,8 +80,8 @@ class MovedGround {
   }
 
   /// The ground that goes, and forgets what was added. `boxes`: of bound();
-  /// `for_each_reference(points, count, visit)`: calls `visit(sights)` with what each reference of
-  /// the scan saw of the first `count` points. The span holds until the next call.
+  /// `for_each_reference(points, count, visit)`: calls `visit(visibility)` with what each reference
+  /// of the scan saw of the first `count` points. The span holds until the next call.
   template <class References>
   Span<const EvidenceVerdict::GroundPoint> find(PointsView ground, Span<const GroundBox> boxes,
                                                 References&& for_each_reference) {
@@ -179,8 +180,8 @@ class MovedGround {
     const std::size_t count = samples_.size();
     free_.assign((count + 7) / 8 * 8, 0);
     hit_.assign((count + 7) / 8 * 8, 0);
-    for_each_reference(samples_.points, count, [&](const detail::Sights& sights) {
-      sights.add_to(count, free_.data(), hit_.data());
+    for_each_reference(samples_.points, count, [&](const detail::Visibility& visibility) {
+      visibility.add_to(count, free_.data(), hit_.data());
     });
     // Most of the time there is none.
     bool any = false;

@@ -22,17 +22,17 @@ namespace dynains {
 /// it again is one of them.
 ///
 /// What is kept is bounded: cells that no scan met for long make room for others.
-class Passages {
+class DynamicOccupancyGrid {
  public:
   using Verdict = EvidenceVerdict::Group;
   /// What a supervoxel was counted as.
   enum class Count : std::uint8_t { kNone, kStayed, kMoved };
 
-  explicit Passages(const FreeSpaceConfig& config)
-      : cell_(config.passage_cell),
-        share_(static_cast<float>(config.passage_share)),
-        memory_(config.memory),
-        lines_(config.passage_share < 1.0 ? kLines : 0),
+  explicit DynamicOccupancyGrid(const FreeSpaceConfig& config)
+      : cell_(config.dynamic_grid_cell),
+        share_(static_cast<float>(config.dynamic_grid_ratio)),
+        memory_(config.lookback_scans),
+        lines_(config.dynamic_grid_ratio < 1.0 ? kLines : 0),
         passed_(lines_.size()) {}
 
   /// Forgets all cells; to be called before the frame `origin` changes.
@@ -154,7 +154,7 @@ class Passages {
       highest = std::max(highest, share);
     }
     if (inside == 0 || kPart * inside < end - begin) return;
-    verdict = {Cause::kInPassage, std::max(verdict.belief, highest)};
+    verdict = {Cause::kDynamicOccupancy, std::max(verdict.belief, highest)};
   }
 
   double cell_;

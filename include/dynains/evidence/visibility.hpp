@@ -22,7 +22,7 @@ namespace dynains::detail {
 inline constexpr std::size_t kBeamBlock = 256;
 
 /// What one reference says of many samples, a bit each.
-class Sights {
+class Visibility {
  public:
   /// Room for `count` samples; their bits are to be written.
   void resize(std::size_t count) {
@@ -89,21 +89,21 @@ class Sights {
 /// Tests `count` samples against a reference. `samples`: m, padded for wide loads;
 /// `T_reference_sample`: rigid. `margin` + `slope` * range: m, how much farther a beam must go to
 /// pass. What moved and was met again says nothing of its place.
-inline void test_beams(const RangeImage& image, const Eigen::Isometry3f& T_reference_sample,
-                       const PointBuffer& samples, std::size_t count, float margin, float slope,
-                       Sights& sights) {
+inline void test_visibility(const RangeImage& image, const Eigen::Isometry3f& T_reference_sample,
+                            const PointBuffer& samples, std::size_t count, float margin,
+                            float slope, Visibility& visibility) {
   constexpr float kCentimetres = 100.0F;
   const PackTransform to_reference(T_reference_sample.matrix().topRows<3>());
   const PackConstant to_centimetres(kCentimetres);
   const PackConstant base(margin * kCentimetres), growth(slope * kCentimetres);
   const ImageLocator locator(image.grid());
-  sights.resize(count);
+  visibility.resize(count);
   run_packs([&](auto packs) {
     using Packs = decltype(packs);
     using Float = typename Packs::Float;
     using Int = typename Packs::Int;
     // Read once: stores of bytes may change anything, as far as the compiler knows.
-    const Sights::Bytes seen = sights.bytes();
+    const Visibility::Bytes seen = visibility.bytes();
     const RangeImage::Cell* const cells = image.data();
     const Float scale(to_centimetres), least(base), slope_per_metre(growth);
     // Images are larger than the caches near the core: all cells of a block are asked for before
