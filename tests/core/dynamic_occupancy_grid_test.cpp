@@ -111,7 +111,7 @@ TEST_CASE("a later verdict on a scan counts in the place of the one before") {
   CHECK(judge(4, Cause::kOccupied) == Cause::kOccupied);
   CHECK(judge(0, Cause::kAlongTrack) == Cause::kAlongTrack);
   CHECK(judge(4, Cause::kOccupied) == Cause::kDynamicOccupancy);
-  grid.forget();
+  grid.clear();
   scans[4].counted.assign(1, Count::kNone);
   CHECK(judge(4, Cause::kOccupied) == Cause::kOccupied);
 }

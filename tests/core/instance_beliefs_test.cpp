@@ -113,14 +113,14 @@ TEST_CASE("what one reference says of a supervoxel changes its belief by one of 
 TEST_CASE("a single hit contests what is seen free, and alone it tells nothing") {
   Scan scan(Instances{{4}});
   scan.see({{0, 1}});
-  CHECK(scan.beliefs.shares[0].decided == 0);
+  CHECK(scan.beliefs.counts[0].decided == 0);
   scan.see({{1, 0}});
   CHECK_FALSE(scan.is_free());  // as it would be otherwise: 1.69
-  CHECK(scan.beliefs.shares[0].decided == 0);
+  CHECK(scan.beliefs.counts[0].decided == 0);
   scan.see({{0, 1}});
   CHECK(scan.belief().level == Approx(std::max(0.0F, 2.0F * kFreeStep + kHitStep)).margin(1e-6));
   scan.see({{0, 2}});
-  CHECK(scan.beliefs.shares[0].decided == 4);
+  CHECK(scan.beliefs.counts[0].decided == 4);
 }
 
 TEST_CASE("a place that was hit needs more evidence, and starts again from zero") {
@@ -159,20 +159,20 @@ TEST_CASE("references before and after a scan do not add up, but the higher side
 TEST_CASE("a fifth of what is known of an instance removes it") {
   Scan enough(Instances{{2, 8}});
   enough.see({{2, 0}, {0, 8}});
-  CHECK(enough.beliefs.shares[0].moved == 2);
-  CHECK(enough.beliefs.shares[0].decided == 10);
+  CHECK(enough.beliefs.counts[0].moved == 2);
+  CHECK(enough.beliefs.counts[0].decided == 10);
   CHECK(enough.removes());
 
   Scan too_little(Instances{{2, 9}});
   too_little.see({{2, 0}, {0, 9}});
-  CHECK(too_little.beliefs.shares[0].decided == 11);
+  CHECK(too_little.beliefs.counts[0].decided == 11);
   CHECK_FALSE(too_little.removes());
 
   // What nobody saw is not known.
   Scan hidden(Instances{{2, 9, 20}});
   hidden.see({{2, 0}, {0, 8}, {0, 0}});
-  CHECK(hidden.beliefs.shares[0].decided == 11);
-  CHECK(hidden.beliefs.shares[0].total == 31);
+  CHECK(hidden.beliefs.counts[0].decided == 11);
+  CHECK(hidden.beliefs.counts[0].total == 31);
 }
 
 // A parked car: four layers of supervoxels of four samples each, `per_layer` in each.
@@ -204,7 +204,7 @@ TEST_CASE("windows alone remove nothing: where beams hit again, the lower half m
 
   Scan parked = scan_of_layers(5);
   see_free_and_hit(parked, windows, true);
-  CHECK(parked.beliefs.shares[0].moved == 16);  // these go nevertheless
+  CHECK(parked.beliefs.counts[0].moved == 16);  // these go nevertheless
   CHECK(parked.belief(10).hit_again != 0);
   CHECK(parked.belief(11).hit_again == 0);
   CHECK_FALSE(parked.removes());
@@ -300,7 +300,7 @@ TEST_CASE("an instance that one reference saw through as a whole is removed") {
   scan.see(contesting);
   scan.see({{5, 3}, {5, 3}, {5, 3}, {5, 3}, {5, 3}});  // 25 of 40: 0.63
   CHECK(scan.beliefs.wholes[0].level == Approx(kFreeStep));
-  CHECK(scan.beliefs.shares[0].moved == 0);
+  CHECK(scan.beliefs.counts[0].moved == 0);
   CHECK(scan.removes());
 
   Scan half(Instances{supervoxels});
@@ -330,7 +330,7 @@ TEST_CASE("to remove an instance that was hit, one reference has to see through 
   gone.see(standing);
   gone.see(wholly);
   CHECK(gone.beliefs.wholes[0].peak == Approx(2.0F * kFreeStep));
-  CHECK(gone.beliefs.shares[0].moved == 0);
+  CHECK(gone.beliefs.counts[0].moved == 0);
   CHECK(gone.removes());  // 1.69, though below the 2.20 of tau_contested
 }
 
@@ -461,9 +461,9 @@ TEST_CASE("beliefs are those of a sum that passes nothing over") {
         moved += scan.is_free(s) ? size : 0;
         decided += scan.is_free(s) || supervoxels[s].occupied != 0 ? size : 0;
       }
-      REQUIRE(scan.beliefs.shares[i].total == total);
-      REQUIRE(scan.beliefs.shares[i].moved == moved);
-      REQUIRE(scan.beliefs.shares[i].decided == decided);
+      REQUIRE(scan.beliefs.counts[i].total == total);
+      REQUIRE(scan.beliefs.counts[i].moved == moved);
+      REQUIRE(scan.beliefs.counts[i].decided == decided);
     }
   }
 }
@@ -499,8 +499,9 @@ TEST_CASE("a reference is found by the scan it is asked from, until its image is
     const auto begin_of = [](std::uint64_t scan) { return scan < kBreak ? 0U : kBreak; };
     for (std::uint64_t scan = 0; scan < kScans; ++scan) {
       phases.push_back(views.advance(scan - begin_of(scan)));
-      REQUIRE(phases.back().phase == (scan - begin_of(scan)) % static_cast<std::uint64_t>(step));
-      if (phases.back().phase == 0) {
+      REQUIRE(phases.back().since_image ==
+              (scan - begin_of(scan)) % static_cast<std::uint64_t>(step));
+      if (phases.back().since_image == 0) {
         views.make_image(scan, epoch_of(scan), Eigen::Isometry3d::Identity(),
                          wall(5.0F + static_cast<float>(scan)), {});
         REQUIRE(views.newest().scan == scan);
@@ -533,7 +534,7 @@ TEST_CASE("a reference is found by the scan it is asked from, until its image is
     points.push_back(newest + 2.0F, 0.0F, 0.0F);
     points.grow(3 + detail::kPackWidth);
     const detail::Visibility& visibility =
-        views.look(points, 3, Eigen::Isometry3d::Identity(), views.newest());
+        views.test(points, 3, Eigen::Isometry3d::Identity(), views.newest());
     CHECK(visibility.is_free(0));
     CHECK_FALSE(visibility.is_hit(0));
     CHECK(visibility.is_hit(1));
@@ -541,7 +542,7 @@ TEST_CASE("a reference is found by the scan it is asked from, until its image is
     CHECK_FALSE(visibility.is_hit(2));
     CHECK_FALSE(visibility.is_free(2));
     views.forget();
-    CHECK(views.find(kScans - 1, 1, phases.back(), -static_cast<int>(phases.back().phase)) ==
+    CHECK(views.find(kScans - 1, 1, phases.back(), -static_cast<int>(phases.back().since_image)) ==
           nullptr);
   }
 }

@@ -1,6 +1,7 @@
-// Few points that stand for many: samples of the instances of one scan, grouped in supervoxels.
+// Samples of the instances of one scan, grouped by supervoxels.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -9,23 +10,25 @@
 
 #include "dynains/evidence/smallest_k.hpp"
 #include "dynains/points.hpp"
+#include "dynains/simd/pack_transform.hpp"
 #include "dynains/simd/wide_lanes.hpp"
 #include "dynains/voxel/voxel_hash_table.hpp"
 #include "dynains/voxel/voxel_key.hpp"
 
 namespace dynains {
 
-/// The samples of one scan in its sensor frame: instance-major, then supervoxel-major, so that
-/// what belongs together is one range.
+/// The samples of one scan (m, sensor frame), ordered by instance, then by supervoxel: each
+/// instance and each supervoxel is one range of samples.
 struct InstanceSamples {
   PointBuffer points;                           ///< padded for wide loads
-  std::vector<std::uint32_t> sample_begin;      ///< by supervoxel, one more than supervoxels
+  std::vector<std::uint32_t> sample_begin;      ///< by supervoxel, and the end
   std::vector<VoxelKey> place;                  ///< by supervoxel
-  std::vector<std::uint32_t> supervoxel_begin;  ///< by instance, one more than instances
-  std::vector<std::uint32_t> supervoxel_of;     ///< by sample; longer than there are any
+  std::vector<std::uint32_t> supervoxel_begin;  ///< by instance, and the end
+  std::vector<std::uint32_t> supervoxel_of;     ///< by sample, with unused places at the end
   std::vector<std::uint32_t> instance_of;       ///< by supervoxel
-  std::vector<std::uint32_t> met_of;  ///< by point of the scan: its supervoxel's position in `met`
-  std::vector<std::uint32_t> met;     ///< supervoxels as the scan meets them, behind one for none
+  std::vector<std::uint32_t> met_of;            ///< by point: index into `met`
+  std::vector<std::uint32_t>
+      met;  ///< supervoxels in the order of the scan; the first stands for none
 
   std::size_t size() const { return sample_begin.empty() ? 0 : sample_begin.back(); }
   std::size_t supervoxel_count() const {
@@ -40,8 +43,32 @@ struct InstanceSamples {
   }
 };
 
-/// Takes up to some samples per supervoxel and instance: those of its points that come first in an
-/// order by hash of their places, whatever their order in the scan.
+namespace detail {
+
+/// Key of the cell of each sample, in a grid of `cell` (m) whose corner is the frame `origin`.
+inline void find_cells(const InstanceSamples& samples, double cell,
+                       const Eigen::Isometry3d& T_origin_sensor, std::vector<VoxelKey>& keys) {
+  const PackTransform to_cells(
+      (Eigen::Scaling(1.0 / cell) * T_origin_sensor.matrix().topRows<3>()).cast<float>());
+  keys.resize(samples.size());
+  VoxelKey* const key = keys.data();
+  for_packs(samples.size(), [&](auto at) {
+    using Float = typename decltype(at)::Float;
+    const Float x = at.load(samples.points.x.data());
+    const Float y = at.load(samples.points.y.data());
+    const Float z = at.load(samples.points.z.data());
+    std::int32_t index[3][decltype(at)::kCount];
+    for (std::size_t axis = 0; axis < 3; ++axis) floor(to_cells(axis, x, y, z)).store(index[axis]);
+    for (std::size_t lane = 0; lane < at.size(); ++lane) {
+      key[at.begin + lane] = voxel_key(index[0][lane], index[1][lane], index[2][lane]);
+    }
+  });
+}
+
+}  // namespace detail
+
+/// Selects up to `most_samples` points per supervoxel and instance: those with the smallest hashes
+/// of their coordinates. The selection does not depend on the order of the scan.
 class InstanceSampler {
  public:
   /// `supervoxel_size`, `max_range`: metres; `most_samples`: of a supervoxel.
@@ -50,8 +77,8 @@ class InstanceSampler {
         max_range_(static_cast<float>(max_range)),
         samples_(most_samples) {}
 
-  /// Which of up to 64 points, a bit each, lie in another supervoxel than their predecessor; the
-  /// first does.
+  /// Bits of those of up to 64 points that lie in another supervoxel than their predecessor; the
+  /// first bit is set.
   std::uint64_t find_changes(PointsView points) const {
     using namespace detail;
     const PackConstant per_metre(supervoxels_per_metre_);
@@ -105,8 +132,8 @@ class InstanceSampler {
   using SupervoxelTable = VoxelHashTable<Supervoxel>;
   static constexpr int kHalf = 16;           // bits
   static constexpr std::size_t kBlock = 64;  // points that are worked off together
-  // Ranks are of places of this size: a turn of the sensor, which changes the last bits of all
-  // coordinates, must not change them.
+  // Ranks are hashes of rounded coordinates, so that they do not depend on the last bits, which
+  // change when the sensor frame rotates.
   static constexpr float kPlacesPerMetre = 64.0F;
 
   void begin_scan() {
@@ -160,8 +187,8 @@ class InstanceSampler {
     return number;
   }
 
-  // Neighbours mostly share a row, which would have to wait for its own last change: stretches of
-  // the points take turns.
+  // Consecutive points mostly share a row, and each change of a row depends on the change before:
+  // points from four parts of the block alternate.
   void rank_points(std::size_t begin, std::size_t count, const std::uint32_t* met_of) {
     constexpr std::size_t kStretches = 4, kLength = kBlock / kStretches;
     samples_.make_rows(table_.size());
@@ -210,14 +237,14 @@ class InstanceSampler {
     copy_samples(points, supervoxel_count, out);
   }
 
-  // As many of each supervoxel as it may have, with no branch on how many it has: what is too much
-  // is written over by the next one.
+  // Copies the maximum number of samples of each supervoxel without a branch; the next supervoxel
+  // overwrites the excess.
   void copy_samples(PointsView points, std::size_t supervoxel_count, InstanceSamples& out) {
     const std::size_t most = samples_.most();
-    const std::size_t room =
+    const std::size_t capacity =
         std::min(supervoxel_count * most, points.size() + most) + detail::kMaxPackWidth;
-    out.points.grow(room);
-    detail::grow(out.supervoxel_of, room);
+    out.points.grow(capacity);
+    detail::grow(out.supervoxel_of, capacity);
     out.sample_begin.resize(supervoxel_count + 1);
     float* const x = out.points.x.data();
     float* const y = out.points.y.data();

@@ -1,8 +1,9 @@
-// What references saw: range images of some of the last scans.
+// Range images of some of the last scans.
 #pragma once
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -18,7 +19,26 @@
 
 namespace dynains {
 
-/// The image of one reference.
+/// Scans from a scan to its references, on both sides: dense near the scan, sparse far from it. The
+/// scans beside it are left out, since an object has hardly moved there.
+inline constexpr std::array<int, 19> kReferenceLags = {2,  4,  6,  8,  10,  13,  16,  20,  25, 30,
+                                                       40, 50, 65, 80, 100, 125, 150, 175, 200};
+
+/// The lags of kReferenceLags up to `most`, each rounded up (or down, beyond `most`) to a lag with
+/// lag % step == remainder. Ascending, each once.
+inline std::vector<int> reference_lags(int most, int remainder, int step) {
+  const auto behind = [&](int lag) { return ((remainder - lag) % step + step) % step; };
+  const int last = most >= 0 ? most + behind(most) - (behind(most) > 0 ? step : 0) : 0;
+  std::vector<int> lags;
+  for (const int wanted : kReferenceLags) {
+    if (wanted >= most + step) break;
+    const int lag = std::min(wanted + behind(wanted), last);
+    if (lag > (lags.empty() ? 0 : lags.back())) lags.push_back(lag);
+  }
+  return lags;
+}
+
+/// A scan whose range image is kept: evidence on other scans.
 struct ReferenceScan {
   static constexpr std::uint64_t kNoEpoch = ~std::uint64_t{0};
 
@@ -28,14 +48,14 @@ struct ReferenceScan {
   RangeImage image;
 };
 
-/// Where a scan stands among the references of its time.
+/// Position of a scan relative to the newest reference at its time.
 struct ReferencePhase {
-  std::uint64_t phase = 0;  ///< scans since the newest image ...
-  std::uint64_t image = 0;  ///< ... and its number
+  std::uint64_t since_image = 0;  ///< scans since that reference, below `reference_step`
+  std::uint64_t image = 0;        ///< number of its image
 };
 
-/// Owns the images of as many references as are ever asked for. Of each epoch, the first scan and
-/// every `reference_step`-th after it is a reference.
+/// Keeps the images of the references of the last scans. The first scan of each epoch and every
+/// `reference_step`-th after it are references.
 class ReferenceScans {
  public:
   explicit ReferenceScans(const FreeSpaceConfig& config)
@@ -48,14 +68,14 @@ class ReferenceScans {
                 step_ +
             1) {}
 
-  /// Chooses the resolution of images, which are those of the sensor as it is tilted.
+  /// Sets the resolution of the images and the tilt of their frame.
   void adapt(const SensorModel& sensor) {
     grid_ = RangeImageGrid::for_sensor(sensor);
     R_beams_level_.reset();
     if (!sensor.is_level()) R_beams_level_ = sensor.R_level_headed.transpose();
   }
 
-  /// Gets the memory of the images of that many scans, or of as many as are ever kept.
+  /// Allocates the images of `scans` scans, or of as many as are kept.
   void reserve(std::size_t scans) {
     const std::size_t images = grid_.rows > 0 ? std::min(scans / step_ + 1, references_.size()) : 0;
     for (std::size_t i = 1; i <= images; ++i) {
@@ -64,60 +84,60 @@ class ReferenceScans {
   }
 
   void forget() {
-    for (ReferenceScan& view : references_) view.epoch = ReferenceScan::kNoEpoch;
+    for (ReferenceScan& reference : references_) reference.epoch = ReferenceScan::kNoEpoch;
   }
 
-  /// Counts the next scan, `since_begin` scans behind the first of its epoch. It is a reference,
-  /// whose image is to be made, if its phase is 0.
+  /// Counts the next scan, `since_begin` scans after the first of its epoch. It is a reference, and
+  /// needs make_image(), if `since_image` of the result is 0.
   ReferencePhase advance(std::uint64_t since_begin) {
     const std::uint64_t phase = since_begin % step_;
     if (phase == 0) {
       ++images_;
-      view().epoch = ReferenceScan::kNoEpoch;  // until its image is whole
+      current().epoch = ReferenceScan::kNoEpoch;  // until its image is whole
     }
     return {phase, images_};
   }
 
-  /// Makes the image of a reference. Beams are rows of it only in the frame of the sensor, tilted
-  /// as it is; `T_world_level`: pose of the frame of `split`; `moving`: as RangeImage::build has
-  /// it, by point above the ground.
+  /// Makes the image of the newest reference, in the tilted frame of the sensor: only there are
+  /// beams rows of the image. `T_world_level`: pose of the frame of `split`. `moving`: by
+  /// non-ground point, see RangeImage::build.
   void make_image(std::uint64_t scan, std::uint64_t epoch, const Eigen::Isometry3d& T_world_level,
                   const GroundSplit& split, Span<const std::uint8_t> moving) {
-    ReferenceScan& view = this->view();
-    view.scan = scan;
-    view.T_world_beams = T_world_level;
+    ReferenceScan& reference = current();
+    reference.scan = scan;
+    reference.T_world_beams = T_world_level;
     PointsView ground = split.ground();
     PointsView rest = split.non_ground();
     if (R_beams_level_) {
-      view.T_world_beams.rotate(R_beams_level_->transpose());
+      reference.T_world_beams.rotate(R_beams_level_->transpose());
       const Eigen::Matrix3f R = R_beams_level_->cast<float>();
-      ground = detail::turn(ground, R, turned_ground_);
-      rest = detail::turn(rest, R, turned_rest_);
+      ground = detail::turn(ground, R, rotated_ground_);
+      rest = detail::turn(rest, R, rotated_rest_);
     }
-    view.image.build(grid_, ground, rest, moving, lateral_margin_, scratch_);
-    view.epoch = epoch;
+    reference.image.build(grid_, ground, rest, moving, lateral_margin_, scratch_);
+    reference.epoch = epoch;
   }
 
   /// Whether the newest reference has no image yet.
   bool awaits_image() const { return newest().epoch == ReferenceScan::kNoEpoch; }
   const ReferenceScan& newest() const { return references_[images_ % references_.size()]; }
 
-  /// The image that was made `lag` scans after a scan, or before it; null if there is none.
-  /// `at`: the phase of that scan; phase and lag make a multiple of the step.
+  /// The reference `lag` scans after a scan (before it, if negative); null if there is none. `at`:
+  /// of that scan; at.since_image + lag is a multiple of the step.
   const ReferenceScan* find(std::uint64_t scan, std::uint64_t epoch, const ReferencePhase& at,
                             int lag) const {
     const auto signed_step = static_cast<std::int64_t>(step_);
-    const std::int64_t to_image = lag + static_cast<std::int64_t>(at.phase);
+    const std::int64_t to_image = lag + static_cast<std::int64_t>(at.since_image);
     const std::uint64_t image =
         at.image + static_cast<std::uint64_t>(to_image / signed_step);  // exact
-    const ReferenceScan& view = references_[image % references_.size()];
+    const ReferenceScan& reference = references_[image % references_.size()];
     const std::uint64_t wanted = scan + static_cast<std::uint64_t>(std::int64_t{lag});
-    return view.scan == wanted && view.epoch == epoch ? &view : nullptr;
+    return reference.scan == wanted && reference.epoch == epoch ? &reference : nullptr;
   }
 
-  /// What a reference saw of the first `count` points (m; padded for wide loads). Holds until the
-  /// next call.
-  const detail::Visibility& look(const PointBuffer& points, std::size_t count,
+  /// Visibility of the first `count` points (m; padded for wide loads) from a reference. Holds
+  /// until the next call.
+  const detail::Visibility& test(const PointBuffer& points, std::size_t count,
                                  const Eigen::Isometry3d& T_world_points,
                                  const ReferenceScan& reference) {
     const Eigen::Isometry3d T_reference_points = reference.T_world_beams.inverse() * T_world_points;
@@ -127,18 +147,18 @@ class ReferenceScans {
   }
 
  private:
-  ReferenceScan& view() { return references_[images_ % references_.size()]; }
+  ReferenceScan& current() { return references_[images_ % references_.size()]; }
 
   float margin_;
   float margin_slope_;
   float lateral_margin_;
   std::uint64_t step_;  // scans from one image to the next
   std::vector<ReferenceScan> references_;
-  std::uint64_t images_ = 0;  // number of the newest
+  std::uint64_t images_ = 0;  // number of the newest image
   RangeImageGrid grid_;
-  std::optional<Eigen::Matrix3d> R_beams_level_;  // of a sensor that is tilted
-  PointBuffer turned_ground_;
-  PointBuffer turned_rest_;
+  std::optional<Eigen::Matrix3d> R_beams_level_;  // if the sensor is tilted
+  PointBuffer rotated_ground_;
+  PointBuffer rotated_rest_;
   RangeImage::Scratch scratch_;
   detail::Visibility visibility_;
 };
