@@ -133,7 +133,7 @@ class Rehearsal {
     return without_empty_folders(without_measurements(tree));
   }
   static Tree results(const Tree& tree) {
-    return without_measurements(
+    return comparable(
         select(tree, [](const std::string& path) { return is_ours(path) && !is_hidden(path); }));
   }
   static std::string difference_of_results(const Tree& found, const Tree& expected) {
