@@ -74,11 +74,11 @@ class PatchSort {
     for (std::size_t i = 0; i < length; i += kStep) {
       for (std::size_t s = 0; s < kStrands; ++s) {
         const std::size_t first = i + s * length;
-        const std::array<Float4, kStep> records = load_records(points, input, first);
+        const FourRegisters<4> records = load_records(points, input, first);
         for (std::size_t k = 0; k < kStep; ++k) {
           PointRecord*& to = next_[s][static_cast<std::size_t>(patch_of[first + k])];
           PointRecord* const here = to;
-          store_four(records[k], here);
+          store(records[k], here);
           to = here + 1;
           __builtin_prefetch(here + kAhead, 1);
         }

@@ -3,9 +3,10 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 
-#include "dynains/simd/lanes.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains::detail {
 
@@ -22,26 +23,37 @@ class ZoneTable {
   explicit ZoneTable(const std::array<float, kZoneCount>& values)
       : first_(values[0]), steps_{values[0], values[0], values[0]}, places_(values[0]) {
     for (std::size_t i = 1; i < kZoneCount; ++i) {
-      steps_[i - 1] = PackConstant(values[i - 1]).bits_changed(PackConstant(values[i]));
+      steps_[i - 1] = changed_bits(values[i - 1], values[i]);
       for (const std::size_t lanes : {kPackWidth, kMaxPackWidth})
         places_.values[lanes - i] = values[i];
     }
   }
 
-  /// That of the first zone, with the differences to later ones flipped bit by bit.
-  Float8 at(const BeyondEdges<Mask8>& beyond) const {
-    return float_of(bits_of(Float8(first_)) ^ (beyond[0] & bits_of(Float8(steps_[0]))) ^
-                    (beyond[1] & bits_of(Float8(steps_[1]))) ^
-                    (beyond[2] & bits_of(Float8(steps_[2]))));
-  }
-  /// A mask counts as -1, so that later zones have their places from the end of the table on.
-  template <int kCount>
-  WideFloat<kCount> at(const BeyondEdges<WideMask<kCount>>& beyond) const {
-    return permuted(WideFloat<kCount>(places_),
-                    WideInt<kCount>(beyond[0].v + beyond[1].v + beyond[2].v));
+  /// A mask counts as -1, so that later zones have their places from the end of the table on. The
+  /// narrow kind flips the bits that differ between zones instead.
+  template <int kWidth, int kParts>
+  FloatPack<kWidth, kParts> at(const BeyondEdges<IntPack<kWidth, kParts>>& beyond) const {
+    using Float = FloatPack<kWidth, kParts>;
+    if constexpr (kParts == 1) {
+      return permuted(Float(places_), beyond[0] + beyond[1] + beyond[2]);
+    } else {
+      return float_of(bits_of(Float(first_)) ^ (beyond[0] & bits_of(Float(steps_[0]))) ^
+                      (beyond[1] & bits_of(Float(steps_[1]))) ^
+                      (beyond[2] & bits_of(Float(steps_[2]))));
+    }
   }
 
  private:
+  static float changed_bits(float from, float to) {
+    std::uint32_t a, b;
+    std::memcpy(&a, &from, sizeof(a));
+    std::memcpy(&b, &to, sizeof(b));
+    a ^= b;
+    float bits;
+    std::memcpy(&bits, &a, sizeof(bits));
+    return bits;
+  }
+
   PackConstant first_;
   std::array<PackConstant, kZoneCount - 1> steps_;
   PackConstant places_;

@@ -84,9 +84,9 @@ class Ingest {
       __builtin_prefetch(point(std::min(at + kAhead, cloud.count - 1)));
       const auto columns = transposed({load_four(point(at)), load_four(point(at + 1)),
                                        load_four(point(at + 2)), load_four(point(at + 3))});
-      store_four(columns[0], x + i);
-      store_four(columns[1], y + i);
-      store_four(columns[2], z + i);
+      detail::store(columns[0], x + i);
+      detail::store(columns[1], y + i);
+      detail::store(columns[2], z + i);
     }
     for (; i < length; ++i) {
       x[i] = point(begin + i)[0];

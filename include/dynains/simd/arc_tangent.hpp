@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <iterator>
 
-#include "dynains/simd/lanes.hpp"
+#include "dynains/simd/pack.hpp"
 
 namespace dynains::detail {
 

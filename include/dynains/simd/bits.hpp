@@ -1,5 +1,4 @@
-// Words of bits: tables by byte, for what processors without instructions of their own do bit by
-// bit, and loops.
+// Words and bytes of bits: counts, loops and tables.
 #pragma once
 
 #include <array>
@@ -7,36 +6,43 @@
 #include <cstdint>
 #include <cstring>
 
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
 namespace dynains::detail {
 
-/// A one in each of eight bytes: what it is multiplied by is in all of them.
+/// A one in each of eight bytes: a product with it repeats a byte in all of them.
 inline constexpr std::uint64_t kInEachByte = 0x0101010101010101U;
 
+/// Eight small numbers for each value of a byte.
 using BytesByByte = std::array<std::array<std::uint8_t, 8>, 256>;
 
 constexpr BytesByByte spread_bits() {
-  BytesByByte bytes{};
-  for (std::size_t i = 0; i < bytes.size(); ++i) {
-    for (std::size_t bit = 0; bit < 8; ++bit) bytes[i][bit] = i >> bit & 1U;
+  BytesByByte bits{};
+  for (std::size_t i = 0; i < bits.size(); ++i) {
+    for (std::size_t bit = 0; bit < 8; ++bit) bits[i][bit] = i >> bit & 1U;
   }
-  return bytes;
+  return bits;
 }
-/// Every bit of a byte as a byte.
+/// Each bit of a byte as a byte.
 inline constexpr BytesByByte kBytesOfBits = spread_bits();
 
-constexpr BytesByByte sum_bits() {
-  BytesByByte sums = spread_bits();
-  for (auto& of_byte : sums) {
-    for (std::size_t bit = 1; bit < 8; ++bit) {
-      of_byte[bit] = static_cast<std::uint8_t>(of_byte[bit] + of_byte[bit - 1]);
+constexpr BytesByByte find_bits() {
+  BytesByByte indices{};
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    std::size_t found = 0;
+    for (std::uint8_t bit = 0; bit < 8; ++bit) {
+      if ((i >> bit & 1U) != 0) indices[i][found++] = bit;
     }
   }
-  return sums;
+  return indices;
 }
-/// How many bits of a byte are set up to each of them.
-inline constexpr BytesByByte kOnesUpTo = sum_bits();
+/// Indices of the set bits of a byte, from the lowest on; zeros follow.
+inline constexpr BytesByByte kIndicesOfBits = find_bits();
 
-/// How many bits are set.
+/// How many bits are set. The builtin function calls a library where the processor need not have
+/// the instruction.
 constexpr std::uint32_t count_ones(std::uint64_t bits) {
   bits -= bits >> 1U & 0x5555555555555555U;
   bits = (bits & 0x3333333333333333U) + (bits >> 2U & 0x3333333333333333U);
@@ -44,23 +50,34 @@ constexpr std::uint32_t count_ones(std::uint64_t bits) {
   return static_cast<std::uint32_t>(bits * kInEachByte >> 56U);
 }
 
-constexpr BytesByByte find_bits() {
-  BytesByByte places{};
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    std::size_t found = 0;
-    for (std::uint8_t bit = 0; bit < 8; ++bit) {
-      if ((i >> bit & 1U) != 0) places[i][found++] = bit;
-    }
-  }
-  return places;
-}
-/// Which bits of a byte are set, from the lowest on.
-inline constexpr BytesByByte kPlacesOfBits = find_bits();
-
-/// Calls `body(number)` for each bit that is set, from the lowest on.
+/// Calls `body(index)` for each set bit, from the lowest on.
 template <class Body>
 void for_each_bit(std::uint64_t bits, Body&& body) {
   for (; bits != 0; bits &= bits - 1) body(static_cast<std::size_t>(__builtin_ctzll(bits)));
+}
+
+/// Bit i is set where byte i of the 64 that begin at `from` is not zero.
+inline std::uint64_t nonzero_bytes(const std::uint8_t* from) {
+  std::uint64_t result = 0;
+#if defined(__SSE2__)
+  for (int i = 0; i < 4; ++i) {
+    const __m128i bytes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(from) + i);
+    const int zero = _mm_movemask_epi8(_mm_cmpeq_epi8(bytes, _mm_setzero_si128()));
+    result |= static_cast<std::uint64_t>(~zero & 0xFFFF) << (16 * i);
+  }
+#else
+  for (int i = 0; i < 64; ++i) result |= std::uint64_t{from[i] != 0} << i;
+#endif
+  return result;
+}
+
+/// Bits of `count` bytes, at most 64; zeros follow.
+inline std::uint64_t nonzero_bytes(const std::uint8_t* from, std::size_t count) {
+  constexpr std::size_t kAll = 64;
+  if (count == kAll) return nonzero_bytes(from);
+  std::uint8_t padded[kAll] = {};
+  std::memcpy(padded, from, count);
+  return nonzero_bytes(padded);
 }
 
 }  // namespace dynains::detail

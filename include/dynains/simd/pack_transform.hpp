@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 
-#include "dynains/simd/lanes.hpp"
+#include "dynains/simd/pack.hpp"
 
 namespace dynains::detail {
 

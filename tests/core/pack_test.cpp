@@ -1,5 +1,3 @@
-#include "dynains/simd/wide_lanes.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -9,6 +7,7 @@
 
 #include "dynains/ground/point_record.hpp"
 #include "dynains/simd/arc_tangent.hpp"
+#include "dynains/simd/pack_loops.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 
@@ -17,8 +16,8 @@ namespace {
 
 using detail::kPackWidth;
 
-// Every operation on the same pairs of numbers, with one kind of lanes: a row of results for each
-// operation, a number for each pair.
+// Applies every operation to the pairs of numbers with one kind of packs. Returns a row of results
+// for each operation, with a number for each pair.
 template <class Packs>
 std::vector<std::vector<std::uint32_t>> results(const std::vector<float>& a,
                                                 const std::vector<float>& b) {
@@ -87,7 +86,7 @@ std::vector<std::vector<std::uint32_t>> results(const std::vector<float>& a,
   return out;
 }
 
-// The sums of eight and eight numbers.
+// Sums of eight numbers each.
 template <class Packs>
 std::vector<float> sums(const std::vector<float>& a) {
   std::vector<float> out;
@@ -97,23 +96,23 @@ std::vector<float> sums(const std::vector<float>& a) {
   return out;
 }
 
-// Calls `test` with the kinds of lanes that this processor has registers for, and within functions
-// for them.
+// Calls `test` with the wider kinds of packs that this processor has registers for, within
+// functions for these registers.
 template <class Test>
-void with_wider_lanes(Test&& test) {
-  if (detail::has_wide_lanes()) {
-    INFO("eight lanes in one register");
-    detail::run_wide_lanes(test);
+void with_wider_packs(Test&& test) {
+  if (detail::has_avx2()) {
+    INFO("eight numbers in one register");
+    detail::run_avx2(test);
   }
-  if constexpr (detail::kHasSixteen) {
-    if (detail::has_widest_lanes()) {
-      INFO("sixteen lanes");
-      detail::run_widest_lanes(test);
+  if constexpr (detail::kHasAvx512Code) {
+    if (detail::has_avx512()) {
+      INFO("sixteen numbers in one register");
+      detail::run_avx512(test);
     }
   }
 }
 
-TEST_CASE("all kinds of lanes give the same bits") {
+TEST_CASE("all kinds of packs give the same bits") {
   Random random(20);
   std::vector<float> a, b;
   const float special[] = {0.0F, -0.0F, 1.0F, -1.0F, 1e-40F, -1e-40F,  1e30F,     -1e30F,
@@ -128,7 +127,7 @@ TEST_CASE("all kinds of lanes give the same bits") {
     a.push_back(static_cast<float>(random.uniform(-100.0, 100.0)));
     b.push_back(static_cast<float>(random.uniform(-100.0, 100.0)));
   }
-  // What a comparison with NaN says must not depend on the width either.
+  // Comparisons with NaN must not depend on the width either.
   constexpr std::size_t kMost = detail::kMaxPackWidth;
   a.resize(a.size() / kMost * kMost);
   b.resize(a.size());
@@ -136,13 +135,13 @@ TEST_CASE("all kinds of lanes give the same bits") {
     a.push_back(i % 2 == 0 ? std::numeric_limits<float>::quiet_NaN() : 1.0F);
     b.push_back(i % 4 < 2 ? 2.0F : std::numeric_limits<float>::quiet_NaN());
   }
-  const std::size_t sure = a.size() - 2 * kMost;  // conversions of NaN to integers are anything
+  const std::size_t sure = a.size() - 2 * kMost;  // conversions of NaN are undefined
   const std::vector<float> sure_a(a.data(), a.data() + sure);
   const std::vector<float> sure_b(b.data(), b.data() + sure);
   const auto expected = results<detail::NarrowPacks>(sure_a, sure_b);
   CHECK(results<detail::WidePacks>(sure_a, sure_b) == expected);
   CHECK(sums<detail::WidePacks>(sure_a) == sums<detail::NarrowPacks>(sure_a));
-  with_wider_lanes([&](auto packs) {
+  with_wider_packs([&](auto packs) {
     using Packs = decltype(packs);
     CHECK(results<Packs>(sure_a, sure_b) == expected);
     for (std::size_t i = sure; i < a.size(); i += Packs::kCount) {
@@ -157,7 +156,7 @@ TEST_CASE("all kinds of lanes give the same bits") {
         CAPTURE(a[i + k], b[i + k]);
         CHECK((less >> k & 1U) == (a[i + k] < b[i + k] ? 1U : 0U));
         CHECK((at_least >> k & 1U) == (a[i + k] >= b[i + k] ? 1U : 0U));
-        // The second one where either is NaN.
+        // The second number where either is NaN.
         const bool any = std::isnan(a[i + k]) || std::isnan(b[i + k]);
         CHECK((least[k] == std::min(a[i + k], b[i + k]) || any));
         if (any) {
@@ -168,10 +167,10 @@ TEST_CASE("all kinds of lanes give the same bits") {
     }
   });
   for (std::size_t i = sure; i < a.size(); i += kPackWidth) {
-    const auto narrow_a = detail::Float8::load(&a[i]);
-    const auto narrow_b = detail::Float8::load(&b[i]);
-    const auto wide_a = detail::WideFloat8::load(&a[i]);
-    const auto wide_b = detail::WideFloat8::load(&b[i]);
+    const auto narrow_a = detail::NarrowPacks::Float::load(&a[i]);
+    const auto narrow_b = detail::NarrowPacks::Float::load(&b[i]);
+    const auto wide_a = detail::WidePacks::Float::load(&a[i]);
+    const auto wide_b = detail::WidePacks::Float::load(&b[i]);
     CHECK((narrow_a < narrow_b).bits() == (wide_a < wide_b).bits());
     CHECK((narrow_a >= narrow_b).bits() == (wide_a >= wide_b).bits());
     CHECK((bits_of(min(narrow_a, narrow_b)) ^ bits_of(max(narrow_b, narrow_a))).bits() ==
@@ -179,7 +178,7 @@ TEST_CASE("all kinds of lanes give the same bits") {
   }
 }
 
-TEST_CASE("places are put by bits, and changes are found, as value by value") {
+TEST_CASE("indices of bits are written, and changes are found, as number by number") {
   Random random(21);
   const auto check = [&](auto packs) {
     using Packs = decltype(packs);
@@ -206,10 +205,10 @@ TEST_CASE("places are put by bits, and changes are found, as value by value") {
     }
   };
   check(detail::NarrowPacks());
-  with_wider_lanes(check);
+  with_wider_packs(check);
 }
 
-TEST_CASE("records turn into columns and close up at the front, whatever the lanes") {
+TEST_CASE("records turn into columns and close up at the front with all kinds of packs") {
   Random random(22);
   const auto check = [&](auto packs) {
     using Packs = decltype(packs);
@@ -220,7 +219,7 @@ TEST_CASE("records turn into columns and close up at the front, whatever the lan
       const unsigned all = (1U << count) - 1U;
       const unsigned bits = static_cast<unsigned>(random.uniform(0.0, Packs::kAll + 0.999)) & all;
       const std::size_t gap = static_cast<std::size_t>(random.uniform(0.0, 5.0));
-      // In front of the records there is room for them; behind them is somebody else's.
+      // Records move forward into the gap; those behind them must not change.
       std::vector<detail::PointRecord> records(gap + 2 * kCount);
       for (std::uint32_t i = 0; i < records.size(); ++i) {
         const auto number = static_cast<float>(i);
@@ -263,10 +262,10 @@ TEST_CASE("records turn into columns and close up at the front, whatever the lan
     }
   };
   check(detail::NarrowPacks());
-  with_wider_lanes(check);
+  with_wider_packs(check);
 }
 
-TEST_CASE("a kernel meets each place once, in order, whatever the count") {
+TEST_CASE("a kernel meets each index once, in order, whatever the count") {
   for (std::size_t count = 0; count <= 3 * detail::kMaxPackWidth; ++count) {
     CAPTURE(count);
     std::vector<float> from(count);

@@ -1,0 +1,203 @@
+// Loops over arrays with the packs that suit the processor, which is found out at run time.
+//
+// A kernel is a generic function object that takes a kind of packs, or a slice that has one, and
+// works with its types. It is instantiated for each kind and gives the same bits with all of them.
+// No vector crosses the border of run_avx2 or run_avx512: its two sides pass vectors differently.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "dynains/simd/bits.hpp"
+#include "dynains/simd/pack.hpp"
+
+namespace dynains::detail {
+
+/// A kind of packs: `kWidth` numbers of 32 bits, or twice as many of 16 bits, in `kParts`
+/// registers.
+template <int kWidth, int kParts>
+struct PackKind {
+  using Float = Pack<float, kWidth, kParts>;
+  using Int = Pack<std::int32_t, kWidth, kParts>;
+  using Mask = Int;
+  using Short = Pack<std::int16_t, 2 * kWidth, kParts>;
+  static constexpr std::size_t kCount = kWidth;
+  static constexpr unsigned kAll = (1U << kCount) - 1U;  ///< a bit for each number
+};
+using NarrowPacks = PackKind<8, 2>;   // SSE2, NEON
+using WidePacks = PackKind<8, 1>;     // AVX2
+using WidestPacks = PackKind<16, 1>;  // AVX-512
+
+#if defined(__x86_64__) && defined(__SSE2__)
+template <class Kernel>
+[[gnu::target("avx2"), gnu::flatten]] void run_avx2(Kernel& kernel) {
+  kernel(WidePacks());
+}
+template <class Kernel>
+[[gnu::target("avx512f,avx512bw,avx512dq,avx512vl"), gnu::flatten]] void run_avx512(
+    Kernel& kernel) {
+  kernel(WidestPacks());
+}
+inline bool has_avx2() { return __builtin_cpu_supports("avx2") != 0; }
+/// Asks for VBMI2, too: the processors before it run slower while they use AVX-512.
+inline bool has_avx512() {
+  return kHasAvx512Code && __builtin_cpu_supports("avx512vbmi2") != 0 &&
+         __builtin_cpu_supports("avx512bw") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
+         __builtin_cpu_supports("avx512vl") != 0;
+}
+#else
+template <class Kernel>
+void run_avx2(Kernel& kernel) {
+  kernel(WidePacks());
+}
+template <class Kernel>
+void run_avx512(Kernel& kernel) {
+  kernel(WidestPacks());
+}
+inline bool has_avx2() { return false; }
+inline bool has_avx512() { return false; }
+#endif
+
+/// Calls `kernel` with packs of eight numbers: WidePacks if the processor has AVX2, else
+/// NarrowPacks.
+template <class Kernel>
+void run_packs(Kernel&& kernel) {
+  if (has_avx2()) return run_avx2(kernel);
+  kernel(NarrowPacks());
+}
+
+/// Calls `kernel` with the widest packs that fill registers of the processor.
+template <class Kernel>
+void run_max_packs(Kernel&& kernel) {
+  if constexpr (kHasAvx512Code) {
+    if (has_avx512()) return run_avx512(kernel);
+  }
+  run_packs(kernel);
+}
+
+#if defined(__clang__)
+// Clang inlines direct calls only into run_avx2, unless functions ask for more.
+template <class Packs, class Kernel>
+[[gnu::always_inline, gnu::flatten]] void for_slices(std::size_t count, Kernel&& kernel);
+template <class Packs, class Kernel>
+[[gnu::always_inline, gnu::flatten]] void for_overlapping_slices(std::size_t begin, std::size_t end,
+                                                                 Kernel&& kernel);
+#endif
+
+/// 0, 1, 2 and so on.
+template <class Int>
+Int lane_indices() {
+  alignas(64) static constexpr std::int32_t kIndices[kMaxPackWidth] = {
+      0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  return Int::load(kIndices);
+}
+
+/// Writes `first + k` for each bit k that is set, as many numbers as a pack has; those behind the
+/// last bit are undefined. Returns how many bits are set.
+template <class Packs>
+std::size_t put_places(unsigned bits, std::size_t first, std::uint32_t* to) {
+  using Int = typename Packs::Int;
+  if constexpr (Packs::kCount == 16) {
+    Int indices = lane_indices<Int>() + Int(static_cast<std::int32_t>(first));
+    compress(bits, indices.part[0]);
+    indices.store(reinterpret_cast<std::int32_t*>(to));
+    return count_ones(bits);
+  } else {
+    for (std::size_t k = 0; k < Packs::kCount; ++k) {
+      to[k] = static_cast<std::uint32_t>(first + kIndicesOfBits[bits][k]);
+    }
+    return count_ones(bits);
+  }
+}
+
+/// Bit i is set if any of the arrays (numbers of 32 bits) differs between i and i - 1. `count` is
+/// at most 64; values[-1] must exist.
+template <class Packs, class... Values>
+std::uint64_t find_changes(std::size_t count, const Values*... values) {
+  using Int = typename Packs::Int;
+  std::uint64_t changes = 0;
+  std::size_t i = 0;
+  for (; i + Packs::kCount <= count; i += Packs::kCount) {
+    const auto load = [i](const auto* from) {
+      return Int::load(reinterpret_cast<const std::int32_t*>(from + i));
+    };
+    const auto equal = ((load(values) == load(values - 1)) & ...);
+    changes |= std::uint64_t{(~equal).bits()} << i;
+  }
+  for (; i < count; ++i) {
+    changes |= std::uint64_t{((*(values + i) != *(values + i - 1)) || ...)} << i;
+  }
+  return changes;
+}
+
+/// The indices [begin, end) of arrays: as many as a pack has numbers, or fewer if `kTail`.
+template <class Packs, bool kTail>
+struct PackSlice : Packs {
+  std::size_t begin;
+  std::size_t end;
+
+  PackSlice(std::size_t first, std::size_t last) : begin(first), end(last) {}
+
+  std::size_t size() const { return kTail ? end - begin : Packs::kCount; }
+  /// Zeros behind the end.
+  typename Packs::Float load(const float* from) const {
+    return load_as<typename Packs::Float>(from);
+  }
+  typename Packs::Int load(const std::uint32_t* from) const {
+    return load_as<typename Packs::Int>(reinterpret_cast<const std::int32_t*>(from));
+  }
+  /// `a` before the end, else `b`.
+  typename Packs::Float there(const typename Packs::Float& a,
+                              const typename Packs::Float& b) const {
+    if constexpr (!kTail) return a;
+    const typename Packs::Int count(static_cast<std::int32_t>(size()));
+    return select(lane_indices<typename Packs::Int>() < count, a, b);
+  }
+
+ private:
+  template <class Result, class Value>
+  Result load_as(const Value* from) const {
+    if constexpr (!kTail) return Result::load(from + begin);
+    alignas(64) Value values[Packs::kCount] = {};
+    for (std::size_t i = begin; i < end; ++i) values[i - begin] = from[i];
+    return Result::load(values);
+  }
+};
+
+/// A slice of arrays that are padded: they can be read beyond their ends.
+template <class Packs, bool kTail>
+struct PaddedPackSlice : PackSlice<Packs, kTail> {
+  using PackSlice<Packs, kTail>::PackSlice;
+  typename Packs::Float load(const float* from) const {
+    return Packs::Float::load(from + this->begin);
+  }
+};
+
+/// Calls `kernel(PackSlice)` for [0, count) in order; for use within a kernel.
+template <class Packs, class Kernel>
+void for_slices(std::size_t count, Kernel&& kernel) {
+  std::size_t begin = 0;
+  for (; begin + Packs::kCount <= count; begin += Packs::kCount) {
+    kernel(PackSlice<Packs, false>(begin, begin + Packs::kCount));
+  }
+  if (begin < count) kernel(PackSlice<Packs, true>(begin, count));
+}
+
+/// Calls `kernel(PaddedPackSlice)` for [begin, end). The last slice begins earlier, so that it is
+/// full and meets some indices again, unless there are too few of them.
+template <class Packs, class Kernel>
+void for_overlapping_slices(std::size_t begin, std::size_t end, Kernel&& kernel) {
+  if (end - begin < Packs::kCount) return kernel(PaddedPackSlice<Packs, true>(begin, end));
+  for (; begin + Packs::kCount < end; begin += Packs::kCount) {
+    kernel(PaddedPackSlice<Packs, false>(begin, begin + Packs::kCount));
+  }
+  kernel(PaddedPackSlice<Packs, false>(end - Packs::kCount, end));
+}
+
+/// Calls `kernel(PackSlice)` for [0, count) in order, with the widest packs that fill registers.
+template <class Kernel>
+void for_packs(std::size_t count, Kernel&& kernel) {
+  run_max_packs([&](auto packs) { for_slices<decltype(packs)>(count, kernel); });
+}
+
+}  // namespace dynains::detail
