@@ -179,11 +179,11 @@ IntPack<W, P> floor(const FloatPack<W, P>& a) {
 /// The bits of each float as an integer, and back. Inline, since GCC 12 has an internal error at
 /// -O1 where it passes the registers of the argument by value.
 template <int W, int P>
-[[gnu::always_inline]] inline IntPack<W, P> bits_of(const FloatPack<W, P>& a) {
+IntPack<W, P> bits_of(const FloatPack<W, P>& a) {
   return by_parts<IntPack<W, P>>([](auto& r, auto& x) { r.v = decltype(r.v)(x.v); }, a);
 }
 template <int W, int P>
-[[gnu::always_inline]] inline FloatPack<W, P> float_of(const IntPack<W, P>& a) {
+FloatPack<W, P> float_of(const IntPack<W, P>& a) {
   return by_parts<FloatPack<W, P>>([](auto& r, auto& x) { r.v = decltype(r.v)(x.v); }, a);
 }
 
