@@ -44,6 +44,9 @@ struct PointCloudTraits<RawPoints<Scalar>> {
       throw CloudError("RawPoints.stride = " + std::to_string(cloud.stride) +
                        " must be at least 3 scalars");
     }
+    if (cloud.data == nullptr && cloud.count > 0) {
+      throw CloudError("RawPoints.data is null, RawPoints.count = " + std::to_string(cloud.count));
+    }
     return cloud.count;
   }
   static Eigen::Vector3f point(const RawPoints<Scalar>& cloud, std::size_t i) {

@@ -10,6 +10,10 @@ namespace dynains::evaluation {
 namespace {
 
 void check_lengths(const LabelledScan& scan, std::size_t index) {
+  if (scan.stride < 3) {
+    throw std::invalid_argument("scan " + std::to_string(index) + " has a stride of " +
+                                std::to_string(scan.stride) + " floats, expected at least 3");
+  }
   const auto check = [&](std::size_t size, const char* what) {
     if (size != 0 && size != scan.size()) {
       throw std::invalid_argument("scan " + std::to_string(index) + " has " +

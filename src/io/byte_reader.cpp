@@ -14,6 +14,7 @@ constexpr std::size_t kMaxLine = std::size_t{1} << 16;
 }  // namespace
 
 ByteReader::ByteReader(const std::filesystem::path& path) : path_(path) {
+  check_is_file(path);
   std::error_code error;
   size_ = std::filesystem::file_size(path, error);
   if (error) fail(path, "cannot be read: " + error.message());

@@ -1,4 +1,4 @@
-// The form of every file error: path, position, what was expected.
+// Errors of files: path, position, expectation.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,10 @@
 namespace dynains {
 
 [[noreturn]] inline void fail(const std::filesystem::path& path, const std::string& what) {
-  throw IoError(path.string() + ": " + what);
+  throw IoError((path.empty() ? "\"\"" : path.string()) + ": " + what);
 }
 
-/// The same with the system's own words for `error`, a value of errno. Throws IoError.
+/// Appends the system's message for `error`, a value of errno.
 [[noreturn]] inline void fail_by_system(const std::filesystem::path& path, const std::string& what,
                                         int error) {
   fail(path, what + ": " + std::generic_category().message(error));

@@ -1,4 +1,4 @@
-// Files to read, with the system's reason where that fails.
+// Files that are read: only regular ones, and errors with the reason of the system.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,10 @@ bool is_there(const std::filesystem::path& path);
 bool is_folder(const std::filesystem::path& path);
 bool is_file(const std::filesystem::path& path);
 
-/// Opens a file to read. Throws IoError, for folders too.
+/// Throws IoError for a folder, a device or a pipe: reading these may never end.
+void check_is_file(const std::filesystem::path& path);
+
+/// Opens a regular file for reading. Throws IoError.
 std::ifstream open_input(const std::filesystem::path& path);
 
 /// For a read that gave fewer bytes than the file has. Call it before anything else sets errno.

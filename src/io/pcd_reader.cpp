@@ -236,8 +236,9 @@ struct BlockSizes {
   std::uint32_t plain;
 };
 
-/// What stands before a compressed block, if the file can hold that.
-BlockSizes read_block_sizes(ByteReader& reader) {
+/// Reads the sizes of the compressed block. Throws IoError unless the file can hold the block, and
+/// the block can hold the points.
+BlockSizes read_block_sizes(ByteReader& reader, const PcdHeader& header) {
   std::array<std::uint32_t, 2> sizes{};
   std::array<char, sizeof(sizes)> bytes{};
   reader.read(bytes.data(), bytes.size(), "the sizes of the compressed block");
@@ -247,7 +248,19 @@ BlockSizes read_block_sizes(ByteReader& reader) {
                      " bytes of compressed points, the file has " +
                      std::to_string(reader.remaining()) + " bytes left");
   }
-  return {sizes[0], sizes[1]};
+  const auto [compressed_size, plain_size] = BlockSizes{sizes[0], sizes[1]};
+  const std::uint64_t each = header.record_bytes();
+  if (plain_size % each != 0 || plain_size / each != header.points) {
+    reader.fail_here("expected a block of " + std::to_string(header.points) + " points of " +
+                     std::to_string(each) + " bytes, its size is given as " +
+                     std::to_string(plain_size));
+  }
+  if (plain_size > std::uint64_t{compressed_size} * kLzfMaxExpansion) {
+    reader.fail_here("expected a block of points that LZF can have compressed: " +
+                     std::to_string(compressed_size) + " bytes cannot hold " +
+                     std::to_string(plain_size));
+  }
+  return {compressed_size, plain_size};
 }
 
 void read_ascii(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
@@ -297,18 +310,7 @@ void read_binary(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
 
 /// The points are stored field after field, and compressed in one block.
 void read_compressed(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
-  const auto [compressed_size, plain_size] = read_block_sizes(reader);
-  const std::uint64_t each = header.record_bytes();
-  if (plain_size % each != 0 || plain_size / each != header.points) {
-    reader.fail_here("expected a block of " + std::to_string(header.points) + " points of " +
-                     std::to_string(each) + " bytes, its size is given as " +
-                     std::to_string(plain_size));
-  }
-  if (plain_size > std::uint64_t{compressed_size} * kLzfMaxExpansion) {
-    reader.fail_here(
-        "expected a block that compression can have made: " + std::to_string(compressed_size) +
-        " bytes cannot hold " + std::to_string(plain_size));
-  }
+  const auto [compressed_size, plain_size] = read_block_sizes(reader, header);
   std::vector<char> compressed(compressed_size);
   reader.read(compressed.data(), compressed.size(), "compressed points");
   std::vector<char> plain(plain_size);
@@ -351,8 +353,8 @@ PointFile read_pcd(const std::filesystem::path& path) {
 PointFileHeader read_pcd_header(const std::filesystem::path& path) {
   ByteReader reader(path);
   PointSink sink;
-  parse_pcd_header(reader, sink);
-  return {sink.file().viewpoint, sink.columns()};
+  const PcdHeader header = parse_pcd_header(reader, sink);
+  return {sink.file().viewpoint, sink.columns(), header.points};
 }
 
 void check_pcd(const std::filesystem::path& path) {
@@ -367,7 +369,7 @@ void check_pcd(const std::filesystem::path& path) {
       check_binary(reader, header);
       break;
     case PcdEncoding::kCompressed:
-      read_block_sizes(reader);
+      read_block_sizes(reader, header);
       break;
   }
 }

@@ -236,8 +236,8 @@ PointFile read_ply(const std::filesystem::path& path) {
 PointFileHeader read_ply_header(const std::filesystem::path& path) {
   ByteReader reader(path);
   PointSink sink;
-  parse_ply_header(reader, sink);
-  return {sink.file().viewpoint, sink.columns()};
+  const PlyHeader header = parse_ply_header(reader, sink);
+  return {sink.file().viewpoint, sink.columns(), header.elements.back().count};
 }
 
 void check_ply(const std::filesystem::path& path) {

@@ -442,6 +442,12 @@ PointFrame Recording::guess_frame() const {
   return around_pose > around_origin ? PointFrame::kWorld : PointFrame::kSensor;
 }
 
+std::uint64_t Recording::point_count(std::size_t i) const {
+  const fs::path& file = scans_.at(i).file;
+  return format_ == ScanFormat::kBin ? count_scan_points(file)
+                                     : read_point_file_header(file).point_count;
+}
+
 void Recording::check_scan(std::size_t i) const {
   const fs::path& file = scans_.at(i).file;
   if (format_ == ScanFormat::kBin) {

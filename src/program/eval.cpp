@@ -10,6 +10,7 @@
 #include "dynains/evaluation/report.hpp"
 #include "dynains/io/point_file.hpp"
 #include "evaluation_options.hpp"
+#include "finished_run.hpp"
 #include "input_files.hpp"
 #include "labelled_sequence.hpp"
 #include "output_folder.hpp"
@@ -46,6 +47,11 @@ void check_targets(const EvalOptions& options, const LabelledSequence& sequence)
   for (const std::string& target : {options.json, options.csv}) inputs.refuse(target);
 }
 
+void check_are_finished(const EvalOptions& options) {
+  for (const std::string& folder : options.runs) check_run_is_finished(folder);
+  for (const std::string& map : options.maps) check_map_is_finished(map);
+}
+
 void eval(const EvalOptions& options) {
   const evaluation::EvaluationConfig config = options.evaluation.config();
   if (options.runs.size() > evaluation::kMaxEstimates) {
@@ -53,10 +59,10 @@ void eval(const EvalOptions& options) {
                       " runs can be evaluated at once, not " + std::to_string(options.runs.size()));
   }
 
+  if (!options.unfinished) check_are_finished(options);
   std::vector<RunLabels> runs;
   std::vector<std::string> names;
   for (const std::string& folder : options.runs) {
-    if (!options.unfinished) require_complete(folder);
     runs.push_back({folder, options.online ? "online" : "labels"});
     names.push_back(options.runs.size() > 1 ? folder : options.online ? "online" : "run");
   }
@@ -104,7 +110,8 @@ void add_eval_command(CLI::App& program) {
   command.add_flag("--online", options->online, "judge the zero-latency labels, OUT/online");
   command.add_flag("--errors", options->errors,
                    "also tell where the first run went wrong: by class, instance, range and cause");
-  command.add_flag("--unfinished", options->unfinished, "also score runs that are not complete");
+  command.add_flag("--unfinished", options->unfinished,
+                   "also judge runs, and maps of runs, whose report.json says \"complete\": false");
   command.add_option("--json", options->json, "write everything to this file, errors included");
   command.add_option("--csv", options->csv, "write the table to this file");
   command.callback([options] { eval(*options); });

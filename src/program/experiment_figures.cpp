@@ -10,6 +10,7 @@
 #include "evaluation_options.hpp"
 #include "experiment.hpp"
 #include "figure.hpp"
+#include "finished_run.hpp"
 #include "labelled_sequence.hpp"
 #include "output_folder.hpp"
 #include "progress.hpp"
@@ -50,7 +51,7 @@ VerdictCloud collect(const FiguresOptions& options) {
 
   std::vector<RunLabels> runs;
   if (!options.run.empty()) {
-    require_complete(options.run);
+    check_run_is_finished(options.run);
     runs.push_back({options.run});
   }
   LabelledSequence sequence(options.sequence.open(), options.window, runs);

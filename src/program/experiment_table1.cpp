@@ -22,6 +22,7 @@ namespace dynains::program {
 namespace {
 
 namespace fs = std::filesystem;
+using evaluation::csv_field;
 using evaluation::format_number;
 
 struct Table1Options {
@@ -89,7 +90,7 @@ void table1(const Table1Options& options) {
   const auto add = [&](const std::string& sequence, const std::string& method, double pr, double rr,
                        double f1, const char* source) {
     table.add({sequence, method, format_number(pr, 3), format_number(rr, 3), format_number(f1, 3)});
-    csv << sequence << ",\"" << method << "\"," << format_number(pr, 6, "") << ','
+    csv << csv_field(sequence) << ',' << csv_field(method) << ',' << format_number(pr, 6, "") << ','
         << format_number(rr, 6, "") << ',' << format_number(f1, 6, "") << ',' << source << '\n';
   };
 

@@ -8,7 +8,6 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
-#include "json_file.hpp"
 
 namespace dynains::program {
 namespace fs = std::filesystem;
@@ -37,15 +36,6 @@ LabelledSequence::LabelledSequence(Recording recording, const ScanWindow& window
                          : (runs_.front().folder / runs_.front().kind).string() +
                                ": no labels for any scan of " + folder.string());
   }
-}
-
-void require_complete(const fs::path& run) {
-  const fs::path report = run / "report.json";
-  if (!fs::exists(report)) return;
-  if (json_field<bool>(report, read_json_file(report), "/complete").value_or(false)) return;
-  throw IoError(report.string() +
-                ": the run is not complete; finish it by dynains run --resume, or score the scans "
-                "that are there by --unfinished");
 }
 
 bool LabelledSequence::every_run_has(std::size_t index) const {
@@ -104,11 +94,14 @@ void LabelledSequence::read_run(std::size_t run, const std::string& name) {
 
 void LabelledSequence::read_causes(const std::string& name) {
   const fs::path file = runs_.front().folder / "causes" / (name + ".cause");
-  if (!fs::exists(file)) return;
-  if (fs::file_size(file) != truth_.size()) {
-    throw IoError(file.string() + ": " + std::to_string(fs::file_size(file)) +
-                  " bytes; expected one for each of the scan's " + std::to_string(truth_.size()) +
-                  " points");
+  const std::string expected =
+      "expected a byte for each of the scan's " + std::to_string(truth_.size()) + " points";
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(file, error);
+  if (error == std::errc::no_such_file_or_directory) return;
+  if (error) throw IoError(file.string() + ": " + error.message() + "; " + expected);
+  if (size != truth_.size()) {
+    throw IoError(file.string() + ": has " + std::to_string(size) + " bytes; " + expected);
   }
   causes_.resize(truth_.size());
   errno = 0;

@@ -31,10 +31,6 @@ struct RunLabels {
   std::string kind = "labels";   ///< or "online"
 };
 
-/// Throws IoError if the report.json of a run is there and the run is not complete. Folders of
-/// other tools have no report.json.
-void require_complete(const std::filesystem::path& run);
-
 /// Reads scan by scan; holds one scan at a time.
 class LabelledSequence {
  public:

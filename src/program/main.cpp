@@ -4,6 +4,7 @@
 
 #include <csignal>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 
 #include "command.hpp"
@@ -97,6 +98,9 @@ int main(int argc, char** argv) {
     return kExitFailure;
   } catch (const Interrupted& interrupted) {
     return 128 + interrupted.signal;
+  } catch (const std::filesystem::filesystem_error& error) {
+    const std::string path = error.path1().empty() ? "\"\"" : error.path1().string();
+    return fail(kExitFailure, path + ": " + error.code().message());
   } catch (const std::bad_alloc&) {
     return fail(kExitFailure, "out of memory");
   } catch (const std::exception& error) {

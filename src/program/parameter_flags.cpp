@@ -52,6 +52,26 @@ std::string trim(const std::string& text) {
   return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
 }
 
+/// A pipe may be given as well, and a device that never ends.
+std::string read_config_text(const std::filesystem::path& path) {
+  constexpr std::size_t kMaxBytes = std::size_t{1} << 20U;
+  const auto fail = [&](const std::string& what) {
+    throw IoError(path.string() + ": " + what + "; expected a config file, see dynains config");
+  };
+  const auto fail_by_system = [&](int reason) {
+    fail("cannot be read: " + std::generic_category().message(reason));
+  };
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  if (!file) fail_by_system(errno);
+  std::string text(kMaxBytes + 1, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (file.bad()) fail_by_system(errno);
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  if (text.size() > kMaxBytes) fail("has more than " + std::to_string(kMaxBytes) + " bytes");
+  return text;
+}
+
 }  // namespace
 
 std::string flag_name(std::string parameter_name) {
@@ -86,13 +106,7 @@ std::string format_value(double value) { return format_real(value); }
 std::string format_value(float value) { return format_real(value); }
 
 ParameterValues read_config_file(const std::filesystem::path& path) {
-  const auto fail = [&](int reason) {
-    throw IoError(path.string() + ": cannot be read: " + std::generic_category().message(reason) +
-                  "; expected a config file, see dynains config");
-  };
-  errno = 0;
-  std::ifstream file(path);
-  if (!file) fail(errno);
+  std::istringstream file(read_config_text(path));
   ParameterValues values;
   std::map<std::string, std::size_t> seen;
   std::size_t number = 0;
@@ -118,7 +132,6 @@ ParameterValues read_config_file(const std::filesystem::path& path) {
     }
     values.set(name, value, where + name);
   }
-  if (file.bad()) fail(errno);
   return values;
 }
 

@@ -1,10 +1,8 @@
 // The loop of `dynains run`, over any remover.
 #pragma once
 
-#include <algorithm>
 #include <chrono>
 #include <cstddef>
-#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -16,6 +14,7 @@
 #include "read_ahead.hpp"
 #include "run_results.hpp"
 #include "run_timing.hpp"
+#include "typical_scan.hpp"
 
 namespace dynains::program {
 
@@ -28,16 +27,19 @@ FrameResult push_scan(Remover& remover, const Recording& recording, std::size_t 
   });
 }
 
-/// The scan of median size among the first (`first`), the middle and the last of the range: one odd
-/// scan does not decide how much memory is reserved.
-inline RecordedScan typical_scan(const Recording& recording, const ScanRange& range,
-                                 const RecordedScan& first) {
-  RecordedScan scans[] = {first, recording.read_scan((range.first + range.last) / 2),
-                          recording.read_scan(range.last)};
-  std::nth_element(
-      std::begin(scans), scans + 1, std::end(scans),
-      [](const RecordedScan& a, const RecordedScan& b) { return a.size() < b.size(); });
-  return std::move(scans[1]);
+inline double ms_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
+      .count();
+}
+
+/// Reserves memory for scans of typical size: larger ones take more when they come. Returns the
+/// milliseconds that it took, reading apart.
+template <class Remover>
+double reserve_memory(Remover& remover, const Recording& recording, const ScanRange& range) {
+  const RecordedScan example = recording.read_scan(typical_scan(recording, range));
+  const auto begin = std::chrono::steady_clock::now();
+  remover.reserve_like(points_of(example), range.size());
+  return ms_since(begin);
 }
 
 /// Pushes the scans of `range` and hands every verdict to `results`; at the end the open ones and
@@ -47,22 +49,14 @@ template <class Remover, class KeepGoing>
 RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanRange& range,
                        RunResults& results, KeepGoing&& keep_going) {
   using Clock = std::chrono::steady_clock;
-  const auto ms_since = [](Clock::time_point begin) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
-  };
   RunTiming timing;
   const StageTimes no_times;
   StageTimes::visit(no_times, [&](const char* name, double) { timing.stages.push_back(name); });
 
+  timing.reserve = reserve_memory(remover, recording, range);
   ReadAhead scans(recording, range.first, range.last);
   for (std::size_t i = range.first; i <= range.last; ++i) {
     RecordedScan scan = scans.next(results.recycle());
-    if (i == range.first) {
-      const RecordedScan example = typical_scan(recording, range, scan);
-      const Clock::time_point begin = Clock::now();
-      remover.reserve_like(points_of(example), range.size());
-      timing.reserve = ms_since(begin);
-    }
     const Clock::time_point begin = Clock::now();
     const FrameResult frame = push_scan(remover, recording, i, scan);
     TimingRow row{recording.name(i), scan.size(), {}, ms_since(begin)};

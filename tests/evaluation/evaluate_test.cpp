@@ -173,6 +173,13 @@ TEST_CASE("Malformed scans and settings are refused by name") {
   scans[0].causes.assign(3, 0);
   CHECK_THROWS_AS(evaluate(source_of(scans), {"run"}, {}), std::invalid_argument);
 
+  const auto narrow = [](std::size_t, LabelledScan& scan) {
+    scan.stride = 2;
+    return true;
+  };
+  CHECK_THROWS_WITH(evaluate(narrow, {}, {}),
+                    "scan 0 has a stride of 2 floats, expected at least 3");
+
   EvaluationConfig config;
   config.voxel = 0;
   CHECK_THROWS_AS(evaluate(source_of(scans), {}, {}, config), ConfigError);

@@ -267,6 +267,29 @@ TEST_CASE("Folders that are no recording are refused with a reason") {
   CHECK_THAT(error_of(seq), ContainsSubstring("b.pcd:1: expected a line of a PCD header"));
 }
 
+TEST_CASE("Folders and devices in the place of files are refused before they are read") {
+  const TemporaryFolder folder;
+  const fs::path seq = folder / "seq";
+  write_text(seq / "0.ply", ply());
+  write_text(seq / "poses.txt", tum(1, 0));
+  RecordingOptions options;
+  for (const char* device : {"/dev/null", "/dev/zero"}) {
+    options.times = device;
+    CHECK(error_of(seq, options) ==
+          std::string(device) + ": is a device or a pipe, expected a file");
+    options.times.clear();
+    options.poses = device;
+    CHECK(error_of(seq, options) ==
+          std::string(device) + ": is a device or a pipe, expected a file");
+    options.poses.clear();
+  }
+  options.poses = seq;
+  CHECK(error_of(seq, options) == seq.string() + ": is a folder, expected a file");
+  options.poses = seq / "none.txt";
+  CHECK_THAT(error_of(seq, options), StartsWith((seq / "none.txt").string() + ": cannot be read"));
+  CHECK_THAT(error_of(""), StartsWith("\"\": is not a folder; expected a KITTI folder"));
+}
+
 TEST_CASE("Names need not be UTF-8") {
   const TemporaryFolder folder;
   write_text(folder / "scan\xff\xfe 1.ply", ply());

@@ -85,6 +85,59 @@ TEST_CASE("with --map-memory the map waits on the disk, and the results are the 
   CHECK(read_text(fixture.out + "/static_map.ply") == map);
 }
 
+TEST_CASE("No name of a file reaches the terminal with bytes that it would obey") {
+  const Fixture fixture(3);
+  const std::string evil = "evil\x1b[31m\nname\xC2\x9B";
+  const std::string seq = fixture.folder / evil;
+  fs::rename(fixture.seq, seq);
+  fs::create_directory(seq + "/labels");
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::vector<std::uint32_t> labels(tiny_scan(i).size() / 4, 9);
+    write_labels(seq + "/labels/" + scan_name(i) + ".label", labels);
+  }
+  const std::string out = fixture.folder / (evil + " out");
+  const std::string table = fixture.folder / (evil + ".csv");
+  const std::string missing = fixture.folder / (evil + " missing");
+  const std::string figures = fixture.folder / (evil + " figures");
+  const std::string simulated = fixture.folder / (evil + " simulated");
+  const std::string map = out + "/static_map.ply";
+  const std::vector<std::vector<std::string>> calls = {
+      {"run", seq, "--out", out},
+      {"run", seq, "--out", out},
+      {"run", seq, "--out", out, "--resume"},
+      {"run", seq, "--out", seq, "--force"},
+      {"run", missing, "--out", out},
+      {"run", seq, "--out", missing, "--config", missing},
+      {"run", seq, "--out", missing, "--map", missing},
+      {"run", seq, "--out", missing, "--poses", missing},
+      {"check", seq},
+      {"check", seq, "--poses", missing},
+      {"eval", seq, out, out, "--map", map, "--map", map, "--csv", table},
+      {"eval", seq, missing},
+      {"eval", seq, "--map", missing},
+      {"statistics", seq},
+      {"simulate", simulated, "--scans", "1", "--sensor", "vlp16"},
+      {"simulate", seq, "--scans", "1", "--sensor", "vlp16"},
+      {"experiment", "table1", seq},
+      {"experiment", "figures", seq, "--out", figures, "--run", out, "--pixels", "16"},
+      {"config", "--preset", evil},
+      {evil},
+      {"run", seq, "--" + evil},
+      {"run", seq, "--out", missing, "--start", evil},
+      {"run", seq, "--out", missing, "--tau-s", evil},
+  };
+  for (const std::vector<std::string>& arguments : calls) {
+    const Outcome outcome = start(arguments);
+    CAPTURE(arguments, outcome.code, outcome.out, outcome.err);
+    for (const std::string* text : {&outcome.out, &outcome.err}) {
+      CHECK(text->find('\x1b') == std::string::npos);
+      CHECK(text->find("\xC2\x9B") == std::string::npos);
+    }
+    if (outcome.code != 0) CHECK(count_lines(outcome.err) == 1);
+  }
+  CHECK_THAT(start({"check", missing}).err, ContainsSubstring("evil\\x1B[31m\\nname\\xC2\\x9B"));
+}
+
 TEST_CASE("The budget of the map needs a map and a size that can be") {
   const Fixture fixture(3);
   const Outcome no_map = fixture.run({"--map-memory", "10", "--build-map", "false"});

@@ -83,6 +83,13 @@ TEST_CASE("Results that cannot be shown are a failure, a reader who leaves is no
   CHECK(code_of("(sleep 0.2; " + program + ") | true") == 0);
 }
 
+TEST_CASE("An error of the file system is one line that begins with the path") {
+  const TemporaryFolder folder;
+  const Outcome outcome = start({"run", folder.path(), "--out", ""});
+  CHECK(outcome.code == 1);
+  CHECK_THAT(outcome.err, StartsWith("dynains: error: \"\": "));
+}
+
 TEST_CASE("Help that cannot be shown is a failure") {
   const auto to_full = [] {
     const int full = ::open("/dev/full", O_WRONLY);

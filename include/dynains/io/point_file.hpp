@@ -85,6 +85,7 @@ PointFile read_points(const std::filesystem::path& path);
 struct PointFileHeader {
   Eigen::Isometry3d viewpoint = Eigen::Isometry3d::Identity();  ///< as in PointFile
   PointColumns columns;                                         ///< without rgb and double_xyz
+  std::uint64_t point_count = 0;  ///< as stated; check_point_file() compares it with the file size
 };
 PointFileHeader read_point_file_header(const std::filesystem::path& path);
 

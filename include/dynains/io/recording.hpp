@@ -107,6 +107,8 @@ class Recording {
     return scans_.at(i).T_world_sensor;
   }
 
+  /// Points of scan i, by the size of its file or by its header: points are not read.
+  std::uint64_t point_count(std::size_t i) const;
   /// Throws unless the file of scan i can hold a scan; cheap.
   void check_scan(std::size_t i) const;
   /// Points of scan i. Values are as stored, but for the frame: NaN and infinity too. Memory of

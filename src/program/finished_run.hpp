@@ -1,0 +1,15 @@
+// Runs whose results are incomplete are not judged by accident.
+#pragma once
+
+#include <filesystem>
+
+namespace dynains::program {
+
+/// Throws IoError if report.json in `folder` is a report of `dynains run` that is not complete, or
+/// cannot be read as JSON. Folders of other tools, and folders without report.json, pass.
+void check_run_is_finished(const std::filesystem::path& folder);
+
+/// The same for the folder of a map file, if its report names that file as the map of the run.
+void check_map_is_finished(const std::filesystem::path& map);
+
+}  // namespace dynains::program
