@@ -18,14 +18,14 @@ using VoxelKey = std::uint64_t;
 
 inline constexpr int kKeyBits = 21;
 inline constexpr std::int64_t kKeyBias = std::int64_t{1} << (kKeyBits - 1);
-/// Key of no voxel: the cell is out of reach.
+/// Key of points outside of the grid.
 inline constexpr VoxelKey kNoKey = ~VoxelKey{0};
 
 /// Cells [i * edge, (i + 1) * edge) per axis of the world frame. Keys count from the cell of an
 /// anchor point, so that large coordinates (UTM) fit; the grid itself does not move with it.
 class VoxelGrid {
  public:
-  /// Throws PoseError if the anchor is too far out for its cell number to be exact.
+  /// Throws PoseError if the cell number of the anchor cannot be exact.
   VoxelGrid(double edge, const Eigen::Vector3d& anchor) : edge_(edge) {
     for (int axis = 0; axis < 3; ++axis) {
       const double cell = std::floor(anchor[axis] / edge);
@@ -93,8 +93,8 @@ inline constexpr std::array<VoxelKey, 27> neighbour_offsets() {
 }
 inline constexpr std::array<VoxelKey, 27> kNeighbours = neighbour_offsets();
 
-/// Numbers keys 0, 1, 2, ... in the order in which they first come. Open addressing; nothing is
-/// ever erased but everything at once.
+/// Numbers keys 0, 1, 2, ... in the order of insertion. Open addressing; single keys cannot be
+/// erased.
 class VoxelIndex {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffU;
