@@ -139,6 +139,35 @@ void add_change(std::vector<Change>& changes, const std::string& meaning, const 
   }
 }
 
+/// Appends copies of `changes` in millimetres, then copies in centimetres.
+void add_units(std::vector<Change>& changes) {
+  struct Unit {
+    const char* name;
+    const char* flag;
+    double metres;
+  };
+  const std::vector<Change> before = changes;
+  for (const Unit& unit : {Unit{"millimetres", "mm", 0.001}, Unit{"centimetres", "cm", 0.01}}) {
+    std::vector<Change> changed = before;
+    add_change(changed, std::string("translations are in ") + unit.name,
+               std::string("--pose-units ") + unit.flag,
+               [&](PoseConvention& c) { c.unit = unit.metres; });
+    changes.insert(changes.end(), changed.begin() + static_cast<std::ptrdiff_t>(before.size()),
+                   changed.end());
+  }
+}
+
+/// A shift is not combined with other changes: its effect is small.
+void add_shifts(std::vector<Change>& changes, const PoseConvention& given) {
+  for (const int shift : {1, -1, 2, -2}) {
+    Change change{
+        std::abs(shift) == 1 ? "the poses are off by one scan" : "the poses are off by two scans",
+        "--pose-shift " + std::to_string(given.shift + shift), given};
+    change.convention.shift = given.shift + shift;
+    changes.push_back(std::move(change));
+  }
+}
+
 /// All combinations of common mistakes, except options that were given.
 std::vector<Change> usual_mistakes(const Recording& recording) {
   const PoseConvention& given = recording.convention();
@@ -171,29 +200,9 @@ std::vector<Change> usual_mistakes(const Recording& recording) {
                  [](PoseConvention& c) { c.frame = PoseFrame::kCamera; });
     }
   }
-  if (given.unit == 1.0) {
-    const std::size_t count = changes.size();
-    add_change(changes, "translations are in millimetres", "--pose-units mm",
-               [](PoseConvention& c) { c.unit = 0.001; });
-    for (std::size_t i = 0; i < count; ++i) {
-      Change change = changes[count + i];
-      const std::string millimetres = "translations are in millimetres";
-      change.meaning.replace(change.meaning.rfind(millimetres), millimetres.size(),
-                             "translations are in centimetres");
-      change.option.replace(change.option.rfind("mm"), 2, "cm");
-      change.convention.unit = 0.01;
-      changes.push_back(std::move(change));
-    }
-  }
-  changes.erase(changes.begin());
-  // A shift is not combined with others: its effect is small.
-  for (const int shift : {1, -1, 2, -2}) {
-    Change change{
-        std::abs(shift) == 1 ? "the poses are off by one scan" : "the poses are off by two scans",
-        "--pose-shift " + std::to_string(given.shift + shift), given};
-    change.convention.shift = given.shift + shift;
-    changes.push_back(std::move(change));
-  }
+  if (given.unit == 1.0) add_units(changes);
+  changes.erase(changes.begin());  // no change at all
+  add_shifts(changes, given);
   std::stable_sort(changes.begin(), changes.end(), [](const Change& a, const Change& b) {
     const auto flags = [](const Change& c) {
       return std::count(c.option.begin(), c.option.end(), '-');
@@ -289,6 +298,95 @@ void look_for_shift(const Recording& recording, Diagnosis& d) {
   d.verdict = PoseVerdict::kOtherwise;
 }
 
+void describe_motion(const Recording& recording, Diagnosis& d) {
+  std::vector<double> periods;
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < recording.size(); ++i) {
+    periods.push_back(recording.time(i) - recording.time(i - 1));
+    steps.push_back(
+        (recording.T_world_sensor(i).translation() - recording.T_world_sensor(i - 1).translation())
+            .norm());
+  }
+  d.period = median(periods);
+  d.step = median(steps);
+  if (!steps.empty()) d.longest_step = *std::max_element(steps.begin(), steps.end());
+}
+
+/// Reads scans and counts their points.
+class ScanSample {
+ public:
+  explicit ScanSample(const Recording& recording) : recording_(recording) {}
+
+  Landmarks read(std::size_t i) {
+    recording_.read_scan(i, scan_);
+    const PointBuffer points = finite_points(scan_);
+    all_ += scan_.size();
+    valid_ += points.size();
+    ++read_;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const double range = std::hypot(points.x[k], points.y[k], points.z[k]);
+      if (range < 2.0) ++near_;
+      if (k % 37 == 0) ranges_.push_back(range);
+    }
+    const Mounting mounting = estimate_mounting(points);
+    if (mounting.known) {
+      heights_.push_back(mounting.height);
+      up_ += mounting.up_sensor;
+    }
+    return Landmarks(points, mounting);
+  }
+
+  /// Sets the members of `d` that describe points and mounting.
+  void describe(Diagnosis& d) {
+    d.points = read_ == 0 ? 0.0 : static_cast<double>(all_) / static_cast<double>(read_);
+    if (all_ > 0) d.invalid_share = static_cast<double>(all_ - valid_) / static_cast<double>(all_);
+    if (valid_ > 0) d.ego_share = static_cast<double>(near_) / static_cast<double>(valid_);
+    if (!ranges_.empty()) {
+      const auto at =
+          ranges_.begin() + static_cast<std::ptrdiff_t>(99 * (ranges_.size() - 1) / 100);
+      std::nth_element(ranges_.begin(), at, ranges_.end());
+      d.farthest = *at;
+    }
+    if (2 * heights_.size() > read_) d.mounting = {median(heights_), up_.normalized(), true};
+  }
+
+ private:
+  const Recording& recording_;
+  RecordedScan scan_;
+  std::size_t all_ = 0;  // points
+  std::size_t valid_ = 0;
+  std::size_t near_ = 0;
+  std::size_t read_ = 0;  // scans
+  std::vector<double> ranges_;
+  std::vector<double> heights_;
+  Eigen::Vector3d up_ = Eigen::Vector3d::Zero();
+};
+
+struct SampledPairs {
+  std::vector<Pair> pairs;  // (i, i + stride)
+  std::size_t stride = 0;
+  std::vector<Pair> neighbours;  // (i, i + 1); empty if stride is 1
+};
+
+/// Increases the stride until the pairs do not agree without motion: scans farther apart show more
+/// of the motion of a slow sensor.
+SampledPairs sample_pairs(const Recording& recording, ScanSample& sample) {
+  const auto read = [&](std::size_t i) { return sample.read(i); };
+  SampledPairs result;
+  for (const std::size_t wanted : {std::size_t{1}, kStride, 4 * kStride, 16 * kStride}) {
+    const std::size_t next = std::min(wanted, recording.size() - 1);
+    if (next == 0 || (!result.pairs.empty() && 2 * next > recording.size())) break;
+    result.stride = next;
+    if (!result.pairs.empty() && result.neighbours.empty()) {
+      result.neighbours = std::move(result.pairs);
+    }
+    result.pairs = take_pairs(0, recording.size() - 1, next, kPairs, read);
+    if (standing_agreement(result.pairs).share < (next == 1 ? 0.35 : kLeastAgreement)) break;
+  }
+  if (result.pairs.empty() && recording.size() > 0) sample.read(0);
+  return result;
+}
+
 }  // namespace
 
 Landmarks::Landmarks(PointsView points, const Mounting& mounting) {
@@ -355,75 +453,17 @@ Diagnosis diagnose(const Recording& recording) {
   d.scan_files = recording.scan_file_count();
   d.pose_rows = recording.pose_count();
   d.scans = recording.size();
-  std::vector<double> periods;
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < recording.size(); ++i) {
-    periods.push_back(recording.time(i) - recording.time(i - 1));
-    steps.push_back(
-        (recording.T_world_sensor(i).translation() - recording.T_world_sensor(i - 1).translation())
-            .norm());
-  }
-  d.period = median(periods);
-  d.step = median(steps);
-  if (!steps.empty()) d.longest_step = *std::max_element(steps.begin(), steps.end());
+  describe_motion(recording, d);
+  ScanSample sample(recording);
+  const SampledPairs sampled = sample_pairs(recording, sample);
+  sample.describe(d);
 
-  std::size_t all = 0;
-  std::size_t valid = 0;
-  std::size_t near = 0;
-  std::size_t read = 0;
-  std::vector<double> ranges;
-  std::vector<double> heights;
-  Eigen::Vector3d up = Eigen::Vector3d::Zero();
-  RecordedScan scan;
-  const auto load = [&](std::size_t i) {
-    recording.read_scan(i, scan);
-    const PointBuffer points = finite_points(scan);
-    all += scan.size();
-    valid += points.size();
-    ++read;
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      const double range = std::hypot(points.x[k], points.y[k], points.z[k]);
-      if (range < 2.0) ++near;
-      if (k % 37 == 0) ranges.push_back(range);
-    }
-    const Mounting mounting = estimate_mounting(points);
-    if (mounting.known) {
-      heights.push_back(mounting.height);
-      up += mounting.up_sensor;
-    }
-    return Landmarks(points, mounting);
-  };
-
-  // Scans farther apart show more of the motion of a slow sensor.
-  std::vector<Pair> pairs;
-  std::vector<Pair> neighbours;
-  std::size_t stride = 0;
-  for (const std::size_t wanted : {std::size_t{1}, kStride, 4 * kStride, 16 * kStride}) {
-    const std::size_t next = std::min(wanted, recording.size() - 1);
-    if (next == 0 || (!pairs.empty() && 2 * next > recording.size())) break;
-    stride = next;
-    if (!pairs.empty() && neighbours.empty()) neighbours = std::move(pairs);
-    pairs = take_pairs(0, recording.size() - 1, stride, kPairs, load);
-    if (standing_agreement(pairs).share < (stride == 1 ? 0.35 : kLeastAgreement)) break;
-  }
-  if (pairs.empty() && recording.size() > 0) load(0);
-
-  d.points = read == 0 ? 0.0 : static_cast<double>(all) / static_cast<double>(read);
-  if (all > 0) d.invalid_share = static_cast<double>(all - valid) / static_cast<double>(all);
-  if (valid > 0) d.ego_share = static_cast<double>(near) / static_cast<double>(valid);
-  if (!ranges.empty()) {
-    const auto at = ranges.begin() + static_cast<std::ptrdiff_t>(99 * (ranges.size() - 1) / 100);
-    std::nth_element(ranges.begin(), at, ranges.end());
-    d.farthest = *at;
-  }
-  if (2 * heights.size() > read) d.mounting = {median(heights), up.normalized(), true};
-
-  compare(recording, pairs, stride, d);
-  if (d.verdict == PoseVerdict::kDisagree && stride > 1 && d.step > kFast) {
+  compare(recording, sampled.pairs, sampled.stride, d);
+  if (d.verdict == PoseVerdict::kDisagree && sampled.stride > 1 && d.step > kFast) {
     // Fast and with few objects in sight, as on a motorway: such pairs may have only traffic in
     // common, while neighbouring scans overlap.
     Diagnosis near_by = d;
-    compare(recording, neighbours, 1, near_by);
+    compare(recording, sampled.neighbours, 1, near_by);
     if (near_by.verdict == PoseVerdict::kDisagree && is_best(near_by)) {
       near_by.verdict = PoseVerdict::kNoMotion;
     }
