@@ -19,13 +19,13 @@ enum class Cause : std::uint8_t {
   kProposed = 7,      ///< dynamic: proposed by occupancy and not reverted (Eq. 19)
   kFreeSpace = 8,     ///< dynamic: another scan saw its place free
   kWithInstance = 9,  ///< dynamic: other scans saw a part of its instance free
-  kUnderInstance = 10,  ///< dynamic: ground point below a removed instance
-  kNoEvidence = 11,     ///< static: no other scan saw its place
-  kAlongTrack = 12,     ///< dynamic: its instance moved in other scans
-  kPresumed = 13,       ///< dynamic, for the time being: no earlier scan saw its place
-  kOccupied = 14,       ///< static: other scans saw its place occupied
-  kTooLittleFree = 15,  ///< static: too few scans saw its place free, or too little of it
-  kInPassage = 16,      ///< dynamic: nearly all other points in its place moved
+  kUnderInstance = 10,     ///< dynamic: ground point below a removed instance
+  kNoEvidence = 11,        ///< static: no other scan saw its place
+  kAlongTrack = 12,        ///< dynamic: its instance moved in other scans
+  kPresumed = 13,          ///< dynamic, for the time being: no earlier scan saw its place
+  kOccupied = 14,          ///< static: other scans saw its place occupied
+  kTooLittleFree = 15,     ///< static: too few scans saw its place free, or too little of it
+  kDynamicOccupancy = 16,  ///< dynamic: nearly all other points in its place moved
 };
 
 inline constexpr std::size_t kCauseCount = 17;
@@ -36,7 +36,7 @@ constexpr bool is_dynamic(Cause cause) {
   constexpr unsigned kDynamic = bit(Cause::kProposed) | bit(Cause::kFreeSpace) |
                                 bit(Cause::kWithInstance) | bit(Cause::kUnderInstance) |
                                 bit(Cause::kAlongTrack) | bit(Cause::kPresumed) |
-                                bit(Cause::kInPassage);
+                                bit(Cause::kDynamicOccupancy);
   return (kDynamic >> static_cast<unsigned>(cause) & 1U) != 0;
 }
 

@@ -23,9 +23,6 @@
 
 namespace dynains {
 
-/// Cluster number of points that belong to no cluster.
-inline constexpr std::uint32_t kNoCluster = 0xFFFFFFFFU;
-
 /// Groups points whose curved voxels are connected in the 26-neighbourhood; azimuth wraps around.
 ///
 /// Occupied cells are bits of a dense grid with azimuth running fastest. Each row is cut into

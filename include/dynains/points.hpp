@@ -28,6 +28,9 @@ constexpr bool is_static(PointLabel label) {
 /// Instance id of points that belong to no instance.
 inline constexpr std::uint32_t kNoInstance = 0;
 
+/// Cluster number of points that belong to no cluster.
+inline constexpr std::uint32_t kNoCluster = 0xFFFFFFFFU;
+
 /// Contiguous range that somebody else owns (C++17 has no std::span).
 template <class T>
 class Span {

@@ -14,6 +14,14 @@ struct RenamedParameter {
 
 inline constexpr RenamedParameter kRenamedParameters[] = {
     {"use_free_space", "decision", "true: free_space or both, false: window"},
+    {"horizon", "lookahead_scans", ""},
+    {"memory", "lookback_scans", ""},
+    {"ground_reach", "ground_test_distance", ""},
+    {"remove_share", "removal_ratio", ""},
+    {"see_share", "pass_ratio", ""},
+    {"passage_cell", "dynamic_grid_cell", ""},
+    {"passage_share", "dynamic_grid_ratio", ""},
+    {"see_past_movers", "ignore_dynamic_returns", ""},
 };
 
 /// Text for an error message: the present name of `former_name`, or an empty text if no parameter

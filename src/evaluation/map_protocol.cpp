@@ -21,7 +21,6 @@ namespace dynains::evaluation {
 using detail::truth_bit;
 using detail::TruthMask;
 using detail::VoxelIndex;
-using detail::VoxelKey;
 
 namespace {
 

@@ -19,7 +19,6 @@ namespace dynains::evaluation {
 using detail::LayerMask;
 using detail::truth_bit;
 using detail::TruthMask;
-using detail::VoxelKey;
 
 class VoxelProtocol::Impl {
  public:

@@ -27,8 +27,16 @@ bool is_folder(const fs::path& path) { return fs::is_directory(status_of(path));
 
 bool is_file(const fs::path& path) { return fs::is_regular_file(status_of(path)); }
 
+void check_is_file(const fs::path& path) {
+  const fs::file_status status = status_of(path);
+  if (fs::is_directory(status)) fail(path, "is a folder, expected a file");
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    fail(path, "is a device or a pipe, expected a file");
+  }
+}
+
 std::ifstream open_input(const fs::path& path) {
-  if (is_folder(path)) fail(path, "is a folder, expected a file");
+  check_is_file(path);
   errno = 0;
   std::ifstream file(path, std::ios::binary);
   if (!file) fail_by_system(path, "cannot be opened for reading", errno);

@@ -154,33 +154,14 @@ std::size_t TiledStaticMap::memory_bytes() const {
 }
 
 std::size_t TiledStaticMap::Tile::memory_bytes() const {
-  return points.capacity() * sizeof(Point) + table.capacity() * sizeof(table[0]);
+  return points.capacity() * sizeof(Point) + filled.memory_bytes();
 }
 
-/// False if the voxel has a point already; otherwise it gets the next point.
+/// False if the voxel has a point already; otherwise marks it as filled.
 bool TiledStaticMap::Tile::fill(std::uint32_t voxel) {
-  if (2 * points.size() >= table.size()) build_table();
-  std::uint32_t& entry = find(voxel);
-  if (entry != 0) return false;
-  entry = static_cast<std::uint32_t>(points.size()) + 1;
-  return true;
-}
-
-/// The entry of the voxel, or a free entry. Linear probing.
-std::uint32_t& TiledStaticMap::Tile::find(std::uint32_t voxel) {
-  const std::size_t mask = table.size() - 1;
-  std::uint32_t hash = voxel * 0x9E3779B1U;
-  hash ^= hash >> 15;
-  std::size_t at = hash & mask;
-  while (table[at] != 0 && points[table[at] - 1].voxel != voxel) at = (at + 1) & mask;
-  return table[at];
-}
-
-void TiledStaticMap::Tile::build_table() {
-  std::size_t size = 1024;
-  while (size < 4 * points.size()) size *= 2;
-  table.assign(size, 0);
-  for (std::uint32_t i = 0; i < points.size(); ++i) find(points[i].voxel) = i + 1;
+  const std::size_t before = filled.size();
+  filled.insert(voxel);
+  return filled.size() > before;
 }
 
 fs::path TiledStaticMap::path_of(const Place& place) const {
@@ -207,6 +188,10 @@ TiledStaticMap::Tile& TiledStaticMap::tile_at(const Place& place) {
   if (found != tiles_.end()) return found->second;
   Tile tile;
   tile.points = read(place, stored_[place]);
+  if (config_.map_voxel > 0.0) {
+    tile.filled.reserve(tile.points.size());
+    for (const Point& point : tile.points) tile.filled.insert(point.voxel);
+  }
   return tiles_.emplace(place, std::move(tile)).first->second;
 }
 

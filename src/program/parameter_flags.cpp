@@ -58,15 +58,15 @@ std::string read_config_text(const std::filesystem::path& path) {
   const auto fail = [&](const std::string& what) {
     throw IoError(path.string() + ": " + what + "; expected a config file, see dynains config");
   };
-  const auto fail_by_system = [&](int reason) {
-    fail("cannot be read: " + std::generic_category().message(reason));
-  };
+  const auto reason = [] { return ": " + std::generic_category().message(errno); };
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) fail("is a folder");
   errno = 0;
   std::ifstream file(path, std::ios::binary);
-  if (!file) fail_by_system(errno);
+  if (!file) fail("cannot be read" + reason());
   std::string text(kMaxBytes + 1, '\0');
   file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (file.bad()) fail_by_system(errno);
+  if (file.bad()) fail("cannot be read" + reason());
   text.resize(static_cast<std::size_t>(file.gcount()));
   if (text.size() > kMaxBytes) fail("has more than " + std::to_string(kMaxBytes) + " bytes");
   return text;

@@ -43,8 +43,8 @@ TEST_CASE("a warm remover allocates nothing, but for the map when it grows") {
   config.build_map = build_map;
   config.revision.revise_map = build_map && config.uses_free_space();
   // Short rings: after seven rounds of twelve scans, every place in them has held every scan.
-  config.evidence.horizon = 6;
-  config.evidence.memory = 20;
+  config.evidence.lookahead_scans = 6;
+  config.evidence.lookback_scans = 20;
   // To and fro over the same ground: the second time, the map has it all.
   const Scene scene = yard_with(van(14.0, 3.5, {-6.0, 0.0, 0.0}));
   Eigen::Isometry3d T_world_sensor = sensor_at(0.0);

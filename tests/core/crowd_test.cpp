@@ -1,4 +1,5 @@
-// People in a crowd hide each other: what passages are for, and knowing what moves.
+// People in a crowd hide each other: the dynamic occupancy grid and ignored dynamic returns find
+// them.
 #include <vector>
 
 #include "support/catch.hpp"
@@ -40,15 +41,16 @@ void check_gain(const DynaInsRemover::Config& config, const Gain& final_gain,
   check(by_default().newest, without.newest, newest_gain);
 }
 
-TEST_CASE("passages find people whom others hide, at once and finally, at little cost") {
+TEST_CASE(
+    "the dynamic occupancy grid finds people whom others hide, in both verdicts, at little cost") {
   DynaInsRemover::Config config;
-  config.evidence.passage_share = 1.0;
+  config.evidence.dynamic_grid_ratio = 1.0;
   check_gain(config, {0.003, 0.2}, {0.004, 0.2});
 }
 
 TEST_CASE("who is known to move hides others less, at once and finally, at little cost") {
   DynaInsRemover::Config config;
-  config.evidence.see_past_movers = false;
+  config.evidence.ignore_dynamic_returns = false;
   check_gain(config, {0.006, 0.3}, {0.012, 0.2});
 }
 

@@ -12,7 +12,7 @@
 namespace dynains::test {
 namespace {
 
-// Points across the line of sight, so far away (m).
+// Points across the line of result, so far away (m).
 PointBuffer panel(float x, float y_low, float y_high, float z_low, float z_high) {
   const float step = 0.006F * x;  // less than a cell of the images
   PointBuffer points;
@@ -40,7 +40,7 @@ class Watch {
   }
 
   Watch& see(const PointBuffer& instance, const PointBuffer& background = wall(),
-             std::uint64_t segment = 0) {
+             std::uint64_t epoch = 0) {
     const PointBuffer points = both(instance, background);
     GroundSplit split;
     split.resize(points.size());
@@ -51,7 +51,7 @@ class Watch {
     }
     std::vector<std::uint32_t> instance_of(points.size(), kNoCluster);
     std::fill_n(instance_of.begin(), instance.size(), 0U);
-    evidence_.observe(splits_.size(), segment, Eigen::Isometry3d::Identity(), split, instance_of,
+    evidence_.observe(splits_.size(), epoch, Eigen::Isometry3d::Identity(), split, instance_of,
                       instance.size() > 0 ? 1 : 0);
     evidence_.judge(splits_.size(), false, split);
     splits_.push_back(split);
@@ -92,7 +92,7 @@ TEST_CASE("only compact instances are presumed to move, and where places were se
   struct Case {
     float length, height;
     std::size_t scan = 2;
-    std::size_t begin = 0;  // of its segment
+    std::size_t begin = 0;  // of its epoch
     bool presumed = false;
   };
   FreeSpaceConfig config = every_scan_a_reference();
@@ -134,7 +134,7 @@ TEST_CASE("only compact instances are presumed to move, and where places were se
 
 TEST_CASE("what scans before an instance saw, and what scans behind it saw, is told apart") {
   FreeSpaceConfig config = every_scan_a_reference();
-  config.memory = config.horizon = 2;
+  config.lookback_scans = config.lookahead_scans = 2;
   // The only references are the first scan and the last: each may see the place free, or nothing.
   const auto causes = [&config](bool before, bool after) {
     Watch watch(config);
@@ -156,18 +156,18 @@ TEST_CASE("what scans before an instance saw, and what scans behind it saw, is t
   CHECK(causes(true, true) == Causes{Cause::kTooLittleFree});
 }
 
-TEST_CASE("scans of another segment tell nothing of an instance, nor which one it was") {
-  for (const std::uint64_t segment : {0U, 1U}) {
+TEST_CASE("scans of another epoch tell nothing of an instance, nor which one it was") {
+  for (const std::uint64_t epoch : {0U, 1U}) {
     Watch left(every_scan_a_reference());
     left.see(car());
-    for (int i = 0; i < 5; ++i) left.see(PointBuffer(), wall(), segment);
-    CAPTURE(segment);
-    CHECK(left.removes(0) == (segment == 0));
-    if (segment != 0) CHECK(left.causes(0) == Causes{Cause::kNoEvidence});
+    for (int i = 0; i < 5; ++i) left.see(PointBuffer(), wall(), epoch);
+    CAPTURE(epoch);
+    CHECK(left.removes(0) == (epoch == 0));
+    if (epoch != 0) CHECK(left.causes(0) == Causes{Cause::kNoEvidence});
 
     Watch stays(every_scan_a_reference());
-    stays.see(car()).see(car(), wall(), segment);
-    CHECK(stays.predecessor() == (segment == 0 ? 0 : kNoCluster));
+    stays.see(car()).see(car(), wall(), epoch);
+    CHECK(stays.predecessor() == (epoch == 0 ? 0 : kNoCluster));
   }
 }
 
@@ -205,7 +205,7 @@ TEST_CASE("what a later scan shows of an instance is known of it in the scans be
 // For one scan, both are one instance.
 TEST_CASE("what stood long before does not go with what was seen to pass beside it") {
   FreeSpaceConfig config = every_scan_a_reference();
-  config.horizon = 0;
+  config.lookahead_scans = 0;
   config.tau_track = 0.6;
   config.still_weight = 0.0;
   const PointBuffer passing = panel(10.0F, 1.2F, 3.2F, -1.5F, 0.5F);
@@ -221,29 +221,30 @@ TEST_CASE("what stood long before does not go with what was seen to pass beside 
 // Only two scans are asked: those two and four back.
 TEST_CASE("what moved and is met again contests nothing") {
   FreeSpaceConfig config = every_scan_a_reference();
-  config.memory = 4;
-  config.horizon = 0;
+  config.lookback_scans = 4;
+  config.lookahead_scans = 0;
   config.tau_whole = 0.9;
   config.use_tracks = false;
-  config.passage_share = 1.0;
-  for (const bool see_past_movers : {false, true}) {
-    config.see_past_movers = see_past_movers;
+  config.dynamic_grid_ratio = 1.0;
+  for (const bool ignore_dynamic_returns : {false, true}) {
+    config.ignore_dynamic_returns = ignore_dynamic_returns;
     Watch watch(config);
     for (int i = 0; i < 4; ++i) watch.see(PointBuffer());
     watch.see(car());
     CHECK(watch.causes(4) == Causes{Cause::kFreeSpace});
     for (int i = 0; i < 3; ++i) watch.see(PointBuffer());
     watch.see(car());
-    CHECK(watch.causes(8) == Causes{see_past_movers ? Cause::kFreeSpace : Cause::kTooLittleFree});
+    CHECK(watch.causes(8) ==
+          Causes{ignore_dynamic_returns ? Cause::kFreeSpace : Cause::kTooLittleFree});
   }
 }
 
 // Something comes to stand beside a hedge, for one scan; only the scan two back is asked.
 TEST_CASE("what goes with a fifth that was seen free still contests where it is met again") {
   FreeSpaceConfig config = every_scan_a_reference();
-  config.memory = 2;
-  config.horizon = 0;
-  config.passage_share = 1.0;
+  config.lookback_scans = 2;
+  config.lookahead_scans = 0;
+  config.dynamic_grid_ratio = 1.0;
   const PointBuffer hedge = panel(10.0F, -3.0F, 1.4F, -1.5F, 0.5F);
   const PointBuffer passing = panel(10.0F, 1.4F, 3.0F, -1.5F, 0.5F);
   Watch watch(config);

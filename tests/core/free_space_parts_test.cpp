@@ -12,7 +12,7 @@
 #include "dynains/evidence/instance_hull.hpp"
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/instance_tracks.hpp"
-#include "dynains/evidence/reference_lags.hpp"
+#include "dynains/evidence/reference_scans.hpp"
 #include "dynains/evidence/supervoxel_groups.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "support/catch.hpp"
@@ -55,7 +55,7 @@ InstanceSamples supervoxels_at(const std::vector<std::array<int, 3>>& places, in
   InstanceSamples samples;
   samples.sample_begin.push_back(0);
   for (const auto& p : places) {
-    samples.place.push_back(pack_place(p[0], p[1], p[2]));
+    samples.place.push_back(voxel_key(p[0], p[1], p[2]));
     samples.sample_begin.push_back(samples.sample_begin.back() +
                                    static_cast<std::uint32_t>(samples_each));
   }
@@ -299,12 +299,12 @@ TEST_CASE("instances of consecutive scans are linked where they overlap") {
     linker.measure(samples[scan], T_origin_sensor, tracked[scan]);
   }
   linker.link(tracked[0], tracked[1]);
-  CHECK(tracked[1].instances[0].previous == 0);
-  CHECK(tracked[1].instances[1].previous == 1);
-  CHECK(tracked[1].instances[2].previous == kNoCluster);
-  CHECK(tracked[1].instances[3].previous == kNoCluster);
-  CHECK(tracked[0].instances[0].next == 0);
-  CHECK(tracked[0].instances[1].next == 1);
+  CHECK(tracked[1].instances[0].past.instance == 0);
+  CHECK(tracked[1].instances[1].past.instance == 1);
+  CHECK(tracked[1].instances[2].past.instance == kNoCluster);
+  CHECK(tracked[1].instances[3].past.instance == kNoCluster);
+  CHECK(tracked[0].instances[0].future.instance == 0);
+  CHECK(tracked[0].instances[1].future.instance == 1);
   CHECK_FALSE(tracked[1].shapes[3].carried);
   CHECK(tracked[1].shapes[0].length == Approx(3.8).margin(0.3));
 }
@@ -315,7 +315,7 @@ TrackedInstances tracked_in(const std::vector<std::vector<int>>& cells_of) {
   tracked.instances.resize(cells_of.size());
   tracked.shapes.resize(cells_of.size());
   for (std::uint32_t i = 0; i < cells_of.size(); ++i) {
-    for (const int x : cells_of[i]) tracked.cells.push_back({pack_place(x, 0, 0), i});
+    for (const int x : cells_of[i]) tracked.cells.push_back({voxel_key(x, 0, 0), i});
     tracked.shapes[i].cells = static_cast<std::uint32_t>(cells_of[i].size());
   }
   return tracked;
@@ -327,25 +327,25 @@ TEST_CASE("of several that it overlaps, an instance is linked to that with which
   const TrackedInstances parts = tracked_in({{0, 1, 2}, {3, 4, 5, 6, 7, 8}, {9, 10, 11}, {40}});
   TrackedInstances before = whole, now = parts;
   linker.link(before, now);
-  CHECK(before.instances[0].next == 1);
-  for (const std::size_t i : {0U, 1U, 2U}) CHECK(now.instances[i].previous == 0);
-  CHECK(now.instances[3].previous == kNoCluster);
+  CHECK(before.instances[0].future.instance == 1);
+  for (const std::size_t i : {0U, 1U, 2U}) CHECK(now.instances[i].past.instance == 0);
+  CHECK(now.instances[3].past.instance == kNoCluster);
 
   before = parts;
   now = whole;
   linker.link(before, now);
-  CHECK(now.instances[0].previous == 1);
-  for (const std::size_t i : {0U, 1U, 2U}) CHECK(before.instances[i].next == 0);
+  CHECK(now.instances[0].past.instance == 1);
+  for (const std::size_t i : {0U, 1U, 2U}) CHECK(before.instances[i].future.instance == 0);
 
   // Two of eleven cells are less than a quarter, and nothing is left of the scans before.
   before = tracked_in({{0, 1}});
   now = tracked_in({{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10}});
   linker.link(before, now);
-  CHECK(now.instances[0].previous == kNoCluster);
+  CHECK(now.instances[0].past.instance == kNoCluster);
   before = tracked_in({});
   now = whole;
   linker.link(before, now);
-  CHECK(now.instances[0].previous == kNoCluster);
+  CHECK(now.instances[0].past.instance == kNoCluster);
 }
 
 TEST_CASE("instances without a common cell are not linked, however many cells they have") {
@@ -355,8 +355,8 @@ TEST_CASE("instances without a common cell are not linked, however many cells th
   for (int i = 0; i < 100000; ++i) (random.index(2) == 0 ? some : others).push_back(i);
   TrackedInstances before = tracked_in({some}), now = tracked_in({others});
   linker.link(before, now);
-  CHECK(now.instances[0].previous == kNoCluster);
-  CHECK(before.instances[0].next == kNoCluster);
+  CHECK(now.instances[0].past.instance == kNoCluster);
+  CHECK(before.instances[0].future.instance == kNoCluster);
 }
 
 TEST_CASE("what is too long, too high or a single sample is not carried") {
@@ -396,43 +396,43 @@ TEST_CASE("belief along a track fades by 0.95 a scan, and old hits contradict it
   TrackedInstances before, now;
   before.instances.resize(1);
   before.instances[0].own = 2.0F * kUnit;
-  belief.run_forward(nullptr, before);
-  CHECK(before.instances[0].forward == Approx(2.0F * kUnit));
+  belief.propagate(&TrackedInstances::Instance::past, nullptr, before);
+  CHECK(before.instances[0].past.log_odds == Approx(2.0F * kUnit));
   now.instances.resize(1);
-  now.instances[0].previous = 0;
-  belief.run_forward(&before, now);
-  CHECK(now.instances[0].forward == Approx(0.95F * 2.0F * kUnit));
-  CHECK(now.instances[0].since_forward == 1);
+  now.instances[0].past.instance = 0;
+  belief.propagate(&TrackedInstances::Instance::past, &before, now);
+  CHECK(now.instances[0].past.log_odds == Approx(0.95F * 2.0F * kUnit));
+  CHECK(now.instances[0].past.scans_since_motion == 1);
   // It moved one scan ago: a hit up to nine scans back may have been itself, an older one not.
-  now.instances[0].hit_back = 9;
-  belief.run_forward(&before, now);
-  CHECK(now.instances[0].forward > 0.0F);
-  now.instances[0].hit_back = 10;
-  belief.run_forward(&before, now);
-  CHECK(now.instances[0].forward == 0.0F);
+  now.instances[0].past.farthest_hit = 9;
+  belief.propagate(&TrackedInstances::Instance::past, &before, now);
+  CHECK(now.instances[0].past.log_odds > 0.0F);
+  now.instances[0].past.farthest_hit = 10;
+  belief.propagate(&TrackedInstances::Instance::past, &before, now);
+  CHECK(now.instances[0].past.log_odds == 0.0F);
   // Its own evidence outweighs that; the sum stops at four units, and one below zero.
   now.instances[0].own = kUnit;
-  belief.run_forward(&before, now);
-  CHECK(now.instances[0].forward == Approx((1.0F + 0.95F * 2.0F) * kUnit));
-  CHECK(now.instances[0].since_forward == 0);
+  belief.propagate(&TrackedInstances::Instance::past, &before, now);
+  CHECK(now.instances[0].past.log_odds == Approx((1.0F + 0.95F * 2.0F) * kUnit));
+  CHECK(now.instances[0].past.scans_since_motion == 0);
   now.instances[0].own = -9.0F * kUnit;
-  belief.run_forward(&before, now);
-  CHECK(now.instances[0].forward == Approx(-kUnit));
+  belief.propagate(&TrackedInstances::Instance::past, &before, now);
+  CHECK(now.instances[0].past.log_odds == Approx(-kUnit));
   now.instances[0].own = 4.0F * kUnit;
-  belief.run_forward(&before, now);
-  CHECK(now.instances[0].forward == Approx(4.0F * kUnit));
+  belief.propagate(&TrackedInstances::Instance::past, &before, now);
+  CHECK(now.instances[0].past.log_odds == Approx(4.0F * kUnit));
   // Backwards it is the same with what comes after.
-  before.instances[0].next = 0;
-  belief.run_backward(nullptr, now);
+  before.instances[0].future.instance = 0;
+  belief.propagate(&TrackedInstances::Instance::future, nullptr, now);
   before.instances[0].own = 0.0F;
-  before.instances[0].hit_back = 100;
-  before.instances[0].hit_ahead = 9;
-  belief.run_backward(&now, before);
-  CHECK(before.instances[0].backward == Approx(0.95F * 4.0F * kUnit));
-  CHECK(before.instances[0].since_backward == 1);
-  before.instances[0].hit_ahead = 10;
-  belief.run_backward(&now, before);
-  CHECK(before.instances[0].backward == 0.0F);
+  before.instances[0].past.farthest_hit = 100;
+  before.instances[0].future.farthest_hit = 9;
+  belief.propagate(&TrackedInstances::Instance::future, &now, before);
+  CHECK(before.instances[0].future.log_odds == Approx(0.95F * 4.0F * kUnit));
+  CHECK(before.instances[0].future.scans_since_motion == 1);
+  before.instances[0].future.farthest_hit = 10;
+  belief.propagate(&TrackedInstances::Instance::future, &now, before);
+  CHECK(before.instances[0].future.log_odds == 0.0F);
 }
 
 TEST_CASE("the beams of a sensor are measured from one scan") {

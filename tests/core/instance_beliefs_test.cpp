@@ -7,10 +7,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/evidence/reference_views.hpp"
+#include "dynains/evidence/reference_scans.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
-#include "support/sights.hpp"
+#include "support/visibility.hpp"
 
 namespace dynains::test {
 namespace {
@@ -34,7 +34,7 @@ InstanceSamples samples_of(const Instances& instances) {
                                    static_cast<std::uint32_t>(samples.supervoxel_count()));
       samples.sample_begin.push_back(samples.sample_begin.back() + count);
       samples.instance_of.push_back(instance);
-      samples.place.push_back(pack_place(0, 0, 0));
+      samples.place.push_back(voxel_key(0, 0, 0));
     }
     samples.supervoxel_begin.push_back(static_cast<std::uint32_t>(samples.supervoxel_count()));
     ++instance;
@@ -54,14 +54,14 @@ struct Scan {
     std::size_t free, hit;
   };
   void see(const std::vector<Seen>& seen) {
-    std::vector<Sight> sights(samples.size(), Sight::kNothing);
+    std::vector<BeamResult> visibility(samples.size(), BeamResult::kUnknown);
     for (std::size_t s = 0; s < seen.size(); ++s) {
-      const auto begin = sights.begin() + samples.sample_begin[s];
-      std::fill_n(begin, seen[s].free, Sight::kFree);
-      std::fill_n(begin + static_cast<std::ptrdiff_t>(seen[s].free), seen[s].hit, Sight::kHit);
+      const auto begin = visibility.begin() + samples.sample_begin[s];
+      std::fill_n(begin, seen[s].free, BeamResult::kFree);
+      std::fill_n(begin + static_cast<std::ptrdiff_t>(seen[s].free), seen[s].hit, BeamResult::kHit);
     }
     hits.clear();
-    updater.update(samples, sights_of(sights), beliefs,
+    updater.update(samples, visibility_of(visibility), beliefs,
                    [&](std::size_t instance) { hits.push_back(instance); });
   }
   const Belief& belief(std::size_t supervoxel = 0) const { return beliefs.supervoxels[supervoxel]; }
@@ -113,14 +113,14 @@ TEST_CASE("what one reference says of a supervoxel changes its belief by one of 
 TEST_CASE("a single hit contests what is seen free, and alone it tells nothing") {
   Scan scan(Instances{{4}});
   scan.see({{0, 1}});
-  CHECK(scan.beliefs.shares[0].decided == 0);
+  CHECK(scan.beliefs.counts[0].decided == 0);
   scan.see({{1, 0}});
   CHECK_FALSE(scan.is_free());  // as it would be otherwise: 1.69
-  CHECK(scan.beliefs.shares[0].decided == 0);
+  CHECK(scan.beliefs.counts[0].decided == 0);
   scan.see({{0, 1}});
   CHECK(scan.belief().level == Approx(std::max(0.0F, 2.0F * kFreeStep + kHitStep)).margin(1e-6));
   scan.see({{0, 2}});
-  CHECK(scan.beliefs.shares[0].decided == 4);
+  CHECK(scan.beliefs.counts[0].decided == 4);
 }
 
 TEST_CASE("a place that was hit needs more evidence, and starts again from zero") {
@@ -159,20 +159,20 @@ TEST_CASE("references before and after a scan do not add up, but the higher side
 TEST_CASE("a fifth of what is known of an instance removes it") {
   Scan enough(Instances{{2, 8}});
   enough.see({{2, 0}, {0, 8}});
-  CHECK(enough.beliefs.shares[0].moved == 2);
-  CHECK(enough.beliefs.shares[0].decided == 10);
+  CHECK(enough.beliefs.counts[0].moved == 2);
+  CHECK(enough.beliefs.counts[0].decided == 10);
   CHECK(enough.removes());
 
   Scan too_little(Instances{{2, 9}});
   too_little.see({{2, 0}, {0, 9}});
-  CHECK(too_little.beliefs.shares[0].decided == 11);
+  CHECK(too_little.beliefs.counts[0].decided == 11);
   CHECK_FALSE(too_little.removes());
 
   // What nobody saw is not known.
   Scan hidden(Instances{{2, 9, 20}});
   hidden.see({{2, 0}, {0, 8}, {0, 0}});
-  CHECK(hidden.beliefs.shares[0].decided == 11);
-  CHECK(hidden.beliefs.shares[0].total == 31);
+  CHECK(hidden.beliefs.counts[0].decided == 11);
+  CHECK(hidden.beliefs.counts[0].total == 31);
 }
 
 // A parked car: four layers of supervoxels of four samples each, `per_layer` in each.
@@ -180,7 +180,7 @@ Scan scan_of_layers(std::size_t per_layer) {
   Scan scan(Instances{std::vector<std::uint32_t>(4 * per_layer, 4)});
   for (std::size_t s = 0; s < scan.samples.place.size(); ++s) {
     const auto layer = static_cast<std::int32_t>(s / per_layer) - 2;  // below the sensor, too
-    scan.samples.place[s] = pack_place(static_cast<std::int32_t>(s % per_layer), 0, layer);
+    scan.samples.place[s] = voxel_key(static_cast<std::int32_t>(s % per_layer), 0, layer);
   }
   return scan;
 }
@@ -204,7 +204,7 @@ TEST_CASE("windows alone remove nothing: where beams hit again, the lower half m
 
   Scan parked = scan_of_layers(5);
   see_free_and_hit(parked, windows, true);
-  CHECK(parked.beliefs.shares[0].moved == 16);  // these go nevertheless
+  CHECK(parked.beliefs.counts[0].moved == 16);  // these go nevertheless
   CHECK(parked.belief(10).hit_again != 0);
   CHECK(parked.belief(11).hit_again == 0);
   CHECK_FALSE(parked.removes());
@@ -274,7 +274,7 @@ TEST_CASE("what is too small to carry windows goes as before") {
 TEST_CASE("of an odd number of layers the middle belongs to the lower half") {
   Scan scan(Instances{std::vector<std::uint32_t>(10, 4)});
   for (std::size_t s = 0; s < 10; ++s) {
-    scan.samples.place[s] = pack_place(0, 0, static_cast<std::int32_t>(s / 2) - 3);
+    scan.samples.place[s] = voxel_key(0, 0, static_cast<std::int32_t>(s / 2) - 3);
   }
   Scan above = scan;
   see_free_and_hit(above, {6, 7}, true);
@@ -300,7 +300,7 @@ TEST_CASE("an instance that one reference saw through as a whole is removed") {
   scan.see(contesting);
   scan.see({{5, 3}, {5, 3}, {5, 3}, {5, 3}, {5, 3}});  // 25 of 40: 0.63
   CHECK(scan.beliefs.wholes[0].level == Approx(kFreeStep));
-  CHECK(scan.beliefs.shares[0].moved == 0);
+  CHECK(scan.beliefs.counts[0].moved == 0);
   CHECK(scan.removes());
 
   Scan half(Instances{supervoxels});
@@ -330,7 +330,7 @@ TEST_CASE("to remove an instance that was hit, one reference has to see through 
   gone.see(standing);
   gone.see(wholly);
   CHECK(gone.beliefs.wholes[0].peak == Approx(2.0F * kFreeStep));
-  CHECK(gone.beliefs.shares[0].moved == 0);
+  CHECK(gone.beliefs.counts[0].moved == 0);
   CHECK(gone.removes());  // 1.69, though below the 2.20 of tau_contested
 }
 
@@ -364,14 +364,15 @@ TEST_CASE("an instance is told to be still there where nearly all that is seen o
 }
 
 // The same sums, each supervoxel and instance anew for every reference.
-void add_slowly(const InstanceSamples& samples, const std::vector<Sight>& sights,
+void add_slowly(const InstanceSamples& samples, const std::vector<BeamResult>& visibility,
                 std::vector<Belief>& supervoxels, std::vector<Belief>& wholes) {
   const FreeSpaceConfig config;
   const auto increment = static_cast<float>(log_odds(config.p_free));
   const auto decrement = static_cast<float>(log_odds(config.p_hit));
-  const auto count = [&](std::size_t begin, std::size_t end, Sight sight) {
-    return static_cast<float>(std::count(sights.begin() + static_cast<std::ptrdiff_t>(begin),
-                                         sights.begin() + static_cast<std::ptrdiff_t>(end), sight));
+  const auto count = [&](std::size_t begin, std::size_t end, BeamResult result) {
+    return static_cast<float>(std::count(visibility.begin() + static_cast<std::ptrdiff_t>(begin),
+                                         visibility.begin() + static_cast<std::ptrdiff_t>(end),
+                                         result));
   };
   const auto add = [&](Belief& belief, float share, bool raises, bool lowers) {
     if (raises) {
@@ -386,7 +387,8 @@ void add_slowly(const InstanceSamples& samples, const std::vector<Sight>& sights
   for (std::size_t s = 0; s < supervoxels.size(); ++s) {
     const std::size_t begin = samples.sample_begin[s], end = samples.sample_begin[s + 1];
     const auto size = static_cast<float>(end - begin);
-    const float free = count(begin, end, Sight::kFree), hit = count(begin, end, Sight::kHit);
+    const float free = count(begin, end, BeamResult::kFree),
+                hit = count(begin, end, BeamResult::kHit);
     if (free + hit == 0.0F) continue;
     const float share = free / (free + hit);
     add(supervoxels[s], share, free >= 0.15F * size && share >= 0.6F, share <= 0.3F);
@@ -397,7 +399,8 @@ void add_slowly(const InstanceSamples& samples, const std::vector<Sight>& sights
   for (std::size_t i = 0; i < wholes.size(); ++i) {
     const std::size_t begin = samples.sample_begin[samples.supervoxel_begin[i]];
     const std::size_t end = samples.sample_begin[samples.supervoxel_begin[i + 1]];
-    const float free = count(begin, end, Sight::kFree), hit = count(begin, end, Sight::kHit);
+    const float free = count(begin, end, BeamResult::kFree),
+                hit = count(begin, end, BeamResult::kHit);
     if (free + hit < std::max(2.0F, 0.25F * static_cast<float>(end - begin))) continue;
     const float share = free / (free + hit);
     add(wholes[i], share, share >= 0.6F, share <= 0.3F);
@@ -423,18 +426,21 @@ TEST_CASE("beliefs are those of a sum that passes nothing over") {
         for (Belief& belief : wholes) belief.level = 0.0F;
       }
       // Whole supervoxels look alike, as they do.
-      std::vector<Sight> sights(scan.samples.size());
+      std::vector<BeamResult> visibility(scan.samples.size());
       for (std::size_t s = 0; s < scan.samples.supervoxel_count(); ++s) {
         const double free = random.uniform(-0.5, 1.5), seen = random.uniform(-0.5, 1.5);
         for (std::size_t i = scan.samples.sample_begin[s]; i < scan.samples.sample_begin[s + 1];
              ++i) {
           const bool is_seen = random.uniform(0.0, 1.0) < seen;
           const bool is_free = random.uniform(0.0, 1.0) < free;
-          sights[i] = !is_seen ? Sight::kNothing : is_free ? Sight::kFree : Sight::kHit;
+          visibility[i] = !is_seen  ? BeamResult::kUnknown
+                          : is_free ? BeamResult::kFree
+                                    : BeamResult::kHit;
         }
       }
-      scan.updater.update(scan.samples, sights_of(sights), scan.beliefs, [](std::size_t) {});
-      add_slowly(scan.samples, sights, supervoxels, wholes);
+      scan.updater.update(scan.samples, visibility_of(visibility), scan.beliefs,
+                          [](std::size_t) {});
+      add_slowly(scan.samples, visibility, supervoxels, wholes);
     }
     for (std::size_t s = 0; s < supervoxels.size(); ++s) {
       REQUIRE(scan.belief(s).level == supervoxels[s].level);
@@ -455,9 +461,9 @@ TEST_CASE("beliefs are those of a sum that passes nothing over") {
         moved += scan.is_free(s) ? size : 0;
         decided += scan.is_free(s) || supervoxels[s].occupied != 0 ? size : 0;
       }
-      REQUIRE(scan.beliefs.shares[i].total == total);
-      REQUIRE(scan.beliefs.shares[i].moved == moved);
-      REQUIRE(scan.beliefs.shares[i].decided == decided);
+      REQUIRE(scan.beliefs.counts[i].total == total);
+      REQUIRE(scan.beliefs.counts[i].moved == moved);
+      REQUIRE(scan.beliefs.counts[i].decided == decided);
     }
   }
 }
@@ -480,34 +486,35 @@ TEST_CASE("a reference is found by the scan it is asked from, until its image is
   for (const int step : {1, 2, 3}) {
     FreeSpaceConfig config;
     config.reference_step = step;
-    config.memory = 12;
-    config.horizon = 6;
-    ReferenceViews views(config);
+    config.lookback_scans = 12;
+    config.lookahead_scans = 6;
+    ReferenceScans views(config);
     SensorModel sensor = SensorModel::typical();
     sensor.azimuth_step = 1.0;
     sensor.elevation_gap = sensor.elevation_gap_wide = 3.0;
     views.adapt(sensor);
     std::vector<ReferencePhase> phases;
-    constexpr std::uint64_t kScans = 40, kBreak = 17;  // where another segment begins
-    const auto segment_of = [](std::uint64_t scan) { return scan < kBreak ? 0U : 1U; };
+    constexpr std::uint64_t kScans = 40, kBreak = 17;  // where another epoch begins
+    const auto epoch_of = [](std::uint64_t scan) { return scan < kBreak ? 0U : 1U; };
     const auto begin_of = [](std::uint64_t scan) { return scan < kBreak ? 0U : kBreak; };
     for (std::uint64_t scan = 0; scan < kScans; ++scan) {
       phases.push_back(views.advance(scan - begin_of(scan)));
-      REQUIRE(phases.back().phase == (scan - begin_of(scan)) % static_cast<std::uint64_t>(step));
-      if (phases.back().phase == 0) {
-        views.make_image(scan, segment_of(scan), Eigen::Isometry3d::Identity(),
+      REQUIRE(phases.back().since_image ==
+              (scan - begin_of(scan)) % static_cast<std::uint64_t>(step));
+      if (phases.back().since_image == 0) {
+        views.make_image(scan, epoch_of(scan), Eigen::Isometry3d::Identity(),
                          wall(5.0F + static_cast<float>(scan)), {});
         REQUIRE(views.newest().scan == scan);
       }
       for (std::uint64_t from = scan >= 6 ? scan - 6 : 0; from <= scan; ++from) {
         for (std::uint64_t other = from >= 12 ? from - 12 : 0; other <= scan; ++other) {
           const bool is_reference =
-              segment_of(other) == segment_of(from) &&
+              epoch_of(other) == epoch_of(from) &&
               (other - begin_of(other)) % static_cast<std::uint64_t>(step) == 0;
           // Only lags that lead to a scan which may be a reference are ever asked for.
           if ((other - begin_of(from)) % static_cast<std::uint64_t>(step) != 0) continue;
           const int lag = static_cast<int>(other) - static_cast<int>(from);
-          const ReferenceView* const found = views.find(from, segment_of(from), phases[from], lag);
+          const ReferenceScan* const found = views.find(from, epoch_of(from), phases[from], lag);
           if (!is_reference) {
             REQUIRE(found == nullptr);
           } else if (scan - other <= 12) {
@@ -526,16 +533,16 @@ TEST_CASE("a reference is found by the scan it is asked from, until its image is
     points.push_back(newest, 0.0F, 0.0F);
     points.push_back(newest + 2.0F, 0.0F, 0.0F);
     points.grow(3 + detail::kPackWidth);
-    const detail::Sights& sights =
-        views.look(points, 3, Eigen::Isometry3d::Identity(), views.newest());
-    CHECK(sights.is_free(0));
-    CHECK_FALSE(sights.is_hit(0));
-    CHECK(sights.is_hit(1));
-    CHECK_FALSE(sights.is_free(1));
-    CHECK_FALSE(sights.is_hit(2));
-    CHECK_FALSE(sights.is_free(2));
+    const detail::Visibility& visibility =
+        views.test(points, 3, Eigen::Isometry3d::Identity(), views.newest());
+    CHECK(visibility.is_free(0));
+    CHECK_FALSE(visibility.is_hit(0));
+    CHECK(visibility.is_hit(1));
+    CHECK_FALSE(visibility.is_free(1));
+    CHECK_FALSE(visibility.is_hit(2));
+    CHECK_FALSE(visibility.is_free(2));
     views.forget();
-    CHECK(views.find(kScans - 1, 1, phases.back(), -static_cast<int>(phases.back().phase)) ==
+    CHECK(views.find(kScans - 1, 1, phases.back(), -static_cast<int>(phases.back().since_image)) ==
           nullptr);
   }
 }

@@ -64,8 +64,8 @@ Place place_of(std::uint32_t instance, const Point& p, float size) {
   };
   return {instance, cell(p[0]), cell(p[1]), cell(p[2])};
 }
-SupervoxelPlace packed(const Place& place) {
-  return pack_place(std::get<1>(place), std::get<2>(place), std::get<3>(place));
+VoxelKey packed(const Place& place) {
+  return voxel_key(std::get<1>(place), std::get<2>(place), std::get<3>(place));
 }
 
 // The samples of each supervoxel of each instance.

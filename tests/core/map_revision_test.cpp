@@ -9,14 +9,14 @@
 #include <vector>
 
 #include "dynains/dyna_ins_remover.hpp"
-#include "dynains/evidence/beam_test.hpp"
+#include "dynains/evidence/visibility.hpp"
 #include "dynains/remover.hpp"
 #include "dynains/static_map_accumulator.hpp"
 #include "support/catch.hpp"
 #include "support/counting_map.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
-#include "support/sights.hpp"
+#include "support/visibility.hpp"
 
 namespace dynains::test {
 namespace {
@@ -24,33 +24,33 @@ namespace {
 /// A scan to which all places look alike: free, hit, or nothing at all.
 class Eyes {
  public:
-  explicit Eyes(Sight sight) : sight_(sight) {}
-  const detail::Sights& operator()(const PointBuffer&, std::size_t count,
-                                   const Eigen::Isometry3d&) {
-    sights_ = sights_of(std::vector<Sight>(count, sight_));
-    return sights_;
+  explicit Eyes(BeamResult result) : result_(result) {}
+  const detail::Visibility& operator()(const PointBuffer&, std::size_t count,
+                                       const Eigen::Isometry3d&) {
+    visibility_ = visibility_of(std::vector<BeamResult>(count, result_));
+    return visibility_;
   }
 
  private:
-  Sight sight_;
-  detail::Sights sights_;
+  BeamResult result_;
+  detail::Visibility visibility_;
 };
 
 /// A scan that sees no more than the first points, and these free.
 class NarrowEyes {
  public:
   explicit NarrowEyes(std::size_t most) : most_(most) {}
-  const detail::Sights& operator()(const PointBuffer&, std::size_t count,
-                                   const Eigen::Isometry3d&) {
-    std::vector<Sight> seen(count, Sight::kNothing);
-    std::fill_n(seen.begin(), std::min(count, most_), Sight::kFree);
-    sights_ = sights_of(seen);
-    return sights_;
+  const detail::Visibility& operator()(const PointBuffer&, std::size_t count,
+                                       const Eigen::Isometry3d&) {
+    std::vector<BeamResult> seen(count, BeamResult::kUnknown);
+    std::fill_n(seen.begin(), std::min(count, most_), BeamResult::kFree);
+    visibility_ = visibility_of(seen);
+    return visibility_;
   }
 
  private:
   std::size_t most_;
-  detail::Sights sights_;
+  detail::Visibility visibility_;
 };
 
 PointBuffer three_points(float x) {
@@ -74,31 +74,31 @@ struct Watched {
     config.revision_period = 1;
     return config;
   }
-  void look(Sight sight, const Eigen::Vector3d& sensor = Eigen::Vector3d::Zero()) {
-    revision.revise(map, scan++, sensor, Eyes(sight));
+  void look(BeamResult result, const Eigen::Vector3d& sensor = Eigen::Vector3d::Zero()) {
+    revision.revise(map, scan++, sensor, Eyes(result));
   }
 };
 
 // log-odds of 0.7 is 0.847; wholly free counts twice: 1.69, then 3.39, over the 2.94 of 0.95.
 TEST_CASE("a block of the map is emptied by the second scan that sees it wholly free") {
   Watched watched;
-  watched.look(Sight::kFree);
+  watched.look(BeamResult::kFree);
   CHECK(watched.map.size() == 3);
-  watched.look(Sight::kFree);
+  watched.look(BeamResult::kFree);
   CHECK(watched.map.empty());
 }
 
 // The hit takes 1.70 away: 1.69, 0, 1.69, 3.39.
 TEST_CASE("a hit takes back what was seen free before, and no more than that") {
   Watched watched;
-  for (int i = 0; i < 50; ++i) watched.look(Sight::kHit);
-  watched.look(Sight::kFree);
-  watched.look(Sight::kHit);
-  watched.look(Sight::kFree);
+  for (int i = 0; i < 50; ++i) watched.look(BeamResult::kHit);
+  watched.look(BeamResult::kFree);
+  watched.look(BeamResult::kHit);
+  watched.look(BeamResult::kFree);
   CHECK(watched.map.size() == 3);
-  watched.look(Sight::kNothing);
+  watched.look(BeamResult::kUnknown);
   CHECK(watched.map.size() == 3);
-  watched.look(Sight::kFree);
+  watched.look(BeamResult::kFree);
   CHECK(watched.map.empty());
 }
 
@@ -136,14 +136,14 @@ TEST_CASE("tau_revise says how much it takes") {
   MapRevision::Config config = Watched::every_scan();
   config.tau_revise = 0.84;  // log-odds 1.66
   Watched sooner(config);
-  sooner.look(Sight::kFree);
+  sooner.look(BeamResult::kFree);
   CHECK(sooner.map.empty());
   config.tau_revise = 0.97;  // log-odds 3.48
   Watched later(config);
-  later.look(Sight::kFree);
-  later.look(Sight::kFree);
+  later.look(BeamResult::kFree);
+  later.look(BeamResult::kFree);
   CHECK(later.map.size() == 3);
-  later.look(Sight::kFree);
+  later.look(BeamResult::kFree);
   CHECK(later.map.empty());
 }
 
@@ -152,11 +152,11 @@ TEST_CASE("a block is looked at once in a period, and only within range") {
   config.revision_period = 5;
   config.tau_revise = 0.84;
   Watched watched(config);
-  for (int i = 0; i < 20; ++i) watched.look(Sight::kFree, {66.0, 0.0, 0.0});
+  for (int i = 0; i < 20; ++i) watched.look(BeamResult::kFree, {66.0, 0.0, 0.0});
   CHECK(watched.map.size() == 3);
   int looks = 0;
   while (!watched.map.empty() && looks < 6) {
-    watched.look(Sight::kFree, {64.0, 0.0, 0.0});
+    watched.look(BeamResult::kFree, {64.0, 0.0, 0.0});
     ++looks;
   }
   CHECK(watched.map.empty());
@@ -167,9 +167,9 @@ TEST_CASE("places that were emptied are filled again, with the memory of before"
   Watched watched;
   const std::size_t memory = watched.map.memory_bytes();
   for (int round = 0; round < 2000; ++round) {
-    watched.look(Sight::kFree);
+    watched.look(BeamResult::kFree);
     REQUIRE(watched.map.size() == 3);
-    watched.look(Sight::kFree);
+    watched.look(BeamResult::kFree);
     REQUIRE(watched.map.empty());
     watched.map.insert(three_points(5.1F), {}, Eigen::Isometry3d::Identity());
     REQUIRE(watched.map.size() == 3);
@@ -205,10 +205,11 @@ std::size_t points_of_van(const StaticMapAccumulator& map) {
   return count;
 }
 
-TEST_CASE("a van that leaves after the horizon leaves the map, too; verdicts stay as they were") {
+TEST_CASE(
+    "a van that leaves after lookahead_scans leaves the map, too; verdicts stay as they were") {
   const std::vector<Scan> scans = departure();
   DynaInsRemover::Config config;
-  config.evidence.horizon = 5;
+  config.evidence.lookahead_scans = 5;
   DynaInsRemover plain(config);
   config.revision.revise_map = true;
   DynaInsRemover revising(config);
@@ -224,7 +225,7 @@ TEST_CASE("a van that leaves after the horizon leaves the map, too; verdicts sta
 TEST_CASE("after a reset, a revised map comes out the same") {
   const std::vector<Scan> scans = departure();
   DynaInsRemover::Config config;
-  config.evidence.horizon = 5;
+  config.evidence.lookahead_scans = 5;
   config.revision.revise_map = true;
   DynaInsRemover remover(config);
   const auto points = [&] {

@@ -11,7 +11,7 @@
 #include "dynains/evidence/surrounding_ground.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
-#include "support/sights.hpp"
+#include "support/visibility.hpp"
 
 namespace dynains::test {
 namespace {
@@ -249,7 +249,7 @@ TEST_CASE("what stands on the ground may begin higher over it where beams are fa
 }
 
 // What a reference saw of the ground, by x.
-using Reference = std::function<Sight(float x)>;
+using Reference = std::function<BeamResult(float x)>;
 
 // Numbers of the ground points beside a removed box that go with it by what references saw.
 std::set<std::uint32_t> ground_seen_free(const PointBuffer& ground,
@@ -261,9 +261,9 @@ std::set<std::uint32_t> ground_seen_free(const PointBuffer& ground,
   moved.bound(ground, boxes);
   const auto ask = [&](const PointBuffer& points, std::size_t count, auto&& visit) {
     for (const Reference& reference : references) {
-      std::vector<Sight> seen;
+      std::vector<BeamResult> seen;
       for (std::size_t i = 0; i < count; ++i) seen.push_back(reference(points.x[i]));
-      visit(sights_of(seen));
+      visit(visibility_of(seen));
     }
   };
   std::set<std::uint32_t> found;
@@ -283,8 +283,8 @@ TEST_CASE("ground beside a removed box goes if two references saw it free and fe
   const std::set<std::uint32_t> near = {0, 1, 2, 6, 7}, far = {3, 4, 5};
   std::set<std::uint32_t> both = near;
   both.insert(far.begin(), far.end());
-  const Reference free = [](float) { return Sight::kFree; };
-  const Reference hit = [](float) { return Sight::kHit; };
+  const Reference free = [](float) { return BeamResult::kFree; };
+  const Reference hit = [](float) { return BeamResult::kHit; };
   CHECK(ground_seen_free(ground, {}).empty());
   CHECK(ground_seen_free(ground, {free}).empty());
   CHECK(ground_seen_free(ground, {free, free}) == both);
@@ -292,8 +292,12 @@ TEST_CASE("ground beside a removed box goes if two references saw it free and fe
   CHECK(ground_seen_free(ground, references) == both);  // 2 are more than 0.3 of 6 ...
   references.push_back(hit);
   CHECK(ground_seen_free(ground, references).empty());  // ... but not of 7
-  const Reference near_free = [](float x) { return x < 22.8F ? Sight::kFree : Sight::kNothing; };
-  const Reference far_free = [](float x) { return x < 22.8F ? Sight::kNothing : Sight::kFree; };
+  const Reference near_free = [](float x) {
+    return x < 22.8F ? BeamResult::kFree : BeamResult::kUnknown;
+  };
+  const Reference far_free = [](float x) {
+    return x < 22.8F ? BeamResult::kUnknown : BeamResult::kFree;
+  };
   CHECK(ground_seen_free(ground, {near_free, near_free}) == near);
   CHECK(ground_seen_free(ground, {far_free, near_free, far_free}) == far);
 }
@@ -306,7 +310,7 @@ TEST_CASE("where the ground around is not known, all of it goes from under a rem
   CHECK(ground_that_goes(config, ground).size() == ground.size());
 
   // Nobody is asked how the ground around lies.
-  config.ground_reach = 0.0;
+  config.ground_test_distance = 0.0;
   const PointBuffer street = street_about(20.0F, 0.0F, 5.0F, kNothing);
   CHECK(ground_that_goes(config, street).size() >= ground.size());
 }

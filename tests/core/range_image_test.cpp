@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "dynains/evidence/beam_test.hpp"
+#include "dynains/evidence/visibility.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 
@@ -305,11 +305,12 @@ TEST_CASE("what moved hides what is behind it, protects nothing and says nothing
     RangeImage image;
     RangeImage::Scratch scratch;
     image.build(grid, PointsView(), points, moving, 0.0F, scratch);
-    detail::Sights sights;
-    detail::test_beams(image, Eigen::Isometry3f::Identity(), samples, count, 0.25F, 0.01F, sights);
+    detail::Visibility visibility;
+    detail::test_visibility(image, Eigen::Isometry3f::Identity(), samples, count, 0.25F, 0.01F,
+                            visibility);
     std::string seen;
     for (std::size_t i = 0; i < count; ++i) {
-      seen += sights.is_free(i) ? 'F' : sights.is_hit(i) ? 'H' : '-';
+      seen += visibility.is_free(i) ? 'F' : visibility.is_hit(i) ? 'H' : '-';
     }
     return seen;
   };
@@ -317,16 +318,16 @@ TEST_CASE("what moved hides what is behind it, protects nothing and says nothing
   CHECK(look(board) == "F---FFFH");
 }
 
-TEST_CASE("bits of sights are counted over any range") {
+TEST_CASE("bits of visibility are counted over any range") {
   Random random(9);
   constexpr std::size_t kCount = 400;
-  detail::Sights sights;
-  sights.resize(kCount);
+  detail::Visibility visibility;
+  visibility.resize(kCount);
   for (std::size_t first = 0; first < kCount; first += detail::kPackWidth) {
     float values[detail::kPackWidth];
     for (float& value : values) value = random.uniform_float(-1.0, 1.0);
     const detail::Float8 random_values = detail::Float8::load(values);
-    const detail::Sights::Bytes bytes = sights.bytes();
+    const detail::Visibility::Bytes bytes = visibility.bytes();
     bytes.free[first / 8] =
         static_cast<std::uint8_t>((random_values > detail::Float8(0.5F)).bits());
     bytes.hit[first / 8] =
@@ -338,10 +339,10 @@ TEST_CASE("bits of sights are counted over any range") {
     std::uint32_t free = 0;
     std::uint32_t hit = 0;
     for (std::size_t i = begin; i < end; ++i) {
-      free += sights.is_free(i) ? 1 : 0;
-      hit += sights.is_hit(i) ? 1 : 0;
+      free += visibility.is_free(i) ? 1 : 0;
+      hit += visibility.is_hit(i) ? 1 : 0;
     }
-    const detail::Sights::Count counted = sights.count(begin, end);
+    const detail::Visibility::Count counted = visibility.count(begin, end);
     REQUIRE(counted.free == free);
     REQUIRE(counted.hit == hit);
   }
@@ -373,14 +374,14 @@ TEST_CASE(
   samples.resize(count + detail::kPackWidth);
   Eigen::Isometry3f T_reference_sample = Eigen::Isometry3f::Identity();
   T_reference_sample.translation().x() = -5.0F;
-  detail::Sights sights;
-  detail::test_beams(image, T_reference_sample, samples, count, 0.25F, 0.01F, sights);
+  detail::Visibility visibility;
+  detail::test_visibility(image, T_reference_sample, samples, count, 0.25F, 0.01F, visibility);
   const std::vector<int> free = {1, 0, 0, 0, 0, 1, 0, 0};
   const std::vector<int> hit = {0, 1, 1, 1, 0, 0, 0, 0};
   for (std::size_t i = 0; i < count; ++i) {
     INFO("sample " << i);
-    CHECK(sights.is_free(i) == (free[i] != 0));
-    CHECK(sights.is_hit(i) == (hit[i] != 0));
+    CHECK(visibility.is_free(i) == (free[i] != 0));
+    CHECK(visibility.is_hit(i) == (hit[i] != 0));
   }
 }
 

@@ -412,8 +412,8 @@ TEST_CASE("windows may decide later than the evidence, which then has no say") {
   config.decision = Decision::kWindow;
   const Run by_windows = run(config, scans);
   config.decision = Decision::kBoth;
-  config.evidence.horizon = 0;
-  config.evidence.memory = 0;
+  config.evidence.lookahead_scans = 0;
+  config.evidence.lookback_scans = 0;
   config.evidence.presume_dynamic = false;
   const Run with_evidence = run(config, scans);
   for (std::size_t s = 0; s < scans.size(); ++s) {
@@ -426,7 +426,7 @@ TEST_CASE("instance ids go from scan to scan, however soon a verdict is final") 
   const std::vector<Scan> scans = drive(oncoming(), 10, 5.0);
   Config config;
   const Run late = run(config, scans);
-  config.evidence.horizon = 0;
+  config.evidence.lookahead_scans = 0;
   const Run at_once = run(config, scans);
   for (std::size_t s = 0; s < scans.size(); ++s) {
     CHECK(at_once.newest[s].instances == late.newest[s].instances);

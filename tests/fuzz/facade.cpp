@@ -73,8 +73,8 @@ Config read_config(Stream& stream) {
     config.clusterer.voxel_elevation = std::max(config.clusterer.voxel_elevation, 1.0);
   }
   config.clusterer.cluster_range = std::min(config.clusterer.cluster_range, 120.0);
-  config.evidence.horizon = std::min(config.evidence.horizon, 12);
-  config.evidence.memory = std::min(config.evidence.memory, 20);
+  config.evidence.lookahead_scans = std::min(config.evidence.lookahead_scans, 12);
+  config.evidence.lookback_scans = std::min(config.evidence.lookback_scans, 20);
   return config;
 }
 

@@ -123,7 +123,7 @@ TEST_CASE("Config files are refused by line") {
   CHECK_THAT(message_of<IoError>([&] { read_config_file(folder / "none.cfg"); }),
              ContainsSubstring("none.cfg: cannot be read"));
   CHECK_THAT(message_of<IoError>([&] { read_config_file(folder.path()); }),
-             ContainsSubstring(": cannot be read: Is a directory; expected a config file"));
+             ContainsSubstring(": is a folder; expected a config file"));
   CHECK_THAT(message_of<IoError>([&] { read_config_file("/dev/zero"); }),
              StartsWith("/dev/zero: has more than 1048576 bytes; expected a config file"));
 }

@@ -41,12 +41,29 @@ std::vector<State> crash_states(const CrashModel& model) {
   return states;
 }
 
+/// Whether the test sees that a program which syncs nothing is wrong.
+bool needs_syncs(const Rehearsal& rehearsal) {
+  std::vector<shim::Entry> events = rehearsal.events();
+  events.erase(std::remove_if(events.begin(), events.end(),
+                              [](const shim::Entry& entry) {
+                                return entry.event == shim::Event::kSync ||
+                                       entry.event == shim::Event::kSyncAll;
+                              }),
+               events.end());
+  const CrashModel model(rehearsal.before(), events, rehearsal.root());
+  const std::vector<State> states = crash_states(model);
+  return std::any_of(states.begin(), states.end(),
+                     [&](const State& state) { return !rehearsal.problem(state.tree).empty(); });
+}
+
 void check(const Scenario& scenario) {
   Rehearsal rehearsal(scenario);
   const CrashModel model(rehearsal.before(), rehearsal.events(), rehearsal.root());
   // Else the shim missed a change.
   const Tree end = model.after({model.size(), NameLoss::kNothing, DataLoss::kNothing, 0});
   REQUIRE(difference(end, rehearsal.after()) == "");
+
+  CHECK(needs_syncs(rehearsal));
 
   const std::vector<State> states = crash_states(model);
   const std::size_t step = std::max<std::size_t>(1, states.size() / DYNAINS_CRASH_STATES);

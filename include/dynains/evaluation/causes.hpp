@@ -26,6 +26,6 @@ inline constexpr std::array<const char*, kCauseCount> kCauseNames = {"unknown",
                                                                      "presumed",
                                                                      "seen occupied",
                                                                      "seen free too little",
-                                                                     "in a passage"};
+                                                                     "dynamic occupancy"};
 
 }  // namespace dynains::evaluation

@@ -1,4 +1,4 @@
-// How what scans saw of a place adds up to a belief that it was free.
+// Log-odds that a place was free.
 #pragma once
 
 #include <algorithm>
@@ -7,25 +7,25 @@
 
 namespace dynains::detail {
 
-/// Steps of a log-odds sum (Eq. 15) in three sizes (the form of Eq. 18), by the share of what a
-/// scan saw of a place that it saw free; never below zero (Page's test), so that a place which was
-/// hit for long may still be left.
+/// Increments of the log-odds that a place was free (Eq. 15), by the ratio of free to visible
+/// samples of the place in one scan (three sizes, as in Eq. 18). The sum is never below zero
+/// (Page's test), so that a place which was hit for long may still become free.
 class FreeSpaceSum {
  public:
-  static constexpr float kFreeShare = 0.6F;  ///< from which a scan speaks for free space
-  static constexpr float kHitShare = 0.3F;   ///< up to which a place counts as hit
+  static constexpr float kFreeRatio = 0.6F;  ///< from which the place counts as free
+  static constexpr float kHitRatio = 0.3F;   ///< up to which the place counts as hit
 
-  /// Update probabilities of a scan that sees through and of one that hits.
+  /// `p_free`, `p_hit`: update probabilities of a scan that finds the place free, or hits it.
   FreeSpaceSum(double p_free, double p_hit)
       : increment_(static_cast<float>(log_odds(p_free))),
         decrement_(static_cast<float>(log_odds(p_hit))) {}
 
   float increment() const { return increment_; }
 
-  /// For a share of at least kFreeShare.
-  void raise(float& level, float share) const {
+  /// `free_ratio`: at least kFreeRatio.
+  void raise(float& level, float free_ratio) const {
     constexpr float kWhollyFree = 0.9F;  // counts twice
-    level += (share > kWhollyFree ? 2.0F : 1.0F) * increment_;
+    level += (free_ratio > kWhollyFree ? 2.0F : 1.0F) * increment_;
   }
   void lower(float& level) const { level = std::max(0.0F, level + decrement_); }
 

@@ -1,4 +1,4 @@
-// Which ground points lie below or beside removed points.
+// Finds the ground points below or beside removed points.
 #pragma once
 
 #include <algorithm>
@@ -16,14 +16,14 @@
 
 namespace dynains {
 
-/// How far what stands on the ground may begin over it: `least` (m), and `slope` (m per metre of
-/// horizontal range) where the beams of a sensor are wider apart.
+/// Largest height above the ground at which the lowest return of an object on it may lie: `least`
+/// (m), or `slope` (m per m of horizontal range), which follows the gap between beams.
 struct Clearance {
   float least;
   float slope;
 };
 
-/// Where in the grids of a footprint some points lie: their first and last columns and rows.
+/// First and last columns and rows of some points in the two grids of a footprint.
 struct GroundBox {
   struct Range {
     std::uint16_t first, last;
@@ -32,11 +32,11 @@ struct GroundBox {
   Range tile_columns, tile_rows;
 };
 
-/// Horizontal grid around the sensor that remembers where points were removed and how low, and a
-/// coarse one beside it that tells quickly which points are near them.
+/// Horizontal grid around the sensor with the lowest removed point per cell, and a coarse grid that
+/// finds the points near removed points.
 class GroundFootprint {
  public:
-  /// Points that are looked at together, a bit each.
+  /// Number of points that are processed together, one bit each.
   static constexpr std::size_t kBlock = 64;
 
   /// The block of `points` that begins at a point; the last one may be shorter.
@@ -44,26 +44,26 @@ class GroundFootprint {
     return points.subview(begin, std::min(kBlock, points.size() - begin));
   }
 
-  /// `cell`: m, points reach into the cells around theirs; `reach`: m, the same for what counts as
-  /// near; `max_range`: m, points beyond are not remembered.
-  GroundFootprint(double cell, double reach, double max_range)
+  /// `cell` (m): a removed point affects its cell and the eight around. `near` (m): likewise in the
+  /// coarse grid. `max_range` (m): points beyond are ignored.
+  GroundFootprint(double cell, double near, double max_range)
       : cell_(static_cast<float>(cell)),
         fine_(cell, max_range),
-        coarse_(reach, max_range),
+        coarse_(near, max_range),
         tile_of_(tile_count(fine_.width()), 0),
         tiles_(1),
         near_(coarse_.cell_count(), 0) {
-    tiles_.reserve(tile_of_.size() + 1);  // takes address space only
+    tiles_.reserve(tile_of_.size() + 1);  // reserves address space only
     used_.reserve(tile_of_.size());
   }
 
-  /// Remembers a removed point; seen after spread().
+  /// Adds a removed point (m); takes effect at spread().
   void add(float x, float y, float z) {
     const Place place = fine_.place(x, y);
     if (place.inside) add_to(tile(place), within(place), z);
   }
 
-  /// Remembers those points of a block whose bits are set.
+  /// Adds the points of a block whose bits are set.
   void add(PointsView block, std::uint64_t which) {
     const Located located = locate(block);
     detail::for_each_bit(which & located.inside, [&](std::size_t i) {
@@ -72,7 +72,7 @@ class GroundFootprint {
     });
   }
 
-  /// Lets what was added reach into the cells around.
+  /// Writes the added points to the cells around them.
   void spread() {
     for (const Touched& touched : touched_) {
       const Place place = place_of(touched);
@@ -84,7 +84,7 @@ class GroundFootprint {
       const Place near =
           coarse_.place(fine_.centre(place.column) * cell_, fine_.centre(place.row) * cell_);
       if (!near.inside) continue;
-      // Many cells lie in one of the coarse grid.
+      // A coarse cell contains many fine ones.
       std::uint8_t& centre = near_[near.row * coarse_.width() + near.column];
       if (centre == kHolds) continue;
       for_around(near, [&](const Place& around) {
@@ -94,7 +94,7 @@ class GroundFootprint {
     }
   }
 
-  /// Where every 64 points lie, to be found once for all calls of visit_near().
+  /// Boxes of every 64 points, for visit_near().
   void bound(PointsView points, std::vector<GroundBox>& boxes) const {
     const std::size_t count = (points.size() + kBlock - 1) / kBlock;
     detail::ensure_capacity(boxes, count);
@@ -119,25 +119,26 @@ class GroundFootprint {
     });
   }
 
-  /// Calls `visit(begin, near, under)` for up to 64 points from `begin` on at a time, a bit each:
-  /// those near a removed point (and some at the border of the grid), and which of these lie under
-  /// one, less than `clearance` below the lowest that was removed about there. `boxes`: of
-  /// bound().
+  /// Calls `visit(begin, near, under)` for blocks of up to 64 points from `begin` on, with bits of
+  /// the points near a removed point (and of some at the border of the grid), and of those that lie
+  /// under one: less than `clearance` below the lowest removed point of the cells around. `boxes`:
+  /// of bound().
   template <class Visitor>
   void visit_near(PointsView points, Span<const GroundBox> boxes, const Clearance& clearance,
                   Visitor&& visit) const {
     for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
-      const Share share = share_near(boxes[begin / kBlock]);
-      if (share == Share::kNone) continue;
+      const Nearness nearness = nearness_of(boxes[begin / kBlock]);
+      if (nearness == Nearness::kNone) continue;
       const PointsView block = block_of(points, begin);
-      const std::uint64_t near =
-          share == Share::kAll ? ~std::uint64_t{0} >> (kBlock - block.size()) : find_near(block);
+      const std::uint64_t near = nearness == Nearness::kAll
+                                     ? ~std::uint64_t{0} >> (kBlock - block.size())
+                                     : find_near(block);
       if (near == 0) continue;
       visit(begin, near, holds(boxes[begin / kBlock]) ? near & find_under(block, clearance) : 0);
     }
   }
 
-  /// Marks the cells of those points of a block whose bits are set: they lie under removed ones.
+  /// Marks the cells of the points of a block whose bits are set; all lie under removed points.
   void mark(PointsView block, std::uint64_t which) {
     const Located located = locate(block);
     detail::for_each_bit(which, [&](std::size_t i) {
@@ -146,7 +147,7 @@ class GroundFootprint {
           .marked = true;
     });
   }
-  /// Which of these points lie in marked cells.
+  /// Bits of those points that lie in marked cells.
   std::uint64_t find_marked(PointsView block, std::uint64_t which) const {
     const Located located = locate(block);
     std::uint64_t marked = 0;
@@ -157,7 +158,7 @@ class GroundFootprint {
 
   bool empty() const { return touched_.empty(); }
 
-  /// Forgets all points.
+  /// Removes all points.
   void clear() {
     for (const std::uint32_t tile : used_) tile_of_[tile] = 0;
     used_.clear();
@@ -170,9 +171,9 @@ class GroundFootprint {
   static constexpr int kTileShift = 3;
   static constexpr std::uint32_t kTile = 1U << kTileShift;  // cells along a side
 
-  enum class Share { kNone, kSome, kAll };
+  enum class Nearness { kNone, kSome, kAll };
 
-  // Of a coarse cell: a removed point is in it or in one beside it; in itself, too.
+  // State of a coarse cell: a removed point is in it or in a cell beside it; or in the cell itself.
   static constexpr std::uint8_t kNear = 1;
   static constexpr std::uint8_t kHolds = 3;
 
@@ -188,7 +189,7 @@ class GroundFootprint {
   struct Touched {
     std::uint32_t tile, cell;
   };
-  // Few tiles are in use at a time, so that they stay in the nearest cache; tile 0 is empty.
+  // Few tiles are in use at a time and fit into the first cache; tile 0 is empty.
   using Tile = std::array<Cell, std::size_t{kTile} * kTile>;
 
   static std::size_t tile_count(std::uint32_t width) {
@@ -196,7 +197,7 @@ class GroundFootprint {
     return side * side;
   }
 
-  // Square cells about the sensor, within a border of cells that only their neighbours reach.
+  // Square cells around the sensor, within a border of cells without points of their own.
   class Grid {
    public:
     Grid(double cell, double max_range)
@@ -213,7 +214,7 @@ class GroundFootprint {
       if (!(column >= 1.0F && column < last && row >= 1.0F && row < last)) return {0, 0, false};
       return {static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row), true};
     }
-    /// Rows or columns of eight points; what lies outside falls into the border.
+    /// Rows or columns of some points; points outside the grid fall into the border.
     template <class Float>
     auto line(const Float& coordinate) const {
       static constexpr detail::PackConstant kZero(0.0F);
@@ -222,7 +223,7 @@ class GroundFootprint {
       const Float per_metre = detail::PackConstant(per_metre_);
       return truncate(min(max(coordinate * per_metre + centre, Float(kZero)), last));
     }
-    /// The same of one point.
+    /// Row or column of one point.
     std::size_t index(float coordinate) const {
       const float place = coordinate * per_metre_ + static_cast<float>(half_);
       return static_cast<std::size_t>(
@@ -235,7 +236,7 @@ class GroundFootprint {
       const Float cells(detail::PackConstant(static_cast<float>(width())));
       return truncate(to_float(line(y)) * cells + to_float(line(x)));
     }
-    /// Of a row or column, in cells from the sensor.
+    /// Centre of a row or column, in cells from the sensor.
     float centre(std::uint32_t index) const {
       return (static_cast<float>(index) + 0.5F) - static_cast<float>(half_);
     }
@@ -263,8 +264,8 @@ class GroundFootprint {
             range(fine_, x_min, x_max, kTile), range(fine_, y_min, y_max, kTile)};
   }
 
-  // What is near of all places within: rows of the coarse grid, a few cells long.
-  Share share_near(const GroundBox& box) const {
+  // Whether all, some or none of the coarse cells of a box are near a removed point.
+  Nearness nearness_of(const GroundBox& box) const {
     unsigned some = 0;
     unsigned all = kNear;
     for (std::size_t row = box.coarse_rows.first; row <= box.coarse_rows.last; ++row) {
@@ -274,10 +275,10 @@ class GroundFootprint {
         all &= cells[i];
       }
     }
-    return some == 0 ? Share::kNone : all != 0 ? Share::kAll : Share::kSome;
+    return some == 0 ? Nearness::kNone : all != 0 ? Nearness::kAll : Nearness::kSome;
   }
 
-  // Which points of a block are near.
+  // Bits of the points of a block that are near a removed point.
   std::uint64_t find_near(PointsView block) const {
     std::int32_t cell[kBlock];
     detail::for_packs(block.size(), [&](auto at) {
@@ -290,7 +291,7 @@ class GroundFootprint {
     return near;
   }
 
-  // Whether some cell within may hold anything.
+  // Whether some tile of a box is in use.
   bool holds(const GroundBox& box) const {
     for (std::size_t row = box.tile_rows.first; row <= box.tile_rows.last; ++row) {
       const std::uint32_t* const tiles = &tile_of_[row * tiles_along_side()];
@@ -301,7 +302,7 @@ class GroundFootprint {
     return false;
   }
 
-  // Tiles and cells of the points of a block, and which of them are inside, a bit each.
+  // Tiles and cells of the points of a block, and bits of the points inside the grid.
   struct Located {
     std::array<std::int32_t, kBlock> tile, cell;
     std::uint64_t inside;
@@ -325,7 +326,7 @@ class GroundFootprint {
     return located;
   }
 
-  // Which points of a block lie under something removed.
+  // Bits of the points of a block that lie under a removed point.
   std::uint64_t find_under(PointsView block, const Clearance& clearance) const {
     const Located located = locate(block);
     float top[kBlock];
@@ -362,7 +363,7 @@ class GroundFootprint {
     cell.own = std::min(cell.own, z);
     if (is_first && cell.own < kNothing) touched_.push_back({tile, within});
   }
-  // Of a located point; an empty one where its tile is not in use.
+  // The cell of a located point; an empty one if its tile is not in use.
   const Cell& cell_of(const Located& located, std::size_t i) const {
     return tiles_[tile_of_[static_cast<std::size_t>(located.tile[i])]]
                  [static_cast<std::size_t>(located.cell[i])];
@@ -381,11 +382,11 @@ class GroundFootprint {
   float cell_;
   Grid fine_;
   Grid coarse_;
-  std::vector<std::uint32_t> tile_of_;  // row-major; 0 where nothing is near
-  std::vector<std::uint32_t> used_;     // what is not 0 there
+  std::vector<std::uint32_t> tile_of_;  // row-major: index into `tiles_`, or 0
+  std::vector<std::uint32_t> used_;     // non-zero entries of it
   std::vector<Tile> tiles_;
   std::vector<std::uint8_t> near_;  // by coarse cell
-  std::vector<Touched> touched_;    // cells of points, each once
+  std::vector<Touched> touched_;    // cells with points, each once
 };
 
 }  // namespace dynains

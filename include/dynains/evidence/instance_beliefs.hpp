@@ -1,4 +1,4 @@
-// What references say of the instances of one scan, as belief per supervoxel and per instance.
+// Free-space beliefs of the supervoxels and the instances of one scan.
 #pragma once
 
 #include <algorithm>
@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "dynains/belief_updater.hpp"
-#include "dynains/evidence/beam_test.hpp"
 #include "dynains/evidence/free_space_sum.hpp"
 #include "dynains/evidence/instance_samples.hpp"
+#include "dynains/evidence/visibility.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/capacity.hpp"
 #include "dynains/simd/wide_lanes.hpp"
@@ -19,66 +19,66 @@ namespace dynains {
 
 /// Beliefs on the samples of one scan.
 struct InstanceBeliefs {
-  /// That a place was free: a log-odds sum that starts again whenever it falls to zero (Page's test
-  /// for a change, 1954). A place that is hit for long and then seen free has changed, and hits
-  /// never cancel what was seen free; yet thin things, which single beams miss, are hit too often
-  /// in between for the sum to grow.
+  /// Log-odds that a place was free, a sum that is never below zero (Page's test for a change,
+  /// 1954). A place that is hit for long and then free has changed: early hits do not cancel later
+  /// free space. Thin objects, which some beams miss, are hit too often for the sum to grow.
   struct Belief {
-    float level = 0.0F;          ///< of the references summed up now; never negative
-    float peak = 0.0F;           ///< the highest it was
-    std::uint8_t contested = 0;  ///< whether some reference hit any of the place
-    std::uint8_t occupied = 0;   ///< whether some reference hit enough of it to say what it was
-    std::uint8_t hit_again = 0;  ///< whether one hit it beyond others that had seen it free
+    float level = 0.0F;          ///< sum over the references of one side of time, >= 0
+    float peak = 0.0F;           ///< maximum of `level`
+    std::uint8_t contested = 0;  ///< some reference hit the place
+    std::uint8_t occupied = 0;   ///< some reference hit enough of its samples
+    std::uint8_t hit_again = 0;  ///< some reference hit it while `level` > 0
   };
-  /// Samples of an instance.
-  struct Share {
+  /// Numbers of samples of an instance.
+  struct Counts {
     std::uint32_t total = 0;
-    std::uint32_t moved = 0;    ///< in supervoxels that were free
-    std::uint32_t decided = 0;  ///< in supervoxels of which anything is known
+    std::uint32_t moved = 0;    ///< in free supervoxels
+    std::uint32_t decided = 0;  ///< in free or occupied supervoxels
   };
 
   std::vector<Belief> supervoxels;
-  std::vector<Belief> wholes;         ///< by instance, of all its samples together
-  std::vector<Share> shares;          ///< by instance
-  std::vector<std::uint64_t> open;    ///< by sample, a bit: whether a hit may change its belief
-  std::vector<std::uint8_t> changed;  ///< by instance: whether any of this did; for the caller
+  std::vector<Belief> wholes;         ///< by instance, for all its samples together
+  std::vector<Counts> counts;         ///< by instance
+  std::vector<std::uint64_t> open;    ///< bit by sample: a hit may change its belief
+  std::vector<std::uint8_t> changed;  ///< by instance: some belief changed; reset by the caller
 };
 
-/// Takes in what references see, and says what follows from it.
+/// Updates beliefs by the visibility from references, and derives decisions from them.
 class InstanceBeliefUpdater {
  public:
   using Belief = InstanceBeliefs::Belief;
-  using Share = InstanceBeliefs::Share;
+  using Counts = InstanceBeliefs::Counts;
 
-  static constexpr float kLeastKnown = 0.3F;  ///< share of an instance, to say that it stands still
+  static constexpr float kLeastKnown =
+      0.3F;  ///< ratio of decided to all samples of a still instance
 
   explicit InstanceBeliefUpdater(const FreeSpaceConfig& config)
-      : see_share_(static_cast<float>(config.see_share)),
-        remove_share_(static_cast<float>(config.remove_share)),
+      : pass_ratio_(static_cast<float>(config.pass_ratio)),
+        removal_ratio_(static_cast<float>(config.removal_ratio)),
         sum_(config.p_free, config.p_hit),
         free_level_(static_cast<float>(log_odds(config.tau_free))),
         contested_level_(static_cast<float>(log_odds(config.tau_contested))),
         whole_level_(static_cast<float>(log_odds(config.tau_whole))) {}
 
-  /// Log-odds of one observation of free space.
+  /// Log-odds increment of one observation of free space.
   float increment() const { return sum_.increment(); }
-  /// Log-odds from which a place that no reference hit was free.
+  /// Log-odds from which a place without hits was free.
   float free_level() const { return free_level_; }
 
-  /// Nothing is known yet.
+  /// Resets the beliefs for the samples of a new scan.
   void begin(const InstanceSamples& samples, InstanceBeliefs& out) const {
     const std::size_t instances = samples.instance_count();
     out.supervoxels.assign(samples.supervoxel_count(), Belief());
     out.wholes.assign(instances, Belief());
     out.changed.assign(instances, 1);
-    out.shares.resize(instances);
+    out.counts.resize(instances);
     for (std::size_t instance = 0; instance < instances; ++instance) {
-      out.shares[instance] = {samples.count(instance), 0, 0};
+      out.counts[instance] = {samples.count(instance), 0, 0};
     }
     out.open.assign(samples.size() / 64 + 1, ~std::uint64_t{0});
   }
 
-  /// What follows is summed apart from what was before.
+  /// Starts the sums of the references on the other side of time.
   void begin_other_side(const InstanceSamples& samples, InstanceBeliefs& beliefs) const {
     for (std::uint32_t s = 0; s < beliefs.supervoxels.size(); ++s) {
       Belief& belief = beliefs.supervoxels[s];
@@ -88,15 +88,15 @@ class InstanceBeliefUpdater {
     for (Belief& belief : beliefs.wholes) belief.level = 0.0F;
   }
 
-  /// Takes in what one reference saw of the samples. Calls `on_hit(instance)` for those of which
-  /// enough was seen, and nearly all of it still there.
+  /// Adds the visibility of the samples from one reference. Calls `on_hit(instance)` for each
+  /// instance with enough visible samples, nearly all of which are hit.
   template <class OnHit>
-  void update(const InstanceSamples& samples, const detail::Sights& sights,
+  void update(const InstanceSamples& samples, const detail::Visibility& visibility,
               InstanceBeliefs& beliefs, OnHit&& on_hit) {
-    // Processors with wide lanes find and count bits by one instruction.
+    // Wide packs imply instructions that find and count bits.
     detail::run_packs([&](auto) {
-      update_supervoxels(samples, sights, beliefs);
-      update_wholes(samples, sights, beliefs, on_hit);
+      update_supervoxels(samples, visibility, beliefs);
+      update_wholes(samples, visibility, beliefs, on_hit);
     });
   }
 
@@ -104,13 +104,12 @@ class InstanceBeliefUpdater {
     return belief.peak >= (belief.contested != 0 ? contested_level_ : free_level_);
   }
 
-  /// Whether an instance was seen through as a whole, or enough of what is known of it was free. If
-  /// less than half of that was, and some was hit again, enough of its lower half must be, too,
-  /// unless little is known of that: beams pass the windows of what stands there at some angles,
-  /// but not what carries them.
+  /// Whether beams passed an instance as a whole, or enough of its decided samples were free. If
+  /// fewer than half of these were free, and some were hit afterwards, enough of its lower half
+  /// must be free, too, if that is known: beams pass the windows of a parked car, but not its body.
   bool removes_whole(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
                      std::size_t instance) const {
-    const Share& share = beliefs.shares[instance];
+    const Counts& share = beliefs.counts[instance];
     const Belief& whole = beliefs.wholes[instance];
     const bool seen_through = whole.peak >= (whole.contested != 0 ? whole_level_ : free_level_);
     if (!seen_through && !is_enough(share)) return false;
@@ -118,24 +117,24 @@ class InstanceBeliefUpdater {
     const bool hit_again =
         seen_through ? whole.hit_again != 0 : was_hit_again(samples, beliefs, instance);
     if (!hit_again) return true;
-    const Share lower_half = share_of_lower_half(samples, beliefs, instance);
+    const Counts lower_half = counts_of_lower_half(samples, beliefs, instance);
     return lower_half.decided < kLeastBody || is_enough(lower_half);
   }
 
  private:
-  static constexpr float kLeastView = 0.25F;       // share of an instance that a reference must see
-  static constexpr float kLeastFree = 0.15F;       // share of a supervoxel that must be seen free
-  static constexpr std::uint32_t kLeastBody = 12;  // known samples of what could carry windows
-  static constexpr float kContradictingHits = 0.85F;  // of what is seen of an instance
-  // Two samples of a supervoxel must be hit, and one of so many, for it to be occupied.
+  static constexpr float kLeastView = 0.25F;          // ratio of visible samples of an instance
+  static constexpr float kLeastFree = 0.15F;          // ratio of free samples of a supervoxel
+  static constexpr std::uint32_t kLeastBody = 12;     // decided samples of the lower half
+  static constexpr float kContradictingHits = 0.85F;  // ratio to visible samples of an instance
+  // A supervoxel is occupied if two of its samples are hit, and one of so many.
   static constexpr std::uint32_t kLeastHit = 4;
 
-  bool is_enough(const Share& share) const {
+  bool is_enough(const Counts& share) const {
     return share.moved > 0 &&
-           static_cast<float>(share.moved) >= remove_share_ * static_cast<float>(share.decided);
+           static_cast<float>(share.moved) >= removal_ratio_ * static_cast<float>(share.decided);
   }
 
-  // Whether any supervoxel of an instance was hit again that counts as free.
+  // Whether any free supervoxel of an instance was hit afterwards.
   bool was_hit_again(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
                      std::size_t instance) const {
     const auto* const all = beliefs.supervoxels.data();
@@ -144,22 +143,22 @@ class InstanceBeliefUpdater {
         [&](const Belief& belief) { return belief.hit_again != 0 && is_free(belief); });
   }
 
-  // Of the supervoxels that lie in the lower half of the layers of an instance.
-  Share share_of_lower_half(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
-                            std::size_t instance) const {
+  // Counts of the supervoxels in the lower half of the layers of an instance.
+  Counts counts_of_lower_half(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
+                              std::size_t instance) const {
     const std::uint32_t begin = samples.supervoxel_begin[instance];
     const std::uint32_t end = samples.supervoxel_begin[instance + 1];
-    std::int32_t lowest = layer_of(samples.place[begin]);
-    std::int32_t highest = lowest;
+    std::int64_t lowest = voxel_index(samples.place[begin], 2);
+    std::int64_t highest = lowest;
     for (std::uint32_t s = begin; s < end; ++s) {
-      lowest = std::min(lowest, layer_of(samples.place[s]));
-      highest = std::max(highest, layer_of(samples.place[s]));
+      lowest = std::min(lowest, voxel_index(samples.place[s], 2));
+      highest = std::max(highest, voxel_index(samples.place[s], 2));
     }
-    Share sum;
+    Counts sum;
     for (std::uint32_t s = begin; s < end; ++s) {
-      if (2 * layer_of(samples.place[s]) > lowest + highest) continue;
-      const Share share =
-          share_of(beliefs.supervoxels[s], samples.sample_begin[s + 1] - samples.sample_begin[s]);
+      if (2 * voxel_index(samples.place[s], 2) > lowest + highest) continue;
+      const Counts share =
+          counts_of(beliefs.supervoxels[s], samples.sample_begin[s + 1] - samples.sample_begin[s]);
       sum.total += share.total;
       sum.moved += share.moved;
       sum.decided += share.decided;
@@ -167,25 +166,25 @@ class InstanceBeliefUpdater {
     return sum;
   }
 
-  // Of one supervoxel, with so many samples.
-  Share share_of(const Belief& belief, std::uint32_t samples) const {
+  // Counts of one supervoxel with `samples` samples.
+  Counts counts_of(const Belief& belief, std::uint32_t samples) const {
     const bool free = is_free(belief);
     return {samples, free ? samples : 0, free || belief.occupied != 0 ? samples : 0};
   }
 
-  // What the reference saw may change supervoxels of which something was seen free, or was hit
-  // while they are open: few, once a scan has met some references. All are asked for before the
-  // first is needed: what is known of an older scan lies far away by now.
-  void update_supervoxels(const InstanceSamples& samples, const detail::Sights& sights,
+  // Only supervoxels with a free sample, or with a hit while they are open, may change: few, after
+  // some references. All are prefetched before the first is used, since beliefs of older scans are
+  // not in the cache.
+  void update_supervoxels(const InstanceSamples& samples, const detail::Visibility& visibility,
                           InstanceBeliefs& beliefs) {
-    const std::size_t count = find_touched(samples, sights, beliefs);
+    const std::size_t count = find_touched(samples, visibility, beliefs);
     for (std::size_t i = 0; i < count; ++i) {
-      update_supervoxel(samples, sights, touched_[i], beliefs);
+      update_supervoxel(samples, visibility, touched_[i], beliefs);
     }
   }
 
-  // Leaves their numbers in `touched_`, in order, and returns how many there are.
-  std::size_t find_touched(const InstanceSamples& samples, const detail::Sights& sights,
+  // Lists them in `touched_`, in order, and returns their number.
+  std::size_t find_touched(const InstanceSamples& samples, const detail::Visibility& visibility,
                            const InstanceBeliefs& beliefs) {
     constexpr std::size_t kBits = 64;
     detail::grow(touched_, samples.supervoxel_count() + 1);
@@ -193,7 +192,7 @@ class InstanceBeliefUpdater {
     std::uint32_t last = kNoCluster;
     for (std::size_t begin = 0; begin < samples.size(); begin += kBits) {
       std::uint64_t seen =
-          sights.free_word(begin) | (sights.hit_word(begin) & beliefs.open[begin / kBits]);
+          visibility.free_word(begin) | (visibility.hit_word(begin) & beliefs.open[begin / kBits]);
       const std::size_t left = samples.size() - begin;
       if (left < kBits) seen &= (std::uint64_t{1} << left) - 1;
       detail::for_each_bit(seen, [&](std::size_t i) {
@@ -209,53 +208,53 @@ class InstanceBeliefUpdater {
     return count;
   }
 
-  void update_supervoxel(const InstanceSamples& samples, const detail::Sights& sights,
+  void update_supervoxel(const InstanceSamples& samples, const detail::Visibility& visibility,
                          std::uint32_t s, InstanceBeliefs& beliefs) const {
     const std::uint32_t begin = samples.sample_begin[s];
     const std::uint32_t end = samples.sample_begin[s + 1];
     Belief& belief = beliefs.supervoxels[s];
     const bool was_open = is_open(belief);
-    const Share before = share_of(belief, end - begin);
-    const bool changed = update(belief, sights.count(begin, end), end - begin);
+    const Counts before = counts_of(belief, end - begin);
+    const bool changed = update(belief, visibility.count(begin, end), end - begin);
     if (is_open(belief) != was_open) flip_open(samples, s, beliefs);
     if (!changed) return;
     const std::uint32_t instance = samples.instance_of[s];
-    Share& share = beliefs.shares[instance];
-    const Share now = share_of(belief, end - begin);
+    Counts& share = beliefs.counts[instance];
+    const Counts now = counts_of(belief, end - begin);
     share.moved += now.moved - before.moved;
     share.decided += now.decided - before.decided;
     beliefs.changed[instance] = 1;
   }
 
-  // Whether hits may change it: what was occupied before and is not seen free stays as it is.
+  // Whether hits may change it: not if it is occupied and its level is zero.
   static bool is_open(const Belief& belief) { return belief.occupied == 0 || belief.level > 0.0F; }
   static void flip_open(const InstanceSamples& samples, std::uint32_t s, InstanceBeliefs& beliefs) {
     std::uint32_t begin = samples.sample_begin[s];
     const std::uint32_t end = samples.sample_begin[s + 1];
     while (begin < end) {
-      const std::uint32_t last = std::min(end - 1, begin | 63U);  // in this word
+      const std::uint32_t last = std::min(end - 1, begin | 63U);  // in the same word
       beliefs.open[begin / 64] ^= ~std::uint64_t{0} >> (63 - (last - begin)) << begin % 64;
       begin = last + 1;
     }
   }
 
-  // Whether the reference saw through whole instances.
+  // Updates the beliefs on whole instances.
   template <class OnHit>
-  void update_wholes(const InstanceSamples& samples, const detail::Sights& sights,
+  void update_wholes(const InstanceSamples& samples, const detail::Visibility& visibility,
                      InstanceBeliefs& beliefs, OnHit&& on_hit) const {
     std::uint32_t end = 0;
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
       const std::uint32_t begin = end;
-      end += beliefs.shares[instance].total;
-      const detail::Sights::Count all = sights.count(begin, end);
+      end += beliefs.counts[instance].total;
+      const detail::Visibility::Count all = visibility.count(begin, end);
       const auto count = static_cast<float>(end - begin);
       const auto seen = static_cast<float>(all.free + all.hit);
       if (seen < std::max(2.0F, kLeastView * count)) continue;
       const float share = static_cast<float>(all.free) / seen;
-      if (share >= see_share_) {
+      if (share >= pass_ratio_) {
         raise(beliefs.wholes[instance], share);
         beliefs.changed[instance] = 1;
-      } else if (share <= detail::FreeSpaceSum::kHitShare) {
+      } else if (share <= detail::FreeSpaceSum::kHitRatio) {
         lower(beliefs.wholes[instance]);
         beliefs.changed[instance] = 1;
         const auto hits = static_cast<float>(all.hit);
@@ -264,19 +263,19 @@ class InstanceBeliefUpdater {
     }
   }
 
-  // For something that was seen. Eq. 15 with three-way increments as in Eq. 18, by the share of
-  // samples seen free; shares that say little, and few samples seen free, change nothing. A single
-  // hit contests what others see free, but does not say that something stands there. Returns
-  // whether anything changed that verdicts look at.
-  bool update(Belief& belief, detail::Sights::Count seen, std::uint32_t samples) const {
+  // Eq. 15 with three increments as in Eq. 18, by the ratio of free to visible samples; at least
+  // one sample is visible. Ratios between the limits, and few free samples, change nothing. A
+  // single hit contests free space, but does not make the place occupied. Returns whether a verdict
+  // may change.
+  bool update(Belief& belief, detail::Visibility::Count seen, std::uint32_t samples) const {
     const auto free = static_cast<float>(seen.free);
     const float share = free / static_cast<float>(seen.free + seen.hit);
     if (free >= kLeastFree * static_cast<float>(samples) &&
-        share >= detail::FreeSpaceSum::kFreeShare) {
+        share >= detail::FreeSpaceSum::kFreeRatio) {
       raise(belief, share);
       return true;
     }
-    if (seen.hit == 0 || share > detail::FreeSpaceSum::kHitShare) return false;
+    if (seen.hit == 0 || share > detail::FreeSpaceSum::kHitRatio) return false;
     const Belief before = belief;
     lower(belief);
     if (seen.hit >= std::max(std::min(2U, samples), (samples + kLeastHit - 1) / kLeastHit)) {
@@ -296,13 +295,13 @@ class InstanceBeliefUpdater {
     sum_.lower(belief.level);
   }
 
-  float see_share_;
-  float remove_share_;
+  float pass_ratio_;
+  float removal_ratio_;
   detail::FreeSpaceSum sum_;
   float free_level_;
   float contested_level_;
   float whole_level_;
-  std::vector<std::uint32_t> touched_;  // supervoxels of which a reference saw something
+  std::vector<std::uint32_t> touched_;  // supervoxels that a reference may change
 };
 
 }  // namespace dynains

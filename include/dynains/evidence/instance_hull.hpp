@@ -1,4 +1,4 @@
-// The ground that an instance covers, also where no beam reached its far side.
+// The ground area that an instance covers, including parts without returns.
 #pragma once
 
 #include <algorithm>
@@ -12,15 +12,15 @@
 
 namespace dynains {
 
-/// Horizontal hull of few points by rows and columns of cells: a cell belongs to it if there are
-/// points on both sides in its row and on both sides in its column, itself included.
+/// Horizontal hull of points by cells: a cell belongs to it if it lies between two points (or at
+/// one) in its row, and in its column.
 class InstanceHull {
  public:
   /// `cell`: m.
   explicit InstanceHull(double cell) : cell_(static_cast<float>(cell)) {}
 
-  /// Calls `visit(x, y)` with the centre (m) of every cell of the hull of `points`. Instances of
-  /// more than 100 cells along an axis are left out: they are no single object.
+  /// Calls `visit(x, y)` with the centre (m) of each cell of the hull of `points` (m). Ignores
+  /// instances of more than 100 cells along an axis, which are not single objects.
   template <class Visitor>
   void visit(PointsView points, Visitor&& visit) {
     if (points.empty()) return;

@@ -1,53 +1,34 @@
-// Few points that stand for many: samples of the instances of one scan, grouped in supervoxels.
+// Samples of the instances of one scan, grouped by supervoxels.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
-#include "dynains/curved_voxel_clusterer.hpp"
 #include "dynains/evidence/smallest_k.hpp"
-#include "dynains/evidence/voxel_hash.hpp"
-#include "dynains/evidence/voxel_hash_table.hpp"
 #include "dynains/points.hpp"
+#include "dynains/simd/pack_transform.hpp"
 #include "dynains/simd/wide_lanes.hpp"
+#include "dynains/voxel/voxel_hash_table.hpp"
+#include "dynains/voxel/voxel_key.hpp"
 
 namespace dynains {
 
-/// Place of a supervoxel in its grid, packed: ordered by x, then y, then z.
-using SupervoxelPlace = std::uint64_t;
-
-inline SupervoxelPlace pack_place(std::int32_t x, std::int32_t y, std::int32_t z) {
-  constexpr std::int64_t kOffset = std::int64_t{1} << 20;
-  return static_cast<std::uint64_t>(x + kOffset) << 42 |
-         static_cast<std::uint64_t>(y + kOffset) << 21 | static_cast<std::uint64_t>(z + kOffset);
-}
-
-/// Its place along z, up to a constant.
-inline std::int32_t layer_of(SupervoxelPlace place) {
-  return static_cast<std::int32_t>(place & ((std::uint64_t{1} << 21) - 1));
-}
-
-/// The place beside another, some steps along each axis.
-inline SupervoxelPlace neighbour(SupervoxelPlace place, int dx, int dy, int dz) {
-  return place + (static_cast<std::uint64_t>(static_cast<std::int64_t>(dx)) << 42) +
-         (static_cast<std::uint64_t>(static_cast<std::int64_t>(dy)) << 21) +
-         static_cast<std::uint64_t>(static_cast<std::int64_t>(dz));
-}
-
-/// The samples of one scan in its sensor frame: instance-major, then supervoxel-major, so that
-/// what belongs together is one range.
+/// The samples of one scan (m, sensor frame), ordered by instance, then by supervoxel: each
+/// instance and each supervoxel is one range of samples.
 struct InstanceSamples {
   PointBuffer points;                           ///< padded for wide loads
-  std::vector<std::uint32_t> sample_begin;      ///< by supervoxel, one more than supervoxels
-  std::vector<SupervoxelPlace> place;           ///< by supervoxel
-  std::vector<std::uint32_t> supervoxel_begin;  ///< by instance, one more than instances
-  std::vector<std::uint32_t> supervoxel_of;     ///< by sample; longer than there are any
+  std::vector<std::uint32_t> sample_begin;      ///< by supervoxel, and the end
+  std::vector<VoxelKey> place;                  ///< by supervoxel
+  std::vector<std::uint32_t> supervoxel_begin;  ///< by instance, and the end
+  std::vector<std::uint32_t> supervoxel_of;     ///< by sample, with unused places at the end
   std::vector<std::uint32_t> instance_of;       ///< by supervoxel
-  std::vector<std::uint32_t> met_of;  ///< by point of the scan: its supervoxel's position in `met`
-  std::vector<std::uint32_t> met;     ///< supervoxels as the scan meets them, behind one for none
+  std::vector<std::uint32_t> met_of;            ///< by point: index into `met`
+  std::vector<std::uint32_t>
+      met;  ///< supervoxels in the order of the scan; the first stands for none
 
   std::size_t size() const { return sample_begin.empty() ? 0 : sample_begin.back(); }
   std::size_t supervoxel_count() const {
@@ -62,8 +43,32 @@ struct InstanceSamples {
   }
 };
 
-/// Takes up to some samples per supervoxel and instance: those of its points that come first in an
-/// order by hash of their places, whatever their order in the scan.
+namespace detail {
+
+/// Key of the cell of each sample, in a grid of `cell` (m) whose corner is the frame `origin`.
+inline void find_cells(const InstanceSamples& samples, double cell,
+                       const Eigen::Isometry3d& T_origin_sensor, std::vector<VoxelKey>& keys) {
+  const PackTransform to_cells(
+      (Eigen::Scaling(1.0 / cell) * T_origin_sensor.matrix().topRows<3>()).cast<float>());
+  keys.resize(samples.size());
+  VoxelKey* const key = keys.data();
+  for_packs(samples.size(), [&](auto at) {
+    using Float = typename decltype(at)::Float;
+    const Float x = at.load(samples.points.x.data());
+    const Float y = at.load(samples.points.y.data());
+    const Float z = at.load(samples.points.z.data());
+    std::int32_t index[3][decltype(at)::kCount];
+    for (std::size_t axis = 0; axis < 3; ++axis) floor(to_cells(axis, x, y, z)).store(index[axis]);
+    for (std::size_t lane = 0; lane < at.size(); ++lane) {
+      key[at.begin + lane] = voxel_key(index[0][lane], index[1][lane], index[2][lane]);
+    }
+  });
+}
+
+}  // namespace detail
+
+/// Selects up to `most_samples` points per supervoxel and instance: those with the smallest hashes
+/// of their coordinates. The selection does not depend on the order of the scan.
 class InstanceSampler {
  public:
   /// `supervoxel_size`, `max_range`: metres; `most_samples`: of a supervoxel.
@@ -72,8 +77,8 @@ class InstanceSampler {
         max_range_(static_cast<float>(max_range)),
         samples_(most_samples) {}
 
-  /// Which of up to 64 points, a bit each, lie in another supervoxel than their predecessor; the
-  /// first does.
+  /// Bits of those of up to 64 points that lie in another supervoxel than their predecessor; the
+  /// first bit is set.
   std::uint64_t find_changes(PointsView points) const {
     using namespace detail;
     const PackConstant per_metre(supervoxels_per_metre_);
@@ -110,17 +115,30 @@ class InstanceSampler {
   }
 
  private:
-  // Number 0 stands for none.
+  // Part of an instance that lies in one voxel. The indices along x and y have 16 bits each.
   struct Supervoxel {
-    std::int32_t xy, z, instance;  // as CellBlock has them
+    std::int32_t xy = 0;
+    std::int32_t z = 0;
+    std::int32_t instance = -2;  // -1: points that get no sample; -2: no supervoxel
+
+    static Supervoxel none() { return {0, 0, -1}; }
+    friend bool operator==(const Supervoxel& a, const Supervoxel& b) {
+      return ((a.xy ^ b.xy) | (a.z ^ b.z) | (a.instance ^ b.instance)) == 0;
+    }
+    friend std::uint32_t voxel_hash(const Supervoxel& s) {
+      return static_cast<std::uint32_t>(detail::mixed_hash(s.xy, s.z, s.instance));
+    }
   };
+  using SupervoxelTable = VoxelHashTable<Supervoxel>;
+  static constexpr int kHalf = 16;           // bits
   static constexpr std::size_t kBlock = 64;  // points that are worked off together
-  // Ranks are of places of this size: a turn of the sensor, which changes the last bits of all
-  // coordinates, must not change them.
+  // Ranks are hashes of rounded coordinates, so that they do not depend on the last bits, which
+  // change when the sensor frame rotates.
   static constexpr float kPlacesPerMetre = 64.0F;
 
   void begin_scan() {
-    memory_.clear();
+    table_.clear();
+    table_.insert(Supervoxel::none());  // number 0
     samples_.clear();
   }
 
@@ -141,32 +159,39 @@ class InstanceSampler {
       const Int rank =
           mixed_hash(truncate(px * kPlaces), truncate(py * kPlaces), truncate(pz * kPlaces));
       rank.store(&rank_[at.begin]);
-      VoxelHashTable::put(is_sampled, floor(px * per_metre), floor(py * per_metre),
-                          floor(pz * per_metre), instance, at.begin, cells_);
+      const Int xy = keep(is_sampled, (floor(px * per_metre) << kHalf) +
+                                          (floor(py * per_metre) & Int((1 << kHalf) - 1)));
+      const Int z = keep(is_sampled, floor(pz * per_metre));
+      const Int kept_instance = select(is_sampled, instance, Int(-1));
+      xy.store(&xy_[at.begin]);
+      z.store(&z_[at.begin]);
+      kept_instance.store(&instance_[at.begin]);
+      mixed_hash(xy, z, kept_instance).store(&hash_[at.begin]);
     });
   }
 
-  // Most points are of supervoxels that are remembered.
+  // Most points lie in the supervoxel that was met last in the first slot of its hash.
   void meet_supervoxels(std::size_t count, std::uint32_t* met_of) {
-    detail::grow(supervoxels_, memory_.count() + 1 + kBlock);
-    memory_.make_room_for(kBlock);
+    detail::grow(supervoxels_, table_.size() + kBlock);
+    table_.reserve(table_.size() + kBlock);
     for (std::size_t i = 0; i < count; ++i) {
-      const detail::VoxelHashTable::Entry& entry = memory_.at(cells_, i);
-      met_of[i] = entry.is_other(cells_, i) ? meet_supervoxel(i) : entry.number;
+      const Supervoxel supervoxel = {xy_[i], z_[i], instance_[i]};
+      const SupervoxelTable::Slot& slot = table_.first_slot(static_cast<std::uint32_t>(hash_[i]));
+      met_of[i] = slot.key == supervoxel ? slot.number : meet_supervoxel(supervoxel, i);
     }
   }
 
-  std::uint32_t meet_supervoxel(std::size_t i) {
-    const std::uint32_t number = memory_.find(cells_, i);
-    supervoxels_[number] = {cells_.xy[i], cells_.z[i], cells_.instance[i]};
+  std::uint32_t meet_supervoxel(const Supervoxel& supervoxel, std::size_t i) {
+    const std::uint32_t number = table_.insert(supervoxel, static_cast<std::uint32_t>(hash_[i]));
+    supervoxels_[number] = supervoxel;
     return number;
   }
 
-  // Neighbours mostly share a row, which would have to wait for its own last change: stretches of
-  // the points take turns.
+  // Consecutive points mostly share a row, and each change of a row depends on the change before:
+  // points from four parts of the block alternate.
   void rank_points(std::size_t begin, std::size_t count, const std::uint32_t* met_of) {
     constexpr std::size_t kStretches = 4, kLength = kBlock / kStretches;
-    samples_.make_rows(memory_.count() + 1);
+    samples_.make_rows(table_.size());
     const auto rank = [&](std::size_t i) {
       samples_.add(met_of[i], static_cast<std::uint32_t>(rank_[i]),
                    static_cast<std::uint32_t>(begin + i));
@@ -180,14 +205,13 @@ class InstanceSampler {
     }
   }
 
-  static SupervoxelPlace place_of(const Supervoxel& cell) {
-    return pack_place(cell.xy >> detail::VoxelHashTable::kHalf, static_cast<std::int16_t>(cell.xy),
-                      cell.z);
+  static VoxelKey place_of(const Supervoxel& cell) {
+    return voxel_key(cell.xy >> kHalf, static_cast<std::int16_t>(cell.xy), cell.z);
   }
 
   // A counting sort: supervoxels by instance, and their samples with them.
   void order(PointsView points, std::size_t instance_count, InstanceSamples& out) {
-    const std::size_t supervoxel_count = memory_.count();
+    const std::size_t supervoxel_count = table_.size() - 1;
     out.supervoxel_begin.assign(instance_count + 1, 0);
     for (std::size_t met = 1; met <= supervoxel_count; ++met) {
       ++out.supervoxel_begin[static_cast<std::uint32_t>(supervoxels_[met].instance) + 1];
@@ -213,14 +237,14 @@ class InstanceSampler {
     copy_samples(points, supervoxel_count, out);
   }
 
-  // As many of each supervoxel as it may have, with no branch on how many it has: what is too much
-  // is written over by the next one.
+  // Copies the maximum number of samples of each supervoxel without a branch; the next supervoxel
+  // overwrites the excess.
   void copy_samples(PointsView points, std::size_t supervoxel_count, InstanceSamples& out) {
     const std::size_t most = samples_.most();
-    const std::size_t room =
+    const std::size_t capacity =
         std::min(supervoxel_count * most, points.size() + most) + detail::kMaxPackWidth;
-    out.points.grow(room);
-    detail::grow(out.supervoxel_of, room);
+    out.points.grow(capacity);
+    detail::grow(out.supervoxel_of, capacity);
     out.sample_begin.resize(supervoxel_count + 1);
     float* const x = out.points.x.data();
     float* const y = out.points.y.data();
@@ -244,10 +268,9 @@ class InstanceSampler {
 
   float supervoxels_per_metre_;
   float max_range_;
-  detail::VoxelHashTable memory_;  // of supervoxels, numbered as met_of counts them
-  // Of the points of a block.
-  detail::CellBlock<kBlock> cells_ = {};
-  std::array<std::int32_t, kBlock> rank_ = {};
+  SupervoxelTable table_{4096};  // numbers as met_of counts them; 0: no sample
+  // By point of a block.
+  std::array<std::int32_t, kBlock> xy_ = {}, z_ = {}, instance_ = {}, hash_ = {}, rank_ = {};
   detail::SmallestK samples_;            // by supervoxel
   std::vector<Supervoxel> supervoxels_;  // longer than what is in use
   std::vector<std::uint32_t> next_;

@@ -1,5 +1,5 @@
-// Instances carried through time: what was shown to move stays dynamic when it stops, and what
-// moves later was dynamic before. Goes beyond the paper.
+// Tracks of instances: an object that moves at one time is dynamic in its other scans, too, before
+// it starts and after it stops. Goes beyond the paper.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -9,68 +9,71 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/curved_voxel_clusterer.hpp"
 #include "dynains/evidence/instance_samples.hpp"
-#include "dynains/evidence/sample_places.hpp"
-#include "dynains/evidence/voxel_hash.hpp"
 #include "dynains/points.hpp"
+#include "dynains/voxel/voxel_key.hpp"
 
 namespace dynains {
 
-/// The instances of one scan as tracks see them.
+/// The instances of one scan as parts of tracks.
 struct TrackedInstances {
-  /// An instance as a part of its track.
+  /// The track of an instance on one side of its scan, in time.
+  struct Side {
+    std::uint32_t instance = kNoCluster;  ///< the same object in the adjacent scan
+    float log_odds = 0.0F;                ///< that it moved, from this scan and those on this side
+    int scans_since_motion = 0;           ///< to the nearest scan whose own log-odds are positive
+    std::int16_t farthest_hit =
+        0;  ///< scans to the farthest reference that hit most of it; 0: none
+  };
   struct Instance {
-    std::uint32_t previous = kNoCluster;  ///< the same object in the scan before
-    std::uint32_t next = kNoCluster;      ///< the same object in the scan after
-    float own = 0.0F;                     ///< what this scan's own evidence says, log-odds
-    float forward = 0.0F;                 ///< belief from this scan and those before it
-    float backward = 0.0F;                ///< belief from this scan and those after it
-    int since_forward = 0;                ///< scans since its own evidence last said that it moved
-    int since_backward = 0;               ///< scans until its own evidence next says that it moves
-    std::int16_t hit_back = 0;   ///< scans to the oldest reference that hit most of it; 0: none
-    std::int16_t hit_ahead = 0;  ///< scans to the latest reference that hit most of it; 0: none
+    float own = 0.0F;  ///< log-odds that it moved, from the evidence on this scan alone
+    Side past;
+    Side future;
+
+    /// Log-odds that it moved, from its whole track; its own evidence counts once.
+    float track_log_odds() const {
+      return own + std::max(0.0F, past.log_odds - own) + std::max(0.0F, future.log_odds - own);
+    }
   };
   std::vector<Instance> instances;
 
-  /// What it looks like: apart, because beliefs run along all open scans again and again.
+  /// Kept apart from Instance, since every scan propagates beliefs through all open scans.
   struct Shape {
-    float length = 0.0F;      ///< m, horizontal diagonal
-    float height = 0.0F;      ///< m
-    std::uint32_t cells = 0;  ///< world cells that it occupies
-    float previous_overlap = 0.0F;
-    float next_overlap = 0.0F;
-    bool carried = false;  ///< small enough to be one object
+    float length = 0.0F;            ///< m, horizontal diagonal
+    float height = 0.0F;            ///< m
+    std::uint32_t cells = 0;        ///< number of its cells
+    float previous_overlap = 0.0F;  ///< ratio of common to all cells, with the linked instance
+    float next_overlap = 0.0F;      ///< likewise
+    bool carried = false;           ///< small enough to be one object
   };
   std::vector<Shape> shapes;  ///< by instance
 
-  /// Occupied cells of carried instances.
   struct Cell {
-    SupervoxelPlace place;
+    VoxelKey place;  ///< in the frame `origin`
     std::uint32_t instance;
   };
-  std::vector<Cell> cells;
+  std::vector<Cell> cells;  ///< of the carried instances, by instance
 };
 
 /// Links instances of consecutive scans that overlap in the world.
 class InstanceLinker {
  public:
-  /// `cell`: m; `max_length`, `max_height`: m, larger instances are not carried; `overlap`: share
-  /// of cells (intersection over union) from which two instances are the same object.
+  /// `cell`: m. `max_length`, `max_height`: m, larger instances are not carried. `overlap`: ratio
+  /// of common to all cells from which two instances are the same object.
   InstanceLinker(double cell, double max_length, double max_height, double overlap)
       : cell_(cell),
         max_length_(static_cast<float>(max_length)),
         max_height_(static_cast<float>(max_height)),
         overlap_(static_cast<float>(overlap)) {}
 
-  /// Sizes and cells of the instances of one scan. Cells lie in the frame `origin` (m), which must
-  /// be the same for scans that are to be linked and should be near them.
+  /// Sizes and cells of the instances of one scan. `origin` (m): one frame near all scans that are
+  /// linked.
   void measure(const InstanceSamples& samples, const Eigen::Isometry3d& T_origin_sensor,
                TrackedInstances& out) {
     out.instances.assign(samples.instance_count(), TrackedInstances::Instance());
     out.shapes.assign(samples.instance_count(), TrackedInstances::Shape());
     out.cells.clear();
-    detail::find_places(samples, cell_, T_origin_sensor, place_);
+    detail::find_cells(samples, cell_, T_origin_sensor, place_);
     table_.assign(kTable, kEmpty);
     for (std::uint32_t i = 0; i < samples.instance_count(); ++i) {
       TrackedInstances::Shape& shape = out.shapes[i];
@@ -82,7 +85,7 @@ class InstanceLinker {
         if (p > begin && place_[p] == place_[p - 1]) continue;
         const TrackedInstances::Cell cell = {place_[p], i};
         std::uint32_t& slot = slot_of(cell);
-        // Two cells that share a place in the table are counted twice: rare, and harmless.
+        // A collision in the table counts a cell twice: rare and harmless.
         if (slot != kEmpty && out.cells[slot].place == cell.place &&
             out.cells[slot].instance == i) {
           continue;
@@ -94,8 +97,8 @@ class InstanceLinker {
     }
   }
 
-  /// Links the instances of two consecutive scans: each to the one of the other scan with which it
-  /// shares most.
+  /// Links each instance of two consecutive scans to the one of the other scan with the largest
+  /// overlap.
   void link(TrackedInstances& before, TrackedInstances& now) {
     table_.assign(kTable, kEmpty);
     for (std::uint32_t i = 0; i < before.cells.size(); ++i) slot_of(before.cells[i]) = i;
@@ -119,11 +122,11 @@ class InstanceLinker {
  private:
   static constexpr std::size_t kTable = 1U << 14;
   static constexpr std::uint32_t kEmpty = 0xFFFFFFFFU;
-  static constexpr std::uint32_t kLeastSamples = 2;  // what is smaller overlaps by chance
+  static constexpr std::uint32_t kLeastSamples = 2;  // one sample overlaps by chance
 
-  // Without the instance: cells of two scans meet in the same place.
+  // The hash leaves the instance out, so that equal cells of two scans share a slot.
   std::uint32_t& slot_of(const TrackedInstances::Cell& cell) {
-    return table_[detail::place_hash(cell.place) % kTable];
+    return table_[voxel_hash(cell.place) >> 8 & (kTable - 1)];
   }
 
   void measure_extent(const PointBuffer& points, std::uint32_t begin, std::uint32_t end,
@@ -153,11 +156,11 @@ class InstanceLinker {
     if (overlap < overlap_) return;
     if (overlap > to_shape.previous_overlap) {
       to_shape.previous_overlap = overlap;
-      now.instances[to].previous = from;
+      now.instances[to].past.instance = from;
     }
     if (overlap > from_shape.next_overlap) {
       from_shape.next_overlap = overlap;
-      before.instances[from].next = to;
+      before.instances[from].future.instance = to;
     }
   }
 
@@ -165,55 +168,47 @@ class InstanceLinker {
   float max_length_;
   float max_height_;
   float overlap_;
-  std::vector<std::uint32_t> table_;    // numbers of cells, direct-mapped
-  std::vector<SupervoxelPlace> place_;  // by sample
+  std::vector<std::uint32_t> table_;  // numbers of cells, direct-mapped
+  std::vector<VoxelKey> place_;       // by sample
   std::vector<std::uint32_t> shared_;
   std::vector<std::uint32_t> touched_;
 };
 
-/// Beliefs that run along linked instances: a log-odds sum that fades from scan to scan.
+/// Propagates log-odds along linked instances; they fade from scan to scan.
 class TrackBelief {
  public:
+  using Instance = TrackedInstances::Instance;
+  using Side = TrackedInstances::Side;
+
   /// `unit`: log-odds of one clear observation.
   explicit TrackBelief(float unit) : floor_(-1.0F * unit), ceiling_(4.0F * unit) {}
 
-  /// Forward beliefs of `now` from those of the scan before; null starts afresh.
-  void run_forward(const TrackedInstances* before, TrackedInstances& now) const {
-    for (TrackedInstances::Instance& instance : now.instances) {
+  /// Log-odds of one scan on one side of time (&Instance::past or &Instance::future), from those of
+  /// the adjacent scan on that side; null if there is none.
+  void propagate(Side Instance::*side, const TrackedInstances* adjacent,
+                 TrackedInstances& now) const {
+    for (Instance& instance : now.instances) {
+      Side& own_side = instance.*side;
       float inherited = 0.0F;
-      instance.since_forward = 0;
-      if (before != nullptr && instance.previous != kNoCluster) {
-        const TrackedInstances::Instance& parent = before->instances[instance.previous];
-        inherited = inherit(parent.forward, parent.since_forward + 1, instance.own,
-                            instance.hit_back, instance.since_forward);
+      own_side.scans_since_motion = 0;
+      if (adjacent != nullptr && own_side.instance != kNoCluster) {
+        const Side& parent = adjacent->instances[own_side.instance].*side;
+        inherited = inherit(parent, instance.own, own_side);
       }
-      instance.forward = std::clamp(inherited + instance.own, floor_, ceiling_);
-    }
-  }
-
-  /// Backward beliefs of `now` from those of the scan after; null starts afresh.
-  void run_backward(const TrackedInstances* after, TrackedInstances& now) const {
-    for (TrackedInstances::Instance& instance : now.instances) {
-      float inherited = 0.0F;
-      instance.since_backward = 0;
-      if (after != nullptr && instance.next != kNoCluster) {
-        const TrackedInstances::Instance& child = after->instances[instance.next];
-        inherited = inherit(child.backward, child.since_backward + 1, instance.own,
-                            instance.hit_ahead, instance.since_backward);
-      }
-      instance.backward = std::clamp(inherited + instance.own, floor_, ceiling_);
+      own_side.log_odds = std::clamp(inherited + instance.own, floor_, ceiling_);
     }
   }
 
  private:
-  // What goes over from a neighbour in time. An instance that does not move itself is contradicted
-  // by references from well before (after) it can have come (gone) that hit its place.
-  static float inherit(float belief, int since, float own, int hit, int& own_since) {
-    constexpr float kFade = 0.95F;  // share of a belief that is left one scan later
+  // Log-odds that an instance takes over. References from well before (after) the motion of its
+  // track that hit its place contradict the motion, unless the instance itself moves.
+  static float inherit(const Side& parent, float own, Side& side) {
+    constexpr float kFade = 0.95F;  // from scan to scan
     constexpr int kSlack = 8;       // scans
-    own_since = own > 0.0F ? 0 : since;
-    const bool contradicted = own <= 0.0F && hit > since + kSlack;
-    return contradicted ? 0.0F : kFade * belief;
+    const int since = parent.scans_since_motion + 1;
+    side.scans_since_motion = own > 0.0F ? 0 : since;
+    const bool contradicted = own <= 0.0F && side.farthest_hit > since + kSlack;
+    return contradicted ? 0.0F : kFade * parent.log_odds;
   }
 
   float floor_;

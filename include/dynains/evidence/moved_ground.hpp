@@ -1,5 +1,5 @@
-// Ground that goes with removed instances: what stands within their footprint, and what was no
-// ground.
+// Ground points that are removed with instances: feet of objects within the footprint, and points
+// that were labelled as ground by mistake.
 #pragma once
 
 #include <algorithm>
@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "dynains/cause.hpp"
-#include "dynains/evidence/beam_test.hpp"
 #include "dynains/evidence/ground_footprint.hpp"
 #include "dynains/evidence/instance_hull.hpp"
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/surrounding_ground.hpp"
+#include "dynains/evidence/visibility.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/simd/bits.hpp"
@@ -23,40 +23,41 @@
 
 namespace dynains {
 
-/// Of one scan at a time: add what was removed from it, then ask which of its ground goes, too.
+/// Finds the moved ground of one scan: add the removed points, then call find().
 class MovedGround {
  public:
   using Verdict = EvidenceVerdict::Group;
 
   explicit MovedGround(const FreeSpaceConfig& config)
       : takes_footprint_(config.footprint > 0.0),
-        tests_(config.ground_reach > 0.0),
+        tests_(config.ground_test_distance > 0.0),
         rise_(static_cast<float>(config.footprint_rise)),
         belief_(static_cast<float>(config.tau_free)),
         footprint_(takes_footprint_ ? std::max(config.footprint, kLeastCell) : kDefaultCell,
-                   std::max({config.ground_reach, config.footprint, 0.5}), config.evidence_range),
+                   std::max({config.ground_test_distance, config.footprint, 0.5}),
+                   config.evidence_range),
         around_(config.evidence_range),
         hull_(2.0 * std::max(config.footprint, kLeastCell)),
         sampler_(config.ground_sample, config.evidence_range, 1) {}
 
   void adapt(const SensorModel& sensor) {
-    // The next beam over one that ended at the foot of something may be the first to hit it.
+    // The lowest return of an object may lie one gap between beams above its foot.
     clearance_.slope = static_cast<float>(std::tan(sensor.elevation_gap_wide * M_PI / 180.0));
   }
 
-  /// Where 64 ground points at a time lie, to be found once for all verdicts on a scan.
+  /// Boxes of every 64 ground points; valid for all verdicts on a scan.
   void bound(PointsView ground, std::vector<GroundBox>& boxes) const {
     footprint_.bound(ground, boxes);
   }
 
-  /// Adds the ground below a compact instance as a whole. `points`: its samples.
+  /// Adds the area below a compact instance. `points` (m): its samples.
   void add_hull(PointsView points) {
     if (!takes_footprint_) return;
     const float lowest = *std::min_element(points.z.begin(), points.z.end());
     hull_.visit(points, [&](float x, float y) { footprint_.add(x, y, lowest); });
   }
 
-  /// Adds the points of groups that moved.
+  /// Adds the points of dynamic groups.
   void add(PointsView points, Span<const std::uint32_t> group_of, Span<const Verdict> groups) {
     detail::grow(moved_, groups.size());
     bool any = false;
@@ -78,9 +79,9 @@ class MovedGround {
     }
   }
 
-  /// The ground that goes, and forgets what was added. `boxes`: of bound();
-  /// `for_each_reference(points, count, visit)`: calls `visit(sights)` with what each reference of
-  /// the scan saw of the first `count` points. The span holds until the next call.
+  /// The ground points to remove; clears the added points. `boxes`: of bound().
+  /// `for_each_reference(points, count, visit)`: calls `visit(visibility)` for each reference of
+  /// the scan, with the visibility of the first `count` points. The span holds until the next call.
   template <class References>
   Span<const EvidenceVerdict::GroundPoint> find(PointsView ground, Span<const GroundBox> boxes,
                                                 References&& for_each_reference) {
@@ -106,33 +107,33 @@ class MovedGround {
   }
 
  private:
-  // Some points of a block of the ground, a bit each.
+  // Points of a block of the ground, one bit each.
   struct Block {
     std::size_t begin;     // point
     std::uint64_t points;  // which
   };
-  // Points of a block of the ground that are tested, a bit each.
+  // Tested points of a block of the ground, one bit each.
   struct TestedBlock {
     std::size_t begin;     // point
     std::uint64_t points;  // which
-    std::uint64_t first;   // of these, the first of a run
+    std::uint64_t first;   // those that begin a run
     std::size_t run;       // number of the first run
   };
   static constexpr double kLeastCell = 0.05;   // m, of the footprint
-  static constexpr double kDefaultCell = 0.2;  // m, the same if the footprint is off
+  static constexpr double kDefaultCell = 0.2;  // m, if the footprint is off
   static constexpr std::uint32_t kLeastFree = 2;
-  static constexpr float kLeastShare = 0.3F;
+  static constexpr float kLeastRatio = 0.3F;
 
-  // What lies under removed points and rises over the ground around, with what shares its cell: the
-  // foot of something. All of it where nobody knows how that ground lies.
+  // Removes the ground under removed points in cells with a point that rises above the ground
+  // around (the foot of an object), and where the height of the ground around is unknown.
   void remove_under(PointsView ground) {
-    if (rise_ > 0.0F && !under_.empty()) keep_flat(ground);
+    if (rise_ > 0.0F && !under_.empty()) remove_flat_cells(ground);
     for (const Block& block : under_) {
       remove(block.begin, block.points, Cause::kUnderInstance);
     }
   }
 
-  void keep_flat(PointsView ground) {
+  void remove_flat_cells(PointsView ground) {
     around_.take(PointsView(tested_points_).subview(0, tested_), rise_);
     for (const Block& block : under_) {
       const PointsView points = GroundFootprint::block_of(ground, block.begin);
@@ -149,14 +150,14 @@ class MovedGround {
     }
   }
 
-  // Of a block of points from `begin` on, those whose bits are set.
+  // Lists the points of a block from `begin` on whose bits are set.
   void remove(std::size_t begin, std::uint64_t which, Cause cause) {
     detail::for_each_bit(which, [&](std::size_t i) {
       found_.push_back({static_cast<std::uint32_t>(begin + i), {cause, belief_}});
     });
   }
 
-  // The same to be tested: runs of points that share a voxel of the samples, by their first points.
+  // Adds points to be tested: runs of points in one voxel, represented by their first point.
   void add_tested(PointsView ground, std::size_t begin, std::uint64_t which) {
     if (which == 0) return;
     const std::uint64_t changes = sampler_.find_changes(GroundFootprint::block_of(ground, begin));
@@ -170,7 +171,7 @@ class MovedGround {
     });
   }
 
-  // Ground that enough of all references saw free, of the first `tested_` of `tested_points_`.
+  // Removes the tested points that enough references find free.
   template <class References>
   void test(References&& for_each_reference) {
     detail::grow(one_instance_, tested_);
@@ -179,10 +180,14 @@ class MovedGround {
     const std::size_t count = samples_.size();
     free_.assign((count + 7) / 8 * 8, 0);
     hit_.assign((count + 7) / 8 * 8, 0);
-    for_each_reference(samples_.points, count, [&](const detail::Sights& sights) {
-      sights.add_to(count, free_.data(), hit_.data());
+    for_each_reference(samples_.points, count, [&](const detail::Visibility& visibility) {
+      visibility.add_to(count, free_.data(), hit_.data());
     });
-    // Most of the time there is none.
+    if (find_free_voxels()) remove_free_runs();
+  }
+
+  // Sets `moved_` by position in InstanceSamples::met; returns whether there is any.
+  bool find_free_voxels() {
     bool any = false;
     detail::grow(moved_, samples_.met.size());
     moved_[0] = 0;
@@ -190,11 +195,14 @@ class MovedGround {
       const std::uint32_t sample = samples_.sample_begin[samples_.met[met]];
       const std::uint8_t free = free_[sample];
       const bool moved = free >= kLeastFree &&
-                         static_cast<float>(free) >= kLeastShare * static_cast<float>(hit_[sample]);
+                         static_cast<float>(free) >= kLeastRatio * static_cast<float>(hit_[sample]);
       moved_[met] = moved ? 1 : 0;
       any |= moved;
     }
-    if (!any) return;
+    return any;
+  }
+
+  void remove_free_runs() {
     const auto lowest = [](std::uint64_t bits) { return bits & (~bits + 1); };
     for (const TestedBlock& block : tested_blocks_) {
       const std::uint32_t* met = &samples_.met_of[block.run];
@@ -213,19 +221,19 @@ class MovedGround {
   float belief_;
   GroundFootprint footprint_;
   SurroundingGround around_;
-  std::vector<Block> under_;  // of what lies under removed points
+  std::vector<Block> under_;  // points under removed points
   InstanceHull hull_;
   InstanceSampler sampler_;
   Clearance clearance_ = {0.4F, 0.0F};  // between ground and what stands on it
   std::vector<EvidenceVerdict::GroundPoint> found_;
-  std::vector<std::uint8_t> moved_;  // by group, then by position in InstanceSamples::met
-  // Ground points that are tested, in runs that share a voxel.
+  std::vector<std::uint8_t> moved_;  // by group, later by position in InstanceSamples::met
+  // Tested ground points, in runs that share a voxel.
   std::vector<TestedBlock> tested_blocks_;
   std::size_t tested_ = 0;                   // runs
   PointBuffer tested_points_;                // their first points
   std::vector<std::uint32_t> one_instance_;  // zeros
   InstanceSamples samples_;
-  std::vector<std::uint8_t> free_;  // by sample, references that saw it so
+  std::vector<std::uint8_t> free_;  // by sample: number of references
   std::vector<std::uint8_t> hit_;
 };
 

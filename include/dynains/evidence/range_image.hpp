@@ -1,4 +1,4 @@
-// Range image of a scan, kept for asking later how far a beam in some direction got.
+// Range image of a scan: the lengths of its beams by direction.
 #pragma once
 
 #include <algorithm>
@@ -16,35 +16,35 @@
 
 namespace dynains {
 
-/// Nearest return per cell, and the nearest return of the 3x3 cells around it.
+/// Nearest return per cell, and nearest return of the 3x3 cells around it.
 ///
-/// The neighbourhood is the margin against grazing incidence: a beam just below a sample protects
-/// the ground, one beside it protects edges. What moved needs no such margin: it hides what lies
-/// behind it in its own cells, and no more.
+/// The neighbourhood is a margin for grazing incidence: beams just below a sample protect the
+/// ground, beams beside it protect edges. Returns of moving points have no such margin: they only
+/// hide the points behind them in their own cells.
 class RangeImage {
  public:
-  /// A cell in four bytes, both values in centimetres: even ones, as odd ones mark what moved.
+  /// Ranges in cm: even for static points, odd for moving points.
   struct Cell {
-    /// The nearest return of what moved in the 3x3 cells, or else the nearest return in this one;
-    /// kNothing if there is neither.
+    /// The nearest return of a moving point in the 3x3 cells, else the nearest return in this cell,
+    /// else kNothing.
     std::int16_t nearest;
-    /// The nearest return of the 3x3 cells, without what moved in those beside this one; kUnknown
-    /// if fewer than two of them have such a return.
+    /// The nearest return of the 3x3 cells, without moving points of the eight cells around;
+    /// kUnknown if fewer than two of the cells have such a return.
     std::int16_t around;
   };
-  static constexpr std::int16_t kMoving = 1;  ///< bit of a range: a return of what moved
+  static constexpr std::int16_t kMoving = 1;  ///< bit of a range: return of a moving point
   static constexpr std::int16_t kNothing = 32766;
   static constexpr std::int16_t kUnknown = -2;
 
-  /// Cells that a return of an object protects at most, in every direction.
+  /// Maximum number of cells that a return of an object protects in each direction.
   static constexpr std::size_t kWidest = 4;
 
-  /// Buffers that building needs, shared by all images of one owner.
+  /// Buffers of build(), shared by the images of one owner.
   struct Scratch {
     std::vector<std::int16_t> nearest;
-    std::vector<std::int16_t> objects;  // the same of objects that stay only, holes and all
-    std::vector<std::uint8_t> reach;    // by row and group of columns: cells that objects reach
-    std::vector<std::uint8_t> nearby;   // the same about one row, by group of columns
+    std::vector<std::int16_t> objects;  // static objects only, before holes are closed
+    std::vector<std::uint8_t> reach;    // protected cells, by row and group of columns
+    std::vector<std::uint8_t> nearby;   // protected cells around one row, by group of columns
     std::array<std::vector<std::int16_t>, kWidest> lines;  // by column, for one row
     std::vector<std::int16_t> below, gap;
     std::vector<std::int16_t> least, least_moving, count;
@@ -56,17 +56,16 @@ class RangeImage {
   /// The grid by which it was built; empty before.
   const RangeImageGrid& grid() const { return grid_; }
 
-  /// Gets the memory of an image and touches it, so that the system has given it before a scan
-  /// needs it.
+  /// Allocates an image and writes to it, so that the system provides the memory now.
   void reserve(const RangeImageGrid& grid) {
     make_cells(grid);
     std::fill_n(cells_.get(), grid.cell_count(), Cell{kNothing, kUnknown});
   }
 
-  /// Replaces the image by that of one scan (m, sensor frame). A return of an object protects what
-  /// lies within `reach` (m) beside it, at least its 3x3 cells: near the sensor these are a few
-  /// centimetres wide, less than what poses are good for. `moving`: by object, 1 if it moved, else
-  /// 0; empty if none did.
+  /// Replaces the image by that of one scan (m, sensor frame). A return of an object protects cells
+  /// within the lateral distance `reach` (m), and at least its 3x3 cells: near the sensor, these
+  /// are narrower than the error of poses. `moving`: by object point, 1 if it moves, else 0; empty
+  /// if none does.
   void build(const RangeImageGrid& grid, PointsView ground, PointsView objects,
              Span<const std::uint8_t> moving, float reach, Scratch& scratch) {
     const Reaches reaches(grid, reach);
@@ -84,8 +83,7 @@ class RangeImage {
   static constexpr float kCentimetres = 100.0F;
   static constexpr float kFarthest = 320.0F;  // m
 
-  // How far returns of objects reach: those nearer than limit[k] (cm) protect k + 1 cells in every
-  // direction.
+  // Returns of objects nearer than limit[k] (cm) protect k + 1 cells in each direction.
   struct Reaches {
     std::array<std::int16_t, kWidest> limit;
 
@@ -97,8 +95,8 @@ class RangeImage {
     }
   };
 
-  // Cells and ranges of a block of points first: their stores then find them in memory, which is
-  // cheaper than to take lanes apart.
+  // Writes the nearest range per cell. Cells and ranges of a block go through memory, which is
+  // cheaper than extracting lanes.
   static void collect(const RangeImageGrid& grid, PointsView points,
                       Span<const std::uint8_t> moving, std::int16_t* nearest) {
     constexpr std::size_t kBlock = 128;
@@ -124,7 +122,7 @@ class RangeImage {
         if (!moving.empty()) {
           for (std::size_t i = 0; i < size; ++i) range[i] |= moving[begin + i];
         }
-        // Directions outside fall into cell 0, which lies in the border and is never read.
+        // Directions outside the image have cell 0, which is in the border and is not read.
         for (std::size_t i = 0; i < size; ++i) {
           std::int16_t& value = nearest[cell[i]];
           value = std::min(value, static_cast<std::int16_t>(range[i]));
@@ -133,8 +131,7 @@ class RangeImage {
     });
   }
 
-  // Columns are looked at in groups; `group_stride` leaves room for one across the seam on each
-  // side.
+  // Columns are processed in groups; `group_stride` includes one group on each side of the seam.
   static std::size_t group_count(const RangeImageGrid& grid) {
     return (grid.stride() - 2 * detail::kPackWidth) / detail::kShortPackWidth;
   }
@@ -147,7 +144,7 @@ class RangeImage {
   static Short is_moving(const Short& range) {
     return (range & Short(kMoving)) == Short(kMoving);
   }
-  // Ranges of what moved, or of what stays; the others become nothing.
+  // Ranges of moving points only, or of static points only; others become kNothing.
   template <class Short>
   static Short only_moving(const Short& range) {
     return select(is_moving(range), range, Short(kNothing));
@@ -157,8 +154,8 @@ class RangeImage {
     return select(is_moving(range), Short(kNothing), range);
   }
 
-  // Copies what stays of the image while it holds nothing but objects, and notes how far that
-  // reaches where it is more than one cell.
+  // Copies the static returns while the image holds objects only, and stores the number of cells
+  // that they protect, if more than one.
   static void keep_objects(const RangeImageGrid& grid, const Reaches& reaches, Scratch& scratch) {
     const std::size_t stride = grid.stride();
     const std::size_t groups = group_count(grid);
@@ -185,13 +182,12 @@ class RangeImage {
     });
   }
 
-  // Between two beams an image has rows that no beam can fill. Up to `hole_rows` of them take the
-  // nearer of the returns below and above.
+  // Rows between two beams are empty. Up to `hole_rows` of them take the nearer return of the rows
+  // below and above.
   static void close_holes(const RangeImageGrid& grid, Scratch& scratch) {
     using namespace detail;
     const std::size_t stride = grid.stride();
-    // By column: the last return below, and how many rows are empty since; too many if there is
-    // none.
+    // By column: the last return below, and the number of empty rows above it.
     scratch.below.assign(stride, kNothing);
     scratch.gap.assign(stride, static_cast<std::int16_t>(grid.hole_rows + 1));
     run_packs([&](auto packs) {
@@ -297,7 +293,7 @@ class RangeImage {
     });
   }
 
-  // Lets near objects protect more cells about their returns.
+  // Near objects protect more than their 3x3 cells.
   void widen(const RangeImageGrid& grid, const Reaches& reaches, Scratch& scratch) {
     const auto rows = static_cast<std::size_t>(grid.rows);
     for (std::vector<std::int16_t>& line : scratch.lines) line.resize(grid.stride());
@@ -311,8 +307,8 @@ class RangeImage {
     });
   }
 
-  // How many cells objects reach about a row, by group, as far as they reach the row itself; false
-  // if they do not.
+  // By group: the largest number of protected cells of objects that protect this row; false if
+  // there is none.
   static bool find_nearby(const RangeImageGrid& grid, std::size_t row, Scratch& scratch) {
     const auto rows = static_cast<std::size_t>(grid.rows);
     const std::size_t groups = group_count(grid);
@@ -327,13 +323,13 @@ class RangeImage {
         nearby[i] = std::max(nearby[i], cells);
       }
     }
-    // Across the seam: the last group may be narrower than the reach.
+    // At the seam, the last group may be narrower than the protected cells.
     nearby[0] = std::max(nearby[groups], nearby[groups - 1]);
     nearby[groups + 1] = nearby[1];
     return *std::max_element(nearby, nearby + stride) > 0;
   }
 
-  // For each reach, the nearest of the objects above and below that reach so far.
+  // For each number of cells: the nearest object above and below that protects so many.
   template <class Short>
   static void widen_upwards(const RangeImageGrid& grid, const Reaches& reaches, std::size_t row,
                             Scratch& scratch) {
@@ -378,7 +374,7 @@ class RangeImage {
     }
   }
 
-  // Lets `around` of sixteen cells be at most `reach`; kNothing changes nothing.
+  // Limits `around` of sixteen cells to `reach`; kNothing is no limit.
   template <class Short>
   static void protect(Cell* cells, const Short& reach) {
     using namespace detail;
@@ -393,7 +389,7 @@ class RangeImage {
     }
   }
 
-  // Copies the ends of a row to its other side, so that neighbours across the seam are at hand.
+  // Copies the ends of a row beyond its other end, as neighbours across the seam.
   static void wrap(std::int16_t* row, std::size_t columns, std::size_t width) {
     std::int16_t* const first = row + detail::kPackWidth;
     for (std::size_t i = 0; i < width; ++i) {
@@ -402,8 +398,8 @@ class RangeImage {
     }
   }
 
-  // Without values: an image is the largest buffer of all, and each of its cells is written before
-  // it is read but the first, which stands for all directions outside.
+  // Leaves cells uninitialised, since each is written before it is read, except cell 0, which is
+  // that of all directions outside.
   void make_cells(const RangeImageGrid& grid) {
     const bool fits = grid.cell_count() == grid_.cell_count();
     if (!fits) {

@@ -1,4 +1,4 @@
-// Rows and columns of range images, and which cell a direction falls into.
+// Rows and columns of range images, and the cell of a direction.
 #pragma once
 
 #include <algorithm>
@@ -15,17 +15,17 @@
 
 namespace dynains {
 
-/// Cells of nearly equal angle, rows by elevation and columns by azimuth, that suit a sensor.
+/// Grid of nearly equal angles for a sensor: rows by elevation, columns by azimuth.
 struct RangeImageGrid {
   std::int32_t rows = 0;
   std::int32_t columns = 0;  ///< around the full circle
   float lowest = 0.0F;       ///< level of the lower edge of row 0
   float rows_per_level = 0.0F;
   float columns_per_radian = 0.0F;
-  std::int32_t hole_rows = 0;  ///< empty rows between two beams that are closed
+  std::int32_t hole_rows = 0;  ///< maximum number of empty rows between two beams that are filled
 
-  /// What rows count instead of the elevation, from its sine: a cubic that grows with the elevation
-  /// and is within 0.2 deg of it below 50 deg; beyond, rows become wider.
+  /// Approximate elevation (rad) from its sine, by a monotonic cubic: within 0.2 deg below 50 deg;
+  /// beyond, rows become wider.
   template <class Number>
   static Number level(const Number& sine) {
     return sine * (kLevel[0] + kLevel[1] * (sine * sine));
@@ -34,8 +34,8 @@ struct RangeImageGrid {
     return sine * (kLevel[0].values[0] + kLevel[1].values[0] * (sine * sine));
   }
 
-  /// Cells a little wider than the azimuth step and narrower than the usual gap between beams, so
-  /// that few cells between returns stay empty and few returns share a cell.
+  /// Cells are a little wider than the azimuth step and narrower than the gap between beams, so
+  /// that few cells between returns are empty and few returns share a cell.
   static RangeImageGrid for_sensor(const SensorModel& sensor) {
     constexpr double kRadians = M_PI / 180.0;
     constexpr double kBorder = 2.0;  // deg beyond the outer beams
@@ -56,7 +56,7 @@ struct RangeImageGrid {
     return grid;
   }
 
-  /// Cells from the beginning of one row to the next: room for wide access past both ends.
+  /// Cells from one row to the next, with padding for wide access beyond both ends.
   std::size_t stride() const {
     return (static_cast<std::size_t>(columns) + detail::kShortPackWidth - 1) /
                detail::kShortPackWidth * detail::kShortPackWidth +
@@ -68,7 +68,7 @@ struct RangeImageGrid {
   static constexpr detail::PackConstant kLevel[] = {0.9832868F, 0.2594117F};
 };
 
-/// Angle of (x, y) in [-pi, pi] within 1e-4 rad, for cells that are much wider; NaN for the origin.
+/// Azimuth of (x, y) in [-pi, pi] (rad), within 1e-4 rad; NaN for the origin.
 template <class Float>
 Float coarse_azimuth(const Float& x, const Float& y) {
   using detail::PackConstant;
@@ -86,7 +86,7 @@ Float coarse_azimuth(const Float& x, const Float& y) {
   return detail::with_sign_of(y, detail::with_sign_of(x, from_y_axis) + kQuarter);
 }
 
-/// What locating needs of a grid, once for all points.
+/// Finds the cells of points; holds the constants of a grid.
 struct ImageLocator {
   explicit ImageLocator(const RangeImageGrid& grid)
       : lowest(grid.lowest),
@@ -96,8 +96,8 @@ struct ImageLocator {
         columns_per_radian(grid.columns_per_radian),
         last_column(static_cast<float>(grid.columns) - 0.5F) {}
 
-  /// Cells into which the directions of eight points fall; 0 where the image does not cover them.
-  /// `range`: distances of the points.
+  /// Cells of the directions of some points; 0 outside the image. `range`: distances of the points
+  /// from the sensor, in the unit of x, y and z.
   template <class Packs>
   typename Packs::Int locate(const typename Packs::Float& x, const typename Packs::Float& y,
                              const typename Packs::Float& z,
@@ -107,9 +107,9 @@ struct ImageLocator {
         kBorder(static_cast<float>(detail::kPackWidth));
     const Float row = (RangeImageGrid::level(z / range) - lowest) * rows_per_level;
     const Float column = (coarse_azimuth(x, y) + kHalfTurn) * columns_per_radian;
-    // False for the place of the sensor itself, whose row is NaN.
+    // False for the origin, whose row is NaN.
     const typename Packs::Mask inside = (row >= kZero) & (row < rows);
-    // Row times stride is exact in floats: images have fewer than 2^24 cells.
+    // Exact in floats, since images have fewer than 2^24 cells.
     const Float first = to_float(truncate(keep(inside, row))) * stride;
     return keep(inside, truncate(first + kBorder) +
                             truncate(max(min(column, Float(last_column)), Float(kZero))));

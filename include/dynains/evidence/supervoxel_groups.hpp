@@ -1,4 +1,4 @@
-// Connected groups of supervoxels: what an object of its own looks like inside a larger instance.
+// Connected groups of supervoxels: separate objects within one instance.
 #pragma once
 
 #include <algorithm>
@@ -10,11 +10,11 @@
 
 namespace dynains {
 
-/// Finds groups in the 26-neighbourhood. Buffers are reused.
+/// Finds groups that are connected in the 26-neighbourhood.
 class SupervoxelGroups {
  public:
-  /// Keeps of `members` (supervoxels of one instance, numbers into `samples`) those whose group
-  /// has at least `least_samples` samples.
+  /// Removes those of `members` (supervoxels of one instance) whose group has fewer than
+  /// `least_samples` samples; the order changes.
   void keep_large(const InstanceSamples& samples, std::size_t least_samples,
                   std::vector<std::uint32_t>& members) {
     entries_.clear();
@@ -40,25 +40,25 @@ class SupervoxelGroups {
 
  private:
   struct Entry {
-    SupervoxelPlace place;
+    VoxelKey place;
     std::uint32_t member;
     bool visited;
   };
 
-  // The group of one entry, into group_.
+  // Writes the group of one entry to group_.
   void collect(std::size_t first) {
     group_.assign(1, first);
     entries_[first].visited = true;
     for (std::size_t next = 0; next < group_.size(); ++next) {
-      const SupervoxelPlace place = entries_[group_[next]].place;
+      const VoxelKey place = entries_[group_[next]].place;
       for (int dx = -1; dx <= 1; ++dx) {
         for (int dy = -1; dy <= 1; ++dy) {
-          // The three neighbours along z follow each other in the order of places.
-          const SupervoxelPlace low = neighbour(place, dx, dy, -1);
-          const SupervoxelPlace high = neighbour(place, dx, dy, 1);
+          // The three neighbours along z are consecutive in the order of keys.
+          const VoxelKey low = place + voxel_key_step(dx, dy, -1);
+          const VoxelKey high = place + voxel_key_step(dx, dy, 1);
           auto at = std::lower_bound(
               entries_.begin(), entries_.end(), low,
-              [](const Entry& entry, SupervoxelPlace value) { return entry.place < value; });
+              [](const Entry& entry, VoxelKey value) { return entry.place < value; });
           for (; at != entries_.end() && at->place <= high; ++at) {
             if (at->visited) continue;
             at->visited = true;

@@ -1,4 +1,4 @@
-// How high ground points stand over the ground around them.
+// Heights of ground points above the ground around them.
 #pragma once
 
 #include <algorithm>
@@ -14,11 +14,11 @@
 
 namespace dynains {
 
-/// Planes through some points of the ground, by horizontal cells in the sensor frame: each through
-/// the points of its cell and of the eight around it.
+/// Planes by horizontal cells of 2 m in the sensor frame: each is fitted to the ground points of
+/// its cell and of the eight around it.
 class SurroundingGround {
  public:
-  /// Height where too little of the ground is known.
+  /// Height where the ground around has too few points for a plane.
   static constexpr float kUnknown = std::numeric_limits<float>::infinity();
 
   /// `max_range`: m; points beyond share the cells at the border.
@@ -31,9 +31,8 @@ class SurroundingGround {
     forget();
   }
 
-  /// Forgets what it knew and takes in ground points (m), but for those that lie `rise` (m) or more
-  /// over planes through all of them, as something may stand there, or of which too little lies
-  /// around.
+  /// Replaces the ground points (m). Leaves out points that lie `rise` (m) or more above the plane
+  /// of all points, which may belong to an object, and points without a plane.
   void take(PointsView points, float rise) {
     forget();
     for (std::size_t i = 0; i < points.size(); ++i) add(points, i, 1.0);
@@ -47,7 +46,7 @@ class SurroundingGround {
     for (Cell& cell : cells_) cell.has_plane = false;
   }
 
-  /// Of a point (m): vertical distance (m) from the ground around it, or kUnknown.
+  /// Height (m) of a point (m) above the ground around it, along z, or kUnknown.
   float height(float x, float y, float z) {
     const std::size_t index = index_of(x, y);
     Cell& cell = cell_at(index);
@@ -57,25 +56,25 @@ class SurroundingGround {
 
  private:
   static constexpr double kCell = 2.0;  // m
-  // With less, points are too few, or too much on a line, to tell how a plane lies.
+  // Fewer points, or points on a line, do not define a plane.
   static constexpr double kLeastPoints = 8.0;
   static constexpr double kLeastVariance = 0.4;  // m^2, along any horizontal direction
 
   struct Cell {
     detail::PlaneMoments moments;
-    // Of its plane: z = slope_x * x + slope_y * y + offset.
+    // Plane z = slope_x * x + slope_y * y + offset.
     float slope_x = 0.0F, slope_y = 0.0F, offset = -kUnknown;
     bool has_plane = false;
   };
 
-  // Number 0 is that of no cell.
+  // Number 0 is an empty cell.
   void forget() {
     for (const std::size_t index : used_) number_of_[index] = 0;
     used_.clear();
     cells_.assign(1, Cell());
   }
 
-  // Cells at the border of the grid are nothing but neighbours.
+  // Points do not fall into the cells at the border of the grid.
   std::size_t index_of(float x, float y) const {
     constexpr auto kPerMetre = static_cast<float>(1.0 / kCell);
     const float last = 2.0F * half_ - 2.0F;
@@ -104,7 +103,7 @@ class SurroundingGround {
                      weight);
   }
 
-  // Least squares in z.
+  // Least-squares fit of z.
   void find_plane(std::size_t index, Cell& cell) const {
     cell.has_plane = true;
     cell.offset = -kUnknown;
@@ -135,10 +134,10 @@ class SurroundingGround {
 
   float half_;                            // cells from the sensor to the border
   std::size_t width_;                     // of the grid, in cells
-  std::vector<std::uint32_t> number_of_;  // row-major: of cells in use, in `cells_`
-  std::vector<std::size_t> used_;         // what is not 0 there
+  std::vector<std::uint32_t> number_of_;  // row-major: index into `cells_`
+  std::vector<std::size_t> used_;         // non-zero entries of it
   std::vector<Cell> cells_;
-  std::vector<std::uint32_t> rising_;  // of the points that are taken in
+  std::vector<std::uint32_t> rising_;  // points that are left out
 };
 
 }  // namespace dynains

@@ -12,6 +12,7 @@
 #include "dynains/io/folder_lock.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
+#include "dynains/voxel/voxel_hash_table.hpp"
 
 namespace dynains {
 
@@ -98,12 +99,10 @@ class TiledStaticMap {
   // Points in the order of insertion, and a hash table of their voxels.
   struct Tile {
     std::vector<Point> points;
-    std::vector<std::uint32_t> table;  // index of a point + 1, by the hash of its voxel; 0: free
+    VoxelHashTable<std::uint32_t> filled;  // Point::voxel of each; empty if every point is kept
 
     std::size_t memory_bytes() const;
     bool fill(std::uint32_t voxel);
-    std::uint32_t& find(std::uint32_t voxel);
-    void build_table();
   };
 
   std::filesystem::path path_of(const Place& place) const;

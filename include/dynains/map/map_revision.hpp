@@ -1,4 +1,4 @@
-// Second thoughts on the static map: what later scans see through is taken out again.
+// Removes blocks of the static map that later scans find free.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -18,41 +18,41 @@
 
 namespace dynains {
 
-/// Goes beyond the paper: a car that stood for longer than the horizon is in the map before it
-/// leaves; the scans after that see through its place.
+/// Goes beyond the paper: a car that parks for longer than lookahead_scans enters the map; beams of
+/// later scans pass its place after it left.
 struct MapRevisionConfig {
-  bool revise_map = false;      ///< take back points whose place later scans see free
-  double revision_range = 60;   ///< m, horizontal; blocks farther from the sensor are not looked at
-  int revision_period = 4;      ///< scans from one look at a block to the next
-  double revision_free = 0.7;   ///< update probability of a scan that sees through a block
-  double revision_hit = 0.155;  ///< update probability of a scan that hits it
-  double tau_revise = 0.95;     ///< belief from which a block is emptied
+  bool revise_map = false;
+  double revision_range = 60;   ///< m
+  int revision_period = 4;      ///< scans
+  double revision_free = 0.7;   ///< form of Eq. 18
+  double revision_hit = 0.155;  ///< form of Eq. 18
+  double tau_revise = 0.95;     ///< form of Eq. 19
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
     visitor(Parameter{"revise_map", self.revise_map, Bounds(), "",
-                      "take points out of the static map again if later scans see their place "
-                      "free; needs decision free_space or both, and a map in memory"});
+                      "remove blocks of the static map that later scans find free; needs decision "
+                      "free_space or both, and a map in memory"});
     visitor(Parameter{"revision_range", self.revision_range, closed(5, 300), "m",
-                      "places of the map farther away (horizontally) are not looked at again"});
+                      "blocks of the map at a larger horizontal range are not tested"});
     visitor(Parameter{"revision_period", self.revision_period, closed(1, 100), "scans",
-                      "from one look at a place of the map to the next; not below reference_step"});
+                      "time between two tests of a block; not below reference_step"});
     visitor(Parameter{"revision_free", self.revision_free, open(0.5, 1), "",
-                      "update probability of a scan that sees through a place (form of Eq. 18)"});
+                      "update probability of a scan whose beams pass a block (form of Eq. 18)"});
     visitor(Parameter{"revision_hit", self.revision_hit, open(0, 0.5), "",
-                      "update probability of a scan that hits it (form of Eq. 18)"});
+                      "update probability of a scan whose beams hit a block (form of Eq. 18)"});
     visitor(Parameter{"tau_revise", self.tau_revise, open(0.5, 1), "",
-                      "belief from which a place is emptied (form of Eq. 19)"});
+                      "belief from which a block is removed (form of Eq. 19)"});
   }
 
   /// Throws ConfigError.
   void validate() const { validate_parameters("MapRevision", *this); }
 };
 
-/// Looks at the blocks of a map around the sensor again and again, some in each scan, and sums up
-/// for each how often it was seen free: the log-odds of Eq. 15 with the three-way increments of Eq.
-/// 18, never below zero (Page's test), as a place that was hit for long may be left by what stood
-/// there. Cost depends on the density of the map around the sensor, not on its size.
+/// Tests the blocks of a map around the sensor against the newest reference, each block once per
+/// period, and sums log-odds that it is free: Eq. 15 with the three increments of Eq. 18, never
+/// below zero (Page's test), so that an object which was hit for long may still leave. The cost
+/// depends on the density of the map around the sensor, not on its size.
 class MapRevision {
  public:
   using Config = MapRevisionConfig;
@@ -67,19 +67,20 @@ class MapRevision {
 
   const Config& config() const { return config_; }
 
-  /// One scan's say on the blocks whose turn it is. `see(points, T_world_points)` tells what that
-  /// scan saw of points (padded for wide loads): FreeSpaceEvidence::see. Empties blocks of `map`.
-  template <class Map, class See>
-  void revise(Map& map, std::uint64_t scan, const Eigen::Vector3d& sensor_world, See&& see) {
-    take_in_new_blocks(map);
+  /// Tests the blocks that are due at scan number `scan`, and erases the free ones from `map`.
+  /// `test_visibility(points, count, T_world_points)`: FreeSpaceEvidence::test_visibility.
+  template <class Map, class TestVisibility>
+  void revise(Map& map, std::uint64_t scan, const Eigen::Vector3d& sensor_world,
+              TestVisibility&& test_visibility) {
+    add_new_blocks(map);
     gather(map, scan, sensor_world);
     if (blocks_.empty()) return;
-    const auto& sights =
-        see(samples_, begin_.back(), Eigen::Isometry3d(Eigen::Translation3d(sensor_world)));
+    const auto& visibility = test_visibility(samples_, begin_.back(),
+                                             Eigen::Isometry3d(Eigen::Translation3d(sensor_world)));
     for (std::size_t i = 0; i < blocks_.size(); ++i) {
-      const auto seen = sights.count(begin_[i], begin_[i + 1]);
+      const auto count = visibility.count(begin_[i], begin_[i + 1]);
       float& level = levels_[blocks_[i]];
-      update(seen.free, seen.hit, begin_[i + 1] - begin_[i], level);
+      update(count.free, count.hit, begin_[i + 1] - begin_[i], level);
       if (level < level_) continue;
       map.erase_block(blocks_[i]);
       level = 0.0F;
@@ -94,8 +95,8 @@ class MapRevision {
 
  private:
   static constexpr double kTile = 25.0;             // m
-  static constexpr std::uint32_t kMostSamples = 8;  // of a block
-  static constexpr float kLeastSeen = 0.3F;         // share of the samples
+  static constexpr std::uint32_t kMostSamples = 8;  // per block
+  static constexpr float kLeastVisible = 0.3F;      // ratio to the samples
 
   static std::int64_t tile_of(double metres) {
     return static_cast<std::int64_t>(std::floor(metres / kTile));
@@ -105,7 +106,7 @@ class MapRevision {
   }
 
   template <class Map>
-  void take_in_new_blocks(const Map& map) {
+  void add_new_blocks(const Map& map) {
     for (std::uint32_t b = levels_.size(); b < map.block_count(); ++b) {
       const Eigen::Vector3d corner = map.block_corner(b);
       tiles_[key(tile_of(corner.x()), tile_of(corner.y()))].push_back(b);
@@ -113,7 +114,7 @@ class MapRevision {
     }
   }
 
-  // Samples of the blocks of every tile around the sensor whose turn it is, relative to the sensor.
+  // Samples of the blocks that are due, in the frame of the sensor with axes of the world.
   template <class Map>
   void gather(const Map& map, std::uint64_t scan, const Eigen::Vector3d& sensor_world) {
     blocks_.clear();
@@ -154,21 +155,21 @@ class MapRevision {
   }
 
   void update(std::uint32_t free, std::uint32_t hit, std::uint32_t samples, float& level) const {
-    const auto seen = static_cast<float>(free + hit);
+    const auto visible = static_cast<float>(free + hit);
     const auto least = static_cast<float>(std::min(2U, samples));
-    if (seen < std::max(least, kLeastSeen * static_cast<float>(samples))) return;
-    const float share = static_cast<float>(free) / seen;
-    if (share >= detail::FreeSpaceSum::kFreeShare) sum_.raise(level, share);
-    if (share <= detail::FreeSpaceSum::kHitShare) sum_.lower(level);
+    if (visible < std::max(least, kLeastVisible * static_cast<float>(samples))) return;
+    const float free_ratio = static_cast<float>(free) / visible;
+    if (free_ratio >= detail::FreeSpaceSum::kFreeRatio) sum_.raise(level, free_ratio);
+    if (free_ratio <= detail::FreeSpaceSum::kHitRatio) sum_.lower(level);
   }
 
   Config config_;
   detail::FreeSpaceSum sum_;
   float level_;
-  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> tiles_;  // blocks by place
+  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> tiles_;  // blocks by tile key
   detail::ChunkedVector<float, 1024> levels_;  // by block: log-odds that it is free
-  std::vector<std::uint32_t> blocks_;          // of which samples are
-  std::vector<std::uint32_t> begin_;           // by these blocks, one more
+  std::vector<std::uint32_t> blocks_;          // that are tested now
+  std::vector<std::uint32_t> begin_;           // first sample of each, and the end
   PointBuffer samples_;
 };
 

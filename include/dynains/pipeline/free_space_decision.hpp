@@ -26,7 +26,7 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
       : evidence_(config.evidence), revision_(config.revision) {}
 
   std::size_t window_length() const override { return 1; }
-  std::size_t latency() const override { return evidence_.horizon(); }
+  std::size_t latency() const override { return evidence_.lookahead_scans(); }
   bool needs_sensor() const override { return true; }
   void adapt(const SensorModel& sensor) override { evidence_.adapt(sensor); }
   void reserve(std::size_t scans) override { reserve_stage(evidence_, scans); }
@@ -78,7 +78,7 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
           map, newest.scan, newest.T_world_sensor.translation(),
           [this](const PointBuffer& points, std::size_t count,
                  const Eigen::Isometry3d& T_world_points) -> const auto& {
-            return evidence_.see(points, count, T_world_points);
+            return evidence_.test_visibility(points, count, T_world_points);
           });
     }
   }

@@ -54,7 +54,7 @@ class Pipeline {
                 "is_dynamic()");
   static_assert(IsConfigurable<Evidence>::value && IsEvidence<Evidence>::value,
                 "Stages::Evidence needs Config, adapt(SensorModel), observe(...), judge(...), "
-                "predecessors() and horizon()");
+                "predecessors() and lookahead_scans()");
   static_assert(IsConfigurable<Map>::value && IsMap<Map>::value,
                 "Stages::Map needs Config, insert(PointsView, flags, T_world_sensor) and clear()");
 
@@ -110,6 +110,7 @@ class Pipeline {
   void ingest(const CloudView& cloud, ScanSlot& next);
   void find_sensor(ScanSlot& newest);
   Eigen::Matrix3f level(ScanSlot& scan) const;
+  void judge_newest(ScanSlot& newest, StageTimer& timer);
   ScanVerdict finish_oldest(StageTimer& timer);
 
   // Keeps the map and the capacity of buffers.
@@ -146,17 +147,21 @@ FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Eigen::Isometry
                 [&] { window_.gather(scans_, decision_->window_length()); });  // Eq. 3
   timer.measure(&StageTimes::cluster, [&] { window_.cluster(clusterer_); });   // Eq. 4
   decision_->observe(scans_, window_, timer);                                  // Eq. 4-18
-  timer.measure(&StageTimes::verdict, [&] { writer_.begin(newest, window_.newest_cluster_of()); });
-  decision_->judge_newest(newest, writer_, timer);  // Eq. 19, 2
+  judge_newest(newest, timer);                                                 // Eq. 19, 2
   transaction.commit();
-  FrameResult result{newest.verdict(), {}, {}};
-  if (scans_.open() > latency()) result.finished = finish_oldest(timer);  // Eq. 1
+  std::optional<ScanVerdict> finished;
+  if (scans_.open() > latency()) finished = finish_oldest(timer);  // Eq. 2, 1
   timer.measure(&StageTimes::revision, [&] { decision_->revise(map_, newest); });
-  result.times = timer.times();
-  return result;
+  return {newest.verdict(), finished, timer.times()};
 }
 
-/// Eq. 2 and Eq. 1. If the map throws, the scan counts as final all the same: its slot is needed.
+template <class Stages>
+void Pipeline<Stages>::judge_newest(ScanSlot& newest, StageTimer& timer) {
+  timer.measure(&StageTimes::verdict, [&] { writer_.begin(newest, window_.newest_cluster_of()); });
+  decision_->judge_newest(newest, writer_, timer);
+}
+
+/// If the map throws, the scan counts as final all the same, since its slot is needed.
 template <class Stages>
 ScanVerdict Pipeline<Stages>::finish_oldest(StageTimer& timer) {
   ScanSlot& scan = scans_.finish_oldest();

@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/curved_voxel_clusterer.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/capacity.hpp"

@@ -87,7 +87,8 @@ struct IsEvidence<
             std::is_convertible_v<decltype(std::declval<Stage&>().judge(
                                       std::uint64_t{}, bool{}, std::declval<const GroundSplit&>())),
                                   EvidenceVerdict> &&
-            std::is_convertible_v<decltype(std::declval<const Stage&>().horizon()), std::size_t> &&
+            std::is_convertible_v<decltype(std::declval<const Stage&>().lookahead_scans()),
+                                  std::size_t> &&
             std::is_convertible_v<decltype(std::declval<const Stage&>().predecessors()),
                                   Span<const std::uint32_t>>>>> : std::true_type {};
 
@@ -109,7 +110,7 @@ struct IsRevisable<Map, Evidence,
                                decltype(std::declval<const Map&>().block_corner(std::uint32_t{})),
                                decltype(std::declval<const Map&>().visit_in_block(
                                    std::uint32_t{}, std::declval<void (*)(float, float, float)>())),
-                               decltype(std::declval<Evidence&>().see(
+                               decltype(std::declval<Evidence&>().test_visibility(
                                    std::declval<const PointBuffer&>(), std::size_t{},
                                    std::declval<const Eigen::Isometry3d&>()))>> : std::true_type {};
 

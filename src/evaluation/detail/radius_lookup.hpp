@@ -35,12 +35,11 @@ class RadiusLookup {
     const Eigen::Vector3d center =
         grid_.corner(key) + Eigen::Vector3d::Constant(0.5 * grid_.edge());
     for (unsigned corner = 0; corner < 8; ++corner) {
-      VoxelKey neighbour = key;
-      for (int axis = 0; axis < 3; ++axis) {
-        if ((corner >> axis & 1U) == 0) continue;
-        const VoxelKey step = VoxelKey{1} << (axis * kKeyBits);
-        neighbour = p[axis] < center[axis] ? neighbour - step : neighbour + step;
-      }
+      const auto step = [&](int axis) {
+        if ((corner >> axis & 1U) == 0) return 0;
+        return p[axis] < center[axis] ? -1 : 1;
+      };
+      const VoxelKey neighbour = key + voxel_key_step(step(0), step(1), step(2));
       const std::uint32_t cell = groups_.index().find(neighbour);
       if (cell == VoxelIndex::kNone) continue;
       for (const std::uint32_t i : groups_.points(cell)) {

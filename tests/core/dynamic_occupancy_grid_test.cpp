@@ -1,5 +1,5 @@
-// Places that movers pass, against counts that are never forgotten, and by hand.
-#include "dynains/evidence/passages.hpp"
+// The dynamic occupancy grid, against counts by hand and a slow reference count.
+#include "dynains/evidence/dynamic_occupancy_grid.hpp"
 
 #include <cmath>
 #include <cstdint>
@@ -13,8 +13,8 @@
 namespace dynains::test {
 namespace {
 
-using Count = Passages::Count;
-using Verdict = Passages::Verdict;
+using Count = DynamicOccupancyGrid::Count;
+using Verdict = DynamicOccupancyGrid::Verdict;
 
 // A scan of single points, each a supervoxel of its own, and what is said of them.
 struct SparseScan {
@@ -38,87 +38,88 @@ constexpr float kBelief = 0.625F;
 
 FreeSpaceConfig three_quarters() {
   FreeSpaceConfig config;
-  config.passage_share = 0.75;
+  config.dynamic_grid_ratio = 0.75;
   return config;
 }
 
 // The cause of a point that stays, if so many in its place moved and stayed before.
 Verdict verdict_behind(int moved, int stayed, FreeSpaceConfig config = three_quarters(),
                        std::uint64_t later = 1, Cause cause_of_moved = Cause::kFreeSpace) {
-  Passages passages(config);
+  DynamicOccupancyGrid grid(config);
   const Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   const std::vector<Eigen::Vector3f> place(1, {10.1F, 5.2F, 0.3F});
   std::uint64_t scan = 0;
   for (int i = 0; i < moved + stayed; ++i) {
     SparseScan one(place);
     one.say(i < moved ? cause_of_moved : Cause::kOccupied);
-    passages.judge(scan++, one.samples, T, one.counted, one.verdicts);
+    grid.judge(scan++, one.samples, T, one.counted, one.verdicts);
   }
   SparseScan last(place);
   last.say(Cause::kOccupied, kBelief);
-  passages.judge(scan - 1 + later, last.samples, T, last.counted, last.verdicts);
+  grid.judge(scan - 1 + later, last.samples, T, last.counted, last.verdicts);
   return last.verdicts[0];
 }
 
-TEST_CASE("what stays where nearly all else moved goes, too") {
+TEST_CASE("a static sample is removed if nearly all samples of its cell are dynamic") {
   // The point itself is one that stays.
-  CHECK(verdict_behind(4, 0).cause == Cause::kInPassage);  // 4 of 5
-  CHECK(verdict_behind(3, 0).cause == Cause::kOccupied);   // 3 of 4: not above the share
-  CHECK(verdict_behind(7, 1).cause == Cause::kInPassage);  // 7 of 9
-  CHECK(verdict_behind(6, 1).cause == Cause::kOccupied);   // 6 of 8
+  CHECK(verdict_behind(4, 0).cause == Cause::kDynamicOccupancy);  // 4 of 5
+  CHECK(verdict_behind(3, 0).cause == Cause::kOccupied);          // 3 of 4: not above the share
+  CHECK(verdict_behind(7, 1).cause == Cause::kDynamicOccupancy);  // 7 of 9
+  CHECK(verdict_behind(6, 1).cause == Cause::kOccupied);          // 6 of 8
   FreeSpaceConfig half = three_quarters();
-  half.passage_share = 0.5;
-  CHECK(verdict_behind(3, 0, half).cause == Cause::kInPassage);
+  half.dynamic_grid_ratio = 0.5;
+  CHECK(verdict_behind(3, 0, half).cause == Cause::kDynamicOccupancy);
   CHECK(verdict_behind(2, 0, half).cause == Cause::kOccupied);  // two samples may be chance
 }
 
-TEST_CASE("the belief in a passage is the share that moved, unless more was known") {
+TEST_CASE(
+    "the belief in a dynamic cell is its ratio of dynamic samples, if that is the higher one") {
   CHECK(verdict_behind(4, 0).belief == Approx(0.8F));
   CHECK(verdict_behind(3, 0).belief == kBelief);
 }
 
-TEST_CASE("passages are forgotten when no scan met them for as long as anything is remembered") {
+TEST_CASE("a cell is cleared if no scan of the lookback interval has a sample in it") {
   FreeSpaceConfig config = three_quarters();
-  config.memory = 20;
-  CHECK(verdict_behind(8, 0, config, 20).cause == Cause::kInPassage);
+  config.lookback_scans = 20;
+  CHECK(verdict_behind(8, 0, config, 20).cause == Cause::kDynamicOccupancy);
   CHECK(verdict_behind(8, 0, config, 21).cause == Cause::kOccupied);
 }
 
-TEST_CASE("what is presumed to move makes no passage, and a share of 1 knows none") {
+TEST_CASE("presumed instances are not counted, and a ratio of 1 turns the grid off") {
   CHECK(verdict_behind(8, 0, three_quarters(), 1, Cause::kPresumed).cause == Cause::kOccupied);
   FreeSpaceConfig never;
-  never.passage_share = 1.0;
+  never.dynamic_grid_ratio = 1.0;
   CHECK(verdict_behind(100, 0, never).cause == Cause::kOccupied);
 }
 
 TEST_CASE("a later verdict on a scan counts in the place of the one before") {
-  Passages passages(three_quarters());
+  DynamicOccupancyGrid grid(three_quarters());
   const Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   const std::vector<Eigen::Vector3f> place(1, {-3.0F, 4.0F, 1.0F});
   std::vector<SparseScan> scans(5, SparseScan(place));
   const auto judge = [&](std::uint64_t scan, Cause cause) {
     SparseScan& one = scans[scan];
     one.say(cause);
-    passages.judge(scan, one.samples, T, one.counted, one.verdicts);
+    grid.judge(scan, one.samples, T, one.counted, one.verdicts);
     return one.verdicts[0].cause;
   };
   for (std::uint64_t scan = 0; scan < 4; ++scan) judge(scan, Cause::kFreeSpace);
   // Asked again and again, it counts once: 4 of 5.
-  for (int i = 0; i < 10; ++i) CHECK(judge(4, Cause::kOccupied) == Cause::kInPassage);
+  for (int i = 0; i < 10; ++i) CHECK(judge(4, Cause::kOccupied) == Cause::kDynamicOccupancy);
   // One of those that moved did not: 3 of 5. And then it did.
   CHECK(judge(0, Cause::kOccupied) == Cause::kOccupied);
   CHECK(judge(4, Cause::kOccupied) == Cause::kOccupied);
   CHECK(judge(0, Cause::kAlongTrack) == Cause::kAlongTrack);
-  CHECK(judge(4, Cause::kOccupied) == Cause::kInPassage);
-  passages.forget();
+  CHECK(judge(4, Cause::kOccupied) == Cause::kDynamicOccupancy);
+  grid.clear();
   scans[4].counted.assign(1, Count::kNone);
   CHECK(judge(4, Cause::kOccupied) == Cause::kOccupied);
 }
 
-TEST_CASE("passages lie in the world: a sensor that moves and turns finds them again") {
+TEST_CASE("cells lie in the world frame: their counts do not depend on the pose of the sensor") {
   FreeSpaceConfig config;
-  config.passage_share = 0.5;
-  Passages passages(config);
+  config.dynamic_grid_ratio = 0.5;
+  DynamicOccupancyGrid grid(config);
   const Eigen::Vector3f place(20.3F, -7.7F, 0.3F);  // the middle of a cell
   for (std::uint64_t scan = 0; scan < 10; ++scan) {
     Eigen::Isometry3d T_origin_sensor = Eigen::Isometry3d::Identity();
@@ -128,21 +129,21 @@ TEST_CASE("passages lie in the world: a sensor that moves and turns finds them a
     const std::vector<Eigen::Vector3f> seen(1, T_origin_sensor.inverse().cast<float>() * place);
     SparseScan one(seen);
     one.say(scan < 9 ? Cause::kFreeSpace : Cause::kOccupied);
-    passages.judge(scan, one.samples, T_origin_sensor, one.counted, one.verdicts);
-    if (scan == 9) CHECK(one.verdicts[0].cause == Cause::kInPassage);
+    grid.judge(scan, one.samples, T_origin_sensor, one.counted, one.verdicts);
+    if (scan == 9) CHECK(one.verdicts[0].cause == Cause::kDynamicOccupancy);
   }
 }
 
-TEST_CASE("passages are those of slow counts") {
+TEST_CASE("the grid equals a slow reference count") {
   Random random(11);
   FreeSpaceConfig config;
-  config.passage_share = 0.6;
-  Passages passages(config);
+  config.dynamic_grid_ratio = 0.6;
+  DynamicOccupancyGrid grid(config);
   struct Counts {
     int moved = 0, stayed = 0;
   };
   std::map<std::tuple<int, int, int>, Counts> cells;
-  std::size_t in_passages = 0, stay = 0;
+  std::size_t in_grid = 0, stay = 0;
   for (std::uint64_t scan = 0; scan < 40; ++scan) {
     std::vector<Eigen::Vector3f> points;
     for (int i = 0; i < 300; ++i) {
@@ -166,7 +167,7 @@ TEST_CASE("passages are those of slow counts") {
       ++(is_dynamic(one.verdicts[s].cause) ? counts.moved : counts.stayed);
     }
     const std::vector<Verdict> said = one.verdicts;
-    passages.judge(scan, one.samples, Eigen::Isometry3d::Identity(), one.counted, one.verdicts);
+    grid.judge(scan, one.samples, Eigen::Isometry3d::Identity(), one.counted, one.verdicts);
     for (std::size_t s = 0; s < said.size(); ++s) {
       if (is_dynamic(said[s].cause)) {
         REQUIRE(one.verdicts[s] == said[s]);
@@ -175,25 +176,25 @@ TEST_CASE("passages are those of slow counts") {
       const Counts& counts = cells[cell_of(s)];
       const bool expected =
           counts.moved >= 3 && 10 * counts.moved > 6 * (counts.moved + counts.stayed);
-      REQUIRE((one.verdicts[s].cause == Cause::kInPassage) == expected);
-      ++(expected ? in_passages : stay);
+      REQUIRE((one.verdicts[s].cause == Cause::kDynamicOccupancy) == expected);
+      ++(expected ? in_grid : stay);
     }
   }
-  CHECK(in_passages > 500);
+  CHECK(in_grid > 500);
   CHECK(stay > 500);
 }
 
-TEST_CASE("of a supervoxel of many samples, a quarter must lie in a passage") {
+TEST_CASE("a quarter of the samples of a supervoxel must lie in dynamic cells") {
   FreeSpaceConfig config;
-  config.passage_share = 0.5;
-  Passages passages(config);
+  config.dynamic_grid_ratio = 0.5;
+  DynamicOccupancyGrid grid(config);
   const Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   const std::vector<Eigen::Vector3f> passed(1, {0.15F, 0.15F, 0.15F});
   std::uint64_t scan = 0;
   for (; scan < 20; ++scan) {
     SparseScan one(passed);
     one.say(Cause::kFreeSpace);
-    passages.judge(scan, one.samples, T, one.counted, one.verdicts);
+    grid.judge(scan, one.samples, T, one.counted, one.verdicts);
   }
   // Four by four samples, 0.3 m apart: those of the corner, two by two, lie in the cell.
   const auto cause_of = [&](int inside, int outside) {
@@ -211,10 +212,10 @@ TEST_CASE("of a supervoxel of many samples, a quarter must lie in a passage") {
     REQUIRE(samples.size() == points.size());
     std::vector<Count> counted(1, Count::kNone);
     std::vector<Verdict> verdicts(1, {Cause::kOccupied, 0.5F});
-    passages.judge(scan++, samples, T, counted, verdicts);
+    grid.judge(scan++, samples, T, counted, verdicts);
     return verdicts[0].cause;
   };
-  CHECK(cause_of(2, 6) == Cause::kInPassage);
+  CHECK(cause_of(2, 6) == Cause::kDynamicOccupancy);
   CHECK(cause_of(2, 7) == Cause::kOccupied);
 }
 

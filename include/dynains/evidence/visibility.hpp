@@ -1,4 +1,4 @@
-// The inner loop of free-space evidence: samples of one scan against the range image of another.
+// Visibility of points from another scan: the inner loop of free-space evidence.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -18,23 +18,24 @@
 
 namespace dynains::detail {
 
-/// Beams that are tested together.
+/// Number of samples that are tested together.
 inline constexpr std::size_t kBeamBlock = 256;
 
-/// What one reference says of many samples, a bit each.
-class Sights {
+/// Result of testing samples against one reference: for each sample one bit "free" and one bit
+/// "hit", at most one of them set.
+class Visibility {
  public:
-  /// Room for `count` samples; their bits are to be written.
+  /// Makes room for `count` samples; the caller writes their bits.
   void resize(std::size_t count) {
-    // Counting reads eight bytes from that of the first bit on.
+    // count() reads eight bytes, beginning with the byte of the first bit.
     const std::size_t bytes = (count + kBeamBlock - 1) / kBeamBlock * kBeamBlock / 8 + 8;
     grow(free_, bytes);
     grow(hit_, bytes);
   }
-  /// To be written: a byte for eight samples.
+  /// Storage of the bits: one byte for eight samples.
   struct Bytes {
-    std::uint8_t* free;  ///< all beams about the sample went farther
-    std::uint8_t* hit;   ///< a beam ended there, at something that stays
+    std::uint8_t* free;  ///< all beams around the sample are longer than its range
+    std::uint8_t* hit;   ///< a beam ended at the sample, on a static point
   };
   Bytes bytes() { return {free_.data(), hit_.data()}; }
 
@@ -43,7 +44,8 @@ class Sights {
     std::uint32_t hit;
   };
   Count count(std::size_t begin, std::size_t end) const {
-    constexpr std::size_t kAtOnce = 56;  // what a word has at least, from any bit of its first byte
+    constexpr std::size_t kAtOnce =
+        56;  // bits of a word behind any bit of its first byte, at least
     constexpr std::uint64_t kAll = (std::uint64_t{1} << kAtOnce) - 1;
     Count seen = {0, 0};
     for (; end - begin > kAtOnce; begin += kAtOnce) {
@@ -55,8 +57,8 @@ class Sights {
     seen.hit += count_ones(word_from(hit_, begin) & left);
     return seen;
   }
-  /// Counts up, for each of the first `count` samples, how many references saw it free or hit it:
-  /// fewer than 256. Both have room for a multiple of eight.
+  /// Increments, for each of the first `count` samples, its number of references that find it free
+  /// or hit it (fewer than 256). Both arrays have room for a multiple of eight.
   void add_to(std::size_t count, std::uint8_t* free, std::uint8_t* hit) const {
     for (std::size_t i = 0; i < count; i += 8) {
       for (std::size_t k = 0; k < 8; ++k) {
@@ -66,15 +68,15 @@ class Sights {
     }
   }
 
-  /// Of the 64 samples from `first` on, a multiple of 64; of those behind the last it may say
-  /// anything.
+  /// Bits of the 64 samples from `first` on, a multiple of 64. Bits behind the last sample are
+  /// arbitrary.
   std::uint64_t free_word(std::size_t first) const { return word_at(free_, first); }
   std::uint64_t hit_word(std::size_t first) const { return word_at(hit_, first); }
   bool is_free(std::size_t sample) const { return (free_[sample / 8] >> sample % 8 & 1U) != 0; }
   bool is_hit(std::size_t sample) const { return (hit_[sample / 8] >> sample % 8 & 1U) != 0; }
 
  private:
-  // From the byte on that holds the first bit.
+  // The word that begins with the byte of the first bit.
   static std::uint64_t word_at(const std::vector<std::uint8_t>& bits, std::size_t first) {
     std::uint64_t word;
     std::memcpy(&word, &bits[first / 8], sizeof(word));
@@ -86,28 +88,28 @@ class Sights {
   std::vector<std::uint8_t> free_, hit_;
 };
 
-/// Tests `count` samples against a reference. `samples`: m, padded for wide loads;
-/// `T_reference_sample`: rigid. `margin` + `slope` * range: m, how much farther a beam must go to
-/// pass. What moved and was met again says nothing of its place.
-inline void test_beams(const RangeImage& image, const Eigen::Isometry3f& T_reference_sample,
-                       const PointBuffer& samples, std::size_t count, float margin, float slope,
-                       Sights& sights) {
+/// Tests `count` samples (m; padded for wide loads) against a range image. A beam passes a sample
+/// if it is longer by more than `margin` (m) + `slope` (m/m) * range. Hits on moving points are
+/// neither "free" nor "hit". `T_reference_sample`: rigid.
+inline void test_visibility(const RangeImage& image, const Eigen::Isometry3f& T_reference_sample,
+                            const PointBuffer& samples, std::size_t count, float margin,
+                            float slope, Visibility& visibility) {
   constexpr float kCentimetres = 100.0F;
   const PackTransform to_reference(T_reference_sample.matrix().topRows<3>());
   const PackConstant to_centimetres(kCentimetres);
   const PackConstant base(margin * kCentimetres), growth(slope * kCentimetres);
   const ImageLocator locator(image.grid());
-  sights.resize(count);
+  visibility.resize(count);
   run_packs([&](auto packs) {
     using Packs = decltype(packs);
     using Float = typename Packs::Float;
     using Int = typename Packs::Int;
-    // Read once: stores of bytes may change anything, as far as the compiler knows.
-    const Sights::Bytes seen = sights.bytes();
+    // Local copies: stores of bytes may alias the members.
+    const Visibility::Bytes seen = visibility.bytes();
     const RangeImage::Cell* const cells = image.data();
     const Float scale(to_centimetres), least(base), slope_per_metre(growth);
-    // Images are larger than the caches near the core: all cells of a block are asked for before
-    // the first is needed.
+    // Images are larger than the first caches: all cells of a block are prefetched before the first
+    // is used.
     std::int32_t cell[kBeamBlock];
     float ranges[kBeamBlock];
     std::int32_t packed[kPackWidth];

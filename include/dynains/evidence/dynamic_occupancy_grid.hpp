@@ -1,0 +1,173 @@
+// Dynamic occupancy grid: places that moving objects pass. Goes beyond the paper.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/cause.hpp"
+#include "dynains/evidence/instance_samples.hpp"
+#include "dynains/stage/evidence_verdict.hpp"
+#include "dynains/stage/free_space_config.hpp"
+#include "dynains/voxel/voxel_key.hpp"
+
+namespace dynains {
+
+/// Counts dynamic and static samples in cells of the world. In cells where nearly all samples are
+/// dynamic, the others are dynamic, too: in a crowd, people hide that a place became free, and the
+/// next hit at that key is another person.
+///
+/// The number of cells is bounded: new cells replace those without samples for the longest time.
+class DynamicOccupancyGrid {
+ public:
+  using Verdict = EvidenceVerdict::Group;
+  /// How a supervoxel is counted.
+  enum class Count : std::uint8_t { kNone, kStatic, kDynamic };
+
+  explicit DynamicOccupancyGrid(const FreeSpaceConfig& config)
+      : cell_(config.dynamic_grid_cell),
+        ratio_(static_cast<float>(config.dynamic_grid_ratio)),
+        lookback_scans_(config.lookback_scans),
+        lines_(config.dynamic_grid_ratio < 1.0 ? kLines : 0),
+        may_be_dynamic_(lines_.size()) {}
+
+  /// Removes all cells. Call it before the frame `origin` changes.
+  void clear() {
+    std::fill(lines_.begin(), lines_.end(), Line());
+    std::fill(may_be_dynamic_.begin(), may_be_dynamic_.end(), false);
+  }
+
+  /// Counts the verdicts of scan number `scan`, by supervoxel, instead of its former ones in
+  /// `counted`, and changes verdicts of static supervoxels in dynamic cells to kDynamicOccupancy.
+  /// `origin`: one frame near all scans.
+  void judge(std::uint64_t scan, const InstanceSamples& samples,
+             const Eigen::Isometry3d& T_origin_sensor, std::vector<Count>& counted,
+             std::vector<Verdict>& verdicts) {
+    if (lines_.empty()) return;
+    detail::find_cells(samples, cell_, T_origin_sensor, keys_);
+    const std::uint32_t now = static_cast<std::uint32_t>(scan) + 1;
+    for (std::size_t s = 0; s < samples.supervoxel_count(); ++s) {
+      const Count count = count_of(verdicts[s].cause);
+      if (count == counted[s]) continue;
+      for (std::uint32_t i = samples.sample_begin[s]; i < samples.sample_begin[s + 1]; ++i) {
+        if (i + kPrefetchDistance < keys_.size())
+          __builtin_prefetch(&lines_[line_of(keys_[i + kPrefetchDistance])]);
+        recount(keys_[i], now, counted[s], count);
+      }
+      counted[s] = count;
+    }
+    for (std::size_t s = 0; s < samples.supervoxel_count(); ++s) {
+      if (counted[s] == Count::kStatic) judge_supervoxel(samples, s, now, verdicts[s]);
+    }
+  }
+
+ private:
+  struct Cell {
+    VoxelKey key = 0;
+    std::uint32_t last_scan = 0;  // number of the latest scan with samples in it, from 1
+    std::uint16_t static_count = 0;
+    std::uint16_t dynamic_count = 0;
+  };
+  // One cache line of the processor.
+  struct alignas(64) Line {
+    std::array<Cell, 4> cells;
+  };
+
+  static constexpr std::size_t kLines = 1U << 15;
+  static constexpr std::uint16_t kMaxCount = 1000;      // then all counts are halved
+  static constexpr std::uint16_t kLeastDynamic = 3;     // samples
+  static constexpr std::uint32_t kPart = 4;             // one of so many samples in dynamic cells
+  static constexpr std::size_t kPrefetchDistance = 32;  // samples
+
+  // Presumed instances have no evidence of motion.
+  static Count count_of(Cause cause) {
+    if (cause == Cause::kPresumed) return Count::kNone;
+    return is_dynamic(cause) ? Count::kDynamic : Count::kStatic;
+  }
+
+  static std::size_t line_of(VoxelKey key) { return voxel_hash(key) >> 8 & (kLines - 1); }
+
+  // The cell of a key if a scan of the lookback interval has samples in it.
+  const Cell* find(VoxelKey key, std::uint32_t now) const {
+    for (const Cell& cell : lines_[line_of(key)].cells) {
+      if (cell.key == key) return age(cell, now) <= lookback_scans_ ? &cell : nullptr;
+    }
+    return nullptr;
+  }
+
+  // The cell of a key; a new one replaces the oldest of its line.
+  Cell& cell_for(VoxelKey key, std::uint32_t now) {
+    Line& line = lines_[line_of(key)];
+    for (Cell& cell : line.cells) {
+      if (cell.key != key) continue;
+      if (age(cell, now) > lookback_scans_) cell = {key, now, 0, 0};
+      cell.last_scan = std::max(cell.last_scan, now);
+      return cell;
+    }
+    Cell& oldest =
+        *std::min_element(line.cells.begin(), line.cells.end(),
+                          [](const Cell& a, const Cell& b) { return a.last_scan < b.last_scan; });
+    oldest = {key, now, 0, 0};
+    const bool may_be_dynamic =
+        std::any_of(line.cells.begin(), line.cells.end(),
+                    [](const Cell& cell) { return cell.dynamic_count >= kLeastDynamic; });
+    may_be_dynamic_[line_of(key)] = may_be_dynamic;
+    return oldest;
+  }
+
+  // Scans since its last sample; negative if a later scan has samples in it.
+  static std::int32_t age(const Cell& cell, std::uint32_t now) {
+    return static_cast<std::int32_t>(now - cell.last_scan);
+  }
+
+  // Counts one sample as `count` instead of `before`.
+  void recount(VoxelKey key, std::uint32_t now, Count before, Count count) {
+    Cell& cell = cell_for(key, now);
+    if (before == Count::kDynamic && cell.dynamic_count > 0) --cell.dynamic_count;
+    if (before == Count::kStatic && cell.static_count > 0) --cell.static_count;
+    if (count == Count::kDynamic) ++cell.dynamic_count;
+    if (count == Count::kStatic) ++cell.static_count;
+    if (cell.dynamic_count >= kLeastDynamic) may_be_dynamic_[line_of(key)] = true;
+    if (cell.dynamic_count + cell.static_count < kMaxCount) return;
+    cell.dynamic_count /= 2;
+    cell.static_count /= 2;
+  }
+
+  static float dynamic_ratio(const Cell& cell) {
+    return static_cast<float>(cell.dynamic_count) /
+           static_cast<float>(cell.dynamic_count + cell.static_count);
+  }
+
+  void judge_supervoxel(const InstanceSamples& samples, std::size_t s, std::uint32_t now,
+                        Verdict& verdict) const {
+    const std::uint32_t begin = samples.sample_begin[s];
+    const std::uint32_t end = samples.sample_begin[s + 1];
+    std::uint32_t inside = 0;
+    float highest = 0.0F;
+    for (std::uint32_t i = begin; i < end; ++i) {
+      if (!may_be_dynamic_[line_of(keys_[i])]) continue;
+      const Cell* const cell = find(keys_[i], now);
+      if (cell == nullptr || cell->dynamic_count < kLeastDynamic) continue;
+      const float ratio = dynamic_ratio(*cell);
+      if (!(ratio > ratio_)) continue;
+      ++inside;
+      highest = std::max(highest, ratio);
+    }
+    if (inside == 0 || kPart * inside < end - begin) return;
+    verdict = {Cause::kDynamicOccupancy, std::max(verdict.belief, highest)};
+  }
+
+  double cell_;
+  float ratio_;
+  std::int32_t lookback_scans_;
+  std::vector<Line> lines_;
+  // By line: whether any of its cells may be dynamic. Few are, so that most samples need no access
+  // to their cell.
+  std::vector<bool> may_be_dynamic_;
+  std::vector<VoxelKey> keys_;  // by sample
+};
+
+}  // namespace dynains

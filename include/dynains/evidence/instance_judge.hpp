@@ -1,0 +1,154 @@
+// Verdicts on the supervoxels of the instances of one scan.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/cause.hpp"
+#include "dynains/evidence/instance_beliefs.hpp"
+#include "dynains/evidence/instance_samples.hpp"
+#include "dynains/evidence/instance_tracks.hpp"
+#include "dynains/evidence/supervoxel_groups.hpp"
+#include "dynains/stage/evidence_verdict.hpp"
+#include "dynains/stage/free_space_config.hpp"
+
+namespace dynains {
+
+/// Evidence on the instances of one scan.
+struct InstanceEvidence {
+  InstanceSamples samples;
+  InstanceBeliefs beliefs;
+  TrackedInstances tracked;
+};
+
+/// Turns the evidence on instances into verdicts. Goes beyond the paper.
+class InstanceJudge {
+ public:
+  using Verdict = EvidenceVerdict::Group;
+
+  explicit InstanceJudge(const FreeSpaceConfig& config)
+      : use_tracks_(config.use_tracks),
+        presume_dynamic_(config.presume_dynamic),
+        still_weight_(static_cast<float>(config.still_weight)),
+        track_level_(static_cast<float>(log_odds(config.tau_track))) {}
+
+  /// Log-odds that an instance moved, from the free-space evidence of its own scan alone.
+  float own_log_odds(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
+                     std::size_t instance) const {
+    const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
+    const float unit = updater.increment();
+    if (updater.removes_whole(evidence.samples, evidence.beliefs, instance)) {
+      return (2 * counts.moved >= counts.decided && counts.moved > 0 ? 2.0F : 1.0F) * unit;
+    }
+    const auto moved = static_cast<float>(counts.moved);
+    const auto decided = static_cast<float>(counts.decided);
+    const bool is_known =
+        decided >= InstanceBeliefUpdater::kLeastKnown * static_cast<float>(counts.total) &&
+        decided > 0.0F;
+    return is_known && moved < kStillRatio * decided ? -still_weight_ * unit : 0.0F;
+  }
+
+  /// Writes one verdict per supervoxel. `may_presume`: the verdict is provisional, and there are
+  /// earlier scans. Calls `on_removed(instance)` for each instance that is removed as a whole.
+  template <class OnRemoved>
+  void judge(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
+             bool may_presume, std::vector<Verdict>& verdicts, OnRemoved&& on_removed) {
+    const InstanceSamples& samples = evidence.samples;
+    verdicts.resize(samples.supervoxel_count());
+    for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
+      const std::uint32_t first = samples.supervoxel_begin[instance];
+      const std::uint32_t last = samples.supervoxel_begin[instance + 1];
+      float level = judge_alone(evidence.beliefs, updater, first, last, verdicts);
+      const Cause whole = cause_of_whole(evidence, updater, may_presume, instance, level);
+      if (is_dynamic(whole)) {
+        const Verdict verdict = {whole, as_probability(std::max(level, updater.free_level()))};
+        std::fill(verdicts.begin() + first, verdicts.begin() + last, verdict);
+        on_removed(instance);
+      } else {
+        // A part of the instance moved; few free samples may be noise.
+        groups_.keep_large(samples, kLeastGroup, free_);
+      }
+      for (const std::uint32_t s : free_) verdicts[s].cause = Cause::kFreeSpace;
+    }
+  }
+
+  /// Whether a supervoxel with verdict `cause` surely moved. A free part of the instance is not
+  /// enough: that may be foliage, or a static object beside a dynamic one.
+  bool surely_moves(const InstanceEvidence& evidence, std::uint32_t supervoxel, Cause cause) const {
+    if (cause == Cause::kFreeSpace || cause == Cause::kDynamicOccupancy) return true;
+    if (!use_tracks_ || !is_dynamic(cause) || cause == Cause::kPresumed) return false;
+    const std::uint32_t instance = evidence.samples.instance_of[supervoxel];
+    const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
+    return 2 * counts.moved >= counts.decided &&
+           evidence.tracked.instances[instance].track_log_odds() >= track_level_;
+  }
+
+ private:
+  static constexpr float kStillRatio = 0.02F;  // moved to decided samples, below which it is still
+  static constexpr std::size_t kLeastGroup = 4;  // samples
+
+  // Verdicts of the supervoxels on their own; lists the free ones in `free_`. Returns the highest
+  // log-odds.
+  float judge_alone(const InstanceBeliefs& beliefs, const InstanceBeliefUpdater& updater,
+                    std::uint32_t first, std::uint32_t last, std::vector<Verdict>& verdicts) {
+    free_.clear();
+    float level = 0.0F;
+    for (std::uint32_t s = first; s < last; ++s) {
+      const InstanceBeliefs::Belief& belief = beliefs.supervoxels[s];
+      level = std::max(level, belief.peak);
+      verdicts[s] = {cause_to_stay(belief), as_probability(belief.peak)};
+      if (updater.is_free(belief)) free_.push_back(s);
+    }
+    return level;
+  }
+
+  static Cause cause_to_stay(const InstanceBeliefs::Belief& belief) {
+    if (belief.peak > 0.0F) return Cause::kTooLittleFree;
+    return belief.contested != 0 ? Cause::kOccupied : Cause::kNoEvidence;
+  }
+
+  // Cause to remove an instance as a whole, or kNoEvidence. Raises `level` to the log-odds along
+  // its track.
+  Cause cause_of_whole(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
+                       bool may_presume, std::size_t instance, float& level) const {
+    if (updater.removes_whole(evidence.samples, evidence.beliefs, instance)) {
+      return Cause::kWithInstance;
+    }
+    if (!use_tracks_ || !evidence.tracked.shapes[instance].carried) return Cause::kNoEvidence;
+    const float along_track = evidence.tracked.instances[instance].track_log_odds();
+    level = std::max(level, along_track);
+    if (along_track >= track_level_) return Cause::kAlongTrack;
+    return may_presume && is_presumed(evidence, instance) ? Cause::kPresumed : Cause::kNoEvidence;
+  }
+
+  // Zero latency: a compact instance at a place without evidence may be a vehicle ahead, or a
+  // static object that came into view.
+  bool is_presumed(const InstanceEvidence& evidence, std::size_t instance) const {
+    constexpr std::uint32_t kLeastSamples = 5;
+    constexpr float kMaxLength = 15.0F, kMaxHeight = 3.5F;  // m
+    constexpr float kMaxDecided = 0.1F;                     // ratio to all samples
+    if (!presume_dynamic_) return false;
+    const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
+    const TrackedInstances::Shape& shape = evidence.tracked.shapes[instance];
+    return counts.total >= kLeastSamples && shape.length <= kMaxLength &&
+           shape.height <= kMaxHeight &&
+           static_cast<float>(counts.decided) <= kMaxDecided * static_cast<float>(counts.total);
+  }
+
+  // Log-odds of 0 are frequent and need no exponential.
+  static float as_probability(float level) {
+    return level == 0.0F ? 0.5F : 1.0F / (1.0F + std::exp(-level));
+  }
+
+  bool use_tracks_;
+  bool presume_dynamic_;
+  float still_weight_;
+  float track_level_;
+  SupervoxelGroups groups_;
+  std::vector<std::uint32_t> free_;  // supervoxels
+};
+
+}  // namespace dynains

@@ -1,0 +1,166 @@
+// Range images of some of the last scans.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "dynains/evidence/range_image.hpp"
+#include "dynains/evidence/visibility.hpp"
+#include "dynains/points.hpp"
+#include "dynains/sensor/rotation.hpp"
+#include "dynains/sensor/sensor_model.hpp"
+#include "dynains/stage/free_space_config.hpp"
+#include "dynains/stage/ground_split.hpp"
+
+namespace dynains {
+
+/// Scans from a scan to its references, on both sides: dense near the scan, sparse far from it. The
+/// scans beside it are left out, since an object has hardly moved there.
+inline constexpr std::array<int, 19> kReferenceLags = {2,  4,  6,  8,  10,  13,  16,  20,  25, 30,
+                                                       40, 50, 65, 80, 100, 125, 150, 175, 200};
+
+/// The lags of kReferenceLags up to `most`, each rounded up (or down, beyond `most`) to a lag with
+/// lag % step == remainder. Ascending, each once.
+inline std::vector<int> reference_lags(int most, int remainder, int step) {
+  const auto behind = [&](int lag) { return ((remainder - lag) % step + step) % step; };
+  const int last = most >= 0 ? most + behind(most) - (behind(most) > 0 ? step : 0) : 0;
+  std::vector<int> lags;
+  for (const int wanted : kReferenceLags) {
+    if (wanted >= most + step) break;
+    const int lag = std::min(wanted + behind(wanted), last);
+    if (lag > (lags.empty() ? 0 : lags.back())) lags.push_back(lag);
+  }
+  return lags;
+}
+
+/// A scan whose range image is kept: evidence on other scans.
+struct ReferenceScan {
+  static constexpr std::uint64_t kNoEpoch = ~std::uint64_t{0};
+
+  std::uint64_t scan = 0;
+  std::uint64_t epoch = kNoEpoch;
+  Eigen::Isometry3d T_world_beams = Eigen::Isometry3d::Identity();
+  RangeImage image;
+};
+
+/// Position of a scan relative to the newest reference at its time.
+struct ReferencePhase {
+  std::uint64_t since_image = 0;  ///< scans since that reference, below `reference_step`
+  std::uint64_t image = 0;        ///< number of its image
+};
+
+/// Keeps the images of the references of the last scans. The first scan of each epoch and every
+/// `reference_step`-th after it are references.
+class ReferenceScans {
+ public:
+  explicit ReferenceScans(const FreeSpaceConfig& config)
+      : margin_(static_cast<float>(config.margin)),
+        margin_slope_(static_cast<float>(config.margin_slope)),
+        lateral_margin_(static_cast<float>(config.lateral_margin)),
+        step_(static_cast<std::uint64_t>(config.reference_step)),
+        references_(
+            static_cast<std::size_t>(std::max(config.lookback_scans, config.lookahead_scans)) /
+                step_ +
+            1) {}
+
+  /// Sets the resolution of the images and the tilt of their frame.
+  void adapt(const SensorModel& sensor) {
+    grid_ = RangeImageGrid::for_sensor(sensor);
+    R_beams_level_.reset();
+    if (!sensor.is_level()) R_beams_level_ = sensor.R_level_headed.transpose();
+  }
+
+  /// Allocates the images of `scans` scans, or of as many as are kept.
+  void reserve(std::size_t scans) {
+    const std::size_t images = grid_.rows > 0 ? std::min(scans / step_ + 1, references_.size()) : 0;
+    for (std::size_t i = 1; i <= images; ++i) {
+      references_[(images_ + i) % references_.size()].image.reserve(grid_);
+    }
+  }
+
+  void forget() {
+    for (ReferenceScan& reference : references_) reference.epoch = ReferenceScan::kNoEpoch;
+  }
+
+  /// Counts the next scan, `since_begin` scans after the first of its epoch. It is a reference, and
+  /// needs make_image(), if `since_image` of the result is 0.
+  ReferencePhase advance(std::uint64_t since_begin) {
+    const std::uint64_t phase = since_begin % step_;
+    if (phase == 0) {
+      ++images_;
+      current().epoch = ReferenceScan::kNoEpoch;  // until its image is whole
+    }
+    return {phase, images_};
+  }
+
+  /// Makes the image of the newest reference, in the tilted frame of the sensor: only there are
+  /// beams rows of the image. `T_world_level`: pose of the frame of `split`. `moving`: by
+  /// non-ground point, see RangeImage::build.
+  void make_image(std::uint64_t scan, std::uint64_t epoch, const Eigen::Isometry3d& T_world_level,
+                  const GroundSplit& split, Span<const std::uint8_t> moving) {
+    ReferenceScan& reference = current();
+    reference.scan = scan;
+    reference.T_world_beams = T_world_level;
+    PointsView ground = split.ground();
+    PointsView rest = split.non_ground();
+    if (R_beams_level_) {
+      reference.T_world_beams.rotate(R_beams_level_->transpose());
+      const Eigen::Matrix3f R = R_beams_level_->cast<float>();
+      ground = detail::turn(ground, R, rotated_ground_);
+      rest = detail::turn(rest, R, rotated_rest_);
+    }
+    reference.image.build(grid_, ground, rest, moving, lateral_margin_, scratch_);
+    reference.epoch = epoch;
+  }
+
+  /// Whether the newest reference has no image yet.
+  bool awaits_image() const { return newest().epoch == ReferenceScan::kNoEpoch; }
+  const ReferenceScan& newest() const { return references_[images_ % references_.size()]; }
+
+  /// The reference `lag` scans after a scan (before it, if negative); null if there is none. `at`:
+  /// of that scan; at.since_image + lag is a multiple of the step.
+  const ReferenceScan* find(std::uint64_t scan, std::uint64_t epoch, const ReferencePhase& at,
+                            int lag) const {
+    const auto signed_step = static_cast<std::int64_t>(step_);
+    const std::int64_t to_image = lag + static_cast<std::int64_t>(at.since_image);
+    const std::uint64_t image =
+        at.image + static_cast<std::uint64_t>(to_image / signed_step);  // exact
+    const ReferenceScan& reference = references_[image % references_.size()];
+    const std::uint64_t wanted = scan + static_cast<std::uint64_t>(std::int64_t{lag});
+    return reference.scan == wanted && reference.epoch == epoch ? &reference : nullptr;
+  }
+
+  /// Visibility of the first `count` points (m; padded for wide loads) from a reference. Holds
+  /// until the next call.
+  const detail::Visibility& test(const PointBuffer& points, std::size_t count,
+                                 const Eigen::Isometry3d& T_world_points,
+                                 const ReferenceScan& reference) {
+    const Eigen::Isometry3d T_reference_points = reference.T_world_beams.inverse() * T_world_points;
+    detail::test_visibility(reference.image, T_reference_points.cast<float>(), points, count,
+                            margin_, margin_slope_, visibility_);
+    return visibility_;
+  }
+
+ private:
+  ReferenceScan& current() { return references_[images_ % references_.size()]; }
+
+  float margin_;
+  float margin_slope_;
+  float lateral_margin_;
+  std::uint64_t step_;  // scans from one image to the next
+  std::vector<ReferenceScan> references_;
+  std::uint64_t images_ = 0;  // number of the newest image
+  RangeImageGrid grid_;
+  std::optional<Eigen::Matrix3d> R_beams_level_;  // if the sensor is tilted
+  PointBuffer rotated_ground_;
+  PointBuffer rotated_rest_;
+  RangeImage::Scratch scratch_;
+  detail::Visibility visibility_;
+};
+
+}  // namespace dynains
