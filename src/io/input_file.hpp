@@ -1,4 +1,4 @@
-// Files to read, with the system's reason where that fails.
+// Files that are read: only regular ones, and errors with the reason of the system.
 #pragma once
 
 #include <cstdint>
