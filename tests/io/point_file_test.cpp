@@ -446,5 +446,5 @@ TEST_CASE("Point files that are not there are refused") {
   TemporaryFolder folder;
   fs::create_directory(folder / "folder.pcd");
   CHECK_THAT(message_of<IoError>([&] { read_points(folder / "folder.pcd"); }),
-             ContainsSubstring("folder.pcd: is a folder, expected a file"));
+             ContainsSubstring("folder.pcd: cannot be read"));
 }
