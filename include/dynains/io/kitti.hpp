@@ -52,7 +52,7 @@ class KittiSequence {
 
   /// x y z intensity of every point, interleaved. Values are as stored: NaN and infinity too.
   std::vector<float> read_scan(std::size_t i) const;
-  /// The same into a vector whose memory is reused.
+  /// Reads a scan into a vector whose memory is reused.
   void read_scan(std::size_t i, std::vector<float>& xyzi) const;
 
   /// One label per point of scan i; throws if the counts differ.
