@@ -82,7 +82,7 @@ class BasicDynaInsRemover {
     reserve_view(detail::CloudView(example), scans);
   }
 
-  /// The same for scans of that many points, of a 64-beam sensor in a street.
+  /// Reserves memory for scans of `points` points, by a synthetic scan of a 64-beam sensor.
   void reserve(std::size_t points);
 
   /// Processes one scan.
@@ -101,7 +101,8 @@ class BasicDynaInsRemover {
     return push_view(detail::CloudView(cloud), T_world_sensor, time);
   }
 
-  /// The same with times that are 0.1 s apart.
+  /// Pushes a scan 0.1 s after the scan before (one step of a double if that is more); the first at
+  /// 0 s.
   template <class Cloud>
   FrameResult push(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor) {
     return push_view(detail::CloudView(cloud), T_world_sensor, std::nullopt);

@@ -86,7 +86,7 @@ void ErrorAnalysis::add(const LabelledScan& scan) {
 }
 
 ErrorAnalysis::RingErrors& ErrorAnalysis::ring(double range) {
-  // The last ring takes all that is farther, should no limit be set.
+  // Without a range limit, the last ring has no outer border.
   constexpr std::size_t kMaxRings = 100;
   const auto number =
       std::min(static_cast<std::size_t>(range / settings_.ring_width), kMaxRings - 1);

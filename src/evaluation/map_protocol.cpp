@@ -94,9 +94,9 @@ class MapProtocol::Impl {
  private:
   static constexpr double kFar = std::numeric_limits<double>::infinity();
 
-  /// Map point next to measured points of more than one class.
+  /// A map point in a mixed map voxel: measured points around it have more than one class.
   struct Mixed {
-    double nearest = kFar;  // squared
+    double nearest = kFar;  // squared distance to the nearest measured point, m^2
     Truth truth = Truth::kIgnored;
   };
 
@@ -129,7 +129,8 @@ class MapProtocol::Impl {
     }
   }
 
-  /// Settles map voxels with measured points of one class around; the others wait for resolve().
+  /// Collects the classes of measured points around each map voxel. One class decides the points of
+  /// the voxel; mixed voxels are decided by resolve().
   void finish_first_pass() {
     if (finished_first_pass_) return;
     finished_first_pass_ = true;
@@ -153,14 +154,14 @@ class MapProtocol::Impl {
     return (truths_[cell] & (truths_[cell] - 1)) != 0;  // more than one bit
   }
 
-  /// Lets a measured point compete for being nearest to the undecided map points around it.
+  /// Updates the nearest measured point of the map points in mixed voxels around `p`.
   void approach(const Eigen::Vector3d& p, Truth truth) {
     const VoxelKey key = grid_.key(p);
     if (key == detail::kNoKey || near_mixed_.find(key) == VoxelIndex::kNone) return;
     for (const VoxelKey offset : detail::kNeighbours) {
       const std::uint32_t cell = groups_.index().find(key + offset);
       if (cell == VoxelIndex::kNone || !is_mixed(cell)) continue;
-      // Dense maps: most points are nearer to a point seen before than to this voxel.
+      // Skips voxels whose points all have a nearer measured point already: most, in dense maps.
       if (squared_distance(p, grid_.corner(key + offset), grid_.edge()) >= farthest_[cell]) {
         continue;
       }
@@ -213,14 +214,14 @@ class MapProtocol::Impl {
   detail::RadiusLookup lookup_;
   PointScore point_score_;
 
-  VoxelIndex measured_;  // voxels with measured points
+  VoxelIndex measured_;  // voxels that contain measured points
   std::vector<TruthMask> measured_truths_;
 
   bool finished_first_pass_ = false;
-  std::vector<TruthMask> truths_;  // per map voxel: measured around it
-  VoxelIndex near_mixed_;          // voxels whose measured points can decide a mixed map voxel
-  std::vector<Mixed> mixed_;       // in the order of groups_
-  std::vector<double> farthest_;   // per map voxel: largest Mixed::nearest
+  std::vector<TruthMask> truths_;  // by map voxel: classes of the measured points around it
+  VoxelIndex near_mixed_;          // mixed map voxels and their neighbours
+  std::vector<Mixed> mixed_;       // by map point, in the order of groups_
+  std::vector<double> farthest_;   // by map voxel: largest Mixed::nearest
 };
 
 MapProtocol::MapProtocol(const Settings& settings, Span<const Eigen::Vector3d> map_world)

@@ -7,6 +7,47 @@
 namespace dynains::evaluation {
 namespace {
 
+struct ClassName {
+  std::uint16_t id;
+  const char* name;
+};
+
+/// SemanticKITTI.
+constexpr ClassName kClassNames[] = {{0, "unlabeled"},
+                                     {1, "outlier"},
+                                     {10, "car"},
+                                     {11, "bicycle"},
+                                     {13, "bus"},
+                                     {15, "motorcycle"},
+                                     {16, "on-rails"},
+                                     {18, "truck"},
+                                     {20, "other-vehicle"},
+                                     {30, "person"},
+                                     {31, "bicyclist"},
+                                     {32, "motorcyclist"},
+                                     {40, "road"},
+                                     {44, "parking"},
+                                     {48, "sidewalk"},
+                                     {49, "other-ground"},
+                                     {50, "building"},
+                                     {51, "fence"},
+                                     {52, "other-structure"},
+                                     {60, "lane-marking"},
+                                     {70, "vegetation"},
+                                     {71, "trunk"},
+                                     {72, "terrain"},
+                                     {80, "pole"},
+                                     {81, "traffic-sign"},
+                                     {99, "other-object"},
+                                     {252, "moving-car"},
+                                     {253, "moving-bicyclist"},
+                                     {254, "moving-person"},
+                                     {255, "moving-motorcyclist"},
+                                     {256, "moving-on-rails"},
+                                     {257, "moving-bus"},
+                                     {258, "moving-truck"},
+                                     {259, "moving-other-vehicle"}};
+
 /// Reads a class id from the front of `text` and removes it.
 std::size_t take_id(std::string_view& text, std::string_view whole) {
   std::size_t id = 0;
@@ -59,78 +100,10 @@ std::string TruthClasses::dynamic_classes() const {
 }
 
 std::string semantic_class_name(std::uint16_t id) {
-  switch (id) {
-    case 0:
-      return "unlabeled";
-    case 1:
-      return "outlier";
-    case 10:
-      return "car";
-    case 11:
-      return "bicycle";
-    case 13:
-      return "bus";
-    case 15:
-      return "motorcycle";
-    case 16:
-      return "on-rails";
-    case 18:
-      return "truck";
-    case 20:
-      return "other-vehicle";
-    case 30:
-      return "person";
-    case 31:
-      return "bicyclist";
-    case 32:
-      return "motorcyclist";
-    case 40:
-      return "road";
-    case 44:
-      return "parking";
-    case 48:
-      return "sidewalk";
-    case 49:
-      return "other-ground";
-    case 50:
-      return "building";
-    case 51:
-      return "fence";
-    case 52:
-      return "other-structure";
-    case 60:
-      return "lane-marking";
-    case 70:
-      return "vegetation";
-    case 71:
-      return "trunk";
-    case 72:
-      return "terrain";
-    case 80:
-      return "pole";
-    case 81:
-      return "traffic-sign";
-    case 99:
-      return "other-object";
-    case 252:
-      return "moving-car";
-    case 253:
-      return "moving-bicyclist";
-    case 254:
-      return "moving-person";
-    case 255:
-      return "moving-motorcyclist";
-    case 256:
-      return "moving-on-rails";
-    case 257:
-      return "moving-bus";
-    case 258:
-      return "moving-truck";
-    case 259:
-      return "moving-other-vehicle";
-    default:
-      return "class " + std::to_string(id);
+  for (const ClassName& entry : kClassNames) {
+    if (entry.id == id) return entry.name;
   }
+  return "class " + std::to_string(id);
 }
 
 }  // namespace dynains::evaluation

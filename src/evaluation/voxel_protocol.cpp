@@ -91,7 +91,7 @@ class VoxelProtocol::Impl {
  private:
   static constexpr std::uint32_t kNotForked = 0xffffffffU;
 
-  /// What one layer has in one voxel: at most one point of each scan.
+  /// The points of one layer in one voxel: at most one per scan.
   struct Cell {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     std::uint32_t count = 0;
@@ -108,8 +108,8 @@ class VoxelProtocol::Impl {
     }
   };
 
-  /// Most voxels hold the same points in every layer: `shared` serves them all. The first scan that
-  /// makes a difference gives every layer its own copy, `forks_[fork + layer]`.
+  /// Most voxels have the same points in every layer, stored once in `shared`. The first scan in
+  /// which layers differ gives each layer a cell of its own, `forks_[fork + layer]`.
   struct Voxel {
     VoxelKey key;
     Cell shared;
@@ -163,8 +163,8 @@ class VoxelProtocol::Impl {
     }
   }
 
-  /// Collects the voxels where the scans' points disagree in some layer. They are forked: a voxel
-  /// whose layers are equal in every scan holds no dynamic point, for the oracle holds none.
+  /// Collects the voxels with points of both classes in some layer. All of them are forked: a voxel
+  /// with equal layers has no dynamic point, because the oracle layer has none.
   void finish_first_pass() {
     if (finished_first_pass_) return;
     finished_first_pass_ = true;
@@ -191,7 +191,7 @@ class VoxelProtocol::Impl {
 
   bool finished_first_pass_ = false;
   detail::VoxelIndex pending_;
-  std::vector<double> nearest_;  // squared, one per pending voxel and layer
+  std::vector<double> nearest_;  // squared distance, m^2, by pending voxel and layer
 };
 
 VoxelProtocol::VoxelProtocol(const Settings& settings, std::size_t estimates)

@@ -13,12 +13,10 @@ constexpr std::size_t kMaxLine = std::size_t{1} << 16;
 
 }  // namespace
 
-ByteReader::ByteReader(const std::filesystem::path& path) : path_(path) {
-  check_is_file(path);
+ByteReader::ByteReader(const std::filesystem::path& path) : path_(path), file_(open_input(path)) {
   std::error_code error;
   size_ = std::filesystem::file_size(path, error);
   if (error) fail(path, "cannot be read: " + error.message());
-  file_ = open_input(path);
 }
 
 bool ByteReader::read_line(std::string& text) {

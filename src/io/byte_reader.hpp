@@ -1,4 +1,4 @@
-// Sequential reader that knows where it stands and how much is left.
+// Sequential reader of a file with position and size.
 #pragma once
 
 #include <cstddef>
@@ -17,19 +17,19 @@ class ByteReader {
 
   std::uint64_t position() const { return position_; }
   std::uint64_t remaining() const { return size_ - position_; }
-  /// Number of the line last read, from 1.
+  /// Number of the last line that was read, from 1.
   std::uint64_t line() const { return line_; }
 
-  /// The next line without its end ("\n" or "\r\n"); false at the end of the file.
-  /// Throws IoError if a line is longer than any that we understand.
+  /// Reads the next line without its end ("\n" or "\r\n"); false at the end of the file.
+  /// Throws IoError for a line of more than 65536 bytes.
   bool read_line(std::string& text);
 
-  /// Exactly `count` bytes; throws IoError, with what they are for, if the file ends before.
+  /// Reads exactly `count` bytes. Throws IoError with `purpose` if the file ends before.
   void read(char* target, std::size_t count, const char* purpose);
   void skip(std::uint64_t count, const char* purpose);
 
-  [[noreturn]] void fail_here(const std::string& what) const;     ///< at this byte
-  [[noreturn]] void fail_on_line(const std::string& what) const;  ///< at the line last read
+  [[noreturn]] void fail_here(const std::string& what) const;     ///< names the current byte
+  [[noreturn]] void fail_on_line(const std::string& what) const;  ///< names the last line
 
  private:
   std::filesystem::path path_;

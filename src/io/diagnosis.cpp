@@ -13,15 +13,15 @@
 namespace dynains {
 namespace {
 
-constexpr std::size_t kPairs = 8;       // compared
-constexpr std::size_t kStride = 5;      // scans from one to the other, at first
-constexpr double kFast = 2.0;           // m from scan to scan: few have much in common
-constexpr std::size_t kQueries = 1200;  // points of a scan that are looked up
+constexpr std::size_t kPairs = 8;       // pairs of scans that are compared
+constexpr std::size_t kStride = 5;      // from one scan of a pair to the other
+constexpr double kFast = 2.0;           // m from scan to scan; overlap of pairs is small beyond it
+constexpr std::size_t kQueries = 1200;  // points of a scan that are compared
 constexpr double kAgreeing = 0.3;       // m
 constexpr double kFarthestGap = 1.0;    // m
-constexpr double kFarthest = 40.0;      // m; farther, points are too thin
+constexpr double kFarthest = 40.0;      // m; points are too sparse beyond it
 
-/// Number of a cell of a grid around the sensor; z runs fastest.
+/// Number of a cell of a grid around the sensor; cells above each other have consecutive numbers.
 std::uint64_t cell_of(const Eigen::Vector3d& p, double edge) {
   std::uint64_t key = 0;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
@@ -54,7 +54,7 @@ Landmarks landmarks_of(const Recording& recording, std::size_t i, RecordedScan& 
   return Landmarks(points, estimate_mounting(points));
 }
 
-/// Two scans a few places apart.
+/// Two scans, some scans apart.
 struct Pair {
   std::size_t first;
   std::size_t second;
@@ -62,7 +62,7 @@ struct Pair {
   Landmarks b;
 };
 
-/// At most `most` pairs of the scans `first` to `last`, `stride` apart and spread evenly; `load`
+/// At most `most` evenly spread pairs (i, i + stride) of the scans `first` to `last`; `load(i)`
 /// gives the landmarks of a scan.
 template <class Load>
 std::vector<Pair> take_pairs(std::size_t first, std::size_t last, std::size_t stride,
@@ -79,7 +79,7 @@ std::vector<Pair> take_pairs(std::size_t first, std::size_t last, std::size_t st
   return pairs;
 }
 
-/// Adds up what pairs say.
+/// Mean of agreements, weighted by their points.
 class AgreementSum {
  public:
   void add(const Agreement& one) {
@@ -111,21 +111,21 @@ Agreement agreement_under(const PoseConvention& convention, const Recording& rec
   return sum.mean();
 }
 
-/// As if the sensor did not move.
+/// Agreement under the identity: no motion.
 Agreement standing_agreement(const std::vector<Pair>& pairs) {
   AgreementSum sum;
   for (const Pair& pair : pairs) sum.add(pair.a.compare(pair.b, Eigen::Isometry3d::Identity()));
   return sum.mean();
 }
 
-/// One way to change a convention; combined with the others.
+/// A changed convention, and the options that select it.
 struct Change {
   std::string meaning;
   std::string option;
   PoseConvention convention;
 };
 
-/// `changes` followed by each of them with `meaning` as well.
+/// Appends a copy of each of `changes` that is also changed by `edit`.
 template <class Edit>
 void add_change(std::vector<Change>& changes, const std::string& meaning, const std::string& option,
                 Edit&& edit) {
@@ -139,7 +139,36 @@ void add_change(std::vector<Change>& changes, const std::string& meaning, const 
   }
 }
 
-/// All combinations of the usual mistakes, but for those already chosen.
+/// Appends copies of `changes` in millimetres, then copies in centimetres.
+void add_units(std::vector<Change>& changes) {
+  struct Unit {
+    const char* name;
+    const char* flag;
+    double metres;
+  };
+  const std::vector<Change> before = changes;
+  for (const Unit& unit : {Unit{"millimetres", "mm", 0.001}, Unit{"centimetres", "cm", 0.01}}) {
+    std::vector<Change> changed = before;
+    add_change(changed, std::string("translations are in ") + unit.name,
+               std::string("--pose-units ") + unit.flag,
+               [&](PoseConvention& c) { c.unit = unit.metres; });
+    changes.insert(changes.end(), changed.begin() + static_cast<std::ptrdiff_t>(before.size()),
+                   changed.end());
+  }
+}
+
+/// A shift is not combined with other changes: its effect is small.
+void add_shifts(std::vector<Change>& changes, const PoseConvention& given) {
+  for (const int shift : {1, -1, 2, -2}) {
+    Change change{
+        std::abs(shift) == 1 ? "the poses are off by one scan" : "the poses are off by two scans",
+        "--pose-shift " + std::to_string(given.shift + shift), given};
+    change.convention.shift = given.shift + shift;
+    changes.push_back(std::move(change));
+  }
+}
+
+/// All combinations of common mistakes, except options that were given.
 std::vector<Change> usual_mistakes(const Recording& recording) {
   const PoseConvention& given = recording.convention();
   std::vector<Change> changes = {{"", "", given}};
@@ -171,29 +200,9 @@ std::vector<Change> usual_mistakes(const Recording& recording) {
                  [](PoseConvention& c) { c.frame = PoseFrame::kCamera; });
     }
   }
-  if (given.unit == 1.0) {
-    const std::size_t count = changes.size();
-    add_change(changes, "translations are in millimetres", "--pose-units mm",
-               [](PoseConvention& c) { c.unit = 0.001; });
-    for (std::size_t i = 0; i < count; ++i) {
-      Change change = changes[count + i];
-      const std::string millimetres = "translations are in millimetres";
-      change.meaning.replace(change.meaning.rfind(millimetres), millimetres.size(),
-                             "translations are in centimetres");
-      change.option.replace(change.option.rfind("mm"), 2, "cm");
-      change.convention.unit = 0.01;
-      changes.push_back(std::move(change));
-    }
-  }
-  changes.erase(changes.begin());
-  // A shift is not combined: what it changes is small.
-  for (const int shift : {1, -1, 2, -2}) {
-    Change change{
-        std::abs(shift) == 1 ? "the poses are off by one scan" : "the poses are off by two scans",
-        "--pose-shift " + std::to_string(given.shift + shift), given};
-    change.convention.shift = given.shift + shift;
-    changes.push_back(std::move(change));
-  }
+  if (given.unit == 1.0) add_units(changes);
+  changes.erase(changes.begin());  // no change at all
+  add_shifts(changes, given);
   std::stable_sort(changes.begin(), changes.end(), [](const Change& a, const Change& b) {
     const auto flags = [](const Change& c) {
       return std::count(c.option.begin(), c.option.end(), '-');
@@ -220,13 +229,13 @@ PoseVerdict judge(const Recording& recording, const Diagnosis& d) {
   return PoseVerdict::kDisagree;
 }
 
-/// Whether nothing explains the scans clearly better than the poses do.
+/// Whether no other reading of the poses is clearly better.
 bool is_best(const Diagnosis& d) {
   return is_passable(d.as_given, d.standing) &&
          (d.readings.empty() || !is_clearly_better(d.readings.front().agreement, d.as_given));
 }
 
-/// Places the scans of `pairs`, `stride` apart, under the poses and under the usual mistakes.
+/// Computes the agreement of `pairs` under the poses and under common mistakes.
 void compare(const Recording& recording, const std::vector<Pair>& pairs, std::size_t stride,
              Diagnosis& d) {
   d.stride = stride;
@@ -238,7 +247,7 @@ void compare(const Recording& recording, const std::vector<Pair>& pairs, std::si
       d.readings.push_back({change.meaning, change.option, change.convention,
                             agreement_under(change.convention, recording, pairs)});
     }
-    // Simpler readings stay before others that are not clearly better.
+    // A reading with fewer changes stays first unless another one is clearly better.
     for (std::size_t i = 1; i < d.readings.size(); ++i) {
       if (is_clearly_better(d.readings[i].agreement, d.readings.front().agreement)) {
         std::rotate(d.readings.begin(), d.readings.begin() + static_cast<std::ptrdiff_t>(i),
@@ -249,7 +258,7 @@ void compare(const Recording& recording, const std::vector<Pair>& pairs, std::si
   d.verdict = judge(recording, d);
 }
 
-/// Gaps of a pair under shifted poses; nothing if one of these is missing.
+/// Gaps of a pair under shifted poses; nothing if a pose is missing.
 std::optional<ShiftedGaps> shifted_gaps(const Recording& recording, const Pair& pair) {
   ShiftedGaps gaps{};
   PoseConvention convention = recording.convention();
@@ -264,7 +273,8 @@ std::optional<ShiftedGaps> shifted_gaps(const Recording& recording, const Pair& 
   return gaps;
 }
 
-/// Scans agree nearly as well under poses that are off by a scan or two; many pairs can tell.
+/// Looks for poses that are shifted by one or two scans: that changes the agreement little, so it
+/// takes more pairs.
 void look_for_shift(const Recording& recording, Diagnosis& d) {
   constexpr std::size_t kManyPairs = 24;
   const auto margin = static_cast<std::size_t>(kFarthestShift);
@@ -279,7 +289,7 @@ void look_for_shift(const Recording& recording, Diagnosis& d) {
   }
   const int shift = best_shift(gaps);
   if (shift == 0) return;
-  // All that is shown of the readings then comes from the same scans.
+  // All readings that are shown come from the same pairs.
   compare(recording, pairs, kStride, d);
   const auto found = std::find_if(d.readings.begin(), d.readings.end(), [&](const PoseReading& r) {
     return r.convention.shift == recording.convention().shift + shift;
@@ -288,11 +298,100 @@ void look_for_shift(const Recording& recording, Diagnosis& d) {
   d.verdict = PoseVerdict::kOtherwise;
 }
 
+void describe_motion(const Recording& recording, Diagnosis& d) {
+  std::vector<double> periods;
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < recording.size(); ++i) {
+    periods.push_back(recording.time(i) - recording.time(i - 1));
+    steps.push_back(
+        (recording.T_world_sensor(i).translation() - recording.T_world_sensor(i - 1).translation())
+            .norm());
+  }
+  d.period = median(periods);
+  d.step = median(steps);
+  if (!steps.empty()) d.longest_step = *std::max_element(steps.begin(), steps.end());
+}
+
+/// Reads scans and counts their points.
+class ScanSample {
+ public:
+  explicit ScanSample(const Recording& recording) : recording_(recording) {}
+
+  Landmarks read(std::size_t i) {
+    recording_.read_scan(i, scan_);
+    const PointBuffer points = finite_points(scan_);
+    all_ += scan_.size();
+    valid_ += points.size();
+    ++read_;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const double range = std::hypot(points.x[k], points.y[k], points.z[k]);
+      if (range < 2.0) ++near_;
+      if (k % 37 == 0) ranges_.push_back(range);
+    }
+    const Mounting mounting = estimate_mounting(points);
+    if (mounting.known) {
+      heights_.push_back(mounting.height);
+      up_ += mounting.up_sensor;
+    }
+    return Landmarks(points, mounting);
+  }
+
+  /// Sets the members of `d` that describe points and mounting.
+  void describe(Diagnosis& d) {
+    d.points = read_ == 0 ? 0.0 : static_cast<double>(all_) / static_cast<double>(read_);
+    if (all_ > 0) d.invalid_share = static_cast<double>(all_ - valid_) / static_cast<double>(all_);
+    if (valid_ > 0) d.ego_share = static_cast<double>(near_) / static_cast<double>(valid_);
+    if (!ranges_.empty()) {
+      const auto at =
+          ranges_.begin() + static_cast<std::ptrdiff_t>(99 * (ranges_.size() - 1) / 100);
+      std::nth_element(ranges_.begin(), at, ranges_.end());
+      d.farthest = *at;
+    }
+    if (2 * heights_.size() > read_) d.mounting = {median(heights_), up_.normalized(), true};
+  }
+
+ private:
+  const Recording& recording_;
+  RecordedScan scan_;
+  std::size_t all_ = 0;  // points
+  std::size_t valid_ = 0;
+  std::size_t near_ = 0;
+  std::size_t read_ = 0;  // scans
+  std::vector<double> ranges_;
+  std::vector<double> heights_;
+  Eigen::Vector3d up_ = Eigen::Vector3d::Zero();
+};
+
+struct SampledPairs {
+  std::vector<Pair> pairs;  // (i, i + stride)
+  std::size_t stride = 0;
+  std::vector<Pair> neighbours;  // (i, i + 1); empty if stride is 1
+};
+
+/// Increases the stride until the pairs do not agree without motion: scans farther apart show more
+/// of the motion of a slow sensor.
+SampledPairs sample_pairs(const Recording& recording, ScanSample& sample) {
+  const auto read = [&](std::size_t i) { return sample.read(i); };
+  SampledPairs result;
+  for (const std::size_t wanted : {std::size_t{1}, kStride, 4 * kStride, 16 * kStride}) {
+    const std::size_t next = std::min(wanted, recording.size() - 1);
+    if (next == 0 || (!result.pairs.empty() && 2 * next > recording.size())) break;
+    result.stride = next;
+    if (!result.pairs.empty() && result.neighbours.empty()) {
+      result.neighbours = std::move(result.pairs);
+    }
+    result.pairs = take_pairs(0, recording.size() - 1, next, kPairs, read);
+    if (standing_agreement(result.pairs).share < (next == 1 ? 0.35 : kLeastAgreement)) break;
+  }
+  if (result.pairs.empty() && recording.size() > 0) sample.read(0);
+  return result;
+}
+
 }  // namespace
 
 Landmarks::Landmarks(PointsView points, const Mounting& mounting) {
-  constexpr double kNearest = 2.0;     // m; nearer is the own vehicle
-  constexpr double kOverGround = 0.5;  // m; the ground agrees with itself wherever it is moved
+  constexpr double kNearest = 2.0;     // m; nearer points belong to the own vehicle
+  constexpr double kOverGround = 0.5;  // m; ground agrees under every motion along it
   constexpr double kThinned = 0.25;    // m
   std::vector<std::pair<std::uint64_t, Eigen::Vector3d>> kept;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -321,7 +420,7 @@ double Landmarks::distance_to(const Eigen::Vector3d& p) const {
   double squared = kFarthestGap * kFarthestGap;
   for (const double x : {-kFarthestGap, 0.0, kFarthestGap}) {
     for (const double y : {-kFarthestGap, 0.0, kFarthestGap}) {
-      // Three cells on top of each other are one range.
+      // Three cells above each other have consecutive numbers.
       const std::uint64_t middle = cell_of(p + Eigen::Vector3d(x, y, 0.0), kFarthestGap);
       auto cell = std::lower_bound(cells_.begin(), cells_.end(), middle - 1);
       for (; cell != cells_.end() && *cell <= middle + 1; ++cell) {
@@ -354,75 +453,17 @@ Diagnosis diagnose(const Recording& recording) {
   d.scan_files = recording.scan_file_count();
   d.pose_rows = recording.pose_count();
   d.scans = recording.size();
-  std::vector<double> periods;
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < recording.size(); ++i) {
-    periods.push_back(recording.time(i) - recording.time(i - 1));
-    steps.push_back(
-        (recording.T_world_sensor(i).translation() - recording.T_world_sensor(i - 1).translation())
-            .norm());
-  }
-  d.period = median(periods);
-  d.step = median(steps);
-  if (!steps.empty()) d.longest_step = *std::max_element(steps.begin(), steps.end());
+  describe_motion(recording, d);
+  ScanSample sample(recording);
+  const SampledPairs sampled = sample_pairs(recording, sample);
+  sample.describe(d);
 
-  std::size_t all = 0;
-  std::size_t valid = 0;
-  std::size_t near = 0;
-  std::size_t read = 0;
-  std::vector<double> ranges;
-  std::vector<double> heights;
-  Eigen::Vector3d up = Eigen::Vector3d::Zero();
-  RecordedScan scan;
-  const auto load = [&](std::size_t i) {
-    recording.read_scan(i, scan);
-    const PointBuffer points = finite_points(scan);
-    all += scan.size();
-    valid += points.size();
-    ++read;
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      const double range = std::hypot(points.x[k], points.y[k], points.z[k]);
-      if (range < 2.0) ++near;
-      if (k % 37 == 0) ranges.push_back(range);
-    }
-    const Mounting mounting = estimate_mounting(points);
-    if (mounting.known) {
-      heights.push_back(mounting.height);
-      up += mounting.up_sensor;
-    }
-    return Landmarks(points, mounting);
-  };
-
-  // A slow sensor tells more from scans farther apart.
-  std::vector<Pair> pairs;
-  std::vector<Pair> neighbours;
-  std::size_t stride = 0;
-  for (const std::size_t wanted : {std::size_t{1}, kStride, 4 * kStride, 16 * kStride}) {
-    const std::size_t next = std::min(wanted, recording.size() - 1);
-    if (next == 0 || (!pairs.empty() && 2 * next > recording.size())) break;
-    stride = next;
-    if (!pairs.empty() && neighbours.empty()) neighbours = std::move(pairs);
-    pairs = take_pairs(0, recording.size() - 1, stride, kPairs, load);
-    if (standing_agreement(pairs).share < (stride == 1 ? 0.35 : kLeastAgreement)) break;
-  }
-  if (pairs.empty() && recording.size() > 0) load(0);
-
-  d.points = read == 0 ? 0.0 : static_cast<double>(all) / static_cast<double>(read);
-  if (all > 0) d.invalid_share = static_cast<double>(all - valid) / static_cast<double>(all);
-  if (valid > 0) d.ego_share = static_cast<double>(near) / static_cast<double>(valid);
-  if (!ranges.empty()) {
-    const auto at = ranges.begin() + static_cast<std::ptrdiff_t>(99 * (ranges.size() - 1) / 100);
-    std::nth_element(ranges.begin(), at, ranges.end());
-    d.farthest = *at;
-  }
-  if (2 * heights.size() > read) d.mounting = {median(heights), up.normalized(), true};
-
-  compare(recording, pairs, stride, d);
-  if (d.verdict == PoseVerdict::kDisagree && stride > 1 && d.step > kFast) {
-    // Fast and with little beside the way, as on a motorway: scans that far apart may show nothing
-    // in common but the traffic. Neighbours do.
+  compare(recording, sampled.pairs, sampled.stride, d);
+  if (d.verdict == PoseVerdict::kDisagree && sampled.stride > 1 && d.step > kFast) {
+    // Fast and with few objects in sight, as on a motorway: such pairs may have only traffic in
+    // common, while neighbouring scans overlap.
     Diagnosis near_by = d;
-    compare(recording, neighbours, 1, near_by);
+    compare(recording, sampled.neighbours, 1, near_by);
     if (near_by.verdict == PoseVerdict::kDisagree && is_best(near_by)) {
       near_by.verdict = PoseVerdict::kNoMotion;
     }
@@ -434,7 +475,7 @@ Diagnosis diagnose(const Recording& recording) {
 
 namespace {
 
-/// Over few pairs of the scans `first` to `last`, `stride` apart.
+/// Agreement of a few pairs (i, i + stride) of the scans `first` to `last`.
 PoseAgreement agreement_at(const Recording& recording, std::size_t first, std::size_t last,
                            std::size_t stride) {
   constexpr std::size_t kFewPairs = 4;
@@ -460,7 +501,7 @@ PoseAgreement pose_agreement(const Recording& recording, std::size_t first, std:
                          .norm();
   const bool is_fast = way > kFast * static_cast<double>(stride);
   if (!agreement.doubtful() || stride == 1 || !is_fast) return agreement;
-  // As in diagnose(): neighbours have more in common.
+  // As in diagnose(): neighbouring scans overlap more.
   const PoseAgreement of_neighbours = agreement_at(recording, first, last, 1);
   return of_neighbours.doubtful() ? agreement : of_neighbours;
 }

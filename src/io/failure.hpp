@@ -30,16 +30,4 @@ namespace dynains {
   throw IoError(path.string() + ": byte " + std::to_string(byte) + ": " + what);
 }
 
-/// Throws IoError unless `path` is a regular file: reading a device or a pipe may never end.
-inline void check_is_file(const std::filesystem::path& path) {
-  std::error_code error;
-  const std::filesystem::file_type type = std::filesystem::status(path, error).type();
-  if (type == std::filesystem::file_type::not_found) fail(path, "not found, expected a file");
-  if (type == std::filesystem::file_type::directory) fail(path, "is a folder, expected a file");
-  if (error) fail(path, "cannot be read: " + error.message());
-  if (type != std::filesystem::file_type::regular) {
-    fail(path, "is a device or a pipe, expected a file");
-  }
-}
-
 }  // namespace dynains

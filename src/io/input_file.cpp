@@ -28,7 +28,12 @@ bool is_folder(const fs::path& path) { return fs::is_directory(status_of(path));
 bool is_file(const fs::path& path) { return fs::is_regular_file(status_of(path)); }
 
 std::ifstream open_input(const fs::path& path) {
-  if (is_folder(path)) fail(path, "is a folder, expected a file");
+  const fs::file_status status = status_of(path);
+  if (!fs::exists(status)) fail_by_system(path, "cannot be read", ENOENT);
+  if (fs::is_directory(status)) fail(path, "cannot be read: is a folder; expected a file");
+  if (!fs::is_regular_file(status)) {
+    fail(path, "cannot be read: is a device or a pipe; expected a file");
+  }
   errno = 0;
   std::ifstream file(path, std::ios::binary);
   if (!file) fail_by_system(path, "cannot be opened for reading", errno);

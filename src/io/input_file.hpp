@@ -1,4 +1,4 @@
-// Files to read, with the system's reason where that fails.
+// Files that are read: only regular ones, and errors with the reason of the system.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,8 @@ bool is_there(const std::filesystem::path& path);
 bool is_folder(const std::filesystem::path& path);
 bool is_file(const std::filesystem::path& path);
 
-/// Opens a file to read. Throws IoError, for folders too.
+/// Opens a regular file to read. Throws IoError, also for folders, and for devices and pipes, whose
+/// reading may never end.
 std::ifstream open_input(const std::filesystem::path& path);
 
 /// For a read that gave fewer bytes than the file has. Call it before anything else sets errno.

@@ -21,7 +21,6 @@ constexpr std::size_t kFloatsPerPoint = 4;
 constexpr std::uintmax_t kBytesPerPoint = kFloatsPerPoint * sizeof(float);
 
 std::uintmax_t size_of(const fs::path& path) {
-  check_is_file(path);
   std::error_code error;
   const std::uintmax_t size = fs::file_size(path, error);
   if (error) fail(path, "cannot be read: " + error.message());

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kRotationTolerance = 1e-3;  // text with 4 digits passes, a scaled matrix does not
+constexpr double kRotationTolerance = 1e-3;  // accepts 4 digits, refuses a scaled matrix
 
 /// The numbers of a line, all finite, exactly as many as `values` has.
 template <std::size_t kCount>
@@ -39,7 +39,7 @@ std::array<double, kCount> parse_row(std::string_view line, const fs::path& path
   return values;
 }
 
-/// Pose from 3x4 numbers, with the rotation nearest to the rounded one of the text.
+/// Pose from 3x4 numbers; the rotation is orthonormalized.
 Eigen::Isometry3d parse_pose(std::string_view line, const fs::path& path, std::size_t number) {
   const std::array<double, 12> row = parse_row<12>(line, path, number);
   const std::optional<Eigen::Isometry3d> pose = nearest_rigid(row.data());
@@ -56,7 +56,7 @@ Eigen::Isometry3d parse_pose(std::string_view line, const fs::path& path, std::s
 
 bool is_blank(std::string_view line) { return text::next_token(line).empty(); }
 
-/// Calls `parse(line, number)` for each line; blank lines are allowed at the end only.
+/// Calls `parse(line, number)` for each line. Blank lines are allowed at the end only.
 template <class Parse>
 void for_each_row(const fs::path& path, Parse&& parse) {
   std::ifstream file = open_input(path);

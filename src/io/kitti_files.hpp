@@ -27,11 +27,11 @@ std::vector<double> read_kitti_times(const std::filesystem::path& path);
 /// `Tr`, from the sensor to the frame of the poses.
 Eigen::Isometry3d read_kitti_calib(const std::filesystem::path& path);
 
-/// Throws unless a file of `rows` rows has those that are needed.
+/// Throws IoError if `rows` < `needed`.
 void check_rows(const std::filesystem::path& path, std::size_t rows, std::size_t needed);
 
-/// The rigid transform nearest to 12 numbers, the upper 3x4 row by row; nothing if they are none
-/// but for rounding.
+/// The rigid transform nearest to 12 numbers (upper 3x4, row by row); nothing if they differ from
+/// one by more than rounding.
 std::optional<Eigen::Isometry3d> nearest_rigid(const double* rows);
 
 }  // namespace dynains

@@ -28,7 +28,7 @@ bool decode_lzf(Span<const char> source, Span<char> target) {
     if (in == source.size()) return false;
     const std::size_t distance = ((control & 31) << 8) + byte(in++) + 1;
     if (distance > out || count > target.size() - out) return false;
-    // The run may overlap what it writes (distance < count), so it is copied byte by byte.
+    // Source and target overlap if distance < count: copied byte by byte.
     for (std::size_t i = 0; i < count; ++i, ++out) target[out] = target[out - distance];
   }
   return out == target.size();

@@ -308,7 +308,7 @@ void read_binary(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
   }
 }
 
-/// The points are stored field after field, and compressed in one block.
+/// One compressed block with the values of all points field by field.
 void read_compressed(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
   const auto [compressed_size, plain_size] = read_block_sizes(reader, header);
   std::vector<char> compressed(compressed_size);

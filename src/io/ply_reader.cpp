@@ -137,7 +137,7 @@ PlyHeader parse_ply_header(ByteReader& reader, PointSink& sink) {
   return header;
 }
 
-/// Reads the values of one element; `store(property, value)` gets those that are not in lists.
+/// Reads one element. Calls `store(property, value)` for values that are not in lists.
 template <class Store>
 void read_binary_element(ByteReader& reader, const Element& element, bool swap, Store&& store) {
   std::array<char, 8> bytes{};
@@ -184,7 +184,7 @@ void read_ascii_element(ByteReader& reader, const Element& element, std::string&
   if (!text::next_token(rest).empty()) reader.fail_on_line("expected fewer values on this line");
 }
 
-/// Fewest bytes that one element takes in the file.
+/// Smallest size of one element in the file, bytes.
 std::uint64_t min_bytes(const Element& element, PlyEncoding encoding) {
   if (encoding == PlyEncoding::kAscii) return 2 * element.properties.size();
   std::uint64_t bytes = 0;

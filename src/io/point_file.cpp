@@ -110,7 +110,7 @@ PointFileWriter::PointFileWriter(const fs::path& path, const PointColumns& colum
   file_.stream() << header();
 }
 
-/// Of the same length for every number of points: a comment takes up the difference.
+/// Has the same length for every number of points: a comment is padded.
 std::string PointFileWriter::header() const {
   const auto text = pcd_ ? pcd_header : ply_header;
   constexpr std::size_t kMost = std::numeric_limits<std::size_t>::max();

@@ -46,7 +46,7 @@ bool store(double value, Integer& target) {
   return true;
 }
 
-/// A double beyond the range of float is undefined to convert: it is infinite.
+/// Conversion of a double beyond the range of float is undefined: it becomes infinite.
 float to_float(double value) {
   constexpr double kMax = std::numeric_limits<float>::max();
   if (value > kMax) return std::numeric_limits<float>::infinity();

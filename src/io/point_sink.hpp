@@ -1,4 +1,4 @@
-// Sorts the columns of a file into the members of PointFile.
+// Stores the values of a file in the columns of a PointFile.
 #pragma once
 
 #include <array>
@@ -15,21 +15,21 @@ namespace dynains {
 /// Meaning of a column.
 enum class Role : std::uint8_t { kX, kY, kZ, kIntensity, kRing, kTime, kLabel, kNone };
 
-/// Meaning of a column with this name, whatever the case.
+/// Meaning of a column with this name; case is ignored.
 Role role_of(std::string_view name);
 
 /// Collects points, value by value.
 class PointSink {
  public:
-  /// Announces a column; false if its role is taken already. The column is then to be ignored.
+  /// Announces a column. False if another column has its role already: ignore it then.
   bool claim(Role role);
-  /// Name of a coordinate that no column was claimed for.
+  /// Name of a coordinate without a column.
   std::optional<std::string> missing() const;
 
-  /// The columns announced beside x y z.
+  /// The announced columns in addition to x y z.
   PointColumns columns() const;
 
-  /// Makes room; `count` must be backed by the size of the file.
+  /// Sets the number of points. The caller has compared it with the size of the file.
   void resize(std::size_t count);
 
   /// Stores one value of point i; false if the column cannot hold it (for example label -1).

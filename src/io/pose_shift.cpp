@@ -8,10 +8,10 @@ namespace {
 
 constexpr std::size_t kAsGiven = kFarthestShift;
 
-/// What the poses would be nearer by under another shift, over all pairs.
+/// Decrease of the gaps under another shift, over all pairs.
 struct Gain {
   double mean = 0.0;   // m
-  double error = 0.0;  // of the mean, m
+  double error = 0.0;  // standard error of the mean, m
   std::size_t better = 0;
   std::size_t worse = 0;
 };
@@ -35,11 +35,11 @@ Gain gain_of(const std::vector<ShiftedGaps>& pairs, std::size_t shift) {
 }  // namespace
 
 int best_shift(const std::vector<ShiftedGaps>& pairs) {
-  // None of some hundred drives with right poses came near these; of poses that are off by two
-  // scans, a fourth goes beyond. On the other drives speed and heading hardly change.
+  // Chosen on some hundred drives: none with right poses comes near these bounds. A fourth of those
+  // with poses shifted by two scans exceeds them; on the others, speed and heading hardly change.
   constexpr double kLeastGain = 0.03;     // of the gap
-  constexpr double kLeastErrors = 2.5;    // by which the mean is above zero
-  constexpr std::size_t kLeastRatio = 3;  // of pairs that are better to pairs that are worse
+  constexpr double kLeastErrors = 2.5;    // ratio of the mean to its standard error
+  constexpr std::size_t kLeastRatio = 3;  // pairs with a smaller gap to pairs with a larger gap
   if (pairs.size() < kLeastShiftPairs) return 0;
   ShiftedGaps mean{};
   for (const ShiftedGaps& gaps : pairs) {
@@ -49,7 +49,7 @@ int best_shift(const std::vector<ShiftedGaps>& pairs) {
   }
   const auto best =
       static_cast<std::size_t>(std::min_element(mean.begin(), mean.end()) - mean.begin());
-  // If gaps still shrink at the end of what was tried, something else is wrong than a shift.
+  // A minimum at the largest shift that was tried is no minimum.
   const bool is_at_end = best == 0 || best + 1 == mean.size();
   if (best == kAsGiven || is_at_end) return 0;
   const Gain gain = gain_of(pairs, best);

@@ -1,4 +1,4 @@
-// Whether poses belong to other scans than those they were given for.
+// Detection of poses that are shifted by some scans.
 #pragma once
 
 #include <array>
@@ -7,18 +7,17 @@
 
 namespace dynains {
 
-/// Scans by which poses are shifted on trial, to either side.
+/// Largest shift that is tried, in both directions, scans.
 inline constexpr int kFarthestShift = 3;
 
-/// How far two scans lie apart where they should agree (Agreement::gap, m), if their poses are
-/// those of the scans 3 before, ..., 3 behind: the poses as they are given stand in the middle.
+/// Agreement::gap (m) of two scans under poses shifted by -3 to 3 scans; the middle value belongs
+/// to the poses as given.
 using ShiftedGaps = std::array<double, 2 * kFarthestShift + 1>;
 
-/// Fewer pairs of scans than these prove nothing.
+/// Smallest number of pairs for a decision.
 inline constexpr std::size_t kLeastShiftPairs = 8;
 
-/// The shift of at most 2 scans under which pairs of scans agree better, beyond doubt; 0 if there
-/// is none.
+/// The shift, at most 2 scans, under which pairs agree significantly better; 0 if there is none.
 int best_shift(const std::vector<ShiftedGaps>& pairs);
 
 }  // namespace dynains

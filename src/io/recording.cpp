@@ -37,7 +37,7 @@ std::optional<ScanFormat> scan_format_of(const fs::path& path) {
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-/// Runs of digits compare by value: scan2 comes before scan10.
+/// Compares runs of digits by value: scan2 comes before scan10.
 bool is_before(const std::string& a, const std::string& b) {
   std::size_t i = 0;
   std::size_t k = 0;
@@ -63,7 +63,7 @@ bool is_before(const std::string& a, const std::string& b) {
   return a < b;
 }
 
-/// Scan files directly in `folder`, hidden ones apart.
+/// Scan files directly in `folder`, except hidden ones.
 std::vector<fs::path> scan_files(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
@@ -80,7 +80,7 @@ std::vector<fs::path> scan_files(const fs::path& folder) {
   return files;
 }
 
-/// Seconds, from a name that is a time.
+/// Time in seconds of a name that is a time.
 std::optional<double> time_of_name(const std::string& name) {
   const auto digits = [](std::string_view text) {
     return !text.empty() && std::all_of(text.begin(), text.end(), is_digit);
@@ -219,7 +219,7 @@ void Recording::read_viewpoints() {
   if (has_viewpoints_) trajectory_ = std::move(viewpoints);
 }
 
-/// The first of these files that is there, in the folder or beside the poses; empty if none is.
+/// The first existing file of `names` in the folder or beside the poses; empty if there is none.
 fs::path Recording::find_beside(const fs::path& poses_file,
                                 const std::vector<const char*>& names) const {
   std::vector<fs::path> folders = {folder_};
@@ -232,7 +232,7 @@ fs::path Recording::find_beside(const fs::path& poses_file,
   return {};
 }
 
-/// Needed for poses of a camera, and to try whether they are; other poses do without.
+/// Reads calib.txt, which poses of a camera need.
 void Recording::read_calibration(const fs::path& poses_file) {
   const fs::path file = find_beside(poses_file, {"calib.txt"});
   if (file.empty()) return;
@@ -274,7 +274,7 @@ std::optional<std::vector<double>> Recording::times_of_names() const {
   return times;
 }
 
-/// Times of the scan files, if anything but the poses tells.
+/// Times of the scan files from a file of times or from their names.
 std::optional<std::vector<double>> Recording::find_times(const fs::path& poses_file) {
   const fs::path file = options_.times.empty()
                             ? find_beside(poses_file, {"times.txt", "timestamps.txt"})
@@ -302,7 +302,7 @@ std::optional<std::vector<double>> Recording::find_times(const fs::path& poses_f
   return times;
 }
 
-/// One row for each scan, by order; or one for each number.
+/// Matches rows to scans by order if there are equally many, else by the number of the scan.
 void Recording::match_rows(const fs::path& file) {
   const std::size_t rows = trajectory_.poses.size();
   const bool by_order = rows == scans_.size();
@@ -333,7 +333,7 @@ void Recording::match_times(const fs::path& file, const std::vector<double>& tim
 }
 
 void Recording::match_scans(const fs::path& file) {
-  // What lies beside poses from elsewhere may be of another recording.
+  // Times beside a file of --poses may belong to another recording.
   const std::optional<std::vector<double>> times =
       find_times(options_.poses.empty() ? file : fs::path());
   if (times) {
@@ -361,7 +361,7 @@ void Recording::match_scans(const fs::path& file) {
   if (!times && trajectory_.times.empty()) notes_.push_back("no times: 0.1 s from scan to scan");
 }
 
-/// Gives each scan its pose and leaves out those without. `poses`: file or folder that has them.
+/// Sets the poses of scans and leaves out scans without one. `poses`: their file or folder.
 void Recording::place_scans(const fs::path& poses) {
   const std::size_t all = scans_.size();
   std::vector<Scan> placed;
@@ -419,8 +419,8 @@ void Recording::find_columns() {
   if (is_folder(folder_ / "labels")) labels_ = Labels::kFiles;
 }
 
-/// Returns of a lidar are densest around it: compare what lies around the origin with what lies
-/// around the pose, far from the origin.
+/// Points are densest around the sensor: compares the number of points around the origin with the
+/// number around the position of a scan that is far from the origin.
 PointFrame Recording::guess_frame() const {
   constexpr double kNear = 8.0;      // m
   constexpr double kFarPose = 20.0;  // m, so that the two do not overlap

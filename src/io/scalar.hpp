@@ -55,7 +55,7 @@ double load(const char* bytes, bool swap) {
 
 }  // namespace scalar_detail
 
-/// The number at `bytes`; `swap` if its byte order is not ours. 64-bit integers are rounded to 53.
+/// The number at `bytes`; `swap` reverses its byte order. 64-bit integers are rounded to 53 bits.
 inline double load_scalar(Scalar type, const char* bytes, bool swap) {
   using scalar_detail::load;
   switch (type) {

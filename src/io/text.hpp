@@ -11,13 +11,13 @@
 
 namespace dynains::text {
 
-/// The number that all of `token` spells; "nan" and "inf" are numbers.
+/// The number that `token` consists of, "nan" and "inf" included.
 std::optional<double> parse_number(std::string_view token);
 
-/// Cuts the next token, separated by blanks, off the front of `line`; empty at the end.
+/// Removes the next token, separated by blanks, from the front of `line`; empty at the end.
 std::string_view next_token(std::string_view& line);
 
-/// Makes a stream write numbers that read back to the same double, whatever the locale.
+/// Makes a stream write doubles that read back exactly, independent of the locale.
 inline std::ostream& exact(std::ostream& stream) {
   stream.imbue(std::locale::classic());
   stream.precision(std::numeric_limits<double>::max_digits10);

@@ -23,12 +23,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kVoxelOfAll = 0.2;  // m, where every point is kept
-constexpr int kSideBits = 8;         // of the number of a voxel in its tile: x, y
-constexpr int kHeightBits = 16;      // z
+constexpr double kVoxelOfAll = 0.2;  // m, edge of the voxels if every point is kept
+constexpr int kSideBits = 8;         // bits of x and of y in the number of a voxel in its tile
+constexpr int kHeightBits = 16;      // bits of z
 const char* const kExtension = ".tile";
 
-/// What a file of a tile begins with; points follow.
+/// Header of the file of a tile, before its points.
 struct TileHeader {
   char magic[8] = {'D', 'Y', 'N', 'A', 'T', 'I', 'L', 'E'};
   std::uint64_t version = 1;
@@ -53,7 +53,7 @@ std::optional<std::array<std::int64_t, 3>> place_of(const fs::path& path) {
   return place;
 }
 
-/// Writes into a file that is there. Throws IoError.
+/// Writes into an existing file. Throws IoError.
 void write_at(const fs::path& path, std::size_t offset, const void* data, std::size_t size) {
   const int descriptor = ::open(path.c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC);
   if (descriptor < 0) fail_by_system(path, "cannot be written", errno);
@@ -73,7 +73,7 @@ void write_at(const fs::path& path, std::size_t offset, const void* data, std::s
   if (error != 0) fail_by_system(path, "cannot be written to the end", error);
 }
 
-/// Created if it lacks. Throws IoError.
+/// Creates `folder` if it is missing. Throws IoError.
 const fs::path& made(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
@@ -157,7 +157,7 @@ std::size_t TiledStaticMap::Tile::memory_bytes() const {
   return points.capacity() * sizeof(Point) + filled.memory_bytes();
 }
 
-/// False if the voxel holds a point already; else it is marked as filled.
+/// False if the voxel has a point already; otherwise marks it as filled.
 bool TiledStaticMap::Tile::fill(std::uint32_t voxel) {
   const std::size_t before = filled.size();
   filled.insert(voxel);
@@ -195,7 +195,7 @@ TiledStaticMap::Tile& TiledStaticMap::tile_at(const Place& place) {
   return tiles_.emplace(place, std::move(tile)).first->second;
 }
 
-/// Points in the file of a tile, whole ones: a write may have been interrupted.
+/// Number of whole points in the file of a tile: a write may have been interrupted.
 std::size_t TiledStaticMap::count_stored(const Place& place) const {
   const fs::path path = path_of(place);
   std::ifstream file = open_input(path);
@@ -239,7 +239,7 @@ std::vector<TiledStaticMap::Point> TiledStaticMap::read(const Place& place,
   const auto outside = std::find_if(points.begin(), points.end(), [this](const Point& point) {
     const Eigen::Array3f share =
         Eigen::Array3f(point.x, point.y, point.z) / static_cast<float>(voxel_);
-    return !((share > -0.01F).all() && (share < 1.01F).all());  // also if it is no number
+    return !((share > -0.01F).all() && (share < 1.01F).all());  // true for NaN, too
   });
   if (outside != points.end()) {
     const auto index = static_cast<std::size_t>(outside - points.begin());
@@ -267,7 +267,7 @@ void TiledStaticMap::write_new_points() {
   }
 }
 
-/// Farthest first. All of them have been written.
+/// Frees the farthest tiles first. All points have been written before.
 void TiledStaticMap::free_far_tiles(const Eigen::Vector3d& sensor) {
   const double budget = 1e6 * config_.map_memory;
   std::size_t bytes = memory_bytes();

@@ -19,7 +19,7 @@ constexpr const char* kExpectedColumns =
     "expected 12 numbers (KITTI), 8 (TUM: time x y z qx qy qz qw), 7, 13 or 16 numbers, or a first "
     "line that names the columns time x y z qx qy qz qw";
 
-/// Where in a row the values stand.
+/// Positions of the values in a row.
 struct Columns {
   std::size_t count = 0;
   std::size_t time = kNoColumn;
@@ -39,7 +39,7 @@ bool is_separated(std::string_view line) {
   return line.find_first_of(",;") != std::string_view::npos;
 }
 
-/// Columns of a line; empty ones count if commas or semicolons separate them.
+/// Cells of a line; empty cells count if commas or semicolons separate them.
 std::vector<std::string> split(std::string_view line) {
   std::vector<std::string> cells;
   if (!is_separated(line)) {
@@ -67,7 +67,7 @@ bool contains(const std::string& text, const char* part) {
   return text.find(part) != std::string::npos;
 }
 
-/// Sorts a named column in; the first of two with one meaning counts.
+/// Sets the meaning of a named column; the first of two columns with one meaning counts.
 void add_column(const std::string& cell, std::size_t index, Columns& columns) {
   const std::string name = lower_case(cell);
   if (name.empty()) return;
@@ -203,7 +203,7 @@ Trajectory read_trajectory(const std::filesystem::path& path) {
 }
 
 std::optional<TrajectoryMatch> match_time(const Trajectory& trajectory, double time) {
-  constexpr double kForgiven = 0.005;  // s, less than any sensor turns in
+  constexpr double kForgiven = 0.005;  // s, much less than one revolution of a sensor
   const std::vector<double>& times = trajectory.times;
   if (times.empty() || time < times.front() - kForgiven || time > times.back() + kForgiven) {
     return std::nullopt;
@@ -235,7 +235,7 @@ Eigen::Isometry3d interpolate(const Eigen::Isometry3d& a, const Eigen::Isometry3
 }
 
 double to_seconds(double stamp) {
-  // Between 1973 and 5138 as seconds, milliseconds, microseconds or nanoseconds.
+  // Stamps between 1973 and 5138.
   if (stamp > 1e17) return stamp * 1e-9;
   if (stamp > 1e14) return stamp * 1e-6;
   if (stamp > 1e11) return stamp * 1e-3;

@@ -3,6 +3,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynains/errors.hpp"
@@ -36,14 +37,22 @@ struct EvalOptions {
 };
 
 /// Scores must not replace the files that they are made from. Throws ConfigError or IoError.
-void check_targets(const EvalOptions& options, const LabelledSequence& sequence) {
+void check_targets(const EvalOptions& options, const Recording& recording) {
   if (!options.json.empty() && !options.csv.empty() &&
       whole_path(options.json) == whole_path(options.csv)) {
     throw ConfigError("--json and --csv name one file: " + options.json);
   }
   InputFiles inputs;
-  for (const std::filesystem::path& file : sequence.files()) inputs.add(file);
+  for (const std::filesystem::path& file : recording.files()) inputs.add(file);
   for (const std::string& map : options.maps) inputs.add(map);
+  for (const std::filesystem::path run : options.runs) {
+    inputs.add(run / "report.json");
+    for (std::size_t i = 0; i < recording.size(); ++i) {
+      inputs.add(run / "labels" / (recording.name(i) + ".label"));
+      inputs.add(run / "online" / (recording.name(i) + ".label"));
+      inputs.add(run / "causes" / (recording.name(i) + ".cause"));
+    }
+  }
   for (const std::string& target : {options.json, options.csv}) inputs.refuse(target);
 }
 
@@ -67,10 +76,11 @@ void eval(const EvalOptions& options) {
     names.push_back(options.runs.size() > 1 ? folder : options.online ? "online" : "run");
   }
 
-  LabelledSequence sequence(options.sequence.open(), options.window, runs);
-  check_targets(options, sequence);
+  Recording recording = options.sequence.open();
+  check_targets(options, recording);
   TextFile json(options.json);
   TextFile csv(options.csv);
+  LabelledSequence sequence(std::move(recording), options.window, runs);
 
   std::vector<PointFile> map_files;
   std::vector<evaluation::MapEstimate> maps;

@@ -18,7 +18,7 @@ class InputFiles {
   /// Throws IoError that names both paths if `output`, the file or folder with this identity, is
   /// read.
   void refuse(const FileIdentity& identity, const std::filesystem::path& output) const;
-  /// The same for the file or folder that `output` leads to, if there is one.
+  /// Refuses the file or folder that `output` leads to, if it exists and is read.
   void refuse(const std::filesystem::path& output) const {
     if (const auto identity = identity_of(output)) refuse(*identity, output);
   }

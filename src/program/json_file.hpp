@@ -40,7 +40,7 @@ std::optional<std::string> json_field(const std::filesystem::path& path,
                                       const nlohmann::ordered_json& json,
                                       const std::string& pointer);
 
-/// The same for a field that must be there.
+/// A field that must exist; see json_field.
 template <class T>
 T required_json_field(const std::filesystem::path& path, const nlohmann::ordered_json& json,
                       const std::string& pointer) {

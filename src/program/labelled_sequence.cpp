@@ -44,17 +44,6 @@ bool LabelledSequence::every_run_has(std::size_t index) const {
   });
 }
 
-std::vector<fs::path> LabelledSequence::files() const {
-  std::vector<fs::path> files = sequence_.files();
-  for (const RunLabels& run : runs_) {
-    for (std::size_t index = first_; index < last_; ++index) {
-      files.push_back(run.folder / run.kind / (sequence_.name(index) + ".label"));
-      files.push_back(run.folder / "causes" / (sequence_.name(index) + ".cause"));
-    }
-  }
-  return files;
-}
-
 bool LabelledSequence::read(std::size_t i, evaluation::LabelledScan& scan) {
   if (i >= size()) return false;
   const std::size_t index = first_ + i;

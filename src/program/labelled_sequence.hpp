@@ -41,8 +41,6 @@ class LabelledSequence {
 
   const Recording& sequence() const { return sequence_; }
   std::size_t size() const { return last_ - first_; }
-  /// Every file that is read: of the recording and of the runs.
-  std::vector<std::filesystem::path> files() const;
   /// Index within sequence() of scan i of the window.
   std::size_t index(std::size_t i) const { return first_ + i; }
 

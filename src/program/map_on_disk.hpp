@@ -13,7 +13,7 @@ struct StagesWithMapOnDisk : DefaultStages {
 };
 using RemoverWithMapOnDisk = BasicDynaInsRemover<StagesWithMapOnDisk>;
 
-/// The same configuration with the map in `folder` and no more than `megabytes` of it in memory.
+/// The configuration with the map in `folder` and no more than `megabytes` of it in memory.
 /// Throws ConfigError.
 RemoverWithMapOnDisk::Config with_map_on_disk(const DynaInsRemover::Config& config,
                                               const std::filesystem::path& folder,

@@ -21,7 +21,7 @@ class RecordingFlags {
   bool names_files() const { return !poses_.empty() || !times_.empty(); }
   /// Throws IoError. Warns of scans that are left out for want of a pose.
   Recording open() const { return open(folder_); }
-  /// The same flags for another folder.
+  /// Opens another folder with these flags.
   Recording open(const std::filesystem::path& folder) const;
 
  private:

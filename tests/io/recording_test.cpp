@@ -276,17 +276,18 @@ TEST_CASE("Folders and devices in the place of files are refused before they are
   for (const char* device : {"/dev/null", "/dev/zero"}) {
     options.times = device;
     CHECK(error_of(seq, options) ==
-          std::string(device) + ": is a device or a pipe, expected a file");
+          std::string(device) + ": cannot be read: is a device or a pipe; expected a file");
     options.times.clear();
     options.poses = device;
     CHECK(error_of(seq, options) ==
-          std::string(device) + ": is a device or a pipe, expected a file");
+          std::string(device) + ": cannot be read: is a device or a pipe; expected a file");
     options.poses.clear();
   }
   options.poses = seq;
-  CHECK(error_of(seq, options) == seq.string() + ": is a folder, expected a file");
+  CHECK(error_of(seq, options) == seq.string() + ": cannot be read: is a folder; expected a file");
   options.poses = seq / "none.txt";
-  CHECK(error_of(seq, options) == (seq / "none.txt").string() + ": not found, expected a file");
+  CHECK(error_of(seq, options) ==
+        (seq / "none.txt").string() + ": cannot be read: No such file or directory");
   CHECK_THAT(error_of(""), StartsWith("\"\": is not a folder; expected a KITTI folder"));
 }
 

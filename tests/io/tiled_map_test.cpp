@@ -300,7 +300,7 @@ TEST_CASE("a folder or a tile that cannot be used is an error with its path") {
   TiledStaticMap map(config_of(map_folder, 1));
   fs::remove(tile);
   CHECK_THAT(message_of<IoError>([&] { points_of(map); }),
-             StartsWith(tile.string() + ": cannot be opened for reading: "));
+             StartsWith(tile.string() + ": cannot be read: "));
 }
 
 TEST_CASE("a folder of tiles belongs to one map at a time, also if that moves") {

@@ -16,7 +16,7 @@ for compiler in g++ clang++ clang++-14; do
   for level in -O1 "-O3 -DNDEBUG"; do
     # shellcheck disable=SC2086
     "$compiler" -std=c++17 $level -ffp-contract=off -I"$root/include" -I"$root/tests" -isystem "$1" \
-      "$root/tests/reliability/determinism.cpp" -o "$work/program"
+      "$root/tests/reliability/determinism.cpp" "$root/src/remover/remover.cpp" -o "$work/program"
     for run in 1 2; do
       "$work/program" >"$work/said"
       echo "$compiler $level, run $run: $(tr '\n' ';' <"$work/said")"

@@ -149,9 +149,9 @@ class RandomStart {
     if (is_input(path)) return false;
     if (is_target(path)) return start_.replaces || is_eval;
     if (!out_ || !is_below(path, *out_)) return false;
-    if (world_.ours.count(path) > 0) return true;
+    const Kind kind = before_.at(path).kind;
     // A folder that only holds files of ours, or none, can go.
-    return before_.at(path).kind == Kind::kFolder;
+    return kind == Kind::kFolder || (kind == Kind::kFile && world_.ours.count(path) > 0);
   }
 
   bool may_appear(const std::string& path) const {
@@ -191,8 +191,9 @@ class RandomStart {
     if (outcome_.code == 0) return claim == Claim::kComplete ? "" : "exit code 0, but not complete";
     if (claim != Claim::kComplete || start_.full || !start_.closed.empty()) return {};
     for (const std::string& path : world_.ours) {
+      const auto earlier = before_.find(path);
       const auto now = after_.find(path);
-      if (now == after_.end() || now->second != before_.at(path)) {
+      if (earlier != before_.end() && (now == after_.end() || now->second != earlier->second)) {
         return "complete, but touched by a run that failed: " + path;
       }
     }

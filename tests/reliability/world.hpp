@@ -30,7 +30,7 @@ struct Parts {
 
 struct World {
   Tree tree;
-  std::set<std::string> ours;       ///< files that the marker beside or above them lists
+  std::set<std::string> ours;       ///< names of files that the marker beside or above them lists
   std::vector<std::string> locked;  ///< without permission to write
   std::string kitti, clouds, out, other, foreign;  ///< names of folders
 };
@@ -138,14 +138,16 @@ class WorldMaker {
   }
 
   static void erase(World& world, const std::string& path) {
-    const auto within = [&](const std::string& name) {
-      return name == path || is_below(name, path);
-    };
     for (auto item = world.tree.begin(); item != world.tree.end();) {
-      item = within(item->first) ? world.tree.erase(item) : std::next(item);
+      const bool within = item->first == path || is_below(item->first, path);
+      item = within ? world.tree.erase(item) : std::next(item);
     }
+  }
+
+  /// No marker in that folder lists anything any more.
+  static void disown(World& world, const std::string& folder) {
     for (auto name = world.ours.begin(); name != world.ours.end();) {
-      name = within(*name) ? world.ours.erase(name) : std::next(name);
+      name = is_below(*name, folder) ? world.ours.erase(name) : std::next(name);
     }
   }
 
@@ -157,10 +159,8 @@ class WorldMaker {
       if (world.tree.count(folder) == 0) put(world, folder, {Kind::kFolder, {}});
       if (world.tree.count(folder) == 0 || world.tree[folder].kind != Kind::kFolder) return;
     }
-    const bool listed = item.kind == Kind::kFile && world.ours.count(path) > 0;
     erase(world, path);
     world.tree[path] = item;
-    if (listed) world.ours.insert(path);  // by its name
   }
 
   /// A name in OUT, of a file or folder of ours.
@@ -194,6 +194,7 @@ class WorldMaker {
                                           "labels/.x.0123456789abcdef.tmp", "a/b/c.txt"}),
                    {Kind::kFile, "mine"});
       case 4:
+        disown(world, world.out);
         return put(world, world.out,
                    {Kind::kLink, pick<std::string>({world.other, world.foreign, world.kitti,
                                                     "nothing", world.out})});
@@ -224,9 +225,7 @@ class WorldMaker {
            world.tree[path].bytes.substr(0, world.tree[path].bytes.size() / 2)});
       world.tree[path].bytes = bytes;
     }
-    for (auto name = world.ours.begin(); name != world.ours.end();) {
-      name = is_below(*name, world.out) ? world.ours.erase(name) : std::next(name);
-    }
+    disown(world, world.out);
   }
 
   void damage_input(World& world) {
@@ -319,13 +318,14 @@ class WorldMaker {
 
   void eval(const World& world, Start& start) {
     const std::string run = chance(0.8) ? world.out : world.other;
+    const bool online = chance(0.2);
     start.arguments = {"eval", spelled(world.kitti), spelled(run)};
     start.inputs = {world.kitti + "/velodyne", world.kitti + "/labels", world.kitti + "/poses.txt",
-                    run + "/labels",           run + "/online",         run + "/causes"};
+                    run + (online ? "/online" : "/labels")};
+    if (online) start.arguments.push_back("--online");
     if (chance(0.6)) add_target(world, start, "--json");
     if (chance(0.3)) add_target(world, start, "--csv");
     if (chance(0.2)) start.arguments.push_back("--errors");
-    if (chance(0.2)) start.arguments.push_back("--online");
   }
 
   void simulate(const World& world, Start& start) {

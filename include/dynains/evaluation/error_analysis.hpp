@@ -1,4 +1,4 @@
-// Where an estimate went wrong: by class, instance, range and cause. Point-wise.
+// Point-wise errors of an estimate by class, instance, range and cause.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,7 +16,7 @@
 
 namespace dynains::evaluation {
 
-/// Collects the errors of estimate 0 of the scans it is shown.
+/// Counts the errors of estimate 0.
 class ErrorAnalysis {
  public:
   struct Settings {
@@ -43,10 +43,11 @@ class ErrorAnalysis {
     std::uint16_t instance = 0;
     Truth truth = Truth::kStatic;
     Counts counts;
-    std::size_t scans = 0;  ///< in which it has points
-    double mean_range = 0;  ///< m, planar, over its points
-    /// m/s: median over consecutive sightings of how fast the centroid moves in the world. A
-    /// centroid also moves as the view changes. Empty without time stamps or with one sighting.
+    std::size_t scans = 0;  ///< scans in which it has points
+    double mean_range = 0;  ///< m, planar, mean over its points
+    /// m/s: median speed of the centroid of its visible points between consecutive scans that show
+    /// it. The centroid also moves when another part becomes visible. Empty without time stamps or
+    /// with one scan.
     std::optional<double> speed;
   };
 
@@ -56,17 +57,17 @@ class ErrorAnalysis {
     PointScore score;
   };
 
-  /// How often a cause stands at wrong and at right verdicts.
+  /// Wrong and right verdicts that have one cause.
   struct CauseErrors {
     std::uint64_t missed_dynamic = 0;
     std::uint64_t lost_static = 0;
     std::uint64_t right = 0;
   };
 
-  /// Errors of points whose cluster (LabelledScan::instances) mixes truths within the scan.
+  /// Errors of points whose cluster (LabelledScan::instances) has static and dynamic points.
   struct MergeErrors {
-    std::uint64_t missed_dynamic = 0;  ///< in clusters that are mostly static
-    std::uint64_t lost_static = 0;     ///< in clusters that are mostly dynamic
+    std::uint64_t missed_dynamic = 0;  ///< in clusters with more static than dynamic points
+    std::uint64_t lost_static = 0;     ///< in clusters with more dynamic than static points
   };
 
   /// Throws ConfigError for settings out of bounds.
@@ -74,8 +75,8 @@ class ErrorAnalysis {
 
   void add(const LabelledScan& scan);
 
-  std::vector<ClassErrors> by_class() const;        ///< by id
-  std::vector<InstanceErrors> by_instance() const;  ///< by class and instance; id 0 is left out
+  std::vector<ClassErrors> by_class() const;        ///< ordered by id
+  std::vector<InstanceErrors> by_instance() const;  ///< ordered by class and instance, without id 0
   const std::vector<RingErrors>& by_range() const { return rings_; }
   const std::array<CauseErrors, kCauseCount>& by_cause() const { return causes_; }
   const MergeErrors& merged() const { return merged_; }
@@ -102,7 +103,7 @@ class ErrorAnalysis {
 
   Settings settings_;
   std::map<std::uint16_t, Counts> classes_;
-  std::map<std::uint32_t, Track> tracks_;  // by truth label, class in the lower 16 bits
+  std::map<std::uint32_t, Track> tracks_;  // key: truth label
   std::vector<RingErrors> rings_;
   std::array<CauseErrors, kCauseCount> causes_{};
   MergeErrors merged_;

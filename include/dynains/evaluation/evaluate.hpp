@@ -1,4 +1,4 @@
-// Both protocols and the error analysis in one call, over any source of labelled scans.
+// Both protocols and the error analysis in one call.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,8 +14,8 @@
 
 namespace dynains::evaluation {
 
-/// What is evaluated and how. The defaults are the published protocols, but for unlabeled points:
-/// the published tables count them as static.
+/// Settings of an evaluation. Defaults are those of the published protocols, with one exception:
+/// the published tables count unlabeled points as static.
 struct EvaluationConfig {
   double voxel = 0.2;
   double min_range = 2.7;
@@ -43,7 +43,7 @@ struct EvaluationConfig {
   void validate() const { validate_parameters("EvaluationConfig", *this); }
 };
 
-/// Finished map that takes part as one more row.
+/// A finished map, evaluated as one more row.
 struct MapEstimate {
   std::string name;
   Span<const Eigen::Vector3d> points_world;  ///< m, in the world frame of the poses
@@ -54,7 +54,7 @@ struct EvaluationRow {
   std::string name;
   VoxelScore voxels;
   PointScore points;
-  /// Map files only: points that lie near no measured point, and points in all.
+  /// Map files only: points without a measured point nearby, and all points.
   std::optional<std::uint64_t> foreign_points;
   std::optional<std::uint64_t> map_points;
 };
@@ -66,13 +66,13 @@ struct Evaluation {
   /// "identity" (nothing removed), "oracle" (exactly the dynamic points removed), the estimates,
   /// the maps.
   std::vector<EvaluationRow> rows;
-  /// Of estimate 0; empty if there is none.
+  /// Errors of estimate 0; empty without estimates.
   std::optional<ErrorAnalysis> errors;
 };
 
-/// Goes through `source` twice. `estimates`: names for the bits of LabelledScan::in_map.
-/// Throws ConfigError for settings out of bounds, std::invalid_argument for a scan whose spans
-/// differ in length, and whatever `source` throws.
+/// Reads `source` twice. `estimates`: names of the bits of LabelledScan::in_map.
+/// Throws ConfigError for settings out of bounds, std::invalid_argument for a scan with spans of
+/// different lengths or a stride below 3, and exceptions of `source`.
 Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& estimates,
                     const std::vector<MapEstimate>& maps, const EvaluationConfig& config = {});
 

@@ -1,4 +1,4 @@
-// Both protocols for a finished map of unlabelled points, such as another tool's map file.
+// Both protocols for a finished map of unlabelled points, such as a map file of another tool.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,14 +13,14 @@
 
 namespace dynains::evaluation {
 
-/// Judges map points by the scans they were made from.
+/// Evaluates map points by the scans that the map was made from.
 ///
-/// Voxel-wise: a map point takes the class of the nearest measured point, as long as that lies
-/// within the 27 voxels around the map point (so the nearest one is found whenever it is nearer
-/// than one voxel edge). Map points without such a point come from elsewhere (out of range, or out
-/// of place) and are left out, as are those nearest to an ignored point. What remains is voxelised
-/// and compared as in VoxelProtocol. Point-wise: a measured point counts as removed if no map point
-/// lies within `point_radius`.
+/// Voxel-wise: a map point has the class of the nearest measured point within the 27 voxels around
+/// it; a measured point nearer than one voxel edge is always found. Map points without a measured
+/// point there (out of range, or in another frame) are left out, and so are map points whose
+/// nearest measured point is ignored. The other map points are voxelised and compared as in
+/// VoxelProtocol. Point-wise: a measured point is removed if no map point lies within
+/// `point_radius`.
 ///
 /// Call add() for every scan, then resolve() for every scan again. Memory grows with the number of
 /// map points and occupied voxels only.
@@ -45,12 +45,12 @@ class MapProtocol {
   void add(const LabelledScan& scan);
   void resolve(const LabelledScan& scan);
 
-  /// Against the raw map of `raw`, which must have seen the same scans with the same settings.
+  /// Score against the raw map of `raw`, which must have the same scans and settings.
   VoxelScore voxel_score(const VoxelProtocol& raw) const;
   PointScore point_score() const;
 
-  /// Map points left out because no measured point is near. If these are most, the map is likely
-  /// in another frame than the poses.
+  /// Map points that were left out because no measured point is near. If these are most of the map,
+  /// it is probably in another frame than the poses.
   std::uint64_t foreign_points() const;
 
  private:

@@ -10,8 +10,8 @@
 
 namespace dynains::evaluation {
 
-/// Counts measured points that an estimate judges right: static ones in its map, dynamic ones not.
-/// Estimates are judged by LabelledScan::in_map.
+/// Counts correct points of each estimate (LabelledScan::in_map): static points in its map, dynamic
+/// points not in its map.
 class PointProtocol {
  public:
   struct Settings {
@@ -27,7 +27,7 @@ class PointProtocol {
 
   const PointScore& score(std::size_t estimate) const { return scores_.at(estimate); }
 
-  /// Rows beside the estimates: nothing removed, and exactly the dynamic points removed.
+  /// Reference rows: nothing removed, and exactly the dynamic points removed.
   PointScore identity() const;
   PointScore oracle() const;
 

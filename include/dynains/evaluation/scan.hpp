@@ -1,4 +1,4 @@
-// One labelled scan as the protocols see it, and where scans come from.
+// One labelled scan, and the source of scans.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -11,19 +11,19 @@
 
 namespace dynains::evaluation {
 
-/// How many estimates can be evaluated in one go.
+/// Largest number of estimates in one evaluation.
 inline constexpr std::size_t kMaxEstimates = 6;
 
-/// Views over one scan. Every span is as long as the scan has points, or empty where it says so.
+/// Views over one scan. Each span has one value per point; some may be empty.
 struct LabelledScan {
-  const float* xyz = nullptr;  ///< sensor frame, m: x y z of a point, `stride` floats to the next
-  std::size_t stride = 3;      ///< floats
+  const float* xyz = nullptr;  ///< sensor frame, m: x y z of each point
+  std::size_t stride = 3;      ///< floats from one point to the next, at least 3
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
   double time = std::numeric_limits<double>::quiet_NaN();  ///< s; NaN if unknown
   Span<const std::uint32_t> truth;                         ///< SemanticKITTI labels
-  /// Bit e is set if the map of estimate e holds the point. Empty: no estimate holds any.
+  /// Bit e is set if the map of estimate e has the point. Empty: no map has a point.
   Span<const std::uint8_t> in_map;
-  /// Why estimate 0 decided as it did (dynains::evaluation::Cause). May be empty.
+  /// Cause of each verdict of estimate 0 (dynains::evaluation::Cause). May be empty.
   Span<const std::uint8_t> causes;
   /// Instance or cluster ids of estimate 0, 0 = none. May be empty.
   Span<const std::uint32_t> instances;
@@ -35,8 +35,8 @@ struct LabelledScan {
   }
 };
 
-/// Fills `scan` with scan `index` and returns true, or returns false past the last one. Views stay
-/// valid until the next call. Scans are asked for in order, and a second time from the start.
+/// Fills `scan` with scan `index` and returns true; returns false behind the last scan. Views stay
+/// valid until the next call. Scans are read in order, and then a second time in order.
 using ScanSource = std::function<bool(std::size_t index, LabelledScan& scan)>;
 
 }  // namespace dynains::evaluation

@@ -1,4 +1,4 @@
-// The numbers of both protocols, as counts: shares are derived, never stored.
+// Counts of both protocols, and the scores that follow from them.
 #pragma once
 
 #include <cmath>
@@ -7,16 +7,17 @@
 
 namespace dynains::evaluation {
 
-/// Share in percent; NaN when there is nothing to take a share of.
+/// Percentage; NaN if `whole` is 0.
 inline double percent(std::uint64_t part, std::uint64_t whole) {
   if (whole == 0) return std::numeric_limits<double>::quiet_NaN();
   return 100.0 * static_cast<double>(part) / static_cast<double>(whole);
 }
 
-/// Harmonic mean; 0 if both are 0, NaN if either is.
+/// Harmonic mean; 0 if both are 0, NaN if one is NaN.
 inline double harmonic_mean(double a, double b) { return a + b == 0 ? 0 : 2 * a * b / (a + b); }
 
-/// ERASOR's protocol (Lim et al., RA-L 2021): voxel points of the raw map that the estimate keeps.
+/// ERASOR's protocol (Lim et al., RA-L 2021): voxel points of the raw map that the estimate
+/// preserves.
 struct VoxelScore {
   std::uint64_t static_total = 0;
   std::uint64_t static_preserved = 0;
@@ -27,11 +28,11 @@ struct VoxelScore {
   double rejection_rate() const {                                                       ///< RR, %
     return percent(dynamic_total - dynamic_preserved, dynamic_total);
   }
-  /// F1, in [0, 1]; NaN if the truth lacks static or dynamic points.
+  /// F1, in [0, 1]; NaN without static or without dynamic points.
   double f1() const { return harmonic_mean(preservation_rate(), rejection_rate()) / 100; }
 };
 
-/// KTH's protocol (Zhang et al., ITSC 2023): measured points that are judged right.
+/// KTH's protocol (Zhang et al., ITSC 2023): measured points that are classified correctly.
 struct PointScore {
   std::uint64_t static_total = 0;
   std::uint64_t static_kept = 0;

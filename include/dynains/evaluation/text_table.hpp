@@ -7,7 +7,7 @@
 
 namespace dynains::evaluation {
 
-/// The first columns are left-aligned, the others right-aligned; widths follow the contents.
+/// The first `left_columns` columns are left-aligned, the others right-aligned.
 class TextTable {
  public:
   explicit TextTable(std::vector<std::string> header, std::size_t left_columns = 1);
@@ -23,7 +23,7 @@ class TextTable {
   std::vector<std::vector<std::string>> rows_;
 };
 
-/// A field of a CSV file (RFC 4180): in quotes if it holds a comma, a quote or a line break.
+/// A field of a CSV file (RFC 4180): quoted if it has a comma, a quote or a line break.
 std::string csv_field(const std::string& text);
 
 /// Fixed number of decimals; `missing` for a value that is not finite.

@@ -1,4 +1,4 @@
-// What the ground truth says of a point: SemanticKITTI class ids reduced to what the protocols ask.
+// Ground truth of a point: SemanticKITTI class ids reduced to static, dynamic and ignored.
 #pragma once
 
 #include <bitset>
@@ -12,13 +12,13 @@ namespace dynains::evaluation {
 enum class Truth : std::uint8_t {
   kStatic,
   kDynamic,
-  kIgnored,  ///< judged by no protocol: dropped from the raw map and from every estimate alike
+  kIgnored,  ///< not evaluated: left out of the raw map and of every estimate
 };
 
-/// What becomes of points without a class: SemanticKITTI's 0 (unlabeled) and 1 (outlier).
+/// Treatment of points without a class: SemanticKITTI's 0 (unlabeled) and 1 (outlier).
 enum class Unlabeled : std::uint8_t {
   kIgnore,
-  kStatic,  ///< as the published tables have it
+  kStatic,  ///< as in the published tables
 };
 
 /// SemanticKITTI label word: class in the lower, instance in the upper 16 bits.
@@ -29,7 +29,7 @@ constexpr std::uint16_t semantic_instance(std::uint32_t label) {
   return static_cast<std::uint16_t>(label >> 16U);
 }
 
-/// Which class ids are dynamic and which are ignored; every other one is static.
+/// Dynamic and ignored class ids; all others are static.
 class TruthClasses {
  public:
   /// Dynamic: SemanticKITTI's moving classes, 252 to 259.

@@ -13,24 +13,25 @@
 
 namespace dynains::evaluation {
 
-/// One labelled point of a voxel map: the centroid of what fell into the voxel, with the class of
-/// the source point nearest to it (among equals, which are those within 1e-8 m^2, the first).
+/// One labelled point of a voxel map: the centroid of the points in the voxel, with the class of
+/// the source point nearest to it. Squared distances within 1e-8 m^2 are equal; the first point
+/// wins.
 struct VoxelPoint {
   Eigen::Vector3d p_world;  ///< m
   Truth truth;              ///< static or dynamic
 };
 
-/// Evaluates several estimates against the raw map of a sequence, scan by scan.
+/// Compares several estimates with the raw map of a sequence, scan by scan.
 ///
 /// Raw map: points at planar range [min_range, max_range] that are not ignored; each scan is
 /// voxelised on the world grid of edge `voxel` (VoxelPoint), all scans are concatenated and
-/// voxelised again. The map of an estimate is made alike from the points that it holds. A raw voxel
-/// point is preserved if the nearest point of the estimate is nearer than voxel * sqrt(3) / 2 and
-/// of its class.
+/// voxelised again. The map of an estimate is made in the same way from the points that it keeps. A
+/// raw voxel point is preserved if the nearest point of the estimate is nearer than
+/// voxel * sqrt(3) / 2 and has the same class.
 ///
-/// Which source point is nearest to a centroid is known only once the centroid is: the scans are
-/// needed twice. Call add() for every scan, then resolve() for every scan in the same order, then
-/// score(). Memory grows with the number of occupied voxels, not with the number of scans.
+/// The source point nearest to a centroid can be found only when the centroid is final, so each
+/// scan is read twice: call add() for every scan, then resolve() for every scan in the same order,
+/// then score(). Memory grows with the number of occupied voxels, not with the number of scans.
 class VoxelProtocol {
  public:
   struct Settings {
@@ -52,9 +53,9 @@ class VoxelProtocol {
   VoxelProtocol(VoxelProtocol&&) noexcept;
   VoxelProtocol& operator=(VoxelProtocol&&) noexcept;
 
-  /// First pass. Points that are no return (all zero), not finite, or farther from the first pose
-  /// than the grid reaches (210 km at 0.2 m) belong to no map. Throws PoseError if the first pose
-  /// itself is that far out (10^14 m) or not finite.
+  /// First pass. Points that are all zero (no return), not finite, or outside of the grid around
+  /// the first pose (210 km at 0.2 m) belong to no map. Throws PoseError if the first pose is not
+  /// finite or beyond 10^14 m.
   void add(const LabelledScan& scan);
 
   /// Second pass. The result is undefined, but safe, if the scans differ from those added.
@@ -63,7 +64,7 @@ class VoxelProtocol {
   /// Score of a row: kIdentity, kOracle, or kFirstEstimate + e.
   VoxelScore score(std::size_t row) const;
 
-  /// Every voxel point of the raw map (row kIdentity) or of an estimate's map.
+  /// Calls `visit` for every voxel point of the raw map (row kIdentity) or of an estimate's map.
   void for_each(std::size_t row, const std::function<void(const VoxelPoint&)>& visit) const;
 
  private:

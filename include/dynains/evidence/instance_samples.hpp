@@ -272,9 +272,9 @@ class InstanceSampler {
   // By point of a block.
   std::array<std::int32_t, kBlock> xy_ = {}, z_ = {}, instance_ = {}, hash_ = {}, rank_ = {};
   detail::SmallestK samples_;            // by supervoxel
-  std::vector<Supervoxel> supervoxels_;  // longer than what is in use
+  std::vector<Supervoxel> supervoxels_;  // by number in the table; unused places at the end
   std::vector<std::uint32_t> next_;
-  std::vector<std::uint32_t> ordered_;  // as they were met, by instance; longer than what is in use
+  std::vector<std::uint32_t> ordered_;  // numbers in the table, by instance
 };
 
 }  // namespace dynains

@@ -224,7 +224,7 @@ class MovedGround {
   std::vector<Block> under_;  // points under removed points
   InstanceHull hull_;
   InstanceSampler sampler_;
-  Clearance clearance_ = {0.4F, 0.0F};  // between ground and what stands on it
+  Clearance clearance_ = {0.4F, 0.0F};  // between the ground and objects on it
   std::vector<EvidenceVerdict::GroundPoint> found_;
   std::vector<std::uint8_t> moved_;  // by group, later by position in InstanceSamples::met
   // Tested ground points, in runs that share a voxel.

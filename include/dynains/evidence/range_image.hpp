@@ -68,15 +68,15 @@ class RangeImage {
   /// if none does.
   void build(const RangeImageGrid& grid, PointsView ground, PointsView objects,
              Span<const std::uint8_t> moving, float reach, Scratch& scratch) {
-    const Reaches reaches(grid, reach);
+    const ProtectionLimits limits(grid, reach);
     scratch.nearest.assign(grid.cell_count(), kNothing);
     scratch.border.assign(grid.stride(), kNothing);
     collect(grid, objects, moving, scratch.nearest.data());
-    keep_objects(grid, reaches, scratch);
+    keep_objects(grid, limits, scratch);
     collect(grid, ground, {}, scratch.nearest.data());
     close_holes(grid, scratch);
-    store_with_least_around(grid, reaches, scratch);
-    widen(grid, reaches, scratch);
+    store_with_least_around(grid, limits, scratch);
+    widen(grid, limits, scratch);
   }
 
  private:
@@ -84,10 +84,10 @@ class RangeImage {
   static constexpr float kFarthest = 320.0F;  // m
 
   // Returns of objects nearer than limit[k] (cm) protect k + 1 cells in each direction.
-  struct Reaches {
+  struct ProtectionLimits {
     std::array<std::int16_t, kWidest> limit;
 
-    Reaches(const RangeImageGrid& grid, float reach) {
+    ProtectionLimits(const RangeImageGrid& grid, float reach) {
       for (std::size_t k = 0; k < kWidest; ++k) {
         const float metres = reach * grid.columns_per_radian / (static_cast<float>(k) + 0.5F);
         limit[k] = static_cast<std::int16_t>(std::min(metres, kFarthest) * kCentimetres);
@@ -156,7 +156,8 @@ class RangeImage {
 
   // Copies the static returns while the image holds objects only, and stores the number of cells
   // that they protect, if more than one.
-  static void keep_objects(const RangeImageGrid& grid, const Reaches& reaches, Scratch& scratch) {
+  static void keep_objects(const RangeImageGrid& grid, const ProtectionLimits& limits,
+                           Scratch& scratch) {
     const std::size_t stride = grid.stride();
     const std::size_t groups = group_count(grid);
     const auto rows = static_cast<std::size_t>(grid.rows);
@@ -164,7 +165,7 @@ class RangeImage {
     scratch.reach.assign(rows * group_stride(grid), 0);
     detail::run_packs([&](auto packs) {
       using Short = typename detail::ShortsOf<decltype(packs)>::Type;
-      const Short far(reaches.limit[1]);
+      const Short far(limits.limit[1]);
       for (std::size_t row = 0; row < rows; ++row) {
         const std::int16_t* const from = &scratch.nearest[row * stride];
         std::int16_t* const to = &scratch.objects[row * stride];
@@ -174,7 +175,7 @@ class RangeImage {
           here.store(to + column_of(group));
           if (!(here < far).any()) continue;
           std::size_t cells = 2;
-          while (cells < kWidest && (here < Short(reaches.limit[cells])).any()) ++cells;
+          while (cells < kWidest && (here < Short(limits.limit[cells])).any()) ++cells;
           reach[group] = static_cast<std::uint8_t>(cells);
         }
         wrap(to, static_cast<std::size_t>(grid.columns), 1);
@@ -221,11 +222,9 @@ class RangeImage {
     });
   }
 
-  // The nearest returns of the 3x3 cells about each cell, beside its own: of what moved and of what
-  // stays. A single one of these says nothing, unless it is that of a near object.
-  void store_with_least_around(const RangeImageGrid& grid, const Reaches& reaches,
+  // Writes the cells: their own nearest return and those of the 3x3 cells.
+  void store_with_least_around(const RangeImageGrid& grid, const ProtectionLimits& limits,
                                Scratch& scratch) {
-    using namespace detail;
     const std::size_t stride = grid.stride();
     const auto rows = static_cast<std::size_t>(grid.rows);
     make_cells(grid);
@@ -235,73 +234,99 @@ class RangeImage {
     for (std::size_t row = 0; row < rows; ++row) {
       wrap(&scratch.nearest[row * stride], static_cast<std::size_t>(grid.columns), 1);
     }
-    run_packs([&](auto packs) {
-      using Short = typename ShortsOf<decltype(packs)>::Type;
-      const Short nothing(kNothing), unknown(kUnknown), near(reaches.limit[0]);
-      const Short zero(0), one_return(-1);
-      std::int16_t* const leasts = scratch.least.data();
-      std::int16_t* const moving_leasts = scratch.least_moving.data();
-      std::int16_t* const counts = scratch.count.data();
+    detail::run_packs([&](auto packs) {
+      using Short = typename detail::ShortsOf<decltype(packs)>::Type;
       for (std::size_t row = 0; row < rows; ++row) {
-        const auto line = [&](const std::vector<std::int16_t>& image, std::size_t number) {
-          return number < rows ? &image[number * stride] : scratch.border.data();
-        };
-        const std::int16_t* const low = line(scratch.nearest, row - 1);
-        const std::int16_t* const middle = line(scratch.nearest, row);
-        const std::int16_t* const high = line(scratch.nearest, row + 1);
-        Cell* const cells = &cells_[row * stride];
-        for (std::size_t column = 0; column < stride; column += kShortPackWidth) {
-          const Short below = Short::load(low + column);
-          const Short here = Short::load(middle + column);
-          const Short above = Short::load(high + column);
-          min(min(only_moving(below), only_moving(here)), only_moving(above))
-              .store(moving_leasts + column);
-          const Short a = only_staying(below);
-          const Short b = only_staying(here);
-          const Short c = only_staying(above);
-          min(min(a, b), c).store(leasts + column);
-          // Set lanes are -1.
-          ((a < nothing) + (b < nothing) + (c < nothing)).store(counts + column);
-        }
-        for (std::size_t column = kPackWidth; column + kPackWidth < stride;
-             column += kShortPackWidth) {
-          const auto least_of_three = [](const std::int16_t* at) {
-            return min(min(Short::load(at - 1), Short::load(at)), Short::load(at + 1));
-          };
-          const std::int16_t* const count = counts + column;
-          const Short returns =
-              Short::load(count - 1) + Short::load(count) + Short::load(count + 1);
-          Short alone = unknown;
-          const Short single = returns == one_return;
-          if (single.any()) {
-            const Short object = min(min(least_of_three(line(scratch.objects, row - 1) + column),
-                                         least_of_three(line(scratch.objects, row) + column)),
-                                     least_of_three(line(scratch.objects, row + 1) + column));
-            alone = select(single & (object < near), object, unknown);
-          }
-          const Short staying =
-              select(returns < one_return, least_of_three(leasts + column), alone);
-          // What moved in the cell itself hides what lies behind it.
-          const Short here = Short::load(middle + column);
-          const Short hiding = min(select(staying < zero, nothing, staying), here);
-          const Short around = select(is_moving(here), hiding, staying);
-          const Short moving = least_of_three(moving_leasts + column);
-          const Short nearest = select(moving < nothing, moving, here);
-          nearest.store_interleaved_with(around, &cells[column].nearest);
-        }
+        merge_three_rows<Short>(grid, row, scratch);
+        store_row<Short>(grid, limits, row, scratch);
       }
     });
   }
 
+  // A row of one of the images of `scratch`; a row of kNothing outside the grid.
+  static const std::int16_t* row_of(const std::vector<std::int16_t>& image, std::size_t row,
+                                    const RangeImageGrid& grid, const Scratch& scratch) {
+    return row < static_cast<std::size_t>(grid.rows) ? &image[row * grid.stride()]
+                                                     : scratch.border.data();
+  }
+
+  // By column of three rows: the nearest static and moving returns, and minus the number of static
+  // returns.
+  template <class Short>
+  static void merge_three_rows(const RangeImageGrid& grid, std::size_t row, Scratch& scratch) {
+    const Short nothing(kNothing);
+    const std::size_t stride = grid.stride();
+    const std::int16_t* const low = row_of(scratch.nearest, row - 1, grid, scratch);
+    const std::int16_t* const middle = row_of(scratch.nearest, row, grid, scratch);
+    const std::int16_t* const high = row_of(scratch.nearest, row + 1, grid, scratch);
+    std::int16_t* const leasts = scratch.least.data();
+    std::int16_t* const moving_leasts = scratch.least_moving.data();
+    std::int16_t* const counts = scratch.count.data();
+    for (std::size_t column = 0; column < stride; column += detail::kShortPackWidth) {
+      const Short below = Short::load(low + column);
+      const Short here = Short::load(middle + column);
+      const Short above = Short::load(high + column);
+      min(min(only_moving(below), only_moving(here)), only_moving(above))
+          .store(moving_leasts + column);
+      const Short a = only_staying(below);
+      const Short b = only_staying(here);
+      const Short c = only_staying(above);
+      min(min(a, b), c).store(leasts + column);
+      // Set lanes are -1.
+      ((a < nothing) + (b < nothing) + (c < nothing)).store(counts + column);
+    }
+  }
+
+  // Writes one row of cells. A single static return of the 3x3 cells leaves the cell unknown,
+  // unless it is that of a near object.
+  template <class Short>
+  void store_row(const RangeImageGrid& grid, const ProtectionLimits& limits, std::size_t row,
+                 const Scratch& scratch) {
+    const Short nothing(kNothing), unknown(kUnknown), near(limits.limit[0]);
+    const Short zero(0), one_return(-1);
+    const std::size_t stride = grid.stride();
+    const std::int16_t* const middle = row_of(scratch.nearest, row, grid, scratch);
+    const std::int16_t* const leasts = scratch.least.data();
+    const std::int16_t* const moving_leasts = scratch.least_moving.data();
+    const std::int16_t* const counts = scratch.count.data();
+    Cell* const cells = &cells_[row * stride];
+    const auto least_of_three = [](const std::int16_t* at) {
+      return min(min(Short::load(at - 1), Short::load(at)), Short::load(at + 1));
+    };
+    const auto least_object = [&](std::size_t object_row, std::size_t column) {
+      return least_of_three(row_of(scratch.objects, object_row, grid, scratch) + column);
+    };
+    for (std::size_t column = detail::kPackWidth; column + detail::kPackWidth < stride;
+         column += detail::kShortPackWidth) {
+      const std::int16_t* const count = counts + column;
+      const Short returns = Short::load(count - 1) + Short::load(count) + Short::load(count + 1);
+      Short alone = unknown;
+      const Short single = returns == one_return;
+      if (single.any()) {
+        const Short object = min(min(least_object(row - 1, column), least_object(row, column)),
+                                 least_object(row + 1, column));
+        alone = select(single & (object < near), object, unknown);
+      }
+      const Short staying = select(returns < one_return, least_of_three(leasts + column), alone);
+      // A moving point of the cell itself hides the points behind it.
+      const Short here = Short::load(middle + column);
+      const Short hiding = min(select(staying < zero, nothing, staying), here);
+      const Short around = select(is_moving(here), hiding, staying);
+      const Short moving = least_of_three(moving_leasts + column);
+      const Short nearest = select(moving < nothing, moving, here);
+      nearest.store_interleaved_with(around, &cells[column].nearest);
+    }
+  }
+
   // Near objects protect more than their 3x3 cells.
-  void widen(const RangeImageGrid& grid, const Reaches& reaches, Scratch& scratch) {
+  void widen(const RangeImageGrid& grid, const ProtectionLimits& limits, Scratch& scratch) {
     const auto rows = static_cast<std::size_t>(grid.rows);
     for (std::vector<std::int16_t>& line : scratch.lines) line.resize(grid.stride());
     detail::run_packs([&](auto packs) {
       using Short = typename detail::ShortsOf<decltype(packs)>::Type;
       for (std::size_t row = 0; row < rows; ++row) {
         if (!find_nearby(grid, row, scratch)) continue;
-        widen_upwards<Short>(grid, reaches, row, scratch);
+        widen_upwards<Short>(grid, limits, row, scratch);
         widen_sideways<Short>(grid, row, scratch);
       }
     });
@@ -331,8 +356,8 @@ class RangeImage {
 
   // For each number of cells: the nearest object above and below that protects so many.
   template <class Short>
-  static void widen_upwards(const RangeImageGrid& grid, const Reaches& reaches, std::size_t row,
-                            Scratch& scratch) {
+  static void widen_upwards(const RangeImageGrid& grid, const ProtectionLimits& limits,
+                            std::size_t row, Scratch& scratch) {
     const std::size_t stride = grid.stride();
     const auto rows = static_cast<std::size_t>(grid.rows);
     const Short nothing(kNothing);
@@ -348,7 +373,7 @@ class RangeImage {
         Short line = nothing;
         if (cells <= farthest) {
           least = min(least, min(load(row - cells), load(row + cells)));
-          line = select(least < Short(reaches.limit[cells - 1]), least, nothing);
+          line = select(least < Short(limits.limit[cells - 1]), least, nothing);
         }
         line.store(&scratch.lines[cells - 1][column]);
       }

@@ -47,15 +47,15 @@ class Visibility {
     constexpr std::size_t kAtOnce =
         56;  // bits of a word behind any bit of its first byte, at least
     constexpr std::uint64_t kAll = (std::uint64_t{1} << kAtOnce) - 1;
-    Count seen = {0, 0};
+    Count sum = {0, 0};
     for (; end - begin > kAtOnce; begin += kAtOnce) {
-      seen.free += count_ones(word_from(free_, begin) & kAll);
-      seen.hit += count_ones(word_from(hit_, begin) & kAll);
+      sum.free += count_ones(word_from(free_, begin) & kAll);
+      sum.hit += count_ones(word_from(hit_, begin) & kAll);
     }
     const std::uint64_t left = (std::uint64_t{1} << (end - begin)) - 1;
-    seen.free += count_ones(word_from(free_, begin) & left);
-    seen.hit += count_ones(word_from(hit_, begin) & left);
-    return seen;
+    sum.free += count_ones(word_from(free_, begin) & left);
+    sum.hit += count_ones(word_from(hit_, begin) & left);
+    return sum;
   }
   /// Increments, for each of the first `count` samples, its number of references that find it free
   /// or hit it (fewer than 256). Both arrays have room for a multiple of eight.
@@ -88,6 +88,30 @@ class Visibility {
   std::vector<std::uint8_t> free_, hit_;
 };
 
+/// Bits of some samples. `cells`: of the image, packed; `is_inside`: in the image; `range`,
+/// `tolerance`: of the samples, in cm.
+template <class Packs>
+void compare_ranges(const typename Packs::Int& cells, const typename Packs::Mask& is_inside,
+                    const typename Packs::Float& range, const typename Packs::Float& tolerance,
+                    std::uint8_t& free_bits, std::uint8_t& hit_bits) {
+  using Float = typename Packs::Float;
+  using Int = typename Packs::Int;
+  // `nearest` is the lower half of a cell, `around` the upper.
+  const Float nearest = to_float((cells << 16) >> 16);
+  const Float around = to_float(cells >> 16);
+  const auto is_at = [&](const Float& value) { return abs(value - range) <= tolerance; };
+  const auto is_odd = [](const Int& value) { return (value << 31) < Int(0); };
+  static_assert(RangeImage::kMoving == 1);
+  const auto is_nearest = is_at(nearest);
+  const auto is_moving_beside = is_odd(cells);
+  const auto is_moving = is_odd(cells >> 16);
+  const auto free = is_inside & (around - range > tolerance) & ~(is_nearest & is_moving_beside);
+  const auto hit =
+      is_inside & ~free & ((is_nearest & ~is_moving_beside) | (is_at(around) & ~is_moving));
+  free_bits = static_cast<std::uint8_t>(free.bits());
+  hit_bits = static_cast<std::uint8_t>(hit.bits());
+}
+
 /// Tests `count` samples (m; padded for wide loads) against a range image. A beam passes a sample
 /// if it is longer by more than `margin` (m) + `slope` (m/m) * range. Hits on moving points are
 /// neither "free" nor "hit". `T_reference_sample`: rigid.
@@ -105,7 +129,7 @@ inline void test_visibility(const RangeImage& image, const Eigen::Isometry3f& T_
     using Float = typename Packs::Float;
     using Int = typename Packs::Int;
     // Local copies: stores of bytes may alias the members.
-    const Visibility::Bytes seen = visibility.bytes();
+    const Visibility::Bytes bits = visibility.bytes();
     const RangeImage::Cell* const cells = image.data();
     const Float scale(to_centimetres), least(base), slope_per_metre(growth);
     // Images are larger than the first caches: all cells of a block are prefetched before the first
@@ -132,24 +156,10 @@ inline void test_visibility(const RangeImage& image, const Eigen::Isometry3f& T_
           std::memcpy(&packed[k], &cells[cell[i + k]], sizeof(std::int32_t));
         }
         const Int both = Int::load(packed);
-        // `nearest` is the lower half of a cell, `around` the upper.
-        const Float nearest = to_float((both << 16) >> 16);
-        const Float around = to_float(both >> 16);
         const Float metres = Float::load(&ranges[i]);
-        const Float range = metres * scale;
-        const Float tolerance = metres * slope_per_metre + least;
-        const auto inside = Int(0) < Int::load(&cell[i]);
-        const auto is_at = [&](const Float& value) { return abs(value - range) <= tolerance; };
-        const auto is_odd = [](const Int& value) { return (value << 31) < Int(0); };
-        const auto is_nearest = is_at(nearest);
-        static_assert(RangeImage::kMoving == 1);
-        const auto is_moving_beside = is_odd(both);
-        const auto is_moving = is_odd(both >> 16);
-        const auto free = inside & (around - range > tolerance) & ~(is_nearest & is_moving_beside);
-        const auto hit =
-            inside & ~free & ((is_nearest & ~is_moving_beside) | (is_at(around) & ~is_moving));
-        seen.free[(begin + i) / 8] = static_cast<std::uint8_t>(free.bits());
-        seen.hit[(begin + i) / 8] = static_cast<std::uint8_t>(hit.bits());
+        compare_ranges<Packs>(both, Int(0) < Int::load(&cell[i]), metres * scale,
+                              metres * slope_per_metre + least, bits.free[(begin + i) / 8],
+                              bits.hit[(begin + i) / 8]);
       }
     }
   });

@@ -16,18 +16,20 @@ namespace dynains {
 ///
 ///   velodyne/NNNNNN.bin   float32 x y z intensity, sensor frame, metres
 ///   poses.txt             one row a scan: the upper 3x4 of the pose P, row by row
-///   calib.txt             optional: `Tr`, from the sensor to the frame of the poses (identity)
-///   times.txt             optional: one row a scan, seconds (0.1 s times the row)
-///   labels/NNNNNN.label   optional: uint32 a point, class below, instance above the 16th bit
+///   calib.txt             optional: `Tr`, from the sensor to the frame of the poses (without it:
+///                         identity)
+///   times.txt             optional: one row a scan, seconds (without it: 0.1 s times the row)
+///   labels/NNNNNN.label   optional: uint32 a point, class in the lower, instance in the upper 16
+///                         bits
 ///
-/// Rows belong to scans by number: scan NNNNNN has row NNNNNN, from 0. Only if the numbers exceed
-/// the rows and there are exactly as many rows as scans (a clip cut out of a longer recording),
-/// rows belong to scans by order. Rows beyond the last scan are ignored.
+/// Scan NNNNNN has row NNNNNN, counted from 0. Exception: if a number exceeds the number of rows
+/// and there are as many rows as scans (a clip of a longer recording), the i-th scan has row i.
+/// Rows beyond the last scan are ignored.
 ///
-/// All members throw IoError with path, position and what was expected.
+/// All members throw IoError with path, position and expectation.
 class KittiSequence {
  public:
-  /// Reads and checks everything but the scans and labels themselves.
+  /// Reads and checks all files except scans and labels.
   explicit KittiSequence(const std::filesystem::path& folder);
 
   const std::filesystem::path& folder() const { return folder_; }
@@ -38,17 +40,19 @@ class KittiSequence {
   const std::string& name(std::size_t i) const { return scans_.at(i).name; }
   /// Seconds, strictly increasing.
   double time(std::size_t i) const { return scans_.at(i).time; }
-  /// Tr^-1 P Tr: pose of the sensor in the world, which is the sensor frame where P is identity.
+  /// Tr^-1 P Tr: pose of the sensor in the world. The world frame is the sensor frame at P =
+  /// identity.
   const Eigen::Isometry3d& T_world_sensor(std::size_t i) const {
     return scans_.at(i).T_world_sensor;
   }
 
-  /// Points of scan i, from the size of its file; throws if that is not a whole number of points.
+  /// Number of points of scan i by the size of its file; throws unless that is a multiple of a
+  /// point.
   std::size_t point_count(std::size_t i) const;
 
   /// x y z intensity of every point, interleaved. Values are as stored: NaN and infinity too.
   std::vector<float> read_scan(std::size_t i) const;
-  /// The same into a vector that keeps its capacity from scan to scan.
+  /// Reads a scan into a vector whose memory is reused.
   void read_scan(std::size_t i, std::vector<float>& xyzi) const;
 
   /// One label per point of scan i; throws if the counts differ.
@@ -68,7 +72,7 @@ class KittiSequence {
   bool has_labels_ = false;
 };
 
-/// Points of a scan NNNNNN.bin, from its size; throws if that is not a whole number of points.
+/// Number of points of a file NNNNNN.bin by its size; throws unless that is a multiple of a point.
 std::size_t count_scan_points(const std::filesystem::path& file);
 /// Reads x y z intensity of every point of a scan NNNNNN.bin, interleaved.
 void read_scan(const std::filesystem::path& file, std::vector<float>& xyzi);
@@ -77,7 +81,7 @@ void read_scan(const std::filesystem::path& file, std::vector<float>& xyzi);
 std::vector<std::uint32_t> read_labels(const std::filesystem::path& file, std::size_t count);
 
 /// Writers of the same layout. Each file appears whole or not at all; folders must exist.
-/// Scans and labels are many and not brought to the disk one by one: see `sync_files()`.
+/// Scans and labels are not synced one by one: see `sync_files()`.
 /// Throw IoError.
 void write_scan(const std::filesystem::path& file, Span<const float> xyzi);
 void write_labels(const std::filesystem::path& file, Span<const std::uint32_t> labels);

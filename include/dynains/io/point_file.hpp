@@ -13,11 +13,11 @@
 
 namespace dynains {
 
-/// Beyond this distance from the origin, in metres, a float coordinate is off by up to 0.5 mm and
-/// soon more (UTM: 0.25 m): write doubles.
+/// Distance from the origin, m, up to which a float coordinate is exact to 0.5 mm. Beyond it, write
+/// doubles: UTM coordinates as floats are off by up to 0.25 m.
 inline constexpr double kFloatCoordinateLimit = 1e4;
 
-/// One point to write. Members that the file has no column for are ignored.
+/// One point to write. Members without a column in the file are ignored.
 struct FilePoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   float intensity = 0.0F;
@@ -27,9 +27,9 @@ struct FilePoint {
   double time = 0.0;
 };
 
-/// Columns beside x y z.
+/// Columns in addition to x y z.
 struct PointColumns {
-  bool double_xyz = false;  ///< x y z as double; some readers of PCD take floats only
+  bool double_xyz = false;  ///< x y z as double; some PCD readers accept floats only
   bool intensity = false;   ///< float `intensity`
   bool rgb = false;         ///< PLY: uchar `red` `green` `blue`; PCD: packed `rgb`
   bool label = false;       ///< uint32 `label`
@@ -37,19 +37,19 @@ struct PointColumns {
   bool time = false;        ///< double `time`
 };
 
-/// Writes a binary point file, point by point: nothing is kept in memory, and the number of points
-/// need not be known before. The file appears whole, at `commit()`, or not at all.
+/// Writes a binary point file, point by point. Keeps no points in memory, and need not know their
+/// number in advance. The file appears whole, at `commit()`, or not at all.
 class PointFileWriter {
  public:
   /// The format follows from the extension, .ply or .pcd.
-  /// `viewpoint` goes into the header of PCD; PLY has no place for it.
-  /// Throws IoError for another extension or if the folder cannot be written.
+  /// `viewpoint` is written to the header of PCD; PLY has no field for it.
+  /// Throws IoError for another extension, or if the folder cannot be written.
   explicit PointFileWriter(const std::filesystem::path& path, const PointColumns& columns = {},
                            const Eigen::Isometry3d& viewpoint = Eigen::Isometry3d::Identity());
 
   void add(const FilePoint& point);
   std::size_t size() const { return size_; }
-  /// Throws IoError if the disk did not take everything.
+  /// Throws IoError unless all bytes were written.
   void commit(AtomicFile::Sync sync = AtomicFile::Sync::kNow);
 
  private:
@@ -65,15 +65,15 @@ class PointFileWriter {
 /// Whether the extension is .ply or .pcd.
 bool is_point_file(const std::filesystem::path& path);
 
-/// What a point file held. A column that the file lacks stays empty; the others have one value for
-/// each position. Names are matched without regard to case; units are those of the file.
+/// Contents of a point file. A column that is not in the file is empty; other columns have one
+/// value for each position. The case of names is ignored; units are those of the file.
 struct PointFile {
   std::vector<Eigen::Vector3d> positions;  ///< x y z
   std::vector<float> intensity;            ///< intensity, i, reflectivity, scalar_intensity
   std::vector<std::uint16_t> ring;         ///< ring, channel, line, scalar_ring
   std::vector<double> time;                ///< time, t, timestamp, offset_time, scalar_time
   std::vector<std::uint32_t> label;        ///< label, class, scalar_label
-  /// Pose of the sensor that the points were taken from: VIEWPOINT of PCD, else identity.
+  /// Pose of the sensor: VIEWPOINT of PCD, else identity.
   Eigen::Isometry3d viewpoint = Eigen::Isometry3d::Identity();
 };
 
@@ -81,7 +81,7 @@ struct PointFile {
 /// format follows from the extension. Throws IoError with path, line or byte, and expectation.
 PointFile read_points(const std::filesystem::path& path);
 
-/// What the header of a point file says, without its points.
+/// Header of a point file.
 struct PointFileHeader {
   Eigen::Isometry3d viewpoint = Eigen::Isometry3d::Identity();  ///< as in PointFile
   PointColumns columns;                                         ///< without rgb and double_xyz
@@ -89,8 +89,8 @@ struct PointFileHeader {
 };
 PointFileHeader read_point_file_header(const std::filesystem::path& path);
 
-/// Throws IoError unless the header is sound and the file large enough for the points that it tells
-/// of; cheap, for the points are not read.
+/// Throws IoError unless the header is valid and the file is large enough for its points. Points
+/// are not read.
 void check_point_file(const std::filesystem::path& path);
 
 }  // namespace dynains

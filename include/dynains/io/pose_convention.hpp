@@ -1,4 +1,4 @@
-// What the rows of a pose file can mean.
+// Conventions of pose files.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -7,27 +7,27 @@
 
 namespace dynains {
 
-/// Which frame a row places in the world.
+/// The frame whose pose a row gives.
 enum class PoseFrame {
   kAuto,   ///< kCamera for rows of 12 numbers beside a calib.txt, else kLidar
   kLidar,  ///< that of the points
   kCamera  ///< z forward, x right, y down; turned by `Tr` of calib.txt, or else by these axes
 };
 
-/// How rows are turned into poses of the sensor in the world, in metres. As it stands: rows are
-/// that already.
+/// How rows become poses of the sensor in the world, in metres. With default values, rows are used
+/// unchanged.
 struct PoseConvention {
   bool invert = false;       ///< rows are from the world to the sensor
   double unit = 1.0;         ///< m per unit of translation: 0.001 for millimetres
-  bool left_handed = false;  ///< y of the poses points the other way, as in some simulators
+  bool left_handed = false;  ///< the y axis of the poses is mirrored, as in some simulators
   PoseFrame frame = PoseFrame::kAuto;
-  /// Order in which the file has its quaternions; kNone: as its form says.
+  /// Order of the quaternions in the file; kNone: the usual order of its format.
   QuaternionOrder quaternion = QuaternionOrder::kNone;
   int shift = 0;  ///< scan i has the pose of scan i + shift
 };
 
-/// The pose of the frame that `row` places, without `frame` and `shift`. `read_as` is the order in
-/// which the quaternion was read.
+/// Applies a convention, except its `frame` and `shift`, to a row. `read_as` is the order in which
+/// the quaternion of the row was read.
 inline Eigen::Isometry3d apply(const PoseConvention& convention, const Eigen::Isometry3d& row,
                                QuaternionOrder read_as) {
   Eigen::Isometry3d pose = row;
@@ -49,7 +49,8 @@ inline Eigen::Isometry3d apply(const PoseConvention& convention, const Eigen::Is
   return pose;
 }
 
-/// From a sensor with x forward, y left, z up to a camera with z forward, x right, y down.
+/// T_camera_sensor of a sensor with x forward, y left, z up and a camera with z forward, x right, y
+/// down.
 inline Eigen::Isometry3d camera_axes() {
   Eigen::Isometry3d T_camera_sensor = Eigen::Isometry3d::Identity();
   T_camera_sensor.linear() << 0, -1, 0, 0, 0, -1, 1, 0, 0;

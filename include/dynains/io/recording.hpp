@@ -18,9 +18,9 @@ namespace dynains {
 
 /// Frame of the points in the files.
 enum class PointFrame {
-  kAuto,    ///< seen from the points: they lie around the origin, or around the sensor's position
-  kSensor,  ///< that of the sensor
-  kWorld    ///< that of the poses
+  kAuto,    ///< decided by the points: they lie around the origin or around the sensor's position
+  kSensor,  ///< frame of the sensor
+  kWorld    ///< frame of the poses
 };
 
 struct RecordingOptions {
@@ -38,7 +38,7 @@ struct RecordedScan {
 
   std::size_t size() const { return xyzi.size() / 4; }
 
-  /// Point i < size() with all that is known of it, for writing.
+  /// Point i < size() with all its columns, for writing.
   FilePoint point(std::size_t i) const {
     FilePoint point;
     point.position = Eigen::Vector3f(xyzi[4 * i], xyzi[4 * i + 1], xyzi[4 * i + 2]).cast<double>();
@@ -49,15 +49,18 @@ struct RecordedScan {
   }
 };
 
-/// Kind of file that scans are in.
+/// File format of the scans.
 enum class ScanFormat { kBin, kPcd, kPly };
 
 /// A folder of scans, one file each:
 ///
-/// - KITTI and SemanticKITTI: see KittiSequence. With `poses` in the options, poses.txt may lack;
+/// - KITTI and SemanticKITTI: see KittiSequence. With `poses` in the options, poses.txt may be
+/// missing;
 /// - point files, .pcd or .ply, in the folder or in one below it (pcd, ply, scans, points, clouds,
 ///   lidar, velodyne), ordered by name, numbers in names by value;
 /// - .bin files as in KITTI, directly in the folder.
+///
+/// Two scans whose names differ in the extension only are refused.
 ///
 /// Poses come from `options.poses`; else from VIEWPOINT, if any scan has one; else from a file
 /// poses.txt, poses.csv, poses.tum, trajectory.txt, trajectory.csv or trajectory.tum in the folder
@@ -65,22 +68,22 @@ enum class ScanFormat { kBin, kPcd, kPly };
 /// times.txt or timestamps.txt in the folder or beside the file of poses, if that was found there;
 /// else from names that are times (seconds with a point, or at least 10 digits: s, ms, us or ns
 /// since 1970; SECONDS_NANOSECONDS); else from the rows of the poses, if there is one for each
-/// scan; else they are 0.1 s apart. calib.txt is taken from the folder or from beside the file of
-/// poses; one that cannot be read matters only to poses of a camera. Rows without times belong to
-/// scans one by one (or by the number of the scan); rows with times are interpolated at the times
-/// of the scans. Scans without a pose are left out and told in `notes()`, unless they are more than
-/// half.
+/// scan; else scans are 0.1 s apart. calib.txt is taken from the folder or from beside the file of
+/// poses; one that cannot be read is an error for poses of a camera only. Rows without times belong
+/// to scans one by one (or by the number of the scan); rows with times are interpolated at the
+/// times of the scans. Scans without a pose are left out and listed in `notes()`; if they are more
+/// than half, that is an error.
 ///
 /// Labels (SemanticKITTI classes) come from labels/NAME.label or a column `label`.
 ///
-/// All members throw IoError with path, position and what was expected.
+/// All members throw IoError with path, position and expectation.
 class Recording {
  public:
-  /// Reads and checks everything but the points.
+  /// Reads and checks all files except points and labels.
   explicit Recording(const std::filesystem::path& folder, const RecordingOptions& options = {});
 
   const std::filesystem::path& folder() const { return folder_; }
-  /// The one that holds the scans: folder() or one below it.
+  /// The folder that holds the scans: folder() or one below it.
   const std::filesystem::path& scan_folder() const { return scan_folder_; }
   /// Every file of the recording: scans, also those without a pose, poses, times, calibration and
   /// files of labels.
@@ -88,18 +91,18 @@ class Recording {
   std::size_t size() const { return scans_.size(); }
   ScanFormat format() const { return format_; }
   PointFrame frame() const { return frame_; }
-  /// Columns of the scans beside x y z, by the first of them.
+  /// Columns of the first scan in addition to x y z.
   const PointColumns& columns() const { return columns_; }
   /// Whether poses come from VIEWPOINT.
   bool has_viewpoints() const { return has_viewpoints_; }
   bool has_labels() const { return labels_ != Labels::kNone; }
-  /// What was taken for what, and what was left out; a sentence each.
+  /// Decisions on files, frames and times, and scans that were left out; a sentence each.
   const std::vector<std::string>& notes() const { return notes_; }
 
-  /// Name of the file of scan i without extension.
+  /// File name of scan i without extension.
   const std::string& name(std::size_t i) const { return scans_.at(i).name; }
   const std::filesystem::path& file(std::size_t i) const { return scans_.at(i).file; }
-  /// The name, if the names of all scans are numbers; otherwise the place in the recording.
+  /// The name as a number if the names of all scans are numbers, otherwise the index of the file.
   std::uint64_t number(std::size_t i) const { return scans_.at(i).number; }
   /// Seconds, strictly increasing.
   double time(std::size_t i) const { return scans_.at(i).time; }
@@ -109,27 +112,26 @@ class Recording {
 
   /// Points of scan i, by the size of its file or by its header: points are not read.
   std::uint64_t point_count(std::size_t i) const;
-  /// Throws unless the file of scan i can hold a scan; cheap.
+  /// Throws unless header and size of the file of scan i are valid. Points are not read.
   void check_scan(std::size_t i) const;
-  /// Points of scan i. Values are as stored, but for the frame: NaN and infinity too. Memory of
-  /// `scan` is reused.
+  /// Points of scan i in the sensor frame. NaN and infinity stay. Memory of `scan` is reused.
   void read_scan(std::size_t i, RecordedScan& scan) const;
   RecordedScan read_scan(std::size_t i) const;
   /// One label per point of scan i.
   std::vector<std::uint32_t> read_labels(std::size_t i) const;
 
-  // For those who try other conventions than the chosen one.
+  // For comparisons with other conventions.
   const PoseConvention& convention() const { return options_.convention; }
-  /// Pose that scan i has under another convention; nothing if its shift leads beyond the ends.
+  /// Pose of scan i under another convention; nothing if its shift leads out of the trajectory.
   std::optional<Eigen::Isometry3d> pose_under(const PoseConvention& convention,
                                               std::size_t i) const;
   bool has_quaternions() const { return trajectory_.order != QuaternionOrder::kNone; }
   QuaternionOrder quaternion_order() const { return trajectory_.order; }
   bool has_calibration() const { return has_calibration_; }
-  /// Rows of the pose file, and scans on the disk: the first thing to compare.
+  /// Rows of the pose file.
   std::size_t pose_count() const { return trajectory_.poses.size(); }
   std::size_t scan_file_count() const { return matches_.size(); }
-  /// How many scans were left out for want of a pose.
+  /// Number of scans that were left out because they have no pose.
   std::size_t missing_pose_count() const { return scan_file_count() - size(); }
 
  private:

@@ -1,4 +1,4 @@
-// The static map of a drive of any length: all of it on the disk, in memory what is near.
+// Static map in files, of which only tiles near the sensor are in memory.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -16,29 +16,29 @@
 
 namespace dynains {
 
-/// Static map (Eq. 1) in a folder of files, of which no more than a budget stays in memory.
+/// Static map (Eq. 1) in a folder of files. The tiles in memory stay within a budget.
 ///
-/// As in StaticMapAccumulator, the first measured point of a voxel stays. A tile is a square of 256
-/// voxels and a file, to which `insert` appends what is new. So the files hold the whole map after
-/// every `insert`, also if the process is killed then; of a kill in between they lose some of the
-/// newest points and nothing else. Tiles that are farthest from the sensor leave the memory first,
-/// and come back when a point falls into them. The result does not depend on the budget.
+/// As in StaticMapAccumulator, the first measured point of a voxel stays. A tile has 256 x 256
+/// voxels and a file of its own, to which `insert` appends new points. So the files hold the whole
+/// map after every `insert`. A process that is killed during an `insert` loses some of its points,
+/// no earlier ones. Tiles that are farthest from the sensor leave the memory first, and are read
+/// again when a point falls into them. The result does not depend on the budget.
 ///
-/// A folder belongs to one map at a time, in this process or another, as long as that lives.
+/// Only one map at a time can have a folder, in all processes.
 ///
-/// Takes the place of the map in memory by `Stages::Map`:
+/// Replaces the map in memory as `Stages::Map`:
 ///
 ///     struct Stages : dynains::DefaultStages { using Map = dynains::TiledStaticMap; };
 ///     dynains::BasicDynaInsRemover<Stages>::Config config;
 ///     config.map.map_folder = "map";
 ///
-/// For a file that must survive a power cut as well, call `sync_files(folder)`.
+/// To make the files survive a power cut, call `sync_files(folder)`.
 class TiledStaticMap {
  public:
   struct Config {
     double map_voxel = 0.2;   ///< m, edge of a voxel; 0 keeps every point
-    double map_memory = 256;  ///< MB that tiles may take between two inserts
-    /// Where the tiles are; created if it lacks. A map that is there is continued.
+    double map_memory = 256;  ///< MB, budget of the tiles in memory between two inserts
+    /// Folder of the tiles; created if missing. A map in it is continued.
     std::filesystem::path map_folder;
 
     template <class Self, class Visitor>
@@ -54,28 +54,28 @@ class TiledStaticMap {
   };
 
   /// Throws ConfigError; UsageError while another map has the folder; IoError if the folder cannot
-  /// be used, or holds a map of other voxels.
+  /// be used or holds a map with another voxel size.
   explicit TiledStaticMap(const Config& config);
 
   const Config& config() const { return config_; }
 
   /// Adds the points of one scan (metres, sensor frame) whose `keep` flag is not zero; an empty
   /// `keep` adds all. Throws IoError if a tile cannot be read or written. Points that could not be
-  /// written stay in memory, whatever the budget, and are written by the next `insert` that can.
+  /// written stay in memory, beyond the budget if necessary, and the next `insert` writes them.
   void insert(PointsView points, Span<const std::uint8_t> keep,
               const Eigen::Isometry3d& T_world_sensor);
 
   std::size_t size() const { return size_; }
   bool empty() const { return size_ == 0; }
 
-  /// Forgets all points and removes their files. Throws IoError.
+  /// Removes all points and their files. Throws IoError.
   void clear();
 
-  /// Bytes held by tiles in memory.
+  /// Bytes of the tiles in memory.
   std::size_t memory_bytes() const;
 
-  /// Calls `visit(Eigen::Vector3d)` for every point, in metres, world frame; tile by tile, in the
-  /// order of their places. Takes the memory of one tile more. Throws IoError.
+  /// Calls `visit(Eigen::Vector3d)` for every point (world frame, m), tile by tile, ordered by
+  /// their indices. Needs the memory of one more tile. Throws IoError.
   template <class Visitor>
   void for_each(Visitor&& visit) const {
     for (const auto& [place, stored] : stored_) {
@@ -89,14 +89,14 @@ class TiledStaticMap {
   }
 
  private:
-  using Place = std::array<std::int64_t, 3>;  // of a tile in the world, counted in tiles
+  using Place = std::array<std::int64_t, 3>;  // index of a tile in the world
 
   struct Point {
     std::uint32_t voxel;  // in the tile: x, y in 8 bits each, z in 16
     float x, y, z;        // m, relative to the corner of the voxel
   };
 
-  // In memory: the points in the order in which they came, and which voxels they fill.
+  // Points in the order of insertion, and a hash table of their voxels.
   struct Tile {
     std::vector<Point> points;
     VoxelHashTable<std::uint32_t> filled;  // Point::voxel of each; empty if every point is kept
@@ -115,10 +115,10 @@ class TiledStaticMap {
 
   Config config_;
   FolderLock lock_;
-  double voxel_;  // m, also if every point is kept
+  double voxel_;  // m, edge of the voxels that tiles count in
   std::size_t size_ = 0;
-  std::map<Place, std::size_t> stored_;  // points of every tile that are in its file
-  std::map<Place, Tile> tiles_;          // those in memory
+  std::map<Place, std::size_t> stored_;  // number of points in the file of each tile
+  std::map<Place, Tile> tiles_;          // tiles in memory
 };
 
 }  // namespace dynains

@@ -1,4 +1,4 @@
-// A vector that grows without moving what it holds.
+// A vector that grows without moving its elements.
 #pragma once
 
 #include <cstddef>
@@ -10,8 +10,8 @@
 
 namespace dynains::detail {
 
-/// Grows by whole chunks that never move: references stay valid, and no push takes longer than it
-/// takes to get one chunk. `T` needs no constructor.
+/// Grows by chunks that never move: references stay valid, and a push allocates one chunk at most.
+/// `T` is trivially constructible; `kChunk`: elements.
 template <class T, std::uint32_t kChunk>
 class ChunkedVector {
  public:
@@ -19,8 +19,8 @@ class ChunkedVector {
   T& operator[](std::uint32_t i) { return chunks_[i / kChunk][i % kChunk]; }
   const T& operator[](std::uint32_t i) const { return chunks_[i / kChunk][i % kChunk]; }
 
-  /// Returns the index of the new element, at most 2^32 - 2. Throws std::length_error if there is
-  /// none left, and std::bad_alloc; then nothing has changed.
+  /// Returns the index of the new element, at most 2^32 - 2. Throws std::length_error beyond it,
+  /// and std::bad_alloc; then the vector is unchanged.
   std::uint32_t push_back(const T& value) {
     if (size_ == chunks_.size() * kChunk) add_chunk();
     (*this)[size_] = value;

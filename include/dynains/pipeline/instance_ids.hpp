@@ -41,7 +41,7 @@ class InstanceIds {
     propagate(candidate_, old_ids, ids);
   }
 
-  /// The same with the old cluster of each cluster given, or kNoCluster.
+  /// Assigns ids by the given old cluster of each cluster, or kNoCluster.
   void propagate(Span<const std::uint32_t> predecessors, Span<const std::uint32_t> old_ids,
                  std::vector<std::uint32_t>& ids) {
     taken_.assign(old_ids.size(), 0);

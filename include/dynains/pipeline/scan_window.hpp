@@ -52,7 +52,7 @@ class ScanWindow {
   std::size_t cluster_count() const { return cluster_count_; }
   /// Cluster of each point, or kNoCluster.
   Span<const std::uint32_t> cluster_of() const { return cluster_of_; }
-  /// The same for the points of the newest scan alone.
+  /// Cluster numbers of the points of the newest scan alone.
   Span<const std::uint32_t> newest_cluster_of() const {
     const std::size_t begin = scan_begin_[scan_count() - 1];
     return cluster_of_.subspan(begin, cluster_of_.size() - begin);

@@ -1,4 +1,4 @@
-// How a sensor is mounted, from what it sees: height over the ground and tilt.
+// Mounting of a sensor, its height above the ground and its tilt, estimated from one scan.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,26 +17,25 @@
 
 namespace dynains {
 
-/// Where the ground is, seen from the sensor.
+/// Plane of the ground around the sensor, in the sensor frame.
 struct Mounting {
-  double height = 0.0;  ///< m, distance of the sensor from the ground around it
-  Eigen::Vector3d up_sensor = Eigen::Vector3d::UnitZ();  ///< normal of that ground, unit length
+  double height = 0.0;  ///< m, distance of the sensor from the plane
+  Eigen::Vector3d up_sensor = Eigen::Vector3d::UnitZ();  ///< upward normal, unit length
   bool known = false;                                    ///< false: no ground was found
 
-  /// Angle between the z axis of the sensor and the normal of the ground, degrees. Above 90 the
-  /// sensor hangs upside down.
+  /// deg, angle between the z axis of the sensor and the normal; above 90 for a sensor that hangs
+  /// upside down.
   double tilt() const { return std::acos(std::clamp(up_sensor.z(), -1.0, 1.0)) * 180.0 / M_PI; }
 
-  /// The smallest turn that brings the normal of the ground to the z axis: from the frame of the
-  /// sensor to that of one mounted level in its place. Of all half turns that do for a normal that
-  /// points straight down, it is the one about x.
+  /// The smallest rotation from the sensor frame to a level frame, which maps the normal to the z
+  /// axis. For a normal along -z it is the half turn about x.
   Eigen::Matrix3d R_level_sensor() const {
-    // In closed form: that of Eigen, which any two vectors do for, takes seconds to compile.
+    // Closed form: Quaterniond::FromTwoVectors takes seconds to compile.
     constexpr double kTiny = 1e-200;
     const double x = up_sensor.x(), y = up_sensor.y(), z = up_sensor.z();
     const double across = x * x + y * y;
     if (z < 0.0 && across < kTiny) return Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
-    // 1 / (1 + z), also where next to nothing is left of 1 + z.
+    // 1 / (1 + z), without cancellation near z = -1.
     const double k = z < 0.0 ? (1.0 - z) / across : 1.0 / (1.0 + z);
     Eigen::Matrix3d R;
     R << 1.0 - k * x * x, -k * x * y, -x,  //
@@ -46,8 +45,8 @@ struct Mounting {
   }
 };
 
-/// Normal of the ground seen from a sensor that was pitched (about y, nose down) and rolled (about
-/// x, left side up) by so many degrees: R_level_sensor = R_y(pitch) R_x(roll).
+/// Normal of the ground in the frame of a sensor with a pitch (deg about y, nose down) and a roll
+/// (deg about x, left side up): R_level_sensor = R_y(pitch) R_x(roll).
 inline Eigen::Vector3d up_of_mounting(double pitch, double roll) {
   constexpr double kRadians = M_PI / 180.0;
   const Eigen::Matrix3d R_level_sensor =
@@ -59,7 +58,7 @@ inline Eigen::Vector3d up_of_mounting(double pitch, double roll) {
 
 namespace detail {
 
-/// Plane through the ground: `up . p = -height`.
+/// Plane `up . p = -height`, m, sensor frame.
 struct GroundHypothesis {
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
   double height = 0.0;
@@ -67,8 +66,8 @@ struct GroundHypothesis {
   double distance(const Eigen::Vector3d& p) const { return up.dot(p) + height; }
 };
 
-/// Finds the plane that carries the scene: as much area as possible on it, as little as possible
-/// below it.
+/// Finds the plane with the most area on it and the least below it: RANSAC over one point per cell,
+/// then least squares.
 class MountingEstimator {
  public:
   explicit MountingEstimator(PointsView points) : cells_(thin(points)) {
@@ -78,7 +77,7 @@ class MountingEstimator {
     }
   }
 
-  /// The ground below the sensor (`side` 1) or, for one that hangs upside down, above it (-1).
+  /// The ground below the sensor (`side` 1), or above it (-1) if the sensor hangs upside down.
   std::optional<GroundHypothesis> find(double side) const {
     if (cells_.size() < kFewestCells) return std::nullopt;
     const std::optional<GroundHypothesis> coarse = search(side);
@@ -91,62 +90,60 @@ class MountingEstimator {
   }
 
  private:
-  static constexpr double kReach = 20.0;         // m; beyond, the ground is another one
-  static constexpr double kCell = 0.5;           // m; one point for each, whatever the density
-  static constexpr double kNearest = 0.4;        // m; nearer points are the housing
+  static constexpr double kMaxDistance = 20.0;   // m; farther ground may lie in another plane
+  static constexpr double kCell = 0.5;           // m; one point per cell makes density irrelevant
+  static constexpr double kMinDistance = 0.4;    // m; nearer points hit the housing
   static constexpr double kLowest = 0.2;         // m, height of the sensor
   static constexpr double kHighest = 5.0;        // m, height of the sensor
   static constexpr double kLeastUpright = 0.64;  // cosine of a tilt of 50 deg
   static constexpr double kOnGround = 0.12;      // m, off the plane
-  static constexpr double kBelow = 0.4;          // m under the plane: the ground is lower
+  static constexpr double kBelow = 0.4;          // m; cells so far below contradict a plane
   static constexpr std::size_t kFewestCells = 60;
   static constexpr int kTrials = 3000;
-  static constexpr std::size_t kScreened = 200;  // cells by which all hypotheses are compared
+  static constexpr std::size_t kScreened = 200;  // cells that score every hypothesis
   static constexpr std::size_t kFinalists = 40;
-  static constexpr std::size_t kScored = 2000;  // cells by which the best are compared
+  static constexpr std::size_t kScored = 2000;  // cells that score the finalists
 
-  // One point for each cell that was hit, the mean of those in it.
+  // Mean of the points in each occupied cell, in random order: any part is a fair sample.
   static std::vector<Eigen::Vector3d> thin(PointsView points) {
-    constexpr auto kHalf = static_cast<std::int32_t>(kReach / kCell);
+    constexpr auto kHalf = static_cast<std::int32_t>(kMaxDistance / kCell);
     constexpr std::size_t kWidth = 2 * static_cast<std::size_t>(kHalf);
     struct Sum {
-      std::size_t place;
+      std::size_t cell;
       Eigen::Vector3d sum;
       double count;
     };
-    std::vector<std::uint32_t> number(kWidth * kWidth * kWidth, 0);  // of a place, from 1
+    std::vector<std::uint32_t> number(kWidth * kWidth * kWidth, 0);  // by cell; from 1
     std::vector<Sum> sums;
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Eigen::Vector3f p(points.x[i], points.y[i], points.z[i]);
       const float range = p.norm();
-      if (!(range > kNearest && range < kReach)) continue;
-      std::size_t place = 0;
+      if (!(range > kMinDistance && range < kMaxDistance)) continue;
+      std::size_t at = 0;
       for (Eigen::Index axis = 0; axis < 3; ++axis) {
-        const auto cell =
+        const auto index =
             static_cast<std::int32_t>(std::floor(p[axis] / static_cast<float>(kCell)));
-        place = place * kWidth + static_cast<std::size_t>(cell + kHalf);
+        at = at * kWidth + static_cast<std::size_t>(index + kHalf);
       }
-      if (number[place] == 0) {
-        sums.push_back({place, Eigen::Vector3d::Zero(), 0.0});
-        number[place] = static_cast<std::uint32_t>(sums.size());
+      if (number[at] == 0) {
+        sums.push_back({at, Eigen::Vector3d::Zero(), 0.0});
+        number[at] = static_cast<std::uint32_t>(sums.size());
       }
-      Sum& sum = sums[number[place] - 1];
+      Sum& sum = sums[number[at] - 1];
       sum.sum += p.cast<double>();
       sum.count += 1.0;
     }
-    // Whatever order the points come in.
-    std::sort(sums.begin(), sums.end(),
-              [](const Sum& a, const Sum& b) { return a.place < b.place; });
+    // The order of the points must not matter.
+    std::sort(sums.begin(), sums.end(), [](const Sum& a, const Sum& b) { return a.cell < b.cell; });
     std::vector<Eigen::Vector3d> cells;
     cells.reserve(sums.size());
     for (const Sum& sum : sums) cells.emplace_back(sum.sum / sum.count);
-    // In random order, so that any part is a fair sample.
     std::mt19937_64 random(1);
     for (std::size_t i = cells.size(); i > 1; --i) std::swap(cells[i - 1], cells[random() % i]);
     return cells;
   }
 
-  /// Random planes through three cells: all are compared by a few cells, the best by many.
+  // The best of random planes through three cells.
   std::optional<GroundHypothesis> search(double side) const {
     struct Candidate {
       GroundHypothesis ground;
@@ -177,8 +174,8 @@ class MountingEstimator {
     return best->ground;
   }
 
-  /// How well the first `most` cells fit a plane.
-  float score(const GroundHypothesis& ground, std::size_t most) const {
+  // How well the first `count_limit` cells fit a plane.
+  float score(const GroundHypothesis& ground, std::size_t count_limit) const {
     const Float8 x(static_cast<float>(ground.up.x()));
     const Float8 y(static_cast<float>(ground.up.y()));
     const Float8 z(static_cast<float>(ground.up.z()));
@@ -187,12 +184,12 @@ class MountingEstimator {
     const Float8 slope(static_cast<float>(0.5 / kOnGround));
     const Float8 below(static_cast<float>(-kBelow));
     Float8 total(0.0F);
-    // Whole groups of lanes; there are many more cells than the few left over.
-    const std::size_t count = std::min(most, cells_.size()) / kPackWidth * kPackWidth;
+    // Whole packs only; the few cells left over do not matter.
+    const std::size_t count = std::min(count_limit, cells_.size()) / kPackWidth * kPackWidth;
     for (std::size_t i = 0; i < count; i += kPackWidth) {
       const Float8 distance = (x * Float8::load(&scored_.x[i]) + y * Float8::load(&scored_.y[i])) +
                               (z * Float8::load(&scored_.z[i]) + height);
-      // Falls off smoothly, so that the middle of the ground wins over its edge.
+      // A smooth fall-off prefers the middle of a rough ground to its edge.
       total = total + max(one - abs(distance) * slope, zero) - keep(distance < below, half);
     }
     return sum(total);
@@ -203,16 +200,16 @@ class MountingEstimator {
            ground.height < kHighest;
   }
 
-  /// Least squares over the cells within `band` of the plane, near ones first: far ground bends
-  /// away on slopes. False if too few are left.
+  // Weighted least squares over the cells within `band` m of the plane. Near cells weigh more,
+  // since far ground bends away on slopes. False if too few cells are left.
   bool refine(double band, double side, GroundHypothesis& ground) const {
     PlaneMoments m;
-    const double reach = 4.0 * ground.height + 3.0;
+    const double near_distance = 4.0 * ground.height + 3.0;
     for (const Eigen::Vector3d& p : cells_) {
       const double distance = ground.distance(p);
       if (!(std::abs(distance) < band)) continue;
       const double off = distance / band;
-      const double far = p.squaredNorm() / (reach * reach);
+      const double far = p.squaredNorm() / (near_distance * near_distance);
       const double w = (1.0 - off * off) * (1.0 - off * off) / (1.0 + far * far);
       m.add(p.x(), p.y(), p.z(), w);
     }
@@ -223,7 +220,7 @@ class MountingEstimator {
     return is_possible(ground, side);
   }
 
-  /// Whether enough of the scene lies on the plane, and little below it.
+  // Whether enough cells lie on the plane, and few below it.
   bool is_sound(const GroundHypothesis& ground) const {
     std::size_t on = 0;
     std::size_t below = 0;
@@ -235,20 +232,19 @@ class MountingEstimator {
     return on >= kFewestCells && on * 20 >= cells_.size() && below < on;
   }
 
-  std::vector<Eigen::Vector3d> cells_;  // sensor frame, m
-  PointBuffer scored_;                  // the first of them
+  std::vector<Eigen::Vector3d> cells_;  // m, sensor frame
+  PointBuffer scored_;                  // the first kScored of them
 };
 
 }  // namespace detail
 
-/// Height and tilt of the sensor that took a scan (sensor frame, metres), from the plane of the
-/// ground within 20 m. On a slope, "up" is the normal of the slope. Sensors 0.2 to 5 m above the
-/// ground, tilted by up to 45 degrees or hanging upside down by the same tolerance; the axes may
-/// point anywhere around the vertical. Unknown if the scan shows too little ground. Points that are
-/// not finite are ignored.
+/// Estimates height and tilt of a sensor from one scan (m, sensor frame), by the plane of the
+/// ground within 20 m. On a slope, the normal is that of the slope.
 ///
-/// Allocates and takes milliseconds: meant for a few scans of a sensor, not for each. The
-/// median over several scans is steadier than one of them.
+/// Valid for sensors 0.2 to 5 m above the ground that are tilted by up to 45 deg, upright or upside
+/// down, with any heading. Not known if the scan shows too little ground. Ignores points that are
+/// not finite. Allocates and takes milliseconds: meant for a few scans of a sensor, not for each;
+/// the median over several scans is steadier.
 inline Mounting estimate_mounting(PointsView points) {
   const detail::MountingEstimator estimator(points);
   for (const double side : {1.0, -1.0}) {

@@ -37,7 +37,7 @@ Float azimuth_of(const Float& y, const Float& x, const Float& length) {
   return select(x < kZero, with_sign_of(y + kZero, Float(kHalfTurn)) - from_axis, from_axis);
 }
 
-/// The same for x >= 0: an elevation, if x is a horizontal distance.
+/// Angle of (range, z) for range >= 0: the elevation, if `range` is a horizontal distance.
 template <class Float>
 Float elevation_of(const Float& z, const Float& range, const Float& length) {
   return twice_arc_tangent(z, length + range);

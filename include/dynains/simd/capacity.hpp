@@ -14,7 +14,7 @@ void ensure_capacity(std::vector<T>& values, std::size_t size) {
   if (values.capacity() < size) values.reserve(size + size / 8);
 }
 
-/// The same for a buffer whose size is that of the largest scan so far.
+/// Grows a buffer to `size` values. The buffer keeps the size of the largest scan so far.
 template <class T>
 void grow(std::vector<T>& values, std::size_t size) {
   if (values.size() >= size) return;

@@ -12,7 +12,7 @@
 namespace dynains::evaluation::detail {
 
 /// Numbers the occupied voxels of a point set and lists the points of each, in input order.
-/// Points out of the grid's reach are left out.
+/// Points outside of the grid are left out.
 class CellGroups {
  public:
   CellGroups(const VoxelGrid& grid, Span<const Eigen::Vector3d> points) {

@@ -1,4 +1,4 @@
-// When a raw voxel point counts as preserved (ERASOR's protocol).
+// Preservation of a raw voxel point (ERASOR's protocol).
 #pragma once
 
 #include <Eigen/Core>
@@ -9,12 +9,12 @@
 
 namespace dynains::evaluation::detail {
 
-/// Whether the estimate's point nearest to `raw` is nearer than edge * sqrt(3) / 2 and of its
+/// Whether the estimate's point nearest to `raw` is nearer than edge * sqrt(3) / 2 and has the same
 /// class. `key`: voxel of `raw`; `point_at(number)`: the estimate's point in voxel `number` of
 /// `index`, a std::optional<VoxelPoint>.
 ///
-/// Exact: the radius is less than an edge, so that no point beyond the 26 neighbouring voxels can
-/// be near enough; the margin of 0.13 edges is far more than rounding can move a centroid.
+/// Exact: the radius is less than an edge, so the nearest point is in the 27 voxels around `raw`.
+/// The margin of 0.13 edges exceeds the rounding of a centroid.
 template <class PointAt>
 bool is_preserved(const VoxelPoint& raw, VoxelKey key, double edge, const VoxelIndex& index,
                   PointAt&& point_at) {

@@ -1,4 +1,4 @@
-// Whether a map has a point near a place.
+// Lookup of map points near a position.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,7 +10,7 @@
 
 namespace dynains::evaluation::detail {
 
-/// Some finite point of the map, so that keys reach as far as possible around the map.
+/// A finite point of the map, as the origin of voxel keys.
 inline Eigen::Vector3d anchor_of(Span<const Eigen::Vector3d> points) {
   for (const Eigen::Vector3d& p : points) {
     if (p.allFinite() && p.cwiseAbs().maxCoeff() < 1e9) return p;
@@ -21,7 +21,8 @@ inline Eigen::Vector3d anchor_of(Span<const Eigen::Vector3d> points) {
 /// Whether some map point lies within a radius.
 class RadiusLookup {
  public:
-  /// Cells are two radii wide: the eight cells around a point's nearest corner cover its ball.
+  /// Cells are two radii wide: the eight cells around the nearest corner of a point contain all
+  /// points within the radius.
   RadiusLookup(double radius, Span<const Eigen::Vector3d> points)
       : squared_radius_(radius * radius),
         points_(points),

@@ -1,4 +1,4 @@
-// Which points of a scan take part, by their place in the sensor frame.
+// Range limits of the points that are evaluated.
 #pragma once
 
 #include <cmath>

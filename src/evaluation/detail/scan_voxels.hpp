@@ -23,7 +23,7 @@ constexpr TruthMask truth_bit(Truth truth) {
 }
 inline constexpr TruthMask kBothTruths = truth_bit(Truth::kStatic) | truth_bit(Truth::kDynamic);
 
-/// One point of a scan that some layer holds.
+/// One point of a scan that is in at least one layer.
 struct ScanPoint {
   Eigen::Vector3d p_world;
   VoxelKey key;
@@ -31,7 +31,7 @@ struct ScanPoint {
   LayerMask layers;
 };
 
-/// Voxelises one scan at a time; buffers are kept from scan to scan.
+/// Voxelises one scan at a time; memory is reused.
 class ScanVoxels {
  public:
   void clear() {
@@ -84,7 +84,7 @@ class ScanVoxels {
     LayerMask in_all = 0xff;
     LayerMask in_any = 0;
 
-    /// Layers differ, or the truth must be looked up.
+    /// The layers differ, or the points have several classes.
     bool mixed() const { return in_all != in_any || truths == kBothTruths; }
   };
 

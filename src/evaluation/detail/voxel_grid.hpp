@@ -14,14 +14,14 @@
 
 namespace dynains::evaluation::detail {
 
-/// Key of no voxel: the cell is out of reach.
+/// Key of points outside of the grid.
 inline constexpr VoxelKey kNoKey = ~VoxelKey{0};
 
 /// Cells [i * edge, (i + 1) * edge) per axis of the world frame. Keys count from the cell of an
 /// anchor point, so that large coordinates (UTM) fit; the grid itself does not move with it.
 class VoxelGrid {
  public:
-  /// Throws PoseError if the anchor is too far out for its cell number to be exact.
+  /// Throws PoseError if the cell number of the anchor cannot be exact.
   VoxelGrid(double edge, const Eigen::Vector3d& anchor) : edge_(edge) {
     for (int axis = 0; axis < 3; ++axis) {
       const double cell = std::floor(anchor[axis] / edge);

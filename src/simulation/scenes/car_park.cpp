@@ -10,8 +10,8 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr double kSpeed = 3;          // m/s
-constexpr double kEgoStart = 40;      // m along the aisle
+constexpr double kAisleSpeed = 3;     // m/s
+constexpr double kStartInAisle = 40;  // m along the aisle
 constexpr double kLaneOffset = 1.35;  // m beside the centre line
 
 /// A parking place: arc length (m) along the aisle, and its side (+1 left, -1 right).
@@ -113,10 +113,10 @@ bool add_moving_car(Builder& builder, const Street& street, const Place& place, 
   if (!builder.is_free_of_drivers(route.at(0), 3.5)) return false;
   const std::size_t object = traffic.add_object(Kind::kCar);
   const std::size_t path = traffic.add_lane(std::move(route));
-  Traffic::Driver& driver = traffic.add_driver(object, path, leaving ? 0 : 1, kSpeed);
+  Traffic::Driver& driver = traffic.add_driver(object, path, leaving ? 0 : 1, kAisleSpeed);
   if (leaving) {
     driver.speed = 0;
-    driver.schedule = {{0, 0}, {start, kSpeed}};
+    driver.schedule = {{0, 0}, {start, kAisleSpeed}};
     driver.waits_for_gap = true;
   } else {
     driver.stays_at_end = true;
@@ -211,9 +211,9 @@ void surround(Builder& builder, Random& random, const Street& street) {
 World car_park(const Config& config) {
   Random random(mix(config.seed, 77));
   const double aisle = random.uniform(60, 90);
-  const double drive = travel(config, kSpeed);
+  const double drive = travel(config, kAisleSpeed);
   std::vector<Street> streets;
-  streets.push_back({route_of_bends(serpentine(aisle, 2 * kEgoStart + drive + 60)), 3.3, 0});
+  streets.push_back({route_of_bends(serpentine(aisle, 2 * kStartInAisle + drive + 60)), 3.3, 0});
   TerrainConfig ground;
   ground.kerb = 0;
   ground.roughness = 0.03;
@@ -224,14 +224,14 @@ World car_park(const Config& config) {
   const Street& street = builder.street(0);
   const std::size_t forward = builder.lane(street, -kLaneOffset);
   const std::size_t backward = builder.lane(street, kLaneOffset);
-  builder.ego(forward, kEgoStart, kSpeed);
+  builder.ego(forward, kStartInAisle, kAisleSpeed);
 
   const double occupied = random.uniform(0.55, 0.9);
-  const double from = kEgoStart - 30, to = kEgoStart + drive + 60;
+  const double from = kStartInAisle - 30, to = kStartInAisle + drive + 60;
   const std::vector<Place> places = find_places(builder, random, street);
   fill_places(builder, random, street, places, occupied, from, to);
-  fill_lane(builder, forward, 45, kSpeed, 0, 0, 0);
-  fill_lane(builder, backward, 40, kSpeed, 0, 0, 0);
+  fill_lane(builder, forward, 45, kAisleSpeed, 0, 0, 0);
+  fill_lane(builder, backward, 40, kAisleSpeed, 0, 0, 0);
   add_walkers(builder, random, street, from, to);
   surround(builder, random, street);
   for (double s = 10; s < street.centre.length(); s += random.uniform(18, 30)) {

@@ -10,8 +10,8 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr double kSpeed = 1.2;    // m/s
-constexpr double kEgoStart = 80;  // m along the street
+constexpr double kWalkingSpeed = 1.2;  // m/s
+constexpr double kStartOnSquare = 80;  // m along the street
 
 /// The ego vehicle is a robot, which keeps less distance than a car.
 void make_robot(Traffic& traffic) {
@@ -63,7 +63,7 @@ void add_group(Builder& builder, Random& random, const Street& street, double fr
                                   -half + 0.05, half - 0.05);
       goals.push_back(street.centre.beside(s + run * u + behind, l).position);
     }
-    const Vec2 ego = builder.traffic().lanes[0].route.at(kEgoStart).position;
+    const Vec2 ego = builder.traffic().lanes[0].route.at(kStartOnSquare).position;
     if (norm(goals[0] - ego) < 2.0) continue;
     builder.walker(std::move(goals), pace, start, stop);
   }
@@ -71,14 +71,14 @@ void add_group(Builder& builder, Random& random, const Street& street, double fr
 
 void add_cyclists(Builder& builder, Random& random, const Street& street, double length) {
   for (int i = 0; i < 3; ++i) {
-    const double s = kEgoStart + random.uniform(-40, 60), side = random.chance(0.5) ? 1 : -1;
+    const double s = kStartOnSquare + random.uniform(-40, 60), side = random.chance(0.5) ? 1 : -1;
     const double lateral = side * random.uniform(0.2, 0.45) * street.half_width;
     const bool with = random.chance(0.5);
     const std::size_t object = builder.traffic().add_object(Kind::kCyclist);
     const std::size_t path = builder.traffic().add_lane(street.centre.shifted(
         with ? 0 : length, with ? length : 0, [lateral](double) { return lateral; }));
     const double along = with ? s : builder.traffic().lanes[path].route.length() - s;
-    if (std::abs(s - kEgoStart) < 5) {
+    if (std::abs(s - kStartOnSquare) < 5) {
       builder.traffic().objects.pop_back();
       continue;
     }
@@ -90,7 +90,7 @@ void add_cyclists(Builder& builder, Random& random, const Street& street, double
 
 World crowd(const Config& config) {
   Random random(mix(config.seed, 77));
-  const double drive = travel(config, kSpeed), length = 2 * kEgoStart + drive + 20;
+  const double drive = travel(config, kWalkingSpeed), length = 2 * kStartOnSquare + drive + 20;
   const double half = random.uniform(6, 11);
   std::vector<Street> streets;
   streets.push_back({route_of_bends(winding(random, length, 0.008, 0, 17)), half, 0});
@@ -103,7 +103,7 @@ World crowd(const Config& config) {
   const double side_of_ego = random.uniform(-0.3, 0.3) * half;
   const std::size_t lane = builder.traffic().add_lane(street.centre.shifted(
       0, length, [side_of_ego](double s) { return side_of_ego + 0.6 * std::sin(s / 9); }));
-  builder.ego(lane, kEgoStart, kSpeed);
+  builder.ego(lane, kStartOnSquare, kWalkingSpeed);
   make_robot(builder.traffic());
 
   Frontage look;
@@ -112,7 +112,7 @@ World crowd(const Config& config) {
   look.parked = 0;
   for (const int side : {-1, 1}) builder.furnish(street, side, look);
   furnish_square(builder, random, street, length, side_of_ego);
-  const double from = kEgoStart - 45, to = kEgoStart + drive + 55;
+  const double from = kStartOnSquare - 45, to = kStartOnSquare + drive + 55;
   const int number = builder.count(std::min(0.85 * (to - from), 2000.0));
   for (int i = 0; i < number; ++i) add_group(builder, random, street, from, to);
   if (builder.lively()) add_cyclists(builder, random, street, length);
