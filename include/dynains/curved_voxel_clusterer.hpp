@@ -14,11 +14,9 @@
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor/sensor_model.hpp"
-#include "dynains/simd/arc_tangent.hpp"
 #include "dynains/simd/bits.hpp"
-#include "dynains/simd/capacity.hpp"
-#include "dynains/simd/lanes.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_geometry.hpp"
+#include "dynains/simd/pack_loops.hpp"
 #include "dynains/stage/polar_points.hpp"
 
 namespace dynains {
@@ -122,7 +120,7 @@ class CurvedVoxelClusterer {
   Span<const std::uint32_t> cluster(PolarView points) {
     find_cells(points);
     mark_cells(points.size());
-    // Processors with wide lanes count ones by one instruction.
+    // Processors with AVX2 count bits by one instruction.
     detail::run_packs([&](auto) { find_runs(); });
     detail::run_packs([&](auto) { join_runs(); });
     number_runs();
@@ -180,12 +178,12 @@ class CurvedVoxelClusterer {
         // Row numbers stay below 2^23 and are exact in floats.
         const Int i_row = truncate(to_float(truncate(i_elevation)) * columns) + truncate(i_range);
         ((i_row << row_shift) + truncate(i_azimuth)).store(cells + at.begin);
-        lowest = min(lowest, at.there(i_elevation, lowest));
-        highest = max(highest, at.there(i_elevation, highest));
+        lowest = min(lowest, at.padded(i_elevation, lowest));
+        highest = max(highest, at.padded(i_elevation, highest));
       });
-      lowest_elevation_ = static_cast<std::int32_t>(min_lane(lowest));
+      lowest_elevation_ = static_cast<std::int32_t>(smallest(lowest));
       // Straight down may be a rounding error below 0; truncated, that is 0.
-      highest_elevation_ = static_cast<std::int32_t>(max_lane(highest));
+      highest_elevation_ = static_cast<std::int32_t>(largest(highest));
     });
   }
 

@@ -21,7 +21,6 @@
 #include "dynains/evidence/reference_scans.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor/sensor_model.hpp"
-#include "dynains/simd/capacity.hpp"
 #include "dynains/stage/evidence_verdict.hpp"
 #include "dynains/stage/free_space_config.hpp"
 #include "dynains/stage/ground_split.hpp"
@@ -128,7 +127,7 @@ class FreeSpaceEvidence {
     return {groups_, samples.met_of, find_moved_ground(scan, record, split.ground())};
   }
 
-  /// Visibility of the first `count` points (m; padded for wide loads) from the newest reference,
+  /// Visibility of the first `count` points (m; padded for packs) from the newest reference,
   /// one of the last `reference_step` scans.
   const detail::Visibility& test_visibility(const PointBuffer& points, std::size_t count,
                                             const Eigen::Isometry3d& T_world_points) {

@@ -10,9 +10,8 @@
 
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
-#include "dynains/simd/arc_tangent.hpp"
-#include "dynains/simd/lanes.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_geometry.hpp"
+#include "dynains/simd/pack_loops.hpp"
 #include "dynains/stage/cluster_set.hpp"
 #include "dynains/stage/polar_points.hpp"
 
@@ -154,9 +153,9 @@ class OccupancyDescriptor {
       Float azimuth_low = first_azimuth, azimuth_high = first_azimuth;
       Float turned_low = first_turned, turned_high = first_turned;
       const auto extend = [&](const auto& at) {
-        const Float range = at.there(at.load(points.range.data()), first_range);
-        const Float azimuth = at.there(at.load(points.azimuth.data()), first_azimuth);
-        const Float z = at.there(at.load(points.z.data()), first_z);
+        const Float range = at.padded(at.load(points.range.data()), first_range);
+        const Float azimuth = at.padded(at.load(points.azimuth.data()), first_azimuth);
+        const Float z = at.padded(at.load(points.z.data()), first_z);
         range_low = min(range_low, range);
         range_high = max(range_high, range);
         z_low = min(z_low, z);
@@ -169,13 +168,13 @@ class OccupancyDescriptor {
       for (const PointRange& part : cluster_.ranges) {
         detail::for_overlapping_slices<Packs>(part.begin, part.end, extend);
       }
-      range_min_ = min_lane(range_low);
-      range_max = max_lane(range_high);
-      z_min_ = min_lane(z_low);
-      low = min_lane(azimuth_low);
-      high = max_lane(azimuth_high);
-      low_turned = min_lane(turned_low);
-      high_turned = max_lane(turned_high);
+      range_min_ = smallest(range_low);
+      range_max = largest(range_high);
+      z_min_ = smallest(z_low);
+      low = smallest(azimuth_low);
+      high = largest(azimuth_high);
+      low_turned = smallest(turned_low);
+      high_turned = largest(turned_high);
     });
     float extent = high - low;
     azimuth_min_ = low;
@@ -269,8 +268,8 @@ class OccupancyDescriptor {
       (multiply(truncate(min(radial, last_radial)), row) + truncate(min(angular, last_azimuth)))
           .store(cell);
       (at.load(points.z.data()) - z_min).store(height);
-      const std::size_t lanes = at.size();
-      for (std::size_t i = 0; i < lanes; ++i) {
+      const std::size_t size = at.size();
+      for (std::size_t i = 0; i < size; ++i) {
         float& highest = heights[cell[i]];
         highest = std::max(highest, height[i]);
       }

@@ -8,8 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "dynains/simd/capacity.hpp"
-
 namespace dynains {
 
 /// Verdict on one input point.
@@ -74,6 +72,25 @@ struct PointsView {
     return {x.subspan(offset, count), y.subspan(offset, count), z.subspan(offset, count)};
   }
 };
+
+namespace detail {
+
+/// Reserves memory for `size` values. An eighth is added, since scans differ in size by a few
+/// percent: most later scans then need no new memory.
+template <class T>
+void ensure_capacity(std::vector<T>& values, std::size_t size) {
+  if (values.capacity() < size) values.reserve(size + size / 8);
+}
+
+/// Makes a buffer at least `size` values long.
+template <class T>
+void grow(std::vector<T>& values, std::size_t size) {
+  if (values.size() >= size) return;
+  ensure_capacity(values, size);
+  values.resize(size);
+}
+
+}  // namespace detail
 
 /// Points as three coordinate arrays that are owned here and reused from scan to scan.
 struct PointBuffer {

@@ -15,9 +15,8 @@
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/bits.hpp"
-#include "dynains/simd/lanes.hpp"
-#include "dynains/simd/pack_transform.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_geometry.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains {
 
@@ -277,7 +276,7 @@ class StaticMapAccumulator {
         was_kept = kept >> (kWord - 1);
         for (std::size_t i = 0; i < size; i += Packs::kCount) {
           const auto which = static_cast<unsigned>((kept & ~repeats) >> i & Packs::kAll);
-          chosen += detail::put_places<Packs>(which, begin + i, &batch.chosen[chosen]);
+          chosen += detail::put_indices<Packs>(which, begin + i, &batch.chosen[chosen]);
         }
       }
     });

@@ -1,4 +1,4 @@
-// Parts of ingest and ground that are fast, against what they mean.
+// Parts of ingest and ground segmentation against simple implementations.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -14,7 +14,7 @@
 namespace dynains::test {
 namespace {
 
-TEST_CASE("PatchSort is a stable sort by patch, whatever the number of points") {
+TEST_CASE("PatchSort is a stable sort by patch for all numbers of points") {
   constexpr std::size_t kPatches = 5;
   Random random(1);
   detail::PatchSort<kPatches> sort;
@@ -82,7 +82,7 @@ TEST_CASE("LowestMean gives the bits of sorting: few values, ties, rising and fa
             found = lowest.of(padded.data(), count, floor);
           });
           REQUIRE(found == expected);
-          detail::LowestMean<64, detail::NarrowPacks> lowest(wanted);
+          detail::LowestMean<64, detail::BaselinePacks> lowest(wanted);
           REQUIRE(lowest.of(padded.data(), count, floor) == expected);
         }
       }

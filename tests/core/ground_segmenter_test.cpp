@@ -14,7 +14,7 @@ namespace {
 
 using Config = GroundSegmenter::Config;
 
-// By point of the scan; checks on the way that the split is a permutation of the scan.
+// Whether each point of the scan is ground. Checks that the split is a permutation of the scan.
 std::vector<bool> ground_of(GroundSegmenter& segmenter, PointsView scan) {
   GroundSplit split;
   std::vector<std::uint32_t> numbers(scan.size());
@@ -79,7 +79,7 @@ TEST_CASE("ground is what Patchwork in double precision calls ground") {
   const auto compare = [&](PointsView scan) {
     const std::vector<bool> expected = reference_ground(segmenter.config(), scan);
     const auto ground = std::count(expected.begin(), expected.end(), true);
-    REQUIRE(ground > static_cast<std::ptrdiff_t>(scan.size() / 4));  // else nothing is compared
+    REQUIRE(ground > static_cast<std::ptrdiff_t>(scan.size() / 4));  // else the comparison is void
     REQUIRE(share_of_differences(ground_of(segmenter, scan), expected) < kOnBorders);
   };
   for (const double yaw : {0.0, 2.0}) {
@@ -98,11 +98,11 @@ TEST_CASE("planes are fitted to some points of a patch that has many") {
     const std::vector<bool> expected = reference_ground(config, scan);
     const std::vector<bool> by_some = ground_of(config, scan);
     CHECK(share_of_differences(by_some, expected) < kOnBorders);
-    CHECK(share_of_differences(by_some, by_all) > 5 * kOnBorders);  // else nothing is compared
+    CHECK(share_of_differences(by_some, by_all) > 5 * kOnBorders);  // else the comparison is void
   }
 }
 
-// A patch whose lowest points give a plane above all others is not fitted to all of them yet.
+// All points are below the first plane, but not all were among those that it was fitted to.
 TEST_CASE("a slope that flattens within its patch is fitted again") {
   Config config = Config::paper();
   const double depth = (config.ground_max_range - config.ground_min_range) / 8.0;  // outer rings
@@ -124,7 +124,7 @@ TEST_CASE("a slope that flattens within its patch is fitted again") {
   CHECK(share_of_differences(ground_of(config, scan), expected) < kOnBorders);
 }
 
-TEST_CASE("ground is what Patchwork says for other parameters, too") {
+TEST_CASE("ground equals that of Patchwork for other parameters") {
   Config config;
   config.sensor_height = 0.6;
   config.ground_min_range = 2.0;
@@ -142,7 +142,7 @@ TEST_CASE("ground is what Patchwork says for other parameters, too") {
 }
 
 // Terraces of a few patches each on a slope.
-TEST_CASE("ground is what the patches around it say, too") {
+TEST_CASE("patches far above their neighbours are not ground, as in the reference") {
   Random random(5);
   std::vector<double> terrace(13 * 10);
   for (double& height : terrace) height = random.index(3) == 0 ? random.uniform(0.3, 1.0) : 0.0;
@@ -183,7 +183,7 @@ TEST_CASE("a flat floor is ground, pillars and vans are not") {
   CHECK(wrong < high / 1000);
 }
 
-// 400 points of the plane z = -h + slope * (x - 10) in one patch, about (10, 0.6).
+// 400 points of the plane z = -h + slope * (x - 10) in the patch around (10, 0.6).
 PointBuffer patch_of_plane(double slope, std::size_t count = 400, double lift = 0.0) {
   Random random(3);
   PointBuffer points;
@@ -204,7 +204,7 @@ TEST_CASE("points are ground up to ground_distance over the plane") {
   CHECK(ground[0]);
   CHECK(ground[400]);
   CHECK_FALSE(ground[401]);
-  CHECK(ground[402]);  // no bound below
+  CHECK(ground[402]);  // there is no lower bound
 }
 
 TEST_CASE("a patch needs ground_min_points") {
@@ -213,7 +213,7 @@ TEST_CASE("a patch needs ground_min_points") {
 }
 
 TEST_CASE("a plane is fitted to all points of a patch up to ground_fit_points") {
-  // The seed is a single point, the last one, that lies too low for any other to be near it.
+  // Only the last point seeds the plane. It is too low for any other point to be near it.
   Config config;
   config.ground_fit_points = 64;
   config.ground_lowest_points = 1;
@@ -240,7 +240,7 @@ TEST_CASE("a plane steeper than ground_uprightness is not ground") {
 }
 
 TEST_CASE("a patch over ground_elevation is ground only if it is flat") {
-  // About 10 m away is ring 2 of the default zones.
+  // With the default zones, points at 10 m are in ring 2.
   Config config;
   config.ground_elevation[1] = 0.7;
   config.ground_flatness[1] = 1e-4;
@@ -255,7 +255,7 @@ TEST_CASE("a patch over ground_elevation is ground only if it is flat") {
   CHECK(ground_of(config, rough)[0]);
 }
 
-// Forty points in the middle of a patch of the third or the fourth zone, `lift` over a floor that
+// Forty points in the middle of a patch of the third or the fourth zone, `lift` above a floor that
 // rises along x.
 void add_patch(int zone, int ring, int sector, double lift, double slope, PointBuffer& points) {
   const double range = zone == 2 ? 25.75 + 6.1875 * (ring + 0.5) : 50.5 + 12.375 * (ring + 0.5);
@@ -270,17 +270,17 @@ void add_patch(int zone, int ring, int sector, double lift, double slope, PointB
 
 TEST_CASE("a patch more than ground_step over most of those around it is not ground") {
   struct Scene {
-    double lift;  // of the patch in the middle
+    double lift;  // m, of the patch in the middle
     double slope = 0.0;
     double step = 0.5;
-    std::size_t around = 8;  // patches around it
-    std::size_t low = 8;     // of these, as many lie on the floor, and the others as high as it
+    std::size_t around = 8;  // number of neighbours with points
+    std::size_t low = 8;     // number of neighbours on the floor; the others are lifted, too
     int zone = 2;
     int sector = 20;
   };
   const auto is_ground = [](const Scene& scene) {
     constexpr int kAround[8][2] = {{2, -1}, {1, -1}, {0, -1}, {2, 0},
-                                   {0, 0},  {2, 1},  {1, 1},  {0, 1}};  // ring, sectors beside
+                                   {0, 0},  {2, 1},  {1, 1},  {0, 1}};  // ring, step by sector
     PointBuffer points;
     add_patch(scene.zone, 1, scene.sector, scene.lift, scene.slope, points);
     for (std::size_t i = 0; i < scene.around; ++i) {
@@ -298,25 +298,25 @@ TEST_CASE("a patch more than ground_step over most of those around it is not gro
   CHECK_FALSE(is_ground({0.51}));
   CHECK(is_ground({0.51, 0.0, 0.52}));
   CHECK(is_ground({0.51, 0.0, 0.0}));
-  // What lies low is ground.
+  // Low patches are ground.
   CHECK(is_ground({-3.0}));
-  // On a slope of 10 %, patches around it lie up to 0.7 m lower, as many as higher.
+  // On a slope of 10 %, some neighbours are up to 0.7 m lower, but as many are higher.
   CHECK(is_ground({0.0, 0.1}));
   CHECK_FALSE(is_ground({1.2, 0.1}));
-  // Half of them are not most of them.
+  // Half of the neighbours are not most of them.
   CHECK(is_ground({1.0, 0.0, 0.5, 8, 4}));
   CHECK_FALSE(is_ground({1.0, 0.0, 0.5, 8, 5}));
-  // Three patches around it say nothing.
+  // Three neighbours are too few.
   CHECK(is_ground({1.0, 0.0, 0.5, 3}));
   CHECK_FALSE(is_ground({1.0, 0.0, 0.5, 4}));
-  // In the outermost zone, they are too far apart.
+  // The outermost zone is not checked.
   CHECK(is_ground({1.0, 0.0, 0.5, 8, 8, 3}));
-  // The first sector lies beside the last one: four patches, three of them across the seam.
+  // The first and the last sector are neighbours: three of these four patches are across the seam.
   CHECK(is_ground({1.0, 0.0, 0.5, 3, 8, 2, 0}));
   CHECK_FALSE(is_ground({1.0, 0.0, 0.5, 4, 8, 2, 0}));
 }
 
-TEST_CASE("whether a patch hangs is told by the scan at hand, not by the one before") {
+TEST_CASE("heights of the scan before do not decide whether a patch is ground") {
   PointBuffer around, alone;
   for (const int ring : {0, 2}) {
     for (const int sector : {19, 20, 21}) add_patch(2, ring, sector, 0.0, 0.0, around);
@@ -327,8 +327,8 @@ TEST_CASE("whether a patch hangs is told by the scan at hand, not by the one bef
   CHECK(ground_of(segmenter, alone)[0]);
 }
 
-TEST_CASE("the height of a patch is that over the ground of the sensor, found or given") {
-  // 0.6 m over the ground of a sensor as high as kSensorHeight, 0.1 m under that of a lower one.
+TEST_CASE("ground_elevation counts from the ground of the sensor, given or estimated") {
+  // 0.6 m above the ground of a sensor as high as kSensorHeight, 0.1 m below that of a lower one.
   const PointBuffer points = patch_of_plane(0.0, 400, 0.6);
   Config config;
   config.ground_elevation[1] = 0.5;
@@ -371,7 +371,7 @@ TEST_CASE("reflections under the floor do not pull the ground down near the sens
   Config config;
   config.ground_lowest_points = 2;
   CHECK(ground_of(config, points)[0]);
-  config.ground_below = 10.0;  // the two seed the plane, and nothing is near them
+  config.ground_below = 10.0;  // the two points seed the plane, and no other is near it
   CHECK_FALSE(ground_of(config, points)[0]);
 }
 

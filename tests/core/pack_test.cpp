@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "dynains/ground/point_record.hpp"
-#include "dynains/simd/arc_tangent.hpp"
+#include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
@@ -16,8 +16,8 @@ namespace {
 
 using detail::kPackWidth;
 
-// Applies every operation to the pairs of numbers with one kind of packs. Returns a row of results
-// for each operation, with a number for each pair.
+// Applies each operation to pairs of numbers with one kind of packs. Returns a row for each
+// operation, with one result for each pair.
 template <class Packs>
 std::vector<std::vector<std::uint32_t>> results(const std::vector<float>& a,
                                                 const std::vector<float>& b) {
@@ -30,19 +30,19 @@ std::vector<std::vector<std::uint32_t>> results(const std::vector<float>& a,
     out[row].push_back(number);
   };
   const auto put = [&](const Float& value) {
-    float lanes[Packs::kCount];
-    value.store(lanes);
-    for (const float lane : lanes) {
+    float numbers[Packs::kCount];
+    value.store(numbers);
+    for (const float number : numbers) {
       std::uint32_t bits;
-      std::memcpy(&bits, &lane, sizeof(bits));
+      std::memcpy(&bits, &number, sizeof(bits));
       put_number(bits);
     }
     ++row;
   };
   const auto put_int = [&](const Int& value) {
-    std::int32_t lanes[Packs::kCount];
-    value.store(lanes);
-    for (const std::int32_t lane : lanes) put_number(static_cast<std::uint32_t>(lane));
+    std::int32_t numbers[Packs::kCount];
+    value.store(numbers);
+    for (const std::int32_t number : numbers) put_number(static_cast<std::uint32_t>(number));
     ++row;
   };
   const auto put_bits = [&](unsigned bits) {
@@ -86,7 +86,7 @@ std::vector<std::vector<std::uint32_t>> results(const std::vector<float>& a,
   return out;
 }
 
-// Sums of eight numbers each.
+// Sums of every eight numbers.
 template <class Packs>
 std::vector<float> sums(const std::vector<float>& a) {
   std::vector<float> out;
@@ -96,10 +96,9 @@ std::vector<float> sums(const std::vector<float>& a) {
   return out;
 }
 
-// Calls `test` with the wider kinds of packs that this processor has registers for, within
-// functions for these registers.
+// Calls `test` with the other kinds of packs that this processor supports, in code for them.
 template <class Test>
-void with_wider_packs(Test&& test) {
+void with_larger_registers(Test&& test) {
   if (detail::has_avx2()) {
     INFO("eight numbers in one register");
     detail::run_avx2(test);
@@ -135,16 +134,16 @@ TEST_CASE("all kinds of packs give the same bits") {
     a.push_back(i % 2 == 0 ? std::numeric_limits<float>::quiet_NaN() : 1.0F);
     b.push_back(i % 4 < 2 ? 2.0F : std::numeric_limits<float>::quiet_NaN());
   }
-  const std::size_t sure = a.size() - 2 * kMost;  // conversions of NaN are undefined
-  const std::vector<float> sure_a(a.data(), a.data() + sure);
-  const std::vector<float> sure_b(b.data(), b.data() + sure);
-  const auto expected = results<detail::NarrowPacks>(sure_a, sure_b);
-  CHECK(results<detail::WidePacks>(sure_a, sure_b) == expected);
-  CHECK(sums<detail::WidePacks>(sure_a) == sums<detail::NarrowPacks>(sure_a));
-  with_wider_packs([&](auto packs) {
+  const std::size_t finite = a.size() - 2 * kMost;  // conversions of NaN are undefined
+  const std::vector<float> finite_a(a.data(), a.data() + finite);
+  const std::vector<float> finite_b(b.data(), b.data() + finite);
+  const auto expected = results<detail::BaselinePacks>(finite_a, finite_b);
+  CHECK(results<detail::Avx2Packs>(finite_a, finite_b) == expected);
+  CHECK(sums<detail::Avx2Packs>(finite_a) == sums<detail::BaselinePacks>(finite_a));
+  with_larger_registers([&](auto packs) {
     using Packs = decltype(packs);
-    CHECK(results<Packs>(sure_a, sure_b) == expected);
-    for (std::size_t i = sure; i < a.size(); i += Packs::kCount) {
+    CHECK(results<Packs>(finite_a, finite_b) == expected);
+    for (std::size_t i = finite; i < a.size(); i += Packs::kCount) {
       const auto x = Packs::Float::load(&a[i]);
       const auto y = Packs::Float::load(&b[i]);
       float least[Packs::kCount], most[Packs::kCount];
@@ -156,7 +155,7 @@ TEST_CASE("all kinds of packs give the same bits") {
         CAPTURE(a[i + k], b[i + k]);
         CHECK((less >> k & 1U) == (a[i + k] < b[i + k] ? 1U : 0U));
         CHECK((at_least >> k & 1U) == (a[i + k] >= b[i + k] ? 1U : 0U));
-        // The second number where either is NaN.
+        // min and max return the second number if either is NaN.
         const bool any = std::isnan(a[i + k]) || std::isnan(b[i + k]);
         CHECK((least[k] == std::min(a[i + k], b[i + k]) || any));
         if (any) {
@@ -166,19 +165,19 @@ TEST_CASE("all kinds of packs give the same bits") {
       }
     }
   });
-  for (std::size_t i = sure; i < a.size(); i += kPackWidth) {
-    const auto narrow_a = detail::NarrowPacks::Float::load(&a[i]);
-    const auto narrow_b = detail::NarrowPacks::Float::load(&b[i]);
-    const auto wide_a = detail::WidePacks::Float::load(&a[i]);
-    const auto wide_b = detail::WidePacks::Float::load(&b[i]);
-    CHECK((narrow_a < narrow_b).bits() == (wide_a < wide_b).bits());
-    CHECK((narrow_a >= narrow_b).bits() == (wide_a >= wide_b).bits());
-    CHECK((bits_of(min(narrow_a, narrow_b)) ^ bits_of(max(narrow_b, narrow_a))).bits() ==
-          (bits_of(min(wide_a, wide_b)) ^ bits_of(max(wide_b, wide_a))).bits());
+  for (std::size_t i = finite; i < a.size(); i += kPackWidth) {
+    const auto baseline_a = detail::BaselinePacks::Float::load(&a[i]);
+    const auto baseline_b = detail::BaselinePacks::Float::load(&b[i]);
+    const auto avx2_a = detail::Avx2Packs::Float::load(&a[i]);
+    const auto avx2_b = detail::Avx2Packs::Float::load(&b[i]);
+    CHECK((baseline_a < baseline_b).bits() == (avx2_a < avx2_b).bits());
+    CHECK((baseline_a >= baseline_b).bits() == (avx2_a >= avx2_b).bits());
+    CHECK((bits_of(min(baseline_a, baseline_b)) ^ bits_of(max(baseline_b, baseline_a))).bits() ==
+          (bits_of(min(avx2_a, avx2_b)) ^ bits_of(max(avx2_b, avx2_a))).bits());
   }
 }
 
-TEST_CASE("indices of bits are written, and changes are found, as number by number") {
+TEST_CASE("put_indices and find_changes agree with loops over single numbers") {
   Random random(21);
   const auto check = [&](auto packs) {
     using Packs = decltype(packs);
@@ -188,9 +187,9 @@ TEST_CASE("indices of bits are written, and changes are found, as number by numb
       for (std::uint32_t k = 0; k < Packs::kCount; ++k) {
         if ((bits >> k & 1U) != 0) expected.push_back(100 + k);
       }
-      std::vector<std::uint32_t> places(Packs::kCount);
-      places.resize(detail::put_places<Packs>(bits, 100, places.data()));
-      CHECK(places == expected);
+      std::vector<std::uint32_t> indices(Packs::kCount);
+      indices.resize(detail::put_indices<Packs>(bits, 100, indices.data()));
+      CHECK(indices == expected);
 
       const auto count = static_cast<std::size_t>(random.uniform(0.0, 64.999));
       std::vector<std::uint32_t> values(count + 1);
@@ -204,11 +203,11 @@ TEST_CASE("indices of bits are written, and changes are found, as number by numb
       CHECK(detail::find_changes<Packs>(count, values.data() + 1) == changes);
     }
   };
-  check(detail::NarrowPacks());
-  with_wider_packs(check);
+  check(detail::BaselinePacks());
+  with_larger_registers(check);
 }
 
-TEST_CASE("records turn into columns and close up at the front with all kinds of packs") {
+TEST_CASE("load_columns, pick and move_some_to_front give equal results with all kinds of packs") {
   Random random(22);
   const auto check = [&](auto packs) {
     using Packs = decltype(packs);
@@ -219,7 +218,7 @@ TEST_CASE("records turn into columns and close up at the front with all kinds of
       const unsigned all = (1U << count) - 1U;
       const unsigned bits = static_cast<unsigned>(random.uniform(0.0, Packs::kAll + 0.999)) & all;
       const std::size_t gap = static_cast<std::size_t>(random.uniform(0.0, 5.0));
-      // Records move forward into the gap; those behind them must not change.
+      // Records move to the front, over the gap; records behind the moved ones must not change.
       std::vector<detail::PointRecord> records(gap + 2 * kCount);
       for (std::uint32_t i = 0; i < records.size(); ++i) {
         const auto number = static_cast<float>(i);
@@ -261,11 +260,11 @@ TEST_CASE("records turn into columns and close up at the front with all kinds of
       }
     }
   };
-  check(detail::NarrowPacks());
-  with_wider_packs(check);
+  check(detail::BaselinePacks());
+  with_larger_registers(check);
 }
 
-TEST_CASE("a kernel meets each index once, in order, whatever the count") {
+TEST_CASE("for_packs passes each index to the kernel once, in order, for all counts") {
   for (std::size_t count = 0; count <= 3 * detail::kMaxPackWidth; ++count) {
     CAPTURE(count);
     std::vector<float> from(count);

@@ -19,7 +19,7 @@ Eigen::Isometry3d random_pose(Random& random, double reach) {
 }
 
 TEST_CASE("points of the window are where Eq. 3 puts them in double") {
-  // Every count up to three vectors of eight lanes, so that tails of every length occur.
+  // Every count up to three packs of eight, so that tails of every length occur.
   Random random(1);
   for (std::size_t count = 0; count <= 24; ++count) {
     const Eigen::Isometry3d T = random_pose(random, 5.0);

@@ -27,19 +27,19 @@ std::int32_t cell_of(const RangeImageGrid& grid, float x, float y, float z) {
   std::int32_t cells[detail::kPackWidth];
   const detail::Float8 px(x), py(y), pz(z);
   ImageLocator(grid)
-      .locate<detail::NarrowPacks>(px, py, pz, sqrt((px * px + py * py) + pz * pz))
+      .locate<detail::BaselinePacks>(px, py, pz, sqrt((px * px + py * py) + pz * pz))
       .store(cells);
   return cells[0];
 }
 
 TEST_CASE("columns follow the azimuth within 1e-4 rad, rows the elevation within 0.2 deg") {
   for (double azimuth = -179.9; azimuth < 180.0; azimuth += 0.37) {
-    float lanes[detail::kPackWidth];
+    float values[detail::kPackWidth];
     const double angle = azimuth / kDegrees;
     coarse_azimuth(detail::Float8(static_cast<float>(7.0 * std::cos(angle))),
                    detail::Float8(static_cast<float>(7.0 * std::sin(angle))))
-        .store(lanes);
-    REQUIRE(std::abs(lanes[0] - angle) < 1e-4);
+        .store(values);
+    REQUIRE(std::abs(values[0] - angle) < 1e-4);
   }
   double before = -10.0;
   for (double elevation = -90.0; elevation <= 90.0; elevation += 0.1) {
@@ -80,9 +80,9 @@ TEST_CASE("a direction that no image covers has cell 0") {
   CHECK(cell_of(grid, 1.0F, 0.0F, 0.0F) > 0);
   // Straight behind the sensor, on both sides of the seam.
   const auto stride = static_cast<std::int32_t>(grid.stride());
-  const auto lanes = static_cast<std::int32_t>(detail::kPackWidth);
-  CHECK(cell_of(grid, -1.0F, 1e-9F, 0.0F) % stride == lanes + grid.columns - 1);
-  CHECK(cell_of(grid, -1.0F, -1e-9F, 0.0F) % stride == lanes);
+  const auto border = static_cast<std::int32_t>(detail::kPackWidth);
+  CHECK(cell_of(grid, -1.0F, 1e-9F, 0.0F) % stride == border + grid.columns - 1);
+  CHECK(cell_of(grid, -1.0F, -1e-9F, 0.0F) % stride == border);
 }
 
 // In centimetres, even: odd are those of what moved.

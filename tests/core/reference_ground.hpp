@@ -1,6 +1,6 @@
-// Patchwork word for word, slow: double precision, libm, sorting and Eigen's eigenvalue solver.
-// Then what goes beyond it: planes fitted to some points of a patch, and patches that lie far over
-// those around them.
+// A slow implementation of Patchwork: double precision, libm, sorting and Eigen's eigenvalue
+// solver. Beyond Patchwork, planes are fitted to some points of a patch, and patches far above
+// their neighbours are not ground.
 #pragma once
 
 #include <Eigen/Dense>
@@ -15,7 +15,7 @@
 
 namespace dynains::test {
 
-/// Those of a patch that its plane is fitted to: all, or runs of eight.
+/// Points to which the plane of a patch is fitted: all, or runs of eight.
 inline std::vector<std::size_t> reference_fit_points(const std::vector<std::size_t>& points,
                                                      std::size_t most) {
   if (points.size() <= most) return points;
@@ -49,8 +49,8 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
     int zone = 3;
     while (range < edges[zone]) --zone;
     const auto z = static_cast<std::size_t>(zone);
-    const int rings = GroundSegmenter::kRings[z];
-    const int sectors = GroundSegmenter::kSectors[z];
+    const int rings = detail::ConcentricZones::kRings[z];
+    const int sectors = detail::ConcentricZones::kSectors[z];
     const double depth = (edges[zone + 1] - edges[zone]) / rings;
     const double width = 2.0 * M_PI / sectors;
     const int ring = std::min(static_cast<int>((range - edges[zone]) / depth), rings - 1);
@@ -58,7 +58,7 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
     const int sector = std::min(static_cast<int>(azimuth / width), sectors - 1);
     std::size_t ring_number = static_cast<std::size_t>(ring);
     for (std::size_t k = 0; k < z; ++k) {
-      ring_number += static_cast<std::size_t>(GroundSegmenter::kRings[k]);
+      ring_number += static_cast<std::size_t>(detail::ConcentricZones::kRings[k]);
     }
     Patch& patch = patches[{zone, ring, sector}];
     patch.is_innermost_zone = zone == 0;
@@ -121,7 +121,7 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
       members = members_of(fitted);
     }
     if (!is_ground || normal.z() < config.ground_uprightness) continue;
-    if (patch.ring < GroundSegmenter::kCheckedRings) {
+    if (patch.ring < GroundConfig::kCheckedRings) {
       const double flatness = eigenvalues[0] / eigenvalues.sum();
       if (mean.z() + h > config.ground_elevation[patch.ring] &&
           flatness >= config.ground_flatness[patch.ring]) {
@@ -133,9 +133,14 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
     patch.members = members_of(patch.points);
   }
 
-  // Patches beside one of a ring, or in the next rings where its middle is, and those beside these.
-  const auto rings = [](int z) { return GroundSegmenter::kRings[static_cast<std::size_t>(z)]; };
-  const auto sectors = [](int z) { return GroundSegmenter::kSectors[static_cast<std::size_t>(z)]; };
+  // Heights of the patches on both sides in the ring, and of three in each adjacent ring: the one
+  // at the middle of the sector and its neighbours.
+  const auto rings = [](int z) {
+    return detail::ConcentricZones::kRings[static_cast<std::size_t>(z)];
+  };
+  const auto sectors = [](int z) {
+    return detail::ConcentricZones::kSectors[static_cast<std::size_t>(z)];
+  };
   const auto heights_around = [&](const std::vector<int>& key) {
     const int zone = key[0], ring = key[1], sector = key[2];
     std::vector<double> heights;

@@ -11,8 +11,7 @@
 
 #include "dynains/points.hpp"
 #include "dynains/simd/bits.hpp"
-#include "dynains/simd/capacity.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains {
 
@@ -107,14 +106,14 @@ class GroundFootprint {
         const detail::PackConstant first_x(block.x[0]), first_y(block.y[0]);
         Float x_min = first_x, x_max = first_x, y_min = first_y, y_max = first_y;
         detail::for_slices<Packs>(block.size(), [&](const auto& at) {
-          const Float x = at.there(at.load(block.x.data()), first_x);
-          const Float y = at.there(at.load(block.y.data()), first_y);
+          const Float x = at.padded(at.load(block.x.data()), first_x);
+          const Float y = at.padded(at.load(block.y.data()), first_y);
           x_min = min(x_min, x);
           x_max = max(x_max, x);
           y_min = min(y_min, y);
           y_max = max(y_max, y);
         });
-        boxes[b] = box(min_lane(x_min), max_lane(x_max), min_lane(y_min), max_lane(y_max));
+        boxes[b] = box(smallest(x_min), largest(x_max), smallest(y_min), largest(y_max));
       }
     });
   }

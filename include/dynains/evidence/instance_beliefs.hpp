@@ -10,9 +10,9 @@
 #include "dynains/evidence/free_space_sum.hpp"
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/visibility.hpp"
+#include "dynains/points.hpp"
 #include "dynains/simd/bits.hpp"
-#include "dynains/simd/capacity.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_loops.hpp"
 #include "dynains/stage/free_space_config.hpp"
 
 namespace dynains {
@@ -93,7 +93,7 @@ class InstanceBeliefUpdater {
   template <class OnHit>
   void update(const InstanceSamples& samples, const detail::Visibility& visibility,
               InstanceBeliefs& beliefs, OnHit&& on_hit) {
-    // Wide packs imply instructions that find and count bits.
+    // Processors with AVX2 have instructions that find and count bits.
     detail::run_packs([&](auto) {
       update_supervoxels(samples, visibility, beliefs);
       update_wholes(samples, visibility, beliefs, on_hit);

@@ -10,8 +10,8 @@
 
 #include "dynains/evidence/smallest_k.hpp"
 #include "dynains/points.hpp"
-#include "dynains/simd/pack_transform.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_geometry.hpp"
+#include "dynains/simd/pack_loops.hpp"
 #include "dynains/voxel/voxel_hash_table.hpp"
 #include "dynains/voxel/voxel_key.hpp"
 
@@ -20,7 +20,7 @@ namespace dynains {
 /// The samples of one scan (m, sensor frame), ordered by instance, then by supervoxel: each
 /// instance and each supervoxel is one range of samples.
 struct InstanceSamples {
-  PointBuffer points;                           ///< padded for wide loads
+  PointBuffer points;                           ///< padded for packs
   std::vector<std::uint32_t> sample_begin;      ///< by supervoxel, and the end
   std::vector<VoxelKey> place;                  ///< by supervoxel
   std::vector<std::uint32_t> supervoxel_begin;  ///< by instance, and the end
@@ -59,8 +59,8 @@ inline void find_cells(const InstanceSamples& samples, double cell,
     const Float z = at.load(samples.points.z.data());
     std::int32_t index[3][decltype(at)::kCount];
     for (std::size_t axis = 0; axis < 3; ++axis) floor(to_cells(axis, x, y, z)).store(index[axis]);
-    for (std::size_t lane = 0; lane < at.size(); ++lane) {
-      key[at.begin + lane] = voxel_key(index[0][lane], index[1][lane], index[2][lane]);
+    for (std::size_t k = 0; k < at.size(); ++k) {
+      key[at.begin + k] = voxel_key(index[0][k], index[1][k], index[2][k]);
     }
   });
 }

@@ -17,7 +17,6 @@
 #include "dynains/points.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/simd/bits.hpp"
-#include "dynains/simd/capacity.hpp"
 #include "dynains/stage/evidence_verdict.hpp"
 #include "dynains/stage/free_space_config.hpp"
 

@@ -10,9 +10,7 @@
 
 #include "dynains/evidence/range_image_grid.hpp"
 #include "dynains/points.hpp"
-#include "dynains/simd/lanes.hpp"
-#include "dynains/simd/short_lanes.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains {
 
@@ -96,7 +94,7 @@ class RangeImage {
   };
 
   // Writes the nearest range per cell. Cells and ranges of a block go through memory, which is
-  // cheaper than extracting lanes.
+  // cheaper than extracting single numbers.
   static void collect(const RangeImageGrid& grid, PointsView points,
                       Span<const std::uint8_t> moving, std::int16_t* nearest) {
     constexpr std::size_t kBlock = 128;
@@ -164,7 +162,7 @@ class RangeImage {
     scratch.objects.resize(grid.cell_count());
     scratch.reach.assign(rows * group_stride(grid), 0);
     detail::run_packs([&](auto packs) {
-      using Short = typename detail::ShortsOf<decltype(packs)>::Type;
+      using Short = typename decltype(packs)::Short;
       const Short far(limits.limit[1]);
       for (std::size_t row = 0; row < rows; ++row) {
         const std::int16_t* const from = &scratch.nearest[row * stride];
@@ -192,7 +190,7 @@ class RangeImage {
     scratch.below.assign(stride, kNothing);
     scratch.gap.assign(stride, static_cast<std::int16_t>(grid.hole_rows + 1));
     run_packs([&](auto packs) {
-      using Short = typename ShortsOf<decltype(packs)>::Type;
+      using Short = typename decltype(packs)::Short;
       const Short zero(0), one(1), nothing(kNothing);
       const Short widest(static_cast<std::int16_t>(grid.hole_rows));
       std::int16_t* const belows = scratch.below.data();
@@ -235,7 +233,7 @@ class RangeImage {
       wrap(&scratch.nearest[row * stride], static_cast<std::size_t>(grid.columns), 1);
     }
     detail::run_packs([&](auto packs) {
-      using Short = typename detail::ShortsOf<decltype(packs)>::Type;
+      using Short = typename decltype(packs)::Short;
       for (std::size_t row = 0; row < rows; ++row) {
         merge_three_rows<Short>(grid, row, scratch);
         store_row<Short>(grid, limits, row, scratch);
@@ -272,7 +270,7 @@ class RangeImage {
       const Short b = only_staying(here);
       const Short c = only_staying(above);
       min(min(a, b), c).store(leasts + column);
-      // Set lanes are -1.
+      // A set mask is -1.
       ((a < nothing) + (b < nothing) + (c < nothing)).store(counts + column);
     }
   }
@@ -323,7 +321,7 @@ class RangeImage {
     const auto rows = static_cast<std::size_t>(grid.rows);
     for (std::vector<std::int16_t>& line : scratch.lines) line.resize(grid.stride());
     detail::run_packs([&](auto packs) {
-      using Short = typename detail::ShortsOf<decltype(packs)>::Type;
+      using Short = typename decltype(packs)::Short;
       for (std::size_t row = 0; row < rows; ++row) {
         if (!find_nearby(grid, row, scratch)) continue;
         widen_upwards<Short>(grid, limits, row, scratch);

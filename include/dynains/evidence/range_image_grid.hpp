@@ -8,10 +8,8 @@
 #include <iterator>
 
 #include "dynains/sensor/sensor_model.hpp"
-#include "dynains/simd/arc_tangent.hpp"
-#include "dynains/simd/lanes.hpp"
-#include "dynains/simd/short_lanes.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_geometry.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains {
 
@@ -56,7 +54,7 @@ struct RangeImageGrid {
     return grid;
   }
 
-  /// Cells from one row to the next, with padding for wide access beyond both ends.
+  /// Cells from one row to the next, with padding for packs beyond both ends.
   std::size_t stride() const {
     return (static_cast<std::size_t>(columns) + detail::kShortPackWidth - 1) /
                detail::kShortPackWidth * detail::kShortPackWidth +

@@ -12,8 +12,8 @@
 #include "dynains/evidence/range_image.hpp"
 #include "dynains/evidence/visibility.hpp"
 #include "dynains/points.hpp"
-#include "dynains/sensor/rotation.hpp"
 #include "dynains/sensor/sensor_model.hpp"
+#include "dynains/simd/pack_geometry.hpp"
 #include "dynains/stage/free_space_config.hpp"
 #include "dynains/stage/ground_split.hpp"
 
@@ -111,8 +111,8 @@ class ReferenceScans {
     if (R_beams_level_) {
       reference.T_world_beams.rotate(R_beams_level_->transpose());
       const Eigen::Matrix3f R = R_beams_level_->cast<float>();
-      ground = detail::turn(ground, R, rotated_ground_);
-      rest = detail::turn(rest, R, rotated_rest_);
+      ground = detail::rotate(ground, R, rotated_ground_);
+      rest = detail::rotate(rest, R, rotated_rest_);
     }
     reference.image.build(grid_, ground, rest, moving, lateral_margin_, scratch_);
     reference.epoch = epoch;
@@ -135,7 +135,7 @@ class ReferenceScans {
     return reference.scan == wanted && reference.epoch == epoch ? &reference : nullptr;
   }
 
-  /// Visibility of the first `count` points (m; padded for wide loads) from a reference. Holds
+  /// Visibility of the first `count` points (m; padded for packs) from a reference. Holds
   /// until the next call.
   const detail::Visibility& test(const PointBuffer& points, std::size_t count,
                                  const Eigen::Isometry3d& T_world_points,

@@ -6,8 +6,6 @@
 #include <cstring>
 #include <vector>
 
-#include "dynains/simd/shuffle.hpp"
-
 namespace dynains::detail {
 
 /// Rows of numbers, in the order of the ranks that they were added with: each keeps as many as it
@@ -36,8 +34,7 @@ class SmallestK {
     for (std::size_t p = pairs_per_row_ - 1;; --p) {
       const Pair here = pairs[p];
       const Pair before = p > 0 ? pairs[p - 1] : Pair{0.0, 0.0};
-      Pair predecessors;
-      shuffle<1, 2>(before, here, predecessors);
+      const Pair predecessors = {before[1], here[0]};
       const Pair moved = predecessors > keys ? predecessors : keys;
       pairs[p] = here < moved ? here : moved;
       if (p == 0) return;

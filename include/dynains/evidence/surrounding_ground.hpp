@@ -10,7 +10,6 @@
 
 #include "dynains/ground/plane_fit.hpp"
 #include "dynains/points.hpp"
-#include "dynains/simd/capacity.hpp"
 
 namespace dynains {
 

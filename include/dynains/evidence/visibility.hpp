@@ -11,10 +11,8 @@
 #include "dynains/evidence/range_image.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/bits.hpp"
-#include "dynains/simd/capacity.hpp"
-#include "dynains/simd/lanes.hpp"
-#include "dynains/simd/pack_transform.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_geometry.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains::detail {
 
@@ -112,7 +110,7 @@ void compare_ranges(const typename Packs::Int& cells, const typename Packs::Mask
   hit_bits = static_cast<std::uint8_t>(hit.bits());
 }
 
-/// Tests `count` samples (m; padded for wide loads) against a range image. A beam passes a sample
+/// Tests `count` samples (m; padded for packs) against a range image. A beam passes a sample
 /// if it is longer by more than `margin` (m) + `slope` (m/m) * range. Hits on moving points are
 /// neither "free" nor "hit". `T_reference_sample`: rigid.
 inline void test_visibility(const RangeImage& image, const Eigen::Isometry3f& T_reference_sample,

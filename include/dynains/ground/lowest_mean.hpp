@@ -1,4 +1,4 @@
-// Mean of the lowest of some heights.
+// Mean of the lowest values of a sequence.
 #pragma once
 
 #include <algorithm>
@@ -8,21 +8,19 @@
 #include <cstdint>
 #include <limits>
 
-#include "dynains/simd/lanes.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains::detail {
 
-/// The lowest values of a sequence, summed up in the order of size. Nothing here branches on single
-/// values, because no branch could be foretold.
+/// Collects the lowest values of a sequence and adds them in ascending order. It avoids branches on
+/// single values, which are unpredictable.
 template <std::size_t kMaxWanted, class Packs>
 class LowestMean {
  public:
   explicit LowestMean(std::size_t wanted) : wanted_(wanted) {}
 
-  /// Mean of the lowest `wanted` of the values that are not below `floor`; all of them if there are
-  /// fewer, and `floor` if there is none. Infinite values stay out; behind the last one, there are
-  /// some to fill up eight lanes.
+  /// Mean of the `wanted` lowest finite values that are at least `floor`: of all if there are
+  /// fewer, and `floor` if there are none. Eight infinite values must follow the last one.
   float of(const float* values, std::size_t count, float floor) {
     const Float infinity(kInfinity);
     const Float least(floor);
@@ -35,7 +33,8 @@ class LowestMean {
       const Float value = load(i);
       const unsigned bits = ((value <= bound) & (value < infinity)).bits();
       if (bits == 0) continue;
-      if (found_ > kRoom - kPackWidth) bound = Float(std::nextafter(drop_highest(), -kInfinity));
+      if (found_ > kCapacity - kPackWidth)
+        bound = Float(std::nextafter(drop_highest(), -kInfinity));
       for (std::size_t k = 0; k < kPackWidth; ++k) {
         found_values_[found_] = values[i + k];
         found_ += (bits >> k) & 1U;
@@ -49,10 +48,11 @@ class LowestMean {
   using Int = typename Packs::Int;
 
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  static constexpr std::size_t kRoom = 2 * kMaxWanted;
+  static constexpr std::size_t kCapacity = 2 * kMaxWanted;
 
-  // No more than a few values are within the bound, mostly: it is the last wanted one of the least
-  // values of some interleaved groups. Values often come in the order of their size.
+  // An upper bound of the wanted values that admits few others. It deals the values out to as many
+  // interleaved lists as are wanted, at least, and returns the wanted-th of the lists' minima. The
+  // lists are interleaved since neighbouring values are similar.
   template <class Load>
   float bound_of(const Load& load, std::size_t count) const {
     const std::size_t groups = (wanted_ - 1) / kPackWidth + 1;
@@ -64,7 +64,7 @@ class LowestMean {
       }
       lowest.store(&least[group * kPackWidth]);
     }
-    // The least one of those that are not below `wanted` of them.
+    // The smallest of the minima that are at least as large as `wanted` of them.
     const Int one(1);
     const Int enough(static_cast<std::int32_t>(wanted_) - 1);
     Float result(kInfinity);
@@ -76,10 +76,10 @@ class LowestMean {
       }
       result = min(select(enough < not_above, value, Float(kInfinity)), result);
     }
-    return min_lane(result);
+    return smallest(result);
   }
 
-  // Leaves the wanted ones, and returns the highest of them.
+  // Keeps only the wanted values; returns the highest of them.
   float drop_highest() {
     std::nth_element(found_values_.begin(), found_values_.begin() + wanted_ - 1,
                      found_values_.begin() + found_);
@@ -88,7 +88,7 @@ class LowestMean {
   }
 
   float mean() const {
-    std::array<std::size_t, kRoom> rank;
+    std::array<std::size_t, kCapacity> rank;
     for (std::size_t i = 0; i < found_; ++i) {
       rank[i] = 0;
       for (std::size_t k = 0; k < i; ++k) {
@@ -97,7 +97,7 @@ class LowestMean {
         rank[i] += 1 - lower;
       }
     }
-    std::array<float, kRoom> sorted;
+    std::array<float, kCapacity> sorted;
     for (std::size_t i = 0; i < found_; ++i) sorted[rank[i]] = found_values_[i];
     const std::size_t count = std::min(found_, wanted_);
     float total = 0.0F;
@@ -107,7 +107,7 @@ class LowestMean {
 
   std::size_t wanted_;
   std::size_t found_ = 0;
-  std::array<float, kRoom> found_values_{};
+  std::array<float, kCapacity> found_values_{};
 };
 
 }  // namespace dynains::detail

@@ -1,4 +1,4 @@
-// The points of a patch that its plane is fitted to.
+// Points of a patch to which its plane is fitted.
 #pragma once
 
 #include <algorithm>
@@ -6,29 +6,56 @@
 #include <cstddef>
 #include <limits>
 
-#include "dynains/ground/half_space.hpp"
 #include "dynains/ground/plane_fit.hpp"
 #include "dynains/ground/point_record.hpp"
 #include "dynains/points.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains::detail {
 
-/// All points of a patch if they are few, else runs of eight that are spread over them: arrays that
-/// stay in the nearest cache.
+/// Points p with normal . (p - origin) < offset (m). The origin must be near the points, to keep
+/// floats accurate.
+struct HalfSpace {
+  /// The points less than `distance` above the origin.
+  HalfSpace(float origin_x, float origin_y, float origin_z, float distance)
+      : x0(origin_x), y0(origin_y), z0(origin_z), offset(distance) {}
+
+  /// Sets it to the points less than `distance` above a plane, which is relative to the origin.
+  void set_below(const Plane& plane, double distance) {
+    x = static_cast<float>(plane.normal_x);
+    y = static_cast<float>(plane.normal_y);
+    z = static_cast<float>(plane.normal_z);
+    offset = static_cast<float>(distance + plane.normal_x * plane.mean_x +
+                                plane.normal_y * plane.mean_y + plane.normal_z * plane.mean_z);
+  }
+
+  /// `local`: coordinates relative to the origin.
+  template <class Float>
+  auto contains(const std::array<Float, 3>& local) const {
+    return x * local[0] + y * local[1] + z * local[2] < offset;
+  }
+
+  PackConstant x0, y0, z0;                    // origin
+  PackConstant x = 0.0F, y = 0.0F, z = 1.0F;  // normal
+  PackConstant offset;
+};
+
+/// All points of a patch, or, of a patch with many, runs of eight points that are spread evenly:
+/// they stay in the cache while planes are fitted.
 class PatchSample {
  public:
-  /// Gets the memory for that many points.
+  /// Gets memory for as many points.
   void reserve(std::size_t points) { points_.grow(points + kPackWidth); }
 
-  /// Takes all of `count` points, or `most` of them, rounded down to runs of eight. What was
-  /// reserved suffices, and the records are padded for wide loads; x and y become relative to the
-  /// first one.
+  /// Takes all `count` points, or `max_count` rounded down to runs of eight if there are more.
+  /// reserve() must have been called for as many. Eight records must be readable from each one on.
+  /// Makes x and y relative to the first record.
   template <class Packs>
-  void take(const PointRecord* records, std::size_t count, std::size_t most) {
+  void take(const PointRecord* records, std::size_t count, std::size_t max_count) {
     using Float = typename Packs::Float;
-    const bool is_whole = count <= most;
-    const std::size_t runs = is_whole ? (count + kPackWidth - 1) / kPackWidth : most / kPackWidth;
+    const bool is_whole = count <= max_count;
+    const std::size_t runs =
+        is_whole ? (count + kPackWidth - 1) / kPackWidth : max_count / kPackWidth;
     size_ = is_whole ? count : runs * kPackWidth;
     const Float x0(records->x);
     const Float y0(records->y);
@@ -42,15 +69,16 @@ class PatchSample {
       (columns[1] - y0).store(y + run * kPackWidth);
       columns[2].store(z + run * kPackWidth);
     }
-    // Behind the last one, there is nothing that is low or below a plane.
+    // Neither among the lowest nor in a half space below a plane.
     Float(std::numeric_limits<float>::infinity()).store(z + size_);
   }
 
   std::size_t size() const { return size_; }
-  /// Heights (m), with infinite ones behind the last to fill up eight lanes.
+  /// Heights (m, sensor frame), then eight infinite ones.
   const float* heights() const { return points_.z.data(); }
 
-  /// Moments of the points in a half space whose origin is above or below the first record.
+  /// Moments of the points in a half space, relative to its origin, whose x and y must be those of
+  /// the first record.
   template <class Packs>
   PlaneMoments moments(const HalfSpace& space) const {
     static constexpr PackConstant kZero(0.0F), kOne(1.0F);
@@ -78,7 +106,7 @@ class PatchSample {
             sum(sxy), sum(sxz), sum(syy), sum(syz), sum(szz)};
   }
 
-  /// Whether all points are in such a half space.
+  /// Whether all points are in a half space whose origin is as for moments().
   template <class Packs>
   bool is_inside(const HalfSpace& space) const {
     for (std::size_t i = 0; i < size_; i += kPackWidth) {

@@ -1,4 +1,4 @@
-// Points in the order of the patches that they lie in.
+// Sorts the points of a scan by patch.
 #pragma once
 
 #include <array>
@@ -8,20 +8,20 @@
 
 #include "dynains/ground/point_record.hpp"
 #include "dynains/points.hpp"
-#include "dynains/simd/capacity.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains::detail {
 
-/// Counting sort; stable, so that points keep the order of the scan within their patch.
+/// Stable counting sort: points of a patch keep the order of the scan.
 ///
-/// Neighbours in a scan mostly share a patch, whose counter would have to wait for its own last
-/// increment. So the scan is worked off in strands: long stretches of it, a few points of each in
-/// turn, and each with counters of its own.
+/// Consecutive points often share a patch, so that an increment of its counter would have to wait
+/// for the one before. The scan is therefore cut into strands with their own counters, and a few
+/// points of each strand are sorted in turn.
 template <std::size_t kPatches>
 class PatchSort {
  public:
-  /// `patch_of` gives the patch of each point, less than kPatches. Numbers are those of `input`.
+  /// `patch_of`: patch of each point, less than kPatches. `input`: index of each point in the input
+  /// of the remover.
   void sort(PointsView points, const std::uint32_t* input, const std::int32_t* patch_of) {
     const std::size_t count = points.size();
     grow(sorted_, count + kMaxPackWidth);
@@ -31,7 +31,7 @@ class PatchSort {
     run_packs([&](auto) { move(points, input, patch_of); });
   }
 
-  /// The points of all patches; padded for wide loads.
+  /// The points of all patches, with kMaxPackWidth more records behind them.
   PointRecord* records() { return sorted_.data(); }
   std::size_t begin(std::size_t patch) const { return begin_[patch]; }
   std::size_t end(std::size_t patch) const { return begin_[patch + 1]; }
@@ -39,11 +39,10 @@ class PatchSort {
  private:
   static constexpr std::size_t kStrands = 4;
   static constexpr std::size_t kHalves = 2 * kStrands;
-  static constexpr std::size_t kStep = 4;   // points of a strand in turn
-  static constexpr std::size_t kAhead = 8;  // records: where the next but one line begins
+  static constexpr std::size_t kStep = 4;   // points of a strand that are sorted in turn
+  static constexpr std::size_t kAhead = 8;  // records from a write to the prefetched cache line
+  static_assert(kStep % 2 == 0, "the length of a strand must be even");
 
-  // By halves of strands.
-  static_assert(kStep % 2 == 0, "strands have halves");
   void count_points(const std::int32_t* patch_of, std::size_t count) {
     for (auto& counts : count_) counts.fill(0);
     const auto add = [&](std::size_t half, std::size_t i) {
@@ -56,7 +55,7 @@ class PatchSort {
     for (std::size_t i = kHalves * length; i < count; ++i) add(kHalves - 1, i);
   }
 
-  // Where the points of each strand begin within their patch.
+  // Finds where each patch begins, and each strand within the patch.
   void add_up_counts() {
     PointRecord* to = sorted_.data();
     for (std::size_t p = 0; p < kPatches; ++p) {

@@ -5,13 +5,13 @@
 
 namespace dynains::detail {
 
-/// Sums over a point set, relative to a reference near it so that float sums stay accurate.
+/// Sums over a point set. Coordinates are relative to a place near it, to keep float sums accurate.
 struct PlaneMoments {
   double count = 0.0;
   double x = 0.0, y = 0.0, z = 0.0;
   double xx = 0.0, xy = 0.0, xz = 0.0, yy = 0.0, yz = 0.0, zz = 0.0;
 
-  /// Adds a point; the same with the opposite weight takes it out again.
+  /// Adds a point; a negative weight removes it.
   void add(double px, double py, double pz, double weight) {
     const double wx = weight * px;
     const double wy = weight * py;
@@ -33,16 +33,17 @@ struct PlaneMoments {
   }
 };
 
-/// Plane `normal . p = offset` with an upward unit normal, in the frame of the moments.
+/// Plane through a mean point with an upward unit normal, in the frame of the moments.
 struct Plane {
   double normal_x = 0.0, normal_y = 0.0, normal_z = 1.0;
   double mean_x = 0.0, mean_y = 0.0, mean_z = 0.0;
-  double flatness = 0.0;  ///< smallest eigenvalue of the covariance over the sum of all, [0, 1/3]
+  double flatness = 0.0;  ///< smallest eigenvalue of the covariance, divided by their sum: [0, 1/3]
 };
 
-/// The normal is the eigenvector of the smallest eigenvalue of the covariance. That eigenvalue is
-/// the smallest root of a cubic whose Newton iteration from zero rises to it monotonically.
-/// Needs count >= 3; degenerate sets (all points equal or on a line) give some normal across them.
+/// Fits a plane by least squares: the normal is the eigenvector of the smallest eigenvalue of the
+/// covariance. That eigenvalue is the smallest root of a cubic; Newton's iteration from zero rises
+/// to it monotonically. Needs count >= 3. If all points are equal or on a line, the normal is one
+/// of the many that fit.
 inline Plane fit_plane(const PlaneMoments& m) {
   Plane plane;
   const double inverse = 1.0 / m.count;
@@ -72,8 +73,8 @@ inline Plane fit_plane(const PlaneMoments& m) {
   }
   plane.flatness = lambda / trace;
 
-  // The normal is orthogonal to every row of (covariance - lambda I): take the longest of the
-  // three cross products of rows.
+  // The normal is orthogonal to each row of (covariance - lambda I). The longest of the three cross
+  // products of rows is the most accurate.
   const double a = xx - lambda;
   const double b = yy - lambda;
   const double c = zz - lambda;

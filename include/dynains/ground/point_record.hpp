@@ -1,4 +1,4 @@
-// Points side by side with their numbers: what is moved one by one, by one load and one store.
+// Points as records of 16 bytes, which one load and one store move.
 #pragma once
 
 #include <array>
@@ -12,15 +12,15 @@
 namespace dynains::detail {
 
 struct alignas(16) PointRecord {
-  float x, y, z;
-  std::uint32_t input;
+  float x, y, z;        // m
+  std::uint32_t input;  // index of the point in the input of the remover
 };
 
-/// Rows or columns of a matrix with four of them.
+/// Four rows or columns of a matrix.
 template <int kWidth>
 using FourRegisters = std::array<Register<float, kWidth>, 4>;
 
-/// The columns of 4x4 values.
+/// The columns of a 4x4 matrix, given its rows.
 inline FourRegisters<4> transposed(const FourRegisters<4>& row) {
   Register<float, 4> a, b, c, d;
   shuffle<0, 4, 1, 5>(row[0], row[1], a);
@@ -35,7 +35,7 @@ inline FourRegisters<4> transposed(const FourRegisters<4>& row) {
   return column;
 }
 
-/// Replaces rows of 4x4 values, two blocks of which lie side by side, by their columns.
+/// Transposes the two 4x4 matrices that lie side by side in four rows.
 inline void transpose(std::array<Pack<float, 8, 1>, 4>& m) {
   Register<float, 8> a, b, c, d;
   shuffle<0, 8, 1, 9, 4, 12, 5, 13>(m[0].part[0], m[1].part[0], a);
@@ -47,7 +47,7 @@ inline void transpose(std::array<Pack<float, 8, 1>, 4>& m) {
   shuffle<0, 1, 8, 9, 4, 5, 12, 13>(c, d, m[2].part[0]);
   shuffle<2, 3, 10, 11, 6, 7, 14, 15>(c, d, m[3].part[0]);
 }
-/// Replaces rows of 16x4 values, four of which follow one another in a pack, by the columns.
+/// Replaces the rows of a 16x4 matrix, four in each pack, by its columns.
 inline void transpose(std::array<Pack<float, 16, 1>, 4>& m) {
   Register<float, 16> a, b, c, d;
   shuffle<0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29>(m[0].part[0], m[1].part[0], a);
@@ -70,19 +70,19 @@ inline Register<float, 4> load_four(const void* from) {
 
 inline void copy_record(const PointRecord* from, PointRecord* to) { store(load_four(from), to); }
 
-/// `to` is not behind `from`, but may be less than `count` before it.
+/// Copies records to a place before or at `from`. The two ranges may overlap.
 inline void move_to_front(const PointRecord* from, std::size_t count, PointRecord* to) {
   if (to == from) return;
   for (std::size_t k = 0; k < count; ++k) copy_record(from + k, to + k);
 }
 
-/// Four points from the i-th on, as records.
+/// The points with the indices i to i + 3, as records.
 inline FourRegisters<4> load_records(PointsView points, const std::uint32_t* input, std::size_t i) {
   return transposed({load_four(points.x.data() + i), load_four(points.y.data() + i),
                      load_four(points.z.data() + i), load_four(input + i)});
 }
 
-/// Records as lanes of x, y, z and, bit by bit, numbers.
+/// Packs of x, y, z and the bits of `input` of consecutive records.
 template <class Packs>
 std::array<typename Packs::Float, 4> load_columns(const PointRecord* from) {
   std::array<typename Packs::Float, 4> result;
@@ -107,14 +107,14 @@ std::array<typename Packs::Float, 4> load_columns(const PointRecord* from) {
   return result;
 }
 
-/// Of up to as many records as there are lanes, those whose bits are set; as move_to_front, and
-/// without a branch on single ones. Returns how many there are.
+/// Copies those of `count` records whose bits are set, at most a pack, to a place before or at
+/// `from`; returns their number. It avoids branches on single bits, which are unpredictable.
 template <class Packs>
 std::size_t move_some_to_front(const PointRecord* from, std::size_t count, unsigned bits,
                                PointRecord* to) {
   std::size_t moved = 0;
   if constexpr (Packs::kCount == 16) {
-    // By the bits of four records: those of their numbers.
+    // From a bit for each of four records to a bit for each of their 16 numbers.
     static constexpr std::array<std::uint16_t, 16> kNumbers = {
         0x0000, 0x000F, 0x00F0, 0x00FF, 0x0F00, 0x0F0F, 0x0FF0, 0x0FFF,
         0xF000, 0xF00F, 0xF0F0, 0xF0FF, 0xFF00, 0xFF0F, 0xFFF0, 0xFFFF};
@@ -137,8 +137,8 @@ std::size_t move_some_to_front(const PointRecord* from, std::size_t count, unsig
   return moved;
 }
 
-/// Columns of the records whose bits are set, of as many as there are lanes; behind them is
-/// anything. `columns` are those of all.
+/// Columns of those records of a pack whose bits are set; the numbers after them are undefined.
+/// `columns`: those of all records.
 template <class Packs>
 std::array<typename Packs::Float, 4> pick(const PointRecord* from, unsigned bits,
                                           const std::array<typename Packs::Float, 4>& columns) {

@@ -14,7 +14,7 @@
 #include "dynains/map/chunked_vector.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
-#include "dynains/simd/lanes.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains {
 

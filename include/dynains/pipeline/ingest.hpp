@@ -12,11 +12,8 @@
 #include "dynains/pipeline/cloud_view.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
-#include "dynains/sensor/rotation.hpp"
-#include "dynains/simd/capacity.hpp"
-#include "dynains/simd/lanes.hpp"
-#include "dynains/simd/pack_transform.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_geometry.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains::detail {
 
@@ -29,7 +26,7 @@ class Ingest {
   /// return. What is taken in is turned by `R`, unless there is none.
   void read(const CloudView& cloud, float min_range, float max_range, const Eigen::Matrix3f* R,
             std::vector<PointLabel>& labels) {
-    const PackTransform turned = turning(R != nullptr ? *R : Eigen::Matrix3f::Identity());
+    const auto rotation = PackTransform::rotation(R != nullptr ? *R : Eigen::Matrix3f::Identity());
     const std::size_t count = cloud.size();
     ensure_capacity(labels, count);
     labels.resize(count);
@@ -42,14 +39,14 @@ class Ingest {
       const std::size_t taken =
           sort_out(begin, length, min_range * min_range, max_range * max_range, labels.data());
       if (R != nullptr) {
-        detail::turn(PointsView(points_).subview(count_, taken), turned, points_, count_);
+        transform_points(PointsView(points_).subview(count_, taken), rotation, points_, count_);
       }
       count_ += taken;
     }
   }
 
   /// Turns the points that were taken in.
-  void turn(const Eigen::Matrix3f& R) { detail::turn(points(), R, points_); }
+  void turn(const Eigen::Matrix3f& R) { rotate(points(), R, points_); }
 
   PointsView points() const { return PointsView(points_).subview(0, count_); }
   /// Position in the input of each point that was taken in.
@@ -127,7 +124,7 @@ class Ingest {
           x.store(xs + taken);
           y.store(ys + taken);
           z.store(zs + taken);
-          (lane_indices<Int>() + Int(static_cast<std::int32_t>(first)))
+          (pack_indices<Int>() + Int(static_cast<std::int32_t>(first)))
               .store(reinterpret_cast<std::int32_t*>(input + taken));
           std::fill_n(labels + first, Packs::kCount, PointLabel::kGround);
           taken += Packs::kCount;

@@ -9,7 +9,6 @@
 #include "dynains/cause.hpp"
 #include "dynains/pipeline/window_votes.hpp"
 #include "dynains/points.hpp"
-#include "dynains/simd/capacity.hpp"
 #include "dynains/stage/evidence_verdict.hpp"
 #include "dynains/stage/ground_split.hpp"
 #include "dynains/verdict.hpp"

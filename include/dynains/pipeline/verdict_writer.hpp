@@ -12,7 +12,6 @@
 #include "dynains/pipeline/scan_slot.hpp"
 #include "dynains/pipeline/window_votes.hpp"
 #include "dynains/points.hpp"
-#include "dynains/simd/capacity.hpp"
 #include "dynains/stage/cluster_set.hpp"
 #include "dynains/stage/evidence_verdict.hpp"
 

@@ -10,7 +10,6 @@
 
 #include "dynains/cause.hpp"
 #include "dynains/points.hpp"
-#include "dynains/simd/capacity.hpp"
 #include "dynains/stage/cluster_set.hpp"
 #include "dynains/stage/evidence_verdict.hpp"
 

@@ -7,8 +7,8 @@
 
 #include "dynains/points.hpp"
 #include "dynains/sensor/mounting.hpp"
-#include "dynains/sensor/rotation.hpp"
 #include "dynains/sensor/sensor_model.hpp"
+#include "dynains/simd/pack_geometry.hpp"
 
 namespace dynains {
 
@@ -59,7 +59,7 @@ class LevelFrame {
     Eigen::Matrix3d R_headed_sensor = Eigen::Matrix3d::Identity();
     if (is_wanted_) R_headed_sensor = R_headed(estimate_heading(scan));
     PointBuffer headed;
-    const PointsView points = turn(scan, R_headed_sensor.cast<float>(), headed);
+    const PointsView points = rotate(scan, R_headed_sensor.cast<float>(), headed);
     SensorModel sensor = estimate_sensor_model(points);
     if (!sensor.known()) return;
     const Mounting mounting = estimate_mounting(points);

@@ -13,7 +13,7 @@
 
 #include "dynains/ground/plane_fit.hpp"
 #include "dynains/points.hpp"
-#include "dynains/simd/lanes.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains {
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "dynains/points.hpp"
-#include "dynains/simd/arc_tangent.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_geometry.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains {
 

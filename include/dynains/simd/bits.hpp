@@ -1,4 +1,4 @@
-// Words and bytes of bits: counts, loops and tables.
+// Counts, loops and tables for the bits of words and bytes.
 #pragma once
 
 #include <array>
@@ -12,10 +12,10 @@
 
 namespace dynains::detail {
 
-/// A one in each of eight bytes: a product with it repeats a byte in all of them.
+/// Each byte is 1. The product with a byte repeats that byte eight times.
 inline constexpr std::uint64_t kInEachByte = 0x0101010101010101U;
 
-/// Eight small numbers for each value of a byte.
+/// Eight bytes for each value of a byte.
 using BytesByByte = std::array<std::array<std::uint8_t, 8>, 256>;
 
 constexpr BytesByByte spread_bits() {
@@ -25,7 +25,7 @@ constexpr BytesByByte spread_bits() {
   }
   return bits;
 }
-/// Each bit of a byte as a byte.
+/// The bits of a byte, each as a byte that is 0 or 1.
 inline constexpr BytesByByte kBytesOfBits = spread_bits();
 
 constexpr BytesByByte find_bits() {
@@ -38,11 +38,10 @@ constexpr BytesByByte find_bits() {
   }
   return indices;
 }
-/// Indices of the set bits of a byte, from the lowest on; zeros follow.
+/// Indices of the set bits of a byte in ascending order, then zeros.
 inline constexpr BytesByByte kIndicesOfBits = find_bits();
 
-/// How many bits are set. The builtin function calls a library where the processor need not have
-/// the instruction.
+/// Number of set bits. Without -mpopcnt, the builtin function would call a library function.
 constexpr std::uint32_t count_ones(std::uint64_t bits) {
   bits -= bits >> 1U & 0x5555555555555555U;
   bits = (bits & 0x3333333333333333U) + (bits >> 2U & 0x3333333333333333U);
@@ -50,13 +49,13 @@ constexpr std::uint32_t count_ones(std::uint64_t bits) {
   return static_cast<std::uint32_t>(bits * kInEachByte >> 56U);
 }
 
-/// Calls `body(index)` for each set bit, from the lowest on.
+/// Calls `body(index)` for each set bit in ascending order.
 template <class Body>
 void for_each_bit(std::uint64_t bits, Body&& body) {
   for (; bits != 0; bits &= bits - 1) body(static_cast<std::size_t>(__builtin_ctzll(bits)));
 }
 
-/// Bit i is set where byte i of the 64 that begin at `from` is not zero.
+/// Bit i is set if byte i of the 64 bytes from `from` on is not zero.
 inline std::uint64_t nonzero_bytes(const std::uint8_t* from) {
   std::uint64_t result = 0;
 #if defined(__SSE2__)
@@ -71,7 +70,7 @@ inline std::uint64_t nonzero_bytes(const std::uint8_t* from) {
   return result;
 }
 
-/// Bits of `count` bytes, at most 64; zeros follow.
+/// Bits of the first `count` bytes, at most 64; the higher bits are 0.
 inline std::uint64_t nonzero_bytes(const std::uint8_t* from, std::size_t count) {
   constexpr std::size_t kAll = 64;
   if (count == kAll) return nonzero_bytes(from);

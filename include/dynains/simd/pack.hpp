@@ -1,6 +1,6 @@
-// Several numbers side by side that one instruction works on. Each operation is exactly rounded
-// IEEE arithmetic: every width, compiler and instruction set gives the same bits, as long as the
-// compiler does not contract multiplications and additions.
+// Packs of numbers in vector registers. Each operation is exactly rounded IEEE arithmetic: results
+// are equal bit by bit for all widths, compilers and instruction sets, unless the compiler
+// contracts multiplications and additions.
 #pragma once
 
 #include <algorithm>
@@ -11,10 +11,11 @@
 
 namespace dynains::detail {
 
-inline constexpr std::size_t kPackWidth = 8;      ///< numbers of 32 bits in most packs
-inline constexpr std::size_t kMaxPackWidth = 16;  ///< padding behind buffers that packs access
+inline constexpr std::size_t kPackWidth = 8;        ///< 32-bit numbers in the packs of run_packs
+inline constexpr std::size_t kShortPackWidth = 16;  ///< 16-bit numbers in these packs
+inline constexpr std::size_t kMaxPackWidth = 16;    ///< 32-bit numbers in the largest pack
 
-/// One value in all numbers of a pack, kept in memory for loops that have no register left.
+/// One number, repeated for a pack. It stays in memory, for loops that need all registers.
 struct PackConstant {
   alignas(64) float values[kMaxPackWidth];
   constexpr PackConstant(float value)
@@ -22,7 +23,8 @@ struct PackConstant {
                value, value, value, value, value, value, value, value} {}
 };
 
-/// Calls `operation(r, x...)` for the registers of the result and those of `packs`.
+/// Calls `operation(r, x...)` for each register of the result and the registers of `packs` at the
+/// same place.
 template <class Result, class Operation, class... Packs>
 Result by_parts(const Operation& operation, const Packs&... packs) {
   Result result;
@@ -31,7 +33,7 @@ Result by_parts(const Operation& operation, const Packs&... packs) {
 }
 
 /// `kWidth` numbers of type T (float, int32, int16) in `kParts` registers. A comparison returns a
-/// pack of integers as mask: -1 where it is true, else 0.
+/// mask: a pack of integers that are -1 where it is true, else 0.
 template <class T, int kWidth, int kParts>
 struct Pack {
   using Mask = Pack<MaskNumber<T>, kWidth, kParts>;
@@ -42,7 +44,7 @@ struct Pack {
 
   Pack() = default;
   explicit Pack(T number) {
-    for (auto& p : part) spread(number, p);
+    for (auto& p : part) broadcast(number, p);
   }
   Pack(const PackConstant& constant) : Pack(load(constant.values)) {}
 
@@ -68,7 +70,7 @@ struct Pack {
     return by_parts<Pack>([](auto& r, auto& x, auto& y) { r.v = x.v / y.v; }, a, b);
   }
 
-  // Integers and masks.
+  // For integers and masks only.
   friend Pack operator&(const Pack& a, const Pack& b) {
     return by_parts<Pack>([](auto& r, auto& x, auto& y) { r.v = x.v & y.v; }, a, b);
   }
@@ -84,7 +86,7 @@ struct Pack {
   friend Pack operator<<(const Pack& a, int bits) {
     return by_parts<Pack>([bits](auto& r, auto& x) { r.v = x.v << bits; }, a);
   }
-  /// Repeats the sign.
+  /// Shifts the sign in.
   friend Pack operator>>(const Pack& a, int bits) {
     return by_parts<Pack>([bits](auto& r, auto& x) { r.v = x.v >> bits; }, a);
   }
@@ -106,7 +108,7 @@ struct Pack {
     return by_parts<Pack>([](auto& r, auto& m, auto& x, auto& y) { choose(m, x, y, r); }, mask, a,
                           b);
   }
-  /// `b` where either is NaN.
+  /// The lesser number; `b` where either is NaN.
   friend Pack min(const Pack& a, const Pack& b) {
     return by_parts<Pack>([](auto& r, auto& x, auto& y) { take_lesser(x, y, r); }, a, b);
   }
@@ -114,7 +116,7 @@ struct Pack {
     return by_parts<Pack>([](auto& r, auto& x, auto& y) { take_greater(x, y, r); }, a, b);
   }
 
-  /// Number i as bit i: whether it is negative, as those of a mask are where it is set.
+  /// Bit i is set if number i is negative; for a mask, if it is set.
   unsigned bits() const {
     unsigned result = 0;
     for (int i = 0; i < kParts; ++i) result |= sign_bits(part[i]) << (i * kPartWidth);
@@ -129,13 +131,13 @@ struct Pack {
       return half_of<kHalf>(part[0]);
     }
   }
-  /// Whether a mask of 32 bytes is set anywhere.
+  /// Whether any number of a mask of 32 bytes is set.
   bool any() const {
     auto either = half<0>();
     either.v |= half<1>().v;
     return detail::any(either);
   }
-  /// Stores a0 b0 a1 b1 and so on; `a` is this pack and `b` the other one.
+  /// Stores a0 b0 a1 b1 ... of this pack a and the other pack b.
   void store_interleaved_with(const Pack& other, std::int16_t* to) const {
     store_interleaved(half<0>(), other.template half<0>(), to);
     store_interleaved(half<1>(), other.template half<1>(), to + kWidth);
@@ -152,13 +154,13 @@ struct Pack {
   }
 };
 
-// W: width, P: parts.
+// W: width, P: number of parts.
 template <int W, int P>
 using FloatPack = Pack<float, W, P>;
 template <int W, int P>
 using IntPack = Pack<std::int32_t, W, P>;
 
-/// Converts each number; towards zero, and only within the range of int32.
+/// Rounds towards zero. Numbers must be in the range of int32.
 template <int W, int P>
 IntPack<W, P> truncate(const FloatPack<W, P>& a) {
   return by_parts<IntPack<W, P>>(
@@ -169,15 +171,14 @@ FloatPack<W, P> to_float(const IntPack<W, P>& a) {
   return by_parts<FloatPack<W, P>>(
       [](auto& r, auto& x) { r.v = __builtin_convertvector(x.v, decltype(r.v)); }, a);
 }
-/// Rounds down; each number must lie within the range of int32.
+/// Rounds down. Numbers must be in the range of int32.
 template <int W, int P>
 IntPack<W, P> floor(const FloatPack<W, P>& a) {
   const IntPack<W, P> whole = truncate(a);
   return whole + (a < to_float(whole));
 }
 
-/// The bits of each float as an integer, and back. Inline, since GCC 12 has an internal error at
-/// -O1 where it passes the registers of the argument by value.
+/// The bits of each float as an integer.
 template <int W, int P>
 IntPack<W, P> bits_of(const FloatPack<W, P>& a) {
   return by_parts<IntPack<W, P>>([](auto& r, auto& x) { r.v = decltype(r.v)(x.v); }, a);
@@ -187,7 +188,7 @@ FloatPack<W, P> float_of(const IntPack<W, P>& a) {
   return by_parts<FloatPack<W, P>>([](auto& r, auto& x) { r.v = decltype(r.v)(x.v); }, a);
 }
 
-/// `a` where the mask is set, else zero: cheaper than select.
+/// `a` where the mask is set, else zero.
 template <int W, int P>
 FloatPack<W, P> keep(const IntPack<W, P>& mask, const FloatPack<W, P>& a) {
   return float_of(mask & bits_of(a));
@@ -201,7 +202,7 @@ template <int W, int P>
 FloatPack<W, P> abs(const FloatPack<W, P>& a) {
   return float_of(bits_of(a) & IntPack<W, P>(0x7FFFFFFF));
 }
-/// `a`, negated where `sign` is negative or -0.
+/// `a`, negated where the sign bit of `sign` is set.
 template <int W, int P>
 FloatPack<W, P> with_sign_of(const FloatPack<W, P>& sign, const FloatPack<W, P>& a) {
   static constexpr PackConstant kSign(-0.0F);
@@ -219,7 +220,7 @@ IntPack<W, P> multiply(const IntPack<W, P>& a, std::int32_t factor) {
   return by_parts<IntPack<W, P>>([f](auto& r, auto& x) { r.v = decltype(r.v)(Unsigned(x.v) * f); },
                                  a);
 }
-/// Number i is number `from[i]` of `a`, modulo the width.
+/// Number i of the result is number `from[i]` of `a`, modulo the width.
 template <int W>
 FloatPack<W, 1> permuted(const FloatPack<W, 1>& a, const IntPack<W, 1>& from) {
   return by_parts<FloatPack<W, 1>>(
@@ -240,20 +241,19 @@ float sum(const FloatPack<8, P>& a) {
   return (s[0] + s[2]) + (s[1] + s[3]);
 }
 template <int W, int P>
-float min_lane(const FloatPack<W, P>& a) {
+float smallest(const FloatPack<W, P>& a) {
   float numbers[W];
   a.store(numbers);
   return *std::min_element(numbers, numbers + W);
 }
 template <int W, int P>
-float max_lane(const FloatPack<W, P>& a) {
+float largest(const FloatPack<W, P>& a) {
   float numbers[W];
   a.store(numbers);
   return *std::max_element(numbers, numbers + W);
 }
 
-/// Eight numbers that every processor holds in registers.
+/// Eight numbers in registers that every processor has.
 using Float8 = FloatPack<8, 2>;
-using Int8 = IntPack<8, 2>;
 
 }  // namespace dynains::detail

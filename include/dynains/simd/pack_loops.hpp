@@ -1,8 +1,8 @@
-// Loops over arrays with the packs that suit the processor, which is found out at run time.
+// Loops over arrays with the packs that suit the processor, chosen at run time.
 //
-// A kernel is a generic function object that takes a kind of packs, or a slice that has one, and
-// works with its types. It is instantiated for each kind and gives the same bits with all of them.
-// No vector crosses the border of run_avx2 or run_avx512: its two sides pass vectors differently.
+// A kernel is a generic function object that takes a kind of packs, or a slice of arrays, and works
+// with its types. It is compiled for each kind; results are equal bit by bit. Vectors must not be
+// passed to or returned from run_avx2 and run_avx512, whose callers pass vectors differently.
 #pragma once
 
 #include <cstddef>
@@ -24,22 +24,22 @@ struct PackKind {
   static constexpr std::size_t kCount = kWidth;
   static constexpr unsigned kAll = (1U << kCount) - 1U;  ///< a bit for each number
 };
-using NarrowPacks = PackKind<8, 2>;   // SSE2, NEON
-using WidePacks = PackKind<8, 1>;     // AVX2
-using WidestPacks = PackKind<16, 1>;  // AVX-512
+using BaselinePacks = PackKind<8, 2>;  ///< SSE2, NEON
+using Avx2Packs = PackKind<8, 1>;
+using Avx512Packs = PackKind<16, 1>;
 
 #if defined(__x86_64__) && defined(__SSE2__)
 template <class Kernel>
 [[gnu::target("avx2"), gnu::flatten]] void run_avx2(Kernel& kernel) {
-  kernel(WidePacks());
+  kernel(Avx2Packs());
 }
 template <class Kernel>
 [[gnu::target("avx512f,avx512bw,avx512dq,avx512vl"), gnu::flatten]] void run_avx512(
     Kernel& kernel) {
-  kernel(WidestPacks());
+  kernel(Avx512Packs());
 }
 inline bool has_avx2() { return __builtin_cpu_supports("avx2") != 0; }
-/// Asks for VBMI2, too: the processors before it run slower while they use AVX-512.
+/// Requires VBMI2 as well, because older processors lower their clock rate for AVX-512.
 inline bool has_avx512() {
   return kHasAvx512Code && __builtin_cpu_supports("avx512vbmi2") != 0 &&
          __builtin_cpu_supports("avx512bw") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
@@ -48,25 +48,24 @@ inline bool has_avx512() {
 #else
 template <class Kernel>
 void run_avx2(Kernel& kernel) {
-  kernel(WidePacks());
+  kernel(Avx2Packs());
 }
 template <class Kernel>
 void run_avx512(Kernel& kernel) {
-  kernel(WidestPacks());
+  kernel(Avx512Packs());
 }
 inline bool has_avx2() { return false; }
 inline bool has_avx512() { return false; }
 #endif
 
-/// Calls `kernel` with packs of eight numbers: WidePacks if the processor has AVX2, else
-/// NarrowPacks.
+/// Calls `kernel` with packs of eight numbers: Avx2Packs or BaselinePacks.
 template <class Kernel>
 void run_packs(Kernel&& kernel) {
   if (has_avx2()) return run_avx2(kernel);
-  kernel(NarrowPacks());
+  kernel(BaselinePacks());
 }
 
-/// Calls `kernel` with the widest packs that fill registers of the processor.
+/// Calls `kernel` with the largest packs that the processor supports.
 template <class Kernel>
 void run_max_packs(Kernel&& kernel) {
   if constexpr (kHasAvx512Code) {
@@ -76,7 +75,7 @@ void run_max_packs(Kernel&& kernel) {
 }
 
 #if defined(__clang__)
-// Clang inlines direct calls only into run_avx2, unless functions ask for more.
+// Without these attributes, Clang inlines only direct calls into run_avx2.
 template <class Packs, class Kernel>
 [[gnu::always_inline, gnu::flatten]] void for_slices(std::size_t count, Kernel&& kernel);
 template <class Packs, class Kernel>
@@ -84,21 +83,21 @@ template <class Packs, class Kernel>
                                                                  Kernel&& kernel);
 #endif
 
-/// 0, 1, 2 and so on.
+/// The numbers 0, 1, 2, ...
 template <class Int>
-Int lane_indices() {
+Int pack_indices() {
   alignas(64) static constexpr std::int32_t kIndices[kMaxPackWidth] = {
       0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
   return Int::load(kIndices);
 }
 
-/// Writes `first + k` for each bit k that is set, as many numbers as a pack has; those behind the
-/// last bit are undefined. Returns how many bits are set.
+/// Writes `first + k` for each set bit k, in ascending order. Returns the number of set bits. `to`
+/// must have room for a whole pack; the numbers after the last index are undefined.
 template <class Packs>
-std::size_t put_places(unsigned bits, std::size_t first, std::uint32_t* to) {
+std::size_t put_indices(unsigned bits, std::size_t first, std::uint32_t* to) {
   using Int = typename Packs::Int;
   if constexpr (Packs::kCount == 16) {
-    Int indices = lane_indices<Int>() + Int(static_cast<std::int32_t>(first));
+    Int indices = pack_indices<Int>() + Int(static_cast<std::int32_t>(first));
     compress(bits, indices.part[0]);
     indices.store(reinterpret_cast<std::int32_t*>(to));
     return count_ones(bits);
@@ -110,8 +109,8 @@ std::size_t put_places(unsigned bits, std::size_t first, std::uint32_t* to) {
   }
 }
 
-/// Bit i is set if any of the arrays (numbers of 32 bits) differs between i and i - 1. `count` is
-/// at most 64; values[-1] must exist.
+/// Bit i is set if values[i] differs from values[i - 1] in any of the arrays, i < `count` <= 64.
+/// values[-1] must exist.
 template <class Packs, class... Values>
 std::uint64_t find_changes(std::size_t count, const Values*... values) {
   using Int = typename Packs::Int;
@@ -130,7 +129,8 @@ std::uint64_t find_changes(std::size_t count, const Values*... values) {
   return changes;
 }
 
-/// The indices [begin, end) of arrays: as many as a pack has numbers, or fewer if `kTail`.
+/// The indices [begin, end) of arrays: as many as a pack has numbers, or fewer if `kTail`. Each
+/// kernel call gets one slice.
 template <class Packs, bool kTail>
 struct PackSlice : Packs {
   std::size_t begin;
@@ -139,19 +139,19 @@ struct PackSlice : Packs {
   PackSlice(std::size_t first, std::size_t last) : begin(first), end(last) {}
 
   std::size_t size() const { return kTail ? end - begin : Packs::kCount; }
-  /// Zeros behind the end.
+  /// The numbers of an array at these indices, then zeros.
   typename Packs::Float load(const float* from) const {
     return load_as<typename Packs::Float>(from);
   }
   typename Packs::Int load(const std::uint32_t* from) const {
     return load_as<typename Packs::Int>(reinterpret_cast<const std::int32_t*>(from));
   }
-  /// `a` before the end, else `b`.
-  typename Packs::Float there(const typename Packs::Float& a,
-                              const typename Packs::Float& b) const {
+  /// The first size() numbers of `a`, then those of `b`.
+  typename Packs::Float padded(const typename Packs::Float& a,
+                               const typename Packs::Float& b) const {
     if constexpr (!kTail) return a;
     const typename Packs::Int count(static_cast<std::int32_t>(size()));
-    return select(lane_indices<typename Packs::Int>() < count, a, b);
+    return select(pack_indices<typename Packs::Int>() < count, a, b);
   }
 
  private:
@@ -164,7 +164,7 @@ struct PackSlice : Packs {
   }
 };
 
-/// A slice of arrays that are padded: they can be read beyond their ends.
+/// A slice of arrays with at least a pack of readable numbers behind their end.
 template <class Packs, bool kTail>
 struct PaddedPackSlice : PackSlice<Packs, kTail> {
   using PackSlice<Packs, kTail>::PackSlice;
@@ -173,7 +173,7 @@ struct PaddedPackSlice : PackSlice<Packs, kTail> {
   }
 };
 
-/// Calls `kernel(PackSlice)` for [0, count) in order; for use within a kernel.
+/// Calls `kernel(PackSlice)` for [0, count) in order. For use within a kernel of run_packs.
 template <class Packs, class Kernel>
 void for_slices(std::size_t count, Kernel&& kernel) {
   std::size_t begin = 0;
@@ -183,8 +183,9 @@ void for_slices(std::size_t count, Kernel&& kernel) {
   if (begin < count) kernel(PackSlice<Packs, true>(begin, count));
 }
 
-/// Calls `kernel(PaddedPackSlice)` for [begin, end). The last slice begins earlier, so that it is
-/// full and meets some indices again, unless there are too few of them.
+/// Calls `kernel(PaddedPackSlice)` for [begin, end). The last slice ends at `end` and is full, so
+/// that it overlaps the slice before; only if there are fewer indices than a pack has numbers, the
+/// one slice is shorter.
 template <class Packs, class Kernel>
 void for_overlapping_slices(std::size_t begin, std::size_t end, Kernel&& kernel) {
   if (end - begin < Packs::kCount) return kernel(PaddedPackSlice<Packs, true>(begin, end));
@@ -194,7 +195,7 @@ void for_overlapping_slices(std::size_t begin, std::size_t end, Kernel&& kernel)
   kernel(PaddedPackSlice<Packs, false>(end - Packs::kCount, end));
 }
 
-/// Calls `kernel(PackSlice)` for [0, count) in order, with the widest packs that fill registers.
+/// Calls `kernel(PackSlice)` for [0, count) in order, with the largest packs of the processor.
 template <class Kernel>
 void for_packs(std::size_t count, Kernel&& kernel) {
   run_max_packs([&](auto packs) { for_slices<decltype(packs)>(count, kernel); });

@@ -1,8 +1,8 @@
-// One vector register of numbers, and the operations that have no operator in C++ or that compilers
-// translate badly as operators.
+// One vector register, and operations for which C++ has no operator or compilers make slow code
+// from the operator.
 //
-// The functions pass registers by reference: code for AVX2 and code for the baseline instruction
-// set pass wide vectors by value in different ways.
+// Functions take registers by reference: AVX2 code and baseline code pass 32-byte vectors by value
+// in different ways.
 #pragma once
 
 #include <cmath>
@@ -18,12 +18,12 @@ namespace dynains::detail {
 
 template <class T, int kWidth>
 struct Register {
-  // GCC 12 aligns returned wide vectors to 16 bytes only where it does not inline.
+  // Aligned to 16 bytes, since GCC 12 gives returned vectors no more where it does not inline.
   typedef T Vector __attribute__((vector_size(kWidth * sizeof(T)), aligned(16)));
   Vector v;
 };
 
-/// Number type of the result of a comparison: -1 where it is true, else 0.
+/// Number type of the mask that a comparison returns: -1 where it is true, else 0.
 template <class T>
 struct MaskNumberOf {
   using Type = T;
@@ -35,8 +35,8 @@ struct MaskNumberOf<float> {
 template <class T>
 using MaskNumber = typename MaskNumberOf<T>::Type;
 
-// With -mavx2, GCC copies a vector by memcpy in two halves; a later load of the whole vector then
-// has to wait for both stores.
+// Registers are loaded and stored as a whole. With -mavx2, GCC makes two halves of a memcpy, and a
+// later load of the whole vector must then wait for both stores.
 template <class T, int kWidth>
 struct [[gnu::packed, gnu::may_alias]] UnalignedRegister {
   typename Register<T, kWidth>::Vector v;
@@ -50,7 +50,7 @@ void store(const Register<T, kWidth>& from, void* to) {
   static_cast<UnalignedRegister<T, kWidth>*>(to)->v = from.v;
 }
 
-/// Numbers of `a`, which count from 0, and of `b`, which count on: those with the given indices.
+/// Selects numbers of `a` (indices 0 to kWidth - 1) and `b` (indices kWidth to 2 kWidth - 1).
 template <int... kIndices, class T, int kWidth, int kResultWidth>
 void shuffle(const Register<T, kWidth>& a, const Register<T, kWidth>& b,
              Register<T, kResultWidth>& result) {
@@ -82,14 +82,14 @@ using Ints8 = Register<std::int32_t, 8>;
 using Ints16 = Register<std::int32_t, 16>;
 using Shorts8 = Register<std::int16_t, 8>;
 using Shorts16 = Register<std::int16_t, 16>;
-// GCC 12 has an internal error if it completes these types first in a function for AVX2.
+// Completes the types: GCC 12 has an internal error if an AVX2 function does it first.
 static_assert(sizeof(Floats8) == 32 && sizeof(Ints8) == 32 && sizeof(Shorts16) == 32);
 static_assert(sizeof(Floats16) == 64 && sizeof(Ints16) == 64);
 
-// Operations for any register. More special overloads follow.
+// Operations for all registers; overloads for some of them follow.
 template <class T, int kWidth>
-void spread(T number, Register<T, kWidth>& to) {
-  to.v = number - typename Register<T, kWidth>::Vector{};  // a sum would lose the sign of -0
+void broadcast(T number, Register<T, kWidth>& to) {
+  to.v = number - typename Register<T, kWidth>::Vector{};  // -0 + 0 would be 0
 }
 template <class T, int kWidth>
 void multiply(const Register<T, kWidth>& a, const Register<T, kWidth>& b,
@@ -115,14 +115,14 @@ void compare_equal(const Register<T, kWidth>& a, const Register<T, kWidth>& b,
 template <class T, int kWidth>
 void choose(const Register<MaskNumber<T>, kWidth>& mask, const Register<T, kWidth>& a,
             const Register<T, kWidth>& b, Register<T, kWidth>& result) {
-  if constexpr (kWidth * sizeof(T) == 16) {  // SSE2 has no instruction to choose
+  if constexpr (kWidth * sizeof(T) == 16) {  // SSE2 has no blend instruction
     using Bits = typename Register<MaskNumber<T>, kWidth>::Vector;
     result.v = typename Register<T, kWidth>::Vector((mask.v & Bits(a.v)) | (~mask.v & Bits(b.v)));
   } else {
     result.v = mask.v ? a.v : b.v;
   }
 }
-/// `b` where either is NaN, as the SSE instruction.
+/// The lesser number; `b` if either is NaN.
 template <class T, int kWidth>
 void take_lesser(const Register<T, kWidth>& a, const Register<T, kWidth>& b,
                  Register<T, kWidth>& result) {
@@ -133,7 +133,7 @@ void take_greater(const Register<T, kWidth>& a, const Register<T, kWidth>& b,
                   Register<T, kWidth>& result) {
   result.v = a.v > b.v ? a.v : b.v;
 }
-/// Moves the numbers whose bits are set to the front; any numbers follow. AVX-512 only.
+/// Moves the numbers whose bits are set to the front; the others are undefined. AVX-512 only.
 template <class T>
 void compress(unsigned bits, Register<T, 16>& numbers);
 
@@ -152,7 +152,7 @@ inline void take_root(const Floats4& a, Floats4& root) { root.v = _mm_sqrt_ps(a.
 inline unsigned sign_bits(const Ints4& a) {
   return static_cast<unsigned>(_mm_movemask_ps(__m128(a.v)));
 }
-/// Whether any mask of 16 bytes is set.
+/// Whether any number of the mask is set.
 inline bool any(const Shorts8& mask) { return _mm_movemask_epi8(__m128i(mask.v)) != 0; }
 #else
 inline void take_root(const Floats4& a, Floats4& root) {
@@ -161,7 +161,7 @@ inline void take_root(const Floats4& a, Floats4& root) {
 inline unsigned sign_bits(const Ints4& a) {
   unsigned result = 0;
   for (int i = 0; i < 4; ++i) {
-    const bool is_set = a.v[i] < 0;  // UBSan of GCC 12 confuses numbers in a longer expression
+    const bool is_set = a.v[i] < 0;  // one expression is compiled wrongly by UBSan of GCC 12
     result |= unsigned{is_set} << i;
   }
   return result;
@@ -174,12 +174,12 @@ inline bool any(const Shorts8& mask) {
 #endif
 
 #if defined(__x86_64__) && defined(__SSE2__) && !defined(__clang__)
-// GCC builds equal numbers one by one in functions that are not for AVX2.
+// Outside AVX2 functions, GCC compiles these operations number by number.
 #pragma GCC push_options
 #pragma GCC target("avx2")
-inline void spread(float number, Floats8& to) { to.v = number - Floats8::Vector{}; }
-inline void spread(std::int32_t number, Ints8& to) { to.v = number - Ints8::Vector{}; }
-inline void spread(std::int16_t number, Shorts16& to) { to.v = number - Shorts16::Vector{}; }
+inline void broadcast(float number, Floats8& to) { to.v = number - Floats8::Vector{}; }
+inline void broadcast(std::int32_t number, Ints8& to) { to.v = number - Ints8::Vector{}; }
+inline void broadcast(std::int16_t number, Shorts16& to) { to.v = number - Shorts16::Vector{}; }
 inline void take_lesser(const Floats8& a, const Floats8& b, Floats8& result) {
   result.v = __builtin_ia32_minps256(a.v, b.v);
 }
@@ -192,7 +192,7 @@ inline unsigned sign_bits(const Ints8& a) {
 }
 #pragma GCC pop_options
 #else
-// Clang does not inline functions for AVX2 into lambdas, and translates halves well.
+// Clang does not inline AVX2 functions into lambdas, but compiles operations on halves well.
 inline void take_root(const Floats8& a, Floats8& root) {
   Floats4 low, high;
   take_root(half_of<0>(a), low);
@@ -205,15 +205,16 @@ inline unsigned sign_bits(const Ints8& a) {
 #endif
 
 #if defined(__x86_64__) && defined(__SSE2__) && !defined(__clang__) && __GNUC__ >= 12
-/// Whether there is code for registers of 64 bytes.
+/// Whether the compiler makes code for registers of 64 bytes.
 inline constexpr bool kHasAvx512Code = true;
 
-// Outside functions for AVX-512, GCC compares number by number. The product by a builtin function
-// is never contracted with a sum, so that all instruction sets give the same bits.
+// Outside AVX-512 functions, GCC compiles comparisons number by number. AVX-512 includes fused
+// multiply-add; a product by a builtin function is not contracted with a sum, so that all
+// instruction sets give equal bits.
 #pragma GCC push_options
 #pragma GCC target("avx512f,avx512bw,avx512dq,avx512vl")
 template <class T>
-void spread(T number, Register<T, 16>& to) {
+void broadcast(T number, Register<T, 16>& to) {
   to.v = number - typename Register<T, 16>::Vector{};
 }
 template <class T>

@@ -9,8 +9,7 @@
 
 #include "dynains/points.hpp"
 #include "dynains/simd/bits.hpp"
-#include "dynains/simd/capacity.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_loops.hpp"
 #include "dynains/stage/polar_points.hpp"
 
 namespace dynains {

@@ -9,31 +9,30 @@
 
 namespace dynains {
 
-/// Patchwork's own, with a check beyond it (`ground_step`) and planes that are fitted to some of
-/// the points where there are many (`ground_fit_points`).
+/// The parameters of Patchwork, and two of our own: `ground_step` and `ground_fit_points`.
 struct GroundConfig {
   /// The innermost rings, where height and roughness of a patch are checked.
   static constexpr std::size_t kCheckedRings = 4;
   static constexpr int kMaxLowest = 64;
 
-  double sensor_height = 0.0;         ///< m, sensor origin over the ground; 0: from the scans
+  double sensor_height = 0.0;         ///< m, sensor origin over the ground; 0: estimated from scans
   double ground_min_range = 1.0;      ///< m, inner edge of the first ring
   double ground_max_range = 100.0;    ///< m, outer edge of the last ring
   int ground_iterations = 3;          ///< plane fits per patch
   int ground_lowest_points = 10;      ///< points whose mean height seeds the plane
   int ground_min_points = 11;         ///< patches with fewer points are not ground
-  int ground_fit_points = 512;        ///< points of a patch, at most, that its plane is fitted to
+  int ground_fit_points = 512;        ///< maximum number of points that a plane is fitted to
   double ground_seed_margin = 0.5;    ///< m above the seed height
-  double ground_distance = 0.125;     ///< m, a ground point lies less than this above the plane
+  double ground_distance = 0.125;     ///< m, ground points are less than this above the plane
   double ground_uprightness = 0.707;  ///< smallest z of the unit normal
-  double ground_below = 0.1;          ///< share of sensor_height below ground taken for noise
-  double ground_step = 0.5;           ///< m, a patch so far over those around it is not ground
+  double ground_below = 0.1;          ///< depth under ground, as a ratio of sensor_height, of noise
+  double ground_step = 0.5;           ///< m, a patch higher above its neighbours is not ground
   /// Largest height (m over ground) of a patch in the four inner rings, unless it is flat.
   std::array<double, kCheckedRings> ground_elevation = {0.523, 0.7246, 0.872, 1.118};
   /// Largest flatness that lets a patch above that height still be ground.
   std::array<double, kCheckedRings> ground_flatness = {0.0, 1.25e-4, 1.85e-4, 1.85e-4};
 
-  /// Without the check, and with the height of KITTI's sensor.
+  /// Without `ground_step`, and with the height of KITTI's sensor.
   static GroundConfig paper() {
     GroundConfig config;
     config.sensor_height = 1.723;
@@ -44,7 +43,7 @@ struct GroundConfig {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
     visitor(Parameter{"sensor_height", self.sensor_height, closed(0, 100), "m",
-                      "height of the sensor over the ground; 0: from the scans"});
+                      "height of the sensor over the ground; 0: estimated from scans"});
     visitor(Parameter{"ground_min_range", self.ground_min_range, closed(0, 100), "m",
                       "inner edge of the first ring of ground patches (Patchwork)"});
     visitor(Parameter{"ground_max_range", self.ground_max_range, closed(1, 1000), "m",
@@ -55,9 +54,8 @@ struct GroundConfig {
                       "lowest points of a patch that seed its plane (Patchwork)"});
     visitor(Parameter{"ground_min_points", self.ground_min_points, closed(3, 1000), "",
                       "patches with fewer points are not ground (Patchwork)"});
-    visitor(
-        Parameter{"ground_fit_points", self.ground_fit_points, closed(64, 1000000), "",
-                  "points of a patch, at most, that its plane is fitted to; more say the same"});
+    visitor(Parameter{"ground_fit_points", self.ground_fit_points, closed(64, 1000000), "",
+                      "maximum number of points of a patch that its plane is fitted to"});
     visitor(Parameter{"ground_seed_margin", self.ground_seed_margin, half_open_below(0, 10), "m",
                       "height over the seeds up to which points enter the first fit (Patchwork)"});
     visitor(Parameter{"ground_distance", self.ground_distance, half_open_below(0, 2), "m",
@@ -65,27 +63,28 @@ struct GroundConfig {
     visitor(Parameter{"ground_uprightness", self.ground_uprightness, closed(0, 1), "",
                       "smallest vertical component of a ground plane's normal (Patchwork)"});
     visitor(Parameter{"ground_below", self.ground_below, closed(0, 10), "",
-                      "depth under the ground, as a share of sensor_height, from which points "
+                      "depth under the ground, as a ratio of sensor_height, from which points "
                       "of the inner zone do not seed a plane (Patchwork)"});
-    visitor(Parameter{"ground_step", self.ground_step, closed(0, 100), "m",
-                      "a patch that lies more than this over most of the patches around it is "
-                      "not ground, but in the outermost zone; 0: whatever they say"});
+    visitor(
+        Parameter{"ground_step", self.ground_step, closed(0, 100), "m",
+                  "a patch more than this above most of its neighbours is not ground, except in "
+                  "the outermost zone; 0: no such check"});
     visitor(Parameter{"ground_elevation_1", self.ground_elevation[0], closed(-100, 100), "m",
                       "height over ground from which a patch of ring 1 must be flat (Patchwork)"});
     visitor(Parameter{"ground_elevation_2", self.ground_elevation[1], closed(-100, 100), "m",
-                      "the same for ring 2"});
+                      "height over ground from which a patch of ring 2 must be flat (Patchwork)"});
     visitor(Parameter{"ground_elevation_3", self.ground_elevation[2], closed(-100, 100), "m",
-                      "the same for ring 3"});
+                      "height over ground from which a patch of ring 3 must be flat (Patchwork)"});
     visitor(Parameter{"ground_elevation_4", self.ground_elevation[3], closed(-100, 100), "m",
-                      "the same for ring 4"});
+                      "height over ground from which a patch of ring 4 must be flat (Patchwork)"});
     visitor(Parameter{"ground_flatness_1", self.ground_flatness[0], closed(0, 1), "",
                       "flatness below which a high patch of ring 1 is ground (Patchwork)"});
     visitor(Parameter{"ground_flatness_2", self.ground_flatness[1], closed(0, 1), "",
-                      "the same for ring 2"});
+                      "flatness below which a high patch of ring 2 is ground (Patchwork)"});
     visitor(Parameter{"ground_flatness_3", self.ground_flatness[2], closed(0, 1), "",
-                      "the same for ring 3"});
+                      "flatness below which a high patch of ring 3 is ground (Patchwork)"});
     visitor(Parameter{"ground_flatness_4", self.ground_flatness[3], closed(0, 1), "",
-                      "the same for ring 4"});
+                      "flatness below which a high patch of ring 4 is ground (Patchwork)"});
   }
 
   /// Throws ConfigError.

@@ -1,4 +1,4 @@
-// A scan in the order of ground and the rest.
+// A scan whose ground points come first.
 #pragma once
 
 #include <cstddef>
@@ -6,18 +6,17 @@
 #include <vector>
 
 #include "dynains/points.hpp"
-#include "dynains/simd/capacity.hpp"
-#include "dynains/simd/lanes.hpp"
+#include "dynains/simd/pack.hpp"
 
 namespace dynains {
 
-/// One scan, reordered: ground points first, all others behind. What follows works on ranges of
-/// it, never on copies.
+/// One scan, reordered: ground points first, then all others. Later stages work on ranges of it and
+/// copy no points.
 struct GroundSplit {
-  PointBuffer points;                ///< may be longer than size(): padded for wide loads
-  std::vector<std::uint32_t> input;  ///< number of each point in the input of the remover
-  std::size_t ground_count = 0;
-  std::size_t count = 0;
+  PointBuffer points;                ///< m, sensor frame; longer than `count`, for packs
+  std::vector<std::uint32_t> input;  ///< index of each point in the input of the remover
+  std::size_t ground_count = 0;      ///< number of ground points
+  std::size_t count = 0;             ///< number of all points
 
   PointsView ground() const { return PointsView(points).subview(0, ground_count); }
   PointsView non_ground() const {

@@ -1,5 +1,5 @@
-// Points in cylindrical coordinates about the vertical axis of a sensor: what clustering and
-// descriptors work on.
+// Points in cylindrical coordinates about the z axis of a sensor frame, for clusters and
+// descriptors.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -7,10 +7,8 @@
 #include <vector>
 
 #include "dynains/points.hpp"
-#include "dynains/simd/arc_tangent.hpp"
-#include "dynains/simd/capacity.hpp"
-#include "dynains/simd/pack_transform.hpp"
-#include "dynains/simd/wide_lanes.hpp"
+#include "dynains/simd/pack_geometry.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains {
 
@@ -27,7 +25,7 @@ struct PolarView {
   }
 };
 
-/// Owner of polar points, reused from scan to scan; padded for wide loads and stores.
+/// Owns polar points and is reused from scan to scan. Arrays are longer than size(), for packs.
 class PolarBuffer {
  public:
   std::size_t size() const { return size_; }
@@ -43,8 +41,8 @@ class PolarBuffer {
     return {{range.data(), size_}, {azimuth.data(), size_}, {z.data(), size_}};
   }
 
-  /// Appends `points` moved by the rigid transform `T_target_source`, which is applied in floats:
-  /// multiply poses in double before.
+  /// Appends `points` (m, source frame), transformed to the target frame in floats. Multiply poses
+  /// in double before.
   void append(PointsView points, const Eigen::Isometry3f& T_target_source) {
     const std::size_t begin = size_;
     resize(begin + points.size());
