@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "dynains/ground/plane_fit.hpp"
+#include "dynains/sensor/plane_fit.hpp"
 #include "dynains/simd/wide_lanes.hpp"
 
 namespace dynains::detail {

@@ -7,9 +7,9 @@
 #include <limits>
 
 #include "dynains/ground/half_space.hpp"
-#include "dynains/ground/plane_fit.hpp"
 #include "dynains/ground/point_record.hpp"
 #include "dynains/points.hpp"
+#include "dynains/sensor/plane_fit.hpp"
 #include "dynains/simd/wide_lanes.hpp"
 
 namespace dynains::detail {

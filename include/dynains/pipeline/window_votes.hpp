@@ -8,11 +8,10 @@
 #include <cstring>
 #include <vector>
 
-#include "dynains/cause.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/capacity.hpp"
 #include "dynains/stage/cluster_set.hpp"
-#include "dynains/stage/evidence_verdict.hpp"
+#include "dynains/verdict.hpp"
 
 namespace dynains::detail {
 
