@@ -3,19 +3,13 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
+#include "dynains/stage/log_odds.hpp"
 
 namespace dynains {
-
-/// l(p) = log(p / (1 - p)), the log-odds of a probability in (0, 1).
-inline double log_odds(double probability) { return std::log(probability / (1.0 - probability)); }
-
-/// Inverse of log_odds (below Eq. 19).
-inline double probability(double log_odds) { return 1.0 / (1.0 + std::exp(-log_odds)); }
 
 /// Binary Bayes filter over the observations of one cluster. Sees heights only, never points.
 class BeliefUpdater {

@@ -7,10 +7,9 @@
 #include <optional>
 #include <vector>
 
-#include "dynains/basic_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/pipeline/pipeline.hpp"
-#include "dynains/pipeline/warm_up.hpp"
+#include "dynains/remover.hpp"
 
 namespace dynains {
 

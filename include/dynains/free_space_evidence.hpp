@@ -10,8 +10,6 @@
 #include <cstdlib>
 #include <vector>
 
-#include "dynains/belief_updater.hpp"
-#include "dynains/cause.hpp"
 #include "dynains/evidence/dynamic_occupancy_grid.hpp"
 #include "dynains/evidence/instance_beliefs.hpp"
 #include "dynains/evidence/instance_judge.hpp"
@@ -21,9 +19,9 @@
 #include "dynains/evidence/reference_scans.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor/sensor_model.hpp"
-#include "dynains/stage/evidence_verdict.hpp"
 #include "dynains/stage/free_space_config.hpp"
 #include "dynains/stage/ground_split.hpp"
+#include "dynains/verdict.hpp"
 
 namespace dynains {
 

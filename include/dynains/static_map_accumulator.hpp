@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "dynains/map/block_table.hpp"
-#include "dynains/map/chunked_vector.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/bits.hpp"

@@ -1,15 +1,82 @@
-// The answer of the remover to one scan.
+// Verdicts on points with their causes, and the answer of the remover to one scan.
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
-#include "dynains/cause.hpp"
 #include "dynains/points.hpp"
-#include "dynains/stage/stage_times.hpp"
 
 namespace dynains {
+
+/// Cause of the verdict on one point. `dynains run` writes these numbers to the files
+/// OUT/causes/NNNNNN.cause (one uint8 per input point, in input order): new causes go to the end.
+enum class Cause : std::uint8_t {
+  kUnknown = 0,
+  kGround = 1,        ///< static: ground
+  kSimilar = 2,       ///< static: similarity of occupancy not below tau_s (Eq. 12)
+  kReverted = 3,      ///< static: proposed as dynamic, reverted by belief (Eq. 19) or too few votes
+  kTooFewPoints = 4,  ///< static: cluster too small (not used by this pipeline)
+  kTooFewScans = 5,   ///< static: cluster not in both the oldest and the newest scan (Eq. 11)
+  kNotJudged = 6,     ///< invalid, out of range, or static without a cluster
+  kProposed = 7,      ///< dynamic: proposed by occupancy and not reverted (Eq. 19)
+  kFreeSpace = 8,     ///< dynamic: another scan saw its place free
+  kWithInstance = 9,  ///< dynamic: other scans saw a part of its instance free
+  kUnderInstance = 10,     ///< dynamic: ground point below a removed instance
+  kNoEvidence = 11,        ///< static: no other scan saw its place
+  kAlongTrack = 12,        ///< dynamic: its instance moved in other scans
+  kPresumed = 13,          ///< dynamic, for the time being: no earlier scan saw its place
+  kOccupied = 14,          ///< static: other scans saw its place occupied
+  kTooLittleFree = 15,     ///< static: too few scans saw its place free, or too little of it
+  kDynamicOccupancy = 16,  ///< dynamic: nearly all other points in its place moved
+};
+
+inline constexpr std::size_t kCauseCount = 17;
+
+/// Whether a point with this cause is removed.
+constexpr bool is_dynamic(Cause cause) {
+  constexpr auto bit = [](Cause c) { return 1U << static_cast<unsigned>(c); };
+  constexpr unsigned kDynamic = bit(Cause::kProposed) | bit(Cause::kFreeSpace) |
+                                bit(Cause::kWithInstance) | bit(Cause::kUnderInstance) |
+                                bit(Cause::kAlongTrack) | bit(Cause::kPresumed) |
+                                bit(Cause::kDynamicOccupancy);
+  return (kDynamic >> static_cast<unsigned>(cause) & 1U) != 0;
+}
+
+/// Milliseconds per stage of one call.
+struct StageTimes {
+  double ingest = 0.0;      ///< copy of the cloud, labels of bad points
+  double ground = 0.0;      ///< ground segmentation
+  double window = 0.0;      ///< Eq. 3
+  double cluster = 0.0;     ///< curved voxels and separation by scan, Eq. 4
+  double descriptor = 0.0;  ///< Eq. 5-12 and, for proposals, the belief of Eq. 13-19
+  double evidence = 0.0;    ///< free space seen by other scans
+  double judge = 0.0;       ///< verdicts from that, also on ground; images of references
+  double verdict = 0.0;     ///< from clusters and groups to points
+  double map = 0.0;         ///< Eq. 1
+  double revision = 0.0;    ///< revision of the map by the newest scan
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& visitor) {
+    visitor("ingest", self.ingest);
+    visitor("ground", self.ground);
+    visitor("window", self.window);
+    visitor("cluster", self.cluster);
+    visitor("descriptor", self.descriptor);
+    visitor("evidence", self.evidence);
+    visitor("judge", self.judge);
+    visitor("verdict", self.verdict);
+    visitor("map", self.map);
+    visitor("revision", self.revision);
+  }
+
+  double total() const {
+    double result = 0.0;
+    visit(*this, [&result](const char*, double milliseconds) { result += milliseconds; });
+    return result;
+  }
+};
 
 /// Verdict on every point of one scan, in input order. The spans are valid until the next call of
 /// the remover.
@@ -33,6 +100,27 @@ struct FrameResult {
   ScanVerdict newest;
   std::optional<ScanVerdict> finished;  ///< verdict on an earlier scan that is final now
   StageTimes times;
+};
+
+/// Non-ground points share the verdict of their group; groups are the same in every verdict on a
+/// scan. Ground points are static unless they are listed.
+struct EvidenceVerdict {
+  struct Group {
+    Cause cause = Cause::kNotJudged;  ///< see is_dynamic()
+    float belief = 0.0F;              ///< probability of being dynamic
+
+    friend bool operator==(const Group& a, const Group& b) {
+      return a.cause == b.cause && a.belief == b.belief;
+    }
+  };
+  struct GroundPoint {
+    std::uint32_t point;  ///< number in the ground of the split
+    Group verdict;
+  };
+
+  Span<const Group> groups;
+  Span<const std::uint32_t> group_of;  ///< by non-ground point, in the order of the split
+  Span<const GroundPoint> ground;      ///< dynamic ground points, each at most once
 };
 
 }  // namespace dynains

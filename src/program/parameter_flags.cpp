@@ -9,7 +9,7 @@
 #include <sstream>
 #include <system_error>
 
-#include "dynains/renamed_parameters.hpp"
+#include "dynains/parameters.hpp"
 
 namespace dynains::program {
 namespace {

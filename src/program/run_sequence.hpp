@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "dynains/io/recording.hpp"
-#include "dynains/stage/stage_times.hpp"
 #include "dynains/verdict.hpp"
 #include "naming_scan.hpp"
 #include "points_of.hpp"

@@ -7,7 +7,7 @@
 
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/remover.hpp"
-#include "dynains/stage/stage_times.hpp"
+#include "dynains/verdict.hpp"
 #include "labelled_sequence.hpp"
 
 namespace dynains::program {

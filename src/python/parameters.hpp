@@ -12,7 +12,6 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/parameters.hpp"
-#include "dynains/renamed_parameters.hpp"
 
 namespace dynains::python {
 

@@ -182,7 +182,7 @@ void bind_remover(py::module_& module) {
                     "(N,) float32, probability of being dynamic; 0 if never proposed.")
       .def_readonly("causes", &Verdict::causes,
                     "(N,) uint8, why the label is what it is; the numbers are those of "
-                    "dynains/cause.hpp.");
+                    "dynains/verdict.hpp.");
 
   py::class_<Frame>(module, "FrameResult", "Answer to one scan.")
       .def_readonly("newest", &Frame::newest,

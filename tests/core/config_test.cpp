@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "dynains/parameters.hpp"
 #include "dynains/remover.hpp"
-#include "dynains/renamed_parameters.hpp"
 #include "support/catch.hpp"
 
 namespace dynains::test {

@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "dynains/evidence/ground_footprint.hpp"
-#include "dynains/evidence/instance_hull.hpp"
+#include "dynains/evidence/instance_judge.hpp"
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/instance_tracks.hpp"
+#include "dynains/evidence/moved_ground.hpp"
 #include "dynains/evidence/reference_scans.hpp"
-#include "dynains/evidence/supervoxel_groups.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"

@@ -12,7 +12,6 @@
 #include <utility>
 #include <vector>
 
-#include "dynains/evidence/smallest_k.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 

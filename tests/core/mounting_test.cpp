@@ -10,7 +10,6 @@
 
 #include "dynains/io/kitti.hpp"
 #include "dynains/remover.hpp"
-#include "dynains/sensor/level_frame.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"

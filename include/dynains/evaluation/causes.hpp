@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "dynains/cause.hpp"
+#include "dynains/verdict.hpp"
 
 namespace dynains::evaluation {
 

@@ -8,11 +8,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/cause.hpp"
 #include "dynains/evidence/instance_samples.hpp"
-#include "dynains/stage/evidence_verdict.hpp"
 #include "dynains/stage/free_space_config.hpp"
-#include "dynains/voxel/voxel_key.hpp"
+#include "dynains/stage/voxel_hash_table.hpp"
+#include "dynains/verdict.hpp"
 
 namespace dynains {
 

@@ -11,7 +11,7 @@
 
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/points.hpp"
-#include "dynains/voxel/voxel_key.hpp"
+#include "dynains/stage/voxel_hash_table.hpp"
 
 namespace dynains {
 

@@ -8,8 +8,8 @@
 #include <limits>
 #include <vector>
 
-#include "dynains/ground/plane_fit.hpp"
 #include "dynains/points.hpp"
+#include "dynains/sensor/plane_fit.hpp"
 
 namespace dynains {
 

@@ -6,9 +6,9 @@
 #include <cstddef>
 #include <limits>
 
-#include "dynains/ground/plane_fit.hpp"
 #include "dynains/ground/point_record.hpp"
 #include "dynains/points.hpp"
+#include "dynains/sensor/plane_fit.hpp"
 #include "dynains/simd/pack_loops.hpp"
 
 namespace dynains::detail {

@@ -12,7 +12,7 @@
 #include "dynains/io/folder_lock.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
-#include "dynains/voxel/voxel_hash_table.hpp"
+#include "dynains/stage/voxel_hash_table.hpp"
 
 namespace dynains {
 

@@ -9,45 +9,13 @@
 #include <unordered_map>
 #include <vector>
 
-#include "dynains/belief_updater.hpp"
-#include "dynains/evidence/free_space_sum.hpp"
-#include "dynains/map/chunked_vector.hpp"
-#include "dynains/parameters.hpp"
+#include "dynains/map/block_table.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/pack_loops.hpp"
+#include "dynains/stage/free_space_config.hpp"
+#include "dynains/stage/log_odds.hpp"
 
 namespace dynains {
-
-/// Goes beyond the paper: a car that parks for longer than lookahead_scans enters the map; beams of
-/// later scans pass its place after it left.
-struct MapRevisionConfig {
-  bool revise_map = false;
-  double revision_range = 60;   ///< m
-  int revision_period = 4;      ///< scans
-  double revision_free = 0.7;   ///< form of Eq. 18
-  double revision_hit = 0.155;  ///< form of Eq. 18
-  double tau_revise = 0.95;     ///< form of Eq. 19
-
-  template <class Self, class Visitor>
-  static void visit(Self& self, Visitor&& visitor) {
-    visitor(Parameter{"revise_map", self.revise_map, Bounds(), "",
-                      "remove blocks of the static map that later scans find free; needs decision "
-                      "free_space or both, and a map in memory"});
-    visitor(Parameter{"revision_range", self.revision_range, closed(5, 300), "m",
-                      "blocks of the map at a larger horizontal range are not tested"});
-    visitor(Parameter{"revision_period", self.revision_period, closed(1, 100), "scans",
-                      "time between two tests of a block; not below reference_step"});
-    visitor(Parameter{"revision_free", self.revision_free, open(0.5, 1), "",
-                      "update probability of a scan whose beams pass a block (form of Eq. 18)"});
-    visitor(Parameter{"revision_hit", self.revision_hit, open(0, 0.5), "",
-                      "update probability of a scan whose beams hit a block (form of Eq. 18)"});
-    visitor(Parameter{"tau_revise", self.tau_revise, open(0.5, 1), "",
-                      "belief from which a block is removed (form of Eq. 19)"});
-  }
-
-  /// Throws ConfigError.
-  void validate() const { validate_parameters("MapRevision", *this); }
-};
 
 /// Tests the blocks of a map around the sensor against the newest reference, each block once per
 /// period, and sums log-odds that it is free: Eq. 15 with the three increments of Eq. 18, never

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "dynains/ground/point_record.hpp"
-#include "dynains/pipeline/cloud_view.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/pack_geometry.hpp"

@@ -7,13 +7,12 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/cause.hpp"
 #include "dynains/curved_voxel_clusterer.hpp"
-#include "dynains/pipeline/scan_slot.hpp"
+#include "dynains/pipeline/scan_ring.hpp"
 #include "dynains/pipeline/window_votes.hpp"
 #include "dynains/points.hpp"
 #include "dynains/stage/cluster_set.hpp"
-#include "dynains/stage/evidence_verdict.hpp"
+#include "dynains/verdict.hpp"
 
 namespace dynains::detail {
 

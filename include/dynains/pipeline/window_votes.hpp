@@ -8,10 +8,9 @@
 #include <cstring>
 #include <vector>
 
-#include "dynains/cause.hpp"
 #include "dynains/points.hpp"
 #include "dynains/stage/cluster_set.hpp"
-#include "dynains/stage/evidence_verdict.hpp"
+#include "dynains/verdict.hpp"
 
 namespace dynains::detail {
 

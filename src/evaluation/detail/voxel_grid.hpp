@@ -9,8 +9,7 @@
 #include <string>
 
 #include "dynains/errors.hpp"
-#include "dynains/voxel/voxel_hash_table.hpp"
-#include "dynains/voxel/voxel_key.hpp"
+#include "dynains/stage/voxel_hash_table.hpp"
 
 namespace dynains::evaluation::detail {
 

@@ -1,9 +1,18 @@
-// Log-odds that a place was free.
+// Log-odds of probabilities, and their sum over the scans that test a place.
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
-#include "dynains/belief_updater.hpp"
+namespace dynains {
+
+/// l(p) = log(p / (1 - p)), the log-odds of a probability in (0, 1).
+inline double log_odds(double probability) { return std::log(probability / (1.0 - probability)); }
+
+/// Inverse of log_odds (below Eq. 19).
+inline double probability(double log_odds) { return 1.0 / (1.0 + std::exp(-log_odds)); }
+
+}  // namespace dynains
 
 namespace dynains::detail {
 

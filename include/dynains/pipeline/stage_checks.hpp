@@ -1,4 +1,4 @@
-// Compile-time contracts of the stages: a stage that does not fit fails with one readable line.
+// Compile-time checks of stages: a stage that does not fit fails with one readable line.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -8,14 +8,13 @@
 #include <utility>
 #include <vector>
 
-#include "dynains/cause.hpp"
+#include "dynains/config.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/stage/cluster_set.hpp"
-#include "dynains/stage/evidence_verdict.hpp"
 #include "dynains/stage/ground_split.hpp"
 #include "dynains/stage/polar_points.hpp"
-#include "dynains/stage/stage_configs.hpp"
+#include "dynains/verdict.hpp"
 
 namespace dynains::detail {
 

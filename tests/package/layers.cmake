@@ -1,0 +1,58 @@
+# Refuses includes that lead upwards in the table of folders in docs/design.md. Headers of one line of
+# the list below form a layer; a header includes headers of the layers above its own in the list, and
+# of its own folder.
+set(layers
+  "^(simd/.*|errors|points|pose|parameters|verdict|point_cloud_traits|version)\\.hpp$"
+  "^sensor/"
+  "^stage/"
+  "^(ground|evidence|map)/"
+  "^(ground_segmenter|curved_voxel_clusterer|occupancy_descriptor)\\.hpp$|^(belief_updater|free_space_evidence|static_map_accumulator)\\.hpp$|^config\\.hpp$"
+  "^pipeline/"
+  "^(remover|dyna_ins_remover)\\.hpp$"
+  "^(adapters|io|evaluation|simulation)/")
+
+# Number of the layer of a header, from 0.
+function(find_layer header result)
+  set(number 0)
+  foreach(layer IN LISTS layers)
+    if(header MATCHES "${layer}")
+      set(${result} ${number} PARENT_SCOPE)
+      return()
+    endif()
+    math(EXPR number "${number} + 1")
+  endforeach()
+  message(FATAL_ERROR "${header} belongs to no layer; add it to ${CMAKE_CURRENT_LIST_FILE} and "
+                      "docs/design.md")
+endfunction()
+
+set(basic_layer 0)
+set(facade_layer 6)
+set(upward "")
+file(GLOB_RECURSE headers RELATIVE ${INCLUDE_DIR}/dynains ${INCLUDE_DIR}/dynains/*.hpp)
+foreach(header IN LISTS headers)
+  find_layer(${header} layer)
+  get_filename_component(folder ${header} DIRECTORY)
+  file(STRINGS ${INCLUDE_DIR}/dynains/${header} includes REGEX "^#include \"dynains/")
+  foreach(include IN LISTS includes)
+    string(REGEX REPLACE "^#include \"dynains/(.*)\"" "\\1" included ${include})
+    find_layer(${included} included_layer)
+    get_filename_component(included_folder ${included} DIRECTORY)
+    # A stage includes no other stage.
+    if(included_layer LESS layer OR
+       (included_layer EQUAL layer AND
+        (layer EQUAL basic_layer OR layer EQUAL facade_layer OR
+         (folder AND folder STREQUAL included_folder))))
+      continue()
+    endif()
+    list(APPEND upward "${header} includes ${included}")
+  endforeach()
+endforeach()
+
+list(LENGTH headers count)
+if(count EQUAL 0)
+  message(FATAL_ERROR "no headers found")
+elseif(upward)
+  string(REPLACE ";" "\n  " upward "${upward}")
+  message(FATAL_ERROR "upward includes:\n  ${upward}")
+endif()
+message("${count} headers include no header of a higher layer")
