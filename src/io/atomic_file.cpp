@@ -123,7 +123,7 @@ LockState lock_state_of(const fs::path& path) {
 
 }  // namespace
 
-/// std::filebuf hides why a write failed and cannot sync; this one knows its descriptor.
+/// A stream buffer with the error of a failed write and with sync, which std::filebuf has not.
 class AtomicFile::Buffer : public std::streambuf {
  public:
   explicit Buffer(int descriptor) : descriptor_(descriptor), bytes_(std::size_t{1} << 16) {

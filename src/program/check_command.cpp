@@ -40,7 +40,7 @@ std::string text_of(const Mounting& mounting) {
   return text;
 }
 
-/// Sentences on what may trouble a run, poses apart.
+/// Prints possible problems of a run other than poses.
 void print_remarks(const Diagnosis& d) {
   if (d.invalid_share > 0.5) {
     std::cout << "note: more than half of the points are NaN, infinite or zero\n";

@@ -1,4 +1,4 @@
-// Scans without what moves, in the form of the recording they come from.
+// Scans without dynamic points, in the format of their recording.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@ class CleanWriter {
   /// Creates the folder. The recording outlives this. Throws IoError.
   CleanWriter(std::filesystem::path folder, const Recording& recording);
 
-  /// Of the file of scan i.
+  /// File name of scan i.
   static std::string name(const Recording& recording, std::size_t i);
 
   /// Writes scan i of the recording: all finite points that are not dynamic, in their order, with

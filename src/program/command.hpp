@@ -1,13 +1,13 @@
-// What a subcommand is: one function that adds it to the program.
+// Subcommands: each has one function that adds it to the program.
 #pragma once
 
 #include <CLI/CLI.hpp>
 
 namespace dynains::program {
 
-// Each adds a subcommand whose callback does the work and throws what goes wrong: ConfigError for
-// wrong flags, UsageError for a folder that is in use, anything else for failures, Interrupted
-// after a signal. main() prints.
+// The callback of a subcommand does the work. It throws ConfigError for wrong flags, UsageError for
+// a folder in use, Interrupted after a signal, and other exceptions for failures. main() prints
+// them.
 void add_run_command(CLI::App& app);
 void add_check_command(CLI::App& app);
 void add_config_command(CLI::App& app);
@@ -18,10 +18,10 @@ void add_statistics_command(CLI::App& app);
 inline constexpr int kExitFailure = 1;
 inline constexpr int kExitUsage = 2;
 
-/// What a command looked for is not in order; it has said so itself.
+/// The checked recording has a defect, which the command has printed.
 struct Finding {};
 
-/// A signal ended the work early; what was finished is written.
+/// A signal ended the work early; finished results are written.
 struct Interrupted {
   int signal;
 };

@@ -11,7 +11,7 @@
 
 namespace dynains::program {
 
-/// Adds itself to a command and gives, after parsing, what to evaluate with.
+/// Flags of an evaluating command, and the settings that they give after parsing.
 class EvaluationOptions {
  public:
   /// `unlabeled`: the command's default for points without a class, "ignore" or "static".

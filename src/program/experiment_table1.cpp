@@ -47,8 +47,8 @@ struct Task {
   ScanWindow window;
 };
 
-/// The published windows of whatever sequences of SemanticKITTI lie below `root`; if there are
-/// none, `root` is the sequence.
+/// The published windows of the SemanticKITTI sequences below `root`; if there are none, `root` is
+/// the sequence.
 std::vector<Task> find_tasks(const fs::path& root, const ScanWindow& window) {
   std::vector<Task> tasks;
   for (const PublishedWindow& published : kPublishedWindows) {

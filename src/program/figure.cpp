@@ -26,7 +26,7 @@ double height_quantile(const VerdictCloud& cloud, double share) {
   return heights[static_cast<std::size_t>(rank)];
 }
 
-/// Errors are drawn last, over what they are errors of.
+/// Errors are drawn last, over correct points.
 std::size_t layer_of(Fate fate, Content content) {
   if (content == Content::kRaw) return is_dynamic(fate) ? 1 : 0;
   return static_cast<std::size_t>(fate);
@@ -48,7 +48,7 @@ void draw_layers(const VerdictCloud& cloud, Content content, Picture& picture, S
   }
 }
 
-/// Horizontal, along the path; a sensor that stands looks towards what moves.
+/// Horizontal direction of the path; towards dynamic points if the sensor stands.
 Eigen::Vector3d viewing_direction(const VerdictCloud& cloud) {
   Eigen::Vector3d forward = cloud.path().back() - cloud.path().front();
   forward.z() = 0;

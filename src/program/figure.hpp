@@ -17,11 +17,11 @@ bool is_shown(Fate fate, Content content);
 
 Colour colour_of(Fate fate, Content content);
 
-/// Seen from above, world x to the right and y up, the longer side `pixels` long.
+/// View from above: world x to the right, y up, the longer side `pixels` long.
 Picture draw_from_above(const VerdictCloud& cloud, Content content, int pixels);
 
-/// Seen from behind and above the start of the path, in its direction (towards what moves, if the
-/// sensor stands); 16:9, `pixels` wide.
+/// View from behind and above the start of the path, in its direction (towards dynamic points if
+/// the sensor stands); 16:9, `pixels` wide.
 Picture draw_perspective(const VerdictCloud& cloud, Content content, int pixels);
 
 }  // namespace dynains::program

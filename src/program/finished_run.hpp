@@ -1,4 +1,4 @@
-// Runs whose results are incomplete are not judged by accident.
+// Checks that the results of a run are complete.
 #pragma once
 
 #include <filesystem>
@@ -9,7 +9,8 @@ namespace dynains::program {
 /// cannot be read as JSON. Folders of other tools, and folders without report.json, pass.
 void check_run_is_finished(const std::filesystem::path& folder);
 
-/// The same for the folder of a map file, if its report names that file as the map of the run.
+/// As check_run_is_finished(), for the folder of a map file if its report names that file as the
+/// map of the run.
 void check_map_is_finished(const std::filesystem::path& map);
 
 }  // namespace dynains::program

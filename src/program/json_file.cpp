@@ -43,7 +43,7 @@ void check_depth(const fs::path& path, std::string_view text) {
   }
 }
 
-/// The part of the JSON library's message that tells what was found and what was expected.
+/// The part of the JSON library's message with the found and the expected content.
 std::string reason_of(const nlohmann::json::exception& error) {
   const std::string what = error.what();
   const std::size_t reason = what.find("syntax error");

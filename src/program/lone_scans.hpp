@@ -11,8 +11,8 @@
 
 namespace dynains::program {
 
-/// What to tell a user if most of the scans `first` to `last` (inclusive) begin a new window: too
-/// much time or way lies before them.
+/// A remark for the user if most of the scans `first` to `last` (inclusive) begin a new window,
+/// because the time or distance from the scan before is too large.
 inline std::optional<std::string> remark_on_lone_scans(const Recording& recording,
                                                        std::size_t first, std::size_t last,
                                                        const RemoverConfig& config) {

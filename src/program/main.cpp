@@ -19,8 +19,8 @@ namespace {
 
 using namespace dynains::program;
 
-// A file that is opened later must never get the number of a standard stream: what is printed would
-// go into it.
+// A file that is opened later must never get the number of a standard stream: printed text would go
+// into the file.
 void open_standard_streams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     // The lowest free number, which is that of the stream.
@@ -29,8 +29,7 @@ void open_standard_streams() {
   }
 }
 
-// Whether standard output is a pipe that nobody reads any more, as behind `head`: that is no
-// failure.
+// Whether standard output is a pipe whose reader has ended, such as `head`. This is no failure.
 bool reader_has_left() {
   pollfd output{STDOUT_FILENO, POLLOUT, 0};
   return ::poll(&output, 1, 0) > 0 && (output.revents & POLLERR) != 0;

@@ -9,7 +9,7 @@
 
 namespace dynains::program {
 
-/// What `work()` returns. A PoseError names scan i then.
+/// Returns `work()`. A PoseError from it gets the name of scan i.
 template <class Work>
 decltype(auto) naming_scan(const Recording& recording, std::size_t i, Work&& work) {
   try {

@@ -37,7 +37,7 @@ class OutputFolder {
   const OutputKind& kind() const { return kind_; }
 
   bool has_results() const { return !marker_.is_null(); }
-  /// Of the earlier results; null if there are none.
+  /// Marker of the earlier results; null if there are none.
   const nlohmann::ordered_json& marker() const { return marker_; }
   const OutputListing& listing() const { return listing_; }
   /// Whether the marker has `"complete": true`.
@@ -55,9 +55,9 @@ class OutputFolder {
   /// Removes listed files and temporaries of them, and folders that are empty then. The marker
   /// stays.
   void remove_results() const;
-  /// The same for one folder of the listing.
+  /// As remove_results(), for one folder of the listing.
   void remove_folder_results(const std::string& name) const;
-  /// Removes what killed processes left of listed files.
+  /// Removes temporaries of listed files that killed processes left.
   void remove_temporaries() const;
   /// Moves all listed files to `target`, over files of their names.
   void move_results(const Folder& target) const;
@@ -97,7 +97,7 @@ class OutputChange {
   OutputChange(const OutputChange&) = delete;
   OutputChange& operator=(const OutputChange&) = delete;
 
-  /// Where the results are to be written.
+  /// The folder to write results into.
   const std::filesystem::path& folder() const;
   bool is_staged() const { return mode_ == Mode::kStaged; }
 

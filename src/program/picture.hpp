@@ -24,7 +24,7 @@ class Picture {
   int width() const { return width_; }
   int height() const { return height_; }
 
-  /// Points drawn from now on cover all that was drawn before, whatever their depth.
+  /// Points drawn after this cover all points drawn before, at any depth.
   void begin_layer();
 
   /// Square of 2 * radius + 1 pixels about a position in pixels from the upper left corner, clipped

@@ -1,4 +1,4 @@
-// Text that a terminal shows as it is, whatever file names it holds.
+// Text without control characters, so that file names in it cannot steer a terminal.
 #pragma once
 
 #include <ostream>

@@ -10,7 +10,7 @@ namespace dynains::program {
 /// On standard error: a bar if it is a terminal, else a plain line for each tenth of the work.
 class Progress {
  public:
-  /// `unit`: what is counted, for example "scans".
+  /// `unit`: name of the counted items, for example "scans".
   Progress(std::size_t total, std::string unit, bool quiet);
   ~Progress();
   Progress(const Progress&) = delete;

@@ -1,4 +1,4 @@
-// Table I of the paper: what it measured and quotes on SemanticKITTI.
+// Table I of the paper: its own and quoted scores on SemanticKITTI.
 #pragma once
 
 #include <array>

@@ -9,7 +9,7 @@
 
 namespace dynains::program {
 
-/// The argument SEQ and the flags that say what its files mean.
+/// The argument SEQ and the flags that describe its files.
 class RecordingFlags {
  public:
   /// `what` starts the help of the argument, for example "labelled sequence".

@@ -45,7 +45,7 @@ void check_scans(const Recording& sequence, const ScanRange& range) {
   }
 }
 
-/// Where the map goes; empty if there is none. Throws ConfigError.
+/// Path of the map; empty if there is none. Throws ConfigError.
 fs::path choose_map(const RunOptions& options, const DynaInsRemover::Config& config) {
   const fs::path out = whole_path(options.out);
   if (options.map.empty()) return config.build_map ? out / "static_map.ply" : fs::path();

@@ -54,7 +54,7 @@ struct RunPlan {
 /// PoseError.
 RunPlan make_plan(const RunOptions& options);
 
-/// What is to be done with a folder of results.
+/// Treatment of a folder of results.
 enum class RunTask { kNothing, kWrite, kReplace };
 
 /// kNothing if the folder holds the complete results of this run already, and --resume is given;

@@ -41,7 +41,7 @@ struct RunDescription {
 nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& results,
                                    const RunTiming& timing);
 
-/// What stands in the place of the report while the run is not finished.
+/// The report of a run that is not finished.
 nlohmann::ordered_json unfinished_report(const std::string& map);
 
 /// Text of a report, as in the file.

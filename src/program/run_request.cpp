@@ -50,7 +50,7 @@ std::string differences(const Json& earlier, const Json& now) {
     if (++count > kShown) return;
     const std::string name = path.substr(path.rfind('/') + 1);
     if (count > 1) text += ", ";
-    // A fingerprint tells nobody anything.
+    // The values are fingerprints, which a reader cannot interpret.
     text += name == kPosesAndTimes ? "poses or times differ" : name + " was " + was + ", is " + is;
   };
   for (const auto& [path, value] : after.items()) {

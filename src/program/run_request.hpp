@@ -1,4 +1,4 @@
-// What the results of a run follow from, so that another run can tell whether they are its own.
+// Everything that determines the results of a run, so that `--resume` can compare two runs.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -11,8 +11,8 @@
 namespace dynains::program {
 
 /// Version, configuration, outputs, the frame of the points, and a fingerprint of names, poses and
-/// times of the scans; their points are not read. A map on the disk takes its points in another
-/// order than one in memory, whatever its budget.
+/// times of the scans; their points are not read. A map on the disk has another order of points
+/// than a map in memory, independent of its budget.
 nlohmann::ordered_json describe_request(const Recording& recording, const ScanRange& range,
                                         const RunOutputs& outputs,
                                         const nlohmann::ordered_json& configuration);

@@ -41,9 +41,8 @@ double reserve_memory(Remover& remover, const Recording& recording, const ScanRa
   return ms_since(begin);
 }
 
-/// Pushes the scans of `range` and hands every verdict to `results`; at the end the open ones and
-/// the map too. `keep_going(done)` is asked after each scan; if it says no, the scans so far are
-/// finished as if the sequence ended there.
+/// Pushes the scans of `range` and passes every verdict, and at the end the map, to `results`.
+/// Calls `keep_going(done)` after each scan; if it returns false, the sequence ends there.
 template <class Remover, class KeepGoing>
 RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanRange& range,
                        RunResults& results, KeepGoing&& keep_going) {

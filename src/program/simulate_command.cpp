@@ -62,7 +62,7 @@ OutputListing listing_of(const simulation::Simulator& simulator) {
   return listing;
 }
 
-/// What makes the same sequence again.
+/// Everything that is needed to make this sequence again.
 nlohmann::ordered_json describe(const SimulateOptions& options, const simulation::Config& config,
                                 bool complete) {
   nlohmann::ordered_json json = {{"program", "dynains"},

@@ -17,7 +17,7 @@ struct Variant {
   DynaInsRemover::Config config;
 };
 
-/// What the variants said, kept in memory: one byte per point.
+/// Verdicts of all variants, in memory: one byte per point.
 struct VariantVerdicts {
   /// Per scan of the window and point: bit v is set if variant v keeps the point.
   std::vector<std::vector<std::uint8_t>> in_map;

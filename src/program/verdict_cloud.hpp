@@ -1,4 +1,4 @@
-// All judged points of a sequence, thinned, with what became of them.
+// All judged points of a sequence, thinned, with their fates.
 #pragma once
 
 #include <Eigen/Core>
@@ -43,8 +43,8 @@ class VerdictCloud {
   /// Adds the points of a scan as estimate 0 judges them.
   void add(const evaluation::LabelledScan& scan);
 
-  /// After the last scan: drops what the map shows all the same, namely lost static points where
-  /// other scans kept some, and removed dynamic points where others were missed.
+  /// After the last scan: drops lost static points where other scans kept some, and removed dynamic
+  /// points where others were missed, because the map does not show them.
   void drop_covered();
 
   /// Position of the first sensor in the world, m.

@@ -53,7 +53,7 @@ inline void expect_rows_of_points(const std::string& what, const py::array& arra
 }
 
 /// Calls `use` with a view of an (N, 3 or more) array of float32 or float64. Throws CloudError for
-/// another shape, TypeError for what is another type or no array.
+/// another shape, TypeError for another type.
 template <class Use>
 auto with_points(const py::object& points, Use&& use) {
   if (!py::isinstance<py::array>(points)) {
@@ -78,8 +78,8 @@ auto with_points(const py::object& points, Use&& use) {
 
 using PoseArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-/// Throws PoseError unless `pose` is a 4 x 4 rigid transform, TypeError if it is no array of
-/// numbers nor what NumPy makes one of.
+/// Throws PoseError unless `pose` is a 4 x 4 rigid transform, TypeError if NumPy cannot convert it
+/// to an array of numbers.
 inline Eigen::Isometry3d to_pose(const py::handle& pose) {
   const PoseArray array = PoseArray::ensure(pose);
   if (!array) throw py::type_error("a pose is " + type_text(pose) + ", expected (4, 4) numbers");

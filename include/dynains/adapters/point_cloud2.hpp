@@ -26,7 +26,7 @@ namespace dynains {
 class PointCloud2View {
  public:
   /// Throws CloudError if a coordinate is missing or of another type, or if the layout does not
-  /// fit the data; the text says which and what was found.
+  /// fit the data; the message names the field and the found value.
   template <class Message>
   explicit PointCloud2View(const Message& message)
       : data_(reinterpret_cast<const unsigned char*>(message.data.data())),

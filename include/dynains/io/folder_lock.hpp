@@ -10,8 +10,8 @@ namespace dynains {
 /// each other.
 ///
 /// The lock lies on the folder itself (flock): it leaves no file behind, and ends with the process,
-/// whatever ends that. File systems that cannot lock folders, as some of those behind a network,
-/// give every lock at once.
+/// in any way. File systems that cannot lock folders, such as some network file systems, grant
+/// every lock.
 class FolderLock {
  public:
   enum class Mode { kExclusive, kShared };

@@ -1,4 +1,4 @@
-// Recorded scans with their poses, whatever form they have on the disk.
+// Recorded scans with their poses, in any supported format.
 #pragma once
 
 #include <Eigen/Geometry>
