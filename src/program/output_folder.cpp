@@ -1,5 +1,7 @@
 #include "output_folder.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <map>
 #include <optional>
@@ -35,6 +37,19 @@ std::optional<Folder> find_folder(const Folder& parent, const std::string& name)
   return Folder(parent, name);
 }
 
+/// Creates a folder and those above it. Returns the created ones, innermost first.
+std::vector<fs::path> create_missing_folders(const fs::path& folder) {
+  std::vector<fs::path> missing;
+  std::error_code ignored;
+  fs::path path = whole_path(folder);
+  while (path.has_relative_path() && !fs::exists(path, ignored)) {
+    missing.push_back(path);
+    path = path.parent_path();
+  }
+  create_folder(folder);
+  return missing;
+}
+
 }  // namespace
 
 fs::path whole_path(const fs::path& path) {
@@ -46,6 +61,13 @@ void create_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw IoError(folder.string() + ": cannot be created: " + error.message());
+}
+
+LockedFolder::LockedFolder(const fs::path& folder)
+    : created_(create_missing_folders(folder)), lock_(folder) {}
+
+LockedFolder::~LockedFolder() {
+  for (const fs::path& folder : created_) ::rmdir(folder.c_str());
 }
 
 OutputFolder::OutputFolder(Folder folder, const OutputKind& kind)

@@ -6,7 +6,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
+#include "dynains/io/folder_lock.hpp"
 #include "folder.hpp"
 #include "input_files.hpp"
 #include "output_listing.hpp"
@@ -20,12 +22,28 @@ std::filesystem::path whole_path(const std::filesystem::path& path);
 /// Creates a folder and those above it. Throws IoError.
 void create_folder(const std::filesystem::path& folder);
 
+/// The folder of a command's results, locked until destruction. The constructor creates it, and
+/// those above it, if they are missing. The destructor removes what the constructor created and
+/// what is still empty: a refused command leaves nothing behind.
+class LockedFolder {
+ public:
+  /// Throws IoError, and UsageError if another process has locked the folder.
+  explicit LockedFolder(const std::filesystem::path& folder);
+  ~LockedFolder();
+  LockedFolder(const LockedFolder&) = delete;
+  LockedFolder& operator=(const LockedFolder&) = delete;
+
+ private:
+  std::vector<std::filesystem::path> created_;  // innermost first
+  FolderLock lock_;
+};
+
 /// In a folder of results, while new results that will replace complete ones are written.
 inline constexpr const char* kStagingFolder = ".dynains_staging";
 
 /// A folder that is empty or holds earlier results of one kind, known by a marker that lists them.
 /// Files that are not listed belong to others and stay. Links below the folder are never followed.
-/// All members throw IoError. Take a FolderLock of the folder first.
+/// All members throw IoError. Make a LockedFolder of the folder first.
 class OutputFolder {
  public:
   /// Throws if the folder is neither empty nor holds results that a command of this `kind` listed.

@@ -11,7 +11,6 @@
 
 #include "command.hpp"
 #include "dynains/io/diagnosis.hpp"
-#include "dynains/io/folder_lock.hpp"
 #include "dynains/remover.hpp"
 #include "evaluation_options.hpp"
 #include "interrupt.hpp"
@@ -147,8 +146,7 @@ void write_results(const RunPlan& plan, const RunOptions& options, OutputFolder&
 
 void run(const RunOptions& options) {
   const RunPlan plan = make_plan(options);
-  create_folder(plan.outputs.folder);
-  const FolderLock lock(plan.outputs.folder);
+  const LockedFolder lock(plan.outputs.folder);
   OutputFolder out(Folder(plan.outputs.folder), run_output_kind());
   const RunTask task = choose_task(plan, options, out);
   if (task == RunTask::kNothing) {

@@ -6,7 +6,6 @@
 
 #include "command.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/io/folder_lock.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
 #include "dynains/version.hpp"
@@ -90,8 +89,7 @@ bool write_scans(simulation::Simulator& simulator, const std::filesystem::path& 
 void simulate(const SimulateOptions& options) {
   const simulation::Config config = make_config(options);
   simulation::Simulator simulator(config);
-  create_folder(options.out);
-  const FolderLock lock(options.out);
+  const LockedFolder lock(options.out);
   OutputFolder out(Folder(options.out), simulation_output_kind());
   if (out.has_results() && !options.force) {
     throw IoError(out.path().string() +

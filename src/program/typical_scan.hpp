@@ -18,16 +18,14 @@ namespace dynains::program {
 inline std::size_t typical_scan(const Recording& recording, const ScanRange& range) {
   constexpr std::size_t kMaxSampled = 15;
   const std::size_t count = std::min(range.size(), kMaxSampled);
-  std::vector<std::pair<std::uint64_t, std::size_t>> points_and_scan;
+  std::vector<std::pair<std::uint64_t, std::size_t>> points_and_scan(count);
   for (std::size_t k = 0; k < count; ++k) {
     const std::size_t i = range.first + k * range.size() / count;
-    points_and_scan.emplace_back(recording.point_count(i), i);
+    points_and_scan[k] = {recording.point_count(i), i};
   }
+  std::sort(points_and_scan.begin(), points_and_scan.end());
   // The lower of two medians: of two scans, the smaller one.
-  const auto median =
-      points_and_scan.begin() + static_cast<std::ptrdiff_t>((points_and_scan.size() - 1) / 2);
-  std::nth_element(points_and_scan.begin(), median, points_and_scan.end());
-  return median->second;
+  return points_and_scan[(count - 1) / 2].second;
 }
 
 }  // namespace dynains::program

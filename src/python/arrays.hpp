@@ -100,7 +100,8 @@ template <class T>
 py::array_t<T> to_array(std::vector<T>&& values, std::size_t columns = 0) {
   auto* const owned = new std::vector<T>(std::move(values));
   const py::capsule owner(owned, [](void* p) { delete static_cast<std::vector<T>*>(p); });
-  if (columns == 0) return py::array_t<T>(owned->size(), owned->data(), owner);
+  const auto size = static_cast<py::ssize_t>(owned->size());
+  if (columns == 0) return py::array_t<T>(size, owned->data(), owner);
   return py::array_t<T>({owned->size() / columns, columns}, owned->data(), owner);
 }
 

@@ -295,3 +295,31 @@ TEST_CASE("A folder below a file cannot be created") {
   CHECK_THAT(message_of<IoError>([&] { create_folder(folder / "file/below"); }),
              ContainsSubstring("file/below: cannot be created: Not a directory"));
 }
+
+TEST_CASE("A locked folder that was created for it and stays empty is removed") {
+  const TemporaryFolder folder;
+  const fs::path above = folder.path() / "above";
+  const fs::path out = above / "out";
+  {
+    const LockedFolder lock(out / "");
+    CHECK(fs::is_directory(out));
+    CHECK_THROWS_AS(LockedFolder(out), UsageError);
+  }
+  CHECK_FALSE(fs::exists(above));
+
+  fs::create_directory(above);
+  { const LockedFolder lock(out); }
+  CHECK_FALSE(fs::exists(out));
+  CHECK(fs::is_directory(above));
+
+  fs::create_directory(out);
+  { const LockedFolder lock(out); }
+  CHECK(fs::is_directory(out));
+
+  const fs::path other = folder.path() / "other";
+  {
+    const LockedFolder lock(other);
+    write_text(other / "result", "");
+  }
+  CHECK(fs::exists(other / "result"));
+}

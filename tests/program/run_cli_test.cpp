@@ -336,6 +336,7 @@ TEST_CASE("A map elsewhere is replaced by --force only, and never a scan") {
   CHECK(refused.code == 1);
   CHECK_THAT(refused.err, ContainsSubstring(map + ": exists") && ContainsSubstring("--force"));
   CHECK(read_text(map) == "of another run");
+  CHECK_FALSE(fs::exists(fixture.out));
 
   // What a killed run left of it goes, what belongs to others stays.
   const std::string leftover = fixture.folder / "maps/.of all.ply.0123456789abcdef.tmp";

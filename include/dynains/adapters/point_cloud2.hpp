@@ -122,7 +122,7 @@ class PointCloud2View {
   }
 
   float coordinate(const unsigned char* point, Field field) const {
-    unsigned char bytes[8];
+    unsigned char bytes[8] = {};
     for (std::size_t i = 0; i < field.size; ++i) {
       bytes[i] = point[field.offset + (is_swapped_ ? field.size - 1 - i : i)];
     }

@@ -106,8 +106,17 @@ class MountingEstimator {
   static constexpr std::size_t kFinalists = 40;
   static constexpr std::size_t kScored = 2000;  // cells that score the finalists
 
-  // Mean of the points in each occupied cell, in random order: any part is a fair sample.
+  static bool is_near(PointsView points, std::size_t i) {
+    const float range = Eigen::Vector3f(points.x[i], points.y[i], points.z[i]).norm();
+    return range > kMinDistance && range < kMaxDistance;
+  }
+
+  // Mean of the points in each occupied cell, in random order: any part is a fair sample. No cells
+  // if the points are too few for kFewestCells.
   static std::vector<Eigen::Vector3d> thin(PointsView points) {
+    std::size_t near = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) near += is_near(points, i) ? 1U : 0U;
+    if (near < kFewestCells) return {};
     constexpr auto kHalf = static_cast<std::int32_t>(kMaxDistance / kCell);
     constexpr std::size_t kWidth = 2 * static_cast<std::size_t>(kHalf);
     struct Sum {
@@ -118,9 +127,8 @@ class MountingEstimator {
     std::vector<std::uint32_t> number(kWidth * kWidth * kWidth, 0);  // by cell; from 1
     std::vector<Sum> sums;
     for (std::size_t i = 0; i < points.size(); ++i) {
+      if (!is_near(points, i)) continue;
       const Eigen::Vector3f p(points.x[i], points.y[i], points.z[i]);
-      const float range = p.norm();
-      if (!(range > kMinDistance && range < kMaxDistance)) continue;
       std::size_t at = 0;
       for (Eigen::Index axis = 0; axis < 3; ++axis) {
         const auto index =

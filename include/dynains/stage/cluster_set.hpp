@@ -85,9 +85,10 @@ class ClusterSet {
     run_count_ = 0;
     first_run_.clear();
     detail::run_max_packs([&](auto packs) {
+      using Packs = decltype(packs);
       for (std::size_t k = 0; k < scan_count_; ++k) {
         first_run_.push_back(run_count_);
-        cut<decltype(packs)>(cluster_of.subspan(scan_begin[k], scan_begin[k + 1] - scan_begin[k]));
+        cut<Packs>(cluster_of.subspan(scan_begin[k], scan_begin[k + 1] - scan_begin[k]));
       }
     });
     first_run_.push_back(run_count_);

@@ -54,8 +54,9 @@ void add_group(Builder& builder, Random& random, const Street& street, double fr
   const double start = mood < 0.12 ? 1e9 : mood < 0.25 ? when : 0;
   const double stop = mood > 0.9 ? when : 1e9;
   for (std::size_t k = 0; k <= company; ++k) {
+    const std::size_t row = k / 2;  // two walk side by side
     const double beside = 0.65 * static_cast<double>(k % 2);
-    const double behind = -0.7 * static_cast<double>(k / 2);
+    const double behind = -0.7 * static_cast<double>(row);
     std::vector<Vec2> goals;
     for (int step = 0; step <= 3; ++step) {
       const double u = step / 3.0;
