@@ -122,6 +122,23 @@ TEST_CASE("A database of rosbag2 gives its messages, by time") {
   check_messages(*open_log(path));
   CHECK(count_entries(folder.path()) == entries);
 
+  std::vector<WrittenMessage> large = seven_messages();
+  for (WrittenMessage& message : large) message.data.append(20000, 'x');
+  fs::remove(path);
+  write_db3(path, kChannels, large);
+  const std::string whole = read_text(path);
+  for (const double share : {0.3, 0.6, 0.9, 0.99}) {
+    write_text(
+        path, whole.substr(0, static_cast<std::size_t>(share * static_cast<double>(whole.size()))));
+    const auto cut = open_log(path);
+    const std::string all = contents(*cut);
+    CHECK(cut->messages().size() < 7);
+    CHECK(all.empty() == (share < 0.5));
+    REQUIRE(cut->early_end());
+    CHECK_THAT(*cut->early_end(),
+               StartsWith(path.string() + ": ") && ContainsSubstring("the log ends early"));
+  }
+
   write_text(path, "no database");
   CHECK_THAT(read_error(path), StartsWith(path.string() + ": expected the tables of rosbag2"));
   fs::remove(path);

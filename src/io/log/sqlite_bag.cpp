@@ -2,6 +2,7 @@
 
 #include <sqlite3.h>
 
+#include <algorithm>
 #include <cctype>
 #include <map>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "../failure.hpp"
 #include "../input_file.hpp"
+#include "raw_file.hpp"
 
 namespace dynains {
 namespace {
@@ -34,6 +36,22 @@ std::string uri_of(const std::filesystem::path& path) {
   return uri + (has_journal ? "?mode=ro" : "?mode=ro&immutable=1");
 }
 
+/// Whether the file has fewer bytes than the pages that its header counts.
+bool is_shorter_than_announced(const std::filesystem::path& path) {
+  constexpr std::uint64_t kHeader = 100;  // bytes
+  RawFile file(path);
+  if (file.size() < kHeader) return false;
+  const auto header = file.read(0, kHeader, "a header");
+  const auto big_endian = [&](std::size_t at, std::size_t size) {
+    std::uint64_t value = 0;
+    for (std::size_t i = at; i < at + size; ++i) value = value << 8U | header[i];
+    return value;
+  };
+  const std::uint64_t page_size = big_endian(16, 2);
+  const std::uint64_t pages = big_endian(28, 4);
+  return pages * (page_size == 1 ? 65536 : page_size) > file.size();
+}
+
 std::string row_of(std::int64_t row) { return "row " + std::to_string(row) + " of messages: "; }
 
 }  // namespace
@@ -44,15 +62,19 @@ void SqliteBag::FinishStatement::operator()(sqlite3_stmt* statement) const {
 }
 
 SqliteBag::SqliteBag(const std::filesystem::path& path) : LogFile(path) {
-  open_input(path);  // for its errors
+  const bool is_cut_off = is_shorter_than_announced(path);
   sqlite3* database = nullptr;
   const int result = sqlite3_open_v2(uri_of(path).c_str(), &database,
                                      SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
   database_.reset(database);
   if (result != SQLITE_OK) fail(path, std::string("cannot be opened: ") + sqlite3_errstr(result));
+  // Lets SQLite read a database that is shorter than its header says. Nothing is written.
+  step(prepare("PRAGMA writable_schema = ON").get());
+  select_message_ = prepare("SELECT data FROM messages WHERE id = ?");
   read_topics();
   read_messages();
-  select_message_ = prepare("SELECT data FROM messages WHERE id = ?");
+  if (is_cut_off && !early_end_) early_end_ = path.string() + ": the log ends early";
+  if (early_end_) drop_unreadable();
   finish_index();
 }
 
@@ -70,21 +92,43 @@ void SqliteBag::read_topics() {
 
 void SqliteBag::read_messages() {
   const Statement messages = prepare("SELECT id, topic_id, timestamp FROM messages ORDER BY id");
-  while (step(messages.get())) {
-    const std::int64_t row = sqlite3_column_int64(messages.get(), 0);
+  std::int64_t row = 0;
+  int result = sqlite3_step(messages.get());
+  for (; result == SQLITE_ROW; result = sqlite3_step(messages.get())) {
+    row = sqlite3_column_int64(messages.get(), 0);
     const auto topic = topic_of_.find(sqlite3_column_int64(messages.get(), 1));
     if (topic == topic_of_.end()) fail(path_, row_of(row) + "expected the id of a topic");
     messages_.push_back({static_cast<std::uint64_t>(sqlite3_column_int64(messages.get(), 2)),
                          static_cast<std::uint64_t>(row), 0, topic->second, 0});
   }
+  if (result == SQLITE_DONE) return;
+  if (result != SQLITE_CORRUPT) fail_by_database();
+  early_end_ = path_.string() + ": " + row_of(row) + "the log ends early behind it";
+}
+
+/// Rows may be there whose data are missing.
+void SqliteBag::drop_unreadable() {
+  const auto is_unreadable = [this](const LogMessage& message) {
+    return select(message) != SQLITE_ROW;
+  };
+  messages_.erase(std::remove_if(messages_.begin(), messages_.end(), is_unreadable),
+                  messages_.end());
+}
+
+/// Result of the search for the data of a message.
+int SqliteBag::select(const LogMessage& message) {
+  sqlite3_reset(select_message_.get());
+  sqlite3_bind_int64(select_message_.get(), 1, static_cast<std::int64_t>(message.block));
+  return sqlite3_step(select_message_.get());
 }
 
 void SqliteBag::read(const LogMessage& message, std::vector<std::uint8_t>& bytes) {
-  const auto row = static_cast<std::int64_t>(message.block);
+  const int result = select(message);
+  if (result == SQLITE_DONE) {
+    fail(path_, row_of(static_cast<std::int64_t>(message.block)) + "expected a message");
+  }
+  if (result != SQLITE_ROW) fail_by_database();
   sqlite3_stmt* const statement = select_message_.get();
-  sqlite3_reset(statement);
-  sqlite3_bind_int64(statement, 1, row);
-  if (!step(statement)) fail(path_, row_of(row) + "expected a message");
   const auto* const data = static_cast<const std::uint8_t*>(sqlite3_column_blob(statement, 0));
   bytes.assign(data, data + sqlite3_column_bytes(statement, 0));
 }
@@ -100,10 +144,12 @@ SqliteBag::Statement SqliteBag::prepare(const char* sql) {
 bool SqliteBag::step(sqlite3_stmt* statement) {
   const int result = sqlite3_step(statement);
   if (result == SQLITE_ROW) return true;
-  if (result != SQLITE_DONE) {
-    fail(path_, std::string("cannot be read: ") + sqlite3_errmsg(database_.get()));
-  }
+  if (result != SQLITE_DONE) fail_by_database();
   return false;
+}
+
+void SqliteBag::fail_by_database() const {
+  fail(path_, std::string("cannot be read: ") + sqlite3_errmsg(database_.get()));
 }
 
 }  // namespace dynains

@@ -30,8 +30,11 @@ class SqliteBag final : public LogFile {
 
   void read_topics();
   void read_messages();
+  void drop_unreadable();
+  int select(const LogMessage& message);
   Statement prepare(const char* sql);
   bool step(sqlite3_stmt* statement);
+  [[noreturn]] void fail_by_database() const;
 
   std::unique_ptr<sqlite3, CloseDatabase> database_;
   Statement select_message_;
