@@ -147,8 +147,9 @@ constexpr CrcTables make_crc_tables() {
 
 }  // namespace
 
-std::string decompress(const std::string& method, const std::vector<std::uint8_t>& input,
-                       std::uint64_t size, std::vector<std::uint8_t>& output) {
+std::string decompress(const std::string& method,
+                       [[maybe_unused]] const std::vector<std::uint8_t>& input,
+                       [[maybe_unused]] std::uint64_t size, std::vector<std::uint8_t>& output) {
   output.clear();
 #if defined(DYNAINS_HAS_LZ4)
   if (method == "lz4") return decompress_lz4(input, size, output);
