@@ -121,3 +121,31 @@ TEST_CASE("No result replaces the log that it comes from") {
   CHECK_THAT(outcome.err, ContainsSubstring("is read by this command"));
   CHECK(read_text(log) == before);
 }
+
+TEST_CASE("simulate --format mcap: run on the log gives the labels of run on the folder") {
+  const TemporaryFolder folder;
+  const std::vector<std::string> flags = {"--sensor", "vlp16", "--scans", std::to_string(kScans),
+                                          "--seed",   "5"};
+  const auto simulate = [&](const std::string& out, std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"simulate", out};
+    arguments.insert(arguments.end(), flags.begin(), flags.end());
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return start(arguments);
+  };
+  REQUIRE(simulate(folder / "seq", {}).code == 0);
+  const Outcome simulated = simulate(folder / "log", {"--format", "mcap"});
+  const std::string log = folder / "log" / "drive.mcap";
+  CHECK(simulated.out == "12 scans: " + log + "\n");
+  CHECK(count_entries(folder / "log") == 2);
+  REQUIRE(start({"run", folder / "seq", "--out", folder / "of_folder"}).code == 0);
+  REQUIRE(start({"run", log, "--out", folder / "of_log"}).code == 0);
+  CHECK(all_labels(folder / "of_log") == all_labels(folder / "of_folder"));
+  CHECK(start({"eval", log, folder / "of_log"}).out ==
+        start({"eval", folder / "seq", folder / "of_folder"}).out);
+
+  const std::string first = read_text(log);
+  REQUIRE(simulate(folder / "log", {"--format", "mcap", "--force"}).code == 0);
+  CHECK(read_text(log) == first);
+  REQUIRE(simulate(folder / "log", {"--force"}).code == 0);
+  CHECK_FALSE(fs::exists(log));
+}
