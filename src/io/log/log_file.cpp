@@ -28,7 +28,7 @@ bool is_log_name(const fs::path& path) {
   return extension == ".mcap" || extension == ".bag" || extension == ".db3";
 }
 
-/// The logs of a folder that rosbag2 wrote, by name. Throws IoError if there is none.
+/// The logs directly in a folder, by name.
 std::vector<fs::path> logs_in_folder(const fs::path& folder) {
   std::vector<fs::path> logs;
   std::error_code error;
@@ -37,7 +37,6 @@ std::vector<fs::path> logs_in_folder(const fs::path& folder) {
     if (is_log_name(entry->path())) logs.push_back(entry->path());
   }
   if (error) fail(folder, "cannot be listed: " + error.message());
-  if (logs.empty()) fail(folder, "expected files .mcap or .db3 beside metadata.yaml");
   std::sort(logs.begin(), logs.end());
   return logs;
 }
@@ -107,7 +106,8 @@ void LogFile::finish_index() {
 }
 
 bool is_log(const fs::path& path) {
-  return is_folder(path) ? is_file(path / "metadata.yaml") : is_log_name(path);
+  if (!is_folder(path)) return is_log_name(path);
+  return is_file(path / "metadata.yaml") && !logs_in_folder(path).empty();
 }
 
 std::unique_ptr<LogFile> open_log(const fs::path& path) {

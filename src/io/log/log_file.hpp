@@ -70,7 +70,8 @@ class LogFile {
   std::optional<std::string> early_end_;
 };
 
-/// Whether `path` is a log by its name: *.mcap, *.bag, *.db3, or a folder with metadata.yaml.
+/// Whether `path` is a log by its name: *.mcap, *.bag, *.db3, or a folder with metadata.yaml and
+/// one or more of these. Throws IoError if the system cannot tell.
 bool is_log(const std::filesystem::path& path);
 
 /// Opens a log of ROS 1 (.bag) or ROS 2 (.mcap, .db3, or a folder with one or more of these beside
