@@ -59,6 +59,31 @@ else()
   dynains_part(components DYNAINS_BUILD_COMPONENTS "io and simulation components")
   dynains_part(evaluation DYNAINS_BUILD_COMPONENTS "evaluation component" ${json})
 endif()
+
+# dynains_log_library(<name> <header> <description>): a library that some logs of ROS need, found
+# without a file of CMake or pkg-config. Debian calls its package lib<name>-dev.
+macro(dynains_log_library name header description)
+  string(TOUPPER ${name} upper_name)
+  find_library(DYNAINS_${upper_name}_LIBRARY ${name})
+  find_path(DYNAINS_${upper_name}_HEADERS ${header})
+  mark_as_advanced(DYNAINS_${upper_name}_LIBRARY DYNAINS_${upper_name}_HEADERS)
+  if(DYNAINS_${upper_name}_LIBRARY AND DYNAINS_${upper_name}_HEADERS)
+    set(lib${name}_FOUND ON)
+  endif()
+  dynains_part(${name} DYNAINS_WITH_${upper_name} "${description}" lib${name}=lib${name}-dev)
+  if(dynains_has_${name})
+    list(APPEND dynains_log_libraries ${name})
+  endif()
+endmacro()
+
+set(dynains_log_libraries "")
+if(dynains_has_components)
+  dynains_log_library(lz4 lz4frame.h "logs with lz4 chunks (.mcap, .bag)")
+  dynains_log_library(zstd zstd.h "logs with zstd chunks (.mcap)")
+  dynains_log_library(bz2 bzlib.h "logs with bz2 chunks (.bag)")
+  dynains_log_library(sqlite3 sqlite3.h "logs in SQLite (.db3)")
+endif()
+
 dynains_part(tests DYNAINS_BUILD_TESTS "tests" Catch2=catch2)
 dynains_part(examples DYNAINS_BUILD_EXAMPLES "examples")
 

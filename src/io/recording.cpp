@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <iomanip>
 #include <map>
 #include <sstream>
 #include <string_view>
@@ -15,6 +16,8 @@
 #include "failure.hpp"
 #include "input_file.hpp"
 #include "kitti_files.hpp"
+#include "log/log_scans.hpp"
+#include "scan_reader.hpp"
 #include "text.hpp"
 
 namespace dynains {
@@ -24,7 +27,9 @@ namespace fs = std::filesystem;
 
 constexpr const char* kAccepted =
     "expected a KITTI folder (velodyne/NNNNNN.bin, poses.txt), or a folder of .pcd, .ply or .bin "
-    "scans (or with them in pcd/, ply/, scans/, points/, clouds/ or lidar/)";
+    "scans (or with them in pcd/, ply/, scans/, points/, clouds/ or lidar/), or a log of ROS "
+    "(.mcap, "
+    ".db3, .bag, or a folder with metadata.yaml)";
 
 std::optional<ScanFormat> scan_format_of(const fs::path& path) {
   std::string extension = path.extension().string();
@@ -120,15 +125,50 @@ std::string shown(const fs::path& path, const fs::path& folder) {
 
 }  // namespace
 
-Recording::Recording(const fs::path& folder, const RecordingOptions& options)
-    : folder_(folder), options_(options) {
-  if (!is_folder(folder)) fail(folder, std::string("is not a folder; ") + kAccepted);
-  list_scans();
-  read_poses();
+Recording::Recording(const fs::path& path, const RecordingOptions& options)
+    : folder_(path), options_(options) {
+  if (is_log(path)) {
+    open_log();
+  } else {
+    if (!is_folder(path)) fail(path, std::string("is not a folder; ") + kAccepted);
+    list_scans();
+    reader_ = format_ == ScanFormat::kBin ? make_bin_reader() : make_point_file_reader();
+    read_poses();
+  }
   find_columns();
   frame_ = options.frame == PointFrame::kAuto ? guess_frame() : options.frame;
   notes_.push_back(frame_ == PointFrame::kWorld ? "points are in the frame of the world"
                                                 : "points are in the frame of the sensor");
+}
+
+/// Takes scans, times and poses of a log. Poses of a file belong to the clouds by time.
+void Recording::open_log() {
+  if (!options_.times.empty()) {
+    fail(options_.times, "expected no file of times: " + folder_.string() + " has stamps");
+  }
+  const bool has_file = !options_.poses.empty();
+  auto log = std::make_unique<LogScans>(
+      folder_,
+      LogChoice{options_.cloud_topic, options_.pose_topic, options_.pose_frame, !has_file});
+  scan_folder_ = folder_;
+  format_ = ScanFormat::kLog;
+  frame_ = log->is_in_world() ? PointFrame::kWorld : PointFrame::kSensor;
+  files_ = log->log().files();
+  early_end_ = log->log().early_end();
+  notes_ = log->notes();
+  numbered_ = true;
+  for (std::size_t i = 0; i < log->size(); ++i) {
+    std::ostringstream name;
+    text::exact(name);
+    name << std::setw(6) << std::setfill('0') << i;
+    scans_.push_back({folder_, name.str(), i, log->times()[i]});
+  }
+  if (has_file) files_.push_back(options_.poses);
+  trajectory_ = has_file ? read_trajectory(options_.poses) : log->trajectory();
+  const fs::path& poses = has_file ? options_.poses : folder_;
+  trajectory_.times.empty() ? match_rows(poses) : match_times(poses, log->times());
+  reader_ = make_log_reader(std::move(log));
+  place_scans(poses);
 }
 
 void Recording::list_scans() {
@@ -410,13 +450,14 @@ std::optional<Eigen::Isometry3d> Recording::pose_under(const PoseConvention& con
 }
 
 void Recording::find_columns() {
-  if (format_ == ScanFormat::kBin) {
-    columns_.intensity = true;
-  } else {
-    columns_ = read_point_file_header(scans_.front().file).columns;
-  }
+  columns_ = reader_->columns(address(0));
   if (columns_.label) labels_ = Labels::kColumn;
   if (is_folder(folder_ / "labels")) labels_ = Labels::kFiles;
+}
+
+ScanAddress Recording::address(std::size_t i) const {
+  const Scan& scan = scans_.at(i);
+  return {scan.file, scan.match};
 }
 
 /// Points are densest around the sensor: compares the number of points around the origin with the
@@ -425,7 +466,7 @@ PointFrame Recording::guess_frame() const {
   constexpr double kNear = 8.0;      // m
   constexpr double kFarPose = 20.0;  // m, so that the two do not overlap
   const PointFrame usual = has_viewpoints_ ? PointFrame::kWorld : PointFrame::kSensor;
-  if (format_ == ScanFormat::kBin) return PointFrame::kSensor;
+  if (format_ == ScanFormat::kBin || format_ == ScanFormat::kLog) return frame_;
   const auto farthest =
       std::max_element(scans_.begin(), scans_.end(), [](const Scan& a, const Scan& b) {
         return a.T_world_sensor.translation().norm() < b.T_world_sensor.translation().norm();
@@ -443,45 +484,14 @@ PointFrame Recording::guess_frame() const {
 }
 
 std::uint64_t Recording::point_count(std::size_t i) const {
-  const fs::path& file = scans_.at(i).file;
-  return format_ == ScanFormat::kBin ? count_scan_points(file)
-                                     : read_point_file_header(file).point_count;
+  return reader_->point_count(address(i));
 }
 
-void Recording::check_scan(std::size_t i) const {
-  const fs::path& file = scans_.at(i).file;
-  if (format_ == ScanFormat::kBin) {
-    count_scan_points(file);
-  } else {
-    check_point_file(file);
-  }
-}
+void Recording::check_scan(std::size_t i) const { reader_->check(address(i)); }
 
 void Recording::read_scan(std::size_t i, RecordedScan& scan) const {
-  const fs::path& file = scans_.at(i).file;
-  scan.ring.clear();
-  scan.time.clear();
   const Eigen::Isometry3d T_sensor_world = T_world_sensor(i).inverse();
-  if (format_ == ScanFormat::kBin) {
-    dynains::read_scan(file, scan.xyzi);
-    if (frame_ != PointFrame::kWorld) return;
-    for (std::size_t k = 0; k < scan.size(); ++k) {
-      Eigen::Map<Eigen::Vector3f> p(scan.xyzi.data() + 4 * k);
-      p = (T_sensor_world * p.cast<double>()).cast<float>();
-    }
-    return;
-  }
-  PointFile points = read_points(file);
-  scan.xyzi.resize(4 * points.positions.size());
-  for (std::size_t k = 0; k < points.positions.size(); ++k) {
-    Eigen::Vector3d p = points.positions[k];
-    if (frame_ == PointFrame::kWorld) p = T_sensor_world * p;
-    float* xyzi = scan.xyzi.data() + 4 * k;
-    Eigen::Map<Eigen::Vector3f>(xyzi, 3) = p.cast<float>();
-    xyzi[3] = points.intensity.empty() ? 0.0F : points.intensity[k];
-  }
-  scan.ring = std::move(points.ring);
-  scan.time = std::move(points.time);
+  reader_->read(address(i), frame_ == PointFrame::kWorld ? &T_sensor_world : nullptr, scan);
 }
 
 RecordedScan Recording::read_scan(std::size_t i) const {
@@ -491,17 +501,8 @@ RecordedScan Recording::read_scan(std::size_t i) const {
 }
 
 std::vector<std::uint32_t> Recording::read_labels(std::size_t i) const {
-  const Scan& scan = scans_.at(i);
-  if (labels_ == Labels::kFiles) {
-    const std::size_t count = format_ == ScanFormat::kBin ? count_scan_points(scan.file)
-                                                          : read_points(scan.file).positions.size();
-    return dynains::read_labels(folder_ / "labels" / (scan.name + ".label"), count);
-  }
-  PointFile points = read_points(scan.file);
-  if (points.label.size() != points.positions.size()) {
-    fail(scan.file, "expected a column \"label\", as in the first scan");
-  }
-  return std::move(points.label);
+  if (labels_ != Labels::kFiles) return reader_->read_labels(address(i));
+  return dynains::read_labels(folder_ / "labels" / (name(i) + ".label"), point_count(i));
 }
 
 }  // namespace dynains

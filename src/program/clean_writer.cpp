@@ -25,6 +25,7 @@ std::string CleanWriter::name(const Recording& recording, std::size_t i) {
     case ScanFormat::kBin:
       return recording.name(i) + ".bin";
     case ScanFormat::kPcd:
+    case ScanFormat::kLog:
       return recording.name(i) + ".pcd";
     case ScanFormat::kPly:
       break;
@@ -62,7 +63,8 @@ void CleanWriter::write(std::size_t i, const RecordedScan& scan,
   PointColumns columns = recording_.columns();
   columns.label = false;
   columns.double_xyz = T.translation().cwiseAbs().maxCoeff() > kFloatCoordinateLimit;
-  const bool has_pose = recording_.has_viewpoints() || recording_.frame() == PointFrame::kWorld;
+  const bool has_pose = recording_.has_viewpoints() || recording_.format() == ScanFormat::kLog ||
+                        recording_.frame() == PointFrame::kWorld;
   PointFileWriter writer(file, columns,
                          has_pose ? recording_.T_world_sensor(i) : Eigen::Isometry3d::Identity());
   for (std::size_t k = 0; k < labels.size(); ++k) {

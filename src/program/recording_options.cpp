@@ -9,8 +9,8 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what) {
       .add_option("SEQ", folder_,
                   what +
                       ": KITTI or SemanticKITTI folder (velodyne/, poses.txt; optional calib.txt, "
-                      "times.txt), or folder of .pcd, .ply or .bin scans with VIEWPOINT or a file "
-                      "of poses")
+                      "times.txt), folder of .pcd, .ply or .bin scans with VIEWPOINT or a file of "
+                      "poses, or log of ROS (.mcap, .db3, .bag, or a folder with metadata.yaml)")
       ->required()
       ->type_name("");
   const char* const kGroup = "What the files of SEQ mean (dynains check SEQ finds out)";
@@ -55,12 +55,23 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what) {
       ->check(CLI::Range(-1000000, 1000000))
       ->type_name("N")
       ->group(kGroup);
+  const auto add_name = [&](const char* flag, std::string& value, const char* help) {
+    command.add_option(flag, value, help)->type_name("NAME")->group(kGroup);
+  };
+  add_name("--cloud-topic", cloud_topic_, "topic of the clouds of a log [the only one]");
+  add_name("--pose-topic", pose_topic_,
+           "topic of the poses of a log: Odometry, PoseStamped or TF [the only one, else TF]");
+  add_name("--pose-frame-id", pose_frame_id_,
+           "take the poses of a log from TF, in this fixed frame [the root of the tree]");
 }
 
 RecordingOptions RecordingFlags::options() const {
   RecordingOptions options;
   options.poses = poses_;
   options.times = times_;
+  options.cloud_topic = cloud_topic_;
+  options.pose_topic = pose_topic_;
+  options.pose_frame = pose_frame_id_;
   if (frame_ == "sensor") options.frame = PointFrame::kSensor;
   if (frame_ == "world") options.frame = PointFrame::kWorld;
   PoseConvention& convention = options.convention;
@@ -82,6 +93,10 @@ Recording RecordingFlags::open(const std::filesystem::path& folder) const {
     std::cerr << "dynains: warning: " << recording.missing_pose_count() << " of "
               << recording.scan_file_count() << " scans have no pose and are left out; see: dynains"
               << " check " << folder.string() << std::endl;
+  }
+  if (recording.early_end()) {
+    std::cerr << "dynains: warning: " << *recording.early_end() << "; "
+              << recording.scan_file_count() << " scans before it are read" << std::endl;
   }
   return recording;
 }

@@ -19,7 +19,8 @@ class RecordingFlags {
   RecordingOptions options() const;
   /// Whether a file is named that belongs to one recording only.
   bool names_files() const { return !poses_.empty() || !times_.empty(); }
-  /// Throws IoError. Warns of scans that are left out for want of a pose.
+  /// Throws IoError. Warns of scans that are left out for want of a pose, and of a log that ends
+  /// early.
   Recording open() const { return open(folder_); }
   /// Opens another folder with these flags.
   Recording open(const std::filesystem::path& folder) const;
@@ -35,6 +36,9 @@ class RecordingFlags {
   bool invert_ = false;
   bool left_handed_ = false;
   int shift_ = 0;
+  std::string cloud_topic_;
+  std::string pose_topic_;
+  std::string pose_frame_id_;
 };
 
 }  // namespace dynains::program

@@ -102,6 +102,7 @@ RunDescription describe(const RunPlan& plan, const RunOptions& options,
   description.first_scan = sequence.name(plan.range.first);
   description.last_scan = sequence.name(plan.range.first + results.finished() - 1);
   description.missing_poses = sequence.missing_pose_count();
+  description.log_ends_early = sequence.early_end().has_value();
   description.agreement = agreement.as_given;
   description.preset = options.remover.preset_name();
   description.complete = results.finished() == plan.range.size();

@@ -63,6 +63,7 @@ nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& 
   report["last_scan"] = run.last_scan;
   report["scans"] = results.finished();
   report["scans_without_pose"] = run.missing_poses;
+  report["log_ends_early"] = run.log_ends_early;
   report["points"] = results.points();
   report["labels"] = {{"invalid", labels[PointLabel::kInvalid]},
                       {"out_of_range", labels[PointLabel::kOutOfRange]},

@@ -31,6 +31,7 @@ struct RunDescription {
   std::string first_scan;
   std::string last_scan;
   std::size_t missing_poses = 0;  ///< scans of the recording that were left out for want of one
+  bool log_ends_early = false;    ///< scans behind the early end are missing
   std::string preset;
   Agreement agreement;   ///< of the scans under the poses, by a sample
   bool complete = true;  ///< false after a signal

@@ -7,6 +7,7 @@
 #include "command.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/simulation/simulator.hpp"
+#include "dynains/simulation/write_log.hpp"
 #include "dynains/simulation/write_sequence.hpp"
 #include "dynains/version.hpp"
 #include "interrupt.hpp"
@@ -18,11 +19,16 @@
 namespace dynains::program {
 namespace {
 
+constexpr const char* kFolder = "kitti";
+constexpr const char* kLog = "mcap";
+constexpr const char* kLogName = "drive.mcap";
+
 struct SimulateOptions {
   std::string out;
   std::string scene = "urban";
   std::string sensor = "hdl64";
   std::string labelling = "ever";
+  std::string format = kFolder;
   bool force = false;
   bool quiet = false;
   ParameterFlags flags;
@@ -39,17 +45,22 @@ simulation::Config make_config(const SimulateOptions& options) {
 }
 
 const OutputKind& simulation_output_kind() {
-  static const OutputKind kind = {"simulate",
-                                  "simulation.json",
-                                  {"poses.txt", "poses_true.txt", "times.txt", "calib.txt"},
-                                  false,
-                                  {{"velodyne", {".bin"}}, {"labels", {".label"}}}};
+  static const OutputKind kind = {
+      "simulate",
+      "simulation.json",
+      {"poses.txt", "poses_true.txt", "times.txt", "calib.txt", kLogName},
+      false,
+      {{"velodyne", {".bin"}}, {"labels", {".label"}}}};
   return kind;
 }
 
-OutputListing listing_of(const simulation::Simulator& simulator) {
+OutputListing listing_of(const simulation::Simulator& simulator, const std::string& format) {
   const simulation::Config& config = simulator.config();
   OutputListing listing;
+  if (format == kLog) {
+    listing.files = {kLogName};
+    return listing;
+  }
   listing.files = {"poses.txt", "times.txt", "calib.txt"};
   if (config.pose_noise_translation > 0 || config.pose_noise_rotation > 0) {
     listing.files.insert("poses_true.txt");
@@ -70,7 +81,8 @@ nlohmann::ordered_json describe(const SimulateOptions& options, const simulation
                                  {"complete", complete},
                                  {"scene", options.scene},
                                  {"sensor", options.sensor},
-                                 {"labelling", options.labelling}};
+                                 {"labelling", options.labelling},
+                                 {"format", options.format}};
   simulation::Config::visit(config,
                             [&](const auto& parameter) { json[parameter.name] = parameter.value; });
   return json;
@@ -78,12 +90,14 @@ nlohmann::ordered_json describe(const SimulateOptions& options, const simulation
 
 /// False if a signal came first.
 bool write_scans(simulation::Simulator& simulator, const std::filesystem::path& folder,
-                 bool quiet) {
-  Progress progress(simulator.size(), "scans", quiet);
-  return simulation::write_sequence(simulator, folder, [&](std::size_t done, std::size_t) {
+                 const SimulateOptions& options) {
+  Progress progress(simulator.size(), "scans", options.quiet);
+  const auto count = [&](std::size_t done, std::size_t) {
     progress.update(done);
     return InterruptGuard::signal() == 0;
-  });
+  };
+  return options.format == kLog ? simulation::write_log(simulator, folder / kLogName, count)
+                                : simulation::write_sequence(simulator, folder, count);
 }
 
 void simulate(const SimulateOptions& options) {
@@ -95,12 +109,12 @@ void simulate(const SimulateOptions& options) {
     throw IoError(out.path().string() +
                   ": holds earlier results; choose another folder, or replace them by --force");
   }
-  const OutputListing listing = listing_of(simulator);
+  const OutputListing listing = listing_of(simulator, options.format);
   out.check(listing, InputFiles());
   const InterruptGuard interrupt;
   const auto mode = out.has_results() ? OutputChange::Mode::kStaged : OutputChange::Mode::kInPlace;
   OutputChange change(out, mode, describe(options, config, false), listing);
-  if (!write_scans(simulator, change.folder(), options.quiet)) {
+  if (!write_scans(simulator, change.folder(), options)) {
     if (change.is_staged()) {
       std::cerr << "dynains: interrupted; the earlier results in " << out.path().string()
                 << " stay as they were" << std::endl;
@@ -109,7 +123,9 @@ void simulate(const SimulateOptions& options) {
   }
   change.put_in_place();
   change.finish(describe(options, config, true), listing);
-  if (!options.quiet) std::cout << simulator.size() << " scans: " << options.out << std::endl;
+  const std::filesystem::path sequence =
+      options.format == kLog ? out.path() / kLogName : out.path();
+  if (!options.quiet) std::cout << simulator.size() << " scans: " << sequence.string() << std::endl;
 }
 
 std::string list(const std::vector<std::string>& names) {
@@ -137,6 +153,11 @@ void add_simulate_command(CLI::App& app) {
   add_choice("--scene", options->scene, simulation::scene_names());
   add_choice("--sensor", options->sensor, simulation::sensor_names());
   add_choice("--labelling", options->labelling, simulation::labelling_names());
+  command
+      .add_option("--format", options->format,
+                  "a folder as of KITTI, or OUT/drive.mcap, a log of ROS 2 [kitti]")
+      ->check(CLI::IsMember({kFolder, kLog}))
+      ->type_name("kitti|mcap");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   options->flags.add_to(command, simulation::Config(), "Parameters");
   command.footer(

@@ -16,6 +16,7 @@ const std::vector<Target>& targets() {
       {"config", run_config, config_seeds},
       {"trajectory", run_trajectory, trajectory_seeds},
       {"recording", run_recording, recording_seeds},
+      {"log", run_log, log_seeds},
       {"tile", run_tile, tile_seeds},
       {"facade", run_facade, facade_seeds},
   };

@@ -35,6 +35,7 @@ void run_pcd(Bytes bytes);
 void run_config(Bytes bytes);
 void run_trajectory(Bytes bytes);
 void run_recording(Bytes bytes);
+void run_log(Bytes bytes);
 void run_tile(Bytes bytes);
 void run_facade(Bytes bytes);
 
@@ -48,6 +49,7 @@ std::vector<std::string> pcd_seeds();
 std::vector<std::string> config_seeds();
 std::vector<std::string> trajectory_seeds();
 std::vector<std::string> recording_seeds();
+std::vector<std::string> log_seeds();
 std::vector<std::string> tile_seeds();
 std::vector<std::string> facade_seeds();
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -28,6 +29,10 @@ struct RecordingOptions {
   std::filesystem::path times;  ///< file with a time for each scan, s; empty: that of the recording
   PointFrame frame = PointFrame::kAuto;
   PoseConvention convention;
+  // Of a log; empty: the only one.
+  std::string cloud_topic;
+  std::string pose_topic;
+  std::string pose_frame;  ///< fixed frame of poses from transforms; empty: root of their tree
 };
 
 /// One scan. Columns that the recording lacks are empty; the others have a value for each point.
@@ -49,16 +54,22 @@ struct RecordedScan {
   }
 };
 
-/// File format of the scans.
-enum class ScanFormat { kBin, kPcd, kPly };
+/// Format of the scans: a file each, or messages of a log.
+enum class ScanFormat { kBin, kPcd, kPly, kLog };
 
-/// A folder of scans, one file each:
+class ScanReader;
+struct ScanAddress;
+
+/// A folder of scans, one file each, or a log:
 ///
 /// - KITTI and SemanticKITTI: see KittiSequence. With `poses` in the options, poses.txt may be
 /// missing;
 /// - point files, .pcd or .ply, in the folder or in one below it (pcd, ply, scans, points, clouds,
 ///   lidar, velodyne), ordered by name, numbers in names by value;
-/// - .bin files as in KITTI, directly in the folder.
+/// - .bin files as in KITTI, directly in the folder;
+/// - a log of ROS: .mcap, .db3 or .bag, or a folder with metadata.yaml and .mcap or .db3 files. It
+///   is read once when it is opened; points stay in the file. Scans are the clouds of one topic,
+///   named by their number, at the times of their stamps. See below for poses.
 ///
 /// Two scans whose names differ in the extension only are refused.
 ///
@@ -74,16 +85,23 @@ enum class ScanFormat { kBin, kPcd, kPly };
 /// times of the scans. Scans without a pose are left out and listed in `notes()`; if they are more
 /// than half, that is an error.
 ///
+/// Poses of a log come from `options.poses`; else from the topic `options.pose_topic` or the only
+/// topic of poses; else from transforms between `options.pose_frame` and the frame of the clouds. A
+/// topic that names its moving frame gives the poses of that frame: the transforms of the log lead
+/// from there to the frame of the clouds; without such transforms the poses count as those of the
+/// sensor. If the clouds are in the fixed frame of the poses, points are in the world frame.
+///
 /// Labels (SemanticKITTI classes) come from labels/NAME.label or a column `label`.
 ///
 /// All members throw IoError with path, position and expectation.
 class Recording {
  public:
   /// Reads and checks all files except points and labels.
-  explicit Recording(const std::filesystem::path& folder, const RecordingOptions& options = {});
+  explicit Recording(const std::filesystem::path& path, const RecordingOptions& options = {});
 
+  /// The folder or the log.
   const std::filesystem::path& folder() const { return folder_; }
-  /// The folder that holds the scans: folder() or one below it.
+  /// The folder that holds the scans: folder() or one below it. A log: folder().
   const std::filesystem::path& scan_folder() const { return scan_folder_; }
   /// Every file of the recording: scans, also those without a pose, poses, times, calibration and
   /// files of labels.
@@ -96,6 +114,8 @@ class Recording {
   /// Whether poses come from VIEWPOINT.
   bool has_viewpoints() const { return has_viewpoints_; }
   bool has_labels() const { return labels_ != Labels::kNone; }
+  /// Path, position and reason, if a log ends early. Its clouds before the end are read.
+  const std::optional<std::string>& early_end() const { return early_end_; }
   /// Decisions on files, frames and times, and scans that were left out; a sentence each.
   const std::vector<std::string>& notes() const { return notes_; }
 
@@ -145,6 +165,7 @@ class Recording {
   };
   enum class Labels { kNone, kFiles, kColumn };
 
+  void open_log();
   void list_scans();
   void check_names() const;
   void read_poses();
@@ -161,10 +182,12 @@ class Recording {
   void place_scans(const std::filesystem::path& poses);
   void find_columns();
   PointFrame guess_frame() const;
+  ScanAddress address(std::size_t i) const;
 
   std::filesystem::path folder_;
   std::filesystem::path scan_folder_;
   RecordingOptions options_;
+  std::shared_ptr<const ScanReader> reader_;  ///< copies of a recording read one file
   ScanFormat format_ = ScanFormat::kBin;
   PointFrame frame_ = PointFrame::kSensor;
   Labels labels_ = Labels::kNone;
@@ -177,6 +200,7 @@ class Recording {
   std::vector<std::optional<TrajectoryMatch>> matches_;  ///< per scan file
   std::vector<Scan> scans_;
   std::vector<std::filesystem::path> files_;  ///< but for labels
+  std::optional<std::string> early_end_;
   std::vector<std::string> notes_;
 };
 

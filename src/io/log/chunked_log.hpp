@@ -1,0 +1,96 @@
+// Logs that are records in a file, most of them in compressed chunks: MCAP and bags of ROS 1.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bytes.hpp"
+#include "log_file.hpp"
+#include "raw_file.hpp"
+
+namespace dynains {
+
+/// The part that both formats have in common. A chunk is followed by an index of its messages. A
+/// chunk without index, and the last chunk of a file that ends early, is decompressed for its
+/// messages. So a file is read in the same way whether its summary was written or not.
+class ChunkedLog : public LogFile {
+ public:
+  void read(const LogMessage& message, std::vector<std::uint8_t>& bytes) override;
+
+ protected:
+  /// The part of the header of a chunk that reading needs.
+  struct Chunk {
+    std::uint64_t content = 0;  ///< byte of the compressed records
+    std::uint64_t compressed_size = 0;
+    std::uint64_t uncompressed_size = 0;
+    std::uint32_t uncompressed_crc = 0;  ///< 0: not given
+    std::string compression;             ///< empty: none
+    bool has_index = false;
+  };
+  struct Message {
+    std::uint32_t channel = 0;
+    std::uint64_t time = 0;  ///< ns
+    Bytes payload;
+  };
+
+  explicit ChunkedLog(const std::filesystem::path& path) : LogFile(path), file_(path) {}
+
+  /// Bytes of the record at `position` of the file; nothing if the file ends before its end.
+  virtual std::optional<std::uint64_t> record_size(std::uint64_t position) = 0;
+  /// Reads a record of the file for the index. False at the end of the records.
+  virtual bool take_record(std::uint64_t position, std::uint64_t size) = 0;
+  /// Takes the next record out of a block of records. Gives the message, if it is one; adds the
+  /// channel, if it defines one.
+  virtual std::optional<Message> parse_record(Bytes& records) = 0;
+  /// Whether nothing is missing behind the last record.
+  virtual bool is_complete() const = 0;
+
+  /// Reads all records of the file from `position` on.
+  void read_index(std::uint64_t position);
+
+  // For take_record().
+  /// Begins a chunk, named by the byte of its record. Throws for sizes that cannot be.
+  void add_chunk(std::uint64_t position, Chunk header);
+  /// Ends the index of the last chunk: another record follows.
+  void finish_chunk();
+  /// A message of the last chunk, by its index.
+  void add_indexed(std::uint32_t channel, std::uint64_t time, std::uint64_t offset);
+  void add_message(std::uint32_t channel, std::uint64_t time, std::uint64_t position) {
+    entries_.push_back({time, position, 0, channel});
+  }
+  void add_channel(std::uint32_t id, LogTopic channel) { channels_[id] = std::move(channel); }
+
+  RawFile file_;
+
+ private:
+  /// A message before all channels are known.
+  struct Entry {
+    std::uint64_t time;
+    std::uint64_t block;
+    std::uint64_t offset;
+    std::uint32_t channel;
+  };
+
+  void drop_index_of_last_chunk();
+  void read_chunk_records(std::uint64_t chunk, bool with_messages);
+  void find_missing_channels();
+  void make_messages();
+  const std::vector<std::uint8_t>& load(std::uint64_t chunk);
+
+  std::map<std::uint32_t, LogTopic> channels_;  ///< several may have one topic
+  std::map<std::uint64_t, Chunk> chunks_;       ///< by byte of the record
+  std::vector<Entry> entries_;
+  // No record is at byte 0.
+  std::uint64_t last_chunk_ = 0;   ///< the chunk whose index is read; 0: none
+  std::size_t first_of_last_ = 0;  ///< its first entry
+  std::uint64_t loaded_ = 0;       ///< the chunk whose records are in memory; 0: none
+  std::vector<std::uint8_t> compressed_;
+  std::vector<std::uint8_t> records_;
+  std::filesystem::path chunk_place_;  ///< path and byte of the loaded chunk, for errors
+};
+
+}  // namespace dynains

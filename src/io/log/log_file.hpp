@@ -1,0 +1,85 @@
+// Logs of robots: files of messages by topic and time.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace dynains {
+
+/// How the fields of a message are serialised.
+enum class MessageEncoding : std::uint8_t {
+  kRos1,  ///< little endian, without padding
+  kCdr,   ///< ROS 2: XCDR1 with an encapsulation header of four bytes
+  kOther  ///< not readable here
+};
+
+/// One stream of messages of one type.
+struct LogTopic {
+  std::string name;  ///< for example "/points"
+  std::string type;  ///< package and name, for example "sensor_msgs/PointCloud2"
+  MessageEncoding encoding = MessageEncoding::kOther;
+  std::uint64_t message_count = 0;
+};
+
+/// Address of one message.
+struct LogMessage {
+  std::uint64_t time = 0;    ///< ns, when the message was recorded
+  std::uint64_t block = 0;   ///< meaning by format: byte of a chunk or of a message, or row
+  std::uint64_t offset = 0;  ///< bytes from the begin of the records of a chunk
+  std::uint32_t topic = 0;   ///< index in LogFile::topics()
+  std::uint32_t part = 0;    ///< index of the file, if the log has several
+};
+
+/// An index of all messages of a log, and access to each. One object serves one thread at a time.
+///
+/// Opening reads the index, 32 bytes for each message, and keeps no message. A log that ends early,
+/// as after a crash of the recorder, gives the messages before its end; early_end() describes it.
+/// All members throw IoError with path, position and the expected content.
+class LogFile {
+ public:
+  virtual ~LogFile() = default;
+
+  const std::filesystem::path& path() const { return path_; }
+  /// Every file that belongs to the log.
+  virtual std::vector<std::filesystem::path> files() const { return {path_}; }
+  const std::vector<LogTopic>& topics() const { return topics_; }
+  /// All messages by time; messages of equal time keep their order in the file.
+  const std::vector<LogMessage>& messages() const { return messages_; }
+  /// Path, position and reason, if the log ends early.
+  const std::optional<std::string>& early_end() const { return early_end_; }
+
+  /// Replaces `bytes` by the serialised message. Memory of `bytes` is reused.
+  virtual void read(const LogMessage& message, std::vector<std::uint8_t>& bytes) = 0;
+
+ protected:
+  explicit LogFile(std::filesystem::path path) : path_(std::move(path)) {}
+  /// The index of a topic of this name, type and encoding, which is added if it is new.
+  std::uint32_t add_topic(const LogTopic& topic);
+  /// Sorts the messages and counts them by topic.
+  void finish_index();
+
+  std::filesystem::path path_;
+  std::vector<LogTopic> topics_;
+  std::vector<LogMessage> messages_;
+  std::optional<std::string> early_end_;
+};
+
+/// Whether `path` is a log by its name: *.mcap, *.bag, *.db3, or a folder with metadata.yaml and
+/// one or more of these. Throws IoError if the system cannot tell.
+bool is_log(const std::filesystem::path& path);
+
+/// Opens a log of ROS 1 (.bag) or ROS 2 (.mcap, .db3, or a folder with one or more of these beside
+/// metadata.yaml). Throws IoError, also if this build lacks the library that the format needs; the
+/// message names its package.
+std::unique_ptr<LogFile> open_log(const std::filesystem::path& path);
+
+/// "sensor_msgs/msg/PointCloud2" of ROS 2 as in ROS 1.
+std::string plain_type(std::string type);
+
+}  // namespace dynains

@@ -1,0 +1,258 @@
+#include "log_scans.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "../failure.hpp"
+
+namespace dynains {
+namespace {
+
+using Topics = std::vector<LogTopic>;
+
+bool is_readable(const LogTopic& topic) {
+  return topic.encoding != MessageEncoding::kOther && topic.message_count > 0;
+}
+
+/// "/points (sensor_msgs/PointCloud2, 120 messages), ..."
+std::string list(const Topics& topics) {
+  std::string text;
+  for (const LogTopic& topic : topics) {
+    text += (text.empty() ? "" : ", ") + topic.name + " (" + topic.type + ", " +
+            std::to_string(topic.message_count) + " messages)";
+  }
+  return text.empty() ? "no topic" : text;
+}
+
+template <class Condition>
+Topics filter(const Topics& topics, Condition&& is_wanted) {
+  Topics result;
+  std::copy_if(topics.begin(), topics.end(), std::back_inserter(result),
+               [&](const LogTopic& topic) { return is_readable(topic) && is_wanted(topic.type); });
+  return result;
+}
+
+bool has(const Topics& topics, const std::string& name) {
+  return std::any_of(topics.begin(), topics.end(),
+                     [&](const LogTopic& topic) { return topic.name == name; });
+}
+
+/// Index of the topic `chosen` by name and type.
+std::uint32_t index_of(const Topics& topics, const LogTopic& chosen) {
+  const auto found = std::find_if(topics.begin(), topics.end(), [&](const LogTopic& topic) {
+    return topic.name == chosen.name && topic.type == chosen.type;
+  });
+  return static_cast<std::uint32_t>(found - topics.begin());
+}
+
+LogTopic named(const Topics& topics, const std::string& name) {
+  return *std::find_if(topics.begin(), topics.end(),
+                       [&](const LogTopic& topic) { return topic.name == name; });
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text.empty() ? "none" : text;
+}
+
+}  // namespace
+
+LogScans::LogScans(const std::filesystem::path& path, const LogChoice& choice)
+    : log_(open_log(path)), choice_(choice) {
+  choose_cloud_topic();
+  if (choice.with_poses) choose_pose_topic();
+  read_log();
+  check_clouds();
+  if (choice.with_poses) place_scans();
+  if (log_->early_end()) notes_.push_back(*log_->early_end());
+}
+
+void LogScans::choose_cloud_topic() {
+  const Topics clouds = filter(log_->topics(), is_cloud_type);
+  if (clouds.empty()) {
+    fail(log_->path(), "expected a topic with clouds; found " + list(log_->topics()));
+  }
+  const std::string& wanted = choice_.cloud_topic;
+  if (wanted.empty() && clouds.size() > 1) {
+    fail(log_->path(), "expected one topic with clouds, or --cloud-topic; found " + list(clouds));
+  }
+  if (!wanted.empty() && !has(clouds, wanted)) {
+    fail(log_->path(), "expected clouds on topic " + wanted + "; found " + list(clouds));
+  }
+  const LogTopic chosen = wanted.empty() ? clouds.front() : named(clouds, wanted);
+  cloud_topic_ = index_of(log_->topics(), chosen);
+  notes_.push_back("clouds from topic " + chosen.name);
+}
+
+/// A topic of poses comes before transforms.
+void LogScans::choose_pose_topic() {
+  const Topics poses = filter(log_->topics(), is_pose_type);
+  const Topics direct = filter(log_->topics(), [](const auto& type) {
+    return is_pose_type(type) && !is_transform_type(type);
+  });
+  const std::string& wanted = choice_.pose_topic;
+  if (poses.empty()) {
+    fail(log_->path(), "expected a topic with poses, or a file of poses by --poses; found " +
+                           list(log_->topics()));
+  }
+  if (!wanted.empty() && !has(poses, wanted)) {
+    fail(log_->path(), "expected poses on topic " + wanted + "; found " + list(poses));
+  }
+  const bool by_frame = wanted.empty() && !choice_.pose_frame.empty();
+  if (wanted.empty() && !by_frame && direct.size() > 1) {
+    fail(log_->path(), "expected one topic with poses, or --pose-topic; found " + list(poses));
+  }
+  LogTopic chosen;
+  if (!wanted.empty()) chosen = named(poses, wanted);
+  if (wanted.empty() && !by_frame && !direct.empty()) chosen = direct.front();
+  if (chosen.name.empty() || is_transform_type(chosen.type)) {
+    notes_.push_back("poses from transforms (tf)");
+    return;
+  }
+  pose_topic_ = index_of(log_->topics(), chosen);
+  notes_.push_back("poses from topic " + chosen.name);
+}
+
+void LogScans::read_log() {
+  for (const LogMessage& message : log_->messages()) {
+    const LogTopic& topic = log_->topics()[message.topic];
+    if (message.topic == cloud_topic_) take_cloud(message);
+    const bool has_poses =
+        message.topic == pose_topic_ || (is_readable(topic) && is_transform_type(topic.type));
+    if (choice_.with_poses && has_poses) take_poses(message);
+  }
+}
+
+void LogScans::take_cloud(const LogMessage& message) {
+  const SerialisedMessage serialised = load(message);
+  const CloudInfo cloud = inspect_cloud(log_->topics()[message.topic].type, serialised);
+  if (clouds_.empty()) {
+    cloud_frame_ = cloud.frame;
+    columns_ = cloud.columns;
+  }
+  if (cloud.frame != cloud_frame_) {
+    throw IoError(serialised.place + ": expected a cloud of frame " + cloud_frame_ +
+                  ", as before; found frame " + cloud.frame);
+  }
+  if (!times_.empty() && !(cloud.time > times_.back())) {
+    ++disordered_;
+    return;
+  }
+  clouds_.push_back(message);
+  times_.push_back(cloud.time);
+  point_counts_.push_back(cloud.points);
+}
+
+void LogScans::take_poses(const LogMessage& message) {
+  const LogTopic& topic = log_->topics()[message.topic];
+  const bool is_static = topic.name.find("static") != std::string::npos;
+  for (const StampedPose& pose : read_poses(topic.type, load(message))) {
+    if (message.topic != pose_topic_) {
+      transforms_.add(pose, is_static);
+      continue;
+    }
+    if (poses_.poses.empty()) {
+      pose_frame_ = pose.frame;
+      pose_child_ = pose.child;
+    }
+    add_in_order(pose.time, pose.T_frame_child, poses_);
+  }
+}
+
+void LogScans::check_clouds() {
+  if (clouds_.empty()) fail(log_->path(), "expected at least one cloud");
+  if (disordered_ == 0) return;
+  const std::string count = std::to_string(disordered_) + " of " +
+                            std::to_string(disordered_ + size()) +
+                            " clouds have a stamp that is not after that of the cloud before";
+  if (disordered_ >= size()) fail(log_->path(), "expected stamps that increase: " + count);
+  notes_.push_back(count + ", and are left out");
+}
+
+void LogScans::place_scans() {
+  if (!pose_topic_) pose_frame_ = world_frame();
+  is_in_world_ = pose_topic_ && cloud_frame_ == pose_frame_ && cloud_frame_ != pose_child_;
+  if (pose_topic_ && !is_in_world_) describe_extrinsic();
+  if (transforms_.left_out() > 0) {
+    notes_.push_back(std::to_string(transforms_.left_out()) +
+                     " transforms contradict earlier ones of their frame, and are left out");
+  }
+  for (const double time : times_) {
+    const std::optional<Eigen::Isometry3d> T_world_sensor = pose_at(time);
+    if (!T_world_sensor) continue;
+    trajectory_.times.push_back(time);
+    trajectory_.poses.push_back(*T_world_sensor);
+  }
+  if (trajectory_.poses.empty()) {
+    fail(log_->path(), "expected poses of frame " +
+                           (pose_child_.empty() ? cloud_frame_ : pose_child_) + " in " +
+                           pose_frame_ + " at the times of the clouds, found none");
+  }
+}
+
+/// The fixed frame of poses from transforms: that of the options, or the root of the tree.
+std::string LogScans::world_frame() const {
+  if (!transforms_.has(cloud_frame_)) {
+    fail(log_->path(), "expected a transform of frame " + cloud_frame_ +
+                           ", that of the clouds; found transforms of " +
+                           joined(transforms_.frames()));
+  }
+  const std::optional<std::string> root = transforms_.root_of(cloud_frame_);
+  if (!root) {
+    fail(log_->path(),
+         "expected transforms that form a tree, found a loop above frame " + cloud_frame_);
+  }
+  return choice_.pose_frame.empty() ? *root : choice_.pose_frame;
+}
+
+/// Poses of a topic are those of a frame of the robot, mostly not of the sensor.
+void LogScans::describe_extrinsic() {
+  if (pose_child_.empty() || pose_child_ == cloud_frame_) {
+    pose_child_.clear();
+    return;
+  }
+  if (transforms_.find(pose_child_, cloud_frame_, times_.front())) {
+    notes_.push_back("the transform from " + cloud_frame_ + " to " + pose_child_ +
+                     " is from the log");
+    return;
+  }
+  notes_.push_back("the log has no transform from " + cloud_frame_ + " to " + pose_child_ +
+                   ": poses count as those of " + cloud_frame_);
+  pose_child_.clear();
+}
+
+/// T_world_sensor at `time`, s.
+std::optional<Eigen::Isometry3d> LogScans::pose_at(double time) const {
+  if (!pose_topic_) return transforms_.find(pose_frame_, cloud_frame_, time);
+  const std::optional<TrajectoryMatch> match = match_time(poses_, time);
+  if (!match) return std::nullopt;
+  const Eigen::Isometry3d T_world_child =
+      interpolate(poses_.poses[match->before], poses_.poses[match->after], match->share);
+  if (pose_child_.empty() || is_in_world_) return T_world_child;
+  const auto T_child_sensor = transforms_.find(pose_child_, cloud_frame_, time);
+  if (!T_child_sensor) return std::nullopt;
+  return T_world_child * *T_child_sensor;
+}
+
+/// The message, in memory until the next one.
+SerialisedMessage LogScans::load(const LogMessage& message) {
+  const LogTopic& topic = log_->topics()[message.topic];
+  log_->read(message, bytes_);
+  return {
+      bytes_.data(), bytes_.size(), topic.encoding,
+      log_->path().string() + ": " + topic.name + " at " + std::to_string(message.time) + " ns"};
+}
+
+void LogScans::read(std::size_t i, RecordedScan& scan) {
+  const LogMessage& message = clouds_.at(i);
+  read_cloud(log_->topics()[message.topic].type, load(message), scan);
+}
+
+std::vector<std::uint32_t> LogScans::read_labels(std::size_t i) {
+  const LogMessage& message = clouds_.at(i);
+  return read_cloud_labels(log_->topics()[message.topic].type, load(message));
+}
+
+}  // namespace dynains

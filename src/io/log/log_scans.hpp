@@ -1,0 +1,81 @@
+// The clouds of a log as scans, and the poses of their sensor.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dynains/io/trajectory.hpp"
+#include "log_file.hpp"
+#include "ros_messages.hpp"
+#include "transform_tree.hpp"
+
+namespace dynains {
+
+/// Topics and frame that the user asked for; empty: found in the log.
+struct LogChoice {
+  std::string cloud_topic;
+  std::string pose_topic;
+  std::string pose_frame;  ///< the fixed frame, if poses come from transforms
+  bool with_poses = true;  ///< false: the log's poses are not used
+};
+
+/// Finds the cloud topic and the poses of a log. Reads it once from begin to end, checks every
+/// cloud, and keeps the poses and the addresses of the clouds. Throws IoError, also if the choice
+/// of a topic is not clear.
+class LogScans {
+ public:
+  LogScans(const std::filesystem::path& path, const LogChoice& choice);
+
+  const LogFile& log() const { return *log_; }
+  std::size_t size() const { return clouds_.size(); }
+  /// Stamps of the clouds, s, increasing.
+  const std::vector<double>& times() const { return times_; }
+  /// T_world_sensor at the times of the scans that have a pose; empty without poses.
+  const Trajectory& trajectory() const { return trajectory_; }
+  /// Whether the frame of the clouds is the fixed frame of the poses.
+  bool is_in_world() const { return is_in_world_; }
+  /// Columns of the first cloud.
+  const PointColumns& columns() const { return columns_; }
+  std::size_t point_count(std::size_t i) const { return point_counts_.at(i); }
+  const std::vector<std::string>& notes() const { return notes_; }
+
+  void read(std::size_t i, RecordedScan& scan);
+  std::vector<std::uint32_t> read_labels(std::size_t i);
+
+ private:
+  void choose_cloud_topic();
+  void choose_pose_topic();
+  void read_log();
+  void take_cloud(const LogMessage& message);
+  void take_poses(const LogMessage& message);
+  void check_clouds();
+  void place_scans();
+  std::string world_frame() const;
+  void describe_extrinsic();
+  std::optional<Eigen::Isometry3d> pose_at(double time) const;
+  SerialisedMessage load(const LogMessage& message);
+
+  std::unique_ptr<LogFile> log_;
+  LogChoice choice_;
+  std::uint32_t cloud_topic_ = 0;
+  std::optional<std::uint32_t> pose_topic_;  ///< without, poses come from transforms
+  std::string cloud_frame_;
+  std::string pose_frame_;  ///< fixed frame of the poses
+  std::string pose_child_;  ///< moving frame of the poses; empty: the sensor
+  std::vector<LogMessage> clouds_;
+  std::vector<double> times_;
+  std::vector<std::size_t> point_counts_;
+  std::size_t disordered_ = 0;  ///< clouds whose stamp is not after that of the cloud before
+  PointColumns columns_;
+  Trajectory poses_;  ///< of the pose topic
+  TransformTree transforms_;
+  bool is_in_world_ = false;
+  Trajectory trajectory_;
+  std::vector<std::string> notes_;
+  std::vector<std::uint8_t> bytes_;
+};
+
+}  // namespace dynains

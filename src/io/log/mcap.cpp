@@ -1,0 +1,134 @@
+#include "mcap.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "../failure.hpp"
+
+namespace dynains {
+namespace {
+
+constexpr std::uint8_t kMagic[8] = {0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'};
+constexpr std::uint64_t kRecordHead = 9;  // opcode and length
+
+enum Opcode : std::uint8_t {
+  kFooter = 0x02,
+  kSchema = 0x03,
+  kChannel = 0x04,
+  kMessage = 0x05,
+  kChunk = 0x06,
+  kMessageIndex = 0x07
+};
+
+MessageEncoding encoding_of(const std::string& name) {
+  if (name == "ros1") return MessageEncoding::kRos1;
+  return name == "cdr" ? MessageEncoding::kCdr : MessageEncoding::kOther;
+}
+
+}  // namespace
+
+McapFile::McapFile(const std::filesystem::path& path) : ChunkedLog(path) {
+  const auto magic =
+      file_.read(0, std::min<std::uint64_t>(file_.size(), sizeof(kMagic)), "magic bytes");
+  if (magic.size() != sizeof(kMagic) || std::memcmp(magic.data(), kMagic, sizeof(kMagic)) != 0) {
+    fail_at_byte(path, 0, "expected the magic bytes of MCAP, version 0");
+  }
+  read_index(sizeof(kMagic));
+}
+
+std::optional<std::uint64_t> McapFile::record_size(std::uint64_t position) {
+  if (file_.size() - position < kRecordHead) return std::nullopt;
+  const auto head = file_.read(position, kRecordHead, "a record");
+  Bytes fields(path_, position, head.data(), head.size());
+  const auto opcode = fields.number<std::uint8_t>("an opcode");
+  const auto size = fields.number<std::uint64_t>("a length");
+  // Some file systems fill the end of a file with zeros after a crash.
+  if (opcode == 0 || size > file_.size() - position - kRecordHead) return std::nullopt;
+  return kRecordHead + size;
+}
+
+bool McapFile::take_record(std::uint64_t position, std::uint64_t size) {
+  constexpr std::uint64_t kMessageHead = kRecordHead + 14;  // and channel, sequence, log time
+  const std::uint64_t head_size = std::min(size, kMessageHead);
+  const auto head = file_.read(position, head_size, "a record");
+  Bytes fields(path_, position, head.data(), head.size());
+  const auto opcode = fields.number<std::uint8_t>("an opcode");
+  if (opcode == kMessageIndex) {
+    take_message_index(position, size);
+    return true;
+  }
+  finish_chunk();
+  if (opcode == kChunk) take_chunk(position, size);
+  if (opcode == kMessage) {
+    fields.skip(8, "a length");
+    const auto channel = fields.number<std::uint16_t>("a channel id");
+    fields.skip(4, "a sequence number");
+    add_message(channel, fields.number<std::uint64_t>("a log time"), position);
+  }
+  if (opcode == kSchema || opcode == kChannel) {
+    const auto record = file_.read(position, size, "a record");
+    Bytes bytes(path_, position, record.data(), record.size());
+    parse_record(bytes);
+  }
+  has_footer_ = opcode == kFooter;
+  return !has_footer_;
+}
+
+void McapFile::take_chunk(std::uint64_t position, std::uint64_t size) {
+  constexpr std::uint64_t kLongestHead = 128;  // compression names are short
+  const auto head = file_.read(position, std::min(size, kLongestHead), "a chunk");
+  Bytes fields(path_, position, head.data(), head.size());
+  Chunk chunk;
+  fields.skip(kRecordHead + 16, "the times of a chunk");
+  chunk.uncompressed_size = fields.number<std::uint64_t>("the size of a chunk");
+  chunk.uncompressed_crc = fields.number<std::uint32_t>("the checksum of a chunk");
+  chunk.compression = fields.string("the compression of a chunk");
+  chunk.compressed_size = fields.number<std::uint64_t>("the size of compressed records");
+  chunk.content = position + fields.position();
+  add_chunk(position, std::move(chunk));
+}
+
+void McapFile::take_message_index(std::uint64_t position, std::uint64_t size) {
+  const auto record = file_.read(position, size, "a message index");
+  Bytes fields(path_, position, record.data(), record.size());
+  fields.skip(kRecordHead, "a record");
+  const auto channel = fields.number<std::uint16_t>("a channel id");
+  Bytes pairs =
+      fields.block(fields.number<std::uint32_t>("the length of an index"), "a message index");
+  while (pairs.remaining() > 0) {
+    const auto time = pairs.number<std::uint64_t>("a log time");
+    add_indexed(channel, time, pairs.number<std::uint64_t>("an offset"));
+  }
+}
+
+std::optional<ChunkedLog::Message> McapFile::parse_record(Bytes& records) {
+  const auto opcode = records.number<std::uint8_t>("an opcode");
+  Bytes fields = records.block(records.number<std::uint64_t>("a length"), "a record");
+  if (opcode != kMessage) {
+    take_definition(opcode, fields);
+    return std::nullopt;
+  }
+  const auto channel = fields.number<std::uint16_t>("a channel id");
+  fields.skip(4, "a sequence number");
+  const auto time = fields.number<std::uint64_t>("a log time");
+  fields.skip(8, "a publish time");
+  return Message{channel, time, fields};
+}
+
+void McapFile::take_definition(std::uint8_t opcode, Bytes fields) {
+  if (opcode == kSchema) {
+    const auto id = fields.number<std::uint16_t>("a schema id");
+    schemas_[id] = plain_type(fields.string("a schema name"));
+  }
+  if (opcode != kChannel) return;
+  const auto id = fields.number<std::uint16_t>("a channel id");
+  const auto schema = schemas_.find(fields.number<std::uint16_t>("a schema id"));
+  LogTopic topic;
+  if (schema != schemas_.end()) topic.type = schema->second;
+  topic.name = fields.string("a topic");
+  topic.encoding = encoding_of(fields.string("a message encoding"));
+  add_channel(id, std::move(topic));
+}
+
+}  // namespace dynains

@@ -1,0 +1,55 @@
+// Layout and values of the points of a sensor_msgs/PointCloud2.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "../scalar.hpp"
+#include "dynains/io/point_file.hpp"
+#include "message_reader.hpp"
+
+namespace dynains {
+
+/// Where the points of a message lie in it.
+class PointCloud2 {
+ public:
+  /// A field of a point; absent unless the message has it.
+  struct Field {
+    bool is_there = false;
+    std::uint32_t offset = 0;  ///< bytes from the begin of a point
+    Scalar type = Scalar::kFloat;
+
+    double value(const std::uint8_t* point) const {
+      return load_scalar(type, reinterpret_cast<const char*>(point) + offset, false);
+    }
+    bool is_integer() const { return type != Scalar::kFloat && type != Scalar::kDouble; }
+  };
+
+  /// Reads what follows the header of the message, without padding at its end. `in` and the message
+  /// outlive this. Throws IoError unless all fields of all points lie within the data.
+  explicit PointCloud2(MessageReader& in);
+
+  std::size_t size() const { return static_cast<std::size_t>(height_) * width_; }
+  /// Point i < size().
+  const std::uint8_t* point(std::size_t i) const {
+    return data_ + i / width_ * row_step_ + i % width_ * point_step_;
+  }
+  PointColumns columns() const;
+
+  Field x, y, z, intensity, ring, time, label;
+
+ private:
+  Field* field_of(const std::string& name);
+  void read_fields(MessageReader& in);
+  void check_fields(const MessageReader& in) const;
+  void check_size(const MessageReader& in, std::uint64_t bytes);
+
+  std::uint32_t height_ = 0;
+  std::uint32_t width_ = 0;
+  std::uint64_t point_step_ = 0;  // bytes
+  std::uint64_t row_step_ = 0;    // bytes
+  const std::uint8_t* data_ = nullptr;
+};
+
+}  // namespace dynains

@@ -1,0 +1,158 @@
+#include "ros_bag.hpp"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "../failure.hpp"
+
+namespace dynains {
+namespace {
+
+const std::string kMagic = "#ROSBAG V2.0\n";
+
+enum Opcode : std::uint8_t {
+  kMessageData = 0x02,
+  kBagHeader = 0x03,
+  kIndexData = 0x04,
+  kChunk = 0x05,
+  kChunkInfo = 0x06,
+  kConnection = 0x07
+};
+
+/// The value of a header field `name`; nothing if the header lacks it.
+std::optional<Bytes> find_field(Bytes header, const std::string& name) {
+  while (header.remaining() > 0) {
+    Bytes field = header.block(header.number<std::uint32_t>("a field length"), "a header field");
+    if (field.remaining() <= name.size()) continue;
+    const char* const text = reinterpret_cast<const char*>(field.here());
+    if (text[name.size()] != '=' || !std::equal(name.begin(), name.end(), text)) continue;
+    field.skip(name.size() + 1, "a field name");
+    return field;
+  }
+  return std::nullopt;
+}
+
+Bytes field_of(const Bytes& header, const std::string& name) {
+  const std::optional<Bytes> field = find_field(header, name);
+  if (!field) header.fail("expected the header field " + name);
+  return *field;
+}
+
+template <class Number>
+Number number_in(const Bytes& header, const std::string& name) {
+  return field_of(header, name).template number<Number>(name.c_str());
+}
+
+std::string text_in(const Bytes& header, const std::string& name) {
+  return field_of(header, name).rest_as_text();
+}
+
+/// Seconds and nanoseconds as nanoseconds.
+std::uint64_t read_time(Bytes& in) {
+  constexpr std::uint64_t kSecond = 1000000000;
+  const auto seconds = in.number<std::uint32_t>("seconds");
+  return kSecond * seconds + in.number<std::uint32_t>("nanoseconds");
+}
+
+}  // namespace
+
+RosBag::RosBag(const std::filesystem::path& path) : ChunkedLog(path) {
+  const auto magic =
+      file_.read(0, std::min<std::uint64_t>(file_.size(), kMagic.size()), "magic bytes");
+  if (!std::equal(magic.begin(), magic.end(), kMagic.begin(), kMagic.end())) {
+    fail_at_byte(path, 0, "expected \"#ROSBAG V2.0\" and the end of a line");
+  }
+  read_index(kMagic.size());
+}
+
+std::optional<std::uint64_t> RosBag::record_size(std::uint64_t position) {
+  std::uint64_t size = 0;
+  for (const char* const purpose : {"the length of a header", "the length of data"}) {
+    if (file_.size() - position - size < sizeof(std::uint32_t)) return std::nullopt;
+    const auto bytes = file_.read(position + size, sizeof(std::uint32_t), purpose);
+    Bytes length(path_, position + size, bytes.data(), bytes.size());
+    size += sizeof(std::uint32_t) + length.number<std::uint32_t>(purpose);
+    if (size > file_.size() - position) return std::nullopt;
+  }
+  return size;
+}
+
+bool RosBag::take_record(std::uint64_t position, std::uint64_t size) {
+  // The data of a chunk are not read here.
+  constexpr std::uint64_t kLongestHead = 4096;
+  const auto bytes = file_.read(position, std::min(size, kLongestHead), "a record");
+  Bytes rest(path_, position, bytes.data(), bytes.size());
+  const Bytes header = rest.block(rest.number<std::uint32_t>("a header length"), "a header");
+  const auto opcode = number_in<std::uint8_t>(header, "op");
+  if (opcode == kIndexData) {
+    take_index(position, size);
+    return true;
+  }
+  finish_chunk();
+  if (opcode == kBagHeader) take_bag_header(position, header);
+  if (opcode == kChunk) take_chunk(position, header, rest);
+  if (opcode == kChunkInfo) ++chunk_infos_;
+  if (opcode == kMessageData) {
+    Bytes time = field_of(header, "time");
+    add_message(number_in<std::uint32_t>(header, "conn"), read_time(time), position);
+  }
+  if (opcode == kConnection) {
+    const auto record = file_.read(position, size, "a connection");
+    Bytes connection(path_, position, record.data(), record.size());
+    parse_record(connection);
+  }
+  return true;
+}
+
+void RosBag::take_bag_header(std::uint64_t position, const Bytes& header) {
+  const std::optional<Bytes> encryptor = find_field(header, "encryptor");
+  if (encryptor && encryptor->remaining() > 0) {
+    fail_at_byte(path_, position, "expected a bag without encryption");
+  }
+  has_index_ = number_in<std::uint64_t>(header, "index_pos") != 0;
+  announced_chunks_ = number_in<std::uint32_t>(header, "chunk_count");
+}
+
+void RosBag::take_chunk(std::uint64_t position, const Bytes& header, Bytes& rest) {
+  Chunk chunk;
+  chunk.compression = text_in(header, "compression");
+  if (chunk.compression == "none") chunk.compression.clear();
+  chunk.uncompressed_size = number_in<std::uint32_t>(header, "size");
+  chunk.compressed_size = rest.number<std::uint32_t>("the length of data");
+  chunk.content = position + rest.position();
+  add_chunk(position, std::move(chunk));
+}
+
+void RosBag::take_index(std::uint64_t position, std::uint64_t size) {
+  const auto record = file_.read(position, size, "an index");
+  Bytes rest(path_, position, record.data(), record.size());
+  const Bytes header = rest.block(rest.number<std::uint32_t>("a header length"), "a header");
+  if (number_in<std::uint32_t>(header, "ver") != 1) header.fail("expected an index of version 1");
+  const auto connection = number_in<std::uint32_t>(header, "conn");
+  Bytes entries = rest.block(rest.number<std::uint32_t>("the length of data"), "an index");
+  while (entries.remaining() > 0) {
+    const std::uint64_t time = read_time(entries);
+    add_indexed(connection, time, entries.number<std::uint32_t>("an offset"));
+  }
+}
+
+std::optional<ChunkedLog::Message> RosBag::parse_record(Bytes& records) {
+  const Bytes header = records.block(records.number<std::uint32_t>("a header length"), "a header");
+  const Bytes content = records.block(records.number<std::uint32_t>("a data length"), "data");
+  const auto opcode = number_in<std::uint8_t>(header, "op");
+  if (opcode == kConnection) take_connection(header, content);
+  if (opcode != kMessageData) return std::nullopt;
+  Bytes time = field_of(header, "time");
+  return Message{number_in<std::uint32_t>(header, "conn"), read_time(time), content};
+}
+
+void RosBag::take_connection(const Bytes& header, Bytes content) {
+  LogTopic topic;
+  topic.name = text_in(header, "topic");
+  topic.type = text_in(content, "type");
+  topic.encoding = MessageEncoding::kRos1;
+  add_channel(number_in<std::uint32_t>(header, "conn"), std::move(topic));
+}
+
+}  // namespace dynains

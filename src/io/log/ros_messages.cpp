@@ -1,0 +1,208 @@
+#include "ros_messages.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+
+#include "message_reader.hpp"
+#include "point_cloud2.hpp"
+
+namespace dynains {
+namespace {
+
+struct Header {
+  double time = 0.0;  // s
+  std::string frame;
+};
+
+double read_stamp(MessageReader& in) {
+  // ROS 1 has an unsigned and ROS 2 a signed number of seconds.
+  const double seconds = in.is_ros1() ? static_cast<double>(in.number<std::uint32_t>("seconds"))
+                                      : static_cast<double>(in.number<std::int32_t>("seconds"));
+  return seconds + 1e-9 * static_cast<double>(in.number<std::uint32_t>("nanoseconds"));
+}
+
+/// Names of frames in old bags begin with a slash.
+std::string read_frame(MessageReader& in, const char* purpose) {
+  std::string frame = in.string(purpose);
+  if (!frame.empty() && frame.front() == '/') frame.erase(0, 1);
+  return frame;
+}
+
+Header read_header(MessageReader& in) {
+  Header header;
+  if (in.is_ros1()) in.number<std::uint32_t>("a sequence number");
+  header.time = read_stamp(in);
+  header.frame = read_frame(in, "a frame id");
+  return header;
+}
+
+/// Position and quaternion, as in geometry_msgs/Pose and geometry_msgs/Transform.
+Eigen::Isometry3d read_pose(MessageReader& in) {
+  Eigen::Vector3d position;
+  for (double& value : position) value = in.number<double>("a position");
+  Eigen::Vector4d xyzw;
+  for (double& value : xyzw) value = in.number<double>("a quaternion");
+  if (!position.allFinite() || !(std::abs(xyzw.norm() - 1.0) < 0.01)) {
+    in.fail("expected a finite position and a quaternion of length 1");
+  }
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear() = Eigen::Quaterniond(xyzw).normalized().toRotationMatrix();
+  T.translation() = position;
+  return T;
+}
+
+StampedPose read_transform(MessageReader& in) {
+  const Header header = read_header(in);
+  std::string child = read_frame(in, "a child frame id");
+  return {header.time, header.frame, std::move(child), read_pose(in)};
+}
+
+/// Converts times of points (seconds, or nanoseconds if integer) to seconds after the stamp.
+void make_relative(bool is_integer, double stamp, std::vector<double>& times) {
+  constexpr double kLongestScan = 10.0;  // s
+  constexpr double kNanoseconds = 1e14;  // of an absolute time; as seconds it is in year 3170000
+  double least = std::numeric_limits<double>::infinity();
+  for (const double time : times) {
+    if (std::isfinite(time)) least = std::min(least, time);
+  }
+  const double unit = is_integer || least > kNanoseconds ? 1e-9 : 1.0;
+  const double origin = std::abs(least * unit) > kLongestScan ? stamp : 0.0;
+  for (double& time : times) time = time * unit - origin;
+}
+
+std::uint16_t ring_of(double value) {
+  return value >= 0.0 && value <= 65535.0 ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
+}
+
+void resize(RecordedScan& scan, std::size_t points, const PointColumns& columns) {
+  scan.xyzi.resize(4 * points);
+  scan.ring.resize(columns.ring ? points : 0);
+  scan.time.resize(columns.time ? points : 0);
+}
+
+void read_point_cloud2(MessageReader& in, RecordedScan& scan) {
+  const double stamp = read_header(in).time;
+  const PointCloud2 cloud(in);
+  resize(scan, cloud.size(), cloud.columns());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const std::uint8_t* const point = cloud.point(i);
+    float* const xyzi = scan.xyzi.data() + 4 * i;
+    xyzi[0] = static_cast<float>(cloud.x.value(point));
+    xyzi[1] = static_cast<float>(cloud.y.value(point));
+    xyzi[2] = static_cast<float>(cloud.z.value(point));
+    const PointCloud2::Field& intensity = cloud.intensity;
+    xyzi[3] = intensity.is_there ? static_cast<float>(intensity.value(point)) : 0.0F;
+    if (cloud.ring.is_there) scan.ring[i] = ring_of(cloud.ring.value(point));
+    if (cloud.time.is_there) scan.time[i] = cloud.time.value(point);
+  }
+  make_relative(cloud.time.is_integer(), stamp, scan.time);
+}
+
+PointColumns livox_columns() {
+  PointColumns columns;
+  columns.intensity = true;
+  columns.ring = true;
+  columns.time = true;
+  return columns;
+}
+
+/// Number of points of a CustomMsg behind its header, checked against the size of the message.
+std::uint32_t read_livox_size(MessageReader& in) {
+  constexpr std::size_t kLeastPoint = 19;  // bytes
+  in.number<std::uint64_t>("a time base");
+  in.number<std::uint32_t>("a number of points");
+  in.number<std::uint8_t>("a lidar id");
+  in.take(3, "reserved bytes");
+  return in.length(kLeastPoint, "points");
+}
+
+void read_livox(MessageReader& in, RecordedScan& scan) {
+  read_header(in);
+  const std::uint32_t points = read_livox_size(in);
+  resize(scan, points, livox_columns());
+  for (std::uint32_t i = 0; i < points; ++i) {
+    scan.time[i] = 1e-9 * static_cast<double>(in.number<std::uint32_t>("an offset time"));
+    float* const xyzi = scan.xyzi.data() + 4 * std::size_t{i};
+    for (int axis = 0; axis < 3; ++axis) xyzi[axis] = in.number<float>("a coordinate");
+    xyzi[3] = static_cast<float>(in.number<std::uint8_t>("a reflectivity"));
+    in.number<std::uint8_t>("a tag");
+    scan.ring[i] = in.number<std::uint8_t>("a line");
+  }
+}
+
+bool is_livox(const std::string& type) {
+  return type == "livox_ros_driver/CustomMsg" || type == "livox_ros_driver2/CustomMsg" ||
+         type == "livox_interfaces/CustomMsg";
+}
+
+}  // namespace
+
+bool is_cloud_type(const std::string& type) {
+  return type == "sensor_msgs/PointCloud2" || is_livox(type);
+}
+
+bool is_transform_type(const std::string& type) {
+  return type == "tf2_msgs/TFMessage" || type == "tf/tfMessage";
+}
+
+bool is_pose_type(const std::string& type) {
+  static constexpr const char* kTypes[] = {
+      "nav_msgs/Odometry",
+      "geometry_msgs/PoseStamped",
+      "geometry_msgs/PoseWithCovarianceStamped",
+      "geometry_msgs/TransformStamped",
+  };
+  return is_transform_type(type) ||
+         std::find(std::begin(kTypes), std::end(kTypes), type) != std::end(kTypes);
+}
+
+CloudInfo inspect_cloud(const std::string& type, const SerialisedMessage& message) {
+  MessageReader in(message);
+  const Header header = read_header(in);
+  if (is_livox(type)) return {header.time, header.frame, read_livox_size(in), livox_columns()};
+  const PointCloud2 cloud(in);
+  return {header.time, header.frame, cloud.size(), cloud.columns()};
+}
+
+void read_cloud(const std::string& type, const SerialisedMessage& message, RecordedScan& scan) {
+  MessageReader in(message);
+  is_livox(type) ? read_livox(in, scan) : read_point_cloud2(in, scan);
+}
+
+std::vector<std::uint32_t> read_cloud_labels(const std::string& type,
+                                             const SerialisedMessage& message) {
+  MessageReader in(message);
+  read_header(in);
+  if (is_livox(type)) in.fail("expected a field \"label\", which CustomMsg cannot have");
+  const PointCloud2 cloud(in);
+  if (!cloud.label.is_there) in.fail("expected a field \"label\", as in the first cloud");
+  std::vector<std::uint32_t> labels(cloud.size());
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    const double label = cloud.label.value(cloud.point(i));
+    if (!(label >= 0.0 && label < 4294967296.0)) in.fail("expected labels from 0 to 4294967295");
+    labels[i] = static_cast<std::uint32_t>(label);
+  }
+  return labels;
+}
+
+std::vector<StampedPose> read_poses(const std::string& type, const SerialisedMessage& message) {
+  MessageReader in(message);
+  std::vector<StampedPose> poses;
+  if (is_transform_type(type)) {
+    constexpr std::size_t kLeastTransform = 72;  // bytes
+    const std::uint32_t count = in.length(kLeastTransform, "transforms");
+    for (std::uint32_t i = 0; i < count; ++i) poses.push_back(read_transform(in));
+  } else if (type == "geometry_msgs/TransformStamped") {
+    poses.push_back(read_transform(in));
+  } else {
+    const Header header = read_header(in);
+    std::string child;
+    if (type == "nav_msgs/Odometry") child = read_frame(in, "a child frame id");
+    poses.push_back({header.time, header.frame, std::move(child), read_pose(in)});
+  }
+  return poses;
+}
+
+}  // namespace dynains

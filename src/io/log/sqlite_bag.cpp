@@ -1,0 +1,155 @@
+#include "sqlite_bag.hpp"
+
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <cctype>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "../failure.hpp"
+#include "../input_file.hpp"
+#include "raw_file.hpp"
+
+namespace dynains {
+namespace {
+
+std::string text_of(sqlite3_stmt* statement, int column) {
+  const unsigned char* const text = sqlite3_column_text(statement, column);
+  return text == nullptr ? std::string() : reinterpret_cast<const char*>(text);
+}
+
+/// Without a journal beside it, the database is opened such that SQLite writes no file.
+std::string uri_of(const std::filesystem::path& path) {
+  constexpr const char* kDigits = "0123456789ABCDEF";
+  std::string uri = "file:";
+  for (const char c : std::filesystem::absolute(path).string()) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (std::isalnum(byte) != 0 || c == '/' || c == '.' || c == '-' || c == '_') {
+      uri += c;
+    } else {
+      uri = uri + '%' + kDigits[byte / 16] + kDigits[byte % 16];
+    }
+  }
+  const bool has_journal = is_there(path.string() + "-wal") || is_there(path.string() + "-journal");
+  return uri + (has_journal ? "?mode=ro" : "?mode=ro&immutable=1");
+}
+
+/// Whether the file has fewer bytes than the pages that its header counts.
+bool is_shorter_than_announced(const std::filesystem::path& path) {
+  constexpr std::uint64_t kHeader = 100;  // bytes
+  RawFile file(path);
+  if (file.size() < kHeader) return false;
+  const auto header = file.read(0, kHeader, "a header");
+  const auto big_endian = [&](std::size_t at, std::size_t size) {
+    std::uint64_t value = 0;
+    for (std::size_t i = at; i < at + size; ++i) value = value << 8U | header[i];
+    return value;
+  };
+  const std::uint64_t page_size = big_endian(16, 2);
+  const std::uint64_t pages = big_endian(28, 4);
+  return pages * (page_size == 1 ? 65536 : page_size) > file.size();
+}
+
+std::string row_of(std::int64_t row) { return "row " + std::to_string(row) + " of messages: "; }
+
+}  // namespace
+
+void SqliteBag::CloseDatabase::operator()(sqlite3* database) const { sqlite3_close(database); }
+void SqliteBag::FinishStatement::operator()(sqlite3_stmt* statement) const {
+  sqlite3_finalize(statement);
+}
+
+SqliteBag::SqliteBag(const std::filesystem::path& path) : LogFile(path) {
+  const bool is_cut_off = is_shorter_than_announced(path);
+  sqlite3* database = nullptr;
+  const int result = sqlite3_open_v2(uri_of(path).c_str(), &database,
+                                     SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
+  database_.reset(database);
+  if (result != SQLITE_OK) fail(path, std::string("cannot be opened: ") + sqlite3_errstr(result));
+  // Lets SQLite read a database that is shorter than its header says. Nothing is written.
+  step(prepare("PRAGMA writable_schema = ON").get());
+  select_message_ = prepare("SELECT data FROM messages WHERE id = ?");
+  read_topics();
+  read_messages();
+  if (is_cut_off && !early_end_) early_end_ = path.string() + ": the log ends early";
+  if (early_end_) drop_unreadable();
+  finish_index();
+}
+
+void SqliteBag::read_topics() {
+  const Statement topics = prepare("SELECT id, name, type, serialization_format FROM topics");
+  while (step(topics.get())) {
+    LogTopic topic;
+    topic.name = text_of(topics.get(), 1);
+    topic.type = plain_type(text_of(topics.get(), 2));
+    topic.encoding =
+        text_of(topics.get(), 3) == "cdr" ? MessageEncoding::kCdr : MessageEncoding::kOther;
+    topic_of_[sqlite3_column_int64(topics.get(), 0)] = add_topic(topic);
+  }
+}
+
+void SqliteBag::read_messages() {
+  const Statement messages = prepare("SELECT id, topic_id, timestamp FROM messages ORDER BY id");
+  std::int64_t row = 0;
+  int result = sqlite3_step(messages.get());
+  for (; result == SQLITE_ROW; result = sqlite3_step(messages.get())) {
+    row = sqlite3_column_int64(messages.get(), 0);
+    const auto topic = topic_of_.find(sqlite3_column_int64(messages.get(), 1));
+    if (topic == topic_of_.end()) fail(path_, row_of(row) + "expected the id of a topic");
+    messages_.push_back({static_cast<std::uint64_t>(sqlite3_column_int64(messages.get(), 2)),
+                         static_cast<std::uint64_t>(row), 0, topic->second, 0});
+  }
+  if (result == SQLITE_DONE) return;
+  if (result != SQLITE_CORRUPT) fail_by_database();
+  early_end_ = path_.string() + ": " + row_of(row) + "the log ends early behind it";
+}
+
+/// Rows may be there whose data are missing.
+void SqliteBag::drop_unreadable() {
+  const auto is_unreadable = [this](const LogMessage& message) {
+    return select(message) != SQLITE_ROW;
+  };
+  messages_.erase(std::remove_if(messages_.begin(), messages_.end(), is_unreadable),
+                  messages_.end());
+}
+
+/// Result of the search for the data of a message.
+int SqliteBag::select(const LogMessage& message) {
+  sqlite3_reset(select_message_.get());
+  sqlite3_bind_int64(select_message_.get(), 1, static_cast<std::int64_t>(message.block));
+  return sqlite3_step(select_message_.get());
+}
+
+void SqliteBag::read(const LogMessage& message, std::vector<std::uint8_t>& bytes) {
+  const int result = select(message);
+  if (result == SQLITE_DONE) {
+    fail(path_, row_of(static_cast<std::int64_t>(message.block)) + "expected a message");
+  }
+  if (result != SQLITE_ROW) fail_by_database();
+  sqlite3_stmt* const statement = select_message_.get();
+  const auto* const data = static_cast<const std::uint8_t*>(sqlite3_column_blob(statement, 0));
+  bytes.assign(data, data + sqlite3_column_bytes(statement, 0));
+}
+
+SqliteBag::Statement SqliteBag::prepare(const char* sql) {
+  sqlite3_stmt* statement = nullptr;
+  if (sqlite3_prepare_v2(database_.get(), sql, -1, &statement, nullptr) != SQLITE_OK) {
+    fail(path_, std::string("expected the tables of rosbag2: ") + sqlite3_errmsg(database_.get()));
+  }
+  return Statement(statement);
+}
+
+bool SqliteBag::step(sqlite3_stmt* statement) {
+  const int result = sqlite3_step(statement);
+  if (result == SQLITE_ROW) return true;
+  if (result != SQLITE_DONE) fail_by_database();
+  return false;
+}
+
+void SqliteBag::fail_by_database() const {
+  fail(path_, std::string("cannot be read: ") + sqlite3_errmsg(database_.get()));
+}
+
+}  // namespace dynains

@@ -1,0 +1,55 @@
+// Transforms between named frames over time, as in ROS.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dynains/io/trajectory.hpp"
+#include "ros_messages.hpp"
+
+namespace dynains {
+
+/// Adds a pose by its time (s). A second pose of one time is left out.
+void add_in_order(double time, const Eigen::Isometry3d& pose, Trajectory& trajectory);
+
+/// Each frame has one parent. An edge is static, or a trajectory that is interpolated.
+class TransformTree {
+ public:
+  /// Adds T_frame_child of a pose. A static transform replaces earlier ones of its frame. A pose
+  /// that gives a frame a second parent is left out and counted.
+  void add(const StampedPose& pose, bool is_static);
+  std::size_t left_out() const { return left_out_; }
+
+  bool has(const std::string& frame) const { return edges_.count(frame) > 0; }
+  /// The frame above `frame` that has no parent; nothing if the frames above it form a loop.
+  std::optional<std::string> root_of(const std::string& frame) const;
+  /// T_target_source at `time` (s), by the nearest frame above both. Nothing if there is none, or
+  /// if a moving edge on the way has no pose at that time (see match_time()).
+  std::optional<Eigen::Isometry3d> find(const std::string& target, const std::string& source,
+                                        double time) const;
+  /// Names of all frames that have a parent.
+  std::vector<std::string> frames() const;
+
+ private:
+  struct Edge {
+    std::string parent;
+    bool is_static = false;
+    Trajectory poses;  ///< one pose without time if static
+  };
+  /// A frame above another one, and the transform to it.
+  struct Step {
+    std::string frame;
+    Eigen::Isometry3d T_frame_source = Eigen::Isometry3d::Identity();
+  };
+
+  std::vector<Step> climb(const std::string& source, double time) const;
+
+  std::map<std::string, Edge> edges_;  ///< by child
+  std::size_t left_out_ = 0;
+};
+
+}  // namespace dynains

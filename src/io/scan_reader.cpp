@@ -1,0 +1,115 @@
+#include "scan_reader.hpp"
+
+#include <mutex>
+#include <utility>
+
+#include "dynains/io/kitti.hpp"
+#include "dynains/io/point_file.hpp"
+#include "failure.hpp"
+#include "log/log_scans.hpp"
+
+namespace dynains {
+namespace {
+
+void transform(const Eigen::Isometry3d* T_target_file, RecordedScan& points) {
+  if (T_target_file == nullptr) return;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    Eigen::Map<Eigen::Vector3f> p(points.xyzi.data() + 4 * k);
+    p = (*T_target_file * p.cast<double>()).cast<float>();
+  }
+}
+
+/// .bin: float32 x y z intensity.
+class BinReader final : public ScanReader {
+ public:
+  PointColumns columns(const ScanAddress&) const override {
+    PointColumns columns;
+    columns.intensity = true;
+    return columns;
+  }
+  void check(const ScanAddress& scan) const override { count_scan_points(scan.file); }
+  std::uint64_t point_count(const ScanAddress& scan) const override {
+    return count_scan_points(scan.file);
+  }
+  void read(const ScanAddress& scan, const Eigen::Isometry3d* T_target_file,
+            RecordedScan& points) const override {
+    points.ring.clear();
+    points.time.clear();
+    read_scan(scan.file, points.xyzi);
+    transform(T_target_file, points);
+  }
+  std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
+    fail(scan.file, "has no labels");
+  }
+};
+
+/// .pcd and .ply.
+class PointFileReader final : public ScanReader {
+ public:
+  PointColumns columns(const ScanAddress& scan) const override {
+    return read_point_file_header(scan.file).columns;
+  }
+  void check(const ScanAddress& scan) const override { check_point_file(scan.file); }
+  std::uint64_t point_count(const ScanAddress& scan) const override {
+    return read_point_file_header(scan.file).point_count;
+  }
+  void read(const ScanAddress& scan, const Eigen::Isometry3d* T_target_file,
+            RecordedScan& points) const override {
+    PointFile file = read_points(scan.file);
+    points.xyzi.resize(4 * file.positions.size());
+    for (std::size_t k = 0; k < file.positions.size(); ++k) {
+      Eigen::Vector3d p = file.positions[k];
+      if (T_target_file != nullptr) p = *T_target_file * p;
+      float* xyzi = points.xyzi.data() + 4 * k;
+      Eigen::Map<Eigen::Vector3f>(xyzi, 3) = p.cast<float>();
+      xyzi[3] = file.intensity.empty() ? 0.0F : file.intensity[k];
+    }
+    points.ring = std::move(file.ring);
+    points.time = std::move(file.time);
+  }
+  std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
+    PointFile points = read_points(scan.file);
+    if (points.label.size() != points.positions.size()) {
+      fail(scan.file, "expected a column \"label\", as in the first scan");
+    }
+    return std::move(points.label);
+  }
+};
+
+/// Clouds of a log. All of them were checked when it was opened.
+class LogReader final : public ScanReader {
+ public:
+  explicit LogReader(std::unique_ptr<LogScans> scans) : scans_(std::move(scans)) {}
+
+  PointColumns columns(const ScanAddress&) const override { return scans_->columns(); }
+  void check(const ScanAddress&) const override {}
+  std::uint64_t point_count(const ScanAddress& scan) const override {
+    return scans_->point_count(scan.index);
+  }
+  void read(const ScanAddress& scan, const Eigen::Isometry3d* T_target_file,
+            RecordedScan& points) const override {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      scans_->read(scan.index, points);
+    }
+    transform(T_target_file, points);
+  }
+  std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return scans_->read_labels(scan.index);
+  }
+
+ private:
+  std::unique_ptr<LogScans> scans_;
+  mutable std::mutex mutex_;  ///< a log has one place in its file
+};
+
+}  // namespace
+
+std::unique_ptr<ScanReader> make_bin_reader() { return std::make_unique<BinReader>(); }
+std::unique_ptr<ScanReader> make_point_file_reader() { return std::make_unique<PointFileReader>(); }
+std::unique_ptr<ScanReader> make_log_reader(std::unique_ptr<LogScans> scans) {
+  return std::make_unique<LogReader>(std::move(scans));
+}
+
+}  // namespace dynains

@@ -1,0 +1,47 @@
+// How the scans of a recording are read, by their format.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "dynains/io/recording.hpp"
+
+namespace dynains {
+
+class LogScans;
+
+/// A scan of a recording: a file, or a cloud of a log by its index.
+struct ScanAddress {
+  std::filesystem::path file;
+  std::size_t index = 0;
+};
+
+/// All members throw IoError with path, position and the expected content. Several threads may
+/// read.
+class ScanReader {
+ public:
+  virtual ~ScanReader() = default;
+
+  /// Columns in addition to x y z.
+  virtual PointColumns columns(const ScanAddress& scan) const = 0;
+  /// Throws unless header and size of the scan are valid.
+  virtual void check(const ScanAddress& scan) const = 0;
+  /// Points by the header or the size of the file.
+  virtual std::uint64_t point_count(const ScanAddress& scan) const = 0;
+  /// Reads the points (m), transformed by `T_target_file` if there is one. Columns that the scan
+  /// lacks become empty; memory of `points` is reused.
+  virtual void read(const ScanAddress& scan, const Eigen::Isometry3d* T_target_file,
+                    RecordedScan& points) const = 0;
+  /// The column `label`.
+  virtual std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const = 0;
+};
+
+std::unique_ptr<ScanReader> make_bin_reader();
+std::unique_ptr<ScanReader> make_point_file_reader();
+std::unique_ptr<ScanReader> make_log_reader(std::unique_ptr<LogScans> scans);
+
+}  // namespace dynains

@@ -1,0 +1,97 @@
+// Logs of ROS: whatever the file holds, scans with poses or an IoError that names the log.
+#include <cmath>
+#include <filesystem>
+#include <string>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/recording.hpp"
+#include "io/files.hpp"
+#include "io/log_writer.hpp"
+#include "targets.hpp"
+
+namespace dynains::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+using test::LogChannel;
+using test::WrittenMessage;
+
+// The first byte of an input chooses the format.
+const char* const kNames[] = {"log.mcap", "log.bag", "log.db3"};
+
+void read_whole(const fs::path& log, std::size_t bytes) {
+  const Recording recording(log);
+  require(recording.size() > 0, "a recording has scans");
+  RecordedScan scan;
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    require(recording.T_world_sensor(i).matrix().allFinite(), "poses are finite");
+    require(i == 0 || recording.time(i) > recording.time(i - 1), "times increase");
+    recording.read_scan(i, scan);
+    require(scan.size() == recording.point_count(i), "as many points as announced");
+    require(scan.size() <= bytes || bytes > (1U << 16U), "points come from bytes");
+    require(scan.ring.empty() || scan.ring.size() == scan.size(), "a ring for each point");
+    require(scan.time.empty() || scan.time.size() == scan.size(), "a time for each point");
+    if (recording.has_labels()) {
+      require(recording.read_labels(i).size() == scan.size(), "a label for each point");
+    }
+  }
+}
+
+/// Two clouds of all fields and their poses, by transforms or odometry.
+std::vector<WrittenMessage> drive(MessageEncoding encoding, bool by_transforms) {
+  const std::vector<test::CloudField> fields = {{"x", 0, 7},      {"y", 4, 7},     {"z", 8, 7},
+                                                {"label", 12, 6}, {"ring", 16, 4}, {"t", 18, 6}};
+  test::ByteWriter points;
+  for (const float x : {1.0F, 2.0F}) {
+    points.number(x).number(2.0F).number(3.0F).number(9U).number(std::uint16_t{1}).number(50U);
+  }
+  std::vector<WrittenMessage> messages;
+  for (const double time : {1.0, 1.5}) {
+    const std::uint64_t at = test::nanoseconds(time);
+    const Eigen::Isometry3d pose = test::pose_at(time, 0.5);
+    messages.push_back(
+        {0, at, test::cloud_message(encoding, time, "lidar", fields, 22, points.text())});
+    messages.push_back({1, at,
+                        by_transforms ? test::transform(time, "odom", "lidar", pose, encoding)
+                                      : test::odometry(time, "lidar", pose, encoding)});
+  }
+  return messages;
+}
+
+std::vector<LogChannel> channels(bool by_transforms) {
+  return {{"/points", "sensor_msgs/PointCloud2"},
+          by_transforms ? LogChannel{"/tf", "tf2_msgs/TFMessage"}
+                        : LogChannel{"/odom", "nav_msgs/Odometry"}};
+}
+
+}  // namespace
+
+void run_log(Bytes bytes) {
+  if (bytes.empty()) return;
+  static const test::TemporaryFolder folder;
+  const fs::path log = folder / kNames[bytes[0] % 3];
+  test::write_text(log, {reinterpret_cast<const char*>(bytes.data()) + 1, bytes.size() - 1});
+  try {
+    read_whole(log, bytes.size());
+  } catch (const IoError& error) {
+    require(std::string(error.what()).rfind(log.string(), 0) == 0, "the error names the log");
+  }
+}
+
+std::vector<std::string> log_seeds() {
+  std::vector<std::string> seeds;
+  for (const std::string compression : {"", "lz4", "zstd"}) {
+    test::McapParts parts;
+    parts.compression = compression;
+    parts.message_index = compression != "lz4";
+    seeds.push_back(std::string(1, '\0') +
+                    test::mcap_file(channels(true), drive(MessageEncoding::kCdr, true), parts));
+  }
+  seeds.push_back('\1' + test::bag_file(channels(false), drive(MessageEncoding::kRos1, false),
+                                        {true, true, "none"}));
+  seeds.push_back('\1' + test::bag_file(channels(true), drive(MessageEncoding::kRos1, true),
+                                        {false, false, "lz4"}));
+  return seeds;
+}
+
+}  // namespace dynains::fuzz

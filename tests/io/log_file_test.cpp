@@ -1,0 +1,300 @@
+#include "log/log_file.hpp"
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "db3_writer.hpp"
+#include "dynains/errors.hpp"
+#include "files.hpp"
+#include "log/decompress.hpp"
+#include "log_writer.hpp"
+#include "support/catch.hpp"
+
+namespace dynains {
+
+using namespace test;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::vector<LogChannel> kChannels = {{"/points", "sensor_msgs/msg/PointCloud2"},
+                                           {"/chatter", "std_msgs/msg/String"}};
+
+/// Seven messages, not quite in the order of their times.
+std::vector<WrittenMessage> seven_messages() {
+  std::vector<WrittenMessage> messages;
+  for (const std::uint64_t time : {10, 20, 40, 30, 50, 60, 70}) {
+    messages.push_back(
+        {static_cast<std::uint16_t>(time / 10 % 2), time, "message " + std::to_string(time)});
+  }
+  return messages;
+}
+
+const std::string kAllMessages =
+    "10 /chatter message 10\n20 /points message 20\n30 /chatter message 30\n"
+    "40 /points message 40\n50 /chatter message 50\n60 /points message 60\n"
+    "70 /chatter message 70\n";
+
+/// Times and contents of all messages.
+std::string contents(LogFile& log) {
+  std::string all;
+  std::vector<std::uint8_t> bytes;
+  for (const LogMessage& message : log.messages()) {
+    log.read(message, bytes);
+    all += std::to_string(message.time) + ' ' + log.topics()[message.topic].name + ' ' +
+           std::string(bytes.begin(), bytes.end()) + '\n';
+  }
+  return all;
+}
+
+std::string read_error(const fs::path& path) {
+  return message_of<IoError>([&] { contents(*open_log(path)); });
+}
+
+void check_messages(LogFile& log) {
+  CHECK(contents(log) == kAllMessages);
+  REQUIRE(log.topics().size() == 2);
+  CHECK(log.topics()[0].type == "sensor_msgs/PointCloud2");
+  CHECK(log.topics()[0].message_count == 3);
+  CHECK_FALSE(log.early_end());
+}
+
+std::string mcap(const McapParts& parts = {}) {
+  return mcap_file(kChannels, seven_messages(), parts);
+}
+std::string bag(const BagParts& parts = {}) {
+  return bag_file({{"/points", "sensor_msgs/PointCloud2"}, {"/chatter", "std_msgs/String"}},
+                  seven_messages(), parts);
+}
+
+/// Whether this build decompresses `method`.
+bool has(const std::string& method) {
+  std::vector<std::uint8_t> output;
+  return decompress(method, {}, 1, output).find("this build has no") == std::string::npos;
+}
+
+}  // namespace
+
+TEST_CASE("Every kind of MCAP file gives the same messages, by time") {
+  const TemporaryFolder folder;
+  for (const std::string compression : {"", "lz4", "zstd"}) {
+    if (!compression.empty() && !has(compression)) continue;
+    for (const int choice : {0, 1, 2, 3, 4, 5, 6, 7}) {
+      CAPTURE(compression, choice);
+      McapParts parts;
+      parts.chunks = (choice & 1) != 0;
+      parts.message_index = (choice & 2) != 0;
+      parts.summary = (choice & 4) != 0;
+      parts.compression = compression;
+      write_text(folder / "log.mcap", mcap(parts));
+      check_messages(*open_log(folder / "log.mcap"));
+    }
+  }
+}
+
+TEST_CASE("Every kind of bag gives the same messages, by time") {
+  const TemporaryFolder folder;
+  for (const bool index : {true, false}) {
+    for (const std::string compression : {"none", "lz4"}) {
+      if (compression != "none" && !has(compression)) continue;
+      CAPTURE(index, compression);
+      write_text(folder / "log.bag", bag({index, true, compression}));
+      check_messages(*open_log(folder / "log.bag"));
+    }
+  }
+  // The recorder did not close it.
+  write_text(folder / "log.bag", bag({true, false, "none"}));
+  const auto log = open_log(folder / "log.bag");
+  CHECK(contents(*log) == kAllMessages);
+  REQUIRE(log->early_end());
+  CHECK_THAT(*log->early_end(),
+             ContainsSubstring("log.bag: byte ") && ContainsSubstring("the log ends early"));
+}
+
+TEST_CASE("A database of rosbag2 gives its messages, by time") {
+  const TemporaryFolder folder;
+  const fs::path path = folder / "log #1?.db3";
+#if defined(DYNAINS_HAS_SQLITE3)
+  write_db3(path, kChannels, seven_messages());
+  const std::size_t entries = count_entries(folder.path());
+  check_messages(*open_log(path));
+  CHECK(count_entries(folder.path()) == entries);
+
+  std::vector<WrittenMessage> large = seven_messages();
+  for (WrittenMessage& message : large) message.data.append(20000, 'x');
+  fs::remove(path);
+  write_db3(path, kChannels, large);
+  const std::string whole = read_text(path);
+  for (const double share : {0.3, 0.6, 0.9, 0.99}) {
+    write_text(
+        path, whole.substr(0, static_cast<std::size_t>(share * static_cast<double>(whole.size()))));
+    const auto cut = open_log(path);
+    const std::string all = contents(*cut);
+    CHECK(cut->messages().size() < 7);
+    CHECK(all.empty() == (share < 0.5));
+    REQUIRE(cut->early_end());
+    CHECK_THAT(*cut->early_end(),
+               StartsWith(path.string() + ": ") && ContainsSubstring("the log ends early"));
+  }
+
+  write_text(path, "no database");
+  CHECK_THAT(read_error(path), StartsWith(path.string() + ": expected the tables of rosbag2"));
+  fs::remove(path);
+  write_db3(path, {}, {{1, 10, "message"}});
+  CHECK(read_error(path) == path.string() + ": row 1 of messages: expected the id of a topic");
+#else
+  write_text(path, "");
+  CHECK_THAT(read_error(path), ContainsSubstring("libsqlite3-dev"));
+#endif
+}
+
+TEST_CASE("A folder of rosbag2 may have several files") {
+  const TemporaryFolder folder;
+  write_text(folder / "metadata.yaml", "");
+  CHECK_FALSE(is_log(folder.path()));
+  const std::vector<WrittenMessage> messages = seven_messages();
+  const std::vector<LogChannel> swapped = {kChannels[1], kChannels[0]};
+  std::vector<WrittenMessage> rest(messages.begin() + 4, messages.end());
+  for (WrittenMessage& message : rest) message.channel ^= 1U;
+  write_text(folder / "log_0.mcap",
+             mcap_file(kChannels, {messages.begin(), messages.begin() + 4}, {}));
+  write_text(folder / "log_1.mcap", mcap_file(swapped, rest, {}));
+  CHECK(is_log(folder.path()));
+  const auto log = open_log(folder.path());
+  check_messages(*log);
+  CHECK(log->files() == std::vector<fs::path>{folder / "metadata.yaml", folder / "log_0.mcap",
+                                              folder / "log_1.mcap"});
+}
+
+TEST_CASE("A log that is cut off anywhere gives the messages before that byte") {
+  const TemporaryFolder folder;
+  const auto check_cuts = [&](const std::string& name, const std::string& whole, std::size_t first,
+                              std::size_t last) {
+    std::size_t before = 0;
+    for (std::size_t size = first; size < last; size += 5) {
+      CAPTURE(name, size);
+      write_text(folder / name, whole.substr(0, size));
+      const auto log = open_log(folder / name);
+      const std::string all = contents(*log);
+      const std::size_t count = log->messages().size();
+      // No message is lost with the index of its chunk.
+      if (count < before) FAIL(count << " messages after " << before);
+      if (!log->early_end()) FAIL("no early end");
+      before = count;
+    }
+    CHECK(before == 7);
+  };
+  for (const bool index : {true, false}) {
+    McapParts parts;
+    parts.message_index = index;
+    const std::string whole = mcap(parts);
+    check_cuts("cut.mcap", whole, 8, whole.size() - 28);
+    const std::string bag_of_ros = bag({index, true, "none"});
+    check_cuts("cut.bag", bag_of_ros, 13, bag_of_ros.size());
+  }
+  // Zeros at the end, as some file systems leave them after a crash.
+  write_text(folder / "cut.mcap", mcap().substr(0, 900) + std::string(5000, '\0'));
+  CHECK(open_log(folder / "cut.mcap")->early_end());
+}
+
+TEST_CASE("Damaged logs give path, byte and expectation") {
+  const TemporaryFolder folder;
+  struct Case {
+    std::string name;
+    std::string bytes;
+    std::string expected;
+  };
+  McapParts checksum;
+  checksum.checksum = 12345;
+  McapParts unknown;
+  unknown.compression = "xz";
+  // A chunk whose uncompressed size is 2^40 bytes is refused before any memory is asked for.
+  std::string large = mcap();
+  const std::size_t chunk = large.find('\x06', 20);
+  large[chunk + 9 + 16 + 5] = '\x01';
+  std::string longer = mcap();
+  longer[chunk + 9 + 16 + 8 + 4 + 4 + 6] = '\x01';  // its compressed size
+  std::string no_op = bag();
+  no_op[no_op.find("op=")] = 'x';
+  std::string encrypted = bag();
+  encrypted.replace(encrypted.find("conn_count"), 10, "encryptor=");
+  const std::vector<Case> cases = {
+      {"log.mcap", "", ": byte 0: expected the magic bytes of MCAP, version 0"},
+      {"log.mcap", "no log at all", ": byte 0: expected the magic bytes of MCAP, version 0"},
+      {"log.mcap", mcap(checksum), ": expected the checksum of the chunk, found that of other"},
+      {"log.mcap", mcap(unknown), ": expected lz4, zstd, bz2 or none, found \"xz\""},
+      {"log.mcap", large, ": expected a chunk of at most 268435456 bytes, found the size 1099"},
+      {"log.mcap", longer, " bytes, found the size 281474976"},
+      {"log.mcap", mcap_file({kChannels[0]}, seven_messages(), {}),
+       ": expected a message of a known channel, found channel 1"},
+      {"log.bag", "", ": byte 0: expected \"#ROSBAG V2.0\""},
+      {"log.bag", "#ROSBAG V1.2\n", ": byte 0: expected \"#ROSBAG V2.0\""},
+      {"log.bag", bag({true, true, "xz"}), ": expected lz4, zstd, bz2 or none, found \"xz\""},
+      {"log.bag", no_op, ": expected the header field op"},
+      {"log.bag", encrypted, ": expected a bag without encryption"},
+      {"log.txt", "", ": expected a log with the name *.mcap, *.db3 or *.bag"},
+  };
+  for (const Case& one : cases) {
+    write_text(folder / one.name, one.bytes);
+    CHECK_THAT(read_error(folder / one.name),
+               StartsWith((folder / one.name).string() + ": ") && ContainsSubstring(one.expected));
+  }
+  CHECK_THAT(read_error(folder / "none.mcap"), ContainsSubstring("No such file"));
+}
+
+TEST_CASE("Any byte of a log may be wrong") {
+  const TemporaryFolder folder;
+  for (const auto& [name, whole] :
+       {std::pair<std::string, std::string>{"log.mcap", mcap()}, {"log.bag", bag()}}) {
+    std::size_t refused = 0;
+    for (std::size_t i = 0; i < whole.size(); i += 2) {
+      std::string bytes = whole;
+      bytes[i] = i % 3 == 0 ? '\0' : i % 3 == 1 ? '\x7F' : '\xFF';
+      write_text(folder / name, bytes);
+      const std::string error = read_error(folder / name);
+      if (error == "(nothing was thrown)") continue;
+      ++refused;
+      if (error.rfind((folder / name).string(), 0) != 0) FAIL(error);
+    }
+    CHECK(refused > 100);
+  }
+}
+
+TEST_CASE("Compressed blocks are decompressed to the announced size, and to no other") {
+  std::vector<std::uint8_t> output;
+  const auto decompressed = [&](const std::string& method, const std::string& bytes,
+                                std::uint64_t size) {
+    return decompress(method, {bytes.begin(), bytes.end()}, size, output);
+  };
+  CHECK(decompressed("bz9", "", 1) == "expected lz4, zstd, bz2 or none, found \"bz9\"");
+  const std::string text = "to be or not to be";
+  const std::string bz2(
+      "\x42\x5a\x68\x39\x31\x41\x59\x26\x53\x59\xd3\x46\x11\xd3\x00\x00"
+      "\x08\x11\x80\x40\x00\x12\x01\x94\x00\x20\x00\x21\x29\xa3\x10\x86"
+      "\x01\x91\xd6\x41\x68\xad\x27\x78\xbb\x92\x29\xc2\x84\x86\x9a\x30"
+      "\x8e\x98",
+      50);
+  for (const std::string method : {"lz4", "zstd", "bz2"}) {
+    CAPTURE(method);
+    const std::string bytes = method == "bz2" ? bz2 : compressed(method, text);
+    if (!has(method)) {
+      CHECK(decompressed(method, bytes, text.size()) ==
+            "this build has no " + method + " (Debian: lib" + method + "-dev)");
+      continue;
+    }
+    CHECK(decompressed(method, bytes, text.size()).empty());
+    CHECK(std::string(output.begin(), output.end()) == text);
+    CHECK_FALSE(decompressed(method, bytes, text.size() - 1).empty());
+    CHECK_FALSE(decompressed(method, bytes, std::uint64_t{1} << 40U).empty());
+    CHECK(output.capacity() < 10000000);
+    CHECK_FALSE(decompressed(method, bytes.substr(0, bytes.size() - 1), text.size()).empty());
+    CHECK_FALSE(decompressed(method, "12345678", 100).empty());
+    CHECK_FALSE(decompressed(method, "", 100).empty());
+  }
+  CHECK(crc32(reinterpret_cast<const std::uint8_t*>("123456789"), 9) == 0xCBF43926U);
+  CHECK(crc32(nullptr, 0) == 0);
+}
+
+}  // namespace dynains

@@ -1,0 +1,294 @@
+// Logs as recordings: topics, poses, labels, files.
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "db3_writer.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/io/recording.hpp"
+#include "files.hpp"
+#include "log_writer.hpp"
+#include "support/catch.hpp"
+
+namespace dynains {
+
+using namespace test;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+const Eigen::Isometry3d kT_base_lidar = pose_at(0.5, M_PI / 2);
+
+const LogChannel kPoints = {"/points", "sensor_msgs/msg/PointCloud2"};
+const LogChannel kTf = {"/tf", "tf2_msgs/msg/TFMessage"};
+const LogChannel kStaticTf = {"/tf_static", "tf2_msgs/msg/TFMessage"};
+const LogChannel kOdometry = {"/odom", "nav_msgs/msg/Odometry"};
+
+/// Four clouds, one metre apart along x.
+std::vector<WrittenMessage> drive_by_transforms(MessageEncoding encoding) {
+  std::vector<WrittenMessage> messages = {
+      {2, nanoseconds(1.0), transform(1.0, "base", "lidar", kT_base_lidar, encoding)}};
+  for (int i = 0; i < 4; ++i) {
+    const double time = 1.0 + 0.1 * i;
+    messages.push_back(
+        {1, nanoseconds(time), transform(time, "odom", "base", pose_at(i, 0), encoding)});
+    messages.push_back({0, nanoseconds(time + 0.03), small_cloud(time, "lidar", encoding)});
+  }
+  return messages;
+}
+
+std::string drive_mcap() {
+  return mcap_file({kPoints, kTf, kStaticTf}, drive_by_transforms(MessageEncoding::kCdr), {});
+}
+
+/// Three clouds in frame `frame` on channel 0, and `poses` on channel 1.
+std::vector<WrittenMessage> clouds_with(const std::string& frame,
+                                        const std::vector<std::string>& poses) {
+  std::vector<WrittenMessage> messages;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double time = 1.0 + 0.1 * static_cast<double>(i);
+    messages.push_back({0, nanoseconds(time), small_cloud(time, frame)});
+    if (i < poses.size()) messages.push_back({1, nanoseconds(time), poses[i]});
+  }
+  return messages;
+}
+
+std::vector<std::string> three_odometries(const std::string& child) {
+  std::vector<std::string> messages;
+  for (int i = 0; i < 3; ++i) {
+    messages.push_back(odometry(1.0 + 0.1 * i, child, pose_at(i, 0.1)));
+  }
+  return messages;
+}
+
+std::string error_of(const fs::path& log, const RecordingOptions& options = {}) {
+  return message_of<IoError>([&] { Recording(log, options); });
+}
+
+bool has_note(const Recording& recording, const std::string& part) {
+  return std::any_of(recording.notes().begin(), recording.notes().end(),
+                     [&](const auto& note) { return note.find(part) != std::string::npos; });
+}
+
+void check_drive(const fs::path& log) {
+  CAPTURE(log);
+  const Recording recording(log);
+  REQUIRE(recording.size() == 4);
+  CHECK(recording.format() == ScanFormat::kLog);
+  CHECK(recording.name(3) == "000003");
+  CHECK(recording.number(3) == 3);
+  CHECK(recording.time(2) == Approx(1.2));
+  CHECK(recording.T_world_sensor(2).isApprox(pose_at(2, 0) * kT_base_lidar, 1e-9));
+  CHECK(recording.point_count(1) == 2);
+  CHECK(recording.read_scan(1).xyzi == std::vector<float>{1, 2, 3, 0, 4, 5, 6, 0});
+  CHECK_FALSE(recording.columns().ring);
+  CHECK_FALSE(recording.has_labels());
+  CHECK_FALSE(recording.early_end());
+  CHECK(recording.files() == std::vector<fs::path>{log});
+}
+
+}  // namespace
+
+TEST_CASE("A log of each format is a recording: clouds, and poses by transforms") {
+  const TemporaryFolder folder;
+  write_text(folder / "drive.mcap", drive_mcap());
+  check_drive(folder / "drive.mcap");
+  write_text(folder / "drive.bag", bag_file({{"/points", "sensor_msgs/PointCloud2"},
+                                             {"/tf", "tf/tfMessage"},
+                                             {"/tf_static", "tf2_msgs/TFMessage"}},
+                                            drive_by_transforms(MessageEncoding::kRos1), {}));
+  check_drive(folder / "drive.bag");
+#if defined(DYNAINS_HAS_SQLITE3)
+  write_db3(folder / "drive.db3", {kPoints, kTf, kStaticTf},
+            drive_by_transforms(MessageEncoding::kCdr));
+  check_drive(folder / "drive.db3");
+#endif
+}
+
+TEST_CASE("Poses of a file belong to the clouds of a log by time") {
+  const TemporaryFolder folder;
+  write_text(folder / "drive.mcap", drive_mcap());
+  write_text(folder / "poses.tum",
+             "1.0 5 0 0 0 0 0 1\n1.1 6 0 0 0 0 0 1\n1.2 7 0 0 0 0 0 1\n1.3 8 0 0 0 0 0 1\n");
+  RecordingOptions options;
+  options.poses = folder / "poses.tum";
+  const Recording recording(folder / "drive.mcap", options);
+  CHECK(recording.T_world_sensor(2).translation().x() == Approx(7.0));
+  CHECK(recording.files() == std::vector<fs::path>{folder / "drive.mcap", folder / "poses.tum"});
+  options.times = folder / "times.txt";
+  CHECK_THAT(error_of(folder / "drive.mcap", options),
+             StartsWith((folder / "times.txt").string() + ": expected no file of times"));
+}
+
+TEST_CASE("A topic of poses gets the transform to the sensor from the log") {
+  const TemporaryFolder folder;
+  const fs::path log = folder / "drive.mcap";
+  std::vector<WrittenMessage> messages = clouds_with("lidar", three_odometries("base"));
+  messages.push_back({2, nanoseconds(1.0), transform(1.0, "base", "lidar", kT_base_lidar)});
+  write_text(log, mcap_file({kPoints, kOdometry, kStaticTf}, messages, {}));
+  CHECK(Recording(log).T_world_sensor(2).isApprox(pose_at(2, 0.1) * kT_base_lidar, 1e-9));
+  CHECK(has_note(Recording(log), "the transform from lidar to base is from the log"));
+
+  messages.pop_back();
+  write_text(log, mcap_file({kPoints, kOdometry}, messages, {}));
+  CHECK(Recording(log).T_world_sensor(2).isApprox(pose_at(2, 0.1), 1e-9));
+  CHECK(has_note(Recording(log), "no transform from lidar to base: poses count as those of lidar"));
+
+  std::vector<std::string> poses;
+  for (int i = 0; i < 3; ++i) {
+    poses.push_back(FieldWriter(MessageEncoding::kCdr)
+                        .header(1.0 + 0.1 * i, "map")
+                        .pose(pose_at(i, 0.1))
+                        .text());
+  }
+  write_text(log, mcap_file({kPoints, {"/pose", "geometry_msgs/msg/PoseStamped"}},
+                            clouds_with("lidar", poses), {}));
+  CHECK(Recording(log).T_world_sensor(1).isApprox(pose_at(1, 0.1), 1e-9));
+}
+
+TEST_CASE("Clouds in the fixed frame of the poses come back in the frame of the sensor") {
+  const TemporaryFolder folder;
+  write_text(folder / "drive.mcap",
+             mcap_file({kPoints, kOdometry}, clouds_with("odom", three_odometries("body")), {}));
+  const Recording recording(folder / "drive.mcap");
+  CHECK(recording.frame() == PointFrame::kWorld);
+  const RecordedScan scan = recording.read_scan(2);
+  const Eigen::Vector3d expected = pose_at(2, 0.1).inverse() * Eigen::Vector3d(1, 2, 3);
+  CHECK(Eigen::Vector3f(scan.xyzi.data()).isApprox(expected.cast<float>(), 1e-5F));
+}
+
+TEST_CASE("Topics are found if they are the only ones, and listed otherwise") {
+  const TemporaryFolder folder;
+  const fs::path log = folder / "drive.mcap";
+  std::vector<WrittenMessage> messages = clouds_with("lidar", three_odometries("base"));
+  for (const WrittenMessage& message : clouds_with("rear", three_odometries("wheels"))) {
+    messages.push_back(
+        {static_cast<std::uint16_t>(message.channel + 2), message.time, message.data});
+  }
+  write_text(log, mcap_file({kPoints,
+                             kOdometry,
+                             {"/rear", "sensor_msgs/msg/PointCloud2"},
+                             {"/wheels", "nav_msgs/msg/Odometry"}},
+                            messages, {}));
+  RecordingOptions options;
+  CHECK(error_of(log) == log.string() +
+                             ": expected one topic with clouds, or --cloud-topic; found /points "
+                             "(sensor_msgs/PointCloud2, 3 messages), /rear "
+                             "(sensor_msgs/PointCloud2, 3 messages)");
+  options.cloud_topic = "/none";
+  CHECK_THAT(error_of(log, options), ContainsSubstring("expected clouds on topic /none; found /p"));
+  options.cloud_topic = "/points";
+  CHECK_THAT(error_of(log, options),
+             ContainsSubstring("expected one topic with poses, or --pose-topic; found /odom"));
+  options.pose_topic = "/points";
+  CHECK_THAT(error_of(log, options), ContainsSubstring("expected poses on topic /points; found"));
+  options.pose_topic = "/odom";
+  CHECK(Recording(log, options).size() == 3);
+
+  write_text(log, mcap_file({kPoints}, clouds_with("lidar", {}), {}));
+  CHECK_THAT(error_of(log), ContainsSubstring("expected a topic with poses, or a file of poses"));
+  write_text(log, mcap_file({kOdometry}, {{0, 1, three_odometries("base")[0]}}, {}));
+  CHECK_THAT(error_of(log), ContainsSubstring("expected a topic with clouds; found /odom"));
+}
+
+TEST_CASE("--pose-frame-id takes the poses from transforms, in that frame") {
+  const TemporaryFolder folder;
+  std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
+  messages.push_back({2, nanoseconds(1.0), transform(1.0, "map", "odom", pose_at(100, 1))});
+  messages.push_back({3, nanoseconds(1.0), odometry(1.0, "base", pose_at(50, 0))});
+  write_text(folder / "drive.mcap", mcap_file({kPoints, kTf, kStaticTf, kOdometry}, messages, {}));
+  RecordingOptions options;
+  options.pose_topic = "/tf";
+  CHECK(Recording(folder / "drive.mcap", options)
+            .T_world_sensor(0)
+            .isApprox(pose_at(100, 1) * pose_at(0, 0) * kT_base_lidar, 1e-9));
+  options.pose_topic.clear();
+  options.pose_frame = "odom";
+  CHECK(Recording(folder / "drive.mcap", options)
+            .T_world_sensor(0)
+            .isApprox(pose_at(0, 0) * kT_base_lidar, 1e-9));
+  options.pose_frame = "utm";
+  CHECK_THAT(error_of(folder / "drive.mcap", options),
+             ContainsSubstring("expected poses of frame lidar in utm at the times of the clouds"));
+}
+
+TEST_CASE("Poses and clouds that make no sense are refused with their place") {
+  const TemporaryFolder folder;
+  const fs::path log = folder / "drive.mcap";
+  Eigen::Isometry3d not_finite = pose_at(0, 0);
+  not_finite.translation().x() = std::numeric_limits<double>::quiet_NaN();
+  struct Case {
+    LogChannel poses;
+    std::vector<std::string> messages;
+    std::string expected;
+  };
+  const std::vector<Case> cases = {
+      {kOdometry, {odometry(1, "base", not_finite)}, "/odom at 1000000000 ns: expected a finite"},
+      {kOdometry, {"\1"}, "/odom at 1000000000 ns: byte 0: expected 4 bytes of the header of CDR"},
+      {kTf,
+       {transform(1, "odom", "base", pose_at(0, 0))},
+       "expected a transform of frame lidar, that of the clouds; found transforms of base"},
+      {kTf, {transform(1, "lidar", "lidar", pose_at(0, 0))}, "found a loop above frame lidar"},
+      {kTf,
+       {transform(1, "base", "lidar", pose_at(0, 0)), transform(1, "lidar", "base", pose_at(0, 0))},
+       "found a loop above frame lidar"},
+      {kOdometry,
+       {odometry(50, "", pose_at(0, 0))},
+       "expected poses of frame lidar in odom at the times of the clouds, found none"},
+  };
+  for (const Case& one : cases) {
+    write_text(log, mcap_file({kPoints, one.poses}, clouds_with("lidar", one.messages), {}));
+    CHECK_THAT(error_of(log), StartsWith(log.string() + ": ") && ContainsSubstring(one.expected));
+  }
+  std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
+  messages.back().data = small_cloud(1.3, "rear");
+  write_text(log, mcap_file({kPoints, kTf, kStaticTf}, messages, {}));
+  CHECK_THAT(error_of(log), ContainsSubstring("/points at 1330000000 ns: expected a cloud of frame "
+                                              "lidar, as before; found frame rear"));
+}
+
+TEST_CASE("Clouds whose stamps do not increase are left out and counted") {
+  const TemporaryFolder folder;
+  const fs::path log = folder / "drive.mcap";
+  std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
+  messages.push_back({0, nanoseconds(1.32), small_cloud(1.1, "lidar")});
+  write_text(log, mcap_file({kPoints, kTf, kStaticTf}, messages, {}));
+  const Recording recording(log);
+  CHECK(recording.size() == 4);
+  CHECK(has_note(recording, "1 of 5 clouds have a stamp that is not after"));
+
+  for (WrittenMessage& message : messages) {
+    if (message.channel == 0) message.data = small_cloud(1.0, "lidar");
+  }
+  write_text(log, mcap_file({kPoints, kTf, kStaticTf}, messages, {}));
+  CHECK_THAT(error_of(log), ContainsSubstring("expected stamps that increase: 4 of 5 clouds"));
+}
+
+TEST_CASE("A field label gives the labels; a log that ends early gives the scans before") {
+  const TemporaryFolder folder;
+  std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
+  std::vector<CloudField> fields = kXyz;
+  fields.push_back({"label", 12, 6});
+  const std::string points = xyz_of({1, 2, 3}) + ByteWriter().number(0x1000FBU).text();
+  for (WrittenMessage& message : messages) {
+    if (message.channel != 0) continue;
+    message.data = cloud_message(MessageEncoding::kCdr, 1e-9 * static_cast<double>(message.time),
+                                 "lidar", fields, 16, points);
+  }
+  const std::string whole = mcap_file({kPoints, kTf, kStaticTf}, messages, {});
+  write_text(folder / "drive.mcap", whole);
+  const Recording recording(folder / "drive.mcap");
+  CHECK(recording.has_labels());
+  CHECK(recording.read_labels(1) == std::vector<std::uint32_t>{0x1000FBU});
+
+  write_text(folder / "cut.mcap", whole.substr(0, whole.size() / 2));
+  const Recording cut(folder / "cut.mcap");
+  CHECK(cut.size() < 4);
+  REQUIRE(cut.early_end());
+  CHECK_THAT(*cut.early_end(), StartsWith((folder / "cut.mcap").string() + ": byte "));
+  CHECK(has_note(cut, "the log ends early"));
+}
+
+}  // namespace dynains

@@ -1,0 +1,171 @@
+// Log files for tests, with a choice of optional parts.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "ros_writer.hpp"
+
+namespace dynains::test {
+
+struct McapParts {
+  bool chunks = true;
+  bool message_index = true;
+  bool summary = true;  ///< repeats schemas and channels at the end
+  std::uint32_t checksum = 0;
+  std::string compression;  ///< a name; "lz4" and "zstd" are written
+};
+
+struct LogChannel {
+  std::string topic;
+  std::string type;
+  std::string encoding = "cdr";
+};
+
+struct WrittenMessage {
+  std::uint16_t channel;
+  std::uint64_t time;  ///< ns
+  std::string data;
+};
+
+/// Frames of both formats may hold bytes as they are.
+inline std::string compressed(const std::string& method, const std::string& bytes) {
+  const auto size = static_cast<std::uint32_t>(bytes.size());
+  if (method == "lz4") {
+    const std::string head("\x04\x22\x4D\x18\x60\x40\x82", 7);
+    return ByteWriter().raw(head).number(size | 1U << 31U).raw(bytes).number(0U).text();
+  }
+  if (method == "zstd") {
+    const std::uint32_t block = size << 3U | 1U;  // the last block, raw
+    const std::string block_head = ByteWriter().number(block).text().substr(0, 3);
+    const std::string head("\x28\xB5\x2F\xFD\xA0", 5);
+    return ByteWriter().raw(head).number(size).raw(block_head).raw(bytes).text();
+  }
+  return bytes;
+}
+
+/// An MCAP file with a chunk for every two messages.
+inline std::string mcap_file(const std::vector<LogChannel>& channels,
+                             const std::vector<WrittenMessage>& messages, const McapParts& parts) {
+  const auto record = [](std::uint8_t opcode, const std::string& content) {
+    return ByteWriter().number(opcode).number(std::uint64_t{content.size()}).raw(content).text();
+  };
+  std::string definitions;
+  for (std::uint16_t i = 0; i < channels.size(); ++i) {
+    const auto id = static_cast<std::uint16_t>(i + 1);
+    definitions += record(
+        3, ByteWriter().number(id).string(channels[i].type).string("ros2msg").string("").text());
+    definitions += record(4, ByteWriter()
+                                 .number(i)
+                                 .number(id)
+                                 .string(channels[i].topic)
+                                 .string(channels[i].encoding)
+                                 .string("")
+                                 .text());
+  }
+  const std::string magic("\x89MCAP0\r\n", 8);
+  std::string file = magic + record(1, ByteWriter().string("ros2").string("test").text());
+  if (!parts.chunks) file += definitions;
+  for (std::size_t begin = 0; begin < messages.size(); begin += 2) {
+    std::string records = parts.chunks && begin == 0 ? definitions : std::string();
+    std::vector<std::pair<const WrittenMessage*, std::uint64_t>> offsets;
+    for (std::size_t i = begin; i < std::min(begin + 2, messages.size()); ++i) {
+      const WrittenMessage& message = messages[i];
+      offsets.emplace_back(&message, records.size());
+      records += record(5, ByteWriter()
+                               .number(message.channel)
+                               .number(static_cast<std::uint32_t>(i))
+                               .number(message.time)
+                               .number(message.time)
+                               .raw(message.data)
+                               .text());
+    }
+    if (!parts.chunks) {
+      file += records;
+      continue;
+    }
+    const std::string content = compressed(parts.compression, records);
+    file += record(6, ByteWriter()
+                          .number(messages[begin].time)
+                          .number(messages[begin].time)
+                          .number(std::uint64_t{records.size()})
+                          .number(parts.checksum)
+                          .string(parts.compression)
+                          .number(std::uint64_t{content.size()})
+                          .raw(content)
+                          .text());
+    if (!parts.message_index) continue;
+    for (const auto& [message, offset] : offsets) {
+      file += record(7, ByteWriter()
+                            .number(message->channel)
+                            .number(std::uint32_t{16})
+                            .number(message->time)
+                            .number(offset)
+                            .text());
+    }
+  }
+  file += record(15, ByteWriter().number(std::uint32_t{0}).text());
+  if (parts.summary) file += definitions;
+  return file + record(2, std::string(20, '\0')) + magic;
+}
+
+struct BagParts {
+  bool index = true;
+  bool is_closed = true;  ///< place of the index in the header, and the index section
+  std::string compression = "none";
+};
+
+/// A bag of ROS 1 with a chunk for every two messages.
+inline std::string bag_file(const std::vector<LogChannel>& channels,
+                            const std::vector<WrittenMessage>& messages, const BagParts& parts) {
+  const auto field = [](const std::string& name, const std::string& value) {
+    return ByteWriter().string(name + '=' + value).text();
+  };
+  const auto bytes = [](auto value) { return ByteWriter().number(value).text(); };
+  const auto record = [&](std::uint8_t opcode, const std::string& fields, const std::string& data) {
+    return ByteWriter().string(field("op", bytes(opcode)) + fields).string(data).text();
+  };
+  const auto stamp = [&](std::uint64_t time) {
+    return bytes(static_cast<std::uint32_t>(time / 1000000000)) +
+           bytes(static_cast<std::uint32_t>(time % 1000000000));
+  };
+  std::string definitions;
+  for (std::uint32_t i = 0; i < channels.size(); ++i) {
+    definitions += record(7, field("conn", bytes(i)) + field("topic", channels[i].topic),
+                          field("topic", channels[i].topic) + field("type", channels[i].type));
+  }
+  std::string chunks;
+  std::string infos;
+  std::uint32_t chunk_count = 0;
+  for (std::size_t begin = 0; begin < messages.size(); begin += 2, ++chunk_count) {
+    std::string records = begin == 0 ? definitions : std::string();
+    std::string index;
+    for (std::size_t i = begin; i < std::min(begin + 2, messages.size()); ++i) {
+      const std::string connection = field("conn", bytes(std::uint32_t{messages[i].channel}));
+      const std::string time = stamp(messages[i].time);
+      index += record(4, field("ver", bytes(1U)) + connection + field("count", bytes(1U)),
+                      time + bytes(static_cast<std::uint32_t>(records.size())));
+      records += record(2, connection + field("time", time), messages[i].data);
+    }
+    chunks += record(5,
+                     field("compression", parts.compression) +
+                         field("size", bytes(static_cast<std::uint32_t>(records.size()))),
+                     compressed(parts.compression, records));
+    if (parts.index) chunks += index;
+    infos += record(6, field("ver", bytes(1U)), "");
+  }
+  const std::uint64_t index_position = parts.is_closed ? 4096 : 0;
+  std::string file =
+      "#ROSBAG V2.0\n" +
+      record(3,
+             field("index_pos", bytes(index_position)) + field("conn_count", bytes(2U)) +
+                 field("chunk_count", bytes(parts.is_closed ? chunk_count : 0U)),
+             std::string(200, ' '));
+  file += chunks;
+  return parts.is_closed ? file + definitions + infos : file;
+}
+
+}  // namespace dynains::test

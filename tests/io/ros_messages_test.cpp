@@ -1,0 +1,179 @@
+#include "log/ros_messages.hpp"
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "files.hpp"
+#include "log/transform_tree.hpp"
+#include "ros_writer.hpp"
+#include "support/catch.hpp"
+
+namespace dynains {
+
+using namespace test;
+
+namespace {
+
+constexpr MessageEncoding kBoth[] = {MessageEncoding::kRos1, MessageEncoding::kCdr};
+
+SerialisedMessage view(const std::string& bytes, MessageEncoding encoding) {
+  return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), encoding, "log: /t"};
+}
+
+RecordedScan decode(const std::string& bytes, MessageEncoding encoding) {
+  RecordedScan scan;
+  read_cloud("sensor_msgs/PointCloud2", view(bytes, encoding), scan);
+  return scan;
+}
+
+}  // namespace
+
+TEST_CASE("Clouds of any layout are read, from ROS 1 and ROS 2") {
+  for (const MessageEncoding encoding : kBoth) {
+    ByteWriter data;
+    for (int i = 0; i < 3; ++i) {
+      data.number(1.5 + i).number(2.5).number(-3.5);         // double x y z
+      data.number(static_cast<std::uint16_t>(40 + i));       // ring
+      data.number(static_cast<std::uint8_t>(200));           // intensity
+      data.number(static_cast<std::uint32_t>(1000000 * i));  // offset in ns
+      data.raw("?");                                         // padding
+    }
+    const std::vector<CloudField> fields = {
+        {"z", 16, 8}, {"y", 8, 8},       {"x", 0, 8}, {"ring", 24, 4}, {"reflectivity", 26, 2},
+        {"t", 27, 6}, {"unknown", 31, 2}};
+    const std::string message = cloud_message(encoding, 12.25, "/lidar", fields, 32, data.text());
+    const CloudInfo info = inspect_cloud("sensor_msgs/PointCloud2", view(message, encoding));
+    CHECK(info.time == 12.25);
+    CHECK(info.frame == "lidar");
+    CHECK(info.points == 3);
+    CHECK((info.columns.ring && info.columns.time && info.columns.intensity));
+    CHECK_FALSE(info.columns.label);
+    const RecordedScan scan = decode(message, encoding);
+    REQUIRE(scan.size() == 3);
+    CHECK(scan.xyzi[8] == 3.5F);
+    CHECK(scan.xyzi[9] == 2.5F);
+    CHECK(scan.xyzi[10] == -3.5F);
+    CHECK(scan.xyzi[11] == 200.0F);
+    CHECK(scan.ring == std::vector<std::uint16_t>{40, 41, 42});
+    CHECK(scan.time[2] == Approx(0.002));
+  }
+}
+
+TEST_CASE("Absolute times of points become relative to the stamp") {
+  ByteWriter data;
+  for (int i = 0; i < 2; ++i) data.raw(xyz_of({1, 2, 3})).number(1000.0 + 0.05 * i);
+  std::vector<CloudField> fields = kXyz;
+  fields.push_back({"timestamp", 12, 8});
+  const RecordedScan scan =
+      decode(cloud_message(MessageEncoding::kCdr, 1000.0, "l", fields, 20, data.text()),
+             MessageEncoding::kCdr);
+  CHECK(scan.time[0] == Approx(0.0).margin(1e-9));
+  CHECK(scan.time[1] == Approx(0.05));
+  CHECK(scan.ring.empty());
+  CHECK(scan.xyzi[3] == 0.0F);
+}
+
+TEST_CASE("Livox messages are clouds") {
+  for (const MessageEncoding encoding : kBoth) {
+    FieldWriter out(encoding);
+    out.header(5.0, "livox").number(std::uint64_t{5000000000}).number(std::uint32_t{2});
+    out.number(std::uint8_t{1}).raw(std::string(3, '\0'));
+    out.number(std::uint32_t{2});
+    for (int i = 0; i < 2; ++i) {
+      out.number(static_cast<std::uint32_t>(50000000 * i));
+      for (const float value : {1.0F, 2.0F, 3.0F + static_cast<float>(i)}) out.number(value);
+      out.number(std::uint8_t{99}).number(std::uint8_t{0}).number(static_cast<std::uint8_t>(i));
+    }
+    RecordedScan scan;
+    read_cloud("livox_ros_driver/CustomMsg", view(out.text(), encoding), scan);
+    REQUIRE(scan.size() == 2);
+    CHECK(scan.xyzi[6] == 4.0F);
+    CHECK(scan.xyzi[7] == 99.0F);
+    CHECK(scan.ring[1] == 1);
+    CHECK(scan.time[1] == Approx(0.05));
+  }
+}
+
+TEST_CASE("Malformed clouds are refused with their place") {
+  const MessageEncoding cdr = MessageEncoding::kCdr;
+  const auto error_of = [&](const std::string& bytes) {
+    return message_of<IoError>([&] { decode(bytes, cdr); });
+  };
+  const std::string good = cloud_message(cdr, 1, "l", kXyz, 12, xyz_of({1, 2, 3}));
+  CHECK(error_of(good) == "(nothing was thrown)");
+  for (std::size_t size = 0; size < good.size() - 4; ++size) {
+    CHECK(error_of(good.substr(0, size)).rfind("log: /t: ", 0) == 0);
+  }
+  CHECK(error_of("\1" + good.substr(1)).find("plain CDR") != std::string::npos);
+  const auto with_fields = [&](const std::vector<CloudField>& fields, std::uint32_t step) {
+    return error_of(cloud_message(cdr, 1, "l", fields, step, xyz_of({1, 2, 3})));
+  };
+  CHECK(with_fields({{"x", 0, 7}, {"y", 4, 7}}, 12).find("fields x, y and z") != std::string::npos);
+  CHECK(with_fields({{"x", 0, 7}, {"y", 4, 7}, {"z", 8, 5}}, 12).find("float32 or float64") !=
+        std::string::npos);
+  CHECK(with_fields({{"x", 0, 7}, {"y", 4, 7}, {"z", 9, 7}}, 12).find("within the 12 bytes") !=
+        std::string::npos);
+  CHECK(with_fields({{"x", 0, 7}, {"y", 4, 7}, {"z", 4294967295U, 7}}, 12).find("within the 12") !=
+        std::string::npos);
+  CHECK(with_fields({{"x", 0, 9}, {"y", 4, 7}, {"z", 8, 7}}, 12).find("datatype from 1 to 8") !=
+        std::string::npos);
+}
+
+TEST_CASE("Poses are read from every type") {
+  const Eigen::Isometry3d T = pose_at(3.0, 0.5);
+  for (const MessageEncoding encoding : kBoth) {
+    const std::string odometry =
+        FieldWriter(encoding).header(2.5, "/odom").string("base").pose(T).raw("rest").text();
+    const auto poses = read_poses("nav_msgs/Odometry", view(odometry, encoding));
+    REQUIRE(poses.size() == 1);
+    CHECK(poses[0].time == 2.5);
+    CHECK(poses[0].frame == "odom");
+    CHECK(poses[0].child == "base");
+    CHECK(poses[0].T_frame_child.isApprox(T, 1e-12));
+
+    const std::string stamped = FieldWriter(encoding).header(2.5, "map").pose(T).text();
+    CHECK(read_poses("geometry_msgs/PoseStamped", view(stamped, encoding))[0].child.empty());
+
+    FieldWriter tf(encoding);
+    tf.number(std::uint32_t{2});
+    for (const char* const child : {"a", "b"}) tf.header(1.0, "map").string(child).pose(T);
+    CHECK(read_poses("tf2_msgs/TFMessage", view(tf.text(), encoding))[1].child == "b");
+  }
+  Eigen::Isometry3d bad = T;
+  bad.translation().x() = std::numeric_limits<double>::quiet_NaN();
+  const std::string message = odometry(1, "base", bad);
+  CHECK(message_of<IoError>([&] {
+          read_poses("nav_msgs/Odometry", view(message, MessageEncoding::kCdr));
+        }).find("a finite position and a quaternion of length 1") != std::string::npos);
+}
+
+TEST_CASE("Transforms are chained and interpolated, by the nearest frame above both") {
+  TransformTree tree;
+  for (const double time : {0.0, 0.2, 0.1}) {
+    tree.add({time, "odom", "base", pose_at(10 * time, 0)}, false);
+  }
+  tree.add({0.1, "odom", "base", pose_at(99, 0)}, false);  // a second one of its time
+  tree.add({0.0, "base", "lidar", pose_at(0.5, M_PI / 2)}, true);
+  tree.add({0.0, "base", "imu", pose_at(-0.5, 1.0)}, true);
+  CHECK(tree.root_of("lidar") == std::string("odom"));
+  const Eigen::Isometry3d T_odom_lidar = pose_at(1.5, 0) * pose_at(0.5, M_PI / 2);
+  CHECK(tree.find("odom", "lidar", 0.15)->isApprox(T_odom_lidar, 1e-12));
+  CHECK(tree.find("lidar", "odom", 0.15)->isApprox(T_odom_lidar.inverse(), 1e-12));
+  CHECK(tree.find("imu", "lidar", 99.0)
+            ->isApprox(pose_at(-0.5, 1.0).inverse() * pose_at(0.5, M_PI / 2), 1e-12));
+  CHECK_FALSE(tree.find("odom", "lidar", 5.0));
+  CHECK_FALSE(tree.find("map", "lidar", 0.1));
+
+  CHECK(tree.left_out() == 0);
+  tree.add({0.0, "other", "lidar", pose_at(7, 0)}, true);  // a second parent
+  CHECK(tree.left_out() == 1);
+  CHECK(tree.root_of("lidar") == std::string("odom"));
+  tree.add({0.0, "lidar", "odom", pose_at(0, 0)}, true);  // a loop
+  CHECK_FALSE(tree.root_of("lidar"));
+  CHECK_FALSE(tree.find("map", "lidar", 0.1));
+}
+
+}  // namespace dynains

@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# foreign_logs.sh PROGRAM WORK KIND WRITER...: a log by an independent writer gives the labels of the
+# folder. KIND is bag or mcap; WRITER is an interpreter and its script.
+set -euo pipefail
+program=$1 work=$2 kind=$3
+shift 3
+rm -rf "$work"
+mkdir -p "$work"
+flags=(--sensor vlp16 --scans 8 --quiet)
+"$program" simulate "$work/seq" "${flags[@]}"
+"$program" run "$work/seq" --out "$work/of_seq" --quiet
+if [[ $kind == bag ]]; then
+  input=$work/seq
+  compressions="none bz2 lz4"
+else
+  "$program" simulate "$work/log" --format mcap "${flags[@]}"
+  input=$work/log/drive.mcap
+  compressions="lz4 zstd"
+fi
+for compression in $compressions; do
+  log=$work/$compression.$kind
+  out=$work/of_$compression
+  "$@" "$input" "$log" "$compression" | tee "$work/said"
+  if grep -q SKIPPED "$work/said"; then exit 0; fi
+  if ! "$program" run "$log" --out "$out" --quiet 2> "$work/error"; then
+    # A build without the library of a compression names its package.
+    grep "this build has no $compression (Debian: lib$compression-dev)" "$work/error"
+    continue
+  fi
+  cat "$work/error"
+  diff -r "$work/of_seq/labels" "$out/labels"
+done

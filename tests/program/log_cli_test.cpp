@@ -1,0 +1,151 @@
+// The program with logs of ROS instead of folders of scans.
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "io/files.hpp"
+#include "io/log_writer.hpp"
+#include "program/start.hpp"
+#include "program/tiny_sequence.hpp"
+#include "support/catch.hpp"
+
+using namespace dynains;
+using namespace dynains::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t kScans = 12;
+const Eigen::Vector3d kPosition(30.0, 4.0, 0.0);
+
+/// The tiny sequence as a log. Points have a label.
+std::string tiny_log() {
+  const std::vector<CloudField> fields = {
+      {"x", 0, 7}, {"y", 4, 7}, {"z", 8, 7}, {"intensity", 12, 7}, {"label", 16, 6}};
+  std::vector<WrittenMessage> messages;
+  for (std::size_t i = 0; i < kScans; ++i) {
+    const double time = 0.1 * static_cast<double>(i);
+    const std::vector<float> scan = tiny_scan(i);
+    ByteWriter points;
+    for (std::size_t k = 0; k < scan.size(); k += 4) {
+      for (std::size_t c = 0; c < 4; ++c) points.number(scan[k + c]);
+      points.number(std::uint32_t{9});
+    }
+    messages.push_back(
+        {0, nanoseconds(time),
+         cloud_message(MessageEncoding::kCdr, time, "lidar", fields, 20, points.text())});
+    messages.push_back(
+        {1, nanoseconds(time),
+         odometry(time, "lidar", Eigen::Isometry3d(Eigen::Translation3d(kPosition)))});
+  }
+  return mcap_file({{"/points", "sensor_msgs/msg/PointCloud2"}, {"/odom", "nav_msgs/msg/Odometry"}},
+                   messages, {});
+}
+
+std::string all_labels(const fs::path& out) {
+  std::string all;
+  for (std::size_t i = 0; i < kScans; ++i) {
+    all += read_text(out / "labels" / (scan_name(i) + ".label"));
+  }
+  return all;
+}
+
+std::size_t count_lines(const std::string& text) {
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+}  // namespace
+
+TEST_CASE("run on a log gives the labels of run on the folder; check and eval read it, too") {
+  const TemporaryFolder folder;
+  write_tiny_sequence(folder / "seq", kScans, kPosition);
+  write_text(folder / "drive.mcap", tiny_log());
+  const std::string log = folder / "drive.mcap";
+  REQUIRE(start({"run", folder / "seq", "--out", folder / "of_folder"}).code == 0);
+  const Outcome outcome = start({"run", log, "--out", folder / "of_log", "--write-clean"});
+  CAPTURE(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK_THAT(outcome.err, !ContainsSubstring("ends early"));
+  CHECK(all_labels(folder / "of_log") == all_labels(folder / "of_folder"));
+  const auto report = nlohmann::json::parse(read_text(folder / "of_log" / "report.json"));
+  CHECK(report["scans"] == kScans);
+  CHECK(report["log_ends_early"] == false);
+  CHECK(start({"eval", log, folder / "of_log"}).code == 0);
+  const Outcome check = start({"check", log});
+  CHECK_THAT(check.out, ContainsSubstring("clouds from topic /points") &&
+                            ContainsSubstring("poses from topic /odom"));
+
+  // Scans without moving points keep their poses.
+  CHECK_THAT(start({"check", folder / "of_log" / "clean"}).out,
+             ContainsSubstring("poses from VIEWPOINT of the scans") &&
+                 ContainsSubstring("points are in the frame of the sensor"));
+}
+
+TEST_CASE("A log that ends early is read up to there, and the program says so in one line") {
+  const TemporaryFolder folder;
+  const std::string whole = tiny_log();
+  const std::string log = folder / "cut.mcap";
+  write_text(log, whole.substr(0, 3 * whole.size() / 4));
+  const Outcome outcome = start({"run", log, "--out", folder / "out", "--quiet"});
+  CHECK(outcome.code == 0);
+  CHECK_THAT(outcome.err, ContainsSubstring(log + ": byte ") &&
+                              ContainsSubstring("the log ends early, as after a crash of its "
+                                                "recorder; 9 scans before it are read\n"));
+  CHECK(count_lines(outcome.err) == 1);
+  const auto report = nlohmann::json::parse(read_text(folder / "out" / "report.json"));
+  CHECK(report["scans"] == 9);
+  CHECK(report["log_ends_early"] == true);
+}
+
+TEST_CASE("No result replaces the log that it comes from") {
+  const TemporaryFolder folder;
+  write_text(folder / "drive.mcap", tiny_log());
+  const std::string log = folder / "drive.mcap";
+  fs::create_hard_link(log, folder / "other.ply");
+  const std::string before = read_text(log);
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"run", log, "--out", log, "--force"},
+        {"run", log, "--out", folder / "out", "--map", folder / "other.ply", "--force"}}) {
+    const Outcome outcome = start(arguments);
+    CAPTURE(outcome.err);
+    CHECK(outcome.code == 1);
+    CHECK(read_text(log) == before);
+  }
+  fs::create_directory(folder / "out2");
+  fs::create_hard_link(log, folder / "out2" / "timing.csv");
+  write_text(folder / "out2" / "report.json",
+             R"({"program": "dynains", "command": "run", "complete": true,
+                 "outputs": {"files": ["timing.csv"], "folders": {}, "scans": []}})");
+  const Outcome outcome = start({"run", log, "--out", folder / "out2", "--force"});
+  CHECK(outcome.code == 1);
+  CHECK_THAT(outcome.err, ContainsSubstring("is read by this command"));
+  CHECK(read_text(log) == before);
+}
+
+TEST_CASE("simulate --format mcap: run on the log gives the labels of run on the folder") {
+  const TemporaryFolder folder;
+  const std::vector<std::string> flags = {"--sensor", "vlp16", "--scans", std::to_string(kScans),
+                                          "--seed",   "5"};
+  const auto simulate = [&](const std::string& out, std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"simulate", out};
+    arguments.insert(arguments.end(), flags.begin(), flags.end());
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return start(arguments);
+  };
+  REQUIRE(simulate(folder / "seq", {}).code == 0);
+  const Outcome simulated = simulate(folder / "log", {"--format", "mcap"});
+  const std::string log = folder / "log" / "drive.mcap";
+  CHECK(simulated.out == "12 scans: " + log + "\n");
+  CHECK(count_entries(folder / "log") == 2);
+  REQUIRE(start({"run", folder / "seq", "--out", folder / "of_folder"}).code == 0);
+  REQUIRE(start({"run", log, "--out", folder / "of_log"}).code == 0);
+  CHECK(all_labels(folder / "of_log") == all_labels(folder / "of_folder"));
+  CHECK(start({"eval", log, folder / "of_log"}).out ==
+        start({"eval", folder / "seq", folder / "of_folder"}).out);
+
+  const std::string first = read_text(log);
+  REQUIRE(simulate(folder / "log", {"--format", "mcap", "--force"}).code == 0);
+  CHECK(read_text(log) == first);
+  REQUIRE(simulate(folder / "log", {"--force"}).code == 0);
+  CHECK_FALSE(fs::exists(log));
+}

@@ -1,0 +1,71 @@
+// node rewrite_mcap.mjs IN.mcap OUT.mcap COMPRESSION: reads a log by @mcap/core, decodes and encodes
+// every message by @foxglove/rosmsg2-serialization, and writes it in chunks that the program
+// COMPRESSION (lz4 or zstd) compresses.
+import { execFileSync } from "node:child_process";
+import fs from "node:fs";
+import { createRequire } from "node:module";
+
+// NODE_PATH holds for require() alone.
+const require = createRequire(import.meta.url);
+let core, rosmsg, serialization;
+try {
+  core = require("@mcap/core");
+  rosmsg = require("@foxglove/rosmsg");
+  serialization = require("@foxglove/rosmsg2-serialization");
+} catch (error) {
+  console.log("SKIPPED: " + error.message.split("\n")[0]);
+  process.exit(0);
+}
+
+const [input, output, compression] = process.argv.slice(2);
+
+const bytes = fs.readFileSync(input);
+const reader = await core.McapIndexedReader.Initialize({
+  readable: {
+    size: async () => BigInt(bytes.length),
+    read: async (offset, length) =>
+      new Uint8Array(bytes.subarray(Number(offset), Number(offset + length))),
+  },
+});
+
+const file = fs.openSync(output, "w");
+let position = 0;
+const writer = new core.McapWriter({
+  writable: {
+    write: async (part) => {
+      fs.writeSync(file, part);
+      position += part.length;
+    },
+    position: () => BigInt(position),
+  },
+  chunkSize: 500000,
+  compressChunk: (data) => ({
+    compression,
+    compressedData: execFileSync(compression, ["-c", "-q"], { input: data, maxBuffer: 1 << 28 }),
+  }),
+});
+await writer.start({ profile: "ros2", library: "rewrite_mcap" });
+
+const channels = new Map();
+for (const [id, channel] of reader.channelsById) {
+  const schema = reader.schemasById.get(channel.schemaId);
+  const definitions = rosmsg.parse(new TextDecoder().decode(schema.data), { ros2: true });
+  channels.set(id, {
+    id: await writer.registerChannel({
+      ...channel,
+      schemaId: await writer.registerSchema(schema),
+    }),
+    reader: new serialization.MessageReader(definitions),
+    writer: new serialization.MessageWriter(definitions),
+  });
+}
+for await (const message of reader.readMessages()) {
+  const channel = channels.get(message.channelId);
+  await writer.addMessage({
+    ...message,
+    channelId: channel.id,
+    data: channel.writer.writeMessage(channel.reader.readMessage(message.data)),
+  });
+}
+await writer.end();
+fs.closeSync(file);
