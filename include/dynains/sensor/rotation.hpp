@@ -1,20 +1,19 @@
 // Points seen from a frame that is turned.
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstddef>
 
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/simd/lanes.hpp"
 #include "dynains/simd/pack_transform.hpp"
 #include "dynains/simd/wide_lanes.hpp"
 
 namespace dynains::detail {
 
-inline PackTransform turning(const Eigen::Matrix3f& R) {
-  Eigen::Matrix<float, 3, 4> m = Eigen::Matrix<float, 3, 4>::Zero();
-  m.leftCols<3>() = R;
-  return PackTransform(m);
+inline PackTransform turning(const Eigen::Matrix3d& R) {
+  return PackTransform(rotated(Eigen::Isometry3d::Identity(), transposed(R)));
 }
 
 /// Puts turned points to the `begin`-th place of a buffer; they may come from there.
@@ -32,7 +31,7 @@ inline void turn(PointsView points, const PackTransform& turning, PointBuffer& t
 }
 
 /// Points in another frame of the same origin; may be `points` of the same buffer.
-inline PointsView turn(PointsView points, const Eigen::Matrix3f& R, PointBuffer& turned) {
+inline PointsView turn(PointsView points, const Eigen::Matrix3d& R, PointBuffer& turned) {
   turned.grow(points.size() + kMaxPackWidth);
   turn(points, turning(R), turned, 0);
   return PointsView(turned).subview(0, points.size());

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/simd/arc_tangent.hpp"
 #include "dynains/simd/wide_lanes.hpp"
 
@@ -31,7 +32,9 @@ struct SensorModel {
   /// sensor that is not tilted.
   Eigen::Matrix3d R_level_headed = Eigen::Matrix3d::Identity();
 
-  Eigen::Matrix3d R_level_sensor() const { return R_level_headed * R_headed_sensor; }
+  Eigen::Matrix3d R_level_sensor() const {
+    return detail::composed(R_level_headed, R_headed_sensor);
+  }
   bool known() const { return azimuth_step > 0.0; }
   bool is_level() const { return R_level_headed.isIdentity(0.0); }
 

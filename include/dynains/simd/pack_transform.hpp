@@ -1,19 +1,18 @@
 // An affine transform of eight points at a time.
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
 #include <cstddef>
 
 #include "dynains/simd/lanes.hpp"
 
 namespace dynains::detail {
 
-/// Rows of a 3x4 matrix, spread once for all points.
+/// The first three rows of `scale * T` in floats, spread once for all points.
 struct PackTransform {
-  explicit PackTransform(const Eigen::Matrix<float, 3, 4>& m)
-      : row{{m(0, 0), m(0, 1), m(0, 2), m(0, 3)},
-            {m(1, 0), m(1, 1), m(1, 2), m(1, 3)},
-            {m(2, 0), m(2, 1), m(2, 2), m(2, 3)}} {}
+  explicit PackTransform(const Eigen::Isometry3d& T, double scale = 1.0)
+      : row{row_of(T, scale, 0), row_of(T, scale, 1), row_of(T, scale, 2)} {}
 
   /// One coordinate of the transformed points.
   template <class Float>
@@ -21,7 +20,13 @@ struct PackTransform {
     return (row[axis][0] * x + row[axis][1] * y) + (row[axis][2] * z + row[axis][3]);
   }
 
-  PackConstant row[3][4];
+  std::array<PackConstant, 4> row[3];
+
+ private:
+  static std::array<PackConstant, 4> row_of(const Eigen::Isometry3d& T, double scale, int i) {
+    const auto element = [&](int j) { return static_cast<float>(scale * T(i, j)); };
+    return {element(0), element(1), element(2), element(3)};
+  }
 };
 
 }  // namespace dynains::detail

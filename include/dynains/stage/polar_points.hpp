@@ -43,12 +43,11 @@ class PolarBuffer {
     return {{range.data(), size_}, {azimuth.data(), size_}, {z.data(), size_}};
   }
 
-  /// Appends `points` moved by the rigid transform `T_target_source`, which is applied in floats:
-  /// multiply poses in double before.
-  void append(PointsView points, const Eigen::Isometry3f& T_target_source) {
+  /// Appends `points` moved by the rigid transform `T_target_source`, which is applied in floats.
+  void append(PointsView points, const Eigen::Isometry3d& T_target_source) {
     const std::size_t begin = size_;
     resize(begin + points.size());
-    const detail::PackTransform transform(T_target_source.matrix().topRows<3>());
+    const detail::PackTransform transform(T_target_source);
     float* const ranges = range.data() + begin;
     float* const azimuths = azimuth.data() + begin;
     float* const heights = z.data() + begin;
