@@ -18,6 +18,7 @@
 #include "dynains/evidence/moved_ground.hpp"
 #include "dynains/evidence/reference_scans.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/stage/free_space_config.hpp"
 #include "dynains/stage/ground_split.hpp"
@@ -153,7 +154,7 @@ class FreeSpaceEvidence {
   }
 
   void begin_epoch(std::uint64_t scan, const Eigen::Isometry3d& T_world_sensor) {
-    T_origin_world_ = T_world_sensor.inverse();
+    T_origin_world_ = detail::inverted(T_world_sensor);
     epoch_begin_ = scan;
     dynamic_grid_.clear();
   }
@@ -172,7 +173,8 @@ class FreeSpaceEvidence {
   void link_to_previous(std::uint64_t scan, Record& record) {
     if (!config_.use_tracks) return;
     InstanceEvidence& evidence = record.evidence;
-    linker_.measure(evidence.samples, T_origin_world_ * record.T_world_sensor, evidence.tracked);
+    linker_.measure(evidence.samples, detail::composed(T_origin_world_, record.T_world_sensor),
+                    evidence.tracked);
     if (scan > epoch_begin_) linker_.link(record_of(scan - 1).evidence.tracked, evidence.tracked);
     for (std::size_t i = 0; i < predecessors_.size(); ++i) {
       predecessors_[i] = evidence.tracked.instances[i].past.instance;
@@ -282,8 +284,9 @@ class FreeSpaceEvidence {
 
   void judge_by_dynamic_grid(std::uint64_t scan, Record& record) {
     if (scan < epoch_begin_) return;  // its cells lay in the frame of another epoch
-    dynamic_grid_.judge(scan, record.evidence.samples, T_origin_world_ * record.T_world_sensor,
-                        record.counted, verdicts_);
+    dynamic_grid_.judge(scan, record.evidence.samples,
+                        detail::composed(T_origin_world_, record.T_world_sensor), record.counted,
+                        verdicts_);
   }
 
   // Makes the image of the newest scan.

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -62,22 +63,22 @@ class StaticMapAccumulator {
   void insert(PointsView points, Span<const std::uint8_t> keep,
               const Eigen::Isometry3d& T_world_sensor) {
     // Floats relative to a corner next to the sensor, an exact multiple of all block edges.
-    const double step = voxel_ * kBlockVoxels.maxCoeff();
-    const Eigen::Vector3d corner = (T_world_sensor.translation() / step).array().floor();
+    const double step = voxel_ * kLongestBlock;
     Eigen::Isometry3d T_corner_sensor = T_world_sensor;
-    T_corner_sensor.translation() -= corner * step;
-    const Eigen::Matrix<float, 3, 4> m = T_corner_sensor.matrix().topRows<3>().cast<float>();
-    const auto blocks = [&](int axis) {
-      return static_cast<std::int32_t>(corner[axis]) *
-             (kBlockVoxels.maxCoeff() / kBlockVoxels[axis]);
-    };
-    const BlockIndex first = {blocks(0), blocks(1), blocks(2)};
+    std::int32_t first_block[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const double corner = std::floor(T_world_sensor(axis, 3) / step);
+      T_corner_sensor(axis, 3) -= corner * step;
+      first_block[axis] = static_cast<std::int32_t>(corner) * (kLongestBlock / kBlockVoxels[axis]);
+    }
+    const detail::PackTransform to_corner(T_corner_sensor);
+    const BlockIndex first = {first_block[0], first_block[1], first_block[2]};
 
     recent_.resize(kRecent, kNone);
     Batch batch;
     for (std::size_t begin = 0; begin < points.size(); begin += kBatch) {
       const std::size_t count = std::min(kBatch, points.size() - begin);
-      locate(points, begin, count, m, first, batch);
+      locate(points, begin, count, to_corner, first, batch);
       choose(count, keep.empty() ? keep : keep.subspan(begin, count), batch);
       insert_chosen(batch);
     }
@@ -116,27 +117,16 @@ class StaticMapAccumulator {
     const auto inside = [&](const Eigen::Vector3d& point) {
       if (box.contains(point)) visit(point);
     };
-    // Farther indices may not fit into 32 bits, and no block has them.
-    constexpr double kFarthest = std::numeric_limits<std::int32_t>::max() - 1;
-    // Rounding to floats can put a point slightly outside of its block.
-    const Eigen::Array3d slack = 1e-3 * block_size();
-    const Eigen::Array3d low = ((box.min().array() - slack) / block_size()).floor().max(-kFarthest);
-    const Eigen::Array3d high = ((box.max().array() + slack) / block_size()).floor().min(kFarthest);
-    if ((low > high).any()) return;
-    const bool few = (high - low + 1.0).prod() < static_cast<double>(blocks_.size());
-    if (!few) {
+    const BlockRange range = blocks_of(box);
+    if (!(range.count < static_cast<double>(blocks_.size()))) {
       for (std::uint32_t block = 0; block < blocks_.size(); ++block) {
-        const BlockIndex& index = blocks_[block].index;
-        const Eigen::Array3d at(index.x, index.y, index.z);
-        if ((at >= low).all() && (at <= high).all()) visit_block(block, inside);
+        if (range.contains(blocks_[block].index)) visit_block(block, inside);
       }
       return;
     }
-    const Eigen::Array3i first = low.cast<std::int32_t>();
-    const Eigen::Array3i last = high.cast<std::int32_t>();
-    for (std::int32_t x = first.x(); x <= last.x(); ++x) {
-      for (std::int32_t y = first.y(); y <= last.y(); ++y) {
-        for (std::int32_t z = first.z(); z <= last.z(); ++z) {
+    for (std::int32_t x = range.first.x; x <= range.last.x; ++x) {
+      for (std::int32_t y = range.first.y; y <= range.last.y; ++y) {
+        for (std::int32_t z = range.first.z; z <= range.last.z; ++z) {
           const std::uint32_t block = blocks_.find({x, y, z});
           if (block != kNone) visit_block(block, inside);
         }
@@ -150,7 +140,7 @@ class StaticMapAccumulator {
   /// below.
   Eigen::Vector3d block_corner(std::uint32_t block) const {
     const BlockIndex& index = blocks_[block].index;
-    return Eigen::Array3d(index.x, index.y, index.z) * block_size();
+    return {index.x * block_size(0), index.y * block_size(1), index.z * block_size(2)};
   }
   /// Calls `visit(x, y, z)` for every point of a block, in metres from its corner.
   template <class Visitor>
@@ -175,7 +165,8 @@ class StaticMapAccumulator {
  private:
   using BlockIndex = detail::BlockIndex;
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
-  static inline const Eigen::Array3i kBlockVoxels{8, 4, 2};
+  static constexpr int kBlockVoxels[3] = {8, 4, 2};
+  static constexpr int kLongestBlock = 8;  // voxels
 
   struct Point {
     float x, y, z;       // m, relative to the corner of the block
@@ -208,21 +199,52 @@ class StaticMapAccumulator {
   template <int kValue>
   using Constant = std::integral_constant<int, kValue>;
 
-  Eigen::Array3d block_size() const { return voxel_ * kBlockVoxels.cast<double>(); }
+  // Edge of a block along an axis, m.
+  double block_size(int axis) const { return voxel_ * kBlockVoxels[axis]; }
 
-  // Finds blocks and voxels of `count` points of the scan, from `begin` on. `m`: from the sensor
-  // frame to the corner of the block `corner`.
+  // The blocks from `first` to `last`, both included.
+  struct BlockRange {
+    BlockIndex first, last;
+    double count;
+
+    bool contains(const BlockIndex& index) const {
+      return index.x >= first.x && index.x <= last.x && index.y >= first.y && index.y <= last.y &&
+             index.z >= first.z && index.z <= last.z;
+    }
+  };
+
+  // The blocks that may have points in a box.
+  BlockRange blocks_of(const Eigen::AlignedBox3d& box) const {
+    // Farther indices may not fit into 32 bits, and no block has them.
+    constexpr double kFarthest = std::numeric_limits<std::int32_t>::max() - 1;
+    std::int32_t first[3], last[3];
+    double count = 1.0;
+    for (int axis = 0; axis < 3; ++axis) {
+      // Rounding to floats can put a point slightly outside of its block.
+      const double slack = 1e-3 * block_size(axis);
+      const double low = std::floor((box.min()(axis) - slack) / block_size(axis));
+      const double high = std::floor((box.max()(axis) + slack) / block_size(axis));
+      first[axis] = static_cast<std::int32_t>(std::max(-kFarthest, std::min(low, kFarthest)));
+      last[axis] = static_cast<std::int32_t>(std::max(-kFarthest, std::min(high, kFarthest)));
+      count *= static_cast<double>(last[axis]) - first[axis] + 1.0;
+    }
+    return {{first[0], first[1], first[2]}, {last[0], last[1], last[2]}, count};
+  }
+
+  // Finds blocks and voxels of `count` points of the scan, from `begin` on. `to_corner`: from the
+  // sensor frame to the corner of the block `corner`.
   void locate(PointsView scan, std::size_t begin, std::size_t count,
-              const Eigen::Matrix<float, 3, 4>& m, const BlockIndex& corner, Batch& batch) const {
+              const detail::PackTransform& to_corner, const BlockIndex& corner,
+              Batch& batch) const {
     using detail::PackConstant;
     const PackConstant scale(static_cast<float>(1.0 / voxel_));
-    const Eigen::Array3f block_size = this->block_size().cast<float>();
-    const PackConstant size[3] = {block_size.x(), block_size.y(), block_size.z()};
+    const PackConstant size[3] = {static_cast<float>(block_size(0)),
+                                  static_cast<float>(block_size(1)),
+                                  static_cast<float>(block_size(2))};
     alignas(64) std::int32_t first[3][detail::kMaxPackWidth];
     std::fill_n(first[0], detail::kMaxPackWidth, corner.x);
     std::fill_n(first[1], detail::kMaxPackWidth, corner.y);
     std::fill_n(first[2], detail::kMaxPackWidth, corner.z);
-    const detail::PackTransform to_corner(m);
     const PointsView points = scan.subview(begin, count);
     detail::for_packs(count, [&](auto at) {
       using Float = typename decltype(at)::Float;
@@ -323,8 +345,9 @@ class StaticMapAccumulator {
   void visit_block(std::uint32_t block, Visitor&& visit) const {
     const Eigen::Vector3d corner = block_corner(block);
     visit_in_block(block, [&](float x, float y, float z) {
-      const Eigen::Vector3d world = corner + Eigen::Vector3d(x, y, z);
-      visit(world);
+      visit(Eigen::Vector3d(corner.x() + static_cast<double>(x),
+                            corner.y() + static_cast<double>(y),
+                            corner.z() + static_cast<double>(z)));
     });
   }
 

@@ -40,7 +40,7 @@ struct Window {
       const test::Scan& scan = street_scans()[k];
       const std::vector<std::uint32_t> input = numbers(scan.points.size());
       ground.segment(buffer_of(scan), input, split);
-      points.append(split.non_ground(), (T_newest_world * scan.T_world_sensor).cast<float>());
+      points.append(split.non_ground(), T_newest_world * scan.T_world_sensor);
       scan_begin.push_back(static_cast<std::uint32_t>(points.size()));
     }
   }
@@ -58,7 +58,7 @@ BENCHMARK(BM_Ground)->Unit(benchmark::kMillisecond);
 
 void BM_Window(benchmark::State& state) {
   const PointBuffer scan = buffer_of(street_scans().front());
-  const Eigen::Isometry3f T(Eigen::AngleAxisf(0.1F, Eigen::Vector3f::UnitZ()));
+  const Eigen::Isometry3d T(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ()));
   PolarBuffer window;
   for (auto _ : state) {
     window.clear();

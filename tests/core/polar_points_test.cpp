@@ -29,8 +29,8 @@ TEST_CASE("points of the window are where Eq. 3 puts them in double") {
       points.push_back(p.x(), p.y(), p.z());
     }
     PolarBuffer window;
-    window.append(points, T.cast<float>());
-    window.append(points, Eigen::Isometry3f::Identity());
+    window.append(points, T);
+    window.append(points, Eigen::Isometry3d::Identity());
     REQUIRE(window.size() == 2 * count);
     for (std::size_t i = 0; i < 2 * count; ++i) {
       const std::size_t from = i % count;
@@ -49,10 +49,10 @@ TEST_CASE("a window that is cleared and refilled holds nothing old") {
   PointBuffer points;
   for (int i = 0; i < 20; ++i) points.push_back(3.0F, 4.0F, 1.0F);
   PolarBuffer window;
-  window.append(points, Eigen::Isometry3f::Identity());
+  window.append(points, Eigen::Isometry3d::Identity());
   window.clear();
   CHECK(window.view().empty());
-  window.append(PointsView(points).subview(0, 3), Eigen::Isometry3f::Identity());
+  window.append(PointsView(points).subview(0, 3), Eigen::Isometry3d::Identity());
   REQUIRE(window.view().size() == 3);
   CHECK(window.view().range[2] == 5.0F);
 }

@@ -306,7 +306,7 @@ TEST_CASE("what moved hides what is behind it, protects nothing and says nothing
     RangeImage::Scratch scratch;
     image.build(grid, PointsView(), points, moving, 0.0F, scratch);
     detail::Visibility visibility;
-    detail::test_visibility(image, Eigen::Isometry3f::Identity(), samples, count, 0.25F, 0.01F,
+    detail::test_visibility(image, Eigen::Isometry3d::Identity(), samples, count, 0.25F, 0.01F,
                             visibility);
     std::string seen;
     for (std::size_t i = 0; i < count; ++i) {
@@ -372,8 +372,8 @@ TEST_CASE(
   samples.push_back(0.0F, 20.0F, 0.0F);  // aside of all beams
   const std::size_t count = samples.size();
   samples.resize(count + detail::kPackWidth);
-  Eigen::Isometry3f T_reference_sample = Eigen::Isometry3f::Identity();
-  T_reference_sample.translation().x() = -5.0F;
+  Eigen::Isometry3d T_reference_sample = Eigen::Isometry3d::Identity();
+  T_reference_sample.translation().x() = -5.0;
   detail::Visibility visibility;
   detail::test_visibility(image, T_reference_sample, samples, count, 0.25F, 0.01F, visibility);
   const std::vector<int> free = {1, 0, 0, 0, 0, 1, 0, 0};

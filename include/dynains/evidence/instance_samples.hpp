@@ -125,8 +125,7 @@ namespace detail {
 /// Key of the cell of each sample, in a grid of `cell` (m) whose corner is the frame `origin`.
 inline void find_cells(const InstanceSamples& samples, double cell,
                        const Eigen::Isometry3d& T_origin_sensor, std::vector<VoxelKey>& keys) {
-  const PackTransform to_cells(
-      (Eigen::Scaling(1.0 / cell) * T_origin_sensor.matrix().topRows<3>()).cast<float>());
+  const PackTransform to_cells(T_origin_sensor, 1.0 / cell);
   keys.resize(samples.size());
   VoxelKey* const key = keys.data();
   for_packs(samples.size(), [&](auto at) {

@@ -12,6 +12,7 @@
 #include "dynains/evidence/range_image.hpp"
 #include "dynains/evidence/visibility.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/stage/free_space_config.hpp"
@@ -72,7 +73,7 @@ class ReferenceScans {
   void adapt(const SensorModel& sensor) {
     grid_ = RangeImageGrid::for_sensor(sensor);
     R_beams_level_.reset();
-    if (!sensor.is_level()) R_beams_level_ = sensor.R_level_headed.transpose();
+    if (!sensor.is_level()) R_beams_level_ = detail::transposed(sensor.R_level_headed);
   }
 
   /// Allocates the images of `scans` scans, or of as many as are kept.
@@ -109,10 +110,9 @@ class ReferenceScans {
     PointsView ground = split.ground();
     PointsView rest = split.non_ground();
     if (R_beams_level_) {
-      reference.T_world_beams.rotate(R_beams_level_->transpose());
-      const Eigen::Matrix3f R = R_beams_level_->cast<float>();
-      ground = detail::rotate(ground, R, rotated_ground_);
-      rest = detail::rotate(rest, R, rotated_rest_);
+      reference.T_world_beams = detail::rotated(T_world_level, *R_beams_level_);
+      ground = detail::rotate(ground, *R_beams_level_, rotated_ground_);
+      rest = detail::rotate(rest, *R_beams_level_, rotated_rest_);
     }
     reference.image.build(grid_, ground, rest, moving, lateral_margin_, scratch_);
     reference.epoch = epoch;
@@ -140,9 +140,10 @@ class ReferenceScans {
   const detail::Visibility& test(const PointBuffer& points, std::size_t count,
                                  const Eigen::Isometry3d& T_world_points,
                                  const ReferenceScan& reference) {
-    const Eigen::Isometry3d T_reference_points = reference.T_world_beams.inverse() * T_world_points;
-    detail::test_visibility(reference.image, T_reference_points.cast<float>(), points, count,
-                            margin_, margin_slope_, visibility_);
+    const Eigen::Isometry3d T_reference_points =
+        detail::composed(detail::inverted(reference.T_world_beams), T_world_points);
+    detail::test_visibility(reference.image, T_reference_points, points, count, margin_,
+                            margin_slope_, visibility_);
     return visibility_;
   }
 

@@ -113,11 +113,11 @@ void compare_ranges(const typename Packs::Int& cells, const typename Packs::Mask
 /// Tests `count` samples (m; padded for packs) against a range image. A beam passes a sample
 /// if it is longer by more than `margin` (m) + `slope` (m/m) * range. Hits on moving points are
 /// neither "free" nor "hit". `T_reference_sample`: rigid.
-inline void test_visibility(const RangeImage& image, const Eigen::Isometry3f& T_reference_sample,
+inline void test_visibility(const RangeImage& image, const Eigen::Isometry3d& T_reference_sample,
                             const PointBuffer& samples, std::size_t count, float margin,
                             float slope, Visibility& visibility) {
   constexpr float kCentimetres = 100.0F;
-  const PackTransform to_reference(T_reference_sample.matrix().topRows<3>());
+  const PackTransform to_reference(T_reference_sample);
   const PackConstant to_centimetres(kCentimetres);
   const PackConstant base(margin * kCentimetres), growth(slope * kCentimetres);
   const ImageLocator locator(image.grid());

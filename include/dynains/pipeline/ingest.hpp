@@ -23,9 +23,9 @@ class Ingest {
   /// Points outside [min_range, max_range] (m, in the sensor's x-y plane), higher or lower than
   /// max_range or without finite coordinates stay out; a point at the origin is a beam that did not
   /// return. What is taken in is turned by `R`, unless there is none.
-  void read(const CloudView& cloud, float min_range, float max_range, const Eigen::Matrix3f* R,
+  void read(const CloudView& cloud, float min_range, float max_range, const Eigen::Matrix3d* R,
             std::vector<PointLabel>& labels) {
-    const auto rotation = PackTransform::rotation(R != nullptr ? *R : Eigen::Matrix3f::Identity());
+    const auto rotation = PackTransform::rotation(R != nullptr ? *R : Eigen::Matrix3d::Identity());
     const std::size_t count = cloud.size();
     ensure_capacity(labels, count);
     labels.resize(count);
@@ -45,7 +45,7 @@ class Ingest {
   }
 
   /// Turns the points that were taken in.
-  void turn(const Eigen::Matrix3f& R) { rotate(points(), R, points_); }
+  void turn(const Eigen::Matrix3d& R) { rotate(points(), R, points_); }
 
   PointsView points() const { return PointsView(points_).subview(0, count_); }
   /// Position in the input of each point that was taken in.

@@ -22,6 +22,7 @@
 #include "dynains/pipeline/verdict_writer.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/sensor/mounting.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/verdict.hpp"
@@ -148,7 +149,7 @@ class Pipeline {
 
   void ingest(const CloudView& cloud, ScanSlot& next);
   void find_sensor(ScanSlot& newest);
-  Eigen::Matrix3f level(ScanSlot& scan) const;
+  Eigen::Matrix3d level(ScanSlot& scan) const;
   void judge_newest(ScanSlot& newest, StageTimer& timer);
   ScanVerdict finish_oldest(StageTimer& timer);
 
@@ -219,7 +220,7 @@ void Pipeline<Stages>::ingest(const CloudView& cloud, ScanSlot& next) {
   const auto nearest = static_cast<float>(config_.min_range);
   const auto farthest = static_cast<float>(config_.max_range);
   if (frame_.turns()) {
-    const Eigen::Matrix3f R_level_sensor = level(next);
+    const Eigen::Matrix3d R_level_sensor = level(next);
     ingest_.read(cloud, nearest, farthest, &R_level_sensor, next.labels);
   } else {
     ingest_.read(cloud, nearest, farthest, nullptr, next.labels);
@@ -249,10 +250,10 @@ void Pipeline<Stages>::find_sensor(ScanSlot& newest) {
 
 /// Levels the pose of the scan. Gives the rotation for its points.
 template <class Stages>
-Eigen::Matrix3f Pipeline<Stages>::level(ScanSlot& scan) const {
+Eigen::Matrix3d Pipeline<Stages>::level(ScanSlot& scan) const {
   const Eigen::Matrix3d R_level_sensor = sensor().R_level_sensor();
-  scan.T_world_level.rotate(R_level_sensor.transpose());
-  return R_level_sensor.cast<float>();
+  scan.T_world_level = rotated(scan.T_world_level, R_level_sensor);
+  return R_level_sensor;
 }
 
 template <class Stages>

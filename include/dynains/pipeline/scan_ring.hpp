@@ -109,9 +109,8 @@ class ScanRing {
     next.scan = pushed_;
     next.epoch = epoch_;
     if (pushed_ > 0) {
-      const Eigen::Vector3d step =
-          T_world_sensor.translation() - newest().T_world_sensor.translation();
-      if (config.starts_epoch(time - last_time_, step.norm())) ++next.epoch;
+      const double step = distance(T_world_sensor, newest().T_world_sensor);
+      if (config.starts_epoch(time - last_time_, step)) ++next.epoch;
     }
     next.time = time;
     next.T_world_sensor = orthonormalized(T_world_sensor);

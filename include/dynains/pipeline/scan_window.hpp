@@ -11,6 +11,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/stage/polar_points.hpp"
 
 namespace dynains::detail {
@@ -25,10 +26,10 @@ class ScanWindow {
     while (scans[first_scan_].epoch != newest.epoch) ++first_scan_;
     points_.clear();
     scan_begin_.assign(1, 0);
-    const Eigen::Isometry3d T_newest_world = newest.T_world_level.inverse();
+    const Eigen::Isometry3d T_newest_world = inverted(newest.T_world_level);
     for (std::uint64_t scan = first_scan_; scan < scans.pushed(); ++scan) {
-      const Eigen::Isometry3d T_newest_scan = T_newest_world * scans[scan].T_world_level;
-      points_.append(scans[scan].split.non_ground(), T_newest_scan.cast<float>());
+      points_.append(scans[scan].split.non_ground(),
+                     composed(T_newest_world, scans[scan].T_world_level));
       scan_begin_.push_back(static_cast<std::uint32_t>(points_.size()));
     }
   }

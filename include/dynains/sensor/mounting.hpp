@@ -36,13 +36,18 @@ struct Mounting {
     constexpr double kTiny = 1e-200;
     const double x = up_sensor.x(), y = up_sensor.y(), z = up_sensor.z();
     const double across = x * x + y * y;
-    if (z < 0.0 && across < kTiny) return Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
+    Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+    if (z < 0.0 && across < kTiny) {
+      R(1, 1) = R(2, 2) = -1.0;
+      return R;
+    }
     // 1 / (1 + z), without cancellation near z = -1.
     const double k = z < 0.0 ? (1.0 - z) / across : 1.0 / (1.0 + z);
-    Eigen::Matrix3d R;
-    R << 1.0 - k * x * x, -k * x * y, -x,  //
-        -k * x * y, 1.0 - k * y * y, -y,   //
-        x, y, z;
+    const double rows[3][3] = {
+        {1.0 - k * x * x, -k * x * y, -x}, {-k * x * y, 1.0 - k * y * y, -y}, {x, y, z}};
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) R(i, j) = rows[i][j];
+    }
     return R;
   }
 };
@@ -51,21 +56,37 @@ struct Mounting {
 /// (deg about x, left side up): R_level_sensor = R_y(pitch) R_x(roll).
 inline Eigen::Vector3d up_of_mounting(double pitch, double roll) {
   constexpr double kRadians = M_PI / 180.0;
-  const Eigen::Matrix3d R_level_sensor =
-      (Eigen::AngleAxisd(pitch * kRadians, Eigen::Vector3d::UnitY()) *
-       Eigen::AngleAxisd(roll * kRadians, Eigen::Vector3d::UnitX()))
-          .toRotationMatrix();
-  return R_level_sensor.row(2);
+  const double p = pitch * kRadians, r = roll * kRadians;
+  return {-std::sin(p), std::cos(p) * std::sin(r), std::cos(p) * std::cos(r)};
 }
 
 namespace detail {
+
+// Operations on vectors without the expressions of Eigen, which take longer to compile.
+inline double dot(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return a.x() * b.x() + a.y() * b.y() + a.z() * b.z();
+}
+inline Eigen::Vector3d cross(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return {a.y() * b.z() - a.z() * b.y(), a.z() * b.x() - a.x() * b.z(),
+          a.x() * b.y() - a.y() * b.x()};
+}
+inline Eigen::Vector3d difference(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return {a.x() - b.x(), a.y() - b.y(), a.z() - b.z()};
+}
+inline Eigen::Vector3d scaled(double factor, const Eigen::Vector3d& a) {
+  return {factor * a.x(), factor * a.y(), factor * a.z()};
+}
+inline Eigen::Vector3d multiplied(const Eigen::Matrix3d& R, const Eigen::Vector3d& a) {
+  const auto row = [&](int i) { return dot({R(i, 0), R(i, 1), R(i, 2)}, a); };
+  return {row(0), row(1), row(2)};
+}
 
 /// Plane `up . p = -height`, m, sensor frame.
 struct GroundHypothesis {
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
   double height = 0.0;
 
-  double distance(const Eigen::Vector3d& p) const { return up.dot(p) + height; }
+  double distance(const Eigen::Vector3d& p) const { return dot(up, p) + height; }
 };
 
 /// Finds the plane with the most area on it and the least below it: RANSAC over one point per cell,
@@ -74,8 +95,9 @@ class MountingEstimator {
  public:
   explicit MountingEstimator(PointsView points) : cells_(thin(points)) {
     for (std::size_t i = 0; i < std::min(kScored, cells_.size()); ++i) {
-      const Eigen::Vector3f p = cells_[i].cast<float>();
-      scored_.push_back(p.x(), p.y(), p.z());
+      const Eigen::Vector3d& p = cells_[i];
+      scored_.push_back(static_cast<float>(p.x()), static_cast<float>(p.y()),
+                        static_cast<float>(p.z()));
     }
   }
 
@@ -121,33 +143,43 @@ class MountingEstimator {
     constexpr std::size_t kWidth = 2 * static_cast<std::size_t>(kHalf);
     struct Sum {
       std::size_t cell;
-      Eigen::Vector3d sum;
+      double x, y, z;
       double count;
     };
     std::vector<std::uint32_t> number(kWidth * kWidth * kWidth, 0);  // by cell; from 1
     std::vector<Sum> sums;
     for (std::size_t i = 0; i < points.size(); ++i) {
+<<<<<<< HEAD
       if (!is_near(points, i)) continue;
       const Eigen::Vector3f p(points.x[i], points.y[i], points.z[i]);
+=======
+      const float p[3] = {points.x[i], points.y[i], points.z[i]};
+      const float range = std::sqrt(p[0] * p[0] + (p[1] * p[1] + p[2] * p[2]));
+      if (!(range > kMinDistance && range < kMaxDistance)) continue;
+>>>>>>> 19b7de6993215236f3bfb2985736dce1e7a252b4
       std::size_t at = 0;
-      for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      for (const float coordinate : p) {
         const auto index =
-            static_cast<std::int32_t>(std::floor(p[axis] / static_cast<float>(kCell)));
+            static_cast<std::int32_t>(std::floor(coordinate / static_cast<float>(kCell)));
         at = at * kWidth + static_cast<std::size_t>(index + kHalf);
       }
       if (number[at] == 0) {
-        sums.push_back({at, Eigen::Vector3d::Zero(), 0.0});
+        sums.push_back({at, 0.0, 0.0, 0.0, 0.0});
         number[at] = static_cast<std::uint32_t>(sums.size());
       }
       Sum& sum = sums[number[at] - 1];
-      sum.sum += p.cast<double>();
+      sum.x += static_cast<double>(p[0]);
+      sum.y += static_cast<double>(p[1]);
+      sum.z += static_cast<double>(p[2]);
       sum.count += 1.0;
     }
     // The order of the points must not matter.
     std::sort(sums.begin(), sums.end(), [](const Sum& a, const Sum& b) { return a.cell < b.cell; });
     std::vector<Eigen::Vector3d> cells;
     cells.reserve(sums.size());
-    for (const Sum& sum : sums) cells.emplace_back(sum.sum / sum.count);
+    for (const Sum& sum : sums) {
+      cells.emplace_back(sum.x / sum.count, sum.y / sum.count, sum.z / sum.count);
+    }
     std::mt19937_64 random(1);
     for (std::size_t i = cells.size(); i > 1; --i) std::swap(cells[i - 1], cells[random() % i]);
     return cells;
@@ -166,12 +198,12 @@ class MountingEstimator {
       const Eigen::Vector3d& a = cells_[random() % cells_.size()];
       const Eigen::Vector3d& b = cells_[random() % cells_.size()];
       const Eigen::Vector3d& c = cells_[random() % cells_.size()];
-      const Eigen::Vector3d normal = (b - a).cross(c - a);
-      const double area = normal.norm();
+      const Eigen::Vector3d normal = cross(difference(b, a), difference(c, a));
+      const double area = std::sqrt(dot(normal, normal));
       if (!(area > 4.0)) continue;
       GroundHypothesis ground;
-      ground.up = normal * ((normal.z() * side > 0.0 ? 1.0 : -1.0) / area);
-      ground.height = -ground.up.dot(a);
+      ground.up = scaled((normal.z() * side > 0.0 ? 1.0 : -1.0) / area, normal);
+      ground.height = -dot(ground.up, a);
       if (is_possible(ground, side)) candidates.push_back({ground, score(ground, kScreened)});
     }
     std::stable_sort(candidates.begin(), candidates.end(), is_better);
@@ -219,14 +251,14 @@ class MountingEstimator {
       const double distance = ground.distance(p);
       if (!(std::abs(distance) < band)) continue;
       const double off = distance / band;
-      const double far = p.squaredNorm() / (near_distance * near_distance);
+      const double far = dot(p, p) / (near_distance * near_distance);
       const double w = (1.0 - off * off) * (1.0 - off * off) / (1.0 + far * far);
       m.add(p.x(), p.y(), p.z(), w);
     }
     if (!(m.count >= 10.0)) return false;
     const Plane plane = fit_plane(m);
-    ground.up = side * Eigen::Vector3d(plane.normal_x, plane.normal_y, plane.normal_z);
-    ground.height = -ground.up.dot(Eigen::Vector3d(plane.mean_x, plane.mean_y, plane.mean_z));
+    ground.up = scaled(side, {plane.normal_x, plane.normal_y, plane.normal_z});
+    ground.height = -dot(ground.up, {plane.mean_x, plane.mean_y, plane.mean_z});
     return is_possible(ground, side);
   }
 
@@ -284,7 +316,11 @@ inline double estimate_heading(PointsView points) {
 
 /// Rotation from the sensor frame to a frame whose x axis points along `heading` (rad, about z).
 inline Eigen::Matrix3d R_headed(double heading) {
-  return Eigen::AngleAxisd(-heading, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  R(0, 0) = R(1, 1) = std::cos(heading);
+  R(0, 1) = std::sin(heading);
+  R(1, 0) = -R(0, 1);
+  return R;
 }
 
 namespace detail {
@@ -310,7 +346,11 @@ class LevelFrame {
     Eigen::Matrix3d R_headed_sensor = Eigen::Matrix3d::Identity();
     if (is_wanted_) R_headed_sensor = R_headed(estimate_heading(scan));
     PointBuffer headed;
+<<<<<<< HEAD
     const PointsView points = rotate(scan, R_headed_sensor.cast<float>(), headed);
+=======
+    const PointsView points = turn(scan, R_headed_sensor, headed);
+>>>>>>> 19b7de6993215236f3bfb2985736dce1e7a252b4
     SensorModel sensor = estimate_sensor_model(points);
     if (!sensor.known()) return;
     const Mounting mounting = estimate_mounting(points);
@@ -329,7 +369,7 @@ class LevelFrame {
   Eigen::Matrix3d R_level_headed(Mounting mounting, const Eigen::Matrix3d& R_headed_sensor) const {
     constexpr double kLevel = 4.0;  // deg; the estimate for a level sensor is up to 2.6
     if (is_tilt_given_) {
-      mounting.up_sensor = R_headed_sensor * up_given_;
+      mounting.up_sensor = multiplied(R_headed_sensor, up_given_);
       return mounting.R_level_sensor();
     }
     return mounting.known && mounting.tilt() > kLevel ? mounting.R_level_sensor()

@@ -9,8 +9,14 @@
 #include <vector>
 
 #include "dynains/points.hpp"
+<<<<<<< HEAD
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
+=======
+#include "dynains/pose.hpp"
+#include "dynains/simd/arc_tangent.hpp"
+#include "dynains/simd/wide_lanes.hpp"
+>>>>>>> 19b7de6993215236f3bfb2985736dce1e7a252b4
 
 namespace dynains {
 
@@ -31,7 +37,9 @@ struct SensorModel {
   /// sensor that is not tilted.
   Eigen::Matrix3d R_level_headed = Eigen::Matrix3d::Identity();
 
-  Eigen::Matrix3d R_level_sensor() const { return R_level_headed * R_headed_sensor; }
+  Eigen::Matrix3d R_level_sensor() const {
+    return detail::composed(R_level_headed, R_headed_sensor);
+  }
   bool known() const { return azimuth_step > 0.0; }
   bool is_level() const { return R_level_headed.isIdentity(0.0); }
 
