@@ -129,7 +129,8 @@ class MountingEstimator {
   static constexpr std::size_t kScored = 2000;  // cells that score the finalists
 
   static bool is_near(PointsView points, std::size_t i) {
-    const float range = Eigen::Vector3f(points.x[i], points.y[i], points.z[i]).norm();
+    const float x = points.x[i], y = points.y[i], z = points.z[i];
+    const float range = std::sqrt(x * x + (y * y + z * z));
     return range > kMinDistance && range < kMaxDistance;
   }
 
@@ -149,14 +150,8 @@ class MountingEstimator {
     std::vector<std::uint32_t> number(kWidth * kWidth * kWidth, 0);  // by cell; from 1
     std::vector<Sum> sums;
     for (std::size_t i = 0; i < points.size(); ++i) {
-<<<<<<< HEAD
       if (!is_near(points, i)) continue;
-      const Eigen::Vector3f p(points.x[i], points.y[i], points.z[i]);
-=======
       const float p[3] = {points.x[i], points.y[i], points.z[i]};
-      const float range = std::sqrt(p[0] * p[0] + (p[1] * p[1] + p[2] * p[2]));
-      if (!(range > kMinDistance && range < kMaxDistance)) continue;
->>>>>>> 19b7de6993215236f3bfb2985736dce1e7a252b4
       std::size_t at = 0;
       for (const float coordinate : p) {
         const auto index =
@@ -346,11 +341,7 @@ class LevelFrame {
     Eigen::Matrix3d R_headed_sensor = Eigen::Matrix3d::Identity();
     if (is_wanted_) R_headed_sensor = R_headed(estimate_heading(scan));
     PointBuffer headed;
-<<<<<<< HEAD
-    const PointsView points = rotate(scan, R_headed_sensor.cast<float>(), headed);
-=======
-    const PointsView points = turn(scan, R_headed_sensor, headed);
->>>>>>> 19b7de6993215236f3bfb2985736dce1e7a252b4
+    const PointsView points = rotate(scan, R_headed_sensor, headed);
     SensorModel sensor = estimate_sensor_model(points);
     if (!sensor.known()) return;
     const Mounting mounting = estimate_mounting(points);

@@ -9,14 +9,9 @@
 #include <vector>
 
 #include "dynains/points.hpp"
-<<<<<<< HEAD
+#include "dynains/pose.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
-=======
-#include "dynains/pose.hpp"
-#include "dynains/simd/arc_tangent.hpp"
-#include "dynains/simd/wide_lanes.hpp"
->>>>>>> 19b7de6993215236f3bfb2985736dce1e7a252b4
 
 namespace dynains {
 

@@ -3,11 +3,13 @@
 // Angles are polynomials of our own, since libm differs between C libraries in the last bit.
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
 #include <cstddef>
 #include <iterator>
 
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/simd/pack_loops.hpp"
 
 namespace dynains::detail {
@@ -46,17 +48,13 @@ Float elevation_of(const Float& z, const Float& range, const Float& length) {
   return twice_arc_tangent(z, length + range);
 }
 
-/// An affine transform of points in packs.
+/// An affine transform of points in packs: the first three rows of `scale * T`, in floats.
 struct PackTransform {
-  explicit PackTransform(const Eigen::Matrix<float, 3, 4>& m)
-      : row{{m(0, 0), m(0, 1), m(0, 2), m(0, 3)},
-            {m(1, 0), m(1, 1), m(1, 2), m(1, 3)},
-            {m(2, 0), m(2, 1), m(2, 2), m(2, 3)}} {}
+  explicit PackTransform(const Eigen::Isometry3d& T, double scale = 1.0)
+      : row{row_of(T, scale, 0), row_of(T, scale, 1), row_of(T, scale, 2)} {}
 
-  static PackTransform rotation(const Eigen::Matrix3f& R) {
-    Eigen::Matrix<float, 3, 4> m = Eigen::Matrix<float, 3, 4>::Zero();
-    m.leftCols<3>() = R;
-    return PackTransform(m);
+  static PackTransform rotation(const Eigen::Matrix3d& R) {
+    return PackTransform(rotated(Eigen::Isometry3d::Identity(), transposed(R)));
   }
 
   /// Coordinate number `axis` of the transformed points.
@@ -65,7 +63,13 @@ struct PackTransform {
     return (row[axis][0] * x + row[axis][1] * y) + (row[axis][2] * z + row[axis][3]);
   }
 
-  PackConstant row[3][4];
+  std::array<PackConstant, 4> row[3];
+
+ private:
+  static std::array<PackConstant, 4> row_of(const Eigen::Isometry3d& T, double scale, int i) {
+    const auto element = [&](int j) { return static_cast<float>(scale * T(i, j)); };
+    return {element(0), element(1), element(2), element(3)};
+  }
 };
 
 /// Stores the transformed points in `to`, from index `begin` on. `points` may be the same memory.
@@ -84,7 +88,7 @@ inline void transform_points(PointsView points, const PackTransform& transform, 
 }
 
 /// The rotated points, held by `rotated`. `points` may be held by the same buffer.
-inline PointsView rotate(PointsView points, const Eigen::Matrix3f& R, PointBuffer& rotated) {
+inline PointsView rotate(PointsView points, const Eigen::Matrix3d& R, PointBuffer& rotated) {
   rotated.grow(points.size() + kMaxPackWidth);
   transform_points(points, PackTransform::rotation(R), rotated, 0);
   return PointsView(rotated).subview(0, points.size());

@@ -41,14 +41,9 @@ class PolarBuffer {
     return {{range.data(), size_}, {azimuth.data(), size_}, {z.data(), size_}};
   }
 
-<<<<<<< HEAD
-  /// Appends `points` (m, source frame), transformed to the target frame in floats. Multiply poses
-  /// in double before.
-  void append(PointsView points, const Eigen::Isometry3f& T_target_source) {
-=======
-  /// Appends `points` moved by the rigid transform `T_target_source`, which is applied in floats.
+  /// Appends `points` (m, source frame), transformed to the target frame. The transform is applied
+  /// in floats.
   void append(PointsView points, const Eigen::Isometry3d& T_target_source) {
->>>>>>> 19b7de6993215236f3bfb2985736dce1e7a252b4
     const std::size_t begin = size_;
     resize(begin + points.size());
     const detail::PackTransform transform(T_target_source);
