@@ -2,9 +2,9 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "ros_writer.hpp"
@@ -47,69 +47,82 @@ inline std::string compressed(const std::string& method, const std::string& byte
   return bytes;
 }
 
+inline std::string mcap_record(std::uint8_t opcode, const ByteWriter& content) {
+  return ByteWriter()
+      .number(opcode)
+      .number(std::uint64_t{content.size()})
+      .raw(content.text())
+      .text();
+}
+
+/// Schemas and channels; the id of a schema is that of its channel and 1.
+inline std::string mcap_definitions(const std::vector<LogChannel>& channels) {
+  std::string records;
+  for (std::uint16_t i = 0; i < channels.size(); ++i) {
+    const auto schema = static_cast<std::uint16_t>(i + 1);
+    const auto& [topic, type, encoding] = channels[i];
+    records +=
+        mcap_record(3, ByteWriter().number(schema).string(type).string("ros2msg").string(""));
+    records += mcap_record(
+        4, ByteWriter().number(i).number(schema).string(topic).string(encoding).string(""));
+  }
+  return records;
+}
+
+inline std::string mcap_message(const WrittenMessage& message) {
+  return mcap_record(5, ByteWriter()
+                            .number(message.channel)
+                            .number(std::uint32_t{0})
+                            .number(message.time)
+                            .number(message.time)
+                            .raw(message.data));
+}
+
+/// A chunk of `definitions` and `messages`, and its index.
+inline std::string mcap_chunk(const std::string& definitions,
+                              const std::vector<WrittenMessage>& messages, const McapParts& parts) {
+  std::string records = definitions;
+  std::string index;
+  for (const WrittenMessage& message : messages) {
+    index += mcap_record(7, ByteWriter()
+                                .number(message.channel)
+                                .number(std::uint32_t{16})
+                                .number(message.time)
+                                .number(std::uint64_t{records.size()}));
+    records += mcap_message(message);
+  }
+  const std::string content = compressed(parts.compression, records);
+  const std::string chunk = mcap_record(6, ByteWriter()
+                                               .number(messages.front().time)
+                                               .number(messages.back().time)
+                                               .number(std::uint64_t{records.size()})
+                                               .number(parts.checksum)
+                                               .string(parts.compression)
+                                               .number(std::uint64_t{content.size()})
+                                               .raw(content));
+  return parts.message_index ? chunk + index : chunk;
+}
+
 /// An MCAP file with a chunk for every two messages.
 inline std::string mcap_file(const std::vector<LogChannel>& channels,
                              const std::vector<WrittenMessage>& messages, const McapParts& parts) {
-  const auto record = [](std::uint8_t opcode, const std::string& content) {
-    return ByteWriter().number(opcode).number(std::uint64_t{content.size()}).raw(content).text();
-  };
-  std::string definitions;
-  for (std::uint16_t i = 0; i < channels.size(); ++i) {
-    const auto id = static_cast<std::uint16_t>(i + 1);
-    definitions += record(
-        3, ByteWriter().number(id).string(channels[i].type).string("ros2msg").string("").text());
-    definitions += record(4, ByteWriter()
-                                 .number(i)
-                                 .number(id)
-                                 .string(channels[i].topic)
-                                 .string(channels[i].encoding)
-                                 .string("")
-                                 .text());
-  }
   const std::string magic("\x89MCAP0\r\n", 8);
-  std::string file = magic + record(1, ByteWriter().string("ros2").string("test").text());
+  const std::string definitions = mcap_definitions(channels);
+  std::string file = magic + mcap_record(1, ByteWriter().string("ros2").string("test"));
   if (!parts.chunks) file += definitions;
-  for (std::size_t begin = 0; begin < messages.size(); begin += 2) {
-    std::string records = parts.chunks && begin == 0 ? definitions : std::string();
-    std::vector<std::pair<const WrittenMessage*, std::uint64_t>> offsets;
-    for (std::size_t i = begin; i < std::min(begin + 2, messages.size()); ++i) {
-      const WrittenMessage& message = messages[i];
-      offsets.emplace_back(&message, records.size());
-      records += record(5, ByteWriter()
-                               .number(message.channel)
-                               .number(static_cast<std::uint32_t>(i))
-                               .number(message.time)
-                               .number(message.time)
-                               .raw(message.data)
-                               .text());
+  for (auto begin = messages.begin(); begin != messages.end();) {
+    const auto end = begin + std::min<std::ptrdiff_t>(2, messages.end() - begin);
+    if (parts.chunks) {
+      file +=
+          mcap_chunk(begin == messages.begin() ? definitions : std::string(), {begin, end}, parts);
+    } else {
+      for (auto message = begin; message != end; ++message) file += mcap_message(*message);
     }
-    if (!parts.chunks) {
-      file += records;
-      continue;
-    }
-    const std::string content = compressed(parts.compression, records);
-    file += record(6, ByteWriter()
-                          .number(messages[begin].time)
-                          .number(messages[begin].time)
-                          .number(std::uint64_t{records.size()})
-                          .number(parts.checksum)
-                          .string(parts.compression)
-                          .number(std::uint64_t{content.size()})
-                          .raw(content)
-                          .text());
-    if (!parts.message_index) continue;
-    for (const auto& [message, offset] : offsets) {
-      file += record(7, ByteWriter()
-                            .number(message->channel)
-                            .number(std::uint32_t{16})
-                            .number(message->time)
-                            .number(offset)
-                            .text());
-    }
+    begin = end;
   }
-  file += record(15, ByteWriter().number(std::uint32_t{0}).text());
+  file += mcap_record(15, ByteWriter().number(std::uint32_t{0}));
   if (parts.summary) file += definitions;
-  return file + record(2, std::string(20, '\0')) + magic;
+  return file + mcap_record(2, ByteWriter().raw(std::string(20, '\0'))) + magic;
 }
 
 struct BagParts {
