@@ -15,11 +15,12 @@ namespace dynains {
 class BeliefUpdater {
  public:
   struct Config {
-    double p_inc = 0.7;    ///< update probability of a cell that differs (Eq. 18)
-    double p_dec = 0.4;    ///< update probability of a cell that agrees (Eq. 18)
-    double tau_rho = 0.8;  ///< discrepancy ratio from which a cell agrees (Eq. 18)
-    double tau_p = 0.5;    ///< posterior above which a cluster is dynamic (Eq. 19)
-    double prior = 0.5;    ///< p(m) (Eq. 14)
+    double p_inc = 0.7;            ///< update probability of a cell that differs (Eq. 18)
+    double p_dec = 0.4;            ///< update probability of a cell that agrees (Eq. 18)
+    double tau_rho = 0.8;          ///< discrepancy ratio from which a cell agrees (Eq. 18)
+    double tau_p = 0.5;            ///< posterior above which a cluster is dynamic (Eq. 19)
+    double prior = 0.5;            ///< p(m) (Eq. 14)
+    double vanished_weight = 2.0;  ///< weight of a cell with rho = 0 (Eq. 18)
 
     template <class Self, class Visitor>
     static void visit(Self& self, Visitor&& visitor) {
@@ -33,6 +34,9 @@ class BeliefUpdater {
                         "posterior above which a cluster is dynamic (Eq. 19)"});
       visitor(Parameter{"prior", self.prior, open(0, 1), "",
                         "probability of being dynamic before any observation (Eq. 14)"});
+      visitor(Parameter{"vanished_weight", self.vanished_weight, closed(1, 10), "",
+                        "weight of a cell that is empty in the observation or in the cluster "
+                        "(Eq. 18; public implementation of the paper: 1)"});
     }
 
     /// Throws ConfigError.
@@ -54,8 +58,8 @@ class BeliefUpdater {
   void reset() { log_odds_ = log_odds(config_.prior); }
 
   /// One step of Eq. 15 with the update term of Eq. 16-18: heights of one observation against
-  /// those of the whole cluster, cell by cell, in metres and not negative. Cells that are empty in
-  /// both say nothing; if all are, the belief stays as it is.
+  /// those of the cluster, cell by cell, in metres and not negative. Cells that are empty in both
+  /// are not in R; if all are, the belief stays.
   void update(Span<const float> observation, Span<const float> cluster) {
     // Counting is exact and independent of order; the sum of Eq. 17 follows from three counts.
     std::size_t vanished = 0;
@@ -77,7 +81,8 @@ class BeliefUpdater {
     const std::size_t cells = vanished + changed + alike;
     if (cells == 0) return;
     log_odds_ +=
-        ((2.0 * static_cast<double>(vanished) + static_cast<double>(changed)) * increment_ +
+        ((config_.vanished_weight * static_cast<double>(vanished) + static_cast<double>(changed)) *
+             increment_ +
          static_cast<double>(alike) * decrement_) /
         static_cast<double>(cells);
   }

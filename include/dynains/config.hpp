@@ -86,11 +86,23 @@ constexpr std::array<const char*, 3> value_names(Decision) {
   return {"window", "free_space", "both"};
 }
 
+/// Observations of a cluster that update its belief, one after the other (Eq. 15).
+enum class BeliefObservations {
+  kSequence,  ///< each from the second on, against the cluster up to it
+  kNewest,    ///< the newest, against the whole cluster
+  kAll,       ///< each, against the whole cluster
+};
+
+constexpr std::array<const char*, 3> value_names(BeliefObservations) {
+  return {"sequence", "newest", "all"};
+}
+
 /// Parameters of the facade itself. visit() describes them.
 struct RemoverConfig {
   Decision decision = Decision::kFreeSpace;
   int window = 4;          ///< scans, K of Eq. 3
   bool use_belief = true;  ///< Eq. 13-19
+  BeliefObservations belief_observations = BeliefObservations::kSequence;
   int votes = 1;           ///< windows
   double min_range = 2.7;  ///< m, sensor's x-y plane
   double max_range = 250;  ///< m, sensor's x-y plane and z axis
@@ -120,6 +132,10 @@ struct RemoverConfig {
     visitor(Parameter{"use_belief", self.use_belief, Bounds(), "",
                       "revert proposals of the window by belief (Eq. 13-19); off is the paper's "
                       "IOC-only row"});
+    visitor(Parameter{"belief_observations", self.belief_observations, Bounds(), "",
+                      "observations that update the belief (Eq. 15, 16): each from the second on, "
+                      "against the cluster up to it (sequence); the newest, or all, against the "
+                      "whole cluster"});
     visitor(Parameter{"votes", self.votes, closed(0, 64), "windows",
                       "windows that must call a point dynamic for the final verdict; 0: the newest "
                       "window alone decides, without latency"});

@@ -71,22 +71,24 @@ class OccupancyDescriptor {
     cluster_ = cluster;
     lay_grid();
     const std::size_t scans = cluster_.scan_count();
-    heights_.resize(std::max(heights_.size(), (scans + 1) * cell_count()));
+    heights_.resize(std::max(heights_.size(), 2 * scans * cell_count()));
     fill(0);
     fill(scans - 1);
   }
 
-  /// Describes the observations between oldest and newest, and the cluster as a whole: belief
-  /// needs them all, similarity does not.
+  /// Describes the observations between oldest and newest, and the growing cluster. The belief
+  /// needs them, the similarity does not.
   void describe_rest() {
     const std::size_t scans = cluster_.scan_count();
     for (std::size_t k = 1; k + 1 < scans; ++k) fill(k);
     const std::size_t cells = cell_count();
-    float* const whole = heights_.data() + scans * cells;
-    std::copy_n(heights_.data(), cells, whole);
-    for (std::size_t k = 1; k < scans; ++k) {
-      const float* const part = heights_.data() + k * cells;
-      for (std::size_t i = 0; i < cells; ++i) whole[i] = std::max(whole[i], part[i]);
+    float* cluster = heights_.data() + scans * cells;
+    std::copy_n(heights_.data(), cells, cluster);
+    for (std::size_t k = 1; k < scans; ++k, cluster += cells) {
+      const float* const observation = heights_.data() + k * cells;
+      for (std::size_t i = 0; i < cells; ++i) {
+        cluster[cells + i] = std::max(cluster[i], observation[i]);
+      }
     }
   }
 
@@ -100,8 +102,8 @@ class OccupancyDescriptor {
     return {heights_.data() + k * cell_count(), cell_count()};
   }
 
-  /// Heights of all observations together, h_{t1:tK} of Eq. 16; after describe_rest.
-  Span<const float> cluster_heights() const { return heights(scan_count()); }
+  /// Heights of observations 0 to k together, h_{t1:tk} of Eq. 16; after describe_rest.
+  Span<const float> cluster_heights(std::size_t k) const { return heights(scan_count() + k); }
 
   /// Cosine similarity d of newest and oldest observation (Eq. 11), in [0, 1]. Two observations
   /// without any height are equal (1); one without and one with are not (0).

@@ -116,6 +116,9 @@ TEST_CASE("a cell that vanished weighs twice, one that nearly vanished once") {
   // 2 logit(0.7): odds (7/3)^2 = 49/9, p = 49/58.
   CHECK(posterior_after({}, {{0.0F}}, {2.0F}) == Approx(49.0 / 58.0));
   CHECK(posterior_after({}, {{1e-30F}}, {2.0F}) == Approx(0.7));
+  BeliefUpdater::Config config;
+  config.vanished_weight = 1.0;  // as the public implementation
+  CHECK(posterior_after(config, {{0.0F}}, {2.0F}) == Approx(0.7));
 }
 
 TEST_CASE("a posterior of exactly tau_p is static, more is dynamic") {

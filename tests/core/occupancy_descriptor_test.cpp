@@ -87,7 +87,8 @@ TEST_CASE("Eq. 5-12 of a cluster worked by hand") {
   CHECK(descriptor.azimuth_cells() == 2);
   check_heights(descriptor.heights(0), {0.0, 0.0, 0.0, 1.5});
   check_heights(descriptor.heights(1), {1.0, 0.0, 0.0, 2.0});
-  check_heights(descriptor.cluster_heights(), {1.0, 0.0, 0.0, 2.0});
+  check_heights(descriptor.cluster_heights(0), {0.0, 0.0, 0.0, 1.5});
+  check_heights(descriptor.cluster_heights(1), {1.0, 0.0, 0.0, 2.0});
   CHECK(descriptor.similarity() == Approx(0.894427).epsilon(1e-6));
   CHECK_FALSE(descriptor.proposes_dynamic());
 
@@ -155,7 +156,7 @@ TEST_CASE("descriptors are those of Eq. 5-11 in double on random clusters") {
     descriptor.describe_rest();
     REQUIRE(descriptor.radial_cells() == expected->radial_cells);
     REQUIRE(descriptor.azimuth_cells() == expected->azimuth_cells);
-    for (std::size_t k = 0; k <= static_cast<std::size_t>(scans); ++k) {
+    for (std::size_t k = 0; k < 2 * static_cast<std::size_t>(scans); ++k) {
       const Span<const float> heights = descriptor.heights(k);
       double worst = 0.0;
       for (std::size_t i = 0; i < heights.size(); ++i) {

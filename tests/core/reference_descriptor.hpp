@@ -15,7 +15,7 @@ namespace dynains::test {
 struct ReferenceDescriptor {
   std::size_t radial_cells = 0;              // N_r
   std::size_t azimuth_cells = 0;             // N_theta
-  std::vector<std::vector<double>> heights;  // H_k, one per scan, and that of the whole cluster
+  std::vector<std::vector<double>> heights;  // H_k of each scan, then of scans 0 to k together
   double similarity = 0.0;                   // d
 };
 
@@ -64,7 +64,7 @@ inline std::optional<ReferenceDescriptor> describe(const OccupancyDescriptor::Co
   result.azimuth_cells = cells(arc / s_theta);
   const std::size_t count = result.radial_cells * result.azimuth_cells;
   const std::size_t scans = cluster.scan_count();
-  result.heights.assign(scans + 1, std::vector<double>(count, 0.0));
+  result.heights.assign(2 * scans, std::vector<double>(count, 0.0));
   for (std::size_t k = 0; k < scans; ++k) {
     const PolarBuffer observed = gathered(cluster.window, cluster.scan(k));
     const PolarView scan = observed.view();
@@ -76,10 +76,12 @@ inline std::optional<ReferenceDescriptor> describe(const OccupancyDescriptor::Co
       if ((i > 0.0 && off_integer(i) < kMargin) || (j > 0.0 && off_integer(j) < kMargin)) return {};
       const std::size_t cell =
           static_cast<std::size_t>(i) * result.azimuth_cells + static_cast<std::size_t>(j);
-      for (const std::size_t set : {k, scans}) {
+      const auto raise = [&](std::size_t set) {
         double& height = result.heights[set][cell];
         height = std::max(height, scan.z[p] - z_min);
-      }
+      };
+      raise(k);
+      for (std::size_t later = k; later < scans; ++later) raise(scans + later);
     }
   }
   double dot = 0.0, aa = 0.0, bb = 0.0;

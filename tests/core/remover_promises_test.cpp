@@ -434,6 +434,34 @@ TEST_CASE("instance ids continue from scan to scan, however soon a verdict is fi
   }
 }
 
+TEST_CASE("belief reverts a wall that comes into view, and no van") {
+  // The wall stands behind the corner of a house; the van comes on the other side.
+  Scene scene;
+  scene.boxes = {van(22.0, -3.5, {-12.0, 0.0, 0.0}),
+                 {{-20.0, 4.0, 0.0}, {4.0, 10.0, 6.0}},
+                 {{6.0, 16.0, 0.0}, {15.0, 16.5, 4.0}}};
+  constexpr int kVan = 0;
+  constexpr int kWall = 2;
+  const std::vector<Scan> scans = drive(scene, 16, 4.0);
+  Config config = Config::paper();
+  const auto removed = [&](int object) {
+    return share(scans, run(config, scans).final, PointLabel::kDynamic, object).labelled;
+  };
+  config.use_belief = false;
+  const std::size_t wall_without_belief = removed(kWall);
+  const std::size_t van_without_belief = removed(kVan);
+  REQUIRE(wall_without_belief > 2000);
+  REQUIRE(van_without_belief > 2000);
+
+  config.use_belief = true;
+  CHECK(removed(kWall) < wall_without_belief / 10);
+  CHECK(removed(kVan) == van_without_belief);
+  config.belief_observations = BeliefObservations::kNewest;
+  CHECK(removed(kWall) < wall_without_belief / 10);
+  config.belief_observations = BeliefObservations::kAll;
+  CHECK(removed(kWall) == wall_without_belief);
+}
+
 TEST_CASE("without belief every proposal is a verdict, and belief only reverts proposals") {
   const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
   Config config = Config::paper();

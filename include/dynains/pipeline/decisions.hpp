@@ -81,6 +81,7 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
       : length_(static_cast<std::size_t>(config.window)),
         votes_(config.votes),
         use_belief_(config.use_belief),
+        observations_(config.belief_observations),
         descriptor_(config.descriptor),
         belief_(config.belief) {}
 
@@ -140,8 +141,13 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
   void update_belief(ClusterVerdict& verdict) {
     descriptor_.describe_rest();
     belief_.reset();
-    for (std::size_t k = 0; k < clusters_.scan_count(); ++k) {
-      belief_.update(descriptor_.heights(k), descriptor_.cluster_heights());
+    const std::size_t last = clusters_.scan_count() - 1;
+    const bool is_sequence = observations_ == BeliefObservations::kSequence;
+    const std::size_t first = is_sequence                                    ? 1
+                              : observations_ == BeliefObservations::kNewest ? last
+                                                                             : 0;
+    for (std::size_t k = first; k <= last; ++k) {
+      belief_.update(descriptor_.heights(k), descriptor_.cluster_heights(is_sequence ? k : last));
     }
     verdict.belief = static_cast<float>(belief_.posterior());
     verdict.is_dynamic = belief_.is_dynamic() ? 1 : 0;
@@ -177,6 +183,7 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
   std::size_t length_;
   int votes_;
   bool use_belief_;
+  BeliefObservations observations_;
   typename Stages::Descriptor descriptor_;
   typename Stages::Belief belief_;
   ClusterSet clusters_;

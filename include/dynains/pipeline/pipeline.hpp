@@ -88,7 +88,7 @@ class Pipeline {
                 "Stages::Clusterer needs Config, cluster(PolarView) and cluster_count()");
   static_assert(IsConfigurable<Descriptor>::value && IsDescriptor<Descriptor>::value,
                 "Stages::Descriptor needs Config, describe(ClusterView), describe_rest(), "
-                "heights(k), cluster_heights() and proposes_dynamic()");
+                "heights(k), cluster_heights(k) and proposes_dynamic()");
   static_assert(IsConfigurable<Belief>::value && IsBelief<Belief>::value,
                 "Stages::Belief needs Config, reset(), update(heights, heights), posterior() and "
                 "is_dynamic()");

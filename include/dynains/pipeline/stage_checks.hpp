@@ -53,7 +53,7 @@ struct IsDescriptor<
     std::void_t<decltype(std::declval<Stage&>().describe(std::declval<const ClusterView&>())),
                 decltype(std::declval<Stage&>().describe_rest()),
                 decltype(std::declval<Stage&>().heights(std::size_t{})),
-                decltype(std::declval<Stage&>().cluster_heights()),
+                decltype(std::declval<Stage&>().cluster_heights(std::size_t{})),
                 std::enable_if_t<std::is_convertible_v<
                     decltype(std::declval<Stage&>().proposes_dynamic()), bool>>>> : std::true_type {
 };
