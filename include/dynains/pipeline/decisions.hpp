@@ -1,4 +1,4 @@
-// The decisions that Config::decision names: window, free_space or both.
+// Implementations of Config::decision: window, free_space and both.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -24,7 +24,7 @@
 
 namespace dynains::detail {
 
-/// Measures the stages of one call.
+/// Measures the time of each stage in one call, in milliseconds.
 class StageTimer {
  public:
   const StageTimes& times() const { return times_; }
@@ -42,38 +42,41 @@ class StageTimer {
   StageTimes times_;
 };
 
-/// Collects evidence about scans and decides which of their points are dynamic. For each scan:
-/// observe(), then judge_newest(), then, latency() scans later, judge_final().
+/// Collects evidence on scans and classifies their points as static or dynamic. The caller calls
+/// observe() and judge_newest() for each scan, and judge_final() for the same scan after latency()
+/// later scans.
 template <class Map>
 class ScanDecision {
  public:
   virtual ~ScanDecision() = default;
 
-  /// Scans whose points are clustered together.
+  /// Number of scans that are clustered together.
   virtual std::size_t window_length() const = 0;
-  /// Scans between observe() and judge_final().
+  /// Number of later scans before judge_final().
   virtual std::size_t latency() const = 0;
 
   virtual bool needs_sensor() const = 0;
   virtual void adapt(const SensorModel& sensor) = 0;
-  /// Gets memory for so many scans. Called after some scans were observed that are forgotten then.
+  /// Reserves memory for `scans` scans. Scans observed before this call belong to the warm-up.
   virtual void reserve(std::size_t scans) = 0;
 
-  /// Takes the newest scan in, and gives each of its clusters an instance id.
+  /// Adds the newest scan and assigns an instance id to each of its clusters.
   virtual void observe(ScanRing& scans, const ScanWindow& window, StageTimer& timer) = 0;
-  /// Verdict on the newest scan from what is known without later scans. The writer has begun it.
+  /// Writes the verdict on the newest scan, without evidence of later scans. The caller calls
+  /// VerdictWriter::begin() before.
   virtual void judge_newest(ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) = 0;
-  /// Verdict that later scans do not change any more.
+  /// Writes the final verdict on `scan`.
   virtual void judge_final(ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) = 0;
 
-  /// Takes points out of the map whose place the newest scan sees free.
+  /// Updates the beliefs of map blocks by the newest scan and removes the blocks that are free.
   virtual void revise(Map& /*map*/, const ScanSlot& /*newest*/) {}
-  /// Back to the state after construction, but for capacity.
+  /// Restores the state after construction. Buffers keep their capacity.
   virtual void clear() = 0;
 };
 
-/// Compares the scans of a window cluster by cluster, and keeps the votes of all windows that see a
-/// scan. Ids go from scan to scan with the points that two windows share.
+/// Decision by occupancy (Eq. 3-19): compares the scans of a window cluster by cluster and
+/// accumulates the votes of all windows that contain a scan. The points that two windows have in
+/// common propagate the instance ids.
 template <class Stages>
 class WindowDecision final : public ScanDecision<typename Stages::Map> {
  public:
@@ -120,11 +123,12 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
     });
   }
 
-  /// Windows that must call a point dynamic for the final verdict.
+  /// Smallest number of votes for a final dynamic verdict on a point.
   int votes_needed() const { return std::max(1, votes_); }
 
  private:
-  // Eq. 5-19 for each cluster that both the oldest and the newest scan saw; others are static.
+  // Eq. 5-19 for each cluster with points in both the oldest and the newest scan. Other clusters
+  // are static.
   void judge_clusters() {
     verdicts_.assign(clusters_.size(), {0.0F, 0, DecisionStage::kTooFewScans});
     for (std::size_t c = 0; c < clusters_.size(); ++c) {
@@ -137,7 +141,7 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
     }
   }
 
-  // Eq. 13-19 on the cluster that was described last.
+  // Eq. 13-19 for the cluster of the last call of describe().
   void update_belief(ClusterVerdict& verdict) {
     descriptor_.describe_rest();
     belief_.reset();
@@ -153,7 +157,7 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
     verdict.is_dynamic = belief_.is_dynamic() ? 1 : 0;
   }
 
-  // From clusters to the points of every scan in the window.
+  // Records the verdicts on clusters as votes on the points of every scan in the window.
   void record(ScanRing& scans, std::uint64_t first_scan) {
     ScanSlot& newest = scans.newest();
     const Span<const ClusterSet::PointRun> runs = clusters_.point_runs(clusters_.scan_count() - 1);
@@ -187,12 +191,13 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
   typename Stages::Descriptor descriptor_;
   typename Stages::Belief belief_;
   ClusterSet clusters_;
-  std::vector<ClusterVerdict> verdicts_;  // by cluster of the window at hand
+  std::vector<ClusterVerdict> verdicts_;  // by cluster of the current window
   WindowVoter voter_;
   InstanceIds instance_ids_;
 };
 
-/// Clusters each scan alone; ids follow the instances that the evidence finds again.
+/// Decision by free space. Each scan is clustered alone. Instance ids follow the associations of
+/// instances between scans (Evidence::predecessors()).
 template <class Stages>
 class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
  public:
@@ -212,7 +217,8 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
     instance_ids_.clear();
   }
 
-  /// Lets scans up to that many behind the newest be judged, if these are more than latency().
+  /// Extends the age at which scans can be judged to `scans` scans. At least latency() scans are
+  /// kept.
   void keep(std::size_t scans) { keep_in_stage(evidence_, scans); }
 
   void observe(ScanRing& scans, const ScanWindow& window, StageTimer& timer) override {
@@ -221,7 +227,7 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
       propagate_ids(scans);
     });
   }
-  /// Takes the newest scan in without ids.
+  /// Adds the newest scan and assigns no instance ids.
   void observe_instances(const ScanSlot& newest, const ScanWindow& window) {
     evidence_.observe(newest.scan, newest.epoch, newest.T_world_level, newest.split,
                       window.newest_cluster_of(), window.cluster_count());
@@ -233,12 +239,13 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
   void judge_final(ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) override {
     write_final(scan, writer, timer);
   }
-  /// The same; give the verdict that was written, which holds until the next call.
+  /// As judge_newest(). Returns the written verdict, which is valid until the next call.
   EvidenceVerdict write_newest(ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) {
     const EvidenceVerdict verdict = judge(newest, false, timer);
     timer.measure(&StageTimes::verdict, [&] { writer.write_groups(newest, verdict); });
     return verdict;
   }
+  /// As judge_final(). Returns the written verdict, which is valid until the next call.
   EvidenceVerdict write_final(ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) {
     const EvidenceVerdict verdict = judge(scan, true, timer);
     timer.measure(&StageTimes::verdict, [&] {
@@ -283,13 +290,14 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
   InstanceIds instance_ids_;
 };
 
-/// Dynamic if either verdict is, the first one's cause before the second one's; the higher belief.
+/// Combines two verdicts: dynamic if one of them is dynamic. The cause is that of `first` unless
+/// only `second` is dynamic; the belief is the larger one.
 inline PointVerdict stronger(const PointVerdict& first, const PointVerdict& second) {
   const bool takes_second = !is_dynamic(first.cause) && is_dynamic(second.cause);
   return {takes_second ? second.cause : first.cause, std::max(first.belief, second.belief)};
 }
 
-/// Adds what windows proposed so far to the verdict by free space that was written last.
+/// Combines the verdict by free space, written before, with the proposals of the windows so far.
 inline void add_proposals(ScanSlot& scan, const EvidenceVerdict& by_free_space, int votes_needed,
                           VerdictWriter& writer) {
   const VerdictWriter::Points points = writer.points(scan);
@@ -301,8 +309,8 @@ inline void add_proposals(ScanSlot& scan, const EvidenceVerdict& by_free_space, 
   }
 }
 
-/// Free space decides on all points; windows add what they propose. Clusters, and with them ids,
-/// are those of the windows.
+/// A point is dynamic if free space or the windows classify it as dynamic. Clusters and instance
+/// ids come from the windows.
 template <class Stages>
 class BothDecisions final : public ScanDecision<typename Stages::Map> {
  public:
@@ -346,7 +354,7 @@ class BothDecisions final : public ScanDecision<typename Stages::Map> {
   FreeSpaceDecision<Stages> free_space_;
 };
 
-/// The decision that `config.decision` names.
+/// Creates the implementation of `config.decision`.
 template <class Stages>
 std::unique_ptr<ScanDecision<typename Stages::Map>> make_decision(
     const PipelineConfig<Stages>& config) {

@@ -1,4 +1,4 @@
-// Foreign clouds on their way in.
+// Input filter: copies the valid points of a cloud and labels all points.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,13 +16,14 @@
 
 namespace dynains::detail {
 
-/// Takes a foreign cloud in: good points as floats, and a label for each of all points. Good ones
-/// count as ground until something else is known of them.
+/// Copies the valid points of a cloud as floats and labels every input point. A valid point has
+/// finite coordinates and lies within the range limits; its first label is kGround.
 class Ingest {
  public:
-  /// Points outside [min_range, max_range] (m, in the sensor's x-y plane), higher or lower than
-  /// max_range or without finite coordinates stay out; a point at the origin is a beam that did not
-  /// return. What is taken in is turned by `R`, unless there is none.
+  /// `cloud`: m, sensor frame. `min_range` and `max_range`: m, in the sensor's x-y plane; the
+  /// absolute z coordinate must not exceed `max_range` either. Points at the origin are beams
+  /// without a return and get kInvalid, as do NaN and infinity. `R`: rotation of the valid points
+  /// after the range test, or null for none. `labels`: by input point.
   void read(const CloudView& cloud, float min_range, float max_range, const Eigen::Matrix3d* R,
             std::vector<PointLabel>& labels) {
     const auto rotation = PackTransform::rotation(R != nullptr ? *R : Eigen::Matrix3d::Identity());
@@ -32,31 +33,32 @@ class Ingest {
     points_.grow(count + kMaxPackWidth);
     grow(input_, count + kMaxPackWidth);
     count_ = 0;
-    for (std::size_t begin = 0; begin < count; begin += kPiece) {
-      const std::size_t length = std::min(kPiece, count - begin);
+    for (std::size_t begin = 0; begin < count; begin += kChunk) {
+      const std::size_t length = std::min(kChunk, count - begin);
       copy(cloud, begin, length);
-      const std::size_t taken =
-          sort_out(begin, length, min_range * min_range, max_range * max_range, labels.data());
+      const std::size_t valid_count =
+          filter(begin, length, min_range * min_range, max_range * max_range, labels.data());
       if (R != nullptr) {
-        transform_points(PointsView(points_).subview(count_, taken), rotation, points_, count_);
+        transform_points(PointsView(points_).subview(count_, valid_count), rotation, points_,
+                         count_);
       }
-      count_ += taken;
+      count_ += valid_count;
     }
   }
 
-  /// Turns the points that were taken in.
+  /// Rotates the valid points by `R`.
   void turn(const Eigen::Matrix3d& R) { rotate(points(), R, points_); }
 
+  /// Valid points, m.
   PointsView points() const { return PointsView(points_).subview(0, count_); }
-  /// Position in the input of each point that was taken in.
+  /// Input index of each valid point; longer than points().
   const std::vector<std::uint32_t>& input() const { return input_; }
 
  private:
-  // Points that are worked off at once: they stay in the nearest cache, and are so few that reading
-  // ahead goes on meanwhile.
-  static constexpr std::size_t kPiece = 128;
+  // Points per step: fits the L1 cache.
+  static constexpr std::size_t kChunk = 128;
 
-  // Puts points behind those that were taken in, whatever they are.
+  // Appends points, valid or not, behind the valid ones.
   void copy(const CloudView& cloud, std::size_t begin, std::size_t length) {
     if (cloud.raw_floats() != nullptr) {
       copy(*cloud.raw_floats(), begin, length);
@@ -66,7 +68,8 @@ class Ingest {
     }
   }
 
-  // Interleaved floats four points at a time, and fetched ahead: who wrote them did so long ago.
+  // Transposes four interleaved points at a time. Prefetching helps because the input is usually
+  // not in the cache.
   void copy(const RawPoints<float>& cloud, std::size_t begin, std::size_t length) {
     constexpr std::size_t kAhead = 128;  // points
     float* const x = points_.x.data() + count_;
@@ -74,7 +77,8 @@ class Ingest {
     float* const z = points_.z.data() + count_;
     const auto point = [&cloud](std::size_t i) { return cloud.data + i * cloud.stride; };
     std::size_t i = 0;
-    // Nothing need lie behind the coordinates of the last point.
+    // Four floats are read per point, so the last point of the cloud must not be read here: memory
+    // may end after its coordinates.
     for (; cloud.stride >= 4 && i + 4 <= length && begin + i + 4 < cloud.count; i += 4) {
       const std::size_t at = begin + i;
       __builtin_prefetch(point(std::min(at + kAhead, cloud.count - 1)));
@@ -91,42 +95,42 @@ class Ingest {
     }
   }
 
-  // Labels the bad ones among these and closes the gaps that they leave; counts the good ones.
-  // Mostly, all of them are.
-  std::size_t sort_out(std::size_t begin, std::size_t length, float min_squared, float max_squared,
-                       PointLabel* label_of) {
+  // Labels the appended points and compacts the valid ones. Returns the number of valid points. The
+  // branch for a whole valid pack is the common case.
+  std::size_t filter(std::size_t begin, std::size_t length, float min_squared, float max_squared,
+                     PointLabel* label_of) {
     std::size_t result = 0;
     run_max_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       using Int = typename Packs::Int;
-      // Read once: stores may change anything, as far as the compiler knows.
+      // Local copies of members avoid reloads after stores that could alias them.
       const Float nearest(min_squared), farthest(max_squared), zero(0.0F);
       float* const xs = points_.x.data() + count_;
       float* const ys = points_.y.data() + count_;
       float* const zs = points_.z.data() + count_;
       std::uint32_t* const input = input_.data() + count_;
       PointLabel* const labels = label_of;
-      std::size_t taken = 0;
+      std::size_t valid_count = 0;
       for_slices<Packs>(length, [&](auto at) {
         const Float x = at.load(xs);
         const Float y = at.load(ys);
         const Float z = at.load(zs);
         const Float squared = x * x + y * y;
-        // Comparisons with NaN are false, so that one test admits only good points; zeros behind
-        // the end are bad.
+        // Comparisons with NaN are false, so NaN fails this test. Zeros behind the end fail it,
+        // too.
         const unsigned good = ((squared >= nearest) & (squared <= farthest) & (z * z <= farthest) &
                                (squared + abs(z) > zero))
                                   .bits();
         const std::size_t first = begin + at.begin;
         if (good == Packs::kAll) {
-          x.store(xs + taken);
-          y.store(ys + taken);
-          z.store(zs + taken);
+          x.store(xs + valid_count);
+          y.store(ys + valid_count);
+          z.store(zs + valid_count);
           (pack_indices<Int>() + Int(static_cast<std::int32_t>(first)))
-              .store(reinterpret_cast<std::int32_t*>(input + taken));
+              .store(reinterpret_cast<std::int32_t*>(input + valid_count));
           std::fill_n(labels + first, Packs::kCount, PointLabel::kGround);
-          taken += Packs::kCount;
+          valid_count += Packs::kCount;
           return;
         }
         const Float infinity(std::numeric_limits<float>::infinity());
@@ -134,18 +138,18 @@ class Ingest {
                                   (abs(x) + abs(y) + abs(z) > zero))
                                      .bits();
         for (std::size_t k = 0; k < at.size(); ++k) {
-          xs[taken] = xs[at.begin + k];
-          ys[taken] = ys[at.begin + k];
-          zs[taken] = zs[at.begin + k];
-          input[taken] = static_cast<std::uint32_t>(first + k);
+          xs[valid_count] = xs[at.begin + k];
+          ys[valid_count] = ys[at.begin + k];
+          zs[valid_count] = zs[at.begin + k];
+          input[valid_count] = static_cast<std::uint32_t>(first + k);
           const unsigned is_good = (good >> k) & 1U;
-          taken += is_good;
+          valid_count += is_good;
           const PointLabel bad =
               ((returns >> k) & 1U) != 0 ? PointLabel::kOutOfRange : PointLabel::kInvalid;
           labels[first + k] = is_good != 0 ? PointLabel::kGround : bad;
         }
       });
-      result = taken;
+      result = valid_count;
     });
     return result;
   }

@@ -1,4 +1,4 @@
-// Instance ids that follow an object from scan to scan.
+// Propagation of instance ids from scan to scan.
 #pragma once
 
 #include <algorithm>
@@ -11,19 +11,20 @@
 
 namespace dynains::detail {
 
-/// Propagates the ids of clusters of the previous scan to those of the current window.
+/// Propagates the instance ids of the previous scan to the clusters of the current window.
 class InstanceIds {
  public:
   using PointRuns = Span<const ClusterSet::PointRun>;
 
-  /// Starts with the first id again.
+  /// Restarts the numbering of ids.
   void clear() { last_id_ = kNoInstance; }
 
-  /// Fills `ids` with an id per cluster of this window. The points of the previous scan give their
-  /// old clusters (`old_runs`, with indices into `old_ids`) and their clusters in this window
-  /// (`point_runs`). A cluster takes the id that more than half of its points had, or without such
-  /// a majority one of those that some had; if two clusters want the same id, the first keeps it
-  /// and the other gets a new one.
+  /// Fills `ids` with the instance id of each cluster of this window. `old_runs` and `point_runs`:
+  /// point runs of the previous scan, with its old clusters (indices into `old_ids`) and with the
+  /// clusters of this window. A cluster inherits the id of more than half of its points in the
+  /// previous scan; without a majority, it inherits the id of some of them. If two clusters have
+  /// one predecessor, the cluster with the lower index inherits the id and the other gets a new
+  /// one.
   void assign(PointRuns old_runs, Span<const std::uint32_t> old_ids, PointRuns point_runs,
               std::size_t cluster_count, std::vector<std::uint32_t>& ids) {
     candidate_.assign(cluster_count, kNoCluster);
@@ -41,25 +42,26 @@ class InstanceIds {
     propagate(candidate_, old_ids, ids);
   }
 
-  /// Assigns ids by the given old cluster of each cluster, or kNoCluster.
+  /// Fills `ids` by cluster. `predecessors`: by cluster, its old cluster (index into `old_ids`) or
+  /// kNoCluster, which gives a new id.
   void propagate(Span<const std::uint32_t> predecessors, Span<const std::uint32_t> old_ids,
                  std::vector<std::uint32_t>& ids) {
-    taken_.assign(old_ids.size(), 0);
+    is_inherited_.assign(old_ids.size(), 0);
     ids.resize(predecessors.size());
     for (std::size_t c = 0; c < predecessors.size(); ++c) {
       const std::uint32_t old = predecessors[c];
-      if (old != kNoCluster && taken_[old] == 0) {
-        taken_[old] = 1;
+      if (old != kNoCluster && is_inherited_[old] == 0) {
+        is_inherited_[old] = 1;
         ids[c] = old_ids[old];
       } else {
-        if (++last_id_ == kNoInstance) ++last_id_;  // after an overflow
+        if (++last_id_ == kNoInstance) ++last_id_;  // skipped after an overflow
         ids[c] = last_id_;
       }
     }
   }
 
  private:
-  // Majority vote of Boyer and Moore: one candidate and one counter per cluster.
+  // Majority vote of Boyer and Moore, with one candidate and one counter per cluster.
   void vote(std::uint32_t cluster, std::uint32_t old_cluster, std::uint32_t points) {
     if (cluster == kNoCluster || old_cluster == kNoCluster) return;
     std::uint32_t& lead = lead_[cluster];
@@ -76,7 +78,7 @@ class InstanceIds {
   std::uint32_t last_id_ = kNoInstance;
   std::vector<std::uint32_t> candidate_;
   std::vector<std::uint32_t> lead_;
-  std::vector<std::uint8_t> taken_;
+  std::vector<std::uint8_t> is_inherited_;
 };
 
 }  // namespace dynains::detail

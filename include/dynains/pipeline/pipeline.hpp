@@ -1,4 +1,4 @@
-// The pipeline of Section II of the paper: from a scan and its pose to verdicts and a static map.
+// Pipeline of Section II of the paper: turns scans and poses into verdicts and a static map.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -29,8 +29,8 @@
 
 namespace dynains::detail {
 
-/// Coordinates x, y, z of `points` points: a street between two walls, scanned ring by ring. Half
-/// of them are ground, as on most scans.
+/// Synthetic scan of a street between two walls: interleaved x, y, z of `points` points in m,
+/// sensor frame, ring by ring. About half of the points are ground.
 inline std::vector<float> synthetic_scan(std::size_t points) {
   constexpr double kHeight = 1.7, kHalfStreet = 12.0, kFarthest = 60.0;  // m
   constexpr std::size_t kRings = 64;
@@ -42,7 +42,7 @@ inline std::vector<float> synthetic_scan(std::size_t points) {
         2.0 * M_PI * static_cast<double>(i % in_ring) / static_cast<double>(in_ring);
     const std::size_t ring = i / in_ring;
     const double share = static_cast<double>(ring) / static_cast<double>(kRings);
-    const double slope = 0.1 - 0.5 * share;  // of the beam
+    const double slope = 0.1 - 0.5 * share;  // vertical per horizontal distance of the beam
     const double to_wall = std::min(kHalfStreet / std::abs(std::sin(azimuth)), kFarthest);
     const double to_ground = slope < 0.0 ? -kHeight / slope : kFarthest;
     const double range = std::min(to_wall, to_ground);
@@ -53,8 +53,8 @@ inline std::vector<float> synthetic_scan(std::size_t points) {
   return xyz;
 }
 
-/// While it lives, scans that are pushed do not enter the map, which may be on a disk; at its end
-/// the pipeline forgets them.
+/// Scope of the warm-up: scans pushed within it are not inserted into the map, which may be on
+/// disk. The destructor removes these scans from the pipeline.
 template <class Pipeline>
 class WarmUp {
  public:
@@ -70,7 +70,8 @@ class WarmUp {
   Pipeline& pipeline_;
 };
 
-/// Owns the stages and every buffer. Calls and errors are those of BasicDynaInsRemover.
+/// Implementation of BasicDynaInsRemover, with the same calls and errors. Owns the stages and every
+/// buffer.
 template <class Stages>
 class Pipeline {
  public:
@@ -107,7 +108,7 @@ class Pipeline {
         decision_(make_decision<Stages>(config)),
         map_(config.map),
         scans_(std::max({decision_->window_length(), latency() + 1, kFewestSlots})) {}
-  // The clusters of window_ are those that clusterer_ holds.
+  // Not copyable: window_ refers to memory of clusterer_.
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
 
@@ -119,7 +120,7 @@ class Pipeline {
 
   FrameResult push(const CloudView& cloud, const Eigen::Isometry3d& T_world_sensor, double time);
 
-  /// The final verdict on the oldest scan without one; nothing if all scans have one.
+  /// Makes the verdict on the oldest open scan final. Empty if no scan is open.
   std::optional<ScanVerdict> finish_oldest() {
     StageTimer timer;
     if (scans_.open() == 0) return std::nullopt;
@@ -137,7 +138,7 @@ class Pipeline {
 
  private:
   friend class WarmUp<Pipeline>;
-  static constexpr std::size_t kFewestSlots = 2;  // ids go from scan to scan
+  static constexpr std::size_t kFewestSlots = 2;  // ids are propagated from the previous scan
 
   static const Config& validated(const Config& config) {
     config.validate();
@@ -153,7 +154,7 @@ class Pipeline {
   void judge_newest(ScanSlot& newest, StageTimer& timer);
   ScanVerdict finish_oldest(StageTimer& timer);
 
-  // Keeps the map and the capacity of buffers.
+  // Removes all scans. The map and the capacity of buffers stay.
   void forget_scans() {
     decision_->clear();
     frame_.forget();
@@ -201,7 +202,7 @@ void Pipeline<Stages>::judge_newest(ScanSlot& newest, StageTimer& timer) {
   decision_->judge_newest(newest, writer_, timer);
 }
 
-/// If the map throws, the scan counts as final all the same, since its slot is needed.
+/// The scan becomes final even if the map throws, because the ring reuses its slot.
 template <class Stages>
 ScanVerdict Pipeline<Stages>::finish_oldest(StageTimer& timer) {
   ScanSlot& scan = scans_.finish_oldest();
@@ -214,7 +215,8 @@ ScanVerdict Pipeline<Stages>::finish_oldest(StageTimer& timer) {
   return scan.verdict();
 }
 
-/// Good points as a level sensor that looks along the scene sees them, and labels of bad points.
+/// Filters the input points. If the sensor is known, the valid points are rotated into the level
+/// frame.
 template <class Stages>
 void Pipeline<Stages>::ingest(const CloudView& cloud, ScanSlot& next) {
   const auto nearest = static_cast<float>(config_.min_range);
@@ -228,7 +230,8 @@ void Pipeline<Stages>::ingest(const CloudView& cloud, ScanSlot& next) {
   next.ensure_capacity(next.labels.size());
 }
 
-/// Adapts the stages to the sensor by the first scan that has enough points to estimate it.
+/// Estimates the sensor model from the newest scan, unless it is known or not needed, and adapts
+/// the stages to it. Stages use SensorModel::typical() until a scan has enough points.
 template <class Stages>
 void Pipeline<Stages>::find_sensor(ScanSlot& newest) {
   const bool is_needed = decision_->needs_sensor() || config_.level || needs_sensor(ground_) ||
@@ -242,13 +245,13 @@ void Pipeline<Stages>::find_sensor(ScanSlot& newest) {
     adapt_stage(clusterer_, model);
     decision_->adapt(model);
   } catch (...) {
-    frame_.forget();  // so that the next scan adapts all of them
+    frame_.forget();  // the next scan adapts all stages
     throw;
   }
   if (frame_.turns()) ingest_.turn(level(newest));
 }
 
-/// Levels the pose of the scan. Gives the rotation for its points.
+/// Levels the pose of the scan. Returns the rotation for its points.
 template <class Stages>
 Eigen::Matrix3d Pipeline<Stages>::level(ScanSlot& scan) const {
   const Eigen::Matrix3d R_level_sensor = sensor().R_level_sensor();
@@ -260,11 +263,11 @@ template <class Stages>
 void Pipeline<Stages>::reserve_like(const CloudView& example, std::size_t scans) {
   if (scans_.pushed() > 0) throw UsageError("memory is reserved before the first push");
   if (scans == 0) return;
-  // Scans of one sensor differ a little in size.
+  // Margin: scans of one sensor differ slightly in size.
   const std::size_t points = example.size() + example.size() / 16;
   for (std::size_t i = 0; i < std::min(scans, scans_.capacity()); ++i) scans_[i].touch(points);
   const WarmUp<Pipeline> warm_up(*this);
-  // The fourth scan has been compared with another one, whatever the decision.
+  // After four scans, each kind of decision has compared a scan with a reference.
   const std::size_t enough = std::max<std::size_t>(decision_->window_length(), 4);
   for (std::size_t i = 0; i < std::min(scans, enough); ++i) {
     push(example, Eigen::Isometry3d::Identity(), next_time());

@@ -1,4 +1,4 @@
-// The scans whose verdicts are open, in a ring, and the count of all scans.
+// Ring buffer of the scans without a final verdict.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -20,19 +20,19 @@
 
 namespace dynains::detail {
 
-/// One scan with its verdict. Reused from scan to scan.
+/// One scan with its verdict. Slots are reused.
 struct ScanSlot {
-  std::uint64_t scan = 0;
+  std::uint64_t scan = 0;   ///< number of the push, from 0
   std::uint64_t epoch = 0;  ///< only scans of one epoch are compared
   double time = 0.0;        ///< s
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d T_world_level = Eigen::Isometry3d::Identity();  ///< frame of split.points
 
   GroundSplit split;
-  std::vector<std::uint32_t> ids;  ///< instance by cluster of the window with this newest scan
+  std::vector<std::uint32_t> ids;  ///< by cluster of the window that ends with this scan
   WindowVotes windows;
-  std::vector<EvidenceVerdict::Group> written_groups;  ///< verdicts by free space, written last
-  std::vector<std::uint32_t> moved_ground;             ///< ground points that these call dynamic
+  std::vector<EvidenceVerdict::Group> written_groups;  ///< last written verdict by free space
+  std::vector<std::uint32_t> moved_ground;             ///< its dynamic ground points, split index
 
   /// @name By input point
   /// @{
@@ -43,25 +43,26 @@ struct ScanSlot {
   /// @}
 
   std::size_t non_ground_count() const { return split.count - split.ground_count; }
-  /// Number in the input of each non-ground point.
+  /// Input index of each non-ground point.
   const std::uint32_t* non_ground_input() const { return split.input.data() + split.ground_count; }
 
   ScanVerdict verdict() const {
     return {scan, time, T_world_sensor, labels, instances, beliefs, causes};
   }
 
-  /// Capacity for a scan of so many points.
+  /// Ensures capacity for a scan of `points` points.
   void ensure_capacity(std::size_t points) {
     const auto ensure = [points](auto&... values) {
       (detail::ensure_capacity(values, points), ...);
     };
     ensure(labels, instances, beliefs, causes);
     ensure(windows.stage, windows.settled, windows.votes, windows.belief);
-    constexpr std::size_t kPointsPerRun = 4;  // on average; more runs make room for themselves
+    constexpr std::size_t kPointsPerRun = 4;  // typical mean; more runs reallocate
     detail::ensure_capacity(windows.point_runs, points / kPointsPerRun);
   }
 
-  /// The same, and touches the memory of a verdict, which the system then need not provide later.
+  /// Ensures capacity for `points` points and writes to the memory of the verdict, so that later
+  /// scans cause no page faults.
   void touch(std::size_t points) {
     ensure_capacity(points);
     split.resize(points);
@@ -73,7 +74,7 @@ struct ScanSlot {
     touch_all(labels, instances, beliefs, causes);
   }
 
-  /// Capacity for as many clusters, groups and moved ground points as another scan has.
+  /// Ensures capacity for the numbers of clusters, groups and moved ground points of `other`.
   void ensure_capacity_like(const ScanSlot& other) {
     detail::ensure_capacity(ids, other.ids.size());
     detail::ensure_capacity(written_groups, other.written_groups.size());
@@ -81,16 +82,16 @@ struct ScanSlot {
   }
 };
 
-/// Ring of scans, numbered from 0. Scans become final in the order in which they came.
+/// Ring of scans, numbered from 0. Scans become final in the order of their pushes.
 class ScanRing {
  public:
   explicit ScanRing(std::size_t capacity) : slots_(capacity) {}
 
   std::size_t capacity() const { return slots_.size(); }
   std::uint64_t pushed() const { return pushed_; }
-  /// Scans without a final verdict.
+  /// Number of scans without a final verdict.
   std::uint64_t open() const { return pushed_ - finished_; }
-  /// Time for a scan that comes without one: 0.1 s after the scan before.
+  /// Default time of the next scan, s: 0.1 s after the previous scan.
   double next_time() const {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     return pushed_ == 0 ? 0.0 : std::max(last_time_ + 0.1, std::nextafter(last_time_, kInfinity));
@@ -100,7 +101,8 @@ class ScanRing {
   ScanSlot& newest() { return (*this)[pushed_ - 1]; }
   std::vector<ScanSlot>& slots() { return slots_; }
 
-  /// The slot for the next scan, which does not count yet: see PushTransaction. Throws PoseError.
+  /// Initializes the slot of the next scan. A PushTransaction adds the scan to the ring. Throws
+  /// PoseError for an invalid pose or a time (s) not greater than the previous one.
   ScanSlot& prepare(const Eigen::Isometry3d& T_world_sensor, double time,
                     const RemoverConfig& config) {
     validate_pose("T_world_sensor", T_world_sensor);
@@ -118,10 +120,10 @@ class ScanRing {
     return next;
   }
 
-  /// The oldest scan without a final verdict, which from now on has one.
+  /// Marks the oldest open scan as final and returns its slot. A scan must be open.
   ScanSlot& finish_oldest() { return (*this)[finished_++]; }
 
-  /// Begins an epoch with the next scan. Gives its number.
+  /// Begins an epoch with the next scan. Returns the number of the epoch.
   std::uint64_t start_epoch() { return ++epoch_; }
 
   void clear() {
@@ -147,8 +149,8 @@ class ScanRing {
   double last_time_ = 0.0;  // s, of the newest scan
 };
 
-/// Counts a prepared scan in. Counts it out again unless commit() is called: stages may have seen
-/// it by then, so that the next scan begins an epoch.
+/// Adds a prepared scan to the ring. Without commit(), the destructor removes it again and begins
+/// an epoch with the next scan, because stages may hold data of the removed one.
 class PushTransaction {
  public:
   PushTransaction(ScanRing& ring, const ScanSlot& prepared)

@@ -1,4 +1,4 @@
-// A sliding window of scans (Eq. 3) and its clusters (Eq. 4).
+// Sliding window of scans (Eq. 3) and its clusters (Eq. 4).
 #pragma once
 
 #include <Eigen/Geometry>
@@ -16,10 +16,10 @@
 
 namespace dynains::detail {
 
-/// Non-ground points of consecutive scans, oldest scan first, in the level frame of the newest.
+/// Non-ground points of consecutive scans in m, level frame of the newest scan, oldest scan first.
 class ScanWindow {
  public:
-  /// Gathers the last `length` scans, or as many as there are in the epoch of the newest.
+  /// Collects the last `length` scans, or fewer if the epoch of the newest scan has fewer.
   void gather(ScanRing& scans, std::size_t length) {
     const ScanSlot& newest = scans.newest();
     first_scan_ = scans.pushed() - std::min<std::uint64_t>(scans.pushed(), length);
@@ -34,7 +34,8 @@ class ScanWindow {
     }
   }
 
-  /// Throws UsageError if the clusterer does not give a number for each point.
+  /// Clusters the points of the window. Throws UsageError unless the clusterer returns one number
+  /// per point.
   template <class Clusterer>
   void cluster(Clusterer& clusterer) {
     cluster_of_ = clusterer.cluster(points_.view());
@@ -44,16 +45,17 @@ class ScanWindow {
                      " cluster numbers for " + std::to_string(points_.size()) + " points");
   }
 
+  /// Number of the oldest scan.
   std::uint64_t first_scan() const { return first_scan_; }
   std::size_t scan_count() const { return scan_begin_.size() - 1; }
   PolarView points() const { return points_.view(); }
-  /// By scan, one more than scans: its first point.
+  /// Index of the first point of each scan, and the number of points as last element.
   Span<const std::uint32_t> scan_begin() const { return scan_begin_; }
 
   std::size_t cluster_count() const { return cluster_count_; }
-  /// Cluster of each point, or kNoCluster.
+  /// Cluster number of each point, or kNoCluster. Valid until the clusterer is called again.
   Span<const std::uint32_t> cluster_of() const { return cluster_of_; }
-  /// Cluster numbers of the points of the newest scan alone.
+  /// Cluster number of each point of the newest scan, or kNoCluster.
   Span<const std::uint32_t> newest_cluster_of() const {
     const std::size_t begin = scan_begin_[scan_count() - 1];
     return cluster_of_.subspan(begin, cluster_of_.size() - begin);

@@ -1,4 +1,4 @@
-// Compile-time checks of stages: a stage that does not fit fails with one readable line.
+// Compile-time checks of the interfaces of stages, for one readable error message per stage.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -70,8 +70,8 @@ struct IsBelief<
                     std::is_convertible_v<decltype(std::declval<Stage&>().is_dynamic()), bool>>>>
     : std::true_type {};
 
-/// observe(scan, epoch, T_world_sensor, split, instance_of, instance_count): scans come in order,
-/// only those of one epoch are compared. judge(scan, is_final, split).
+/// Required: observe(scan, epoch, T_world_sensor, split, instance_of, instance_count), called in
+/// the order of scans, of which only those of one epoch are compared; judge(scan, is_final, split).
 template <class Stage, class = void>
 struct IsEvidence : std::false_type {};
 template <class Stage>
@@ -99,7 +99,7 @@ struct IsMap<Stage, std::void_t<decltype(std::declval<Stage&>().insert(
                                     std::declval<const Eigen::Isometry3d&>())),
                                 decltype(std::declval<Stage&>().clear())>> : std::true_type {};
 
-/// Whether MapRevision can use the map and the evidence.
+/// Whether the map and the evidence have the members that MapRevision needs.
 template <class Map, class Evidence, class = void>
 struct IsRevisable : std::false_type {};
 template <class Map, class Evidence>
@@ -135,7 +135,7 @@ void adapt_stage(Stage& stage, const SensorModel& sensor) {
   if constexpr (WantsSensor<Stage>::value) stage.adapt(sensor);
 }
 
-/// Lets a stage get its memory for so many scans; `reserve(std::size_t scans)` is optional.
+/// Calls the optional member `reserve(std::size_t scans)` of a stage: memory for `scans` scans.
 template <class Stage>
 using Reserve = decltype(std::declval<Stage&>().reserve(std::size_t{}));
 template <class Stage>
@@ -143,7 +143,8 @@ void reserve_stage(Stage& stage, std::size_t scans) {
   if constexpr (Offers<Reserve, Stage>::value) stage.reserve(scans);
 }
 
-/// Lets a stage judge scans of that age; `keep(std::size_t scans)` is optional.
+/// Calls the optional member `keep(std::size_t scans)` of a stage: scans up to that age, in scans,
+/// can then be judged.
 template <class Stage>
 using Keep = decltype(std::declval<Stage&>().keep(std::size_t{}));
 template <class Stage>

@@ -1,5 +1,5 @@
-// The one place where verdicts on clusters, groups and points become the arrays of a ScanVerdict
-// (Eq. 2). Label and keep flag follow from the cause.
+// Conversion of verdicts on clusters, groups and points to the arrays of a ScanVerdict (Eq. 2). The
+// cause determines the label and the keep flag.
 #pragma once
 
 #include <algorithm>
@@ -16,21 +16,21 @@
 
 namespace dynains::detail {
 
-/// Label of a good point by the cause of its verdict.
+/// Label of a valid point for the cause of its verdict.
 constexpr PointLabel label_of(Cause cause) {
   if (is_dynamic(cause)) return PointLabel::kDynamic;
   return cause == Cause::kGround ? PointLabel::kGround : PointLabel::kStatic;
 }
 
-/// Writes verdicts into the arrays of scans. Points are written by run or by group where many share
-/// a verdict, since random access to several arrays at once is what costs most.
+/// Writes verdicts into the arrays of scans. Points with a common verdict are written by point run
+/// or by group, because random access to several arrays dominates the cost.
 class VerdictWriter {
  public:
-  /// By point of the split, ground first: 1 if the final verdict, written last, is static.
+  /// Keep flags of the last final verdict, by point of the split (ground first): 1 if static.
   Span<const std::uint8_t> is_kept() const { return is_kept_; }
 
-  /// Begins the first verdict on a scan, in which good points are labelled as ground.
-  /// `cluster_of`: by non-ground point. Verdicts of others follow.
+  /// Begins the first verdict on a scan: writes instance ids and the verdicts on ground and invalid
+  /// points. All valid points must have the label kGround. `cluster_of`: by non-ground point.
   void begin(ScanSlot& scan, Span<const std::uint32_t> cluster_of) {
     const std::size_t count = scan.labels.size();
     is_kept_.resize(scan.split.count);
@@ -53,7 +53,8 @@ class VerdictWriter {
     }
   }
 
-  /// First verdict on the non-ground points, run by run: `verdict_of(cluster)`.
+  /// Writes the first verdict on the non-ground points, by point run. `verdict_of(cluster)` returns
+  /// a PointVerdict.
   template <class VerdictOf>
   void write_runs(ScanSlot& scan, Span<const ClusterSet::PointRun> point_runs,
                   VerdictOf&& verdict_of) {
@@ -73,8 +74,8 @@ class VerdictWriter {
     }
   }
 
-  /// First verdict by groups. Groups are brought into the order of the input first, so that the
-  /// arrays are written from front to back.
+  /// Writes the first verdict by group. The group of each input point is computed first, so that
+  /// the arrays are written sequentially.
   void write_groups(ScanSlot& scan, const EvidenceVerdict& evidence) {
     order_groups(scan, evidence.group_of);
     verdicts_.resize(kFirstGroup + evidence.groups.size());
@@ -86,7 +87,7 @@ class VerdictWriter {
     ensure_capacity(scan.written_groups, evidence.groups.size());
     scan.written_groups.assign(evidence.groups.begin(), evidence.groups.end());
 
-    // Read once: stores of bytes may change anything, as far as the compiler knows.
+    // Local copies of members avoid reloads after byte stores, which could alias them.
     const std::size_t count = scan.labels.size();
     const std::uint32_t* const group_of = group_of_input_.data();
     const GroupVerdict* const verdicts = verdicts_.data();
@@ -102,10 +103,11 @@ class VerdictWriter {
     write_ground(scan, evidence.ground);
   }
 
-  /// Begins the final verdict on a scan: all is kept that nothing else is said of.
+  /// Begins the final verdict on a scan: sets all keep flags.
   void begin_final(const ScanSlot& scan) { is_kept_.assign(scan.split.count, 1); }
 
-  /// Final verdict by groups; only what changed is written.
+  /// Writes the final verdict by group. Only changed verdicts are written to the arrays of the
+  /// scan.
   void rewrite_groups(ScanSlot& scan, const EvidenceVerdict& evidence) {
     write_ground(scan, evidence.ground);
     verdicts_.resize(evidence.groups.size());
@@ -125,7 +127,7 @@ class VerdictWriter {
     for (std::size_t i = 0; i < count; ++i) {
       const GroupVerdict verdict = verdicts[group_of[i]];
       is_kept[i] = verdict.is_kept;
-      if (verdict.is_news == 0) continue;
+      if (verdict.is_changed == 0) continue;
       const std::uint32_t to = input[i];
       labels[to] = verdict.label;
       causes[to] = verdict.cause;
@@ -133,7 +135,7 @@ class VerdictWriter {
     }
   }
 
-  /// Writes verdicts on single points of one split: `write(point, verdict)`.
+  /// Writes verdicts on single points, by index in the split.
   class Points {
    public:
     void write(std::size_t point, const PointVerdict& verdict) const {
@@ -162,22 +164,22 @@ class VerdictWriter {
   Points points(ScanSlot& scan) { return {scan, is_kept_}; }
 
  private:
-  // Verdict on the points of a group, in eight bytes.
+  // Verdict on the points of a group, packed in eight bytes.
   struct GroupVerdict {
     GroupVerdict() = default;
-    GroupVerdict(const PointVerdict& verdict, bool news)
+    GroupVerdict(const PointVerdict& verdict, bool changed)
         : belief(verdict.belief),
           label(label_of(verdict.cause)),
           cause(verdict.cause),
           is_kept(is_dynamic(verdict.cause) ? 0 : 1),
-          is_news(news ? 1 : 0) {}
+          is_changed(changed ? 1 : 0) {}
     float belief = 0.0F;
     PointLabel label = PointLabel::kStatic;
     Cause cause = Cause::kNotJudged;
     std::uint8_t is_kept = 1;
-    std::uint8_t is_news = 1;  // not equal to the verdict written before
+    std::uint8_t is_changed = 1;  // differs from the verdict written before
   };
-  // Groups of the input: two of fixed verdicts, then those of the evidence.
+  // Group numbers in group_of_input_: two with fixed verdicts, then the groups of the evidence.
   static constexpr std::uint32_t kBadPoints = 0;
   static constexpr std::uint32_t kGroundPoints = 1;
   static constexpr std::uint32_t kFirstGroup = 2;
@@ -194,7 +196,7 @@ class VerdictWriter {
     for (std::size_t i = 0; i < groups.size(); ++i) group_of[input[i]] = kFirstGroup + groups[i];
   }
 
-  // Ground points that moved, and those that an earlier verdict called moved.
+  // Resets the ground points that an earlier verdict classified as dynamic, then writes `moved`.
   void write_ground(ScanSlot& scan, Span<const EvidenceVerdict::GroundPoint> moved) {
     const Points points = this->points(scan);
     for (const std::uint32_t point : scan.moved_ground) points.write(point, {Cause::kGround, 0.0F});
@@ -206,8 +208,8 @@ class VerdictWriter {
     }
   }
 
-  std::vector<std::uint8_t> is_kept_;
-  std::vector<std::uint32_t> group_of_input_;
+  std::vector<std::uint8_t> is_kept_;          // by point of the split
+  std::vector<std::uint32_t> group_of_input_;  // by input point
   std::vector<GroupVerdict> verdicts_;
 };
 

@@ -1,4 +1,4 @@
-// Verdicts of windows on clusters, and the votes that they make for each point of a scan.
+// Votes of windows on the points of a scan.
 #pragma once
 
 #include <algorithm>
@@ -14,29 +14,30 @@
 
 namespace dynains::detail {
 
-/// Cause and belief.
+/// Cause and belief of the verdict on one point.
 using PointVerdict = EvidenceVerdict::Group;
 
-/// Step of the decision by windows at which the verdict on a cluster fell (Eq. 11-19), in order.
+/// Step of the decision by windows that determined the verdict on a cluster (Eq. 11-19), in order.
 enum class DecisionStage : std::uint8_t {
   kNoCluster,    ///< the point belongs to no cluster
-  kTooFewScans,  ///< the cluster was not seen by both the oldest and the newest scan
+  kTooFewScans,  ///< the cluster has no points in the oldest or in the newest scan
   kSimilar,      ///< similarity not below tau_s (Eq. 12)
   kProposed,     ///< proposed as dynamic; belief and votes decide
 };
 
-/// What all windows so far decided on the non-ground points of one scan, in the order of its split.
-/// Stages are written in pieces: their arrays are longer than there are points.
+/// Accumulated verdicts of all windows so far, by non-ground point of one scan in the order of its
+/// split. The arrays of stages are longer than the number of points, because they are written in
+/// pieces of constant length.
 struct WindowVotes {
   std::vector<DecisionStage> stage;    ///< latest stage reached in any window
-  std::vector<DecisionStage> settled;  ///< stage that the written verdict rests on for good;
-                                       ///< kNoCluster for proposed points, whose votes may change
-  std::vector<std::uint8_t> votes;     ///< of proposed points: windows that called them dynamic
-  std::vector<float> belief;           ///< of proposed points: highest posterior of any window
-  std::vector<ClusterSet::PointRun> point_runs;  ///< of the window in which the scan was the newest
+  std::vector<DecisionStage> settled;  ///< stage of the written verdict; kNoCluster for proposed
+                                       ///< points, whose number of votes may change
+  std::vector<std::uint8_t> votes;     ///< proposed points: number of windows with verdict dynamic
+  std::vector<float> belief;           ///< proposed points: highest posterior of all windows
+  std::vector<ClusterSet::PointRun> point_runs;  ///< in the window that ends with the scan
 };
 
-/// Cause of a static verdict on a point whose cluster came to that stage.
+/// Cause of a static verdict on a point whose cluster reached `stage`.
 constexpr Cause static_cause(DecisionStage stage) {
   constexpr std::array<Cause, 4> kCauses = {Cause::kNotJudged, Cause::kTooFewScans, Cause::kSimilar,
                                             Cause::kReverted};
@@ -54,19 +55,19 @@ inline PointVerdict point_verdict(const ClusterVerdict& verdict) {
   return {verdict.is_dynamic != 0 ? Cause::kProposed : static_cause(verdict.stage), verdict.belief};
 }
 
-/// Verdict on non-ground point `i`: dynamic if at least `votes_needed` windows called it so.
+/// Verdict on non-ground point `i`: dynamic if it has at least `votes_needed` votes.
 inline PointVerdict point_verdict(const WindowVotes& votes, std::size_t i, int votes_needed) {
   const DecisionStage stage = votes.stage[i];
   if (stage != DecisionStage::kProposed) return {static_cause(stage), 0.0F};
   return {votes.votes[i] >= votes_needed ? Cause::kProposed : Cause::kReverted, votes.belief[i]};
 }
 
-/// Verdicts of the windows that see a scan, from clusters to votes by point.
+/// Converts the verdicts of windows on clusters to votes by point.
 class WindowVoter {
  public:
   using PointRun = ClusterSet::PointRun;
 
-  /// First window, in which the scan is the newest and has the point runs `votes.point_runs`.
+  /// Records the window that ends with the scan. `votes.point_runs` must be set.
   static void record_first(std::size_t point_count, Span<const ClusterVerdict> verdicts,
                            WindowVotes& votes) {
     votes.votes.resize(point_count);
@@ -84,7 +85,7 @@ class WindowVoter {
     }
   }
 
-  /// A later window, which cuts the points of the scan into other runs.
+  /// Records a later window. `point_runs`: point runs of the scan in that window.
   void record_again(std::size_t point_count, Span<const PointRun> point_runs,
                     Span<const ClusterVerdict> verdicts, WindowVotes& votes) {
     for (const PointRun& run : point_runs) {
@@ -97,7 +98,7 @@ class WindowVoter {
   }
 
   /// Calls `visit(i)` for each non-ground point whose final verdict may differ from the first one:
-  /// proposed points and those that a later window brought to a later stage.
+  /// proposed points and points with a later stage in a later window.
   template <class Visit>
   static void for_each_unsettled(std::size_t point_count, const WindowVotes& votes, Visit&& visit) {
     constexpr std::size_t kBlock = 8;
@@ -130,8 +131,9 @@ class WindowVoter {
     }
   }
 
-  // The stage of each run's cluster by point. Most runs are short: they are written in pieces of
-  // constant length, of which the next run overwrites the end, up to kPiece places behind the last.
+  // Writes the stage of each run's cluster to its points. Most runs are short, so they are written
+  // in pieces of kPiece stages. The next run overwrites the excess of a piece. `stage` must have
+  // room for kPiece more values.
   static void spread_stages(Span<const PointRun> point_runs, Span<const ClusterVerdict> verdicts,
                             DecisionStage* stage) {
     for (const PointRun& run : point_runs) {
@@ -143,7 +145,7 @@ class WindowVoter {
     }
   }
 
-  // The later of two stages, by pieces that compilers hold in one register.
+  // Writes the later stage of each point. A piece of kPiece stages fits one vector register.
   static void raise_stages(const DecisionStage* other, std::size_t count, DecisionStage* stage) {
     for (std::size_t begin = 0; begin < count; begin += kPiece) {
       Piece a, b;
@@ -154,7 +156,7 @@ class WindowVoter {
     }
   }
 
-  std::vector<DecisionStage> stage_in_window_;  // of one scan in the window at hand
+  std::vector<DecisionStage> stage_in_window_;  // by point of one scan in the current window
 };
 
 }  // namespace dynains::detail
