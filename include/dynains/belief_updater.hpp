@@ -1,5 +1,4 @@
-// Belief that a cluster is dynamic, from the occupancy discrepancies of its observations
-// (Eq. 13-19).
+// Belief that a cluster is dynamic, by the occupancy discrepancies of its observations (Eq. 13-19).
 #pragma once
 
 #include <algorithm>
@@ -11,7 +10,8 @@
 
 namespace dynains {
 
-/// Binary Bayes filter over the observations of one cluster. Sees heights only, never points.
+/// Binary Bayes filter over the observations of one cluster. The heights of OccupancyDescriptor
+/// are its only input.
 class BeliefUpdater {
  public:
   struct Config {
@@ -54,14 +54,14 @@ class BeliefUpdater {
 
   const Config& config() const { return config_; }
 
-  /// Back to the prior: a new cluster.
+  /// Resets the belief to the prior, for a new cluster.
   void reset() { log_odds_ = log_odds(config_.prior); }
 
-  /// One step of Eq. 15 with the update term of Eq. 16-18: heights of one observation against
-  /// those of the cluster, cell by cell, in metres and not negative. Cells that are empty in both
-  /// are not in R; if all are, the belief stays.
+  /// One step of Eq. 15 with the update term of Eq. 16-18, which compares the heights of one
+  /// observation with those of the cluster. Both have one value per cell, m, not negative. Cells
+  /// that are empty in both are not in R (Eq. 17). If R is empty, the belief does not change.
   void update(Span<const float> observation, Span<const float> cluster) {
-    // Counting is exact and independent of order; the sum of Eq. 17 follows from three counts.
+    // The sum of Eq. 17 follows from three counts, which do not depend on the order of cells.
     std::size_t vanished = 0;
     std::size_t changed = 0;
     std::size_t alike = 0;
@@ -87,9 +87,10 @@ class BeliefUpdater {
         static_cast<double>(cells);
   }
 
+  /// Log-odds that the cluster is dynamic.
   double log_odds_value() const { return log_odds_; }
 
-  /// p(m | z) (Eq. 13, by way of Eq. 15).
+  /// p(m | z) (Eq. 13) from the log-odds of Eq. 15.
   double posterior() const { return probability(log_odds_); }
 
   /// Verdict of Eq. 19.

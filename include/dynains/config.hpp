@@ -1,4 +1,4 @@
-// All parameters of a remover: the facade's own and those of its stages.
+// All parameters of a remover: RemoverConfig and the Config of each stage.
 #pragma once
 
 #include <array>
@@ -33,7 +33,7 @@ struct ConfigOfStage<FreeSpaceEvidence> {
 template <class Stage>
 using ConfigOf = typename ConfigOfStage<Stage>::type;
 
-/// Stages::Evidence, or FreeSpaceEvidence for sets of stages that name the paper's five only.
+/// Stages::Evidence, or FreeSpaceEvidence if `Stages` has no such alias.
 template <class Stages, class = void>
 struct EvidenceOf {
   using type = FreeSpaceEvidence;
@@ -43,13 +43,13 @@ struct EvidenceOf<Stages, std::void_t<typename Stages::Evidence>> {
   using type = typename Stages::Evidence;
 };
 
-/// Whether `Operation<T>` is well-formed, for optional members of T.
+/// Whether `Operation<T>` is well-formed; detects optional members of T.
 template <template <class> class Operation, class T, class = void>
 struct Offers : std::false_type {};
 template <template <class> class Operation, class T>
 struct Offers<Operation, T, std::void_t<Operation<T>>> : std::true_type {};
 
-/// Scans from one reference of the evidence to the next; 1 without the member `reference_step`.
+/// Number of scans between two reference scans; 1 if the config has no member `reference_step`.
 template <class Config>
 using ReferenceStep = decltype(std::declval<Config&>().reference_step);
 template <class Config>
@@ -61,7 +61,7 @@ int reference_step(const Config& config) {
   }
 }
 
-/// The paper's parameters of a stage; a stage without `Config::paper()` keeps its defaults.
+/// `Config::paper()`, or the defaults if the config has no such member.
 template <class Config>
 using Paper = decltype(Config::paper());
 template <class Config>
@@ -75,37 +75,37 @@ Config paper_config() {
 
 }  // namespace detail
 
-/// Evidence by which points are called dynamic.
+/// Evidence by which points are classified as dynamic.
 enum class Decision {
   kWindow,     ///< occupancy of clusters within a sliding window of scans: the paper, Eq. 3-19
-  kFreeSpace,  ///< beams of other scans that passed through the place of a point; beyond the paper
-  kBoth,       ///< dynamic is what either of them calls dynamic
+  kFreeSpace,  ///< beams of other scans through the position of a point; not in the paper
+  kBoth,       ///< a point is dynamic if kWindow or kFreeSpace classifies it as dynamic
 };
 
 constexpr std::array<const char*, 3> value_names(Decision) {
   return {"window", "free_space", "both"};
 }
 
-/// Observations of a cluster that update its belief, one after the other (Eq. 15).
+/// Observations of a cluster that update its belief sequentially (Eq. 15, 16).
 enum class BeliefObservations {
-  kSequence,  ///< each from the second on, against the cluster up to it
-  kNewest,    ///< the newest, against the whole cluster
-  kAll,       ///< each, against the whole cluster
+  kSequence,  ///< observations 2 to K, each compared with the cluster up to that observation
+  kNewest,    ///< only the newest observation, compared with the whole cluster
+  kAll,       ///< all observations, each compared with the whole cluster
 };
 
 constexpr std::array<const char*, 3> value_names(BeliefObservations) {
   return {"sequence", "newest", "all"};
 }
 
-/// Parameters of the facade itself. visit() describes them.
+/// Parameters of BasicDynaInsRemover itself. visit() gives their meaning and bounds.
 struct RemoverConfig {
   Decision decision = Decision::kFreeSpace;
   int window = 4;          ///< scans, K of Eq. 3
   bool use_belief = true;  ///< Eq. 13-19
   BeliefObservations belief_observations = BeliefObservations::kSequence;
-  int votes = 1;           ///< windows
-  double min_range = 2.7;  ///< m, sensor's x-y plane
-  double max_range = 250;  ///< m, sensor's x-y plane and z axis
+  int votes = 1;           ///< number of windows
+  double min_range = 2.7;  ///< m, in the sensor's x-y plane
+  double max_range = 250;  ///< m, in the sensor's x-y plane, and along its z axis
   double max_gap = 1.0;    ///< s
   double max_speed = 100;  ///< m/s
   bool level = true;
@@ -113,7 +113,7 @@ struct RemoverConfig {
   double mounting_roll = 0.0;   ///< deg, left side up
   bool build_map = true;
 
-  /// The paper's own verdict.
+  /// Verdicts by the method of the paper (Eq. 3-19).
   static RemoverConfig paper() {
     RemoverConfig config;
     config.decision = Decision::kWindow;
@@ -126,16 +126,17 @@ struct RemoverConfig {
     visitor(Parameter{"decision", self.decision, Bounds(), "",
                       "evidence by which points are called dynamic: occupancy of clusters within a "
                       "sliding window of scans (the paper), free space that beams of other scans "
-                      "passed through, or either of both"});
+                      "passed through, or both"});
     visitor(Parameter{"window", self.window, closed(2, 64), "scans",
                       "sliding window K (Eq. 3); without effect on decision = free_space"});
     visitor(Parameter{"use_belief", self.use_belief, Bounds(), "",
-                      "revert proposals of the window by belief (Eq. 13-19); off is the paper's "
-                      "IOC-only row"});
+                      "revert proposals of the window by belief (Eq. 13-19); false: the IOC-only "
+                      "variant of the paper"});
     visitor(Parameter{"belief_observations", self.belief_observations, Bounds(), "",
-                      "observations that update the belief (Eq. 15, 16): each from the second on, "
-                      "against the cluster up to it (sequence); the newest, or all, against the "
-                      "whole cluster"});
+                      "observations that update the belief (Eq. 15, 16); sequence: the second to "
+                      "the newest, each compared with the cluster up to that observation; newest: "
+                      "only the newest, compared with the whole cluster; all: all observations, "
+                      "each compared with the whole cluster"});
     visitor(Parameter{"votes", self.votes, closed(0, 64), "windows",
                       "windows that must call a point dynamic for the final verdict; 0: the newest "
                       "window alone decides, without latency"});
@@ -161,17 +162,18 @@ struct RemoverConfig {
     visitor(Parameter{"build_map", self.build_map, Bounds(), "", "accumulate the static map"});
   }
 
-  /// Whether windows of scans are compared (decision window or both).
+  /// Whether the decision uses the window (kWindow or kBoth).
   bool uses_window() const { return decision != Decision::kFreeSpace; }
-  /// Whether free space gives evidence (decision free_space or both).
+  /// Whether the decision uses free space (kFreeSpace or kBoth).
   bool uses_free_space() const { return decision != Decision::kWindow; }
 
-  /// Whether a scan starts a new epoch: `pause` s and `distance` m behind the one before.
+  /// Whether a scan starts a new epoch. `pause`: s since the previous scan. `distance`: m from its
+  /// pose.
   bool starts_epoch(double pause, double distance) const {
     return pause > max_gap || distance > max_speed * pause;
   }
 
-  /// Throws ConfigError.
+  /// Throws ConfigError for a field out of bounds, min_range >= max_range or votes > window.
   void validate() const {
     validate_parameters("DynaInsRemover", *this);
     if (!(min_range < max_range)) {
@@ -185,7 +187,7 @@ struct RemoverConfig {
   }
 };
 
-/// `BasicDynaInsRemover<Stages>::Config`.
+/// All parameters: `BasicDynaInsRemover<Stages>::Config`.
 template <class Stages>
 struct PipelineConfig : RemoverConfig {
   using Evidence = typename detail::EvidenceOf<Stages>::type;
@@ -198,8 +200,8 @@ struct PipelineConfig : RemoverConfig {
   detail::ConfigOf<typename Stages::Map> map;
   MapRevisionConfig revision;
 
-  /// The paper to the letter, with its parameters; voxels, cells and ground, which it gives no
-  /// numbers for, are those of its public implementation. Ranges differ, see docs/algorithm.md.
+  /// Method and parameters of the paper. Voxels, cells and ground, for which the paper gives no
+  /// values, follow its public implementation. Ranges differ, see docs/algorithm.md.
   static PipelineConfig paper() {
     PipelineConfig config;
     static_cast<RemoverConfig&>(config) = RemoverConfig::paper();
@@ -211,7 +213,7 @@ struct PipelineConfig : RemoverConfig {
     return config;
   }
 
-  /// Calls `visitor(name, config)` for the facade's own fields and for those of each stage.
+  /// Calls `visitor(name, config)` for the RemoverConfig and for the Config of each stage.
   template <class Self, class Visitor>
   static void visit_sections(Self& self, Visitor&& visitor) {
     using Own = std::conditional_t<std::is_const_v<Self>, const RemoverConfig, RemoverConfig>;
@@ -233,7 +235,7 @@ struct PipelineConfig : RemoverConfig {
     });
   }
 
-  /// Throws ConfigError.
+  /// Throws ConfigError for an invalid section or contradictory sections.
   void validate() const {
     visit_sections(*this, [](const char*, const auto& section) { section.validate(); });
     if (!revision.revise_map) return;
@@ -241,7 +243,7 @@ struct PipelineConfig : RemoverConfig {
       throw ConfigError("MapRevision.revise_map = true needs decision = free_space or both");
     }
     if (!build_map) throw ConfigError("MapRevision.revise_map = true needs build_map = true");
-    // A reference must not count twice.
+    // Each reference scan must update the belief of a map block at most once.
     const int step = detail::reference_step(evidence);
     if (revision.revision_period < step) {
       throw ConfigError(

@@ -1,5 +1,5 @@
-// DynaInsRemover, headers only, with stages of one's own if wanted. A source file that needs the
-// default stages alone compiles faster with remover.hpp and the library dynains::remover.
+// Header-only DynaInsRemover, for default or custom stages. For the default stages alone,
+// remover.hpp with the library dynains::remover compiles faster.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,8 @@
 
 namespace dynains {
 
-// Defined outside of the class, so that `extern template class` leaves the pipeline out of a unit.
+// Members are defined outside of the class, so that `extern template class` prevents the
+// instantiation of the pipeline.
 
 template <class Stages>
 BasicDynaInsRemover<Stages>::BasicDynaInsRemover() : BasicDynaInsRemover(Config()) {}

@@ -1,4 +1,4 @@
-// Exceptions of the library, which neither prints nor aborts.
+// Exceptions of the library. The library does not print or abort.
 #pragma once
 
 #include <stdexcept>
@@ -6,32 +6,33 @@
 
 namespace dynains {
 
-/// A configuration value is out of its documented bounds; the text names field, value and bound.
+/// A configuration value is out of bounds. The message names field, value and violated bound.
 class ConfigError : public std::invalid_argument {
  public:
   using std::invalid_argument::invalid_argument;
 };
 
-/// A pose is not a finite rigid transform, or a time stamp does not increase.
+/// A pose is not a finite rigid transform within kMaxTranslation, or a time is not greater than the
+/// previous one.
 class PoseError : public std::invalid_argument {
  public:
   using std::invalid_argument::invalid_argument;
 };
 
-/// The description of a cloud does not fit its data or lacks a field.
+/// The layout of a cloud does not match its data, or a required field is missing.
 class CloudError : public std::invalid_argument {
  public:
   using std::invalid_argument::invalid_argument;
 };
 
-/// A call at the wrong time: during another call on the same object (from a second thread or from
-/// within), reserve() after the first push, or a write to a folder that another process writes to.
+/// A call is not permitted in the present state: during another call on the same object, reserve()
+/// after the first push, a moved-from object, or a folder that another process writes to.
 class UsageError : public std::logic_error {
  public:
   using std::logic_error::logic_error;
 };
 
-/// A file cannot be read or written; the text gives path, position and what was expected.
+/// A file cannot be read or written. The message names path, position and expected content.
 class IoError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

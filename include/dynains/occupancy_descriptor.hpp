@@ -17,13 +17,13 @@
 
 namespace dynains {
 
-/// Describes each observation S_k of a cluster by the heights of its points over a polar grid that
-/// spans the whole cluster.
+/// Describes each observation S_k of a cluster by the heights of its points in the cells of a polar
+/// grid that spans the whole cluster.
 ///
-/// Choices where the paper is silent: the azimuth extent is the smallest arc that holds the
-/// cluster, so that a cluster behind the sensor is not torn at +-pi; a point on the outer border
-/// belongs to the last cell; a cell whose highest point is the lowest of the cluster has height 0
-/// and counts as empty, as Eq. 9 and 10 say to the letter.
+/// The paper does not define two cases. The azimuth extent is the smallest arc that contains the
+/// cluster, so that the seam at +-pi does not split a cluster. A point on the outer border belongs
+/// to the last cell. According to Eq. 9 and 10, a cell whose highest point is the lowest point of
+/// the cluster has height 0 and is empty.
 class OccupancyDescriptor {
  public:
   struct Config {
@@ -44,7 +44,7 @@ class OccupancyDescriptor {
     /// Throws ConfigError.
     void validate() const {
       validate_parameters("OccupancyDescriptor", *this);
-      // A cluster may reach round the sensor, and as far as any cluster_range.
+      // Largest possible grid: a cluster around the sensor with the largest cluster_range.
       constexpr double kFarthest = 1000.0;  // m
       constexpr double kMaxCells = 1 << 26;
       const double cells = 360.0 / cell_azimuth * (kFarthest / cell_range);
@@ -64,20 +64,20 @@ class OccupancyDescriptor {
 
   const Config& config() const { return config_; }
 
-  /// Lays the grid of Eq. 5-8 over a cluster and describes its oldest and newest observation.
-  /// The cluster must be comparable (ClusterSet), and outlive the calls that follow with its
-  /// window.
+  /// Computes the grid of Eq. 5-8 for a cluster and the heights of its oldest and newest
+  /// observation. The cluster must be comparable (ClusterSet::comparable). The memory that the view
+  /// refers to must stay valid until the next call.
   void describe(const ClusterView& cluster) {
     cluster_ = cluster;
-    lay_grid();
+    compute_grid();
     const std::size_t scans = cluster_.scan_count();
     heights_.resize(std::max(heights_.size(), 2 * scans * cell_count()));
     fill(0);
     fill(scans - 1);
   }
 
-  /// Describes the observations between oldest and newest, and the growing cluster. The belief
-  /// needs them, the similarity does not.
+  /// Computes the heights of the other observations, and cluster_heights(). The belief requires
+  /// them, the similarity does not.
   void describe_rest() {
     const std::size_t scans = cluster_.scan_count();
     for (std::size_t k = 1; k + 1 < scans; ++k) fill(k);
@@ -97,16 +97,18 @@ class OccupancyDescriptor {
   std::size_t cell_count() const { return radial_cells_ * azimuth_cells_; }
   std::size_t scan_count() const { return cluster_.scan_count(); }
 
-  /// H_k flattened, radial index slowest: metres over the lowest point of the cluster (Eq. 9-10).
+  /// H_k by cell, radial index slowest: height of the highest point over the lowest point of the
+  /// cluster, m (Eq. 9-10). 0 <= k < scan_count().
   Span<const float> heights(std::size_t k) const {
     return {heights_.data() + k * cell_count(), cell_count()};
   }
 
-  /// Heights of observations 0 to k together, h_{t1:tk} of Eq. 16; after describe_rest.
+  /// Maximum of the heights of observations 0 to k by cell, m: h_{t1:tk} of Eq. 16. Requires
+  /// describe_rest().
   Span<const float> cluster_heights(std::size_t k) const { return heights(scan_count() + k); }
 
-  /// Cosine similarity d of newest and oldest observation (Eq. 11), in [0, 1]. Two observations
-  /// without any height are equal (1); one without and one with are not (0).
+  /// Cosine similarity d of newest and oldest observation (Eq. 11), in [0, 1]. If all heights of
+  /// one observation are 0, the similarity is 0; if all heights of both are 0, it is 1.
   double similarity() const {
     const Span<const float> a = heights(0);
     const Span<const float> b = heights(scan_count() - 1);
@@ -136,24 +138,23 @@ class OccupancyDescriptor {
   bool proposes_dynamic() const { return similarity() < config_.tau_s; }
 
  private:
-  void lay_grid() {
+  void compute_grid() {
     using detail::PackConstant;
     const PolarView& points = cluster_.window;
-    // In the place of those that are missing from the last eight, the first point changes no
-    // extent.
+    // The first point pads incomplete packs, because it does not change the extents.
     const std::size_t first = cluster_.ranges[0].begin;
     const PackConstant first_range(points.range[first]), first_azimuth(points.azimuth[first]);
-    const PackConstant first_z(points.z[first]), first_turned(turned(points.azimuth[first]));
+    const PackConstant first_z(points.z[first]), first_wrapped(wrapped(points.azimuth[first]));
     const PackConstant zero(0.0F), turn(2.0F * detail::kPi);
-    // Extents for the seam at +-pi and for the seam at 0: the smaller of the two is the smallest
-    // arc if it is at most half a turn.
-    float range_max = 0.0F, low = 0.0F, high = 0.0F, low_turned = 0.0F, high_turned = 0.0F;
+    // Azimuth extents for a seam at +-pi and for a seam at 0. The smaller extent is the smallest
+    // arc if it is at most pi.
+    float range_max = 0.0F, low = 0.0F, high = 0.0F, low_wrapped = 0.0F, high_wrapped = 0.0F;
     detail::run_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       Float range_low = first_range, range_high = first_range, z_low = first_z;
       Float azimuth_low = first_azimuth, azimuth_high = first_azimuth;
-      Float turned_low = first_turned, turned_high = first_turned;
+      Float wrapped_low = first_wrapped, wrapped_high = first_wrapped;
       const auto extend = [&](const auto& at) {
         const Float range = at.padded(at.load(points.range.data()), first_range);
         const Float azimuth = at.padded(at.load(points.azimuth.data()), first_azimuth);
@@ -164,8 +165,8 @@ class OccupancyDescriptor {
         azimuth_low = min(azimuth_low, azimuth);
         azimuth_high = max(azimuth_high, azimuth);
         const Float on = azimuth + keep(azimuth < zero, Float(turn));
-        turned_low = min(turned_low, on);
-        turned_high = max(turned_high, on);
+        wrapped_low = min(wrapped_low, on);
+        wrapped_high = max(wrapped_high, on);
       };
       for (const PointRange& part : cluster_.ranges) {
         detail::for_overlapping_slices<Packs>(part.begin, part.end, extend);
@@ -175,14 +176,14 @@ class OccupancyDescriptor {
       z_min_ = smallest(z_low);
       low = smallest(azimuth_low);
       high = largest(azimuth_high);
-      low_turned = smallest(turned_low);
-      high_turned = largest(turned_high);
+      low_wrapped = smallest(wrapped_low);
+      high_wrapped = largest(wrapped_high);
     });
     float extent = high - low;
     azimuth_min_ = low;
-    if (high_turned - low_turned < extent) {
-      extent = high_turned - low_turned;
-      azimuth_min_ = low_turned;
+    if (high_wrapped - low_wrapped < extent) {
+      extent = high_wrapped - low_wrapped;
+      azimuth_min_ = low_wrapped;
     }
     if (extent > detail::kPi) extent = find_smallest_arc(extent);
 
@@ -196,28 +197,29 @@ class OccupancyDescriptor {
     return static_cast<std::size_t>(std::max(1.0F, std::ceil(extent)));
   }
 
-  static float turned(float azimuth) {
+  // Azimuth in [0, 2 pi).
+  static float wrapped(float azimuth) {
     return azimuth < 0.0F ? azimuth + 2.0F * detail::kPi : azimuth;
   }
 
-  // For clusters that reach around more than half of the sensor: the seam goes into the widest gap
-  // of an azimuth histogram finer than the cells.
+  // Smallest arc of a cluster with an extent above pi. The seam is put into the widest gap of an
+  // azimuth histogram.
   float find_smallest_arc(float whole_extent) {
     constexpr std::size_t kBins = 1024;
     constexpr float kBinsPerRadian = static_cast<float>(kBins) / (2.0F * detail::kPi);
-    taken_.assign(kBins, 0);
+    bin_is_occupied_.assign(kBins, 0);
     const float* const azimuth = cluster_.window.azimuth.data();
     for (const PointRange& part : cluster_.ranges) {
       for (std::size_t i = part.begin; i < part.end; ++i) {
-        const auto bin = static_cast<std::size_t>(turned(azimuth[i]) * kBinsPerRadian);
-        taken_[std::min(bin, kBins - 1)] = 1;
+        const auto bin = static_cast<std::size_t>(wrapped(azimuth[i]) * kBinsPerRadian);
+        bin_is_occupied_[std::min(bin, kBins - 1)] = 1;
       }
     }
     std::size_t widest = 0;
-    std::size_t seam = kBins;  // first taken bin behind the widest gap
+    std::size_t seam = kBins;  // first occupied bin behind the widest gap
     std::size_t gap = 0;
     for (std::size_t i = 0; i < 2 * kBins; ++i) {
-      if (taken_[i % kBins] == 0) {
+      if (bin_is_occupied_[i % kBins] == 0) {
         ++gap;
         continue;
       }
@@ -233,26 +235,26 @@ class OccupancyDescriptor {
     float high = 0.0F;
     for (const PointRange& part : cluster_.ranges) {
       for (std::size_t i = part.begin; i < part.end; ++i) {
-        float offset = turned(azimuth[i]) - origin;
+        float offset = wrapped(azimuth[i]) - origin;
         if (offset < -0.5F / kBinsPerRadian) offset += 2.0F * detail::kPi;
         low = std::min(low, offset);
         high = std::max(high, offset);
       }
     }
     azimuth_min_ = origin + low;
-    // Back into the interval of azimuths, so that no point is more than one turn away.
+    // In (-pi, pi], as azimuths are, so that an offset is at most one turn.
     if (azimuth_min_ > detail::kPi) azimuth_min_ -= 2.0F * detail::kPi;
     return high - low;
   }
 
-  // Eq. 9-10 for one observation.
+  // Eq. 9-10 for observation k.
   void fill(std::size_t k) {
     const std::size_t cells = cell_count();
     float* const heights = heights_.data() + k * cells;
     std::fill(heights, heights + cells, 0.0F);
     using detail::PackConstant;
     const PolarView points = cluster_.window;
-    // Read once: the compiler cannot know that stores leave members alone.
+    // Local copies of members avoid reloads after stores that could alias them.
     const PackConstant range_min(range_min_), azimuth_min(azimuth_min_), z_min(z_min_);
     const PackConstant cells_per_metre(cells_per_metre_), cells_per_radian(cells_per_radian_);
     const PackConstant zero(0.0F), just_below(-detail::kPi * 1e-4F), turn(2.0F * detail::kPi);
@@ -293,7 +295,7 @@ class OccupancyDescriptor {
   std::size_t radial_cells_ = 0;
   std::size_t azimuth_cells_ = 0;
   std::vector<float> heights_;
-  std::vector<std::uint8_t> taken_;
+  std::vector<std::uint8_t> bin_is_occupied_;
 };
 
 }  // namespace dynains

@@ -1,7 +1,5 @@
-// One definition per configuration field. `validate()`, config files, command-line flags, reports
-// and the parameter table in docs/ are all visits over the same list.
-//
-// A config struct lists its fields once:
+// Reflection of configuration fields. Each config struct lists its fields once, in `visit()`.
+// `validate()`, config files, command-line flags, reports and docs/parameters.md use that list.
 //
 //   template <class Self, class Visitor>
 //   static void visit(Self& self, Visitor&& visitor) {
@@ -9,7 +7,7 @@
 //     12)"});
 //   }
 //
-// `Self` is the struct, const or not, so that one list serves readers and writers.
+// `Self` is the struct or the const struct, so that one list serves readers and writers.
 #pragma once
 
 #include <cstddef>
@@ -23,14 +21,14 @@
 
 namespace dynains {
 
-/// Interval of valid values of a parameter; either end can be open.
+/// Interval of valid values of a parameter. Each end is closed or open.
 struct Bounds {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
   bool min_open = false;
   bool max_open = false;
 
-  /// False for NaN, whatever the interval.
+  /// Whether `value` is in the interval; false for NaN.
   bool contain(double value) const {
     return (min_open ? value > min : value >= min) && (max_open ? value < max : value <= max);
   }
@@ -47,16 +45,16 @@ constexpr Bounds closed(double min, double max) { return {min, max, false, false
 constexpr Bounds open(double min, double max) { return {min, max, true, true}; }
 constexpr Bounds half_open_below(double min, double max) { return {min, max, true, false}; }
 
-/// One named field of a configuration: a number, a boolean, or an enum whose values 0, 1, ... have
-/// the names that the array `value_names(T)` holds in the same order.
+/// One field of a configuration: a number, a boolean, or an enum. An enum has the values 0, 1, ...,
+/// and the array `value_names(T)` holds their names in this order.
 template <class T>
 struct Parameter {
   static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T>,
                 "parameters are numbers, booleans or enums");
 
   const char* name;  ///< snake_case, unique over all stages
-  T& value;          ///< reference into the visited struct, const if the struct is
-  Bounds bounds;     ///< of numbers; ignored for booleans and enums
+  T& value;          ///< reference into the visited struct
+  Bounds bounds;     ///< for numbers; ignored for booleans and enums
   const char* unit;  ///< "m", "deg", "s", "scans" or "" if dimensionless
   const char* help;  ///< one sentence with its source (equation or paper)
 };
@@ -64,12 +62,12 @@ struct Parameter {
 template <class T>
 Parameter(const char*, T&, Bounds, const char*, const char*) -> Parameter<T>;
 
-/// Whether the bounds of a parameter of type T mean anything.
+/// Whether parameters of type T have bounds.
 template <class T>
 inline constexpr bool kIsBounded =
     std::is_arithmetic_v<T> && !std::is_same_v<std::remove_const_t<T>, bool>;
 
-/// The value as a number, a boolean or the name of an enum's value: what files and messages hold.
+/// Value for files and messages: the number, the boolean, or the name of the enum value.
 template <class T>
 auto plain_value(T value) {
   if constexpr (std::is_enum_v<T>) {
@@ -81,7 +79,7 @@ auto plain_value(T value) {
   }
 }
 
-/// Names of all values of an enum: "window|free_space|both".
+/// Names of all values of an enum, for example "window|free_space|both".
 template <class Enum>
 std::string all_value_names() {
   std::string result;
@@ -90,7 +88,7 @@ std::string all_value_names() {
   return result;
 }
 
-/// The value of that name, if there is one.
+/// Enum value with that name; empty if there is none.
 template <class Enum>
 std::optional<Enum> value_of_name(const std::string& name) {
   const auto& names = value_names(Enum());
@@ -100,8 +98,8 @@ std::optional<Enum> value_of_name(const std::string& name) {
   return std::nullopt;
 }
 
-/// Throws ConfigError unless every field of `config` lies within its bounds.
-/// `owner` is the name that the message starts with, for example "BeliefUpdater".
+/// Throws ConfigError unless every field of `config` is within its bounds. The message starts with
+/// `owner`, for example "BeliefUpdater".
 template <class Config>
 void validate_parameters(const char* owner, const Config& config) {
   Config::visit(config, [owner](const auto& parameter) {
@@ -126,7 +124,7 @@ void validate_parameters(const char* owner, const Config& config) {
 struct RenamedParameter {
   const char* former_name;  ///< snake_case
   const char* present_name;
-  const char* note;  ///< how values translate; empty if they stay the same
+  const char* note;  ///< conversion of values; empty if values are unchanged
 };
 
 inline constexpr RenamedParameter kRenamedParameters[] = {
@@ -141,8 +139,8 @@ inline constexpr RenamedParameter kRenamedParameters[] = {
     {"see_past_movers", "ignore_dynamic_returns", ""},
 };
 
-/// Text for an error message: the present name of `former_name`, or an empty text if no parameter
-/// ever had that name.
+/// Part of an error message with the present name of `former_name`; empty if no parameter had that
+/// name.
 inline std::string renaming_of(const std::string& former_name) {
   for (const RenamedParameter& renamed : kRenamedParameters) {
     if (former_name != renamed.former_name) continue;

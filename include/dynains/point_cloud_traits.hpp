@@ -1,4 +1,4 @@
-// How foreign clouds come in. Specialise PointCloudTraits for a type of your own:
+// Access to point clouds of any type. To support a type, specialise PointCloudTraits:
 //
 //   template <> struct dynains::PointCloudTraits<MyCloud> {
 //     static std::size_t size(const MyCloud& cloud);
@@ -20,15 +20,15 @@ namespace dynains {
 template <class Cloud, class Enable = void>
 struct PointCloudTraits;
 
-/// Interleaved coordinates that somebody else owns: x, y, z first, then `stride - 3` values that
-/// are skipped, for example float x y z intensity with stride 4.
+/// Non-owning view of interleaved points, m, sensor frame: x, y, z and `stride - 3` ignored values
+/// per point. Example: float x y z intensity with stride 4.
 template <class Scalar>
 struct RawPoints {
   static_assert(std::is_floating_point_v<Scalar>, "coordinates are float or double");
 
   const Scalar* data;
   std::size_t count;
-  std::size_t stride = 3;  ///< scalars from one point to the next, at least 3
+  std::size_t stride = 3;  ///< scalars per point, at least 3
 };
 
 template <class Scalar>
@@ -38,7 +38,7 @@ RawPoints(const Scalar*, std::size_t) -> RawPoints<Scalar>;
 
 template <class Scalar>
 struct PointCloudTraits<RawPoints<Scalar>> {
-  /// Throws CloudError.
+  /// Throws CloudError for a stride below 3 or missing data.
   static std::size_t size(const RawPoints<Scalar>& cloud) {
     if (cloud.stride < 3) {
       throw CloudError("RawPoints.stride = " + std::to_string(cloud.stride) +
@@ -57,7 +57,7 @@ struct PointCloudTraits<RawPoints<Scalar>> {
 
 template <>
 struct PointCloudTraits<PointsView> {
-  /// Throws CloudError.
+  /// Throws CloudError for arrays of different lengths.
   static std::size_t size(const PointsView& cloud) {
     if (cloud.y.size() != cloud.x.size() || cloud.z.size() != cloud.x.size()) {
       throw CloudError("PointsView has " + std::to_string(cloud.x.size()) + " x, " +
@@ -82,8 +82,9 @@ struct IsPointMatrix<Cloud, std::enable_if_t<std::is_base_of_v<Eigen::MatrixBase
 
 }  // namespace detail
 
-/// Dense Eigen matrices, maps and blocks: a point per column if there are 3 or 4 rows at compile
-/// time, else a point per row if there are 3 or 4 columns. A fourth coordinate is ignored.
+/// Dense Eigen matrices, maps and blocks. If the number of rows is 3 or 4 at compile time, each
+/// column is a point; else, if the number of columns is 3 or 4, each row is a point. A fourth
+/// coordinate is ignored.
 template <class Matrix>
 struct PointCloudTraits<Matrix, std::enable_if_t<detail::IsPointMatrix<Matrix>::value>> {
   static constexpr bool kColumns = Matrix::RowsAtCompileTime == 3 || Matrix::RowsAtCompileTime == 4;
@@ -120,7 +121,7 @@ struct PointCloudTraits<
 
 namespace dynains::detail {
 
-/// Refers to a cloud that PointCloudTraits describe; valid as long as the cloud.
+/// Type-erased view of a cloud with PointCloudTraits. The cloud must outlive the view.
 class CloudView {
  public:
   template <class Cloud>
@@ -130,10 +131,10 @@ class CloudView {
   }
 
   std::size_t size() const { return size_; }
-  /// The cloud itself if it is of that type, else null.
+  /// The cloud if it is of type RawPoints<float>, else null.
   const RawPoints<float>* raw_floats() const { return raw_; }
 
-  /// Writes the coordinates of points [begin, begin + count): m, sensor frame.
+  /// Writes the coordinates of points [begin, begin + count), m, sensor frame.
   void copy(std::size_t begin, std::size_t count, float* x, float* y, float* z) const {
     copy_(cloud_, begin, count, x, y, z);
   }

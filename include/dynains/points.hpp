@@ -1,4 +1,4 @@
-// Views over points and the labels they get. No view owns anything.
+// Views and buffers of points, and labels of points.
 #pragma once
 
 #include <cassert>
@@ -12,30 +12,30 @@ namespace dynains {
 
 /// Verdict on one input point.
 enum class PointLabel : std::uint8_t {
-  kInvalid,     ///< NaN or infinite coordinate, or no return (all zero); never enters the map
-  kOutOfRange,  ///< nearer than min_range or farther than max_range; never enters the map
+  kInvalid,     ///< NaN, infinity, or no return (all coordinates zero); never in the map
+  kOutOfRange,  ///< nearer than min_range or farther than max_range; never in the map
   kGround,      ///< static, and part of the ground
   kStatic,      ///< static, above the ground
-  kDynamic,     ///< part of a moving instance; never enters the map
+  kDynamic,     ///< part of a moving instance; not inserted into the map
 };
 
 constexpr bool is_static(PointLabel label) {
   return label == PointLabel::kGround || label == PointLabel::kStatic;
 }
 
-/// Instance id of points that belong to no instance.
+/// Instance id of points without an instance.
 inline constexpr std::uint32_t kNoInstance = 0;
 
-/// Cluster number of points that belong to no cluster.
+/// Cluster number of points without a cluster.
 inline constexpr std::uint32_t kNoCluster = 0xFFFFFFFFU;
 
-/// Contiguous range that somebody else owns (C++17 has no std::span).
+/// Non-owning view of a contiguous range (std::span is C++20).
 template <class T>
 class Span {
  public:
   constexpr Span() = default;
   constexpr Span(T* data, std::size_t size) : data_(data), size_(size) {}
-  /// From any contiguous container, as std::span does.
+  /// Implicit conversion from contiguous containers, as in std::span.
   template <class Container,
             class = std::enable_if_t<std::is_convertible_v<
                 std::remove_pointer_t<decltype(std::declval<Container&>().data())> (*)[], T (*)[]>>>
@@ -60,7 +60,7 @@ class Span {
   std::size_t size_ = 0;
 };
 
-/// Points as three coordinate arrays of equal length, in metres.
+/// Non-owning view of points: three coordinate arrays of equal length, m.
 struct PointsView {
   Span<const float> x;
   Span<const float> y;
@@ -75,14 +75,14 @@ struct PointsView {
 
 namespace detail {
 
-/// Reserves memory for `size` values. An eighth is added, since scans differ in size by a few
-/// percent: most later scans then need no new memory.
+/// Ensures capacity for `size` values, with a margin of 1/8, because scans differ in size by a few
+/// percent.
 template <class T>
 void ensure_capacity(std::vector<T>& values, std::size_t size) {
   if (values.capacity() < size) values.reserve(size + size / 8);
 }
 
-/// Makes a buffer at least `size` values long.
+/// Resizes `values` to at least `size`.
 template <class T>
 void grow(std::vector<T>& values, std::size_t size) {
   if (values.size() >= size) return;
@@ -92,7 +92,7 @@ void grow(std::vector<T>& values, std::size_t size) {
 
 }  // namespace detail
 
-/// Points as three coordinate arrays that are owned here and reused from scan to scan.
+/// Owning, reusable buffer of points: three coordinate arrays of equal length, m.
 struct PointBuffer {
   std::vector<float> x;
   std::vector<float> y;
@@ -105,7 +105,7 @@ struct PointBuffer {
     y.resize(size);
     z.resize(size);
   }
-  /// Makes the arrays longer, if they are shorter.
+  /// Resizes the arrays to at least `size`.
   void grow(std::size_t size) {
     detail::grow(x, size);
     detail::grow(y, size);

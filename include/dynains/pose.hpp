@@ -1,4 +1,4 @@
-// Checks on poses and time stamps.
+// Validation of poses, and operations on rigid transforms.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -11,20 +11,18 @@
 
 namespace dynains {
 
-/// Largest deviation of R^T R from identity that still counts as a rotation: text files keep few
-/// digits.
+/// Largest accepted deviation of an element of R^T R from identity. Text files round rotations.
 inline constexpr double kRotationTolerance = 1e-3;
 
-/// Largest coordinate of a sensor in the world, in metres: more than any map grid on Earth has, and
-/// little enough for the indices of a map of any resolution.
+/// Largest accepted coordinate of a sensor in the world frame, m. It exceeds the coordinates of all
+/// map grids on Earth and limits the voxel indices of a map.
 inline constexpr double kMaxTranslation = 2.1e7;
 
 namespace detail {
 
-// Operations on transforms by their coefficients. The expressions of Eigen for them would take a
-// third of the time in which the library compiles.
+// These operations use coefficients instead of Eigen's expression templates, which compile slowly.
 
-/// T_a_c from T_a_b and T_b_c.
+/// T_a_c = T_a_b T_b_c.
 inline Eigen::Isometry3d composed(const Eigen::Isometry3d& T_a_b, const Eigen::Isometry3d& T_b_c) {
   Eigen::Isometry3d T_a_c = T_a_b;
   for (int i = 0; i < 3; ++i) {
@@ -37,7 +35,7 @@ inline Eigen::Isometry3d composed(const Eigen::Isometry3d& T_a_b, const Eigen::I
   return T_a_c;
 }
 
-/// R_a_c from R_a_b and R_b_c.
+/// R_a_c = R_a_b R_b_c.
 inline Eigen::Matrix3d composed(const Eigen::Matrix3d& R_a_b, const Eigen::Matrix3d& R_b_c) {
   Eigen::Matrix3d R_a_c;
   for (int i = 0; i < 3; ++i) {
@@ -49,7 +47,7 @@ inline Eigen::Matrix3d composed(const Eigen::Matrix3d& R_a_b, const Eigen::Matri
   return R_a_c;
 }
 
-/// T_b_a from T_a_b, which is rigid.
+/// T_b_a, the inverse of the rigid transform T_a_b.
 inline Eigen::Isometry3d inverted(const Eigen::Isometry3d& T_a_b) {
   Eigen::Isometry3d T_b_a = T_a_b;
   for (int i = 0; i < 3; ++i) {
@@ -60,7 +58,7 @@ inline Eigen::Isometry3d inverted(const Eigen::Isometry3d& T_a_b) {
   return T_b_a;
 }
 
-/// T_a_b from T_a_c and R_b_c: the same origin, other axes.
+/// T_a_b from T_a_c and R_b_c. Frames b and c have a common origin.
 inline Eigen::Isometry3d rotated(const Eigen::Isometry3d& T_a_c, const Eigen::Matrix3d& R_b_c) {
   Eigen::Isometry3d T_a_b = T_a_c;
   for (int i = 0; i < 3; ++i) {
@@ -80,7 +78,7 @@ inline Eigen::Matrix3d transposed(const Eigen::Matrix3d& R) {
   return result;
 }
 
-/// Distance of two origins, m.
+/// Distance between the origins of two poses, m.
 inline double distance(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
   double squared = 0.0;
   for (int i = 0; i < 3; ++i) squared += (a(i, 3) - b(i, 3)) * (a(i, 3) - b(i, 3));
@@ -96,7 +94,7 @@ inline bool is_finite(const Eigen::Isometry3d& T) {
   return true;
 }
 
-/// Largest deviation of an element of R^T R from that of the identity. Coefficients are finite.
+/// Largest deviation of an element of R^T R from identity. `T` must be finite.
 inline double rotation_error(const Eigen::Isometry3d& T) {
   double largest = 0.0;
   for (int i = 0; i < 3; ++i) {
@@ -116,8 +114,8 @@ inline double rotation_determinant(const Eigen::Isometry3d& T) {
 
 }  // namespace detail
 
-/// Throws PoseError unless `T` is finite, rigid and within kMaxTranslation; `name` starts the
-/// message.
+/// Throws PoseError unless `T` is finite, rigid and within kMaxTranslation. The message starts with
+/// `name`.
 inline void validate_pose(const std::string& name, const Eigen::Isometry3d& T) {
   if (!detail::is_finite(T)) throw PoseError(name + " has NaN or infinite entries");
   if (T(3, 0) != 0.0 || T(3, 1) != 0.0 || T(3, 2) != 0.0 || T(3, 3) != 1.0) {
@@ -140,7 +138,7 @@ inline void validate_pose(const std::string& name, const Eigen::Isometry3d& T) {
   }
 }
 
-/// `T` with its rotation made exactly orthonormal.
+/// `T` with an orthonormalized rotation.
 inline Eigen::Isometry3d orthonormalized(const Eigen::Isometry3d& T) {
   Eigen::Isometry3d result = T;
   result.linear() = Eigen::Quaterniond(T.linear()).normalized().toRotationMatrix();

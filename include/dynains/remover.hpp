@@ -1,6 +1,6 @@
-// DynaInsRemover: scans and poses in, verdicts and a static map out. Units that include this header
-// link dynains::remover, which holds the default stages compiled; dyna_ins_remover.hpp needs no
-// library and takes other stages.
+// DynaInsRemover: turns scans and poses into verdicts and a static map. This header requires the
+// library dynains::remover, which contains the compiled default stages. dyna_ins_remover.hpp
+// requires no library and supports custom stages.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -24,28 +24,27 @@
 
 namespace dynains::detail {
 
-/// Admits one call at a time. A second one, from another thread or from within the first, throws
-/// before it changes anything. The next call sees the writes of the last one, also from another
-/// thread.
+/// Admits one call at a time. A concurrent or nested call throws before it changes any state. The
+/// end of a call synchronizes with the begin of the next one (release and acquire).
 class ReentrancyGuard {
  public:
   ReentrancyGuard() = default;
   ~ReentrancyGuard() = default;
-  // Objects are moved between calls only.
+  // The flag is not moved: an object must not be moved during a call.
   ReentrancyGuard(ReentrancyGuard&&) noexcept {}
   ReentrancyGuard& operator=(ReentrancyGuard&&) noexcept { return *this; }
 
-  /// One call, from construction to destruction. Throws UsageError during another one.
+  /// Scope of one call. Throws UsageError during another call.
   class Guard {
    public:
     explicit Guard(ReentrancyGuard& owner) : owner_(owner) {
-      if (owner_.at_work_.exchange(true, std::memory_order_acquire)) {
+      if (owner_.is_busy_.exchange(true, std::memory_order_acquire)) {
         throw UsageError(
             "DynaInsRemover: push, flush, reset and reserve must not be called while one of them "
             "is at work; take one object for each thread, or a lock");
       }
     }
-    ~Guard() { owner_.at_work_.store(false, std::memory_order_release); }
+    ~Guard() { owner_.is_busy_.store(false, std::memory_order_release); }
     Guard(const Guard&) = delete;
     Guard& operator=(const Guard&) = delete;
 
@@ -54,7 +53,7 @@ class ReentrancyGuard {
   };
 
  private:
-  std::atomic<bool> at_work_{false};
+  std::atomic<bool> is_busy_{false};
 };
 
 }  // namespace dynains::detail
@@ -66,7 +65,8 @@ template <class Stages>
 class Pipeline;
 }  // namespace detail
 
-/// The stages of the pipeline. To swap one, derive from this and re-alias its name.
+/// Types of the pipeline's stages. To replace a stage, derive from this struct and redefine its
+/// alias.
 struct DefaultStages {
   using Ground = GroundSegmenter;
   using Clusterer = CurvedVoxelClusterer;
@@ -78,17 +78,17 @@ struct DefaultStages {
 
 /// Removes moving instances from a stream of scans, one scan at a time.
 ///
-/// Owns every buffer; once warm, a frame allocates nothing except when the map grows. Objects are
-/// independent of each other. One object serves one thread at a time: `push`, `flush`, `reset`,
-/// `reserve` and `reserve_like` throw UsageError while another of these calls runs. The map and the
-/// spans of a verdict are read between two calls: by the thread that makes them, or by others under
-/// a lock that also covers the calls. Can be moved; an object that was moved from can be assigned
-/// to or destroyed, all else throws UsageError.
+/// Owns every buffer. After warm-up, a push allocates memory only when the map grows. Objects are
+/// independent of each other. `push`, `flush`, `reset`, `reserve` and `reserve_like` throw
+/// UsageError while another of these calls runs on the same object. The map and the spans of a
+/// verdict must not be read during such a call, except by the sink of `flush`; other threads need a
+/// lock that also covers the calls. Objects are movable. A moved-from object can be assigned to or
+/// destroyed; other calls throw UsageError.
 template <class Stages = DefaultStages>
 class BasicDynaInsRemover {
  public:
   using Map = typename Stages::Map;
-  /// All parameters, see RemoverConfig and the Config of each stage.
+  /// All parameters: RemoverConfig and the Config of each stage.
   using Config = PipelineConfig<Stages>;
 
   BasicDynaInsRemover();
@@ -101,52 +101,53 @@ class BasicDynaInsRemover {
   const Config& config() const;
   const Map& map() const;
 
-  /// Scans between a push and the final verdict on it.
+  /// Number of scans between a push and the final verdict on its scan.
   std::size_t latency() const;
 
-  /// What the first scan told about the sensor. Not known() before the first scan, or if every
-  /// parameter that depends on the sensor was given.
+  /// Model of the sensor, estimated from the first scan with enough points. Not known() before that
+  /// scan, or if no parameter needs the estimate.
   const SensorModel& sensor() const;
 
-  /// Allocates and touches the memory for scans like `example`, so that the first scans need not
-  /// wait for the system to provide it: 27 to 38 bytes per point for each scan whose verdict is
-  /// open, and the memory of the stages, which process the example some times and forget it.
-  /// `scans`: how many will come, if that is known. Scans of other sizes may follow; results do not
-  /// change. Throws UsageError after the first push.
+  /// Warm-up: allocates and touches the memory for scans like `example` (m, sensor frame), so that
+  /// the first pushes cause few allocations and page faults. The memory is 27 to 38 bytes per point
+  /// and open scan, and the buffers of the stages, which process `example` a few times. `scans`:
+  /// expected number of scans, an upper bound for the reserved slots. Scans of other sizes may
+  /// follow. Results do not change. Throws UsageError after the first push, and CloudError for an
+  /// invalid cloud.
   template <class Cloud>
   void reserve_like(const Cloud& example,
                     std::size_t scans = std::numeric_limits<std::size_t>::max()) {
     reserve_view(detail::CloudView(example), scans);
   }
 
-  /// Reserves memory for scans of `points` points, by a synthetic scan of a 64-beam sensor.
+  /// Calls reserve_like() with a synthetic scan of `points` points and 64 rings.
   void reserve(std::size_t points);
 
   /// Processes one scan.
   ///
-  /// `cloud`: m, sensor frame, z up (tilts are found, see RemoverConfig::level); any type that
-  /// PointCloudTraits describe, of any size. Bad points get a label of their own.
-  /// `T_world_sensor`: pose of the sensor at that scan. `time`: s, greater than that of the scan
-  /// before.
+  /// `cloud`: m, sensor frame, z up (RemoverConfig::level handles tilted sensors); any type with
+  /// PointCloudTraits, any size. Invalid points get PointLabel::kInvalid or kOutOfRange.
+  /// `T_world_sensor`: pose of the sensor at the time of the scan. `time`: s, greater than the time
+  /// of the previous scan.
   ///
-  /// Throws PoseError, or what reading the cloud throws, and then leaves the state as it was. If a
-  /// stage throws (std::bad_alloc), the scan does not count and the next one starts a new epoch, as
-  /// behind a gap; evidence that the scan gave on older scans may remain. If a scan that becomes
-  /// final throws, for example in the map, the final verdict on that scan alone is lost.
+  /// Throws PoseError, or the exceptions of PointCloudTraits such as CloudError; the state is then
+  /// unchanged. If a stage throws (std::bad_alloc), the scan is discarded and the next scan starts
+  /// a new epoch; evidence of the discarded scan on older scans may remain. If the finalization of
+  /// an older scan throws, for example in the map, only the final verdict on that scan is lost.
   template <class Cloud>
   FrameResult push(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor, double time) {
     return push_view(detail::CloudView(cloud), T_world_sensor, time);
   }
 
-  /// Pushes a scan 0.1 s after the scan before (one step of a double if that is more); the first at
-  /// 0 s.
+  /// Pushes a scan with a default time: 0 s for the first scan, else 0.1 s after the previous scan,
+  /// or the next double if 0.1 s is below the resolution.
   template <class Cloud>
   FrameResult push(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor) {
     return push_view(detail::CloudView(cloud), T_world_sensor, std::nullopt);
   }
 
-  /// Makes the verdicts on all open scans final, oldest first, and calls `sink` with the
-  /// ScanVerdict of each. The next push starts a new epoch.
+  /// Makes the verdicts on all open scans final, oldest first, and calls `sink(const ScanVerdict&)`
+  /// for each. The next push starts a new epoch.
   template <class Sink>
   void flush(Sink&& sink) {
     const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
@@ -154,9 +155,9 @@ class BasicDynaInsRemover {
     start_epoch();
   }
 
-  /// Back to the state after construction, with an empty map; buffers keep their capacity. A
-  /// TiledStaticMap removes its files, also those of earlier runs. To start again and keep the map,
-  /// construct a new remover.
+  /// Restores the state after construction and clears the map; buffers keep their capacity. A
+  /// TiledStaticMap removes its files, also those of earlier runs. To keep the map, construct a new
+  /// remover instead.
   void reset();
 
  private:

@@ -1,4 +1,4 @@
-// Verdicts on points with their causes, and the answer of the remover to one scan.
+// Verdicts on points with their causes, and the result of one push.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -10,26 +10,26 @@
 
 namespace dynains {
 
-/// Cause of the verdict on one point. `dynains run` writes these numbers to the files
-/// OUT/causes/NNNNNN.cause (one uint8 per input point, in input order): new causes go to the end.
+/// Cause of the verdict on one point. `dynains run` writes these numbers to OUT/causes/NNNNNN.cause
+/// (one uint8 per input point, in input order), so existing numbers must not change.
 enum class Cause : std::uint8_t {
   kUnknown = 0,
-  kGround = 1,        ///< static: ground
-  kSimilar = 2,       ///< static: similarity of occupancy not below tau_s (Eq. 12)
-  kReverted = 3,      ///< static: proposed as dynamic, reverted by belief (Eq. 19) or too few votes
-  kTooFewPoints = 4,  ///< static: cluster too small (not used by this pipeline)
-  kTooFewScans = 5,   ///< static: cluster not in both the oldest and the newest scan (Eq. 11)
-  kNotJudged = 6,     ///< invalid, out of range, or static without a cluster
-  kProposed = 7,      ///< dynamic: proposed by occupancy and not reverted (Eq. 19)
-  kFreeSpace = 8,     ///< dynamic: another scan saw its place free
-  kWithInstance = 9,  ///< dynamic: other scans saw a part of its instance free
+  kGround = 1,             ///< static: ground
+  kSimilar = 2,            ///< static: similarity of occupancy not below tau_s (Eq. 12)
+  kReverted = 3,           ///< static: proposed as dynamic, reverted by belief (Eq. 19) or votes
+  kTooFewPoints = 4,       ///< static: cluster too small (not used by this pipeline)
+  kTooFewScans = 5,        ///< static: cluster without points in the oldest or newest scan (Eq. 11)
+  kNotJudged = 6,          ///< invalid, out of range, or static without a cluster
+  kProposed = 7,           ///< dynamic: proposed by occupancy and not reverted (Eq. 19)
+  kFreeSpace = 8,          ///< dynamic: its position is free according to other scans
+  kWithInstance = 9,       ///< dynamic: part of its instance is free according to other scans
   kUnderInstance = 10,     ///< dynamic: ground point below a removed instance
-  kNoEvidence = 11,        ///< static: no other scan saw its place
+  kNoEvidence = 11,        ///< static: no evidence of other scans
   kAlongTrack = 12,        ///< dynamic: its instance moved in other scans
-  kPresumed = 13,          ///< dynamic, for the time being: no earlier scan saw its place
-  kOccupied = 14,          ///< static: other scans saw its place occupied
-  kTooLittleFree = 15,     ///< static: too few scans saw its place free, or too little of it
-  kDynamicOccupancy = 16,  ///< dynamic: nearly all other points in its place moved
+  kPresumed = 13,          ///< dynamic, provisionally: no evidence of earlier scans
+  kOccupied = 14,          ///< static: its position is occupied according to other scans
+  kTooLittleFree = 15,     ///< static: too few scans with free space, or too few free samples
+  kDynamicOccupancy = 16,  ///< dynamic: most other points in its dynamic grid cell are dynamic
 };
 
 inline constexpr std::size_t kCauseCount = 17;
@@ -44,16 +44,16 @@ constexpr bool is_dynamic(Cause cause) {
   return (kDynamic >> static_cast<unsigned>(cause) & 1U) != 0;
 }
 
-/// Milliseconds per stage of one call.
+/// Time per stage of one call, ms.
 struct StageTimes {
-  double ingest = 0.0;      ///< copy of the cloud, labels of bad points
+  double ingest = 0.0;      ///< copy of the cloud, labels of invalid points
   double ground = 0.0;      ///< ground segmentation
   double window = 0.0;      ///< Eq. 3
   double cluster = 0.0;     ///< curved voxels and separation by scan, Eq. 4
   double descriptor = 0.0;  ///< Eq. 5-12 and, for proposals, the belief of Eq. 13-19
-  double evidence = 0.0;    ///< free space seen by other scans
-  double judge = 0.0;       ///< verdicts from that, also on ground; images of references
-  double verdict = 0.0;     ///< from clusters and groups to points
+  double evidence = 0.0;    ///< update of the free-space evidence by the newest scan
+  double judge = 0.0;       ///< verdicts by free space, also on ground; images of references
+  double verdict = 0.0;     ///< conversion of verdicts on clusters and groups to points
   double map = 0.0;         ///< Eq. 1
   double revision = 0.0;    ///< revision of the map by the newest scan
 
@@ -78,32 +78,32 @@ struct StageTimes {
   }
 };
 
-/// Verdict on every point of one scan, in input order. The spans are valid until the next call of
-/// the remover.
+/// Verdict on every point of one scan. Each span has one value per input point, in input order, and
+/// is valid until the next call of the remover.
 struct ScanVerdict {
   std::uint64_t scan = 0;  ///< number of the push, from 0
   double time = 0.0;       ///< s, as pushed
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
   Span<const PointLabel> labels;
   Span<const std::uint32_t> instances;  ///< kNoInstance for ground and points without a cluster
-  /// Probability of being dynamic, [0, 1]. 0 for points that were not judged: static ground, points
-  /// without a cluster and, for decision = window, points that were not proposed. For decision =
-  /// free_space, judged points have at least 0.5, also occupied places and places that no other
-  /// scan saw.
+  /// Probability of being dynamic, [0, 1]. It is 0 for points without a belief: static ground,
+  /// points without a cluster and, for decision = window, points that were not proposed. For
+  /// decision = free_space, all other points have at least 0.5, even if they are occupied or
+  /// without evidence.
   Span<const float> beliefs;
-  Span<const Cause> causes;  ///< reason for the label
+  Span<const Cause> causes;
 };
 
-/// Answer to one scan.
+/// Result of one push.
 struct FrameResult {
-  /// Verdict on the scan just pushed, from it and earlier scans; final if there is no latency.
+  /// Verdict on the pushed scan by this and earlier scans; final if latency() is 0.
   ScanVerdict newest;
-  std::optional<ScanVerdict> finished;  ///< verdict on an earlier scan that is final now
+  std::optional<ScanVerdict> finished;  ///< final verdict on the scan latency() pushes ago
   StageTimes times;
 };
 
-/// Non-ground points share the verdict of their group; groups are the same in every verdict on a
-/// scan. Ground points are static unless they are listed.
+/// Verdict by free space on one scan. Each non-ground point belongs to a group with one verdict;
+/// the groups of a scan do not change between its verdicts. Ground points are static unless listed.
 struct EvidenceVerdict {
   struct Group {
     Cause cause = Cause::kNotJudged;  ///< see is_dynamic()
@@ -114,7 +114,7 @@ struct EvidenceVerdict {
     }
   };
   struct GroundPoint {
-    std::uint32_t point;  ///< number in the ground of the split
+    std::uint32_t point;  ///< index in GroundSplit::ground()
     Group verdict;
   };
 

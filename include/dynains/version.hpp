@@ -1,4 +1,4 @@
-// The one place where the version number stands: CMake reads it from here.
+// Version number. CMake reads it from this file.
 #pragma once
 
 namespace dynains {
