@@ -1,6 +1,6 @@
-// Clustering on curved voxels (Park et al., "Curved-voxel clustering", IROS 2019), the paper's
-// instance segmentation: points fall into cells of range, azimuth and elevation; cells that touch,
-// diagonals included, belong to one cluster.
+// Curved-voxel clustering (Park et al., "Curved-voxel clustering", IROS 2019), the instance
+// segmentation of the paper. A curved voxel is a cell of range, azimuth and elevation. Occupied
+// voxels that touch, diagonals included, form one cluster.
 #pragma once
 
 #include <algorithm>
@@ -21,20 +21,20 @@
 
 namespace dynains {
 
-/// Groups points whose curved voxels are connected in the 26-neighbourhood; azimuth wraps around.
+/// Clusters points whose curved voxels are connected in the 26-neighbourhood. Azimuth is periodic.
 ///
-/// Occupied cells are bits of a dense grid with azimuth running fastest. Each row is cut into
-/// runs of occupied cells, 64 cells at a time, and runs of neighbouring rows that touch are joined
-/// by union-find.
+/// The grid stores one bit per cell, with azimuth as the fastest index, in blocks of 64 cells. A
+/// row contains the cells of one elevation and one range. A run is a maximal sequence of occupied
+/// cells in a row. Union-find joins the runs of neighbouring rows that touch.
 class CurvedVoxelClusterer {
  public:
   struct Config {
     double voxel_range = 0.6;      ///< m
-    double voxel_azimuth = 0.0;    ///< deg, whole voxels fill the circle; 0: from the sensor
+    double voxel_azimuth = 0.0;    ///< deg, rounded to a divisor of 360; 0: from the sensor
     double voxel_elevation = 0.0;  ///< deg; 0: from the sensor
-    double cluster_range = 90.0;   ///< m, points farther away belong to no cluster
+    double cluster_range = 90.0;   ///< m; points farther away have no cluster
 
-    /// The public implementation's voxels.
+    /// Voxels of the paper's public implementation.
     static Config paper() {
       Config config;
       config.voxel_range = 0.5;
@@ -43,8 +43,8 @@ class CurvedVoxelClusterer {
       return config;
     }
 
-    /// Copy with voxels that suit the sensor where they are not given: wide enough that
-    /// neighbouring beams fall into neighbouring voxels.
+    /// Copy with the voxel sizes that are 0 derived from the sensor, so that neighbouring beams hit
+    /// the same or neighbouring voxels.
     Config resolved(const SensorModel& sensor) const {
       Config config = *this;
       const double spacing = 0.75 * (sensor.azimuth_step + sensor.elevation_gap);
@@ -68,14 +68,13 @@ class CurvedVoxelClusterer {
                         "points farther away belong to no cluster and stay static"});
     }
 
-    /// Number of cells of azimuth, elevation and range together, rows of azimuth padded to a
-    /// power of two.
+    /// Number of cells of the grid. The length of a row is padded to a power of two.
     double cell_count() const {
       return std::exp2(std::ceil(std::log2(std::max(64.0, std::round(360.0 / voxel_azimuth))))) *
              std::ceil(180.0 / voxel_elevation) * (std::floor(cluster_range / voxel_range) + 2.0);
     }
 
-    /// Throws ConfigError.
+    /// Throws ConfigError for a field out of bounds or a grid with too many cells.
     void validate() const {
       validate_parameters("CurvedVoxelClusterer", *this);
       constexpr double kMaxCells = 1 << 29;
@@ -97,12 +96,13 @@ class CurvedVoxelClusterer {
     adapt(SensorModel::typical());
   }
 
-  /// Whether the size of the voxels was left to be found in the scans.
+  /// Whether a voxel size depends on the sensor.
   bool needs_sensor() const {
     return config_.voxel_azimuth == 0.0 || config_.voxel_elevation == 0.0;
   }
 
-  /// Sizes the voxels that were left to the sensor; a typical one until this is called.
+  /// Sets the voxel sizes that depend on the sensor. Before this call, they are those of
+  /// SensorModel::typical().
   void adapt(const SensorModel& sensor) {
     resolved_ = config_.resolved(sensor);
     azimuths_ = static_cast<std::int32_t>(std::round(360.0 / resolved_.voxel_azimuth));
@@ -115,33 +115,34 @@ class CurvedVoxelClusterer {
 
   const Config& config() const { return config_; }
 
-  /// Cluster number per point, 0 to cluster_count() - 1, or kNoCluster; numbers go by place, not by
-  /// the order of the points. The view holds until the next call.
+  /// Clusters points of one or more scans (m and rad, level frame). Returns the cluster number of
+  /// each point in [0, cluster_count()), or kNoCluster. The numbers follow the order of cells and
+  /// do not depend on the order of points. The view is valid until the next call.
   Span<const std::uint32_t> cluster(PolarView points) {
     find_cells(points);
     mark_cells(points.size());
-    // Processors with AVX2 count bits by one instruction.
+    // Run as kernels for the popcnt instruction of processors with AVX2.
     detail::run_packs([&](auto) { find_runs(); });
     detail::run_packs([&](auto) { join_runs(); });
     number_runs();
     number_points(points.size());
     clear_cells();
-    return {of_points_.data(), points.size()};
+    return {cell_or_cluster_.data(), points.size()};
   }
 
   std::size_t cluster_count() const { return cluster_count_; }
 
  private:
   static constexpr int kBlockShift = 6;
-  static constexpr std::size_t kBlock = 1U << kBlockShift;  // cells, a word of bits
+  static constexpr std::size_t kBlock = 1U << kBlockShift;  // cells per word of bits
 
-  // Cell of each point as (elevation * columns + range) * row + azimuth. Points too far away share
-  // a column behind the last range. Rows have a power of two of cells: a shift is cheaper than a
-  // product.
+  // Computes the cell of each point: ((elevation * columns() + range) << row_shift_) + azimuth.
+  // Points beyond cluster_range are in an additional column behind the last range. The length of a
+  // row is a power of two, because a shift is cheaper than a product.
   void find_cells(PolarView points) {
     using detail::PackConstant;
     const std::size_t count = points.size();
-    detail::grow(of_points_, count + detail::kMaxPackWidth);
+    detail::grow(cell_or_cluster_, count + detail::kMaxPackWidth);
     constexpr double kRadians = M_PI / 180.0;
     const PackConstant azimuth_scale(static_cast<float>(azimuths_ / (2.0 * M_PI)));
     const PackConstant elevation_scale(
@@ -156,7 +157,7 @@ class CurvedVoxelClusterer {
     const PackConstant beyond(static_cast<float>(ranges_));
     const PackConstant columns(static_cast<float>(ranges_ + 1));
     const int row_shift = row_shift_;
-    auto* const cells = reinterpret_cast<std::int32_t*>(of_points_.data());
+    auto* const cells = reinterpret_cast<std::int32_t*>(cell_or_cluster_.data());
     const PackConstant above_all(static_cast<float>(elevations_));
     const PackConstant below_all(-1.0F);
     detail::run_max_packs([&](auto packs) {
@@ -182,14 +183,14 @@ class CurvedVoxelClusterer {
         highest = max(highest, at.padded(i_elevation, highest));
       });
       lowest_elevation_ = static_cast<std::int32_t>(smallest(lowest));
-      // Straight down may be a rounding error below 0; truncated, that is 0.
+      // Rounding can make the index of -90 deg slightly negative. Truncation gives 0.
       highest_elevation_ = static_cast<std::int32_t>(largest(highest));
     });
   }
 
-  // The grid covers only the elevations that occur. It is all zero between calls. Neighbours in a
-  // scan mostly mark the same word, which would have to wait for its own last change: six
-  // stretches of the points take turns.
+  // Sets the bits of occupied cells. The grid covers only the occurring elevations, and is zero
+  // between calls. Neighbouring points usually set bits of one word, and each store delays the next
+  // load of that word. Alternation between six stretches of points hides this latency.
   void mark_cells(std::size_t count) {
     if (highest_elevation_ < 0) return;
     first_cell_ = (static_cast<std::size_t>(lowest_elevation_) * columns()) << row_shift_;
@@ -199,7 +200,7 @@ class CurvedVoxelClusterer {
       starts_.resize(blocks);
       run_before_.resize(blocks);
     }
-    const std::uint32_t* const cell_of = of_points_.data();
+    const std::uint32_t* const cell_of = cell_or_cluster_.data();
     std::uint64_t* const occupied = occupied_.data();
     const std::size_t first_cell = first_cell_;
     const auto mark = [&](std::size_t i) {
@@ -214,7 +215,7 @@ class CurvedVoxelClusterer {
     for (std::size_t i = kStretches * length; i < count; ++i) mark(i);
   }
 
-  // Rows of one elevation: one for each range, and one for what is too far away.
+  // Rows per elevation: one per range, and one for points beyond cluster_range.
   std::size_t columns() const { return static_cast<std::size_t>(ranges_) + 1; }
   std::size_t row_blocks() const { return std::size_t{1} << (row_shift_ - kBlockShift); }
   std::size_t row_count() const {
@@ -223,8 +224,9 @@ class CurvedVoxelClusterer {
     return static_cast<std::size_t>(elevations) * columns();
   }
 
-  // The first block from `block` on that holds anything, or `end`. Most do not: eight at a time.
-  std::size_t next_used(std::size_t block, std::size_t end) const {
+  // First block in [block, end) with an occupied cell, or `end`. Most blocks are empty, so eight
+  // are tested at a time.
+  std::size_t next_occupied(std::size_t block, std::size_t end) const {
     constexpr std::size_t kAtOnce = 8;
     for (; block + kAtOnce <= end; block += kAtOnce) {
       std::uint64_t any = 0;
@@ -235,14 +237,14 @@ class CurvedVoxelClusterer {
     return block;
   }
 
-  // Cuts rows into runs, numbered in the order of their cells.
+  // Finds the runs of all rows, numbered in the order of their cells.
   void find_runs() {
-    used_blocks_.clear();
+    occupied_blocks_.clear();
     const std::size_t blocks = row_count() * row_blocks();
     std::uint32_t runs = 0;
-    for (std::size_t block = next_used(0, blocks); block < blocks;
-         block = next_used(block + 1, blocks)) {
-      used_blocks_.push_back(static_cast<std::uint32_t>(block));
+    for (std::size_t block = next_occupied(0, blocks); block < blocks;
+         block = next_occupied(block + 1, blocks)) {
+      occupied_blocks_.push_back(static_cast<std::uint32_t>(block));
       starts_[block] = occupied_[block] & ~occupied_before(block);
       run_before_[block] = runs - 1;
       runs += detail::count_ones(starts_[block]);
@@ -251,14 +253,14 @@ class CurvedVoxelClusterer {
     std::iota(parent_.begin(), parent_.end(), 0U);
   }
 
-  // Runs of neighbouring rows that touch, also across the azimuth seam.
+  // Joins runs that touch in the same or in neighbouring rows, also across the azimuth seam.
   void join_runs() {
-    std::size_t first_row = 0;  // of an elevation
-    for (const std::uint32_t block : used_blocks_) {
+    std::size_t first_row = 0;  // of the current elevation
+    for (const std::uint32_t block : occupied_blocks_) {
       const std::size_t row = block >> (row_shift_ - kBlockShift);
       while (row >= first_row + columns()) first_row += columns();
-      if (is_beyond(row - first_row)) {
-        leave_alone(block);
+      if (is_out_of_range(row - first_row)) {
+        exclude_runs(block);
         continue;
       }
       join_seam(block, row);
@@ -268,18 +270,19 @@ class CurvedVoxelClusterer {
       const std::size_t below = row - columns();
       if (has_nearer) join_block(block, below - 1);
       join_block(block, below);
-      if (!is_beyond(row + 1 - first_row)) join_block(block, below + 1);
+      if (!is_out_of_range(row + 1 - first_row)) join_block(block, below + 1);
     }
   }
 
-  bool is_beyond(std::size_t column) const { return column + 1 == columns(); }
-  void leave_alone(std::size_t block) {
+  bool is_out_of_range(std::size_t column) const { return column + 1 == columns(); }
+  // Marks the runs that start in the block as kNoCluster.
+  void exclude_runs(std::size_t block) {
     detail::for_each_bit(
         starts_[block], [&](std::size_t at) { parent_[run_of(block * kBlock + at)] = kNoCluster; });
   }
 
-  // Joins the runs in a block with those of another row that overlap or touch at a corner: of two
-  // such runs, one begins in the other, or just behind it.
+  // Joins the runs of a block with the runs of another row that overlap them or touch them at a
+  // corner. In such a pair, one run begins within the other run or one cell behind it.
   void join_block(std::size_t block, std::size_t row) {
     join_seam(block, row);
     const std::size_t other = row * row_blocks() + place_in_row(block);
@@ -292,14 +295,14 @@ class CurvedVoxelClusterer {
       const std::uint32_t before_there = run_before_[other];
       const std::uint64_t begins =
           (starts_here & (there | there << 1U)) | (starts_there & (here | here << 1U));
-      // An empty cell begins no run: counted up to there, the last one is that of the cell before.
+      // If the cell is empty, the last run up to it is the run of the cell before.
       detail::for_each_bit(begins, [&](std::size_t at) {
-        const std::uint64_t up_to_it = ~std::uint64_t{0} >> (kBlock - 1 - at);
-        join(before_here + detail::count_ones(starts_here & up_to_it),
-             before_there + detail::count_ones(starts_there & up_to_it));
+        const std::uint64_t up_to_cell = ~std::uint64_t{0} >> (kBlock - 1 - at);
+        join(before_here + detail::count_ones(starts_here & up_to_cell),
+             before_there + detail::count_ones(starts_there & up_to_cell));
       });
     }
-    // At a corner, across the border of a block.
+    // Runs that touch at a corner across the border of a block.
     const std::size_t first = block * kBlock;
     const std::size_t first_there = other * kBlock;
     if ((here & 1U) != 0 && place_in_row(other) != 0 && is_occupied(first_there - 1)) {
@@ -311,7 +314,7 @@ class CurvedVoxelClusterer {
     }
   }
 
-  // The same across the seam.
+  // Joins the runs of a block with the runs of `row` that touch them across the azimuth seam.
   void join_seam(std::size_t block, std::size_t row) {
     const std::size_t first = row * row_blocks() * kBlock;
     const std::size_t last = first + static_cast<std::size_t>(azimuths_) - 1;
@@ -325,22 +328,22 @@ class CurvedVoxelClusterer {
     }
   }
 
-  // Rows have a power of two of blocks.
+  // Index of the block within its row. The number of blocks per row is a power of two.
   std::size_t place_in_row(std::size_t block) const { return block & (row_blocks() - 1); }
   bool is_occupied(std::size_t cell) const {
     return (occupied_[cell / kBlock] >> cell % kBlock & 1U) != 0;
   }
-  // Cells of a block behind an occupied one.
+  // Bits of the cells whose preceding cell in the row is occupied.
   std::uint64_t occupied_before(std::size_t block) const {
     const std::uint64_t carried =
         place_in_row(block) == 0 ? 0 : occupied_[block - 1] >> (kBlock - 1);
     return occupied_[block] << 1U | carried;
   }
 
-  // Of an occupied cell: the run that began last, there or before it.
+  // Run of an occupied cell: the last run that starts at or before the cell.
   std::uint32_t run_of(std::size_t cell) const {
-    const std::uint64_t up_to_it = starts_[cell / kBlock] << (~cell % kBlock);
-    return run_before_[cell / kBlock] + detail::count_ones(up_to_it);
+    const std::uint64_t up_to_cell = starts_[cell / kBlock] << (~cell % kBlock);
+    return run_before_[cell / kBlock] + detail::count_ones(up_to_cell);
   }
 
   std::uint32_t root(std::uint32_t run) {
@@ -351,7 +354,7 @@ class CurvedVoxelClusterer {
     return run;
   }
 
-  // The root of a set is its first run.
+  // The root of a set is its run with the lowest number.
   void join(std::uint32_t a, std::uint32_t b) {
     if (parent_[a] == parent_[b]) return;
     a = root(a);
@@ -359,7 +362,7 @@ class CurvedVoxelClusterer {
     parent_[std::max(a, b)] = std::min(a, b);
   }
 
-  // Parents come first.
+  // Assigns cluster numbers to runs. A parent has a lower number than its children.
   void number_runs() {
     number_of_run_.resize(parent_.size());
     cluster_count_ = 0;
@@ -373,40 +376,40 @@ class CurvedVoxelClusterer {
     }
   }
 
+  // Replaces the cell of each point by its cluster number.
   void number_points(std::size_t count) {
     detail::run_packs([&](auto) {
       for (std::size_t i = 0; i < count; ++i) {
-        of_points_[i] = number_of_run_[run_of(of_points_[i] - first_cell_)];
+        cell_or_cluster_[i] = number_of_run_[run_of(cell_or_cluster_[i] - first_cell_)];
       }
     });
   }
 
   void clear_cells() {
-    for (const std::uint32_t block : used_blocks_) {
+    for (const std::uint32_t block : occupied_blocks_) {
       occupied_[block] = 0;
       starts_[block] = 0;
     }
   }
 
   Config config_;
-  Config resolved_;  // without values left to the sensor
+  Config resolved_;  // with voxel sizes for the sensor
   std::int32_t azimuths_ = 0;
   std::int32_t ranges_ = 0;
   std::int32_t elevations_ = 0;
-  int row_shift_ = 0;  // log2 of the cells in a row
+  int row_shift_ = 0;  // log2 of the number of cells per row
 
   std::int32_t lowest_elevation_ = 0;
   std::int32_t highest_elevation_ = -1;
   std::size_t first_cell_ = 0;
   std::size_t cluster_count_ = 0;
-  std::vector<std::uint32_t> of_points_;  // cells of points, and in their place clusters
-  // By block.
-  std::vector<std::uint64_t> occupied_;  // a bit for each cell
-  std::vector<std::uint64_t> starts_;    // those with which a run begins
-  std::vector<std::uint32_t> run_before_;
-  std::vector<std::uint32_t> used_blocks_;
-  std::vector<std::uint32_t> parent_;  // by run; the root is the first run of its set
-  std::vector<std::uint32_t> number_of_run_;
+  std::vector<std::uint32_t> cell_or_cluster_;  // cell of each point, then its cluster
+  std::vector<std::uint64_t> occupied_;         // by block, a bit per cell: occupied
+  std::vector<std::uint64_t> starts_;           // by block, a bit per cell: first cell of a run
+  std::vector<std::uint32_t> run_before_;       // by block, the last run that starts before it
+  std::vector<std::uint32_t> occupied_blocks_;  // blocks with occupied cells, ascending
+  std::vector<std::uint32_t> parent_;           // by run; kNoCluster beyond cluster_range
+  std::vector<std::uint32_t> number_of_run_;    // by run, its cluster
 };
 
 }  // namespace dynains
