@@ -1,4 +1,4 @@
-// Poses that come as plain arrays of numbers.
+// Poses from arrays of numbers.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -29,15 +29,16 @@ Eigen::Isometry3d pose_from_array(const Scalar* values, const char* order, const
 
 }  // namespace detail
 
-/// `values`: 16 numbers, row after row, as in C arrays and NumPy. Translation in metres.
-/// Throws PoseError unless they are a rigid transform; a transposed one is called by its name.
+/// Pose from a 4x4 matrix in row-major order, as in C arrays and NumPy: 16 numbers, translation in
+/// m. Throws PoseError unless it is a rigid transform; the message for a transposed matrix names
+/// the other order.
 template <class Scalar>
 Eigen::Isometry3d pose_from_row_major(const Scalar* values) {
   return detail::pose_from_array<Eigen::RowMajor>(values, "row-major", "column-major");
 }
 
-/// `values`: 16 numbers, column after column, as in Eigen, OpenGL and MATLAB. Translation in
-/// metres. Throws PoseError as pose_from_row_major() does.
+/// Pose from a 4x4 matrix in column-major order, as in Eigen, OpenGL and MATLAB: 16 numbers,
+/// translation in m. Throws PoseError like pose_from_row_major().
 template <class Scalar>
 Eigen::Isometry3d pose_from_column_major(const Scalar* values) {
   return detail::pose_from_array<Eigen::ColMajor>(values, "column-major", "row-major");

@@ -1,4 +1,4 @@
-// Clouds of the Point Cloud Library. Needs PCL's headers; nothing else of dynains does.
+// Support for pcl::PointCloud. Only this header requires PCL.
 #pragma once
 
 #include <pcl/point_cloud.h>
@@ -13,8 +13,8 @@
 
 namespace dynains {
 
-/// Any point type with x, y, z; metres, sensor frame. Organized clouds and NaN points are fine:
-/// labels answer in the order of the cloud. Given a ConstPtr, push `*cloud`.
+/// Clouds of any point type with x, y, z; m, sensor frame. Organized clouds and NaN are supported.
+/// Labels have the order of the cloud. For a ConstPtr, push `*cloud`.
 template <class Point>
 struct PointCloudTraits<pcl::PointCloud<Point>> {
   static std::size_t size(const pcl::PointCloud<Point>& cloud) { return cloud.size(); }
@@ -24,8 +24,8 @@ struct PointCloudTraits<pcl::PointCloud<Point>> {
   }
 };
 
-/// The points of `cloud` with a static label, all their fields, its header and sensor pose. Throws
-/// std::invalid_argument unless there is a label for each point.
+/// Copy of the points of `cloud` with a static label, with all fields, header and sensor pose.
+/// `labels`: by point of `cloud`. Throws std::invalid_argument if the sizes differ.
 template <class Point>
 pcl::PointCloud<Point> static_points(const pcl::PointCloud<Point>& cloud,
                                      Span<const PointLabel> labels) {

@@ -1,5 +1,5 @@
-// PointCloud2 messages: sensor_msgs of ROS 1 and ROS 2, pcl::PCLPointCloud2, and every type with
-// the same members. Needs no ROS: the message type is a template parameter.
+// Support for PointCloud2 messages: sensor_msgs of ROS 1 and ROS 2, pcl::PCLPointCloud2, and types
+// with equal members. The message type is a template parameter, so ROS is not required.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,17 +16,17 @@
 
 namespace dynains {
 
-/// The points of a message where they are: nothing is copied, the message must outlive the view.
+/// Non-owning view of the points of a message, which must outlive the view.
 ///
 ///     remover.push(PointCloud2View(*message), T_world_sensor, message_time(*message));
 ///
-/// Coordinates are the fields "x", "y", "z", each FLOAT32 or FLOAT64, at any offset, in either byte
-/// order, other fields between them and padding behind rows allowed. Points are numbered row by
-/// row, labels answer in that order.
+/// The coordinates are the fields "x", "y" and "z", each FLOAT32 or FLOAT64 at any offset. Either
+/// byte order, other fields and padding of rows are supported. Points are numbered row by row, and
+/// labels have this order.
 class PointCloud2View {
  public:
-  /// Throws CloudError if a coordinate is missing or of another type, or if the layout does not
-  /// fit the data; the message names the field and the found value.
+  /// Throws CloudError if a coordinate is missing or has another type, or if the layout does not
+  /// match the data. The message names the field and its value.
   template <class Message>
   explicit PointCloud2View(const Message& message)
       : data_(reinterpret_cast<const unsigned char*>(message.data.data())),
@@ -50,7 +50,7 @@ class PointCloud2View {
       throw CloudError("PointCloud2: row_step = " + std::to_string(row_step_) +
                        " must be at least width * point_step = " + std::to_string(row));
     }
-    // The last row may come without its padding. Both factors have 32 bits: no overflow.
+    // The last row may lack its padding. The factors have 32 bits, so the product cannot overflow.
     const std::size_t needed = (height_ - 1) * row_step_;
     if (message.data.size() < needed || message.data.size() - needed < row) {
       throw CloudError("PointCloud2: data has " + std::to_string(message.data.size()) + " bytes, " +
@@ -61,7 +61,7 @@ class PointCloud2View {
 
   std::size_t size() const { return width_ * height_; }
 
-  /// Metres, frame of the message (which has to be that of the sensor).
+  /// Coordinates of point i < size(), m, frame of the message. push() requires the sensor frame.
   Eigen::Vector3f point(std::size_t i) const {
     const unsigned char* const p = at(i);
     if (is_plain_)
@@ -69,7 +69,7 @@ class PointCloud2View {
     return {coordinate(p, x_), coordinate(p, y_), coordinate(p, z_)};
   }
 
-  /// First byte of point `i`, all its fields.
+  /// First byte of the `point_step` bytes of point i < size().
   const unsigned char* at(std::size_t i) const {
     if (is_packed_) return data_ + i * point_step_;
     return data_ + (i / width_) * row_step_ + (i % width_) * point_step_;
@@ -77,7 +77,7 @@ class PointCloud2View {
 
  private:
   struct Field {
-    std::size_t offset = 0;  // bytes into the point
+    std::size_t offset = 0;  // bytes from the start of the point
     std::size_t size = 0;    // bytes: 4 or 8
   };
 
@@ -90,7 +90,7 @@ class PointCloud2View {
 
   template <class Message>
   Field find(const Message& message, const char* name) const {
-    constexpr int kFloat32 = 7;  // sensor_msgs/PointField
+    constexpr int kFloat32 = 7;  // as in sensor_msgs/PointField
     constexpr int kFloat64 = 8;
     std::string names;
     for (const auto& field : message.fields) {
@@ -132,7 +132,7 @@ class PointCloud2View {
   const unsigned char* data_;
   std::size_t width_, height_, point_step_, row_step_;
   bool is_packed_, is_swapped_;
-  bool is_plain_ = false;  // three floats of this machine: the usual case
+  bool is_plain_ = false;  // three floats in host byte order, the usual case
   Field x_, y_, z_;
 };
 
@@ -164,9 +164,9 @@ double message_time(const Message& message) {
   return static_cast<double>(stamp.sec) + 1e-9 * static_cast<double>(detail::nanoseconds(stamp, 0));
 }
 
-/// The points of `message` with a static label, all their fields, under the same header, as one
-/// row. Throws CloudError if the layout is broken, std::invalid_argument unless there is a label
-/// for each point.
+/// Copy of the points of `message` with a static label, with all fields and the header, as one row.
+/// `labels`: by point of `message`. Throws CloudError for an invalid layout, and
+/// std::invalid_argument if the sizes differ.
 template <class Message>
 Message static_points(const Message& message, Span<const PointLabel> labels) {
   const PointCloud2View view(message);

@@ -1,4 +1,4 @@
-// Poses of Sophus. Needs Sophus (any version with se3.hpp); nothing else of dynains does.
+// Conversion of Sophus poses. Only this header requires Sophus (any version with se3.hpp).
 #pragma once
 
 #include <Eigen/Geometry>
@@ -8,7 +8,7 @@
 
 namespace dynains {
 
-/// `T_world_sensor` of float or double as the pose that DynaInsRemover::push() takes.
+/// Converts a pose of float or double to the type of DynaInsRemover::push().
 template <class Scalar, int kOptions>
 Eigen::Isometry3d to_isometry(const Sophus::SE3<Scalar, kOptions>& T_world_sensor) {
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
@@ -17,8 +17,7 @@ Eigen::Isometry3d to_isometry(const Sophus::SE3<Scalar, kOptions>& T_world_senso
   return T;
 }
 
-/// The pose of a ScanVerdict for code that goes on with Sophus. Throws PoseError if `T` is not
-/// rigid.
+/// Converts a pose, for example that of a ScanVerdict. Throws PoseError if `T` is not rigid.
 inline Sophus::SE3<double> to_sophus(const Eigen::Isometry3d& T) {
   validate_pose("T", T);
   return {Eigen::Quaterniond(T.linear()).normalized(), T.translation()};
