@@ -1,4 +1,4 @@
-// Files that appear whole or not at all.
+// Atomic replacement of files.
 #pragma once
 
 #include <cstddef>
@@ -10,31 +10,32 @@
 
 namespace dynains {
 
-/// Writes to a temporary beside the target, `.NAME.0123456789abcdef.tmp` with random digits, and
-/// renames it on `commit()`. Until then the target, if it exists, stays as it was; without a commit
-/// the temporary is removed. The temporary is always a new file, never one that a link leads to,
-/// and bears a lock (flock) until the file is in place: see `remove_leftovers()`.
+/// Writes a temporary file beside the target, `.NAME.0123456789abcdef.tmp` with random digits.
+/// `commit()` renames it to the target; until then, the target is unchanged. Without a commit, the
+/// destructor removes the temporary file. The temporary file is always created, never opened
+/// through an existing file or link, and locked (flock) until it is renamed: see
+/// `remove_leftovers()`.
 class AtomicFile {
  public:
-  /// Opens the temporary. A symbolic link is followed: the file that it names is replaced.
-  /// Throws IoError if the folder cannot be written or the target is not a regular file.
+  /// Creates the temporary file. If `target` is a symbolic link, the file that it refers to is
+  /// replaced. Throws IoError if the folder is not writable or the target is not a regular file.
   explicit AtomicFile(std::filesystem::path target);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// Buffered binary stream into the temporary; `seekp(position)` works. Failures may be left to
-  /// `commit()`.
+  /// Buffered binary stream to the temporary file; supports `seekp(position)`. `commit()` reports
+  /// failures of the stream.
   std::ostream& stream() { return stream_; }
 
   enum class Sync {
-    kNow,   ///< the file survives a power cut from here on
-    kLater  ///< faster for many files: they survive after `sync_files()`
+    kNow,   ///< the file is on the disk when commit() returns
+    kLater  ///< the file is on the disk after `sync_files()`; faster for many files
   };
 
-  /// Puts the file in place. Throws IoError if anything could not be written, with the reason of
-  /// the first failure; the target is then untouched. Throws IoError as well if the file is in
-  /// place, but its folder could not be brought to the disk.
+  /// Renames the temporary file to the target. Throws IoError with the reason of the first failure
+  /// if a write failed; the target is then unchanged. Throws IoError also if the rename succeeded,
+  /// but the synchronization of the folder failed.
   void commit(Sync sync = Sync::kNow);
 
  private:
@@ -47,20 +48,20 @@ class AtomicFile {
   bool committed_ = false;
 };
 
-/// Name of the file that `name` is a temporary of, by its form; empty if it is none.
+/// Name of the target if `name` has the form of a temporary file, else empty.
 std::string target_of_temporary(const std::string& name);
 
-/// Removes temporaries that killed processes left in `folder`, which must not be a link: those of
-/// files for which `is_ours(NAME)` holds. A temporary that is being written stays, and so does any
-/// on a file system without locks. Throws IoError.
+/// Removes the temporary files of killed processes from `folder`, which must not be a link.
+/// `is_ours(NAME)`: whether temporary files of target NAME are to be removed. Locked temporary
+/// files stay; on a file system without locks, all stay. Throws IoError.
 void remove_leftovers(const std::filesystem::path& folder,
                       const std::function<bool(const std::string&)>& is_ours);
 
-/// How many AtomicFiles of `target` are open, in this process and others; 0 on a file system
+/// Number of open AtomicFiles of `target` in all processes of this machine; 0 on a file system
 /// without locks. Throws IoError.
 std::size_t count_writers(const std::filesystem::path& target);
 
-/// Brings everything written to the file system of `folder` to its disk. Throws IoError.
+/// Synchronizes the file system of `folder` with its disk. Throws IoError.
 void sync_files(const std::filesystem::path& folder);
 
 }  // namespace dynains

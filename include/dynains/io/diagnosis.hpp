@@ -1,4 +1,4 @@
-// Checks whether the scans of a recording agree under its poses.
+// Check of the poses of a recording: whether its scans agree under them.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -13,22 +13,22 @@
 
 namespace dynains {
 
-/// How well two scans agree above the ground.
+/// Agreement of two scans above the ground.
 struct Agreement {
-  double share = 0.0;      ///< part of the points with a point of the other scan within 0.3 m
-  double gap = 1.0;        ///< mean distance to the nearest point of the other scan, at most 1, m
-  std::size_t points = 0;  ///< points compared; 0: nothing to compare
+  double share = 0.0;      ///< ratio of points with a point of the other scan within 0.3 m, [0, 1]
+  double gap = 1.0;        ///< mean distance to the nearest point of the other scan, m, at most 1
+  std::size_t points = 0;  ///< number of compared points
 };
 
-/// Points of one scan by which it is aligned with others: above the ground, one in each voxel of
-/// 0.25 m, between 2 and 40 m from the sensor.
+/// Points of one scan for the comparison with other scans: above the ground, 2 to 40 m from the
+/// sensor, one per voxel of 0.25 m.
 class Landmarks {
  public:
-  /// Points in the sensor frame, m. If `mounting` is known, points near the ground are left out.
+  /// `points`: m, sensor frame. If `mounting` is known, points near the ground are excluded.
   Landmarks(PointsView points, const Mounting& mounting);
 
   std::size_t size() const { return points_.size(); }
-  /// Agreement of `other` with this scan under the pose `T_this_other`. Symmetric apart from
+  /// Agreement of `other` with this scan under the pose `T_this_other`. It is symmetric except for
   /// occlusion.
   Agreement compare(const Landmarks& other, const Eigen::Isometry3d& T_this_other) const;
 
@@ -39,20 +39,20 @@ class Landmarks {
   std::vector<Eigen::Vector3d> points_;
 };
 
-/// The poses under one convention.
+/// Agreement under one pose convention.
 struct PoseReading {
-  std::string meaning;  ///< "the poses are inverse ..."
+  std::string meaning;  ///< for messages, for example "the poses are inverse ..."
   std::string option;   ///< flags of `dynains run` that select it, such as "--invert-poses"
   PoseConvention convention;
   Agreement agreement;
 };
 
 enum class PoseVerdict {
-  kAgree,       ///< scans agree under the poses as given
+  kAgree,       ///< scans agree under the given poses
   kOtherwise,   ///< scans agree under another convention, the first of `readings`
-  kNoMotion,    ///< the sensor hardly moves, or too little is in sight, for a decision
+  kNoMotion,    ///< too little motion or too few objects for a decision
   kDisagree,    ///< scans agree under no convention
-  kWorldFrame,  ///< points are in the world frame and agree there; poses do not matter
+  kWorldFrame,  ///< points are in the world frame and agree there; poses have no effect
   kUnknown      ///< too few points or scans
 };
 
@@ -60,28 +60,29 @@ struct Diagnosis {
   std::size_t scan_files = 0;
   std::size_t pose_rows = 0;
   std::size_t scans = 0;       ///< scans with a pose
-  double period = 0.0;         ///< median time from scan to scan, s
-  double points = 0.0;         ///< mean number per scan
-  double invalid_share = 0.0;  ///< part of the points that are NaN, infinite or all zero
-  double ego_share = 0.0;      ///< part of the valid points nearer than 2 m
+  double period = 0.0;         ///< median time between consecutive scans, s
+  double points = 0.0;         ///< mean number of points per scan
+  double invalid_share = 0.0;  ///< ratio of points that are NaN, infinite or all zero, [0, 1]
+  double ego_share = 0.0;      ///< ratio of valid points nearer than 2 m, [0, 1]
   double farthest = 0.0;       ///< 99th percentile of the ranges, m
-  double step = 0.0;           ///< median distance from scan to scan under the poses, m
-  double longest_step = 0.0;   ///< m
-  Mounting mounting;           ///< median over the scans in which ground was found
+  double step = 0.0;           ///< median distance between consecutive poses, m
+  double longest_step = 0.0;   ///< largest distance between consecutive poses, m
+  Mounting mounting;           ///< median over the scans with detected ground
   std::size_t stride = 0;      ///< scan i was compared with scan i + stride
   Agreement as_given;
-  Agreement standing;                 ///< under the identity: no motion at all
-  std::vector<PoseReading> readings;  ///< under common mistakes, best first
+  Agreement standing;                 ///< under identity poses (no motion)
+  std::vector<PoseReading> readings;  ///< under other conventions, best first
   PoseVerdict verdict = PoseVerdict::kUnknown;
 
-  /// Whether a run can use the poses as they are.
+  /// Whether a run can use the given poses.
   bool sound() const {
     return verdict == PoseVerdict::kAgree || verdict == PoseVerdict::kNoMotion ||
            verdict == PoseVerdict::kWorldFrame;
   }
 };
 
-/// Share of agreeing points that wrong poses of a moving sensor do not reach.
+/// Smallest Agreement::share that is accepted without further test. Wrong poses of a moving sensor
+/// stay below it.
 inline constexpr double kLeastAgreement = 0.5;
 
 /// Whether the gap of `a` is clearly smaller than that of `b`.
@@ -89,20 +90,20 @@ inline bool is_clearly_better(const Agreement& a, const Agreement& b) {
   return a.gap < 0.85 * b.gap - 0.01;
 }
 
-/// Whether scans agree well enough: half of the points, or (few beams, fast motion) a fifth of them
-/// and clearly more than without motion.
+/// Whether scans agree: share >= kLeastAgreement, or (few beams, fast motion) share >= 0.2 and a
+/// clearly smaller gap than `standing`, the agreement without motion.
 inline bool fits(const Agreement& agreement, const Agreement& standing) {
   return agreement.share >= kLeastAgreement ||
          (agreement.share >= 0.2 && is_clearly_better(agreement, standing));
 }
 
-/// Weaker test for neighbouring scans where few objects are in sight: some agreement, and no
-/// clearly better agreement without motion.
+/// Weaker test for consecutive scans with few objects: share >= 0.4, and no clearly smaller gap
+/// without motion (`standing`).
 inline bool is_passable(const Agreement& agreement, const Agreement& standing) {
   return agreement.share >= 0.4 && !is_clearly_better(standing, agreement);
 }
 
-/// Agreement of a sample of scans under the poses, and without motion.
+/// Agreement of a sample of scans under the given poses and without motion.
 struct PoseAgreement {
   Agreement as_given;
   Agreement standing;
@@ -115,14 +116,15 @@ struct PoseAgreement {
   }
 };
 
-/// Compares a sample of scans: takes seconds for any length of the recording. Throws IoError.
+/// Compares a sample of scans. The time, a few seconds, does not depend on the length of the
+/// recording. Throws IoError.
 Diagnosis diagnose(const Recording& recording);
 
-/// Compares a sample of the scans `first` to `last` (inclusive) under the poses as given: cheap
-/// enough for the start of a run. Throws IoError.
+/// Compares a small sample of the scans `first` to `last` (inclusive) under the given poses, for
+/// the start of a run. Throws IoError.
 PoseAgreement pose_agreement(const Recording& recording, std::size_t first, std::size_t last);
 
-/// The verdict on the poses and the option to use, in one sentence.
+/// One sentence with the verdict on the poses and the recommended option.
 std::string advice(const Diagnosis& diagnosis);
 
 }  // namespace dynains

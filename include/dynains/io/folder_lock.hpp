@@ -1,22 +1,20 @@
-// One writer at a time for a folder of files.
+// Lock of a folder.
 #pragma once
 
 #include <filesystem>
 
 namespace dynains {
 
-/// Keeps a folder for itself, from construction to destruction, among all who take a FolderLock of
-/// it: of this process or of another one on this machine. Shared locks exclude exclusive ones, not
-/// each other.
+/// Advisory lock of a folder from construction to destruction, for all processes of this machine.
+/// An exclusive lock excludes all other locks; shared locks exclude exclusive locks only.
 ///
-/// The lock lies on the folder itself (flock): it leaves no file behind, and ends with the process,
-/// in any way. File systems that cannot lock folders, such as some network file systems, grant
-/// every lock.
+/// The lock is a flock on the folder: it creates no file, and the end of the process releases it.
+/// On file systems without locks of folders, such as some network file systems, each lock succeeds.
 class FolderLock {
  public:
   enum class Mode { kExclusive, kShared };
 
-  /// Throws UsageError if somebody else has the folder, IoError if it cannot be opened.
+  /// Throws UsageError for a conflicting lock of the folder, and IoError if it cannot be opened.
   explicit FolderLock(const std::filesystem::path& folder, Mode mode = Mode::kExclusive);
   ~FolderLock();
   FolderLock(FolderLock&& other) noexcept;
@@ -25,7 +23,7 @@ class FolderLock {
   FolderLock& operator=(const FolderLock&) = delete;
 
  private:
-  int descriptor_;  // -1: moved from
+  int descriptor_;  // -1 after a move
 };
 
 }  // namespace dynains

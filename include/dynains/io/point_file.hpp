@@ -1,4 +1,4 @@
-// Point clouds in PLY and PCD files.
+// Reader and writer of point clouds in PLY and PCD files.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -13,11 +13,12 @@
 
 namespace dynains {
 
-/// Distance from the origin, m, up to which a float coordinate is exact to 0.5 mm. Beyond it, write
-/// doubles: UTM coordinates as floats are off by up to 0.25 m.
+/// Largest coordinate, m, that a float represents with an error of at most 0.5 mm. Larger
+/// coordinates require doubles: UTM coordinates as floats have errors of up to 0.25 m.
 inline constexpr double kFloatCoordinateLimit = 1e4;
 
-/// One point to write. Members without a column in the file are ignored.
+/// One point to write. Members without a column in the file are ignored. Units are those of the
+/// caller.
 struct FilePoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   float intensity = 0.0F;
@@ -29,7 +30,7 @@ struct FilePoint {
 
 /// Columns in addition to x y z.
 struct PointColumns {
-  bool double_xyz = false;  ///< x y z as double; some PCD readers accept floats only
+  bool double_xyz = false;  ///< x y z as double; some PCD readers support floats only
   bool intensity = false;   ///< float `intensity`
   bool rgb = false;         ///< PLY: uchar `red` `green` `blue`; PCD: packed `rgb`
   bool label = false;       ///< uint32 `label`
@@ -37,19 +38,19 @@ struct PointColumns {
   bool time = false;        ///< double `time`
 };
 
-/// Writes a binary point file, point by point. Keeps no points in memory, and need not know their
-/// number in advance. The file appears whole, at `commit()`, or not at all.
+/// Writes a binary point file, point by point, without points in memory. The number of points need
+/// not be known in advance. `commit()` creates or replaces the file atomically.
 class PointFileWriter {
  public:
-  /// The format follows from the extension, .ply or .pcd.
-  /// `viewpoint` is written to the header of PCD; PLY has no field for it.
-  /// Throws IoError for another extension, or if the folder cannot be written.
+  /// The extension .ply or .pcd determines the format. `viewpoint`: pose of the sensor for the
+  /// header of PCD; ignored for PLY. Throws IoError for another extension or a folder that is not
+  /// writable.
   explicit PointFileWriter(const std::filesystem::path& path, const PointColumns& columns = {},
                            const Eigen::Isometry3d& viewpoint = Eigen::Isometry3d::Identity());
 
   void add(const FilePoint& point);
   std::size_t size() const { return size_; }
-  /// Throws IoError unless all bytes were written.
+  /// Throws IoError unless the file was written completely.
   void commit(AtomicFile::Sync sync = AtomicFile::Sync::kNow);
 
  private:
@@ -65,8 +66,8 @@ class PointFileWriter {
 /// Whether the extension is .ply or .pcd.
 bool is_point_file(const std::filesystem::path& path);
 
-/// Contents of a point file. A column that is not in the file is empty; other columns have one
-/// value for each position. The case of names is ignored; units are those of the file.
+/// Content of a point file. Each column has one value per position, or is empty if the file lacks
+/// it. The accepted column names are listed; their case is ignored. Units are those of the file.
 struct PointFile {
   std::vector<Eigen::Vector3d> positions;  ///< x y z
   std::vector<float> intensity;            ///< intensity, i, reflectivity, scalar_intensity
@@ -77,20 +78,21 @@ struct PointFile {
   Eigen::Isometry3d viewpoint = Eigen::Isometry3d::Identity();
 };
 
-/// Reads PLY (ascii, binary of both byte orders) and PCD (ascii, binary, binary_compressed); the
-/// format follows from the extension. Throws IoError with path, line or byte, and expectation.
+/// Reads PLY (ascii, binary of both byte orders) and PCD (ascii, binary, binary_compressed). The
+/// extension determines the format. Throws IoError with path, line or byte, and expected content.
 PointFile read_points(const std::filesystem::path& path);
 
 /// Header of a point file.
 struct PointFileHeader {
   Eigen::Isometry3d viewpoint = Eigen::Isometry3d::Identity();  ///< as in PointFile
   PointColumns columns;                                         ///< without rgb and double_xyz
-  std::uint64_t point_count = 0;  ///< as stated; check_point_file() compares it with the file size
+  std::uint64_t point_count = 0;  ///< as in the header; check_point_file() compares the file size
 };
+/// Reads the header of a PLY or PCD file. Throws IoError like read_points().
 PointFileHeader read_point_file_header(const std::filesystem::path& path);
 
-/// Throws IoError unless the header is valid and the file is large enough for its points. Points
-/// are not read.
+/// Throws IoError unless the header is valid and the file is large enough for its points. Does not
+/// read points.
 void check_point_file(const std::filesystem::path& path);
 
 }  // namespace dynains

@@ -7,27 +7,27 @@
 
 namespace dynains {
 
-/// The frame whose pose a row gives.
+/// Moving frame of the poses in a file.
 enum class PoseFrame {
-  kAuto,   ///< kCamera for rows of 12 numbers beside a calib.txt, else kLidar
-  kLidar,  ///< that of the points
-  kCamera  ///< z forward, x right, y down; turned by `Tr` of calib.txt, or else by these axes
+  kAuto,   ///< kCamera for rows of 12 numbers with a calib.txt, else kLidar
+  kLidar,  ///< frame of the points
+  kCamera  ///< z forward, x right, y down; converted by `Tr` of calib.txt, else by camera_axes()
 };
 
-/// How rows become poses of the sensor in the world, in metres. With default values, rows are used
-/// unchanged.
+/// Conversion of the rows of a pose file to poses of the sensor in the world frame, m. By default,
+/// rows are used without conversion.
 struct PoseConvention {
-  bool invert = false;       ///< rows are from the world to the sensor
-  double unit = 1.0;         ///< m per unit of translation: 0.001 for millimetres
+  bool invert = false;       ///< rows are T_sensor_world
+  double unit = 1.0;         ///< m per unit of translation, for example 0.001 for millimetres
   bool left_handed = false;  ///< the y axis of the poses is mirrored, as in some simulators
   PoseFrame frame = PoseFrame::kAuto;
-  /// Order of the quaternions in the file; kNone: the usual order of its format.
+  /// Order of the quaternions in the file; kNone: the order that its format defines.
   QuaternionOrder quaternion = QuaternionOrder::kNone;
   int shift = 0;  ///< scan i has the pose of scan i + shift
 };
 
-/// Applies a convention, except its `frame` and `shift`, to a row. `read_as` is the order in which
-/// the quaternion of the row was read.
+/// Applies a convention, except `frame` and `shift`, to a row. `read_as`: order in which the
+/// quaternion of the row was read.
 inline Eigen::Isometry3d apply(const PoseConvention& convention, const Eigen::Isometry3d& row,
                                QuaternionOrder read_as) {
   Eigen::Isometry3d pose = row;
@@ -49,8 +49,8 @@ inline Eigen::Isometry3d apply(const PoseConvention& convention, const Eigen::Is
   return pose;
 }
 
-/// T_camera_sensor of a sensor with x forward, y left, z up and a camera with z forward, x right, y
-/// down.
+/// T_camera_sensor for a sensor with x forward, y left, z up and a camera with z forward, x right,
+/// y down, and a common origin.
 inline Eigen::Isometry3d camera_axes() {
   Eigen::Isometry3d T_camera_sensor = Eigen::Isometry3d::Identity();
   T_camera_sensor.linear() << 0, -1, 0, 0, 0, -1, 1, 0, 0;

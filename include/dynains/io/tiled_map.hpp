@@ -1,4 +1,4 @@
-// Static map in files, of which only tiles near the sensor are in memory.
+// Static map in files. Only tiles near the sensor are in memory.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -16,29 +16,29 @@
 
 namespace dynains {
 
-/// Static map (Eq. 1) in a folder of files. The tiles in memory stay within a budget.
+/// Static map (Eq. 1) in a folder of files, with a memory budget for its tiles.
 ///
-/// As in StaticMapAccumulator, the first measured point of a voxel stays. A tile has 256 x 256
-/// voxels and a file of its own, to which `insert` appends new points. So the files hold the whole
-/// map after every `insert`. A process that is killed during an `insert` loses some of its points,
-/// no earlier ones. Tiles that are farthest from the sensor leave the memory first, and are read
-/// again when a point falls into them. The result does not depend on the budget.
+/// As in StaticMapAccumulator, the first inserted point of a voxel is kept. A tile has 256 x 256
+/// voxels and one file. `insert` appends new points to the files, so the files contain the whole
+/// map after each `insert`. If a process is killed during an `insert`, some points of that `insert`
+/// are lost, but no earlier points. The tiles farthest from the sensor are freed first, and read
+/// again when a point falls into them. The map does not depend on the budget.
 ///
-/// Only one map at a time can have a folder, in all processes.
+/// A folder can be open in one map at a time, in all processes of this machine.
 ///
-/// Replaces the map in memory as `Stages::Map`:
+/// Use as `Stages::Map`:
 ///
 ///     struct Stages : dynains::DefaultStages { using Map = dynains::TiledStaticMap; };
 ///     dynains::BasicDynaInsRemover<Stages>::Config config;
 ///     config.map.map_folder = "map";
 ///
-/// To make the files survive a power cut, call `sync_files(folder)`.
+/// `sync_files(folder)` synchronizes the files with the disk.
 class TiledStaticMap {
  public:
   struct Config {
     double map_voxel = 0.2;   ///< m, edge of a voxel; 0 keeps every point
     double map_memory = 256;  ///< MB, budget of the tiles in memory between two inserts
-    /// Folder of the tiles; created if missing. A map in it is continued.
+    /// Folder of the tiles; created if missing. New points are added to an existing map.
     std::filesystem::path map_folder;
 
     template <class Self, class Visitor>
@@ -46,36 +46,37 @@ class TiledStaticMap {
       visitor(Parameter{"map_voxel", self.map_voxel, closed(0, 10), "m",
                         "resolution of the static map, one measured point per voxel; 0 keeps all"});
       visitor(Parameter{"map_memory", self.map_memory, closed(0, 1e6), "MB",
-                        "memory that the static map may take; what is farthest goes to the disk"});
+                        "memory budget of the static map; the farthest tiles are only on disk"});
     }
 
     /// Throws ConfigError.
     void validate() const;
   };
 
-  /// Throws ConfigError; UsageError while another map has the folder; IoError if the folder cannot
-  /// be used or holds a map with another voxel size.
+  /// Throws ConfigError; UsageError if the folder is open in another map; IoError if the folder is
+  /// not accessible or contains a map with another voxel size.
   explicit TiledStaticMap(const Config& config);
 
   const Config& config() const { return config_; }
 
-  /// Adds the points of one scan (metres, sensor frame) whose `keep` flag is not zero; an empty
-  /// `keep` adds all. Throws IoError if a tile cannot be read or written. Points that could not be
+  /// Adds the points of one scan (m, sensor frame) whose `keep` flag is not zero. `keep`: by point;
+  /// empty for all points. Throws IoError if a tile cannot be read or written. Points that were not
   /// written stay in memory, beyond the budget if necessary, and the next `insert` writes them.
   void insert(PointsView points, Span<const std::uint8_t> keep,
               const Eigen::Isometry3d& T_world_sensor);
 
+  /// Number of points.
   std::size_t size() const { return size_; }
   bool empty() const { return size_ == 0; }
 
   /// Removes all points and their files. Throws IoError.
   void clear();
 
-  /// Bytes of the tiles in memory.
+  /// Memory of the loaded tiles, bytes.
   std::size_t memory_bytes() const;
 
-  /// Calls `visit(Eigen::Vector3d)` for every point (world frame, m), tile by tile, ordered by
-  /// their indices. Needs the memory of one more tile. Throws IoError.
+  /// Calls `visit(Eigen::Vector3d)` for each point (m, world frame), tile by tile in the order of
+  /// tile indices. Requires the memory of one additional tile. Throws IoError.
   template <class Visitor>
   void for_each(Visitor&& visit) const {
     for (const auto& [place, stored] : stored_) {
@@ -96,10 +97,10 @@ class TiledStaticMap {
     float x, y, z;        // m, relative to the corner of the voxel
   };
 
-  // Points in the order of insertion, and a hash table of their voxels.
+  // Points in the order of insertion, and the set of their voxels.
   struct Tile {
     std::vector<Point> points;
-    VoxelHashTable<std::uint32_t> filled;  // Point::voxel of each; empty if every point is kept
+    VoxelHashTable<std::uint32_t> filled;  // Point::voxel of each point; empty for map_voxel 0
 
     std::size_t memory_bytes() const;
     bool fill(std::uint32_t voxel);
@@ -115,7 +116,7 @@ class TiledStaticMap {
 
   Config config_;
   FolderLock lock_;
-  double voxel_;  // m, edge of the voxels that tiles count in
+  double voxel_;  // m, edge of the voxels of a tile
   std::size_t size_ = 0;
   std::map<Place, std::size_t> stored_;  // number of points in the file of each tile
   std::map<Place, Tile> tiles_;          // tiles in memory

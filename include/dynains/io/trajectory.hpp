@@ -1,4 +1,4 @@
-// Trajectory files: poses over time.
+// Reader of trajectory files, and interpolation of poses.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -11,48 +11,48 @@ namespace dynains {
 
 enum class QuaternionOrder { kNone, kXyzw, kWxyz };
 
-/// Rows of a trajectory file: frame, direction and unit are those of the file.
+/// Rows of a trajectory file. Frame, direction and unit of translation are those of the file.
 struct Trajectory {
   std::vector<Eigen::Isometry3d> poses;
   std::vector<double> times;  ///< s, strictly increasing; empty if the file has none
-  QuaternionOrder order = QuaternionOrder::kNone;  ///< kNone: rows are matrices
+  QuaternionOrder order = QuaternionOrder::kNone;  ///< kNone for matrices
 };
 
-/// Reads a text file with one pose a row; blanks, commas or semicolons separate the columns. A
-/// header names the columns; without a header, their number decides:
+/// Reads a text file with one pose per row. Blanks, commas or semicolons separate the columns. A
+/// header determines the meaning of the columns. Without a header, their number determines it:
 ///
-///   12  KITTI: the upper 3x4 of the matrix, row by row
-///   13  time, then the same
-///   16  the whole 4x4 matrix
+///   12  KITTI: the upper 3x4 of the matrix, row-major
+///   13  time and the upper 3x4 of the matrix, row-major
+///   16  the 4x4 matrix, row-major
 ///    8  TUM: time x y z qx qy qz qw
 ///    7  x y z qx qy qz qw
 ///
-/// A header (its first line, with or without a leading #) names a column for time (t, time, stamp,
-/// timestamp ...), position (x, tx, p_x, pos_x ...) and rotation (qx, q_x, quat_x, orientation.x
-/// ...) in any order; other columns are ignored. Other lines that start with # are comments.
-/// Times are seconds; see to_seconds() for other units. Throws IoError with path, line and
-/// expectation.
+/// A header is the first line, with or without a leading #. It contains, in any order, columns for
+/// time (t, time, stamp, timestamp ...), position (x, tx, p_x, pos_x ...) and rotation (qx, q_x,
+/// quat_x, orientation.x ...); other columns are ignored. Other lines that start with # are
+/// comments. Times are converted by to_seconds(). Throws IoError with path, line and expected
+/// content.
 Trajectory read_trajectory(const std::filesystem::path& path);
 
-/// The rows before and after a time, and the position of the time between them in [0, 1].
+/// Indices of the rows before and after a time, and the relative position of the time in [0, 1].
 struct TrajectoryMatch {
   std::size_t before = 0;
   std::size_t after = 0;
   double share = 0.0;
 };
 
-/// Longest gap between two poses that is interpolated, s.
+/// Longest interval between two poses for interpolation, s.
 inline constexpr double kLongestPoseGap = 1.0;
 
-/// The rows around `time` (s). Nothing if the time is more than 5 ms outside of the trajectory, or
-/// in a gap longer than kLongestPoseGap.
+/// Rows around `time` (s). Empty if the time is more than 5 ms outside of the trajectory, or within
+/// an interval longer than kLongestPoseGap.
 std::optional<TrajectoryMatch> match_time(const Trajectory& trajectory, double time);
 
-/// Linear in translation, slerp in rotation; `share` 0 is exactly `a`, 1 exactly `b`.
+/// Interpolates linearly in translation and by slerp in rotation. `share`: [0, 1]; 0 gives exactly
+/// `a`, 1 exactly `b`.
 Eigen::Isometry3d interpolate(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double share);
 
-/// Converts a stamp to seconds. Numbers above 1e11, 1e14 and 1e17 are milliseconds, microseconds
-/// and nanoseconds since 1970.
+/// Converts a stamp to seconds. Numbers above 1e11, 1e14 and 1e17 are in ms, us and ns since 1970.
 double to_seconds(double stamp);
 
 }  // namespace dynains
