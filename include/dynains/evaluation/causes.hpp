@@ -1,4 +1,4 @@
-// Causes of verdicts as the error analysis prints them.
+// Names of causes in the error analysis.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Point-wise errors of an estimate by class, instance, range and cause.
+// Point-wise errors of an estimate, by class, instance, range and cause.
 #pragma once
 
 #include <Eigen/Core>
@@ -33,7 +33,7 @@ class ErrorAnalysis {
   };
 
   struct ClassErrors {
-    std::uint16_t id = 0;  ///< SemanticKITTI
+    std::uint16_t id = 0;  ///< SemanticKITTI class
     Truth truth = Truth::kStatic;
     Counts counts;
   };
@@ -43,11 +43,11 @@ class ErrorAnalysis {
     std::uint16_t instance = 0;
     Truth truth = Truth::kStatic;
     Counts counts;
-    std::size_t scans = 0;  ///< scans in which it has points
+    std::size_t scans = 0;  ///< number of scans with points of the instance
     double mean_range = 0;  ///< m, planar, mean over its points
-    /// m/s: median speed of the centroid of its visible points between consecutive scans that show
-    /// it. The centroid also moves when another part becomes visible. Empty without time stamps or
-    /// with one scan.
+    /// Median speed of the centroid of its points between consecutive scans with points of the
+    /// instance, m/s. A change of the visible part also moves the centroid. Empty without time
+    /// stamps or with one scan.
     std::optional<double> speed;
   };
 
@@ -57,14 +57,14 @@ class ErrorAnalysis {
     PointScore score;
   };
 
-  /// Wrong and right verdicts that have one cause.
+  /// Numbers of wrong and right verdicts with one cause.
   struct CauseErrors {
     std::uint64_t missed_dynamic = 0;
     std::uint64_t lost_static = 0;
     std::uint64_t right = 0;
   };
 
-  /// Errors of points whose cluster (LabelledScan::instances) has static and dynamic points.
+  /// Errors in clusters (LabelledScan::instances) that contain both static and dynamic points.
   struct MergeErrors {
     std::uint64_t missed_dynamic = 0;  ///< in clusters with more static than dynamic points
     std::uint64_t lost_static = 0;     ///< in clusters with more dynamic than static points
@@ -73,6 +73,7 @@ class ErrorAnalysis {
   /// Throws ConfigError for settings out of bounds.
   explicit ErrorAnalysis(const Settings& settings);
 
+  /// Counts the errors of one scan. Scans must be added in order.
   void add(const LabelledScan& scan);
 
   std::vector<ClassErrors> by_class() const;        ///< ordered by id

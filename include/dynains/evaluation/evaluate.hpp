@@ -1,4 +1,4 @@
-// Both protocols and the error analysis in one call.
+// Evaluation by both protocols and the error analysis.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,8 +14,8 @@
 
 namespace dynains::evaluation {
 
-/// Settings of an evaluation. Defaults are those of the published protocols, with one exception:
-/// the published tables count unlabeled points as static.
+/// Settings of an evaluation. visit() gives their meaning. The defaults follow the published
+/// protocols, except that unlabeled points are ignored; the published tables count them as static.
 struct EvaluationConfig {
   double voxel = 0.2;
   double min_range = 2.7;
@@ -34,27 +34,30 @@ struct EvaluationConfig {
     visitor(Parameter{"max_range", self.max_range, closed(0.0, 10000.0), "m",
                       "points at a larger planar range are not judged by PR and RR; 0 = no limit"});
     visitor(Parameter{"point_max_range", self.point_max_range, closed(0.0, 10000.0), "m",
-                      "the same for SA and DA (KTH) and for the error analysis; 0 = no limit"});
+                      "points at a larger planar range are not judged by SA and DA (KTH) and by "
+                      "the error analysis; 0 = no limit"});
     visitor(Parameter{"point_radius", self.point_radius, closed(0.0001, 10.0), "m",
-                      "a point is in a map file if a map point is that near (KTH)"});
+                      "largest distance to a map point for a point to be in a map file (KTH)"});
     visitor(Parameter{"ring_width", self.ring_width, closed(0.1, 10000.0), "m",
                       "width of the range rings of the error analysis"});
   }
+  /// Throws ConfigError for a field out of bounds.
   void validate() const { validate_parameters("EvaluationConfig", *this); }
 };
 
-/// A finished map, evaluated as one more row.
+/// A map of unlabelled points, evaluated as an additional row.
 struct MapEstimate {
   std::string name;
   Span<const Eigen::Vector3d> points_world;  ///< m, in the world frame of the poses
 };
 
-/// One line of the table.
+/// Scores of one estimate, map or reference.
 struct EvaluationRow {
   std::string name;
   VoxelScore voxels;
   PointScore points;
-  /// Map files only: points without a measured point nearby, and all points.
+  /// Maps only: number of points without a measured point nearby (MapProtocol::foreign_points()),
+  /// and number of all points.
   std::optional<std::uint64_t> foreign_points;
   std::optional<std::uint64_t> map_points;
 };
@@ -63,16 +66,17 @@ struct Evaluation {
   EvaluationConfig config;
   std::size_t scans = 0;
   std::uint64_t points = 0;
-  /// "identity" (nothing removed), "oracle" (exactly the dynamic points removed), the estimates,
-  /// the maps.
+  /// "identity" (no point removed), "oracle" (exactly the dynamic points removed), the estimates
+  /// and the maps, in this order.
   std::vector<EvaluationRow> rows;
   /// Errors of estimate 0; empty without estimates.
   std::optional<ErrorAnalysis> errors;
 };
 
-/// Reads `source` twice. `estimates`: names of the bits of LabelledScan::in_map.
-/// Throws ConfigError for settings out of bounds, std::invalid_argument for a scan with spans of
-/// different lengths or a stride below 3, and exceptions of `source`.
+/// Evaluates estimates and maps. Reads `source` twice. `estimates`: name of the estimate of each
+/// bit of LabelledScan::in_map. Throws ConfigError for settings out of bounds,
+/// std::invalid_argument for a scan with spans of different lengths or a stride below 3, and the
+/// exceptions of `source`.
 Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& estimates,
                     const std::vector<MapEstimate>& maps, const EvaluationConfig& config = {});
 

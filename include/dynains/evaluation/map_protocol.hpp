@@ -1,4 +1,4 @@
-// Both protocols for a finished map of unlabelled points, such as a map file of another tool.
+// Both protocols for a map of unlabelled points, such as a map file of another program.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,17 +13,16 @@
 
 namespace dynains::evaluation {
 
-/// Evaluates map points by the scans that the map was made from.
+/// Evaluates a map by the scans from which it was built.
 ///
-/// Voxel-wise: a map point has the class of the nearest measured point within the 27 voxels around
-/// it; a measured point nearer than one voxel edge is always found. Map points without a measured
-/// point there (out of range, or in another frame) are left out, and so are map points whose
-/// nearest measured point is ignored. The other map points are voxelised and compared as in
-/// VoxelProtocol. Point-wise: a measured point is removed if no map point lies within
-/// `point_radius`.
+/// Voxel-wise (PR, RR): a map point gets the class of the nearest measured point within the 27
+/// voxels around it, which contain all measured points nearer than one voxel edge. Map points
+/// without such a measured point (out of range, or in another frame), or with an ignored one, are
+/// excluded. The other map points are voxelised and compared as in VoxelProtocol. Point-wise (SA,
+/// DA): a measured point is removed if no map point lies within `point_radius`.
 ///
-/// Call add() for every scan, then resolve() for every scan again. Memory grows with the number of
-/// map points and occupied voxels only.
+/// Call add() for each scan, then resolve() for each scan. Memory is proportional to the numbers of
+/// map points and occupied voxels.
 class MapProtocol {
  public:
   struct Settings {
@@ -35,22 +34,22 @@ class MapProtocol {
     TruthClasses truth;
   };
 
-  /// `map_world`: points in the world frame of the poses, m; must outlive this object. Points that
-  /// are not finite are left out. Throws ConfigError for settings out of bounds.
+  /// `map_world`: points, m, world frame of the poses; must outlive this object. Points that are
+  /// not finite are excluded. Throws ConfigError for settings out of bounds.
   MapProtocol(const Settings& settings, Span<const Eigen::Vector3d> map_world);
   ~MapProtocol();
   MapProtocol(MapProtocol&&) noexcept;
   MapProtocol& operator=(MapProtocol&&) noexcept;
 
-  void add(const LabelledScan& scan);
-  void resolve(const LabelledScan& scan);
+  void add(const LabelledScan& scan);      ///< first pass
+  void resolve(const LabelledScan& scan);  ///< second pass
 
-  /// Score against the raw map of `raw`, which must have the same scans and settings.
+  /// Score relative to the raw map of `raw`, which must have equal scans and settings.
   VoxelScore voxel_score(const VoxelProtocol& raw) const;
   PointScore point_score() const;
 
-  /// Map points that were left out because no measured point is near. If these are most of the map,
-  /// it is probably in another frame than the poses.
+  /// Number of map points that are excluded because no measured point is near. If most map points
+  /// are excluded, the map is probably not in the world frame of the poses.
   std::uint64_t foreign_points() const;
 
  private:

@@ -1,4 +1,4 @@
-// SA, DA, AA and HA after KTH's DynamicMap_Benchmark (Zhang et al., ITSC 2023), streaming.
+// SA, DA, AA and HA of KTH's DynamicMap_Benchmark (Zhang et al., ITSC 2023), scan by scan.
 #pragma once
 
 #include <cstddef>
@@ -10,8 +10,8 @@
 
 namespace dynains::evaluation {
 
-/// Counts correct points of each estimate (LabelledScan::in_map): static points in its map, dynamic
-/// points not in its map.
+/// Counts the correctly classified points of each estimate (LabelledScan::in_map): static points in
+/// its map and dynamic points not in its map.
 class PointProtocol {
  public:
   struct Settings {
@@ -20,14 +20,15 @@ class PointProtocol {
     TruthClasses truth;
   };
 
-  /// Throws ConfigError for ranges that are negative or crossed, or more than kMaxEstimates.
+  /// `estimates`: number of estimates. Throws ConfigError for negative ranges, min_range above
+  /// max_range, or more than kMaxEstimates estimates.
   PointProtocol(const Settings& settings, std::size_t estimates);
 
   void add(const LabelledScan& scan);
 
   const PointScore& score(std::size_t estimate) const { return scores_.at(estimate); }
 
-  /// Reference rows: nothing removed, and exactly the dynamic points removed.
+  /// Scores of the references: no point removed, and exactly the dynamic points removed.
   PointScore identity() const;
   PointScore oracle() const;
 

@@ -1,4 +1,4 @@
-// An evaluation as table, JSON and CSV.
+// Output of an evaluation as table, JSON and CSV.
 #pragma once
 
 #include <string>
@@ -7,11 +7,11 @@
 
 namespace dynains::evaluation {
 
-/// Settings and one aligned line per row; ends with a newline. "-": a percentage of zero points.
+/// Settings, and one aligned line per row. Ends with a newline. A percentage of zero points is "-".
 std::string to_table(const Evaluation& evaluation);
 
-/// The error analysis as tables: classes, instances (the worst `max_instances` static and dynamic
-/// ones), range rings and, if given, causes. Empty without an analysis.
+/// Tables of the error analysis: classes, the `max_instances` static and dynamic instances with
+/// most errors, range rings and, if available, causes. Empty without an analysis.
 std::string errors_to_table(const Evaluation& evaluation, std::size_t max_instances = 20);
 
 /// Settings, rows with counts, and error analysis. A percentage of zero points is null.

@@ -1,4 +1,4 @@
-// One labelled scan, and the source of scans.
+// Input of the evaluation: labelled scans.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -14,14 +14,14 @@ namespace dynains::evaluation {
 /// Largest number of estimates in one evaluation.
 inline constexpr std::size_t kMaxEstimates = 6;
 
-/// Views over one scan. Each span has one value per point; some may be empty.
+/// Views of one scan. Each span has one value per point; spans may be empty where stated.
 struct LabelledScan {
-  const float* xyz = nullptr;  ///< sensor frame, m: x y z of each point
-  std::size_t stride = 3;      ///< floats from one point to the next, at least 3
+  const float* xyz = nullptr;  ///< x y z of each point, m, sensor frame
+  std::size_t stride = 3;      ///< floats per point, at least 3
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
   double time = std::numeric_limits<double>::quiet_NaN();  ///< s; NaN if unknown
   Span<const std::uint32_t> truth;                         ///< SemanticKITTI labels
-  /// Bit e is set if the map of estimate e has the point. Empty: no map has a point.
+  /// Bit e is set if the map of estimate e contains the point. Empty if no map contains a point.
   Span<const std::uint8_t> in_map;
   /// Cause of each verdict of estimate 0 (dynains::evaluation::Cause). May be empty.
   Span<const std::uint8_t> causes;
@@ -35,8 +35,9 @@ struct LabelledScan {
   }
 };
 
-/// Fills `scan` with scan `index` and returns true; returns false behind the last scan. Views stay
-/// valid until the next call. Scans are read in order, and then a second time in order.
+/// Writes the views of scan `index` to `scan` and returns true, or returns false for an index
+/// behind the last scan. The views must be valid until the next call. The evaluation reads all
+/// scans twice in order.
 using ScanSource = std::function<bool(std::size_t index, LabelledScan& scan)>;
 
 }  // namespace dynains::evaluation

@@ -1,4 +1,4 @@
-// Counts of both protocols, and the scores that follow from them.
+// Counts and scores of both protocols.
 #pragma once
 
 #include <cmath>
@@ -7,7 +7,7 @@
 
 namespace dynains::evaluation {
 
-/// Percentage; NaN if `whole` is 0.
+/// 100 * part / whole; NaN if `whole` is 0.
 inline double percent(std::uint64_t part, std::uint64_t whole) {
   if (whole == 0) return std::numeric_limits<double>::quiet_NaN();
   return 100.0 * static_cast<double>(part) / static_cast<double>(whole);
@@ -16,8 +16,8 @@ inline double percent(std::uint64_t part, std::uint64_t whole) {
 /// Harmonic mean; 0 if both are 0, NaN if one is NaN.
 inline double harmonic_mean(double a, double b) { return a + b == 0 ? 0 : 2 * a * b / (a + b); }
 
-/// ERASOR's protocol (Lim et al., RA-L 2021): voxel points of the raw map that the estimate
-/// preserves.
+/// ERASOR's protocol (Lim et al., RA-L 2021): numbers of voxel points of the raw map, and of those
+/// that are preserved in the map of the estimate.
 struct VoxelScore {
   std::uint64_t static_total = 0;
   std::uint64_t static_preserved = 0;
@@ -32,7 +32,8 @@ struct VoxelScore {
   double f1() const { return harmonic_mean(preservation_rate(), rejection_rate()) / 100; }
 };
 
-/// KTH's protocol (Zhang et al., ITSC 2023): measured points that are classified correctly.
+/// KTH's protocol (Zhang et al., ITSC 2023): numbers of measured points, and of correctly
+/// classified ones.
 struct PointScore {
   std::uint64_t static_total = 0;
   std::uint64_t static_kept = 0;

@@ -7,12 +7,12 @@
 
 namespace dynains::evaluation {
 
-/// The first `left_columns` columns are left-aligned, the others right-aligned.
+/// Table with aligned columns: the first `left_columns` are left-aligned, the others right-aligned.
 class TextTable {
  public:
   explicit TextTable(std::vector<std::string> header, std::size_t left_columns = 1);
 
-  /// Throws std::invalid_argument for more cells than the header has.
+  /// Adds a row. Throws std::invalid_argument if it has more cells than the header.
   void add(std::vector<std::string> row);
 
   /// One line per row, each with a newline.
@@ -23,10 +23,10 @@ class TextTable {
   std::vector<std::vector<std::string>> rows_;
 };
 
-/// A field of a CSV file (RFC 4180): quoted if it has a comma, a quote or a line break.
+/// Field of a CSV file (RFC 4180), quoted if it contains a comma, a quote or a line break.
 std::string csv_field(const std::string& text);
 
-/// Fixed number of decimals; `missing` for a value that is not finite.
+/// `value` with a fixed number of decimals; `missing` if it is not finite.
 std::string format_number(double value, int decimals, const char* missing = "-");
 
 }  // namespace dynains::evaluation

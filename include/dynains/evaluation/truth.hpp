@@ -12,7 +12,7 @@ namespace dynains::evaluation {
 enum class Truth : std::uint8_t {
   kStatic,
   kDynamic,
-  kIgnored,  ///< not evaluated: left out of the raw map and of every estimate
+  kIgnored,  ///< not evaluated: excluded from the raw map and from all estimates
 };
 
 /// Treatment of points without a class: SemanticKITTI's 0 (unlabeled) and 1 (outlier).
@@ -29,7 +29,7 @@ constexpr std::uint16_t semantic_instance(std::uint32_t label) {
   return static_cast<std::uint16_t>(label >> 16U);
 }
 
-/// Dynamic and ignored class ids; all others are static.
+/// Mapping from SemanticKITTI classes to Truth. Classes are static by default.
 class TruthClasses {
  public:
   /// Dynamic: SemanticKITTI's moving classes, 252 to 259.
@@ -48,7 +48,7 @@ class TruthClasses {
 
   Unlabeled unlabeled() const { return unlabeled_; }
 
-  /// The dynamic ids as a list that the constructor reads back.
+  /// List of the dynamic ids in the format of the constructor.
   std::string dynamic_classes() const;
 
  private:
@@ -56,7 +56,7 @@ class TruthClasses {
   Unlabeled unlabeled_;
 };
 
-/// SemanticKITTI's name of a class id, or "class <id>".
+/// SemanticKITTI name of a class id; "class <id>" for an unknown id.
 std::string semantic_class_name(std::uint16_t id);
 
 }  // namespace dynains::evaluation
