@@ -1,4 +1,4 @@
-// Configuration of the simulation: scene, sensor and disturbances.
+// Parameters of the simulation: scene, sensor and disturbances.
 #pragma once
 
 #include <cstdint>
@@ -9,20 +9,20 @@
 
 namespace dynains::simulation {
 
-/// Kind of place. Every seed of a scene is another place with other traffic.
+/// Type of scene. The seed determines the layout and the traffic.
 enum class Scene {
-  kUrban,       ///< street with crossings, moving, parked and stopping vehicles, pedestrians
-  kHighway,     ///< fast traffic both ways, guard rails, trucks, a lead vehicle at ego speed
+  kUrban,    ///< street with crossings; moving, parked and stopping vehicles; pedestrians
+  kHighway,  ///< fast traffic in both directions, guard rails, trucks, a vehicle ahead at ego speed
   kVegetation,  ///< dense trees and porous bushes, few movers
-  kCrowd,       ///< pedestrian zone: walkers in groups, along walls, standing ones who start
-  kStopAndGo,   ///< queues before, beside and behind the ego vehicle, which stops with them
+  kCrowd,       ///< pedestrian zone: groups, walkers along walls, standing people that start
+  kStopAndGo,   ///< queues ahead, beside and behind the ego vehicle, which stops as well
   kCanopy,      ///< movers below bridges, roofs and tree canopies
   kHill,        ///< slopes of up to 10 %, curved ground
   kCarPark,     ///< rows of parked cars, cars leaving and arriving, pedestrians between them
-  kStatic,      ///< the urban street without anything that moves, parked cars included
+  kStatic,      ///< urban street with parked cars and without moving objects
 };
 
-/// Beam pattern with its usual mounting height and range.
+/// Beam pattern with a typical mounting height and range.
 enum class Sensor {
   kHdl64,     ///< 64 beams in two blocks, +2 to -24.3 deg, 2083 columns
   kVlp16,     ///< 16 beams, +-15 deg, 1800 columns
@@ -33,24 +33,25 @@ enum class Sensor {
   kLivox,     ///< non-repetitive rosette, 70 deg cone forward, 30,000 beams a scan
 };
 
-/// Which points of an object that moves at some time count as moving.
+/// Rule for the moving labels of an object.
 enum class Labelling {
-  /// All, if within the sensor's range it is ever faster than 0.5 m/s, or ever half a metre from
-  /// where it was first: who creeps leaves a trail, too (SemanticKITTI).
+  /// All points of an object that, within the sensor's range, exceeds 0.5 m/s or is 0.5 m from its
+  /// first position at any time (SemanticKITTI).
   kEver,
-  kInstant,  ///< those of scans in which it moves faster than 0.5 m/s
+  kInstant,  ///< the points in scans at which the object is faster than 0.5 m/s
 };
 
-/// Names for files and command lines: "urban", "hdl64", "ever" ...
+/// Names of the enum values for files and command lines, for example "urban", "hdl64", "ever".
 const std::vector<std::string>& scene_names();
 const std::vector<std::string>& sensor_names();
 const std::vector<std::string>& labelling_names();
 
-/// Inverse of the names. Throw ConfigError that lists the known names.
+/// Enum values of names. They throw ConfigError with the list of valid names.
 Scene scene_from_name(const std::string& name);
 Sensor sensor_from_name(const std::string& name);
 Labelling labelling_from_name(const std::string& name);
 
+/// Parameters of one sequence. visit() gives their bounds.
 struct Config {
   Scene scene = Scene::kUrban;
   Sensor sensor = Sensor::kHdl64;
@@ -59,27 +60,28 @@ struct Config {
   int scans = 150;
   std::uint64_t seed = 1;
   double rate = 10.0;                   ///< scans per second
-  double ego_speed = -1.0;              ///< m/s; negative: usual for the scene
-  double traffic = 1.0;                 ///< ratio to the usual number of movers
-  double sensor_height = 0.0;           ///< m over ground; 0: usual for the sensor
-  double max_range = 0.0;               ///< m; 0: usual for the sensor
-  double mounting_pitch = 0.0;          ///< deg, positive looks down
+  double ego_speed = -1.0;              ///< m/s; negative: default of the scene
+  double traffic = 1.0;                 ///< ratio to the default number of moving objects
+  double sensor_height = 0.0;           ///< m above ground; 0: default of the sensor
+  double max_range = 0.0;               ///< m; 0: default of the sensor
+  double mounting_pitch = 0.0;          ///< deg, positive is nose down
   double mounting_roll = 0.0;           ///< deg
   double range_noise = 0.02;            ///< m, standard deviation
-  double dropout = 1.0;                 ///< scales all causes of lost returns; 0 loses none
+  double dropout = 1.0;                 ///< factor on the loss of returns; 0: no loss
   double pose_noise_translation = 0.0;  ///< m, standard deviation per axis and scan
   double pose_noise_rotation = 0.0;     ///< deg, standard deviation per axis and scan
-  bool ego_points = false;              ///< whether the roof below the sensor is seen
+  bool ego_points = false;              ///< whether scans contain the roof below the sensor
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
     visitor(Parameter{"scans", self.scans, closed(1, 1000000), "scans", "length of the sequence"});
-    visitor(Parameter{"seed", self.seed, Bounds{}, "", "another seed is another place"});
+    visitor(Parameter{"seed", self.seed, Bounds{}, "",
+                      "seed of the layout and the traffic of the scene"});
     visitor(Parameter{"rate", self.rate, closed(1, 50), "1/s", "scans per second"});
     visitor(Parameter{"ego_speed", self.ego_speed, closed(-1, 50), "m/s",
                       "cruising speed; negative: usual for the scene"});
     visitor(Parameter{"traffic", self.traffic, closed(0, 4), "",
-                      "number of movers relative to what is usual for the scene"});
+                      "ratio of the number of moving objects to the default of the scene"});
     visitor(Parameter{"sensor_height", self.sensor_height, closed(0, 10), "m",
                       "height of the sensor over ground; 0: usual for the sensor"});
     visitor(Parameter{"max_range", self.max_range, closed(0, 160), "m",
@@ -97,9 +99,10 @@ struct Config {
     visitor(Parameter{"pose_noise_rotation", self.pose_noise_rotation, closed(0, 45), "deg",
                       "standard deviation of the written poses, per axis"});
     visitor(Parameter{"ego_points", self.ego_points, Bounds{}, "",
-                      "whether the sensor sees the roof of its own vehicle"});
+                      "whether scans contain points on the roof of the ego vehicle"});
   }
 
+  /// Throws ConfigError for a field out of bounds.
   void validate() const { validate_parameters("simulation", *this); }
 };
 

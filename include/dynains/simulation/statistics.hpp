@@ -1,4 +1,4 @@
-// Statistics of scans, to compare simulated with real ones.
+// Statistics of scans, for the comparison of simulated and real scans.
 #pragma once
 
 #include <array>
@@ -10,29 +10,31 @@
 
 namespace dynains::simulation {
 
-/// Collects scan after scan.
+/// Accumulates statistics over scans.
 class ScanStatistics {
  public:
-  /// Outer limits of the range bins, m; the last bin is open.
+  /// Upper limits of the range bins, m. A further bin has no upper limit.
   static constexpr std::array<double, 6> kRangeLimits{5, 10, 20, 30, 50, 80};
-  /// Distances at which the points of a car are counted, within +-15 %, m.
+  /// Ranges for points_per_car(), m, with a tolerance of 15 %.
   static constexpr std::array<double, 3> kCarRanges{10, 20, 40};
 
-  /// `xyzi` interleaved, sensor frame, z about upwards; `labels` SemanticKITTI, or empty.
-  /// Throws CloudError if there are not as many labels as points.
+  /// Adds one scan. `xyzi`: interleaved, m, sensor frame, z approximately up. `labels`:
+  /// SemanticKITTI labels by point, or empty. Throws CloudError if the numbers of points and labels
+  /// differ.
   void add(Span<const float> xyzi, Span<const std::uint32_t> labels);
 
   double points_per_scan() const;
-  /// Share of all points in each range bin.
+  /// Ratio of points in each range bin, [0, 1].
   std::array<double, kRangeLimits.size() + 1> range_shares() const;
-  /// Share of points less than 0.2 m above the lowest point within about 1.5 m, where that lies
-  /// well below the sensor. Needs no labels, so it means the same on every recording.
+  /// Ratio of points less than 0.2 m above the lowest point within about 1.5 m, if that point lies
+  /// well below the sensor, [0, 1]. It does not use labels, so it is comparable between all
+  /// recordings.
   double ground_share() const;
-  /// Share of labelled points that are moving (classes 252 to 259).
+  /// Ratio of points with a moving class (252 to 259), [0, 1].
   double moving_share() const;
-  /// Median number of points of a car (10, 252) around each of kCarRanges; 0 if there is none.
+  /// Median number of points of a car (classes 10 and 252) at each of kCarRanges; 0 without cars.
   std::array<double, kCarRanges.size()> points_per_car() const;
-  /// Number of cars behind each median.
+  /// Number of cars in each median of points_per_car().
   std::array<std::size_t, kCarRanges.size()> cars() const;
 
  private:
