@@ -115,16 +115,16 @@ struct IsRevisable<Map, Evidence,
 
 /// Whether a stage has the optional members `needs_sensor()` and `adapt(const SensorModel&)`.
 template <class Stage, class = void>
-struct WantsSensor : std::false_type {};
+struct HasSensorMembers : std::false_type {};
 template <class Stage>
-struct WantsSensor<
+struct HasSensorMembers<
     Stage,
     std::enable_if_t<std::is_convertible_v<decltype(std::declval<Stage&>().adapt(SensorModel()),
                                                     std::declval<const Stage&>().needs_sensor()),
                                            bool>>> : std::true_type {};
 template <class Stage>
 bool needs_sensor(const Stage& stage) {
-  if constexpr (WantsSensor<Stage>::value) {
+  if constexpr (HasSensorMembers<Stage>::value) {
     return stage.needs_sensor();
   } else {
     return false;
@@ -132,7 +132,7 @@ bool needs_sensor(const Stage& stage) {
 }
 template <class Stage>
 void adapt_stage(Stage& stage, const SensorModel& sensor) {
-  if constexpr (WantsSensor<Stage>::value) stage.adapt(sensor);
+  if constexpr (HasSensorMembers<Stage>::value) stage.adapt(sensor);
 }
 
 /// Calls the optional member `reserve(std::size_t scans)` of a stage: memory for `scans` scans.
