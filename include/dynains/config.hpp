@@ -88,13 +88,13 @@ constexpr std::array<const char*, 3> value_names(Decision) {
 
 /// Observations of a cluster that update its belief sequentially (Eq. 15, 16).
 enum class BeliefObservations {
-  kSequence,  ///< observations 2 to K, each compared with the cluster up to that observation
   kNewest,    ///< only the newest observation, compared with the whole cluster
+  kSequence,  ///< observations 2 to K, each compared with the cluster up to that observation
   kAll,       ///< all observations, each compared with the whole cluster
 };
 
 constexpr std::array<const char*, 3> value_names(BeliefObservations) {
-  return {"sequence", "newest", "all"};
+  return {"newest", "sequence", "all"};
 }
 
 /// Parameters of BasicDynaInsRemover itself. visit() gives their meaning and bounds.
@@ -102,7 +102,7 @@ struct RemoverConfig {
   Decision decision = Decision::kFreeSpace;
   int window = 4;          ///< scans, K of Eq. 3
   bool use_belief = true;  ///< Eq. 13-19
-  BeliefObservations belief_observations = BeliefObservations::kSequence;
+  BeliefObservations belief_observations = BeliefObservations::kNewest;
   int votes = 1;           ///< number of windows
   double min_range = 2.7;  ///< m, in the sensor's x-y plane
   double max_range = 250;  ///< m, in the sensor's x-y plane, and along its z axis
@@ -133,9 +133,9 @@ struct RemoverConfig {
                       "revert proposals of the window by belief (Eq. 13-19); false: the IOC-only "
                       "variant of the paper"});
     visitor(Parameter{"belief_observations", self.belief_observations, Bounds(), "",
-                      "observations that update the belief (Eq. 15, 16); sequence: the second to "
-                      "the newest, each compared with the cluster up to that observation; newest: "
-                      "only the newest, compared with the whole cluster; all: all observations, "
+                      "observations that update the belief (Eq. 15, 16); newest: only the newest, "
+                      "compared with the whole cluster; sequence: the second to the newest, each "
+                      "compared with the cluster up to that observation; all: all observations, "
                       "each compared with the whole cluster"});
     visitor(Parameter{"votes", self.votes, closed(0, 64), "windows",
                       "windows that must call a point dynamic for the final verdict; 0: the newest "
