@@ -1,6 +1,6 @@
-// Free-space evidence: a point is dynamic if beams of other scans pass through its position. The
-// evidence consists of single points; instances define the points that are removed together. Goes
-// beyond the paper, with beliefs in the form of Eq. 15-19.
+// Free-space evidence: a point is dynamic if beams of other scans pass through its position. Free
+// space identifies single dynamic points; instances define the points that are removed together.
+// Goes beyond the paper, with beliefs in the form of Eq. 15-19.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -87,11 +87,11 @@ class MovedGround {
   using Verdict = EvidenceVerdict::Group;
 
   explicit MovedGround(const FreeSpaceConfig& config)
-      : takes_footprint_(config.footprint > 0.0),
-        tests_(config.ground_test_distance > 0.0),
+      : removes_footprint_(config.footprint > 0.0),
+        tests_ground_(config.ground_test_distance > 0.0),
         rise_(static_cast<float>(config.footprint_rise)),
         belief_(static_cast<float>(config.tau_free)),
-        footprint_(takes_footprint_ ? std::max(config.footprint, kLeastCell) : kDefaultCell,
+        footprint_(removes_footprint_ ? std::max(config.footprint, kLeastCell) : kDefaultCell,
                    std::max({config.ground_test_distance, config.footprint, 0.5}),
                    config.evidence_range),
         around_(config.evidence_range),
@@ -111,7 +111,7 @@ class MovedGround {
 
   /// Adds the area below a compact instance. `points`: its samples, at least one.
   void add_hull(PointsView points) {
-    if (!takes_footprint_) return;
+    if (!removes_footprint_) return;
     const float lowest = *std::min_element(points.z.begin(), points.z.end());
     hull_.visit(points, [&](float x, float y) { footprint_.add(x, y, lowest); });
   }
@@ -156,9 +156,9 @@ class MovedGround {
     under_.clear();
     footprint_.visit_near(ground, boxes, clearance_,
                           [&](std::size_t begin, std::uint64_t near, std::uint64_t below) {
-                            const std::uint64_t under = takes_footprint_ ? below : 0;
+                            const std::uint64_t under = removes_footprint_ ? below : 0;
                             if (under != 0) under_.push_back({begin, under});
-                            if (tests_) add_tested(ground, begin, near & ~under);
+                            if (tests_ground_) add_tested(ground, begin, near & ~under);
                           });
     remove_under(ground);
     if (tested_ > 0) test(for_each_reference);
@@ -277,8 +277,8 @@ class MovedGround {
     }
   }
 
-  bool takes_footprint_;
-  bool tests_;
+  bool removes_footprint_;
+  bool tests_ground_;
   float rise_;
   float belief_;
   GroundFootprint footprint_;

@@ -26,16 +26,16 @@ namespace dynains {
 inline constexpr std::array<int, 19> kReferenceLags = {2,  4,  6,  8,  10,  13,  16,  20,  25, 30,
                                                        40, 50, 65, 80, 100, 125, 150, 175, 200};
 
-/// The lags (scans) of kReferenceLags up to `most`, rounded up to lags with lag % step ==
-/// remainder, or down where the result would exceed `most`. Ascending and unique. `remainder`: [0,
-/// `step`].
+/// The lags (scans) of kReferenceLags up to `most`, each rounded up to a lag with lag % step ==
+/// remainder; a result above `most` is rounded down instead. Ascending and unique. `remainder`: in
+/// [0, `step`].
 inline std::vector<int> reference_lags(int most, int remainder, int step) {
-  const auto behind = [&](int lag) { return ((remainder - lag) % step + step) % step; };
-  const int last = most >= 0 ? most + behind(most) - (behind(most) > 0 ? step : 0) : 0;
+  const auto to_next = [&](int lag) { return ((remainder - lag) % step + step) % step; };
+  const int last = most >= 0 ? most + to_next(most) - (to_next(most) > 0 ? step : 0) : 0;
   std::vector<int> lags;
-  for (const int wanted : kReferenceLags) {
-    if (wanted >= most + step) break;
-    const int lag = std::min(wanted + behind(wanted), last);
+  for (const int reference_lag : kReferenceLags) {
+    if (reference_lag >= most + step) break;
+    const int lag = std::min(reference_lag + to_next(reference_lag), last);
     if (lag > (lags.empty() ? 0 : lags.back())) lags.push_back(lag);
   }
   return lags;
@@ -86,6 +86,7 @@ class ReferenceScans {
     }
   }
 
+  /// Invalidates all references.
   void forget() {
     for (ReferenceScan& reference : references_) reference.epoch = ReferenceScan::kNoEpoch;
   }
@@ -124,8 +125,8 @@ class ReferenceScans {
   bool awaits_image() const { return newest().epoch == ReferenceScan::kNoEpoch; }
   const ReferenceScan& newest() const { return references_[images_ % references_.size()]; }
 
-  /// The reference `lag` scans after a scan (before it, if negative); null if there is none. `at`:
-  /// of that scan; at.since_image + lag is a multiple of the step.
+  /// The reference `lag` scans after scan number `scan` (before it for a negative lag); null if
+  /// there is none. `at`: phase of `scan`; at.since_image + lag is a multiple of the step.
   const ReferenceScan* find(std::uint64_t scan, std::uint64_t epoch, const ReferencePhase& at,
                             int lag) const {
     const auto signed_step = static_cast<std::int64_t>(step_);
@@ -133,8 +134,8 @@ class ReferenceScans {
     const std::uint64_t image =
         at.image + static_cast<std::uint64_t>(to_image / signed_step);  // exact
     const ReferenceScan& reference = references_[image % references_.size()];
-    const std::uint64_t wanted = scan + static_cast<std::uint64_t>(std::int64_t{lag});
-    return reference.scan == wanted && reference.epoch == epoch ? &reference : nullptr;
+    const std::uint64_t reference_scan = scan + static_cast<std::uint64_t>(std::int64_t{lag});
+    return reference.scan == reference_scan && reference.epoch == epoch ? &reference : nullptr;
   }
 
   /// Visibility of the first `count` points (m; padded for packs) from a reference. The result is

@@ -332,7 +332,7 @@ class LevelFrame {
   /// `level`: whether scans are rotated to the level frame. `pitch`, `roll`: tilt of the mounting,
   /// deg, as in up_of_mounting(); if both are 0, estimate() estimates the tilt.
   LevelFrame(bool level, double pitch, double roll)
-      : is_wanted_(level),
+      : is_enabled_(level),
         is_tilt_given_(pitch != 0.0 || roll != 0.0),
         up_given_(up_of_mounting(pitch, roll)) {}
 
@@ -340,20 +340,20 @@ class LevelFrame {
   const SensorModel& sensor() const { return sensor_; }
 
   /// Whether the caller rotates scans by sensor().R_level_sensor().
-  bool rotates_scans() const { return sensor_.known() && is_wanted_; }
+  bool rotates_scans() const { return sensor_.known() && is_enabled_; }
 
   /// Estimates the sensor model from a scan (m, sensor frame). The model is unchanged if the scan
   /// has too few points.
   void estimate(PointsView scan) {
     Eigen::Matrix3d R_headed_sensor = Eigen::Matrix3d::Identity();
-    if (is_wanted_) R_headed_sensor = R_headed(estimate_heading(scan));
+    if (is_enabled_) R_headed_sensor = R_headed(estimate_heading(scan));
     PointBuffer headed;
     const PointsView points = rotate(scan, R_headed_sensor, headed);
     SensorModel sensor = estimate_sensor_model(points);
     if (!sensor.known()) return;
     const Mounting mounting = estimate_mounting(points);
     if (mounting.known) sensor.height = mounting.height;
-    if (is_wanted_) {
+    if (is_enabled_) {
       sensor.R_headed_sensor = R_headed_sensor;
       sensor.R_level_headed = R_level_headed(mounting, R_headed_sensor);
     }
@@ -374,7 +374,7 @@ class LevelFrame {
                                                       : Eigen::Matrix3d::Identity();
   }
 
-  bool is_wanted_;
+  bool is_enabled_;
   bool is_tilt_given_;
   Eigen::Vector3d up_given_;  // normal of the ground, sensor frame
   SensorModel sensor_;
