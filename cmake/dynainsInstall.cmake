@@ -45,7 +45,7 @@ if(TARGET dynains_program)
     RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT dynains_program)
 endif()
 
-# Shared libraries find each other, and the program finds them, after the tree was moved.
+# Programs and shared libraries find the shared libraries after the tree was moved.
 if(BUILD_SHARED_LIBS AND NOT DEFINED CMAKE_INSTALL_RPATH)
   foreach(component IN LISTS dynains_components)
     set_target_properties(dynains_${component} PROPERTIES INSTALL_RPATH "$ORIGIN")

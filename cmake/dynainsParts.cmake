@@ -1,11 +1,11 @@
-# Which optional parts are built. Each part has an option with three values:
+# Optional parts. Each part has an option with three values:
 #   AUTO   build the part if this is the top-level project and all needs of the part are found
 #   ON     build the part; a missing need is an error
 #   OFF    leave the part out
 # The result is dynains_has_<part>. One status line for each part names what is missing.
 
-# dynains_part(<part> <option> <description> <need>...); a need is written package=debian-package. A
-# macro, because packages set variables for the folder that looks for them.
+# dynains_part(<part> <option> <description> <need>...); a need is written package=debian-package.
+# This is a macro, because packages set variables in the scope of the caller.
 macro(dynains_part part option description)
   if(NOT DEFINED ${option})
     set(${option} AUTO CACHE STRING "Build the ${description}: AUTO, ON or OFF")
@@ -60,8 +60,8 @@ else()
   dynains_part(evaluation DYNAINS_BUILD_COMPONENTS "evaluation component" ${json})
 endif()
 
-# dynains_log_library(<name> <header> <description>): a library that some logs of ROS need, found
-# without a file of CMake or pkg-config. Debian calls its package lib<name>-dev.
+# dynains_log_library(<name> <header> <description>): a library that some logs of ROS need. It has
+# no CMake package or pkg-config file. Its Debian package is lib<name>-dev.
 macro(dynains_log_library name header description)
   string(TOUPPER ${name} upper_name)
   find_library(DYNAINS_${upper_name}_LIBRARY ${name})
@@ -87,5 +87,5 @@ endif()
 dynains_part(tests DYNAINS_BUILD_TESTS "tests" Catch2=catch2)
 dynains_part(examples DYNAINS_BUILD_EXAMPLES "examples")
 
-# Folders of src/ and include/dynains/ that belong to one compiled component each.
+# Folders of src/ and include/dynains/ that form one compiled component each.
 set(dynains_component_folders io evaluation simulation)

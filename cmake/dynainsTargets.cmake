@@ -1,4 +1,4 @@
-# How this project builds its own targets. Nothing here reaches a consumer.
+# Compiler settings of the project's own targets. They have no effect on consumers.
 
 option(DYNAINS_WARNINGS_AS_ERRORS "Refuse warnings in our own targets" OFF)
 
@@ -13,7 +13,7 @@ option(DYNAINS_BUILD_FUZZERS "Build the fuzzers (libFuzzer, Clang), with ASan an
 
 set(dynains_warnings -Wall -Wextra -Wpedantic -Wconversion -Wshadow)
 
-# What code that links our instrumented targets has to be compiled and linked with as well.
+# Flags to compile and link all code that uses instrumented targets.
 set(dynains_instrumentation "")
 if(dynains_top_level AND DYNAINS_SANITIZE)
   string(REPLACE ";" "," dynains_sanitizers "${DYNAINS_SANITIZE}")
@@ -21,7 +21,7 @@ if(dynains_top_level AND DYNAINS_SANITIZE)
     -fsanitize=${dynains_sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer)
 endif()
 if(dynains_top_level AND DYNAINS_COVERAGE)
-  # Atomic: counts that threads tear come out negative, which gcovr takes for a broken file.
+  # Atomic: races between threads can make counts negative, and gcovr then refuses the file.
   list(APPEND dynains_instrumentation --coverage -fprofile-update=atomic)
 endif()
 
@@ -30,32 +30,32 @@ if(dynains_top_level AND DYNAINS_BUILD_FUZZERS)
     -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
 endif()
 
-# Strict warnings, and no fused multiply-add: the same bits from every compiler.
+# Strict warnings. Without fused multiply-add, all compilers give equal bits.
 function(dynains_own_target target)
   target_compile_features(${target} PRIVATE cxx_std_17)
   target_compile_options(${target} PRIVATE
     ${dynains_warnings} -ffp-contract=off
     $<$<BOOL:${DYNAINS_WARNINGS_AS_ERRORS}>:-Werror>
     ${dynains_instrumentation}
-    # Checked operator[], iterators and preconditions of libstdc++; same layout as without.
+    # Checked operator[], iterators and preconditions of libstdc++, with unchanged layout.
     $<$<CONFIG:Debug>:-D_GLIBCXX_ASSERTIONS>
-    # Optimized enough to run the whole suite, yet lines stay apart.
+    # Fast enough to run the whole suite, and each line keeps its own count.
     $<$<AND:$<BOOL:${dynains_top_level}>,$<BOOL:${DYNAINS_COVERAGE}>>:-O1>)
   target_link_options(${target} PRIVATE ${dynains_instrumentation})
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)
 endfunction()
 
-# dynains_quick_target(<name>): one of ours that is not optimized as much as it could be: as fast as a
-# test or an example needs, in less time. What is tested of optimized code is tested by the facade
-# that tests share and by programs (core_contraction, reliability, program).
+# dynains_quick_target(<name>): a target of this project that compiles quickly, with less
+# optimization: tests and examples. Tests of fully optimized code use the shared facade and programs
+# (core_contraction, reliability, program).
 function(dynains_quick_target name)
   dynains_own_target(${name})
   target_compile_options(${name} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1>)
 endfunction()
 
 # A compiled component: library dynains_<name>, alias and export name dynains::<name>. Its public
-# headers live in include/dynains/<name>. Whatever it links as Package::target is found again by
-# the package's config file (see dynainsInstall.cmake).
+# headers are in include/dynains/<name>. The config file of the package finds again all libraries
+# that it links as Package::target (see dynainsInstall.cmake).
 function(dynains_component name)
   add_library(dynains_${name} ${ARGN})
   add_library(dynains::${name} ALIAS dynains_${name})
@@ -67,8 +67,8 @@ function(dynains_component name)
   set_property(GLOBAL APPEND PROPERTY DYNAINS_COMPONENTS ${name})
 endfunction()
 
-# dynains_private_headers(<target> <library>...): header-only libraries used in source files only.
-# Unlike a link, this leaves no trace in the exported target: consumers need not have them.
+# dynains_private_headers(<target> <library>...): header-only libraries for source files only. In
+# contrast to a link, they do not appear in the exported target, and consumers do not need them.
 function(dynains_private_headers target)
   foreach(library IN LISTS ARGN)
     target_include_directories(${target} SYSTEM PRIVATE

@@ -1,9 +1,9 @@
-// Scans as plain arrays in, labels and a static map out.
+// Input: scans as plain arrays. Output: labels and a static map.
 #include <cstdio>
 #include <dynains/remover.hpp>
 #include <vector>
 
-// In place of your driver: a wall 10 m ahead, and a box that moves to the left at 5 m/s.
+// Replaces a driver: a wall 10 m ahead, and a box that moves to the left at 5 m/s.
 std::vector<float> read_scan(int i) {
   std::vector<float> xyzi;  // x y z intensity
   for (float y = -5.0F; y < 5.0F; y += 0.05F) {

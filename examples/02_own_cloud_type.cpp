@@ -1,4 +1,4 @@
-// Your own cloud type goes in as it is: tell dynains how many points it has and where they are.
+// A cloud type of your own: CloudTraits gives dynains the number of points and their coordinates.
 #include <cstdio>
 #include <dynains/remover.hpp>
 #include <vector>

@@ -1,10 +1,10 @@
-// Swap a stage: a ground segmentation of your own, everything else as it is.
+// Replaces one stage: a ground segmentation of your own with all other stages unchanged.
 #include <algorithm>
 #include <cstdio>
 #include <dynains/dyna_ins_remover.hpp>
 #include <vector>
 
-// For flat halls: points below a threshold are the floor.
+// For flat halls: points below a threshold are floor.
 class FloorByHeight {
  public:
   struct Config {
@@ -20,7 +20,7 @@ class FloorByHeight {
 
   explicit FloorByHeight(const Config& config) : config_(config) {}
 
-  // Ground first, everything else behind, each point with its number in the input.
+  // Ground first, all others after it, each point with its index in the input.
   void segment(dynains::PointsView scan, dynains::Span<const std::uint32_t> input,
                dynains::GroundSplit& split) const {
     split.resize(scan.size());

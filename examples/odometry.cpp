@@ -1,6 +1,6 @@
-// A LiDAR odometry, complete and small: point-to-plane registration of each scan to a map of the
-// scans before. It drives through a simulated street twice, once with all points and once without
-// those that dynains labels as dynamic, and compares the drift with the true poses.
+// A small but complete LiDAR odometry: point-to-plane registration of each scan to a map of earlier
+// scans. It drives through a simulated street twice, once with all points and once without the
+// points that dynains labels as dynamic, and compares the drift with the true poses.
 //
 //   example_odometry [scene] [sensor] [scans] [seed]
 //
@@ -19,7 +19,7 @@
 
 using Points = std::vector<Eigen::Vector3d>;
 
-// One point per voxel of `edge` m: the first.
+// Keeps the first point of each voxel of `edge` m.
 Points thin_out(const Points& points, double edge) {
   std::map<std::array<int, 3>, Eigen::Vector3d> voxels;
   for (const Eigen::Vector3d& p : points) {
@@ -31,10 +31,10 @@ Points thin_out(const Points& points, double edge) {
   return result;
 }
 
-// Points around the sensor, world frame, with a search tree.
+// Points around the sensor in the world frame, with a search tree.
 class LocalMap {
  public:
-  // nanoflann's view of the points.
+  // Interface for nanoflann.
   std::size_t kdtree_get_point_count() const { return points_.size(); }
   double kdtree_get_pt(std::size_t i, std::size_t k) const {
     return points_[i][static_cast<Eigen::Index>(k)];
@@ -55,7 +55,8 @@ class LocalMap {
     tree_.buildIndex();
   }
 
-  // A plane through the neighbours of `p`: unit normal and signed distance of `p`, or false.
+  // Fits a plane to the neighbours of `p`: unit normal and signed distance of `p`. False if it
+  // fails.
   bool plane_at(const Eigen::Vector3d& p, Eigen::Vector3d& normal, double& distance) const {
     constexpr std::size_t kNeighbours = 8;
     constexpr double kFarthest = 1.5;   // m
@@ -87,10 +88,10 @@ class LocalMap {
   nanoflann::KDTreeSingleIndexAdaptor<Distance, LocalMap, 3, std::size_t> tree_{3, *this};
 };
 
-// Gauss-Newton on point-to-plane distances, from a guess.
+// Gauss-Newton on point-to-plane distances, from an initial pose.
 Eigen::Isometry3d align(const Points& scan, const LocalMap& map, Eigen::Isometry3d T_world_sensor) {
   constexpr int kIterations = 20;
-  constexpr double kScale = 0.2;  // m; farther planes count less (Geman-McClure)
+  constexpr double kScale = 0.2;  // m; larger distances have less weight (Geman-McClure)
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Identity() * 1e-6;
     Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
@@ -145,8 +146,8 @@ Drift drive(const dynains::simulation::Config& street, bool remove_what_moves) {
   for (std::size_t i = 0; i < simulator.size(); ++i) {
     const dynains::simulation::SimulatedScan scan = simulator.scan(i);
 
-    // 1. Predict at constant velocity, and register everything: the window of the remover needs a
-    // pose that is good to a few centimetres, which a mere prediction is not while speeds change.
+    // 1. Predict at constant velocity, and register all points: the window of the remover needs an
+    // error of a few centimetres. A prediction alone is worse while the speed changes.
     Eigen::Isometry3d T_world_sensor = T_world_last * T_last_newest;
     Points points = points_of(scan);
     if (!map.empty()) T_world_sensor = align(thin_out(points, 1.0), map, T_world_sensor);
@@ -162,12 +163,12 @@ Drift drive(const dynains::simulation::Config& street, bool remove_what_moves) {
       drift.removed += static_cast<double>(points.size() - still.size());
       points = still;
 
-      // 3. Register the rest from there.
+      // 3. Register the remaining points, starting from that pose.
       if (!map.empty()) T_world_sensor = align(thin_out(points, 1.0), map, T_world_sensor);
     }
     drift.kept += static_cast<double>(points.size());
 
-    // 4. Insert the rest into the map.
+    // 4. Insert the remaining points into the map.
     Points in_world = thin_out(points, 0.4);
     for (Eigen::Vector3d& p : in_world) p = T_world_sensor * p;
     map.insert(in_world, T_world_sensor.translation());

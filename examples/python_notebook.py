@@ -1,4 +1,4 @@
-# %% A crowd in ten lines: moving points leave a simulated street.
+# %% A crowd in ten lines: removes the moving points of a simulated street.
 import dynains
 
 street = dynains.Simulator("crowd", "os1-64", scans=20)  # or your own arrays

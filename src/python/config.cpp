@@ -3,9 +3,45 @@
 #include "parameters.hpp"
 
 namespace dynains::python {
+namespace {
+
+using Config = DynaInsRemover::Config;
+
+py::list list_parameters() {
+  py::list result;
+  const Config defaults;
+  Config::visit_sections(defaults, [&](const char* section, const auto& fields) {
+    std::decay_t<decltype(fields)>::visit(fields, [&](const auto& parameter) {
+      py::dict entry;
+      entry["name"] = parameter.name;
+      entry["section"] = section;
+      entry["default"] = value_of(parameter);
+      entry["min"] = parameter.bounds.min;
+      entry["max"] = parameter.bounds.max;
+      entry["values"] = values_of(parameter);
+      entry["unit"] = parameter.unit;
+      entry["help"] = parameter.help;
+      result.append(entry);
+    });
+  });
+  return result;
+}
+
+std::string represent(const Config& config) {
+  const py::dict defaults = to_dict(Config());
+  std::string text = "dynains.Config(";
+  const char* separator = "";
+  for (const auto& [name, value] : to_dict(config)) {
+    if (value.equal(defaults[name])) continue;
+    text += separator + name.cast<std::string>() + '=' + py::repr(value).cast<std::string>();
+    separator = ", ";
+  }
+  return text + ')';
+}
+
+}  // namespace
 
 void bind_config(py::module_& module) {
-  using Config = DynaInsRemover::Config;
   py::class_<Config> config(module, "Config",
                             "All parameters by name: Config(window=6), config.tau_s = 0.5. Bounds "
                             "are checked at once; Config.parameters() lists everything.");
@@ -27,28 +63,8 @@ void bind_config(py::module_& module) {
   add_former_names(config);
   config.def("to_dict", &to_dict<Config>, "Values by name.");
   config.def("validate", &Config::validate, "Raises ConfigError if parameters contradict.");
-  config.def_static(
-      "parameters",
-      [] {
-        py::list result;
-        const Config defaults;
-        Config::visit_sections(defaults, [&](const char* section, const auto& fields) {
-          std::decay_t<decltype(fields)>::visit(fields, [&](const auto& parameter) {
-            py::dict entry;
-            entry["name"] = parameter.name;
-            entry["section"] = section;
-            entry["default"] = value_of(parameter);
-            entry["min"] = parameter.bounds.min;
-            entry["max"] = parameter.bounds.max;
-            entry["values"] = values_of(parameter);
-            entry["unit"] = parameter.unit;
-            entry["help"] = parameter.help;
-            result.append(entry);
-          });
-        });
-        return result;
-      },
-      "Name, section, default, bounds or values, unit and help of every parameter.");
+  config.def_static("parameters", &list_parameters,
+                    "Name, section, default, bounds or values, unit and help of every parameter.");
   config.def(
       "__eq__", [](const Config& a, const Config& b) { return to_dict(a).equal(to_dict(b)); },
       py::is_operator());  // with anything else: not equal
@@ -58,17 +74,7 @@ void bind_config(py::module_& module) {
                           assign_all(result, values);
                           return result;
                         }));
-  config.def("__repr__", [](const Config& self) {
-    const py::dict defaults = to_dict(Config());
-    std::string text = "dynains.Config(";
-    const char* separator = "";
-    for (const auto& [name, value] : to_dict(self)) {
-      if (value.equal(defaults[name])) continue;
-      text += separator + name.cast<std::string>() + '=' + py::repr(value).cast<std::string>();
-      separator = ", ";
-    }
-    return text + ')';
-  });
+  config.def("__repr__", &represent);
 }
 
 }  // namespace dynains::python

@@ -81,55 +81,55 @@ void BeamTable::add(double azimuth, double cos_elevation, double sin_elevation, 
   cells_.push_back(static_cast<std::uint32_t>(row * kColumns + column_of(azimuth)));
 }
 
-void BeamTable::fill(const SensorModel& model, std::uint64_t seed, std::size_t scan) {
-  unordered_.clear();
-  cells_.clear();
-  if (model.elevations.empty()) {
-    // Two mirrors with incommensurate speeds: petals that precess from scan to scan.
-    const double opening = 35 * kDegree;
-    const double first = static_cast<double>(scan) * model.columns;
+// Two mirrors with incommensurate speeds: petals that precess from scan to scan.
+void BeamTable::add_rosette(const SensorModel& model, std::size_t scan) {
+  const double opening = 35 * kDegree;
+  const double first = static_cast<double>(scan) * model.columns;
+  for (int i = 0; i < model.columns; ++i) {
+    const double t = (first + i) / model.columns;
+    const double petal = 2 * kPi * (t * 61.6180339887 - std::floor(t * 61.6180339887));
+    const double spin = 2 * kPi * (t * 17.4142135624 - std::floor(t * 17.4142135624));
+    const double angle = opening * std::cos(petal);
+    const double y = std::sin(angle) * std::cos(spin), z = std::sin(angle) * std::sin(spin);
+    const double elevation = std::asin(z);
+    add(std::atan2(y, std::cos(angle)), std::sqrt(1 - z * z), z, row_of(elevation));
+  }
+}
+
+void BeamTable::add_rings(const SensorModel& model, std::uint64_t seed, std::size_t scan) {
+  const double step = 2 * kPi / model.columns;
+  const double phase = static_cast<double>(unit_float(mix(mix(seed, 11), scan)));
+  Random calibration(mix(seed, 12));
+  // Trigonometry once per column and ring.
+  std::vector<double> sines, cosines;
+  for (int i = 0; i < model.columns; ++i) {
+    const double azimuth = kPi - step * (i + phase);
+    sines.push_back(std::sin(azimuth));
+    cosines.push_back(std::cos(azimuth));
+  }
+  for (const double nominal : model.elevations) {
+    const double elevation = nominal + 0.03 * kDegree * calibration.normal();
+    const double turn = 0.5 * step * calibration.normal();
+    const double c = std::cos(elevation), s = std::sin(elevation);
+    const double cos_turn = std::cos(turn), sin_turn = std::sin(turn);
+    const int row = row_of(elevation);
     for (int i = 0; i < model.columns; ++i) {
-      const double t = (first + i) / model.columns;
-      const double petal = 2 * kPi * (t * 61.6180339887 - std::floor(t * 61.6180339887));
-      const double spin = 2 * kPi * (t * 17.4142135624 - std::floor(t * 17.4142135624));
-      const double angle = opening * std::cos(petal);
-      const double y = std::sin(angle) * std::cos(spin), z = std::sin(angle) * std::sin(spin);
-      const double elevation = std::asin(z);
-      add(std::atan2(y, std::cos(angle)), std::sqrt(1 - z * z), z, row_of(elevation));
-    }
-  } else {
-    const double step = 2 * kPi / model.columns;
-    const double phase = static_cast<double>(unit_float(mix(mix(seed, 11), scan)));
-    Random calibration(mix(seed, 12));
-    // Trigonometry once per column and ring.
-    std::vector<double> sines, cosines;
-    for (int i = 0; i < model.columns; ++i) {
-      const double azimuth = kPi - step * (i + phase);
-      sines.push_back(std::sin(azimuth));
-      cosines.push_back(std::cos(azimuth));
-    }
-    for (const double nominal : model.elevations) {
-      const double elevation = nominal + 0.03 * kDegree * calibration.normal();
-      const double turn = 0.5 * step * calibration.normal();
-      const double c = std::cos(elevation), s = std::sin(elevation);
-      const double cos_turn = std::cos(turn), sin_turn = std::sin(turn);
-      const int row = row_of(elevation);
-      for (int i = 0; i < model.columns; ++i) {
-        const auto k = static_cast<std::size_t>(i);
-        const double azimuth = kPi - step * (i + phase) + turn;
-        const double x = cosines[k] * cos_turn - sines[k] * sin_turn;
-        const double y = sines[k] * cos_turn + cosines[k] * sin_turn;
-        unordered_.push_back(
-            {static_cast<float>(c * x), static_cast<float>(c * y), static_cast<float>(s)});
-        const double wrapped = azimuth < -kPi   ? azimuth + 2 * kPi
-                               : azimuth >= kPi ? azimuth - 2 * kPi
-                                                : azimuth;
-        cells_.push_back(static_cast<std::uint32_t>(row * kColumns + column_of(wrapped)));
-      }
+      const auto k = static_cast<std::size_t>(i);
+      const double azimuth = kPi - step * (i + phase) + turn;
+      const double x = cosines[k] * cos_turn - sines[k] * sin_turn;
+      const double y = sines[k] * cos_turn + cosines[k] * sin_turn;
+      unordered_.push_back(
+          {static_cast<float>(c * x), static_cast<float>(c * y), static_cast<float>(s)});
+      const double wrapped = azimuth < -kPi   ? azimuth + 2 * kPi
+                             : azimuth >= kPi ? azimuth - 2 * kPi
+                                              : azimuth;
+      cells_.push_back(static_cast<std::uint32_t>(row * kColumns + column_of(wrapped)));
     }
   }
+}
 
-  // Counting sort by cell, stable.
+// Counting sort, stable.
+void BeamTable::sort_by_cell() {
   first_.assign(grid_index(kRows, 0, kColumns) + 1, 0);
   for (const std::uint32_t cell : cells_) ++first_[cell + 1];
   for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
@@ -141,6 +141,17 @@ void BeamTable::fill(const SensorModel& model, std::uint64_t seed, std::size_t s
     directions_[slot] = unordered_[i];
     slot_of_beam_[i] = slot;
   }
+}
+
+void BeamTable::fill(const SensorModel& model, std::uint64_t seed, std::size_t scan) {
+  unordered_.clear();
+  cells_.clear();
+  if (model.elevations.empty()) {
+    add_rosette(model, scan);
+  } else {
+    add_rings(model, seed, scan);
+  }
+  sort_by_cell();
 }
 
 }  // namespace dynains::simulation

@@ -51,6 +51,9 @@ class BeamTable {
 
  private:
   void add(double azimuth, double cos_elevation, double sin_elevation, int row);
+  void add_rosette(const SensorModel& model, std::size_t scan);
+  void add_rings(const SensorModel& model, std::uint64_t seed, std::size_t scan);
+  void sort_by_cell();
 
   std::vector<Vec3> unordered_;
   std::vector<std::uint32_t> cells_;

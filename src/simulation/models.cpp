@@ -47,6 +47,73 @@ void add_wheels(Model& model, double front, double rear, double width, double ra
   }
 }
 
+/// `shape` in [0, 1): how far the rear end of the cabin lies from the rear of the car.
+void add_car(Model& model, const Size& size, const Material& paint, double shape) {
+  const double l = size.length / 2, w = size.width / 2, h = size.height;
+  const double belt = 0.62 * h, floor = 0.22;
+  model.push_back(make_tapered_box(paint, vec(0, 0, (floor + belt) / 2),
+                                   vec(l, w, (belt - floor) / 2), 0.12F, 0.05F));
+  // The cabin leans inwards; estates keep it to the rear.
+  const double cabin_rear = -l + 0.1 + 0.5 * shape, cabin_front = 0.45 * l;
+  model.push_back(make_tapered_box(
+      materials::kGlass, vec((cabin_rear + cabin_front) / 2, 0, (belt + h - 0.06) / 2),
+      vec((cabin_front - cabin_rear) / 2, w - 0.06, (h - 0.06 - belt) / 2), 0.42F, 0.14F));
+  model.push_back(
+      block(paint, cabin_rear + 0.42, cabin_front - 0.42, -w + 0.2, w - 0.2, h - 0.07, h));
+  // Roof pillars stop the glass from being all there is.
+  for (const double side : {-1.0, 1.0}) {
+    model.push_back(block(paint, cabin_rear + 0.25, cabin_rear + 0.55, side * (w - 0.14) - 0.04,
+                          side * (w - 0.14) + 0.04, belt, h - 0.05));
+    model.push_back(
+        block(paint, 0.0, 0.1, side * (w - 0.13) - 0.04, side * (w - 0.13) + 0.04, belt, h - 0.05));
+    model.push_back(block(paint, 0.35 * l, 0.35 * l + 0.15, side * (w + 0.07) - 0.07,
+                          side * (w + 0.07) + 0.07, belt - 0.05, belt + 0.1));
+  }
+  add_wheels(model, 0.62 * l, -0.62 * l, size.width, 0.31);
+}
+
+void add_van(Model& model, const Size& size, const Material& paint) {
+  const double l = size.length / 2, w = size.width / 2, h = size.height;
+  model.push_back(block(paint, -l, 0.55 * l, -w, w, 0.3, h));
+  model.push_back(
+      make_tapered_box(paint, vec(0.75 * l, 0, 0.75), vec(0.25 * l, w, 0.45), 0.05F, 0.03F));
+  model.push_back(make_tapered_box(materials::kGlass, vec(0.62 * l, 0, (1.2 + h) / 2),
+                                   vec(0.2 * l, w - 0.03, (h - 1.2) / 2), 0.3F, 0.08F));
+  add_wheels(model, 0.6 * l, -0.6 * l, size.width, 0.34);
+}
+
+/// `shape` in [0, 1): a box body below 0.75, a loaded platform above.
+void add_truck(Model& model, const Size& size, const Material& paint, double shape) {
+  const double l = size.length / 2, w = size.width / 2, h = size.height;
+  const double cab = l - 2.0;
+  model.push_back(block(paint, cab + 0.2, l, -w, w, 0.6, 0.62 * h));
+  model.push_back(
+      block(materials::kGlass, l - 0.15, l + 0.01, -w + 0.15, w - 0.15, 0.62 * h, 0.82 * h));
+  model.push_back(block(paint, cab + 0.2, l - 0.1, -w, w, 0.62 * h, 0.88 * h));
+  if (shape < 0.75) {
+    model.push_back(block(materials::kBrightPaint, -l, cab, -w, w, 1.1, h));
+  } else {
+    model.push_back(block(paint, -l, cab, -w, w, 1.0, 1.25));
+    model.push_back(make_tapered_box(materials::kStreetFurniture, vec(-0.2 * l, 0, 1.9),
+                                     vec(0.6 * l, w - 0.1, 0.65), 0.5F, 0.3F));
+  }
+  model.push_back(block(materials::kTyre, -l + 0.3, cab, -0.45, 0.45, 0.6, 1.0));
+  add_wheels(model, l - 1.2, -l + 1.2, size.width, 0.48);
+  add_wheels(model, -l + 2.4, -l + 3.6, size.width, 0.48);
+}
+
+void add_bus(Model& model, const Size& size, const Material& paint) {
+  const double l = size.length / 2, w = size.width / 2, h = size.height;
+  model.push_back(block(paint, -l, l, -w, w, 0.3, 1.1));
+  model.push_back(block(materials::kGlass, -l + 0.03, l - 0.03, -w + 0.03, w - 0.03, 1.1, 2.3));
+  model.push_back(block(paint, -l, l, -w, w, 2.3, h));
+  for (int i = 0; i < 6; ++i) {
+    const double x = -l + 0.1 + i * (2 * l - 0.3) / 5;
+    model.push_back(block(paint, x, x + 0.14, -w, w, 1.1, 2.3));
+  }
+  add_wheels(model, 0.6 * l, -0.55 * l, size.width, 0.48);
+}
+
 }  // namespace
 
 std::uint16_t resting_label(Kind kind) {
@@ -104,64 +171,19 @@ Size random_size(Kind kind, Random& random) {
 
 Model vehicle_model(Kind kind, const Size& size, Random& random) {
   Model model;
-  const double l = size.length / 2, w = size.width / 2, h = size.height;
   const Material& paint = random.chance(0.35) ? materials::kDarkPaint : materials::kBrightPaint;
   const double shape = random.unit();
   if (kind == Kind::kCar) {
-    const double belt = 0.62 * h, floor = 0.22;
-    model.push_back(make_tapered_box(paint, vec(0, 0, (floor + belt) / 2),
-                                     vec(l, w, (belt - floor) / 2), 0.12F, 0.05F));
-    // The cabin leans inwards; estates keep it to the rear.
-    const double cabin_rear = -l + 0.1 + 0.5 * shape, cabin_front = 0.45 * l;
-    model.push_back(make_tapered_box(
-        materials::kGlass, vec((cabin_rear + cabin_front) / 2, 0, (belt + h - 0.06) / 2),
-        vec((cabin_front - cabin_rear) / 2, w - 0.06, (h - 0.06 - belt) / 2), 0.42F, 0.14F));
-    model.push_back(
-        block(paint, cabin_rear + 0.42, cabin_front - 0.42, -w + 0.2, w - 0.2, h - 0.07, h));
-    // Roof pillars stop the glass from being all there is.
-    for (const double side : {-1.0, 1.0}) {
-      model.push_back(block(paint, cabin_rear + 0.25, cabin_rear + 0.55, side * (w - 0.14) - 0.04,
-                            side * (w - 0.14) + 0.04, belt, h - 0.05));
-      model.push_back(block(paint, 0.0, 0.1, side * (w - 0.13) - 0.04, side * (w - 0.13) + 0.04,
-                            belt, h - 0.05));
-      model.push_back(block(paint, 0.35 * l, 0.35 * l + 0.15, side * (w + 0.07) - 0.07,
-                            side * (w + 0.07) + 0.07, belt - 0.05, belt + 0.1));
-    }
-    add_wheels(model, 0.62 * l, -0.62 * l, size.width, 0.31);
+    add_car(model, size, paint, shape);
   } else if (kind == Kind::kVan) {
-    model.push_back(block(paint, -l, 0.55 * l, -w, w, 0.3, h));
-    model.push_back(
-        make_tapered_box(paint, vec(0.75 * l, 0, 0.75), vec(0.25 * l, w, 0.45), 0.05F, 0.03F));
-    model.push_back(make_tapered_box(materials::kGlass, vec(0.62 * l, 0, (1.2 + h) / 2),
-                                     vec(0.2 * l, w - 0.03, (h - 1.2) / 2), 0.3F, 0.08F));
-    add_wheels(model, 0.6 * l, -0.6 * l, size.width, 0.34);
+    add_van(model, size, paint);
   } else if (kind == Kind::kTruck) {
-    const double cab = l - 2.0;
-    model.push_back(block(paint, cab + 0.2, l, -w, w, 0.6, 0.62 * h));
-    model.push_back(
-        block(materials::kGlass, l - 0.15, l + 0.01, -w + 0.15, w - 0.15, 0.62 * h, 0.82 * h));
-    model.push_back(block(paint, cab + 0.2, l - 0.1, -w, w, 0.62 * h, 0.88 * h));
-    if (shape < 0.75) {
-      model.push_back(block(materials::kBrightPaint, -l, cab, -w, w, 1.1, h));
-    } else {
-      model.push_back(block(paint, -l, cab, -w, w, 1.0, 1.25));
-      model.push_back(make_tapered_box(materials::kStreetFurniture, vec(-0.2 * l, 0, 1.9),
-                                       vec(0.6 * l, w - 0.1, 0.65), 0.5F, 0.3F));
-    }
-    model.push_back(block(materials::kTyre, -l + 0.3, cab, -0.45, 0.45, 0.6, 1.0));
-    add_wheels(model, l - 1.2, -l + 1.2, size.width, 0.48);
-    add_wheels(model, -l + 2.4, -l + 3.6, size.width, 0.48);
+    add_truck(model, size, paint, shape);
   } else {
-    model.push_back(block(paint, -l, l, -w, w, 0.3, 1.1));
-    model.push_back(block(materials::kGlass, -l + 0.03, l - 0.03, -w + 0.03, w - 0.03, 1.1, 2.3));
-    model.push_back(block(paint, -l, l, -w, w, 2.3, h));
-    for (int i = 0; i < 6; ++i) {
-      const double x = -l + 0.1 + i * (2 * l - 0.3) / 5;
-      model.push_back(block(paint, x, x + 0.14, -w, w, 1.1, 2.3));
-    }
-    add_wheels(model, 0.6 * l, -0.55 * l, size.width, 0.48);
+    add_bus(model, size, paint);
   }
-  model.push_back(block(materials::kPlate, -l - 0.01, -l + 0.02, -0.26, 0.26, 0.5, 0.62));
+  const double rear = -size.length / 2;
+  model.push_back(block(materials::kPlate, rear - 0.01, rear + 0.02, -0.26, 0.26, 0.5, 0.62));
   return model;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "simulation/beams.hpp"
 #include "simulation/materials.hpp"
@@ -232,71 +233,96 @@ class Simulator::Implementation {
     return moving ? moving_label(kind) : resting_label(kind);
   }
 
-  /// Turns hits and ground into points with noise, losses and labels.
+  /// Place where a beam meets the ground or an object.
+  struct Surface {
+    float range = 0;   ///< m
+    float cosine = 1;  ///< of the angle of incidence
+    float loss = 0;    ///< probability of no return, besides that of weak returns
+    float reflectivity = 0;
+    float roughness = 0;  ///< m, added to the noise of the range
+    std::uint32_t label = 0;
+  };
+
+  /// The ground nearer than `reach` (m) along a beam from `origin`; needs a prepared terrain.
+  std::optional<Surface> ground_surface(Vec3 origin, Vec3 world_direction, float reach) {
+    const float range = world_.terrain.cast(origin, world_direction, reach);
+    if (range <= 0) return std::nullopt;
+    Surface surface;
+    surface.range = range;
+    const Vec3 p = origin + range * world_direction;
+    surface.cosine = std::abs(dot(world_.terrain.normal_near(p.x, p.y), world_direction));
+    surface.label = world_.terrain.label_near(p.x, p.y);
+    surface.loss = 0.01F;
+    const bool grass = surface.label == semantic::kTerrain;
+    const bool sidewalk = surface.label == semantic::kSidewalk;
+    surface.reflectivity = grass ? 0.3F : sidewalk ? 0.28F : 0.18F;
+    surface.roughness = grass ? 0.015F : 0.003F;
+    return surface;
+  }
+
+  /// The object that the renderer found along a beam.
+  std::optional<Surface> object_surface(const Renderer::Hit& hit, Vec3 direction,
+                                        const std::vector<ObjectState>& objects) const {
+    if (hit.drawn == Renderer::kNothing) return std::nullopt;
+    const Renderer::Drawn& drawn = renderer_.drawn()[hit.drawn];
+    const Material& material = *drawn.primitive.material;
+    Surface surface;
+    surface.range = hit.range;
+    surface.label = material.label;
+    if (drawn.object != kNoObject) {
+      const ObjectState& state = objects[drawn.object];
+      surface.label = state.label | (state.instance << 16);
+    }
+    surface.reflectivity = material.reflectivity;
+    surface.roughness = material.roughness;
+    surface.loss = hit.extra_loss + material.loss;
+    surface.cosine =
+        material.density == 0
+            ? std::abs(dot(surface_normal(drawn.primitive, hit.range * direction), direction))
+            : 0.7F;
+    return surface;
+  }
+
+  /// Turns surfaces into points with noise, losses and labels.
   void measure(const Moment& moment, SimulatedScan& scan, std::uint64_t scan_seed) {
     const Rigid T_world_sensor = to_rigid(moment.T_world_sensor);
     const Vec3 origin = T_world_sensor.translation;
     world_.terrain.prepare({moment.T_world_sensor(0, 3), moment.T_world_sensor(1, 3)},
                            model_.max_range);
-    const auto sigma = static_cast<float>(config_.range_noise);
-    const auto loss_scale = static_cast<float>(config_.dropout);
-    const auto dark_range = static_cast<float>(model_.dark_range);
-    const auto min_range = static_cast<float>(model_.min_range);
     scan.xyzi.reserve(beams_.size() * 4);
     scan.labels.reserve(beams_.size());
     for (const std::uint32_t slot : beams_.measured_order()) {
       const Renderer::Hit& hit = renderer_.hits()[slot];
       const Vec3 direction = beams_.direction(slot);
       const Vec3 world_direction = T_world_sensor.rotation * direction;
-      float range = hit.range, cosine = 1, loss = hit.extra_loss;
-      float reflectivity = 0.2F, roughness = 0;
-      std::uint32_t label = 0;
-      const float ground = world_.terrain.cast(origin, world_direction, hit.range);
-      if (ground > 0) {
-        range = ground;
-        const Vec3 p = origin + ground * world_direction;
-        cosine = std::abs(dot(world_.terrain.normal_near(p.x, p.y), world_direction));
-        label = world_.terrain.label_near(p.x, p.y);
-        loss = 0.01F;
-        const bool grass = label == semantic::kTerrain;
-        reflectivity = grass ? 0.3F : label == semantic::kSidewalk ? 0.28F : 0.18F;
-        roughness = grass ? 0.015F : 0.003F;
-      } else if (hit.drawn != Renderer::kNothing) {
-        const Renderer::Drawn& drawn = renderer_.drawn()[hit.drawn];
-        const Material& material = *drawn.primitive.material;
-        label = material.label;
-        if (drawn.object != kNoObject) {
-          const ObjectState& state = scan.objects[drawn.object];
-          label = state.label | (state.instance << 16);
-        }
-        reflectivity = material.reflectivity;
-        roughness = material.roughness;
-        loss += material.loss;
-        if (material.density == 0) {
-          cosine = std::abs(dot(surface_normal(drawn.primitive, range * direction), direction));
-        } else {
-          cosine = 0.7F;
-        }
-      } else {
-        continue;
-      }
-      const std::uint64_t random = mix(scan_seed, slot);
-      // Received over required power: 1 where nine of ten beams detect a dark surface.
-      const float reach = dark_range / range;
-      const float power = reflectivity * (0.08F + 0.92F * cosine) * 10 * reach * reach;
-      loss += 1 / (1 + 9 * power);
-      if (unit_float(mix(random, 1)) < loss * loss_scale) continue;
-      range += std::sqrt(sigma * sigma + (sigma > 0 ? roughness * roughness : 0)) *
-               normal_float(mix(random, 2));
-      if (range < min_range || range > static_cast<float>(model_.max_range)) continue;
-      const float brightness =
-          reflectivity * (0.3F + 0.7F * cosine) * (1 + 0.15F * normal_float(mix(random, 3)));
-      scan.xyzi.push_back(range * direction.x);
-      scan.xyzi.push_back(range * direction.y);
-      scan.xyzi.push_back(range * direction.z);
-      scan.xyzi.push_back(std::clamp(brightness, 0.0F, 1.0F));
-      scan.labels.push_back(label);
+      std::optional<Surface> surface = ground_surface(origin, world_direction, hit.range);
+      if (!surface) surface = object_surface(hit, direction, scan.objects);
+      if (surface) add_point(*surface, direction, mix(scan_seed, slot), scan);
     }
+  }
+
+  /// Adds the point of a surface unless the return is lost or out of range.
+  void add_point(const Surface& surface, Vec3 direction, std::uint64_t random,
+                 SimulatedScan& scan) const {
+    const auto sigma = static_cast<float>(config_.range_noise);
+    // Received over required power: 1 where nine of ten beams detect a dark surface.
+    const float reach = static_cast<float>(model_.dark_range) / surface.range;
+    const float power =
+        surface.reflectivity * (0.08F + 0.92F * surface.cosine) * 10 * reach * reach;
+    const float loss = surface.loss + 1 / (1 + 9 * power);
+    if (unit_float(mix(random, 1)) < loss * static_cast<float>(config_.dropout)) return;
+    const float roughness = sigma > 0 ? surface.roughness : 0;
+    const float range = surface.range + std::sqrt(sigma * sigma + roughness * roughness) *
+                                            normal_float(mix(random, 2));
+    const auto min_range = static_cast<float>(model_.min_range);
+    if (range < min_range || range > static_cast<float>(model_.max_range)) return;
+    const float brightness = surface.reflectivity * (0.3F + 0.7F * surface.cosine) *
+                             (1 + 0.15F * normal_float(mix(random, 3)));
+    scan.xyzi.push_back(range * direction.x);
+    scan.xyzi.push_back(range * direction.y);
+    scan.xyzi.push_back(range * direction.z);
+    scan.xyzi.push_back(std::clamp(brightness, 0.0F, 1.0F));
+    scan.labels.push_back(surface.label);
   }
 
   static constexpr std::uint32_t kNoObject = 0xffffffff;

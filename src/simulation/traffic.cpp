@@ -238,12 +238,7 @@ double Traffic::wanted_acceleration(const Driver& driver, std::size_t index) con
   return std::clamp(acceleration, -7.0, driver.comfort);
 }
 
-void Traffic::walk(Walker& walker, double dt) {
-  const bool standing = time_ < walker.start || time_ >= walker.stop || walker.goals.empty();
-  if (standing) {
-    walker.velocity = {};
-    return;
-  }
+Vec2 Traffic::wanted_velocity(Walker& walker) {
   Vec2 to_goal = walker.goals[walker.goal] - walker.position;
   if (norm(to_goal) < 0.8) {
     ++walker.goal;
@@ -253,8 +248,11 @@ void Traffic::walk(Walker& walker, double dt) {
     }
     to_goal = walker.goals[walker.goal] - walker.position;
   }
-  const Vec2 wanted = (walker.pace / std::max(norm(to_goal), 0.3)) * to_goal;
-  // Social force model: Helbing and Molnar, 1995; people also pass on the right.
+  return (walker.pace / std::max(norm(to_goal), 0.3)) * to_goal;
+}
+
+// Social force model: Helbing and Molnar, 1995; people also pass on the right.
+Vec2 Traffic::social_force(const Walker& walker, Vec2 wanted) const {
   Vec2 force = (1 / 0.5) * (wanted - walker.velocity);
   for (const Body& body : bodies_) {
     const Vec2 apart = walker.position - body.footprint.centre;
@@ -278,11 +276,10 @@ void Traffic::walk(Walker& walker, double dt) {
     const Vec2 apart = gap > 0.01 ? walker.position - nearest : d;
     force = force + (8.0 * std::exp(-gap / 0.25) / std::max(norm(apart), 1e-3)) * apart;
   });
-  Vec2 velocity = walker.velocity + dt * force;
-  const double speed = norm(velocity), limit = 1.4 * walker.pace;
-  if (speed > limit) velocity = (limit / speed) * velocity;
-  const Vec2 next = walker.position + dt * velocity;
-  // Nobody walks into a wall or a vehicle: stand if the step would end there.
+  return force;
+}
+
+bool Traffic::is_blocked(const Walker& walker, Vec2 next) const {
   bool blocked = false;
   fixed.visit_near(next, [&](const Footprint& footprint) {
     blocked = blocked || (distance(footprint, next) < 0.25 &&
@@ -297,7 +294,21 @@ void Traffic::walk(Walker& walker, double dt) {
       blocked = true;
     }
   }
-  if (blocked) {
+  return blocked;
+}
+
+void Traffic::walk(Walker& walker, double dt) {
+  const bool standing = time_ < walker.start || time_ >= walker.stop || walker.goals.empty();
+  if (standing) {
+    walker.velocity = {};
+    return;
+  }
+  const Vec2 wanted = wanted_velocity(walker);
+  Vec2 velocity = walker.velocity + dt * social_force(walker, wanted);
+  const double speed = norm(velocity), limit = 1.4 * walker.pace;
+  if (speed > limit) velocity = (limit / speed) * velocity;
+  const Vec2 next = walker.position + dt * velocity;
+  if (is_blocked(walker, next)) {
     walker.velocity = {};
     return;
   }

@@ -142,6 +142,12 @@ class Traffic {
   /// Speed (m/s) on a free road: schedule, gaps in cross traffic, bends.
   double wanted_speed(const Driver& driver, std::size_t index) const;
   double wanted_acceleration(const Driver& driver, std::size_t index) const;
+  /// Velocity (m/s) towards the walker's goal; takes the next goal near the current one.
+  static Vec2 wanted_velocity(Walker& walker);
+  /// Acceleration (m/s^2): towards the wanted velocity, away from others and from obstacles.
+  Vec2 social_force(const Walker& walker, Vec2 wanted) const;
+  /// Whether a step to `next` ends too near to an obstacle or a body, and nearer than before it.
+  bool is_blocked(const Walker& walker, Vec2 next) const;
   void walk(Walker& walker, double dt);
 
   Random random_;

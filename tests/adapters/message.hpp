@@ -1,4 +1,4 @@
-// A PointCloud2 look-alike, and messages of any such type with points worked by hand.
+// A PointCloud2 replacement, and messages with point coordinates that are worked out by hand.
 #pragma once
 
 #include <Eigen/Core>
@@ -40,14 +40,14 @@ inline constexpr std::uint8_t kUint16 = 4;
 inline constexpr std::uint8_t kFloat32 = 7;
 inline constexpr std::uint8_t kFloat64 = 8;
 
-/// How a message is laid out.
+/// Layout of the data of a message.
 struct Layout {
   std::uint32_t x = 0, y = 4, z = 8;  // offsets
   std::uint8_t type = kFloat32;
   std::uint32_t point_step = 16;
   std::uint32_t height = 1;
-  std::uint32_t padding = 0;  // bytes behind each row
-  bool swapped = false;       // the byte order that this machine does not have
+  std::uint32_t padding = 0;  // bytes after each row
+  bool swapped = false;       // uses the byte order that this machine does not have
 };
 
 inline bool host_is_big_endian() {
@@ -74,7 +74,7 @@ Message make_message(const std::vector<Eigen::Vector3f>& points, const Layout& l
   message.point_step = layout.point_step;
   message.row_step = message.width * layout.point_step + layout.padding;
   message.is_bigendian = host_is_big_endian() != layout.swapped;
-  // Not in the order of the offsets, and with a stranger among them.
+  // Fields in another order than their offsets, with an unknown field among them.
   add_field(message, "z", layout.z, layout.type);
   add_field(message, "ring", 0, kUint16);
   add_field(message, "x", layout.x, layout.type);

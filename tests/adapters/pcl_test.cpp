@@ -80,7 +80,7 @@ TEST_CASE("the static points of a PCL cloud keep their fields and header") {
                   std::invalid_argument);
 }
 
-TEST_CASE("pcl::PCLPointCloud2 is a message like any other") {
+TEST_CASE("pcl::PCLPointCloud2 is read as any other message") {
   const std::vector<Eigen::Vector3f> points = {{1, 2, 3}, {4, 5, 6}};
   const auto message = make_message<pcl::PCLPointCloud2>(points);
   CHECK(PointCloud2View(message).point(1) == points[1]);

@@ -61,7 +61,7 @@ TEST_CASE("a message may mix floats and doubles") {
   CHECK(PointCloud2View(message).point(0) == Eigen::Vector3f(1, 2, -3.25F));
 }
 
-TEST_CASE("what drivers leave out and nobody needs") {
+TEST_CASE("values that drivers often leave out are not needed") {
   SECTION("row_step of a single row") {
     LookAlike message = make_message<LookAlike>(kPoints);
     message.row_step = 0;
@@ -154,7 +154,7 @@ TEST_CASE("the static points of a message keep every byte") {
                                           PointLabel::kInvalid, PointLabel::kStatic};
   LookAlike message = make_message<LookAlike>(kPoints, {0, 4, 8, kFloat32, 16, 2, 3});
   message.header.frame_id = "velodyne";
-  for (std::size_t i = 0; i < 6; ++i) {  // the four bytes behind the coordinates
+  for (std::size_t i = 0; i < 6; ++i) {  // the four bytes after the coordinates
     message.data[(i / 3) * message.row_step + (i % 3) * 16 + 15] = static_cast<std::uint8_t>(i);
   }
   const LookAlike kept = static_points(message, labels);

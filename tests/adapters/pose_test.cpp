@@ -26,7 +26,7 @@ TEST_CASE("16 numbers are a pose in either order") {
   CHECK(pose_from_column_major(kColumns.data()).isApprox(expected(), 1e-12));
 }
 
-TEST_CASE("16 numbers in the wrong order are called so") {
+TEST_CASE("16 numbers in the wrong order are refused with this reason") {
   CHECK_THROWS_WITH(pose_from_row_major(kColumns.data()),
                     "16 numbers read as a row-major pose have the translation in the last row: "
                     "they are column-major");
@@ -49,7 +49,7 @@ TEST_CASE("16 numbers that are no pose are refused") {
   }
 }
 
-TEST_CASE("Sophus poses go in and come out") {
+TEST_CASE("Sophus poses are converted in both directions") {
   const Eigen::Isometry3d T = expected();
   const Sophus::SE3d pose(Eigen::Quaterniond(T.linear()), T.translation());
   CHECK(to_isometry(pose).isApprox(T, 1e-12));

@@ -8,7 +8,7 @@
 namespace dynains::test {
 namespace {
 
-TEST_CASE("sensor_msgs::PointCloud2 goes in and comes out") {
+TEST_CASE("sensor_msgs::PointCloud2 is converted in both directions") {
   const std::vector<Eigen::Vector3f> points = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
   auto message = make_message<sensor_msgs::PointCloud2>(points, {4, 8, 12, kFloat32, 22});
   message.header.stamp.sec = 3;

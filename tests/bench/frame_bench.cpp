@@ -1,4 +1,4 @@
-// The whole pipeline: how the cost of a frame depends on points, on K and on the length of the run.
+// The whole pipeline: cost of a frame as a function of points, of K and of the length of the run.
 #include <benchmark/benchmark.h>
 
 #include <cstddef>
@@ -21,7 +21,7 @@ std::vector<test::Scan> every(const std::vector<test::Scan>& scans, std::size_t 
   return result;
 }
 
-// To and fro over the same lane, so that the map stops growing.
+// Back and forth on one lane, so that the map stops growing.
 void push_lap(DynaInsRemover& remover, const std::vector<test::Scan>& scans, double& time,
               std::vector<double>& milliseconds) {
   for (std::size_t i = 0; i < 2 * scans.size(); ++i) {
@@ -37,7 +37,7 @@ void report(benchmark::State& state, const std::vector<double>& milliseconds) {
   state.counters["worst_ms"] = quantile(milliseconds, 1.0);
 }
 
-// Arguments: window K, and every how many-th point is used.
+// Arguments: window K, and n to use every n-th point.
 void BM_Frame(benchmark::State& state) {
   auto config = DynaInsRemover::Config::paper();
   config.window = static_cast<int>(state.range(0));
@@ -58,7 +58,7 @@ BENCHMARK(BM_Frame)
     ->Args({4, 2})
     ->Args({4, 4});
 
-// The default configuration, with everything that goes beyond the paper.
+// The default configuration, with all additions to the paper.
 void BM_DefaultFrame(benchmark::State& state) {
   DynaInsRemover remover;
   double time = 0.0;
@@ -68,8 +68,8 @@ void BM_DefaultFrame(benchmark::State& state) {
 }
 BENCHMARK(BM_DefaultFrame)->Unit(benchmark::kMillisecond);
 
-// Median of a lap near frame 100 and of one near frame 10,000 of one run, on a quarter of the
-// points.
+// Median times of a lap near frame 100 and of a lap near frame 10,000 of one run, with a quarter of
+// the points.
 void BM_LongRun(benchmark::State& state) {
   const auto scans = every(street_scans(), 4);
   for (auto _ : state) {

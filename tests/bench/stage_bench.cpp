@@ -1,4 +1,4 @@
-// Each stage alone, on a warm object.
+// Each stage alone, on an object after warm-up.
 #include <benchmark/benchmark.h>
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The scans that benchmarks work on: a long lane between pillars, with one van on its way.
+// Scans for benchmarks: a long lane between pillars with one van.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +31,7 @@ inline PointBuffer buffer_of(const test::Scan& scan) {
   return result;
 }
 
-/// Value below which `share` of the values lie.
+/// Value below which a `share` of the values lies.
 inline double quantile(std::vector<double> values, double share) {
   std::sort(values.begin(), values.end());
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Compares this working tree with another revision: verdicts and maps byte by byte, and the time of a
-# frame by versions that take turns.
+# Compares this working tree with another revision: verdicts and maps byte by byte, and times of a
+# frame by alternating runs of both versions.
 #
 #   tests/compare/compare_revisions.sh BASE WORK [SEQUENCE...]
 #

@@ -1,6 +1,6 @@
-// Writes everything that the remover answers on a recording, as bytes to compare: for each final
-// verdict the labels, instances, beliefs and causes, then the points of the map. Prints the median
-// time of a push in milliseconds. Uses only interfaces that exist in all revisions.
+// Writes all answers of the remover on a recording, as bytes to compare: for each final verdict the
+// labels, instances, beliefs and causes, then the points of the map. Prints the median time of a
+// push in milliseconds. Uses only interfaces that exist in all revisions.
 //
 //   verdict_bytes SEQUENCE default|paper OUT [SCANS]
 //

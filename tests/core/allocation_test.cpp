@@ -1,4 +1,4 @@
-// Counts what the global operator new hands out: an executable of its own.
+// Counts the calls of the global operator new. This test is an executable of its own.
 #include <atomic>
 #include <cstddef>
 #include <cstdlib>
@@ -36,7 +36,7 @@ void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); 
 namespace dynains::test {
 namespace {
 
-TEST_CASE("a warm remover allocates nothing, but for the map when it grows") {
+TEST_CASE("a warm remover allocates nothing, except for the map when it grows") {
   const auto base = GENERATE(DynaInsRemover::Config::paper(), DynaInsRemover::Config());
   DynaInsRemover::Config config = base;
   const bool build_map = GENERATE(false, true);
@@ -45,7 +45,7 @@ TEST_CASE("a warm remover allocates nothing, but for the map when it grows") {
   // Short rings: after seven rounds of twelve scans, every place in them has held every scan.
   config.evidence.lookahead_scans = 6;
   config.evidence.lookback_scans = 20;
-  // To and fro over the same ground: the second time, the map has it all.
+  // Back and forth over the same ground: the second time, the map contains all of it.
   const Scene scene = yard_with(van(14.0, 3.5, {-6.0, 0.0, 0.0}));
   Eigen::Isometry3d T_world_sensor = sensor_at(0.0);
   T_world_sensor.rotate(Eigen::AngleAxisd(GENERATE(0.0, 0.3), Eigen::Vector3d::UnitY()));
@@ -70,7 +70,7 @@ TEST_CASE("a warm remover allocates nothing, but for the map when it grows") {
 }
 
 TEST_CASE("a remover with reserved memory allocates nothing from the second scan on") {
-  // The first one tells what the sensor is like.
+  // The first scan gives the sensor model.
   DynaInsRemover::Config config =
       GENERATE(DynaInsRemover::Config::paper(), DynaInsRemover::Config());
   config.build_map = false;

@@ -1,4 +1,4 @@
-// Whatever type a cloud has, the labels are the same.
+// Labels do not depend on the type of the cloud.
 #include <Eigen/Core>
 #include <string>
 #include <vector>
@@ -33,8 +33,8 @@ struct dynains::PointCloudTraits<dynains::test::EchoCloud> {
 namespace dynains::test {
 namespace {
 
-// Runs over the scans, each turned into another type by `convert`. Only then is it pushed, so that
-// the converted cloud outlives the call.
+// Runs over the scans, each converted to another type by `convert`. The converted cloud is a
+// variable, so that it outlives the call of push.
 template <class Convert>
 std::vector<Verdict> verdicts_of(const std::vector<Scan>& scans, Convert&& convert) {
   DynaInsRemover remover(DynaInsRemover::Config::paper());
@@ -82,7 +82,7 @@ TEST_CASE("labels do not depend on the type of the cloud") {
              floats.assign(1, -99.0F);
              const std::vector<float> values = interleaved<float>(points, 4);
              floats.insert(floats.end(), values.begin(), values.end() - 1);
-             floats.shrink_to_fit();  // nothing behind the last coordinate
+             floats.shrink_to_fit();  // no memory after the last coordinate
              return RawPoints<float>{floats.data() + 1, points.size(), 4};
            }) == expected));
   }

@@ -19,8 +19,8 @@ double posterior_after(const BeliefUpdater::Config& config,
   return belief.posterior();
 }
 
-// Eq. 13 and 14 in probabilities, no logarithm of odds added up: p(m | z) of each observation is
-// the geometric mean of odds that Eq. 17 and 18 stand for.
+// Eq. 13 and 14 in probabilities, without a sum of log-odds: p(m | z) of each observation is the
+// geometric mean of the odds in Eq. 17 and 18.
 double bayes_in_probabilities(const BeliefUpdater::Config& config,
                               const std::vector<Heights>& observations, const Heights& cluster) {
   double previous = 0.5;
@@ -49,7 +49,7 @@ double bayes_in_probabilities(const BeliefUpdater::Config& config,
 TEST_CASE("Eq. 13-19 of two observations worked by hand") {
   // logit(0.7) = ln(7/3) = 0.847298, logit(0.4) = ln(2/3) = -0.405465.
   // Cluster heights (1, 0, 0, 2).
-  //   Oldest (0, 0, 0, 1.5): rho = 0/1 = 0 and 1.5/2 = 0.75 < 0.8; the two empty cells say nothing
+  //   Oldest (0, 0, 0, 1.5): rho = 0/1 = 0 and 1.5/2 = 0.75 < 0.8; the two empty cells are not in R
   //     l(m|z_1) = (2 * 0.847298 + 0.847298) / 2 = 1.270947                          (Eq. 17, 18)
   //   Newest (1, 0, 0, 2): rho = 1 twice
   //     l(m|z_2) = (-0.405465 - 0.405465) / 2 = -0.405465

@@ -1,4 +1,4 @@
-// Why each point got its verdict, on scenes in which that is obvious.
+// The cause of each verdict, on scenes with known causes.
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -15,7 +15,7 @@ namespace {
 
 using Config = DynaInsRemover::Config;
 
-// How many points of `object` have each cause.
+// Number of points of `object` with each cause.
 struct Causes {
   std::array<std::size_t, kCauseCount> of{};
   std::size_t total = 0;
@@ -43,7 +43,7 @@ struct Causes {
   }
 };
 
-TEST_CASE("a cause is one of movement if and only if the label is, at once and finally") {
+TEST_CASE("a cause is one of movement if and only if the label is, in newest and final verdicts") {
   const Config config = GENERATE(Config::paper(), Config());
   const std::vector<Scan> scans = drive(oncoming(), 12, 5.0);
   const Run result = run(config, scans);
@@ -90,7 +90,7 @@ TEST_CASE("paper: similar, proposed, reverted by belief, by votes") {
 
   config = Config::paper();
   config.votes = 4;
-  // Only three windows see the first scan together with another.
+  // Only three windows compare the first scan with another one.
   const Causes outvoted(scans[0], run(config, scans).final[0], kAddedBox);
   CHECK(outvoted[Cause::kProposed] == 0);
   CHECK(outvoted.share(Cause::kReverted) > 0.5);
@@ -132,7 +132,7 @@ TEST_CASE("not judged: bad points, points out of range, points beyond the range 
   }
 }
 
-TEST_CASE("evidence: what moved was seen free, what stands was seen occupied") {
+TEST_CASE("evidence: a moved object was seen free, a static one was seen occupied") {
   const std::vector<Scan> scans = drive(oncoming(), 10, 5.0);
   const Run result = run(Config(), scans);
   const Causes moving(scans, result.final, kAddedBox);
@@ -148,14 +148,14 @@ TEST_CASE("evidence: what moved was seen free, what stands was seen occupied") {
   CHECK(ground[Cause::kUnderInstance] > 0);
 }
 
-TEST_CASE("evidence: one scan alone tells nothing") {
+TEST_CASE("evidence: a single scan gives no evidence") {
   const std::vector<Scan> scans = drive(oncoming(), 1, 0.0);
   const Causes all(scans, run(Config(), scans).final);
   CHECK(all[Cause::kNoEvidence] > 5000);
   CHECK(all[Cause::kNoEvidence] + all[Cause::kGround] + all[Cause::kNotJudged] == all.total);
 }
 
-TEST_CASE("evidence: seen free, but less than the thresholds ask for") {
+TEST_CASE("evidence: seen free, but below the thresholds") {
   const std::vector<Scan> scans = drive(oncoming(), 16, 0.0);
   Config config;
   config.evidence.use_tracks = false;
@@ -167,7 +167,7 @@ TEST_CASE("evidence: seen free, but less than the thresholds ask for") {
   CHECK(moving[Cause::kFreeSpace] == 0);
 }
 
-// As fast as the sensor, and seen from behind: no earlier scan saw its place.
+// As fast as the sensor and scanned from behind, so that no earlier scan covers its place.
 TEST_CASE("evidence: a lead vehicle is presumed to move until its place was seen") {
   const std::vector<Scan> scans = drive(yard_with(van(9.0, 0.0, {10.0, 0.0, 0.0})), 16, 10.0);
   Config config;
@@ -182,9 +182,9 @@ TEST_CASE("evidence: a lead vehicle is presumed to move until its place was seen
   CHECK(silent.share(Cause::kNoEvidence) > 0.8);
 }
 
-// Scans behind the newest have meanwhile been seen through; of the newest itself, too little was,
-// if supervoxels are this small.
-TEST_CASE("evidence: a vehicle whose sides overlap from scan to scan is known along its track") {
+// The vehicle in earlier scans has been seen through since. In the newest scan, too few of its
+// samples were seen free, because supervoxels are so small.
+TEST_CASE("evidence: a vehicle whose sides overlap from scan to scan is removed along its track") {
   const std::vector<Scan> scans = drive(yard_with(van(9.0, 2.0, {4.0, 0.0, 0.0})), 6, 4.0);
   Config config;
   config.evidence.supervoxel = 0.4;

@@ -26,7 +26,7 @@ std::vector<Point> points_of(PolarView window, Span<const PointRange> ranges) {
 }
 
 TEST_CASE("S_k of every comparable cluster holds exactly the points of Eq. 4, in input order") {
-  ClusterSet clusters;  // the same object for all, as in the pipeline
+  ClusterSet clusters;  // one object for all scans, as in the pipeline
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     INFO("seed " << seed);
     Random random(seed);
@@ -69,7 +69,7 @@ TEST_CASE("S_k of every comparable cluster holds exactly the points of Eq. 4, in
   }
 }
 
-TEST_CASE("a cluster that the newest or the oldest scan missed is not compared") {
+TEST_CASE("a cluster without points in the newest or the oldest scan is not compared") {
   PolarBuffer window;
   for (int i = 0; i < 6; ++i) add(window, 10.0, 0.0, 0.0);
   const std::vector<std::uint32_t> scan_begin = {0, 2, 4, 6};

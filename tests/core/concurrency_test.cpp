@@ -1,5 +1,5 @@
-// What threads may do with a remover, and what happens if they do something else. Worth most under
-// ThreadSanitizer, see docs/reliability.md.
+// Permitted and forbidden use of a remover by several threads. Run it with ThreadSanitizer, see
+// docs/reliability.md.
 #include <algorithm>
 #include <atomic>
 #include <mutex>
@@ -29,7 +29,7 @@ std::vector<Eigen::Vector3d> map_points(const DynaInsRemover& remover) {
   return points;
 }
 
-TEST_CASE("under a lock of the user's, the map is read while another thread pushes") {
+TEST_CASE("with a lock of the caller, the map is read while another thread pushes") {
   const Config config = GENERATE(Config::paper(), Config());
   const std::vector<Scan> scans = passing_van();
   DynaInsRemover alone(config);
@@ -80,7 +80,7 @@ TEST_CASE("an object may go from thread to thread") {
   CHECK((newest == expected.newest));
 }
 
-TEST_CASE("a call while another is at work is refused and changes nothing") {
+TEST_CASE("a call during another call is refused and changes nothing") {
   const Config config = GENERATE(Config::paper(), Config());
   const std::vector<Scan> scans = passing_van();
   const Run expected = run(config, scans);
@@ -140,7 +140,7 @@ TEST_CASE("threads that push into one object at once get answers or UsageError, 
   CHECK(answers + refusals == 20);
   std::size_t final = 0;
   remover.flush([&](const ScanVerdict&) { ++final; });
-  // Those that are final already were given out by push.
+  // Verdicts that are final already were given by push.
   const std::size_t open = std::min<std::size_t>(answers, remover.latency());
   CHECK(final == open);
 }

@@ -149,7 +149,7 @@ TEST_CASE("a value out of bounds is refused by field, value and bound") {
       }
       CHECK_THROWS_AS(DynaInsRemover(with(field.name, value)), ConfigError);
     }
-    // The good side of both bounds: no complaint about this field's interval.
+    // Values within both bounds give no error for the bounds of this field.
     const double good[] = {
         field.bounds.min_open ? std::nextafter(field.bounds.min, infinity) : field.bounds.min,
         field.bounds.max_open ? std::nextafter(field.bounds.max, -infinity) : field.bounds.max};
@@ -161,7 +161,7 @@ TEST_CASE("a value out of bounds is refused by field, value and bound") {
   }
 }
 
-TEST_CASE("parameters that do not go together are refused by name") {
+TEST_CASE("parameters that contradict each other are refused by name") {
   Config config = Config::paper();
   SECTION("range") {
     config.min_range = config.max_range = 50.0;

@@ -1,5 +1,5 @@
-// A consumer may let the compiler fuse multiplications and additions: labels then hardly change.
-// With other vectors than ours they do not change at all.
+// A consumer may let the compiler fuse multiplications and additions. This changes few labels.
+// Other SIMD packs change no label.
 #include <cstdint>
 #include <cstdlib>
 #include <fstream>
@@ -25,7 +25,7 @@ int label(const std::string& program, const std::string& scans, const std::strin
   return WEXITSTATUS(status);
 }
 
-// A car in a yard, as the program reads it; the number of points.
+// Writes scans of a car in a yard for the program; returns the number of points.
 std::size_t write_scans(const std::string& scans) {
   std::size_t count = 0;
   std::ofstream file(scans, std::ios::binary);
@@ -46,8 +46,8 @@ struct Labels {
   std::vector<char> exact, other;
 };
 
-// What the exact build and another one make of the same scans, in files called `name`; nothing
-// where the processor lacks what the other one was built with.
+// Labels of the scans by the exact build and by another one, in files called `name`. Empty if the
+// processor lacks a feature of the other build.
 std::optional<Labels> labels_by_both(const std::string& other, const std::string& name) {
   const std::string scans = name + ".scans";
   const std::size_t count = write_scans(scans);
@@ -76,13 +76,13 @@ TEST_CASE("with contraction on, less than one label in a thousand differs") {
   CHECK(different * 1000 < count);
 }
 
-TEST_CASE("without wide vectors, and without SSE, labels are the same byte for byte") {
+TEST_CASE("without wide vectors, and without SSE, all labels are equal") {
   const std::optional<Labels> labels = labels_by_both(DYNAINS_LABELS_PLAIN, "plain");
   REQUIRE(labels);
   CHECK(labels->other == labels->exact);
 }
 
-TEST_CASE("with AVX2 wherever the compiler likes it, labels are the same byte for byte") {
+TEST_CASE("with AVX2 for the whole program, all labels are equal") {
   const std::optional<Labels> labels = labels_by_both(DYNAINS_LABELS_AVX2, "avx2");
   if (!labels) return;
   CHECK(labels->other == labels->exact);

@@ -13,8 +13,8 @@ namespace {
 
 using Config = CurvedVoxelClusterer::Config;
 
-// Numbers in the order in which clusters first appear, as the reference has them. Numbers of the
-// clusterer itself go by place, from 0 on.
+// Cluster numbers in order of first appearance, as in the reference. The clusterer itself numbers
+// clusters by place, from 0.
 std::vector<std::uint32_t> clusters(CurvedVoxelClusterer& clusterer, PolarView points) {
   const auto result = clusterer.cluster(points);
   std::vector<std::uint32_t> renumbered(clusterer.cluster_count(), kNoCluster);
@@ -48,7 +48,7 @@ struct Region {
   double elevation_min, elevation_max;
 };
 
-// Random points none of which lies so near to a voxel border that float and double may differ.
+// Random points, none so near to a voxel border that float and double may choose different voxels.
 PolarBuffer random_points(const Config& config, const Region& region, std::size_t count,
                           std::uint64_t seed) {
   constexpr double kMargin = 2e-3;  // voxels
@@ -113,11 +113,11 @@ TEST_CASE("clusters are those of a breadth-first search over all 26 neighbours")
   }
 }
 
-TEST_CASE("a clusterer forgets one scan before the next") {
+TEST_CASE("a clusterer keeps nothing of the previous scan") {
   const Config config = make(0.5, 1.0, 3.0);
   CurvedVoxelClusterer clusterer(config);
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    // Alternately many elevations and few, so that the grid behind it grows and shrinks.
+    // Alternately many elevations and few, so that the grid grows and shrinks.
     const double half = seed % 2 == 0 ? 2.0 : 60.0;
     const PolarBuffer points =
         random_points(config, {3, 40, -180, 180, -half, half}, 100 * seed, seed);
@@ -195,7 +195,7 @@ TEST_CASE("a point at exactly the clustering range belongs to a cluster, the nex
 }
 
 TEST_CASE(
-    "a point straight below or above the sensor is a cluster, whatever was clustered before") {
+    "a point straight below or above the sensor is a cluster, independently of earlier scans") {
   const Config config = make(0.5, 0.5, 3.0);
   CurvedVoxelClusterer clusterer(config);
   for (const double z : {-5.0, 5.0, -0.1}) {
@@ -208,7 +208,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("points that are not numbers belong to no cluster and disturb none") {
+TEST_CASE("points that are not finite belong to no cluster and change no cluster") {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinity = std::numeric_limits<float>::infinity();
   PolarBuffer points;
@@ -221,7 +221,7 @@ TEST_CASE("points that are not numbers belong to no cluster and disturb none") {
   CHECK(clusters(Config(), PolarView()).empty());
 }
 
-TEST_CASE("voxels that are left to the sensor suit its beams, those that are given stay") {
+TEST_CASE("default voxels are derived from the beams of the sensor, given voxels are kept") {
   SensorModel sensor;
   sensor.azimuth_step = 0.4;
   sensor.elevation_gap = 2.0;
@@ -242,7 +242,7 @@ TEST_CASE("voxels that are left to the sensor suit its beams, those that are giv
   CHECK(CurvedVoxelClusterer(make(0.5, 0.0, 4.0)).needs_sensor());
   CHECK_FALSE(CurvedVoxelClusterer(make(0.5, 0.7, 4.0)).needs_sensor());
 
-  // Neighbouring voxels of 1.8 deg, but not of the 0.5 deg that suit a typical sensor.
+  // Neighbouring voxels of 1.8 deg, but not of 0.5 deg, the default for a typical sensor.
   PolarBuffer points;
   add(points, 10.0, 0.9, 0.0);
   add(points, 10.0, 2.7, 0.0);
@@ -252,7 +252,7 @@ TEST_CASE("voxels that are left to the sensor suit its beams, those that are giv
   CHECK(clusters(clusterer, points.view()) == std::vector<std::uint32_t>{0, 0});
 }
 
-TEST_CASE("voxels of the largest grid that is allowed are told apart") {
+TEST_CASE("voxels of the largest permitted grid are distinguished") {
   // 12 azimuths, 1800 elevations: the row numbers of the grid run into the millions.
   Config config = make(0.05, 30.0, 0.1, 1000.0);
   double low = 1.0;

@@ -1,4 +1,4 @@
-// The dynamic occupancy grid, against counts by hand and a slow reference count.
+// The dynamic occupancy grid, compared with counts by hand and with a slow reference count.
 #include "dynains/evidence/dynamic_occupancy_grid.hpp"
 
 #include <cmath>
@@ -16,7 +16,7 @@ namespace {
 using Count = DynamicOccupancyGrid::Count;
 using Verdict = DynamicOccupancyGrid::Verdict;
 
-// A scan of single points, each a supervoxel of its own, and what is said of them.
+// A scan of single points, each a supervoxel of its own, with a verdict for each.
 struct SparseScan {
   InstanceSamples samples;
   std::vector<Count> counted;
@@ -42,7 +42,7 @@ FreeSpaceConfig three_quarters() {
   return config;
 }
 
-// The cause of a point that stays, if so many in its place moved and stayed before.
+// The cause of a static point in a place where `moved` and `stayed` points were seen before.
 Verdict verdict_behind(int moved, int stayed, FreeSpaceConfig config = three_quarters(),
                        std::uint64_t later = 1, Cause cause_of_moved = Cause::kFreeSpace) {
   DynamicOccupancyGrid grid(config);
@@ -61,7 +61,7 @@ Verdict verdict_behind(int moved, int stayed, FreeSpaceConfig config = three_qua
 }
 
 TEST_CASE("a static sample is removed if nearly all samples of its cell are dynamic") {
-  // The point itself is one that stays.
+  // The point itself counts as one that stays.
   CHECK(verdict_behind(4, 0).cause == Cause::kDynamicOccupancy);  // 4 of 5
   CHECK(verdict_behind(3, 0).cause == Cause::kOccupied);          // 3 of 4: not above the share
   CHECK(verdict_behind(7, 1).cause == Cause::kDynamicOccupancy);  // 7 of 9
@@ -92,7 +92,7 @@ TEST_CASE("presumed instances are not counted, and a ratio of 1 turns the grid o
   CHECK(verdict_behind(100, 0, never).cause == Cause::kOccupied);
 }
 
-TEST_CASE("a later verdict on a scan counts in the place of the one before") {
+TEST_CASE("a later verdict on a scan replaces the earlier one in the count") {
   DynamicOccupancyGrid grid(three_quarters());
   const Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   const std::vector<Eigen::Vector3f> place(1, {-3.0F, 4.0F, 1.0F});
@@ -104,9 +104,9 @@ TEST_CASE("a later verdict on a scan counts in the place of the one before") {
     return one.verdicts[0].cause;
   };
   for (std::uint64_t scan = 0; scan < 4; ++scan) judge(scan, Cause::kFreeSpace);
-  // Asked again and again, it counts once: 4 of 5.
+  // After repeated verdicts, the scan counts once: 4 of 5.
   for (int i = 0; i < 10; ++i) CHECK(judge(4, Cause::kOccupied) == Cause::kDynamicOccupancy);
-  // One of those that moved did not: 3 of 5. And then it did.
+  // One of the moving points gets a static verdict: 3 of 5. Then it gets a dynamic one again.
   CHECK(judge(0, Cause::kOccupied) == Cause::kOccupied);
   CHECK(judge(4, Cause::kOccupied) == Cause::kOccupied);
   CHECK(judge(0, Cause::kAlongTrack) == Cause::kAlongTrack);
@@ -160,7 +160,7 @@ TEST_CASE("the grid equals a slow reference count") {
     };
     one.say(Cause::kOccupied);
     for (std::size_t s = 0; s < one.counted.size(); ++s) {
-      // Movers pass on one side more often than on the other.
+      // Points on one side move more often than points on the other.
       const double chance = one.samples.points.x[one.samples.sample_begin[s]] > 0 ? 0.75 : 0.3;
       if (random.uniform(0, 1) < chance) one.verdicts[s].cause = Cause::kWithInstance;
       Counts& counts = cells[cell_of(s)];
@@ -196,7 +196,7 @@ TEST_CASE("a quarter of the samples of a supervoxel must lie in dynamic cells") 
     one.say(Cause::kFreeSpace);
     grid.judge(scan, one.samples, T, one.counted, one.verdicts);
   }
-  // Four by four samples, 0.3 m apart: those of the corner, two by two, lie in the cell.
+  // Four by four samples, 0.3 m apart. The two by two samples of a corner are in the cell.
   const auto cause_of = [&](int inside, int outside) {
     PointBuffer points;
     for (int i = 0; i < 16; ++i) {

@@ -1,4 +1,4 @@
-// The evidence of a few scans as a whole, on panels before a wall.
+// The evidence of a few scans as a whole, on panels in front of a wall.
 #include "dynains/free_space_evidence.hpp"
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 namespace dynains::test {
 namespace {
 
-// Points across the line of result, so far away (m).
+// Points on a rectangle across the x axis, at distance x (m).
 PointBuffer panel(float x, float y_low, float y_high, float z_low, float z_high) {
   const float step = 0.006F * x;  // less than a cell of the images
   PointBuffer points;
@@ -30,7 +30,7 @@ PointBuffer both(const PointBuffer& a, const PointBuffer& b) {
   return points;
 }
 
-// What a sensor that does not move sees: at most one instance, and a wall that is none.
+// Scans of a sensor that stands still: at most one instance, and a wall without an instance.
 class Watch {
  public:
   explicit Watch(const FreeSpaceConfig& config) : evidence_(config) {
@@ -59,7 +59,7 @@ class Watch {
     return *this;
   }
 
-  // Of all points of the instance.
+  // Causes of all points of the instance.
   std::set<Cause> causes(std::size_t scan, bool is_final = true) {
     const EvidenceVerdict said = evidence_.judge(scan, is_final, splits_[scan]);
     std::set<Cause> result;
@@ -88,7 +88,7 @@ FreeSpaceConfig every_scan_a_reference() {
   return config;
 }
 
-TEST_CASE("only compact instances are presumed to move, and where places were seen before") {
+TEST_CASE("only compact instances in places that were seen before are presumed to move") {
   struct Case {
     float length, height;
     std::size_t scan = 2;
@@ -111,18 +111,18 @@ TEST_CASE("only compact instances are presumed to move, and where places were se
   };
   for (const Case& c : {
            Case{2.0F, 1.5F, 2, 0, true},
-           Case{2.0F, 1.5F, 1, 0, false},  // nothing is compared with yet
+           Case{2.0F, 1.5F, 1, 0, false},  // no earlier scan is compared yet
            Case{2.0F, 1.5F, 6, 5, false}, Case{2.0F, 1.5F, 7, 5, true},
            Case{14.7F, 1.5F, 2, 0, true}, Case{15.6F, 1.5F, 2, 0, false},
            Case{2.0F, 3.4F, 2, 0, true}, Case{2.0F, 4.1F, 2, 0, false},
            Case{0.75F, 0.1F, 2, 0, false},  // twelve points of one supervoxel: four samples
-           Case{0.78F, 0.1F, 2, 0, true},   // one more beyond it: five
+           Case{0.78F, 0.1F, 2, 0, true},   // one more point in another supervoxel: five samples
        }) {
     CAPTURE(c.length, c.height, c.scan, c.begin);
     CHECK(is_presumed(c) == c.presumed);
     CHECK(causes(c, true) == Causes{Cause::kNoEvidence});
   }
-  // Nor what is not carried along tracks.
+  // Instances that are not carried along tracks are not presumed to move.
   config.track_length = 12.0;
   config.track_height = 3.0;
   CHECK(is_presumed({11.7F, 2.9F}));
@@ -132,10 +132,11 @@ TEST_CASE("only compact instances are presumed to move, and where places were se
   CHECK_FALSE(is_presumed({2.0F, 1.5F}));
 }
 
-TEST_CASE("what scans before an instance saw, and what scans behind it saw, is told apart") {
+TEST_CASE("the evidence of scans before an instance and that of scans after it are kept apart") {
   FreeSpaceConfig config = every_scan_a_reference();
   config.lookback_scans = config.lookahead_scans = 2;
-  // The only references are the first scan and the last: each may see the place free, or nothing.
+  // The only references are the first scan and the last one. Each has a wall
+  // behind the place, or no points.
   const auto causes = [&config](bool before, bool after) {
     Watch watch(config);
     watch.see(PointBuffer(), before ? wall() : PointBuffer());
@@ -145,7 +146,7 @@ TEST_CASE("what scans before an instance saw, and what scans behind it saw, is t
     watch.see(PointBuffer(), after ? wall() : PointBuffer());
     return watch.causes(2);
   };
-  // Once wholly free is twice 0.847, a belief of 0.845.
+  // One reference in which the place is wholly free gives twice 0.847, a belief of 0.845.
   config.tau_free = 0.84;
   CHECK(causes(false, false) == Causes{Cause::kNoEvidence});
   CHECK(causes(true, false).count(Cause::kFreeSpace) == 1);
@@ -156,7 +157,7 @@ TEST_CASE("what scans before an instance saw, and what scans behind it saw, is t
   CHECK(causes(true, true) == Causes{Cause::kTooLittleFree});
 }
 
-TEST_CASE("scans of another epoch tell nothing of an instance, nor which one it was") {
+TEST_CASE("scans of another epoch give no evidence about an instance and no predecessor") {
   for (const std::uint64_t epoch : {0U, 1U}) {
     Watch left(every_scan_a_reference());
     left.see(car());
@@ -171,7 +172,7 @@ TEST_CASE("scans of another epoch tell nothing of an instance, nor which one it 
   }
 }
 
-TEST_CASE("what stands and is seen to stand is no evidence for a movement, however long") {
+TEST_CASE("a standing object gives no evidence for a movement, however long it stands") {
   FreeSpaceConfig config = every_scan_a_reference();
   config.still_weight = 1.0;
   Watch watch(config);
@@ -181,14 +182,14 @@ TEST_CASE("what stands and is seen to stand is no evidence for a movement, howev
   }
 }
 
-TEST_CASE("what a later scan shows of an instance is known of it in the scans beside, too") {
+TEST_CASE("evidence from a later scan is carried along the track to scans beside") {
   FreeSpaceConfig config = every_scan_a_reference();
   const auto causes = [&config] {
     Watch watch(config);
     watch.see(PointBuffer(), PointBuffer());
     watch.see(car(), PointBuffer()).see(car(), PointBuffer());
     CHECK(watch.causes(1) == Causes{Cause::kNoEvidence});
-    watch.see(PointBuffer());  // two scans behind the first of both
+    watch.see(PointBuffer());  // two scans after the first of both
     CHECK(watch.removes(1));
     return watch.causes(2);
   };
@@ -202,8 +203,8 @@ TEST_CASE("what a later scan shows of an instance is known of it in the scans be
   CHECK(causes() == Causes{Cause::kNoEvidence});
 }
 
-// For one scan, both are one instance.
-TEST_CASE("what stood long before does not go with what was seen to pass beside it") {
+// In one scan, both are one instance.
+TEST_CASE("an object that stood long before stays when an object that moved was merged with it") {
   FreeSpaceConfig config = every_scan_a_reference();
   config.lookahead_scans = 0;
   config.tau_track = 0.6;
@@ -218,8 +219,8 @@ TEST_CASE("what stood long before does not go with what was seen to pass beside 
   CHECK(watch.causes(22) == Causes{Cause::kOccupied});
 }
 
-// Only two scans are asked: those two and four back.
-TEST_CASE("what moved and is met again contests nothing") {
+// The only references are the scans two and four back.
+TEST_CASE("returns of a moved object do not contest a later object in its place") {
   FreeSpaceConfig config = every_scan_a_reference();
   config.lookback_scans = 4;
   config.lookahead_scans = 0;
@@ -239,8 +240,9 @@ TEST_CASE("what moved and is met again contests nothing") {
   }
 }
 
-// Something comes to stand beside a hedge, for one scan; only the scan two back is asked.
-TEST_CASE("what goes with a fifth that was seen free still contests where it is met again") {
+// An object stands beside a hedge in one scan and is merged with it. The only reference is two
+// scans back.
+TEST_CASE("the part of a removed instance that was not seen free still contests later ones") {
   FreeSpaceConfig config = every_scan_a_reference();
   config.lookback_scans = 2;
   config.lookahead_scans = 0;
@@ -255,7 +257,7 @@ TEST_CASE("what goes with a fifth that was seen free still contests where it is 
   CHECK(watch.causes(8) == Causes{Cause::kOccupied});
 }
 
-TEST_CASE("what stays and is met again contests, even if it was presumed to move") {
+TEST_CASE("returns of a static object contest, even if it was presumed to move") {
   Watch watch(every_scan_a_reference());
   for (int i = 0; i < 2; ++i) watch.see(PointBuffer(), PointBuffer());
   watch.see(car(), PointBuffer());

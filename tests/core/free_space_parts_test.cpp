@@ -1,4 +1,4 @@
-// The parts of the free-space evidence, each against something slow and obvious.
+// The parts of the free-space evidence, each compared with a slow and simple implementation.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -23,14 +23,15 @@ namespace {
 
 constexpr std::uint32_t kNoLimit = 64;
 
-TEST_CASE("references are the scans that can be looked at nearest behind those wanted") {
+TEST_CASE("references are the nearest scans with an image behind the wanted ones") {
   using Lags = std::vector<int>;
   CHECK(reference_lags(30, 0, 1) == Lags{2, 4, 6, 8, 10, 13, 16, 20, 25, 30});
   CHECK(reference_lags(29, 0, 1) == Lags{2, 4, 6, 8, 10, 13, 16, 20, 25});
-  // One scan of three is an image. 30 scans behind scan 31 is scan 1: scan 0 is the next.
+  // One scan of three has an image. The scan 30 before scan 31 is scan 1; scan 0 is the next with
+  // an image.
   CHECK(reference_lags(31, 1, 3) == Lags{4, 7, 10, 13, 16, 22, 25, 31});
   CHECK(reference_lags(30, 1, 3) == Lags{4, 7, 10, 13, 16, 22, 25, 28});
-  // Two lags that meet in one scan count once.
+  // Two lags that lead to one scan count once.
   CHECK(reference_lags(25, 0, 10) == Lags{10, 20});
   CHECK(reference_lags(0, 0, 1).empty());
   CHECK(reference_lags(2, 0, 3).empty());
@@ -50,7 +51,7 @@ TEST_CASE("references are the scans that can be looked at nearest behind those w
   }
 }
 
-// Supervoxels with one sample each at the given places, all of one instance.
+// Supervoxels with the given number of samples at the given places, all of one instance.
 InstanceSamples supervoxels_at(const std::vector<std::array<int, 3>>& places, int samples_each) {
   InstanceSamples samples;
   samples.sample_begin.push_back(0);
@@ -63,7 +64,7 @@ InstanceSamples supervoxels_at(const std::vector<std::array<int, 3>>& places, in
   return samples;
 }
 
-TEST_CASE("groups of supervoxels connect over faces, edges and corners, and only so") {
+TEST_CASE("groups of supervoxels connect over faces, edges and corners, and only over these") {
   const InstanceSamples samples = supervoxels_at(
       {{0, 0, 0}, {1, 1, 1}, {5, 0, 0}, {7, 0, 0}, {-1, -1, 1}, {0, 0, -40}, {0, 1, -40}}, 2);
   SupervoxelGroups groups;
@@ -119,7 +120,7 @@ TEST_CASE("groups of random supervoxels are those of a search over all pairs") {
   }
 }
 
-TEST_CASE("a hull fills the ground between the sides of an object that were seen") {
+TEST_CASE("a hull fills the ground between the seen sides of an object") {
   // An L of points along the lower and the left side of a 2 m square, and its far corner.
   PointBuffer points;
   for (float t = 0.1F; t < 2.0F; t += 0.2F) {
@@ -135,9 +136,9 @@ TEST_CASE("a hull fills the ground between the sides of an object that were seen
                   {static_cast<int>(std::floor(x / 0.4F)), static_cast<int>(std::floor(y / 0.4F))})
               .second);
   });
-  // 5 x 5 cells of 0.4 m. The lowest row reaches from side to side: 5 cells, as each of its columns
-  // begins there. The rows above hold the left column only: 3 cells. The top row reaches from side
-  // to side again, but the columns between end at the bottom: 2 cells.
+  // 5 x 5 cells of 0.4 m. The lowest row reaches from side to side: 5 cells, because each column
+  // begins there. The rows above it have only the left column: 3 cells. The top row reaches from
+  // side to side again, but the columns in between end at the bottom: 2 cells.
   CHECK(cells.size() == 5 + 3 + 2);
   CHECK(cells.count({4, 4}) == 1);
   CHECK(cells.count({2, 0}) == 1);
@@ -153,7 +154,7 @@ TEST_CASE("a hull fills the ground between the sides of an object that were seen
   CHECK(cells.size() == 25);
 }
 
-// Points that are near removed points, and those that are under them.
+// Indices of points near removed points, and of points under them.
 struct Found {
   std::vector<std::size_t> near, under;
 };
@@ -173,14 +174,14 @@ Found search(const GroundFootprint& footprint, const PointBuffer& ground,
   return found;
 }
 
-// Whether a point is higher than what was removed about there.
+// Whether a point is higher than the removed points around it.
 bool is_under(const GroundFootprint& footprint, float x, float y, float z) {
   PointBuffer point;
   point.push_back(x, y, z);
   return !search(footprint, point, {0.0F, 0.0F}).under.empty();
 }
 
-TEST_CASE("a footprint remembers the lowest point of a cell and its neighbours, until cleared") {
+TEST_CASE("a footprint keeps the lowest point of a cell and of its neighbours, until cleared") {
   GroundFootprint footprint(0.2, 2.0, 50.0);
   CHECK(footprint.empty());
   footprint.add(10.05F, -3.05F, 0.7F);
@@ -195,7 +196,7 @@ TEST_CASE("a footprint remembers the lowest point of a cell and its neighbours, 
   footprint.clear();
   CHECK(footprint.empty());
   CHECK_FALSE(is_under(footprint, 10.05F, -3.05F, 1e6F));
-  // Out of reach, NaN: neither remembered nor found.
+  // Points out of reach and NaN are neither kept nor found.
   footprint.add(60.0F, 0.0F, 0.0F);
   footprint.add(std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.0F);
   footprint.add(-1e30F, 1e30F, 0.0F);
@@ -205,10 +206,10 @@ TEST_CASE("a footprint remembers the lowest point of a cell and its neighbours, 
   CHECK_FALSE(is_under(footprint, std::numeric_limits<float>::infinity(), 0.0F, 1e6F));
 }
 
-TEST_CASE("a footprint finds what a search over all removed points finds") {
+TEST_CASE("a footprint gives the points that a search over all removed points gives") {
   Random random(11);
   GroundFootprint footprint(0.25, 2.0, 40.0);
-  // Scattered points, and small places with many: what is not near is passed over as a whole there.
+  // Scattered points, and small places with many points, in which whole blocks are skipped.
   PointBuffer ground;
   for (int i = 0; i < 1001; ++i) {
     ground.push_back(random.uniform_float(-39, 39), random.uniform_float(-39, 39),
@@ -221,9 +222,9 @@ TEST_CASE("a footprint finds what a search over all removed points finds") {
                        random.uniform_float(-1, 2));
     }
   }
-  // Twice, so that nothing is left of the first time.
+  // Two rounds, because the second must not depend on the first.
   for (int round = 0; round < 2; ++round) {
-    // Some alone, the others of a block of which only they were removed.
+    // Some points are removed alone, others as a part of a block.
     PointBuffer removed, block;
     std::uint64_t which = 0;
     for (int i = 0; i < 90; ++i) {
@@ -284,8 +285,8 @@ TEST_CASE("instances of consecutive scans are linked where they overlap") {
   InstanceSamples samples[2];
   TrackedInstances tracked[2];
   for (int scan = 0; scan < 2; ++scan) {
-    // The sensor drives 1 m ahead; the first box as well, the second stands, the third is new, the
-    // fourth is too long to be carried.
+    // The sensor and the first box drive 1 m ahead. The second box stands, the third is new, and
+    // the fourth is too long for a track.
     const float sensor = static_cast<float>(scan);
     PointBuffer points;
     std::vector<std::uint32_t> instance_of;
@@ -309,7 +310,7 @@ TEST_CASE("instances of consecutive scans are linked where they overlap") {
   CHECK(tracked[1].shapes[0].length == Approx(3.8).margin(0.3));
 }
 
-// Instances that occupy some cells of a row.
+// Instances that occupy the given cells of a row.
 TrackedInstances tracked_in(const std::vector<std::vector<int>>& cells_of) {
   TrackedInstances tracked;
   tracked.instances.resize(cells_of.size());
@@ -321,7 +322,7 @@ TrackedInstances tracked_in(const std::vector<std::vector<int>>& cells_of) {
   return tracked;
 }
 
-TEST_CASE("of several that it overlaps, an instance is linked to that with which it shares most") {
+TEST_CASE("an instance is linked to the earlier instance with which it shares most cells") {
   InstanceLinker linker(0.8, 18.0, 4.5, 0.25);
   const TrackedInstances whole = tracked_in({{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}});
   const TrackedInstances parts = tracked_in({{0, 1, 2}, {3, 4, 5, 6, 7, 8}, {9, 10, 11}, {40}});
@@ -337,7 +338,7 @@ TEST_CASE("of several that it overlaps, an instance is linked to that with which
   CHECK(now.instances[0].past.instance == 1);
   for (const std::size_t i : {0U, 1U, 2U}) CHECK(before.instances[i].future.instance == 0);
 
-  // Two of eleven cells are less than a quarter, and nothing is left of the scans before.
+  // Two of eleven cells are less than a quarter. Earlier scans have no influence.
   before = tracked_in({{0, 1}});
   now = tracked_in({{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10}});
   linker.link(before, now);
@@ -359,7 +360,7 @@ TEST_CASE("instances without a common cell are not linked, however many cells th
   CHECK(before.instances[0].future.instance == kNoCluster);
 }
 
-TEST_CASE("what is too long, too high or a single sample is not carried") {
+TEST_CASE("instances that are too long, too high or a single sample are not carried") {
   struct Case {
     float length, height;
     int samples;
@@ -373,7 +374,7 @@ TEST_CASE("what is too long, too high or a single sample is not carried") {
        }) {
     PointBuffer points;
     points.push_back(10.0F, 5.0F, -1.0F);
-    // The diagonal counts: 3, 4, 5.
+    // The limit applies to the diagonal: 3, 4, 5.
     if (c.samples > 1) {
       points.push_back(10.0F + 0.6F * c.length, 5.0F - 0.8F * c.length, c.height - 1.0F);
     }
@@ -403,14 +404,14 @@ TEST_CASE("belief along a track fades by 0.95 a scan, and old hits contradict it
   belief.propagate(&TrackedInstances::Instance::past, &before, now);
   CHECK(now.instances[0].past.log_odds == Approx(0.95F * 2.0F * kUnit));
   CHECK(now.instances[0].past.scans_since_motion == 1);
-  // It moved one scan ago: a hit up to nine scans back may have been itself, an older one not.
+  // It moved one scan ago. A hit up to nine scans back may be its own, an older one is not.
   now.instances[0].past.farthest_hit = 9;
   belief.propagate(&TrackedInstances::Instance::past, &before, now);
   CHECK(now.instances[0].past.log_odds > 0.0F);
   now.instances[0].past.farthest_hit = 10;
   belief.propagate(&TrackedInstances::Instance::past, &before, now);
   CHECK(now.instances[0].past.log_odds == 0.0F);
-  // Its own evidence outweighs that; the sum stops at four units, and one below zero.
+  // Its own evidence outweighs the hit. The sum is limited to four units above zero and one below.
   now.instances[0].own = kUnit;
   belief.propagate(&TrackedInstances::Instance::past, &before, now);
   CHECK(now.instances[0].past.log_odds == Approx((1.0F + 0.95F * 2.0F) * kUnit));
@@ -421,7 +422,7 @@ TEST_CASE("belief along a track fades by 0.95 a scan, and old hits contradict it
   now.instances[0].own = 4.0F * kUnit;
   belief.propagate(&TrackedInstances::Instance::past, &before, now);
   CHECK(now.instances[0].past.log_odds == Approx(4.0F * kUnit));
-  // Backwards it is the same with what comes after.
+  // The future side behaves equally.
   before.instances[0].future.instance = 0;
   belief.propagate(&TrackedInstances::Instance::future, nullptr, now);
   before.instances[0].own = 0.0F;
@@ -435,7 +436,7 @@ TEST_CASE("belief along a track fades by 0.95 a scan, and old hits contradict it
   CHECK(before.instances[0].future.log_odds == 0.0F);
 }
 
-TEST_CASE("the beams of a sensor are measured from one scan") {
+TEST_CASE("the beam spacing of a sensor is measured from one scan") {
   // 40 beams 0.5 deg apart, a point every 0.3 deg, at 20 m.
   PointBuffer points;
   for (int beam = 0; beam < 40; ++beam) {
@@ -458,7 +459,7 @@ TEST_CASE("the beams of a sensor are measured from one scan") {
   CHECK(estimate_sensor_model(PointsView(points).subview(0, 500)).known());
 }
 
-TEST_CASE("of a sensor whose beams are not evenly spaced, dense and wide gaps are told apart") {
+TEST_CASE("dense and wide gaps of unevenly spaced beams are distinguished") {
   // 24 gaps: ten of 0.3 deg, eight of 0.6 deg, six of 1.2 deg. Each beam is measured twice.
   PointBuffer points;
   double elevation = -10.0;

@@ -1,4 +1,4 @@
-// Parts of ingest and ground segmentation against simple implementations.
+// Parts of ingest and ground segmentation compared with simple implementations.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -58,7 +58,7 @@ float mean_by_sorting(std::vector<float> values, std::size_t wanted, float floor
   return total / static_cast<float>(values.size());
 }
 
-TEST_CASE("LowestMean gives the bits of sorting: few values, ties, rising and falling ones") {
+TEST_CASE("LowestMean gives the bits of sorting for few values, ties, rising and falling values") {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   Random random(2);
   for (const std::size_t count : {1U, 7U, 8U, 9U, 40U, 129U, 3000U}) {
@@ -90,7 +90,7 @@ TEST_CASE("LowestMean gives the bits of sorting: few values, ties, rising and fa
   }
 }
 
-TEST_CASE("Ingest takes good points in order and labels the others, however they are mixed") {
+TEST_CASE("Ingest takes good points in order and labels the others, in any mixture") {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   constexpr float kTiny = std::numeric_limits<float>::denorm_min();
@@ -111,7 +111,7 @@ TEST_CASE("Ingest takes good points in order and labels the others, however they
           const std::array<float, 3>& p = kinds[is_bad ? kind : 0];
           std::copy(p.begin(), p.end(), cloud.begin() + static_cast<std::ptrdiff_t>(stride * i));
         }
-        std::vector<PointLabel> labels(count / 2, PointLabel::kDynamic);  // of the scan before
+        std::vector<PointLabel> labels(count / 2, PointLabel::kDynamic);  // of an earlier scan
         const RawPoints<float> points{cloud.data(), count, stride};
         ingest.read(detail::CloudView(points), min_range, 50.0F, nullptr, labels);
 

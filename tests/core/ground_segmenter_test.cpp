@@ -14,7 +14,8 @@ namespace {
 
 using Config = GroundSegmenter::Config;
 
-// Whether each point of the scan is ground. Checks that the split is a permutation of the scan.
+// For each point of the scan, whether it is ground. Checks that the split is a permutation of the
+// scan.
 std::vector<bool> ground_of(GroundSegmenter& segmenter, PointsView scan) {
   GroundSplit split;
   std::vector<std::uint32_t> numbers(scan.size());
@@ -71,15 +72,16 @@ double share_of_differences(const std::vector<bool>& a, const std::vector<bool>&
   return static_cast<double>(different) / static_cast<double>(a.size());
 }
 
-// Only points on a border of a patch or of a plane may differ: moments and angles are floats.
+// Only points on a border of a patch or of a plane may differ, because moments and angles are
+// floats.
 constexpr double kOnBorders = 1e-3;
 
-TEST_CASE("ground is what Patchwork in double precision calls ground") {
-  GroundSegmenter segmenter(Config::paper());  // one object for all, as in the pipeline
+TEST_CASE("ground equals that of Patchwork in double precision") {
+  GroundSegmenter segmenter(Config::paper());  // one object for all scans, as in the pipeline
   const auto compare = [&](PointsView scan) {
     const std::vector<bool> expected = reference_ground(segmenter.config(), scan);
     const auto ground = std::count(expected.begin(), expected.end(), true);
-    REQUIRE(ground > static_cast<std::ptrdiff_t>(scan.size() / 4));  // else the comparison is void
+    REQUIRE(ground > static_cast<std::ptrdiff_t>(scan.size() / 4));  // otherwise nothing is tested
     REQUIRE(share_of_differences(ground_of(segmenter, scan), expected) < kOnBorders);
   };
   for (const double yaw : {0.0, 2.0}) {
@@ -98,11 +100,11 @@ TEST_CASE("planes are fitted to some points of a patch that has many") {
     const std::vector<bool> expected = reference_ground(config, scan);
     const std::vector<bool> by_some = ground_of(config, scan);
     CHECK(share_of_differences(by_some, expected) < kOnBorders);
-    CHECK(share_of_differences(by_some, by_all) > 5 * kOnBorders);  // else the comparison is void
+    CHECK(share_of_differences(by_some, by_all) > 5 * kOnBorders);  // otherwise nothing is tested
   }
 }
 
-// All points are below the first plane, but not all were among those that it was fitted to.
+// All points are below the first plane, but it was fitted to some of them only.
 TEST_CASE("a slope that flattens within its patch is fitted again") {
   Config config = Config::paper();
   const double depth = (config.ground_max_range - config.ground_min_range) / 8.0;  // outer rings
@@ -303,7 +305,7 @@ TEST_CASE("a patch more than ground_step over most of those around it is not gro
   // On a slope of 10 %, some neighbours are up to 0.7 m lower, but as many are higher.
   CHECK(is_ground({0.0, 0.1}));
   CHECK_FALSE(is_ground({1.2, 0.1}));
-  // Half of the neighbours are not most of them.
+  // Half of the neighbours are not a majority.
   CHECK(is_ground({1.0, 0.0, 0.5, 8, 4}));
   CHECK_FALSE(is_ground({1.0, 0.0, 0.5, 8, 5}));
   // Three neighbours are too few.
@@ -316,7 +318,7 @@ TEST_CASE("a patch more than ground_step over most of those around it is not gro
   CHECK_FALSE(is_ground({1.0, 0.0, 0.5, 4, 8, 2, 0}));
 }
 
-TEST_CASE("heights of the scan before do not decide whether a patch is ground") {
+TEST_CASE("heights of the previous scan do not decide whether a patch is ground") {
   PointBuffer around, alone;
   for (const int ring : {0, 2}) {
     for (const int sector : {19, 20, 21}) add_patch(2, ring, sector, 0.0, 0.0, around);

@@ -1,4 +1,4 @@
-// Beliefs of the free-space evidence: by hand, and against a sum without short cuts.
+// Beliefs of the free-space evidence, compared with values by hand and with a slow sum.
 #include "dynains/evidence/instance_beliefs.hpp"
 
 #include <algorithm>
@@ -42,14 +42,15 @@ InstanceSamples samples_of(const Instances& instances) {
   return samples;
 }
 
-// One scan and what references say of it.
+// One scan and the results of references on it.
 struct Scan {
   explicit Scan(const Instances& instances)
       : updater(FreeSpaceConfig()), samples(samples_of(instances)) {
     updater.begin(samples, beliefs);
   }
 
-  // By supervoxel: samples seen free, then samples hit, of the first ones.
+  // By supervoxel: number of samples seen free, then number of samples hit, beginning with the
+  // first sample.
   struct Seen {
     std::size_t free, hit;
   };
@@ -76,7 +77,7 @@ struct Scan {
   std::vector<std::size_t> hits;
 };
 
-TEST_CASE("what one reference says of a supervoxel changes its belief by one of three steps") {
+TEST_CASE("one reference changes the belief of a supervoxel by one of three steps") {
   enum Hit { kNone, kContested, kOccupied };
   struct Case {
     std::uint32_t samples;
@@ -88,16 +89,16 @@ TEST_CASE("what one reference says of a supervoxel changes its belief by one of 
            Case{4, {4, 0}, 2.0F * kFreeStep, kNone},  // wholly free
            Case{10, {9, 1}, kFreeStep, kNone},        // 0.9 is not more than 0.9
            Case{20, {19, 1}, 2.0F * kFreeStep, kNone},
-           Case{5, {3, 2}, kFreeStep, kNone},          // 0.6 speaks for free space
-           Case{9, {5, 4}, 0.0F, kNone},               // 0.56 says nothing
-           Case{10, {2, 0}, 2.0F * kFreeStep, kNone},  // two of ten are a view of it
+           Case{5, {3, 2}, kFreeStep, kNone},          // 0.6 raises the belief
+           Case{9, {5, 4}, 0.0F, kNone},               // 0.56 does not change the belief
+           Case{10, {2, 0}, 2.0F * kFreeStep, kNone},  // two of ten are enough
            Case{10, {1, 0}, 0.0F, kNone},              // one is not
-           Case{10, {3, 7}, 0.0F, kOccupied},          // 0.3 is a hit
+           Case{10, {3, 7}, 0.0F, kOccupied},          // one is not enough
            Case{9, {3, 6}, 0.0F, kNone},               // 0.33 is not
            Case{4, {0, 2}, 0.0F, kOccupied},           // two hits
-           Case{4, {0, 1}, 0.0F, kContested},          // one may be chance ...
-           Case{1, {0, 1}, 0.0F, kOccupied},           // ... unless there is no other sample
-           Case{12, {0, 3}, 0.0F, kOccupied},          // a quarter of many
+           Case{4, {0, 1}, 0.0F, kContested},  // a single hit of several samples may be chance
+           Case{1, {0, 1}, 0.0F, kOccupied},   // the only sample is hit
+           Case{12, {0, 3}, 0.0F, kOccupied},  // a quarter of many
            Case{12, {0, 2}, 0.0F, kContested}, Case{4, {0, 0}, 0.0F, kNone},  // not seen
        }) {
     Scan scan(Instances{{c.samples}});
@@ -110,12 +111,12 @@ TEST_CASE("what one reference says of a supervoxel changes its belief by one of 
   }
 }
 
-TEST_CASE("a single hit contests what is seen free, and alone it tells nothing") {
+TEST_CASE("a single hit contests free space, and alone it decides nothing") {
   Scan scan(Instances{{4}});
   scan.see({{0, 1}});
   CHECK(scan.beliefs.counts[0].decided == 0);
   scan.see({{1, 0}});
-  CHECK_FALSE(scan.is_free());  // as it would be otherwise: 1.69
+  CHECK_FALSE(scan.is_free());  // without the hit, 1.69 would be enough
   CHECK(scan.beliefs.counts[0].decided == 0);
   scan.see({{0, 1}});
   CHECK(scan.belief().level == Approx(std::max(0.0F, 2.0F * kFreeStep + kHitStep)).margin(1e-6));
@@ -138,7 +139,7 @@ TEST_CASE("a place that was hit needs more evidence, and starts again from zero"
   scan.see({{4, 0}});
   CHECK(scan.is_free());  // 2.54
   scan.see({{0, 4}});
-  CHECK(scan.is_free());  // what was seen free stays
+  CHECK(scan.is_free());  // the peak of the belief decides
   CHECK(scan.belief().level == Approx(3.0F * kFreeStep + kHitStep));
 }
 
@@ -156,7 +157,7 @@ TEST_CASE("references before and after a scan do not add up, but the higher side
   CHECK(scan.is_free());
 }
 
-TEST_CASE("a fifth of what is known of an instance removes it") {
+TEST_CASE("an instance is removed if a fifth of its known samples moved") {
   Scan enough(Instances{{2, 8}});
   enough.see({{2, 0}, {0, 8}});
   CHECK(enough.beliefs.counts[0].moved == 2);
@@ -168,7 +169,7 @@ TEST_CASE("a fifth of what is known of an instance removes it") {
   CHECK(too_little.beliefs.counts[0].decided == 11);
   CHECK_FALSE(too_little.removes());
 
-  // What nobody saw is not known.
+  // A supervoxel without results does not count as known.
   Scan hidden(Instances{{2, 9, 20}});
   hidden.see({{2, 0}, {0, 8}, {0, 0}});
   CHECK(hidden.beliefs.counts[0].decided == 11);
@@ -185,7 +186,7 @@ Scan scan_of_layers(std::size_t per_layer) {
   return scan;
 }
 
-// Two references see some supervoxels free, another may hit them again, and all hit the rest.
+// Some supervoxels are free in two references, and may be hit in another one. All others are hit.
 void see_free_and_hit(Scan& scan, const std::vector<std::size_t>& free, bool again) {
   std::vector<Scan::Seen> seen(scan.samples.supervoxel_count(), {0, 4});
   scan.see(seen);
@@ -195,21 +196,21 @@ void see_free_and_hit(Scan& scan, const std::vector<std::size_t>& free, bool aga
   if (again) scan.see(std::vector<Scan::Seen>(seen.size(), {0, 4}));
 }
 
-TEST_CASE("windows alone remove nothing: where beams hit again, the lower half must have moved") {
+TEST_CASE("free windows remove nothing: where beams hit again, the lower half must have moved") {
   // Five supervoxels a layer; numbers 0 to 9 are the lower half.
   const std::vector<std::size_t> windows = {10, 12, 16, 19};  // 0.2 of all
   Scan left = scan_of_layers(5);
   see_free_and_hit(left, windows, false);
-  CHECK(left.removes());  // nobody says that anything stands there still
+  CHECK(left.removes());  // no later hit shows that the object still stands
 
   Scan parked = scan_of_layers(5);
   see_free_and_hit(parked, windows, true);
-  CHECK(parked.beliefs.counts[0].moved == 16);  // these go nevertheless
+  CHECK(parked.beliefs.counts[0].moved == 16);  // the windows themselves count as moved
   CHECK(parked.belief(10).hit_again != 0);
   CHECK(parked.belief(11).hit_again == 0);
   CHECK_FALSE(parked.removes());
 
-  // Of the lower half, one tenth is too little, and two are enough.
+  // One tenth of the lower half is not enough, two tenths are.
   Scan little = scan_of_layers(5);
   see_free_and_hit(little, {10, 12, 16, 9}, true);
   CHECK_FALSE(little.removes());
@@ -217,7 +218,7 @@ TEST_CASE("windows alone remove nothing: where beams hit again, the lower half m
   see_free_and_hit(enough, {10, 12, 0, 9}, true);
   CHECK(enough.removes());
 
-  // Who lost half moved, whichever half it was.
+  // An instance that lost half of its samples moved, in whichever half they are.
   Scan nearly = scan_of_layers(5);
   see_free_and_hit(nearly, {10, 11, 12, 13, 14, 15, 16, 17, 18}, true);
   CHECK_FALSE(nearly.removes());
@@ -227,8 +228,8 @@ TEST_CASE("windows alone remove nothing: where beams hit again, the lower half m
 }
 
 TEST_CASE(
-    "who was seen through as a whole goes unless that was hit again and its lower half stayed") {
-  // Two references see nothing but windows, all of them free: three of ten samples.
+    "an instance seen through as a whole stays if it was hit again and its lower half stayed") {
+  // Two references cover only windows, all of them free: three of ten samples.
   const auto see_windows = [](std::size_t windows_below) {
     Scan scan = scan_of_layers(5);
     const std::vector<Scan::Seen> standing(20, {0, 4});
@@ -250,8 +251,8 @@ TEST_CASE(
   CHECK(moved.removes());
 }
 
-TEST_CASE("what is too small to carry windows goes as before") {
-  // Two supervoxels a layer, 16 samples in the lower half, of some of which nothing is known.
+TEST_CASE("an instance with few known samples in its lower half is removed by the general rule") {
+  // Two supervoxels per layer: 16 samples in the lower half, some without results.
   const Scan small = scan_of_layers(2);
   std::vector<Scan::Seen> seen(8, {0, 4});
   seen[0].hit = 0;
@@ -271,7 +272,7 @@ TEST_CASE("what is too small to carry windows goes as before") {
   }
 }
 
-TEST_CASE("of an odd number of layers the middle belongs to the lower half") {
+TEST_CASE("with an odd number of layers the middle layer belongs to the lower half") {
   Scan scan(Instances{std::vector<std::uint32_t>(10, 4)});
   for (std::size_t s = 0; s < 10; ++s) {
     scan.samples.place[s] = voxel_key(0, 0, static_cast<std::int32_t>(s / 2) - 3);
@@ -283,7 +284,7 @@ TEST_CASE("of an odd number of layers the middle belongs to the lower half") {
   CHECK(scan.removes());
 }
 
-TEST_CASE("a hit before a place was seen free, or on the other side, is none again") {
+TEST_CASE("a hit before a place was seen free, or on the other side, is not a hit again") {
   Scan scan = scan_of_layers(5);
   see_free_and_hit(scan, {10, 12, 16, 19}, false);
   scan.updater.begin_other_side(scan.samples, scan.beliefs);
@@ -292,8 +293,8 @@ TEST_CASE("a hit before a place was seen free, or on the other side, is none aga
   CHECK(scan.removes());
 }
 
-TEST_CASE("an instance that one reference saw through as a whole is removed") {
-  // A hit each contests all supervoxels; five samples of a hundred are no view of the whole.
+TEST_CASE("an instance that is free as a whole in one reference is removed") {
+  // One hit each contests all supervoxels. Five samples of a hundred are not enough for the whole.
   const std::vector<std::uint32_t> supervoxels(5, 20);
   const std::vector<Scan::Seen> contesting(5, {0, 1});
   Scan scan(Instances{supervoxels});
@@ -309,7 +310,7 @@ TEST_CASE("an instance that one reference saw through as a whole is removed") {
   CHECK(half.beliefs.wholes[0].level == 0.0F);
   CHECK_FALSE(half.removes());
 
-  // 24 of a hundred samples are no view of it, 25 are.
+  // 24 of a hundred samples are not enough for the whole, 25 are.
   Scan few(Instances{supervoxels});
   few.see({{5, 0}, {5, 0}, {5, 0}, {5, 0}, {4, 0}});
   CHECK(few.beliefs.wholes[0].level == 0.0F);
@@ -317,29 +318,29 @@ TEST_CASE("an instance that one reference saw through as a whole is removed") {
   CHECK(few.beliefs.wholes[0].level == Approx(2.0F * kFreeStep));
 }
 
-TEST_CASE("to remove an instance that was hit, one reference has to see through nearly all of it") {
+TEST_CASE("an instance that was hit is removed only if nearly all of it is free in one reference") {
   const std::vector<std::uint32_t> supervoxels(5, 20);
   const std::vector<Scan::Seen> standing(5, {0, 6}), wholly(5, {6, 0});
   Scan scan(Instances{supervoxels});
   scan.see(standing);
   scan.see({{5, 3}, {5, 3}, {5, 3}, {5, 3}, {5, 3}});
   CHECK(scan.beliefs.wholes[0].peak == Approx(kFreeStep));
-  CHECK_FALSE(scan.removes());  // below the 1.66 of tau_whole
+  CHECK_FALSE(scan.removes());  // below tau_whole: 1.66
 
   Scan gone(Instances{supervoxels});
   gone.see(standing);
   gone.see(wholly);
   CHECK(gone.beliefs.wholes[0].peak == Approx(2.0F * kFreeStep));
   CHECK(gone.beliefs.counts[0].moved == 0);
-  CHECK(gone.removes());  // 1.69, though below the 2.20 of tau_contested
+  CHECK(gone.removes());  // 1.69 is above tau_whole, though below the 2.20 of tau_contested
 }
 
-TEST_CASE("the caller is told of which instances anything changed") {
+TEST_CASE("the caller gets the instances whose beliefs changed") {
   Scan scan(Instances{{4, 4}, {20, 20, 20, 20, 20}, {20, 20, 20, 20, 20}, {4}});
   for (int round = 0; round < 2; ++round) {
     std::fill(scan.beliefs.changed.begin(), scan.beliefs.changed.end(), std::uint8_t{0});
-    // Of the first a part alone, of the last nothing, and when the third is hit like that again,
-    // the whole alone.
+    // First instance: only supervoxels change. Second: all beliefs change. Third: all change, and
+    // in the second round only the whole. Fourth: nothing changes.
     scan.see({{4, 0},
               {0, 4},
               {5, 0},
@@ -356,14 +357,14 @@ TEST_CASE("the caller is told of which instances anything changed") {
   }
 }
 
-TEST_CASE("an instance is told to be still there where nearly all that is seen of it is") {
+TEST_CASE("an instance is still there where nearly all of its seen samples are hit") {
   Scan scan(Instances{{10}, {10}, {10}, {10}});
-  // Of the second too little is seen, of the third too much is free, of the last nothing is seen.
+  // Second instance: too few samples are seen. Third: too many are free. Fourth: none is seen.
   scan.see({{0, 3}, {0, 2}, {1, 5}, {0, 0}});
   CHECK(scan.hits == std::vector<std::size_t>{0});
 }
 
-// The same sums, each supervoxel and instance anew for every reference.
+// Slow reference sum: recounts each supervoxel and instance for every reference.
 void add_slowly(const InstanceSamples& samples, const std::vector<BeamResult>& visibility,
                 std::vector<Belief>& supervoxels, std::vector<Belief>& wholes) {
   const FreeSpaceConfig config;
@@ -407,7 +408,7 @@ void add_slowly(const InstanceSamples& samples, const std::vector<BeamResult>& v
   }
 }
 
-TEST_CASE("beliefs are those of a sum that passes nothing over") {
+TEST_CASE("beliefs equal those of the slow reference sum") {
   Random random(29);
   for (int round = 0; round < 40; ++round) {
     Instances instances(1 + random.index(12));
@@ -425,7 +426,7 @@ TEST_CASE("beliefs are those of a sum that passes nothing over") {
         for (Belief& belief : supervoxels) belief.level = 0.0F;
         for (Belief& belief : wholes) belief.level = 0.0F;
       }
-      // Whole supervoxels look alike, as they do.
+      // Whole supervoxels often have equal results.
       std::vector<BeamResult> visibility(scan.samples.size());
       for (std::size_t s = 0; s < scan.samples.supervoxel_count(); ++s) {
         const double free = random.uniform(-0.5, 1.5), seen = random.uniform(-0.5, 1.5);
@@ -468,7 +469,7 @@ TEST_CASE("beliefs are those of a sum that passes nothing over") {
   }
 }
 
-// A wall in all directions, so far away (m).
+// A wall in all directions at `range` (m).
 GroundSplit wall(float range) {
   constexpr std::size_t kColumns = 360, kRows = 3;
   GroundSplit split;
@@ -482,7 +483,7 @@ GroundSplit wall(float range) {
   return split;
 }
 
-TEST_CASE("a reference is found by the scan it is asked from, until its image is needed again") {
+TEST_CASE("a reference is found by scan and lag until its image is replaced") {
   for (const int step : {1, 2, 3}) {
     FreeSpaceConfig config;
     config.reference_step = step;
@@ -494,7 +495,7 @@ TEST_CASE("a reference is found by the scan it is asked from, until its image is
     sensor.elevation_gap = sensor.elevation_gap_wide = 3.0;
     views.adapt(sensor);
     std::vector<ReferencePhase> phases;
-    constexpr std::uint64_t kScans = 40, kBreak = 17;  // where another epoch begins
+    constexpr std::uint64_t kScans = 40, kBreak = 17;  // another epoch begins at kBreak
     const auto epoch_of = [](std::uint64_t scan) { return scan < kBreak ? 0U : 1U; };
     const auto begin_of = [](std::uint64_t scan) { return scan < kBreak ? 0U : kBreak; };
     for (std::uint64_t scan = 0; scan < kScans; ++scan) {
@@ -511,7 +512,7 @@ TEST_CASE("a reference is found by the scan it is asked from, until its image is
           const bool is_reference =
               epoch_of(other) == epoch_of(from) &&
               (other - begin_of(other)) % static_cast<std::uint64_t>(step) == 0;
-          // Only lags that lead to a scan which may be a reference are ever asked for.
+          // Queries use only lags that lead to a scan with an image.
           if ((other - begin_of(from)) % static_cast<std::uint64_t>(step) != 0) continue;
           const int lag = static_cast<int>(other) - static_cast<int>(from);
           const ReferenceScan* const found = views.find(from, epoch_of(from), phases[from], lag);
@@ -526,7 +527,7 @@ TEST_CASE("a reference is found by the scan it is asked from, until its image is
         }
       }
     }
-    // What a beam of the last reference passed: nearer than its wall; hit: at it.
+    // A beam of the last reference passes points nearer than its wall, and hits those at it.
     PointBuffer points;
     const auto newest = 5.0F + static_cast<float>(views.newest().scan);
     points.push_back(newest - 2.0F, 0.0F, 0.0F);

@@ -1,4 +1,4 @@
-// Samples of instances, against something slow and obvious.
+// Samples of instances, compared with a slow and simple implementation.
 #include "dynains/evidence/instance_samples.hpp"
 
 #include <algorithm>
@@ -34,7 +34,7 @@ struct Scan {
 
 constexpr std::size_t kInstances = 5;
 
-// Points of some instances, and some of none, in a box about the sensor.
+// Points of some instances and points without instance, in a box around the sensor.
 Scan random_scan(std::uint64_t seed, std::size_t count, double reach) {
   Random random(seed);
   Scan scan;
@@ -56,7 +56,7 @@ Scan shuffled(const Scan& scan, std::uint64_t seed) {
   return result;
 }
 
-// The supervoxel in which a point of an instance lies.
+// The supervoxel that contains a point of an instance.
 Place place_of(std::uint32_t instance, const Point& p, float size) {
   const auto cell = [size](float coordinate) {
     return static_cast<std::int32_t>(std::floor(coordinate * (1.0F / size)));
@@ -82,7 +82,7 @@ std::map<Place, std::multiset<Point>> by_supervoxel(const InstanceSamples& sampl
       REQUIRE(!points.empty());
       const Place place = place_of(instance, *points.begin(), size);
       REQUIRE(samples.place[s] == packed(place));
-      // Never twice, however many supervoxels there are.
+      // No supervoxel occurs twice.
       REQUIRE(result.insert({place, points}).second);
     }
   }
@@ -102,7 +102,7 @@ std::vector<std::uint32_t> supervoxel_of(const InstanceSamples& samples, std::si
   return result;
 }
 
-TEST_CASE("a supervoxel has so many of its points as samples as it may, and every point has one") {
+TEST_CASE("a supervoxel has as many samples as permitted, and every point has a supervoxel") {
   constexpr float kSize = 0.9F;
   constexpr float kRange = 10.0F;
   const Scan scan = random_scan(7, 4000, 12.0);
@@ -110,7 +110,7 @@ TEST_CASE("a supervoxel has so many of its points as samples as it may, and ever
     CAPTURE(most);
     InstanceSampler sampler(kSize, kRange, most);
     InstanceSamples samples;
-    // Twice: buffers that were used before change nothing.
+    // Twice: the second call must not depend on the first.
     sampler.sample(scan.points, scan.instance_of, kInstances, samples);
     sampler.sample(scan.points, scan.instance_of, kInstances, samples);
     REQUIRE(samples.instance_count() == kInstances);
@@ -138,8 +138,8 @@ TEST_CASE("a supervoxel has so many of its points as samples as it may, and ever
   }
 }
 
-TEST_CASE("which points are samples does not depend on the order of the scan") {
-  // Near and crowded, and so wide that memory has to grow while points come.
+TEST_CASE("the choice of samples does not depend on the order of the scan") {
+  // Near and crowded, then so wide that memory grows while points are added.
   for (const double reach : {6.0, 60.0}) {
     CAPTURE(reach);
     const Scan scan = random_scan(21, 30000, reach);
@@ -155,7 +155,7 @@ TEST_CASE("which points are samples does not depend on the order of the scan") {
   }
 }
 
-TEST_CASE("what changes the last bit of a coordinate changes few samples") {
+TEST_CASE("a change of the last bit of a coordinate changes few samples") {
   const Scan scan = random_scan(5, 30000, 30.0);
   Scan moved;
   Random random(6);
@@ -186,7 +186,7 @@ TEST_CASE("what changes the last bit of a coordinate changes few samples") {
   CHECK(1000 * both.size() > 998 * after.size());
 }
 
-TEST_CASE("every part of a supervoxel gives as many samples as it has points") {
+TEST_CASE("the number of samples in each part of a supervoxel is proportional to its points") {
   // Points of one supervoxel at a time, twice as many in its right half as in its left half.
   Random random(9);
   Scan scan;
@@ -213,7 +213,7 @@ TEST_CASE("every part of a supervoxel gives as many samples as it has points") {
   CHECK(halves[0] < 2667 + 170);
 }
 
-TEST_CASE("rows of ranks keep the least of all that they were given, in order") {
+TEST_CASE("rows of ranks keep the least of all given ranks, in order") {
   Random random(3);
   for (const std::size_t most : {1U, 2U, 3U, 4U, 5U, 64U}) {
     detail::SmallestK ranks(most);
@@ -225,7 +225,7 @@ TEST_CASE("rows of ranks keep the least of all that they were given, in order") 
         const std::size_t row = random.index(row_count + 1);
         row_count = std::max(row_count, row + 1);
         ranks.make_rows(row_count);
-        // Ranks differ in more than their last three bits, or not at all.
+        // Ranks differ in more than their last three bits, or are equal.
         const auto rank = static_cast<std::uint32_t>(random.index(500)) * 8589930U;
         const std::uint32_t number = i * 2147479U;
         ranks.add(row, rank, number);
@@ -264,14 +264,14 @@ TEST_CASE("a point and its samples lie in the same supervoxel of the same instan
   }
 }
 
-TEST_CASE("a point that lies in another supervoxel than its predecessor is a change") {
+TEST_CASE("a point in another supervoxel than its predecessor is a change") {
   Random random(5);
   InstanceSampler sampler(0.5, 80.0, 1);
   for (const std::size_t count : {1U, 7U, 8U, 9U, 63U, 64U}) {
     for (int round = 0; round < 50; ++round) {
       PointBuffer points;
       for (std::size_t i = 0; i < count; ++i) {
-        // Within one voxel, or a few about the sensor.
+        // Within one voxel, or within a few around the sensor.
         const float reach = random.index(3) == 0 ? 0.6F : 0.1F;
         points.push_back(random.uniform_float(-0.05F, reach), random.uniform_float(-0.05F, reach),
                          random.uniform_float(-0.05F, reach));

@@ -1,5 +1,5 @@
-// What must not matter: where the world's origin is, which way the sensor's x axis points, and in
-// which order points come.
+// Results do not depend on the origin of the world, on the direction of the sensor's x axis, or on
+// the order of the points.
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstddef>
@@ -29,7 +29,7 @@ double f1(const std::vector<SimulatedScan>& scans, const StaticPoints& in_map) {
 }
 double f1(const std::vector<SimulatedScan>& scans) { return f1(scans, static_points(scans).final); }
 
-/// The same scans of a sensor that is turned about its z axis.
+/// The scans of a sensor that is turned about its z axis.
 std::vector<SimulatedScan> turned(std::vector<SimulatedScan> scans, double angle) {
   const Eigen::Isometry3d T_turned_sensor(
       Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix());
@@ -70,7 +70,7 @@ TEST_CASE("a moved world, a turned sensor and shuffled points change F1 by at mo
   T_moved_world.rotate(Eigen::AngleAxisd(1.1, Eigen::Vector3d(0.3, -0.2, 1.0).normalized()));
   const StaticPoints in_moved_map = static_points(scans, {}, T_moved_world).final;
   CHECK(std::abs(f1(scans, in_moved_map) - plain) <= 0.002);
-  // Not even a label changes, but where rounding decides.
+  // Labels change only where rounding decides.
   std::size_t count = 0, different = 0;
   for (std::size_t s = 0; s < scans.size(); ++s) {
     count += in_map[s].size();

@@ -1,4 +1,5 @@
-// Sensors that are mounted at a slant: the scans are turned level, and nobody notices.
+// Sensors that are mounted at a tilt: scans are levelled inside, and answers are in the sensor
+// frame.
 #include <Eigen/Geometry>
 #include <cmath>
 #include <vector>
@@ -20,7 +21,7 @@ Eigen::Matrix3d slant(double pitch, double roll) {
       .toRotationMatrix();
 }
 
-// At 5 m/s.
+// A drive at 5 m/s.
 std::vector<Scan> drive_slanted(double pitch, double roll) {
   const Scene scene = oncoming();
   std::vector<Scan> scans;
@@ -39,7 +40,7 @@ double kept_share(const std::vector<Scan>& scans, const std::vector<Verdict>& ve
                    static_cast<double>(removed.total - van.total);
 }
 
-TEST_CASE("a slanted sensor sees what a level one sees") {
+TEST_CASE("a tilted sensor gives results as good as a level one") {
   const auto [pitch, roll] =
       GENERATE(std::pair(0.0, 0.0), std::pair(5.0, 0.0), std::pair(15.0, 0.0), std::pair(25.0, 0.0),
                std::pair(-20.0, 10.0), std::pair(0.0, 30.0));
@@ -60,7 +61,7 @@ TEST_CASE("a sensor that hangs upside down needs no option") {
   CHECK(kept_share(scans, verdicts) > 0.99);
 }
 
-TEST_CASE("poses and map stay those of the user") {
+TEST_CASE("poses and map stay in the user's frames") {
   const std::vector<Scan> scans = drive_slanted(20.0, 5.0);
   DynaInsRemover remover;
   const auto check = [&](const ScanVerdict& verdict) {
@@ -84,11 +85,10 @@ TEST_CASE("poses and map stay those of the user") {
     if (!on_pillar && std::abs(p.z()) > 0.05) ++off;
   });
   REQUIRE(count > 3000);
-  CHECK(off < count / 100);  // what is left of the van
+  CHECK(off < count / 100);  // remaining points of the van
 }
 
-TEST_CASE(
-    "a level sensor is not tilted, only turned to its scene; or left alone if that is asked") {
+TEST_CASE("a level sensor is only turned to its scene, and not at all without the option level") {
   const double pitch = GENERATE(0.0, 2.0);
   const std::vector<Scan> scans = drive_slanted(pitch, 0.0);
   DynaInsRemover levelled;
@@ -120,7 +120,7 @@ TEST_CASE("a tilt of more than four degrees is levelled, and the height of the s
   }
 }
 
-TEST_CASE("a given tilt is taken at its word") {
+TEST_CASE("a given tilt is used without estimation") {
   const auto [pitch, roll] =
       GENERATE(std::pair(20.0, -10.0), std::pair(20.0, 0.0), std::pair(0.0, -20.0));
   const std::vector<Scan> scans = drive_slanted(pitch, roll);
@@ -139,7 +139,7 @@ TEST_CASE("a given tilt is taken at its word") {
   CHECK(as_it_is.sensor().is_level());
 }
 
-TEST_CASE("the range of points is that of the sensor, tilted or not") {
+TEST_CASE("the range of points is that of the sensor frame, tilted or not") {
   std::vector<Scan> scans = drive_slanted(25.0, 0.0);
   const std::vector<Verdict> verdicts = run(Config(), scans).final;
   for (const Verdict& verdict : verdicts) {
@@ -151,7 +151,7 @@ TEST_CASE("the range of points is that of the sensor, tilted or not") {
   }
 }
 
-TEST_CASE("after reset another sensor may be mounted otherwise") {
+TEST_CASE("after reset another sensor may have another mounting") {
   const std::vector<Scan> slanted = drive_slanted(20.0, 0.0);
   const std::vector<Scan> upright = drive_slanted(0.0, 0.0);
   DynaInsRemover used;

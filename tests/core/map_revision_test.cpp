@@ -1,4 +1,4 @@
-// What is in the map and is later seen through leaves it again.
+// Points of the map that are later seen through are removed.
 #include "dynains/map/map_revision.hpp"
 
 #include <Eigen/Geometry>
@@ -21,7 +21,7 @@
 namespace dynains::test {
 namespace {
 
-/// A scan to which all places look alike: free, hit, or nothing at all.
+/// A scan with one result for all samples: free, hit or unknown.
 class Eyes {
  public:
   explicit Eyes(BeamResult result) : result_(result) {}
@@ -36,7 +36,7 @@ class Eyes {
   detail::Visibility visibility_;
 };
 
-/// A scan that sees no more than the first points, and these free.
+/// A scan that covers only the first points, and these are free.
 class NarrowEyes {
  public:
   explicit NarrowEyes(std::size_t most) : most_(most) {}
@@ -79,8 +79,8 @@ struct Watched {
   }
 };
 
-// log-odds of 0.7 is 0.847; wholly free counts twice: 1.69, then 3.39, over the 2.94 of 0.95.
-TEST_CASE("a block of the map is emptied by the second scan that sees it wholly free") {
+// The log-odds of 0.7 are 0.847. Wholly free counts twice: 1.69, then 3.39, above the 2.94 of 0.95.
+TEST_CASE("a block of the map is emptied by the second scan in which it is wholly free") {
   Watched watched;
   watched.look(BeamResult::kFree);
   CHECK(watched.map.size() == 3);
@@ -89,7 +89,7 @@ TEST_CASE("a block of the map is emptied by the second scan that sees it wholly 
 }
 
 // The hit takes 1.70 away: 1.69, 0, 1.69, 3.39.
-TEST_CASE("a hit takes back what was seen free before, and no more than that") {
+TEST_CASE("a hit lowers the belief in free space, but not below zero") {
   Watched watched;
   for (int i = 0; i < 50; ++i) watched.look(BeamResult::kHit);
   watched.look(BeamResult::kFree);
@@ -102,7 +102,7 @@ TEST_CASE("a hit takes back what was seen free before, and no more than that") {
   CHECK(watched.map.empty());
 }
 
-TEST_CASE("a scan that sees little of a block says nothing of it") {
+TEST_CASE("a scan that covers few points of a block does not change its belief") {
   PointBuffer eight;
   for (int i = 0; i < 8; ++i) {
     eight.push_back(5.1F + 0.2F * static_cast<float>(i % 4), 0.1F,
@@ -132,7 +132,7 @@ TEST_CASE("a scan that sees little of a block says nothing of it") {
   }
 }
 
-TEST_CASE("tau_revise says how much it takes") {
+TEST_CASE("tau_revise is the belief at which a block is emptied") {
   MapRevision::Config config = Watched::every_scan();
   config.tau_revise = 0.84;  // log-odds 1.66
   Watched sooner(config);
@@ -147,7 +147,7 @@ TEST_CASE("tau_revise says how much it takes") {
   CHECK(later.map.empty());
 }
 
-TEST_CASE("a block is looked at once in a period, and only within range") {
+TEST_CASE("a block is tested once in a period, and only within range") {
   MapRevision::Config config;
   config.revision_period = 5;
   config.tau_revise = 0.84;
@@ -163,7 +163,7 @@ TEST_CASE("a block is looked at once in a period, and only within range") {
   CHECK(looks <= 5);
 }
 
-TEST_CASE("places that were emptied are filled again, with the memory of before") {
+TEST_CASE("emptied places are filled again, without new memory") {
   Watched watched;
   const std::size_t memory = watched.map.memory_bytes();
   for (int round = 0; round < 2000; ++round) {
@@ -199,14 +199,13 @@ std::vector<Scan> departure() {
 
 std::size_t points_of_van(const StaticMapAccumulator& map) {
   std::size_t count = 0;
-  // Lower blocks are shared with the ground, which stays.
+  // Lower blocks also contain ground, which stays.
   map.for_each_in({Eigen::Vector3d(6.7, 1.9, 0.41), Eigen::Vector3d(11.3, 4.1, 2.5)},
                   [&](const Eigen::Vector3d&) { ++count; });
   return count;
 }
 
-TEST_CASE(
-    "a van that leaves after lookahead_scans leaves the map, too; verdicts stay as they were") {
+TEST_CASE("a van that leaves after lookahead_scans leaves the map, and verdicts do not change") {
   const std::vector<Scan> scans = departure();
   DynaInsRemover::Config config;
   config.evidence.lookahead_scans = 5;
@@ -216,13 +215,13 @@ TEST_CASE(
   CHECK(run(plain, scans).final == run(revising, scans).final);
   CHECK(points_of_van(plain.map()) > 100);
   CHECK(points_of_van(revising.map()) < 5);
-  // Nothing else is lost.
+  // All other points stay.
   const std::size_t van = points_of_van(plain.map()) - points_of_van(revising.map());
   CHECK(static_cast<double>(revising.map().size()) >
         0.998 * static_cast<double>(plain.map().size() - van));
 }
 
-TEST_CASE("after a reset, a revised map comes out the same") {
+TEST_CASE("after a reset, a revised map is equal") {
   const std::vector<Scan> scans = departure();
   DynaInsRemover::Config config;
   config.evidence.lookahead_scans = 5;
@@ -244,7 +243,7 @@ struct CountingStages : DefaultStages {
   using Map = CountingMap;
 };
 
-TEST_CASE("a map is revised by free-space evidence, and only one that can let go of points") {
+TEST_CASE("a map is revised by free-space evidence, and only if its type can remove points") {
   DynaInsRemover::Config config = DynaInsRemover::Config::paper();
   config.revision.revise_map = true;
   CHECK_THROWS_WITH(
@@ -263,7 +262,7 @@ TEST_CASE("a map is revised by free-space evidence, and only one that can let go
       ContainsSubstring("MapRevision.revise_map = true needs a map that is kept in memory"));
 }
 
-TEST_CASE("a block of the map meets a reference once: its period is not below the step") {
+TEST_CASE("a block of the map is tested once per reference: its period is not below the step") {
   DynaInsRemover::Config config;
   config.evidence.reference_step = 3;
   config.revision.revision_period = 2;

@@ -35,8 +35,8 @@ double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b)) / kRadians;
 }
 
-/// A plane of 30 m by 30 m, `height` below the sensor, with a wall along it; turned into the frame
-/// of a sensor that is mounted with `R_level_sensor`.
+/// A plane of 30 m by 30 m, `height` below the sensor, with a wall along it, in the frame of a
+/// sensor that is mounted with `R_level_sensor`.
 PointBuffer street(double height, const Eigen::Matrix3d& R_level_sensor) {
   PointBuffer points;
   const auto add = [&](double x, double y, double z) {
@@ -50,7 +50,7 @@ PointBuffer street(double height, const Eigen::Matrix3d& R_level_sensor) {
   return points;
 }
 
-TEST_CASE("a heading turns with the points and runs along the scene, to its fuller end") {
+TEST_CASE("a heading turns with the points and runs along the scene, to its end with more points") {
   dynains::test::Random random(11);
   PointBuffer scan;
   for (int i = 0; i < 2000; ++i) {
@@ -92,7 +92,7 @@ TEST_CASE("A plane and a wall give exact height and tilt") {
   }
 }
 
-TEST_CASE("A sensor that hangs upside down is known by its tilt") {
+TEST_CASE("A sensor that hangs upside down is detected by its tilt") {
   const Eigen::Matrix3d R_level_sensor =
       Eigen::AngleAxisd(170.0 * kRadians, Eigen::Vector3d::UnitX()).toRotationMatrix();
   const Mounting mounting = estimate_mounting(street(2.0, R_level_sensor));
@@ -101,7 +101,7 @@ TEST_CASE("A sensor that hangs upside down is known by its tilt") {
   CHECK(std::abs(mounting.tilt() - 170.0) < 0.3);
 }
 
-TEST_CASE("What makes a sensor level is the smallest turn that does, upside down or not") {
+TEST_CASE("A sensor is levelled by the smallest rotation, upside down or not") {
   Mounting mounting;
   for (const double tilt : {0.0, 1e-9, 5.0, 89.9, 90.0, 90.1, 179.0, 180.0 - 1e-4, 180.0 - 1e-9}) {
     for (const double heading : {0.0, 0.3, 2.0, -1.7}) {
@@ -113,20 +113,20 @@ TEST_CASE("What makes a sensor level is the smallest turn that does, upside down
       CHECK((R * mounting.up_sensor - Eigen::Vector3d::UnitZ()).norm() < 1e-9);
       CHECK((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-9);
       CHECK(std::abs(R.determinant() - 1.0) < 1e-9);
-      if (tilt > 179.5) continue;  // Eigen's gives any half turn there
+      if (tilt > 179.5) continue;  // Eigen gives any half turn there
       const auto slow =
           Eigen::Quaterniond::FromTwoVectors(mounting.up_sensor, Eigen::Vector3d::UnitZ());
       CHECK((R - slow.toRotationMatrix()).norm() < 1e-12);
     }
   }
-  mounting.up_sensor = {0.0, 0.0, std::nextafter(1.0, 2.0)};  // as normals round
+  mounting.up_sensor = {0.0, 0.0, std::nextafter(1.0, 2.0)};  // rounding error of normals
   CHECK(mounting.tilt() == 0.0);
   mounting.up_sensor = -Eigen::Vector3d::UnitZ();
   CHECK(mounting.R_level_sensor() ==
         Eigen::Matrix3d(Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal()));
 }
 
-TEST_CASE("A roof of the own vehicle and points that are not finite do not mislead") {
+TEST_CASE("A roof of the own vehicle and points that are not finite change nothing") {
   PointBuffer points = street(1.9, Eigen::Matrix3d::Identity());
   for (double a = -2.0; a < 2.0; a += 0.05) {
     for (double b = -0.8; b < 0.8; b += 0.05) {
@@ -166,7 +166,7 @@ TEST_CASE("Without ground, the mounting is not known") {
   CHECK_FALSE(estimate_mounting(cloud).known);
 }
 
-TEST_CASE("Of two planes, that is the ground which has nothing below it, even if it is smaller") {
+TEST_CASE("The lower of two planes is the ground, even if it is smaller") {
   PointBuffer points;
   for (float b = -9.0F; b < 9.0F; b += 0.23F) {
     for (float a = -9.0F; a < 0.0F; a += 0.23F) points.push_back(a, b, -1.0F);
@@ -177,8 +177,7 @@ TEST_CASE("Of two planes, that is the ground which has nothing below it, even if
   CHECK(std::abs(mounting.height - 2.5) < 0.02);
 }
 
-TEST_CASE(
-    "A plane is no ground if more lies below it than on it, or if it is a small part of all") {
+TEST_CASE("A plane is no ground if more points are below it than on it, or if it is a small part") {
   const auto is_known = [](std::size_t below, std::size_t above) {
     PointBuffer points;
     for (float a = -2.5F; a < 2.5F; a += 0.23F) {  // a platform of a hundred cells
@@ -235,13 +234,13 @@ TEST_CASE("Height and tilt of every sensor in every simulated scene") {
             mount.roll, mounting.height, mounting.up_sensor.transpose());
     REQUIRE(mounting.known);
     CHECK(std::abs(mounting.height - mount.height) < 0.12);
-    // The vehicle does not stand parallel to the ground around it: crowned roads, unevenness.
+    // The vehicle is not parallel to the ground around it: crowned roads, unevenness.
     CHECK(angle_between(mounting.up_sensor, R_body_sensor.transpose() * Eigen::Vector3d::UnitZ()) <
           2.2);
   }
 }
 
-// Height: of ground points around the vehicle, read off by hand.
+// `height` was measured by hand on ground points around the vehicle.
 void check_mounting(const std::string& name, double height, double tilt) {
   const auto folder = dynains::test::recording_or_skip(name);
   if (!folder) return;
@@ -266,7 +265,7 @@ struct Accuracy {
   double removed;  // share of moving points
 };
 
-/// The default preset on a street seen by a sensor that is pitched by so many degrees.
+/// The default preset on a street with a sensor that is pitched by `pitch` degrees.
 Accuracy accuracy_when_pitched(double pitch) {
   dynains::simulation::Config config;
   config.scene = dynains::simulation::Scene::kUrban;
@@ -307,7 +306,7 @@ Accuracy accuracy_when_pitched(double pitch) {
           static_cast<double>(removed) / static_cast<double>(moving)};
 }
 
-TEST_CASE("A street is cleaned as well through a pitched sensor") {
+TEST_CASE("A street is cleaned equally well with a pitched sensor") {
   const Accuracy level = accuracy_when_pitched(0.0);
   CHECK(level.kept > 0.97);
   CHECK(level.removed > 0.93);

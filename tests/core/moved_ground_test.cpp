@@ -1,4 +1,4 @@
-// Ground under removed instances: what stands on it goes, the ground itself stays.
+// Ground under removed instances: points of objects on it are removed, the ground itself stays.
 #include "dynains/evidence/moved_ground.hpp"
 
 #include <Eigen/Dense>
@@ -22,7 +22,7 @@ constexpr float kAnyRise = 100.0F;  // m, so that every point is kept
 // A street that falls to the right and rises ahead.
 float street(float x, float y) { return -1.7F + 0.1F * x - 0.05F * y; }
 
-// Points of the street, one in 0.5 m, but for those that `leave_out(x, y)`.
+// Points of the street, one in 0.5 m, except those where `leave_out(x, y)`.
 template <class LeaveOut>
 PointBuffer street_about(float x, float y, float reach, LeaveOut&& leave_out) {
   PointBuffer points;
@@ -35,7 +35,7 @@ PointBuffer street_about(float x, float y, float reach, LeaveOut&& leave_out) {
 }
 constexpr auto kNothing = [](float, float) { return false; };
 
-TEST_CASE("heights over a slope are told from the ground around, whatever stands on it") {
+TEST_CASE("heights over a slope are derived from the ground around, whatever stands on it") {
   SurroundingGround ground(80.0);
   PointBuffer points = street_about(21.0F, -9.0F, 4.0F, kNothing);
   const auto off = [&] { return std::abs(ground.height(21.0F, -9.0F, street(21.0F, -9.0F))); };
@@ -51,7 +51,7 @@ TEST_CASE("heights over a slope are told from the ground around, whatever stands
   CHECK(off() < 1e-4F);
 }
 
-TEST_CASE("too few points, or points on a line, tell nothing of how the ground lies") {
+TEST_CASE("too few points, or points on a line, do not define the plane of the ground") {
   SurroundingGround ground(80.0);
   PointBuffer points;
   ground.assign(points, 0.03F);
@@ -66,7 +66,7 @@ TEST_CASE("too few points, or points on a line, tell nothing of how the ground l
   ground.assign(points, 0.03F);
   CHECK(ground.height(1.0F, 1.0F, 0.25F) == Approx(0.25F).margin(1e-5));
 
-  // Two lines: 0.4 m^2 of variance across them are at a distance of 1.265 m.
+  // Two lines: the variance across them is 0.4 m^2 at a distance of 1.265 m.
   for (const float apart : {0.0F, 1.26F, 1.27F}) {
     PointBuffer lines;
     for (int i = 0; i < 20; ++i) {
@@ -91,7 +91,7 @@ TEST_CASE("points beyond the range of the ground around change nothing within") 
   CHECK_NOTHROW(ground.height(-1e30F, 1e30F, 0.0F));
 }
 
-// Height over the plane through all points in the nine cells about a place, by Eigen.
+// Height over the plane through all points in the nine cells around a place, by Eigen.
 float reference_height(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& at) {
   const auto cell = [](double coordinate) { return std::floor(coordinate / 2.0); };
   std::vector<Eigen::Vector3d> around;
@@ -122,7 +122,7 @@ float reference_height(const std::vector<Eigen::Vector3d>& points, const Eigen::
   return static_cast<float>(at.z() - plane.dot(Eigen::Vector3d(at.x(), at.y(), 1.0)));
 }
 
-TEST_CASE("heights are those of a least-squares fit to what does not rise itself") {
+TEST_CASE("heights equal those of a least-squares fit to points that do not rise") {
   Random random(71);
   SurroundingGround ground(80.0);
   std::size_t known = 0, unknown = 0, rising = 0;
@@ -169,7 +169,7 @@ TEST_CASE("heights are those of a least-squares fit to what does not rise itself
   CHECK(rising > 50);
 }
 
-// A box of 2 m that was removed from the street, so far over it (m).
+// A box of 2 m that was removed, `rise` (m) above the street.
 struct RemovedBox {
   explicit RemovedBox(float over = 0.2F) {
     for (float x = 19.0F; x <= 21.0F; x += 0.1F) {
@@ -186,7 +186,7 @@ struct RemovedBox {
   std::vector<EvidenceVerdict::Group> groups = {{}, {Cause::kWithInstance, 0.9F}};
 };
 
-// Numbers of the ground points that go with the box; no other scan has a say.
+// Indices of the ground points that are removed with the box. There are no references.
 std::set<std::uint32_t> ground_that_goes(const FreeSpaceConfig& config, const PointBuffer& ground) {
   MovedGround moved(config);
   const RemovedBox box;
@@ -202,22 +202,23 @@ std::set<std::uint32_t> ground_that_goes(const FreeSpaceConfig& config, const Po
   return found;
 }
 
-TEST_CASE("under a removed box the foot of something goes with its cell, the street stays") {
+TEST_CASE(
+    "under a removed box, the foot of an object is removed with its cell, and the street stays") {
   FreeSpaceConfig config;
   PointBuffer ground = street_about(20.0F, 0.0F, 5.0F, kNothing);
   const auto street_size = static_cast<std::uint32_t>(ground.size());
   CHECK(ground_that_goes(config, ground).empty());
 
   const auto rise = static_cast<float>(config.footprint_rise);
-  // In cells of their own, as the sides of cells are whole multiples of 0.3 m from the sensor.
+  // Each in a cell of its own: the sides of cells are whole multiples of 0.3 m from the sensor.
   ground.push_back(20.25F, 0.15F, street(20.25F, 0.15F) + rise + 0.005F);
   ground.push_back(20.20F, 0.10F, street(20.20F, 0.10F));
   ground.push_back(19.65F, 0.75F, street(19.65F, 0.75F) + rise - 0.005F);
-  // As high, but with nothing over it.
+  // At equal height, but without a removed point above it.
   ground.push_back(24.15F, 0.15F, street(24.15F, 0.15F) + rise + 0.005F);
   CHECK(ground_that_goes(config, ground) == std::set<std::uint32_t>{street_size, street_size + 1});
 
-  // Without a look at heights, whatever lies below goes.
+  // Without a limit for heights, all ground points below the box are removed.
   config.footprint_rise = 0.0;
   const std::set<std::uint32_t> all = ground_that_goes(config, ground);
   CHECK(all.count(street_size + 2) == 1);
@@ -228,7 +229,7 @@ TEST_CASE("under a removed box the foot of something goes with its cell, the str
   }
 }
 
-TEST_CASE("what stands on the ground may begin higher over it where beams are farther apart") {
+TEST_CASE("an object on the ground may begin higher above it where beams are farther apart") {
   FreeSpaceConfig config;
   config.footprint_rise = 0.0;
   const PointBuffer ground = street_about(20.0F, 0.0F, 5.0F, kNothing);
@@ -248,10 +249,10 @@ TEST_CASE("what stands on the ground may begin higher over it where beams are fa
   }
 }
 
-// What a reference saw of the ground, by x.
+// Result of a reference for a ground point at x.
 using Reference = std::function<BeamResult(float x)>;
 
-// Numbers of the ground points beside a removed box that go with it by what references saw.
+// Indices of the ground points beside a removed box that are removed by the results of references.
 std::set<std::uint32_t> ground_seen_free(const PointBuffer& ground,
                                          const std::vector<Reference>& references) {
   MovedGround moved{FreeSpaceConfig()};
@@ -274,8 +275,8 @@ std::set<std::uint32_t> ground_seen_free(const PointBuffer& ground,
   return found;
 }
 
-TEST_CASE("ground beside a removed box goes if two references saw it free and few hit it") {
-  // Two voxels of 1.2 m beside the box, from one to the other and back, and one point far from it.
+TEST_CASE("ground beside a removed box is removed if it is free in two references and hit in few") {
+  // Two voxels of 1.2 m beside the box, visited alternately, and one point far from it.
   PointBuffer ground;
   for (const float x : {22.1F, 22.2F, 22.3F, 23.1F, 23.2F, 23.3F, 22.4F, 22.5F, 30.0F}) {
     ground.push_back(x, 0.1F, street(x, 0.1F));
@@ -289,9 +290,9 @@ TEST_CASE("ground beside a removed box goes if two references saw it free and fe
   CHECK(ground_seen_free(ground, {free}).empty());
   CHECK(ground_seen_free(ground, {free, free}) == both);
   std::vector<Reference> references = {free, hit, hit, hit, hit, hit, hit, free};
-  CHECK(ground_seen_free(ground, references) == both);  // 2 are more than 0.3 of 6 ...
+  CHECK(ground_seen_free(ground, references) == both);  // 2 are more than 0.3 of 6
   references.push_back(hit);
-  CHECK(ground_seen_free(ground, references).empty());  // ... but not of 7
+  CHECK(ground_seen_free(ground, references).empty());  // 2 are less than 0.3 of 7
   const Reference near_free = [](float x) {
     return x < 22.8F ? BeamResult::kFree : BeamResult::kUnknown;
   };
@@ -302,14 +303,14 @@ TEST_CASE("ground beside a removed box goes if two references saw it free and fe
   CHECK(ground_seen_free(ground, {far_free, near_free, far_free}) == far);
 }
 
-TEST_CASE("where the ground around is not known, all of it goes from under a removed box") {
+TEST_CASE("where the ground around is not known, all of it is removed from under a removed box") {
   FreeSpaceConfig config;
-  // The ground shows below the box only.
+  // Ground points exist below the box only.
   const PointBuffer ground =
       street_about(20.0F, 0.0F, 5.0F, [](float x, float y) { return !RemovedBox::is_below(x, y); });
   CHECK(ground_that_goes(config, ground).size() == ground.size());
 
-  // Nobody is asked how the ground around lies.
+  // With this distance, the plane of the ground around is not used.
   config.ground_test_distance = 0.0;
   const PointBuffer street = street_about(20.0F, 0.0F, 5.0F, kNothing);
   CHECK(ground_that_goes(config, street).size() >= ground.size());

@@ -11,8 +11,8 @@
 namespace dynains::test {
 namespace {
 
-// A cluster that owns its window; scans are added oldest first. Its points come in ranges of 1, 2,
-// 3 and so on up to 19, between which lie points of another cluster.
+// A cluster with its own window. Scans are added oldest first. The points are in ranges of 1, 2, 3
+// and so on up to 19, with points of another cluster in between.
 class Cluster {
  public:
   Cluster& point(double range, double azimuth_degrees, double z) {
@@ -132,7 +132,7 @@ TEST_CASE("descriptors are those of Eq. 5-11 in double on random clusters") {
   }));
   INFO(c.why);
   const OccupancyDescriptor::Config config = make(0.25, 1.5);
-  OccupancyDescriptor descriptor(config);  // one object for all, as in the pipeline
+  OccupancyDescriptor descriptor(config);  // one object for all clusters, as in the pipeline
   int compared = 0;
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
     Random random(seed);
@@ -230,7 +230,7 @@ TEST_CASE("observations without any height are equal to each other and unlike al
   }
 }
 
-TEST_CASE("tau_s = 0 proposes nothing, tau_s = 1 all that differ") {
+TEST_CASE("tau_s = 0 proposes nothing, tau_s = 1 proposes all that differ") {
   const Cluster apart = Cluster()
                             .point(10.0, 0.0, 0.0)
                             .point(12.0, 0.0, 1.0)

@@ -96,7 +96,7 @@ std::vector<float> sums(const std::vector<float>& a) {
   return out;
 }
 
-// Calls `test` with the other kinds of packs that this processor supports, in code for them.
+// Calls `test` with the other kinds of packs that this processor supports, compiled for them.
 template <class Test>
 void with_larger_registers(Test&& test) {
   if (detail::has_avx2()) {
@@ -111,7 +111,7 @@ void with_larger_registers(Test&& test) {
   }
 }
 
-TEST_CASE("all kinds of packs give the same bits") {
+TEST_CASE("all kinds of packs give equal bits") {
   Random random(20);
   std::vector<float> a, b;
   const float special[] = {0.0F, -0.0F, 1.0F, -1.0F, 1e-40F, -1e-40F,  1e30F,     -1e30F,
@@ -218,7 +218,7 @@ TEST_CASE("load_columns, pick and move_some_to_front give equal results with all
       const unsigned all = (1U << count) - 1U;
       const unsigned bits = static_cast<unsigned>(random.uniform(0.0, Packs::kAll + 0.999)) & all;
       const std::size_t gap = static_cast<std::size_t>(random.uniform(0.0, 5.0));
-      // Records move to the front, over the gap; records behind the moved ones must not change.
+      // Records move to the front, over the gap. Records after the moved ones must not change.
       std::vector<detail::PointRecord> records(gap + 2 * kCount);
       for (std::uint32_t i = 0; i < records.size(); ++i) {
         const auto number = static_cast<float>(i);

@@ -18,8 +18,8 @@ Eigen::Isometry3d random_pose(Random& random, double reach) {
   return T;
 }
 
-TEST_CASE("points of the window are where Eq. 3 puts them in double") {
-  // Every count up to three packs of eight, so that tails of every length occur.
+TEST_CASE("points of the window are at the place of Eq. 3 in double") {
+  // All counts up to three packs of eight, so that tails of every length occur.
   Random random(1);
   for (std::size_t count = 0; count <= 24; ++count) {
     const Eigen::Isometry3d T = random_pose(random, 5.0);
@@ -45,7 +45,7 @@ TEST_CASE("points of the window are where Eq. 3 puts them in double") {
   }
 }
 
-TEST_CASE("a window that is cleared and refilled holds nothing old") {
+TEST_CASE("a window that is cleared and refilled contains no old points") {
   PointBuffer points;
   for (int i = 0; i < 20; ++i) points.push_back(3.0F, 4.0F, 1.0F);
   PolarBuffer window;

@@ -1,4 +1,4 @@
-// Polar points written by hand in degrees, or drawn at random.
+// Polar points given by hand in degrees, or drawn at random.
 #pragma once
 
 #include <cmath>
@@ -20,7 +20,7 @@ inline void add(PolarBuffer& points, double range, double azimuth_degrees, doubl
   points.z[at] = static_cast<float>(z);
 }
 
-/// Points of some ranges, one behind the other.
+/// Points of some ranges, one after the other.
 inline PolarBuffer gathered(PolarView window, Span<const PointRange> ranges) {
   PolarBuffer result;
   for (const PointRange& part : ranges) {

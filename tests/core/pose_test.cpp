@@ -18,7 +18,7 @@ Eigen::Isometry3d random_pose(Random& random) {
   return T;
 }
 
-TEST_CASE("transforms by coefficients are those of Eigen") {
+TEST_CASE("transforms by coefficients equal those of Eigen") {
   Random random(1);
   for (int i = 0; i < 20; ++i) {
     const Eigen::Isometry3d a = random_pose(random), b = random_pose(random);

@@ -1,4 +1,4 @@
-// Range images and the beams that are tested against them, each against the slow and obvious.
+// Range images and the beams that are tested against them, compared with slow and simple ones.
 #include "dynains/evidence/range_image.hpp"
 
 #include <algorithm>
@@ -50,7 +50,7 @@ TEST_CASE("columns follow the azimuth within 1e-4 rad, rows the elevation within
   }
 }
 
-TEST_CASE("an image has cells that suit the beams of a sensor, within limits") {
+TEST_CASE("cells of an image are derived from the beams of a sensor, within limits") {
   SensorModel sensor;
   sensor.azimuth_step = 0.3;
   sensor.elevation_gap = 0.5;
@@ -59,7 +59,7 @@ TEST_CASE("an image has cells that suit the beams of a sensor, within limits") {
   sensor.elevation_max = 10.0;
   const RangeImageGrid grid = RangeImageGrid::for_sensor(sensor);
   CHECK(grid.columns == 1000);                    // 0.36 deg
-  CHECK(std::abs(grid.rows - 34.0 / 0.3) < 2.0);  // 2 deg more than the beams on either side
+  CHECK(std::abs(grid.rows - 34.0 / 0.3) < 2.0);  // 2 deg more than the beams on each side
   CHECK(std::abs(grid.lowest * kDegrees + 22.0) < 0.2);
   CHECK(grid.hole_rows == 4);  // 1.2 deg
   sensor.azimuth_step = 0.05;
@@ -72,28 +72,28 @@ TEST_CASE("an image has cells that suit the beams of a sensor, within limits") {
   CHECK(std::abs(RangeImageGrid::for_sensor(sensor).rows - 34.0 / 0.4) < 2.0);
 }
 
-TEST_CASE("a direction that no image covers has cell 0") {
+TEST_CASE("a direction outside the image has cell 0") {
   const RangeImageGrid grid = small_grid();
   CHECK(cell_of(grid, 0.0F, 0.0F, 0.0F) == 0);
   CHECK(cell_of(grid, 1.0F, 0.0F, 1.0F) == 0);
   CHECK(cell_of(grid, 1.0F, 0.0F, -1.0F) == 0);
   CHECK(cell_of(grid, 1.0F, 0.0F, 0.0F) > 0);
-  // Straight behind the sensor, on both sides of the seam.
+  // Straight backwards, on both sides of the seam.
   const auto stride = static_cast<std::int32_t>(grid.stride());
   const auto border = static_cast<std::int32_t>(detail::kPackWidth);
   CHECK(cell_of(grid, -1.0F, 1e-9F, 0.0F) % stride == border + grid.columns - 1);
   CHECK(cell_of(grid, -1.0F, -1e-9F, 0.0F) % stride == border);
 }
 
-// In centimetres, even: odd are those of what moved.
+// In centimetres. Even numbers are static points, odd ones moving points.
 int marked_range(float x, float y, float z, bool moving) {
   const float range = std::sqrt((x * x + y * y) + z * z);
   return (static_cast<int>(range * 100.0F) & ~1) | (moving ? 1 : 0);
 }
 bool is_moving(int range) { return range % 2 != 0; }
 
-// The image as its definition has it: nearest return per cell, holes between two returns of a
-// column closed, the nearest of 3x3 cells around. `moving`: by point; none did if it is empty.
+// The image by its definition: nearest return per cell, gaps between two returns of a column
+// closed, nearest of the 3x3 cells around. `moving`: by point; if empty, no point moves.
 class ReferenceImage {
  public:
   ReferenceImage(const RangeImageGrid& grid, const PointBuffer& points,
@@ -165,7 +165,7 @@ class ReferenceImage {
   std::vector<int> cells_;
 };
 
-TEST_CASE("an image is what its definition says, cell by cell") {
+TEST_CASE("an image equals its definition, cell by cell") {
   Random random(5);
   const RangeImageGrid grid = small_grid();
   REQUIRE(grid.hole_rows >= 2);
@@ -184,7 +184,7 @@ TEST_CASE("an image is what its definition says, cell by cell") {
     for (const double share : {0.0, 0.1, 0.6}) {
       std::vector<std::uint8_t> moving(points.size());
       for (auto& value : moving) value = random.uniform(0.0, 1.0) < share ? 1 : 0;
-      // With a reach of nothing, objects are like ground.
+      // With a reach of zero, objects are treated like ground.
       if (share > 0) {
         image.build(grid, PointsView(), points, moving, 0.0F, scratch);
       } else {
@@ -219,7 +219,7 @@ int around_with_objects(const RangeImageGrid& grid, const ReferenceImage& all,
   return result;
 }
 
-TEST_CASE("near objects protect more cells about them, across the seam and the edges as well") {
+TEST_CASE("near objects protect more cells around them, also across the seam and at the edges") {
   Random random(6);
   SensorModel sensor = SensorModel::typical();
   sensor.elevation_min = -10.0;
@@ -267,8 +267,9 @@ TEST_CASE("near objects protect more cells about them, across the seam and the e
   }
 }
 
-// A wall 20 m ahead and before it, at 10 m, a board of 1 m, seen by beams 0.2 deg apart.
-TEST_CASE("what moved hides what is behind it, protects nothing and says nothing of its place") {
+// A wall at 20 m and a board of 1 m at 10 m in front of it, seen by beams 0.2 deg apart.
+TEST_CASE(
+    "a moving board hides points behind it, protects no cells and gives unknown at its place") {
   const RangeImageGrid grid = RangeImageGrid::for_sensor(SensorModel::typical());
   PointBuffer points;
   std::vector<std::uint8_t> board;
@@ -282,7 +283,8 @@ TEST_CASE("what moved hides what is behind it, protects nothing and says nothing
                        static_cast<float>(std::hypot(x, y) * std::tan(elevation / kDegrees)));
     }
   }
-  // Before and behind the board; in the column beside its last return, at 2.8 deg; far beside it.
+  // In front of the board and behind it; in the column beside its last return, at 2.8 deg; far
+  // beside it.
   const double column = 2.0 * M_PI / grid.columns;
   const double behind = 1.5 / kDegrees, far_beside = 4.5 / kDegrees;
   const double beside = (std::floor((M_PI + 2.8 / kDegrees) / column) + 1.5) * column - M_PI;
@@ -349,7 +351,7 @@ TEST_CASE("bits of visibility are counted over any range") {
 }
 
 TEST_CASE(
-    "a sample is free where all beams about it go farther, hit where one ends, else unknown") {
+    "a sample is free where all beams around it go farther, hit where one ends, else unknown") {
   // A wall 20 m ahead, seen by beams 0.2 deg apart in both directions.
   const RangeImageGrid grid = RangeImageGrid::for_sensor(SensorModel::typical());
   PointBuffer wall;
@@ -364,12 +366,12 @@ TEST_CASE(
   RangeImage::Scratch scratch;
   image.build(grid, PointsView(), wall, {}, 0.0F, scratch);
 
-  // The margin at 20 m is 0.25 + 0.01 * 20 = 0.45 m. Samples in the frame of a sensor that stands
-  // 5 m behind this one.
+  // The margin at 20 m is 0.25 + 0.01 * 20 = 0.45 m. Samples are in the frame of a sensor 5 m
+  // behind this one.
   PointBuffer samples;
   for (const float x : {24.4F, 24.6F, 25.0F, 25.4F, 25.6F, 15.0F}) samples.push_back(x, 0.0F, 0.0F);
   samples.push_back(5.0F, 0.0F, 20.0F);  // above all beams
-  samples.push_back(0.0F, 20.0F, 0.0F);  // aside of all beams
+  samples.push_back(0.0F, 20.0F, 0.0F);  // beside all beams
   const std::size_t count = samples.size();
   samples.resize(count + detail::kPackWidth);
   Eigen::Isometry3d T_reference_sample = Eigen::Isometry3d::Identity();

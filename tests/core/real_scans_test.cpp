@@ -1,4 +1,4 @@
-// A recorded clip, where the machine has it.
+// A recorded clip, if the machine has it.
 #include <vector>
 
 #include "dynains/evaluation/evaluate.hpp"

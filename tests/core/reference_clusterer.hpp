@@ -1,4 +1,4 @@
-// Curved-voxel clustering as the paper tells it: a map of voxels, breadth-first search over the 26
+// Curved-voxel clustering as in the paper: a map of voxels, breadth-first search over the 26
 // neighbours, in double with libm.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Eq. 5-11 word for word: sets of points, double precision, the smallest arc by sorting.
+// Direct implementation of Eq. 5-11: sets of points, double precision, the smallest arc by sorting.
 #pragma once
 
 #include <algorithm>
@@ -19,8 +19,8 @@ struct ReferenceDescriptor {
   double similarity = 0.0;                   // d
 };
 
-/// Empty if a point or an extent lies so near to a border that float and double may differ, or if
-/// two gaps between the points are almost equally wide.
+/// Empty if a point or an extent is so near to a border that float and double may differ, or if two
+/// gaps between the points have almost equal widths.
 inline std::optional<ReferenceDescriptor> describe(const OccupancyDescriptor::Config& config,
                                                    const ClusterView& cluster) {
   constexpr double kMargin = 1e-3;
@@ -32,7 +32,7 @@ inline std::optional<ReferenceDescriptor> describe(const OccupancyDescriptor::Co
   const double r_max = *std::max_element(points.range.begin(), points.range.end());
   const double z_min = *std::min_element(points.z.begin(), points.z.end());
 
-  // The smallest arc that holds all points begins behind the widest gap between neighbours.
+  // The smallest arc that contains all points begins after the widest gap between neighbours.
   std::vector<double> sorted(points.azimuth.begin(), points.azimuth.end());
   std::sort(sorted.begin(), sorted.end());
   double theta_min = sorted.front();

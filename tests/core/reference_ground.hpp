@@ -1,6 +1,6 @@
 // A slow implementation of Patchwork: double precision, libm, sorting and Eigen's eigenvalue
-// solver. Beyond Patchwork, planes are fitted to some points of a patch, and patches far above
-// their neighbours are not ground.
+// solver. Two rules are additions to Patchwork: planes are fitted to some points of a patch, and
+// patches far above their neighbours are not ground.
 #pragma once
 
 #include <Eigen/Dense>
@@ -133,8 +133,8 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
     patch.members = members_of(patch.points);
   }
 
-  // Heights of the patches on both sides in the ring, and of three in each adjacent ring: the one
-  // at the middle of the sector and its neighbours.
+  // Heights of the neighbouring patches in the ring, and of three in each adjacent ring: the one at
+  // the middle of the sector and its neighbours.
   const auto rings = [](int z) {
     return detail::ConcentricZones::kRings[static_cast<std::size_t>(z)];
   };

@@ -1,4 +1,4 @@
-// Whatever comes in: an exception or a label, and a remover that works on.
+// Any input gives an exception or a label, and the remover continues to work.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -17,7 +17,7 @@
 namespace dynains {
 
 namespace test {
-// Points that cannot be read to the end.
+// A cloud whose points throw at some index.
 struct BrokenCloud {
   const std::vector<Eigen::Vector3f>& points;
 };
@@ -58,7 +58,7 @@ Eigen::Isometry3d broken(const std::function<void(Eigen::Matrix4d&)>& damage) {
   return T;
 }
 
-TEST_CASE("a pose that is none is refused with its reason, and the state stays as it was") {
+TEST_CASE("an invalid pose is refused with its reason, and the state does not change") {
   struct Case {
     const char* reason;
     Eigen::Isometry3d pose;
@@ -95,7 +95,7 @@ TEST_CASE("a pose that is none is refused with its reason, and the state stays a
   });
 }
 
-TEST_CASE("a time that does not increase is refused, and the state stays as it was") {
+TEST_CASE("a time that does not increase is refused, and the state does not change") {
   const Config config = any_preset();
   const std::vector<Scan> scans = good_scans();
   const Run expected = run(config, scans);
@@ -127,7 +127,7 @@ TEST_CASE("a push without a time is later than the one before, however late that
   }
 }
 
-TEST_CASE("a view that would read other memory than the points is refused") {
+TEST_CASE("a view that would read memory outside the points is refused") {
   DynaInsRemover remover(any_preset());
   const std::vector<float> floats(12, 5.0F);
   const std::vector<double> doubles(12, 5.0);
@@ -153,7 +153,7 @@ TEST_CASE("a rotation with the few digits of a text file is accepted") {
   CHECK((R.transpose() * R - Eigen::Matrix3d::Identity()).norm() < 1e-12);
 }
 
-TEST_CASE("points that are no measurements get a label that says so") {
+TEST_CASE("points that are no measurements get a label for this") {
   constexpr float kNanF = std::numeric_limits<float>::quiet_NaN();
   constexpr float kInf = std::numeric_limits<float>::infinity();
   using L = PointLabel;
@@ -182,7 +182,7 @@ TEST_CASE("points that are no measurements get a label that says so") {
   }
 }
 
-TEST_CASE("bad points among good ones change nothing for the good ones") {
+TEST_CASE("bad points do not change the labels of good points") {
   const Config config = any_preset();
   std::vector<Scan> scans = good_scans();
   const Run clean = run(config, scans);
@@ -251,7 +251,7 @@ TEST_CASE("any cloud can come between good ones") {
   for (const Case& c : cases) {
     INFO(c.name);
     DynaInsRemover remover(config);
-    // Strange clouds first, as many as a window holds, then good ones behind a pause.
+    // Invalid clouds first, enough to fill a window, then good ones after a pause.
     for (int i = 0; i < 5; ++i) {
       const FrameResult frame = remover.push(c.points, sensor_at(0.0), -100.0 + 0.1 * i);
       REQUIRE(frame.newest.labels.size() == c.points.size());
@@ -259,12 +259,12 @@ TEST_CASE("any cloud can come between good ones") {
     for (std::size_t s = 0; s < scans.size(); ++s) {
       const FrameResult frame =
           remover.push(scans[s].points, scans[s].T_world_sensor, scans[s].time);
-      // The default preset takes the cloud of many points for what the sensor is like.
+      // The default preset would derive the sensor model from the cloud of many points.
       if (config.uses_free_space() && c.points.size() == 500000) continue;
       REQUIRE((std::vector<PointLabel>(frame.newest.labels.begin(), frame.newest.labels.end()) ==
                expected.newest[s].labels));
     }
-    // And one in the middle of a window.
+    // One more in the middle of a window.
     remover.push(c.points, sensor_at(3.0), 50.0);
     remover.push(scans[0].points, scans[0].T_world_sensor, 50.1);
     std::size_t finished = 0;
@@ -274,7 +274,7 @@ TEST_CASE("any cloud can come between good ones") {
   }
 }
 
-TEST_CASE("a cloud that throws is not taken in, and the state stays as it was") {
+TEST_CASE("a cloud that throws is not taken, and the state does not change") {
   const Config config = any_preset();
   const std::vector<Scan> scans = drive(oncoming(), 40, 5.0);  // longer than lookahead_scans
   const Run expected = run(config, scans);
@@ -292,7 +292,7 @@ TEST_CASE("a cloud that throws is not taken in, and the state stays as it was") 
   CHECK((result.final == expected.final));
 }
 
-// Runs out of memory once.
+// Throws std::bad_alloc once.
 class ForgetfulClusterer : public CurvedVoxelClusterer {
  public:
   struct Config : CurvedVoxelClusterer::Config {
@@ -320,7 +320,7 @@ struct ForgetfulStages : DefaultStages {
   using Clusterer = ForgetfulClusterer;
 };
 
-TEST_CASE("a scan on which a stage throws was never there, and a new window begins") {
+TEST_CASE("a scan on which a stage throws is dropped, and a new window begins") {
   using Remover = BasicDynaInsRemover<ForgetfulStages>;
   const bool is_paper = GENERATE(true, false);
   const int failing = GENERATE(0, 3, 35);
@@ -329,7 +329,7 @@ TEST_CASE("a scan on which a stage throws was never there, and a new window begi
   config.clusterer.failing_call = failing;
   Remover remover(config);
   const std::vector<Scan> scans = drive(oncoming(), 72, 0.0);
-  std::vector<std::size_t> finished;  // points, by scan in the order of verdicts
+  std::vector<std::size_t> finished;  // number of points of each scan, in the order of verdicts
   std::vector<std::size_t> expected;
   const auto take = [&](const ScanVerdict& verdict) {
     CHECK(verdict.scan == finished.size());
@@ -353,7 +353,7 @@ TEST_CASE("a scan on which a stage throws was never there, and a new window begi
   CHECK(finished == expected);
 }
 
-// Throws once, where it is told to.
+// Throws once, at a chosen call.
 class FaintingEvidence : public FreeSpaceEvidence {
  public:
   struct Config : FreeSpaceConfig {
@@ -383,7 +383,7 @@ struct FaintingStages : DefaultStages {
   using Evidence = FaintingEvidence;
 };
 
-TEST_CASE("a final verdict that throws is lost, and no other") {
+TEST_CASE("only the final verdict that throws is lost") {
   using Remover = BasicDynaInsRemover<FaintingStages>;
   Remover::Config config;
   config.evidence.failing_verdict = 2;
@@ -408,7 +408,7 @@ TEST_CASE("a final verdict that throws is lost, and no other") {
   CHECK(finished == expected);
 }
 
-TEST_CASE("a remover that could not adapt to its sensor does so with the next scan") {
+TEST_CASE("a remover that failed to adapt to its sensor adapts at the next scan") {
   using Remover = BasicDynaInsRemover<FaintingStages>;
   Remover::Config config;
   config.evidence.fails_to_adapt = true;
@@ -424,7 +424,7 @@ TEST_CASE("a remover that could not adapt to its sensor does so with the next sc
   CHECK((result.final == expected.final));
 }
 
-TEST_CASE("a remover that was moved from says so, and can be assigned to") {
+TEST_CASE("a moved-from remover throws, and can be assigned to") {
   const std::vector<Scan> scans = drive(yard(), 3, 5.0);
   DynaInsRemover first;
   first.push(scans[0].points, scans[0].T_world_sensor);
@@ -436,7 +436,7 @@ TEST_CASE("a remover that was moved from says so, and can be assigned to") {
   CHECK(first.push(scans[2].points, scans[2].T_world_sensor).newest.scan == 2);
 }
 
-TEST_CASE("a pose that jumps away and back leaves no trace once it is out of the window") {
+TEST_CASE("a pose that jumps away and back has no effect after it left the window") {
   const std::vector<Scan> scans = drive(oncoming(), 9, 0.0);
   const Run expected = run_paper(scans);
   DynaInsRemover remover(Config::paper());

@@ -1,4 +1,4 @@
-// What the facade promises, on scenes in which the right answer is obvious.
+// Guarantees of the facade, on scenes with known truth.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,7 +17,7 @@ namespace {
 
 using Config = DynaInsRemover::Config;
 
-// Numbers of the dynamic points of one verdict.
+// Indices of the dynamic points of one verdict.
 std::vector<std::size_t> dynamic_points(const Verdict& verdict) {
   std::vector<std::size_t> result;
   for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
@@ -38,7 +38,7 @@ std::size_t dynamic_count(const std::vector<Verdict>& verdicts) {
   return result;
 }
 
-TEST_CASE("in a static scene at most 0.1 % is removed, moving or not, whatever the heading") {
+TEST_CASE("in a static scene at most 0.1 % is removed, with any motion and heading of the sensor") {
   const Config config = GENERATE(Config::paper(), Config());
   const double speed = GENERATE(0.0, 5.0, 8.0);
   const double yaw = GENERATE(0.0, 0.7, 3.1);
@@ -47,10 +47,10 @@ TEST_CASE("in a static scene at most 0.1 % is removed, moving or not, whatever t
   CHECK(share(scans, run(config, scans).final, PointLabel::kDynamic).value() < 1e-3);
 }
 
-TEST_CASE("a moving van is removed, and what stands around it stays") {
+TEST_CASE("a moving van is removed, and static objects around it stay") {
   const Config config = GENERATE(Config::paper(), Config());
   const double speed = GENERATE(0.0, 5.0);
-  const double yaw = GENERATE(0.0, 0.7, 1.6, 3.1);  // across the azimuth seam too
+  const double yaw = GENERATE(0.0, 0.7, 1.6, 3.1);  // also across the azimuth seam
   const std::vector<Scan> scans = drive(oncoming(), 10, speed, yaw);
   const std::vector<Verdict> verdicts = run(config, scans).final;
   INFO("speed " << speed << " m/s, yaw " << yaw);
@@ -62,7 +62,7 @@ TEST_CASE("a moving van is removed, and what stands around it stays") {
   CHECK(all.labelled - moving.labelled < all.total / 200);
 }
 
-TEST_CASE("however few scans are references, the van is removed, and only it") {
+TEST_CASE("with any number of reference scans, the van is removed, and only the van") {
   Config config;
   config.evidence.reference_step = GENERATE(1, 2, 3, 4);
   const std::vector<Scan> scans = drive(oncoming(), 10, 5.0);
@@ -133,7 +133,7 @@ TEST_CASE("the map is exactly the points with a static final label, each once") 
   const std::vector<Scan> scans = drive(oncoming(), 7, 5.0, 0.4);
   DynaInsRemover remover(config);
   const Run result = run(remover, scans);
-  // Measured points by whole centimetres; each map point uses up the nearest.
+  // Measured points by whole centimetres. Each map point consumes the nearest one.
   using Key = std::array<long, 3>;
   const auto key = [](const Eigen::Vector3d& p) {
     return Key{std::lround(p.x() * 100.0), std::lround(p.y() * 100.0), std::lround(p.z() * 100.0)};
@@ -188,7 +188,7 @@ TEST_CASE("no point is on the map before its verdict is final, all are after flu
   CHECK(remover.map().size() > before);
 }
 
-TEST_CASE("without a map the labels are the same") {
+TEST_CASE("without a map the labels are equal") {
   Config config = Config::paper();
   const std::vector<Scan> scans = drive(oncoming(), 6, 0.0);
   const Run with_map = run(config, scans);
@@ -198,7 +198,7 @@ TEST_CASE("without a map the labels are the same") {
   CHECK(remover.map().empty());
 }
 
-TEST_CASE("the first scan alone shows nothing to be dynamic; two scans do") {
+TEST_CASE("the first scan alone shows no dynamic point, two scans do") {
   const std::vector<Scan> scans = drive(oncoming(), 2, 0.0);
   const Run result = run_paper(scans);
   CHECK(dynamic_points(result.newest[0]).empty());
@@ -206,7 +206,7 @@ TEST_CASE("the first scan alone shows nothing to be dynamic; two scans do") {
   CHECK(dynamic_count(run_paper({scans[0]}).final) == 0);
 }
 
-TEST_CASE("each window is judged on its own: nothing older than K scans has a say") {
+TEST_CASE("each window is judged on its own: scans before it have no influence") {
   const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
   const Run whole = run_paper(scans);
   for (std::ptrdiff_t last = 4; last < 8; ++last) {
@@ -218,7 +218,7 @@ TEST_CASE("each window is judged on its own: nothing older than K scans has a sa
   }
 }
 
-TEST_CASE("what only one scan saw is static: nothing shows that it moved") {
+TEST_CASE("an object in one scan only is static: no scan shows that it moved") {
   std::vector<Scan> scans = drive(yard(), 9, 0.0);
   scans[4] = yard_with(van(12.0, 3.0)).scan(sensor_at(0.0), scans[4].time);
   const Run result = run_paper(scans);
@@ -235,7 +235,8 @@ TEST_CASE("labels do not depend on where in the world the street is") {
   const Eigen::Isometry3d T_there_here = Eigen::Translation3d(offset) * turn;
   std::vector<Scan> moved = scans;
   for (Scan& scan : moved) scan.T_world_sensor = T_there_here * scan.T_world_sensor;
-  // A pose product in double is right to about 1e-10 m: only points on a border may change sides.
+  // A pose product in double has an error of about 1e-10 m, so that only points on a border may
+  // change.
   CHECK(disagreement(run_paper(moved).final, here) < 1e-3);
 }
 
@@ -256,7 +257,7 @@ TEST_CASE("labels do not depend on the order of the points") {
   CHECK(disagreement(shuffled, ordered) < 1e-3);
 }
 
-TEST_CASE("the same input gives the same bits, also side by side in two threads") {
+TEST_CASE("equal input gives equal bytes, also in two threads at once") {
   const Config config = GENERATE(Config::paper(), Config());
   const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
   const Run expected = run(config, scans);
@@ -271,7 +272,7 @@ TEST_CASE("the same input gives the same bits, also side by side in two threads"
   CHECK((b.newest == expected.newest));
 }
 
-TEST_CASE("after reset a remover is as good as new") {
+TEST_CASE("after reset a remover behaves like a new one") {
   const Config config = GENERATE(Config::paper(), Config());
   const std::vector<Scan> scans = drive(oncoming(), 6, 5.0);
   DynaInsRemover remover(config);
@@ -284,12 +285,11 @@ TEST_CASE("after reset a remover is as good as new") {
   CHECK(remover.map().size() == map_size);
 }
 
-TEST_CASE(
-    "memory that was reserved changes no result, and is reserved before the first scan only") {
+TEST_CASE("reserved memory changes no result, and can be reserved before the first scan only") {
   const Config config = GENERATE(Config::paper(), Config());
   const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
   DynaInsRemover remover(config);
-  // Too little, more than the scans need, and what they need.
+  // Less memory than the scans need, more than they need, and as much as they need.
   const std::size_t points = GENERATE(std::size_t{0}, std::size_t{1000}, std::size_t{200000});
   if (points > 0) {
     remover.reserve(points);
@@ -308,9 +308,9 @@ TEST_CASE(
   CHECK(run(remover, scans).final == plain.final);
 }
 
-TEST_CASE("what a later scan tells of the sensor changes nothing about scans before") {
-  // Scans with too few points to tell the sensor by: ground, and a wall behind it. In one of them,
-  // something stands before the wall, and is gone again.
+TEST_CASE("a sensor model from a later scan changes nothing in earlier scans") {
+  // Scans with too few points for a sensor model: ground, and a wall behind it. In one of them, an
+  // object stands in front of the wall.
   std::vector<Scan> scans;
   const auto add_scan = [&scans] {
     scans.push_back(
@@ -382,7 +382,7 @@ TEST_CASE("votes: the more windows must agree, the less is removed") {
   Config config = Config::paper();
   config.votes = 0;
   const Run newest_alone = run(config, scans);
-  CHECK((newest_alone.final == newest_alone.newest));  // no latency: said once and for all
+  CHECK((newest_alone.final == newest_alone.newest));  // without latency, both verdicts are equal
   std::vector<Verdict> looser;
   for (int votes = 1; votes <= config.window; ++votes) {
     config.votes = votes;
@@ -396,15 +396,16 @@ TEST_CASE("votes: the more windows must agree, the less is removed") {
     if (votes > 1) CHECK(dynamic_count(result.final) < dynamic_count(looser));
     looser = result.final;
   }
-  // The first and the last scan lie in fewer than K windows that compare: four votes never come.
+  // The first and the last scan are in fewer than K windows that compare, so that they never get
+  // four votes.
   CHECK(dynamic_points(looser.front()).empty());
   CHECK(dynamic_points(looser.back()).empty());
 }
 
-TEST_CASE("windows may decide later than the evidence, which then has no say") {
+TEST_CASE("windows may decide later than the evidence, which then has no influence") {
   std::vector<Scan> scans = drive(oncoming(), 12, 5.0);
   for (std::size_t s = 1; s < scans.size(); s += 2) {
-    scans[s].points.resize(scans[s].points.size() / 3);  // every other one has fewer points
+    scans[s].points.resize(scans[s].points.size() / 3);  // every second scan has fewer points
   }
   Config config;
   config.window = 5;
@@ -422,7 +423,7 @@ TEST_CASE("windows may decide later than the evidence, which then has no say") {
   CHECK(dynamic_count(by_windows.final) > 0);
 }
 
-TEST_CASE("instance ids go from scan to scan, however soon a verdict is final") {
+TEST_CASE("instance ids continue from scan to scan, however soon a verdict is final") {
   const std::vector<Scan> scans = drive(oncoming(), 10, 5.0);
   Config config;
   const Run late = run(config, scans);
@@ -461,7 +462,7 @@ TEST_CASE("belief reverts a wall that comes into view, and no van") {
   CHECK(removed(kWall) == wall_without_belief);
 }
 
-TEST_CASE("without belief every proposal is a verdict; belief only takes proposals back") {
+TEST_CASE("without belief every proposal is a verdict, and belief only reverts proposals") {
   const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
   Config config = Config::paper();
   config.belief.tau_p = 0.95;
@@ -480,7 +481,7 @@ TEST_CASE("without belief every proposal is a verdict; belief only takes proposa
   CHECK(dynamic_count(with_belief.final) < dynamic_count(proposals.final));
 }
 
-// Labels as known at once, from scan `first` on.
+// Newest labels from scan `first` on.
 std::vector<std::vector<PointLabel>> newest_labels(const Run& result, std::size_t first) {
   std::vector<std::vector<PointLabel>> labels;
   for (std::size_t s = first; s < result.newest.size(); ++s) {
@@ -489,7 +490,7 @@ std::vector<std::vector<PointLabel>> newest_labels(const Run& result, std::size_
   return labels;
 }
 
-TEST_CASE("a pause longer than max_gap starts a new window, one of just max_gap does not") {
+TEST_CASE("a pause longer than max_gap starts a new window, a pause of exactly max_gap does not") {
   Config config = Config::paper();
   config.max_gap = 2.0;
   std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
@@ -529,7 +530,7 @@ TEST_CASE("a pose that jumps farther than max_speed allows starts a new window")
   CHECK((newest_labels(with_jump(8.0), 4) != newest_labels(second_half, 0)));
 }
 
-TEST_CASE("a scan that comes without a time comes 0.1 s after the one before") {
+TEST_CASE("a scan without a time is 0.1 s after the previous one") {
   const std::vector<Eigen::Vector3f> points = {{10.0F, 0.0F, 1.0F}};
   DynaInsRemover remover;
   const auto T = Eigen::Isometry3d::Identity();
@@ -539,7 +540,7 @@ TEST_CASE("a scan that comes without a time comes 0.1 s after the one before") {
   CHECK(remover.push(points, T).newest.time == Approx(5.1));
 }
 
-TEST_CASE("flush in the middle finishes what is open, and the next scan starts a new window") {
+TEST_CASE("flush in the middle finishes all open scans, and the next scan starts a new window") {
   const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
   const std::vector<Scan> first(scans.begin(), scans.begin() + 4);
   const std::vector<Scan> second(scans.begin() + 4, scans.end());

@@ -1,4 +1,4 @@
-// Every stage can be replaced by one of one's own.
+// Every stage can be replaced by a stage of the user.
 #include <cstdint>
 #include <vector>
 
@@ -12,7 +12,7 @@
 namespace dynains::test {
 namespace {
 
-// Ground is what lies under a height.
+// Points below a height are ground.
 class FlatGround {
  public:
   struct Config {
@@ -46,7 +46,7 @@ class FlatGround {
   Config config_;
 };
 
-// One cluster ahead of the sensor, one behind; nothing near the ground belongs to either.
+// One cluster ahead of the sensor, one behind it. Points near the ground belong to neither.
 class HalvesClusterer {
  public:
   struct Config {
@@ -69,7 +69,7 @@ class HalvesClusterer {
   std::vector<std::uint32_t> numbers_;
 };
 
-// Forgets the last point.
+// Omits the last point.
 class ShortClusterer : public HalvesClusterer {
  public:
   using HalvesClusterer::HalvesClusterer;
@@ -94,7 +94,7 @@ class Credulous : public BeliefUpdater {
   bool is_dynamic() const { return true; }
 };
 
-// Has parameters of its own for the paper.
+// Has its own parameters for the paper.
 class PaperBelief : public BeliefUpdater {
  public:
   struct Config : BeliefUpdater::Config {
@@ -110,13 +110,13 @@ struct OwnBelief : DefaultStages {
   using Belief = PaperBelief;
 };
 
-TEST_CASE("the paper's parameters of a stage of one's own are its own") {
+TEST_CASE("a stage of the user has its own parameters for the paper") {
   using Remover = BasicDynaInsRemover<OwnBelief>;
   CHECK(Remover::Config::paper().belief.tau_p == 0.625);
   CHECK(Remover::Config().belief.tau_p == BeliefUpdater::Config().tau_p);
 }
 
-// Take down of which sensor they are told.
+// Stages that store the sensor model that adapt() gives them.
 class ToldGround : public GroundSegmenter {
  public:
   using GroundSegmenter::GroundSegmenter;
@@ -144,7 +144,7 @@ struct ToldStages : DefaultStages {
   using Evidence = ToldEvidence;
 };
 
-TEST_CASE("stages are told of the sensor by the first scan that shows it") {
+TEST_CASE("stages get the sensor model from the first scan that shows it") {
   Eigen::Isometry3d T_world_sensor = sensor_at(0.0);
   T_world_sensor.translation().z() = 2.6;
   BasicDynaInsRemover<ToldStages> remover;
@@ -169,15 +169,14 @@ struct OwnEverything {
   using Map = CountingMap;
 };
 
-TEST_CASE("a clusterer that leaves points out is refused with a reason") {
+TEST_CASE("a clusterer that omits points is refused with a reason") {
   const std::vector<Scan> scans = drive(yard(), 1, 0.0);
   BasicDynaInsRemover<OwnShortClusterer> remover;
   CHECK_THROWS_WITH(remover.push(scans[0].points, scans[0].T_world_sensor),
                     StartsWith("Stages::Clusterer gave "));
 }
 
-TEST_CASE(
-    "a ground stage of one's own decides what is ground, and its config is part of the whole") {
+TEST_CASE("a ground stage of the user decides the ground, and its config is a part of the whole") {
   const std::vector<Scan> scans = drive(yard(), 5, 0.0);
   BasicDynaInsRemover<OwnGround>::Config config;
   config.ground.flat_ground_below = -1.25;
@@ -200,7 +199,7 @@ TEST_CASE(
   CHECK_THROWS_WITH(BasicDynaInsRemover<OwnGround>(config), StartsWith("FlatGround."));
 }
 
-TEST_CASE("all stages can be one's own at the same time") {
+TEST_CASE("all stages can be stages of the user at the same time") {
   const std::vector<Scan> scans = drive(yard(), 5, 0.0);
   using Remover = BasicDynaInsRemover<OwnEverything>;
   Remover remover(Remover::Config::paper());
@@ -211,7 +210,7 @@ TEST_CASE("all stages can be one's own at the same time") {
       const float z = scans[s].points[i].z();
       const PointLabel label = result.final[s].labels[i];
       if (label == PointLabel::kOutOfRange) continue;
-      // Two clusters that every scan sees, each proposed and believed; the rest is static.
+      // Two clusters in every scan, each proposed and believed. All other points are static.
       REQUIRE((label == PointLabel::kDynamic) == (z >= -1.0F));
       REQUIRE(result.final[s].beliefs[i] == (z >= -1.0F ? 0.875F : 0.0F));
       REQUIRE((result.final[s].instances[i] != kNoInstance) == (z >= -1.0F));

@@ -30,7 +30,7 @@ std::vector<Coordinates> sorted_points(const StaticMapAccumulator& map) {
   return result;
 }
 
-// Eq. 1 on a grid: the first point of every voxel.
+// Eq. 1 on a grid: keeps the first point of every voxel.
 class ReferenceMap {
  public:
   explicit ReferenceMap(double voxel) : voxel_(voxel) {}
@@ -57,13 +57,13 @@ class ReferenceMap {
   std::map<std::array<std::int64_t, 3>, Coordinates> first_;
 };
 
-// Multiples of 1/64 m: every sum and product below is exact in floats, on both sides.
+// Multiples of 1/64 m: every sum and product below is exact in floats, in the map and in the test.
 Eigen::Vector3d grid_vector(Random& random, double reach, double height) {
   const Eigen::Vector3d most(reach, reach, height);
   return (random.vector(-most, most) * 64.0).array().round() / 64.0;
 }
 
-// Half of them lie beside their predecessor, as neighbours in a scan do.
+// Half of the points are near their predecessor, like neighbours in a scan.
 PointBuffer grid_points(Random& random, std::size_t count, double reach) {
   PointBuffer points;
   Eigen::Vector3d place = Eigen::Vector3d::Zero();
@@ -147,7 +147,7 @@ TEST_CASE("at UTM coordinates the map keeps a tenth of a millimetre") {
   }
 }
 
-TEST_CASE("the finest map reaches to the farthest pose that is accepted") {
+TEST_CASE("the finest map reaches the farthest pose that is accepted") {
   PointBuffer point;
   point.push_back(100.0F, -100.0F, 100.0F);
   for (const double side : {-1.0, 1.0}) {
@@ -167,7 +167,7 @@ TEST_CASE("the finest map reaches to the farthest pose that is accepted") {
   }
 }
 
-TEST_CASE("a region holds exactly the points that a filter over the map finds") {
+TEST_CASE("a region has exactly the points that a filter over the map finds") {
   StaticMapAccumulator map = make(0.25);
   Random random(13);
   for (int i = 0; i < 40; ++i) {
@@ -194,7 +194,7 @@ TEST_CASE("a region holds exactly the points that a filter over the map finds") 
   }
   CHECK(found > 1000);
 
-  // Borders belong to the region: a box that is one stored point.
+  // Borders belong to the region: a box of one stored point.
   const Coordinates first = sorted_points(map).front();
   const Eigen::Vector3d p(first[0], first[1], first[2]);
   CHECK(compare({p, p}) == 1);
@@ -204,7 +204,7 @@ TEST_CASE("a region holds exactly the points that a filter over the map finds") 
   CHECK(compare(Eigen::AlignedBox3d()) == 0);
 }
 
-TEST_CASE("every point that is stored is found where it lies, whatever the rounding of floats") {
+TEST_CASE("every stored point is found at its place, whatever the rounding of floats") {
   StaticMapAccumulator map = make(0.05);
   Random random(14);
   for (int i = 0; i < 20; ++i) {
@@ -246,7 +246,7 @@ TEST_CASE("a cleared map is empty and can be filled again") {
   map.insert(points, {}, Eigen::Isometry3d::Identity());
   const std::vector<Coordinates> before = sorted_points(map);
   CHECK(map.memory_bytes() > before.size() * 3 * sizeof(float));
-  map.erase_block(0);  // leaves places to be filled, which go as well
+  map.erase_block(0);  // erased places that wait for new points are cleared, too
   CHECK(map.size() < before.size());
   map.clear();
   CHECK(map.empty());

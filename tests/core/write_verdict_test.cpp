@@ -1,4 +1,4 @@
-// Verdicts that are written by runs and groups of points, against a simple model by point.
+// Verdicts that are written by runs and groups of points, compared with a simple model by point.
 #include <algorithm>
 #include <array>
 #include <map>
@@ -26,7 +26,7 @@ constexpr std::array<DecisionStage, 4> kStages = {
     DecisionStage::kNoCluster, DecisionStage::kTooFewScans, DecisionStage::kSimilar,
     DecisionStage::kProposed};
 
-// PointRuns of random length, mostly short, a cluster each or none.
+// PointRuns of random length, mostly short, each with one cluster or none.
 std::vector<PointRun> random_runs(Random& random, std::uint32_t points) {
   std::vector<PointRun> point_runs;
   for (std::uint32_t begin = 0; begin < points;) {
@@ -59,7 +59,7 @@ std::vector<ClusterVerdict> random_verdicts(Random& random) {
   return verdicts;
 }
 
-// Votes of all windows so far on one point, as the documentation describes them.
+// Votes of all windows so far on one point, by the documentation.
 struct Votes {
   DecisionStage stage = DecisionStage::kNoCluster;
   int votes = 0;
@@ -74,8 +74,8 @@ struct Votes {
   }
 };
 
-TEST_CASE("verdicts by point_run are those by point, at once and after more windows") {
-  // The same objects for all scans, as in the pipeline.
+TEST_CASE("verdicts by point_run equal those by point, at once and after more windows") {
+  // One set of objects for all scans, as in the pipeline.
   detail::ScanSlot scan;
   detail::WindowVoter voter;
   detail::VerdictWriter writer;
@@ -91,7 +91,7 @@ TEST_CASE("verdicts by point_run are those by point, at once and after more wind
     const std::vector<std::size_t> order = random.permutation(ground + points + bad);
     for (std::size_t i = 0; i < ground + points; ++i) {
       scan.split.input[i] = static_cast<std::uint32_t>(order[i]);
-      scan.labels[order[i]] = PointLabel::kGround;  // as good points come
+      scan.labels[order[i]] = PointLabel::kGround;  // default label of good points
     }
     scan.ids.resize(kClusters);
     for (std::uint32_t c = 0; c < kClusters; ++c) scan.ids[c] = 100 + c;
@@ -158,7 +158,7 @@ TEST_CASE("verdicts by point_run are those by point, at once and after more wind
 
 constexpr std::uint32_t kGroups = 9;
 
-// Scans of some points of which some are in no cluster and some in no group, as far ones are.
+// Scans in which some points are in no cluster and some, like far ones, in no group.
 struct JudgedScan {
   detail::ScanSlot slot;
   std::size_t ground;
@@ -258,7 +258,7 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
     };
 
     change();
-    // Left in its slot by an earlier scan.
+    // Left in the slot by an earlier scan.
     for (std::uint32_t i = 0; i < slot.split.count; i += 3) slot.moved_ground.push_back(i);
     slot.written_groups.assign(random.index(2 * kGroups), random_group(random));
     writer.begin(slot, scan.cluster_of);
@@ -278,7 +278,7 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
   }
 }
 
-TEST_CASE("of two verdicts dynamic wins, the first one's cause, and the higher belief") {
+TEST_CASE("the dynamic one of two verdicts wins, else the first, with the higher belief") {
   const EvidenceVerdict::Group stays = {Cause::kOccupied, 0.5F};
   const EvidenceVerdict::Group goes = {Cause::kFreeSpace, 0.8F};
   const EvidenceVerdict::Group proposed = {Cause::kProposed, 0.9F};
@@ -289,7 +289,7 @@ TEST_CASE("of two verdicts dynamic wins, the first one's cause, and the higher b
   CHECK((detail::stronger(goes, reverted) == goes));
 }
 
-TEST_CASE("ids go to the cluster that got most points, whatever the point_runs") {
+TEST_CASE("ids go to the cluster that has most points, for any point_runs") {
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     INFO("seed " << seed);
     Random random(seed);
@@ -314,7 +314,7 @@ TEST_CASE("ids go to the cluster that got most points, whatever the point_runs")
         ++all;
       }
       for (const auto& [old, count] : votes) {
-        if (2 * count <= all) continue;  // the vote is sure of majorities alone
+        if (2 * count <= all) continue;  // only a majority certainly wins the vote
         if (!taken[old]) REQUIRE(ids[c] == old_ids[old]);
       }
       for (std::uint32_t old = 0; old < kClusters; ++old) {

@@ -1,4 +1,4 @@
-# Doxygen has nothing to say about the public headers, and describes the facade.
+# Doxygen gives no warning for the public headers, and describes the facade.
 if(NOT DOXYGEN)
   message("SKIPPED: doxygen is not installed")
   return()

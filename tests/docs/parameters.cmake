@@ -1,4 +1,4 @@
-# The table of parameters says what the program says.
+# The table of parameters in docs/ is the output of `dynains config --markdown`.
 execute_process(COMMAND ${PROGRAM} config --markdown
   OUTPUT_VARIABLE expected RESULT_VARIABLE result)
 file(READ ${FILE} found)

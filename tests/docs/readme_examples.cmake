@@ -1,4 +1,4 @@
-# Every C++ block of README.md stands in a numbered example as it is, so that it compiles and runs.
+# Every C++ block of README.md is part of a numbered example, so that it is compiled and run.
 file(READ "${SOURCE_DIR}/README.md" readme)
 file(GLOB files "${SOURCE_DIR}/examples/0*.cpp")
 set(examples "")

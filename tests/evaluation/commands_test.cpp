@@ -1,4 +1,4 @@
-// The evaluating commands, from the command line to the files they write.
+// The commands for evaluation, from the command line to the files that they write.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Standard output of `dynains <arguments>`; passes on exceptions of the command.
+/// Standard output of `dynains <arguments>`. Exceptions of the command are passed on.
 std::string call(std::vector<std::string> arguments) {
   CLI::App app("test", "dynains");
   add_eval_command(app);
@@ -57,7 +57,7 @@ bool has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// A street of three scans, and a run over it that is right, to be judged into `json`.
+/// A street of three scans with a correct run, whose score is written to `json`.
 struct JudgedStreet {
   JudgedStreet() { write_run(run, scans, 0); }
   std::vector<std::string> eval(const std::vector<std::string>& more = {}) const {
@@ -76,7 +76,7 @@ struct JudgedStreet {
 
 }  // namespace
 
-TEST_CASE("eval refuses a run that is not complete, unless that is allowed") {
+TEST_CASE("eval refuses an incomplete run, unless a flag allows it") {
   const TemporaryFolder folder;
   const std::string sequence = (folder.path() / "street").string();
   const auto scans = write_street(sequence, 2);
@@ -86,7 +86,7 @@ TEST_CASE("eval refuses a run that is not complete, unless that is allowed") {
   const std::string unfinished =
       R"({"program": "dynains", "complete": false, "static_map": {"file": "map.ply"}})";
 
-  CHECK_NOTHROW(call({"eval", sequence, run.string()}));  // without report.json: of any tool
+  CHECK_NOTHROW(call({"eval", sequence, run.string()}));  // without report.json: by any tool
   report(R"({"program": "dynains", "complete": true})");
   CHECK_NOTHROW(call({"eval", sequence, run.string()}));
   report(R"({"program": "other", "complete": false})");
@@ -117,7 +117,7 @@ TEST_CASE("eval refuses a run that is not complete, unless that is allowed") {
                     ContainsSubstring("report.json: is a folder; expected a JSON file"));
 }
 
-TEST_CASE("eval judges a run beside identity and oracle") {
+TEST_CASE("eval scores a run beside identity and oracle") {
   const TemporaryFolder folder;
   const fs::path sequence = folder.path() / "street";
   const auto scans = write_street(sequence, 4);
@@ -145,7 +145,7 @@ TEST_CASE("eval judges a run beside identity and oracle") {
   CHECK(has(window, "2 scans, "));
 }
 
-TEST_CASE("eval --online judges the verdicts without latency, and only these") {
+TEST_CASE("eval --online scores the verdicts without latency, and only these") {
   const JudgedStreet street;
   const auto accuracy = [&](const std::vector<std::string>& more) {
     call(street.eval(more));
@@ -157,7 +157,7 @@ TEST_CASE("eval --online judges the verdicts without latency, and only these") {
   CHECK(accuracy({"--online"}) == 75.0);
 }
 
-TEST_CASE("Maps of several runs are told apart by their paths") {
+TEST_CASE("Maps of several runs are distinguished by their paths") {
   const TemporaryFolder folder;
   const fs::path sequence = folder.path() / "street";
   write_street(sequence, 2);
@@ -175,11 +175,11 @@ TEST_CASE("Maps of several runs are told apart by their paths") {
   CHECK(has(two, maps[1]));
 }
 
-TEST_CASE("A file that cannot be written is noticed before the work") {
+TEST_CASE("A file that cannot be written is detected before the evaluation") {
   const TemporaryFolder folder;
   const fs::path sequence = folder.path() / "street";
   write_street(sequence, 2);
-  // Noticed after it, the missing run would be the complaint.
+  // If it were detected afterwards, the error would be the missing run.
   const std::string file = (folder.path() / "nowhere" / "file").string();
   const std::string broken = (folder.path() / "no run").string();
   for (const char* flag : {"--json", "--csv"}) {
@@ -198,7 +198,7 @@ TEST_CASE("A file that cannot be written is noticed before the work") {
             "cannot be created"));
 }
 
-TEST_CASE("eval judges map files of either format") {
+TEST_CASE("eval scores map files of either format") {
   const TemporaryFolder folder;
   const fs::path sequence = folder.path() / "street";
   const auto scans = write_street(sequence, 3);
@@ -223,7 +223,7 @@ TEST_CASE("eval judges map files of either format") {
   }
 }
 
-TEST_CASE("eval says what is wrong with its input, and writes nothing then") {
+TEST_CASE("eval names the problem of its input, and then writes nothing") {
   const JudgedStreet street;
   const auto& [folder, sequence, scans, run, json] = street;
   const std::vector<std::string> good = street.eval();
@@ -238,7 +238,7 @@ TEST_CASE("eval says what is wrong with its input, and writes nothing then") {
   CHECK(has(message_of({"eval", (folder.path() / "nowhere").string()}), "nowhere"));
   CHECK(!fs::exists(json));
 
-  // A gap in the labels is not skipped silently.
+  // A gap in the numbers of the label files is an error.
   const fs::path label = run / "labels" / "000001.label";
   fs::rename(label, folder.path() / "aside");
   CHECK(has(message_of(good), "000001.label"));
@@ -290,7 +290,7 @@ TEST_CASE("Causes beside the labels of a run are counted") {
   CHECK(json["errors"]["by_cause"][11]["lost_static"] == 0);
 }
 
-TEST_CASE("Variants judge every point once, each by its own configuration") {
+TEST_CASE("Variants label every point once, each with its own configuration") {
   const TemporaryFolder folder;
   const auto scans = write_street(folder.path() / "street", 8);
   std::vector<Variant> variants = {{"full", DynaInsRemover::Config::paper()},
@@ -311,7 +311,7 @@ TEST_CASE("Variants judge every point once, each by its own configuration") {
       }
     }
   }
-  // The newest verdicts, as a remover gives them.
+  // The newest verdicts equal those of a remover.
   const VariantVerdicts newest = run_variants(sequence, {variants[0]}, Answer::kNewest, nullptr);
   DynaInsRemover remover(variants[0].config);
   bool differs = false;
@@ -330,7 +330,7 @@ TEST_CASE("Variants judge every point once, each by its own configuration") {
   const evaluation::Evaluation result =
       evaluate_variants(sequence, variants, Answer::kFinal, {}, nullptr);
   REQUIRE(result.rows.size() == 4);
-  // A box that moves 1 m per scan before an empty background is easy.
+  // Moving a box by 1 m per scan before an empty background is an easy case.
   CHECK(result.rows[2].points.static_accuracy() > 95);
   CHECK(result.rows[2].points.dynamic_accuracy() > 60);
 }
@@ -363,7 +363,7 @@ TEST_CASE("The experiments run on any labelled sequence") {
     CHECK(call({"experiment", "table1", street, "--quiet", "--poses", poses.string()}) == expected);
   }
   SECTION("table1 on SemanticKITTI's layout") {
-    // The published window of 02 starts at scan 860.
+    // The published interval of sequence 02 starts at scan 860.
     const fs::path root = folder.path() / "kitti" / "sequences" / "02";
     write_street(root, 3);
     for (const char* kind : {"velodyne", "labels"}) {
@@ -380,7 +380,7 @@ TEST_CASE("The experiments run on any labelled sequence") {
     CHECK(has(text, "dynains, default preset"));
     CHECK(has(message_of({"experiment", "table1", folder.path().string()}),
               "has no scans; expected a KITTI folder"));
-    // One file of poses cannot be that of two sequences.
+    // One file of poses cannot belong to two sequences.
     fs::create_directories(folder.path() / "kitti" / "sequences" / "07" / "velodyne");
     CHECK(has(message_of({"experiment", "table1", (folder.path() / "kitti").string(), "--poses",
                           (root / "poses.txt").string()}),
@@ -394,7 +394,7 @@ TEST_CASE("The experiments run on any labelled sequence") {
     const std::string csv = read_text(csv_path);
     CHECK(std::count(csv.begin(), csv.end(), '\n') == 8);
     CHECK(csv.rfind("tau-s,pr,rr,f1,sa,da,ha\n0,", 0) == 0);
-    // Nothing is below a similarity of 0, nearly everything that changes below 1.
+    // No similarity is below 0, and nearly all changed clusters are below 1.
     const auto scores = [&](const std::string& value) {
       const std::size_t begin = csv.find('\n' + value + ',') + 1 + value.size();
       return csv.substr(begin, csv.find('\n', begin) - begin);
@@ -424,7 +424,7 @@ TEST_CASE("The experiments run on any labelled sequence") {
     }
     CHECK(read_points(out / "raw.ply").positions.size() ==
           read_points(out / "cleaned.ply").positions.size());
-    // The labels of an earlier run decide, so flags of the remover are refused.
+    // The labels of an earlier run are used, so flags of the remover are refused.
     const fs::path run = folder.path() / "run";
     write_run(run, write_street(street, 6), 240);  // half of the moving points are missed
     const std::vector<std::string> of_run = {

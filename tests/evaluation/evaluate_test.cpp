@@ -36,7 +36,7 @@ std::vector<OwnedScan> street() {
 
 }  // namespace
 
-TEST_CASE("Point-wise accuracies are shares of the points of either truth") {
+TEST_CASE("Point-wise accuracies are shares of the static and of the dynamic points") {
   PointProtocol protocol({2.7, 50, TruthClasses()}, 1);
   for (const OwnedScan& scan : street()) protocol.add(scan.view());
   const PointScore& score = protocol.score(0);
@@ -65,13 +65,13 @@ TEST_CASE("Every evaluation carries identity and oracle") {
   CHECK(result.rows[1].name == "oracle");
   CHECK(result.rows[1].voxels.f1() == 1.0);
   CHECK(result.rows[1].points.harmonic_accuracy() == 100.0);
-  // The road's voxels are held by other scans; the car's four voxels of scan 1 are kept.
+  // The road's voxels contain points of other scans. The four voxels of the car in scan 1 are kept.
   CHECK(result.rows[2].voxels.preservation_rate() == 100.0);
   CHECK(result.rows[2].voxels.dynamic_total == 12);
   CHECK(result.rows[2].voxels.dynamic_preserved == 4);
 }
 
-TEST_CASE("A map of the kept points scores as the labels do where voxels are apart") {
+TEST_CASE("A map of the kept points gets the score of the labels if voxels do not mix classes") {
   const auto scans = street();
   std::vector<Eigen::Vector3d> map;
   for (const OwnedScan& scan : scans) {
@@ -83,12 +83,12 @@ TEST_CASE("A map of the kept points scores as the labels do where voxels are apa
   REQUIRE(result.rows.size() == 4);
   CHECK(result.rows[3].voxels.preservation_rate() == result.rows[2].voxels.preservation_rate());
   CHECK(result.rows[3].voxels.rejection_rate() == result.rows[2].voxels.rejection_rate());
-  // Point-wise the map still covers the road that scan 2 lost.
+  // Point-wise, the map covers the road that scan 2 lost.
   CHECK(result.rows[3].points.static_accuracy() == 100.0);
   CHECK(*result.rows[3].foreign_points == 0);
 }
 
-TEST_CASE("Errors are told by class, instance, range, cause and cluster") {
+TEST_CASE("Errors are counted by class, instance, range, cause and cluster") {
   auto scans = street();
   for (std::size_t s = 0; s < scans.size(); ++s) {
     scans[s].causes.assign(14, static_cast<std::uint8_t>(Cause::kNoEvidence));
@@ -143,7 +143,7 @@ TEST_CASE("Errors are told by class, instance, range, cause and cluster") {
   CHECK(text.find("similarity too high") != std::string::npos);
 }
 
-TEST_CASE("Reports carry the same numbers") {
+TEST_CASE("All reports have equal numbers") {
   const auto scans = street();
   const Evaluation result = evaluate(source_of(scans), {"my \"run\""}, {});
   const auto json = nlohmann::json::parse(to_json(result));
@@ -157,14 +157,14 @@ TEST_CASE("Reports carry the same numbers") {
   CHECK(csv.find("\"my \"\"run\"\"\",100.000000,66.666667,0.800000,") != std::string::npos);
   CHECK(to_table(result).find("66.667") != std::string::npos);
 
-  // A share of nothing is no number anywhere.
+  // A share of zero points is not a number.
   const Evaluation nothing = evaluate([](std::size_t, LabelledScan&) { return false; }, {}, {});
   CHECK(nlohmann::json::parse(to_json(nothing))["rows"][0]["voxels"]["pr"].is_null());
   CHECK(to_csv(nothing).find("nan") == std::string::npos);
   CHECK(errors_to_table(nothing).empty());
 }
 
-TEST_CASE("Malformed scans and settings are refused by name") {
+TEST_CASE("Malformed scans and settings are refused with their name") {
   auto scans = street();
   scans[1].in_map.pop_back();
   CHECK_THROWS_WITH(evaluate(source_of(scans), {"run"}, {}),
@@ -206,15 +206,15 @@ TEST_CASE("Class lists are ids and ranges") {
   }
 }
 
-TEST_CASE("A list of dynamic classes is told in the shortest way, and reads back") {
+TEST_CASE("A list of dynamic classes has a short text form that can be read back") {
   for (const char* list : {"252-259", "3-5,9", "0", "65535", "1,3,5-6"}) {
     CHECK(TruthClasses(list, Unlabeled::kIgnore).dynamic_classes() == list);
   }
   CHECK(TruthClasses("9,3,4,5,5", Unlabeled::kIgnore).dynamic_classes() == "3-5,9");
 }
 
-TEST_CASE("What moves is named after what it is") {
-  // The pairs by which SemanticKITTI maps moving classes to those that stand.
+TEST_CASE("Moving classes are named after the classes at rest") {
+  // The pairs by which SemanticKITTI maps moving classes to classes at rest.
   const std::vector<std::pair<std::uint16_t, std::uint16_t>> pairs = {
       {252, 10}, {253, 31}, {254, 30}, {255, 32}, {256, 16}, {257, 13}, {258, 18}, {259, 20}};
   for (const auto& [moving, still] : pairs) {
@@ -222,7 +222,7 @@ TEST_CASE("What moves is named after what it is") {
   }
 }
 
-TEST_CASE("Every class has a name of its own, known or not") {
+TEST_CASE("Every class has a unique name, known or not") {
   std::set<std::string> names;
   for (std::uint16_t id = 0; id < 300; ++id) names.insert(semantic_class_name(id));
   CHECK(names.size() == 300);

@@ -21,7 +21,7 @@ constexpr Colour kWhite = {255, 255, 255};
 constexpr Colour kRed = {255, 0, 0};
 constexpr Colour kBlue = {0, 0, 255};
 
-/// One point of each fate, 10 m from the sensor.
+/// One point for each of the four outcomes, 10 m from the sensor.
 VerdictCloud four_fates() {
   OwnedScan scan;
   scan.T_world_sensor.translation() = Eigen::Vector3d(1e6, 0, 0);
@@ -40,7 +40,7 @@ VerdictCloud four_fates() {
 
 }  // namespace
 
-TEST_CASE("A figure of the map shows the points that stay, and no others") {
+TEST_CASE("A figure of the map shows the kept points, and no others") {
   VerdictCloud cloud = four_fates();
   OwnedScan scan;
   scan.T_world_sensor.translation() = Eigen::Vector3d(1e6, 0, 0);
@@ -65,7 +65,7 @@ TEST_CASE("A figure of the map shows the points that stay, and no others") {
   CHECK(others == 0);
 }
 
-TEST_CASE("Within a layer the nearest point is seen, and later layers cover") {
+TEST_CASE("Within a layer the nearest point is visible, and later layers cover earlier ones") {
   Picture picture(10, 5);
   CHECK(picture.at(3, 2) == kWhite);
   picture.splat(3.5, 2.5, 1.0, 0, kRed);
@@ -77,7 +77,7 @@ TEST_CASE("Within a layer the nearest point is seen, and later layers cover") {
   picture.begin_layer();
   picture.splat(3.5, 2.5, 9.0, 0, kBlue);
   CHECK(picture.at(3, 2) == kBlue);
-  // Clipped, and far out of any picture.
+  // Points at the border of the picture and far outside.
   picture.splat(-0.5, -0.5, 0, 1, kRed);
   CHECK(picture.at(0, 0) == kRed);
   picture.splat(1e300, -1e300, 0, 1, kRed);
@@ -85,7 +85,7 @@ TEST_CASE("Within a layer the nearest point is seen, and later layers cover") {
   CHECK_THROWS_AS(Picture(5, 20000), ConfigError);
 }
 
-TEST_CASE("A picture comes back from its PNG file") {
+TEST_CASE("A picture is read back from its PNG file") {
   const TemporaryFolder folder;
   Picture picture(7, 3);
   picture.splat(6.5, 0.5, 0, 0, kRed);
@@ -110,7 +110,7 @@ TEST_CASE("A picture comes back from its PNG file") {
   CHECK_THROWS_AS(picture.write_png(folder.path() / "missing" / "picture.png"), IoError);
 }
 
-TEST_CASE("A cloud of verdicts keeps one point per voxel and fate") {
+TEST_CASE("A cloud of verdicts keeps one point per voxel and outcome") {
   const VerdictCloud cloud = four_fates();
   REQUIRE(cloud.points().size() == 4);
   CHECK(cloud.points()[0].fate == Fate::kKeptStatic);
@@ -121,7 +121,7 @@ TEST_CASE("A cloud of verdicts keeps one point per voxel and fate") {
   CHECK(cloud.origin().x() == 1e6);
 }
 
-TEST_CASE("What the map shows all the same is not lost") {
+TEST_CASE("A static point with a kept point in its voxel is not lost") {
   OwnedScan scan;
   scan.add(10.01F, 0.01F, 0.01F, kRoad, 0);  // lost, but kept in the same voxel
   scan.add(10.02F, 0.01F, 0.01F, kRoad, 1);
@@ -138,7 +138,7 @@ TEST_CASE("What the map shows all the same is not lost") {
   CHECK(cloud.points()[2].fate == Fate::kMissedDynamic);
 }
 
-TEST_CASE("Figures show each fate where it is and in its colour") {
+TEST_CASE("Figures show each outcome at its place and in its colour") {
   const VerdictCloud cloud = four_fates();
   // 20 m by 20 m on 200 pixels: x to the right, y up.
   const Picture cleaned = draw_from_above(cloud, Content::kVerdict, 200);
@@ -154,7 +154,7 @@ TEST_CASE("Figures show each fate where it is and in its colour") {
   CHECK(!(raw.at(0, 100) == kWhite));
   CHECK(!(raw.at(0, 100) == colour_of(Fate::kLostStatic, Content::kVerdict)));
 
-  // An empty cloud is a white picture, not a crash.
+  // An empty cloud gives a white picture.
   const VerdictCloud nothing(0.1, 2.7, 50, evaluation::TruthClasses());
   CHECK(draw_from_above(nothing, Content::kRaw, 50).at(0, 0) == kWhite);
   CHECK(draw_perspective(nothing, Content::kRaw, 50).at(25, 10) == kWhite);

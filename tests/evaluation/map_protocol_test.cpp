@@ -83,11 +83,11 @@ TEST_CASE("A measured point is in the map up to the radius, inclusive") {
   CHECK(score.harmonic_accuracy() == Approx(50.0));
 }
 
-TEST_CASE("Map files are scored as the all-at-once reference scores them", "[reference]") {
+TEST_CASE("Map files get the score of the simple reference implementation", "[reference]") {
   for (const std::uint64_t seed : {21U, 22U, 23U}) {
     const auto scans = mixed_scans(seed, 4, 700);
     Random random(seed);
-    // A map of measured points of estimate 0, some displaced by another tool's rounding.
+    // A map of the kept points of estimate 0, some with rounding errors of another tool.
     std::vector<Eigen::Vector3d> map;
     for (const OwnedScan& scan : scans) {
       for (std::size_t i = 0; i < scan.truth.size(); ++i) {

@@ -1,4 +1,4 @@
-// The protocols as their definitions read: everything in memory, sorted maps, every pair compared.
+// Simple implementations of the protocols: everything in memory, sorted maps, every pair compared.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -41,7 +41,7 @@ inline std::vector<VoxelPoint> voxelise(const std::vector<VoxelPoint>& points, d
   return result;
 }
 
-/// True if a point takes part, by its position in the sensor frame.
+/// Whether a point is within range, by its position in the sensor frame.
 inline bool in_range(const Eigen::Vector3d& p, double min_range, double max_range) {
   const double range = p.head<2>().norm();
   return p.allFinite() && p != Eigen::Vector3d::Zero() && range >= min_range &&
@@ -50,7 +50,7 @@ inline bool in_range(const Eigen::Vector3d& p, double min_range, double max_rang
 
 using Chosen = std::function<bool(const OwnedScan&, std::size_t, Truth)>;
 
-/// Map of the chosen points of all scans: voxelised scan by scan, then as a whole.
+/// Map of the chosen points of all scans: voxels of each scan, then voxels of the whole.
 inline std::vector<VoxelPoint> reference_map(const std::vector<OwnedScan>& scans,
                                              const VoxelProtocol::Settings& settings,
                                              const Chosen& chosen) {

@@ -1,4 +1,4 @@
-// Small labelled scans for the tests of the evaluation.
+// Small labelled scans for tests of the evaluation.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -65,8 +65,8 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-/// Scans of a small box of points in which truths, ignored points and two estimates mix in most
-/// voxels of 0.2 m; the sensor turns and moves, some points are no return or not finite.
+/// Scans of a small box of points. Truths, ignored points and two estimates mix in most voxels of
+/// 0.2 m. The sensor turns and moves. Some points are no returns or not finite.
 inline std::vector<OwnedScan> mixed_scans(std::uint64_t seed, std::size_t scans,
                                           std::size_t points_per_scan) {
   Random random(seed);
@@ -79,7 +79,7 @@ inline std::vector<OwnedScan> mixed_scans(std::uint64_t seed, std::size_t scans,
     for (std::size_t i = 0; i < points_per_scan; ++i) {
       const bool moving = random.chance(0.4);
       const std::uint32_t label = random.chance(0.1) ? 0 : moving ? kMovingCar : kRoad;
-      // Estimate 0 mostly right, estimate 1 nearly a coin.
+      // Estimate 0 is mostly right, estimate 1 nearly random.
       const unsigned held =
           (random.chance(moving ? 0.2 : 0.8) ? 1U : 0U) | (random.chance(0.5) ? 2U : 0U);
       auto x = static_cast<float>(random.uniform(0.5, 3.0));

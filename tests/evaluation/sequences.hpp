@@ -1,4 +1,4 @@
-// Small labelled sequences on the disk, for the tests of the evaluating commands.
+// Small labelled sequences on disk, for tests of the evaluation commands.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -75,8 +75,8 @@ inline std::vector<OwnedScan> write_street(const std::filesystem::path& folder, 
   return result;
 }
 
-/// Labels of a run that is right but for the first `missed` moving points of each scan; final ones,
-/// or the verdicts without latency ("online").
+/// Labels of a run that is right except for the first `missed` moving points of each scan: final
+/// labels, or the verdicts without latency ("online").
 inline void write_run(const std::filesystem::path& out, const std::vector<OwnedScan>& scans,
                       std::size_t missed, const std::string& kind = "labels") {
   std::filesystem::create_directories(out / kind);

@@ -1,4 +1,4 @@
-// Identity and oracle on real recordings, where they are at hand.
+// Identity and oracle on real recordings, if they exist.
 #include <string>
 
 #include "dynains/evaluation/evaluate.hpp"
@@ -24,8 +24,8 @@ void check_identity_and_oracle(const std::string& name) {
     CHECK(identity.voxels.preservation_rate() == 100.0);
     CHECK(identity.voxels.rejection_rate() == 0.0);
     CHECK(identity.voxels.dynamic_total > 1000);
-    // Where truths share a voxel, the oracle moves its centroid: by the protocol it can lose a
-    // few static voxels.
+    // If points of both classes share a voxel, the oracle moves the centroid of that voxel. By the
+    // protocol, it can then lose a few static voxels.
     const evaluation::EvaluationRow& oracle = result.rows[1];
     CHECK(oracle.voxels.preservation_rate() > 99.99);
     CHECK(oracle.voxels.rejection_rate() == 100.0);

@@ -123,7 +123,7 @@ TEST_CASE("Each scan counts once in a voxel, however many points it has there") 
   REQUIRE(raw.size() == 1);
   CHECK(raw[0].p_world.x() == Approx(0.4));
   CHECK(raw[0].truth == Truth::kDynamic);
-  // The oracle keeps the static point, 0.3 from the raw one: near, but of the other class.
+  // The oracle keeps the static point 0.3 from the raw one, which is of the other class.
   CHECK(protocol.score(VoxelProtocol::kOracle).dynamic_preserved == 0);
 }
 
@@ -150,7 +150,7 @@ TEST_CASE("Unlabeled points are static or belong to no map, for raw and estimate
   CHECK(kept.static_preserved == 1);
 }
 
-TEST_CASE("Streaming equals the all-at-once reference", "[reference]") {
+TEST_CASE("Streaming gives the score of the simple reference implementation", "[reference]") {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const auto scans = mixed_scans(seed, 6, 900);
     for (const Unlabeled unlabeled : {Unlabeled::kIgnore, Unlabeled::kStatic}) {
@@ -168,7 +168,7 @@ TEST_CASE("Streaming equals the all-at-once reference", "[reference]") {
         CHECK(map_of(protocol, row).size() == estimate.size());
         CHECK(same(protocol.score(row), reference_score(raw, estimate, with.voxel)));
       }
-      // The scene is hard enough to tell a wrong rule from a right one.
+      // The scene is hard enough to detect a wrong rule.
       const VoxelScore score = protocol.score(VoxelProtocol::kFirstEstimate);
       CHECK(score.preservation_rate() < 95);
       CHECK(score.rejection_rate() < 95);
@@ -184,7 +184,7 @@ TEST_CASE("Identity preserves everything; the oracle rejects everything dynamic"
   CHECK(identity.rejection_rate() == 0.0);
   CHECK(protocol.score(VoxelProtocol::kOracle).rejection_rate() == 100.0);
 
-  // Where truths do not share voxels, the oracle is perfect.
+  // If the classes share no voxels, the oracle is perfect.
   OwnedScan apart;
   for (int i = 0; i < 50; ++i) {
     apart.add(5.0F + 0.1F * static_cast<float>(i), 3.0F, 0.1F, kRoad);
@@ -197,7 +197,7 @@ TEST_CASE("Identity preserves everything; the oracle rejects everything dynamic"
   CHECK(oracle.f1() == 1.0);
 }
 
-TEST_CASE("Coordinates of a national grid do not change the score") {
+TEST_CASE("Coordinates far from the origin do not change the score") {
   auto scans = mixed_scans(11, 4, 600);
   const VoxelScore here = run(scans, settings(0.25), 2).score(2);
   // Multiples of the edge that are exact in binary, so that the same points share voxels.
@@ -209,7 +209,7 @@ TEST_CASE("Coordinates of a national grid do not change the score") {
   CHECK(same(here, there));
 }
 
-TEST_CASE("Nothing to judge gives shares of nothing, not numbers") {
+TEST_CASE("Shares of zero points are not numbers") {
   const VoxelProtocol nothing = run({}, settings(0.2), 1);
   CHECK(std::isnan(nothing.score(0).preservation_rate()));
   CHECK(std::isnan(nothing.score(0).f1()));
@@ -220,7 +220,7 @@ TEST_CASE("Nothing to judge gives shares of nothing, not numbers") {
   bad.add(kNan, 5.0F, 0.0F, kRoad, 1);
   bad.add(5.0F, 5.0F, kInf, kRoad, 1);
   bad.add(0.0F, 0.0F, 0.0F, kRoad, 1);
-  bad.add(1e30F, 0.0F, 0.0F, kRoad, 1);  // out of the grid's reach
+  bad.add(1e30F, 0.0F, 0.0F, kRoad, 1);  // outside the range of the grid
   CHECK(run({bad}, settings(0.2), 1).score(0).static_total == 0);
 }
 

@@ -1,4 +1,4 @@
-// The fuzzing targets without a fuzzer: their seeds and mutations of these.
+// Runs the fuzzing targets on their seeds and on mutations of these, without a fuzzer.
 #include <algorithm>
 #include <string>
 
@@ -13,7 +13,7 @@ void run(const Target& target, const std::string& input) {
   target.run({reinterpret_cast<const std::uint8_t*>(input.data()), input.size()});
 }
 
-/// Some bytes changed, removed, doubled, or the end cut off.
+/// The input with some bytes changed, removed or doubled, or with its end cut off.
 std::string mutated(std::string input, test::Random& random) {
   const std::size_t changes = 1 + random.index(4);
   for (std::size_t i = 0; i < changes && !input.empty(); ++i) {
@@ -39,7 +39,7 @@ std::string mutated(std::string input, test::Random& random) {
   return input;
 }
 
-TEST_CASE("Seeds and their mutations: a value or an exception of ours") {
+TEST_CASE("Seeds and their mutations give a value or an exception of this project") {
   for (const Target& target : targets()) {
     INFO(target.name);
     test::Random random(7);
@@ -55,7 +55,7 @@ TEST_CASE("Seeds and their mutations: a value or an exception of ours") {
   }
 }
 
-TEST_CASE("A broken promise is noticed") {
+TEST_CASE("A failed requirement is detected") {
   CHECK_THROWS_AS(require(false, "never"), std::logic_error);
   CHECK_THROWS_AS(target("none"), std::out_of_range);
 }

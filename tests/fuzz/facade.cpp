@@ -1,4 +1,4 @@
-// DynaInsRemover driven by bytes: configuration, scans, poses, times and the order of calls.
+// DynaInsRemover with a configuration, scans, poses, times and calls that are read from bytes.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -20,7 +20,7 @@ namespace {
 using Config = DynaInsRemover::Config;
 using Point = Eigen::Vector3f;
 
-/// Values from bytes; zeros behind the end.
+/// Reads values from bytes; zeros after the end.
 class Stream {
  public:
   explicit Stream(Bytes bytes) : bytes_(bytes) {}
@@ -48,7 +48,7 @@ float strange(unsigned which) {
   return values[which % 8];
 }
 
-/// Few scans are open or remembered at once: little memory to build, and soon full.
+/// A preset with few open and remembered scans: it needs little memory, and rings fill up soon.
 Config small_preset(bool paper) {
   Config config = paper ? Config::paper() : Config();
   config.window = std::min(config.window, 3);
@@ -58,7 +58,7 @@ Config small_preset(bool paper) {
   return config;
 }
 
-/// Some parameters set to any value, also beyond their bounds.
+/// Sets some parameters to random values, also out of bounds.
 void change(Stream& stream, Config& config) {
   Config::visit(config, [&](const auto& parameter) {
     const unsigned choice = stream.byte();
@@ -75,7 +75,7 @@ void change(Stream& stream, Config& config) {
       parameter.value = static_cast<Value>(low + share * share * share * (high - low));
     }
   });
-  // Fine grids and long memories take time without other code being reached.
+  // Fine grids and long memories need more time without reaching more code.
   config.clusterer.voxel_range = std::max(config.clusterer.voxel_range, 0.4);
   if (config.clusterer.voxel_azimuth > 0.0) {
     config.clusterer.voxel_azimuth = std::max(config.clusterer.voxel_azimuth, 1.0);
@@ -90,9 +90,9 @@ void change(Stream& stream, Config& config) {
   config.votes = std::min(config.votes, 7);
 }
 
-/// A floor around the sensor. A dense one has enough points to tell a sensor, one of few beams,
-/// whose range images are small. Only a near one shows how the sensor is mounted, which takes as
-/// long as ten scans.
+/// A floor around the sensor. A dense floor has enough points to derive a sensor model, one of few
+/// beams, whose range images are small. Only a near floor shows the mounting of the sensor; its
+/// estimation takes as long as ten scans.
 void add_floor(Stream& stream, bool dense, std::vector<Point>& points) {
   const auto height = static_cast<float>(-1.7 + stream.number(1.0));
   const bool near = stream.byte() % 32 == 31;
@@ -121,7 +121,7 @@ void add_wall(Stream& stream, std::vector<Point>& points) {
   }
 }
 
-/// `dense`: whether a floor is.
+/// `dense`: whether floors are dense.
 std::vector<Point> read_points(Stream& stream, unsigned kind, bool dense) {
   std::vector<Point> points;
   if ((kind & 1U) != 0) add_floor(stream, dense, points);
@@ -143,7 +143,7 @@ Eigen::Isometry3d read_pose(Stream& stream, unsigned kind) {
   if ((kind & 1U) != 0) {
     const double unit = (kind & 2U) != 0 ? 3e7 : 30.0;
     for (int axis = 0; axis < 3; ++axis) {
-      const double share = stream.number(1.0);  // most of them so near that scans overlap
+      const double share = stream.number(1.0);  // most walls are so near that scans overlap
       T.translation()[axis] = unit * share * share * share;
     }
     T.linear() = Eigen::AngleAxisd(stream.number(M_PI), Eigen::Vector3d::UnitZ()).matrix();
@@ -154,8 +154,8 @@ Eigen::Isometry3d read_pose(Stream& stream, unsigned kind) {
   return T;
 }
 
-/// Checks every answer of a remover against what it was given. Begins with a reset: the remover may
-/// have served before.
+/// Checks every answer of a remover against its input. Begins with a reset, because the remover may
+/// have been used before.
 class Witness {
  public:
   explicit Witness(DynaInsRemover& remover) : remover_(remover) { reset(); }
@@ -184,9 +184,9 @@ class Witness {
   }
 
   double time_step() const { return remover_.config().max_gap; }
-  /// Whether no scan was taken since the last reset: the next one tells the sensor.
+  /// Whether no scan was taken since the last reset. The next scan then gives the sensor model.
   bool is_new() const { return pushed_ == 0; }
-  /// Of all final verdicts so far.
+  /// Digest of all final verdicts so far.
   std::uint64_t digest() const { return digest_; }
 
  private:
@@ -283,7 +283,7 @@ constexpr char kFlush = 13;
 constexpr char kReset = 14;
 constexpr char kPushAlone = 15;  ///< any scan, also as the first one
 
-/// Makes the calls that the rest of the stream tells; returns the digest of all final verdicts.
+/// Makes the calls that the rest of the stream encodes; returns the digest of all final verdicts.
 std::uint64_t play(Stream stream, DynaInsRemover& remover) {
   Witness witness(remover);
   double time = 0.0;
@@ -296,7 +296,7 @@ std::uint64_t play(Stream stream, DynaInsRemover& remover) {
       witness.reset();
     } else {
       const unsigned kind = stream.byte();
-      // A scan that tells the sensor is a floor and nothing else: images have few rows.
+      // The scan that gives the sensor model is only a floor, so that range images have few rows.
       const bool tells_sensor = what != kPushAlone && witness.is_new();
       const std::vector<Point> points =
           read_points(stream, tells_sensor ? 1U : kind & 15U, tells_sensor);
@@ -317,10 +317,10 @@ std::uint64_t play(Stream stream, DynaInsRemover& remover) {
   return witness.digest();
 }
 
-constexpr unsigned kPooled = 64;          ///< configurations with a remover of their own
-constexpr unsigned kWithDynamicGrid = 8;  ///< of these, some have a dynamic grid of 2 MB
-constexpr unsigned kLeastCompared = 250;  ///< from here on, a new remover has to say the same
-constexpr unsigned kLeastChanged = 253;   ///< from here on, the stream tells the configuration
+constexpr unsigned kPooled = 64;          ///< number of configurations with their own remover
+constexpr unsigned kWithDynamicGrid = 8;  ///< number of them with a dynamic grid of 2 MB
+constexpr unsigned kLeastCompared = 250;  ///< from here on, a new remover has to give equal answers
+constexpr unsigned kLeastChanged = 253;   ///< from here on, the stream encodes the configuration
 
 /// The two presets, then presets with some parameters changed at random.
 Config pooled_config(unsigned number) {
@@ -343,7 +343,7 @@ std::optional<DynaInsRemover> built(const Config& config) {
   }
 }
 
-/// Built once, for a run begins with a reset; null if its configuration is refused.
+/// Built once, because a run begins with a reset; null if its configuration is refused.
 DynaInsRemover* pooled_remover(unsigned number) {
   static std::map<unsigned, std::optional<DynaInsRemover>> pool;
   auto entry = pool.find(number);
@@ -376,7 +376,7 @@ std::vector<std::string> facade_seeds() {
   std::vector<std::string> seeds;
   for (const char kind : {'\0', '\1', '\x40', '\xFB'}) {
     std::string seed(1, kind);
-    // A floor, three scans of floor and a wall that moves, then a flush.
+    // A floor, three scans of a floor and a moving wall, then a flush.
     for (int i = 0; i < 4; ++i) {
       seed += {kPush, '\x13', '\0', '\x80', kind == '\x40' ? '\x1F' : '\0'};   // floor
       if (i > 0) seed += {'\0', static_cast<char>(0xA0 + i), '\0', '\x98'};    // wall at x, y
@@ -386,11 +386,11 @@ std::vector<std::string> facade_seeds() {
     seed += kFlush;
     seeds.push_back(seed);
   }
-  // A pose that is none, a reset, odd points.
+  // An invalid pose, a reset, invalid points.
   seeds.push_back({'\0',   kPush,  '\xD4', '\0',   '\0',   '\0', '\x90', '\x90', '\x90',
                    '\x90', '\x90', '\x90', '\x90', '\x90', '\1', '\1',   '\1',   kReset,
                    '\xF',  '\xC',  '\2',   '\1',   '\2',   '\3', '\4',   '\5',   '\6'});
-  // Every parameter set to something.
+  // A changed value for every parameter.
   std::string changed = "\xFE";
   for (int i = 0; i < 200; ++i) changed += {'\x47', static_cast<char>(i), '\x70'};
   seeds.push_back(changed);

@@ -1,4 +1,4 @@
-// Logs of ROS: whatever the file holds, scans with poses or an IoError that names the log.
+// Logs of ROS: any bytes give scans with poses, or an IoError that names the log.
 #include <cmath>
 #include <filesystem>
 #include <string>
@@ -37,7 +37,7 @@ void read_whole(const fs::path& log, std::size_t bytes) {
   }
 }
 
-/// Two clouds of all fields and their poses, by transforms or odometry.
+/// Two clouds with all fields, and their poses as transforms or odometry.
 std::vector<WrittenMessage> drive(MessageEncoding encoding, bool by_transforms) {
   const std::vector<test::CloudField> fields = {{"x", 0, 7},      {"y", 4, 7},     {"z", 8, 7},
                                                 {"label", 12, 6}, {"ring", 16, 4}, {"t", 18, 6}};

@@ -1,4 +1,4 @@
-// Every reader of files: whatever the file holds, a value that makes sense or an IoError.
+// Every reader of files: any bytes give a valid value or an IoError.
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A file of that name with these bytes, in a folder that lives as long as the process.
+/// Writes a file of this name, in a folder that lives as long as the process.
 fs::path file_of(const char* name, Bytes bytes) {
   static const test::TemporaryFolder folder;
   const fs::path path = folder / name;
@@ -32,7 +32,7 @@ fs::path file_of(const char* name, Bytes bytes) {
   return path;
 }
 
-/// Runs `read` on the file; an Error is fine if it names the file.
+/// Runs `read` on the file. An Error is permitted if it names the file.
 template <class Error, class Read>
 void expect_value_or(const fs::path& path, Read&& read) {
   try {
@@ -158,7 +158,7 @@ void run_tile(Bytes bytes) {
     };
     map->for_each(check);
     require(count == map->size() && 16 * count <= bytes.size(), "points come from bytes");
-    // Goes on with it, from memory and from the file.
+    // Continues the map, from memory and from the file.
     const PointBuffer one{{1.0F}, {1.0F}, {1.0F}};
     map->insert(one, {}, Eigen::Isometry3d::Identity());
     const std::size_t size = map->size();
@@ -207,7 +207,7 @@ std::vector<std::string> ply_seeds() {
 
 std::vector<std::string> pcd_seeds() {
   const std::string point = floats({1.0F, 2.0F, 3.0F, 0.5F}) + std::string("\xFB\0\0\0", 4);
-  // Two times 20 bytes column by column; a literal run of 32 bytes and one of 8, in LZF.
+  // Twice 20 bytes column by column, in LZF: a literal run of 32 bytes and one of 8.
   const std::string columns(40, '\0');
   const std::string lzf = '\x1F' + columns.substr(0, 32) + '\x07' + columns.substr(0, 8);
   const std::string sizes = std::string("\x2A\0\0\0\x28\0\0\0", 8);

@@ -1,5 +1,5 @@
-// Trajectories, and whole folders of scans: whatever the files hold and however they are called,
-// poses and points that make sense or an IoError that names the place.
+// Trajectories and folders of scans: any contents and any file names give valid poses and points,
+// or an IoError that names the place.
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Runs `read`; an IoError is fine if it says where.
+/// Runs `read`. An IoError is permitted if it names the place.
 template <class Read>
 void expect_value_or_place(const fs::path& place, Read&& read) {
   try {
@@ -32,8 +32,8 @@ void require_rigid(const Eigen::Isometry3d& pose) {
   require((R.transpose() * R).isIdentity(1e-6), "poses are rigid");
 }
 
-// A folder is written as one text: a file begins with "@@" and the letter of its name, and goes on
-// to the next.
+// One text encodes a folder: a file begins with "@@" and the letter of its name, and ends where the
+// next one begins.
 constexpr char kFirstName = 'a';
 const char* const kNames[] = {
     "poses.txt",
@@ -178,7 +178,7 @@ std::vector<std::string> recording_seeds() {
       std::string(1, '\0') + file('g', bin(5.0F)) + file('h', bin(6.0F)) +
           file('a', identity + identity) + file('b', "0\n0.1\n") + file('c', "Tr: " + identity) +
           file('j', label) + file('k', label),
-      // Point clouds with VIEWPOINT, and by a trajectory with times.
+      // Point clouds with VIEWPOINT, and point clouds with a trajectory and times.
       std::string(1, '\3') + file('l', pcd("1 2 3 1 0 0 0")) + file('m', pcd("2 2 3 1 0 0 0")),
       std::string(1, '\x21') + file('o', ply()) + file('p', ply()) +
           file('d', "t,x,y,z,qx,qy,qz,qw\n1.5,0,0,0,0,0,0,1\n2.5,1,0,0,0,0,0,1\n"),

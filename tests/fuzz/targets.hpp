@@ -1,4 +1,4 @@
-// What is fuzzed: functions of bytes. They return, or throw what is a bug.
+// Fuzzing targets: functions of bytes. They return normally, or throw to report a bug.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ using Bytes = Span<const std::uint8_t>;
 struct Target {
   const char* name;
   void (*run)(Bytes);
-  std::vector<std::string> (*seeds)();  ///< inputs from which others are made
+  std::vector<std::string> (*seeds)();  ///< initial inputs that a fuzzer mutates
 };
 
 const std::vector<Target>& targets();

@@ -29,7 +29,7 @@ TEST_CASE("AtomicFile replaces the target at commit and not before") {
   CHECK(count_entries(folder.path()) == 1);
 }
 
-TEST_CASE("Files can be brought to the disk later, all at once") {
+TEST_CASE("Files can be synced to the disk later, all at once") {
   TemporaryFolder folder;
   AtomicFile file(folder / "a.txt");
   file.stream() << "new";
@@ -73,12 +73,12 @@ TEST_CASE("AtomicFile refuses targets that it cannot replace, and names them") {
   CHECK_THAT(is_folder,
              ContainsSubstring(folder.path().string()) && ContainsSubstring("regular file"));
 
-  // Renaming over a device would destroy it.
+  // Renaming over a device would remove it.
   const std::string device = message_of<IoError>([] { AtomicFile file("/dev/null"); });
   CHECK_THAT(device, ContainsSubstring("/dev/null") && ContainsSubstring("regular file"));
 }
 
-TEST_CASE("AtomicFile tells why a file could not be written, and keeps the target") {
+TEST_CASE("AtomicFile reports why a file could not be written, and keeps the target") {
   TemporaryFolder folder;
   const fs::path target = folder / "a.txt";
   write_text(target, "old");
@@ -99,7 +99,7 @@ TEST_CASE("AtomicFile tells why a file could not be written, and keeps the targe
   CHECK(count_entries(folder.path()) == 1);
 }
 
-TEST_CASE("Two writers of one file never share a temporary, and links in its place lead nowhere") {
+TEST_CASE("Two writers of one file use different temporary files and never follow links") {
   TemporaryFolder folder;
   const fs::path victim = folder / "victim";
   write_text(victim, "precious");
@@ -118,7 +118,7 @@ TEST_CASE("Two writers of one file never share a temporary, and links in its pla
   CHECK(count_entries(folder.path()) == 3);
 }
 
-TEST_CASE("Names of temporaries tell the file, and no other name does") {
+TEST_CASE("Names of temporary files give the name of the file, and other names do not") {
   CHECK(target_of_temporary(".a.txt.0123456789abcdef.tmp") == "a.txt");
   CHECK(target_of_temporary("..x.0123456789abcdef.tmp") == ".x");
   for (const char* other :
@@ -130,7 +130,7 @@ TEST_CASE("Names of temporaries tell the file, and no other name does") {
   }
 }
 
-TEST_CASE("Only temporaries that nobody writes, and of files that are named, are removed") {
+TEST_CASE("Only temporary files of the named files without a writer are removed") {
   TemporaryFolder folder;
   const fs::path leftover = folder / ".a.txt.0123456789abcdef.tmp";
   const fs::path foreign = folder / ".b.txt.0123456789abcdef.tmp";

@@ -1,4 +1,4 @@
-// Logs of rosbag2 in SQLite for tests, if this build has SQLite.
+// Writes logs of rosbag2 in SQLite for tests, if this build has SQLite.
 #pragma once
 
 #if defined(DYNAINS_HAS_SQLITE3)

@@ -52,7 +52,7 @@ inline std::size_t count_entries(const std::filesystem::path& folder) {
   return static_cast<std::size_t>(std::distance(Iterator(folder), Iterator()));
 }
 
-/// Text of the exception that `action` throws; fails loudly if it is of another type or missing.
+/// Text of the exception that `action` throws. Fails if its type is another or nothing is thrown.
 template <class Exception, class Action>
 std::string message_of(Action&& action) {
   try {

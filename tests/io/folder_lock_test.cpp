@@ -24,7 +24,7 @@ std::string refusal(const fs::path& folder) {
 
 }  // namespace
 
-TEST_CASE("a folder has one lock at a time, whatever path leads to it, and no file for it") {
+TEST_CASE("a folder has one lock at a time for all its paths, and no lock file") {
   const TemporaryFolder folder;
   fs::create_directory(folder / "a");
   fs::create_directory_symlink(folder / "a", folder / "link");
@@ -39,7 +39,7 @@ TEST_CASE("a folder has one lock at a time, whatever path leads to it, and no fi
   CHECK(refusal(folder / "a") == "(nothing was thrown)");
 }
 
-TEST_CASE("a lock goes where it is moved") {
+TEST_CASE("a moved lock stays held") {
   const TemporaryFolder folder;
   fs::create_directory(folder / "a");
   std::optional<FolderLock> lock;
@@ -88,7 +88,7 @@ TEST_CASE("a lock ends with its process, also by kill -9") {
   ::close(locked[1]);
 }
 
-TEST_CASE("what is no folder cannot be locked") {
+TEST_CASE("only a folder can be locked") {
   const TemporaryFolder folder;
   write_text(folder / "file", "");
   for (const char* name : {"file", "nothing"}) {

@@ -18,7 +18,7 @@ const char* const kIdentity = "1 0 0 0 0 1 0 0 0 0 1 0\n";
 
 std::string bytes(std::size_t count) { return std::string(count, '\0'); }
 
-/// A sound sequence of three scans with 2 points each; tests then spoil one thing.
+/// A valid sequence of three scans with 2 points each. Tests then damage one part of it.
 void make_sequence(const TemporaryFolder& folder) {
   for (const char* name : {"000000", "000001", "000002"}) {
     write_text(folder / ("velodyne/" + std::string(name) + ".bin"), bytes(32));
@@ -33,7 +33,7 @@ std::string open_error(const TemporaryFolder& folder) {
 
 }  // namespace
 
-TEST_CASE("What is written is read back") {
+TEST_CASE("Written sequences are read back") {
   TemporaryFolder folder;
   make_sequence(folder);
   const std::vector<float> scan = {1.5F, -2.0F, 3.25F, 0.5F, std::nanf(""), -0.0F, 1e30F, 1.0F};
@@ -70,8 +70,8 @@ TEST_CASE("What is written is read back") {
 TEST_CASE("The pose of the sensor is Tr^-1 P Tr") {
   TemporaryFolder folder;
   make_sequence(folder);
-  // The camera sees z forward, x right, y down; the sensor has x forward, y left, z up, and is
-  // mounted 0.5 m above the camera. x_cam = -y, y_cam = -z - 0.5, z_cam = x.
+  // Axes of the camera: z forward, x right, y down. Axes of the sensor: x forward, y left, z up.
+  // The sensor is mounted 0.5 m above the camera: x_cam = -y, y_cam = -z - 0.5, z_cam = x.
   write_text(folder / "calib.txt",
              "P0: 7 0 6 0 0 7 1 0 0 0 1 0\nTr: 0 -1 0 0 0 0 -1 -0.5 1 0 0 0\n");
   // The camera moved 2 m forward (+z) and 1 m to the right (+x).
@@ -79,11 +79,11 @@ TEST_CASE("The pose of the sensor is Tr^-1 P Tr") {
              std::string(kIdentity) + "1 0 0 1 0 1 0 0 0 0 1 2\n" + kIdentity);
   const KittiSequence sequence(folder.path());
   CHECK(sequence.T_world_sensor(0).isApprox(Eigen::Isometry3d::Identity(), 1e-15));
-  // So did the sensor: 2 m along its x, -1 m along its y.
+  // The sensor moved equally: 2 m along its x, -1 m along its y.
   CHECK(sequence.T_world_sensor(1).translation().isApprox(Eigen::Vector3d(2.0, -1.0, 0.0)));
 }
 
-TEST_CASE("Without times.txt the clock of row n stands at n / 10 s") {
+TEST_CASE("Without times.txt the time of row n is n / 10 s") {
   TemporaryFolder folder;
   make_sequence(folder);
   const KittiSequence sequence(folder.path());
@@ -129,7 +129,7 @@ TEST_CASE("Rounded rotations are accepted and made exact") {
   CHECK(R(1, 0) == Approx(0.5).epsilon(1e-4));
 }
 
-TEST_CASE("Empty scans and blank lines at the end are fine") {
+TEST_CASE("Empty scans and blank lines at the end are accepted") {
   TemporaryFolder folder;
   make_sequence(folder);
   write_text(folder / "velodyne/000001.bin", "");

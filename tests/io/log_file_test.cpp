@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 const std::vector<LogChannel> kChannels = {{"/points", "sensor_msgs/msg/PointCloud2"},
                                            {"/chatter", "std_msgs/msg/String"}};
 
-/// Seven messages, not quite in the order of their times.
+/// Seven messages, with some times out of order.
 std::vector<WrittenMessage> seven_messages() {
   std::vector<WrittenMessage> messages;
   for (const std::uint64_t time : {10, 20, 40, 30, 50, 60, 70}) {
@@ -104,7 +104,7 @@ TEST_CASE("Every kind of bag gives the same messages, by time") {
       check_messages(*open_log(folder / "log.bag"));
     }
   }
-  // The recorder did not close it.
+  // A bag that was not closed by its recorder.
   write_text(folder / "log.bag", bag({true, false, "none"}));
   const auto log = open_log(folder / "log.bag");
   CHECK(contents(*log) == kAllMessages);
@@ -179,7 +179,7 @@ TEST_CASE("A log that is cut off anywhere gives the messages before that byte") 
       const auto log = open_log(folder / name);
       const std::string all = contents(*log);
       const std::size_t count = log->messages().size();
-      // No message is lost with the index of its chunk.
+      // A damaged index of a chunk loses no message.
       if (count < before) FAIL(count << " messages after " << before);
       if (!log->early_end()) FAIL("no early end");
       before = count;
@@ -194,7 +194,7 @@ TEST_CASE("A log that is cut off anywhere gives the messages before that byte") 
     const std::string bag_of_ros = bag({index, true, "none"});
     check_cuts("cut.bag", bag_of_ros, 13, bag_of_ros.size());
   }
-  // Zeros at the end, as some file systems leave them after a crash.
+  // Zeros at the end, as some file systems leave after a crash.
   write_text(folder / "cut.mcap", mcap().substr(0, 900) + std::string(5000, '\0'));
   CHECK(open_log(folder / "cut.mcap")->early_end());
 }
@@ -210,7 +210,7 @@ TEST_CASE("Damaged logs give path, byte and expectation") {
   checksum.checksum = 12345;
   McapParts unknown;
   unknown.compression = "xz";
-  // A chunk whose uncompressed size is 2^40 bytes is refused before any memory is asked for.
+  // A chunk with an uncompressed size of 2^40 bytes is refused before any memory is allocated.
   std::string large = mcap();
   const std::size_t chunk = large.find('\x06', 20);
   large[chunk + 9 + 16 + 5] = '\x01';
@@ -244,7 +244,7 @@ TEST_CASE("Damaged logs give path, byte and expectation") {
   CHECK_THAT(read_error(folder / "none.mcap"), ContainsSubstring("No such file"));
 }
 
-TEST_CASE("Any byte of a log may be wrong") {
+TEST_CASE("Any byte of a log may be damaged") {
   const TemporaryFolder folder;
   for (const auto& [name, whole] :
        {std::pair<std::string, std::string>{"log.mcap", mcap()}, {"log.bag", bag()}}) {

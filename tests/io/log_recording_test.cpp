@@ -91,7 +91,7 @@ void check_drive(const fs::path& log) {
 
 }  // namespace
 
-TEST_CASE("A log of each format is a recording: clouds, and poses by transforms") {
+TEST_CASE("A log of each format is a recording with clouds and with poses from transforms") {
   const TemporaryFolder folder;
   write_text(folder / "drive.mcap", drive_mcap());
   check_drive(folder / "drive.mcap");
@@ -159,7 +159,7 @@ TEST_CASE("Clouds in the fixed frame of the poses come back in the frame of the 
   CHECK(Eigen::Vector3f(scan.xyzi.data()).isApprox(expected.cast<float>(), 1e-5F));
 }
 
-TEST_CASE("Topics are found if they are the only ones, and listed otherwise") {
+TEST_CASE("Topics are found if there is only one, and listed otherwise") {
   const TemporaryFolder folder;
   const fs::path log = folder / "drive.mcap";
   std::vector<WrittenMessage> messages = clouds_with("lidar", three_odometries("base"));
@@ -193,7 +193,7 @@ TEST_CASE("Topics are found if they are the only ones, and listed otherwise") {
   CHECK_THAT(error_of(log), ContainsSubstring("expected a topic with clouds; found /odom"));
 }
 
-TEST_CASE("--pose-frame-id takes the poses from transforms, in that frame") {
+TEST_CASE("Flag --pose-frame-id takes the poses from transforms, in that frame") {
   const TemporaryFolder folder;
   std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
   messages.push_back({2, nanoseconds(1.0), transform(1.0, "map", "odom", pose_at(100, 1))});
@@ -214,7 +214,7 @@ TEST_CASE("--pose-frame-id takes the poses from transforms, in that frame") {
              ContainsSubstring("expected poses of frame lidar in utm at the times of the clouds"));
 }
 
-TEST_CASE("Poses and clouds that make no sense are refused with their place") {
+TEST_CASE("Contradictory poses and clouds are refused with their place") {
   const TemporaryFolder folder;
   const fs::path log = folder / "drive.mcap";
   Eigen::Isometry3d not_finite = pose_at(0, 0);
@@ -266,7 +266,7 @@ TEST_CASE("Clouds whose stamps do not increase are left out and counted") {
   CHECK_THAT(error_of(log), ContainsSubstring("expected stamps that increase: 4 of 5 clouds"));
 }
 
-TEST_CASE("A field label gives the labels; a log that ends early gives the scans before") {
+TEST_CASE("A field label gives the labels, and a truncated log gives the scans before its end") {
   const TemporaryFolder folder;
   std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
   std::vector<CloudField> fields = kXyz;

@@ -31,7 +31,7 @@ struct WrittenMessage {
   std::string data;
 };
 
-/// Frames of both formats may hold bytes as they are.
+/// Frames of lz4 and zstd can contain uncompressed bytes.
 inline std::string compressed(const std::string& method, const std::string& bytes) {
   const auto size = static_cast<std::uint32_t>(bytes.size());
   if (method == "lz4") {

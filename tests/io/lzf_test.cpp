@@ -19,24 +19,24 @@ std::string decode(const std::vector<int>& bytes, std::size_t size) {
 
 }  // namespace
 
-TEST_CASE("LZF: bytes as they are") {
+TEST_CASE("LZF: literal bytes") {
   CHECK(decode({}, 0).empty());
   CHECK(decode({0, 'a'}, 1) == "a");
   CHECK(decode({2, 'a', 'b', 'c', 0, 'd'}, 4) == "abcd");
-  // 31 is the last control byte of this kind: 32 bytes follow.
+  // 31 is the last control byte of literals: 32 bytes follow.
   std::vector<int> longest(33, 'x');
   longest[0] = 31;
   CHECK(decode(longest, 32) == std::string(32, 'x'));
 }
 
-TEST_CASE("LZF: runs of earlier output") {
+TEST_CASE("LZF: copies of earlier output") {
   // 0x20: length 1 + 2 = 3, distance 0 + 2 + 1 = 3.
   CHECK(decode({2, 'a', 'b', 'c', 0x20, 2}, 6) == "abcabc");
   // Distance 1 repeats the byte just written.
   CHECK(decode({0, 'a', 0x20, 0}, 4) == "aaaa");
   // 0xE0: length 7 + 5 + 2 = 14 with the extra length byte before the distance.
   CHECK(decode({0, 'a', 0xE0, 5, 0}, 15) == std::string(15, 'a'));
-  // Longest run: 7 + 255 + 2 = 264 from 3 bytes, as kLzfMaxExpansion says.
+  // Longest copy: 7 + 255 + 2 = 264 from 3 bytes, which is kLzfMaxExpansion.
   CHECK(decode({0, 'a', 0xE0, 255, 0}, 265) == std::string(265, 'a'));
   // 0x21: distance (1 << 8) + 0 + 1 = 257: the first byte of 257.
   std::vector<int> far;
@@ -51,12 +51,12 @@ TEST_CASE("LZF: runs of earlier output") {
 }
 
 TEST_CASE("LZF: broken streams are refused") {
-  CHECK(decode({3, 'a', 'b'}, 4) == "refused");       // ends within plain bytes
+  CHECK(decode({3, 'a', 'b'}, 4) == "refused");       // ends within literal bytes
   CHECK(decode({1, 'a', 'b'}, 1) == "refused");       // more than the target holds
   CHECK(decode({1, 'a', 'b'}, 3) == "refused");       // less than the target holds
   CHECK(decode({0, 'a', 0x20, 1}, 4) == "refused");   // from before the beginning
   CHECK(decode({0x20, 0}, 3) == "refused");           // from before the beginning
-  CHECK(decode({0, 'a', 0x20, 0}, 3) == "refused");   // run over the end of the target
+  CHECK(decode({0, 'a', 0x20, 0}, 3) == "refused");   // copy beyond the end of the target
   CHECK(decode({0, 'a', 0x20}, 4) == "refused");      // no distance
   CHECK(decode({0, 'a', 0xE0}, 20) == "refused");     // no extra length
   CHECK(decode({0, 'a', 0xE0, 5}, 15) == "refused");  // extra length, no distance

@@ -14,7 +14,7 @@ using namespace dynains::test;
 
 namespace {
 
-/// Bytes of values as they stand in memory, one after the other.
+/// Bytes of values in memory order, one value after the other.
 template <class... T>
 std::string pack(const T&... values) {
   std::string bytes;
@@ -86,7 +86,7 @@ TEST_CASE("Written point files are read back") {
   CHECK(file.viewpoint.isApprox(Eigen::Isometry3d::Identity()));
 }
 
-TEST_CASE("The bytes of a written PLY are those of the format") {
+TEST_CASE("A written PLY has the bytes of the format") {
   TemporaryFolder folder;
   PointColumns columns;
   columns.rgb = true;
@@ -104,7 +104,7 @@ TEST_CASE("The bytes of a written PLY are those of the format") {
             pack(1.0F, 2.0F, 3.0F) + "\x07\x08\x09");
 }
 
-TEST_CASE("A point file without commit leaves no trace") {
+TEST_CASE("A point file without commit leaves no file") {
   TemporaryFolder folder;
   write_text(folder / "a.ply", "old");
   {
@@ -210,7 +210,7 @@ TEST_CASE("PCD: ascii, with a field to skip and a viewpoint") {
   CHECK(image.isApprox(Eigen::Vector3d(0.0, 2.0, 3.0)));
 }
 
-TEST_CASE("PCD: binary and compressed hold the same") {
+TEST_CASE("PCD: binary and compressed files hold equal points") {
   const std::string header =
       "VERSION 0.7\nFIELDS x _ y z timestamp\nSIZE 4 1 4 4 8\nTYPE F U F F F\nCOUNT 1 3 1 1 1\n"
       "WIDTH 1\nHEIGHT 2\nDATA ";
@@ -222,7 +222,7 @@ TEST_CASE("PCD: binary and compressed hold the same") {
   };
   check(read("a.pcd", header + "binary\n" + pack(1.0F) + "abc" + pack(2.0F, 3.0F, 0.25) +
                           pack(4.0F) + "def" + pack(5.0F, 6.0F, 0.5)));
-  // Field after field; stored in runs of at most 32 plain bytes.
+  // Field after field, stored in literals of at most 32 bytes.
   const std::string plain =
       pack(1.0F, 4.0F) + "abcdef" + pack(2.0F, 5.0F, 3.0F, 6.0F) + pack(0.25, 0.5);
   REQUIRE(plain.size() == 46);
@@ -360,7 +360,7 @@ TEST_CASE("Malformed point files are refused with position and expectation") {
   }
 }
 
-TEST_CASE("A point file that was cut off is noticed without reading its points") {
+TEST_CASE("A truncated point file is detected without reading its points") {
   const TemporaryFolder folder;
   struct Case {
     std::string name;
@@ -387,7 +387,7 @@ TEST_CASE("A point file that was cut off is noticed without reading its points")
   }
 }
 
-TEST_CASE("Any prefix of a point file is read or refused, never more") {
+TEST_CASE("Any prefix of a point file is read or refused, without access beyond its end") {
   TemporaryFolder folder;
   const std::string extension = GENERATE(".ply", ".pcd");
   const fs::path path = folder / ("whole" + extension);
@@ -400,7 +400,7 @@ TEST_CASE("Any prefix of a point file is read or refused, never more") {
   }
 }
 
-TEST_CASE("Files with wrong bytes anywhere are read or refused") {
+TEST_CASE("Files with wrong bytes at any place are read or refused") {
   const std::string ply_types =
       "element face 2\nproperty list uchar int i\nelement vertex 2\nproperty uchar ring\n";
   const std::string faces("\1\1\0\0\0\0", 6);
@@ -423,7 +423,7 @@ TEST_CASE("Files with wrong bytes anywhere are read or refused") {
     std::string bytes = whole[which];
     for (std::uint64_t flips = random() % 3 + 1; flips > 0; --flips) {
       const std::uint64_t at = random() % bytes.size();
-      // Mostly digits: they keep the header readable and change its numbers.
+      // Mostly digits, which keep the header readable and change its numbers.
       bytes[at] = static_cast<char>(random() % 2 == 0 ? '0' + random() % 10 : random() % 256);
     }
     try {
@@ -440,7 +440,7 @@ TEST_CASE("Files with wrong bytes anywhere are read or refused") {
   CHECK(read_anyway > 50);
 }
 
-TEST_CASE("Point files that are not there are refused") {
+TEST_CASE("Missing point files are refused") {
   CHECK_THAT(message_of<IoError>([] { read_points("/no/such/file.ply"); }),
              ContainsSubstring("/no/such/file.ply: cannot be read"));
   TemporaryFolder folder;

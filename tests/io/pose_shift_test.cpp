@@ -22,13 +22,14 @@ std::vector<ShiftedGaps> pairs_of(std::size_t count, int bottom, double depth) {
 
 }  // namespace
 
-TEST_CASE("poses are shifted if enough pairs agree better by enough, and not by ever more") {
+TEST_CASE(
+    "poses are shifted if enough pairs agree better by a margin, and only within a small shift") {
   for (const int shift : {-2, -1, 1, 2}) CHECK(best_shift(pairs_of(12, shift, 0.02)) == shift);
   CHECK(best_shift(pairs_of(12, 0, 0.02)) == 0);
   CHECK(best_shift(pairs_of(12, 2, 0.004)) == 0);
   CHECK(best_shift(pairs_of(kLeastShiftPairs, 1, 0.02)) == 1);
   CHECK(best_shift(pairs_of(kLeastShiftPairs - 1, 1, 0.02)) == 0);
-  // Where a valley would be farther off, something else is wrong.
+  // A minimum beyond the largest shift has another cause.
   CHECK(best_shift(pairs_of(12, 3, 0.02)) == 0);
   CHECK(best_shift(pairs_of(12, -3, 0.02)) == 0);
   CHECK(best_shift({}) == 0);
@@ -41,7 +42,7 @@ TEST_CASE("poses are not shifted where pairs contradict each other") {
   pairs.push_back(valley(-1, 0.004));
   CHECK(best_shift(pairs) == 0);
 
-  // One pair that gains all there is to gain proves nothing.
+  // A single pair does not prove a shift, even with the greatest possible gain.
   pairs = pairs_of(12, 1, 0.0015);
   CHECK(best_shift(pairs) == 0);
   pairs.push_back(valley(1, 0.3));

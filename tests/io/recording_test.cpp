@@ -51,7 +51,7 @@ bool tells(const Recording& recording, const std::string& note) {
 
 TEST_CASE("Scans in the world frame with VIEWPOINT come back in the sensor frame") {
   const TemporaryFolder folder;
-  // At (100, 0, 0) and (101, 0, 0), turned by 90 degrees around z.
+  // Poses at (100, 0, 0) and (101, 0, 0), turned by 90 degrees around z.
   write_text(folder / "pcd/000007.pcd", pcd({100, 0, 0}, "100 0 0 0.70710678 0 0 0.70710678"));
   write_text(folder / "pcd/000009.pcd", pcd({101, 0, 0}, "101 0 0 0.70710678 0 0 0.70710678"));
   write_text(folder / "gt_cloud.pcd", pcd({0, 0, 0}));
@@ -71,7 +71,7 @@ TEST_CASE("Scans in the world frame with VIEWPOINT come back in the sensor frame
   CHECK(scan.time == std::vector<double>{7.25, 7.25, 7.25});
 }
 
-TEST_CASE("The frame of the points is seen, and can be forced") {
+TEST_CASE("The frame of the points is detected, and can be forced") {
   const TemporaryFolder folder;
   write_text(folder / "a1.pcd", pcd({0, 0, 0}, "100 0 0 1 0 0 0"));
   write_text(folder / "a2.pcd", pcd({0, 0, 0}, "101 0 0 1 0 0 0"));
@@ -99,7 +99,7 @@ TEST_CASE("Names are ordered by the numbers in them") {
   CHECK(recording.read_scan(0).ring.empty());
 }
 
-TEST_CASE("Times of names find their poses by interpolation; scans without are left out") {
+TEST_CASE("Times in names find their poses by interpolation, and scans without pose are left out") {
   const TemporaryFolder folder;
   for (const char* name : {"1600000000.00", "1600000000.25", "1600000000.50", "1600000009.00"}) {
     write_text(folder / (std::string(name) + ".ply"), ply());
@@ -136,7 +136,7 @@ TEST_CASE("A shift gives every scan the pose of a neighbour") {
   CHECK_THAT(error_of(folder.path(), options), ContainsSubstring("no pose for any scan"));
 }
 
-TEST_CASE("If a shift leaves no pose, the message names where poses are") {
+TEST_CASE("If a shift leaves no pose, the message names the range of the poses") {
   const TemporaryFolder folder;
   write_text(folder / "pcd/1.pcd", pcd({1, 0, 0}, "1 2 3 1 0 0 0"));
   RecordingOptions options;
@@ -175,7 +175,7 @@ TEST_CASE("A KITTI folder is the same as a KittiSequence") {
   }
 }
 
-TEST_CASE("calib.txt and times.txt lie with the poses, or in the folder") {
+TEST_CASE("calib.txt and times.txt are beside the poses or in the folder") {
   const TemporaryFolder folder;
   const fs::path scans = folder / "velodyne";
   for (const char* name : {"000000", "000001"}) {
@@ -185,7 +185,7 @@ TEST_CASE("calib.txt and times.txt lie with the poses, or in the folder") {
   write_text(folder / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 2\n");
   write_text(folder / "times.txt", "0\n0.25\n");
   const Recording whole(folder.path());
-  // A camera that moves along its z axis is a sensor that moves along its x axis.
+  // A motion of the camera along its z axis is a motion of the sensor along its x axis.
   REQUIRE(whole.T_world_sensor(1).translation().isApprox(Eigen::Vector3d(2, 0, 0), 1e-12));
 
   const Recording inner(scans);
@@ -193,7 +193,7 @@ TEST_CASE("calib.txt and times.txt lie with the poses, or in the folder") {
   CHECK(inner.time(1) == 0.25);
   CHECK(inner.T_world_sensor(1).isApprox(whole.T_world_sensor(1), 1e-15));
 
-  // Times beside the poses that fit other scans are not ours.
+  // A times.txt beside the poses is ignored if its number of rows does not fit.
   write_text(folder / "times.txt", "0\n");
   const Recording without(scans);
   CHECK(without.time(1) == 0.1);
@@ -201,7 +201,7 @@ TEST_CASE("calib.txt and times.txt lie with the poses, or in the folder") {
   CHECK(tells(without, "not used: " + times + " has 1 rows for 2 scans"));
   CHECK_THAT(error_of(folder.path()), ContainsSubstring("times.txt"));
 
-  // Poses from elsewhere bring their calibration; times may be those of other scans.
+  // Poses of another folder come with their calib.txt. Their times.txt may belong to other scans.
   const fs::path copy = folder / "elsewhere/scans";
   fs::create_directories(copy);
   for (const auto& file : fs::directory_iterator(scans)) fs::copy(file, copy);
@@ -212,7 +212,7 @@ TEST_CASE("calib.txt and times.txt lie with the poses, or in the folder") {
   CHECK(other.time(1) == 0.1);
 }
 
-TEST_CASE("A calib.txt that cannot be read stops poses of a camera only") {
+TEST_CASE("A calib.txt that cannot be read is an error for poses of a camera only") {
   const TemporaryFolder folder;
   write_text(folder / "velodyne/000000.bin", std::string(32, 'a'));
   write_text(folder / "calib.txt", "of another kind\n");
@@ -300,7 +300,7 @@ TEST_CASE("Names need not be UTF-8") {
   CHECK(recording.read_scan(0).size() == 1);
 }
 
-TEST_CASE("Values that are not finite pass; labels of a column are read") {
+TEST_CASE("Values that are not finite are read, and labels of a column are read") {
   const TemporaryFolder folder;
   write_text(
       folder / "0.ply",

@@ -76,7 +76,7 @@ TEST_CASE("Absolute times of points become relative to the stamp") {
   CHECK(scan.xyzi[3] == 0.0F);
 }
 
-TEST_CASE("Livox messages are clouds") {
+TEST_CASE("Livox messages are read as clouds") {
   for (const MessageEncoding encoding : kBoth) {
     FieldWriter out(encoding);
     out.header(5.0, "livox").number(std::uint64_t{5000000000}).number(std::uint32_t{2});
@@ -155,7 +155,7 @@ TEST_CASE("Transforms are chained and interpolated, by the nearest frame above b
   for (const double time : {0.0, 0.2, 0.1}) {
     tree.add({time, "odom", "base", pose_at(10 * time, 0)}, false);
   }
-  tree.add({0.1, "odom", "base", pose_at(99, 0)}, false);  // a second one of its time
+  tree.add({0.1, "odom", "base", pose_at(99, 0)}, false);  // a second transform of one time
   tree.add({0.0, "base", "lidar", pose_at(0.5, M_PI / 2)}, true);
   tree.add({0.0, "base", "imu", pose_at(-0.5, 1.0)}, true);
   CHECK(tree.root_of("lidar") == std::string("odom"));

@@ -10,7 +10,7 @@
 
 namespace dynains::test {
 
-/// Bytes of numbers and texts, little endian.
+/// Bytes of numbers and texts, little-endian.
 class ByteWriter {
  public:
   template <class Number>

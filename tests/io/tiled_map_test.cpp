@@ -42,8 +42,8 @@ struct MapScan {
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
 };
 
-/// A loop of 300 m around `centre`, back to where it began. All coordinates are
-/// multiples of 1/64 m: nothing is rounded, in floats or in doubles.
+/// A closed loop of 300 m around `centre`. All coordinates are multiples of 1/64 m, so that floats
+/// and doubles need no rounding.
 std::vector<MapScan> loop(const Eigen::Vector3d& centre = Eigen::Vector3d::Zero()) {
   std::vector<MapScan> scans;
   Random random(11);
@@ -93,7 +93,7 @@ fs::path any_tile(const fs::path& folder) {
   });
 }
 
-/// Bounds the size of every file that is written, as a disk that fills up in the middle of one.
+/// Bounds the size of every file that is written, like a disk that becomes full during a write.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) {
@@ -112,7 +112,7 @@ class FileSizeLimit {
 
 }  // namespace
 
-TEST_CASE("a map in tiles holds the points of the map in memory, whatever the budget") {
+TEST_CASE("a map in tiles holds the points of the map in memory, for any memory budget") {
   const Eigen::Vector3d centre =
       GENERATE(Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(691200, 5334016, -70));
   const double voxel = GENERATE(0.25, 0.0);
@@ -135,7 +135,7 @@ TEST_CASE("a map in tiles holds the points of the map in memory, whatever the bu
     CHECK(static_cast<double>(most) <= megabytes * 1e6);
     const Points points = points_of(map);
     CHECK(points.size() == expected.size());
-    // Corners of voxels of 0.25 m are numbers without rounding, those of 0.2 m are not.
+    // Corners of voxels of 0.25 m need no rounding, those of 0.2 m do.
     if (voxel > 0.0) CHECK((sorted(points) == sorted(points_of(expected))));
     if (whole.empty()) whole = points;
     CHECK((points == whole));
@@ -162,7 +162,7 @@ TEST_CASE("an empty list of flags keeps all points; clear removes them and their
   CHECK(map.size() < all);
 }
 
-TEST_CASE("a map that is there is continued, whatever the end of an interrupted write holds") {
+TEST_CASE("an existing map is continued, whatever bytes an interrupted write left at the end") {
   const TemporaryFolder folder;
   const std::vector<MapScan> scans = loop();
   Points before;
@@ -186,7 +186,7 @@ TEST_CASE("a map that is there is continued, whatever the end of an interrupted 
   CHECK((points_of(map) == points_of(undisturbed)));
 }
 
-TEST_CASE("kill -9 at any moment leaves every scan in the files that was inserted") {
+TEST_CASE("kill -9 at any moment leaves every inserted scan in the files") {
   const std::vector<MapScan> scans = loop();
   Random random(3);
   std::size_t interrupted = 0;
@@ -205,7 +205,7 @@ TEST_CASE("kill -9 at any moment leaves every scan in the files that was inserte
       ::_exit(0);
     }
     ::close(done[1]);
-    // Killed some time into the scan behind a random one, however fast the machine is.
+    // Killed during a scan after a random one, independently of the speed of the machine.
     const std::size_t before = random.index(scans.size() / 2);
     std::size_t inserted = 0;
     char byte = 0;
@@ -219,7 +219,8 @@ TEST_CASE("kill -9 at any moment leaves every scan in the files that was inserte
 
     const TiledStaticMap found(config_of(folder.path(), 0));
     const Points points = sorted(points_of(found));
-    // Between what was inserted for certain, and that with the scan at hand.
+    // The map has at least the scans that were inserted for certain, and at most the next scan,
+    // too.
     StaticMapAccumulator::Config in_memory;
     in_memory.map_voxel = 0.25;
     StaticMapAccumulator expected(in_memory);
@@ -238,7 +239,7 @@ TEST_CASE("kill -9 at any moment leaves every scan in the files that was inserte
   CHECK(interrupted > 0);
 }
 
-TEST_CASE("what cannot be written stays in memory until it can") {
+TEST_CASE("points that cannot be written stay in memory until they can") {
   const TemporaryFolder folder;
   const std::vector<MapScan> scans = loop();
   TiledStaticMap map(config_of(folder.path(), 0));
@@ -303,7 +304,7 @@ TEST_CASE("a folder or a tile that cannot be used is an error with its path") {
              StartsWith(tile.string() + ": cannot be read: "));
 }
 
-TEST_CASE("a folder of tiles belongs to one map at a time, also if that moves") {
+TEST_CASE("a folder of tiles belongs to one map at a time, also after the map was moved") {
   const TemporaryFolder folder;
   const MapScan scan = loop()[0];
   const auto refusal = [&] {
@@ -341,7 +342,7 @@ using DiskRemover = BasicDynaInsRemover<OnDisk>;
 
 }  // namespace
 
-TEST_CASE("a remover keeps its map in tiles, and outlives a disk that is full") {
+TEST_CASE("a remover keeps its map in tiles, and continues after a full disk") {
   const std::vector<Scan> scans = drive(yard(), 6, 10.0);
   const TemporaryFolder folder;
   DiskRemover::Config config = DiskRemover::Config::paper();
@@ -351,7 +352,7 @@ TEST_CASE("a remover keeps its map in tiles, and outlives a disk that is full") 
   DynaInsRemover in_memory(DynaInsRemover::Config::paper());
   const Run expected = run(in_memory, scans);
   CHECK((whole.final == expected.final));
-  // At the border of two voxels floats and doubles may choose differently.
+  // At the border of two voxels, floats and doubles may round to different voxels.
   const auto size = static_cast<double>(in_memory.map().size());
   CHECK(std::abs(static_cast<double>(remover.map().size()) - size) < 1e-3 * size);
 
@@ -377,7 +378,7 @@ TEST_CASE("a remover keeps its map in tiles, and outlives a disk that is full") 
     CHECK((verdict.labels.size() == scans[verdict.scan].points.size()));
     ++final;
   });
-  // Of a scan whose points could not be written only the verdict is lost.
+  // If the points of a scan cannot be written, only the verdict of this scan is lost.
   CHECK(final + failed == scans.size());
   CHECK((points_of(broken.map()) == points_of(remover.map())));
 }

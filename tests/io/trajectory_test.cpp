@@ -98,7 +98,7 @@ TEST_CASE("Damaged trajectories are refused with their line") {
              ContainsSubstring("/nonexistent/poses.txt: cannot be read"));
 }
 
-TEST_CASE("Times are matched by interpolation, within the ends and short gaps only") {
+TEST_CASE("Times are matched by interpolation, near the ends and in short gaps only") {
   Trajectory trajectory;
   trajectory.times = {10.0, 10.5, 13.0};
   trajectory.poses = {pose(0.0, 0.0), pose(1.0, 0.4), pose(2.0, 0.8)};
@@ -109,7 +109,7 @@ TEST_CASE("Times are matched by interpolation, within the ends and short gaps on
   CHECK(at(10.125)->share == Approx(0.25));
   CHECK(at(10.5)->before == 1);
   CHECK(at(10.5)->share == 0.0);
-  // 5 ms beyond the ends are forgiven, 6 are not.
+  // Times 5 ms beyond the ends are accepted, times 6 ms beyond are not.
   CHECK(at(9.9951));
   CHECK_FALSE(at(9.994));
   CHECK(at(13.0049));
@@ -131,7 +131,7 @@ TEST_CASE("Time stamps of every unit become seconds") {
   CHECK(to_seconds(0.3) == 0.3);
 }
 
-TEST_CASE("A convention undoes the mistake it is named after") {
+TEST_CASE("A convention corrects the mistake in its name") {
   Eigen::Isometry3d truth = pose(3.0, 0.7);
   truth.translation() << 3.0, -2.0, 0.5;
   truth.rotate(Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitX()));

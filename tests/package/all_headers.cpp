@@ -1,5 +1,5 @@
-// Links two translation units that both include every public header: a function or variable that
-// is defined twice fails to link, one that is not inline where it should be differs in its address.
+// Links two translation units that both include every public header. A duplicate definition fails
+// to link. A function that should be inline and is not has two addresses.
 const char* first();
 const char* second();
 

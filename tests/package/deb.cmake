@@ -1,4 +1,4 @@
-# Packs BUILD_DIR, installs the package into an empty root and starts the program from there.
+# Packs BUILD_DIR, installs the package into an empty root and starts the installed program.
 file(REMOVE_RECURSE ${WORK_DIR}/deb ${WORK_DIR}/deb_root)
 execute_process(
   COMMAND ${CPACK} -G DEB -C "${CONFIG}" -B ${WORK_DIR}/deb --config ${BUILD_DIR}/CPackConfig.cmake
@@ -9,7 +9,7 @@ if(NOT result EQUAL 0 OR NOT count EQUAL 1)
   message(FATAL_ERROR "cpack made ${count} packages:\n${output}")
 endif()
 
-# What it depends on is installed on this machine, not in the empty root.
+# The dependencies of the package are installed on this machine, not in the empty root.
 set(root ${WORK_DIR}/deb_root)
 file(MAKE_DIRECTORY ${root}/var/lib/dpkg/info ${root}/var/lib/dpkg/updates)
 file(WRITE ${root}/var/lib/dpkg/status "")

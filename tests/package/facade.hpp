@@ -1,4 +1,4 @@
-// The whole pipeline, not only its declarations.
+// Includes the whole pipeline, not only its declarations.
 #pragma once
 
 #include "dynains/dyna_ins_remover.hpp"

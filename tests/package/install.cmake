@@ -1,6 +1,6 @@
-# Installs BUILD_DIR into WORK_DIR, moves the result elsewhere and looks for traces of where it was.
+# Installs BUILD_DIR into WORK_DIR, moves the result and searches it for the original paths.
 
-# install_tree(<name> <option>...) installs to a passing place and moves it to WORK_DIR/<name>.
+# install_tree(<name> <option>...) installs to a temporary place and moves it to WORK_DIR/<name>.
 function(install_tree name)
   set(passing ${WORK_DIR}/passing_${name})
   file(REMOVE_RECURSE ${passing} ${WORK_DIR}/${name})
@@ -14,7 +14,7 @@ function(install_tree name)
 
   file(GLOB_RECURSE files ${WORK_DIR}/${name}/*)
   foreach(file IN LISTS files)
-    # Debug information and instrumentation rightly name the source files.
+    # Debug information and instrumentation contain paths of source files.
     if(file MATCHES "\\.(hpp|cmake|pc)$" OR (CONFIG STREQUAL "Release" AND NOT INSTRUMENTED))
       foreach(path ${passing} ${BUILD_DIR} ${SOURCE_DIR})
         execute_process(COMMAND grep -F -q -- ${path} ${file} RESULT_VARIABLE absent)

@@ -1,6 +1,6 @@
-# Refuses includes that lead upwards in the table of folders in docs/design.md. Headers of one line of
-# the list below form a layer; a header includes headers of the layers above its own in the list, and
-# of its own folder.
+# Refuses includes that contradict the table of folders in docs/design.md. The headers on one line
+# of the list below form a layer. A header may include headers of its own folder and of the layers
+# that precede its own in the list.
 set(layers
   "^(simd/.*|errors|points|pose|parameters|verdict|point_cloud_traits|version)\\.hpp$"
   "^sensor/"

@@ -1,5 +1,6 @@
-# Configures the project without any optional package and expects one status line for each part that
-# is left out; then as part of a parent project, and expects the option that builds the components.
+# Configures the project without any optional package, and expects one status line for each part
+# that is left out. Then configures it as part of a parent project, and expects a status line with
+# the option that builds the components.
 set(common -G "${GENERATOR}" -DCMAKE_CXX_COMPILER=${COMPILER} -DEigen3_DIR=${EIGEN_DIR})
 set(without "")
 foreach(package Catch2 CLI11 PNG nlohmann_json pybind11 Python3)

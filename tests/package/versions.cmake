@@ -1,4 +1,4 @@
-# The project's VERSION, the header, the installed package files and the program name one version.
+# VERSION of the project, the header, the installed package files and the program have one version.
 
 function(expect_version where found)
   if(NOT found STREQUAL VERSION)

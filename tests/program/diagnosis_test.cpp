@@ -1,4 +1,4 @@
-// What `dynains check` finds, on simulated streets whose poses are spoilt in every usual way.
+// Findings of `dynains check` on simulated streets with all usual mistakes in the poses.
 #include "dynains/io/diagnosis.hpp"
 
 #include <functional>
@@ -19,7 +19,7 @@ namespace {
 
 using Poses = std::vector<Eigen::Isometry3d>;
 
-/// Around bends of a hilly street.
+/// A drive around the bends of a hilly street.
 simulation::Config bends() {
   simulation::Config config;
   config.scene = simulation::Scene::kHill;
@@ -31,7 +31,7 @@ simulation::Config bends() {
   return config;
 }
 
-/// A drive whose poses can be written anew.
+/// A drive whose poses can be replaced.
 class Street {
  public:
   explicit Street(const simulation::Config& config = bends()) {
@@ -110,7 +110,7 @@ TEST_CASE("check names the mistake in the poses and the option against it") {
   CHECK(quaternions.verdict == PoseVerdict::kOtherwise);
   CHECK(quaternions.readings.front().option == "--quaternion-order wxyz");
 
-  // The option heals it.
+  // The named option corrects the mistake.
   RecordingOptions options;
   options.convention.quaternion = QuaternionOrder::kWxyz;
   const Recording healed(street.path(), options);
@@ -141,7 +141,7 @@ TEST_CASE("check names poses that belong to the scan before or behind, if the dr
   }
 }
 
-TEST_CASE("few beams that look ahead on a fast empty road are no reason to doubt the poses") {
+TEST_CASE("few beams ahead on a fast empty road give no warning about the poses") {
   simulation::Config config;
   config.scene = simulation::Scene::kHighway;
   config.sensor = simulation::Sensor::kLivox;
@@ -153,16 +153,16 @@ TEST_CASE("few beams that look ahead on a fast empty road are no reason to doubt
   CHECK(sound.sound());
   CHECK_FALSE(pose_agreement(Recording(road.path()), 0, 23).doubtful());
 
-  // Wrong poses are wrong here, too.
+  // Wrong poses are detected on this road, too.
   CHECK_FALSE(road.diagnose([](const Eigen::Isometry3d& T) { return T.inverse(); }).sound());
   CHECK(pose_agreement(Recording(road.path()), 0, 23).doubtful());
   CHECK_FALSE(road.diagnose([](const Eigen::Isometry3d& T) { return scaled(T, 1000.0); }).sound());
   CHECK(pose_agreement(Recording(road.path()), 0, 23).doubtful());
 }
 
-TEST_CASE("check admits what it cannot tell") {
+TEST_CASE("check reports what it cannot decide") {
   const Street street;
-  // As if every scan came from elsewhere.
+  // Poses as if every scan came from another place.
   std::size_t i = 0;
   const Diagnosis chaos = street.diagnose([&](const Eigen::Isometry3d&) {
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
@@ -181,7 +181,7 @@ TEST_CASE("check admits what it cannot tell") {
   CHECK_FALSE(one.mounting.known);
 }
 
-TEST_CASE("check and run say what is wrong, in a sentence") {
+TEST_CASE("check and run report a problem in one sentence") {
   const Street street;
   Poses inverse;
   for (const Eigen::Isometry3d& pose : street.poses()) inverse.push_back(pose.inverse());
@@ -206,7 +206,7 @@ TEST_CASE("check and run say what is wrong, in a sentence") {
   CHECK(fine.err.empty());
 }
 
-TEST_CASE("check looks at the size of every scan file") {
+TEST_CASE("check verifies the size of every scan file") {
   const Street street;
   write_poses(street.path() / "poses.txt", street.poses());
   const fs::path scans = street.path() / "velodyne";
@@ -225,7 +225,7 @@ TEST_CASE("check looks at the size of every scan file") {
   CHECK_THAT(three.err, StartsWith(first) && ContainsSubstring("; 2 more scan files are broken\n"));
 }
 
-TEST_CASE("check and run notice scans that are too far apart in time to be compared") {
+TEST_CASE("check and run report scans that are too far apart in time to be compared") {
   const Street street;
   write_poses(street.path() / "poses.txt", street.poses());
   std::string milliseconds;
@@ -248,7 +248,7 @@ TEST_CASE("check and run notice scans that are too far apart in time to be compa
   CHECK(told.err.empty());
 }
 
-TEST_CASE("run takes PCD scans and writes them cleaned, to be read again") {
+TEST_CASE("run takes PCD scans and writes cleaned ones that can be read again") {
   const Street street;
   const TemporaryFolder folder;
   write_poses(street.path() / "poses.txt", street.poses());

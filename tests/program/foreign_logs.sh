@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# foreign_logs.sh PROGRAM WORK KIND WRITER...: a log by an independent writer gives the labels of the
-# folder. KIND is bag or mcap; WRITER is an interpreter and its script.
+# foreign_logs.sh PROGRAM WORK KIND WRITER...: a run on a log by an independent writer gives the
+# labels of a run on the folder. KIND is bag or mcap; WRITER is an interpreter and its script.
 set -euo pipefail
 program=$1 work=$2 kind=$3
 shift 3
@@ -23,7 +23,7 @@ for compression in $compressions; do
   "$@" "$input" "$log" "$compression" | tee "$work/said"
   if grep -q SKIPPED "$work/said"; then exit 0; fi
   if ! "$program" run "$log" --out "$out" --quiet 2> "$work/error"; then
-    # A build without the library of a compression names its package.
+    # A build without a decompression library names the Debian package in its error.
     grep "this build has no $compression (Debian: lib$compression-dev)" "$work/error"
     continue
   fi

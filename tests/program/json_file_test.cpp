@@ -10,7 +10,7 @@ using namespace dynains::test;
 
 namespace {
 
-/// Message of the error that a JSON file with this text gives, from the name of the file on.
+/// Error message for a JSON file with this text, from the name of the file on.
 std::string refusal(const std::string& text) {
   TemporaryFolder folder;
   write_text(folder / "a.json", text);
@@ -50,7 +50,7 @@ TEST_CASE("The depth of a JSON file is bounded") {
   CHECK(refusal('"' + nested(100) + "\\\"[\"") == "none");
 }
 
-TEST_CASE("A path that is no JSON file at all is refused by its kind") {
+TEST_CASE("A path that is no JSON file is refused with its kind") {
   TemporaryFolder folder;
   CHECK_THROWS_WITH(read_json_file(folder.path()),
                     ContainsSubstring(": is a folder; expected a JSON file"));

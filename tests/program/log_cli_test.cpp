@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kScans = 12;
 const Eigen::Vector3d kPosition(30.0, 4.0, 0.0);
 
-/// The tiny sequence as a log. Points have a label.
+/// The tiny sequence as a log whose points have a label.
 std::string tiny_log() {
   const std::vector<CloudField> fields = {
       {"x", 0, 7}, {"y", 4, 7}, {"z", 8, 7}, {"intensity", 12, 7}, {"label", 16, 6}};
@@ -75,13 +75,13 @@ TEST_CASE("run on a log gives the labels of run on the folder; check and eval re
   CHECK_THAT(check.out, ContainsSubstring("clouds from topic /points") &&
                             ContainsSubstring("poses from topic /odom"));
 
-  // Scans without moving points keep their poses.
+  // The clean scans, without moving points, have the poses of the log.
   CHECK_THAT(start({"check", folder / "of_log" / "clean"}).out,
              ContainsSubstring("poses from VIEWPOINT of the scans") &&
                  ContainsSubstring("points are in the frame of the sensor"));
 }
 
-TEST_CASE("A log that ends early is read up to there, and the program says so in one line") {
+TEST_CASE("A truncated log is read up to its end, and the program reports it in one line") {
   const TemporaryFolder folder;
   const std::string whole = tiny_log();
   const std::string log = folder / "cut.mcap";
@@ -97,7 +97,7 @@ TEST_CASE("A log that ends early is read up to there, and the program says so in
   CHECK(report["log_ends_early"] == true);
 }
 
-TEST_CASE("No result replaces the log that it comes from") {
+TEST_CASE("No result replaces the log that is read") {
   const TemporaryFolder folder;
   write_text(folder / "drive.mcap", tiny_log());
   const std::string log = folder / "drive.mcap";

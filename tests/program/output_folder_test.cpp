@@ -25,7 +25,7 @@ Json marker(bool complete, const OutputListing& listing = kListing) {
           {"outputs", listing.to_json()}};
 }
 
-/// Complete results, and files of somebody else beside them.
+/// Complete results, with files of another owner beside them.
 void write_results(const TemporaryFolder& folder) {
   write_text(folder / "report.json", marker(true).dump());
   for (const char* name : {"a.txt", "map.ply", "labels/000000.label", "labels/000001.label"}) {
@@ -60,7 +60,7 @@ const std::string kNoRefusal = "(nothing was thrown)";
 
 }  // namespace
 
-TEST_CASE("An empty folder is taken, and what a killed command left of its marker does not count") {
+TEST_CASE("An empty folder is accepted, even with a temporary marker of a killed command") {
   TemporaryFolder folder;
   CHECK(refusal(folder) == kNoRefusal);
   write_text(folder / ".report.json.0123456789abcdef.tmp", "{");
@@ -72,7 +72,7 @@ TEST_CASE("An empty folder is taken, and what a killed command left of its marke
   CHECK_FALSE(fs::exists(folder / ".report.json.0123456789abcdef.tmp"));
 }
 
-TEST_CASE("Somebody's folder is refused, whatever its files are called") {
+TEST_CASE("A folder of another owner is refused, whatever its files are called") {
   for (const char* name : {"labels/000000.label", ".notes.2024.tmp", ".notes.0123456789abcdef.tmp",
                            ".a.txt.0123456789abcdef.tmp", "a.txt"}) {
     CAPTURE(name);
@@ -172,7 +172,7 @@ TEST_CASE("Links and folders in the place of results are refused before anything
   CHECK(read_text(other / "000000.label") == "precious");
 }
 
-TEST_CASE("A file of somebody in the place of new results is refused") {
+TEST_CASE("A file of another owner in the place of new results is refused") {
   TemporaryFolder folder;
   write_results(folder);
   OutputListing planned = kListing;
@@ -250,7 +250,7 @@ TEST_CASE("New results that are not put in place leave the earlier ones as they 
   CHECK_FALSE(fs::exists(folder / kStagingFolder));
   check_foreign_files(folder);
 
-  // As a killed command leaves it.
+  // State after a command was killed.
   write_text(folder / kStagingFolder / "report.json", marker(false).dump());
   write_text(folder / kStagingFolder / "labels/000001.label", "new");
   write_text(folder / kStagingFolder / "labels/.000000.label.0123456789abcdef.tmp", "half");
@@ -279,7 +279,7 @@ TEST_CASE("Results in place keep what they list, and lose what only the earlier 
   check_foreign_files(folder);
 }
 
-TEST_CASE("A temporary that is being written is no leftover") {
+TEST_CASE("A temporary file that is being written is not removed as a leftover") {
   TemporaryFolder folder;
   write_results(folder);
   AtomicFile file(folder / "labels/000000.label");

@@ -53,7 +53,7 @@ Sample read(const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("Flags set what they name and leave the rest") {
+TEST_CASE("Flags set the parameters that they name and no others") {
   const Sample sample = parse({"--tau-s", "0.25", "--use-belief=false"});
   CHECK(sample.tau_s == 0.25);
   CHECK(sample.window == 4);

@@ -1,11 +1,11 @@
 // node rewrite_mcap.mjs IN.mcap OUT.mcap COMPRESSION: reads a log by @mcap/core, decodes and encodes
-// every message by @foxglove/rosmsg2-serialization, and writes it in chunks that the program
-// COMPRESSION (lz4 or zstd) compresses.
+// every message by @foxglove/rosmsg2-serialization, and writes the log in chunks. The command
+// COMPRESSION (lz4 or zstd) compresses each chunk.
 import { execFileSync } from "node:child_process";
 import fs from "node:fs";
 import { createRequire } from "node:module";
 
-// NODE_PATH holds for require() alone.
+// NODE_PATH has an effect on require() only.
 const require = createRequire(import.meta.url);
 let core, rosmsg, serialization;
 try {

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// A sequence, and a folder for the results that does not exist yet. Names have a blank.
+/// A sequence, and a folder for the results that does not exist yet. Their names contain a blank.
 struct Fixture {
   explicit Fixture(std::size_t scans = 12) : seq(folder / "a seq"), out(folder / "an out") {
     write_tiny_sequence(seq, scans);
@@ -48,9 +48,9 @@ std::size_t count_lines(const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("with --map-memory the map waits on the disk, and the results are the same") {
+TEST_CASE("with --map-memory the map is kept on the disk, and the results are equal") {
   const Fixture fixture;
-  // Walls of the tiny scans lie on borders of voxels: turned, they would fall to either side.
+  // Walls of the tiny scans lie on borders of voxels. A rotation would move points across them.
   REQUIRE(fixture.run({"--level", "false"}).code == 0);
   const std::size_t points = read_points(fixture.out + "/static_map.ply").positions.size();
   const std::string labels = read_text(fixture.out + "/labels/" + scan_name(5) + ".label");
@@ -66,7 +66,7 @@ TEST_CASE("with --map-memory the map waits on the disk, and the results are the 
   CHECK(fixture.report()["configuration"]["map_memory"] == 0.0);
   const std::string map = read_text(fixture.out + "/static_map.ply");
 
-  // Tiles of a run that was killed do not get into the map of the next.
+  // Tiles of a killed run do not get into the map of the next run.
   nlohmann::json report = fixture.report();
   report["complete"] = false;
   report["outputs"]["folders"]["map_tiles"] = ".tile";
@@ -77,7 +77,7 @@ TEST_CASE("with --map-memory the map waits on the disk, and the results are the 
     const PointBuffer other{{1000.0F}, {1000.0F}, {1000.0F}};
     TiledStaticMap(config).insert(other, {}, Eigen::Isometry3d::Identity());
   }
-  // One that a power cut tore, and what a kill left of another.
+  // A tile that a power cut truncated, and a temporary file of a killed run.
   write_text(fixture.out + "/map_tiles/0_0_0.tile", "");
   write_text(fixture.out + "/map_tiles/.0_-1_0.tile.0123456789abcdef.tmp", "half");
   REQUIRE(fixture.run({"--map-memory", "0", "--level", "false", "--resume"}).code == 0);
@@ -85,7 +85,7 @@ TEST_CASE("with --map-memory the map waits on the disk, and the results are the 
   CHECK(read_text(fixture.out + "/static_map.ply") == map);
 }
 
-TEST_CASE("No name of a file reaches the terminal with bytes that it would obey") {
+TEST_CASE("File names are printed without bytes that control the terminal") {
   const Fixture fixture(3);
   const std::string evil = "evil\x1b[31m\nname\xC2\x9B";
   const std::string seq = fixture.folder / evil;
@@ -138,7 +138,7 @@ TEST_CASE("No name of a file reaches the terminal with bytes that it would obey"
   CHECK_THAT(start({"check", missing}).err, ContainsSubstring("evil\\x1B[31m\\nname\\xC2\\x9B"));
 }
 
-TEST_CASE("The budget of the map needs a map and a size that can be") {
+TEST_CASE("Flag --map-memory needs a map and a possible size") {
   const Fixture fixture(3);
   const Outcome no_map = fixture.run({"--map-memory", "10", "--build-map", "false"});
   CHECK(no_map.code != 0);
@@ -228,7 +228,7 @@ TEST_CASE("The same input gives the same bytes") {
   }
 }
 
-TEST_CASE("Progress is plain lines in a pipe, and silence with --quiet") {
+TEST_CASE("Progress is plain lines in a pipe, and nothing with --quiet") {
   const Fixture fixture;
   const Outcome loud = fixture.run();
   CHECK_THAT(loud.err, ContainsSubstring("12 of 12 scans\n"));
@@ -254,7 +254,7 @@ TEST_CASE("Flags --map and --map-voxel") {
   REQUIRE(fixture.run({"--map", map, "--map-voxel", "0"}).code == 0);
   CHECK_FALSE(fs::exists(fixture.out + "/static_map.ply"));
   const nlohmann::json report = fixture.report();
-  // Without voxels every point that is kept is in the map.
+  // Without voxels, every kept point is in the map.
   CHECK(read_points(map).positions.size() == report["labels"]["ground"].get<std::size_t>() +
                                                  report["labels"]["static"].get<std::size_t>());
 
@@ -267,7 +267,7 @@ TEST_CASE("Flags --map and --map-voxel") {
   CHECK(fixture.report()["static_map"].is_null());
 }
 
-TEST_CASE("Preset, config file and flags: the later wins") {
+TEST_CASE("Preset, config file and flags: the later one has priority") {
   const Fixture fixture;
   const std::string config = fixture.folder / "run.cfg";
   write_text(config, "tau-s = 0.5\nwindow = 5\n");
@@ -279,14 +279,14 @@ TEST_CASE("Preset, config file and flags: the later wins") {
   CHECK(report["configuration"]["p_inc"] == 0.7);
 }
 
-TEST_CASE("What config prints, run takes, for every parameter") {
+TEST_CASE("run takes the output of config, for every parameter") {
   const Fixture fixture;
   const std::string preset = GENERATE("default", "paper");
   const Outcome printed = start({"config", "--preset", preset});
   REQUIRE(printed.code == 0);
   const std::string config = fixture.folder / "run.cfg";
   write_text(config, printed.out);
-  // The other preset, so that only the file can bring the values.
+  // The other preset, so that only the file can set the values.
   REQUIRE(
       fixture.run({"--config", config, "--preset", preset == "paper" ? "default" : "paper"}).code ==
       0);
@@ -307,7 +307,7 @@ TEST_CASE("What config prints, run takes, for every parameter") {
   CHECK(configuration.size() == parameters);
 }
 
-TEST_CASE("Results replace earlier ones by --force only, and whole") {
+TEST_CASE("Only --force replaces earlier results, and it replaces all of them") {
   const Fixture fixture;
   const std::string map = fixture.out + "/first.pcd";
   REQUIRE(fixture.run({"--write-online", "--map", map}).code == 0);
@@ -328,7 +328,7 @@ TEST_CASE("Results replace earlier ones by --force only, and whole") {
   CHECK(read_text(fixture.out + "/notes.txt") == "mine");
 }
 
-TEST_CASE("A map elsewhere is replaced by --force only, and never a scan") {
+TEST_CASE("Only --force replaces a map in another folder, and it never replaces a scan") {
   const Fixture fixture;
   const std::string map = fixture.folder / "maps/of all.ply";
   write_text(map, "of another run");
@@ -338,7 +338,7 @@ TEST_CASE("A map elsewhere is replaced by --force only, and never a scan") {
   CHECK(read_text(map) == "of another run");
   CHECK_FALSE(fs::exists(fixture.out));
 
-  // What a killed run left of it goes, what belongs to others stays.
+  // Temporary files of a killed run are removed, files of other owners stay.
   const std::string leftover = fixture.folder / "maps/.of all.ply.0123456789abcdef.tmp";
   const std::string foreign = fixture.folder / "maps/.of some.ply.0123456789abcdef.tmp";
   write_text(leftover, "half");
@@ -369,7 +369,7 @@ TEST_CASE("A run never removes or replaces a file that it reads") {
   CHECK_THAT(refusal({"run", clean, "--poses", poses, "--out", fixture.out, "--force"}),
              ContainsSubstring(clean + ": is read by this command, as " + clean));
 
-  // Through links: of the folder, of one scan, and of the poses.
+  // Access through links: to the folder, to one scan, and to the poses.
   const std::string link = fixture.folder / "link";
   fs::create_directory_symlink(clean, link);
   CHECK_THAT(refusal({"run", link, "--poses", poses, "--out", fixture.out, "--force"}),
@@ -395,7 +395,7 @@ TEST_CASE("A run never removes or replaces a file that it reads") {
   CHECK(count_entries(clean) == 12);
 }
 
-TEST_CASE("A folder with a report that run did not write belongs to somebody else") {
+TEST_CASE("A folder with a report that run did not write belongs to another owner") {
   const Fixture fixture;
   const std::string precious = fixture.out + "/labels/000000.label";
   write_text(precious, "by hand");
@@ -471,7 +471,8 @@ TEST_CASE("Until the results of --force are complete, the earlier ones stay as t
   CHECK_FALSE(fs::exists(staging));
   CHECK(count_entries(fixture.folder.path()) == 3);
 
-  // A run that was killed is resumed by its own flags; those of the earlier run find nothing to do.
+  // A killed run is resumed with its own flags. With the flags of the earlier run, nothing is left
+  // to do.
   CHECK(end_by(SIGKILL).code == 128 + SIGKILL);
   CHECK(contents() == before);
   CHECK(fs::exists(staging));
@@ -495,7 +496,7 @@ TEST_CASE("A run that was killed while it replaced results is completed by --res
   const nlohmann::json report = fixture.report();
   const std::string map = read_text(fixture.out + "/static_map.ply");
 
-  // The marker has the new request and lists the earlier files, some of which are there.
+  // The marker has the new request and lists the earlier files. Some of them exist.
   nlohmann::json marker = report;
   marker["complete"] = false;
   marker["outputs"] = earlier["outputs"];
@@ -514,7 +515,7 @@ TEST_CASE("A run that was killed while it replaced results is completed by --res
   CHECK(fixture.report()["outputs"] == report["outputs"]);
 }
 
-TEST_CASE("Flag --resume completes the run that it was asked for, and no other") {
+TEST_CASE("Flag --resume completes the requested run and no other") {
   const Fixture fixture;
   const std::string map = fixture.folder / "a/map.ply";
   fs::create_directories(fixture.folder / "a");
@@ -537,7 +538,7 @@ TEST_CASE("Flag --resume completes the run that it was asked for, and no other")
   }
   CHECK(count_entries(fixture.folder / "b") == 0);
 
-  // Whatever is missing is made again.
+  // Missing files are written again.
   for (const std::string& lost :
        {map, fixture.out + "/labels/000003.label", fixture.out + "/causes/000004.cause",
         fixture.out + "/clean/000005.bin", fixture.out + "/timing.csv",
@@ -573,7 +574,7 @@ TEST_CASE("Flag --resume names what differs, with both values") {
   CHECK_THAT(refusal({"--window", "5"}), ContainsSubstring("(report.json does not tell of them)"));
 }
 
-TEST_CASE("Flag --resume goes on with another budget for the map, which changes no result") {
+TEST_CASE("Flag --resume accepts another --map-memory, which changes no result") {
   const Fixture fixture;
   REQUIRE(fixture.run({"--map-memory", "10"}).code == 0);
   const std::string map = read_text(fixture.out + "/static_map.ply");
@@ -588,7 +589,7 @@ TEST_CASE("Flag --resume goes on with another budget for the map, which changes 
   CHECK_THAT(in_memory.err, ContainsSubstring("(map_on_disk was true, is false);"));
 }
 
-TEST_CASE("Paths are those of one place, however they are written") {
+TEST_CASE("Different spellings of a path name one place") {
   const Fixture fixture;
   struct Here {
     explicit Here(const fs::path& folder) : before(fs::current_path()) { fs::current_path(folder); }
@@ -813,7 +814,7 @@ TEST_CASE("One odd scan does not decide how much memory a run takes") {
   const auto size_lines = [](int points) {
     return "WIDTH " + std::to_string(points) + "\nPOINTS " + std::to_string(points) + "\n";
   };
-  // LZF: the byte 5, and then copies of 264 bytes from one byte before. 34 KB hold all points.
+  // LZF: a literal byte 5, then copies of 264 bytes from distance 1. 34 KB encode all points.
   std::string lzf("\0\5", 2);
   int made = 1;
   for (; made + 264 <= 3 * kPoints; made += 264) lzf += std::string("\xE0\xFF\0", 3);
@@ -838,7 +839,7 @@ TEST_CASE("One odd scan does not decide how much memory a run takes") {
   REQUIRE(outcome.code == 0);
   const std::string report = read_text(folder / "out/report.json");
   const std::size_t at = report.find("\"peak_memory_bytes\": ") + 21;
-  // The open scan itself, its file in memory, and what its verdict needs: 300 bytes a point.
+  // The open scan, its file in memory, and the memory for its verdict: 300 bytes per point.
   CHECK(std::stoull(report.substr(at)) < 100'000'000U + 300U * kPoints);
 }
 
@@ -874,7 +875,7 @@ TEST_CASE("Maps far from the origin lose nothing") {
   }
 }
 
-TEST_CASE("Ctrl-C: the scan at hand is finished, what is final is written, exit code 130") {
+TEST_CASE("Ctrl-C: run finishes the current scan, writes final results and exits with code 130") {
   const Fixture fixture(400);
   Process process({"run", fixture.seq, "--out", fixture.out});
   for (int i = 0; i < 10000 && !fs::exists(fixture.out + "/labels/000000.label"); ++i) {
@@ -896,7 +897,7 @@ TEST_CASE("Ctrl-C: the scan at hand is finished, what is final is written, exit 
   CHECK(count_entries(fixture.out) == 6);
 }
 
-TEST_CASE("A signal that was ignored from the start does not end a run") {
+TEST_CASE("A signal that is ignored at the start does not end a run") {
   const Fixture fixture(40);
   const int signal = GENERATE(SIGINT, SIGTERM);
   Process process({"run", fixture.seq, "--out", fixture.out},
@@ -927,7 +928,7 @@ TEST_CASE("Closed standard streams change no result") {
   }
 }
 
-TEST_CASE("A real clip runs as published") {
+TEST_CASE("A real clip gives the published results") {
   const auto clip = recording_or_skip("kitti_van");
   if (!clip) return;
   TemporaryFolder folder;
@@ -939,7 +940,7 @@ TEST_CASE("A real clip runs as published") {
   CHECK_THAT(outcome.out, ContainsSubstring("run"));
 }
 
-TEST_CASE("run writes scans of KITTI cleaned, in the frame they came in") {
+TEST_CASE("run writes cleaned scans of KITTI, in the frame of the input") {
   const TemporaryFolder folder;
   const std::string seq = folder / "seq";
   constexpr std::size_t kScans = 12;
@@ -947,7 +948,7 @@ TEST_CASE("run writes scans of KITTI cleaned, in the frame they came in") {
   CAPTURE(world);
   const Eigen::Vector3d position = world ? Eigen::Vector3d(30, -20, 2) : Eigen::Vector3d::Zero();
   write_tiny_sequence(seq, kScans, position);
-  if (world) {  // the same points, registered
+  if (world) {  // the scans are transformed to the world frame
     for (std::size_t i = 0; i < kScans; ++i) {
       std::vector<float> xyzi = tiny_scan(i);
       for (std::size_t k = 0; k < xyzi.size(); k += 4) {
@@ -984,12 +985,11 @@ TEST_CASE("run writes scans of KITTI cleaned, in the frame they came in") {
     }
   }
   CHECK(removed > 0);
-  // Into the sensor's frame and back costs a rounding; without a frame to change, bytes stay.
+  // The transformation into the sensor's frame and back rounds. Without it, bytes are unchanged.
   CHECK(furthest <= (world ? 1e-5F : 0.0F));
 }
 
-TEST_CASE(
-    "Progress is a bar that redraws itself on a terminal, lines in a file, nothing if quiet") {
+TEST_CASE("Progress is a redrawn bar on a terminal, lines in a file, and nothing with --quiet") {
   const Fixture fixture;
   const std::vector<std::string> arguments = {"run", fixture.seq, "--out", fixture.out, "--force"};
   const std::string shown = show_on_terminal(arguments);
@@ -998,7 +998,7 @@ TEST_CASE(
   const std::size_t end = shown.find(full);
   REQUIRE(end != std::string::npos);
   CHECK(end == shown.rfind(full));
-  // One line from the first bar to the full one, which the next output does not write into.
+  // All redraws of the bar are on one line, which ends before the next output.
   CHECK(shown.find('\n', shown.find("\r[")) == end + full.size() + 1);
 
   const Outcome redirected = fixture.run({"--force"});

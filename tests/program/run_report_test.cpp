@@ -6,7 +6,7 @@
 using namespace dynains::program;
 using namespace dynains::test;
 
-TEST_CASE("Quantiles are values that were measured") {
+TEST_CASE("Quantiles are measured values") {
   std::vector<double> hundred;
   for (int i = 100; i >= 1; --i) hundred.push_back(i);
   const TimeStatistics s = statistics(hundred);

@@ -1,4 +1,4 @@
-// The loop of `dynains run`, with a remover whose every answer is known.
+// The loop of `dynains run`, with a remover that gives predefined answers.
 #include "run_sequence.hpp"
 
 #include <algorithm>
@@ -18,8 +18,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Final after two more scans. Final labels: point 0 dynamic, 1 invalid, 2 out of range, 3 ground,
-/// others static; newest verdicts: all static.
+/// Verdicts are final after two more scans. Final labels: point 0 dynamic, 1 invalid, 2 out of
+/// range, 3 ground, others static. Newest verdicts: all static.
 class FakeRemover {
  public:
   struct Map {
@@ -174,7 +174,7 @@ TEST_CASE("Every scan gets its final labels, every dynamic point its place in th
 
   const PointFile moving = read_points(fixture.folder / "out/dynamic_points.ply");
   REQUIRE(moving.positions.size() == 4);
-  // The first point of each scan is (4, 0, -1.7), seen from (100, 200, 300).
+  // The first point of each scan is (4, 0, -1.7) in the frame of a sensor at (100, 200, 300).
   CHECK(moving.positions[3].isApprox(Eigen::Vector3d(104.0, 200.0, 298.3), 1e-6));
   CHECK(moving.intensity[3] == 0.5F);
   CHECK(moving.label[3] == (251 | 4465U << 16));
@@ -189,7 +189,7 @@ TEST_CASE("Every scan gets its final labels, every dynamic point its place in th
   CHECK(timing.rows[0].stages.at(stage) == 0.5);
 }
 
-TEST_CASE("A run that is told to stop finishes what it has seen") {
+TEST_CASE("A stopped run finishes the scans that it has taken") {
   Fixture fixture(6);
   const ScanRange range{0, 5};
   RunResults results(*fixture.sequence, range, fixture.outputs());
@@ -202,7 +202,7 @@ TEST_CASE("A run that is told to stop finishes what it has seen") {
   CHECK(fs::exists(fixture.folder / "out/map.ply"));
 }
 
-TEST_CASE("A pose that is refused is named, and what was final stays") {
+TEST_CASE("A refused pose is named, and final results stay") {
   Fixture fixture(6);
   fixture.remover.fail_at = 4;
   const ScanRange range{0, 5};
@@ -214,7 +214,7 @@ TEST_CASE("A pose that is refused is named, and what was final stays") {
                ContainsSubstring("scan 000004: the pose jumps"));
   }
   CHECK(count_entries(fixture.folder / "out/labels") == 2);
-  // Labels, causes and online labels; neither map nor moving points, nor anything temporary.
+  // Labels, causes and online labels, but no map, no moving points and no temporary files.
   CHECK(count_entries(fixture.folder / "out") == 3);
 }
 

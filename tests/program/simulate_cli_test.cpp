@@ -23,7 +23,7 @@ Outcome simulate(const std::string& out, std::vector<std::string> more = {}) {
 
 }  // namespace
 
-TEST_CASE("simulate makes a sequence that run and eval take, the same from the same seed") {
+TEST_CASE("simulate makes a sequence for run and eval, with equal bytes for equal seeds") {
   TemporaryFolder folder;
   const std::string a = folder / "a";
   const std::string b = folder / "b";
@@ -68,7 +68,7 @@ TEST_CASE("simulate makes a sequence that run and eval take, the same from the s
     CHECK(right > 1000);
   }
 
-  // Nothing is written over what is read.
+  // An output never replaces an input.
   for (const std::string& input : {a + "/labels/000001.label", a + "/velodyne/000001.bin",
                                    a + "/poses.txt", out + "/causes/000001.cause"}) {
     const std::string before = read_text(input);
@@ -86,7 +86,7 @@ TEST_CASE("simulate makes a sequence that run and eval take, the same from the s
                               ContainsSubstring("000002.label: has 4 bytes, expected"));
 }
 
-TEST_CASE("simulate replaces its own work by --force, and nobody else's") {
+TEST_CASE("simulate replaces only its own results, and only by --force") {
   TemporaryFolder folder;
   const std::string out = folder / "sim";
   REQUIRE(simulate(out, {"--scans", "3"}).code == 0);
@@ -97,7 +97,7 @@ TEST_CASE("simulate replaces its own work by --force, and nobody else's") {
 
   CHECK_FALSE(fs::exists(out + "/.dynains_staging"));
 
-  // Not even by a marker that lists nothing, or by that of a run.
+  // A marker that lists no files, or the marker of a run, does not permit it either.
   REQUIRE(start({"run", out, "--out", folder / "run"}).code == 0);
   for (const std::string& marker : {std::string("{}"), read_text(folder / "run/report.json")}) {
     write_text(out + "/simulation.json", marker);
@@ -146,7 +146,7 @@ TEST_CASE("simulate refuses a folder that another run writes to") {
   CHECK(fs::is_empty(folder.path()));
 }
 
-TEST_CASE("simulate refuses what it does not know") {
+TEST_CASE("simulate refuses unknown values") {
   TemporaryFolder folder;
   const std::string out = folder / "sim";
   CHECK_THAT(simulate(out, {"--scene", "moon"}).err, ContainsSubstring("moon not in"));
@@ -180,14 +180,14 @@ TEST_CASE("statistics is a table with one row for each sequence") {
   const Outcome some = start({"statistics", seq, "--step", "2"});
   CHECK_THAT(row_of(some), StartsWith("| " + seq + " | " + std::to_string(mean({0, 2})) + " |"));
 
-  // Without labels nothing is known to move, and no car is known.
+  // Without labels, no point is known to move and no car is known.
   fs::remove_all(seq + "/labels");
   const Outcome unlabelled = start({"statistics", seq});
   CHECK(unlabelled.code == 0);
   CHECK_THAT(row_of(unlabelled), ContainsSubstring(" | 0.0 % | - | - | - |"));
 }
 
-TEST_CASE("statistics refuses what it cannot read") {
+TEST_CASE("statistics refuses input that it cannot read") {
   TemporaryFolder folder;
   const std::string seq = folder / "seq";
   REQUIRE(simulate(seq, {"--scans", "2"}).code == 0);

@@ -1,4 +1,4 @@
-// Starts the dynains program and sees what comes back.
+// Starts the dynains program and returns its exit code and output.
 #pragma once
 
 #include <fcntl.h>
@@ -21,8 +21,8 @@ struct Outcome {
   std::string err;  ///< standard error
 };
 
-/// A running `dynains ARGUMENTS`, both outputs piped into files. `prepare` is called in the new
-/// process, before the program starts.
+/// A running `dynains ARGUMENTS` with both outputs redirected to files. `prepare` is called in the
+/// new process, before the program starts.
 class Process {
  public:
   explicit Process(
@@ -38,7 +38,7 @@ class Process {
     if (id_ > 0) return;
     redirect(out, STDOUT_FILENO);
     redirect(err, STDERR_FILENO);
-    // A script that starts tests by `&` makes them ignore Ctrl-C.
+    // A script that starts tests with `&` makes them ignore SIGINT.
     for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
     prepare();
     ::execv(DYNAINS_PROGRAM, argv.data());
@@ -76,7 +76,7 @@ inline Outcome start(
   return Process(arguments, prepare).wait();
 }
 
-/// What `dynains ARGUMENTS` shows on a terminal of its own; throws unless it ends with exit code 0.
+/// Output of `dynains ARGUMENTS` on a pseudo-terminal. Throws unless the exit code is 0.
 inline std::string show_on_terminal(std::vector<std::string> arguments) {
   const int screen = ::posix_openpt(O_RDWR | O_NOCTTY);
   if (screen < 0 || ::grantpt(screen) != 0 || ::unlockpt(screen) != 0) {
@@ -98,8 +98,8 @@ inline std::string show_on_terminal(std::vector<std::string> arguments) {
     ::execv(DYNAINS_PROGRAM, argv.data());
     ::_exit(127);
   }
-  // Reading ends with an error when nobody has the other end any more; until the child has opened
-  // it, that is so as well.
+  // read() fails if no process has the other end open: after the child has ended, and also before
+  // it has opened the terminal.
   std::string shown;
   int status = 0;
   bool ended = false;

@@ -44,7 +44,7 @@ TEST_CASE("Wrong usage is one line on standard error and exit code 2") {
   }
 }
 
-TEST_CASE("A command that there is not: which there are, and the nearest of them") {
+TEST_CASE("An unknown command gives the list of commands and the nearest of them") {
   struct Case {
     std::vector<std::string> arguments;
     std::string expected;
@@ -67,12 +67,12 @@ TEST_CASE("A command that there is not: which there are, and the nearest of them
     CHECK_THAT(outcome.err, StartsWith("dynains: error: ") && ContainsSubstring(wrong.expected));
     CHECK(std::count(outcome.err.begin(), outcome.err.end(), '\n') == 1);
   }
-  // Elsewhere words that nobody expects are no commands.
+  // For a word that is not in the place of a command, no command is proposed.
   CHECK_THAT(start({"config", "runn"}).err, !ContainsSubstring("no command"));
   CHECK_THAT(start({"--runn"}).err, !ContainsSubstring("no command"));
 }
 
-TEST_CASE("Results that cannot be shown are a failure, a reader who leaves is none") {
+TEST_CASE("A failed write to standard output is an error, a closed pipe is none") {
   const std::string program = std::string("'") + DYNAINS_PROGRAM + "' config";
   const auto code_of = [](const std::string& command) {
     return WEXITSTATUS(
@@ -90,7 +90,7 @@ TEST_CASE("An error of the file system is one line that begins with the path") {
   CHECK_THAT(outcome.err, StartsWith("dynains: error: \"\": "));
 }
 
-TEST_CASE("Help that cannot be shown is a failure") {
+TEST_CASE("Help that cannot be written is an error") {
   const auto to_full = [] {
     const int full = ::open("/dev/full", O_WRONLY);
     ::dup2(full, STDOUT_FILENO);
@@ -103,7 +103,7 @@ TEST_CASE("Help that cannot be shown is a failure") {
   CHECK(start({"run", "--help"}, to_full).code == 1);
 }
 
-TEST_CASE("File names cannot steer the terminal") {
+TEST_CASE("File names cannot control the terminal") {
   const TemporaryFolder folder;
   const std::string name =
       "evil\x1b]0;title\x07\x1b[2J\nline\xc2\x9b"

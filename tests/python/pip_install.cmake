@@ -9,11 +9,11 @@ endif()
 set(target ${WORK_DIR}/pip)
 file(REMOVE_RECURSE ${target})
 file(MAKE_DIRECTORY ${WORK_DIR}/pip_build)
-# Whatever pip writes stays out of the sources.
+# All files that pip writes are outside the source folder.
 file(WRITE ${WORK_DIR}/pip.cfg
   "[build]\nbuild_base = ${WORK_DIR}/pip_build\n[egg_info]\negg_base = ${WORK_DIR}/pip_build\n")
 set(ENV{DIST_EXTRA_CONFIG} ${WORK_DIR}/pip.cfg)
-# What is proved is that it builds: speed of the result would cost minutes.
+# The test checks the build only. Optimization would cost minutes.
 set(ENV{CMAKE_ARGS} "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER} -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O0 -DCMAKE_UNITY_BUILD=ON")
 set(ENV{PIP_DISABLE_PIP_VERSION_CHECK} 1)
 execute_process(

@@ -39,7 +39,7 @@ def test_truth_is_flags_or_labels():
     assert score(kept, labels) == score(kept)
     assert score(kept, labels.tolist()) == score(kept)
     assert score(kept, MOVES.tolist()) == score(kept)
-    # Without class 259 the last point is static, and lost.
+    # Without class 259 the last point is static, and is lost.
     assert score(kept, labels, dynamic_classes="252-258")["PR"] == pytest.approx(100 / 3)
 
 
@@ -53,7 +53,7 @@ def test_unlabeled_points():
 def test_range_setting():
     near = score([False, True, False, True], max_range=10.5)
     assert near["PR"] == 50
-    assert near["RR"] != near["RR"]  # the dynamic points are too far: a share of nothing
+    assert near["RR"] != near["RR"]  # the dynamic points are too far: a share of zero points
 
 
 def test_poses_place_the_points():
@@ -90,7 +90,7 @@ def test_nothing_removed_is_the_identity_on_a_street(street):
         (([[[1, 2, 3], [1]]], [np.eye(4)], [MOVES], [MOVES]), {}, TypeError, "points of scan 0"),
         (([POINTS], [np.eye(3)], [MOVES], [MOVES]), {}, dynains.PoseError, "shape"),
         (([POINTS], ["north"], [MOVES], [MOVES]), {}, TypeError, "a pose is str"),
-        # Labels of a verdict where is_static() of them is meant; classes that are none.
+        # Raw labels in place of the result of is_static(); invalid classes.
         (([POINTS], [np.eye(4)], [MOVES], [np.uint8([3, 3, 4, 4])]), {}, TypeError, "is_static"),
         (([POINTS], [np.eye(4)], [MOVES], [[1.0, 0.5, 0, 0]]), {}, TypeError, "kept of scan 0"),
         (([POINTS], [np.eye(4)], [[40, 40, -1, 252]], [MOVES]), {}, TypeError, "truth of scan 0"),

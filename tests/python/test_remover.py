@@ -181,9 +181,9 @@ def test_push_lets_other_threads_run(street):
     thread.start()
     interval = sys.getswitchinterval()
     try:
-        sys.setswitchinterval(1000)  # nobody has to give way: whoever waits runs only if push does
+        sys.setswitchinterval(1000)  # the other thread runs only if push releases the GIL
         started.set()
-        for scan in 100 * street:  # on a busy machine it may take some
+        for scan in 100 * street:  # a busy machine may need several scans
             remover.push(scan.points, scan.T_world_sensor)
             if ran:
                 break

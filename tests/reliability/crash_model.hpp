@@ -1,16 +1,18 @@
-// What a file system may hold after the power has gone, given what a program did before.
+// States of a file system after a power cut, computed from the recorded calls of a program.
 //
-// Names (files and folders created, renamed, removed): a folder loses its last changes, those from
-// some moment on since it was synced. A change of two folders is kept or lost in both; what is in a
-// lost folder is lost. Folders lose independently of each other: more than on ext4 and xfs, whose
-// journals have one order for a whole file system.
+// Names (files and folders that were created, renamed or removed): each folder loses all its
+// changes after some moment since its last sync. A change of two folders is kept in both or lost in
+// both. The contents of a lost folder are lost. Folders lose changes independently of each other.
+// This model permits more losses than ext4 and xfs, whose journals keep one order for a whole file
+// system.
 //
-// Data (bytes and size of a file): every write since the file was synced is kept, lost, kept up to
-// some byte or leaves zeros, whatever becomes of other writes and of names. A new name can lead to
-// no data, also where it replaced a file that was whole.
+// Data (bytes and size of a file): each write since the last sync of the file is kept, lost, kept
+// up to some byte or replaced by zeros, independently of other writes and of names. A new name can
+// lead to no data, even if it replaced a complete file.
 //
-// fsync of a file keeps its data, of a folder its names and itself; syncfs and sync keep all before
-// them. Each folder at the top of the root is a file system of its own.
+// fsync of a file keeps its data. fsync of a folder keeps its names and the folder itself. syncfs
+// and sync keep everything before the call. Each folder at the top of the root is a separate file
+// system.
 #pragma once
 
 #include <fcntl.h>
@@ -29,12 +31,12 @@
 
 namespace dynains::test {
 
-/// What becomes of unsynced changes; kMixed: one of the others for each folder or file.
+/// Loss of unsynced changes. kMixed chooses one of the others for each folder or file.
 enum class NameLoss { kNothing, kAll, kTail, kMixed };
 enum class DataLoss { kNothing, kAll, kZeros, kTorn, kMixed };
 
 struct Crash {
-  std::size_t length;  ///< events before the power went
+  std::size_t length;  ///< number of events before the power cut
   NameLoss names;
   DataLoss data;
   unsigned seed;
@@ -42,7 +44,7 @@ struct Crash {
 
 class CrashModel {
  public:
-  /// `before` was on the disk when the events began; these are below `root`.
+  /// `before` is the content of the disk before the first event. Events are below `root`.
   CrashModel(const Tree& before, const std::vector<shim::Entry>& events, const std::string& root)
       : root_(root) {
     nodes_.push_back({Kind::kFolder, {}, 0, {}, {}});
@@ -78,7 +80,7 @@ class CrashModel {
     std::string bytes;
     bool cuts;  ///< the file ends at the offset
   };
-  /// A file, a folder or a link, whatever its name.
+  /// A file, a folder or a link, independent of its name.
   struct Node {
     Kind kind;
     std::string bytes;  ///< before the first event
@@ -90,7 +92,7 @@ class CrashModel {
     NodeId folder;
     std::string name;
   };
-  /// The name leads to the node, or to none any more.
+  /// The name leads to the node, or to no node.
   struct Naming {
     NodeId folder;
     std::string name;
@@ -99,7 +101,7 @@ class CrashModel {
   struct NameChange {
     std::size_t at;
     std::vector<Naming> namings;
-    std::vector<NodeId> folders;  ///< that keep or lose it, all or none
+    std::vector<NodeId> folders;  ///< each of them keeps the change, or each loses it
   };
 
   static void set_name(Names& names, const Naming& naming) {
@@ -216,7 +218,7 @@ class CrashModel {
     std::vector<std::size_t> synced(nodes_.size());
     std::transform(nodes_.begin(), nodes_.end(), synced.begin(),
                    [&](const Node& node) { return last_sync(node, crash); });
-    // What one folder has for certain, the other folder of the change has, too.
+    // A change that one folder keeps for certain is kept by the other folder, too.
     for (auto change = changes_.rbegin(); change != changes_.rend(); ++change) {
       const auto is_safe = [&](NodeId folder) { return synced[folder] > change->at; };
       if (std::none_of(change->folders.begin(), change->folders.end(), is_safe)) continue;

@@ -1,6 +1,6 @@
-// The power goes at any moment of a run. Whatever the file system kept (crash_model.hpp): a folder
-// of results is absent, whole or clearly unfinished, files of others are as they were, and one more
-// start gives the bytes of an undisturbed run.
+// Power cuts at every moment of a run, for every state of the file system in crash_model.hpp.
+// Afterwards a folder of results is absent, complete or marked as unfinished. Other files are
+// unchanged. A restart gives the bytes of an undisturbed run.
 #include <algorithm>
 #include <set>
 #include <string>
@@ -18,7 +18,7 @@ struct State {
   Tree tree;
 };
 
-/// Different states only: for each moment the plain losses, then mixtures.
+/// Distinct states: for each moment the plain losses, then mixtures.
 std::vector<State> crash_states(const CrashModel& model) {
   constexpr unsigned kMixtures = 128;
   std::vector<State> states;
@@ -41,7 +41,7 @@ std::vector<State> crash_states(const CrashModel& model) {
   return states;
 }
 
-/// Whether the test sees that a program which syncs nothing is wrong.
+/// Whether the test detects a program that never syncs.
 bool needs_syncs(const Rehearsal& rehearsal) {
   std::vector<shim::Entry> events = rehearsal.events();
   events.erase(std::remove_if(events.begin(), events.end(),
@@ -59,7 +59,7 @@ bool needs_syncs(const Rehearsal& rehearsal) {
 void check(const Scenario& scenario) {
   Rehearsal rehearsal(scenario);
   const CrashModel model(rehearsal.before(), rehearsal.events(), rehearsal.root());
-  // Else the shim missed a change.
+  // A difference means that the shim missed a change.
   const Tree end = model.after({model.size(), NameLoss::kNothing, DataLoss::kNothing, 0});
   REQUIRE(difference(end, rehearsal.after()) == "");
 
@@ -79,34 +79,32 @@ void check(const Scenario& scenario) {
 
 }  // namespace
 
-TEST_CASE("the power goes during a run") { check(fresh_run({})); }
+TEST_CASE("power cut during a run") { check(fresh_run({})); }
 
-TEST_CASE("the power goes during a run that writes everything") {
+TEST_CASE("power cut during a run that writes all outputs") {
   check(fresh_run({"--write-online", "--write-clean"}));
 }
 
-TEST_CASE("the power goes during a run with its map elsewhere") {
+TEST_CASE("power cut during a run with its map in another folder") {
   check(fresh_run({"--map", "/maps/map.ply"}));
 }
 
-TEST_CASE("the power goes during a run with its map on the disk") {
+TEST_CASE("power cut during a run with its map on the disk") {
   check(fresh_run({"--map-memory", "0"}));
 }
 
-TEST_CASE("the power goes while a stopped run is resumed") {
-  check(resumed_run({"--write-clean"}));
-}
+TEST_CASE("power cut while a stopped run is resumed") { check(resumed_run({"--write-clean"})); }
 
-TEST_CASE("the power goes while a result is replaced") {
+TEST_CASE("power cut while a result is replaced") {
   check(replacing_run({"--write-online", "--write-clean"}, {}));
 }
 
-TEST_CASE("the power goes while a result with its map elsewhere is replaced") {
+TEST_CASE("power cut while a result with its map in another folder is replaced") {
   check(replacing_run({"--map", "/maps/map.ply"}, {"--map", "/maps/map.ply"}));
 }
 
-TEST_CASE("the power goes during a simulation") { check(simulation()); }
+TEST_CASE("power cut during a simulation") { check(simulation()); }
 
-TEST_CASE("the power goes while a simulation is replaced") { check(replacing_simulation()); }
+TEST_CASE("power cut while a simulation is replaced") { check(replacing_simulation()); }
 
 }  // namespace dynains::test

@@ -1,4 +1,4 @@
-// Prints a fingerprint of everything that the remover says of a small scene, for each preset.
+// Prints a fingerprint of all answers of the remover on a small scene, for each preset.
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
@@ -30,8 +30,8 @@ class Fingerprint {
   std::uint64_t value_ = 0xCBF29CE484222325U;
 };
 
-/// A floor and boxes, every other of which moves. Coordinates are exact in float: no rounding, no
-/// libm.
+/// A floor and boxes. Every second box moves. Coordinates are exact in float, so that neither
+/// rounding nor libm has an influence.
 std::vector<Scan> scene() {
   std::vector<Scan> scans;
   Random random(5);
@@ -47,7 +47,7 @@ std::vector<Scan> scene() {
       const float left = 6.0F + 5.0F * static_cast<float>(object);
       const float ahead = object % 2 == 0 ? 12.0F - 1.5F * static_cast<float>(i) : -6.0F;
       for (int point = 0; point < 400; ++point) {
-        // One after the other: the order of arguments is the compiler's own.
+        // Separate statements: the order in which function arguments are evaluated is unspecified.
         const auto along = 0.125F * static_cast<float>(random.index(16));
         const auto across = 0.125F * static_cast<float>(random.index(8));
         const auto up = 0.125F * static_cast<float>(random.index(16));

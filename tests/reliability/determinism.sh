@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# determinism.sh EIGEN_INCLUDE: every compiler that is there, at several levels of optimization, and
-# every run give the same labels, instances, beliefs and map, bit by bit.
+# determinism.sh EIGEN_INCLUDE: labels, instances, beliefs and map have equal bits for every
+# installed compiler, for several levels of optimization and for repeated runs.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 work=$(mktemp -d)

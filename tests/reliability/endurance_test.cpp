@@ -1,6 +1,6 @@
-// Hours, in small scans: memory and time stay flat, and what is long past has no say.
+// Long runs of small scans: memory and time stay constant, and old scans have no influence.
 //
-// DYNAINS_ENDURANCE_SCANS=100000 test_reliability "[endurance]"   is the long run.
+// DYNAINS_ENDURANCE_SCANS=100000 test_reliability "[endurance]" is the long run.
 #include <unistd.h>
 
 #include <algorithm>
@@ -27,7 +27,7 @@ std::size_t scan_count() {
   return wanted == nullptr ? kShort : static_cast<std::size_t>(std::stoul(wanted));
 }
 
-/// Every 60th point of a full scan, about 1,500; a car passes again and again.
+/// Every 60th point of a full scan, about 1,500 points. A car passes repeatedly.
 std::vector<Scan> small_round(std::size_t count) {
   std::vector<Scan> scans;
   for (std::size_t i = 0; i < count; ++i) {
@@ -58,7 +58,8 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-TEST_CASE("hours at once: memory and time stay flat, the past is forgotten", "[endurance]") {
+TEST_CASE("a long run needs constant memory and time, and old scans have no influence",
+          "[endurance]") {
   const bool paper = GENERATE(true, false);
   const Config config = paper ? Config::paper() : Config();
   const std::vector<Scan> round = small_round(40);
@@ -91,7 +92,7 @@ TEST_CASE("hours at once: memory and time stay flat, the past is forgotten", "[e
   CHECK(growth < 8.0);
   CHECK(slower < 3.0);
 
-  // A fresh object that was fed the last scans only says the same of the newest.
+  // A new remover that gets only the last scans gives an equal verdict for the newest scan.
   DynaInsRemover fresh(config);
   const std::size_t reach = paper ? static_cast<std::size_t>(config.window) : 200;
   for (std::size_t i = count - std::min(count, reach); i + 1 < count; ++i) push(fresh, i);
@@ -100,7 +101,8 @@ TEST_CASE("hours at once: memory and time stay flat, the past is forgotten", "[e
   if (paper) {
     CHECK((newest.labels == expected.labels));
   } else {
-    // Beliefs along tracks have no end; the sensor was judged by another first scan.
+    // Beliefs along tracks have no end, and the two removers adapted to the sensor by different
+    // scans.
     CHECK(disagreement({newest}, {expected}) < 0.01);
   }
 }

@@ -1,6 +1,6 @@
-// Each call of the program that touches a file fails once: the first, the second, and so on to the
-// last. The program ends with a message that names file and cause, or with the result of an
-// undisturbed run; nothing is lost, and one more start gives that result.
+// Each call of the program that touches a file fails once. The program then ends with a message
+// that names file and cause, or with the result of an undisturbed run. No earlier file is lost, and
+// a restart gives the result of an undisturbed run.
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
@@ -13,7 +13,7 @@
 namespace dynains::test {
 namespace {
 
-/// Errors of a call, as in shim.cpp; 0: half the bytes.
+/// Errors of a call, as in shim.cpp; 0: the call moves half the bytes.
 struct Call {
   const char* name;
   std::vector<int> errors;
@@ -31,7 +31,7 @@ const std::vector<Call> kCalls = {{"open", {EMFILE, EACCES, EINTR}},
                                   {"lock", {ENOLCK, EINTR}},
                                   {"close", {EIO, EINTR}}};
 
-/// What is wrong with the message; empty if nothing is.
+/// Description of a problem of the message; empty if there is none.
 std::string problem_of_message(const std::string& message, int error, const std::string& root) {
   const auto has = [&](const std::string& part) { return message.find(part) != std::string::npos; };
   if (message.rfind("dynains: error: ", 0) != 0) return "no message: " + message;
@@ -45,7 +45,7 @@ class FaultTest {
  public:
   explicit FaultTest(const Scenario& scenario) : rehearsal_(scenario) {}
 
-  /// Each call with each of its errors, or with one of them after the other.
+  /// Each call with each of its errors, or with its errors in turn.
   void check() {
     for (const Call& call : kCalls) {
       for (std::size_t n = 1; true; ++n) {
@@ -90,7 +90,7 @@ class FaultTest {
 
   Rehearsal rehearsal_;
   std::size_t failed_ = 0;
-  std::set<std::size_t> states_;  ///< that the command was started from again
+  std::set<std::size_t> states_;  ///< states from which the command was started again
 };
 
 void check(const Scenario& scenario) { FaultTest(scenario).check(); }

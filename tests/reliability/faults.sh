@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
-# faults.sh PROGRAM [KILLS]: `dynains run` under kill -9, a full disk, a folder that cannot be
-# written and input that vanishes. Whatever happens, each file is absent or whole, report.json says
-# "complete": false until everything is there, and --resume comes to the bytes of an undisturbed
-# run.
+# faults.sh PROGRAM [KILLS]: `dynains run` with kill -9, with a full disk, without write permission
+# and with input that vanishes. Each file is absent or complete, report.json has "complete": false
+# until all files are written, and --resume gives the bytes of an undisturbed run.
 set -euo pipefail
 program=$1
 kills=${2:-12}
@@ -16,14 +15,14 @@ trap cleanup EXIT
 failures=0
 fail() { echo "FAILED: $*"; failures=$((failures + 1)); }
 
-# Bytes that depend on nothing but the input: all but measured times and the report.
+# Files that depend on nothing but the input: all except timing.csv and report.json.
 results() { (cd "$1" && find labels static_map.ply dynamic_points.ply -type f | sort); }
 same() {
   diff <(results "$1") <(results "$2") &&
     while read -r file; do cmp "$1/$file" "$2/$file" || return 1; done < <(results "$2")
 }
-# whole FOLDER [EXPECTED]: every label file under its final name is as long as that of the
-# undisturbed run, every cloud the same.
+# whole FOLDER [EXPECTED]: every label file under its final name has the length of that of the
+# undisturbed run, every cloud has its bytes.
 whole() {
   local file expected=${2:-$work/expected}
   for file in "$1"/labels/*.label; do
@@ -52,7 +51,7 @@ kill_runs() {
   echo "--- kill -9, $count times within $((span / 1000)) ms${*:+, $*}"
   for ((i = 0; i < count; ++i)); do
     out=$work/out
-    # A third of the time the next start resumes what the last left and is killed again.
+    # Two of three runs resume the results of the run that was killed before.
     if ((i % 3 == 0)); then rm -rf "$out"; fi
     "$program" run "$seq" --out "$out" --resume --quiet "$@" &
     pid=$!
@@ -92,7 +91,7 @@ for ((i = 0; i < kills; ++i)); do
   cp -r "$work/earlier" "$work/out"
   "$program" run "$seq" --out "$work/out" --force --quiet &
   pid=$!
-  # One of three at any time, the others while the new files replace the earlier ones.
+  # One run of three is killed at any time, the others while new files replace earlier ones.
   delay=$(((RANDOM * 32768 + RANDOM) % span))
   if ((i % 3 > 0)); then
     while complete "$work/out" && kill -0 "$pid" 2>/dev/null; do :; done
@@ -119,12 +118,12 @@ echo "$kept of them left the earlier results, $broken unfinished ones"
 ((kept > 0 && broken > 0)) || fail "no kill of --force hit both"
 
 echo "--- --resume after Ctrl-C; with other flags; when complete; --force after a kill"
-# On a busy machine a run may be over before the signal reaches it: such a one says nothing and is
-# done again. A program that does not hear the signal is over first every time.
+# On a busy machine a run may end before the signal arrives. Such a run is repeated. A program that
+# ignores the signal ends before it every time, and the test fails.
 code=0
 for ((attempt = 0; attempt < 20 && code == 0; ++attempt)); do
   rm -rf "$work/out"
-  # In a script `&` ignores SIGINT.
+  # In a script, `&` makes a command ignore SIGINT.
   env --default-signal=INT "$program" run "$seq" --out "$work/out" --quiet &
   pid=$!
   await "$work/out/labels"

@@ -1,4 +1,4 @@
-// Poses and times as they come from a bad day: what happens is defined, for both presets.
+// Faulty poses and times: the results are defined, for both presets.
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -17,7 +17,7 @@ double dynamic_share(const std::vector<Scan>& scans, const Run& result) {
   return share(scans, result.final, PointLabel::kDynamic).value();
 }
 
-TEST_CASE("a pose that jumps far away and stays there removes nothing that stands") {
+TEST_CASE("a pose that jumps far away and stays there removes no static object") {
   const Config config = GENERATE(Config::paper(), Config());
   std::vector<Scan> scans = drive(yard(), 10, 5.0);
   for (std::size_t i = 5; i < scans.size(); ++i) {
@@ -28,20 +28,19 @@ TEST_CASE("a pose that jumps far away and stays there removes nothing that stand
   CHECK(dynamic_share(scans, result) < 1e-3);
 }
 
-TEST_CASE(
-    "a pose that jumps within the scene, faster than anything drives, removes nothing either") {
+TEST_CASE("a pose that jumps within the scene at an impossible speed removes nothing") {
   Config config = GENERATE(Config::paper(), Config());
   std::vector<Scan> scans = drive(yard(), 10, 5.0);
   for (std::size_t i = 5; i < scans.size(); ++i) {
     scans[i].T_world_sensor.pretranslate(Eigen::Vector3d(12.0, -4.0, 0.0));
   }
   CHECK(dynamic_share(scans, run(config, scans)) < 1e-3);
-  // And if it is taken for a fast drive, something is: the test can fail.
+  // With a higher max_speed the jump counts as motion and removes points: the test can fail.
   config.max_speed = 1000.0;
   CHECK(dynamic_share(scans, run(config, scans)) > 5e-3);
 }
 
-TEST_CASE("after a gap nothing before it has a say, and before it nothing after") {
+TEST_CASE("scans before a gap and after it have no influence on each other") {
   const Config config = GENERATE(Config::paper(), Config());
   std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
   for (std::size_t i = 4; i < scans.size(); ++i) scans[i].time += config.max_gap;
@@ -49,7 +48,7 @@ TEST_CASE("after a gap nothing before it has a say, and before it nothing after"
   const Run before = run(config, {scans.begin(), scans.begin() + 4});
   for (std::size_t i = 0; i < 4; ++i) CHECK((whole.final[i].labels == before.final[i].labels));
 
-  // The first scan tells what sensor it is, and nothing else that outlives the gap.
+  // The first scan also gives the model of the sensor, which is kept across the gap.
   std::vector<Scan> after = {scans[0]};
   after.insert(after.end(), scans.begin() + 4, scans.end());
   const Run second = run(config, after);
@@ -57,12 +56,12 @@ TEST_CASE("after a gap nothing before it has a say, and before it nothing after"
     CHECK((whole.newest[i].labels == second.newest[i - 3].labels));
     CHECK((whole.final[i].labels == second.final[i - 3].labels));
   }
-  // And without the gap it is not the same: the test can fail.
+  // Without the gap, the results differ: the test can fail.
   const Run together = run(config, drive(oncoming(), 8, 5.0));
   CHECK((whole.newest[4].labels != together.newest[4].labels));
 }
 
-TEST_CASE("one scan again and again shows no motion and adds nothing to the map") {
+TEST_CASE("a repeated scan shows no motion and adds nothing to the map") {
   const Config config = GENERATE(Config::paper(), Config());
   const std::vector<Scan> once = {oncoming().scan(sensor_at(0.0), 0.0)};
   std::vector<Scan> again(12, once[0]);
@@ -77,7 +76,7 @@ TEST_CASE("one scan again and again shows no motion and adds nothing to the map"
 
 TEST_CASE("standing still for two minutes removes nothing, and the map stops growing") {
   const Config config = GENERATE(Config::paper(), Config());
-  // Two scans a second, with the noise of ten again and again.
+  // Two scans per second: the noise of ten scans, repeated.
   const std::vector<Scan> scans = drive(yard(), 10, 0.0);
   DynaInsRemover remover(config);
   std::size_t moving = 0;
@@ -102,7 +101,7 @@ TEST_CASE("standing still for two minutes removes nothing, and the map stops gro
   CHECK(remover.map().size() <= map_in_the_middle + map_in_the_middle / 1000);
 }
 
-TEST_CASE("stamps that run back or repeat are refused and change nothing") {
+TEST_CASE("times that decrease or repeat are refused and change nothing") {
   const Config config = GENERATE(Config::paper(), Config());
   const std::vector<Scan> scans = drive(oncoming(), 6, 5.0);
   const Run expected = run(config, scans);
@@ -121,7 +120,7 @@ TEST_CASE("stamps that run back or repeat are refused and change nothing") {
   CHECK((final == expected.final));
 }
 
-TEST_CASE("every third scan dropped: what moves is still removed, what stands stays") {
+TEST_CASE("with every third scan dropped, moving objects are removed and static ones stay") {
   const Config config = GENERATE(Config::paper(), Config());
   std::vector<Scan> scans;
   for (int i = 0; i < 13; ++i) {

@@ -1,7 +1,7 @@
-// The program is started with arguments and in folders made at random. Files that are not of the
-// result it writes are as before, it ends by itself, and says why if it fails.
+// Starts the program with random arguments in random folders. Files that do not belong to the
+// result are unchanged, the program ends, and a failure has a message.
 //
-// DYNAINS_PROGRAM_STARTS=1000000 test_disturbed "*at random*" is the long run; with
+// DYNAINS_PROGRAM_STARTS=1000000 test_disturbed "*at random*" is the long run. With
 // DYNAINS_PROGRAM_FIRST=N it begins at start N.
 #include <fcntl.h>
 #include <linux/capability.h>
@@ -57,7 +57,7 @@ Parts make_parts() {
   return parts;
 }
 
-/// In the new process. Root may write everywhere: permissions are to count for it, too.
+/// Runs in the new process. Drops the privileges of root, so that permissions have an effect.
 void prepare(const Start& start, const std::string& root) {
   ::alarm(20);
   ::prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0);
@@ -89,7 +89,7 @@ class RandomStart {
     after_ = read_tree(root);
   }
 
-  /// What is wrong; empty if nothing is.
+  /// Description of a problem; empty if there is none.
   std::string problem() const {
     if (outcome_.code > 2 && outcome_.code != 130) return "exit code";
     const std::string message = problem_of_message();
@@ -125,7 +125,7 @@ class RandomStart {
     }
   }
 
-  /// Relative to the root; nothing if it leads nowhere.
+  /// Relative to the root; nothing if the path leads to no file.
   std::optional<std::string> real_path(const std::string& path) const {
     std::error_code error;
     fs::path whole = fs::weakly_canonical(fs::path(root_) / path, error).lexically_normal();
@@ -150,14 +150,14 @@ class RandomStart {
     if (is_target(path)) return start_.replaces || is_eval;
     if (!out_ || !is_below(path, *out_)) return false;
     const Kind kind = before_.at(path).kind;
-    // A folder that only holds files of ours, or none, can go.
+    // A folder may be removed if it is empty or holds only files of the program.
     return kind == Kind::kFolder || (kind == Kind::kFile && world_.ours.count(path) > 0);
   }
 
   bool may_appear(const std::string& path) const {
     if (is_target(path)) return true;
     const std::string name = path.substr(path.rfind('/') + 1);
-    // Where calls fail, a temporary may stay.
+    // After a failed call, a temporary file may stay.
     if (!start_.fault.empty() && name.front() == '.' && ends_with(name, ".tmp")) return true;
     if (!out_) return false;
     if (path == *out_ || is_below(*out_, path)) return true;

@@ -1,4 +1,4 @@
-// A command of the program that is disturbed again and again, and what must hold after that.
+// A command of the program that is disturbed repeatedly, and the conditions that hold afterwards.
 #pragma once
 
 #include <filesystem>
@@ -20,18 +20,18 @@ inline Arguments operator+(Arguments left, const Arguments& right) {
   return left;
 }
 
-/// Arguments that begin with / are below the root: /seq is the input, /disk/out the results, /maps
-/// another disk.
+/// Arguments that begin with / are below the root: /seq is the input, /disk/out the folder of the
+/// results, /maps another disk.
 struct Scenario {
-  std::vector<Arguments> before;  ///< done first
-  Arguments stopped;              ///< done after them, and stopped in the middle; may be empty
-  Arguments command;              ///< is disturbed
-  Arguments again;                ///< completes it
+  std::vector<Arguments> before;  ///< run before the others
+  Arguments stopped;              ///< run after them and stopped in the middle; may be empty
+  Arguments command;              ///< the command that is disturbed
+  Arguments again;                ///< completes the command
 };
 
 class Rehearsal {
  public:
-  /// Does all of the scenario once, undisturbed.
+  /// Runs the whole scenario once, undisturbed.
   explicit Rehearsal(const Scenario& scenario) : scenario_(scenario) {
     for (const char* disk : {"/disk", "/maps"}) std::filesystem::create_directories(root_ + disk);
     write_small_recording(root_ + "/seq", 4);
@@ -59,13 +59,13 @@ class Rehearsal {
   const Tree& after() const { return after_; }
   const std::vector<shim::Entry>& events() const { return events_; }
 
-  /// The command from where it began, with a fault as in shim.cpp.
+  /// Runs the command from its initial state, with a fault as in shim.cpp.
   Recorded disturb(const std::string& fault) {
     restore(before_);
     return disturb(scenario_.command, fault);
   }
 
-  /// What is wrong with a state that the command left; empty if nothing is.
+  /// Description of a problem in a state that the command left; empty if there is none.
   std::string problem(const Tree& state) const {
     const std::string foreign = difference(not_ours(state), not_ours(before_));
     if (!foreign.empty()) return "not ours: " + foreign;
@@ -90,12 +90,12 @@ class Rehearsal {
     return {};
   }
 
-  /// Starts again from the state: what is wrong with the end of it; empty if nothing is.
+  /// Restarts from the state. Returns a description of a problem in the result; empty if none.
   std::string problem_after_restart(const Tree& state) {
     restore(state);
     Outcome outcome = start_or_stop(with_root(scenario_.again));
     if (outcome.code != 0 && is_earlier(state)) {
-      // An earlier result is whole and stays; the command itself replaces it.
+      // A complete earlier result stays. Only the command itself replaces it.
       const std::string changed = difference(read_tree(root_), state);
       if (!changed.empty()) return "refused, but changed: " + changed;
       outcome = start_or_stop(with_root(scenario_.command));
@@ -105,7 +105,7 @@ class Rehearsal {
     return difference_from_end(end);
   }
 
-  /// The results of the state are whole and those that the command makes; empty if so.
+  /// Empty if the state has the complete results of the command, else the first difference.
   std::string difference_from_end(const Tree& state) const {
     return difference(comparable(state), comparable(after_));
   }
@@ -114,7 +114,7 @@ class Rehearsal {
   static constexpr const char* kForeign = "/notes.txt";
 
   static bool is_foreign(const std::string& path) { return ends_with(path, kForeign); }
-  /// What a run has for itself until it is done: temporaries and what they lie in.
+  /// Temporary files of a run and the folders that hold them.
   static bool is_hidden(const std::string& path) { return path.find("/.") != std::string::npos; }
   static bool is_ours(const std::string& path) {
     return (path.rfind("disk/out", 0) == 0 || path.rfind("maps/", 0) == 0) && !is_foreign(path);
@@ -141,7 +141,7 @@ class Rehearsal {
   }
   bool is_earlier(const Tree& state) const { return results(state) == results(before_); }
 
-  /// Makes the disks hold what the state says. The input is never written: a difference shows.
+  /// Restores the disks to the state. The input is never written, so that a change is detected.
   void restore(const Tree& state) const {
     for (const char* disk : {"disk", "maps"}) write_tree(root_ + '/' + disk, below(state, disk));
   }
@@ -168,7 +168,7 @@ inline Arguments run_with(const Arguments& flags) {
   return Arguments{"run", "/seq", "--out", "/disk/out", "--quiet"} + flags;
 }
 
-/// A small one.
+/// A small simulation.
 inline Arguments simulate_with(const Arguments& flags) {
   return Arguments{"simulate", "/disk/out",   "--quiet",  "--scans", "1",
                    "--scene",  "car-park",    "--sensor", "vlp16",   "--traffic",
@@ -176,13 +176,13 @@ inline Arguments simulate_with(const Arguments& flags) {
          flags;
 }
 
-/// A run of the first three scans in a folder that is not there, and again with --resume.
+/// A run of the first three scans into a new folder, completed by --resume.
 inline Scenario fresh_run(const Arguments& flags) {
   const Arguments command = run_with(Arguments{"--end", "2"} + flags);
   return {{}, {}, command, command + Arguments{"--resume"}};
 }
 
-/// --force over the result of a longer run that wrote more; again with --resume.
+/// --force over the result of a longer run with more outputs, completed by --resume.
 inline Scenario replacing_run(const Arguments& earlier, const Arguments& flags) {
   Scenario scenario = fresh_run(flags);
   scenario.before = {run_with(Arguments{"--window", "2"} + earlier)};
@@ -190,7 +190,7 @@ inline Scenario replacing_run(const Arguments& earlier, const Arguments& flags) 
   return scenario;
 }
 
-/// --resume of a run that was stopped.
+/// --resume of a stopped run.
 inline Scenario resumed_run(const Arguments& flags) {
   Scenario scenario = fresh_run(flags);
   scenario.stopped = scenario.command;

@@ -1,4 +1,4 @@
-// What folders of results claim, and whether it holds.
+// The completeness that folders of results declare, and checks of it.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -16,7 +16,7 @@ inline bool ends_with(const std::string& text, const std::string& end) {
 
 enum class Claim { kNone, kUnfinished, kComplete, kUnreadable };
 
-/// What report.json or simulation.json says; kNone: neither is there.
+/// Value of "complete" in report.json or simulation.json; kNone: neither file exists.
 inline Claim claim_of(const Tree& results) {
   for (const char* marker : {"report.json", "simulation.json"}) {
     const auto file = results.find(marker);
@@ -28,7 +28,7 @@ inline Claim claim_of(const Tree& results) {
   return Claim::kNone;
 }
 
-/// The tree without what is measured: times and memory.
+/// The tree without measured times and memory.
 inline Tree without_measurements(Tree tree) {
   for (auto& [name, item] : tree) {
     if (ends_with(name, "report.json")) {

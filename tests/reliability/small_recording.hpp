@@ -1,4 +1,4 @@
-// A recording that the program is through with in milliseconds.
+// A recording that the program processes in milliseconds.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,8 @@
 
 namespace dynains::test {
 
-/// Every twelfth point of the tiny sequence, some 440 a scan, with ground truth for the box, and
-/// times that differ from those of a recording without.
+/// Every twelfth point of the tiny sequence, about 440 per scan, with ground truth for the box.
+/// Times differ from the defaults of a recording without times.
 inline void write_small_recording(const std::filesystem::path& folder, std::size_t scans) {
   write_tiny_sequence(folder, scans);
   std::filesystem::create_directories(folder / "labels");

@@ -1,4 +1,4 @@
-// A folder and all that lies below it, as a value.
+// A folder with all its contents, as a value.
 #pragma once
 
 #include <cstddef>
@@ -43,7 +43,7 @@ inline Tree read_tree(const std::filesystem::path& folder) {
   return tree;
 }
 
-/// Makes the folder hold the tree and nothing else.
+/// Replaces the contents of the folder by the tree.
 inline void write_tree(const std::filesystem::path& folder, const Tree& tree) {
   namespace fs = std::filesystem;
   fs::remove_all(folder);
@@ -57,7 +57,7 @@ inline void write_tree(const std::filesystem::path& folder, const Tree& tree) {
   }
 }
 
-/// What lies below that folder of the tree, by path relative to it.
+/// Items of the tree below the folder, by their path relative to it.
 inline Tree below(const Tree& tree, const std::string& folder) {
   Tree part;
   const std::string prefix = folder + '/';
@@ -68,7 +68,7 @@ inline Tree below(const Tree& tree, const std::string& folder) {
   return part;
 }
 
-/// An empty folder is no result, and harms nobody where it cannot be removed.
+/// Empty folders are no results. A failed command may leave them.
 inline Tree without_empty_folders(Tree tree) {
   for (auto item = tree.begin(); item != tree.end();) {
     const bool empty = item->second.kind == Kind::kFolder && below(tree, item->first).empty();
@@ -77,14 +77,14 @@ inline Tree without_empty_folders(Tree tree) {
   return tree;
 }
 
-/// Differs between trees that differ.
+/// Different for different trees.
 inline std::size_t fingerprint(const Tree& tree) {
   std::string all;
   for (const auto& [name, item] : tree) all += name + '\0' + item.bytes + '\0';
   return std::hash<std::string>()(all);
 }
 
-/// The first difference, in words; empty if there is none.
+/// Text about the first difference; empty if there is none.
 inline std::string difference(const Tree& found, const Tree& expected) {
   for (const auto& [name, item] : expected) {
     const auto other = found.find(name);

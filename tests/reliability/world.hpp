@@ -1,4 +1,4 @@
-// Folders as users may have them, and starts of the program among them, at random from a seed.
+// Random folders of a user and random starts of the program in them, from a seed.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@ inline bool is_below(const std::string& path, const std::string& folder) {
   return path.rfind(folder + '/', 0) == 0;
 }
 
-/// What a world is made of, each relative to its own folder.
+/// Parts of a world, each relative to its own folder.
 struct Parts {
   Tree kitti;       ///< a recording
   Tree clouds;      ///< a recording of .ply files
@@ -30,7 +30,7 @@ struct Parts {
 
 struct World {
   Tree tree;
-  std::set<std::string> ours;       ///< names of files that the marker beside or above them lists
+  std::set<std::string> ours;       ///< names of files that a marker beside or above them lists
   std::vector<std::string> locked;  ///< without permission to write
   std::string kitti, clouds, out, other, foreign;  ///< names of folders
 };
@@ -38,12 +38,12 @@ struct World {
 /// A start of the program in the folder of the world.
 struct Start {
   Arguments arguments;
-  std::vector<std::string> inputs;   ///< files and folders that arguments ask to be read
+  std::vector<std::string> inputs;   ///< files and folders that the arguments name as input
   std::string out;                   ///< of run and simulate
-  std::vector<std::string> targets;  ///< files that arguments ask to be written
+  std::vector<std::string> targets;  ///< files that the arguments name as output
   bool replaces = false;             ///< --force or --resume
   std::vector<int> closed;           ///< descriptors
-  bool full = false;                 ///< standard output takes nothing
+  bool full = false;                 ///< standard output is full
   std::string fault;                 ///< as in shim.cpp
 };
 
@@ -87,7 +87,7 @@ class WorldMaker {
     start.full = chance(0.05);
     if (chance(0.2)) {
       const std::string error = pick<std::string>({"28", "5", "13", "24", "4"});
-      // A call that is interrupted for ever is tried for ever.
+      // The program repeats an interrupted call, so that an endless EINTR would never end.
       const std::string how = error == "4" ? "once" : pick<std::string>({"once", "on"});
       start.fault = pick<std::string>({"open", "write", "read", "sync", "rename", "remove", "mkdir",
                                        "stat", "list", "lock", "close"}) +
@@ -144,14 +144,14 @@ class WorldMaker {
     }
   }
 
-  /// No marker in that folder lists anything any more.
+  /// Removes the paths below the folder from `ours`.
   static void disown(World& world, const std::string& folder) {
     for (auto name = world.ours.begin(); name != world.ours.end();) {
       name = is_below(*name, folder) ? world.ours.erase(name) : std::next(name);
     }
   }
 
-  /// Puts an item of somebody else there, if its folder is one.
+  /// Puts an item of another owner there if its folder exists.
   static void put(World& world, const std::string& path, const Item& item) {
     const std::size_t slash = path.rfind('/');
     if (slash != std::string::npos) {
@@ -163,7 +163,7 @@ class WorldMaker {
     world.tree[path] = item;
   }
 
-  /// A name in OUT, of a file or folder of ours.
+  /// A name of a file or folder of the program in OUT.
   std::string name_in_out(const World& world) {
     return world.out + '/' +
            pick<std::string>({"report.json", "static_map.ply", "dynamic_points.ply", "timing.csv",
@@ -212,7 +212,7 @@ class WorldMaker {
     }
   }
 
-  /// The result is nobody's after that.
+  /// Damages the markers, so that no result in OUT belongs to the program.
   void damage_marker(World& world) {
     const std::string program = "{\"program\": \"dynains\"";
     for (const char* marker : {"/report.json", "/simulation.json"}) {
@@ -246,7 +246,7 @@ class WorldMaker {
     }
   }
 
-  /// A path as a user may spell it.
+  /// One of the ways to write a path.
   std::string spelled(const std::string& path) {
     switch (random_.index(5)) {
       case 0:

@@ -27,7 +27,7 @@ TEST_CASE("a ray meets a box at its faces") {
   // Just inside and just outside of the side face y = 1.
   require_interval(intersect(box, {0, 0.99F, 0}, {1, 0, 0}), 8, 12);
   CHECK(intersect(box, {0, 1.01F, 0}, {1, 0, 0}).empty());
-  // Looking away the interval lies behind the origin.
+  // In the opposite direction, the interval is behind the origin.
   CHECK(intersect(box, {0, 0, 0}, {-1, 0, 0}).leave < 0);
 }
 
@@ -67,7 +67,7 @@ TEST_CASE("a ray meets an ellipsoid") {
   CHECK(intersect(ball, {-4, 2.01F, 0}, {1, 0, 0}).empty());
 }
 
-TEST_CASE("a moved primitive is met as if the ray had been moved back") {
+TEST_CASE("a moved primitive gives the intersection of a ray that is moved back") {
   const Primitive ball = make_primitive(Shape::kEllipsoid, kSolid, {0, 0, 0}, {1, 2, 3});
   // After a quarter turn the half axis of 2 points along -x.
   const Primitive moved = transformed({rotation_z(kPi / 2), {10, 0, 0}}, ball);
@@ -126,7 +126,7 @@ TEST_CASE("rays end where they cross the ground") {
                    static_cast<float>(std::cos(elevation) * std::sin(azimuth)),
                    static_cast<float>(std::sin(elevation))};
     const float t = terrain.cast(eye, ray, 100);
-    // Slow and obvious: the first of many small steps that is below the ground.
+    // Reference: the first of many small steps that is below the ground.
     float expected = -1;
     for (float s = 0; s < 100; s += 0.01F) {
       const Vec3 p = eye + s * ray;
@@ -141,19 +141,19 @@ TEST_CASE("rays end where they cross the ground") {
     hits += t > 0;
   }
   CHECK(hits > 100);
-  // A point above is missed, and the ray ends in time.
+  // A point above is not hit, and the search ends.
   CHECK(terrain.cast(eye, {0, 0, 1}, 100) < 0);
   CHECK(terrain.cast(eye, {0, 0, -1}, 1.9F) < 0);
   CHECK(terrain.cast(eye, {0, 0, -1}, 2.1F) == Approx(2).epsilon(1e-3));
 }
 
-TEST_CASE("streets, pavements and open ground are told apart") {
+TEST_CASE("streets, pavements and open ground have different classes") {
   Terrain terrain({}, {{Route({{-100, 0}, {0, 0}, {100, 0}}), 4, 2}}, Random(5));
   CHECK(terrain.label({0, 3.5}) == 40);
   CHECK(terrain.label({0, 4.6}) == 48);
   CHECK(terrain.label({0, -7}) == 72);
   CHECK(terrain.distance_to_street({3, 6}) == Approx(2).epsilon(1e-6));
-  // The pavement is a kerb higher than the edge of the street.
+  // The pavement is higher than the edge of the street by a kerb.
   CHECK(terrain.height({0.6, 4.8}) - terrain.height({0.6, 3.9}) > 0.08);
 }
 

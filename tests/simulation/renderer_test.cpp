@@ -12,7 +12,7 @@ namespace {
 
 const Material kSolid{50, 0.3F, 0, 0, 0, 0, 0};
 
-/// Every beam against every primitive, without any bounds.
+/// Tests every beam against every primitive, without any bounds.
 float nearest_by_force(const std::vector<Primitive>& primitives, Vec3 direction, float max_range) {
   float best = max_range;
   for (const Primitive& primitive : primitives) {
@@ -24,7 +24,7 @@ float nearest_by_force(const std::vector<Primitive>& primitives, Vec3 direction,
 
 }  // namespace
 
-TEST_CASE("drawing by solid angle finds what brute force finds") {
+TEST_CASE("rendering by solid angle gives the result of testing all pairs") {
   for (const Sensor sensor : {Sensor::kHdl64, Sensor::kOs0_128, Sensor::kLivox}) {
     BeamTable beams;
     beams.fill(sensor_model(sensor), 3, 7);
@@ -43,7 +43,7 @@ TEST_CASE("drawing by solid angle finds what brute force finds") {
                                            static_cast<float>(far * std::sin(azimuth)), up},
                                           {a, b, c}, rotation_z(turn) * rotation_x(tilt)));
     }
-    // One right above, and one across the seam at +-pi.
+    // One primitive straight above, and one across the seam at +-pi.
     primitives.push_back(make_primitive(Shape::kBox, kSolid, {0, 0, 6}, {8, 8, 0.2F}));
     primitives.push_back(make_primitive(Shape::kBox, kSolid, {-9, 0, 0}, {0.3F, 4, 2}));
     Renderer renderer;
@@ -62,7 +62,7 @@ TEST_CASE("drawing by solid angle finds what brute force finds") {
   }
 }
 
-TEST_CASE("nothing is seen behind a wall") {
+TEST_CASE("a wall hides everything behind it") {
   BeamTable beams;
   beams.fill(sensor_model(Sensor::kHdl64), 1, 0);
   Renderer renderer;

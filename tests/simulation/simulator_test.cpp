@@ -11,7 +11,7 @@ namespace dynains::simulation {
 
 namespace {
 
-/// FNV-1a over everything that reaches the disk.
+/// FNV-1a over all data that is written to disk.
 std::uint64_t hash_of(const SimulatedScan& scan) {
   std::uint64_t hash = 14695981039346656037ULL;
   auto add = [&hash](const void* data, std::size_t bytes) {
@@ -38,7 +38,7 @@ bool is_moving(std::uint32_t label) { return class_of(label) >= 252 && class_of(
 
 }  // namespace
 
-TEST_CASE("the same configuration gives the same bits, in any order of scans") {
+TEST_CASE("one configuration gives equal bits, in any order of scans") {
   const Config config = small(Scene::kUrban, Sensor::kVlp16, 4, 3);
   Simulator a(config), b(config);
   const std::uint64_t third = hash_of(b.scan(2));
@@ -73,7 +73,7 @@ TEST_CASE("every scene gives points with every sensor") {
   }
 }
 
-TEST_CASE("instant labels say who moves faster than half a metre per second") {
+TEST_CASE("instant labels are moving above half a metre per second") {
   for (const Scene scene : {Scene::kUrban, Scene::kStopAndGo, Scene::kCrowd}) {
     Config config = small(scene, Sensor::kVlp16, 40, 2);
     config.labelling = Labelling::kInstant;
@@ -98,7 +98,7 @@ TEST_CASE("instant labels say who moves faster than half a metre per second") {
   }
 }
 
-TEST_CASE("ever labels never change, and cover whoever moves at any time") {
+TEST_CASE("ever labels never change, and are moving if the object moves at any time") {
   Config config = small(Scene::kStopAndGo, Sensor::kVlp16, 80, 3);
   Simulator ever(config);
   config.labelling = Labelling::kInstant;
@@ -129,7 +129,7 @@ TEST_CASE("ever labels never change, and cover whoever moves at any time") {
   CHECK(stood_and_moved);
 }
 
-TEST_CASE("movers move as fast as they say") {
+TEST_CASE("movers have their stated speed") {
   Simulator simulator(small(Scene::kUrban, Sensor::kVlp16, 20, 7));
   std::size_t compared = 0;
   std::map<std::uint32_t, ObjectState> last;
@@ -163,14 +163,14 @@ TEST_CASE("nothing moves in the static scene") {
   CHECK(parked);
 }
 
-TEST_CASE("vehicles keep clear of one another and of the ego vehicle") {
+TEST_CASE("vehicles keep a distance from one another and from the ego vehicle") {
   for (const Scene scene : {Scene::kHighway, Scene::kHill, Scene::kStopAndGo}) {
     Simulator simulator(small(scene, Sensor::kVlp16, 60, 3));
     for (std::size_t i = 0; i < simulator.size(); i += 4) {
       const SimulatedScan scan = simulator.scan(i);
       for (const ObjectState& state : scan.objects) {
         if (class_of(state.label) == 254 || class_of(state.label) == 30) continue;
-        // Not even the middle of one lies within the rectangle of the other.
+        // The centre of one vehicle is outside the rectangle of the other.
         const Eigen::Vector3d ego =
             state.T_world_object.inverse() * scan.T_world_sensor.translation();
         CHECK_FALSE((std::abs(ego.x()) < state.length / 2 && std::abs(ego.y()) < state.width / 2));
@@ -197,7 +197,7 @@ TEST_CASE("points of an object lie within its box") {
     const Eigen::Vector3d p =
         state.T_world_object.inverse() *
         (scan.T_world_sensor * Eigen::Map<const Eigen::Vector3f>(&scan.xyzi[4 * i]).cast<double>());
-    // Limbs swing and noise adds; wheels may stand in a bump.
+    // Limbs swing, ranges are noisy, and wheels may stand in a bump.
     const bool in = std::abs(p.x()) < state.length / 2 + 0.45 &&
                     std::abs(p.y()) < state.width / 2 + 0.35 && p.z() > -0.3 &&
                     p.z() < state.height + 0.3;
@@ -207,14 +207,14 @@ TEST_CASE("points of an object lie within its box") {
   CHECK(outside <= inside / 500);
 }
 
-TEST_CASE("range noise has the asked deviation") {
+TEST_CASE("range noise has the configured deviation") {
   Config config = small(Scene::kStatic, Sensor::kVlp16, 1, 4);
   config.dropout = 0;
   config.range_noise = 0;
   const SimulatedScan exact = Simulator(config).scan(0);
   config.range_noise = 0.05;
   const SimulatedScan noisy = Simulator(config).scan(0);
-  // Without losses the same beams return, but for those at the end of the range.
+  // Without losses, equal beams return, except at the end of the range.
   double sum = 0, squares = 0;
   std::size_t count = 0;
   std::size_t j = 0;
@@ -234,7 +234,7 @@ TEST_CASE("range noise has the asked deviation") {
   CHECK(std::sqrt(squares / n) == Approx(0.05).margin(0.003));
 }
 
-TEST_CASE("poses are rigid, smooth and as noisy as asked") {
+TEST_CASE("poses are rigid and smooth, with the configured noise") {
   Config config = small(Scene::kHill, Sensor::kVlp16, 60, 2);
   config.pose_noise_translation = 0.03;
   config.pose_noise_rotation = 0.1;
@@ -265,7 +265,7 @@ TEST_CASE("poses are rigid, smooth and as noisy as asked") {
   CHECK(std::sqrt(rotation / n) * 57.29578 == Approx(0.1).epsilon(0.2));
 }
 
-TEST_CASE("the sensor stands at its height over the ground") {
+TEST_CASE("the sensor is at its height over the ground") {
   Config config = small(Scene::kStatic, Sensor::kHdl64, 1, 2);
   config.sensor_height = 2.2;
   const SimulatedScan scan = Simulator(config).scan(0);
@@ -276,7 +276,7 @@ TEST_CASE("the sensor stands at its height over the ground") {
       lowest = std::min(lowest, static_cast<double>(p[2]));
     }
   }
-  // The street may fall by a few percent; the usual 1.73 m is farther off.
+  // The street may fall by a few percent. The usual height of 1.73 m would be out of the margin.
   CHECK(lowest == Approx(-2.2).margin(0.35));
 }
 

@@ -27,7 +27,7 @@ struct LabelledScan {
 
 }  // namespace
 
-TEST_CASE("Points are counted by range, and a limit belongs to the bin behind it") {
+TEST_CASE("Points are counted by range, and a limit belongs to the upper bin") {
   LabelledScan scan;
   for (const float x : {4.9F, 5.0F, 9.9F, 15.0F, 79.0F, 80.0F, 200.0F, 300.0F}) {
     scan.add(x, 0.0F, 0.0F);
@@ -39,7 +39,7 @@ TEST_CASE("Points are counted by range, and a limit belongs to the bin behind it
   CHECK(statistics.points_per_scan() == 8);
 }
 
-TEST_CASE("A beam without return is no point, neither of a range nor of the ground") {
+TEST_CASE("A beam without return is not counted as a point") {
   LabelledScan scan;
   const float nan = std::numeric_limits<float>::quiet_NaN();
   scan.add(0.0F, 0.0F, 0.0F);
@@ -51,12 +51,12 @@ TEST_CASE("A beam without return is no point, neither of a range nor of the grou
   CHECK(statistics.ground_share() == 1.0);
   CHECK(statistics.range_shares()[2] == 1.0);
 
-  // Scans of nothing count as scans.
+  // Empty scans count as scans.
   statistics.add({}, {});
   CHECK(statistics.points_per_scan() == 0.5);
 }
 
-TEST_CASE("Labels are one per point, or none at all") {
+TEST_CASE("Labels are one per point, or none") {
   LabelledScan scan;
   scan.add(10.0F, 0.0F, -1.7F);
   scan.add(11.0F, 0.0F, -1.7F);
@@ -68,13 +68,13 @@ TEST_CASE("Labels are one per point, or none at all") {
   CHECK(statistics.moving_share() == 0.0);
 }
 
-TEST_CASE("Ground is what lies low around it and far below the sensor") {
+TEST_CASE("Ground is low in its surroundings and far below the sensor") {
   LabelledScan scan;
   scan.add(10.0F, 0.0F, -1.7F);    // ground
   scan.add(10.5F, 0.0F, -1.55F);   // ground: 0.15 m above it
   scan.add(10.5F, 0.5F, -1.4F);    // 0.3 m above it
   scan.add(30.0F, 0.0F, 1.0F);     // a roof, with nothing below it
-  scan.add(0.0F, 60.0F, 0.5F);     // ground of a hill: it may rise with the distance
+  scan.add(0.0F, 60.0F, 0.5F);     // ground of a hill: the limit rises with the distance
   scan.add(500.0F, 0.0F, -20.0F);  // beyond the range of the statistics
   ScanStatistics statistics;
   statistics.add(scan.xyzi, {});
@@ -82,7 +82,7 @@ TEST_CASE("Ground is what lies low around it and far below the sensor") {
   CHECK(statistics.moving_share() == 0.0);
 }
 
-TEST_CASE("The points of a car are the median over the cars about as far away") {
+TEST_CASE("The points of a car are the median over the cars at about its distance") {
   ScanStatistics statistics;
   LabelledScan first;
   first.add_car(9.0F, 70, kCar, 1);

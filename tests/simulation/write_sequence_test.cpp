@@ -10,7 +10,7 @@ namespace dynains::simulation {
 
 namespace {
 
-/// A folder of its own that goes away again.
+/// A temporary folder, which is removed at the end.
 struct Folder {
   std::filesystem::path path;
   explicit Folder(const char* name) : path(std::filesystem::temp_directory_path() / name) {
@@ -29,7 +29,7 @@ Config three_scans() {
 
 }  // namespace
 
-TEST_CASE("a written sequence reads back") {
+TEST_CASE("a written sequence is read back") {
   const Folder folder("dynains_simulated_sequence");
   Simulator simulator(three_scans());
   std::size_t calls = 0;
@@ -64,7 +64,7 @@ TEST_CASE("a stopped sequence has no poses") {
   CHECK_FALSE(std::filesystem::exists(folder.path / "poses.txt"));
 }
 
-TEST_CASE("a folder that cannot be made is an error") {
+TEST_CASE("a folder that cannot be created is an error") {
   Simulator simulator(three_scans());
   CHECK_THROWS_AS(write_sequence(simulator, "/dev/null/sequence"), IoError);
 }

@@ -1,4 +1,4 @@
-// A map that counts the points it is given, and lets go of none.
+// A map that counts inserted points and cannot remove any.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -1,4 +1,4 @@
-// Random numbers that are the same with every standard library.
+// Random numbers that are equal for all standard libraries.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,8 +19,8 @@ class Random {
     return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1p-53;
   }
   float uniform_float(double low, double high) { return static_cast<float>(uniform(low, high)); }
-  /// Uniform in a box, coordinate by coordinate: the order in which a compiler evaluates the
-  /// arguments of one call is its own.
+  /// Uniform in a box. Draws the coordinates one by one, because the order in which function
+  /// arguments are evaluated is unspecified.
   Eigen::Vector3d vector(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
     Eigen::Vector3d result;
     for (int i = 0; i < 3; ++i) result[i] = uniform(low[i], high[i]);

@@ -36,8 +36,8 @@ struct Verdict {
 };
 
 struct Run {
-  std::vector<Verdict> newest;  // as known at once
-  std::vector<Verdict> final;   // in the order in which they were given out
+  std::vector<Verdict> newest;  // verdicts without latency
+  std::vector<Verdict> final;   // in the order of their calls
 };
 
 template <class Stages>
@@ -61,8 +61,8 @@ inline Run run_paper(const std::vector<Scan>& scans) {
   return run(DynaInsRemover::Config::paper(), scans);
 }
 
-/// Points of one object (all objects if `object` is kAnyObject), and how many of them carry a
-/// label.
+/// Number of points of one object (all objects if `object` is kAnyObject), and number of them with
+/// a label.
 inline constexpr int kAnyObject = -2;
 struct Share {
   std::size_t labelled = 0;
@@ -85,7 +85,7 @@ inline Share share(const std::vector<Scan>& scans, const std::vector<Verdict>& v
   return result;
 }
 
-/// Share of points on which two runs disagree.
+/// Share of points with different labels in two runs.
 inline double disagreement(const std::vector<Verdict>& a, const std::vector<Verdict>& b) {
   std::size_t different = 0;
   std::size_t total = 0;

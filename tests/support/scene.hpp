@@ -1,4 +1,4 @@
-// A small world of boxes on a plane, scanned by rays: scenes in which the right answer is obvious.
+// A small world of boxes on a plane, scanned by rays: scenes with known truth.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -16,7 +16,7 @@ namespace dynains::test {
 inline constexpr int kGroundObject = -1;
 inline constexpr double kSensorHeight = 1.723;  // m, the default of GroundSegmenter::Config
 
-/// Axis-aligned in the world; where it stands at time 0, and how it moves (m, m/s).
+/// Axis-aligned box: its place at time 0 and its velocity (m, m/s).
 struct Box {
   Eigen::Vector3d low, high;
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
@@ -97,7 +97,7 @@ inline Eigen::Isometry3d sensor_at(double x, double y = 0.0, double yaw = 0.0) {
   return T;
 }
 
-/// `count` scans at 10 Hz along x at `speed` (m/s), the sensor turned by `yaw` (rad).
+/// `count` scans at 10 Hz along x at `speed` (m/s). The sensor is turned by `yaw` (rad).
 inline std::vector<Scan> drive(const Scene& scene, int count, double speed, double yaw = 0.0) {
   std::vector<Scan> scans;
   for (int i = 0; i < count; ++i) {
@@ -106,7 +106,7 @@ inline std::vector<Scan> drive(const Scene& scene, int count, double speed, doub
   return scans;
 }
 
-/// Two rows of pillars along x, nearer than 25 m, a free lane between them.
+/// Two rows of pillars along x, nearer than 25 m, with a free lane between them.
 inline Scene yard() {
   Scene scene;
   for (const double x : {-8.0, 0.0, 8.0, 16.0}) {

@@ -19,14 +19,14 @@ inline std::vector<simulation::SimulatedScan> simulate(const simulation::Config&
   return scans;
 }
 
-/// By scan: whether each point is static.
+/// For each scan and point, whether the point is static.
 using StaticPoints = std::vector<std::vector<std::uint8_t>>;
 
 struct StaticByVerdict {
   StaticPoints newest, final;
 };
 
-/// The remover takes the poses moved by `T_moved_world`.
+/// All poses are multiplied by `T_moved_world` from the left.
 inline StaticByVerdict static_points(
     const std::vector<simulation::SimulatedScan>& scans, const DynaInsRemover::Config& config = {},
     const Eigen::Isometry3d& T_moved_world = Eigen::Isometry3d::Identity()) {

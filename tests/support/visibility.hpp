@@ -1,4 +1,4 @@
-// What a reference saw, written down sample by sample.
+// Visibility bits of a reference, given sample by sample.
 #pragma once
 
 #include <cstddef>

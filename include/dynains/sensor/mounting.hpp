@@ -140,7 +140,9 @@ class MountingEstimator {
   // sample. Empty if there are fewer points than kFewestCells.
   static std::vector<Eigen::Vector3d> thin(PointsView points) {
     std::size_t near = 0;
-    for (std::size_t i = 0; i < points.size(); ++i) near += is_near(points, i) ? 1U : 0U;
+    for (std::size_t i = 0; i < points.size() && near < kFewestCells; ++i) {
+      if (is_near(points, i)) ++near;
+    }
     if (near < kFewestCells) return {};
     constexpr auto kHalf = static_cast<std::int32_t>(kMaxDistance / kCell);
     constexpr std::size_t kWidth = 2 * static_cast<std::size_t>(kHalf);

@@ -1,6 +1,6 @@
-// Reads scans, writes the final labels of their points, one byte each. Built with and without fused
-// multiply-add and AVX2, so that all can be compared. Exits with 77 where the processor lacks what
-// it was built with.
+// Reads scans and writes the final labels of their points, one byte each. It is built with and
+// without fused multiply-add and AVX2, and the tests compare the outputs. Exits with 77 if the
+// processor lacks a feature of the build.
 #include <cstdint>
 #include <fstream>
 #include <vector>

@@ -1,2 +1,2 @@
-// The program where the library is missing.
+// Program for the case that the library is missing.
 int main() { return 0; }

@@ -1,4 +1,4 @@
-// The compiled remover: this unit sees its declaration alone.
+// The compiled remover. This unit includes its declaration only.
 #include <cstddef>
 #include <vector>
 

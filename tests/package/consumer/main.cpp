@@ -1,4 +1,4 @@
-// A first program of a consumer: a few scans of a static street.
+// A minimal program: a few scans of a static street.
 #include <cmath>
 #include <cstddef>
 #include <cstdio>

@@ -1,4 +1,4 @@
-// What the shim writes down of a program, and how tests read it.
+// Format of the log that the shim writes, and a reader for it.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +21,7 @@ enum class Event : std::uint8_t {
   kMakeFolder,  ///< path
   kRemove,      ///< path, a file or an empty folder
   kSync,        ///< descriptor
-  kSyncAll,     ///< file system of descriptor; all of them if that is -1
+  kSyncAll,     ///< file system of descriptor; all file systems if it is -1
   kFault,       ///< a call on path was made to fail
 };
 

@@ -1,4 +1,4 @@
-// Starts the program with the shim before it.
+// Starts the program with the shim preloaded.
 #pragma once
 
 #include <cstdlib>
@@ -13,7 +13,7 @@
 
 namespace dynains::test {
 
-/// Variables that processes started meanwhile inherit.
+/// Sets variables that processes inherit if they start during its life.
 class Environment {
  public:
   explicit Environment(std::map<std::string, std::string> variables)
@@ -30,7 +30,7 @@ class Environment {
   std::map<std::string, std::string> variables_;
 };
 
-/// `dynains ARGUMENTS`; ended by SIGALRM (exit code 142) if it hangs.
+/// Runs `dynains ARGUMENTS`. SIGALRM ends a program that hangs (exit code 142).
 inline Outcome start_or_stop(const std::vector<std::string>& arguments) {
   return start(arguments, [] { ::alarm(20); });
 }
@@ -40,7 +40,8 @@ struct Recorded {
   std::vector<shim::Entry> events;
 };
 
-/// `dynains ARGUMENTS`, and what it did below `root`. `fault` as in shim.cpp; empty: none.
+/// Runs `dynains ARGUMENTS` and records its changes below `root`. `fault` as in shim.cpp; empty:
+/// none.
 inline Recorded start_with_shim(const std::vector<std::string>& arguments, const std::string& root,
                                 const std::string& fault = {}) {
   const TemporaryFolder folder;

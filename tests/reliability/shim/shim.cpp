@@ -1,6 +1,6 @@
-// Preloaded into a program (LD_PRELOAD, glibc), stands between it and the calls that touch files.
+// Preloaded into a program (LD_PRELOAD, glibc), intercepts the calls that touch files.
 //
-// DYNAINS_SHIM_ROOT  folder: calls on anything outside it pass unseen
+// DYNAINS_SHIM_ROOT  folder: calls on paths outside it are not intercepted
 // DYNAINS_SHIM_LOG   file: every change below the root is appended, in one order for all threads
 // DYNAINS_SHIM_FAULT "CALL N ERRNO once|on": the Nth CALL below the root fails, or it and all later
 //                    ones. ERRNO 0 means that read and write move half the bytes. CALL is open,
@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 using dynains::shim::Entry;
 using dynains::shim::Event;
 
-/// The function of that name which the shim hides.
+/// The function of this name that the shim hides.
 template <class Function>
 Function* next(const char* name) {
   return reinterpret_cast<Function*>(::dlsym(RTLD_NEXT, name));
@@ -43,7 +43,7 @@ std::string environment(const char* name) {
   return value == nullptr ? std::string() : value;
 }
 
-/// What to do with a call.
+/// Treatment of a call.
 enum class Fate { kPass, kFail, kHalf };
 
 class Shim {
@@ -53,7 +53,7 @@ class Shim {
     const int flags = O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC;
     if (!log.empty()) {
       const int low = next<int(const char*, int, ...)>("open")(log.c_str(), flags, 0600);
-      log_ = ::fcntl(low, F_DUPFD_CLOEXEC, 500);  // the program's own numbers are as without a log
+      log_ = ::fcntl(low, F_DUPFD_CLOEXEC, 500);  // descriptors of the program are unchanged
       next<int(int)>("close")(low);
     }
     char call[16] = {};
@@ -78,7 +78,7 @@ class Shim {
     return below ? text : std::string();
   }
 
-  /// The path that the descriptor was opened by, if below the root; else empty.
+  /// The path that the descriptor was opened by if it is below the root, else empty.
   std::string below_root(int descriptor) const {
     const auto found = open_.find(descriptor);
     return found == open_.end() ? std::string() : found->second;
@@ -113,7 +113,7 @@ class Shim {
     listed_.erase(descriptor);
   }
 
-  /// Whether the system is asked: it gives many entries at once.
+  /// Whether this is the first readdir of the descriptor: only this one calls the system.
   bool is_first_entry(int descriptor) { return listed_.insert(descriptor).second; }
 
  private:
@@ -140,7 +140,7 @@ Shim& shim() {
   return *instance;
 }
 
-/// Held while a call is made and recorded: the log has one order.
+/// Held while a call is made and recorded, so that the log has one order.
 std::unique_lock<std::mutex> lock() {
   static std::mutex* const mutex = new std::mutex;
   return std::unique_lock<std::mutex>(*mutex);
@@ -166,7 +166,7 @@ FILE* open_stream(const char* path, const char* mode) {
   return stream;
 }
 
-/// Makes the call with all bytes, half of them, or not at all; records what was written.
+/// Makes the call with all bytes, with half of them, or not at all. Records the written bytes.
 template <class Call>
 ssize_t write_bytes(int descriptor, const char* data, size_t size, off_t offset, Call&& call) {
   const std::string whole = shim().below_root(descriptor);
