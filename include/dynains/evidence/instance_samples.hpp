@@ -20,7 +20,7 @@ namespace dynains::detail {
 /// for equal ranks. The last three bits of a rank are ignored.
 class SmallestK {
  public:
-  /// `most`: maximum number of numbers of a row, at least 1.
+  /// `most`: maximum size of a row, at least 1.
   explicit SmallestK(std::size_t most) : most_(most), pairs_per_row_((most + 1) / 2) {}
 
   /// Empties all rows.
@@ -32,7 +32,7 @@ class SmallestK {
     if (pairs_.size() < pairs) pairs_.resize(pairs + pairs / 8, kEmpty);
   }
 
-  /// Adds a number to a row; a full row loses its last number. Each key of the row becomes
+  /// Adds a number to a row; removes the last number of a full row. Each key of the row becomes
   /// min(key, max(new key, preceding key)). This insertion has no branch, because a branch would
   /// depend on every third point of a scan and would not be predictable.
   void add(std::size_t row, std::uint32_t rank, std::uint32_t number) {
@@ -49,10 +49,10 @@ class SmallestK {
     }
   }
 
-  /// Maximum number of numbers of a row.
+  /// Maximum size of a row.
   std::size_t most() const { return most_; }
 
-  /// Number of numbers of a row.
+  /// Size of a row.
   std::size_t count(std::size_t row) const {
     std::size_t count = 0;
     for (std::size_t k = 0; k < most_; ++k) count += key(row, k) < kNone ? 1 : 0;

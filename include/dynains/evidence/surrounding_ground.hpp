@@ -30,8 +30,9 @@ class SurroundingGround {
     forget();
   }
 
-  /// Replaces the ground points (m). The planes exclude points without a plane, and points that lie
-  /// `rise` (m) or more above the plane of all points, since these may belong to an object.
+  /// Replaces the ground points (m). The planes exclude points that lie `rise` (m) or more above
+  /// the plane of all points, since these may belong to an object, and points of cells without a
+  /// plane.
   void assign(PointsView points, float rise) {
     forget();
     for (std::size_t i = 0; i < points.size(); ++i) add(points, i, 1.0);
