@@ -1,6 +1,6 @@
-// Free-space evidence: a beam of another scan that passed through the place of a point shows that
-// the point belonged to a moving object. Free space finds places of motion; instances define the
-// points that are removed together. Goes beyond the paper, in the form of its belief (Eq. 15-19).
+// Free-space evidence: a point is dynamic if beams of other scans pass through its position. Free
+// space identifies single dynamic points; instances define the points that are removed together.
+// Goes beyond the paper, with beliefs in the form of Eq. 15-19.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -26,9 +26,9 @@
 
 namespace dynains {
 
-/// Tests samples of each scan against the range images of reference scans before and after it. Sums
-/// the results as log-odds per supervoxel and per instance, separately for both sides of time, and
-/// propagates them along instances that overlap from scan to scan.
+/// Tests the samples of each scan against the range images of reference scans before and after it.
+/// Sums the results as log-odds by supervoxel and by instance, separately for the past and the
+/// future, and propagates the log-odds along tracks of instances.
 class FreeSpaceEvidence {
  public:
   using Config = FreeSpaceConfig;
@@ -58,37 +58,37 @@ class FreeSpaceEvidence {
 
   const Config& config() const { return config_; }
 
-  /// Scans until a verdict is final.
+  /// Number of later scans after which a verdict is final.
   std::size_t lookahead_scans() const { return static_cast<std::size_t>(config_.lookahead_scans); }
 
-  /// Sets the sensor. Call it before the first scan, and again when more is known of the sensor.
+  /// Sets the sensor. Call it before the first scan, and after each new estimate of the sensor.
   void adapt(const SensorModel& sensor) {
     references_.adapt(sensor);
     moved_ground_.adapt(sensor);
   }
 
-  /// Allows judge() for the last `scans` scans before the newest, if these are more than
+  /// Extends judge() to the last `scans` scans before the newest; no effect if `scans` is below
   /// lookahead_scans(). Call it before the first scan.
   void keep(std::size_t scans) { records_.resize(std::max(records_.size(), scans + 2)); }
 
-  /// Allocates memory for `scans` scans, or for as many as are kept: images for the sensor of
-  /// adapt(), and records for scans of the size of those already observed. Observed scans are lost:
-  /// call it before scan 0.
+  /// Allocates memory for `scans` scans: images for the sensor of adapt(), and records for scans of
+  /// the size of the scans already observed. Discards the observed scans, so call it before scan 0.
   void reserve(std::size_t scans) {
     references_.reserve(scans);
     const auto largest =
         std::max_element(records_.begin(), records_.end(), [](const Record& a, const Record& b) {
           return a.evidence.samples.size() < b.evidence.samples.size();
         });
-    // A copy has no spare capacity, and scans of one sensor differ a little.
+    // Some spare capacity, since a copy has none and scans of one sensor differ in size.
     Record roomy = *largest;
     std::vector<std::uint32_t>& by_point = roomy.evidence.samples.met_of;
     by_point.resize(by_point.size() + by_point.size() / 8);
     for (std::size_t i = 0; i < std::min(scans, records_.size()); ++i) records_[i] = roomy;
   }
 
-  /// Adds scan number `scan`; scans come in order, from 0, and are compared within one `epoch`.
-  /// `instance_of`: by non-ground point of `split`, below `instance_count` or kNoCluster.
+  /// Adds a scan. `scan`: its number, consecutive from 0; 0 discards all earlier scans. `epoch`:
+  /// only scans of one epoch are compared. `T_world_sensor`: rigid, pose of the frame of `split`.
+  /// `instance_of`: by non-ground point of `split`, instance below `instance_count`, or kNoCluster.
   void observe(std::uint64_t scan, std::uint64_t epoch, const Eigen::Isometry3d& T_world_sensor,
                const GroundSplit& split, Span<const std::uint32_t> instance_of,
                std::size_t instance_count) {
@@ -107,10 +107,10 @@ class FreeSpaceEvidence {
     propagate_beliefs(scan);
   }
 
-  /// Verdict on a scan that is at most lookahead_scans() behind the newest (or see keep()), by the
-  /// evidence so far. A final verdict has no presumed instances. `split`: that of the scan. The
-  /// spans hold until the next call. The first verdict on the newest scan makes it a reference, if
-  /// its number is that of a reference.
+  /// Verdict on scan number `scan` by the evidence of all observed scans. The scan is at most
+  /// lookahead_scans(), or the argument of keep(), scans before the newest. `is_final`: no presumed
+  /// instances. `split`: points of the scan, as in observe(). The spans are valid until the next
+  /// call. The first verdict on the newest scan also makes its range image, if it is a reference.
   EvidenceVerdict judge(std::uint64_t scan, bool is_final, const GroundSplit& split) {
     Record& record = record_of(scan);
     judge_instances(scan, is_final, record);
@@ -126,14 +126,14 @@ class FreeSpaceEvidence {
     return {groups_, samples.met_of, find_moved_ground(scan, record, split.ground())};
   }
 
-  /// Visibility of the first `count` points (m; padded for packs) from the newest reference,
-  /// one of the last `reference_step` scans.
+  /// Visibility of the first `count` points (m; padded for packs) from the newest reference, which
+  /// is one of the last `reference_step` scans. The result is valid until the next call.
   const detail::Visibility& test_visibility(const PointBuffer& points, std::size_t count,
                                             const Eigen::Isometry3d& T_world_points) {
     return references_.test(points, count, T_world_points, references_.newest());
   }
 
-  /// By instance of the newest scan: its number in the scan before, or kNoCluster.
+  /// By instance of the newest scan: the linked instance of the scan before it, or kNoCluster.
   Span<const std::uint32_t> predecessors() const { return predecessors_; }
 
  private:
@@ -145,7 +145,7 @@ class FreeSpaceEvidence {
     ReferencePhase phase;
     InstanceEvidence evidence;
     std::vector<DynamicOccupancyGrid::Count> counted;  // by supervoxel
-    std::vector<GroundBox> ground_boxes;               // by 64 ground points
+    std::vector<GroundBox> ground_boxes;               // by block of 64 ground points
   };
 
   void forget_scans() {
@@ -194,7 +194,7 @@ class FreeSpaceEvidence {
     return references_.find(scan, record.epoch, record.phase, lag);
   }
 
-  // Tests all samples of a scan against one reference. `lag`: scans from the samples to it.
+  // Tests all samples of a scan against one reference. `lag`: scans from the scan to the reference.
   void test(Record& record, const ReferenceScan& reference, int lag) {
     InstanceEvidence& evidence = record.evidence;
     const detail::Visibility& visibility = references_.test(
@@ -207,14 +207,14 @@ class FreeSpaceEvidence {
     });
   }
 
-  // Scans from a new image to the tests of the older scans of a phase against it. Each phase has
-  // another delay, for an even load. Scans of phase 0 wait for the next scan, since making the
-  // image is work enough for one scan.
+  // Delay (scans) between a new image and the tests of the older scans of a phase against it. The
+  // phases have different delays, which distributes the work over the scans. The delay of phase 0
+  // is one scan, since the scan of phase 0 already makes the image.
   std::uint64_t delay_of(std::uint64_t phase) const {
     return phase == 0 && config_.reference_step > 1 ? 1 : phase;
   }
 
-  // Tests older scans, those of the phases with this delay, against the newest image.
+  // Tests older scans of the phases with this delay against the newest image.
   void test_older_scans(std::uint64_t delay) {
     if (references_.awaits_image()) return;
     for (std::uint64_t phase = 0; phase < lags_before_.size(); ++phase) {
@@ -243,7 +243,8 @@ class FreeSpaceEvidence {
     }
   }
 
-  // Propagates beliefs along tracks through all scans that are still open, forward and backward.
+  // Propagates beliefs along tracks through all scans without a final verdict, forward and
+  // backward.
   void propagate_beliefs(std::uint64_t newest) {
     if (!config_.use_tracks) return;
     const std::uint64_t open = std::min<std::uint64_t>(newest, lookahead_scans());
@@ -270,7 +271,7 @@ class FreeSpaceEvidence {
                  [&](std::size_t instance) { add_hull(record.evidence, instance); });
   }
 
-  // The ground below a compact instance that is removed as a whole.
+  // Adds the ground below a compact instance that is removed as a whole.
   void add_hull(const InstanceEvidence& evidence, std::size_t instance) {
     constexpr float kLeastHeight = 0.3F;  // m
     if (!config_.use_tracks) return;
@@ -283,13 +284,13 @@ class FreeSpaceEvidence {
   }
 
   void judge_by_dynamic_grid(std::uint64_t scan, Record& record) {
-    if (scan < epoch_begin_) return;  // its cells lay in the frame of another epoch
+    if (scan < epoch_begin_) return;  // the grid has the origin frame of the newest epoch
     dynamic_grid_.judge(scan, record.evidence.samples,
                         detail::composed(T_origin_world_, record.T_world_sensor), record.counted,
                         verdicts_);
   }
 
-  // Makes the image of the newest scan.
+  // Makes the range image of the newest scan.
   void make_reference(const Record& record, const GroundSplit& split) {
     is_moving_.clear();
     if (config_.ignore_dynamic_returns) find_moving_points(record.evidence);
@@ -338,17 +339,17 @@ class FreeSpaceEvidence {
   InstanceJudge judge_;
   DynamicOccupancyGrid dynamic_grid_;
   MovedGround moved_ground_;
-  // `origin`: the first sensor of the epoch. Cells of tracks and of the dynamic occupancy grid lie
-  // in that frame, so that they do not depend on the world frame.
+  // The origin frame is the sensor frame of the first scan of the epoch. It is the frame of the
+  // cells of tracks and of the dynamic occupancy grid, which thus do not depend on the world frame.
   Eigen::Isometry3d T_origin_world_ = Eigen::Isometry3d::Identity();
-  std::uint64_t epoch_begin_ = 0;  // first scan of the epoch of the newest
+  std::uint64_t epoch_begin_ = 0;  // first scan of the epoch of the newest scan
   std::uint64_t newest_ = 0;
-  std::vector<std::vector<int>> lags_before_, lags_after_;  // by phase, scans to the references
-  std::vector<Record> records_;
-  std::vector<Verdict> verdicts_;              // by supervoxel
-  std::vector<Verdict> groups_;                // by position in InstanceSamples::met
-  std::vector<std::uint8_t> is_moving_group_;  // by position in InstanceSamples::met
-  std::vector<std::uint8_t> is_moving_;        // by non-ground point
+  std::vector<std::vector<int>> lags_before_, lags_after_;  // by phase: scans to the references
+  std::vector<Record> records_;                             // ring buffer, by scan number
+  std::vector<Verdict> verdicts_;                           // by supervoxel
+  std::vector<Verdict> groups_;                             // by index in InstanceSamples::met
+  std::vector<std::uint8_t> is_moving_group_;               // by index in InstanceSamples::met
+  std::vector<std::uint8_t> is_moving_;                     // by non-ground point
   std::vector<std::uint32_t> predecessors_;
 };
 

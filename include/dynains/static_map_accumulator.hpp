@@ -1,4 +1,4 @@
-// The static map (Eq. 1): measured points in the world frame, thinned to one point per voxel.
+// Static map (Eq. 1): measured points in the world frame, at most one per voxel.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -20,12 +20,13 @@
 
 namespace dynains {
 
-/// Sparse voxel map that keeps the first measured point of each voxel, never a voxel centre.
+/// Sparse voxel map. It stores the first measured point of each voxel, not the centre of the voxel.
 ///
-/// Voxels are grouped in blocks of 8 x 4 x 2, flat as the ground is, whose occupancy is one word.
-/// Points are floats relative to the corner of their block: their precision does not depend on the
-/// distance from the world origin. Stored points never move, and the table of blocks grows bucket
-/// by bucket: no frame pays for the growth of the map.
+/// Voxels are grouped in flat blocks of 8 x 4 x 2, because the ground is flat; the occupancy of a
+/// block is one word. Points are stored in single precision relative to the corner of their block,
+/// so their precision does not depend on the distance from the world origin. Stored points never
+/// move in memory, and the table of blocks grows bucket by bucket, so the time of an insertion does
+/// not grow with the map.
 class StaticMapAccumulator {
  public:
   struct Config {
@@ -57,12 +58,14 @@ class StaticMapAccumulator {
 
   const Config& config() const { return config_; }
 
-  /// Adds the points of one scan (m, sensor frame) whose `keep` flag, by point, is not zero; an
-  /// empty `keep` adds all. The first point of a voxel stays. `T_world_sensor`: translation within
-  /// kMaxTranslation. Throws std::length_error beyond 2^32 - 2 points, and std::bad_alloc.
+  /// Adds points of one scan. `points`: m, sensor frame. `keep`: by point, 0 for points to ignore;
+  /// an empty `keep` adds all points. A voxel with a point ignores further points.
+  /// `T_world_sensor`: rigid, translation within kMaxTranslation. Throws std::length_error beyond
+  /// 2^32 - 2 points, and std::bad_alloc.
   void insert(PointsView points, Span<const std::uint8_t> keep,
               const Eigen::Isometry3d& T_world_sensor) {
-    // Floats relative to a corner next to the sensor, an exact multiple of all block edges.
+    // Transforms to a corner next to the sensor, an exact multiple of all block edges, so that
+    // single precision is sufficient.
     const double step = voxel_ * kLongestBlock;
     Eigen::Isometry3d T_corner_sensor = T_world_sensor;
     std::int32_t first_block[3];
@@ -97,20 +100,20 @@ class StaticMapAccumulator {
     free_ = kNone;
   }
 
-  /// Bytes held by the map, its index included.
+  /// Memory of the map, including its index, bytes.
   std::size_t memory_bytes() const {
     return points_.memory_bytes() + blocks_.memory_bytes() + recent_.size() * sizeof(recent_[0]);
   }
 
-  /// Calls `visit(Eigen::Vector3d)` for every point, in metres, world frame.
+  /// Calls `visit(Eigen::Vector3d)` for every point (m, world frame).
   template <class Visitor>
   void for_each(Visitor&& visit) const {
     for (std::uint32_t block = 0; block < blocks_.size(); ++block) visit_block(block, visit);
   }
 
-  /// Calls `visit(Eigen::Vector3d)` for every point inside `box` (m, world frame, borders
-  /// included). Takes time for each block that fits into the box, or for each block of the map if
-  /// these are fewer.
+  /// Calls `visit(Eigen::Vector3d)` for every point (m, world frame) inside `box` (m, world frame,
+  /// borders included). The cost is proportional to the number of possible blocks in the box, or to
+  /// the number of blocks of the map if this is smaller.
   template <class Visitor>
   void for_each_in(const Eigen::AlignedBox3d& box, Visitor&& visit) const {
     if (box.isEmpty()) return;
@@ -134,22 +137,23 @@ class StaticMapAccumulator {
     }
   }
 
-  /// Number of blocks; they are numbered in the order of their first points.
+  /// Number of blocks. Blocks are numbered in the order of their first points.
   std::uint32_t block_count() const { return blocks_.size(); }
-  /// The lowest corner of a block, in metres, world frame. `block`: below block_count(), here and
-  /// below.
+  /// The lowest corner (m, world frame) of a block; `block` is below block_count().
   Eigen::Vector3d block_corner(std::uint32_t block) const {
     const BlockIndex& index = blocks_[block].index;
     return {index.x * block_size(0), index.y * block_size(1), index.z * block_size(2)};
   }
-  /// Calls `visit(x, y, z)` for every point of a block, in metres from its corner.
+  /// Calls `visit(x, y, z)` for every point of a block (m, relative to its lowest corner); `block`
+  /// is below block_count().
   template <class Visitor>
   void visit_in_block(std::uint32_t block, Visitor&& visit) const {
     for (std::uint32_t i = blocks_[block].data.first; i != kNone; i = points_[i].next) {
       visit(points_[i].x, points_[i].y, points_[i].z);
     }
   }
-  /// Removes all points of a block; its voxels can be filled again.
+  /// Removes all points of a block; later points can fill its voxels again. `block` is below
+  /// block_count().
   void erase_block(std::uint32_t block) {
     BlockContent& content = blocks_[block].data;
     const std::uint32_t first = content.first;
@@ -170,20 +174,20 @@ class StaticMapAccumulator {
 
   struct Point {
     float x, y, z;       // m, relative to the corner of the block
-    std::uint32_t next;  // in the block; kNone behind the last
+    std::uint32_t next;  // next point of the block, or kNone
   };
 
   struct BlockContent {
-    std::uint64_t occupied;  // a bit per voxel
-    std::uint32_t first;     // point
+    std::uint64_t occupied;  // one bit per voxel
+    std::uint32_t first;     // first point of the block, or kNone
   };
 
-  // Direct-mapped cache of blocks by the low bits of their indices, which repeat every 51.2 m (6.4
-  // m in height) at voxels of 0.2 m: neighbouring points fall into few blocks.
+  // Size of recent_, a direct-mapped cache of block numbers by the low bits of block indices. With
+  // voxels of 0.2 m, these bits repeat every 51.2 m, and every 6.4 m in height.
   static constexpr std::size_t kRecent = std::size_t{32} * 64 * 16;
 
-  // Consecutive points of a scan. Blocks and voxels begin at index kFirst, so that each point has a
-  // predecessor.
+  // Consecutive points of a scan. `block` and `voxel` begin at index kFirst, so that each point has
+  // a predecessor.
   static constexpr std::size_t kBatch = 512;
   struct Batch {
     static constexpr std::size_t kFirst = detail::kMaxPackWidth;
@@ -202,7 +206,7 @@ class StaticMapAccumulator {
   // Edge of a block along an axis, m.
   double block_size(int axis) const { return voxel_ * kBlockVoxels[axis]; }
 
-  // The blocks from `first` to `last`, both included.
+  // Box of blocks from `first` to `last`, both included; `count`: number of its blocks.
   struct BlockRange {
     BlockIndex first, last;
     double count;
@@ -213,14 +217,14 @@ class StaticMapAccumulator {
     }
   };
 
-  // The blocks that may have points in a box.
+  // The blocks that may contain points of a box (m, world frame).
   BlockRange blocks_of(const Eigen::AlignedBox3d& box) const {
-    // Farther indices may not fit into 32 bits, and no block has them.
+    // Blocks have 32-bit indices; the indices of the box are clamped to this range.
     constexpr double kFarthest = std::numeric_limits<std::int32_t>::max() - 1;
     std::int32_t first[3], last[3];
     double count = 1.0;
     for (int axis = 0; axis < 3; ++axis) {
-      // Rounding to floats can put a point slightly outside of its block.
+      // Rounding to single precision can move a point slightly out of its block.
       const double slack = 1e-3 * block_size(axis);
       const double low = std::floor((box.min()(axis) - slack) / block_size(axis));
       const double high = std::floor((box.max()(axis) + slack) / block_size(axis));
@@ -231,8 +235,8 @@ class StaticMapAccumulator {
     return {{first[0], first[1], first[2]}, {last[0], last[1], last[2]}, count};
   }
 
-  // Finds blocks and voxels of `count` points of the scan, from `begin` on. `to_corner`: from the
-  // sensor frame to the corner of the block `corner`.
+  // Computes blocks and voxels of `count` points of the scan, from `begin` on. `to_corner`:
+  // transform from the sensor frame to the corner of the block `corner`.
   void locate(PointsView scan, std::size_t begin, std::size_t count,
               const detail::PackTransform& to_corner, const BlockIndex& corner,
               Batch& batch) const {
@@ -252,7 +256,7 @@ class StaticMapAccumulator {
       const Float x = at.load(points.x.data());
       const Float y = at.load(points.y.data());
       const Float z = at.load(points.z.data());
-      // The next batch is still in main memory.
+      // Prefetches the next batch from main memory.
       const std::size_t ahead = std::min(begin + at.begin + kBatch, scan.size() - 1);
       for (const auto& axis : {scan.x, scan.y, scan.z}) __builtin_prefetch(&axis[ahead]);
       Int voxel_in_block(0), recent(0);
@@ -275,7 +279,7 @@ class StaticMapAccumulator {
     });
   }
 
-  // Chooses the points with a `keep` flag, except those in the voxel of a kept predecessor. No
+  // Chooses the points with a `keep` flag, except points in the voxel of a kept predecessor. No
   // branch depends on a single point.
   void choose(std::size_t count, Span<const std::uint8_t> keep, Batch& batch) const {
     constexpr std::size_t kBefore = Batch::kFirst - 1;
@@ -328,7 +332,7 @@ class StaticMapAccumulator {
     }
   }
 
-  // Returns the index of the point; reuses those of erased points.
+  // Stores a point and returns its index; reuses the indices of erased points.
   std::uint32_t add_point(const Point& point) {
     std::uint32_t index = free_;
     if (index == kNone) {
@@ -357,8 +361,8 @@ class StaticMapAccumulator {
   std::size_t size_ = 0;
   detail::BlockTable<BlockContent> blocks_;
   detail::ChunkedVector<Point, 512> points_;
-  std::uint32_t free_ = kNone;         // index of the first erased point, a list by Point::next
-  std::vector<std::uint32_t> recent_;  // number of the block met last, or kNone
+  std::uint32_t free_ = kNone;         // first erased point; Point::next links the others
+  std::vector<std::uint32_t> recent_;  // by cache slot: number of the last block, or kNone
 };
 
 }  // namespace dynains

@@ -39,31 +39,31 @@ TEST_CASE("heights over a slope are derived from the ground around, whatever sta
   SurroundingGround ground(80.0);
   PointBuffer points = street_about(21.0F, -9.0F, 4.0F, kNothing);
   const auto off = [&] { return std::abs(ground.height(21.0F, -9.0F, street(21.0F, -9.0F))); };
-  ground.take(points, 0.03F);
+  ground.assign(points, 0.03F);
   CHECK(off() < 1e-4F);
   CHECK(ground.height(20.5F, -8.5F, street(20.5F, -8.5F) + 0.1F) == Approx(0.1F).margin(1e-4));
   CHECK(ground.height(20.5F, -8.5F, street(20.5F, -8.5F) - 0.1F) == Approx(-0.1F).margin(1e-4));
 
   for (int i = 0; i < 12; ++i) points.push_back(21.2F, -9.2F, street(21.2F, -9.2F) + 0.5F);
-  ground.take(points, kAnyRise);
+  ground.assign(points, kAnyRise);
   CHECK(off() > 0.03F);
-  ground.take(points, 0.1F);
+  ground.assign(points, 0.1F);
   CHECK(off() < 1e-4F);
 }
 
 TEST_CASE("too few points, or points on a line, do not define the plane of the ground") {
   SurroundingGround ground(80.0);
   PointBuffer points;
-  ground.take(points, 0.03F);
+  ground.assign(points, 0.03F);
   CHECK(ground.height(1.0F, 1.0F, 0.0F) == kUnknown);
 
   for (int i = 0; i < 7; ++i) {
     points.push_back(0.3F + static_cast<float>(i % 2) * 3.0F, 0.4F * static_cast<float>(i), 0.0F);
   }
-  ground.take(points, 0.03F);
+  ground.assign(points, 0.03F);
   CHECK(ground.height(1.0F, 1.0F, 0.0F) == kUnknown);
   points.push_back(3.3F, 0.0F, 0.0F);
-  ground.take(points, 0.03F);
+  ground.assign(points, 0.03F);
   CHECK(ground.height(1.0F, 1.0F, 0.25F) == Approx(0.25F).margin(1e-5));
 
   // Two lines: the variance across them is 0.4 m^2 at a distance of 1.265 m.
@@ -74,7 +74,7 @@ TEST_CASE("too few points, or points on a line, do not define the plane of the g
       lines.push_back(x, 0.5F, 0.0F);
       lines.push_back(x, 0.5F + apart, 0.0F);
     }
-    ground.take(lines, 0.03F);
+    ground.assign(lines, 0.03F);
     CAPTURE(apart);
     CHECK((ground.height(1.0F, 1.0F, 0.0F) == kUnknown) == (apart < 1.265F));
   }
@@ -86,7 +86,7 @@ TEST_CASE("points beyond the range of the ground around change nothing within") 
   for (const float far : {1e3F, -1e3F, 1e30F}) {
     for (int i = 0; i < 20; ++i) points.push_back(far, -far, far);
   }
-  ground.take(points, 0.03F);
+  ground.assign(points, 0.03F);
   CHECK(ground.height(5.0F, 5.0F, street(5.0F, 5.0F)) == Approx(0.0F).margin(1e-4));
   CHECK_NOTHROW(ground.height(-1e30F, 1e30F, 0.0F));
 }
@@ -141,7 +141,7 @@ TEST_CASE("heights equal those of a least-squares fit to points that do not rise
       all.emplace_back(static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
                        static_cast<double>(points.z[i]));
     }
-    ground.take(points, 0.03F);
+    ground.assign(points, 0.03F);
     std::vector<Eigen::Vector3d> kept;
     for (const Eigen::Vector3d& p : all) {
       const float over = reference_height(all, p);

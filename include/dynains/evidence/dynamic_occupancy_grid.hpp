@@ -1,4 +1,4 @@
-// Dynamic occupancy grid: places that moving objects pass. Goes beyond the paper.
+// Dynamic occupancy grid: world cells in which most samples are dynamic. Goes beyond the paper.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -15,15 +15,16 @@
 
 namespace dynains {
 
-/// Counts dynamic and static samples in cells of the world. In cells where nearly all samples are
-/// dynamic, the others are dynamic, too: in a crowd, people hide that a place became free, and the
-/// next hit at that key is another person.
+/// Counts dynamic and static samples per cell of the world. In cells where nearly all samples are
+/// dynamic, the remaining samples become dynamic, too. Reason: in a crowd, pedestrians occlude each
+/// other, so few reference scans have free samples, and later hits in a cell often come from
+/// another pedestrian.
 ///
-/// The number of cells is bounded: new cells replace those without samples for the longest time.
+/// The number of cells is bounded: a new cell replaces the cell with the oldest sample.
 class DynamicOccupancyGrid {
  public:
   using Verdict = EvidenceVerdict::Group;
-  /// How a supervoxel is counted.
+  /// Count in which the samples of a supervoxel are included.
   enum class Count : std::uint8_t { kNone, kStatic, kDynamic };
 
   explicit DynamicOccupancyGrid(const FreeSpaceConfig& config)
@@ -33,15 +34,16 @@ class DynamicOccupancyGrid {
         lines_(config.dynamic_grid_ratio < 1.0 ? kLines : 0),
         may_be_dynamic_(lines_.size()) {}
 
-  /// Removes all cells. Call it before the frame `origin` changes.
+  /// Removes all cells. Call it before the origin frame changes.
   void clear() {
     std::fill(lines_.begin(), lines_.end(), Line());
     std::fill(may_be_dynamic_.begin(), may_be_dynamic_.end(), false);
   }
 
-  /// Counts the verdicts of scan number `scan`, by supervoxel, instead of its former ones in
-  /// `counted`, and changes verdicts of static supervoxels in dynamic cells to kDynamicOccupancy.
-  /// `origin`: one frame near all scans.
+  /// Counts the samples of scan number `scan` by their verdicts, and changes verdicts of static
+  /// supervoxels in dynamic cells to kDynamicOccupancy. `counted`: by supervoxel, counts of the
+  /// preceding call for the scan, which this call replaces; kNone before the first call.
+  /// `verdicts`: by supervoxel. The origin frame is fixed until clear() and near all scans.
   void judge(std::uint64_t scan, const InstanceSamples& samples,
              const Eigen::Isometry3d& T_origin_sensor, std::vector<Count>& counted,
              std::vector<Verdict>& verdicts) {
@@ -66,22 +68,23 @@ class DynamicOccupancyGrid {
  private:
   struct Cell {
     VoxelKey key = 0;
-    std::uint32_t last_scan = 0;  // number of the latest scan with samples in it, from 1
+    std::uint32_t last_scan = 0;  // number of the latest scan with samples in the cell, plus 1
     std::uint16_t static_count = 0;
     std::uint16_t dynamic_count = 0;
   };
-  // One cache line of the processor.
+  // Cells that share one cache line.
   struct alignas(64) Line {
     std::array<Cell, 4> cells;
   };
 
   static constexpr std::size_t kLines = 1U << 15;
-  static constexpr std::uint16_t kMaxCount = 1000;      // then all counts are halved
-  static constexpr std::uint16_t kLeastDynamic = 3;     // samples
-  static constexpr std::uint32_t kPart = 4;             // one of so many samples in dynamic cells
+  static constexpr std::uint16_t kMaxCount = 1000;   // total at which both counts are halved
+  static constexpr std::uint16_t kLeastDynamic = 3;  // dynamic samples of a dynamic cell
+  // A supervoxel is dynamic if one of kSamplesPerDynamic samples lies in dynamic cells.
+  static constexpr std::uint32_t kSamplesPerDynamic = 4;
   static constexpr std::size_t kPrefetchDistance = 32;  // samples
 
-  // Presumed instances have no evidence of motion.
+  // Presumed instances are not counted: they have no evidence of motion.
   static Count count_of(Cause cause) {
     if (cause == Cause::kPresumed) return Count::kNone;
     return is_dynamic(cause) ? Count::kDynamic : Count::kStatic;
@@ -89,7 +92,7 @@ class DynamicOccupancyGrid {
 
   static std::size_t line_of(VoxelKey key) { return voxel_hash(key) >> 8 & (kLines - 1); }
 
-  // The cell of a key if a scan of the lookback interval has samples in it.
+  // The cell of a key; null if it has no samples of the last lookback scans.
   const Cell* find(VoxelKey key, std::uint32_t now) const {
     for (const Cell& cell : lines_[line_of(key)].cells) {
       if (cell.key == key) return age(cell, now) <= lookback_scans_ ? &cell : nullptr;
@@ -97,7 +100,7 @@ class DynamicOccupancyGrid {
     return nullptr;
   }
 
-  // The cell of a key; a new one replaces the oldest of its line.
+  // The cell of a key; a new cell replaces the oldest cell of its line.
   Cell& cell_for(VoxelKey key, std::uint32_t now) {
     Line& line = lines_[line_of(key)];
     for (Cell& cell : line.cells) {
@@ -117,7 +120,7 @@ class DynamicOccupancyGrid {
     return oldest;
   }
 
-  // Scans since its last sample; negative if a later scan has samples in it.
+  // Scans since the last sample of the cell; negative if a later scan has samples in it.
   static std::int32_t age(const Cell& cell, std::uint32_t now) {
     return static_cast<std::int32_t>(now - cell.last_scan);
   }
@@ -155,7 +158,7 @@ class DynamicOccupancyGrid {
       ++inside;
       highest = std::max(highest, ratio);
     }
-    if (inside == 0 || kPart * inside < end - begin) return;
+    if (inside == 0 || kSamplesPerDynamic * inside < end - begin) return;
     verdict = {Cause::kDynamicOccupancy, std::max(verdict.belief, highest)};
   }
 
@@ -163,8 +166,8 @@ class DynamicOccupancyGrid {
   float ratio_;
   std::int32_t lookback_scans_;
   std::vector<Line> lines_;
-  // By line: whether any of its cells may be dynamic. Few are, so that most samples need no access
-  // to their cell.
+  // By line: whether any of its cells may be dynamic. Few lines have such cells, so most samples
+  // need no access to their cell.
   std::vector<bool> may_be_dynamic_;
   std::vector<VoxelKey> keys_;  // by sample
 };

@@ -1,4 +1,4 @@
-// Finds the ground points below or beside removed points.
+// Search for ground points below or beside removed points.
 #pragma once
 
 #include <algorithm>
@@ -15,14 +15,14 @@
 
 namespace dynains {
 
-/// Largest height above the ground at which the lowest return of an object on it may lie: `least`
-/// (m), or `slope` (m per m of horizontal range), which follows the gap between beams.
+/// Largest height above the ground of the lowest return of an object that stands on it: the greater
+/// of `least` and `slope` * horizontal range. The gap between two beams defines `slope`.
 struct Clearance {
-  float least;
-  float slope;
+  float least;  ///< m
+  float slope;  ///< m per m
 };
 
-/// First and last columns and rows of some points in the two grids of a footprint.
+/// Bounding box of points in the two grids of a footprint: first and last columns and rows.
 struct GroundBox {
   struct Range {
     std::uint16_t first, last;
@@ -31,20 +31,21 @@ struct GroundBox {
   Range tile_columns, tile_rows;
 };
 
-/// Horizontal grid around the sensor with the lowest removed point per cell, and a coarse grid that
-/// finds the points near removed points.
+/// Two horizontal grids around the sensor: a fine one with the height of the lowest removed point
+/// per cell, and a coarse one for the search for points near removed points. All points are in the
+/// sensor frame (m).
 class GroundFootprint {
  public:
-  /// Number of points that are processed together, one bit each.
+  /// Number of points per block. Sets of points of a block are words with one bit per point.
   static constexpr std::size_t kBlock = 64;
 
-  /// The block of `points` that begins at a point; the last one may be shorter.
+  /// The block of `points` from index `begin` on; the last block may be shorter.
   static PointsView block_of(PointsView points, std::size_t begin) {
     return points.subview(begin, std::min(kBlock, points.size() - begin));
   }
 
-  /// `cell` (m): a removed point affects its cell and the eight around. `near` (m): likewise in the
-  /// coarse grid. `max_range` (m): points beyond are ignored.
+  /// `cell`, `near` (m): edges of the fine and the coarse cells. A removed point affects its cell
+  /// and the eight cells around it in both grids. `max_range` (m): points beyond are ignored.
   GroundFootprint(double cell, double near, double max_range)
       : cell_(static_cast<float>(cell)),
         fine_(cell, max_range),
@@ -52,17 +53,17 @@ class GroundFootprint {
         tile_of_(tile_count(fine_.width()), 0),
         tiles_(1),
         near_(coarse_.cell_count(), 0) {
-    tiles_.reserve(tile_of_.size() + 1);  // reserves address space only
+    tiles_.reserve(tile_of_.size() + 1);  // uses address space only
     used_.reserve(tile_of_.size());
   }
 
-  /// Adds a removed point (m); takes effect at spread().
+  /// Adds a removed point (m). It has an effect after spread().
   void add(float x, float y, float z) {
     const Place place = fine_.place(x, y);
     if (place.inside) add_to(tile(place), within(place), z);
   }
 
-  /// Adds the points of a block whose bits are set.
+  /// Adds the points of a block whose bits are set in `which`.
   void add(PointsView block, std::uint64_t which) {
     const Located located = locate(block);
     detail::for_each_bit(which & located.inside, [&](std::size_t i) {
@@ -71,7 +72,7 @@ class GroundFootprint {
     });
   }
 
-  /// Writes the added points to the cells around them.
+  /// Updates the cells around all added points.
   void spread() {
     for (const Touched& touched : touched_) {
       const Place place = place_of(touched);
@@ -83,7 +84,7 @@ class GroundFootprint {
       const Place near =
           coarse_.place(fine_.centre(place.column) * cell_, fine_.centre(place.row) * cell_);
       if (!near.inside) continue;
-      // A coarse cell contains many fine ones.
+      // Handles each coarse cell once, since it contains many fine cells.
       std::uint8_t& centre = near_[near.row * coarse_.width() + near.column];
       if (centre == kHolds) continue;
       for_around(near, [&](const Place& around) {
@@ -93,7 +94,7 @@ class GroundFootprint {
     }
   }
 
-  /// Boxes of every 64 points, for visit_near().
+  /// Computes the box of each block of points, for visit_near().
   void bound(PointsView points, std::vector<GroundBox>& boxes) const {
     const std::size_t count = (points.size() + kBlock - 1) / kBlock;
     detail::ensure_capacity(boxes, count);
@@ -118,10 +119,11 @@ class GroundFootprint {
     });
   }
 
-  /// Calls `visit(begin, near, under)` for blocks of up to 64 points from `begin` on, with bits of
-  /// the points near a removed point (and of some at the border of the grid), and of those that lie
-  /// under one: less than `clearance` below the lowest removed point of the cells around. `boxes`:
-  /// of bound().
+  /// Calls `visit(begin, near, under)` for each block with points near removed points. `begin`:
+  /// index of the first point of the block. `near`: bits of the points near a removed point (also
+  /// set for some points at the border of the grid). `under`: bits of the points that lie less than
+  /// `clearance` below the lowest removed point of the 3x3 fine cells. `boxes`: result of bound()
+  /// for `points`.
   template <class Visitor>
   void visit_near(PointsView points, Span<const GroundBox> boxes, const Clearance& clearance,
                   Visitor&& visit) const {
@@ -137,7 +139,8 @@ class GroundFootprint {
     }
   }
 
-  /// Marks the cells of the points of a block whose bits are set; all lie under removed points.
+  /// Marks the cells of the points of a block whose bits are set in `which`. All these points must
+  /// lie under removed points.
   void mark(PointsView block, std::uint64_t which) {
     const Located located = locate(block);
     detail::for_each_bit(which, [&](std::size_t i) {
@@ -146,7 +149,7 @@ class GroundFootprint {
           .marked = true;
     });
   }
-  /// Bits of those points that lie in marked cells.
+  /// The bits of `which` whose points lie in marked cells.
   std::uint64_t find_marked(PointsView block, std::uint64_t which) const {
     const Located located = locate(block);
     std::uint64_t marked = 0;
@@ -157,7 +160,7 @@ class GroundFootprint {
 
   bool empty() const { return touched_.empty(); }
 
-  /// Removes all points.
+  /// Removes all points and marks.
   void clear() {
     for (const std::uint32_t tile : used_) tile_of_[tile] = 0;
     used_.clear();
@@ -172,23 +175,23 @@ class GroundFootprint {
 
   enum class Nearness { kNone, kSome, kAll };
 
-  // State of a coarse cell: a removed point is in it or in a cell beside it; or in the cell itself.
-  static constexpr std::uint8_t kNear = 1;
-  static constexpr std::uint8_t kHolds = 3;
+  // States of a coarse cell; kHolds includes the bit of kNear.
+  static constexpr std::uint8_t kNear = 1;   // a removed point lies in its 3x3 cells
+  static constexpr std::uint8_t kHolds = 3;  // a removed point lies in the cell itself
 
   struct Place {
     std::uint32_t column, row;
     bool inside;
   };
   struct Cell {
-    float own = kNothing;     // lowest point in it
-    float lowest = kNothing;  // the same with the cells around
+    float own = kNothing;     // m, height of the lowest removed point in the cell
+    float lowest = kNothing;  // m, height of the lowest removed point in its 3x3 cells
     bool marked = false;
   };
   struct Touched {
     std::uint32_t tile, cell;
   };
-  // Few tiles are in use at a time and fit into the first cache; tile 0 is empty.
+  // Only few tiles are in use, and these fit into the first-level cache. Tile 0 is empty.
   using Tile = std::array<Cell, std::size_t{kTile} * kTile>;
 
   static std::size_t tile_count(std::uint32_t width) {
@@ -196,7 +199,7 @@ class GroundFootprint {
     return side * side;
   }
 
-  // Square cells around the sensor, within a border of cells without points of their own.
+  // Square cells around the sensor. The cells at the border contain no points.
   class Grid {
    public:
     Grid(double cell, double max_range)
@@ -213,7 +216,7 @@ class GroundFootprint {
       if (!(column >= 1.0F && column < last && row >= 1.0F && row < last)) return {0, 0, false};
       return {static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row), true};
     }
-    /// Rows or columns of some points; points outside the grid fall into the border.
+    /// Rows (or columns) of points by their coordinates; the border for points outside the grid.
     template <class Float>
     auto line(const Float& coordinate) const {
       static constexpr detail::PackConstant kZero(0.0F);
@@ -222,20 +225,20 @@ class GroundFootprint {
       const Float per_metre = detail::PackConstant(per_metre_);
       return truncate(min(max(coordinate * per_metre + centre, Float(kZero)), last));
     }
-    /// Row or column of one point.
+    /// Row (or column) of one point; the border for a point outside the grid.
     std::size_t index(float coordinate) const {
       const float place = coordinate * per_metre_ + static_cast<float>(half_);
       return static_cast<std::size_t>(
           std::min(std::max(place, 0.0F), static_cast<float>(width() - 1)));
     }
-    /// Row-major.
+    /// Row-major indices of the cells of points.
     template <class Float>
     auto indices(const Float& x, const Float& y) const {
-      // Exact in floats: coarse grids have fewer than 2^24 cells.
+      // Exact in single precision: coarse grids have fewer than 2^24 cells.
       const Float cells(detail::PackConstant(static_cast<float>(width())));
       return truncate(to_float(line(y)) * cells + to_float(line(x)));
     }
-    /// Centre of a row or column, in cells from the sensor.
+    /// Distance of the centre of a row (or column) from the sensor, in cells.
     float centre(std::uint32_t index) const {
       return (static_cast<float>(index) + 0.5F) - static_cast<float>(half_);
     }
@@ -263,7 +266,7 @@ class GroundFootprint {
             range(fine_, x_min, x_max, kTile), range(fine_, y_min, y_max, kTile)};
   }
 
-  // Whether all, some or none of the coarse cells of a box are near a removed point.
+  // Whether all, some or no coarse cells of a box are near a removed point.
   Nearness nearness_of(const GroundBox& box) const {
     unsigned some = 0;
     unsigned all = kNear;
@@ -277,7 +280,7 @@ class GroundFootprint {
     return some == 0 ? Nearness::kNone : all != 0 ? Nearness::kAll : Nearness::kSome;
   }
 
-  // Bits of the points of a block that are near a removed point.
+  // Bits of the points of a block whose coarse cells are near a removed point.
   std::uint64_t find_near(PointsView block) const {
     std::int32_t cell[kBlock];
     detail::for_packs(block.size(), [&](auto at) {
@@ -290,7 +293,7 @@ class GroundFootprint {
     return near;
   }
 
-  // Whether some tile of a box is in use.
+  // Whether any tile of a box is in use.
   bool holds(const GroundBox& box) const {
     for (std::size_t row = box.tile_rows.first; row <= box.tile_rows.last; ++row) {
       const std::uint32_t* const tiles = &tile_of_[row * tiles_along_side()];
@@ -301,7 +304,7 @@ class GroundFootprint {
     return false;
   }
 
-  // Tiles and cells of the points of a block, and bits of the points inside the grid.
+  // By point of a block: its tile and its cell in the tile; bits of the points inside the grid.
   struct Located {
     std::array<std::int32_t, kBlock> tile, cell;
     std::uint64_t inside;
@@ -362,7 +365,7 @@ class GroundFootprint {
     cell.own = std::min(cell.own, z);
     if (is_first && cell.own < kNothing) touched_.push_back({tile, within});
   }
-  // The cell of a located point; an empty one if its tile is not in use.
+  // The cell of a located point; an empty cell if its tile is not in use.
   const Cell& cell_of(const Located& located, std::size_t i) const {
     return tiles_[tile_of_[static_cast<std::size_t>(located.tile[i])]]
                  [static_cast<std::size_t>(located.cell[i])];
@@ -381,11 +384,11 @@ class GroundFootprint {
   float cell_;
   Grid fine_;
   Grid coarse_;
-  std::vector<std::uint32_t> tile_of_;  // row-major: index into `tiles_`, or 0
-  std::vector<std::uint32_t> used_;     // non-zero entries of it
+  std::vector<std::uint32_t> tile_of_;  // row-major: index in tiles_, or 0
+  std::vector<std::uint32_t> used_;     // indices of the non-zero entries of tile_of_
   std::vector<Tile> tiles_;
-  std::vector<std::uint8_t> near_;  // by coarse cell
-  std::vector<Touched> touched_;    // cells with points, each once
+  std::vector<std::uint8_t> near_;  // by coarse cell: its state
+  std::vector<Touched> touched_;    // cells with removed points, each once
 };
 
 }  // namespace dynains

@@ -18,17 +18,16 @@ namespace dynains {
 
 /// Beliefs on the samples of one scan.
 struct InstanceBeliefs {
-  /// Log-odds that a place was free, a sum that is never below zero (Page's test for a change,
-  /// 1954). A place that is hit for long and then free has changed: early hits do not cancel later
-  /// free space. Thin objects, which some beams miss, are hit too often for the sum to grow.
+  /// Log-odds that a supervoxel or a whole instance was free, a detail::FreeSpaceSum. Thin objects,
+  /// which some beams pass, have too many hits for the sum to grow.
   struct Belief {
-    float level = 0.0F;          ///< sum over the references of one side of time, >= 0
-    float peak = 0.0F;           ///< maximum of `level`
-    std::uint8_t contested = 0;  ///< some reference hit the place
-    std::uint8_t occupied = 0;   ///< some reference hit enough of its samples
-    std::uint8_t hit_again = 0;  ///< some reference hit it while `level` > 0
+    float level = 0.0F;          ///< log-odds by the references of one side of time, >= 0
+    float peak = 0.0F;           ///< maximum of `level`, over both sides of time
+    std::uint8_t contested = 0;  ///< 1 after a reference with mostly hits
+    std::uint8_t occupied = 0;   ///< 1 after a reference with hits on enough samples
+    std::uint8_t hit_again = 0;  ///< 1 after a reference with mostly hits while `level` > 0
   };
-  /// Numbers of samples of an instance.
+  /// Numbers of samples of an instance, or of a part of it.
   struct Counts {
     std::uint32_t total = 0;
     std::uint32_t moved = 0;    ///< in free supervoxels
@@ -36,20 +35,20 @@ struct InstanceBeliefs {
   };
 
   std::vector<Belief> supervoxels;
-  std::vector<Belief> wholes;         ///< by instance, for all its samples together
+  std::vector<Belief> wholes;         ///< by instance: belief on all its samples together
   std::vector<Counts> counts;         ///< by instance
-  std::vector<std::uint64_t> open;    ///< bit by sample: a hit may change its belief
-  std::vector<std::uint8_t> changed;  ///< by instance: some belief changed; reset by the caller
+  std::vector<std::uint64_t> open;    ///< bit by sample: a hit may change its supervoxel's belief
+  std::vector<std::uint8_t> changed;  ///< by instance: 1 if a belief changed; the caller resets it
 };
 
-/// Updates beliefs by the visibility from references, and derives decisions from them.
+/// Updates beliefs by the visibility of samples from reference scans, and evaluates them.
 class InstanceBeliefUpdater {
  public:
   using Belief = InstanceBeliefs::Belief;
   using Counts = InstanceBeliefs::Counts;
 
-  static constexpr float kLeastKnown =
-      0.3F;  ///< ratio of decided to all samples of a still instance
+  /// Least ratio of decided to all samples of an instance for evidence that it stands still.
+  static constexpr float kLeastKnown = 0.3F;
 
   explicit InstanceBeliefUpdater(const FreeSpaceConfig& config)
       : pass_ratio_(static_cast<float>(config.pass_ratio)),
@@ -59,9 +58,9 @@ class InstanceBeliefUpdater {
         contested_level_(static_cast<float>(log_odds(config.tau_contested))),
         whole_level_(static_cast<float>(log_odds(config.tau_whole))) {}
 
-  /// Log-odds increment of one observation of free space.
+  /// Log-odds increment of one reference with free samples, l(p_free).
   float increment() const { return sum_.increment(); }
-  /// Log-odds from which a place without hits was free.
+  /// Log-odds from which a supervoxel without hits was free, l(tau_free).
   float free_level() const { return free_level_; }
 
   /// Resets the beliefs for the samples of a new scan.
@@ -77,7 +76,7 @@ class InstanceBeliefUpdater {
     out.open.assign(samples.size() / 64 + 1, ~std::uint64_t{0});
   }
 
-  /// Starts the sums of the references on the other side of time.
+  /// Restarts the sums for the references on the other side of time; keeps the peaks.
   void begin_other_side(const InstanceSamples& samples, InstanceBeliefs& beliefs) const {
     for (std::uint32_t s = 0; s < beliefs.supervoxels.size(); ++s) {
       Belief& belief = beliefs.supervoxels[s];
@@ -87,12 +86,12 @@ class InstanceBeliefUpdater {
     for (Belief& belief : beliefs.wholes) belief.level = 0.0F;
   }
 
-  /// Adds the visibility of the samples from one reference. Calls `on_hit(instance)` for each
-  /// instance with enough visible samples, nearly all of which are hit.
+  /// Updates the beliefs by the visibility of `samples` from one reference. Calls
+  /// `on_hit(instance)` for each instance with enough visible samples of which nearly all are hit.
   template <class OnHit>
   void update(const InstanceSamples& samples, const detail::Visibility& visibility,
               InstanceBeliefs& beliefs, OnHit&& on_hit) {
-    // Processors with AVX2 have instructions that find and count bits.
+    // AVX2 processors have instructions that find and count bits.
     detail::run_packs([&](auto) {
       update_supervoxels(samples, visibility, beliefs);
       update_wholes(samples, visibility, beliefs, on_hit);
@@ -103,37 +102,39 @@ class InstanceBeliefUpdater {
     return belief.peak >= (belief.contested != 0 ? contested_level_ : free_level_);
   }
 
-  /// Whether beams passed an instance as a whole, or enough of its decided samples were free. If
-  /// fewer than half of these were free, and some were hit afterwards, enough of its lower half
-  /// must be free, too, if that is known: beams pass the windows of a parked car, but not its body.
+  /// Whether an instance is dynamic as a whole: its belief as a whole reaches the threshold, or
+  /// enough of its decided samples are free. An additional condition holds if fewer than half of
+  /// the decided samples are free and some were hit afterwards: enough samples of its lower half
+  /// must be free, unless too few of them are decided. This condition keeps parked cars, since
+  /// beams pass through their windows, but not through their bodies.
   bool removes_whole(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
                      std::size_t instance) const {
-    const Counts& share = beliefs.counts[instance];
+    const Counts& counts = beliefs.counts[instance];
     const Belief& whole = beliefs.wholes[instance];
-    const bool seen_through = whole.peak >= (whole.contested != 0 ? whole_level_ : free_level_);
-    if (!seen_through && !is_enough(share)) return false;
-    if (2 * share.moved >= share.decided) return true;
+    const bool whole_is_free = whole.peak >= (whole.contested != 0 ? whole_level_ : free_level_);
+    if (!whole_is_free && !is_enough(counts)) return false;
+    if (2 * counts.moved >= counts.decided) return true;
     const bool hit_again =
-        seen_through ? whole.hit_again != 0 : was_hit_again(samples, beliefs, instance);
+        whole_is_free ? whole.hit_again != 0 : was_hit_again(samples, beliefs, instance);
     if (!hit_again) return true;
     const Counts lower_half = counts_of_lower_half(samples, beliefs, instance);
     return lower_half.decided < kLeastBody || is_enough(lower_half);
   }
 
  private:
-  static constexpr float kLeastView = 0.25F;          // ratio of visible samples of an instance
+  static constexpr float kLeastVisible = 0.25F;       // ratio of visible samples of an instance
   static constexpr float kLeastFree = 0.15F;          // ratio of free samples of a supervoxel
   static constexpr std::uint32_t kLeastBody = 12;     // decided samples of the lower half
-  static constexpr float kContradictingHits = 0.85F;  // ratio to visible samples of an instance
-  // A supervoxel is occupied if two of its samples are hit, and one of so many.
-  static constexpr std::uint32_t kLeastHit = 4;
+  static constexpr float kContradictingHits = 0.85F;  // ratio of hits to visible samples
+  // A supervoxel is occupied if at least two of its samples and one of kSamplesPerHit are hit.
+  static constexpr std::uint32_t kSamplesPerHit = 4;
 
-  bool is_enough(const Counts& share) const {
-    return share.moved > 0 &&
-           static_cast<float>(share.moved) >= removal_ratio_ * static_cast<float>(share.decided);
+  bool is_enough(const Counts& counts) const {
+    return counts.moved > 0 &&
+           static_cast<float>(counts.moved) >= removal_ratio_ * static_cast<float>(counts.decided);
   }
 
-  // Whether any free supervoxel of an instance was hit afterwards.
+  // Whether any free supervoxel of an instance was hit after it had been free.
   bool was_hit_again(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
                      std::size_t instance) const {
     const auto* const all = beliefs.supervoxels.data();
@@ -142,7 +143,7 @@ class InstanceBeliefUpdater {
         [&](const Belief& belief) { return belief.hit_again != 0 && is_free(belief); });
   }
 
-  // Counts of the supervoxels in the lower half of the layers of an instance.
+  // Counts of the supervoxels in the lower half of the height of an instance.
   Counts counts_of_lower_half(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
                               std::size_t instance) const {
     const std::uint32_t begin = samples.supervoxel_begin[instance];
@@ -156,11 +157,11 @@ class InstanceBeliefUpdater {
     Counts sum;
     for (std::uint32_t s = begin; s < end; ++s) {
       if (2 * voxel_index(samples.place[s], 2) > lowest + highest) continue;
-      const Counts share =
+      const Counts counts =
           counts_of(beliefs.supervoxels[s], samples.sample_begin[s + 1] - samples.sample_begin[s]);
-      sum.total += share.total;
-      sum.moved += share.moved;
-      sum.decided += share.decided;
+      sum.total += counts.total;
+      sum.moved += counts.moved;
+      sum.decided += counts.decided;
     }
     return sum;
   }
@@ -171,9 +172,9 @@ class InstanceBeliefUpdater {
     return {samples, free ? samples : 0, free || belief.occupied != 0 ? samples : 0};
   }
 
-  // Only supervoxels with a free sample, or with a hit while they are open, may change: few, after
-  // some references. All are prefetched before the first is used, since beliefs of older scans are
-  // not in the cache.
+  // Only supervoxels with a free sample, or with a hit while they are open, can change. Their
+  // number is small after the first references. The beliefs of all of them are prefetched before
+  // the first update, since beliefs of older scans are not in the cache.
   void update_supervoxels(const InstanceSamples& samples, const detail::Visibility& visibility,
                           InstanceBeliefs& beliefs) {
     const std::size_t count = find_touched(samples, visibility, beliefs);
@@ -182,7 +183,7 @@ class InstanceBeliefUpdater {
     }
   }
 
-  // Lists them in `touched_`, in order, and returns their number.
+  // Writes the supervoxels that can change to `touched_`, in ascending order; returns their number.
   std::size_t find_touched(const InstanceSamples& samples, const detail::Visibility& visibility,
                            const InstanceBeliefs& beliefs) {
     constexpr std::size_t kBits = 64;
@@ -190,11 +191,11 @@ class InstanceBeliefUpdater {
     std::size_t count = 0;
     std::uint32_t last = kNoCluster;
     for (std::size_t begin = 0; begin < samples.size(); begin += kBits) {
-      std::uint64_t seen =
+      std::uint64_t touched =
           visibility.free_word(begin) | (visibility.hit_word(begin) & beliefs.open[begin / kBits]);
       const std::size_t left = samples.size() - begin;
-      if (left < kBits) seen &= (std::uint64_t{1} << left) - 1;
-      detail::for_each_bit(seen, [&](std::size_t i) {
+      if (left < kBits) touched &= (std::uint64_t{1} << left) - 1;
+      detail::for_each_bit(touched, [&](std::size_t i) {
         const std::uint32_t s = samples.supervoxel_of[begin + i];
         touched_[count] = s;
         count += s != last ? 1 : 0;
@@ -218,20 +219,20 @@ class InstanceBeliefUpdater {
     if (is_open(belief) != was_open) flip_open(samples, s, beliefs);
     if (!changed) return;
     const std::uint32_t instance = samples.instance_of[s];
-    Counts& share = beliefs.counts[instance];
+    Counts& counts = beliefs.counts[instance];
     const Counts now = counts_of(belief, end - begin);
-    share.moved += now.moved - before.moved;
-    share.decided += now.decided - before.decided;
+    counts.moved += now.moved - before.moved;
+    counts.decided += now.decided - before.decided;
     beliefs.changed[instance] = 1;
   }
 
-  // Whether hits may change it: not if it is occupied and its level is zero.
+  // Whether hits can change the belief.
   static bool is_open(const Belief& belief) { return belief.occupied == 0 || belief.level > 0.0F; }
   static void flip_open(const InstanceSamples& samples, std::uint32_t s, InstanceBeliefs& beliefs) {
     std::uint32_t begin = samples.sample_begin[s];
     const std::uint32_t end = samples.sample_begin[s + 1];
     while (begin < end) {
-      const std::uint32_t last = std::min(end - 1, begin | 63U);  // in the same word
+      const std::uint32_t last = std::min(end - 1, begin | 63U);  // last bit in this word
       beliefs.open[begin / 64] ^= ~std::uint64_t{0} >> (63 - (last - begin)) << begin % 64;
       begin = last + 1;
     }
@@ -247,45 +248,46 @@ class InstanceBeliefUpdater {
       end += beliefs.counts[instance].total;
       const detail::Visibility::Count all = visibility.count(begin, end);
       const auto count = static_cast<float>(end - begin);
-      const auto seen = static_cast<float>(all.free + all.hit);
-      if (seen < std::max(2.0F, kLeastView * count)) continue;
-      const float share = static_cast<float>(all.free) / seen;
-      if (share >= pass_ratio_) {
-        raise(beliefs.wholes[instance], share);
+      const auto visible = static_cast<float>(all.free + all.hit);
+      if (visible < std::max(2.0F, kLeastVisible * count)) continue;
+      const float free_ratio = static_cast<float>(all.free) / visible;
+      if (free_ratio >= pass_ratio_) {
+        raise(beliefs.wholes[instance], free_ratio);
         beliefs.changed[instance] = 1;
-      } else if (share <= detail::FreeSpaceSum::kHitRatio) {
+      } else if (free_ratio <= detail::FreeSpaceSum::kHitRatio) {
         lower(beliefs.wholes[instance]);
         beliefs.changed[instance] = 1;
         const auto hits = static_cast<float>(all.hit);
-        if (share <= 1.0F - kContradictingHits && hits >= kLeastKnown * count) on_hit(instance);
+        if (free_ratio <= 1.0F - kContradictingHits && hits >= kLeastKnown * count) {
+          on_hit(instance);
+        }
       }
     }
   }
 
-  // Eq. 15 with three increments as in Eq. 18, by the ratio of free to visible samples; at least
-  // one sample is visible. Ratios between the limits, and few free samples, change nothing. A
-  // single hit contests free space, but does not make the place occupied. Returns whether a verdict
-  // may change.
-  bool update(Belief& belief, detail::Visibility::Count seen, std::uint32_t samples) const {
-    const auto free = static_cast<float>(seen.free);
-    const float share = free / static_cast<float>(seen.free + seen.hit);
+  // Updates the belief on a supervoxel by one reference (Eq. 15), with `samples` samples and at
+  // least one visible sample. No change if the ratio of free to visible samples lies between the
+  // limits of FreeSpaceSum, or if few samples are free. A single hit sets `contested`, but not
+  // `occupied`. Returns whether a verdict may change.
+  bool update(Belief& belief, detail::Visibility::Count visible, std::uint32_t samples) const {
+    const auto free = static_cast<float>(visible.free);
+    const float free_ratio = free / static_cast<float>(visible.free + visible.hit);
     if (free >= kLeastFree * static_cast<float>(samples) &&
-        share >= detail::FreeSpaceSum::kFreeRatio) {
-      raise(belief, share);
+        free_ratio >= detail::FreeSpaceSum::kFreeRatio) {
+      raise(belief, free_ratio);
       return true;
     }
-    if (seen.hit == 0 || share > detail::FreeSpaceSum::kHitRatio) return false;
+    if (visible.hit == 0 || free_ratio > detail::FreeSpaceSum::kHitRatio) return false;
     const Belief before = belief;
     lower(belief);
-    if (seen.hit >= std::max(std::min(2U, samples), (samples + kLeastHit - 1) / kLeastHit)) {
-      belief.occupied = 1;
-    }
+    const std::uint32_t least_hits = (samples + kSamplesPerHit - 1) / kSamplesPerHit;
+    if (visible.hit >= std::max(std::min(2U, samples), least_hits)) belief.occupied = 1;
     return belief.contested != before.contested || belief.occupied != before.occupied ||
            belief.hit_again != before.hit_again;
   }
 
-  void raise(Belief& belief, float share) const {
-    sum_.raise(belief.level, share);
+  void raise(Belief& belief, float free_ratio) const {
+    sum_.raise(belief.level, free_ratio);
     belief.peak = std::max(belief.peak, belief.level);
   }
   void lower(Belief& belief) const {
@@ -300,7 +302,7 @@ class InstanceBeliefUpdater {
   float free_level_;
   float contested_level_;
   float whole_level_;
-  std::vector<std::uint32_t> touched_;  // supervoxels that a reference may change
+  std::vector<std::uint32_t> touched_;  // supervoxels that the current reference can change
 };
 
 }  // namespace dynains

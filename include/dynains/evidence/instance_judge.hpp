@@ -15,11 +15,11 @@
 
 namespace dynains {
 
-/// Finds groups that are connected in the 26-neighbourhood.
+/// Finds groups of supervoxels that are connected in the 26-neighbourhood.
 class SupervoxelGroups {
  public:
-  /// Removes those of `members` (supervoxels of one instance) whose group has fewer than
-  /// `least_samples` samples; the order changes.
+  /// Removes supervoxels from `members` whose group has fewer than `least_samples` samples, and
+  /// reorders the rest. `members`: supervoxels of one instance.
   void keep_large(const InstanceSamples& samples, std::size_t least_samples,
                   std::vector<std::uint32_t>& members) {
     entries_.clear();
@@ -85,7 +85,7 @@ struct InstanceEvidence {
   TrackedInstances tracked;
 };
 
-/// Turns the evidence on instances into verdicts. Goes beyond the paper.
+/// Derives the verdicts on supervoxels from the evidence on their instances. Goes beyond the paper.
 class InstanceJudge {
  public:
   using Verdict = EvidenceVerdict::Group;
@@ -96,7 +96,8 @@ class InstanceJudge {
         still_weight_(static_cast<float>(config.still_weight)),
         track_level_(static_cast<float>(log_odds(config.tau_track))) {}
 
-  /// Log-odds that an instance moved, from the free-space evidence of its own scan alone.
+  /// Log-odds that an instance moved, by the free-space evidence on its own scan without its track:
+  /// positive if it is dynamic as a whole, negative if it stands still, 0 if unknown.
   float own_log_odds(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
                      std::size_t instance) const {
     const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
@@ -112,8 +113,9 @@ class InstanceJudge {
     return is_known && moved < kStillRatio * decided ? -still_weight_ * unit : 0.0F;
   }
 
-  /// Writes one verdict per supervoxel. `may_presume`: the verdict is provisional, and there are
-  /// earlier scans. Calls `on_removed(instance)` for each instance that is removed as a whole.
+  /// Writes one verdict per supervoxel. `may_presume`: allows kPresumed, for provisional verdicts
+  /// with earlier scans in the epoch. Calls `on_removed(instance)` for each instance that is
+  /// removed as a whole.
   template <class OnRemoved>
   void judge(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
              bool may_presume, std::vector<Verdict>& verdicts, OnRemoved&& on_removed) {
@@ -129,15 +131,16 @@ class InstanceJudge {
         std::fill(verdicts.begin() + first, verdicts.begin() + last, verdict);
         on_removed(instance);
       } else {
-        // A part of the instance moved; few free samples may be noise.
+        // Only a part of the instance is dynamic; small groups of free samples may be noise.
         groups_.keep_large(samples, kLeastGroup, free_);
       }
       for (const std::uint32_t s : free_) verdicts[s].cause = Cause::kFreeSpace;
     }
   }
 
-  /// Whether a supervoxel with verdict `cause` surely moved. A free part of the instance is not
-  /// enough: that may be foliage, or a static object beside a dynamic one.
+  /// Whether a supervoxel with verdict `cause` is dynamic with high certainty. A free part of its
+  /// instance is not sufficient: the instance may be foliage, or may include a static object beside
+  /// a dynamic one.
   bool surely_moves(const InstanceEvidence& evidence, std::uint32_t supervoxel, Cause cause) const {
     if (cause == Cause::kFreeSpace || cause == Cause::kDynamicOccupancy) return true;
     if (!use_tracks_ || !is_dynamic(cause) || cause == Cause::kPresumed) return false;
@@ -148,11 +151,12 @@ class InstanceJudge {
   }
 
  private:
-  static constexpr float kStillRatio = 0.02F;  // moved to decided samples, below which it is still
+  // An instance stands still if its ratio of moved to decided samples is below this.
+  static constexpr float kStillRatio = 0.02F;
   static constexpr std::size_t kLeastGroup = 4;  // samples
 
-  // Verdicts of the supervoxels on their own; lists the free ones in `free_`. Returns the highest
-  // log-odds.
+  // Writes static verdicts for supervoxels [first, last) and lists the free ones in `free_`.
+  // Returns the largest log-odds of them.
   float judge_alone(const InstanceBeliefs& beliefs, const InstanceBeliefUpdater& updater,
                     std::uint32_t first, std::uint32_t last, std::vector<Verdict>& verdicts) {
     free_.clear();
@@ -172,7 +176,7 @@ class InstanceJudge {
   }
 
   // Cause to remove an instance as a whole, or kNoEvidence. Raises `level` to the log-odds along
-  // its track.
+  // the track of the instance if these are larger.
   Cause cause_of_whole(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
                        bool may_presume, std::size_t instance, float& level) const {
     if (updater.removes_whole(evidence.samples, evidence.beliefs, instance)) {
@@ -185,8 +189,8 @@ class InstanceJudge {
     return may_presume && is_presumed(evidence, instance) ? Cause::kPresumed : Cause::kNoEvidence;
   }
 
-  // Zero latency: a compact instance at a place without evidence may be a vehicle ahead, or a
-  // static object that came into view.
+  // Whether a provisional verdict removes a compact instance without evidence: it may be a moving
+  // vehicle ahead, or a static object that came into view.
   bool is_presumed(const InstanceEvidence& evidence, std::size_t instance) const {
     constexpr std::uint32_t kLeastSamples = 5;
     constexpr float kMaxLength = 15.0F, kMaxHeight = 3.5F;  // m
@@ -199,7 +203,7 @@ class InstanceJudge {
            static_cast<float>(counts.decided) <= kMaxDecided * static_cast<float>(counts.total);
   }
 
-  // Log-odds of 0 are frequent and need no exponential.
+  // Avoids the exponential for log-odds of 0, which are frequent.
   static float as_probability(float level) {
     return level == 0.0F ? 0.5F : 1.0F / (1.0F + std::exp(-level));
   }
@@ -209,7 +213,7 @@ class InstanceJudge {
   float still_weight_;
   float track_level_;
   SupervoxelGroups groups_;
-  std::vector<std::uint32_t> free_;  // supervoxels
+  std::vector<std::uint32_t> free_;  // free supervoxels of the current instance
 };
 
 }  // namespace dynains

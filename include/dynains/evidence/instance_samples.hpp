@@ -16,25 +16,25 @@
 
 namespace dynains::detail {
 
-/// Rows of numbers, in the order of the ranks that they were added with: each keeps as many as it
-/// may, of those with the least. Numbers of one rank are in their own order.
+/// Rows of numbers. Each row keeps the numbers of the smallest ranks, sorted by rank, and by number
+/// for equal ranks. The last three bits of a rank are ignored.
 class SmallestK {
  public:
-  /// `most`: of each row, 1 or more.
+  /// `most`: maximum size of a row, at least 1.
   explicit SmallestK(std::size_t most) : most_(most), pairs_per_row_((most + 1) / 2) {}
 
-  /// Leaves all rows empty.
+  /// Empties all rows.
   void clear() { pairs_.assign(pairs_.size(), kEmpty); }
 
-  /// Makes sure that there are so many rows; new ones are empty.
+  /// Makes at least `count` rows; new rows are empty.
   void make_rows(std::size_t count) {
     const std::size_t pairs = count * pairs_per_row_;
     if (pairs_.size() < pairs) pairs_.resize(pairs + pairs / 8, kEmpty);
   }
 
-  /// Adds a number to a row, whose last one goes if it was full. Each place takes the lesser of
-  /// what stands there and the greater of the new one and what stood before it: no branch, which
-  /// would be taken for every third point of a scan, and never foreseen.
+  /// Adds a number to a row; removes the last number of a full row. Each key of the row becomes
+  /// min(key, max(new key, preceding key)). This insertion has no branch, because a branch would
+  /// depend on every third point of a scan and would not be predictable.
   void add(std::size_t row, std::uint32_t rank, std::uint32_t number) {
     const double key = key_of(rank, number);
     const Pair keys = {key, key};
@@ -49,17 +49,17 @@ class SmallestK {
     }
   }
 
-  /// How many numbers a row has at most.
+  /// Maximum size of a row.
   std::size_t most() const { return most_; }
 
-  /// How many numbers the row has.
+  /// Size of a row.
   std::size_t count(std::size_t row) const {
     std::size_t count = 0;
     for (std::size_t k = 0; k < most_; ++k) count += key(row, k) < kNone ? 1 : 0;
     return count;
   }
 
-  /// The k-th number of a row; 0 if there are not so many.
+  /// The k-th number of a row, k below most(); 0 if the row has fewer numbers.
   std::uint32_t number(std::size_t row, std::size_t k) const {
     const double wanted = key(row, k);
     std::uint64_t bits;
@@ -69,11 +69,12 @@ class SmallestK {
 
  private:
   using Pair = double __attribute__((vector_size(16)));
-  static constexpr double kNone = 2.0;  // above all keys, and zeros where a number would be
+  static constexpr double kNone = 2.0;  // above all keys; its lower 32 bits are zero
   static constexpr Pair kEmpty = {kNone, kNone};
 
-  // Doubles, since baseline x86-64 finds the lesser of no other numbers of 64 bits. The rank, but
-  // for its last three bits, is in their upper half, which makes a normal number between 0 and 2.
+  // A key is a double, since baseline x86-64 has no other minimum of 64-bit numbers. Its upper half
+  // contains the rank without the last three bits, its lower half the number. The exponent bits
+  // make it a normal number between 0 and 2.
   static double key_of(std::uint32_t rank, std::uint32_t number) {
     const std::uint64_t bits = std::uint64_t{0x20000000U + (rank >> 3)} << 32 | number;
     double key;
@@ -94,18 +95,17 @@ class SmallestK {
 
 namespace dynains {
 
-/// The samples of one scan (m, sensor frame), ordered by instance, then by supervoxel: each
-/// instance and each supervoxel is one range of samples.
+/// The samples of one scan, ordered by instance, then by supervoxel: each instance and each
+/// supervoxel is one range of samples.
 struct InstanceSamples {
-  PointBuffer points;                           ///< padded for packs
-  std::vector<std::uint32_t> sample_begin;      ///< by supervoxel, and the end
-  std::vector<VoxelKey> place;                  ///< by supervoxel
-  std::vector<std::uint32_t> supervoxel_begin;  ///< by instance, and the end
-  std::vector<std::uint32_t> supervoxel_of;     ///< by sample, with unused places at the end
+  PointBuffer points;                           ///< samples, m, sensor frame; padded for packs
+  std::vector<std::uint32_t> sample_begin;      ///< by supervoxel: first sample, and the end
+  std::vector<VoxelKey> place;                  ///< by supervoxel: its voxel in the sensor frame
+  std::vector<std::uint32_t> supervoxel_begin;  ///< by instance: first supervoxel, and the end
+  std::vector<std::uint32_t> supervoxel_of;     ///< by sample; padded at the end
   std::vector<std::uint32_t> instance_of;       ///< by supervoxel
-  std::vector<std::uint32_t> met_of;            ///< by point: index into `met`
-  std::vector<std::uint32_t>
-      met;  ///< supervoxels in the order of the scan; the first stands for none
+  std::vector<std::uint32_t> met_of;            ///< by point: index in `met`; 0: no supervoxel
+  std::vector<std::uint32_t> met;  ///< supervoxels in scan order, from index 1 on; [0]: kNoCluster
 
   std::size_t size() const { return sample_begin.empty() ? 0 : sample_begin.back(); }
   std::size_t supervoxel_count() const {
@@ -114,7 +114,7 @@ struct InstanceSamples {
   std::size_t instance_count() const {
     return supervoxel_begin.empty() ? 0 : supervoxel_begin.size() - 1;
   }
-  /// Samples of an instance.
+  /// Number of samples of an instance.
   std::uint32_t count(std::size_t instance) const {
     return sample_begin[supervoxel_begin[instance + 1]] - sample_begin[supervoxel_begin[instance]];
   }
@@ -122,7 +122,8 @@ struct InstanceSamples {
 
 namespace detail {
 
-/// Key of the cell of each sample, in a grid of `cell` (m) whose corner is the frame `origin`.
+/// Computes the key of the cell of each sample, in a grid in the origin frame with cells of edge
+/// `cell` (m).
 inline void find_cells(const InstanceSamples& samples, double cell,
                        const Eigen::Isometry3d& T_origin_sensor, std::vector<VoxelKey>& keys) {
   const PackTransform to_cells(T_origin_sensor, 1.0 / cell);
@@ -143,18 +144,20 @@ inline void find_cells(const InstanceSamples& samples, double cell,
 
 }  // namespace detail
 
-/// Selects up to `most_samples` points per supervoxel and instance: those with the smallest hashes
-/// of their coordinates. The selection does not depend on the order of the scan.
+/// Selects samples of instances: in each supervoxel, up to `most_samples` points of the smallest
+/// hashes of their coordinates. A supervoxel is the part of one instance in one voxel. The
+/// selection does not depend on the order of the points.
 class InstanceSampler {
  public:
-  /// `supervoxel_size`, `max_range`: metres; `most_samples`: of a supervoxel.
+  /// `supervoxel_size` (m): edge of the voxels. `max_range` (m): horizontal range beyond which
+  /// points get no sample. `most_samples`: maximum number of samples of a supervoxel, at least 1.
   InstanceSampler(double supervoxel_size, double max_range, std::uint32_t most_samples)
       : supervoxels_per_metre_(static_cast<float>(1.0 / supervoxel_size)),
         max_range_(static_cast<float>(max_range)),
         samples_(most_samples) {}
 
-  /// Bits of those of up to 64 points that lie in another supervoxel than their predecessor; the
-  /// first bit is set.
+  /// Bits of the points, of up to 64 `points`, that lie in another voxel than their predecessor.
+  /// The first bit is always set.
   std::uint64_t find_changes(PointsView points) const {
     using namespace detail;
     const PackConstant per_metre(supervoxels_per_metre_);
@@ -174,8 +177,9 @@ class InstanceSampler {
     return changes | 1;
   }
 
-  /// `points`: one scan, sensor frame; `instance_of`: its instances below `instance_count`, or
-  /// kNoCluster. Points beyond the range and without instance get no sample.
+  /// Replaces `out` by the samples of one scan. `points`: m, sensor frame. `instance_of`: by point,
+  /// instance below `instance_count`, or kNoCluster. Points beyond the range or without an instance
+  /// get no sample.
   void sample(PointsView points, Span<const std::uint32_t> instance_of, std::size_t instance_count,
               InstanceSamples& out) {
     begin_scan();
@@ -191,11 +195,11 @@ class InstanceSampler {
   }
 
  private:
-  // Part of an instance that lies in one voxel. The indices along x and y have 16 bits each.
+  // Part of an instance in one voxel. `xy` contains the voxel indices along x and y, 16 bits each.
   struct Supervoxel {
     std::int32_t xy = 0;
     std::int32_t z = 0;
-    std::int32_t instance = -2;  // -1: points that get no sample; -2: no supervoxel
+    std::int32_t instance = -2;  // -1: points without sample; -2: empty slot of the table
 
     static Supervoxel none() { return {0, 0, -1}; }
     friend bool operator==(const Supervoxel& a, const Supervoxel& b) {
@@ -207,9 +211,9 @@ class InstanceSampler {
   };
   using SupervoxelTable = VoxelHashTable<Supervoxel>;
   static constexpr int kHalf = 16;           // bits
-  static constexpr std::size_t kBlock = 64;  // points that are worked off together
-  // Ranks are hashes of rounded coordinates, so that they do not depend on the last bits, which
-  // change when the sensor frame rotates.
+  static constexpr std::size_t kBlock = 64;  // points that are processed together
+  // Ranks are hashes of rounded coordinates. The rounding removes the last bits, which depend on
+  // the rotation of the sensor frame.
   static constexpr float kPlacesPerMetre = 64.0F;
 
   void begin_scan() {
@@ -218,7 +222,7 @@ class InstanceSampler {
     samples_.clear();
   }
 
-  // The supervoxel of each point, and its rank there.
+  // Computes the supervoxel and the rank of each point of a block.
   void find_supervoxels(PointsView points, const std::uint32_t* instance_of) {
     using namespace detail;
     const PackConstant per_metre(supervoxels_per_metre_), far_squared(max_range_ * max_range_);
@@ -246,7 +250,8 @@ class InstanceSampler {
     });
   }
 
-  // Most points lie in the supervoxel that was met last in the first slot of its hash.
+  // Numbers the supervoxels of a block in the order of the points. For most points, the first slot
+  // of the hash holds their supervoxel.
   void meet_supervoxels(std::size_t count, std::uint32_t* met_of) {
     detail::grow(supervoxels_, table_.size() + kBlock);
     table_.reserve(table_.size() + kBlock);
@@ -263,10 +268,11 @@ class InstanceSampler {
     return number;
   }
 
-  // Consecutive points mostly share a row, and each change of a row depends on the change before:
-  // points from four parts of the block alternate.
+  // Adds the points of a block to the rows of their supervoxels. Consecutive points mostly share a
+  // row, and an insertion depends on the result of the preceding insertion into the row. The loop
+  // alternates between four parts of the block, so that their insertions can overlap in time.
   void rank_points(std::size_t begin, std::size_t count, const std::uint32_t* met_of) {
-    constexpr std::size_t kStretches = 4, kLength = kBlock / kStretches;
+    constexpr std::size_t kParts = 4, kLength = kBlock / kParts;
     samples_.make_rows(table_.size());
     const auto rank = [&](std::size_t i) {
       samples_.add(met_of[i], static_cast<std::uint32_t>(rank_[i]),
@@ -277,7 +283,7 @@ class InstanceSampler {
       return;
     }
     for (std::size_t i = 0; i < kLength; ++i) {
-      for (std::size_t k = 0; k < kStretches; ++k) rank(i + k * kLength);
+      for (std::size_t k = 0; k < kParts; ++k) rank(i + k * kLength);
     }
   }
 
@@ -285,7 +291,7 @@ class InstanceSampler {
     return voxel_key(cell.xy >> kHalf, static_cast<std::int16_t>(cell.xy), cell.z);
   }
 
-  // A counting sort: supervoxels by instance, and their samples with them.
+  // Counting sort of the supervoxels by instance; the samples follow their supervoxels.
   void order(PointsView points, std::size_t instance_count, InstanceSamples& out) {
     const std::size_t supervoxel_count = table_.size() - 1;
     out.supervoxel_begin.assign(instance_count + 1, 0);
@@ -313,7 +319,7 @@ class InstanceSampler {
     copy_samples(points, supervoxel_count, out);
   }
 
-  // Copies the maximum number of samples of each supervoxel without a branch; the next supervoxel
+  // Copies the maximum number of samples of each supervoxel, without a branch. The next supervoxel
   // overwrites the excess.
   void copy_samples(PointsView points, std::size_t supervoxel_count, InstanceSamples& out) {
     const std::size_t most = samples_.most();
@@ -344,13 +350,13 @@ class InstanceSampler {
 
   float supervoxels_per_metre_;
   float max_range_;
-  SupervoxelTable table_{4096};  // numbers as met_of counts them; 0: no sample
+  SupervoxelTable table_{4096};  // its numbers are indices in InstanceSamples::met
   // By point of a block.
   std::array<std::int32_t, kBlock> xy_ = {}, z_ = {}, instance_ = {}, hash_ = {}, rank_ = {};
-  detail::SmallestK samples_;            // by supervoxel
-  std::vector<Supervoxel> supervoxels_;  // by number in the table; unused places at the end
-  std::vector<std::uint32_t> next_;
-  std::vector<std::uint32_t> ordered_;  // numbers in the table, by instance
+  detail::SmallestK samples_;            // by number in the table: indices of points
+  std::vector<Supervoxel> supervoxels_;  // by number in the table; padded at the end
+  std::vector<std::uint32_t> next_;      // by instance: position of its next supervoxel
+  std::vector<std::uint32_t> ordered_;   // by supervoxel: number in the table
 };
 
 }  // namespace dynains

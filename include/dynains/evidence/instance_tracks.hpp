@@ -1,5 +1,5 @@
-// Tracks of instances: an object that moves at one time is dynamic in its other scans, too, before
-// it starts and after it stops. Goes beyond the paper.
+// Tracks of instances. An object that moves in some scans is dynamic in all scans of its track,
+// also before it starts and after it stops. Goes beyond the paper.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -15,59 +15,59 @@
 
 namespace dynains {
 
-/// The instances of one scan as parts of tracks.
+/// The instances of one scan, with links to the instances of the adjacent scans.
 struct TrackedInstances {
-  /// The track of an instance on one side of its scan, in time.
+  /// The part of a track in the past, or in the future, of a scan.
   struct Side {
-    std::uint32_t instance = kNoCluster;  ///< the same object in the adjacent scan
-    float log_odds = 0.0F;                ///< that it moved, from this scan and those on this side
-    int scans_since_motion = 0;           ///< to the nearest scan whose own log-odds are positive
-    std::int16_t farthest_hit =
-        0;  ///< scans to the farthest reference that hit most of it; 0: none
+    std::uint32_t instance = kNoCluster;  ///< linked instance of the adjacent scan, or kNoCluster
+    float log_odds = 0.0F;                ///< of motion, by this scan and the scans on this side
+    int scans_since_motion = 0;           ///< scans to the nearest scan with positive own log-odds
+    std::int16_t farthest_hit = 0;        ///< scans to the farthest reference that hit it; 0: none
   };
   struct Instance {
-    float own = 0.0F;  ///< log-odds that it moved, from the evidence on this scan alone
+    float own = 0.0F;  ///< log-odds of motion, by the evidence on this scan alone
     Side past;
     Side future;
 
-    /// Log-odds that it moved, from its whole track; its own evidence counts once.
+    /// Log-odds of motion, by the whole track. The own log-odds count once.
     float track_log_odds() const {
       return own + std::max(0.0F, past.log_odds - own) + std::max(0.0F, future.log_odds - own);
     }
   };
   std::vector<Instance> instances;
 
-  /// Kept apart from Instance, since every scan propagates beliefs through all open scans.
+  /// Extent and overlap of an instance. Separate from Instance, which the propagation reads for all
+  /// open scans in each frame.
   struct Shape {
     float length = 0.0F;            ///< m, horizontal diagonal
     float height = 0.0F;            ///< m
     std::uint32_t cells = 0;        ///< number of its cells
-    float previous_overlap = 0.0F;  ///< ratio of common to all cells, with the linked instance
-    float next_overlap = 0.0F;      ///< likewise
-    bool carried = false;           ///< small enough to be one object
+    float previous_overlap = 0.0F;  ///< ratio of common to all cells, with Instance::past
+    float next_overlap = 0.0F;      ///< ratio of common to all cells, with Instance::future
+    bool carried = false;           ///< whether it is tracked: small enough to be one object
   };
   std::vector<Shape> shapes;  ///< by instance
 
   struct Cell {
-    VoxelKey place;  ///< in the frame `origin`
+    VoxelKey place;  ///< origin frame
     std::uint32_t instance;
   };
-  std::vector<Cell> cells;  ///< of the carried instances, by instance
+  std::vector<Cell> cells;  ///< of the carried instances, ordered by instance
 };
 
-/// Links instances of consecutive scans that overlap in the world.
+/// Links instances of consecutive scans that overlap in the origin frame.
 class InstanceLinker {
  public:
-  /// `cell`: m. `max_length`, `max_height`: m, larger instances are not carried. `overlap`: ratio
-  /// of common to all cells from which two instances are the same object.
+  /// `cell`: edge of the cells, m. `max_length`, `max_height`: m, larger instances are not carried.
+  /// `overlap`: ratio of common to all cells from which two instances are one object.
   InstanceLinker(double cell, double max_length, double max_height, double overlap)
       : cell_(cell),
         max_length_(static_cast<float>(max_length)),
         max_height_(static_cast<float>(max_height)),
         overlap_(static_cast<float>(overlap)) {}
 
-  /// Sizes and cells of the instances of one scan. `origin` (m): one frame near all scans that are
-  /// linked.
+  /// Computes the shapes and the cells of the instances of one scan, and resets their log-odds. All
+  /// linked scans must have one origin frame, which should be near them.
   void measure(const InstanceSamples& samples, const Eigen::Isometry3d& T_origin_sensor,
                TrackedInstances& out) {
     out.instances.assign(samples.instance_count(), TrackedInstances::Instance());
@@ -85,7 +85,8 @@ class InstanceLinker {
         if (p > begin && place_[p] == place_[p - 1]) continue;
         const TrackedInstances::Cell cell = {place_[p], i};
         std::uint32_t& slot = slot_of(cell);
-        // A collision in the table counts a cell twice: rare and harmless.
+        // A collision in the table may count a cell twice. Collisions are rare, and the count needs
+        // no more accuracy.
         if (slot != kEmpty && out.cells[slot].place == cell.place &&
             out.cells[slot].instance == i) {
           continue;
@@ -97,8 +98,8 @@ class InstanceLinker {
     }
   }
 
-  /// Links each instance of two consecutive scans to the one of the other scan with the largest
-  /// overlap.
+  /// Links each instance of two consecutive scans to the instance of the other scan with the
+  /// largest overlap.
   void link(TrackedInstances& before, TrackedInstances& now) {
     table_.assign(kTable, kEmpty);
     for (std::uint32_t i = 0; i < before.cells.size(); ++i) slot_of(before.cells[i]) = i;
@@ -122,9 +123,9 @@ class InstanceLinker {
  private:
   static constexpr std::size_t kTable = 1U << 14;
   static constexpr std::uint32_t kEmpty = 0xFFFFFFFFU;
-  static constexpr std::uint32_t kLeastSamples = 2;  // one sample overlaps by chance
+  static constexpr std::uint32_t kLeastSamples = 2;  // a single sample may overlap by chance
 
-  // The hash leaves the instance out, so that equal cells of two scans share a slot.
+  // The hash does not include the instance, so that equal cells of two scans share a slot.
   std::uint32_t& slot_of(const TrackedInstances::Cell& cell) {
     return table_[voxel_hash(cell.place) >> 8 & (kTable - 1)];
   }
@@ -168,23 +169,24 @@ class InstanceLinker {
   float max_length_;
   float max_height_;
   float overlap_;
-  std::vector<std::uint32_t> table_;  // numbers of cells, direct-mapped
-  std::vector<VoxelKey> place_;       // by sample
-  std::vector<std::uint32_t> shared_;
-  std::vector<std::uint32_t> touched_;
+  std::vector<std::uint32_t> table_;    // direct-mapped: index in TrackedInstances::cells
+  std::vector<VoxelKey> place_;         // by sample
+  std::vector<std::uint32_t> shared_;   // by instance of the scan before: number of common cells
+  std::vector<std::uint32_t> touched_;  // instances of the scan before with common cells
 };
 
-/// Propagates log-odds along linked instances; they fade from scan to scan.
+/// Propagates log-odds of motion along linked instances, with a fade factor per scan.
 class TrackBelief {
  public:
   using Instance = TrackedInstances::Instance;
   using Side = TrackedInstances::Side;
 
-  /// `unit`: log-odds of one clear observation.
+  /// `unit`: log-odds increment of one reference with free samples.
   explicit TrackBelief(float unit) : floor_(-1.0F * unit), ceiling_(4.0F * unit) {}
 
-  /// Log-odds of one scan on one side of time (&Instance::past or &Instance::future), from those of
-  /// the adjacent scan on that side; null if there is none.
+  /// Computes the log-odds of a scan `now` on one side of time. `side`: &Instance::past or
+  /// &Instance::future. `adjacent`: the adjacent scan on that side, with its log-odds already
+  /// computed, or null.
   void propagate(Side Instance::*side, const TrackedInstances* adjacent,
                  TrackedInstances& now) const {
     for (Instance& instance : now.instances) {
@@ -200,10 +202,11 @@ class TrackBelief {
   }
 
  private:
-  // Log-odds that an instance takes over. References from well before (after) the motion of its
-  // track that hit its place contradict the motion, unless the instance itself moves.
+  // Log-odds that an instance inherits from its linked instance, `parent`. Hits from references
+  // long before (or after) the motion of the track contradict this motion, and then the instance
+  // inherits nothing, unless its own log-odds are positive.
   static float inherit(const Side& parent, float own, Side& side) {
-    constexpr float kFade = 0.95F;  // from scan to scan
+    constexpr float kFade = 0.95F;  // factor per scan
     constexpr int kSlack = 8;       // scans
     const int since = parent.scans_since_motion + 1;
     side.scans_since_motion = own > 0.0F ? 0 : since;

@@ -1,5 +1,5 @@
-// Ground points that are removed with instances: feet of objects within the footprint, and points
-// that were labelled as ground by mistake.
+// Ground points that are removed with dynamic instances: the feet of objects, and object points
+// with the label ground.
 #pragma once
 
 #include <algorithm>
@@ -21,11 +21,11 @@
 
 namespace dynains {
 
-/// Horizontal hull of points by cells: a cell belongs to it if it lies between two points (or at
-/// one) in its row, and in its column.
+/// Horizontal hull of points on a grid. A cell belongs to the hull if it lies between the first and
+/// the last occupied cell of its row, and of its column.
 class InstanceHull {
  public:
-  /// `cell`: m.
+  /// `cell`: edge of the cells, m.
   explicit InstanceHull(double cell) : cell_(static_cast<float>(cell)) {}
 
   /// Calls `visit(x, y)` with the centre (m) of each cell of the hull of `points` (m). Ignores
@@ -45,8 +45,8 @@ class InstanceHull {
     for (std::size_t i = 0; i < points.size(); ++i) {
       const std::int32_t column = cell_of(points.x[i]) - first_column;
       const std::int32_t row = cell_of(points.y[i]) - first_row;
-      in_row_[static_cast<std::size_t>(row)].take(column);
-      in_column_[static_cast<std::size_t>(column)].take(row);
+      in_row_[static_cast<std::size_t>(row)].extend(column);
+      in_column_[static_cast<std::size_t>(column)].extend(row);
     }
     for (std::int32_t row = 0; row < rows; ++row) {
       const Extent& extent = in_row_[static_cast<std::size_t>(row)];
@@ -65,7 +65,7 @@ class InstanceHull {
   struct Extent {
     std::int32_t first = std::numeric_limits<std::int32_t>::max();
     std::int32_t last = std::numeric_limits<std::int32_t>::min();
-    void take(std::int32_t cell) {
+    void extend(std::int32_t cell) {
       first = std::min(first, cell);
       last = std::max(last, cell);
     }
@@ -80,17 +80,18 @@ class InstanceHull {
   std::vector<Extent> in_column_;
 };
 
-/// Finds the moved ground of one scan: add the removed points, then call find().
+/// Finds the moved ground points of one scan. Call add() and add_hull() for the removed points,
+/// then find(). All points are in the sensor frame (m).
 class MovedGround {
  public:
   using Verdict = EvidenceVerdict::Group;
 
   explicit MovedGround(const FreeSpaceConfig& config)
-      : takes_footprint_(config.footprint > 0.0),
-        tests_(config.ground_test_distance > 0.0),
+      : removes_footprint_(config.footprint > 0.0),
+        tests_ground_(config.ground_test_distance > 0.0),
         rise_(static_cast<float>(config.footprint_rise)),
         belief_(static_cast<float>(config.tau_free)),
-        footprint_(takes_footprint_ ? std::max(config.footprint, kLeastCell) : kDefaultCell,
+        footprint_(removes_footprint_ ? std::max(config.footprint, kLeastCell) : kDefaultCell,
                    std::max({config.ground_test_distance, config.footprint, 0.5}),
                    config.evidence_range),
         around_(config.evidence_range),
@@ -98,23 +99,24 @@ class MovedGround {
         sampler_(config.ground_sample, config.evidence_range, 1) {}
 
   void adapt(const SensorModel& sensor) {
-    // The lowest return of an object may lie one gap between beams above its foot.
+    // The lowest return of an object may lie one gap between two beams above its foot.
     clearance_.slope = static_cast<float>(std::tan(sensor.elevation_gap_wide * M_PI / 180.0));
   }
 
-  /// Boxes of every 64 ground points; valid for all verdicts on a scan.
+  /// Computes the box of each block of 64 ground points. The boxes are valid for all verdicts on a
+  /// scan.
   void bound(PointsView ground, std::vector<GroundBox>& boxes) const {
     footprint_.bound(ground, boxes);
   }
 
-  /// Adds the area below a compact instance. `points` (m): its samples.
+  /// Adds the area below a compact instance. `points`: its samples, at least one.
   void add_hull(PointsView points) {
-    if (!takes_footprint_) return;
+    if (!removes_footprint_) return;
     const float lowest = *std::min_element(points.z.begin(), points.z.end());
     hull_.visit(points, [&](float x, float y) { footprint_.add(x, y, lowest); });
   }
 
-  /// Adds the points of dynamic groups.
+  /// Adds the points of dynamic groups. `group_of`: by point, index in `groups`.
   void add(PointsView points, Span<const std::uint32_t> group_of, Span<const Verdict> groups) {
     detail::grow(moved_, groups.size());
     bool any = false;
@@ -136,9 +138,10 @@ class MovedGround {
     }
   }
 
-  /// The ground points to remove; clears the added points. `boxes`: of bound().
-  /// `for_each_reference(points, count, visit)`: calls `visit(visibility)` for each reference of
-  /// the scan, with the visibility of the first `count` points. The span holds until the next call.
+  /// Returns the ground points to remove, and clears the added points. `boxes`: result of bound()
+  /// for `ground`. `for_each_reference(points, count, visit)`: calls `visit(visibility)` for each
+  /// reference of the scan, with the visibility of the first `count` points. The span is valid
+  /// until the next call.
   template <class References>
   Span<const EvidenceVerdict::GroundPoint> find(PointsView ground, Span<const GroundBox> boxes,
                                                 References&& for_each_reference) {
@@ -153,9 +156,9 @@ class MovedGround {
     under_.clear();
     footprint_.visit_near(ground, boxes, clearance_,
                           [&](std::size_t begin, std::uint64_t near, std::uint64_t below) {
-                            const std::uint64_t under = takes_footprint_ ? below : 0;
+                            const std::uint64_t under = removes_footprint_ ? below : 0;
                             if (under != 0) under_.push_back({begin, under});
-                            if (tests_) add_tested(ground, begin, near & ~under);
+                            if (tests_ground_) add_tested(ground, begin, near & ~under);
                           });
     remove_under(ground);
     if (tested_ > 0) test(for_each_reference);
@@ -164,25 +167,25 @@ class MovedGround {
   }
 
  private:
-  // Points of a block of the ground, one bit each.
+  // Some points of a block of the ground.
   struct Block {
-    std::size_t begin;     // point
-    std::uint64_t points;  // which
+    std::size_t begin;     // index of the first point of the block
+    std::uint64_t points;  // bits of the points
   };
-  // Tested points of a block of the ground, one bit each.
+  // The tested points of a block of the ground.
   struct TestedBlock {
-    std::size_t begin;     // point
-    std::uint64_t points;  // which
-    std::uint64_t first;   // those that begin a run
+    std::size_t begin;     // index of the first point of the block
+    std::uint64_t points;  // bits of the tested points
+    std::uint64_t first;   // bits of the tested points that begin a run
     std::size_t run;       // number of the first run
   };
-  static constexpr double kLeastCell = 0.05;   // m, of the footprint
-  static constexpr double kDefaultCell = 0.2;  // m, if the footprint is off
-  static constexpr std::uint32_t kLeastFree = 2;
-  static constexpr float kLeastRatio = 0.3F;
+  static constexpr double kLeastCell = 0.05;      // m, smallest cell of the footprint
+  static constexpr double kDefaultCell = 0.2;     // m, cell for a footprint of 0
+  static constexpr std::uint32_t kLeastFree = 2;  // "free" references of a moved voxel
+  static constexpr float kLeastRatio = 0.3F;      // "free" to "hit" references of a moved voxel
 
-  // Removes the ground under removed points in cells with a point that rises above the ground
-  // around (the foot of an object), and where the height of the ground around is unknown.
+  // Removes ground points under removed points, in cells with a point that rises above the
+  // surrounding ground (the foot of an object) or whose surrounding ground is unknown.
   void remove_under(PointsView ground) {
     if (rise_ > 0.0F && !under_.empty()) remove_flat_cells(ground);
     for (const Block& block : under_) {
@@ -190,8 +193,9 @@ class MovedGround {
     }
   }
 
+  // Deletes the points of flat cells from `under_`: these stay in the ground.
   void remove_flat_cells(PointsView ground) {
-    around_.take(PointsView(tested_points_).subview(0, tested_), rise_);
+    around_.assign(PointsView(tested_points_).subview(0, tested_), rise_);
     for (const Block& block : under_) {
       const PointsView points = GroundFootprint::block_of(ground, block.begin);
       std::uint64_t rising = 0;
@@ -207,14 +211,15 @@ class MovedGround {
     }
   }
 
-  // Lists the points of a block from `begin` on whose bits are set.
+  // Adds the points of a block whose bits are set in `which` to the result.
   void remove(std::size_t begin, std::uint64_t which, Cause cause) {
     detail::for_each_bit(which, [&](std::size_t i) {
       found_.push_back({static_cast<std::uint32_t>(begin + i), {cause, belief_}});
     });
   }
 
-  // Adds points to be tested: runs of points in one voxel, represented by their first point.
+  // Adds points of a block to the test. Consecutive points in one voxel are a run, and the first
+  // point of a run represents it.
   void add_tested(PointsView ground, std::size_t begin, std::uint64_t which) {
     if (which == 0) return;
     const std::uint64_t changes = sampler_.find_changes(GroundFootprint::block_of(ground, begin));
@@ -228,7 +233,7 @@ class MovedGround {
     });
   }
 
-  // Removes the tested points that enough references find free.
+  // Removes the tested points that are free in enough references.
   template <class References>
   void test(References&& for_each_reference) {
     detail::grow(one_instance_, tested_);
@@ -243,7 +248,7 @@ class MovedGround {
     if (find_free_voxels()) remove_free_runs();
   }
 
-  // Sets `moved_` by position in InstanceSamples::met; returns whether there is any.
+  // Sets `moved_` by index in InstanceSamples::met; returns whether any voxel has moved.
   bool find_free_voxels() {
     bool any = false;
     detail::grow(moved_, samples_.met.size());
@@ -272,26 +277,25 @@ class MovedGround {
     }
   }
 
-  bool takes_footprint_;
-  bool tests_;
+  bool removes_footprint_;
+  bool tests_ground_;
   float rise_;
   float belief_;
   GroundFootprint footprint_;
   SurroundingGround around_;
-  std::vector<Block> under_;  // points under removed points
+  std::vector<Block> under_;  // ground points under removed points
   InstanceHull hull_;
   InstanceSampler sampler_;
   Clearance clearance_ = {0.4F, 0.0F};  // between the ground and objects on it
   std::vector<EvidenceVerdict::GroundPoint> found_;
-  std::vector<std::uint8_t> moved_;  // by group, later by position in InstanceSamples::met
-  // Tested ground points, in runs that share a voxel.
+  std::vector<std::uint8_t> moved_;  // by group, then by index in InstanceSamples::met
   std::vector<TestedBlock> tested_blocks_;
-  std::size_t tested_ = 0;                   // runs
-  PointBuffer tested_points_;                // their first points
-  std::vector<std::uint32_t> one_instance_;  // zeros
-  InstanceSamples samples_;
-  std::vector<std::uint8_t> free_;  // by sample: number of references
-  std::vector<std::uint8_t> hit_;
+  std::size_t tested_ = 0;                   // number of runs of tested points
+  PointBuffer tested_points_;                // by run: its first point
+  std::vector<std::uint32_t> one_instance_;  // by run: instance 0
+  InstanceSamples samples_;                  // of the runs
+  std::vector<std::uint8_t> free_;           // by sample: number of references with "free"
+  std::vector<std::uint8_t> hit_;            // by sample: number of references with "hit"
 };
 
 }  // namespace dynains

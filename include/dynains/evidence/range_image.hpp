@@ -1,4 +1,4 @@
-// Range image of a scan: the lengths of its beams by direction.
+// Range image of a scan: ranges of its returns by direction.
 #pragma once
 
 #include <algorithm>
@@ -14,56 +14,57 @@
 
 namespace dynains {
 
-/// Nearest return per cell, and nearest return of the 3x3 cells around it.
+/// Range image with the nearest return of each cell and the nearest return of its 3x3 cells.
 ///
-/// The neighbourhood is a margin for grazing incidence: beams just below a sample protect the
-/// ground, beams beside it protect edges. Returns of moving points have no such margin: they only
-/// hide the points behind them in their own cells.
+/// A return protects the samples in its 3x3 cells: samples at its range or behind it are not free.
+/// This margin keeps ground at grazing incidence and edges of objects. Returns of moving points
+/// have no such margin: they only occlude the points behind them in their own cells.
 class RangeImage {
  public:
   /// Ranges in cm: even for static points, odd for moving points.
   struct Cell {
-    /// The nearest return of a moving point in the 3x3 cells, else the nearest return in this cell,
-    /// else kNothing.
+    /// Range of the nearest return of a moving point in the 3x3 cells; without one, range of the
+    /// nearest return in this cell; without a return, kNothing.
     std::int16_t nearest;
-    /// The nearest return of the 3x3 cells, without moving points of the eight cells around;
-    /// kUnknown if fewer than two of the cells have such a return.
+    /// Range of the nearest return in the 3x3 cells, except returns of moving points in the eight
+    /// outer cells. kUnknown if fewer than two cells have such a return.
     std::int16_t around;
   };
-  static constexpr std::int16_t kMoving = 1;  ///< bit of a range: return of a moving point
+  static constexpr std::int16_t kMoving = 1;  ///< bit that is set in ranges of moving points
   static constexpr std::int16_t kNothing = 32766;
   static constexpr std::int16_t kUnknown = -2;
 
-  /// Maximum number of cells that a return of an object protects in each direction.
+  /// Maximum number of cells on each side that a return of an object protects.
   static constexpr std::size_t kWidest = 4;
 
-  /// Buffers of build(), shared by the images of one owner.
+  /// Buffers of build(), which several images can share.
   struct Scratch {
-    std::vector<std::int16_t> nearest;
-    std::vector<std::int16_t> objects;  // static objects only, before holes are closed
-    std::vector<std::uint8_t> reach;    // protected cells, by row and group of columns
-    std::vector<std::uint8_t> nearby;   // protected cells around one row, by group of columns
-    std::array<std::vector<std::int16_t>, kWidest> lines;  // by column, for one row
-    std::vector<std::int16_t> below, gap;
-    std::vector<std::int16_t> least, least_moving, count;
-    std::vector<std::int16_t> border;
+    std::vector<std::int16_t> nearest;  // by cell: nearest return
+    std::vector<std::int16_t> objects;  // by cell: nearest return of a static object
+    std::vector<std::uint8_t> reach;    // by row and group of columns: protected cells per side
+    std::vector<std::uint8_t> nearby;   // by group of columns: protected cells around one row
+    std::array<std::vector<std::int16_t>, kWidest> lines;  // by protected cells and column
+    std::vector<std::int16_t> below, gap;                  // by column, see close_holes()
+    std::vector<std::int16_t> least, least_moving, count;  // by column, see merge_three_rows()
+    std::vector<std::int16_t> border;                      // row of kNothing
   };
 
   const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
   const Cell* data() const { return cells_.get(); }
-  /// The grid by which it was built; empty before.
+  /// The grid of the image; empty before the first build() or reserve().
   const RangeImageGrid& grid() const { return grid_; }
 
-  /// Allocates an image and writes to it, so that the system provides the memory now.
+  /// Allocates the cells and writes to them, so that the operating system maps the memory now.
   void reserve(const RangeImageGrid& grid) {
     make_cells(grid);
     std::fill_n(cells_.get(), grid.cell_count(), Cell{kNothing, kUnknown});
   }
 
-  /// Replaces the image by that of one scan (m, sensor frame). A return of an object protects cells
-  /// within the lateral distance `reach` (m), and at least its 3x3 cells: near the sensor, these
-  /// are narrower than the error of poses. `moving`: by object point, 1 if it moves, else 0; empty
-  /// if none does.
+  /// Replaces the image by the image of one scan. `ground`, `objects`: its points, m, sensor frame.
+  /// `moving`: by point of `objects`, 1 for a moving point, else 0; empty if no point moves.
+  /// `reach` (m): a return of an object protects the cells within this lateral distance, and at
+  /// least its 3x3 cells. Near the sensor, the 3x3 cells alone are narrower than the error of the
+  /// poses.
   void build(const RangeImageGrid& grid, PointsView ground, PointsView objects,
              Span<const std::uint8_t> moving, float reach, Scratch& scratch) {
     const ProtectionLimits limits(grid, reach);
@@ -81,7 +82,7 @@ class RangeImage {
   static constexpr float kCentimetres = 100.0F;
   static constexpr float kFarthest = 320.0F;  // m
 
-  // Returns of objects nearer than limit[k] (cm) protect k + 1 cells in each direction.
+  // Returns of objects at ranges below limit[k] (cm) protect k + 1 cells on each side.
   struct ProtectionLimits {
     std::array<std::int16_t, kWidest> limit;
 
@@ -93,8 +94,8 @@ class RangeImage {
     }
   };
 
-  // Writes the nearest range per cell. Cells and ranges of a block go through memory, which is
-  // cheaper than extracting single numbers.
+  // Writes the nearest range of each cell. Cells and ranges of a block are stored in arrays, which
+  // is faster than an extraction of single numbers from packs.
   static void collect(const RangeImageGrid& grid, PointsView points,
                       Span<const std::uint8_t> moving, std::int16_t* nearest) {
     constexpr std::size_t kBlock = 128;
@@ -120,7 +121,7 @@ class RangeImage {
         if (!moving.empty()) {
           for (std::size_t i = 0; i < size; ++i) range[i] |= moving[begin + i];
         }
-        // Directions outside the image have cell 0, which is in the border and is not read.
+        // Points outside the image have cell 0, a cell of the border that is not read.
         for (std::size_t i = 0; i < size; ++i) {
           std::int16_t& value = nearest[cell[i]];
           value = std::min(value, static_cast<std::int16_t>(range[i]));
@@ -129,7 +130,7 @@ class RangeImage {
     });
   }
 
-  // Columns are processed in groups; `group_stride` includes one group on each side of the seam.
+  // Columns are processed in groups. The group stride includes one additional group on each side.
   static std::size_t group_count(const RangeImageGrid& grid) {
     return (grid.stride() - 2 * detail::kPackWidth) / detail::kShortPackWidth;
   }
@@ -142,7 +143,7 @@ class RangeImage {
   static Short is_moving(const Short& range) {
     return (range & Short(kMoving)) == Short(kMoving);
   }
-  // Ranges of moving points only, or of static points only; others become kNothing.
+  // Keeps ranges of moving points only, or of static points only; replaces others by kNothing.
   template <class Short>
   static Short only_moving(const Short& range) {
     return select(is_moving(range), range, Short(kNothing));
@@ -152,8 +153,8 @@ class RangeImage {
     return select(is_moving(range), Short(kNothing), range);
   }
 
-  // Copies the static returns while the image holds objects only, and stores the number of cells
-  // that they protect, if more than one.
+  // Copies the returns of static objects, before the ground is added to the image. Stores the
+  // number of cells that they protect on each side, by group of columns, if it is above one.
   static void keep_objects(const RangeImageGrid& grid, const ProtectionLimits& limits,
                            Scratch& scratch) {
     const std::size_t stride = grid.stride();
@@ -181,12 +182,12 @@ class RangeImage {
     });
   }
 
-  // Rows between two beams are empty. Up to `hole_rows` of them take the nearer return of the rows
+  // Fills gaps of up to `hole_rows` empty rows between two beams with the nearer return of the rows
   // below and above.
   static void close_holes(const RangeImageGrid& grid, Scratch& scratch) {
     using namespace detail;
     const std::size_t stride = grid.stride();
-    // By column: the last return below, and the number of empty rows above it.
+    // By column: the last return below the row, and the number of empty rows above that return.
     scratch.below.assign(stride, kNothing);
     scratch.gap.assign(stride, static_cast<std::int16_t>(grid.hole_rows + 1));
     run_packs([&](auto packs) {
@@ -220,7 +221,7 @@ class RangeImage {
     });
   }
 
-  // Writes the cells: their own nearest return and those of the 3x3 cells.
+  // Writes the cells of the image from the nearest returns of their 3x3 cells.
   void store_with_least_around(const RangeImageGrid& grid, const ProtectionLimits& limits,
                                Scratch& scratch) {
     const std::size_t stride = grid.stride();
@@ -241,15 +242,15 @@ class RangeImage {
     });
   }
 
-  // A row of one of the images of `scratch`; a row of kNothing outside the grid.
+  // A row of `image`, a buffer of `scratch`; a row of kNothing if `row` lies outside the grid.
   static const std::int16_t* row_of(const std::vector<std::int16_t>& image, std::size_t row,
                                     const RangeImageGrid& grid, const Scratch& scratch) {
     return row < static_cast<std::size_t>(grid.rows) ? &image[row * grid.stride()]
                                                      : scratch.border.data();
   }
 
-  // By column of three rows: the nearest static and moving returns, and minus the number of static
-  // returns.
+  // Computes for each column of three rows: the nearest static return, the nearest moving return,
+  // and the negative number of static returns.
   template <class Short>
   static void merge_three_rows(const RangeImageGrid& grid, std::size_t row, Scratch& scratch) {
     const Short nothing(kNothing);
@@ -270,13 +271,13 @@ class RangeImage {
       const Short b = only_staying(here);
       const Short c = only_staying(above);
       min(min(a, b), c).store(leasts + column);
-      // A set mask is -1.
+      // The number of a set mask is -1.
       ((a < nothing) + (b < nothing) + (c < nothing)).store(counts + column);
     }
   }
 
-  // Writes one row of cells. A single static return of the 3x3 cells leaves the cell unknown,
-  // unless it is that of a near object.
+  // Writes one row of cells. A cell with a single static return in its 3x3 cells is unknown, unless
+  // this is the return of a near object.
   template <class Short>
   void store_row(const RangeImageGrid& grid, const ProtectionLimits& limits, std::size_t row,
                  const Scratch& scratch) {
@@ -306,7 +307,7 @@ class RangeImage {
         alone = select(single & (object < near), object, unknown);
       }
       const Short staying = select(returns < one_return, least_of_three(leasts + column), alone);
-      // A moving point of the cell itself hides the points behind it.
+      // A moving point in the cell itself occludes the points behind it.
       const Short here = Short::load(middle + column);
       const Short hiding = min(select(staying < zero, nothing, staying), here);
       const Short around = select(is_moving(here), hiding, staying);
@@ -316,7 +317,7 @@ class RangeImage {
     }
   }
 
-  // Near objects protect more than their 3x3 cells.
+  // Extends the protection of near objects beyond their 3x3 cells.
   void widen(const RangeImageGrid& grid, const ProtectionLimits& limits, Scratch& scratch) {
     const auto rows = static_cast<std::size_t>(grid.rows);
     for (std::vector<std::int16_t>& line : scratch.lines) line.resize(grid.stride());
@@ -330,8 +331,8 @@ class RangeImage {
     });
   }
 
-  // By group: the largest number of protected cells of objects that protect this row; false if
-  // there is none.
+  // Computes for each group of columns the largest number of protected cells among the objects that
+  // protect this row. Returns false if no object protects it.
   static bool find_nearby(const RangeImageGrid& grid, std::size_t row, Scratch& scratch) {
     const auto rows = static_cast<std::size_t>(grid.rows);
     const std::size_t groups = group_count(grid);
@@ -346,13 +347,14 @@ class RangeImage {
         nearby[i] = std::max(nearby[i], cells);
       }
     }
-    // At the seam, the last group may be narrower than the protected cells.
+    // At the seam of the image, the last group may be narrower than the protected cells.
     nearby[0] = std::max(nearby[groups], nearby[groups - 1]);
     nearby[groups + 1] = nearby[1];
     return *std::max_element(nearby, nearby + stride) > 0;
   }
 
-  // For each number of cells: the nearest object above and below that protects so many.
+  // Writes to lines[cells - 1], for each column and each number of cells: the nearest object of the
+  // column at most `cells` rows above or below, if it protects that many cells.
   template <class Short>
   static void widen_upwards(const RangeImageGrid& grid, const ProtectionLimits& limits,
                             std::size_t row, Scratch& scratch) {
@@ -381,6 +383,7 @@ class RangeImage {
     }
   }
 
+  // Applies the protection of the nearest objects in the neighbouring columns to one row.
   template <class Short>
   void widen_sideways(const RangeImageGrid& grid, std::size_t row, const Scratch& scratch) {
     for (std::size_t group = 0; group < group_count(grid); ++group) {
@@ -397,7 +400,7 @@ class RangeImage {
     }
   }
 
-  // Limits `around` of sixteen cells to `reach`; kNothing is no limit.
+  // Limits Cell::around of the cells of one group to `reach`, if it is not kNothing.
   template <class Short>
   static void protect(Cell* cells, const Short& reach) {
     using namespace detail;
@@ -412,7 +415,7 @@ class RangeImage {
     }
   }
 
-  // Copies the ends of a row beyond its other end, as neighbours across the seam.
+  // Copies `width` cells of each end of a row beyond its other end: the neighbours across the seam.
   static void wrap(std::int16_t* row, std::size_t columns, std::size_t width) {
     std::int16_t* const first = row + detail::kPackWidth;
     for (std::size_t i = 0; i < width; ++i) {
@@ -421,8 +424,8 @@ class RangeImage {
     }
   }
 
-  // Leaves cells uninitialised, since each is written before it is read, except cell 0, which is
-  // that of all directions outside.
+  // Allocates the cells. They are not initialised, since each is written before it is read. The
+  // exception is cell 0, the cell of all directions outside the image.
   void make_cells(const RangeImageGrid& grid) {
     const bool fits = grid.cell_count() == grid_.cell_count();
     if (!fits) {

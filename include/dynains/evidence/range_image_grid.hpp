@@ -1,4 +1,4 @@
-// Rows and columns of range images, and the cell of a direction.
+// Grid of range images: rows, columns, and the cell of a direction.
 #pragma once
 
 #include <algorithm>
@@ -17,13 +17,13 @@ namespace dynains {
 struct RangeImageGrid {
   std::int32_t rows = 0;
   std::int32_t columns = 0;  ///< around the full circle
-  float lowest = 0.0F;       ///< level of the lower edge of row 0
+  float lowest = 0.0F;       ///< level() of the lower edge of row 0
   float rows_per_level = 0.0F;
   float columns_per_radian = 0.0F;
-  std::int32_t hole_rows = 0;  ///< maximum number of empty rows between two beams that are filled
+  std::int32_t hole_rows = 0;  ///< largest gap between two beams that is filled, in rows
 
-  /// Approximate elevation (rad) from its sine, by a monotonic cubic: within 0.2 deg below 50 deg;
-  /// beyond, rows become wider.
+  /// Approximate elevation (rad) by its sine: a monotonic cubic, with an error up to 0.2 deg at
+  /// elevations within 50 deg. Rows at steeper elevations are wider.
   template <class Number>
   static Number level(const Number& sine) {
     return sine * (kLevel[0] + kLevel[1] * (sine * sine));
@@ -32,8 +32,8 @@ struct RangeImageGrid {
     return sine * (kLevel[0].values[0] + kLevel[1].values[0] * (sine * sine));
   }
 
-  /// Cells are a little wider than the azimuth step and narrower than the gap between beams, so
-  /// that few cells between returns are empty and few returns share a cell.
+  /// Grid for a sensor. The cells are slightly wider than its azimuth step and lower than the gap
+  /// between its beams: few cells between returns are empty, and few returns share a cell.
   static RangeImageGrid for_sensor(const SensorModel& sensor) {
     constexpr double kRadians = M_PI / 180.0;
     constexpr double kBorder = 2.0;  // deg beyond the outer beams
@@ -54,7 +54,7 @@ struct RangeImageGrid {
     return grid;
   }
 
-  /// Cells from one row to the next, with padding for packs beyond both ends.
+  /// Number of cells from one row to the next, with padding for packs at both ends.
   std::size_t stride() const {
     return (static_cast<std::size_t>(columns) + detail::kShortPackWidth - 1) /
                detail::kShortPackWidth * detail::kShortPackWidth +
@@ -66,7 +66,7 @@ struct RangeImageGrid {
   static constexpr detail::PackConstant kLevel[] = {0.9832868F, 0.2594117F};
 };
 
-/// Azimuth of (x, y) in [-pi, pi] (rad), within 1e-4 rad; NaN for the origin.
+/// Azimuth (rad) of (x, y) in [-pi, pi], with an error below 1e-4 rad; NaN for the origin.
 template <class Float>
 Float coarse_azimuth(const Float& x, const Float& y) {
   using detail::PackConstant;
@@ -84,7 +84,7 @@ Float coarse_azimuth(const Float& x, const Float& y) {
   return detail::with_sign_of(y, detail::with_sign_of(x, from_y_axis) + kQuarter);
 }
 
-/// Finds the cells of points; holds the constants of a grid.
+/// Computes the cells of points in a grid.
 struct ImageLocator {
   explicit ImageLocator(const RangeImageGrid& grid)
       : lowest(grid.lowest),
@@ -94,8 +94,8 @@ struct ImageLocator {
         columns_per_radian(grid.columns_per_radian),
         last_column(static_cast<float>(grid.columns) - 0.5F) {}
 
-  /// Cells of the directions of some points; 0 outside the image. `range`: distances of the points
-  /// from the sensor, in the unit of x, y and z.
+  /// Indices of the cells in the direction of points; 0 for directions outside the image.
+  /// `range`: distances of the points from the sensor, in the unit of `x`, `y` and `z`.
   template <class Packs>
   typename Packs::Int locate(const typename Packs::Float& x, const typename Packs::Float& y,
                              const typename Packs::Float& z,
@@ -105,9 +105,9 @@ struct ImageLocator {
         kBorder(static_cast<float>(detail::kPackWidth));
     const Float row = (RangeImageGrid::level(z / range) - lowest) * rows_per_level;
     const Float column = (coarse_azimuth(x, y) + kHalfTurn) * columns_per_radian;
-    // False for the origin, whose row is NaN.
+    // False for the origin, since its row is NaN.
     const typename Packs::Mask inside = (row >= kZero) & (row < rows);
-    // Exact in floats, since images have fewer than 2^24 cells.
+    // Exact in single precision, since images have fewer than 2^24 cells.
     const Float first = to_float(truncate(keep(inside, row))) * stride;
     return keep(inside, truncate(first + kBorder) +
                             truncate(max(min(column, Float(last_column)), Float(kZero))));

@@ -1,4 +1,4 @@
-// Range images of some of the last scans.
+// Reference scans: scans with a range image, against which other scans are tested.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -20,28 +20,30 @@
 
 namespace dynains {
 
-/// Scans from a scan to its references, on both sides: dense near the scan, sparse far from it. The
-/// scans beside it are left out, since an object has hardly moved there.
+/// Distances (scans) from a scan to its references, before and after it. References are dense near
+/// the scan and sparse far from it. The adjacent scans are excluded, because objects move little in
+/// one scan.
 inline constexpr std::array<int, 19> kReferenceLags = {2,  4,  6,  8,  10,  13,  16,  20,  25, 30,
                                                        40, 50, 65, 80, 100, 125, 150, 175, 200};
 
-/// The lags of kReferenceLags up to `most`, each rounded up (or down, beyond `most`) to a lag with
-/// lag % step == remainder. Ascending, each once.
+/// The lags (scans) of kReferenceLags up to `most`, each rounded up to a lag with lag % step ==
+/// remainder; a result above `most` is rounded down instead. Ascending and unique. `remainder`: in
+/// [0, `step`].
 inline std::vector<int> reference_lags(int most, int remainder, int step) {
-  const auto behind = [&](int lag) { return ((remainder - lag) % step + step) % step; };
-  const int last = most >= 0 ? most + behind(most) - (behind(most) > 0 ? step : 0) : 0;
+  const auto to_next = [&](int lag) { return ((remainder - lag) % step + step) % step; };
+  const int last = most >= 0 ? most + to_next(most) - (to_next(most) > 0 ? step : 0) : 0;
   std::vector<int> lags;
-  for (const int wanted : kReferenceLags) {
-    if (wanted >= most + step) break;
-    const int lag = std::min(wanted + behind(wanted), last);
+  for (const int reference_lag : kReferenceLags) {
+    if (reference_lag >= most + step) break;
+    const int lag = std::min(reference_lag + to_next(reference_lag), last);
     if (lag > (lags.empty() ? 0 : lags.back())) lags.push_back(lag);
   }
   return lags;
 }
 
-/// A scan whose range image is kept: evidence on other scans.
+/// A reference scan: its range image is evidence on other scans.
 struct ReferenceScan {
-  static constexpr std::uint64_t kNoEpoch = ~std::uint64_t{0};
+  static constexpr std::uint64_t kNoEpoch = ~std::uint64_t{0};  ///< epoch without a valid image
 
   std::uint64_t scan = 0;
   std::uint64_t epoch = kNoEpoch;
@@ -49,14 +51,14 @@ struct ReferenceScan {
   RangeImage image;
 };
 
-/// Position of a scan relative to the newest reference at its time.
+/// Position of a scan relative to the latest reference up to it.
 struct ReferencePhase {
   std::uint64_t since_image = 0;  ///< scans since that reference, below `reference_step`
   std::uint64_t image = 0;        ///< number of its image
 };
 
-/// Keeps the images of the references of the last scans. The first scan of each epoch and every
-/// `reference_step`-th after it are references.
+/// Ring buffer of the latest reference scans. The first scan of each epoch, and every scan that is
+/// a multiple of `reference_step` scans after it, is a reference.
 class ReferenceScans {
  public:
   explicit ReferenceScans(const FreeSpaceConfig& config)
@@ -69,14 +71,14 @@ class ReferenceScans {
                 step_ +
             1) {}
 
-  /// Sets the resolution of the images and the tilt of their frame.
+  /// Sets the resolution of later images, and the tilt of their frame, for a sensor.
   void adapt(const SensorModel& sensor) {
     grid_ = RangeImageGrid::for_sensor(sensor);
     R_beams_level_.reset();
     if (!sensor.is_level()) R_beams_level_ = detail::transposed(sensor.R_level_headed);
   }
 
-  /// Allocates the images of `scans` scans, or of as many as are kept.
+  /// Allocates the images for `scans` scans, at most the capacity of the ring buffer.
   void reserve(std::size_t scans) {
     const std::size_t images = grid_.rows > 0 ? std::min(scans / step_ + 1, references_.size()) : 0;
     for (std::size_t i = 1; i <= images; ++i) {
@@ -84,24 +86,25 @@ class ReferenceScans {
     }
   }
 
+  /// Invalidates all references.
   void forget() {
     for (ReferenceScan& reference : references_) reference.epoch = ReferenceScan::kNoEpoch;
   }
 
-  /// Counts the next scan, `since_begin` scans after the first of its epoch. It is a reference, and
-  /// needs make_image(), if `since_image` of the result is 0.
+  /// Registers the next scan, `since_begin` scans after the first scan of its epoch. If
+  /// `since_image` of the result is 0, the scan is a reference and requires make_image().
   ReferencePhase advance(std::uint64_t since_begin) {
     const std::uint64_t phase = since_begin % step_;
     if (phase == 0) {
       ++images_;
-      current().epoch = ReferenceScan::kNoEpoch;  // until its image is whole
+      current().epoch = ReferenceScan::kNoEpoch;  // until make_image()
     }
     return {phase, images_};
   }
 
-  /// Makes the image of the newest reference, in the tilted frame of the sensor: only there are
-  /// beams rows of the image. `T_world_level`: pose of the frame of `split`. `moving`: by
-  /// non-ground point, see RangeImage::build.
+  /// Makes the image of the newest reference in the tilted frame of the sensor, in which each beam
+  /// is a row of the image. `scan`, `epoch`: numbers of the scan and of its epoch. `T_world_level`:
+  /// pose of the frame of `split`. `moving`: by non-ground point, as in RangeImage::build().
   void make_image(std::uint64_t scan, std::uint64_t epoch, const Eigen::Isometry3d& T_world_level,
                   const GroundSplit& split, Span<const std::uint8_t> moving) {
     ReferenceScan& reference = current();
@@ -122,8 +125,8 @@ class ReferenceScans {
   bool awaits_image() const { return newest().epoch == ReferenceScan::kNoEpoch; }
   const ReferenceScan& newest() const { return references_[images_ % references_.size()]; }
 
-  /// The reference `lag` scans after a scan (before it, if negative); null if there is none. `at`:
-  /// of that scan; at.since_image + lag is a multiple of the step.
+  /// The reference `lag` scans after scan number `scan` (before it for a negative lag); null if
+  /// there is none. `at`: phase of `scan`; at.since_image + lag is a multiple of the step.
   const ReferenceScan* find(std::uint64_t scan, std::uint64_t epoch, const ReferencePhase& at,
                             int lag) const {
     const auto signed_step = static_cast<std::int64_t>(step_);
@@ -131,12 +134,12 @@ class ReferenceScans {
     const std::uint64_t image =
         at.image + static_cast<std::uint64_t>(to_image / signed_step);  // exact
     const ReferenceScan& reference = references_[image % references_.size()];
-    const std::uint64_t wanted = scan + static_cast<std::uint64_t>(std::int64_t{lag});
-    return reference.scan == wanted && reference.epoch == epoch ? &reference : nullptr;
+    const std::uint64_t reference_scan = scan + static_cast<std::uint64_t>(std::int64_t{lag});
+    return reference.scan == reference_scan && reference.epoch == epoch ? &reference : nullptr;
   }
 
-  /// Visibility of the first `count` points (m; padded for packs) from a reference. Holds
-  /// until the next call.
+  /// Visibility of the first `count` points (m; padded for packs) from a reference. The result is
+  /// valid until the next call.
   const detail::Visibility& test(const PointBuffer& points, std::size_t count,
                                  const Eigen::Isometry3d& T_world_points,
                                  const ReferenceScan& reference) {
@@ -153,9 +156,9 @@ class ReferenceScans {
   float margin_;
   float margin_slope_;
   float lateral_margin_;
-  std::uint64_t step_;  // scans from one image to the next
-  std::vector<ReferenceScan> references_;
-  std::uint64_t images_ = 0;  // number of the newest image
+  std::uint64_t step_;                     // scans from one image to the next
+  std::vector<ReferenceScan> references_;  // ring buffer, by number of the image
+  std::uint64_t images_ = 0;               // number of the newest image
   RangeImageGrid grid_;
   std::optional<Eigen::Matrix3d> R_beams_level_;  // if the sensor is tilted
   PointBuffer rotated_ground_;

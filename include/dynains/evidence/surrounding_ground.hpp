@@ -1,4 +1,4 @@
-// Heights of ground points above the ground around them.
+// Heights of ground points above the surrounding ground.
 #pragma once
 
 #include <algorithm>
@@ -13,26 +13,27 @@
 
 namespace dynains {
 
-/// Planes by horizontal cells of 2 m in the sensor frame: each is fitted to the ground points of
-/// its cell and of the eight around it.
+/// Ground planes by horizontal cells of 2 m in the sensor frame. Each plane is fitted to the ground
+/// points of its cell and of the eight cells around it.
 class SurroundingGround {
  public:
-  /// Height where the ground around has too few points for a plane.
+  /// Height above ground with too few points for a plane.
   static constexpr float kUnknown = std::numeric_limits<float>::infinity();
 
-  /// `max_range`: m; points beyond share the cells at the border.
+  /// `max_range`: m; points beyond are assigned to the outermost cells.
   explicit SurroundingGround(double max_range)
       : half_(std::ceil(static_cast<float>(max_range / kCell)) + 2.0F),
         width_(2 * static_cast<std::size_t>(half_)),
         number_of_(width_ * width_, 0) {
-    cells_.reserve(number_of_.size() + 1);  // takes address space only
+    cells_.reserve(number_of_.size() + 1);  // uses address space only
     used_.reserve(number_of_.size());
     forget();
   }
 
-  /// Replaces the ground points (m). Leaves out points that lie `rise` (m) or more above the plane
-  /// of all points, which may belong to an object, and points without a plane.
-  void take(PointsView points, float rise) {
+  /// Replaces the ground points (m). The planes exclude points that lie `rise` (m) or more above
+  /// the plane of all points, since these may belong to an object, and points of cells without a
+  /// plane.
+  void assign(PointsView points, float rise) {
     forget();
     for (std::size_t i = 0; i < points.size(); ++i) add(points, i, 1.0);
     detail::ensure_capacity(rising_, points.size());
@@ -45,7 +46,7 @@ class SurroundingGround {
     for (Cell& cell : cells_) cell.has_plane = false;
   }
 
-  /// Height (m) of a point (m) above the ground around it, along z, or kUnknown.
+  /// Height (m) of a point (m) above the plane of its cell, along z, or kUnknown.
   float height(float x, float y, float z) {
     const std::size_t index = index_of(x, y);
     Cell& cell = cell_at(index);
@@ -66,14 +67,14 @@ class SurroundingGround {
     bool has_plane = false;
   };
 
-  // Number 0 is an empty cell.
+  // Cell 0 is the empty cell of all unused places.
   void forget() {
     for (const std::size_t index : used_) number_of_[index] = 0;
     used_.clear();
     cells_.assign(1, Cell());
   }
 
-  // Points do not fall into the cells at the border of the grid.
+  // Index of the cell of a point, never a cell at the border of the grid.
   std::size_t index_of(float x, float y) const {
     constexpr auto kPerMetre = static_cast<float>(1.0 / kCell);
     const float last = 2.0F * half_ - 2.0F;
@@ -102,7 +103,7 @@ class SurroundingGround {
                      weight);
   }
 
-  // Least-squares fit of z.
+  // Fits the plane of a cell by least squares of z.
   void find_plane(std::size_t index, Cell& cell) const {
     cell.has_plane = true;
     cell.offset = -kUnknown;
@@ -113,13 +114,13 @@ class SurroundingGround {
       }
     }
     if (sum.count < kLeastPoints) return;
-    const double share = 1.0 / sum.count;
-    const double mean_x = sum.x * share, mean_y = sum.y * share, mean_z = sum.z * share;
-    const double xx = sum.xx * share - mean_x * mean_x;
-    const double xy = sum.xy * share - mean_x * mean_y;
-    const double yy = sum.yy * share - mean_y * mean_y;
-    const double xz = sum.xz * share - mean_x * mean_z;
-    const double yz = sum.yz * share - mean_y * mean_z;
+    const double weight = 1.0 / sum.count;
+    const double mean_x = sum.x * weight, mean_y = sum.y * weight, mean_z = sum.z * weight;
+    const double xx = sum.xx * weight - mean_x * mean_x;
+    const double xy = sum.xy * weight - mean_x * mean_y;
+    const double yy = sum.yy * weight - mean_y * mean_y;
+    const double xz = sum.xz * weight - mean_x * mean_z;
+    const double yz = sum.yz * weight - mean_y * mean_z;
     const double half = 0.5 * (xx - yy);
     const double least_variance = 0.5 * (xx + yy) - std::sqrt(half * half + xy * xy);
     if (!(least_variance >= kLeastVariance)) return;
@@ -133,10 +134,10 @@ class SurroundingGround {
 
   float half_;                            // cells from the sensor to the border
   std::size_t width_;                     // of the grid, in cells
-  std::vector<std::uint32_t> number_of_;  // row-major: index into `cells_`
-  std::vector<std::size_t> used_;         // non-zero entries of it
+  std::vector<std::uint32_t> number_of_;  // row-major: index in cells_
+  std::vector<std::size_t> used_;         // indices of the non-zero entries of number_of_
   std::vector<Cell> cells_;
-  std::vector<std::uint32_t> rising_;  // points that are left out
+  std::vector<std::uint32_t> rising_;  // excluded points
 };
 
 }  // namespace dynains

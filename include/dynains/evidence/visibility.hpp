@@ -1,4 +1,4 @@
-// Visibility of points from another scan: the inner loop of free-space evidence.
+// Visibility of samples from a reference scan: the inner loop of the free-space evidence.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -16,24 +16,24 @@
 
 namespace dynains::detail {
 
-/// Number of samples that are tested together.
+/// Number of samples per block of test_visibility().
 inline constexpr std::size_t kBeamBlock = 256;
 
-/// Result of testing samples against one reference: for each sample one bit "free" and one bit
-/// "hit", at most one of them set.
+/// Visibility of samples from one reference scan: for each sample one bit "free" and one bit "hit".
+/// Not both are set; a sample without either is unknown.
 class Visibility {
  public:
-  /// Makes room for `count` samples; the caller writes their bits.
+  /// Allocates the bits of `count` samples; the caller writes them.
   void resize(std::size_t count) {
-    // count() reads eight bytes, beginning with the byte of the first bit.
+    // count() reads eight bytes from the byte of the first bit on.
     const std::size_t bytes = (count + kBeamBlock - 1) / kBeamBlock * kBeamBlock / 8 + 8;
     grow(free_, bytes);
     grow(hit_, bytes);
   }
-  /// Storage of the bits: one byte for eight samples.
+  /// Storage of the bits: one byte per eight samples.
   struct Bytes {
-    std::uint8_t* free;  ///< all beams around the sample are longer than its range
-    std::uint8_t* hit;   ///< a beam ended at the sample, on a static point
+    std::uint8_t* free;  ///< all returns in the cells around the sample lie behind it
+    std::uint8_t* hit;   ///< a static return lies at the sample
   };
   Bytes bytes() { return {free_.data(), hit_.data()}; }
 
@@ -41,9 +41,10 @@ class Visibility {
     std::uint32_t free;
     std::uint32_t hit;
   };
+  /// Numbers of free and hit samples in [begin, end).
   Count count(std::size_t begin, std::size_t end) const {
-    constexpr std::size_t kAtOnce =
-        56;  // bits of a word behind any bit of its first byte, at least
+    // A word that begins with the byte of a bit contains at least 56 bits from this bit on.
+    constexpr std::size_t kAtOnce = 56;
     constexpr std::uint64_t kAll = (std::uint64_t{1} << kAtOnce) - 1;
     Count sum = {0, 0};
     for (; end - begin > kAtOnce; begin += kAtOnce) {
@@ -55,8 +56,9 @@ class Visibility {
     sum.hit += count_ones(word_from(hit_, begin) & left);
     return sum;
   }
-  /// Increments, for each of the first `count` samples, its number of references that find it free
-  /// or hit it (fewer than 256). Both arrays have room for a multiple of eight.
+  /// For each of the first `count` samples, increments its number of "free" references in `free`
+  /// and its number of "hit" references in `hit`; the results must be below 256. The sizes of both
+  /// arrays are at least `count`, rounded up to a multiple of eight.
   void add_to(std::size_t count, std::uint8_t* free, std::uint8_t* hit) const {
     for (std::size_t i = 0; i < count; i += 8) {
       for (std::size_t k = 0; k < 8; ++k) {
@@ -66,8 +68,8 @@ class Visibility {
     }
   }
 
-  /// Bits of the 64 samples from `first` on, a multiple of 64. Bits behind the last sample are
-  /// arbitrary.
+  /// Bits of the 64 samples from `first` on; `first` is a multiple of 64. Bits behind the last
+  /// sample are arbitrary.
   std::uint64_t free_word(std::size_t first) const { return word_at(free_, first); }
   std::uint64_t hit_word(std::size_t first) const { return word_at(hit_, first); }
   bool is_free(std::size_t sample) const { return (free_[sample / 8] >> sample % 8 & 1U) != 0; }
@@ -86,15 +88,16 @@ class Visibility {
   std::vector<std::uint8_t> free_, hit_;
 };
 
-/// Bits of some samples. `cells`: of the image, packed; `is_inside`: in the image; `range`,
-/// `tolerance`: of the samples, in cm.
+/// Computes the bits of a pack of samples. `cells`: their cells of the range image, one
+/// RangeImage::Cell per number. `is_inside`: whether they lie in the image. `range`, `tolerance`:
+/// range of the samples and margin, cm.
 template <class Packs>
 void compare_ranges(const typename Packs::Int& cells, const typename Packs::Mask& is_inside,
                     const typename Packs::Float& range, const typename Packs::Float& tolerance,
                     std::uint8_t& free_bits, std::uint8_t& hit_bits) {
   using Float = typename Packs::Float;
   using Int = typename Packs::Int;
-  // `nearest` is the lower half of a cell, `around` the upper.
+  // Cell::nearest is the lower half of a cell, Cell::around the upper half.
   const Float nearest = to_float((cells << 16) >> 16);
   const Float around = to_float(cells >> 16);
   const auto is_at = [&](const Float& value) { return abs(value - range) <= tolerance; };
@@ -110,9 +113,10 @@ void compare_ranges(const typename Packs::Int& cells, const typename Packs::Mask
   hit_bits = static_cast<std::uint8_t>(hit.bits());
 }
 
-/// Tests `count` samples (m; padded for packs) against a range image. A beam passes a sample
-/// if it is longer by more than `margin` (m) + `slope` (m/m) * range. Hits on moving points are
-/// neither "free" nor "hit". `T_reference_sample`: rigid.
+/// Tests the first `count` samples (m; padded for packs) against a range image. A return lies
+/// behind a sample if its range is larger by more than `margin` (m) + `slope` (m/m) * range of the
+/// sample. A sample at a return of a moving point is neither "free" nor "hit".
+/// `T_reference_sample`: rigid, from the frame of the samples to the frame of the image.
 inline void test_visibility(const RangeImage& image, const Eigen::Isometry3d& T_reference_sample,
                             const PointBuffer& samples, std::size_t count, float margin,
                             float slope, Visibility& visibility) {
@@ -126,12 +130,12 @@ inline void test_visibility(const RangeImage& image, const Eigen::Isometry3d& T_
     using Packs = decltype(packs);
     using Float = typename Packs::Float;
     using Int = typename Packs::Int;
-    // Local copies: stores of bytes may alias the members.
+    // Local copies, since stores of bytes may alias the members.
     const Visibility::Bytes bits = visibility.bytes();
     const RangeImage::Cell* const cells = image.data();
     const Float scale(to_centimetres), least(base), slope_per_metre(growth);
-    // Images are larger than the first caches: all cells of a block are prefetched before the first
-    // is used.
+    // All cells of a block are prefetched before the first is used, since an image is larger than
+    // the inner caches.
     std::int32_t cell[kBeamBlock];
     float ranges[kBeamBlock];
     std::int32_t packed[kPackWidth];

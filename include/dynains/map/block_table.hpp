@@ -1,4 +1,4 @@
-// Blocks of voxels by their index in the world: storage and hash table of the static map.
+// Storage of the static map: a chunked vector and a hash table of blocks of voxels.
 #pragma once
 
 #include <cstddef>
@@ -12,8 +12,8 @@
 
 namespace dynains::detail {
 
-/// Grows by chunks that never move: references stay valid, and a push allocates one chunk at most.
-/// `T` is trivially constructible; `kChunk`: elements.
+/// Vector that grows by chunks. Elements never move, so references stay valid. A push_back()
+/// allocates at most one chunk. `T`: trivially constructible. `kChunk`: elements per chunk.
 template <class T, std::uint32_t kChunk>
 class ChunkedVector {
  public:
@@ -21,8 +21,8 @@ class ChunkedVector {
   T& operator[](std::uint32_t i) { return chunks_[i / kChunk][i % kChunk]; }
   const T& operator[](std::uint32_t i) const { return chunks_[i / kChunk][i % kChunk]; }
 
-  /// Returns the index of the new element, at most 2^32 - 2. Throws std::length_error beyond it,
-  /// and std::bad_alloc; then the vector is unchanged.
+  /// Appends an element and returns its index, at most 2^32 - 2. Throws std::length_error if the
+  /// vector is full, and std::bad_alloc; in both cases the vector is unchanged.
   std::uint32_t push_back(const T& value) {
     if (size_ == chunks_.size() * kChunk) add_chunk();
     (*this)[size_] = value;
@@ -44,8 +44,8 @@ class ChunkedVector {
   std::uint32_t size_ = 0;
 };
 
-/// Indices of a block in the world, counted in blocks: 32 bits each, since a VoxelKey is too narrow
-/// for the smallest voxels at national grid coordinates.
+/// Indices of a block in the world frame, in blocks. Each has 32 bits: the 21 bits of a VoxelKey
+/// are too few for the smallest voxels at national grid coordinates.
 struct BlockIndex {
   std::int32_t x, y, z;
   friend bool operator==(const BlockIndex& a, const BlockIndex& b) {
@@ -53,11 +53,11 @@ struct BlockIndex {
   }
 };
 
-/// Hash table that numbers blocks in the order in which they are added, and keeps their data.
+/// Hash table that numbers blocks in the order of their insertion, and stores their data.
 ///
-/// Linear hashing (Litwin, 1980): each new block splits one bucket, so that no frame pays for a
-/// rebuild of the whole table. VoxelHashTable does rebuild: tens of milliseconds for half a million
-/// keys.
+/// Linear hashing (Litwin, 1980): each new block splits one bucket, so the time of an insertion
+/// does not grow with the table. VoxelHashTable instead rebuilds the whole table, which takes tens
+/// of milliseconds for half a million keys.
 template <class Data>
 class BlockTable {
  public:
@@ -66,7 +66,7 @@ class BlockTable {
   struct Block {
     Data data;
     BlockIndex index;
-    std::uint32_t next;  // in the bucket; kNone behind the last
+    std::uint32_t next;  // next block of the bucket, or kNone
   };
 
   std::uint32_t size() const { return blocks_.size(); }
@@ -76,8 +76,8 @@ class BlockTable {
   /// Number of a block, or kNone.
   std::uint32_t find(const BlockIndex& index) const { return find(index, hash_of(index)); }
 
-  /// Number of a block, which is added with `data` if it is new. Throws std::length_error beyond
-  /// 2^32 - 2 blocks, and std::bad_alloc.
+  /// Number of a block; adds a new block with `data`. Throws std::length_error beyond 2^32 - 2
+  /// blocks, and std::bad_alloc.
   std::uint32_t find_or_add(const BlockIndex& index, const Data& data) {
     const std::uint32_t hash = hash_of(index);
     const std::uint32_t found = find(index, hash);
@@ -87,13 +87,13 @@ class BlockTable {
   std::size_t memory_bytes() const { return blocks_.memory_bytes() + buckets_.memory_bytes(); }
 
  private:
-  // Well mixed in the lower bits.
+  // The lower bits are well mixed.
   static std::uint32_t hash_of(const BlockIndex& index) {
     const auto hash = static_cast<std::uint32_t>(mixed_hash(index.x, index.y, index.z));
     return hash ^ (hash >> 13);
   }
 
-  // Each round of splits doubles the number of buckets, from `round_begin_` on.
+  // A round of splits doubles the number of buckets, from round_begin_ to 2 * round_begin_.
   std::uint32_t bucket_of(std::uint32_t hash) const {
     const std::uint32_t bucket = hash & (2 * round_begin_ - 1);
     return bucket < buckets_.size() ? bucket : bucket - round_begin_;
@@ -106,7 +106,7 @@ class BlockTable {
     return block;
   }
 
-  // One bucket per block: a search looks at one or two blocks on average.
+  // The table has one bucket per block: a search visits one or two blocks on average.
   std::uint32_t add(const BlockIndex& index, const Data& data, std::uint32_t hash) {
     split_bucket();
     std::uint32_t& first = buckets_[bucket_of(hash)];
@@ -134,7 +134,7 @@ class BlockTable {
   }
 
   std::uint32_t round_begin_ = 1;
-  ChunkedVector<std::uint32_t, 1024> buckets_;  // first block of each
+  ChunkedVector<std::uint32_t, 1024> buckets_;  // by bucket: its first block, or kNone
   ChunkedVector<Block, 512> blocks_;
 };
 

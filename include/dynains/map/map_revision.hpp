@@ -1,4 +1,4 @@
-// Removes blocks of the static map that later scans find free.
+// Removal of blocks of the static map that are free in later scans.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -17,10 +17,10 @@
 
 namespace dynains {
 
-/// Tests the blocks of a map around the sensor against the newest reference, each block once per
-/// period, and sums log-odds that it is free: Eq. 15 with the three increments of Eq. 18, never
-/// below zero (Page's test), so that an object which was hit for long may still leave. The cost
-/// depends on the density of the map around the sensor, not on its size.
+/// Sums the log-odds that a block of the map is free (see detail::FreeSpaceSum) over its visibility
+/// from reference scans. Tests each block around the sensor once per period, against the newest
+/// reference scan. The cost depends on the density of the map around the sensor, not on the size of
+/// the map. Goes beyond the paper.
 class MapRevision {
  public:
   using Config = MapRevisionConfig;
@@ -35,8 +35,9 @@ class MapRevision {
 
   const Config& config() const { return config_; }
 
-  /// Tests the blocks that are due at scan number `scan`, and erases the free ones from `map`.
-  /// `test_visibility(points, count, T_world_points)`: FreeSpaceEvidence::test_visibility.
+  /// Tests the blocks that are due at scan number `scan`, and erases free blocks from `map`.
+  /// `sensor_world`: position of the sensor, m, world frame. `test_visibility(points, count,
+  /// T_world_points)`: calls FreeSpaceEvidence::test_visibility().
   template <class Map, class TestVisibility>
   void revise(Map& map, std::uint64_t scan, const Eigen::Vector3d& sensor_world,
               TestVisibility&& test_visibility) {
@@ -64,7 +65,7 @@ class MapRevision {
  private:
   static constexpr double kTile = 25.0;             // m
   static constexpr std::uint32_t kMostSamples = 8;  // per block
-  static constexpr float kLeastVisible = 0.3F;      // ratio to the samples
+  static constexpr float kLeastVisible = 0.3F;      // ratio of visible to all samples of a block
 
   static std::int64_t tile_of(double metres) {
     return static_cast<std::int64_t>(std::floor(metres / kTile));
@@ -82,7 +83,8 @@ class MapRevision {
     }
   }
 
-  // Samples of the blocks that are due, in the frame of the sensor with axes of the world.
+  // Collects samples of the blocks that are due: m, relative to the sensor, with the axes of the
+  // world frame.
   template <class Map>
   void gather(const Map& map, std::uint64_t scan, const Eigen::Vector3d& sensor_world) {
     blocks_.clear();
@@ -136,8 +138,8 @@ class MapRevision {
   float level_;
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> tiles_;  // blocks by tile key
   detail::ChunkedVector<float, 1024> levels_;  // by block: log-odds that it is free
-  std::vector<std::uint32_t> blocks_;          // that are tested now
-  std::vector<std::uint32_t> begin_;           // first sample of each, and the end
+  std::vector<std::uint32_t> blocks_;          // tested blocks
+  std::vector<std::uint32_t> begin_;           // by tested block: first sample, and the end
   PointBuffer samples_;
 };
 

@@ -221,7 +221,7 @@ template <class Stages>
 void Pipeline<Stages>::ingest(const CloudView& cloud, ScanSlot& next) {
   const auto nearest = static_cast<float>(config_.min_range);
   const auto farthest = static_cast<float>(config_.max_range);
-  if (frame_.turns()) {
+  if (frame_.rotates_scans()) {
     const Eigen::Matrix3d R_level_sensor = level(next);
     ingest_.read(cloud, nearest, farthest, &R_level_sensor, next.labels);
   } else {
@@ -248,7 +248,7 @@ void Pipeline<Stages>::find_sensor(ScanSlot& newest) {
     frame_.forget();  // the next scan adapts all stages
     throw;
   }
-  if (frame_.turns()) ingest_.turn(level(newest));
+  if (frame_.rotates_scans()) ingest_.turn(level(newest));
 }
 
 /// Levels the pose of the scan. Returns the rotation for its points.

@@ -1,4 +1,4 @@
-// Mounting of a sensor, its height above the ground and its tilt, estimated from one scan.
+// Estimate of the mounting of a sensor (height above the ground, tilt) from one scan.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,18 +19,18 @@
 
 namespace dynains {
 
-/// Plane of the ground around the sensor, in the sensor frame.
+/// Mounting of a sensor: the ground plane around it, in the sensor frame.
 struct Mounting {
   double height = 0.0;  ///< m, distance of the sensor from the plane
   Eigen::Vector3d up_sensor = Eigen::Vector3d::UnitZ();  ///< upward normal, unit length
-  bool known = false;                                    ///< false: no ground was found
+  bool known = false;                                    ///< whether a ground plane was found
 
-  /// deg, angle between the z axis of the sensor and the normal; above 90 for a sensor that hangs
-  /// upside down.
+  /// Angle between the z axis of the sensor and the upward normal (deg, [0, 180]). Above 90 if the
+  /// sensor is mounted upside down.
   double tilt() const { return std::acos(std::clamp(up_sensor.z(), -1.0, 1.0)) * 180.0 / M_PI; }
 
-  /// The smallest rotation from the sensor frame to a level frame, which maps the normal to the z
-  /// axis. For a normal along -z it is the half turn about x.
+  /// Rotation by the smallest angle from the sensor frame to a level frame, whose z axis is the
+  /// upward normal. For a normal along -z, a rotation by 180 deg about x.
   Eigen::Matrix3d R_level_sensor() const {
     // Closed form: Quaterniond::FromTwoVectors takes seconds to compile.
     constexpr double kTiny = 1e-200;
@@ -89,10 +89,11 @@ struct GroundHypothesis {
   double distance(const Eigen::Vector3d& p) const { return dot(up, p) + height; }
 };
 
-/// Finds the plane with the most area on it and the least below it: RANSAC over one point per cell,
-/// then least squares.
+/// Finds the ground plane: the plane with most occupied cells on it and fewest below it. RANSAC
+/// over one point per cell, then least squares.
 class MountingEstimator {
  public:
+  /// `points`: one scan, m, sensor frame.
   explicit MountingEstimator(PointsView points) : cells_(thin(points)) {
     for (std::size_t i = 0; i < std::min(kScored, cells_.size()); ++i) {
       const Eigen::Vector3d& p = cells_[i];
@@ -101,7 +102,8 @@ class MountingEstimator {
     }
   }
 
-  /// The ground below the sensor (`side` 1), or above it (-1) if the sensor hangs upside down.
+  /// The ground plane on the negative z side of the sensor (`side` 1), or on its positive z side
+  /// (-1: mounted upside down). Empty if no plane is valid.
   std::optional<GroundHypothesis> find(double side) const {
     if (cells_.size() < kFewestCells) return std::nullopt;
     const std::optional<GroundHypothesis> coarse = search(side);
@@ -115,13 +117,13 @@ class MountingEstimator {
 
  private:
   static constexpr double kMaxDistance = 20.0;   // m; farther ground may lie in another plane
-  static constexpr double kCell = 0.5;           // m; one point per cell makes density irrelevant
-  static constexpr double kMinDistance = 0.4;    // m; nearer points hit the housing
+  static constexpr double kCell = 0.5;           // m; one point per cell evens out the density
+  static constexpr double kMinDistance = 0.4;    // m; nearer points may lie on the housing
   static constexpr double kLowest = 0.2;         // m, height of the sensor
   static constexpr double kHighest = 5.0;        // m, height of the sensor
   static constexpr double kLeastUpright = 0.64;  // cosine of a tilt of 50 deg
-  static constexpr double kOnGround = 0.12;      // m, off the plane
-  static constexpr double kBelow = 0.4;          // m; cells so far below contradict a plane
+  static constexpr double kOnGround = 0.12;      // m, largest distance of a ground cell
+  static constexpr double kBelow = 0.4;          // m; cells farther below contradict a plane
   static constexpr std::size_t kFewestCells = 60;
   static constexpr int kTrials = 3000;
   static constexpr std::size_t kScreened = 200;  // cells that score every hypothesis
@@ -134,8 +136,8 @@ class MountingEstimator {
     return range > kMinDistance && range < kMaxDistance;
   }
 
-  // Mean of the points in each occupied cell, in random order: any part is a fair sample. No cells
-  // if the points are too few for kFewestCells.
+  // Mean of the points in each occupied cell, in random order, so that any subrange is a random
+  // sample. Empty if there are fewer points than kFewestCells.
   static std::vector<Eigen::Vector3d> thin(PointsView points) {
     std::size_t near = 0;
     for (std::size_t i = 0; i < points.size() && near < kFewestCells; ++i) {
@@ -170,7 +172,7 @@ class MountingEstimator {
       sum.z += static_cast<double>(p[2]);
       sum.count += 1.0;
     }
-    // The order of the points must not matter.
+    // Makes the result independent of the order of the points.
     std::sort(sums.begin(), sums.end(), [](const Sum& a, const Sum& b) { return a.cell < b.cell; });
     std::vector<Eigen::Vector3d> cells;
     cells.reserve(sums.size());
@@ -182,7 +184,7 @@ class MountingEstimator {
     return cells;
   }
 
-  // The best of random planes through three cells.
+  // RANSAC: the plane with the best score among planes through three random cells.
   std::optional<GroundHypothesis> search(double side) const {
     struct Candidate {
       GroundHypothesis ground;
@@ -213,7 +215,8 @@ class MountingEstimator {
     return best->ground;
   }
 
-  // How well the first `count_limit` cells fit a plane.
+  // Score of a plane by the first `count_limit` cells: the weighted number of cells on it, minus
+  // half the number of cells below it.
   float score(const GroundHypothesis& ground, std::size_t count_limit) const {
     const Float8 x(static_cast<float>(ground.up.x()));
     const Float8 y(static_cast<float>(ground.up.y()));
@@ -223,12 +226,12 @@ class MountingEstimator {
     const Float8 slope(static_cast<float>(0.5 / kOnGround));
     const Float8 below(static_cast<float>(-kBelow));
     Float8 total(0.0F);
-    // Whole packs only; the few cells left over do not matter.
+    // Ignores the cells of the last, incomplete pack.
     const std::size_t count = std::min(count_limit, cells_.size()) / kPackWidth * kPackWidth;
     for (std::size_t i = 0; i < count; i += kPackWidth) {
       const Float8 distance = (x * Float8::load(&scored_.x[i]) + y * Float8::load(&scored_.y[i])) +
                               (z * Float8::load(&scored_.z[i]) + height);
-      // A smooth fall-off prefers the middle of a rough ground to its edge.
+      // The weight decreases with distance, so that the plane fits the middle of a rough ground.
       total = total + max(one - abs(distance) * slope, zero) - keep(distance < below, half);
     }
     return sum(total);
@@ -239,8 +242,9 @@ class MountingEstimator {
            ground.height < kHighest;
   }
 
-  // Weighted least squares over the cells within `band` m of the plane. Near cells weigh more,
-  // since far ground bends away on slopes. False if too few cells are left.
+  // Weighted least squares over the cells within `band` m of the plane. Near cells have a larger
+  // weight, since distant ground on a slope may lie off the plane. Returns false if the fit has too
+  // few cells or is not possible.
   bool refine(double band, double side, GroundHypothesis& ground) const {
     PlaneMoments m;
     const double near_distance = 4.0 * ground.height + 3.0;
@@ -259,7 +263,7 @@ class MountingEstimator {
     return is_possible(ground, side);
   }
 
-  // Whether enough cells lie on the plane, and few below it.
+  // Whether enough cells lie on the plane, and fewer below it.
   bool is_sound(const GroundHypothesis& ground) const {
     std::size_t on = 0;
     std::size_t below = 0;
@@ -272,18 +276,18 @@ class MountingEstimator {
   }
 
   std::vector<Eigen::Vector3d> cells_;  // m, sensor frame
-  PointBuffer scored_;                  // the first kScored of them
+  PointBuffer scored_;                  // the first kScored cells
 };
 
 }  // namespace detail
 
-/// Estimates height and tilt of a sensor from one scan (m, sensor frame), by the plane of the
-/// ground within 20 m. On a slope, the normal is that of the slope.
+/// Estimates the height and the tilt of a sensor from one scan (m, sensor frame): a plane fit to
+/// the ground within 20 m. On a slope, the result is the normal of the slope.
 ///
-/// Valid for sensors 0.2 to 5 m above the ground that are tilted by up to 45 deg, upright or upside
-/// down, with any heading. Not known if the scan shows too little ground. Ignores points that are
-/// not finite. Allocates and takes milliseconds: meant for a few scans of a sensor, not for each;
-/// the median over several scans is steadier.
+/// Valid for sensors 0.2 to 5 m above the ground with a tilt up to 45 deg, upright or upside down,
+/// at any heading. The result is not `known` if the scan has too few ground points. Ignores points
+/// that are not finite. Allocates memory and takes milliseconds, so call it for a few scans of a
+/// sensor, not for each. The median over several scans has a smaller error.
 inline Mounting estimate_mounting(PointsView points) {
   const detail::MountingEstimator estimator(points);
   for (const double side : {1.0, -1.0}) {
@@ -292,9 +296,10 @@ inline Mounting estimate_mounting(PointsView points) {
   return {};
 }
 
-/// Azimuth (rad, sensor frame) of the direction in which a scan extends farthest, towards the end
-/// with more points. It rotates with the points, and so do cells that are laid along it. 0 for an
-/// empty scan; coordinates are finite.
+/// Azimuth (rad, sensor frame) of the main axis of a scan: the horizontal axis of the largest
+/// second moment about the sensor, towards the side of the mean. It rotates with the points, so
+/// results in a frame along this axis do not depend on the yaw of the sensor. 0 for an empty scan.
+/// `points` (m) must be finite.
 inline double estimate_heading(PointsView points) {
   double x = 0.0, y = 0.0;           // sums
   double along = 0.0, across = 0.0;  // second moments, as a vector at twice the angle
@@ -311,7 +316,7 @@ inline double estimate_heading(PointsView points) {
   return ahead ? heading : heading + M_PI;
 }
 
-/// Rotation from the sensor frame to a frame whose x axis points along `heading` (rad, about z).
+/// Rotation about z from the sensor frame to a frame with its x axis at azimuth `heading` (rad).
 inline Eigen::Matrix3d R_headed(double heading) {
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   R(0, 0) = R(1, 1) = std::cos(heading);
@@ -322,33 +327,35 @@ inline Eigen::Matrix3d R_headed(double heading) {
 
 namespace detail {
 
-/// Sensor model from one scan, with the rotation from the sensor frame to the level frame.
+/// Estimates the sensor model from a scan, with the rotation from the sensor frame to the level
+/// frame.
 class LevelFrame {
  public:
-  /// `level`: whether scans are rotated at all. `pitch`, `roll`: deg, tilt of the mounting; 0 and 0
-  /// if it is to be estimated.
+  /// `level`: whether scans are rotated to the level frame. `pitch`, `roll`: tilt of the mounting,
+  /// deg, as in up_of_mounting(); if both are 0, estimate() estimates the tilt.
   LevelFrame(bool level, double pitch, double roll)
-      : is_wanted_(level),
+      : is_enabled_(level),
         is_tilt_given_(pitch != 0.0 || roll != 0.0),
         up_given_(up_of_mounting(pitch, roll)) {}
 
-  /// Not known() before a scan had enough points.
+  /// Not known() until estimate() was called with enough points.
   const SensorModel& sensor() const { return sensor_; }
 
-  /// Whether scans are rotated, by sensor().R_level_sensor().
-  bool turns() const { return sensor_.known() && is_wanted_; }
+  /// Whether the caller rotates scans by sensor().R_level_sensor().
+  bool rotates_scans() const { return sensor_.known() && is_enabled_; }
 
-  /// Estimates the sensor from a scan (m, sensor frame).
+  /// Estimates the sensor model from a scan (m, sensor frame). The model is unchanged if the scan
+  /// has too few points.
   void estimate(PointsView scan) {
     Eigen::Matrix3d R_headed_sensor = Eigen::Matrix3d::Identity();
-    if (is_wanted_) R_headed_sensor = R_headed(estimate_heading(scan));
+    if (is_enabled_) R_headed_sensor = R_headed(estimate_heading(scan));
     PointBuffer headed;
     const PointsView points = rotate(scan, R_headed_sensor, headed);
     SensorModel sensor = estimate_sensor_model(points);
     if (!sensor.known()) return;
     const Mounting mounting = estimate_mounting(points);
     if (mounting.known) sensor.height = mounting.height;
-    if (is_wanted_) {
+    if (is_enabled_) {
       sensor.R_headed_sensor = R_headed_sensor;
       sensor.R_level_headed = R_level_headed(mounting, R_headed_sensor);
     }
@@ -358,9 +365,9 @@ class LevelFrame {
   void forget() { sensor_ = {}; }
 
  private:
-  // `mounting`: in the headed frame.
+  // `mounting`: estimate in the headed frame.
   Eigen::Matrix3d R_level_headed(Mounting mounting, const Eigen::Matrix3d& R_headed_sensor) const {
-    constexpr double kLevel = 4.0;  // deg; the estimate for a level sensor is up to 2.6
+    constexpr double kLevel = 4.0;  // deg; estimates for level sensors are up to 2.6
     if (is_tilt_given_) {
       mounting.up_sensor = multiplied(R_headed_sensor, up_given_);
       return mounting.R_level_sensor();
@@ -369,7 +376,7 @@ class LevelFrame {
                                                       : Eigen::Matrix3d::Identity();
   }
 
-  bool is_wanted_;
+  bool is_enabled_;
   bool is_tilt_given_;
   Eigen::Vector3d up_given_;  // normal of the ground, sensor frame
   SensorModel sensor_;

@@ -5,13 +5,14 @@
 
 namespace dynains::detail {
 
-/// Sums over a point set. Coordinates are relative to a place near it, to keep float sums accurate.
+/// Moments of a point set: sums of the weights, coordinates and products of coordinates. The origin
+/// of the coordinates should be near the points, for accurate sums.
 struct PlaneMoments {
   double count = 0.0;
   double x = 0.0, y = 0.0, z = 0.0;
   double xx = 0.0, xy = 0.0, xz = 0.0, yy = 0.0, yz = 0.0, zz = 0.0;
 
-  /// Adds a point; a negative weight removes it.
+  /// Adds a point. Adding it again with the negative weight removes it.
   void add(double px, double py, double pz, double weight) {
     const double wx = weight * px;
     const double wy = weight * py;
@@ -40,10 +41,10 @@ struct Plane {
   double flatness = 0.0;  ///< smallest eigenvalue of the covariance, divided by their sum: [0, 1/3]
 };
 
-/// Fits a plane by least squares: the normal is the eigenvector of the smallest eigenvalue of the
-/// covariance. That eigenvalue is the smallest root of a cubic; Newton's iteration from zero rises
-/// to it monotonically. Needs count >= 3. If all points are equal or on a line, the normal is one
-/// of the many that fit.
+/// Fits a plane by total least squares: the normal is the eigenvector of the smallest eigenvalue of
+/// the covariance. Newton's method from zero converges monotonically to this eigenvalue, the
+/// smallest root of a cubic. Requires `count` >= 3. If all points are equal or on a line, the
+/// normal is one of the many solutions.
 inline Plane fit_plane(const PlaneMoments& m) {
   Plane plane;
   const double inverse = 1.0 / m.count;
@@ -73,8 +74,8 @@ inline Plane fit_plane(const PlaneMoments& m) {
   }
   plane.flatness = lambda / trace;
 
-  // The normal is orthogonal to each row of (covariance - lambda I). The longest of the three cross
-  // products of rows is the most accurate.
+  // The normal is orthogonal to each row of (covariance - lambda I). The longest cross product of
+  // two rows is the most accurate.
   const double a = xx - lambda;
   const double b = yy - lambda;
   const double c = zz - lambda;

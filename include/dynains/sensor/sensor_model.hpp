@@ -1,4 +1,4 @@
-// Angular sampling and mounting of a sensor, and its estimate from one scan.
+// Angular sampling and mounting of a sensor; estimate of the sampling from one scan.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,19 +17,19 @@ namespace dynains {
 
 /// Angular sampling of a sensor (deg), and its mounting.
 struct SensorModel {
-  double azimuth_step = 0.0;        ///< median step between neighbours on one beam
+  double azimuth_step = 0.0;        ///< median step between consecutive returns of one beam
   double elevation_gap = 0.0;       ///< 30th percentile of the gaps between beams
   double elevation_gap_wide = 0.0;  ///< 90th percentile of these gaps
-  double elevation_min = 0.0;       ///< lowest beam
-  double elevation_max = 0.0;       ///< highest beam
+  double elevation_min = 0.0;       ///< elevation of the lowest beam
+  double elevation_max = 0.0;       ///< elevation of the highest beam
 
   double height = 0.0;  ///< m above the ground
 
-  /// Rotation about z from the sensor frame to the headed frame, whose x axis points along
+  /// Rotation about z from the sensor frame to the headed frame, whose x axis has the azimuth
   /// estimate_heading().
   Eigen::Matrix3d R_headed_sensor = Eigen::Matrix3d::Identity();
-  /// Rotation from the headed frame to the level frame, in which the stages work. Identity for a
-  /// sensor that is not tilted.
+  /// Rotation from the headed frame to the level frame, the frame of all stages. Identity for a
+  /// sensor without tilt.
   Eigen::Matrix3d R_level_headed = Eigen::Matrix3d::Identity();
 
   Eigen::Matrix3d R_level_sensor() const {
@@ -38,7 +38,7 @@ struct SensorModel {
   bool known() const { return azimuth_step > 0.0; }
   bool is_level() const { return R_level_headed.isIdentity(0.0); }
 
-  /// A 64-beam sensor on the roof of a car; in use until a scan gives an estimate.
+  /// Model of a 64-beam sensor on the roof of a car, the default until there is an estimate.
   static SensorModel typical() {
     SensorModel model;
     model.azimuth_step = 0.2;
@@ -53,7 +53,7 @@ struct SensorModel {
 
 namespace detail {
 
-/// Azimuth and elevation of each point, deg.
+/// By point: azimuth and elevation, deg.
 struct BeamAngles {
   std::vector<float> azimuth, elevation;
 };
@@ -77,15 +77,17 @@ inline BeamAngles beam_angles(PointsView points) {
   return angles;
 }
 
-/// The value with a ratio of the others below it; reorders `values`.
+/// The value above the ratio `ratio` ([0, 1]) of the other values. Reorders `values`, which must
+/// not be empty.
 inline double percentile(std::vector<float>& values, double ratio) {
   const auto at = static_cast<std::ptrdiff_t>(ratio * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + at, values.end());
   return static_cast<double>(values[static_cast<std::size_t>(at)]);
 }
 
-/// Gaps (deg) above `smallest` between neighbours along one angle, within bands `band` deg wide
-/// across it. Skips bands so that a quarter of the points is sorted.
+/// Gaps (deg) larger than `smallest` (deg) between consecutive values of the angle `along`, within
+/// each band of the angle `across` of width `band` (deg). Skips bands: sorts only about a quarter
+/// of the points.
 inline std::vector<float> gaps_within_bands(const std::vector<float>& across,
                                             const std::vector<float>& along, double band,
                                             double smallest) {
@@ -100,12 +102,12 @@ inline std::vector<float> gaps_within_bands(const std::vector<float>& across,
   std::vector<std::size_t> next = begin;
   for (std::size_t i = 0; i < along.size(); ++i) by_band[next[band_of(across[i])]++] = along[i];
 
-  constexpr std::size_t kOneOf = 4;
+  constexpr std::size_t kPointsPerSorted = 4;
   std::size_t sorted = 0;
   std::vector<float> gaps;
   gaps.reserve(along.size());
   for (std::size_t i = 0; i + 1 < begin.size(); ++i) {
-    if (sorted * kOneOf > begin[i]) continue;
+    if (sorted * kPointsPerSorted > begin[i]) continue;
     sorted += begin[i + 1] - begin[i];
     std::sort(&by_band[0] + begin[i], &by_band[0] + begin[i + 1]);
     for (std::size_t k = begin[i] + 1; k < begin[i + 1]; ++k) {
@@ -118,9 +120,10 @@ inline std::vector<float> gaps_within_bands(const std::vector<float>& across,
 
 }  // namespace detail
 
-/// Estimates the angular sampling from one scan (m, sensor frame, finite coordinates). The height
-/// is that of a typical sensor; see estimate_mounting(). Not known() if the scan has fewer than 500
-/// points, or no two points on one beam. Allocates: meant for one scan of a sensor, not for each.
+/// Estimates the angular sampling from one scan (m, sensor frame, finite coordinates). Sets the
+/// height of SensorModel::typical(); estimate_mounting() estimates the height. The result is not
+/// known() if the scan has fewer than 500 points, or no two points on one beam. Allocates memory,
+/// so call it for one scan of a sensor, not for each.
 inline SensorModel estimate_sensor_model(PointsView points) {
   constexpr std::size_t kFewest = 500;
   if (points.size() < kFewest) return {};
@@ -131,7 +134,7 @@ inline SensorModel estimate_sensor_model(PointsView points) {
   model.elevation_min = detail::percentile(elevation, 0.0005);
   model.elevation_max = detail::percentile(elevation, 0.9995);
 
-  constexpr double kBeamBand = 0.1;    // deg, elevations of one beam
+  constexpr double kBeamBand = 0.1;    // deg, range of the elevations of one beam
   constexpr double kLeastStep = 0.01;  // deg
   constexpr double kLeastGap = 0.08;   // deg, between beams
   std::vector<float> steps =

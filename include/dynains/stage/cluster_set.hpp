@@ -1,5 +1,5 @@
-// Which points of a window make up each cluster and, within a cluster, each scan: the separation by
-// time stamp of Eq. 4. Points stay where they are; what is ordered are ranges of them.
+// Orders the points of a window by cluster and, within a cluster, by scan: the separation by time
+// stamp of Eq. 4. The order consists of index ranges; no point is copied.
 #pragma once
 
 #include <algorithm>
@@ -14,41 +14,41 @@
 
 namespace dynains {
 
-/// Points [begin, end) of a window, neighbours in a scan that share a cluster.
+/// Points [begin, end) of a window: consecutive points of one scan and one cluster.
 struct PointRange {
   std::uint32_t begin, end;
 };
 
-/// One cluster: ranges of its points in all scans, oldest scan first, none of them empty.
+/// One cluster: the ranges of its points in all scans, oldest scan first. No range is empty.
 struct ClusterView {
-  PolarView window;                       ///< all points; can be read a few places beyond its end
-  Span<const PointRange> ranges;          ///< of this cluster
-  Span<const std::uint32_t> first_range;  ///< by scan, one more than scans, counted from any number
+  PolarView window;               ///< all points of the window, padded for packs
+  Span<const PointRange> ranges;  ///< of this cluster
+  /// By scan, plus the end: number of the first range. `ranges` begins at number first_range[0].
+  Span<const std::uint32_t> first_range;
 
   std::size_t scan_count() const { return first_range.size() - 1; }
-  /// S_k of Eq. 4.
+  /// S_k of Eq. 4; `k` is below scan_count().
   Span<const PointRange> scan(std::size_t k) const {
     return ranges.subspan(first_range[k] - first_range[0], first_range[k + 1] - first_range[k]);
   }
 };
 
-/// Counting sort of a window. Only clusters that were seen by both the oldest and the newest scan
-/// can be compared (Eq. 11); the others are left out of the order.
+/// Counting sort of a window by cluster and scan. Eq. 11 compares only clusters with points in both
+/// the oldest and the newest scan; the order leaves out all other clusters.
 ///
-/// Neighbours in a scan mostly share a cluster: what is counted and ordered are point_runs of
-/// points.
+/// Consecutive points mostly share a cluster, so the sort moves runs of points, not single points.
 class ClusterSet {
  public:
-  /// Points [begin, end) of a scan, neighbours that share a cluster.
+  /// Points [begin, end) of a scan: consecutive points of one cluster.
   struct PointRun {
     std::uint32_t begin, end;
     std::uint32_t cluster;  ///< or kNoCluster
   };
 
-  /// `window` holds the scans one after another, oldest first, and is of a PolarBuffer, which can
-  /// be read a few places beyond its end; scan k is [scan_begin[k], scan_begin[k + 1]).
-  /// `cluster_of` holds a number per point below `cluster_count`, or kNoCluster. Views returned
-  /// later hold until the next build, and no longer than the window.
+  /// `window`: view of a PolarBuffer with the scans one after another, oldest first; scan k is
+  /// [scan_begin[k], scan_begin[k + 1]). `cluster_of`: by point of the window, cluster number below
+  /// `cluster_count`, or kNoCluster. Views of the set are valid until the next build() and as long
+  /// as `window` is valid.
   void build(PolarView window, Span<const std::uint32_t> scan_begin,
              Span<const std::uint32_t> cluster_of, std::size_t cluster_count) {
     window_ = window;
@@ -61,16 +61,16 @@ class ClusterSet {
 
   std::size_t size() const { return cluster_count_; }
   std::size_t scan_count() const { return scan_count_; }
-  /// Whether both the oldest and the newest scan saw the cluster.
+  /// Whether the cluster has points in both the oldest and the newest scan.
   bool comparable(std::size_t cluster) const { return comparable_[cluster] != 0; }
 
-  /// All points of scan k, point_run by point_run.
+  /// The runs of all points of scan k, in scan order.
   Span<const PointRun> point_runs(std::size_t k) const {
     return Span<const PointRun>(point_runs_)
         .subspan(first_run_[k], first_run_[k + 1] - first_run_[k]);
   }
 
-  /// A comparable cluster; without ranges for others.
+  /// View of a cluster; it has no ranges unless the cluster is comparable().
   ClusterView operator[](std::size_t cluster) const {
     const std::size_t slot = cluster * (scan_count_ + 1);
     const std::uint32_t begin = begin_[slot];
@@ -94,7 +94,7 @@ class ClusterSet {
     first_run_.push_back(run_count_);
   }
 
-  // One scan, 64 points at a time.
+  // Cuts one scan into runs, 64 points at a time.
   template <class Packs>
   void cut(Span<const std::uint32_t> cluster_of) {
     constexpr std::size_t kWord = 64;
@@ -114,8 +114,8 @@ class ClusterSet {
     if (!cluster_of.empty()) end_at(cluster_of.size());
   }
 
-  // Slot of (cluster, scan): counts first, which then turn into beginnings. Behind the slots of
-  // each cluster comes its end.
+  // Counts the runs of each slot (cluster, scan), then replaces each count by the number of the
+  // first range of the slot. An additional slot behind each cluster holds its end.
   void count_runs() {
     const std::size_t slots = scan_count_ + 1;
     begin_.assign(cluster_count_ * slots, 0);
@@ -154,9 +154,9 @@ class ClusterSet {
   std::size_t scan_count_ = 0;
   std::size_t cluster_count_ = 0;
   std::size_t run_count_ = 0;
-  std::vector<PointRun> point_runs_;    // may be more
-  std::vector<std::size_t> first_run_;  // by scan
-  std::vector<std::uint32_t> begin_;    // range, by slot
+  std::vector<PointRun> point_runs_;    // the first run_count_ are in use
+  std::vector<std::size_t> first_run_;  // by scan, and the end
+  std::vector<std::uint32_t> begin_;    // by slot: number of its first range
   std::vector<std::uint32_t> next_;
   std::vector<std::uint8_t> comparable_;
   std::vector<PointRange> ranges_;

@@ -1,11 +1,12 @@
-// Parameters of the free-space evidence, and of the revision of the map by it.
+// Parameters of the free-space evidence and of the map revision.
 #pragma once
 
 #include "dynains/parameters.hpp"
 
 namespace dynains {
 
-/// Goes beyond the paper. docs/accuracy.md gives the tested ranges. `visit` describes each field.
+/// Parameters of the free-space evidence, an extension of the paper. The help texts in `visit`
+/// describe the fields; docs/accuracy.md lists the tested ranges.
 struct FreeSpaceConfig {
   int lookahead_scans = 30;
   int lookback_scans = 100;
@@ -41,6 +42,16 @@ struct FreeSpaceConfig {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
+    visit_visibility(self, visitor);
+    visit_verdicts(self, visitor);
+  }
+
+  /// Throws ConfigError.
+  void validate() const { validate_parameters("FreeSpaceEvidence", *this); }
+
+ private:
+  template <class Self, class Visitor>
+  static void visit_visibility(Self& self, Visitor& visitor) {
     visitor(Parameter{"lookahead_scans", self.lookahead_scans, closed(0, 100), "scans",
                       "later scans that are used before a verdict is final"});
     visitor(Parameter{"lookback_scans", self.lookback_scans, closed(0, 200), "scans",
@@ -69,6 +80,10 @@ struct FreeSpaceConfig {
                       "update probability of a reference whose beams pass (form of Eq. 18)"});
     visitor(Parameter{"p_hit", self.p_hit, open(0, 0.5), "",
                       "update probability of a reference whose beams hit (form of Eq. 18)"});
+  }
+
+  template <class Self, class Visitor>
+  static void visit_verdicts(Self& self, Visitor& visitor) {
     visitor(Parameter{"tau_free", self.tau_free, open(0.5, 1), "",
                       "belief from which a supervoxel without hits was free (form of Eq. 19)"});
     visitor(Parameter{"tau_contested", self.tau_contested, open(0.5, 1), "",
@@ -78,8 +93,8 @@ struct FreeSpaceConfig {
     visitor(Parameter{"removal_ratio", self.removal_ratio, half_open_below(0, 1), "",
                       "ratio of free to decided samples from which the whole instance is removed"});
     visitor(Parameter{"pass_ratio", self.pass_ratio, half_open_below(0, 1), "",
-                      "ratio of free to visible samples of an instance from which a reference "
-                      "passes it as a whole"});
+                      "ratio of free to visible samples of an instance from which a reference is "
+                      "evidence that the whole instance is free"});
     visitor(Parameter{"footprint", self.footprint, closed(0, 2), "m",
                       "ground at a smaller distance from removed points is removed; 0: none"});
     visitor(Parameter{"footprint_rise", self.footprint_rise, closed(0, 1), "m",
@@ -88,7 +103,7 @@ struct FreeSpaceConfig {
     visitor(Parameter{"use_tracks", self.use_tracks, Bounds(), "",
                       "propagate beliefs along instances that overlap from scan to scan"});
     visitor(Parameter{"tau_track", self.tau_track, open(0.5, 1), "",
-                      "belief along its track from which an instance moved (form of Eq. 19)"});
+                      "belief along its track from which an instance is dynamic (form of Eq. 19)"});
     visitor(Parameter{"still_weight", self.still_weight, closed(0, 10), "",
                       "decrease of the belief along a track by a scan in which the instance stood "
                       "still, in increments of p_free"});
@@ -113,13 +128,11 @@ struct FreeSpaceConfig {
                       "the zero-latency verdict removes compact instances at places without "
                       "earlier evidence; no effect with lookahead_scans 0"});
   }
-
-  /// Throws ConfigError.
-  void validate() const { validate_parameters("FreeSpaceEvidence", *this); }
 };
 
-/// Goes beyond the paper: a car that parks for longer than lookahead_scans enters the map; beams of
-/// later scans pass its place after it left.
+/// Parameters of the map revision, an extension of the paper. A car that is parked for longer than
+/// lookahead_scans enters the map. After the car has left, beams of later scans pass through its
+/// former voxels, and the revision removes these.
 struct MapRevisionConfig {
   bool revise_map = false;
   double revision_range = 60;   ///< m
@@ -131,8 +144,8 @@ struct MapRevisionConfig {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
     visitor(Parameter{"revise_map", self.revise_map, Bounds(), "",
-                      "remove blocks of the static map that later scans find free; needs decision "
-                      "free_space or both, and a map in memory"});
+                      "remove blocks of the static map that are free in later scans; needs "
+                      "decision free_space or both, and a map in memory"});
     visitor(Parameter{"revision_range", self.revision_range, closed(5, 300), "m",
                       "blocks of the map at a larger horizontal range are not tested"});
     visitor(Parameter{"revision_period", self.revision_period, closed(1, 100), "scans",

@@ -9,9 +9,9 @@
 
 namespace dynains {
 
-/// The parameters of Patchwork, and two of our own: `ground_step` and `ground_fit_points`.
+/// Parameters of Patchwork, plus two additional ones: `ground_step` and `ground_fit_points`.
 struct GroundConfig {
-  /// The innermost rings, where height and roughness of a patch are checked.
+  /// Number of innermost rings in which the height and the flatness of a patch are checked.
   static constexpr std::size_t kCheckedRings = 4;
   static constexpr int kMaxLowest = 64;
 
@@ -25,14 +25,14 @@ struct GroundConfig {
   double ground_seed_margin = 0.5;    ///< m above the seed height
   double ground_distance = 0.125;     ///< m, ground points are less than this above the plane
   double ground_uprightness = 0.707;  ///< smallest z of the unit normal
-  double ground_below = 0.1;          ///< depth under ground, as a ratio of sensor_height, of noise
-  double ground_step = 0.5;           ///< m, a patch higher above its neighbours is not ground
-  /// Largest height (m over ground) of a patch in the four inner rings, unless it is flat.
+  double ground_below = 0.1;  ///< depth of noise below the ground, as a ratio of sensor_height
+  double ground_step = 0.5;   ///< m, a patch higher above its neighbours is not ground
+  /// By inner ring: largest height (m over ground) of a ground patch that is not flat.
   std::array<double, kCheckedRings> ground_elevation = {0.523, 0.7246, 0.872, 1.118};
-  /// Largest flatness that lets a patch above that height still be ground.
+  /// By inner ring: flatness below which a patch above ground_elevation is ground.
   std::array<double, kCheckedRings> ground_flatness = {0.0, 1.25e-4, 1.85e-4, 1.85e-4};
 
-  /// Without `ground_step`, and with the height of KITTI's sensor.
+  /// The values of the paper: no `ground_step`, and the sensor height of KITTI.
   static GroundConfig paper() {
     GroundConfig config;
     config.sensor_height = 1.723;

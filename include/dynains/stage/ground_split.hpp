@@ -10,10 +10,10 @@
 
 namespace dynains {
 
-/// One scan, reordered: ground points first, then all others. Later stages work on ranges of it and
-/// copy no points.
+/// One scan, reordered: ground points first, then all other points. Later stages use views of it
+/// and copy no points.
 struct GroundSplit {
-  PointBuffer points;                ///< m, sensor frame; longer than `count`, for packs
+  PointBuffer points;                ///< m, sensor frame; padded for packs beyond `count`
   std::vector<std::uint32_t> input;  ///< index of each point in the input of the remover
   std::size_t ground_count = 0;      ///< number of ground points
   std::size_t count = 0;             ///< number of all points

@@ -1,4 +1,4 @@
-// Log-odds of probabilities, and their sum over the scans that test a place.
+// Log-odds of probabilities, and the sum of log-odds that a voxel is free.
 #pragma once
 
 #include <algorithm>
@@ -6,34 +6,39 @@
 
 namespace dynains {
 
-/// l(p) = log(p / (1 - p)), the log-odds of a probability in (0, 1).
+/// l(p) = log(p / (1 - p)), the log-odds of a probability p in (0, 1).
 inline double log_odds(double probability) { return std::log(probability / (1.0 - probability)); }
 
-/// Inverse of log_odds (below Eq. 19).
+/// Inverse of log_odds(), in (0, 1) (below Eq. 19).
 inline double probability(double log_odds) { return 1.0 / (1.0 + std::exp(-log_odds)); }
 
 }  // namespace dynains
 
 namespace dynains::detail {
 
-/// Increments of the log-odds that a place was free (Eq. 15), by the ratio of free to visible
-/// samples of the place in one scan (three sizes, as in Eq. 18). The sum is never below zero
-/// (Page's test), so that a place which was hit for long may still become free.
+/// Updates the log-odds that a voxel, supervoxel or instance is free (Eq. 15). Each reference scan
+/// adds one of three increments (form of Eq. 18), by the ratio of its free to visible samples. The
+/// sum is never below zero (Page's test for a change, 1954): early hits do not cancel later free
+/// samples.
 class FreeSpaceSum {
  public:
-  static constexpr float kFreeRatio = 0.6F;  ///< from which the place counts as free
-  static constexpr float kHitRatio = 0.3F;   ///< up to which the place counts as hit
+  /// Limits of the ratio of free to visible samples in one reference scan: raise() from kFreeRatio
+  /// on, lower() up to kHitRatio.
+  static constexpr float kFreeRatio = 0.6F;
+  static constexpr float kHitRatio = 0.3F;
 
-  /// `p_free`, `p_hit`: update probabilities of a scan that finds the place free, or hits it.
+  /// `p_free`, in (0.5, 1): update probability of raise(). `p_hit`, in (0, 0.5): update probability
+  /// of lower().
   FreeSpaceSum(double p_free, double p_hit)
       : increment_(static_cast<float>(log_odds(p_free))),
         decrement_(static_cast<float>(log_odds(p_hit))) {}
 
   float increment() const { return increment_; }
 
-  /// `free_ratio`: at least kFreeRatio.
+  /// Adds the increment once, or twice if nearly all visible samples are free. `free_ratio`: ratio
+  /// of free to visible samples.
   void raise(float& level, float free_ratio) const {
-    constexpr float kWhollyFree = 0.9F;  // counts twice
+    constexpr float kWhollyFree = 0.9F;
     level += (free_ratio > kWhollyFree ? 2.0F : 1.0F) * increment_;
   }
   void lower(float& level) const { level = std::max(0.0F, level + decrement_); }

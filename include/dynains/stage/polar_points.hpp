@@ -25,7 +25,8 @@ struct PolarView {
   }
 };
 
-/// Owns polar points and is reused from scan to scan. Arrays are longer than size(), for packs.
+/// Polar points in three arrays, which are padded for packs beyond size(). A buffer is reused from
+/// scan to scan.
 class PolarBuffer {
  public:
   std::size_t size() const { return size_; }
@@ -41,8 +42,7 @@ class PolarBuffer {
     return {{range.data(), size_}, {azimuth.data(), size_}, {z.data(), size_}};
   }
 
-  /// Appends `points` (m, source frame), transformed to the target frame. The transform is applied
-  /// in floats.
+  /// Appends `points` (m, source frame), transformed to the target frame in single precision.
   void append(PointsView points, const Eigen::Isometry3d& T_target_source) {
     const std::size_t begin = size_;
     resize(begin + points.size());

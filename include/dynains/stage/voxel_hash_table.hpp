@@ -8,8 +8,8 @@
 
 namespace dynains {
 
-/// Index of a voxel in its grid as one number, ordered by x, then y, then z. Each of the three
-/// indices lies in [-2^20, 2^20).
+/// The three indices of a voxel in its grid as one number, ordered by x, then y, then z. Each index
+/// lies in [-2^20, 2^20).
 using VoxelKey = std::uint64_t;
 
 inline constexpr int kVoxelKeyBits = 21;  // of each index
@@ -21,19 +21,19 @@ constexpr VoxelKey voxel_key(std::int64_t x, std::int64_t y, std::int64_t z) {
          static_cast<VoxelKey>(z + kVoxelKeyOffset);
 }
 
-/// Difference between the keys of two voxels that lie so many steps apart.
+/// Difference between the keys of two voxels that are (dx, dy, dz) voxels apart.
 constexpr VoxelKey voxel_key_step(std::int64_t dx, std::int64_t dy, std::int64_t dz) {
   return (static_cast<VoxelKey>(dx) << (2 * kVoxelKeyBits)) +
          (static_cast<VoxelKey>(dy) << kVoxelKeyBits) + static_cast<VoxelKey>(dz);
 }
 
-/// Index of a voxel along axis 0 (x), 1 (y) or 2 (z).
+/// Index of a voxel along `axis`: 0 (x), 1 (y) or 2 (z).
 constexpr std::int64_t voxel_index(VoxelKey key, int axis) {
   constexpr VoxelKey kMask = (VoxelKey{1} << kVoxelKeyBits) - 1;
   return static_cast<std::int64_t>(key >> ((2 - axis) * kVoxelKeyBits) & kMask) - kVoxelKeyOffset;
 }
 
-/// Hash of a key; its upper bits are mixed best.
+/// Hash of a key. The upper bits are mixed best.
 constexpr std::uint32_t voxel_hash(VoxelKey key) {
   constexpr std::uint64_t kMix = 0x9E3779B97F4A7C15ULL;  // 2^64 over the golden ratio
   return static_cast<std::uint32_t>(((key ^ key >> 32U) * kMix) >> 32U);
@@ -45,7 +45,7 @@ constexpr std::int32_t multiply(std::int32_t a, std::int32_t b) {
   return static_cast<std::int32_t>(static_cast<std::uint32_t>(a) * static_cast<std::uint32_t>(b));
 }
 
-/// Hash of three numbers, for one triple or for a pack of them; its upper bits are mixed best.
+/// Hash of three numbers, for one triple or for a pack of triples. The upper bits are mixed best.
 template <class Int>
 Int mixed_hash(const Int& a, const Int& b, const Int& c) {
   const auto factor = [](std::uint32_t odd) { return static_cast<std::int32_t>(odd); };
@@ -56,8 +56,9 @@ Int mixed_hash(const Int& a, const Int& b, const Int& c) {
 
 }  // namespace detail
 
-/// Open addressing with linear probing; at most half of the slots are in use. Single keys cannot be
-/// erased. `Key`: VoxelKey, or a type with operator== and a function voxel_hash(key).
+/// Hash table that numbers keys: open addressing with linear probing, at most half of the slots in
+/// use. Single keys cannot be erased. `Key`: VoxelKey, or a type with operator== and a function
+/// voxel_hash(key).
 template <class Key = VoxelKey>
 class VoxelHashTable {
  public:
@@ -69,16 +70,16 @@ class VoxelHashTable {
     std::uint32_t number = kNone;
   };
 
-  /// Takes `expected` keys without growing.
+  /// Reserves memory for `expected` keys.
   explicit VoxelHashTable(std::size_t expected = 32) { reserve(expected); }
 
-  /// Number of keys; they are numbered from 0.
+  /// Number of keys. The keys are numbered from 0 in the order of insertion.
   std::size_t size() const { return size_; }
 
   /// Number of a key, or kNone.
   std::uint32_t find(const Key& key) const { return slots_[slot_of(key, voxel_hash(key))].number; }
 
-  /// Number of a key; a new key gets the number size(). `hash`: voxel_hash(key).
+  /// Number of a key; adds a new key with the number size(). `hash`: voxel_hash(key).
   std::uint32_t insert(const Key& key, std::uint32_t hash) {
     if (2 * size_ >= slots_.size()) grow();
     const std::size_t at = slot_of(key, hash);
@@ -89,11 +90,12 @@ class VoxelHashTable {
   }
   std::uint32_t insert(const Key& key) { return insert(key, voxel_hash(key)); }
 
-  /// The slot where a search begins. It holds the key that was inserted last among those that begin
-  /// there, or Key() if it is empty: a short cut for keys that come again and again.
+  /// The slot where a search for `hash` begins: a short cut for keys that are inserted repeatedly.
+  /// It holds the last inserted key among the keys whose search begins there, or Key() if it is
+  /// empty.
   const Slot& first_slot(std::uint32_t hash) const { return slots_[first_of(hash)]; }
 
-  /// Makes place for `count` keys, those in the table included.
+  /// Reserves memory for `count` keys in total.
   void reserve(std::size_t count) {
     while (2 * count > slots_.size()) grow();
   }
@@ -109,7 +111,7 @@ class VoxelHashTable {
  private:
   std::size_t first_of(std::uint32_t hash) const { return hash >> shift_; }
 
-  // The slot of a key, or the empty one where it belongs.
+  // The slot of a key, or the empty slot where the key would be inserted.
   std::size_t slot_of(const Key& key, std::uint32_t hash) const {
     std::size_t at = first_of(hash);
     while (slots_[at].number != kNone && !(slots_[at].key == key)) {
@@ -128,7 +130,7 @@ class VoxelHashTable {
     }
   }
 
-  int shift_ = 27;  // 32 - log2 of the number of slots; one more before the first
+  int shift_ = 27;  // 32 - log2 of the number of slots; 27 before the first slots exist
   std::size_t size_ = 0;
   std::vector<Slot> slots_;
 };
