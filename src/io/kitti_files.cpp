@@ -8,6 +8,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "dynains/pose.hpp"
 #include "failure.hpp"
 #include "input_file.hpp"
 #include "text.hpp"
@@ -16,8 +17,6 @@ namespace dynains {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr double kRotationTolerance = 1e-3;  // accepts 4 digits, refuses a scaled matrix
 
 /// The numbers of a line, all finite, exactly as many as `values` has.
 template <std::size_t kCount>

@@ -5,21 +5,12 @@
 #include <utility>
 
 #include "../failure.hpp"
+#include "mcap_format.hpp"
 
 namespace dynains {
 namespace {
 
-constexpr std::uint8_t kMagic[8] = {0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'};
 constexpr std::uint64_t kRecordHead = 9;  // opcode and length
-
-enum Opcode : std::uint8_t {
-  kFooter = 0x02,
-  kSchema = 0x03,
-  kChannel = 0x04,
-  kMessage = 0x05,
-  kChunk = 0x06,
-  kMessageIndex = 0x07
-};
 
 MessageEncoding encoding_of(const std::string& name) {
   if (name == "ros1") return MessageEncoding::kRos1;
@@ -30,11 +21,12 @@ MessageEncoding encoding_of(const std::string& name) {
 
 McapFile::McapFile(const std::filesystem::path& path) : ChunkedLog(path) {
   const auto magic =
-      file_.read(0, std::min<std::uint64_t>(file_.size(), sizeof(kMagic)), "magic bytes");
-  if (magic.size() != sizeof(kMagic) || std::memcmp(magic.data(), kMagic, sizeof(kMagic)) != 0) {
+      file_.read(0, std::min<std::uint64_t>(file_.size(), mcap::kMagic.size()), "magic bytes");
+  if (magic.size() != mcap::kMagic.size() ||
+      std::memcmp(magic.data(), mcap::kMagic.data(), magic.size()) != 0) {
     fail_at_byte(path, 0, "expected the magic bytes of MCAP, version 0");
   }
-  read_index(sizeof(kMagic));
+  read_index(mcap::kMagic.size());
 }
 
 std::optional<std::uint64_t> McapFile::record_size(std::uint64_t position) {
@@ -54,24 +46,24 @@ bool McapFile::take_record(std::uint64_t position, std::uint64_t size) {
   const auto head = file_.read(position, head_size, "a record");
   Bytes fields(path_, position, head.data(), head.size());
   const auto opcode = fields.number<std::uint8_t>("an opcode");
-  if (opcode == kMessageIndex) {
+  if (opcode == mcap::kMessageIndex) {
     take_message_index(position, size);
     return true;
   }
   finish_chunk();
-  if (opcode == kChunk) take_chunk(position, size);
-  if (opcode == kMessage) {
+  if (opcode == mcap::kChunk) take_chunk(position, size);
+  if (opcode == mcap::kMessage) {
     fields.skip(8, "a length");
     const auto channel = fields.number<std::uint16_t>("a channel id");
     fields.skip(4, "a sequence number");
     add_message(channel, fields.number<std::uint64_t>("a log time"), position);
   }
-  if (opcode == kSchema || opcode == kChannel) {
+  if (opcode == mcap::kSchema || opcode == mcap::kChannel) {
     const auto record = file_.read(position, size, "a record");
     Bytes bytes(path_, position, record.data(), record.size());
     parse_record(bytes);
   }
-  has_footer_ = opcode == kFooter;
+  has_footer_ = opcode == mcap::kFooter;
   return !has_footer_;
 }
 
@@ -105,7 +97,7 @@ void McapFile::take_message_index(std::uint64_t position, std::uint64_t size) {
 std::optional<ChunkedLog::Message> McapFile::parse_record(Bytes& records) {
   const auto opcode = records.number<std::uint8_t>("an opcode");
   Bytes fields = records.block(records.number<std::uint64_t>("a length"), "a record");
-  if (opcode != kMessage) {
+  if (opcode != mcap::kMessage) {
     take_definition(opcode, fields);
     return std::nullopt;
   }
@@ -117,11 +109,11 @@ std::optional<ChunkedLog::Message> McapFile::parse_record(Bytes& records) {
 }
 
 void McapFile::take_definition(std::uint8_t opcode, Bytes fields) {
-  if (opcode == kSchema) {
+  if (opcode == mcap::kSchema) {
     const auto id = fields.number<std::uint16_t>("a schema id");
     schemas_[id] = plain_type(fields.string("a schema name"));
   }
-  if (opcode != kChannel) return;
+  if (opcode != mcap::kChannel) return;
   const auto id = fields.number<std::uint16_t>("a channel id");
   const auto schema = schemas_.find(fields.number<std::uint16_t>("a schema id"));
   LogTopic topic;

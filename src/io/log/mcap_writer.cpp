@@ -3,25 +3,12 @@
 #include <cstring>
 
 #include "decompress.hpp"
+#include "mcap_format.hpp"
 
 namespace dynains {
 namespace {
 
-const std::string kMagic("\x89MCAP0\r\n", 8);
 constexpr std::size_t kChunkSize = std::size_t{1} << 22;  // bytes, about
-
-enum Opcode : char {
-  kHeader = 0x01,
-  kFooter = 0x02,
-  kSchema = 0x03,
-  kChannel = 0x04,
-  kMessage = 0x05,
-  kChunk = 0x06,
-  kMessageIndex = 0x07,
-  kChunkIndex = 0x08,
-  kStatistics = 0x0B,
-  kDataEnd = 0x0F
-};
 
 /// Content of a record.
 class Fields {
@@ -47,7 +34,7 @@ class Fields {
   std::string bytes_;
 };
 
-std::string record(Opcode opcode, const Fields& content) {
+std::string record(mcap::Opcode opcode, const Fields& content) {
   return Fields().number(opcode).number(std::uint64_t{content.bytes().size()}).bytes() +
          content.bytes();
 }
@@ -63,7 +50,7 @@ Fields list(const Pairs& pairs) {
 }  // namespace
 
 McapWriter::McapWriter(const std::filesystem::path& path) : file_(path) {
-  append(kMagic + record(kHeader, Fields().string("ros2").string("dynains")));
+  append(mcap::kMagic + record(mcap::kHeader, Fields().string("ros2").string("dynains")));
 }
 
 std::uint16_t McapWriter::add_channel(const std::string& topic, const std::string& type,
@@ -71,8 +58,9 @@ std::uint16_t McapWriter::add_channel(const std::string& topic, const std::strin
   const auto channel = static_cast<std::uint16_t>(counts_.size());
   const auto schema = static_cast<std::uint16_t>(channel + 1);  // 0 is no schema
   const std::string records =
-      record(kSchema, Fields().number(schema).string(type).string("ros2msg").string(definition)) +
-      record(kChannel,
+      record(mcap::kSchema,
+             Fields().number(schema).string(type).string("ros2msg").string(definition)) +
+      record(mcap::kChannel,
              Fields().number(channel).number(schema).string(topic).string("cdr").string(""));
   definitions_ += records;
   records_ += records;
@@ -85,8 +73,9 @@ void McapWriter::write(std::uint16_t channel, std::uint64_t time, const std::str
   last_time_ = time;
   index_[channel].push_back({time, records_.size()});
   const auto sequence = static_cast<std::uint32_t>(counts_.at(channel)++);
-  records_ += record(
-      kMessage, Fields().number(channel).number(sequence).number(time).number(time).raw(message));
+  records_ +=
+      record(mcap::kMessage,
+             Fields().number(channel).number(sequence).number(time).number(time).raw(message));
   if (records_.size() >= kChunkSize) finish_chunk();
 }
 
@@ -96,18 +85,18 @@ void McapWriter::finish_chunk() {
   const std::uint32_t checksum =
       crc32(reinterpret_cast<const std::uint8_t*>(records_.data()), records_.size());
   ChunkPlace chunk{first_time_, last_time_, position_, 0, records_size, {}, 0};
-  append(record(kChunk, Fields()
-                            .number(first_time_)
-                            .number(last_time_)
-                            .number(records_size)
-                            .number(checksum)
-                            .string("")
-                            .number(records_size)
-                            .raw(records_)));
+  append(record(mcap::kChunk, Fields()
+                                  .number(first_time_)
+                                  .number(last_time_)
+                                  .number(records_size)
+                                  .number(checksum)
+                                  .string("")
+                                  .number(records_size)
+                                  .raw(records_)));
   chunk.size = position_ - chunk.position;
   for (const auto& [channel, entries] : index_) {
     chunk.indexes[channel] = position_;
-    append(record(kMessageIndex, Fields().number(channel).raw(list(entries).bytes())));
+    append(record(mcap::kMessageIndex, Fields().number(channel).raw(list(entries).bytes())));
   }
   chunk.indexes_size = position_ - chunk.position - chunk.size;
   chunks_.push_back(std::move(chunk));
@@ -124,41 +113,41 @@ std::string McapWriter::summary() const {
     messages += count;
   }
   const std::uint64_t begin = chunks_.empty() ? 0 : chunks_.front().begin_time;
-  bytes += record(kStatistics, Fields()
-                                   .number(messages)
-                                   .number(static_cast<std::uint16_t>(counts_.size()))
-                                   .number(static_cast<std::uint32_t>(counts_.size()))
-                                   .number(std::uint32_t{0})  // attachments
-                                   .number(std::uint32_t{0})  // metadata
-                                   .number(static_cast<std::uint32_t>(chunks_.size()))
-                                   .number(begin)
-                                   .number(last_time_)
-                                   .raw(list(counts).bytes()));
+  bytes += record(mcap::kStatistics, Fields()
+                                         .number(messages)
+                                         .number(static_cast<std::uint16_t>(counts_.size()))
+                                         .number(static_cast<std::uint32_t>(counts_.size()))
+                                         .number(std::uint32_t{0})  // attachments
+                                         .number(std::uint32_t{0})  // metadata
+                                         .number(static_cast<std::uint32_t>(chunks_.size()))
+                                         .number(begin)
+                                         .number(last_time_)
+                                         .raw(list(counts).bytes()));
   for (const ChunkPlace& chunk : chunks_) {
-    bytes += record(kChunkIndex, Fields()
-                                     .number(chunk.begin_time)
-                                     .number(chunk.end_time)
-                                     .number(chunk.position)
-                                     .number(chunk.size)
-                                     .raw(list(chunk.indexes).bytes())
-                                     .number(chunk.indexes_size)
-                                     .string("")
-                                     .number(chunk.records_size)
-                                     .number(chunk.records_size));
+    bytes += record(mcap::kChunkIndex, Fields()
+                                           .number(chunk.begin_time)
+                                           .number(chunk.end_time)
+                                           .number(chunk.position)
+                                           .number(chunk.size)
+                                           .raw(list(chunk.indexes).bytes())
+                                           .number(chunk.indexes_size)
+                                           .string("")
+                                           .number(chunk.records_size)
+                                           .number(chunk.records_size));
   }
   return bytes;
 }
 
 void McapWriter::commit() {
   finish_chunk();
-  append(record(kDataEnd, Fields().number(std::uint32_t{0})));
+  append(record(mcap::kDataEnd, Fields().number(std::uint32_t{0})));
   const std::uint64_t summary_begin = position_;
   append(summary());
-  append(record(kFooter, Fields()
-                             .number(summary_begin)
-                             .number(std::uint64_t{0})     // no offsets of the summary
-                             .number(std::uint32_t{0})) +  // no checksum of the summary
-         kMagic);
+  append(record(mcap::kFooter, Fields()
+                                   .number(summary_begin)
+                                   .number(std::uint64_t{0})     // no offsets of the summary
+                                   .number(std::uint32_t{0})) +  // no checksum of the summary
+         mcap::kMagic);
   file_.commit();
 }
 

@@ -9,6 +9,8 @@
 namespace dynains {
 namespace {
 
+namespace bag {
+
 const std::string kMagic = "#ROSBAG V2.0\n";
 
 enum Opcode : std::uint8_t {
@@ -19,6 +21,8 @@ enum Opcode : std::uint8_t {
   kChunkInfo = 0x06,
   kConnection = 0x07
 };
+
+}  // namespace bag
 
 /// The value of a header field `name`; nothing if the header lacks it.
 std::optional<Bytes> find_field(Bytes header, const std::string& name) {
@@ -59,11 +63,11 @@ std::uint64_t read_time(Bytes& in) {
 
 RosBag::RosBag(const std::filesystem::path& path) : ChunkedLog(path) {
   const auto magic =
-      file_.read(0, std::min<std::uint64_t>(file_.size(), kMagic.size()), "magic bytes");
-  if (!std::equal(magic.begin(), magic.end(), kMagic.begin(), kMagic.end())) {
+      file_.read(0, std::min<std::uint64_t>(file_.size(), bag::kMagic.size()), "magic bytes");
+  if (!std::equal(magic.begin(), magic.end(), bag::kMagic.begin(), bag::kMagic.end())) {
     fail_at_byte(path, 0, "expected \"#ROSBAG V2.0\" and the end of a line");
   }
-  read_index(kMagic.size());
+  read_index(bag::kMagic.size());
 }
 
 std::optional<std::uint64_t> RosBag::record_size(std::uint64_t position) {
@@ -85,19 +89,19 @@ bool RosBag::take_record(std::uint64_t position, std::uint64_t size) {
   Bytes rest(path_, position, bytes.data(), bytes.size());
   const Bytes header = rest.block(rest.number<std::uint32_t>("a header length"), "a header");
   const auto opcode = number_in<std::uint8_t>(header, "op");
-  if (opcode == kIndexData) {
+  if (opcode == bag::kIndexData) {
     take_index(position, size);
     return true;
   }
   finish_chunk();
-  if (opcode == kBagHeader) take_bag_header(position, header);
-  if (opcode == kChunk) take_chunk(position, header, rest);
-  if (opcode == kChunkInfo) ++chunk_infos_;
-  if (opcode == kMessageData) {
+  if (opcode == bag::kBagHeader) take_bag_header(position, header);
+  if (opcode == bag::kChunk) take_chunk(position, header, rest);
+  if (opcode == bag::kChunkInfo) ++chunk_infos_;
+  if (opcode == bag::kMessageData) {
     Bytes time = field_of(header, "time");
     add_message(number_in<std::uint32_t>(header, "conn"), read_time(time), position);
   }
-  if (opcode == kConnection) {
+  if (opcode == bag::kConnection) {
     const auto record = file_.read(position, size, "a connection");
     Bytes connection(path_, position, record.data(), record.size());
     parse_record(connection);
@@ -141,8 +145,8 @@ std::optional<ChunkedLog::Message> RosBag::parse_record(Bytes& records) {
   const Bytes header = records.block(records.number<std::uint32_t>("a header length"), "a header");
   const Bytes content = records.block(records.number<std::uint32_t>("a data length"), "data");
   const auto opcode = number_in<std::uint8_t>(header, "op");
-  if (opcode == kConnection) take_connection(header, content);
-  if (opcode != kMessageData) return std::nullopt;
+  if (opcode == bag::kConnection) take_connection(header, content);
+  if (opcode != bag::kMessageData) return std::nullopt;
   Bytes time = field_of(header, "time");
   return Message{number_in<std::uint32_t>(header, "conn"), read_time(time), content};
 }
