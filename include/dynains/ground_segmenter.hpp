@@ -168,9 +168,8 @@ class GroundSegmenter {
   template <class Packs>
   void take_back_overhangs(const PatchCounts& begin, PatchCounts& rest, Output<Packs>& ground) {
     using Zones = detail::ConcentricZones;
-    constexpr auto kOutermost =
-        static_cast<std::size_t>(Zones::kRings.back() * Zones::kSectors.back());
-    for (std::size_t p = kPatches - kOutermost; p-- > 0;) {
+    constexpr int kOutermost = Zones::kRings.back() * Zones::kSectors.back();
+    for (std::size_t p = kPatches - static_cast<std::size_t>(kOutermost); p-- > 0;) {
       const std::size_t found = begin[p + 1] - begin[p];
       if (found == 0 || !overhangs(p)) continue;
       ground.take_back(begin[p], found, sorted_.records() + sorted_.begin(p) + rest[p]);

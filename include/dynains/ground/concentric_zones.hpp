@@ -150,7 +150,8 @@ class ConcentricZones {
     std::int32_t first_patch;
     std::int32_t sectors;
     std::size_t patch(std::int32_t sector) const {
-      return static_cast<std::size_t>(first_patch + (sector + sectors) % sectors);
+      const std::int32_t patch = first_patch + (sector + sectors) % sectors;
+      return static_cast<std::size_t>(patch);
     }
   };
 
