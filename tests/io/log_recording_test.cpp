@@ -289,6 +289,10 @@ TEST_CASE("A field label gives the labels, and a truncated log gives the scans b
   REQUIRE(cut.early_end());
   CHECK_THAT(*cut.early_end(), StartsWith((folder / "cut.mcap").string() + ": byte "));
   CHECK(has_note(cut, "the log ends early"));
+
+  write_text(folder / "first_bytes.mcap", whole.substr(0, 40));
+  CHECK_THAT(error_of(folder / "first_bytes.mcap"),
+             ContainsSubstring("found no topic") && ContainsSubstring("the log ends early"));
 }
 
 }  // namespace dynains

@@ -72,7 +72,8 @@ LogScans::LogScans(const std::filesystem::path& path, const LogChoice& choice)
 void LogScans::choose_cloud_topic() {
   const Topics clouds = filter(log_->topics(), is_cloud_type);
   if (clouds.empty()) {
-    fail(log_->path(), "expected a topic with clouds; found " + list(log_->topics()));
+    const std::string end = log_->early_end() ? "; " + *log_->early_end() : "";
+    fail(log_->path(), "expected a topic with clouds; found " + list(log_->topics()) + end);
   }
   const std::string& wanted = choice_.cloud_topic;
   if (wanted.empty() && clouds.size() > 1) {
