@@ -1,5 +1,6 @@
 #include "chunked_log.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "../failure.hpp"
@@ -13,7 +14,16 @@ constexpr std::uint64_t kLargestChunk = std::uint64_t{1} << 28;
 
 }  // namespace
 
-void ChunkedLog::read_index(std::uint64_t position) {
+void ChunkedLog::read_index(const std::string& magic, const std::string& expectation) {
+  const auto begin =
+      file_.read(0, std::min<std::uint64_t>(file_.size(), magic.size()), "magic bytes");
+  const auto is_equal = [](std::uint8_t byte, char expected) {
+    return byte == static_cast<std::uint8_t>(expected);
+  };
+  if (!std::equal(begin.begin(), begin.end(), magic.begin(), magic.end(), is_equal)) {
+    fail_at_byte(path_, 0, expectation);
+  }
+  std::uint64_t position = magic.size();
   bool goes_on = true;
   while (goes_on && position < file_.size()) {
     const std::optional<std::uint64_t> size = record_size(position);

@@ -49,8 +49,9 @@ class ChunkedLog : public LogFile {
   /// Whether nothing is missing behind the last record.
   virtual bool is_complete() const = 0;
 
-  /// Reads all records of the file from `position` on.
-  void read_index(std::uint64_t position);
+  /// Reads all records of the file, which begins with `magic`. Throws IoError with `expectation`
+  /// for another begin.
+  void read_index(const std::string& magic, const std::string& expectation);
 
   // For take_record().
   /// Begins a chunk, named by the byte of its record. Throws for sizes that cannot be.

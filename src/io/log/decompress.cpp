@@ -18,10 +18,10 @@
 namespace dynains {
 namespace {
 
-/// What one call of a library took and made.
+/// Result of one call of a library: bytes read from the input and written to the output.
 struct Step {
-  std::size_t taken = 0;  // bytes
-  std::size_t made = 0;   // bytes
+  std::size_t taken = 0;
+  std::size_t made = 0;
   bool is_end = false;
   std::string error;
 };
@@ -34,7 +34,7 @@ struct Room {
   std::size_t output_size = 0;
 };
 
-/// Calls `step(room)` until the end or an error, and grows the output by what was made.
+/// Calls `step(room)` until the end or an error, and grows the output as needed.
 template <class Decoder>
 std::string run(Decoder&& step, const std::vector<std::uint8_t>& input, std::uint64_t size,
                 std::vector<std::uint8_t>& output) {

@@ -1,10 +1,8 @@
 #include "mcap.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
-#include "../failure.hpp"
 #include "mcap_format.hpp"
 
 namespace dynains {
@@ -20,13 +18,7 @@ MessageEncoding encoding_of(const std::string& name) {
 }  // namespace
 
 McapFile::McapFile(const std::filesystem::path& path) : ChunkedLog(path) {
-  const auto magic =
-      file_.read(0, std::min<std::uint64_t>(file_.size(), mcap::kMagic.size()), "magic bytes");
-  if (magic.size() != mcap::kMagic.size() ||
-      std::memcmp(magic.data(), mcap::kMagic.data(), magic.size()) != 0) {
-    fail_at_byte(path, 0, "expected the magic bytes of MCAP, version 0");
-  }
-  read_index(mcap::kMagic.size());
+  read_index(mcap::kMagic, "expected the magic bytes of MCAP, version 0");
 }
 
 std::optional<std::uint64_t> McapFile::record_size(std::uint64_t position) {

@@ -3,9 +3,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
+#include <filesystem>
 #include <string>
 
+#include "bytes.hpp"
 #include "dynains/errors.hpp"
 #include "ros_messages.hpp"
 
@@ -14,32 +15,34 @@ namespace dynains {
 /// Reads the fields of a message of ROS 1, or of ROS 2 by CDR with its alignment.
 class MessageReader {
  public:
-  explicit MessageReader(const SerialisedMessage& message) : message_(message) {
-    if (message.encoding == MessageEncoding::kOther) fail("expected a message of ROS 1 or ROS 2");
-    if (message.encoding != MessageEncoding::kCdr) return;
+  explicit MessageReader(const SerialisedMessage& message)
+      : encoding_(message.encoding),
+        place_(message.place),
+        bytes_(place_, 0, message.data, message.size) {
+    if (encoding_ == MessageEncoding::kOther) fail("expected a message of ROS 1 or ROS 2");
+    if (encoding_ != MessageEncoding::kCdr) return;
     constexpr std::uint8_t kLittleEndian = 1;
     const std::uint8_t* const header = take(4, "the header of CDR");
     if (header[0] != 0 || header[1] != kLittleEndian) {
       fail("expected plain CDR, little endian, found the representation " +
            std::to_string(header[0] * 256 + header[1]));
     }
-    begin_ = position_;
+    begin_ = bytes_.position();
   }
+  MessageReader(const MessageReader&) = delete;
+  MessageReader& operator=(const MessageReader&) = delete;
 
-  bool is_ros1() const { return message_.encoding == MessageEncoding::kRos1; }
-  std::size_t remaining() const { return message_.size - position_; }
+  bool is_ros1() const { return encoding_ == MessageEncoding::kRos1; }
+  std::size_t remaining() const { return bytes_.remaining(); }
 
   template <class Number>
   Number number(const char* purpose) {
     align(sizeof(Number));
-    Number value;
-    std::memcpy(&value, take(sizeof(value), purpose), sizeof(value));
-    return value;
+    return bytes_.number<Number>(purpose);
   }
   std::string string(const char* purpose) {
-    const auto size = number<std::uint32_t>(purpose);
-    const auto* const text = reinterpret_cast<const char*>(take(size, purpose));
-    std::string result(text, size);
+    align(sizeof(std::uint32_t));
+    std::string result = bytes_.string(purpose);
     if (!is_ros1() && !result.empty() && result.back() == '\0') result.pop_back();
     return result;
   }
@@ -52,28 +55,25 @@ class MessageReader {
     return count;
   }
   const std::uint8_t* take(std::size_t size, const char* purpose) {
-    if (size > remaining()) {
-      fail("byte " + std::to_string(position_) + ": expected " + std::to_string(size) +
-           " bytes of " + purpose + ", found " + std::to_string(remaining()));
-    }
-    const std::uint8_t* const result = message_.data + position_;
-    position_ += size;
+    const std::uint8_t* const result = bytes_.here();
+    bytes_.skip(size, purpose);
     return result;
   }
 
   [[noreturn]] void fail(const std::string& what) const {
-    throw IoError(message_.place + ": " + what);
+    throw IoError(place_.string() + ": " + what);
   }
 
  private:
   void align(std::size_t size) {
     if (is_ros1()) return;
-    const std::size_t past = (position_ - begin_) % size;
+    const std::size_t past = (bytes_.position() - begin_) % size;
     if (past != 0) take(size - past, "padding");
   }
 
-  const SerialisedMessage& message_;
-  std::size_t position_ = 0;
+  MessageEncoding encoding_;
+  std::filesystem::path place_;  ///< of the message, for errors
+  Bytes bytes_;
   std::size_t begin_ = 0;  ///< alignment counts from here
 };
 

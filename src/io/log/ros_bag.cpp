@@ -24,6 +24,11 @@ enum Opcode : std::uint8_t {
 
 }  // namespace bag
 
+/// The header at the begin of a record.
+Bytes next_header(Bytes& record) {
+  return record.block(record.number<std::uint32_t>("a header length"), "a header");
+}
+
 /// The value of a header field `name`; nothing if the header lacks it.
 std::optional<Bytes> find_field(Bytes header, const std::string& name) {
   while (header.remaining() > 0) {
@@ -62,12 +67,7 @@ std::uint64_t read_time(Bytes& in) {
 }  // namespace
 
 RosBag::RosBag(const std::filesystem::path& path) : ChunkedLog(path) {
-  const auto magic =
-      file_.read(0, std::min<std::uint64_t>(file_.size(), bag::kMagic.size()), "magic bytes");
-  if (!std::equal(magic.begin(), magic.end(), bag::kMagic.begin(), bag::kMagic.end())) {
-    fail_at_byte(path, 0, "expected \"#ROSBAG V2.0\" and the end of a line");
-  }
-  read_index(bag::kMagic.size());
+  read_index(bag::kMagic, "expected \"#ROSBAG V2.0\" and the end of a line");
 }
 
 std::optional<std::uint64_t> RosBag::record_size(std::uint64_t position) {
@@ -87,7 +87,7 @@ bool RosBag::take_record(std::uint64_t position, std::uint64_t size) {
   constexpr std::uint64_t kLongestHead = 4096;
   const auto bytes = file_.read(position, std::min(size, kLongestHead), "a record");
   Bytes rest(path_, position, bytes.data(), bytes.size());
-  const Bytes header = rest.block(rest.number<std::uint32_t>("a header length"), "a header");
+  const Bytes header = next_header(rest);
   const auto opcode = number_in<std::uint8_t>(header, "op");
   if (opcode == bag::kIndexData) {
     take_index(position, size);
@@ -131,7 +131,7 @@ void RosBag::take_chunk(std::uint64_t position, const Bytes& header, Bytes& rest
 void RosBag::take_index(std::uint64_t position, std::uint64_t size) {
   const auto record = file_.read(position, size, "an index");
   Bytes rest(path_, position, record.data(), record.size());
-  const Bytes header = rest.block(rest.number<std::uint32_t>("a header length"), "a header");
+  const Bytes header = next_header(rest);
   if (number_in<std::uint32_t>(header, "ver") != 1) header.fail("expected an index of version 1");
   const auto connection = number_in<std::uint32_t>(header, "conn");
   Bytes entries = rest.block(rest.number<std::uint32_t>("the length of data"), "an index");
@@ -142,7 +142,7 @@ void RosBag::take_index(std::uint64_t position, std::uint64_t size) {
 }
 
 std::optional<ChunkedLog::Message> RosBag::parse_record(Bytes& records) {
-  const Bytes header = records.block(records.number<std::uint32_t>("a header length"), "a header");
+  const Bytes header = next_header(records);
   const Bytes content = records.block(records.number<std::uint32_t>("a data length"), "data");
   const auto opcode = number_in<std::uint8_t>(header, "op");
   if (opcode == bag::kConnection) take_connection(header, content);
