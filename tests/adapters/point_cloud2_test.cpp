@@ -20,7 +20,7 @@ std::vector<Eigen::Vector3f> points_of(const PointCloud2View& view) {
   return points;
 }
 
-TEST_CASE("a message gives its points, whatever its layout") {
+TEST_CASE("a message gives its points, in any layout") {
   Layout layout;
   SECTION("as most drivers lay it out") {}
   SECTION("odd offsets, not aligned, another order") {

@@ -35,7 +35,7 @@ PointBuffer street_about(float x, float y, float reach, LeaveOut&& leave_out) {
 }
 constexpr auto kNothing = [](float, float) { return false; };
 
-TEST_CASE("heights over a slope are derived from the ground around, whatever stands on it") {
+TEST_CASE("heights over a slope are derived from the ground around, under any object") {
   SurroundingGround ground(80.0);
   PointBuffer points = street_about(21.0F, -9.0F, 4.0F, kNothing);
   const auto off = [&] { return std::abs(ground.height(21.0F, -9.0F, street(21.0F, -9.0F))); };

@@ -204,7 +204,7 @@ TEST_CASE("a region has exactly the points that a filter over the map finds") {
   CHECK(compare(Eigen::AlignedBox3d()) == 0);
 }
 
-TEST_CASE("every stored point is found at its place, whatever the rounding of floats") {
+TEST_CASE("every stored point is found at its place, for any rounding of floats") {
   StaticMapAccumulator map = make(0.05);
   Random random(14);
   for (int i = 0; i < 20; ++i) {

@@ -162,7 +162,7 @@ TEST_CASE("an empty list of flags keeps all points; clear removes them and their
   CHECK(map.size() < all);
 }
 
-TEST_CASE("an existing map is continued, whatever bytes an interrupted write left at the end") {
+TEST_CASE("an existing map is continued after an interrupted write, for any bytes at its end") {
   const TemporaryFolder folder;
   const std::vector<MapScan> scans = loop();
   Points before;

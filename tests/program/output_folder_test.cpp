@@ -72,7 +72,7 @@ TEST_CASE("An empty folder is accepted, even with a temporary marker of a killed
   CHECK_FALSE(fs::exists(folder / ".report.json.0123456789abcdef.tmp"));
 }
 
-TEST_CASE("A folder of another owner is refused, whatever its files are called") {
+TEST_CASE("A folder of another owner is refused, for any names of its files") {
   for (const char* name : {"labels/000000.label", ".notes.2024.tmp", ".notes.0123456789abcdef.tmp",
                            ".a.txt.0123456789abcdef.tmp", "a.txt"}) {
     CAPTURE(name);
@@ -182,7 +182,7 @@ TEST_CASE("A file of another owner in the place of new results is refused") {
              ContainsSubstring("000002.label: is in the way, and no part of earlier results"));
 }
 
-TEST_CASE("Files that a command reads are never removed, whatever path leads to them") {
+TEST_CASE("Files that a command reads are never removed, by any path to them") {
   TemporaryFolder folder;
   TemporaryFolder other;
   write_results(folder);
