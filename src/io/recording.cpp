@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "deskew.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
@@ -139,6 +140,31 @@ Recording::Recording(const fs::path& path, const RecordingOptions& options)
   frame_ = options.frame == PointFrame::kAuto ? guess_frame() : options.frame;
   notes_.push_back(frame_ == PointFrame::kWorld ? "points are in the frame of the world"
                                                 : "points are in the frame of the sensor");
+  if (options.deskew) prepare_deskewing();
+}
+
+/// The trajectory if it has times of its own, else the poses of the scans.
+void Recording::prepare_deskewing() {
+  if (!columns_.time) fail(folder_, "de-skewing needs a time for each point, a column time");
+  if (frame_ == PointFrame::kWorld) {
+    fail(folder_, "de-skewing needs points in the frame of the sensor");
+  }
+  notes_.push_back("points are de-skewed by their times");
+  const Trajectory& rows = motion_.times.empty() ? trajectory_ : motion_;
+  const PoseConvention& convention = options_.convention;
+  Trajectory motion;
+  if (convention.shift == 0 && rows.times.size() > 1) {
+    motion.times = rows.times;
+    for (const Eigen::Isometry3d& row : rows.poses) {
+      motion.poses.push_back(to_sensor_pose(convention, apply(convention, row, trajectory_.order)));
+    }
+  } else {
+    for (const Scan& scan : scans_) {
+      motion.times.push_back(scan.time);
+      motion.poses.push_back(scan.T_world_sensor);
+    }
+  }
+  motion_ = std::move(motion);
 }
 
 /// Takes scans, times and poses of a log. Poses of a file belong to the clouds by time.
@@ -165,6 +191,7 @@ void Recording::open_log() {
   }
   if (has_file) files_.push_back(options_.poses);
   trajectory_ = has_file ? read_trajectory(options_.poses) : log->trajectory();
+  if (options_.deskew && !has_file) motion_ = log->motion();
   const fs::path& poses = has_file ? options_.poses : folder_;
   trajectory_.times.empty() ? match_rows(poses) : match_times(poses, log->times());
   reader_ = make_log_reader(std::move(log));
@@ -438,10 +465,16 @@ std::optional<Eigen::Isometry3d> Recording::pose_under(const PoseConvention& con
   const std::optional<TrajectoryMatch>& match = matches_[static_cast<std::size_t>(at)];
   if (!match) return std::nullopt;
   const QuaternionOrder order = trajectory_.order;
-  const Eigen::Isometry3d pose =
+  return to_sensor_pose(
+      convention,
       interpolate(apply(convention, trajectory_.poses[match->before], order),
-                  apply(convention, trajectory_.poses[match->after], order), match->share);
-  const bool is_matrix = order == QuaternionOrder::kNone;
+                  apply(convention, trajectory_.poses[match->after], order), match->share));
+}
+
+/// T_world_sensor of a pose to which the rest of the convention was applied.
+Eigen::Isometry3d Recording::to_sensor_pose(const PoseConvention& convention,
+                                            const Eigen::Isometry3d& pose) const {
+  const bool is_matrix = trajectory_.order == QuaternionOrder::kNone;
   const bool is_camera = convention.frame == PoseFrame::kCamera ||
                          (convention.frame == PoseFrame::kAuto && has_calibration_ && is_matrix);
   if (!is_camera) return pose;
@@ -492,6 +525,7 @@ void Recording::check_scan(std::size_t i) const { reader_->check(address(i)); }
 void Recording::read_scan(std::size_t i, RecordedScan& scan) const {
   const Eigen::Isometry3d T_sensor_world = T_world_sensor(i).inverse();
   reader_->read(address(i), frame_ == PointFrame::kWorld ? &T_sensor_world : nullptr, scan);
+  if (options_.deskew) deskew(motion_, time(i), T_world_sensor(i), file(i), scan);
 }
 
 RecordedScan Recording::read_scan(std::size_t i) const {

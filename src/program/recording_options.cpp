@@ -55,6 +55,11 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what) {
       ->check(CLI::Range(-1000000, 1000000))
       ->type_name("N")
       ->group(kGroup);
+  command
+      .add_flag("--deskew", deskew_,
+                "move points by the interpolated poses to the time of their scan; needs a time for "
+                "each point")
+      ->group(kGroup);
   const auto add_name = [&](const char* flag, std::string& value, const char* help) {
     command.add_option(flag, value, help)->type_name("NAME")->group(kGroup);
   };
@@ -72,6 +77,7 @@ RecordingOptions RecordingFlags::options() const {
   options.cloud_topic = cloud_topic_;
   options.pose_topic = pose_topic_;
   options.pose_frame = pose_frame_id_;
+  options.deskew = deskew_;
   if (frame_ == "sensor") options.frame = PointFrame::kSensor;
   if (frame_ == "world") options.frame = PointFrame::kWorld;
   PoseConvention& convention = options.convention;

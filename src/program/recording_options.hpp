@@ -36,6 +36,7 @@ class RecordingFlags {
   bool invert_ = false;
   bool left_handed_ = false;
   int shift_ = 0;
+  bool deskew_ = false;
   std::string cloud_topic_;
   std::string pose_topic_;
   std::string pose_frame_id_;

@@ -78,6 +78,7 @@ nlohmann::ordered_json describe_request(const Recording& recording, const ScanRa
           {"last_scan", recording.name(range.last)},
           {kPosesAndTimes, fingerprint(recording, range)},
           {"points_in_world", recording.frame() == PointFrame::kWorld},
+          {"deskew", recording.is_deskewed()},
           {"map", outputs.map_name()},
           {"map_on_disk", outputs.map_on_disk},
           {"write_online", outputs.write_online},

@@ -41,6 +41,11 @@ simulation::Config make_config(const SimulateOptions& options) {
   config.labelling = simulation::labelling_from_name(options.labelling);
   options.flags.values().apply(config);
   config.validate();
+  if (config.rolling_shutter && options.format != kLog) {
+    throw ConfigError(
+        "--rolling-shutter needs --format mcap: a folder as of KITTI has no times of "
+        "points");
+  }
   return config;
 }
 

@@ -82,10 +82,10 @@ void BeamTable::add(double azimuth, double cos_elevation, double sin_elevation, 
 }
 
 // Two mirrors with incommensurate speeds: petals that precess from scan to scan.
-void BeamTable::add_rosette(const SensorModel& model, std::size_t scan) {
+void BeamTable::add_rosette(const SensorModel& model, std::size_t scan, Columns part) {
   const double opening = 35 * kDegree;
   const double first = static_cast<double>(scan) * model.columns;
-  for (int i = 0; i < model.columns; ++i) {
+  for (int i = part.first; i < part.last; ++i) {
     const double t = (first + i) / model.columns;
     const double petal = 2 * kPi * (t * 61.6180339887 - std::floor(t * 61.6180339887));
     const double spin = 2 * kPi * (t * 17.4142135624 - std::floor(t * 17.4142135624));
@@ -96,13 +96,14 @@ void BeamTable::add_rosette(const SensorModel& model, std::size_t scan) {
   }
 }
 
-void BeamTable::add_rings(const SensorModel& model, std::uint64_t seed, std::size_t scan) {
+void BeamTable::add_rings(const SensorModel& model, std::uint64_t seed, std::size_t scan,
+                          Columns part) {
   const double step = 2 * kPi / model.columns;
   const double phase = static_cast<double>(unit_float(mix(mix(seed, 11), scan)));
   Random calibration(mix(seed, 12));
   // Trigonometry once per column and ring.
   std::vector<double> sines, cosines;
-  for (int i = 0; i < model.columns; ++i) {
+  for (int i = part.first; i < part.last; ++i) {
     const double azimuth = kPi - step * (i + phase);
     sines.push_back(std::sin(azimuth));
     cosines.push_back(std::cos(azimuth));
@@ -113,8 +114,8 @@ void BeamTable::add_rings(const SensorModel& model, std::uint64_t seed, std::siz
     const double c = std::cos(elevation), s = std::sin(elevation);
     const double cos_turn = std::cos(turn), sin_turn = std::sin(turn);
     const int row = row_of(elevation);
-    for (int i = 0; i < model.columns; ++i) {
-      const auto k = static_cast<std::size_t>(i);
+    for (int i = part.first; i < part.last; ++i) {
+      const auto k = static_cast<std::size_t>(i - part.first);
       const double azimuth = kPi - step * (i + phase) + turn;
       const double x = cosines[k] * cos_turn - sines[k] * sin_turn;
       const double y = sines[k] * cos_turn + cosines[k] * sin_turn;
@@ -143,13 +144,13 @@ void BeamTable::sort_by_cell() {
   }
 }
 
-void BeamTable::fill(const SensorModel& model, std::uint64_t seed, std::size_t scan) {
+void BeamTable::fill(const SensorModel& model, std::uint64_t seed, std::size_t scan, Columns part) {
   unordered_.clear();
   cells_.clear();
   if (model.elevations.empty()) {
-    add_rosette(model, scan);
+    add_rosette(model, scan, part);
   } else {
-    add_rings(model, seed, scan);
+    add_rings(model, seed, scan, part);
   }
   sort_by_cell();
 }

@@ -31,9 +31,18 @@ class BeamTable {
   static constexpr int kColumns = 720;  ///< cells of half a degree
   static constexpr int kRows = 360;
 
-  /// Beams of scan `scan`: every scan starts at another azimuth, every seed is another
-  /// calibration, and the rosette never repeats.
-  void fill(const SensorModel& model, std::uint64_t seed, std::size_t scan);
+  /// Columns of one turn: `first` to `last`, `last` excluded.
+  struct Columns {
+    int first = 0;
+    int last = 0;
+  };
+
+  /// Beams of scan `scan` in these columns: every scan starts at another azimuth, every seed is
+  /// another calibration, and the rosette never repeats.
+  void fill(const SensorModel& model, std::uint64_t seed, std::size_t scan, Columns part);
+  void fill(const SensorModel& model, std::uint64_t seed, std::size_t scan) {
+    fill(model, seed, scan, {0, model.columns});
+  }
 
   std::size_t size() const { return directions_.size(); }
   const Vec3& direction(std::size_t slot) const { return directions_[slot]; }
@@ -51,8 +60,8 @@ class BeamTable {
 
  private:
   void add(double azimuth, double cos_elevation, double sin_elevation, int row);
-  void add_rosette(const SensorModel& model, std::size_t scan);
-  void add_rings(const SensorModel& model, std::uint64_t seed, std::size_t scan);
+  void add_rosette(const SensorModel& model, std::size_t scan, Columns part);
+  void add_rings(const SensorModel& model, std::uint64_t seed, std::size_t scan, Columns part);
   void sort_by_cell();
 
   std::vector<Vec3> unordered_;

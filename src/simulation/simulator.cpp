@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kMovingSpeed = 0.5;  // m/s
 constexpr double kMovedWay = 0.5;     // m
+constexpr int kShutterParts = 40;     // of a scan, each measured at one time
 
 /// Rotation Rz(yaw) Ry(pitch) Rx(roll) in doubles, without vector instructions that might differ.
 Eigen::Matrix3d rotation(double yaw, double pitch, double roll) {
@@ -106,7 +107,7 @@ class Simulator::Implementation {
   }
 
   const Config& config() const { return config_; }
-  std::size_t size() const { return moments_.size(); }
+  std::size_t size() const { return static_cast<std::size_t>(config_.scans); }
 
   SimulatedScan scan(std::size_t index) {
     const Moment& moment = moments_.at(index);
@@ -115,18 +116,27 @@ class Simulator::Implementation {
     result.T_world_sensor = moment.T_world_sensor;
     result.T_world_sensor_noisy = with_noise(moment.T_world_sensor, index);
 
-    beams_.fill(model_, config_.seed, index);
     const std::uint64_t scan_seed = mix(mix(config_.seed, 500), index);
-    renderer_.start(beams_, static_cast<float>(model_.max_range), scan_seed);
-    draw_world(moment, result.objects);
-    measure(moment, result, scan_seed);
+    if (!config_.rolling_shutter) {
+      measure_part(index, moment, {0, model_.columns}, scan_seed, result);
+      return result;
+    }
+    for (int part = 0; part < kShutterParts; ++part) {
+      const BeamTable::Columns columns{model_.columns * part / kShutterParts,
+                                       model_.columns * (part + 1) / kShutterParts};
+      const double share = 0.5 * (columns.first + columns.last) / model_.columns;
+      const Moment now = between(moment, moments_.at(index + 1), share);
+      measure_part(index, now, columns, mix(scan_seed, static_cast<std::uint64_t>(part)), result);
+      result.times.resize(result.labels.size(), static_cast<float>(now.time - moment.time));
+    }
     return result;
   }
 
  private:
-  /// Record of one scan.
+  /// Where everything is at one time.
   struct Moment {
     double time = 0;
+    EgoPose ego;
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
     std::vector<ObjectPose> objects;
   };
@@ -138,10 +148,13 @@ class Simulator::Implementation {
     const double dt = interval / steps;
     std::map<std::uint32_t, Vec2> first_seen;
     ever_moved_.assign(world_.traffic.objects.size(), false);
-    for (int i = 0; i < config_.scans; ++i) {
+    // The last scan with a rolling shutter ends at one more moment.
+    const int moments = config_.scans + (config_.rolling_shutter ? 1 : 0);
+    for (int i = 0; i < moments; ++i) {
       const EgoPose ego = world_.traffic.ego();
       Moment moment;
       moment.time = i * interval;
+      moment.ego = ego;
       moment.T_world_sensor = sensor_pose(ego, moment.time);
       moment.objects = world_.traffic.around(ego.at.position, model_.max_range + 8);
       ever_moved_.resize(world_.traffic.objects.size(), false);
@@ -153,6 +166,33 @@ class Simulator::Implementation {
       moments_.push_back(std::move(moment));
       for (int k = 0; k < steps; ++k) world_.traffic.step(dt);
     }
+  }
+
+  static Waypoint between(const Waypoint& a, const Waypoint& b, double share) {
+    Waypoint at = a;
+    at.position = a.position + share * (b.position - a.position);
+    at.heading = a.heading + share * wrap(b.heading - a.heading);
+    return at;
+  }
+
+  /// `share` of the way from `a` to `b`. Ground and springs move the sensor as at that time.
+  Moment between(const Moment& a, const Moment& b, double share) {
+    Moment moment = a;
+    moment.time = a.time + share * (b.time - a.time);
+    moment.ego.at = between(a.ego.at, b.ego.at, share);
+    moment.ego.speed += share * (b.ego.speed - a.ego.speed);
+    moment.ego.acceleration += share * (b.ego.acceleration - a.ego.acceleration);
+    moment.ego.turn_rate += share * (b.ego.turn_rate - a.ego.turn_rate);
+    moment.T_world_sensor = sensor_pose(moment.ego, moment.time);
+    for (ObjectPose& pose : moment.objects) {
+      const auto later =
+          std::find_if(b.objects.begin(), b.objects.end(),
+                       [&](const ObjectPose& other) { return other.object == pose.object; });
+      if (later == b.objects.end()) continue;
+      pose.at = between(pose.at, later->at, share);
+      pose.phase += share * (later->phase - pose.phase);
+    }
+    return moment;
   }
 
   Eigen::Isometry3d sensor_pose(const EgoPose& ego, double time) {
@@ -283,20 +323,32 @@ class Simulator::Implementation {
     return surface;
   }
 
+  /// Adds the points of some columns of a scan, measured at one moment.
+  void measure_part(std::size_t index, const Moment& moment, BeamTable::Columns columns,
+                    std::uint64_t seed, SimulatedScan& scan) {
+    beams_.fill(model_, config_.seed, index, columns);
+    renderer_.start(beams_, static_cast<float>(model_.max_range), seed);
+    std::vector<ObjectState> states;
+    draw_world(moment, states);
+    measure(moment, states, scan, seed);
+    if (columns.first == 0) scan.objects = std::move(states);
+  }
+
   /// Turns surfaces into points with noise, losses and labels.
-  void measure(const Moment& moment, SimulatedScan& scan, std::uint64_t scan_seed) {
+  void measure(const Moment& moment, const std::vector<ObjectState>& objects, SimulatedScan& scan,
+               std::uint64_t scan_seed) {
     const Rigid T_world_sensor = to_rigid(moment.T_world_sensor);
     const Vec3 origin = T_world_sensor.translation;
     world_.terrain.prepare({moment.T_world_sensor(0, 3), moment.T_world_sensor(1, 3)},
                            model_.max_range);
-    scan.xyzi.reserve(beams_.size() * 4);
-    scan.labels.reserve(beams_.size());
+    scan.xyzi.reserve(scan.xyzi.size() + beams_.size() * 4);
+    scan.labels.reserve(scan.labels.size() + beams_.size());
     for (const std::uint32_t slot : beams_.measured_order()) {
       const Renderer::Hit& hit = renderer_.hits()[slot];
       const Vec3 direction = beams_.direction(slot);
       const Vec3 world_direction = T_world_sensor.rotation * direction;
       std::optional<Surface> surface = ground_surface(origin, world_direction, hit.range);
-      if (!surface) surface = object_surface(hit, direction, scan.objects);
+      if (!surface) surface = object_surface(hit, direction, objects);
       if (surface) add_point(*surface, direction, mix(scan_seed, slot), scan);
     }
   }

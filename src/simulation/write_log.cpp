@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstring>
 #include <string>
+#include <vector>
 
 #include "io/log/cdr_writer.hpp"
 #include "io/log/mcap_writer.hpp"
@@ -41,21 +42,24 @@ std::string cloud_of(const SimulatedScan& scan, std::uint64_t time) {
   };
   constexpr std::uint8_t kUint32 = 6;
   constexpr std::uint8_t kFloat32 = 7;
-  constexpr Field kFields[] = {{"x", kFloat32},
+  std::vector<Field> fields = {{"x", kFloat32},
                                {"y", kFloat32},
                                {"z", kFloat32},
                                {"intensity", kFloat32},
                                {"label", kUint32}};
+  const bool has_times = !scan.times.empty();
+  if (has_times) fields.push_back({"time", kFloat32});
   constexpr std::uint32_t kSize = 4;  // bytes of each field
-  constexpr std::uint32_t kStep = kSize * std::uint32_t{std::size(kFields)};
+  const auto field_count = static_cast<std::uint32_t>(fields.size());
+  const std::uint32_t step = kSize * field_count;
   const auto points = static_cast<std::uint32_t>(scan.labels.size());
   CdrWriter out;
   out.header(time, kFrame);
   out.number(std::uint32_t{1});  // height
   out.number(points);
-  out.number(std::uint32_t{std::size(kFields)});
+  out.number(field_count);
   std::uint32_t offset = 0;
-  for (const Field& field : kFields) {
+  for (const Field& field : fields) {
     out.string(field.name);
     out.number(offset);
     out.number(field.datatype);
@@ -63,12 +67,13 @@ std::string cloud_of(const SimulatedScan& scan, std::uint64_t time) {
     offset += kSize;
   }
   out.number(std::uint8_t{0});  // little endian
-  out.number(kStep);
-  out.number(kStep * points);
-  out.number(kStep * points);
+  out.number(step);
+  out.number(step * points);
+  out.number(step * points);
   for (std::uint32_t i = 0; i < points; ++i) {
     for (std::uint32_t k = 0; k < 4; ++k) out.number(scan.xyzi[4 * std::size_t{i} + k]);
     out.number(scan.labels[i]);
+    if (has_times) out.number(scan.times[i]);
   }
   out.number(std::uint8_t{1});  // dense
   return out.bytes();

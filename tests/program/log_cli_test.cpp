@@ -1,8 +1,11 @@
 // The program with logs of ROS instead of folders of scans.
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <vector>
 
+#include "dynains/io/recording.hpp"
 #include "io/files.hpp"
 #include "io/log_writer.hpp"
 #include "program/start.hpp"
@@ -120,6 +123,44 @@ TEST_CASE("No result replaces the log that is read") {
   CHECK(outcome.code == 1);
   CHECK_THAT(outcome.err, ContainsSubstring("is read by this command"));
   CHECK(read_text(log) == before);
+}
+
+TEST_CASE("--deskew restores the scores that a rolling shutter costs, and keeps times of points") {
+  const TemporaryFolder folder;
+  const std::string log = folder / "drive" / "drive.mcap";
+  const Outcome refused =
+      start({"simulate", folder / "kitti", "--scans", "2", "--rolling-shutter", "true"});
+  CHECK(refused.code != 0);
+  CHECK_THAT(refused.err, ContainsSubstring("--rolling-shutter needs --format mcap"));
+  REQUIRE(start({"simulate", folder / "drive", "--format", "mcap", "--scene", "urban", "--sensor",
+                 "vlp16", "--scans", "30", "--rolling-shutter", "true"})
+              .code == 0);
+  const auto static_accuracy = [&](const std::vector<std::string>& flags) {
+    const std::string out = folder / ("out" + std::to_string(flags.size()));
+    std::vector<std::string> run = {"run", log, "--out", out, "--write-clean"};
+    std::vector<std::string> eval = {"eval", log, out};
+    run.insert(run.end(), flags.begin(), flags.end());
+    eval.insert(eval.end(), flags.begin(), flags.end());
+    REQUIRE(start(run).code == 0);
+    const Outcome scores = start(eval);
+    CAPTURE(scores.err);
+    REQUIRE(scores.code == 0);
+    std::istringstream row(scores.out.substr(scores.out.find("\nrun ")));
+    std::string name;
+    double preservation = 0, rejection = 0, f1 = 0, accuracy = 0;
+    row >> name >> preservation >> rejection >> f1 >> accuracy;
+    return accuracy;
+  };
+  const double distorted = static_accuracy({});
+  const double deskewed = static_accuracy({"--deskew"});
+  CHECK(deskewed > 98.0);
+  CHECK(distorted < deskewed - 1.0);
+  const RecordedScan raw = Recording(log).read_scan(3);
+  const Recording clean(folder / "out1" / "clean");
+  CHECK(clean.columns().time);
+  const RecordedScan scan = clean.read_scan(3);
+  CHECK(std::includes(raw.time.begin(), raw.time.end(), scan.time.begin(), scan.time.end()));
+  CHECK(scan.xyzi[0] != raw.xyzi[0]);
 }
 
 TEST_CASE("simulate --format mcap: run on the log gives the labels of run on the folder") {

@@ -1,5 +1,6 @@
 #include "dynains/simulation/simulator.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <map>
@@ -50,6 +51,33 @@ TEST_CASE("one configuration gives equal bits, in any order of scans") {
   Config other = config;
   other.seed = 4;
   CHECK(hash_of(Simulator(other).scan(0)) != hash_of(a.scan(0)));
+}
+
+TEST_CASE(
+    "with a rolling shutter, the points of a scan have increasing times and own sensor poses") {
+  Config config = small(Scene::kHighway, Sensor::kVlp16, 2, 3);
+  config.range_noise = 0;
+  config.dropout = 0;
+  config.rolling_shutter = true;
+  Simulator simulator(config);
+  REQUIRE(simulator.size() == 2);
+  const SimulatedScan scan = simulator.scan(0);
+  const SimulatedScan last = simulator.scan(1);
+  CHECK(hash_of(last) == hash_of(Simulator(config).scan(1)));
+  REQUIRE(scan.times.size() == scan.labels.size());
+  CHECK(std::is_sorted(scan.times.begin(), scan.times.end()));
+  CHECK(scan.times.front() > 0.0F);
+  CHECK(scan.times.front() < 0.005F);
+  CHECK(scan.times.back() < 0.1F);
+  CHECK(scan.times.back() > 0.095F);
+  CHECK(last.times.size() == last.labels.size());
+
+  config.rolling_shutter = false;
+  const SimulatedScan still = Simulator(config).scan(0);
+  CHECK(still.times.empty());
+  CHECK(still.T_world_sensor.isApprox(scan.T_world_sensor, 0.0));
+  const Eigen::Vector3d way = last.T_world_sensor.translation() - scan.T_world_sensor.translation();
+  CHECK(way.norm() > 2.0);
 }
 
 TEST_CASE("every scene gives points with every sensor") {

@@ -32,6 +32,9 @@ struct RecordingOptions {
   std::string cloud_topic;  ///< for logs; empty: the only topic of clouds
   std::string pose_topic;   ///< for logs; empty: the only topic of poses
   std::string pose_frame;   ///< for logs: fixed frame of transforms; empty: root of their tree
+  /// Whether points are moved to the sensor frame at the time of their scan. Needs a time for each
+  /// point, and points in the sensor frame.
+  bool deskew = false;
 };
 
 /// One scan. Each column has one value per point, or is empty if the recording lacks it.
@@ -118,6 +121,8 @@ class Recording {
   /// Whether the poses are those of VIEWPOINT.
   bool has_viewpoints() const { return has_viewpoints_; }
   bool has_labels() const { return labels_ != Labels::kNone; }
+  /// Whether read_scan() moves points to the sensor frame at the time of the scan.
+  bool is_deskewed() const { return options_.deskew; }
   /// Path, position and reason if a log is truncated. The clouds before that position are valid.
   const std::optional<std::string>& early_end() const { return early_end_; }
   /// Automatic choices of files, frames and times, and excluded scans, one sentence each.
@@ -139,6 +144,8 @@ class Recording {
   /// Throws unless the header and the size of the file of scan i are valid. Does not read points.
   void check_scan(std::size_t i) const;
   /// Reads scan i, m, sensor frame, and reuses the memory of `scan`. May contain NaN and infinity.
+  /// With RecordingOptions::deskew, the poses of the recording between the scans are interpolated
+  /// at the time of each point; times of points keep their values.
   void read_scan(std::size_t i, RecordedScan& scan) const;
   RecordedScan read_scan(std::size_t i) const;
   /// One label per point of scan i.
@@ -186,6 +193,9 @@ class Recording {
   void place_scans(const std::filesystem::path& poses);
   void find_columns();
   PointFrame guess_frame() const;
+  Eigen::Isometry3d to_sensor_pose(const PoseConvention& convention,
+                                   const Eigen::Isometry3d& pose) const;
+  void prepare_deskewing();
   ScanAddress address(std::size_t i) const;
 
   std::filesystem::path folder_;
@@ -202,6 +212,7 @@ class Recording {
   Eigen::Isometry3d Tr_ = Eigen::Isometry3d::Identity();  ///< of calib.txt
   Trajectory trajectory_;
   std::vector<std::optional<TrajectoryMatch>> matches_;  ///< per scan file
+  Trajectory motion_;                                    ///< T_world_sensor, for de-skewing
   std::vector<Scan> scans_;
   std::vector<std::filesystem::path> files_;  ///< without files of labels
   std::optional<std::string> early_end_;

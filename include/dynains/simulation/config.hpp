@@ -71,6 +71,7 @@ struct Config {
   double pose_noise_translation = 0.0;  ///< m, standard deviation per axis and scan
   double pose_noise_rotation = 0.0;     ///< deg, standard deviation per axis and scan
   bool ego_points = false;              ///< whether scans contain the roof below the sensor
+  bool rolling_shutter = false;  ///< whether the beams of a scan are spread over 1 / rate seconds
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
@@ -100,6 +101,9 @@ struct Config {
                       "standard deviation of the written poses, per axis"});
     visitor(Parameter{"ego_points", self.ego_points, Bounds{}, "",
                       "whether scans contain points on the roof of the ego vehicle"});
+    visitor(Parameter{"rolling_shutter", self.rolling_shutter, Bounds{}, "",
+                      "whether sensor and objects move while a scan is measured; needs a --format "
+                      "with times of points"});
   }
 
   /// Throws ConfigError for a field out of bounds.

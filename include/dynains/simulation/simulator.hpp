@@ -22,9 +22,10 @@ struct ObjectState {
 
 /// One scan with its ground truth.
 struct SimulatedScan {
-  double time = 0.0;                  ///< s, 0 for the first scan
+  double time = 0.0;                  ///< s, 0 for the first scan; of the first beam
   std::vector<float> xyzi;            ///< interleaved; m, sensor frame; reflectivity in [0, 1]
   std::vector<std::uint32_t> labels;  ///< by point: SemanticKITTI class | instance << 16
+  std::vector<float> times;           ///< by point: s after `time`; empty without a rolling shutter
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d T_world_sensor_noisy = Eigen::Isometry3d::Identity();
   std::vector<ObjectState> objects;  ///< vehicles and people near the sensor, also parked ones
@@ -33,8 +34,10 @@ struct SimulatedScan {
 /// Generates the scans of one sequence. The world frame has z up and differs from the first sensor
 /// frame.
 ///
-/// All points of a scan are measured at one time from one pose, as after motion compensation. Beams
-/// without a return give no point. Equal Configs give bit-identical scans.
+/// All points of a scan are measured at one time from one pose, as after motion compensation. With
+/// Config::rolling_shutter, points are measured over 1 / rate seconds, in the frame of the sensor
+/// at the time of the point. Beams without a return give no point. Equal Configs give bit-identical
+/// scans.
 class Simulator {
  public:
   /// Generates the scene and the motion of all objects for the whole sequence. Throws ConfigError.

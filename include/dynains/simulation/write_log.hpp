@@ -10,9 +10,10 @@
 namespace dynains::simulation {
 
 /// Writes an MCAP file: clouds on /points (sensor_msgs/PointCloud2 in frame "lidar": float32 x y z
-/// intensity, uint32 label) and the noisy poses of "lidar" in "map" on /tf (tf2_msgs/TFMessage).
-/// `progress(done, total)` is called after each scan. If it returns false, the call ends without a
-/// file. Returns whether the file was written. Throws IoError.
+/// intensity, uint32 label, with a rolling shutter float32 time, s) and the noisy poses of "lidar"
+/// in "map" on /tf (tf2_msgs/TFMessage). `progress(done, total)` is called after each scan. If it
+/// returns false, the call ends without a file. Returns whether the file was written. Throws
+/// IoError.
 bool write_log(Simulator& simulator, const std::filesystem::path& file,
                const std::function<bool(std::size_t, std::size_t)>& progress = {});
 

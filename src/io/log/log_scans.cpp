@@ -193,6 +193,17 @@ void LogScans::place_scans() {
   }
 }
 
+Trajectory LogScans::motion() const {
+  Trajectory motion;
+  for (const double time : pose_topic_ ? poses_.times : transforms_.times()) {
+    const std::optional<Eigen::Isometry3d> T_world_sensor = pose_at(time);
+    if (!T_world_sensor) continue;
+    motion.times.push_back(time);
+    motion.poses.push_back(*T_world_sensor);
+  }
+  return motion;
+}
+
 /// The fixed frame of poses from transforms: that of the options, or the root of the tree.
 std::string LogScans::world_frame() const {
   if (!transforms_.has(cloud_frame_)) {

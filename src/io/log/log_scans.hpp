@@ -35,6 +35,8 @@ class LogScans {
   const std::vector<double>& times() const { return times_; }
   /// T_world_sensor at the times of the scans that have a pose; empty without poses.
   const Trajectory& trajectory() const { return trajectory_; }
+  /// T_world_sensor at all times of poses, for de-skewing.
+  Trajectory motion() const;
   /// Whether the frame of the clouds is the fixed frame of the poses.
   bool is_in_world() const { return is_in_world_; }
   /// Columns of the first cloud.

@@ -1,6 +1,7 @@
 #include "transform_tree.hpp"
 
 #include <algorithm>
+#include <set>
 
 namespace dynains {
 namespace {
@@ -71,6 +72,14 @@ std::optional<Eigen::Isometry3d> TransformTree::find(const std::string& target,
     }
   }
   return std::nullopt;
+}
+
+std::vector<double> TransformTree::times() const {
+  std::set<double> times;
+  for (const auto& edge : edges_) {
+    times.insert(edge.second.poses.times.begin(), edge.second.poses.times.end());
+  }
+  return {times.begin(), times.end()};
 }
 
 std::vector<std::string> TransformTree::frames() const {

@@ -31,6 +31,8 @@ class TransformTree {
   /// if a moving edge on the way has no pose at that time (see match_time()).
   std::optional<Eigen::Isometry3d> find(const std::string& target, const std::string& source,
                                         double time) const;
+  /// Times of all moving transforms, s, strictly increasing.
+  std::vector<double> times() const;
   /// Names of all frames that have a parent.
   std::vector<std::string> frames() const;
 

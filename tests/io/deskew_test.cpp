@@ -1,0 +1,207 @@
+// Removal of the distortion by the motion of the sensor during a scan.
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/point_file.hpp"
+#include "dynains/io/recording.hpp"
+#include "files.hpp"
+#include "log_writer.hpp"
+#include "support/catch.hpp"
+
+namespace dynains {
+
+using namespace test;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kSpeed = 20.0;    // m/s along x
+constexpr double kTurnRate = 0.5;  // rad/s
+const Eigen::Vector3d kPlace(30.0, 8.0, 3.0);
+
+Eigen::Isometry3d motion(double time) { return pose_at(kSpeed * time, kTurnRate * time); }
+
+/// kPlace in the sensor frame at `time`.
+Eigen::Vector3f seen_at(double time) { return (motion(time).inverse() * kPlace).cast<float>(); }
+
+Eigen::Vector3f point_of(const RecordedScan& scan, std::size_t i) {
+  return Eigen::Map<const Eigen::Vector3f>(scan.xyzi.data() + 4 * i);
+}
+
+const std::vector<double> kOffsets = {-0.02, 0.0, 0.013, 0.1};  // s
+
+/// Three scans that see kPlace four times each. `stored` gives the value of the column time.
+void write_drive(const fs::path& folder, const std::function<double(double, double)>& stored,
+                 double first_time = 0.0) {
+  PointColumns columns;
+  columns.time = true;
+  std::string times, poses;
+  for (int i = 0; i < 3; ++i) {
+    const double time = 0.1 * i;
+    fs::create_directories(folder);
+    PointFileWriter writer(folder / ("scan" + std::to_string(i) + ".ply"), columns);
+    for (const double offset : kOffsets) {
+      FilePoint point;
+      point.position = seen_at(time + offset).cast<double>();
+      point.time = stored(first_time + time, offset);
+      writer.add(point);
+    }
+    writer.commit();
+    const auto seconds = [&](double value) { return std::to_string(first_time + value) + ' '; };
+    times += seconds(time) + '\n';
+    const Eigen::Isometry3d T = motion(time);
+    const Eigen::Quaterniond q(T.linear());
+    poses += seconds(time);
+    for (const double value : {T.translation().x(), T.translation().y(), T.translation().z(), q.x(),
+                               q.y(), q.z(), q.w()}) {
+      poses += std::to_string(value) + ' ';
+    }
+    poses += '\n';
+  }
+  write_text(folder / "times.txt", times);
+  write_text(folder / "poses.tum", poses);
+}
+
+RecordingOptions with_deskewing() {
+  RecordingOptions options;
+  options.deskew = true;
+  options.frame = PointFrame::kSensor;
+  return options;
+}
+
+void check_deskewed(const fs::path& path) {
+  CAPTURE(path);
+  const Recording recording(path, with_deskewing());
+  const Recording raw(path);
+  CHECK(recording.is_deskewed());
+  REQUIRE(recording.size() == 3);
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    const RecordedScan scan = recording.read_scan(i);
+    REQUIRE(scan.size() == kOffsets.size());
+    CHECK(scan.time == raw.read_scan(i).time);
+    for (std::size_t k = 0; k < scan.size(); ++k) {
+      CHECK((point_of(scan, k) - seen_at(0.1 * static_cast<double>(i))).norm() < 0.005F);
+    }
+    CHECK((point_of(raw.read_scan(i), 3) - point_of(scan, 3)).norm() > 1.0F);
+  }
+}
+
+std::string error_of(const fs::path& path, const RecordingOptions& options = with_deskewing()) {
+  return message_of<IoError>([&] { Recording(path, options).read_scan(1); });
+}
+
+}  // namespace
+
+TEST_CASE("De-skewing moves points to the time of the scan, whatever the unit of their times") {
+  const TemporaryFolder folder;
+  write_drive(folder / "s", [](double, double offset) { return offset; });
+  check_deskewed(folder / "s");
+  write_drive(folder / "ms", [](double, double offset) { return 1e3 * offset; });
+  check_deskewed(folder / "ms");
+  write_drive(folder / "ns", [](double, double offset) { return 1e9 * offset; });
+  check_deskewed(folder / "ns");
+  write_drive(
+      folder / "absolute", [](double stamp, double offset) { return stamp + offset; }, 1.5e9);
+  check_deskewed(folder / "absolute");
+}
+
+TEST_CASE("Poses of a log between its clouds take part in de-skewing") {
+  const std::vector<CloudField> fields = {{"x", 0, 7}, {"y", 4, 7}, {"z", 8, 7}, {"t", 12, 5}};
+  for (const bool by_transforms : {false, true}) {
+    std::vector<WrittenMessage> messages;
+    // The sensor stands still, and starts to move between the first cloud and the second one.
+    const auto place = [](double time) {
+      return pose_at(time < 1.05 ? 0.0 : 20 * (time - 1.05), 0);
+    };
+    for (int i = 0; i <= 6; ++i) {
+      const double time = 1.0 + 0.05 * i;
+      messages.push_back({1, nanoseconds(time),
+                          by_transforms ? transform(time, "odom", "lidar", place(time))
+                                        : odometry(time, "lidar", place(time))});
+    }
+    for (const double time : {1.0, 1.1, 1.2}) {
+      ByteWriter points;
+      for (const double offset : {0.0, 0.04, 0.09}) {
+        for (const float c :
+             {static_cast<float>(50.0 - place(time + offset).translation().x()), 1.0F, 2.0F}) {
+          points.number(c);
+        }
+        points.number(static_cast<std::int32_t>(1e9 * offset));
+      }
+      messages.push_back(
+          {0, nanoseconds(time),
+           cloud_message(MessageEncoding::kCdr, time, "lidar", fields, 16, points.text())});
+    }
+    const TemporaryFolder folder;
+    write_text(folder / "drive.mcap",
+               mcap_file({{"/points", "sensor_msgs/msg/PointCloud2"},
+                          by_transforms ? LogChannel{"/tf", "tf2_msgs/msg/TFMessage"}
+                                        : LogChannel{"/odom", "nav_msgs/msg/Odometry"}},
+                         messages, {}));
+    const Recording recording(folder / "drive.mcap", with_deskewing());
+    REQUIRE(recording.size() == 3);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const RecordedScan scan = recording.read_scan(i);
+      for (std::size_t k = 0; k < scan.size(); ++k) {
+        CAPTURE(by_transforms, i, k);
+        CHECK((point_of(scan, k) - point_of(scan, 0)).norm() < 0.005F);
+      }
+    }
+  }
+}
+
+TEST_CASE("Points at the origin and points without a finite time keep their place") {
+  const TemporaryFolder folder;
+  PointColumns columns;
+  columns.time = true;
+  for (int i = 0; i < 2; ++i) {
+    PointFileWriter writer(folder / (std::to_string(i) + ".ply"), columns);
+    const auto add = [&](double x, double time) {
+      FilePoint point;
+      point.position = {x, 0, 0};
+      point.time = time;
+      writer.add(point);
+    };
+    add(0.0, 0.05);
+    add(5.0, std::numeric_limits<double>::quiet_NaN());
+    add(5.0, 0.05);
+    writer.commit();
+  }
+  write_text(folder / "poses.tum", "0 0 0 0 0 0 0 1\n0.1 2 0 0 0 0 0 1\n");
+  const Recording recording(folder.path(), with_deskewing());
+  const RecordedScan scan = recording.read_scan(0);
+  CHECK(point_of(scan, 0).isZero(0.0F));
+  CHECK(point_of(scan, 1).x() == 5.0F);
+  CHECK(point_of(scan, 2).x() == Approx(6.0F).margin(1e-4));
+}
+
+TEST_CASE("De-skewing that is not possible is an error with its reason") {
+  const TemporaryFolder folder;
+  write_drive(folder / "other_clock", [](double, double offset) { return 100.0 + offset; });
+  CHECK_THAT(error_of(folder / "other_clock"),
+             ContainsSubstring((folder / "other_clock" / "scan1.ply").string()) &&
+                 ContainsSubstring("expected times of points within 1 s of the time of the scan"));
+
+  write_drive(folder / "drive", [](double, double offset) { return offset; });
+  RecordingOptions options = with_deskewing();
+  options.frame = PointFrame::kWorld;
+  CHECK_THAT(error_of(folder / "drive", options),
+             ContainsSubstring("needs points in the frame of the sensor"));
+  write_text(folder / "drive" / "poses.tum",
+             "0 0 0 0 0 0 0 1\n0.1 2 0 0 0 0 0 1\n9 2 0 0 0 0 0 1\n");
+  write_text(folder / "drive" / "times.txt", "0\n0.1\n9\n");
+  CHECK_THAT(
+      message_of<IoError>([&] { Recording(folder / "drive", with_deskewing()).read_scan(2); }),
+      ContainsSubstring("expected poses at most 1 s apart"));
+
+  fs::create_directory(folder / "bare");
+  PointFileWriter(folder / "bare" / "0.ply").commit();
+  write_text(folder / "bare" / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  CHECK_THAT(error_of(folder / "bare"), ContainsSubstring("a column time"));
+}
+
+}  // namespace dynains
