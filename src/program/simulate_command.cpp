@@ -89,7 +89,7 @@ nlohmann::ordered_json describe(const SimulateOptions& options, const simulation
                                  {"labelling", options.labelling},
                                  {"format", options.format}};
   simulation::Config::visit(config,
-                            [&](const auto& parameter) { json[parameter.name] = parameter.value; });
+                            [&](const auto& parameter) { json[parameter.name] = plain_value(parameter.value); });
   return json;
 }
 

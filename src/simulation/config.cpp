@@ -18,9 +18,9 @@ std::size_t position_of(const std::string& name, const std::vector<std::string>&
 }  // namespace
 
 const std::vector<std::string>& scene_names() {
-  static const std::vector<std::string> names{"urban", "highway",     "vegetation",
-                                              "crowd", "stop-and-go", "canopy",
-                                              "hill",  "car-park",    "static"};
+  static const std::vector<std::string> names{"urban",       "highway", "vegetation", "crowd",
+                                              "stop-and-go", "canopy",  "hill",       "car-park",
+                                              "static",      "hall",    "forest",     "garage"};
   return names;
 }
 

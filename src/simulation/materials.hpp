@@ -27,6 +27,10 @@ inline constexpr Material kThinLeaves{semantic::kVegetation, 0.35F, 0.15F, 0.6F,
 inline constexpr Material kBush{semantic::kVegetation, 0.35F, 0.08F, 5.0F, 0.2F, 0, 0};
 inline constexpr Material kHedge{semantic::kVegetation, 0.35F, 0.06F, 9.0F, 0.15F, 0, 0};
 inline constexpr Material kGrass{semantic::kVegetation, 0.3F, 0.15F, 2.5F, 0.12F, 0, 0};
+inline constexpr Material kLeafClump{semantic::kVegetation, 0.35F, 0.10F, 3.0F, 0.12F, 0, 0};
+inline constexpr Material kBareTwigs{semantic::kVegetation, 0.25F, 0.15F, 0.5F, 0.15F, 0, 0};
+inline constexpr Material kOpenHedge{semantic::kVegetation, 0.35F, 0.08F, 3.5F, 0.15F, 0, 0};
+inline constexpr Material kGlassPane{semantic::kBuilding, 0.1F, 0.3F, 12.0F, 0, 0, 0};
 inline constexpr Material kWireFence{semantic::kFence, 0.3F, 0.10F, 5.0F, 0, 0, 0};
 inline constexpr Material kWoodFence{semantic::kFence, 0.4F, 0.03F, 0, 0, 0.01F, 0};
 inline constexpr Material kGuardRail{semantic::kFence, 0.6F, 0.05F, 0, 0, 0, 0};

@@ -4,30 +4,10 @@
 #include <cmath>
 
 #include "simulation/materials.hpp"
+#include "simulation/model_parts.hpp"
 
 namespace dynains::simulation {
 namespace {
-
-Vec3 vec(double x, double y, double z) {
-  return {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
-}
-
-/// Corner-to-corner box in the axes of the model.
-Primitive block(const Material& material, double x0, double x1, double y0, double y1, double z0,
-                double z1) {
-  return make_primitive(Shape::kBox, material, vec((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2),
-                        vec((x1 - x0) / 2, (y1 - y0) / 2, (z1 - z0) / 2));
-}
-
-Primitive post(const Material& material, double x, double y, double z0, double z1, double radius) {
-  return make_primitive(Shape::kCylinder, material, vec(x, y, (z0 + z1) / 2),
-                        vec(radius, radius, (z1 - z0) / 2));
-}
-
-Primitive ball(const Material& material, double x, double y, double z, double rx, double ry,
-               double rz, const Mat3& rotation = {}) {
-  return make_primitive(Shape::kEllipsoid, material, vec(x, y, z), vec(rx, ry, rz), rotation);
-}
 
 /// A limb that hangs from (x, y, z), turned by `swing` about the y axis.
 Primitive limb(const Material& material, double x, double y, double z, double length, double radius,
@@ -228,55 +208,6 @@ Model cyclist_model(const Size& size, std::uint64_t seed, double phase) {
   return model;
 }
 
-Model tree_model(double height, double crown_radius, double clear_height, Random& random) {
-  Model model;
-  const double trunk = 0.08 + 0.018 * height * random.uniform(0.7, 1.3);
-  const double lean = random.uniform(-0.04, 0.04);
-  model.push_back(make_primitive(
-      Shape::kCylinder, materials::kTreeTrunk, vec(0, 0, 0.5 * (clear_height + 1) - 0.3),
-      vec(trunk, trunk, 0.5 * (clear_height + 1) + 0.3), rotation_y(lean)));
-  const double middle = 0.5 * (clear_height + height);
-  const double half = 0.5 * (height - clear_height);
-  // Limbs inside the crown.
-  for (int i = 0; i < 3; ++i) {
-    const double heading = random.uniform(0, 2 * kPi), tilt = random.uniform(0.3, 0.9);
-    const double length = 0.8 * half;
-    const Mat3 rotation = rotation_z(heading) * rotation_y(tilt);
-    const Vec3 along = rotation * vec(0, 0, length / 2);
-    model.push_back(make_primitive(Shape::kCylinder, materials::kTreeTrunk,
-                                   vec(0, 0, clear_height + 0.3) + along,
-                                   vec(0.45 * trunk, 0.45 * trunk, length / 2), rotation));
-  }
-  // One thin ball as the whole, dense ones as boughs.
-  const bool thin = random.chance(0.3);
-  model.push_back(ball(materials::kThinLeaves, 0, 0, middle, crown_radius, crown_radius, half));
-  const auto boughs = static_cast<int>(5 + random.index(6));
-  for (int i = 0; i < boughs; ++i) {
-    const double heading = random.uniform(0, 2 * kPi);
-    const double out = crown_radius * random.uniform(0.2, 0.75);
-    const double up = half * random.uniform(-0.7, 0.75);
-    const double radius = crown_radius * random.uniform(0.3, 0.5);
-    const double flat = random.uniform(0.6, 1.0);
-    const double z = std::max(middle + up, clear_height + 0.7 * radius);
-    model.push_back(ball(thin ? materials::kThinLeaves : materials::kLeaves,
-                         out * std::cos(heading), out * std::sin(heading), z, radius, radius,
-                         radius * flat));
-  }
-  return model;
-}
-
-Model bush_model(double radius, double height, Random& random) {
-  Model model;
-  const auto parts = static_cast<int>(2 + random.index(3));
-  for (int i = 0; i < parts; ++i) {
-    const double heading = random.uniform(0, 2 * kPi), out = radius * random.uniform(0.1, 0.5);
-    const double r = radius * random.uniform(0.5, 0.8), h = height * random.uniform(0.35, 0.55);
-    model.push_back(
-        ball(materials::kBush, out * std::cos(heading), out * std::sin(heading), h, r, r, h));
-  }
-  return model;
-}
-
 Model pole_model(double height, bool lamp, bool sign, Random& random) {
   Model model;
   const double radius = random.uniform(0.04, 0.1);
@@ -338,17 +269,6 @@ Model fence_model(double length, double height, bool wire) {
   return model;
 }
 
-Model hedge_model(double length, double width, double height, Random& random) {
-  Model model;
-  const double l = length / 2, w = width / 2;
-  for (double x = -l; x < l - 0.1; x += 1.5) {
-    const double end = std::min(x + 1.55, l), wide = w * random.uniform(0.85, 1.1);
-    const double high = height * random.uniform(0.9, 1.08);
-    model.push_back(block(materials::kHedge, x, end, -wide, wide, -0.2, high));
-  }
-  return model;
-}
-
 Model guard_rail_model(double length) {
   Model model;
   model.push_back(block(materials::kGuardRail, -length / 2, length / 2, -0.05, 0.05, 0.45, 0.78));
@@ -395,6 +315,40 @@ Model furniture_model(Random& random) {
     model.push_back(block(materials::kStreetFurniture, -0.6, 0.6, -0.2, 0.2, -0.2, 1.25));
   } else {
     model.push_back(post(materials::kSteelPole, 0, 0, -0.2, 0.9, 0.08));
+  }
+  return model;
+}
+
+Model slab_model(double length, double width, double bottom, double top) {
+  return {block(materials::kConcrete, -length / 2, length / 2, -width / 2, width / 2, bottom, top)};
+}
+
+Model column_model(double width, double height) {
+  const double w = width / 2;
+  return {block(materials::kConcrete, -w, w, -w, w, -0.2, height)};
+}
+
+Model wall_model(double length, double height) {
+  return {block(materials::kWall, -length / 2, length / 2, 0, 0.2, -0.2, height)};
+}
+
+Model glass_front_model(double length, double height) {
+  Model model{block(materials::kGlassPane, -length / 2, length / 2, 0, 0.02, 0.1, height - 0.1)};
+  for (double x = -length / 2; x <= length / 2; x += 1.5) {
+    model.push_back(block(materials::kSteelPole, x - 0.03, x + 0.03, -0.03, 0.05, -0.2, height));
+  }
+  return model;
+}
+
+Model stall_model(double length, double depth, Random& random) {
+  const double l = length / 2, d = depth / 2, counter = random.uniform(0.9, 1.2);
+  Model model{block(materials::kWoodFence, -l, l, -d, -d + 0.4, -0.1, counter),
+              block(materials::kWoodFence, -l, l, d - 0.05, d, -0.1, random.uniform(1.8, 2.6))};
+  if (random.chance(0.5)) {
+    model.push_back(block(materials::kStreetFurniture, -l, l, -d, d, 2.3, 2.4));
+    for (const double x : {-l, l}) {
+      model.push_back(post(materials::kSteelPole, x, -d, -0.1, 2.3, 0.04));
+    }
   }
   return model;
 }

@@ -29,6 +29,10 @@ Model cyclist_model(const Size& size, std::uint64_t seed, double phase);
 
 Model tree_model(double height, double crown_radius, double clear_height, Random& random);
 Model bush_model(double radius, double height, Random& random);
+/// Plants with gaps: branches with separate clumps of leaves; a third of the trees are bare.
+Model open_tree_model(double height, double crown_radius, double clear_height, Random& random);
+Model open_bush_model(double radius, double height, Random& random);
+Model open_hedge_model(double length, double width, double height, Random& random);
 Model pole_model(double height, bool lamp, bool sign, Random& random);
 /// Front along x, `depth` to the left (y from 0 to depth), base below the ground.
 Model building_model(double length, double depth, double height, Random& random);
@@ -40,5 +44,14 @@ Model bridge_model(double span, double width, double clearance);
 /// A roof on four posts.
 Model shelter_model(double length, double width, double height);
 Model furniture_model(Random& random);
+
+/// Parts of buildings from inside. A ceiling or a floor between two heights (m).
+Model slab_model(double length, double width, double bottom, double top);
+Model column_model(double width, double height);
+/// Walls along x; their inner faces are in the plane y = 0.
+Model wall_model(double length, double height);
+Model glass_front_model(double length, double height);
+/// A counter with a back wall, and a roof on half of them.
+Model stall_model(double length, double depth, Random& random);
 
 }  // namespace dynains::simulation

@@ -196,19 +196,60 @@ class Simulator::Implementation {
   }
 
   Eigen::Isometry3d sensor_pose(const EgoPose& ego, double time) {
-    const Eigen::Isometry3d T_world_ground = stand_on(world_.terrain, ego.at, 4.3, 1.8);
-    // Springs: braking, bends, and a little swaying while driving.
+    const Eigen::Matrix3d tilt =
+        rotation(0, config_.mounting_pitch * kPi / 180, config_.mounting_roll * kPi / 180);
+    const Eigen::Isometry3d T_body_mount = isometry(tilt, 0, 0, model_.height);
+    const Eigen::Isometry3d T_mount_sensor = isometry(rotation(model_.yaw, 0, 0), 0, 0, 0);
+    return product(product(body_pose(ego, time), T_body_mount), T_mount_sensor);
+  }
+
+  /// Pose of the body that carries the sensor, at the ground.
+  Eigen::Isometry3d body_pose(const EgoPose& ego, double time) {
+    switch (config_.gait) {
+      case Gait::kHandHeld:
+        return product(upright(ego.at), hand_held_sway(std::min(1.0, ego.speed), time));
+      case Gait::kLegged:
+        return product(stand_on(world_.terrain, ego.at, 0.9, 0.5),
+                       trot(std::min(1.0, ego.speed / 0.5), time));
+      case Gait::kVehicle:
+        break;
+    }
+    return product(stand_on(world_.terrain, ego.at, 4.3, 1.8), springs(ego, time));
+  }
+
+  Eigen::Isometry3d upright(const Waypoint& at) {
+    return isometry(rotation(at.heading, 0, 0), at.position.x, at.position.y,
+                    world_.terrain.height(at.position));
+  }
+
+  /// Braking, bends, and a little swaying while driving.
+  static Eigen::Isometry3d springs(const EgoPose& ego, double time) {
     const double sway = std::min(1.0, ego.speed / 5) * 0.12 * kPi / 180;
     const double pitch = -0.0035 * std::clamp(ego.acceleration, -4.0, 2.0) +
                          sway * (std::sin(2 * kPi * 1.3 * time) + std::sin(2 * kPi * 0.71 * time));
     const double roll = 0.004 * std::clamp(ego.speed * ego.turn_rate, -3.0, 3.0) +
                         sway * std::sin(2 * kPi * 0.93 * time + 1);
-    const Eigen::Isometry3d T_ground_body = isometry(rotation(0, pitch, roll), 0, 0, 0);
-    const Eigen::Matrix3d tilt =
-        rotation(0, config_.mounting_pitch * kPi / 180, config_.mounting_roll * kPi / 180);
-    const Eigen::Isometry3d T_body_mount = isometry(tilt, 0, 0, model_.height);
-    const Eigen::Isometry3d T_mount_sensor = isometry(rotation(model_.yaw, 0, 0), 0, 0, 0);
-    return product(product(product(T_world_ground, T_ground_body), T_body_mount), T_mount_sensor);
+    return isometry(rotation(0, pitch, roll), 0, 0, 0);
+  }
+
+  /// A person looks around all the time, and bobs with `stride` (0 to 1) at 1.8 steps a second.
+  static Eigen::Isometry3d hand_held_sway(double stride, double time) {
+    constexpr double kLook = 1.15;  // rad/s; with the amplitude below up to 40 deg/s
+    const double step = 2 * kPi * 1.8 * time, deg = kPi / 180;
+    const double yaw = 0.6 * std::sin(kLook * time);
+    const double pitch = deg * (2.5 * std::sin(0.5 * kLook * time) + stride * std::sin(step));
+    const double roll = deg * 2 * std::sin(0.7 * kLook * time + 1);
+    return isometry(rotation(yaw, pitch, roll), 0, 0.03 * stride * std::sin(step / 2),
+                    0.03 * stride * std::sin(step));
+  }
+
+  /// A robot on four legs, with two steps of each pair of legs a second.
+  static Eigen::Isometry3d trot(double stride, double time) {
+    const double step = 2 * kPi * 2 * time, deg = kPi / 180;
+    return isometry(
+        rotation(stride * deg * 2 * std::sin(step / 2), stride * deg * 1.2 * std::sin(2 * step),
+                 stride * deg * 1.5 * std::sin(step)),
+        0.01 * stride * std::sin(2 * step), 0, 0.015 * stride * std::sin(2 * step));
   }
 
   Eigen::Isometry3d with_noise(const Eigen::Isometry3d& pose, std::size_t index) const {
@@ -370,11 +411,22 @@ class Simulator::Implementation {
     if (range < min_range || range > static_cast<float>(model_.max_range)) return;
     const float brightness = surface.reflectivity * (0.3F + 0.7F * surface.cosine) *
                              (1 + 0.15F * normal_float(mix(random, 3)));
-    scan.xyzi.push_back(range * direction.x);
-    scan.xyzi.push_back(range * direction.y);
-    scan.xyzi.push_back(range * direction.z);
+    const Vec3 p = range * reported_direction(direction, random);
+    scan.xyzi.push_back(p.x);
+    scan.xyzi.push_back(p.y);
+    scan.xyzi.push_back(p.z);
     scan.xyzi.push_back(std::clamp(brightness, 0.0F, 1.0F));
     scan.labels.push_back(surface.label);
+  }
+
+  /// A beam has a width: the surface that it met lies a little beside its nominal direction.
+  Vec3 reported_direction(Vec3 direction, std::uint64_t random) const {
+    if (config_.direction_noise <= 0) return direction;
+    const auto sigma = static_cast<float>(config_.direction_noise * kPi / 180);
+    const Vec3 beside =
+        direction + Vec3{sigma * normal_float(mix(random, 4)), sigma * normal_float(mix(random, 5)),
+                         sigma * normal_float(mix(random, 6))};
+    return (1 / norm(beside)) * beside;
   }
 
   static constexpr std::uint32_t kNoObject = 0xffffffff;

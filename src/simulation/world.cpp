@@ -39,6 +39,12 @@ World build_world(const Config& config) {
       return hill(config);
     case Scene::kCarPark:
       return car_park(config);
+    case Scene::kHall:
+      return hall(config);
+    case Scene::kForest:
+      return forest(config);
+    case Scene::kGarage:
+      return garage(config);
     case Scene::kUrban:
     case Scene::kStatic:
       break;

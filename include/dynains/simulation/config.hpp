@@ -1,6 +1,7 @@
 // Parameters of the simulation: scene, sensor and disturbances.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -20,6 +21,9 @@ enum class Scene {
   kHill,        ///< slopes of up to 10 %, curved ground
   kCarPark,     ///< rows of parked cars, cars leaving and arriving, pedestrians between them
   kStatic,      ///< urban street with parked cars and without moving objects
+  kHall,        ///< indoor hall: walls, ceiling, columns, stands, a glass front, people
+  kForest,      ///< track through a wood, walkers and cyclists
+  kGarage,      ///< one storey of a multi-storey car park: low ceiling, columns, walls
 };
 
 /// Beam pattern with a typical mounting height and range.
@@ -40,6 +44,23 @@ enum class Labelling {
   kEver,
   kInstant,  ///< the points in scans at which the object is faster than 0.5 m/s
 };
+
+/// How the sensor is carried.
+enum class Gait {
+  kVehicle,   ///< on a roof, on springs
+  kHandHeld,  ///< by a walking person, who looks around with up to 40 deg/s
+  kLegged,    ///< on a trotting robot
+};
+inline constexpr std::array<const char*, 3> kGaitNames = {"vehicle", "hand-held", "legged"};
+constexpr const std::array<const char*, 3>& value_names(Gait) { return kGaitNames; }
+
+/// Shape of trees, bushes and hedges.
+enum class Foliage {
+  kSolid,  ///< crowns and hedges without large gaps
+  kOpen,   ///< branches with separate clumps of leaves or bare twigs, hedges with gaps
+};
+inline constexpr std::array<const char*, 2> kFoliageNames = {"solid", "open"};
+constexpr const std::array<const char*, 2>& value_names(Foliage) { return kFoliageNames; }
 
 /// Names of the enum values for files and command lines, for example "urban", "hdl64", "ever".
 const std::vector<std::string>& scene_names();
@@ -70,7 +91,11 @@ struct Config {
   double dropout = 1.0;                 ///< factor on the loss of returns; 0: no loss
   double pose_noise_translation = 0.0;  ///< m, standard deviation per axis and scan
   double pose_noise_rotation = 0.0;     ///< deg, standard deviation per axis and scan
-  bool ego_points = false;              ///< whether scans contain the roof below the sensor
+  Gait gait = Gait::kVehicle;
+  Foliage foliage = Foliage::kSolid;
+  double halt = 0.0;             ///< s of braking and standing, in the middle
+  double direction_noise = 0.0;  ///< deg, standard deviation of the direction of a beam
+  bool ego_points = false;       ///< whether scans contain the roof below the sensor
   bool rolling_shutter = false;  ///< whether the beams of a scan are spread over 1 / rate seconds
 
   template <class Self, class Visitor>
@@ -99,6 +124,16 @@ struct Config {
                       "standard deviation of the written poses, per axis"});
     visitor(Parameter{"pose_noise_rotation", self.pose_noise_rotation, closed(0, 45), "deg",
                       "standard deviation of the written poses, per axis"});
+    visitor(Parameter{"gait", self.gait, Bounds{}, "",
+                      "how the sensor is carried: on a vehicle, by a walking person, or on a robot "
+                      "with legs"});
+    visitor(Parameter{"foliage", self.foliage, Bounds{}, "",
+                      "solid or open crowns, bushes and hedges"});
+    visitor(
+        Parameter{"halt", self.halt, closed(0, 3600), "s",
+                  "time in the middle of the sequence in which the ego vehicle brakes and stands"});
+    visitor(Parameter{"direction_noise", self.direction_noise, closed(0, 5), "deg",
+                      "standard deviation of the direction of a beam: its width"});
     visitor(Parameter{"ego_points", self.ego_points, Bounds{}, "",
                       "whether scans contain points on the roof of the ego vehicle"});
     visitor(Parameter{"rolling_shutter", self.rolling_shutter, Bounds{}, "",

@@ -38,13 +38,23 @@ double Builder::clearance(const Footprint& f) const {
 void Builder::tree(Vec2 at, double height, double radius, double clear) {
   Random random = random_.fork(random_.bits());
   const double heading = random.uniform(0, 2 * kPi);
-  place(tree_model(height, radius, clear, random), {at, heading, 0.35, 0.35}, 0.2);
+  const bool open = config_.foliage == Foliage::kOpen;
+  place(open ? open_tree_model(height, radius, clear, random)
+             : tree_model(height, radius, clear, random),
+        {at, heading, 0.35, 0.35}, 0.2);
 }
 
 void Builder::bush(Vec2 at, double radius, double height) {
   Random random = random_.fork(random_.bits());
   const double heading = random.uniform(0, 2 * kPi);
-  place(bush_model(radius, height, random), {at, heading, 0.8 * radius, 0.8 * radius}, 0.2);
+  const bool open = config_.foliage == Foliage::kOpen;
+  place(open ? open_bush_model(radius, height, random) : bush_model(radius, height, random),
+        {at, heading, 0.8 * radius, 0.8 * radius}, 0.2);
+}
+
+Model Builder::hedge(double length, double width, double height, Random& random) const {
+  return config_.foliage == Foliage::kOpen ? open_hedge_model(length, width, height, random)
+                                           : hedge_model(length, width, height, random);
 }
 
 void Builder::park(const Waypoint& at, Kind kind) {
@@ -159,7 +169,7 @@ void Builder::garden(const PlaceBeside& at, double s, double front, double back,
   const Footprint strip{line.position, line.heading, front / 2, 0.4};
   if (clearance(strip) > 1) {
     if (which < 0.45) {
-      place(hedge_model(front, 0.7, height, model_random), strip, 0);
+      place(hedge(front, 0.7, height, model_random), strip, 0);
     } else if (which < 0.8) {
       place(fence_model(front, height, which < 0.65), strip, 0);
     }
@@ -204,7 +214,11 @@ void Builder::plant(const Street& street, double from, double to, double trees_p
 void Builder::ego(std::size_t lane, double s, double usual_speed) {
   Traffic& t = world_.traffic;
   const double speed = config_.ego_speed < 0 ? usual_speed : config_.ego_speed;
-  t.add_driver(t.add_object(Kind::kCar, {4.3, 1.8, 1.55}), lane, s, speed);
+  Traffic::Driver& driver =
+      t.add_driver(t.add_object(Kind::kCar, {4.3, 1.8, 1.55}), lane, s, speed);
+  if (config_.halt <= 0) return;
+  const double middle = 0.5 * config_.scans / config_.rate;
+  driver.schedule = {{middle - 0.5 * config_.halt, 0}, {middle + 0.5 * config_.halt, speed}};
 }
 
 void Builder::walker(std::vector<Vec2> goals, double pace, double start, double stop, Kind kind) {

@@ -54,6 +54,8 @@ class Builder {
 
   void bush(Vec2 at, double radius, double height);
 
+  Model hedge(double length, double width, double height, Random& random) const;
+
   void park(const Waypoint& at, Kind kind);
 
   Kind parked_kind();

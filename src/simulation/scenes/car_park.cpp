@@ -39,13 +39,14 @@ bool is_straight(const Street& street, double s, double reach) {
 }
 
 /// Places on both sides of the straight parts; a tree stands on some of them.
-std::vector<Place> find_places(Builder& builder, Random& random, const Street& street) {
+std::vector<Place> find_places(Builder& builder, Random& random, const Street& street,
+                               bool roofed) {
   std::vector<Place> places;
   for (const int side : {-1, 1}) {
     for (double s = 6; s < street.centre.length() - 6; s += 2.6) {
       if (!is_straight(street, s, 5)) continue;
       if (random.unit() < 0.03) {
-        builder.tree(street.centre.beside(s, side * 7.5).position, 6, 2, 2.2);
+        if (!roofed) builder.tree(street.centre.beside(s, side * 7.5).position, 6, 2, 2.2);
         continue;
       }
       places.push_back({s, side});
@@ -173,42 +174,81 @@ void add_border(Builder& builder, Vec2 p, double heading, double kind, Random& m
       builder.place_anyway(building_model(8.2, 10, 6 + 4 * kind, model_random), {p, heading});
     }
   } else if (kind < 0.75) {
-    builder.place(hedge_model(8, 0.8, 1.6, model_random), {p, heading, 4, 0.4}, -0.1);
+    builder.place(builder.hedge(8, 0.8, 1.6, model_random), {p, heading, 4, 0.4}, -0.1);
   } else {
     builder.place(fence_model(8, 1.6, true), {p, heading, 4, 0.1}, -0.1);
   }
 }
 
-/// The four edges of the car park.
-void surround(Builder& builder, Random& random, const Street& street) {
-  double low_x = 1e9, high_x = -1e9, low_y = 1e9, high_y = -1e9;
+/// Rectangle around all aisles, m.
+struct Extent {
+  Vec2 low, high;
+};
+
+Extent extent_of(const Street& street, double margin) {
+  Extent extent{{1e9, 1e9}, {-1e9, -1e9}};
   for (const Vec2 p : street.centre.points()) {
-    low_x = std::min(low_x, p.x);
-    high_x = std::max(high_x, p.x);
-    low_y = std::min(low_y, p.y);
-    high_y = std::max(high_y, p.y);
+    extent.low = {std::min(extent.low.x, p.x - margin), std::min(extent.low.y, p.y - margin)};
+    extent.high = {std::max(extent.high.x, p.x + margin), std::max(extent.high.y, p.y + margin)};
   }
-  const double margin = random.uniform(10, 14);
+  return extent;
+}
+
+/// The four edges of the car park. `step`: length of an element, m. Calls `add(position, heading)`
+/// for each element; the car park is to its right.
+template <class Add>
+void for_each_edge(const Extent& extent, double step, Add&& add) {
+  const Vec2 low = extent.low, high = extent.high;
   for (int edge = 0; edge < 4; ++edge) {
     const bool along_x = edge % 2 == 0;
     const double sign = edge < 2 ? 1 : -1;
-    const double begin = along_x ? low_x - margin : low_y - margin;
-    const double finish = along_x ? high_x + margin : high_y + margin;
-    const double cross = along_x ? (sign > 0 ? high_y + margin : low_y - margin)
-                                 : (sign > 0 ? high_x + margin : low_x - margin);
+    const double begin = along_x ? low.x : low.y, finish = along_x ? high.x : high.y;
+    const double cross = along_x ? (sign > 0 ? high.y : low.y) : (sign > 0 ? high.x : low.x);
     const double heading = along_x ? (sign > 0 ? 0 : kPi) : (sign > 0 ? -kPi / 2 : kPi / 2);
-    const double kind = random.unit();
-    for (double d = begin + 4; d < finish; d += 8.2) {
-      const Vec2 p = along_x ? Vec2{d, cross} : Vec2{cross, d};
-      Random model_random = random.fork(random.bits());
-      add_border(builder, p, heading, kind, model_random);
+    for (double d = begin + 4; d < finish; d += step) {
+      add(edge, along_x ? Vec2{d, cross} : Vec2{cross, d}, heading);
     }
   }
 }
 
-}  // namespace
+/// Buildings, hedges or fences along each edge.
+void surround(Builder& builder, Random& random, const Street& street) {
+  const Extent extent = extent_of(street, random.uniform(10, 14));
+  int last_edge = -1;
+  double kind = 0;
+  for_each_edge(extent, 8.2, [&](int edge, Vec2 p, double heading) {
+    if (edge != last_edge) kind = random.unit();
+    last_edge = edge;
+    Random model_random = random.fork(random.bits());
+    add_border(builder, p, heading, kind, model_random);
+  });
+}
 
-World car_park(const Config& config) {
+/// Ceiling, columns between the places, and parapets or walls along the edges.
+void roof_over(Builder& builder, Random& random, const Street& street) {
+  constexpr double kClear = 2.9, kPanel = 10;  // m
+  const Extent extent = extent_of(street, 12);
+  for (double x = extent.low.x; x < extent.high.x; x += kPanel) {
+    for (double y = extent.low.y; y < extent.high.y; y += kPanel) {
+      builder.place_anyway(slab_model(kPanel, kPanel, kClear, kClear + 0.3),
+                           {{x + kPanel / 2, y + kPanel / 2}, 0});
+      builder.place_anyway(slab_model(kPanel, 0.4, kClear - 0.4, kClear),
+                           {{x + kPanel / 2, y + kPanel / 2}, 0});
+    }
+  }
+  for (double s = 7.3; s < street.centre.length(); s += 7.8) {
+    for (const int side : {-1, 1}) {
+      const Waypoint at = street.centre.beside(s, side * 8.6);
+      builder.place(column_model(0.5, kClear), {at.position, at.heading, 0.25, 0.25}, 0.02);
+    }
+  }
+  const bool walls = random.chance(0.5);
+  for_each_edge(extent, 8, [&](int, Vec2 p, double heading) {
+    builder.place_anyway(wall_model(8, walls ? kClear : 1.1), {p, heading});
+  });
+}
+
+World parking_level(const Config& config, bool roofed) {
   Random random(mix(config.seed, 77));
   const double aisle = random.uniform(60, 90);
   const double drive = travel(config, kAisleSpeed);
@@ -218,6 +258,10 @@ World car_park(const Config& config) {
   ground.kerb = 0;
   ground.roughness = 0.03;
   ground.hill_slope = random.uniform(0.002, 0.03);
+  if (roofed) {
+    ground.roughness = 0.005;
+    ground.hill_slope = 0.002;
+  }
   ground.street_label = semantic::kParking;
   ground.open_label = semantic::kParking;
   Builder builder(config, ground, std::move(streets));
@@ -228,11 +272,15 @@ World car_park(const Config& config) {
 
   const double occupied = random.uniform(0.55, 0.9);
   const double from = kStartInAisle - 30, to = kStartInAisle + drive + 60;
-  const std::vector<Place> places = find_places(builder, random, street);
+  const std::vector<Place> places = find_places(builder, random, street, roofed);
   fill_places(builder, random, street, places, occupied, from, to);
   fill_lane(builder, forward, 45, kAisleSpeed, 0, 0, 0);
   fill_lane(builder, backward, 40, kAisleSpeed, 0, 0, 0);
   add_walkers(builder, random, street, from, to);
+  if (roofed) {
+    roof_over(builder, random, street);
+    return builder.finish();
+  }
   surround(builder, random, street);
   for (double s = 10; s < street.centre.length(); s += random.uniform(18, 30)) {
     Random model_random = random.fork(random.bits());
@@ -241,5 +289,10 @@ World car_park(const Config& config) {
   }
   return builder.finish();
 }
+
+}  // namespace
+
+World car_park(const Config& config) { return parking_level(config, false); }
+World garage(const Config& config) { return parking_level(config, true); }
 
 }  // namespace dynains::simulation

@@ -13,5 +13,8 @@ World stop_and_go(const Config& config);
 World canopy(const Config& config);
 World hill(const Config& config);
 World car_park(const Config& config);
+World garage(const Config& config);
+World hall(const Config& config);
+World forest(const Config& config);
 
 }  // namespace dynains::simulation

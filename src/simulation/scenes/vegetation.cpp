@@ -29,8 +29,8 @@ World vegetation(const Config& config) {
   builder.plant(street, 4.4, 45, trees, bushes);
   for (const int side : {-1, 1}) {
     if (!random.chance(0.4)) continue;
-    add_barrier(builder, street, side * 4.6, 6, [](Random& r) {
-      return r.chance(0.6) ? hedge_model(6, 1.0, r.uniform(0.8, 2.2), r)
+    add_barrier(builder, street, side * 4.6, 6, [&builder](Random& r) {
+      return r.chance(0.6) ? builder.hedge(6, 1.0, r.uniform(0.8, 2.2), r)
                            : fence_model(6, 1.1, true);
     });
   }
