@@ -150,7 +150,7 @@ const std::vector<std::uint8_t>& ChunkedLog::load(std::uint64_t chunk) {
         decompress(header.compression, compressed_, header.uncompressed_size, records_);
     if (!obstacle.empty()) fail_at_byte(path_, header.content, "compressed chunk: " + obstacle);
   }
-  if (header.uncompressed_crc != 0 &&
+  if (has_crc32() && header.uncompressed_crc != 0 &&
       header.uncompressed_crc != crc32(records_.data(), records_.size())) {
     fail_at_byte(path_, header.content,
                  "expected the checksum of the chunk, found that of other bytes");
