@@ -60,8 +60,8 @@ else()
   dynains_part(evaluation DYNAINS_BUILD_COMPONENTS "evaluation component" ${json})
 endif()
 
-# dynains_log_library(<name> <header> <description>): a library that some logs of ROS need. It has
-# no CMake package or pkg-config file. Its Debian package is lib<name>-dev.
+# dynains_log_library(<name> <header> <description> [<package>]): a library that some files need. It
+# has no CMake package or pkg-config file. Its Debian package is <package>, or lib<name>-dev.
 macro(dynains_log_library name header description)
   string(TOUPPER ${name} upper_name)
   find_library(DYNAINS_${upper_name}_LIBRARY ${name})
@@ -70,7 +70,11 @@ macro(dynains_log_library name header description)
   if(DYNAINS_${upper_name}_LIBRARY AND DYNAINS_${upper_name}_HEADERS)
     set(lib${name}_FOUND ON)
   endif()
-  dynains_part(${name} DYNAINS_WITH_${upper_name} "${description}" lib${name}=lib${name}-dev)
+  set(debian_package lib${name}-dev)
+  if(${ARGC} GREATER 3)
+    set(debian_package ${ARGV3})
+  endif()
+  dynains_part(${name} DYNAINS_WITH_${upper_name} "${description}" lib${name}=${debian_package})
   if(dynains_has_${name})
     list(APPEND dynains_log_libraries ${name})
   endif()
@@ -81,6 +85,7 @@ if(dynains_has_components)
   dynains_log_library(lz4 lz4frame.h "logs with lz4 chunks (.mcap, .bag)")
   dynains_log_library(zstd zstd.h "logs with zstd chunks (.mcap)")
   dynains_log_library(bz2 bzlib.h "logs with bz2 chunks (.bag)")
+  dynains_log_library(z zlib.h "checksums of logs, and deflated .npz" zlib1g-dev)
   dynains_log_library(sqlite3 sqlite3.h "logs in SQLite (.db3)")
 endif()
 

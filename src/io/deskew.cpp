@@ -49,7 +49,7 @@ Clock clock_of(const TimeRange& range, double stamp) {
 }
 
 /// T_world_sensor at `time`, by the poses around it or by the two nearest ones.
-std::optional<Eigen::Isometry3d> pose_at(const Trajectory& motion, double time) {
+std::optional<Eigen::Isometry3d> motion_at(const Trajectory& motion, double time) {
   const std::vector<double>& times = motion.times;
   if (times.size() < 2) return std::nullopt;
   const auto after = std::upper_bound(times.begin() + 1, times.end() - 1, time);
@@ -85,7 +85,7 @@ class Motion {
     const Eigen::Isometry3d T_stamp_world = T_world_sensor.inverse();
     for (std::size_t i = 0; i <= (step_ > 0.0 ? kSteps : 0); ++i) {
       const double offset = first + static_cast<double>(i) * step_;
-      const auto pose = pose_at(motion, stamp + offset);
+      const auto pose = motion_at(motion, stamp + offset);
       if (!pose) {
         fail(place,
              "the scan cannot be de-skewed: expected poses at most 1 s apart around its "

@@ -17,21 +17,41 @@ namespace {
 
 namespace fs = std::filesystem;
 
-enum class Format { kPly, kPcd, kUnknown };
-
-Format format_of(const fs::path& path) {
+std::string extension_in_lower_case(const fs::path& path) {
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (extension == ".ply") return Format::kPly;
-  if (extension == ".pcd") return Format::kPcd;
-  return Format::kUnknown;
+  return extension;
 }
 
-Format known_format_of(const fs::path& path) {
-  const Format format = format_of(path);
-  if (format == Format::kUnknown) fail(path, "expected a name that ends in .ply or .pcd");
-  return format;
+/// Whether the writer writes PCD, and not PLY.
+bool is_pcd(const fs::path& path) {
+  if (!is_point_file(path)) fail(path, "expected a name that ends in .ply or .pcd");
+  return extension_in_lower_case(path) == ".pcd";
+}
+
+struct PointFileFormat {
+  const char* extension;
+  PointFile (*read)(const fs::path&);
+  PointFileHeader (*read_header)(const fs::path&);
+  void (*check)(const fs::path&);
+};
+
+constexpr PointFileFormat kPointFileFormats[] = {
+    {".ply", read_ply, read_ply_header, check_ply}, {".pcd", read_pcd, read_pcd_header, check_pcd},
+    {".las", read_las, read_las_header, check_las}, {".npy", read_npy, read_npy_header, check_npy},
+    {".npz", read_npz, read_npz_header, check_npz}, {".xyz", read_xyz, read_xyz_header, check_xyz},
+    {".csv", read_xyz, read_xyz_header, check_xyz}};
+
+const PointFileFormat& format_to_read(const fs::path& path) {
+  const std::string extension = extension_in_lower_case(path);
+  for (const PointFileFormat& format : kPointFileFormats) {
+    if (format.extension == extension) return format;
+  }
+  const std::optional<std::string> conversion = conversion_of(path);
+  fail(path, conversion
+                 ? *conversion
+                 : "expected a name that ends in .ply, .pcd, .las, .npy, .npz, .xyz or .csv");
 }
 
 std::string ply_header(std::size_t count, const PointColumns& columns, const std::string& padding,
@@ -103,10 +123,7 @@ class Record {
 
 PointFileWriter::PointFileWriter(const fs::path& path, const PointColumns& columns,
                                  const Eigen::Isometry3d& viewpoint)
-    : columns_(columns),
-      viewpoint_(viewpoint),
-      pcd_(known_format_of(path) == Format::kPcd),
-      file_(path) {
+    : columns_(columns), viewpoint_(viewpoint), pcd_(is_pcd(path)), file_(path) {
   file_.stream() << header();
 }
 
@@ -149,18 +166,39 @@ void PointFileWriter::commit(AtomicFile::Sync sync) {
   file_.commit(sync);
 }
 
-bool is_point_file(const fs::path& path) { return format_of(path) != Format::kUnknown; }
-
-PointFile read_points(const fs::path& path) {
-  return known_format_of(path) == Format::kPly ? read_ply(path) : read_pcd(path);
+bool is_point_file(const fs::path& path) {
+  const std::string extension = extension_in_lower_case(path);
+  return extension == ".ply" || extension == ".pcd";
 }
+
+std::optional<std::string> conversion_of(const fs::path& path) {
+  struct Conversion {
+    const char* extension;
+    const char* text;
+  };
+  static constexpr Conversion kConversions[] = {
+      {".laz",
+       "LAZ (compressed LAS) is not read; convert it: pdal translate IN.laz OUT.las, or laszip "
+       "-i IN.laz -o OUT.las"},
+      {".e57",
+       "E57 is not read; convert it: pdal translate IN.e57 OUT.las, or save it as PLY by "
+       "CloudCompare"},
+      {".pcap",
+       "PCAP (packets of a sensor) is not read; play it through the ROS driver of the sensor and "
+       "record sensor_msgs/PointCloud2 in a log (.mcap, .bag)"}};
+  const std::string extension = extension_in_lower_case(path);
+  for (const Conversion& conversion : kConversions) {
+    if (extension == conversion.extension) return conversion.text;
+  }
+  return std::nullopt;
+}
+
+PointFile read_points(const fs::path& path) { return format_to_read(path).read(path); }
 
 PointFileHeader read_point_file_header(const fs::path& path) {
-  return known_format_of(path) == Format::kPly ? read_ply_header(path) : read_pcd_header(path);
+  return format_to_read(path).read_header(path);
 }
 
-void check_point_file(const fs::path& path) {
-  (known_format_of(path) == Format::kPly ? check_ply : check_pcd)(path);
-}
+void check_point_file(const fs::path& path) { format_to_read(path).check(path); }
 
 }  // namespace dynains

@@ -9,11 +9,23 @@ namespace dynains {
 
 PointFile read_ply(const std::filesystem::path& path);
 PointFile read_pcd(const std::filesystem::path& path);
+PointFile read_las(const std::filesystem::path& path);
+PointFile read_npy(const std::filesystem::path& path);
+PointFile read_npz(const std::filesystem::path& path);
+PointFile read_xyz(const std::filesystem::path& path);
 
 PointFileHeader read_ply_header(const std::filesystem::path& path);
 PointFileHeader read_pcd_header(const std::filesystem::path& path);
+PointFileHeader read_las_header(const std::filesystem::path& path);
+PointFileHeader read_npy_header(const std::filesystem::path& path);
+PointFileHeader read_npz_header(const std::filesystem::path& path);
+PointFileHeader read_xyz_header(const std::filesystem::path& path);
 
 void check_ply(const std::filesystem::path& path);
 void check_pcd(const std::filesystem::path& path);
+void check_las(const std::filesystem::path& path);
+void check_npy(const std::filesystem::path& path);
+void check_npz(const std::filesystem::path& path);
+void check_xyz(const std::filesystem::path& path);
 
 }  // namespace dynains

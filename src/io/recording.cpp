@@ -1,6 +1,7 @@
 #include "dynains/io/recording.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <iomanip>
@@ -27,8 +28,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kAccepted =
-    "expected a KITTI folder (velodyne/NNNNNN.bin, poses.txt), or a folder of .pcd, .ply or .bin "
-    "scans (or with them in pcd/, ply/, scans/, points/, clouds/ or lidar/), or a log of ROS "
+    "expected a KITTI folder (velodyne/NNNNNN.bin, poses.txt), or a folder of .pcd, .ply, .bin, "
+    ".las, .npy, .npz, .xyz or .csv scans (or with them in pcd/, ply/, scans/, points/, clouds/ or "
+    "lidar/), or a log of ROS "
     "(.mcap, "
     ".db3, .bag, or a folder with metadata.yaml)";
 
@@ -38,8 +40,21 @@ std::optional<ScanFormat> scan_format_of(const fs::path& path) {
   if (extension == ".bin") return ScanFormat::kBin;
   if (extension == ".pcd") return ScanFormat::kPcd;
   if (extension == ".ply") return ScanFormat::kPly;
+  if (extension == ".las") return ScanFormat::kLas;
+  if (extension == ".npy") return ScanFormat::kNpy;
+  if (extension == ".npz") return ScanFormat::kNpz;
+  if (extension == ".xyz") return ScanFormat::kXyz;
+  if (extension == ".csv") return ScanFormat::kCsv;
   return std::nullopt;
 }
+
+/// Beside scans of these formats, files of the other ones are no scans.
+bool is_for_scans_only(ScanFormat format) {
+  return format == ScanFormat::kBin || format == ScanFormat::kPcd || format == ScanFormat::kPly;
+}
+
+constexpr std::array<const char*, 6> kPoseFiles = {
+    "poses.txt", "poses.csv", "poses.tum", "trajectory.txt", "trajectory.csv", "trajectory.tum"};
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
@@ -76,14 +91,34 @@ std::vector<fs::path> scan_files(const fs::path& folder) {
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
     const fs::path& path = entry->path();
-    if (!scan_format_of(path) || path.filename().string().front() == '.') continue;
+    const std::string name = path.filename().string();
+    const bool has_poses =
+        std::find(kPoseFiles.begin(), kPoseFiles.end(), name) != kPoseFiles.end();
+    if (!scan_format_of(path) || name.front() == '.' || has_poses) continue;
     files.push_back(path);
   }
   if (error) fail(folder, "cannot be listed: " + error.message());
+  const auto is_scan = [](const fs::path& path) {
+    return is_for_scans_only(*scan_format_of(path));
+  };
+  if (std::any_of(files.begin(), files.end(), is_scan)) {
+    files.erase(std::stable_partition(files.begin(), files.end(), is_scan), files.end());
+  }
   std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
     return is_before(a.filename().string(), b.filename().string());
   });
   return files;
+}
+
+/// For a folder whose only scans are in known formats that are not read: how to convert them.
+std::optional<std::string> conversion_of_scans(const fs::path& folder) {
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const auto conversion = conversion_of(entry->path());
+    if (conversion) return entry->path().filename().string() + ": " + *conversion;
+  }
+  return std::nullopt;
 }
 
 /// Time in seconds of a name that is a time.
@@ -131,7 +166,10 @@ Recording::Recording(const fs::path& path, const RecordingOptions& options)
   if (is_log(path)) {
     open_log();
   } else {
-    if (!is_folder(path)) fail(path, std::string("is not a folder; ") + kAccepted);
+    if (!is_folder(path)) {
+      const auto conversion = conversion_of(path);
+      fail(path, conversion ? *conversion : std::string("is not a folder; ") + kAccepted);
+    }
     list_scans();
     reader_ = format_ == ScanFormat::kBin ? make_bin_reader() : make_point_file_reader();
     read_poses();
@@ -208,7 +246,10 @@ void Recording::list_scans() {
     }
   }
   const std::vector<fs::path> files = scan_files(scan_folder_);
-  if (files.empty()) fail(scan_folder_, std::string("has no scans; ") + kAccepted);
+  if (files.empty()) {
+    const auto conversion = conversion_of_scans(scan_folder_);
+    fail(scan_folder_, conversion ? *conversion : std::string("has no scans; ") + kAccepted);
+  }
   files_ = files;
   format_ = *scan_format_of(files.front());
   for (const fs::path& file : files) {
@@ -266,8 +307,7 @@ fs::path Recording::find_poses() const {
     folders.push_back(fs::absolute(folder_).lexically_normal() / "..");
   }
   for (const fs::path& folder : folders) {
-    for (const char* name : {"poses.txt", "poses.csv", "poses.tum", "trajectory.txt",
-                             "trajectory.csv", "trajectory.tum"}) {
+    for (const char* name : kPoseFiles) {
       if (is_file(folder / name)) return (folder / name).lexically_normal();
     }
   }

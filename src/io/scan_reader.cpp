@@ -43,7 +43,7 @@ class BinReader final : public ScanReader {
   }
 };
 
-/// .pcd and .ply.
+/// Files of read_points().
 class PointFileReader final : public ScanReader {
  public:
   PointColumns columns(const ScanAddress& scan) const override {

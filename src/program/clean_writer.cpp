@@ -28,6 +28,11 @@ std::string CleanWriter::name(const Recording& recording, std::size_t i) {
     case ScanFormat::kLog:
       return recording.name(i) + ".pcd";
     case ScanFormat::kPly:
+    case ScanFormat::kLas:
+    case ScanFormat::kNpy:
+    case ScanFormat::kNpz:
+    case ScanFormat::kXyz:
+    case ScanFormat::kCsv:
       break;
   }
   return recording.name(i) + ".ply";

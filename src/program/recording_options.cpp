@@ -9,8 +9,9 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what) {
       .add_option("SEQ", folder_,
                   what +
                       ": KITTI or SemanticKITTI folder (velodyne/, poses.txt; optional calib.txt, "
-                      "times.txt), folder of .pcd, .ply or .bin scans with VIEWPOINT or a file of "
-                      "poses, or log of ROS (.mcap, .db3, .bag, or a folder with metadata.yaml)")
+                      "times.txt), folder of scans (.pcd, .ply, .bin, .las, .npy, .npz, .xyz or "
+                      ".csv) with VIEWPOINT or a file of poses, or log of ROS (.mcap, .db3, .bag, "
+                      "or a folder with metadata.yaml)")
       ->required()
       ->type_name("");
   const char* const kGroup = "What the files of SEQ mean (dynains check SEQ finds out)";

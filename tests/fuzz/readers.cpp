@@ -12,6 +12,7 @@
 #include "dynains/pose.hpp"
 #include "dynains/remover.hpp"
 #include "io/files.hpp"
+#include "io/point_format_writer.hpp"
 #include "kitti_files.hpp"
 #include "parameter_flags.hpp"
 #include "targets.hpp"
@@ -127,6 +128,11 @@ void run_times(Bytes bytes) {
 void run_ply(Bytes bytes) { read_point_file("cloud.ply", bytes); }
 void run_pcd(Bytes bytes) { read_point_file("cloud.pcd", bytes); }
 
+void run_las(Bytes bytes) { read_point_file("cloud.las", bytes); }
+void run_npy(Bytes bytes) { read_point_file("cloud.npy", bytes); }
+void run_npz(Bytes bytes) { read_point_file("cloud.npz", bytes); }
+void run_xyz(Bytes bytes) { read_point_file("cloud.xyz", bytes); }
+
 void run_config(Bytes bytes) {
   const fs::path path = file_of("run.cfg", bytes);
   expect_value_or<ConfigError>(path, [](const fs::path& file) {
@@ -213,6 +219,32 @@ std::vector<std::string> pcd_seeds() {
   const std::string sizes = std::string("\x2A\0\0\0\x28\0\0\0", 8);
   return {pcd("ascii", "1 2 3 0.5 251\nnan -inf 0 1 9\n"), pcd("binary", point + point),
           pcd("binary_compressed", sizes + lzf)};
+}
+
+std::vector<std::string> las_seeds() {
+  const std::string extra = test::extra_bytes("ring", 3) + test::extra_bytes("label", 5);
+  return {test::las_file({2, 1, "", 28, 2}, std::string(56, '\1')),
+          test::las_file({4, 6, extra, 36, 1}, std::string(36, '\0'))};
+}
+
+std::vector<std::string> npy_seeds() {
+  const std::string xyzi = floats({1.0F, 2.0F, 3.0F, 0.5F});
+  return {test::npy_file("'<f4'", "(1, 4)", xyzi), test::npy_file("'>f4'", "(1, 4)", xyzi, "True"),
+          test::npy_file("[('x', '<f4'), ('y', '<f4'), ('z', '<f4'), ('label', '|u1', (4,))]",
+                         "(1,)", xyzi)};
+}
+
+std::vector<std::string> npz_seeds() {
+  const auto column = [](const std::string& name) {
+    return test::ZipMember{name, test::npy_file("'<f4'", "(1,)", floats({1.0F}))};
+  };
+  test::ZipMember deflated{"points.npy", "\x03", 0, 8, 1};
+  return {test::zip_file({column("x.npy"), column("y.npy"), column("z.npy")}),
+          test::zip_file({deflated})};
+}
+
+std::vector<std::string> xyz_seeds() {
+  return {"x,y,z,label\n1,2,3,9\n", "1 2 3\n-1e3 nan 0.5\n", "# x y z t\n\n1;2;3;4"};
 }
 
 std::vector<std::string> config_seeds() {

@@ -293,7 +293,8 @@ TEST_CASE("Compressed blocks are decompressed to the announced size, and to no o
     CHECK_FALSE(decompressed(method, "12345678", 100).empty());
     CHECK_FALSE(decompressed(method, "", 100).empty());
   }
-  CHECK(crc32(reinterpret_cast<const std::uint8_t*>("123456789"), 9) == 0xCBF43926U);
+  CHECK(crc32(reinterpret_cast<const std::uint8_t*>("123456789"), 9) ==
+        (has_crc32() ? 0xCBF43926U : 0U));
   CHECK(crc32(nullptr, 0) == 0);
 }
 

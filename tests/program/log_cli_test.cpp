@@ -163,7 +163,38 @@ TEST_CASE("--deskew restores the scores that a rolling shutter costs, and keeps 
   CHECK(scan.xyzi[0] != raw.xyzi[0]);
 }
 
-TEST_CASE("simulate --format mcap: run on the log gives the labels of run on the folder") {
+TEST_CASE("Memory for reading does not grow with the log") {
+  const TemporaryFolder folder;
+  constexpr std::size_t kMegabyte = std::size_t{1} << 20U;
+  const std::string points(12 * 40000, '\1');
+  const auto write = [&](int clouds) {
+    std::vector<WrittenMessage> messages;
+    for (int i = 0; i < clouds; ++i) {
+      const double time = 0.1 * i;
+      messages.push_back({0, nanoseconds(time),
+                          cloud_message(MessageEncoding::kCdr, time, "lidar", kXyz, 12, points)});
+      messages.push_back(
+          {1, nanoseconds(time), odometry(time, "lidar", Eigen::Isometry3d::Identity())});
+    }
+    write_text(folder / "drive.mcap", mcap_file({{"/points", "sensor_msgs/msg/PointCloud2"},
+                                                 {"/odom", "nav_msgs/msg/Odometry"}},
+                                                messages, {}));
+  };
+  const auto peak_memory = [&](int clouds) {
+    // A new process counts the memory of this one, too, so that the log in memory must be gone.
+    write(clouds);
+    Process process({"check", folder / "drive.mcap"});
+    const Outcome outcome = process.wait();
+    CAPTURE(outcome.err);
+    REQUIRE_THAT(outcome.out, ContainsSubstring(std::to_string(clouds) + " scans with a pose"));
+    return process.peak_memory();
+  };
+  const std::size_t least = peak_memory(10);
+  CHECK(least > kMegabyte);
+  CHECK(peak_memory(200) < least + 4 * kMegabyte);  // of 96 MB
+}
+
+TEST_CASE("simulate --format: run on a log of each format gives the labels of run on the folder") {
   const TemporaryFolder folder;
   const std::vector<std::string> flags = {"--sensor", "vlp16", "--scans", std::to_string(kScans),
                                           "--seed",   "5"};
@@ -174,19 +205,29 @@ TEST_CASE("simulate --format mcap: run on the log gives the labels of run on the
     return start(arguments);
   };
   REQUIRE(simulate(folder / "seq", {}).code == 0);
-  const Outcome simulated = simulate(folder / "log", {"--format", "mcap"});
-  const std::string log = folder / "log" / "drive.mcap";
-  CHECK(simulated.out == "12 scans: " + log + "\n");
-  CHECK(count_entries(folder / "log") == 2);
   REQUIRE(start({"run", folder / "seq", "--out", folder / "of_folder"}).code == 0);
-  REQUIRE(start({"run", log, "--out", folder / "of_log"}).code == 0);
-  CHECK(all_labels(folder / "of_log") == all_labels(folder / "of_folder"));
-  CHECK(start({"eval", log, folder / "of_log"}).out ==
-        start({"eval", folder / "seq", folder / "of_folder"}).out);
+  for (const std::string format : {"mcap", "bag", "db3"}) {
+    CAPTURE(format);
+    const Outcome simulated = simulate(folder / format, {"--format", format});
+    if (format == "db3" && simulated.code != 0) {
+      CHECK_THAT(simulated.err, ContainsSubstring("libsqlite3-dev"));
+      continue;
+    }
+    const std::string log = folder / format / ("drive." + format);
+    CHECK(simulated.out == "12 scans: " + log + "\n");
+    CHECK(count_entries(folder / format) == 2);
+    const std::string out = folder / ("of_" + format);
+    REQUIRE(start({"run", log, "--out", out}).code == 0);
+    CHECK(all_labels(out) == all_labels(folder / "of_folder"));
+    CHECK(start({"eval", log, out}).out ==
+          start({"eval", folder / "seq", folder / "of_folder"}).out);
+  }
 
+  const std::string log = folder / "mcap" / "drive.mcap";
+  const std::string log_folder = folder / "mcap";
   const std::string first = read_text(log);
-  REQUIRE(simulate(folder / "log", {"--format", "mcap", "--force"}).code == 0);
+  REQUIRE(simulate(log_folder, {"--format", "mcap", "--force"}).code == 0);
   CHECK(read_text(log) == first);
-  REQUIRE(simulate(folder / "log", {"--force"}).code == 0);
+  REQUIRE(simulate(log_folder, {"--force"}).code == 0);
   CHECK_FALSE(fs::exists(log));
 }

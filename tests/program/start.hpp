@@ -2,6 +2,7 @@
 #pragma once
 
 #include <fcntl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -51,10 +52,14 @@ class Process {
   Process& operator=(const Process&) = delete;
 
   pid_t id() const { return id_; }
+  /// Bytes in memory at most; known after wait().
+  std::size_t peak_memory() const { return peak_memory_; }
 
   Outcome wait() {
     int status = 0;
-    ::waitpid(id_, &status, 0);
+    rusage usage{};
+    ::wait4(id_, &status, 0, &usage);
+    peak_memory_ = 1024 * static_cast<std::size_t>(usage.ru_maxrss);
     id_ = 0;
     const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     return {code, read_text(folder_ / "out"), read_text(folder_ / "err")};
@@ -69,6 +74,7 @@ class Process {
 
   TemporaryFolder folder_;
   pid_t id_ = 0;
+  std::size_t peak_memory_ = 0;
 };
 
 inline Outcome start(

@@ -28,6 +28,9 @@ class AtomicFile {
   /// failures of the stream.
   std::ostream& stream() { return stream_; }
 
+  /// For libraries that write files by name.
+  const std::filesystem::path& temporary_path() const { return temporary_; }
+
   enum class Sync {
     kNow,   ///< the file is on the disk when commit() returns
     kLater  ///< the file is on the disk after `sync_files()`; faster for many files

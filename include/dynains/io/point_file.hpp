@@ -1,4 +1,4 @@
-// Reader and writer of point clouds in PLY and PCD files.
+// Reader of point clouds in PLY, PCD, LAS, NumPy and text files; writer of PLY and PCD.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -63,8 +64,12 @@ class PointFileWriter {
   AtomicFile file_;
 };
 
-/// Whether the extension is .ply or .pcd.
+/// Whether the extension is .ply or .pcd, those of PointFileWriter.
 bool is_point_file(const std::filesystem::path& path);
+
+/// For a known format that read_points() does not read (.laz, .e57, .pcap): its name and the way to
+/// convert it. Else empty.
+std::optional<std::string> conversion_of(const std::filesystem::path& path);
 
 /// Content of a point file. Each column has one value per position, or is empty if the file lacks
 /// it. The accepted column names are listed; their case is ignored. Units are those of the file.
@@ -78,8 +83,19 @@ struct PointFile {
   Eigen::Isometry3d viewpoint = Eigen::Isometry3d::Identity();
 };
 
-/// Reads PLY (ascii, binary of both byte orders) and PCD (ascii, binary, binary_compressed). The
-/// extension determines the format. Throws IoError with path, line or byte, and expected content.
+/// Reads a point file. The extension determines the format:
+///
+///   .ply        ascii, binary of both byte orders
+///   .pcd        ascii, binary, binary_compressed
+///   .las        version 1.0 to 1.4, point formats 0 to 10; the time of GPS is `time`; `ring` and
+///               `label` are extra bytes
+///   .npy        a structured array with fields of these names, or one row for each point: x y z
+///               intensity, others ignored
+///   .npz        one such array, or one array for each column, named like it
+///   .xyz, .csv  text with a point on each line, separated by blanks, commas or semicolons: x y z
+///               intensity, others ignored; or with names of the columns in the first line
+///
+/// Throws IoError with path, line or byte, and expected content.
 PointFile read_points(const std::filesystem::path& path);
 
 /// Header of a point file.
@@ -88,7 +104,8 @@ struct PointFileHeader {
   PointColumns columns;                                         ///< without rgb and double_xyz
   std::uint64_t point_count = 0;  ///< as in the header; check_point_file() compares the file size
 };
-/// Reads the header of a PLY or PCD file. Throws IoError like read_points().
+/// Reads the header of a point file; lines of a text are counted. Throws IoError like
+/// read_points().
 PointFileHeader read_point_file_header(const std::filesystem::path& path);
 
 /// Throws IoError unless the header is valid and the file is large enough for its points. Does not

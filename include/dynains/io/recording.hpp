@@ -57,7 +57,7 @@ struct RecordedScan {
 };
 
 /// Format of the scans: one file per scan, or messages of a log.
-enum class ScanFormat { kBin, kPcd, kPly, kLog };
+enum class ScanFormat { kBin, kPcd, kPly, kLas, kNpy, kNpz, kXyz, kCsv, kLog };
 
 class ScanReader;
 struct ScanAddress;
@@ -65,8 +65,9 @@ struct ScanAddress;
 /// Recorded scans with poses. Supported recordings:
 ///
 /// - KITTI and SemanticKITTI: see KittiSequence. With `options.poses`, poses.txt may be missing.
-/// - Folder of point files, .pcd or .ply, directly in the folder or in a subfolder (clouds, lidar,
-///   pcd, ply, points, scans, velodyne). Scans are ordered by name, with numbers in names by value.
+/// - Folder of point files (see read_points()), directly in the folder or in a subfolder (clouds,
+///   lidar, pcd, ply, points, scans, velodyne). Beside .pcd, .ply or .bin files, files of the other
+///   formats are no scans. Scans are ordered by name, with numbers in names by value.
 /// - Folder of .bin files in the format of KITTI.
 /// - ROS log: .mcap, .db3 or .bag, or a folder with metadata.yaml and .mcap or .db3 files. The
 ///   constructor reads the log once; points stay in the file. Scans are the clouds of one topic,

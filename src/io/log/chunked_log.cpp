@@ -136,7 +136,7 @@ void ChunkedLog::read(const LogMessage& message, std::vector<std::uint8_t>& byte
 const std::vector<std::uint8_t>& ChunkedLog::load(std::uint64_t chunk) {
   if (loaded_ == chunk) return records_;
   loaded_ = 0;
-  const Chunk& header = chunks_.at(chunk);
+  Chunk& header = chunks_.at(chunk);
   file_.read(header.content, header.compressed_size, "a chunk", compressed_);
   if (header.compression.empty()) {
     records_.swap(compressed_);
@@ -150,11 +150,12 @@ const std::vector<std::uint8_t>& ChunkedLog::load(std::uint64_t chunk) {
         decompress(header.compression, compressed_, header.uncompressed_size, records_);
     if (!obstacle.empty()) fail_at_byte(path_, header.content, "compressed chunk: " + obstacle);
   }
-  if (header.uncompressed_crc != 0 &&
+  if (has_crc32() && header.uncompressed_crc != 0 &&
       header.uncompressed_crc != crc32(records_.data(), records_.size())) {
     fail_at_byte(path_, header.content,
                  "expected the checksum of the chunk, found that of other bytes");
   }
+  header.uncompressed_crc = 0;
   loaded_ = chunk;
   chunk_place_ = path_.string() + ": chunk at byte " + std::to_string(chunk);
   return records_;

@@ -27,7 +27,7 @@ class ChunkedLog : public LogFile {
     std::uint64_t content = 0;  ///< byte of the compressed records
     std::uint64_t compressed_size = 0;
     std::uint64_t uncompressed_size = 0;
-    std::uint32_t uncompressed_crc = 0;  ///< 0: not given
+    std::uint32_t uncompressed_crc = 0;  ///< 0: not given, or compared already
     std::string compression;             ///< empty: none
     bool has_index = false;
   };

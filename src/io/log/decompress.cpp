@@ -1,15 +1,16 @@
 #include "decompress.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
-#include <cstring>
 
 #if defined(DYNAINS_HAS_BZ2)
 #include <bzlib.h>
 #endif
 #if defined(DYNAINS_HAS_LZ4)
 #include <lz4frame.h>
+#endif
+#if defined(DYNAINS_HAS_Z)
+#include <zlib.h>
 #endif
 #if defined(DYNAINS_HAS_ZSTD)
 #include <zstd.h>
@@ -126,24 +127,32 @@ std::string decompress_bz2(const std::vector<std::uint8_t>& input, std::uint64_t
 }
 #endif
 
-using CrcTables = std::array<std::array<std::uint32_t, 256>, 8>;
-
-/// Table k advances a byte that k further bytes follow (slicing by eight).
-constexpr CrcTables make_crc_tables() {
-  CrcTables tables{};
-  for (std::uint32_t i = 0; i < 256; ++i) {
-    std::uint32_t value = i;
-    for (int bit = 0; bit < 8; ++bit) value = value >> 1U ^ ((value & 1U) != 0 ? 0xEDB88320U : 0U);
-    tables[0][i] = value;
-  }
-  for (std::size_t k = 1; k < tables.size(); ++k) {
-    for (std::size_t i = 0; i < 256; ++i) {
-      const std::uint32_t before = tables[k - 1][i];
-      tables[k][i] = before >> 8U ^ tables[0][before & 0xFFU];
+#if defined(DYNAINS_HAS_Z)
+std::string decompress_deflate(const std::vector<std::uint8_t>& input, std::uint64_t size,
+                               std::vector<std::uint8_t>& output) {
+  constexpr std::size_t kMost = std::size_t{1} << 30U;  // the library counts in 32 bits
+  z_stream stream{};
+  if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) return "zlib cannot be initialised";
+  const auto step = [&](const Room& room) {
+    const std::size_t input_size = std::min(room.input_size, kMost);
+    const std::size_t output_size = std::min(room.output_size, kMost);
+    stream.next_in = const_cast<std::uint8_t*>(room.input);
+    stream.avail_in = static_cast<unsigned>(input_size);
+    stream.next_out = room.output;
+    stream.avail_out = static_cast<unsigned>(output_size);
+    const int result = inflate(&stream, Z_NO_FLUSH);
+    Step made{
+        input_size - stream.avail_in, output_size - stream.avail_out, result == Z_STREAM_END, {}};
+    if (result != Z_OK && result != Z_STREAM_END && result != Z_BUF_ERROR) {
+      made.error = "no valid deflate data";
     }
-  }
-  return tables;
+    return made;
+  };
+  const std::string error = run(step, input, size, output);
+  inflateEnd(&stream);
+  return error;
 }
+#endif
 
 }  // namespace
 
@@ -160,27 +169,30 @@ std::string decompress(const std::string& method,
 #if defined(DYNAINS_HAS_BZ2)
   if (method == "bz2") return decompress_bz2(input, size, output);
 #endif
+#if defined(DYNAINS_HAS_Z)
+  if (method == "deflate") return decompress_deflate(input, size, output);
+#endif
+  if (method == "deflate") return "this build has no zlib (Debian: zlib1g-dev)";
   for (const std::string known : {"lz4", "zstd", "bz2"}) {
     if (method == known) return "this build has no " + known + " (Debian: lib" + known + "-dev)";
   }
   return "expected lz4, zstd, bz2 or none, found \"" + method + '"';
 }
 
-std::uint32_t crc32(const std::uint8_t* data, std::size_t size) {
-  static constexpr CrcTables kTables = make_crc_tables();
-  std::uint32_t value = 0xFFFFFFFFU;
-  for (; size >= 8; size -= 8, data += 8) {
-    std::uint32_t low, high;
-    std::memcpy(&low, data, sizeof(low));
-    std::memcpy(&high, data + 4, sizeof(high));
-    low ^= value;
-    value = 0;
-    for (std::size_t k = 0; k < 4; ++k) {
-      value ^= kTables[7 - k][low >> (8 * k) & 0xFFU] ^ kTables[3 - k][high >> (8 * k) & 0xFFU];
-    }
-  }
-  for (; size > 0; --size, ++data) value = value >> 8U ^ kTables[0][(value ^ *data) & 0xFFU];
-  return ~value;
+bool has_crc32() {
+#if defined(DYNAINS_HAS_Z)
+  return true;
+#else
+  return false;
+#endif
+}
+
+std::uint32_t crc32([[maybe_unused]] const std::uint8_t* data, [[maybe_unused]] std::size_t size) {
+#if defined(DYNAINS_HAS_Z)
+  return size == 0 ? 0 : static_cast<std::uint32_t>(::crc32_z(0, data, size));
+#else
+  return 0;
+#endif
 }
 
 }  // namespace dynains

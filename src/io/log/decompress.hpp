@@ -9,12 +9,15 @@
 namespace dynains {
 
 /// Decompresses all of `input` into `output`, which ends with exactly `size` bytes. `method` is
-/// "lz4" (frame format), "zstd" or "bz2". Memory grows with the bytes that are really there, not
-/// with `size`. Returns an empty text, or the reason why that is not possible.
+/// "lz4" (frame format), "zstd", "bz2" or "deflate" (raw). Memory grows with the bytes that are
+/// really there, not with `size`. Returns an empty text, or the reason why that is not possible.
 std::string decompress(const std::string& method, const std::vector<std::uint8_t>& input,
                        std::uint64_t size, std::vector<std::uint8_t>& output);
 
-/// CRC-32 as in zlib and PNG.
+/// Whether this build has zlib, and with it crc32().
+bool has_crc32();
+
+/// CRC-32 of zlib; 0 without zlib. MCAP has 0 for a checksum that is not given.
 std::uint32_t crc32(const std::uint8_t* data, std::size_t size);
 
 }  // namespace dynains

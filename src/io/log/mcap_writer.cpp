@@ -53,13 +53,15 @@ McapWriter::McapWriter(const std::filesystem::path& path) : file_(path) {
   append(mcap::kMagic + record(mcap::kHeader, Fields().string("ros2").string("dynains")));
 }
 
-std::uint16_t McapWriter::add_channel(const std::string& topic, const std::string& type,
-                                      const std::string& definition) {
+std::uint16_t McapWriter::add_channel(const std::string& topic, const MessageType& type) {
   const auto channel = static_cast<std::uint16_t>(counts_.size());
   const auto schema = static_cast<std::uint16_t>(channel + 1);  // 0 is no schema
   const std::string records =
-      record(mcap::kSchema,
-             Fields().number(schema).string(type).string("ros2msg").string(definition)) +
+      record(mcap::kSchema, Fields()
+                                .number(schema)
+                                .string(type.ros2_name())
+                                .string("ros2msg")
+                                .string(type.definition(encoding()))) +
       record(mcap::kChannel,
              Fields().number(channel).number(schema).string(topic).string("cdr").string(""));
   definitions_ += records;

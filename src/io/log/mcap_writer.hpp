@@ -9,21 +9,19 @@
 #include <vector>
 
 #include "dynains/io/atomic_file.hpp"
+#include "log_writer.hpp"
 
 namespace dynains {
 
-/// Writes chunks of some megabytes with their index, without compression, and a summary. The file
-/// appears whole, at `commit()`, or not at all. All members throw IoError.
-class McapWriter {
+/// Writes chunks of some megabytes with their index, without compression, and a summary.
+class McapWriter final : public LogWriter {
  public:
   explicit McapWriter(const std::filesystem::path& path);
 
-  /// A topic of messages of `type` ("tf2_msgs/msg/TFMessage"), whose fields are in `definition`.
-  std::uint16_t add_channel(const std::string& topic, const std::string& type,
-                            const std::string& definition);
-  /// `time`: ns, not before that of the message before.
-  void write(std::uint16_t channel, std::uint64_t time, const std::string& message);
-  void commit();
+  MessageEncoding encoding() const override { return MessageEncoding::kCdr; }
+  std::uint16_t add_channel(const std::string& topic, const MessageType& type) override;
+  void write(std::uint16_t channel, std::uint64_t time, const std::string& message) override;
+  void commit() override;
 
  private:
   struct Entry {

@@ -1,0 +1,203 @@
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "failure.hpp"
+#include "las_format.hpp"
+#include "log/bytes.hpp"
+#include "log/raw_file.hpp"
+#include "point_readers.hpp"
+#include "point_sink.hpp"
+
+namespace dynains {
+namespace {
+
+struct LasColumn {
+  Role role;
+  std::size_t offset;  // bytes from the begin of a record
+  Scalar type;
+};
+
+struct LasHeader {
+  std::uint64_t points_begin = 0;
+  std::uint64_t point_count = 0;
+  std::uint32_t vlr_count = 0;
+  std::uint64_t vlr_begin = 0;
+  std::size_t point_size = 0;   // bytes, of a record
+  std::size_t extra_begin = 0;  // bytes from the begin of a record
+  std::array<double, 3> scale{}, offset{};
+  std::vector<LasColumn> columns;
+};
+
+/// The number of points in 64 bits stands at the end of the header of version 1.4.
+std::uint64_t read_count(RawFile& file, std::uint8_t minor, std::uint32_t legacy_count) {
+  constexpr std::uint64_t kCountPosition = 247;
+  if (minor < 4) return legacy_count;
+  const auto bytes = file.read(kCountPosition, 8, "the number of points");
+  return Bytes(file.path(), kCountPosition, bytes.data(), bytes.size())
+      .number<std::uint64_t>("the number of points");
+}
+
+void add_column(PointSink& sink, LasHeader& header, LasColumn column) {
+  if (sink.claim(column.role)) header.columns.push_back(column);
+}
+
+/// Columns of a point format, without those of extra bytes.
+void add_fixed_columns(PointSink& sink, LasHeader& header, const las::PointFormat& format) {
+  add_column(sink, header, {Role::kX, 0, Scalar::kInt32});
+  add_column(sink, header, {Role::kY, 4, Scalar::kInt32});
+  add_column(sink, header, {Role::kZ, 8, Scalar::kInt32});
+  add_column(sink, header, {Role::kIntensity, 12, Scalar::kUint16});
+  if (format.gps_offset != 0) {
+    add_column(sink, header, {Role::kTime, format.gps_offset, Scalar::kDouble});
+  }
+}
+
+/// Columns of extra bytes whose names are those of a ring or a label.
+void add_extra_columns(PointSink& sink, LasHeader& header, Bytes descriptions) {
+  std::size_t offset = header.extra_begin;
+  while (descriptions.remaining() >= las::kExtraBytesSize) {
+    Bytes fields = descriptions.block(las::kExtraBytesSize, "the description of extra bytes");
+    fields.skip(2, "reserved bytes");
+    const auto type = fields.number<std::uint8_t>("a type of extra bytes");
+    const auto options = fields.number<std::uint8_t>("options of extra bytes");
+    const auto* const text = reinterpret_cast<const char*>(fields.here());
+    const std::string name(text, std::find(text, text + 32, '\0'));
+    if (type >= std::size(las::kExtraTypes)) {
+      fields.fail("expected a type of extra bytes from 0 to 10, found " + std::to_string(type));
+    }
+    const Scalar scalar = las::kExtraTypes[type];
+    const std::size_t size = type == 0 ? options : size_of(scalar);
+    if (offset + size > header.point_size) {
+      fields.fail("expected extra bytes within the " + std::to_string(header.point_size) +
+                  " bytes of a point");
+    }
+    const Role role = role_of(name);
+    constexpr std::uint8_t kIsScaled = 0x18;
+    if (type != 0 && (options & kIsScaled) == 0 && (role == Role::kRing || role == Role::kLabel)) {
+      add_column(sink, header, {role, offset, scalar});
+    }
+    offset += size;
+  }
+}
+
+void read_vlrs(RawFile& file, PointSink& sink, LasHeader& header) {
+  std::uint64_t position = header.vlr_begin;
+  for (std::uint32_t i = 0; i < header.vlr_count; ++i) {
+    const auto head = file.read(position, las::kVlrHeaderSize, "a variable length record");
+    Bytes fields(file.path(), position, head.data(), head.size());
+    fields.skip(2, "reserved bytes");
+    const auto* const text = reinterpret_cast<const char*>(fields.here());
+    const std::string user(text, std::find(text, text + 16, '\0'));
+    fields.skip(16, "a user id");
+    const auto record = fields.number<std::uint16_t>("a record id");
+    const auto size = fields.number<std::uint16_t>("the size of a record");
+    position += las::kVlrHeaderSize;
+    if (user == las::kSpecUser && record == las::kExtraBytesRecord) {
+      const auto content = file.read(position, size, "a variable length record");
+      add_extra_columns(sink, header, Bytes(file.path(), position, content.data(), content.size()));
+    }
+    position += size;
+  }
+}
+
+LasHeader read_header(RawFile& file, PointSink& sink) {
+  const auto head =
+      file.read(0, std::min<std::uint64_t>(file.size(), las::kHeaderSize12), "the header of LAS");
+  Bytes fields(file.path(), 0, head.data(), head.size());
+  if (head.size() < las::kMagicSize ||
+      !std::equal(las::kMagic, las::kMagic + las::kMagicSize, head.begin())) {
+    fields.fail("expected LASF, the magic bytes of LAS");
+  }
+  fields.skip(24, "the header of LAS");
+  const auto major = fields.number<std::uint8_t>("a version");
+  const auto minor = fields.number<std::uint8_t>("a version");
+  if (major != 1 || minor > 4) {
+    fields.fail("expected version 1.0 to 1.4 of LAS, found " + std::to_string(major) + '.' +
+                std::to_string(minor));
+  }
+  fields.skip(68, "the header of LAS");
+  LasHeader header;
+  header.vlr_begin = fields.number<std::uint16_t>("the size of the header");
+  header.points_begin = fields.number<std::uint32_t>("the place of the points");
+  header.vlr_count = fields.number<std::uint32_t>("the number of records");
+  const auto format = fields.number<std::uint8_t>("a point format");
+  if ((format & 0x80U) != 0) {
+    fields.fail(
+        "points are compressed (LAZ), which is not read; convert the file: "
+        "pdal translate IN.laz OUT.las");
+  }
+  if (format >= std::size(las::kPointFormats)) {
+    fields.fail("expected a point format from 0 to 10, found " + std::to_string(format));
+  }
+  header.point_size = fields.number<std::uint16_t>("the size of a point");
+  header.extra_begin = las::kPointFormats[format].size;
+  if (header.point_size < header.extra_begin) {
+    fields.fail("expected points of at least " + std::to_string(header.extra_begin) +
+                " bytes, found " + std::to_string(header.point_size));
+  }
+  const auto legacy_count = fields.number<std::uint32_t>("the number of points");
+  fields.skip(20, "the numbers of points by return");
+  for (double& scale : header.scale) scale = fields.number<double>("a scale");
+  for (double& offset : header.offset) offset = fields.number<double>("an offset");
+  header.point_count = read_count(file, minor, legacy_count);
+  add_fixed_columns(sink, header, las::kPointFormats[format]);
+  read_vlrs(file, sink, header);
+  return header;
+}
+
+void check_size(const RawFile& file, const LasHeader& header) {
+  const std::uint64_t available = file.size() - std::min(file.size(), header.points_begin);
+  if (header.point_count <= available / header.point_size) return;
+  fail_at_byte(file.path(), header.points_begin,
+               "expected " + std::to_string(header.point_count) + " points of " +
+                   std::to_string(header.point_size) + " bytes, the file has " +
+                   std::to_string(available) + " bytes left");
+}
+
+}  // namespace
+
+PointFile read_las(const std::filesystem::path& path) {
+  constexpr std::uint64_t kBlock = 1U << 14U;  // points
+  RawFile file(path);
+  PointSink sink;
+  const LasHeader header = read_header(file, sink);
+  check_size(file, header);
+  sink.resize(static_cast<std::size_t>(header.point_count));
+  std::vector<std::uint8_t> block;
+  for (std::uint64_t first = 0; first < header.point_count; first += kBlock) {
+    const std::uint64_t count = std::min(kBlock, header.point_count - first);
+    const std::uint64_t position = header.points_begin + first * header.point_size;
+    file.read(position, count * header.point_size, "points", block);
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto* const record =
+          reinterpret_cast<const char*>(block.data()) + i * header.point_size;
+      for (const LasColumn& column : header.columns) {
+        double value = load_scalar(column.type, record + column.offset, false);
+        const auto axis = static_cast<std::size_t>(column.role);
+        if (axis < 3) value = value * header.scale[axis] + header.offset[axis];
+        if (sink.set(static_cast<std::size_t>(first) + i, column.role, value)) continue;
+        fail_at_byte(path, position + i * header.point_size,
+                     "expected a whole number of at least 0 in the extra bytes");
+      }
+    }
+  }
+  return std::move(sink.file());
+}
+
+PointFileHeader read_las_header(const std::filesystem::path& path) {
+  RawFile file(path);
+  PointSink sink;
+  const LasHeader header = read_header(file, sink);
+  return {Eigen::Isometry3d::Identity(), sink.columns(), header.point_count};
+}
+
+void check_las(const std::filesystem::path& path) {
+  RawFile file(path);
+  PointSink sink;
+  check_size(file, read_header(file, sink));
+}
+
+}  // namespace dynains

@@ -1,0 +1,46 @@
+// Writer of bags of ROS 1 (version 2.0).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "dynains/io/atomic_file.hpp"
+#include "log_writer.hpp"
+
+namespace dynains {
+
+/// Writes chunks of some megabytes with their index, without compression.
+class BagWriter final : public LogWriter {
+ public:
+  explicit BagWriter(const std::filesystem::path& path);
+
+  MessageEncoding encoding() const override { return MessageEncoding::kRos1; }
+  std::uint16_t add_channel(const std::string& topic, const MessageType& type) override;
+  void write(std::uint16_t channel, std::uint64_t time, const std::string& message) override;
+  void commit() override;
+
+ private:
+  struct Entry {
+    std::uint64_t time;    ///< ns
+    std::uint32_t offset;  ///< bytes from the begin of the chunk
+  };
+  using Index = std::map<std::uint16_t, std::vector<Entry>>;
+
+  void append(const std::string& bytes);
+  void finish_chunk();
+  std::string file_header() const;
+
+  AtomicFile file_;
+  std::uint64_t position_ = 0;
+  std::vector<std::string> connections_;  ///< records
+  std::string records_;                   ///< of the chunk at work
+  Index index_;                           ///< of the chunk at work
+  std::string chunk_infos_;               ///< records
+  std::uint32_t chunk_count_ = 0;
+  std::uint64_t index_position_ = 0;  ///< 0 until the end
+};
+
+}  // namespace dynains

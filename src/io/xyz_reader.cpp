@@ -1,0 +1,152 @@
+#include <cctype>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "byte_reader.hpp"
+#include "point_readers.hpp"
+#include "point_sink.hpp"
+#include "text.hpp"
+
+namespace dynains {
+namespace {
+
+/// Commas and semicolons separate like blanks.
+void use_blanks(std::string& line) {
+  for (char& c : line) {
+    if (c == ',' || c == ';') c = ' ';
+  }
+}
+
+std::vector<std::string_view> tokens_of(std::string_view line) {
+  std::vector<std::string_view> tokens;
+  for (auto token = text::next_token(line); !token.empty(); token = text::next_token(line)) {
+    tokens.push_back(token);
+  }
+  return tokens;
+}
+
+std::string_view without_marks(std::string_view token) {
+  while (!token.empty() && (token.front() == '#' || token.front() == '/' || token.front() == '"')) {
+    token.remove_prefix(1);
+  }
+  while (!token.empty() && token.back() == '"') token.remove_suffix(1);
+  return token;
+}
+
+bool is_comment(const std::string& line) { return line[0] == '#' || line.rfind("//", 0) == 0; }
+
+/// The columns of a text: those of a line of names, else x y z intensity.
+class XyzColumns {
+ public:
+  XyzColumns(const ByteReader& reader, PointSink& sink) : reader_(reader), sink_(sink) {}
+
+  bool are_known() const { return !roles_.empty(); }
+
+  /// True if `tokens` are names, which the first line may have, also behind a mark of a comment.
+  bool take_names(const std::vector<std::string_view>& tokens) {
+    std::vector<Role> roles;
+    bool has_x = false;
+    for (const std::string_view token : tokens) {
+      const std::string_view name = without_marks(token);
+      if (name.empty()) continue;
+      roles.push_back(role_of(name));
+      has_x = has_x || roles.back() == Role::kX;
+    }
+    if (!has_x) return false;
+    for (Role& role : roles) {
+      if (role != Role::kNone && !sink_.claim(role)) role = Role::kNone;
+    }
+    if (const auto name = sink_.missing()) {
+      reader_.fail_on_line("expected columns x, y and z, found no " + *name);
+    }
+    roles_ = std::move(roles);
+    return true;
+  }
+
+  void take_default(std::size_t count) {
+    constexpr Role kRoles[] = {Role::kX, Role::kY, Role::kZ, Role::kIntensity};
+    if (count < 3) reader_.fail_on_line("expected at least 3 numbers: x y z");
+    roles_.assign(count, Role::kNone);
+    for (std::size_t i = 0; i < count && i < std::size(kRoles); ++i) {
+      roles_[i] = kRoles[i];
+      sink_.claim(kRoles[i]);
+    }
+  }
+
+  void store(const std::vector<std::string_view>& tokens, std::size_t row) {
+    if (tokens.size() != roles_.size()) {
+      reader_.fail_on_line("expected " + std::to_string(roles_.size()) + " columns, found " +
+                           std::to_string(tokens.size()));
+    }
+    for (std::size_t i = 0; i < tokens.size(); ++i) {
+      if (roles_[i] == Role::kNone) continue;
+      const auto value = text::parse_number(tokens[i]);
+      if (!value || !sink_.set(row, roles_[i], *value)) {
+        reader_.fail_on_line("expected a number that the column can have, found \"" +
+                             std::string(tokens[i].substr(0, 40)) + '"');
+      }
+    }
+  }
+
+ private:
+  const ByteReader& reader_;
+  PointSink& sink_;
+  std::vector<Role> roles_;
+};
+
+/// Calls `take(tokens, row)` for each line of a point. Returns the number of points.
+template <class Take>
+std::size_t read_lines(ByteReader& reader, XyzColumns& columns, Take&& take) {
+  std::string line;
+  std::size_t row = 0;
+  bool is_first = true;
+  while (reader.read_line(line)) {
+    use_blanks(line);
+    const std::vector<std::string_view> tokens = tokens_of(line);
+    if (tokens.empty()) continue;
+    const bool may_be_names = is_first && !text::parse_number(tokens.front());
+    is_first = false;
+    if (may_be_names && columns.take_names(tokens)) continue;
+    if (is_comment(line)) continue;
+    if (!columns.are_known()) columns.take_default(tokens.size());
+    take(tokens, row++);
+  }
+  if (!columns.are_known()) reader.fail_on_line("file ends, expected at least one point");
+  return row;
+}
+
+std::size_t count_points(const std::filesystem::path& path, PointSink& sink) {
+  ByteReader reader(path);
+  XyzColumns columns(reader, sink);
+  return read_lines(reader, columns, [](const auto&, std::size_t) {});
+}
+
+}  // namespace
+
+PointFile read_xyz(const std::filesystem::path& path) {
+  PointSink counted;
+  const std::size_t count = count_points(path, counted);
+  ByteReader reader(path);
+  PointSink sink;
+  XyzColumns columns(reader, sink);
+  read_lines(reader, columns, [&](const std::vector<std::string_view>& tokens, std::size_t row) {
+    if (row == 0) sink.resize(count);
+    if (row >= count) reader.fail_on_line("expected no more points than before");
+    columns.store(tokens, row);
+  });
+  return std::move(sink.file());
+}
+
+PointFileHeader read_xyz_header(const std::filesystem::path& path) {
+  PointSink sink;
+  const std::size_t count = count_points(path, sink);
+  return {Eigen::Isometry3d::Identity(), sink.columns(), count};
+}
+
+void check_xyz(const std::filesystem::path& path) {
+  PointSink sink;
+  count_points(path, sink);
+}
+
+}  // namespace dynains

@@ -1,0 +1,310 @@
+// Points in files of LAS, NumPy and text.
+#include <string>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/point_file.hpp"
+#include "dynains/io/recording.hpp"
+#include "files.hpp"
+#include "log/decompress.hpp"
+#include "point_format_writer.hpp"
+#include "support/catch.hpp"
+
+namespace dynains {
+
+using namespace test;
+
+namespace {
+
+namespace fs = std::filesystem;
+using Position = Eigen::Vector3d;
+
+PointFile read(const std::string& name, const std::string& content) {
+  const TemporaryFolder folder;
+  const fs::path path = folder / name;
+  write_text(path, content);
+  check_point_file(path);
+  PointFile points = read_points(path);
+  const PointFileHeader header = read_point_file_header(path);
+  CHECK(header.point_count == points.positions.size());
+  CHECK(header.columns.intensity == !points.intensity.empty());
+  CHECK(header.columns.ring == !points.ring.empty());
+  CHECK(header.columns.time == !points.time.empty());
+  CHECK(header.columns.label == !points.label.empty());
+  return points;
+}
+
+std::string error(const std::string& name, const std::string& content) {
+  const TemporaryFolder folder;
+  write_text(folder / name, content);
+  const std::string text = message_of<IoError>([&] { read_points(folder / name); });
+  CHECK_THAT(text, StartsWith((folder / name).string()));
+  return text;
+}
+
+template <class Number>
+std::string bytes_of(const std::vector<Number>& values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(Number)};
+}
+
+const std::string kTwoPoints = bytes_of<float>({1, 2, 3, 0.5F, 4, 5, 6, 0.25F});
+const std::string kFields =
+    "[('x', '<f8'), ('y', '<f8'), ('z', '<f8'), ('name', '<U2'), "
+    "('vector', '<f4', (2,)), ('Ring', '>u2'), ('t', '<i8'), "
+    "('label', '|u1')]";
+
+std::string structured_point(double x, char ring, std::int64_t time, std::uint8_t label) {
+  return ByteWriter()
+      .number(x)
+      .number(2.0)
+      .number(3.0)
+      .raw(std::string(16, '\0') + '\0' + ring)
+      .number(time)
+      .number(label)
+      .text();
+}
+
+void check_two_points(const PointFile& points) {
+  REQUIRE(points.positions.size() == 2);
+  CHECK(points.positions[0] == Position(1, 2, 3));
+  CHECK(points.positions[1] == Position(4, 5, 6));
+  CHECK(points.intensity == std::vector<float>{0.5F, 0.25F});
+}
+
+std::string las_points(const LasParts& parts, std::uint8_t label) {
+  std::string record = ByteWriter()
+                           .number(std::int32_t{150})
+                           .number(std::int32_t{-1})
+                           .number(std::int32_t{2000000000})
+                           .number(std::uint16_t{700})
+                           .text();
+  record.resize(parts.format < 6 ? 20 : 22, '\0');
+  record += ByteWriter().number(1234.5).text();
+  record.resize(parts.point_size - 3U, '\0');
+  return record + ByteWriter().number(std::uint16_t{17}).number(label).text();
+}
+
+}  // namespace
+
+TEST_CASE("NumPy: rows of x y z and intensity") {
+  check_two_points(read("a.npy", npy_file("'<f4'", "(2, 4)", kTwoPoints)));
+  const std::string columns = bytes_of<double>({1, 4, 2, 5, 3, 6, 0.5, 0.25});
+  check_two_points(read("a.NPY", npy_file("'<f8'", "(2, 4)", columns, "True")));
+  // An image of points, and integers.
+  const PointFile image = read("a.npy", npy_file("'|i1'", "(2, 1, 3)", "\1\2\3\4\5\6"));
+  CHECK(image.positions[1] == Position(4, 5, 6));
+  CHECK(image.intensity.empty());
+  CHECK(read("a.npy", npy_file("'<f4'", "(0, 3)", "")).positions.empty());
+}
+
+TEST_CASE("NumPy: a structured array has columns by name") {
+  const std::string data = structured_point(1e7, 5, -3, 9) + structured_point(1.5, 6, 1LL << 52, 0);
+  const PointFile points = read("a.npy", npy_file(kFields, "(2,)", data));
+  CHECK(points.positions[0] == Position(1e7, 2, 3));
+  CHECK(points.ring == std::vector<std::uint16_t>{5, 6});
+  CHECK(points.time == std::vector<double>{-3.0, 4503599627370496.0});
+  CHECK(points.label == std::vector<std::uint32_t>{9, 0});
+}
+
+TEST_CASE("NumPy: archives of a table, or of columns") {
+  const auto member = [](const std::string& name, const std::string& content) {
+    return ZipMember{name, content,
+                     crc32(reinterpret_cast<const std::uint8_t*>(content.data()), content.size())};
+  };
+  const auto x = member("x.npy", npy_file("'<f4'", "(2,)", bytes_of<float>({1, 4})));
+  const auto y = member("y.npy", npy_file("'<f8'", "(2,)", bytes_of<double>({2, 5})));
+  const auto z = member("z.npy", npy_file("'<i2'", "(2,)", bytes_of<std::int16_t>({3, 6})));
+  const auto intensity = member("i.npy", npy_file("'<f4'", "(2,)", bytes_of<float>({0.5F, 0.25F})));
+  const auto other = member("colours.npy", npy_file("'<f4'", "(7,)", std::string(28, 'x')));
+  const auto text = member("meta.json", "{}");
+  const auto object = member("info.npy", npy_file("'|O'", "()", "pickled"));
+  check_two_points(read("a.npz", zip_file({other, x, text, y, z, object, intensity})));
+  const auto table = member("points.npy", npy_file("'<f4'", "(2, 4)", kTwoPoints));
+  check_two_points(read("a.npz", zip_file({table})));
+  const auto labels =
+      member("label.npy", npy_file("'<u4'", "(2,)", bytes_of<std::uint32_t>({9, 251})));
+  CHECK(read("a.npz", zip_file({table, labels})).label == std::vector<std::uint32_t>{9, 251});
+
+  CHECK_THAT(error("a.npz", zip_file({x, y})), ContainsSubstring("found no z"));
+  const auto three = member("label.npy", npy_file("'<u4'", "(3,)", std::string(12, '\0')));
+  CHECK_THAT(error("a.npz", zip_file({table, three})),
+             ContainsSubstring("label.npy: byte 0: expected 2 items, as in ") &&
+                 ContainsSubstring("points.npy, found 3"));
+  ZipMember changed = table;
+  changed.content.back() ^= 1;
+  if (has_crc32()) {
+    CHECK_THAT(error("a.npz", zip_file({changed})), ContainsSubstring("checksum of the member"));
+  }
+  changed = table;
+  changed.method = 8;
+  changed.content = "no deflate";
+  CHECK_THAT(error("a.npz", zip_file({changed})),
+             ContainsSubstring(has_crc32() ? "deflate" : "zlib1g-dev"));
+  changed.method = 9;
+  CHECK_THAT(error("a.npz", zip_file({changed})), ContainsSubstring("found method 9"));
+  const std::string whole = zip_file({x, y, z});
+  CHECK_THAT(error("a.npz", "no archive"), ContainsSubstring("expected the end of a ZIP archive"));
+  for (std::size_t size = 0; size < whole.size(); size += 7) error("a.npz", whole.substr(0, size));
+}
+
+TEST_CASE("NumPy: deflated members") {
+  if (!has_crc32()) return;
+  // Deflate holds a stored block of any bytes: last block, length, its complement.
+  const std::string array = npy_file("'<f4'", "(2, 4)", kTwoPoints);
+  const auto size = static_cast<std::uint16_t>(array.size());
+  ZipMember member{"arr_0.npy",
+                   ByteWriter()
+                       .number(std::uint8_t{1})
+                       .number(size)
+                       .number(static_cast<std::uint16_t>(~size))
+                       .raw(array)
+                       .text(),
+                   crc32(reinterpret_cast<const std::uint8_t*>(array.data()), array.size()), 8,
+                   size};
+  check_two_points(read("a.npz", zip_file({member})));
+  member.size = 0x7FFFFFFF;
+  CHECK_THAT(error("a.npz", zip_file({member})), ContainsSubstring("expected 2147483647 bytes"));
+}
+
+TEST_CASE("NumPy: malformed arrays are refused with the reason") {
+  const auto check = [](const std::string& content, const std::string& expected) {
+    CHECK_THAT(error("a.npy", content), ContainsSubstring(expected));
+  };
+  const std::string xyz = std::string(24, '\0');
+  check("", "magic bytes of an array");
+  check(std::string("\x93NUMPY\1\0", 8), "the length of the header");
+  check(std::string("\x93NUMPY\7\0\1\0", 10), "expected format 1 to 3");
+  check(npy_file("'<f4'", "(2, 3)", xyz.substr(1)), "expected all items of the array");
+  check(npy_file("'<f4'", "(18446744073709551615, 18446744073709551615)", xyz), "all items");
+  check(npy_file("'<f4'", "(2305843009213693952, 8)", xyz), "all items");
+  check(npy_file("'<f4'", "(99999999999999999999, 3)", xyz), "length of a dimension");
+  check(npy_file("'<f4'", "(6,)", xyz), "expected an array of N rows");
+  check(npy_file("'<f4'", "(3, 2)", xyz), "expected an array of N rows");
+  check(npy_file("'<f4'", "(-2, 3)", xyz), "length of a dimension");
+  check(npy_file("'<f4'", "(2 3)", xyz), "expected ',' or ')'");
+  check(npy_file("'<f2'", "(2, 3)", xyz), "float16 is not read");
+  check(npy_file("'<M8[ns]'", "(1, 3)", xyz), "expected numbers");
+  check(npy_file("''", "(2, 3)", xyz), "expected a type such as");
+  check(npy_file("'<f999999999999'", "(2, 3)", xyz), "expected a type such as");
+  check(npy_file("[]", "(2,)", xyz), "expected at least one field");
+  check(npy_file("[('x', '<f4'), ('y', '<f4')]", "(3,)", xyz), "found no z");
+  check(npy_file("[('x', [('a', '<f4')])]", "(3,)", xyz), "fields of one level");
+  check(npy_file("'<f4'", "(2, 3)", xyz, "Maybe"), "True or False");
+  check(npy_file("'<f4'", "(2, 3)", xyz, "False, 'other': 1"), "once each");
+  check(npy_file("'<f4", "(2, 3)", xyz), "header of the array");
+  const std::string labels = "[('x', '<f4'), ('y', '<f4'), ('z', '<f4'), ('label', '<f4')]";
+  check(npy_file(labels, "(1,)", bytes_of<float>({1, 2, 3, -1})), "whole numbers of at least 0");
+}
+
+TEST_CASE("LAS: versions and point formats with scale, offset, time and extra bytes") {
+  LasParts parts;
+  SECTION("1.2, format 0") { parts = {2, 0, "", 20, 1}; }
+  SECTION("1.2, format 1") { parts = {2, 1, "", 31, 1}; }
+  SECTION("1.3, format 3") { parts = {3, 3, "", 37, 1}; }
+  SECTION("1.4, format 6") { parts = {4, 6, "", 40, 1}; }
+  SECTION("1.4, format 7 with extra bytes") {
+    parts = {4, 7, extra_bytes("ring", 3) + extra_bytes("label", 1), 39, 1};
+  }
+  const PointFile points = read("a.las", las_file(parts, las_points(parts, 9)));
+  REQUIRE(points.positions.size() == 1);
+  CHECK(points.positions[0].isApprox(Position(101.5, 199.99, 20000300.0), 1e-12));
+  if (parts.point_size > 22) CHECK(points.intensity[0] == 700.0F);
+  CHECK(points.time == (parts.format == 0 ? std::vector<double>{} : std::vector<double>{1234.5}));
+  if (parts.extra_bytes.empty()) return;
+  CHECK(points.ring == std::vector<std::uint16_t>{17});
+  CHECK(points.label == std::vector<std::uint32_t>{9});
+}
+
+TEST_CASE("LAS: malformed files are refused with position and reason") {
+  const LasParts good;
+  const std::string whole = las_file(good, las_points(good, 9));
+  const auto check = [](LasParts parts, const std::string& points, const std::string& expected) {
+    CHECK_THAT(error("a.las", las_file(parts, points)), ContainsSubstring(expected));
+  };
+  CHECK_THAT(error("a.las", "LASX"), ContainsSubstring("byte 0: expected LASF"));
+  CHECK_THAT(error("a.las", whole.substr(0, 100)),
+             ContainsSubstring("a.las: byte 100: expected 4 bytes"));
+  for (std::size_t size = 0; size < whole.size(); ++size) error("a.las", whole.substr(0, size));
+  check({5, 1, "", 28, 1}, "", "found 1.5");
+  check({4, 11, "", 28, 1}, "", "point format from 0 to 10");
+  check({4, 0x86, "", 30, 1}, "", "pdal translate IN.laz OUT.las");
+  check({4, 6, "", 29, 1}, "", "points of at least 30 bytes, found 29");
+  check({2, 1, "", 28, 4000000000U}, std::string(28, '\0'), "expected 4000000000 points");
+  check({4, 6, "", 30, 2}, std::string(59, '\0'), "expected 2 points of 30 bytes");
+  check({4, 6, extra_bytes("label", 1), 30, 1}, std::string(30, '\0'), "within the 30 bytes");
+  check({4, 6, extra_bytes("label", 30), 34, 1}, std::string(34, '\0'), "from 0 to 10, found 30");
+  const std::string bad_label = std::string(30, '\0') + bytes_of<float>({-1});
+  check({4, 6, extra_bytes("label", 9), 34, 1}, bad_label, "expected a whole number");
+}
+
+TEST_CASE("Text: columns by order or by name, with any separator") {
+  check_two_points(read("a.xyz", "1 2 3 0.5\n\n4 5 6 .25\n"));
+  check_two_points(read("a.csv", "1,2,3,0.5,9\r\n4, 5, 6, 0.25, 9"));
+  check_two_points(
+      read("a.csv", "\"X\";\"Y\";\"Z\";\"colour\";\"Intensity\"\n1;2;3;9;0.5\n4;5;6;9;0.25\n"));
+  check_two_points(read("a.xyz", "# x y z i\n# a comment\n1 2 3 0.5\n4 5 6 0.25\n"));
+  check_two_points(read("a.xyz", "//X Y Z intensity\n1 2 3 0.5\n4 5 6 0.25\n"));
+  check_two_points(read("a.xyz", "# from a scanner\n1 2 3 0.5\n4 5 6 0.25\n"));
+  const PointFile points = read("a.csv", "time,label,ring,z,y,x\n1e9,251,7,3,2,1\n");
+  CHECK(points.positions[0] == Position(1, 2, 3));
+  CHECK(points.time == std::vector<double>{1e9});
+  CHECK(points.label == std::vector<std::uint32_t>{251});
+  CHECK(points.ring == std::vector<std::uint16_t>{7});
+  CHECK(read("a.csv", "x,y,z\n").positions.empty());
+}
+
+TEST_CASE("Text: malformed lines are refused with their number") {
+  const auto check = [](const std::string& content, const std::string& expected) {
+    CHECK_THAT(error("a.csv", content), ContainsSubstring(expected));
+  };
+  check("", "expected at least one point");
+  check("# nothing\n", "expected at least one point");
+  check("1 2\n", ":1: expected at least 3 numbers");
+  check("1 2 3\n1 2\n", ":2: expected 3 columns, found 2");
+  check("1 2 3\n1 2 three\n", ":2: expected a number that the column can have, found \"three\"");
+  check("x,y\n1,2\n", ":1: expected columns x, y and z, found no z");
+  check("x,y,z,label\n1,2,3,-1\n", ":2: expected a number that the column can have, found \"-1\"");
+}
+
+TEST_CASE("Scans of a recording can be LAS, NumPy or text; poses.csv is none") {
+  const TemporaryFolder folder;
+  const LasParts parts{4, 6, "", 33, 1};
+  const auto write = [&](const std::string& kind, const std::string& content) {
+    write_text(folder / kind / ("0." + kind), content);
+    write_text(folder / kind / ("1." + kind), content);
+    write_text(folder / kind / "poses.csv",
+               "t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,1,0,0,0,0,0,1\n");
+  };
+  write("csv", "1,2,3\n4,5,6\n");
+  write("npy", npy_file("'<f4'", "(2, 4)", kTwoPoints));
+  write("las", las_file(parts, las_points(parts, 0)));
+  for (const auto& [kind, format] :
+       {std::pair("csv", ScanFormat::kCsv), {"npy", ScanFormat::kNpy}, {"las", ScanFormat::kLas}}) {
+    CAPTURE(kind);
+    const Recording recording(folder / kind);
+    CHECK(recording.format() == format);
+    CHECK(recording.size() == 2);
+    CHECK(recording.columns().time == (format == ScanFormat::kLas));
+    CHECK(recording.read_scan(1).size() == recording.point_count(1));
+  }
+  // Beside scans of other formats, a table is no scan.
+  write_text(folder / "csv" / "2.bin", std::string(16, '\0'));
+  write_text(folder / "csv" / "poses.csv", "t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n");
+  CHECK(Recording(folder / "csv").format() == ScanFormat::kBin);
+}
+
+TEST_CASE("A known format that is not read gets its name and the way to convert it") {
+  for (const std::string name : {"scan.laz", "scan.E57", "drive.pcap"}) {
+    const TemporaryFolder folder;
+    write_text(folder / name, "content");
+    const std::string expected =
+        fs::path(name).extension() == ".pcap" ? "sensor_msgs/PointCloud2" : "pdal translate";
+    const auto of_folder = message_of<IoError>([&] { Recording recording(folder.path()); });
+    CHECK_THAT(of_folder, ContainsSubstring(name + ": ") && ContainsSubstring(expected));
+    const auto of_file = message_of<IoError>([&] { Recording recording(folder / name); });
+    CHECK_THAT(of_file, StartsWith((folder / name).string()) && ContainsSubstring(expected));
+    CHECK_THAT(error(name, ""), ContainsSubstring(expected));
+  }
+}
+
+}  // namespace dynains
