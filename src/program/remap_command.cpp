@@ -99,6 +99,8 @@ std::optional<Recording> open_original(const RemapOptions& options, const Earlie
   original.poses.clear();
   original.pose_topic.clear();
   original.pose_frame.clear();
+  original.time_offset = 0.0;
+  original.convention.T_body_sensor.setIdentity();
   original.frame = PointFrame::kWorld;
   Recording recording(options.sequence.folder(), original);
   const std::vector<std::size_t> scans = scans_of(recording, run);

@@ -34,6 +34,7 @@ struct RunOptions {
   bool write_clean = false;
   bool force = false;
   bool resume = false;
+  bool accept_poses = false;
   bool quiet = false;
   RemoverOptions remover;
 };
