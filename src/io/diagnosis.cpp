@@ -8,6 +8,8 @@
 #include <optional>
 #include <utility>
 
+#include "finite_points.hpp"
+#include "pose_fit.hpp"
 #include "pose_shift.hpp"
 
 namespace dynains {
@@ -35,17 +37,6 @@ double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
-}
-
-PointBuffer finite_points(const RecordedScan& scan) {
-  PointBuffer points;
-  for (std::size_t i = 0; i < scan.size(); ++i) {
-    const float* p = scan.xyzi.data() + 4 * i;
-    const bool finite = std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
-    if (!finite || (p[0] == 0.0F && p[1] == 0.0F && p[2] == 0.0F)) continue;
-    points.push_back(p[0], p[1], p[2]);
-  }
-  return points;
 }
 
 Landmarks landmarks_of(const Recording& recording, std::size_t i, RecordedScan& scan) {

@@ -192,7 +192,8 @@ void Recording::prepare_deskewing() {
   const PoseConvention& convention = options_.convention;
   Trajectory motion;
   if (convention.shift == 0 && rows.times.size() > 1) {
-    motion.times = rows.times;
+    // A scan at time t has the pose at t + time_offset.
+    for (const double time : rows.times) motion.times.push_back(time - options_.time_offset);
     for (const Eigen::Isometry3d& row : rows.poses) {
       motion.poses.push_back(to_sensor_pose(convention, apply(convention, row, trajectory_.order)));
     }
@@ -428,7 +429,7 @@ void Recording::match_rows(const fs::path& file) {
 void Recording::match_times(const fs::path& file, const std::vector<double>& times) {
   std::size_t found = 0;
   for (const double time : times) {
-    matches_.push_back(match_time(trajectory_, time));
+    matches_.push_back(match_time(trajectory_, time + options_.time_offset, options_.pose_gap));
     if (matches_.back()) ++found;
   }
   if (2 * found >= times.size()) return;
@@ -436,7 +437,8 @@ void Recording::match_times(const fs::path& file, const std::vector<double>& tim
                  in_seconds(trajectory_.times.back()) + " for " + std::to_string(found) + " of " +
                  std::to_string(times.size()) + " scans, which are from " +
                  in_seconds(times.front()) + " to " + in_seconds(times.back()) +
-                 "; expected times of one clock, with gaps of at most 1 s");
+                 "; expected times of one clock, with gaps of at most " +
+                 in_seconds(options_.pose_gap));
 }
 
 void Recording::match_scans(const fs::path& file) {
@@ -459,13 +461,37 @@ void Recording::match_scans(const fs::path& file) {
     return;
   }
   match_rows(file);
-  notes_.push_back("poses belong to scans one by one");
+  note_rows(file);
   for (std::size_t i = 0; i < scans_.size() && !times; ++i) {
     const std::size_t row = matches_[i]->before;
     scans_[i].time = trajectory_.times.empty() ? kKittiPeriod * static_cast<double>(row)
                                                : trajectory_.times[row];
   }
   if (!times && trajectory_.times.empty()) notes_.push_back("no times: 0.1 s from scan to scan");
+  if (options_.time_offset != 0.0) shift_times(file);
+}
+
+/// Notes how rows without times belong to scans.
+void Recording::note_rows(const fs::path& file) {
+  const std::size_t rows = trajectory_.poses.size();
+  if (rows == scans_.size()) {
+    notes_.push_back("poses belong to scans one by one");
+    return;
+  }
+  notes_.push_back(std::to_string(rows) + " poses for " + std::to_string(scans_.size()) +
+                   " scans in " + shown(file, folder_) +
+                   ": row N belongs to the scan with number N, counted from 0");
+}
+
+/// Matches scans to the times of their rows plus the offset.
+void Recording::shift_times(const fs::path& file) {
+  if (trajectory_.times.empty()) {
+    fail(file, "has no times, which an offset of the time needs; expected rows with times");
+  }
+  std::vector<double> times;
+  for (const Scan& scan : scans_) times.push_back(scan.time);
+  matches_.clear();
+  match_times(file, times);
 }
 
 /// Sets the poses of scans and leaves out scans without one. `poses`: their file or folder.
@@ -517,9 +543,9 @@ Eigen::Isometry3d Recording::to_sensor_pose(const PoseConvention& convention,
   const bool is_matrix = trajectory_.order == QuaternionOrder::kNone;
   const bool is_camera = convention.frame == PoseFrame::kCamera ||
                          (convention.frame == PoseFrame::kAuto && has_calibration_ && is_matrix);
-  if (!is_camera) return pose;
+  if (!is_camera) return pose * convention.T_body_sensor;
   const Eigen::Isometry3d T_camera_sensor = has_calibration_ ? Tr_ : camera_axes();
-  return T_camera_sensor.inverse() * pose * T_camera_sensor;
+  return T_camera_sensor.inverse() * pose * T_camera_sensor * convention.T_body_sensor;
 }
 
 void Recording::find_columns() {

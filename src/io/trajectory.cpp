@@ -202,7 +202,8 @@ Trajectory read_trajectory(const std::filesystem::path& path) {
   return trajectory;
 }
 
-std::optional<TrajectoryMatch> match_time(const Trajectory& trajectory, double time) {
+std::optional<TrajectoryMatch> match_time(const Trajectory& trajectory, double time,
+                                          double longest_gap) {
   constexpr double kForgiven = 0.005;  // s, much less than one revolution of a sensor
   const std::vector<double>& times = trajectory.times;
   if (times.empty() || time < times.front() - kForgiven || time > times.back() + kForgiven) {
@@ -214,7 +215,7 @@ std::optional<TrajectoryMatch> match_time(const Trajectory& trajectory, double t
   if (after == 0 || times[after] == time) return TrajectoryMatch{after, after, 0.0};
   const double gap = times[after] - times[after - 1];
   const double share = (time - times[after - 1]) / gap;
-  if (gap > kLongestPoseGap) {
+  if (gap > longest_gap) {
     if (time - times[after - 1] <= kForgiven) return TrajectoryMatch{after - 1, after - 1, 0.0};
     if (times[after] - time <= kForgiven) return TrajectoryMatch{after, after, 0.0};
     return std::nullopt;

@@ -106,6 +106,9 @@ void check(const RecordingFlags& flags) {
     lone = remark_on_lone_scans(recording, 0, recording.size() - 1, RemoverConfig());
   }
   if (!lone || !d.sound()) std::cout << advice(d) << std::endl;
+  if (d.verdict == PoseVerdict::kOtherwise) {
+    std::cout << "    dynains run " << flags.as_given(d.readings.front().option) << " --out OUT\n";
+  }
   if (lone) std::cout << *lone << '.' << std::endl;
   if (lone || !d.sound()) throw Finding{};
 }

@@ -9,6 +9,7 @@ namespace dynains::program {
 // a folder in use, Interrupted after a signal, and other exceptions for failures. main() prints
 // them.
 void add_run_command(CLI::App& app);
+void add_remap_command(CLI::App& app);
 void add_check_command(CLI::App& app);
 void add_config_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);

@@ -12,6 +12,11 @@
 namespace dynains::program {
 namespace fs = std::filesystem;
 
+void refuse_class(std::uint32_t id, std::size_t point, const fs::path& file) {
+  throw IoError(file.string() + ": point " + std::to_string(point) + " has class " +
+                std::to_string(id) + "; expected 9 (static), 251 (moving) or 0 (not judged)");
+}
+
 LabelledSequence::LabelledSequence(Recording recording, const ScanWindow& window,
                                    std::vector<RunLabels> runs)
     : sequence_(std::move(recording)), runs_(std::move(runs)) {
@@ -71,11 +76,7 @@ void LabelledSequence::read_run(std::size_t run, const std::string& name) {
   const std::vector<std::uint32_t> labels = read_labels(file, truth_.size());
   if (run == 0) instances_.resize(labels.size());
   for (std::size_t p = 0; p < labels.size(); ++p) {
-    const std::uint32_t id = labels[p] & 0xffffU;
-    if (id != kRunStatic && id != kRunMoving && id != kRunNotJudged) {
-      throw IoError(file.string() + ": point " + std::to_string(p) + " has class " +
-                    std::to_string(id) + "; expected 9 (static), 251 (moving) or 0 (not judged)");
-    }
+    const std::uint32_t id = run_class(labels[p], p, file);
     if (id == kRunStatic) in_map_[p] = static_cast<std::uint8_t>(in_map_[p] | (1U << run));
     if (run == 0) instances_[p] = labels[p] >> 16U;
   }

@@ -19,6 +19,19 @@ inline constexpr std::uint32_t kRunNotJudged = 0;
 inline constexpr std::uint32_t kRunStatic = 9;
 inline constexpr std::uint32_t kRunMoving = 251;
 
+/// Throws IoError for a class id that `dynains run` does not write. `point`: index in `file`.
+[[noreturn]] void refuse_class(std::uint32_t id, std::size_t point,
+                               const std::filesystem::path& file);
+
+/// Class id of a label that `dynains run` wrote for `point` in `file`. Throws IoError for a label
+/// of another program.
+inline std::uint32_t run_class(std::uint32_t label, std::size_t point,
+                               const std::filesystem::path& file) {
+  const std::uint32_t id = label & 0xffffU;
+  if (id != kRunStatic && id != kRunMoving && id != kRunNotJudged) refuse_class(id, point, file);
+  return id;
+}
+
 /// Scan numbers, both inclusive; an empty end is the sequence's own.
 struct ScanWindow {
   std::optional<std::size_t> start;

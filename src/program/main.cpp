@@ -71,6 +71,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(0, 1);
   app.get_formatter()->column_width(36);
   add_run_command(app);
+  add_remap_command(app);
   add_check_command(app);
   add_config_command(app);
   add_simulate_command(app);

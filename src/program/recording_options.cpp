@@ -1,10 +1,29 @@
 #include "recording_options.hpp"
 
+#include <cmath>
 #include <iostream>
 
-namespace dynains::program {
+#include "dynains/errors.hpp"
+#include "dynains/io/extrinsic.hpp"
 
-RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what) {
+namespace dynains::program {
+namespace {
+
+constexpr const char* kGroup = "What the files of SEQ mean (dynains check SEQ finds out)";
+
+/// `word` as a shell reads it back.
+std::string quoted(const std::string& word) {
+  constexpr const char* kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./:@%";
+  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
+}
+
+}  // namespace
+
+RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what) : command_(&command) {
   command
       .add_option("SEQ", folder_,
                   what +
@@ -14,7 +33,6 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what) {
                       "or a folder with metadata.yaml)")
       ->required()
       ->type_name("");
-  const char* const kGroup = "What the files of SEQ mean (dynains check SEQ finds out)";
   command
       .add_option("--poses", poses_,
                   "file of poses: 12 numbers a row (KITTI), time x y z qx qy qz qw (TUM), or CSV "
@@ -61,6 +79,24 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what) {
                 "move points by the interpolated poses to the time of their scan; needs a time for "
                 "each point")
       ->group(kGroup);
+  command
+      .add_option("--extrinsic", extrinsic_,
+                  "pose of the lidar in the body whose poses are given (IMU, base_link, antenna): "
+                  "\"x y z qx qy qz qw\" in m, or a file with one pose [the poses are those of the "
+                  "lidar]")
+      ->type_name("POSE")
+      ->group(kGroup);
+  command
+      .add_option("--time-offset", time_offset_,
+                  "a scan at time t has the pose at t + S, for clocks that differ [0]")
+      ->type_name("S")
+      ->group(kGroup);
+  command
+      .add_option("--pose-gap", pose_gap_,
+                  "longest time between two poses of a file for interpolation [1]")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->type_name("S")
+      ->group(kGroup);
   const auto add_name = [&](const char* flag, std::string& value, const char* help) {
     command.add_option(flag, value, help)->type_name("NAME")->group(kGroup);
   };
@@ -91,7 +127,24 @@ RecordingOptions RecordingFlags::options() const {
   if (quaternion_ == "wxyz") convention.quaternion = QuaternionOrder::kWxyz;
   if (pose_frame_ == "lidar") convention.frame = PoseFrame::kLidar;
   if (pose_frame_ == "camera") convention.frame = PoseFrame::kCamera;
+  if (!extrinsic_.empty()) convention.T_body_sensor = read_extrinsic(extrinsic_);
+  if (!std::isfinite(time_offset_)) throw ConfigError("--time-offset: expected a finite number");
+  options.time_offset = time_offset_;
+  options.pose_gap = pose_gap_;
   return options;
+}
+
+std::string RecordingFlags::as_given(const std::string& further) const {
+  std::string text = quoted(folder_);
+  for (const CLI::Option* option : command_->get_options()) {
+    const std::string flag = option->get_name();
+    const bool is_replaced = (' ' + further + ' ').find(' ' + flag + ' ') != std::string::npos;
+    if (option->get_group() != kGroup || option->count() == 0 || is_replaced) continue;
+    text += ' ' + flag;
+    if (option->get_expected_max() == 0) continue;
+    for (const std::string& value : option->results()) text += ' ' + quoted(value);
+  }
+  return further.empty() ? text : text + ' ' + further;
 }
 
 Recording RecordingFlags::open(const std::filesystem::path& folder) const {
@@ -99,7 +152,7 @@ Recording RecordingFlags::open(const std::filesystem::path& folder) const {
   if (recording.missing_pose_count() > 0) {
     std::cerr << "dynains: warning: " << recording.missing_pose_count() << " of "
               << recording.scan_file_count() << " scans have no pose and are left out; see: dynains"
-              << " check " << folder.string() << std::endl;
+              << " check " << as_given() << std::endl;
   }
   if (recording.early_end()) {
     std::cerr << "dynains: warning: " << *recording.early_end() << "; "

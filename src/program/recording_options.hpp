@@ -16,7 +16,11 @@ class RecordingFlags {
   RecordingFlags(CLI::App& command, const std::string& what);
 
   const std::string& folder() const { return folder_; }
+  /// Throws ConfigError, and IoError for a file of --extrinsic.
   RecordingOptions options() const;
+  /// SEQ and the flags as a shell reads them, so that a message can propose a command. Flags in
+  /// `further` replace those that were given.
+  std::string as_given(const std::string& further = "") const;
   /// Whether a file is named that belongs to one recording only.
   bool names_files() const { return !poses_.empty() || !times_.empty(); }
   /// Throws IoError. Warns of scans that are left out for want of a pose, and of a log that ends
@@ -26,6 +30,7 @@ class RecordingFlags {
   Recording open(const std::filesystem::path& folder) const;
 
  private:
+  const CLI::App* command_;
   std::string folder_;
   std::string poses_;
   std::string times_;
@@ -37,6 +42,9 @@ class RecordingFlags {
   bool left_handed_ = false;
   int shift_ = 0;
   bool deskew_ = false;
+  std::string extrinsic_;
+  double time_offset_ = 0.0;           // s
+  double pose_gap_ = kLongestPoseGap;  // s
   std::string cloud_topic_;
   std::string pose_topic_;
   std::string pose_frame_id_;

@@ -80,15 +80,26 @@ void print_summary(const RunResults& results, const RunTiming& timing, const Run
             << "\nreport: " << (outputs.folder / "report.json").string() << std::endl;
 }
 
-void warn_of_poses(const std::string& sequence, const Agreement& agreement) {
-  std::cerr << "dynains: warning: only " << std::lround(100.0 * agreement.share)
-            << " % of the points of neighbouring scans agree under these poses; see: dynains check "
-            << sequence << std::endl;
+/// Throws ConfigError if the scans disagree with the poses beyond doubt, unless they are accepted.
+/// Warns if it is not beyond doubt.
+void judge_poses(const RunPlan& plan, const RunOptions& options, const Agreement& agreement) {
+  const std::string share = std::to_string(std::lround(100.0 * agreement.share)) +
+                            " % of the points of neighbouring scans agree under these poses";
+  if (!options.accept_poses) {
+    const Diagnosis diagnosis = diagnose(plan.sequence);
+    if (!diagnosis.sound() && diagnosis.verdict != PoseVerdict::kUnknown) {
+      throw ConfigError("only " + share + ". " + advice(diagnosis) + " See: dynains check " +
+                        options.sequence.as_given() +
+                        "; or run with these poses by --accept-poses");
+    }
+  }
+  std::cerr << "dynains: warning: only " << share << "; see: dynains check "
+            << options.sequence.as_given() << std::endl;
 }
 
 void warn_of_doubts(const RunPlan& plan, const RunOptions& options,
                     const PoseAgreement& agreement) {
-  if (agreement.doubtful()) warn_of_poses(options.sequence.folder(), agreement.as_given);
+  if (agreement.doubtful()) judge_poses(plan, options, agreement.as_given);
   const auto lone =
       remark_on_lone_scans(plan.sequence, plan.range.first, plan.range.last, plan.config);
   if (lone) std::cerr << "dynains: warning: " << *lone << std::endl;
@@ -201,6 +212,10 @@ void add_run_command(CLI::App& app) {
   command.add_flag("--write-clean", options->write_clean,
                    "also write every scan without its moving points, to the folder clean, in the "
                    "form it has in SEQ");
+  command.add_flag(
+      "--accept-poses", options->accept_poses,
+      "run even if the scans disagree with the poses, which else ends the command with "
+      "exit code 2 before anything is written");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   command.footer(
       "Writes labels/NNNNNN.label (uint32 a point: 251 moving, 9 static, 0 not judged; instance id "
@@ -208,7 +223,10 @@ void add_run_command(CLI::App& app) {
       "--errors`), "
       "static_map.ply,\ndynamic_points.ply, report.json and timing.csv. Each file appears whole or "
       "not at all; report.json says\n\"complete\": false until the end. Ctrl-C ends the run after "
-      "the scan at hand, writes what is there and exits\nwith 130.");
+      "the scan at hand, writes what is there and exits\nwith 130. Other exit codes: 0; 1 if a "
+      "file "
+      "cannot be read or written; 2 for wrong flags, refused outputs and\nposes that the scans "
+      "disagree with.");
   command.callback([options] { run(*options); });
 }
 

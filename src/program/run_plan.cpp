@@ -50,21 +50,7 @@ fs::path choose_map(const RunOptions& options, const DynaInsRemover::Config& con
   const fs::path out = whole_path(options.out);
   if (options.map.empty()) return config.build_map ? out / "static_map.ply" : fs::path();
   if (!config.build_map) throw ConfigError("--map needs --build-map true");
-  const fs::path map = whole_path(options.map);
-  if (!is_point_file(options.map) || !is_point_file(map)) {
-    throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
-  }
-  if (map == out / "dynamic_points.ply") {
-    throw ConfigError("--map " + options.map + ": the moving points go there");
-  }
-  const bool is_beside_results =
-      map.parent_path().parent_path() == out &&
-      (run_output_kind().folders.count(map.parent_path().filename().string()) > 0 ||
-       map.parent_path().filename() == kStagingFolder);
-  if (is_beside_results) {
-    throw ConfigError("--map " + options.map + ": other results go into that folder");
-  }
-  return map;
+  return map_path(options.map, out);
 }
 
 InputFiles inputs_of(const RunOptions& options, const Recording& sequence) {
@@ -95,6 +81,24 @@ bool is_whole(const RunPlan& plan, const OutputFolder& out) {
 }
 
 }  // namespace
+
+fs::path map_path(const std::string& name, const fs::path& out) {
+  fs::path map = whole_path(name);
+  if (!is_point_file(name) || !is_point_file(map)) {
+    throw ConfigError("--map " + name + ": expected a name that ends in .ply or .pcd");
+  }
+  if (map == out / "dynamic_points.ply") {
+    throw ConfigError("--map " + name + ": the moving points go there");
+  }
+  const bool is_beside_results =
+      map.parent_path().parent_path() == out &&
+      (run_output_kind().folders.count(map.parent_path().filename().string()) > 0 ||
+       map.parent_path().filename() == kStagingFolder);
+  if (is_beside_results) {
+    throw ConfigError("--map " + name + ": other results go into that folder");
+  }
+  return map;
+}
 
 RunPlan make_plan(const RunOptions& options) {
   const DynaInsRemover::Config config = options.remover.config();
@@ -158,10 +162,14 @@ void check_space(const RunPlan& plan) {
 
 OutsideMap::OutsideMap(const RunPlan& plan, bool may_replace) {
   if (!plan.outputs.has_outside_map()) return;
-  const fs::path& map = plan.outputs.map;
+  open(plan.outputs.map, plan.sequence, plan.range, plan.inputs, may_replace);
+}
+
+void OutsideMap::open(const fs::path& map, const Recording& recording, const ScanRange& range,
+                      const InputFiles& inputs, bool may_replace) {
   const fs::path folder = map.parent_path();
-  plan.inputs.refuse(map);
-  if (identity_of(folder) == identity_of(plan.sequence.scan_folder())) {
+  inputs.refuse(map);
+  if (identity_of(folder) == identity_of(recording.scan_folder())) {
     throw IoError(map.string() + ": the scans are there; choose another folder for --map");
   }
   if (fs::exists(fs::symlink_status(map)) && !may_replace) {
@@ -171,7 +179,7 @@ OutsideMap::OutsideMap(const RunPlan& plan, bool may_replace) {
   }
   lock_.emplace(folder, FolderLock::Mode::kShared);
   remove_leftovers(folder, [&](const std::string& name) { return name == map.filename(); });
-  writer_ = open_map(map, plan.sequence, plan.range);
+  writer_ = open_map(map, recording, range);
   if (count_writers(map) > 1) {
     throw UsageError(map.string() + ": is being written by another run");
   }

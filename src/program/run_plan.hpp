@@ -34,6 +34,7 @@ struct RunOptions {
   bool write_clean = false;
   bool force = false;
   bool resume = false;
+  bool accept_poses = false;
   bool quiet = false;
   RemoverOptions remover;
 };
@@ -49,6 +50,11 @@ struct RunPlan {
   nlohmann::ordered_json configuration;  ///< parameter name -> value
   nlohmann::ordered_json request;        ///< see describe_request()
 };
+
+/// Path of the file that a flag --map names, links followed. `out`: folder of the results, by
+/// whole_path(). Throws ConfigError unless the name ends in .ply or .pcd and no other result goes
+/// there.
+std::filesystem::path map_path(const std::string& name, const std::filesystem::path& out);
 
 /// Opens the recording and checks everything but the points. Throws ConfigError, IoError,
 /// PoseError.
@@ -73,10 +79,18 @@ class OutsideMap {
   /// Throws IoError if the map cannot be written or is in the way, UsageError if another run writes
   /// it or has its folder.
   OutsideMap(const RunPlan& plan, bool may_replace);
+  /// For a map of these scans; `inputs` are never replaced.
+  OutsideMap(const std::filesystem::path& map, const Recording& recording, const ScanRange& range,
+             const InputFiles& inputs, bool may_replace) {
+    open(map, recording, range, inputs, may_replace);
+  }
 
   std::unique_ptr<PointFileWriter> take_writer() { return std::move(writer_); }
 
  private:
+  void open(const std::filesystem::path& map, const Recording& recording, const ScanRange& range,
+            const InputFiles& inputs, bool may_replace);
+
   std::optional<FolderLock> lock_;
   std::unique_ptr<PointFileWriter> writer_;
 };

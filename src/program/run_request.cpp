@@ -26,17 +26,6 @@ class Fingerprint {
   std::uint64_t value_ = 0xCBF29CE484222325U;
 };
 
-std::string fingerprint(const Recording& recording, const ScanRange& range) {
-  Fingerprint result;
-  for (std::size_t i = range.first; i <= range.last; ++i) {
-    result.add(recording.name(i));
-    result.add(recording.time(i));
-    const Eigen::Matrix4d pose = recording.T_world_sensor(i).matrix();
-    for (Eigen::Index k = 0; k < pose.size(); ++k) result.add(pose(k));
-  }
-  return result.text();
-}
-
 using Json = nlohmann::ordered_json;
 
 /// Which fields of two requests differ, the first few with both values; empty if none does.
@@ -70,13 +59,24 @@ std::string differences(const Json& earlier, const Json& now) {
 
 }  // namespace
 
+std::string pose_fingerprint(const Recording& recording, const ScanRange& range) {
+  Fingerprint result;
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    result.add(recording.name(i));
+    result.add(recording.time(i));
+    const Eigen::Matrix4d pose = recording.T_world_sensor(i).matrix();
+    for (Eigen::Index k = 0; k < pose.size(); ++k) result.add(pose(k));
+  }
+  return result.text();
+}
+
 nlohmann::ordered_json describe_request(const Recording& recording, const ScanRange& range,
                                         const RunOutputs& outputs,
                                         const nlohmann::ordered_json& configuration) {
   return {{"version", kVersionString},
           {"first_scan", recording.name(range.first)},
           {"last_scan", recording.name(range.last)},
-          {kPosesAndTimes, fingerprint(recording, range)},
+          {kPosesAndTimes, pose_fingerprint(recording, range)},
           {"points_in_world", recording.frame() == PointFrame::kWorld},
           {"deskew", recording.is_deskewed()},
           {"map", outputs.map_name()},

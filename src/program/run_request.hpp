@@ -17,6 +17,9 @@ nlohmann::ordered_json describe_request(const Recording& recording, const ScanRa
                                         const RunOutputs& outputs,
                                         const nlohmann::ordered_json& configuration);
 
+/// Fingerprint of the names, poses and times of the scans, as in describe_request().
+std::string pose_fingerprint(const Recording& recording, const ScanRange& range);
+
 /// Which fields of `request` an earlier run with this report had otherwise, the first few with both
 /// values; empty if none differs.
 std::string request_differences(const nlohmann::ordered_json& report,

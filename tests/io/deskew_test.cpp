@@ -179,6 +179,30 @@ TEST_CASE("Points at the origin and points without a finite time keep their plac
   CHECK(point_of(scan, 2).x() == Approx(6.0F).margin(1e-4));
 }
 
+TEST_CASE("De-skewing follows the time offset between scans and poses") {
+  const TemporaryFolder folder;
+  PointColumns columns;
+  columns.time = true;
+  for (int i = 0; i < 2; ++i) {
+    PointFileWriter writer(folder / (std::to_string(i) + ".ply"), columns);
+    for (const double time : {0.0, 0.05}) {
+      FilePoint point;
+      point.position = {5, 0, 0};
+      point.time = time;
+      writer.add(point);
+    }
+    writer.commit();
+  }
+  // The clock of the poses is 40 s ahead; the sensor moves at 20 m/s in the first 0.1 s.
+  write_text(folder / "times.txt", "0\n0.1\n");
+  write_text(folder / "poses.tum", "40 0 0 0 0 0 0 1\n40.1 2 0 0 0 0 0 1\n40.2 2 0 0 0 0 0 1\n");
+  RecordingOptions options = with_deskewing();
+  options.time_offset = 40.0;
+  const RecordedScan scan = Recording(folder.path(), options).read_scan(0);
+  CHECK(point_of(scan, 0).x() == Approx(5.0F).margin(1e-4));
+  CHECK(point_of(scan, 1).x() == Approx(6.0F).margin(1e-4));
+}
+
 TEST_CASE("De-skewing that is not possible is an error with its reason") {
   const TemporaryFolder folder;
   write_drive(folder / "other_clock", [](double, double offset) { return 100.0 + offset; });

@@ -190,20 +190,57 @@ TEST_CASE("check and run report a problem in one sentence") {
 
   const Outcome wrong = start({"check", seq});
   CHECK(wrong.code == 1);
-  CHECK_THAT(wrong.out, ContainsSubstring("pass --invert-poses.\n"));
+  CHECK_THAT(wrong.out, ContainsSubstring("pass --invert-poses.\n    dynains run " + seq +
+                                          " --invert-poses --out OUT\n"));
   CHECK(wrong.err.empty());
   const Outcome right = start({"check", seq, "--invert-poses"});
   CHECK(right.code == 0);
   CHECK_THAT(right.out, ContainsSubstring("agree as they are"));
 
   const TemporaryFolder out;
-  const Outcome warned = start({"run", seq, "-o", out / "wrong", "-q"});
+  const Outcome stopped = start({"run", seq, "-o", out / "wrong", "-q"});
+  CHECK(stopped.code == 2);
+  CHECK_THAT(stopped.err, StartsWith("dynains: error: only ") &&
+                              ContainsSubstring("pass --invert-poses. See: dynains check " + seq) &&
+                              ContainsSubstring("--accept-poses"));
+  CHECK_FALSE(fs::exists(out / "wrong"));
+  const Outcome warned = start({"run", seq, "-o", out / "wrong", "-q", "--accept-poses"});
   CHECK(warned.code == 0);
   CHECK_THAT(warned.err, StartsWith("dynains: warning: only ") &&
                              ContainsSubstring("see: dynains check " + seq));
   const Outcome fine = start({"run", seq, "-o", out / "right", "-q", "--invert-poses"});
   CHECK(fine.code == 0);
   CHECK(fine.err.empty());
+}
+
+TEST_CASE("Proposed commands repeat the flags of the user, as a shell reads them") {
+  const Street street;
+  Poses millimetres;
+  for (const Eigen::Isometry3d& pose : street.poses()) {
+    millimetres.push_back(scaled(pose, 1000.0).inverse());
+  }
+  const std::string poses = street.path() / "a user's poses.txt";
+  write_poses(poses, millimetres);
+  const std::string seq = street.path();
+  const Outcome outcome = start({"check", seq, "--poses", poses, "--invert-poses", "--pose-shift",
+                                 "0", "--extrinsic", "0 0 0 0 0 0 1"});
+  CHECK(outcome.code == 1);
+  CHECK_THAT(outcome.out, ContainsSubstring("\n    dynains run " + seq + " --poses '" + seq +
+                                            "/a user'\\''s poses.txt' --invert-poses"));
+  CHECK_THAT(outcome.out,
+             ContainsSubstring(" --pose-shift 0 --extrinsic '0 0 0 0 0 0 1' --pose-units mm "
+                               "--out OUT\n"));
+}
+
+TEST_CASE("check tells if there are more poses than scans") {
+  const Street street;
+  Poses poses = street.poses();
+  poses.resize(30, poses.back());
+  write_poses(street.path() / "poses.txt", poses);
+  const Outcome outcome = start({"check", street.path()});
+  CHECK(outcome.code == 0);
+  CHECK_THAT(outcome.out, ContainsSubstring(" 30 poses for 24 scans in poses.txt: row N belongs to "
+                                            "the scan with number N, counted from 0\n"));
 }
 
 TEST_CASE("check verifies the size of every scan file") {

@@ -24,10 +24,12 @@ struct PoseConvention {
   /// Order of the quaternions in the file; kNone: the order that its format defines.
   QuaternionOrder quaternion = QuaternionOrder::kNone;
   int shift = 0;  ///< scan i has the pose of scan i + shift
+  /// Extrinsic calibration: pose of the sensor in the body whose poses the file has, m.
+  Eigen::Isometry3d T_body_sensor = Eigen::Isometry3d::Identity();
 };
 
-/// Applies a convention, except `frame` and `shift`, to a row. `read_as`: order in which the
-/// quaternion of the row was read.
+/// Applies a convention, except `frame`, `shift` and `T_body_sensor`, to a row. `read_as`: order in
+/// which the quaternion of the row was read.
 inline Eigen::Isometry3d apply(const PoseConvention& convention, const Eigen::Isometry3d& row,
                                QuaternionOrder read_as) {
   Eigen::Isometry3d pose = row;

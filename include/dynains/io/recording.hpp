@@ -29,9 +29,11 @@ struct RecordingOptions {
   std::filesystem::path times;  ///< file with one time per scan, s; empty: search the recording
   PointFrame frame = PointFrame::kAuto;
   PoseConvention convention;
-  std::string cloud_topic;  ///< for logs; empty: the only topic of clouds
-  std::string pose_topic;   ///< for logs; empty: the only topic of poses
-  std::string pose_frame;   ///< for logs: fixed frame of transforms; empty: root of their tree
+  double time_offset = 0.0;           ///< s; a scan at time t has the pose at t + time_offset
+  double pose_gap = kLongestPoseGap;  ///< s, longest interval between poses for interpolation
+  std::string cloud_topic;            ///< for logs; empty: the only topic of clouds
+  std::string pose_topic;             ///< for logs; empty: the only topic of poses
+  std::string pose_frame;  ///< for logs: fixed frame of transforms; empty: root of their tree
   /// Whether points are moved to the sensor frame at the time of their scan. Needs a time for each
   /// point, and points in the sensor frame.
   bool deskew = false;
@@ -91,8 +93,9 @@ struct ScanAddress;
 ///
 /// calib.txt is in the folder or beside the file of poses. An unreadable calib.txt is an error only
 /// if the poses are those of a camera. Rows without times are assigned to scans by order, or by the
-/// number of the scan. Rows with times are interpolated at the times of the scans. Scans without a
-/// pose are excluded and listed in `notes()`; more than half of them without a pose are an error.
+/// number of the scan. Rows with times are interpolated at the times of the scans plus
+/// `options.time_offset`. Scans without a pose are excluded and listed in `notes()`; more than half
+/// of them without a pose are an error.
 ///
 /// Poses of a log: the first available of `options.poses`; the topic `options.pose_topic`, or the
 /// only topic of poses; the transforms between `options.pose_frame` and the frame of the clouds. If
@@ -190,6 +193,8 @@ class Recording {
   std::optional<std::vector<double>> times_of_names() const;
   void match_scans(const std::filesystem::path& poses_file);
   void match_rows(const std::filesystem::path& poses_file);
+  void note_rows(const std::filesystem::path& poses_file);
+  void shift_times(const std::filesystem::path& poses_file);
   void match_times(const std::filesystem::path& poses_file, const std::vector<double>& times);
   void place_scans(const std::filesystem::path& poses);
   void find_columns();

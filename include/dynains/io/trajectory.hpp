@@ -41,12 +41,13 @@ struct TrajectoryMatch {
   double share = 0.0;
 };
 
-/// Longest interval between two poses for interpolation, s.
+/// Default of the longest interval between two poses for interpolation, s.
 inline constexpr double kLongestPoseGap = 1.0;
 
 /// Rows around `time` (s). Empty if the time is more than 5 ms outside of the trajectory, or within
-/// an interval longer than kLongestPoseGap.
-std::optional<TrajectoryMatch> match_time(const Trajectory& trajectory, double time);
+/// an interval longer than `longest_gap` (s).
+std::optional<TrajectoryMatch> match_time(const Trajectory& trajectory, double time,
+                                          double longest_gap = kLongestPoseGap);
 
 /// Interpolates linearly in translation and by slerp in rotation. `share`: [0, 1]; 0 gives exactly
 /// `a`, 1 exactly `b`.

@@ -1,0 +1,18 @@
+// Extrinsic calibration of a sensor, as text or in a file.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <string>
+
+namespace dynains {
+
+/// Pose of the sensor in the body, T_body_sensor, m. `text` is `x y z qx qy qz qw`, with blanks or
+/// commas between the numbers, or the path of a file with one pose in a form of read_trajectory().
+/// Throws ConfigError for seven values that are no pose, IoError for a file that has no pose or
+/// more than one.
+Eigen::Isometry3d read_extrinsic(const std::string& text);
+
+/// `x y z qx qy qz qw` of a pose, with six decimals.
+std::string extrinsic_text(const Eigen::Isometry3d& T_body_sensor);
+
+}  // namespace dynains

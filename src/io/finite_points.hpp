@@ -1,0 +1,24 @@
+// Measured points of a scan.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+
+#include "dynains/io/recording.hpp"
+#include "dynains/points.hpp"
+
+namespace dynains {
+
+/// The points with finite coordinates that are not all zero, m, sensor frame.
+inline PointBuffer finite_points(const RecordedScan& scan) {
+  PointBuffer points;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const float* p = scan.xyzi.data() + 4 * i;
+    const bool finite = std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
+    if (!finite || (p[0] == 0.0F && p[1] == 0.0F && p[2] == 0.0F)) continue;
+    points.push_back(p[0], p[1], p[2]);
+  }
+  return points;
+}
+
+}  // namespace dynains

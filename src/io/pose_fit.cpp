@@ -1,0 +1,249 @@
+#include "pose_fit.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <utility>
+
+#include "finite_points.hpp"
+#include "scan_registration.hpp"
+
+namespace dynains {
+namespace {
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+constexpr double kLever = 10.0;  // m, distance of the points at which a rotation is judged
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double angle_of(const Eigen::Matrix3d& R) { return std::abs(Eigen::AngleAxisd(R).angle()); }
+
+/// Reads scans on demand and keeps those of one chain.
+class ChainScans {
+ public:
+  explicit ChainScans(const Recording& recording) : recording_(recording) {}
+
+  const RegistrationScan& get(std::size_t i) {
+    std::unique_ptr<RegistrationScan>& entry = scans_[i];
+    if (entry == nullptr) {
+      recording_.read_scan(i, scan_);
+      entry = std::make_unique<RegistrationScan>(finite_points(scan_));
+    }
+    return *entry;
+  }
+  void clear() { scans_.clear(); }
+
+ private:
+  const Recording& recording_;
+  RecordedScan scan_;
+  std::map<std::size_t, std::unique_ptr<RegistrationScan>> scans_;
+};
+
+/// Guesses of the motion to the next scan: as given, none, the given distance in each direction,
+/// and the motion at another place.
+std::vector<Eigen::Isometry3d> first_guesses(const Eigen::Isometry3d& given,
+                                             const std::optional<Eigen::Isometry3d>& elsewhere) {
+  constexpr double kFarthest = 6.0;  // m
+  std::vector<Eigen::Isometry3d> guesses = {Eigen::Isometry3d::Identity()};
+  const double way = given.translation().norm();
+  if (way < kFarthest) {
+    guesses.push_back(given);
+    for (const Eigen::Vector2d& direction : {Eigen::Vector2d(1, 0), Eigen::Vector2d(-1, 0),
+                                             Eigen::Vector2d(0, 1), Eigen::Vector2d(0, -1)}) {
+      if (way < 0.3) continue;
+      guesses.push_back(Eigen::Isometry3d::Identity());
+      guesses.back().translation().head<2>() = way * direction;
+    }
+  }
+  if (elsewhere) guesses.push_back(*elsewhere);
+  return guesses;
+}
+
+bool is_certain(const std::optional<Registration>& registration) {
+  constexpr double kLeastScore = 0.45;
+  constexpr double kUncertain = 0.06;  // m
+  return registration && registration->score > kLeastScore &&
+         registration->uncertainty < kUncertain;
+}
+
+/// Residual of a motion: rotation times kLever, and translation, m.
+Vector6 residual(const Eigen::Isometry3d& body, const Eigen::Isometry3d& sensor,
+                 const Eigen::Isometry3d& X) {
+  const Eigen::Isometry3d E = (body * X).inverse() * X * sensor;
+  const Eigen::AngleAxisd rotation(E.linear());
+  Vector6 r;
+  r << kLever * rotation.angle() * rotation.axis(), E.translation();
+  return r;
+}
+
+struct Motions {
+  Eigen::Isometry3d body;
+  Eigen::Isometry3d sensor;
+};
+
+double robust_cost(const std::vector<Motions>& motions, const Eigen::Isometry3d& X) {
+  double cost = 0.0;
+  for (const Motions& m : motions)
+    cost += std::log1p(residual(m.body, m.sensor, X).squaredNorm() / 0.01);
+  return cost;
+}
+
+/// Gauss-Newton with Cauchy weights and a weak prior that the lever arm is 0.
+Eigen::Isometry3d refine(const std::vector<Motions>& motions, Eigen::Isometry3d X) {
+  constexpr double kScale = 0.1;   // m, of a residual
+  constexpr double kPrior = 0.02;  // m per m of the lever arm
+  constexpr double kStep = 1e-6;
+  for (int k = 0; k < 25; ++k) {
+    Matrix6 H = 1e-6 * Matrix6::Identity();
+    Vector6 g = Vector6::Zero();
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      H(3 + axis, 3 + axis) += kPrior * kPrior;
+      g[3 + axis] += kPrior * kPrior * X.translation()[axis];
+    }
+    for (const Motions& m : motions) {
+      const Vector6 r = residual(m.body, m.sensor, X);
+      Matrix6 J;
+      for (Eigen::Index j = 0; j < 6; ++j) {
+        Vector6 change = Vector6::Zero();
+        change[j] = kStep;
+        Eigen::Isometry3d moved = X;
+        const Eigen::Isometry3d T = motion_of(change);
+        moved.linear() = (T.linear() * X.linear()).eval();
+        moved.translation() += T.translation();
+        J.col(j) = (residual(m.body, m.sensor, moved) - r) / kStep;
+      }
+      const double weight = 1.0 / (1.0 + r.squaredNorm() / (kScale * kScale));
+      H += weight * J.transpose() * J;
+      g += weight * J.transpose() * r;
+    }
+    const Vector6 change = -H.ldlt().solve(g);
+    if (!change.allFinite()) break;
+    const Eigen::Isometry3d T = motion_of(change);
+    X.linear() = (T.linear() * X.linear()).eval();
+    X.translation() += T.translation();
+    if (change.norm() < 1e-7) break;
+  }
+  X.linear() = Eigen::Quaterniond(X.linear()).normalized().toRotationMatrix();
+  return X;
+}
+
+/// The 24 rotations that map axes to axes.
+std::vector<Eigen::Matrix3d> axis_rotations() {
+  std::vector<Eigen::Matrix3d> rotations;
+  for (int x = 0; x < 3; ++x) {
+    for (int y = 0; y < 3; ++y) {
+      if (x == y) continue;
+      for (const double x_sign : {1.0, -1.0}) {
+        for (const double y_sign : {1.0, -1.0}) {
+          Eigen::Matrix3d R;
+          R.col(0) = x_sign * Eigen::Vector3d::Unit(x);
+          R.col(1) = y_sign * Eigen::Vector3d::Unit(y);
+          R.col(2) = R.col(0).cross(R.col(1));
+          rotations.push_back(R);
+        }
+      }
+    }
+  }
+  std::stable_sort(rotations.begin(), rotations.end(),
+                   [](const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
+                     return angle_of(a) < angle_of(b) - 1e-6;
+                   });
+  return rotations;
+}
+
+}  // namespace
+
+std::vector<RegisteredMotion> register_motions(const Recording& recording) {
+  constexpr std::size_t kChains = 12;
+  constexpr std::size_t kLongest = 16;  // scans
+  constexpr double kFar = 3.0;          // m
+  constexpr double kTurned = 0.25;      // rad
+  std::vector<RegisteredMotion> motions;
+  if (recording.size() < 2) return motions;
+  const std::size_t starts = recording.size() - 1;
+  const std::size_t chains = std::min(kChains, starts);
+  ChainScans scans(recording);
+  std::optional<Eigen::Isometry3d> elsewhere;
+  for (std::size_t chain = 0; chain < chains; ++chain) {
+    scans.clear();
+    const std::size_t first = chains == 1 ? 0 : chain * (starts - 1) / (chains - 1);
+    const Eigen::Isometry3d given =
+        recording.T_world_sensor(first).inverse() * recording.T_world_sensor(first + 1);
+    std::vector<Eigen::Isometry3d> guesses = first_guesses(given, elsewhere);
+    for (std::size_t step = 1; step <= kLongest && first + step < recording.size(); step *= 2) {
+      const auto found = register_scans(scans.get(first), scans.get(first + step), guesses);
+      if (!is_certain(found)) break;
+      motions.push_back({chain, first, first + step, found->T_a_b});
+      if (step == 1) elsewhere = found->T_a_b;
+      if (found->T_a_b.translation().norm() > kFar || angle_of(found->T_a_b.linear()) > kTurned) {
+        break;
+      }
+      guesses = {found->T_a_b * found->T_a_b};
+    }
+  }
+  return motions;
+}
+
+MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
+                         const Eigen::Isometry3d& T_body_sensor, bool only_steps) {
+  std::vector<double> translations;
+  std::vector<double> rotations;
+  std::vector<double> both;
+  for (const RegisteredMotion& motion : motions) {
+    if (only_steps && motion.second != motion.first + 1) continue;
+    const auto T_body = body(motion);
+    if (!T_body) continue;
+    const Vector6 r = residual(*T_body, motion.T_first_second, T_body_sensor);
+    translations.push_back(r.tail<3>().norm());
+    rotations.push_back(r.head<3>().norm() / kLever);
+    both.push_back(r.norm());
+  }
+  const std::size_t pairs = both.size();
+  return {median(std::move(translations)), median(std::move(rotations)), median(std::move(both)),
+          pairs};
+}
+
+std::optional<Eigen::Isometry3d> fit_extrinsic(const std::vector<RegisteredMotion>& registered,
+                                               const BodyMotion& body) {
+  constexpr std::size_t kFewest = 4;
+  constexpr double kClearly = 0.9;  // ratio of costs
+  std::vector<Motions> motions;
+  for (const RegisteredMotion& motion : registered) {
+    const auto T_body = body(motion);
+    if (T_body) motions.push_back({*T_body, motion.T_first_second});
+  }
+  if (motions.size() < kFewest) return std::nullopt;
+  std::optional<Eigen::Isometry3d> best;
+  double least = 0.0;
+  for (const Eigen::Matrix3d& R : axis_rotations()) {
+    Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+    X.linear() = R;
+    X = refine(motions, X);
+    const double cost = robust_cost(motions, X);
+    // Of equal results, that with the smallest first rotation counts.
+    if (best && !(cost < kClearly * least)) continue;
+    best = X;
+    least = cost;
+  }
+  return best;
+}
+
+std::vector<RegisteredMotion> half_of(const std::vector<RegisteredMotion>& motions,
+                                      std::size_t which) {
+  std::vector<RegisteredMotion> half;
+  for (const RegisteredMotion& motion : motions) {
+    if (motion.chain % 2 == which) half.push_back(motion);
+  }
+  return half;
+}
+
+}  // namespace dynains

@@ -1,0 +1,51 @@
+// Comparison of poses with the motions that scans themselves show.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "dynains/io/recording.hpp"
+
+namespace dynains {
+
+/// Motion of the sensor between two scans, by their registration.
+struct RegisteredMotion {
+  std::size_t chain;   ///< motions of one chain begin at one scan
+  std::size_t first;   ///< scan
+  std::size_t second;  ///< scan
+  Eigen::Isometry3d T_first_second;
+};
+
+/// Registers pairs of scans at some places of a recording, neighbours and scans farther apart. The
+/// given poses are one of several first guesses. Pairs that determine no motion are left out.
+/// Throws IoError.
+std::vector<RegisteredMotion> register_motions(const Recording& recording);
+
+/// Motion of the body between two scans under some reading of the poses; empty without poses.
+using BodyMotion = std::function<std::optional<Eigen::Isometry3d>(const RegisteredMotion&)>;
+
+/// Difference of poses and registered motions: medians over pairs.
+struct MotionError {
+  double translation = 0.0;  ///< m
+  double rotation = 0.0;     ///< rad
+  double at_points = 0.0;    ///< m, of both, for points 10 m from the sensor
+  std::size_t pairs = 0;
+};
+
+/// `T_body_sensor`: of the body that moves. With `only_steps`, of neighbouring scans.
+MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
+                         const Eigen::Isometry3d& T_body_sensor, bool only_steps = false);
+
+/// Hand-eye calibration: T_body_sensor for which the motions of the body and of the sensor agree
+/// best. Directions that the motions do not determine stay 0. Empty for fewer than 4 motions.
+std::optional<Eigen::Isometry3d> fit_extrinsic(const std::vector<RegisteredMotion>& motions,
+                                               const BodyMotion& body);
+
+/// The motions of even (0) or odd (1) chains.
+std::vector<RegisteredMotion> half_of(const std::vector<RegisteredMotion>& motions,
+                                      std::size_t which);
+
+}  // namespace dynains

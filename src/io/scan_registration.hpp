@@ -1,0 +1,54 @@
+// Registration of two scans by planes in the cells of a grid.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <unordered_map>
+#include <vector>
+
+#include "dynains/points.hpp"
+
+namespace dynains {
+
+/// One scan as a reference and as a source of a registration.
+class RegistrationScan {
+ public:
+  static constexpr std::size_t kLevels = 3;
+
+  /// Plane, or pole, through the points of a cell.
+  struct Cell {
+    Eigen::Vector3d mean;        ///< m, sensor frame
+    Eigen::Matrix3d constraint;  ///< projector on the directions that the cell determines
+  };
+
+  /// `points`: m, sensor frame, finite.
+  explicit RegistrationScan(PointsView points);
+
+  /// One point for each voxel of 0.4 m, 2 to 60 m from the sensor.
+  const std::vector<Eigen::Vector3d>& points() const { return points_; }
+  /// The cell around a point; null if it has too few points or no plane.
+  const Cell* find(std::size_t level, const Eigen::Vector3d& point) const;
+
+ private:
+  std::vector<Eigen::Vector3d> points_;
+  std::array<std::unordered_map<std::uint64_t, Cell>, kLevels> cells_;
+};
+
+struct Registration {
+  Eigen::Isometry3d T_a_b = Eigen::Isometry3d::Identity();
+  double score = 0.0;        ///< mean weight of the points of b, [0, 1]; higher is better
+  double uncertainty = 0.0;  ///< m, of the translation along its least certain direction
+};
+
+/// Registers `b` to `a` from several guesses of T_a_b; the best result counts. Empty if too few
+/// points of `b` meet a cell of `a`.
+std::optional<Registration> register_scans(const RegistrationScan& a, const RegistrationScan& b,
+                                           const std::vector<Eigen::Isometry3d>& guesses);
+
+/// Rigid motion of a rotation vector (rad) and a translation (m).
+Eigen::Isometry3d motion_of(const Eigen::Matrix<double, 6, 1>& rotation_and_translation);
+
+}  // namespace dynains

@@ -1,0 +1,273 @@
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <iomanip>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "command.hpp"
+#include "dynains/pose.hpp"
+#include "dynains/static_map_accumulator.hpp"
+#include "finished_run.hpp"
+#include "interrupt.hpp"
+#include "json_file.hpp"
+#include "kept_points.hpp"
+#include "naming_scan.hpp"
+#include "output_folder.hpp"
+#include "progress.hpp"
+#include "recording_options.hpp"
+#include "run_plan.hpp"
+#include "run_request.hpp"
+
+namespace dynains::program {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// Name of the map in the folder of the run.
+constexpr const char* kRemappedMap = "static_map_remapped.ply";
+
+/// Flags of `dynains remap`.
+struct RemapOptions {
+  explicit RemapOptions(CLI::App& command) : sequence(command, "recording of the run") {}
+
+  RecordingFlags sequence;
+  std::string run;
+  std::string map;
+  std::optional<double> map_voxel;  // m
+  bool force = false;
+  bool quiet = false;
+};
+
+/// The finished run whose labels are used.
+struct EarlierRun {
+  fs::path report_file;
+  Json report;
+  std::set<std::string> scans;
+  bool has_points_in_world = false;
+  double map_voxel = 0.0;  // m
+};
+
+EarlierRun read_run(const OutputFolder& out) {
+  EarlierRun run;
+  run.report_file = out.path() / out.kind().marker;
+  if (!out.has_results()) {
+    throw IoError(run.report_file.string() + ": not found; expected the results of dynains run");
+  }
+  check_run_is_finished(out.path());
+  run.report = out.marker();
+  run.scans = out.listing().scans;
+  run.has_points_in_world =
+      required_json_field<bool>(run.report_file, run.report, "/request/points_in_world");
+  run.map_voxel =
+      required_json_field<double>(run.report_file, run.report, "/configuration/map_voxel");
+  return run;
+}
+
+/// The recording with the poses for the new map.
+Recording open_corrected(const RemapOptions& options, const EarlierRun& run) {
+  RecordingOptions corrected = options.sequence.options();
+  corrected.frame = run.has_points_in_world ? PointFrame::kWorld : PointFrame::kSensor;
+  return Recording(options.sequence.folder(), corrected);
+}
+
+/// Indices of the scans of the run. Throws IoError if the recording lacks one.
+std::vector<std::size_t> scans_of(const Recording& recording, const EarlierRun& run) {
+  std::vector<std::size_t> scans;
+  std::set<std::string> missing = run.scans;
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    if (missing.erase(recording.name(i)) > 0) scans.push_back(i);
+  }
+  if (missing.empty()) return scans;
+  throw IoError(recording.folder().string() + ": has no pose or no scan for " +
+                std::to_string(missing.size()) + " of " + std::to_string(run.scans.size()) +
+                " scans of the run, " + *missing.begin() +
+                " first; expected the recording of the run, and a pose for each of its scans");
+}
+
+/// The recording as the run read it, if its points are in the frame of the world: the poses of the
+/// run lead back to the frame of the sensor. Empty for points in the frame of the sensor.
+std::optional<Recording> open_original(const RemapOptions& options, const EarlierRun& run) {
+  if (!run.has_points_in_world) return std::nullopt;
+  RecordingOptions original = options.sequence.options();
+  original.poses.clear();
+  original.pose_topic.clear();
+  original.pose_frame.clear();
+  original.time_offset = 0.0;
+  original.convention.T_body_sensor.setIdentity();
+  original.frame = PointFrame::kWorld;
+  Recording recording(options.sequence.folder(), original);
+  const std::vector<std::size_t> scans = scans_of(recording, run);
+  const std::string now = pose_fingerprint(recording, {scans.front(), scans.back()});
+  if (now !=
+      required_json_field<std::string>(run.report_file, run.report, "/request/poses_and_times")) {
+    throw IoError(recording.folder().string() +
+                  ": points are in the frame of the world, and the poses of the recording are not "
+                  "those of the run, which lead back to the frame of the sensor");
+  }
+  return recording;
+}
+
+/// Builds the map of the run's verdicts under the poses of `corrected`. Throws Interrupted.
+StaticMapAccumulator build_map(const Recording& corrected, const Recording& original,
+                               const std::vector<std::size_t>& scans, const fs::path& labels,
+                               double voxel, bool quiet) {
+  StaticMapAccumulator::Config config;
+  config.map_voxel = voxel;
+  StaticMapAccumulator map(config);
+  KeptPoints kept(original, labels, scans);
+  Progress progress(scans.size(), "scans", quiet);
+  for (std::size_t k = 0; k < scans.size(); ++k) {
+    if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
+    const Eigen::Isometry3d& pose = corrected.T_world_sensor(scans[k]);
+    map.insert(kept.next(), {}, orthonormalized(pose));
+    progress.update(k + 1);
+  }
+  return map;
+}
+
+/// Writes the map and returns its path. In the folder of the run, the report lists the file before
+/// it appears, and describes it afterwards.
+class NewMap {
+ public:
+  NewMap(const RemapOptions& options, OutputFolder& out, const Recording& recording,
+         const ScanRange& range, const InputFiles& inputs)
+      : out_(out) {
+    const fs::path folder = whole_path(out.path());
+    path_ = options.map.empty() ? folder / kRemappedMap : map_path(options.map, folder);
+    is_inside_ = path_.parent_path() == folder;
+    if (!is_inside_) {
+      outside_.emplace(path_, recording, range, inputs, options.force);
+      writer_ = outside_->take_writer();
+      return;
+    }
+    if (path_.filename() != kRemappedMap) {
+      throw ConfigError("--map " + options.map + ": in the folder of the run, the map is " +
+                        kRemappedMap);
+    }
+    const auto entry = out.folder().find(kRemappedMap);
+    if (entry &&
+        (entry->kind != Folder::Kind::kFile || !out.listing().contains("", kRemappedMap))) {
+      throw IoError(path_.string() +
+                    ": is in the way, and was not written by dynains remap; move it away");
+    }
+    writer_ = open_map(path_, recording, range);
+  }
+
+  const fs::path& path() const { return path_; }
+
+  void write(const StaticMapAccumulator& map, Json report, const Json& description) {
+    map.for_each([&](const Eigen::Vector3d& point) {
+      FilePoint out;
+      out.position = point;
+      writer_->add(out);
+    });
+    if (!is_inside_) {
+      writer_->commit();
+      return;
+    }
+    OutputListing listing = out_.listing();
+    listing.files.insert(kRemappedMap);
+    report.erase(kField);
+    out_.mark(report, listing);
+    out_.remove_temporaries();
+    writer_->commit();
+    report[kField] = description;
+    out_.mark(report, listing);
+  }
+
+ private:
+  static constexpr const char* kField = "remapped_map";
+
+  OutputFolder& out_;
+  fs::path path_;
+  bool is_inside_ = false;
+  std::optional<OutsideMap> outside_;
+  std::unique_ptr<PointFileWriter> writer_;
+};
+
+InputFiles inputs_of(const Recording& corrected, const std::optional<Recording>& original) {
+  InputFiles inputs;
+  for (const Recording* recording : {&corrected, original ? &*original : nullptr}) {
+    if (recording == nullptr) continue;
+    for (const fs::path& file : recording->files()) inputs.add(file);
+    inputs.add(recording->scan_folder());
+  }
+  return inputs;
+}
+
+void check_run_folder(const fs::path& folder) {
+  std::error_code error;
+  if (fs::is_directory(folder, error)) return;
+  throw IoError(folder.string() + ": is not a folder; expected the results of dynains run");
+}
+
+void check_poses(const Recording& recording, const std::vector<std::size_t>& scans) {
+  for (const std::size_t i : scans) {
+    naming_scan(recording, i,
+                [&] { validate_pose("T_world_sensor", recording.T_world_sensor(i)); });
+  }
+}
+
+void remap(const RemapOptions& options) {
+  check_run_folder(options.run);
+  const LockedFolder lock(options.run);
+  OutputFolder out(Folder(options.run), run_output_kind());
+  const EarlierRun run = read_run(out);
+  const Recording corrected = open_corrected(options, run);
+  const std::vector<std::size_t> scans = scans_of(corrected, run);
+  check_poses(corrected, scans);
+  const std::optional<Recording> original = open_original(options, run);
+  const ScanRange range{scans.front(), scans.back()};
+  NewMap file(options, out, corrected, range, inputs_of(corrected, original));
+
+  const InterruptGuard interrupt;
+  const StaticMapAccumulator map =
+      build_map(corrected, original ? *original : corrected, scans, out.path() / "labels",
+                options.map_voxel.value_or(run.map_voxel), options.quiet);
+  file.write(map, run.report,
+             {{"file", kRemappedMap},
+              {"points", map.size()},
+              {"map_voxel", map.config().map_voxel},
+              {"poses_and_times", pose_fingerprint(corrected, range)}});
+  if (options.quiet) return;
+  std::cout << scans.size() << " scans, static map: " << file.path().string() << " (" << map.size()
+            << " points)" << std::endl;
+}
+
+}  // namespace
+
+void add_remap_command(CLI::App& app) {
+  CLI::App& command = *app.add_subcommand(
+      "remap", "Build the static map of a finished run again, under corrected poses");
+  auto options = std::make_shared<RemapOptions>(command);
+  command.add_option("OUT", options->run, "folder of the results of dynains run over SEQ")
+      ->required()
+      ->type_name("");
+  command
+      .add_option("--map", options->map,
+                  std::string("static map, .ply or .pcd [") + kRemappedMap + " in OUT]")
+      ->type_name("FILE");
+  command
+      .add_option("--map-voxel", options->map_voxel,
+                  "resolution of the static map; 0 keeps all points [of the run]")
+      ->type_name("M");
+  command.add_flag("--force", options->force, "replace the file of --map if it exists");
+  command.add_flag("-q,--quiet", options->quiet, "print errors only");
+  command.footer(
+      "The verdicts of the run stay: they were made between neighbouring scans, and a correction "
+      "moves these\ntogether. The map is built from the points that OUT/labels calls static, in "
+      "the "
+      "order of the scans and of\ntheir points. Nothing in OUT changes but the map and its entry "
+      "in "
+      "report.json; earlier maps of remap are\nreplaced.");
+  command.callback([options] { remap(*options); });
+}
+
+}  // namespace dynains::program

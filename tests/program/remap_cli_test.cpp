@@ -1,0 +1,282 @@
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "dynains/io/folder_lock.hpp"
+#include "dynains/io/kitti.hpp"
+#include "dynains/io/point_file.hpp"
+#include "dynains/io/recording.hpp"
+#include "dynains/pose.hpp"
+#include "dynains/static_map_accumulator.hpp"
+#include "io/files.hpp"
+#include "program/start.hpp"
+#include "program/tiny_sequence.hpp"
+#include "support/catch.hpp"
+
+using namespace dynains;
+using namespace dynains::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t kScans = 12;
+
+std::vector<Eigen::Isometry3d> other_poses(std::size_t count, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> any(-1.0, 1.0);
+  std::vector<Eigen::Isometry3d> poses;
+  for (std::size_t i = 0; i < count; ++i) {
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.translation() = 20.0 * Eigen::Vector3d(any(random), any(random), any(random));
+    pose.linear() = Eigen::Quaterniond(1.0, any(random), any(random), any(random))
+                        .normalized()
+                        .toRotationMatrix();
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+void write_other_poses(const std::string& file, std::size_t count, unsigned seed) {
+  const std::vector<Eigen::Isometry3d> poses = other_poses(count, seed);
+  write_poses(file, poses);
+}
+
+/// A finished run over a small sequence, and a file of corrected poses.
+struct Fixture {
+  explicit Fixture(std::vector<std::string> more = {}) {
+    write_tiny_sequence(seq, kScans);
+    write_other_poses(corrected, kScans, 7);
+    std::vector<std::string> arguments = {"run", seq, "--out", out};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    if (start(arguments).code != 0) throw std::runtime_error("run failed");
+  }
+  Outcome remap(std::vector<std::string> more = {}) const {
+    std::vector<std::string> arguments = {"remap", seq, out};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return start(arguments);
+  }
+
+  TemporaryFolder folder;
+  std::string seq = folder / "a seq";
+  std::string out = folder / "an out";
+  std::string corrected = folder / "corrected.txt";
+  std::string map = out + "/static_map_remapped.ply";
+};
+
+/// Bytes of the map of the labels in `out` under the poses of `corrected`.
+std::string expected_map(const Recording& points, const Recording& corrected,
+                         const std::string& out) {
+  StaticMapAccumulator map;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const RecordedScan scan = points.read_scan(i);
+    const auto labels = read_labels(out + "/labels/" + points.name(i) + ".label", scan.size());
+    PointBuffer cloud;
+    std::vector<std::uint8_t> keep;
+    for (std::size_t k = 0; k < scan.size(); ++k) {
+      cloud.push_back(scan.xyzi[4 * k], scan.xyzi[4 * k + 1], scan.xyzi[4 * k + 2]);
+      keep.push_back((labels[k] & 0xffffU) == 9 ? 1 : 0);
+    }
+    map.insert(cloud, keep, orthonormalized(corrected.T_world_sensor(i)));
+  }
+  const TemporaryFolder folder;
+  const std::string file = folder / "map.ply";
+  PointFileWriter writer(file);
+  map.for_each([&](const Eigen::Vector3d& point) {
+    FilePoint out_point;
+    out_point.position = point;
+    writer.add(out_point);
+  });
+  writer.commit();
+  return read_text(file);
+}
+
+std::string expected_map(const Fixture& f) {
+  RecordingOptions options;
+  options.poses = f.corrected;
+  const Recording recording(f.seq, options);
+  return expected_map(recording, recording, f.out);
+}
+
+}  // namespace
+
+TEST_CASE("remap gives the bytes of a map of the labels and the corrected poses") {
+  const Fixture f;
+  const std::string own_map = read_text(f.out + "/static_map.ply");
+  const Outcome outcome = f.remap({"--poses", f.corrected});
+  CAPTURE(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK(read_text(f.map) == expected_map(f));
+  CHECK_THAT(outcome.out, ContainsSubstring("12 scans, static map: "));
+  CHECK(read_text(f.out + "/static_map.ply") == own_map);
+  const auto report = nlohmann::json::parse(read_text(f.out + "/report.json"));
+  CHECK(report["remapped_map"]["points"] == read_points(f.map).positions.size());
+  CHECK(report["complete"] == true);
+
+  SECTION("a further correction replaces the map") {
+    write_other_poses(f.corrected, kScans, 8);
+    REQUIRE(f.remap({"--poses", f.corrected, "-q"}).code == 0);
+    CHECK(read_text(f.map) == expected_map(f));
+  }
+  SECTION("the run is complete as before, and --force removes the map with it") {
+    CHECK_THAT(start({"run", f.seq, "--out", f.out, "--resume"}).out,
+               ContainsSubstring("complete already"));
+    REQUIRE(start({"run", f.seq, "--out", f.out, "--force"}).code == 0);
+    CHECK_FALSE(fs::exists(f.map));
+  }
+  SECTION("a map elsewhere leaves the folder of the run as it is") {
+    const std::string before = read_text(f.out + "/report.json");
+    const std::string elsewhere = f.folder / "corrected.ply";
+    REQUIRE(f.remap({"--poses", f.corrected, "--map", elsewhere}).code == 0);
+    CHECK(read_text(elsewhere) == expected_map(f));
+    CHECK(read_text(f.out + "/report.json") == before);
+    CHECK_THAT(f.remap({"--map", elsewhere}).err, ContainsSubstring("exists"));
+    CHECK(read_text(elsewhere) == expected_map(f));
+    CHECK(f.remap({"--map", elsewhere, "--force"}).code == 0);
+    CHECK(read_text(elsewhere) != expected_map(f));
+  }
+}
+
+TEST_CASE("remap with the poses of the run fills the voxels of the run's map") {
+  const Fixture f({"--level", "false"});
+  REQUIRE(f.remap().code == 0);
+  CHECK(read_points(f.map).positions.size() ==
+        read_points(f.out + "/static_map.ply").positions.size());
+  REQUIRE(f.remap({"--map-voxel", "0"}).code == 0);
+  const auto report = nlohmann::json::parse(read_text(f.out + "/report.json"));
+  CHECK(read_points(f.map).positions.size() == report["labels"]["static"].get<std::size_t>() +
+                                                   report["labels"]["ground"].get<std::size_t>());
+}
+
+TEST_CASE("remap takes a run over some of the scans") {
+  const Fixture f({"--start", "3", "--end", "8"});
+  const Outcome outcome = f.remap({"--poses", f.corrected});
+  REQUIRE(outcome.code == 0);
+  CHECK_THAT(outcome.out, ContainsSubstring("6 scans"));
+}
+
+TEST_CASE("remap of points in the frame of the world leads through the poses of the run") {
+  Fixture f;
+  const std::string seq = f.folder / "world";
+  fs::create_directories(seq + "/pcd");
+  const std::vector<Eigen::Isometry3d> poses = other_poses(kScans, 3);
+  for (std::size_t i = 0; i < kScans; ++i) {
+    PointFileWriter writer(seq + "/pcd/" + scan_name(i) + ".pcd", {}, poses[i]);
+    const std::vector<float> scan = tiny_scan(i);
+    for (std::size_t k = 0; k < scan.size(); k += 4) {
+      FilePoint point;
+      point.position =
+          poses[i] * Eigen::Vector3d(static_cast<double>(scan[k]), static_cast<double>(scan[k + 1]),
+                                     static_cast<double>(scan[k + 2]));
+      writer.add(point);
+    }
+    writer.commit();
+  }
+  const std::string out = f.folder / "world out";
+  REQUIRE(start({"run", seq, "--out", out, "--frame", "world"}).code == 0);
+  REQUIRE(start({"remap", seq, out, "--poses", f.corrected}).code == 0);
+  RecordingOptions world;
+  world.frame = PointFrame::kWorld;
+  RecordingOptions corrected;
+  corrected.poses = f.corrected;
+  corrected.frame = PointFrame::kSensor;
+  CHECK(read_text(out + "/static_map_remapped.ply") ==
+        expected_map(Recording(seq, world), Recording(seq, corrected), out));
+
+  // The poses of the run came from elsewhere.
+  const std::string other = f.folder / "other.txt";
+  write_other_poses(other, kScans, 4);
+  const std::string other_out = f.folder / "other out";
+  REQUIRE(
+      start({"run", seq, "--out", other_out, "--frame", "world", "--poses", other, "-q"}).code ==
+      0);
+  const Outcome outcome = start({"remap", seq, other_out, "--poses", f.corrected});
+  CHECK(outcome.code == 1);
+  CHECK_THAT(outcome.err, ContainsSubstring("are not those of the run"));
+}
+
+TEST_CASE("remap refuses what does not belong together, and writes nothing then") {
+  const Fixture f;
+  const std::string report_file = f.out + "/report.json";
+  std::vector<std::string> arguments = {"--poses", f.corrected};
+  std::string expected;
+  int code = 1;
+  SECTION("fewer poses than scans") {
+    write_other_poses(f.corrected, kScans - 1, 7);
+    expected = "expected";
+  }
+  SECTION("poses in time for some scans only") {
+    std::string rows;
+    for (int i = 0; i < 8; ++i) rows += std::to_string(0.1 * i) + " 0 0 0 0 0 0 1\n";
+    write_text(f.corrected, rows);
+    std::string times;
+    for (std::size_t i = 0; i < kScans; ++i) times += std::to_string(0.1 * double(i)) + "\n";
+    write_text(f.seq + "/times.txt", times);
+    expected = "has no pose or no scan for 4 of 12 scans of the run, 000008 first";
+  }
+  SECTION("an interrupted run") {
+    auto report = nlohmann::json::parse(read_text(report_file));
+    report["complete"] = false;
+    write_text(report_file, report.dump());
+    expected = "/complete: expected true";
+  }
+  SECTION("a folder without a run") {
+    fs::remove_all(f.out);
+    fs::create_directory(f.out);
+    expected = "report.json: not found";
+  }
+  SECTION("no folder") {
+    fs::remove_all(f.out);
+    expected = "is not a folder";
+  }
+  SECTION("labels of other scans") {
+    const std::vector<float> scan(40, 1.0F);
+    write_scan(f.seq + "/velodyne/" + scan_name(4) + ".bin", scan);
+    expected = scan_name(4) + ".label: has";
+  }
+  SECTION("labels of another program") {
+    std::vector<std::uint32_t> labels(tiny_scan(4).size() / 4, 40);
+    write_labels(f.out + "/labels/" + scan_name(4) + ".label", labels);
+    expected = "point 0 has class 40";
+  }
+  SECTION("static points that are none") {
+    std::vector<float> scan = tiny_scan(4);
+    std::fill(scan.begin(), scan.end(), std::nanf(""));
+    write_scan(f.seq + "/velodyne/" + scan_name(4) + ".bin", scan);
+    expected = "not finite";
+  }
+  SECTION("a file of another owner in the place of the map") {
+    write_text(f.map, "mine");
+    expected = "is in the way";
+  }
+  SECTION("a map under a name of the run") {
+    arguments.insert(arguments.end(), {"--map", f.out + "/static_map.ply"});
+    expected = "in the folder of the run, the map is static_map_remapped.ply";
+    code = 2;
+  }
+  SECTION("a voxel size that no map has") {
+    arguments.insert(arguments.end(), {"--map-voxel", "0.001"});
+    expected = "map_voxel = 0.001";
+    code = 2;
+  }
+  SECTION("a folder in use") {
+    const FolderLock lock(f.out);
+    const Outcome outcome = f.remap(arguments);
+    CHECK(outcome.code == 2);
+    CHECK_FALSE(fs::exists(f.map));
+    return;
+  }
+  const std::string before = fs::exists(report_file) ? read_text(report_file) : "";
+  const std::string in_the_way = fs::exists(f.map) ? read_text(f.map) : "";
+  const Outcome outcome = f.remap(arguments);
+  CAPTURE(outcome.err);
+  CHECK(outcome.code == code);
+  CHECK_THAT(outcome.err, ContainsSubstring(expected));
+  CHECK((fs::exists(report_file) ? read_text(report_file) : "") == before);
+  CHECK((fs::exists(f.map) ? read_text(f.map) : "") == in_the_way);
+}
