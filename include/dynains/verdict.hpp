@@ -99,8 +99,8 @@ struct ScanVerdict {
 struct PoseResidual {
   double translation = 0.0;  ///< m
   double rotation = 0.0;     ///< deg
-  /// Aligned motion: pose of this scan in the sensor frame of the previous one. A first estimate
-  /// for a registration.
+  /// Corrected motion: pose of this scan in the sensor frame of the previous one. It is the pushed
+  /// motion, except for rounding, if the residual is within the tolerance for poses.
   Eigen::Isometry3d T_previous_newest = Eigen::Isometry3d::Identity();
 };
 

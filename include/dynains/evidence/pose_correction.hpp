@@ -131,11 +131,12 @@ class PoseCorrection {
                kLeastInliers * static_cast<double>(alignment.matched);
     if (is_lost_) return;
     residual_ = difference(T_origin_newest_, alignment.T_map_sensor);
-    residual_->T_previous_newest = detail::composed(T_previous_origin, alignment.T_map_sensor);
-    if (alignment.change <= tolerance_) return;
-    const Eigen::Isometry3d T_origin_pushed = detail::composed(T_origin_world_, T_world_level);
-    correction_ = detail::composed(alignment.T_map_sensor, detail::inverted(T_origin_pushed));
-    T_origin_newest_ = alignment.T_map_sensor;
+    if (alignment.change > tolerance_) {
+      const Eigen::Isometry3d T_origin_pushed = detail::composed(T_origin_world_, T_world_level);
+      correction_ = detail::composed(alignment.T_map_sensor, detail::inverted(T_origin_pushed));
+      T_origin_newest_ = alignment.T_map_sensor;
+    }
+    residual_->T_previous_newest = detail::composed(T_previous_origin, T_origin_newest_);
   }
 
   // Rotation and translation of the sensor from one pose to another.
