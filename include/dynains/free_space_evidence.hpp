@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <optional>
 #include <vector>
 
 #include "dynains/evidence/dynamic_occupancy_grid.hpp"
@@ -16,6 +17,7 @@
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/instance_tracks.hpp"
 #include "dynains/evidence/moved_ground.hpp"
+#include "dynains/evidence/pose_correction.hpp"
 #include "dynains/evidence/reference_scans.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
@@ -41,6 +43,7 @@ class FreeSpaceEvidence {
         sampler_(config.supervoxel, config.evidence_range,
                  static_cast<std::uint32_t>(config.supervoxel_samples)),
         references_(config),
+        pose_correction_(config.pose_tolerance),
         updater_(config),
         linker_(config.track_cell, config.track_length, config.track_height, config.track_overlap),
         track_belief_(updater_.increment()),
@@ -75,6 +78,7 @@ class FreeSpaceEvidence {
   /// the size of the scans already observed. Discards the observed scans, so call it before scan 0.
   void reserve(std::size_t scans) {
     references_.reserve(scans);
+    if (checks_poses()) pose_correction_.reserve();
     const auto largest =
         std::max_element(records_.begin(), records_.end(), [](const Record& a, const Record& b) {
           return a.evidence.samples.size() < b.evidence.samples.size();
@@ -88,16 +92,19 @@ class FreeSpaceEvidence {
 
   /// Adds a scan. `scan`: its number, consecutive from 0; 0 discards all earlier scans. `epoch`:
   /// only scans of one epoch are compared. `T_world_sensor`: rigid, pose of the frame of `split`.
-  /// `instance_of`: by non-ground point of `split`, instance below `instance_count`, or kNoCluster.
+  /// An inexact pose is corrected for the comparisons. If the static surfaces of the scan do not
+  /// fit to those of earlier scans, it is not compared with them. `instance_of`: by non-ground
+  /// point of `split`, instance below `instance_count`, or kNoCluster.
   void observe(std::uint64_t scan, std::uint64_t epoch, const Eigen::Isometry3d& T_world_sensor,
                const GroundSplit& split, Span<const std::uint32_t> instance_of,
                std::size_t instance_count) {
     if (scan == 0) forget_scans();
-    if (scan == 0 || record_of(scan - 1).epoch != epoch) begin_epoch(scan, T_world_sensor);
+    if (scan == 0 || pushed_epoch_ != epoch) begin_epoch(scan, T_world_sensor);
+    pushed_epoch_ = epoch;
     newest_ = scan;
     Record& record = record_of(scan);
-    record.epoch = epoch;
-    record.T_world_sensor = T_world_sensor;
+    record.T_world_sensor = correct(scan, T_world_sensor, split);
+    record.epoch = epoch_;
     record.phase = references_.advance(scan - epoch_begin_);
     moved_ground_.bound(split.ground(), record.ground_boxes);
     begin_evidence(split.non_ground(), instance_of, instance_count, record);
@@ -130,8 +137,12 @@ class FreeSpaceEvidence {
   /// is one of the last `reference_step` scans. The result is valid until the next call.
   const detail::Visibility& test_visibility(const PointBuffer& points, std::size_t count,
                                             const Eigen::Isometry3d& T_world_points) {
-    return references_.test(points, count, T_world_points, references_.newest());
+    return references_.test(points, count, pose_correction_.corrected(T_world_points),
+                            references_.newest());
   }
+
+  /// Alignment of the newest scan with earlier scans, in the frame of its pose.
+  const std::optional<PoseResidual>& pose_residual() const { return pose_correction_.residual(); }
 
   /// By instance of the newest scan: the linked instance of the scan before it, or kNoCluster.
   Span<const std::uint32_t> predecessors() const { return predecessors_; }
@@ -155,8 +166,22 @@ class FreeSpaceEvidence {
 
   void begin_epoch(std::uint64_t scan, const Eigen::Isometry3d& T_world_sensor) {
     T_origin_world_ = detail::inverted(T_world_sensor);
+    ++epoch_;
     epoch_begin_ = scan;
     dynamic_grid_.clear();
+    pose_correction_.begin_epoch(T_world_sensor);
+  }
+
+  bool checks_poses() const { return config_.pose_tolerance > 0.0; }
+
+  // The pose of a scan for comparisons. Begins an epoch if the scan does not fit to earlier ones.
+  Eigen::Isometry3d correct(std::uint64_t scan, const Eigen::Isometry3d& T_world_sensor,
+                            const GroundSplit& split) {
+    if (!checks_poses()) return T_world_sensor;
+    const Eigen::Isometry3d T_corrected = pose_correction_.correct(T_world_sensor, split);
+    if (!pose_correction_.is_lost()) return T_corrected;
+    begin_epoch(scan, T_world_sensor);
+    return T_world_sensor;
   }
 
   Record& record_of(std::uint64_t scan) { return records_[scan % records_.size()]; }
@@ -295,6 +320,7 @@ class FreeSpaceEvidence {
     is_moving_.clear();
     if (config_.ignore_dynamic_returns) find_moving_points(record.evidence);
     references_.make_image(newest_, record.epoch, record.T_world_sensor, split, is_moving_);
+    if (checks_poses()) pose_correction_.insert(record.T_world_sensor, split, is_moving_);
     if (delay_of(0) != 0) return;
     test_older_scans(0);
     propagate_beliefs(newest_);
@@ -333,6 +359,7 @@ class FreeSpaceEvidence {
   Config config_;
   InstanceSampler sampler_;
   ReferenceScans references_;
+  PoseCorrection pose_correction_;
   InstanceBeliefUpdater updater_;
   InstanceLinker linker_;
   TrackBelief track_belief_;
@@ -342,7 +369,9 @@ class FreeSpaceEvidence {
   // The origin frame is the sensor frame of the first scan of the epoch. It is the frame of the
   // cells of tracks and of the dynamic occupancy grid, which thus do not depend on the world frame.
   Eigen::Isometry3d T_origin_world_ = Eigen::Isometry3d::Identity();
-  std::uint64_t epoch_begin_ = 0;  // first scan of the epoch of the newest scan
+  std::uint64_t pushed_epoch_ = 0;  // epoch of the newest scan, as given to observe()
+  std::uint64_t epoch_ = 0;         // number of the begun epochs
+  std::uint64_t epoch_begin_ = 0;   // first scan of the epoch of the newest scan
   std::uint64_t newest_ = 0;
   std::vector<std::vector<int>> lags_before_, lags_after_;  // by phase: scans to the references
   std::vector<Record> records_;                             // ring buffer, by scan number

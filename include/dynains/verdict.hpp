@@ -94,12 +94,25 @@ struct ScanVerdict {
   Span<const Cause> causes;
 };
 
+/// Alignment of a scan with the static surfaces of earlier scans: the error of the pushed motion of
+/// the sensor since the previous scan.
+struct PoseResidual {
+  double translation = 0.0;  ///< m
+  double rotation = 0.0;     ///< deg
+  /// Corrected motion: pose of this scan in the sensor frame of the previous one. It is the pushed
+  /// motion, except for rounding, if the residual is within the tolerance for poses.
+  Eigen::Isometry3d T_previous_newest = Eigen::Isometry3d::Identity();
+};
+
 /// Result of one push.
 struct FrameResult {
   /// Verdict on the pushed scan by this and earlier scans; final if latency() is 0.
   ScanVerdict newest;
   std::optional<ScanVerdict> finished;  ///< final verdict on the scan latency() pushes ago
   StageTimes times;
+  /// Empty for the first scan of an epoch, without enough common surfaces, and if free space is not
+  /// used (decision = window) or `pose_tolerance` is 0.
+  std::optional<PoseResidual> pose_residual;
 };
 
 /// Verdict by free space on one scan. Each non-ground point belongs to a group with one verdict;

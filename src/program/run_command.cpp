@@ -62,7 +62,7 @@ void print_summary(const RunResults& results, const RunTiming& timing, const Run
   };
   std::vector<double> totals;
   for (const TimingRow& row : timing.rows) totals.push_back(row.total);
-  const TimeStatistics time = statistics(std::move(totals));
+  const Statistics time = statistics(std::move(totals));
   const std::uint64_t moving = labels[PointLabel::kDynamic];
   const std::uint64_t kept = labels[PointLabel::kGround] + labels[PointLabel::kStatic];
   std::cout << std::fixed << std::setprecision(2) << results.finished() << " scans, "

@@ -15,8 +15,8 @@
 namespace dynains::program {
 namespace {
 
-nlohmann::ordered_json to_json(std::vector<double> milliseconds) {
-  const TimeStatistics s = statistics(std::move(milliseconds));
+nlohmann::ordered_json to_json(std::vector<double> values) {
+  const Statistics s = statistics(std::move(values));
   return {{"median", s.median}, {"p95", s.p95}, {"p99", s.p99}, {"max", s.max}};
 }
 
@@ -34,16 +34,27 @@ nlohmann::ordered_json times_to_json(const RunTiming& timing) {
   return json;
 }
 
+nlohmann::ordered_json pose_residual_to_json(const RunTiming& timing) {
+  std::vector<double> metres, degrees;
+  for (const TimingRow& row : timing.rows) {
+    if (!row.pose_residual) continue;
+    metres.push_back(row.pose_residual->translation);
+    degrees.push_back(row.pose_residual->rotation);
+  }
+  if (metres.empty()) return nullptr;
+  return {{"metres", to_json(std::move(metres))}, {"degrees", to_json(std::move(degrees))}};
+}
+
 }  // namespace
 
-TimeStatistics statistics(std::vector<double> milliseconds) {
-  if (milliseconds.empty()) return {};
-  std::sort(milliseconds.begin(), milliseconds.end());
+Statistics statistics(std::vector<double> values) {
+  if (values.empty()) return {};
+  std::sort(values.begin(), values.end());
   const auto quantile = [&](double share) {
-    const double rank = std::ceil(share * static_cast<double>(milliseconds.size()));
-    return milliseconds[std::max<std::size_t>(static_cast<std::size_t>(rank), 1) - 1];
+    const double rank = std::ceil(share * static_cast<double>(values.size()));
+    return values[std::max<std::size_t>(static_cast<std::size_t>(rank), 1) - 1];
   };
-  return {quantile(0.5), quantile(0.95), quantile(0.99), milliseconds.back()};
+  return {quantile(0.5), quantile(0.95), quantile(0.99), values.back()};
 }
 
 std::uint64_t peak_memory_bytes() {
@@ -77,6 +88,7 @@ nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& 
   report["peak_memory_bytes"] = peak_memory_bytes();
   report["pose_agreement"] = nullptr;
   if (run.agreement.points > 0) report["pose_agreement"] = run.agreement.share;
+  report["pose_residual"] = pose_residual_to_json(timing);
   report["preset"] = run.preset;
   report["configuration"] = run.configuration;
   return report;
@@ -103,11 +115,15 @@ void write_timing(const std::filesystem::path& path, const RunTiming& timing) {
   out.imbue(std::locale::classic());
   out << std::fixed << std::setprecision(4) << "scan,points";
   for (const std::string& stage : timing.stages) out << ',' << stage << "_ms";
-  out << ",total_ms\n";
+  out << ",total_ms,pose_residual_m,pose_residual_deg\n";
   for (const TimingRow& row : timing.rows) {
     out << evaluation::csv_field(row.scan) << ',' << row.points;
     for (const double ms : row.stages) out << ',' << ms;
-    out << ',' << row.total << '\n';
+    out << ',' << row.total << ',';
+    if (row.pose_residual) out << row.pose_residual->translation;
+    out << ',';
+    if (row.pose_residual) out << row.pose_residual->rotation;
+    out << '\n';
   }
   file.commit();
 }

@@ -13,15 +13,15 @@
 
 namespace dynains::program {
 
-/// Milliseconds of one stage over all scans. Quantiles are the smallest value that at least that
-/// share of the values does not exceed; all 0 if there are none.
-struct TimeStatistics {
+/// Statistics of one number, for example milliseconds, over all scans. Quantiles are the smallest
+/// value that at least that share of the values does not exceed; all 0 if there are none.
+struct Statistics {
   double median = 0.0;
   double p95 = 0.0;
   double p99 = 0.0;
   double max = 0.0;
 };
-TimeStatistics statistics(std::vector<double> milliseconds);
+Statistics statistics(std::vector<double> values);
 
 /// Highest resident memory of this process so far.
 std::uint64_t peak_memory_bytes();

@@ -57,7 +57,7 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
     RecordedScan scan = scans.next(results.recycle());
     const Clock::time_point begin = Clock::now();
     const FrameResult frame = push_scan(remover, recording, i, scan);
-    TimingRow row{recording.name(i), scan.size(), {}, ms_since(begin)};
+    TimingRow row{recording.name(i), scan.size(), {}, ms_since(begin), frame.pose_residual};
     StageTimes::visit(frame.times, [&](const char*, double ms) { row.stages.push_back(ms); });
     timing.rows.push_back(std::move(row));
     results.take_newest(std::move(scan), frame.newest);

@@ -1,9 +1,12 @@
-// Milliseconds of each scan and stage.
+// Milliseconds of each scan and stage, and errors of the poses.
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "dynains/verdict.hpp"
 
 namespace dynains::program {
 
@@ -12,6 +15,7 @@ struct TimingRow {
   std::size_t points = 0;
   std::vector<double> stages;  ///< ms, in the order of RunTiming::stages
   double total = 0.0;          ///< ms in the pipeline, reading and writing of files apart
+  std::optional<PoseResidual> pose_residual;
 };
 
 struct RunTiming {

@@ -63,6 +63,7 @@ struct Frame {
   py::object newest;
   py::object finished;
   py::dict times;
+  std::optional<PoseResidual> pose_residual;
 };
 
 // The remover without the interpreter's lock: a mutex keeps threads that share it apart.
@@ -74,6 +75,7 @@ class Remover {
     const Eigen::Isometry3d T_world_sensor = to_pose(pose);
     std::optional<OwnedVerdict> newest, finished;
     StageTimes times;
+    std::optional<PoseResidual> pose_residual;
     with_points(points, [&](const auto& cloud) {
       const py::gil_scoped_release release;
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -82,8 +84,10 @@ class Remover {
       newest.emplace(result.newest);
       if (result.finished) finished.emplace(*result.finished);
       times = result.times;
+      pose_residual = result.pose_residual;
     });
     Frame frame;
+    frame.pose_residual = pose_residual;
     frame.newest = py::cast(Verdict(std::move(*newest)));
     if (finished) {
       frame.finished = py::cast(Verdict(std::move(*finished)));
@@ -184,12 +188,20 @@ void bind_remover(py::module_& module) {
                     "(N,) uint8, why the label is what it is; the numbers are those of "
                     "dynains/verdict.hpp.");
 
+  py::class_<PoseResidual>(module, "PoseResidual",
+                           "Motion of the sensor that aligns a scan with earlier scans.")
+      .def_readonly("translation", &PoseResidual::translation, "m")
+      .def_readonly("rotation", &PoseResidual::rotation, "deg");
+
   py::class_<Frame>(module, "FrameResult", "Answer to one scan.")
       .def_readonly("newest", &Frame::newest,
                     "ScanVerdict: what the past alone says of the scan just pushed.")
       .def_readonly("finished", &Frame::finished,
                     "ScanVerdict of the scan whose verdict is now final, or None.")
-      .def_readonly("times", &Frame::times, "Milliseconds by stage.");
+      .def_readonly("times", &Frame::times, "Milliseconds by stage.")
+      .def_readonly("pose_residual", &Frame::pose_residual,
+                    "PoseResidual: error of the pushed pose relative to earlier scans; None if it "
+                    "is unknown.");
 
   py::class_<Remover>(module, "DynaInsRemover",
                       "Removes moving instances from a stream of scans, one scan at a time. "

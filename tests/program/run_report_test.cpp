@@ -9,16 +9,16 @@ using namespace dynains::test;
 TEST_CASE("Quantiles are measured values") {
   std::vector<double> hundred;
   for (int i = 100; i >= 1; --i) hundred.push_back(i);
-  const TimeStatistics s = statistics(hundred);
+  const Statistics s = statistics(hundred);
   CHECK(s.median == 50.0);
   CHECK(s.p95 == 95.0);
   CHECK(s.p99 == 99.0);
   CHECK(s.max == 100.0);
 
-  const TimeStatistics one = statistics({7.0});
+  const Statistics one = statistics({7.0});
   CHECK(one.median == 7.0);
   CHECK(one.p99 == 7.0);
-  const TimeStatistics two = statistics({9.0, 3.0});
+  const Statistics two = statistics({9.0, 3.0});
   CHECK(two.median == 3.0);
   CHECK(two.p95 == 9.0);
   CHECK(statistics({}).max == 0.0);
@@ -28,15 +28,15 @@ TEST_CASE("timing.csv has a row for each scan") {
   TemporaryFolder folder;
   RunTiming timing;
   timing.stages = {"ground", "map"};
-  timing.rows.push_back({"000007", 120000, {1.25, 0.5}, 2.0});
-  timing.rows.push_back({"000008", 0, {0.0, 0.0}, 0.00004});
+  timing.rows.push_back({"000007", 120000, {1.25, 0.5}, 2.0, dynains::PoseResidual{0.0125, 0.5, {}}});
+  timing.rows.push_back({"000008", 0, {0.0, 0.0}, 0.00004, {}});
   write_timing(folder / "timing.csv", timing);
   CHECK(read_text(folder / "timing.csv") ==
-        "scan,points,ground_ms,map_ms,total_ms\n"
-        "000007,120000,1.2500,0.5000,2.0000\n"
-        "000008,0,0.0000,0.0000,0.0000\n");
+        "scan,points,ground_ms,map_ms,total_ms,pose_residual_m,pose_residual_deg\n"
+        "000007,120000,1.2500,0.5000,2.0000,0.0125,0.5000\n"
+        "000008,0,0.0000,0.0000,0.0000,,\n");
 
-  timing.rows = {{"a,b\n\"c\"", 1, {0.0, 0.0}, 0.0}};
+  timing.rows = {{"a,b\n\"c\"", 1, {0.0, 0.0}, 0.0, {}}};
   write_timing(folder / "timing.csv", timing);
   CHECK(read_text(folder / "timing.csv").find("\n\"a,b\n\"\"c\"\"\",1,0.0000") !=
         std::string::npos);

@@ -95,6 +95,11 @@ def test_reset_starts_again(street, verdicts):
     assert frame.newest.scan == 0
 
 
+def test_the_first_pose_has_no_residual(identity):
+    remover = dynains.DynaInsRemover()
+    assert remover.push(np.ones((10, 3)), identity).pose_residual is None
+
+
 def test_times_are_optional_and_stages_are_timed(identity):
     remover = dynains.DynaInsRemover()
     for _ in range(3):

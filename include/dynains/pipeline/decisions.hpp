@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "dynains/config.hpp"
@@ -67,6 +68,9 @@ class ScanDecision {
   virtual void judge_newest(ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) = 0;
   /// Writes the final verdict on `scan`.
   virtual void judge_final(ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) = 0;
+
+  /// Alignment of the newest scan with earlier scans, in the level frame.
+  virtual std::optional<PoseResidual> pose_residual() const { return std::nullopt; }
 
   /// Updates the beliefs of map blocks by the newest scan and removes the blocks that are free.
   virtual void revise(Map& /*map*/, const ScanSlot& /*newest*/) {}
@@ -255,6 +259,7 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
     return verdict;
   }
 
+  std::optional<PoseResidual> pose_residual() const override { return pose_residual_of(evidence_); }
   void revise(Map& map, const ScanSlot& newest) override {
     if constexpr (IsRevisable<Map, Evidence>::value) {
       if (!revision_.config().revise_map) return;
@@ -345,6 +350,7 @@ class BothDecisions final : public ScanDecision<typename Stages::Map> {
     timer.measure(&StageTimes::verdict,
                   [&] { add_proposals(scan, by_free_space, window_.votes_needed(), writer); });
   }
+  std::optional<PoseResidual> pose_residual() const override { return free_space_.pose_residual(); }
   void revise(typename Stages::Map& map, const ScanSlot& newest) override {
     free_space_.revise(map, newest);
   }

@@ -153,6 +153,7 @@ class Pipeline {
   Eigen::Matrix3d level(ScanSlot& scan) const;
   void judge_newest(ScanSlot& newest, StageTimer& timer);
   ScanVerdict finish_oldest(StageTimer& timer);
+  std::optional<PoseResidual> pose_residual() const;
 
   // Removes all scans. The map and the capacity of buffers stay.
   void forget_scans() {
@@ -193,7 +194,7 @@ FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Eigen::Isometry
   std::optional<ScanVerdict> finished;
   if (scans_.open() > latency()) finished = finish_oldest(timer);  // Eq. 2, 1
   timer.measure(&StageTimes::revision, [&] { decision_->revise(map_, newest); });
-  return {newest.verdict(), finished, timer.times()};
+  return {newest.verdict(), finished, timer.times(), pose_residual()};
 }
 
 template <class Stages>
@@ -257,6 +258,19 @@ Eigen::Matrix3d Pipeline<Stages>::level(ScanSlot& scan) const {
   const Eigen::Matrix3d R_level_sensor = sensor().R_level_sensor();
   scan.T_world_level = rotated(scan.T_world_level, R_level_sensor);
   return R_level_sensor;
+}
+
+/// The residual of the newest scan, with its motion in the sensor frame.
+template <class Stages>
+std::optional<PoseResidual> Pipeline<Stages>::pose_residual() const {
+  std::optional<PoseResidual> residual = decision_->pose_residual();
+  if (residual && frame_.rotates_scans()) {
+    Eigen::Isometry3d T_sensor_level = Eigen::Isometry3d::Identity();
+    T_sensor_level.linear() = transposed(sensor().R_level_sensor());
+    residual->T_previous_newest =
+        composed(composed(T_sensor_level, residual->T_previous_newest), inverted(T_sensor_level));
+  }
+  return residual;
 }
 
 template <class Stages>

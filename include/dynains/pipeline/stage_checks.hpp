@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -150,6 +151,18 @@ using Keep = decltype(std::declval<Stage&>().keep(std::size_t{}));
 template <class Stage>
 void keep_in_stage(Stage& stage, std::size_t scans) {
   if constexpr (Offers<Keep, Stage>::value) stage.keep(scans);
+}
+
+/// Result of the optional member `pose_residual()` of a stage; empty without it.
+template <class Stage>
+using HasPoseResidual = decltype(std::declval<const Stage&>().pose_residual());
+template <class Stage>
+std::optional<PoseResidual> pose_residual_of(const Stage& stage) {
+  if constexpr (Offers<HasPoseResidual, Stage>::value) {
+    return stage.pose_residual();
+  } else {
+    return std::nullopt;
+  }
 }
 
 }  // namespace dynains::detail

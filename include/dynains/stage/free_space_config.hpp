@@ -19,6 +19,7 @@ struct FreeSpaceConfig {
   double margin = 0.25;               ///< m
   double margin_slope = 0.0075;       ///< m per m of range
   double lateral_margin = 0.07;       ///< m
+  double pose_tolerance = 0.01;       ///< m
   double p_free = 0.7;                ///< form of Eq. 18
   double p_hit = 0.155;               ///< form of Eq. 18
   double tau_free = 0.65;             ///< form of Eq. 19
@@ -76,6 +77,9 @@ struct FreeSpaceConfig {
     visitor(Parameter{"lateral_margin", self.lateral_margin, closed(0, 1), "m",
                       "no sample at a smaller lateral distance from a return, or in its 3x3 cells, "
                       "is free"});
+    visitor(Parameter{"pose_tolerance", self.pose_tolerance, closed(0, 1), "m",
+                      "poses whose static surfaces lie farther than this (rms) from those of "
+                      "earlier scans are corrected for comparisons; 0: poses are not checked"});
     visitor(Parameter{"p_free", self.p_free, open(0.5, 1), "",
                       "update probability of a reference whose beams pass (form of Eq. 18)"});
     visitor(Parameter{"p_hit", self.p_hit, open(0, 0.5), "",

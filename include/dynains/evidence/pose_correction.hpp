@@ -1,0 +1,168 @@
+// Correction of poses for the comparison of scans: how far the static world of a scan lies from
+// that of the scans before it.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "dynains/evidence/pose_alignment.hpp"
+#include "dynains/evidence/voxel_planes.hpp"
+#include "dynains/points.hpp"
+#include "dynains/pose.hpp"
+#include "dynains/stage/ground_split.hpp"
+#include "dynains/verdict.hpp"
+
+namespace dynains {
+
+/// Aligns each scan with the planes of earlier scans of its epoch. If a pose is inexact, so that
+/// static surfaces of the scan lie too far from the planes, it is replaced by the aligned pose, and
+/// the correction applies to later poses, too. Exact poses stay as they are, bit by bit.
+class PoseCorrection {
+ public:
+  /// `tolerance`: root mean square distance (m) between static surfaces up to which a pose stays.
+  explicit PoseCorrection(double tolerance) : tolerance_(tolerance) {}
+
+  /// Allocates all memory.
+  void reserve() {
+    planes_.reserve();
+    selected_.grow(kMostSelected);
+  }
+
+  /// Forgets all scans. `T_world_sensor`: pose of the first scan of the next epoch.
+  void begin_epoch(const Eigen::Isometry3d& T_world_sensor) {
+    planes_.clear();
+    inserted_ = 0;
+    T_world_origin_ = T_world_sensor;
+    T_origin_world_ = detail::inverted(T_world_sensor);
+    T_origin_newest_ = Eigen::Isometry3d::Identity();
+    correction_.reset();
+    residual_.reset();
+  }
+
+  /// Pose of a scan for comparisons with other scans. `T_world_level`, `split`: pushed pose and
+  /// points, m. Updates residual() and is_lost().
+  Eigen::Isometry3d correct(const Eigen::Isometry3d& T_world_level, const GroundSplit& split) {
+    const Eigen::Isometry3d T_origin_previous = T_origin_newest_;
+    residual_.reset();
+    is_lost_ = false;
+    T_origin_newest_ = detail::composed(T_origin_world_, T_world_level);
+    if (correction_) T_origin_newest_ = detail::composed(*correction_, T_origin_newest_);
+    if (inserted_ > 0) align(T_world_level, split, detail::inverted(T_origin_previous));
+    return corrected(T_world_level);
+  }
+
+  /// The pose `T_world_frame` with the newest correction.
+  Eigen::Isometry3d corrected(const Eigen::Isometry3d& T_world_frame) const {
+    if (!correction_) return T_world_frame;
+    return detail::composed(
+        T_world_origin_,
+        detail::composed(*correction_, detail::composed(T_origin_world_, T_world_frame)));
+  }
+
+  /// Adds the static points of a scan to the planes. `T_world_level`: result of correct().
+  /// `moving`: by non-ground point, 1 for a moving point, else 0; empty if no point moves.
+  void insert(const Eigen::Isometry3d& T_world_level, const GroundSplit& split,
+              Span<const std::uint8_t> moving) {
+    const Eigen::Isometry3d T = detail::composed(T_origin_world_, T_world_level);
+    const std::size_t wanted = inserted_ < kFirstScans ? kFirstInserted : kInserted;
+    ++inserted_;
+    planes_.begin_scan();
+    visit_some(split, wanted, [&](std::size_t i, double x, double y, double z) {
+      if (!moving.empty() && i >= split.ground_count && moving[i - split.ground_count] != 0) return;
+      double p[3];
+      for (int k = 0; k < 3; ++k) p[k] = T(k, 0) * x + T(k, 1) * y + T(k, 2) * z + T(k, 3);
+      planes_.add(p);
+    });
+  }
+
+  /// Result of the last correct(), in the frame of its pose; empty without enough common planes.
+  const std::optional<PoseResidual>& residual() const { return residual_; }
+
+  /// Whether the static world of the last scan does not fit to that of the scans before it, so that
+  /// motion and errors of poses cannot be told apart.
+  bool is_lost() const { return is_lost_; }
+
+ private:
+  static constexpr std::size_t kSelected = 1000;        // points that are aligned
+  static constexpr std::size_t kMostSelected = 1024;    // with padding
+  static constexpr std::size_t kInserted = 6000;        // points of a scan in the planes
+  static constexpr std::size_t kFirstInserted = 24000;  // the same for the first scans
+  static constexpr std::size_t kFirstScans = 2;
+  static constexpr std::size_t kFewestMatches = 100;
+  static constexpr double kLeastInliers = 0.6;               // ratio to the matches
+  static constexpr double kNearest = 3.0, kFarthest = 50.0;  // m, horizontal
+
+  // Calls `visit(index, x, y, z)` for about `wanted` points of a scan. They are spread evenly over
+  // its order, at pseudo-random distances, since beams repeat at regular ones.
+  template <class Visit>
+  static void visit_some(const GroundSplit& split, std::size_t wanted, Visit&& visit) {
+    const std::size_t step = split.count / wanted + 1;
+    std::uint32_t random = 1;
+    for (std::size_t begin = 0; begin < split.count; begin += step) {
+      random = random * 1664525U + 1013904223U;
+      const std::size_t i = begin + (random >> 8) % step;
+      if (i >= split.count) return;
+      const double x = double{split.points.x[i]};
+      const double y = double{split.points.y[i]};
+      const double squared = x * x + y * y;
+      if (squared < kNearest * kNearest || squared > kFarthest * kFarthest) continue;
+      visit(i, x, y, double{split.points.z[i]});
+    }
+  }
+
+  PointsView select(const GroundSplit& split) {
+    selected_.clear();
+    visit_some(split, kSelected, [&](std::size_t i, double, double, double) {
+      selected_.push_back(split.points.x[i], split.points.y[i], split.points.z[i]);
+    });
+    return selected_;
+  }
+
+  // Aligns the newest scan, whose pose with the last correction is T_origin_newest_.
+  void align(const Eigen::Isometry3d& T_world_level, const GroundSplit& split,
+             const Eigen::Isometry3d& T_previous_origin) {
+    const detail::Alignment alignment = detail::align(select(split), planes_, T_origin_newest_);
+    if (alignment.matched < kFewestMatches) return;
+    is_lost_ = static_cast<double>(alignment.inliers) <
+               kLeastInliers * static_cast<double>(alignment.matched);
+    if (is_lost_) return;
+    residual_ = difference(T_origin_newest_, alignment.T_map_sensor);
+    if (alignment.change > tolerance_) {
+      const Eigen::Isometry3d T_origin_pushed = detail::composed(T_origin_world_, T_world_level);
+      correction_ = detail::composed(alignment.T_map_sensor, detail::inverted(T_origin_pushed));
+      T_origin_newest_ = alignment.T_map_sensor;
+    }
+    residual_->T_previous_newest = detail::composed(T_previous_origin, T_origin_newest_);
+  }
+
+  // Rotation and translation of the sensor from one pose to another.
+  static PoseResidual difference(const Eigen::Isometry3d& T_map_a,
+                                 const Eigen::Isometry3d& T_map_b) {
+    const Eigen::Isometry3d T_a_b = detail::composed(detail::inverted(T_map_a), T_map_b);
+    const double x = T_a_b(2, 1) - T_a_b(1, 2);
+    const double y = T_a_b(0, 2) - T_a_b(2, 0);
+    const double z = T_a_b(1, 0) - T_a_b(0, 1);
+    const double sine = 0.5 * std::sqrt(x * x + y * y + z * z);  // of an angle below 90 deg
+    PoseResidual residual;
+    residual.translation = detail::distance(T_map_a, T_map_b);
+    residual.rotation = std::asin(std::min(sine, 1.0)) * 180.0 / M_PI;
+    return residual;
+  }
+
+  double tolerance_;
+  VoxelPlanes planes_;  // in the origin frame: the first scan of the epoch
+  std::size_t inserted_ = 0;
+  Eigen::Isometry3d T_world_origin_ = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d T_origin_world_ = Eigen::Isometry3d::Identity();
+  std::optional<Eigen::Isometry3d> correction_;  // in the origin frame, multiplied from the left
+  Eigen::Isometry3d T_origin_newest_ = Eigen::Isometry3d::Identity();  // corrected
+  std::optional<PoseResidual> residual_;
+  bool is_lost_ = false;
+  PointBuffer selected_;
+};
+
+}  // namespace dynains

@@ -1,0 +1,216 @@
+// Correction of poses for comparisons, against known perturbations of the exact poses of simulated
+// scans.
+#include "dynains/evidence/pose_correction.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/random.hpp"
+#include "support/simulated_runs.hpp"
+
+namespace dynains::test {
+namespace {
+
+using simulation::Scene;
+using simulation::Sensor;
+using simulation::SimulatedScan;
+
+constexpr double kTolerance = 0.01;  // m, the default of FreeSpaceConfig::pose_tolerance
+constexpr double kDegrees = M_PI / 180.0;
+
+std::vector<SimulatedScan> drive(Scene scene, Sensor sensor, int scans) {
+  simulation::Config config;
+  config.scene = scene;
+  config.sensor = sensor;
+  config.scans = scans;
+  config.seed = 31;
+  return simulate(config);
+}
+
+// All points of a scan, as non-ground points.
+GroundSplit split_of(const SimulatedScan& scan) {
+  GroundSplit split;
+  split.resize(scan.labels.size());
+  for (std::size_t i = 0; i < split.count; ++i) {
+    split.points.x[i] = scan.xyzi[4 * i];
+    split.points.y[i] = scan.xyzi[4 * i + 1];
+    split.points.z[i] = scan.xyzi[4 * i + 2];
+  }
+  return split;
+}
+
+// A correction that knows all scans but the last, under their exact poses.
+PoseCorrection after_all_but_last(const std::vector<SimulatedScan>& scans) {
+  PoseCorrection correction(kTolerance);
+  correction.begin_epoch(scans.front().T_world_sensor);
+  for (std::size_t i = 0; i + 1 < scans.size(); ++i) {
+    const GroundSplit split = split_of(scans[i]);
+    correction.insert(correction.correct(scans[i].T_world_sensor, split), split, {});
+  }
+  return correction;
+}
+
+Eigen::Isometry3d perturbation(const Eigen::Vector3d& metres, const Eigen::Vector3d& degrees) {
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.translation() = metres;
+  const Eigen::Vector3d turn = degrees * kDegrees;
+  T.linear() = Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()).toRotationMatrix();
+  return T;
+}
+
+double degrees(const Eigen::Isometry3d& T) {
+  return Eigen::AngleAxisd(T.linear()).angle() / kDegrees;
+}
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+  return values[values.size() / 2];
+}
+
+TEST_CASE("exact poses stay, with residuals below 1 cm and 0.02 deg") {
+  const auto [scene, sensor] = GENERATE(
+      table<Scene, Sensor>({{Scene::kUrban, Sensor::kHdl64}, {Scene::kCrowd, Sensor::kOs1_64}}));
+  const std::vector<SimulatedScan> scans = drive(scene, sensor, 15);
+  PoseCorrection correction(kTolerance);
+  correction.begin_epoch(scans.front().T_world_sensor);
+  std::vector<double> translations, rotations;
+  for (const SimulatedScan& scan : scans) {
+    const GroundSplit split = split_of(scan);
+    const Eigen::Isometry3d T = correction.correct(scan.T_world_sensor, split);
+    CHECK((T.matrix() - scan.T_world_sensor.matrix()).norm() == 0.0);
+    correction.insert(T, split, {});
+    if (!correction.residual()) continue;
+    translations.push_back(correction.residual()->translation);
+    rotations.push_back(correction.residual()->rotation);
+  }
+  REQUIRE(translations.size() == scans.size() - 1);
+  CHECK(median(translations) < 0.01);
+  CHECK(median(rotations) < 0.02);
+  CHECK(*std::max_element(translations.begin(), translations.end()) < 0.03);
+  CHECK(*std::max_element(rotations.begin(), rotations.end()) < 0.06);
+}
+
+// The errors allowed are those along the street, the direction with the least information.
+TEST_CASE("a perturbed pose is found and corrected") {
+  constexpr double kMetres = 0.035, kDegreesLeft = 0.05;
+  const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 8);
+  const Eigen::Isometry3d& T_truth = scans.back().T_world_sensor;
+  const GroundSplit split = split_of(scans.back());
+  const auto [metres, turn] =
+      GENERATE(table<Eigen::Vector3d, Eigen::Vector3d>({{{0.3, 0.0, 0.0}, {0.0, 0.0, 0.0}},
+                                                        {{0.0, -0.3, 0.0}, {0.0, 0.0, 0.0}},
+                                                        {{0.0, 0.0, 0.2}, {0.0, 0.0, 0.0}},
+                                                        {{0.0, 0.0, 0.0}, {0.5, 0.0, 0.0}},
+                                                        {{0.0, 0.0, 0.0}, {0.0, -0.5, 0.0}},
+                                                        {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.8}},
+                                                        {{0.05, 0.04, -0.03}, {0.1, 0.1, -0.2}},
+                                                        {{-0.3, 0.4, 0.05}, {0.1, -0.1, 0.3}}}));
+  const Eigen::Isometry3d T_wrong = T_truth * perturbation(metres, turn);
+  PoseCorrection correction = after_all_but_last(scans);
+  const Eigen::Isometry3d T = correction.correct(T_wrong, split);
+  INFO(metres.transpose() << " m, " << turn.transpose() << " deg");
+  REQUIRE(correction.residual());
+  CHECK_FALSE(correction.is_lost());
+  CHECK(correction.residual()->translation == Approx(metres.norm()).margin(kMetres));
+  CHECK(correction.residual()->rotation == Approx(turn.norm()).margin(kDegreesLeft));
+  const Eigen::Isometry3d T_error = T_truth.inverse() * T;
+  CHECK(T_error.translation().norm() < kMetres);
+  CHECK(degrees(T_error) < kDegreesLeft);
+
+  // The aligned motion does not depend on the error of the pushed pose.
+  const Eigen::Isometry3d T_motion = scans[scans.size() - 2].T_world_sensor.inverse() * T_truth;
+  const Eigen::Isometry3d T_difference =
+      T_motion.inverse() * correction.residual()->T_previous_newest;
+  CHECK(T_difference.translation().norm() < kMetres);
+  CHECK(degrees(T_difference) < kDegreesLeft);
+}
+
+TEST_CASE("a lasting offset is one residual, and later poses are corrected by it") {
+  const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 12);
+  const Eigen::Isometry3d T_moved_world(Eigen::Translation3d(0.3, -0.4, 0.0));
+  PoseCorrection correction(kTolerance);
+  correction.begin_epoch(scans.front().T_world_sensor);
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    const bool is_moved = i >= 6;
+    const GroundSplit split = split_of(scans[i]);
+    const Eigen::Isometry3d T_pushed =
+        is_moved ? T_moved_world * scans[i].T_world_sensor : scans[i].T_world_sensor;
+    const Eigen::Isometry3d T = correction.correct(T_pushed, split);
+    correction.insert(T, split, {});
+    INFO("scan " << i);
+    CHECK((T.translation() - scans[i].T_world_sensor.translation()).norm() < 0.03);
+    if (i > 0) {
+      REQUIRE(correction.residual());
+      const double expected = i == 6 ? 0.5 : 0.0;
+      CHECK(correction.residual()->translation == Approx(expected).margin(0.03));
+    }
+  }
+}
+
+TEST_CASE("between two long walls, the position along them stays") {
+  const auto corridor = [](std::uint64_t seed) {
+    Random random(seed);
+    GroundSplit split;
+    split.resize(20000);
+    for (std::size_t i = 0; i < split.count; ++i) {
+      const int side = static_cast<int>(random.index(3));
+      split.points.x[i] = random.uniform_float(-30.0, 30.0);
+      split.points.y[i] = side == 0 ? random.uniform_float(-4.0, 4.0) : side == 1 ? -4.0F : 4.0F;
+      split.points.z[i] = side == 0 ? -1.7F : random.uniform_float(-1.7, 2.0);
+    }
+    return split;
+  };
+  PoseCorrection correction(kTolerance);
+  correction.begin_epoch(Eigen::Isometry3d::Identity());
+  const GroundSplit first = corridor(7);
+  correction.insert(correction.correct(Eigen::Isometry3d::Identity(), first), first, {});
+  const Eigen::Isometry3d T_pushed(Eigen::Translation3d(1.0, 0.2, 0.0));
+  const Eigen::Isometry3d T = correction.correct(T_pushed, corridor(8));
+  CHECK(T.translation().x() == Approx(1.0).margin(0.01));
+  CHECK(T.translation().y() == Approx(0.0).margin(0.01));
+}
+
+TEST_CASE("a scan of another place is lost, and a scan without points has no residual") {
+  const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 4);
+  const std::vector<SimulatedScan> others = drive(Scene::kVegetation, Sensor::kHdl64, 1);
+  PoseCorrection correction = after_all_but_last(scans);
+  const Eigen::Isometry3d tilted =
+      scans.back().T_world_sensor * perturbation({0.0, 0.0, 0.4}, {6.0, 5.0, 30.0});
+  correction.correct(tilted, split_of(others.front()));
+  CHECK(correction.is_lost());
+  CHECK_FALSE(correction.residual());
+
+  PoseCorrection next = after_all_but_last(scans);
+  const Eigen::Isometry3d T = next.correct(scans.back().T_world_sensor, GroundSplit());
+  CHECK_FALSE(next.is_lost());
+  CHECK_FALSE(next.residual());
+  CHECK((T.matrix() - scans.back().T_world_sensor.matrix()).norm() == 0.0);
+}
+
+TEST_CASE("a full map of planes forgets the oldest voxels") {
+  VoxelPlanes planes;
+  planes.reserve();
+  for (int scan = 0; scan < 400; ++scan) {
+    planes.begin_scan();
+    for (int y = 0; y < 100; ++y) {
+      for (int k = 0; k < 8; ++k) {
+        const double p[3] = {scan + 0.1 + 0.1 * k, y + 0.1 + 0.1 * (k * 3 % 8), 0.2};
+        planes.add(p);
+      }
+    }
+    REQUIRE(planes.size() <= VoxelPlanes::kMostVoxels);
+  }
+  const double newest[3] = {399.5, 50.5, 0.7};
+  const double oldest[3] = {0.5, 50.5, 0.7};
+  REQUIRE(planes.find(newest) != nullptr);
+  CHECK(planes.find(newest)->distance(newest) == Approx(0.5));
+  CHECK(planes.find(oldest) == nullptr);
+}
+
+}  // namespace
+}  // namespace dynains::test
