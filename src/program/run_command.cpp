@@ -188,8 +188,15 @@ void add_run_command(CLI::App& app) {
   add_window_options(command, options->window);
   command
       .add_option("--map", options->map,
-                  "static map, .ply or .pcd [static_map.ply in the folder of --out]")
+                  "static map, .ply, .pcd or .las [static_map.ply in the folder of --out]")
       ->type_name("FILE");
+  command.add_flag("--map-attributes", options->map_attributes,
+                   "the map holds intensity, time and label of its points, as far as scans have "
+                   "them; a map of LAS holds its attributes always");
+  command
+      .add_option("--crs", options->crs,
+                  "coordinate reference system of the poses, for a map of LAS [none]")
+      ->type_name("EPSG:N");
   command
       .add_option(
           "--map-memory", options->map_memory,

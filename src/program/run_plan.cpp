@@ -1,9 +1,11 @@
 #include "run_plan.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
+#include "dynains/io/coordinate_system.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/pose.hpp"
@@ -51,10 +53,10 @@ fs::path choose_map(const RunOptions& options, const DynaInsRemover::Config& con
   if (options.map.empty()) return config.build_map ? out / "static_map.ply" : fs::path();
   if (!config.build_map) throw ConfigError("--map needs --build-map true");
   const fs::path map = whole_path(options.map);
-  if (!is_point_file(options.map) || !is_point_file(map)) {
-    throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
+  if (!is_map_name(options.map) || !is_map_name(map)) {
+    throw ConfigError("--map " + options.map + ": expected a name that ends in .ply, .pcd or .las");
   }
-  if (map == out / "dynamic_points.ply") {
+  if (map == out / "dynamic_points.ply" || map == out / "dynamic_points.las") {
     throw ConfigError("--map " + options.map + ": the moving points go there");
   }
   const bool is_beside_results =
@@ -65,6 +67,26 @@ fs::path choose_map(const RunOptions& options, const DynaInsRemover::Config& con
     throw ConfigError("--map " + options.map + ": other results go into that folder");
   }
   return map;
+}
+
+/// Throws ConfigError.
+void add_map_attributes(const RunOptions& options, const DynaInsRemover::Config& config,
+                        RunOutputs& outputs) {
+  outputs.map_attributes = options.map_attributes || outputs.has_las_map();
+  constexpr double kFinest = 0.01;  // m, for a map of all points
+  outputs.map_voxel = std::max(config.map.map_voxel, kFinest);
+  outputs.crs = options.crs;
+  if (options.map_attributes && !config.build_map) {
+    throw ConfigError("--map-attributes needs --build-map true");
+  }
+  if (outputs.map_attributes && outputs.map_on_disk) {
+    throw ConfigError(
+        "--map-memory bounds the memory of a map without attributes: not with "
+        "--map-attributes or a map of LAS");
+  }
+  if (outputs.crs.empty()) return;
+  if (!outputs.has_las_map()) throw ConfigError("--crs needs --map FILE.las");
+  wkt_of(outputs.crs);
 }
 
 InputFiles inputs_of(const RunOptions& options, const Recording& sequence) {
@@ -104,6 +126,7 @@ RunPlan make_plan(const RunOptions& options) {
   outputs.write_online = options.write_online;
   outputs.write_clean = options.write_clean;
   outputs.map_on_disk = options.map_memory.has_value();
+  add_map_attributes(options, config, outputs);
   std::optional<RemoverWithMapOnDisk::Config> map_on_disk;
   if (options.map_memory) {
     if (!config.build_map) throw ConfigError("--map-memory needs --build-map true");
@@ -171,7 +194,7 @@ OutsideMap::OutsideMap(const RunPlan& plan, bool may_replace) {
   }
   lock_.emplace(folder, FolderLock::Mode::kShared);
   remove_leftovers(folder, [&](const std::string& name) { return name == map.filename(); });
-  writer_ = open_map(map, plan.sequence, plan.range);
+  writer_ = open_map(map, plan.sequence, plan.range, plan.outputs);
   if (count_writers(map) > 1) {
     throw UsageError(map.string() + ": is being written by another run");
   }

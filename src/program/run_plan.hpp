@@ -29,6 +29,8 @@ struct RunOptions {
   std::string out;
   std::string map;
   std::optional<double> map_memory;  // MB
+  bool map_attributes = false;
+  std::string crs;
   ScanWindow window;
   bool write_online = false;
   bool write_clean = false;
@@ -74,11 +76,11 @@ class OutsideMap {
   /// it or has its folder.
   OutsideMap(const RunPlan& plan, bool may_replace);
 
-  std::unique_ptr<PointFileWriter> take_writer() { return std::move(writer_); }
+  std::unique_ptr<MapFile> take_writer() { return std::move(writer_); }
 
  private:
   std::optional<FolderLock> lock_;
-  std::unique_ptr<PointFileWriter> writer_;
+  std::unique_ptr<MapFile> writer_;
 };
 
 }  // namespace dynains::program
