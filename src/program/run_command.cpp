@@ -208,6 +208,9 @@ void add_run_command(CLI::App& app) {
   command.add_flag("--write-clean", options->write_clean,
                    "also write every scan without its moving points, to the folder clean, in the "
                    "form it has in SEQ");
+  command.add_flag("--write-mcap", options->write_mcap,
+                   "also write verdicts.mcap, a log of ROS 2 with all scans, their labels, "
+                   "instances, beliefs and causes, the poses and the map");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   command.footer(
       "Writes labels/NNNNNN.label (uint32 a point: 251 moving, 9 static, 0 not judged; instance id "

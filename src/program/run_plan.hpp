@@ -34,6 +34,7 @@ struct RunOptions {
   ScanWindow window;
   bool write_online = false;
   bool write_clean = false;
+  bool write_mcap = false;
   bool force = false;
   bool resume = false;
   bool quiet = false;

@@ -85,6 +85,7 @@ nlohmann::ordered_json describe_request(const Recording& recording, const ScanRa
           {"crs", outputs.crs},
           {"write_online", outputs.write_online},
           {"write_clean", outputs.write_clean},
+          {"write_mcap", outputs.write_mcap},
           {"configuration", configuration}};
 }
 

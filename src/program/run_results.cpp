@@ -20,6 +20,7 @@ bool is_far(const Recording& recording, const ScanRange& range) {
 }
 
 constexpr const char* kDynamicLas = "dynamic_points.las";
+constexpr const char* kVerdictLog = "verdicts.mcap";
 
 PointColumns map_columns(bool far, const Recording& recording, bool with_attributes) {
   PointColumns columns;
@@ -59,7 +60,7 @@ PointColumns dynamic_columns(bool far, PointColumns columns) {
 const OutputKind& run_output_kind() {
   static const OutputKind kind = {"run",
                                   "report.json",
-                                  {"timing.csv", "dynamic_points.ply", kDynamicLas},
+                                  {"timing.csv", "dynamic_points.ply", kDynamicLas, kVerdictLog},
                                   true,
                                   {{"labels", {".label"}},
                                    {"online", {".label"}},
@@ -83,6 +84,7 @@ OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& r
   listing.files = {"timing.csv", "dynamic_points.ply"};
   if (!map.empty() && !has_outside_map()) listing.files.insert(map_name());
   if (has_las_map()) listing.files.insert(kDynamicLas);
+  if (write_mcap) listing.files.insert(kVerdictLog);
   listing.folders = {{"labels", ".label"}, {"causes", ".cause"}};
   if (write_online) listing.folders["online"] = ".label";
   if (write_clean) {
@@ -119,6 +121,10 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
   if (!outputs.map.empty() && !map_is_outside_) {
     map_ = open_map(outputs.folder / outputs.map.filename(), recording, range, outputs);
   }
+  if (outputs.write_mcap) {
+    log_ = std::make_unique<VerdictLog>(outputs.folder / kVerdictLog, recording, range.first,
+                                        is_far(recording, range));
+  }
   if (outputs.has_las_map()) {
     dynamic_las_ = open_map(outputs.folder / kDynamicLas, recording, range, outputs);
   }
@@ -141,6 +147,7 @@ void RunResults::take_final(const ScanVerdict& verdict) {
   RecordedScan scan = std::move(open_scans_.front());
   open_scans_.pop_front();
   if (clean_scans_) clean_scans_->write(index, scan, verdict.labels);
+  if (log_) log_->add(scan, verdict);
   const bool has_labels = map_attributes_ && recording_.has_labels();
   const auto labels = has_labels ? recording_.read_labels(index) : std::vector<std::uint32_t>();
   if (map_attributes_) map_attributes_->add(scan, verdict, labels);
@@ -164,6 +171,7 @@ RecordedScan RunResults::recycle() {
 }
 
 void RunResults::add_map_point(const Eigen::Vector3d& point) {
+  if (log_) log_->add_map_point(point);
   map_->add(point, map_attributes_ ? map_attributes_->at(point) : MapAttributes());
 }
 
@@ -172,6 +180,7 @@ void RunResults::commit() {
   if (online_labels_) online_labels_->finish();
   dynamic_points_.commit();
   if (dynamic_las_) dynamic_las_->commit();
+  if (log_) log_->commit();
   if (map_ && !map_is_outside_) map_->commit();
 }
 

@@ -19,6 +19,7 @@
 #include "label_writer.hpp"
 #include "map_file.hpp"
 #include "output_listing.hpp"
+#include "verdict_log.hpp"
 
 namespace dynains::program {
 
@@ -41,6 +42,7 @@ struct RunOutputs {
   std::filesystem::path map;  ///< by whole_path(); empty: no map
   bool write_online = false;
   bool write_clean = false;
+  bool write_mcap = false;
   bool map_on_disk = false;
   bool map_attributes = false;  ///< the map holds attributes of its points
   std::string crs;              ///< of a LAS map, for example "EPSG:25832"; empty: none
@@ -102,6 +104,7 @@ class RunResults {
   std::optional<LabelWriter> online_labels_;
   std::optional<CleanWriter> clean_scans_;
   PointFileWriter dynamic_points_;
+  std::unique_ptr<VerdictLog> log_;
   std::unique_ptr<MapFile> map_;
   std::unique_ptr<MapFile> dynamic_las_;  ///< moving points beside a LAS map
   std::optional<MapAttributeTable> map_attributes_;

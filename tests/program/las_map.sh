@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# las_map.sh PROGRAM WORK NODE SCRIPT: an independent reader finds in a map of LAS the points of PLY.
+# las_map.sh PROGRAM WORK NODE: an independent reader finds in a map of LAS the points of PLY.
 set -euo pipefail
-program=$1 work=$2 node=$3 script=$4
+program=$1 work=$2 node=$3
+script=${0%/*}/check_las.mjs
 rm -rf "$work"
 mkdir -p "$work"
 "$program" simulate "$work/seq" --sensor vlp16 --scans 12 --quiet
