@@ -10,6 +10,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
 #include "json_file.hpp"
+#include "map_file.hpp"
 
 namespace dynains::program {
 namespace {
@@ -67,7 +68,7 @@ class ListingReader {
       const std::string name = name_of(entry);
       const bool is_fixed =
           std::find(kind_.files.begin(), kind_.files.end(), name) != kind_.files.end();
-      if (!is_fixed && !(kind_.has_map && is_point_file(name))) refuse("files", name);
+      if (!is_fixed && !(kind_.has_map && is_map_name(name))) refuse("files", name);
       listing.files.insert(name);
     }
     const ListingJson& folders = field(json, "folders", &ListingJson::is_object, "an object");

@@ -141,6 +141,9 @@ class NewMap {
       : out_(out) {
     const fs::path folder = whole_path(out.path());
     path_ = options.map.empty() ? folder / kRemappedMap : map_path(options.map, folder);
+    if (is_las(path_)) {
+      throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
+    }
     is_inside_ = path_.parent_path() == folder;
     if (!is_inside_) {
       outside_.emplace(path_, recording, range, inputs, options.force);
@@ -157,17 +160,13 @@ class NewMap {
       throw IoError(path_.string() +
                     ": is in the way, and was not written by dynains remap; move it away");
     }
-    writer_ = open_map(path_, recording, range);
+    writer_ = open_map(path_, recording, range, RunOutputs());
   }
 
   const fs::path& path() const { return path_; }
 
   void write(const StaticMapAccumulator& map, Json report, const Json& description) {
-    map.for_each([&](const Eigen::Vector3d& point) {
-      FilePoint out;
-      out.position = point;
-      writer_->add(out);
-    });
+    map.for_each([&](const Eigen::Vector3d& point) { writer_->add(point, MapAttributes()); });
     if (!is_inside_) {
       writer_->commit();
       return;
@@ -189,7 +188,7 @@ class NewMap {
   fs::path path_;
   bool is_inside_ = false;
   std::optional<OutsideMap> outside_;
-  std::unique_ptr<PointFileWriter> writer_;
+  std::unique_ptr<MapFile> writer_;
 };
 
 InputFiles inputs_of(const Recording& corrected, const std::optional<Recording>& original) {

@@ -199,8 +199,15 @@ void add_run_command(CLI::App& app) {
   add_window_options(command, options->window);
   command
       .add_option("--map", options->map,
-                  "static map, .ply or .pcd [static_map.ply in the folder of --out]")
+                  "static map, .ply, .pcd or .las [static_map.ply in the folder of --out]")
       ->type_name("FILE");
+  command.add_flag("--map-attributes", options->map_attributes,
+                   "the map holds intensity, time and label of its points, as far as scans have "
+                   "them; a map of LAS holds its attributes always");
+  command
+      .add_option("--crs", options->crs,
+                  "coordinate reference system of the poses, for a map of LAS [none]")
+      ->type_name("EPSG:N");
   command
       .add_option(
           "--map-memory", options->map_memory,
@@ -216,6 +223,9 @@ void add_run_command(CLI::App& app) {
       "--accept-poses", options->accept_poses,
       "run even if the scans disagree with the poses, which else ends the command with "
       "exit code 2 before anything is written");
+  command.add_flag("--write-mcap", options->write_mcap,
+                   "also write verdicts.mcap, a log of ROS 2 with all scans, their labels, "
+                   "instances, beliefs and causes, the poses and the map");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   command.footer(
       "Writes labels/NNNNNN.label (uint32 a point: 251 moving, 9 static, 0 not judged; instance id "

@@ -1,9 +1,11 @@
 #include "run_plan.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
+#include "dynains/io/coordinate_system.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/pose.hpp"
@@ -53,6 +55,26 @@ fs::path choose_map(const RunOptions& options, const DynaInsRemover::Config& con
   return map_path(options.map, out);
 }
 
+/// Throws ConfigError.
+void add_map_attributes(const RunOptions& options, const DynaInsRemover::Config& config,
+                        RunOutputs& outputs) {
+  outputs.map_attributes = options.map_attributes || outputs.has_las_map();
+  constexpr double kFinest = 0.01;  // m, for a map of all points
+  outputs.map_voxel = std::max(config.map.map_voxel, kFinest);
+  outputs.crs = options.crs;
+  if (options.map_attributes && !config.build_map) {
+    throw ConfigError("--map-attributes needs --build-map true");
+  }
+  if (outputs.map_attributes && outputs.map_on_disk) {
+    throw ConfigError(
+        "--map-memory bounds the memory of a map without attributes: not with "
+        "--map-attributes or a map of LAS");
+  }
+  if (outputs.crs.empty()) return;
+  if (!outputs.has_las_map()) throw ConfigError("--crs needs --map FILE.las");
+  wkt_of(outputs.crs);
+}
+
 InputFiles inputs_of(const RunOptions& options, const Recording& sequence) {
   InputFiles inputs;
   for (const fs::path& file : sequence.files()) inputs.add(file);
@@ -84,10 +106,10 @@ bool is_whole(const RunPlan& plan, const OutputFolder& out) {
 
 fs::path map_path(const std::string& name, const fs::path& out) {
   fs::path map = whole_path(name);
-  if (!is_point_file(name) || !is_point_file(map)) {
-    throw ConfigError("--map " + name + ": expected a name that ends in .ply or .pcd");
+  if (!is_map_name(name) || !is_map_name(map)) {
+    throw ConfigError("--map " + name + ": expected a name that ends in .ply, .pcd or .las");
   }
-  if (map == out / "dynamic_points.ply") {
+  if (map == out / "dynamic_points.ply" || map == out / "dynamic_points.las") {
     throw ConfigError("--map " + name + ": the moving points go there");
   }
   const bool is_beside_results =
@@ -107,7 +129,9 @@ RunPlan make_plan(const RunOptions& options) {
   outputs.map = choose_map(options, config);
   outputs.write_online = options.write_online;
   outputs.write_clean = options.write_clean;
+  outputs.write_mcap = options.write_mcap;
   outputs.map_on_disk = options.map_memory.has_value();
+  add_map_attributes(options, config, outputs);
   std::optional<RemoverWithMapOnDisk::Config> map_on_disk;
   if (options.map_memory) {
     if (!config.build_map) throw ConfigError("--map-memory needs --build-map true");
@@ -162,11 +186,11 @@ void check_space(const RunPlan& plan) {
 
 OutsideMap::OutsideMap(const RunPlan& plan, bool may_replace) {
   if (!plan.outputs.has_outside_map()) return;
-  open(plan.outputs.map, plan.sequence, plan.range, plan.inputs, may_replace);
+  open(plan.outputs.map, plan.sequence, plan.range, plan.outputs, plan.inputs, may_replace);
 }
 
 void OutsideMap::open(const fs::path& map, const Recording& recording, const ScanRange& range,
-                      const InputFiles& inputs, bool may_replace) {
+                      const RunOutputs& outputs, const InputFiles& inputs, bool may_replace) {
   const fs::path folder = map.parent_path();
   inputs.refuse(map);
   if (identity_of(folder) == identity_of(recording.scan_folder())) {
@@ -179,7 +203,7 @@ void OutsideMap::open(const fs::path& map, const Recording& recording, const Sca
   }
   lock_.emplace(folder, FolderLock::Mode::kShared);
   remove_leftovers(folder, [&](const std::string& name) { return name == map.filename(); });
-  writer_ = open_map(map, recording, range);
+  writer_ = open_map(map, recording, range, outputs);
   if (count_writers(map) > 1) {
     throw UsageError(map.string() + ": is being written by another run");
   }

@@ -29,9 +29,12 @@ struct RunOptions {
   std::string out;
   std::string map;
   std::optional<double> map_memory;  // MB
+  bool map_attributes = false;
+  std::string crs;
   ScanWindow window;
   bool write_online = false;
   bool write_clean = false;
+  bool write_mcap = false;
   bool force = false;
   bool resume = false;
   bool accept_poses = false;
@@ -52,8 +55,8 @@ struct RunPlan {
 };
 
 /// Path of the file that a flag --map names, links followed. `out`: folder of the results, by
-/// whole_path(). Throws ConfigError unless the name ends in .ply or .pcd and no other result goes
-/// there.
+/// whole_path(). Throws ConfigError unless the name ends in .ply, .pcd or .las and no other result
+/// goes there.
 std::filesystem::path map_path(const std::string& name, const std::filesystem::path& out);
 
 /// Opens the recording and checks everything but the points. Throws ConfigError, IoError,
@@ -82,17 +85,17 @@ class OutsideMap {
   /// For a map of these scans; `inputs` are never replaced.
   OutsideMap(const std::filesystem::path& map, const Recording& recording, const ScanRange& range,
              const InputFiles& inputs, bool may_replace) {
-    open(map, recording, range, inputs, may_replace);
+    open(map, recording, range, RunOutputs(), inputs, may_replace);
   }
 
-  std::unique_ptr<PointFileWriter> take_writer() { return std::move(writer_); }
+  std::unique_ptr<MapFile> take_writer() { return std::move(writer_); }
 
  private:
   void open(const std::filesystem::path& map, const Recording& recording, const ScanRange& range,
-            const InputFiles& inputs, bool may_replace);
+            const RunOutputs& outputs, const InputFiles& inputs, bool may_replace);
 
   std::optional<FolderLock> lock_;
-  std::unique_ptr<PointFileWriter> writer_;
+  std::unique_ptr<MapFile> writer_;
 };
 
 }  // namespace dynains::program

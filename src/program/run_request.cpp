@@ -81,8 +81,11 @@ nlohmann::ordered_json describe_request(const Recording& recording, const ScanRa
           {"deskew", recording.is_deskewed()},
           {"map", outputs.map_name()},
           {"map_on_disk", outputs.map_on_disk},
+          {"map_attributes", outputs.map_attributes},
+          {"crs", outputs.crs},
           {"write_online", outputs.write_online},
           {"write_clean", outputs.write_clean},
+          {"write_mcap", outputs.write_mcap},
           {"configuration", configuration}};
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "dynains/io/coordinate_system.hpp"
 #include "output_folder.hpp"
 
 namespace dynains::program {
@@ -18,10 +19,33 @@ bool is_far(const Recording& recording, const ScanRange& range) {
   return false;
 }
 
-PointColumns map_columns(bool far) {
+constexpr const char* kDynamicLas = "dynamic_points.las";
+constexpr const char* kVerdictLog = "verdicts.mcap";
+
+PointColumns map_columns(bool far, const Recording& recording, bool with_attributes) {
   PointColumns columns;
   columns.double_xyz = far;
+  if (!with_attributes) return columns;
+  columns.intensity = recording.columns().intensity;
+  columns.time = recording.columns().time;
+  columns.label = recording.has_labels();
   return columns;
+}
+
+float most_intensity(const RecordedScan& scan) {
+  float most = 0.0F;
+  for (std::size_t i = 0; i < scan.size(); ++i) most = std::max(most, scan.xyzi[4 * i + 3]);
+  return most;
+}
+
+/// The origin is a whole number of kilometres, so that the coordinates stay short.
+LasOptions las_options(const Recording& recording, const ScanRange& range, const std::string& crs) {
+  constexpr double kKilometre = 1000.0;  // m
+  LasOptions options;
+  const Eigen::Vector3d first = recording.T_world_sensor(range.first).translation();
+  options.offset = kKilometre * (first / kKilometre).array().floor();
+  if (!crs.empty()) options.wkt = wkt_of(crs);
+  return options;
 }
 
 PointColumns dynamic_columns(bool far, PointColumns columns) {
@@ -36,7 +60,7 @@ PointColumns dynamic_columns(bool far, PointColumns columns) {
 const OutputKind& run_output_kind() {
   static const OutputKind kind = {"run",
                                   "report.json",
-                                  {"timing.csv", "dynamic_points.ply"},
+                                  {"timing.csv", "dynamic_points.ply", kDynamicLas, kVerdictLog},
                                   true,
                                   {{"labels", {".label"}},
                                    {"online", {".label"}},
@@ -59,6 +83,8 @@ OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& r
   OutputListing listing;
   listing.files = {"timing.csv", "dynamic_points.ply"};
   if (!map.empty() && !has_outside_map()) listing.files.insert(map_name());
+  if (has_las_map()) listing.files.insert(kDynamicLas);
+  if (write_mcap) listing.files.insert(kVerdictLog);
   listing.folders = {{"labels", ".label"}, {"causes", ".cause"}};
   if (write_online) listing.folders["online"] = ".label";
   if (write_clean) {
@@ -70,13 +96,19 @@ OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& r
   return listing;
 }
 
-std::unique_ptr<PointFileWriter> open_map(const std::filesystem::path& file,
-                                          const Recording& recording, const ScanRange& range) {
-  return std::make_unique<PointFileWriter>(file, map_columns(is_far(recording, range)));
+std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recording& recording,
+                                  const ScanRange& range, const RunOutputs& outputs) {
+  MapFileOptions options;
+  options.columns = map_columns(is_far(recording, range), recording, outputs.map_attributes);
+  if (is_las(file)) {
+    options.las = las_options(recording, range, outputs.crs);
+    options.intensity_scale = las_intensity_scale(most_intensity(recording.read_scan(range.first)));
+  }
+  return MapFile::open(file, options);
 }
 
 RunResults::RunResults(const Recording& recording, const ScanRange& range,
-                       const RunOutputs& outputs, std::unique_ptr<PointFileWriter> outside_map)
+                       const RunOutputs& outputs, std::unique_ptr<MapFile> outside_map)
     : recording_(recording),
       range_(range),
       final_labels_(outputs.folder / "labels", outputs.folder / "causes"),
@@ -87,7 +119,17 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
   if (outputs.write_online) online_labels_.emplace(outputs.folder / "online");
   if (outputs.write_clean) clean_scans_.emplace(outputs.folder / "clean", recording);
   if (!outputs.map.empty() && !map_is_outside_) {
-    map_ = open_map(outputs.folder / outputs.map.filename(), recording, range);
+    map_ = open_map(outputs.folder / outputs.map.filename(), recording, range, outputs);
+  }
+  if (outputs.write_mcap) {
+    log_ = std::make_unique<VerdictLog>(outputs.folder / kVerdictLog, recording, range.first,
+                                        is_far(recording, range));
+  }
+  if (outputs.has_las_map()) {
+    dynamic_las_ = open_map(outputs.folder / kDynamicLas, recording, range, outputs);
+  }
+  if (outputs.map_attributes) {
+    map_attributes_.emplace(outputs.map_voxel, recording.T_world_sensor(range.first).translation());
   }
 }
 
@@ -105,12 +147,17 @@ void RunResults::take_final(const ScanVerdict& verdict) {
   RecordedScan scan = std::move(open_scans_.front());
   open_scans_.pop_front();
   if (clean_scans_) clean_scans_->write(index, scan, verdict.labels);
+  if (log_) log_->add(scan, verdict);
+  const bool has_labels = map_attributes_ && recording_.has_labels();
+  const auto labels = has_labels ? recording_.read_labels(index) : std::vector<std::uint32_t>();
+  if (map_attributes_) map_attributes_->add(scan, verdict, labels);
   for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
     if (verdict.labels[i] != PointLabel::kDynamic) continue;
     FilePoint point = scan.point(i);
     point.position = verdict.T_world_sensor * point.position;
     point.label = mos_label(verdict.labels[i], verdict.instances[i]);
     dynamic_points_.add(point);
+    if (dynamic_las_) dynamic_las_->add(point.position, attributes_of(scan, verdict, labels, i));
   }
   spare_.push_back(std::move(scan));
   ++finished_;
@@ -124,15 +171,16 @@ RecordedScan RunResults::recycle() {
 }
 
 void RunResults::add_map_point(const Eigen::Vector3d& point) {
-  FilePoint out;
-  out.position = point;
-  map_->add(out);
+  if (log_) log_->add_map_point(point);
+  map_->add(point, map_attributes_ ? map_attributes_->at(point) : MapAttributes());
 }
 
 void RunResults::commit() {
   final_labels_.finish();
   if (online_labels_) online_labels_->finish();
   dynamic_points_.commit();
+  if (dynamic_las_) dynamic_las_->commit();
+  if (log_) log_->commit();
   if (map_ && !map_is_outside_) map_->commit();
 }
 

@@ -17,7 +17,9 @@
 #include "dynains/io/recording.hpp"
 #include "dynains/verdict.hpp"
 #include "label_writer.hpp"
+#include "map_file.hpp"
 #include "output_listing.hpp"
+#include "verdict_log.hpp"
 
 namespace dynains::program {
 
@@ -40,9 +42,14 @@ struct RunOutputs {
   std::filesystem::path map;  ///< by whole_path(); empty: no map
   bool write_online = false;
   bool write_clean = false;
+  bool write_mcap = false;
   bool map_on_disk = false;
+  bool map_attributes = false;  ///< the map holds attributes of its points
+  std::string crs;              ///< of a LAS map, for example "EPSG:25832"; empty: none
+  double map_voxel = 0.0;       ///< m, of attributes
 
   bool has_outside_map() const;
+  bool has_las_map() const { return is_las(map); }
   /// The map relative to the folder if it lies there, so that the folder can be moved; else
   /// absolute. Empty if there is none.
   std::string map_name() const;
@@ -50,9 +57,9 @@ struct RunOutputs {
   OutputListing listing(const Recording& recording, const ScanRange& range, bool lasts) const;
 };
 
-/// Opens a file for the map of these scans. Throws IoError.
-std::unique_ptr<PointFileWriter> open_map(const std::filesystem::path& file,
-                                          const Recording& recording, const ScanRange& range);
+/// Opens a file for the map of these scans, or for its moving points. Throws IoError.
+std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recording& recording,
+                                  const ScanRange& range, const RunOutputs& outputs);
 
 /// Counts of points by final label.
 struct LabelCounts {
@@ -72,7 +79,7 @@ class RunResults {
   /// `outside_map` is that of open_map(); if it is null, the map goes into `outputs.folder`. The
   /// recording outlives this. Throws IoError.
   RunResults(const Recording& recording, const ScanRange& range, const RunOutputs& outputs,
-             std::unique_ptr<PointFileWriter> outside_map = nullptr);
+             std::unique_ptr<MapFile> outside_map = nullptr);
 
   /// The scan just pushed, which this keeps, and the verdict on it.
   void take_newest(RecordedScan scan, const ScanVerdict& verdict);
@@ -97,7 +104,10 @@ class RunResults {
   std::optional<LabelWriter> online_labels_;
   std::optional<CleanWriter> clean_scans_;
   PointFileWriter dynamic_points_;
-  std::unique_ptr<PointFileWriter> map_;
+  std::unique_ptr<VerdictLog> log_;
+  std::unique_ptr<MapFile> map_;
+  std::unique_ptr<MapFile> dynamic_las_;  ///< moving points beside a LAS map
+  std::optional<MapAttributeTable> map_attributes_;
   bool map_is_outside_;
   std::deque<RecordedScan> open_scans_;  // oldest first
   std::vector<RecordedScan> spare_;

@@ -46,11 +46,13 @@ bool write_log(Simulator& simulator, const std::filesystem::path& file,
                const std::function<bool(std::size_t, std::size_t)>& progress) {
   const std::unique_ptr<LogWriter> writer = create_log(file);
   const MessageEncoding encoding = writer->encoding();
+  // ROS 1 takes time 0 for a time that is not known.
+  const double begin = encoding == MessageEncoding::kRos1 ? 1.0 : 0.0;  // s
   const std::uint16_t clouds = writer->add_channel("/points", point_cloud2_type());
   const std::uint16_t transforms = writer->add_channel("/tf", transforms_type());
   for (std::size_t i = 0; i < simulator.size(); ++i) {
     const SimulatedScan scan = simulator.scan(i);
-    const auto time = static_cast<std::uint64_t>(std::llround(scan.time * 1e9));
+    const auto time = static_cast<std::uint64_t>(std::llround((begin + scan.time) * 1e9));
     writer->write(transforms, time,
                   transform_message(encoding, time, "map", kFrame, scan.T_world_sensor_noisy));
     writer->write(clouds, time, cloud_of(scan, encoding, time));

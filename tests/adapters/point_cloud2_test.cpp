@@ -148,7 +148,7 @@ TEST_CASE("labels of messages are those of the points in them") {
   CHECK((found == expected));
 }
 
-TEST_CASE("the static points of a message keep every byte") {
+TEST_CASE("the static points of a message keep every byte, and the others are apart") {
   const std::vector<PointLabel> labels = {PointLabel::kDynamic, PointLabel::kStatic,
                                           PointLabel::kGround,  PointLabel::kOutOfRange,
                                           PointLabel::kInvalid, PointLabel::kStatic};
@@ -168,6 +168,10 @@ TEST_CASE("the static points of a message keep every byte") {
   CHECK(kept.height == 1);
   CHECK(kept.width == 3);
   CHECK(kept.row_step == 48);
+  const LookAlike moving = dynamic_points(message, labels);
+  CHECK(points_of(PointCloud2View(moving)) == std::vector<Eigen::Vector3f>{kPoints[0]});
+  CHECK(moving.header.frame_id == "velodyne");
+  CHECK(moving.width == 1);
   CHECK_THROWS_AS(static_points(message, Span<const PointLabel>(labels.data(), 5)),
                   std::invalid_argument);
 }

@@ -31,7 +31,7 @@ def main(bag_file, sequence):
         (transform,) = message.transforms
         assert transform.header.frame_id == "map" and transform.child_frame_id == "lidar"
         assert cloud.header.frame_id == "lidar"
-        assert abs(transform.header.stamp.to_sec() - time) < 1e-6
+        assert abs(transform.header.stamp.to_sec() - 1.0 - time) < 1e-6
         q = transform.transform.rotation
         assert abs(q.x ** 2 + q.y ** 2 + q.z ** 2 + q.w ** 2 - 1.0) < 1e-9
     print(len(clouds), "clouds are equal")

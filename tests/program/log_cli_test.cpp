@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "dynains/io/kitti.hpp"
+#include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
 #include "io/files.hpp"
 #include "io/log_writer.hpp"
@@ -161,6 +163,37 @@ TEST_CASE("--deskew restores the scores that a rolling shutter costs, and keeps 
   const RecordedScan scan = clean.read_scan(3);
   CHECK(std::includes(raw.time.begin(), raw.time.end(), scan.time.begin(), scan.time.end()));
   CHECK(scan.xyzi[0] != raw.xyzi[0]);
+}
+
+TEST_CASE("--write-mcap: the log of the verdicts is a recording with the scans of the input") {
+  const TemporaryFolder folder;
+  write_tiny_sequence(folder / "seq", kScans, kPosition);
+  const std::string out = folder / "out";
+  REQUIRE(start({"run", folder / "seq", "--out", out}).code == 0);
+  const std::string labels = all_labels(out);
+  REQUIRE(start({"run", folder / "seq", "--out", out, "--write-mcap", "--force"}).code == 0);
+  CHECK(all_labels(out) == labels);
+  RecordingOptions options;
+  options.cloud_topic = "/points";
+  const Recording verdicts(out + "/verdicts.mcap", options);
+  const Recording input(folder / "seq");
+  REQUIRE(verdicts.size() == input.size());
+  CHECK(verdicts.read_scan(3).xyzi == input.read_scan(3).xyzi);
+  CHECK(verdicts.T_world_sensor(3).isApprox(input.T_world_sensor(3), 1e-9));
+  CHECK(verdicts.time(3) == Approx(input.time(3)));
+  std::vector<std::uint32_t> expected =
+      read_labels(fs::path(out) / "labels" / "000003.label", input.point_count(3));
+  for (std::uint32_t& label : expected) label &= 0xFFFFU;
+  CHECK(verdicts.read_labels(3) == expected);
+  write_text(folder / "poses.tum", "1.1 0 0 0 0 0 0 1\n");
+  options.poses = folder / "poses.tum";
+  options.cloud_topic = "/static_map";
+  CHECK(Recording(out + "/verdicts.mcap", options).point_count(0) ==
+        read_point_file_header(out + "/static_map.ply").point_count);
+
+  // Results of a run without the flag replace the log.
+  REQUIRE(start({"run", folder / "seq", "--out", out, "--force"}).code == 0);
+  CHECK_FALSE(fs::exists(out + "/verdicts.mcap"));
 }
 
 TEST_CASE("Memory for reading does not grow with the log") {

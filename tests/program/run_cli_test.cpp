@@ -248,6 +248,51 @@ TEST_CASE("Flags --start and --end are scan numbers, both included") {
   CHECK(fixture.report()["scans"] == 5);
 }
 
+TEST_CASE("A map of LAS holds classes and attributes, and moving points have a file of their own") {
+  const Fixture fixture;
+  const std::string map = fixture.folder / "map.las";
+  REQUIRE(fixture.run({"--map-attributes"}).code == 0);
+  const PointFile expected = read_points(fixture.out + "/static_map.ply");
+  CHECK(expected.intensity.size() == expected.positions.size());
+  CHECK(expected.time.empty());
+  const std::size_t moving = read_points(fixture.out + "/dynamic_points.ply").positions.size();
+  CHECK(moving > 0);
+
+  REQUIRE(fixture.run({"--map", map, "--force"}).code == 0);
+  CHECK(fixture.report()["static_map"]["points"] == expected.positions.size());
+  const PointFile points = read_points(map);
+  REQUIRE(points.positions.size() == expected.positions.size());
+  for (std::size_t i = 0; i < points.positions.size(); ++i) {
+    CHECK((points.positions[i] - expected.positions[i]).cwiseAbs().maxCoeff() < 0.00052);
+  }
+  CHECK(points.time.size() == points.positions.size());
+  CHECK(read_points(fixture.out + "/dynamic_points.las").positions.size() == moving);
+  // Results without LAS replace both files.
+  REQUIRE(fixture.run({"--force"}).code == 0);
+  CHECK_FALSE(fs::exists(fixture.out + "/dynamic_points.las"));
+}
+
+TEST_CASE("Flags of attributes of the map that do not fit together are refused") {
+  const Fixture fixture(3);
+  const auto refusal = [&](const std::vector<std::string>& flags) {
+    const Outcome outcome = fixture.run(flags);
+    CHECK(outcome.code != 0);
+    CHECK_FALSE(fs::exists(fixture.out));
+    return outcome.err;
+  };
+  const std::string map = fixture.folder / "map.las";
+  CHECK_THAT(refusal({"--crs", "EPSG:25832"}), ContainsSubstring("--crs needs --map FILE.las"));
+  CHECK_THAT(refusal({"--map", map, "--crs", "nowhere"}),
+             ContainsSubstring("found nowhere") || ContainsSubstring("libproj-dev"));
+  CHECK_THAT(refusal({"--map", map, "--map-memory", "10"}), ContainsSubstring("a map of LAS"));
+  CHECK_THAT(refusal({"--map-attributes", "--build-map", "false"}),
+             ContainsSubstring("--map-attributes needs --build-map true"));
+  CHECK_THAT(refusal({"--map", fixture.out + "/dynamic_points.las"}),
+             ContainsSubstring("the moving points go there"));
+  CHECK_THAT(refusal({"--map", fixture.folder / "map.laz"}),
+             ContainsSubstring("ends in .ply, .pcd or .las"));
+}
+
 TEST_CASE("Flags --map and --map-voxel") {
   const Fixture fixture;
   const std::string map = fixture.folder / "my map.pcd";
@@ -695,7 +740,7 @@ TEST_CASE("Wrong flags: exit code 2, one line, nothing written") {
       {{"--start", "-1"}, "--start: expected the number of a scan, found -1"},
       {{"--end", "-1"}, "--end: expected the number of a scan, found -1"},
       {{"--end", "18446744073709551616"}, "--end: expected the number of a scan"},
-      {{"--map", "a.las"}, "a.las: expected a name that ends in .ply or .pcd"},
+      {{"--map", "a.laz"}, "a.laz: expected a name that ends in .ply, .pcd or .las"},
       {{"--map", "a.ply", "--build-map", "false"}, "--map needs --build-map true"},
       {{"--map", fixture.out + "/dynamic_points.ply"}, "the moving points go there"},
       {{"--map", fixture.out + "/clean/a.ply"}, "other results go into that folder"},

@@ -95,7 +95,13 @@ struct Fixture {
     sequence.emplace(folder / "seq");
     fs::create_directory(folder / "out");
   }
-  RunOutputs outputs() const { return {folder / "out", folder / "out/map.ply", true, false}; }
+  RunOutputs outputs() const {
+    RunOutputs outputs;
+    outputs.folder = folder / "out";
+    outputs.map = folder / "out/map.ply";
+    outputs.write_online = true;
+    return outputs;
+  }
 
   TemporaryFolder folder;
   std::optional<Recording> sequence;

@@ -164,14 +164,14 @@ double message_time(const Message& message) {
   return static_cast<double>(stamp.sec) + 1e-9 * static_cast<double>(detail::nanoseconds(stamp, 0));
 }
 
-/// Copy of the points of `message` with a static label, with all fields and the header, as one row.
-/// `labels`: by point of `message`. Throws CloudError for an invalid layout, and
-/// std::invalid_argument if the sizes differ.
-template <class Message>
-Message static_points(const Message& message, Span<const PointLabel> labels) {
+/// Copy of the points of `message` for whose label `is_kept(label)` holds, with all fields and the
+/// header, as one row. `labels`: by point of `message`. Throws CloudError for an invalid layout,
+/// and std::invalid_argument if the sizes differ.
+template <class Message, class IsKept>
+Message select_points(const Message& message, Span<const PointLabel> labels, IsKept&& is_kept) {
   const PointCloud2View view(message);
   if (labels.size() != view.size()) {
-    throw std::invalid_argument("static_points: as many labels as points are needed");
+    throw std::invalid_argument("select_points: as many labels as points are needed");
   }
   Message result;
   result.header = message.header;
@@ -180,18 +180,31 @@ Message static_points(const Message& message, Span<const PointLabel> labels) {
   result.is_dense = message.is_dense;
   result.point_step = message.point_step;
   std::size_t count = 0;
-  for (const PointLabel label : labels) count += is_static(label) ? 1 : 0;
+  for (const PointLabel label : labels) count += is_kept(label) ? 1 : 0;
   result.height = 1;
   result.width = static_cast<std::uint32_t>(count);
   result.row_step = static_cast<std::uint32_t>(count * message.point_step);
   result.data.resize(count * message.point_step);
   auto to = result.data.begin();
   for (std::size_t i = 0; i < view.size(); ++i) {
-    if (!is_static(labels[i])) continue;
+    if (!is_kept(labels[i])) continue;
     std::memcpy(&*to, view.at(i), message.point_step);
     to += static_cast<std::ptrdiff_t>(message.point_step);
   }
   return result;
+}
+
+/// The points with a static label; see select_points().
+template <class Message>
+Message static_points(const Message& message, Span<const PointLabel> labels) {
+  return select_points(message, labels, is_static);
+}
+
+/// The points of moving instances; see select_points().
+template <class Message>
+Message dynamic_points(const Message& message, Span<const PointLabel> labels) {
+  return select_points(message, labels,
+                       [](PointLabel label) { return label == PointLabel::kDynamic; });
 }
 
 }  // namespace dynains

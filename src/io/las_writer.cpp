@@ -1,0 +1,149 @@
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/las_file.hpp"
+#include "failure.hpp"
+#include "las_format.hpp"
+
+namespace dynains {
+namespace {
+
+class LasFields {
+ public:
+  template <class Number>
+  LasFields& number(Number value) {
+    char copy[sizeof(value)];
+    std::memcpy(copy, &value, sizeof(value));
+    bytes_.append(copy, sizeof(value));
+    return *this;
+  }
+  LasFields& zeros(std::size_t count) {
+    bytes_.append(count, '\0');
+    return *this;
+  }
+  /// The text, filled up with zeros.
+  LasFields& text(const std::string& text, std::size_t size) {
+    bytes_ += text.substr(0, size);
+    return zeros(size - std::min(size, text.size()));
+  }
+  const std::string& bytes() const { return bytes_; }
+
+ private:
+  std::string bytes_;
+};
+
+std::string extra_description(const char* name, std::uint8_t type, const char* description) {
+  constexpr std::size_t kUnused = 124;  // no-data, least, most, scale and offset
+  return LasFields()
+      .zeros(2)
+      .number(type)
+      .number(std::uint8_t{0})
+      .text(name, 32)
+      .zeros(kUnused)
+      .text(description, 32)
+      .bytes();
+}
+
+std::string vlr(const std::string& user, std::uint16_t record, const std::string& description,
+                const std::string& content) {
+  return LasFields()
+             .zeros(2)
+             .text(user, 16)
+             .number(record)
+             .number(static_cast<std::uint16_t>(content.size()))
+             .text(description, 32)
+             .bytes() +
+         content;
+}
+
+std::string extra_bytes_vlr() {
+  constexpr std::uint8_t kUint8 = 1;
+  constexpr std::uint8_t kUint32 = 5;
+  constexpr std::uint8_t kFloat = 9;
+  return vlr(las::kSpecUser, las::kExtraBytesRecord, "extra bytes",
+             extra_description("belief", kFloat, "probability of being dynamic") +
+                 extra_description("cause", kUint8, "cause of the verdict") +
+                 extra_description("instance", kUint32, "0: none"));
+}
+
+constexpr std::uint8_t kLasPointFormat = 6;
+constexpr std::uint16_t kLasPointSize = 30 + 4 + 1 + 4;  // bytes, with extra bytes
+
+}  // namespace
+
+LasWriter::LasWriter(const std::filesystem::path& path, const LasOptions& options)
+    : path_(path), options_(options), file_(path) {
+  if (options.wkt.size() >= std::numeric_limits<std::uint16_t>::max()) {
+    fail(path, "expected a reference system of less than 65535 bytes");
+  }
+  least_.fill(std::numeric_limits<std::int32_t>::max());
+  most_.fill(std::numeric_limits<std::int32_t>::min());
+  file_.stream() << header();
+}
+
+/// Has the same length for every number of points.
+std::string LasWriter::header() const {
+  constexpr std::uint16_t kWktIsUsed = 1U << 4U;
+  constexpr std::uint16_t kWktRecord = 2112;
+  std::string records = extra_bytes_vlr();
+  if (!options_.wkt.empty()) {
+    records += vlr("LASF_Projection", kWktRecord, "OGC WKT", options_.wkt + '\0');
+  }
+  LasFields out;
+  out.text(las::kMagic, las::kMagicSize).zeros(2).number(kWktIsUsed).zeros(16);
+  out.number(std::uint8_t{1}).number(std::uint8_t{4});
+  out.text("dynains", 32).text("dynains", 32);
+  out.zeros(4);  // without a day, so that equal points give equal files
+  out.number(static_cast<std::uint16_t>(las::kHeaderSize14));
+  out.number(static_cast<std::uint32_t>(las::kHeaderSize14 + records.size()));
+  out.number(std::uint32_t{options_.wkt.empty() ? 1U : 2U});
+  out.number(kLasPointFormat).number(kLasPointSize);
+  out.zeros(24);  // numbers of points as in older versions
+  for (int axis = 0; axis < 3; ++axis) out.number(options_.scale);
+  for (const double offset : options_.offset) out.number(offset);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (const auto* limit : {&most_, &least_}) {
+      const double steps = size_ == 0 ? 0.0 : (*limit)[axis];
+      out.number(options_.offset[static_cast<Eigen::Index>(axis)] + steps * options_.scale);
+    }
+  }
+  out.zeros(20);  // no records behind the points
+  out.number(std::uint64_t{size_}).number(std::uint64_t{size_}).zeros(14 * 8);  // all first returns
+  return out.bytes() + records;
+}
+
+void LasWriter::add(const LasPoint& point) {
+  constexpr std::uint8_t kOnlyReturn = 1U << 4U | 1U;
+  constexpr double kMost = std::numeric_limits<std::int32_t>::max();
+  std::array<std::int32_t, 3> steps{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<Eigen::Index>(axis);
+    const double value = std::round((point.position[i] - options_.offset[i]) / options_.scale);
+    if (!(std::abs(value) <= kMost)) {
+      fail(path_, "expected points within " + std::to_string(kMost * options_.scale) +
+                      " m of the first one");
+    }
+    steps[axis] = static_cast<std::int32_t>(value);
+    least_[axis] = std::min(least_[axis], steps[axis]);
+    most_[axis] = std::max(most_[axis], steps[axis]);
+  }
+  LasFields record;
+  for (const std::int32_t step : steps) record.number(step);
+  record.number(point.intensity).number(kOnlyReturn).number(std::uint8_t{0});
+  record.number(point.classification).number(std::uint8_t{0});
+  record.number(std::int16_t{0}).number(std::uint16_t{0}).number(point.time);
+  record.number(point.belief).number(point.cause).number(point.instance);
+  file_.stream() << record.bytes();
+  ++size_;
+}
+
+void LasWriter::commit(AtomicFile::Sync sync) {
+  file_.stream().seekp(0);
+  file_.stream() << header();
+  file_.commit(sync);
+}
+
+}  // namespace dynains

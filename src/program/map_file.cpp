@@ -1,0 +1,79 @@
+#include "map_file.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+
+namespace dynains::program {
+namespace {
+
+class PointMapFile final : public MapFile {
+ public:
+  PointMapFile(const std::filesystem::path& path, const PointColumns& columns)
+      : writer_(path, columns) {}
+
+  void add(const Eigen::Vector3d& position, const MapAttributes& attributes) override {
+    FilePoint point;
+    point.position = position;
+    point.intensity = attributes.intensity;
+    point.label = attributes.label;
+    point.time = attributes.time;
+    writer_.add(point);
+  }
+  std::size_t size() const override { return writer_.size(); }
+  void commit() override { writer_.commit(); }
+
+ private:
+  PointFileWriter writer_;
+};
+
+class LasMapFile final : public MapFile {
+ public:
+  LasMapFile(const std::filesystem::path& path, const MapFileOptions& options)
+      : writer_(path, options.las), intensity_scale_(options.intensity_scale) {}
+
+  void add(const Eigen::Vector3d& position, const MapAttributes& attributes) override {
+    const double intensity = std::round(intensity_scale_ * attributes.intensity);
+    LasPoint point;
+    point.position = position;
+    // Also for NaN, which no comparison holds for.
+    point.intensity = intensity >= 0.0 ? static_cast<std::uint16_t>(std::min(intensity, 65535.0))
+                                       : std::uint16_t{0};
+    point.classification = attributes.is_ground ? LasClass::kGround : LasClass::kUnclassified;
+    point.time = attributes.scan_time;
+    point.belief = attributes.belief;
+    point.cause = static_cast<std::uint8_t>(attributes.cause);
+    point.instance = attributes.instance;
+    writer_.add(point);
+  }
+  std::size_t size() const override { return writer_.size(); }
+  void commit() override { writer_.commit(); }
+
+ private:
+  LasWriter writer_;
+  double intensity_scale_;
+};
+
+}  // namespace
+
+bool is_las(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return extension == ".las";
+}
+
+bool is_map_name(const std::filesystem::path& path) { return is_point_file(path) || is_las(path); }
+
+std::unique_ptr<MapFile> MapFile::open(const std::filesystem::path& path,
+                                       const MapFileOptions& options) {
+  if (is_las(path)) return std::make_unique<LasMapFile>(path, options);
+  return std::make_unique<PointMapFile>(path, options.columns);
+}
+
+double las_intensity_scale(float most) {
+  constexpr double kMost = 65535.0;
+  if (!(most > 0.0F && most <= 255.0F)) return 1.0;
+  return kMost / (most <= 1.0F ? 1.0 : 255.0);
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,82 @@
+// Maps in LAS files, and coordinate reference systems.
+#include "dynains/io/las_file.hpp"
+
+#include <limits>
+#include <string>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/coordinate_system.hpp"
+#include "dynains/io/point_file.hpp"
+#include "files.hpp"
+#include "support/catch.hpp"
+
+namespace dynains {
+
+using namespace test;
+
+TEST_CASE("LAS: written points are read back to half a millimetre, in coordinates of UTM") {
+  const TemporaryFolder folder;
+  LasOptions options;
+  options.offset = {691000.0, 5334000.0, 500.0};
+  options.wkt = "PROJCS[\"a name\"]";
+  LasWriter writer(folder / "map.las", options);
+  LasPoint point;
+  point.position = {691234.5678, 5334567.8912, 499.0004};
+  point.intensity = 65535;
+  point.classification = LasClass::kGround;
+  point.time = 1571234567.25;
+  point.belief = 0.75F;
+  point.cause = 10;
+  point.instance = 70000;
+  writer.add(point);
+  point.position = {690000.0, 5336000.0, 700.0};
+  point.intensity = 7;
+  writer.add(point);
+  CHECK(writer.size() == 2);
+  CHECK_FALSE(std::filesystem::exists(folder / "map.las"));
+  writer.commit();
+
+  check_point_file(folder / "map.las");
+  const PointFile points = read_points(folder / "map.las");
+  REQUIRE(points.positions.size() == 2);
+  CHECK((points.positions[0] - Eigen::Vector3d(691234.5678, 5334567.8912, 499.0004))
+            .cwiseAbs()
+            .maxCoeff() <= 0.0005000001);
+  CHECK(points.positions[1] == point.position);
+  CHECK(points.intensity == std::vector<float>{65535.0F, 7.0F});
+  CHECK(points.time == std::vector<double>{1571234567.25, 1571234567.25});
+  const std::string bytes = read_text(folder / "map.las");
+  CHECK_THAT(bytes, ContainsSubstring("LASF_Projection") &&
+                        ContainsSubstring(options.wkt + std::string(1, '\0')));
+}
+
+TEST_CASE("LAS: points that the file cannot hold are refused, and no file appears") {
+  const TemporaryFolder folder;
+  {
+    LasWriter writer(folder / "map.las");
+    LasPoint point;
+    writer.add(point);
+    for (const double x : {2.2e6, -2.2e6, std::numeric_limits<double>::quiet_NaN()}) {
+      point.position.x() = x;
+      CHECK_THAT(message_of<IoError>([&] { writer.add(point); }),
+                 StartsWith((folder / "map.las").string()) && ContainsSubstring("2147483"));
+    }
+  }
+  CHECK(count_entries(folder.path()) == 0);
+  LasOptions options;
+  options.wkt.assign(65535, 'x');
+  CHECK_THROWS_AS(LasWriter(folder / "map.las", options), IoError);
+  LasWriter(folder / "empty.las").commit();
+  CHECK(read_points(folder / "empty.las").positions.empty());
+}
+
+TEST_CASE("Names of coordinate reference systems give their WKT") {
+  const std::string unknown = message_of<ConfigError>([] { wkt_of("EPSG:1"); });
+  if (unknown.find("libproj-dev") != std::string::npos) return;  // this build has no PROJ
+  CHECK_THAT(wkt_of("EPSG:25832"), StartsWith("PROJCS[\"ETRS89 / UTM zone 32N\""));
+  CHECK_THAT(unknown, ContainsSubstring("found EPSG:1"));
+  CHECK_THROWS_AS(wkt_of(""), ConfigError);
+  CHECK_THROWS_AS(wkt_of("+proj=longlat"), ConfigError);  // an operation, not a reference system
+}
+
+}  // namespace dynains
