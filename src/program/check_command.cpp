@@ -128,13 +128,13 @@ void add_check_command(CLI::App& app) {
   const auto flags = std::make_shared<RecordingFlags>(command, "recording");
   command.footer(
       "Looks at the size of every scan file, and at a sample of scans: counts, units, invalid "
-      "points, height\n"
-      "and tilt of the sensor, and whether scans agree under the poses or under the usual "
-      "mistakes. "
-      "Exits with 1\n"
-      "if a file is cut off, if the poses need another option or fit under none, or if scans are "
-      "too far apart\n"
-      "to be compared.");
+      "points, "
+      "height\nand tilt of the sensor, and whether scans agree under the poses or under the usual "
+      "mistakes. Registers\nneighbouring scans, for the error of the poses in cm and deg, the "
+      "extrinsic calibration and the offset of\nthe clocks. Exits with 1 if a file is cut off, if "
+      "the "
+      "poses need another option or fit under none, or if\nscans are too far apart to be "
+      "compared.");
   command.callback([flags] { check(*flags); });
 }
 
