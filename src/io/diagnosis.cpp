@@ -5,12 +5,16 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <iomanip>
 #include <optional>
+#include <sstream>
+#include <string>
 #include <utility>
 
 #include "finite_points.hpp"
-#include "pose_fit.hpp"
+#include "pose_diagnosis.hpp"
 #include "pose_shift.hpp"
+#include "text.hpp"
 
 namespace dynains {
 namespace {
@@ -439,7 +443,10 @@ Agreement Landmarks::compare(const Landmarks& other, const Eigen::Isometry3d& T_
           count};
 }
 
-Diagnosis diagnose(const Recording& recording) {
+namespace {
+
+/// Diagnosis by the agreement of scans.
+Diagnosis diagnose_agreement(const Recording& recording) {
   Diagnosis d;
   d.scan_files = recording.scan_file_count();
   d.pose_rows = recording.pose_count();
@@ -464,8 +471,6 @@ Diagnosis diagnose(const Recording& recording) {
   return d;
 }
 
-namespace {
-
 /// Agreement of a few pairs (i, i + stride) of the scans `first` to `last`.
 PoseAgreement agreement_at(const Recording& recording, std::size_t first, std::size_t last,
                            std::size_t stride) {
@@ -483,6 +488,12 @@ PoseAgreement agreement_at(const Recording& recording, std::size_t first, std::s
 
 }  // namespace
 
+Diagnosis diagnose(const Recording& recording) {
+  Diagnosis d = diagnose_agreement(recording);
+  compare_with_registration(recording, d);
+  return d;
+}
+
 PoseAgreement pose_agreement(const Recording& recording, std::size_t first, std::size_t last) {
   const std::size_t stride = std::min(kStride, last - first);
   if (stride == 0) return {};
@@ -497,6 +508,43 @@ PoseAgreement pose_agreement(const Recording& recording, std::size_t first, std:
   return of_neighbours.doubtful() ? agreement : of_neighbours;
 }
 
+namespace {
+
+constexpr double kDegrees = 180.0 / 3.14159265358979323846;
+
+std::string fixed(double value, int digits) {
+  std::ostringstream text;
+  text::exact(text);
+  text << std::fixed << std::setprecision(digits) << value;
+  return text.str();
+}
+
+/// "12 cm and 0.3 deg from one scan to the next".
+std::string error_text(const Diagnosis& d) {
+  return fixed(100.0 * d.translation_error, 0) + " cm and " +
+         fixed(kDegrees * d.rotation_error, 1) + " deg from one scan to the next";
+}
+
+std::string body_text(const Eigen::Isometry3d& T_body_sensor) {
+  constexpr double kUpright = 0.98;
+  const Eigen::AngleAxisd rotation(T_body_sensor.linear());
+  const Eigen::Vector3d t = T_body_sensor.translation();
+  std::string text;
+  if (std::abs(rotation.angle()) > 1e-6) {
+    const Eigen::Vector3d axis = rotation.axis();
+    const bool is_yaw = std::abs(axis.z()) > kUpright;
+    const double degrees = kDegrees * rotation.angle() * (is_yaw && axis.z() < 0.0 ? -1.0 : 1.0);
+    text = std::string(is_yaw ? "is yawed by " : "is turned by ") + fixed(degrees, 1) + " deg";
+  }
+  if (t.norm() > 0.0) {
+    text += std::string(text.empty() ? "" : " and ") + "lies at (" + fixed(t.x(), 2) + ' ' +
+            fixed(t.y(), 2) + ' ' + fixed(t.z(), 2) + ") m";
+  }
+  return text;
+}
+
+}  // namespace
+
 std::string advice(const Diagnosis& d) {
   switch (d.verdict) {
     case PoseVerdict::kAgree:
@@ -504,6 +552,18 @@ std::string advice(const Diagnosis& d) {
     case PoseVerdict::kOtherwise:
       return (fits(d.as_given, d.standing) ? "Scans agree better if " : "Scans agree if ") +
              d.readings.front().meaning + ": pass " + d.readings.front().option + ".";
+    case PoseVerdict::kBodyFrame:
+      return "Scans agree if the poses are those of a body, such as an IMU or a vehicle, in which "
+             "the "
+             "lidar " +
+             body_text(d.convention.T_body_sensor) +
+             " (parts that the drive does not determine are 0): pass " + d.option + ".";
+    case PoseVerdict::kTimeOffset:
+      return "Scans agree better under the poses " + fixed(std::abs(d.time_offset), 3) + " s " +
+             (d.time_offset > 0.0 ? "after" : "before") + " their times: pass " + d.option + ".";
+    case PoseVerdict::kInexact:
+      return "Scans and poses agree roughly, but the poses are inexact by about " + error_text(d) +
+             ": expect losses; poses of a LiDAR odometry would do better.";
     case PoseVerdict::kNoMotion:
       if (d.step * static_cast<double>(d.stride) > 1.0) {
         return "Too little stands beside the way to tell what the poses mean; nothing speaks "
@@ -518,7 +578,8 @@ std::string advice(const Diagnosis& d) {
                "still, the poses are wrong.";
       }
       return "Scans do not agree under these poses, nor under any usual mistake: they belong to "
-             "another recording or clock, or are far too inexact.";
+             "another recording or clock, or are far too inexact" +
+             (d.registered_pairs > 0 ? " (off by " + error_text(d) + ")." : std::string("."));
     case PoseVerdict::kWorldFrame:
       return "Points are in the frame of the world and agree there; no option is needed.";
     case PoseVerdict::kUnknown:

@@ -167,6 +167,7 @@ std::vector<RegisteredMotion> register_motions(const Recording& recording) {
   constexpr std::size_t kLongest = 16;  // scans
   constexpr double kFar = 3.0;          // m
   constexpr double kTurned = 0.25;      // rad
+  constexpr double kNoisy = 0.25;       // m, 10 m from the sensor
   std::vector<RegisteredMotion> motions;
   if (recording.size() < 2) return motions;
   const std::size_t starts = recording.size() - 1;
@@ -182,7 +183,13 @@ std::vector<RegisteredMotion> register_motions(const Recording& recording) {
     for (std::size_t step = 1; step <= kLongest && first + step < recording.size(); step *= 2) {
       const auto found = register_scans(scans.get(first), scans.get(first + step), guesses);
       if (!is_certain(found)) break;
-      motions.push_back({chain, first, first + step, found->T_a_b});
+      const auto back =
+          register_scans(scans.get(first + step), scans.get(first), {found->T_a_b.inverse()});
+      if (!is_certain(back)) break;
+      const double noise =
+          residual(found->T_a_b, back->T_a_b.inverse(), Eigen::Isometry3d::Identity()).norm();
+      if (noise > kNoisy) break;
+      motions.push_back({chain, first, first + step, found->T_a_b, noise});
       if (step == 1) elsewhere = found->T_a_b;
       if (found->T_a_b.translation().norm() > kFar || angle_of(found->T_a_b.linear()) > kTurned) {
         break;
@@ -198,6 +205,7 @@ MotionError motion_error(const std::vector<RegisteredMotion>& motions, const Bod
   std::vector<double> translations;
   std::vector<double> rotations;
   std::vector<double> both;
+  std::vector<double> noise;
   for (const RegisteredMotion& motion : motions) {
     if (only_steps && motion.second != motion.first + 1) continue;
     const auto T_body = body(motion);
@@ -206,10 +214,11 @@ MotionError motion_error(const std::vector<RegisteredMotion>& motions, const Bod
     translations.push_back(r.tail<3>().norm());
     rotations.push_back(r.head<3>().norm() / kLever);
     both.push_back(r.norm());
+    noise.push_back(motion.noise);
   }
   const std::size_t pairs = both.size();
   return {median(std::move(translations)), median(std::move(rotations)), median(std::move(both)),
-          pairs};
+          median(std::move(noise)), pairs};
 }
 
 std::optional<Eigen::Isometry3d> fit_extrinsic(const std::vector<RegisteredMotion>& registered,

@@ -17,6 +17,7 @@ struct RegisteredMotion {
   std::size_t first;   ///< scan
   std::size_t second;  ///< scan
   Eigen::Isometry3d T_first_second;
+  double noise;  ///< m, difference of both directions of the registration, 10 m from the sensor
 };
 
 /// Registers pairs of scans at some places of a recording, neighbours and scans farther apart. The
@@ -32,6 +33,7 @@ struct MotionError {
   double translation = 0.0;  ///< m
   double rotation = 0.0;     ///< rad
   double at_points = 0.0;    ///< m, of both, for points 10 m from the sensor
+  double noise = 0.0;        ///< m, of the registration, as at_points
   std::size_t pairs = 0;
 };
 

@@ -154,6 +154,20 @@ std::string in_seconds(double time) {
   return text.str();
 }
 
+/// Proposes a longer gap if most gaps of the trajectory are too long; else empty.
+std::string gap_hint(const Trajectory& trajectory, double longest) {
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < trajectory.times.size(); ++i) {
+    gaps.push_back(trajectory.times[i] - trajectory.times[i - 1]);
+  }
+  if (gaps.empty()) return {};
+  std::sort(gaps.begin(), gaps.end());
+  const double usual = gaps[gaps.size() / 2];
+  if (!(usual > longest)) return {};
+  return ". Poses are " + in_seconds(usual) +
+         " apart: --pose-gap takes them, at the cost of the error of a linear motion between them";
+}
+
 std::string shown(const fs::path& path, const fs::path& folder) {
   const fs::path shorter = path.lexically_relative(folder);
   return shorter.empty() || *shorter.begin() == ".." ? path.string() : shorter.string();
@@ -438,7 +452,7 @@ void Recording::match_times(const fs::path& file, const std::vector<double>& tim
                  std::to_string(times.size()) + " scans, which are from " +
                  in_seconds(times.front()) + " to " + in_seconds(times.back()) +
                  "; expected times of one clock, with gaps of at most " +
-                 in_seconds(options_.pose_gap));
+                 in_seconds(options_.pose_gap) + gap_hint(trajectory_, options_.pose_gap));
 }
 
 void Recording::match_scans(const fs::path& file) {
@@ -530,11 +544,23 @@ std::optional<Eigen::Isometry3d> Recording::pose_under(const PoseConvention& con
   if (at < 0 || at >= static_cast<std::ptrdiff_t>(matches_.size())) return std::nullopt;
   const std::optional<TrajectoryMatch>& match = matches_[static_cast<std::size_t>(at)];
   if (!match) return std::nullopt;
+  return pose_of(convention, *match);
+}
+
+std::optional<Eigen::Isometry3d> Recording::pose_after(std::size_t i, double offset) const {
+  const double time = scans_.at(i).time + options_.time_offset + offset;
+  const auto match = match_time(trajectory_, time, options_.pose_gap);
+  if (!match) return std::nullopt;
+  return pose_of(options_.convention, *match);
+}
+
+Eigen::Isometry3d Recording::pose_of(const PoseConvention& convention,
+                                     const TrajectoryMatch& match) const {
   const QuaternionOrder order = trajectory_.order;
   return to_sensor_pose(
       convention,
-      interpolate(apply(convention, trajectory_.poses[match->before], order),
-                  apply(convention, trajectory_.poses[match->after], order), match->share));
+      interpolate(apply(convention, trajectory_.poses[match.before], order),
+                  apply(convention, trajectory_.poses[match.after], order), match.share));
 }
 
 /// T_world_sensor of a pose to which the rest of the convention was applied.

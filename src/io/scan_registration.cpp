@@ -113,7 +113,9 @@ RegistrationScan::RegistrationScan(PointsView points) {
   constexpr double kNearest = 2.0, kFarthest = 60.0;
   std::array<std::unordered_map<std::uint64_t, Moments>, kLevels> moments;
   std::unordered_map<std::uint64_t, bool> taken;
-  for (std::size_t i = 0; i < points.size(); ++i) {
+  constexpr std::size_t kMost = 40000;  // points
+  const std::size_t stride = 1 + points.size() / kMost;
+  for (std::size_t i = 0; i < points.size(); i += stride) {
     const Eigen::Vector3d p(static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
                             static_cast<double>(points.z[i]));
     const double range = p.norm();
@@ -156,14 +158,22 @@ std::optional<Registration> register_scans(const RegistrationScan& a, const Regi
                                            const std::vector<Eigen::Isometry3d>& guesses) {
   constexpr std::size_t kFewest = 200;  // points that meet a cell
   constexpr double kFine = 0.1;         // m
+  constexpr double kDistinct = 0.5;     // m
+  constexpr double kAlmost = 0.93;      // ratio of scores
   Registration best;
+  std::vector<std::pair<Eigen::Vector3d, double>> results;  // translation and score
   for (const Eigen::Isometry3d& guess : guesses) {
     Eigen::Isometry3d T = refine(a, b, guess, 0, 1.0, 4, 12);
     T = refine(a, b, T, 1, 0.4, 3, 10);
     const Step step = linearize(a, b, T, 1, 0.3, 2);
     const double score =
         step.weight / (0.5 * static_cast<double>(std::max<std::size_t>(1, b.points().size())));
+    results.emplace_back(T.translation(), score);
     if (score > best.score) best = {T, score, 0.0};
+  }
+  for (const auto& [translation, score] : results) {
+    const bool is_other = (translation - best.T_a_b.translation()).norm() > kDistinct;
+    if (is_other && score > kAlmost * best.score) return std::nullopt;
   }
   best.T_a_b = refine(a, b, best.T_a_b, 1, 0.2, 1, 8);
   best.T_a_b = refine(a, b, best.T_a_b, 2, kFine, 1, 15);

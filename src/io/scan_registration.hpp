@@ -44,7 +44,8 @@ struct Registration {
 };
 
 /// Registers `b` to `a` from several guesses of T_a_b; the best result counts. Empty if too few
-/// points of `b` meet a cell of `a`.
+/// points of `b` meet a cell of `a`, or if another result is nearly as good, as in traffic that
+/// moves with the sensor.
 std::optional<Registration> register_scans(const RegistrationScan& a, const RegistrationScan& b,
                                            const std::vector<Eigen::Isometry3d>& guesses);
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <iomanip>
 #include <iostream>
 #include <memory>
@@ -91,6 +92,12 @@ void check(const RecordingFlags& flags) {
   print_line("sensor", text_of(d.mounting));
   print_line("motion", "median " + fixed(d.step, 2, " m from scan to scan, longest ") +
                            fixed(d.longest_step, 2, " m"));
+  if (d.registered_pairs > 0) {
+    print_line("poses", "off by " + fixed(100.0 * d.translation_error, 1, " cm and ") +
+                            fixed(180.0 / M_PI * d.rotation_error, 2, " deg") +
+                            " from one scan to the next, by the registration of " +
+                            std::to_string(d.registered_pairs) + " pairs of scans");
+  }
   std::cout << "\nscans " << d.stride << " apart, placed by\n";
   print_line("  poses as given", to_text(d.as_given));
   print_line("  no motion at all", to_text(d.standing));
@@ -106,8 +113,8 @@ void check(const RecordingFlags& flags) {
     lone = remark_on_lone_scans(recording, 0, recording.size() - 1, RemoverConfig());
   }
   if (!lone || !d.sound()) std::cout << advice(d) << std::endl;
-  if (d.verdict == PoseVerdict::kOtherwise) {
-    std::cout << "    dynains run " << flags.as_given(d.readings.front().option) << " --out OUT\n";
+  if (!d.option.empty()) {
+    std::cout << "    dynains run " << flags.as_given(d.option) << " --out OUT\n";
   }
   if (lone) std::cout << *lone << '.' << std::endl;
   if (lone || !d.sound()) throw Finding{};
@@ -121,13 +128,13 @@ void add_check_command(CLI::App& app) {
   const auto flags = std::make_shared<RecordingFlags>(command, "recording");
   command.footer(
       "Looks at the size of every scan file, and at a sample of scans: counts, units, invalid "
-      "points, height\n"
-      "and tilt of the sensor, and whether scans agree under the poses or under the usual "
-      "mistakes. "
-      "Exits with 1\n"
-      "if a file is cut off, if the poses need another option or fit under none, or if scans are "
-      "too far apart\n"
-      "to be compared.");
+      "points, "
+      "height\nand tilt of the sensor, and whether scans agree under the poses or under the usual "
+      "mistakes. Registers\nneighbouring scans, for the error of the poses in cm and deg, the "
+      "extrinsic calibration and the offset of\nthe clocks. Exits with 1 if a file is cut off, if "
+      "the "
+      "poses need another option or fit under none, or if\nscans are too far apart to be "
+      "compared.");
   command.callback([flags] { check(*flags); });
 }
 

@@ -1,10 +1,13 @@
 // Findings of `dynains check` on simulated streets with all usual mistakes in the poses.
 #include "dynains/io/diagnosis.hpp"
 
+#include <cmath>
 #include <functional>
+#include <random>
 #include <string>
 #include <vector>
 
+#include "dynains/io/extrinsic.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "io/files.hpp"
@@ -28,6 +31,17 @@ simulation::Config bends() {
   config.rate = 5.0;
   config.seed = 4;
   config.sensor_height = 1.9;
+  return config;
+}
+
+/// A drive with bends and changes of speed, by a sensor whose scans determine its motion well.
+simulation::Config dense() {
+  simulation::Config config;
+  config.scene = simulation::Scene::kStopAndGo;
+  config.sensor = simulation::Sensor::kOs1_64;
+  config.scans = 24;
+  config.rate = 5.0;
+  config.seed = 4;
   return config;
 }
 
@@ -139,6 +153,81 @@ TEST_CASE("check names poses that belong to the scan before or behind, if the dr
     CHECK(shifted.readings.front().option == "--pose-shift 0");
     CHECK(shifted.readings.front().agreement.gap < shifted.as_given.gap);
   }
+}
+
+TEST_CASE("check estimates the place of the lidar in the body whose poses are given") {
+  const Street street(dense());
+  Eigen::Isometry3d T_body_sensor = Eigen::Isometry3d::Identity();
+  T_body_sensor.linear() = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const auto of_body = [&](const Eigen::Isometry3d& T) { return T * T_body_sensor.inverse(); };
+  const Diagnosis yawed = street.diagnose(of_body);
+  CHECK(yawed.verdict == PoseVerdict::kBodyFrame);
+  CHECK_THAT(advice(yawed), ContainsSubstring("the lidar is yawed by ") &&
+                                ContainsSubstring("pass --extrinsic \""));
+  const Eigen::Isometry3d found = yawed.convention.T_body_sensor;
+  CHECK(Eigen::AngleAxisd(found.linear().transpose() * T_body_sensor.linear()).angle() < 0.03);
+  CHECK(found.translation().norm() < 0.3);
+
+  // The flag that check prints corrects the poses.
+  const std::string seq = street.path();
+  const std::string pose = extrinsic_text(found);
+  const Outcome told = start({"check", seq});
+  CHECK(told.code == 1);
+  CHECK_THAT(told.out, ContainsSubstring("\n    dynains run " + seq + " --extrinsic \"" + pose +
+                                         "\" --out OUT\n"));
+  const Outcome healed = start({"check", seq, "--extrinsic", pose});
+  CAPTURE(healed.out);
+  CHECK(healed.code == 0);
+  CHECK_THAT(healed.out, ContainsSubstring("agree as they are"));
+}
+
+TEST_CASE("check estimates the offset of the clocks") {
+  const Street street(dense());
+  std::string scan_times;
+  std::string rows;
+  for (std::size_t i = 0; i < street.poses().size(); ++i) {
+    const double time = 0.2 * static_cast<double>(i);
+    scan_times += std::to_string(time) + '\n';
+    const Eigen::Vector3d t = street.poses()[i].translation();
+    const Eigen::Quaterniond q(street.poses()[i].linear());
+    for (const double value : {time + 0.15, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()}) {
+      rows += std::to_string(value) + ' ';
+    }
+    rows += '\n';
+  }
+  write_text(street.path() / "times.txt", scan_times);
+  write_text(street.path() / "poses.txt", rows);
+  const Diagnosis late = diagnose(Recording(street.path()));
+  CHECK(late.verdict == PoseVerdict::kTimeOffset);
+  CHECK(std::abs(late.time_offset - 0.15) < 0.02);
+  RecordingOptions options;
+  options.time_offset = late.time_offset;
+  CHECK(diagnose(Recording(street.path(), options)).verdict == PoseVerdict::kAgree);
+
+  // A trajectory with fewer poses than the default gap allows.
+  std::string sparse = rows.substr(0, rows.find('\n') + 1);
+  sparse += rows.substr(rows.rfind('\n', rows.size() - 2) + 1);
+  write_text(street.path() / "poses.txt", sparse);
+  const Outcome outcome = start({"check", street.path()});
+  CHECK(outcome.code == 1);
+  CHECK_THAT(outcome.err, ContainsSubstring("Poses are 4.6 s apart: --pose-gap takes them"));
+}
+
+TEST_CASE("check gives the error of inexact poses in centimetres and degrees") {
+  const Street street(dense());
+  std::mt19937 random(3);
+  std::normal_distribution<double> metres(0.0, 0.05);
+  const Diagnosis noisy = street.diagnose([&](Eigen::Isometry3d T) {
+    T.translation() += Eigen::Vector3d(metres(random), metres(random), metres(random));
+    return T;
+  });
+  CHECK(noisy.verdict == PoseVerdict::kInexact);
+  CHECK(noisy.sound());
+  // Median length of the difference of two errors with a deviation of 5 cm an axis.
+  CHECK(noisy.translation_error == Approx(0.05 * std::sqrt(2.0) * 1.54).epsilon(0.35));
+  CHECK(noisy.registered_pairs >= 8);
+  CHECK_THAT(advice(noisy), ContainsSubstring("inexact by about 1") &&
+                                ContainsSubstring(" deg from one scan to the next"));
 }
 
 TEST_CASE("few beams ahead on a fast empty road give no warning about the poses") {

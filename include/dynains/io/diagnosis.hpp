@@ -50,6 +50,9 @@ struct PoseReading {
 enum class PoseVerdict {
   kAgree,       ///< scans agree under the given poses
   kOtherwise,   ///< scans agree under another convention, the first of `readings`
+  kBodyFrame,   ///< scans agree if the poses are those of a body; see `convention`
+  kTimeOffset,  ///< scans agree under poses of another time; see `time_offset`
+  kInexact,     ///< scans agree, but the motion between neighbouring scans is inexact
   kNoMotion,    ///< too little motion or too few objects for a decision
   kDisagree,    ///< scans agree under no convention
   kWorldFrame,  ///< points are in the world frame and agree there; poses have no effect
@@ -72,12 +75,21 @@ struct Diagnosis {
   Agreement as_given;
   Agreement standing;                 ///< under identity poses (no motion)
   std::vector<PoseReading> readings;  ///< under other conventions, best first
+  /// Difference of the given poses and the registration of neighbouring scans: medians over
+  /// `registered_pairs`, m and rad.
+  double translation_error = 0.0;
+  double rotation_error = 0.0;
+  std::size_t registered_pairs = 0;  ///< 0 if no motion could be registered
+  /// Under which scans agree, for kOtherwise, kBodyFrame and kTimeOffset.
+  PoseConvention convention;
+  double time_offset = 0.0;  ///< s, as RecordingOptions::time_offset
+  std::string option;        ///< flags of `dynains run` for both; empty: none
   PoseVerdict verdict = PoseVerdict::kUnknown;
 
   /// Whether a run can use the given poses.
   bool sound() const {
-    return verdict == PoseVerdict::kAgree || verdict == PoseVerdict::kNoMotion ||
-           verdict == PoseVerdict::kWorldFrame;
+    return verdict == PoseVerdict::kAgree || verdict == PoseVerdict::kInexact ||
+           verdict == PoseVerdict::kNoMotion || verdict == PoseVerdict::kWorldFrame;
   }
 };
 

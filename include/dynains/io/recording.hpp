@@ -157,9 +157,13 @@ class Recording {
 
   // Members for comparisons with other conventions.
   const PoseConvention& convention() const { return options_.convention; }
+  double time_offset() const { return options_.time_offset; }
   /// Pose of scan i under another convention; empty if its shift leads out of the trajectory.
   std::optional<Eigen::Isometry3d> pose_under(const PoseConvention& convention,
                                               std::size_t i) const;
+  /// Pose of the sensor at `offset` (s) after the pose of scan i, by the times of the poses; empty
+  /// without times and outside of the trajectory.
+  std::optional<Eigen::Isometry3d> pose_after(std::size_t i, double offset) const;
   bool has_quaternions() const { return trajectory_.order != QuaternionOrder::kNone; }
   QuaternionOrder quaternion_order() const { return trajectory_.order; }
   bool has_calibration() const { return has_calibration_; }
@@ -198,6 +202,7 @@ class Recording {
   void match_times(const std::filesystem::path& poses_file, const std::vector<double>& times);
   void place_scans(const std::filesystem::path& poses);
   void find_columns();
+  Eigen::Isometry3d pose_of(const PoseConvention& convention, const TrajectoryMatch& match) const;
   PointFrame guess_frame() const;
   Eigen::Isometry3d to_sensor_pose(const PoseConvention& convention,
                                    const Eigen::Isometry3d& pose) const;

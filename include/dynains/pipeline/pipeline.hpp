@@ -114,6 +114,7 @@ class Pipeline {
 
   const Config& config() const { return config_; }
   const Map& map() const { return map_; }
+  Map& mutable_map() { return map_; }
   std::size_t latency() const { return decision_->latency(); }
   const SensorModel& sensor() const { return frame_.sensor(); }
   double next_time() const { return scans_.next_time(); }
@@ -210,8 +211,9 @@ ScanVerdict Pipeline<Stages>::finish_oldest(StageTimer& timer) {
   decision_->judge_final(scan, writer_, timer);
   if (build_map_) {
     const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
-    timer.measure(&StageTimes::map,
-                  [&] { map_.insert(points, writer_.is_kept(), scan.T_world_level); });
+    timer.measure(&StageTimes::map, [&] {
+      insert_scan(map_, points, writer_.is_kept(), scan.T_world_level, scan.T_world_sensor);
+    });
   }
   return scan.verdict();
 }

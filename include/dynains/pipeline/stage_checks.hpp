@@ -100,6 +100,21 @@ struct IsMap<Stage, std::void_t<decltype(std::declval<Stage&>().insert(
                                     std::declval<const Eigen::Isometry3d&>())),
                                 decltype(std::declval<Stage&>().clear())>> : std::true_type {};
 
+/// Inserts a scan. A map that takes the pose of the sensor as well can correct it later.
+template <class Map>
+using InsertWithSensor = decltype(std::declval<Map&>().insert(
+    PointsView(), Span<const std::uint8_t>(), std::declval<const Eigen::Isometry3d&>(),
+    std::declval<const Eigen::Isometry3d&>()));
+template <class Map>
+void insert_scan(Map& map, PointsView points, Span<const std::uint8_t> keep,
+                 const Eigen::Isometry3d& T_world_points, const Eigen::Isometry3d& T_world_sensor) {
+  if constexpr (Offers<InsertWithSensor, Map>::value) {
+    map.insert(points, keep, T_world_points, T_world_sensor);
+  } else {
+    map.insert(points, keep, T_world_points);
+  }
+}
+
 /// Whether the map and the evidence have the members that MapRevision needs.
 template <class Map, class Evidence, class = void>
 struct IsRevisable : std::false_type {};

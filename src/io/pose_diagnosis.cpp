@@ -1,0 +1,238 @@
+#include "pose_diagnosis.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "dynains/io/extrinsic.hpp"
+#include "pose_fit.hpp"
+
+namespace dynains {
+namespace {
+
+constexpr double kExact = 0.03;            // m at points 10 m away; registrations are worse rarely
+constexpr std::size_t kFewestMotions = 6;  // for any estimate
+constexpr std::size_t kFewestPairs = 3;    // neighbouring scans, for a statement about their error
+constexpr double kInexactTranslation = 0.05;  // m, from one scan to the next
+constexpr double kInexactRotation = 0.0045;   // rad
+constexpr double kFarOff = 1.0;               // m at points 10 m away
+
+BodyMotion motion_under(const Recording& recording, const PoseConvention& convention) {
+  return [&recording, convention](const RegisteredMotion& m) -> std::optional<Eigen::Isometry3d> {
+    const auto T_world_a = recording.pose_under(convention, m.first);
+    const auto T_world_b = recording.pose_under(convention, m.second);
+    if (!T_world_a || !T_world_b) return std::nullopt;
+    return T_world_a->inverse() * *T_world_b;
+  };
+}
+
+BodyMotion motion_after(const Recording& recording, double offset) {
+  return [&recording, offset](const RegisteredMotion& m) -> std::optional<Eigen::Isometry3d> {
+    const auto T_world_a = recording.pose_after(m.first, offset);
+    const auto T_world_b = recording.pose_after(m.second, offset);
+    if (!T_world_a || !T_world_b) return std::nullopt;
+    return T_world_a->inverse() * *T_world_b;
+  };
+}
+
+double error_at_points(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
+                       const Eigen::Isometry3d& T_body_sensor = Eigen::Isometry3d::Identity()) {
+  return motion_error(motions, body, T_body_sensor).at_points;
+}
+
+/// An estimate from one half of the motions must hold on the other half.
+bool is_much_better(double error, double before) {
+  return error < 0.5 * before && before - error > 0.02;
+}
+
+/// What the poses mean, with the error that is left.
+struct Explanation {
+  PoseVerdict verdict = PoseVerdict::kBodyFrame;
+  double error = 0.0;  // m at points 10 m away
+  PoseConvention convention;
+  double time_offset = 0.0;
+  std::string option;
+};
+
+/// Without parts that explain nothing: a rotation or translation near 0, or one that the motions do
+/// not determine.
+Eigen::Isometry3d simplified(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
+                             const Eigen::Isometry3d& X) {
+  const double error = error_at_points(motions, body, X);
+  const auto is_enough = [&](const Eigen::Isometry3d& simpler) {
+    return error_at_points(motions, body, simpler) < 1.1 * error + 0.002;
+  };
+  Eigen::Isometry3d unturned = X;
+  unturned.linear().setIdentity();
+  Eigen::Isometry3d result = is_enough(unturned) ? unturned : X;
+  Eigen::Isometry3d unmoved = result;
+  unmoved.translation().setZero();
+  if (is_enough(unmoved)) return unmoved;
+  Eigen::Isometry3d level = result;
+  level.translation().z() = 0.0;
+  return is_enough(level) ? level : result;
+}
+
+std::optional<Explanation> explain_by_body(const Recording& recording,
+                                           const std::vector<RegisteredMotion>& motions,
+                                           const PoseConvention& convention,
+                                           const std::string& flags, double before) {
+  const BodyMotion body = motion_under(recording, convention);
+  const auto of_half = fit_extrinsic(half_of(motions, 0), body);
+  if (!of_half) return std::nullopt;
+  const std::vector<RegisteredMotion> others = half_of(motions, 1);
+  if (!is_much_better(error_at_points(others, body, *of_half), before)) return std::nullopt;
+  const auto fitted = fit_extrinsic(motions, body);
+  if (!fitted) return std::nullopt;
+  const Eigen::Isometry3d X = simplified(motions, body, *fitted);
+  Explanation result;
+  result.error = error_at_points(motions, body, X);
+  if (!is_much_better(result.error, before)) return std::nullopt;
+  result.convention = convention;
+  result.convention.T_body_sensor = convention.T_body_sensor * X;
+  result.time_offset = recording.time_offset();
+  result.option = flags + "--extrinsic \"" + extrinsic_text(result.convention.T_body_sensor) + '"';
+  return result;
+}
+
+/// The best of all bodies, also for poses that have a usual mistake in addition.
+std::optional<Explanation> explain_by_body(const Recording& recording,
+                                           const std::vector<RegisteredMotion>& motions,
+                                           double before) {
+  const PoseConvention& given = recording.convention();
+  std::vector<std::pair<PoseConvention, std::string>> conventions = {{given, ""}};
+  if (!given.invert) {
+    conventions.emplace_back(given, "--invert-poses ");
+    conventions.back().first.invert = true;
+  }
+  if (recording.has_quaternions() && given.quaternion == QuaternionOrder::kNone) {
+    const bool to_wxyz = recording.quaternion_order() == QuaternionOrder::kXyzw;
+    conventions.emplace_back(given,
+                             to_wxyz ? "--quaternion-order wxyz " : "--quaternion-order xyzw ");
+    conventions.back().first.quaternion = to_wxyz ? QuaternionOrder::kWxyz : QuaternionOrder::kXyzw;
+  }
+  std::optional<Explanation> best;
+  for (const auto& [convention, flags] : conventions) {
+    const auto found = explain_by_body(recording, motions, convention, flags, before);
+    // A further flag must explain clearly more.
+    if (found && (!best || found->error < 0.5 * best->error)) best = found;
+  }
+  return best;
+}
+
+/// Offset (s, added to the given one) with the least error; 0 if it is at an end of the range.
+double best_offset(const Recording& recording, const std::vector<RegisteredMotion>& motions) {
+  constexpr double kFarthest = 0.6;
+  constexpr double kCoarse = 0.02;
+  constexpr double kFine = 0.005;
+  double best = 0.0;
+  double least = error_at_points(motions, motion_after(recording, 0.0));
+  const auto look = [&](double from, double to, double step) {
+    for (double offset = from; offset < to + 0.5 * step; offset += step) {
+      const MotionError error =
+          motion_error(motions, motion_after(recording, offset), Eigen::Isometry3d::Identity());
+      if (2 * error.pairs < motions.size() || !(error.at_points < least)) continue;
+      least = error.at_points;
+      best = offset;
+    }
+  };
+  look(-kFarthest, kFarthest, kCoarse);
+  look(best - kCoarse, best + kCoarse, kFine);
+  return std::abs(best) < kFarthest - kCoarse ? best : 0.0;
+}
+
+std::optional<Explanation> explain_by_offset(const Recording& recording,
+                                             const std::vector<RegisteredMotion>& motions,
+                                             double before) {
+  if (!recording.pose_after(motions.front().first, 0.0)) return std::nullopt;
+  const double of_half = best_offset(recording, half_of(motions, 0));
+  const std::vector<RegisteredMotion> others = half_of(motions, 1);
+  const double error_then = error_at_points(others, motion_after(recording, of_half));
+  const double error_now = error_at_points(others, motion_after(recording, 0.0));
+  if (of_half == 0.0 || !(error_then < 0.6 * error_now && error_now - error_then > 0.01)) {
+    return std::nullopt;
+  }
+  const double offset = best_offset(recording, motions);
+  Explanation result;
+  result.verdict = PoseVerdict::kTimeOffset;
+  result.convention = recording.convention();
+  result.error = error_at_points(motions, motion_after(recording, offset));
+  if (offset == 0.0 || !(result.error < 0.6 * before)) return std::nullopt;
+  result.time_offset = recording.time_offset() + offset;
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.3f", result.time_offset);
+  result.option = std::string("--time-offset ") + text;
+  return result;
+}
+
+void take(const Explanation& explanation, Diagnosis& d) {
+  d.verdict = explanation.verdict;
+  d.convention = explanation.convention;
+  d.time_offset = explanation.time_offset;
+  d.option = explanation.option;
+}
+
+}  // namespace
+
+void compare_with_registration(const Recording& recording, Diagnosis& d) {
+  d.time_offset = recording.time_offset();
+  if (d.verdict == PoseVerdict::kOtherwise) {
+    d.convention = d.readings.front().convention;
+    d.option = d.readings.front().option;
+  }
+  if (recording.frame() != PointFrame::kSensor || d.verdict == PoseVerdict::kUnknown) return;
+  const std::vector<RegisteredMotion> motions = register_motions(recording);
+  const BodyMotion given = motion_under(recording, recording.convention());
+  const auto identity = Eigen::Isometry3d::Identity();
+  const MotionError steps = motion_error(motions, given, identity, true);
+  const MotionError all = motion_error(motions, given, identity);
+  const double before = all.at_points;
+  if (d.sound() && before > kFarOff) {
+    // In traffic of the own speed, a registration can find no motion, though the poses agree with
+    // all that stands still.
+    d.registered_pairs = 0;
+    return;
+  }
+  const double exact = std::max(kExact, 2.0 * all.noise);
+  d.translation_error = steps.translation;
+  d.rotation_error = steps.rotation;
+  d.registered_pairs = steps.pairs;
+  if (motions.size() < kFewestMotions || steps.pairs < kFewestPairs) return;
+
+  if (before > exact) {
+    const bool has_reading = d.verdict == PoseVerdict::kOtherwise;
+    const double reading =
+        has_reading
+            ? error_at_points(motions, motion_under(recording, d.readings.front().convention))
+            : before;
+    const double bound = has_reading ? std::max(0.5 * reading, exact) : before;
+    const auto body = explain_by_body(recording, motions, before);
+    const auto offset = explain_by_offset(recording, motions, before);
+    const Explanation* best = nullptr;
+    for (const auto* candidate : {&offset, &body}) {
+      // A body has six numbers to fit, an offset has one.
+      if (*candidate && (best == nullptr || (*candidate)->error < 0.6 * best->error)) {
+        best = &**candidate;
+      }
+    }
+    const bool is_explained =
+        best != nullptr && best->error < bound && !(has_reading && reading < exact);
+    if (is_explained) {
+      take(*best, d);
+      return;
+    }
+  }
+  const bool is_inexact = steps.translation > std::max(kInexactTranslation, 3.0 * steps.noise) ||
+                          steps.rotation > std::max(kInexactRotation, 3.0 * steps.noise / 10.0);
+  if (d.verdict == PoseVerdict::kDisagree && before < exact) d.verdict = PoseVerdict::kAgree;
+  if (d.verdict == PoseVerdict::kDisagree && before < kFarOff) d.verdict = PoseVerdict::kInexact;
+  const bool may_be_inexact =
+      d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion;
+  if (may_be_inexact && is_inexact) d.verdict = PoseVerdict::kInexact;
+}
+
+}  // namespace dynains
