@@ -77,6 +77,7 @@ int main(int argc, char** argv) {
   add_statistics_command(app);
   add_eval_command(app);
   add_experiment_command(app);
+  add_view_command(app);
 
   try {
     app.parse(argc, argv);

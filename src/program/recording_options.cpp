@@ -1,19 +1,25 @@
 #include "recording_options.hpp"
 
 #include <iostream>
+#include <utility>
 
 namespace dynains::program {
+namespace {
 
-RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what) {
+constexpr const char* kGroup = "What the files of SEQ mean (dynains check SEQ finds out)";
+
+}  // namespace
+
+RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool required)
+    : command_(command) {
   command
       .add_option("SEQ", folder_,
                   what +
                       ": KITTI or SemanticKITTI folder (velodyne/, poses.txt; optional calib.txt, "
                       "times.txt), folder of .pcd, .ply or .bin scans with VIEWPOINT or a file of "
                       "poses, or log of ROS (.mcap, .db3, .bag, or a folder with metadata.yaml)")
-      ->required()
+      ->required(required)
       ->type_name("");
-  const char* const kGroup = "What the files of SEQ mean (dynains check SEQ finds out)";
   command
       .add_option("--poses", poses_,
                   "file of poses: 12 numbers a row (KITTI), time x y z qx qy qz qw (TUM), or CSV "
@@ -63,6 +69,27 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what) {
            "topic of the poses of a log: Odometry, PoseStamped or TF [the only one, else TF]");
   add_name("--pose-frame-id", pose_frame_id_,
            "take the poses of a log from TF, in this fixed frame [the root of the tree]");
+}
+
+nlohmann::ordered_json RecordingFlags::given_flags() const {
+  auto flags = nlohmann::ordered_json::object();
+  for (const CLI::Option* option : std::as_const(command_).get_options()) {
+    if (option->get_group() == kGroup && option->count() > 0) {
+      flags[option->get_name()] = option->results().front();
+    }
+  }
+  return flags;
+}
+
+void RecordingFlags::complete(const std::string& folder, const nlohmann::ordered_json& flags) {
+  if (folder_.empty()) folder_ = folder;
+  for (const auto& [name, value] : flags.items()) {
+    CLI::Option* const option = command_.get_option(name);
+    if (option->get_group() != kGroup) throw CLI::OptionNotFound(name);
+    if (option->count() > 0 || !value.is_string()) continue;
+    option->add_result(value.get<std::string>());
+    option->run_callback();
+  }
 }
 
 RecordingOptions RecordingFlags::options() const {

@@ -21,6 +21,7 @@
 #include "run_report.hpp"
 #include "run_results.hpp"
 #include "run_sequence.hpp"
+#include "view_command.hpp"
 
 namespace dynains::program {
 namespace {
@@ -99,6 +100,7 @@ RunDescription describe(const RunPlan& plan, const RunOptions& options,
   const Recording& sequence = plan.sequence;
   RunDescription description;
   description.sequence = options.sequence.folder();
+  description.sequence_flags = options.sequence.given_flags();
   description.first_scan = sequence.name(plan.range.first);
   description.last_scan = sequence.name(plan.range.first + results.finished() - 1);
   description.missing_poses = sequence.missing_pose_count();
@@ -145,6 +147,12 @@ void write_results(const RunPlan& plan, const RunOptions& options, OutputFolder&
   if (!description.complete) throw Interrupted{InterruptGuard::signal()};
 }
 
+/// The page of a complete run.
+void write_page(const RunPlan& plan, const RunOptions& options, OutputFolder& out) {
+  const fs::path page = write_view(out, plan.sequence, kDefaultViewPoints);
+  if (!options.quiet) std::cout << "page: " << page.string() << std::endl;
+}
+
 void run(const RunOptions& options) {
   const RunPlan plan = make_plan(options);
   const LockedFolder lock(plan.outputs.folder);
@@ -153,6 +161,7 @@ void run(const RunOptions& options) {
   if (task == RunTask::kNothing) {
     out.discard_staging();
     if (!options.quiet) std::cout << out.path().string() << ": complete already" << std::endl;
+    if (options.view) write_page(plan, options, out);
     return;
   }
   out.check(plan.listing, plan.inputs);
@@ -162,6 +171,7 @@ void run(const RunOptions& options) {
       plan, options, out,
       task == RunTask::kReplace ? OutputChange::Mode::kStaged : OutputChange::Mode::kInPlace,
       outside_map);
+  if (options.view) write_page(plan, options, out);
 }
 
 }  // namespace
@@ -201,6 +211,11 @@ void add_run_command(CLI::App& app) {
   command.add_flag("--write-clean", options->write_clean,
                    "also write every scan without its moving points, to the folder clean, in the "
                    "form it has in SEQ");
+  command.add_flag("--write-beliefs", options->write_beliefs,
+                   "also write the probability that a point moves, to the folder beliefs");
+  command.add_flag("--view", options->view,
+                   "also write the page view.html, which shows the results (see `dynains view`), "
+                   "and the folder beliefs");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   command.footer(
       "Writes labels/NNNNNN.label (uint32 a point: 251 moving, 9 static, 0 not judged; instance id "

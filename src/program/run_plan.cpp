@@ -103,6 +103,7 @@ RunPlan make_plan(const RunOptions& options) {
   outputs.map = choose_map(options, config);
   outputs.write_online = options.write_online;
   outputs.write_clean = options.write_clean;
+  outputs.write_beliefs = options.view || options.write_beliefs;
   outputs.map_on_disk = options.map_memory.has_value();
   std::optional<RemoverWithMapOnDisk::Config> map_on_disk;
   if (options.map_memory) {

@@ -32,6 +32,8 @@ struct RunOptions {
   ScanWindow window;
   bool write_online = false;
   bool write_clean = false;
+  bool write_beliefs = false;
+  bool view = false;
   bool force = false;
   bool resume = false;
   bool quiet = false;

@@ -82,6 +82,7 @@ nlohmann::ordered_json describe_request(const Recording& recording, const ScanRa
           {"map_on_disk", outputs.map_on_disk},
           {"write_online", outputs.write_online},
           {"write_clean", outputs.write_clean},
+          {"write_beliefs", outputs.write_beliefs},
           {"configuration", configuration}};
 }
 

@@ -36,11 +36,12 @@ PointColumns dynamic_columns(bool far, PointColumns columns) {
 const OutputKind& run_output_kind() {
   static const OutputKind kind = {"run",
                                   "report.json",
-                                  {"timing.csv", "dynamic_points.ply"},
+                                  {"timing.csv", "dynamic_points.ply", kViewPage},
                                   true,
                                   {{"labels", {".label"}},
                                    {"online", {".label"}},
                                    {"causes", {".cause"}},
+                                   {"beliefs", {".belief"}},
                                    {"clean", {".bin", ".pcd", ".ply"}},
                                    {kTileFolder, {kTileExtension}}}};
   return kind;
@@ -60,6 +61,7 @@ OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& r
   listing.files = {"timing.csv", "dynamic_points.ply"};
   if (!map.empty() && !has_outside_map()) listing.files.insert(map_name());
   listing.folders = {{"labels", ".label"}, {"causes", ".cause"}};
+  if (write_beliefs) listing.folders["beliefs"] = ".belief";
   if (write_online) listing.folders["online"] = ".label";
   if (write_clean) {
     listing.folders["clean"] =
@@ -79,7 +81,8 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
                        const RunOutputs& outputs, std::unique_ptr<PointFileWriter> outside_map)
     : recording_(recording),
       range_(range),
-      final_labels_(outputs.folder / "labels", outputs.folder / "causes"),
+      final_labels_(outputs.folder / "labels", outputs.folder / "causes",
+                    outputs.write_beliefs ? outputs.folder / "beliefs" : std::filesystem::path()),
       dynamic_points_(outputs.folder / "dynamic_points.ply",
                       dynamic_columns(is_far(recording, range), recording.columns())),
       map_(std::move(outside_map)),

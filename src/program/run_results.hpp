@@ -32,6 +32,9 @@ struct ScanRange {
 /// In the folder of results, while a run with --map-memory lasts.
 inline constexpr const char* kTileFolder = "map_tiles";
 
+/// The page of `dynains view` in the folder of results.
+inline constexpr const char* kViewPage = "view.html";
+
 /// The names that `dynains run` may use in its folder.
 const OutputKind& run_output_kind();
 
@@ -40,6 +43,7 @@ struct RunOutputs {
   std::filesystem::path map;  ///< by whole_path(); empty: no map
   bool write_online = false;
   bool write_clean = false;
+  bool write_beliefs = false;
   bool map_on_disk = false;
 
   bool has_outside_map() const;

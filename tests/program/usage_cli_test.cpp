@@ -50,7 +50,7 @@ TEST_CASE("An unknown command gives the list of commands and the nearest of them
     std::string expected;
   };
   const std::string all =
-      "xpected one of run, check, config, simulate, statistics, eval, experiment (";
+      "xpected one of run, check, config, simulate, statistics, eval, experiment, view (";
   const std::vector<Case> cases = {
       {{"runn", "seq", "--out", "out"}, "\"runn\" is no command; did you mean run? E" + all},
       {{"sim", "out"}, "\"sim\" is no command; did you mean simulate? E" + all},
