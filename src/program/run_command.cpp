@@ -78,6 +78,7 @@ void print_summary(const RunResults& results, const RunTiming& timing, const Run
   std::cout << "moving points: " << (outputs.folder / "dynamic_points.ply").string() << " ("
             << moving << " points)\n"
             << "labels: " << (outputs.folder / "labels").string()
+            << "\npicture: " << (outputs.folder / kOverviewPicture).string()
             << "\nreport: " << (outputs.folder / "report.json").string() << std::endl;
 }
 
@@ -200,19 +201,24 @@ void add_run_command(CLI::App& app) {
       .add_option("--map", options->map,
                   "static map, .ply or .pcd [static_map.ply in the folder of --out]")
       ->type_name("FILE");
+  const char* const kOutputs = "More outputs, and memory";
   command
       .add_option(
           "--map-memory", options->map_memory,
           "bounds the memory of the map, for long drives: what is farthest goes to files in "
           "--out until the run is complete [no bound]")
-      ->type_name("MB");
-  command.add_flag("--write-online", options->write_online,
-                   "also write the verdicts without latency, to the folder online");
-  command.add_flag("--write-clean", options->write_clean,
-                   "also write every scan without its moving points, to the folder clean, in the "
-                   "form it has in SEQ");
-  command.add_flag("--write-beliefs", options->write_beliefs,
-                   "also write the probability that a point moves, to the folder beliefs");
+      ->type_name("MB")
+      ->group(kOutputs);
+  const auto add_output = [&](const char* flag, bool& value, const char* help) {
+    command.add_flag(flag, value, help)->group(kOutputs);
+  };
+  add_output("--write-online", options->write_online,
+             "also write the verdicts without latency, to the folder online");
+  add_output("--write-clean", options->write_clean,
+             "also write every scan without its moving points, to the folder clean, in the form it "
+             "has in SEQ");
+  add_output("--write-beliefs", options->write_beliefs,
+             "also write the probability that a point moves, to the folder beliefs");
   command.add_flag("--view", options->view,
                    "also write the page view.html, which shows the results (see `dynains view`), "
                    "and the folder beliefs");
@@ -221,7 +227,8 @@ void add_run_command(CLI::App& app) {
       "Writes labels/NNNNNN.label (uint32 a point: 251 moving, 9 static, 0 not judged; instance id "
       "above\nthe 16th bit), causes/NNNNNN.cause (uint8 a point: why, see `dynains eval "
       "--errors`), "
-      "static_map.ply,\ndynamic_points.ply, report.json and timing.csv. Each file appears whole or "
+      "static_map.ply,\ndynamic_points.ply, overview.png (before, after, removed), report.json and "
+      "timing.csv. Each file appears whole or "
       "not at all; report.json says\n\"complete\": false until the end. Ctrl-C ends the run after "
       "the scan at hand, writes what is there and exits\nwith 130.");
   command.callback([options] { run(*options); });

@@ -18,6 +18,14 @@ bool is_far(const Recording& recording, const ScanRange& range) {
   return false;
 }
 
+std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange& range) {
+  std::vector<Eigen::Vector3d> path;
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    path.emplace_back(recording.T_world_sensor(i).translation());
+  }
+  return path;
+}
+
 PointColumns map_columns(bool far) {
   PointColumns columns;
   columns.double_xyz = far;
@@ -36,7 +44,7 @@ PointColumns dynamic_columns(bool far, PointColumns columns) {
 const OutputKind& run_output_kind() {
   static const OutputKind kind = {"run",
                                   "report.json",
-                                  {"timing.csv", "dynamic_points.ply", kViewPage},
+                                  {"timing.csv", "dynamic_points.ply", kOverviewPicture, kViewPage},
                                   true,
                                   {{"labels", {".label"}},
                                    {"online", {".label"}},
@@ -58,7 +66,7 @@ std::string RunOutputs::map_name() const {
 OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& range,
                                   bool lasts) const {
   OutputListing listing;
-  listing.files = {"timing.csv", "dynamic_points.ply"};
+  listing.files = {"timing.csv", "dynamic_points.ply", kOverviewPicture};
   if (!map.empty() && !has_outside_map()) listing.files.insert(map_name());
   listing.folders = {{"labels", ".label"}, {"causes", ".cause"}};
   if (write_beliefs) listing.folders["beliefs"] = ".belief";
@@ -85,6 +93,8 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
                     outputs.write_beliefs ? outputs.folder / "beliefs" : std::filesystem::path()),
       dynamic_points_(outputs.folder / "dynamic_points.ply",
                       dynamic_columns(is_far(recording, range), recording.columns())),
+      overview_(path_of(recording, range)),
+      overview_file_(outputs.folder / kOverviewPicture),
       map_(std::move(outside_map)),
       map_is_outside_(map_ != nullptr) {
   if (outputs.write_online) online_labels_.emplace(outputs.folder / "online");
@@ -108,6 +118,7 @@ void RunResults::take_final(const ScanVerdict& verdict) {
   RecordedScan scan = std::move(open_scans_.front());
   open_scans_.pop_front();
   if (clean_scans_) clean_scans_->write(index, scan, verdict.labels);
+  overview_.add(scan, verdict);
   for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
     if (verdict.labels[i] != PointLabel::kDynamic) continue;
     FilePoint point = scan.point(i);
@@ -136,6 +147,7 @@ void RunResults::commit() {
   final_labels_.finish();
   if (online_labels_) online_labels_->finish();
   dynamic_points_.commit();
+  overview_.picture().write_png(overview_file_);
   if (map_ && !map_is_outside_) map_->commit();
 }
 

@@ -18,6 +18,7 @@
 #include "dynains/verdict.hpp"
 #include "label_writer.hpp"
 #include "output_listing.hpp"
+#include "overview.hpp"
 
 namespace dynains::program {
 
@@ -32,6 +33,8 @@ struct ScanRange {
 /// In the folder of results, while a run with --map-memory lasts.
 inline constexpr const char* kTileFolder = "map_tiles";
 
+/// The picture of a run, see Overview.
+inline constexpr const char* kOverviewPicture = "overview.png";
 /// The page of `dynains view` in the folder of results.
 inline constexpr const char* kViewPage = "view.html";
 
@@ -101,6 +104,8 @@ class RunResults {
   std::optional<LabelWriter> online_labels_;
   std::optional<CleanWriter> clean_scans_;
   PointFileWriter dynamic_points_;
+  Overview overview_;
+  std::filesystem::path overview_file_;
   std::unique_ptr<PointFileWriter> map_;
   bool map_is_outside_;
   std::deque<RecordedScan> open_scans_;  // oldest first
