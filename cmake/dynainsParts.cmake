@@ -46,7 +46,8 @@ macro(dynains_part part option description)
 endmacro()
 
 set(json nlohmann_json=nlohmann-json3-dev)
-dynains_part(program DYNAINS_BUILD_PROGRAM "program" CLI11=libcli11-dev PNG=libpng-dev ${json})
+dynains_part(program DYNAINS_BUILD_PROGRAM "program" CLI11=libcli11-dev
+  PNG=libpng-dev ZLIB=zlib1g-dev ${json})
 if(NOT DYNAINS_BUILD_PYTHON STREQUAL "OFF")
   find_package(Python3 QUIET COMPONENTS Interpreter Development.Module)
 endif()

@@ -1,9 +1,10 @@
 #include "label_writer.hpp"
 
+#include <cmath>
 #include <utility>
 
-#include "dynains/io/atomic_file.hpp"
 #include "dynains/io/kitti.hpp"
+#include "dynains/io/point_bytes.hpp"
 #include "labelled_sequence.hpp"
 #include "output_folder.hpp"
 
@@ -24,13 +25,6 @@ std::uint32_t mos_class(PointLabel label) {
   return kRunNotJudged;
 }
 
-void write_causes(const std::filesystem::path& path, const std::vector<Cause>& causes) {
-  AtomicFile file(path);
-  file.stream().write(reinterpret_cast<const char*>(causes.data()),
-                      static_cast<std::streamsize>(causes.size()));
-  file.commit(AtomicFile::Sync::kLater);
-}
-
 }  // namespace
 
 std::uint32_t mos_label(PointLabel label, std::uint32_t instance) {
@@ -39,10 +33,14 @@ std::uint32_t mos_label(PointLabel label, std::uint32_t instance) {
   return mos_class(label) | id << 16;
 }
 
-LabelWriter::LabelWriter(std::filesystem::path folder, std::filesystem::path causes)
-    : folder_(std::move(folder)), cause_folder_(std::move(causes)) {
+LabelWriter::LabelWriter(std::filesystem::path folder, std::filesystem::path causes,
+                         std::filesystem::path beliefs)
+    : folder_(std::move(folder)),
+      cause_folder_(std::move(causes)),
+      belief_folder_(std::move(beliefs)) {
   create_folder(folder_);
   if (!cause_folder_.empty()) create_folder(cause_folder_);
+  if (!belief_folder_.empty()) create_folder(belief_folder_);
 }
 
 void LabelWriter::write(const std::string& name, const ScanVerdict& verdict) {
@@ -51,10 +49,20 @@ void LabelWriter::write(const std::string& name, const ScanVerdict& verdict) {
   for (std::size_t i = 0; i < labels_.size(); ++i) {
     labels_[i] = mos_label(verdict.labels[i], verdict.instances[i]);
   }
-  if (!cause_folder_.empty()) causes_.assign(verdict.causes.begin(), verdict.causes.end());
+  causes_.clear();
+  beliefs_.clear();
+  if (!cause_folder_.empty()) {
+    for (const Cause cause : verdict.causes) causes_.push_back(static_cast<std::uint8_t>(cause));
+  }
+  if (!belief_folder_.empty()) {
+    for (const float belief : verdict.beliefs) {
+      beliefs_.push_back(static_cast<std::uint8_t>(std::lround(255.0F * belief)));
+    }
+  }
   pending_ = std::async(std::launch::async, [this, name] {
     write_labels(folder_ / (name + ".label"), labels_);
-    if (!cause_folder_.empty()) write_causes(cause_folder_ / (name + ".cause"), causes_);
+    if (!cause_folder_.empty()) write_point_bytes(cause_folder_ / (name + ".cause"), causes_);
+    if (!belief_folder_.empty()) write_point_bytes(belief_folder_ / (name + ".belief"), beliefs_);
   });
 }
 

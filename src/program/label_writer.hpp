@@ -18,13 +18,15 @@ std::uint32_t mos_label(PointLabel label, std::uint32_t instance);
 /// One thread at most; one scan at most waits for the disk.
 class LabelWriter {
  public:
-  /// Creates the folders. No causes are written if `causes` is empty. Throws IoError.
-  explicit LabelWriter(std::filesystem::path folder, std::filesystem::path causes = {});
+  /// Creates the folders. No causes or beliefs are written if their folder is empty. Throws
+  /// IoError.
+  explicit LabelWriter(std::filesystem::path folder, std::filesystem::path causes = {},
+                       std::filesystem::path beliefs = {});
   LabelWriter(const LabelWriter&) = delete;
   LabelWriter& operator=(const LabelWriter&) = delete;
 
-  /// Writes `folder`/`name`.label and `causes`/`name`.cause. Throws IoError, for the scan before as
-  /// well.
+  /// Writes `folder`/`name`.label, `causes`/`name`.cause and `beliefs`/`name`.belief (255 is a
+  /// belief of 1). Throws IoError, for the scan before as well.
   void write(const std::string& name, const ScanVerdict& verdict);
   /// Waits for the last file. Throws IoError.
   void finish();
@@ -32,9 +34,11 @@ class LabelWriter {
  private:
   std::filesystem::path folder_;
   std::filesystem::path cause_folder_;
+  std::filesystem::path belief_folder_;
   // The writing thread's, while pending_ is valid.
   std::vector<std::uint32_t> labels_;
-  std::vector<Cause> causes_;
+  std::vector<std::uint8_t> causes_;
+  std::vector<std::uint8_t> beliefs_;
   std::future<void> pending_;
 };
 

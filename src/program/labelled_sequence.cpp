@@ -1,13 +1,11 @@
 #include "labelled_sequence.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <fstream>
-#include <system_error>
 #include <utility>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
+#include "dynains/io/point_bytes.hpp"
 
 namespace dynains::program {
 namespace fs = std::filesystem;
@@ -58,7 +56,10 @@ bool LabelledSequence::read(std::size_t i, evaluation::LabelledScan& scan) {
   instances_.clear();
   causes_.clear();
   for (std::size_t run = 0; run < runs_.size(); ++run) read_run(run, sequence_.name(index));
-  if (!runs_.empty() && runs_.front().kind == "labels") read_causes(sequence_.name(index));
+  if (!runs_.empty() && runs_.front().kind == "labels") {
+    const fs::path causes = runs_.front().folder / "causes";
+    causes_ = read_point_bytes(causes / (sequence_.name(index) + ".cause"), truth_.size());
+  }
 
   scan.xyz = points_.xyzi.data();
   scan.stride = 4;
@@ -79,26 +80,6 @@ void LabelledSequence::read_run(std::size_t run, const std::string& name) {
     const std::uint32_t id = run_class(labels[p], p, file);
     if (id == kRunStatic) in_map_[p] = static_cast<std::uint8_t>(in_map_[p] | (1U << run));
     if (run == 0) instances_[p] = labels[p] >> 16U;
-  }
-}
-
-void LabelledSequence::read_causes(const std::string& name) {
-  const fs::path file = runs_.front().folder / "causes" / (name + ".cause");
-  const std::string expected =
-      "expected a byte for each of the scan's " + std::to_string(truth_.size()) + " points";
-  std::error_code error;
-  const std::uintmax_t size = fs::file_size(file, error);
-  if (error == std::errc::no_such_file_or_directory) return;
-  if (error) throw IoError(file.string() + ": " + error.message() + "; " + expected);
-  if (size != truth_.size()) {
-    throw IoError(file.string() + ": has " + std::to_string(size) + " bytes; " + expected);
-  }
-  causes_.resize(truth_.size());
-  errno = 0;
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream.read(reinterpret_cast<char*>(causes_.data()),
-                   static_cast<std::streamsize>(causes_.size()))) {
-    throw IoError(file.string() + ": cannot be read: " + std::generic_category().message(errno));
   }
 }
 

@@ -64,7 +64,6 @@ class LabelledSequence {
  private:
   bool every_run_has(std::size_t index) const;
   void read_run(std::size_t run, const std::string& name);
-  void read_causes(const std::string& name);
 
   Recording sequence_;
   std::vector<RunLabels> runs_;

@@ -6,12 +6,14 @@
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <memory>
 
 #include "command.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/version.hpp"
 #include "eval.hpp"
 #include "experiment.hpp"
+#include "help_formatter.hpp"
 #include "printable.hpp"
 #include "unknown_command.hpp"
 
@@ -69,7 +71,9 @@ int main(int argc, char** argv) {
   CLI::App app("Removes moving objects from LiDAR scans and maps, scan by scan.", "dynains");
   app.set_version_flag("--version", std::string("dynains ") + dynains::kVersionString);
   app.require_subcommand(0, 1);
+  app.formatter(std::make_shared<HelpFormatter>());
   app.get_formatter()->column_width(36);
+  app.set_help_all_flag("--help-all", "print the help with all options and exit");
   add_run_command(app);
   add_remap_command(app);
   add_check_command(app);
@@ -78,6 +82,8 @@ int main(int argc, char** argv) {
   add_statistics_command(app);
   add_eval_command(app);
   add_experiment_command(app);
+  add_view_command(app);
+  add_reference_commands(app);
 
   try {
     app.parse(argc, argv);
@@ -88,7 +94,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::Success& success) {
     return print_help(app, success);
   } catch (const CLI::ParseError& error) {
-    const std::string what = remark_on_unknown_command(app).value_or(error.what());
+    const std::string what = remark_on_unknown_word(app).value_or(error.what());
     return fail(kExitUsage, what + " (see dynains --help)");
   } catch (const dynains::ConfigError& error) {
     return fail(kExitUsage, error.what());

@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "dynains/parameters.hpp"
+#include "nearest_name.hpp"
 
 namespace dynains::program {
 namespace {
@@ -135,12 +136,15 @@ ParameterValues read_config_file(const std::filesystem::path& path) {
   return values;
 }
 
-void ParameterValues::refuse(const std::string& name, const std::string& where) {
+void ParameterValues::refuse(const std::string& name, const std::string& where,
+                             const std::vector<std::string>& names) {
   std::string former = name;
   std::replace(former.begin(), former.end(), '-', '_');
   const std::string renaming = renaming_of(former);
-  throw ConfigError(
-      where + (renaming.empty() ? ": unknown parameter, see dynains config" : ": " + renaming));
+  if (!renaming.empty()) throw ConfigError(where + ": " + renaming);
+  const std::string like = nearest_name(name, names);
+  throw ConfigError(where + ": unknown parameter" +
+                    (like.empty() ? "" : "; did you mean " + like + "?") + ", see dynains config");
 }
 
 void ParameterFlags::add_former_names_to(CLI::App& command) {

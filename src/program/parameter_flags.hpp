@@ -95,18 +95,22 @@ class ParameterValues {
   template <class Config>
   void apply(Config& config) const {
     std::map<std::string, Value> left = values_;
+    std::vector<std::string> names;
     Config::visit(config, [&](const auto& parameter) {
+      names.push_back(flag_name(parameter.name));
       const auto found = left.find(flag_name(parameter.name));
       if (found == left.end()) return;
       assign_parameter(parameter, found->second.text, found->second.where);
       left.erase(found);
     });
     if (left.empty()) return;
-    refuse(left.begin()->first, left.begin()->second.where);
+    refuse(left.begin()->first, left.begin()->second.where, names);
   }
 
  private:
-  [[noreturn]] static void refuse(const std::string& name, const std::string& where);
+  /// Throws ConfigError with the present name of a former one, or the nearest of `names`.
+  [[noreturn]] static void refuse(const std::string& name, const std::string& where,
+                                  const std::vector<std::string>& names);
 
   struct Value {
     std::string text;

@@ -7,7 +7,13 @@
 
 namespace dynains::program {
 
-/// On standard error: a bar if it is a terminal, else a plain line for each tenth of the work.
+/// " (24.5 scans/s, 1:02 left)": the rate of `done` items in `seconds`, and the time for the rest
+/// of `total`. Empty if nothing is known yet.
+std::string describe_rate(std::size_t done, std::size_t total, double seconds,
+                          const std::string& unit);
+
+/// On standard error: a bar if it is a terminal, else a plain line for each tenth of the work; with
+/// the rate since the start, and the remaining time at that rate.
 class Progress {
  public:
   /// `unit`: name of the counted items, for example "scans".
@@ -21,10 +27,12 @@ class Progress {
  private:
   enum class Style { kNone, kBar, kLines };
   void draw_bar(std::size_t done);
+  std::string state(std::size_t done) const;
 
   std::size_t total_;
   std::string unit_;
   Style style_;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   std::size_t tenths_ = 0;
   bool drawn_ = false;
   std::chrono::steady_clock::time_point last_;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <iostream>
+#include <utility>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/extrinsic.hpp"
@@ -23,7 +24,8 @@ std::string quoted(const std::string& word) {
 
 }  // namespace
 
-RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what) : command_(&command) {
+RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool required)
+    : command_(&command) {
   command
       .add_option("SEQ", folder_,
                   what +
@@ -31,7 +33,7 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what) : com
                       "times.txt), folder of scans (.pcd, .ply, .bin, .las, .npy, .npz, .xyz or "
                       ".csv) with VIEWPOINT or a file of poses, or log of ROS (.mcap, .db3, .bag, "
                       "or a folder with metadata.yaml)")
-      ->required()
+      ->required(required)
       ->type_name("");
   command
       .add_option("--poses", poses_,
@@ -105,6 +107,27 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what) : com
            "topic of the poses of a log: Odometry, PoseStamped or TF [the only one, else TF]");
   add_name("--pose-frame-id", pose_frame_id_,
            "take the poses of a log from TF, in this fixed frame [the root of the tree]");
+}
+
+nlohmann::ordered_json RecordingFlags::given_flags() const {
+  auto flags = nlohmann::ordered_json::object();
+  for (const CLI::Option* option : std::as_const(*command_).get_options()) {
+    if (option->get_group() == kGroup && option->count() > 0) {
+      flags[option->get_name()] = option->results().front();
+    }
+  }
+  return flags;
+}
+
+void RecordingFlags::complete(const std::string& folder, const nlohmann::ordered_json& flags) {
+  if (folder_.empty()) folder_ = folder;
+  for (const auto& [name, value] : flags.items()) {
+    CLI::Option* const option = command_->get_option(name);
+    if (option->get_group() != kGroup) throw CLI::OptionNotFound(name);
+    if (option->count() > 0 || !value.is_string()) continue;
+    option->add_result(value.get<std::string>());
+    option->run_callback();
+  }
 }
 
 RecordingOptions RecordingFlags::options() const {

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "dynains/io/recording.hpp"
@@ -13,7 +14,7 @@ namespace dynains::program {
 class RecordingFlags {
  public:
   /// `what` starts the help of the argument, for example "labelled sequence".
-  RecordingFlags(CLI::App& command, const std::string& what);
+  RecordingFlags(CLI::App& command, const std::string& what, bool required = true);
 
   const std::string& folder() const { return folder_; }
   /// Throws ConfigError, and IoError for a file of --extrinsic.
@@ -21,6 +22,11 @@ class RecordingFlags {
   /// SEQ and the flags as a shell reads them, so that a message can propose a command. Flags in
   /// `further` replace those that were given.
   std::string as_given(const std::string& further = "") const;
+  /// The flags on the command line that describe the files of the recording, with their values.
+  nlohmann::ordered_json given_flags() const;
+  /// Takes the folder and given_flags() of an earlier command, as far as the command line does not
+  /// have them. Throws CLI::Error for flags or values that do not exist.
+  void complete(const std::string& folder, const nlohmann::ordered_json& flags);
   /// Whether a file is named that belongs to one recording only.
   bool names_files() const { return !poses_.empty() || !times_.empty(); }
   /// Throws IoError. Warns of scans that are left out for want of a pose, and of a log that ends
@@ -30,7 +36,7 @@ class RecordingFlags {
   Recording open(const std::filesystem::path& folder) const;
 
  private:
-  const CLI::App* command_;
+  CLI::App* command_;
   std::string folder_;
   std::string poses_;
   std::string times_;

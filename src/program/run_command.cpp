@@ -21,6 +21,7 @@
 #include "run_report.hpp"
 #include "run_results.hpp"
 #include "run_sequence.hpp"
+#include "view_command.hpp"
 
 namespace dynains::program {
 namespace {
@@ -77,6 +78,7 @@ void print_summary(const RunResults& results, const RunTiming& timing, const Run
   std::cout << "moving points: " << (outputs.folder / "dynamic_points.ply").string() << " ("
             << moving << " points)\n"
             << "labels: " << (outputs.folder / "labels").string()
+            << "\npicture: " << (outputs.folder / kOverviewPicture).string()
             << "\nreport: " << (outputs.folder / "report.json").string() << std::endl;
 }
 
@@ -110,6 +112,7 @@ RunDescription describe(const RunPlan& plan, const RunOptions& options,
   const Recording& sequence = plan.sequence;
   RunDescription description;
   description.sequence = options.sequence.folder();
+  description.sequence_flags = options.sequence.given_flags();
   description.first_scan = sequence.name(plan.range.first);
   description.last_scan = sequence.name(plan.range.first + results.finished() - 1);
   description.missing_poses = sequence.missing_pose_count();
@@ -156,6 +159,12 @@ void write_results(const RunPlan& plan, const RunOptions& options, OutputFolder&
   if (!description.complete) throw Interrupted{InterruptGuard::signal()};
 }
 
+/// The page of a complete run.
+void write_page(const RunPlan& plan, const RunOptions& options, OutputFolder& out) {
+  const fs::path page = write_view(out, plan.sequence, kDefaultViewPoints);
+  if (!options.quiet) std::cout << "page: " << page.string() << std::endl;
+}
+
 void run(const RunOptions& options) {
   const RunPlan plan = make_plan(options);
   const LockedFolder lock(plan.outputs.folder);
@@ -164,6 +173,7 @@ void run(const RunOptions& options) {
   if (task == RunTask::kNothing) {
     out.discard_staging();
     if (!options.quiet) std::cout << out.path().string() << ": complete already" << std::endl;
+    if (options.view) write_page(plan, options, out);
     return;
   }
   out.check(plan.listing, plan.inputs);
@@ -173,6 +183,7 @@ void run(const RunOptions& options) {
       plan, options, out,
       task == RunTask::kReplace ? OutputChange::Mode::kStaged : OutputChange::Mode::kInPlace,
       outside_map);
+  if (options.view) write_page(plan, options, out);
 }
 
 }  // namespace
@@ -201,37 +212,51 @@ void add_run_command(CLI::App& app) {
       .add_option("--map", options->map,
                   "static map, .ply, .pcd or .las [static_map.ply in the folder of --out]")
       ->type_name("FILE");
-  command.add_flag("--map-attributes", options->map_attributes,
-                   "the map holds intensity, time and label of its points, as far as scans have "
-                   "them; a map of LAS holds its attributes always");
+  const char* const kOutputs = "More outputs, and memory";
+  command
+      .add_flag("--map-attributes", options->map_attributes,
+                "the map holds intensity, time and label of its points, as far as scans have "
+                "them; a map of LAS holds its attributes always")
+      ->group(kOutputs);
   command
       .add_option("--crs", options->crs,
                   "coordinate reference system of the poses, for a map of LAS [none]")
-      ->type_name("EPSG:N");
+      ->type_name("EPSG:N")
+      ->group(kOutputs);
   command
       .add_option(
           "--map-memory", options->map_memory,
           "bounds the memory of the map, for long drives: what is farthest goes to files in "
           "--out until the run is complete [no bound]")
-      ->type_name("MB");
-  command.add_flag("--write-online", options->write_online,
-                   "also write the verdicts without latency, to the folder online");
-  command.add_flag("--write-clean", options->write_clean,
-                   "also write every scan without its moving points, to the folder clean, in the "
-                   "form it has in SEQ");
+      ->type_name("MB")
+      ->group(kOutputs);
+  const auto add_output = [&](const char* flag, bool& value, const char* help) {
+    command.add_flag(flag, value, help)->group(kOutputs);
+  };
+  add_output("--write-online", options->write_online,
+             "also write the verdicts without latency, to the folder online");
+  add_output("--write-clean", options->write_clean,
+             "also write every scan without its moving points, to the folder clean, in the form it "
+             "has in SEQ");
+  add_output("--write-beliefs", options->write_beliefs,
+             "also write the probability that a point moves, to the folder beliefs");
+  add_output("--write-mcap", options->write_mcap,
+             "also write verdicts.mcap, a log of ROS 2 with all scans, their labels, instances, "
+             "beliefs and causes, the poses and the map");
+  command.add_flag("--view", options->view,
+                   "also write the page view.html, which shows the results (see `dynains view`), "
+                   "and the folder beliefs");
   command.add_flag(
       "--accept-poses", options->accept_poses,
       "run even if the scans disagree with the poses, which else ends the command with "
       "exit code 2 before anything is written");
-  command.add_flag("--write-mcap", options->write_mcap,
-                   "also write verdicts.mcap, a log of ROS 2 with all scans, their labels, "
-                   "instances, beliefs and causes, the poses and the map");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   command.footer(
       "Writes labels/NNNNNN.label (uint32 a point: 251 moving, 9 static, 0 not judged; instance id "
       "above\nthe 16th bit), causes/NNNNNN.cause (uint8 a point: why, see `dynains eval "
       "--errors`), "
-      "static_map.ply,\ndynamic_points.ply, report.json and timing.csv. Each file appears whole or "
+      "static_map.ply,\ndynamic_points.ply, overview.png (before, after, removed), report.json and "
+      "timing.csv. Each file appears whole or "
       "not at all; report.json says\n\"complete\": false until the end. Ctrl-C ends the run after "
       "the scan at hand, writes what is there and exits\nwith 130. Other exit codes: 0; 1 if a "
       "file "

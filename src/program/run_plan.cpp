@@ -130,6 +130,7 @@ RunPlan make_plan(const RunOptions& options) {
   outputs.write_online = options.write_online;
   outputs.write_clean = options.write_clean;
   outputs.write_mcap = options.write_mcap;
+  outputs.write_beliefs = options.view || options.write_beliefs;
   outputs.map_on_disk = options.map_memory.has_value();
   add_map_attributes(options, config, outputs);
   std::optional<RemoverWithMapOnDisk::Config> map_on_disk;

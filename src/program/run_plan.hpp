@@ -35,6 +35,8 @@ struct RunOptions {
   bool write_online = false;
   bool write_clean = false;
   bool write_mcap = false;
+  bool write_beliefs = false;
+  bool view = false;
   bool force = false;
   bool resume = false;
   bool accept_poses = false;

@@ -70,6 +70,7 @@ nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& 
   nlohmann::ordered_json report = unfinished_report(run.map);
   report["complete"] = run.complete;
   report["sequence"] = run.sequence;
+  report["sequence_flags"] = run.sequence_flags;
   report["first_scan"] = run.first_scan;
   report["last_scan"] = run.last_scan;
   report["scans"] = results.finished();

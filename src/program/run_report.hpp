@@ -28,6 +28,7 @@ std::uint64_t peak_memory_bytes();
 
 struct RunDescription {
   std::string sequence;
+  nlohmann::ordered_json sequence_flags;  ///< flag -> value, those that describe the files
   std::string first_scan;
   std::string last_scan;
   std::size_t missing_poses = 0;  ///< scans of the recording that were left out for want of one

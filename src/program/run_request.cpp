@@ -86,6 +86,7 @@ nlohmann::ordered_json describe_request(const Recording& recording, const ScanRa
           {"write_online", outputs.write_online},
           {"write_clean", outputs.write_clean},
           {"write_mcap", outputs.write_mcap},
+          {"write_beliefs", outputs.write_beliefs},
           {"configuration", configuration}};
 }
 

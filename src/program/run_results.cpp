@@ -19,6 +19,14 @@ bool is_far(const Recording& recording, const ScanRange& range) {
   return false;
 }
 
+std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange& range) {
+  std::vector<Eigen::Vector3d> path;
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    path.emplace_back(recording.T_world_sensor(i).translation());
+  }
+  return path;
+}
+
 constexpr const char* kDynamicLas = "dynamic_points.las";
 constexpr const char* kVerdictLog = "verdicts.mcap";
 
@@ -58,15 +66,17 @@ PointColumns dynamic_columns(bool far, PointColumns columns) {
 }  // namespace
 
 const OutputKind& run_output_kind() {
-  static const OutputKind kind = {"run",
-                                  "report.json",
-                                  {"timing.csv", "dynamic_points.ply", kDynamicLas, kVerdictLog},
-                                  true,
-                                  {{"labels", {".label"}},
-                                   {"online", {".label"}},
-                                   {"causes", {".cause"}},
-                                   {"clean", {".bin", ".pcd", ".ply"}},
-                                   {kTileFolder, {kTileExtension}}}};
+  static const OutputKind kind = {
+      "run",
+      "report.json",
+      {"timing.csv", "dynamic_points.ply", kDynamicLas, kVerdictLog, kOverviewPicture, kViewPage},
+      true,
+      {{"labels", {".label"}},
+       {"online", {".label"}},
+       {"causes", {".cause"}},
+       {"beliefs", {".belief"}},
+       {"clean", {".bin", ".pcd", ".ply"}},
+       {kTileFolder, {kTileExtension}}}};
   return kind;
 }
 
@@ -81,11 +91,12 @@ std::string RunOutputs::map_name() const {
 OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& range,
                                   bool lasts) const {
   OutputListing listing;
-  listing.files = {"timing.csv", "dynamic_points.ply"};
+  listing.files = {"timing.csv", "dynamic_points.ply", kOverviewPicture};
   if (!map.empty() && !has_outside_map()) listing.files.insert(map_name());
   if (has_las_map()) listing.files.insert(kDynamicLas);
   if (write_mcap) listing.files.insert(kVerdictLog);
   listing.folders = {{"labels", ".label"}, {"causes", ".cause"}};
+  if (write_beliefs) listing.folders["beliefs"] = ".belief";
   if (write_online) listing.folders["online"] = ".label";
   if (write_clean) {
     listing.folders["clean"] =
@@ -111,9 +122,12 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
                        const RunOutputs& outputs, std::unique_ptr<MapFile> outside_map)
     : recording_(recording),
       range_(range),
-      final_labels_(outputs.folder / "labels", outputs.folder / "causes"),
+      final_labels_(outputs.folder / "labels", outputs.folder / "causes",
+                    outputs.write_beliefs ? outputs.folder / "beliefs" : std::filesystem::path()),
       dynamic_points_(outputs.folder / "dynamic_points.ply",
                       dynamic_columns(is_far(recording, range), recording.columns())),
+      overview_(path_of(recording, range)),
+      overview_file_(outputs.folder / kOverviewPicture),
       map_(std::move(outside_map)),
       map_is_outside_(map_ != nullptr) {
   if (outputs.write_online) online_labels_.emplace(outputs.folder / "online");
@@ -151,6 +165,7 @@ void RunResults::take_final(const ScanVerdict& verdict) {
   const bool has_labels = map_attributes_ && recording_.has_labels();
   const auto labels = has_labels ? recording_.read_labels(index) : std::vector<std::uint32_t>();
   if (map_attributes_) map_attributes_->add(scan, verdict, labels);
+  overview_.add(scan, verdict);
   for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
     if (verdict.labels[i] != PointLabel::kDynamic) continue;
     FilePoint point = scan.point(i);
@@ -181,6 +196,7 @@ void RunResults::commit() {
   dynamic_points_.commit();
   if (dynamic_las_) dynamic_las_->commit();
   if (log_) log_->commit();
+  overview_.picture().write_png(overview_file_);
   if (map_ && !map_is_outside_) map_->commit();
 }
 

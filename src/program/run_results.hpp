@@ -19,6 +19,7 @@
 #include "label_writer.hpp"
 #include "map_file.hpp"
 #include "output_listing.hpp"
+#include "overview.hpp"
 #include "verdict_log.hpp"
 
 namespace dynains::program {
@@ -34,6 +35,11 @@ struct ScanRange {
 /// In the folder of results, while a run with --map-memory lasts.
 inline constexpr const char* kTileFolder = "map_tiles";
 
+/// The picture of a run, see Overview.
+inline constexpr const char* kOverviewPicture = "overview.png";
+/// The page of `dynains view` in the folder of results.
+inline constexpr const char* kViewPage = "view.html";
+
 /// The names that `dynains run` may use in its folder.
 const OutputKind& run_output_kind();
 
@@ -43,6 +49,7 @@ struct RunOutputs {
   bool write_online = false;
   bool write_clean = false;
   bool write_mcap = false;
+  bool write_beliefs = false;
   bool map_on_disk = false;
   bool map_attributes = false;  ///< the map holds attributes of its points
   std::string crs;              ///< of a LAS map, for example "EPSG:25832"; empty: none
@@ -104,6 +111,8 @@ class RunResults {
   std::optional<LabelWriter> online_labels_;
   std::optional<CleanWriter> clean_scans_;
   PointFileWriter dynamic_points_;
+  Overview overview_;
+  std::filesystem::path overview_file_;
   std::unique_ptr<VerdictLog> log_;
   std::unique_ptr<MapFile> map_;
   std::unique_ptr<MapFile> dynamic_las_;  ///< moving points beside a LAS map

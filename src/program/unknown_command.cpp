@@ -1,43 +1,12 @@
 #include "unknown_command.hpp"
 
 #include <algorithm>
-#include <cstddef>
-#include <numeric>
 #include <vector>
+
+#include "nearest_name.hpp"
 
 namespace dynains::program {
 namespace {
-
-/// Letters to insert, remove or replace to get from one word to the other (Levenshtein).
-std::size_t distance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (std::size_t k = 0; k < b.size(); ++k) {
-      const std::size_t replaced = diagonal + (a[i] == b[k] ? 0 : 1);
-      diagonal = row[k + 1];
-      row[k + 1] = std::min({replaced, row[k] + 1, diagonal + 1});
-    }
-  }
-  return row.back();
-}
-
-/// Empty if none is alike.
-std::string nearest(const std::string& word, const std::vector<std::string>& names) {
-  constexpr std::size_t kAlike = 2;  // letters
-  std::string best;
-  std::size_t least = std::min(kAlike + 1, word.size());
-  for (const std::string& name : names) {
-    const bool is_begun = name.compare(0, word.size(), word) == 0;
-    const std::size_t letters = is_begun ? 0 : distance(word, name);
-    if (letters >= least) continue;
-    least = letters;
-    best = name;
-  }
-  return best;
-}
 
 /// The innermost command that was understood.
 const CLI::App& last_command(const CLI::App& app) {
@@ -46,23 +15,47 @@ const CLI::App& last_command(const CLI::App& app) {
   return *last;
 }
 
-}  // namespace
-
-std::optional<std::string> remark_on_unknown_command(const CLI::App& app) {
-  const CLI::App& last = last_command(app);
+std::optional<std::string> remark_on_word(const CLI::App& command, const std::string& word) {
   std::vector<std::string> names;
-  for (const CLI::App* command : last.get_subcommands([](const CLI::App*) { return true; })) {
-    names.push_back(command->get_name());
+  for (const CLI::App* one : command.get_subcommands([](const CLI::App*) { return true; })) {
+    names.push_back(one->get_name());
   }
-  const std::vector<std::string> rest = app.remaining(true);
-  if (names.empty() || rest.empty() || rest.front().substr(0, 1) == "-") return std::nullopt;
-
-  std::string text = "\"" + rest.front() + "\" is no command";
-  const std::string like = nearest(rest.front(), names);
+  if (names.empty()) return std::nullopt;
+  std::string text = "\"" + word + "\" is no command";
+  const std::string like = nearest_name(word, names);
   if (!like.empty()) text += "; did you mean " + like + "?";
   text += like.empty() ? "; expected one of " : " Expected one of ";
   for (std::size_t i = 0; i < names.size(); ++i) text += (i == 0 ? "" : ", ") + names[i];
   return text;
+}
+
+std::string remark_on_option(const CLI::App& command, const std::string& word) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->get_group().empty()) continue;  // former names
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  const std::string given = word.substr(0, word.find('='));
+  const std::string like = nearest_name(given, names);
+  std::string text = given + " is no option";
+  if (command.get_parent() != nullptr) text += " of " + command.get_name();
+  return like.empty() ? text : text + "; did you mean " + like + "?";
+}
+
+}  // namespace
+
+std::optional<std::string> remark_on_unknown_word(const CLI::App& app) {
+  const CLI::App& command = last_command(app);
+  const std::vector<std::string> rest = app.remaining(true);
+  if (rest.empty()) return std::nullopt;
+  if (rest.front().substr(0, 1) != "-") {
+    if (auto remark = remark_on_word(command, rest.front())) return remark;
+  }
+  const auto option = std::find_if(rest.begin(), rest.end(), [](const std::string& word) {
+    return word.size() > 2 && word.compare(0, 2, "--") == 0;
+  });
+  if (option == rest.end()) return std::nullopt;
+  return remark_on_option(command, *option);
 }
 
 }  // namespace dynains::program

@@ -1,4 +1,4 @@
-// A command that there is not, mistyped perhaps.
+// A command or option that does not exist, mistyped perhaps.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -7,8 +7,8 @@
 
 namespace dynains::program {
 
-/// After `app` has refused a command line: if a command was to stand where something else does,
-/// which there are and which of them is spelt most alike.
-std::optional<std::string> remark_on_unknown_command(const CLI::App& app);
+/// After `app` has refused a command line: names the first word that is no option, or no command
+/// where one is expected, and the nearest existing name.
+std::optional<std::string> remark_on_unknown_word(const CLI::App& app);
 
 }  // namespace dynains::program

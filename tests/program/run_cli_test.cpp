@@ -57,7 +57,7 @@ TEST_CASE("with --map-memory the map is kept on the disk, and the results are eq
   const Outcome outcome = fixture.run({"--map-memory", "0", "--level", "false", "--force"});
   CAPTURE(outcome.err);
   REQUIRE(outcome.code == 0);
-  CHECK(count_entries(fixture.out) == 6);
+  CHECK(count_entries(fixture.out) == 7);
   CHECK(read_text(fixture.out + "/labels/" + scan_name(5) + ".label") == labels);
   const auto size =
       static_cast<double>(read_points(fixture.out + "/static_map.ply").positions.size());
@@ -81,7 +81,7 @@ TEST_CASE("with --map-memory the map is kept on the disk, and the results are eq
   write_text(fixture.out + "/map_tiles/0_0_0.tile", "");
   write_text(fixture.out + "/map_tiles/.0_-1_0.tile.0123456789abcdef.tmp", "half");
   REQUIRE(fixture.run({"--map-memory", "0", "--level", "false", "--resume"}).code == 0);
-  CHECK(count_entries(fixture.out) == 6);
+  CHECK(count_entries(fixture.out) == 7);
   CHECK(read_text(fixture.out + "/static_map.ply") == map);
 }
 
@@ -159,7 +159,7 @@ TEST_CASE("run writes labels, causes, map, moving points, report and timing, and
   CAPTURE(outcome.err);
   REQUIRE(outcome.code == 0);
   CHECK_THAT(outcome.out, ContainsSubstring("12 scans"));
-  CHECK(count_entries(fixture.out) == 6);
+  CHECK(count_entries(fixture.out) == 7);
   CHECK(fixture.labels() == 12);
   CHECK(count_entries(fixture.out + "/causes") == 12);
 
@@ -179,7 +179,7 @@ TEST_CASE("run writes labels, causes, map, moving points, report and timing, and
   CHECK(report["program"] == "dynains");
   CHECK(report["command"] == "run");
   CHECK(report["outputs"]["files"] ==
-        nlohmann::json({"dynamic_points.ply", "static_map.ply", "timing.csv"}));
+        nlohmann::json({"dynamic_points.ply", "overview.png", "static_map.ply", "timing.csv"}));
   CHECK(report["outputs"]["folders"] ==
         nlohmann::json({{"labels", ".label"}, {"causes", ".cause"}}));
   CHECK(report["outputs"]["scans"].size() == 12);
@@ -231,7 +231,8 @@ TEST_CASE("The same input gives the same bytes") {
 TEST_CASE("Progress is plain lines in a pipe, and nothing with --quiet") {
   const Fixture fixture;
   const Outcome loud = fixture.run();
-  CHECK_THAT(loud.err, ContainsSubstring("12 of 12 scans\n"));
+  CHECK_THAT(loud.err,
+             ContainsSubstring("\n12 of 12 scans (") && Catch::Matchers::EndsWith(" scans/s)\n"));
   CHECK(loud.err.find('\r') == std::string::npos);
   const Outcome quiet = fixture.run({"--quiet", "--force"});
   CHECK(quiet.code == 0);
@@ -335,7 +336,7 @@ TEST_CASE("run takes the output of config, for every parameter") {
   REQUIRE(
       fixture.run({"--config", config, "--preset", preset == "paper" ? "default" : "paper"}).code ==
       0);
-  const std::string help = start({"run", "--help"}).out;
+  const std::string help = start({"run", "--help-all"}).out;
   const nlohmann::json configuration = fixture.report()["configuration"];
   std::size_t parameters = 0;
   const DynaInsRemover::Config expected =
@@ -556,7 +557,7 @@ TEST_CASE("A run that was killed while it replaced results is completed by --res
   REQUIRE(resumed.code == 0);
   CHECK(read_text(fixture.out + "/static_map.ply") == map);
   CHECK(fixture.labels() == 9);
-  CHECK(count_entries(fixture.out) == 6);
+  CHECK(count_entries(fixture.out) == 7);
   CHECK(fixture.report()["outputs"] == report["outputs"]);
 }
 
@@ -705,7 +706,7 @@ TEST_CASE("A folder that another run writes to is refused, and stays as it is") 
     CHECK(fixture.labels() == 12);
   }
   CHECK(fixture.run({"--force"}).code == 0);
-  CHECK(count_entries(fixture.out) == 6);
+  CHECK(count_entries(fixture.out) == 7);
 }
 
 TEST_CASE("A folder that is no result is never written to") {
@@ -733,7 +734,7 @@ TEST_CASE("Wrong flags: exit code 2, one line, nothing written") {
       {{"--tau-x", "1"}, "--tau-x"},
       {{"--use-free-space", "false"}, "--use-free-space: is now called decision"},
       {{"--decision", "paper"}, "--decision = paper: expected window|free_space|both"},
-      {{"--config", config}, "run.cfg:3: tau-x: unknown parameter"},
+      {{"--config", config}, "run.cfg:3: tau-x: unknown parameter; did you mean tau-s?"},
       {{"--preset", "best"}, "best not in"},
       {{"--start", "12"}, "--start and --end leave no scan of 000000 to 000011"},
       {{"--start", "5", "--end", "4"}, "--start and --end leave no scan"},
@@ -939,7 +940,7 @@ TEST_CASE("Ctrl-C: run finishes the current scan, writes final results and exits
   CHECK(report["last_scan"] == scan_name(scans - 1));
   CHECK(read_points(fixture.out + "/static_map.ply").positions.size() ==
         report["static_map"]["points"]);
-  CHECK(count_entries(fixture.out) == 6);
+  CHECK(count_entries(fixture.out) == 7);
 }
 
 TEST_CASE("A signal that is ignored at the start does not end a run") {
@@ -1039,16 +1040,33 @@ TEST_CASE("Progress is a redrawn bar on a terminal, lines in a file, and nothing
   const std::vector<std::string> arguments = {"run", fixture.seq, "--out", fixture.out, "--force"};
   const std::string shown = show_on_terminal(arguments);
   CAPTURE(shown);
-  const std::string full = "\r[" + std::string(40, '#') + "] 12 of 12 scans";
+  const std::string full = "\r[" + std::string(30, '#') + "] 12 of 12 scans (";
   const std::size_t end = shown.find(full);
   REQUIRE(end != std::string::npos);
   CHECK(end == shown.rfind(full));
   // All redraws of the bar are on one line, which ends before the next output.
-  CHECK(shown.find('\n', shown.find("\r[")) == end + full.size() + 1);
+  const std::size_t line_end = shown.find('\n', shown.find("\r["));
+  CHECK(shown.find("scans/s)", end) < line_end);
+  CHECK(shown.rfind('\r', line_end - 2) == end);
 
   const Outcome redirected = fixture.run({"--force"});
-  CHECK_THAT(redirected.err, ContainsSubstring("12 of 12 scans\n"));
+  CHECK_THAT(redirected.err,
+             ContainsSubstring("\n12 of 12 scans (") && Catch::Matchers::EndsWith(" scans/s)\n"));
   CHECK(redirected.err.find('\r') == std::string::npos);
   CHECK(count_lines(redirected.err) <= 10);
   CHECK(fixture.run({"--force", "--quiet"}).err.empty());
+}
+
+TEST_CASE("a run without ground truth leaves a picture, also without a map") {
+  const Fixture fixture;
+  REQUIRE(fixture.run({"--build-map", "false"}).code == 0);
+  const std::string png = read_text(fixture.out + "/overview.png");
+  CHECK(png.substr(1, 3) == "PNG");
+  // The sensor stands: three panels of 100 m at 8 pixels per m, below each other.
+  const auto side = [&](std::size_t byte) {
+    return 256 * static_cast<unsigned char>(png[byte + 2]) +
+           static_cast<unsigned char>(png[byte + 3]);
+  };
+  CHECK(side(16) == 800);
+  CHECK(side(20) == 3 * 800 + 2 * 8);
 }

@@ -1,6 +1,7 @@
 #include "run_report.hpp"
 
 #include "io/files.hpp"
+#include "progress.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains::program;
@@ -40,4 +41,12 @@ TEST_CASE("timing.csv has a row for each scan") {
   write_timing(folder / "timing.csv", timing);
   CHECK(read_text(folder / "timing.csv").find("\n\"a,b\n\"\"c\"\"\",1,0.0000") !=
         std::string::npos);
+}
+
+TEST_CASE("Progress tells the rate and the time that is left") {
+  CHECK(describe_rate(0, 100, 3.0, "scans").empty());
+  CHECK(describe_rate(50, 100, 20.0, "scans") == " (2.5 scans/s, 0:20 left)");
+  CHECK(describe_rate(250, 100000, 1.0, "scans") == " (250 scans/s, 6:39 left)");
+  CHECK(describe_rate(1, 7300, 1.0, "scans") == " (1.0 scans/s, 2:01:39 left)");
+  CHECK(describe_rate(100, 100, 20.0, "scans") == " (5.0 scans/s)");
 }

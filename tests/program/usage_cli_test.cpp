@@ -2,10 +2,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <cstdlib>
 #include <string>
 
 #include "dynains/version.hpp"
+#include "io/files.hpp"
 #include "program/start.hpp"
 #include "support/catch.hpp"
 
@@ -21,6 +23,21 @@ TEST_CASE("Flags --version and --help") {
     CHECK_THAT(help.out, ContainsSubstring(command));
     CHECK(start({command, "--help"}).code == 0);
   }
+}
+
+TEST_CASE("--help shows the options that matter, --help-all the rest too") {
+  const std::string help = start({"run", "--help"}).out;
+  const std::string all = start({"run", "--help-all"}).out;
+  for (const char* option : {"--out", "--preset", "--view", "--map "}) {
+    CHECK_THAT(help, ContainsSubstring(option));
+    CHECK_THAT(all, ContainsSubstring(option));
+  }
+  for (const char* option : {"--tau-s", "--invert-poses", "--write-online"}) {
+    CHECK(help.find(option) == std::string::npos);
+    CHECK_THAT(all, ContainsSubstring(option));
+  }
+  CHECK_THAT(help, ContainsSubstring("--help-all: "));
+  CHECK(std::count(help.begin(), help.end(), '\n') < 40);
 }
 
 TEST_CASE("Wrong usage is one line on standard error and exit code 2") {
@@ -44,13 +61,14 @@ TEST_CASE("Wrong usage is one line on standard error and exit code 2") {
   }
 }
 
-TEST_CASE("An unknown command gives the list of commands and the nearest of them") {
+TEST_CASE("An unknown command or option gives the nearest one") {
   struct Case {
     std::vector<std::string> arguments;
     std::string expected;
   };
   const std::string all =
-      "xpected one of run, remap, check, config, simulate, statistics, eval, experiment (";
+      "xpected one of run, remap, check, config, simulate, statistics, eval, experiment, view, "
+      "man, completion (";
   const std::vector<Case> cases = {
       {{"runn", "seq", "--out", "out"}, "\"runn\" is no command; did you mean run? E" + all},
       {{"sim", "out"}, "\"sim\" is no command; did you mean simulate? E" + all},
@@ -58,6 +76,10 @@ TEST_CASE("An unknown command gives the list of commands and the nearest of them
       {{"chekc", "seq"}, "did you mean check?"},
       {{"remove", "seq"}, "\"remove\" is no command; e" + all},
       {{""}, "\"\" is no command; e" + all},
+      {{"run", "seq", "--otu", "out"}, "--otu is no option of run; did you mean --out?"},
+      {{"run", "seq", "--out", "out", "--tau_s=1"},
+       "--tau_s is no option of run; did you mean --tau-s?"},
+      {{"run", "--nothing-like-it"}, "--nothing-like-it is no option of run (see"},
       {{"experiment", "tabel1"}, "\"tabel1\" is no command; did you mean table1? Expected one of "},
   };
   for (const Case& wrong : cases) {
@@ -123,4 +145,28 @@ TEST_CASE("A NUL byte in a config file is named with its line") {
   CHECK(outcome.code == 2);
   CHECK(outcome.err == "dynains: error: " + (folder / "config").string() +
                            ":2: expected a line of text, found a NUL byte\n");
+}
+
+TEST_CASE("The manual page and the completion have every command and option") {
+  const std::string manual = start({"man"}).out;
+  const std::string completion = start({"completion"}).out;
+  CHECK_THAT(manual, StartsWith(".TH DYNAINS 1 "));
+  for (const char* command : {"run", "view", "experiment table1"}) {
+    CHECK_THAT(manual, ContainsSubstring(std::string(".SS ") + command + '\n'));
+    CHECK_THAT(completion, ContainsSubstring(std::string("    \"") + command + "\") options="));
+  }
+  CHECK_THAT(manual, ContainsSubstring("\\fB\\-\\-tau\\-s\\fR"));
+
+  // Bash completes the words of a command line by the function.
+  const TemporaryFolder folder;
+  const std::string script = folder / "complete.sh";
+  write_text(script, completion + R"(
+reply() { COMP_WORDS=(dynains "$@"); COMP_CWORD=$#; _dynains; echo "${COMPREPLY[*]}"; }
+reply ru; reply run seq --tau-wh; reply experiment tab; reply view --max
+)");
+  FILE* const bash = ::popen(("bash '" + script + "'").c_str(), "r");
+  std::string shown;
+  for (int c = std::fgetc(bash); c != EOF; c = std::fgetc(bash)) shown += static_cast<char>(c);
+  CHECK(::pclose(bash) == 0);
+  CHECK(shown == "run\n--tau-whole\ntable1\n--max-points\n");
 }

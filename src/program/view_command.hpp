@@ -1,0 +1,20 @@
+// The page that shows the results of a run.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+
+#include "dynains/io/recording.hpp"
+#include "output_folder.hpp"
+
+namespace dynains::program {
+
+/// Points on a page: for 1 million, it has some 10 MB.
+inline constexpr std::size_t kDefaultViewPoints = 1000000;
+
+/// Writes view.html into a folder with complete results of a run over `recording`, and lists it in
+/// report.json. Returns its path. Throws IoError.
+std::filesystem::path write_view(OutputFolder& out, const Recording& recording,
+                                 std::size_t max_points);
+
+}  // namespace dynains::program

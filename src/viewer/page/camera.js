@@ -1,0 +1,79 @@
+// Three cameras about a target, z up. Matrices are column-major.
+
+const FIELD_OF_VIEW = 0.9;  // rad, vertical
+
+function product(a, b) {
+  const c = new Float32Array(16);
+  for (let column = 0; column < 4; ++column) {
+    for (let row = 0; row < 4; ++row) {
+      for (let k = 0; k < 4; ++k) c[4 * column + row] += a[4 * k + row] * b[4 * column + k];
+    }
+  }
+  return c;
+}
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const sum = (a, b, factor = 1) => a.map((value, axis) => value + factor * b[axis]);
+
+class Camera {
+  constructor(target, yaw, distance) {
+    this.mode = 'free';
+    this.target = target;
+    this.yaw = yaw;  // direction of view in the plane, rad
+    this.pitch = 0.5;  // downwards, rad
+    this.distance = distance;
+  }
+
+  axes() {
+    const pitch = this.mode === 'top' ? Math.PI / 2 : this.pitch;
+    const [sy, cy, sp, cp] =
+      [Math.sin(this.yaw), Math.cos(this.yaw), Math.sin(pitch), Math.cos(pitch)];
+    return {forward: [cp * cy, cp * sy, -sp], right: [sy, -cy, 0], up: [sp * cy, sp * sy, cp]};
+  }
+
+  matrix(aspect) {
+    const {forward, right, up} = this.axes();
+    const eye = sum(this.target, forward, -this.distance);
+    const view = new Float32Array([
+      right[0], up[0], -forward[0], 0, right[1], up[1], -forward[1], 0,
+      right[2], up[2], -forward[2], 0, -dot(right, eye), -dot(up, eye), dot(forward, eye), 1]);
+    const near = Math.max(0.2, this.distance / 200);
+    const far = this.distance + 2000;
+    const f = 1 / Math.tan(FIELD_OF_VIEW / 2);
+    const projection = new Float32Array(16);
+    if (this.mode === 'top') {
+      projection.set([f / (aspect * this.distance), 0, 0, 0, 0, f / this.distance, 0, 0,
+        0, 0, 2 / (near - far), 0, 0, 0, (near + far) / (near - far), 1]);
+    } else {
+      projection.set([f / aspect, 0, 0, 0, 0, f, 0, 0,
+        0, 0, (near + far) / (near - far), -1, 0, 0, 2 * near * far / (near - far), 0]);
+    }
+    return {matrix: product(projection, view), near, far, isFlat: this.mode === 'top'};
+  }
+
+  turn(dx, dy) {
+    this.yaw -= 0.005 * dx;
+    this.pitch = Math.min(1.55, Math.max(-0.3, this.pitch + 0.005 * dy));
+  }
+
+  move(dx, dy, height) {
+    const {right} = this.axes();
+    const metres = 2 * this.distance * Math.tan(FIELD_OF_VIEW / 2) / height;
+    this.target = sum(this.target, right, -dx * metres);
+    this.target = sum(this.target, [Math.cos(this.yaw), Math.sin(this.yaw), 0], dy * metres);
+  }
+
+  zoom(factor) {
+    this.distance = Math.min(5000, Math.max(1, this.distance * factor));
+  }
+
+  // Behind the sensor, in its direction of travel.
+  follow(scans, index) {
+    const from = scans[Math.max(0, index - 3)].position;
+    const to = scans[Math.min(scans.length - 1, index + 3)].position;
+    this.target = scans[index].position;
+    if (Math.hypot(to[0] - from[0], to[1] - from[1]) > 0.2) {
+      this.yaw = Math.atan2(to[1] - from[1], to[0] - from[0]);
+    }
+  }
+}

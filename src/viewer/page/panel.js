@@ -1,0 +1,104 @@
+// Texts: the card of a point, the filter by cause, the legend.
+
+const CAUSE_COLOURS = [
+  [0.40, 0.42, 0.46], [0.55, 0.47, 0.38], [0.45, 0.62, 0.80], [0.30, 0.75, 0.70],
+  [0.50, 0.50, 0.62], [0.60, 0.56, 0.70], [0.33, 0.35, 0.40], [0.95, 0.35, 0.65],
+  [0.95, 0.25, 0.20], [1.00, 0.55, 0.10], [0.80, 0.65, 0.20], [0.55, 0.62, 0.70],
+  [0.85, 0.30, 0.85], [0.60, 0.35, 0.95], [0.35, 0.55, 0.90], [0.30, 0.80, 0.45],
+  [0.98, 0.85, 0.35]];
+
+const CAUSE_SENTENCES = [
+  'kept or removed for an unknown cause',
+  'kept: it is ground',
+  'kept: the occupancy of its instance is alike in older and newer scans',
+  'kept: its instance was proposed as moving, but the belief or the votes of other windows revert this',
+  'kept: its cluster has too few points',
+  'kept: its cluster has no points in the oldest or newest scan',
+  'kept: it is out of range or belongs to no cluster, and is not judged',
+  'removed: the occupancy of its instance differs between older and newer scans',
+  'removed: beams of other scans passed through its position',
+  'removed: beams of other scans passed through a part of its instance',
+  'removed: it is ground below a removed instance',
+  'kept: other scans give no evidence about its position',
+  'removed: its instance moved in other scans',
+  'removed for now: earlier scans give no evidence about its position',
+  'kept: its position is occupied according to other scans',
+  'kept: too few beams of other scans passed through its position',
+  'removed: most points in its dynamic grid cell are dynamic'];
+
+const LABELS = ['not judged', 'static', 'moving'];
+const count = (number) => number.toLocaleString('en-US');
+const element = (id) => document.getElementById(id);
+const css = (colour) => `rgb(${colour.map((value) => Math.round(255 * value)).join(' ')})`;
+
+function swatch(colour) {
+  const box = document.createElement('i');
+  box.style.background = css(colour);
+  return box;
+}
+
+function summaryOf(description, points) {
+  const shown = [0, 1].map((layer) => points.chunks.filter((chunk) => chunk.layer === layer)
+    .reduce((sum, chunk) => sum + chunk.count, 0));
+  const {counts} = description;
+  let text = `${count(description.scans.length)} scans, ${count(counts.points)} points. ` +
+    `This page has ${count(shown[0])} of ${count(counts.map)} map points and ` +
+    `${count(shown[1])} of ${count(counts.moving)} removed points.`;
+  if (description.has_truth) {
+    text += ` By ground truth, ${count(counts.missed)} moving points were missed and ` +
+      `${count(counts.lost)} static points were lost.`;
+  }
+  return text;
+}
+
+function errorOf(point) {
+  if (point.truth === 0) return 'not known';
+  const truth = LABELS[point.truth];
+  if (point.truth === point.label) return `${truth}: right`;
+  return truth + (point.label === 2 ? ': lost static point' : ': missed moving point');
+}
+
+function factsOf(description, points, index) {
+  const point = pointAt(points, index);
+  const scan = point.scan === NO_SCAN ? null : description.scans[point.scan];
+  const world = point.local.map((value, axis) => (value + description.origin[axis]).toFixed(2));
+  const facts = [
+    ['scan', scan ? `${scan.name} (${scan.time.toFixed(2)} s)` : 'not found'],
+    ['instance', point.instance === 0 ? 'none' : String(point.instance)],
+    ['label', LABELS[point.label]],
+    ['belief', description.has_beliefs ? point.belief.toFixed(2)
+      : 'not in the files (dynains run --write-beliefs)'],
+    ['cause', CAUSE_SENTENCES[point.cause] ?? CAUSE_SENTENCES[0]],
+  ];
+  if (description.has_truth) facts.push(['ground truth', errorOf(point)]);
+  facts.push(['position', world.join(', ') + ' m']);
+  return facts;
+}
+
+function showCard(facts) {
+  const list = document.createElement('dl');
+  for (const [name, text] of facts) {
+    const term = document.createElement('dt');
+    const value = document.createElement('dd');
+    term.textContent = name;
+    value.textContent = text;
+    list.append(term, value);
+  }
+  element('facts').replaceChildren(list);
+  element('card').hidden = false;
+}
+
+function legendOf(mode, description) {
+  const entries = {
+    0: [['static', [0.6, 0.6, 0.6]], ['removed: a colour for each instance', [0.95, 0.45, 0.35]]],
+    3: [['ground', [0.55, 0.47, 0.38]], ['static', [0.45, 0.62, 0.80]],
+      ['moving', [0.95, 0.25, 0.20]]],
+    4: [['belief 0', [0.16, 0.23, 0.55]], ['belief 1', [0.98, 0.86, 0.30]]],
+    6: [['right static', [0.6, 0.6, 0.6]], ['removed moving', [0.12, 0.63, 0.24]],
+      ['lost static', [1, 0.55, 0]], ['missed moving', [0.86, 0.08, 0.12]],
+      ['no ground truth', [0.25, 0.27, 0.32]]],
+  }[mode] ?? [];
+  const parts = entries.flatMap(([name, colour]) => [swatch(colour), name + '  ']);
+  if (mode === 4 && !description.has_beliefs) parts.push('The run wrote no beliefs.');
+  return parts;
+}

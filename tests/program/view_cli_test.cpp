@@ -1,0 +1,92 @@
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "io/files.hpp"
+#include "program/start.hpp"
+#include "program/tiny_sequence.hpp"
+#include "support/catch.hpp"
+
+using namespace dynains::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Fixture {
+  Fixture() : seq(folder / "seq"), out(folder / "out"), page(out + "/view.html") {
+    write_tiny_sequence(seq, 4);
+  }
+
+  TemporaryFolder folder;
+  std::string seq;
+  std::string out;
+  std::string page;
+};
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+}  // namespace
+
+TEST_CASE("the page of a run has its description and is listed among the results") {
+  const Fixture fixture;
+  const Outcome run = start({"run", fixture.seq, "--out", fixture.out, "--view"});
+  CAPTURE(run.err);
+  REQUIRE(run.code == 0);
+  CHECK(contains(run.out, "page: " + fixture.page + "\n"));
+  const std::string page = read_text(fixture.page);
+  CHECK(contains(page, "\"has_beliefs\":true"));
+  CHECK(!contains(page, "{{"));
+  // Nothing is loaded from elsewhere.
+  CHECK(!contains(page, "http:"));
+  CHECK(!contains(page, "https:"));
+  CHECK(contains(read_text(fixture.out + "/report.json"), "\"view.html\""));
+
+  // The page belongs to the results: it goes with them.
+  REQUIRE(start({"run", fixture.seq, "--out", fixture.out, "--force"}).code == 0);
+  CHECK(!fs::exists(fixture.page));
+  CHECK(!fs::exists(fixture.out + "/beliefs"));
+  REQUIRE(start({"view", fixture.out}).code == 0);
+  CHECK(contains(read_text(fixture.page), "\"has_beliefs\":false"));
+  const auto outcome = start({"run", fixture.seq, "--out", fixture.out, "--resume"});
+  CHECK(contains(outcome.out, "complete already"));
+}
+
+TEST_CASE("view refuses what is no finished run, and files of others") {
+  const Fixture fixture;
+  CHECK(contains(start({"view", fixture.out}).err, "no such folder"));
+  fs::create_directory(fixture.out);
+  CHECK(contains(start({"view", fixture.out}).err, "holds no results"));
+  REQUIRE(start({"run", fixture.seq, "--out", fixture.out}).code == 0);
+  write_text(fixture.page, "mine");
+  const Outcome refused = start({"view", fixture.out});
+  CHECK(refused.code == 1);
+  CHECK(contains(refused.err, "view.html"));
+  CHECK(read_text(fixture.page) == "mine");
+}
+
+TEST_CASE("view finds the recording by the report, with its flags, or by its new place") {
+  const Fixture fixture;
+  const std::string poses = fixture.folder / "my poses.txt";
+  fs::rename(fixture.seq + "/poses.txt", poses);
+  REQUIRE(start({"run", fixture.seq, "--out", fixture.out, "--poses", poses}).code == 0);
+  REQUIRE(start({"view", fixture.out}).code == 0);
+
+  fs::rename(fixture.seq, fixture.seq + "2");
+  CHECK(contains(start({"view", fixture.out}).err, "name the place of the run's recording"));
+  CHECK(start({"view", fixture.out, fixture.seq + "2"}).code == 0);
+  fs::remove(fixture.seq + "2/velodyne/000000.bin");
+  CHECK(contains(start({"view", fixture.out, fixture.seq + "2"}).err, "scan 000000"));
+}
+
+TEST_CASE("beliefs are written on demand, one byte per point") {
+  const Fixture fixture;
+  REQUIRE(start({"run", fixture.seq, "--out", fixture.out, "--write-beliefs"}).code == 0);
+  CHECK(fs::file_size(fixture.out + "/beliefs/000003.belief") ==
+        fs::file_size(fixture.out + "/causes/000003.cause"));
+  fs::resize_file(fixture.out + "/beliefs/000003.belief", 7);
+  const Outcome outcome = start({"view", fixture.out});
+  CHECK(outcome.code == 1);
+  CHECK(contains(outcome.err, "000003.belief: has 7 bytes; expected a byte for each"));
+}
