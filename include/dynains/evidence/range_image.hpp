@@ -27,13 +27,14 @@ class RangeImage {
     /// nearest return in this cell; without a return, kNothing.
     std::int16_t nearest;
     /// Range of the nearest return in the 3x3 cells, except returns of moving points in the eight
-    /// outer cells. kUnknown if fewer than two cells have such a return, or if only rows on one
-    /// side of this cell have one.
+    /// outer cells. kUnknown if fewer than two cells have such a return; kBeyond if the cell may
+    /// lie beyond the outermost beam.
     std::int16_t around;
   };
   static constexpr std::int16_t kMoving = 1;  ///< bit that is set in ranges of moving points
   static constexpr std::int16_t kNothing = 32766;
   static constexpr std::int16_t kUnknown = -2;
+  static constexpr std::int16_t kBeyond = -4;  ///< unknown, and not protected by near objects
 
   /// Maximum number of cells on each side that a return of an object protects.
   static constexpr std::size_t kWidest = 4;
@@ -287,15 +288,14 @@ class RangeImage {
     }
   }
 
-  // Writes one row of cells. A cell is unknown if its 3x3 cells have a single static return, or if
-  // it may lie beyond the outermost beam: only rows on one side have returns. Near objects protect
-  // such cells all the same. In the row of the highest beam and above, its own row
-  // is not enough, because a slanted surface a little above that beam is much nearer than its
-  // return.
+  // Writes one row of cells. A cell is unknown if its 3x3 cells have a single static return, unless
+  // this is the return of a near object. A cell lies beyond the outermost beam if only rows on one
+  // side have returns. In the row of the highest beam and above, its own row is not enough, because
+  // a slanted surface a little above that beam is much nearer than its return.
   template <class Short>
   void store_row(const RangeImageGrid& grid, const ProtectionLimits& limits, std::size_t row,
                  const Scratch& scratch) {
-    const Short nothing(kNothing), unknown(kUnknown), near(limits.limit[0]);
+    const Short nothing(kNothing), unknown(kUnknown), beyond(kBeyond), near(limits.limit[0]);
     const Short zero(0), one_return(-1);
     const std::size_t stride = grid.stride();
     const std::int16_t* const middle = row_of(scratch.nearest, row, grid, scratch);
@@ -321,14 +321,14 @@ class RangeImage {
       const Short bits =
           Short::load(row_bits - 1) | Short::load(row_bits) | Short::load(row_bits + 1);
       const Short is_between = ((bits & same) == same) | ((bits & both_sides) == both_sides);
-      const Short known = (returns < one_return) & is_between;
-      Short alone = unknown;
-      const Short too_few = select(known, zero, returns) < zero;
-      if (too_few.any()) {
+      Short alone = select(is_between, unknown, beyond);
+      const Short single = (returns == one_return) & is_between;
+      if (single.any()) {
         const Short object = min(min(least_object(row - 1, column), least_object(row, column)),
                                  least_object(row + 1, column));
-        alone = select(too_few & (object < near), object, unknown);
+        alone = select(single & (object < near), object, alone);
       }
+      const Short known = (returns < one_return) & is_between;
       const Short staying = select(known, least_of_three(leasts + column), alone);
       // A moving point in the cell itself occludes the points behind it.
       const Short here = Short::load(middle + column);
@@ -434,7 +434,7 @@ class RangeImage {
       std::int16_t* const at = &cells[half * kShortPackWidth / 2].nearest;
       const Short here = Short::load(at);
       const Short limit = Short::load(limits + half * kShortPackWidth);
-      min(select((here < Short(0)) & (limit < nothing), nothing, here), limit).store(at);
+      min(select((here == Short(kUnknown)) & (limit < nothing), nothing, here), limit).store(at);
     }
   }
 
