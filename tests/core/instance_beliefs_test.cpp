@@ -68,7 +68,10 @@ struct Scan {
   const Belief& belief(std::size_t supervoxel = 0) const { return beliefs.supervoxels[supervoxel]; }
   bool is_free(std::size_t supervoxel = 0) const { return updater.is_free(belief(supervoxel)); }
   bool removes(std::size_t instance = 0) const {
-    return updater.removes_whole(samples, beliefs, instance);
+    return updater.removes_whole(samples, beliefs, instance, false);
+  }
+  bool removes_large(std::size_t instance = 0) const {
+    return updater.removes_whole(samples, beliefs, instance, true);
   }
 
   InstanceBeliefUpdater updater;
@@ -174,6 +177,17 @@ TEST_CASE("an instance is removed if a fifth of its known samples moved") {
   hidden.see({{2, 0}, {0, 8}, {0, 0}});
   CHECK(hidden.beliefs.counts[0].decided == 11);
   CHECK(hidden.beliefs.counts[0].total == 31);
+}
+
+TEST_CASE("an instance larger than one object is removed if half of its known samples moved") {
+  Scan enough(Instances{{5, 5}});
+  enough.see({{5, 0}, {0, 5}});
+  CHECK(enough.removes_large());
+
+  Scan too_little(Instances{{4, 5}});
+  too_little.see({{4, 0}, {0, 5}});
+  CHECK(too_little.removes());
+  CHECK_FALSE(too_little.removes_large());
 }
 
 // A parked car: four layers of supervoxels of four samples each, `per_layer` in each.

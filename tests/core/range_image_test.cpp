@@ -62,6 +62,8 @@ TEST_CASE("cells of an image are derived from the beams of a sensor, within limi
   CHECK(std::abs(grid.rows - 34.0 / 0.3) < 2.0);  // 2 deg more than the beams on each side
   CHECK(std::abs(grid.lowest * kDegrees + 22.0) < 0.2);
   CHECK(grid.hole_rows == 4);  // 1.2 deg
+  // The row of the highest beam, at 10 deg, is 32 deg above the lower edge.
+  CHECK(std::abs(grid.last_inner_row - (31.75 / 0.3 - 1.0)) < 2.0);
   sensor.azimuth_step = 0.05;
   CHECK(RangeImageGrid::for_sensor(sensor).columns == 1800);
   sensor.azimuth_step = 2.0;
@@ -134,12 +136,13 @@ class ReferenceImage {
     int least = kNothing;
     int count = 0;
     for (const int value : about(row, column)) {
-      if (value == kNothing || is_moving(value)) continue;
+      if (!is_static_return(value)) continue;
       least = std::min(least, value);
       ++count;
     }
     const int here = cells_[at(row, column)];
-    if (count < 2) return is_moving(here) ? here : RangeImage::kUnknown;
+    if (count < 2 || !is_between_beams(row, column))
+      return is_moving(here) ? here : RangeImage::kUnknown;
     return is_moving(here) ? std::min(least, here) : least;
   }
   std::size_t at(int row, int column) const {
@@ -149,6 +152,23 @@ class ReferenceImage {
 
  private:
   static constexpr int kNothing = RangeImage::kNothing;
+
+  static bool is_static_return(int value) { return value != kNothing && !is_moving(value); }
+
+  // One of three neighbouring cells of a row has a static return.
+  bool has_return(int row, int column) const {
+    if (row < 0 || row >= grid_.rows) return false;
+    bool found = false;
+    for (int c = column - 1; c <= column + 1; ++c) {
+      found |= is_static_return(cells_[at(row, (c + grid_.columns) % grid_.columns)]);
+    }
+    return found;
+  }
+
+  bool is_between_beams(int row, int column) const {
+    const bool both_sides = has_return(row - 1, column) && has_return(row + 1, column);
+    return both_sides || (row <= grid_.last_inner_row && has_return(row, column));
+  }
 
   // The 3x3 cells.
   std::vector<int> about(int row, int column) const {
@@ -206,6 +226,7 @@ TEST_CASE("an image equals its definition, cell by cell") {
 int around_with_objects(const RangeImageGrid& grid, const ReferenceImage& all,
                         const std::vector<int>& objects, float reach, int row, int column) {
   int result = all.around(row, column);
+  if (result == RangeImage::kBeyond) return result;
   for (int k = 1; k <= 4; ++k) {
     const float limit = reach * grid.columns_per_radian / (static_cast<float>(k) - 0.5F);
     for (int r = std::max(0, row - k); r <= std::min(grid.rows - 1, row + k); ++r) {
@@ -385,6 +406,50 @@ TEST_CASE(
     CHECK(visibility.is_free(i) == (free[i] != 0));
     CHECK(visibility.is_hit(i) == (hit[i] != 0));
   }
+}
+
+// A ceiling 1.2 m above the sensor, seen by beams 0.4 deg apart up to 2 deg. Two beams that meet it
+// one after the other end 8 m apart.
+TEST_CASE("a ceiling beyond the highest beam is not free, a place between two beams may be") {
+  SensorModel sensor = SensorModel::typical();
+  sensor.azimuth_step = 0.5;
+  sensor.elevation_gap = 0.4;
+  sensor.elevation_max = 2.0;
+  const RangeImageGrid grid = RangeImageGrid::for_sensor(sensor);
+  constexpr double kCeiling = 1.2;  // m
+  PointBuffer ceiling;
+  for (double azimuth = -20.0; azimuth <= 20.0; azimuth += 0.25) {
+    for (double elevation = 0.8; elevation <= 2.01; elevation += 0.4) {
+      const double range = kCeiling / std::tan(elevation / kDegrees);
+      ceiling.push_back(static_cast<float>(range * std::cos(azimuth / kDegrees)),
+                        static_cast<float>(range * std::sin(azimuth / kDegrees)),
+                        static_cast<float>(kCeiling));
+    }
+  }
+  RangeImage image;
+  RangeImage::Scratch scratch;
+  image.build(grid, PointsView(), ceiling, {}, 0.0F, scratch);
+
+  PointBuffer samples;
+  const auto add = [&samples](double range, double elevation) {
+    samples.push_back(static_cast<float>(range), 0.0F,
+                      static_cast<float>(range * std::tan(elevation / kDegrees)));
+  };
+  for (const double beyond : {0.05, 0.1, 0.15, 0.2, 0.3}) {  // deg beyond the highest beam
+    add(kCeiling / std::tan((2.0 + beyond) / kDegrees), 2.0 + beyond);
+  }
+  const std::size_t on_ceiling = samples.size();
+  add(15.0, 1.4);  // far below the ceiling
+  const std::size_t count = samples.size();
+  samples.resize(count + detail::kPackWidth);
+  detail::Visibility visibility;
+  detail::test_visibility(image, Eigen::Isometry3d::Identity(), samples, count, 0.25F, 0.0075F,
+                          visibility);
+  for (std::size_t i = 0; i < on_ceiling; ++i) {
+    INFO("sample " << i);
+    CHECK_FALSE(visibility.is_free(i));
+  }
+  CHECK(visibility.is_free(on_ceiling));
 }
 
 }  // namespace

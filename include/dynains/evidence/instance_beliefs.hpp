@@ -53,6 +53,7 @@ class InstanceBeliefUpdater {
   explicit InstanceBeliefUpdater(const FreeSpaceConfig& config)
       : pass_ratio_(static_cast<float>(config.pass_ratio)),
         removal_ratio_(static_cast<float>(config.removal_ratio)),
+        large_removal_ratio_(static_cast<float>(config.large_removal_ratio)),
         sum_(config.p_free, config.p_hit),
         free_level_(static_cast<float>(log_odds(config.tau_free))),
         contested_level_(static_cast<float>(log_odds(config.tau_contested))),
@@ -107,18 +108,21 @@ class InstanceBeliefUpdater {
   /// the decided samples are free and some were hit afterwards: enough samples of its lower half
   /// must be free, unless too few of them are decided. This condition keeps parked cars, since
   /// beams pass through their windows, but not through their bodies.
+  /// `is_large`: larger than one object; large_removal_ratio of its samples must be free.
   bool removes_whole(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
-                     std::size_t instance) const {
+                     std::size_t instance, bool is_large) const {
     const Counts& counts = beliefs.counts[instance];
     const Belief& whole = beliefs.wholes[instance];
     const bool whole_is_free = whole.peak >= (whole.contested != 0 ? whole_level_ : free_level_);
-    if (!whole_is_free && !is_enough(counts)) return false;
+    if (!whole_is_free && !is_enough(counts, is_large ? large_removal_ratio_ : removal_ratio_)) {
+      return false;
+    }
     if (2 * counts.moved >= counts.decided) return true;
     const bool hit_again =
         whole_is_free ? whole.hit_again != 0 : was_hit_again(samples, beliefs, instance);
     if (!hit_again) return true;
     const Counts lower_half = counts_of_lower_half(samples, beliefs, instance);
-    return lower_half.decided < kLeastBody || is_enough(lower_half);
+    return lower_half.decided < kLeastBody || is_enough(lower_half, removal_ratio_);
   }
 
  private:
@@ -129,9 +133,9 @@ class InstanceBeliefUpdater {
   // A supervoxel is occupied if at least two of its samples and one of kSamplesPerHit are hit.
   static constexpr std::uint32_t kSamplesPerHit = 4;
 
-  bool is_enough(const Counts& counts) const {
+  static bool is_enough(const Counts& counts, float ratio) {
     return counts.moved > 0 &&
-           static_cast<float>(counts.moved) >= removal_ratio_ * static_cast<float>(counts.decided);
+           static_cast<float>(counts.moved) >= ratio * static_cast<float>(counts.decided);
   }
 
   // Whether any free supervoxel of an instance was hit after it had been free.
@@ -298,6 +302,7 @@ class InstanceBeliefUpdater {
 
   float pass_ratio_;
   float removal_ratio_;
+  float large_removal_ratio_;
   detail::FreeSpaceSum sum_;
   float free_level_;
   float contested_level_;

@@ -102,7 +102,7 @@ class InstanceJudge {
                      std::size_t instance) const {
     const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
     const float unit = updater.increment();
-    if (updater.removes_whole(evidence.samples, evidence.beliefs, instance)) {
+    if (removes_whole(evidence, updater, instance)) {
       return (2 * counts.moved >= counts.decided && counts.moved > 0 ? 2.0F : 1.0F) * unit;
     }
     const auto moved = static_cast<float>(counts.moved);
@@ -155,6 +155,12 @@ class InstanceJudge {
   static constexpr float kStillRatio = 0.02F;
   static constexpr std::size_t kLeastGroup = 4;  // samples
 
+  bool removes_whole(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
+                     std::size_t instance) const {
+    const bool is_large = use_tracks_ && !evidence.tracked.shapes[instance].carried;
+    return updater.removes_whole(evidence.samples, evidence.beliefs, instance, is_large);
+  }
+
   // Writes static verdicts for supervoxels [first, last) and lists the free ones in `free_`.
   // Returns the largest log-odds of them.
   float judge_alone(const InstanceBeliefs& beliefs, const InstanceBeliefUpdater& updater,
@@ -179,7 +185,7 @@ class InstanceJudge {
   // the track of the instance if these are larger.
   Cause cause_of_whole(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
                        bool may_presume, std::size_t instance, float& level) const {
-    if (updater.removes_whole(evidence.samples, evidence.beliefs, instance)) {
+    if (removes_whole(evidence, updater, instance)) {
       return Cause::kWithInstance;
     }
     if (!use_tracks_ || !evidence.tracked.shapes[instance].carried) return Cause::kNoEvidence;

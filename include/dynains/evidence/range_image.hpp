@@ -27,12 +27,14 @@ class RangeImage {
     /// nearest return in this cell; without a return, kNothing.
     std::int16_t nearest;
     /// Range of the nearest return in the 3x3 cells, except returns of moving points in the eight
-    /// outer cells. kUnknown if fewer than two cells have such a return.
+    /// outer cells. kUnknown if fewer than two cells have such a return; kBeyond if the cell may
+    /// lie beyond the outermost beam.
     std::int16_t around;
   };
   static constexpr std::int16_t kMoving = 1;  ///< bit that is set in ranges of moving points
   static constexpr std::int16_t kNothing = 32766;
   static constexpr std::int16_t kUnknown = -2;
+  static constexpr std::int16_t kBeyond = -4;  ///< unknown, and not protected by near objects
 
   /// Maximum number of cells on each side that a return of an object protects.
   static constexpr std::size_t kWidest = 4;
@@ -45,8 +47,9 @@ class RangeImage {
     std::vector<std::uint8_t> nearby;   // by group of columns: protected cells around one row
     std::array<std::vector<std::int16_t>, kWidest> lines;  // by protected cells and column
     std::vector<std::int16_t> below, gap;                  // by column, see close_holes()
-    std::vector<std::int16_t> least, least_moving, count;  // by column, see merge_three_rows()
-    std::vector<std::int16_t> border;                      // row of kNothing
+    std::vector<std::int16_t> least, least_moving, count,
+        rows;                          // by column, see merge_three_rows()
+    std::vector<std::int16_t> border;  // row of kNothing
   };
 
   const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
@@ -230,6 +233,7 @@ class RangeImage {
     scratch.least.resize(stride);
     scratch.least_moving.resize(stride);
     scratch.count.resize(stride);
+    scratch.rows.resize(stride);
     for (std::size_t row = 0; row < rows; ++row) {
       wrap(&scratch.nearest[row * stride], static_cast<std::size_t>(grid.columns), 1);
     }
@@ -249,8 +253,12 @@ class RangeImage {
                                                      : scratch.border.data();
   }
 
+  // Bits of the rows of three that have a static return.
+  static constexpr std::int16_t kBelow = 1, kSame = 2, kAbove = 4;
+  static constexpr std::int16_t kNoRow = 8;  // bit that no row has
+
   // Computes for each column of three rows: the nearest static return, the nearest moving return,
-  // and the negative number of static returns.
+  // the negative number of static returns, and the bits of their rows.
   template <class Short>
   static void merge_three_rows(const RangeImageGrid& grid, std::size_t row, Scratch& scratch) {
     const Short nothing(kNothing);
@@ -261,6 +269,7 @@ class RangeImage {
     std::int16_t* const leasts = scratch.least.data();
     std::int16_t* const moving_leasts = scratch.least_moving.data();
     std::int16_t* const counts = scratch.count.data();
+    std::int16_t* const rows = scratch.rows.data();
     for (std::size_t column = 0; column < stride; column += detail::kShortPackWidth) {
       const Short below = Short::load(low + column);
       const Short here = Short::load(middle + column);
@@ -273,21 +282,30 @@ class RangeImage {
       min(min(a, b), c).store(leasts + column);
       // The number of a set mask is -1.
       ((a < nothing) + (b < nothing) + (c < nothing)).store(counts + column);
+      (((a < nothing) & Short(kBelow)) | ((b < nothing) & Short(kSame)) |
+       ((c < nothing) & Short(kAbove)))
+          .store(rows + column);
     }
   }
 
-  // Writes one row of cells. A cell with a single static return in its 3x3 cells is unknown, unless
-  // this is the return of a near object.
+  // Writes one row of cells. A cell is unknown if its 3x3 cells have a single static return, unless
+  // this is the return of a near object. A cell lies beyond the outermost beam if only rows on one
+  // side have returns. In the row of the highest beam and above, its own row is not enough, because
+  // a slanted surface a little above that beam is much nearer than its return.
   template <class Short>
   void store_row(const RangeImageGrid& grid, const ProtectionLimits& limits, std::size_t row,
                  const Scratch& scratch) {
-    const Short nothing(kNothing), unknown(kUnknown), near(limits.limit[0]);
+    const Short nothing(kNothing), unknown(kUnknown), beyond(kBeyond), near(limits.limit[0]);
     const Short zero(0), one_return(-1);
     const std::size_t stride = grid.stride();
     const std::int16_t* const middle = row_of(scratch.nearest, row, grid, scratch);
     const std::int16_t* const leasts = scratch.least.data();
     const std::int16_t* const moving_leasts = scratch.least_moving.data();
     const std::int16_t* const counts = scratch.count.data();
+    const std::int16_t* const rows = scratch.rows.data();
+    const Short both_sides(kBelow | kAbove);
+    const bool is_inner = static_cast<std::int32_t>(row) <= grid.last_inner_row;
+    const Short same(is_inner ? kSame : kNoRow);
     Cell* const cells = &cells_[row * stride];
     const auto least_of_three = [](const std::int16_t* at) {
       return min(min(Short::load(at - 1), Short::load(at)), Short::load(at + 1));
@@ -299,14 +317,19 @@ class RangeImage {
          column += detail::kShortPackWidth) {
       const std::int16_t* const count = counts + column;
       const Short returns = Short::load(count - 1) + Short::load(count) + Short::load(count + 1);
-      Short alone = unknown;
-      const Short single = returns == one_return;
+      const std::int16_t* const row_bits = rows + column;
+      const Short bits =
+          Short::load(row_bits - 1) | Short::load(row_bits) | Short::load(row_bits + 1);
+      const Short is_between = ((bits & same) == same) | ((bits & both_sides) == both_sides);
+      Short alone = select(is_between, unknown, beyond);
+      const Short single = (returns == one_return) & is_between;
       if (single.any()) {
         const Short object = min(min(least_object(row - 1, column), least_object(row, column)),
                                  least_object(row + 1, column));
-        alone = select(single & (object < near), object, unknown);
+        alone = select(single & (object < near), object, alone);
       }
-      const Short staying = select(returns < one_return, least_of_three(leasts + column), alone);
+      const Short known = (returns < one_return) & is_between;
+      const Short staying = select(known, least_of_three(leasts + column), alone);
       // A moving point in the cell itself occludes the points behind it.
       const Short here = Short::load(middle + column);
       const Short hiding = min(select(staying < zero, nothing, staying), here);
@@ -411,7 +434,7 @@ class RangeImage {
       std::int16_t* const at = &cells[half * kShortPackWidth / 2].nearest;
       const Short here = Short::load(at);
       const Short limit = Short::load(limits + half * kShortPackWidth);
-      min(select((here < Short(0)) & (limit < nothing), nothing, here), limit).store(at);
+      min(select((here == Short(kUnknown)) & (limit < nothing), nothing, here), limit).store(at);
     }
   }
 

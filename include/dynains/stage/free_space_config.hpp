@@ -26,6 +26,7 @@ struct FreeSpaceConfig {
   double tau_contested = 0.9;         ///< form of Eq. 19
   double tau_whole = 0.84;            ///< form of Eq. 19
   double removal_ratio = 0.2;
+  double large_removal_ratio = 0.5;
   double pass_ratio = 0.6;
   double footprint = 0.3;        ///< m
   double footprint_rise = 0.03;  ///< m
@@ -96,6 +97,9 @@ struct FreeSpaceConfig {
                       "belief from which a whole instance with hits was free (form of Eq. 19)"});
     visitor(Parameter{"removal_ratio", self.removal_ratio, half_open_below(0, 1), "",
                       "ratio of free to decided samples from which the whole instance is removed"});
+    visitor(Parameter{"large_removal_ratio", self.large_removal_ratio, half_open_below(0, 1), "",
+                      "removal_ratio of instances that are longer than track_length or higher than "
+                      "track_height"});
     visitor(Parameter{"pass_ratio", self.pass_ratio, half_open_below(0, 1), "",
                       "ratio of free to visible samples of an instance from which a reference is "
                       "evidence that the whole instance is free"});
