@@ -189,9 +189,14 @@ void bind_remover(py::module_& module) {
                     "dynains/verdict.hpp.");
 
   py::class_<PoseResidual>(module, "PoseResidual",
-                           "Motion of the sensor that aligns a scan with earlier scans.")
+                           "Error of the pushed motion of the sensor, by an alignment of the "
+                           "scan with earlier scans.")
       .def_readonly("translation", &PoseResidual::translation, "m")
-      .def_readonly("rotation", &PoseResidual::rotation, "deg");
+      .def_readonly("rotation", &PoseResidual::rotation, "deg")
+      .def_property_readonly(
+          "T_previous_newest",
+          [](const PoseResidual& residual) { return to_array(residual.T_previous_newest); },
+          "(4, 4) float64: corrected pose of this scan in the sensor frame of the previous one.");
 
   py::class_<Frame>(module, "FrameResult", "Answer to one scan.")
       .def_readonly("newest", &Frame::newest,
