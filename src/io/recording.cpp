@@ -19,6 +19,7 @@
 #include "input_file.hpp"
 #include "kitti_files.hpp"
 #include "log/log_scans.hpp"
+#include "nuscenes.hpp"
 #include "scan_reader.hpp"
 #include "text.hpp"
 
@@ -37,6 +38,7 @@ constexpr const char* kAccepted =
 std::optional<ScanFormat> scan_format_of(const fs::path& path) {
   std::string extension = path.extension().string();
   for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (extension == ".bin" && path.stem().extension() == ".pcd") return ScanFormat::kNuScenes;
   if (extension == ".bin") return ScanFormat::kBin;
   if (extension == ".pcd") return ScanFormat::kPcd;
   if (extension == ".ply") return ScanFormat::kPly;
@@ -50,7 +52,8 @@ std::optional<ScanFormat> scan_format_of(const fs::path& path) {
 
 /// Beside scans of these formats, files of the other ones are no scans.
 bool is_for_scans_only(ScanFormat format) {
-  return format == ScanFormat::kBin || format == ScanFormat::kPcd || format == ScanFormat::kPly;
+  return format == ScanFormat::kBin || format == ScanFormat::kPcd || format == ScanFormat::kPly ||
+         format == ScanFormat::kNuScenes;
 }
 
 constexpr std::array<const char*, 6> kPoseFiles = {
@@ -108,6 +111,11 @@ std::vector<fs::path> scan_files(const fs::path& folder) {
     return is_before(a.filename().string(), b.filename().string());
   });
   return files;
+}
+
+std::string name_of_scan(const fs::path& file) {
+  const fs::path stem = file.stem();
+  return scan_format_of(file) == ScanFormat::kNuScenes ? stem.stem().string() : stem.string();
 }
 
 /// For a folder whose only scans are in known formats that are not read: how to convert them.
@@ -177,15 +185,18 @@ std::string shown(const fs::path& path, const fs::path& folder) {
 
 Recording::Recording(const fs::path& path, const RecordingOptions& options)
     : folder_(path), options_(options) {
+  const auto tables = is_folder(path) ? nuscenes_tables(path) : std::nullopt;
   if (is_log(path)) {
     open_log();
+  } else if (tables) {
+    open_nuscenes(*tables);
   } else {
     if (!is_folder(path)) {
       const auto conversion = conversion_of(path);
       fail(path, conversion ? *conversion : std::string("is not a folder; ") + kAccepted);
     }
     list_scans();
-    reader_ = format_ == ScanFormat::kBin ? make_bin_reader() : make_point_file_reader();
+    reader_ = make_file_reader(format_);
     read_poses();
   }
   find_columns();
@@ -251,6 +262,39 @@ void Recording::open_log() {
   place_scans(poses);
 }
 
+/// Takes the sweeps of one scene. Poses of a file belong to the sweeps by time.
+void Recording::open_nuscenes(const fs::path& tables) {
+  if (!options_.times.empty()) {
+    fail(options_.times, "expected no file of times: " + tables.string() + " has times");
+  }
+  const NuScenesSweeps nuscenes = read_nuscenes(folder_, tables, options_.scene);
+  files_ = nuscenes.tables;
+  scan_folder_ = nuscenes.sweeps.front().file.parent_path();
+  format_ = ScanFormat::kNuScenes;
+  reader_ = make_file_reader(format_);
+  notes_.push_back("sweeps, poses and times of nuScenes");
+  std::vector<double> times;
+  for (const NuScenesSweep& sweep : nuscenes.sweeps) {
+    scans_.push_back({sweep.file, name_of_scan(sweep.file), scans_.size(), sweep.time});
+    files_.push_back(sweep.file);
+    times.push_back(sweep.time);
+    if (times.size() > 1 && !(times.back() > times[times.size() - 2])) {
+      fail(tables / "sample_data.json", "expected one sweep at a time, found a second one for " +
+                                            sweep.file.filename().string());
+    }
+    trajectory_.poses.push_back(sweep.T_world_sensor);
+  }
+  check_names();
+  trajectory_.times = times;
+  if (!options_.poses.empty()) {
+    files_.push_back(options_.poses);
+    trajectory_ = read_trajectory(options_.poses);
+  }
+  const fs::path& poses = options_.poses.empty() ? tables : options_.poses;
+  trajectory_.times.empty() ? match_rows(poses) : match_times(poses, times);
+  place_scans(poses);
+}
+
 void Recording::list_scans() {
   scan_folder_ = folder_;
   for (const char* name : {"velodyne", "pcd", "ply", "scans", "points", "clouds", "lidar"}) {
@@ -286,7 +330,7 @@ void Recording::list_scans() {
   for (const fs::path& file : files) {
     scans_.emplace_back();
     scans_.back().file = file;
-    scans_.back().name = file.stem().string();
+    scans_.back().name = name_of_scan(file);
   }
   check_names();
   numbered_ = std::all_of(scans_.begin(), scans_.end(), [](const Scan& scan) {
@@ -591,7 +635,10 @@ PointFrame Recording::guess_frame() const {
   constexpr double kNear = 8.0;      // m
   constexpr double kFarPose = 20.0;  // m, so that the two do not overlap
   const PointFrame usual = has_viewpoints_ ? PointFrame::kWorld : PointFrame::kSensor;
-  if (format_ == ScanFormat::kBin || format_ == ScanFormat::kLog) return frame_;
+  if (format_ == ScanFormat::kBin || format_ == ScanFormat::kNuScenes ||
+      format_ == ScanFormat::kLog) {
+    return frame_;
+  }
   const auto farthest =
       std::max_element(scans_.begin(), scans_.end(), [](const Scan& a, const Scan& b) {
         return a.T_world_sensor.translation().norm() < b.T_world_sensor.translation().norm();

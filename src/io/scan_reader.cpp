@@ -1,12 +1,15 @@
 #include "scan_reader.hpp"
 
+#include <cstring>
 #include <mutex>
+#include <string>
 #include <utility>
 
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "failure.hpp"
 #include "log/log_scans.hpp"
+#include "log/raw_file.hpp"
 
 namespace dynains {
 namespace {
@@ -41,6 +44,46 @@ class BinReader final : public ScanReader {
   std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
     fail(scan.file, "has no labels");
   }
+};
+
+/// .pcd.bin: float32 x y z intensity ring.
+class NuScenesReader final : public ScanReader {
+ public:
+  PointColumns columns(const ScanAddress&) const override {
+    PointColumns columns;
+    columns.intensity = true;
+    columns.ring = true;
+    return columns;
+  }
+  void check(const ScanAddress& scan) const override { point_count(scan); }
+  std::uint64_t point_count(const ScanAddress& scan) const override {
+    const std::uint64_t bytes = RawFile(scan.file).size();
+    if (bytes % kPoint == 0) return bytes / kPoint;
+    fail(scan.file, "has " + std::to_string(bytes) +
+                        " bytes, expected a multiple of 20: float32 x y z intensity ring");
+  }
+  void read(const ScanAddress& scan, const Eigen::Isometry3d* T_target_file,
+            RecordedScan& points) const override {
+    const std::uint64_t count = point_count(scan);
+    const auto bytes = RawFile(scan.file).read(0, count * kPoint, "points");
+    points.xyzi.resize(4 * count);
+    points.ring.resize(count);
+    points.time.clear();
+    for (std::size_t i = 0; i < count; ++i) {
+      float ring;
+      std::memcpy(points.xyzi.data() + 4 * i, bytes.data() + kPoint * i, 4 * sizeof(float));
+      std::memcpy(&ring, bytes.data() + kPoint * i + 4 * sizeof(float), sizeof(float));
+      points.ring[i] =
+          ring >= 0.0F && ring <= 65535.0F ? static_cast<std::uint16_t>(ring) : std::uint16_t{0};
+    }
+    transform(T_target_file, points);
+  }
+  std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
+    fail(scan.file, "has no labels");
+  }
+
+ private:
+  static constexpr std::uint64_t kPoint = 5 * sizeof(float);  // bytes
 };
 
 /// Files of read_points().
@@ -106,8 +149,11 @@ class LogReader final : public ScanReader {
 
 }  // namespace
 
-std::unique_ptr<ScanReader> make_bin_reader() { return std::make_unique<BinReader>(); }
-std::unique_ptr<ScanReader> make_point_file_reader() { return std::make_unique<PointFileReader>(); }
+std::unique_ptr<ScanReader> make_file_reader(ScanFormat format) {
+  if (format == ScanFormat::kBin) return std::make_unique<BinReader>();
+  if (format == ScanFormat::kNuScenes) return std::make_unique<NuScenesReader>();
+  return std::make_unique<PointFileReader>();
+}
 std::unique_ptr<ScanReader> make_log_reader(std::unique_ptr<LogScans> scans) {
   return std::make_unique<LogReader>(std::move(scans));
 }

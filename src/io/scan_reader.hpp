@@ -40,8 +40,8 @@ class ScanReader {
   virtual std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const = 0;
 };
 
-std::unique_ptr<ScanReader> make_bin_reader();
-std::unique_ptr<ScanReader> make_point_file_reader();
+/// For scans in files, one each.
+std::unique_ptr<ScanReader> make_file_reader(ScanFormat format);
 std::unique_ptr<ScanReader> make_log_reader(std::unique_ptr<LogScans> scans);
 
 }  // namespace dynains

@@ -33,6 +33,7 @@ std::string CleanWriter::name(const Recording& recording, std::size_t i) {
     case ScanFormat::kNpz:
     case ScanFormat::kXyz:
     case ScanFormat::kCsv:
+    case ScanFormat::kNuScenes:
       break;
   }
   return recording.name(i) + ".ply";

@@ -103,6 +103,7 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool 
     command.add_option(flag, value, help)->type_name("NAME")->group(kGroup);
   };
   add_name("--cloud-topic", cloud_topic_, "topic of the clouds of a log [the only one]");
+  add_name("--nuscenes-scene", scene_, "scene of nuScenes, for example scene-0061 [the only one]");
   add_name("--pose-topic", pose_topic_,
            "topic of the poses of a log: Odometry, PoseStamped or TF [the only one, else TF]");
   add_name("--pose-frame-id", pose_frame_id_,
@@ -138,6 +139,7 @@ RecordingOptions RecordingFlags::options() const {
   options.pose_topic = pose_topic_;
   options.pose_frame = pose_frame_id_;
   options.deskew = deskew_;
+  options.scene = scene_;
   if (frame_ == "sensor") options.frame = PointFrame::kSensor;
   if (frame_ == "world") options.frame = PointFrame::kWorld;
   PoseConvention& convention = options.convention;

@@ -54,6 +54,7 @@ class RecordingFlags {
   std::string cloud_topic_;
   std::string pose_topic_;
   std::string pose_frame_id_;
+  std::string scene_;
 };
 
 }  // namespace dynains::program

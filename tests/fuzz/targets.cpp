@@ -21,6 +21,7 @@ const std::vector<Target>& targets() {
       {"trajectory", run_trajectory, trajectory_seeds},
       {"recording", run_recording, recording_seeds},
       {"log", run_log, log_seeds},
+      {"nuscenes", run_nuscenes, nuscenes_seeds},
       {"tile", run_tile, tile_seeds},
       {"facade", run_facade, facade_seeds},
   };

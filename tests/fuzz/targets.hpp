@@ -40,6 +40,7 @@ void run_config(Bytes bytes);
 void run_trajectory(Bytes bytes);
 void run_recording(Bytes bytes);
 void run_log(Bytes bytes);
+void run_nuscenes(Bytes bytes);
 void run_tile(Bytes bytes);
 void run_facade(Bytes bytes);
 
@@ -58,6 +59,7 @@ std::vector<std::string> config_seeds();
 std::vector<std::string> trajectory_seeds();
 std::vector<std::string> recording_seeds();
 std::vector<std::string> log_seeds();
+std::vector<std::string> nuscenes_seeds();
 std::vector<std::string> tile_seeds();
 std::vector<std::string> facade_seeds();
 

@@ -34,6 +34,7 @@ struct RecordingOptions {
   std::string cloud_topic;            ///< for logs; empty: the only topic of clouds
   std::string pose_topic;             ///< for logs; empty: the only topic of poses
   std::string pose_frame;  ///< for logs: fixed frame of transforms; empty: root of their tree
+  std::string scene;       ///< for nuScenes: name of the scene; empty: the only one
   /// Whether points are moved to the sensor frame at the time of their scan. Needs a time for each
   /// point, and points in the sensor frame.
   bool deskew = false;
@@ -59,7 +60,7 @@ struct RecordedScan {
 };
 
 /// Format of the scans: one file per scan, or messages of a log.
-enum class ScanFormat { kBin, kPcd, kPly, kLas, kNpy, kNpz, kXyz, kCsv, kLog };
+enum class ScanFormat { kBin, kPcd, kPly, kLas, kNpy, kNpz, kXyz, kCsv, kNuScenes, kLog };
 
 class ScanReader;
 struct ScanAddress;
@@ -71,6 +72,9 @@ struct ScanAddress;
 ///   lidar, pcd, ply, points, scans, velodyne). Beside .pcd, .ply or .bin files, files of the other
 ///   formats are no scans. Scans are ordered by name, with numbers in names by value.
 /// - Folder of .bin files in the format of KITTI.
+/// - nuScenes: a folder with samples/, sweeps/ and v1.0-*/, or the folder of its tables. Scans are
+///   the .pcd.bin files of one scene; poses and times are those of sample_data.json, ego_pose.json
+///   and calibrated_sensor.json.
 /// - ROS log: .mcap, .db3 or .bag, or a folder with metadata.yaml and .mcap or .db3 files. The
 ///   constructor reads the log once; points stay in the file. Scans are the clouds of one topic,
 ///   named by their number, with the times of their stamps.
@@ -185,6 +189,7 @@ class Recording {
   enum class Labels { kNone, kFiles, kColumn };
 
   void open_log();
+  void open_nuscenes(const std::filesystem::path& tables);
   void list_scans();
   void check_names() const;
   void read_poses();
