@@ -87,7 +87,10 @@ void judge_poses(const RunPlan& plan, const RunOptions& options, const Agreement
                             " % of the points of neighbouring scans agree under these poses";
   if (!options.accept_poses) {
     const Diagnosis diagnosis = diagnose(plan.sequence);
-    if (!diagnosis.sound() && diagnosis.verdict != PoseVerdict::kUnknown) {
+    // A shift changes little: some broken scans can make one look better.
+    const bool is_shift = diagnosis.verdict == PoseVerdict::kOtherwise &&
+                          diagnosis.convention.shift != plan.sequence.convention().shift;
+    if (!diagnosis.sound() && diagnosis.verdict != PoseVerdict::kUnknown && !is_shift) {
       throw ConfigError("only " + share + ". " + advice(diagnosis) + " See: dynains check " +
                         options.sequence.as_given() +
                         "; or run with these poses by --accept-poses");
