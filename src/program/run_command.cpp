@@ -87,9 +87,13 @@ void print_summary(const RunResults& results, const RunTiming& timing, const Run
 void judge_poses(const RunPlan& plan, const RunOptions& options, const Agreement& agreement) {
   const std::string share = std::to_string(std::lround(100.0 * agreement.share)) +
                             " % of the points of neighbouring scans agree under these poses";
-  if (!options.accept_poses) {
+  constexpr std::size_t kFewestScans = 8;  // for a judgement beyond doubt
+  if (!options.accept_poses && plan.range.size() >= kFewestScans) {
     const Diagnosis diagnosis = diagnose(plan.sequence);
-    if (!diagnosis.sound() && diagnosis.verdict != PoseVerdict::kUnknown) {
+    // A shift changes little: some broken scans can make one look better.
+    const bool is_shift = diagnosis.verdict == PoseVerdict::kOtherwise &&
+                          diagnosis.convention.shift != plan.sequence.convention().shift;
+    if (!diagnosis.sound() && diagnosis.verdict != PoseVerdict::kUnknown && !is_shift) {
       throw ConfigError("only " + share + ". " + advice(diagnosis) + " See: dynains check " +
                         options.sequence.as_given() +
                         "; or run with these poses by --accept-poses");

@@ -178,7 +178,7 @@ TEST_CASE("remap of points in the frame of the world leads through the poses of 
     writer.commit();
   }
   const std::string out = f.folder / "world out";
-  REQUIRE(start({"run", seq, "--out", out, "--frame", "world"}).code == 0);
+  REQUIRE(start({"run", seq, "--out", out, "--frame", "world", "--accept-poses"}).code == 0);
   REQUIRE(start({"remap", seq, out, "--poses", f.corrected}).code == 0);
   RecordingOptions world;
   world.frame = PointFrame::kWorld;
@@ -192,9 +192,9 @@ TEST_CASE("remap of points in the frame of the world leads through the poses of 
   const std::string other = f.folder / "other.txt";
   write_other_poses(other, kScans, 4);
   const std::string other_out = f.folder / "other out";
-  REQUIRE(
-      start({"run", seq, "--out", other_out, "--frame", "world", "--poses", other, "-q"}).code ==
-      0);
+  REQUIRE(start({"run", seq, "--out", other_out, "--frame", "world", "--poses", other,
+                 "--accept-poses"})
+              .code == 0);
   const Outcome outcome = start({"remap", seq, other_out, "--poses", f.corrected});
   CHECK(outcome.code == 1);
   CHECK_THAT(outcome.err, ContainsSubstring("are not those of the run"));
