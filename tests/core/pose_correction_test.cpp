@@ -20,7 +20,7 @@ using simulation::Scene;
 using simulation::Sensor;
 using simulation::SimulatedScan;
 
-constexpr double kTolerance = 0.01;  // m, the default of FreeSpaceConfig::pose_tolerance
+constexpr double kTolerance = 0.01;  // m
 constexpr double kDegrees = M_PI / 180.0;
 
 std::vector<SimulatedScan> drive(Scene scene, Sensor sensor, int scans) {

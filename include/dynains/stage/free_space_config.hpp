@@ -19,7 +19,7 @@ struct FreeSpaceConfig {
   double margin = 0.25;               ///< m
   double margin_slope = 0.0075;       ///< m per m of range
   double lateral_margin = 0.07;       ///< m
-  double pose_tolerance = 0.01;       ///< m
+  double pose_tolerance = 0.02;       ///< m
   double p_free = 0.7;                ///< form of Eq. 18
   double p_hit = 0.155;               ///< form of Eq. 18
   double tau_free = 0.65;             ///< form of Eq. 19
