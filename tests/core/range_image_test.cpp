@@ -141,8 +141,8 @@ class ReferenceImage {
       ++count;
     }
     const int here = cells_[at(row, column)];
-    if (count < 2 || !is_between_beams(row, column))
-      return is_moving(here) ? here : RangeImage::kUnknown;
+    if (!is_between_beams(row, column)) return is_moving(here) ? here : RangeImage::kBeyond;
+    if (count < 2) return is_moving(here) ? here : RangeImage::kUnknown;
     return is_moving(here) ? std::min(least, here) : least;
   }
   std::size_t at(int row, int column) const {

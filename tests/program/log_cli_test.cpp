@@ -127,7 +127,9 @@ TEST_CASE("No result replaces the log that is read") {
   CHECK(read_text(log) == before);
 }
 
-TEST_CASE("--deskew restores the scores that a rolling shutter costs, and keeps times of points") {
+TEST_CASE(
+    "De-skewing by --deskew restores the scores that a rolling shutter costs, and keeps times of "
+    "points") {
   const TemporaryFolder folder;
   const std::string log = folder / "drive" / "drive.mcap";
   const Outcome refused =
@@ -165,7 +167,7 @@ TEST_CASE("--deskew restores the scores that a rolling shutter costs, and keeps 
   CHECK(scan.xyzi[0] != raw.xyzi[0]);
 }
 
-TEST_CASE("--write-mcap: the log of the verdicts is a recording with the scans of the input") {
+TEST_CASE("The log of --write-mcap is a recording with the scans of the input") {
   const TemporaryFolder folder;
   write_tiny_sequence(folder / "seq", kScans, kPosition);
   const std::string out = folder / "out";

@@ -321,19 +321,19 @@ class RangeImage {
       const Short bits =
           Short::load(row_bits - 1) | Short::load(row_bits) | Short::load(row_bits + 1);
       const Short is_between = ((bits & same) == same) | ((bits & both_sides) == both_sides);
-      Short alone = select(is_between, unknown, beyond);
-      const Short single = (returns == one_return) & is_between;
-      if (single.any()) {
+      const Short here = Short::load(middle + column);
+      Short alone = unknown;
+      const Short guarded = select(is_between, returns == one_return, is_moving(here));
+      if (guarded.any()) {
         const Short object = min(min(least_object(row - 1, column), least_object(row, column)),
                                  least_object(row + 1, column));
-        alone = select(single & (object < near), object, alone);
+        alone = select(guarded & (object < near), object, unknown);
       }
       const Short known = (returns < one_return) & is_between;
       const Short staying = select(known, least_of_three(leasts + column), alone);
       // A moving point in the cell itself occludes the points behind it.
-      const Short here = Short::load(middle + column);
       const Short hiding = min(select(staying < zero, nothing, staying), here);
-      const Short around = select(is_moving(here), hiding, staying);
+      const Short around = select(is_moving(here), hiding, select(is_between, staying, beyond));
       const Short moving = least_of_three(moving_leasts + column);
       const Short nearest = select(moving < nothing, moving, here);
       nearest.store_interleaved_with(around, &cells[column].nearest);

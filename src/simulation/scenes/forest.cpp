@@ -9,7 +9,7 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr double kWalkingSpeed = 1.4;  // m/s
+constexpr double kPaceInForest = 1.4;  // m/s
 
 /// Trees from the edge of the track on, dense at first.
 void add_trees(Builder& builder, Random& random, const Street& street) {
@@ -48,7 +48,7 @@ void add_people(Builder& builder, Random& random, const Street& street, double f
 
 World forest(const Config& config) {
   Random random(mix(config.seed, 77));
-  const double drive = travel(config, kWalkingSpeed), start = 60;
+  const double drive = travel(config, kPaceInForest), start = 60;
   const double length = 2 * start + drive + 40;
   std::vector<Street> streets;
   streets.push_back({route_of_bends(winding(random, length, 0.03, 0, 17)), 1.7, 0});
@@ -60,7 +60,7 @@ World forest(const Config& config) {
   ground.street_label = ground.open_label;
   Builder builder(config, ground, std::move(streets));
   const Street& street = builder.street(0);
-  builder.ego(builder.lane(street, -0.4), start, kWalkingSpeed);
+  builder.ego(builder.lane(street, -0.4), start, kPaceInForest);
   builder.traffic().objects[0].size = {0.8, 0.6, 0.9};
   add_trees(builder, random, street);
   builder.plant(street, street.half_width + 0.3, 20, 0, random.uniform(60, 120));

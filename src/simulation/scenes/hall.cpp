@@ -10,7 +10,7 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr double kWalkingSpeed = 1.0;  // m/s
+constexpr double kPaceInHall = 1.0;  // m/s
 constexpr double kPanel = 8.0;         // m, of walls and of the ceiling
 
 /// The hall extends along x from 0, and to both sides of y = 0.
@@ -91,7 +91,7 @@ void add_outside(Builder& builder, Random& random, const Hall& hall, double from
 
 World hall(const Config& config) {
   Random random(mix(config.seed, 77));
-  const double drive = travel(config, kWalkingSpeed), start = 15;
+  const double drive = travel(config, kPaceInHall), start = 15;
   const Hall hall{2 * start + drive + 20, random.uniform(9, 18), random.uniform(3.5, 7)};
   std::vector<Street> streets;
   streets.push_back({Route({{0, 0}, {hall.length / 2, 0}, {hall.length, 0}}), hall.half_width, 0});
@@ -104,7 +104,7 @@ World hall(const Config& config) {
   const Street& street = builder.street(0);
   const std::size_t way = builder.traffic().add_lane(
       street.centre.shifted(0, hall.length, [](double s) { return 1.2 * std::sin(s / 7); }));
-  builder.ego(way, start, kWalkingSpeed);
+  builder.ego(way, start, kPaceInHall);
   builder.traffic().objects[0].size = {0.8, 0.6, 0.9};
   build_shell(builder, hall);
   furnish(builder, random, hall);
