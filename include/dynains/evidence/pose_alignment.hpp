@@ -115,8 +115,9 @@ inline NormalEquations match(PointsView points, VoxelPlanes& planes, double scal
   for (std::size_t i = 0; i < points.size(); ++i) {
     double turned[3], p[3];
     for (int k = 0; k < 3; ++k) {
-      turned[k] = T(k, 0) * double{points.x[i]} + T(k, 1) * double{points.y[i]} +
-                  T(k, 2) * double{points.z[i]};
+      turned[k] = T(k, 0) * static_cast<double>(points.x[i]) +
+                  T(k, 1) * static_cast<double>(points.y[i]) +
+                  T(k, 2) * static_cast<double>(points.z[i]);
       p[k] = turned[k] + T(k, 3);
     }
     const VoxelPlanes::Plane* const plane = planes.find(p);

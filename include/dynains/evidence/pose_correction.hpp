@@ -106,11 +106,11 @@ class PoseCorrection {
       random = random * 1664525U + 1013904223U;
       const std::size_t i = begin + (random >> 8) % step;
       if (i >= split.count) return;
-      const double x = double{split.points.x[i]};
-      const double y = double{split.points.y[i]};
+      const double x = static_cast<double>(split.points.x[i]);
+      const double y = static_cast<double>(split.points.y[i]);
       const double squared = x * x + y * y;
       if (squared < kNearest * kNearest || squared > kFarthest * kFarthest) continue;
-      visit(i, x, y, double{split.points.z[i]});
+      visit(i, x, y, static_cast<double>(split.points.z[i]));
     }
   }
 
