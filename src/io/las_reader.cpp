@@ -112,11 +112,12 @@ LasHeader read_header(RawFile& file, PointSink& sink) {
     fields.fail("expected LASF, the magic bytes of LAS");
   }
   fields.skip(24, "the header of LAS");
-  const auto major = fields.number<std::uint8_t>("a version");
-  const auto minor = fields.number<std::uint8_t>("a version");
-  if (major != 1 || minor > 4) {
-    fields.fail("expected version 1.0 to 1.4 of LAS, found " + std::to_string(major) + '.' +
-                std::to_string(minor));
+  // Two bytes: the number after the point in the upper one.
+  const auto version = fields.number<std::uint16_t>("a version");
+  const auto minor = static_cast<std::uint8_t>(version >> 8U);
+  if ((version & 0xffU) != 1 || minor > 4) {
+    fields.fail("expected version 1.0 to 1.4 of LAS, found " + std::to_string(version & 0xffU) +
+                '.' + std::to_string(minor));
   }
   fields.skip(68, "the header of LAS");
   LasHeader header;

@@ -171,8 +171,9 @@ std::string decompress(const std::string& method,
 #endif
 #if defined(DYNAINS_HAS_Z)
   if (method == "deflate") return decompress_deflate(input, size, output);
-#endif
+#else
   if (method == "deflate") return "this build has no zlib (Debian: zlib1g-dev)";
+#endif
   for (const std::string known : {"lz4", "zstd", "bz2"}) {
     if (method == known) return "this build has no " + known + " (Debian: lib" + known + "-dev)";
   }
