@@ -531,7 +531,7 @@ std::string body_text(const Eigen::Isometry3d& T_body_sensor) {
   const Eigen::Vector3d t = T_body_sensor.translation();
   std::string text;
   if (std::abs(rotation.angle()) > 1e-6) {
-    const Eigen::Vector3d axis = rotation.axis();
+    const Eigen::Vector3d& axis = rotation.axis();
     const bool is_yaw = std::abs(axis.z()) > kUpright;
     const double degrees = kDegrees * rotation.angle() * (is_yaw && axis.z() < 0.0 ? -1.0 : 1.0);
     text = std::string(is_yaw ? "is yawed by " : "is turned by ") + fixed(degrees, 1) + " deg";

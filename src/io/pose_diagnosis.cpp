@@ -61,14 +61,14 @@ struct Explanation {
 /// Without parts that explain nothing: a rotation or translation near 0, or one that the motions do
 /// not determine.
 Eigen::Isometry3d simplified(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
-                             const Eigen::Isometry3d& X) {
-  const double error = error_at_points(motions, body, X);
+                             const Eigen::Isometry3d& T_body_sensor) {
+  const double error = error_at_points(motions, body, T_body_sensor);
   const auto is_enough = [&](const Eigen::Isometry3d& simpler) {
     return error_at_points(motions, body, simpler) < 1.1 * error + 0.002;
   };
-  Eigen::Isometry3d unturned = X;
+  Eigen::Isometry3d unturned = T_body_sensor;
   unturned.linear().setIdentity();
-  Eigen::Isometry3d result = is_enough(unturned) ? unturned : X;
+  Eigen::Isometry3d result = is_enough(unturned) ? unturned : T_body_sensor;
   Eigen::Isometry3d unmoved = result;
   unmoved.translation().setZero();
   if (is_enough(unmoved)) return unmoved;
@@ -88,12 +88,12 @@ std::optional<Explanation> explain_by_body(const Recording& recording,
   if (!is_much_better(error_at_points(others, body, *of_half), before)) return std::nullopt;
   const auto fitted = fit_extrinsic(motions, body);
   if (!fitted) return std::nullopt;
-  const Eigen::Isometry3d X = simplified(motions, body, *fitted);
+  const Eigen::Isometry3d T_body_sensor = simplified(motions, body, *fitted);
   Explanation result;
-  result.error = error_at_points(motions, body, X);
+  result.error = error_at_points(motions, body, T_body_sensor);
   if (!is_much_better(result.error, before)) return std::nullopt;
   result.convention = convention;
-  result.convention.T_body_sensor = convention.T_body_sensor * X;
+  result.convention.T_body_sensor = convention.T_body_sensor * T_body_sensor;
   result.time_offset = recording.time_offset();
   result.option = flags + "--extrinsic \"" + extrinsic_text(result.convention.T_body_sensor) + '"';
   return result;

@@ -77,8 +77,8 @@ bool is_certain(const std::optional<Registration>& registration) {
 
 /// Residual of a motion: rotation times kLever, and translation, m.
 Vector6 residual(const Eigen::Isometry3d& body, const Eigen::Isometry3d& sensor,
-                 const Eigen::Isometry3d& X) {
-  const Eigen::Isometry3d E = (body * X).inverse() * X * sensor;
+                 const Eigen::Isometry3d& T_body_sensor) {
+  const Eigen::Isometry3d E = (body * T_body_sensor).inverse() * T_body_sensor * sensor;
   const Eigen::AngleAxisd rotation(E.linear());
   Vector6 r;
   r << kLever * rotation.angle() * rotation.axis(), E.translation();
@@ -90,15 +90,15 @@ struct Motions {
   Eigen::Isometry3d sensor;
 };
 
-double robust_cost(const std::vector<Motions>& motions, const Eigen::Isometry3d& X) {
+double robust_cost(const std::vector<Motions>& motions, const Eigen::Isometry3d& T_body_sensor) {
   double cost = 0.0;
   for (const Motions& m : motions)
-    cost += std::log1p(residual(m.body, m.sensor, X).squaredNorm() / 0.01);
+    cost += std::log1p(residual(m.body, m.sensor, T_body_sensor).squaredNorm() / 0.01);
   return cost;
 }
 
 /// Gauss-Newton with Cauchy weights and a weak prior that the lever arm is 0.
-Eigen::Isometry3d refine(const std::vector<Motions>& motions, Eigen::Isometry3d X) {
+Eigen::Isometry3d refine(const std::vector<Motions>& motions, Eigen::Isometry3d T_body_sensor) {
   constexpr double kScale = 0.1;   // m, of a residual
   constexpr double kPrior = 0.02;  // m per m of the lever arm
   constexpr double kStep = 1e-6;
@@ -107,17 +107,17 @@ Eigen::Isometry3d refine(const std::vector<Motions>& motions, Eigen::Isometry3d 
     Vector6 g = Vector6::Zero();
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
       H(3 + axis, 3 + axis) += kPrior * kPrior;
-      g[3 + axis] += kPrior * kPrior * X.translation()[axis];
+      g[3 + axis] += kPrior * kPrior * T_body_sensor.translation()[axis];
     }
     for (const Motions& m : motions) {
-      const Vector6 r = residual(m.body, m.sensor, X);
+      const Vector6 r = residual(m.body, m.sensor, T_body_sensor);
       Matrix6 J;
       for (Eigen::Index j = 0; j < 6; ++j) {
         Vector6 change = Vector6::Zero();
         change[j] = kStep;
-        Eigen::Isometry3d moved = X;
+        Eigen::Isometry3d moved = T_body_sensor;
         const Eigen::Isometry3d T = motion_of(change);
-        moved.linear() = (T.linear() * X.linear()).eval();
+        moved.linear() = (T.linear() * T_body_sensor.linear()).eval();
         moved.translation() += T.translation();
         J.col(j) = (residual(m.body, m.sensor, moved) - r) / kStep;
       }
@@ -128,12 +128,13 @@ Eigen::Isometry3d refine(const std::vector<Motions>& motions, Eigen::Isometry3d 
     const Vector6 change = -H.ldlt().solve(g);
     if (!change.allFinite()) break;
     const Eigen::Isometry3d T = motion_of(change);
-    X.linear() = (T.linear() * X.linear()).eval();
-    X.translation() += T.translation();
+    T_body_sensor.linear() = (T.linear() * T_body_sensor.linear()).eval();
+    T_body_sensor.translation() += T.translation();
     if (change.norm() < 1e-7) break;
   }
-  X.linear() = Eigen::Quaterniond(X.linear()).normalized().toRotationMatrix();
-  return X;
+  T_body_sensor.linear() =
+      Eigen::Quaterniond(T_body_sensor.linear()).normalized().toRotationMatrix();
+  return T_body_sensor;
 }
 
 /// The 24 rotations that map axes to axes.
@@ -234,13 +235,13 @@ std::optional<Eigen::Isometry3d> fit_extrinsic(const std::vector<RegisteredMotio
   std::optional<Eigen::Isometry3d> best;
   double least = 0.0;
   for (const Eigen::Matrix3d& R : axis_rotations()) {
-    Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-    X.linear() = R;
-    X = refine(motions, X);
-    const double cost = robust_cost(motions, X);
+    Eigen::Isometry3d T_body_sensor = Eigen::Isometry3d::Identity();
+    T_body_sensor.linear() = R;
+    T_body_sensor = refine(motions, T_body_sensor);
+    const double cost = robust_cost(motions, T_body_sensor);
     // Of equal results, that with the smallest first rotation counts.
     if (best && !(cost < kClearly * least)) continue;
-    best = X;
+    best = T_body_sensor;
     least = cost;
   }
   return best;

@@ -43,7 +43,7 @@ MotionError motion_error(const std::vector<RegisteredMotion>& motions, const Bod
 
 /// Hand-eye calibration: T_body_sensor for which the motions of the body and of the sensor agree
 /// best. Directions that the motions do not determine stay 0. Empty for fewer than 4 motions.
-std::optional<Eigen::Isometry3d> fit_extrinsic(const std::vector<RegisteredMotion>& motions,
+std::optional<Eigen::Isometry3d> fit_extrinsic(const std::vector<RegisteredMotion>& registered,
                                                const BodyMotion& body);
 
 /// The motions of even (0) or odd (1) chains.
