@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "dynains/io/recording.hpp"
@@ -20,23 +22,23 @@ class Overview {
 
   /// Three panels of one size, side by side or below each other: before (static points grey, moving
   /// ones blue), after (static points), removed (moving points green, the others pale).
-  const Picture& picture() const { return picture_; }
+  Picture picture() const;
 
  private:
-  struct Layout {
-    Eigen::Vector2d low;   ///< m, world, of the left and lower border
-    double scale;          ///< pixels per m
-    int width;             ///< pixels of a panel
-    int height;            ///< pixels of a panel
-    Eigen::Vector2d step;  ///< pixels from one panel to the next
+  /// A place of a panel. All panels follow from it.
+  struct Pixel {
+    float height = -std::numeric_limits<float>::infinity();  // m, of the highest static point
+    std::uint8_t grey = 0;                                   // of the highest static point
+    bool has_moving = false;
+
+    bool has_static() const { return height > -std::numeric_limits<float>::infinity(); }
   };
 
-  static Layout layout_of(const std::vector<Eigen::Vector3d>& path);
-  explicit Overview(const Layout& layout);
-  void splat(int panel, const Eigen::Vector2d& pixel, double depth, Colour colour);
-
-  Layout layout_;
-  Picture picture_;
+  Eigen::Vector2d low_;  // m, world, left and lower border
+  double scale_;         // pixels per m
+  int width_;            // pixels of a panel
+  int height_;           // pixels of a panel
+  std::vector<Pixel> pixels_;
 };
 
 }  // namespace dynains::program

@@ -56,12 +56,9 @@ void Picture::write_png(const std::filesystem::path& path) const {
   image.width = static_cast<png_uint_32>(width_);
   image.height = static_cast<png_uint_32>(height_);
   image.format = PNG_FORMAT_RGB;
-  png_alloc_size_t size = 0;
-  const bool sized =
-      png_image_write_get_memory_size(image, size, 0, pixels_.data(), 0, nullptr) != 0;
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
   std::vector<char> bytes(size);
-  if (!sized ||
-      png_image_write_to_memory(&image, bytes.data(), &size, 0, pixels_.data(), 0, nullptr) == 0) {
+  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, pixels_.data(), 0, nullptr) == 0) {
     throw IoError(path.string() + ": cannot be encoded as PNG: " + image.message);
   }
   AtomicFile file(path);
