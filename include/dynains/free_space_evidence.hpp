@@ -78,7 +78,7 @@ class FreeSpaceEvidence {
   /// the size of the scans already observed. Discards the observed scans, so call it before scan 0.
   void reserve(std::size_t scans) {
     references_.reserve(scans);
-    if (checks_poses()) pose_correction_.reserve();
+    pose_correction_.reserve();
     const auto largest =
         std::max_element(records_.begin(), records_.end(), [](const Record& a, const Record& b) {
           return a.evidence.samples.size() < b.evidence.samples.size();
@@ -172,12 +172,9 @@ class FreeSpaceEvidence {
     pose_correction_.begin_epoch(T_world_sensor);
   }
 
-  bool checks_poses() const { return config_.pose_tolerance > 0.0; }
-
   // The pose of a scan for comparisons. Begins an epoch if the scan does not fit to earlier ones.
   Eigen::Isometry3d correct(std::uint64_t scan, const Eigen::Isometry3d& T_world_sensor,
                             const GroundSplit& split) {
-    if (!checks_poses()) return T_world_sensor;
     const Eigen::Isometry3d T_corrected = pose_correction_.correct(T_world_sensor, split);
     if (!pose_correction_.is_lost()) return T_corrected;
     begin_epoch(scan, T_world_sensor);
@@ -320,7 +317,7 @@ class FreeSpaceEvidence {
     is_moving_.clear();
     if (config_.ignore_dynamic_returns) find_moving_points(record.evidence);
     references_.make_image(newest_, record.epoch, record.T_world_sensor, split, is_moving_);
-    if (checks_poses()) pose_correction_.insert(record.T_world_sensor, split, is_moving_);
+    pose_correction_.insert(record.T_world_sensor, split, is_moving_);
     if (delay_of(0) != 0) return;
     test_older_scans(0);
     propagate_beliefs(newest_);

@@ -23,11 +23,13 @@ namespace dynains {
 /// the correction applies to later poses, too. Exact poses stay as they are, bit by bit.
 class PoseCorrection {
  public:
-  /// `tolerance`: root mean square distance (m) between static surfaces up to which a pose stays.
+  /// `tolerance`: root mean square distance (m) between static surfaces up to which a pose stays;
+  /// 0: all poses stay, and there are no residuals.
   explicit PoseCorrection(double tolerance) : tolerance_(tolerance) {}
 
   /// Allocates all memory.
   void reserve() {
+    if (!is_active()) return;
     planes_.reserve();
     selected_.grow(kMostSelected);
   }
@@ -46,6 +48,7 @@ class PoseCorrection {
   /// Pose of a scan for comparisons with other scans. `T_world_level`, `split`: pushed pose and
   /// points, m. Updates residual() and is_lost().
   Eigen::Isometry3d correct(const Eigen::Isometry3d& T_world_level, const GroundSplit& split) {
+    if (!is_active()) return T_world_level;
     const Eigen::Isometry3d T_origin_previous = T_origin_newest_;
     residual_.reset();
     is_lost_ = false;
@@ -67,6 +70,7 @@ class PoseCorrection {
   /// `moving`: by non-ground point, 1 for a moving point, else 0; empty if no point moves.
   void insert(const Eigen::Isometry3d& T_world_level, const GroundSplit& split,
               Span<const std::uint8_t> moving) {
+    if (!is_active()) return;
     const Eigen::Isometry3d T = detail::composed(T_origin_world_, T_world_level);
     const std::size_t wanted = inserted_ < kFirstScans ? kFirstInserted : kInserted;
     ++inserted_;
@@ -95,6 +99,8 @@ class PoseCorrection {
   static constexpr std::size_t kFewestMatches = 100;
   static constexpr double kLeastInliers = 0.6;               // ratio to the matches
   static constexpr double kNearest = 3.0, kFarthest = 50.0;  // m, horizontal
+
+  bool is_active() const { return tolerance_ > 0.0; }
 
   // Calls `visit(index, x, y, z)` for about `wanted` points of a scan. They are spread evenly over
   // its order, at pseudo-random distances, since beams repeat at regular ones.
