@@ -54,20 +54,14 @@ bool is_shorter_than_announced(const std::filesystem::path& path) {
 
 std::string row_of(std::int64_t row) { return "row " + std::to_string(row) + " of messages: "; }
 
-}  // namespace
+constexpr const char* kUnreadable = "cannot be read";
 
-void SqliteBag::CloseDatabase::operator()(sqlite3* database) const { sqlite3_close(database); }
-void SqliteBag::FinishStatement::operator()(sqlite3_stmt* statement) const {
-  sqlite3_finalize(statement);
-}
+}  // namespace
 
 SqliteBag::SqliteBag(const std::filesystem::path& path) : LogFile(path) {
   const bool is_cut_off = is_shorter_than_announced(path);
-  sqlite3* database = nullptr;
-  const int result = sqlite3_open_v2(uri_of(path).c_str(), &database,
-                                     SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
-  database_.reset(database);
-  if (result != SQLITE_OK) fail(path, std::string("cannot be opened: ") + sqlite3_errstr(result));
+  database_ =
+      open_database(uri_of(path), SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, path, "cannot be opened");
   // Lets SQLite read a database that is shorter than its header says. Nothing is written.
   step(prepare("PRAGMA writable_schema = ON").get());
   select_message_ = prepare("SELECT data FROM messages WHERE id = ?");
@@ -79,7 +73,7 @@ SqliteBag::SqliteBag(const std::filesystem::path& path) : LogFile(path) {
 }
 
 void SqliteBag::read_topics() {
-  const Statement topics = prepare("SELECT id, name, type, serialization_format FROM topics");
+  const SqliteStatement topics = prepare("SELECT id, name, type, serialization_format FROM topics");
   while (step(topics.get())) {
     LogTopic topic;
     topic.name = text_of(topics.get(), 1);
@@ -91,7 +85,8 @@ void SqliteBag::read_topics() {
 }
 
 void SqliteBag::read_messages() {
-  const Statement messages = prepare("SELECT id, topic_id, timestamp FROM messages ORDER BY id");
+  const SqliteStatement messages =
+      prepare("SELECT id, topic_id, timestamp FROM messages ORDER BY id");
   std::int64_t row = 0;
   int result = sqlite3_step(messages.get());
   for (; result == SQLITE_ROW; result = sqlite3_step(messages.get())) {
@@ -102,7 +97,7 @@ void SqliteBag::read_messages() {
                          static_cast<std::uint64_t>(row), 0, topic->second, 0});
   }
   if (result == SQLITE_DONE) return;
-  if (result != SQLITE_CORRUPT) fail_by_database();
+  if (result != SQLITE_CORRUPT) fail_by_database(database_, path_, kUnreadable);
   early_end_ = path_.string() + ": " + row_of(row) + "the log ends early behind it";
 }
 
@@ -127,29 +122,21 @@ void SqliteBag::read(const LogMessage& message, std::vector<std::uint8_t>& bytes
   if (result == SQLITE_DONE) {
     fail(path_, row_of(static_cast<std::int64_t>(message.block)) + "expected a message");
   }
-  if (result != SQLITE_ROW) fail_by_database();
+  if (result != SQLITE_ROW) fail_by_database(database_, path_, kUnreadable);
   sqlite3_stmt* const statement = select_message_.get();
   const auto* const data = static_cast<const std::uint8_t*>(sqlite3_column_blob(statement, 0));
   bytes.assign(data, data + sqlite3_column_bytes(statement, 0));
 }
 
-SqliteBag::Statement SqliteBag::prepare(const char* sql) {
-  sqlite3_stmt* statement = nullptr;
-  if (sqlite3_prepare_v2(database_.get(), sql, -1, &statement, nullptr) != SQLITE_OK) {
-    fail(path_, std::string("expected the tables of rosbag2: ") + sqlite3_errmsg(database_.get()));
-  }
-  return Statement(statement);
+SqliteStatement SqliteBag::prepare(const char* sql) {
+  return prepare_statement(database_, sql, path_, "expected the tables of rosbag2");
 }
 
 bool SqliteBag::step(sqlite3_stmt* statement) {
   const int result = sqlite3_step(statement);
   if (result == SQLITE_ROW) return true;
-  if (result != SQLITE_DONE) fail_by_database();
+  if (result != SQLITE_DONE) fail_by_database(database_, path_, kUnreadable);
   return false;
-}
-
-void SqliteBag::fail_by_database() const {
-  fail(path_, std::string("cannot be read: ") + sqlite3_errmsg(database_.get()));
 }
 
 }  // namespace dynains

@@ -3,13 +3,10 @@
 
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <vector>
 
 #include "log_file.hpp"
-
-struct sqlite3;
-struct sqlite3_stmt;
+#include "sqlite_handles.hpp"
 
 namespace dynains {
 
@@ -20,24 +17,15 @@ class SqliteBag final : public LogFile {
   void read(const LogMessage& message, std::vector<std::uint8_t>& bytes) override;
 
  private:
-  struct CloseDatabase {
-    void operator()(sqlite3* database) const;
-  };
-  struct FinishStatement {
-    void operator()(sqlite3_stmt* statement) const;
-  };
-  using Statement = std::unique_ptr<sqlite3_stmt, FinishStatement>;
-
   void read_topics();
   void read_messages();
   void drop_unreadable();
   int select(const LogMessage& message);
-  Statement prepare(const char* sql);
+  SqliteStatement prepare(const char* sql);
   bool step(sqlite3_stmt* statement);
-  [[noreturn]] void fail_by_database() const;
 
-  std::unique_ptr<sqlite3, CloseDatabase> database_;
-  Statement select_message_;
+  SqliteDatabase database_;
+  SqliteStatement select_message_;
   std::map<std::int64_t, std::uint32_t> topic_of_;  ///< by id in the database
 };
 

@@ -6,17 +6,14 @@
 
 namespace dynains {
 
-void SqliteWriter::CloseDatabase::operator()(sqlite3* database) const { sqlite3_close(database); }
-void SqliteWriter::FinishStatement::operator()(sqlite3_stmt* statement) const {
-  sqlite3_finalize(statement);
-}
+namespace {
+constexpr const char* kUnwritable = "cannot be written";
+}  // namespace
 
-SqliteWriter::SqliteWriter(const std::filesystem::path& path) : path_(path), file_(path) {
-  sqlite3* database = nullptr;
-  const int result =
-      sqlite3_open_v2(file_.temporary_path().c_str(), &database, SQLITE_OPEN_READWRITE, nullptr);
-  database_.reset(database);
-  if (result != SQLITE_OK) fail(path_, std::string("cannot be written: ") + sqlite3_errstr(result));
+SqliteWriter::SqliteWriter(const std::filesystem::path& path)
+    : path_(path),
+      file_(path),
+      database_(open_database(file_.temporary_path(), SQLITE_OPEN_READWRITE, path_, kUnwritable)) {
   // The file takes its name when it is whole: a journal would have no use.
   execute("PRAGMA journal_mode = OFF");
   execute("PRAGMA synchronous = OFF");
@@ -34,7 +31,7 @@ SqliteWriter::SqliteWriter(const std::filesystem::path& path) : path_(path), fil
 }
 
 std::uint16_t SqliteWriter::add_channel(const std::string& topic, const MessageType& type) {
-  const Statement insert = prepare("INSERT INTO topics VALUES(?, ?, ?, 'cdr', '')");
+  const SqliteStatement insert = prepare("INSERT INTO topics VALUES(?, ?, ?, 'cdr', '')");
   const std::string name = type.ros2_name();
   const std::uint16_t channel = ++channels_;  // rows count from 1
   sqlite3_bind_int(insert.get(), 1, channel);
@@ -60,26 +57,18 @@ void SqliteWriter::commit() {
   file_.commit();
 }
 
-SqliteWriter::Statement SqliteWriter::prepare(const char* sql) {
-  sqlite3_stmt* statement = nullptr;
-  if (sqlite3_prepare_v2(database_.get(), sql, -1, &statement, nullptr) != SQLITE_OK) {
-    fail_by_database();
-  }
-  return Statement(statement);
+SqliteStatement SqliteWriter::prepare(const char* sql) {
+  return prepare_statement(database_, sql, path_, kUnwritable);
 }
 
 void SqliteWriter::step(sqlite3_stmt* statement) {
-  if (sqlite3_step(statement) != SQLITE_DONE) fail_by_database();
+  if (sqlite3_step(statement) != SQLITE_DONE) fail_by_database(database_, path_, kUnwritable);
 }
 
 void SqliteWriter::execute(const char* sql) {
   if (sqlite3_exec(database_.get(), sql, nullptr, nullptr, nullptr) != SQLITE_OK) {
-    fail_by_database();
+    fail_by_database(database_, path_, kUnwritable);
   }
-}
-
-void SqliteWriter::fail_by_database() const {
-  fail(path_, std::string("cannot be written: ") + sqlite3_errmsg(database_.get()));
 }
 
 }  // namespace dynains

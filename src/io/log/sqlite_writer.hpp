@@ -3,14 +3,11 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <string>
 
 #include "dynains/io/atomic_file.hpp"
 #include "log_writer.hpp"
-
-struct sqlite3;
-struct sqlite3_stmt;
+#include "sqlite_handles.hpp"
 
 namespace dynains {
 
@@ -24,23 +21,14 @@ class SqliteWriter final : public LogWriter {
   void commit() override;
 
  private:
-  struct CloseDatabase {
-    void operator()(sqlite3* database) const;
-  };
-  struct FinishStatement {
-    void operator()(sqlite3_stmt* statement) const;
-  };
-  using Statement = std::unique_ptr<sqlite3_stmt, FinishStatement>;
-
-  Statement prepare(const char* sql);
+  SqliteStatement prepare(const char* sql);
   void step(sqlite3_stmt* statement);
   void execute(const char* sql);
-  [[noreturn]] void fail_by_database() const;
 
   std::filesystem::path path_;
   AtomicFile file_;
-  std::unique_ptr<sqlite3, CloseDatabase> database_;
-  Statement insert_message_;
+  SqliteDatabase database_;
+  SqliteStatement insert_message_;
   std::uint16_t channels_ = 0;
 };
 
