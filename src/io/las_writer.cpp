@@ -1,12 +1,12 @@
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/las_file.hpp"
 #include "failure.hpp"
 #include "las_format.hpp"
+#include "scalar.hpp"
 
 namespace dynains {
 namespace {
@@ -15,9 +15,7 @@ class LasFields {
  public:
   template <class Number>
   LasFields& number(Number value) {
-    char copy[sizeof(value)];
-    std::memcpy(copy, &value, sizeof(value));
-    bytes_.append(copy, sizeof(value));
+    append_number(value, bytes_);
     return *this;
   }
   LasFields& zeros(std::size_t count) {

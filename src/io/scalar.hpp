@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <string>
 
 namespace dynains {
 
@@ -39,6 +40,14 @@ inline std::size_t size_of(Scalar type) {
       return 8;
   }
   return 0;
+}
+
+/// Appends the bytes of a number, in the byte order of the machine.
+template <class Number>
+void append_number(Number value, std::string& bytes) {
+  char copy[sizeof(value)];
+  std::memcpy(copy, &value, sizeof(value));
+  bytes.append(copy, sizeof(value));
 }
 
 namespace scalar_detail {

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "io/log/log_writer.hpp"
 #include "io/log/message_writer.hpp"
+#include "io/scalar.hpp"
 #include "label_writer.hpp"
 
 namespace dynains::program {
@@ -13,13 +13,6 @@ namespace {
 
 constexpr const char* kSensorFrame = "lidar";
 constexpr const char* kMapFrame = "map";
-
-template <class Number>
-void append(Number value, std::string& bytes) {
-  char copy[sizeof(value)];
-  std::memcpy(copy, &value, sizeof(value));
-  bytes.append(copy, sizeof(value));
-}
 
 CloudLayout scan_layout(const PointColumns& columns) {
   CloudLayout layout{{{"x", CloudLayout::kFloat32, 4},
@@ -66,13 +59,13 @@ void VerdictLog::add(const RecordedScan& scan, const ScanVerdict& verdict) {
   const bool has_time = scan.time.size() == scan.size();
   points_.clear();
   for (std::size_t i = 0; i < scan.size(); ++i) {
-    for (std::size_t k = 0; k < 4; ++k) append(scan.xyzi[4 * i + k], points_);
-    if (columns.ring) append(has_ring ? scan.ring[i] : std::uint16_t{0}, points_);
-    if (columns.time) append(has_time ? scan.time[i] : 0.0, points_);
-    append(static_cast<std::uint16_t>(mos_label(verdict.labels[i], kNoInstance)), points_);
-    append(verdict.instances[i], points_);
-    append(verdict.beliefs[i], points_);
-    append(verdict.causes[i], points_);
+    for (std::size_t k = 0; k < 4; ++k) append_number(scan.xyzi[4 * i + k], points_);
+    if (columns.ring) append_number(has_ring ? scan.ring[i] : std::uint16_t{0}, points_);
+    if (columns.time) append_number(has_time ? scan.time[i] : 0.0, points_);
+    append_number(static_cast<std::uint16_t>(mos_label(verdict.labels[i], kNoInstance)), points_);
+    append_number(verdict.instances[i], points_);
+    append_number(verdict.beliefs[i], points_);
+    append_number(verdict.causes[i], points_);
   }
   last_time_ = nanoseconds(verdict.time);
   const MessageEncoding encoding = writer_->encoding();
@@ -87,7 +80,7 @@ void VerdictLog::add(const RecordedScan& scan, const ScanVerdict& verdict) {
 void VerdictLog::add_map_point(const Eigen::Vector3d& point) {
   constexpr std::size_t kMostPoints = 4000000;
   for (const double value : point) {
-    is_far_ ? append(value, points_) : append(static_cast<float>(value), points_);
+    is_far_ ? append_number(value, points_) : append_number(static_cast<float>(value), points_);
   }
   if (++map_points_ == kMostPoints) write_map();
 }

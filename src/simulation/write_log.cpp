@@ -2,25 +2,18 @@
 
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "io/log/log_writer.hpp"
 #include "io/log/message_writer.hpp"
+#include "io/scalar.hpp"
 
 namespace dynains::simulation {
 namespace {
 
 constexpr const char* kFrame = "lidar";
-
-template <class Number>
-void append(Number value, std::string& bytes) {
-  char copy[sizeof(value)];
-  std::memcpy(copy, &value, sizeof(value));
-  bytes.append(copy, sizeof(value));
-}
 
 std::string cloud_of(const SimulatedScan& scan, MessageEncoding encoding, std::uint64_t time) {
   CloudLayout layout{{{"x", CloudLayout::kFloat32, 4},
@@ -33,9 +26,9 @@ std::string cloud_of(const SimulatedScan& scan, MessageEncoding encoding, std::u
   std::string points;
   points.reserve(scan.labels.size() * layout.point_size());
   for (std::size_t i = 0; i < scan.labels.size(); ++i) {
-    for (std::size_t k = 0; k < 4; ++k) append(scan.xyzi[4 * i + k], points);
-    append(scan.labels[i], points);
-    if (has_times) append(scan.times[i], points);
+    for (std::size_t k = 0; k < 4; ++k) append_number(scan.xyzi[4 * i + k], points);
+    append_number(scan.labels[i], points);
+    if (has_times) append_number(scan.times[i], points);
   }
   return cloud_message(encoding, time, kFrame, layout, points);
 }

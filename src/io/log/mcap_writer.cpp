@@ -1,7 +1,6 @@
 #include "mcap_writer.hpp"
 
-#include <cstring>
-
+#include "../scalar.hpp"
 #include "decompress.hpp"
 #include "mcap_format.hpp"
 
@@ -15,9 +14,7 @@ class Fields {
  public:
   template <class Number>
   Fields& number(Number value) {
-    char copy[sizeof(value)];
-    std::memcpy(copy, &value, sizeof(value));
-    bytes_.append(copy, sizeof(value));
+    append_number(value, bytes_);
     return *this;
   }
   Fields& string(const std::string& text) {

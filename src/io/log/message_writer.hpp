@@ -4,10 +4,10 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <string>
 #include <vector>
 
+#include "../scalar.hpp"
 #include "log_file.hpp"
 
 namespace dynains {
@@ -22,9 +22,7 @@ class MessageWriter {
   template <class Number>
   void number(Number value) {
     while (!is_ros1_ && (bytes_.size() - kCdrHeader) % sizeof(value) != 0) bytes_.push_back('\0');
-    char copy[sizeof(value)];
-    std::memcpy(copy, &value, sizeof(value));
-    bytes_.append(copy, sizeof(value));
+    append_number(value, bytes_);
   }
   void string(const std::string& text) {
     const std::size_t end = is_ros1_ ? 0 : 1;
