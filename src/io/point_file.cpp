@@ -1,7 +1,5 @@
 #include "dynains/io/point_file.hpp"
 
-#include <algorithm>
-#include <cctype>
 #include <cstring>
 #include <limits>
 #include <ostream>
@@ -18,10 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string extension_in_lower_case(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
+  return text::lower_case(path.extension().string());
 }
 
 /// Whether the writer writes PCD, and not PLY.

@@ -1,9 +1,9 @@
 #include "point_sink.hpp"
 
-#include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <limits>
+
+#include "text.hpp"
 
 namespace dynains {
 namespace {
@@ -57,9 +57,7 @@ float to_float(double value) {
 }  // namespace
 
 Role role_of(std::string_view name) {
-  std::string lower(name);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string lower = text::lower_case(std::string(name));
   for (const Alias& alias : kAliases) {
     if (alias.name == lower) return alias.role;
   }

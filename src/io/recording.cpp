@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <iomanip>
 #include <map>
@@ -36,8 +35,7 @@ constexpr const char* kAccepted =
     ".db3, .bag, or a folder with metadata.yaml)";
 
 std::optional<ScanFormat> scan_format_of(const fs::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string extension = text::lower_case(path.extension().string());
   if (extension == ".bin" && path.stem().extension() == ".pcd") return ScanFormat::kNuScenes;
   if (extension == ".bin") return ScanFormat::kBin;
   if (extension == ".pcd") return ScanFormat::kPcd;

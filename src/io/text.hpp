@@ -1,4 +1,4 @@
-// Numbers in text files, independent of the locale of the process.
+// Text and numbers in files, independent of the locale of the process.
 #pragma once
 
 #include <cstddef>
@@ -16,6 +16,9 @@ std::optional<double> parse_number(std::string_view token);
 
 /// Removes the next token, separated by blanks, from the front of `line`; empty at the end.
 std::string_view next_token(std::string_view& line);
+
+/// The text with its ASCII letters in lower case.
+std::string lower_case(std::string text);
 
 /// Makes a stream write doubles that read back exactly, independent of the locale.
 inline std::ostream& exact(std::ostream& stream) {

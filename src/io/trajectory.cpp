@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <string>
 #include <string_view>
@@ -58,18 +57,13 @@ std::vector<std::string> split(std::string_view line) {
   }
 }
 
-std::string lower_case(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
 bool contains(const std::string& text, const char* part) {
   return text.find(part) != std::string::npos;
 }
 
 /// Sets the meaning of a named column; the first of two columns with one meaning counts.
 void add_column(const std::string& cell, std::size_t index, Columns& columns) {
-  const std::string name = lower_case(cell);
+  const std::string name = text::lower_case(cell);
   if (name.empty()) return;
   const auto claim = [index](std::size_t& column) {
     if (column == kNoColumn) column = index;

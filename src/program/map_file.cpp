@@ -1,8 +1,9 @@
 #include "map_file.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
+
+#include "io/text.hpp"
 
 namespace dynains::program {
 namespace {
@@ -57,9 +58,7 @@ class LasMapFile final : public MapFile {
 }  // namespace
 
 bool is_las(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension == ".las";
+  return text::lower_case(path.extension().string()) == ".las";
 }
 
 bool is_map_name(const std::filesystem::path& path) { return is_point_file(path) || is_las(path); }

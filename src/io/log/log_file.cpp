@@ -1,7 +1,6 @@
 #include "log_file.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <system_error>
 
 #include "../failure.hpp"
@@ -9,6 +8,7 @@
 #include "mcap.hpp"
 #include "ros_bag.hpp"
 #if defined(DYNAINS_HAS_SQLITE3)
+#include "../text.hpp"
 #include "sqlite_bag.hpp"
 #endif
 
@@ -18,9 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string extension_of(const fs::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension;
+  return text::lower_case(path.extension().string());
 }
 
 bool is_log_name(const fs::path& path) {
