@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "dynains/stage/voxel_hash_table.hpp"
+
 namespace dynains {
 namespace {
 
@@ -14,13 +16,11 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 constexpr std::array<double, RegistrationScan::kLevels> kEdges = {4.0, 2.0, 1.0};  // m
 
-std::uint64_t key_of(const Eigen::Vector3d& p, double edge) {
-  std::uint64_t key = 0;
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    key = key << 20U |
-          (static_cast<std::uint64_t>(std::floor(p[axis] / edge) + 1048576.0) & 0xFFFFFU);
-  }
-  return key;
+VoxelKey key_of(const Eigen::Vector3d& p, double edge) {
+  const auto index = [&](double coordinate) {
+    return static_cast<std::int64_t>(std::floor(coordinate / edge));
+  };
+  return voxel_key(index(p.x()), index(p.y()), index(p.z()));
 }
 
 struct Moments {

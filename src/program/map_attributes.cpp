@@ -26,39 +26,28 @@ void MapAttributeTable::add(const RecordedScan& scan, const ScanVerdict& verdict
   for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
     if (!is_static(verdict.labels[i])) continue;
     const Eigen::Map<const Eigen::Vector3f> point(scan.xyzi.data() + 4 * i);
-    const std::uint64_t key = key_of(voxel_of(verdict.T_world_sensor * point.cast<double>()));
-    const auto [place, is_new] = attributes_.try_emplace(key);
-    if (is_new) place->second = attributes_of(scan, verdict, labels, i);
+    const std::uint32_t voxel =
+        voxels_.insert(key_of(verdict.T_world_sensor * point.cast<double>()));
+    if (voxel == attributes_.size()) attributes_.push_back(attributes_of(scan, verdict, labels, i));
   }
 }
 
 MapAttributes MapAttributeTable::at(const Eigen::Vector3d& position) const {
-  const Voxel voxel = voxel_of(position);
-  const auto own = attributes_.find(key_of(voxel));
-  if (own != attributes_.end()) return own->second;
+  const VoxelKey key = key_of(position);
+  const std::uint32_t own = voxels_.find(key);
+  if (own != VoxelHashTable<>::kNone) return attributes_[own];
   for (int neighbour = 0; neighbour < 27; ++neighbour) {
-    const auto found =
-        attributes_.find(key_of({voxel[0] + neighbour % 3 - 1, voxel[1] + neighbour / 3 % 3 - 1,
-                                 voxel[2] + neighbour / 9 - 1}));
-    if (found != attributes_.end()) return found->second;
+    const std::uint32_t found = voxels_.find(
+        key + voxel_key_step(neighbour % 3 - 1, neighbour / 3 % 3 - 1, neighbour / 9 - 1));
+    if (found != VoxelHashTable<>::kNone) return attributes_[found];
   }
   return {};
 }
 
-MapAttributeTable::Voxel MapAttributeTable::voxel_of(const Eigen::Vector3d& position) const {
+VoxelKey MapAttributeTable::key_of(const Eigen::Vector3d& position) const {
   const Eigen::Vector3d index = (position / voxel_).array().floor() - origin_.array();
-  return {static_cast<std::int64_t>(index.x()), static_cast<std::int64_t>(index.y()),
-          static_cast<std::int64_t>(index.z())};
-}
-
-std::uint64_t MapAttributeTable::key_of(const Voxel& voxel) {
-  constexpr unsigned kBits = 21;
-  constexpr std::uint64_t kMask = (std::uint64_t{1} << kBits) - 1;
-  std::uint64_t key = 0;
-  for (const std::int64_t index : voxel) {
-    key = key << kBits | (static_cast<std::uint64_t>(index) & kMask);
-  }
-  return key;
+  return voxel_key(static_cast<std::int64_t>(index.x()), static_cast<std::int64_t>(index.y()),
+                   static_cast<std::int64_t>(index.z()));
 }
 
 }  // namespace dynains::program

@@ -2,13 +2,12 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <unordered_map>
 #include <vector>
 
 #include "dynains/io/recording.hpp"
+#include "dynains/stage/voxel_hash_table.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::program {
@@ -44,13 +43,12 @@ class MapAttributeTable {
   MapAttributes at(const Eigen::Vector3d& position) const;
 
  private:
-  using Voxel = std::array<std::int64_t, 3>;
-  Voxel voxel_of(const Eigen::Vector3d& position) const;
-  static std::uint64_t key_of(const Voxel& voxel);
+  VoxelKey key_of(const Eigen::Vector3d& position) const;
 
   double voxel_;
   Eigen::Vector3d origin_;
-  std::unordered_map<std::uint64_t, MapAttributes> attributes_;
+  VoxelHashTable<> voxels_;
+  std::vector<MapAttributes> attributes_;  // by number of the voxel
 };
 
 }  // namespace dynains::program
