@@ -1,5 +1,6 @@
 #include "label_writer.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -49,15 +50,16 @@ void LabelWriter::write(const std::string& name, const ScanVerdict& verdict) {
   for (std::size_t i = 0; i < labels_.size(); ++i) {
     labels_[i] = mos_label(verdict.labels[i], verdict.instances[i]);
   }
-  causes_.clear();
-  beliefs_.clear();
   if (!cause_folder_.empty()) {
-    for (const Cause cause : verdict.causes) causes_.push_back(static_cast<std::uint8_t>(cause));
+    causes_.resize(verdict.causes.size());
+    std::transform(verdict.causes.begin(), verdict.causes.end(), causes_.begin(),
+                   [](Cause cause) { return static_cast<std::uint8_t>(cause); });
   }
   if (!belief_folder_.empty()) {
-    for (const float belief : verdict.beliefs) {
-      beliefs_.push_back(static_cast<std::uint8_t>(std::lround(255.0F * belief)));
-    }
+    beliefs_.resize(verdict.beliefs.size());
+    std::transform(
+        verdict.beliefs.begin(), verdict.beliefs.end(), beliefs_.begin(),
+        [](float belief) { return static_cast<std::uint8_t>(std::lround(255.0F * belief)); });
   }
   pending_ = std::async(std::launch::async, [this, name] {
     write_labels(folder_ / (name + ".label"), labels_);
