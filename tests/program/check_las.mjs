@@ -1,25 +1,18 @@
 // node check_las.mjs MAP.las MAP.ply: @loaders.gl/las reads from a map of LAS the points of the PLY
 // (float x y z intensity, uint label), in its order.
 import fs from "node:fs";
-import { createRequire } from "node:module";
 import path from "node:path";
 import { pathToFileURL } from "node:url";
 
-const require = createRequire(import.meta.url); // NODE_PATH has an effect on require() only
-let core, las;
-try {
-  core = require("@loaders.gl/core");
+import { expect, packages, require } from "../support/node_check.mjs";
+
+const { core, las } = await packages(async () => {
   const folder = path.dirname(require.resolve("@loaders.gl/las"));
-  las = await import(pathToFileURL(path.join(folder, "index.js")));
-} catch (error) {
-  console.log("SKIPPED: " + error.message.split("\n")[0]);
-  process.exit(0);
-}
-const expect = (condition, message) => {
-  if (condition) return;
-  console.log("FAILED: " + message);
-  process.exit(1);
-};
+  return {
+    core: require("@loaders.gl/core"),
+    las: await import(pathToFileURL(path.join(folder, "index.js"))),
+  };
+});
 
 // The reader of version 1.4 fetches its own WebAssembly, which is a file here.
 globalThis.fetch = async (url) =>

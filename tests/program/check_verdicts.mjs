@@ -1,33 +1,17 @@
 // node check_verdicts.mjs OUT: @mcap/core and @foxglove/rosmsg2-serialization read from
 // OUT/verdicts.mcap the labels and causes of OUT, poses, and the points of OUT/static_map.ply.
 import fs from "node:fs";
-import { createRequire } from "node:module";
 
-const require = createRequire(import.meta.url); // NODE_PATH has an effect on require() only
-let core, rosmsg, serialization;
-try {
-  core = require("@mcap/core");
-  rosmsg = require("@foxglove/rosmsg");
-  serialization = require("@foxglove/rosmsg2-serialization");
-} catch (error) {
-  console.log("SKIPPED: " + error.message.split("\n")[0]);
-  process.exit(0);
-}
-const expect = (condition, message) => {
-  if (condition) return;
-  console.log("FAILED: " + message);
-  process.exit(1);
-};
+import { expect, openMcap, packages, require } from "../support/node_check.mjs";
+
+const { core, rosmsg, serialization } = await packages(() => ({
+  core: require("@mcap/core"),
+  rosmsg: require("@foxglove/rosmsg"),
+  serialization: require("@foxglove/rosmsg2-serialization"),
+}));
 
 const [out] = process.argv.slice(2);
-const bytes = fs.readFileSync(`${out}/verdicts.mcap`);
-const reader = await core.McapIndexedReader.Initialize({
-  readable: {
-    size: async () => BigInt(bytes.length),
-    read: async (offset, length) =>
-      new Uint8Array(bytes.subarray(Number(offset), Number(offset + length))),
-  },
-});
+const reader = await openMcap(core, `${out}/verdicts.mcap`);
 const readers = new Map();
 for (const [id, channel] of reader.channelsById) {
   const schema = reader.schemasById.get(channel.schemaId);

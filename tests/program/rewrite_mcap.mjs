@@ -3,30 +3,18 @@
 // COMPRESSION (lz4 or zstd) compresses each chunk.
 import { execFileSync } from "node:child_process";
 import fs from "node:fs";
-import { createRequire } from "node:module";
 
-// NODE_PATH has an effect on require() only.
-const require = createRequire(import.meta.url);
-let core, rosmsg, serialization;
-try {
-  core = require("@mcap/core");
-  rosmsg = require("@foxglove/rosmsg");
-  serialization = require("@foxglove/rosmsg2-serialization");
-} catch (error) {
-  console.log("SKIPPED: " + error.message.split("\n")[0]);
-  process.exit(0);
-}
+import { openMcap, packages, require } from "../support/node_check.mjs";
+
+const { core, rosmsg, serialization } = await packages(() => ({
+  core: require("@mcap/core"),
+  rosmsg: require("@foxglove/rosmsg"),
+  serialization: require("@foxglove/rosmsg2-serialization"),
+}));
 
 const [input, output, compression] = process.argv.slice(2);
 
-const bytes = fs.readFileSync(input);
-const reader = await core.McapIndexedReader.Initialize({
-  readable: {
-    size: async () => BigInt(bytes.length),
-    read: async (offset, length) =>
-      new Uint8Array(bytes.subarray(Number(offset), Number(offset + length))),
-  },
-});
+const reader = await openMcap(core, input);
 
 const file = fs.openSync(output, "w");
 let position = 0;
