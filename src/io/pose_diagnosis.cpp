@@ -49,7 +49,7 @@ bool is_much_better(double error, double before) {
   return error < 0.5 * before && before - error > 0.02;
 }
 
-/// What the poses mean, with the error that is left.
+/// A meaning of the poses, and the error that remains under it.
 struct Explanation {
   PoseVerdict verdict = PoseVerdict::kBodyFrame;
   double error = 0.0;  // m at points 10 m away

@@ -239,7 +239,7 @@ std::optional<Eigen::Isometry3d> fit_extrinsic(const std::vector<RegisteredMotio
     T_body_sensor.linear() = R;
     T_body_sensor = refine(motions, T_body_sensor);
     const double cost = robust_cost(motions, T_body_sensor);
-    // Of equal results, that with the smallest first rotation counts.
+    // The rotations are sorted by their angle: the first of equal results stays.
     if (best && !(cost < kClearly * least)) continue;
     best = T_body_sensor;
     least = cost;

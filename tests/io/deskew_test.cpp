@@ -96,7 +96,8 @@ std::string error_of(const fs::path& path, const RecordingOptions& options = wit
 
 }  // namespace
 
-TEST_CASE("De-skewing moves points to the time of the scan, whatever the unit of their times") {
+TEST_CASE(
+    "De-skewing moves points to the time of the scan for times in s, ms and ns, and since 1970") {
   const TemporaryFolder folder;
   write_drive(folder / "s", [](double, double offset) { return offset; });
   check_deskewed(folder / "s");
