@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "finite_points.hpp"
+#include "median.hpp"
 #include "pose_diagnosis.hpp"
 #include "pose_shift.hpp"
 #include "text.hpp"
@@ -34,13 +35,6 @@ std::uint64_t cell_of(const Eigen::Vector3d& p, double edge) {
     key = key << 16U | static_cast<std::uint64_t>(std::floor(p[axis] / edge) + 4096.0);
   }
   return key;
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 Landmarks landmarks_of(const Recording& recording, std::size_t i, RecordedScan& scan) {

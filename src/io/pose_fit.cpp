@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "finite_points.hpp"
+#include "median.hpp"
 #include "scan_registration.hpp"
 
 namespace dynains {
@@ -17,13 +18,6 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 constexpr double kLever = 10.0;  // m, distance of the points at which a rotation is judged
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double angle_of(const Eigen::Matrix3d& R) { return std::abs(Eigen::AngleAxisd(R).angle()); }
 

@@ -18,6 +18,7 @@
 #include "input_file.hpp"
 #include "kitti_files.hpp"
 #include "log/log_scans.hpp"
+#include "median.hpp"
 #include "nuscenes.hpp"
 #include "scan_reader.hpp"
 #include "text.hpp"
@@ -166,9 +167,7 @@ std::string gap_hint(const Trajectory& trajectory, double longest) {
   for (std::size_t i = 1; i < trajectory.times.size(); ++i) {
     gaps.push_back(trajectory.times[i] - trajectory.times[i - 1]);
   }
-  if (gaps.empty()) return {};
-  std::sort(gaps.begin(), gaps.end());
-  const double usual = gaps[gaps.size() / 2];
+  const double usual = median(std::move(gaps));
   if (!(usual > longest)) return {};
   return ". Poses are " + in_seconds(usual) +
          " apart: --pose-gap takes them, at the cost of the error of a linear motion between them";

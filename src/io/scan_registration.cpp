@@ -61,8 +61,8 @@ Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
   return m;
 }
 
-/// Normal equations of one step.
-struct Step {
+/// Normal equations at one motion.
+struct Linearization {
   Matrix6 H = Matrix6::Zero();
   Vector6 g = Vector6::Zero();
   double weight = 0.0;
@@ -70,9 +70,10 @@ struct Step {
 };
 
 /// `scale`: m, residual at which the weight of a point is a fourth.
-Step linearize(const RegistrationScan& a, const RegistrationScan& b, const Eigen::Isometry3d& T,
-               std::size_t level, double scale, std::size_t stride) {
-  Step step;
+Linearization linearize(const RegistrationScan& a, const RegistrationScan& b,
+                        const Eigen::Isometry3d& T, std::size_t level, double scale,
+                        std::size_t stride) {
+  Linearization step;
   for (std::size_t i = 0; i < b.points().size(); i += stride) {
     const Eigen::Vector3d p = T * b.points()[i];
     const RegistrationScan::Cell* const cell = a.find(level, p);
@@ -95,7 +96,7 @@ Step linearize(const RegistrationScan& a, const RegistrationScan& b, const Eigen
 Eigen::Isometry3d refine(const RegistrationScan& a, const RegistrationScan& b, Eigen::Isometry3d T,
                          std::size_t level, double scale, std::size_t stride, int most) {
   for (int k = 0; k < most; ++k) {
-    const Step step = linearize(a, b, T, level, scale, stride);
+    const Linearization step = linearize(a, b, T, level, scale, stride);
     if (step.met < 30) break;
     const Matrix6 damped = step.H + 1e-3 * Matrix6::Identity();
     const Vector6 change = -damped.ldlt().solve(step.g);
@@ -165,7 +166,7 @@ std::optional<Registration> register_scans(const RegistrationScan& a, const Regi
   for (const Eigen::Isometry3d& guess : guesses) {
     Eigen::Isometry3d T = refine(a, b, guess, 0, 1.0, 4, 12);
     T = refine(a, b, T, 1, 0.4, 3, 10);
-    const Step step = linearize(a, b, T, 1, 0.3, 2);
+    const Linearization step = linearize(a, b, T, 1, 0.3, 2);
     const double score =
         step.weight / (0.5 * static_cast<double>(std::max<std::size_t>(1, b.points().size())));
     results.emplace_back(T.translation(), score);
@@ -177,7 +178,7 @@ std::optional<Registration> register_scans(const RegistrationScan& a, const Regi
   }
   best.T_a_b = refine(a, b, best.T_a_b, 1, 0.2, 1, 8);
   best.T_a_b = refine(a, b, best.T_a_b, 2, kFine, 1, 15);
-  const Step step = linearize(a, b, best.T_a_b, 2, kFine, 1);
+  const Linearization step = linearize(a, b, best.T_a_b, 2, kFine, 1);
   if (step.met < kFewest) return std::nullopt;
   best.score = step.weight / static_cast<double>(step.met);
   // Residuals of neighbouring points are correlated, so the deviation of a point is a large value.
