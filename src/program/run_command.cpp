@@ -1,79 +1,47 @@
-#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
-#include <system_error>
-#include <utility>
-#include <vector>
 
 #include "command.hpp"
-#include "dynains/io/diagnosis.hpp"
-#include "dynains/remover.hpp"
 #include "evaluation_options.hpp"
-#include "interrupt.hpp"
-#include "lone_scans.hpp"
-#include "output_folder.hpp"
 #include "progress.hpp"
-#include "run_plan.hpp"
-#include "run_report.hpp"
-#include "run_results.hpp"
-#include "run_sequence.hpp"
-#include "view_command.hpp"
+#include "recording_options.hpp"
+#include "remover_options.hpp"
+#include "run.hpp"
 
 namespace dynains::program {
 namespace {
 
-namespace fs = std::filesystem;
+struct RunFlags {
+  explicit RunFlags(CLI::App& command)
+      : recording(command, "recording"), remover(command, "default") {}
 
-/// Processes all scans, or those that come before a signal. Returns the times.
-RunTiming process(const RunPlan& plan, const RunOptions& options, const fs::path& folder,
-                  RunResults& results) {
-  RunTiming timing;
-  const auto work = [&](auto& remover) {
-    Progress progress(plan.range.size(), "scans", options.quiet);
-    timing = run_sequence(remover, plan.sequence, plan.range, results, [&](std::size_t done) {
-      progress.update(done);
-      return InterruptGuard::signal() == 0;
-    });
-  };
-  if (plan.map_on_disk) {
-    RemoverWithMapOnDisk::Config config = *plan.map_on_disk;
-    config.map.map_folder = folder / kTileFolder;
-    RemoverWithMapOnDisk remover(config);
-    work(remover);
-    remover.reset();
-    std::error_code ignored;
-    fs::remove(config.map.map_folder, ignored);
-  } else {
-    DynaInsRemover remover(plan.config);
-    work(remover);
-  }
-  return timing;
-}
+  RecordingFlags recording;
+  RemoverOptions remover;
+  RunSettings settings;  // but for what the two above give after parsing
+  bool quiet = false;
+};
 
-void print_summary(const RunResults& results, const RunTiming& timing, const RunOutputs& outputs) {
-  const LabelCounts& labels = results.labels();
+void print_summary(const RunOutcome& run) {
+  const RunOutputs& outputs = run.outputs;
   const auto percent = [&](std::uint64_t count) {
-    return results.points() == 0
-               ? 0.0
-               : 100.0 * static_cast<double>(count) / static_cast<double>(results.points());
+    return run.points == 0 ? 0.0
+                           : 100.0 * static_cast<double>(count) / static_cast<double>(run.points);
   };
-  std::vector<double> totals;
-  for (const TimingRow& row : timing.rows) totals.push_back(row.total);
-  const Statistics time = statistics(std::move(totals));
-  const std::uint64_t moving = labels[PointLabel::kDynamic];
-  const std::uint64_t kept = labels[PointLabel::kGround] + labels[PointLabel::kStatic];
-  std::cout << std::fixed << std::setprecision(2) << results.finished() << " scans, "
-            << results.points() << " points: " << percent(moving) << " % moving, " << percent(kept)
-            << " % static, " << percent(results.points() - moving - kept) << " % not judged\n"
-            << "time per scan: median " << time.median << " ms, p95 " << time.p95 << " ms, max "
-            << time.max << " ms\n";
-  if (results.map_points()) {
+  const std::uint64_t moving = run.labels[PointLabel::kDynamic];
+  const std::uint64_t kept = run.labels[PointLabel::kGround] + run.labels[PointLabel::kStatic];
+  std::cout << std::fixed << std::setprecision(2) << run.scans << " scans, " << run.points
+            << " points: " << percent(moving) << " % moving, " << percent(kept) << " % static, "
+            << percent(run.points - moving - kept) << " % not judged\n"
+            << "time per scan: median " << run.time.median << " ms, p95 " << run.time.p95
+            << " ms, max " << run.time.max << " ms\n";
+  if (run.map_points) {
     std::cout << "static map: " << (outputs.folder / outputs.map_name()).string() << " ("
-              << *results.map_points() << " points)\n";
+              << *run.map_points << " points)\n";
   }
   std::cout << "moving points: " << (outputs.folder / "dynamic_points.ply").string() << " ("
             << moving << " points)\n"
@@ -82,119 +50,48 @@ void print_summary(const RunResults& results, const RunTiming& timing, const Run
             << "\nreport: " << (outputs.folder / "report.json").string() << std::endl;
 }
 
-/// Throws ConfigError if the scans disagree with the poses beyond doubt, unless they are accepted.
-/// Warns if it is not beyond doubt.
-void judge_poses(const RunPlan& plan, const RunOptions& options, const Agreement& agreement) {
-  const std::string share = std::to_string(std::lround(100.0 * agreement.share)) +
-                            " % of the points of neighbouring scans agree under these poses";
-  constexpr std::size_t kFewestScans = 8;  // for a judgement beyond doubt
-  if (!options.accept_poses && plan.range.size() >= kFewestScans) {
-    const Diagnosis diagnosis = diagnose(plan.sequence);
-    // A shift changes little: some broken scans can make one look better.
-    const bool is_shift = diagnosis.verdict == PoseVerdict::kOtherwise &&
-                          diagnosis.convention.shift != plan.sequence.convention().shift;
-    if (!diagnosis.sound() && diagnosis.verdict != PoseVerdict::kUnknown && !is_shift) {
-      throw ConfigError("only " + share + ". " + advice(diagnosis) + " See: dynains check " +
-                        options.sequence.as_given() +
-                        "; or run with these poses by --accept-poses");
-    }
-  }
-  std::cerr << "dynains: warning: only " << share << "; see: dynains check "
-            << options.sequence.as_given() << std::endl;
-}
+void run_as_asked(RunFlags& flags) {
+  RunSettings& settings = flags.settings;
+  settings.config = flags.remover.config();
+  settings.preset = flags.remover.preset_name();
+  settings.config_file = flags.remover.config_file();
+  settings.recording = flags.recording.folder();
+  settings.recording_as_given = flags.recording.as_given();
+  settings.recording_flags = flags.recording.given_flags();
 
-void warn_of_doubts(const RunPlan& plan, const RunOptions& options,
-                    const PoseAgreement& agreement) {
-  if (agreement.doubtful()) judge_poses(plan, options, agreement.as_given);
-  const auto lone =
-      remark_on_lone_scans(plan.sequence, plan.range.first, plan.range.last, plan.config);
-  if (lone) std::cerr << "dynains: warning: " << *lone << std::endl;
-}
+  std::optional<Progress> progress;
+  RunListener listener;
+  listener.warn = [](const std::string& text) {
+    std::cerr << "dynains: warning: " << text << std::endl;
+  };
+  listener.progress = [&](std::size_t done, std::size_t total) {
+    if (!progress) progress.emplace(total, "scans", flags.quiet);
+    if (done > 0) progress->update(done);
+  };
+  const RunOutcome outcome = run(settings, flags.recording.open(), listener);
+  progress.reset();
 
-RunDescription describe(const RunPlan& plan, const RunOptions& options,
-                        const PoseAgreement& agreement, const RunResults& results) {
-  const Recording& sequence = plan.sequence;
-  RunDescription description;
-  description.sequence = options.sequence.folder();
-  description.sequence_flags = options.sequence.given_flags();
-  description.first_scan = sequence.name(plan.range.first);
-  description.last_scan = sequence.name(plan.range.first + results.finished() - 1);
-  description.missing_poses = sequence.missing_pose_count();
-  description.log_ends_early = sequence.early_end().has_value();
-  description.agreement = agreement.as_given;
-  description.preset = options.remover.preset_name();
-  description.complete = results.finished() == plan.range.size();
-  description.map = plan.outputs.map_name();
-  description.configuration = plan.configuration;
-  if (plan.map_on_disk) {
-    description.configuration["map_memory"] = plan.map_on_disk->map.map_memory;
-  }
-  return description;
-}
-
-/// Writes the results into `out`, from the first scan on, or until a signal comes.
-void write_results(const RunPlan& plan, const RunOptions& options, OutputFolder& out,
-                   OutputChange::Mode mode, OutsideMap& outside_map) {
-  const PoseAgreement agreement = pose_agreement(plan.sequence, plan.range.first, plan.range.last);
-  warn_of_doubts(plan, options, agreement);
-
-  const InterruptGuard interrupt;
-  nlohmann::ordered_json marker = unfinished_report(plan.outputs.map_name());
-  marker["request"] = plan.request;
-  OutputChange change(out, mode, marker, plan.listing);
-  if (!change.is_staged()) out.remove_folder_results(kTileFolder);
-  RunOutputs outputs = plan.outputs;
-  outputs.folder = change.folder();
-  RunResults results(plan.sequence, plan.range, outputs, outside_map.take_writer());
-  const RunTiming timing = process(plan, options, outputs.folder, results);
-  const RunDescription description = describe(plan, options, agreement, results);
-  if (change.is_staged() && !description.complete) {
-    std::cerr << "dynains: interrupted; the earlier results in " << out.path().string()
+  if (outcome.earlier_results_stay) {
+    std::cerr << "dynains: interrupted; the earlier results in " << outcome.outputs.folder.string()
               << " stay as they were" << std::endl;
-    throw Interrupted{InterruptGuard::signal()};
+  } else if (flags.quiet) {
+  } else if (outcome.was_complete_before) {
+    std::cout << outcome.outputs.folder.string() << ": complete already" << std::endl;
+  } else {
+    print_summary(outcome);
   }
-  results.commit();
-  write_timing(outputs.folder / "timing.csv", timing);
-  change.put_in_place([&] { results.commit_outside_map(); });
-  nlohmann::ordered_json report = make_report(description, results, timing);
-  report["request"] = plan.request;
-  change.finish(report, plan.outputs.listing(plan.sequence, plan.range, false));
-  if (!options.quiet) print_summary(results, timing, plan.outputs);
-  if (!description.complete) throw Interrupted{InterruptGuard::signal()};
-}
-
-/// The page of a complete run.
-void write_page(const RunPlan& plan, const RunOptions& options, OutputFolder& out) {
-  const fs::path page = write_view(out, plan.sequence, kDefaultViewPoints);
-  if (!options.quiet) std::cout << "page: " << page.string() << std::endl;
-}
-
-void run(const RunOptions& options) {
-  const RunPlan plan = make_plan(options);
-  const LockedFolder lock(plan.outputs.folder);
-  OutputFolder out(Folder(plan.outputs.folder), run_output_kind());
-  const RunTask task = choose_task(plan, options, out);
-  if (task == RunTask::kNothing) {
-    out.discard_staging();
-    if (!options.quiet) std::cout << out.path().string() << ": complete already" << std::endl;
-    if (options.view) write_page(plan, options, out);
-    return;
+  if (!outcome.complete) throw Interrupted{outcome.signal};
+  if (!flags.quiet && !outcome.page.empty()) {
+    std::cout << "page: " << outcome.page.string() << std::endl;
   }
-  out.check(plan.listing, plan.inputs);
-  if (task == RunTask::kReplace) check_space(plan);
-  OutsideMap outside_map(plan, options.force || out.has_results());
-  write_results(
-      plan, options, out,
-      task == RunTask::kReplace ? OutputChange::Mode::kStaged : OutputChange::Mode::kInPlace,
-      outside_map);
-  if (options.view) write_page(plan, options, out);
 }
 
 }  // namespace
 
 void add_run_command(CLI::App& app) {
   CLI::App& command = *app.add_subcommand("run", "Remove what moves from a recorded sequence");
-  auto options = std::make_shared<RunOptions>(command);
+  auto flags = std::make_shared<RunFlags>(command);
+  RunSettings* const options = &flags->settings;
   command
       .add_option("-o,--out", options->out,
                   "folder for the results; created, must be empty (see --force)")
@@ -254,7 +151,7 @@ void add_run_command(CLI::App& app) {
       "--accept-poses", options->accept_poses,
       "run even if the scans disagree with the poses, which else ends the command with "
       "exit code 2 before anything is written");
-  command.add_flag("-q,--quiet", options->quiet, "print errors only");
+  command.add_flag("-q,--quiet", flags->quiet, "print errors only");
   command.footer(
       "Writes labels/NNNNNN.label (uint32 a point: 251 moving, 9 static, 0 not judged; instance id "
       "above\nthe 16th bit), causes/NNNNNN.cause (uint8 a point: why, see `dynains eval "
@@ -266,7 +163,7 @@ void add_run_command(CLI::App& app) {
       "file "
       "cannot be read or written; 2 for wrong flags, refused outputs and\nposes that the scans "
       "disagree with.");
-  command.callback([options] { run(*options); });
+  command.callback([flags] { run_as_asked(*flags); });
 }
 
 }  // namespace dynains::program

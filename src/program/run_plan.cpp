@@ -48,21 +48,21 @@ void check_scans(const Recording& sequence, const ScanRange& range) {
 }
 
 /// Path of the map; empty if there is none. Throws ConfigError.
-fs::path choose_map(const RunOptions& options, const DynaInsRemover::Config& config) {
-  const fs::path out = whole_path(options.out);
-  if (options.map.empty()) return config.build_map ? out / "static_map.ply" : fs::path();
+fs::path choose_map(const RunSettings& settings, const DynaInsRemover::Config& config) {
+  const fs::path out = whole_path(settings.out);
+  if (settings.map.empty()) return config.build_map ? out / "static_map.ply" : fs::path();
   if (!config.build_map) throw ConfigError("--map needs --build-map true");
-  return map_path(options.map, out);
+  return map_path(settings.map, out);
 }
 
 /// Throws ConfigError.
-void add_map_attributes(const RunOptions& options, const DynaInsRemover::Config& config,
+void add_map_attributes(const RunSettings& settings, const DynaInsRemover::Config& config,
                         RunOutputs& outputs) {
-  outputs.map_attributes = options.map_attributes || outputs.has_las_map();
+  outputs.map_attributes = settings.map_attributes || outputs.has_las_map();
   constexpr double kFinest = 0.01;  // m, for a map of all points
   outputs.map_voxel = std::max(config.map.map_voxel, kFinest);
-  outputs.crs = options.crs;
-  if (options.map_attributes && !config.build_map) {
+  outputs.crs = settings.crs;
+  if (settings.map_attributes && !config.build_map) {
     throw ConfigError("--map-attributes needs --build-map true");
   }
   if (outputs.map_attributes && outputs.map_on_disk) {
@@ -75,12 +75,12 @@ void add_map_attributes(const RunOptions& options, const DynaInsRemover::Config&
   wkt_of(outputs.crs);
 }
 
-InputFiles inputs_of(const RunOptions& options, const Recording& sequence) {
+InputFiles inputs_of(const RunSettings& settings, const Recording& sequence) {
   InputFiles inputs;
   for (const fs::path& file : sequence.files()) inputs.add(file);
   inputs.add(sequence.scan_folder());
   inputs.add(sequence.folder() / "labels");
-  if (!options.remover.config_file().empty()) inputs.add(options.remover.config_file());
+  if (!settings.config_file.empty()) inputs.add(settings.config_file);
   return inputs;
 }
 
@@ -122,38 +122,37 @@ fs::path map_path(const std::string& name, const fs::path& out) {
   return map;
 }
 
-RunPlan make_plan(const RunOptions& options) {
-  const DynaInsRemover::Config config = options.remover.config();
+RunPlan make_plan(const RunSettings& settings, Recording sequence) {
+  const DynaInsRemover::Config& config = settings.config;
   RunOutputs outputs;
-  outputs.folder = options.out;
-  outputs.map = choose_map(options, config);
-  outputs.write_online = options.write_online;
-  outputs.write_clean = options.write_clean;
-  outputs.write_mcap = options.write_mcap;
-  outputs.write_beliefs = options.view || options.write_beliefs;
-  outputs.map_on_disk = options.map_memory.has_value();
-  add_map_attributes(options, config, outputs);
+  outputs.folder = settings.out;
+  outputs.map = choose_map(settings, config);
+  outputs.write_online = settings.write_online;
+  outputs.write_clean = settings.write_clean;
+  outputs.write_mcap = settings.write_mcap;
+  outputs.write_beliefs = settings.view || settings.write_beliefs;
+  outputs.map_on_disk = settings.map_memory.has_value();
+  add_map_attributes(settings, config, outputs);
   std::optional<RemoverWithMapOnDisk::Config> map_on_disk;
-  if (options.map_memory) {
+  if (settings.map_memory) {
     if (!config.build_map) throw ConfigError("--map-memory needs --build-map true");
-    map_on_disk = with_map_on_disk(config, outputs.folder / kTileFolder, *options.map_memory);
+    map_on_disk = with_map_on_disk(config, outputs.folder / kTileFolder, *settings.map_memory);
   }
-  Recording sequence = options.sequence.open();
-  const ScanRange range = select_scans(sequence, options.window);
+  const ScanRange range = select_scans(sequence, settings.window);
   check_scans(sequence, range);
   const nlohmann::ordered_json configuration = parameters_of(config);
   const nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);
   OutputListing listing = outputs.listing(sequence, range, true);
-  InputFiles inputs = inputs_of(options, sequence);
+  InputFiles inputs = inputs_of(settings, sequence);
   return {config,  map_on_disk,        std::move(sequence), range,
           outputs, std::move(listing), std::move(inputs),   configuration,
           request};
 }
 
-RunTask choose_task(const RunPlan& plan, const RunOptions& options, const OutputFolder& out) {
+RunTask choose_task(const RunPlan& plan, const RunSettings& settings, const OutputFolder& out) {
   if (!out.has_results()) return RunTask::kWrite;
-  if (options.force) return RunTask::kReplace;
-  if (!options.resume) {
+  if (settings.force) return RunTask::kReplace;
+  if (!settings.resume) {
     throw IoError(out.path().string() +
                   ": holds earlier results; choose another folder, or replace them by --force");
   }

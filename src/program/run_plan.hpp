@@ -1,7 +1,6 @@
 // Everything about a run that is known before anything is written.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -11,38 +10,12 @@
 #include "dynains/io/folder_lock.hpp"
 #include "dynains/io/recording.hpp"
 #include "input_files.hpp"
-#include "labelled_sequence.hpp"
 #include "map_on_disk.hpp"
 #include "output_folder.hpp"
-#include "recording_options.hpp"
-#include "remover_options.hpp"
 #include "run_results.hpp"
+#include "run_settings.hpp"
 
 namespace dynains::program {
-
-/// Flags of `dynains run`.
-struct RunOptions {
-  explicit RunOptions(CLI::App& command)
-      : sequence(command, "recording"), remover(command, "default") {}
-
-  RecordingFlags sequence;
-  std::string out;
-  std::string map;
-  std::optional<double> map_memory;  // MB
-  bool map_attributes = false;
-  std::string crs;
-  ScanWindow window;
-  bool write_online = false;
-  bool write_clean = false;
-  bool write_mcap = false;
-  bool write_beliefs = false;
-  bool view = false;
-  bool force = false;
-  bool resume = false;
-  bool accept_poses = false;
-  bool quiet = false;
-  RemoverOptions remover;
-};
 
 struct RunPlan {
   DynaInsRemover::Config config;
@@ -61,9 +34,8 @@ struct RunPlan {
 /// goes there.
 std::filesystem::path map_path(const std::string& name, const std::filesystem::path& out);
 
-/// Opens the recording and checks everything but the points. Throws ConfigError, IoError,
-/// PoseError.
-RunPlan make_plan(const RunOptions& options);
+/// Checks everything but the points. Throws ConfigError, IoError, PoseError.
+RunPlan make_plan(const RunSettings& settings, Recording recording);
 
 /// Treatment of a folder of results.
 enum class RunTask { kNothing, kWrite, kReplace };
@@ -71,7 +43,7 @@ enum class RunTask { kNothing, kWrite, kReplace };
 /// kNothing if the folder holds the complete results of this run already, and --resume is given;
 /// kReplace if it holds results that stay until new ones are complete. Throws IoError if it holds
 /// results that the flags do not allow to change.
-RunTask choose_task(const RunPlan& plan, const RunOptions& options, const OutputFolder& out);
+RunTask choose_task(const RunPlan& plan, const RunSettings& settings, const OutputFolder& out);
 
 /// Throws IoError if the free space cannot hold even labels and causes of the scans. Points of
 /// .pcd and .ply scans are not counted.

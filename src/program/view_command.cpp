@@ -1,17 +1,13 @@
-#include "view_command.hpp"
-
 #include <iostream>
 #include <memory>
 #include <string>
 
 #include "command.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/io/atomic_file.hpp"
 #include "json_file.hpp"
-#include "page.hpp"
 #include "recording_options.hpp"
 #include "run_results.hpp"
-#include "run_view.hpp"
+#include "write_view.hpp"
 
 namespace dynains::program {
 namespace {
@@ -31,34 +27,6 @@ struct ViewOptions {
   std::size_t max_points = kDefaultViewPoints;
   bool quiet = false;
 };
-
-/// Index of the scan of this name. Throws IoError.
-std::size_t scan_named(const Recording& recording, const std::string& name,
-                       const fs::path& report) {
-  for (std::size_t i = 0; i < recording.size(); ++i) {
-    if (recording.name(i) == name) return i;
-  }
-  throw IoError(report.string() + ": the run has scan " + name + ", which " +
-                recording.folder().string() + " does not have; is it the recording of the run?");
-}
-
-viewer::RunFiles files_of(const OutputFolder& out, const Recording& recording) {
-  const fs::path report = out.path() / out.kind().marker;
-  const auto& json = out.marker();
-  viewer::RunFiles files;
-  files.folder = out.path();
-  const auto text = [&](const char* field) {
-    return required_json_field<std::string>(report, json, field);
-  };
-  files.first = scan_named(recording, text("/first_scan"), report);
-  files.last = scan_named(recording, text("/last_scan"), report);
-  if (files.last < files.first) {
-    throw IoError(report.string() + ": /last_scan: expected a scan after /first_scan");
-  }
-  const auto map = json_field<std::string>(report, json, "/static_map/file");
-  if (map) files.map = out.path() / *map;
-  return files;
-}
 
 void check_is_complete(const OutputFolder& out) {
   if (!out.has_results()) {
@@ -96,21 +64,6 @@ void view(ViewOptions& options) {
 }
 
 }  // namespace
-
-fs::path write_view(OutputFolder& out, const Recording& recording, std::size_t max_points) {
-  OutputListing listing = out.listing();
-  listing.files.insert(kViewPage);
-  out.check(listing, InputFiles());
-  const viewer::ViewData data =
-      viewer::view_of_run(recording, files_of(out, recording), max_points);
-  const fs::path page = out.path() / kViewPage;
-  AtomicFile file(page);
-  viewer::write_page(file.stream(), data);
-  // Listed first: a page that is not listed would count as a file of the user.
-  out.mark(nlohmann::ordered_json(out.marker()), listing);
-  file.commit();
-  return page;
-}
 
 void add_view_command(CLI::App& app) {
   CLI::App& command =

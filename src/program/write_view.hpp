@@ -1,4 +1,4 @@
-// The page that shows the results of a run.
+// The page that shows the results of a run, written into their folder.
 #pragma once
 
 #include <cstddef>

@@ -1,0 +1,182 @@
+#include "run.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/diagnosis.hpp"
+#include "dynains/remover.hpp"
+#include "interrupt.hpp"
+#include "lone_scans.hpp"
+#include "output_folder.hpp"
+#include "run_plan.hpp"
+#include "run_sequence.hpp"
+#include "write_view.hpp"
+
+namespace dynains::program {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Processes all scans, or those that come before a signal. Returns the times.
+RunTiming process(const RunPlan& plan, const RunListener& listener, const fs::path& folder,
+                  RunResults& results) {
+  const std::size_t total = plan.range.size();
+  const auto report_progress = [&](std::size_t done) {
+    if (listener.progress) listener.progress(done, total);
+  };
+  RunTiming timing;
+  const auto work = [&](auto& remover) {
+    report_progress(0);
+    timing = run_sequence(remover, plan.sequence, plan.range, results, [&](std::size_t done) {
+      report_progress(done);
+      return InterruptGuard::signal() == 0;
+    });
+  };
+  if (plan.map_on_disk) {
+    RemoverWithMapOnDisk::Config config = *plan.map_on_disk;
+    config.map.map_folder = folder / kTileFolder;
+    RemoverWithMapOnDisk remover(config);
+    work(remover);
+    remover.reset();
+    std::error_code ignored;
+    fs::remove(config.map.map_folder, ignored);
+  } else {
+    DynaInsRemover remover(plan.config);
+    work(remover);
+  }
+  return timing;
+}
+
+void warn(const RunListener& listener, const std::string& text) {
+  if (listener.warn) listener.warn(text);
+}
+
+/// Throws ConfigError if the scans disagree with the poses beyond doubt, unless they are accepted.
+/// Warns if it is not beyond doubt.
+void judge_poses(const RunPlan& plan, const RunSettings& settings, const RunListener& listener,
+                 const Agreement& agreement) {
+  const std::string share = std::to_string(std::lround(100.0 * agreement.share)) +
+                            " % of the points of neighbouring scans agree under these poses";
+  constexpr std::size_t kFewestScans = 8;  // for a judgement beyond doubt
+  if (!settings.accept_poses && plan.range.size() >= kFewestScans) {
+    const Diagnosis diagnosis = diagnose(plan.sequence);
+    // A shift changes little: some broken scans can make one look better.
+    const bool is_shift = diagnosis.verdict == PoseVerdict::kOtherwise &&
+                          diagnosis.convention.shift != plan.sequence.convention().shift;
+    if (!diagnosis.sound() && diagnosis.verdict != PoseVerdict::kUnknown && !is_shift) {
+      throw ConfigError("only " + share + ". " + advice(diagnosis) + " See: dynains check " +
+                        settings.recording_as_given +
+                        "; or run with these poses by --accept-poses");
+    }
+  }
+  warn(listener, "only " + share + "; see: dynains check " + settings.recording_as_given);
+}
+
+void warn_of_doubts(const RunPlan& plan, const RunSettings& settings, const RunListener& listener,
+                    const PoseAgreement& agreement) {
+  if (agreement.doubtful()) judge_poses(plan, settings, listener, agreement.as_given);
+  const auto lone =
+      remark_on_lone_scans(plan.sequence, plan.range.first, plan.range.last, plan.config);
+  if (lone) warn(listener, *lone);
+}
+
+RunDescription describe(const RunPlan& plan, const RunSettings& settings,
+                        const PoseAgreement& agreement, const RunResults& results) {
+  const Recording& sequence = plan.sequence;
+  RunDescription description;
+  description.sequence = settings.recording;
+  description.sequence_flags = settings.recording_flags;
+  description.first_scan = sequence.name(plan.range.first);
+  description.last_scan = sequence.name(plan.range.first + results.finished() - 1);
+  description.missing_poses = sequence.missing_pose_count();
+  description.log_ends_early = sequence.early_end().has_value();
+  description.agreement = agreement.as_given;
+  description.preset = settings.preset;
+  description.complete = results.finished() == plan.range.size();
+  description.map = plan.outputs.map_name();
+  description.configuration = plan.configuration;
+  if (plan.map_on_disk) {
+    description.configuration["map_memory"] = plan.map_on_disk->map.map_memory;
+  }
+  return description;
+}
+
+RunOutcome outcome_of(const RunPlan& plan, const RunResults& results, const RunTiming& timing) {
+  RunOutcome outcome;
+  outcome.outputs = plan.outputs;
+  outcome.complete = results.finished() == plan.range.size();
+  outcome.scans = results.finished();
+  outcome.points = results.points();
+  outcome.labels = results.labels();
+  outcome.map_points = results.map_points();
+  std::vector<double> totals;
+  for (const TimingRow& row : timing.rows) totals.push_back(row.total);
+  outcome.time = statistics(std::move(totals));
+  return outcome;
+}
+
+/// Writes the results into `out`, from the first scan on, or until a signal comes.
+RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
+                         const RunListener& listener, OutputFolder& out, OutputChange::Mode mode,
+                         OutsideMap& outside_map) {
+  const PoseAgreement agreement = pose_agreement(plan.sequence, plan.range.first, plan.range.last);
+  warn_of_doubts(plan, settings, listener, agreement);
+
+  const InterruptGuard interrupt;
+  nlohmann::ordered_json marker = unfinished_report(plan.outputs.map_name());
+  marker["request"] = plan.request;
+  OutputChange change(out, mode, marker, plan.listing);
+  if (!change.is_staged()) out.remove_folder_results(kTileFolder);
+  RunOutputs outputs = plan.outputs;
+  outputs.folder = change.folder();
+  RunResults results(plan.sequence, plan.range, outputs, outside_map.take_writer());
+  const RunTiming timing = process(plan, listener, outputs.folder, results);
+  RunOutcome outcome = outcome_of(plan, results, timing);
+  if (!outcome.complete) outcome.signal = InterruptGuard::signal();
+  if (change.is_staged() && !outcome.complete) {
+    outcome.earlier_results_stay = true;
+    return outcome;
+  }
+  results.commit();
+  write_timing(outputs.folder / "timing.csv", timing);
+  change.put_in_place([&] { results.commit_outside_map(); });
+  outcome.map_points = results.map_points();
+  nlohmann::ordered_json report =
+      make_report(describe(plan, settings, agreement, results), results, timing);
+  report["request"] = plan.request;
+  change.finish(report, plan.outputs.listing(plan.sequence, plan.range, false));
+  return outcome;
+}
+
+}  // namespace
+
+RunOutcome run(const RunSettings& settings, Recording recording, const RunListener& listener) {
+  const RunPlan plan = make_plan(settings, std::move(recording));
+  const LockedFolder lock(plan.outputs.folder);
+  OutputFolder out(Folder(plan.outputs.folder), run_output_kind());
+  const RunTask task = choose_task(plan, settings, out);
+  RunOutcome outcome;
+  if (task == RunTask::kNothing) {
+    out.discard_staging();
+    outcome.outputs = plan.outputs;
+    outcome.was_complete_before = true;
+  } else {
+    out.check(plan.listing, plan.inputs);
+    if (task == RunTask::kReplace) check_space(plan);
+    OutsideMap outside_map(plan, settings.force || out.has_results());
+    outcome = write_results(
+        plan, settings, listener, out,
+        task == RunTask::kReplace ? OutputChange::Mode::kStaged : OutputChange::Mode::kInPlace,
+        outside_map);
+  }
+  if (settings.view && outcome.complete) {
+    outcome.page = write_view(out, plan.sequence, kDefaultViewPoints);
+  }
+  return outcome;
+}
+
+}  // namespace dynains::program

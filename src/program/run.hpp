@@ -1,0 +1,44 @@
+// A run over a recording: from the scans to the folder of results.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "dynains/io/recording.hpp"
+#include "run_report.hpp"
+#include "run_results.hpp"
+#include "run_settings.hpp"
+
+namespace dynains::program {
+
+/// How a run reaches its caller while it lasts. Both functions may be empty.
+struct RunListener {
+  std::function<void(const std::string&)> warn;
+  /// Called before the first scan and after each.
+  std::function<void(std::size_t done, std::size_t total)> progress;
+};
+
+struct RunOutcome {
+  RunOutputs outputs;
+  bool was_complete_before = false;   ///< --resume of a complete run: nothing below is known
+  bool complete = true;               ///< false after a signal: `scans` were finished
+  int signal = 0;                     ///< that ended the run
+  bool earlier_results_stay = false;  ///< the run ended before it could replace them
+  std::size_t scans = 0;
+  std::uint64_t points = 0;
+  LabelCounts labels;
+  std::optional<std::size_t> map_points;
+  Statistics time;             ///< ms per scan
+  std::filesystem::path page;  ///< empty: none was asked for
+};
+
+/// Runs over a recording. SIGINT and SIGTERM end the run after the scan at hand: a new folder then
+/// holds the results so far, and earlier results stay. Throws ConfigError, IoError, PoseError,
+/// UsageError.
+RunOutcome run(const RunSettings& settings, Recording recording, const RunListener& listener);
+
+}  // namespace dynains::program

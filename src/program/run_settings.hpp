@@ -1,0 +1,38 @@
+// What `dynains run` shall do, without the command line: a caller in another language fills it, too.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "dynains/remover.hpp"
+#include "labelled_sequence.hpp"
+
+namespace dynains::program {
+
+struct RunSettings {
+  std::string out;                   ///< folder of the results
+  std::string map;                   ///< file of the static map; empty: static_map.ply in `out`
+  std::optional<double> map_memory;  ///< MB
+  bool map_attributes = false;
+  std::string crs;  ///< of a LAS map, for example "EPSG:25832"; empty: none
+  ScanWindow window;
+  bool write_online = false;
+  bool write_clean = false;
+  bool write_mcap = false;
+  bool write_beliefs = false;
+  bool view = false;
+  bool force = false;
+  bool resume = false;
+  bool accept_poses = false;
+
+  DynaInsRemover::Config config;
+  std::string preset = "default";  ///< name of the preset that `config` began with
+  std::string config_file;         ///< empty: none was read
+
+  std::string recording;           ///< folder or file, as the user named it
+  std::string recording_as_given;  ///< `recording` and its flags, so that messages propose commands
+  nlohmann::ordered_json recording_flags;  ///< flag -> value, those that describe the files
+};
+
+}  // namespace dynains::program
