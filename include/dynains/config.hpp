@@ -73,6 +73,18 @@ Config paper_config() {
   }
 }
 
+/// `Config::offline()`, or the defaults if the config has no such member.
+template <class Config>
+using Offline = decltype(Config::offline());
+template <class Config>
+Config offline_config() {
+  if constexpr (Offers<Offline, Config>::value) {
+    return Config::offline();
+  } else {
+    return Config();
+  }
+}
+
 }  // namespace detail
 
 /// Evidence by which points are classified as dynamic.
@@ -210,6 +222,14 @@ struct PipelineConfig : RemoverConfig {
     config.descriptor = detail::paper_config<decltype(config.descriptor)>();
     config.belief = detail::paper_config<decltype(config.belief)>();
     config.map = detail::paper_config<decltype(config.map)>();
+    return config;
+  }
+
+  /// For recordings, where latency does not matter: more later scans are evidence, at the cost of
+  /// memory.
+  static PipelineConfig offline() {
+    PipelineConfig config;
+    config.evidence = detail::offline_config<decltype(config.evidence)>();
     return config;
   }
 

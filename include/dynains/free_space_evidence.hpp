@@ -120,7 +120,7 @@ class FreeSpaceEvidence {
   /// call. The first verdict on the newest scan also makes its range image, if it is a reference.
   EvidenceVerdict judge(std::uint64_t scan, bool is_final, const GroundSplit& split) {
     Record& record = record_of(scan);
-    judge_instances(scan, is_final, record);
+    judge_instances(is_final, record);
     judge_by_dynamic_grid(scan, record);
     if (scan == newest_ && record.phase.since_image == 0 && references_.awaits_image()) {
       make_reference(record, split);
@@ -286,10 +286,8 @@ class FreeSpaceEvidence {
     }
   }
 
-  void judge_instances(std::uint64_t scan, bool is_final, const Record& record) {
-    // The first two scans of an epoch have no earlier evidence.
-    const bool may_presume = !is_final && scan >= epoch_begin_ + 2;
-    judge_.judge(record.evidence, updater_, may_presume, verdicts_,
+  void judge_instances(bool is_final, const Record& record) {
+    judge_.judge(record.evidence, updater_, !is_final, verdicts_,
                  [&](std::size_t instance) { add_hull(record.evidence, instance); });
   }
 

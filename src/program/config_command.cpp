@@ -46,11 +46,17 @@ std::string member_of(const DynaInsRemover::Config& config, const void* section)
 
 // The parameter table of the documentation.
 void print_markdown() {
-  std::map<std::string, std::string> paper;
-  const DynaInsRemover::Config published = DynaInsRemover::Config::paper();
-  DynaInsRemover::Config::visit(published, [&](const auto& parameter) {
-    paper[parameter.name] = format_value(parameter.value);
-  });
+  std::string heading = "| name |";
+  std::string rule = "|---|";
+  std::map<std::string, std::string> values;  // by parameter: the columns of the presets
+  for (const std::string& name : preset_names()) {
+    heading += ' ' + name + " |";
+    rule += "---|";
+    const DynaInsRemover::Config config = preset(name);
+    DynaInsRemover::Config::visit(config, [&](const auto& parameter) {
+      values[parameter.name] += ' ' + format_value(parameter.value) + " |";
+    });
+  }
   std::cout
       << "# Parameters\n\n"
          "Written by `dynains config --markdown`; a test compares. As flags and in config files "
@@ -59,14 +65,15 @@ void print_markdown() {
          "(`config.tau_p`).\n";
   const DynaInsRemover::Config config;
   DynaInsRemover::Config::visit_sections(config, [&](const char* name, const auto& section) {
-    std::cout << "\n## " << name << ": `" << member_of(config, &section) << '`'
-              << "\n\n| name | default | paper | range | meaning |\n|---|---|---|---|---|\n";
+    std::cout << "\n## " << name << ": `" << member_of(config, &section) << '`' << "\n\n"
+              << heading << " range | meaning |\n"
+              << rule << "---|---|\n";
     using Section = std::remove_const_t<std::remove_reference_t<decltype(section)>>;
     Section::visit(section, [&](const auto& parameter) {
       std::string range = describe_range(parameter);
       std::replace(range.begin(), range.end(), '|', '/');  // a bar would start a column
-      std::cout << "| `" << parameter.name << "` | " << format_value(parameter.value) << " | "
-                << paper[parameter.name] << " | " << range << " | " << parameter.help << " |\n";
+      std::cout << "| `" << parameter.name << "` |" << values[parameter.name] << ' ' << range
+                << " | " << parameter.help << " |\n";
     });
   });
 }
@@ -76,7 +83,11 @@ void print_markdown() {
 void add_config_command(CLI::App& app) {
   CLI::App& command = *app.add_subcommand("config", "Print a config file with every parameter");
   auto name = std::make_shared<std::string>("default");
-  command.add_option("--preset", *name, "default, or paper: the paper to the letter [default]")
+  command
+      .add_option(
+          "--preset", *name,
+          "default; offline: verdicts wait for 100 later scans; paper: the paper to the letter "
+          "[default]")
       ->check(CLI::IsMember(preset_names()))
       ->type_name("NAME");
   auto markdown = std::make_shared<bool>(false);

@@ -9,12 +9,14 @@
 namespace dynains::program {
 
 inline const std::vector<std::string>& preset_names() {
-  static const std::vector<std::string> names = {"default", "paper"};
+  static const std::vector<std::string> names = {"default", "offline", "paper"};
   return names;
 }
 
 inline DynaInsRemover::Config preset(const std::string& name) {
-  return name == "paper" ? DynaInsRemover::Config::paper() : DynaInsRemover::Config();
+  using Config = DynaInsRemover::Config;
+  if (name == "offline") return Config::offline();
+  return name == "paper" ? Config::paper() : Config();
 }
 
 }  // namespace dynains::program

@@ -9,7 +9,10 @@ namespace dynains::program {
 
 RemoverOptions::RemoverOptions(CLI::App& command, std::string default_preset)
     : preset_(std::move(default_preset)) {
-  command.add_option("--preset", preset_, "parameters to start from")
+  command
+      .add_option(
+          "--preset", preset_,
+          "parameters to start from; offline: for recordings, verdicts wait for 100 later scans")
       ->check(CLI::IsMember(preset_names()))
       ->capture_default_str();
   command.add_option("--config", config_file_, "config file, see dynains config");

@@ -51,14 +51,19 @@ void bind_config(py::module_& module) {
                return result;
              }),
              "Defaults, with the parameters that are named set.");
-  config.def_static(
-      "paper",
-      [](const py::kwargs& values) {
-        Config result = Config::paper();
-        assign_all(result, values);
-        return result;
-      },
-      "The paper to the letter, with its published parameters.");
+  const auto add_preset = [&](const char* name, Config (*preset)(), const char* help) {
+    config.def_static(
+        name,
+        [preset](const py::kwargs& values) {
+          Config result = preset();
+          assign_all(result, values);
+          return result;
+        },
+        help);
+  };
+  add_preset("paper", &Config::paper, "The paper to the letter, with its published parameters.");
+  add_preset("offline", &Config::offline,
+             "For recordings: verdicts wait for more later scans, at the cost of memory.");
   add_properties<Config>(config);
   add_former_names(config);
   config.def("to_dict", &to_dict<Config>, "Values by name.");

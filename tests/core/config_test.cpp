@@ -85,8 +85,16 @@ TEST_CASE("cells of a descriptor are bounded, since a cluster may reach all arou
                                    ContainsSubstring("at most 67108864"));
 }
 
-TEST_CASE("the default and the paper's configuration are valid") {
+TEST_CASE("the presets are valid, and the offline one differs by its later scans alone") {
   CHECK_NOTHROW(Config().validate());
+  CHECK_NOTHROW(Config::offline().validate());
+  std::set<std::string> differing;
+  const auto defaults = fields_of(Config()), offline = fields_of(Config::offline());
+  for (std::size_t i = 0; i < defaults.size(); ++i) {
+    if (defaults[i].value < offline[i].value) differing.insert(defaults[i].name);
+    CHECK(defaults[i].value <= offline[i].value);
+  }
+  CHECK(differing == std::set<std::string>{"lookahead_scans"});
   CHECK_NOTHROW(Config::paper().validate());
 }
 

@@ -154,23 +154,20 @@ TEST_CASE("a hull fills the ground between the seen sides of an object") {
   CHECK(cells.size() == 25);
 }
 
-// Indices of points near removed points, and of points under them.
-struct Found {
-  std::vector<std::size_t> near, under;
-};
-
-Found search(const GroundFootprint& footprint, const PointBuffer& ground,
-             const Clearance& clearance) {
+// Indices of the points that a footprint finds under removed points.
+std::vector<std::size_t> find_under(const GroundFootprint& footprint, const PointBuffer& ground,
+                                    const Clearance& clearance) {
   std::vector<GroundBox> boxes;
   footprint.bound(ground, boxes);
-  Found found;
-  footprint.visit_near(ground, boxes, clearance,
-                       [&](std::size_t begin, std::uint64_t near, std::uint64_t under) {
-                         for (std::size_t i = 0; i < 64; ++i) {
-                           if ((near >> i & 1U) != 0) found.near.push_back(begin + i);
-                           if ((under >> i & 1U) != 0) found.under.push_back(begin + i);
-                         }
-                       });
+  std::vector<std::size_t> found;
+  for (std::size_t block = 0; block < boxes.size(); ++block) {
+    const std::size_t begin = block * GroundFootprint::kBlock;
+    const std::uint64_t under =
+        footprint.find_under(GroundFootprint::block_of(ground, begin), boxes[block], clearance);
+    for (std::size_t i = 0; i < GroundFootprint::kBlock; ++i) {
+      if ((under >> i & 1U) != 0) found.push_back(begin + i);
+    }
+  }
   return found;
 }
 
@@ -178,11 +175,11 @@ Found search(const GroundFootprint& footprint, const PointBuffer& ground,
 bool is_under(const GroundFootprint& footprint, float x, float y, float z) {
   PointBuffer point;
   point.push_back(x, y, z);
-  return !search(footprint, point, {0.0F, 0.0F}).under.empty();
+  return !find_under(footprint, point, {0.0F, 0.0F}).empty();
 }
 
 TEST_CASE("a footprint keeps the lowest point of a cell and of its neighbours, until cleared") {
-  GroundFootprint footprint(0.2, 2.0, 50.0);
+  GroundFootprint footprint(0.2, 50.0);
   CHECK(footprint.empty());
   footprint.add(10.05F, -3.05F, 0.7F);
   footprint.add(10.05F, -3.05F, 0.4F);
@@ -208,7 +205,7 @@ TEST_CASE("a footprint keeps the lowest point of a cell and of its neighbours, u
 
 TEST_CASE("a footprint gives the points that a search over all removed points gives") {
   Random random(11);
-  GroundFootprint footprint(0.25, 2.0, 40.0);
+  GroundFootprint footprint(0.25, 40.0);
   // Scattered points, and small places with many points, in which whole blocks are skipped.
   PointBuffer ground;
   for (int i = 0; i < 1001; ++i) {
@@ -239,31 +236,25 @@ TEST_CASE("a footprint gives the points that a search over all removed points gi
     footprint.add(block, which);
     footprint.spread();
     const Clearance clearance = {0.4F, round == 0 ? 0.0F : 0.02F};
-    const Found found = search(footprint, ground, clearance);
-    Found expected;
-    const auto cells_apart = [](float a, float b, float cell) {
-      return std::abs(std::floor(a / cell) - std::floor(b / cell));
+    const std::vector<std::size_t> found = find_under(footprint, ground, clearance);
+    std::vector<std::size_t> expected;
+    const auto touches = [](float a, float b) {
+      return std::abs(std::floor(a / 0.25F) - std::floor(b / 0.25F)) <= 1.0F;
     };
     for (std::size_t i = 0; i < ground.size(); ++i) {
-      bool near = false;
       float lowest = std::numeric_limits<float>::infinity();
       for (std::size_t k = 0; k < removed.size(); ++k) {
-        const auto touches = [&](float cell) {
-          return cells_apart(ground.x[i], removed.x[k], cell) <= 1.0F &&
-                 cells_apart(ground.y[i], removed.y[k], cell) <= 1.0F;
-        };
-        near = near || touches(2.0F);
-        if (touches(0.25F)) lowest = std::min(lowest, removed.z[k]);
+        if (touches(ground.x[i], removed.x[k]) && touches(ground.y[i], removed.y[k])) {
+          lowest = std::min(lowest, removed.z[k]);
+        }
       }
-      if (near) expected.near.push_back(i);
       const float range = std::sqrt(ground.x[i] * ground.x[i] + ground.y[i] * ground.y[i]);
       const float gap = std::max(clearance.least, clearance.slope * range);
-      if (lowest < ground.z[i] + gap) expected.under.push_back(i);
+      if (lowest < ground.z[i] + gap) expected.push_back(i);
     }
-    REQUIRE(found.near == expected.near);
-    REQUIRE(found.under == expected.under);
-    CHECK(found.near.size() < ground.size() / 2);
-    CHECK_FALSE(found.under.empty());
+    REQUIRE(found == expected);
+    CHECK(found.size() < ground.size() / 2);
+    CHECK_FALSE(found.empty());
     footprint.clear();
   }
 }

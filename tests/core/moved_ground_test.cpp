@@ -275,22 +275,22 @@ std::set<std::uint32_t> ground_seen_free(const PointBuffer& ground,
   return found;
 }
 
-TEST_CASE("ground beside a removed box is removed if it is free in two references and hit in few") {
-  // Two voxels of 1.2 m beside the box, visited alternately, and one point far from it.
+TEST_CASE("ground is removed if it is free in two references and hit in few") {
+  // Two voxels of 1.2 m beside the box, visited alternately, and one point far from both.
   PointBuffer ground;
   for (const float x : {22.1F, 22.2F, 22.3F, 23.1F, 23.2F, 23.3F, 22.4F, 22.5F, 30.0F}) {
     ground.push_back(x, 0.1F, street(x, 0.1F));
   }
-  const std::set<std::uint32_t> near = {0, 1, 2, 6, 7}, far = {3, 4, 5};
-  std::set<std::uint32_t> both = near;
-  both.insert(far.begin(), far.end());
+  const std::set<std::uint32_t> near = {0, 1, 2, 6, 7}, far = {3, 4, 5, 8};
+  std::set<std::uint32_t> all = near;
+  all.insert(far.begin(), far.end());
   const Reference free = [](float) { return BeamResult::kFree; };
   const Reference hit = [](float) { return BeamResult::kHit; };
   CHECK(ground_seen_free(ground, {}).empty());
   CHECK(ground_seen_free(ground, {free}).empty());
-  CHECK(ground_seen_free(ground, {free, free}) == both);
+  CHECK(ground_seen_free(ground, {free, free}) == all);
   std::vector<Reference> references = {free, hit, hit, hit, hit, hit, hit, free};
-  CHECK(ground_seen_free(ground, references) == both);  // 2 are more than 0.3 of 6
+  CHECK(ground_seen_free(ground, references) == all);  // 2 are more than 0.3 of 6
   references.push_back(hit);
   CHECK(ground_seen_free(ground, references).empty());  // 2 are less than 0.3 of 7
   const Reference near_free = [](float x) {
@@ -310,8 +310,8 @@ TEST_CASE("where the ground around is not known, all of it is removed from under
       street_about(20.0F, 0.0F, 5.0F, [](float x, float y) { return !RemovedBox::is_below(x, y); });
   CHECK(ground_that_goes(config, ground).size() == ground.size());
 
-  // With this distance, the plane of the ground around is not used.
-  config.ground_test_distance = 0.0;
+  // Without the test of the ground, the plane of the ground around is not known.
+  config.test_ground = false;
   const PointBuffer street = street_about(20.0F, 0.0F, 5.0F, kNothing);
   CHECK(ground_that_goes(config, street).size() >= ground.size());
 }

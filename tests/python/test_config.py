@@ -40,6 +40,10 @@ def test_paper_has_the_published_parameters():
     assert dynains.Config.paper(window=5).window == 5
 
 
+def test_offline_waits_for_more_later_scans():
+    assert dynains.Config.offline().lookahead_scans > dynains.Config().lookahead_scans
+
+
 def test_the_configuration_of_a_remover_is_a_copy():
     remover = dynains.DynaInsRemover()
     remover.config.window = 9

@@ -1,4 +1,4 @@
-// Search for ground points below or beside removed points.
+// Search for ground points below removed points.
 #pragma once
 
 #include <algorithm>
@@ -22,18 +22,16 @@ struct Clearance {
   float slope;  ///< m per m
 };
 
-/// Bounding box of points in the two grids of a footprint: first and last columns and rows.
+/// Bounding box of points in the tiles of a footprint: first and last columns and rows.
 struct GroundBox {
   struct Range {
     std::uint16_t first, last;
   };
-  Range coarse_columns, coarse_rows;
-  Range tile_columns, tile_rows;
+  Range columns, rows;
 };
 
-/// Two horizontal grids around the sensor: a fine one with the height of the lowest removed point
-/// per cell, and a coarse one for the search for points near removed points. All points are in the
-/// sensor frame (m).
+/// Horizontal grid around the sensor with the height of the lowest removed point per cell. All
+/// points are in the sensor frame (m).
 class GroundFootprint {
  public:
   /// Number of points per block. Sets of points of a block are words with one bit per point.
@@ -44,22 +42,17 @@ class GroundFootprint {
     return points.subview(begin, std::min(kBlock, points.size() - begin));
   }
 
-  /// `cell`, `near` (m): edges of the fine and the coarse cells. A removed point affects its cell
-  /// and the eight cells around it in both grids. `max_range` (m): points beyond are ignored.
-  GroundFootprint(double cell, double near, double max_range)
-      : cell_(static_cast<float>(cell)),
-        fine_(cell, max_range),
-        coarse_(near, max_range),
-        tile_of_(tile_count(fine_.width()), 0),
-        tiles_(1),
-        near_(coarse_.cell_count(), 0) {
+  /// `cell` (m): edge of the cells. A removed point affects its cell and the eight cells around it.
+  /// `max_range` (m): points beyond are ignored.
+  GroundFootprint(double cell, double max_range)
+      : grid_(cell, max_range), tile_of_(tile_count(grid_.width()), 0), tiles_(1) {
     tiles_.reserve(tile_of_.size() + 1);  // uses address space only
     used_.reserve(tile_of_.size());
   }
 
   /// Adds a removed point (m). It has an effect after spread().
   void add(float x, float y, float z) {
-    const Place place = fine_.place(x, y);
+    const Place place = grid_.place(x, y);
     if (place.inside) add_to(tile(place), within(place), z);
   }
 
@@ -81,20 +74,10 @@ class GroundFootprint {
         Cell& cell = cell_at(tile(around), within(around));
         cell.lowest = std::min(cell.lowest, own);
       });
-      const Place near =
-          coarse_.place(fine_.centre(place.column) * cell_, fine_.centre(place.row) * cell_);
-      if (!near.inside) continue;
-      // Handles each coarse cell once, since it contains many fine cells.
-      std::uint8_t& centre = near_[near.row * coarse_.width() + near.column];
-      if (centre == kHolds) continue;
-      for_around(near, [&](const Place& around) {
-        near_[around.row * coarse_.width() + around.column] |= kNear;
-      });
-      centre = kHolds;
     }
   }
 
-  /// Computes the box of each block of points, for visit_near().
+  /// Computes the box of each block of points, for find_under().
   void bound(PointsView points, std::vector<GroundBox>& boxes) const {
     const std::size_t count = (points.size() + kBlock - 1) / kBlock;
     detail::ensure_capacity(boxes, count);
@@ -119,24 +102,11 @@ class GroundFootprint {
     });
   }
 
-  /// Calls `visit(begin, near, under)` for each block with points near removed points. `begin`:
-  /// index of the first point of the block. `near`: bits of the points near a removed point (also
-  /// set for some points at the border of the grid). `under`: bits of the points that lie less than
-  /// `clearance` below the lowest removed point of the 3x3 fine cells. `boxes`: result of bound()
-  /// for `points`.
-  template <class Visitor>
-  void visit_near(PointsView points, Span<const GroundBox> boxes, const Clearance& clearance,
-                  Visitor&& visit) const {
-    for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
-      const Nearness nearness = nearness_of(boxes[begin / kBlock]);
-      if (nearness == Nearness::kNone) continue;
-      const PointsView block = block_of(points, begin);
-      const std::uint64_t near = nearness == Nearness::kAll
-                                     ? ~std::uint64_t{0} >> (kBlock - block.size())
-                                     : find_near(block);
-      if (near == 0) continue;
-      visit(begin, near, holds(boxes[begin / kBlock]) ? near & find_under(block, clearance) : 0);
-    }
+  /// The bits of the points of a block that lie less than `clearance` below the lowest removed
+  /// point of the 3x3 cells around them. `box`: result of bound() for the block.
+  std::uint64_t find_under(PointsView block, const GroundBox& box,
+                           const Clearance& clearance) const {
+    return holds(box) ? find_under(block, clearance) : 0;
   }
 
   /// Marks the cells of the points of a block whose bits are set in `which`. All these points must
@@ -165,19 +135,12 @@ class GroundFootprint {
     for (const std::uint32_t tile : used_) tile_of_[tile] = 0;
     used_.clear();
     touched_.clear();
-    std::fill(near_.begin(), near_.end(), std::uint8_t{0});
   }
 
  private:
   static constexpr float kNothing = std::numeric_limits<float>::infinity();
   static constexpr int kTileShift = 3;
   static constexpr std::uint32_t kTile = 1U << kTileShift;  // cells along a side
-
-  enum class Nearness { kNone, kSome, kAll };
-
-  // States of a coarse cell; kHolds includes the bit of kNear.
-  static constexpr std::uint8_t kNear = 1;   // a removed point lies in its 3x3 cells
-  static constexpr std::uint8_t kHolds = 3;  // a removed point lies in the cell itself
 
   struct Place {
     std::uint32_t column, row;
@@ -207,7 +170,6 @@ class GroundFootprint {
           half_(static_cast<std::uint32_t>(std::ceil(max_range / cell)) + 2) {}
 
     std::uint32_t width() const { return 2 * half_; }
-    std::size_t cell_count() const { return std::size_t{width()} * width(); }
     Place place(float x, float y) const {
       const auto centre = static_cast<float>(half_);
       const auto last = static_cast<float>(width() - 1);
@@ -231,17 +193,6 @@ class GroundFootprint {
       return static_cast<std::size_t>(
           std::min(std::max(place, 0.0F), static_cast<float>(width() - 1)));
     }
-    /// Row-major indices of the cells of points.
-    template <class Float>
-    auto indices(const Float& x, const Float& y) const {
-      // Exact in single precision: coarse grids have fewer than 2^24 cells.
-      const Float cells(detail::PackConstant(static_cast<float>(width())));
-      return truncate(to_float(line(y)) * cells + to_float(line(x)));
-    }
-    /// Distance of the centre of a row (or column) from the sensor, in cells.
-    float centre(std::uint32_t index) const {
-      return (static_cast<float>(index) + 0.5F) - static_cast<float>(half_);
-    }
 
    private:
     float per_metre_;
@@ -258,46 +209,18 @@ class GroundFootprint {
   }
 
   GroundBox box(float x_min, float x_max, float y_min, float y_max) const {
-    const auto range = [](const Grid& grid, float low, float high, std::uint32_t cells) {
-      return GroundBox::Range{static_cast<std::uint16_t>(grid.index(low) / cells),
-                              static_cast<std::uint16_t>(grid.index(high) / cells)};
+    const auto range = [&](float low, float high) {
+      return GroundBox::Range{static_cast<std::uint16_t>(grid_.index(low) / kTile),
+                              static_cast<std::uint16_t>(grid_.index(high) / kTile)};
     };
-    return {range(coarse_, x_min, x_max, 1), range(coarse_, y_min, y_max, 1),
-            range(fine_, x_min, x_max, kTile), range(fine_, y_min, y_max, kTile)};
-  }
-
-  // Whether all, some or no coarse cells of a box are near a removed point.
-  Nearness nearness_of(const GroundBox& box) const {
-    unsigned some = 0;
-    unsigned all = kNear;
-    for (std::size_t row = box.coarse_rows.first; row <= box.coarse_rows.last; ++row) {
-      const std::uint8_t* const cells = &near_[row * coarse_.width()];
-      for (std::size_t i = box.coarse_columns.first; i <= box.coarse_columns.last; ++i) {
-        some |= cells[i];
-        all &= cells[i];
-      }
-    }
-    return some == 0 ? Nearness::kNone : all != 0 ? Nearness::kAll : Nearness::kSome;
-  }
-
-  // Bits of the points of a block whose coarse cells are near a removed point.
-  std::uint64_t find_near(PointsView block) const {
-    std::int32_t cell[kBlock];
-    detail::for_packs(block.size(), [&](auto at) {
-      coarse_.indices(at.load(block.x.data()), at.load(block.y.data())).store(&cell[at.begin]);
-    });
-    std::uint64_t near = 0;
-    for (std::size_t i = 0; i < block.size(); ++i) {
-      near |= (std::uint64_t{near_[static_cast<std::size_t>(cell[i])]} & kNear) << i;
-    }
-    return near;
+    return {range(x_min, x_max), range(y_min, y_max)};
   }
 
   // Whether any tile of a box is in use.
   bool holds(const GroundBox& box) const {
-    for (std::size_t row = box.tile_rows.first; row <= box.tile_rows.last; ++row) {
+    for (std::size_t row = box.rows.first; row <= box.rows.last; ++row) {
       const std::uint32_t* const tiles = &tile_of_[row * tiles_along_side()];
-      for (std::size_t i = box.tile_columns.first; i <= box.tile_columns.last; ++i) {
+      for (std::size_t i = box.columns.first; i <= box.columns.last; ++i) {
         if (tiles[i] != 0) return true;
       }
     }
@@ -313,11 +236,11 @@ class GroundFootprint {
     Located located;
     located.inside = 0;
     const auto side = static_cast<std::int32_t>(tiles_along_side());
-    const auto border = static_cast<std::int32_t>(fine_.width()) - 1;
+    const auto border = static_cast<std::int32_t>(grid_.width()) - 1;
     detail::for_packs(block.size(), [&](auto at) {
       using Int = typename decltype(at)::Int;
-      const Int column = fine_.line(at.load(block.x.data()));
-      const Int row = fine_.line(at.load(block.y.data()));
+      const Int column = grid_.line(at.load(block.x.data()));
+      const Int row = grid_.line(at.load(block.y.data()));
       const Int last(static_cast<std::int32_t>(kTile) - 1);
       (multiply(row >> kTileShift, side) + (column >> kTileShift)).store(&located.tile[at.begin]);
       (((row & last) << kTileShift) + (column & last)).store(&located.cell[at.begin]);
@@ -347,7 +270,7 @@ class GroundFootprint {
     return under & located.inside;
   }
 
-  std::uint32_t tiles_along_side() const { return fine_.width() / kTile + 1; }
+  std::uint32_t tiles_along_side() const { return grid_.width() / kTile + 1; }
   std::uint32_t tile(const Place& place) const {
     return place.row / kTile * tiles_along_side() + place.column / kTile;
   }
@@ -381,14 +304,11 @@ class GroundFootprint {
     return tiles_[number][within];
   }
 
-  float cell_;
-  Grid fine_;
-  Grid coarse_;
+  Grid grid_;
   std::vector<std::uint32_t> tile_of_;  // row-major: index in tiles_, or 0
   std::vector<std::uint32_t> used_;     // indices of the non-zero entries of tile_of_
   std::vector<Tile> tiles_;
-  std::vector<std::uint8_t> near_;  // by coarse cell: its state
-  std::vector<Touched> touched_;    // cells with removed points, each once
+  std::vector<Touched> touched_;  // cells with removed points, each once
 };
 
 }  // namespace dynains

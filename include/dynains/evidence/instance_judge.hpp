@@ -113,8 +113,8 @@ class InstanceJudge {
     return is_known && moved < kStillRatio * decided ? -still_weight_ * unit : 0.0F;
   }
 
-  /// Writes one verdict per supervoxel. `may_presume`: allows kPresumed, for provisional verdicts
-  /// with earlier scans in the epoch. Calls `on_removed(instance)` for each instance that is
+  /// Writes one verdict per supervoxel. `may_presume`: allows kPresumed, for provisional verdicts.
+  /// Calls `on_removed(instance)` for each instance that is
   /// removed as a whole.
   template <class OnRemoved>
   void judge(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,

@@ -88,11 +88,10 @@ class MovedGround {
 
   explicit MovedGround(const FreeSpaceConfig& config)
       : removes_footprint_(config.footprint > 0.0),
-        tests_ground_(config.ground_test_distance > 0.0),
+        tests_ground_(config.test_ground),
         rise_(static_cast<float>(config.footprint_rise)),
         belief_(static_cast<float>(config.tau_free)),
         footprint_(removes_footprint_ ? std::max(config.footprint, kLeastCell) : kDefaultCell,
-                   std::max({config.ground_test_distance, config.footprint, 0.5}),
                    config.evidence_range),
         around_(config.evidence_range),
         hull_(2.0 * std::max(config.footprint, kLeastCell)),
@@ -146,7 +145,7 @@ class MovedGround {
   Span<const EvidenceVerdict::GroundPoint> find(PointsView ground, Span<const GroundBox> boxes,
                                                 References&& for_each_reference) {
     found_.clear();
-    if (footprint_.empty()) return found_;
+    if (footprint_.empty() && !tests_ground_) return found_;
     footprint_.spread();
     tested_points_.grow(ground.size());
     detail::ensure_capacity(tested_blocks_, boxes.size());
@@ -154,12 +153,15 @@ class MovedGround {
     tested_ = 0;
     detail::ensure_capacity(under_, boxes.size());
     under_.clear();
-    footprint_.visit_near(ground, boxes, clearance_,
-                          [&](std::size_t begin, std::uint64_t near, std::uint64_t below) {
-                            const std::uint64_t under = removes_footprint_ ? below : 0;
-                            if (under != 0) under_.push_back({begin, under});
-                            if (tests_ground_) add_tested(ground, begin, near & ~under);
-                          });
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      const std::size_t begin = i * GroundFootprint::kBlock;
+      const PointsView block = GroundFootprint::block_of(ground, begin);
+      const std::uint64_t under =
+          removes_footprint_ ? footprint_.find_under(block, boxes[i], clearance_) : 0;
+      if (under != 0) under_.push_back({begin, under});
+      const std::uint64_t all = ~std::uint64_t{0} >> (GroundFootprint::kBlock - block.size());
+      if (tests_ground_) add_tested(ground, begin, all & ~under);
+    }
     remove_under(ground);
     if (tested_ > 0) test(for_each_reference);
     footprint_.clear();

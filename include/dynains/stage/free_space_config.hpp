@@ -14,17 +14,17 @@ struct FreeSpaceConfig {
   double evidence_range = 80.0;  ///< m
   double supervoxel = 0.75;      ///< m
   int supervoxel_samples = 4;
-  double ground_sample = 1.2;         ///< m
-  double ground_test_distance = 2.0;  ///< m
-  double margin = 0.25;               ///< m
-  double margin_slope = 0.0075;       ///< m per m of range
-  double lateral_margin = 0.07;       ///< m
-  double pose_tolerance = 0.02;       ///< m
-  double p_free = 0.7;                ///< form of Eq. 18
-  double p_hit = 0.155;               ///< form of Eq. 18
-  double tau_free = 0.65;             ///< form of Eq. 19
-  double tau_contested = 0.9;         ///< form of Eq. 19
-  double tau_whole = 0.84;            ///< form of Eq. 19
+  double ground_sample = 1.2;  ///< m
+  bool test_ground = true;
+  double margin = 0.25;          ///< m
+  double margin_slope = 0.0075;  ///< m per m of range
+  double lateral_margin = 0.07;  ///< m
+  double pose_tolerance = 0.02;  ///< m
+  double p_free = 0.7;           ///< form of Eq. 18
+  double p_hit = 0.155;          ///< form of Eq. 18
+  double tau_free = 0.65;        ///< form of Eq. 19
+  double tau_contested = 0.9;    ///< form of Eq. 19
+  double tau_whole = 0.84;       ///< form of Eq. 19
   double removal_ratio = 0.2;
   double large_removal_ratio = 0.5;
   double pass_ratio = 0.6;
@@ -41,6 +41,13 @@ struct FreeSpaceConfig {
   double dynamic_grid_ratio = 0.65;
   bool ignore_dynamic_returns = true;
   bool presume_dynamic = true;
+
+  /// For recordings: a verdict waits for 100 later scans.
+  static FreeSpaceConfig offline() {
+    FreeSpaceConfig config;
+    config.lookahead_scans = 100;
+    return config;
+  }
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
@@ -68,9 +75,9 @@ struct FreeSpaceConfig {
                       "maximum number of samples of a supervoxel"});
     visitor(Parameter{"ground_sample", self.ground_sample, closed(0.05, 2), "m",
                       "edge of the voxels that have one ground sample each"});
-    visitor(Parameter{"ground_test_distance", self.ground_test_distance, closed(0, 10), "m",
-                      "ground at a smaller distance from removed points is tested for free space, "
-                      "and gives the height of the ground for footprint_rise; 0: no test"});
+    visitor(Parameter{"test_ground", self.test_ground, Bounds(), "",
+                      "the ground is tested for free space, too, and gives the height of the "
+                      "ground around for footprint_rise"});
     visitor(Parameter{"margin", self.margin, closed(0.02, 2), "m",
                       "a beam passes a sample if its range is larger by at least this much"});
     visitor(Parameter{"margin_slope", self.margin_slope, closed(0, 0.1), "m/m",
@@ -132,9 +139,10 @@ struct FreeSpaceConfig {
     visitor(Parameter{"ignore_dynamic_returns", self.ignore_dynamic_returns, Bounds(), "",
                       "returns of surely dynamic points neither count as hits nor as lateral or "
                       "3x3 protection"});
-    visitor(Parameter{"presume_dynamic", self.presume_dynamic, Bounds(), "",
-                      "the zero-latency verdict removes compact instances at places without "
-                      "earlier evidence; no effect with lookahead_scans 0"});
+    visitor(
+        Parameter{"presume_dynamic", self.presume_dynamic, Bounds(), "",
+                  "the zero-latency verdict removes compact instances at places without "
+                  "earlier evidence, from the first scan on; no effect with lookahead_scans 0"});
   }
 };
 
