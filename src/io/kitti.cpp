@@ -113,7 +113,12 @@ void KittiSequence::read_scan(std::size_t i, std::vector<float>& xyzi) const {
 }
 
 void read_scan(const fs::path& file, std::vector<float>& xyzi) {
-  xyzi.resize(count_scan_points(file) * kFloatsPerPoint);
+  const std::size_t count = count_scan_points(file) * kFloatsPerPoint;
+  if (count > xyzi.capacity()) {
+    xyzi = {};
+    xyzi.reserve(count + count / 8);  // scans of one sensor differ in size; resize() would double
+  }
+  xyzi.resize(count);
   read_all(file, xyzi);
 }
 

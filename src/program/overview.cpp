@@ -14,7 +14,11 @@ constexpr double kMargin = 50.0;        // m around the path
 constexpr double kLongerSide = 1200.0;  // pixels of a panel
 constexpr double kMostPerMetre = 8.0;   // pixels
 constexpr int kGap = 8;                 // pixels between panels
-constexpr std::size_t kStaticStep = 4;  // one of so many static points is drawn
+
+/// One of so many static points of a scan is drawn: later scans show the same places again.
+std::size_t static_step(std::size_t scans) {
+  return std::clamp(scans / 8, std::size_t{1}, std::size_t{16});
+}
 
 /// Grey that gets darker with the height above the ground below the sensor.
 std::uint8_t shade(double height) {
@@ -23,7 +27,8 @@ std::uint8_t shade(double height) {
 
 }  // namespace
 
-Overview::Overview(const std::vector<Eigen::Vector3d>& path) {
+Overview::Overview(const std::vector<Eigen::Vector3d>& path)
+    : static_step_(static_step(path.size())) {
   Eigen::Array2d low = path.front().head<2>().array();
   Eigen::Array2d high = low;
   for (const Eigen::Vector3d& position : path) {
@@ -43,9 +48,12 @@ Overview::Overview(const std::vector<Eigen::Vector3d>& path) {
 
 void Overview::add(const RecordedScan& scan, const ScanVerdict& verdict) {
   const double sensor_height = verdict.T_world_sensor.translation().z();
+  std::size_t next_static = 0;
   for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
     const bool is_moving = verdict.labels[i] == PointLabel::kDynamic;
-    if (!is_moving && !(is_static(verdict.labels[i]) && i % kStaticStep == 0)) continue;
+    const bool is_in_step = i == next_static;
+    if (is_in_step) next_static += static_step_;
+    if (!is_moving && !(is_in_step && is_static(verdict.labels[i]))) continue;
     const Eigen::Vector3d p = verdict.T_world_sensor * scan.point(i).position;
     const double x = (p.x() - low_.x()) * scale_;
     const double y = height_ - (p.y() - low_.y()) * scale_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -17,7 +18,7 @@ class Overview {
   /// `path`: positions of the sensor in the world, m; the picture shows 50 m around them.
   explicit Overview(const std::vector<Eigen::Vector3d>& path);
 
-  /// Adds all removed and every fourth static point of a scan.
+  /// Adds all removed points of a scan, and some of its static points.
   void add(const RecordedScan& scan, const ScanVerdict& verdict);
 
   /// Three panels of one size, side by side or below each other: before (static points grey, moving
@@ -34,6 +35,7 @@ class Overview {
     bool has_static() const { return height > -std::numeric_limits<float>::infinity(); }
   };
 
+  std::size_t static_step_;
   Eigen::Vector2d low_;  // m, world, left and lower border
   double scale_;         // pixels per m
   int width_;            // pixels of a panel
