@@ -6,8 +6,6 @@
 #include <cmath>
 #include <utility>
 
-#include "dynains/stage/voxel_hash_table.hpp"
-
 namespace dynains {
 namespace {
 
@@ -18,12 +16,21 @@ constexpr std::array<double, RegistrationScan::kLevels> kEdges = {4.0, 2.0, 1.0}
 
 VoxelKey key_of(const Eigen::Vector3d& p, double edge) {
   const auto index = [&](double coordinate) {
-    return static_cast<std::int64_t>(std::floor(coordinate / edge));
+    const double cell = coordinate / edge;
+    const auto number = static_cast<std::int64_t>(cell);
+    return number - (static_cast<double>(number) > cell ? 1 : 0);  // floor without a call of libm
   };
   return voxel_key(index(p.x()), index(p.y()), index(p.z()));
 }
 
+/// Whether `key` was new to `table`, which has it now.
+bool adds(VoxelHashTable<>& table, VoxelKey key) {
+  const std::size_t count = table.size();
+  return table.insert(key) == count;
+}
+
 struct Moments {
+  VoxelKey key;
   double count = 0.0;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
@@ -47,18 +54,14 @@ std::optional<RegistrationScan::Cell> cell_of(const Moments& m, double edge) {
   const Eigen::Matrix3d& axes = solver.eigenvectors();
   if (extent[1] < kNarrow * extent[2]) {
     if (std::abs(axes(2, 2)) < kUpright) return std::nullopt;
-    cell.constraint = Eigen::Matrix3d::Identity() - axes.col(2) * axes.col(2).transpose();
+    cell.directions = {axes.col(0), axes.col(1)};
+    cell.direction_count = 2;
     return cell;
   }
   if (extent[0] > kThin * extent[1] + 0.03) return std::nullopt;
-  cell.constraint = axes.col(0) * axes.col(0).transpose();
+  cell.directions[0] = axes.col(0);
+  cell.direction_count = 1;
   return cell;
-}
-
-Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
 }
 
 /// Normal equations at one motion.
@@ -74,21 +77,29 @@ Linearization linearize(const RegistrationScan& a, const RegistrationScan& b,
                         const Eigen::Isometry3d& T, std::size_t level, double scale,
                         std::size_t stride) {
   Linearization step;
+  auto H = step.H.selfadjointView<Eigen::Lower>();
   for (std::size_t i = 0; i < b.points().size(); i += stride) {
     const Eigen::Vector3d p = T * b.points()[i];
     const RegistrationScan::Cell* const cell = a.find(level, p);
     if (cell == nullptr) continue;
     ++step.met;
-    const Eigen::Vector3d r = cell->constraint * (p - cell->mean);
-    const double root = 1.0 / (1.0 + r.squaredNorm() / (scale * scale));
+    std::array<double, 2> residuals{};
+    double squared = 0.0;
+    for (std::size_t k = 0; k < cell->direction_count; ++k) {
+      residuals[k] = cell->directions[k].dot(p - cell->mean);
+      squared += residuals[k] * residuals[k];
+    }
+    const double root = 1.0 / (1.0 + squared / (scale * scale));
     const double weight = root * root;
-    Eigen::Matrix<double, 3, 6> J;
-    J << -skew(p), Eigen::Matrix3d::Identity();
-    J = (cell->constraint * J).eval();
-    step.H += weight * J.transpose() * J;
-    step.g += weight * J.transpose() * r;
+    for (std::size_t k = 0; k < cell->direction_count; ++k) {
+      Vector6 J;
+      J << p.cross(cell->directions[k]), cell->directions[k];
+      H.rankUpdate(J, weight);
+      step.g += (weight * residuals[k]) * J;
+    }
     step.weight += weight;
   }
+  step.H.triangularView<Eigen::StrictlyUpper>() = step.H.transpose();
   return step;
 }
 
@@ -112,8 +123,9 @@ Eigen::Isometry3d refine(const RegistrationScan& a, const RegistrationScan& b, E
 RegistrationScan::RegistrationScan(PointsView points) {
   constexpr double kThinned = 0.4;  // m
   constexpr double kNearest = 2.0, kFarthest = 60.0;
-  std::array<std::unordered_map<std::uint64_t, Moments>, kLevels> moments;
-  std::unordered_map<std::uint64_t, bool> taken;
+  std::array<VoxelHashTable<>, kLevels> voxels;
+  std::array<std::vector<Moments>, kLevels> moments;
+  VoxelHashTable<> taken, thinned;
   constexpr std::size_t kMost = 40000;  // points
   const std::size_t stride = 1 + points.size() / kMost;
   for (std::size_t i = 0; i < points.size(); i += stride) {
@@ -122,28 +134,32 @@ RegistrationScan::RegistrationScan(PointsView points) {
     const double range = p.norm();
     if (!(range > kNearest && range < kFarthest)) continue;
     // Dense rings would outweigh others: a cell takes one point for each small voxel.
-    if (!taken.emplace(key_of(p, 0.1), true).second) continue;
+    if (!adds(taken, key_of(p, 0.1))) continue;
     for (std::size_t level = 0; level < kLevels; ++level) {
-      Moments& m = moments[level][key_of(p, kEdges[level])];
+      const VoxelKey key = key_of(p, kEdges[level]);
+      const std::uint32_t number = voxels[level].insert(key);
+      if (number == moments[level].size()) moments[level].push_back({key});
+      Moments& m = moments[level][number];
       m.count += 1.0;
       m.sum += p;
       m.squares += p * p.transpose();
     }
-    if (taken.emplace(key_of(p, kThinned) | std::uint64_t{1} << 63U, true).second) {
-      points_.push_back(p);
-    }
+    if (adds(thinned, key_of(p, kThinned))) points_.push_back(p);
   }
   for (std::size_t level = 0; level < kLevels; ++level) {
-    for (const auto& [key, m] : moments[level]) {
-      if (const auto cell = cell_of(m, kEdges[level])) cells_[level].emplace(key, *cell);
+    for (const Moments& m : moments[level]) {
+      const auto cell = cell_of(m, kEdges[level]);
+      if (!cell) continue;
+      index_[level].insert(m.key);
+      cells_[level].push_back(*cell);
     }
   }
 }
 
 const RegistrationScan::Cell* RegistrationScan::find(std::size_t level,
                                                      const Eigen::Vector3d& point) const {
-  const auto found = cells_[level].find(key_of(point, kEdges[level]));
-  return found == cells_[level].end() ? nullptr : &found->second;
+  const std::uint32_t number = index_[level].find(key_of(point, kEdges[level]));
+  return number == VoxelHashTable<>::kNone ? nullptr : &cells_[level][number];
 }
 
 Eigen::Isometry3d motion_of(const Vector6& rotation_and_translation) {

@@ -4,12 +4,11 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <optional>
-#include <unordered_map>
 #include <vector>
 
 #include "dynains/points.hpp"
+#include "dynains/stage/voxel_hash_table.hpp"
 
 namespace dynains {
 
@@ -20,8 +19,10 @@ class RegistrationScan {
 
   /// Plane, or pole, through the points of a cell.
   struct Cell {
-    Eigen::Vector3d mean;        ///< m, sensor frame
-    Eigen::Matrix3d constraint;  ///< projector on the directions that the cell determines
+    Eigen::Vector3d mean;  ///< m, sensor frame
+    std::array<Eigen::Vector3d, 2>
+        directions;               ///< orthonormal; the cell determines places along them
+    std::size_t direction_count;  ///< 1: plane, 2: pole
   };
 
   /// `points`: m, sensor frame, finite.
@@ -34,7 +35,8 @@ class RegistrationScan {
 
  private:
   std::vector<Eigen::Vector3d> points_;
-  std::array<std::unordered_map<std::uint64_t, Cell>, kLevels> cells_;
+  std::array<VoxelHashTable<>, kLevels> index_;
+  std::array<std::vector<Cell>, kLevels> cells_;
 };
 
 struct Registration {
