@@ -72,7 +72,7 @@ void bind_config(py::module_& module) {
                     "Name, section, default, bounds or values, unit and help of every parameter.");
   config.def(
       "__eq__", [](const Config& a, const Config& b) { return to_dict(a).equal(to_dict(b)); },
-      py::is_operator());  // with anything else: not equal
+      py::arg("other"), py::is_operator());  // with anything else: not equal
   config.def(py::pickle([](const Config& self) { return to_dict(self); },
                         [](const py::dict& values) {
                           Config result;

@@ -4,8 +4,11 @@
 #include "dynains/errors.hpp"
 #include "dynains/version.hpp"
 
-PYBIND11_MODULE(dynains, module) {
+PYBIND11_MODULE(_dynains, module) {
   namespace py = pybind11;
+  // Classes name the package as their module, as if they were defined in it.
+  const py::object own_name = module.attr("__name__");
+  module.attr("__name__") = "dynains";
   module.doc() =
       "Removes moving objects from LiDAR scans and maps, scan by scan.\n\n"
       "    remover = dynains.DynaInsRemover()\n"
@@ -26,4 +29,5 @@ PYBIND11_MODULE(dynains, module) {
   dynains::python::bind_remover(module);
   dynains::python::bind_evaluation(module);
   dynains::python::bind_simulation(module);
+  module.attr("__name__") = own_name;
 }

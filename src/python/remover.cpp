@@ -2,9 +2,13 @@
 
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <iomanip>
 #include <mutex>
 #include <optional>
+#include <sstream>
+#include <string>
 #include <vector>
 
 #include "arrays.hpp"
@@ -146,6 +150,37 @@ class Remover {
   DynaInsRemover remover_;
 };
 
+std::string represent(const Verdict& verdict) {
+  const auto dynamic = static_cast<std::uint8_t>(PointLabel::kDynamic);
+  const std::uint8_t* const labels = verdict.labels.data();
+  std::ostringstream text;
+  text << "<dynains.ScanVerdict: scan " << verdict.scan << " at " << verdict.time << " s, "
+       << verdict.labels.size() << " points, "
+       << std::count(labels, labels + verdict.labels.size(), dynamic) << " dynamic>";
+  return text.str();
+}
+
+std::string represent(const PoseResidual& residual) {
+  std::ostringstream text;
+  text << std::setprecision(3) << "<dynains.PoseResidual: " << residual.translation << " m, "
+       << residual.rotation << " deg>";
+  return text.str();
+}
+
+std::string represent(const Frame& frame) {
+  const auto verdict = [](const py::object& value) {
+    return value.is_none() ? "None" : represent(value.cast<const Verdict&>());
+  };
+  return "<dynains.FrameResult: newest " + verdict(frame.newest) + ", finished " +
+         verdict(frame.finished) + '>';
+}
+
+std::string represent(Remover& remover) {
+  const std::string config = py::repr(py::cast(remover.config()));
+  return "<dynains.DynaInsRemover: " + std::to_string(remover.map_size()) + " points on the map, " +
+         config + '>';
+}
+
 void bind_label(py::module_& module) {
   const auto value = [](PointLabel label) { return static_cast<int>(label); };
   py::dict names;
@@ -186,7 +221,8 @@ void bind_remover(py::module_& module) {
                     "(N,) float32, probability of being dynamic; 0 if never proposed.")
       .def_readonly("causes", &Verdict::causes,
                     "(N,) uint8, why the label is what it is; the numbers are those of "
-                    "dynains/verdict.hpp.");
+                    "dynains/verdict.hpp.")
+      .def("__repr__", [](const Verdict& verdict) { return represent(verdict); });
 
   py::class_<PoseResidual>(module, "PoseResidual",
                            "Error of the pushed motion of the sensor, by an alignment of the "
@@ -196,7 +232,8 @@ void bind_remover(py::module_& module) {
       .def_property_readonly(
           "T_previous_newest",
           [](const PoseResidual& residual) { return to_array(residual.T_previous_newest); },
-          "(4, 4) float64: corrected pose of this scan in the sensor frame of the previous one.");
+          "(4, 4) float64: corrected pose of this scan in the sensor frame of the previous one.")
+      .def("__repr__", [](const PoseResidual& residual) { return represent(residual); });
 
   py::class_<Frame>(module, "FrameResult", "Answer to one scan.")
       .def_readonly("newest", &Frame::newest,
@@ -206,7 +243,8 @@ void bind_remover(py::module_& module) {
       .def_readonly("times", &Frame::times, "Milliseconds by stage.")
       .def_readonly("pose_residual", &Frame::pose_residual,
                     "PoseResidual: error of the pushed pose relative to earlier scans; None if it "
-                    "is unknown.");
+                    "is unknown.")
+      .def("__repr__", [](const Frame& frame) { return represent(frame); });
 
   py::class_<Remover>(module, "DynaInsRemover",
                       "Removes moving instances from a stream of scans, one scan at a time. "
@@ -234,7 +272,8 @@ void bind_remover(py::module_& module) {
       .def_property_readonly("latency", &Remover::latency,
                              "Scans between a push and the final verdict on it.")
       .def_property_readonly("config", &Remover::config, "A copy of the Config.",
-                             py::return_value_policy::copy);
+                             py::return_value_policy::copy)
+      .def("__repr__", [](Remover& remover) { return represent(remover); });
 }
 
 }  // namespace dynains::python

@@ -1,4 +1,5 @@
 #include <cstdint>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,22 @@ ScanOfArrays scan_of(Simulator& simulator, py::ssize_t index) {
           to_array(scan.T_world_sensor_noisy)};
 }
 
+std::string represent(const ScanOfArrays& scan) {
+  std::ostringstream text;
+  text << "<dynains.SimulatedScan: " << scan.points.shape(0) << " points at " << scan.time << " s>";
+  return text.str();
+}
+
+std::string represent(const Simulator& simulator) {
+  const simulation::Config& config = simulator.config();
+  std::ostringstream text;
+  text << "<dynains.Simulator: " << simulator.size() << " scans of scene "
+       << simulation::scene_names()[static_cast<std::size_t>(config.scene)] << ", sensor "
+       << simulation::sensor_names()[static_cast<std::size_t>(config.sensor)] << ", seed "
+       << config.seed << '>';
+  return text.str();
+}
+
 }  // namespace
 
 void bind_simulation(py::module_& module) {
@@ -50,7 +67,8 @@ void bind_simulation(py::module_& module) {
       .def_readonly("labels", &ScanOfArrays::labels,
                     "(N,) uint32, class and instance of SemanticKITTI.")
       .def_readonly("T_world_sensor", &ScanOfArrays::T_world_sensor,
-                    "(4, 4) float64, with the noise that was asked for.");
+                    "(4, 4) float64, with the noise that was asked for.")
+      .def("__repr__", [](const ScanOfArrays& scan) { return represent(scan); });
 
   std::string doc =
       "A labelled street, measured by ray casting: simulator[i] is scan i.\n\nScenes:";
@@ -68,7 +86,8 @@ void bind_simulation(py::module_& module) {
       .def(py::init(&make_simulator), py::arg("scene") = "urban", py::arg("sensor") = "hdl64",
            py::arg("labelling") = "ever", "Raises ConfigError for unknown names and values.")
       .def("__len__", &Simulator::size)
-      .def("__getitem__", &scan_of, py::arg("index"), "Scan `index` as SimulatedScan.");
+      .def("__getitem__", &scan_of, py::arg("index"), "Scan `index` as SimulatedScan.")
+      .def("__repr__", [](const Simulator& simulator) { return represent(simulator); });
 }
 
 }  // namespace dynains::python

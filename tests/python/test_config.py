@@ -113,6 +113,12 @@ def test_a_parameter_with_named_values_is_a_text():
     assert pickle.loads(pickle.dumps(config)) == config
 
 
+def test_every_class_has_a_text_of_its_own():
+    for name, thing in vars(dynains).items():
+        if isinstance(thing, type) and not issubclass(thing, (Exception, int)):
+            assert "__repr__" in vars(thing), name
+
+
 def test_everything_public_has_a_docstring():
     for name, thing in vars(dynains).items():
         if name.startswith("_"):

@@ -1,0 +1,70 @@
+// Writes the type stubs of the Python module to standard output: the template, with a line for each
+// parameter in place of a line @NAME@.
+#include <fstream>
+#include <iostream>
+#include <string>
+#include <type_traits>
+
+#include "dynains/evaluation/evaluate.hpp"
+#include "dynains/parameters.hpp"
+#include "dynains/remover.hpp"
+#include "dynains/simulation/config.hpp"
+
+namespace {
+
+template <class T>
+std::string type_of(const dynains::Parameter<T>&) {
+  using Value = std::remove_const_t<T>;
+  if constexpr (std::is_enum_v<Value>) {
+    std::string names;
+    for (const char* name : value_names(Value())) {
+      names += (names.empty() ? "\"" : ", \"") + std::string(name) + '"';
+    }
+    return "Literal[" + names + ']';
+  } else if constexpr (std::is_same_v<Value, bool>) {
+    return "bool";
+  } else {
+    return std::is_integral_v<Value> ? "int" : "float";
+  }
+}
+
+/// A line for each parameter: its name, its type, and `end`.
+template <class Config>
+std::string lines_of(const std::string& indent, const std::string& end) {
+  std::string lines;
+  const Config defaults;
+  Config::visit(defaults, [&](const auto& parameter) {
+    lines += indent + parameter.name + ": " + type_of(parameter) + end + '\n';
+  });
+  return lines;
+}
+
+/// The lines that replace a line of the template, which starts with `indent`.
+std::string expand(const std::string& indent, const std::string& line) {
+  const std::string as_argument = " = ...,";
+  if (line == "@CONFIG_ATTRIBUTES@") return lines_of<dynains::DynaInsRemover::Config>(indent, "");
+  if (line == "@CONFIG_ARGUMENTS@")
+    return lines_of<dynains::DynaInsRemover::Config>(indent, as_argument);
+  if (line == "@EVALUATION_ARGUMENTS@") {
+    return lines_of<dynains::evaluation::EvaluationConfig>(indent, as_argument);
+  }
+  if (line == "@SIMULATION_ARGUMENTS@") {
+    return lines_of<dynains::simulation::Config>(indent, as_argument);
+  }
+  return indent + line + '\n';
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::ifstream stubs(argc == 2 ? argv[1] : "");
+  if (!stubs) {
+    std::cerr << "usage: write_stubs TEMPLATE\n";
+    return 1;
+  }
+  for (std::string line; std::getline(stubs, line);) {
+    const std::string indent(line, 0, line.find_first_not_of(' '));
+    std::cout << (indent.size() == line.size() ? "\n" : expand(indent, line.substr(indent.size())));
+  }
+  return std::cout.flush() ? 0 : 1;
+}
