@@ -52,7 +52,7 @@ if(NOT DYNAINS_BUILD_PYTHON STREQUAL "OFF")
   find_package(Python3 QUIET COMPONENTS Interpreter Development.Module)
 endif()
 dynains_part(python DYNAINS_BUILD_PYTHON "Python module"
-  Python3=python3-dev pybind11=pybind11-dev ${json})
+  Python3=python3-dev pybind11=pybind11-dev PNG=libpng-dev ZLIB=zlib1g-dev ${json})
 if(dynains_has_program OR dynains_has_python)
   set(dynains_has_components ON)
   set(dynains_has_evaluation ON)

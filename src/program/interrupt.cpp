@@ -1,10 +1,27 @@
 #include "interrupt.hpp"
 
+#include <csignal>
+#include <cstddef>
+#include <mutex>
+
 namespace dynains::program {
 namespace {
 
 // A signal handler can reach nothing but a global.
 volatile std::sig_atomic_t received = 0;
+
+// The process has one action for each signal, whatever the number of guards.
+struct Actions {
+  std::mutex mutex;
+  std::size_t guards = 0;
+  struct sigaction interrupt_before {};
+  struct sigaction termination_before {};
+};
+
+Actions& actions() {
+  static Actions result;
+  return result;
+}
 
 void remember(int signal) { received = signal; }
 
@@ -24,14 +41,20 @@ struct sigaction listen_to(int signal) {
 }  // namespace
 
 InterruptGuard::InterruptGuard() {
+  Actions& all = actions();
+  const std::lock_guard<std::mutex> lock(all.mutex);
+  if (all.guards++ > 0) return;
   received = 0;
-  interrupt_before_ = listen_to(SIGINT);
-  termination_before_ = listen_to(SIGTERM);
+  all.interrupt_before = listen_to(SIGINT);
+  all.termination_before = listen_to(SIGTERM);
 }
 
 InterruptGuard::~InterruptGuard() {
-  sigaction(SIGINT, &interrupt_before_, nullptr);
-  sigaction(SIGTERM, &termination_before_, nullptr);
+  Actions& all = actions();
+  const std::lock_guard<std::mutex> lock(all.mutex);
+  if (--all.guards > 0) return;
+  sigaction(SIGINT, &all.interrupt_before, nullptr);
+  sigaction(SIGTERM, &all.termination_before, nullptr);
 }
 
 int InterruptGuard::signal() { return received; }

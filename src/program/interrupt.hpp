@@ -1,12 +1,11 @@
 // Ctrl-C as a request that a loop looks at.
 #pragma once
 
-#include <csignal>
-
 namespace dynains::program {
 
-/// While it lives, SIGINT and SIGTERM ask to stop; a second one ends the program at once. A signal
-/// that the program was started to ignore, as by nohup or `&` in a script, stays ignored.
+/// While one lives, in any thread, SIGINT and SIGTERM ask to stop; a second one ends the program at
+/// once. A signal that the program was started to ignore, as by nohup or `&` in a script, stays
+/// ignored.
 class InterruptGuard {
  public:
   InterruptGuard();
@@ -16,10 +15,6 @@ class InterruptGuard {
 
   /// Number of the signal that asked to stop, 0 if none did.
   static int signal();
-
- private:
-  struct sigaction interrupt_before_ {};
-  struct sigaction termination_before_ {};
 };
 
 }  // namespace dynains::program

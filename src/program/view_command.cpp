@@ -6,7 +6,6 @@
 #include "dynains/errors.hpp"
 #include "json_file.hpp"
 #include "recording_options.hpp"
-#include "run_results.hpp"
 #include "write_view.hpp"
 
 namespace dynains::program {
@@ -28,38 +27,29 @@ struct ViewOptions {
   bool quiet = false;
 };
 
-void check_is_complete(const OutputFolder& out) {
-  if (!out.has_results()) {
-    throw IoError(out.path().string() + ": holds no results; expected a folder of `dynains run`");
-  }
-  if (!out.is_complete()) {
-    throw IoError(out.path().string() +
-                  ": the run was interrupted; complete it first by dynains run --resume");
-  }
-}
-
-void view(ViewOptions& options) {
-  if (!fs::is_directory(options.out)) {
-    throw IoError(options.out + ": no such folder; expected a folder of `dynains run`");
-  }
-  const LockedFolder lock(options.out);
-  OutputFolder out(Folder(options.out), run_output_kind());
-  check_is_complete(out);
-  const fs::path report = out.path() / out.kind().marker;
-  const auto& json = out.marker();
+Recording open_recording(ViewOptions& options, const fs::path& report_file,
+                         const nlohmann::ordered_json& report) {
   try {
-    options.sequence.complete(required_json_field<std::string>(report, json, "/sequence"),
-                              json.value("sequence_flags", nlohmann::ordered_json::object()));
+    options.sequence.complete(required_json_field<std::string>(report_file, report, "/sequence"),
+                              report.value("sequence_flags", nlohmann::ordered_json::object()));
   } catch (const CLI::Error& error) {
-    throw IoError(report.string() + ": /sequence_flags: " + error.what());
+    throw IoError(report_file.string() + ": /sequence_flags: " + error.what());
   }
   if (!fs::exists(options.sequence.folder())) {
     throw IoError(options.sequence.folder() +
                   ": no such recording; name the place of the run's recording: dynains view " +
                   options.out + " SEQ");
   }
-  const Recording recording = options.sequence.open();
-  const fs::path page = write_view(out, recording, options.max_points);
+  return options.sequence.open();
+}
+
+void view(ViewOptions& options) {
+  const fs::path page = write_view(
+      options.out,
+      [&](const fs::path& report_file, const nlohmann::ordered_json& report) {
+        return open_recording(options, report_file, report);
+      },
+      options.max_points);
   if (!options.quiet) std::cout << "page: " << page.string() << std::endl;
 }
 

@@ -42,6 +42,16 @@ viewer::RunFiles files_of(const OutputFolder& out, const Recording& recording) {
   return files;
 }
 
+void check_is_complete(const OutputFolder& out) {
+  if (!out.has_results()) {
+    throw IoError(out.path().string() + ": holds no results; expected a folder of `dynains run`");
+  }
+  if (!out.is_complete()) {
+    throw IoError(out.path().string() +
+                  ": the run was interrupted; complete it first by dynains run --resume");
+  }
+}
+
 }  // namespace
 
 fs::path write_view(OutputFolder& out, const Recording& recording, std::size_t max_points) {
@@ -57,6 +67,16 @@ fs::path write_view(OutputFolder& out, const Recording& recording, std::size_t m
   out.mark(nlohmann::ordered_json(out.marker()), listing);
   file.commit();
   return page;
+}
+
+fs::path write_view(const fs::path& folder, const OpenRecording& open, std::size_t max_points) {
+  if (!fs::is_directory(folder)) {
+    throw IoError(folder.string() + ": no such folder; expected a folder of `dynains run`");
+  }
+  const LockedFolder lock(folder);
+  OutputFolder out(Folder(folder), run_output_kind());
+  check_is_complete(out);
+  return write_view(out, open(out.path() / out.kind().marker, out.marker()), max_points);
 }
 
 }  // namespace dynains::program

@@ -79,7 +79,7 @@ void bind_config(py::module_& module) {
                           assign_all(result, values);
                           return result;
                         }));
-  config.def("__repr__", &represent);
+  config.def("__repr__", [](const Config& self) { return represent(self); });
 }
 
 }  // namespace dynains::python

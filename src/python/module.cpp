@@ -14,6 +14,8 @@ PYBIND11_MODULE(_dynains, module) {
       "    remover = dynains.DynaInsRemover()\n"
       "    frame = remover.push(points, T_world_sensor, time)\n"
       "    moving = points[frame.newest.labels == dynains.Label.DYNAMIC]\n\n"
+      "    dynains.run('drive.mcap', 'cleaned')\n"
+      "    dynains.view('cleaned')\n\n"
       "Points are float32 or float64 arrays of shape (N, 3 to 64), metres, sensor frame, read\n"
       "where they lie. Poses are (4, 4). What is given out is the caller's own.";
   module.attr("__version__") = dynains::kVersionString;
@@ -24,10 +26,17 @@ PYBIND11_MODULE(_dynains, module) {
       "A pose is no rigid transform, or a time does not increase.";
   py::register_exception<dynains::CloudError>(module, "CloudError", PyExc_ValueError).doc() =
       "An array of points has the wrong shape.";
+  py::register_exception<dynains::IoError>(module, "IoError", PyExc_OSError).doc() =
+      "A file cannot be read or written; the text names path, position and what was expected.";
+  py::register_exception<dynains::UsageError>(module, "UsageError", PyExc_RuntimeError).doc() =
+      "A call that the present state does not allow, such as a run into a folder in use.";
 
   dynains::python::bind_config(module);
   dynains::python::bind_remover(module);
   dynains::python::bind_evaluation(module);
   dynains::python::bind_simulation(module);
+  dynains::python::bind_recording(module);
+  dynains::python::bind_check(module);
+  dynains::python::bind_run(module);
   module.attr("__name__") = own_name;
 }

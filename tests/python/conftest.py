@@ -13,3 +13,20 @@ def street():
 @pytest.fixture
 def identity():
     return np.eye(4)
+
+
+@pytest.fixture(scope="session")
+def drive(street, tmp_path_factory):
+    """The street as a folder in the format of SemanticKITTI; its poses also in mm."""
+    folder = tmp_path_factory.mktemp("recordings") / "drive"
+    for name in "velodyne", "labels":
+        (folder / name).mkdir(parents=True)
+    for i, scan in enumerate(street):
+        scan.points.tofile(folder / f"velodyne/{i:06}.bin")
+        scan.labels.tofile(folder / f"labels/{i:06}.label")
+    poses = np.array([scan.T_world_sensor[:3] for scan in street])
+    np.savetxt(folder / "times.txt", [scan.time for scan in street])
+    np.savetxt(folder / "poses.txt", poses.reshape(-1, 12))
+    poses[:, :, 3] *= 1000
+    np.savetxt(folder / "poses_mm.txt", poses.reshape(-1, 12))
+    return folder

@@ -1,0 +1,130 @@
+#include "recording_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <optional>
+#include <sstream>
+
+#include "dynains/config.hpp"
+#include "dynains/errors.hpp"
+#include "lone_scans.hpp"
+
+namespace dynains::program {
+namespace {
+
+std::string fixed(double value, int digits, const char* unit = "") {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(digits) << value << unit;
+  return text.str();
+}
+
+void add_line(std::ostream& text, const std::string& what, const std::string& value) {
+  text << std::left << std::setw(20) << what << value << '\n';
+}
+
+std::string to_text(const Agreement& agreement) {
+  if (agreement.points == 0) return "nothing to compare";
+  return fixed(100.0 * agreement.share, 0, " %") + " of points agree, gap " +
+         fixed(100.0 * agreement.gap, 0, " cm");
+}
+
+std::string text_of(const Mounting& mounting) {
+  if (!mounting.known) return "no ground found";
+  std::string text =
+      fixed(mounting.height, 2, " m over ground, tilted by ") + fixed(mounting.tilt(), 1, " deg");
+  if (mounting.tilt() > 90.0) text += " (upside down)";
+  return text;
+}
+
+/// Possible problems of a run other than poses.
+void add_remarks(std::ostream& text, const Diagnosis& d) {
+  if (d.invalid_share > 0.5) {
+    text << "note: more than half of the points are NaN, infinite or zero\n";
+  }
+  if (d.farthest > 1000.0) {
+    text << "note: ranges beyond 1 km: points seem not to be in metres, or not in the frame "
+            "of the sensor (--frame world)\n";
+  } else if (d.farthest > 0.0 && d.farthest < 2.0) {
+    text << "note: all ranges are below 2 m: points seem not to be in metres\n";
+  }
+  if (d.ego_share > 0.3) {
+    text << "note: many points are nearer than 2 m; see --min-range\n";
+  }
+  if (!d.mounting.known) {
+    text << "note: without ground in sight, height and tilt are not known\n";
+  }
+}
+
+/// The diagnosis reads a sample; this looks at every file, for scans that were cut off. Throws
+/// IoError of the first and counts the others.
+void check_files(const Recording& recording) {
+  std::string first;
+  std::size_t broken = 0;
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    try {
+      recording.check_scan(i);
+    } catch (const IoError& error) {
+      if (broken == 0) first = error.what();
+      ++broken;
+    }
+  }
+  if (broken == 0) return;
+  if (broken > 1) first += "; " + std::to_string(broken - 1) + " more scan files are broken";
+  throw IoError(first);
+}
+
+std::string describe(const Recording& recording, const Diagnosis& d) {
+  std::ostringstream text;
+  add_line(text, "scans",
+           std::to_string(d.scan_files) + " files, " + std::to_string(d.pose_rows) + " poses, " +
+               std::to_string(d.scans) + " scans with a pose");
+  for (const std::string& note : recording.notes()) add_line(text, "", note);
+  add_line(text, "time", fixed(d.period, 3, " s from scan to scan"));
+  add_line(text, "points",
+           fixed(d.points, 0, " a scan, ") + fixed(100.0 * d.invalid_share, 1) + " % invalid, " +
+               fixed(100.0 * d.ego_share, 1) + " % nearer than 2 m, 99 % within " +
+               fixed(d.farthest, 0, " m"));
+  add_line(text, "sensor", text_of(d.mounting));
+  add_line(text, "motion",
+           "median " + fixed(d.step, 2, " m from scan to scan, longest ") +
+               fixed(d.longest_step, 2, " m"));
+  if (d.registered_pairs > 0) {
+    add_line(text, "poses",
+             "off by " + fixed(100.0 * d.translation_error, 1, " cm and ") +
+                 fixed(180.0 / M_PI * d.rotation_error, 2, " deg") +
+                 " from one scan to the next, by the registration of " +
+                 std::to_string(d.registered_pairs) + " pairs of scans");
+  }
+  text << "\nscans " << d.stride << " apart, placed by\n";
+  add_line(text, "  poses as given", to_text(d.as_given));
+  add_line(text, "  no motion at all", to_text(d.standing));
+  constexpr std::size_t kShown = 3;
+  for (std::size_t i = 0; i < std::min(kShown, d.readings.size()); ++i) {
+    add_line(text, "  " + d.readings[i].option, "");
+    add_line(text, "", to_text(d.readings[i].agreement));
+  }
+  text << '\n';
+  add_remarks(text, d);
+  return text.str();
+}
+
+}  // namespace
+
+RecordingCheck check_recording(const Recording& recording) {
+  check_files(recording);
+  RecordingCheck check;
+  check.diagnosis = diagnose(recording);
+  const bool sound = check.diagnosis.sound();
+  check.findings = describe(recording, check.diagnosis);
+  std::optional<std::string> lone;
+  if (recording.size() > 1) {
+    lone = remark_on_lone_scans(recording, 0, recording.size() - 1, RemoverConfig());
+  }
+  check.passed = sound && !lone;
+  if (!lone || !sound) check.advice = advice(check.diagnosis) + '\n';
+  if (lone) check.remark = *lone + ".\n";
+  return check;
+}
+
+}  // namespace dynains::program

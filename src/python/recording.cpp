@@ -1,0 +1,215 @@
+#include "recording.hpp"
+
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "dynains/errors.hpp"
+#include "recording_settings.hpp"
+
+namespace dynains::python {
+namespace {
+
+using RecordingPointer = std::shared_ptr<SharedRecording>;
+
+RecordingPointer open(const std::filesystem::path& path, const py::dict& values) {
+  const RecordingOptions options = to_recording_options(values);
+  std::optional<Recording> recording;
+  {
+    const py::gil_scoped_release release;
+    recording.emplace(path, options);
+  }
+  return std::make_shared<SharedRecording>(std::move(*recording), values);
+}
+
+/// One scan, whose labels are read when they are asked for.
+class ScanOfRecording {
+ public:
+  ScanOfRecording(RecordingPointer recording, std::size_t index)
+      : recording_(std::move(recording)), index_(index) {
+    RecordedScan scan =
+        recording_->read([&](const Recording& open) { return open.read_scan(index); });
+    points_ = to_array(std::move(scan.xyzi), 4);
+    if (!scan.ring.empty()) rings_ = to_array(std::move(scan.ring));
+    if (!scan.time.empty()) times_ = to_array(std::move(scan.time));
+  }
+
+  const std::string& name() const { return recording_->get().name(index_); }
+  double time() const { return recording_->get().time(index_); }
+  py::array_t<double> T_world_sensor() const {
+    return to_array(recording_->get().T_world_sensor(index_));
+  }
+  const py::array_t<float>& points() const { return points_; }
+  const py::object& rings() const { return rings_; }
+  const py::object& times() const { return times_; }
+
+  py::object intensity() const {
+    if (!recording_->get().columns().intensity) return py::none();
+    constexpr py::ssize_t kColumn = 3;
+    return points_[py::make_tuple(py::slice(py::none(), py::none(), py::none()), kColumn)];
+  }
+
+  py::object labels() {
+    if (labels_.is_none() && recording_->get().has_labels()) {
+      labels_ = to_array(
+          recording_->read([&](const Recording& open) { return open.read_labels(index_); }));
+    }
+    return labels_;
+  }
+
+  std::string represent() const {
+    std::ostringstream text;
+    text << "<dynains.RecordedScan: " << name() << " at " << time() << " s, " << points_.shape(0)
+         << " points>";
+    return text.str();
+  }
+
+ private:
+  RecordingPointer recording_;
+  std::size_t index_;
+  py::array_t<float> points_;
+  py::object rings_ = py::none();
+  py::object times_ = py::none();
+  py::object labels_ = py::none();
+};
+
+ScanOfRecording scan_of(const RecordingPointer& recording, py::ssize_t index) {
+  const auto size = static_cast<py::ssize_t>(recording->get().size());
+  if (index < 0) index += size;
+  if (index < 0 || index >= size) throw py::index_error("the recording has no such scan");
+  return {recording, static_cast<std::size_t>(index)};
+}
+
+template <class ValueOf>
+auto values_of_scans(const SharedRecording& recording, ValueOf&& value_of) {
+  std::vector<decltype(value_of(std::size_t{0}))> values;
+  for (std::size_t i = 0; i < recording.get().size(); ++i) values.push_back(value_of(i));
+  return values;
+}
+
+py::array_t<double> poses_of(const SharedRecording& recording) {
+  py::array_t<double> poses({recording.get().size(), std::size_t{4}, std::size_t{4}});
+  using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
+  for (std::size_t i = 0; i < recording.get().size(); ++i) {
+    const auto row = static_cast<py::ssize_t>(i);
+    Eigen::Map<RowMajor>(poses.mutable_data(row)) = recording.get().T_world_sensor(i).matrix();
+  }
+  return poses;
+}
+
+std::string represent(const SharedRecording& recording) {
+  const Recording& open = recording.get();
+  std::ostringstream text;
+  text << "<dynains.Recording: " << open.size() << " scans";
+  if (open.size() > 0) text << " in " << open.time(open.size() - 1) - open.time(0) << " s";
+  text << " of " << open.folder().string() << '>';
+  return text.str();
+}
+
+}  // namespace
+
+RecordingPointer to_recording(const py::object& recording, const py::dict& options) {
+  if (!py::isinstance<SharedRecording>(recording)) {
+    return open(recording.cast<std::filesystem::path>(), options);
+  }
+  if (!options.empty()) {
+    throw py::type_error(
+        "options of an open recording: give its path, or the options where it is "
+        "opened");
+  }
+  return recording.cast<RecordingPointer>();
+}
+
+void bind_recording(py::module_& module) {
+  py::class_<ScanOfRecording>(module, "RecordedScan", "One scan of a recording.")
+      .def_property_readonly("name", &ScanOfRecording::name, "File name without extension.")
+      .def_property_readonly("time", &ScanOfRecording::time, "s")
+      .def_property_readonly("T_world_sensor", &ScanOfRecording::T_world_sensor, "(4, 4) float64.")
+      .def_property_readonly("points", &ScanOfRecording::points,
+                             "(N, 4) float32: x y z (m, sensor frame), intensity (0 without one).")
+      .def_property_readonly("intensity", &ScanOfRecording::intensity,
+                             "(N,) float32, a view of the points; None if scans have none.")
+      .def_property_readonly("rings", &ScanOfRecording::rings,
+                             "(N,) uint16, number of the beam; None if scans have none.")
+      .def_property_readonly("times", &ScanOfRecording::times,
+                             "(N,) float64, time of each point in the unit of the file; None if "
+                             "scans have none.")
+      .def_property_readonly("labels", &ScanOfRecording::labels,
+                             "(N,) uint32, class and instance of SemanticKITTI, read at the first "
+                             "use; None if the recording has none. Raises IoError.")
+      .def("__repr__", &ScanOfRecording::represent);
+
+  const std::string doc =
+      "Recorded scans with poses: recording[i] is scan i, read when it is asked for.\n\n"
+      "path: folder of KITTI, SemanticKITTI or nuScenes, folder of .pcd, .ply, .bin, .las, .npy, "
+      ".npz, .xyz or .csv files, or log of ROS (.mcap, .db3, .bag, or a folder with "
+      "metadata.yaml).\n"
+      "What the files mean, by name (dynains.check finds out):\n" +
+      describe_recording_settings();
+  py::class_<SharedRecording, RecordingPointer>(module, "Recording", doc.c_str())
+      .def(py::init([](const std::filesystem::path& path, const py::kwargs& options) {
+             return open(path, py::dict(options));
+           }),
+           py::arg("path"),
+           "Raises IoError for files that cannot be read, ConfigError for unknown options.")
+      .def("__len__", [](const SharedRecording& recording) { return recording.get().size(); })
+      .def("__getitem__", &scan_of, py::arg("index"),
+           "Scan `index` as RecordedScan. Raises IoError.")
+      .def_property_readonly(
+          "path", [](const SharedRecording& recording) { return recording.get().folder(); },
+          "Folder or log.")
+      .def_property_readonly(
+          "options",
+          [](const SharedRecording& recording) {
+            return py::dict(recording.options().attr("copy")());
+          },
+          "The options that it was opened with.")
+      .def_property_readonly(
+          "frame",
+          [](const SharedRecording& recording) {
+            return recording.get().frame() == PointFrame::kWorld ? "world" : "sensor";
+          },
+          "Frame of the points in the files, 'sensor' or 'world'.")
+      .def_property_readonly(
+          "names",
+          [](const SharedRecording& recording) {
+            return values_of_scans(recording,
+                                   [&](std::size_t i) { return recording.get().name(i); });
+          },
+          "Name of each scan.")
+      .def_property_readonly(
+          "times",
+          [](const SharedRecording& recording) {
+            return to_array(
+                values_of_scans(recording, [&](std::size_t i) { return recording.get().time(i); }));
+          },
+          "(scans,) float64, s, strictly increasing.")
+      .def_property_readonly("poses", &poses_of, "(scans, 4, 4) float64, T_world_sensor.")
+      .def_property_readonly(
+          "has_labels",
+          [](const SharedRecording& recording) { return recording.get().has_labels(); },
+          "Whether scans have labels.")
+      .def_property_readonly(
+          "missing_poses",
+          [](const SharedRecording& recording) { return recording.get().missing_pose_count(); },
+          "Number of scans that are left out for want of a pose.")
+      .def_property_readonly(
+          "early_end", [](const SharedRecording& recording) { return recording.get().early_end(); },
+          "Path, position and reason if a log is cut off, else None.")
+      .def_property_readonly(
+          "notes", [](const SharedRecording& recording) { return recording.get().notes(); },
+          "What was chosen or left out when the recording was opened, a sentence each.")
+      .def("__repr__", [](const SharedRecording& recording) { return represent(recording); });
+}
+
+}  // namespace dynains::python

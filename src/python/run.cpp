@@ -1,0 +1,301 @@
+#include "run.hpp"
+
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <algorithm>
+#include <array>
+#include <csignal>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bindings.hpp"
+#include "dynains/errors.hpp"
+#include "json_file.hpp"
+#include "preset.hpp"
+#include "recording.hpp"
+#include "recording_settings.hpp"
+#include "settings.hpp"
+#include "write_view.hpp"
+
+namespace dynains::python {
+namespace {
+
+namespace fs = std::filesystem;
+using program::RunOutcome;
+using program::RunSettings;
+
+// The arguments of run() but for the recording and its options.
+struct RunArguments {
+  RunSettings settings;
+  std::optional<std::string> preset;
+  std::optional<DynaInsRemover::Config> config;
+  py::object progress = py::none();
+};
+
+using RunSetting = Setting<RunArguments>;
+
+template <bool RunSettings::*Field>
+void set_flag(RunArguments& run, const py::handle& value) {
+  run.settings.*Field = to_flag(value);
+}
+
+template <std::optional<std::size_t> program::ScanWindow::*Field>
+void set_scan(RunArguments& run, const py::handle& value) {
+  if (!value.is_none()) run.settings.window.*Field = value.cast<std::size_t>();
+}
+
+const std::array<RunSetting, 17> kRunSettings{{
+    {"preset", "'default' or 'paper'", "parameters to start from",
+     [](RunArguments& run, const py::handle& value) {
+       run.preset = choose<std::string>(value, {{"default", "default"}, {"paper", "paper"}});
+     }},
+    {"config", "a Config", "all parameters, in place of a preset",
+     [](RunArguments& run, const py::handle& value) {
+       if (!value.is_none()) run.config = value.cast<DynaInsRemover::Config>();
+     }},
+    {"force", "bool", "replace the results of an earlier run when the new ones are complete",
+     &set_flag<&RunSettings::force>},
+    {"resume", "bool",
+     "complete a run with the same arguments that was interrupted; nothing to do if it is complete",
+     &set_flag<&RunSettings::resume>},
+    {"start", "int", "number of the first scan", &set_scan<&program::ScanWindow::start>},
+    {"end", "int", "number of the last scan", &set_scan<&program::ScanWindow::end>},
+    {"map", "a path", "file of the static map, .ply, .pcd or .las",
+     [](RunArguments& run, const py::handle& value) {
+       if (!value.is_none()) run.settings.map = to_path(value).string();
+     }},
+    {"map_attributes", "bool", "the map holds intensity, time and label of its points",
+     &set_flag<&RunSettings::map_attributes>},
+    {"crs", "str, 'EPSG:N'", "coordinate reference system of the poses, for a map of LAS",
+     [](RunArguments& run, const py::handle& value) {
+       run.settings.crs = value.cast<std::string>();
+     }},
+    {"map_memory", "float, MB", "bound of the memory of the map; the rest goes to files in out",
+     [](RunArguments& run, const py::handle& value) {
+       if (!value.is_none()) {
+         run.settings.map_memory = to_number(value, 0.0, std::numeric_limits<double>::max());
+       }
+     }},
+    {"write_online", "bool", "also write the verdicts without latency",
+     &set_flag<&RunSettings::write_online>},
+    {"write_clean", "bool", "also write every scan without its moving points",
+     &set_flag<&RunSettings::write_clean>},
+    {"write_beliefs", "bool", "also write the probability that a point moves",
+     &set_flag<&RunSettings::write_beliefs>},
+    {"write_mcap", "bool", "also write verdicts.mcap, a log of ROS 2",
+     &set_flag<&RunSettings::write_mcap>},
+    {"view", "bool", "also write the page view.html and the folder beliefs",
+     &set_flag<&RunSettings::view>},
+    {"accept_poses", "bool", "run even if the scans disagree with the poses",
+     &set_flag<&RunSettings::accept_poses>},
+    {"progress", "a function", "called with the numbers of finished scans and of all scans",
+     [](RunArguments& run, const py::handle& value) {
+       if (!value.is_none() && PyCallable_Check(value.ptr()) == 0) throw py::cast_error();
+       run.progress = py::reinterpret_borrow<py::object>(value);
+     }},
+}};
+
+/// Takes the arguments of a run out of `values`, which keeps the options of the recording.
+RunArguments take_arguments(py::dict& values) {
+  RunArguments run;
+  std::vector<std::string> names = recording_setting_names();
+  const std::vector<std::string> options = names;
+  for (const RunSetting& setting : kRunSettings) names.emplace_back(setting.name);
+  py::dict rest;
+  for (const auto& [key, value] : values) {
+    const std::string name = py::str(key);
+    if (assign_setting(kRunSettings, run, name, value)) continue;
+    if (std::find(options.begin(), options.end(), name) == options.end()) refuse(name, names);
+    rest[key] = value;
+  }
+  values = rest;
+  return run;
+}
+
+nlohmann::ordered_json to_json(const py::dict& flags) {
+  auto json = nlohmann::ordered_json::object();
+  for (const auto& [flag, value] : flags) {
+    json[py::str(flag).cast<std::string>()] = py::str(value).cast<std::string>();
+  }
+  return json;
+}
+
+/// The recording and its flags as a shell reads them.
+std::string as_given(const std::string& path, const py::dict& flags) {
+  py::list words;
+  words.append(path);
+  for (const auto& [flag, value] : flags) {
+    words.append(flag);
+    if (py::str(value).cast<std::string>() != "true") words.append(value);
+  }
+  return py::module_::import("shlex").attr("join")(words).cast<std::string>();
+}
+
+void take_config(RunArguments& run) {
+  if (run.config && run.preset) throw ConfigError("run: give preset or config, not both");
+  RunSettings& settings = run.settings;
+  settings.preset = run.preset.value_or("default");
+  settings.config = run.config ? *run.config : program::preset(settings.preset);
+  settings.config.validate();
+}
+
+program::RunListener listen(const RunArguments& run) {
+  program::RunListener listener;
+  listener.warn = [](const std::string& text) {
+    const py::gil_scoped_acquire acquire;
+    if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+  };
+  listener.progress = [&run](std::size_t done, std::size_t total) {
+    const py::gil_scoped_acquire acquire;
+    // Ctrl-C before the run began to listen to signals.
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    if (!run.progress.is_none()) run.progress(done, total);
+  };
+  return listener;
+}
+
+/// Raises what Python raises for a signal.
+[[noreturn]] void raise_signal(const RunOutcome& outcome) {
+  const std::string folder = outcome.outputs.folder.string();
+  const std::string text =
+      outcome.earlier_results_stay
+          ? "the earlier results in " + folder + " stay as they were"
+          : folder + " has the results of " + std::to_string(outcome.scans) + " scans";
+  if (outcome.signal == SIGINT) {
+    PyErr_SetString(PyExc_KeyboardInterrupt, text.c_str());
+  } else {
+    constexpr int kSignalled = 128;
+    PyErr_SetObject(PyExc_SystemExit, py::int_(kSignalled + outcome.signal).ptr());
+  }
+  throw py::error_already_set();
+}
+
+// What a run has written.
+struct RunResult {
+  RunOutcome outcome;
+  py::dict report;
+
+  fs::path file(const char* name) const { return outcome.outputs.folder / name; }
+};
+
+RunResult run(const py::object& recording, const fs::path& out, const py::kwargs& values) {
+  py::dict options(values);
+  RunArguments arguments = take_arguments(options);
+  take_config(arguments);
+  const std::shared_ptr<SharedRecording> shared = to_recording(recording, options);
+  RunSettings& settings = arguments.settings;
+  settings.out = out.string();
+  settings.recording = shared->get().folder().string();
+  const py::dict flags = to_flags(shared->options());
+  settings.recording_flags = to_json(flags);
+  settings.recording_as_given = as_given(settings.recording, flags);
+
+  const program::RunListener listener = listen(arguments);
+  RunOutcome outcome;
+  {
+    const py::gil_scoped_release release;
+    outcome = program::run(settings, shared->get(), listener);
+  }
+  if (!outcome.complete) raise_signal(outcome);
+  RunResult result{std::move(outcome), {}};
+  const py::object text =
+      py::module_::import("pathlib").attr("Path")(result.file("report.json")).attr("read_text")();
+  result.report = py::module_::import("json").attr("loads")(text);
+  return result;
+}
+
+std::string represent(const RunResult& result) {
+  const auto field = [&](const char* name) {
+    return py::str(result.report[name]).cast<std::string>();
+  };
+  return "<dynains.RunResult: " + field("scans") + " scans in " +
+         result.outcome.outputs.folder.string() + '>';
+}
+
+/// Writes the page of a finished run. The recording and its options are those of the run unless
+/// they are given.
+fs::path write_page(const fs::path& out, const py::object& recording, std::size_t max_points) {
+  const auto open = [&](const fs::path& report_file, const nlohmann::ordered_json& report) {
+    if (!recording.is_none()) return to_recording(recording, py::dict())->get();
+    const auto path = program::required_json_field<std::string>(report_file, report, "/sequence");
+    py::dict flags;
+    const auto given = report.value("sequence_flags", nlohmann::ordered_json::object());
+    for (const auto& [flag, value] : given.items()) {
+      if (value.is_string()) flags[flag.c_str()] = value.get<std::string>();
+    }
+    return to_recording(py::cast(path), from_flags(flags))->get();
+  };
+  return program::write_view(out, open, max_points);
+}
+
+py::object path_or_none(const fs::path& path) {
+  return path.empty() ? py::object(py::none()) : py::cast(path);
+}
+
+}  // namespace
+
+void bind_run(py::module_& module) {
+  const auto count = [](const char* name) {
+    return [name](const RunResult& result) { return py::object(result.report[name]); };
+  };
+  py::class_<RunResult>(module, "RunResult", "What a run has written.")
+      .def_property_readonly(
+          "folder", [](const RunResult& result) { return result.outcome.outputs.folder; },
+          "Folder of the results.")
+      .def_property_readonly(
+          "was_complete_before",
+          [](const RunResult& result) { return result.outcome.was_complete_before; },
+          "Whether resume=True found the results complete, so that nothing was done.")
+      .def_property_readonly("scans", count("scans"), "Number of scans.")
+      .def_property_readonly("points", count("points"), "Number of points of all scans.")
+      .def_property_readonly(
+          "label_counts", count("labels"),
+          "Number of points by label: invalid, out_of_range, ground, static, dynamic.")
+      .def_property_readonly(
+          "static_map",
+          [](const RunResult& result) {
+            const program::RunOutputs& outputs = result.outcome.outputs;
+            return path_or_none(outputs.map.empty() ? fs::path()
+                                                    : outputs.folder / outputs.map_name());
+          },
+          "File of the static map; None without a map.")
+      .def_property_readonly(
+          "moving_points",
+          [](const RunResult& result) { return result.file("dynamic_points.ply"); },
+          "File of the moving points.")
+      .def_property_readonly(
+          "labels", [](const RunResult& result) { return result.file("labels"); },
+          "Folder of the labels, a file for each scan.")
+      .def_property_readonly(
+          "picture", [](const RunResult& result) { return result.file(program::kOverviewPicture); },
+          "Picture: before, after, removed.")
+      .def_property_readonly(
+          "page", [](const RunResult& result) { return path_or_none(result.outcome.page); },
+          "Page for a browser; None unless view=True.")
+      .def_property_readonly(
+          "report", [](const RunResult& result) { return result.report; },
+          "The content of report.json.")
+      .def("__repr__", [](const RunResult& result) { return represent(result); });
+
+  const std::string doc =
+      "Removes what moves from a recorded sequence, as the program `dynains run`.\n\n"
+      "recording: a Recording, or its path. out: folder for the results; created, must be empty.\n"
+      "By name:\n" +
+      describe_settings(kRunSettings) + "For the path of a recording also:\n" +
+      describe_recording_settings() +
+      "Returns a RunResult. Ctrl-C ends the run after the scan at hand and raises "
+      "KeyboardInterrupt; what is there is written, and resume=True completes it. Raises IoError, "
+      "ConfigError, PoseError, and UsageError if another run writes to the folder. Warns by "
+      "RuntimeWarning. Other threads run meanwhile.";
+  module.def("run", &run, py::arg("recording"), py::arg("out"), doc.c_str());
+  module.def("_write_page", &write_page, py::arg("out"), py::arg("recording") = py::none(),
+             py::arg("max_points") = program::kDefaultViewPoints);
+}
+
+}  // namespace dynains::python

@@ -1,0 +1,153 @@
+import os
+
+import dynains
+import numpy as np
+import pytest
+
+
+def test_a_recording_is_a_sequence_of_scans(drive, street):
+    recording = dynains.Recording(drive)
+    assert len(recording) == len(street)
+    for recorded, scan in zip(recording, street):
+        np.testing.assert_array_equal(recorded.points, scan.points)
+        np.testing.assert_array_equal(recorded.labels, scan.labels)
+        np.testing.assert_allclose(recorded.T_world_sensor, scan.T_world_sensor, atol=1e-9)
+        assert recorded.time == pytest.approx(scan.time)
+    assert recording[-1].name == recording.names[-1] == "000011"
+    np.testing.assert_allclose(recording.times, [scan.time for scan in street])
+    np.testing.assert_array_equal(recording.poses[3], recording[3].T_world_sensor)
+    assert recording.has_labels
+    assert (recording.missing_poses, recording.early_end, recording.frame) == (0, None, "sensor")
+    assert recording.path == drive and "poses from poses.txt" in recording.notes
+    with pytest.raises(IndexError):
+        recording[len(street)]
+
+
+def test_a_recorded_scan_goes_into_the_remover_as_it_is(drive):
+    scan = dynains.Recording(str(drive))[0]
+    frame = dynains.DynaInsRemover().push(scan.points, scan.T_world_sensor, scan.time)
+    assert len(frame.newest.labels) == len(scan.points)
+    assert scan.points.dtype == np.float32 and scan.points.shape[1] == 4
+    assert np.shares_memory(scan.intensity, scan.points)
+    np.testing.assert_array_equal(scan.intensity, scan.points[:, 3])
+    assert scan.rings is None and scan.times is None
+    assert scan.labels is scan.labels
+
+
+def write_pcd(file, points):
+    rows = "\n".join(f"{x} {y} {z} {i * 2} {i * 0.5}" for i, (x, y, z) in enumerate(points))
+    file.write_text(
+        "VERSION .7\nFIELDS x y z ring time\nSIZE 4 4 4 2 8\nTYPE F F F U F\nCOUNT 1 1 1 1 1\n"
+        f"WIDTH {len(points)}\nHEIGHT 1\nVIEWPOINT 7 0 0 1 0 0 0\nPOINTS {len(points)}\n"
+        f"DATA ascii\n{rows}\n"
+    )
+
+
+def test_columns_and_poses_of_pcd_files(tmp_path):
+    points = np.arange(12, dtype=np.float32).reshape(4, 3)
+    for i in range(2):
+        write_pcd(tmp_path / f"{i}.pcd", points)
+    scan = dynains.Recording(tmp_path, frame="sensor")[1]
+    np.testing.assert_array_equal(scan.points[:, :3], points)
+    assert scan.rings.dtype == np.uint16 and scan.rings.tolist() == [0, 2, 4, 6]
+    assert scan.times.dtype == np.float64 and scan.times.tolist() == [0, 0.5, 1, 1.5]
+    assert scan.intensity is None and scan.labels is None
+    assert scan.T_world_sensor[:3, 3].tolist() == [7, 0, 0]
+
+
+@pytest.mark.parametrize(
+    "name, write",
+    [
+        ("npy", lambda file, points: np.save(file, points)),
+        ("npz", lambda file, points: np.savez(file, points=points)),
+        ("xyz", lambda file, points: np.savetxt(file, points)),
+        (
+            "csv",
+            lambda file, points: np.savetxt(file, points, delimiter=",", header="x,y,z", comments=""),
+        ),
+    ],
+)
+def test_other_formats(tmp_path, name, write):
+    points = np.random.default_rng(1).uniform(-20, 20, (50, 3)).astype(np.float32)
+    for i in range(3):
+        write(tmp_path / f"{i}.{name}", points)
+    np.savetxt(tmp_path / "poses.txt", np.tile(np.eye(4)[:3].ravel(), (3, 1)))
+    recording = dynains.Recording(tmp_path, frame="sensor")
+    assert len(recording) == 3
+    np.testing.assert_allclose(recording[2].points[:, :3], points, rtol=1e-6)
+
+
+def test_what_the_files_mean_is_told_by_name(drive):
+    plain = dynains.Recording(drive)
+    other = dynains.Recording(drive, poses=drive / "poses_mm.txt", pose_units="mm")
+    np.testing.assert_allclose(other.poses, plain.poses, atol=1e-6)
+    assert other.options == {"poses": drive / "poses_mm.txt", "pose_units": "mm"}
+    T = np.eye(4)
+    T[0, 3] = 2.0
+    as_array = dynains.Recording(drive, extrinsic=T)
+    as_text = dynains.Recording(drive, extrinsic="2 0 0 0 0 0 1")
+    np.testing.assert_allclose(as_array.poses, as_text.poses, atol=1e-9)
+    np.testing.assert_allclose(as_array.poses, plain.poses @ T, atol=1e-9)
+    np.testing.assert_array_equal(dynains.Recording(drive, pose_shift=1).poses[0], plain.poses[1])
+
+
+@pytest.mark.parametrize(
+    "options, error, text",
+    [
+        ({"invert_pose": True}, dynains.ConfigError, "did you mean invert_poses"),
+        ({"nonsense": 1}, dynains.ConfigError, "unknown parameter nonsense$"),
+        ({"pose_units": "km"}, TypeError, "pose_units = 'km': expected 'm', 'cm' or 'mm'"),
+        ({"invert_poses": "yes"}, TypeError, "expected bool"),
+        ({"pose_shift": 0.5}, TypeError, "pose_shift = 0.5: expected int"),
+        ({"pose_shift": 2000000}, TypeError, "expected int in"),
+        ({"time_offset": float("nan")}, TypeError, "expected finite float"),
+        ({"pose_gap": None}, TypeError, "pose_gap = None: expected float"),
+        ({"poses": 3}, TypeError, "poses = 3: expected a path"),
+        ({"extrinsic": np.zeros((4, 4))}, dynains.PoseError, "a pose|no transform"),
+        ({"poses": "nowhere.txt"}, dynains.IoError, "nowhere.txt"),
+    ],
+)
+def test_wrong_options_are_refused(drive, options, error, text):
+    with pytest.raises(error, match=text):
+        dynains.Recording(drive, **options)
+    with pytest.raises(error, match=text):
+        dynains.check(drive, **options)
+
+
+def test_files_that_cannot_be_read_are_os_errors(drive, tmp_path):
+    with pytest.raises(OSError, match="nowhere"):
+        dynains.Recording(tmp_path / "nowhere")
+    with pytest.raises(TypeError):
+        dynains.Recording(7)
+    scan = tmp_path / "000000.bin"
+    scan.write_bytes(bytes(17))
+    np.savetxt(tmp_path / "poses.txt", np.eye(4)[:3].reshape(1, 12))
+    recording = dynains.Recording(tmp_path)
+    with pytest.raises(dynains.IoError, match="000000.bin") as caught:
+        recording[0]
+    assert isinstance(caught.value, OSError)
+
+
+def test_check_of_a_good_recording(drive):
+    recording = dynains.Recording(drive)
+    diagnosis = dynains.check(recording)
+    assert diagnosis.passed and diagnosis.verdict == "agree" and diagnosis.options == {}
+    assert diagnosis.scans == len(recording) and diagnosis.period == pytest.approx(0.1)
+    assert 0 <= diagnosis.translation_error < 0.1 and 0 <= diagnosis.rotation_error < 1
+    assert diagnosis.height == pytest.approx(1.2, abs=0.1) and diagnosis.tilt < 3
+    assert diagnosis.points == pytest.approx(np.mean([len(scan.points) for scan in recording]), 0.01)
+    text = repr(diagnosis)
+    assert text.splitlines()[0].startswith("scans  ") and text.endswith(diagnosis.advice)
+    with pytest.raises(TypeError, match="open recording"):
+        dynains.check(recording, pose_units="mm")
+
+
+def test_check_proposes_the_options_of_a_recording(drive):
+    given = {"poses": drive / "poses_mm.txt"}
+    diagnosis = dynains.check(drive, **given)
+    assert not diagnosis.passed and diagnosis.verdict == "otherwise"
+    assert diagnosis.options == {**given, "pose_units": "mm"}
+    (call,) = [line for line in repr(diagnosis).splitlines() if "dynains.Recording(" in line]
+    recording = eval(call.strip(), {"dynains": dynains})
+    assert dynains.check(recording).passed
+    assert os.fspath(recording.path) == os.fspath(drive)
