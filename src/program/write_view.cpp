@@ -1,9 +1,11 @@
 #include "write_view.hpp"
 
+#include <algorithm>
 #include <string>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
+#include "dynains/stage/free_space_config.hpp"
 #include "json_file.hpp"
 #include "page.hpp"
 #include "run_results.hpp"
@@ -37,6 +39,15 @@ viewer::RunFiles files_of(const OutputFolder& out, const Recording& recording) {
   if (files.last < files.first) {
     throw IoError(report.string() + ": /last_scan: expected a scan after /first_scan");
   }
+  const FreeSpaceConfig defaults;
+  const auto scans = [&](const std::string& name, int value) {
+    const auto given = json_field<double>(report, json, "/configuration/" + name);
+    return static_cast<std::size_t>(std::clamp(given.value_or(value), 0.0, 1e9));
+  };
+  files.references = viewer::ReferenceWindow(
+      scans("lookback_scans", defaults.lookback_scans),
+      scans("lookahead_scans", defaults.lookahead_scans),
+      std::max<std::size_t>(scans("reference_step", defaults.reference_step), 1));
   const auto map = json_field<std::string>(report, json, "/static_map/file");
   if (map) files.map = out.path() / *map;
   return files;

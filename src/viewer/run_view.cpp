@@ -57,6 +57,7 @@ class Collector {
     }
     data_.moving = moving_->take();
     data_.moving_cell = moving_->cell();
+    find_sightings();
     return std::move(data_);
   }
 
@@ -143,6 +144,20 @@ class Collector {
       point.local = data_.map[found].local;
       data_.map[found] = point;
     }
+  }
+
+  void find_sightings() {
+    data_.reference_step = files_.references.step();
+    data_.reference_lookback = files_.references.lookback();
+    SightingFinder finder(data_.moving, files_.references);
+    for (std::size_t i = files_.first; i <= files_.last; ++i) {
+      if (!files_.references.is_reference(i - files_.first)) continue;
+      recording_.read_scan(i, scan_.points);
+      Eigen::Isometry3d T_local_sensor = recording_.T_world_sensor(i);
+      T_local_sensor.translation() -= data_.origin;
+      finder.compare(i - files_.first, T_local_sensor.inverse(), scan_.points.xyzi);
+    }
+    data_.sightings = finder.take();
   }
 
   const Recording& recording_;

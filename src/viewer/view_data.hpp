@@ -34,6 +34,13 @@ struct ViewPoint {
   ViewTruth truth = ViewTruth::kUnknown;
 };
 
+/// What beams of the reference scans of a point met at its place; bit k stands for reference k of
+/// its ReferenceWindow.
+struct Sightings {
+  std::uint64_t passed = 0;    ///< beams passed through the place
+  std::uint64_t returned = 0;  ///< a beam was returned there
+};
+
 struct ViewScan {
   std::string name;
   double time;               ///< s
@@ -56,6 +63,9 @@ struct ViewData {
   std::vector<ViewScan> scans;
   std::vector<ViewPoint> map;
   std::vector<ViewPoint> moving;
+  std::vector<Sightings> sightings;    ///< by point of `moving`
+  std::size_t reference_step = 1;      ///< of the window of the sightings, scans
+  std::size_t reference_lookback = 0;  ///< of that window, scans
   double map_cell = 0.0;  ///< edge of cells with one map point each, m; 0: all points of the file
   double moving_cell = 0.0;  ///< edge of cells with one moving point per scan, m
   ViewCounts counts;

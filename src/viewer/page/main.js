@@ -144,12 +144,17 @@ class Viewer {
     }, 1000 * Math.min(0.5, Math.max(0.02, pause)));
   }
 
+  // Name and text of everything that is known of a point.
+  factsOf(index) {
+    return factsOf(this.description, this.points, index);
+  }
+
   pick(x, y) {
     const index = this.renderer.pick(this.state, x, y);
     if (index < 0) {
       element('card').hidden = true;
     } else {
-      showCard(factsOf(this.description, this.points, index));
+      showCard(this.factsOf(index));
     }
     this.request();
     return index;
