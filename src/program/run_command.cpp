@@ -113,6 +113,24 @@ void add_run_command(CLI::App& app) {
       .add_option("--map", options->map,
                   "static map, .ply, .pcd or .las [static_map.ply in the folder of --out]")
       ->type_name("FILE");
+  const char* const kCores = "Cores and chunks";
+  command
+      .add_option("--jobs", options->jobs,
+                  "threads that process chunks of the recording; changes no result [one for each "
+                  "core]")
+      ->type_name("N")
+      ->group(kCores);
+  command
+      .add_option("--chunk", options->chunk,
+                  "scans of a chunk, 0: the recording is one stream [0 for less than 1000 scans, "
+                  "else about 500]")
+      ->type_name("SCANS")
+      ->group(kCores);
+  command
+      .add_option("--lookback", options->lookback,
+                  "scans before a chunk that prepare it [those whose evidence counts for a scan]")
+      ->type_name("SCANS")
+      ->group(kCores);
   const char* const kOutputs = "More outputs, and memory";
   command
       .add_flag("--map-attributes", options->map_attributes,
