@@ -217,6 +217,7 @@ class ChunkedRun {
     }
     const std::lock_guard<std::mutex> lock(mutex_);
     done_ += chunk(number).own.size();
+    ++timing_.kept_chunks;
     return true;
   }
 
@@ -348,6 +349,8 @@ class ChunkedRun {
       row.scan = plan_.sequence.name(own.first + i);
       timing_.rows.push_back(std::move(row));
     }
+    ++timing_.chunks;
+    const std::lock_guard<std::mutex> lock(mutex_);
     timing_.pipeline += summary.timing.pipeline;
     map.add(reader, plan_.sequence.T_world_sensor(own.first));
   }

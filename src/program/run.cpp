@@ -121,6 +121,7 @@ RunOutcome outcome_of(const RunPlan& plan, const RunResults& results, const RunT
   std::vector<double> totals;
   for (const TimingRow& row : timing.rows) totals.push_back(row.total);
   outcome.time = statistics(std::move(totals));
+  outcome.jobs = timing.jobs;
   return outcome;
 }
 
@@ -153,11 +154,13 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   change.put_in_place([&] { results.commit_outside_map(); });
   if (!change.is_staged() && outcome.complete) remove_chunks(plan, outputs.folder);
   outcome.map_points = results.map_points();
-  nlohmann::ordered_json report =
-      make_report(describe(plan, settings, agreement, results), results, timing);
+  outcome.wall = wall_time(ms_since(settings.started), timing);
+  RunDescription description = describe(plan, settings, agreement, results);
+  description.wall = outcome.wall;
+  nlohmann::ordered_json report = make_report(description, results, timing);
   report["request"] = plan.request;
-  change.finish(report,
-                plan.outputs.listing(plan.sequence, plan.range, /*lasts=*/!outcome.complete));
+  change.finish(report, plan.outputs.listing(plan.sequence, plan.range,
+                                             plan.outputs.in_chunks && !outcome.complete));
   return outcome;
 }
 
