@@ -34,18 +34,19 @@ std::uint32_t mos_label(PointLabel label, std::uint32_t instance) {
   return mos_class(label) | id << 16;
 }
 
-LabelWriter::LabelWriter(std::filesystem::path folder, std::filesystem::path causes,
-                         std::filesystem::path beliefs)
-    : folder_(std::move(folder)),
+LabelFiles::LabelFiles(std::filesystem::path labels, std::filesystem::path causes,
+                       std::filesystem::path beliefs)
+    : folder_(std::move(labels)),
       cause_folder_(std::move(causes)),
-      belief_folder_(std::move(beliefs)) {
-  create_folder(folder_);
-  if (!cause_folder_.empty()) create_folder(cause_folder_);
-  if (!belief_folder_.empty()) create_folder(belief_folder_);
+      belief_folder_(std::move(beliefs)) {}
+
+void LabelFiles::create_folders() const {
+  for (const std::filesystem::path& folder : {folder_, cause_folder_, belief_folder_}) {
+    if (!folder.empty()) create_folder(folder);
+  }
 }
 
-void LabelWriter::write(const std::string& name, const ScanVerdict& verdict) {
-  finish();
+void LabelFiles::take(const ScanVerdict& verdict) {
   labels_.resize(verdict.labels.size());
   for (std::size_t i = 0; i < labels_.size(); ++i) {
     labels_[i] = mos_label(verdict.labels[i], verdict.instances[i]);
@@ -61,11 +62,24 @@ void LabelWriter::write(const std::string& name, const ScanVerdict& verdict) {
         verdict.beliefs.begin(), verdict.beliefs.end(), beliefs_.begin(),
         [](float belief) { return static_cast<std::uint8_t>(std::lround(255.0F * belief)); });
   }
-  pending_ = std::async(std::launch::async, [this, name] {
-    write_labels(folder_ / (name + ".label"), labels_);
-    if (!cause_folder_.empty()) write_point_bytes(cause_folder_ / (name + ".cause"), causes_);
-    if (!belief_folder_.empty()) write_point_bytes(belief_folder_ / (name + ".belief"), beliefs_);
-  });
+}
+
+void LabelFiles::write(const std::string& name) const {
+  write_labels(folder_ / (name + ".label"), labels_);
+  if (!cause_folder_.empty()) write_point_bytes(cause_folder_ / (name + ".cause"), causes_);
+  if (!belief_folder_.empty()) write_point_bytes(belief_folder_ / (name + ".belief"), beliefs_);
+}
+
+LabelWriter::LabelWriter(std::filesystem::path folder, std::filesystem::path causes,
+                         std::filesystem::path beliefs)
+    : files_(std::move(folder), std::move(causes), std::move(beliefs)) {
+  files_.create_folders();
+}
+
+void LabelWriter::write(const std::string& name, const ScanVerdict& verdict) {
+  finish();
+  files_.take(verdict);
+  pending_ = std::async(std::launch::async, [this, name] { files_.write(name); });
 }
 
 void LabelWriter::finish() {

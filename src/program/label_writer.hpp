@@ -15,30 +15,46 @@ namespace dynains::program {
 /// 0 for none; ids beyond 65535 start again at 1.
 std::uint32_t mos_label(PointLabel label, std::uint32_t instance);
 
-/// One thread at most; one scan at most waits for the disk.
-class LabelWriter {
+/// The files of labels of a scan: written by the caller's thread.
+class LabelFiles {
  public:
-  /// Creates the folders. No causes or beliefs are written if their folder is empty. Throws
-  /// IoError.
-  explicit LabelWriter(std::filesystem::path folder, std::filesystem::path causes = {},
-                       std::filesystem::path beliefs = {});
-  LabelWriter(const LabelWriter&) = delete;
-  LabelWriter& operator=(const LabelWriter&) = delete;
+  /// No causes or beliefs are written if their folder is empty.
+  explicit LabelFiles(std::filesystem::path labels, std::filesystem::path causes = {},
+                      std::filesystem::path beliefs = {});
 
-  /// Writes `folder`/`name`.label, `causes`/`name`.cause and `beliefs`/`name`.belief (255 is a
-  /// belief of 1). Throws IoError, for the scan before as well.
-  void write(const std::string& name, const ScanVerdict& verdict);
-  /// Waits for the last file. Throws IoError.
-  void finish();
+  /// Creates the folders. Throws IoError.
+  void create_folders() const;
+  /// Copies a verdict into the form of the files.
+  void take(const ScanVerdict& verdict);
+  /// Writes the verdict of take() to `labels`/`name`.label, `causes`/`name`.cause and
+  /// `beliefs`/`name`.belief (255 is a belief of 1). Throws IoError.
+  void write(const std::string& name) const;
 
  private:
   std::filesystem::path folder_;
   std::filesystem::path cause_folder_;
   std::filesystem::path belief_folder_;
-  // The writing thread's, while pending_ is valid.
   std::vector<std::uint32_t> labels_;
   std::vector<std::uint8_t> causes_;
   std::vector<std::uint8_t> beliefs_;
+};
+
+/// Writes LabelFiles in a thread. One thread at most; one scan at most waits for the disk.
+class LabelWriter {
+ public:
+  /// As LabelFiles. Creates the folders. Throws IoError.
+  explicit LabelWriter(std::filesystem::path folder, std::filesystem::path causes = {},
+                       std::filesystem::path beliefs = {});
+  LabelWriter(const LabelWriter&) = delete;
+  LabelWriter& operator=(const LabelWriter&) = delete;
+
+  /// Writes the files of scan `name`. Throws IoError, for the scan before as well.
+  void write(const std::string& name, const ScanVerdict& verdict);
+  /// Waits for the last file. Throws IoError.
+  void finish();
+
+ private:
+  LabelFiles files_;  // the writing thread's, while pending_ is valid
   std::future<void> pending_;
 };
 

@@ -60,14 +60,36 @@ void Overview::add(const RecordedScan& scan, const ScanVerdict& verdict) {
     if (!(x >= 0 && x < width_ && y >= 0 && y < height_)) continue;
     const auto row = static_cast<std::size_t>(y), column = static_cast<std::size_t>(x);
     Pixel& pixel = pixels_[row * static_cast<std::size_t>(width_) + column];
-    const auto height = static_cast<float>(p.z());
     if (is_moving) {
       pixel.has_moving = true;
-    } else if (height > pixel.height) {
-      pixel.height = height;
-      pixel.grey = shade(p.z() - sensor_height);
+    } else {
+      pixel.add_static(static_cast<float>(p.z()), shade(p.z() - sensor_height));
     }
   }
+}
+
+std::vector<Overview::Place> Overview::places() const {
+  std::vector<Place> places;
+  for (std::size_t i = 0; i < pixels_.size(); ++i) {
+    const Pixel& pixel = pixels_[i];
+    if (!pixel.has_static() && !pixel.has_moving) continue;
+    places.push_back({static_cast<std::uint32_t>(i), pixel.height, pixel.grey,
+                      static_cast<std::uint8_t>(pixel.has_moving ? 1 : 0)});
+  }
+  return places;
+}
+
+bool Overview::merge(const std::vector<Place>& places) {
+  const bool is_inside = std::all_of(places.begin(), places.end(), [&](const Place& place) {
+    return place.pixel < pixels_.size();
+  });
+  if (!is_inside) return false;
+  for (const Place& place : places) {
+    Pixel& pixel = pixels_[place.pixel];
+    pixel.add_static(place.height, place.grey);
+    pixel.has_moving = pixel.has_moving || place.has_moving != 0;
+  }
+  return true;
 }
 
 Picture Overview::picture() const {

@@ -1,11 +1,13 @@
 #include "run.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <system_error>
 #include <utility>
 #include <vector>
 
+#include "chunked_run.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/diagnosis.hpp"
 #include "dynains/remover.hpp"
@@ -28,6 +30,7 @@ RunTiming process(const RunPlan& plan, const RunListener& listener, const fs::pa
   const auto report_progress = [&](std::size_t done) {
     if (listener.progress) listener.progress(done, total);
   };
+  if (!plan.chunks.empty()) return run_in_chunks(plan, listener, folder, results);
   RunTiming timing;
   const auto work = [&](auto& remover) {
     report_progress(0);
@@ -91,7 +94,9 @@ RunDescription describe(const RunPlan& plan, const RunSettings& settings,
   description.sequence = settings.recording;
   description.sequence_flags = settings.recording_flags;
   description.first_scan = sequence.name(plan.range.first);
-  description.last_scan = sequence.name(plan.range.first + results.finished() - 1);
+  // Without a finished scan, as after a signal within the first chunk: the first one.
+  description.last_scan =
+      sequence.name(plan.range.first + std::max<std::size_t>(results.finished(), 1) - 1);
   description.missing_poses = sequence.missing_pose_count();
   description.log_ends_early = sequence.early_end().has_value();
   description.agreement = agreement.as_given;
@@ -116,6 +121,7 @@ RunOutcome outcome_of(const RunPlan& plan, const RunResults& results, const RunT
   std::vector<double> totals;
   for (const TimingRow& row : timing.rows) totals.push_back(row.total);
   outcome.time = statistics(std::move(totals));
+  outcome.jobs = timing.jobs;
   return outcome;
 }
 
@@ -143,12 +149,18 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   }
   results.commit();
   write_timing(outputs.folder / "timing.csv", timing);
+  // An earlier folder keeps the chunks until all other files are on the disk.
+  if (change.is_staged()) remove_chunks(plan, outputs.folder);
   change.put_in_place([&] { results.commit_outside_map(); });
+  if (!change.is_staged() && outcome.complete) remove_chunks(plan, outputs.folder);
   outcome.map_points = results.map_points();
-  nlohmann::ordered_json report =
-      make_report(describe(plan, settings, agreement, results), results, timing);
+  outcome.wall = wall_time(ms_since(settings.started), timing);
+  RunDescription description = describe(plan, settings, agreement, results);
+  description.wall = outcome.wall;
+  nlohmann::ordered_json report = make_report(description, results, timing);
   report["request"] = plan.request;
-  change.finish(report, plan.outputs.listing(plan.sequence, plan.range, false));
+  change.finish(report, plan.outputs.listing(plan.sequence, plan.range,
+                                             plan.outputs.in_chunks && !outcome.complete));
   return outcome;
 }
 

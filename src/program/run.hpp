@@ -32,7 +32,9 @@ struct RunOutcome {
   std::uint64_t points = 0;
   LabelCounts labels;
   std::optional<std::size_t> map_points;
-  Statistics time;             ///< ms per scan
+  Statistics time;  ///< ms per scan
+  WallTime wall;
+  std::size_t jobs = 1;
   std::filesystem::path page;  ///< empty: none was asked for
 };
 

@@ -38,7 +38,11 @@ void print_summary(const RunOutcome& run) {
             << " points: " << percent(moving) << " % moving, " << percent(kept) << " % static, "
             << percent(run.points - moving - kept) << " % not judged\n"
             << "time per scan: median " << run.time.median << " ms, p95 " << run.time.p95
-            << " ms, max " << run.time.max << " ms\n";
+            << " ms, max " << run.time.max << " ms\n"
+            << "wall time: " << run.wall.ms / 1000.0 << " s"
+            << (run.jobs > 1 ? ", " + std::to_string(run.jobs) + " jobs" : std::string()) << "; "
+            << 100.0 * run.wall.outside
+            << " % of it outside the pipeline (reading, writing, starting)\n";
   if (run.map_points) {
     std::cout << "static map: " << (outputs.folder / outputs.map_name()).string() << " ("
               << *run.map_points << " points)\n";
@@ -105,14 +109,32 @@ void add_run_command(CLI::App& app) {
   command
       .add_flag("--resume", options->resume,
                 "complete a run with the same flags that was interrupted or killed, if --out holds "
-                "one; nothing to do if it is complete. Scans are processed from the first on, for "
-                "verdicts depend on earlier scans")
+                "one; nothing to do if it is complete. Finished chunks are kept; one stream begins "
+                "with the first scan again, for verdicts depend on earlier scans")
       ->excludes(force);
   add_window_options(command, options->window);
   command
       .add_option("--map", options->map,
                   "static map, .ply, .pcd or .las [static_map.ply in the folder of --out]")
       ->type_name("FILE");
+  const char* const kCores = "Cores and chunks";
+  command
+      .add_option("--jobs", options->jobs,
+                  "threads that process chunks of the recording; changes no result [one for each "
+                  "core]")
+      ->type_name("N")
+      ->group(kCores);
+  command
+      .add_option("--chunk", options->chunk,
+                  "scans of a chunk, 0: the recording is one stream [0 for less than 1000 scans, "
+                  "else about 500]")
+      ->type_name("SCANS")
+      ->group(kCores);
+  command
+      .add_option("--lookback", options->lookback,
+                  "scans before a chunk that prepare it [those whose evidence counts for a scan]")
+      ->type_name("SCANS")
+      ->group(kCores);
   const char* const kOutputs = "More outputs, and memory";
   command
       .add_flag("--map-attributes", options->map_attributes,

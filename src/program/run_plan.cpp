@@ -1,6 +1,7 @@
 #include "run_plan.hpp"
 
 #include <algorithm>
+#include <thread>
 #include <utility>
 
 #include "dynains/errors.hpp"
@@ -9,6 +10,7 @@
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/pose.hpp"
+#include "fingerprint.hpp"
 #include "naming_scan.hpp"
 #include "run_request.hpp"
 
@@ -73,6 +75,54 @@ void add_map_attributes(const RunSettings& settings, const DynaInsRemover::Confi
   if (outputs.crs.empty()) return;
   if (!outputs.has_las_map()) throw ConfigError("--crs needs --map FILE.las");
   wkt_of(outputs.crs);
+}
+
+/// Scans before another one whose evidence counts for it.
+std::size_t evidence_horizon(const DynaInsRemover::Config& config) {
+  const int window = config.uses_window() ? config.window - 1 : 0;
+  const int references = config.uses_free_space() ? config.evidence.lookback_scans : 0;
+  return static_cast<std::size_t>(std::max(window, references));
+}
+
+/// Throws ConfigError unless a flag has at least this value.
+void check_least(const char* flag, const std::optional<std::int64_t>& value, std::int64_t least) {
+  if (!value || *value >= least) return;
+  throw ConfigError(std::string(flag) + " " + std::to_string(*value) + ": expected at least " +
+                    std::to_string(least));
+}
+
+/// Nothing of it depends on the machine. Throws ConfigError.
+ChunkSettings choose_chunks(const RunSettings& settings, const DynaInsRemover::Config& config,
+                            std::size_t scans) {
+  check_least("--jobs", settings.jobs, 1);
+  check_least("--chunk", settings.chunk, 0);
+  check_least("--lookback", settings.lookback, 0);
+  const bool is_stream = settings.chunk && *settings.chunk == 0;
+  if (settings.lookback && (!settings.chunk || is_stream)) {
+    throw ConfigError("--lookback needs --chunk: without chunks there is no warm-up");
+  }
+  if (is_stream && settings.jobs && *settings.jobs > 1) {
+    throw ConfigError("--jobs " + std::to_string(*settings.jobs) +
+                      " with --chunk 0: one stream is processed by one job");
+  }
+  if (config.revision.revise_map && settings.chunk && !is_stream) {
+    throw ConfigError(
+        "--revise-map with --chunk: the map is revised by all later scans; use --chunk 0");
+  }
+  ChunkSettings chunks;
+  if (config.revision.revise_map) return chunks;
+  chunks.lookback =
+      settings.lookback ? static_cast<std::size_t>(*settings.lookback) : evidence_horizon(config);
+  chunks.scans = settings.chunk
+                     ? static_cast<std::size_t>(*settings.chunk)
+                     : default_chunk(scans, chunks.lookback, DynaInsRemover(config).latency());
+  return chunks;
+}
+
+std::size_t choose_jobs(const RunSettings& settings, std::size_t chunks) {
+  const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
+  const std::size_t jobs = settings.jobs ? static_cast<std::size_t>(*settings.jobs) : cores;
+  return std::max<std::size_t>(1, std::min(jobs, chunks));
 }
 
 InputFiles inputs_of(const RunSettings& settings, const Recording& sequence) {
@@ -140,13 +190,33 @@ RunPlan make_plan(const RunSettings& settings, Recording sequence) {
   }
   const ScanRange range = select_scans(sequence, settings.window);
   check_scans(sequence, range);
+  const ChunkSettings chunk_settings = choose_chunks(settings, config, range.size());
+  std::vector<Chunk> chunks;
+  if (chunk_settings.scans > 0) {
+    chunks = chunk_grid(range, chunk_settings, DynaInsRemover(config).latency());
+  }
+  outputs.in_chunks = !chunks.empty();
   const nlohmann::ordered_json configuration = parameters_of(config);
-  const nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);
+  nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);
+  request["chunk"] = chunk_settings.scans;
+  request["lookback"] = chunks.empty() ? 0 : chunk_settings.lookback;
+  Fingerprint fingerprint;
+  fingerprint.add(request.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  const std::size_t jobs = choose_jobs(settings, chunks.size());
   OutputListing listing = outputs.listing(sequence, range, true);
   InputFiles inputs = inputs_of(settings, sequence);
-  return {config,  map_on_disk,        std::move(sequence), range,
-          outputs, std::move(listing), std::move(inputs),   configuration,
-          request};
+  return {config,
+          map_on_disk,
+          std::move(sequence),
+          range,
+          outputs,
+          std::move(listing),
+          std::move(inputs),
+          configuration,
+          request,
+          std::move(chunks),
+          jobs,
+          fingerprint.value()};
 }
 
 RunTask choose_task(const RunPlan& plan, const RunSettings& settings, const OutputFolder& out) {

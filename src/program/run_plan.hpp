@@ -6,7 +6,9 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "chunk_grid.hpp"
 #include "dynains/io/folder_lock.hpp"
 #include "dynains/io/recording.hpp"
 #include "input_files.hpp"
@@ -27,6 +29,9 @@ struct RunPlan {
   InputFiles inputs;
   nlohmann::ordered_json configuration;  ///< parameter name -> value
   nlohmann::ordered_json request;        ///< see describe_request()
+  std::vector<Chunk> chunks;             ///< empty: the recording is one stream
+  std::size_t jobs = 1;                  ///< threads that process chunks
+  std::uint64_t fingerprint = 0;         ///< of the request
 };
 
 /// Path of the file that a flag --map names, links followed. `out`: folder of the results, by

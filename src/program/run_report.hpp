@@ -26,6 +26,14 @@ Statistics statistics(std::vector<double> values);
 /// Highest resident memory of this process so far.
 std::uint64_t peak_memory_bytes();
 
+/// Time of a whole run.
+struct WallTime {
+  double ms = 0.0;       ///< from the start of the command to the report
+  double outside = 0.0;  ///< share of the jobs' time that is not the pipeline, [0, 1]
+};
+/// `ms`: from the start of the command on.
+WallTime wall_time(double ms, const RunTiming& timing);
+
 struct RunDescription {
   std::string sequence;
   nlohmann::ordered_json sequence_flags;  ///< flag -> value, those that describe the files
@@ -38,6 +46,7 @@ struct RunDescription {
   bool complete = true;  ///< false after a signal
   std::string map;       ///< file, relative to the folder of results if it lies there; empty: none
   nlohmann::ordered_json configuration;  ///< parameter name -> value
+  WallTime wall;
 };
 
 nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& results,

@@ -1,30 +1,14 @@
 #include "run_request.hpp"
 
-#include <cstdint>
-#include <cstring>
 #include <string>
 
 #include "dynains/version.hpp"
+#include "fingerprint.hpp"
 
 namespace dynains::program {
 namespace {
 
 constexpr const char* kPosesAndTimes = "poses_and_times";
-
-/// FNV-1a, 64 bits.
-class Fingerprint {
- public:
-  void add(const void* data, std::size_t size) {
-    const auto* const bytes = static_cast<const unsigned char*>(data);
-    for (std::size_t i = 0; i < size; ++i) value_ = (value_ ^ bytes[i]) * 0x100000001B3U;
-  }
-  void add(const std::string& text) { add(text.data(), text.size()); }
-  void add(double value) { add(&value, sizeof(value)); }
-  std::string text() const { return std::to_string(value_); }
-
- private:
-  std::uint64_t value_ = 0xCBF29CE484222325U;
-};
 
 using Json = nlohmann::ordered_json;
 

@@ -19,14 +19,6 @@ bool is_far(const Recording& recording, const ScanRange& range) {
   return false;
 }
 
-std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange& range) {
-  std::vector<Eigen::Vector3d> path;
-  for (std::size_t i = range.first; i <= range.last; ++i) {
-    path.emplace_back(recording.T_world_sensor(i).translation());
-  }
-  return path;
-}
-
 constexpr const char* kDynamicLas = "dynamic_points.las";
 constexpr const char* kVerdictLog = "verdicts.mcap";
 
@@ -65,6 +57,14 @@ PointColumns dynamic_columns(bool far, PointColumns columns) {
 
 }  // namespace
 
+std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange& range) {
+  std::vector<Eigen::Vector3d> path;
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    path.emplace_back(recording.T_world_sensor(i).translation());
+  }
+  return path;
+}
+
 const OutputKind& run_output_kind() {
   static const OutputKind kind = {
       "run",
@@ -76,6 +76,7 @@ const OutputKind& run_output_kind() {
        {"causes", {".cause"}},
        {"beliefs", {".belief"}},
        {"clean", {".bin", ".pcd", ".ply"}},
+       {kChunkFolder, {kChunkExtension}},
        {kTileFolder, {kTileExtension}}}};
   return kind;
 }
@@ -102,6 +103,7 @@ OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& r
     listing.folders["clean"] =
         std::filesystem::path(CleanWriter::name(recording, range.first)).extension().string();
   }
+  if (in_chunks && lasts) listing.folders[kChunkFolder] = kChunkExtension;
   if (map_on_disk && lasts) listing.folders[kTileFolder] = kTileExtension;
   for (std::size_t i = range.first; i <= range.last; ++i) listing.scans.insert(recording.name(i));
   return listing;
@@ -154,17 +156,12 @@ void RunResults::take_newest(RecordedScan scan, const ScanVerdict& verdict) {
 }
 
 void RunResults::take_final(const ScanVerdict& verdict) {
-  const std::size_t index = range_.first + verdict.scan;
-  final_labels_.write(recording_.name(index), verdict);
+  final_labels_.write(recording_.name(range_.first + verdict.scan), verdict);
   labels_.add(verdict.labels);
 
   RecordedScan scan = std::move(open_scans_.front());
   open_scans_.pop_front();
-  if (clean_scans_) clean_scans_->write(index, scan, verdict.labels);
-  if (log_) log_->add(scan, verdict);
-  const bool has_labels = map_attributes_ && recording_.has_labels();
-  const auto labels = has_labels ? recording_.read_labels(index) : std::vector<std::uint32_t>();
-  if (map_attributes_) map_attributes_->add(scan, verdict, labels);
+  add_scan(scan, verdict);
   overview_.add(scan, verdict);
   for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
     if (verdict.labels[i] != PointLabel::kDynamic) continue;
@@ -172,10 +169,36 @@ void RunResults::take_final(const ScanVerdict& verdict) {
     point.position = verdict.T_world_sensor * point.position;
     point.label = mos_label(verdict.labels[i], verdict.instances[i]);
     dynamic_points_.add(point);
-    if (dynamic_las_) dynamic_las_->add(point.position, attributes_of(scan, verdict, labels, i));
   }
   spare_.push_back(std::move(scan));
   ++finished_;
+}
+
+bool RunResults::needs_scans() const {
+  return clean_scans_ || log_ || map_attributes_ || dynamic_las_;
+}
+
+void RunResults::add_scan(const RecordedScan& scan, const ScanVerdict& verdict) {
+  const std::size_t index = range_.first + verdict.scan;
+  if (clean_scans_) clean_scans_->write(index, scan, verdict.labels);
+  if (log_) log_->add(scan, verdict);
+  const bool has_labels = map_attributes_ && recording_.has_labels();
+  const auto labels = has_labels ? recording_.read_labels(index) : std::vector<std::uint32_t>();
+  if (map_attributes_) map_attributes_->add(scan, verdict, labels);
+  if (!dynamic_las_) return;
+  for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
+    if (verdict.labels[i] != PointLabel::kDynamic) continue;
+    const Eigen::Vector3d position = verdict.T_world_sensor * scan.point(i).position;
+    dynamic_las_->add(position, attributes_of(scan, verdict, labels, i));
+  }
+}
+
+bool RunResults::add_chunk(std::size_t scans, const ChunkSummary& summary) {
+  if (!overview_.merge(summary.overview)) return false;
+  points_ += summary.points;
+  for (std::size_t i = 0; i < labels_.of.size(); ++i) labels_.of[i] += summary.labels[i];
+  finished_ += scans;
+  return true;
 }
 
 RecordedScan RunResults::recycle() {

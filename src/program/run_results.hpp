@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "chunk_file.hpp"
 #include "clean_writer.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
@@ -20,17 +21,10 @@
 #include "map_file.hpp"
 #include "output_listing.hpp"
 #include "overview.hpp"
+#include "scan_range.hpp"
 #include "verdict_log.hpp"
 
 namespace dynains::program {
-
-/// Which scans of a sequence take part.
-struct ScanRange {
-  std::size_t first;  ///< index
-  std::size_t last;   ///< index, inclusive
-
-  std::size_t size() const { return last - first + 1; }
-};
 
 /// In the folder of results, while a run with --map-memory lasts.
 inline constexpr const char* kTileFolder = "map_tiles";
@@ -39,6 +33,11 @@ inline constexpr const char* kTileFolder = "map_tiles";
 inline constexpr const char* kOverviewPicture = "overview.png";
 /// The page of `dynains view` in the folder of results.
 inline constexpr const char* kViewPage = "view.html";
+
+/// In the folder of results, while a run in chunks lasts: a file for each chunk, named by its first
+/// scan.
+inline constexpr const char* kChunkFolder = "chunks";
+inline constexpr const char* kChunkExtension = ".chunk";
 
 /// The names that `dynains run` may use in its folder.
 const OutputKind& run_output_kind();
@@ -51,6 +50,7 @@ struct RunOutputs {
   bool write_mcap = false;
   bool write_beliefs = false;
   bool map_on_disk = false;
+  bool in_chunks = false;
   bool map_attributes = false;  ///< the map holds attributes of its points
   std::string crs;              ///< of a LAS map, for example "EPSG:25832"; empty: none
   double map_voxel = 0.0;       ///< m, of attributes
@@ -63,6 +63,9 @@ struct RunOutputs {
   /// Files in the folder of a run over these scans; with map tiles while it lasts.
   OutputListing listing(const Recording& recording, const ScanRange& range, bool lasts) const;
 };
+
+/// Positions of the sensor, m, world frame.
+std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange& range);
 
 /// Opens a file for the map of these scans, or for its moving points. Throws IoError.
 std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recording& recording,
@@ -93,6 +96,19 @@ class RunResults {
   void take_final(const ScanVerdict& verdict);
   /// Memory of a scan that is finished, for reading the next.
   RecordedScan recycle();
+
+  /// @name Results of chunks
+  /// In the place of take_newest() and take_final(), in the order of the scans. The caller writes
+  /// the label files.
+  /// @{
+  /// Whether an output needs add_scan().
+  bool needs_scans() const;
+  /// A scan with its final verdict.
+  void add_scan(const RecordedScan& scan, const ScanVerdict& verdict);
+  void add_moving_point(const FilePoint& point) { dynamic_points_.add(point); }
+  /// A chunk of `scans` scans. False, and nothing changes, if its picture is another one.
+  bool add_chunk(std::size_t scans, const ChunkSummary& summary);
+  /// @}
 
   void add_map_point(const Eigen::Vector3d& point);
   /// Puts all files in place, but for a map outside of the folder.

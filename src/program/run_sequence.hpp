@@ -48,18 +48,14 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
                        RunResults& results, KeepGoing&& keep_going) {
   using Clock = std::chrono::steady_clock;
   RunTiming timing;
-  const StageTimes no_times;
-  StageTimes::visit(no_times, [&](const char* name, double) { timing.stages.push_back(name); });
-
+  timing.stages = stage_names();
   timing.reserve = reserve_memory(remover, recording, range);
   ReadAhead scans(recording, range.first, range.last);
   for (std::size_t i = range.first; i <= range.last; ++i) {
     RecordedScan scan = scans.next(results.recycle());
     const Clock::time_point begin = Clock::now();
     const FrameResult frame = push_scan(remover, recording, i, scan);
-    TimingRow row{recording.name(i), scan.size(), {}, ms_since(begin), frame.pose_residual};
-    StageTimes::visit(frame.times, [&](const char*, double ms) { row.stages.push_back(ms); });
-    timing.rows.push_back(std::move(row));
+    timing.rows.push_back(timing_row(recording.name(i), scan.size(), ms_since(begin), frame));
     results.take_newest(std::move(scan), frame.newest);
     if (frame.finished) results.take_final(*frame.finished);
     if (!keep_going(timing.rows.size())) break;
@@ -73,6 +69,8 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
     writing += ms_since(begin_writing);
   });
   timing.flush = ms_since(begin) - writing;
+  timing.pipeline = timing.reserve + timing.flush;
+  for (const TimingRow& row : timing.rows) timing.pipeline += row.total;
   if (results.map_points()) {
     remover.map().for_each([&](const Eigen::Vector3d& point) { results.add_map_point(point); });
   }

@@ -1,6 +1,9 @@
-// What `dynains run` shall do, without the command line: a caller in another language fills it, too.
+// What `dynains run` shall do, without the command line: a caller in another language fills it,
+// too.
 #pragma once
 
+#include <chrono>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -17,6 +20,9 @@ struct RunSettings {
   bool map_attributes = false;
   std::string crs;  ///< of a LAS map, for example "EPSG:25832"; empty: none
   ScanWindow window;
+  std::optional<std::int64_t> jobs;      ///< threads; empty: one for each core
+  std::optional<std::int64_t> chunk;     ///< scans, 0 for one stream; empty: default_chunk()
+  std::optional<std::int64_t> lookback;  ///< scans of the warm-up of a chunk; needs `chunk`
   bool write_online = false;
   bool write_clean = false;
   bool write_mcap = false;
@@ -32,6 +38,8 @@ struct RunSettings {
 
   std::string recording;           ///< folder or file, as the user named it
   std::string recording_as_given;  ///< `recording` and its flags, so that messages propose commands
+  /// Begin of the wall time in the report.
+  std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
   nlohmann::ordered_json recording_flags;  ///< flag -> value, those that describe the files
 };
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynains/verdict.hpp"
@@ -23,6 +24,27 @@ struct RunTiming {
   std::vector<TimingRow> rows;
   double reserve = 0.0;  ///< ms before the first scan, for its memory
   double flush = 0.0;    ///< ms for the verdicts that were open after the last scan
+  double pipeline =
+      0.0;               ///< ms in the pipeline, of all workers together, all of the above included
+  std::size_t jobs = 1;         ///< workers
+  std::size_t chunks = 0;       ///< finished ones; 0 for one stream
+  std::size_t kept_chunks = 0;  ///< those of them that an earlier run had finished
 };
+
+/// Names of the stages, RunTiming::stages.
+inline std::vector<std::string> stage_names() {
+  std::vector<std::string> names;
+  const StageTimes no_times;
+  StageTimes::visit(no_times, [&](const char* name, double) { names.emplace_back(name); });
+  return names;
+}
+
+/// The row of a push that took `total` ms.
+inline TimingRow timing_row(std::string scan, std::size_t points, double total,
+                            const FrameResult& frame) {
+  TimingRow row{std::move(scan), points, {}, total, frame.pose_residual};
+  StageTimes::visit(frame.times, [&](const char*, double ms) { row.stages.push_back(ms); });
+  return row;
+}
 
 }  // namespace dynains::program

@@ -1,0 +1,276 @@
+#include "chunk_file.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+#include "dynains/errors.hpp"
+
+namespace dynains::program {
+namespace {
+
+// A file is a sequence of words of 8 bytes: magic and version, key; for each scan its arrays; the
+// summary; the map; and last the position of the summary and the checksum of all words before. An
+// array is the number of its bytes, the bytes, and zeros up to a whole word. Numbers have the byte
+// order of the machine, which the version tells.
+constexpr std::uint64_t kMagic = 0x4B4E5543594E5944U;
+constexpr std::uint64_t kVersion = 1;
+constexpr std::size_t kWord = 8;
+constexpr std::uint64_t kHeader = 5 * kWord;
+constexpr std::uint64_t kTrailer = 2 * kWord;
+
+constexpr std::size_t padded(std::size_t size) { return (size + kWord - 1) / kWord * kWord; }
+
+/// `data`: whole words.
+std::uint64_t add_to_checksum(std::uint64_t sum, const char* data, std::size_t size) {
+  for (std::size_t i = 0; i < size; i += kWord) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, data + i, kWord);
+    sum = (sum ^ word) * 0x9E3779B97F4A7C15U;
+    sum ^= sum >> 32U;
+  }
+  return sum;
+}
+
+}  // namespace
+
+void ChunkScan::take(const ScanVerdict& verdict, bool with_beliefs) {
+  labels.assign(verdict.labels.begin(), verdict.labels.end());
+  causes.assign(verdict.causes.begin(), verdict.causes.end());
+  instances.assign(verdict.instances.begin(), verdict.instances.end());
+  beliefs.clear();
+  if (with_beliefs) beliefs.assign(verdict.beliefs.begin(), verdict.beliefs.end());
+}
+
+ChunkFileWriter::ChunkFileWriter(const std::filesystem::path& file, const ChunkKey& key)
+    : file_(file) {
+  for (const std::uint64_t number : {kMagic, kVersion, key.request, key.first, key.scans}) {
+    put_number(number);
+  }
+}
+
+void ChunkFileWriter::write(const void* data, std::size_t size) {
+  const auto* const bytes = static_cast<const char*>(data);
+  const std::size_t whole = size / kWord * kWord;
+  checksum_ = add_to_checksum(checksum_, bytes, whole);
+  file_.stream().write(bytes, static_cast<std::streamsize>(whole));
+  if (whole < size) {
+    std::array<char, kWord> rest{};
+    std::memcpy(rest.data(), bytes + whole, size - whole);
+    checksum_ = add_to_checksum(checksum_, rest.data(), kWord);
+    file_.stream().write(rest.data(), kWord);
+  }
+  position_ += padded(size);
+}
+
+template <class T>
+void ChunkFileWriter::put(Span<const T> values) {
+  const std::size_t size = values.size() * sizeof(T);
+  put_number(size);
+  if (size > 0) write(values.data(), size);
+}
+
+void ChunkFileWriter::put_number(std::uint64_t value) { write(&value, sizeof(value)); }
+
+void ChunkFileWriter::add(const ChunkScan& scan) {
+  put<const MovingPoint>(scan.moving);
+  put<const PointLabel>(scan.labels);
+  put<const Cause>(scan.causes);
+  put<const std::uint32_t>(scan.instances);
+  put<const float>(scan.beliefs);
+  put<const PointLabel>(scan.online);
+}
+
+void ChunkFileWriter::finish(const ChunkSummary& summary, const StaticMapAccumulator& map) {
+  const std::uint64_t begin = position_;
+  put_number(summary.points);
+  put<const std::uint64_t>(summary.labels);
+  put<const std::uint32_t>(summary.instances.shared_before);
+  put<const std::uint32_t>(summary.instances.shared_behind);
+  put_number(summary.instances.last);
+  std::vector<std::uint32_t> pixels;
+  std::vector<float> heights;
+  std::vector<std::uint8_t> greys, moving;
+  for (const Overview::Place& place : summary.overview) {
+    pixels.push_back(place.pixel);
+    heights.push_back(place.height);
+    greys.push_back(place.grey);
+    moving.push_back(place.has_moving);
+  }
+  put<const std::uint32_t>(pixels);
+  put<const float>(heights);
+  put<const std::uint8_t>(greys);
+  put<const std::uint8_t>(moving);
+
+  const RunTiming& timing = summary.timing;
+  std::vector<double> times = {timing.reserve, timing.flush, timing.pipeline};
+  for (const TimingRow& row : timing.rows) {
+    times.push_back(static_cast<double>(row.points));
+    times.push_back(row.total);
+    times.insert(times.end(), row.stages.begin(), row.stages.end());
+    times.push_back(row.pose_residual ? 1.0 : 0.0);
+    times.push_back(row.pose_residual ? row.pose_residual->translation : 0.0);
+    times.push_back(row.pose_residual ? row.pose_residual->rotation : 0.0);
+  }
+  put<const double>(times);
+
+  std::vector<float> xyz;
+  for (std::uint32_t block = 0; block < map.block_count(); ++block) {
+    xyz.clear();
+    map.visit_in_block(block, [&](float x, float y, float z) { xyz.insert(xyz.end(), {z, y, x}); });
+    // Blocks give their newest point first: in the other order, a map fills up as this one did.
+    std::reverse(xyz.begin(), xyz.end());
+    const std::array<std::int32_t, 3> index = map.block_index(block);
+    put<const std::int32_t>(index);
+    put<const float>(xyz);
+  }
+  put_number(begin);
+  put_number(checksum_);
+  file_.commit(AtomicFile::Sync::kLater);
+}
+
+ChunkFileReader::ChunkFileReader(std::filesystem::path file, const ChunkKey& key)
+    : path_(std::move(file)), file_(path_, std::ios::binary) {
+  std::error_code error;
+  size_ = std::filesystem::file_size(path_, error);
+  if (error || !file_) fail("cannot be opened");
+  if (size_ < kHeader + kTrailer || size_ % kWord != 0) fail("is cut off");
+  if (get_number() != kMagic) fail("is no result of a chunk");
+  if (get_number() != kVersion) fail("has another version");
+  if (get_number() != key.request) fail("belongs to another run");
+  const std::uint64_t first = get_number();
+  if (first != key.first || get_number() != key.scans) fail("belongs to another chunk");
+  file_.seekg(static_cast<std::streamoff>(size_ - kTrailer));
+  summary_ = get_number();
+  checksum_ = get_number();
+  file_.seekg(kHeader);
+}
+
+void ChunkFileReader::fail(const std::string& reason) const {
+  throw IoError(path_.string() + ": " + reason);
+}
+
+void ChunkFileReader::verify() {
+  constexpr std::size_t kPart = std::size_t{1} << 20U;
+  file_.seekg(0);
+  std::vector<char> bytes;
+  std::uint64_t sum = 0;
+  for (std::uint64_t left = size_ - kWord; left > 0; left -= bytes.size()) {
+    bytes.resize(static_cast<std::size_t>(std::min<std::uint64_t>(left, kPart)));
+    read(bytes.data(), bytes.size());
+    sum = add_to_checksum(sum, bytes.data(), bytes.size());
+  }
+  if (sum != checksum_) fail("does not have the bytes that were written");
+  file_.seekg(kHeader);
+}
+
+void ChunkFileReader::read(void* data, std::size_t size) {
+  if (!file_.read(static_cast<char*>(data), static_cast<std::streamsize>(size))) {
+    fail("cannot be read");
+  }
+}
+
+std::uint64_t ChunkFileReader::get_number() {
+  std::uint64_t value = 0;
+  read(&value, sizeof(value));
+  return value;
+}
+
+template <class T>
+void ChunkFileReader::get(std::vector<T>& values) {
+  const std::uint64_t size = get_number();
+  if (size > size_ || size % sizeof(T) != 0)
+    fail("has an array of " + std::to_string(size) + " bytes");
+  values.resize(static_cast<std::size_t>(size / sizeof(T)));
+  read(values.data(), static_cast<std::size_t>(size));
+  const std::size_t rest = padded(static_cast<std::size_t>(size)) - static_cast<std::size_t>(size);
+  std::array<char, kWord> zeros{};
+  read(zeros.data(), rest);
+}
+
+void ChunkFileReader::next(ChunkScan& scan, bool moving_only) {
+  get(scan.moving);
+  if (moving_only) {
+    constexpr int kOtherArrays = 5;
+    for (int i = 0; i < kOtherArrays; ++i) {
+      const std::uint64_t size = get_number();
+      if (size > size_) fail("has an array of " + std::to_string(size) + " bytes");
+      file_.seekg(static_cast<std::streamoff>(padded(static_cast<std::size_t>(size))),
+                  std::ios::cur);
+    }
+    return;
+  }
+  get(scan.labels);
+  get(scan.causes);
+  get(scan.instances);
+  get(scan.beliefs);
+  get(scan.online);
+}
+
+ChunkSummary ChunkFileReader::read_summary() {
+  file_.seekg(static_cast<std::streamoff>(summary_));
+  ChunkSummary summary;
+  summary.points = get_number();
+  std::vector<std::uint64_t> labels;
+  get(labels);
+  if (labels.size() != summary.labels.size()) fail("has other labels");
+  std::copy(labels.begin(), labels.end(), summary.labels.begin());
+  get(summary.instances.shared_before);
+  get(summary.instances.shared_behind);
+  summary.instances.last = static_cast<std::uint32_t>(get_number());
+  std::vector<std::uint32_t> pixels;
+  std::vector<float> heights;
+  std::vector<std::uint8_t> greys, moving;
+  get(pixels);
+  get(heights);
+  get(greys);
+  get(moving);
+  const std::size_t count = pixels.size();
+  if (heights.size() != count || greys.size() != count || moving.size() != count) {
+    fail("has another picture");
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    summary.overview.push_back({pixels[i], heights[i], greys[i], moving[i]});
+  }
+
+  RunTiming& timing = summary.timing;
+  timing.stages = stage_names();
+  std::vector<double> times;
+  get(times);
+  const std::size_t columns = timing.stages.size() + 5;
+  constexpr std::size_t kTotals = 3;
+  if (times.size() < kTotals || (times.size() - kTotals) % columns != 0) fail("has other times");
+  const double* value = times.data();
+  timing.reserve = *value++;
+  timing.flush = *value++;
+  timing.pipeline = *value++;
+  while (value != times.data() + times.size()) {
+    TimingRow row;
+    row.points = static_cast<std::size_t>(*value++);
+    row.total = *value++;
+    row.stages.assign(value, value + timing.stages.size());
+    value += timing.stages.size();
+    if (*value != 0.0) {
+      row.pose_residual.emplace();
+      row.pose_residual->translation = value[1];
+      row.pose_residual->rotation = value[2];
+    }
+    value += 3;
+    timing.rows.push_back(std::move(row));
+  }
+  return summary;
+}
+
+void ChunkFileReader::add_map(StaticMapAccumulator& map) {
+  std::vector<std::int32_t> index;
+  std::vector<float> xyz;
+  while (static_cast<std::uint64_t>(file_.tellg()) < size_ - kTrailer) {
+    get(index);
+    get(xyz);
+    if (index.size() != 3) fail("has a block of the map without a place");
+    map.insert_in_block({index[0], index[1], index[2]}, xyz);
+  }
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,112 @@
+// The result of one chunk in a file, as long as the run lasts.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "dynains/io/atomic_file.hpp"
+#include "dynains/points.hpp"
+#include "dynains/static_map_accumulator.hpp"
+#include "dynains/verdict.hpp"
+#include "instance_numbers.hpp"
+#include "overview.hpp"
+#include "run_timing.hpp"
+
+namespace dynains::program {
+
+/// What a file of a chunk must agree in to be of use.
+struct ChunkKey {
+  std::uint64_t request = 0;  ///< fingerprint of the request of the run
+  std::uint64_t first = 0;    ///< index of the first own scan
+  std::uint64_t scans = 0;    ///< number of own scans
+};
+
+/// A dynamic point, world frame, m, with its columns in the recording.
+struct MovingPoint {
+  std::array<double, 3> position{};
+  double time = 0.0;
+  float intensity = 0.0F;
+  std::uint32_t instance = kNoInstance;  ///< id in the chunk
+  std::uint16_t ring = 0;
+  std::array<std::uint16_t, 3> unused{};  ///< no undefined bytes in the file
+};
+
+/// The final verdict on one scan, with ids of the chunk. Each array has one value per point, or is
+/// empty if no output needs it.
+struct ChunkScan {
+  std::vector<PointLabel> labels;
+  std::vector<Cause> causes;
+  std::vector<std::uint32_t> instances;
+  std::vector<float> beliefs;
+  std::vector<PointLabel> online;  ///< labels of the first verdict
+  std::vector<MovingPoint> moving;
+
+  /// Copies a verdict, but for `online` and `moving`.
+  void take(const ScanVerdict& verdict, bool with_beliefs);
+};
+
+/// What a chunk gives beside the verdicts on its scans and its map.
+struct ChunkSummary {
+  std::uint64_t points = 0;
+  std::array<std::uint64_t, 5> labels{};  ///< points by PointLabel
+  ChunkInstances instances;
+  std::vector<Overview::Place> overview;
+  RunTiming timing;  ///< of the own scans
+};
+
+/// Writes scan after scan; the file appears whole, at finish(), or not at all. Throws IoError.
+class ChunkFileWriter {
+ public:
+  ChunkFileWriter(const std::filesystem::path& file, const ChunkKey& key);
+
+  /// To be called for each own scan in order.
+  void add(const ChunkScan& scan);
+  void finish(const ChunkSummary& summary, const StaticMapAccumulator& map);
+
+ private:
+  AtomicFile file_;
+  std::uint64_t position_ = 0;
+  std::uint64_t checksum_ = 0;
+
+  void write(const void* data, std::size_t size);
+  template <class T>
+  void put(Span<const T> values);
+  void put_number(std::uint64_t value);
+};
+
+/// Reads a file of ChunkFileWriter. All members throw IoError with path and reason.
+class ChunkFileReader {
+ public:
+  /// Checks version and key.
+  ChunkFileReader(std::filesystem::path file, const ChunkKey& key);
+
+  /// Throws unless the checksum is that of the content. Reads the whole file.
+  void verify();
+
+  /// Reads the next of the own scans; all arrays, or `moving` alone.
+  void next(ChunkScan& scan, bool moving_only = false);
+  /// Ends the scans.
+  ChunkSummary read_summary();
+  /// Adds the points of the map to `map`. To be called once, after read_summary().
+  void add_map(StaticMapAccumulator& map);
+
+ private:
+  std::filesystem::path path_;
+  std::ifstream file_;
+  std::uint64_t size_ = 0;
+  std::uint64_t summary_ = 0;   // position
+  std::uint64_t checksum_ = 0;  // as the file says
+
+  [[noreturn]] void fail(const std::string& reason) const;
+  void read(void* data, std::size_t size);
+  template <class T>
+  void get(std::vector<T>& values);
+  std::uint64_t get_number();
+};
+
+}  // namespace dynains::program

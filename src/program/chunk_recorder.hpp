@@ -1,0 +1,71 @@
+// Takes the verdicts of a remover on a chunk, and gives those that belong to it to its file.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "chunk_file.hpp"
+#include "chunk_grid.hpp"
+#include "dynains/io/recording.hpp"
+#include "dynains/points.hpp"
+#include "dynains/static_map_accumulator.hpp"
+#include "dynains/verdict.hpp"
+#include "overview.hpp"
+#include "run_timing.hpp"
+
+namespace dynains::program {
+
+/// Which results of a chunk its run needs.
+struct ChunkOutputs {
+  bool with_beliefs = false;
+  bool with_online = false;
+  bool with_map = true;
+  StaticMapAccumulator::Config map;
+};
+
+class ChunkRecorder {
+ public:
+  /// `shared_before`, `shared_behind`: see shared_scan(). `path`: positions of the sensor of the
+  /// whole run. The writer outlives this.
+  ChunkRecorder(const Chunk& chunk, std::optional<std::size_t> shared_before,
+                std::optional<std::size_t> shared_behind, const std::vector<Eigen::Vector3d>& path,
+                const ChunkOutputs& outputs, ChunkFileWriter& writer);
+
+  /// Scan `i` of the recording, just pushed, and the first verdict on it.
+  void take_newest(std::size_t i, TimingRow row, RecordedScan scan, const ScanVerdict& verdict);
+  /// The final verdict on scan `i`. Throws IoError.
+  void take_final(std::size_t i, const ScanVerdict& verdict);
+  /// Memory of a scan that is finished, for reading the next.
+  RecordedScan recycle();
+  void add_pipeline_time(double ms) { summary_.timing.pipeline += ms; }
+
+  /// Own scans with a final verdict.
+  std::size_t finished() const { return finished_; }
+  /// Finishes the file. To be called after all own scans. Throws IoError.
+  void finish();
+
+ private:
+  bool is_own(std::size_t i) const { return i >= chunk_.own.first && i <= chunk_.own.last; }
+  void add_moving_points(const RecordedScan& scan, const ScanVerdict& verdict);
+  void add_to_map(const RecordedScan& scan, const ScanVerdict& verdict);
+
+  Chunk chunk_;
+  std::optional<std::size_t> shared_before_, shared_behind_;
+  ChunkOutputs outputs_;
+  ChunkFileWriter& writer_;
+  ChunkSummary summary_;
+  Overview overview_;
+  StaticMapAccumulator map_;
+  std::deque<RecordedScan> open_scans_;  // own ones, oldest first
+  std::deque<std::vector<PointLabel>> open_online_;
+  std::vector<RecordedScan> spare_;
+  std::size_t finished_ = 0;
+  ChunkScan record_;
+  PointBuffer kept_;
+};
+
+}  // namespace dynains::program

@@ -1,0 +1,407 @@
+#include "chunked_run.hpp"
+
+#include <algorithm>
+#include <condition_variable>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "chunk_file.hpp"
+#include "chunk_recorder.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/pose.hpp"
+#include "dynains/remover.hpp"
+#include "instance_numbers.hpp"
+#include "interrupt.hpp"
+#include "label_writer.hpp"
+#include "run_chunk.hpp"
+
+namespace dynains::program {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path file_of(const RunPlan& plan, const fs::path& folder, const Chunk& chunk) {
+  return folder / kChunkFolder / (plan.sequence.name(chunk.own.first) + kChunkExtension);
+}
+
+/// The static map of all chunks, in memory or on the disk.
+class MergedMap {
+ public:
+  MergedMap(const RunPlan& plan, const fs::path& folder) : in_memory_(plan.config.map) {
+    if (!plan.map_on_disk) return;
+    TiledStaticMap::Config config = plan.map_on_disk->map;
+    config.map_folder = folder / kTileFolder;
+    on_disk_ = std::make_unique<TiledStaticMap>(config);
+  }
+
+  /// `place`: pose of a scan of the chunk.
+  void add(ChunkFileReader& reader, const Eigen::Isometry3d& place) {
+    reader.add_map(in_memory_);
+    if (!on_disk_) return;
+    Eigen::Isometry3d T_world_chunk = Eigen::Isometry3d::Identity();
+    T_world_chunk.translation() = place.translation();
+    PointBuffer points;
+    in_memory_.for_each([&](const Eigen::Vector3d& point) {
+      const Eigen::Vector3f p = (point - place.translation()).cast<float>();
+      points.x.push_back(p.x());
+      points.y.push_back(p.y());
+      points.z.push_back(p.z());
+    });
+    in_memory_.clear();
+    on_disk_->insert(points, {}, T_world_chunk);
+  }
+
+  void give_to(RunResults& results) {
+    const auto give = [&](const Eigen::Vector3d& point) { results.add_map_point(point); };
+    if (!on_disk_) {
+      in_memory_.for_each(give);
+      return;
+    }
+    on_disk_->for_each(give);
+    on_disk_->clear();
+    const fs::path folder = on_disk_->config().map_folder;
+    on_disk_.reset();
+    std::error_code ignored;
+    fs::remove(folder, ignored);
+  }
+
+ private:
+  StaticMapAccumulator in_memory_;  // with tiles on the disk: of one chunk
+  std::unique_ptr<TiledStaticMap> on_disk_;
+};
+
+class ChunkedRun {
+ public:
+  ChunkedRun(const RunPlan& plan, const RunListener& listener, const fs::path& folder,
+             RunResults& results)
+      : plan_(plan),
+        listener_(listener),
+        folder_(folder),
+        results_(results),
+        path_(path_of(plan.sequence, plan.range)),
+        states_(plan.chunks.size()) {
+    config_ = plan.config;
+    config_.build_map = false;  // each chunk builds its own from the final labels
+    outputs_.with_beliefs = plan.outputs.write_beliefs || results.needs_scans();
+    outputs_.with_online = plan.outputs.write_online;
+    outputs_.with_map = plan.config.build_map;
+    outputs_.map = plan.config.map;
+  }
+  ~ChunkedRun() { join(); }
+  ChunkedRun(const ChunkedRun&) = delete;
+  ChunkedRun& operator=(const ChunkedRun&) = delete;
+
+  RunTiming run() {
+    timing_.stages = stage_names();
+    timing_.jobs = plan_.jobs;
+    MergedMap map(plan_, folder_);
+    report_progress();
+    for (std::size_t i = 0; i < plan_.jobs; ++i) threads_.emplace_back([this] { work(); });
+    for (std::size_t chunk = 0; chunk < states_.size() && await(chunk); ++chunk) {
+      merge(chunk, map);
+    }
+    join();
+    report_progress();
+    if (error_) std::rethrow_exception(error_);
+    if (results_.map_points()) map.give_to(results_);
+    return std::move(timing_);
+  }
+
+ private:
+  enum class Stage { kWaiting, kAtWork, kJudged, kLinked };
+  struct State {
+    Stage stage = Stage::kWaiting;
+    bool has_labels = false;  // written, or being written
+    ChunkInstances instances;
+    std::optional<InstanceNumbers> numbers;
+  };
+  struct Task {
+    std::size_t chunk;
+    bool is_labels;
+  };
+
+  const Chunk& chunk(std::size_t number) const { return plan_.chunks[number]; }
+  fs::path file(std::size_t number) const { return file_of(plan_, folder_, chunk(number)); }
+  ChunkKey key(std::size_t number) const {
+    const ScanRange& own = chunk(number).own;
+    return {plan_.fingerprint, own.first, own.size()};
+  }
+
+  // Labels come first, so that few chunks wait for them. Empty if nothing is left to do.
+  std::optional<Task> next_task() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (true) {
+      is_stopping_ = is_stopping_ || InterruptGuard::signal() != 0;
+      for (std::size_t i = 0; i < linked_ && !error_; ++i) {
+        if (states_[i].has_labels) continue;
+        states_[i].has_labels = true;
+        return Task{i, true};
+      }
+      if (!is_stopping_ && next_ < states_.size()) {
+        states_[next_].stage = Stage::kAtWork;
+        ++at_work_;
+        return Task{next_++, false};
+      }
+      if (at_work_ == 0) return std::nullopt;
+      changed_.wait(lock);
+    }
+  }
+
+  void work() {
+    std::optional<DynaInsRemover> remover;
+    while (const std::optional<Task> task = next_task()) {
+      bool is_judged = false;
+      std::exception_ptr error;
+      ChunkInstances instances;
+      try {
+        if (task->is_labels) {
+          write_labels(task->chunk);
+          continue;
+        }
+        is_judged = is_usable(task->chunk) || judge(task->chunk, remover);
+        if (is_judged)
+          instances = ChunkFileReader(file(task->chunk), key(task->chunk)).read_summary().instances;
+      } catch (...) {
+        error = std::current_exception();
+      }
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (!task->is_labels) --at_work_;
+      if (error && (!error_ || task->chunk < error_chunk_)) {
+        error_ = error;
+        error_chunk_ = task->chunk;
+      }
+      if (is_judged) {
+        states_[task->chunk].instances = std::move(instances);
+        states_[task->chunk].stage = Stage::kJudged;
+        link();
+      } else {
+        is_stopping_ = true;
+      }
+      changed_.notify_all();
+    }
+    changed_.notify_all();
+  }
+
+  // Translates the ids of all chunks behind a row of judged ones. The caller holds the mutex.
+  void link() {
+    for (; linked_ < states_.size() && states_[linked_].stage == Stage::kJudged; ++linked_) {
+      State& state = states_[linked_];
+      if (linked_ == 0) {
+        state.numbers.emplace(state.instances);
+      } else {
+        State& before = states_[linked_ - 1];
+        state.numbers.emplace(*before.numbers, before.instances, state.instances);
+        before.instances = {};
+      }
+      state.stage = Stage::kLinked;
+    }
+  }
+
+  // Whether an earlier run left a whole file of the chunk.
+  bool is_usable(std::size_t number) {
+    std::error_code ignored;
+    if (!fs::exists(file(number), ignored)) return false;
+    try {
+      ChunkFileReader(file(number), key(number)).verify();
+    } catch (const IoError& error) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      warnings_.push_back(std::string(error.what()) + "; the chunk is processed again");
+      return false;
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    done_ += chunk(number).own.size();
+    ++timing_.kept_chunks;
+    return true;
+  }
+
+  // False if a signal or an error elsewhere ended it.
+  bool judge(std::size_t number, std::optional<DynaInsRemover>& remover) {
+    if (!remover) {
+      remover.emplace(config_);
+      const double ms = reserve_memory(*remover, plan_.sequence, plan_.range);
+      const std::lock_guard<std::mutex> lock(mutex_);
+      timing_.reserve += ms;
+      timing_.pipeline += ms;
+    }
+    const auto shared = [&](std::size_t before) -> std::optional<std::size_t> {
+      if (before + 1 >= states_.size()) return std::nullopt;
+      return shared_scan(chunk(before), chunk(before + 1));
+    };
+    ChunkFileWriter writer(file(number), key(number));
+    ChunkRecorder recorder(chunk(number), number > 0 ? shared(number - 1) : std::nullopt,
+                           shared(number), path_, outputs_, writer);
+    std::size_t finished = 0;
+    const bool is_finished =
+        run_chunk(*remover, plan_.sequence, plan_.range, chunk(number), recorder, [&] {
+          const std::size_t more =
+              recorder.finished() - std::exchange(finished, recorder.finished());
+          const std::lock_guard<std::mutex> lock(mutex_);
+          done_ += more;
+          changed_.notify_all();
+          return !is_stopping_ && InterruptGuard::signal() == 0;
+        });
+    if (!is_finished) return false;
+    recorder.finish();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    done_ += recorder.finished() - finished;
+    return true;
+  }
+
+  void write_labels(std::size_t number) const {
+    LabelFiles labels(folder_ / "labels", folder_ / "causes",
+                      plan_.outputs.write_beliefs ? folder_ / "beliefs" : fs::path());
+    LabelFiles online(folder_ / "online");
+    const InstanceNumbers& numbers = *states_[number].numbers;
+    ChunkFileReader reader(file(number), key(number));
+    ChunkScan scan;
+    for (std::size_t i = chunk(number).own.first; i <= chunk(number).own.last; ++i) {
+      reader.next(scan);
+      for (std::uint32_t& id : scan.instances) id = numbers(id);
+      ScanVerdict verdict = verdict_of(i, scan);
+      labels.take(verdict);
+      labels.write(plan_.sequence.name(i));
+      if (!outputs_.with_online) continue;
+      verdict.labels = scan.online;
+      online.take(verdict);
+      online.write(plan_.sequence.name(i));
+    }
+  }
+
+  ScanVerdict verdict_of(std::size_t i, const ChunkScan& scan) const {
+    return {i - plan_.range.first,
+            plan_.sequence.time(i),
+            orthonormalized(plan_.sequence.T_world_sensor(i)),
+            scan.labels,
+            scan.instances,
+            scan.beliefs,
+            scan.causes};
+  }
+
+  // Waits for the ids of a chunk. False if the chunk will not be finished.
+  bool await(std::size_t number) {
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (true) {
+      for (const std::string& warning : std::exchange(warnings_, {})) {
+        if (listener_.warn) listener_.warn(warning);
+      }
+      if (error_) return false;
+      if (states_[number].stage == Stage::kLinked) return true;
+      if (is_stopping_ && at_work_ == 0) return false;
+      const std::size_t done = done_;
+      lock.unlock();
+      report_progress(done);
+      lock.lock();
+      if (done == done_ && states_[number].stage != Stage::kLinked && at_work_ > 0 && !error_) {
+        changed_.wait(lock);
+      }
+    }
+  }
+
+  void report_progress(std::size_t done) const {
+    if (listener_.progress) listener_.progress(done, plan_.range.size());
+  }
+  void report_progress() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    const std::size_t done = done_;
+    lock.unlock();
+    report_progress(done);
+  }
+
+  // Gives everything but the labels to the results. All chunks before are merged.
+  void merge(std::size_t number, MergedMap& map) {
+    const ScanRange& own = chunk(number).own;
+    const InstanceNumbers& numbers = *states_[number].numbers;
+    const bool needs_scans = results_.needs_scans();
+    std::optional<ReadAhead> scans;
+    if (needs_scans) scans.emplace(plan_.sequence, own.first, own.last);
+    RecordedScan points;
+    ChunkFileReader reader(file(number), key(number));
+    ChunkScan scan;
+    for (std::size_t i = own.first; i <= own.last; ++i) {
+      reader.next(scan, !needs_scans);
+      for (const MovingPoint& moving : scan.moving) {
+        FilePoint point;
+        point.position = {moving.position[0], moving.position[1], moving.position[2]};
+        point.time = moving.time;
+        point.intensity = moving.intensity;
+        point.ring = moving.ring;
+        point.label = mos_label(PointLabel::kDynamic, numbers(moving.instance));
+        results_.add_moving_point(point);
+      }
+      if (!needs_scans) continue;
+      for (std::uint32_t& id : scan.instances) id = numbers(id);
+      points = scans->next(std::move(points));
+      results_.add_scan(points, verdict_of(i, scan));
+    }
+    ChunkSummary summary = reader.read_summary();
+    if (!results_.add_chunk(own.size(), summary)) {
+      throw IoError(file(number).string() + ": has another picture");
+    }
+    for (std::size_t i = 0; i < summary.timing.rows.size(); ++i) {
+      TimingRow& row = summary.timing.rows[i];
+      row.scan = plan_.sequence.name(own.first + i);
+      timing_.rows.push_back(std::move(row));
+    }
+    ++timing_.chunks;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    timing_.pipeline += summary.timing.pipeline;
+    map.add(reader, plan_.sequence.T_world_sensor(own.first));
+  }
+
+  void join() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      // Without an error or a signal, no chunk waits any more.
+      if (std::uncaught_exceptions() > 0) is_stopping_ = true;
+      changed_.notify_all();
+    }
+    for (std::thread& thread : threads_) thread.join();
+    threads_.clear();
+  }
+
+  const RunPlan& plan_;
+  const RunListener& listener_;
+  const fs::path& folder_;
+  RunResults& results_;
+  std::vector<Eigen::Vector3d> path_;
+  DynaInsRemover::Config config_;
+  ChunkOutputs outputs_;
+
+  // The members below are guarded by the mutex, but for numbers of linked chunks, which stay.
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<State> states_;
+  std::size_t next_ = 0;     // chunk to begin
+  std::size_t at_work_ = 0;  // chunks
+  std::size_t linked_ = 0;   // chunks
+  std::size_t done_ = 0;     // scans
+  bool is_stopping_ = false;
+  std::exception_ptr error_;
+  std::size_t error_chunk_ = 0;
+  std::vector<std::string> warnings_;
+  RunTiming timing_;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace
+
+RunTiming run_in_chunks(const RunPlan& plan, const RunListener& listener, const fs::path& folder,
+                        RunResults& results) {
+  create_folder(folder / kChunkFolder);
+  return ChunkedRun(plan, listener, folder, results).run();
+}
+
+void remove_chunks(const RunPlan& plan, const fs::path& folder) {
+  std::error_code ignored;
+  for (const Chunk& chunk : plan.chunks) fs::remove(file_of(plan, folder, chunk), ignored);
+  fs::remove(folder / kChunkFolder, ignored);
+}
+
+}  // namespace dynains::program

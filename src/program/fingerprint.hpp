@@ -1,0 +1,27 @@
+// A number that tells two inputs apart, with a probability that is enough against mistakes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+namespace dynains::program {
+
+/// FNV-1a, 64 bits.
+class Fingerprint {
+ public:
+  void add(const void* data, std::size_t size) {
+    const auto* const bytes = static_cast<const unsigned char*>(data);
+    for (std::size_t i = 0; i < size; ++i) value_ = (value_ ^ bytes[i]) * 0x100000001B3U;
+  }
+  void add(const std::string& text) { add(text.data(), text.size()); }
+  void add(double value) { add(&value, sizeof(value)); }
+
+  std::uint64_t value() const { return value_; }
+  std::string text() const { return std::to_string(value_); }
+
+ private:
+  std::uint64_t value_ = 0xCBF29CE484222325U;
+};
+
+}  // namespace dynains::program
