@@ -51,9 +51,13 @@ void set_scan(RunArguments& run, const py::handle& value) {
 }
 
 const std::array<RunSetting, 17> kRunSettings{{
-    {"preset", "'default' or 'paper'", "parameters to start from",
+    {"preset", "'default', 'offline' or 'paper'", "parameters to start from",
      [](RunArguments& run, const py::handle& value) {
-       run.preset = choose<std::string>(value, {{"default", "default"}, {"paper", "paper"}});
+       const auto& names = program::preset_names();
+       run.preset = value.cast<std::string>();
+       if (std::find(names.begin(), names.end(), *run.preset) == names.end()) {
+         throw py::cast_error();
+       }
      }},
     {"config", "a Config", "all parameters, in place of a preset",
      [](RunArguments& run, const py::handle& value) {

@@ -89,7 +89,7 @@ def test_arguments_by_name(drive, tmp_path):
     [
         ({"forse": True}, dynains.ConfigError, "did you mean force"),
         ({"pose_unit": "mm"}, dynains.ConfigError, "did you mean pose_units"),
-        ({"preset": "fast"}, TypeError, "preset = 'fast': expected 'default' or 'paper'"),
+        ({"preset": "fast"}, TypeError, "preset = 'fast': expected 'default', 'offline' or 'paper'"),
         ({"preset": "paper", "config": dynains.Config()}, dynains.ConfigError, "not both"),
         ({"config": {"window": 4}}, TypeError, "expected a Config"),
         ({"config": dynains.Config(min_range=50, max_range=40)}, dynains.ConfigError, "min_range"),
@@ -114,6 +114,14 @@ def test_earlier_results_stay_unless_they_are_replaced(drive, finished):
     assert again.was_complete_before and again.scans == finished.scans
     dynains.run(drive, finished.folder, view=True, write_mcap=True, force=True)
     assert read_labels(finished.folder) == before
+
+
+def test_presets(drive, tmp_path):
+    for name in "default", "offline", "paper":
+        report = dynains.run(drive, tmp_path / name, preset=name, end=2).report
+        assert report["preset"] == name
+        config = getattr(dynains.Config, name, dynains.Config)()
+        assert report["configuration"] == config.to_dict()
 
 
 def test_poses_that_do_not_fit(drive, tmp_path):
