@@ -88,6 +88,8 @@ void ChunkFileWriter::finish(const ChunkSummary& summary, const StaticMapAccumul
   put<const std::uint64_t>(summary.labels);
   put<const std::uint32_t>(summary.instances.shared_before);
   put<const std::uint32_t>(summary.instances.shared_behind);
+  put<const std::uint32_t>(summary.instances.still_before);
+  put<const std::uint32_t>(summary.instances.moving_behind);
   put_number(summary.instances.last);
   std::vector<std::uint32_t> pixels;
   std::vector<float> heights;
@@ -218,6 +220,8 @@ ChunkSummary ChunkFileReader::read_summary() {
   std::copy(labels.begin(), labels.end(), summary.labels.begin());
   get(summary.instances.shared_before);
   get(summary.instances.shared_behind);
+  get(summary.instances.still_before);
+  get(summary.instances.moving_behind);
   summary.instances.last = static_cast<std::uint32_t>(get_number());
   std::vector<std::uint32_t> pixels;
   std::vector<float> heights;

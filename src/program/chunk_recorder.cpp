@@ -4,6 +4,28 @@
 #include <utility>
 
 namespace dynains::program {
+namespace {
+
+/// An instance moves up to the end of a chunk if it is dynamic in so many scans: fewer could be an
+/// error of few scans, and an instance that moved lately is seen by the next chunk, too.
+constexpr std::size_t kSteadyScans = 30;
+
+}  // namespace
+
+void InstancePoints::count(Span<const PointLabel> labels, Span<const std::uint32_t> instances) {
+  for (const std::uint32_t id : ids_) all_[id] = dynamic_[id] = 0;
+  ids_.clear();
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    const std::uint32_t id = instances[i];
+    if (id == kNoInstance) continue;
+    if (id >= all_.size()) {
+      all_.resize(std::size_t{id} + 1, 0);
+      dynamic_.resize(std::size_t{id} + 1, 0);
+    }
+    if (all_[id]++ == 0) ids_.push_back(id);
+    dynamic_[id] += labels[i] == PointLabel::kDynamic ? 1U : 0U;
+  }
+}
 
 ChunkRecorder::ChunkRecorder(const Chunk& chunk, std::optional<std::size_t> shared_before,
                              std::optional<std::size_t> shared_behind,
@@ -20,7 +42,10 @@ ChunkRecorder::ChunkRecorder(const Chunk& chunk, std::optional<std::size_t> shar
 void ChunkRecorder::take_newest(std::size_t i, TimingRow row, RecordedScan scan,
                                 const ScanVerdict& verdict) {
   const Span<const std::uint32_t> ids = verdict.instances;
-  if (i == shared_before_) summary_.instances.shared_before.assign(ids.begin(), ids.end());
+  if (i == shared_before_) {
+    summary_.instances.shared_before.assign(ids.begin(), ids.end());
+    ids_before_ = {ids.begin(), ids.end()};
+  }
   if (i == shared_behind_) summary_.instances.shared_behind.assign(ids.begin(), ids.end());
   if (!is_own(i)) {
     spare_.push_back(std::move(scan));
@@ -31,6 +56,13 @@ void ChunkRecorder::take_newest(std::size_t i, TimingRow row, RecordedScan scan,
   if (outputs_.with_online) {
     open_online_.emplace_back(verdict.labels.begin(), verdict.labels.end());
   }
+}
+
+void ChunkRecorder::take_shared(std::vector<std::uint32_t> before,
+                                std::vector<std::uint32_t> behind) {
+  ids_before_ = {before.begin(), before.end()};
+  summary_.instances.shared_before = std::move(before);
+  summary_.instances.shared_behind = std::move(behind);
 }
 
 void ChunkRecorder::take_final(std::size_t i, const ScanVerdict& verdict) {
@@ -48,12 +80,21 @@ void ChunkRecorder::take_final(std::size_t i, const ScanVerdict& verdict) {
 
   summary_.points += verdict.labels.size();
   for (const PointLabel label : verdict.labels) ++summary_.labels[static_cast<std::size_t>(label)];
-  std::uint32_t& last = summary_.instances.last;
-  for (const std::uint32_t id : verdict.instances) last = std::max(last, id);
+  count_instances(i, verdict);
   overview_.add(scan, verdict);
   if (outputs_.with_map) add_to_map(scan, verdict);
   spare_.push_back(std::move(scan));
   ++finished_;
+}
+
+void ChunkRecorder::count_instances(std::size_t i, const ScanVerdict& verdict) {
+  const bool is_one_of_last = chunk_.own.last - i < kSteadyScans;
+  points_.count(verdict.labels, verdict.instances);
+  points_.for_each([&](std::uint32_t id, bool is_dynamic) {
+    summary_.instances.last = std::max(summary_.instances.last, id);
+    if (is_dynamic && is_one_of_last) ++moving_scans_[id];
+    if (!is_dynamic && ids_before_.count(id) > 0) still_before_.insert(id);
+  });
 }
 
 void ChunkRecorder::add_moving_points(const RecordedScan& scan, const ScanVerdict& verdict) {
@@ -94,6 +135,11 @@ RecordedScan ChunkRecorder::recycle() {
 
 void ChunkRecorder::finish() {
   summary_.overview = overview_.places();
+  summary_.instances.still_before.assign(still_before_.begin(), still_before_.end());
+  const std::size_t steady = std::min(kSteadyScans, chunk_.own.size());
+  for (const auto& [id, scans] : moving_scans_) {
+    if (scans == steady) summary_.instances.moving_behind.push_back(id);
+  }
   writer_.finish(summary_, map_);
 }
 

@@ -5,7 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "chunk_file.hpp"
@@ -27,6 +29,22 @@ struct ChunkOutputs {
   StaticMapAccumulator::Config map;
 };
 
+/// Number of points of each instance in one scan.
+class InstancePoints {
+ public:
+  void count(Span<const PointLabel> labels, Span<const std::uint32_t> instances);
+  /// Calls `visit(id, is_dynamic)` for each instance; dynamic are those with more dynamic points
+  /// than others.
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    for (const std::uint32_t id : ids_) visit(id, 2 * dynamic_[id] > all_[id]);
+  }
+
+ private:
+  std::vector<std::uint32_t> ids_;            // in the order of their first points
+  std::vector<std::uint32_t> all_, dynamic_;  // by id; 0 for those that are not in ids_
+};
+
 class ChunkRecorder {
  public:
   /// `shared_before`, `shared_behind`: see shared_scan(). `path`: positions of the sensor of the
@@ -41,6 +59,8 @@ class ChunkRecorder {
   void take_final(std::size_t i, const ScanVerdict& verdict);
   /// Memory of a scan that is finished, for reading the next.
   RecordedScan recycle();
+  /// The instances of the shared scans, in the place of those from take_newest().
+  void take_shared(std::vector<std::uint32_t> before, std::vector<std::uint32_t> behind);
   void add_pipeline_time(double ms) { summary_.timing.pipeline += ms; }
 
   /// Own scans with a final verdict.
@@ -50,6 +70,7 @@ class ChunkRecorder {
 
  private:
   bool is_own(std::size_t i) const { return i >= chunk_.own.first && i <= chunk_.own.last; }
+  void count_instances(std::size_t i, const ScanVerdict& verdict);
   void add_moving_points(const RecordedScan& scan, const ScanVerdict& verdict);
   void add_to_map(const RecordedScan& scan, const ScanVerdict& verdict);
 
@@ -64,6 +85,10 @@ class ChunkRecorder {
   std::deque<std::vector<PointLabel>> open_online_;
   std::vector<RecordedScan> spare_;
   std::size_t finished_ = 0;
+  InstancePoints points_;
+  std::set<std::uint32_t> ids_before_;                 // in the shared scan before
+  std::set<std::uint32_t> still_before_;               // static in an own scan
+  std::map<std::uint32_t, std::size_t> moving_scans_;  // of the last own scans, by id
   ChunkScan record_;
   PointBuffer kept_;
 };

@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <system_error>
 #include <thread>
@@ -89,6 +90,7 @@ class ChunkedRun {
         states_(plan.chunks.size()) {
     config_ = plan.config;
     config_.build_map = false;  // each chunk builds its own from the final labels
+    latency_ = DynaInsRemover(config_).latency();
     outputs_.with_beliefs = plan.outputs.write_beliefs || results.needs_scans();
     outputs_.with_online = plan.outputs.write_online;
     outputs_.with_map = plan.config.build_map;
@@ -119,6 +121,7 @@ class ChunkedRun {
   struct State {
     Stage stage = Stage::kWaiting;
     bool has_labels = false;  // written, or being written
+    bool is_final = false;    // the labels are written
     ChunkInstances instances;
     std::optional<InstanceNumbers> numbers;
   };
@@ -142,6 +145,7 @@ class ChunkedRun {
       for (std::size_t i = 0; i < linked_ && !error_; ++i) {
         if (states_[i].has_labels) continue;
         states_[i].has_labels = true;
+        ++at_work_;
         return Task{i, true};
       }
       if (!is_stopping_ && next_ < states_.size()) {
@@ -157,32 +161,33 @@ class ChunkedRun {
   void work() {
     std::optional<DynaInsRemover> remover;
     while (const std::optional<Task> task = next_task()) {
-      bool is_judged = false;
+      bool is_done = false;
       std::exception_ptr error;
       ChunkInstances instances;
       try {
         if (task->is_labels) {
-          write_labels(task->chunk);
-          continue;
+          finish(task->chunk);
+          is_done = true;
+        } else if (is_usable(task->chunk) || judge(task->chunk, remover)) {
+          instances = open(task->chunk).read_summary().instances;
+          is_done = true;
         }
-        is_judged = is_usable(task->chunk) || judge(task->chunk, remover);
-        if (is_judged)
-          instances = ChunkFileReader(file(task->chunk), key(task->chunk)).read_summary().instances;
       } catch (...) {
         error = std::current_exception();
       }
       const std::lock_guard<std::mutex> lock(mutex_);
-      if (!task->is_labels) --at_work_;
       if (error && (!error_ || task->chunk < error_chunk_)) {
         error_ = error;
         error_chunk_ = task->chunk;
       }
-      if (is_judged) {
-        states_[task->chunk].instances = std::move(instances);
-        states_[task->chunk].stage = Stage::kJudged;
+      --at_work_;
+      is_stopping_ = is_stopping_ || !is_done;
+      State& state = states_[task->chunk];
+      if (is_done && task->is_labels) state.is_final = true;
+      if (is_done && !task->is_labels) {
+        state.instances = std::move(instances);
+        state.stage = Stage::kJudged;
         link();
-      } else {
-        is_stopping_ = true;
       }
       changed_.notify_all();
     }
@@ -199,17 +204,30 @@ class ChunkedRun {
         State& before = states_[linked_ - 1];
         state.numbers.emplace(*before.numbers, before.instances, state.instances);
         before.instances = {};
+        add_moved(*state.numbers, state.instances);
       }
       state.stage = Stage::kLinked;
     }
   }
+
+  // Instances that moved before the chunk and are there at its end moved up to its end, too.
+  static void add_moved(const InstanceNumbers& numbers, ChunkInstances& instances) {
+    std::vector<std::uint32_t>& moving = instances.moving_behind;
+    std::set<std::uint32_t> ids(moving.begin(), moving.end());
+    for (const std::uint32_t id : instances.shared_behind) {
+      if (numbers.moved_before(id)) ids.insert(id);
+    }
+    moving.assign(ids.begin(), ids.end());
+  }
+
+  ChunkFileReader open(std::size_t number) const { return {file(number), key(number)}; }
 
   // Whether an earlier run left a whole file of the chunk.
   bool is_usable(std::size_t number) {
     std::error_code ignored;
     if (!fs::exists(file(number), ignored)) return false;
     try {
-      ChunkFileReader(file(number), key(number)).verify();
+      open(number).verify();
     } catch (const IoError& error) {
       const std::lock_guard<std::mutex> lock(mutex_);
       warnings_.push_back(std::string(error.what()) + "; the chunk is processed again");
@@ -254,12 +272,76 @@ class ChunkedRun {
     return true;
   }
 
+  void finish(std::size_t number) const {
+    const std::vector<std::uint32_t> still = open(number).read_summary().instances.still_before;
+    const InstanceNumbers& numbers = *states_[number].numbers;
+    const bool is_contradicted =
+        config_.uses_free_space() && std::any_of(still.begin(), still.end(), [&](std::uint32_t id) {
+          return numbers.moved_before(id);
+        });
+    if (is_contradicted) hand_over(number);
+    write_labels(number);
+  }
+
+  // Evidence of motion can be older than the warm-up, if an object stands for long. What the chunk
+  // before calls dynamic up to the border therefore stays dynamic: the file is written again.
+  void hand_over(std::size_t number) const {
+    const Chunk& own = chunk(number);
+    const InstanceNumbers& numbers = *states_[number].numbers;
+    ChunkSummary summary = open(number).read_summary();
+    ChunkFileReader reader = open(number);
+    ChunkFileWriter writer(file(number), key(number));
+    ChunkRecorder recorder(own, std::nullopt, std::nullopt, path_, outputs_, writer);
+    recorder.take_shared(std::move(summary.instances.shared_before),
+                         std::move(summary.instances.shared_behind));
+    recorder.add_pipeline_time(summary.timing.pipeline);
+    ReadAhead scans(plan_.sequence, own.own.first, own.own.last);
+    InstancePoints points;
+    ChunkScan scan;
+    for (std::size_t i = own.own.first; i <= own.own.last; ++i) {
+      reader.next(scan);
+      std::set<std::uint32_t> moved;
+      points.count(scan.labels, scan.instances);
+      points.for_each([&](std::uint32_t id, bool is_dynamic) {
+        if (!is_dynamic && numbers.moved_before(id)) moved.insert(id);
+      });
+      if (!moved.empty()) mark_moved(moved, scan);
+      // The first verdict knows of the chunk before when its verdicts have become final.
+      if (!moved.empty() && i >= own.own.first + latency_) mark_moved_online(moved, scan);
+      ScanVerdict verdict = verdict_of(i, scan);
+      verdict.labels = scan.online;
+      recorder.take_newest(i, std::move(summary.timing.rows[i - own.own.first]),
+                           scans.next(recorder.recycle()), verdict);
+      verdict.labels = scan.labels;
+      recorder.take_final(i, verdict);
+    }
+    recorder.finish();
+  }
+
+  void mark_moved(const std::set<std::uint32_t>& moved, ChunkScan& scan) const {
+    const auto belief = static_cast<float>(config_.evidence.tau_track);
+    for (std::size_t i = 0; i < scan.instances.size(); ++i) {
+      if (scan.labels[i] != PointLabel::kStatic || moved.count(scan.instances[i]) == 0) continue;
+      scan.labels[i] = PointLabel::kDynamic;
+      scan.causes[i] = Cause::kAlongTrack;
+      if (!scan.beliefs.empty()) scan.beliefs[i] = std::max(scan.beliefs[i], belief);
+    }
+  }
+
+  static void mark_moved_online(const std::set<std::uint32_t>& moved, ChunkScan& scan) {
+    for (std::size_t i = 0; i < scan.online.size(); ++i) {
+      if (scan.online[i] == PointLabel::kStatic && moved.count(scan.instances[i]) > 0) {
+        scan.online[i] = PointLabel::kDynamic;
+      }
+    }
+  }
+
   void write_labels(std::size_t number) const {
     LabelFiles labels(folder_ / "labels", folder_ / "causes",
                       plan_.outputs.write_beliefs ? folder_ / "beliefs" : fs::path());
     LabelFiles online(folder_ / "online");
     const InstanceNumbers& numbers = *states_[number].numbers;
-    ChunkFileReader reader(file(number), key(number));
+    ChunkFileReader reader = open(number);
     ChunkScan scan;
     for (std::size_t i = chunk(number).own.first; i <= chunk(number).own.last; ++i) {
       reader.next(scan);
@@ -284,7 +366,7 @@ class ChunkedRun {
             scan.causes};
   }
 
-  // Waits for the ids of a chunk. False if the chunk will not be finished.
+  // Waits for the labels of a chunk. False if the chunk will not be finished.
   bool await(std::size_t number) {
     std::unique_lock<std::mutex> lock(mutex_);
     while (true) {
@@ -292,13 +374,15 @@ class ChunkedRun {
         if (listener_.warn) listener_.warn(warning);
       }
       if (error_) return false;
-      if (states_[number].stage == Stage::kLinked) return true;
-      if (is_stopping_ && at_work_ == 0) return false;
+      if (states_[number].is_final) return true;
+      const bool is_linked = states_[number].stage == Stage::kLinked;
+      if (is_stopping_ && at_work_ == 0 && !is_linked) return false;
       const std::size_t done = done_;
       lock.unlock();
       report_progress(done);
       lock.lock();
-      if (done == done_ && states_[number].stage != Stage::kLinked && at_work_ > 0 && !error_) {
+      if (done == done_ && !states_[number].is_final && !error_ &&
+          (at_work_ > 0 || states_[number].stage == Stage::kLinked)) {
         changed_.wait(lock);
       }
     }
@@ -322,7 +406,7 @@ class ChunkedRun {
     std::optional<ReadAhead> scans;
     if (needs_scans) scans.emplace(plan_.sequence, own.first, own.last);
     RecordedScan points;
-    ChunkFileReader reader(file(number), key(number));
+    ChunkFileReader reader = open(number);
     ChunkScan scan;
     for (std::size_t i = own.first; i <= own.last; ++i) {
       reader.next(scan, !needs_scans);
@@ -372,6 +456,7 @@ class ChunkedRun {
   RunResults& results_;
   std::vector<Eigen::Vector3d> path_;
   DynaInsRemover::Config config_;
+  std::size_t latency_ = 0;  // scans
   ChunkOutputs outputs_;
 
   // The members below are guarded by the mutex, but for numbers of linked chunks, which stay.

@@ -44,6 +44,7 @@ InstanceNumbers::InstanceNumbers(const InstanceNumbers& numbers_before,
   const std::uint32_t newest =
       shared.empty() ? kNoInstance : *std::max_element(shared.begin(), shared.end());
   known_.assign(std::size_t{newest} + 1, kNoInstance);
+  moved_.assign(known_.size(), false);
   std::vector<bool> has_partner(known_.size(), false);
   std::set<std::uint32_t> is_taken;
   for (const Overlap& overlap : find_overlaps(before.shared_behind, shared)) {
@@ -51,7 +52,10 @@ InstanceNumbers::InstanceNumbers(const InstanceNumbers& numbers_before,
     if (has_partner[overlap.behind]) continue;
     has_partner[overlap.behind] = true;
     const std::uint32_t id = numbers_before(overlap.before);
-    if (is_taken.insert(id).second) known_[overlap.behind] = id;
+    if (!is_taken.insert(id).second) continue;
+    known_[overlap.behind] = id;
+    moved_[overlap.behind] = std::binary_search(before.moving_behind.begin(),
+                                                before.moving_behind.end(), overlap.before);
   }
 
   last_ = numbers_before.last();

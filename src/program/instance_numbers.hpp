@@ -15,6 +15,10 @@ struct ChunkInstances {
   /// Empty if there is none.
   std::vector<std::uint32_t> shared_before, shared_behind;
   std::uint32_t last = kNoInstance;  ///< largest id in the own scans
+  /// Ids, ascending, of `shared_before` that are static in an own scan.
+  std::vector<std::uint32_t> still_before;
+  /// Ids, ascending, that are dynamic in all of the last own scans.
+  std::vector<std::uint32_t> moving_behind;
 };
 
 /// Translates ids of a chunk to ids of the run. A chunk numbers its instances from 1 in the order
@@ -34,11 +38,15 @@ class InstanceNumbers {
   std::uint32_t operator()(std::uint32_t id) const {
     return id < known_.size() ? known_[id] : id + shift_;
   }
+  /// Whether the chunk before calls an instance of this chunk dynamic up to the border. Its id of
+  /// the chunk.
+  bool moved_before(std::uint32_t id) const { return id < moved_.size() && moved_[id]; }
   /// Largest id of the run in this chunk and those before.
   std::uint32_t last() const { return last_; }
 
  private:
   std::vector<std::uint32_t> known_;  // by id in the chunk, for those up to the shared scan
+  std::vector<bool> moved_;           // by id in the chunk, as known_
   std::uint32_t shift_ = 0;           // of all others; may wrap around
   std::uint32_t last_;
 };

@@ -33,7 +33,6 @@ class Overview {
   /// Adds the places of a picture with the same path whose scans come behind those of this one.
   /// False, and nothing changes, if a number is not that of a pixel.
   bool merge(const std::vector<Place>& places);
-  void clear() { pixels_.assign(pixels_.size(), {}); }
 
   /// Three panels of one size, side by side or below each other: before (static points grey, moving
   /// ones blue), after (static points), removed (moving points green, the others pale).

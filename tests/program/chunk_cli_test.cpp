@@ -23,6 +23,8 @@ namespace {
 
 using Flags = std::vector<std::string>;
 
+constexpr std::size_t kBoxPoints = 24 * 8;  // last points of a tiny scan
+
 struct Fixture {
   explicit Fixture(std::size_t scans = 23) : seq(folder / "seq") {
     write_tiny_sequence(seq, scans, {100.0, 200.0, 300.0});
@@ -175,17 +177,52 @@ TEST_CASE("chunks of one scan: each scan has its labels, and the report its time
   CHECK_THAT(timing, ContainsSubstring("\n000006,"));
 }
 
-TEST_CASE("an instance keeps its id from chunk to chunk") {
-  const Fixture fixture;
-  REQUIRE(fixture.run("out", {"--chunk", "6", "--jobs", "2"}).code == 0);
+namespace {
+
+/// A floor, a wall, and a box that drives 0.25 m from scan to scan until it stops at scan `stop`.
+std::vector<float> scan_with_stopping_box(std::size_t i, std::size_t stop) {
+  std::vector<float> xyzi = tiny_scan(0);
+  xyzi.resize(xyzi.size() - kBoxPoints * 4);
+  const double begin = -8.0 + 0.25 * static_cast<double>(std::min(i, stop));
+  for (std::size_t k = 0; k < kBoxPoints; ++k) {
+    const auto across = static_cast<double>(k / 8), up = static_cast<double>(k % 8);
+    for (const double value : {10.0, begin + 0.07 * across, -1.3 + 0.15 * up, 0.5}) {
+      xyzi.push_back(static_cast<float>(value));
+    }
+  }
+  return xyzi;
+}
+
+}  // namespace
+
+TEST_CASE("behind a border, an object that stopped keeps its id and stays dynamic") {
+  constexpr std::size_t kScans = 150, kStop = 40;
+  const Fixture fixture(kScans);
+  for (std::size_t i = 0; i < kScans; ++i) {
+    const std::vector<float> scan = scan_with_stopping_box(i, kStop);
+    write_scan(fixture.seq + "/velodyne/" + scan_name(i) + ".bin", scan);
+  }
+  REQUIRE(fixture.run("stream", {}).code == 0);
+  REQUIRE(fixture.run("chunks", {"--chunk", "75", "--lookback", "20", "--jobs", "2"}).code == 0);
   const std::size_t points = tiny_scan(0).size() / 4;
-  const auto wall = [&](std::size_t i) {
-    return read_labels(fixture.folder / ("out/labels/" + scan_name(i) + ".label"), points)
-               .at(120 * 40 + 160) >>
-           16U;
+  const auto box = [&](const std::string& out, std::size_t i) {
+    return read_labels(fixture.folder / (out + "/labels/" + scan_name(i) + ".label"), points)
+        .at(points - kBoxPoints / 2);
   };
-  REQUIRE(wall(0) != 0);
-  for (std::size_t i = 1; i < 23; ++i) CHECK(wall(i) == wall(0));
+  // The warm-up of the second chunk begins when the box stands.
+  const std::uint32_t before = box("chunks", 74);
+  REQUIRE((before & 0xFFFFU) == 251);
+  REQUIRE(before >> 16U != 0);
+  for (std::size_t i = 75; i < kScans; ++i) {
+    CAPTURE(i);
+    REQUIRE(box("stream", i) == before);
+    REQUIRE(box("chunks", i) == before);
+  }
+  CHECK(fixture.report("chunks")["labels"] == fixture.report("stream")["labels"]);
+  const auto size = [&](const std::string& file) {
+    return read_points(fixture.folder / file).positions.size();
+  };
+  CHECK(size("chunks/dynamic_points.ply") == size("stream/dynamic_points.ply"));
 }
 
 TEST_CASE("a killed run in chunks is resumed with the chunks that it had finished") {

@@ -1,10 +1,12 @@
 // Chunks of a recording: their grid, their files, and the ids of instances across their borders.
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "chunk_file.hpp"
 #include "chunk_grid.hpp"
+#include "chunk_recorder.hpp"
 #include "dynains/errors.hpp"
 #include "instance_numbers.hpp"
 #include "io/files.hpp"
@@ -36,6 +38,8 @@ ChunkSummary example_summary() {
   summary.instances.shared_before = {1, 0, 2};
   summary.instances.shared_behind = {7, 8};
   summary.instances.last = 9;
+  summary.instances.still_before = {1, 2};
+  summary.instances.moving_behind = {8};
   summary.overview = {{5, 1.5F, 70, 1}, {9, -2.0F, 210, 0}};
   summary.timing.stages = stage_names();
   TimingRow row{"", 7, std::vector<double>(summary.timing.stages.size(), 0.25), 3.5, {}};
@@ -144,6 +148,43 @@ TEST_CASE("an instance keeps its id across the border, others get the next ones"
   CHECK(numbers.last() == 42);
 }
 
+TEST_CASE("an instance that moved up to the border is told to the next chunk") {
+  ChunkInstances first;
+  first.shared_behind = {3, 3, 4, 4, 5};
+  first.moving_behind = {3, 5, 9};
+  first.last = 9;
+  ChunkInstances second;
+  second.shared_before = {1, 1, 2, 2, 6};
+  second.last = 9;
+  const InstanceNumbers numbers(InstanceNumbers(first), first, second);
+  CHECK(numbers.moved_before(1));
+  CHECK_FALSE(numbers.moved_before(2));
+  CHECK(numbers.moved_before(6));
+  // 9 is another instance in this chunk, and 0 is none.
+  CHECK_FALSE(numbers.moved_before(9));
+  CHECK_FALSE(numbers.moved_before(kNoInstance));
+  CHECK_FALSE(InstanceNumbers(first).moved_before(3));
+}
+
+TEST_CASE("an instance is dynamic with more than half of its points, scan by scan") {
+  InstancePoints points;
+  const auto found = [&] {
+    std::vector<std::pair<std::uint32_t, bool>> result;
+    points.for_each(
+        [&](std::uint32_t id, bool is_dynamic) { result.emplace_back(id, is_dynamic); });
+    return result;
+  };
+  constexpr PointLabel kMoves = PointLabel::kDynamic, kStays = PointLabel::kStatic;
+  const std::vector<PointLabel> labels = {kMoves, kMoves, kStays, kMoves, kStays, kMoves};
+  const Ids ids = {7, 7, 7, 0, 2, 2};
+  points.count(labels, ids);
+  CHECK(found() == std::vector<std::pair<std::uint32_t, bool>>{{7, true}, {2, false}});
+  const std::vector<PointLabel> next_labels = {kStays};
+  const Ids next_ids = {7};
+  points.count(next_labels, next_ids);
+  CHECK(found() == std::vector<std::pair<std::uint32_t, bool>>{{7, false}});
+}
+
 TEST_CASE("of two instances that were one, the larger one keeps the id; of equal ones, the first") {
   ChunkInstances first;
   first.shared_behind = {5, 5, 5, 5, 5, 6, 6, 6, 6};
@@ -194,6 +235,8 @@ TEST_CASE("the file of a chunk gives back what was written") {
   CHECK(summary.labels == expected.labels);
   CHECK(summary.instances.shared_before == expected.instances.shared_before);
   CHECK(summary.instances.shared_behind == expected.instances.shared_behind);
+  CHECK(summary.instances.still_before == expected.instances.still_before);
+  CHECK(summary.instances.moving_behind == expected.instances.moving_behind);
   CHECK(summary.instances.last == expected.instances.last);
   REQUIRE(summary.overview.size() == 2);
   CHECK(summary.overview[0].pixel == 5);
