@@ -26,13 +26,14 @@ Actions& actions() {
 void remember(int signal) { received = signal; }
 
 /// Returns the action before.
-struct sigaction listen_to(int signal) {
+struct sigaction listen_to(int signal, SecondSignal second) {
   struct sigaction before {};
   sigaction(signal, nullptr, &before);
   if (before.sa_handler == SIG_IGN) return before;
   struct sigaction action {};
   action.sa_handler = remember;
-  action.sa_flags = static_cast<int>(SA_RESTART | SA_RESETHAND);
+  action.sa_flags = SA_RESTART;
+  if (second == SecondSignal::kEndsProcess) action.sa_flags |= static_cast<int>(SA_RESETHAND);
   sigemptyset(&action.sa_mask);
   sigaction(signal, &action, nullptr);
   return before;
@@ -40,13 +41,13 @@ struct sigaction listen_to(int signal) {
 
 }  // namespace
 
-InterruptGuard::InterruptGuard() {
+InterruptGuard::InterruptGuard(SecondSignal second) {
   Actions& all = actions();
   const std::lock_guard<std::mutex> lock(all.mutex);
   if (all.guards++ > 0) return;
   received = 0;
-  all.interrupt_before = listen_to(SIGINT);
-  all.termination_before = listen_to(SIGTERM);
+  all.interrupt_before = listen_to(SIGINT, second);
+  all.termination_before = listen_to(SIGTERM, second);
 }
 
 InterruptGuard::~InterruptGuard() {

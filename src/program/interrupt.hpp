@@ -3,12 +3,15 @@
 
 namespace dynains::program {
 
-/// While one lives, in any thread, SIGINT and SIGTERM ask to stop; a second one ends the program at
-/// once. A signal that the program was started to ignore, as by nohup or `&` in a script, stays
-/// ignored.
+/// What a signal does after one that asked to stop.
+enum class SecondSignal { kEndsProcess, kAsksAgain };
+
+/// While one lives, in any thread, SIGINT and SIGTERM ask to stop. A signal that the program was
+/// started to ignore, as by nohup or `&` in a script, stays ignored.
 class InterruptGuard {
  public:
-  InterruptGuard();
+  /// `second` of the first of several guards counts.
+  explicit InterruptGuard(SecondSignal second = SecondSignal::kEndsProcess);
   ~InterruptGuard();
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;

@@ -132,7 +132,7 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   const PoseAgreement agreement = pose_agreement(plan.sequence, plan.range.first, plan.range.last);
   warn_of_doubts(plan, settings, listener, agreement);
 
-  const InterruptGuard interrupt;
+  const InterruptGuard interrupt(listener.second_signal);
   nlohmann::ordered_json marker = unfinished_report(plan.outputs.map_name());
   marker["request"] = plan.request;
   OutputChange change(out, mode, marker, plan.listing);

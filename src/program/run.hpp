@@ -9,17 +9,19 @@
 #include <string>
 
 #include "dynains/io/recording.hpp"
+#include "interrupt.hpp"
 #include "run_report.hpp"
 #include "run_results.hpp"
 #include "run_settings.hpp"
 
 namespace dynains::program {
 
-/// How a run reaches its caller while it lasts. Both functions may be empty.
+/// How a run and its caller reach each other while it lasts. Both functions may be empty.
 struct RunListener {
   std::function<void(const std::string&)> warn;
   /// Called before the first scan and after each.
   std::function<void(std::size_t done, std::size_t total)> progress;
+  SecondSignal second_signal = SecondSignal::kEndsProcess;
 };
 
 struct RunOutcome {

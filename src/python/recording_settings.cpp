@@ -87,14 +87,15 @@ RecordingOptions to_recording_options(const py::dict& values) {
   RecordingOptions options;
   for (const auto& [key, value] : values) {
     const std::string name = py::str(key);
-    if (!assign_setting(kRecordingSettings, options, name, value))
-      refuse(name, recording_setting_names());
+    if (assign_setting(kRecordingSettings, options, name, value)) continue;
+    refuse(name, recording_setting_names());
   }
   return options;
 }
 
 std::vector<std::string> recording_setting_names() {
   std::vector<std::string> names;
+  names.reserve(kRecordingSettings.size());
   for (const auto& setting : kRecordingSettings) names.emplace_back(setting.name);
   return names;
 }

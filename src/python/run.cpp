@@ -50,7 +50,13 @@ void set_scan(RunArguments& run, const py::handle& value) {
   if (!value.is_none()) run.settings.window.*Field = value.cast<std::size_t>();
 }
 
-const std::array<RunSetting, 17> kRunSettings{{
+template <std::optional<std::int64_t> RunSettings::*Field, std::int64_t kLeast>
+void set_count(RunArguments& run, const py::handle& value) {
+  if (value.is_none()) return;
+  run.settings.*Field = to_whole_number(value, kLeast, std::numeric_limits<std::int32_t>::max());
+}
+
+const std::array<RunSetting, 20> kRunSettings{{
     {"preset", "'default', 'offline' or 'paper'", "parameters to start from",
      [](RunArguments& run, const py::handle& value) {
        const auto& names = program::preset_names();
@@ -86,6 +92,12 @@ const std::array<RunSetting, 17> kRunSettings{{
          run.settings.map_memory = to_number(value, 0.0, std::numeric_limits<double>::max());
        }
      }},
+    {"jobs", "int from 1 on", "threads that process chunks of the recording; changes no result",
+     &set_count<&RunSettings::jobs, 1>},
+    {"chunk", "int from 0 on", "scans of a chunk; 0: the recording is one stream",
+     &set_count<&RunSettings::chunk, 0>},
+    {"lookback", "int from 0 on", "scans before a chunk that prepare it; needs chunk",
+     &set_count<&RunSettings::lookback, 0>},
     {"write_online", "bool", "also write the verdicts without latency",
      &set_flag<&RunSettings::write_online>},
     {"write_clean", "bool", "also write every scan without its moving points",
@@ -151,6 +163,8 @@ void take_config(RunArguments& run) {
 
 program::RunListener listen(const RunArguments& run) {
   program::RunListener listener;
+  // The process is that of others, such as the kernel of a notebook.
+  listener.second_signal = program::SecondSignal::kAsksAgain;
   listener.warn = [](const std::string& text) {
     const py::gil_scoped_acquire acquire;
     if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) != 0) throw py::error_already_set();

@@ -27,6 +27,8 @@ class CMakeBuild(build_ext):
         target = Path(self.get_ext_fullpath(extension.name)).resolve().parent
         if os.environ.get("DYNAINS_BUILD_DIR"):
             built = Path(os.environ["DYNAINS_BUILD_DIR"]) / "python/dynains"
+            if not list(built.glob("_dynains*")):
+                sys.exit(f"{built}: holds no module; build the target dynains_python first")
             copytree(built, target, ignore=ignore_patterns("__pycache__"), dirs_exist_ok=True)
             return
         build = Path(self.build_temp).resolve()

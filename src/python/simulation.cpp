@@ -1,4 +1,8 @@
+#include <pybind11/stl/filesystem.h>
+
+#include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -6,6 +10,7 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "dynains/simulation/simulator.hpp"
+#include "dynains/simulation/write_sequence.hpp"
 #include "parameters.hpp"
 
 namespace dynains::python {
@@ -39,6 +44,13 @@ ScanOfArrays scan_of(Simulator& simulator, py::ssize_t index) {
   SimulatedScan scan = simulator.scan(static_cast<std::size_t>(index));
   return {scan.time, to_array(std::move(scan.xyzi), 4), to_array(std::move(scan.labels)),
           to_array(scan.T_world_sensor_noisy)};
+}
+
+void write(Simulator& simulator, const std::filesystem::path& folder) {
+  simulation::write_sequence(simulator, folder, [](std::size_t, std::size_t) {
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    return true;
+  });
 }
 
 std::string represent(const ScanOfArrays& scan) {
@@ -87,6 +99,9 @@ void bind_simulation(py::module_& module) {
            py::arg("labelling") = "ever", "Raises ConfigError for unknown names and values.")
       .def("__len__", &Simulator::size)
       .def("__getitem__", &scan_of, py::arg("index"), "Scan `index` as SimulatedScan.")
+      .def("write", &write, py::arg("folder"),
+           "Writes the sequence in the format of SemanticKITTI, as the program `dynains simulate`; "
+           "the folder is created. Raises IoError.")
       .def("__repr__", [](const Simulator& simulator) { return represent(simulator); });
 }
 

@@ -23,8 +23,10 @@ std::string type_of(const dynains::Parameter<T>&) {
     return "Literal[" + names + ']';
   } else if constexpr (std::is_same_v<Value, bool>) {
     return "bool";
+  } else if constexpr (std::is_integral_v<Value>) {
+    return "int";
   } else {
-    return std::is_integral_v<Value> ? "int" : "float";
+    return "float";
   }
 }
 

@@ -117,3 +117,17 @@ def test_the_simulator_is_a_sequence():
         dynains.Simulator("moon")
     with pytest.raises(dynains.ConfigError, match="unknown parameter"):
         dynains.Simulator(scan=3)
+
+
+def test_the_simulator_writes_a_recording(tmp_path):
+    simulator = dynains.Simulator("static", "vlp16", scans=3, seed=5)
+    simulator.write(tmp_path / "street")
+    recording = dynains.Recording(tmp_path / "street")
+    assert len(recording) == 3 and recording.has_labels
+    for scan, simulated in zip(recording, simulator):
+        np.testing.assert_array_equal(scan.points, simulated.points)
+        np.testing.assert_array_equal(scan.labels, simulated.labels)
+        np.testing.assert_allclose(scan.T_world_sensor, simulated.T_world_sensor, atol=1e-6)
+    with pytest.raises(dynains.IoError, match="file"):
+        (tmp_path / "file").write_text("")
+        simulator.write(tmp_path / "file")
