@@ -10,6 +10,15 @@ namespace {
 /// error of few scans, and an instance that moved lately is seen by the next chunk, too.
 constexpr std::size_t kSteadyScans = 30;
 
+/// Neighbouring points often have the same id.
+std::set<std::uint32_t> set_of(Span<const std::uint32_t> ids) {
+  std::set<std::uint32_t> set;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (i == 0 || ids[i] != ids[i - 1]) set.insert(ids[i]);
+  }
+  return set;
+}
+
 }  // namespace
 
 void InstancePoints::count(Span<const PointLabel> labels, Span<const std::uint32_t> instances) {
@@ -44,7 +53,7 @@ void ChunkRecorder::take_newest(std::size_t i, TimingRow row, RecordedScan scan,
   const Span<const std::uint32_t> ids = verdict.instances;
   if (i == shared_before_) {
     summary_.instances.shared_before.assign(ids.begin(), ids.end());
-    ids_before_ = {ids.begin(), ids.end()};
+    ids_before_ = set_of(ids);
   }
   if (i == shared_behind_) summary_.instances.shared_behind.assign(ids.begin(), ids.end());
   if (!is_own(i)) {
@@ -60,7 +69,7 @@ void ChunkRecorder::take_newest(std::size_t i, TimingRow row, RecordedScan scan,
 
 void ChunkRecorder::take_shared(std::vector<std::uint32_t> before,
                                 std::vector<std::uint32_t> behind) {
-  ids_before_ = {before.begin(), before.end()};
+  ids_before_ = set_of(before);
   summary_.instances.shared_before = std::move(before);
   summary_.instances.shared_behind = std::move(behind);
 }

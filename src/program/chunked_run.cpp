@@ -122,6 +122,7 @@ class ChunkedRun {
     Stage stage = Stage::kWaiting;
     bool has_labels = false;  // written, or being written
     bool is_final = false;    // the labels are written
+    bool is_kept = false;     // an earlier run had finished the chunk
     ChunkInstances instances;
     std::optional<InstanceNumbers> numbers;
   };
@@ -236,6 +237,7 @@ class ChunkedRun {
     const std::lock_guard<std::mutex> lock(mutex_);
     done_ += chunk(number).own.size();
     ++timing_.kept_chunks;
+    states_[number].is_kept = true;
     return true;
   }
 
@@ -341,6 +343,8 @@ class ChunkedRun {
                       plan_.outputs.write_beliefs ? folder_ / "beliefs" : fs::path());
     LabelFiles online(folder_ / "online");
     const InstanceNumbers& numbers = *states_[number].numbers;
+    // An earlier run may have written the labels of its chunks.
+    const bool is_kept = states_[number].is_kept;
     ChunkFileReader reader = open(number);
     ChunkScan scan;
     for (std::size_t i = chunk(number).own.first; i <= chunk(number).own.last; ++i) {
@@ -348,11 +352,11 @@ class ChunkedRun {
       for (std::uint32_t& id : scan.instances) id = numbers(id);
       ScanVerdict verdict = verdict_of(i, scan);
       labels.take(verdict);
-      labels.write(plan_.sequence.name(i));
+      labels.write(plan_.sequence.name(i), is_kept);
       if (!outputs_.with_online) continue;
       verdict.labels = scan.online;
       online.take(verdict);
-      online.write(plan_.sequence.name(i));
+      online.write(plan_.sequence.name(i), is_kept);
     }
   }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
+#include <system_error>
 #include <utility>
 
 #include "dynains/io/kitti.hpp"
@@ -24,6 +26,16 @@ std::uint32_t mos_class(PointLabel label) {
       return kRunNotJudged;
   }
   return kRunNotJudged;
+}
+
+/// Whether a file has exactly this content.
+bool has_bytes(const std::filesystem::path& file, const void* data, std::size_t size) {
+  std::error_code error;
+  if (std::filesystem::file_size(file, error) != size || error) return false;
+  std::vector<char> content(size);
+  std::ifstream stream(file, std::ios::binary);
+  return stream.read(content.data(), static_cast<std::streamsize>(size)) &&
+         std::equal(content.begin(), content.end(), static_cast<const char*>(data));
 }
 
 }  // namespace
@@ -64,10 +76,16 @@ void LabelFiles::take(const ScanVerdict& verdict) {
   }
 }
 
-void LabelFiles::write(const std::string& name) const {
-  write_labels(folder_ / (name + ".label"), labels_);
-  if (!cause_folder_.empty()) write_point_bytes(cause_folder_ / (name + ".cause"), causes_);
-  if (!belief_folder_.empty()) write_point_bytes(belief_folder_ / (name + ".belief"), beliefs_);
+void LabelFiles::write(const std::string& name, bool keep_equal) const {
+  const auto is_kept = [&](const std::filesystem::path& file, const auto& values) {
+    return keep_equal && has_bytes(file, values.data(), sizeof(values[0]) * values.size());
+  };
+  const std::filesystem::path labels = folder_ / (name + ".label");
+  if (!is_kept(labels, labels_)) write_labels(labels, labels_);
+  const std::filesystem::path causes = cause_folder_ / (name + ".cause");
+  if (!cause_folder_.empty() && !is_kept(causes, causes_)) write_point_bytes(causes, causes_);
+  const std::filesystem::path beliefs = belief_folder_ / (name + ".belief");
+  if (!belief_folder_.empty() && !is_kept(beliefs, beliefs_)) write_point_bytes(beliefs, beliefs_);
 }
 
 LabelWriter::LabelWriter(std::filesystem::path folder, std::filesystem::path causes,
