@@ -1,0 +1,224 @@
+"""Cleans many recordings at once, on the cores of one machine or on many machines, by Dask.
+
+    python3 -m dynains.fleet LOGS... --out OUT [--scheduler tcp://HOST:PORT] [--workers N]
+
+Each recording is a task. Its results go to OUT/NAME, as `dynains run` writes them, so they do not
+depend on the worker, the number of workers, or the order. A task of a worker that dies is given to
+another worker, which keeps the chunks that are finished. A recording that fails does not stop the
+others; OUT/fleet.json tells the reason. Run the command again to complete what is missing.
+"""
+
+import argparse
+import fcntl
+import json
+import os
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Callable, Dict, Iterable, List, Optional, Union
+
+from . import ConfigError, IoError, PoseError, Recording, UsageError, run
+
+__all__ = ["clean", "find_recordings"]
+
+_REPORT = "fleet.json"
+_LOCK = ".fleet.lock"
+_PATIENCE = 600.0  # s, for a folder that another process holds
+
+PathLike = Union[str, "os.PathLike[str]"]
+
+
+def find_recordings(paths: Iterable[PathLike]) -> Dict[str, Path]:
+    """Recordings by the name of their results.
+
+    paths: recordings, or folders of recordings. Raises IoError for a path that is neither, and for
+    two recordings of one name.
+    """
+    found: Dict[str, Path] = {}
+    for path in map(Path, paths):
+        for recording in _recordings_at(path):
+            name = recording.stem if recording.is_file() else recording.name
+            if found.get(name, recording) != recording:
+                raise IoError(
+                    f"{recording}: has the same name as {found[name]}; results go to a folder of "
+                    "that name, so rename one of them"
+                )
+            found[name] = recording
+    if not found:
+        raise IoError("no recording was named")
+    return found
+
+
+def _recordings_at(path: Path) -> List[Path]:
+    path = path.resolve()
+    if not path.exists():
+        raise IoError(f"{path}: no such recording")
+    if not path.is_dir() or _opens(path):
+        return [path]
+    entries = sorted(entry for entry in path.iterdir() if not entry.name.startswith("."))
+    recordings = [entry for entry in entries if _opens(entry)]
+    if not recordings:
+        raise IoError(f"{path}: neither a recording nor a folder of recordings")
+    return recordings
+
+
+def _opens(path: Path) -> bool:
+    try:
+        Recording(path)
+    except (IoError, ConfigError, PoseError):
+        return False
+    return True
+
+
+def _clean_one(recording: str, out: str, arguments: Dict[str, Any]) -> Dict[str, Any]:
+    """Runs on a worker. Errors are results: another attempt would fail, too."""
+    end = time.monotonic() + _PATIENCE
+    while True:
+        try:
+            result = run(recording, out, resume=True, jobs=1, **arguments)
+            break
+        except UsageError as error:
+            # A worker that was taken for dead may still hold the folder.
+            if time.monotonic() > end:
+                return {"recording": recording, "error": str(error)}
+            time.sleep(1.0)
+        except (ConfigError, IoError, PoseError) as error:
+            return {"recording": recording, "error": str(error)}
+    return {
+        "recording": recording,
+        "scans": result.scans,
+        "points": result.points,
+        "labels": result.label_counts,
+    }
+
+
+@contextmanager
+def _locked(out: Path):
+    """Raises UsageError if another fleet works in the folder."""
+    out.mkdir(parents=True, exist_ok=True)
+    with open(out / _LOCK, "w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise UsageError(f"{out}: another fleet works in this folder") from error
+        yield
+
+
+def _write_report(out: Path, results: Dict[str, Dict[str, Any]]) -> None:
+    text = json.dumps({name: results[name] for name in sorted(results)}, indent=2) + "\n"
+    staged = out / (_REPORT + ".part")
+    staged.write_text(text)
+    os.replace(staged, out / _REPORT)
+
+
+def clean(
+    recordings: Dict[str, Path],
+    out: PathLike,
+    *,
+    scheduler: Optional[str] = None,
+    workers: Optional[int] = None,
+    progress: Optional[Callable[[int, int, str, Dict[str, Any]], object]] = None,
+    **arguments: Any,
+) -> Dict[str, Dict[str, Any]]:
+    """Cleans recordings into OUT/NAME and writes OUT/fleet.json, which it returns.
+
+    recordings: by name, see find_recordings(). out: a folder that all workers reach. scheduler:
+    address of a scheduler of Dask; None: workers on this machine. workers: their number on this
+    machine; None: one for each core. progress: called with the numbers of finished and of all
+    recordings, the name of the one that finished and its result. arguments: of dynains.run().
+
+    Raises ImportError without Dask, UsageError if another fleet works in the folder, OSError if the
+    scheduler does not answer.
+    """
+    from distributed import Client, LocalCluster, as_completed
+
+    out = Path(out).resolve()
+    results: Dict[str, Dict[str, Any]] = {}
+    with _locked(out):
+        cluster = scheduler or LocalCluster(
+            n_workers=workers, threads_per_worker=1, dashboard_address=None
+        )
+        with Client(cluster) as client:
+            # The longest first, so that no worker is left with one at the end.
+            order = sorted(recordings, key=lambda name: (-_size_of(recordings[name]), name))
+            tasks = {
+                client.submit(
+                    _clean_one,
+                    str(recordings[name]),
+                    str(out / name),
+                    arguments,
+                    pure=False,
+                ): name
+                for name in order
+            }
+            for task in as_completed(tasks):
+                name = tasks[task]
+                error = task.exception()
+                results[name] = (
+                    {"recording": str(recordings[name]), "error": f"{error}"}
+                    if error
+                    else task.result()
+                )
+                if progress:
+                    progress(len(results), len(recordings), name, results[name])
+        if scheduler is None:
+            cluster.close()
+        _write_report(out, results)
+    return {name: results[name] for name in sorted(results)}
+
+
+def _size_of(path: Path) -> int:
+    if path.is_file():
+        return path.stat().st_size
+    return sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
+
+
+def _tell(done: int, total: int, name: str, result: Dict[str, Any]) -> None:
+    outcome = f"failed: {result['error']}" if "error" in result else f"{result['scans']} scans"
+    print(f"{done} of {total} recordings: {name}: {outcome}", file=sys.stderr, flush=True)
+
+
+def main(words: Optional[List[str]] = None) -> int:
+    """0; 1 if a recording failed; 2 for wrong arguments."""
+    parser = argparse.ArgumentParser(
+        prog="dynains.fleet", description="Clean many recordings at once, by Dask."
+    )
+    parser.add_argument("logs", nargs="+", help="recordings, or folders of recordings")
+    parser.add_argument("--out", required=True, help="folder that all workers reach")
+    parser.add_argument("--scheduler", help="address of a scheduler [workers on this machine]")
+    parser.add_argument("--workers", type=int, help="on this machine [one for each core]")
+    parser.add_argument("--preset", default="default", choices=["default", "offline", "paper"])
+    parser.add_argument("--accept-poses", action="store_true")
+    options = parser.parse_args(words)
+    if options.scheduler and options.workers:
+        parser.error("--workers are those of this machine: not with --scheduler")
+    if options.workers is not None and options.workers < 1:
+        parser.error(f"--workers {options.workers}: expected at least 1")
+    try:
+        results = clean(
+            find_recordings(options.logs),
+            options.out,
+            scheduler=options.scheduler,
+            workers=options.workers,
+            progress=_tell,
+            preset=options.preset,
+            accept_poses=options.accept_poses,
+        )
+    except ImportError as error:
+        print(f"dynains.fleet: {error}; Debian has it as python3-distributed", file=sys.stderr)
+        return 1
+    except (IoError, OSError) as error:
+        print(f"dynains.fleet: {error}", file=sys.stderr)
+        return 1
+    except UsageError as error:
+        print(f"dynains.fleet: {error}", file=sys.stderr)
+        return 2
+    return 1 if any("error" in result for result in results.values()) else 0
+
+
+if __name__ == "__main__":
+    # Workers import functions by the name of their module, which is not __main__ there.
+    from dynains import fleet
+
+    sys.exit(fleet.main())

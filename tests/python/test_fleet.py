@@ -1,0 +1,133 @@
+import json
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import dynains
+import pytest
+
+pytest.importorskip("distributed")
+from dynains import fleet  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def drives(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("drives")
+    for seed in range(6):
+        dynains.Simulator("urban", "vlp16", scans=20, seed=seed).write(folder / f"drive{seed}")
+    broken = folder / "broken"
+    (broken / "velodyne").mkdir(parents=True)
+    (broken / "velodyne" / "000000.bin").write_bytes(b"x")
+    (broken / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
+    return folder
+
+
+def results_in(folder):
+    """Bytes of labels, causes and maps; reports hold times."""
+    files = sorted(f for f in folder.rglob("*") if f.suffix in (".label", ".cause", ".ply"))
+    return {str(file.relative_to(folder)): file.read_bytes() for file in files}
+
+
+@pytest.fixture(scope="module")
+def expected(drives, tmp_path_factory):
+    """Results of one process."""
+    out = tmp_path_factory.mktemp("expected")
+    for drive in drives.glob("drive*"):
+        dynains.run(drive, out / drive.name)
+    return results_in(out)
+
+
+class Workers:
+    """A scheduler and three workers, each a process."""
+
+    def __init__(self, folder):
+        self.file = folder / "scheduler.json"
+        self.log = open(folder / "log", "w")
+        self.scheduler = self.start("scheduler", "--port", "0", "--no-dashboard")
+        self.workers = [self.start("worker", "--nthreads", "1", "--no-nanny") for _ in range(3)]
+        while not self.file.exists():
+            time.sleep(0.1)
+        self.address = json.loads(self.file.read_text())["address"]
+
+    def start(self, what, *flags):
+        command = [sys.executable, "-m", f"distributed.cli.dask_{what}", *flags]
+        return subprocess.Popen(
+            [*command, "--scheduler-file", str(self.file)], stdout=self.log, stderr=self.log
+        )
+
+    def close(self):
+        for process in [*self.workers, self.scheduler]:
+            process.kill()
+            process.wait()
+        self.log.close()
+
+
+@pytest.fixture
+def workers(tmp_path):
+    result = Workers(tmp_path)
+    yield result
+    result.close()
+
+
+def test_a_worker_that_dies_and_one_that_stops_change_no_byte(drives, expected, workers, tmp_path):
+    disturbed = []
+
+    def disturb(done, total, name, result):
+        if not disturbed:
+            disturbed.append(name)
+            workers.workers[0].send_signal(signal.SIGKILL)
+            workers.workers[1].send_signal(signal.SIGSTOP)
+            threading.Timer(20.0, workers.workers[1].send_signal, [signal.SIGCONT]).start()
+
+    out = tmp_path / "out"
+    results = fleet.clean(
+        fleet.find_recordings(drives.glob("drive*")),
+        out,
+        scheduler=workers.address,
+        progress=disturb,
+    )
+    assert disturbed and workers.workers[0].wait() == -signal.SIGKILL
+    assert not [name for name, result in results.items() if "error" in result]
+    assert list(results) == [f"drive{seed}" for seed in range(6)]
+    assert results_in(out) == expected
+    assert json.loads((out / "fleet.json").read_text()) == results
+
+
+def test_a_recording_that_fails_is_reported_and_does_not_stop_the_others(drives, tmp_path, capsys):
+    some = [str(drives / name) for name in ("broken", "drive1", "drive2")]
+    assert fleet.main([*some, "--out", str(tmp_path / "out"), "--workers", "2"]) == 1
+    report = json.loads((tmp_path / "out" / "fleet.json").read_text())
+    assert "000000.bin: truncated at byte" in report["broken"]["error"]
+    assert [report[name]["scans"] for name in ("drive1", "drive2")] == [20, 20]
+    assert "3 of 3 recordings" in capsys.readouterr().err
+
+
+def test_wrong_arguments_of_a_fleet(drives, tmp_path, capsys):
+    def error_of(*words):
+        assert fleet.main([*map(str, words), "--out", str(tmp_path / "out")]) == 1
+        return capsys.readouterr().err
+
+    assert "absent: no such recording" in error_of(drives / "drive1", drives / "absent")
+    (tmp_path / "other").mkdir()
+    assert "neither a recording nor a folder of recordings" in error_of(tmp_path / "other")
+    assert fleet.find_recordings([drives / "drive1", drives / "drive1"]).keys() == {"drive1"}
+    with pytest.raises(SystemExit):
+        error_of(drives / "drive1", "--workers", "0")
+    assert "--workers 0: expected at least 1" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_recordings_of_one_name_are_refused(drives, tmp_path):
+    other = tmp_path / "drive1"
+    other.mkdir()
+    for file in (drives / "drive1").iterdir():
+        (other / file.name).symlink_to(file)
+    with pytest.raises(dynains.IoError, match="has the same name as"):
+        fleet.find_recordings([drives / "drive1", other])
+
+
+def test_two_fleets_do_not_share_a_folder(drives, tmp_path):
+    with fleet._locked(tmp_path), pytest.raises(dynains.UsageError, match="another fleet"):
+        fleet.clean({"drive1": drives / "drive1"}, tmp_path)
