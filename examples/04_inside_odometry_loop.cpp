@@ -33,7 +33,8 @@ int main() {
   dynains::DynaInsRemover::Config config;
   config.build_map = false;  // pushed poses are not final, and an odometry has its own map
   dynains::DynaInsRemover remover(config);
-  Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d T_odometry = Eigen::Isometry3d::Identity();      // poses of the odometry alone
+  Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();  // corrected
   Cloud map;  // replaces the map of the odometry
   std::size_t removed = 0;
 
@@ -44,9 +45,10 @@ int main() {
     // 1. Register all points.
     Eigen::Isometry3d T_last_newest = Eigen::Isometry3d::Identity();
     if (i > 0) T_last_newest = register_motion(scan);
+    T_odometry = T_odometry * T_last_newest;
 
-    // 2. Push the scan with this motion.
-    const dynains::FrameResult frame = remover.push(scan, T_world_sensor * T_last_newest, time);
+    // 2. Push the scan with the pose of the odometry, without earlier corrections.
+    const dynains::FrameResult frame = remover.push(scan, T_odometry, time);
 
     // 3. Take the corrected motion. Without common surfaces there is none.
     if (frame.pose_residual) T_last_newest = frame.pose_residual->T_previous_newest;

@@ -33,8 +33,9 @@ class RefinedOdometry {
     const Eigen::Isometry3d T_last_newest = T_odometry_last_.inverse() * T_odometry;
     T_odometry_last_ = T_odometry;
 
-    // 2. Push the scan, with the motion of the odometry.
-    const dynains::FrameResult frame = remover_.push(scan, T_world_last_ * T_last_newest, time);
+    // 2. Push the scan with the pose of the odometry, not with the refined one: the remover
+    // remembers its corrections, and would apply them twice.
+    const dynains::FrameResult frame = remover_.push(scan, T_odometry, time);
 
     // 3. Take the corrected motion. Without common surfaces there is none.
     T_world_last_ = T_world_last_ *

@@ -312,27 +312,45 @@ class FreeSpaceEvidence {
 
   // Makes the range image of the newest scan.
   void make_reference(const Record& record, const GroundSplit& split) {
+    const InstanceEvidence& evidence = record.evidence;
     is_moving_.clear();
-    if (config_.ignore_dynamic_returns) find_moving_points(record.evidence);
+    if (config_.ignore_dynamic_returns) {
+      mark_points(
+          evidence.samples, [&](std::uint32_t s) { return surely_moves(evidence, s); }, is_moving_);
+    }
     references_.make_image(newest_, record.epoch, record.T_world_sensor, split, is_moving_);
-    pose_correction_.insert(record.T_world_sensor, split, is_moving_);
+    mark_points(
+        evidence.samples,
+        [&](std::uint32_t s) { return surely_moves(evidence, s) || may_move(evidence, s); },
+        may_move_);
+    pose_correction_.insert(record.T_world_sensor, split, may_move_);
     if (delay_of(0) != 0) return;
     test_older_scans(0);
     propagate_beliefs(newest_);
   }
 
-  void find_moving_points(const InstanceEvidence& evidence) {
-    const InstanceSamples& samples = evidence.samples;
-    is_moving_group_.assign(samples.met.size(), 0);
+  bool surely_moves(const InstanceEvidence& evidence, std::uint32_t supervoxel) const {
+    return judge_.surely_moves(evidence, supervoxel, verdicts_[supervoxel].cause);
+  }
+  // Whether the instance of a supervoxel is small enough to move, and does not stand still by the
+  // evidence on this scan. Slow vehicles around the sensor would pull its pose along.
+  bool may_move(const InstanceEvidence& evidence, std::uint32_t supervoxel) const {
+    if (!config_.use_tracks) return false;
+    const std::uint32_t instance = evidence.samples.instance_of[supervoxel];
+    return evidence.tracked.shapes[instance].carried &&
+           evidence.tracked.instances[instance].own >= 0.0F;
+  }
+
+  // Writes by non-ground point whether `test(supervoxel)` holds.
+  template <class Test>
+  void mark_points(const InstanceSamples& samples, Test&& test, std::vector<std::uint8_t>& marks) {
+    is_marked_group_.assign(samples.met.size(), 0);
     for (std::size_t i = 1; i < samples.met.size(); ++i) {
-      const std::uint32_t s = samples.met[i];
-      is_moving_group_[i] = judge_.surely_moves(evidence, s, verdicts_[s].cause) ? 1 : 0;
+      is_marked_group_[i] = test(samples.met[i]) ? 1 : 0;
     }
-    detail::ensure_capacity(is_moving_, samples.met_of.size());
-    is_moving_.resize(samples.met_of.size());
-    for (std::size_t i = 0; i < is_moving_.size(); ++i) {
-      is_moving_[i] = is_moving_group_[samples.met_of[i]];
-    }
+    detail::ensure_capacity(marks, samples.met_of.size());
+    marks.resize(samples.met_of.size());
+    for (std::size_t i = 0; i < marks.size(); ++i) marks[i] = is_marked_group_[samples.met_of[i]];
   }
 
   Span<const EvidenceVerdict::GroundPoint> find_moved_ground(std::uint64_t scan,
@@ -372,8 +390,8 @@ class FreeSpaceEvidence {
   std::vector<Record> records_;                             // ring buffer, by scan number
   std::vector<Verdict> verdicts_;                           // by supervoxel
   std::vector<Verdict> groups_;                             // by index in InstanceSamples::met
-  std::vector<std::uint8_t> is_moving_group_;               // by index in InstanceSamples::met
-  std::vector<std::uint8_t> is_moving_;                     // by non-ground point
+  std::vector<std::uint8_t> is_marked_group_;               // by index in InstanceSamples::met
+  std::vector<std::uint8_t> is_moving_, may_move_;          // by non-ground point
   std::vector<std::uint32_t> predecessors_;
 };
 

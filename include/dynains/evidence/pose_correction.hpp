@@ -19,8 +19,10 @@
 namespace dynains {
 
 /// Aligns each scan with the planes of earlier scans of its epoch. If a pose is inexact, so that
-/// static surfaces of the scan lie too far from the planes, it is replaced by the aligned pose, and
-/// the correction applies to later poses, too. Exact poses stay as they are, bit by bit.
+/// static surfaces of the scan lie too far from the planes, it is replaced by the aligned pose.
+/// Directions in which the planes do not support the correction stay as they were pushed. What two
+/// scans in a row agree on is a lasting offset and applies to later poses, too. Exact poses stay as
+/// they are, bit by bit.
 class PoseCorrection {
  public:
   /// `tolerance`: root mean square distance (m) between static surfaces up to which a pose stays;
@@ -32,6 +34,7 @@ class PoseCorrection {
     if (!is_active()) return;
     planes_.reserve();
     selected_.grow(kMostSelected);
+    aligner_.reserve(kMostSelected);
   }
 
   /// Forgets all scans. `T_world_sensor`: pose of the first scan of the next epoch.
@@ -41,7 +44,10 @@ class PoseCorrection {
     T_world_origin_ = T_world_sensor;
     T_origin_world_ = detail::inverted(T_world_sensor);
     T_origin_newest_ = Eigen::Isometry3d::Identity();
+    T_origin_pushed_ = Eigen::Isometry3d::Identity();
     correction_.reset();
+    offset_.reset();
+    open_ = {};
     residual_.reset();
   }
 
@@ -49,12 +55,15 @@ class PoseCorrection {
   /// points, m. Updates residual() and is_lost().
   Eigen::Isometry3d correct(const Eigen::Isometry3d& T_world_level, const GroundSplit& split) {
     if (!is_active()) return T_world_level;
-    const Eigen::Isometry3d T_origin_previous = T_origin_newest_;
     residual_.reset();
     is_lost_ = false;
-    T_origin_newest_ = detail::composed(T_origin_world_, T_world_level);
-    if (correction_) T_origin_newest_ = detail::composed(*correction_, T_origin_newest_);
-    if (inserted_ > 0) align(T_world_level, split, detail::inverted(T_origin_previous));
+    const Eigen::Isometry3d T_pushed = detail::composed(T_origin_world_, T_world_level);
+    const Eigen::Isometry3d T_guess = offset_ ? detail::composed(*offset_, T_pushed) : T_pushed;
+    correction_ = offset_;
+    Eigen::Isometry3d T_newest = T_guess;
+    if (inserted_ > 0) align(split, T_pushed, T_guess, T_newest);
+    T_origin_newest_ = T_newest;
+    T_origin_pushed_ = T_pushed;
     return corrected(T_world_level);
   }
 
@@ -67,15 +76,14 @@ class PoseCorrection {
   }
 
   /// Adds the static points of a scan to the planes. `T_world_level`: result of correct().
-  /// `moving`: by non-ground point, 1 for a moving point, else 0; empty if no point moves.
+  /// `moving`: by non-ground point, 1 for a point that may move, else 0; empty if no point does.
   void insert(const Eigen::Isometry3d& T_world_level, const GroundSplit& split,
               Span<const std::uint8_t> moving) {
     if (!is_active()) return;
     const Eigen::Isometry3d T = detail::composed(T_origin_world_, T_world_level);
-    const std::size_t wanted = inserted_ < kFirstScans ? kFirstInserted : kInserted;
     ++inserted_;
     planes_.begin_scan();
-    visit_some(split, wanted, [&](std::size_t i, double x, double y, double z) {
+    visit_some(split, kInserted, [&](std::size_t i, double x, double y, double z) {
       if (!moving.empty() && i >= split.ground_count && moving[i - split.ground_count] != 0) return;
       double p[3];
       for (int k = 0; k < 3; ++k) p[k] = T(k, 0) * x + T(k, 1) * y + T(k, 2) * z + T(k, 3);
@@ -91,11 +99,10 @@ class PoseCorrection {
   bool is_lost() const { return is_lost_; }
 
  private:
-  static constexpr std::size_t kSelected = 1000;        // points that are aligned
-  static constexpr std::size_t kMostSelected = 1024;    // with padding
-  static constexpr std::size_t kInserted = 6000;        // points of a scan in the planes
-  static constexpr std::size_t kFirstInserted = 24000;  // the same for the first scans
-  static constexpr std::size_t kFirstScans = 2;
+  using Step = detail::NormalEquations::Vector;
+  static constexpr std::size_t kSelected = 3000;      // points that are aligned
+  static constexpr std::size_t kMostSelected = 3072;  // with padding
+  static constexpr std::size_t kInserted = 24000;     // points of a scan in the planes
   static constexpr std::size_t kFewestMatches = 100;
   static constexpr double kLeastInliers = 0.6;               // ratio to the matches
   static constexpr double kNearest = 3.0, kFarthest = 50.0;  // m, horizontal
@@ -128,21 +135,46 @@ class PoseCorrection {
     return selected_;
   }
 
-  // Aligns the newest scan, whose pose with the last correction is T_origin_newest_.
-  void align(const Eigen::Isometry3d& T_world_level, const GroundSplit& split,
-             const Eigen::Isometry3d& T_previous_origin) {
-    const detail::Alignment alignment = detail::align(select(split), planes_, T_origin_newest_);
+  // Aligns the newest scan from its pose `T_guess` with the lasting offset, and writes `T_newest`.
+  void align(const GroundSplit& split, const Eigen::Isometry3d& T_pushed,
+             const Eigen::Isometry3d& T_guess, Eigen::Isometry3d& T_newest) {
+    const Step before = open_;
+    open_ = {};
+    const detail::Alignment alignment = aligner_.align(select(split), planes_, T_guess);
     if (alignment.matched < kFewestMatches) return;
     is_lost_ = static_cast<double>(alignment.inliers) <
                kLeastInliers * static_cast<double>(alignment.matched);
     if (is_lost_) return;
-    residual_ = difference(T_origin_newest_, alignment.T_map_sensor);
+    const Eigen::Isometry3d T_motion =
+        detail::composed(detail::inverted(T_origin_pushed_), T_pushed);
+    residual_ = difference(detail::composed(T_origin_newest_, T_motion), alignment.T_map_sensor);
+    open_ = alignment.found;
     if (alignment.change > tolerance_) {
-      const Eigen::Isometry3d T_origin_pushed = detail::composed(T_origin_world_, T_world_level);
-      correction_ = detail::composed(alignment.T_map_sensor, detail::inverted(T_origin_pushed));
-      T_origin_newest_ = alignment.T_map_sensor;
+      T_newest = alignment.T_map_sensor;
+      correction_ = detail::composed(T_newest, detail::inverted(T_pushed));
+      const Step lasting = agreed(alignment.supported, before);
+      offset_ = detail::composed(detail::moved(T_guess, lasting), detail::inverted(T_pushed));
+      for (std::size_t i = 0; i < lasting.size(); ++i) open_[i] -= lasting[i];
     }
-    residual_->T_previous_newest = detail::composed(T_previous_origin, T_origin_newest_);
+    residual_->T_previous_newest = detail::composed(detail::inverted(T_origin_newest_), T_newest);
+  }
+
+  // The part on which two steps agree: the mean direction of both, with the smaller length; zero at
+  // more than a right angle. Translations and rotations on their own.
+  static Step agreed(const Step& a, const Step& b) {
+    Step result = {};
+    for (std::size_t first = 0; first < a.size(); first += 3) {
+      double aa = 0.0, bb = 0.0, ab = 0.0;
+      for (std::size_t i = first; i < first + 3; ++i) {
+        aa += a[i] * a[i];
+        bb += b[i] * b[i];
+        ab += a[i] * b[i];
+      }
+      if (ab <= 0.0) continue;
+      const double scale = std::sqrt(std::min(aa, bb) / (aa + 2.0 * ab + bb));
+      for (std::size_t i = first; i < first + 3; ++i) result[i] = scale * (a[i] + b[i]);
+    }
+    return result;
   }
 
   // Rotation and translation of the sensor from one pose to another.
@@ -164,11 +196,16 @@ class PoseCorrection {
   std::size_t inserted_ = 0;
   Eigen::Isometry3d T_world_origin_ = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d T_origin_world_ = Eigen::Isometry3d::Identity();
-  std::optional<Eigen::Isometry3d> correction_;  // in the origin frame, multiplied from the left
+  // Corrections in the origin frame, multiplied from the left: of the newest scan, and the part
+  // that lasts.
+  std::optional<Eigen::Isometry3d> correction_, offset_;
+  Step open_ = {};  // step that aligns the last scan, without the part that lasts
   Eigen::Isometry3d T_origin_newest_ = Eigen::Isometry3d::Identity();  // corrected
+  Eigen::Isometry3d T_origin_pushed_ = Eigen::Isometry3d::Identity();  // as pushed
   std::optional<PoseResidual> residual_;
   bool is_lost_ = false;
   PointBuffer selected_;
+  detail::PlaneAligner aligner_;
 };
 
 }  // namespace dynains

@@ -22,6 +22,7 @@ class VoxelPlanes {
     double normal[3];  ///< unit vector
     double mean[3];    ///< m
     bool is_flat = false;
+    std::uint32_t matches = 0;  ///< number of matched points, for alignments
 
     double distance(const double (&p)[3]) const {
       return normal[0] * (p[0] - mean[0]) + normal[1] * (p[1] - mean[1]) +
@@ -70,7 +71,7 @@ class VoxelPlanes {
   }
 
   /// Plane of the voxel of a point; null if there is none.
-  const Plane* find(const double (&p)[3]) {
+  Plane* find(const double (&p)[3]) {
     std::int64_t index[3];
     const std::uint32_t number = table_.find(key_of(p, index));
     if (number == VoxelHashTable<>::kNone) return nullptr;
@@ -111,7 +112,8 @@ class VoxelPlanes {
                    {centre(index[0]) + fitted.mean_x, centre(index[1]) + fitted.mean_y,
                     centre(index[2]) + fitted.mean_z},
                    fitted.flatness <= kMostFlatness && fitted.breadth >= kLeastBreadth &&
-                       thickness_squared <= kMostThickness * kMostThickness};
+                       thickness_squared <= kMostThickness * kMostThickness,
+                   0};
   }
 
   // Keeps the voxels that have received a point in the last scans, at most half of the maximum.
