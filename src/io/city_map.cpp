@@ -39,6 +39,42 @@ TileHistory CityMap::history(const TileIndex& tile, std::uint32_t last) const {
   return history;
 }
 
+CityChanges CityMap::changes(const TileIndex& tile, std::uint32_t a, std::uint32_t b) const {
+  if (a >= b) throw ConfigError("changes of a map: expected an earlier and a later session");
+  const TileHistory history = this->history(tile, b);
+  const SessionGrid& grid = city_.grid();
+  VoxelHashTable<> before, after;
+  history.for_each_standing(a, [&](std::size_t session, std::size_t i) {
+    before.insert(session_voxel(grid, history.points(session)[i]));
+  });
+  std::vector<CityPoint> candidates;
+  history.for_each_standing(b, [&](std::size_t session, std::size_t i) {
+    const SessionPoint& point = history.points(session)[i];
+    const VoxelKey voxel = session_voxel(grid, point);
+    after.insert(voxel);
+    if (session <= a || before.find(voxel) != VoxelHashTable<>::kNone) return;
+    candidates.push_back({static_cast<std::uint32_t>(session), point});
+  });
+
+  CityChanges changes;
+  history.for_each_standing(a, [&](std::size_t session, std::size_t i) {
+    if (history.stands(session, i, b)) return;
+    const SessionPoint& point = history.points(session)[i];
+    if (after.find(session_voxel(grid, point)) != VoxelHashTable<>::kNone) return;
+    changes.removed.push_back({static_cast<std::uint32_t>(session), point});
+  });
+  // What was free in the earlier sessions has come; what they did not see is new to the map only.
+  TileHistory reversed(grid, config_);
+  std::vector<SessionPoint> points;
+  for (const CityPoint& candidate : candidates) points.push_back(candidate.point);
+  reversed.add_session(std::move(points));
+  for (std::size_t session = 0; session <= a; ++session) revise(reversed, tile, session);
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    if (!reversed.stands(0, i, 1)) changes.added.push_back(candidates[i]);
+  }
+  return changes;
+}
+
 void CityMap::revise(TileHistory& history, const TileIndex& tile, std::size_t session) const {
   ReferenceTest test{FreeSpaceConfig()};
   SessionReference reference;

@@ -14,6 +14,7 @@
 #include "output_folder.hpp"
 #include "run_results.hpp"
 #include "run_settings.hpp"
+#include "session_contribution.hpp"
 
 namespace dynains::program {
 
@@ -27,6 +28,7 @@ struct RunPlan {
   InputFiles inputs;
   nlohmann::ordered_json configuration;  ///< parameter name -> value
   nlohmann::ordered_json request;        ///< see describe_request()
+  SessionRequest session;
 };
 
 /// Path of the file that a flag --map names, links followed. `out`: folder of the results, by

@@ -21,13 +21,13 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::uint32_t kParked = 10, kContainer = 99;
-const test::Box kParkedCar = {{4, 3, 0}, {8, 5, 1.5}, kParked};
-const test::Box kNewContainer = {{-6, -8, 0}, {-2, -6, 2}, kContainer};
+const test::StreetBox kParkedCar = {{4, 3, 0}, {8, 5, 1.5}, kParked};
+const test::StreetBox kNewContainer = {{-6, -8, 0}, {-2, -6, 2}, kContainer};
 
 struct Session {
   std::string name;
   double begin;
-  std::vector<test::Box> boxes;
+  std::vector<test::StreetBox> boxes;
 };
 
 /// A car is there on the first day only, a container from the second day on.
@@ -170,7 +170,7 @@ TEST_CASE("a city: what a later session sees through leaves, what it sees standi
 TEST_CASE("a city: what a later session did not see stays") {
   const test::TemporaryFolder folder;
   const City city = city_of(folder.path() / "city", {kDays[0]});
-  const test::Box wall = {{-40, 2.0, 0}, {40, 2.2, 5}, 50};
+  const test::StreetBox wall = {{-40, 2.0, 0}, {40, 2.2, 5}, 50};
   add(city, {"tuesday", 86400.0, {wall}});
   auto before = label_counts(city, 0);
   auto after = label_counts(city, 1);

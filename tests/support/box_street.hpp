@@ -12,7 +12,7 @@
 
 namespace dynains::test {
 
-struct Box {
+struct StreetBox {
   Eigen::Vector3d lowest, highest;  // m, world frame
   std::uint32_t label;
 };
@@ -25,7 +25,7 @@ struct BoxScan {
 };
 
 /// Distance (m) along a ray to a box, infinite if it misses.
-inline double distance_to(const Box& box, const Eigen::Vector3d& origin,
+inline double distance_to(const StreetBox& box, const Eigen::Vector3d& origin,
                           const Eigen::Vector3d& direction) {
   double enter = 0.0;
   double leave = std::numeric_limits<double>::infinity();
@@ -39,7 +39,7 @@ inline double distance_to(const Box& box, const Eigen::Vector3d& origin,
 }
 
 /// One scan at (x, y), 1.7 m above the ground, of the boxes and two walls at y = -12 and 12.
-inline BoxScan scan_boxes(std::vector<Box> boxes, double x, double y) {
+inline BoxScan scan_boxes(std::vector<StreetBox> boxes, double x, double y) {
   constexpr double kRadians = M_PI / 180.0;
   boxes.push_back({{-100, 12, 0}, {100, 13, 6}, 50});
   boxes.push_back({{-100, -13, 0}, {100, -12, 6}, 50});
@@ -54,7 +54,7 @@ inline BoxScan scan_boxes(std::vector<Box> boxes, double x, double y) {
                                       std::cos(up) * std::sin(around), std::sin(up));
       double range = direction.z() < 0.0 ? -origin.z() / direction.z() : 1e9;
       std::uint32_t label = 40;
-      for (const Box& box : boxes) {
+      for (const StreetBox& box : boxes) {
         const double to_box = distance_to(box, origin, direction);
         if (to_box >= range) continue;
         range = to_box;
@@ -71,7 +71,8 @@ inline BoxScan scan_boxes(std::vector<Box> boxes, double x, double y) {
 }
 
 /// Scans of a drive along the x axis from `from` to `to`, 1 m apart.
-inline std::vector<BoxScan> drive_along(const std::vector<Box>& boxes, double from, double to) {
+inline std::vector<BoxScan> drive_along(const std::vector<StreetBox>& boxes, double from,
+                                        double to) {
   std::vector<BoxScan> scans;
   for (double x = from; x <= to; x += 1.0) scans.push_back(scan_boxes(boxes, x, 0.0));
   return scans;

@@ -14,6 +14,18 @@
 
 namespace dynains {
 
+/// One point of the map of a city.
+struct CityPoint {
+  std::uint32_t session;  ///< number of the session that measured it
+  SessionPoint point;
+};
+
+/// What changed in a tile between the maps after two sessions.
+struct CityChanges {
+  std::vector<CityPoint> removed;  ///< points that beams of a later session passed through
+  std::vector<CityPoint> added;    ///< new points whose place beams of earlier sessions passed
+};
+
 /// Reads a city as a map. The result is a function of the set of sessions. Memory: one tile of all
 /// sessions and one range image.
 class CityMap {
@@ -30,6 +42,11 @@ class CityMap {
 
   /// The history of one tile over sessions 0 to `last`. Throws IoError.
   TileHistory history(const TileIndex& tile, std::uint32_t last = TileHistory::kNever) const;
+
+  /// Changes of one tile from the map after session `a` to the map after session `b`. Points of
+  /// places that only one of both maps has seen are no changes. Throws ConfigError unless `a` is
+  /// before `b`; IoError.
+  CityChanges changes(const TileIndex& tile, std::uint32_t a, std::uint32_t b) const;
 
   /// World position of a point of a tile, m.
   Eigen::Vector3d position(const TileIndex& tile, const SessionPoint& point) const {
