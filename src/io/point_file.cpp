@@ -60,6 +60,7 @@ std::string ply_header(std::size_t count, const PointColumns& columns, const std
   if (columns.label) text += "property uint label\n";
   if (columns.ring) text += "property ushort ring\n";
   if (columns.time) text += "property double time\n";
+  if (columns.session) text += "property ushort session\n";
   return text + "end_header\n";
 }
 
@@ -91,6 +92,7 @@ std::string pcd_header(std::size_t count, const PointColumns& columns, const std
   if (columns.label) add("label", "U");
   if (columns.ring) add("ring", "U", 2);
   if (columns.time) add("time", "F", 8);
+  if (columns.session) add("session", "U", 2);
   const std::string size = std::to_string(count);
   return "# .PCD v0.7 - Point Cloud Data file format\n# dynains" + padding + "\nVERSION 0.7\n" +
          fields + '\n' + sizes + '\n' + types + '\n' + counts + "\nWIDTH " + size + "\nHEIGHT 1\n" +
@@ -151,6 +153,7 @@ void PointFileWriter::add(const FilePoint& point) {
   if (columns_.label) record.put(point.label);
   if (columns_.ring) record.put(point.ring);
   if (columns_.time) record.put(point.time);
+  if (columns_.session) record.put(point.session);
   record.write_to(file_.stream());
   ++size_;
 }

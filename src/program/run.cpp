@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -132,6 +133,12 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   const PoseAgreement agreement = pose_agreement(plan.sequence, plan.range.first, plan.range.last);
   warn_of_doubts(plan, settings, listener, agreement);
 
+  std::optional<SessionContribution> session;
+  // A run that is resumed may have added its session already.
+  if (!plan.session.city.empty() && !(settings.resume && plan.session.is_fulfilled())) {
+    session.emplace(plan.session);
+  }
+
   const InterruptGuard interrupt(listener.second_signal);
   nlohmann::ordered_json marker = unfinished_report(plan.outputs.map_name());
   marker["request"] = plan.request;
@@ -140,6 +147,7 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   RunOutputs outputs = plan.outputs;
   outputs.folder = change.folder();
   RunResults results(plan.sequence, plan.range, outputs, outside_map.take_writer());
+  if (session) results.contribute_to(*session);
   const RunTiming timing = process(plan, listener, outputs.folder, results);
   RunOutcome outcome = outcome_of(plan, results, timing);
   if (!outcome.complete) outcome.signal = InterruptGuard::signal();
@@ -151,7 +159,10 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   write_timing(outputs.folder / "timing.csv", timing);
   // An earlier folder keeps the chunks until all other files are on the disk.
   if (change.is_staged()) remove_chunks(plan, outputs.folder);
-  change.put_in_place([&] { results.commit_outside_map(); });
+  change.put_in_place([&] {
+    results.commit_outside_map();
+    if (session && outcome.complete) session->commit();
+  });
   if (!change.is_staged() && outcome.complete) remove_chunks(plan, outputs.folder);
   outcome.map_points = results.map_points();
   outcome.wall = wall_time(ms_since(settings.started), timing);

@@ -153,6 +153,22 @@ void add_run_command(CLI::App& app) {
           "--out until the run is complete [no bound]")
       ->type_name("MB")
       ->group(kOutputs);
+  command
+      .add_option("--update", options->update,
+                  "also adds the session to this map of many sessions, a folder (see `dynains "
+                  "map`), when the run is complete")
+      ->type_name("CITY")
+      ->group(kOutputs);
+  command
+      .add_option("--session", options->session,
+                  "name of the session in --update [name of the recording]")
+      ->type_name("NAME")
+      ->group(kOutputs);
+  command
+      .add_option("--session-begin", options->session_begin,
+                  "time by which sessions are ordered [time of the first scan]")
+      ->type_name("S")
+      ->group(kOutputs);
   const auto add_output = [&](const char* flag, bool& value, const char* help) {
     command.add_flag(flag, value, help)->group(kOutputs);
   };

@@ -134,10 +134,49 @@ InputFiles inputs_of(const RunSettings& settings, const Recording& sequence) {
   return inputs;
 }
 
+/// Name of the session of a recording: that of its folder or file.
+std::string session_name(const RunSettings& settings) {
+  if (!settings.session.empty()) return settings.session;
+  const fs::path recording = whole_path(settings.recording);
+  return fs::is_directory(recording) ? recording.filename().string() : recording.stem().string();
+}
+
+/// Throws ConfigError.
+SessionRequest session_request(const RunSettings& settings, const Recording& sequence,
+                               const ScanRange& range,
+                               const nlohmann::ordered_json& configuration) {
+  SessionRequest request;
+  if (settings.update.empty()) {
+    if (!settings.session.empty()) throw ConfigError("--session needs --update CITY");
+    if (settings.session_begin) throw ConfigError("--session-begin needs --update CITY");
+    return request;
+  }
+  request.city = whole_path(settings.update);
+  const fs::path out = whole_path(settings.out);
+  if (out == request.city || out.parent_path() == request.city) {
+    throw ConfigError("--update " + settings.update +
+                      ": its folders are sessions; choose a folder for --out outside of it");
+  }
+  request.grid.map_voxel = settings.config.map.map_voxel;
+  request.grid.validate();
+  request.info.name = session_name(settings);
+  if (!is_session_name(request.info.name)) {
+    throw ConfigError("\"" + request.info.name +
+                      "\" cannot name a session: give one of letters, digits, '.', '_' and '-' by "
+                      "--session NAME");
+  }
+  request.info.begin = settings.session_begin.value_or(sequence.time(range.first));
+  request.info.recording = settings.recording;
+  request.info.fingerprint = pose_fingerprint(sequence, range);
+  request.info.config = configuration.dump();
+  return request;
+}
+
 /// Whether every file of complete results is still there.
 bool is_whole(const RunPlan& plan, const OutputFolder& out) {
   const RunOutputs& outputs = plan.outputs;
   if (outputs.has_outside_map() && !fs::exists(outputs.map)) return false;
+  if (!plan.session.city.empty() && !plan.session.is_fulfilled()) return false;
   const OutputListing listing = outputs.listing(plan.sequence, plan.range, false);
   for (const std::string& name : listing.files) {
     if (!out.folder().find(name)) return false;
@@ -200,6 +239,11 @@ RunPlan make_plan(const RunSettings& settings, Recording sequence) {
   nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);
   request["chunk"] = chunk_settings.scans;
   request["lookback"] = chunks.empty() ? 0 : chunk_settings.lookback;
+  SessionRequest session = session_request(settings, sequence, range, configuration);
+  if (!session.city.empty()) {
+    request["update"] = session.city.string();
+    request["session"] = session.info.name;
+  }
   Fingerprint fingerprint;
   fingerprint.add(request.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   const std::size_t jobs = choose_jobs(settings, chunks.size());
@@ -213,7 +257,8 @@ RunPlan make_plan(const RunSettings& settings, Recording sequence) {
           std::move(listing),
           std::move(inputs),
           configuration,
-          request,
+          std::move(request),
+          std::move(session),
           std::move(chunks),
           jobs,
           fingerprint.value()};

@@ -16,6 +16,7 @@
 #include "output_folder.hpp"
 #include "run_results.hpp"
 #include "run_settings.hpp"
+#include "session_contribution.hpp"
 
 namespace dynains::program {
 
@@ -29,6 +30,7 @@ struct RunPlan {
   InputFiles inputs;
   nlohmann::ordered_json configuration;  ///< parameter name -> value
   nlohmann::ordered_json request;        ///< see describe_request()
+  SessionRequest session;
   std::vector<Chunk> chunks;             ///< empty: the recording is one stream
   std::size_t jobs = 1;                  ///< threads that process chunks
   std::uint64_t fingerprint = 0;         ///< of the request

@@ -175,16 +175,17 @@ void RunResults::take_final(const ScanVerdict& verdict) {
 }
 
 bool RunResults::needs_scans() const {
-  return clean_scans_ || log_ || map_attributes_ || dynamic_las_;
+  return clean_scans_ || log_ || map_attributes_ || dynamic_las_ || session_ != nullptr;
 }
 
 void RunResults::add_scan(const RecordedScan& scan, const ScanVerdict& verdict) {
   const std::size_t index = range_.first + verdict.scan;
   if (clean_scans_) clean_scans_->write(index, scan, verdict.labels);
   if (log_) log_->add(scan, verdict);
-  const bool has_labels = map_attributes_ && recording_.has_labels();
+  const bool has_labels = (map_attributes_ || session_ != nullptr) && recording_.has_labels();
   const auto labels = has_labels ? recording_.read_labels(index) : std::vector<std::uint32_t>();
   if (map_attributes_) map_attributes_->add(scan, verdict, labels);
+  if (session_ != nullptr) session_->add(scan, verdict, labels, index);
   if (!dynamic_las_) return;
   for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
     if (verdict.labels[i] != PointLabel::kDynamic) continue;

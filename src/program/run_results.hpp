@@ -22,6 +22,7 @@
 #include "output_listing.hpp"
 #include "overview.hpp"
 #include "scan_range.hpp"
+#include "session_contribution.hpp"
 #include "verdict_log.hpp"
 
 namespace dynains::program {
@@ -94,6 +95,8 @@ class RunResults {
   /// The scan just pushed, which this keeps, and the verdict on it.
   void take_newest(RecordedScan scan, const ScanVerdict& verdict);
   void take_final(const ScanVerdict& verdict);
+  /// Final verdicts also go to `session`, which outlives this.
+  void contribute_to(SessionContribution& session) { session_ = &session; }
   /// Memory of a scan that is finished, for reading the next.
   RecordedScan recycle();
 
@@ -134,6 +137,7 @@ class RunResults {
   std::unique_ptr<MapFile> dynamic_las_;  ///< moving points beside a LAS map
   std::optional<MapAttributeTable> map_attributes_;
   bool map_is_outside_;
+  SessionContribution* session_ = nullptr;
   std::deque<RecordedScan> open_scans_;  // oldest first
   std::vector<RecordedScan> spare_;
   std::size_t finished_ = 0;

@@ -16,7 +16,8 @@ namespace {
 
 constexpr double kMovingSpeed = 0.5;  // m/s
 constexpr double kMovedWay = 0.5;     // m
-constexpr int kShutterParts = 40;     // of a scan, each measured at one time
+constexpr double kSecondsOfDay = 86400.0;
+constexpr int kShutterParts = 40;  // of a scan, each measured at one time
 
 /// Rotation Rz(yaw) Ry(pitch) Rx(roll) in doubles, without vector instructions that might differ.
 Eigen::Matrix3d rotation(double yaw, double pitch, double roll) {
@@ -112,11 +113,11 @@ class Simulator::Implementation {
   SimulatedScan scan(std::size_t index) {
     const Moment& moment = moments_.at(index);
     SimulatedScan result;
-    result.time = moment.time;
+    result.time = moment.time + kSecondsOfDay * std::max(0, config_.day - 1);
     result.T_world_sensor = moment.T_world_sensor;
     result.T_world_sensor_noisy = with_noise(moment.T_world_sensor, index);
 
-    const std::uint64_t scan_seed = mix(mix(config_.seed, 500), index);
+    const std::uint64_t scan_seed = mix(seed_of_day(500), index);
     if (!config_.rolling_shutter) {
       measure_part(index, moment, {0, model_.columns}, scan_seed, result);
       return result;
@@ -133,6 +134,12 @@ class Simulator::Implementation {
   }
 
  private:
+  /// Seed for a purpose, which differs from day to day.
+  std::uint64_t seed_of_day(std::uint64_t purpose) const {
+    const std::uint64_t seed = mix(config_.seed, purpose);
+    return config_.day == 0 ? seed : mix(seed, static_cast<std::uint64_t>(config_.day));
+  }
+
   /// Where everything is at one time.
   struct Moment {
     double time = 0;
@@ -253,7 +260,7 @@ class Simulator::Implementation {
   }
 
   Eigen::Isometry3d with_noise(const Eigen::Isometry3d& pose, std::size_t index) const {
-    Random random(mix(mix(config_.seed, 600), index));
+    Random random(mix(seed_of_day(600), index));
     double offset[3], turn[3];
     for (double& v : offset) v = config_.pose_noise_translation * random.normal();
     for (double& v : turn) v = config_.pose_noise_rotation * kPi / 180 * random.normal();
@@ -283,8 +290,9 @@ class Simulator::Implementation {
           person ? isometry(rotation(pose.at.heading, 0, 0), pose.at.position.x, pose.at.position.y,
                             world_.terrain.height(pose.at.position))
                  : stand_on(world_.terrain, pose.at, object.size.length, object.size.width);
-      states.push_back({pose.object + 1, label_of(pose), T_world_object, pose.speed,
-                        object.size.length, object.size.width, object.size.height});
+      const std::uint32_t instance = object.instance == 0 ? pose.object + 1 : object.instance;
+      states.push_back({instance, label_of(pose), T_world_object, pose.speed, object.size.length,
+                        object.size.width, object.size.height});
       const Rigid T_sensor_object = to_rigid(product(T_sensor_world, T_world_object));
       Model shape;
       if (person) {
@@ -308,7 +316,9 @@ class Simulator::Implementation {
   }
 
   std::uint32_t label_of(const ObjectPose& pose) const {
-    const Kind kind = world_.traffic.objects[pose.object].kind;
+    const Object& object = world_.traffic.objects[pose.object];
+    if (object.label != 0) return object.label;
+    const Kind kind = object.kind;
     const bool moving = config_.labelling == Labelling::kEver ? ever_moved_[pose.object]
                                                               : pose.speed > kMovingSpeed;
     return moving ? moving_label(kind) : resting_label(kind);

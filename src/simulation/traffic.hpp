@@ -20,7 +20,9 @@ struct Object {
   Kind kind = Kind::kCar;
   Size size;
   std::uint64_t seed = 0;
-  Model model;  ///< empty for people, whose shape changes
+  Model model;                 ///< empty for people, whose shape changes
+  std::uint16_t label = 0;     ///< SemanticKITTI class; 0: that of its kind
+  std::uint32_t instance = 0;  ///< 0: by its number
 };
 
 /// Pose of an object at the time of one scan.

@@ -23,7 +23,9 @@ void StaticGeometry::add(const Rigid& T_world_model, const Model& model) {
   }
 }
 
-World build_world(const Config& config) {
+namespace {
+
+World build_scene(const Config& config) {
   switch (config.scene) {
     case Scene::kHighway:
       return highway(config);
@@ -50,6 +52,15 @@ World build_world(const Config& config) {
       break;
   }
   return urban(config);
+}
+
+}  // namespace
+
+World build_world(const Config& config) {
+  if (config.day == 0) return build_scene(config);
+  Config layout = config;
+  layout.day = 0;
+  return on_day(build_scene(layout), build_scene(config), config);
 }
 
 }  // namespace dynains::simulation

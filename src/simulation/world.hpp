@@ -46,4 +46,8 @@ struct World {
 /// Builds the scene at its start time.
 World build_world(const Config& config);
 
+/// The place of `layout` with the traffic and the parked vehicles of `day`, and the changes of the
+/// day. Both are of one seed and scene.
+World on_day(World layout, World day, const Config& config);
+
 }  // namespace dynains::simulation

@@ -54,6 +54,8 @@ class RangeImage {
 
   const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
   const Cell* data() const { return cells_.get(); }
+  /// A cell to write, for images that are read from files. Call reserve() before.
+  Cell& cell(std::size_t index) { return cells_[index]; }
   /// The grid of the image; empty before the first build() or reserve().
   const RangeImageGrid& grid() const { return grid_; }
 

@@ -64,6 +64,11 @@ struct RangeImageGrid {
                detail::kShortPackWidth * detail::kShortPackWidth +
            2 * detail::kPackWidth;
   }
+  /// Index of a cell in the image. Cells between the rows are padding.
+  std::size_t cell(std::int32_t row, std::int32_t column) const {
+    return static_cast<std::size_t>(row) * stride() + detail::kPackWidth +
+           static_cast<std::size_t>(column);
+  }
   std::size_t cell_count() const { return static_cast<std::size_t>(rows) * stride(); }
 
  private:

@@ -27,6 +27,7 @@ struct FilePoint {
   std::uint32_t label = 0;
   std::uint16_t ring = 0;
   double time = 0.0;
+  std::uint16_t session = 0;
 };
 
 /// Columns in addition to x y z.
@@ -37,6 +38,7 @@ struct PointColumns {
   bool label = false;       ///< uint32 `label`
   bool ring = false;        ///< uint16 `ring`
   bool time = false;        ///< double `time`
+  bool session = false;     ///< uint16 `session`, of a map of many sessions
 };
 
 /// Writes a binary point file, point by point, without points in memory. The number of points need

@@ -80,6 +80,9 @@ struct Config {
 
   int scans = 150;
   std::uint64_t seed = 1;
+  /// 0: a place without days. From 1 on: the same static place with the movers and parked vehicles
+  /// of this day, and a few changes from day to day. Scenes kUrban and kStatic only.
+  int day = 0;
   double rate = 10.0;                   ///< scans per second
   double ego_speed = -1.0;              ///< m/s; negative: default of the scene
   double traffic = 1.0;                 ///< ratio to the default number of moving objects
@@ -103,6 +106,9 @@ struct Config {
     visitor(Parameter{"scans", self.scans, closed(1, 1000000), "scans", "length of the sequence"});
     visitor(Parameter{"seed", self.seed, Bounds{}, "",
                       "seed of the layout and the traffic of the scene"});
+    visitor(Parameter{"day", self.day, closed(0, 1000), "",
+                      "day of a place of scene urban or static: other movers, other parked "
+                      "vehicles, a few real changes; 0: a place without changes"});
     visitor(Parameter{"rate", self.rate, closed(1, 50), "1/s", "scans per second"});
     visitor(Parameter{"ego_speed", self.ego_speed, closed(-1, 50), "m/s",
                       "cruising speed; negative: usual for the scene"});
@@ -142,7 +148,13 @@ struct Config {
   }
 
   /// Throws ConfigError for a field out of bounds.
-  void validate() const { validate_parameters("simulation", *this); }
+  void validate() const {
+    validate_parameters("simulation", *this);
+    if (day > 0 && scene != Scene::kUrban && scene != Scene::kStatic) {
+      throw ConfigError("simulation.day = " + std::to_string(day) +
+                        " must be 0 for this scene: only urban and static have days");
+    }
+  }
 };
 
 }  // namespace dynains::simulation

@@ -11,9 +11,14 @@
 
 namespace dynains::simulation {
 
+/// Least instance id of the changes of a place from day to day.
+inline constexpr std::uint32_t kFirstChange = 0xF000;
+
 /// True state of an object at the time of a scan.
 struct ObjectState {
-  std::uint32_t instance;            ///< instance id from 1, the upper 16 bits of its labels
+  /// Instance id from 1, the upper 16 bits of its labels; from kFirstChange on for a change of the
+  /// place, which has its id on all days
+  std::uint32_t instance;
   std::uint32_t label;               ///< SemanticKITTI class, the lower 16 bits in this scan
   Eigen::Isometry3d T_world_object;  ///< origin: centre of the footprint on the ground; x forward
   double speed;                      ///< m/s
@@ -22,7 +27,9 @@ struct ObjectState {
 
 /// One scan with its ground truth.
 struct SimulatedScan {
-  double time = 0.0;                  ///< s, 0 for the first scan; of the first beam
+  /// s, of the first beam; 0 for the first scan of a place without days and of day 1, 86400 for
+  /// that of day 2
+  double time = 0.0;
   std::vector<float> xyzi;            ///< interleaved; m, sensor frame; reflectivity in [0, 1]
   std::vector<std::uint32_t> labels;  ///< by point: SemanticKITTI class | instance << 16
   std::vector<float> times;           ///< by point: s after `time`; empty without a rolling shutter

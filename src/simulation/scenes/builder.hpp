@@ -29,7 +29,7 @@ class Builder {
  public:
   Builder(const Config& config, const TerrainConfig& ground, std::vector<Street> streets)
       : config_(config),
-        random_(mix(config.seed, 1000 + static_cast<std::uint64_t>(config.scene))),
+        random_(seed_of(config)),
         world_{Terrain(ground, std::move(streets), random_.fork(1)), {}, Traffic(random_.fork(2))} {
   }
 
@@ -106,6 +106,11 @@ class Builder {
   bool is_free_of_drivers(const Waypoint& at, double half_length) const;
 
  private:
+  static std::uint64_t seed_of(const Config& config) {
+    const std::uint64_t seed = mix(config.seed, 1000 + static_cast<std::uint64_t>(config.scene));
+    return config.day == 0 ? seed : mix(seed, static_cast<std::uint64_t>(config.day));
+  }
+
   /// Waypoint at arc length s (m), `lateral` (m) beside the street, turned by `turn` (rad).
   using PlaceBeside = std::function<Waypoint(double s, double lateral, double turn)>;
 

@@ -1,0 +1,97 @@
+#include "dynains/io/city_map.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynains/errors.hpp"
+
+namespace dynains {
+
+CityMap::CityMap(const City& city, const MapRevisionConfig& config)
+    : city_(city), config_((config.validate(), config)), sessions_(city.sessions()) {
+  references_.reserve(sessions_.size());
+  for (const SessionInfo& session : sessions_) references_.emplace_back(city_, session);
+}
+
+std::uint32_t CityMap::number_of(const std::string& session) const {
+  const auto found = std::find_if(sessions_.begin(), sessions_.end(),
+                                  [&](const SessionInfo& info) { return info.name == session; });
+  if (found == sessions_.end()) {
+    throw ConfigError(city_.folder().string() + ": has no session \"" + session + '"');
+  }
+  return static_cast<std::uint32_t>(found - sessions_.begin());
+}
+
+std::vector<TileIndex> CityMap::tiles() const {
+  std::set<TileIndex> tiles;
+  for (const SessionInfo& session : sessions_) {
+    for (const auto& tile : session.tiles) tiles.insert(tile.first);
+  }
+  return {tiles.begin(), tiles.end()};
+}
+
+TileHistory CityMap::history(const TileIndex& tile, std::uint32_t last) const {
+  TileHistory history(city_.grid(), config_);
+  for (std::size_t i = 0; i < sessions_.size() && i <= last; ++i) {
+    revise(history, tile, i);
+    history.add_session(city_.read_tile(sessions_[i], tile));
+  }
+  return history;
+}
+
+CityChanges CityMap::changes(const TileIndex& tile, std::uint32_t a, std::uint32_t b) const {
+  if (a >= b) throw ConfigError("changes of a map: expected an earlier and a later session");
+  const TileHistory history = this->history(tile, b);
+  const SessionGrid& grid = city_.grid();
+  VoxelHashTable<> before, after;
+  history.for_each_standing(a, [&](std::size_t session, std::size_t i) {
+    before.insert(session_voxel(grid, history.points(session)[i]));
+  });
+  std::vector<CityPoint> candidates;
+  history.for_each_standing(b, [&](std::size_t session, std::size_t i) {
+    const SessionPoint& point = history.points(session)[i];
+    const VoxelKey voxel = session_voxel(grid, point);
+    after.insert(voxel);
+    if (session <= a || before.find(voxel) != VoxelHashTable<>::kNone) return;
+    candidates.push_back({static_cast<std::uint32_t>(session), point});
+  });
+
+  CityChanges changes;
+  history.for_each_standing(a, [&](std::size_t session, std::size_t i) {
+    if (history.stands(session, i, b)) return;
+    const SessionPoint& point = history.points(session)[i];
+    if (after.find(session_voxel(grid, point)) != VoxelHashTable<>::kNone) return;
+    changes.removed.push_back({static_cast<std::uint32_t>(session), point});
+  });
+  // What was free in the earlier sessions has come; what they did not see is new to the map only.
+  TileHistory reversed(grid, config_);
+  std::vector<SessionPoint> points;
+  for (const CityPoint& candidate : candidates) points.push_back(candidate.point);
+  reversed.add_session(std::move(points));
+  for (std::size_t session = 0; session <= a; ++session) revise(reversed, tile, session);
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    if (!reversed.stands(0, i, 1)) changes.added.push_back(candidates[i]);
+  }
+  return changes;
+}
+
+void CityMap::revise(TileHistory& history, const TileIndex& tile, std::size_t session) const {
+  ReferenceTest test{FreeSpaceConfig()};
+  SessionReference reference;
+  const Eigen::Vector3d corner = tile_corner(city_.grid(), tile);
+  const Eigen::Vector3d middle =
+      corner + Eigen::Vector3d(0.5 * city_.grid().tile, 0.5 * city_.grid().tile, 0.0);
+  // Beyond this distance, no point of the tile is in range.
+  const double reach = config_.revision_range + std::sqrt(0.5) * city_.grid().tile;
+  for (const SessionReferenceReader::Entry& entry : references_[session].entries()) {
+    if ((entry.sensor - middle).head<2>().norm() > reach) continue;
+    references_[session].read(entry, reference);
+    const Eigen::Isometry3d T_world_points(Eigen::Translation3d(entry.sensor));
+    history.revise(entry.scan, entry.sensor - corner,
+                   [&](const PointBuffer& points, std::size_t count) -> const detail::Visibility& {
+                     return test(reference, points, count, T_world_points);
+                   });
+  }
+}
+
+}  // namespace dynains

@@ -1,0 +1,172 @@
+#include "dynains/io/session_writer.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <limits>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/atomic_file.hpp"
+#include "dynains/io/folder_lock.hpp"
+#include "failure.hpp"
+#include "session_files.hpp"
+
+namespace dynains {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Removes the staging folders of killed processes.
+void remove_stale_staging(const fs::path& city) {
+  std::vector<fs::path> folders;
+  for (const auto& entry : fs::directory_iterator(city)) {
+    const bool is_staging = session_files::is_staging_name(entry.path().filename().string()) &&
+                            entry.is_directory() && !entry.is_symlink();
+    if (is_staging) folders.push_back(entry.path());
+  }
+  for (const fs::path& folder : folders) {
+    try {
+      const FolderLock lock(folder);
+      session_files::remove_session_files(folder);
+    } catch (const UsageError&) {
+      // Its writer lives.
+    }
+  }
+}
+
+void refuse_known_session(const City& city, const SessionInfo& session) {
+  if (fs::exists(fs::symlink_status(city.session_folder(session.name)))) {
+    throw UsageError(city.session_folder(session.name).string() +
+                     ": exists; a session is added once. Drop it first, or choose another name");
+  }
+  if (session.fingerprint.empty()) return;
+  for (const SessionInfo& other : city.sessions()) {
+    if (other.fingerprint != session.fingerprint) continue;
+    throw UsageError(city.session_folder(other.name).string() +
+                     ": is a session of the same scans, poses and times already");
+  }
+}
+
+void check_stream(std::ofstream& file, const fs::path& path) {
+  file.flush();
+  if (!file) fail(path, "cannot be written to the end");
+}
+
+void write_file(const fs::path& path, const std::string& bytes) {
+  std::ofstream file(path, std::ios::binary);
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  check_stream(file, path);
+}
+
+}  // namespace
+
+/// The staging folder of a session.
+class SessionWriter::Files {
+ public:
+  Files(const fs::path& city, const std::string& session)
+      : folder_(session_files::make_staging(city, session)), lock_(folder_) {
+    std::error_code error;
+    if (!fs::create_directory(folder_ / session_files::kTileFolder, error)) {
+      fail_by_system(folder_, "cannot be written", error.value());
+    }
+    references_.open(reference_path(), std::ios::binary);
+  }
+  ~Files() {
+    if (!is_committed_) session_files::remove_session_files(folder_);
+  }
+  Files(const Files&) = delete;
+  Files& operator=(const Files&) = delete;
+
+  void add_reference(const RangeImageGrid& grid, const SessionReference& reference) {
+    if (!has_header_) write_reference(session_files::reference_header(grid));
+    has_header_ = true;
+    write_reference(session_files::reference_record(reference));
+  }
+  void write_tile(const TileIndex& tile, const std::string& bytes) {
+    write_file(folder_ / session_files::kTileFolder / session_files::tile_name(tile), bytes);
+  }
+  void commit(const fs::path& target, const std::string& session_text) {
+    check_stream(references_, reference_path());
+    references_.close();
+    write_file(folder_ / session_files::kSessionFile, session_text);
+    sync_files(folder_);
+    std::error_code error;
+    fs::rename(folder_, target, error);
+    if (error) fail_by_system(target, "cannot be put in place", error.value());
+    is_committed_ = true;
+    sync_files(target);
+  }
+
+ private:
+  fs::path reference_path() const { return folder_ / session_files::kReferenceFile; }
+  void write_reference(const std::string& bytes) {
+    references_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    if (!references_) fail(reference_path(), "cannot be written to the end");
+  }
+
+  fs::path folder_;
+  FolderLock lock_;
+  std::ofstream references_;
+  bool has_header_ = false;
+  bool is_committed_ = false;
+};
+
+SessionWriter::SessionWriter(const City& city, SessionInfo session,
+                             const SessionReferencesConfig& config)
+    : city_(city), session_(std::move(session)), points_(city.grid()), references_(config) {
+  if (!is_session_name(session_.name)) {
+    throw ConfigError("SessionInfo.name = \"" + session_.name +
+                      "\" must consist of letters, digits, '.', '_' and '-', and begin with a "
+                      "letter, a digit or '_'");
+  }
+  session_files::check_config_text(session_.config);
+  refuse_known_session(city_, session_);
+  {
+    const FolderLock lock = session_files::lock_city(city_.folder());
+    remove_stale_staging(city_.folder());
+    files_ = std::make_unique<Files>(city_.folder(), session_.name);
+  }
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  session_.lowest.setConstant(kInfinity);
+  session_.highest.setConstant(-kInfinity);
+  session_.scans = session_.points = session_.references = 0;
+  session_.tiles.clear();
+}
+
+SessionWriter::~SessionWriter() = default;
+
+void SessionWriter::add(PointsView points, Span<const PointLabel> verdicts,
+                        Span<const std::uint32_t> labels, const Eigen::Isometry3d& T_world_sensor,
+                        std::uint32_t scan) {
+  ++session_.scans;
+  points_.add(points, verdicts, labels, T_world_sensor, scan);
+  const SessionReference* const reference = references_.add(points, verdicts, T_world_sensor, scan);
+  if (reference == nullptr) return;
+  files_->add_reference(references_.grid(), *reference);
+  ++session_.references;
+}
+
+void SessionWriter::commit() {
+  points_.for_each_tile([&](const TileIndex& tile, const std::vector<SessionPoint>& points) {
+    files_->write_tile(tile, session_files::tile_bytes(city_.grid(), tile, points));
+    session_.tiles[tile] = points.size();
+    session_.points += points.size();
+    for (const SessionPoint& point : points) {
+      const Eigen::Vector3d position =
+          tile_corner(city_.grid(), tile) + Eigen::Vector3d(static_cast<double>(point.x),
+                                                            static_cast<double>(point.y),
+                                                            static_cast<double>(point.z));
+      session_.lowest = session_.lowest.cwiseMin(position);
+      session_.highest = session_.highest.cwiseMax(position);
+    }
+  });
+  if (session_.points == 0) session_.lowest = session_.highest = Eigen::Vector3d::Zero();
+  const std::string text = session_files::session_text(session_);
+  const FolderLock lock = session_files::lock_city(city_.folder());
+  refuse_known_session(city_, session_);
+  files_->commit(city_.session_folder(session_.name), text);
+}
+
+}  // namespace dynains

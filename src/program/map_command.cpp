@@ -1,0 +1,268 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <iomanip>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "command.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/io/city.hpp"
+#include "dynains/io/city_map.hpp"
+#include "dynains/io/las_file.hpp"
+#include "dynains/io/point_file.hpp"
+#include "map_file.hpp"
+#include "output_folder.hpp"
+
+namespace dynains::program {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct MapOptions {
+  std::string city;
+  std::string session, later_session;
+  std::string file, added, removed;
+  std::vector<double> region;  // m: lowest x, lowest y, highest x, highest y
+  bool force = false;
+};
+
+/// Writes points of a city with their session, its begin as time, and their label, as far as the
+/// format has them.
+class CityPointFile {
+ public:
+  /// Throws ConfigError, IoError.
+  CityPointFile(const CityMap& map, const fs::path& city, const std::string& name, bool force)
+      : map_(map) {
+    const fs::path path = whole_path(name);
+    if (!is_map_name(name) || !is_map_name(path)) {
+      throw ConfigError(name + ": expected a name that ends in .ply, .pcd or .las");
+    }
+    const fs::path inner = fs::relative(path, whole_path(city));
+    if (!inner.empty() && *inner.begin() != "..") {
+      throw ConfigError(name + ": lies in the map of many sessions; choose another folder");
+    }
+    if (fs::exists(fs::symlink_status(path)) && !force) {
+      throw IoError(name + ": exists; choose another name, or replace it by --force");
+    }
+    double most = 0.0;
+    Eigen::Vector3d lowest = Eigen::Vector3d::Zero();
+    for (const SessionInfo& session : map.sessions()) {
+      most = std::max(
+          {most, session.lowest.cwiseAbs().maxCoeff(), session.highest.cwiseAbs().maxCoeff()});
+      lowest = session.lowest;
+    }
+    if (is_las(path)) {
+      constexpr double kKilometre = 1000.0;  // m
+      LasOptions options;
+      options.offset = kKilometre * (lowest / kKilometre).array().floor();
+      las_ = std::make_unique<LasWriter>(path, options);
+      return;
+    }
+    PointColumns columns;
+    columns.double_xyz = most > kFloatCoordinateLimit;
+    columns.label = columns.time = columns.session = true;
+    points_ = std::make_unique<PointFileWriter>(path, columns);
+  }
+
+  void add(const Eigen::Vector3d& position, std::uint32_t session, const SessionPoint& point) {
+    ++size_;
+    if (las_) {
+      LasPoint las;
+      las.position = position;
+      las.time = map_.sessions()[session].begin;
+      las.instance = point.label;
+      las_->add(las);
+      return;
+    }
+    FilePoint file_point;
+    file_point.position = position;
+    file_point.label = point.label;
+    file_point.time = map_.sessions()[session].begin;
+    file_point.session = static_cast<std::uint16_t>(std::min(session, 65535U));
+    points_->add(file_point);
+  }
+
+  std::size_t size() const { return size_; }
+  void commit() {
+    if (las_) las_->commit();
+    if (points_) points_->commit();
+  }
+
+ private:
+  const CityMap& map_;
+  std::unique_ptr<LasWriter> las_;
+  std::unique_ptr<PointFileWriter> points_;
+  std::size_t size_ = 0;
+};
+
+void list(const MapOptions& options) {
+  const City city{fs::path(options.city)};
+  std::cout << "map of " << options.city << ": voxels of " << city.grid().map_voxel
+            << " m, tiles of " << city.grid().tile << " m\n"
+            << "session, begin s, scans, references, points, tiles, extent m\n"
+            << std::fixed;
+  for (const SessionInfo& session : city.sessions()) {
+    const Eigen::Vector3d extent = session.highest - session.lowest;
+    std::cout << session.name << ", " << std::setprecision(3) << session.begin << ", "
+              << session.scans << ", " << session.references << ", " << session.points << ", "
+              << session.tiles.size() << ", " << std::setprecision(1) << extent.x() << " x "
+              << extent.y() << " x " << extent.z() << '\n';
+  }
+  std::cout << std::flush;
+}
+
+/// Whether a tile reaches into the region; true without a region.
+bool is_in_region(const std::vector<double>& region, const SessionGrid& grid,
+                  const TileIndex& tile) {
+  if (region.empty()) return true;
+  const Eigen::Vector3d corner = tile_corner(grid, tile);
+  return corner.x() <= region[2] && corner.y() <= region[3] &&
+         corner.x() + grid.tile >= region[0] && corner.y() + grid.tile >= region[1];
+}
+
+bool is_in_region(const std::vector<double>& region, const Eigen::Vector3d& p) {
+  return region.empty() ||
+         (p.x() >= region[0] && p.y() >= region[1] && p.x() <= region[2] && p.y() <= region[3]);
+}
+
+/// Writes the map after session number `last`.
+void write_map(const City& city, const CityMap& map, std::uint32_t last,
+               const MapOptions& options) {
+  if (!options.region.empty() &&
+      !(options.region[0] < options.region[2] && options.region[1] < options.region[3])) {
+    throw ConfigError("--region: expected the lowest x and y before the highest x and y");
+  }
+  CityPointFile file(map, city.folder(), options.file, options.force);
+  for (const TileIndex& tile : map.tiles()) {
+    if (!is_in_region(options.region, city.grid(), tile)) continue;
+    const TileHistory history = map.history(tile, last);
+    history.for_each_standing(last, [&](std::size_t session, std::size_t i) {
+      const SessionPoint& point = history.points(session)[i];
+      const Eigen::Vector3d position = map.position(tile, point);
+      if (!is_in_region(options.region, position)) return;
+      file.add(position, static_cast<std::uint32_t>(session), point);
+    });
+  }
+  file.commit();
+  std::cout << options.file << ": " << file.size() << " points" << std::endl;
+}
+
+void export_map(const MapOptions& options) {
+  const City city{fs::path(options.city)};
+  write_map(city, CityMap(city), TileHistory::kNever, options);
+}
+
+void write_map_at(const MapOptions& options) {
+  const City city{fs::path(options.city)};
+  const CityMap map(city);
+  write_map(city, map, map.number_of(options.session), options);
+}
+
+void diff(const MapOptions& options) {
+  const City city{fs::path(options.city)};
+  const CityMap map(city);
+  const std::uint32_t a = map.number_of(options.session);
+  const std::uint32_t b = map.number_of(options.later_session);
+  if (a >= b) {
+    throw ConfigError("diff " + options.session + ' ' + options.later_session +
+                      ": expected an earlier and a later session, by their begin");
+  }
+  CityPointFile added(map, city.folder(), options.added, options.force);
+  CityPointFile removed(map, city.folder(), options.removed, options.force);
+  for (const TileIndex& tile : map.tiles()) {
+    const CityChanges changes = map.changes(tile, a, b);
+    for (const CityPoint& p : changes.added) {
+      added.add(map.position(tile, p.point), p.session, p.point);
+    }
+    for (const CityPoint& p : changes.removed) {
+      removed.add(map.position(tile, p.point), p.session, p.point);
+    }
+  }
+  added.commit();
+  removed.commit();
+  std::cout << options.added << ": " << added.size() << " points\n"
+            << options.removed << ": " << removed.size() << " points" << std::endl;
+}
+
+void drop(const MapOptions& options) {
+  City city{fs::path(options.city)};
+  city.drop(options.session);
+  std::cout << options.session << ": dropped, " << city.sessions().size() << " sessions left"
+            << std::endl;
+}
+
+void check(const MapOptions& options) {
+  const City city{fs::path(options.city)};
+  const std::vector<std::string> defects = city.check();
+  for (const std::string& defect : defects) std::cout << defect << '\n';
+  if (!defects.empty()) {
+    std::cout << defects.size() << " defects" << std::endl;
+    throw Finding{};
+  }
+  std::cout << options.city << ": " << city.sessions().size() << " sessions, whole" << std::endl;
+}
+
+}  // namespace
+
+void add_map_command(CLI::App& app) {
+  CLI::App& map = *app.add_subcommand("map", "Read and change a map of many sessions");
+  auto options = std::make_shared<MapOptions>();
+  map.add_option("CITY", options->city, "folder of the map, see `dynains run --update`")
+      ->required()
+      ->type_name("");
+  map.require_subcommand(1);
+
+  const auto add = [&](const char* name, const char* help, void (*work)(const MapOptions&)) {
+    CLI::App& command = *map.add_subcommand(name, help);
+    command.callback([options, work] { work(*options); });
+    return &command;
+  };
+  const auto add_session = [&](CLI::App* command, const char* name, std::string& value) {
+    command->add_option(name, value, "name of a session")->required()->type_name("");
+  };
+  const auto add_file = [&](CLI::App* command) {
+    command->add_option("FILE", options->file, "points, .ply, .pcd or .las")
+        ->required()
+        ->type_name("");
+    command
+        ->add_option("--region", options->region,
+                     "lowest x, lowest y, highest x and highest y of the points [all]")
+        ->expected(4)
+        ->type_name("M M M M");
+  };
+  const auto add_force = [&](CLI::App* command) {
+    command->add_flag("--force", options->force, "replace files");
+  };
+
+  add("list", "Print the sessions in the order of their time", list);
+  CLI::App* const export_command = add("export", "Write the map after all sessions", export_map);
+  add_file(export_command);
+  add_force(export_command);
+  CLI::App* const at_command = add("at", "Write the map after one session", write_map_at);
+  add_session(at_command, "SESSION", options->session);
+  add_file(at_command);
+  add_force(at_command);
+  CLI::App* const diff_command =
+      add("diff", "Write what came and what left between two sessions", diff);
+  add_session(diff_command, "A", options->session);
+  add_session(diff_command, "B", options->later_session);
+  options->added = "added.ply";
+  options->removed = "removed.ply";
+  diff_command->add_option("--added", options->added, "points that came [added.ply]")
+      ->type_name("FILE");
+  diff_command->add_option("--removed", options->removed, "points that left [removed.ply]")
+      ->type_name("FILE");
+  add_force(diff_command);
+  add_session(add("drop", "Remove one session: the map is as if it had never come", drop),
+              "SESSION", options->session);
+  add("check",
+      "Read everything; print each defect with path and position; exit code 1 if there is one",
+      check);
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,333 @@
+// A map of many sessions: order, repetition, removal, damage and failure.
+#include "dynains/io/city.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/city_map.hpp"
+#include "dynains/io/session_writer.hpp"
+#include "io/files.hpp"
+#include "support/box_street.hpp"
+#include "support/catch.hpp"
+
+using namespace dynains;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::uint32_t kParked = 10, kContainer = 99;
+const test::StreetBox kParkedCar = {{4, 3, 0}, {8, 5, 1.5}, kParked};
+const test::StreetBox kNewContainer = {{-6, -8, 0}, {-2, -6, 2}, kContainer};
+
+struct Session {
+  std::string name;
+  double begin;
+  std::vector<test::StreetBox> boxes;
+};
+
+/// A car is there on the first day only, a container from the second day on.
+const std::vector<Session> kDays = {{"monday", 0.0, {kParkedCar}},
+                                    {"tuesday", 86400.0, {kNewContainer}},
+                                    {"wednesday", 172800.0, {kNewContainer}}};
+
+void add(const City& city, const Session& session) {
+  SessionInfo info;
+  info.name = session.name;
+  info.begin = session.begin;
+  info.fingerprint = session.name;
+  SessionWriter writer(city, info);
+  std::uint32_t number = 0;
+  for (const test::BoxScan& scan : test::drive_along(session.boxes, -5.0, 5.0)) {
+    writer.add(scan.points, scan.verdicts, scan.labels, scan.T_world_sensor, number++);
+  }
+  writer.commit();
+}
+
+City city_of(const fs::path& folder, const std::vector<Session>& sessions) {
+  const City city = City::open_or_make(folder, {});
+  for (const Session& session : sessions) add(city, session);
+  return city;
+}
+
+/// Everything that the map tells, as bytes.
+std::string map_bytes(const City& city, std::uint32_t last = TileHistory::kNever) {
+  const CityMap map(city);
+  std::string bytes;
+  for (const TileIndex& tile : map.tiles()) {
+    const TileHistory history = map.history(tile, last);
+    history.for_each_standing(last, [&](std::size_t session, std::size_t i) {
+      const SessionPoint& point = history.points(session)[i];
+      bytes += map.sessions()[session].name;
+      const auto* const data = reinterpret_cast<const char*>(&point);
+      bytes.append(data, sizeof(point));
+    });
+  }
+  return bytes;
+}
+
+/// Number of points of the map by label.
+std::map<std::uint32_t, std::size_t> label_counts(const City& city,
+                                                  std::uint32_t last = TileHistory::kNever) {
+  const CityMap map(city);
+  std::map<std::uint32_t, std::size_t> counts;
+  for (const TileIndex& tile : map.tiles()) {
+    const TileHistory history = map.history(tile, last);
+    history.for_each_standing(last, [&](std::size_t session, std::size_t i) {
+      ++counts[history.points(session)[i].label];
+    });
+  }
+  return counts;
+}
+
+/// Path and content of every file below a folder.
+std::map<std::string, std::string> files_below(const fs::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (!entry.is_regular_file()) {
+      files[entry.path().string()] = "folder";
+      continue;
+    }
+    std::ifstream file(entry.path(), std::ios::binary);
+    files[entry.path().string()] =
+        std::string(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+  }
+  return files;
+}
+
+fs::path some_tile(const City& city, const std::string& session) {
+  std::vector<fs::path> tiles;
+  for (const auto& entry : fs::directory_iterator(city.session_folder(session) / "tiles")) {
+    tiles.push_back(entry.path());
+  }
+  REQUIRE_FALSE(tiles.empty());
+  return *std::min_element(tiles.begin(), tiles.end());
+}
+
+void change_byte(const fs::path& path, std::streamoff at) {
+  std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
+  file.seekg(at);
+  const int byte = file.get();
+  file.seekp(at);
+  file.put(static_cast<char>(byte ^ 1));
+}
+
+bool names(const std::vector<std::string>& defects, const std::string& text) {
+  return std::any_of(defects.begin(), defects.end(), [&](const std::string& defect) {
+    return defect.find(text) != std::string::npos;
+  });
+}
+
+}  // namespace
+
+TEST_CASE("a city: sessions in any order give the same map and the same files") {
+  const test::TemporaryFolder folder;
+  std::vector<std::size_t> order = {0, 1, 2};
+  std::string expected;
+  std::size_t orders = 0;
+  do {
+    const City city = city_of(folder.path() / std::to_string(orders++),
+                              {kDays[order[0]], kDays[order[1]], kDays[order[2]]});
+    const std::string bytes = map_bytes(city);
+    if (expected.empty()) expected = bytes;
+    CHECK(bytes.size() > 1000);
+    CHECK(bytes == expected);
+    CHECK(city.check().empty());
+  } while (std::next_permutation(order.begin(), order.end()));
+  CHECK(orders == 6);
+}
+
+TEST_CASE("a city: what a later session sees through leaves, what it sees standing comes in") {
+  const test::TemporaryFolder folder;
+  const City city = city_of(folder.path() / "city", kDays);
+  auto first = label_counts(city, 0);
+  auto second = label_counts(city, 1);
+  REQUIRE(first[kParked] > 100);
+  CHECK(first[kContainer] == 0);
+  CHECK(second[kContainer] > 100);
+  CHECK(second[50] > first[50] * 99 / 100);
+  CHECK(second[40] > first[40] * 99 / 100);
+
+  const CityMap map(city);
+  for (const TileIndex& tile : map.tiles()) {
+    const TileHistory history = map.history(tile, 1);
+    for (std::size_t i = 0; i < history.points(0).size(); ++i) {
+      // Lower points are too near to the road for a beam to pass between.
+      const SessionPoint& point = history.points(0)[i];
+      if (point.label != kParked || point.z < 0.3F) continue;
+      CHECK_FALSE(history.stands(0, i, 1));
+      CHECK(history.stands(0, i, 0));
+      CHECK(history.removal(0, i).session == 1);
+      CHECK(history.removal(0, i).scan <= 10);
+    }
+  }
+}
+
+TEST_CASE("a city: what a later session did not see stays") {
+  const test::TemporaryFolder folder;
+  const City city = city_of(folder.path() / "city", {kDays[0]});
+  const test::StreetBox wall = {{-40, 2.0, 0}, {40, 2.2, 5}, 50};
+  add(city, {"tuesday", 86400.0, {wall}});
+  auto before = label_counts(city, 0);
+  auto after = label_counts(city, 1);
+  REQUIRE(before[kParked] > 100);
+  CHECK(after[kParked] == before[kParked]);
+}
+
+TEST_CASE("a city: a dropped session leaves the bytes of never having had it") {
+  const test::TemporaryFolder folder;
+  const City without = city_of(folder.path() / "without", {kDays[0], kDays[2]});
+  City with = city_of(folder.path() / "with", kDays);
+  REQUIRE(map_bytes(with) != map_bytes(without));
+  with.drop("tuesday");
+  CHECK(map_bytes(with) == map_bytes(without));
+  CHECK(with.sessions().size() == 2);
+  CHECK_FALSE(fs::exists(with.session_folder("tuesday")));
+  for (const auto& entry : fs::directory_iterator(with.folder())) {
+    CHECK(entry.path().filename().string().front() != '.');
+  }
+  CHECK_THROWS_AS(with.drop("tuesday"), IoError);
+  CHECK_THROWS_AS(with.drop("../with"), IoError);
+}
+
+TEST_CASE("a city: files that are not of the session are not removed") {
+  const test::TemporaryFolder folder;
+  City city = city_of(folder.path() / "city", {kDays[0]});
+  std::ofstream(city.session_folder("monday") / "notes.txt") << "mine";
+  const auto before = files_below(city.folder());
+  CHECK_THROWS_WITH(city.drop("monday"), ContainsSubstring("notes.txt"));
+  CHECK(files_below(city.folder()) == before);
+}
+
+TEST_CASE("a city: the same session twice is refused") {
+  const test::TemporaryFolder folder;
+  const City city = city_of(folder.path() / "city", {kDays[0]});
+  const auto before = files_below(city.folder());
+  CHECK_THROWS_AS(add(city, kDays[0]), UsageError);
+  SessionInfo again;
+  again.name = "another";
+  again.fingerprint = "monday";
+  CHECK_THROWS_WITH(SessionWriter(city, again), ContainsSubstring("monday"));
+  SessionInfo nameless;
+  nameless.name = "../monday";
+  CHECK_THROWS_AS(SessionWriter(city, nameless), ConfigError);
+  CHECK(files_below(city.folder()) == before);
+}
+
+TEST_CASE("a city: another grid or version is refused") {
+  const test::TemporaryFolder folder;
+  const City city = city_of(folder.path() / "city", {kDays[0]});
+  SessionGrid coarse;
+  coarse.map_voxel = 0.3;
+  CHECK_THROWS_WITH(City::open_or_make(city.folder(), coarse),
+                    ContainsSubstring("map_voxel = 0.2 m") && ContainsSubstring("0.3"));
+  const fs::path tile = some_tile(city, "monday");
+  change_byte(tile, 8);
+  CHECK_THROWS_WITH(map_bytes(city), ContainsSubstring("version 0; expected version 1"));
+
+  std::ofstream(city.folder() / "city.json")
+      << R"({"format": "dynains city", "format_version": 2, "map_voxel": 0.2, "tile": 50})";
+  CHECK_THROWS_WITH(City(city.folder()), ContainsSubstring("expected version 1"));
+
+  fs::create_directory(folder.path() / "other");
+  std::ofstream(folder.path() / "other" / "holiday.txt") << "mine";
+  CHECK_THROWS_AS(City::open_or_make(folder.path() / "other", {}), IoError);
+  CHECK_THROWS_AS(City(folder.path() / "nothing"), IoError);
+}
+
+TEST_CASE("a city: every damage is named by path and position") {
+  const test::TemporaryFolder folder;
+  const City city = city_of(folder.path() / "city", {kDays[0]});
+  REQUIRE(city.check().empty());
+  const fs::path tile = some_tile(city, "monday");
+  const fs::path references = city.session_folder("monday") / "references.bin";
+  const auto size = static_cast<std::streamoff>(fs::file_size(tile));
+  for (const std::streamoff at :
+       {std::streamoff{0}, std::streamoff{9}, std::streamoff{17}, std::streamoff{33},
+        std::streamoff{41}, std::streamoff{60}, size - 3}) {
+    change_byte(tile, at);
+    const auto defects = city.check();
+    REQUIRE(defects.size() == 1);
+    CHECK(names(defects, tile.string() + ": byte "));
+    change_byte(tile, at);
+  }
+  REQUIRE(city.check().empty());
+
+  for (const std::streamoff at : {0, 8, 20, 47, 60, 400}) {
+    change_byte(references, at);
+    CHECK(names(city.check(), references.string() + ": byte "));
+    change_byte(references, at);
+  }
+  fs::resize_file(references, fs::file_size(references) - 1);
+  CHECK(names(city.check(), references.string()));
+  fs::resize_file(tile, fs::file_size(tile) - 1);
+  CHECK(names(city.check(), tile.string() + ": byte 40"));
+  fs::rename(tile, tile.parent_path() / "77_77.tile");
+  const auto defects = city.check();
+  CHECK(names(defects, tile.string()));
+  CHECK(names(defects, "77_77.tile: session.json does not list it"));
+}
+
+TEST_CASE("a city: a session that is not committed changes nothing") {
+  const test::TemporaryFolder folder;
+  const City city = city_of(folder.path() / "city", {kDays[0]});
+  const auto before = files_below(city.folder());
+  SessionInfo info;
+  info.name = "tuesday";
+  {
+    SessionWriter writer(city, info);
+    const test::BoxScan scan = test::scan_boxes({}, 0.0, 0.0);
+    writer.add(scan.points, scan.verdicts, scan.labels, scan.T_world_sensor, 0);
+    CHECK(files_below(city.folder()) != before);
+    CHECK(city.sessions().size() == 1);
+    CHECK(city.check().empty());
+    // Another writer leaves the folder of this one alone.
+    add(city, kDays[2]);
+    writer.add(scan.points, scan.verdicts, scan.labels, scan.T_world_sensor, 1);
+  }
+  City changed = city;
+  changed.drop("wednesday");
+  CHECK(files_below(city.folder()) == before);
+
+  // As left by a killed process.
+  const fs::path stale = city.folder() / ".tuesday.0123456789abcdef.staging";
+  fs::create_directories(stale / "tiles");
+  std::ofstream(stale / "tiles" / "0_0.tile") << "half";
+  std::ofstream(stale / "references.bin") << "half";
+  const fs::path foreign = city.folder() / ".friday.0123456789abcdef.staging";
+  fs::create_directories(foreign);
+  std::ofstream(foreign / "notes.txt") << "mine";
+  add(city, kDays[1]);
+  CHECK_FALSE(fs::exists(stale));
+  CHECK(fs::exists(foreign / "notes.txt"));
+  CHECK(city.sessions().size() == 2);
+}
+
+TEST_CASE("references of a session: coded images are the images") {
+  SessionReferences recorder{SessionReferencesConfig()};
+  const test::BoxScan scan = test::scan_boxes({kParkedCar}, 0.0, 0.0);
+  const SessionReference* const reference =
+      recorder.add(scan.points, scan.verdicts, scan.T_world_sensor, 0);
+  REQUIRE(reference != nullptr);
+  const RangeImageGrid& grid = recorder.grid();
+  std::vector<std::uint8_t> bytes = pack_image(reference->image);
+  CHECK(bytes.size() < grid.cell_count() * 2);
+  RangeImage image;
+  REQUIRE(unpack_image(grid, bytes, image));
+  for (std::int32_t row = 0; row < grid.rows; ++row) {
+    for (std::int32_t column = 0; column < grid.columns; ++column) {
+      const std::size_t cell = grid.cell(row, column);
+      REQUIRE(image[cell].nearest == reference->image[cell].nearest);
+      REQUIRE(image[cell].around == reference->image[cell].around);
+    }
+  }
+  bytes.push_back(0);
+  CHECK_FALSE(unpack_image(grid, bytes, image));
+  bytes.resize(bytes.size() / 2);
+  CHECK_FALSE(unpack_image(grid, bytes, image));
+  CHECK(recorder.add(scan.points, scan.verdicts, scan.T_world_sensor, 1) == nullptr);
+}

@@ -1,0 +1,176 @@
+// `dynains run --update` and `dynains map`: a map of many sessions from the command line.
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "dynains/io/point_file.hpp"
+#include "io/files.hpp"
+#include "program/start.hpp"
+#include "program/tiny_sequence.hpp"
+#include "support/catch.hpp"
+
+using namespace dynains;
+using namespace dynains::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t kScans = 12;
+
+/// Path below a folder and content of every file; folders, too.
+std::map<std::string, std::string> content_of(const fs::path& folder) {
+  std::map<std::string, std::string> content;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    content[fs::relative(entry.path(), folder).string()] =
+        entry.is_regular_file() ? read_text(entry.path()) : "";
+  }
+  return content;
+}
+
+/// Three small recordings at different places, and runs over them.
+class Days {
+ public:
+  Days() {
+    for (int day = 0; day < 3; ++day) {
+      write_tiny_sequence(folder_ / name(day), kScans, {3.0 * day, 0.5 * day, 0.0});
+    }
+  }
+
+  static std::string name(int day) { return "day" + std::to_string(day); }
+  std::string at(const std::string& file) const { return folder_ / file; }
+
+  Outcome update(int day, const std::string& city, const std::string& out,
+                 std::vector<std::string> more = {}) const {
+    std::vector<std::string> arguments = {
+        "run",    at(name(day)),    "--out", at(out),           "--update",
+        at(city), "--accept-poses", "-q",    "--session-begin", std::to_string(day)};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return start(arguments);
+  }
+  std::string exported(const std::string& city, const std::string& file) const {
+    const Outcome outcome = start({"map", at(city), "export", at(file)});
+    REQUIRE(outcome.code == 0);
+    return read_text(at(file));
+  }
+
+ private:
+  TemporaryFolder folder_;
+};
+
+}  // namespace
+
+TEST_CASE(
+    "map: sessions in any order give the same bytes, and drop those of never having had one") {
+  const Days days;
+  int number = 0;
+  const auto build = [&](const std::string& city, const std::vector<int>& order) {
+    for (const int day : order) {
+      const Outcome outcome = days.update(day, city, "out" + std::to_string(number++));
+      CAPTURE(outcome.err);
+      REQUIRE(outcome.code == 0);
+    }
+  };
+  build("forward", {0, 1, 2});
+  build("backward", {2, 1, 0});
+  build("without", {2, 0});
+  const std::string expected = days.exported("forward", "forward.ply");
+  CHECK(expected.size() > 10000);
+  CHECK(days.exported("backward", "backward.ply") == expected);
+  CHECK(days.exported("without", "without.ply") != expected);
+
+  const Outcome at = start({"map", days.at("forward"), "at", "day0", days.at("day0.pcd")});
+  REQUIRE(at.code == 0);
+  const PointFile first = read_points(days.at("day0.pcd"));
+  CHECK(first.positions.size() > 100);
+  CHECK(first.time == std::vector<double>(first.positions.size(), 0.0));
+  const Outcome diff = start({"map", days.at("forward"), "diff", "day0", "day2", "--added",
+                              days.at("added.ply"), "--removed", days.at("removed.ply")});
+  CHECK(diff.code == 0);
+  CHECK(fs::exists(days.at("added.ply")));
+  CHECK(fs::exists(days.at("removed.ply")));
+
+  CHECK(start({"map", days.at("forward"), "drop", "day1"}).code == 0);
+  CHECK(days.exported("forward", "dropped.ply") == read_text(days.at("without.ply")));
+  CHECK(start({"map", days.at("forward"), "check"}).code == 0);
+  const Outcome list = start({"map", days.at("forward"), "list"});
+  CHECK_THAT(list.out, ContainsSubstring("day0") && ContainsSubstring("day2"));
+  CHECK(list.out.find("day1") == std::string::npos);
+}
+
+TEST_CASE("map: a session twice, another voxel edge and bad names are refused, and all stays") {
+  const Days days;
+  REQUIRE(days.update(0, "city", "out").code == 0);
+  const auto before = content_of(days.at("city"));
+  const auto is_refused = [&](const Outcome& outcome, const std::string& reason) {
+    CHECK(outcome.code == 2);
+    CHECK_THAT(outcome.err, ContainsSubstring(reason));
+    CHECK(content_of(days.at("city")) == before);
+  };
+  is_refused(days.update(0, "city", "out2"), "a session is added once");
+  CHECK_FALSE(fs::exists(days.at("out2")));
+  is_refused(days.update(0, "city", "out2", {"--session", "again"}),
+             "the same scans, poses and times");
+  is_refused(days.update(1, "city", "out2", {"--map-voxel", "0.4"}), "map_voxel = 0.2 m");
+  is_refused(days.update(1, "city", "out2", {"--session", "a/b"}), "cannot name a session");
+  is_refused(days.update(1, "city", "city/out2"), "outside of it");
+  is_refused(start({"map", days.at("city"), "at", "day7", days.at("x.ply")}),
+             "no session \"day7\"");
+  is_refused(start({"map", days.at("city"), "export", days.at("city/x.ply")}), "lies in the map");
+  is_refused(start({"run", days.at("day1"), "--out", days.at("out3"), "--session", "x"}),
+             "--session needs --update");
+  // Nothing to do for a complete run; no second session.
+  CHECK(days.update(0, "city", "out", {"--resume"}).code == 0);
+  CHECK(content_of(days.at("city")) == before);
+  // What left comes back with the same bytes.
+  CHECK(start({"map", days.at("city"), "drop", "day0"}).code == 0);
+  CHECK(days.update(0, "city", "out", {"--resume"}).code == 0);
+  CHECK(content_of(days.at("city")) == before);
+}
+
+TEST_CASE("map: a broken tile is named by check with path and position") {
+  const Days days;
+  REQUIRE(days.update(0, "city", "out").code == 0);
+  fs::path tile;
+  for (const auto& entry : fs::directory_iterator(days.at("city/day0/tiles"))) tile = entry.path();
+  std::string bytes = read_text(tile);
+  bytes[70] = static_cast<char>(bytes[70] ^ 4);
+  write_text(tile, bytes);
+  const Outcome check = start({"map", days.at("city"), "check"});
+  CHECK(check.code == 1);
+  CHECK_THAT(check.out, ContainsSubstring(tile.string() + ": byte "));
+  const Outcome broken = start({"map", days.at("city"), "export", days.at("x.ply")});
+  CHECK(broken.code == 1);
+  CHECK_THAT(broken.err, ContainsSubstring(tile.string() + ": byte "));
+  CHECK_FALSE(fs::exists(days.at("x.ply")));
+}
+
+TEST_CASE("map: a run that is killed or interrupted leaves the map as it was") {
+  const Days days;
+  REQUIRE(days.update(0, "city", "out").code == 0);
+  const std::string before = days.exported("city", "before.ply");
+  write_tiny_sequence(days.at("long"), 400, {5.0, 0.0, 0.0});
+  const std::vector<std::string> run = {"run",      days.at("long"), "--out", days.at("out2"),
+                                        "--update", days.at("city"), "-q",    "--accept-poses"};
+  for (const int signal : {SIGKILL, SIGTERM}) {
+    Process process(run);
+    const auto is_writing = [&] { return fs::exists(days.at("out2/labels/000020.label")); };
+    for (int i = 0; i < 3000 && !is_writing(); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    REQUIRE(is_writing());
+    ::kill(process.id(), signal);
+    CHECK(process.wait().code == 128 + signal);
+    CHECK(start({"map", days.at("city"), "check"}).code == 0);
+    CHECK(days.exported("city", "after" + std::to_string(signal) + ".ply") == before);
+    fs::remove_all(days.at("out2"));
+  }
+  // The next writer removes what the killed one left.
+  REQUIRE(days.update(1, "city", "out3").code == 0);
+  for (const auto& entry : fs::directory_iterator(days.at("city"))) {
+    CHECK(entry.path().filename().string().front() != '.');
+  }
+}
