@@ -12,6 +12,7 @@
 #include "recording_options.hpp"
 #include "remover_options.hpp"
 #include "run.hpp"
+#include "run_plan.hpp"
 
 namespace dynains::program {
 namespace {
@@ -63,6 +64,7 @@ void run_as_asked(RunFlags& flags) {
   settings.recording_as_given = flags.recording.as_given();
   settings.recording_flags = flags.recording.given_flags();
 
+  check_settings(settings);
   std::optional<Progress> progress;
   RunListener listener;
   listener.warn = [](const std::string& text) {

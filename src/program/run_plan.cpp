@@ -125,6 +125,29 @@ std::size_t choose_jobs(const RunSettings& settings, std::size_t chunks) {
   return std::max<std::size_t>(1, std::min(jobs, chunks));
 }
 
+/// What the run will write. Throws ConfigError.
+RunOutputs outputs_of(const RunSettings& settings) {
+  const DynaInsRemover::Config& config = settings.config;
+  RunOutputs outputs;
+  outputs.folder = settings.out;
+  outputs.map = choose_map(settings, config);
+  outputs.write_online = settings.write_online;
+  outputs.write_clean = settings.write_clean;
+  outputs.write_mcap = settings.write_mcap;
+  outputs.write_beliefs = settings.view || settings.write_beliefs;
+  outputs.map_on_disk = settings.map_memory.has_value();
+  add_map_attributes(settings, config, outputs);
+  return outputs;
+}
+
+/// Throws ConfigError.
+std::optional<RemoverWithMapOnDisk::Config> map_on_disk_of(const RunSettings& settings,
+                                                           const RunOutputs& outputs) {
+  if (!settings.map_memory) return std::nullopt;
+  if (!settings.config.build_map) throw ConfigError("--map-memory needs --build-map true");
+  return with_map_on_disk(settings.config, outputs.folder / kTileFolder, *settings.map_memory);
+}
+
 InputFiles inputs_of(const RunSettings& settings, const Recording& sequence) {
   InputFiles inputs;
   for (const fs::path& file : sequence.files()) inputs.add(file);
@@ -211,22 +234,12 @@ fs::path map_path(const std::string& name, const fs::path& out) {
   return map;
 }
 
+void check_settings(const RunSettings& settings) { map_on_disk_of(settings, outputs_of(settings)); }
+
 RunPlan make_plan(const RunSettings& settings, Recording sequence) {
   const DynaInsRemover::Config& config = settings.config;
-  RunOutputs outputs;
-  outputs.folder = settings.out;
-  outputs.map = choose_map(settings, config);
-  outputs.write_online = settings.write_online;
-  outputs.write_clean = settings.write_clean;
-  outputs.write_mcap = settings.write_mcap;
-  outputs.write_beliefs = settings.view || settings.write_beliefs;
-  outputs.map_on_disk = settings.map_memory.has_value();
-  add_map_attributes(settings, config, outputs);
-  std::optional<RemoverWithMapOnDisk::Config> map_on_disk;
-  if (settings.map_memory) {
-    if (!config.build_map) throw ConfigError("--map-memory needs --build-map true");
-    map_on_disk = with_map_on_disk(config, outputs.folder / kTileFolder, *settings.map_memory);
-  }
+  RunOutputs outputs = outputs_of(settings);
+  const auto map_on_disk = map_on_disk_of(settings, outputs);
   const ScanRange range = select_scans(sequence, settings.window);
   check_scans(sequence, range);
   const ChunkSettings chunk_settings = choose_chunks(settings, config, range.size());

@@ -41,6 +41,10 @@ struct RunPlan {
 /// goes there.
 std::filesystem::path map_path(const std::string& name, const std::filesystem::path& out);
 
+/// Checks what can be checked without the recording. Throws ConfigError, and
+/// std::filesystem::filesystem_error for a path of `out` that cannot be.
+void check_settings(const RunSettings& settings);
+
 /// Checks everything but the points. Throws ConfigError, IoError, PoseError.
 RunPlan make_plan(const RunSettings& settings, Recording recording);
 

@@ -20,6 +20,7 @@
 #include "preset.hpp"
 #include "recording.hpp"
 #include "recording_settings.hpp"
+#include "run_plan.hpp"
 #include "settings.hpp"
 #include "write_view.hpp"
 
@@ -206,9 +207,10 @@ RunResult run(const py::object& recording, const fs::path& out, const py::kwargs
   py::dict options(values);
   RunArguments arguments = take_arguments(options);
   take_config(arguments);
-  const std::shared_ptr<SharedRecording> shared = to_recording(recording, options);
   RunSettings& settings = arguments.settings;
   settings.out = out.string();
+  program::check_settings(settings);
+  const std::shared_ptr<SharedRecording> shared = to_recording(recording, options);
   settings.recording = shared->get().folder().string();
   const py::dict flags = to_flags(shared->options());
   settings.recording_flags = to_json(flags);

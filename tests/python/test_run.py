@@ -98,12 +98,24 @@ def test_arguments_by_name(drive, tmp_path):
         ({"start": 50}, dynains.ConfigError, "leave no scan"),
         ({"map": "map.txt"}, dynains.ConfigError, "map.txt"),
         ({"crs": "EPSG:25832"}, dynains.ConfigError, "las"),
+        (
+            {"map_memory": 5, "config": dynains.Config(revise_map=True)},
+            dynains.ConfigError,
+            "revise_map",
+        ),
     ],
 )
 def test_wrong_arguments_write_nothing(drive, tmp_path, arguments, error, text):
     with pytest.raises(error, match=text):
         dynains.run(drive, tmp_path / "out", **arguments)
     assert not (tmp_path / "out").exists() or not list((tmp_path / "out").glob("*.json"))
+
+
+def test_arguments_are_checked_before_the_recording_is_read(tmp_path):
+    with pytest.raises(dynains.ConfigError, match="map.txt"):
+        dynains.run(tmp_path / "nowhere", tmp_path / "out", map="map.txt")
+    with pytest.raises(dynains.IoError, match="nowhere"):
+        dynains.run(tmp_path / "nowhere", tmp_path / "out")
 
 
 def test_earlier_results_stay_unless_they_are_replaced(drive, finished):
