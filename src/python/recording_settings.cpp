@@ -121,7 +121,8 @@ py::dict to_flags(const py::dict& values) {
 py::dict from_flags(const py::dict& flags) {
   py::dict values;
   for (const auto& [flag, value] : flags) {
-    std::string name = py::str(flag).cast<std::string>().substr(2);
+    std::string name = py::str(flag);
+    if (name.rfind("--", 0) == 0) name.erase(0, 2);
     std::replace(name.begin(), name.end(), '-', '_');
     values[name.c_str()] = value;
   }

@@ -225,7 +225,7 @@ RunResult run(const py::object& recording, const fs::path& out, const py::kwargs
   if (!outcome.complete) raise_signal(outcome);
   RunResult result{std::move(outcome), {}};
   const py::object text =
-      py::module_::import("pathlib").attr("Path")(result.file("report.json")).attr("read_text")();
+      py::module_::import("pathlib").attr("Path")(result.file("report.json")).attr("read_bytes")();
   result.report = py::module_::import("json").attr("loads")(text);
   return result;
 }
@@ -242,6 +242,7 @@ std::string represent(const RunResult& result) {
 /// they are given.
 fs::path write_page(const fs::path& out, const py::object& recording, std::size_t max_points) {
   const auto open = [&](const fs::path& report_file, const nlohmann::ordered_json& report) {
+    const py::gil_scoped_acquire acquire;
     if (!recording.is_none()) return to_recording(recording, py::dict())->get();
     const auto path = program::required_json_field<std::string>(report_file, report, "/sequence");
     py::dict flags;
@@ -251,6 +252,7 @@ fs::path write_page(const fs::path& out, const py::object& recording, std::size_
     }
     return to_recording(py::cast(path), from_flags(flags))->get();
   };
+  const py::gil_scoped_release release;
   return program::write_view(out, open, max_points);
 }
 

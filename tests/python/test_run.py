@@ -183,6 +183,30 @@ def test_an_error_in_the_callback_ends_the_run(drive, finished, tmp_path):
     assert read_labels(tmp_path / "out") == read_labels(finished.folder)
 
 
+def test_others_run_during_a_check_and_a_view(drive, finished):
+    """A thread that is still at work when start() returns has released the lock."""
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1000)
+    try:
+        for work in lambda: dynains.check(drive), lambda: dynains.view(finished):
+            thread = threading.Thread(target=work)
+            thread.start()
+            assert thread.is_alive()
+            thread.join()
+    finally:
+        sys.setswitchinterval(interval)
+
+
+def test_a_report_with_unknown_flags_is_refused(drive, tmp_path):
+    dynains.run(drive, tmp_path / "out", end=3)
+    report = json.loads((tmp_path / "out/report.json").read_text())
+    for flag in "--nonsense", "-":
+        report["sequence_flags"] = {flag: "1"}
+        (tmp_path / "out/report.json").write_text(json.dumps(report))
+        with pytest.raises(dynains.ConfigError, match="unknown parameter"):
+            dynains.view(tmp_path / "out")
+
+
 def test_runs_in_threads(drive, finished, tmp_path):
     """Others run during a run; two runs at once give what one gives, and leave the signals alone."""
     recording = dynains.Recording(drive)
