@@ -88,7 +88,7 @@ data=$(mktemp -d)
 trap 'command rm -rf "$data"' EXIT
 chown nobody "$data"
 # The build folder need not be readable by others.
-cp "$program" "$data/dynains"
+install -m 755 "$program" "$data/dynains"
 cd "$data"
 as_user() { setpriv --reuid=nobody --regid=nogroup --clear-groups "$@"; }
 as_user ./dynains simulate street --scans 5 --sensor vlp16 -q
