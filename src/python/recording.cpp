@@ -130,6 +130,19 @@ RecordingPointer to_recording(const py::object& recording, const py::dict& optio
   return recording.cast<RecordingPointer>();
 }
 
+void warn_of_missing_scans(const Recording& recording) {
+  const auto warn = [](const std::string& text) {
+    if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+  };
+  const std::string total = std::to_string(recording.scan_file_count());
+  if (recording.missing_pose_count() > 0) {
+    warn(recording.folder().string() + ": " + std::to_string(recording.missing_pose_count()) +
+         " of " + total + " scans have no pose and are left out; see the notes of the recording");
+  }
+  if (recording.early_end())
+    warn(*recording.early_end() + "; " + total + " scans before it are read");
+}
+
 void bind_recording(py::module_& module) {
   py::class_<ScanOfRecording>(module, "RecordedScan", "One scan of a recording.")
       .def_property_readonly("name", &ScanOfRecording::name, "File name without extension.")
@@ -157,11 +170,15 @@ void bind_recording(py::module_& module) {
       "What the files mean, by name (dynains.check finds out):\n" +
       describe_recording_settings();
   py::class_<SharedRecording, RecordingPointer>(module, "Recording", doc.c_str())
-      .def(py::init([](const std::filesystem::path& path, const py::kwargs& options) {
-             return open(path, py::dict(options));
-           }),
-           py::arg("path"),
-           "Raises IoError for files that cannot be read, ConfigError for unknown options.")
+      .def(
+          py::init([](const std::filesystem::path& path, const py::kwargs& options) {
+            RecordingPointer recording = open(path, py::dict(options));
+            warn_of_missing_scans(recording->get());
+            return recording;
+          }),
+          py::arg("path"),
+          "Raises IoError for files that cannot be read, ConfigError for unknown options. Warns if "
+          "scans are left out.")
       .def("__len__", [](const SharedRecording& recording) { return recording.get().size(); })
       .def("__getitem__", &scan_of, py::arg("index"),
            "Scan `index` as RecordedScan. Raises IoError.")

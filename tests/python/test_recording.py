@@ -88,7 +88,9 @@ def test_what_the_files_mean_is_told_by_name(drive):
     as_text = dynains.Recording(drive, extrinsic="2 0 0 0 0 0 1")
     np.testing.assert_allclose(as_array.poses, as_text.poses, atol=1e-9)
     np.testing.assert_allclose(as_array.poses, plain.poses @ T, atol=1e-9)
-    np.testing.assert_array_equal(dynains.Recording(drive, pose_shift=1).poses[0], plain.poses[1])
+    with pytest.warns(RuntimeWarning, match="1 of 12 scans"):
+        shifted = dynains.Recording(drive, pose_shift=1)
+    np.testing.assert_array_equal(shifted.poses, plain.poses[1:])
 
 
 @pytest.mark.parametrize(
@@ -126,6 +128,26 @@ def test_files_that_cannot_be_read_are_os_errors(drive, tmp_path):
     with pytest.raises(dynains.IoError, match="000000.bin") as caught:
         recording[0]
     assert isinstance(caught.value, OSError)
+
+
+def test_scans_without_a_pose_are_told(drive, street, tmp_path):
+    poses = tmp_path / "poses.tum"
+    rows = [[scan.time, *scan.T_world_sensor[:3, 3], 0, 0, 0, 1] for scan in street[:8]]
+    np.savetxt(poses, rows)
+    with pytest.warns(RuntimeWarning, match="4 of 12 scans have no pose"):
+        recording = dynains.Recording(drive, poses=poses)
+    assert len(recording) == 8 and recording.missing_poses == 4
+    with pytest.warns(RuntimeWarning, match="4 of 12 scans have no pose"):
+        dynains.run(drive, tmp_path / "out", poses=poses, accept_poses=True)
+
+
+def test_a_log_that_is_cut_off(drive, tmp_path):
+    log = dynains.run(drive, tmp_path / "out", write_mcap=True).folder / "verdicts.mcap"
+    data = log.read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(data[: len(data) * 3 // 4])
+    with pytest.warns(RuntimeWarning, match="scans before it are read"):
+        recording = dynains.Recording(tmp_path / "cut.mcap")
+    assert 0 < len(recording) < 12 and "cut.mcap" in recording.early_end
 
 
 def test_check_of_a_good_recording(drive):
