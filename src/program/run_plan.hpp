@@ -40,7 +40,7 @@ struct RunPlan {
 std::filesystem::path map_path(const std::string& name, const std::filesystem::path& out);
 
 /// Checks everything but the points. Throws ConfigError, IoError, PoseError.
-RunPlan make_plan(const RunSettings& settings, Recording recording);
+RunPlan make_plan(const RunSettings& settings, Recording sequence);
 
 /// Treatment of a folder of results.
 enum class RunTask { kNothing, kWrite, kReplace };
