@@ -22,18 +22,41 @@ constexpr std::uint64_t kTrailer = 2 * kWord;
 
 constexpr std::size_t padded(std::size_t size) { return (size + kWord - 1) / kWord * kWord; }
 
-/// `data`: whole words.
-std::uint64_t add_to_checksum(std::uint64_t sum, const char* data, std::size_t size) {
-  for (std::size_t i = 0; i < size; i += kWord) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, data + i, kWord);
-    sum = (sum ^ word) * 0x9E3779B97F4A7C15U;
-    sum ^= sum >> 32U;
-  }
-  return sum;
+/// The sum with one more word.
+std::uint64_t mixed(std::uint64_t sum, const char* word) {
+  std::uint64_t value = 0;
+  std::memcpy(&value, word, kWord);
+  sum = (sum ^ value) * 0x9E3779B97F4A7C15U;
+  return sum ^ sum >> 32U;
 }
 
 }  // namespace
+
+void Checksum::add(const char* data, std::size_t size) {
+  const char* const end = data + size;
+  const auto add_one = [&] {
+    sums_[next_] = mixed(sums_[next_], data);
+    next_ = (next_ + 1) % sums_.size();
+    data += kWord;
+  };
+  while (data != end && next_ != 0) add_one();
+  constexpr std::size_t kTurn = 4 * kWord;
+  std::array<std::uint64_t, 4> sums = sums_;
+  for (; static_cast<std::size_t>(end - data) >= kTurn; data += kTurn) {
+    for (std::size_t i = 0; i < sums.size(); ++i) sums[i] = mixed(sums[i], data + i * kWord);
+  }
+  sums_ = sums;
+  while (data != end) add_one();
+}
+
+std::uint64_t Checksum::value() const {
+  std::uint64_t result = 0;
+  for (const std::uint64_t sum : sums_) {
+    result = (result ^ sum) * 0x9E3779B97F4A7C15U;
+    result ^= result >> 32U;
+  }
+  return result;
+}
 
 void ChunkScan::take(const ScanVerdict& verdict, bool with_beliefs) {
   labels.assign(verdict.labels.begin(), verdict.labels.end());
@@ -53,12 +76,12 @@ ChunkFileWriter::ChunkFileWriter(const std::filesystem::path& file, const ChunkK
 void ChunkFileWriter::write(const void* data, std::size_t size) {
   const auto* const bytes = static_cast<const char*>(data);
   const std::size_t whole = size / kWord * kWord;
-  checksum_ = add_to_checksum(checksum_, bytes, whole);
+  checksum_.add(bytes, whole);
   file_.stream().write(bytes, static_cast<std::streamsize>(whole));
   if (whole < size) {
     std::array<char, kWord> rest{};
     std::memcpy(rest.data(), bytes + whole, size - whole);
-    checksum_ = add_to_checksum(checksum_, rest.data(), kWord);
+    checksum_.add(rest.data(), kWord);
     file_.stream().write(rest.data(), kWord);
   }
   position_ += padded(size);
@@ -128,7 +151,7 @@ void ChunkFileWriter::finish(const ChunkSummary& summary, const StaticMapAccumul
     put<const float>(xyz);
   }
   put_number(begin);
-  put_number(checksum_);
+  put_number(checksum_.value());
   file_.commit(AtomicFile::Sync::kLater);
 }
 
@@ -157,13 +180,13 @@ void ChunkFileReader::verify() {
   constexpr std::size_t kPart = std::size_t{1} << 20U;
   file_.seekg(0);
   std::vector<char> bytes;
-  std::uint64_t sum = 0;
+  Checksum sum;
   for (std::uint64_t left = size_ - kWord; left > 0; left -= bytes.size()) {
     bytes.resize(static_cast<std::size_t>(std::min<std::uint64_t>(left, kPart)));
     read(bytes.data(), bytes.size());
-    sum = add_to_checksum(sum, bytes.data(), bytes.size());
+    sum.add(bytes.data(), bytes.size());
   }
-  if (sum != checksum_) fail("does not have the bytes that were written");
+  if (sum.value() != checksum_) fail("does not have the bytes that were written");
   file_.seekg(kHeader);
 }
 

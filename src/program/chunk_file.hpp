@@ -59,6 +59,18 @@ struct ChunkSummary {
   RunTiming timing;  ///< of the own scans
 };
 
+/// Checksum of a sequence of words of 8 bytes. Four sums take turns, so that none waits for itself.
+class Checksum {
+ public:
+  /// `size`: bytes of whole words.
+  void add(const char* data, std::size_t size);
+  std::uint64_t value() const;
+
+ private:
+  std::array<std::uint64_t, 4> sums_{};
+  std::size_t next_ = 0;  // sum of the next word
+};
+
 /// Writes scan after scan; the file appears whole, at finish(), or not at all. Throws IoError.
 class ChunkFileWriter {
  public:
@@ -71,7 +83,7 @@ class ChunkFileWriter {
  private:
   AtomicFile file_;
   std::uint64_t position_ = 0;
-  std::uint64_t checksum_ = 0;
+  Checksum checksum_;
 
   void write(const void* data, std::size_t size);
   template <class T>

@@ -32,6 +32,12 @@ fs::path file_of(const RunPlan& plan, const fs::path& folder, const Chunk& chunk
   return folder / kChunkFolder / (plan.sequence.name(chunk.own.first) + kChunkExtension);
 }
 
+/// Each chunk builds its map from the final labels of its own scans.
+DynaInsRemover::Config without_map(DynaInsRemover::Config config) {
+  config.build_map = false;
+  return config;
+}
+
 /// The static map of all chunks, in memory or on the disk.
 class MergedMap {
  public:
@@ -86,10 +92,9 @@ class ChunkedRun {
         listener_(listener),
         folder_(folder),
         results_(results),
+        config_(without_map(plan.config)),
         path_(path_of(plan.sequence, plan.range)),
         states_(plan.chunks.size()) {
-    config_ = plan.config;
-    config_.build_map = false;  // each chunk builds its own from the final labels
     latency_ = DynaInsRemover(config_).latency();
     outputs_.with_beliefs = plan.outputs.write_beliefs || results.needs_scans();
     outputs_.with_online = plan.outputs.write_online;
@@ -104,13 +109,13 @@ class ChunkedRun {
     timing_.stages = stage_names();
     timing_.jobs = plan_.jobs;
     MergedMap map(plan_, folder_);
-    report_progress();
+    report_progress(0);
     for (std::size_t i = 0; i < plan_.jobs; ++i) threads_.emplace_back([this] { work(); });
     for (std::size_t chunk = 0; chunk < states_.size() && await(chunk); ++chunk) {
       merge(chunk, map);
     }
     join();
-    report_progress();
+    tell(warnings_, done_);
     if (error_) std::rethrow_exception(error_);
     if (results_.map_points()) map.give_to(results_);
     return std::move(timing_);
@@ -374,34 +379,32 @@ class ChunkedRun {
   bool await(std::size_t number) {
     std::unique_lock<std::mutex> lock(mutex_);
     while (true) {
-      for (const std::string& warning : std::exchange(warnings_, {})) {
-        if (listener_.warn) listener_.warn(warning);
+      const std::vector<std::string> warnings = std::exchange(warnings_, {});
+      const std::size_t done = done_;
+      if (!warnings.empty() || done != reported_) {
+        reported_ = done;
+        lock.unlock();
+        tell(warnings, done);
+        lock.lock();
+        continue;
       }
       if (error_) return false;
-      if (states_[number].is_final) return true;
-      const bool is_linked = states_[number].stage == Stage::kLinked;
-      if (is_stopping_ && at_work_ == 0 && !is_linked) return false;
-      const std::size_t done = done_;
-      lock.unlock();
-      report_progress(done);
-      lock.lock();
-      if (done == done_ && !states_[number].is_final && !error_ &&
-          (at_work_ > 0 || states_[number].stage == Stage::kLinked)) {
-        changed_.wait(lock);
-      }
+      const State& state = states_[number];
+      if (state.is_final) return true;
+      if (is_stopping_ && at_work_ == 0 && state.stage != Stage::kLinked) return false;
+      changed_.wait(lock);
     }
   }
 
+  void tell(const std::vector<std::string>& warnings, std::size_t done) const {
+    for (const std::string& warning : warnings) {
+      if (listener_.warn) listener_.warn(warning);
+    }
+    report_progress(done);
+  }
   void report_progress(std::size_t done) const {
     if (listener_.progress) listener_.progress(done, plan_.range.size());
   }
-  void report_progress() {
-    std::unique_lock<std::mutex> lock(mutex_);
-    const std::size_t done = done_;
-    lock.unlock();
-    report_progress(done);
-  }
-
   // Gives everything but the labels to the results. All chunks before are merged.
   void merge(std::size_t number, MergedMap& map) {
     const ScanRange& own = chunk(number).own;
@@ -458,8 +461,8 @@ class ChunkedRun {
   const RunListener& listener_;
   const fs::path& folder_;
   RunResults& results_;
-  std::vector<Eigen::Vector3d> path_;
   DynaInsRemover::Config config_;
+  std::vector<Eigen::Vector3d> path_;
   std::size_t latency_ = 0;  // scans
   ChunkOutputs outputs_;
 
@@ -467,10 +470,11 @@ class ChunkedRun {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<State> states_;
-  std::size_t next_ = 0;     // chunk to begin
-  std::size_t at_work_ = 0;  // chunks
-  std::size_t linked_ = 0;   // chunks
-  std::size_t done_ = 0;     // scans
+  std::size_t next_ = 0;      // chunk to begin
+  std::size_t at_work_ = 0;   // chunks
+  std::size_t linked_ = 0;    // chunks
+  std::size_t done_ = 0;      // scans
+  std::size_t reported_ = 0;  // scans, of done_
   bool is_stopping_ = false;
   std::exception_ptr error_;
   std::size_t error_chunk_ = 0;
