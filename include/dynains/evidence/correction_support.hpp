@@ -31,12 +31,18 @@ class CorrectionSupport {
     sectors_[sector_of(x, y)].add(derivatives, distance, weight);
   }
 
-  /// Removes from `correction` what its uncertainty may explain, by direction: none of it if it is
-  /// zero within kDeviations standard deviations. `attraction`: weights by which the unknowns are
-  /// attracted to a correction of zero.
-  Vector supported(const Vector& correction, const Vector& attraction) const {
+  /// Equations of all distances.
+  NormalEquations sum() const {
+    NormalEquations all;
+    for (const NormalEquations& sector : sectors_) all += sector;
+    return all;
+  }
+
+  /// Removes from `correction` what its uncertainty may explain, by direction: all of it within
+  /// kDeviations standard deviations. `equations`: sum(), with attractions.
+  Vector supported(const Vector& correction, const NormalEquations& equations) const {
     constexpr double kDeviations = 2.0;
-    Matrix covariance = covariance_of(correction, attraction);
+    Matrix covariance = covariance_of(equations);
     Vector scaled = correction;
     for (std::size_t i = 0; i < 6; ++i) {
       scaled[i] *= unit(i);
@@ -74,10 +80,7 @@ class CorrectionSupport {
     return std::min(static_cast<std::size_t>(angle * (kSectors / 4.0)), kSectors - 1);
   }
 
-  Matrix covariance_of(const Vector& correction, const Vector& attraction) const {
-    NormalEquations all;
-    for (const NormalEquations& sector : sectors_) all += sector;
-    for (std::size_t i = 0; i < 6; ++i) all.attract(i, -correction[i], attraction[i]);
+  Matrix covariance_of(const NormalEquations& all) const {
     Matrix covariance = {};
     for (std::size_t i = 0; i < 6; ++i) {
       Vector one = {};

@@ -81,9 +81,10 @@ class PoseCorrection {
               Span<const std::uint8_t> moving) {
     if (!is_active()) return;
     const Eigen::Isometry3d T = detail::composed(T_origin_world_, T_world_level);
+    const std::size_t wanted = inserted_ < kFirstScans ? kFirstInserted : kInserted;
     ++inserted_;
     planes_.begin_scan();
-    visit_some(split, kInserted, [&](std::size_t i, double x, double y, double z) {
+    visit_some(split, wanted, [&](std::size_t i, double x, double y, double z) {
       if (!moving.empty() && i >= split.ground_count && moving[i - split.ground_count] != 0) return;
       double p[3];
       for (int k = 0; k < 3; ++k) p[k] = T(k, 0) * x + T(k, 1) * y + T(k, 2) * z + T(k, 3);
@@ -100,9 +101,11 @@ class PoseCorrection {
 
  private:
   using Step = detail::NormalEquations::Vector;
-  static constexpr std::size_t kSelected = 3000;      // points that are aligned
-  static constexpr std::size_t kMostSelected = 3072;  // with padding
-  static constexpr std::size_t kInserted = 24000;     // points of a scan in the planes
+  static constexpr std::size_t kSelected = 3000;        // points that are aligned
+  static constexpr std::size_t kMostSelected = 3072;    // with padding
+  static constexpr std::size_t kInserted = 12000;       // points of a scan in the planes
+  static constexpr std::size_t kFirstInserted = 24000;  // the same for the first scans
+  static constexpr std::size_t kFirstScans = 5;
   static constexpr std::size_t kFewestMatches = 100;
   static constexpr double kLeastInliers = 0.6;               // ratio to the matches
   static constexpr double kNearest = 3.0, kFarthest = 50.0;  // m, horizontal
