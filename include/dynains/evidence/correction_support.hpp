@@ -73,9 +73,9 @@ class CorrectionSupport {
 
   // Sectors of nearly equal angles, without trigonometric functions.
   static std::size_t sector_of(float x, float y) {
-    const double sum = std::abs(static_cast<double>(x)) + std::abs(static_cast<double>(y));
-    if (!(sum > 0.0)) return 0;
-    const double t = static_cast<double>(y) / sum;
+    const double length = std::abs(static_cast<double>(x)) + std::abs(static_cast<double>(y));
+    if (!(length > 0.0)) return 0;
+    const double t = static_cast<double>(y) / length;
     const double angle = x >= 0.0F ? 1.0 + t : 3.0 - t;  // [0, 4]
     return std::min(static_cast<std::size_t>(angle * (kSectors / 4.0)), kSectors - 1);
   }
