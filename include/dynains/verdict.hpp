@@ -100,7 +100,7 @@ struct PoseResidual {
   double translation = 0.0;  ///< m
   double rotation = 0.0;     ///< deg
   /// Corrected motion: pose of this scan in the sensor frame of the previous one. It is the pushed
-  /// motion, except for rounding, if the residual is within the tolerance for poses.
+  /// motion, except for rounding, if neither of both poses was corrected.
   Eigen::Isometry3d T_previous_newest = Eigen::Isometry3d::Identity();
 };
 

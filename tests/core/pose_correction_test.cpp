@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/evidence/symmetric_eigen.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 #include "support/simulated_runs.hpp"
@@ -70,6 +71,13 @@ double degrees(const Eigen::Isometry3d& T) {
 double median(std::vector<double> values) {
   std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
   return values[values.size() / 2];
+}
+
+// Sum of twelve uniform numbers, which is nearly normal.
+double normal(Random& random) {
+  double sum = -6.0;
+  for (int i = 0; i < 12; ++i) sum += random.uniform(0.0, 1.0);
+  return sum;
 }
 
 TEST_CASE("exact poses stay, with residuals below 1 cm and 0.02 deg") {
@@ -152,27 +160,107 @@ TEST_CASE("a lasting offset is one residual, and later poses are corrected by it
   }
 }
 
-TEST_CASE("between two long walls, the position along them stays") {
-  const auto corridor = [](std::uint64_t seed) {
-    Random random(seed);
-    GroundSplit split;
-    split.resize(20000);
-    for (std::size_t i = 0; i < split.count; ++i) {
-      const int side = static_cast<int>(random.index(3));
-      split.points.x[i] = random.uniform_float(-30.0, 30.0);
-      split.points.y[i] = side == 0 ? random.uniform_float(-4.0, 4.0) : side == 1 ? -4.0F : 4.0F;
-      split.points.z[i] = side == 0 ? -1.7F : random.uniform_float(-1.7, 2.0);
-    }
-    return split;
-  };
+// A scan between two long walls along x at the position `x`, `y` (m), 20,000 points. With
+// `vehicle`, 2,000 more are the rear of a vehicle that is 8 m ahead of the sensor.
+GroundSplit corridor(std::uint64_t seed, float x, float y, bool vehicle) {
+  Random random(seed);
+  GroundSplit split;
+  split.resize(vehicle ? 22000 : 20000);
+  for (std::size_t i = 0; i < 20000; ++i) {
+    const int side = static_cast<int>(random.index(3));
+    split.points.x[i] = random.uniform_float(-30.0, 30.0) - x;
+    split.points.y[i] = (side == 0   ? random.uniform_float(-4.0, 4.0)
+                         : side == 1 ? -4.0F
+                                     : 4.0F) -
+                        y;
+    split.points.z[i] = side == 0 ? -1.7F : random.uniform_float(-1.7, 2.0);
+  }
+  for (std::size_t i = 20000; i < split.count; ++i) {
+    split.points.x[i] = 8.0F + 0.01F * static_cast<float>(normal(random));
+    split.points.y[i] = random.uniform_float(-0.9, 0.9) - y;
+    split.points.z[i] = random.uniform_float(-1.5, 0.0);
+  }
+  return split;
+}
+
+// The observable part of the error grows from scan to scan, and so does the other.
+TEST_CASE("between two long walls, errors across them are corrected, those along them stay") {
   PoseCorrection correction(kTolerance);
   correction.begin_epoch(Eigen::Isometry3d::Identity());
-  const GroundSplit first = corridor(7);
-  correction.insert(correction.correct(Eigen::Isometry3d::Identity(), first), first, {});
-  const Eigen::Isometry3d T_pushed(Eigen::Translation3d(1.0, 0.2, 0.0));
-  const Eigen::Isometry3d T = correction.correct(T_pushed, corridor(8));
-  CHECK(T.translation().x() == Approx(1.0).margin(0.01));
-  CHECK(T.translation().y() == Approx(0.0).margin(0.01));
+  for (int scan = 0; scan < 12; ++scan) {
+    const float x = 0.5F * static_cast<float>(scan);
+    const GroundSplit split = corridor(7 + static_cast<std::uint64_t>(scan), x, 0.0F, false);
+    const double pushed_x = static_cast<double>(x) + 0.04 * scan;
+    const Eigen::Isometry3d T_pushed =
+        Eigen::Translation3d(pushed_x, 0.03 * scan, 0.0) *
+        Eigen::Isometry3d(Eigen::AngleAxisd(0.2 * kDegrees * scan, Eigen::Vector3d::UnitZ()));
+    const Eigen::Isometry3d T = correction.correct(T_pushed, split);
+    INFO("scan " << scan);
+    CHECK(T.translation().x() == Approx(pushed_x).margin(0.02));
+    CHECK(T.translation().y() == Approx(0.0).margin(0.02));
+    CHECK(degrees(T) < 0.1);
+    if (scan > 0) {
+      REQUIRE(correction.residual());
+      const Eigen::Vector3d motion = correction.residual()->T_previous_newest.translation();
+      CHECK(motion.x() == Approx(0.54).margin(0.02));
+      CHECK(motion.y() == Approx(0.0).margin(0.03));
+    }
+    correction.insert(T, split, {});
+  }
+}
+
+TEST_CASE("one object alone does not decide about a direction") {
+  PoseCorrection correction(kTolerance);
+  correction.begin_epoch(Eigen::Isometry3d::Identity());
+  for (int scan = 0; scan < 20; ++scan) {
+    // The vehicle ahead drives as fast as the sensor, 2 cm per scan.
+    const float x = 0.02F * static_cast<float>(scan);
+    const GroundSplit split = corridor(40 + static_cast<std::uint64_t>(scan), x, 0.0F, true);
+    const Eigen::Isometry3d T_pushed(
+        Eigen::Translation3d(static_cast<double>(x), scan < 5 ? 0.0 : 0.1, 0.0));
+    const Eigen::Isometry3d T = correction.correct(T_pushed, split);
+    INFO("scan " << scan);
+    CHECK(T.translation().x() == Approx(static_cast<double>(x)).margin(0.01));
+    CHECK(T.translation().y() == Approx(0.0).margin(0.02));
+    correction.insert(T, split, {});
+  }
+}
+
+TEST_CASE("an error of one pose alone does not last") {
+  const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 8);
+  PoseCorrection correction(kTolerance);
+  correction.begin_epoch(scans.front().T_world_sensor);
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    const GroundSplit split = split_of(scans[i]);
+    Eigen::Isometry3d T_pushed = scans[i].T_world_sensor;
+    if (i == 5) T_pushed.translation() += Eigen::Vector3d(0.1, 0.3, 0.0);
+    const Eigen::Isometry3d T = correction.correct(T_pushed, split);
+    correction.insert(T, split, {});
+    INFO("scan " << i);
+    const double error = (T.translation() - scans[i].T_world_sensor.translation()).norm();
+    CHECK(error < (i == 5 ? 0.035 : 0.002));
+  }
+}
+
+TEST_CASE("eigenvalues and eigenvectors of a symmetric matrix") {
+  using Eigen6 = detail::SymmetricEigen<6>;
+  Random random(3);
+  Eigen6::Matrix m;
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) m[i][j] = m[j][i] = random.uniform(-1.0, 1.0);
+  }
+  const Eigen6 eigen = detail::symmetric_eigen<6>(m);
+  for (std::size_t k = 0; k < 6; ++k) {
+    for (std::size_t i = 0; i < 6; ++i) {
+      double product = 0.0, dot = 0.0;
+      for (std::size_t j = 0; j < 6; ++j) {
+        product += m[i][j] * eigen.vectors[k][j];
+        dot += eigen.vectors[k][j] * eigen.vectors[i][j];
+      }
+      CHECK(product == Approx(eigen.values[k] * eigen.vectors[k][i]).margin(1e-12));
+      CHECK(dot == Approx(i == k ? 1.0 : 0.0).margin(1e-12));
+    }
+  }
 }
 
 TEST_CASE("a scan of another place is lost, and a scan without points has no residual") {

@@ -15,8 +15,8 @@ namespace dynains::detail {
 ///
 /// The uncertainty is the sum of two covariances: that of the distances (their variance times the
 /// inverse of the normal equations), and that of the choice of surfaces (jackknife: the spread of
-/// the corrections that leave out one sector around the sensor). The second is large if one object
-/// alone decides about a direction, for example a slow vehicle ahead.
+/// the corrections that leave out two adjacent sectors around the sensor). The second is large if
+/// one object alone decides about a direction, for example a slow vehicle ahead.
 class CorrectionSupport {
  public:
   using Vector = NormalEquations::Vector;
@@ -31,12 +31,18 @@ class CorrectionSupport {
     sectors_[sector_of(x, y)].add(derivatives, distance, weight);
   }
 
-  /// Removes from `correction` what its uncertainty may explain, by direction: none of it if it is
-  /// zero within kDeviations standard deviations. `attraction`: weights by which the unknowns are
-  /// attracted to a correction of zero.
-  Vector supported(const Vector& correction, const Vector& attraction) const {
-    constexpr double kDeviations = 2.0;
-    Matrix covariance = covariance_of(correction, attraction);
+  /// Equations of all distances.
+  NormalEquations sum() const {
+    NormalEquations all;
+    for (const NormalEquations& sector : sectors_) all += sector;
+    return all;
+  }
+
+  /// Removes from `correction` what its uncertainty may explain, by direction: all of it within
+  /// kDeviations standard deviations. `equations`: sum(), with attractions.
+  Vector supported(const Vector& correction, const NormalEquations& equations) const {
+    constexpr double kDeviations = 3.0;
+    Matrix covariance = covariance_of(equations);
     Vector scaled = correction;
     for (std::size_t i = 0; i < 6; ++i) {
       scaled[i] *= unit(i);
@@ -67,36 +73,32 @@ class CorrectionSupport {
 
   // Sectors of nearly equal angles, without trigonometric functions.
   static std::size_t sector_of(float x, float y) {
-    const double sum = std::abs(static_cast<double>(x)) + std::abs(static_cast<double>(y));
-    if (!(sum > 0.0)) return 0;
-    const double t = static_cast<double>(y) / sum;
+    const double length = std::abs(static_cast<double>(x)) + std::abs(static_cast<double>(y));
+    if (!(length > 0.0)) return 0;
+    const double t = static_cast<double>(y) / length;
     const double angle = x >= 0.0F ? 1.0 + t : 3.0 - t;  // [0, 4]
     return std::min(static_cast<std::size_t>(angle * (kSectors / 4.0)), kSectors - 1);
   }
 
-  Matrix covariance_of(const Vector& correction, const Vector& attraction) const {
-    NormalEquations all;
-    for (const NormalEquations& sector : sectors_) all += sector;
-    for (std::size_t i = 0; i < 6; ++i) all.attract(i, -correction[i], attraction[i]);
+  Matrix covariance_of(const NormalEquations& all) const {
     Matrix covariance = {};
     for (std::size_t i = 0; i < 6; ++i) {
       Vector one = {};
       one[i] = all.variance();
       covariance[i] = all.solve(one);
     }
+    // Pairs of adjacent sectors, so that no object is divided. They overlap, so each counts half.
     const Vector step = all.solve();
-    const auto used = static_cast<double>(
-        std::count_if(sectors_.begin(), sectors_.end(),
-                      [](const NormalEquations& sector) { return !sector.empty(); }));
-    for (const NormalEquations& sector : sectors_) {
-      if (sector.empty()) continue;
+    for (std::size_t sector = 0; sector < kSectors; ++sector) {
+      const NormalEquations& next = sectors_[(sector + 1) % kSectors];
+      if (sectors_[sector].empty() && next.empty()) continue;
       NormalEquations others = all;
-      others -= sector;
+      others -= sectors_[sector];
+      others -= next;
       Vector change = others.solve();
       for (std::size_t i = 0; i < 6; ++i) change[i] -= step[i];
-      const double weight = (used - 1.0) / used;
       for (std::size_t i = 0; i < 6; ++i) {
-        for (std::size_t j = 0; j < 6; ++j) covariance[i][j] += weight * change[i] * change[j];
+        for (std::size_t j = 0; j < 6; ++j) covariance[i][j] += 0.5 * change[i] * change[j];
       }
     }
     return covariance;

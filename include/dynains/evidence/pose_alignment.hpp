@@ -59,28 +59,28 @@ class PlaneAligner {
   /// Aligns points (m, sensor frame) with planes, from a first estimate of the pose that is wrong
   /// by at most half a voxel. Directions without information keep the first estimate.
   Alignment align(PointsView points, VoxelPlanes& planes, const Eigen::Isometry3d& T_guess) {
-    constexpr double kScales[] = {0.4, 0.25, 0.15, 0.1, 0.06, 0.06, 0.06};  // m, by iteration
-    constexpr std::size_t kIterations = std::size(kScales);
-    constexpr double kSmall = 0.01;       // m, change by one iteration
+    constexpr double kCoarseScales[] = {0.4, 0.25, 0.15, 0.1};  // m, by iteration
+    constexpr std::size_t kCoarseStep = 3;                      // one of so many points
+    constexpr double kSmall = 0.01;                             // m, change by one iteration
+    constexpr double kScale = 0.06;                             // m
+    constexpr int kMostIterations = 3;
     constexpr double kConverged = 0.002;  // m
     Alignment result;
     Eigen::Isometry3d T = T_guess;
-    for (std::size_t iteration = 0; iteration < kIterations; ++iteration) {
-      find_planes(points, planes, T);
-      NormalEquations equations;
-      visit_equations(kScales[iteration],
-                      [&](const Match&, const NormalEquations::Vector& d, double distance,
-                          double weight) { equations.add(d, distance, weight); });
-      for (std::size_t i = 0; i < 6; ++i) equations.attract(i, -result.found[i], kAttraction[i]);
-      const NormalEquations::Vector step = equations.solve();
-      for (std::size_t i = 0; i < 6; ++i) result.found[i] += step[i];
-      T = moved(T, step);
-      const double change = equations.change(step);
-      if (change <= kConverged && iteration + 2 >= kIterations) break;
-      if (change <= kSmall) iteration = std::max(iteration, kIterations - 3);
+    NormalEquations equations;
+    for (const double scale : kCoarseScales) {
+      find_planes(points, kCoarseStep, planes, T);
+      sum_equations(points, scale, result.found, equations);
+      if (advance(equations, T, result.found) <= kSmall) break;
+    }
+    for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+      find_planes(points, 1, planes, T);
+      sum_equations(points, kScale, result.found, equations);
+      if (advance(equations, T, result.found) <= kConverged) break;
     }
     count_inliers(result);
-    keep_supported(points, planes, kScales[kIterations - 1], T, result);
+    result.supported = support_.supported(result.found, equations);
+    result.change = equations.change(result.supported);
     result.T_map_sensor = moved(T_guess, result.supported);
     return result;
   }
@@ -96,9 +96,11 @@ class PlaneAligner {
     std::uint32_t point;
   };
 
-  void find_planes(PointsView points, VoxelPlanes& planes, const Eigen::Isometry3d& T) {
+  // Matches every `step`-th point.
+  void find_planes(PointsView points, std::size_t step, VoxelPlanes& planes,
+                   const Eigen::Isometry3d& T) {
     matches_.clear();
-    for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::size_t i = 0; i < points.size(); i += step) {
       Match match;
       double p[3];
       for (int k = 0; k < 3; ++k) {
@@ -117,22 +119,34 @@ class PlaneAligner {
     for (const Match& match : matches_) ++match.plane->matches;
   }
 
-  // Calls `visit(match, derivatives, distance, weight)` for each match. `scale` (m): larger
-  // distances have little weight (Geman-McClure). The points of one plane share its error, so that
-  // all of them weigh at most as much as kMost points.
-  template <class Visit>
-  void visit_equations(double scale, Visit&& visit) const {
+  // Equations of the matches for the next step after `found`, also by sector in `support_`. `scale`
+  // (m): larger distances have little weight (Geman-McClure). The points of one plane share its
+  // error, so that all of them weigh at most as much as kMost points.
+  void sum_equations(PointsView points, double scale, const NormalEquations::Vector& found,
+                     NormalEquations& equations) {
     constexpr double kMost = 20.0;
+    support_.clear();
     for (const Match& match : matches_) {
       const double(&n)[3] = match.plane->normal;
       const double(&arm)[3] = match.arm;
       const double loss = scale * scale / (scale * scale + match.distance * match.distance);
       const double share = kMost / (kMost + static_cast<double>(match.plane->matches));
-      visit(match,
-            NormalEquations::Vector{n[0], n[1], n[2], arm[1] * n[2] - arm[2] * n[1],
-                                    arm[2] * n[0] - arm[0] * n[2], arm[0] * n[1] - arm[1] * n[0]},
-            match.distance, loss * loss * share);
+      support_.add(points.x[match.point], points.y[match.point],
+                   {n[0], n[1], n[2], arm[1] * n[2] - arm[2] * n[1], arm[2] * n[0] - arm[0] * n[2],
+                    arm[0] * n[1] - arm[1] * n[0]},
+                   match.distance, loss * loss * share);
     }
+    equations = support_.sum();
+    for (std::size_t i = 0; i < 6; ++i) equations.attract(i, -found[i], kAttraction[i]);
+  }
+
+  // Makes the next step. Returns the root mean square of the change of the distances, m.
+  static double advance(const NormalEquations& equations, Eigen::Isometry3d& T,
+                        NormalEquations::Vector& found) {
+    const NormalEquations::Vector step = equations.solve();
+    for (std::size_t i = 0; i < 6; ++i) found[i] += step[i];
+    T = moved(T, step);
+    return equations.change(step);
   }
 
   void count_inliers(Alignment& result) const {
@@ -141,20 +155,6 @@ class PlaneAligner {
     result.inliers = static_cast<std::size_t>(
         std::count_if(matches_.begin(), matches_.end(),
                       [](const Match& match) { return std::abs(match.distance) <= kInlier; }));
-  }
-
-  void keep_supported(PointsView points, VoxelPlanes& planes, double scale,
-                      const Eigen::Isometry3d& T, Alignment& result) {
-    find_planes(points, planes, T);
-    support_.clear();
-    NormalEquations equations;
-    visit_equations(scale, [&](const Match& match, const NormalEquations::Vector& d,
-                               double distance, double weight) {
-      support_.add(points.x[match.point], points.y[match.point], d, distance, weight);
-      equations.add(d, distance, weight);
-    });
-    result.supported = support_.supported(result.found, kAttraction);
-    result.change = equations.change(result.supported);
   }
 
   std::vector<Match> matches_;

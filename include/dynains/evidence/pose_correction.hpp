@@ -81,9 +81,10 @@ class PoseCorrection {
               Span<const std::uint8_t> moving) {
     if (!is_active()) return;
     const Eigen::Isometry3d T = detail::composed(T_origin_world_, T_world_level);
+    const std::size_t wanted = inserted_ < kFirstScans ? kFirstInserted : kInserted;
     ++inserted_;
     planes_.begin_scan();
-    visit_some(split, kInserted, [&](std::size_t i, double x, double y, double z) {
+    visit_some(split, wanted, [&](std::size_t i, double x, double y, double z) {
       if (!moving.empty() && i >= split.ground_count && moving[i - split.ground_count] != 0) return;
       double p[3];
       for (int k = 0; k < 3; ++k) p[k] = T(k, 0) * x + T(k, 1) * y + T(k, 2) * z + T(k, 3);
@@ -100,9 +101,11 @@ class PoseCorrection {
 
  private:
   using Step = detail::NormalEquations::Vector;
-  static constexpr std::size_t kSelected = 3000;      // points that are aligned
-  static constexpr std::size_t kMostSelected = 3072;  // with padding
-  static constexpr std::size_t kInserted = 24000;     // points of a scan in the planes
+  static constexpr std::size_t kSelected = 3000;        // points that are aligned
+  static constexpr std::size_t kMostSelected = 3072;    // with padding
+  static constexpr std::size_t kInserted = 12000;       // points of a scan in the planes
+  static constexpr std::size_t kFirstInserted = 24000;  // the same for the first scans
+  static constexpr std::size_t kFirstScans = 5;
   static constexpr std::size_t kFewestMatches = 100;
   static constexpr double kLeastInliers = 0.6;               // ratio to the matches
   static constexpr double kNearest = 3.0, kFarthest = 50.0;  // m, horizontal
@@ -152,27 +155,26 @@ class PoseCorrection {
     if (alignment.change > tolerance_) {
       T_newest = alignment.T_map_sensor;
       correction_ = detail::composed(T_newest, detail::inverted(T_pushed));
-      const Step lasting = agreed(alignment.supported, before);
+      const Step lasting = confirmed(alignment.supported, before);
       offset_ = detail::composed(detail::moved(T_guess, lasting), detail::inverted(T_pushed));
       for (std::size_t i = 0; i < lasting.size(); ++i) open_[i] -= lasting[i];
     }
     residual_->T_previous_newest = detail::composed(detail::inverted(T_origin_newest_), T_newest);
   }
 
-  // The part on which two steps agree: the mean direction of both, with the smaller length; zero at
-  // more than a right angle. Translations and rotations on their own.
-  static Step agreed(const Step& a, const Step& b) {
+  // The part of a step that an earlier step confirms: the projection of the earlier one, at most
+  // the whole step. Translations and rotations on their own.
+  static Step confirmed(const Step& step, const Step& before) {
     Step result = {};
-    for (std::size_t first = 0; first < a.size(); first += 3) {
-      double aa = 0.0, bb = 0.0, ab = 0.0;
+    for (std::size_t first = 0; first < step.size(); first += 3) {
+      double squared = 0.0, product = 0.0;
       for (std::size_t i = first; i < first + 3; ++i) {
-        aa += a[i] * a[i];
-        bb += b[i] * b[i];
-        ab += a[i] * b[i];
+        squared += step[i] * step[i];
+        product += step[i] * before[i];
       }
-      if (ab <= 0.0) continue;
-      const double scale = std::sqrt(std::min(aa, bb) / (aa + 2.0 * ab + bb));
-      for (std::size_t i = first; i < first + 3; ++i) result[i] = scale * (a[i] + b[i]);
+      if (product <= 0.0) continue;
+      const double ratio = std::min(product / squared, 1.0);
+      for (std::size_t i = first; i < first + 3; ++i) result[i] = ratio * step[i];
     }
     return result;
   }
