@@ -109,11 +109,14 @@ struct SessionReference {
 
 struct SessionReferencesConfig {
   double reference_way = 1.0;  ///< m
+  int reference_scans = 10;    ///< scans
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
     visitor(Parameter{"reference_way", self.reference_way, closed(0, 20), "m",
                       "way of the sensor between two reference scans that a session keeps"});
+    visitor(Parameter{"reference_scans", self.reference_scans, closed(1, 1000000), "scans",
+                      "most scans between two reference scans that a session keeps"});
   }
 
   /// Throws ConfigError.
@@ -121,7 +124,7 @@ struct SessionReferencesConfig {
 };
 
 /// Makes the reference scans of one session: the first scan, and each scan that is `reference_way`
-/// away from the latest reference. The grid of all images is that of the first scan.
+/// or `reference_scans` away from the latest reference. The grid of all images is that of the first scan.
 class SessionReferences {
  public:
   explicit SessionReferences(const SessionReferencesConfig& config)
@@ -134,7 +137,7 @@ class SessionReferences {
   /// m, sensor frame. `verdicts`: final verdict by point; dynamic points only occlude.
   const SessionReference* add(PointsView points, Span<const PointLabel> verdicts,
                               const Eigen::Isometry3d& T_world_sensor, std::uint32_t scan) {
-    if (is_near_latest(T_world_sensor.translation())) return nullptr;
+    if (is_near_latest(T_world_sensor.translation(), scan)) return nullptr;
     split(points, verdicts);
     if (grid_.rows == 0 && !choose_grid()) return nullptr;
     latest_ = T_world_sensor.translation();
@@ -146,8 +149,9 @@ class SessionReferences {
   }
 
  private:
-  bool is_near_latest(const Eigen::Vector3d& position) const {
-    return latest_ && (position - *latest_).norm() < config_.reference_way;
+  bool is_near_latest(const Eigen::Vector3d& position, std::uint32_t scan) const {
+    return latest_ && (position - *latest_).norm() < config_.reference_way &&
+           scan - reference_.scan < static_cast<std::uint32_t>(config_.reference_scans);
   }
 
   void split(PointsView points, Span<const PointLabel> verdicts) {
