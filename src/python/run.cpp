@@ -57,7 +57,7 @@ void set_count(RunArguments& run, const py::handle& value) {
   run.settings.*Field = to_whole_number(value, kLeast, std::numeric_limits<std::int32_t>::max());
 }
 
-const std::array<RunSetting, 20> kRunSettings{{
+const std::array<RunSetting, 23> kRunSettings{{
     {"preset", "'default', 'offline' or 'paper'", "parameters to start from",
      [](RunArguments& run, const py::handle& value) {
        const auto& names = program::preset_names();
@@ -92,6 +92,19 @@ const std::array<RunSetting, 20> kRunSettings{{
        if (!value.is_none()) {
          run.settings.map_memory = to_number(value, 0.0, std::numeric_limits<double>::max());
        }
+     }},
+    {"update", "a path", "folder of a map of many sessions that the session is added to",
+     [](RunArguments& run, const py::handle& value) {
+       if (!value.is_none()) run.settings.update = to_path(value).string();
+     }},
+    {"session", "str", "name of the session in update; that of the recording if it is not given",
+     [](RunArguments& run, const py::handle& value) {
+       if (!value.is_none()) run.settings.session = value.cast<std::string>();
+     }},
+    {"session_begin", "float, s", "time by which sessions are ordered; default: of the first scan",
+     [](RunArguments& run, const py::handle& value) {
+       constexpr double kMost = std::numeric_limits<double>::max();
+       if (!value.is_none()) run.settings.session_begin = to_number(value, -kMost, kMost);
      }},
     {"jobs", "int from 1 on", "threads that process chunks of the recording; changes no result",
      &set_count<&RunSettings::jobs, 1>},

@@ -95,6 +95,20 @@ def test_a_worker_that_dies_and_one_that_stops_change_no_byte(drives, expected, 
     assert json.loads((out / "fleet.json").read_text()) == results
 
 
+def test_the_map_of_a_fleet_is_that_of_one_process(drives, tmp_path):
+    def bytes_of(city):
+        return {str(f.relative_to(city)): f.read_bytes() for f in city.rglob("*") if f.is_file()}
+
+    some = {f"drive{seed}": drives / f"drive{seed}" for seed in range(3)}
+    results = fleet.clean(some, tmp_path / "out", city=tmp_path / "city", workers=3)
+    assert not [name for name, result in results.items() if "error" in result]
+    (tmp_path / "alone").mkdir()
+    for name in reversed(list(some)):
+        dynains.run(some[name], tmp_path / "alone" / name, update=tmp_path / "map", session=name)
+    assert bytes_of(tmp_path / "city") == bytes_of(tmp_path / "map")
+    assert {"drive0", "drive1", "drive2"} <= {f.name for f in (tmp_path / "city").iterdir()}
+
+
 def test_a_recording_that_fails_is_reported_and_does_not_stop_the_others(drives, tmp_path, capsys):
     some = [str(drives / name) for name in ("broken", "drive1", "drive2")]
     assert fleet.main([*some, "--out", str(tmp_path / "out"), "--workers", "2"]) == 1

@@ -1,6 +1,6 @@
 """Cleans many recordings at once, on the cores of one machine or on many machines, by Dask.
 
-    python3 -m dynains.fleet LOGS... --out OUT [--scheduler tcp://HOST:PORT] [--workers N]
+    python3 -m dynains.fleet LOGS... --out OUT [--city CITY] [--scheduler tcp://HOST:PORT]
 
 Each recording is a task. Its results go to OUT/NAME, as `dynains run` writes them, so they do not
 depend on the worker, the number of workers, or the order. A task of a worker that dies is given to
@@ -116,6 +116,7 @@ def clean(
     recordings: Dict[str, Path],
     out: PathLike,
     *,
+    city: Optional[PathLike] = None,
     scheduler: Optional[str] = None,
     workers: Optional[int] = None,
     progress: Optional[Callable[[int, int, str, Dict[str, Any]], object]] = None,
@@ -123,8 +124,8 @@ def clean(
 ) -> Dict[str, Dict[str, Any]]:
     """Cleans recordings into OUT/NAME and writes OUT/fleet.json, which it returns.
 
-    recordings: by name, see find_recordings(). out: a folder that all workers reach. scheduler:
-    address of a scheduler of Dask; None: workers on this machine. workers: their number on this
+    recordings: by name, see find_recordings(). out: a folder that all workers reach. city: folder
+    of a map of many sessions that each recording is added to, under its name. scheduler: address of a scheduler of Dask; None: workers on this machine. workers: their number on this
     machine; None: one for each core. progress: called with the numbers of finished and of all
     recordings, the name of the one that finished and its result. arguments: of dynains.run().
 
@@ -147,7 +148,7 @@ def clean(
                     _clean_one,
                     str(recordings[name]),
                     str(out / name),
-                    arguments,
+                    {**arguments, **_session(city, name)},
                     pure=False,
                 ): name
                 for name in order
@@ -168,6 +169,10 @@ def clean(
     return {name: results[name] for name in sorted(results)}
 
 
+def _session(city: Optional[PathLike], name: str) -> Dict[str, str]:
+    return {} if city is None else {"update": str(Path(city).resolve()), "session": name}
+
+
 def _size_of(path: Path) -> int:
     if path.is_file():
         return path.stat().st_size
@@ -186,6 +191,7 @@ def main(words: Optional[List[str]] = None) -> int:
     )
     parser.add_argument("logs", nargs="+", help="recordings, or folders of recordings")
     parser.add_argument("--out", required=True, help="folder that all workers reach")
+    parser.add_argument("--city", help="map of many sessions that each recording is added to")
     parser.add_argument("--scheduler", help="address of a scheduler [workers on this machine]")
     parser.add_argument("--workers", type=int, help="on this machine [one for each core]")
     parser.add_argument("--preset", default="default", choices=["default", "offline", "paper"])
@@ -199,6 +205,7 @@ def main(words: Optional[List[str]] = None) -> int:
         results = clean(
             find_recordings(options.logs),
             options.out,
+            city=options.city,
             scheduler=options.scheduler,
             workers=options.workers,
             progress=_tell,
