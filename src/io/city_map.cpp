@@ -69,6 +69,7 @@ CityChanges CityMap::changes(const TileIndex& tile, std::uint32_t a, std::uint32
   for (const CityPoint& candidate : candidates) points.push_back(candidate.point);
   reversed.add_session(std::move(points));
   for (std::size_t session = 0; session <= a; ++session) revise(reversed, tile, session);
+  reversed.add_session({});
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     if (!reversed.stands(0, i, 1)) changes.added.push_back(candidates[i]);
   }

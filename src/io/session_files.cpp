@@ -31,7 +31,7 @@ constexpr char kTileMagic[9] = "DYNSTILE";
 constexpr char kReferenceMagic[9] = "DYNSREFS";
 constexpr std::uint32_t kVersion = 1;
 constexpr std::uint64_t kTileHeaderBytes = 48;
-constexpr std::uint64_t kPointBytes = 20;
+constexpr std::uint64_t kPointBytes = 24;
 constexpr std::uint64_t kRecordHeaderBytes = 112;  // scan, pose, size
 constexpr std::uint64_t kMostImageBytes = std::uint64_t{1} << 26U;
 constexpr const char* kTileEnd = ".tile";
@@ -109,6 +109,7 @@ std::string tile_bytes(const SessionGrid& grid, const TileIndex& tile,
     append_number(point.z, bytes);
     append_number(point.scan, bytes);
     append_number(point.label, bytes);
+    append_number(std::uint32_t{point.is_ground ? 1U : 0U}, bytes);
   }
   append_number(checksum(bytes.data(), bytes.size()), bytes);
   return bytes;
@@ -137,9 +138,12 @@ std::vector<SessionPoint> read_tile(const fs::path& path, const SessionGrid& gri
   std::vector<SessionPoint> points(static_cast<std::size_t>(count));
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::size_t at = kTileHeaderBytes + kPointBytes * i;
-    points[i] = {number_at<float>(bytes, at), number_at<float>(bytes, at + 4),
-                 number_at<float>(bytes, at + 8), number_at<std::uint32_t>(bytes, at + 12),
-                 number_at<std::uint32_t>(bytes, at + 16)};
+    points[i] = {number_at<float>(bytes, at),
+                 number_at<float>(bytes, at + 4),
+                 number_at<float>(bytes, at + 8),
+                 number_at<std::uint32_t>(bytes, at + 12),
+                 number_at<std::uint32_t>(bytes, at + 16),
+                 number_at<std::uint32_t>(bytes, at + 20) != 0};
     if (!is_within(grid, points[i])) fail_at_byte(path, at, "expected a point within the tile");
   }
   return points;

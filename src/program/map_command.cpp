@@ -76,6 +76,7 @@ class CityPointFile {
       las.position = position;
       las.time = map_.sessions()[session].begin;
       las.instance = point.label;
+      if (point.is_ground) las.classification = LasClass::kGround;
       las_->add(las);
       return;
     }

@@ -42,6 +42,7 @@ struct SessionPoint {
   float z;              ///< m, world frame
   std::uint32_t scan;   ///< number of the scan that measured it
   std::uint32_t label;  ///< of the recording, 0 without labels
+  bool is_ground;       ///< by its verdict
 };
 
 inline Eigen::Vector3d tile_corner(const SessionGrid& grid, const TileIndex& tile) {
@@ -74,7 +75,8 @@ class SessionPoints {
       const Eigen::Vector3d local(static_cast<double>(points.x[i]),
                                   static_cast<double>(points.y[i]),
                                   static_cast<double>(points.z[i]));
-      add_point(T_world_sensor * local, labels.empty() ? 0 : labels[i], scan);
+      add_point(T_world_sensor * local, {0.0F, 0.0F, 0.0F, scan, labels.empty() ? 0 : labels[i],
+                                         verdicts[i] == PointLabel::kGround});
     }
   }
 
@@ -92,7 +94,8 @@ class SessionPoints {
     VoxelHashTable<> filled;
   };
 
-  void add_point(const Eigen::Vector3d& position, std::uint32_t label, std::uint32_t scan) {
+  // `point`: all but the coordinates.
+  void add_point(const Eigen::Vector3d& position, SessionPoint point) {
     const TileIndex index = {static_cast<std::int32_t>(std::floor(position.x() / grid_.tile)),
                              static_cast<std::int32_t>(std::floor(position.y() / grid_.tile))};
     if (newest_ == nullptr || index != newest_index_) {
@@ -100,8 +103,9 @@ class SessionPoints {
       newest_index_ = index;
     }
     const Eigen::Vector3d relative = position - tile_corner(grid_, index);
-    const SessionPoint point = {static_cast<float>(relative.x()), static_cast<float>(relative.y()),
-                                static_cast<float>(relative.z()), scan, label};
+    point.x = static_cast<float>(relative.x());
+    point.y = static_cast<float>(relative.y());
+    point.z = static_cast<float>(relative.z());
     if (newest_->filled.insert(session_voxel(grid_, point)) != newest_->points.size()) return;
     newest_->points.push_back(point);
     ++size_;
