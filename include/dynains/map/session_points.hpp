@@ -58,7 +58,7 @@ inline VoxelKey session_voxel(const SessionGrid& grid, const SessionPoint& point
 }
 
 /// Collects the static points of the scans of one session. The first point of each voxel is kept.
-/// The result depends on the scans of this session only. Memory: about 40 bytes per kept point.
+/// The result depends on the scans of this session only. Memory: 56 to 112 bytes per kept point.
 class SessionPoints {
  public:
   /// Throws ConfigError.
