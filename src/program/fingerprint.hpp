@@ -1,8 +1,10 @@
 // A number that tells two inputs apart, with a probability that is enough against mistakes.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <string>
 
 namespace dynains::program {
@@ -15,7 +17,11 @@ class Fingerprint {
     for (std::size_t i = 0; i < size; ++i) value_ = (value_ ^ bytes[i]) * 0x100000001B3U;
   }
   void add(const std::string& text) { add(text.data(), text.size()); }
-  void add(double value) { add(&value, sizeof(value)); }
+  void add(double value) {
+    std::array<unsigned char, sizeof(value)> bytes;
+    std::memcpy(bytes.data(), &value, sizeof(value));
+    add(bytes.data(), bytes.size());
+  }
 
   std::uint64_t value() const { return value_; }
   std::string text() const { return std::to_string(value_); }
