@@ -66,6 +66,7 @@ CityChanges CityMap::changes(const TileIndex& tile, std::uint32_t a, std::uint32
   // What was free in the earlier sessions has come; what they did not see is new to the map only.
   TileHistory reversed(grid, config_);
   std::vector<SessionPoint> points;
+  points.reserve(candidates.size());
   for (const CityPoint& candidate : candidates) points.push_back(candidate.point);
   reversed.add_session(std::move(points));
   for (std::size_t session = 0; session <= a; ++session) revise(reversed, tile, session);

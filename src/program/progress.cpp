@@ -55,11 +55,11 @@ void Progress::draw_bar(std::size_t done) {
   if (drawn_ && done != total_ && now - last_ < kPeriod) return;
   last_ = now;
   drawn_ = true;
-  constexpr std::size_t kWidth = 30;
+  constexpr std::size_t kBarWidth = 30;
   constexpr const char* kClearLine = "\x1b[K";  // the text may be shorter than the one before
-  const std::size_t filled = total_ == 0 ? kWidth : done * kWidth / total_;
+  const std::size_t filled = total_ == 0 ? kBarWidth : done * kBarWidth / total_;
   // The bar needs carriage returns, which the filter of std::cerr escapes.
-  std::clog << "\r[" << std::string(filled, '#') << std::string(kWidth - filled, ' ') << "] "
+  std::clog << "\r[" << std::string(filled, '#') << std::string(kBarWidth - filled, ' ') << "] "
             << state(done) << kClearLine << std::flush;
 }
 

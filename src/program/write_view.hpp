@@ -23,9 +23,9 @@ std::filesystem::path write_view(OutputFolder& out, const Recording& recording,
 using OpenRecording = std::function<Recording(const std::filesystem::path& report_file,
                                               const nlohmann::ordered_json& report)>;
 
-/// Writes the page into the folder `out` of a run. Throws IoError if it has no complete results,
+/// Writes the page into the `folder` of a run. Throws IoError if it has no complete results,
 /// and UsageError if another run writes to it.
-std::filesystem::path write_view(const std::filesystem::path& out, const OpenRecording& open,
+std::filesystem::path write_view(const std::filesystem::path& folder, const OpenRecording& open,
                                  std::size_t max_points);
 
 }  // namespace dynains::program
