@@ -31,9 +31,9 @@ struct RunPlan {
   nlohmann::ordered_json configuration;  ///< parameter name -> value
   nlohmann::ordered_json request;        ///< see describe_request()
   SessionRequest session;
-  std::vector<Chunk> chunks;             ///< empty: the recording is one stream
-  std::size_t jobs = 1;                  ///< threads that process chunks
-  std::uint64_t fingerprint = 0;         ///< of the request
+  std::vector<Chunk> chunks;      ///< empty: the recording is one stream
+  std::size_t jobs = 1;           ///< threads that process chunks
+  std::uint64_t fingerprint = 0;  ///< of the request
 };
 
 /// Path of the file that a flag --map names, links followed. `out`: folder of the results, by

@@ -89,8 +89,8 @@ nlohmann::ordered_json describe(const SimulateOptions& options, const simulation
                                  {"sensor", options.sensor},
                                  {"labelling", options.labelling},
                                  {"format", options.format}};
-  simulation::Config::visit(config,
-                            [&](const auto& parameter) { json[parameter.name] = plain_value(parameter.value); });
+  simulation::Config::visit(
+      config, [&](const auto& parameter) { json[parameter.name] = plain_value(parameter.value); });
   return json;
 }
 

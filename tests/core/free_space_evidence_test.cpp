@@ -110,8 +110,7 @@ TEST_CASE("only compact instances are presumed to move, from the first scan of a
     return at_once == Causes{Cause::kPresumed};
   };
   for (const Case& c : {
-           Case{2.0F, 1.5F, 2, 0, true},
-           Case{2.0F, 1.5F, 0, 0, true}, Case{2.0F, 1.5F, 5, 5, true},
+           Case{2.0F, 1.5F, 2, 0, true}, Case{2.0F, 1.5F, 0, 0, true}, Case{2.0F, 1.5F, 5, 5, true},
            Case{14.7F, 1.5F, 2, 0, true}, Case{15.6F, 1.5F, 2, 0, false},
            Case{2.0F, 3.4F, 2, 0, true}, Case{2.0F, 4.1F, 2, 0, false},
            Case{0.75F, 0.1F, 2, 0, false},  // twelve points of one supervoxel: four samples

@@ -29,7 +29,8 @@ TEST_CASE("timing.csv has a row for each scan") {
   TemporaryFolder folder;
   RunTiming timing;
   timing.stages = {"ground", "map"};
-  timing.rows.push_back({"000007", 120000, {1.25, 0.5}, 2.0, dynains::PoseResidual{0.0125, 0.5, {}}});
+  timing.rows.push_back(
+      {"000007", 120000, {1.25, 0.5}, 2.0, dynains::PoseResidual{0.0125, 0.5, {}}});
   timing.rows.push_back({"000008", 0, {0.0, 0.0}, 0.00004, {}});
   write_timing(folder / "timing.csv", timing);
   CHECK(read_text(folder / "timing.csv") ==

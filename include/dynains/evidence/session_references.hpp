@@ -124,7 +124,8 @@ struct SessionReferencesConfig {
 };
 
 /// Makes the reference scans of one session: the first scan, and each scan that is `reference_way`
-/// or `reference_scans` away from the latest reference. The grid of all images is that of the first scan.
+/// or `reference_scans` away from the latest reference. The grid of all images is that of the first
+/// scan.
 class SessionReferences {
  public:
   explicit SessionReferences(const SessionReferencesConfig& config)

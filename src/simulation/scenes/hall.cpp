@@ -11,7 +11,7 @@ namespace dynains::simulation {
 namespace {
 
 constexpr double kPaceInHall = 1.0;  // m/s
-constexpr double kPanel = 8.0;         // m, of walls and of the ceiling
+constexpr double kPanel = 8.0;       // m, of walls and of the ceiling
 
 /// The hall extends along x from 0, and to both sides of y = 0.
 struct Hall {
