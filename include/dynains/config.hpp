@@ -73,17 +73,8 @@ Config paper_config() {
   }
 }
 
-/// `Config::offline()`, or the defaults if the config has no such member.
 template <class Config>
 using Offline = decltype(Config::offline());
-template <class Config>
-Config offline_config() {
-  if constexpr (Offers<Offline, Config>::value) {
-    return Config::offline();
-  } else {
-    return Config();
-  }
-}
 
 }  // namespace detail
 
@@ -229,7 +220,10 @@ struct PipelineConfig : RemoverConfig {
   /// memory.
   static PipelineConfig offline() {
     PipelineConfig config;
-    config.evidence = detail::offline_config<decltype(config.evidence)>();
+    using EvidenceConfig = decltype(config.evidence);
+    if constexpr (detail::Offers<detail::Offline, EvidenceConfig>::value) {
+      config.evidence = EvidenceConfig::offline();
+    }
     return config;
   }
 

@@ -117,7 +117,7 @@ void City::drop(const std::string& name) {
   session_files::read_session(session / session_files::kSessionFile);
   const fs::path foreign = session_files::foreign_entry(session);
   if (!foreign.empty()) fail(foreign, "is not part of the session, which stays as it is");
-  // The session leaves at once, whatever happens while its files are removed.
+  // One rename takes the session out of the map. Its files are removed after that.
   const fs::path aside = session_files::make_staging(folder_, name);
   std::error_code error;
   fs::rename(session, aside, error);

@@ -63,7 +63,8 @@ CityChanges CityMap::changes(const TileIndex& tile, std::uint32_t a, std::uint32
     if (after.find(session_voxel(grid, point)) != VoxelHashTable<>::kNone) return;
     changes.removed.push_back({static_cast<std::uint32_t>(session), point});
   });
-  // What was free in the earlier sessions has come; what they did not see is new to the map only.
+  // A point was added if beams of the earlier sessions passed through its place. Places that they
+  // did not see are no changes.
   TileHistory reversed(grid, config_);
   std::vector<SessionPoint> points;
   points.reserve(candidates.size());

@@ -15,6 +15,7 @@
 #include "byte_reader.hpp"
 #include "dynains/errors.hpp"
 #include "failure.hpp"
+#include "fingerprint.hpp"
 #include "scalar.hpp"
 
 #if defined(DYNAINS_HAS_JSON)
@@ -38,13 +39,10 @@ constexpr const char* kTileEnd = ".tile";
 constexpr const char* kStagingEnd = ".staging";
 constexpr std::size_t kRandomDigits = 16;
 
-/// FNV-1a, 64 bits.
 std::uint64_t checksum(const char* data, std::size_t size) {
-  std::uint64_t value = 0xCBF29CE484222325U;
-  for (std::size_t i = 0; i < size; ++i) {
-    value = (value ^ static_cast<unsigned char>(data[i])) * 0x100000001B3U;
-  }
-  return value;
+  Fingerprint fingerprint;
+  fingerprint.add(data, size);
+  return fingerprint.value();
 }
 
 template <class T>

@@ -108,7 +108,7 @@ void ChunkFileWriter::add(const ChunkScan& scan) {
 void ChunkFileWriter::finish(const ChunkSummary& summary, const StaticMapAccumulator& map) {
   const std::uint64_t begin = position_;
   put_number(summary.points);
-  put<const std::uint64_t>(summary.labels);
+  put<const std::uint64_t>(summary.labels.of);
   put<const std::uint32_t>(summary.instances.shared_before);
   put<const std::uint32_t>(summary.instances.shared_behind);
   put<const std::uint32_t>(summary.instances.still_before);
@@ -239,8 +239,8 @@ ChunkSummary ChunkFileReader::read_summary() {
   summary.points = get_number();
   std::vector<std::uint64_t> labels;
   get(labels);
-  if (labels.size() != summary.labels.size()) fail("has other labels");
-  std::copy(labels.begin(), labels.end(), summary.labels.begin());
+  if (labels.size() != summary.labels.of.size()) fail("has other labels");
+  std::copy(labels.begin(), labels.end(), summary.labels.of.begin());
   get(summary.instances.shared_before);
   get(summary.instances.shared_behind);
   get(summary.instances.still_before);

@@ -14,12 +14,13 @@
 #include "dynains/static_map_accumulator.hpp"
 #include "dynains/verdict.hpp"
 #include "instance_numbers.hpp"
+#include "label_counts.hpp"
 #include "overview.hpp"
 #include "run_timing.hpp"
 
 namespace dynains::program {
 
-/// What a file of a chunk must agree in to be of use.
+/// Identifies a chunk. A file with another key is not used.
 struct ChunkKey {
   std::uint64_t request = 0;  ///< fingerprint of the request of the run
   std::uint64_t first = 0;    ///< index of the first own scan
@@ -50,10 +51,10 @@ struct ChunkScan {
   void take(const ScanVerdict& verdict, bool with_beliefs);
 };
 
-/// What a chunk gives beside the verdicts on its scans and its map.
+/// Results of a chunk, except the verdicts on its scans and its map.
 struct ChunkSummary {
   std::uint64_t points = 0;
-  std::array<std::uint64_t, 5> labels{};  ///< points by PointLabel
+  LabelCounts labels;
   ChunkInstances instances;
   std::vector<Overview::Place> overview;
   RunTiming timing;  ///< of the own scans

@@ -88,7 +88,7 @@ void ChunkRecorder::take_final(std::size_t i, const ScanVerdict& verdict) {
   writer_.add(record_);
 
   summary_.points += verdict.labels.size();
-  for (const PointLabel label : verdict.labels) ++summary_.labels[static_cast<std::size_t>(label)];
+  summary_.labels.add(verdict.labels);
   count_instances(i, verdict);
   overview_.add(scan, verdict);
   if (outputs_.with_map) add_to_map(scan, verdict);

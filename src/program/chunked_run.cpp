@@ -95,7 +95,6 @@ class ChunkedRun {
         config_(without_map(plan.config)),
         path_(path_of(plan.sequence, plan.range)),
         states_(plan.chunks.size()) {
-    latency_ = DynaInsRemover(config_).latency();
     outputs_.with_beliefs = plan.outputs.write_beliefs || results.needs_scans();
     outputs_.with_online = plan.outputs.write_online;
     outputs_.with_map = plan.config.build_map;
@@ -314,7 +313,7 @@ class ChunkedRun {
       });
       if (!moved.empty()) mark_moved(moved, scan);
       // The first verdict knows of the chunk before when its verdicts have become final.
-      if (!moved.empty() && i >= own.own.first + latency_) mark_moved_online(moved, scan);
+      if (!moved.empty() && i >= own.own.first + plan_.latency) mark_moved_online(moved, scan);
       ScanVerdict verdict = verdict_of(i, scan);
       verdict.labels = scan.online;
       recorder.take_newest(i, std::move(summary.timing.rows[i - own.own.first]),
@@ -463,7 +462,6 @@ class ChunkedRun {
   RunResults& results_;
   DynaInsRemover::Config config_;
   std::vector<Eigen::Vector3d> path_;
-  std::size_t latency_ = 0;  // scans
   ChunkOutputs outputs_;
 
   // The members below are guarded by the mutex, but for numbers of linked chunks, which stay.

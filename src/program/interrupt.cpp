@@ -10,7 +10,7 @@ namespace {
 // A signal handler can reach nothing but a global.
 volatile std::sig_atomic_t received = 0;
 
-// The process has one action for each signal, whatever the number of guards.
+// A signal has one action in the process. All guards share these actions.
 struct Actions {
   std::mutex mutex;
   std::size_t guards = 0;

@@ -3,7 +3,7 @@
 
 namespace dynains::program {
 
-/// What a signal does after one that asked to stop.
+/// Effect of a second signal. The first one asks to stop.
 enum class SecondSignal { kEndsProcess, kAsksAgain };
 
 /// While one lives, in any thread, SIGINT and SIGTERM ask to stop. A signal that the program was

@@ -57,10 +57,7 @@ class CityPointFile {
       lowest = session.lowest;
     }
     if (is_las(path)) {
-      constexpr double kKilometre = 1000.0;  // m
-      LasOptions options;
-      options.offset = kKilometre * (lowest / kKilometre).array().floor();
-      las_ = std::make_unique<LasWriter>(path, options);
+      las_ = std::make_unique<LasWriter>(path, las_options_near(lowest));
       return;
     }
     PointColumns columns;

@@ -69,6 +69,13 @@ std::unique_ptr<MapFile> MapFile::open(const std::filesystem::path& path,
   return std::make_unique<PointMapFile>(path, options.columns);
 }
 
+LasOptions las_options_near(const Eigen::Vector3d& position) {
+  constexpr double kKilometre = 1000.0;  // m
+  LasOptions options;
+  options.offset = kKilometre * (position / kKilometre).array().floor();
+  return options;
+}
+
 double las_intensity_scale(float most) {
   constexpr double kMost = 65535.0;
   if (!(most > 0.0F && most <= 255.0F)) return 1.0;

@@ -17,6 +17,10 @@ namespace dynains::program {
 bool is_map_name(const std::filesystem::path& path);
 bool is_las(const std::filesystem::path& path);
 
+/// Options of a LAS file whose origin is a whole number of kilometres near `position` (m, world),
+/// so that its coordinates stay short.
+LasOptions las_options_near(const Eigen::Vector3d& position);
+
 struct MapFileOptions {
   PointColumns columns;          ///< of .ply and .pcd
   LasOptions las;                ///< of .las

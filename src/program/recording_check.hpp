@@ -1,4 +1,4 @@
-// What `dynains check` says of a recording.
+// The check of a recording for `dynains check` and the Python module.
 #pragma once
 
 #include <string>

@@ -3,14 +3,23 @@
 #include <cmath>
 #include <iostream>
 #include <utility>
+#include <vector>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/extrinsic.hpp"
+#include "dynains/parameters.hpp"
 
 namespace dynains::program {
 namespace {
 
 constexpr const char* kGroup = "What the files of SEQ mean (dynains check SEQ finds out)";
+
+/// Accepts the names of the values of an enumeration.
+template <class Enum>
+CLI::IsMember is_name_of() {
+  const auto names = value_names(Enum());
+  return CLI::IsMember(std::vector<std::string>(names.begin(), names.end()));
+}
 
 /// `word` as a shell reads it back.
 std::string quoted(const std::string& word) {
@@ -45,7 +54,7 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool 
       ->type_name("FILE")
       ->group(kGroup);
   command.add_option("--frame", frame_, "frame of the points [auto]")
-      ->check(CLI::IsMember({"auto", "sensor", "world"}))
+      ->check(is_name_of<PointFrame>())
       ->type_name("auto|sensor|world")
       ->group(kGroup);
   command
@@ -58,14 +67,14 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool 
   command
       .add_option("--quaternion-order", quaternion_,
                   "order of quaternions in the file [auto: as the form of the file has it]")
-      ->check(CLI::IsMember({"auto", "xyzw", "wxyz"}))
+      ->check(is_name_of<QuaternionOrder>())
       ->type_name("auto|xyzw|wxyz")
       ->group(kGroup);
   command
       .add_option("--pose-frame", pose_frame_,
                   "whose poses they are [auto: camera for 12 numbers a row beside calib.txt, else "
                   "lidar]. A camera without calib.txt looks along the x axis of the lidar")
-      ->check(CLI::IsMember({"auto", "lidar", "camera"}))
+      ->check(is_name_of<PoseFrame>())
       ->type_name("auto|lidar|camera")
       ->group(kGroup);
   command
@@ -140,18 +149,15 @@ RecordingOptions RecordingFlags::options() const {
   options.pose_frame = pose_frame_id_;
   options.deskew = deskew_;
   options.scene = scene_;
-  if (frame_ == "sensor") options.frame = PointFrame::kSensor;
-  if (frame_ == "world") options.frame = PointFrame::kWorld;
+  options.frame = value_of_name<PointFrame>(frame_).value();
   PoseConvention& convention = options.convention;
   convention.invert = invert_;
   convention.left_handed = left_handed_;
   convention.shift = shift_;
   if (units_ == "cm") convention.unit = 0.01;
   if (units_ == "mm") convention.unit = 0.001;
-  if (quaternion_ == "xyzw") convention.quaternion = QuaternionOrder::kXyzw;
-  if (quaternion_ == "wxyz") convention.quaternion = QuaternionOrder::kWxyz;
-  if (pose_frame_ == "lidar") convention.frame = PoseFrame::kLidar;
-  if (pose_frame_ == "camera") convention.frame = PoseFrame::kCamera;
+  convention.quaternion = value_of_name<QuaternionOrder>(quaternion_).value();
+  convention.frame = value_of_name<PoseFrame>(pose_frame_).value();
   if (!extrinsic_.empty()) convention.T_body_sensor = read_extrinsic(extrinsic_);
   if (!std::isfinite(time_offset_)) throw ConfigError("--time-offset: expected a finite number");
   options.time_offset = time_offset_;

@@ -27,7 +27,7 @@ struct RunFlags {
   bool quiet = false;
 };
 
-void print_summary(const RunOutcome& run) {
+void print_results(const RunOutcome& run) {
   const RunOutputs& outputs = run.outputs;
   const auto percent = [&](std::uint64_t count) {
     return run.points == 0 ? 0.0
@@ -55,6 +55,15 @@ void print_summary(const RunOutcome& run) {
             << "\nreport: " << (outputs.folder / "report.json").string() << std::endl;
 }
 
+void print_summary(const RunOutcome& run) {
+  if (run.was_complete_before) {
+    std::cout << run.outputs.folder.string() << ": complete already" << std::endl;
+  } else {
+    print_results(run);
+  }
+  if (!run.page.empty()) std::cout << "page: " << run.page.string() << std::endl;
+}
+
 void run_as_asked(RunFlags& flags) {
   RunSettings& settings = flags.settings;
   settings.config = flags.remover.config();
@@ -80,16 +89,10 @@ void run_as_asked(RunFlags& flags) {
   if (outcome.earlier_results_stay) {
     std::cerr << "dynains: interrupted; the earlier results in " << outcome.outputs.folder.string()
               << " stay as they were" << std::endl;
-  } else if (flags.quiet) {
-  } else if (outcome.was_complete_before) {
-    std::cout << outcome.outputs.folder.string() << ": complete already" << std::endl;
-  } else {
+  } else if (!flags.quiet) {
     print_summary(outcome);
   }
   if (!outcome.complete) throw Interrupted{outcome.signal};
-  if (!flags.quiet && !outcome.page.empty()) {
-    std::cout << "page: " << outcome.page.string() << std::endl;
-  }
 }
 
 }  // namespace

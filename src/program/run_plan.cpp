@@ -10,7 +10,7 @@
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/pose.hpp"
-#include "fingerprint.hpp"
+#include "io/fingerprint.hpp"
 #include "naming_scan.hpp"
 #include "run_request.hpp"
 
@@ -93,7 +93,7 @@ void check_least(const char* flag, const std::optional<std::int64_t>& value, std
 
 /// Nothing of it depends on the machine. Throws ConfigError.
 ChunkSettings choose_chunks(const RunSettings& settings, const DynaInsRemover::Config& config,
-                            std::size_t scans) {
+                            std::size_t scans, std::size_t latency) {
   check_least("--jobs", settings.jobs, 1);
   check_least("--chunk", settings.chunk, 0);
   check_least("--lookback", settings.lookback, 0);
@@ -113,9 +113,8 @@ ChunkSettings choose_chunks(const RunSettings& settings, const DynaInsRemover::C
   if (config.revision.revise_map) return chunks;
   chunks.lookback =
       settings.lookback ? static_cast<std::size_t>(*settings.lookback) : evidence_horizon(config);
-  chunks.scans = settings.chunk
-                     ? static_cast<std::size_t>(*settings.chunk)
-                     : default_chunk(scans, chunks.lookback, DynaInsRemover(config).latency());
+  chunks.scans = settings.chunk ? static_cast<std::size_t>(*settings.chunk)
+                                : default_chunk(scans, chunks.lookback, latency);
   return chunks;
 }
 
@@ -125,7 +124,7 @@ std::size_t choose_jobs(const RunSettings& settings, std::size_t chunks) {
   return std::max<std::size_t>(1, std::min(jobs, chunks));
 }
 
-/// What the run will write. Throws ConfigError.
+/// Outputs of the run. Throws ConfigError.
 RunOutputs outputs_of(const RunSettings& settings) {
   const DynaInsRemover::Config& config = settings.config;
   RunOutputs outputs;
@@ -242,11 +241,10 @@ RunPlan make_plan(const RunSettings& settings, Recording sequence) {
   const auto map_on_disk = map_on_disk_of(settings, outputs);
   const ScanRange range = select_scans(sequence, settings.window);
   check_scans(sequence, range);
-  const ChunkSettings chunk_settings = choose_chunks(settings, config, range.size());
+  const std::size_t latency = DynaInsRemover(config).latency();
+  const ChunkSettings chunk_settings = choose_chunks(settings, config, range.size(), latency);
   std::vector<Chunk> chunks;
-  if (chunk_settings.scans > 0) {
-    chunks = chunk_grid(range, chunk_settings, DynaInsRemover(config).latency());
-  }
+  if (chunk_settings.scans > 0) chunks = chunk_grid(range, chunk_settings, latency);
   outputs.in_chunks = !chunks.empty();
   const nlohmann::ordered_json configuration = parameters_of(config);
   nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);
@@ -272,6 +270,7 @@ RunPlan make_plan(const RunSettings& settings, Recording sequence) {
           configuration,
           std::move(request),
           std::move(session),
+          latency,
           std::move(chunks),
           jobs,
           fingerprint.value()};

@@ -31,6 +31,7 @@ struct RunPlan {
   nlohmann::ordered_json configuration;  ///< parameter name -> value
   nlohmann::ordered_json request;        ///< see describe_request()
   SessionRequest session;
+  std::size_t latency = 0;        ///< scans from a scan to its final verdict
   std::vector<Chunk> chunks;      ///< empty: the recording is one stream
   std::size_t jobs = 1;           ///< threads that process chunks
   std::uint64_t fingerprint = 0;  ///< of the request

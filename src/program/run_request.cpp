@@ -3,7 +3,7 @@
 #include <string>
 
 #include "dynains/version.hpp"
-#include "fingerprint.hpp"
+#include "io/fingerprint.hpp"
 
 namespace dynains::program {
 namespace {

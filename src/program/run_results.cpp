@@ -38,12 +38,8 @@ float most_intensity(const RecordedScan& scan) {
   return most;
 }
 
-/// The origin is a whole number of kilometres, so that the coordinates stay short.
 LasOptions las_options(const Recording& recording, const ScanRange& range, const std::string& crs) {
-  constexpr double kKilometre = 1000.0;  // m
-  LasOptions options;
-  const Eigen::Vector3d first = recording.T_world_sensor(range.first).translation();
-  options.offset = kKilometre * (first / kKilometre).array().floor();
+  LasOptions options = las_options_near(recording.T_world_sensor(range.first).translation());
   if (!crs.empty()) options.wkt = wkt_of(crs);
   return options;
 }
@@ -197,7 +193,7 @@ void RunResults::add_scan(const RecordedScan& scan, const ScanVerdict& verdict) 
 bool RunResults::add_chunk(std::size_t scans, const ChunkSummary& summary) {
   if (!overview_.merge(summary.overview)) return false;
   points_ += summary.points;
-  for (std::size_t i = 0; i < labels_.of.size(); ++i) labels_.of[i] += summary.labels[i];
+  labels_ += summary.labels;
   finished_ += scans;
   return true;
 }

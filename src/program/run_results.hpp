@@ -17,6 +17,7 @@
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/verdict.hpp"
+#include "label_counts.hpp"
 #include "label_writer.hpp"
 #include "map_file.hpp"
 #include "output_listing.hpp"
@@ -71,16 +72,6 @@ std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange
 /// Opens a file for the map of these scans, or for its moving points. Throws IoError.
 std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recording& recording,
                                   const ScanRange& range, const RunOutputs& outputs);
-
-/// Counts of points by final label.
-struct LabelCounts {
-  std::array<std::uint64_t, 5> of{};
-
-  void add(Span<const PointLabel> labels) {
-    for (const PointLabel label : labels) ++of[static_cast<std::size_t>(label)];
-  }
-  std::uint64_t operator[](PointLabel label) const { return of[static_cast<std::size_t>(label)]; }
-};
 
 /// Takes verdicts as they come and streams them to files. Nothing but the scans whose final
 /// verdict is open is kept in memory.

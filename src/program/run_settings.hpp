@@ -1,5 +1,4 @@
-// What `dynains run` shall do, without the command line: a caller in another language fills it,
-// too.
+// Settings of a run. The command line and the Python module fill them.
 #pragma once
 
 #include <chrono>

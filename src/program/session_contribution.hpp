@@ -1,4 +1,4 @@
-// What a run adds to a map of many sessions.
+// Contribution of a run to a map of many sessions.
 #pragma once
 
 #include <cstddef>

@@ -29,11 +29,7 @@ const std::array<Setting<RecordingOptions>, 17> kRecordingSettings{{
     {"times", "a path", "file with the time of each scan, s",
      [](RecordingOptions& o, const py::handle& v) { o.times = to_path(v); }},
     {"frame", "'auto', 'sensor' or 'world'", "frame of the points",
-     [](RecordingOptions& o, const py::handle& v) {
-       o.frame = choose<PointFrame>(v, {{"auto", PointFrame::kAuto},
-                                        {"sensor", PointFrame::kSensor},
-                                        {"world", PointFrame::kWorld}});
-     }},
+     [](RecordingOptions& o, const py::handle& v) { o.frame = to_enum<PointFrame>(v); }},
     {"invert_poses", "bool", "poses are from the world to the sensor, not from it",
      [](RecordingOptions& o, const py::handle& v) { o.convention.invert = to_flag(v); }},
     {"pose_units", "'m', 'cm' or 'mm'", "unit of the translations",
@@ -42,16 +38,10 @@ const std::array<Setting<RecordingOptions>, 17> kRecordingSettings{{
      }},
     {"quaternion_order", "'auto', 'xyzw' or 'wxyz'", "order of quaternions in the file of poses",
      [](RecordingOptions& o, const py::handle& v) {
-       o.convention.quaternion = choose<QuaternionOrder>(v, {{"auto", QuaternionOrder::kNone},
-                                                             {"xyzw", QuaternionOrder::kXyzw},
-                                                             {"wxyz", QuaternionOrder::kWxyz}});
+       o.convention.quaternion = to_enum<QuaternionOrder>(v);
      }},
     {"pose_frame", "'auto', 'lidar' or 'camera'", "whose poses they are",
-     [](RecordingOptions& o, const py::handle& v) {
-       o.convention.frame = choose<PoseFrame>(v, {{"auto", PoseFrame::kAuto},
-                                                  {"lidar", PoseFrame::kLidar},
-                                                  {"camera", PoseFrame::kCamera}});
-     }},
+     [](RecordingOptions& o, const py::handle& v) { o.convention.frame = to_enum<PoseFrame>(v); }},
     {"left_handed_poses", "bool", "poses have y to the right, as in some simulators",
      [](RecordingOptions& o, const py::handle& v) { o.convention.left_handed = to_flag(v); }},
     {"pose_shift", "int in [-1000000, 1000000]", "scan i has the pose of scan i + pose_shift",

@@ -1,5 +1,5 @@
-// What the files of a recording mean, as keyword arguments. The names are those of the flags of the
-// program, with underscores.
+// Options of a recording as keyword arguments. The names are those of the flags of the program,
+// with underscores.
 #pragma once
 
 #include <pybind11/pybind11.h>

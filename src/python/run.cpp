@@ -208,7 +208,7 @@ program::RunListener listen(const RunArguments& run) {
   throw py::error_already_set();
 }
 
-// What a run has written.
+// Results of a run, and the content of report.json.
 struct RunResult {
   RunOutcome outcome;
   py::dict report;
@@ -280,7 +280,7 @@ void bind_run(py::module_& module) {
   const auto count = [](const char* name) {
     return [name](const RunResult& result) { return py::object(result.report[name]); };
   };
-  py::class_<RunResult>(module, "RunResult", "What a run has written.")
+  py::class_<RunResult>(module, "RunResult", "Results of a run.")
       .def_property_readonly(
           "folder", [](const RunResult& result) { return result.outcome.outputs.folder; },
           "Folder of the results.")

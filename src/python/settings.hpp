@@ -61,6 +61,14 @@ Value choose(const py::handle& word, std::initializer_list<std::pair<const char*
   throw py::cast_error();
 }
 
+/// The value of this name.
+template <class Enum>
+Enum to_enum(const py::handle& name) {
+  const auto value = value_of_name<Enum>(name.cast<std::string>());
+  if (!value) throw py::cast_error();
+  return *value;
+}
+
 inline bool to_flag(const py::handle& value) {
   if (py::isinstance<py::str>(value))
     return choose<bool>(value, {{"true", true}, {"false", false}});

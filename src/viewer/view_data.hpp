@@ -34,8 +34,8 @@ struct ViewPoint {
   ViewTruth truth = ViewTruth::kUnknown;
 };
 
-/// What beams of the reference scans of a point met at its place; bit k stands for reference k of
-/// its ReferenceWindow.
+/// Results of the reference scans of a point at its place. Bit k stands for reference k of its
+/// ReferenceWindow.
 struct Sightings {
   std::uint64_t passed = 0;    ///< beams passed through the place
   std::uint64_t returned = 0;  ///< a beam was returned there

@@ -14,7 +14,7 @@
 
 namespace dynains {
 
-/// What session.json tells of a session.
+/// A session of the map: the content of its session.json.
 struct SessionInfo {
   std::string name;         ///< of its folder: letters, digits, '.', '_', '-'; first no '.'
   double begin = 0.0;       ///< s; sessions are ordered by begin, then by name

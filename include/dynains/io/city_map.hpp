@@ -20,7 +20,7 @@ struct CityPoint {
   SessionPoint point;
 };
 
-/// What changed in a tile between the maps after two sessions.
+/// Changes of a tile from the map after one session to the map after a later one.
 struct CityChanges {
   std::vector<CityPoint> removed;  ///< points that beams of a later session passed through
   std::vector<CityPoint> added;    ///< new points whose place beams of earlier sessions passed

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 
 #include "dynains/io/trajectory.hpp"
 
@@ -13,6 +14,9 @@ enum class PoseFrame {
   kLidar,  ///< frame of the points
   kCamera  ///< z forward, x right, y down; converted by `Tr` of calib.txt, else by camera_axes()
 };
+
+/// Names as in options.
+constexpr std::array<const char*, 3> value_names(PoseFrame) { return {"auto", "lidar", "camera"}; }
 
 /// Conversion of the rows of a pose file to poses of the sensor in the world frame, m. By default,
 /// rows are used without conversion.

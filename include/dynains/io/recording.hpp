@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -23,6 +24,9 @@ enum class PointFrame {
   kSensor,  ///< frame of the sensor
   kWorld    ///< frame of the poses
 };
+
+/// Names as in options.
+constexpr std::array<const char*, 3> value_names(PointFrame) { return {"auto", "sensor", "world"}; }
 
 struct RecordingOptions {
   std::filesystem::path poses;  ///< trajectory file; empty: search the recording

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cstddef>
 #include <filesystem>
 #include <optional>
@@ -10,6 +11,11 @@
 namespace dynains {
 
 enum class QuaternionOrder { kNone, kXyzw, kWxyz };
+
+/// Names as in options.
+constexpr std::array<const char*, 3> value_names(QuaternionOrder) {
+  return {"auto", "xyzw", "wxyz"};
+}
 
 /// Rows of a trajectory file. Frame, direction and unit of translation are those of the file.
 struct Trajectory {

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <string>
 
-namespace dynains::program {
+namespace dynains {
 
 /// FNV-1a, 64 bits.
 class Fingerprint {
@@ -30,4 +30,4 @@ class Fingerprint {
   std::uint64_t value_ = 0xCBF29CE484222325U;
 };
 
-}  // namespace dynains::program
+}  // namespace dynains
