@@ -280,24 +280,36 @@ TEST_CASE("a scan of another place is lost, and a scan without points has no res
   CHECK((T.matrix() - scans.back().T_world_sensor.matrix()).norm() == 0.0);
 }
 
+void set(double (&p)[3], double x, double y, double z) {
+  p[0] = x;
+  p[1] = y;
+  p[2] = z;
+}
+
 TEST_CASE("a full map of planes forgets the oldest voxels") {
   VoxelPlanes planes;
   planes.reserve();
   for (int scan = 0; scan < 400; ++scan) {
     planes.begin_scan();
+    VoxelPlanes::Block block;
     for (int y = 0; y < 100; ++y) {
       for (int k = 0; k < 8; ++k) {
-        const double p[3] = {scan + 0.1 + 0.1 * k, y + 0.1 + 0.1 * (k * 3 % 8), 0.2};
-        planes.add(p);
+        set(block.next(), scan + 0.1 + 0.1 * k, y + 0.1 + 0.1 * (k * 3 % 8), 0.2);
+        if (block.is_full()) planes.add(block);
       }
     }
+    planes.add(block);
     REQUIRE(planes.size() <= VoxelPlanes::kMostVoxels);
   }
-  const double newest[3] = {399.5, 50.5, 0.7};
-  const double oldest[3] = {0.5, 50.5, 0.7};
-  REQUIRE(planes.find(newest) != nullptr);
-  CHECK(planes.find(newest)->distance(newest) == Approx(0.5));
-  CHECK(planes.find(oldest) == nullptr);
+  VoxelPlanes::Block asked;
+  set(asked.next(), 0.5, 50.5, 0.7);    // oldest
+  set(asked.next(), 399.5, 50.5, 0.7);  // newest
+  std::vector<std::size_t> found;
+  planes.find(asked, [&](std::size_t i, const VoxelPlanes::Plane& plane) {
+    found.push_back(i);
+    CHECK(plane.distance(asked.points[i]) == Approx(0.5));
+  });
+  CHECK(found == std::vector<std::size_t>{1});
 }
 
 }  // namespace

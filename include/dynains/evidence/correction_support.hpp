@@ -31,15 +31,9 @@ class CorrectionSupport {
     sectors_[sector_of(x, y)].add(derivatives, distance, weight);
   }
 
-  /// Equations of all distances.
-  NormalEquations sum() const {
-    NormalEquations all;
-    for (const NormalEquations& sector : sectors_) all += sector;
-    return all;
-  }
-
   /// Removes from `correction` what its uncertainty may explain, by direction: all of it within
-  /// kDeviations standard deviations. `equations`: sum(), with attractions.
+  /// kDeviations standard deviations. `equations`: those of all added
+  /// distances, with attractions.
   Vector supported(const Vector& correction, const NormalEquations& equations) const {
     constexpr double kDeviations = 3.0;
     Matrix covariance = covariance_of(equations);

@@ -70,15 +70,16 @@ class PlaneAligner {
     NormalEquations equations;
     for (const double scale : kCoarseScales) {
       find_planes(points, kCoarseStep, planes, T);
-      sum_equations(points, scale, result.found, equations);
+      equations = sum_equations(scale, result.found);
       if (advance(equations, T, result.found) <= kSmall) break;
     }
     for (int iteration = 0; iteration < kMostIterations; ++iteration) {
       find_planes(points, 1, planes, T);
-      sum_equations(points, kScale, result.found, equations);
+      equations = sum_equations(kScale, result.found);
       if (advance(equations, T, result.found) <= kConverged) break;
     }
     count_inliers(result);
+    collect_sectors(points, kScale);
     result.supported = support_.supported(result.found, equations);
     result.change = equations.change(result.supported);
     result.T_map_sensor = moved(T_guess, result.supported);
@@ -99,45 +100,66 @@ class PlaneAligner {
   // Matches every `step`-th point.
   void find_planes(PointsView points, std::size_t step, VoxelPlanes& planes,
                    const Eigen::Isometry3d& T) {
+    using Block = VoxelPlanes::Block;
     matches_.clear();
-    for (std::size_t i = 0; i < points.size(); i += step) {
-      Match match;
-      double p[3];
-      for (int k = 0; k < 3; ++k) {
-        match.arm[k] = T(k, 0) * static_cast<double>(points.x[i]) +
-                       T(k, 1) * static_cast<double>(points.y[i]) +
-                       T(k, 2) * static_cast<double>(points.z[i]);
-        p[k] = match.arm[k] + T(k, 3);
+    for (std::size_t begin = 0; begin < points.size(); begin += Block::kMost * step) {
+      const std::size_t end = std::min(points.size(), begin + Block::kMost * step);
+      Block block;
+      for (std::size_t i = begin; i < end; i += step) {
+        double(&p)[3] = block.next();
+        for (int k = 0; k < 3; ++k) {
+          p[k] = T(k, 0) * static_cast<double>(points.x[i]) +
+                 T(k, 1) * static_cast<double>(points.y[i]) +
+                 T(k, 2) * static_cast<double>(points.z[i]) + T(k, 3);
+        }
       }
-      match.plane = planes.find(p);
-      if (match.plane == nullptr) continue;
-      match.distance = match.plane->distance(p);
-      match.point = static_cast<std::uint32_t>(i);
-      matches_.push_back(match);
+      planes.find(block, [&](std::size_t i, VoxelPlanes::Plane& plane) {
+        const double(&p)[3] = block.points[i];
+        matches_.push_back({&plane,
+                            {p[0] - T(0, 3), p[1] - T(1, 3), p[2] - T(2, 3)},
+                            plane.distance(p),
+                            static_cast<std::uint32_t>(begin + i * step)});
+      });
     }
     for (const Match& match : matches_) match.plane->matches = 0;
     for (const Match& match : matches_) ++match.plane->matches;
   }
 
-  // Equations of the matches for the next step after `found`, also by sector in `support_`. `scale`
-  // (m): larger distances have little weight (Geman-McClure). The points of one plane share its
-  // error, so that all of them weigh at most as much as kMost points.
-  void sum_equations(PointsView points, double scale, const NormalEquations::Vector& found,
-                     NormalEquations& equations) {
+  // Calls `add(match, derivatives, weight)` for each match. `scale` (m): larger distances have
+  // little weight (Geman-McClure). The points of one plane share its error, so that all of them
+  // weigh at most as much as kMost points.
+  template <class Add>
+  void weigh_matches(double scale, Add&& add) const {
     constexpr double kMost = 20.0;
-    support_.clear();
     for (const Match& match : matches_) {
       const double(&n)[3] = match.plane->normal;
       const double(&arm)[3] = match.arm;
       const double loss = scale * scale / (scale * scale + match.distance * match.distance);
       const double share = kMost / (kMost + static_cast<double>(match.plane->matches));
-      support_.add(points.x[match.point], points.y[match.point],
-                   {n[0], n[1], n[2], arm[1] * n[2] - arm[2] * n[1], arm[2] * n[0] - arm[0] * n[2],
-                    arm[0] * n[1] - arm[1] * n[0]},
-                   match.distance, loss * loss * share);
+      add(match,
+          NormalEquations::Vector{n[0], n[1], n[2], arm[1] * n[2] - arm[2] * n[1],
+                                  arm[2] * n[0] - arm[0] * n[2], arm[0] * n[1] - arm[1] * n[0]},
+          loss * loss * share);
     }
-    equations = support_.sum();
+  }
+
+  // Equations of the matches for the next step after `found`.
+  NormalEquations sum_equations(double scale, const NormalEquations::Vector& found) const {
+    NormalEquations equations;
+    weigh_matches(scale, [&](const Match& match, const auto& derivatives, double weight) {
+      equations.add(derivatives, match.distance, weight);
+    });
     for (std::size_t i = 0; i < 6; ++i) equations.attract(i, -found[i], kAttraction[i]);
+    return equations;
+  }
+
+  // The terms of the last sum, by sector.
+  void collect_sectors(PointsView points, double scale) {
+    support_.clear();
+    weigh_matches(scale, [&](const Match& match, const auto& derivatives, double weight) {
+      support_.add(points.x[match.point], points.y[match.point], derivatives, match.distance,
+                   weight);
+    });
   }
 
   // Makes the next step. Returns the root mean square of the change of the distances, m.

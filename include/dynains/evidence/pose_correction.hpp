@@ -84,12 +84,14 @@ class PoseCorrection {
     const std::size_t wanted = inserted_ < kFirstScans ? kFirstInserted : kInserted;
     ++inserted_;
     planes_.begin_scan();
+    VoxelPlanes::Block block;
     visit_some(split, wanted, [&](std::size_t i, double x, double y, double z) {
       if (!moving.empty() && i >= split.ground_count && moving[i - split.ground_count] != 0) return;
-      double p[3];
+      double(&p)[3] = block.next();
       for (int k = 0; k < 3; ++k) p[k] = T(k, 0) * x + T(k, 1) * y + T(k, 2) * z + T(k, 3);
-      planes_.add(p);
+      if (block.is_full()) planes_.add(block);
     });
+    planes_.add(block);
   }
 
   /// Result of the last correct(), in the frame of its pose; empty without enough common planes.

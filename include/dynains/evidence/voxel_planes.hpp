@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -21,6 +20,7 @@ class VoxelPlanes {
   struct Plane {
     double normal[3];  ///< unit vector
     double mean[3];    ///< m
+    bool is_fitted = false;
     bool is_flat = false;
     std::uint32_t matches = 0;  ///< number of matched points, for alignments
 
@@ -30,57 +30,74 @@ class VoxelPlanes {
     }
   };
 
+  /// Some points, m. A block is looked up at once, so that its memory accesses overlap.
+  struct Block {
+    static constexpr std::size_t kMost = 32;
+    double points[kMost][3];
+    std::size_t count = 0;
+
+    bool is_full() const { return count == kMost; }
+    /// Coordinates of one more point. The block must not be full.
+    double (&next())[3] { return points[count++]; }
+  };
+
   /// Maximum number of voxels.
   static constexpr std::size_t kMostVoxels = 24576;
   static constexpr double kEdge = 1.0;  ///< edge of the voxels, m
 
   void clear() {
     table_.clear();
-    voxels_.clear();
+    keys_.clear();
+    moments_.clear();
+    planes_.clear();
     scans_ = 0;
   }
 
   /// Allocates the memory of a full map.
   void reserve() {
     table_.reserve(kMostVoxels);
-    voxels_.reserve(kMostVoxels);
     keys_.reserve(kMostVoxels);
+    moments_.reserve(kMostVoxels);
+    planes_.reserve(kMostVoxels);
   }
 
   /// Begins the insertion of the points of the next scan.
   void begin_scan() {
     ++scans_;
-    if (voxels_.size() > kMostVoxels / 4 * 3) forget_oldest();
+    if (size() > kMostVoxels / 4 * 3) forget_oldest();
   }
 
-  /// Adds a point of the current scan.
-  void add(const double (&p)[3]) {
-    std::int64_t index[3];
-    const VoxelKey key = key_of(p, index);
-    if (voxels_.size() == kMostVoxels && table_.find(key) == VoxelHashTable<>::kNone) return;
-    const std::uint32_t number = table_.insert(key);
-    if (number == voxels_.size()) {
-      voxels_.emplace_back();
-      keys_.push_back(key);
+  /// Adds points of the current scan, and empties the block.
+  void add(Block& block) {
+    VoxelKey keys[Block::kMost];
+    std::uint32_t numbers[Block::kMost];
+    find_keys(block, keys);
+    for (std::size_t i = 0; i < block.count; ++i) numbers[i] = number_for(keys[i]);
+    for (std::size_t i = 0; i < block.count; ++i) {
+      if (numbers[i] != kNone) add(block.points[i], keys[i], numbers[i]);
     }
-    Voxel& voxel = voxels_[number];
-    voxel.moments.add(p[0] - centre(index[0]), p[1] - centre(index[1]), p[2] - centre(index[2]),
-                      1.0);
-    voxel.last_scan = scans_;
-    voxel.is_fitted = false;
+    block.count = 0;
   }
 
-  /// Plane of the voxel of a point; null if there is none.
-  Plane* find(const double (&p)[3]) {
-    std::int64_t index[3];
-    const std::uint32_t number = table_.find(key_of(p, index));
-    if (number == VoxelHashTable<>::kNone) return nullptr;
-    Voxel& voxel = voxels_[number];
-    if (!voxel.is_fitted) fit(index, voxel);
-    return voxel.plane.is_flat ? &voxel.plane : nullptr;
+  /// Calls `visit(i, plane)` for each point of a block in a voxel with a plane.
+  template <class Visit>
+  void find(const Block& block, Visit&& visit) {
+    VoxelKey keys[Block::kMost];
+    std::uint32_t numbers[Block::kMost];
+    find_keys(block, keys);
+    for (std::size_t i = 0; i < block.count; ++i) {
+      numbers[i] = table_.find(keys[i]);
+      if (numbers[i] != kNone) __builtin_prefetch(&planes_[numbers[i]]);
+    }
+    for (std::size_t i = 0; i < block.count; ++i) {
+      if (numbers[i] == kNone) continue;
+      Plane& plane = planes_[numbers[i]];
+      if (!plane.is_fitted) plane = fit(keys[i], moments_[numbers[i]]);
+      if (plane.is_flat) visit(i, plane);
+    }
   }
 
-  std::size_t size() const { return voxels_.size(); }
+  std::size_t size() const { return keys_.size(); }
 
  private:
   static constexpr double kFewestPoints = 6.0;
@@ -88,32 +105,65 @@ class VoxelPlanes {
   static constexpr double kMostFlatness = 0.04;   // smallest eigenvalue to the sum
   static constexpr double kLeastBreadth = 0.04;   // product of the other two to their squared sum
 
-  struct Voxel {
-    detail::PlaneMoments moments;  // relative to the centre of the voxel
-    Plane plane;
+  static constexpr std::uint32_t kNone = VoxelHashTable<>::kNone;
+
+  // The points of a voxel, relative to its centre.
+  struct Moments {
+    detail::PlaneMoments sums;
     std::uint32_t last_scan = 0;
-    bool is_fitted = false;
   };
 
-  static double centre(std::int64_t index) { return (static_cast<double>(index) + 0.5) * kEdge; }
-  static VoxelKey key_of(const double (&p)[3], std::int64_t (&index)[3]) {
-    for (std::size_t i = 0; i < 3; ++i)
-      index[i] = static_cast<std::int64_t>(std::floor(p[i] / kEdge));
-    return voxel_key(index[0], index[1], index[2]);
+  static double centre(VoxelKey key, int axis) {
+    return (static_cast<double>(voxel_index(key, axis)) + 0.5) * kEdge;
   }
 
-  static void fit(const std::int64_t (&index)[3], Voxel& voxel) {
-    voxel.is_fitted = true;
-    voxel.plane.is_flat = false;
-    if (voxel.moments.count < kFewestPoints) return;
-    const detail::Plane fitted = detail::fit_plane(voxel.moments);
+  // Computes the keys of the voxels of a block, and prefetches their entries in the table.
+  void find_keys(const Block& block, VoxelKey* keys) const {
+    for (std::size_t i = 0; i < block.count; ++i) {
+      std::int64_t index[3];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double scaled = block.points[i][axis] / kEdge;
+        const auto truncated = static_cast<std::int64_t>(scaled);
+        index[axis] = truncated - (static_cast<double>(truncated) > scaled ? 1 : 0);
+      }
+      keys[i] = voxel_key(index[0], index[1], index[2]);
+      __builtin_prefetch(&table_.first_slot(voxel_hash(keys[i])));
+    }
+  }
+
+  // Number of a voxel, which may be new; kNone if the map is full. Prefetches its moments.
+  std::uint32_t number_for(VoxelKey key) {
+    if (size() == kMostVoxels && table_.find(key) == kNone) return kNone;
+    const std::uint32_t number = table_.insert(key);
+    if (number == size()) {
+      keys_.push_back(key);
+      moments_.emplace_back();
+      planes_.emplace_back();
+    }
+    __builtin_prefetch(&moments_[number]);
+    return number;
+  }
+
+  void add(const double (&p)[3], VoxelKey key, std::uint32_t number) {
+    Moments& moments = moments_[number];
+    moments.sums.add(p[0] - centre(key, 0), p[1] - centre(key, 1), p[2] - centre(key, 2), 1.0);
+    moments.last_scan = scans_;
+    planes_[number].is_fitted = false;
+  }
+
+  static Plane fit(VoxelKey key, const Moments& moments) {
+    Plane plane = {};
+    plane.is_fitted = true;
+    if (moments.sums.count < kFewestPoints) return plane;
+    const detail::Plane fitted = detail::fit_plane(moments.sums);
     const double thickness_squared = fitted.flatness * fitted.spread;
-    voxel.plane = {{fitted.normal_x, fitted.normal_y, fitted.normal_z},
-                   {centre(index[0]) + fitted.mean_x, centre(index[1]) + fitted.mean_y,
-                    centre(index[2]) + fitted.mean_z},
-                   fitted.flatness <= kMostFlatness && fitted.breadth >= kLeastBreadth &&
-                       thickness_squared <= kMostThickness * kMostThickness,
-                   0};
+    return {{fitted.normal_x, fitted.normal_y, fitted.normal_z},
+            {centre(key, 0) + fitted.mean_x, centre(key, 1) + fitted.mean_y,
+             centre(key, 2) + fitted.mean_z},
+            true,
+            fitted.flatness <= kMostFlatness && fitted.breadth >= kLeastBreadth &&
+                thickness_squared <= kMostThickness * kMostThickness,
+            0};
   }
 
   // Keeps the voxels that have received a point in the last scans, at most half of the maximum.
@@ -121,28 +171,31 @@ class VoxelPlanes {
     std::uint32_t age = kLongest;
     while (count_since(age) > kMostVoxels / 2) age /= 2;
     std::size_t kept = 0;
-    for (std::size_t i = 0; i < voxels_.size(); ++i) {
-      if (scans_ - voxels_[i].last_scan > age) continue;
-      voxels_[kept] = voxels_[i];
+    for (std::size_t i = 0; i < size(); ++i) {
+      if (scans_ - moments_[i].last_scan > age) continue;
       keys_[kept] = keys_[i];
+      moments_[kept] = moments_[i];
+      planes_[kept] = planes_[i];
       ++kept;
     }
-    voxels_.resize(kept);
     keys_.resize(kept);
+    moments_.resize(kept);
+    planes_.resize(kept);
     table_.clear();
     for (const VoxelKey key : keys_) table_.insert(key);
   }
   std::size_t count_since(std::uint32_t age) const {
     return static_cast<std::size_t>(
-        std::count_if(voxels_.begin(), voxels_.end(),
-                      [&](const Voxel& voxel) { return scans_ - voxel.last_scan <= age; }));
+        std::count_if(moments_.begin(), moments_.end(),
+                      [&](const Moments& moments) { return scans_ - moments.last_scan <= age; }));
   }
 
   static constexpr std::uint32_t kLongest = 64;  // scans
 
   VoxelHashTable<> table_{4096};  // numbers of the voxels
-  std::vector<Voxel> voxels_;
-  std::vector<VoxelKey> keys_;  // by voxel
+  std::vector<VoxelKey> keys_;    // by voxel
+  std::vector<Moments> moments_;  // by voxel
+  std::vector<Plane> planes_;     // by voxel
   std::uint32_t scans_ = 0;
 };
 
