@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "dynains/evidence/dynamic_occupancy_grid.hpp"
+#include "dynains/evidence/ground_samples.hpp"
 #include "dynains/evidence/instance_beliefs.hpp"
 #include "dynains/evidence/instance_judge.hpp"
 #include "dynains/evidence/instance_samples.hpp"
@@ -42,6 +43,7 @@ class FreeSpaceEvidence {
       : config_((config.validate(), config)),
         sampler_(config.supervoxel, config.evidence_range,
                  static_cast<std::uint32_t>(config.supervoxel_samples)),
+        ground_sampler_(config),
         references_(config),
         pose_correction_(config.pose_tolerance),
         updater_(config),
@@ -107,6 +109,7 @@ class FreeSpaceEvidence {
     record.epoch = epoch_;
     record.phase = references_.advance(scan - epoch_begin_);
     moved_ground_.bound(split.ground(), record.ground_boxes);
+    ground_sampler_.sample(split.ground(), record.ground);
     begin_evidence(split.non_ground(), instance_of, instance_count, record);
     link_to_previous(scan, record);
     test_against_earlier_references(scan, record);
@@ -130,7 +133,8 @@ class FreeSpaceEvidence {
     groups_.resize(samples.met.size());
     for (std::size_t i = 1; i < samples.met.size(); ++i) groups_[i] = verdicts_[samples.met[i]];
     moved_ground_.add(split.non_ground(), samples.met_of, groups_);
-    return {groups_, samples.met_of, find_moved_ground(scan, record, split.ground())};
+    return {groups_, samples.met_of,
+            moved_ground_.find(split.ground(), record.ground_boxes, record.ground)};
   }
 
   /// Visibility of the first `count` points (m; padded for packs) from the newest reference, which
@@ -157,6 +161,7 @@ class FreeSpaceEvidence {
     InstanceEvidence evidence;
     std::vector<DynamicOccupancyGrid::Count> counted;  // by supervoxel
     std::vector<GroundBox> ground_boxes;               // by block of 64 ground points
+    GroundSamples ground;
   };
 
   void forget_scans() {
@@ -218,6 +223,8 @@ class FreeSpaceEvidence {
 
   // Tests all samples of a scan against one reference. `lag`: scans from the scan to the reference.
   void test(Record& record, const ReferenceScan& reference, int lag) {
+    record.ground.add(references_.test(record.ground.samples.points, record.ground.size(),
+                                       record.T_world_sensor, reference));
     InstanceEvidence& evidence = record.evidence;
     const detail::Visibility& visibility = references_.test(
         evidence.samples.points, evidence.samples.size(), record.T_world_sensor, reference);
@@ -353,24 +360,9 @@ class FreeSpaceEvidence {
     for (std::size_t i = 0; i < marks.size(); ++i) marks[i] = is_marked_group_[samples.met_of[i]];
   }
 
-  Span<const EvidenceVerdict::GroundPoint> find_moved_ground(std::uint64_t scan,
-                                                             const Record& record,
-                                                             PointsView ground) {
-    return moved_ground_.find(
-        ground, record.ground_boxes,
-        [&](const PointBuffer& points, std::size_t count, auto&& visit) {
-          const auto test_against = [&](int lag) {
-            const ReferenceScan* const reference = reference_of(record, scan, lag);
-            if (reference == nullptr) return;
-            visit(references_.test(points, count, record.T_world_sensor, *reference));
-          };
-          for (const int lag : lags_before_[record.phase.since_image]) test_against(-lag);
-          for (const int lag : lags_after_[record.phase.since_image]) test_against(lag);
-        });
-  }
-
   Config config_;
   InstanceSampler sampler_;
+  GroundSampler ground_sampler_;
   ReferenceScans references_;
   PoseCorrection pose_correction_;
   InstanceBeliefUpdater updater_;

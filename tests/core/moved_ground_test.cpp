@@ -8,6 +8,7 @@
 #include <set>
 #include <vector>
 
+#include "dynains/evidence/ground_samples.hpp"
 #include "dynains/evidence/surrounding_ground.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
@@ -186,6 +187,12 @@ struct RemovedBox {
   std::vector<EvidenceVerdict::Group> groups = {{}, {Cause::kWithInstance, 0.9F}};
 };
 
+GroundSamples samples_of(const FreeSpaceConfig& config, const PointBuffer& ground) {
+  GroundSamples samples;
+  GroundSampler(config).sample(ground, samples);
+  return samples;
+}
+
 // Indices of the ground points that are removed with the box. There are no references.
 std::set<std::uint32_t> ground_that_goes(const FreeSpaceConfig& config, const PointBuffer& ground) {
   MovedGround moved(config);
@@ -195,7 +202,7 @@ std::set<std::uint32_t> ground_that_goes(const FreeSpaceConfig& config, const Po
   moved.bound(ground, boxes);
   std::set<std::uint32_t> found;
   for (const EvidenceVerdict::GroundPoint& point :
-       moved.find(ground, boxes, [](const PointBuffer&, std::size_t, auto&&) {})) {
+       moved.find(ground, boxes, samples_of(config, ground))) {
     CHECK(point.verdict.cause == Cause::kUnderInstance);
     CHECK(found.insert(point.point).second);
   }
@@ -243,7 +250,7 @@ TEST_CASE("an object on the ground may begin higher above it where beams are far
     moved.add(box.points, box.group_of, box.groups);
     std::vector<GroundBox> boxes;
     moved.bound(ground, boxes);
-    const auto found = moved.find(ground, boxes, [](const PointBuffer&, std::size_t, auto&&) {});
+    const auto found = moved.find(ground, boxes, samples_of(config, ground));
     CAPTURE(gap);
     CHECK(found.empty() == (gap < 2.5));
   }
@@ -260,15 +267,16 @@ std::set<std::uint32_t> ground_seen_free(const PointBuffer& ground,
   moved.add(box.points, box.group_of, box.groups);
   std::vector<GroundBox> boxes;
   moved.bound(ground, boxes);
-  const auto ask = [&](const PointBuffer& points, std::size_t count, auto&& visit) {
-    for (const Reference& reference : references) {
-      std::vector<BeamResult> seen;
-      for (std::size_t i = 0; i < count; ++i) seen.push_back(reference(points.x[i]));
-      visit(visibility_of(seen));
+  GroundSamples samples = samples_of(FreeSpaceConfig(), ground);
+  for (const Reference& reference : references) {
+    std::vector<BeamResult> seen;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      seen.push_back(reference(samples.samples.points.x[i]));
     }
-  };
+    samples.add(visibility_of(seen));
+  }
   std::set<std::uint32_t> found;
-  for (const EvidenceVerdict::GroundPoint& point : moved.find(ground, boxes, ask)) {
+  for (const EvidenceVerdict::GroundPoint& point : moved.find(ground, boxes, samples)) {
     CHECK(point.verdict.cause == Cause::kFreeSpace);
     CHECK(found.insert(point.point).second);
   }

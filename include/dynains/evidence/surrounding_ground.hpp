@@ -30,28 +30,32 @@ class SurroundingGround {
     forget();
   }
 
-  /// Replaces the ground points (m). The planes exclude points that lie `rise` (m) or more above
-  /// the plane of all points, since these may belong to an object, and points of cells without a
-  /// plane.
+  /// Replaces the ground points (m), which must stay valid for height(). The planes exclude points
+  /// that lie `rise` (m) or more above the plane of all points, since these may belong to an
+  /// object, and points of cells without a plane.
   void assign(PointsView points, float rise) {
     forget();
-    for (std::size_t i = 0; i < points.size(); ++i) add(points, i, 1.0);
-    detail::ensure_capacity(rising_, points.size());
-    rising_.clear();
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const float over = height(points.x[i], points.y[i], points.z[i]);
-      if (over >= rise) rising_.push_back(static_cast<std::uint32_t>(i));
+    points_ = points;
+    rise_ = rise;
+    detail::grow(next_, points.size());
+    for (std::size_t i = points.size(); i-- > 0;) {
+      Cell& cell = cell_at(index_of(points.x[i], points.y[i]));
+      next_[i] = cell.first;
+      cell.first = static_cast<std::uint32_t>(i);
     }
-    for (const std::uint32_t i : rising_) add(points, i, -1.0);
-    for (Cell& cell : cells_) cell.has_plane = false;
   }
 
-  /// Height (m) of a point (m) above the plane of its cell, along z, or kUnknown.
+  /// Height (m) of a point (m) above the plane of its cell, along z, or kUnknown. Only the cells
+  /// around the asked points are computed.
   float height(float x, float y, float z) {
     const std::size_t index = index_of(x, y);
     Cell& cell = cell_at(index);
-    if (!cell.has_plane) find_plane(index, cell);
-    return z - (cell.slope_x * x + cell.slope_y * y + cell.offset);
+    if (!cell.has_plane) {
+      cell.has_plane = true;
+      cell.plane = plane_around(
+          index, [this](std::size_t place) { find_kept(place); }, &Cell::kept);
+    }
+    return cell.plane.height(x, y, z);
   }
 
  private:
@@ -60,11 +64,21 @@ class SurroundingGround {
   static constexpr double kLeastPoints = 8.0;
   static constexpr double kLeastVariance = 0.4;  // m^2, along any horizontal direction
 
-  struct Cell {
-    detail::PlaneMoments moments;
-    // Plane z = slope_x * x + slope_y * y + offset.
+  static constexpr std::uint32_t kNoPoint = 0xFFFFFFFFU;
+
+  // Plane z = slope_x * x + slope_y * y + offset.
+  struct Plane {
     float slope_x = 0.0F, slope_y = 0.0F, offset = -kUnknown;
-    bool has_plane = false;
+
+    float height(float x, float y, float z) const {
+      return z - (slope_x * x + slope_y * y + offset);
+    }
+  };
+  struct Cell {
+    std::uint32_t first = kNoPoint;  // its points are a list, see next_
+    detail::PlaneMoments all, kept;  // of all its points, and of those that do not rise
+    Plane plane;                     // through the kept points around
+    bool has_all = false, has_kept = false, has_plane = false;
   };
 
   // Cell 0 is the empty cell of all unused places.
@@ -96,24 +110,54 @@ class SurroundingGround {
     return cells_[number];
   }
 
-  void add(PointsView points, std::size_t i, double weight) {
-    const float x = points.x[i], y = points.y[i], z = points.z[i];
-    cell_at(index_of(x, y))
-        .moments.add(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z),
-                     weight);
+  template <class Visit>
+  void for_points(const Cell& cell, Visit&& visit) const {
+    for (std::uint32_t i = cell.first; i != kNoPoint; i = next_[i]) {
+      visit(points_.x[i], points_.y[i], points_.z[i]);
+    }
+  }
+  static void add(float x, float y, float z, double weight, detail::PlaneMoments& moments) {
+    moments.add(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z), weight);
   }
 
-  // Fits the plane of a cell by least squares of z.
-  void find_plane(std::size_t index, Cell& cell) const {
-    cell.has_plane = true;
-    cell.offset = -kUnknown;
+  void find_all(std::size_t index) {
+    Cell& cell = cells_[number_of_[index]];
+    if (cell.has_all) return;
+    cell.has_all = true;
+    for_points(cell, [&](float x, float y, float z) { add(x, y, z, 1.0, cell.all); });
+  }
+
+  void find_kept(std::size_t index) {
+    Cell& cell = cells_[number_of_[index]];
+    if (cell.has_kept) return;
+    cell.has_kept = true;
+    if (cell.first == kNoPoint) return;
+    const Plane plane = plane_around(
+        index, [this](std::size_t place) { find_all(place); }, &Cell::all);
+    cell.kept = cell.all;
+    for_points(cell, [&](float x, float y, float z) {
+      if (plane.height(x, y, z) >= rise_) add(x, y, z, -1.0, cell.kept);
+    });
+  }
+
+  // Plane through the points of a cell and of the cells around it. Their `moments` are valid after
+  // `find(place)`.
+  template <class Find>
+  Plane plane_around(std::size_t index, Find&& find, detail::PlaneMoments Cell::*moments) {
     detail::PlaneMoments sum;
     for (const std::size_t row : {index - width_, index, index + width_}) {
       for (const std::size_t place : {row - 1, row, row + 1}) {
-        sum += cells_[number_of_[place]].moments;
+        find(place);
+        sum += cells_[number_of_[place]].*moments;
       }
     }
-    if (sum.count < kLeastPoints) return;
+    return fit(sum);
+  }
+
+  // Least squares of z.
+  static Plane fit(const detail::PlaneMoments& sum) {
+    Plane plane;
+    if (sum.count < kLeastPoints) return plane;
     const double weight = 1.0 / sum.count;
     const double mean_x = sum.x * weight, mean_y = sum.y * weight, mean_z = sum.z * weight;
     const double xx = sum.xx * weight - mean_x * mean_x;
@@ -123,13 +167,14 @@ class SurroundingGround {
     const double yz = sum.yz * weight - mean_y * mean_z;
     const double half = 0.5 * (xx - yy);
     const double least_variance = 0.5 * (xx + yy) - std::sqrt(half * half + xy * xy);
-    if (!(least_variance >= kLeastVariance)) return;
+    if (!(least_variance >= kLeastVariance)) return plane;
     const double inverse = 1.0 / (xx * yy - xy * xy);
     const double slope_x = (xz * yy - yz * xy) * inverse;
     const double slope_y = (yz * xx - xz * xy) * inverse;
-    cell.slope_x = static_cast<float>(slope_x);
-    cell.slope_y = static_cast<float>(slope_y);
-    cell.offset = static_cast<float>(mean_z - slope_x * mean_x - slope_y * mean_y);
+    plane.slope_x = static_cast<float>(slope_x);
+    plane.slope_y = static_cast<float>(slope_y);
+    plane.offset = static_cast<float>(mean_z - slope_x * mean_x - slope_y * mean_y);
+    return plane;
   }
 
   float half_;                            // cells from the sensor to the border
@@ -137,7 +182,9 @@ class SurroundingGround {
   std::vector<std::uint32_t> number_of_;  // row-major: index in cells_
   std::vector<std::size_t> used_;         // indices of the non-zero entries of number_of_
   std::vector<Cell> cells_;
-  std::vector<std::uint32_t> rising_;  // excluded points
+  PointsView points_;
+  std::vector<std::uint32_t> next_;  // by point: next point of its cell, in ascending order
+  float rise_ = 0.0F;
 };
 
 }  // namespace dynains
