@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -35,7 +36,13 @@ ErrorAnalysis::ErrorAnalysis(const Settings& settings) : settings_(settings) {
 void ErrorAnalysis::add(const LabelledScan& scan) {
   const detail::RangeGate gate(settings_.min_range, settings_.max_range);
   std::vector<std::size_t> judged;
+  judged.reserve(scan.size());
   std::map<std::uint32_t, Sighting> sightings;
+  // Consecutive points mostly have one label.
+  std::optional<std::uint32_t> last_label;
+  Counts* of_class = nullptr;
+  Track* track = nullptr;
+  Sighting* sighting = nullptr;
   for (std::size_t i = 0; i < scan.size(); ++i) {
     const std::uint32_t label = scan.truth[i];
     const Truth truth = settings_.truth(label);
@@ -45,9 +52,15 @@ void ErrorAnalysis::add(const LabelledScan& scan) {
     const Eigen::Vector3d p = scan.point(i);
     const double range = p.head<2>().norm();
 
-    Counts& counts = classes_[semantic_class(label)];
-    ++counts.points;
-    counts.removed += removed;
+    if (last_label != label) {
+      last_label = label;
+      of_class = &classes_[semantic_class(label)];
+      const bool has_instance = semantic_instance(label) != 0;
+      track = has_instance ? &tracks_[label] : nullptr;
+      sighting = has_instance ? &sightings[label] : nullptr;
+    }
+    ++of_class->points;
+    of_class->removed += removed;
 
     PointScore& score = ring(range).score;
     if (truth == Truth::kStatic) {
@@ -58,27 +71,25 @@ void ErrorAnalysis::add(const LabelledScan& scan) {
       score.dynamic_removed += removed;
     }
 
-    if (semantic_instance(label) == 0) continue;
-    Track& track = tracks_[label];
-    ++track.counts.points;
-    track.counts.removed += removed;
-    track.range_sum += range;
-    Sighting& sighting = sightings[label];
-    sighting.sum += p;
-    ++sighting.count;
+    if (track == nullptr) continue;
+    ++track->counts.points;
+    track->counts.removed += removed;
+    track->range_sum += range;
+    sighting->sum += p;
+    ++sighting->count;
   }
 
-  for (const auto& [label, sighting] : sightings) {
-    Track& track = tracks_[label];
+  for (const auto& [label, seen] : sightings) {
+    Track& seen_track = tracks_[label];
     const Eigen::Vector3d centroid =
-        scan.T_world_sensor * Eigen::Vector3d(sighting.sum / static_cast<double>(sighting.count));
-    if (track.scans > 0 && scan.time > track.last_time) {
-      track.speeds.push_back((centroid - track.last_centroid).norm() /
-                             (scan.time - track.last_time));
+        scan.T_world_sensor * Eigen::Vector3d(seen.sum / static_cast<double>(seen.count));
+    if (seen_track.scans > 0 && scan.time > seen_track.last_time) {
+      seen_track.speeds.push_back((centroid - seen_track.last_centroid).norm() /
+                                  (scan.time - seen_track.last_time));
     }
-    track.last_centroid = centroid;
-    track.last_time = scan.time;
-    ++track.scans;
+    seen_track.last_centroid = centroid;
+    seen_track.last_time = scan.time;
+    ++seen_track.scans;
   }
 
   if (!scan.causes.empty()) count_causes(scan, judged);
@@ -121,22 +132,28 @@ void ErrorAnalysis::count_merged(const LabelledScan& scan, const std::vector<std
     std::size_t dynamic_points = 0;
   };
   std::unordered_map<std::uint32_t, Composition> clusters;
+  std::vector<Composition*> cluster_of;  // by judged point
+  cluster_of.reserve(judged.size());
+  // Consecutive points mostly have one cluster.
+  std::optional<std::uint32_t> last_id;
+  Composition* cluster = nullptr;
   for (const std::size_t i : judged) {
-    Composition& cluster = clusters[scan.instances[i]];
+    if (last_id != scan.instances[i]) {
+      last_id = scan.instances[i];
+      cluster = &clusters[*last_id];  // references stay valid when the map grows
+    }
     const bool dynamic = settings_.truth(scan.truth[i]) == Truth::kDynamic;
-    ++(dynamic ? cluster.dynamic_points : cluster.static_points);
+    ++(dynamic ? cluster->dynamic_points : cluster->static_points);
+    cluster_of.push_back(cluster);
   }
-  for (const std::size_t i : judged) {
+  for (std::size_t k = 0; k < judged.size(); ++k) {
+    const std::size_t i = judged[k];
     if (scan.instances[i] == kNoInstance) continue;
-    const Composition& cluster = clusters[scan.instances[i]];
+    const Composition& own = *cluster_of[k];
     const bool dynamic = settings_.truth(scan.truth[i]) == Truth::kDynamic;
     const bool kept = is_kept(scan, i);
-    if (dynamic && kept && cluster.static_points > cluster.dynamic_points) {
-      ++merged_.missed_dynamic;
-    }
-    if (!dynamic && !kept && cluster.dynamic_points > cluster.static_points) {
-      ++merged_.lost_static;
-    }
+    if (dynamic && kept && own.static_points > own.dynamic_points) ++merged_.missed_dynamic;
+    if (!dynamic && !kept && own.dynamic_points > own.static_points) ++merged_.lost_static;
   }
 }
 

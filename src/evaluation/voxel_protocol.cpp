@@ -40,9 +40,11 @@ class VoxelProtocol::Impl {
   void add(const LabelledScan& scan) {
     if (!grid_) grid_.emplace(settings_.voxel, scan.T_world_sensor.translation());
     voxelise(scan, [](VoxelKey) { return true; });
-    scan_voxels_.for_each(all_layers_,
-                          [this](VoxelKey key, LayerMask layers, const Eigen::Vector3d& centroid,
-                                 Truth truth) { accumulate(key, layers, centroid, truth); });
+    scan_voxels_.for_each(
+        all_layers_, [this](VoxelKey key) { prefetch(key); },
+        [this](VoxelKey key, LayerMask layers, const Eigen::Vector3d& centroid, Truth truth) {
+          accumulate(key, layers, centroid, truth);
+        });
     finished_first_pass_ = false;
   }
 
@@ -51,20 +53,21 @@ class VoxelProtocol::Impl {
     if (pending_.size() == 0) return;
     voxelise(scan,
              [this](VoxelKey key) { return pending_.find(key) != detail::VoxelIndex::kNone; });
-    scan_voxels_.for_each(all_layers_, [this](VoxelKey key, LayerMask layers,
-                                              const Eigen::Vector3d& centroid, Truth truth) {
-      const Voxel& voxel = voxels_[index_.find(key)];
-      double* nearest = &nearest_[pending_.find(key) * layers_];
-      for (std::size_t layer = 0; layer < layers_; ++layer) {
-        if ((layers >> layer & 1U) == 0) continue;
-        Cell& cell = forks_[voxel.fork + layer];
-        const double distance = (centroid - cell.centroid()).squaredNorm();
-        if (detail::is_nearer(distance, nearest[layer])) {
-          nearest[layer] = distance;
-          cell.truths = truth_bit(truth);
-        }
-      }
-    });
+    scan_voxels_.for_each(
+        all_layers_, [](VoxelKey) {},
+        [this](VoxelKey key, LayerMask layers, const Eigen::Vector3d& centroid, Truth truth) {
+          const Voxel& voxel = voxels_[index_.find(key)];
+          double* nearest = &nearest_[pending_.find(key) * layers_];
+          for (std::size_t layer = 0; layer < layers_; ++layer) {
+            if ((layers >> layer & 1U) == 0) continue;
+            Cell& cell = forks_[voxel.fork + layer];
+            const double distance = (centroid - cell.centroid()).squaredNorm();
+            if (detail::is_nearer(distance, nearest[layer])) {
+              nearest[layer] = distance;
+              cell.truths = truth_bit(truth);
+            }
+          }
+        });
   }
 
   VoxelScore score(std::size_t row) {
@@ -73,6 +76,10 @@ class VoxelProtocol::Impl {
     const auto point_at = [&](std::uint32_t number) { return point(voxels_[number], row); };
     for (const Voxel& voxel : voxels_) {
       const VoxelPoint raw = *point(voxel, kIdentity);
+      if (voxel.fork == kNotForked) {  // the estimate has the same point
+        detail::count(score, raw.truth, true);
+        continue;
+      }
       detail::count(score, raw.truth,
                     detail::is_preserved(raw, voxel.key, settings_.voxel, index_, point_at));
     }
@@ -145,6 +152,8 @@ class VoxelProtocol::Impl {
       scan_voxels_.add({p_world, key, truth, static_cast<LayerMask>(layers & all_layers_)});
     }
   }
+
+  void prefetch(VoxelKey key) const { __builtin_prefetch(&index_.first_slot(voxel_hash(key))); }
 
   void accumulate(VoxelKey key, LayerMask layers, const Eigen::Vector3d& centroid, Truth truth) {
     const std::uint32_t number = index_.insert(key);

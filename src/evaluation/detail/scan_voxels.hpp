@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -42,7 +43,10 @@ class ScanVoxels {
   }
 
   void add(const ScanPoint& point) {
-    const std::uint32_t number = index_.insert(point.key);
+    const std::uint32_t hash = voxel_hash(point.key);
+    const VoxelIndex::Slot& slot = index_.first_slot(hash);
+    const bool is_known = slot.key == point.key && slot.number != VoxelIndex::kNone;
+    const std::uint32_t number = is_known ? slot.number : index_.insert(point.key, hash);
     if (number == voxels_.size()) voxels_.push_back({point.key});
     Voxel& voxel = voxels_[number];
     voxel.sum += point.p_world;
@@ -57,10 +61,13 @@ class ScanVoxels {
   /// visit(key, layers, centroid, truth) for every voxel, once or once per layer: the centroid of
   /// the layer's points in the voxel and the truth of the point nearest to it. Voxels come in the
   /// order of their first points.
-  template <class Visit>
-  void for_each(LayerMask all_layers, Visit&& visit) {
+  /// `announce(key)` is called some voxels before `visit`, to prefetch memory.
+  template <class Announce, class Visit>
+  void for_each(LayerMask all_layers, Announce&& announce, Visit&& visit) {
     gather_mixed();
-    for (const Voxel& voxel : voxels_) {
+    for (std::size_t v = 0; v < voxels_.size(); ++v) {
+      const Voxel& voxel = voxels_[v];
+      announce(voxels_[std::min(v + kAhead, voxels_.size() - 1)].key);
       if (!voxel.mixed()) {
         const Truth truth =
             voxel.truths == truth_bit(Truth::kStatic) ? Truth::kStatic : Truth::kDynamic;
@@ -75,6 +82,8 @@ class ScanVoxels {
   }
 
  private:
+  static constexpr std::size_t kAhead = 16;  // voxels
+
   struct Voxel {
     VoxelKey key;
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
