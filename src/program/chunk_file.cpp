@@ -15,7 +15,7 @@ namespace {
 // array is the number of its bytes, the bytes, and zeros up to a whole word. Numbers have the byte
 // order of the machine, which the version tells.
 constexpr std::uint64_t kMagic = 0x4B4E5543594E5944U;
-constexpr std::uint64_t kVersion = 1;
+constexpr std::uint64_t kVersion = 2;
 constexpr std::size_t kWord = 8;
 constexpr std::uint64_t kHeader = 5 * kWord;
 constexpr std::uint64_t kTrailer = 2 * kWord;
@@ -129,7 +129,7 @@ void ChunkFileWriter::finish(const ChunkSummary& summary, const StaticMapAccumul
   put<const std::uint8_t>(moving);
 
   const RunTiming& timing = summary.timing;
-  std::vector<double> times = {timing.reserve, timing.flush, timing.pipeline};
+  std::vector<double> times = {timing.flush, timing.pipeline};
   for (const TimingRow& row : timing.rows) {
     times.push_back(static_cast<double>(row.points));
     times.push_back(row.total);
@@ -266,10 +266,9 @@ ChunkSummary ChunkFileReader::read_summary() {
   std::vector<double> times;
   get(times);
   const std::size_t columns = timing.stages.size() + 5;
-  constexpr std::size_t kTotals = 3;
+  constexpr std::size_t kTotals = 2;
   if (times.size() < kTotals || (times.size() - kTotals) % columns != 0) fail("has other times");
   const double* value = times.data();
-  timing.reserve = *value++;
   timing.flush = *value++;
   timing.pipeline = *value++;
   while (value != times.data() + times.size()) {

@@ -247,13 +247,7 @@ class ChunkedRun {
 
   // False if a signal or an error elsewhere ended it.
   bool judge(std::size_t number, std::optional<DynaInsRemover>& remover) {
-    if (!remover) {
-      remover.emplace(config_);
-      const double ms = reserve_memory(*remover, plan_.sequence, plan_.range);
-      const std::lock_guard<std::mutex> lock(mutex_);
-      timing_.reserve += ms;
-      timing_.pipeline += ms;
-    }
+    if (!remover) remover.emplace(config_);
     const auto shared = [&](std::size_t before) -> std::optional<std::size_t> {
       if (before + 1 >= states_.size()) return std::nullopt;
       return shared_scan(chunk(before), chunk(before + 1));

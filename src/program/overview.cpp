@@ -17,7 +17,7 @@ constexpr int kGap = 8;                 // pixels between panels
 
 /// One of so many static points of a scan is drawn: later scans show the same places again.
 std::size_t static_step(std::size_t scans) {
-  return std::clamp(scans / 8, std::size_t{1}, std::size_t{16});
+  return std::clamp(scans / 4, std::size_t{1}, std::size_t{32});
 }
 
 /// Grey that gets darker with the height above the ground below the sensor.

@@ -90,7 +90,6 @@ nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& 
                       {"dynamic", labels[PointLabel::kDynamic]}};
   if (results.map_points()) report["static_map"]["points"] = *results.map_points();
   report["milliseconds"] = times_to_json(timing);
-  report["reserve_milliseconds"] = timing.reserve;
   report["flush_milliseconds"] = timing.flush;
   report["wall_milliseconds"] = run.wall.ms;
   report["share_outside_pipeline"] = run.wall.outside;

@@ -13,7 +13,6 @@
 #include "read_ahead.hpp"
 #include "run_results.hpp"
 #include "run_timing.hpp"
-#include "typical_scan.hpp"
 
 namespace dynains::program {
 
@@ -31,16 +30,6 @@ inline double ms_since(std::chrono::steady_clock::time_point begin) {
       .count();
 }
 
-/// Reserves memory for scans of typical size: larger ones take more when they come. Returns the
-/// milliseconds that it took, reading apart.
-template <class Remover>
-double reserve_memory(Remover& remover, const Recording& recording, const ScanRange& range) {
-  const RecordedScan example = recording.read_scan(typical_scan(recording, range));
-  const auto begin = std::chrono::steady_clock::now();
-  remover.reserve_like(points_of(example), range.size());
-  return ms_since(begin);
-}
-
 /// Pushes the scans of `range` and passes every verdict, and at the end the map, to `results`.
 /// Calls `keep_going(done)` after each scan; if it returns false, the sequence ends there.
 template <class Remover, class KeepGoing>
@@ -49,7 +38,6 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
   using Clock = std::chrono::steady_clock;
   RunTiming timing;
   timing.stages = stage_names();
-  timing.reserve = reserve_memory(remover, recording, range);
   ReadAhead scans(recording, range.first, range.last);
   for (std::size_t i = range.first; i <= range.last; ++i) {
     RecordedScan scan = scans.next(results.recycle());
@@ -69,7 +57,7 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
     writing += ms_since(begin_writing);
   });
   timing.flush = ms_since(begin) - writing;
-  timing.pipeline = timing.reserve + timing.flush;
+  timing.pipeline = timing.flush;
   for (const TimingRow& row : timing.rows) timing.pipeline += row.total;
   if (results.map_points()) {
     remover.map().for_each([&](const Eigen::Vector3d& point) { results.add_map_point(point); });

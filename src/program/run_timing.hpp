@@ -22,7 +22,6 @@ struct TimingRow {
 struct RunTiming {
   std::vector<std::string> stages;
   std::vector<TimingRow> rows;
-  double reserve = 0.0;  ///< ms before the first scan, for its memory
   double flush = 0.0;    ///< ms for the verdicts that were open after the last scan
   double pipeline =
       0.0;               ///< ms in the pipeline, of all workers together, all of the above included

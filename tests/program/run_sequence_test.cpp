@@ -47,10 +47,6 @@ class FakeRemover {
     result.times.map = 0.5;
     return result;
   }
-  void reserve_like(const RawPoints<float>& example, std::size_t scans) {
-    reserved_points = example.count;
-    reserved_scans = scans;
-  }
   template <class Sink>
   void flush(Sink&& sink) {
     while (finished_ < pushed_.size()) sink(finish());
@@ -58,8 +54,6 @@ class FakeRemover {
   Map map() const { return {}; }
 
   std::size_t fail_at = 1000;
-  std::size_t reserved_points = 0;
-  std::size_t reserved_scans = 0;
 
  private:
   struct Scan {
@@ -123,28 +117,6 @@ TEST_CASE("Labels: 251 moving, 9 static, 0 not judged; instances wrap but never 
   CHECK(mos_label(PointLabel::kDynamic, 70000) == (251 | 4465U << 16));
   CHECK(mos_label(PointLabel::kDynamic, 2 * 65535) == (251 | 65535U << 16));
   CHECK(mos_label(PointLabel::kDynamic, 0xFFFFFFFF) == (251 | 65535U << 16));
-}
-
-TEST_CASE("Memory is reserved by a scan of typical size") {
-  Fixture fixture(9);
-  const fs::path scans = fixture.folder / "seq/velodyne";
-  const std::size_t usual = tiny_scan(0).size() / 4;
-  const auto typical_points = [&] {
-    const Recording recording(fixture.folder / "seq");
-    return recording.point_count(typical_scan(recording, {0, recording.size() - 1}));
-  };
-  CHECK(typical_points() == usual);
-  const std::vector<float> large(400000);
-  write_scan(scans / "000000.bin", large);
-  write_scan(scans / "000004.bin", Span<const float>());
-  CHECK(typical_points() == usual);
-  const Recording recording(fixture.folder / "seq");
-  CHECK(recording.point_count(typical_scan(recording, {0, 1})) == usual);
-  CHECK(recording.point_count(typical_scan(recording, {0, 0})) == 100000);
-  const ScanRange range{0, 8};
-  RunResults results(recording, range, fixture.outputs());
-  run_sequence(fixture.remover, recording, range, results, kAlways);
-  CHECK(fixture.remover.reserved_points == usual);
 }
 
 TEST_CASE("Every scan gets its final labels, every dynamic point its place in the world") {
