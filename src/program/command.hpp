@@ -11,6 +11,7 @@ namespace dynains::program {
 void add_run_command(CLI::App& app);
 void add_remap_command(CLI::App& app);
 void add_map_command(CLI::App& app);
+void add_fleet_command(CLI::App& app);
 void add_check_command(CLI::App& app);
 void add_config_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);

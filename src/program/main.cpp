@@ -77,6 +77,7 @@ int main(int argc, char** argv) {
   add_run_command(app);
   add_remap_command(app);
   add_map_command(app);
+  add_fleet_command(app);
   add_check_command(app);
   add_config_command(app);
   add_simulate_command(app);

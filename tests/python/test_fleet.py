@@ -1,4 +1,5 @@
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -140,6 +141,35 @@ def test_recordings_of_one_name_are_refused(drives, tmp_path):
         (other / file.name).symlink_to(file)
     with pytest.raises(dynains.IoError, match="has the same name as"):
         fleet.find_recordings([drives / "drive1", other])
+
+
+@pytest.mark.skipif("DYNAINS_PROGRAM" not in os.environ, reason="the program is not built")
+def test_the_program_starts_a_fleet_and_says_what_it_lacks(drives, tmp_path):
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "python3").symlink_to(sys.executable)
+    path = f"{tmp_path / 'bin'}:{os.environ['PATH']}"
+
+    def fleet_command(*words, **environment):
+        command = [os.environ["DYNAINS_PROGRAM"], "fleet", *map(str, words)]
+        environment = {**os.environ, "PATH": path, **environment}
+        return subprocess.run(command, env=environment, capture_output=True, text=True)
+
+    out = tmp_path / "out"
+    done = fleet_command(drives / "drive1", "--out", out, "--workers", "1")
+    assert done.returncode == 0 and "1 of 1 recordings: drive1: 20 scans" in done.stderr
+    assert json.loads((out / "fleet.json").read_text())["drive1"]["scans"] == 20
+    wrong = fleet_command(drives / "drive1", "--out", out, "--workers", "0")
+    assert wrong.returncode == 2 and "expected at least 1" in wrong.stderr
+    assert "usage: dynains fleet" in fleet_command("--help").stdout
+
+    (tmp_path / "dynains.py").write_text("raise ImportError('not here')")
+    missing = fleet_command("x", PYTHONPATH=str(tmp_path))
+    assert missing.returncode == 1
+    assert missing.stderr == (
+        "dynains: error: fleet needs the Python module of dynains: not here\n"
+    )
+    no_python = fleet_command("x", PATH=str(tmp_path))
+    assert no_python.returncode == 1 and "python3" in no_python.stderr
 
 
 def test_two_fleets_do_not_share_a_folder(drives, tmp_path):

@@ -1,6 +1,6 @@
 """Cleans many recordings at once, on the cores of one machine or on many machines, by Dask.
 
-    python3 -m dynains.fleet LOGS... --out OUT [--city CITY] [--scheduler tcp://HOST:PORT]
+    dynains fleet LOGS... --out OUT [--city CITY] [--scheduler tcp://HOST:PORT]
 
 Each recording is a task. Its results go to OUT/NAME, as `dynains run` writes them, so they do not
 depend on the worker, the number of workers, or the order. A task of a worker that dies is given to
@@ -125,8 +125,9 @@ def clean(
     """Cleans recordings into OUT/NAME and writes OUT/fleet.json, which it returns.
 
     recordings: by name, see find_recordings(). out: a folder that all workers reach. city: folder
-    of a map of many sessions that each recording is added to, under its name. scheduler: address of a scheduler of Dask; None: workers on this machine. workers: their number on this
-    machine; None: one for each core. progress: called with the numbers of finished and of all
+    of a map of many sessions that each recording is added to, under its name. scheduler: address of
+    a scheduler of Dask, or its scheduler file (.json); None: workers on this machine. workers: their number on this machine; None:
+    one for each core. progress: called with the numbers of finished and of all
     recordings, the name of the one that finished and its result. arguments: of dynains.run().
 
     Raises ImportError without Dask, UsageError if another fleet works in the folder, OSError if the
@@ -140,7 +141,8 @@ def clean(
         cluster = scheduler or LocalCluster(
             n_workers=workers, threads_per_worker=1, dashboard_address=None
         )
-        with Client(cluster) as client:
+        is_file = isinstance(cluster, str) and cluster.endswith(".json")
+        with Client(scheduler_file=cluster) if is_file else Client(cluster) as client:
             # The longest first, so that no worker is left with one at the end.
             order = sorted(recordings, key=lambda name: (-_size_of(recordings[name]), name))
             tasks = {
@@ -187,12 +189,12 @@ def _tell(done: int, total: int, name: str, result: Dict[str, Any]) -> None:
 def main(words: Optional[List[str]] = None) -> int:
     """0; 1 if a recording failed; 2 for wrong arguments."""
     parser = argparse.ArgumentParser(
-        prog="dynains.fleet", description="Clean many recordings at once, by Dask."
+        prog="dynains fleet", description="Clean many recordings at once, by Dask."
     )
     parser.add_argument("logs", nargs="+", help="recordings, or folders of recordings")
     parser.add_argument("--out", required=True, help="folder that all workers reach")
     parser.add_argument("--city", help="map of many sessions that each recording is added to")
-    parser.add_argument("--scheduler", help="address of a scheduler [workers on this machine]")
+    parser.add_argument("--scheduler", help="address or scheduler file (.json) of a scheduler [workers on this machine]")
     parser.add_argument("--workers", type=int, help="on this machine [one for each core]")
     parser.add_argument("--preset", default="default", choices=["default", "offline", "paper"])
     parser.add_argument("--accept-poses", action="store_true")
@@ -213,13 +215,13 @@ def main(words: Optional[List[str]] = None) -> int:
             accept_poses=options.accept_poses,
         )
     except ImportError as error:
-        print(f"dynains.fleet: {error}; Debian has it as python3-distributed", file=sys.stderr)
+        print(f"dynains fleet: {error}; Debian has it as python3-distributed", file=sys.stderr)
         return 1
     except (IoError, OSError) as error:
-        print(f"dynains.fleet: {error}", file=sys.stderr)
+        print(f"dynains fleet: {error}", file=sys.stderr)
         return 1
     except UsageError as error:
-        print(f"dynains.fleet: {error}", file=sys.stderr)
+        print(f"dynains fleet: {error}", file=sys.stderr)
         return 2
     return 1 if any("error" in result for result in results.values()) else 0
 
