@@ -8,10 +8,12 @@
 # The same command completes the work of a job that ended early.
 set -eu
 file="$PWD/dask-$SLURM_JOB_ID.json"
-trap 'kill $(jobs -p) 2> /dev/null || true; rm -f "$file"' EXIT
+scheduler= workers=
+trap 'kill $scheduler $workers 2> /dev/null || true; rm -f "$file"' EXIT
 python3 -m distributed.cli.dask_scheduler --port 0 --no-dashboard --scheduler-file "$file" &
 scheduler=$!
 srun python3 -m distributed.cli.dask_worker --scheduler-file "$file" --nthreads 1 --no-nanny &
+workers=$!
 until [ -s "$file" ]; do
   kill -0 "$scheduler"  # ends the job if the scheduler has ended
   sleep 1
