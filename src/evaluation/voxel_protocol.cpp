@@ -39,9 +39,10 @@ class VoxelProtocol::Impl {
 
   void add(const LabelledScan& scan) {
     if (!grid_) grid_.emplace(settings_.voxel, scan.T_world_sensor.translation());
-    voxelise(scan, [](VoxelKey) { return true; });
+    const Points points(*this, scan);
+    voxelise(scan, points, [](VoxelKey) { return true; });
     scan_voxels_.for_each(
-        all_layers_, [this](VoxelKey key) { prefetch(key); },
+        all_layers_, points, [this](VoxelKey key) { prefetch(key); },
         [this](VoxelKey key, LayerMask layers, const Eigen::Vector3d& centroid, Truth truth) {
           accumulate(key, layers, centroid, truth);
         });
@@ -51,10 +52,11 @@ class VoxelProtocol::Impl {
   void resolve(const LabelledScan& scan) {
     finish_first_pass();
     if (pending_.size() == 0) return;
-    voxelise(scan,
+    const Points points(*this, scan);
+    voxelise(scan, points,
              [this](VoxelKey key) { return pending_.find(key) != detail::VoxelIndex::kNone; });
     scan_voxels_.for_each(
-        all_layers_, [](VoxelKey) {},
+        all_layers_, points, [](VoxelKey) {},
         [this](VoxelKey key, LayerMask layers, const Eigen::Vector3d& centroid, Truth truth) {
           const Voxel& voxel = voxels_[index_.find(key)];
           double* nearest = &nearest_[pending_.find(key) * layers_];
@@ -133,23 +135,47 @@ class VoxelProtocol::Impl {
     return VoxelPoint{held.centroid(), held.truth()};
   }
 
+  // The points of a scan with their voxels.
+  class Points {
+   public:
+    Points(const Impl& protocol, const LabelledScan& scan)
+        : protocol_(protocol),
+          scan_(scan),
+          R_(scan.T_world_sensor.linear()),
+          t_(scan.T_world_sensor.translation()) {}
+
+    // False for a point that is not judged.
+    bool is_judged(std::size_t i) const {
+      return protocol_.settings_.truth(scan_.truth[i]) != Truth::kIgnored &&
+             protocol_.gate_.passes(scan_.xyz + i * scan_.stride);
+    }
+    detail::ScanPoint operator()(std::size_t i) const {
+      const float* p = scan_.xyz + i * scan_.stride;
+      detail::ScanPoint point;
+      point.p_world = R_ * Eigen::Vector3d(p[0], p[1], p[2]) + t_;
+      point.key = protocol_.grid_->key(point.p_world);
+      point.truth = protocol_.settings_.truth(scan_.truth[i]);
+      unsigned layers = 1U << kIdentity;
+      if (point.truth == Truth::kStatic) layers |= 1U << kOracle;
+      if (!scan_.in_map.empty()) layers |= static_cast<unsigned>(scan_.in_map[i]) << kFirstEstimate;
+      point.layers = static_cast<LayerMask>(layers & protocol_.all_layers_);
+      return point;
+    }
+
+   private:
+    const Impl& protocol_;
+    const LabelledScan& scan_;
+    Eigen::Matrix3d R_;
+    Eigen::Vector3d t_;
+  };
+
   template <class Wanted>
-  void voxelise(const LabelledScan& scan, Wanted&& wanted) {
-    const Eigen::Matrix3d R = scan.T_world_sensor.linear();
-    const Eigen::Vector3d t = scan.T_world_sensor.translation();
+  void voxelise(const LabelledScan& scan, const Points& points, Wanted&& wanted) {
     scan_voxels_.clear();
     for (std::size_t i = 0; i < scan.size(); ++i) {
-      const Truth truth = settings_.truth(scan.truth[i]);
-      if (truth == Truth::kIgnored) continue;
-      const float* p = scan.xyz + i * scan.stride;
-      if (!gate_.passes(p)) continue;
-      const Eigen::Vector3d p_world = R * Eigen::Vector3d(p[0], p[1], p[2]) + t;
-      const VoxelKey key = grid_->key(p_world);
-      if (key == detail::kNoKey || !wanted(key)) continue;
-      unsigned layers = 1U << kIdentity;
-      if (truth == Truth::kStatic) layers |= 1U << kOracle;
-      if (!scan.in_map.empty()) layers |= static_cast<unsigned>(scan.in_map[i]) << kFirstEstimate;
-      scan_voxels_.add({p_world, key, truth, static_cast<LayerMask>(layers & all_layers_)});
+      if (!points.is_judged(i)) continue;
+      const detail::ScanPoint point = points(i);
+      if (point.key != detail::kNoKey && wanted(point.key)) scan_voxels_.add(point, i);
     }
   }
 

@@ -24,7 +24,7 @@ constexpr TruthMask truth_bit(Truth truth) {
 }
 inline constexpr TruthMask kBothTruths = truth_bit(Truth::kStatic) | truth_bit(Truth::kDynamic);
 
-/// One point of a scan that is in at least one layer.
+/// A point of a scan that is in at least one layer.
 struct ScanPoint {
   Eigen::Vector3d p_world;
   VoxelKey key;
@@ -32,39 +32,38 @@ struct ScanPoint {
   LayerMask layers;
 };
 
-/// Voxelises one scan at a time; memory is reused.
+/// Voxelises one scan at a time; memory is reused. Only the numbers of the points are stored.
 class ScanVoxels {
  public:
   void clear() {
     index_.clear();
     voxels_.clear();
     points_.clear();
-    voxel_of_point_.clear();
   }
 
-  void add(const ScanPoint& point) {
+  /// `number`: of the point in its scan.
+  void add(const ScanPoint& point, std::size_t number) {
     const std::uint32_t hash = voxel_hash(point.key);
     const VoxelIndex::Slot& slot = index_.first_slot(hash);
     const bool is_known = slot.key == point.key && slot.number != VoxelIndex::kNone;
-    const std::uint32_t number = is_known ? slot.number : index_.insert(point.key, hash);
-    if (number == voxels_.size()) voxels_.push_back({point.key});
-    Voxel& voxel = voxels_[number];
+    const std::uint32_t at = is_known ? slot.number : index_.insert(point.key, hash);
+    if (at == voxels_.size()) voxels_.push_back({point.key});
+    Voxel& voxel = voxels_[at];
     voxel.sum += point.p_world;
     ++voxel.count;
     voxel.truths |= truth_bit(point.truth);
     voxel.in_all &= point.layers;
     voxel.in_any |= point.layers;
-    points_.push_back(point);
-    voxel_of_point_.push_back(number);
+    points_.push_back({static_cast<std::uint32_t>(number), at});
   }
 
   /// visit(key, layers, centroid, truth) for every voxel, once or once per layer: the centroid of
   /// the layer's points in the voxel and the truth of the point nearest to it. Voxels come in the
-  /// order of their first points.
-  /// `announce(key)` is called some voxels before `visit`, to prefetch memory.
-  template <class Announce, class Visit>
-  void for_each(LayerMask all_layers, Announce&& announce, Visit&& visit) {
-    gather_mixed();
+  /// order of their first points. `point(number)`: the ScanPoint of add(). `announce(key)` is
+  /// called some voxels before `visit`, to prefetch memory.
+  template <class Point, class Announce, class Visit>
+  void for_each(LayerMask all_layers, Point&& point, Announce&& announce, Visit&& visit) {
+    gather_mixed(point);
     for (std::size_t v = 0; v < voxels_.size(); ++v) {
       const Voxel& voxel = voxels_[v];
       announce(voxels_[std::min(v + kAhead, voxels_.size() - 1)].key);
@@ -102,18 +101,19 @@ class ScanVoxels {
   }
 
   /// Groups the points of the mixed voxels by voxel, in scan order.
-  void gather_mixed() {
+  template <class Point>
+  void gather_mixed(Point&& point) {
     std::uint32_t total = 0;
     for (Voxel& voxel : voxels_) {
       voxel.first_mixed = total;
       if (voxel.mixed()) total += voxel.count;
     }
     mixed_points_.resize(total);
+    if (total == 0) return;
     next_.resize(voxels_.size());
     for (std::size_t v = 0; v < voxels_.size(); ++v) next_[v] = voxels_[v].first_mixed;
-    for (std::size_t i = 0; i < points_.size(); ++i) {
-      const std::uint32_t v = voxel_of_point_[i];
-      if (voxels_[v].mixed()) mixed_points_[next_[v]++] = static_cast<std::uint32_t>(i);
+    for (const Member& member : points_) {
+      if (voxels_[member.voxel].mixed()) mixed_points_[next_[member.voxel]++] = point(member.point);
     }
   }
 
@@ -124,29 +124,33 @@ class ScanVoxels {
     const auto* first = mixed_points_.data() + voxel.first_mixed;
     const auto* last = first + voxel.count;
     for (const auto* i = first; i != last; ++i) {
-      if ((points_[*i].layers & layer) == 0) continue;
-      sum += points_[*i].p_world;
+      if ((i->layers & layer) == 0) continue;
+      sum += i->p_world;
       ++count;
     }
     const Eigen::Vector3d center = centroid(sum, count);
     double best = std::numeric_limits<double>::infinity();
     Truth truth = Truth::kStatic;
     for (const auto* i = first; i != last; ++i) {
-      if ((points_[*i].layers & layer) == 0) continue;
-      const double distance = (points_[*i].p_world - center).squaredNorm();
+      if ((i->layers & layer) == 0) continue;
+      const double distance = (i->p_world - center).squaredNorm();
       if (is_nearer(distance, best)) {
         best = distance;
-        truth = points_[*i].truth;
+        truth = i->truth;
       }
     }
     visit(voxel.key, layer, center, truth);
   }
 
+  struct Member {
+    std::uint32_t point;
+    std::uint32_t voxel;
+  };
+
   VoxelIndex index_;
   std::vector<Voxel> voxels_;
-  std::vector<ScanPoint> points_;
-  std::vector<std::uint32_t> voxel_of_point_;
-  std::vector<std::uint32_t> mixed_points_;
+  std::vector<Member> points_;
+  std::vector<ScanPoint> mixed_points_;
   std::vector<std::uint32_t> next_;
 };
 
