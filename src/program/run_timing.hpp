@@ -22,7 +22,7 @@ struct TimingRow {
 struct RunTiming {
   std::vector<std::string> stages;
   std::vector<TimingRow> rows;
-  double flush = 0.0;    ///< ms for the verdicts that were open after the last scan
+  double flush = 0.0;  ///< ms for the verdicts that were open after the last scan
   double pipeline =
       0.0;               ///< ms in the pipeline, of all workers together, all of the above included
   std::size_t jobs = 1;  ///< workers
