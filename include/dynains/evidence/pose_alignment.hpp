@@ -71,12 +71,16 @@ class PlaneAligner {
     for (const double scale : kCoarseScales) {
       find_planes(points, kCoarseStep, planes, T);
       equations = sum_equations(scale, result.found);
-      if (advance(equations, T, result.found) <= kSmall) break;
+      const NormalEquations::Vector step = equations.solve();
+      if (equations.change(step) <= kSmall) break;  // left to the fine steps
+      advance(step, T, result.found);
     }
     for (int iteration = 0; iteration < kMostIterations; ++iteration) {
       find_planes(points, 1, planes, T);
       equations = sum_equations(kScale, result.found);
-      if (advance(equations, T, result.found) <= kConverged) break;
+      const NormalEquations::Vector step = equations.solve();
+      advance(step, T, result.found);
+      if (equations.change(step) <= kConverged) break;
     }
     count_inliers(result);
     collect_sectors(points, kScale);
@@ -162,13 +166,10 @@ class PlaneAligner {
     });
   }
 
-  // Makes the next step. Returns the root mean square of the change of the distances, m.
-  static double advance(const NormalEquations& equations, Eigen::Isometry3d& T,
-                        NormalEquations::Vector& found) {
-    const NormalEquations::Vector step = equations.solve();
+  static void advance(const NormalEquations::Vector& step, Eigen::Isometry3d& T,
+                      NormalEquations::Vector& found) {
     for (std::size_t i = 0; i < 6; ++i) found[i] += step[i];
     T = moved(T, step);
-    return equations.change(step);
   }
 
   void count_inliers(Alignment& result) const {
