@@ -10,6 +10,7 @@
 #include "finite_points.hpp"
 #include "median.hpp"
 #include "scan_registration.hpp"
+#include "way_search.hpp"
 
 namespace dynains {
 namespace {
@@ -21,16 +22,33 @@ constexpr double kLever = 10.0;  // m, distance of the points at which a rotatio
 
 double angle_of(const Eigen::Matrix3d& R) { return std::abs(Eigen::AngleAxisd(R).angle()); }
 
+/// A scan, as planes and as landmarks.
+class ChainScan {
+ public:
+  explicit ChainScan(PointBuffer points) : points_(std::move(points)), planes_(points_) {}
+
+  const RegistrationScan& planes() const { return planes_; }
+  const Landmarks& landmarks() {
+    if (!landmarks_) landmarks_.emplace(points_, estimate_mounting(points_), kWayRange);
+    return *landmarks_;
+  }
+
+ private:
+  PointBuffer points_;
+  RegistrationScan planes_;
+  std::optional<Landmarks> landmarks_;
+};
+
 /// Reads scans on demand and keeps those of one chain.
 class ChainScans {
  public:
   explicit ChainScans(const Recording& recording) : recording_(recording) {}
 
-  const RegistrationScan& get(std::size_t i) {
-    std::unique_ptr<RegistrationScan>& entry = scans_[i];
+  ChainScan& get(std::size_t i) {
+    std::unique_ptr<ChainScan>& entry = scans_[i];
     if (entry == nullptr) {
       recording_.read_scan(i, scan_);
-      entry = std::make_unique<RegistrationScan>(finite_points(scan_));
+      entry = std::make_unique<ChainScan>(finite_points(scan_));
     }
     return *entry;
   }
@@ -39,7 +57,7 @@ class ChainScans {
  private:
   const Recording& recording_;
   RecordedScan scan_;
-  std::map<std::size_t, std::unique_ptr<RegistrationScan>> scans_;
+  std::map<std::size_t, std::unique_ptr<ChainScan>> scans_;
 };
 
 /// Guesses of the motion to the next scan: as given, none, the given distance in each direction,
@@ -66,7 +84,7 @@ bool is_certain(const std::optional<Registration>& registration) {
   constexpr double kLeastScore = 0.45;
   constexpr double kUncertain = 0.06;  // m
   return registration && registration->score > kLeastScore &&
-         registration->uncertainty < kUncertain;
+         registration->uncertainty < kUncertain && !registration->is_ambiguous;
 }
 
 /// Residual of a motion: rotation times kLever, and translation, m.
@@ -77,6 +95,52 @@ Vector6 residual(const Eigen::Isometry3d& body, const Eigen::Isometry3d& sensor,
   Vector6 r;
   r << kLever * rotation.angle() * rotation.axis(), E.translation();
   return r;
+}
+
+/// A motion by two registrations, forth and back.
+struct CheckedMotion {
+  Eigen::Isometry3d T_a_b;
+  double noise;  // m
+};
+
+std::optional<CheckedMotion> checked(const std::optional<Registration>& forth,
+                                     const std::optional<Registration>& back, double deviation) {
+  if (!is_certain(forth) || !is_certain(back)) return std::nullopt;
+  const Vector6 difference =
+      residual(forth->T_a_b, back->T_a_b.inverse(), Eigen::Isometry3d::Identity());
+  return CheckedMotion{forth->T_a_b, std::hypot(difference.norm(), deviation)};
+}
+
+/// Completes a registration by planes that leaves a direction open: landmarks tell the way along
+/// it, less than `farthest` (m) from what planes say. The least certain direction is not always the
+/// open one: the back of a vehicle ahead is a plane, too.
+std::optional<CheckedMotion> complete(ChainScan& a, ChainScan& b, const Registration& by_planes,
+                                      double farthest) {
+  constexpr double kDeviation = 0.04;  // m, of search_way()
+  for (const Eigen::Vector3d& direction : by_planes.uncertain) {
+    const auto guess =
+        search_way(a.landmarks(), b.landmarks(), by_planes.T_a_b, direction, farthest);
+    if (!guess) continue;
+    const auto forth = register_near(a.planes(), b.planes(), *guess, {direction, kDeviation});
+    if (!is_certain(forth)) continue;
+    const Eigen::Isometry3d T_b_a = forth->T_a_b.inverse();
+    return checked(
+        forth,
+        register_near(b.planes(), a.planes(), T_b_a, {T_b_a.linear() * direction, kDeviation}),
+        kDeviation);
+  }
+  return std::nullopt;
+}
+
+/// Registers b to a. Empty if the motion is uncertain.
+std::optional<CheckedMotion> register_both_ways(ChainScan& a, ChainScan& b,
+                                                const std::vector<Eigen::Isometry3d>& guesses,
+                                                double farthest) {
+  constexpr double kOpen = 0.025;  // m, uncertainty of a direction that planes leave open
+  const auto found = register_scans(a.planes(), b.planes(), guesses);
+  if (!found) return std::nullopt;
+  if (found->is_ambiguous || found->uncertainty > kOpen) return complete(a, b, *found, farthest);
+  return checked(found, register_scans(b.planes(), a.planes(), {found->T_a_b.inverse()}), 0.0);
 }
 
 struct Motions {
@@ -159,10 +223,13 @@ std::vector<Eigen::Matrix3d> axis_rotations() {
 
 std::vector<RegisteredMotion> register_motions(const Recording& recording) {
   constexpr std::size_t kChains = 12;
-  constexpr std::size_t kLongest = 16;  // scans
-  constexpr double kFar = 3.0;          // m
-  constexpr double kTurned = 0.25;      // rad
-  constexpr double kNoisy = 0.25;       // m, 10 m from the sensor
+  constexpr std::size_t kLongest = 16;        // scans
+  constexpr std::size_t kLongEnough = 4;      // scans
+  constexpr double kFar = 3.0;                // m
+  constexpr double kFarthestStep = 6.0;       // m
+  constexpr double kFarthestFromGuess = 1.5;  // m
+  constexpr double kTurned = 0.25;            // rad
+  constexpr double kNoisy = 0.25;             // m, 10 m from the sensor
   std::vector<RegisteredMotion> motions;
   if (recording.size() < 2) return motions;
   const std::size_t starts = recording.size() - 1;
@@ -176,19 +243,13 @@ std::vector<RegisteredMotion> register_motions(const Recording& recording) {
         recording.T_world_sensor(first).inverse() * recording.T_world_sensor(first + 1);
     std::vector<Eigen::Isometry3d> guesses = first_guesses(given, elsewhere);
     for (std::size_t step = 1; step <= kLongest && first + step < recording.size(); step *= 2) {
-      const auto found = register_scans(scans.get(first), scans.get(first + step), guesses);
-      if (!is_certain(found)) break;
-      const auto back =
-          register_scans(scans.get(first + step), scans.get(first), {found->T_a_b.inverse()});
-      if (!is_certain(back)) break;
-      const double noise =
-          residual(found->T_a_b, back->T_a_b.inverse(), Eigen::Isometry3d::Identity()).norm();
-      if (noise > kNoisy) break;
-      motions.push_back({chain, first, first + step, found->T_a_b, noise});
+      const auto found = register_both_ways(scans.get(first), scans.get(first + step), guesses,
+                                            step == 1 ? kFarthestStep : kFarthestFromGuess);
+      if (!found || found->noise > kNoisy) break;
+      motions.push_back({chain, first, first + step, found->T_a_b, found->noise});
       if (step == 1) elsewhere = found->T_a_b;
-      if (found->T_a_b.translation().norm() > kFar || angle_of(found->T_a_b.linear()) > kTurned) {
-        break;
-      }
+      const bool is_far = found->T_a_b.translation().norm() > kFar && step >= kLongEnough;
+      if (is_far || angle_of(found->T_a_b.linear()) > kTurned) break;
       guesses = {found->T_a_b * found->T_a_b};
     }
   }

@@ -214,9 +214,10 @@ bool is_right(const fs::path& folder, const Kind& kind, const Poses& truth, std:
   try {
     const Recording recording(folder);
     const Diagnosis d = diagnose(recording);
-    told = advice(d);
+    told = advice(d) + " (" + std::to_string(d.registered_pairs) + " pairs)";
     const bool is_sound = d.sound() && d.verdict != PoseVerdict::kInexact;
     const double given = error_of(recording, truth);
+    told += " [" + std::to_string(given) + " m]";
     if (kind.expected == Answer::kNone) return is_sound;
     if (kind.expected == Answer::kInexact) return !is_sound;
     if (kind.expected == Answer::kDisagree) return d.verdict == PoseVerdict::kDisagree;
@@ -226,7 +227,7 @@ bool is_right(const fs::path& folder, const Kind& kind, const Poses& truth, std:
     options.convention = d.convention;
     options.time_offset = d.time_offset;
     const double healed = error_of(Recording(folder, options), truth);
-    told += " [" + std::to_string(given) + " -> " + std::to_string(healed) + " m]";
+    told += " [-> " + std::to_string(healed) + " m]";
     return healed < kTrue || healed < 0.25 * given;
   } catch (const IoError& error) {
     told = error.what();
@@ -240,6 +241,7 @@ int main(int argc, char** argv) {
   const std::size_t every = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 1;
   const bool is_verbose = argc > 2;
   const char* const only = argc > 3 ? argv[3] : nullptr;
+  const std::size_t first_seed = argc > 4 ? std::strtoul(argv[4], nullptr, 10) : 100;
   const std::vector<Kind> all = kinds();
   std::map<std::string, std::pair<int, int>> right_of;
   std::string pattern = (fs::temp_directory_path() / "pose_trials_XXXXXX").string();
@@ -254,7 +256,7 @@ int main(int argc, char** argv) {
       config.scene = simulation::scene_from_name(scene);
       config.sensor = simulation::sensor_from_name(sensor);
       config.scans = static_cast<int>(kScans);
-      config.seed = 100 + number;
+      config.seed = first_seed + number;
       simulation::Simulator simulator(config);
       Poses truth;
       for (std::size_t i = 0; i < kScans; ++i) {
