@@ -197,7 +197,11 @@ std::optional<Explanation> explain_by_reading(const Recording& recording,
     best = i;
     least = error;
   }
-  if (!is_much_better(least, before)) return std::nullopt;
+  // Small motions differ little from any others, so no motion must be clearly worse, too.
+  const double standing = error_at_points(
+      motions, [](const RegisteredMotion&) { return Eigen::Isometry3d::Identity(); });
+  const bool explains = is_much_better(least, before) && least < std::min(kRough, 0.5 * standing);
+  if (!explains) return std::nullopt;
   const auto found = readings.begin() + static_cast<std::ptrdiff_t>(best);
   std::rotate(readings.begin(), found, found + 1);
   return Explanation{PoseVerdict::kOtherwise, least, readings.front().convention,
@@ -239,25 +243,28 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
   if (motions.size() < kFewestMotions || steps.pairs < kFewestPairs) return;
 
   if (before > exact) {
-    const auto reading = explain_by_reading(recording, motions, d.readings, before);
+    auto reading = explain_by_reading(recording, motions, d.readings, before);
     const auto offset = explain_by_offset(recording, motions, before);
     const auto body = explain_by_body(recording, motions, before);
+    // A shift by scans is a coarse offset.
+    const bool is_shift = reading && reading->convention.shift != recording.convention().shift;
+    if (is_shift && offset && offset->error < reading->error) reading.reset();
     const Explanation* best = nullptr;
     // A mistake has no number to fit, an offset has one, a body has six.
-    for (const auto* candidate : {&reading, &offset, &body}) {
+    for (const auto* candidate : {&std::as_const(reading), &offset, &body}) {
       if (!*candidate) continue;
-      const bool is_needed = best == nullptr || best->error > exact;
-      if (is_needed && (best == nullptr || (*candidate)->error < 0.6 * best->error)) {
-        best = &**candidate;
-      }
+      const bool is_better =
+          best == nullptr || (best->error > exact && (*candidate)->error < 0.6 * best->error);
+      if (is_better) best = &**candidate;
     }
     if (best != nullptr) {
       take(*best, d);
       return;
     }
   }
-  const bool is_inexact = steps.translation > std::max(kInexactTranslation, 3.0 * steps.noise) ||
-                          steps.rotation > std::max(kInexactRotation, 3.0 * steps.noise / 10.0);
+  const bool is_inexact =
+      steps.translation > std::max(kInexactTranslation, 3.0 * steps.translation_noise) ||
+      steps.rotation > std::max(kInexactRotation, 3.0 * steps.rotation_noise);
   if (d.verdict == PoseVerdict::kDisagree && before < exact) d.verdict = PoseVerdict::kAgree;
   if (d.verdict == PoseVerdict::kDisagree && before < kRough) d.verdict = PoseVerdict::kInexact;
   if (d.verdict == PoseVerdict::kNoMotion && before > kRough) d.verdict = PoseVerdict::kDisagree;

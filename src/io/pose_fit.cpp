@@ -100,15 +100,18 @@ Vector6 residual(const Eigen::Isometry3d& body, const Eigen::Isometry3d& sensor,
 /// A motion by two registrations, forth and back.
 struct CheckedMotion {
   Eigen::Isometry3d T_a_b;
-  double noise;  // m
+  Vector6 difference;
+  double deviation;  // m
 };
 
 std::optional<CheckedMotion> checked(const std::optional<Registration>& forth,
                                      const std::optional<Registration>& back, double deviation) {
+  constexpr double kNoisy = 0.25;  // m, 10 m from the sensor
   if (!is_certain(forth) || !is_certain(back)) return std::nullopt;
   const Vector6 difference =
       residual(forth->T_a_b, back->T_a_b.inverse(), Eigen::Isometry3d::Identity());
-  return CheckedMotion{forth->T_a_b, std::hypot(difference.norm(), deviation)};
+  if (difference.norm() > kNoisy) return std::nullopt;
+  return CheckedMotion{forth->T_a_b, difference, deviation};
 }
 
 /// Completes a registration by planes that leaves a direction open: landmarks tell the way along
@@ -229,7 +232,6 @@ std::vector<RegisteredMotion> register_motions(const Recording& recording) {
   constexpr double kFarthestStep = 6.0;       // m
   constexpr double kFarthestFromGuess = 1.5;  // m
   constexpr double kTurned = 0.25;            // rad
-  constexpr double kNoisy = 0.25;             // m, 10 m from the sensor
   std::vector<RegisteredMotion> motions;
   if (recording.size() < 2) return motions;
   const std::size_t starts = recording.size() - 1;
@@ -245,8 +247,9 @@ std::vector<RegisteredMotion> register_motions(const Recording& recording) {
     for (std::size_t step = 1; step <= kLongest && first + step < recording.size(); step *= 2) {
       const auto found = register_both_ways(scans.get(first), scans.get(first + step), guesses,
                                             step == 1 ? kFarthestStep : kFarthestFromGuess);
-      if (!found || found->noise > kNoisy) break;
-      motions.push_back({chain, first, first + step, found->T_a_b, found->noise});
+      if (!found) break;
+      motions.push_back(
+          {chain, first, first + step, found->T_a_b, found->difference, found->deviation});
       if (step == 1) elsewhere = found->T_a_b;
       const bool is_far = found->T_a_b.translation().norm() > kFar && step >= kLongEnough;
       if (is_far || angle_of(found->T_a_b.linear()) > kTurned) break;
@@ -256,25 +259,48 @@ std::vector<RegisteredMotion> register_motions(const Recording& recording) {
   return motions;
 }
 
+namespace {
+
+/// Weights of the axes of residuals, at most 1, from the differences of both registrations.
+Vector6 weights_of_axes(const std::vector<RegisteredMotion>& motions) {
+  constexpr double kGood = 0.02;  // m
+  Vector6 weights;
+  for (Eigen::Index axis = 0; axis < 6; ++axis) {
+    std::vector<double> differences;
+    for (const RegisteredMotion& m : motions) differences.push_back(std::abs(m.difference[axis]));
+    weights[axis] = kGood / std::max(kGood, median(std::move(differences)));
+  }
+  return weights;
+}
+
+}  // namespace
+
 MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
                          const Eigen::Isometry3d& T_body_sensor, bool only_steps) {
-  std::vector<double> translations;
-  std::vector<double> rotations;
-  std::vector<double> both;
-  std::vector<double> noise;
+  std::vector<double> translations, rotations, translation_noise, rotation_noise, both, noise;
+  const Vector6 weights = weights_of_axes(motions);
   for (const RegisteredMotion& motion : motions) {
     if (only_steps && motion.second != motion.first + 1) continue;
     const auto T_body = body(motion);
     if (!T_body) continue;
     const Vector6 r = residual(*T_body, motion.T_first_second, T_body_sensor);
+    const Vector6& d = motion.difference;
     translations.push_back(r.tail<3>().norm());
     rotations.push_back(r.head<3>().norm() / kLever);
-    both.push_back(r.norm());
-    noise.push_back(motion.noise);
+    translation_noise.push_back(std::hypot(d.tail<3>().norm(), motion.deviation));
+    rotation_noise.push_back(d.head<3>().norm() / kLever);
+    both.push_back(r.cwiseProduct(weights).norm());
+    noise.push_back(std::hypot(d.cwiseProduct(weights).norm(), motion.deviation));
   }
-  const std::size_t pairs = both.size();
-  return {median(std::move(translations)), median(std::move(rotations)), median(std::move(both)),
-          median(std::move(noise)), pairs};
+  MotionError error;
+  error.pairs = both.size();
+  error.translation = median(std::move(translations));
+  error.rotation = median(std::move(rotations));
+  error.translation_noise = median(std::move(translation_noise));
+  error.rotation_noise = median(std::move(rotation_noise));
+  error.at_points = median(std::move(both));
+  error.noise = median(std::move(noise));
+  return error;
 }
 
 std::optional<Eigen::Isometry3d> fit_extrinsic(const std::vector<RegisteredMotion>& registered,

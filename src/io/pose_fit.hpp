@@ -17,7 +17,9 @@ struct RegisteredMotion {
   std::size_t first;   ///< scan
   std::size_t second;  ///< scan
   Eigen::Isometry3d T_first_second;
-  double noise;  ///< m, difference of both directions of the registration, 10 m from the sensor
+  /// Difference of both directions of the registration: rotation times 10 m, and translation, m.
+  Eigen::Matrix<double, 6, 1> difference;
+  double deviation;  ///< m, of a direction that landmarks determine; 0: none
 };
 
 /// Registers pairs of scans at some places of a recording, neighbours and scans farther apart. The
@@ -30,10 +32,14 @@ using BodyMotion = std::function<std::optional<Eigen::Isometry3d>(const Register
 
 /// Difference of poses and registered motions: medians over pairs.
 struct MotionError {
-  double translation = 0.0;  ///< m
-  double rotation = 0.0;     ///< rad
-  double at_points = 0.0;    ///< m, of both, for points 10 m from the sensor
-  double noise = 0.0;        ///< m, of the registration, as at_points
+  double translation = 0.0;        ///< m
+  double rotation = 0.0;           ///< rad
+  double translation_noise = 0.0;  ///< m, of the registration
+  double rotation_noise = 0.0;     ///< rad, of the registration
+  /// m, of both, for points 10 m from the sensor. Axes that the registration determines worse than
+  /// others, such as the pitch of a sensor with few beams, count less.
+  double at_points = 0.0;
+  double noise = 0.0;  ///< m, of the registration, as at_points
   std::size_t pairs = 0;
 };
 

@@ -1,6 +1,7 @@
 // Trials of `dynains check`: simulated recordings times kinds of wrong poses, as a table in
 // Markdown. An answer is right if the proposed options give the true motion, or if the poses as
 // given do and no option is proposed.
+//   pose_trials [EVERY [VERBOSE [SCENE|all [SEED]]]]   (every n-th recording)
 #include <unistd.h>
 
 #include <algorithm>
@@ -240,7 +241,7 @@ bool is_right(const fs::path& folder, const Kind& kind, const Poses& truth, std:
 int main(int argc, char** argv) {
   const std::size_t every = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 1;
   const bool is_verbose = argc > 2;
-  const char* const only = argc > 3 ? argv[3] : nullptr;
+  const std::string only = argc > 3 ? argv[3] : "all";
   const std::size_t first_seed = argc > 4 ? std::strtoul(argv[4], nullptr, 10) : 100;
   const std::vector<Kind> all = kinds();
   std::map<std::string, std::pair<int, int>> right_of;
@@ -251,7 +252,7 @@ int main(int argc, char** argv) {
   for (const std::string& scene : simulation::scene_names()) {
     for (const char* const sensor : {"hdl64", "vlp16", "os1-64", "hdl32", "livox"}) {
       if (scene == "static" || number++ % every != 0) continue;
-      if (only != nullptr && scene != only) continue;
+      if (only != "all" && scene != only) continue;
       simulation::Config config;
       config.scene = simulation::scene_from_name(scene);
       config.sensor = simulation::sensor_from_name(sensor);
