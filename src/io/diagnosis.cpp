@@ -513,9 +513,13 @@ std::string fixed(double value, int digits) {
 }
 
 /// "12 cm and 0.3 deg from one scan to the next".
+std::string error_text(double translation, double rotation) {
+  return fixed(100.0 * translation, 0) + " cm and " + fixed(kDegrees * rotation, 1) +
+         " deg from one scan to the next";
+}
+
 std::string error_text(const Diagnosis& d) {
-  return fixed(100.0 * d.translation_error, 0) + " cm and " +
-         fixed(kDegrees * d.rotation_error, 1) + " deg from one scan to the next";
+  return error_text(d.translation_error, d.rotation_error);
 }
 
 std::string body_text(const Eigen::Isometry3d& T_body_sensor) {
@@ -555,6 +559,13 @@ std::string advice(const Diagnosis& d) {
       return "Scans agree better under the poses " + fixed(std::abs(d.time_offset), 3) + " s " +
              (d.time_offset > 0.0 ? "after" : "before") + " their times: pass " + d.option + ".";
     case PoseVerdict::kInexact:
+      if (d.is_inexact_at_start) {
+        return "Scans and poses agree, but the poses of the first scans are inexact by about " +
+               error_text(d.start_translation_error, d.start_rotation_error) +
+               ", as those of an odometry that has not converged yet: expect losses there; run "
+               "--start leaves "
+               "them out.";
+      }
       return "Scans and poses agree roughly, but the poses are inexact by about " + error_text(d) +
              ": expect losses; poses of a LiDAR odometry would do better.";
     case PoseVerdict::kNoMotion:

@@ -18,10 +18,17 @@ namespace {
 constexpr double kExact = 0.03;            // m at points 10 m away; registrations are worse rarely
 constexpr std::size_t kFewestMotions = 6;  // for any estimate
 constexpr std::size_t kFewestPairs = 3;    // neighbouring scans, for a statement about their error
+constexpr std::size_t kFewestFirstPairs = 2;  // at the start of the recording
 constexpr double kInexactTranslation = 0.05;  // m, from one scan to the next
 constexpr double kInexactRotation = 0.0045;   // rad
 constexpr double kFarOff = 1.0;               // m at points 10 m away
 constexpr double kRough = 0.4;  // m at points 10 m away; more is not inexact but wrong
+
+/// Whether errors are larger than what `all` registrations explain.
+bool is_inexact(const MotionError& error, const MotionError& all) {
+  return error.translation > std::max(kInexactTranslation, 3.0 * all.translation_noise) ||
+         error.rotation > std::max(kInexactRotation, 3.0 * all.rotation_noise);
+}
 
 BodyMotion motion_under(const Recording& recording, const PoseConvention& convention) {
   return [&recording, convention](const RegisteredMotion& m) -> std::optional<Eigen::Isometry3d> {
@@ -227,7 +234,8 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
   const std::vector<RegisteredMotion> motions = register_motions(recording);
   const BodyMotion given = motion_under(recording, recording.convention());
   const auto identity = Eigen::Isometry3d::Identity();
-  const MotionError steps = motion_error(motions, given, identity, true);
+  const MotionError steps = motion_error(motions, given, identity, Motions::kSteps);
+  const MotionError first_steps = motion_error(motions, given, identity, Motions::kFirstSteps);
   const MotionError all = motion_error(motions, given, identity);
   const double before = all.at_points;
   if (d.verdict == PoseVerdict::kAgree && before > kFarOff) {
@@ -262,15 +270,19 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
       return;
     }
   }
-  const bool is_inexact =
-      steps.translation > std::max(kInexactTranslation, 3.0 * steps.translation_noise) ||
-      steps.rotation > std::max(kInexactRotation, 3.0 * steps.rotation_noise);
+  d.is_inexact_at_start = first_steps.pairs >= kFewestFirstPairs &&
+                          is_inexact(first_steps, steps) && !is_inexact(steps, steps);
+  if (d.is_inexact_at_start) {
+    d.start_translation_error = first_steps.translation;
+    d.start_rotation_error = first_steps.rotation;
+  }
   if (d.verdict == PoseVerdict::kDisagree && before < exact) d.verdict = PoseVerdict::kAgree;
   if (d.verdict == PoseVerdict::kDisagree && before < kRough) d.verdict = PoseVerdict::kInexact;
   if (d.verdict == PoseVerdict::kNoMotion && before > kRough) d.verdict = PoseVerdict::kDisagree;
   const bool may_be_inexact =
       d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion;
-  if (may_be_inexact && is_inexact) d.verdict = PoseVerdict::kInexact;
+  if (may_be_inexact && (is_inexact(steps, steps) || d.is_inexact_at_start))
+    d.verdict = PoseVerdict::kInexact;
 }
 
 }  // namespace dynains

@@ -146,20 +146,21 @@ std::optional<CheckedMotion> register_both_ways(ChainScan& a, ChainScan& b,
   return checked(found, register_scans(b.planes(), a.planes(), {found->T_a_b.inverse()}), 0.0);
 }
 
-struct Motions {
+struct BothMotions {
   Eigen::Isometry3d body;
   Eigen::Isometry3d sensor;
 };
 
-double robust_cost(const std::vector<Motions>& motions, const Eigen::Isometry3d& T_body_sensor) {
+double robust_cost(const std::vector<BothMotions>& motions,
+                   const Eigen::Isometry3d& T_body_sensor) {
   double cost = 0.0;
-  for (const Motions& m : motions)
+  for (const BothMotions& m : motions)
     cost += std::log1p(residual(m.body, m.sensor, T_body_sensor).squaredNorm() / 0.01);
   return cost;
 }
 
 /// Gauss-Newton with Cauchy weights and a weak prior that the lever arm is 0.
-Eigen::Isometry3d refine(const std::vector<Motions>& motions, Eigen::Isometry3d T_body_sensor) {
+Eigen::Isometry3d refine(const std::vector<BothMotions>& motions, Eigen::Isometry3d T_body_sensor) {
   constexpr double kScale = 0.1;   // m, of a residual
   constexpr double kPrior = 0.02;  // m per m of the lever arm
   constexpr double kStep = 1e-6;
@@ -170,7 +171,7 @@ Eigen::Isometry3d refine(const std::vector<Motions>& motions, Eigen::Isometry3d 
       H(3 + axis, 3 + axis) += kPrior * kPrior;
       g[3 + axis] += kPrior * kPrior * T_body_sensor.translation()[axis];
     }
-    for (const Motions& m : motions) {
+    for (const BothMotions& m : motions) {
       const Vector6 r = residual(m.body, m.sensor, T_body_sensor);
       Matrix6 J;
       for (Eigen::Index j = 0; j < 6; ++j) {
@@ -224,8 +225,27 @@ std::vector<Eigen::Matrix3d> axis_rotations() {
 
 }  // namespace
 
-std::vector<RegisteredMotion> register_motions(const Recording& recording) {
+namespace {
+
+/// Scans at which chains begin: 0, 2 and 4, the others evenly spread.
+std::vector<std::size_t> starts_of_chains(std::size_t scans) {
   constexpr std::size_t kChains = 12;
+  constexpr std::size_t kAtStart = kStartScans / 2;
+  std::vector<std::size_t> starts;
+  for (std::size_t i = 0; i < scans - 1 && scans - 1 <= kChains; ++i) starts.push_back(i);
+  if (!starts.empty()) return starts;
+  for (std::size_t k = 0; k < kAtStart; ++k) starts.push_back(2 * k);
+  constexpr std::size_t kLast = kChains - kAtStart;
+  for (std::size_t k = 1; k <= kLast; ++k) {
+    const std::size_t start = k * (scans - 2) / kLast;
+    if (start > starts.back()) starts.push_back(start);
+  }
+  return starts;
+}
+
+}  // namespace
+
+std::vector<RegisteredMotion> register_motions(const Recording& recording) {
   constexpr std::size_t kLongest = 16;        // scans
   constexpr std::size_t kLongEnough = 4;      // scans
   constexpr double kFar = 3.0;                // m
@@ -234,13 +254,12 @@ std::vector<RegisteredMotion> register_motions(const Recording& recording) {
   constexpr double kTurned = 0.25;            // rad
   std::vector<RegisteredMotion> motions;
   if (recording.size() < 2) return motions;
-  const std::size_t starts = recording.size() - 1;
-  const std::size_t chains = std::min(kChains, starts);
+  const std::vector<std::size_t> starts = starts_of_chains(recording.size());
   ChainScans scans(recording);
   std::optional<Eigen::Isometry3d> elsewhere;
-  for (std::size_t chain = 0; chain < chains; ++chain) {
+  for (std::size_t chain = 0; chain < starts.size(); ++chain) {
     scans.clear();
-    const std::size_t first = chains == 1 ? 0 : chain * (starts - 1) / (chains - 1);
+    const std::size_t first = starts[chain];
     const Eigen::Isometry3d given =
         recording.T_world_sensor(first).inverse() * recording.T_world_sensor(first + 1);
     std::vector<Eigen::Isometry3d> guesses = first_guesses(given, elsewhere);
@@ -276,11 +295,13 @@ Vector6 weights_of_axes(const std::vector<RegisteredMotion>& motions) {
 }  // namespace
 
 MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
-                         const Eigen::Isometry3d& T_body_sensor, bool only_steps) {
+                         const Eigen::Isometry3d& T_body_sensor, Motions which) {
   std::vector<double> translations, rotations, translation_noise, rotation_noise, both, noise;
   const Vector6 weights = weights_of_axes(motions);
   for (const RegisteredMotion& motion : motions) {
-    if (only_steps && motion.second != motion.first + 1) continue;
+    const bool is_step = motion.second == motion.first + 1;
+    if (which != Motions::kAll && !is_step) continue;
+    if (which == Motions::kFirstSteps && motion.second >= kStartScans) continue;
     const auto T_body = body(motion);
     if (!T_body) continue;
     const Vector6 r = residual(*T_body, motion.T_first_second, T_body_sensor);
@@ -307,7 +328,7 @@ std::optional<Eigen::Isometry3d> fit_extrinsic(const std::vector<RegisteredMotio
                                                const BodyMotion& body) {
   constexpr std::size_t kFewest = 4;
   constexpr double kClearly = 0.9;  // ratio of costs
-  std::vector<Motions> motions;
+  std::vector<BothMotions> motions;
   for (const RegisteredMotion& motion : registered) {
     const auto T_body = body(motion);
     if (T_body) motions.push_back({*T_body, motion.T_first_second});

@@ -22,7 +22,11 @@ struct RegisteredMotion {
   double deviation;  ///< m, of a direction that landmarks determine; 0: none
 };
 
-/// Registers pairs of scans at some places of a recording, neighbours and scans farther apart. The
+/// Scans at the start of a recording, where an odometry has not converged yet.
+inline constexpr std::size_t kStartScans = 6;
+
+/// Registers pairs of scans at some places of a recording, three of them among the first
+/// kStartScans, neighbours and scans farther apart. The
 /// given poses are one of several first guesses. Pairs that determine no motion are left out.
 /// Throws IoError.
 std::vector<RegisteredMotion> register_motions(const Recording& recording);
@@ -43,9 +47,11 @@ struct MotionError {
   std::size_t pairs = 0;
 };
 
-/// `T_body_sensor`: of the body that moves. With `only_steps`, of neighbouring scans.
+enum class Motions { kAll, kSteps, kFirstSteps };  ///< steps: between neighbouring scans
+
+/// `T_body_sensor`: of the body that moves.
 MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
-                         const Eigen::Isometry3d& T_body_sensor, bool only_steps = false);
+                         const Eigen::Isometry3d& T_body_sensor, Motions which = Motions::kAll);
 
 /// Hand-eye calibration: T_body_sensor for which the motions of the body and of the sensor agree
 /// best. Directions that the motions do not determine stay 0. Empty for fewer than 4 motions.

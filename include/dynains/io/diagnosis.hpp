@@ -83,6 +83,11 @@ struct Diagnosis {
   double translation_error = 0.0;
   double rotation_error = 0.0;
   std::size_t registered_pairs = 0;  ///< 0 if no motion could be registered
+  /// Whether only the poses of the first scans are inexact, as those of an odometry that has not
+  /// converged yet; then the errors there, m and rad.
+  bool is_inexact_at_start = false;
+  double start_translation_error = 0.0;
+  double start_rotation_error = 0.0;
   /// Under which scans agree, for kOtherwise, kBodyFrame and kTimeOffset.
   PoseConvention convention;
   double time_offset = 0.0;  ///< s, as RecordingOptions::time_offset
