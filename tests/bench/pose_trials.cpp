@@ -265,6 +265,7 @@ int main(int argc, char** argv) {
         write_scan(folder / "velodyne" / (simulation::scan_name(i) + ".bin"), scan.xyzi);
         truth.push_back(scan.T_world_sensor);
       }
+      int right_here = 0;
       for (const Kind& kind : all) {
         fs::remove(folder / "times.txt");
         kind.write(folder, truth);
@@ -272,10 +273,14 @@ int main(int argc, char** argv) {
         const bool right = is_right(folder, kind, truth, told);
         auto& [good, count] = right_of[kind.name];
         good += right ? 1 : 0;
+        right_here += right ? 1 : 0;
         ++count;
         if (is_verbose && !right) {
           std::cerr << scene << ' ' << sensor << ": " << kind.name << ": " << told << '\n';
         }
+      }
+      if (is_verbose) {
+        std::cerr << scene << ' ' << sensor << ": " << right_here << " of " << all.size() << '\n';
       }
     }
   }
