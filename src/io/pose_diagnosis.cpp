@@ -19,6 +19,7 @@ constexpr double kExact = 0.03;            // m at points 10 m away; registratio
 constexpr std::size_t kFewestMotions = 6;  // for any estimate
 constexpr std::size_t kFewestPairs = 3;    // neighbouring scans, for a statement about their error
 constexpr std::size_t kFewestFirstPairs = 2;  // at the start of the recording
+constexpr double kClearlyWorse = 3.0;         // ratio of errors at the start and elsewhere
 constexpr double kInexactTranslation = 0.05;  // m, from one scan to the next
 constexpr double kInexactRotation = 0.0045;   // rad
 constexpr double kFarOff = 1.0;               // m at points 10 m away
@@ -270,7 +271,9 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
       return;
     }
   }
-  d.is_inexact_at_start = first_steps.pairs >= kFewestFirstPairs &&
+  const bool is_worse_at_start = first_steps.translation > kClearlyWorse * steps.translation ||
+                                 first_steps.rotation > kClearlyWorse * steps.rotation;
+  d.is_inexact_at_start = first_steps.pairs >= kFewestFirstPairs && is_worse_at_start &&
                           is_inexact(first_steps, steps) && !is_inexact(steps, steps);
   if (d.is_inexact_at_start) {
     d.start_translation_error = first_steps.translation;
