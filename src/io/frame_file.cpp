@@ -48,6 +48,10 @@ void add(const fs::path& path, std::uint64_t line, const StampedPose& pose, Tran
   if (pose.frame.empty() || pose.child.empty() || pose.frame == pose.child) {
     fail_at_line(path, line, "expected the names of two frames");
   }
+  constexpr double kFarthest = 1e5;  // m
+  if (!(pose.T_frame_child.translation().norm() < kFarthest)) {
+    fail_at_line(path, line, "expected frames at most 100 km apart");
+  }
   if (tree.has(pose.child)) {
     fail_at_line(path, line, "frame " + pose.child + " has a transform already");
   }

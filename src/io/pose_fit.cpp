@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <utility>
 
 #include "finite_points.hpp"
@@ -227,13 +228,16 @@ std::vector<Eigen::Matrix3d> axis_rotations() {
 
 namespace {
 
-/// Scans at which chains begin: 0, 2 and 4, the others evenly spread.
+/// Scans at which chains begin: 0, 2 and 4, the others evenly spread. `scans`: at least 2.
 std::vector<std::size_t> starts_of_chains(std::size_t scans) {
   constexpr std::size_t kChains = 12;
   constexpr std::size_t kAtStart = kStartScans / 2;
   std::vector<std::size_t> starts;
-  for (std::size_t i = 0; i < scans - 1 && scans - 1 <= kChains; ++i) starts.push_back(i);
-  if (!starts.empty()) return starts;
+  if (scans - 1 <= kChains) {
+    starts.resize(scans - 1);
+    std::iota(starts.begin(), starts.end(), std::size_t{0});
+    return starts;
+  }
   for (std::size_t k = 0; k < kAtStart; ++k) starts.push_back(2 * k);
   constexpr std::size_t kLast = kChains - kAtStart;
   for (std::size_t k = 1; k <= kLast; ++k) {
@@ -286,6 +290,7 @@ Vector6 weights_of_axes(const std::vector<RegisteredMotion>& motions) {
   Vector6 weights;
   for (Eigen::Index axis = 0; axis < 6; ++axis) {
     std::vector<double> differences;
+    differences.reserve(motions.size());
     for (const RegisteredMotion& m : motions) differences.push_back(std::abs(m.difference[axis]));
     weights[axis] = kGood / std::max(kGood, median(std::move(differences)));
   }

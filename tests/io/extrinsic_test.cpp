@@ -136,6 +136,8 @@ TEST_CASE("An extrinsic is found in static transforms by two frames") {
                 "expected the names of two frames");
   check_refused("h.yaml", "- {parent: a, child: b, x: 0, y: 0, z: 0, qx: 0, qy: 0, qz: 0, qw: 2}\n",
                 "1", "expected a quaternion of length 1");
+  check_refused("j.yaml", "- {parent: a, child: b, x: 0, y: 1e200, z: 0}\n", "1",
+                "expected frames at most 100 km apart");
   check_refused("i.yaml", "- 7\n", "1", "expected x, y and z");
 }
 
