@@ -26,7 +26,6 @@ constexpr double kFast = 2.0;           // m from scan to scan; overlap of pairs
 constexpr std::size_t kQueries = 1200;  // points of a scan that are compared
 constexpr double kAgreeing = 0.3;       // m
 constexpr double kFarthestGap = 1.0;    // m
-constexpr double kFarthest = 40.0;      // m; points are too sparse beyond it
 
 /// Number of a cell of a grid around the sensor; cells above each other have consecutive numbers.
 std::uint64_t cell_of(const Eigen::Vector3d& p, double edge) {
@@ -378,7 +377,8 @@ SampledPairs sample_pairs(const Recording& recording, ScanSample& sample) {
 
 }  // namespace
 
-Landmarks::Landmarks(PointsView points, const Mounting& mounting) {
+Landmarks::Landmarks(PointsView points, const Mounting& mounting, double farthest)
+    : farthest_(farthest) {
   constexpr double kNearest = 2.0;     // m; nearer points belong to the own vehicle
   constexpr double kOverGround = 0.5;  // m; ground agrees under every motion along it
   constexpr double kThinned = 0.25;    // m
@@ -386,7 +386,7 @@ Landmarks::Landmarks(PointsView points, const Mounting& mounting) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d p(points.x[i], points.y[i], points.z[i]);
     const double range = p.norm();
-    if (!(range > kNearest && range < kFarthest)) continue;
+    if (!(range > kNearest && range < farthest)) continue;
     if (mounting.known && mounting.up_sensor.dot(p) + mounting.height < kOverGround) continue;
     kept.emplace_back(cell_of(p, kThinned), p);
   }
@@ -403,9 +403,8 @@ Landmarks::Landmarks(PointsView points, const Mounting& mounting) {
   }
 }
 
-/// Distance to the nearest point, at most kFarthestGap.
 double Landmarks::distance_to(const Eigen::Vector3d& p) const {
-  if (!(p.cwiseAbs().maxCoeff() < kFarthest + kFarthestGap)) return kFarthestGap;
+  if (!(p.cwiseAbs().maxCoeff() < farthest_ + kFarthestGap)) return kFarthestGap;
   double squared = kFarthestGap * kFarthestGap;
   for (const double x : {-kFarthestGap, 0.0, kFarthestGap}) {
     for (const double y : {-kFarthestGap, 0.0, kFarthestGap}) {
@@ -514,9 +513,13 @@ std::string fixed(double value, int digits) {
 }
 
 /// "12 cm and 0.3 deg from one scan to the next".
+std::string error_text(double translation, double rotation) {
+  return fixed(100.0 * translation, 0) + " cm and " + fixed(kDegrees * rotation, 1) +
+         " deg from one scan to the next";
+}
+
 std::string error_text(const Diagnosis& d) {
-  return fixed(100.0 * d.translation_error, 0) + " cm and " +
-         fixed(kDegrees * d.rotation_error, 1) + " deg from one scan to the next";
+  return error_text(d.translation_error, d.rotation_error);
 }
 
 std::string body_text(const Eigen::Isometry3d& T_body_sensor) {
@@ -556,6 +559,13 @@ std::string advice(const Diagnosis& d) {
       return "Scans agree better under the poses " + fixed(std::abs(d.time_offset), 3) + " s " +
              (d.time_offset > 0.0 ? "after" : "before") + " their times: pass " + d.option + ".";
     case PoseVerdict::kInexact:
+      if (d.is_inexact_at_start) {
+        return "Scans and poses agree, but the poses of the first scans are inexact by about " +
+               error_text(d.start_translation_error, d.start_rotation_error) +
+               ", as those of an odometry that has not converged yet: expect losses there; run "
+               "--start leaves "
+               "them out.";
+      }
       return "Scans and poses agree roughly, but the poses are inexact by about " + error_text(d) +
              ": expect losses; poses of a LiDAR odometry would do better.";
     case PoseVerdict::kNoMotion:

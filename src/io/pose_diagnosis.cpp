@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
@@ -17,9 +18,18 @@ namespace {
 constexpr double kExact = 0.03;            // m at points 10 m away; registrations are worse rarely
 constexpr std::size_t kFewestMotions = 6;  // for any estimate
 constexpr std::size_t kFewestPairs = 3;    // neighbouring scans, for a statement about their error
+constexpr std::size_t kFewestFirstPairs = 2;  // at the start of the recording
+constexpr double kClearlyWorse = 3.0;         // ratio of errors at the start and elsewhere
 constexpr double kInexactTranslation = 0.05;  // m, from one scan to the next
 constexpr double kInexactRotation = 0.0045;   // rad
 constexpr double kFarOff = 1.0;               // m at points 10 m away
+constexpr double kRough = 0.4;  // m at points 10 m away; more is not inexact but wrong
+
+/// Whether errors are larger than what `all` registrations explain.
+bool is_inexact(const MotionError& error, const MotionError& all) {
+  return error.translation > std::max(kInexactTranslation, 3.0 * all.translation_noise) ||
+         error.rotation > std::max(kInexactRotation, 3.0 * all.rotation_noise);
+}
 
 BodyMotion motion_under(const Recording& recording, const PoseConvention& convention) {
   return [&recording, convention](const RegisteredMotion& m) -> std::optional<Eigen::Isometry3d> {
@@ -169,6 +179,43 @@ std::optional<Explanation> explain_by_offset(const Recording& recording,
   return result;
 }
 
+/// The usual mistake under which poses and motions agree best; it becomes the first of `readings`.
+std::optional<Explanation> explain_by_reading(const Recording& recording,
+                                              const std::vector<RegisteredMotion>& motions,
+                                              std::vector<PoseReading>& readings, double before) {
+  const auto error_of = [&](const PoseReading& reading) {
+    return error_at_points(motions, motion_under(recording, reading.convention));
+  };
+  const auto flags_of = [](const PoseReading& reading) {
+    return std::count(reading.option.begin(), reading.option.end(), '-');
+  };
+  std::vector<std::size_t> order(readings.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return flags_of(readings[a]) < flags_of(readings[b]);
+  });
+  std::size_t best = 0;
+  double least = before;
+  for (const std::size_t i : order) {
+    const double error = error_of(readings[i]);
+    const bool has_as_few_flags =
+        least < before && flags_of(readings[i]) == flags_of(readings[best]);
+    // A further flag must explain clearly more.
+    if (!(error < (has_as_few_flags ? 1.0 : 0.5) * least)) continue;
+    best = i;
+    least = error;
+  }
+  // Small motions differ little from any others, so no motion must be clearly worse, too.
+  const double standing = error_at_points(
+      motions, [](const RegisteredMotion&) { return Eigen::Isometry3d::Identity(); });
+  const bool explains = is_much_better(least, before) && least < std::min(kRough, 0.5 * standing);
+  if (!explains) return std::nullopt;
+  const auto found = readings.begin() + static_cast<std::ptrdiff_t>(best);
+  std::rotate(readings.begin(), found, found + 1);
+  return Explanation{PoseVerdict::kOtherwise, least, readings.front().convention,
+                     recording.time_offset(), readings.front().option};
+}
+
 void take(const Explanation& explanation, Diagnosis& d) {
   d.verdict = explanation.verdict;
   d.convention = explanation.convention;
@@ -188,10 +235,11 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
   const std::vector<RegisteredMotion> motions = register_motions(recording);
   const BodyMotion given = motion_under(recording, recording.convention());
   const auto identity = Eigen::Isometry3d::Identity();
-  const MotionError steps = motion_error(motions, given, identity, true);
+  const MotionError steps = motion_error(motions, given, identity, Motions::kSteps);
+  const MotionError first_steps = motion_error(motions, given, identity, Motions::kFirstSteps);
   const MotionError all = motion_error(motions, given, identity);
   const double before = all.at_points;
-  if (d.sound() && before > kFarOff) {
+  if (d.verdict == PoseVerdict::kAgree && before > kFarOff) {
     // In traffic of the own speed, a registration can find no motion, though the poses agree with
     // all that stands still.
     d.registered_pairs = 0;
@@ -204,35 +252,40 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
   if (motions.size() < kFewestMotions || steps.pairs < kFewestPairs) return;
 
   if (before > exact) {
-    const bool has_reading = d.verdict == PoseVerdict::kOtherwise;
-    const double reading =
-        has_reading
-            ? error_at_points(motions, motion_under(recording, d.readings.front().convention))
-            : before;
-    const double bound = has_reading ? std::max(0.5 * reading, exact) : before;
-    const auto body = explain_by_body(recording, motions, before);
+    auto reading = explain_by_reading(recording, motions, d.readings, before);
     const auto offset = explain_by_offset(recording, motions, before);
+    const auto body = explain_by_body(recording, motions, before);
+    // A shift by scans is a coarse offset.
+    const bool is_shift = reading && reading->convention.shift != recording.convention().shift;
+    if (is_shift && offset && offset->error < reading->error) reading.reset();
     const Explanation* best = nullptr;
-    for (const auto* candidate : {&offset, &body}) {
-      // A body has six numbers to fit, an offset has one.
-      if (*candidate && (best == nullptr || (*candidate)->error < 0.6 * best->error)) {
-        best = &**candidate;
-      }
+    // A mistake has no number to fit, an offset has one, a body has six.
+    for (const auto* candidate : {&std::as_const(reading), &offset, &body}) {
+      if (!*candidate) continue;
+      const bool is_better =
+          best == nullptr || (best->error > exact && (*candidate)->error < 0.6 * best->error);
+      if (is_better) best = &**candidate;
     }
-    const bool is_explained =
-        best != nullptr && best->error < bound && !(has_reading && reading < exact);
-    if (is_explained) {
+    if (best != nullptr) {
       take(*best, d);
       return;
     }
   }
-  const bool is_inexact = steps.translation > std::max(kInexactTranslation, 3.0 * steps.noise) ||
-                          steps.rotation > std::max(kInexactRotation, 3.0 * steps.noise / 10.0);
+  const bool is_worse_at_start = first_steps.translation > kClearlyWorse * steps.translation ||
+                                 first_steps.rotation > kClearlyWorse * steps.rotation;
+  d.is_inexact_at_start = first_steps.pairs >= kFewestFirstPairs && is_worse_at_start &&
+                          is_inexact(first_steps, steps) && !is_inexact(steps, steps);
+  if (d.is_inexact_at_start) {
+    d.start_translation_error = first_steps.translation;
+    d.start_rotation_error = first_steps.rotation;
+  }
   if (d.verdict == PoseVerdict::kDisagree && before < exact) d.verdict = PoseVerdict::kAgree;
-  if (d.verdict == PoseVerdict::kDisagree && before < kFarOff) d.verdict = PoseVerdict::kInexact;
+  if (d.verdict == PoseVerdict::kDisagree && before < kRough) d.verdict = PoseVerdict::kInexact;
+  if (d.verdict == PoseVerdict::kNoMotion && before > kRough) d.verdict = PoseVerdict::kDisagree;
   const bool may_be_inexact =
       d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion;
-  if (may_be_inexact && is_inexact) d.verdict = PoseVerdict::kInexact;
+  if (may_be_inexact && (is_inexact(steps, steps) || d.is_inexact_at_start))
+    d.verdict = PoseVerdict::kInexact;
 }
 
 }  // namespace dynains

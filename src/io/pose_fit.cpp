@@ -5,11 +5,13 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <utility>
 
 #include "finite_points.hpp"
 #include "median.hpp"
 #include "scan_registration.hpp"
+#include "way_search.hpp"
 
 namespace dynains {
 namespace {
@@ -21,16 +23,33 @@ constexpr double kLever = 10.0;  // m, distance of the points at which a rotatio
 
 double angle_of(const Eigen::Matrix3d& R) { return std::abs(Eigen::AngleAxisd(R).angle()); }
 
+/// A scan, as planes and as landmarks.
+class ChainScan {
+ public:
+  explicit ChainScan(PointBuffer points) : points_(std::move(points)), planes_(points_) {}
+
+  const RegistrationScan& planes() const { return planes_; }
+  const Landmarks& landmarks() {
+    if (!landmarks_) landmarks_.emplace(points_, estimate_mounting(points_), kWayRange);
+    return *landmarks_;
+  }
+
+ private:
+  PointBuffer points_;
+  RegistrationScan planes_;
+  std::optional<Landmarks> landmarks_;
+};
+
 /// Reads scans on demand and keeps those of one chain.
 class ChainScans {
  public:
   explicit ChainScans(const Recording& recording) : recording_(recording) {}
 
-  const RegistrationScan& get(std::size_t i) {
-    std::unique_ptr<RegistrationScan>& entry = scans_[i];
+  ChainScan& get(std::size_t i) {
+    std::unique_ptr<ChainScan>& entry = scans_[i];
     if (entry == nullptr) {
       recording_.read_scan(i, scan_);
-      entry = std::make_unique<RegistrationScan>(finite_points(scan_));
+      entry = std::make_unique<ChainScan>(finite_points(scan_));
     }
     return *entry;
   }
@@ -39,7 +58,7 @@ class ChainScans {
  private:
   const Recording& recording_;
   RecordedScan scan_;
-  std::map<std::size_t, std::unique_ptr<RegistrationScan>> scans_;
+  std::map<std::size_t, std::unique_ptr<ChainScan>> scans_;
 };
 
 /// Guesses of the motion to the next scan: as given, none, the given distance in each direction,
@@ -66,7 +85,7 @@ bool is_certain(const std::optional<Registration>& registration) {
   constexpr double kLeastScore = 0.45;
   constexpr double kUncertain = 0.06;  // m
   return registration && registration->score > kLeastScore &&
-         registration->uncertainty < kUncertain;
+         registration->uncertainty < kUncertain && !registration->is_ambiguous;
 }
 
 /// Residual of a motion: rotation times kLever, and translation, m.
@@ -79,20 +98,70 @@ Vector6 residual(const Eigen::Isometry3d& body, const Eigen::Isometry3d& sensor,
   return r;
 }
 
-struct Motions {
+/// A motion by two registrations, forth and back.
+struct CheckedMotion {
+  Eigen::Isometry3d T_a_b;
+  Vector6 difference;
+  double deviation;  // m
+};
+
+std::optional<CheckedMotion> checked(const std::optional<Registration>& forth,
+                                     const std::optional<Registration>& back, double deviation) {
+  constexpr double kNoisy = 0.25;  // m, 10 m from the sensor
+  if (!is_certain(forth) || !is_certain(back)) return std::nullopt;
+  const Vector6 difference =
+      residual(forth->T_a_b, back->T_a_b.inverse(), Eigen::Isometry3d::Identity());
+  if (difference.norm() > kNoisy) return std::nullopt;
+  return CheckedMotion{forth->T_a_b, difference, deviation};
+}
+
+/// Completes a registration by planes that leaves a direction open: landmarks tell the way along
+/// it, less than `farthest` (m) from what planes say. The least certain direction is not always the
+/// open one: the back of a vehicle ahead is a plane, too.
+std::optional<CheckedMotion> complete(ChainScan& a, ChainScan& b, const Registration& by_planes,
+                                      double farthest) {
+  constexpr double kDeviation = 0.04;  // m, of search_way()
+  for (const Eigen::Vector3d& direction : by_planes.uncertain) {
+    const auto guess =
+        search_way(a.landmarks(), b.landmarks(), by_planes.T_a_b, direction, farthest);
+    if (!guess) continue;
+    const auto forth = register_near(a.planes(), b.planes(), *guess, {direction, kDeviation});
+    if (!is_certain(forth)) continue;
+    const Eigen::Isometry3d T_b_a = forth->T_a_b.inverse();
+    return checked(
+        forth,
+        register_near(b.planes(), a.planes(), T_b_a, {T_b_a.linear() * direction, kDeviation}),
+        kDeviation);
+  }
+  return std::nullopt;
+}
+
+/// Registers b to a. Empty if the motion is uncertain.
+std::optional<CheckedMotion> register_both_ways(ChainScan& a, ChainScan& b,
+                                                const std::vector<Eigen::Isometry3d>& guesses,
+                                                double farthest) {
+  constexpr double kOpen = 0.025;  // m, uncertainty of a direction that planes leave open
+  const auto found = register_scans(a.planes(), b.planes(), guesses);
+  if (!found) return std::nullopt;
+  if (found->is_ambiguous || found->uncertainty > kOpen) return complete(a, b, *found, farthest);
+  return checked(found, register_scans(b.planes(), a.planes(), {found->T_a_b.inverse()}), 0.0);
+}
+
+struct BothMotions {
   Eigen::Isometry3d body;
   Eigen::Isometry3d sensor;
 };
 
-double robust_cost(const std::vector<Motions>& motions, const Eigen::Isometry3d& T_body_sensor) {
+double robust_cost(const std::vector<BothMotions>& motions,
+                   const Eigen::Isometry3d& T_body_sensor) {
   double cost = 0.0;
-  for (const Motions& m : motions)
+  for (const BothMotions& m : motions)
     cost += std::log1p(residual(m.body, m.sensor, T_body_sensor).squaredNorm() / 0.01);
   return cost;
 }
 
 /// Gauss-Newton with Cauchy weights and a weak prior that the lever arm is 0.
-Eigen::Isometry3d refine(const std::vector<Motions>& motions, Eigen::Isometry3d T_body_sensor) {
+Eigen::Isometry3d refine(const std::vector<BothMotions>& motions, Eigen::Isometry3d T_body_sensor) {
   constexpr double kScale = 0.1;   // m, of a residual
   constexpr double kPrior = 0.02;  // m per m of the lever arm
   constexpr double kStep = 1e-6;
@@ -103,7 +172,7 @@ Eigen::Isometry3d refine(const std::vector<Motions>& motions, Eigen::Isometry3d 
       H(3 + axis, 3 + axis) += kPrior * kPrior;
       g[3 + axis] += kPrior * kPrior * T_body_sensor.translation()[axis];
     }
-    for (const Motions& m : motions) {
+    for (const BothMotions& m : motions) {
       const Vector6 r = residual(m.body, m.sensor, T_body_sensor);
       Matrix6 J;
       for (Eigen::Index j = 0; j < 6; ++j) {
@@ -157,70 +226,114 @@ std::vector<Eigen::Matrix3d> axis_rotations() {
 
 }  // namespace
 
-std::vector<RegisteredMotion> register_motions(const Recording& recording) {
+namespace {
+
+/// Scans at which chains begin: 0, 2 and 4, the others evenly spread. `scans`: at least 2.
+std::vector<std::size_t> starts_of_chains(std::size_t scans) {
   constexpr std::size_t kChains = 12;
-  constexpr std::size_t kLongest = 16;  // scans
-  constexpr double kFar = 3.0;          // m
-  constexpr double kTurned = 0.25;      // rad
-  constexpr double kNoisy = 0.25;       // m, 10 m from the sensor
+  constexpr std::size_t kAtStart = kStartScans / 2;
+  std::vector<std::size_t> starts;
+  if (scans - 1 <= kChains) {
+    starts.resize(scans - 1);
+    std::iota(starts.begin(), starts.end(), std::size_t{0});
+    return starts;
+  }
+  for (std::size_t k = 0; k < kAtStart; ++k) starts.push_back(2 * k);
+  constexpr std::size_t kLast = kChains - kAtStart;
+  for (std::size_t k = 1; k <= kLast; ++k) {
+    const std::size_t start = k * (scans - 2) / kLast;
+    if (start > starts.back()) starts.push_back(start);
+  }
+  return starts;
+}
+
+}  // namespace
+
+std::vector<RegisteredMotion> register_motions(const Recording& recording) {
+  constexpr std::size_t kLongest = 16;        // scans
+  constexpr std::size_t kLongEnough = 4;      // scans
+  constexpr double kFar = 3.0;                // m
+  constexpr double kFarthestStep = 6.0;       // m
+  constexpr double kFarthestFromGuess = 1.5;  // m
+  constexpr double kTurned = 0.25;            // rad
   std::vector<RegisteredMotion> motions;
   if (recording.size() < 2) return motions;
-  const std::size_t starts = recording.size() - 1;
-  const std::size_t chains = std::min(kChains, starts);
+  const std::vector<std::size_t> starts = starts_of_chains(recording.size());
   ChainScans scans(recording);
   std::optional<Eigen::Isometry3d> elsewhere;
-  for (std::size_t chain = 0; chain < chains; ++chain) {
+  for (std::size_t chain = 0; chain < starts.size(); ++chain) {
     scans.clear();
-    const std::size_t first = chains == 1 ? 0 : chain * (starts - 1) / (chains - 1);
+    const std::size_t first = starts[chain];
     const Eigen::Isometry3d given =
         recording.T_world_sensor(first).inverse() * recording.T_world_sensor(first + 1);
     std::vector<Eigen::Isometry3d> guesses = first_guesses(given, elsewhere);
     for (std::size_t step = 1; step <= kLongest && first + step < recording.size(); step *= 2) {
-      const auto found = register_scans(scans.get(first), scans.get(first + step), guesses);
-      if (!is_certain(found)) break;
-      const auto back =
-          register_scans(scans.get(first + step), scans.get(first), {found->T_a_b.inverse()});
-      if (!is_certain(back)) break;
-      const double noise =
-          residual(found->T_a_b, back->T_a_b.inverse(), Eigen::Isometry3d::Identity()).norm();
-      if (noise > kNoisy) break;
-      motions.push_back({chain, first, first + step, found->T_a_b, noise});
+      const auto found = register_both_ways(scans.get(first), scans.get(first + step), guesses,
+                                            step == 1 ? kFarthestStep : kFarthestFromGuess);
+      if (!found) break;
+      motions.push_back(
+          {chain, first, first + step, found->T_a_b, found->difference, found->deviation});
       if (step == 1) elsewhere = found->T_a_b;
-      if (found->T_a_b.translation().norm() > kFar || angle_of(found->T_a_b.linear()) > kTurned) {
-        break;
-      }
+      const bool is_far = found->T_a_b.translation().norm() > kFar && step >= kLongEnough;
+      if (is_far || angle_of(found->T_a_b.linear()) > kTurned) break;
       guesses = {found->T_a_b * found->T_a_b};
     }
   }
   return motions;
 }
 
+namespace {
+
+/// Weights of the axes of residuals, at most 1, from the differences of both registrations.
+Vector6 weights_of_axes(const std::vector<RegisteredMotion>& motions) {
+  constexpr double kGood = 0.02;  // m
+  Vector6 weights;
+  for (Eigen::Index axis = 0; axis < 6; ++axis) {
+    std::vector<double> differences;
+    differences.reserve(motions.size());
+    for (const RegisteredMotion& m : motions) differences.push_back(std::abs(m.difference[axis]));
+    weights[axis] = kGood / std::max(kGood, median(std::move(differences)));
+  }
+  return weights;
+}
+
+}  // namespace
+
 MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
-                         const Eigen::Isometry3d& T_body_sensor, bool only_steps) {
-  std::vector<double> translations;
-  std::vector<double> rotations;
-  std::vector<double> both;
-  std::vector<double> noise;
+                         const Eigen::Isometry3d& T_body_sensor, Motions which) {
+  std::vector<double> translations, rotations, translation_noise, rotation_noise, both, noise;
+  const Vector6 weights = weights_of_axes(motions);
   for (const RegisteredMotion& motion : motions) {
-    if (only_steps && motion.second != motion.first + 1) continue;
+    const bool is_step = motion.second == motion.first + 1;
+    if (which != Motions::kAll && !is_step) continue;
+    if (which == Motions::kFirstSteps && motion.second >= kStartScans) continue;
     const auto T_body = body(motion);
     if (!T_body) continue;
     const Vector6 r = residual(*T_body, motion.T_first_second, T_body_sensor);
+    const Vector6& d = motion.difference;
     translations.push_back(r.tail<3>().norm());
     rotations.push_back(r.head<3>().norm() / kLever);
-    both.push_back(r.norm());
-    noise.push_back(motion.noise);
+    translation_noise.push_back(std::hypot(d.tail<3>().norm(), motion.deviation));
+    rotation_noise.push_back(d.head<3>().norm() / kLever);
+    both.push_back(r.cwiseProduct(weights).norm());
+    noise.push_back(std::hypot(d.cwiseProduct(weights).norm(), motion.deviation));
   }
-  const std::size_t pairs = both.size();
-  return {median(std::move(translations)), median(std::move(rotations)), median(std::move(both)),
-          median(std::move(noise)), pairs};
+  MotionError error;
+  error.pairs = both.size();
+  error.translation = median(std::move(translations));
+  error.rotation = median(std::move(rotations));
+  error.translation_noise = median(std::move(translation_noise));
+  error.rotation_noise = median(std::move(rotation_noise));
+  error.at_points = median(std::move(both));
+  error.noise = median(std::move(noise));
+  return error;
 }
 
 std::optional<Eigen::Isometry3d> fit_extrinsic(const std::vector<RegisteredMotion>& registered,
                                                const BodyMotion& body) {
   constexpr std::size_t kFewest = 4;
   constexpr double kClearly = 0.9;  // ratio of costs
-  std::vector<Motions> motions;
+  std::vector<BothMotions> motions;
   for (const RegisteredMotion& motion : registered) {
     const auto T_body = body(motion);
     if (T_body) motions.push_back({*T_body, motion.T_first_second});

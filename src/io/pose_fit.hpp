@@ -17,10 +17,16 @@ struct RegisteredMotion {
   std::size_t first;   ///< scan
   std::size_t second;  ///< scan
   Eigen::Isometry3d T_first_second;
-  double noise;  ///< m, difference of both directions of the registration, 10 m from the sensor
+  /// Difference of both directions of the registration: rotation times 10 m, and translation, m.
+  Eigen::Matrix<double, 6, 1> difference;
+  double deviation;  ///< m, of a direction that landmarks determine; 0: none
 };
 
-/// Registers pairs of scans at some places of a recording, neighbours and scans farther apart. The
+/// Scans at the start of a recording, where an odometry has not converged yet.
+inline constexpr std::size_t kStartScans = 6;
+
+/// Registers pairs of scans at some places of a recording, three of them among the first
+/// kStartScans, neighbours and scans farther apart. The
 /// given poses are one of several first guesses. Pairs that determine no motion are left out.
 /// Throws IoError.
 std::vector<RegisteredMotion> register_motions(const Recording& recording);
@@ -30,16 +36,22 @@ using BodyMotion = std::function<std::optional<Eigen::Isometry3d>(const Register
 
 /// Difference of poses and registered motions: medians over pairs.
 struct MotionError {
-  double translation = 0.0;  ///< m
-  double rotation = 0.0;     ///< rad
-  double at_points = 0.0;    ///< m, of both, for points 10 m from the sensor
-  double noise = 0.0;        ///< m, of the registration, as at_points
+  double translation = 0.0;        ///< m
+  double rotation = 0.0;           ///< rad
+  double translation_noise = 0.0;  ///< m, of the registration
+  double rotation_noise = 0.0;     ///< rad, of the registration
+  /// m, of both, for points 10 m from the sensor. Axes that the registration determines worse than
+  /// others, such as the pitch of a sensor with few beams, count less.
+  double at_points = 0.0;
+  double noise = 0.0;  ///< m, of the registration, as at_points
   std::size_t pairs = 0;
 };
 
-/// `T_body_sensor`: of the body that moves. With `only_steps`, of neighbouring scans.
+enum class Motions { kAll, kSteps, kFirstSteps };  ///< steps: between neighbouring scans
+
+/// `T_body_sensor`: of the body that moves.
 MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
-                         const Eigen::Isometry3d& T_body_sensor, bool only_steps = false);
+                         const Eigen::Isometry3d& T_body_sensor, Motions which = Motions::kAll);
 
 /// Hand-eye calibration: T_body_sensor for which the motions of the body and of the sensor agree
 /// best. Directions that the motions do not determine stay 0. Empty for fewer than 4 motions.

@@ -103,12 +103,28 @@ Linearization linearize(const RegistrationScan& a, const RegistrationScan& b,
   return step;
 }
 
+/// A known component of the translation, as a term of the normal equations.
+struct Prior {
+  Eigen::Vector3d direction;
+  double place;  // m, along direction
+  double weight;
+
+  void add_to(Linearization& step, const Eigen::Isometry3d& T) const {
+    Vector6 J;
+    J << T.translation().cross(direction), direction;
+    step.H += weight * J * J.transpose();
+    step.g += (weight * (direction.dot(T.translation()) - place)) * J;
+  }
+};
+
 /// Gauss-Newton steps until they are short.
 Eigen::Isometry3d refine(const RegistrationScan& a, const RegistrationScan& b, Eigen::Isometry3d T,
-                         std::size_t level, double scale, std::size_t stride, int most) {
+                         std::size_t level, double scale, std::size_t stride, int most,
+                         const Prior* prior = nullptr) {
   for (int k = 0; k < most; ++k) {
-    const Linearization step = linearize(a, b, T, level, scale, stride);
+    Linearization step = linearize(a, b, T, level, scale, stride);
     if (step.met < 30) break;
+    if (prior != nullptr) prior->add_to(step, T);
     const Matrix6 damped = step.H + 1e-3 * Matrix6::Identity();
     const Vector6 change = -damped.ldlt().solve(step.g);
     if (!change.allFinite()) break;
@@ -171,13 +187,37 @@ Eigen::Isometry3d motion_of(const Vector6& rotation_and_translation) {
   return T;
 }
 
+namespace {
+
+constexpr double kFine = 0.1;  // m
+// Residuals of neighbouring points are correlated, so the deviation of a point is a large value.
+constexpr double kDeviation = 0.2;  // m
+
+/// The result at `T` after the last step; empty if too few points meet a cell.
+std::optional<Registration> registration_at(const RegistrationScan& a, const RegistrationScan& b,
+                                            const Eigen::Isometry3d& T, const Prior* prior) {
+  constexpr std::size_t kFewest = 200;  // points that meet a cell
+  Linearization step = linearize(a, b, T, 2, kFine, 1);
+  if (step.met < kFewest) return std::nullopt;
+  if (prior != nullptr) prior->add_to(step, T);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(
+      (step.H + 1e-6 * Matrix6::Identity()).inverse().bottomRightCorner<3, 3>());
+  Registration result;
+  result.T_a_b = T;
+  result.score = step.weight / static_cast<double>(step.met);
+  result.uncertainty = kDeviation * std::sqrt(std::max(0.0, solver.eigenvalues()[2]));
+  result.uncertain = {solver.eigenvectors().col(2), solver.eigenvectors().col(1)};
+  return result;
+}
+
+}  // namespace
+
 std::optional<Registration> register_scans(const RegistrationScan& a, const RegistrationScan& b,
                                            const std::vector<Eigen::Isometry3d>& guesses) {
-  constexpr std::size_t kFewest = 200;  // points that meet a cell
-  constexpr double kFine = 0.1;         // m
-  constexpr double kDistinct = 0.5;     // m
-  constexpr double kAlmost = 0.93;      // ratio of scores
-  Registration best;
+  constexpr double kDistinct = 0.5;  // m
+  constexpr double kAlmost = 0.93;   // ratio of scores
+  Eigen::Isometry3d best = Eigen::Isometry3d::Identity();
+  double best_score = 0.0;
   std::vector<std::pair<Eigen::Vector3d, double>> results;  // translation and score
   for (const Eigen::Isometry3d& guess : guesses) {
     Eigen::Isometry3d T = refine(a, b, guess, 0, 1.0, 4, 12);
@@ -186,23 +226,28 @@ std::optional<Registration> register_scans(const RegistrationScan& a, const Regi
     const double score =
         step.weight / (0.5 * static_cast<double>(std::max<std::size_t>(1, b.points().size())));
     results.emplace_back(T.translation(), score);
-    if (score > best.score) best = {T, score, 0.0};
+    if (score <= best_score) continue;
+    best = T;
+    best_score = score;
   }
-  for (const auto& [translation, score] : results) {
-    const bool is_other = (translation - best.T_a_b.translation()).norm() > kDistinct;
-    if (is_other && score > kAlmost * best.score) return std::nullopt;
-  }
-  best.T_a_b = refine(a, b, best.T_a_b, 1, 0.2, 1, 8);
-  best.T_a_b = refine(a, b, best.T_a_b, 2, kFine, 1, 15);
-  const Linearization step = linearize(a, b, best.T_a_b, 2, kFine, 1);
-  if (step.met < kFewest) return std::nullopt;
-  best.score = step.weight / static_cast<double>(step.met);
-  // Residuals of neighbouring points are correlated, so the deviation of a point is a large value.
-  constexpr double kDeviation = 0.2;  // m
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(
-      (step.H + 1e-6 * Matrix6::Identity()).inverse().bottomRightCorner<3, 3>());
-  best.uncertainty = kDeviation * std::sqrt(std::max(0.0, solver.eigenvalues()[2]));
-  return best;
+  const bool is_ambiguous = std::any_of(results.begin(), results.end(), [&](const auto& result) {
+    return (result.first - best.translation()).norm() > kDistinct &&
+           result.second > kAlmost * best_score;
+  });
+  best = refine(a, b, best, 1, 0.2, 1, 8);
+  best = refine(a, b, best, 2, kFine, 1, 15);
+  auto result = registration_at(a, b, best, nullptr);
+  if (result) result->is_ambiguous = is_ambiguous;
+  return result;
+}
+
+std::optional<Registration> register_near(const RegistrationScan& a, const RegistrationScan& b,
+                                          const Eigen::Isometry3d& guess, const KnownWay& way) {
+  const double ratio = kDeviation / way.deviation;
+  const Prior prior{way.direction, way.direction.dot(guess.translation()), ratio * ratio};
+  Eigen::Isometry3d T = refine(a, b, guess, 1, 0.2, 1, 8, &prior);
+  T = refine(a, b, T, 2, kFine, 1, 15, &prior);
+  return registration_at(a, b, T, &prior);
 }
 
 }  // namespace dynains

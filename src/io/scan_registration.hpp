@@ -43,13 +43,26 @@ struct Registration {
   Eigen::Isometry3d T_a_b = Eigen::Isometry3d::Identity();
   double score = 0.0;        ///< mean weight of the points of b, [0, 1]; higher is better
   double uncertainty = 0.0;  ///< m, of the translation along its least certain direction
+  /// The two least certain directions, the least certain first; unit vectors, frame of a.
+  std::array<Eigen::Vector3d, 2> uncertain = {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY()};
+  /// Whether another result is nearly as good, as in traffic that moves with the sensor.
+  bool is_ambiguous = false;
 };
 
 /// Registers `b` to `a` from several guesses of T_a_b; the best result counts. Empty if too few
-/// points of `b` meet a cell of `a`, or if another result is nearly as good, as in traffic that
-/// moves with the sensor.
+/// points of `b` meet a cell of `a`.
 std::optional<Registration> register_scans(const RegistrationScan& a, const RegistrationScan& b,
                                            const std::vector<Eigen::Isometry3d>& guesses);
+
+/// A component of the translation that is known otherwise.
+struct KnownWay {
+  Eigen::Vector3d direction;  ///< unit vector, frame of a
+  double deviation;           ///< m
+};
+
+/// As register_scans(), by small steps from `guess`, whose translation along `way` is known.
+std::optional<Registration> register_near(const RegistrationScan& a, const RegistrationScan& b,
+                                          const Eigen::Isometry3d& guess, const KnownWay& way);
 
 /// Rigid motion of a rotation vector (rad) and a translation (m).
 Eigen::Isometry3d motion_of(const Eigen::Matrix<double, 6, 1>& rotation_and_translation);

@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <iomanip>
 #include <optional>
 #include <sstream>
+#include <string>
+#include <system_error>
+#include <vector>
 
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
@@ -35,6 +39,22 @@ std::string text_of(const Mounting& mounting) {
       fixed(mounting.height, 2, " m over ground, tilted by ") + fixed(mounting.tilt(), 1, " deg");
   if (mounting.tilt() > 90.0) text += " (upside down)";
   return text;
+}
+
+/// Robot descriptions and static transforms in the folder of a recording, in the order of names.
+std::vector<std::string> frame_files(const Recording& recording) {
+  std::vector<std::string> files;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(recording.folder(), error)) {
+    const std::string name = entry.path().filename().string();
+    const bool is_description = entry.path().extension() == ".urdf";
+    const bool is_static = name.find("static_transforms") == 0 || name.find("tf_static") == 0;
+    if (is_description || (is_static && name.find(".y") != std::string::npos)) {
+      files.push_back(entry.path().string());
+    }
+  }
+  std::sort(files.begin(), files.end());
+  return files;
 }
 
 /// Possible problems of a run other than poses.
@@ -105,6 +125,12 @@ std::string describe(const Recording& recording, const Diagnosis& d) {
     add_line(text, "", to_text(d.readings[i].agreement));
   }
   text << '\n';
+  if (recording.convention().T_body_sensor.isApprox(Eigen::Isometry3d::Identity(), 0.0)) {
+    for (const std::string& file : frame_files(recording)) {
+      text << "note: for poses of another frame than the lidar: --extrinsic " << file
+           << ":BODY:LIDAR\n";
+    }
+  }
   add_remarks(text, d);
   return text.str();
 }

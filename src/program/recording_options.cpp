@@ -91,10 +91,12 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool 
                 "each point")
       ->group(kGroup);
   command
-      .add_option("--extrinsic", extrinsic_,
-                  "pose of the lidar in the body whose poses are given (IMU, base_link, antenna): "
-                  "\"x y z qx qy qz qw\" in m, or a file with one pose [the poses are those of the "
-                  "lidar]")
+      .add_option(
+          "--extrinsic", extrinsic_,
+          "pose of the lidar in the body whose poses are given (IMU, base_link, antenna): "
+          "\"x y z qx qy qz qw\" in m, a file with one pose, or FILE:BODY:LIDAR, two frames "
+          "of a .urdf or of a .yaml with static transforms [the poses are those of the "
+          "lidar]")
       ->type_name("POSE")
       ->group(kGroup);
   command

@@ -19,6 +19,8 @@ const std::vector<Target>& targets() {
       {"xyz", run_xyz, xyz_seeds},
       {"config", run_config, config_seeds},
       {"trajectory", run_trajectory, trajectory_seeds},
+      {"urdf", run_urdf, urdf_seeds},
+      {"transforms", run_transforms, transforms_seeds},
       {"recording", run_recording, recording_seeds},
       {"log", run_log, log_seeds},
       {"nuscenes", run_nuscenes, nuscenes_seeds},

@@ -26,7 +26,8 @@ struct Drive {
       for (double& value : noise) value = 0.0005 * any(random);
       noise.tail<3>() *= 10.0;
       bodies.push_back(motion_of(motion));
-      motions.push_back({i / 2, i, i + 1, X.inverse() * bodies.back() * X * motion_of(noise), 0.0});
+      motions.push_back({i / 2, i, i + 1, X.inverse() * bodies.back() * X * motion_of(noise),
+                         Vector6::Zero(), 0.0});
     }
   }
   BodyMotion body() const {

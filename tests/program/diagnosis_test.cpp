@@ -1,6 +1,7 @@
 // Findings of `dynains check` on simulated streets with all usual mistakes in the poses.
 #include "dynains/io/diagnosis.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <random>
@@ -181,6 +182,19 @@ TEST_CASE("check estimates the place of the lidar in the body whose poses are gi
   CHECK_THAT(healed.out, ContainsSubstring("agree as they are"));
 }
 
+TEST_CASE("check names a robot description beside the recording") {
+  const Street street(dense());
+  write_poses(street.path() / "poses.txt", street.poses());
+  const std::string file = street.path() / "robot.urdf";
+  write_text(file, "<robot/>");
+  const std::string seq = street.path();
+  CHECK_THAT(start({"check", seq}).out,
+             ContainsSubstring("\nnote: for poses of another frame than the lidar: --extrinsic " +
+                               file + ":BODY:LIDAR\n"));
+  CHECK_THAT(start({"check", seq, "--extrinsic", "0 0 1 0 0 0 1"}).out,
+             !ContainsSubstring("robot.urdf"));
+}
+
 TEST_CASE("check estimates the offset of the clocks") {
   const Street street(dense());
   std::string scan_times;
@@ -228,6 +242,56 @@ TEST_CASE("check gives the error of inexact poses in centimetres and degrees") {
   CHECK(noisy.registered_pairs >= 8);
   CHECK_THAT(advice(noisy), ContainsSubstring("inexact by about 1") &&
                                 ContainsSubstring(" deg from one scan to the next"));
+}
+
+TEST_CASE("check sees that an odometry has not converged in the first scans") {
+  const Street street(dense());
+  // Each of the first four motions is too short by 25 cm.
+  int i = 0;
+  const Diagnosis early = street.diagnose([&](Eigen::Isometry3d T) {
+    T.translation() -= 0.25 * std::min(4, i++) * street.poses()[0].linear().col(0);
+    return T;
+  });
+  CHECK(early.verdict == PoseVerdict::kInexact);
+  CHECK(early.is_inexact_at_start);
+  CHECK(early.translation_error < 0.05);
+  CHECK(early.start_translation_error == Approx(0.25).margin(0.03));
+  CHECK_THAT(advice(early),
+             ContainsSubstring("the poses of the first scans are inexact by about 2"));
+
+  // The same losses in the middle of the drive concern no start.
+  int k = 0;
+  const Diagnosis late = street.diagnose([&](Eigen::Isometry3d T) {
+    T.translation() -= 0.25 * std::clamp(k++ - 10, 0, 4) * street.poses()[0].linear().col(0);
+    return T;
+  });
+  CHECK_FALSE(late.is_inexact_at_start);
+}
+
+TEST_CASE("On a motorway, plants and posts tell the way that walls and rails leave open") {
+  simulation::Config config;
+  config.scene = simulation::Scene::kHighway;
+  config.sensor = simulation::Sensor::kHdl32;
+  config.scans = 24;
+  config.seed = GENERATE(31U, 32U);
+  const Street road(config);
+  INFO("seed " << config.seed);
+  const Diagnosis sound = road.diagnose([](const Eigen::Isometry3d& T) { return T; });
+  CHECK(sound.sound());
+  CHECK(sound.option.empty());
+  CHECK(sound.registered_pairs >= 6);
+  CHECK(sound.translation_error < 0.1);
+  CHECK(road.diagnose([](const Eigen::Isometry3d& T) { return T.inverse(); }).option ==
+        "--invert-poses");
+  CHECK(road.diagnose([](const Eigen::Isometry3d& T) { return scaled(T, 1000.0); }).option ==
+        "--pose-units mm");
+  Eigen::Isometry3d T_body_sensor = Eigen::Isometry3d::Identity();
+  T_body_sensor.linear() = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const Diagnosis yawed =
+      road.diagnose([&](const Eigen::Isometry3d& T) { return T * T_body_sensor.inverse(); });
+  CHECK(yawed.verdict == PoseVerdict::kBodyFrame);
+  const Eigen::Matrix3d R = yawed.convention.T_body_sensor.linear();
+  CHECK(Eigen::AngleAxisd(R.transpose() * T_body_sensor.linear()).angle() < 0.03);
 }
 
 TEST_CASE("few beams ahead on a fast empty road give no warning about the poses") {

@@ -20,21 +20,24 @@ struct Agreement {
   std::size_t points = 0;  ///< number of compared points
 };
 
-/// Points of one scan for the comparison with other scans: above the ground, 2 to 40 m from the
-/// sensor, one per voxel of 0.25 m.
+/// Points of one scan for the comparison with other scans: above the ground, 2 m to `farthest` from
+/// the sensor, one per voxel of 0.25 m.
 class Landmarks {
  public:
   /// `points`: m, sensor frame. If `mounting` is known, points near the ground are excluded.
-  Landmarks(PointsView points, const Mounting& mounting);
+  /// `farthest`: m, (2, 1000].
+  Landmarks(PointsView points, const Mounting& mounting, double farthest = 40.0);
 
   std::size_t size() const { return points_.size(); }
+  const std::vector<Eigen::Vector3d>& points() const { return points_; }
   /// Agreement of `other` with this scan under the pose `T_this_other`. It is symmetric except for
   /// occlusion.
   Agreement compare(const Landmarks& other, const Eigen::Isometry3d& T_this_other) const;
-
- private:
+  /// Distance from `p` (m, sensor frame) to the nearest point, m, at most 1.
   double distance_to(const Eigen::Vector3d& p) const;
 
+ private:
+  double farthest_;
   std::vector<std::uint64_t> cells_;  // voxel (1 m) of each point, ascending
   std::vector<Eigen::Vector3d> points_;
 };
@@ -80,6 +83,11 @@ struct Diagnosis {
   double translation_error = 0.0;
   double rotation_error = 0.0;
   std::size_t registered_pairs = 0;  ///< 0 if no motion could be registered
+  /// Whether only the poses of the first scans are inexact, as those of an odometry that has not
+  /// converged yet; then the errors there, m and rad.
+  bool is_inexact_at_start = false;
+  double start_translation_error = 0.0;
+  double start_rotation_error = 0.0;
   /// Under which scans agree, for kOtherwise, kBodyFrame and kTimeOffset.
   PoseConvention convention;
   double time_offset = 0.0;  ///< s, as RecordingOptions::time_offset
