@@ -59,7 +59,7 @@ TilesetWriter::TilesetWriter(fs::path folder, const PointColumns& columns,
     : folder_(std::move(folder)),
       columns_(columns),
       cube_(lowest, highest),
-      spill_(folder_ / kTilesetFile),
+      spill_(std::in_place, folder_ / kTilesetFile),
       root_(std::make_unique<Node>(TileNode())) {}
 
 TilesetWriter::~TilesetWriter() = default;
@@ -83,13 +83,13 @@ void TilesetWriter::insert(Node& start, const TilePoint& point) {
     if (!child) child = std::make_unique<Node>(node->place.child(octant));
     node = child.get();
   }
-  spill_.add(node->points, point);
+  spill_->add(node->points, point);
   const bool is_list = !node->occupied && node->place.depth() < TileNode::kMostDepth;
   if (is_list && node->points.size() > kMostPointsInMemory) divide(*node);
 }
 
 void TilesetWriter::divide(Node& node) {
-  const std::vector<TilePoint> points = spill_.take(node.points);
+  const std::vector<TilePoint> points = spill_->take(node.points);
   node.occupied = std::make_unique<OccupiedCells>();
   for (const TilePoint& point : points) insert(node, point);
 }
@@ -141,7 +141,7 @@ TilesetWriter::Written TilesetWriter::write(const TileNode& place, std::vector<T
 }
 
 TilesetWriter::Written TilesetWriter::write(Node& node) {
-  if (!node.occupied) return write(node.place, spill_.take(node.points));
+  if (!node.occupied) return write(node.place, spill_->take(node.points));
   node.occupied.reset();
   std::vector<Written> children;
   for (std::unique_ptr<Node>& child : node.children) {
@@ -149,7 +149,7 @@ TilesetWriter::Written TilesetWriter::write(Node& node) {
     children.push_back(write(*child));
     child.reset();
   }
-  return write_tile(node.place, spill_.take(node.points), std::move(children));
+  return write_tile(node.place, spill_->take(node.points), std::move(children));
 }
 
 void TilesetWriter::commit() {
@@ -159,6 +159,7 @@ void TilesetWriter::commit() {
     throw IoError((folder_ / kTilesetFolder).string() + ": cannot be created: " + error.message());
   }
   Written root = write(*root_);
+  spill_.reset();
   root.json["refine"] = "ADD";
   Json names = Json::array();
   if (columns_.time) names.push_back("time");

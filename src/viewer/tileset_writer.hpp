@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -70,7 +71,7 @@ class TilesetWriter {
   std::filesystem::path folder_;
   PointColumns columns_;
   TileCube cube_;
-  PointSpill spill_;
+  std::optional<PointSpill> spill_;  // until commit()
   std::unique_ptr<Node> root_;
   std::size_t size_ = 0;
 };
