@@ -10,6 +10,7 @@
 #include "dynains/version.hpp"
 #include "interrupt.hpp"
 #include "json_file.hpp"
+#include "progress.hpp"
 #include "tileset_writer.hpp"
 
 namespace dynains::program {
@@ -41,20 +42,24 @@ void stop_after_signal() {
   if (const int signal = InterruptGuard::signal()) throw Interrupted{signal};
 }
 
-void write_tileset(const fs::path& map, const fs::path& folder) {
+void write_tileset(const fs::path& map, const fs::path& folder, bool quiet) {
+  const PointFileHeader header = read_point_file_header(map);
   Eigen::AlignedBox3d bounds;
   for_each_point(map, [&](const FilePoint& point) {
     stop_after_signal();
     bounds.extend(point.position);
   });
   if (bounds.isEmpty()) bounds.extend(Eigen::Vector3d::Zero());
-  viewer::TilesetWriter writer(folder, read_point_file_header(map).columns, bounds.min(),
-                               bounds.max());
+  viewer::TilesetWriter writer(folder, header.columns, bounds.min(), bounds.max());
+  Progress progress(static_cast<std::size_t>(header.point_count), "points", quiet);
   for_each_point(map, [&](const FilePoint& point) {
     stop_after_signal();
     writer.add(point);
+    constexpr std::size_t kStep = 100000;  // points
+    if (writer.size() % kStep == 0) progress.update(writer.size());
   });
   writer.commit();
+  stop_after_signal();
 }
 
 }  // namespace
@@ -82,7 +87,7 @@ nlohmann::ordered_json tileset_marker(bool complete) {
           {"complete", complete}};
 }
 
-void write_run_tileset(OutputFolder& out) {
+void write_run_tileset(OutputFolder& out, bool quiet) {
   const fs::path map = map_of(out);
   const fs::path tileset = out.path() / kTilesetFile;
   OutputListing listing = out.listing();
@@ -92,9 +97,10 @@ void write_run_tileset(OutputFolder& out) {
   out.check(listing, InputFiles());
   // Listed first: tiles that are not listed would count as files of the user.
   out.mark(nlohmann::ordered_json(out.marker()), listing);
+  out.remove_temporaries();
   out.folder().remove_file(kTilesetFile);
   out.remove_folder_results(kTilesetFolder);
-  write_tileset(map, out.path());
+  write_tileset(map, out.path(), quiet);
 }
 
 }  // namespace dynains::program

@@ -19,7 +19,8 @@ OutputListing tileset_listing();
 nlohmann::ordered_json tileset_marker(bool complete);
 
 /// Writes the static map of a run as a tileset into its folder, and lists it in report.json. A
-/// tileset that is newer than the map stays. Throws IoError; Interrupted after a signal.
-void write_run_tileset(OutputFolder& out);
+/// tileset that is newer than the map stays. Unless `quiet`, shows the progress. Throws IoError;
+/// Interrupted after a signal.
+void write_run_tileset(OutputFolder& out, bool quiet);
 
 }  // namespace dynains::program

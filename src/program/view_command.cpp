@@ -62,7 +62,7 @@ void view(ViewOptions& options) {
 
 /// Makes the tileset of a run if it is missing. Throws IoError unless `folder` is of a run or of
 /// `dynains map CITY export --format 3dtiles`.
-void prepare_tileset(const fs::path& folder) {
+void prepare_tileset(const fs::path& folder, bool quiet) {
   if (!fs::is_directory(folder)) {
     throw IoError(folder.string() + ": no such folder; expected a folder of `dynains run`");
   }
@@ -80,11 +80,11 @@ void prepare_tileset(const fs::path& folder) {
   }
   OutputFolder out = open_finished_run(folder);
   const InterruptGuard interrupt;
-  write_run_tileset(out);
+  write_run_tileset(out, quiet);
 }
 
 void serve(const ViewOptions& options) {
-  prepare_tileset(options.out);
+  prepare_tileset(options.out, options.quiet);
   const TileServer server(options.out);
   serve_web(
       options.port, [&](const std::string& path) { return server.answer(path); },
