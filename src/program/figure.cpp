@@ -65,11 +65,13 @@ class DotGrid {
     for (std::size_t i = 0; i < cells_.size(); ++i) {
       const Cell& cell = cells_[i];
       if (cell.layer < 0) continue;
-      const auto column = static_cast<double>(i % static_cast<std::size_t>(columns_));
-      const auto row = static_cast<double>(i / static_cast<std::size_t>(columns_));
+      const auto columns = static_cast<std::size_t>(columns_);
+      const std::size_t row = i / columns;
+      const std::size_t column = i % columns;
       figure_.layers[static_cast<std::size_t>(cell.layer)].push_back(
-          {static_cast<float>(figure_.low_x + (column + 0.5) * step_x),
-           static_cast<float>(figure_.low_y + (row + 0.5) * step_y), cell.colour});
+          {static_cast<float>(figure_.low_x + (static_cast<double>(column) + 0.5) * step_x),
+           static_cast<float>(figure_.low_y + (static_cast<double>(row) + 0.5) * step_y),
+           cell.colour});
     }
   }
 

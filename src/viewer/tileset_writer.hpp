@@ -61,7 +61,7 @@ class TilesetWriter {
     Eigen::AlignedBox3d bounds;   // m, world frame
   };
 
-  void insert(Node& node, const TilePoint& point);
+  void insert(Node& start, const TilePoint& point);
   void divide(Node& node);
   Written write(Node& node);
   Written write(const TileNode& place, std::vector<TilePoint> points);
