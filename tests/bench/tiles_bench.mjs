@@ -51,7 +51,7 @@ async function fly(page, budget) {
 console.log(`${kSize.width} x ${kSize.height} pixels`);
 console.log('most points | s to load the first view | shown, mean | most loaded | frames per second');
 await withPage(address, kSize, async (page) => {
-  for (const budget of [250000, 1000000]) {
+  for (const budget of [250000, 500000, 1000000]) {
     const {loading, shown, most, rate} = await fly(page, budget);
     console.log([budget, (loading / 1000).toFixed(1), Math.round(shown), most, rate.toFixed(1)].join(' | '));
   }
