@@ -10,6 +10,7 @@ namespace dynains {
 namespace {
 
 constexpr std::string_view kNpyMagic("\x93NUMPY", 6);
+constexpr std::size_t kLargestNpyField = 1000000000;  // bytes
 
 /// Parses the literal of Python in which a header describes its array.
 class NpyLiteral {
@@ -126,7 +127,9 @@ void read_npy_type(NpyLiteral& literal, NpyArray& array) {
       // Several values in one field are no column.
       array.fields.back().type.reset();
       for (const std::uint64_t length : literal.shape()) {
-        if (length > kLongestNpyHeader) literal.fail("expected fields of at most 65536 values");
+        if (length > 0 && size > kLargestNpyField / length) {
+          literal.fail("expected fields of at most 1 GB");
+        }
         size *= static_cast<std::size_t>(length);
       }
     }
@@ -186,17 +189,15 @@ NpyArray parse_npy_header(Bytes in, std::uint64_t size) {
   NpyLiteral literal(header, text);
   read_npy_description(literal, array);
 
-  // Without overflow: each factor is compared before it is multiplied.
+  // Items that each step leaves room for: a product could overflow.
   std::uint64_t available = array.item_size == 0 ? 0 : (size - array.data_begin) / array.item_size;
   const bool is_empty = std::count(array.shape.begin(), array.shape.end(), 0U) > 0;
-  for (const std::uint64_t dimension : array.shape) {
-    if (is_empty) break;
-    available /= dimension;
-    if (available == 0) {
-      begin.fail("expected all items of the array, found " + std::to_string(size) + " bytes");
-    }
-  }
   if (array.item_size == 0) begin.fail("expected items of at least one byte");
+  for (const std::uint64_t dimension : array.shape) available /= is_empty ? 1 : dimension;
+  // An array without dimensions has one item.
+  if (!is_empty && available == 0) {
+    begin.fail("expected all items of the array, found " + std::to_string(size) + " bytes");
+  }
   return array;
 }
 

@@ -1,5 +1,6 @@
 #include <array>
 #include <charconv>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -205,21 +206,23 @@ void check_count(const ByteReader& reader, const Element& element, PlyEncoding e
   }
 }
 
-}  // namespace
+enum class Storage : std::uint8_t { kAllPoints, kOnePoint };
 
-PointFile read_ply(const std::filesystem::path& path) {
-  ByteReader reader(path);
-  PointSink sink;
-  const PlyHeader header = parse_ply_header(reader, sink);
+/// Reads all elements. The sink gets all vertices, or each one in place of the one before; `done()`
+/// is called after each vertex.
+template <class Done>
+void read_elements(ByteReader& reader, const PlyHeader& header, PointSink& sink, Storage storage,
+                   Done&& done) {
   const bool swap = header.encoding == PlyEncoding::kBigEndian;
   std::string line;
   for (const Element& element : header.elements) {
     check_count(reader, element, header.encoding);
     if (element.properties.empty()) continue;
-    if (element.is_vertex) sink.resize(static_cast<std::size_t>(element.count));
+    const bool has_all = storage == Storage::kAllPoints;
+    if (element.is_vertex) sink.resize(has_all ? static_cast<std::size_t>(element.count) : 1);
     for (std::size_t i = 0; i < element.count; ++i) {
       const auto store = [&](const Property& property, double value) {
-        if (sink.set(i, property.role, value)) return;
+        if (sink.set(has_all ? i : 0, property.role, value)) return;
         const std::string what = "expected a whole number that " + property.name + " can have";
         header.encoding == PlyEncoding::kAscii ? reader.fail_on_line(what) : reader.fail_here(what);
       };
@@ -228,9 +231,27 @@ PointFile read_ply(const std::filesystem::path& path) {
       } else {
         read_binary_element(reader, element, swap, store);
       }
+      if (element.is_vertex) done();
     }
   }
+}
+
+}  // namespace
+
+PointFile read_ply(const std::filesystem::path& path) {
+  ByteReader reader(path);
+  PointSink sink;
+  const PlyHeader header = parse_ply_header(reader, sink);
+  read_elements(reader, header, sink, Storage::kAllPoints, [] {});
   return std::move(sink.file());
+}
+
+void visit_ply(const std::filesystem::path& path,
+               const std::function<void(const FilePoint&)>& visit) {
+  ByteReader reader(path);
+  PointSink sink;
+  const PlyHeader header = parse_ply_header(reader, sink);
+  read_elements(reader, header, sink, Storage::kOnePoint, [&] { visit(point_of(sink.file(), 0)); });
 }
 
 PointFileHeader read_ply_header(const std::filesystem::path& path) {

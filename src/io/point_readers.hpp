@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 
 #include "dynains/io/point_file.hpp"
 
@@ -13,6 +14,10 @@ PointFile read_las(const std::filesystem::path& path);
 PointFile read_npy(const std::filesystem::path& path);
 PointFile read_npz(const std::filesystem::path& path);
 PointFile read_xyz(const std::filesystem::path& path);
+
+/// Reads a PLY file without points in memory.
+void visit_ply(const std::filesystem::path& path,
+               const std::function<void(const FilePoint&)>& visit);
 
 PointFileHeader read_ply_header(const std::filesystem::path& path);
 PointFileHeader read_pcd_header(const std::filesystem::path& path);

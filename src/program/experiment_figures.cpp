@@ -93,17 +93,18 @@ void figures(const FiguresOptions& options) {
   const VerdictCloud cloud = collect(options);
   const std::pair<Content, std::string> kinds[] = {
       {Content::kRaw, "raw"}, {Content::kVerdict, "cleaned"}, {Content::kMap, "map"}};
+  std::vector<std::string> names;
   for (const auto& [content, name] : kinds) {
-    draw_from_above(cloud, content, options.pixels).write_png(folder / (name + "_above.png"));
-    draw_perspective(cloud, content, options.pixels)
-        .write_png(folder / (name + "_perspective.png"));
     write_ply(cloud, content, folder / (name + ".ply"));
+    names.insert(names.end(), {name + "_above", name + "_perspective"});
+    write_figure(view_from_above(cloud, content, options.pixels), folder, name + "_above");
+    write_figure(view_in_perspective(cloud, content, options.pixels), folder,
+                 name + "_perspective");
   }
-  std::cout
-      << cloud.points().size() << " points in " << folder.string()
-      << ": raw, cleaned and map, each as _above.png, _perspective.png and .ply\n"
-         "raw: static grey, dynamic blue; cleaned: kept static grey, removed dynamic green, "
-         "missed dynamic red, lost static orange; map: kept static grey, missed dynamic red\n";
+  for (const std::string& name : names) draw_figure(folder, name);
+  std::cout << cloud.points().size() << " points in " << folder.string()
+            << ": raw, cleaned and map, each as _above.png, _perspective.png and .ply; .gp and "
+               ".dat draw them again\n";
 }
 
 }  // namespace

@@ -5,12 +5,13 @@
 #include <string>
 #include <vector>
 
+#include "chart.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/text_table.hpp"
 #include "evaluation_options.hpp"
 #include "experiment.hpp"
+#include "gnuplot.hpp"
 #include "labelled_sequence.hpp"
-#include "line_chart.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "remover_options.hpp"
@@ -75,13 +76,14 @@ void sweep(const SweepOptions& options) {
     variants.push_back(variant);
   }
   TextFile csv_file(options.csv);
-  TextFile svg_file(options.svg);
+  const std::string script = options.svg.empty() ? "" : options.svg + ".gp";
+  TextFile script_file(script);
   const std::vector<EvaluationRow> rows = measure(options, variants);
 
   evaluation::TextTable table({name, "PR %", "RR %", "F1", "SA %", "DA %", "HA %"});
   std::ostringstream csv;
   csv << name << ",pr,rr,f1,sa,da,ha\n";
-  LineChart chart(name, {"PR", "RR", "F1 x 100"});
+  Chart chart(name, {"PR", "RR", "F1 x 100"});
   for (const EvaluationRow& row : rows) {
     const double pr = row.voxels.preservation_rate();
     const double rr = row.voxels.rejection_rate();
@@ -101,7 +103,8 @@ void sweep(const SweepOptions& options) {
   }
   std::cout << table.to_string();
   csv_file.write(csv.str());
-  svg_file.write(chart.to_svg());
+  script_file.write(chart.script());
+  if (!options.svg.empty()) draw_by_gnuplot(script, options.svg);
 }
 
 }  // namespace
@@ -119,7 +122,8 @@ void add_sweep_command(CLI::App& experiment) {
   command.add_flag("--online", options->online, "judge the zero-latency verdict");
   command.add_flag("--quiet", options->quiet, "no progress");
   command.add_option("--csv", options->csv, "write the table to this file");
-  command.add_option("--svg", options->svg, "draw the curves into this file");
+  command.add_option("--svg", options->svg,
+                     "draw the curves into this file by gnuplot, from FILE.gp, which has the data");
   command.callback([options] { sweep(*options); });
 }
 

@@ -1,3 +1,4 @@
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,8 +16,11 @@
 #include "dynains/io/city_map.hpp"
 #include "dynains/io/las_file.hpp"
 #include "dynains/io/point_file.hpp"
+#include "interrupt.hpp"
 #include "map_file.hpp"
 #include "output_folder.hpp"
+#include "tileset_files.hpp"
+#include "tileset_writer.hpp"
 
 namespace dynains::program {
 namespace {
@@ -28,8 +32,35 @@ struct MapOptions {
   std::string session, later_session;
   std::string file, added, removed;
   std::vector<double> region;  // m: lowest x, lowest y, highest x, highest y
+  std::string format;          // empty: by the extension of the file
   bool force = false;
 };
+
+/// Throws ConfigError if `name` lies in the map.
+void check_is_outside(const fs::path& city, const std::string& name) {
+  const fs::path inner = fs::relative(whole_path(name), whole_path(city));
+  if (!inner.empty() && *inner.begin() != "..") {
+    throw ConfigError(name + ": lies in the map of many sessions; choose another folder");
+  }
+}
+
+/// Columns of a point of a city, in addition to x y z.
+PointColumns city_columns() {
+  PointColumns columns;
+  columns.label = columns.time = columns.session = true;
+  return columns;
+}
+
+/// The time is the begin of the session.
+FilePoint file_point(const CityMap& map, const Eigen::Vector3d& position, std::uint32_t session,
+                     const SessionPoint& point) {
+  FilePoint file_point;
+  file_point.position = position;
+  file_point.label = point.label;
+  file_point.time = map.sessions()[session].begin;
+  file_point.session = static_cast<std::uint16_t>(std::min(session, 65535U));
+  return file_point;
+}
 
 /// Writes points of a city with their session, its begin as time, and their label, as far as the
 /// format has them.
@@ -42,10 +73,7 @@ class CityPointFile {
     if (!is_map_name(name) || !is_map_name(path)) {
       throw ConfigError(name + ": expected a name that ends in .ply, .pcd or .las");
     }
-    const fs::path inner = fs::relative(path, whole_path(city));
-    if (!inner.empty() && *inner.begin() != "..") {
-      throw ConfigError(name + ": lies in the map of many sessions; choose another folder");
-    }
+    check_is_outside(city, name);
     if (fs::exists(fs::symlink_status(path)) && !force) {
       throw IoError(name + ": exists; choose another name, or replace it by --force");
     }
@@ -60,9 +88,8 @@ class CityPointFile {
       las_ = std::make_unique<LasWriter>(path, las_options_near(lowest));
       return;
     }
-    PointColumns columns;
+    PointColumns columns = city_columns();
     columns.double_xyz = most > kFloatCoordinateLimit;
-    columns.label = columns.time = columns.session = true;
     points_ = std::make_unique<PointFileWriter>(path, columns);
   }
 
@@ -77,12 +104,7 @@ class CityPointFile {
       las_->add(las);
       return;
     }
-    FilePoint file_point;
-    file_point.position = position;
-    file_point.label = point.label;
-    file_point.time = map_.sessions()[session].begin;
-    file_point.session = static_cast<std::uint16_t>(std::min(session, 65535U));
-    points_->add(file_point);
+    points_->add(file_point(map_, position, session, point));
   }
 
   std::size_t size() const { return size_; }
@@ -128,6 +150,56 @@ bool is_in_region(const std::vector<double>& region, const Eigen::Vector3d& p) {
          (p.x() >= region[0] && p.y() >= region[1] && p.x() <= region[2] && p.y() <= region[3]);
 }
 
+/// visit(position, session, point) for each point of the region that stands after session `last`.
+template <class Visitor>
+void for_each_standing(const City& city, const CityMap& map, std::uint32_t last,
+                       const std::vector<double>& region, Visitor&& visit) {
+  for (const TileIndex& tile : map.tiles()) {
+    if (!is_in_region(region, city.grid(), tile)) continue;
+    const TileHistory history = map.history(tile, last);
+    history.for_each_standing(last, [&](std::size_t session, std::size_t i) {
+      const SessionPoint& point = history.points(session)[i];
+      const Eigen::Vector3d position = map.position(tile, point);
+      if (is_in_region(region, position)) {
+        visit(position, static_cast<std::uint32_t>(session), point);
+      }
+    });
+  }
+}
+
+void write_tiles(const City& city, const CityMap& map, std::uint32_t last,
+                 const MapOptions& options) {
+  check_is_outside(city.folder(), options.file);
+  const LockedFolder lock(options.file);
+  OutputFolder out(Folder(options.file), tileset_output_kind());
+  if (out.has_results() && !options.force) {
+    throw IoError(options.file +
+                  ": holds earlier results; choose another folder, or replace "
+                  "them by --force");
+  }
+  out.check(tileset_listing(), InputFiles());
+  const InterruptGuard interrupt;
+  const auto mode = out.has_results() ? OutputChange::Mode::kStaged : OutputChange::Mode::kInPlace;
+  OutputChange change(out, mode, tileset_marker(false), tileset_listing());
+  Eigen::AlignedBox3d bounds(Eigen::Vector3d::Zero());
+  if (!map.sessions().empty()) bounds.setEmpty();
+  for (const SessionInfo& session : map.sessions()) {
+    bounds.extend(session.lowest).extend(session.highest);
+  }
+  viewer::TilesetWriter writer(change.folder(), city_columns(), bounds.min(), bounds.max());
+  for_each_standing(
+      city, map, last, options.region,
+      [&](const Eigen::Vector3d& position, std::uint32_t session, const SessionPoint& point) {
+        if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
+        writer.add(file_point(map, position, session, point));
+      });
+  writer.commit();
+  change.put_in_place();
+  change.finish(tileset_marker(true), tileset_listing());
+  std::cout << (out.path() / viewer::kTilesetFile).string() << ": " << writer.size() << " points"
+            << std::endl;
+}
+
 /// Writes the map after session number `last`.
 void write_map(const City& city, const CityMap& map, std::uint32_t last,
                const MapOptions& options) {
@@ -135,17 +207,11 @@ void write_map(const City& city, const CityMap& map, std::uint32_t last,
       !(options.region[0] < options.region[2] && options.region[1] < options.region[3])) {
     throw ConfigError("--region: expected the lowest x and y before the highest x and y");
   }
+  if (!options.format.empty()) return write_tiles(city, map, last, options);
   CityPointFile file(map, city.folder(), options.file, options.force);
-  for (const TileIndex& tile : map.tiles()) {
-    if (!is_in_region(options.region, city.grid(), tile)) continue;
-    const TileHistory history = map.history(tile, last);
-    history.for_each_standing(last, [&](std::size_t session, std::size_t i) {
-      const SessionPoint& point = history.points(session)[i];
-      const Eigen::Vector3d position = map.position(tile, point);
-      if (!is_in_region(options.region, position)) return;
-      file.add(position, static_cast<std::uint32_t>(session), point);
-    });
-  }
+  for_each_standing(city, map, last, options.region,
+                    [&](const Eigen::Vector3d& position, std::uint32_t session,
+                        const SessionPoint& point) { file.add(position, session, point); });
   file.commit();
   std::cout << options.file << ": " << file.size() << " points" << std::endl;
 }
@@ -224,9 +290,14 @@ void add_map_command(CLI::App& app) {
     command->add_option(name, value, "name of a session")->required()->type_name("");
   };
   const auto add_file = [&](CLI::App* command) {
-    command->add_option("FILE", options->file, "points, .ply, .pcd or .las")
+    command->add_option("FILE", options->file, "points, .ply, .pcd or .las; a folder for 3dtiles")
         ->required()
         ->type_name("");
+    command
+        ->add_option("--format", options->format,
+                     "3dtiles: write OGC 3D Tiles into the folder FILE [by the extension]")
+        ->check(CLI::IsMember({"3dtiles"}))
+        ->type_name("NAME");
     command
         ->add_option("--region", options->region,
                      "lowest x, lowest y, highest x and highest y of the points [all]")

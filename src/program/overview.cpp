@@ -100,7 +100,7 @@ Picture Overview::picture() const {
   const int step_y = is_beside ? 0 : height_ + kGap;
   Picture picture(width_ + 2 * step_x, height_ + 2 * step_y);
   const auto draw = [&](int panel, int x, int y, Colour colour) {
-    picture.splat(x + panel * step_x, y + panel * step_y, 0, 0, colour);
+    picture.set(x + panel * step_x, y + panel * step_y, colour);
   };
   std::size_t next = 0;
   for (int y = 0; y < height_; ++y) {

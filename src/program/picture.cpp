@@ -2,9 +2,6 @@
 
 #include <png.h>
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
 #include <string>
 
 #include "dynains/errors.hpp"
@@ -26,28 +23,7 @@ Picture::Picture(int width, int height)
     : width_(checked_side(width)),
       height_(checked_side(height)),
       pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height),
-              Colour{255, 255, 255}),
-      depths_(pixels_.size(), std::numeric_limits<float>::infinity()) {}
-
-void Picture::begin_layer() {
-  std::fill(depths_.begin(), depths_.end(), std::numeric_limits<float>::infinity());
-}
-
-void Picture::splat(double x, double y, double depth, int radius, Colour colour) {
-  // Far out points must not reach the conversion to int.
-  if (!(std::abs(x) < 1e6 && std::abs(y) < 1e6)) return;
-  const int center_x = static_cast<int>(std::floor(x));
-  const int center_y = static_cast<int>(std::floor(y));
-  const auto near = static_cast<float>(depth);
-  for (int v = std::max(0, center_y - radius); v <= std::min(height_ - 1, center_y + radius); ++v) {
-    for (int u = std::max(0, center_x - radius); u <= std::min(width_ - 1, center_x + radius);
-         ++u) {
-      if (!(near < depths_[index(u, v)])) continue;
-      depths_[index(u, v)] = near;
-      pixels_[index(u, v)] = colour;
-    }
-  }
-}
+              Colour{255, 255, 255}) {}
 
 void Picture::write_png(const std::filesystem::path& path) const {
   static_assert(sizeof(Colour) == 3, "rows are handed to libpng as they are");

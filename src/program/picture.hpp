@@ -1,4 +1,4 @@
-// A small colour picture of points: nearest point wins, layer by layer.
+// A small colour picture.
 #pragma once
 
 #include <cstddef>
@@ -24,12 +24,8 @@ class Picture {
   int width() const { return width_; }
   int height() const { return height_; }
 
-  /// Points drawn after this cover all points drawn before, at any depth.
-  void begin_layer();
-
-  /// Square of 2 * radius + 1 pixels about a position in pixels from the upper left corner, clipped
-  /// to the picture; within a layer the smallest depth is seen.
-  void splat(double x, double y, double depth, int radius, Colour colour);
+  /// `x`, `y`: pixels from the upper left corner, within the picture.
+  void set(int x, int y, Colour colour) { pixels_[index(x, y)] = colour; }
 
   Colour at(int x, int y) const { return pixels_[index(x, y)]; }
 
@@ -45,7 +41,6 @@ class Picture {
   int width_;
   int height_;
   std::vector<Colour> pixels_;
-  std::vector<float> depths_;
 };
 
 }  // namespace dynains::program

@@ -5,6 +5,7 @@
 
 #include "dynains/io/coordinate_system.hpp"
 #include "output_folder.hpp"
+#include "tileset_writer.hpp"
 
 namespace dynains::program {
 namespace {
@@ -62,18 +63,19 @@ std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange
 }
 
 const OutputKind& run_output_kind() {
-  static const OutputKind kind = {
-      "run",
-      "report.json",
-      {"timing.csv", "dynamic_points.ply", kDynamicLas, kVerdictLog, kOverviewPicture, kViewPage},
-      true,
-      {{"labels", {".label"}},
-       {"online", {".label"}},
-       {"causes", {".cause"}},
-       {"beliefs", {".belief"}},
-       {"clean", {".bin", ".pcd", ".ply"}},
-       {kChunkFolder, {kChunkExtension}},
-       {kTileFolder, {kTileExtension}}}};
+  static const OutputKind kind = {"run",
+                                  "report.json",
+                                  {"timing.csv", "dynamic_points.ply", kDynamicLas, kVerdictLog,
+                                   kOverviewPicture, kViewPage, viewer::kTilesetFile},
+                                  true,
+                                  {{"labels", {".label"}},
+                                   {"online", {".label"}},
+                                   {"causes", {".cause"}},
+                                   {"beliefs", {".belief"}},
+                                   {"clean", {".bin", ".pcd", ".ply"}},
+                                   {kChunkFolder, {kChunkExtension}},
+                                   {kTileFolder, {kTileExtension}},
+                                   {viewer::kTilesetFolder, {viewer::kPointTileExtension}}}};
   return kind;
 }
 

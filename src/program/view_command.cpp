@@ -4,8 +4,13 @@
 
 #include "command.hpp"
 #include "dynains/errors.hpp"
+#include "interrupt.hpp"
 #include "json_file.hpp"
+#include "output_folder.hpp"
 #include "recording_options.hpp"
+#include "tile_server.hpp"
+#include "tileset_files.hpp"
+#include "web_server.hpp"
 #include "write_view.hpp"
 
 namespace dynains::program {
@@ -24,6 +29,8 @@ struct ViewOptions {
   CLI::Option* out_option;  // the first positional argument
   RecordingFlags sequence;
   std::size_t max_points = kDefaultViewPoints;
+  bool serve = false;
+  int port = 0;
   bool quiet = false;
 };
 
@@ -53,6 +60,39 @@ void view(ViewOptions& options) {
   if (!options.quiet) std::cout << "page: " << page.string() << std::endl;
 }
 
+/// Makes the tileset of a run if it is missing. Throws IoError unless `folder` is of a run or of
+/// `dynains map CITY export --format 3dtiles`.
+void prepare_tileset(const fs::path& folder, bool quiet) {
+  if (!fs::is_directory(folder)) {
+    throw IoError(folder.string() + ": no such folder; expected a folder of `dynains run`");
+  }
+  const LockedFolder lock(folder);
+  const OutputKind& exported = tileset_output_kind();
+  if (fs::exists(folder / exported.marker)) {
+    const OutputFolder out(Folder(folder), exported);
+    if (out.is_complete()) return;
+    throw IoError(folder.string() + ": its export was interrupted; repeat it with --force");
+  }
+  if (fs::exists(folder / "city.json")) {
+    throw IoError(folder.string() +
+                  ": is a map of many sessions; write its tiles first: dynains map " +
+                  folder.string() + " export FOLDER --format 3dtiles");
+  }
+  OutputFolder out = open_finished_run(folder);
+  const InterruptGuard interrupt;
+  write_run_tileset(out, quiet);
+}
+
+void serve(const ViewOptions& options) {
+  prepare_tileset(options.out, options.quiet);
+  const TileServer server(options.out);
+  serve_web(
+      options.port, [&](const std::string& path) { return server.answer(path); },
+      [](int port) {
+        std::cout << "map: http://127.0.0.1:" << port << "/ (Ctrl-C stops)" << std::endl;
+      });
+}
+
 }  // namespace
 
 void add_view_command(CLI::App& app) {
@@ -65,11 +105,20 @@ void add_view_command(CLI::App& app) {
       ->check(CLI::Range(std::size_t{1000}, std::size_t{100000000}))
       ->capture_default_str()
       ->type_name("N");
+  CLI::Option* const serve_option =
+      command.add_flag("--serve", options->serve,
+                       "for large maps: serve the static map in tiles (OGC 3D Tiles) until Ctrl-C");
+  command.add_option("--port", options->port, "of --serve, on this machine alone [a free one]")
+      ->check(CLI::Range(1, 65535))
+      ->needs(serve_option)
+      ->type_name("N");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   command.footer(
       "Writes OUT/view.html: one file that needs no server and no network. SEQ and its flags are\n"
-      "those of the run unless you give them.");
-  command.callback([options] { view(*options); });
+      "those of the run unless you give them. With --serve, writes OUT/tileset.json and "
+      "OUT/tileset\n"
+      "instead, and OUT may be a folder of dynains map CITY export OUT --format 3dtiles.");
+  command.callback([options] { options->serve ? serve(*options) : view(*options); });
 }
 
 }  // namespace dynains::program

@@ -53,7 +53,10 @@ viewer::RunFiles files_of(const OutputFolder& out, const Recording& recording) {
   return files;
 }
 
-void check_is_complete(const OutputFolder& out) {
+}  // namespace
+
+OutputFolder open_finished_run(const fs::path& folder) {
+  OutputFolder out(Folder(folder), run_output_kind());
   if (!out.has_results()) {
     throw IoError(out.path().string() + ": holds no results; expected a folder of `dynains run`");
   }
@@ -61,9 +64,8 @@ void check_is_complete(const OutputFolder& out) {
     throw IoError(out.path().string() +
                   ": the run was interrupted; complete it first by dynains run --resume");
   }
+  return out;
 }
-
-}  // namespace
 
 fs::path write_view(OutputFolder& out, const Recording& recording, std::size_t max_points) {
   OutputListing listing = out.listing();
@@ -85,8 +87,7 @@ fs::path write_view(const fs::path& folder, const OpenRecording& open, std::size
     throw IoError(folder.string() + ": no such folder; expected a folder of `dynains run`");
   }
   const LockedFolder lock(folder);
-  OutputFolder out(Folder(folder), run_output_kind());
-  check_is_complete(out);
+  OutputFolder out = open_finished_run(folder);
   return write_view(out, open(out.path() / out.kind().marker, out.marker()), max_points);
 }
 

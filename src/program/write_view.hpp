@@ -14,6 +14,9 @@ namespace dynains::program {
 /// Points on a page: for 1 million, it has some 10 MB.
 inline constexpr std::size_t kDefaultViewPoints = 1000000;
 
+/// The complete results of a run in `folder`, which is locked. Throws IoError.
+OutputFolder open_finished_run(const std::filesystem::path& folder);
+
 /// Writes view.html into a folder with complete results of a run over `recording`, and lists it in
 /// report.json. Returns its path. Throws IoError.
 std::filesystem::path write_view(OutputFolder& out, const Recording& recording,

@@ -2,9 +2,14 @@
 
 #include <png.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
 #include <string>
 #include <vector>
 
+#include "chart.hpp"
 #include "dynains/errors.hpp"
 #include "picture.hpp"
 #include "sequences.hpp"
@@ -38,6 +43,16 @@ VerdictCloud four_fates() {
   return cloud;
 }
 
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+std::size_t count_dots(const Figure& figure) {
+  std::size_t count = 0;
+  for (const auto& layer : figure.layers) count += layer.size();
+  return count;
+}
+
 }  // namespace
 
 TEST_CASE("A figure of the map shows the kept points, and no others") {
@@ -46,41 +61,24 @@ TEST_CASE("A figure of the map shows the kept points, and no others") {
   scan.T_world_sensor.translation() = Eigen::Vector3d(1e6, 0, 0);
   scan.add(5.0F, 0.0F, 0.0F, kRoad, 1);
   cloud.add(scan.view());
-  const Picture map = draw_from_above(cloud, Content::kMap, 200);
-  std::size_t kept = 0, missed = 0, others = 0;
-  for (int y = 0; y < map.height(); ++y) {
-    for (int x = 0; x < map.width(); ++x) {
-      const Colour colour = map.at(x, y);
-      if (colour == kFateColours[static_cast<std::size_t>(Fate::kMissedDynamic)]) {
-        ++missed;
-      } else if (colour.r == colour.g && colour.g == colour.b) {
-        kept += colour == kWhite ? 0 : 1;
-      } else {
-        ++others;
-      }
-    }
+  const Figure map = view_from_above(cloud, Content::kMap, 200);
+  CHECK(map.layers[0].size() == 2);
+  for (const Figure::Dot& dot : map.layers[0]) {
+    CHECK(dot.colour.r == dot.colour.g);
+    CHECK(dot.colour.g == dot.colour.b);
   }
-  CHECK(kept > 0);
-  CHECK(missed > 0);
-  CHECK(others == 0);
+  const auto missed = static_cast<std::size_t>(Fate::kMissedDynamic);
+  REQUIRE(map.layers[missed].size() == 1);
+  CHECK(map.layers[missed][0].colour == kFateColours[missed]);
+  CHECK(count_dots(map) == 3);
 }
 
-TEST_CASE("Within a layer the nearest point is visible, and later layers cover earlier ones") {
+TEST_CASE("A picture is white, and its sides are bounded") {
   Picture picture(10, 5);
   CHECK(picture.at(3, 2) == kWhite);
-  picture.splat(3.5, 2.5, 1.0, 0, kRed);
-  picture.splat(3.5, 2.5, 2.0, 1, kBlue);  // farther, but larger
+  picture.set(3, 2, kRed);
   CHECK(picture.at(3, 2) == kRed);
-  CHECK(picture.at(2, 1) == kBlue);
-  CHECK(picture.at(4, 3) == kBlue);
-  CHECK(picture.at(5, 2) == kWhite);
-  picture.begin_layer();
-  picture.splat(3.5, 2.5, 9.0, 0, kBlue);
-  CHECK(picture.at(3, 2) == kBlue);
-  // Points at the border of the picture and far outside.
-  picture.splat(-0.5, -0.5, 0, 1, kRed);
-  CHECK(picture.at(0, 0) == kRed);
-  picture.splat(1e300, -1e300, 0, 1, kRed);
+  CHECK(picture.at(2, 2) == kWhite);
   CHECK_THROWS_AS(Picture(0, 5), ConfigError);
   CHECK_THROWS_AS(Picture(5, 20000), ConfigError);
 }
@@ -88,8 +86,8 @@ TEST_CASE("Within a layer the nearest point is visible, and later layers cover e
 TEST_CASE("A picture is read back from its PNG file") {
   const TemporaryFolder folder;
   Picture picture(7, 3);
-  picture.splat(6.5, 0.5, 0, 0, kRed);
-  picture.splat(0.5, 2.5, 0, 0, kBlue);
+  picture.set(6, 0, kRed);
+  picture.set(0, 2, kBlue);
   const auto path = folder.path() / "picture.png";
   picture.write_png(path);
 
@@ -140,24 +138,139 @@ TEST_CASE("A static point with a kept point in its voxel is not lost") {
 
 TEST_CASE("Figures show each outcome at its place and in its colour") {
   const VerdictCloud cloud = four_fates();
-  // 20 m by 20 m on 200 pixels: x to the right, y up.
-  const Picture cleaned = draw_from_above(cloud, Content::kVerdict, 200);
-  CHECK(cleaned.width() == 200);
-  CHECK(cleaned.height() == 200);
-  CHECK(cleaned.at(100, 0) == colour_of(Fate::kRemovedDynamic, Content::kVerdict));
-  CHECK(cleaned.at(0, 100) == colour_of(Fate::kLostStatic, Content::kVerdict));
-  CHECK(cleaned.at(100, 199) == colour_of(Fate::kMissedDynamic, Content::kVerdict));
-  CHECK(cleaned.at(50, 50) == kWhite);
-  const Picture raw = draw_from_above(cloud, Content::kRaw, 200);
-  CHECK(raw.at(100, 0) == kRawDynamicColour);
-  CHECK(raw.at(100, 199) == kRawDynamicColour);
-  CHECK(!(raw.at(0, 100) == kWhite));
-  CHECK(!(raw.at(0, 100) == colour_of(Fate::kLostStatic, Content::kVerdict)));
+  const Figure cleaned = view_from_above(cloud, Content::kVerdict, 200);
+  CHECK(cleaned.width == 200);
+  CHECK(cleaned.height == 200);
+  const auto check = [](const Figure& figure, std::size_t layer, double x, double y,
+                        Colour colour) {
+    REQUIRE(figure.layers[layer].size() == 1);
+    const Figure::Dot& dot = figure.layers[layer][0];
+    CHECK(std::abs(static_cast<double>(dot.x) - x) < 0.11);  // half a cell of 0.2 m
+    CHECK(std::abs(static_cast<double>(dot.y) - y) < 0.11);
+    CHECK(dot.colour == colour);
+  };
+  const auto layer = [](Fate fate) { return static_cast<std::size_t>(fate); };
+  check(cleaned, layer(Fate::kRemovedDynamic), 0, 10, kFateColours[1]);
+  check(cleaned, layer(Fate::kLostStatic), -10, 0, kFateColours[2]);
+  check(cleaned, layer(Fate::kMissedDynamic), 0, -10, kFateColours[3]);
+  CHECK(cleaned.layers[0].size() == 1);
+  const Figure raw = view_from_above(cloud, Content::kRaw, 200);
+  REQUIRE(raw.layers[1].size() == 2);
+  CHECK(raw.layers[1][0].colour == kRawDynamicColour);
+  CHECK(raw.layers[0].size() == 2);
 
-  // An empty cloud gives a white picture.
   const VerdictCloud nothing(0.1, 2.7, 50, evaluation::TruthClasses());
-  CHECK(draw_from_above(nothing, Content::kRaw, 50).at(0, 0) == kWhite);
-  CHECK(draw_perspective(nothing, Content::kRaw, 50).at(25, 10) == kWhite);
+  CHECK(count_dots(view_from_above(nothing, Content::kRaw, 50)) == 0);
+  CHECK(count_dots(view_in_perspective(nothing, Content::kRaw, 50)) == 0);
+}
+
+TEST_CASE("A cell of a figure has one dot: of the errors first, then of the nearest point") {
+  OwnedScan scan;
+  scan.add(20.0F, 20.0F, 0.0F, kRoad, 1);
+  scan.add(-20.0F, -20.0F, 0.0F, kRoad, 1);
+  scan.add(5.0F, 5.0F, -1.0F, kRoad, 1);
+  scan.add(5.0F, 5.0F, 6.0F, kRoad, 1);  // above, hence lighter
+  scan.add(-5.0F, 5.0F, 9.0F, kRoad, 1);
+  scan.add(-5.0F, 5.0F, 0.0F, kMovingCar, 1);  // below, but missed
+  VerdictCloud cloud(0.1, 2.7, 50, evaluation::TruthClasses());
+  cloud.add(scan.view());
+  const Figure figure = view_from_above(cloud, Content::kVerdict, 100);
+  CHECK(figure.layers[0].size() == 3);
+  CHECK(figure.layers[3].size() == 1);
+  CHECK(count_dots(figure) == 4);
+  const auto near = [](const Figure::Dot& dot) { return dot.x > 4.0F && dot.x < 6.0F; };
+  const auto& plain = figure.layers[0];
+  const auto found = std::find_if(plain.begin(), plain.end(), near);
+  REQUIRE(found != plain.end());
+  CHECK(found->colour.r > plain[0].colour.r);
+}
+
+TEST_CASE("gnuplot draws a figure from files in any folder") {
+  const TemporaryFolder folder;
+  // No shell reads this name.
+  const std::filesystem::path strange = folder.path() / "it's \"$(touch broken)\" `x`\n; ";
+  std::filesystem::create_directory(strange);
+  const Figure figure = view_from_above(four_fates(), Content::kVerdict, 400);
+  try {
+    write_figure(figure, strange, "cleaned");
+    draw_figure(strange, "cleaned");
+  } catch (const IoError& error) {
+    if (!has(error.what(), "is not installed")) throw;
+    WARN("SKIPPED: no gnuplot");
+    return;
+  }
+  CHECK(!std::filesystem::exists(strange / "broken"));
+  CHECK(read_text(strange / "cleaned.dat").size() == 12 * count_dots(figure));
+  const std::string script = read_text(strange / "cleaned.gp");
+  CHECK(has(script, "x (m)"));
+  CHECK(has(script, "\"5 m\""));  // the scale bar
+  CHECK(has(script, "removed dynamic"));
+  CHECK(!has(script, folder.path().string()));
+
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  REQUIRE(png_image_begin_read_from_file(&image, (strange / "cleaned.png").c_str()) != 0);
+  image.format = PNG_FORMAT_RGB;
+  std::vector<unsigned char> bytes(PNG_IMAGE_SIZE(image));
+  REQUIRE(png_image_finish_read(&image, nullptr, bytes.data(), 0, nullptr) != 0);
+  CHECK(image.width == 640);
+  CHECK(image.height == 510);
+  // 20 m on 400 pixels, from 80 pixels on the left and 40 at the top.
+  const auto has_colour_near = [&](int x, int y, Colour colour) {
+    for (int row = y - 3; row <= y + 3; ++row) {
+      for (int column = x - 3; column <= x + 3; ++column) {
+        const unsigned char* p = &bytes[static_cast<std::size_t>(3 * (640 * row + column))];
+        if (Colour{p[0], p[1], p[2]} == colour) return true;
+      }
+    }
+    return false;
+  };
+  CHECK(has_colour_near(280, 41, kFateColours[1]));
+  CHECK(has_colour_near(81, 240, kFateColours[2]));
+  CHECK(has_colour_near(280, 438, kFateColours[3]));
+  CHECK(!has_colour_near(150, 150, kFateColours[3]));
+  // The same figure gives the same bytes.
+  write_figure(figure, folder.path(), "cleaned");
+  draw_figure(folder.path(), "cleaned");
+  for (const char* name : {"cleaned.dat", "cleaned.gp", "cleaned.png"}) {
+    CHECK(read_text(folder.path() / name) == read_text(strange / name));
+  }
+}
+
+TEST_CASE("Without gnuplot, the data stay, and the error names the package") {
+  const TemporaryFolder folder;
+  const std::string path = std::getenv("PATH");
+  ::setenv("PATH", folder.path().c_str(), 1);
+  std::string message;
+  try {
+    write_figure(view_from_above(four_fates(), Content::kMap, 100), folder.path(), "map");
+    draw_figure(folder.path(), "map");
+  } catch (const IoError& error) {
+    message = error.what();
+  }
+  ::setenv("PATH", path.c_str(), 1);
+  CHECK(has(message, "gnuplot-nox"));
+  CHECK(std::filesystem::exists(folder.path() / "map.gp"));
+  CHECK(std::filesystem::exists(folder.path() / "map.dat"));
+  CHECK(!std::filesystem::exists(folder.path() / "map.png"));
+}
+
+TEST_CASE("The script of a chart has its data, with gaps, and texts that are only texts") {
+  Chart numbers("tau-s", {"PR", "RR"});
+  numbers.add("0.1", {99.5, std::nan("")});
+  numbers.add("1e-1", {98, 50});
+  const std::string script = numbers.script();
+  CHECK(has(script, "\n0.1 99.500000 -\n1e-1 98.000000 50.000000\nEND\n"));
+  CHECK(has(script, "set xlabel \"tau-s\""));
+  CHECK(has(script, "using 1:3"));
+  CHECK(has(script, "title \"RR\""));
+
+  Chart texts("\"; system(\"touch broken\") #", {"PR"});
+  texts.add("`date`\\", {1});
+  texts.add("2", {2});
+  CHECK(has(texts.script(), "set xlabel \"?; system(?touch broken?) #\"\n"));
+  CHECK(has(texts.script(), "\n\"?date??\" 1.000000\n\"2\" 2.000000\n"));
+  CHECK(has(texts.script(), "using 0:2:xtic(1)"));
 }
 
 }  // namespace dynains::program

@@ -86,6 +86,43 @@ TEST_CASE("Written point files are read back") {
   CHECK(file.viewpoint.isApprox(Eigen::Isometry3d::Identity()));
 }
 
+TEST_CASE("Points are visited one by one, as they are read at once") {
+  TemporaryFolder folder;
+  const std::string extension = GENERATE(".ply", ".pcd");
+  PointColumns columns;
+  columns.intensity = columns.label = columns.time = columns.ring = GENERATE(false, true);
+  const fs::path path = folder / ("points" + extension);
+  PointFileWriter writer(path, columns);
+  for (int i = 0; i < 100; ++i) {
+    FilePoint point;
+    point.position = Eigen::Vector3d(i, -2 * i, 0.5 * i);
+    point.intensity = static_cast<float>(i);
+    point.label = static_cast<std::uint32_t>(3 * i);
+    point.ring = static_cast<std::uint16_t>(i % 64);
+    point.time = 1e9 + i;
+    writer.add(point);
+  }
+  writer.commit();
+  const PointFile file = read_points(path);
+  std::size_t count = 0;
+  for_each_point(path, [&](const FilePoint& point) {
+    const FilePoint expected = point_of(file, count++);
+    CHECK(point.position == expected.position);
+    CHECK(point.intensity == expected.intensity);
+    CHECK(point.label == expected.label);
+    CHECK(point.ring == expected.ring);
+    CHECK(point.time == expected.time);
+    CHECK((point.label != 0) == (columns.label && count > 1));
+  });
+  CHECK(count == 100);
+
+  write_text(folder / "short.ply",
+             "ply\nformat ascii 1.0\nelement vertex 2\n" + kPlyXyz + "1 2 3\n");
+  const auto ignore = [](const FilePoint&) {};
+  CHECK_THROWS_AS(for_each_point(folder / "short.ply", ignore), IoError);
+  CHECK_THROWS_AS(for_each_point(folder / "missing.ply", ignore), IoError);
+}
+
 TEST_CASE("A written PLY has the bytes of the format") {
   TemporaryFolder folder;
   PointColumns columns;

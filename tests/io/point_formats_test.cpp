@@ -178,6 +178,14 @@ TEST_CASE("NumPy: malformed arrays are refused with the reason") {
   check(npy_file("'<f4'", "(18446744073709551615, 18446744073709551615)", xyz), "all items");
   check(npy_file("'<f4'", "(2305843009213693952, 8)", xyz), "all items");
   check(npy_file("'<f4'", "(99999999999999999999, 3)", xyz), "length of a dimension");
+  const std::string one_item = "[('x', '<u8'), ('y', '>u1'), ('z', '<f4')]";
+  check(npy_file(one_item, "()", xyz.substr(0, 5)), "expected all items of the array");
+  check(npy_file(one_item, "()", ""), "expected all items of the array");
+  // The size of an item must not overflow: 65536^4 values are 2^64 bytes.
+  check(npy_file("[('a', '|u1', (65536, 65536, 65536, 65536)), ('x', '<f4'), ('y', '<f4'), ('z', "
+                 "'<f4')]",
+                 "(1,)", xyz),
+        "fields of at most 1 GB");
   check(npy_file("'<f4'", "(6,)", xyz), "expected an array of N rows");
   check(npy_file("'<f4'", "(3, 2)", xyz), "expected an array of N rows");
   check(npy_file("'<f4'", "(-2, 3)", xyz), "length of a dimension");

@@ -130,8 +130,6 @@ TEST_CASE("Every scan gets its final labels, every dynamic point its place in th
   CHECK(results.finished() == 4);
   const std::size_t count = fixture.sequence->read_scan(1).size();
   CHECK(results.points() == 4 * count);
-  CHECK(fixture.remover.reserved_points == count);
-  CHECK(fixture.remover.reserved_scans == 4);
   CHECK(results.labels()[PointLabel::kDynamic] == 4);
   CHECK(results.labels()[PointLabel::kInvalid] == 4);
   CHECK(results.labels()[PointLabel::kStatic] == 4 * (count - 4));

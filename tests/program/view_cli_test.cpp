@@ -90,3 +90,24 @@ TEST_CASE("beliefs are written on demand, one byte per point") {
   CHECK(outcome.code == 1);
   CHECK(contains(outcome.err, "000003.belief: has 7 bytes; expected a byte for each"));
 }
+
+TEST_CASE(
+    "view --serve refuses what is no finished run, a run without a map, and files of others") {
+  const Fixture fixture;
+  CHECK(contains(start({"view", fixture.out, "--serve"}).err, "no such folder"));
+  fs::create_directory(fixture.out);
+  CHECK(contains(start({"view", fixture.out, "--serve"}).err, "holds no results"));
+  CHECK(start({"view", fixture.out, "--port", "8000"}).code == 2);
+  CHECK(start({"view", fixture.out, "--serve", "--port", "70000"}).code == 2);
+  REQUIRE(start({"run", fixture.seq, "--out", fixture.out, "--build-map", "false"}).code == 0);
+  const Outcome no_map = start({"view", fixture.out, "--serve"});
+  CHECK(no_map.code == 1);
+  CHECK(contains(no_map.err, "the run built no map"));
+
+  REQUIRE(start({"run", fixture.seq, "--out", fixture.out, "--force"}).code == 0);
+  write_text(fixture.out + "/tileset.json", "mine");
+  const Outcome foreign = start({"view", fixture.out, "--serve"});
+  CHECK(foreign.code == 1);
+  CHECK(contains(foreign.err, "tileset.json"));
+  CHECK(read_text(fixture.out + "/tileset.json") == "mine");
+}

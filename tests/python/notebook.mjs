@@ -17,7 +17,7 @@ page = dynains.view(result, height=333)
 with open("notebook.html", "w") as notebook:
     notebook.write("<!doctype html><p>a cell</p>" + page._repr_html_())
 `], {cwd: folder, stdio: 'inherit'});
-await withPage(`${folder}/notebook.html`, {width: 600, height: 500}, async (page, complaints) => {
+await withPage(`file://${folder}/notebook.html`, {width: 600, height: 500}, async (page, complaints) => {
   const node = await page.$('iframe');
   assert.equal((await node.boundingBox()).height, 333);
   const frame = await node.contentFrame();

@@ -1,4 +1,4 @@
-// Opens a page of `dynains view` in headless Chromium. Needs npm puppeteer-core below NODE_PATH and
+// Opens pages of `dynains view` in headless Chromium. Needs npm puppeteer-core below NODE_PATH and
 // a program chromium; NODE_PATH holds for require() only.
 import {createRequire} from 'node:module';
 import {existsSync} from 'node:fs';
@@ -20,9 +20,9 @@ const chromium = ['/usr/bin/chromium', '/usr/bin/chromium-browser', '/usr/bin/go
   .find((path) => existsSync(path)) ?? skip('no chromium');
 const puppeteer = findPuppeteer();
 
-// Calls work(page, complaints) with the loaded page; complaints are messages of its console and
-// requests that leave the file.
-export async function withPage(file, size, work) {
+// Calls work(page, complaints) with the loaded page of an address; complaints are messages of its
+// console and requests that leave the file or the server.
+export async function withPage(address, size, work) {
   const browser = await puppeteer.launch({
     executablePath: chromium, headless: true, protocolTimeout: 300000,
     args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
@@ -37,10 +37,12 @@ export async function withPage(file, size, work) {
     });
     page.on('pageerror', (error) => complaints.push(error.message));
     page.on('request', (request) => {
-      if (!/^(file|data|blob):/.test(request.url())) complaints.push(`request ${request.url()}`);
+      const isOwn = /^(data|blob):/.test(request.url()) ||
+        request.url().startsWith(address.startsWith('file:') ? 'file:' : address);
+      if (!isOwn) complaints.push(`request ${request.url()}`);
     });
     await page.setViewport(size);
-    await page.goto(`file://${file}`, {timeout: 120000});
+    await page.goto(address, {timeout: 120000});
     await page.evaluate(async () => { await window.dynainsViewer; });
     await work(page, complaints);
   } finally {

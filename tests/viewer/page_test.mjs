@@ -197,14 +197,14 @@ const out = makePage();
 const file = `${out}/view.html`;
 const size = {width: 720, height: 450};
 assert.ok(statSync(file).size < 15e6, 'the page has less than 15 MB');
-await withPage(file, size, async (page, complaints) => {
+await withPage(`file://${file}`, size, async (page, complaints) => {
   await testCounts(page, out);
   await testPicture(page);
   assert.deepEqual(complaints, [], 'the console is empty, and nothing is requested');
 });
 // Without a graphics processor, fewer points are drawn sooner.
 execFileSync(program, ['view', out, `${folder}/street`, '--max-points', '150000']);
-await withPage(file, size, async (page, complaints) => {
+await withPage(`file://${file}`, size, async (page, complaints) => {
   await testSlider(page);
   await testFilter(page);
   await testPicking(page, out);

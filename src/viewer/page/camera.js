@@ -22,6 +22,7 @@ class Camera {
     this.yaw = yaw;  // direction of view in the plane, rad
     this.pitch = 0.5;  // downwards, rad
     this.distance = distance;
+    this.reach = 2000;  // m, that is seen behind the target
   }
 
   axes() {
@@ -38,7 +39,7 @@ class Camera {
       right[0], up[0], -forward[0], 0, right[1], up[1], -forward[1], 0,
       right[2], up[2], -forward[2], 0, -dot(right, eye), -dot(up, eye), dot(forward, eye), 1]);
     const near = Math.max(0.2, this.distance / 200);
-    const far = this.distance + 2000;
+    const far = this.distance + this.reach;
     const f = 1 / Math.tan(FIELD_OF_VIEW / 2);
     const projection = new Float32Array(16);
     if (this.mode === 'top') {
@@ -48,7 +49,7 @@ class Camera {
       projection.set([f / aspect, 0, 0, 0, 0, f, 0, 0,
         0, 0, (near + far) / (near - far), -1, 0, 0, 2 * near * far / (near - far), 0]);
     }
-    return {matrix: product(projection, view), near, far, isFlat: this.mode === 'top'};
+    return {matrix: product(projection, view), eye, near, far, isFlat: this.mode === 'top'};
   }
 
   turn(dx, dy) {
@@ -64,7 +65,7 @@ class Camera {
   }
 
   zoom(factor) {
-    this.distance = Math.min(5000, Math.max(1, this.distance * factor));
+    this.distance = Math.min(2.5 * this.reach, Math.max(1, this.distance * factor));
   }
 
   // Behind the sensor, in its direction of travel.

@@ -72,35 +72,7 @@ class Viewer {
 
   connectMouse() {
     const canvas = element('canvas');
-    let drag = null;
-    canvas.addEventListener('contextmenu', (event) => event.preventDefault());
-    canvas.addEventListener('pointerdown', (event) => {
-      canvas.setPointerCapture(event.pointerId);
-      drag = {x: event.clientX, y: event.clientY, moved: 0,
-        isMove: event.button !== 0 || event.shiftKey};
-    });
-    canvas.addEventListener('pointermove', (event) => {
-      if (!drag) return;
-      const [dx, dy] = [event.clientX - drag.x, event.clientY - drag.y];
-      drag = {...drag, x: event.clientX, y: event.clientY,
-        moved: drag.moved + Math.abs(dx) + Math.abs(dy)};
-      const {camera} = this.state;
-      if (drag.isMove || camera.mode === 'top') {
-        camera.move(dx, dy, canvas.clientHeight);
-      } else {
-        camera.turn(dx, dy);
-      }
-      this.request();
-    });
-    canvas.addEventListener('pointerup', (event) => {
-      if (drag && drag.moved < 4) this.pick(event.clientX, event.clientY);
-      drag = null;
-    });
-    canvas.addEventListener('wheel', (event) => {
-      event.preventDefault();
-      this.state.camera.zoom(Math.exp(0.001 * event.deltaY));
-      this.request();
-    }, {passive: false});
+    connectCamera(canvas, this.state.camera, () => this.request(), (x, y) => this.pick(x, y));
     const divider = element('divider');
     divider.addEventListener('pointerdown', (event) => divider.setPointerCapture(event.pointerId));
     divider.addEventListener('pointermove', (event) => {

@@ -27,8 +27,6 @@ const CAUSE_SENTENCES = [
   'removed: most points in its dynamic grid cell are dynamic'];
 
 const LABELS = ['not judged', 'static', 'moving'];
-const count = (number) => number.toLocaleString('en-US');
-const element = (id) => document.getElementById(id);
 const css = (colour) => `rgb(${colour.map((value) => Math.round(255 * value)).join(' ')})`;
 
 function swatch(colour) {

@@ -23,17 +23,7 @@ uniform vec3 cause_colours[17];
 uniform bool is_picking;
 flat out vec4 colour;
 
-vec3 ramp(float t) {
-  t = clamp(t, 0.0, 1.0);
-  vec3 low = mix(vec3(0.16, 0.23, 0.55), vec3(0.14, 0.62, 0.62), smoothstep(0.0, 0.4, t));
-  vec3 high = mix(vec3(0.55, 0.78, 0.35), vec3(0.98, 0.86, 0.30), smoothstep(0.6, 1.0, t));
-  return mix(low, high, smoothstep(0.25, 0.75, t));
-}
-
-vec3 hue(float h) {
-  vec3 k = abs(fract(h + vec3(0.0, 0.667, 0.333)) * 6.0 - 3.0) - 1.0;
-  return mix(vec3(1.0), clamp(k, 0.0, 1.0), 0.75);
-}
+${COLOURS}
 
 vec3 colour_of(float height) {
   uint instance = position_instance.w;
@@ -82,51 +72,4 @@ void main() {
   } else {
     colour = vec4(colour_of(local.z), 1.0);
   }
-}`;
-
-const POINT_FRAGMENT = `#version 300 es
-precision mediump float;
-flat in highp vec4 colour;
-out highp vec4 result;
-void main() { result = colour; }`;
-
-const SCREEN_VERTEX = `#version 300 es
-void main() {
-  gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
-}`;
-
-// Eye-dome lighting: a pixel gets darker, the farther it lies behind its neighbours.
-const SCREEN_FRAGMENT = `#version 300 es
-precision highp float;
-uniform sampler2D colours;
-uniform highp sampler2D depths;
-uniform vec2 range;  // near, far, m
-uniform bool is_flat;
-uniform float strength;
-uniform vec3 background;
-out vec4 result;
-
-float log_depth(ivec2 pixel) {
-  float d = texelFetch(depths, clamp(pixel, ivec2(0), textureSize(depths, 0) - 1), 0).r;
-  if (d >= 1.0) return 1e6;
-  float metres = is_flat ? mix(range.x, range.y, d)
-                         : range.x * range.y / (range.y - d * (range.y - range.x));
-  return log2(metres);
-}
-
-void main() {
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
-  float depth = log_depth(pixel);
-  if (depth > 1e5) {
-    result = vec4(background, 1.0);
-    return;
-  }
-  const ivec2 around[8] = ivec2[8](ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1),
-                                   ivec2(1, 1), ivec2(-1, 1), ivec2(1, -1), ivec2(-1, -1));
-  float behind = 0.0;
-  for (int i = 0; i < 8; ++i) {
-    behind += min(max(0.0, depth - log_depth(pixel + around[i])), 0.2);
-  }
-  vec3 colour = texelFetch(colours, pixel, 0).rgb;
-  result = vec4(colour * exp(-6.0 * strength * behind), 1.0);
 }`;
