@@ -68,9 +68,8 @@ void check_same_files(const fs::path& a, const fs::path& b) {
 
 /// A report without what depends on the moment and on the number of jobs.
 nlohmann::json lasting_part(nlohmann::json report) {
-  for (const char* name :
-       {"milliseconds", "flush_milliseconds", "wall_milliseconds",
-        "share_outside_pipeline", "jobs", "kept_chunks", "peak_memory_bytes"}) {
+  for (const char* name : {"milliseconds", "flush_milliseconds", "wall_milliseconds",
+                           "share_outside_pipeline", "jobs", "kept_chunks", "peak_memory_bytes"}) {
     report.erase(name);
   }
   return report;

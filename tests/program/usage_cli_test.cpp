@@ -67,7 +67,8 @@ TEST_CASE("An unknown command or option gives the nearest one") {
     std::string expected;
   };
   const std::string all =
-      "xpected one of run, remap, map, fleet, check, config, simulate, statistics, eval, experiment, "
+      "xpected one of run, remap, map, fleet, check, config, simulate, statistics, eval, "
+      "experiment, "
       "view, "
       "man, completion (";
   const std::vector<Case> cases = {

@@ -34,9 +34,8 @@ inline Tree without_measurements(Tree tree) {
     if (ends_with(name, "report.json")) {
       auto json = nlohmann::json::parse(item.bytes, nullptr, false);
       if (!json.is_object()) continue;
-      for (const char* field :
-           {"milliseconds", "flush_milliseconds", "wall_milliseconds",
-            "share_outside_pipeline", "kept_chunks", "peak_memory_bytes"}) {
+      for (const char* field : {"milliseconds", "flush_milliseconds", "wall_milliseconds",
+                                "share_outside_pipeline", "kept_chunks", "peak_memory_bytes"}) {
         json.erase(field);
       }
       item.bytes = json.dump();
