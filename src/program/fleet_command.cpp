@@ -36,8 +36,8 @@ sys.exit(fleet.main())
 
 }  // namespace
 
-void add_fleet_command(CLI::App& program) {
-  CLI::App& command = *program.add_subcommand(
+void add_fleet_command(CLI::App& app) {
+  CLI::App& command = *app.add_subcommand(
       "fleet", "Clean many recordings at once, on many cores or machines (Python and Dask)");
   command.set_help_flag();  // the module has its own help
   command.prefix_command();
