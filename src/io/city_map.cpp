@@ -32,9 +32,13 @@ std::vector<TileIndex> CityMap::tiles() const {
 
 TileHistory CityMap::history(const TileIndex& tile, std::uint32_t last) const {
   TileHistory history(city_.grid(), config_);
-  for (std::size_t i = 0; i < sessions_.size() && i <= last; ++i) {
-    revise(history, tile, i);
+  const std::size_t count = std::min<std::size_t>(sessions_.size(), std::size_t{last} + 1);
+  for (std::size_t i = 0; i < count; ++i) {
     history.add_session(city_.read_tile(sessions_[i], tile));
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    revise(history, tile, i);
+    history.end_session();
   }
   return history;
 }
@@ -70,10 +74,14 @@ CityChanges CityMap::changes(const TileIndex& tile, std::uint32_t a, std::uint32
   points.reserve(candidates.size());
   for (const CityPoint& candidate : candidates) points.push_back(candidate.point);
   reversed.add_session(std::move(points));
-  for (std::size_t session = 0; session <= a; ++session) revise(reversed, tile, session);
-  reversed.add_session({});
+  for (std::size_t session = 0; session <= a; ++session) reversed.add_session({});
+  reversed.end_session();
+  for (std::size_t session = 0; session <= a; ++session) {
+    revise(reversed, tile, session);
+    reversed.end_session();
+  }
   for (std::size_t i = 0; i < candidates.size(); ++i) {
-    if (!reversed.stands(0, i, 1)) changes.added.push_back(candidates[i]);
+    if (!reversed.stands(0, i, a + 1)) changes.added.push_back(candidates[i]);
   }
   return changes;
 }

@@ -35,17 +35,22 @@ const std::vector<Session> kDays = {{"monday", 0.0, {kParkedCar}},
                                     {"tuesday", 86400.0, {kNewContainer}},
                                     {"wednesday", 172800.0, {kNewContainer}}};
 
-void add(const City& city, const Session& session) {
+void add(const City& city, const Session& session, const std::vector<test::BoxScan>& scans,
+         const SessionPointsConfig& config = {}) {
   SessionInfo info;
   info.name = session.name;
   info.begin = session.begin;
   info.fingerprint = session.name;
-  SessionWriter writer(city, info);
+  SessionWriter writer(city, info, config);
   std::uint32_t number = 0;
-  for (const test::BoxScan& scan : test::drive_along(session.boxes, -5.0, 5.0)) {
+  for (const test::BoxScan& scan : scans) {
     writer.add(scan.points, scan.verdicts, scan.labels, scan.T_world_sensor, number++);
   }
   writer.commit();
+}
+
+void add(const City& city, const Session& session) {
+  add(city, session, test::drive_along(session.boxes, -5.0, 5.0));
 }
 
 City city_of(const fs::path& folder, const std::vector<Session>& sessions) {
@@ -177,6 +182,49 @@ TEST_CASE("a city: what a later session did not see stays") {
   auto after = label_counts(city, 1);
   REQUIRE(before[kParked] > 100);
   CHECK(after[kParked] == before[kParked]);
+}
+
+TEST_CASE("a city: what a run missed does not come in where earlier sessions saw free space") {
+  const test::TemporaryFolder folder;
+  // A car drives ahead, and the run of tuesday does not see that it moves.
+  std::vector<test::BoxScan> scans;
+  for (const double x : {0.0, 1.0}) {
+    const double rear = 3.0 + 6.0 * x;
+    scans.push_back(test::scan_boxes({{{rear, 3, 0}, {rear + 4, 5, 1.5}, kParked}}, x, 0.0));
+  }
+  const City without = city_of(folder.path() / "without", {});
+  add(without, {"tuesday", 86400.0, {}}, scans);
+  City with = city_of(folder.path() / "with", {{"monday", 0.0, {}}});
+  add(with, {"tuesday", 86400.0, {}}, scans);
+  REQUIRE(label_counts(without)[kParked] > 20);
+  CHECK(label_counts(with)[kParked] == 0);
+  CHECK(label_counts(with)[40] > label_counts(without)[40] * 99 / 100);
+  with.drop("monday");
+  CHECK(map_bytes(with) == map_bytes(without));
+}
+
+TEST_CASE("a city: an object of which a part is seen through leaves as a whole") {
+  const test::TemporaryFolder folder;
+  const City city = city_of(folder.path() / "city", {kDays[0]});
+  // A wall hides most of the place of the car.
+  add(city, {"tuesday", 86400.0, {{{-40, 2.0, 0}, {5.5, 2.2, 5}, 50}}});
+  REQUIRE(label_counts(city, 0)[kParked] > 100);
+  CHECK(label_counts(city, 1)[kParked] == 0);
+}
+
+TEST_CASE("a city: points beyond the contribution range do not come in") {
+  const test::TemporaryFolder folder;
+  SessionPointsConfig near;
+  near.contribution_range = 20.0;
+  const std::vector<test::BoxScan> scans = {test::scan_boxes({}, 0.0, 0.0)};
+  const City city = city_of(folder.path() / "city", {});
+  add(city, kDays[0], scans, near);
+  const SessionInfo session = city.sessions().at(0);
+  CHECK(session.points > 1000);
+  CHECK(session.highest.head<2>().cwiseAbs().maxCoeff() <= 20.0);
+  CHECK(session.lowest.head<2>().cwiseAbs().maxCoeff() > 15.0);
+  near.contribution_range = 0.0;
+  CHECK_THROWS_WITH(add(city, kDays[1], scans, near), ContainsSubstring("contribution_range"));
 }
 
 TEST_CASE("a city: a dropped session leaves the bytes of never having had it") {
