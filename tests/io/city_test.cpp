@@ -11,6 +11,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/city_map.hpp"
 #include "dynains/io/session_writer.hpp"
+#include "dynains/map/change_clusters.hpp"
 #include "io/files.hpp"
 #include "support/box_street.hpp"
 #include "support/catch.hpp"
@@ -210,6 +211,63 @@ TEST_CASE("a city: an object of which a part is seen through leaves as a whole")
   add(city, {"tuesday", 86400.0, {{{-40, 2.0, 0}, {5.5, 2.2, 5}, 50}}});
   REQUIRE(label_counts(city, 0)[kParked] > 100);
   CHECK(label_counts(city, 1)[kParked] == 0);
+}
+
+TEST_CASE("a city: changes are objects that came or left") {
+  const test::TemporaryFolder folder;
+  const City city = city_of(folder.path() / "city", kDays);
+  const CityMap map(city);
+  const auto labels = [&](std::uint32_t a, std::uint32_t b, auto member) {
+    std::map<std::uint32_t, std::size_t> counts;
+    for (const TileIndex& tile : map.tiles()) {
+      const CityChanges changes = map.changes(tile, a, b);
+      for (const CityPoint& p : changes.*member) ++counts[p.point.label];
+    }
+    return counts;
+  };
+  auto removed = labels(0, 1, &CityChanges::removed);
+  CHECK(removed.size() == 1);
+  CHECK(removed[kParked] > 100);
+  auto added = labels(0, 2, &CityChanges::added);
+  CHECK(added.size() == 1);
+  CHECK(added[kContainer] > 100);
+  CHECK(labels(1, 2, &CityChanges::added).empty());
+  CHECK(labels(1, 2, &CityChanges::removed).empty());
+  CHECK_THROWS_AS(map.changes(map.tiles().front(), 1, 1), ConfigError);
+}
+
+TEST_CASE("clusters of changes: small ones, parts and what was seen too briefly are none") {
+  const SessionGrid grid;
+  // A wall of points 0.2 m apart, 2 m long and 1.6 m high.
+  const auto wall = [](float height, std::uint32_t hits) {
+    std::vector<ChangedPoint> points;
+    for (int column = 0; column < 10; ++column) {
+      const float x = 5.1F + 0.2F * static_cast<float>(column);
+      for (float z = 0.1F; z < height; z += 0.2F) {
+        points.push_back({{x, 5.1F, z, 0, 0, false}, hits});
+      }
+    }
+    return points;
+  };
+  const auto selected = [&](const ChangeClusters& clusters,
+                            const std::vector<ChangedPoint>& points) {
+    const std::vector<bool> is_selected = clusters.select(points);
+    return std::count(is_selected.begin(), is_selected.end(), true);
+  };
+  const ChangeClusters alone(grid);
+  CHECK(selected(alone, wall(1.6F, 5)) == 80);
+  CHECK(selected(alone, wall(0.4F, 5)) == 0);  // lower than 0.4 m
+  CHECK(selected(alone, wall(1.6F, 2)) == 0);
+  CHECK(selected(alone, {}) == 0);
+  ChangeClusters in_a_corner(grid), in_a_bush(grid);
+  for (const ChangedPoint& changed : wall(1.6F, 5)) {
+    SessionPoint beside = changed.point;
+    beside.y += 0.4F;
+    if (beside.x < 5.4F) in_a_corner.add_standing(beside);
+    in_a_bush.add_standing(beside);
+  }
+  CHECK(selected(in_a_corner, wall(1.6F, 5)) == 80);
+  CHECK(selected(in_a_bush, wall(1.6F, 5)) == 0);
 }
 
 TEST_CASE("a city: points beyond the contribution range do not come in") {

@@ -56,6 +56,21 @@ class TileHistory {
     const Session& own = sessions_[session];
     return own.removal_of[own.block_of[point]];
   }
+  /// Number of references of its own session that hit the block of a point, up to 255.
+  std::uint32_t own_hits(std::size_t session, std::size_t point) const {
+    return sessions_[session].own_hits[sessions_[session].block_of[point]];
+  }
+  /// Whether a point is no ground, or higher than the lowest ground around of the sessions that
+  /// have tested.
+  bool is_above_ground(const SessionPoint& point) const {
+    if (!point.is_ground) return true;
+    for (int i = 0; i < 9; ++i) {
+      const std::uint32_t cell =
+          ground_cells_.find(ground_cell(point) + voxel_key_step(i % 3 - 1, i / 3 - 1, 0));
+      if (cell != kNone && point.z > lowest_ground_[cell] + kGroundRise) return true;
+    }
+    return false;
+  }
   /// Whether a point is neither removed by a session up to number `last`, nor newer than `last`.
   bool stands(std::size_t session, std::size_t point, std::uint32_t last) const {
     const std::uint32_t by = removal(session, point).session;
@@ -87,6 +102,7 @@ class TileHistory {
       session.by_block[next[session.block_of[i]]++] = i;
     }
     session.level.assign(blocks.size(), 0.0F);
+    session.own_hits.assign(blocks.size(), 0);
     session.free_scan.assign(blocks.size(), 0);
     session.removal_of.assign(blocks.size(), Removal());
     sessions_.push_back(std::move(session));
@@ -172,6 +188,7 @@ class TileHistory {
     std::vector<std::uint32_t> begin;         // by block: in by_block
     std::vector<std::uint32_t> by_block;      // points, sorted by block
     std::vector<float> level;                 // by block: log-odds of being free
+    std::vector<std::uint8_t> own_hits;       // by block: references of this session that hit
     std::vector<std::uint32_t> free_scan;     // by block: latest reference that passed
     std::vector<std::uint32_t> component_of;  // by block, or kNone for ground
     std::vector<std::uint8_t> is_compact;     // by component
@@ -190,17 +207,6 @@ class TileHistory {
       if (cell == lowest_ground_.size()) lowest_ground_.push_back(point.z);
       lowest_ground_[cell] = std::min(lowest_ground_[cell], point.z);
     }
-  }
-
-  // Whether a point is no ground, or higher than the lowest ground around.
-  bool is_above_ground(const SessionPoint& point) const {
-    if (!point.is_ground) return true;
-    for (int i = 0; i < 9; ++i) {
-      const std::uint32_t cell =
-          ground_cells_.find(ground_cell(point) + voxel_key_step(i % 3 - 1, i / 3 - 1, 0));
-      if (cell != kNone && point.z > lowest_ground_[cell] + kGroundRise) return true;
-    }
-    return false;
   }
 
   // Numbers the components of touching blocks with points above the ground.
@@ -331,6 +337,8 @@ class TileHistory {
     }
     if (free_ratio <= detail::FreeSpaceSum::kHitRatio) {
       session.level[block] += hit_;
+      std::uint8_t& hits = session.own_hits[block];
+      if (session.number == tested_count_ && hits < 255) ++hits;
     }
   }
 
