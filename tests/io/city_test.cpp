@@ -204,6 +204,25 @@ TEST_CASE("a city: what a run missed does not come in where earlier sessions saw
   CHECK(map_bytes(with) == map_bytes(without));
 }
 
+TEST_CASE("a city: beams that end at moving points remove nothing") {
+  const test::TemporaryFolder folder;
+  const City city = city_of(folder.path() / "city", {kDays[0]});
+  // All beams through the place of the car end behind it, at points with a dynamic verdict.
+  std::vector<test::BoxScan> scans =
+      test::drive_along({{{-20, 3.4, 0}, {30, 6, 4}, kContainer}}, -5.0, 5.0);
+  const City seen_through = city_of(folder.path() / "seen_through", {kDays[0]});
+  add(seen_through, kDays[1], scans);
+  for (test::BoxScan& scan : scans) {
+    for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+      if (scan.labels[i] == kContainer) scan.verdicts[i] = PointLabel::kDynamic;
+    }
+  }
+  add(city, kDays[1], scans);
+  auto before = label_counts(city, 0);
+  CHECK(label_counts(seen_through, 1)[kParked] < before[kParked] / 2);
+  CHECK(label_counts(city, 1)[kParked] > before[kParked] * 9 / 10);
+}
+
 TEST_CASE("a city: an object of which a part is seen through leaves as a whole") {
   const test::TemporaryFolder folder;
   const City city = city_of(folder.path() / "city", {kDays[0]});

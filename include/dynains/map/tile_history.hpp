@@ -178,7 +178,7 @@ class TileHistory {
   };
   static constexpr Limits kNotStanding = {2.0F, 0.3F};   // in its own session
   static constexpr Limits kCompactLeft = {0.25F, 0.1F};  // the size of a vehicle
-  static constexpr Limits kLeft = {1.0F, 0.2F};
+  static constexpr Limits kLeft = {1.0F, 0.5F};
 
   struct Session {
     std::uint32_t number = 0;
