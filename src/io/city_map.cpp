@@ -6,6 +6,38 @@
 #include "dynains/errors.hpp"
 
 namespace dynains {
+namespace {
+
+/// Points that may be changes, with their sessions.
+struct Candidates {
+  std::vector<ChangedPoint> points;
+  std::vector<std::uint32_t> sessions;
+
+  void add(std::size_t session, const SessionPoint& point, std::uint32_t hits) {
+    points.push_back({point, hits});
+    sessions.push_back(static_cast<std::uint32_t>(session));
+  }
+  void keep(const std::vector<bool>& is_kept) {
+    std::size_t size = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (!is_kept[i]) continue;
+      points[size] = points[i];
+      sessions[size++] = sessions[i];
+    }
+    points.resize(size);
+    sessions.resize(size);
+  }
+  std::vector<CityPoint> selected(const ChangeClusters& clusters) const {
+    const std::vector<bool> is_selected = clusters.select(points);
+    std::vector<CityPoint> result;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (is_selected[i]) result.push_back({sessions[i], points[i].point});
+    }
+    return result;
+  }
+};
+
+}  // namespace
 
 CityMap::CityMap(const City& city, const MapRevisionConfig& config)
     : city_(city), config_((config.validate(), config)), sessions_(city.sessions()) {
@@ -32,9 +64,13 @@ std::vector<TileIndex> CityMap::tiles() const {
 
 TileHistory CityMap::history(const TileIndex& tile, std::uint32_t last) const {
   TileHistory history(city_.grid(), config_);
-  for (std::size_t i = 0; i < sessions_.size() && i <= last; ++i) {
-    revise(history, tile, i);
+  const std::size_t count = std::min<std::size_t>(sessions_.size(), std::size_t{last} + 1);
+  for (std::size_t i = 0; i < count; ++i) {
     history.add_session(city_.read_tile(sessions_[i], tile));
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    revise(history, tile, i);
+    history.end_session();
   }
   return history;
 }
@@ -43,39 +79,58 @@ CityChanges CityMap::changes(const TileIndex& tile, std::uint32_t a, std::uint32
   if (a >= b) throw ConfigError("changes of a map: expected an earlier and a later session");
   const TileHistory history = this->history(tile, b);
   const SessionGrid& grid = city_.grid();
+  ChangeClusters clusters(grid);
   VoxelHashTable<> before, after;
   history.for_each_standing(a, [&](std::size_t session, std::size_t i) {
     before.insert(session_voxel(grid, history.points(session)[i]));
   });
-  std::vector<CityPoint> candidates;
   history.for_each_standing(b, [&](std::size_t session, std::size_t i) {
-    const SessionPoint& point = history.points(session)[i];
-    const VoxelKey voxel = session_voxel(grid, point);
-    after.insert(voxel);
-    if (session <= a || before.find(voxel) != VoxelHashTable<>::kNone) return;
-    candidates.push_back({static_cast<std::uint32_t>(session), point});
+    after.insert(session_voxel(grid, history.points(session)[i]));
   });
-
-  CityChanges changes;
+  Candidates removed, added;
+  const auto sort = [&](std::size_t session, std::size_t i, const VoxelHashTable<>& other,
+                        Candidates& candidates) {
+    const SessionPoint& point = history.points(session)[i];
+    if (!history.is_above_ground(point)) return;
+    if (other.find(session_voxel(grid, point)) != VoxelHashTable<>::kNone) {
+      clusters.add_standing(point);
+    } else {
+      candidates.add(session, point, history.own_hits(session, i));
+    }
+  };
   history.for_each_standing(a, [&](std::size_t session, std::size_t i) {
-    if (history.stands(session, i, b)) return;
-    const SessionPoint& point = history.points(session)[i];
-    if (after.find(session_voxel(grid, point)) != VoxelHashTable<>::kNone) return;
-    changes.removed.push_back({static_cast<std::uint32_t>(session), point});
+    if (!history.stands(session, i, b)) sort(session, i, after, removed);
   });
+  history.for_each_standing(
+      b, [&](std::size_t session, std::size_t i) { sort(session, i, before, added); });
   // A point was added if beams of the earlier sessions passed through its place. Places that they
   // did not see are no changes.
-  TileHistory reversed(grid, config_);
-  std::vector<SessionPoint> points;
-  points.reserve(candidates.size());
-  for (const CityPoint& candidate : candidates) points.push_back(candidate.point);
-  reversed.add_session(std::move(points));
-  for (std::size_t session = 0; session <= a; ++session) revise(reversed, tile, session);
-  reversed.add_session({});
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    if (!reversed.stands(0, i, 1)) changes.added.push_back(candidates[i]);
-  }
+  added.keep(free_before(tile, a, added.points));
+
+  CityChanges changes;
+  changes.removed = removed.selected(clusters);
+  changes.added = added.selected(clusters);
   return changes;
+}
+
+std::vector<bool> CityMap::free_before(const TileIndex& tile, std::uint32_t last,
+                                       const std::vector<ChangedPoint>& points) const {
+  TileHistory reversed(city_.grid(), config_);
+  std::vector<SessionPoint> places;
+  places.reserve(points.size());
+  for (const ChangedPoint& changed : points) places.push_back(changed.point);
+  reversed.add_session(std::move(places));
+  for (std::size_t session = 0; session <= last; ++session) reversed.add_session({});
+  reversed.end_session();
+  for (std::size_t session = 0; session <= last; ++session) {
+    revise(reversed, tile, session);
+    reversed.end_session();
+  }
+  std::vector<bool> is_free;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    is_free.push_back(!reversed.stands(0, i, last + 1));
+  }
+  return is_free;
 }
 
 void CityMap::revise(TileHistory& history, const TileIndex& tile, std::size_t session) const {

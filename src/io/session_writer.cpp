@@ -114,8 +114,12 @@ class SessionWriter::Files {
 };
 
 SessionWriter::SessionWriter(const City& city, SessionInfo session,
-                             const SessionReferencesConfig& config)
-    : city_(city), session_(std::move(session)), points_(city.grid()), references_(config) {
+                             const SessionPointsConfig& points,
+                             const SessionReferencesConfig& references)
+    : city_(city),
+      session_(std::move(session)),
+      points_(city.grid(), points),
+      references_(references) {
   if (!is_session_name(session_.name)) {
     throw ConfigError("SessionInfo.name = \"" + session_.name +
                       "\" must consist of letters, digits, '.', '_' and '-', and begin with a "

@@ -1,8 +1,10 @@
 // Trials of a map of many sessions: simulated days of one place, as a table in Markdown; see
-// docs/scale.md. `city_trials DAYS SEEDS SCANS SENSOR...`.
+// docs/scale.md. `city_trials DAYS SEED SEEDS SCANS SENSOR...`; SEED is the first one.
 #include <unistd.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <deque>
@@ -41,9 +43,15 @@ PointBuffer points_of(const simulation::SimulatedScan& scan) {
   return points;
 }
 
+/// All static and moving points of a day.
+struct Measured {
+  SessionPoints near;  ///< up to the range of contributions
+  SessionPoints all;
+};
+
 /// Runs over one day and adds it to the city. Returns the changes of the place that stand there.
 std::set<std::uint32_t> add_day(const City& city, const simulation::Config& config,
-                                SessionPoints& everything) {
+                                Measured& measured) {
   simulation::Simulator simulator(config);
   DynaInsRemover remover(DynaInsRemover::Config::offline());
   SessionInfo info;
@@ -62,7 +70,8 @@ std::set<std::uint32_t> add_day(const City& city, const simulation::Config& conf
     for (PointLabel& label : all) {
       if (label == PointLabel::kDynamic) label = PointLabel::kStatic;
     }
-    everything.add(points, all, scan.labels, scan.T_world_sensor, number);
+    measured.near.add(points, all, scan.labels, scan.T_world_sensor, number);
+    measured.all.add(points, all, scan.labels, scan.T_world_sensor, number);
   };
   for (std::size_t i = 0; i < simulator.size(); ++i) {
     open.push_back(simulator.scan(i));
@@ -92,13 +101,15 @@ struct Count {
 };
 
 struct Result {
-  Count fixed;          ///< points of the static world that sessions brought: their voxel stands
-  Count gone_near;      ///< of gone_brought: earlier sessions, near the way of a later session
-  Count gone_brought;   ///< points that sessions brought of objects that are gone: they stand
-  Count gone_measured;  ///< points that sessions measured of objects that are gone: they stand
-  Count added;          ///< points of `diff`, added: of an object
-  Count removed;        ///< points of `diff`, removed: of an object
-  Count changes;        ///< changes between the first and the last day: found by `diff`
+  Count fixed;      ///< points of the static world that sessions brought: their voxel stands
+  Count fixed_far;  ///< voxels of the static world measured at any distance: they stand
+  Count come;       ///< points brought of objects that stand at the end: their voxel stands
+  Count gone_near;  ///< of gone: earlier sessions, near the way of a later session
+  Count gone;       ///< measured points of objects that are gone by the last session: they stand
+  Count gone_last;  ///< measured points of moving objects of the last session: they stand
+  Count added;      ///< clusters of `diff`, added: of an object that has come
+  Count removed;    ///< clusters of `diff`, removed: of an object that has left
+  Count changes;    ///< changes between the first and the last day: found by `diff`
 };
 
 /// Whether a point of a session is of an object that is not there at the end.
@@ -121,7 +132,7 @@ std::vector<std::vector<Eigen::Vector3d>> ways_of(const City& city, const CityMa
   return ways;
 }
 
-void judge_map(const City& city, const std::vector<std::size_t>& measured,
+void judge_map(const City& city, const std::vector<Measured>& measured,
                const std::set<std::uint32_t>& at_end, Result& result) {
   const CityMap map(city);
   const auto last = static_cast<std::uint32_t>(map.sessions().size() - 1);
@@ -134,10 +145,10 @@ void judge_map(const City& city, const std::vector<std::size_t>& measured,
     }
     return false;
   };
-  std::size_t gone = 0;
+  std::map<TileIndex, VoxelHashTable<>> standing_of;
   for (const TileIndex& tile : map.tiles()) {
     const TileHistory history = map.history(tile);
-    VoxelHashTable<> standing;
+    VoxelHashTable<>& standing = standing_of[tile];
     std::set<std::pair<std::size_t, std::size_t>> in_map;
     history.for_each_standing(last, [&](std::size_t session, std::size_t i) {
       standing.insert(session_voxel(city.grid(), history.points(session)[i]));
@@ -148,61 +159,154 @@ void judge_map(const City& city, const std::vector<std::size_t>& measured,
         const SessionPoint& point = history.points(session)[i];
         if (is_gone(point.label, session == last, at_end)) {
           const bool stands = in_map.count({session, i}) > 0;
-          result.gone_brought.add(stands);
-          if (is_near_later_way(map.position(tile, point), session)) result.gone_near.add(stands);
-          gone += stands ? 1 : 0;
-        } else if (instance_of(point.label) == 0) {
-          result.fixed.add(standing.find(session_voxel(city.grid(), point)) !=
-                           VoxelHashTable<>::kNone);
+          Count& gone = session == last ? result.gone_last : result.gone;
+          gone.kept += stands ? 1 : 0;
+          if (is_near_later_way(map.position(tile, point), session)) {
+            result.gone_near.kept += stands ? 1 : 0;
+          }
+          continue;
         }
+        (instance_of(point.label) == 0 ? result.fixed : result.come)
+            .add(standing.find(session_voxel(city.grid(), point)) != VoxelHashTable<>::kNone);
       }
     }
   }
-  result.gone_measured.kept += gone;
-  for (const std::size_t count : measured) result.gone_measured.of += count;
+  std::map<TileIndex, VoxelHashTable<>> seen_of;
+  for (std::size_t session = 0; session < measured.size(); ++session) {
+    const bool is_last = session + 1 == measured.size();
+    measured[session].near.for_each_tile(
+        [&](const TileIndex& tile, const std::vector<SessionPoint>& points) {
+          for (const SessionPoint& point : points) {
+            if (!is_gone(point.label, is_last, at_end)) continue;
+            ++(is_last ? result.gone_last : result.gone).of;
+            if (is_near_later_way(map.position(tile, point), session)) ++result.gone_near.of;
+          }
+        });
+    measured[session].all.for_each_tile(
+        [&](const TileIndex& tile, const std::vector<SessionPoint>& points) {
+          for (const SessionPoint& point : points) {
+            if (instance_of(point.label) != 0) continue;
+            VoxelHashTable<>& seen = seen_of[tile];
+            const VoxelKey voxel = session_voxel(city.grid(), point);
+            const std::size_t before = seen.size();
+            if (seen.insert(voxel) != before) continue;
+            result.fixed_far.add(standing_of[tile].find(voxel) != VoxelHashTable<>::kNone);
+          }
+        });
+  }
+}
+
+/// One point of `diff`.
+struct DiffPoint {
+  Eigen::Vector3d position;  // m
+  std::uint32_t label;
+};
+
+constexpr double kClusterCell = 0.5;  // m
+
+/// Calls `visit(members)` for the clusters of points in touching cells of kClusterCell.
+template <class Visitor>
+void for_each_cluster(const std::vector<DiffPoint>& points, Visitor&& visit) {
+  VoxelHashTable<> cells;
+  std::vector<VoxelKey> keys;
+  std::vector<std::vector<std::uint32_t>> members;
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d at = points[i].position / kClusterCell;
+    const VoxelKey key = voxel_key(static_cast<std::int64_t>(std::floor(at.x())),
+                                   static_cast<std::int64_t>(std::floor(at.y())),
+                                   static_cast<std::int64_t>(std::floor(at.z())));
+    const std::uint32_t cell = cells.insert(key);
+    if (cell == keys.size()) {
+      keys.push_back(key);
+      members.emplace_back();
+    }
+    members[cell].push_back(i);
+  }
+  std::vector<bool> is_done(keys.size(), false);
+  for (std::uint32_t first = 0; first < keys.size(); ++first) {
+    if (is_done[first]) continue;
+    is_done[first] = true;
+    std::vector<std::uint32_t> open = {first}, cluster;
+    while (!open.empty()) {
+      const std::uint32_t cell = open.back();
+      open.pop_back();
+      cluster.insert(cluster.end(), members[cell].begin(), members[cell].end());
+      for (int i = 0; i < 27; ++i) {
+        const std::uint32_t next =
+            cells.find(keys[cell] + voxel_key_step(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
+        if (next == VoxelHashTable<>::kNone || is_done[next]) continue;
+        is_done[next] = true;
+        open.push_back(next);
+      }
+    }
+    visit(cluster);
+  }
+}
+
+/// Counts the clusters that are larger than 0.5 m; true ones are mostly of objects that stand.
+/// What stands only on one of two days is a change, be it a container or a parked car.
+void judge_clusters(const std::vector<DiffPoint>& points, Count& count) {
+  constexpr double kLeastExtent = 0.5;  // m
+  for_each_cluster(points, [&](const std::vector<std::uint32_t>& cluster) {
+    Eigen::AlignedBox3d box;
+    std::size_t objects = 0;
+    for (const std::uint32_t i : cluster) {
+      box.extend(points[i].position);
+      objects += instance_of(points[i].label) != 0 && !is_moving(points[i].label) ? 1 : 0;
+    }
+    if (box.sizes().maxCoeff() > kLeastExtent) count.add(2 * objects > cluster.size());
+  });
 }
 
 void judge_diff(const City& city, const std::set<std::uint32_t>& before,
                 const std::set<std::uint32_t>& after, Result& result) {
-  constexpr std::size_t kFewest = 20;  // points of a change that was found
   const CityMap map(city);
   const auto last = static_cast<std::uint32_t>(map.sessions().size() - 1);
-  std::map<std::uint32_t, std::size_t> came, left;
+  struct Share {
+    std::size_t changed = 0, of = 0;
+  };
+  std::map<std::uint32_t, Share> came, left;
+  std::vector<DiffPoint> added, removed;
   for (const TileIndex& tile : map.tiles()) {
+    const TileHistory history = map.history(tile);
+    const auto count = [&](std::uint32_t number, std::map<std::uint32_t, Share>& shares) {
+      history.for_each_standing(number, [&](std::size_t session, std::size_t i) {
+        ++shares[instance_of(history.points(session)[i].label)].of;
+      });
+    };
+    count(0, left);
+    count(last, came);
     const CityChanges changes = map.changes(tile, 0, last);
     for (const CityPoint& p : changes.added) {
-      result.added.add(instance_of(p.point.label) != 0);
-      ++came[instance_of(p.point.label)];
+      added.push_back({map.position(tile, p.point), p.point.label});
+      ++came[instance_of(p.point.label)].changed;
     }
     for (const CityPoint& p : changes.removed) {
-      result.removed.add(instance_of(p.point.label) != 0);
-      ++left[instance_of(p.point.label)];
+      removed.push_back({map.position(tile, p.point), p.point.label});
+      ++left[instance_of(p.point.label)].changed;
     }
   }
+  judge_clusters(added, result.added);
+  judge_clusters(removed, result.removed);
+  const auto judge = [&](const Share& share) {
+    result.changes.add(share.changed > 0 && 2 * share.changed >= share.of);
+  };
   for (const std::uint32_t change : after) {
-    if (before.count(change) == 0) result.changes.add(came[change] >= kFewest);
+    if (before.count(change) == 0) judge(came[change]);
   }
   for (const std::uint32_t change : before) {
-    if (after.count(change) == 0) result.changes.add(left[change] >= kFewest);
+    if (after.count(change) == 0) judge(left[change]);
   }
 }
 
 Result try_days(const fs::path& folder, int days, simulation::Config config) {
+  constexpr SessionPointsConfig kAnyDistance{300.0};
   const City city = City::open_or_make(folder, {});
   std::vector<std::set<std::uint32_t>> changes;
-  std::vector<SessionPoints> everything;
+  std::vector<Measured> measured;
   for (config.day = 1; config.day <= days; ++config.day) {
-    everything.emplace_back(city.grid());
-    changes.push_back(add_day(city, config, everything.back()));
-  }
-  std::vector<std::size_t> measured;
-  for (std::size_t i = 0; i < everything.size(); ++i) {
-    measured.push_back(0);
-    everything[i].for_each_tile([&](const TileIndex&, const std::vector<SessionPoint>& points) {
-      for (const SessionPoint& point : points) {
-        measured[i] += is_gone(point.label, i + 1 == everything.size(), changes.back()) ? 1 : 0;
-      }
-    });
+    measured.push_back({SessionPoints(city.grid()), SessionPoints(city.grid(), kAnyDistance)});
+    changes.push_back(add_day(city, config, measured.back()));
   }
   Result result;
   judge_map(city, measured, changes.back(), result);
@@ -214,19 +318,23 @@ Result try_days(const fs::path& folder, int days, simulation::Config config) {
 
 int main(int argc, char** argv) {
   const int days = argc > 1 ? std::atoi(argv[1]) : 5;
-  const int seeds = argc > 2 ? std::atoi(argv[2]) : 3;
+  const int first_seed = argc > 2 ? std::atoi(argv[2]) : 1;
+  const int seeds = argc > 3 ? std::atoi(argv[3]) : 3;
   simulation::Config config;
-  config.scans = argc > 3 ? std::atoi(argv[3]) : 150;
-  std::vector<std::string> sensors(argv + std::min(argc, 4), argv + argc);
+  config.scans = argc > 4 ? std::atoi(argv[4]) : 150;
+  std::vector<std::string> sensors(argv + std::min(argc, 5), argv + argc);
   if (sensors.empty()) sensors = {"hdl64", "vlp16"};
-  std::cout << "| sensor | seed | static kept | gone, near | gone, of brought | gone, of measured "
-               "| diff added: "
-               "objects | diff removed: objects | changes found "
-               "|\n|---|---|---|---|---|---|---|---|---|\n"
-            << std::fixed << std::setprecision(2);
+  std::cout
+      << "| sensor | seed | static kept | static kept of all distances | standing objects kept "
+         "| gone, near | gone | moving on the last day | diff added | diff removed | changes "
+         "found |\n|---|---|---|---|---|---|---|---|---|---|---|\n"
+      << std::fixed << std::setprecision(2);
+  const auto print = [](const Count& count) {
+    std::cout << " | " << count.percent() << " % of " << count.of;
+  };
   for (const std::string& sensor : sensors) {
     config.sensor = simulation::sensor_from_name(sensor);
-    for (int seed = 1; seed <= seeds; ++seed) {
+    for (int seed = first_seed; seed < first_seed + seeds; ++seed) {
       config.seed = static_cast<std::uint64_t>(seed);
       const fs::path folder =
           fs::temp_directory_path() / ("city_trials_" + std::to_string(::getpid()));
@@ -235,13 +343,14 @@ int main(int argc, char** argv) {
       for (const SessionInfo& session : city.sessions()) city.drop(session.name);
       fs::remove(folder / "city.json");
       fs::remove(folder);
-      std::cout << "| " << sensor << " | " << seed << " | " << r.fixed.percent() << " % | "
-                << r.gone_near.percent() << " % of " << r.gone_near.of << " | "
-                << r.gone_brought.percent() << " % of " << r.gone_brought.of << " | "
-                << r.gone_measured.percent() << " % of " << r.gone_measured.of << " | "
-                << r.added.percent() << " % of " << r.added.of << " | " << r.removed.percent()
-                << " % of " << r.removed.of << " | " << r.changes.kept << " of " << r.changes.of
-                << " |" << std::endl;
+      std::cout << "| " << sensor << " | " << seed;
+      for (const Count& count : {r.fixed, r.fixed_far, r.come, r.gone_near, r.gone, r.gone_last}) {
+        print(count);
+      }
+      for (const Count& count : {r.added, r.removed, r.changes}) {
+        std::cout << " | " << count.kept << " of " << count.of;
+      }
+      std::cout << " |" << std::endl;
     }
   }
 }

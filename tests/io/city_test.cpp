@@ -11,6 +11,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/city_map.hpp"
 #include "dynains/io/session_writer.hpp"
+#include "dynains/map/change_clusters.hpp"
 #include "io/files.hpp"
 #include "support/box_street.hpp"
 #include "support/catch.hpp"
@@ -35,17 +36,22 @@ const std::vector<Session> kDays = {{"monday", 0.0, {kParkedCar}},
                                     {"tuesday", 86400.0, {kNewContainer}},
                                     {"wednesday", 172800.0, {kNewContainer}}};
 
-void add(const City& city, const Session& session) {
+void add(const City& city, const Session& session, const std::vector<test::BoxScan>& scans,
+         const SessionPointsConfig& config = {}) {
   SessionInfo info;
   info.name = session.name;
   info.begin = session.begin;
   info.fingerprint = session.name;
-  SessionWriter writer(city, info);
+  SessionWriter writer(city, info, config);
   std::uint32_t number = 0;
-  for (const test::BoxScan& scan : test::drive_along(session.boxes, -5.0, 5.0)) {
+  for (const test::BoxScan& scan : scans) {
     writer.add(scan.points, scan.verdicts, scan.labels, scan.T_world_sensor, number++);
   }
   writer.commit();
+}
+
+void add(const City& city, const Session& session) {
+  add(city, session, test::drive_along(session.boxes, -5.0, 5.0));
 }
 
 City city_of(const fs::path& folder, const std::vector<Session>& sessions) {
@@ -177,6 +183,125 @@ TEST_CASE("a city: what a later session did not see stays") {
   auto after = label_counts(city, 1);
   REQUIRE(before[kParked] > 100);
   CHECK(after[kParked] == before[kParked]);
+}
+
+TEST_CASE("a city: what a run missed does not come in where earlier sessions saw free space") {
+  const test::TemporaryFolder folder;
+  // A car drives ahead, and the run of tuesday does not see that it moves.
+  std::vector<test::BoxScan> scans;
+  for (const double x : {0.0, 1.0}) {
+    const double rear = 3.0 + 6.0 * x;
+    scans.push_back(test::scan_boxes({{{rear, 3, 0}, {rear + 4, 5, 1.5}, kParked}}, x, 0.0));
+  }
+  const City without = city_of(folder.path() / "without", {});
+  add(without, {"tuesday", 86400.0, {}}, scans);
+  City with = city_of(folder.path() / "with", {{"monday", 0.0, {}}});
+  add(with, {"tuesday", 86400.0, {}}, scans);
+  REQUIRE(label_counts(without)[kParked] > 20);
+  CHECK(label_counts(with)[kParked] == 0);
+  CHECK(label_counts(with)[40] > label_counts(without)[40] * 99 / 100);
+  with.drop("monday");
+  CHECK(map_bytes(with) == map_bytes(without));
+}
+
+TEST_CASE("a city: beams that end at moving points remove nothing") {
+  const test::TemporaryFolder folder;
+  const City city = city_of(folder.path() / "city", {kDays[0]});
+  // All beams through the place of the car end behind it, at points with a dynamic verdict.
+  std::vector<test::BoxScan> scans =
+      test::drive_along({{{-20, 3.4, 0}, {30, 6, 4}, kContainer}}, -5.0, 5.0);
+  const City seen_through = city_of(folder.path() / "seen_through", {kDays[0]});
+  add(seen_through, kDays[1], scans);
+  for (test::BoxScan& scan : scans) {
+    for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+      if (scan.labels[i] == kContainer) scan.verdicts[i] = PointLabel::kDynamic;
+    }
+  }
+  add(city, kDays[1], scans);
+  auto before = label_counts(city, 0);
+  CHECK(label_counts(seen_through, 1)[kParked] < before[kParked] / 2);
+  CHECK(label_counts(city, 1)[kParked] > before[kParked] * 9 / 10);
+}
+
+TEST_CASE("a city: an object of which a part is seen through leaves as a whole") {
+  const test::TemporaryFolder folder;
+  const City city = city_of(folder.path() / "city", {kDays[0]});
+  // A wall hides most of the place of the car.
+  add(city, {"tuesday", 86400.0, {{{-40, 2.0, 0}, {5.5, 2.2, 5}, 50}}});
+  REQUIRE(label_counts(city, 0)[kParked] > 100);
+  CHECK(label_counts(city, 1)[kParked] == 0);
+}
+
+TEST_CASE("a city: changes are objects that came or left") {
+  const test::TemporaryFolder folder;
+  const City city = city_of(folder.path() / "city", kDays);
+  const CityMap map(city);
+  const auto labels = [&](std::uint32_t a, std::uint32_t b, auto member) {
+    std::map<std::uint32_t, std::size_t> counts;
+    for (const TileIndex& tile : map.tiles()) {
+      const CityChanges changes = map.changes(tile, a, b);
+      for (const CityPoint& p : changes.*member) ++counts[p.point.label];
+    }
+    return counts;
+  };
+  auto removed = labels(0, 1, &CityChanges::removed);
+  CHECK(removed.size() == 1);
+  CHECK(removed[kParked] > 100);
+  auto added = labels(0, 2, &CityChanges::added);
+  CHECK(added.size() == 1);
+  CHECK(added[kContainer] > 100);
+  CHECK(labels(1, 2, &CityChanges::added).empty());
+  CHECK(labels(1, 2, &CityChanges::removed).empty());
+  CHECK_THROWS_AS(map.changes(map.tiles().front(), 1, 1), ConfigError);
+}
+
+TEST_CASE("clusters of changes: small ones, parts and what was seen too briefly are none") {
+  const SessionGrid grid;
+  // A wall of points 0.2 m apart, 2 m long and 1.6 m high.
+  const auto wall = [](float height, std::uint32_t hits) {
+    std::vector<ChangedPoint> points;
+    for (int column = 0; column < 10; ++column) {
+      const float x = 5.1F + 0.2F * static_cast<float>(column);
+      for (float z = 0.1F; z < height; z += 0.2F) {
+        points.push_back({{x, 5.1F, z, 0, 0, false}, hits});
+      }
+    }
+    return points;
+  };
+  const auto selected = [&](const ChangeClusters& clusters,
+                            const std::vector<ChangedPoint>& points) {
+    const std::vector<bool> is_selected = clusters.select(points);
+    return std::count(is_selected.begin(), is_selected.end(), true);
+  };
+  const ChangeClusters alone(grid);
+  CHECK(selected(alone, wall(1.6F, 5)) == 80);
+  CHECK(selected(alone, wall(0.4F, 5)) == 0);  // lower than 0.4 m
+  CHECK(selected(alone, wall(1.6F, 2)) == 0);
+  CHECK(selected(alone, {}) == 0);
+  ChangeClusters in_a_corner(grid), in_a_bush(grid);
+  for (const ChangedPoint& changed : wall(1.6F, 5)) {
+    SessionPoint beside = changed.point;
+    beside.y += 0.4F;
+    if (beside.x < 5.4F) in_a_corner.add_standing(beside);
+    in_a_bush.add_standing(beside);
+  }
+  CHECK(selected(in_a_corner, wall(1.6F, 5)) == 80);
+  CHECK(selected(in_a_bush, wall(1.6F, 5)) == 0);
+}
+
+TEST_CASE("a city: points beyond the contribution range do not come in") {
+  const test::TemporaryFolder folder;
+  SessionPointsConfig near;
+  near.contribution_range = 20.0;
+  const std::vector<test::BoxScan> scans = {test::scan_boxes({}, 0.0, 0.0)};
+  const City city = city_of(folder.path() / "city", {});
+  add(city, kDays[0], scans, near);
+  const SessionInfo session = city.sessions().at(0);
+  CHECK(session.points > 1000);
+  CHECK(session.highest.head<2>().cwiseAbs().maxCoeff() <= 20.0);
+  CHECK(session.lowest.head<2>().cwiseAbs().maxCoeff() > 15.0);
+  near.contribution_range = 0.0;
+  CHECK_THROWS_WITH(add(city, kDays[1], scans, near), ContainsSubstring("contribution_range"));
 }
 
 TEST_CASE("a city: a dropped session leaves the bytes of never having had it") {

@@ -135,7 +135,8 @@ class SessionReferences {
   const RangeImageGrid& grid() const { return grid_; }
 
   /// The reference of a scan, or null if the scan is not one; valid until the next call. `points`:
-  /// m, sensor frame. `verdicts`: final verdict by point; dynamic points only occlude.
+  /// m, sensor frame. `verdicts`: final verdict by point. The directions of dynamic points are
+  /// unknown: if their verdicts are wrong, nothing else is removed by them.
   const SessionReference* add(PointsView points, Span<const PointLabel> verdicts,
                               const Eigen::Isometry3d& T_world_sensor, std::uint32_t scan) {
     if (is_near_latest(T_world_sensor.translation(), scan)) return nullptr;
@@ -146,6 +147,7 @@ class SessionReferences {
     reference_.T_world_beams = T_world_sensor;
     reference_.image.build(grid_, ground_, objects_, moving_,
                            static_cast<float>(FreeSpaceConfig().lateral_margin), scratch_);
+    forget_moving(reference_.image);
     return &reference_;
   }
 
@@ -153,6 +155,16 @@ class SessionReferences {
   bool is_near_latest(const Eigen::Vector3d& position, std::uint32_t scan) const {
     return latest_ && (position - *latest_).norm() < config_.reference_way &&
            scan - reference_.scan < static_cast<std::uint32_t>(config_.reference_scans);
+  }
+
+  static void forget_moving(RangeImage& image) {
+    for (std::int32_t row = 0; row < image.grid().rows; ++row) {
+      for (std::int32_t column = 0; column < image.grid().columns; ++column) {
+        RangeImage::Cell& cell = image.cell(image.grid().cell(row, column));
+        const bool has_moving = (cell.nearest & RangeImage::kMoving) != 0;
+        if (has_moving) cell = {RangeImage::kNothing, RangeImage::kUnknown};
+      }
+    }
   }
 
   void split(PointsView points, Span<const PointLabel> verdicts) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "dynains/io/city.hpp"
+#include "dynains/map/change_clusters.hpp"
 #include "dynains/map/tile_history.hpp"
 
 namespace dynains {
@@ -43,9 +44,9 @@ class CityMap {
   /// The history of one tile over sessions 0 to `last`. Throws IoError.
   TileHistory history(const TileIndex& tile, std::uint32_t last = TileHistory::kNever) const;
 
-  /// Changes of one tile from the map after session `a` to the map after session `b`. Points of
-  /// places that only one of both maps has seen are no changes. Throws ConfigError unless `a` is
-  /// before `b`; IoError.
+  /// Objects larger than 0.5 m that came or left from the map after session `a` to the map after
+  /// session `b`, see ChangeClusters. Places that only one of both maps has seen are no changes.
+  /// Throws ConfigError unless `a` is before `b`; IoError.
   CityChanges changes(const TileIndex& tile, std::uint32_t a, std::uint32_t b) const;
 
   /// World position of a point of a tile, m.
@@ -56,6 +57,9 @@ class CityMap {
   }
 
  private:
+  // Whether beams of sessions 0 to `last` passed through the places of points.
+  std::vector<bool> free_before(const TileIndex& tile, std::uint32_t last,
+                                const std::vector<ChangedPoint>& points) const;
   void revise(TileHistory& history, const TileIndex& tile, std::size_t session) const;
 
   City city_;

@@ -22,7 +22,8 @@ class SessionWriter {
   /// `session`: name, begin, recording, fingerprint and config; the rest is counted here. Throws
   /// ConfigError for an invalid name or config, UsageError if the city has a session of this name
   /// or of this fingerprint, IoError if the city is not writable.
-  SessionWriter(const City& city, SessionInfo session, const SessionReferencesConfig& config = {});
+  SessionWriter(const City& city, SessionInfo session, const SessionPointsConfig& points = {},
+                const SessionReferencesConfig& references = {});
   ~SessionWriter();
   SessionWriter(const SessionWriter&) = delete;
   SessionWriter& operator=(const SessionWriter&) = delete;

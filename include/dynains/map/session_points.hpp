@@ -57,12 +57,26 @@ inline VoxelKey session_voxel(const SessionGrid& grid, const SessionPoint& point
   return voxel_key(index(point.x), index(point.y), index(point.z));
 }
 
+struct SessionPointsConfig {
+  double contribution_range = 60.0;  ///< m
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& visitor) {
+    visitor(Parameter{"contribution_range", self.contribution_range, closed(5, 300), "m",
+                      "points at a larger distance from the sensor are not contributed"});
+  }
+
+  /// Throws ConfigError.
+  void validate() const { validate_parameters("SessionPoints", *this); }
+};
+
 /// Collects the static points of the scans of one session. The first point of each voxel is kept.
 /// The result depends on the scans of this session only. Memory: 56 to 112 bytes per kept point.
 class SessionPoints {
  public:
   /// Throws ConfigError.
-  explicit SessionPoints(const SessionGrid& grid) : grid_((grid.validate(), grid)) {}
+  explicit SessionPoints(const SessionGrid& grid, const SessionPointsConfig& config = {})
+      : grid_((grid.validate(), grid)), config_((config.validate(), config)) {}
 
   const SessionGrid& grid() const { return grid_; }
 
@@ -75,6 +89,7 @@ class SessionPoints {
       const Eigen::Vector3d local(static_cast<double>(points.x[i]),
                                   static_cast<double>(points.y[i]),
                                   static_cast<double>(points.z[i]));
+      if (local.squaredNorm() > config_.contribution_range * config_.contribution_range) continue;
       add_point(T_world_sensor * local, {0.0F, 0.0F, 0.0F, scan, labels.empty() ? 0 : labels[i],
                                          verdicts[i] == PointLabel::kGround});
     }
@@ -112,6 +127,7 @@ class SessionPoints {
   }
 
   SessionGrid grid_;
+  SessionPointsConfig config_;
   std::map<TileIndex, Tile> tiles_;
   Tile* newest_ = nullptr;  // elements of a map do not move
   TileIndex newest_index_ = {};

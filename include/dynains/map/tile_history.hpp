@@ -20,18 +20,21 @@ namespace dynains {
 
 /// Function from the contributions of all sessions to the points of one tile of the map.
 ///
-/// The sessions come in the order of their time: for each, first its reference scans revise the
-/// points of earlier sessions, then its own points are added. The points of a session form blocks
-/// of 2 x 2 x 2 voxels. A block sums its log-odds of being free over the references of all later
-/// sessions, by the rules of MapRevision. If most of the decided blocks of a component of
-/// touching blocks above the ground have left, the whole component leaves. Blocks of different
-/// sessions do not influence each other, so without a session the others have the results of never
-/// having had it.
+/// First the points of all sessions are added, in the order of their time; then, in the same order,
+/// the reference scans of each session test the points of all sessions. The points of a session
+/// form blocks of 2 x 2 x 2 voxels. A block sums its log-odds of being free session by session, by
+/// the rules of MapRevision:
+/// - Sessions before its own tell whether its place was free. Its own session tells whether it
+///   stands there. What does not stand does not come in.
+/// - A later session that passes through it removes it.
+/// Touching blocks above the ground form components. A component that has mostly left leaves as a
+/// whole. Blocks of different sessions do not influence each other, except that the lowest ground
+/// of all sessions tells what is ground.
 class TileHistory {
  public:
   static constexpr std::uint32_t kNever = std::numeric_limits<std::uint32_t>::max();
 
-  /// The reference scan whose beams removed a point.
+  /// The session that removed a point, and its latest reference scan that passed through.
   struct Removal {
     std::uint32_t session = kNever;  ///< number in the order of the sessions
     std::uint32_t scan = 0;
@@ -41,7 +44,8 @@ class TileHistory {
   TileHistory(const SessionGrid& grid, const MapRevisionConfig& config)
       : grid_((grid.validate(), grid)),
         config_((config.validate(), config)),
-        sum_(config.revision_free, config.revision_hit),
+        free_(static_cast<float>(log_odds(config.revision_free))),
+        hit_(static_cast<float>(log_odds(config.revision_hit))),
         level_(static_cast<float>(log_odds(config.tau_revise))) {}
 
   std::size_t session_count() const { return sessions_.size(); }
@@ -52,49 +56,41 @@ class TileHistory {
     const Session& own = sessions_[session];
     return own.removal_of[own.block_of[point]];
   }
+  /// Number of references of its own session that hit the block of a point, up to 255.
+  std::uint32_t own_hits(std::size_t session, std::size_t point) const {
+    return sessions_[session].own_hits[sessions_[session].block_of[point]];
+  }
+  /// Whether a point is no ground, or higher than the lowest ground around of the sessions that
+  /// have tested.
+  bool is_above_ground(const SessionPoint& point) const {
+    if (!point.is_ground) return true;
+    for (int i = 0; i < 9; ++i) {
+      const std::uint32_t cell =
+          ground_cells_.find(ground_cell(point) + voxel_key_step(i % 3 - 1, i / 3 - 1, 0));
+      if (cell != kNone && point.z > lowest_ground_[cell] + kGroundRise) return true;
+    }
+    return false;
+  }
   /// Whether a point is neither removed by a session up to number `last`, nor newer than `last`.
   bool stands(std::size_t session, std::size_t point, std::uint32_t last) const {
     const std::uint32_t by = removal(session, point).session;
     return session <= last && (by == kNever || by > last);
   }
 
-  /// Revises all points that were added so far by a reference scan of the next session, number
-  /// session_count(). `sensor`: position of the sensor, m, in the frame of SessionPoint.
-  /// `test_visibility(points, count)`: see detail::test_visibility(); points in the frame of
-  /// SessionPoint, relative to `sensor`.
-  template <class TestVisibility>
-  void revise(std::uint32_t scan, const Eigen::Vector3d& sensor, TestVisibility&& test_visibility) {
-    const auto by = static_cast<std::uint32_t>(sessions_.size());
-    for (Session& session : sessions_) {
-      gather(session, sensor);
-      if (tested_.empty()) continue;
-      const auto& visibility = test_visibility(samples_, std::size_t{begin_.back()});
-      for (std::size_t i = 0; i < tested_.size(); ++i) {
-        const auto count = visibility.count(begin_[i], begin_[i + 1]);
-        float& level = session.level[tested_[i]];
-        update(count.free, count.hit, begin_[i + 1] - begin_[i], level, session.is_hit[tested_[i]]);
-        if (level < level_) continue;
-        session.removal_of[tested_[i]] = {by, scan};
-        session.newest_removal_scan = scan;
-      }
-    }
-  }
-
-  /// Adds the points of the next session, in the order of their scans.
+  /// Adds the points of the next session, in the order of their scans. All sessions are added
+  /// before the first reference.
   void add_session(std::vector<SessionPoint> points) {
-    const auto number = static_cast<std::uint32_t>(sessions_.size());
-    for (Session& earlier : sessions_) remove_components(number, earlier);
     Session session;
+    session.number = static_cast<std::uint32_t>(sessions_.size());
     session.points = std::move(points);
     VoxelHashTable<> blocks;
-    std::vector<VoxelKey> keys;  // by block
     session.block_of.reserve(session.points.size());
     for (const SessionPoint& point : session.points) {
       const VoxelKey voxel = session_voxel(grid_, point);
       const VoxelKey block = voxel_key(voxel_index(voxel, 0) >> 1, voxel_index(voxel, 1) >> 1,
                                        voxel_index(voxel, 2) >> 1);
       session.block_of.push_back(blocks.insert(block));
-      if (session.block_of.back() == keys.size()) keys.push_back(block);
+      if (session.block_of.back() == session.keys.size()) session.keys.push_back(block);
     }
     // Counting sort by block.
     session.begin.assign(blocks.size() + 1, 0);
@@ -106,10 +102,45 @@ class TileHistory {
       session.by_block[next[session.block_of[i]]++] = i;
     }
     session.level.assign(blocks.size(), 0.0F);
-    session.is_hit.assign(blocks.size(), 0);
-    find_components(blocks, keys, session);
+    session.own_hits.assign(blocks.size(), 0);
+    session.free_scan.assign(blocks.size(), 0);
     session.removal_of.assign(blocks.size(), Removal());
     sessions_.push_back(std::move(session));
+  }
+
+  /// Tests all points by a reference scan of session number tested_count(). `sensor`: position of
+  /// the sensor, m, in the frame of SessionPoint. `test_visibility(points, count)`: see
+  /// detail::test_visibility(); points in the frame of SessionPoint, relative to `sensor`.
+  template <class TestVisibility>
+  void revise(std::uint32_t scan, const Eigen::Vector3d& sensor, TestVisibility&& test_visibility) {
+    for (Session& session : sessions_) {
+      gather(session, sensor);
+      if (tested_.empty()) continue;
+      const auto& visibility = test_visibility(samples_, std::size_t{begin_.back()});
+      for (std::size_t i = 0; i < tested_.size(); ++i) {
+        const auto count = visibility.count(begin_[i], begin_[i + 1]);
+        update(count.free, count.hit, begin_[i + 1] - begin_[i], scan, session, tested_[i]);
+      }
+    }
+  }
+
+  /// Number of sessions whose references have tested the points.
+  std::size_t tested_count() const { return tested_count_; }
+
+  /// Ends the references of session number tested_count().
+  void end_session() {
+    const auto by = static_cast<std::uint32_t>(tested_count_++);
+    add_ground(sessions_[by]);
+    find_components(sessions_[by]);
+    for (std::uint32_t i = 0; i <= by; ++i) {
+      remove_blocks(by, sessions_[i]);
+      remove_components(by, sessions_[i]);
+    }
+    for (std::size_t i = 0; i < sessions_.size(); ++i) {
+      // Whatever the earlier sessions have seen, a few references of its own show that it stands.
+      const float most = i == tested_count_ ? level_ : kNoLimit;
+      for (float& level : sessions_[i].level) level = std::clamp(level, 0.0F, most);
+    }
   }
 
   /// Calls `visit(session, point)` for the points of the map after session number `last`: of each
@@ -135,74 +166,137 @@ class TileHistory {
  private:
   static constexpr std::uint32_t kNone = VoxelHashTable<>::kNone;
   static constexpr float kLeastVisible = 0.3F;  // ratio of visible to all samples of a block
+  static constexpr float kNoLimit = std::numeric_limits<float>::max();
+  static constexpr float kGroundCell = 1.0F;   // m
+  static constexpr float kGroundRise = 0.35F;  // m above the lowest ground around
+  static constexpr double kCompactLength = 18.0, kCompactHeight = 4.5;  // m
+
+  /// Least numbers of free blocks from which a component has left.
+  struct Limits {
+    float per_hit;  ///< ratio to the blocks that are hit
+    float of_all;   ///< ratio to all its blocks
+  };
+  static constexpr Limits kNotStanding = {2.0F, 0.3F};   // in its own session
+  static constexpr Limits kCompactLeft = {0.25F, 0.1F};  // the size of a vehicle
+  static constexpr Limits kLeft = {1.0F, 0.5F};
 
   struct Session {
+    std::uint32_t number = 0;
     std::vector<SessionPoint> points;
-    std::vector<std::uint32_t> block_of;        // by point
-    std::vector<std::uint32_t> begin;           // by block: in by_block
-    std::vector<std::uint32_t> by_block;        // points, sorted by block
-    std::vector<float> level;                   // by block: log-odds of being free
-    std::vector<std::uint8_t> is_hit;           // by block: whether the latest evidence is a hit
-    std::vector<std::uint32_t> component_of;    // by block, or kNone for ground
-    std::vector<std::uint32_t> component_size;  // blocks, by component
-    std::uint32_t newest_removal_scan = 0;
-    std::vector<Removal> removal_of;  // by block
+    std::vector<VoxelKey> keys;               // by block
+    std::vector<std::uint32_t> block_of;      // by point
+    std::vector<std::uint32_t> begin;         // by block: in by_block
+    std::vector<std::uint32_t> by_block;      // points, sorted by block
+    std::vector<float> level;                 // by block: log-odds of being free
+    std::vector<std::uint8_t> own_hits;       // by block: references of this session that hit
+    std::vector<std::uint32_t> free_scan;     // by block: latest reference that passed
+    std::vector<std::uint32_t> component_of;  // by block, or kNone for ground
+    std::vector<std::uint8_t> is_compact;     // by component
+    std::vector<Removal> removal_of;          // by block
   };
 
+  static VoxelKey ground_cell(const SessionPoint& point) {
+    return voxel_key(static_cast<std::int64_t>(point.x / kGroundCell),
+                     static_cast<std::int64_t>(point.y / kGroundCell), 0);
+  }
+
+  void add_ground(const Session& session) {
+    for (const SessionPoint& point : session.points) {
+      if (!point.is_ground) continue;
+      const std::uint32_t cell = ground_cells_.insert(ground_cell(point));
+      if (cell == lowest_ground_.size()) lowest_ground_.push_back(point.z);
+      lowest_ground_[cell] = std::min(lowest_ground_[cell], point.z);
+    }
+  }
+
   // Numbers the components of touching blocks with points above the ground.
-  static void find_components(const VoxelHashTable<>& blocks, const std::vector<VoxelKey>& keys,
-                              Session& session) {
+  void find_components(Session& session) const {
+    const std::vector<VoxelKey>& keys = session.keys;
+    VoxelHashTable<> blocks;
+    for (const VoxelKey& key : keys) blocks.insert(key);
     std::vector<std::uint8_t> is_object(keys.size(), 0);
     for (std::size_t i = 0; i < session.points.size(); ++i) {
-      if (!session.points[i].is_ground) is_object[session.block_of[i]] = 1;
+      if (is_above_ground(session.points[i])) is_object[session.block_of[i]] = 1;
     }
     session.component_of.assign(keys.size(), kNone);
-    std::vector<std::uint32_t> open;
+    std::vector<std::uint32_t> members;
     for (std::uint32_t first = 0; first < keys.size(); ++first) {
       if (is_object[first] == 0 || session.component_of[first] != kNone) continue;
-      const auto component = static_cast<std::uint32_t>(session.component_size.size());
-      session.component_size.push_back(0);
+      const auto component = static_cast<std::uint32_t>(session.is_compact.size());
       session.component_of[first] = component;
-      open.assign(1, first);
-      while (!open.empty()) {
-        const std::uint32_t block = open.back();
-        open.pop_back();
-        ++session.component_size[component];
+      members.assign(1, first);
+      for (std::size_t next = 0; next < members.size(); ++next) {
         for (int i = 0; i < 27; ++i) {
-          const std::uint32_t next =
-              blocks.find(keys[block] + voxel_key_step(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
+          const std::uint32_t block = blocks.find(
+              keys[members[next]] + voxel_key_step(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
           const bool is_new =
-              next != kNone && is_object[next] != 0 && session.component_of[next] == kNone;
+              block != kNone && is_object[block] != 0 && session.component_of[block] == kNone;
           if (!is_new) continue;
-          session.component_of[next] = component;
-          open.push_back(next);
+          session.component_of[block] = component;
+          members.push_back(block);
         }
+      }
+      session.is_compact.push_back(is_compact(keys, members) ? 1 : 0);
+    }
+  }
+
+  bool is_compact(const std::vector<VoxelKey>& keys,
+                  const std::vector<std::uint32_t>& blocks) const {
+    const double edge = 2.0 * grid_.map_voxel;
+    for (int axis = 0; axis < 3; ++axis) {
+      std::int64_t lowest = voxel_index(keys[blocks[0]], axis), highest = lowest;
+      for (const std::uint32_t block : blocks) {
+        lowest = std::min(lowest, voxel_index(keys[block], axis));
+        highest = std::max(highest, voxel_index(keys[block], axis));
+      }
+      const double extent = edge * static_cast<double>(highest - lowest + 1);
+      if (extent > (axis < 2 ? kCompactLength : kCompactHeight)) return false;
+    }
+    return true;
+  }
+
+  // Removes the blocks that are free after session number `by`. In their own session, components
+  // come in or not as a whole.
+  void remove_blocks(std::uint32_t by, Session& session) const {
+    for (std::size_t block = 0; block < session.level.size(); ++block) {
+      const bool is_undivided = by == session.number && session.component_of[block] != kNone;
+      const bool is_free = session.level[block] >= level_ && !is_undivided;
+      if (is_free && session.removal_of[block].session == kNever) {
+        session.removal_of[block] = {by, session.free_scan[block]};
       }
     }
   }
 
-  // Removes the rest of the components that have left mostly after session number `by`.
+  // Removes the rest of the components that have left by the references of session number `by`.
   static void remove_components(std::uint32_t by, Session& session) {
     struct Count {
-      std::uint32_t removed = 0, hit = 0;
+      std::uint32_t free = 0, hit = 0, unknown = 0, scan = 0;
     };
-    std::vector<Count> counts(session.component_size.size());
+    std::vector<Count> counts(session.is_compact.size());
     for (std::size_t block = 0; block < session.component_of.size(); ++block) {
       if (session.component_of[block] == kNone) continue;
       Count& count = counts[session.component_of[block]];
-      if (session.removal_of[block].session != kNever) {
-        ++count.removed;
-      } else if (session.is_hit[block] != 0) {
-        ++count.hit;
+      const Removal& removal = session.removal_of[block];
+      if (removal.session != by && removal.session != kNever) continue;
+      if (session.level[block] > 0.0F) {
+        ++count.free;
+        count.scan = std::max(count.scan, session.free_scan[block]);
+      } else {
+        ++(session.level[block] < 0.0F ? count.hit : count.unknown);
       }
     }
     for (std::size_t block = 0; block < session.component_of.size(); ++block) {
       const std::uint32_t component = session.component_of[block];
       if (component == kNone || session.removal_of[block].session != kNever) continue;
       const Count& count = counts[component];
-      const bool has_left = count.removed > 0 && count.removed >= count.hit &&
-                            5 * count.removed >= session.component_size[component];
-      if (has_left) session.removal_of[block] = {by, session.newest_removal_scan};
+      const Limits& limits = by == session.number                 ? kNotStanding
+                             : session.is_compact[component] != 0 ? kCompactLeft
+                                                                  : kLeft;
+      const auto free = static_cast<float>(count.free);
+      const auto all = static_cast<float>(count.free + count.hit + count.unknown);
+      const bool has_left = free > 0.0F && free >= limits.per_hit * static_cast<float>(count.hit) &&
+                            free >= limits.of_all * all;
+      if (has_left) session.removal_of[block] = {by, count.scan};
     }
   }
 
@@ -231,27 +325,31 @@ class TileHistory {
     }
   }
 
-  void update(std::uint32_t free, std::uint32_t hit, std::uint32_t samples, float& level,
-              std::uint8_t& is_hit) const {
+  void update(std::uint32_t free, std::uint32_t hit, std::uint32_t samples, std::uint32_t scan,
+              Session& session, std::uint32_t block) const {
     const auto visible = static_cast<float>(free + hit);
     const auto least = static_cast<float>(std::min(2U, samples));
     if (visible < std::max(least, kLeastVisible * static_cast<float>(samples))) return;
     const float free_ratio = static_cast<float>(free) / visible;
     if (free_ratio >= detail::FreeSpaceSum::kFreeRatio) {
-      sum_.raise(level, free_ratio);
-      is_hit = 0;
+      session.level[block] += free_;
+      session.free_scan[block] = scan;
     }
     if (free_ratio <= detail::FreeSpaceSum::kHitRatio) {
-      sum_.lower(level);
-      is_hit = 1;
+      session.level[block] += hit_;
+      std::uint8_t& hits = session.own_hits[block];
+      if (session.number == tested_count_ && hits < 255) ++hits;
     }
   }
 
   SessionGrid grid_;
   MapRevisionConfig config_;
-  detail::FreeSpaceSum sum_;
-  float level_;
+  float free_, hit_;  // log-odds
+  float level_;       // log-odds from which a block is free
   std::vector<Session> sessions_;
+  std::size_t tested_count_ = 0;
+  VoxelHashTable<> ground_cells_;
+  std::vector<float> lowest_ground_;   // m, by cell
   std::vector<std::uint32_t> tested_;  // blocks
   std::vector<std::uint32_t> begin_;   // by tested block: first sample, and the end
   PointBuffer samples_;
