@@ -141,8 +141,8 @@ class VoxelProtocol::Impl {
     Points(const Impl& protocol, const LabelledScan& scan)
         : protocol_(protocol),
           scan_(scan),
-          R_(scan.T_world_sensor.linear()),
-          t_(scan.T_world_sensor.translation()) {}
+          rotation_(scan.T_world_sensor.linear()),
+          translation_(scan.T_world_sensor.translation()) {}
 
     // False for a point that is not judged.
     bool is_judged(std::size_t i) const {
@@ -152,7 +152,7 @@ class VoxelProtocol::Impl {
     detail::ScanPoint operator()(std::size_t i) const {
       const float* p = scan_.xyz + i * scan_.stride;
       detail::ScanPoint point;
-      point.p_world = R_ * Eigen::Vector3d(p[0], p[1], p[2]) + t_;
+      point.p_world = rotation_ * Eigen::Vector3d(p[0], p[1], p[2]) + translation_;
       point.key = protocol_.grid_->key(point.p_world);
       point.truth = protocol_.settings_.truth(scan_.truth[i]);
       unsigned layers = 1U << kIdentity;
@@ -165,8 +165,8 @@ class VoxelProtocol::Impl {
    private:
     const Impl& protocol_;
     const LabelledScan& scan_;
-    Eigen::Matrix3d R_;
-    Eigen::Vector3d t_;
+    Eigen::Matrix3d rotation_;
+    Eigen::Vector3d translation_;
   };
 
   template <class Wanted>

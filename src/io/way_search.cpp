@@ -39,7 +39,7 @@ std::optional<std::size_t> clear_minimum(const std::vector<double>& gaps) {
   if (least == 0 || least + 1 == gaps.size()) return std::nullopt;
   for (std::size_t k = 1; k + 1 < gaps.size(); ++k) {
     const bool is_minimum = gaps[k] <= gaps[k - 1] && gaps[k] <= gaps[k + 1];
-    const bool is_other = k + 1 < least || k > least + 1;
+    const bool is_other = std::max(k, least) - std::min(k, least) > 1;
     if (is_minimum && is_other && gaps[k] < kClearly * gaps[least]) return std::nullopt;
   }
   return least;

@@ -27,6 +27,7 @@ sys.exit(fleet.main())
   std::vector<std::string> command = {"python3", "-c", kStart};
   command.insert(command.end(), words.begin(), words.end());
   std::vector<char*> arguments;
+  arguments.reserve(command.size() + 1);
   for (std::string& word : command) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   std::cout.flush();

@@ -280,12 +280,6 @@ TEST_CASE("a scan of another place is lost, and a scan without points has no res
   CHECK((T.matrix() - scans.back().T_world_sensor.matrix()).norm() == 0.0);
 }
 
-void set(double (&p)[3], double x, double y, double z) {
-  p[0] = x;
-  p[1] = y;
-  p[2] = z;
-}
-
 TEST_CASE("a full map of planes forgets the oldest voxels") {
   VoxelPlanes planes;
   planes.reserve();
@@ -294,7 +288,7 @@ TEST_CASE("a full map of planes forgets the oldest voxels") {
     VoxelPlanes::Block block;
     for (int y = 0; y < 100; ++y) {
       for (int k = 0; k < 8; ++k) {
-        set(block.next(), scan + 0.1 + 0.1 * k, y + 0.1 + 0.1 * (k * 3 % 8), 0.2);
+        block.push_back(scan + 0.1 + 0.1 * k, y + 0.1 + 0.1 * (k * 3 % 8), 0.2);
         if (block.is_full()) planes.add(block);
       }
     }
@@ -302,8 +296,8 @@ TEST_CASE("a full map of planes forgets the oldest voxels") {
     REQUIRE(planes.size() <= VoxelPlanes::kMostVoxels);
   }
   VoxelPlanes::Block asked;
-  set(asked.next(), 0.5, 50.5, 0.7);    // oldest
-  set(asked.next(), 399.5, 50.5, 0.7);  // newest
+  asked.push_back(0.5, 50.5, 0.7);    // oldest
+  asked.push_back(399.5, 50.5, 0.7);  // newest
   std::vector<std::size_t> found;
   planes.find(asked, [&](std::size_t i, const VoxelPlanes::Plane& plane) {
     found.push_back(i);

@@ -87,8 +87,8 @@ class PoseCorrection {
     VoxelPlanes::Block block;
     visit_some(split, wanted, [&](std::size_t i, double x, double y, double z) {
       if (!moving.empty() && i >= split.ground_count && moving[i - split.ground_count] != 0) return;
-      double(&p)[3] = block.next();
-      for (int k = 0; k < 3; ++k) p[k] = T(k, 0) * x + T(k, 1) * y + T(k, 2) * z + T(k, 3);
+      const auto along = [&](int k) { return T(k, 0) * x + T(k, 1) * y + T(k, 2) * z + T(k, 3); };
+      block.push_back(along(0), along(1), along(2));
       if (block.is_full()) planes_.add(block);
     });
     planes_.add(block);

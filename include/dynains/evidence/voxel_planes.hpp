@@ -37,8 +37,13 @@ class VoxelPlanes {
     std::size_t count = 0;
 
     bool is_full() const { return count == kMost; }
-    /// Coordinates of one more point. The block must not be full.
-    double (&next())[3] { return points[count++]; }
+    /// Adds a point. The block must not be full.
+    void push_back(double x, double y, double z) {
+      double(&point)[3] = points[count++];
+      point[0] = x;
+      point[1] = y;
+      point[2] = z;
+    }
   };
 
   /// Maximum number of voxels.
