@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What the new process changes before the program starts.
+/// File actions of posix_spawn(): standard input, standard output and working folder.
 class SpawnActions {
  public:
   SpawnActions(const fs::path& folder, const fs::path& input, const fs::path& output) {

@@ -244,7 +244,7 @@ void for_each_cluster(const std::vector<DiffPoint>& points, Visitor&& visit) {
 }
 
 /// Counts the clusters that are larger than 0.5 m; true ones are mostly of objects that stand.
-/// What stands only on one of two days is a change, be it a container or a parked car.
+/// A parked car that stands on one of the two days only is a change, like a container.
 void judge_clusters(const std::vector<DiffPoint>& points, Count& count) {
   constexpr double kLeastExtent = 0.5;  // m
   for_each_cluster(points, [&](const std::vector<std::uint32_t>& cluster) {

@@ -288,7 +288,8 @@ TEST_CASE("a full map of planes forgets the oldest voxels") {
     VoxelPlanes::Block block;
     for (int y = 0; y < 100; ++y) {
       for (int k = 0; k < 8; ++k) {
-        block.push_back(scan + 0.1 + 0.1 * k, y + 0.1 + 0.1 * (k * 3 % 8), 0.2);
+        block.push_back(Eigen::Isometry3d::Identity(), scan + 0.1 + 0.1 * k,
+                        y + 0.1 + 0.1 * (k * 3 % 8), 0.2);
         if (block.is_full()) planes.add(block);
       }
     }
@@ -296,8 +297,8 @@ TEST_CASE("a full map of planes forgets the oldest voxels") {
     REQUIRE(planes.size() <= VoxelPlanes::kMostVoxels);
   }
   VoxelPlanes::Block asked;
-  asked.push_back(0.5, 50.5, 0.7);    // oldest
-  asked.push_back(399.5, 50.5, 0.7);  // newest
+  asked.push_back(Eigen::Isometry3d::Identity(), 0.5, 50.5, 0.7);    // oldest
+  asked.push_back(Eigen::Isometry3d::Identity(), 399.5, 50.5, 0.7);  // newest
   std::vector<std::size_t> found;
   planes.find(asked, [&](std::size_t i, const VoxelPlanes::Plane& plane) {
     found.push_back(i);

@@ -229,7 +229,7 @@ TEST_CASE("gnuplot draws a figure from files in any folder") {
   CHECK(has_colour_near(81, 240, kFateColours[2]));
   CHECK(has_colour_near(280, 438, kFateColours[3]));
   CHECK(!has_colour_near(150, 150, kFateColours[3]));
-  // The same figure gives the same bytes.
+  // A second call writes equal bytes.
   write_figure(figure, folder.path(), "cleaned");
   draw_figure(folder.path(), "cleaned");
   for (const char* name : {"cleaned.dat", "cleaned.gp", "cleaned.png"}) {

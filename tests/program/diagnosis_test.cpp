@@ -259,7 +259,7 @@ TEST_CASE("check sees that an odometry has not converged in the first scans") {
   CHECK_THAT(advice(early),
              ContainsSubstring("the poses of the first scans are inexact by about 2"));
 
-  // The same losses in the middle of the drive concern no start.
+  // Errors of the same size in the middle of the drive do not set is_inexact_at_start.
   int k = 0;
   const Diagnosis late = street.diagnose([&](Eigen::Isometry3d T) {
     T.translation() -= 0.25 * std::clamp(k++ - 10, 0, 4) * street.poses()[0].linear().col(0);

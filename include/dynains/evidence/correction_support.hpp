@@ -32,8 +32,8 @@ class CorrectionSupport {
   }
 
   /// Removes from `correction` what its uncertainty may explain, by direction: all of it within
-  /// kDeviations standard deviations. `equations`: those of all added
-  /// distances, with attractions.
+  /// kDeviations standard deviations. `equations`: those of all added distances,
+  /// with attractions.
   Vector supported(const Vector& correction, const NormalEquations& equations) const {
     constexpr double kDeviations = 3.0;
     Matrix covariance = covariance_of(equations);

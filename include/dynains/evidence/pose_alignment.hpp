@@ -110,11 +110,8 @@ class PlaneAligner {
       const std::size_t end = std::min(points.size(), begin + Block::kMost * step);
       Block block;
       for (std::size_t i = begin; i < end; i += step) {
-        const auto x = static_cast<double>(points.x[i]);
-        const auto y = static_cast<double>(points.y[i]);
-        const auto z = static_cast<double>(points.z[i]);
-        const auto along = [&](int k) { return T(k, 0) * x + T(k, 1) * y + T(k, 2) * z + T(k, 3); };
-        block.push_back(along(0), along(1), along(2));
+        block.push_back(T, static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
+                        static_cast<double>(points.z[i]));
       }
       planes.find(block, [&](std::size_t i, VoxelPlanes::Plane& plane) {
         const double(&p)[3] = block.points[i];

@@ -87,8 +87,7 @@ class PoseCorrection {
     VoxelPlanes::Block block;
     visit_some(split, wanted, [&](std::size_t i, double x, double y, double z) {
       if (!moving.empty() && i >= split.ground_count && moving[i - split.ground_count] != 0) return;
-      const auto along = [&](int k) { return T(k, 0) * x + T(k, 1) * y + T(k, 2) * z + T(k, 3); };
-      block.push_back(along(0), along(1), along(2));
+      block.push_back(T, x, y, z);
       if (block.is_full()) planes_.add(block);
     });
     planes_.add(block);

@@ -1,6 +1,7 @@
 // Planes of the static world in voxels around the sensor.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -37,12 +38,10 @@ class VoxelPlanes {
     std::size_t count = 0;
 
     bool is_full() const { return count == kMost; }
-    /// Adds a point. The block must not be full.
-    void push_back(double x, double y, double z) {
+    /// Adds the point (x, y, z) (m), transformed by `T`. The block must not be full.
+    void push_back(const Eigen::Isometry3d& T, double x, double y, double z) {
       double(&point)[3] = points[count++];
-      point[0] = x;
-      point[1] = y;
-      point[2] = z;
+      for (int k = 0; k < 3; ++k) point[k] = T(k, 0) * x + T(k, 1) * y + T(k, 2) * z + T(k, 3);
     }
   };
 
