@@ -6,13 +6,7 @@ precision highp int;
 layout(location = 0) in uvec4 position_instance;
 layout(location = 1) in uint scan;
 layout(location = 2) in uvec4 bytes;  // intensity, belief, cause, label + 4 * truth
-uniform mat4 matrix;
-uniform vec3 origin;
 uniform float unit;
-uniform float point_size;    // m, about
-uniform float pixels;        // per metre at distance 1
-uniform float least_size;    // pixels
-uniform bool is_flat;
 uniform float split;         // border between before and after, from -1 to 1
 uniform bool is_moving_layer;
 uniform int current_scan;    // -1: all scans
@@ -23,6 +17,7 @@ uniform vec3 cause_colours[17];
 uniform bool is_picking;
 flat out vec4 colour;
 
+${PLACE}
 ${COLOURS}
 
 vec3 colour_of(float height) {
@@ -57,15 +52,13 @@ bool is_hidden() {
 
 void main() {
   vec3 local = origin + unit * vec3(position_instance.xyz);
-  gl_Position = matrix * vec4(local, 1.0);
+  place(local);
   bool is_after = gl_Position.x > split * gl_Position.w;
   if (is_hidden() || (is_moving_layer && is_after)) {
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
     gl_PointSize = 0.0;
     return;
   }
-  float depth = is_flat ? 1.0 : gl_Position.w;
-  gl_PointSize = clamp(point_size * pixels / depth, least_size, 24.0);
   if (is_picking) {
     uint id = uint(gl_VertexID) + 1u;
     colour = vec4(uvec4(id, id >> 8, id >> 16, id >> 24) & 255u) / 255.0;

@@ -6,16 +6,11 @@ precision highp int;
 layout(location = 0) in vec3 position;
 layout(location = 1) in uint label;
 layout(location = 2) in uvec2 bytes;  // session, intensity
-uniform mat4 matrix;
-uniform vec3 origin;
-uniform float point_size;  // m, about
-uniform float pixels;      // per metre at distance 1
-uniform float least_size;  // pixels
-uniform bool is_flat;
 uniform int colour_mode;
 uniform vec2 heights;
 flat out vec4 colour;
 
+${PLACE}
 ${COLOURS}
 
 vec3 colour_of(float height) {
@@ -27,9 +22,7 @@ vec3 colour_of(float height) {
 
 void main() {
   vec3 local = origin + position;
-  gl_Position = matrix * vec4(local, 1.0);
-  float depth = is_flat ? 1.0 : gl_Position.w;
-  gl_PointSize = clamp(point_size * pixels / depth, least_size, 24.0);
+  place(local);
   colour = vec4(colour_of(local.z), 1.0);
 }`;
 
