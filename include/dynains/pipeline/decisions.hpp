@@ -63,11 +63,11 @@ class ScanDecision {
 
   /// Adds the newest scan and assigns an instance id to each of its clusters.
   virtual void observe(ScanRing& scans, const ScanWindow& window, StageTimer& timer) = 0;
-  /// Writes the verdict on the newest scan, without evidence of later scans. The caller calls
-  /// VerdictWriter::begin() before.
-  virtual void judge_newest(ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) = 0;
-  /// Writes the final verdict on `scan`.
-  virtual void judge_final(ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) = 0;
+  /// Writes the verdict on the newest scan, without evidence of later scans, after
+  /// VerdictWriter::begin().
+  virtual void judge_newest(const ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) = 0;
+  /// Writes the final verdict on `scan`, with keep flags, after VerdictWriter::begin().
+  virtual void judge_final(const ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) = 0;
 
   /// Alignment of the newest scan with earlier scans, in the level frame.
   virtual std::optional<PoseResidual> pose_residual() const { return std::nullopt; }
@@ -108,23 +108,12 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
     timer.measure(&StageTimes::verdict, [&] { record(scans, window.first_scan()); });
   }
 
-  void judge_newest(ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) override {
-    timer.measure(&StageTimes::verdict, [&] {
-      writer.write_runs(newest, newest.windows.point_runs, [this](std::uint32_t cluster) {
-        return cluster == kNoCluster ? PointVerdict() : point_verdict(verdicts_[cluster]);
-      });
-    });
+  void judge_newest(const ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) override {
+    timer.measure(&StageTimes::verdict, [&] { writer.write_windows(newest, 1); });
   }
 
-  void judge_final(ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) override {
-    timer.measure(&StageTimes::verdict, [&] {
-      writer.begin_final(scan);
-      const VerdictWriter::Points points = writer.points(scan);
-      const std::size_t first = scan.split.ground_count;
-      WindowVoter::for_each_unsettled(scan.non_ground_count(), scan.windows, [&](std::size_t i) {
-        points.write(first + i, point_verdict(scan.windows, i, votes_needed()));
-      });
-    });
+  void judge_final(const ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) override {
+    timer.measure(&StageTimes::verdict, [&] { writer.write_windows(scan, votes_needed()); });
   }
 
   /// Smallest number of votes for a final dynamic verdict on a point.
@@ -237,24 +226,24 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
                       window.newest_cluster_of(), window.cluster_count());
   }
 
-  void judge_newest(ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) override {
+  void judge_newest(const ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) override {
     write_newest(newest, writer, timer);
   }
-  void judge_final(ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) override {
+  void judge_final(const ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) override {
     write_final(scan, writer, timer);
   }
   /// As judge_newest(). Returns the written verdict, which is valid until the next call.
-  EvidenceVerdict write_newest(ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) {
+  EvidenceVerdict write_newest(const ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) {
     const EvidenceVerdict verdict = judge(newest, false, timer);
     timer.measure(&StageTimes::verdict, [&] { writer.write_groups(newest, verdict); });
     return verdict;
   }
   /// As judge_final(). Returns the written verdict, which is valid until the next call.
-  EvidenceVerdict write_final(ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) {
+  EvidenceVerdict write_final(const ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) {
     const EvidenceVerdict verdict = judge(scan, true, timer);
     timer.measure(&StageTimes::verdict, [&] {
-      writer.begin_final(scan);
-      writer.rewrite_groups(scan, verdict);
+      writer.write_groups(scan, verdict);
+      writer.flag_groups(scan, verdict);
     });
     return verdict;
   }
@@ -303,8 +292,8 @@ inline PointVerdict stronger(const PointVerdict& first, const PointVerdict& seco
 }
 
 /// Combines the verdict by free space, written before, with the proposals of the windows so far.
-inline void add_proposals(ScanSlot& scan, const EvidenceVerdict& by_free_space, int votes_needed,
-                          VerdictWriter& writer) {
+inline void add_proposals(const ScanSlot& scan, const EvidenceVerdict& by_free_space,
+                          int votes_needed, VerdictWriter& writer) {
   const VerdictWriter::Points points = writer.points(scan);
   const std::size_t first = scan.split.ground_count;
   for (std::size_t i = 0; i < scan.non_ground_count(); ++i) {
@@ -341,11 +330,11 @@ class BothDecisions final : public ScanDecision<typename Stages::Map> {
     timer.measure(&StageTimes::evidence,
                   [&] { free_space_.observe_instances(scans.newest(), window); });
   }
-  void judge_newest(ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) override {
+  void judge_newest(const ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) override {
     const EvidenceVerdict by_free_space = free_space_.write_newest(newest, writer, timer);
     timer.measure(&StageTimes::verdict, [&] { add_proposals(newest, by_free_space, 1, writer); });
   }
-  void judge_final(ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) override {
+  void judge_final(const ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) override {
     const EvidenceVerdict by_free_space = free_space_.write_final(scan, writer, timer);
     timer.measure(&StageTimes::verdict,
                   [&] { add_proposals(scan, by_free_space, window_.votes_needed(), writer); });

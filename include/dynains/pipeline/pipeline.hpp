@@ -171,7 +171,8 @@ class Pipeline {
   ScanWindow window_;
   Clusterer clusterer_;
   std::unique_ptr<ScanDecision<Map>> decision_;
-  VerdictWriter writer_;
+  VerdictWriter newest_verdict_;
+  VerdictWriter final_verdict_;
   Map map_;
   ScanRing scans_;
 };
@@ -195,27 +196,33 @@ FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Eigen::Isometry
   std::optional<ScanVerdict> finished;
   if (scans_.open() > latency()) finished = finish_oldest(timer);  // Eq. 2, 1
   timer.measure(&StageTimes::revision, [&] { decision_->revise(map_, newest); });
-  return {newest.verdict(), finished, timer.times(), pose_residual()};
+  const bool is_final = finished && finished->scan == newest.scan;
+  return {is_final ? *finished : newest_verdict_.verdict(newest), finished, timer.times(),
+          pose_residual()};
 }
 
 template <class Stages>
 void Pipeline<Stages>::judge_newest(ScanSlot& newest, StageTimer& timer) {
-  timer.measure(&StageTimes::verdict, [&] { writer_.begin(newest, window_.newest_cluster_of()); });
-  decision_->judge_newest(newest, writer_, timer);
+  timer.measure(&StageTimes::verdict, [&] {
+    newest.assign_instances(window_.newest_cluster_of());
+    newest_verdict_.begin(newest);
+  });
+  decision_->judge_newest(newest, newest_verdict_, timer);
 }
 
 /// The scan becomes final even if the map throws, because the ring reuses its slot.
 template <class Stages>
 ScanVerdict Pipeline<Stages>::finish_oldest(StageTimer& timer) {
-  ScanSlot& scan = scans_.finish_oldest();
-  decision_->judge_final(scan, writer_, timer);
+  const ScanSlot& scan = scans_.finish_oldest();
+  timer.measure(&StageTimes::verdict, [&] { final_verdict_.begin(scan); });
+  decision_->judge_final(scan, final_verdict_, timer);
   if (build_map_) {
     const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
     timer.measure(&StageTimes::map, [&] {
-      insert_scan(map_, points, writer_.is_kept(), scan.T_world_level, scan.T_world_sensor);
+      insert_scan(map_, points, final_verdict_.is_kept(), scan.T_world_level, scan.T_world_sensor);
     });
   }
-  return scan.verdict();
+  return final_verdict_.verdict(scan);
 }
 
 /// Filters the input points. If the sensor is known, the valid points are rotated into the level
@@ -226,11 +233,11 @@ void Pipeline<Stages>::ingest(const CloudView& cloud, ScanSlot& next) {
   const auto farthest = static_cast<float>(config_.max_range);
   if (frame_.rotates_scans()) {
     const Eigen::Matrix3d R_level_sensor = level(next);
-    ingest_.read(cloud, nearest, farthest, &R_level_sensor, next.labels);
+    ingest_.read(cloud, nearest, farthest, &R_level_sensor, next.input_labels);
   } else {
-    ingest_.read(cloud, nearest, farthest, nullptr, next.labels);
+    ingest_.read(cloud, nearest, farthest, nullptr, next.input_labels);
   }
-  next.ensure_capacity(next.labels.size());
+  next.ensure_capacity(next.input_labels.size());
 }
 
 /// Estimates the sensor model from the newest scan, unless it is known or not needed, and adapts
@@ -282,6 +289,8 @@ void Pipeline<Stages>::reserve_like(const CloudView& example, std::size_t scans)
   // Margin: scans of one sensor differ slightly in size.
   const std::size_t points = example.size() + example.size() / 16;
   for (std::size_t i = 0; i < std::min(scans, scans_.capacity()); ++i) scans_[i].touch(points);
+  newest_verdict_.touch(points);
+  final_verdict_.touch(points);
   const WarmUp<Pipeline> warm_up(*this);
   // After four scans, each kind of decision has compared a scan with a reference.
   const std::size_t enough = std::max<std::size_t>(decision_->window_length(), 4);

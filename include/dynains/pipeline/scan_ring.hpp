@@ -20,7 +20,7 @@
 
 namespace dynains::detail {
 
-/// One scan with its verdict. Slots are reused.
+/// One scan and the evidence of the windows on it. Slots are reused.
 struct ScanSlot {
   std::uint64_t scan = 0;   ///< number of the push, from 0
   std::uint64_t epoch = 0;  ///< only scans of one epoch are compared
@@ -29,25 +29,22 @@ struct ScanSlot {
   Eigen::Isometry3d T_world_level = Eigen::Isometry3d::Identity();  ///< frame of split.points
 
   GroundSplit split;
-  std::vector<std::uint32_t> ids;  ///< by cluster of the window that ends with this scan
+  std::vector<PointLabel> input_labels;  ///< by input point: kGround for valid points
+  std::vector<std::uint32_t> instances;  ///< by non-ground point: id, or kNoInstance
+  std::vector<std::uint32_t> ids;        ///< by cluster of the window that ends with this scan
   WindowVotes windows;
-  std::vector<EvidenceVerdict::Group> written_groups;  ///< last written verdict by free space
-  std::vector<std::uint32_t> moved_ground;             ///< its dynamic ground points, split index
-
-  /// @name By input point
-  /// @{
-  std::vector<PointLabel> labels;
-  std::vector<std::uint32_t> instances;
-  std::vector<float> beliefs;
-  std::vector<Cause> causes;
-  /// @}
 
   std::size_t non_ground_count() const { return split.count - split.ground_count; }
   /// Input index of each non-ground point.
   const std::uint32_t* non_ground_input() const { return split.input.data() + split.ground_count; }
 
-  ScanVerdict verdict() const {
-    return {scan, time, T_world_sensor, labels, instances, beliefs, causes};
+  /// Sets `instances` from `ids`. `cluster_of`: by non-ground point, or kNoCluster.
+  void assign_instances(Span<const std::uint32_t> cluster_of) {
+    detail::ensure_capacity(instances, cluster_of.size());
+    instances.resize(cluster_of.size());
+    for (std::size_t i = 0; i < cluster_of.size(); ++i) {
+      instances[i] = cluster_of[i] == kNoCluster ? kNoInstance : ids[cluster_of[i]];
+    }
   }
 
   /// Ensures capacity for a scan of `points` points.
@@ -55,30 +52,25 @@ struct ScanSlot {
     const auto ensure = [points](auto&... values) {
       (detail::ensure_capacity(values, points), ...);
     };
-    ensure(labels, instances, beliefs, causes);
-    ensure(windows.stage, windows.settled, windows.votes, windows.belief);
+    ensure(input_labels, instances);
+    ensure(windows.stage, windows.votes, windows.belief);
     constexpr std::size_t kPointsPerRun = 4;  // typical mean; more runs reallocate
     detail::ensure_capacity(windows.point_runs, points / kPointsPerRun);
   }
 
-  /// Ensures capacity for `points` points and writes to the memory of the verdict, so that later
+  /// Ensures capacity for `points` points and writes to the memory of the points, so that later
   /// scans cause no page faults.
   void touch(std::size_t points) {
     ensure_capacity(points);
     split.resize(points);
     split.resize(0);
-    const auto touch_all = [points](auto&... values) {
-      (values.resize(points), ...);
-      (values.clear(), ...);
-    };
-    touch_all(labels, instances, beliefs, causes);
+    input_labels.resize(points);
+    input_labels.clear();
   }
 
-  /// Ensures capacity for the numbers of clusters, groups and moved ground points of `other`.
+  /// Ensures capacity for the number of clusters of `other`.
   void ensure_capacity_like(const ScanSlot& other) {
     detail::ensure_capacity(ids, other.ids.size());
-    detail::ensure_capacity(written_groups, other.written_groups.size());
-    detail::ensure_capacity(moved_ground, other.moved_ground.size());
   }
 };
 

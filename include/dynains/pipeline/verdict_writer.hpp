@@ -7,11 +7,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/curved_voxel_clusterer.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
 #include "dynains/pipeline/window_votes.hpp"
 #include "dynains/points.hpp"
-#include "dynains/stage/cluster_set.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {
@@ -22,117 +20,86 @@ constexpr PointLabel label_of(Cause cause) {
   return cause == Cause::kGround ? PointLabel::kGround : PointLabel::kStatic;
 }
 
-/// Writes verdicts into the arrays of scans. Points with a common verdict are written by point run
-/// or by group, because random access to several arrays dominates the cost.
+/// Holds the verdict on one scan, by input point, and writes it by group of points, because random
+/// access to several arrays dominates the cost. One writer serves all scans in turn, so that
+/// open scans need no arrays of their own.
 class VerdictWriter {
  public:
-  /// Keep flags of the last final verdict, by point of the split (ground first): 1 if static.
+  /// The written verdict on `scan`, valid until the next begin().
+  ScanVerdict verdict(const ScanSlot& scan) const {
+    return {scan.scan, scan.time, scan.T_world_sensor, labels_, instances_, beliefs_, causes_};
+  }
+  /// Keep flags of the verdict, by point of the split (ground first): 1 if static.
   Span<const std::uint8_t> is_kept() const { return is_kept_; }
 
-  /// Begins the first verdict on a scan: writes instance ids and the verdicts on ground and invalid
-  /// points. All valid points must have the label kGround. `cluster_of`: by non-ground point.
-  void begin(ScanSlot& scan, Span<const std::uint32_t> cluster_of) {
-    const std::size_t count = scan.labels.size();
-    is_kept_.resize(scan.split.count);
-    scan.moved_ground.clear();
-    scan.beliefs.assign(count, 0.0F);
-    scan.causes.resize(count);
-    const PointLabel* const labels = scan.labels.data();
-    Cause* const causes = scan.causes.data();
-    for (std::size_t i = 0; i < count; ++i) {
-      causes[i] = labels[i] == PointLabel::kGround ? Cause::kGround : Cause::kNotJudged;
-    }
-    scan.instances.assign(count, kNoInstance);
+  /// Ensures capacity for a scan of `points` points and writes to the memory, so that later scans
+  /// cause no page faults.
+  void touch(std::size_t points) {
+    const auto touch_all = [points](auto&... values) {
+      (ensure_capacity(values, points), ...);
+      (values.resize(points), ...);
+    };
+    touch_all(labels_, instances_, beliefs_, causes_, is_kept_, group_of_input_);
+  }
+
+  /// Begins the verdict on a scan: writes the instance ids, and sets all keep flags.
+  void begin(const ScanSlot& scan) {
+    const std::size_t count = scan.input_labels.size();
+    is_kept_.assign(scan.split.count, 1);
+    ensure_capacity(instances_, count);
+    instances_.assign(count, kNoInstance);
     const std::uint32_t* const input = scan.non_ground_input();
-    const std::uint32_t* const clusters = cluster_of.data();
-    const std::uint32_t* const ids = scan.ids.data();
-    std::uint32_t* const instances = scan.instances.data();
-    const std::size_t non_ground_count = cluster_of.size();
-    for (std::size_t i = 0; i < non_ground_count; ++i) {
-      if (clusters[i] != kNoCluster) instances[input[i]] = ids[clusters[i]];
-    }
+    const std::uint32_t* const ids = scan.instances.data();
+    std::uint32_t* const instances = instances_.data();
+    const std::size_t non_ground_count = scan.instances.size();
+    for (std::size_t i = 0; i < non_ground_count; ++i) instances[input[i]] = ids[i];
+    resize_all(count);
   }
 
-  /// Writes the first verdict on the non-ground points, by point run. `verdict_of(cluster)` returns
-  /// a PointVerdict.
-  template <class VerdictOf>
-  void write_runs(ScanSlot& scan, Span<const ClusterSet::PointRun> point_runs,
-                  VerdictOf&& verdict_of) {
-    const std::uint32_t* const input = scan.non_ground_input();
-    PointLabel* const labels = scan.labels.data();
-    Cause* const causes = scan.causes.data();
-    float* const beliefs = scan.beliefs.data();
-    for (const ClusterSet::PointRun& run : point_runs) {
-      const PointVerdict verdict = verdict_of(run.cluster);
-      const PointLabel label = label_of(verdict.cause);
-      for (std::size_t i = run.begin; i < run.end; ++i) {
-        labels[input[i]] = label;
-        causes[input[i]] = verdict.cause;
-      }
-      if (verdict.belief == 0.0F) continue;
-      for (std::size_t i = run.begin; i < run.end; ++i) beliefs[input[i]] = verdict.belief;
-    }
-  }
-
-  /// Writes the first verdict by group. The group of each input point is computed first, so that
-  /// the arrays are written sequentially.
-  void write_groups(ScanSlot& scan, const EvidenceVerdict& evidence) {
-    order_groups(scan, evidence.group_of);
-    verdicts_.resize(kFirstGroup + evidence.groups.size());
-    verdicts_[kBadPoints] = {{Cause::kNotJudged, 0.0F}, true};
-    verdicts_[kGroundPoints] = {{Cause::kGround, 0.0F}, true};
-    for (std::size_t g = 0; g < evidence.groups.size(); ++g) {
-      verdicts_[kFirstGroup + g] = {evidence.groups[g], true};
-    }
-    ensure_capacity(scan.written_groups, evidence.groups.size());
-    scan.written_groups.assign(evidence.groups.begin(), evidence.groups.end());
-
-    // Local copies of members avoid reloads after byte stores, which could alias them.
-    const std::size_t count = scan.labels.size();
-    const std::uint32_t* const group_of = group_of_input_.data();
-    const GroupVerdict* const verdicts = verdicts_.data();
-    PointLabel* const labels = scan.labels.data();
-    Cause* const causes = scan.causes.data();
-    float* const beliefs = scan.beliefs.data();
-    for (std::size_t i = 0; i < count; ++i) {
-      const GroupVerdict verdict = verdicts[group_of[i]];
-      beliefs[i] = verdict.belief;
-      causes[i] = verdict.cause;
-      labels[i] = group_of[i] == kBadPoints ? labels[i] : verdict.label;
-    }
-    write_ground(scan, evidence.ground);
-  }
-
-  /// Begins the final verdict on a scan: sets all keep flags.
-  void begin_final(const ScanSlot& scan) { is_kept_.assign(scan.split.count, 1); }
-
-  /// Writes the final verdict by group. Only changed verdicts are written to the arrays of the
-  /// scan.
-  void rewrite_groups(ScanSlot& scan, const EvidenceVerdict& evidence) {
-    write_ground(scan, evidence.ground);
-    verdicts_.resize(evidence.groups.size());
-    for (std::size_t g = 0; g < evidence.groups.size(); ++g) {
-      verdicts_[g] = {evidence.groups[g], !(evidence.groups[g] == scan.written_groups[g])};
-    }
-    scan.written_groups.assign(evidence.groups.begin(), evidence.groups.end());
-
+  /// Writes the verdict of the windows so far on all points: dynamic with at least `votes_needed`
+  /// votes. Also writes the keep flags.
+  void write_windows(const ScanSlot& scan, int votes_needed) {
+    write_input_labels(scan.input_labels);
     const std::size_t count = scan.non_ground_count();
     const std::uint32_t* const input = scan.non_ground_input();
-    const std::uint32_t* const group_of = evidence.group_of.data();
-    const GroupVerdict* const verdicts = verdicts_.data();
-    std::uint8_t* const is_kept = is_kept_.data() + scan.split.ground_count;
-    PointLabel* const labels = scan.labels.data();
-    Cause* const causes = scan.causes.data();
-    float* const beliefs = scan.beliefs.data();
+    const DecisionStage* const stage = scan.windows.stage.data();
+    PointLabel* const labels = labels_.data();
+    Cause* const causes = causes_.data();
+    const Points points = this->points(scan);
     for (std::size_t i = 0; i < count; ++i) {
-      const GroupVerdict verdict = verdicts[group_of[i]];
-      is_kept[i] = verdict.is_kept;
-      if (verdict.is_changed == 0) continue;
-      const std::uint32_t to = input[i];
-      labels[to] = verdict.label;
-      causes[to] = verdict.cause;
-      beliefs[to] = verdict.belief;
+      if (stage[i] == DecisionStage::kProposed) {
+        points.write(scan.split.ground_count + i, point_verdict(scan.windows, i, votes_needed));
+      } else {
+        labels[input[i]] = PointLabel::kStatic;
+        causes[input[i]] = static_cause(stage[i]);
+      }
     }
+  }
+
+  /// Writes the verdict by evidence on all points. The group of each input point is computed first,
+  /// so that the arrays are written sequentially.
+  void write_groups(const ScanSlot& scan, const EvidenceVerdict& evidence) {
+    verdicts_.resize(kFirstGroup + evidence.groups.size());
+    verdicts_[kBadPoints] = PointVerdict{Cause::kNotJudged, 0.0F};
+    verdicts_[kGroundPoints] = PointVerdict{Cause::kGround, 0.0F};
+    for (std::size_t g = 0; g < evidence.groups.size(); ++g) {
+      verdicts_[kFirstGroup + g] = evidence.groups[g];
+    }
+    order_groups(scan, evidence.group_of);
+    expand_groups(scan.input_labels);
+    const Points points = this->points(scan);
+    for (const EvidenceVerdict::GroundPoint& ground : evidence.ground) {
+      points.write(ground.point, ground.verdict);
+    }
+  }
+
+  /// Writes the keep flags of the non-ground points after write_groups().
+  void flag_groups(const ScanSlot& scan, const EvidenceVerdict& evidence) {
+    const std::size_t count = scan.non_ground_count();
+    const std::uint32_t* const group_of = evidence.group_of.data();
+    const GroupVerdict* const verdicts = verdicts_.data() + kFirstGroup;
+    std::uint8_t* const is_kept = is_kept_.data() + scan.split.ground_count;
+    for (std::size_t i = 0; i < count; ++i) is_kept[i] = verdicts[group_of[i]].is_kept;
   }
 
   /// Writes verdicts on single points, by index in the split.
@@ -140,55 +107,65 @@ class VerdictWriter {
    public:
     void write(std::size_t point, const PointVerdict& verdict) const {
       const std::uint32_t to = input_[point];
-      labels_[to] = label_of(verdict.cause);
-      causes_[to] = verdict.cause;
-      beliefs_[to] = verdict.belief;
-      is_kept_[point] = is_dynamic(verdict.cause) ? 0 : 1;
+      writer_.labels_[to] = label_of(verdict.cause);
+      writer_.causes_[to] = verdict.cause;
+      writer_.beliefs_[to] = verdict.belief;
+      writer_.is_kept_[point] = is_dynamic(verdict.cause) ? 0 : 1;
     }
 
    private:
     friend class VerdictWriter;
-    Points(ScanSlot& scan, std::vector<std::uint8_t>& is_kept)
-        : input_(scan.split.input.data()),
-          labels_(scan.labels.data()),
-          causes_(scan.causes.data()),
-          beliefs_(scan.beliefs.data()),
-          is_kept_(is_kept.data()) {}
+    Points(const ScanSlot& scan, VerdictWriter& writer)
+        : input_(scan.split.input.data()), writer_(writer) {}
 
     const std::uint32_t* input_;
-    PointLabel* labels_;
-    Cause* causes_;
-    float* beliefs_;
-    std::uint8_t* is_kept_;
+    VerdictWriter& writer_;
   };
-  Points points(ScanSlot& scan) { return {scan, is_kept_}; }
+  Points points(const ScanSlot& scan) { return {scan, *this}; }
 
  private:
   // Verdict on the points of a group, packed in eight bytes.
   struct GroupVerdict {
     GroupVerdict() = default;
-    GroupVerdict(const PointVerdict& verdict, bool changed)
+    GroupVerdict(const PointVerdict& verdict)  // NOLINT(google-explicit-constructor)
         : belief(verdict.belief),
           label(label_of(verdict.cause)),
           cause(verdict.cause),
-          is_kept(is_dynamic(verdict.cause) ? 0 : 1),
-          is_changed(changed ? 1 : 0) {}
+          is_kept(is_dynamic(verdict.cause) ? 0 : 1) {}
     float belief = 0.0F;
     PointLabel label = PointLabel::kStatic;
     Cause cause = Cause::kNotJudged;
     std::uint8_t is_kept = 1;
-    std::uint8_t is_changed = 1;  // differs from the verdict written before
   };
   // Group numbers in group_of_input_: two with fixed verdicts, then the groups of the evidence.
   static constexpr std::uint32_t kBadPoints = 0;
   static constexpr std::uint32_t kGroundPoints = 1;
   static constexpr std::uint32_t kFirstGroup = 2;
 
+  void resize_all(std::size_t count) {
+    const auto resize = [count](auto&... values) {
+      (ensure_capacity(values, count), ...);
+      (values.resize(count), ...);
+    };
+    resize(labels_, beliefs_, causes_);
+  }
+
+  // Writes the verdict on ground and on invalid points; other points get that of the ground.
+  void write_input_labels(Span<const PointLabel> input_labels) {
+    Cause* const causes = causes_.data();
+    const PointLabel* const from = input_labels.data();
+    for (std::size_t i = 0; i < input_labels.size(); ++i) {
+      causes[i] = from[i] == PointLabel::kGround ? Cause::kGround : Cause::kNotJudged;
+    }
+    std::copy(input_labels.begin(), input_labels.end(), labels_.begin());
+    std::fill(beliefs_.begin(), beliefs_.end(), 0.0F);
+  }
+
   void order_groups(const ScanSlot& scan, Span<const std::uint32_t> groups) {
-    const std::size_t count = scan.labels.size();
+    const std::size_t count = scan.input_labels.size();
     grow(group_of_input_, count);
     std::uint32_t* const group_of = group_of_input_.data();
-    const PointLabel* const labels = scan.labels.data();
+    const PointLabel* const labels = scan.input_labels.data();
     for (std::size_t i = 0; i < count; ++i) {
       group_of[i] = labels[i] == PointLabel::kGround ? kGroundPoints : kBadPoints;
     }
@@ -196,20 +173,30 @@ class VerdictWriter {
     for (std::size_t i = 0; i < groups.size(); ++i) group_of[input[i]] = kFirstGroup + groups[i];
   }
 
-  // Resets the ground points that an earlier verdict classified as dynamic, then writes `moved`.
-  void write_ground(ScanSlot& scan, Span<const EvidenceVerdict::GroundPoint> moved) {
-    const Points points = this->points(scan);
-    for (const std::uint32_t point : scan.moved_ground) points.write(point, {Cause::kGround, 0.0F});
-    scan.moved_ground.clear();
-    ensure_capacity(scan.moved_ground, moved.size());
-    for (const EvidenceVerdict::GroundPoint& ground : moved) {
-      points.write(ground.point, ground.verdict);
-      scan.moved_ground.push_back(ground.point);
+  void expand_groups(Span<const PointLabel> input_labels) {
+    // Local copies of members avoid reloads after byte stores, which could alias them.
+    const std::size_t count = input_labels.size();
+    const std::uint32_t* const group_of = group_of_input_.data();
+    const GroupVerdict* const verdicts = verdicts_.data();
+    PointLabel* const labels = labels_.data();
+    Cause* const causes = causes_.data();
+    float* const beliefs = beliefs_.data();
+    for (std::size_t i = 0; i < count; ++i) {
+      const GroupVerdict verdict = verdicts[group_of[i]];
+      beliefs[i] = verdict.belief;
+      causes[i] = verdict.cause;
+      labels[i] = group_of[i] == kBadPoints ? input_labels[i] : verdict.label;
     }
   }
 
-  std::vector<std::uint8_t> is_kept_;          // by point of the split
-  std::vector<std::uint32_t> group_of_input_;  // by input point
+  // By input point.
+  std::vector<PointLabel> labels_;
+  std::vector<std::uint32_t> instances_;
+  std::vector<float> beliefs_;
+  std::vector<Cause> causes_;
+  std::vector<std::uint32_t> group_of_input_;
+
+  std::vector<std::uint8_t> is_kept_;  // by point of the split
   std::vector<GroupVerdict> verdicts_;
 };
 

@@ -26,14 +26,12 @@ enum class DecisionStage : std::uint8_t {
 };
 
 /// Accumulated verdicts of all windows so far, by non-ground point of one scan in the order of its
-/// split. The arrays of stages are longer than the number of points, because they are written in
-/// pieces of constant length.
+/// split. The array of stages is longer than the number of points, because it is written in pieces
+/// of constant length.
 struct WindowVotes {
-  std::vector<DecisionStage> stage;    ///< latest stage reached in any window
-  std::vector<DecisionStage> settled;  ///< stage of the written verdict; kNoCluster for proposed
-                                       ///< points, whose number of votes may change
-  std::vector<std::uint8_t> votes;     ///< proposed points: number of windows with verdict dynamic
-  std::vector<float> belief;           ///< proposed points: highest posterior of all windows
+  std::vector<DecisionStage> stage;  ///< latest stage reached in any window
+  std::vector<std::uint8_t> votes;   ///< proposed points: number of windows with verdict dynamic
+  std::vector<float> belief;         ///< proposed points: highest posterior of all windows
   std::vector<ClusterSet::PointRun> point_runs;  ///< in the window that ends with the scan
 };
 
@@ -50,10 +48,6 @@ struct ClusterVerdict {
   std::uint8_t is_dynamic = 0;
   DecisionStage stage = DecisionStage::kNoCluster;
 };
-
-inline PointVerdict point_verdict(const ClusterVerdict& verdict) {
-  return {verdict.is_dynamic != 0 ? Cause::kProposed : static_cause(verdict.stage), verdict.belief};
-}
 
 /// Verdict on non-ground point `i`: dynamic if it has at least `votes_needed` votes.
 inline PointVerdict point_verdict(const WindowVotes& votes, std::size_t i, int votes_needed) {
@@ -74,14 +68,12 @@ class WindowVoter {
     votes.belief.resize(point_count);
     votes.stage.resize(point_count + kPiece);
     spread_stages(votes.point_runs, verdicts, votes.stage.data());
-    votes.settled = votes.stage;
     for (const PointRun& run : votes.point_runs) {
       const ClusterVerdict verdict = verdict_on(run, verdicts);
       if (verdict.stage != DecisionStage::kProposed) continue;
       const std::size_t length = run.end - run.begin;
       std::fill_n(votes.votes.data() + run.begin, length, verdict.is_dynamic);
       std::fill_n(votes.belief.data() + run.begin, length, verdict.belief);
-      std::fill_n(votes.settled.data() + run.begin, length, DecisionStage::kNoCluster);
     }
   }
 
@@ -95,22 +87,6 @@ class WindowVoter {
     grow(stage_in_window_, votes.stage.size());
     spread_stages(point_runs, verdicts, stage_in_window_.data());
     raise_stages(stage_in_window_.data(), point_count, votes.stage.data());
-  }
-
-  /// Calls `visit(i)` for each non-ground point whose final verdict may differ from the first one:
-  /// proposed points and points with a later stage in a later window.
-  template <class Visit>
-  static void for_each_unsettled(std::size_t point_count, const WindowVotes& votes, Visit&& visit) {
-    constexpr std::size_t kBlock = 8;
-    const DecisionStage* const stage = votes.stage.data();
-    const DecisionStage* const settled = votes.settled.data();
-    for (std::size_t begin = 0; begin < point_count; begin += kBlock) {
-      if (std::memcmp(stage + begin, settled + begin, kBlock) == 0) continue;
-      const std::size_t end = std::min(begin + kBlock, point_count);
-      for (std::size_t i = begin; i < end; ++i) {
-        if (stage[i] != settled[i]) visit(i);
-      }
-    }
   }
 
  private:
@@ -127,7 +103,6 @@ class WindowVoter {
       votes.votes[i] =
           static_cast<std::uint8_t>((is_first ? 0 : votes.votes[i]) + verdict.is_dynamic);
       votes.belief[i] = is_first ? verdict.belief : std::max(votes.belief[i], verdict.belief);
-      votes.settled[i] = DecisionStage::kNoCluster;
     }
   }
 
