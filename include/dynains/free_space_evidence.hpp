@@ -53,11 +53,14 @@ class FreeSpaceEvidence {
         dynamic_grid_(config),
         moved_ground_(config),
         records_(static_cast<std::size_t>(config.lookahead_scans) + 2) {
-    const int step = config.reference_step;
-    for (int phase = 0; phase < step; ++phase) {
+    const ReferenceSpan& span = references_.span();
+    for (int phase = 0; phase < span.sparse_step; ++phase) {
+      lags_before_.push_back(span.lags_before(phase));
+    }
+    for (int phase = 0; phase < span.step; ++phase) {
       const auto delay = static_cast<int>(delay_of(static_cast<std::uint64_t>(phase)));
-      lags_before_.push_back(reference_lags(config.lookback_scans, phase, step));
-      lags_after_.push_back(reference_lags(config.lookahead_scans - delay, step - phase, step));
+      lags_after_.push_back(
+          reference_lags(config.lookahead_scans - delay, span.step - phase, span.step));
     }
   }
 
@@ -107,13 +110,14 @@ class FreeSpaceEvidence {
     Record& record = record_of(scan);
     record.T_world_sensor = correct(scan, T_world_sensor, split);
     record.epoch = epoch_;
-    record.phase = references_.advance(scan - epoch_begin_);
+    record.since_begin = scan - epoch_begin_;
+    if (phase_of(record) == 0) references_.begin(scan, epoch_, record.since_begin);
     moved_ground_.bound(split.ground(), record.ground_boxes);
     ground_sampler_.sample(split.ground(), record.ground);
     begin_evidence(split.non_ground(), instance_of, instance_count, record);
     link_to_previous(scan, record);
     test_against_earlier_references(scan, record);
-    if (record.phase.since_image != 0) test_older_scans(record.phase.since_image);
+    if (phase_of(record) != 0) test_older_scans(phase_of(record));
     propagate_beliefs(scan);
   }
 
@@ -125,7 +129,7 @@ class FreeSpaceEvidence {
     Record& record = record_of(scan);
     judge_instances(is_final, record);
     judge_by_dynamic_grid(scan, record);
-    if (scan == newest_ && record.phase.since_image == 0 && references_.awaits_image()) {
+    if (scan == newest_ && phase_of(record) == 0 && references_.awaits_image()) {
       make_reference(record, split);
     }
     const InstanceSamples& samples = record.evidence.samples;
@@ -157,7 +161,7 @@ class FreeSpaceEvidence {
   struct Record {
     std::uint64_t epoch = ReferenceScan::kNoEpoch;
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
-    ReferencePhase phase;
+    std::uint64_t since_begin = 0;  // scans since the first scan of the epoch
     InstanceEvidence evidence;
     std::vector<DynamicOccupancyGrid::Count> counted;  // by supervoxel
     std::vector<GroundBox> ground_boxes;               // by block of 64 ground points
@@ -209,16 +213,19 @@ class FreeSpaceEvidence {
   }
 
   void test_against_earlier_references(std::uint64_t scan, Record& record) {
-    for (const int lag : lags_before_[record.phase.since_image]) {
-      const ReferenceScan* const reference = reference_of(record, scan, -lag);
+    for (const int lag : lags_before_[record.since_begin % lags_before_.size()]) {
+      const auto back = static_cast<std::uint64_t>(lag);
+      if (back > record.since_begin) break;
+      const ReferenceScan* const reference = references_.find(scan - back, record.epoch);
       if (reference != nullptr) test(record, *reference, -lag);
     }
     updater_.begin_other_side(record.evidence.samples, record.evidence.beliefs);
     update_own_log_odds(record);
   }
 
-  const ReferenceScan* reference_of(const Record& record, std::uint64_t scan, int lag) const {
-    return references_.find(scan, record.epoch, record.phase, lag);
+  // Scans since the latest reference.
+  std::uint64_t phase_of(const Record& record) const {
+    return record.since_begin % lags_after_.size();
   }
 
   // Tests all samples of a scan against one reference. `lag`: scans from the scan to the reference.
@@ -246,7 +253,7 @@ class FreeSpaceEvidence {
   // Tests older scans of the phases with this delay against the newest image.
   void test_older_scans(std::uint64_t delay) {
     if (references_.awaits_image()) return;
-    for (std::uint64_t phase = 0; phase < lags_before_.size(); ++phase) {
+    for (std::uint64_t phase = 0; phase < lags_after_.size(); ++phase) {
       if (delay_of(phase) == delay) test_older_scans_of_phase(phase, references_.newest());
     }
   }
@@ -325,7 +332,7 @@ class FreeSpaceEvidence {
       mark_points(
           evidence.samples, [&](std::uint32_t s) { return surely_moves(evidence, s); }, is_moving_);
     }
-    references_.make_image(newest_, record.epoch, record.T_world_sensor, split, is_moving_);
+    references_.make_image(record.epoch, record.T_world_sensor, split, is_moving_);
     mark_points(
         evidence.samples,
         [&](std::uint32_t s) { return surely_moves(evidence, s) || may_move(evidence, s); },
@@ -378,12 +385,13 @@ class FreeSpaceEvidence {
   std::uint64_t epoch_ = 0;         // number of the begun epochs
   std::uint64_t epoch_begin_ = 0;   // first scan of the epoch of the newest scan
   std::uint64_t newest_ = 0;
-  std::vector<std::vector<int>> lags_before_, lags_after_;  // by phase: scans to the references
-  std::vector<Record> records_;                             // ring buffer, by scan number
-  std::vector<Verdict> verdicts_;                           // by supervoxel
-  std::vector<Verdict> groups_;                             // by index in InstanceSamples::met
-  std::vector<std::uint8_t> is_marked_group_;               // by index in InstanceSamples::met
-  std::vector<std::uint8_t> is_moving_, may_move_;          // by non-ground point
+  std::vector<std::vector<int>> lags_before_;       // by scan since the begin, modulo their number
+  std::vector<std::vector<int>> lags_after_;        // by scans since the latest reference
+  std::vector<Record> records_;                     // ring buffer, by scan number
+  std::vector<Verdict> verdicts_;                   // by supervoxel
+  std::vector<Verdict> groups_;                     // by index in InstanceSamples::met
+  std::vector<std::uint8_t> is_marked_group_;       // by index in InstanceSamples::met
+  std::vector<std::uint8_t> is_moving_, may_move_;  // by non-ground point
   std::vector<std::uint32_t> predecessors_;
 };
 

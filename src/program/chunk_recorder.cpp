@@ -48,20 +48,15 @@ ChunkRecorder::ChunkRecorder(const Chunk& chunk, std::optional<std::size_t> shar
       overview_(path),
       map_(outputs.map) {}
 
-void ChunkRecorder::take_newest(std::size_t i, TimingRow row, RecordedScan scan,
-                                const ScanVerdict& verdict) {
+void ChunkRecorder::take_newest(std::size_t i, TimingRow row, const ScanVerdict& verdict) {
   const Span<const std::uint32_t> ids = verdict.instances;
   if (i == shared_before_) {
     summary_.instances.shared_before.assign(ids.begin(), ids.end());
     ids_before_ = set_of(ids);
   }
   if (i == shared_behind_) summary_.instances.shared_behind.assign(ids.begin(), ids.end());
-  if (!is_own(i)) {
-    spare_.push_back(std::move(scan));
-    return;
-  }
+  if (!is_own(i)) return;
   summary_.timing.rows.push_back(std::move(row));
-  open_scans_.push_back(std::move(scan));
   if (outputs_.with_online) {
     open_online_.emplace_back(verdict.labels.begin(), verdict.labels.end());
   }
@@ -74,10 +69,8 @@ void ChunkRecorder::take_shared(std::vector<std::uint32_t> before,
   summary_.instances.shared_behind = std::move(behind);
 }
 
-void ChunkRecorder::take_final(std::size_t i, const ScanVerdict& verdict) {
-  if (!is_own(i)) return;
-  RecordedScan scan = std::move(open_scans_.front());
-  open_scans_.pop_front();
+void ChunkRecorder::take_final(std::size_t i, const RecordedScan& scan,
+                               const ScanVerdict& verdict) {
   record_.take(verdict, outputs_.with_beliefs);
   record_.online.clear();
   if (outputs_.with_online) {
@@ -92,7 +85,6 @@ void ChunkRecorder::take_final(std::size_t i, const ScanVerdict& verdict) {
   count_instances(i, verdict);
   overview_.add(scan, verdict);
   if (outputs_.with_map) add_to_map(scan, verdict);
-  spare_.push_back(std::move(scan));
   ++finished_;
 }
 
@@ -133,13 +125,6 @@ void ChunkRecorder::add_to_map(const RecordedScan& scan, const ScanVerdict& verd
     count += is_static(verdict.labels[i]) ? 1U : 0U;
   }
   map_.insert(PointsView(kept_).subview(0, count), {}, verdict.T_world_sensor);
-}
-
-RecordedScan ChunkRecorder::recycle() {
-  if (spare_.empty()) return {};
-  RecordedScan scan = std::move(spare_.back());
-  spare_.pop_back();
-  return scan;
 }
 
 void ChunkRecorder::finish() {

@@ -53,12 +53,10 @@ class ChunkRecorder {
                 std::optional<std::size_t> shared_behind, const std::vector<Eigen::Vector3d>& path,
                 const ChunkOutputs& outputs, ChunkFileWriter& writer);
 
-  /// Scan `i` of the recording, just pushed, and the first verdict on it.
-  void take_newest(std::size_t i, TimingRow row, RecordedScan scan, const ScanVerdict& verdict);
-  /// The final verdict on scan `i`. Throws IoError.
-  void take_final(std::size_t i, const ScanVerdict& verdict);
-  /// Memory of a scan that is finished, for reading the next.
-  RecordedScan recycle();
+  /// The first verdict on scan `i` of the recording, just pushed.
+  void take_newest(std::size_t i, TimingRow row, const ScanVerdict& verdict);
+  /// The final verdict on own scan `i`. Throws IoError.
+  void take_final(std::size_t i, const RecordedScan& scan, const ScanVerdict& verdict);
   /// The instances of the shared scans, in the place of those from take_newest().
   void take_shared(std::vector<std::uint32_t> before, std::vector<std::uint32_t> behind);
   void add_pipeline_time(double ms) { summary_.timing.pipeline += ms; }
@@ -81,9 +79,7 @@ class ChunkRecorder {
   ChunkSummary summary_;
   Overview overview_;
   StaticMapAccumulator map_;
-  std::deque<RecordedScan> open_scans_;  // own ones, oldest first
   std::deque<std::vector<PointLabel>> open_online_;
-  std::vector<RecordedScan> spare_;
   std::size_t finished_ = 0;
   InstancePoints points_;
   std::set<std::uint32_t> ids_before_;                 // in the shared scan before

@@ -296,6 +296,7 @@ class ChunkedRun {
                          std::move(summary.instances.shared_behind));
     recorder.add_pipeline_time(summary.timing.pipeline);
     ReadAhead scans(plan_.sequence, own.own.first, own.own.last);
+    RecordedScan recorded;
     InstancePoints points;
     ChunkScan scan;
     for (std::size_t i = own.own.first; i <= own.own.last; ++i) {
@@ -310,10 +311,10 @@ class ChunkedRun {
       if (!moved.empty() && i >= own.own.first + plan_.latency) mark_moved_online(moved, scan);
       ScanVerdict verdict = verdict_of(i, scan);
       verdict.labels = scan.online;
-      recorder.take_newest(i, std::move(summary.timing.rows[i - own.own.first]),
-                           scans.next(recorder.recycle()), verdict);
+      recorder.take_newest(i, std::move(summary.timing.rows[i - own.own.first]), verdict);
       verdict.labels = scan.labels;
-      recorder.take_final(i, verdict);
+      recorded = scans.next(std::move(recorded));
+      recorder.take_final(i, recorded, verdict);
     }
     recorder.finish();
   }

@@ -28,17 +28,21 @@ bool run_chunk(Remover& remover, const Recording& recording, const ScanRange& ra
     recorder.add_pipeline_time(ms);
     return std::make_pair(frame, ms);
   };
+  OpenScans scans(recording, {chunk.first, chunk.last}, chunk.own, remover.latency());
   const auto finish = [&](const ScanVerdict& verdict) {
-    if (verdict.scan >= extra) recorder.take_final(chunk.first + verdict.scan - extra, verdict);
+    if (verdict.scan < extra) return;
+    const std::size_t i = chunk.first + verdict.scan - extra;
+    if (i >= chunk.own.first && i <= chunk.own.last) {
+      recorder.take_final(i, scans.next_judged(), verdict);
+    }
   };
   if (extra > 0) push(range.first, recording.read_scan(range.first));
 
-  ReadAhead scans(recording, chunk.first, chunk.last);
   for (std::size_t i = chunk.first; i <= chunk.last; ++i) {
-    RecordedScan scan = scans.next(recorder.recycle());
+    const RecordedScan& scan = scans.next();
     const auto [frame, ms] = push(i, scan);
     TimingRow row = timing_row(recording.name(i), scan.size(), ms, frame);
-    recorder.take_newest(i, std::move(row), std::move(scan), frame.newest);
+    recorder.take_newest(i, std::move(row), frame.newest);
     if (frame.finished) finish(*frame.finished);
     if (!keep_going()) return false;
   }

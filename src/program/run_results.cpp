@@ -147,18 +147,14 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
   }
 }
 
-void RunResults::take_newest(RecordedScan scan, const ScanVerdict& verdict) {
+void RunResults::take_newest(const ScanVerdict& verdict) {
   points_ += verdict.labels.size();
-  open_scans_.push_back(std::move(scan));
   if (online_labels_) online_labels_->write(recording_.name(range_.first + verdict.scan), verdict);
 }
 
-void RunResults::take_final(const ScanVerdict& verdict) {
+void RunResults::take_final(const RecordedScan& scan, const ScanVerdict& verdict) {
   final_labels_.write(recording_.name(range_.first + verdict.scan), verdict);
   labels_.add(verdict.labels);
-
-  RecordedScan scan = std::move(open_scans_.front());
-  open_scans_.pop_front();
   add_scan(scan, verdict);
   overview_.add(scan, verdict);
   for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
@@ -168,7 +164,6 @@ void RunResults::take_final(const ScanVerdict& verdict) {
     point.label = mos_label(verdict.labels[i], verdict.instances[i]);
     dynamic_points_.add(point);
   }
-  spare_.push_back(std::move(scan));
   ++finished_;
 }
 
@@ -198,13 +193,6 @@ bool RunResults::add_chunk(std::size_t scans, const ChunkSummary& summary) {
   labels_ += summary.labels;
   finished_ += scans;
   return true;
-}
-
-RecordedScan RunResults::recycle() {
-  if (spare_.empty()) return {};
-  RecordedScan scan = std::move(spare_.back());
-  spare_.pop_back();
-  return scan;
 }
 
 void RunResults::add_map_point(const Eigen::Vector3d& point) {

@@ -5,7 +5,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -73,8 +72,7 @@ std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange
 std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recording& recording,
                                   const ScanRange& range, const RunOutputs& outputs);
 
-/// Takes verdicts as they come and streams them to files. Nothing but the scans whose final
-/// verdict is open is kept in memory.
+/// Takes verdicts as they come and streams them to files.
 class RunResults {
  public:
   /// Opens all files, so that a folder that cannot be written is noticed before the work.
@@ -83,13 +81,12 @@ class RunResults {
   RunResults(const Recording& recording, const ScanRange& range, const RunOutputs& outputs,
              std::unique_ptr<MapFile> outside_map = nullptr);
 
-  /// The scan just pushed, which this keeps, and the verdict on it.
-  void take_newest(RecordedScan scan, const ScanVerdict& verdict);
-  void take_final(const ScanVerdict& verdict);
+  /// The verdict on the scan just pushed.
+  void take_newest(const ScanVerdict& verdict);
+  /// The final verdict on a scan, in the order of the scans.
+  void take_final(const RecordedScan& scan, const ScanVerdict& verdict);
   /// Final verdicts also go to `session`, which outlives this.
   void contribute_to(SessionContribution& session) { session_ = &session; }
-  /// Memory of a scan that is finished, for reading the next.
-  RecordedScan recycle();
 
   /// @name Results of chunks
   /// In the place of take_newest() and take_final(), in the order of the scans. The caller writes
@@ -129,8 +126,6 @@ class RunResults {
   std::optional<MapAttributeTable> map_attributes_;
   bool map_is_outside_;
   SessionContribution* session_ = nullptr;
-  std::deque<RecordedScan> open_scans_;  // oldest first
-  std::vector<RecordedScan> spare_;
   std::size_t finished_ = 0;
   std::uint64_t points_ = 0;
   LabelCounts labels_;

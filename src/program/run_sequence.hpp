@@ -9,8 +9,8 @@
 #include "dynains/io/recording.hpp"
 #include "dynains/verdict.hpp"
 #include "naming_scan.hpp"
+#include "open_scans.hpp"
 #include "points_of.hpp"
-#include "read_ahead.hpp"
 #include "run_results.hpp"
 #include "run_timing.hpp"
 
@@ -38,14 +38,14 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
   using Clock = std::chrono::steady_clock;
   RunTiming timing;
   timing.stages = stage_names();
-  ReadAhead scans(recording, range.first, range.last);
+  OpenScans scans(recording, range, range, remover.latency());
   for (std::size_t i = range.first; i <= range.last; ++i) {
-    RecordedScan scan = scans.next(results.recycle());
+    const RecordedScan& scan = scans.next();
     const Clock::time_point begin = Clock::now();
     const FrameResult frame = push_scan(remover, recording, i, scan);
     timing.rows.push_back(timing_row(recording.name(i), scan.size(), ms_since(begin), frame));
-    results.take_newest(std::move(scan), frame.newest);
-    if (frame.finished) results.take_final(*frame.finished);
+    results.take_newest(frame.newest);
+    if (frame.finished) results.take_final(scans.next_judged(), *frame.finished);
     if (!keep_going(timing.rows.size())) break;
   }
 
@@ -53,7 +53,7 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
   const Clock::time_point begin = Clock::now();
   remover.flush([&](const ScanVerdict& verdict) {
     const Clock::time_point begin_writing = Clock::now();
-    results.take_final(verdict);
+    results.take_final(scans.next_judged(), verdict);
     writing += ms_since(begin_writing);
   });
   timing.flush = ms_since(begin) - writing;

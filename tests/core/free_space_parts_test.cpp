@@ -36,6 +36,9 @@ TEST_CASE("references are the nearest scans with an image behind the wanted ones
   CHECK(reference_lags(0, 0, 1).empty());
   CHECK(reference_lags(2, 0, 3).empty());
   CHECK(reference_lags(-2, 1, 3).empty());
+  // Only lags above a limit.
+  CHECK(reference_lags(100, 3, 10, 31) == Lags{43, 53, 73, 83, 93});
+  CHECK(reference_lags(35, 9, 10, 31).empty());
   for (int step = 1; step <= 10; ++step) {
     for (int remainder = 0; remainder <= step; ++remainder) {
       for (int most = 0; most <= 200; ++most) {

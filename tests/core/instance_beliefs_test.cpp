@@ -497,53 +497,53 @@ GroundSplit wall(float range) {
   return split;
 }
 
-TEST_CASE("a reference is found by scan and lag until its image is replaced") {
-  for (const int step : {1, 2, 3}) {
+TEST_CASE("a reference is found as long as scans need it, and every scan finds its references") {
+  for (const auto& [step, lookback, lookahead] : {std::array{1, 12, 6}, std::array{2, 100, 30},
+                                                  std::array{3, 75, 0}, std::array{2, 20, 60}}) {
+    INFO("step " << step << ", lookback " << lookback << ", lookahead " << lookahead);
     FreeSpaceConfig config;
     config.reference_step = step;
-    config.lookback_scans = 12;
-    config.lookahead_scans = 6;
+    config.lookback_scans = lookback;
+    config.lookahead_scans = lookahead;
     ReferenceScans views(config);
+    const ReferenceSpan& span = views.span();
     SensorModel sensor = SensorModel::typical();
     sensor.azimuth_step = 1.0;
     sensor.elevation_gap = sensor.elevation_gap_wide = 3.0;
     views.adapt(sensor);
-    std::vector<ReferencePhase> phases;
-    constexpr std::uint64_t kScans = 40, kBreak = 17;  // another epoch begins at kBreak
+    constexpr std::uint64_t kScans = 240, kBreak = 17;  // another epoch begins at kBreak
     const auto epoch_of = [](std::uint64_t scan) { return scan < kBreak ? 0U : 1U; };
-    const auto begin_of = [](std::uint64_t scan) { return scan < kBreak ? 0U : kBreak; };
+    const auto since_begin = [](std::uint64_t scan) {
+      return scan < kBreak ? scan : scan - kBreak;
+    };
     for (std::uint64_t scan = 0; scan < kScans; ++scan) {
-      phases.push_back(views.advance(scan - begin_of(scan)));
-      REQUIRE(phases.back().since_image ==
-              (scan - begin_of(scan)) % static_cast<std::uint64_t>(step));
-      if (phases.back().since_image == 0) {
-        views.make_image(scan, epoch_of(scan), Eigen::Isometry3d::Identity(),
-                         wall(5.0F + static_cast<float>(scan)), {});
+      if (since_begin(scan) % static_cast<std::uint64_t>(step) == 0) {
+        views.begin(scan, epoch_of(scan), since_begin(scan));
+        REQUIRE(views.awaits_image());
+        REQUIRE(views.find(scan, epoch_of(scan)) == nullptr);
+        views.make_image(epoch_of(scan), Eigen::Isometry3d::Identity(),
+                         wall(5.0F + 0.1F * static_cast<float>(scan)), {});
         REQUIRE(views.newest().scan == scan);
       }
-      for (std::uint64_t from = scan >= 6 ? scan - 6 : 0; from <= scan; ++from) {
-        for (std::uint64_t other = from >= 12 ? from - 12 : 0; other <= scan; ++other) {
-          const bool is_reference =
-              epoch_of(other) == epoch_of(from) &&
-              (other - begin_of(other)) % static_cast<std::uint64_t>(step) == 0;
-          // Queries use only lags that lead to a scan with an image.
-          if ((other - begin_of(from)) % static_cast<std::uint64_t>(step) != 0) continue;
-          const int lag = static_cast<int>(other) - static_cast<int>(from);
-          const ReferenceScan* const found = views.find(from, epoch_of(from), phases[from], lag);
-          if (!is_reference) {
-            REQUIRE(found == nullptr);
-          } else if (scan - other <= 12) {
-            REQUIRE(found != nullptr);
-            REQUIRE(found->scan == other);
-          } else {
-            REQUIRE((found == nullptr || found->scan == other));
-          }
-        }
+      const auto phase =
+          static_cast<int>(since_begin(scan) % static_cast<std::uint64_t>(span.sparse_step));
+      const std::vector<int> lags = span.lags_before(phase);
+      REQUIRE((lags.empty() || lags.back() <= lookback));
+      for (const int lag : lags) {
+        if (static_cast<std::uint64_t>(lag) > since_begin(scan)) break;
+        REQUIRE(views.find(scan - static_cast<std::uint64_t>(lag), epoch_of(scan)) != nullptr);
       }
+      // The references of scans without a final verdict.
+      for (int lag = 0; lag <= std::min(lookahead, static_cast<int>(since_begin(scan))); ++lag) {
+        const std::uint64_t other = scan - static_cast<std::uint64_t>(lag);
+        const bool is_reference = since_begin(other) % static_cast<std::uint64_t>(step) == 0;
+        REQUIRE((views.find(other, epoch_of(scan)) != nullptr) == is_reference);
+      }
+      REQUIRE(views.find(scan, epoch_of(scan) + 1) == nullptr);
     }
     // A beam of the last reference passes points nearer than its wall, and hits those at it.
     PointBuffer points;
-    const auto newest = 5.0F + static_cast<float>(views.newest().scan);
+    const auto newest = 5.0F + 0.1F * static_cast<float>(views.newest().scan);
     points.push_back(newest - 2.0F, 0.0F, 0.0F);
     points.push_back(newest, 0.0F, 0.0F);
     points.push_back(newest + 2.0F, 0.0F, 0.0F);
@@ -556,9 +556,10 @@ TEST_CASE("a reference is found by scan and lag until its image is replaced") {
     CHECK_FALSE(visibility.is_free(1));
     CHECK_FALSE(visibility.is_hit(2));
     CHECK_FALSE(visibility.is_free(2));
+    const std::uint64_t newest_scan = views.newest().scan;
+    REQUIRE(views.find(newest_scan, 1) != nullptr);
     views.forget();
-    CHECK(views.find(kScans - 1, 1, phases.back(), -static_cast<int>(phases.back().since_image)) ==
-          nullptr);
+    CHECK(views.find(newest_scan, 1) == nullptr);
   }
 }
 

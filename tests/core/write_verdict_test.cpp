@@ -74,7 +74,7 @@ struct Votes {
   }
 };
 
-TEST_CASE("verdicts by point_run equal those by point, at once and after more windows") {
+TEST_CASE("verdicts by point run equal those by point, at once and after more windows") {
   // One set of objects for all scans, as in the pipeline.
   detail::ScanSlot scan;
   detail::WindowVoter voter;
@@ -87,11 +87,11 @@ TEST_CASE("verdicts by point_run equal those by point, at once and after more wi
     const std::uint32_t bad = 3;
     scan.split.resize(ground + points);
     scan.split.ground_count = ground;
-    scan.labels.assign(ground + points + bad, PointLabel::kInvalid);
+    scan.input_labels.assign(ground + points + bad, PointLabel::kInvalid);
     const std::vector<std::size_t> order = random.permutation(ground + points + bad);
     for (std::size_t i = 0; i < ground + points; ++i) {
       scan.split.input[i] = static_cast<std::uint32_t>(order[i]);
-      scan.labels[order[i]] = PointLabel::kGround;  // default label of good points
+      scan.input_labels[order[i]] = PointLabel::kGround;  // of good points
     }
     scan.ids.resize(kClusters);
     for (std::uint32_t c = 0; c < kClusters; ++c) scan.ids[c] = 100 + c;
@@ -104,41 +104,41 @@ TEST_CASE("verdicts by point_run equal those by point, at once and after more wi
       const std::vector<std::uint32_t> cluster_of = by_point(point_runs);
       for (std::size_t i = 0; i < points; ++i) expected[i].add(cluster_of[i], verdicts);
     };
-    const auto check = [&](int votes, bool is_final) {
+    const auto check = [&](int votes) {
+      const ScanVerdict verdict = writer.verdict(scan);
       for (std::size_t i = 0; i < points; ++i) {
         const std::uint32_t to = scan.split.input[ground + i];
         const bool dynamic = expected[i].votes >= votes;
-        REQUIRE(scan.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kStatic));
-        REQUIRE(scan.causes[to] ==
+        REQUIRE(verdict.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kStatic));
+        REQUIRE(verdict.causes[to] ==
                 (dynamic ? Cause::kProposed : detail::static_cause(expected[i].stage)));
-        REQUIRE(scan.beliefs[to] == expected[i].belief);
-        if (is_final) REQUIRE(writer.is_kept()[ground + i] == (dynamic ? 0 : 1));
-        REQUIRE(scan.instances[to] ==
+        REQUIRE(verdict.beliefs[to] == expected[i].belief);
+        REQUIRE(writer.is_kept()[ground + i] == (dynamic ? 0 : 1));
+        REQUIRE(verdict.instances[to] ==
                 (first_cluster[i] == kNoCluster ? kNoInstance : 100 + first_cluster[i]));
       }
       for (std::size_t i = 0; i < ground; ++i) {
         const std::uint32_t to = scan.split.input[i];
-        REQUIRE(scan.labels[to] == PointLabel::kGround);
-        REQUIRE(scan.causes[to] == Cause::kGround);
-        REQUIRE(scan.beliefs[to] == 0.0F);
-        REQUIRE(scan.instances[to] == kNoInstance);
-        if (is_final) REQUIRE(writer.is_kept()[i] == 1);
+        REQUIRE(verdict.labels[to] == PointLabel::kGround);
+        REQUIRE(verdict.causes[to] == Cause::kGround);
+        REQUIRE(verdict.beliefs[to] == 0.0F);
+        REQUIRE(verdict.instances[to] == kNoInstance);
+        REQUIRE(writer.is_kept()[i] == 1);
       }
       for (std::size_t i = ground + points; i < order.size(); ++i) {
-        REQUIRE(scan.labels[order[i]] == PointLabel::kInvalid);
-        REQUIRE(scan.causes[order[i]] == Cause::kNotJudged);
-        REQUIRE(scan.instances[order[i]] == kNoInstance);
+        REQUIRE(verdict.labels[order[i]] == PointLabel::kInvalid);
+        REQUIRE(verdict.causes[order[i]] == Cause::kNotJudged);
+        REQUIRE(verdict.instances[order[i]] == kNoInstance);
       }
     };
 
     const std::vector<ClusterVerdict> first = random_verdicts(random);
     add(scan.windows.point_runs, first);
     detail::WindowVoter::record_first(points, first, scan.windows);
-    writer.begin(scan, first_cluster);
-    writer.write_runs(scan, scan.windows.point_runs, [&](std::uint32_t cluster) {
-      return cluster == kNoCluster ? detail::PointVerdict() : detail::point_verdict(first[cluster]);
-    });
-    check(1, false);
+    scan.assign_instances(first_cluster);
+    writer.begin(scan);
+    writer.write_windows(scan, 1);
+    check(1);
 
     const std::size_t windows = random.index(4);
     for (std::size_t k = 0; k < windows; ++k) {
@@ -148,11 +148,9 @@ TEST_CASE("verdicts by point_run equal those by point, at once and after more wi
       voter.record_again(points, point_runs, verdicts, scan.windows);
     }
     const int votes = 1 + static_cast<int>(random.index(3));
-    writer.begin_final(scan);
-    detail::WindowVoter::for_each_unsettled(points, scan.windows, [&](std::size_t i) {
-      writer.points(scan).write(ground + i, detail::point_verdict(scan.windows, i, votes));
-    });
-    check(votes, true);
+    writer.begin(scan);
+    writer.write_windows(scan, votes);
+    check(votes);
   }
 }
 
@@ -173,8 +171,9 @@ struct JudgedScan {
     slot.split.resize(ground + above);
     slot.split.ground_count = ground;
     std::copy_n(order.begin(), ground + above, slot.split.input.begin());
-    slot.labels.assign(all, PointLabel::kOutOfRange);
-    for (std::size_t i = 0; i < ground + above; ++i) slot.labels[order[i]] = PointLabel::kGround;
+    slot.input_labels.assign(all, PointLabel::kOutOfRange);
+    for (std::size_t i = 0; i < ground + above; ++i)
+      slot.input_labels[order[i]] = PointLabel::kGround;
     for (std::uint32_t c = 0; c < kClusters; ++c) slot.ids.push_back(100 + c);
     for (std::size_t i = 0; i < above; ++i) {
       const std::size_t cluster = random.index(kClusters + 1);
@@ -219,6 +218,7 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
       }
     };
     const auto check = [&](int votes, bool is_final) {
+      const ScanVerdict verdict = writer.verdict(slot);
       for (std::size_t i = 0; i < above; ++i) {
         const std::uint32_t to = slot.split.input[scan.ground + i];
         EvidenceVerdict::Group expected = groups[scan.group_of[i]];
@@ -229,10 +229,10 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
           }
         }
         const bool dynamic = is_dynamic(expected.cause);
-        REQUIRE(slot.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kStatic));
-        REQUIRE(slot.causes[to] == expected.cause);
-        REQUIRE(slot.beliefs[to] == expected.belief);
-        REQUIRE(slot.instances[to] ==
+        REQUIRE(verdict.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kStatic));
+        REQUIRE(verdict.causes[to] == expected.cause);
+        REQUIRE(verdict.beliefs[to] == expected.belief);
+        REQUIRE(verdict.instances[to] ==
                 (scan.cluster_of[i] == kNoCluster ? kNoInstance : 100 + scan.cluster_of[i]));
         if (is_final) REQUIRE(writer.is_kept()[scan.ground + i] == (dynamic ? 0 : 1));
       }
@@ -240,28 +240,26 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
         const std::uint32_t to = slot.split.input[i];
         const bool dynamic = std::any_of(moved.begin(), moved.end(),
                                          [i](const auto& point) { return point.point == i; });
-        REQUIRE(slot.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kGround));
-        REQUIRE(slot.causes[to] == (dynamic ? Cause::kUnderInstance : Cause::kGround));
-        REQUIRE(slot.beliefs[to] == (dynamic ? 0.75F : 0.0F));
-        REQUIRE(slot.instances[to] == kNoInstance);
+        REQUIRE(verdict.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kGround));
+        REQUIRE(verdict.causes[to] == (dynamic ? Cause::kUnderInstance : Cause::kGround));
+        REQUIRE(verdict.beliefs[to] == (dynamic ? 0.75F : 0.0F));
+        REQUIRE(verdict.instances[to] == kNoInstance);
         if (is_final) REQUIRE(writer.is_kept()[i] == (dynamic ? 0 : 1));
       }
       std::size_t outside = 0;
-      for (std::size_t i = 0; i < slot.labels.size(); ++i) {
-        if (slot.labels[i] != PointLabel::kOutOfRange) continue;
+      for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
+        if (verdict.labels[i] != PointLabel::kOutOfRange) continue;
         ++outside;
-        REQUIRE(slot.causes[i] == Cause::kNotJudged);
-        REQUIRE(slot.beliefs[i] == 0.0F);
-        REQUIRE(slot.instances[i] == kNoInstance);
+        REQUIRE(verdict.causes[i] == Cause::kNotJudged);
+        REQUIRE(verdict.beliefs[i] == 0.0F);
+        REQUIRE(verdict.instances[i] == kNoInstance);
       }
-      REQUIRE(outside == slot.labels.size() - slot.split.count);
+      REQUIRE(outside == verdict.labels.size() - slot.split.count);
     };
 
     change();
-    // Left in the slot by an earlier scan.
-    for (std::uint32_t i = 0; i < slot.split.count; i += 3) slot.moved_ground.push_back(i);
-    slot.written_groups.assign(random.index(2 * kGroups), random_group(random));
-    writer.begin(slot, scan.cluster_of);
+    slot.assign_instances(scan.cluster_of);
+    writer.begin(slot);
     writer.write_groups(slot, {groups, scan.group_of, moved});
     if (has_windows) detail::add_proposals(slot, {groups, scan.group_of, moved}, 1, writer);
     check(1, false);
@@ -270,8 +268,9 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
       for (DecisionStage& stage : slot.windows.stage) {
         if (random.index(4) == 0) stage = DecisionStage::kProposed;
       }
-      writer.begin_final(slot);
-      writer.rewrite_groups(slot, {groups, scan.group_of, moved});
+      writer.begin(slot);
+      writer.write_groups(slot, {groups, scan.group_of, moved});
+      writer.flag_groups(slot, {groups, scan.group_of, moved});
       if (has_windows) detail::add_proposals(slot, {groups, scan.group_of, moved}, 2, writer);
       check(2, true);
     }

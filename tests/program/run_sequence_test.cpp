@@ -8,6 +8,7 @@
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
 #include "label_writer.hpp"
+#include "open_scans.hpp"
 #include "program/tiny_sequence.hpp"
 #include "support/catch.hpp"
 
@@ -52,6 +53,7 @@ class FakeRemover {
     while (finished_ < pushed_.size()) sink(finish());
   }
   Map map() const { return {}; }
+  std::size_t latency() const { return 2; }
 
   std::size_t fail_at = 1000;
 
@@ -117,6 +119,23 @@ TEST_CASE("Labels: 251 moving, 9 static, 0 not judged; instances wrap but never 
   CHECK(mos_label(PointLabel::kDynamic, 70000) == (251 | 4465U << 16));
   CHECK(mos_label(PointLabel::kDynamic, 2 * 65535) == (251 | 65535U << 16));
   CHECK(mos_label(PointLabel::kDynamic, 0xFFFFFFFF) == (251 | 65535U << 16));
+}
+
+TEST_CASE("Scans are the same again for their final verdict, kept or read a second time") {
+  Fixture fixture(7);
+  const Recording& recording = *fixture.sequence;
+  for (const std::size_t latency : {std::size_t{2}, std::size_t{30}}) {
+    OpenScans scans(recording, {1, 6}, {2, 5}, latency);
+    std::size_t judged = 2;
+    const auto judge_next = [&] {
+      CHECK(scans.next_judged().xyzi == recording.read_scan(judged++).xyzi);
+    };
+    for (std::size_t i = 1; i <= 6; ++i) {
+      CHECK(scans.next().xyzi == recording.read_scan(i).xyzi);
+      if (i >= 4) judge_next();
+    }
+    judge_next();
+  }
 }
 
 TEST_CASE("Every scan gets its final labels, every dynamic point its place in the world") {

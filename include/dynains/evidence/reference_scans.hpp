@@ -26,50 +26,81 @@ namespace dynains {
 inline constexpr std::array<int, 19> kReferenceLags = {2,  4,  6,  8,  10,  13,  16,  20,  25, 30,
                                                        40, 50, 65, 80, 100, 125, 150, 175, 200};
 
-/// The lags (scans) of kReferenceLags up to `most`, each rounded up to a lag with lag % step ==
-/// remainder; a result above `most` is rounded down instead. Ascending and unique. `remainder`: in
-/// [0, `step`].
-inline std::vector<int> reference_lags(int most, int remainder, int step) {
+/// The lags (scans) of kReferenceLags above `above` and up to `most`, each rounded up to a lag with
+/// lag % step == remainder % step; a result above `most` is rounded down instead. Ascending, unique
+/// and above `above`.
+inline std::vector<int> reference_lags(int most, int remainder, int step, int above = 0) {
   const auto to_next = [&](int lag) { return ((remainder - lag) % step + step) % step; };
   const int last = most >= 0 ? most + to_next(most) - (to_next(most) > 0 ? step : 0) : 0;
   std::vector<int> lags;
   for (const int reference_lag : kReferenceLags) {
     if (reference_lag >= most + step) break;
+    if (reference_lag <= above) continue;
     const int lag = std::min(reference_lag + to_next(reference_lag), last);
-    if (lag > (lags.empty() ? 0 : lags.back())) lags.push_back(lag);
+    if (lag > (lags.empty() ? above : lags.back())) lags.push_back(lag);
   }
   return lags;
 }
+
+/// Which scans are references, and for how long. Every `step`-th scan of an epoch is a reference
+/// for the scans up to `near` after it, and every `sparse_step`-th one up to `lookback`: images of
+/// long ago would take most of the memory.
+struct ReferenceSpan {
+  static constexpr int kDense = 30;       // scans
+  static constexpr int kSparseStep = 10;  // scans
+
+  explicit ReferenceSpan(const FreeSpaceConfig& config)
+      : step(config.reference_step),
+        sparse_step(step * std::max(kSparseStep / step, 1)),
+        lookback(config.lookback_scans),
+        near(std::max(config.lookahead_scans, std::min(lookback, kDense + step - 1))) {}
+
+  int step;         ///< scans
+  int sparse_step;  ///< scans, a multiple of `step`
+  int lookback;     ///< scans
+  int near;         ///< scans
+
+  /// Largest number of references that are needed at a time.
+  std::size_t count() const {
+    const int sparse = lookback > near ? (lookback - near) / sparse_step + 1 : 0;
+    return static_cast<std::size_t>(near / step + 1 + sparse);
+  }
+  /// Distances (scans) from a scan to its earlier references, ascending. `phase`: number of the
+  /// scan since the begin of its epoch, modulo `sparse_step`.
+  std::vector<int> lags_before(int phase) const {
+    std::vector<int> lags = reference_lags(std::min(lookback, near), phase, step);
+    const std::vector<int> sparse = reference_lags(lookback, phase, sparse_step, near);
+    lags.insert(lags.end(), sparse.begin(), sparse.end());
+    return lags;
+  }
+  /// Whether a reference is needed by scans `age` (scans) after it.
+  bool needs(std::uint64_t since_begin, std::uint64_t age) const {
+    const bool is_sparse = since_begin % static_cast<std::uint64_t>(sparse_step) == 0;
+    return age <= static_cast<std::uint64_t>(is_sparse ? std::max(lookback, near) : near);
+  }
+};
 
 /// A reference scan: its range image is evidence on other scans.
 struct ReferenceScan {
   static constexpr std::uint64_t kNoEpoch = ~std::uint64_t{0};  ///< epoch without a valid image
 
   std::uint64_t scan = 0;
+  std::uint64_t since_begin = 0;  ///< scans since the first scan of the epoch
   std::uint64_t epoch = kNoEpoch;
   Eigen::Isometry3d T_world_beams = Eigen::Isometry3d::Identity();
   RangeImage image;
 };
 
-/// Position of a scan relative to the latest reference up to it.
-struct ReferencePhase {
-  std::uint64_t since_image = 0;  ///< scans since that reference, below `reference_step`
-  std::uint64_t image = 0;        ///< number of its image
-};
-
-/// Ring buffer of the latest reference scans. The first scan of each epoch, and every scan that is
-/// a multiple of `reference_step` scans after it, is a reference.
+/// The reference scans that are still needed, see ReferenceSpan. The first scan of each epoch, and
+/// every scan that is a multiple of `reference_step` scans after it, is a reference.
 class ReferenceScans {
  public:
   explicit ReferenceScans(const FreeSpaceConfig& config)
       : margin_(static_cast<float>(config.margin)),
         margin_slope_(static_cast<float>(config.margin_slope)),
         lateral_margin_(static_cast<float>(config.lateral_margin)),
-        step_(static_cast<std::uint64_t>(config.reference_step)),
-        references_(
-            static_cast<std::size_t>(std::max(config.lookback_scans, config.lookahead_scans)) /
-                step_ +
-            1) {}
+        span_(config),
+        references_(span_.count()) {}
 
   /// Sets the resolution of later images, and the tilt of their frame, for a sensor.
   void adapt(const SensorModel& sensor) {
@@ -78,11 +109,13 @@ class ReferenceScans {
     if (!sensor.is_level()) R_beams_level_ = detail::transposed(sensor.R_level_headed);
   }
 
-  /// Allocates the images for `scans` scans, at most the capacity of the ring buffer.
+  const ReferenceSpan& span() const { return span_; }
+
+  /// Allocates the images for `scans` scans, at most all.
   void reserve(std::size_t scans) {
-    const std::size_t images = grid_.rows > 0 ? std::min(scans / step_ + 1, references_.size()) : 0;
-    for (std::size_t i = 1; i <= images; ++i) {
-      references_[(images_ + i) % references_.size()].image.reserve(grid_);
+    const std::size_t images = scans / static_cast<std::size_t>(span_.step) + 1;
+    for (std::size_t i = 0; grid_.rows > 0 && i < std::min(images, references_.size()); ++i) {
+      references_[i].image.reserve(grid_);
     }
   }
 
@@ -91,24 +124,27 @@ class ReferenceScans {
     for (ReferenceScan& reference : references_) reference.epoch = ReferenceScan::kNoEpoch;
   }
 
-  /// Registers the next scan, `since_begin` scans after the first scan of its epoch. If
-  /// `since_image` of the result is 0, the scan is a reference and requires make_image().
-  ReferencePhase advance(std::uint64_t since_begin) {
-    const std::uint64_t phase = since_begin % step_;
-    if (phase == 0) {
-      ++images_;
-      current().epoch = ReferenceScan::kNoEpoch;  // until make_image()
-    }
-    return {phase, images_};
+  /// Begins a reference, which requires make_image(), in the place of one that is not needed any
+  /// more. `scan`, `epoch`: numbers of the scan and of its epoch. `since_begin`: scans since the
+  /// first scan of the epoch, a multiple of `reference_step`.
+  void begin(std::uint64_t scan, std::uint64_t epoch, std::uint64_t since_begin) {
+    const auto unneeded =
+        std::find_if(references_.begin(), references_.end(), [&](const ReferenceScan& reference) {
+          return reference.epoch != epoch ||
+                 !span_.needs(reference.since_begin, scan - reference.scan);
+        });
+    newest_ = static_cast<std::size_t>(unneeded - references_.begin());
+    references_[newest_].scan = scan;
+    references_[newest_].since_begin = since_begin;
+    references_[newest_].epoch = ReferenceScan::kNoEpoch;  // until make_image()
   }
 
   /// Makes the image of the newest reference in the tilted frame of the sensor, in which each beam
-  /// is a row of the image. `scan`, `epoch`: numbers of the scan and of its epoch. `T_world_level`:
-  /// pose of the frame of `split`. `moving`: by non-ground point, as in RangeImage::build().
-  void make_image(std::uint64_t scan, std::uint64_t epoch, const Eigen::Isometry3d& T_world_level,
+  /// is a row of the image. `epoch`: as in begin(). `T_world_level`: pose of the frame of `split`.
+  /// `moving`: by non-ground point, as in RangeImage::build().
+  void make_image(std::uint64_t epoch, const Eigen::Isometry3d& T_world_level,
                   const GroundSplit& split, Span<const std::uint8_t> moving) {
-    ReferenceScan& reference = current();
-    reference.scan = scan;
+    ReferenceScan& reference = references_[newest_];
     reference.T_world_beams = T_world_level;
     PointsView ground = split.ground();
     PointsView rest = split.non_ground();
@@ -123,19 +159,14 @@ class ReferenceScans {
 
   /// Whether the newest reference has no image yet.
   bool awaits_image() const { return newest().epoch == ReferenceScan::kNoEpoch; }
-  const ReferenceScan& newest() const { return references_[images_ % references_.size()]; }
+  const ReferenceScan& newest() const { return references_[newest_]; }
 
-  /// The reference `lag` scans after scan number `scan` (before it for a negative lag); null if
-  /// there is none. `at`: phase of `scan`; at.since_image + lag is a multiple of the step.
-  const ReferenceScan* find(std::uint64_t scan, std::uint64_t epoch, const ReferencePhase& at,
-                            int lag) const {
-    const auto signed_step = static_cast<std::int64_t>(step_);
-    const std::int64_t to_image = lag + static_cast<std::int64_t>(at.since_image);
-    const std::uint64_t image =
-        at.image + static_cast<std::uint64_t>(to_image / signed_step);  // exact
-    const ReferenceScan& reference = references_[image % references_.size()];
-    const std::uint64_t reference_scan = scan + static_cast<std::uint64_t>(std::int64_t{lag});
-    return reference.scan == reference_scan && reference.epoch == epoch ? &reference : nullptr;
+  /// The reference that is scan number `scan` of an epoch; null if there is none.
+  const ReferenceScan* find(std::uint64_t scan, std::uint64_t epoch) const {
+    for (const ReferenceScan& reference : references_) {
+      if (reference.scan == scan && reference.epoch == epoch) return &reference;
+    }
+    return nullptr;
   }
 
   /// Visibility of the first `count` points (m; padded for packs) from a reference. The result is
@@ -151,14 +182,12 @@ class ReferenceScans {
   }
 
  private:
-  ReferenceScan& current() { return references_[images_ % references_.size()]; }
-
   float margin_;
   float margin_slope_;
   float lateral_margin_;
-  std::uint64_t step_;                     // scans from one image to the next
-  std::vector<ReferenceScan> references_;  // ring buffer, by number of the image
-  std::uint64_t images_ = 0;               // number of the newest image
+  ReferenceSpan span_;
+  std::vector<ReferenceScan> references_;
+  std::size_t newest_ = 0;  // index of the newest reference
   RangeImageGrid grid_;
   std::optional<Eigen::Matrix3d> R_beams_level_;  // if the sensor is tilted
   PointBuffer rotated_ground_;

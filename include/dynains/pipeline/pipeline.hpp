@@ -298,6 +298,7 @@ void Pipeline<Stages>::reserve_like(const CloudView& example, std::size_t scans)
     push(example, Eigen::Isometry3d::Identity(), next_time());
   }
   for (ScanSlot& slot : scans_.slots()) slot.ensure_capacity_like(scans_.newest());
+  final_verdict_.ensure_capacity_like(newest_verdict_);
   decision_->reserve(scans);
 }
 

@@ -42,6 +42,11 @@ class VerdictWriter {
     touch_all(labels_, instances_, beliefs_, causes_, is_kept_, group_of_input_);
   }
 
+  /// Ensures capacity for the number of groups of `other`.
+  void ensure_capacity_like(const VerdictWriter& other) {
+    ensure_capacity(verdicts_, other.verdicts_.size());
+  }
+
   /// Begins the verdict on a scan: writes the instance ids, and sets all keep flags.
   void begin(const ScanSlot& scan) {
     const std::size_t count = scan.input_labels.size();
@@ -80,10 +85,10 @@ class VerdictWriter {
   /// so that the arrays are written sequentially.
   void write_groups(const ScanSlot& scan, const EvidenceVerdict& evidence) {
     verdicts_.resize(kFirstGroup + evidence.groups.size());
-    verdicts_[kBadPoints] = PointVerdict{Cause::kNotJudged, 0.0F};
-    verdicts_[kGroundPoints] = PointVerdict{Cause::kGround, 0.0F};
+    verdicts_[kBadPoints] = GroupVerdict({Cause::kNotJudged, 0.0F});
+    verdicts_[kGroundPoints] = GroupVerdict({Cause::kGround, 0.0F});
     for (std::size_t g = 0; g < evidence.groups.size(); ++g) {
-      verdicts_[kFirstGroup + g] = evidence.groups[g];
+      verdicts_[kFirstGroup + g] = GroupVerdict(evidence.groups[g]);
     }
     order_groups(scan, evidence.group_of);
     expand_groups(scan.input_labels);
@@ -127,7 +132,7 @@ class VerdictWriter {
   // Verdict on the points of a group, packed in eight bytes.
   struct GroupVerdict {
     GroupVerdict() = default;
-    GroupVerdict(const PointVerdict& verdict)  // NOLINT(google-explicit-constructor)
+    explicit GroupVerdict(const PointVerdict& verdict)
         : belief(verdict.belief),
           label(label_of(verdict.cause)),
           cause(verdict.cause),

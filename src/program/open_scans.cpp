@@ -1,0 +1,31 @@
+#include "open_scans.hpp"
+
+#include <utility>
+
+namespace dynains::program {
+
+OpenScans::OpenScans(const Recording& recording, const ScanRange& pushed, const ScanRange& judged,
+                     std::size_t latency)
+    : judged_(judged), next_(pushed.first), reader_(recording, pushed.first, pushed.last) {
+  constexpr std::size_t kFewScans = 8;
+  if (latency > kFewScans && recording.format() == ScanFormat::kBin) {
+    second_reader_.emplace(recording, judged.first, judged.last);
+  }
+}
+
+const RecordedScan& OpenScans::next() {
+  const bool is_kept = !second_reader_ && is_judged(next_++);
+  if (!is_kept) return pushed_scan_ = reader_.next(std::move(pushed_scan_));
+  kept_.push_back(reader_.next(std::move(judged_scan_)));
+  judged_scan_ = {};
+  return kept_.back();
+}
+
+const RecordedScan& OpenScans::next_judged() {
+  if (second_reader_) return judged_scan_ = second_reader_->next(std::move(judged_scan_));
+  judged_scan_ = std::move(kept_.front());
+  kept_.pop_front();
+  return judged_scan_;
+}
+
+}  // namespace dynains::program

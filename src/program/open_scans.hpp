@@ -1,0 +1,41 @@
+// The scans of a run: read ahead for their push, and again for their final verdict.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <optional>
+
+#include "dynains/io/recording.hpp"
+#include "read_ahead.hpp"
+#include "scan_range.hpp"
+
+namespace dynains::program {
+
+/// Scans without a final verdict are kept in memory, unless they are many and a second reading is a
+/// plain copy of their file (.bin).
+class OpenScans {
+ public:
+  /// `pushed`: the scans to push, of a recording that outlives this. `judged`: those of them that
+  /// are needed for their final verdict. `latency`: pushes after a scan before its final verdict.
+  OpenScans(const Recording& recording, const ScanRange& pushed, const ScanRange& judged,
+            std::size_t latency);
+
+  /// To be called once for each scan of `pushed`. The scan is valid until the next call of a
+  /// member. Throws IoError if it could not be read.
+  const RecordedScan& next();
+  /// To be called once for each scan of `judged`, behind its next(). As next().
+  const RecordedScan& next_judged();
+
+ private:
+  bool is_judged(std::size_t i) const { return i >= judged_.first && i <= judged_.last; }
+
+  ScanRange judged_;
+  std::size_t next_;
+  ReadAhead reader_;
+  std::optional<ReadAhead> second_reader_;
+  std::deque<RecordedScan> kept_;  // oldest first; the last one is the pushed scan
+  RecordedScan pushed_scan_;       // unless it is kept
+  RecordedScan judged_scan_;
+};
+
+}  // namespace dynains::program
