@@ -21,7 +21,7 @@ const RecordedScan& OpenScans::next() {
   return kept_.back();
 }
 
-const RecordedScan& OpenScans::next_judged() {
+RecordedScan& OpenScans::next_judged() {
   if (second_reader_) return judged_scan_ = second_reader_->next(std::move(judged_scan_));
   judged_scan_ = std::move(kept_.front());
   kept_.pop_front();

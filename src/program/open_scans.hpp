@@ -23,8 +23,9 @@ class OpenScans {
   /// To be called once for each scan of `pushed`. The scan is valid until the next call of a
   /// member. Throws IoError if it could not be read.
   const RecordedScan& next();
-  /// To be called once for each scan of `judged`, behind its next(). As next().
-  const RecordedScan& next_judged();
+  /// To be called once for each scan of `judged`, behind its next(). As next(). The caller may
+  /// exchange it for another scan, whose memory is used again.
+  RecordedScan& next_judged();
 
  private:
   bool is_judged(std::size_t i) const { return i >= judged_.first && i <= judged_.last; }

@@ -130,6 +130,7 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
       overview_file_(outputs.folder / kOverviewPicture),
       map_(std::move(outside_map)),
       map_is_outside_(map_ != nullptr) {
+  final_labels_.create_folders();
   if (outputs.write_online) online_labels_.emplace(outputs.folder / "online");
   if (outputs.write_clean) clean_scans_.emplace(outputs.folder / "clean", recording);
   if (!outputs.map.empty() && !map_is_outside_) {
@@ -152,8 +153,33 @@ void RunResults::take_newest(const ScanVerdict& verdict) {
   if (online_labels_) online_labels_->write(recording_.name(range_.first + verdict.scan), verdict);
 }
 
-void RunResults::take_final(const RecordedScan& scan, const ScanVerdict& verdict) {
-  final_labels_.write(recording_.name(range_.first + verdict.scan), verdict);
+void JudgedScan::take(RecordedScan& other, const ScanVerdict& other_verdict) {
+  std::swap(scan, other);
+  labels.assign(other_verdict.labels.begin(), other_verdict.labels.end());
+  instances.assign(other_verdict.instances.begin(), other_verdict.instances.end());
+  beliefs.assign(other_verdict.beliefs.begin(), other_verdict.beliefs.end());
+  causes.assign(other_verdict.causes.begin(), other_verdict.causes.end());
+  verdict = other_verdict;
+  verdict.labels = labels;
+  verdict.instances = instances;
+  verdict.beliefs = beliefs;
+  verdict.causes = causes;
+}
+
+void RunResults::take_final(RecordedScan& scan, const ScanVerdict& verdict) {
+  finish();
+  judged_.take(scan, verdict);
+  writing_ = std::async(std::launch::async, [this] { write_final(judged_.scan, judged_.verdict); });
+  ++finished_;
+}
+
+void RunResults::finish() {
+  if (writing_.valid()) writing_.get();
+}
+
+void RunResults::write_final(const RecordedScan& scan, const ScanVerdict& verdict) {
+  final_labels_.take(verdict);
+  final_labels_.write(recording_.name(range_.first + verdict.scan));
   labels_.add(verdict.labels);
   add_scan(scan, verdict);
   overview_.add(scan, verdict);
@@ -164,7 +190,6 @@ void RunResults::take_final(const RecordedScan& scan, const ScanVerdict& verdict
     point.label = mos_label(verdict.labels[i], verdict.instances[i]);
     dynamic_points_.add(point);
   }
-  ++finished_;
 }
 
 bool RunResults::needs_scans() const {
@@ -201,7 +226,7 @@ void RunResults::add_map_point(const Eigen::Vector3d& point) {
 }
 
 void RunResults::commit() {
-  final_labels_.finish();
+  finish();
   if (online_labels_) online_labels_->finish();
   dynamic_points_.commit();
   if (dynamic_las_) dynamic_las_->commit();

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -72,6 +73,19 @@ std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange
 std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recording& recording,
                                   const ScanRange& range, const RunOutputs& outputs);
 
+/// A scan and a copy of its final verdict.
+struct JudgedScan {
+  RecordedScan scan;
+  std::vector<PointLabel> labels;
+  std::vector<std::uint32_t> instances;
+  std::vector<float> beliefs;
+  std::vector<Cause> causes;
+  ScanVerdict verdict;  ///< with these arrays
+
+  /// Exchanges `other` for the scan, and copies its verdict.
+  void take(RecordedScan& other, const ScanVerdict& other_verdict);
+};
+
 /// Takes verdicts as they come and streams them to files.
 class RunResults {
  public:
@@ -83,8 +97,11 @@ class RunResults {
 
   /// The verdict on the scan just pushed.
   void take_newest(const ScanVerdict& verdict);
-  /// The final verdict on a scan, in the order of the scans.
-  void take_final(const RecordedScan& scan, const ScanVerdict& verdict);
+  /// The final verdict on a scan, in the order of the scans. Another thread writes the results of
+  /// the scan, which is exchanged for an earlier one. Throws IoError, for the scan before as well.
+  void take_final(RecordedScan& scan, const ScanVerdict& verdict);
+  /// Waits for the results of the last scan. Throws IoError.
+  void finish();
   /// Final verdicts also go to `session`, which outlives this.
   void contribute_to(SessionContribution& session) { session_ = &session; }
 
@@ -114,7 +131,7 @@ class RunResults {
  private:
   const Recording& recording_;
   ScanRange range_;
-  LabelWriter final_labels_;
+  LabelFiles final_labels_;
   std::optional<LabelWriter> online_labels_;
   std::optional<CleanWriter> clean_scans_;
   PointFileWriter dynamic_points_;
@@ -129,6 +146,10 @@ class RunResults {
   std::size_t finished_ = 0;
   std::uint64_t points_ = 0;
   LabelCounts labels_;
+  JudgedScan judged_;  // the writing thread's, while writing_ is valid
+  std::future<void> writing_;
+
+  void write_final(const RecordedScan& scan, const ScanVerdict& verdict);
 };
 
 }  // namespace dynains::program

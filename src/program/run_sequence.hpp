@@ -57,6 +57,7 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
     writing += ms_since(begin_writing);
   });
   timing.flush = ms_since(begin) - writing;
+  results.finish();
   timing.pipeline = timing.flush;
   for (const TimingRow& row : timing.rows) timing.pipeline += row.total;
   if (results.map_points()) {

@@ -65,8 +65,10 @@ struct FreeSpaceConfig {
                       "later scans that are used before a verdict is final"});
     visitor(Parameter{"lookback_scans", self.lookback_scans, closed(0, 200), "scans",
                       "earlier scans that are used as evidence"});
-    visitor(Parameter{"reference_step", self.reference_step, closed(1, 10), "scans",
-                      "distance between two reference scans, which give evidence on other scans"});
+    visitor(
+        Parameter{"reference_step", self.reference_step, closed(1, 10), "scans",
+                  "distance between two reference scans, which give evidence on other scans; about "
+                  "10 for those more than 30 scans back"});
     visitor(Parameter{"evidence_range", self.evidence_range, closed(5, 300), "m",
                       "points at a larger horizontal range are not tested for free space"});
     visitor(Parameter{"supervoxel", self.supervoxel, closed(0.1, 5), "m",
