@@ -15,7 +15,7 @@ namespace {
 // array is the number of its bytes, the bytes, and zeros up to a whole word. Numbers have the byte
 // order of the machine, which the version tells.
 constexpr std::uint64_t kMagic = 0x4B4E5543594E5944U;
-constexpr std::uint64_t kVersion = 2;
+constexpr std::uint64_t kVersion = 3;
 constexpr std::size_t kWord = 8;
 constexpr std::uint64_t kHeader = 5 * kWord;
 constexpr std::uint64_t kTrailer = 2 * kWord;
@@ -66,6 +66,46 @@ void ChunkScan::take(const ScanVerdict& verdict, bool with_beliefs) {
   if (with_beliefs) beliefs.assign(verdict.beliefs.begin(), verdict.beliefs.end());
 }
 
+void VerdictRuns::assign(const ChunkScan& scan) {
+  ends.clear();
+  instances.clear();
+  labels.clear();
+  causes.clear();
+  const std::size_t count = scan.labels.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool continues = i + 1 < count && scan.instances[i + 1] == scan.instances[i] &&
+                           scan.causes[i + 1] == scan.causes[i] &&
+                           scan.labels[i + 1] == scan.labels[i];
+    if (continues) continue;
+    ends.push_back(static_cast<std::uint32_t>(i + 1));
+    instances.push_back(scan.instances[i]);
+    labels.push_back(scan.labels[i]);
+    causes.push_back(scan.causes[i]);
+  }
+}
+
+bool VerdictRuns::expand(ChunkScan& scan) const {
+  constexpr std::uint32_t kMostPoints = std::uint32_t{1} << 26U;
+  const std::size_t count = ends.size();
+  const std::size_t points = count > 0 ? ends.back() : 0;
+  if (instances.size() != count || labels.size() != count || causes.size() != count ||
+      points > kMostPoints || !std::is_sorted(ends.begin(), ends.end())) {
+    return false;
+  }
+  scan.instances.resize(points);
+  scan.labels.resize(points);
+  scan.causes.resize(points);
+  std::uint32_t begin = 0;
+  for (std::size_t run = 0; run < count; ++run) {
+    const std::size_t length = ends[run] - begin;
+    std::fill_n(scan.instances.begin() + begin, length, instances[run]);
+    std::fill_n(scan.labels.begin() + begin, length, labels[run]);
+    std::fill_n(scan.causes.begin() + begin, length, causes[run]);
+    begin = ends[run];
+  }
+  return true;
+}
+
 ChunkFileWriter::ChunkFileWriter(const std::filesystem::path& file, const ChunkKey& key)
     : file_(file) {
   for (const std::uint64_t number : {kMagic, kVersion, key.request, key.first, key.scans}) {
@@ -98,9 +138,11 @@ void ChunkFileWriter::put_number(std::uint64_t value) { write(&value, sizeof(val
 
 void ChunkFileWriter::add(const ChunkScan& scan) {
   put<const MovingPoint>(scan.moving);
-  put<const PointLabel>(scan.labels);
-  put<const Cause>(scan.causes);
-  put<const std::uint32_t>(scan.instances);
+  runs_.assign(scan);
+  put<const std::uint32_t>(runs_.ends);
+  put<const std::uint32_t>(runs_.instances);
+  put<const PointLabel>(runs_.labels);
+  put<const Cause>(runs_.causes);
   put<const float>(scan.beliefs);
   put<const PointLabel>(scan.online);
 }
@@ -217,7 +259,7 @@ void ChunkFileReader::get(std::vector<T>& values) {
 void ChunkFileReader::next(ChunkScan& scan, bool moving_only) {
   get(scan.moving);
   if (moving_only) {
-    constexpr int kOtherArrays = 5;
+    constexpr int kOtherArrays = 6;
     for (int i = 0; i < kOtherArrays; ++i) {
       const std::uint64_t size = get_number();
       if (size > size_) fail("has an array of " + std::to_string(size) + " bytes");
@@ -226,9 +268,11 @@ void ChunkFileReader::next(ChunkScan& scan, bool moving_only) {
     }
     return;
   }
-  get(scan.labels);
-  get(scan.causes);
-  get(scan.instances);
+  get(runs_.ends);
+  get(runs_.instances);
+  get(runs_.labels);
+  get(runs_.causes);
+  if (!runs_.expand(scan)) fail("has other runs of points");
   get(scan.beliefs);
   get(scan.online);
 }

@@ -11,6 +11,7 @@
 #include "instance_numbers.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
+#include "support/random.hpp"
 
 using namespace dynains;
 using namespace dynains::program;
@@ -210,6 +211,49 @@ TEST_CASE("without a shared scan all instances are new ones") {
   CHECK(numbers(1) == 21);
   CHECK(numbers(3) == 23);
   CHECK(numbers.last() == 23);
+}
+
+TEST_CASE("runs of points with one verdict expand to the verdicts of all points") {
+  Random random(5);
+  for (const std::size_t points : {0U, 1U, 2U, 500U}) {
+    ChunkScan scan;
+    for (std::size_t i = 0; i < points; ++i) {
+      const bool continues = i > 0 && random.index(4) != 0;
+      scan.labels.push_back(continues ? scan.labels.back()
+                                      : static_cast<PointLabel>(random.index(5)));
+      scan.causes.push_back(continues ? scan.causes.back()
+                                      : static_cast<Cause>(random.index(kCauseCount)));
+      scan.instances.push_back(continues ? scan.instances.back()
+                                         : static_cast<std::uint32_t>(random.index(3)));
+    }
+    VerdictRuns runs;
+    runs.assign(scan);
+    CHECK(runs.ends.size() <= points);
+    ChunkScan expanded = scan_of(7, 3);
+    REQUIRE(runs.expand(expanded));
+    CHECK(expanded.labels == scan.labels);
+    CHECK(expanded.causes == scan.causes);
+    CHECK(expanded.instances == scan.instances);
+  }
+}
+
+TEST_CASE("runs that do not fit together are refused") {
+  ChunkScan scan;
+  VerdictRuns runs;
+  runs.assign(scan_of(5, 3));
+  REQUIRE(runs.ends == Ids{5});
+  runs.causes.clear();
+  CHECK_FALSE(runs.expand(scan));
+  runs.assign(scan_of(5, 3));
+  runs.ends = {0xFFFFFFFF};
+  CHECK_FALSE(runs.expand(scan));
+  runs.ends = {5, 4};
+  runs.instances = {1, 2};
+  runs.labels.assign(2, PointLabel::kStatic);
+  runs.causes.assign(2, Cause::kOccupied);
+  CHECK_FALSE(runs.expand(scan));
+  runs.ends = {4, 5};
+  CHECK(runs.expand(scan));
 }
 
 TEST_CASE("the file of a chunk gives back what was written") {
