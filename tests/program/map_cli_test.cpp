@@ -1,4 +1,5 @@
 // `dynains run --update` and `dynains map`: a map of many sessions from the command line.
+#include <Eigen/Geometry>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -9,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "io/files.hpp"
 #include "program/start.hpp"
@@ -175,6 +177,47 @@ TEST_CASE("map: a run that is killed or interrupted leaves the map as it was") {
   for (const auto& entry : fs::directory_iterator(days.at("city"))) {
     CHECK(entry.path().filename().string().front() != '.');
   }
+}
+
+TEST_CASE("map: remap --update moves one session to corrected poses, as if it had been added so") {
+  const Days days;
+  REQUIRE(days.update(0, "city", "out0").code == 0);
+  REQUIRE(days.update(1, "city", "out1").code == 0);
+  const auto before = content_of(days.at("city"));
+  const auto remap = [&](const std::string& poses, const std::string& city,
+                         const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {
+        "remap",        days.at("day1"), days.at("out1"), "--poses",
+        days.at(poses), "--update",      days.at(city),   "-q"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return start(arguments);
+  };
+  // The poses of the run give the files of the run.
+  const Outcome same = remap("day1/poses.txt", "city");
+  CAPTURE(same.err);
+  REQUIRE(same.code == 0);
+  CHECK(content_of(days.at("city")) == before);
+
+  // Whole numbers of metres change no verdict, so that a run over the corrected poses is
+  // comparable.
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.translation() = Eigen::Vector3d(64.0, -32.0, 2.0);
+  const std::vector<Eigen::Isometry3d> poses(kScans, pose);
+  write_poses(days.at("corrected.txt"), poses);
+  REQUIRE(remap("corrected.txt", "city").code == 0);
+  REQUIRE(days.update(0, "expected", "out2").code == 0);
+  REQUIRE(days.update(1, "expected", "out3", {"--poses", days.at("corrected.txt")}).code == 0);
+  CHECK(content_of(days.at("city")) == content_of(days.at("expected")));
+  CHECK(content_of(days.at("city")) != before);
+  CHECK(content_of(days.at("city/day0")) == content_of(days.at("expected/day0")));
+  CHECK(start({"map", days.at("city"), "check"}).code == 0);
+
+  const auto after = content_of(days.at("city"));
+  CHECK(remap("corrected.txt", "city", {"--session", "day7"}).code == 2);
+  write_text(days.at("city/day1/note.txt"), "of another program");
+  CHECK(remap("day1/poses.txt", "city").code == 1);
+  fs::remove(days.at("city/day1/note.txt"));
+  CHECK(content_of(days.at("city")) == after);
 }
 
 TEST_CASE("map: a city is exported as tiles, the same bytes each time, and files of others stay") {
