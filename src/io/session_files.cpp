@@ -313,6 +313,51 @@ Eigen::Vector3d vector_field(const fs::path& path, const Json& json, const char*
   return result;
 }
 
+/// The upper three rows, row by row.
+Json json_of(const Eigen::Isometry3d& T) {
+  Json values = Json::array();
+  for (Eigen::Index row = 0; row < 3; ++row) {
+    for (Eigen::Index column = 0; column < 4; ++column) values.push_back(T(row, column));
+  }
+  return values;
+}
+
+Eigen::Isometry3d transform_field(const fs::path& path, const Json& json, const char* name) {
+  const auto values = field<Json>(path, json, name, &Json::is_array, "twelve numbers");
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  for (std::size_t i = 0; i < 12; ++i) {
+    if (values.size() != 12 || !values[i].is_number()) {
+      fail(path, std::string("/alignment/") + name + ": expected twelve numbers");
+    }
+    T(static_cast<Eigen::Index>(i / 4), static_cast<Eigen::Index>(i % 4)) = values[i].get<double>();
+  }
+  return T;
+}
+
+Json json_of(const SessionAlignment& alignment) {
+  return {{"T_city_session", json_of(alignment.T_city_session)},
+          {"T_city_start", json_of(alignment.T_city_start)},
+          {"residual", alignment.residual},
+          {"fitting", alignment.fitting},
+          {"uncertainty", alignment.uncertainty},
+          {"sessions", alignment.sessions}};
+}
+
+SessionAlignment alignment_of(const fs::path& path, const Json& json) {
+  if (!json.is_object()) fail(path, "/alignment: expected an object");
+  SessionAlignment alignment;
+  alignment.T_city_session = transform_field(path, json, "T_city_session");
+  alignment.T_city_start = transform_field(path, json, "T_city_start");
+  alignment.residual = number_field(path, json, "residual");
+  alignment.fitting = number_field(path, json, "fitting");
+  alignment.uncertainty = number_field(path, json, "uncertainty");
+  for (const Json& name : field<Json>(path, json, "sessions", &Json::is_array, "a list of names")) {
+    if (!name.is_string()) fail(path, "/alignment/sessions: expected a list of names");
+    alignment.sessions.push_back(name.get<std::string>());
+  }
+  return alignment;
+}
+
 std::string text_of(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
@@ -343,19 +388,20 @@ std::string session_text(const SessionInfo& session) {
   const auto vector = [](const Eigen::Vector3d& v) { return Json({v.x(), v.y(), v.z()}); };
   Json tiles = Json::array();
   for (const auto& [tile, count] : session.tiles) tiles.push_back({tile[0], tile[1], count});
-  return text_of(
-      {{"format", kSessionFormat},
-       {"format_version", kVersion},
-       {"begin", session.begin},
-       {"recording", session.recording},
-       {"fingerprint", session.fingerprint},
-       {"scans", session.scans},
-       {"points", session.points},
-       {"references", session.references},
-       {"lowest", vector(session.lowest)},
-       {"highest", vector(session.highest)},
-       {"tiles", tiles},
-       {"configuration", session.config.empty() ? Json() : Json::parse(session.config)}});
+  Json json = {{"format", kSessionFormat},
+               {"format_version", kVersion},
+               {"begin", session.begin},
+               {"recording", session.recording},
+               {"fingerprint", session.fingerprint},
+               {"scans", session.scans},
+               {"points", session.points},
+               {"references", session.references},
+               {"lowest", vector(session.lowest)},
+               {"highest", vector(session.highest)},
+               {"tiles", tiles},
+               {"configuration", session.config.empty() ? Json() : Json::parse(session.config)}};
+  if (session.alignment) json["alignment"] = json_of(*session.alignment);
+  return text_of(json);
 }
 
 SessionInfo read_session(const fs::path& path) {
@@ -377,6 +423,8 @@ SessionInfo read_session(const fs::path& path) {
     session.tiles[{tile[0].get<std::int32_t>(), tile[1].get<std::int32_t>()}] =
         tile[2].get<std::uint64_t>();
   }
+  const auto alignment = json.find("alignment");
+  if (alignment != json.end()) session.alignment = alignment_of(path, *alignment);
   const auto config = json.find("configuration");
   if (config != json.end() && !config->is_null()) session.config = config->dump();
   return session;

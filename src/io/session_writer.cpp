@@ -1,6 +1,10 @@
 #include "dynains/io/session_writer.hpp"
 
+#include <fcntl.h>
+
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
 #include <fstream>
 #include <limits>
 #include <string>
@@ -36,17 +40,31 @@ void remove_stale_staging(const fs::path& city) {
   }
 }
 
-void refuse_known_session(const City& city, const SessionInfo& session) {
-  if (fs::exists(fs::symlink_status(city.session_folder(session.name)))) {
-    throw UsageError(city.session_folder(session.name).string() +
+/// Throws unless the city can take the session.
+void check_session(const City& city, const SessionInfo& session, bool replaces) {
+  const fs::path folder = city.session_folder(session.name);
+  if (replaces) {
+    if (!fs::is_directory(fs::symlink_status(folder))) {
+      fail(city.folder(), "has no session \"" + session.name + "\" to replace");
+    }
+    const fs::path foreign = session_files::foreign_entry(folder);
+    if (!foreign.empty()) fail(foreign, "is not part of the session, which stays as it is");
+  } else if (fs::exists(fs::symlink_status(folder))) {
+    throw UsageError(folder.string() +
                      ": exists; a session is added once. Drop it first, or choose another name");
   }
   if (session.fingerprint.empty()) return;
   for (const SessionInfo& other : city.sessions()) {
-    if (other.fingerprint != session.fingerprint) continue;
+    if (other.fingerprint != session.fingerprint || other.name == session.name) continue;
     throw UsageError(city.session_folder(other.name).string() +
                      ": is a session of the same scans, poses and times already");
   }
+}
+
+/// Exchanges two folders in one step.
+void exchange(const fs::path& a, const fs::path& b) {
+  if (::renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) == 0) return;
+  fail_by_system(b, "cannot be replaced in one step; drop the session and add it again", errno);
 }
 
 void check_stream(std::ofstream& file, const fs::path& path) {
@@ -87,15 +105,20 @@ class SessionWriter::Files {
   void write_tile(const TileIndex& tile, const std::string& bytes) {
     write_file(folder_ / session_files::kTileFolder / session_files::tile_name(tile), bytes);
   }
-  void commit(const fs::path& target, const std::string& session_text) {
+  void commit(const fs::path& target, const std::string& session_text, bool replaces) {
     check_stream(references_, reference_path());
     references_.close();
     write_file(folder_ / session_files::kSessionFile, session_text);
     sync_files(folder_);
-    std::error_code error;
-    fs::rename(folder_, target, error);
-    if (error) fail_by_system(target, "cannot be put in place", error.value());
-    is_committed_ = true;
+    if (replaces) {
+      // The staging folder has the earlier session then, which the destructor removes.
+      exchange(folder_, target);
+    } else {
+      std::error_code error;
+      fs::rename(folder_, target, error);
+      if (error) fail_by_system(target, "cannot be put in place", error.value());
+      is_committed_ = true;
+    }
     sync_files(target);
   }
 
@@ -115,9 +138,10 @@ class SessionWriter::Files {
 
 SessionWriter::SessionWriter(const City& city, SessionInfo session,
                              const SessionPointsConfig& points,
-                             const SessionReferencesConfig& references)
+                             const SessionReferencesConfig& references, Mode mode)
     : city_(city),
       session_(std::move(session)),
+      mode_(mode),
       points_(city.grid(), points),
       references_(references) {
   if (!is_session_name(session_.name)) {
@@ -126,7 +150,7 @@ SessionWriter::SessionWriter(const City& city, SessionInfo session,
                       "letter, a digit or '_'");
   }
   session_files::check_config_text(session_.config);
-  refuse_known_session(city_, session_);
+  check_session(city_, session_, mode_ == Mode::kReplace);
   {
     const FolderLock lock = session_files::lock_city(city_.folder());
     remove_stale_staging(city_.folder());
@@ -169,8 +193,9 @@ void SessionWriter::commit() {
   if (session_.points == 0) session_.lowest = session_.highest = Eigen::Vector3d::Zero();
   const std::string text = session_files::session_text(session_);
   const FolderLock lock = session_files::lock_city(city_.folder());
-  refuse_known_session(city_, session_);
-  files_->commit(city_.session_folder(session_.name), text);
+  const bool replaces = mode_ == Mode::kReplace;
+  check_session(city_, session_, replaces);
+  files_->commit(city_.session_folder(session_.name), text, replaces);
 }
 
 }  // namespace dynains

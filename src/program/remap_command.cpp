@@ -21,6 +21,7 @@
 #include "output_folder.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
+#include "repose_session.hpp"
 #include "run_plan.hpp"
 #include "run_request.hpp"
 
@@ -40,6 +41,8 @@ struct RemapOptions {
   RecordingFlags sequence;
   std::string run;
   std::string map;
+  std::string update;               // folder of a map of many sessions; empty: none
+  std::string session;              // its name there; empty: that of the run
   std::optional<double> map_voxel;  // m
   bool force = false;
   bool quiet = false;
@@ -230,6 +233,17 @@ void remap(const RemapOptions& options) {
   const StaticMapAccumulator map =
       build_map(corrected, original ? *original : corrected, scans, out.path() / "labels",
                 options.map_voxel.value_or(run.map_voxel), options.quiet);
+  if (!options.update.empty()) {
+    const auto name = Json::json_pointer("/request/session");
+    const bool has_name = run.report.contains(name) && run.report[name].is_string();
+    if (options.session.empty() && !has_name) {
+      throw ConfigError("the run has added no session; name one by --session");
+    }
+    repose_session({whole_path(options.update),
+                    options.session.empty() ? run.report[name].get<std::string>() : options.session,
+                    out.path(), pose_fingerprint(corrected, range), scans},
+                   original ? *original : corrected, corrected);
+  }
   file.write(map, run.report,
              {{"file", kRemappedMap},
               {"points", map.size()},
@@ -257,6 +271,13 @@ void add_remap_command(CLI::App& app) {
       .add_option("--map-voxel", options->map_voxel,
                   "resolution of the static map; 0 keeps all points [of the run]")
       ->type_name("M");
+  command
+      .add_option("--update", options->update,
+                  "also replaces the session of the run in this map of many sessions: its points "
+                  "and references move to the corrected poses")
+      ->type_name("CITY");
+  command.add_option("--session", options->session, "name of the session in --update [of the run]")
+      ->type_name("NAME");
   command.add_flag("--force", options->force, "replace the file of --map if it exists");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   command.footer(

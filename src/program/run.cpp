@@ -134,9 +134,12 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   warn_of_doubts(plan, settings, listener, agreement);
 
   std::optional<SessionContribution> session;
+  std::optional<SessionAlignment> alignment;
   // A run that is resumed may have added its session already.
   if (!plan.session.city.empty() && !(settings.resume && plan.session.is_fulfilled())) {
-    session.emplace(plan.session);
+    const SessionRequest request = aligned(plan.session, plan.sequence, plan.range);
+    alignment = request.info.alignment;
+    session.emplace(request);
   }
 
   const InterruptGuard interrupt(listener.second_signal);
@@ -150,6 +153,7 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   if (session) results.contribute_to(*session);
   const RunTiming timing = process(plan, listener, outputs.folder, results);
   RunOutcome outcome = outcome_of(plan, results, timing);
+  outcome.alignment = alignment;
   if (!outcome.complete) outcome.signal = InterruptGuard::signal();
   if (change.is_staged() && !outcome.complete) {
     outcome.earlier_results_stay = true;

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "dynains/io/recording.hpp"
+#include "dynains/io/session_alignment.hpp"
 #include "interrupt.hpp"
 #include "run_report.hpp"
 #include "run_results.hpp"
@@ -37,7 +38,8 @@ struct RunOutcome {
   Statistics time;  ///< ms per scan
   WallTime wall;
   std::size_t jobs = 1;
-  std::filesystem::path page;  ///< empty: none was asked for
+  std::optional<SessionAlignment> alignment;  ///< of the session in a map of many sessions
+  std::filesystem::path page;                 ///< empty: none was asked for
 };
 
 /// Runs over a recording. SIGINT and SIGTERM end the run after the scan at hand: a new folder then

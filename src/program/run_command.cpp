@@ -1,3 +1,5 @@
+#include <Eigen/Geometry>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <iomanip>
@@ -55,11 +57,23 @@ void print_results(const RunOutcome& run) {
             << "\nreport: " << (outputs.folder / "report.json").string() << std::endl;
 }
 
+void print_alignment(const SessionAlignment& alignment) {
+  const Eigen::Isometry3d& T = alignment.T_city_session;
+  const Eigen::Vector3d t = T.translation();
+  std::cout << std::fixed << std::setprecision(3) << "aligned with " << alignment.sessions.size()
+            << (alignment.sessions.size() == 1 ? " session" : " sessions") << ": moved by ("
+            << t.x() << ", " << t.y() << ", " << t.z() << ") m and "
+            << Eigen::AngleAxisd(T.linear()).angle() * 180.0 / M_PI << " degrees; residual "
+            << alignment.residual << " m, " << std::setprecision(1) << 100.0 * alignment.fitting
+            << " % of points at upright surfaces fit" << std::endl;
+}
+
 void print_summary(const RunOutcome& run) {
   if (run.was_complete_before) {
     std::cout << run.outputs.folder.string() << ": complete already" << std::endl;
   } else {
     print_results(run);
+    if (run.alignment) print_alignment(*run.alignment);
   }
   if (!run.page.empty()) std::cout << "page: " << run.page.string() << std::endl;
 }
@@ -173,6 +187,18 @@ void add_run_command(CLI::App& app) {
       .add_option("--session-begin", options->session_begin,
                   "time by which sessions are ordered [time of the first scan]")
       ->type_name("S")
+      ->group(kOutputs);
+  command
+      .add_flag("--align", options->align,
+                "moves the session into the frame of the map in --update: registers scans to its "
+                "points from a start that is within 2 m and 5 degrees; ends with exit code 2 "
+                "before anything is written if they do not fit")
+      ->group(kOutputs);
+  command
+      .add_option("--align-start", options->align_start,
+                  "start of --align, pose of the session's frame in that of the map: \"x y z qx qy "
+                  "qz qw\", 12 or 16 numbers of a matrix, or a file [identity]")
+      ->type_name("T")
       ->group(kOutputs);
   const auto add_output = [&](const char* flag, bool& value, const char* help) {
     command.add_flag(flag, value, help)->group(kOutputs);

@@ -7,6 +7,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/io/coordinate_system.hpp"
+#include "dynains/io/extrinsic.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/pose.hpp"
@@ -168,9 +169,13 @@ SessionRequest session_request(const RunSettings& settings, const Recording& seq
                                const ScanRange& range,
                                const nlohmann::ordered_json& configuration) {
   SessionRequest request;
+  if (!settings.align_start.empty() && !settings.align) {
+    throw ConfigError("--align-start needs --align");
+  }
   if (settings.update.empty()) {
     if (!settings.session.empty()) throw ConfigError("--session needs --update CITY");
     if (settings.session_begin) throw ConfigError("--session-begin needs --update CITY");
+    if (settings.align) throw ConfigError("--align needs --update CITY");
     return request;
   }
   request.city = whole_path(settings.update);
@@ -191,6 +196,10 @@ SessionRequest session_request(const RunSettings& settings, const Recording& seq
   request.info.recording = settings.recording;
   request.info.fingerprint = pose_fingerprint(sequence, range);
   request.info.config = configuration.dump();
+  if (settings.align) {
+    request.T_city_start = settings.align_start.empty() ? Eigen::Isometry3d::Identity()
+                                                        : read_extrinsic(settings.align_start);
+  }
   return request;
 }
 
@@ -254,6 +263,7 @@ RunPlan make_plan(const RunSettings& settings, Recording sequence) {
   if (!session.city.empty()) {
     request["update"] = session.city.string();
     request["session"] = session.info.name;
+    if (session.T_city_start) request["align_start"] = extrinsic_text(*session.T_city_start);
   }
   Fingerprint fingerprint;
   fingerprint.add(request.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));

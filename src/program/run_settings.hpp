@@ -19,6 +19,8 @@ struct RunSettings {
   std::string update;                   ///< folder of a map of many sessions; empty: none
   std::string session;                  ///< name there; empty: that of the recording
   std::optional<double> session_begin;  ///< s; none: time of the first scan
+  bool align = false;                   ///< moves the session into the frame of `update`
+  std::string align_start;              ///< as of read_extrinsic(); empty: identity
   bool map_attributes = false;
   std::string crs;  ///< of a LAS map, for example "EPSG:25832"; empty: none
   ScanWindow window;

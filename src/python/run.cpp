@@ -57,7 +57,7 @@ void set_count(RunArguments& run, const py::handle& value) {
   run.settings.*Field = to_whole_number(value, kLeast, std::numeric_limits<std::int32_t>::max());
 }
 
-const std::array<RunSetting, 23> kRunSettings{{
+const std::array<RunSetting, 25> kRunSettings{{
     {"preset", "'default', 'offline' or 'paper'", "parameters to start from",
      [](RunArguments& run, const py::handle& value) {
        const auto& names = program::preset_names();
@@ -105,6 +105,13 @@ const std::array<RunSetting, 23> kRunSettings{{
      [](RunArguments& run, const py::handle& value) {
        constexpr double kMost = std::numeric_limits<double>::max();
        if (!value.is_none()) run.settings.session_begin = to_number(value, -kMost, kMost);
+     }},
+    {"align", "bool", "moves the session into the frame of the map in update",
+     &set_flag<&RunSettings::align>},
+    {"align_start", "str, 'x y z qx qy qz qw' or a path",
+     "start of align, pose of the session's frame in that of the map; default: identity",
+     [](RunArguments& run, const py::handle& value) {
+       if (!value.is_none()) run.settings.align_start = value.cast<std::string>();
      }},
     {"jobs", "int from 1 on", "threads that process chunks of the recording; changes no result",
      &set_count<&RunSettings::jobs, 1>},

@@ -1,12 +1,16 @@
 // `dynains run --update` and `dynains map`: a map of many sessions from the command line.
+#include <Eigen/Geometry>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "io/files.hpp"
 #include "program/start.hpp"
@@ -175,6 +179,47 @@ TEST_CASE("map: a run that is killed or interrupted leaves the map as it was") {
   }
 }
 
+TEST_CASE("map: remap --update moves one session to corrected poses, as if it had been added so") {
+  const Days days;
+  REQUIRE(days.update(0, "city", "out0").code == 0);
+  REQUIRE(days.update(1, "city", "out1").code == 0);
+  const auto before = content_of(days.at("city"));
+  const auto remap = [&](const std::string& poses, const std::string& city,
+                         const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {
+        "remap",        days.at("day1"), days.at("out1"), "--poses",
+        days.at(poses), "--update",      days.at(city),   "-q"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return start(arguments);
+  };
+  // The poses of the run give the files of the run.
+  const Outcome same = remap("day1/poses.txt", "city");
+  CAPTURE(same.err);
+  REQUIRE(same.code == 0);
+  CHECK(content_of(days.at("city")) == before);
+
+  // Whole numbers of metres change no verdict, so that a run over the corrected poses is
+  // comparable.
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.translation() = Eigen::Vector3d(64.0, -32.0, 2.0);
+  const std::vector<Eigen::Isometry3d> poses(kScans, pose);
+  write_poses(days.at("corrected.txt"), poses);
+  REQUIRE(remap("corrected.txt", "city").code == 0);
+  REQUIRE(days.update(0, "expected", "out2").code == 0);
+  REQUIRE(days.update(1, "expected", "out3", {"--poses", days.at("corrected.txt")}).code == 0);
+  CHECK(content_of(days.at("city")) == content_of(days.at("expected")));
+  CHECK(content_of(days.at("city")) != before);
+  CHECK(content_of(days.at("city/day0")) == content_of(days.at("expected/day0")));
+  CHECK(start({"map", days.at("city"), "check"}).code == 0);
+
+  const auto after = content_of(days.at("city"));
+  CHECK(remap("corrected.txt", "city", {"--session", "day7"}).code == 2);
+  write_text(days.at("city/day1/note.txt"), "of another program");
+  CHECK(remap("day1/poses.txt", "city").code == 1);
+  fs::remove(days.at("city/day1/note.txt"));
+  CHECK(content_of(days.at("city")) == after);
+}
+
 TEST_CASE("map: a city is exported as tiles, the same bytes each time, and files of others stay") {
   const Days days;
   REQUIRE(days.update(0, "city", "out").code == 0);
@@ -217,4 +262,67 @@ TEST_CASE("map: a city is exported as tiles, the same bytes each time, and files
   const Outcome served = start({"view", days.at("city"), "--serve"});
   CHECK(served.code == 1);
   CHECK_THAT(served.err, ContainsSubstring("write its tiles first: dynains map"));
+}
+
+TEST_CASE("map: a session of a slightly different frame is aligned, or refused before anything") {
+  const TemporaryFolder folder;
+  const auto at = [&](const std::string& name) { return (folder / name).string(); };
+  for (const std::string day : {"1", "2"}) {
+    REQUIRE(start({"simulate", at("day" + day), "--scene", "urban", "--sensor", "vlp16", "--scans",
+                   "150", "--seed", "22", "--day", day, "-q"})
+                .code == 0);
+  }
+  const auto update = [&](const std::string& day, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"run",      at(day),   "--out", at("out-" + day),
+                                          "--update", at("city")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  };
+  const auto is_refused = [&](const std::vector<std::string>& arguments, const std::string& why) {
+    const Outcome outcome = start(arguments);
+    CHECK(outcome.code == 2);
+    CHECK_THAT(outcome.err, ContainsSubstring(why));
+    CHECK_FALSE(fs::exists(at("out-day2/labels")));
+  };
+  is_refused(update("day2", {"--align"}), "no map to align with");
+  CHECK_FALSE(fs::exists(at("city")));
+  is_refused(update("day2", {"--align-start", "0 0 0 0 0 0 1"}), "--align-start needs --align");
+  REQUIRE(start(update("day1", {"-q"})).code == 0);
+  const auto before = content_of(at("city"));
+  is_refused(update("day2", {"--align", "--align-start", "9 1 0 0 0 0 1"}), "cannot be aligned");
+  CHECK(content_of(at("city")) == before);
+
+  // 1.5 m from the truth, which is the identity.
+  const std::vector<std::string> align = {"--align", "--align-start", "1.2 -0.9 0.1 0 0 0 1"};
+  {
+    Process process(update("day2", align));
+    for (int i = 0; i < 3000 && !fs::exists(at("out-day2/labels/000000.label")); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    ::kill(process.id(), SIGKILL);
+    CHECK(process.wait().code == 128 + SIGKILL);
+    const Outcome list = start({"map", at("city"), "list"});
+    CHECK_THAT(list.out, ContainsSubstring("day1") && !ContainsSubstring("day2"));
+    fs::remove_all(at("out-day2"));
+  }
+  const Outcome aligned = start(update("day2", align));
+  CAPTURE(aligned.err);
+  REQUIRE(aligned.code == 0);
+  CHECK_THAT(aligned.out, ContainsSubstring("aligned with 1 session: moved by"));
+  const auto session = nlohmann::json::parse(read_text(at("city/day2/session.json")));
+  const auto T = session["alignment"]["T_city_session"].get<std::vector<double>>();
+  REQUIRE(T.size() == 12);
+  for (std::size_t i = 0; i < 12; ++i) {
+    CHECK(std::abs(T[i] - (i == 0 || i == 5 || i == 10 ? 1.0 : 0.0)) < (i % 4 == 3 ? 0.05 : 1e-3));
+  }
+  CHECK(session["alignment"]["sessions"] == nlohmann::json({"day1"}));
+  CHECK(start({"map", at("city"), "check"}).code == 0);
+  const Outcome again = start(update("day2", {"--resume", align[0], align[1], align[2]}));
+  CHECK_THAT(again.out, ContainsSubstring("complete already"));
+
+  const auto first = content_of(at("city/day2"));
+  REQUIRE(start({"map", at("city"), "drop", "day2"}).code == 0);
+  REQUIRE(start(update("day2", {"--force", "--jobs", "1", align[0], align[1], align[2]})).code ==
+          0);
+  CHECK(content_of(at("city/day2")) == first);
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "dynains/evidence/session_references.hpp"
+#include "dynains/io/session_alignment.hpp"
 #include "dynains/map/session_points.hpp"
 
 namespace dynains {
@@ -27,6 +28,8 @@ struct SessionInfo {
   std::map<TileIndex, std::uint64_t> tiles;           ///< number of points by tile
   Eigen::Vector3d lowest = Eigen::Vector3d::Zero();   ///< m, world frame, of its points
   Eigen::Vector3d highest = Eigen::Vector3d::Zero();  ///< m, world frame, of its points
+  /// How its poses were moved into the frame of the map; empty: they were taken as they are.
+  std::optional<SessionAlignment> alignment;
 };
 
 /// Whether `name` can name a session.

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <utility>
 
 #include "dynains/evidence/session_references.hpp"
 #include "dynains/io/city.hpp"
@@ -19,11 +20,18 @@ namespace dynains {
 /// is removed by the next writer. References go to the disk as they come; points stay in memory.
 class SessionWriter {
  public:
+  enum class Mode {
+    kNew,      ///< the city has no session of this name
+    kReplace,  ///< the city has one; commit() puts this one in its place in one step
+  };
+
   /// `session`: name, begin, recording, fingerprint and config; the rest is counted here. Throws
   /// ConfigError for an invalid name or config, UsageError if the city has a session of this name
   /// or of this fingerprint, IoError if the city is not writable.
   SessionWriter(const City& city, SessionInfo session, const SessionPointsConfig& points = {},
-                const SessionReferencesConfig& references = {});
+                const SessionReferencesConfig& references = {}, Mode mode = Mode::kNew);
+  SessionWriter(const City& city, SessionInfo session, Mode mode)
+      : SessionWriter(city, std::move(session), {}, {}, mode) {}
   ~SessionWriter();
   SessionWriter(const SessionWriter&) = delete;
   SessionWriter& operator=(const SessionWriter&) = delete;
@@ -34,7 +42,8 @@ class SessionWriter {
            const Eigen::Isometry3d& T_world_sensor, std::uint32_t scan);
 
   /// Puts the session in place, on the disk. Throws IoError or UsageError; the city is then
-  /// unchanged.
+  /// unchanged. A session that is replaced must not hold foreign files; its file system must be
+  /// able to exchange two folders.
   void commit();
 
  private:
@@ -42,6 +51,7 @@ class SessionWriter {
 
   City city_;
   SessionInfo session_;
+  Mode mode_;
   SessionPoints points_;
   SessionReferences references_;
   std::unique_ptr<Files> files_;

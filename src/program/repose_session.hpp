@@ -1,0 +1,28 @@
+// A session of a map of many sessions under corrected poses.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "dynains/io/recording.hpp"
+
+namespace dynains::program {
+
+/// What replaces a session.
+struct ReposedSession {
+  std::filesystem::path city;
+  std::string name;
+  std::filesystem::path run;       ///< folder of the finished run, for its verdicts
+  std::string fingerprint;         ///< of the corrected poses
+  std::vector<std::size_t> scans;  ///< of the run, indices in the recordings
+};
+
+/// Replaces a session by the verdicts of a run at the poses of `corrected`. Begin, recording and
+/// configuration stay; an alignment ends: the poses are those of the map. Until the end, and after
+/// any error or signal, the map is as it was. `points`: the recording as the run read it. Throws
+/// ConfigError, IoError, UsageError, Interrupted.
+void repose_session(const ReposedSession& request, const Recording& points,
+                    const Recording& corrected);
+
+}  // namespace dynains::program
