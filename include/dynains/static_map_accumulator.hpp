@@ -109,7 +109,10 @@ class StaticMapAccumulator {
   /// Calls `visit(Eigen::Vector3d)` for every point (m, world frame).
   template <class Visitor>
   void for_each(Visitor&& visit) const {
-    for (std::uint32_t block = 0; block < blocks_.size(); ++block) visit_block(block, visit);
+    for (std::uint32_t block = 0; block < blocks_.size(); ++block) {
+      prefetch_points_after(block);
+      visit_block(block, visit);
+    }
   }
 
   /// Calls `visit(Eigen::Vector3d)` for every point (m, world frame) inside `box` (m, world frame,
@@ -370,6 +373,19 @@ class StaticMapAccumulator {
     }
     ++size_;
     return index;
+  }
+
+  // Prefetches the first points of a later block, and the next ones of nearer blocks.
+  void prefetch_points_after(std::uint32_t block) const {
+    constexpr std::uint32_t kDepth = 4;     // points of a block
+    constexpr std::uint32_t kDistance = 4;  // blocks
+    for (std::uint32_t depth = 0; depth < kDepth; ++depth) {
+      const std::uint32_t later = block + (kDepth - depth) * kDistance;
+      if (later >= blocks_.size()) continue;
+      std::uint32_t point = blocks_[later].data.first;
+      for (std::uint32_t k = 0; k < depth && point != kNone; ++k) point = points_[point].next;
+      if (point != kNone) __builtin_prefetch(&points_[point]);
+    }
   }
 
   template <class Visitor>

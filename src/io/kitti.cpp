@@ -7,6 +7,7 @@
 #include "failure.hpp"
 #include "input_file.hpp"
 #include "kitti_files.hpp"
+#include "sequential_file.hpp"
 #include "text.hpp"
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
@@ -30,13 +31,7 @@ std::uintmax_t size_of(const fs::path& path) {
 /// Fills `values` from a file that must have exactly that size.
 template <class T>
 void read_all(const fs::path& path, std::vector<T>& values) {
-  std::ifstream file = open_input(path);
-  const auto bytes = static_cast<std::streamsize>(values.size() * sizeof(T));
-  file.read(reinterpret_cast<char*>(values.data()), bytes);
-  if (file.gcount() != bytes) {
-    fail_to_read(file, path, static_cast<std::uint64_t>(file.gcount()),
-                 static_cast<std::uint64_t>(bytes));
-  }
+  SequentialFile(path, values.size() * sizeof(T)).read(values.data(), values.size());
 }
 
 template <class T>
@@ -126,13 +121,17 @@ std::vector<std::uint32_t> KittiSequence::read_labels(std::size_t i) const {
   return dynains::read_labels(folder_ / "labels" / (name(i) + ".label"), point_count(i));
 }
 
-std::vector<std::uint32_t> read_labels(const fs::path& file, std::size_t count) {
+void check_labels(const fs::path& file, std::size_t count) {
   const std::uintmax_t size = size_of(file);
   if (size != count * sizeof(std::uint32_t)) {
     fail(file, "has " + std::to_string(size) + " bytes, expected " +
                    std::to_string(count * sizeof(std::uint32_t)) + " (uint32 for each of " +
                    std::to_string(count) + " points)");
   }
+}
+
+std::vector<std::uint32_t> read_labels(const fs::path& file, std::size_t count) {
+  check_labels(file, count);
   std::vector<std::uint32_t> labels(count);
   read_all(file, labels);
   return labels;

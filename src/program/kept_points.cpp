@@ -1,70 +1,136 @@
 #include "kept_points.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstdint>
+#include <limits>
+#include <optional>
 #include <string>
-#include <utility>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
+#include "dynains/points.hpp"
+#include "dynains/simd/pack_loops.hpp"
+#include "io/sequential_file.hpp"
 #include "labelled_sequence.hpp"
 
 namespace dynains::program {
 namespace {
 
-/// Copies the static points of `scan` to `kept`. `file`: the labels, for messages.
-void copy_static(const RecordedScan& scan, const std::vector<std::uint32_t>& labels,
-                 const std::filesystem::path& file, PointBuffer& kept) {
-  kept.grow(labels.size());
-  std::size_t count = 0;
-  bool is_finite = true;
-  for (std::size_t i = 0; i < labels.size(); ++i) {
-    const float* const p = scan.xyzi.data() + 4 * i;
-    const bool is_static = run_class(labels[i], i, file) == kRunStatic;
-    kept.x[count] = p[0];
-    kept.y[count] = p[1];
-    kept.z[count] = p[2];
-    count += is_static ? 1 : 0;
-    is_finite = is_finite && (!is_static || std::isfinite(p[0] + p[1] + p[2]));
+/// Consecutive points of a scan, few enough for the fastest cache.
+struct Block {
+  static constexpr std::size_t kCapacity = 4096;
+
+  std::array<float, kCapacity> x, y, z;        // m, sensor frame; 0 for points that are not static
+  std::array<std::uint8_t, kCapacity> keep{};  // 1 for static points
+
+  PointsView points(std::size_t count) const {
+    return {{x.data(), count}, {y.data(), count}, {z.data(), count}};
   }
-  if (!is_finite) {
-    throw IoError(file.string() +
-                  ": has static points whose coordinates are not finite; expected labels of a run "
-                  "over these scans");
-  }
-  kept.resize(count);
+};
+
+struct Faults {
+  bool has_foreign_class = false;
+  bool has_infinite_point = false;
+};
+
+/// Fills `block` with `count` points. No branch depends on a point.
+Faults fill(const float* xyzi, const std::uint32_t* labels, std::size_t count, Block& block) {
+  std::uint32_t foreign = 0;
+  std::uint32_t infinite = 0;
+  detail::run_max_packs([&](auto) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint32_t id = labels[i] & 0xffffU;
+      const std::uint32_t kept = id == kRunStatic ? 1 : 0;
+      const std::uint32_t other = id == kRunMoving || id == kRunNotJudged ? 1 : 0;
+      foreign |= (kept | other) ^ 1U;
+      block.keep[i] = static_cast<std::uint8_t>(kept);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const float x = xyzi[4 * i];
+      const float y = xyzi[4 * i + 1];
+      const float z = xyzi[4 * i + 2];
+      const bool is_kept = block.keep[i] != 0;
+      block.x[i] = is_kept ? x : 0.0F;
+      block.y[i] = is_kept ? y : 0.0F;
+      block.z[i] = is_kept ? z : 0.0F;
+    }
+    constexpr float kMost = std::numeric_limits<float>::max();
+    for (std::size_t i = 0; i < count; ++i) {
+      infinite |= std::abs(block.x[i]) <= kMost ? 0U : 1U;
+      infinite |= std::abs(block.y[i]) <= kMost ? 0U : 1U;
+      infinite |= std::abs(block.z[i]) <= kMost ? 0U : 1U;
+    }
+  });
+  return {foreign != 0, infinite != 0};
 }
+
+/// The points of a scan, from the first to the last one. Points that a file holds as they are used
+/// are read block by block, so that they stay in the cache.
+class ScanPoints {
+ public:
+  /// `scan`: memory for points that need a conversion.
+  ScanPoints(const Recording& recording, std::size_t i, RecordedScan& scan) {
+    if (recording.format() == ScanFormat::kBin && recording.frame() == PointFrame::kSensor &&
+        !recording.is_deskewed()) {
+      size_ = count_scan_points(recording.file(i));
+      file_.emplace(recording.file(i), kValues * size_ * sizeof(float));
+      block_.resize(kValues * Block::kCapacity);
+      return;
+    }
+    recording.read_scan(i, scan);
+    size_ = scan.size();
+    rest_ = scan.xyzi.data();
+  }
+
+  std::size_t size() const { return size_; }
+
+  /// x y z intensity of the next `count` points, at most Block::kCapacity; valid until the next
+  /// call.
+  const float* next(std::size_t count) {
+    if (file_) {
+      file_->read(block_.data(), kValues * count);
+      return block_.data();
+    }
+    const float* const points = rest_;
+    rest_ += kValues * count;
+    return points;
+  }
+
+ private:
+  static constexpr std::size_t kValues = 4;  // of a point
+
+  std::size_t size_ = 0;
+  std::optional<SequentialFile> file_;
+  std::vector<float> block_;
+  const float* rest_ = nullptr;
+};
 
 }  // namespace
 
-KeptPoints::KeptPoints(const Recording& recording, std::filesystem::path labels,
-                       std::vector<std::size_t> scans)
-    : recording_(recording), labels_(std::move(labels)), scans_(std::move(scans)) {
-  constexpr std::size_t kAhead = 3;
-  for (std::size_t i = 0; i < kAhead; ++i) launch({});
-}
-
-const PointBuffer& KeptPoints::next() {
-  Slot spare = std::move(current_);
-  current_ = pending_.front().get();
-  pending_.pop_front();
-  launch(std::move(spare));
-  return current_.kept;
-}
-
-void KeptPoints::launch(Slot slot) {
-  if (launched_ == scans_.size()) return;
-  const std::size_t i = scans_[launched_++];
-  pending_.push_back(std::async(std::launch::async, [this, i, reused = std::move(slot)]() mutable {
-    read(i, reused);
-    return std::move(reused);
-  }));
-}
-
-void KeptPoints::read(std::size_t i, Slot& slot) const {
-  recording_.read_scan(i, slot.scan);
+void KeptPoints::insert_into(StaticMapAccumulator& map, std::size_t i,
+                             const Eigen::Isometry3d& T_world_sensor) {
+  ScanPoints points(recording_, i, scan_);
   const std::filesystem::path file = labels_ / (recording_.name(i) + ".label");
-  copy_static(slot.scan, read_labels(file, slot.scan.size()), file, slot.kept);
+  check_labels(file, points.size());
+  SequentialFile labels(file, points.size() * sizeof(std::uint32_t));
+  label_block_.resize(Block::kCapacity);
+
+  Block block;
+  for (std::size_t begin = 0; begin < points.size(); begin += Block::kCapacity) {
+    const std::size_t count = std::min(Block::kCapacity, points.size() - begin);
+    labels.read(label_block_.data(), count);
+    const Faults faults = fill(points.next(count), label_block_.data(), count, block);
+    if (faults.has_foreign_class) {
+      for (std::size_t k = 0; k < count; ++k) run_class(label_block_[k], begin + k, file);
+    }
+    if (faults.has_infinite_point) {
+      throw IoError(file.string() +
+                    ": has static points whose coordinates are not finite; expected labels of a "
+                    "run over these scans");
+    }
+    map.insert(block.points(count), {block.keep.data(), count}, T_world_sensor);
+  }
 }
 
 }  // namespace dynains::program

@@ -1,43 +1,36 @@
 // Points of recorded scans that a finished run labelled static.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstddef>
-#include <deque>
+#include <cstdint>
 #include <filesystem>
-#include <future>
+#include <utility>
 #include <vector>
 
 #include "dynains/io/recording.hpp"
-#include "dynains/points.hpp"
+#include "dynains/static_map_accumulator.hpp"
 
 namespace dynains::program {
 
-/// Reads scans and their labels ahead, in a few threads, and gives the static points scan by scan.
+/// Reads scans and their labels, and inserts the static points into a map.
 class KeptPoints {
  public:
-  /// `scans`: indices in a recording that outlives this. `labels`: folder of the label files.
-  KeptPoints(const Recording& recording, std::filesystem::path labels,
-             std::vector<std::size_t> scans);
+  /// `recording` outlives this. `labels`: folder of the label files.
+  KeptPoints(const Recording& recording, std::filesystem::path labels)
+      : recording_(recording), labels_(std::move(labels)) {}
 
-  /// The static points of the next scan, m, sensor frame, in the order of the file. To be called
-  /// once for each scan; valid until the next call. Throws IoError for files that cannot be read,
-  /// labels of other scans, and labels that no run writes.
-  const PointBuffer& next();
+  /// Inserts the static points of scan `i` in the order of the file. Throws IoError for files that
+  /// cannot be read, labels of other scans, and labels that no run writes; the map is then
+  /// incomplete.
+  void insert_into(StaticMapAccumulator& map, std::size_t i,
+                   const Eigen::Isometry3d& T_world_sensor);
 
  private:
-  struct Slot {
-    RecordedScan scan;
-    PointBuffer kept;
-  };
-  void launch(Slot slot);
-  void read(std::size_t i, Slot& slot) const;
-
   const Recording& recording_;
   std::filesystem::path labels_;
-  std::vector<std::size_t> scans_;
-  std::size_t launched_ = 0;  // scans
-  std::deque<std::future<Slot>> pending_;
-  Slot current_;
+  RecordedScan scan_;
+  std::vector<std::uint32_t> label_block_;
 };
 
 }  // namespace dynains::program

@@ -124,12 +124,12 @@ StaticMapAccumulator build_map(const Recording& corrected, const Recording& orig
   StaticMapAccumulator::Config config;
   config.map_voxel = voxel;
   StaticMapAccumulator map(config);
-  KeptPoints kept(original, labels, scans);
+  KeptPoints kept(original, labels);
   Progress progress(scans.size(), "scans", quiet);
   for (std::size_t k = 0; k < scans.size(); ++k) {
     if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
     const Eigen::Isometry3d& pose = corrected.T_world_sensor(scans[k]);
-    map.insert(kept.next(), {}, orthonormalized(pose));
+    kept.insert_into(map, scans[k], orthonormalized(pose));
     progress.update(k + 1);
   }
   return map;

@@ -142,6 +142,29 @@ TEST_CASE("remap gives the bytes of a map of the labels and the corrected poses"
   }
 }
 
+TEST_CASE("remap of scans of thousands of points gives the same bytes") {
+  const Fixture f;
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> place(-30.0F, 30.0F);
+  constexpr std::uint32_t kClasses[] = {9, 9, 9, 251, 0};
+  for (const std::size_t count : {std::size_t{4095}, std::size_t{4096}, std::size_t{13001}}) {
+    std::vector<float> scan(4 * count);
+    for (float& value : scan) value = place(random);
+    std::vector<std::uint32_t> labels(count);
+    for (std::uint32_t& label : labels) label = kClasses[random() % 5] | 7U << 16U;
+    for (std::size_t k = 0; k < count; ++k) {
+      if ((labels[k] & 0xffffU) == 0) scan[4 * k + k % 3] = std::nanf("");
+    }
+    const std::string name = scan_name(count % 12);
+    write_scan(f.seq + "/velodyne/" + name + ".bin", scan);
+    write_labels(f.out + "/labels/" + name + ".label", labels);
+  }
+  const Outcome outcome = f.remap({"--poses", f.corrected});
+  CAPTURE(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK(read_text(f.map) == expected_map(f));
+}
+
 TEST_CASE("remap with the poses of the run fills the voxels of the run's map") {
   const Fixture f({"--level", "false"});
   REQUIRE(f.remap().code == 0);
@@ -243,6 +266,14 @@ TEST_CASE("remap refuses what does not belong together, and writes nothing then"
     std::vector<std::uint32_t> labels(tiny_scan(4).size() / 4, 40);
     write_labels(f.out + "/labels/" + scan_name(4) + ".label", labels);
     expected = "point 0 has class 40";
+  }
+  SECTION("a label of another program at the last of many points") {
+    std::vector<float> scan(std::size_t{4} * 9001, 5.0F);
+    write_scan(f.seq + "/velodyne/" + scan_name(4) + ".bin", scan);
+    std::vector<std::uint32_t> labels(9001, 9);
+    labels.back() = 40;
+    write_labels(f.out + "/labels/" + scan_name(4) + ".label", labels);
+    expected = "point 9000 has class 40";
   }
   SECTION("static points that are none") {
     std::vector<float> scan = tiny_scan(4);

@@ -81,6 +81,8 @@ void read_scan(const std::filesystem::path& file, std::vector<float>& xyzi);
 
 /// Reads a file of labels, one uint32 per point. Throws IoError unless it has `count` labels.
 std::vector<std::uint32_t> read_labels(const std::filesystem::path& file, std::size_t count);
+/// Throws IoError unless the file has the size of `count` labels.
+void check_labels(const std::filesystem::path& file, std::size_t count);
 
 /// Writers of this layout. Each file is replaced atomically; folders must exist. Scans and labels
 /// are not synchronized with the disk: see `sync_files()`. They throw IoError.
