@@ -1,6 +1,7 @@
 // A file of numbers, read from begin to end into memory of the caller.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
