@@ -49,7 +49,7 @@ void repose_session(const ReposedSession& request, const Recording& points,
   for (const std::size_t i : request.scans) {
     if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
     points.read_scan(i, scan);
-    const std::string name = points.name(i);
+    const std::string& name = points.name(i);
     const std::filesystem::path file = request.run / "labels" / (name + ".label");
     const std::vector<std::uint32_t> run_labels = read_labels(file, scan.size());
     const std::vector<std::uint8_t> causes =

@@ -62,8 +62,9 @@ struct ReferenceSpan {
 
   /// Largest number of references that are needed at a time.
   std::size_t count() const {
+    const int dense = near / step + 1;
     const int sparse = lookback > near ? (lookback - near) / sparse_step + 1 : 0;
-    return static_cast<std::size_t>(near / step + 1 + sparse);
+    return static_cast<std::size_t>(dense) + static_cast<std::size_t>(sparse);
   }
   /// Distances (scans) from a scan to its earlier references, ascending. `phase`: number of the
   /// scan since the begin of its epoch, modulo `sparse_step`.
