@@ -75,9 +75,9 @@ TileHistory CityMap::history(const TileIndex& tile, std::uint32_t last) const {
   return history;
 }
 
-CityChanges CityMap::changes(const TileIndex& tile, std::uint32_t a, std::uint32_t b) const {
+CityChanges CityMap::changes(const TileIndex& tile, const TileHistory& history, std::uint32_t a,
+                             std::uint32_t b) const {
   if (a >= b) throw ConfigError("changes of a map: expected an earlier and a later session");
-  const TileHistory history = this->history(tile, b);
   const SessionGrid& grid = city_.grid();
   ChangeClusters clusters(grid);
   VoxelHashTable<> before, after;

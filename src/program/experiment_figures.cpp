@@ -9,7 +9,6 @@
 #include "dynains/io/point_file.hpp"
 #include "evaluation_options.hpp"
 #include "experiment.hpp"
-#include "figure.hpp"
 #include "finished_run.hpp"
 #include "labelled_sequence.hpp"
 #include "output_folder.hpp"
@@ -18,6 +17,7 @@
 #include "remover_options.hpp"
 #include "variants.hpp"
 #include "verdict_cloud.hpp"
+#include "verdict_figure.hpp"
 
 namespace dynains::program {
 namespace {

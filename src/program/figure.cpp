@@ -1,9 +1,11 @@
 #include "figure.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <iomanip>
 #include <sstream>
 #include <utility>
 
@@ -11,177 +13,6 @@
 #include "gnuplot.hpp"
 
 namespace dynains::program {
-namespace {
-
-/// Static points get lighter with height, so that walls and trees stand out from the ground.
-Colour shaded(Colour colour, double height) {
-  const double light = std::clamp(0.55 + 0.07 * height, 0.55, 1.2);
-  const auto scale = [&](std::uint8_t value) {
-    return static_cast<std::uint8_t>(std::min(215.0, value * light));
-  };
-  return {scale(colour.r), scale(colour.g), scale(colour.b)};
-}
-
-/// Height that a share of the points lies below; the ground for small shares.
-double height_quantile(const VerdictCloud& cloud, double share) {
-  std::vector<float> heights;
-  for (const VerdictCloud::Point& point : cloud.points()) heights.push_back(point.local.z());
-  if (heights.empty()) return 0;
-  const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(heights.size() - 1));
-  std::nth_element(heights.begin(), heights.begin() + rank, heights.end());
-  return heights[static_cast<std::size_t>(rank)];
-}
-
-/// Errors are drawn last, over correct points.
-std::size_t layer_of(Fate fate, Content content) {
-  if (content == Content::kRaw) return is_dynamic(fate) ? 1 : 0;
-  return static_cast<std::size_t>(fate);
-}
-
-/// Chooses one point for each cell of a figure: of the highest layer, then the nearest.
-class DotGrid {
- public:
-  explicit DotGrid(Figure& figure)
-      : figure_(figure),
-        columns_((figure.width + Figure::kCell - 1) / Figure::kCell),
-        cells_(static_cast<std::size_t>(columns_) *
-               static_cast<std::size_t>((figure.height + Figure::kCell - 1) / Figure::kCell)) {}
-
-  /// `x`, `y`: pixels from the lower left corner; points outside are left out.
-  void add(double x, double y, double depth, std::size_t layer, Colour colour) {
-    if (!(x >= 0.0 && x < figure_.width && y >= 0.0 && y < figure_.height)) return;
-    const auto column = static_cast<std::size_t>(x / Figure::kCell);
-    const auto row = static_cast<std::size_t>(y / Figure::kCell);
-    Cell& cell = cells_[row * static_cast<std::size_t>(columns_) + column];
-    const auto order = static_cast<int>(layer);
-    if (order < cell.layer || (order == cell.layer && depth >= cell.depth)) return;
-    cell = {order, depth, colour};
-  }
-
-  /// Dots in the middle of their cells.
-  void finish() const {
-    const double step_x = (figure_.high_x - figure_.low_x) / figure_.width * Figure::kCell;
-    const double step_y = (figure_.high_y - figure_.low_y) / figure_.height * Figure::kCell;
-    for (std::size_t i = 0; i < cells_.size(); ++i) {
-      const Cell& cell = cells_[i];
-      if (cell.layer < 0) continue;
-      const auto columns = static_cast<std::size_t>(columns_);
-      const std::size_t row = i / columns;
-      const std::size_t column = i % columns;
-      figure_.layers[static_cast<std::size_t>(cell.layer)].push_back(
-          {static_cast<float>(figure_.low_x + (static_cast<double>(column) + 0.5) * step_x),
-           static_cast<float>(figure_.low_y + (static_cast<double>(row) + 0.5) * step_y),
-           cell.colour});
-    }
-  }
-
- private:
-  struct Cell {
-    int layer = -1;
-    double depth = 0.0;
-    Colour colour;
-  };
-
-  Figure& figure_;
-  int columns_;
-  std::vector<Cell> cells_;
-};
-
-/// add(point, layer, colour) for every point that the figure shows.
-template <class Add>
-void for_each_shown(const VerdictCloud& cloud, Content content, Add&& add) {
-  const double ground = height_quantile(cloud, 0.1);
-  for (const VerdictCloud::Point& point : cloud.points()) {
-    if (!is_shown(point.fate, content)) continue;
-    const std::size_t layer = layer_of(point.fate, content);
-    const Colour colour = colour_of(point.fate, content);
-    add(point.local.cast<double>(), layer,
-        layer == 0 ? shaded(colour, point.local.z() - ground) : colour);
-  }
-}
-
-/// Horizontal direction of the path; towards dynamic points if the sensor stands.
-Eigen::Vector3d viewing_direction(const VerdictCloud& cloud) {
-  Eigen::Vector3d forward = cloud.path().back() - cloud.path().front();
-  forward.z() = 0;
-  if (forward.norm() < 1) {
-    forward.setZero();
-    for (const VerdictCloud::Point& point : cloud.points()) {
-      if (is_dynamic(point.fate)) forward += point.local.cast<double>();
-    }
-    forward.z() = 0;
-  }
-  return forward.norm() > 0 ? Eigen::Vector3d(forward.normalized()) : Eigen::Vector3d::UnitX();
-}
-
-}  // namespace
-
-bool is_shown(Fate fate, Content content) {
-  return content != Content::kMap || fate == Fate::kKeptStatic || fate == Fate::kMissedDynamic;
-}
-
-Colour colour_of(Fate fate, Content content) {
-  if (content != Content::kRaw) return kFateColours[static_cast<std::size_t>(fate)];
-  return is_dynamic(fate) ? kRawDynamicColour
-                          : kFateColours[static_cast<std::size_t>(Fate::kKeptStatic)];
-}
-
-Figure view_from_above(const VerdictCloud& cloud, Content content, int pixels) {
-  Eigen::Array2d low = Eigen::Array2d::Zero();
-  Eigen::Array2d high = Eigen::Array2d::Zero();
-  for (const VerdictCloud::Point& point : cloud.points()) {
-    const Eigen::Array2d p = point.local.head<2>().cast<double>().array();
-    low = low.min(p);
-    high = high.max(p);
-  }
-  const Eigen::Array2d size = (high - low).max(1.0);
-  const double scale = (pixels - 1) / size.maxCoeff();  // pixels per m
-  const auto side = [&](double metres) { return static_cast<int>(metres * scale) + 1; };
-  Figure figure;
-  figure.content = content;
-  figure.is_from_above = true;
-  figure.width = side(size.x());
-  figure.height = side(size.y());
-  figure.low_x = low.x();
-  figure.low_y = low.y();
-  figure.high_x = low.x() + figure.width / scale;
-  figure.high_y = low.y() + figure.height / scale;
-  DotGrid grid(figure);
-  for_each_shown(cloud, content, [&](const Eigen::Vector3d& p, std::size_t layer, Colour colour) {
-    grid.add((p.x() - low.x()) * scale, (p.y() - low.y()) * scale, -p.z(), layer, colour);
-  });
-  grid.finish();
-  return figure;
-}
-
-Figure view_in_perspective(const VerdictCloud& cloud, Content content, int pixels) {
-  Figure figure;
-  figure.content = content;
-  figure.width = pixels;
-  figure.height = std::max(1, pixels * 9 / 16);
-  figure.high_x = figure.width;
-  figure.high_y = figure.height;
-  if (cloud.path().empty()) return figure;
-  const Eigen::Vector3d forward = viewing_direction(cloud);
-
-  constexpr double kBack = 22, kUp = 16, kAhead = 25, kFocal = 0.9;  // m, m, m, picture widths
-  const Eigen::Vector3d eye = -kBack * forward + kUp * Eigen::Vector3d::UnitZ();
-  const Eigen::Vector3d axis = (kAhead * forward - eye).normalized();
-  const Eigen::Vector3d right = axis.cross(Eigen::Vector3d::UnitZ()).normalized();
-  const Eigen::Vector3d up = right.cross(axis);
-  DotGrid grid(figure);
-  for_each_shown(cloud, content, [&](const Eigen::Vector3d& p, std::size_t layer, Colour colour) {
-    constexpr double kNearest = 2;  // m
-    const double depth = axis.dot(p - eye);
-    if (depth < kNearest) return;
-    const double scale = kFocal * figure.width / depth;
-    grid.add(0.5 * figure.width + scale * right.dot(p - eye),
-             0.5 * figure.height + scale * up.dot(p - eye), depth, layer, colour);
-  });
-  grid.finish();
-  return figure;
-}
-
 namespace {
 
 std::uint32_t code_of(Colour colour) {
@@ -195,23 +26,6 @@ std::string text_of(Colour colour) {
   return text.data();
 }
 
-/// Names of the layers for the legend, with their colours.
-std::vector<std::pair<std::string, Colour>> legend_of(Content content) {
-  if (content == Content::kRaw) {
-    return {{"static", colour_of(Fate::kKeptStatic, content)},
-            {"dynamic", colour_of(Fate::kRemovedDynamic, content)}};
-  }
-  std::vector<std::pair<std::string, Colour>> entries;
-  const std::pair<Fate, const char*> names[] = {{Fate::kKeptStatic, "kept static"},
-                                                {Fate::kRemovedDynamic, "removed dynamic"},
-                                                {Fate::kLostStatic, "lost static"},
-                                                {Fate::kMissedDynamic, "missed dynamic"}};
-  for (const auto& [fate, name] : names) {
-    if (is_shown(fate, content)) entries.emplace_back(name, colour_of(fate, content));
-  }
-  return entries;
-}
-
 /// The largest of 1, 2, 5, 10, 20, ... that is at most a quarter of `width`.
 double bar_length(double width) {
   const double power = std::pow(10.0, std::floor(std::log10(0.25 * width)));
@@ -221,12 +35,23 @@ double bar_length(double width) {
   return power;
 }
 
+std::string axis_title(char axis, double origin) {
+  std::ostringstream text;
+  text << axis;
+  if (origin != 0.0)
+    text << std::fixed << std::setprecision(0) << (origin < 0.0 ? " + " : " - ")
+         << std::abs(origin);
+  text << " (m)";
+  return text.str();
+}
+
 /// Axes and a scale bar below the picture.
 std::string axes_of(const Figure& figure) {
   if (!figure.is_from_above) return "unset border\nunset tics\n";
   const double bar = bar_length(figure.high_x - figure.low_x);
   std::ostringstream text;
-  text << "set xlabel \"x (m)\"\nset ylabel \"y (m)\"\nset tics out nomirror\n"
+  text << "set xlabel \"" << axis_title('x', figure.origin_x) << "\"\nset ylabel \""
+       << axis_title('y', figure.origin_y) << "\"\nset tics out nomirror\n"
        << "set arrow from first " << figure.high_x - bar << ", screen 0.02 to first "
        << figure.high_x << ", screen 0.02 nohead lw 4 lc rgb \"black\"\n"
        << "set label \"" << bar << " m\" at first " << figure.high_x - 0.5 * bar
@@ -261,11 +86,10 @@ std::string script_of(const Figure& figure, const std::string& name) {
          << (layer == 0 ? kPlain : kLarge) << " lc rgb variable notitle, \\\n  ";
     skipped += 12 * count;
   }
-  const auto entries = legend_of(figure.content);
-  for (std::size_t i = 0; i < entries.size(); ++i) {
-    text << "keyentry with points pt 5 ps 1 lc rgb \"" << text_of(entries[i].second)
-         << "\" title \"" << entries[i].first << '"'
-         << (i + 1 < entries.size() ? ", \\\n  " : "\n");
+  const std::vector<Figure::LegendEntry>& legend = figure.legend;
+  for (std::size_t i = 0; i < legend.size(); ++i) {
+    text << "keyentry with points pt 5 ps 1 lc rgb \"" << text_of(legend[i].colour) << "\" title "
+         << gnuplot_text(legend[i].name) << (i + 1 < legend.size() ? ", \\\n  " : "\n");
   }
   return text.str();
 }
@@ -277,6 +101,77 @@ void write_file(const std::filesystem::path& path, const std::string& bytes) {
 }
 
 }  // namespace
+
+DotGrid::DotGrid(Figure figure)
+    : figure_(std::move(figure)),
+      columns_((figure_.width + Figure::kCell - 1) / Figure::kCell),
+      cells_(static_cast<std::size_t>(columns_) *
+             static_cast<std::size_t>((figure_.height + Figure::kCell - 1) / Figure::kCell)) {}
+
+void DotGrid::add(double x, double y, double depth, std::size_t layer, Colour colour) {
+  if (!(x >= 0.0 && x < figure_.width && y >= 0.0 && y < figure_.height)) return;
+  const auto column = static_cast<std::size_t>(x / Figure::kCell);
+  const auto row = static_cast<std::size_t>(y / Figure::kCell);
+  Cell& cell = cells_[row * static_cast<std::size_t>(columns_) + column];
+  const auto order = static_cast<int>(layer);
+  if (order < cell.layer || (order == cell.layer && depth >= cell.depth)) return;
+  cell = {order, depth, colour};
+}
+
+Figure DotGrid::figure() const {
+  Figure figure = figure_;
+  const double step_x = (figure.high_x - figure.low_x) / figure.width * Figure::kCell;
+  const double step_y = (figure.high_y - figure.low_y) / figure.height * Figure::kCell;
+  const auto columns = static_cast<std::size_t>(columns_);
+  for (std::size_t i = 0; i < cells_.size(); ++i) {
+    const Cell& cell = cells_[i];
+    if (cell.layer < 0) continue;
+    figure.layers[static_cast<std::size_t>(cell.layer)].push_back(
+        {static_cast<float>(figure.low_x + (static_cast<double>(i % columns) + 0.5) * step_x),
+         static_cast<float>(figure.low_y + (static_cast<double>(i / columns) + 0.5) * step_y),
+         cell.colour});
+  }
+  return figure;
+}
+
+namespace {
+
+double scale_of(const Eigen::Vector2d& low, const Eigen::Vector2d& high, int pixels) {
+  return (pixels - 1) / std::max((high - low).maxCoeff(), 1.0);
+}
+
+/// Without dots.
+Figure view_of(const Eigen::Vector2d& low, const Eigen::Vector2d& high, double scale,
+               std::size_t layers, std::vector<Figure::LegendEntry> legend) {
+  const Eigen::Array2d size = (high - low).array().max(1.0);
+  const auto side = [&](double metres) { return static_cast<int>(metres * scale) + 1; };
+  Figure figure;
+  figure.legend = std::move(legend);
+  figure.is_from_above = true;
+  figure.width = side(size.x());
+  figure.height = side(size.y());
+  figure.low_x = low.x();
+  figure.low_y = low.y();
+  figure.high_x = low.x() + figure.width / scale;
+  figure.high_y = low.y() + figure.height / scale;
+  figure.layers.resize(layers);
+  return figure;
+}
+
+}  // namespace
+
+ViewFromAbove::ViewFromAbove(const Eigen::Vector2d& low, const Eigen::Vector2d& high, int pixels,
+                             std::size_t layers, std::vector<Figure::LegendEntry> legend)
+    : low_(low),
+      scale_(scale_of(low, high, pixels)),
+      grid_(view_of(low, high, scale_, layers, std::move(legend))) {}
+
+Figure ViewFromAbove::figure(const Eigen::Vector2d& origin) const {
+  Figure figure = grid_.figure();
+  figure.origin_x = origin.x();
+  figure.origin_y = origin.y();
+  return figure;
+}
 
 void write_figure(const Figure& figure, const std::filesystem::path& folder,
                   const std::string& name) {

@@ -1,28 +1,15 @@
-// Figures of a cloud of verdicts, drawn by gnuplot.
+// Figures of points, drawn by gnuplot.
 #pragma once
 
-#include <array>
+#include <Eigen/Core>
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "picture.hpp"
-#include "verdict_cloud.hpp"
 
 namespace dynains::program {
-
-enum class Content {
-  kRaw,      ///< every point: static grey, dynamic blue (Fig. 1, top)
-  kVerdict,  ///< kept grey, removed dynamic green, lost static orange, missed dynamic red
-  kMap,      ///< the points that stay: kept grey, missed dynamic red (Fig. 1, bottom)
-};
-
-/// Whether points of this fate are part of the figure.
-bool is_shown(Fate fate, Content content);
-
-Colour colour_of(Fate fate, Content content);
 
 /// A figure: dots on a grid of cells of kCell pixels, at most one in a cell.
 struct Figure {
@@ -35,22 +22,68 @@ struct Figure {
       return a.x == b.x && a.y == b.y && a.colour == b.colour;
     }
   };
+  struct LegendEntry {
+    std::string name;  ///< printable
+    Colour colour;
+  };
 
-  Content content = Content::kRaw;
+  std::vector<LegendEntry> legend;
   bool is_from_above = false;         ///< then it has axes and a scale bar
   int width = 1, height = 1;          ///< pixels
   double low_x = 0.0, low_y = 0.0;    ///< of the lower left corner
   double high_x = 1.0, high_y = 1.0;  ///< of the upper right corner
+  double origin_x = 0.0;              ///< m, world: place of x = 0 of a view from above
+  double origin_y = 0.0;              ///< m, world
   /// By layer, in the order of drawing: plain points, then those that matter.
-  std::array<std::vector<Dot>, kFateCount> layers;
+  std::vector<std::vector<Dot>> layers;
 };
 
-/// View from above: world x to the right, y up, the longer side `pixels` long.
-Figure view_from_above(const VerdictCloud& cloud, Content content, int pixels);
+/// Chooses one point for each cell of a figure: of the highest layer, then the nearest.
+class DotGrid {
+ public:
+  /// `figure`: its size in pixels and in its units, and its layers.
+  explicit DotGrid(Figure figure);
 
-/// View from behind and above the start of the path, in its direction (towards dynamic points if
-/// the sensor stands); 16:9, `pixels` wide.
-Figure view_in_perspective(const VerdictCloud& cloud, Content content, int pixels);
+  /// `x`, `y`: pixels from the lower left corner; points outside are left out.
+  void add(double x, double y, double depth, std::size_t layer, Colour colour);
+
+  /// The figure with dots in the middle of their cells.
+  Figure figure() const;
+
+ private:
+  struct Cell {
+    int layer = -1;
+    double depth = 0.0;
+    Colour colour;
+  };
+
+  Figure figure_;
+  int columns_;
+  std::vector<Cell> cells_;
+};
+
+/// View from above: x to the right, y up. Of each cell, the highest point of the last layer is
+/// drawn. Memory: a cell of DotGrid for each 4 pixels.
+class ViewFromAbove {
+ public:
+  /// Shows the places from `low` to `high` (m); the longer side has `pixels` pixels.
+  ViewFromAbove(const Eigen::Vector2d& low, const Eigen::Vector2d& high, int pixels,
+                std::size_t layers, std::vector<Figure::LegendEntry> legend);
+
+  /// `point`: m, in the frame of `low`.
+  void add(const Eigen::Vector3d& point, std::size_t layer, Colour colour) {
+    grid_.add((point.x() - low_.x()) * scale_, (point.y() - low_.y()) * scale_, -point.z(), layer,
+              colour);
+  }
+
+  /// `origin`: world position of x = y = 0, m; written at the axes.
+  Figure figure(const Eigen::Vector2d& origin = Eigen::Vector2d::Zero()) const;
+
+ private:
+  Eigen::Vector2d low_;
+  double scale_;  // pixels per m
+  DotGrid grid_;
+};
 
 /// Writes NAME.dat (for each dot x and y as float, colour as 0x00RRGGBB) and NAME.gp, which reads
 /// it, into a folder. Throws IoError.

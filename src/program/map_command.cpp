@@ -10,12 +10,14 @@
 #include <string>
 #include <vector>
 
+#include "change_picture.hpp"
 #include "command.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/city.hpp"
 #include "dynains/io/city_map.hpp"
 #include "dynains/io/las_file.hpp"
 #include "dynains/io/point_file.hpp"
+#include "figure.hpp"
 #include "interrupt.hpp"
 #include "map_file.hpp"
 #include "output_folder.hpp"
@@ -30,9 +32,11 @@ namespace fs = std::filesystem;
 struct MapOptions {
   std::string city;
   std::string session, later_session;
-  std::string file, added, removed;
+  std::string file, added, removed, picture;
   std::vector<double> region;  // m: lowest x, lowest y, highest x, highest y
   std::string format;          // empty: by the extension of the file
+  int pixels = 1600;           // of the longer side of a picture
+  bool no_picture = false;
   bool force = false;
 };
 
@@ -41,6 +45,13 @@ void check_is_outside(const fs::path& city, const std::string& name) {
   const fs::path inner = fs::relative(whole_path(name), whole_path(city));
   if (!inner.empty() && *inner.begin() != "..") {
     throw ConfigError(name + ": lies in the map of many sessions; choose another folder");
+  }
+}
+
+/// Throws IoError if a file is there and must not be replaced.
+void check_is_new(const fs::path& path, const std::string& name, bool force) {
+  if (fs::exists(fs::symlink_status(path)) && !force) {
+    throw IoError(name + ": exists; choose another name, or replace it by --force");
   }
 }
 
@@ -74,9 +85,7 @@ class CityPointFile {
       throw ConfigError(name + ": expected a name that ends in .ply, .pcd or .las");
     }
     check_is_outside(city, name);
-    if (fs::exists(fs::symlink_status(path)) && !force) {
-      throw IoError(name + ": exists; choose another name, or replace it by --force");
-    }
+    check_is_new(path, name, force);
     double most = 0.0;
     Eigen::Vector3d lowest = Eigen::Vector3d::Zero();
     for (const SessionInfo& session : map.sessions()) {
@@ -227,6 +236,37 @@ void write_map_at(const MapOptions& options) {
   write_map(city, map, map.number_of(options.session), options);
 }
 
+/// Script, data and picture of a figure: NAME.gp, NAME.dat and NAME.png.
+class FigureFiles {
+ public:
+  /// Throws ConfigError, IoError.
+  FigureFiles(const fs::path& city, const std::string& name, bool force) {
+    const fs::path path = whole_path(name);
+    folder_ = path.parent_path();
+    name_ = path.stem().string();
+    // The script names the data, and gnuplot would interpret other characters.
+    if (path.extension() != ".png" || !is_session_name(name_)) {
+      throw ConfigError(name +
+                        ": expected a name that ends in .png and consists of letters, digits, "
+                        "'.', '_' and '-'");
+    }
+    check_is_outside(city, name);
+    for (const char* extension : {".gp", ".dat", ".png"}) {
+      check_is_new(fs::path(path).replace_extension(extension),
+                   fs::path(name).replace_extension(extension).string(), force);
+    }
+  }
+
+  void write(const Figure& figure) const {
+    write_figure(figure, folder_, name_);
+    draw_figure(folder_, name_);
+  }
+
+ private:
+  fs::path folder_;
+  std::string name_;
+};
+
 void diff(const MapOptions& options) {
   const City city{fs::path(options.city)};
   const CityMap map(city);
@@ -236,21 +276,37 @@ void diff(const MapOptions& options) {
     throw ConfigError("diff " + options.session + ' ' + options.later_session +
                       ": expected an earlier and a later session, by their begin");
   }
+  if (whole_path(options.added) == whole_path(options.removed)) {
+    throw ConfigError("--removed " + options.removed + ": is the file of --added, too");
+  }
   CityPointFile added(map, city.folder(), options.added, options.force);
   CityPointFile removed(map, city.folder(), options.removed, options.force);
+  std::optional<FigureFiles> files;
+  if (!options.no_picture) files.emplace(city.folder(), options.picture, options.force);
+  ChangePicture picture(map.sessions(), options.pixels);
   for (const TileIndex& tile : map.tiles()) {
-    const CityChanges changes = map.changes(tile, a, b);
+    const TileHistory history = map.history(tile, b);
+    history.for_each_standing(b, [&](std::size_t session, std::size_t i) {
+      const SessionPoint& point = history.points(session)[i];
+      picture.add_standing(map.position(tile, point), history.is_above_ground(point));
+    });
+    const CityChanges changes = map.changes(tile, history, a, b);
     for (const CityPoint& p : changes.added) {
       added.add(map.position(tile, p.point), p.session, p.point);
+      picture.add_added(map.position(tile, p.point));
     }
     for (const CityPoint& p : changes.removed) {
       removed.add(map.position(tile, p.point), p.session, p.point);
+      picture.add_removed(map.position(tile, p.point));
     }
   }
   added.commit();
   removed.commit();
   std::cout << options.added << ": " << added.size() << " points\n"
             << options.removed << ": " << removed.size() << " points" << std::endl;
+  if (!files) return;
+  files->write(picture.figure());
+  std::cout << options.picture << ": drawn" << std::endl;
 }
 
 void drop(const MapOptions& options) {
@@ -326,6 +382,16 @@ void add_map_command(CLI::App& app) {
       ->type_name("FILE");
   diff_command->add_option("--removed", options->removed, "points that left [removed.ply]")
       ->type_name("FILE");
+  options->picture = "changes.png";
+  CLI::Option* const picture =
+      diff_command
+          ->add_option("--picture", options->picture,
+                       "both and the map after B from above, by gnuplot [changes.png]")
+          ->type_name("FILE");
+  diff_command->add_option("--pixels", options->pixels, "longer side of the picture")
+      ->check(CLI::Range(16, 16384))
+      ->capture_default_str();
+  diff_command->add_flag("--no-picture", options->no_picture, "points only")->excludes(picture);
   add_force(diff_command);
   add_session(add("drop", "Remove one session: the map is as if it had never come", drop),
               "SESSION", options->session);

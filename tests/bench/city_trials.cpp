@@ -30,7 +30,6 @@ namespace fs = std::filesystem;
 namespace {
 
 std::uint32_t instance_of(std::uint32_t label) { return label >> 16U; }
-bool is_moving(std::uint32_t label) { return (label & 0xFFFFU) >= 252 && (label & 0xFFFFU) <= 259; }
 
 PointBuffer points_of(const simulation::SimulatedScan& scan) {
   PointBuffer points;
@@ -43,22 +42,50 @@ PointBuffer points_of(const simulation::SimulatedScan& scan) {
   return points;
 }
 
-/// All static and moving points of a day.
-struct Measured {
-  SessionPoints near;  ///< up to the range of contributions
-  SessionPoints all;
+/// The objects whose points a day measured at different places, up to the range of contributions.
+/// Labels do not tell this: they call a car moving that drove off out of sight.
+class MovedObjects {
+ public:
+  void add(const simulation::SimulatedScan& scan) {
+    constexpr float kRange = static_cast<float>(SessionPointsConfig().contribution_range);
+    std::set<std::uint32_t> measured;
+    for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+      const Eigen::Map<const Eigen::Vector3f> point(&scan.xyzi[4 * i]);
+      if (instance_of(scan.labels[i]) != 0 && point.norm() <= kRange) {
+        measured.insert(instance_of(scan.labels[i]));
+      }
+    }
+    for (const simulation::ObjectState& object : scan.objects) {
+      if (measured.count(object.instance) == 0) continue;
+      const Eigen::Vector3d at = object.T_world_object.translation();
+      const Eigen::Vector3d& first = first_.emplace(object.instance, at).first->second;
+      if ((at - first).head<2>().norm() > kMovedWay) moved_.insert(object.instance);
+    }
+  }
+  bool contains(std::uint32_t label) const { return moved_.count(instance_of(label)) > 0; }
+
+ private:
+  static constexpr double kMovedWay = 0.5;  // m
+  std::map<std::uint32_t, Eigen::Vector3d> first_;
+  std::set<std::uint32_t> moved_;
 };
 
-/// Runs over one day and adds it to the city. Returns the changes of the place that stand there.
-std::set<std::uint32_t> add_day(const City& city, const simulation::Config& config,
-                                Measured& measured) {
+/// One simulated day.
+struct Day {
+  SessionPoints near;  ///< static and moving points, up to the range of contributions
+  SessionPoints all;
+  std::set<std::uint32_t> changes = {};  ///< changes of the place that stand there
+  MovedObjects moved = {};
+};
+
+/// Runs over one day and adds it to the city.
+void add_day(const City& city, const simulation::Config& config, Day& day) {
   simulation::Simulator simulator(config);
   DynaInsRemover remover(DynaInsRemover::Config::offline());
   SessionInfo info;
   info.name = "day" + std::to_string(config.day);
   info.begin = config.day;
   SessionWriter writer(city, info);
-  std::set<std::uint32_t> changes;
   std::deque<simulation::SimulatedScan> open;
   const auto take_final = [&](const ScanVerdict& verdict) {
     const simulation::SimulatedScan scan = std::move(open.front());
@@ -70,22 +97,22 @@ std::set<std::uint32_t> add_day(const City& city, const simulation::Config& conf
     for (PointLabel& label : all) {
       if (label == PointLabel::kDynamic) label = PointLabel::kStatic;
     }
-    measured.near.add(points, all, scan.labels, scan.T_world_sensor, number);
-    measured.all.add(points, all, scan.labels, scan.T_world_sensor, number);
+    day.near.add(points, all, scan.labels, scan.T_world_sensor, number);
+    day.all.add(points, all, scan.labels, scan.T_world_sensor, number);
   };
   for (std::size_t i = 0; i < simulator.size(); ++i) {
     open.push_back(simulator.scan(i));
     const simulation::SimulatedScan& scan = open.back();
     for (const simulation::ObjectState& object : scan.objects) {
-      if (object.instance >= simulation::kFirstChange) changes.insert(object.instance);
+      if (object.instance >= simulation::kFirstChange) day.changes.insert(object.instance);
     }
+    day.moved.add(scan);
     const RawPoints<float> points{scan.xyzi.data(), scan.labels.size(), 4};
     const FrameResult frame = remover.push(points, scan.T_world_sensor, scan.time);
     if (frame.finished) take_final(*frame.finished);
   }
   remover.flush(take_final);
   writer.commit();
-  return changes;
 }
 
 struct Count {
@@ -113,10 +140,11 @@ struct Result {
 };
 
 /// Whether a point of a session is of an object that is not there at the end.
-bool is_gone(std::uint32_t label, bool is_last, const std::set<std::uint32_t>& at_end) {
-  if (instance_of(label) == 0) return false;
-  if (instance_of(label) >= simulation::kFirstChange) return at_end.count(instance_of(label)) == 0;
-  return !is_last || is_moving(label);
+bool is_gone(std::uint32_t label, std::size_t session, const std::vector<Day>& days) {
+  const std::uint32_t instance = instance_of(label);
+  if (instance == 0) return false;
+  if (instance >= simulation::kFirstChange) return days.back().changes.count(instance) == 0;
+  return session + 1 < days.size() || days.back().moved.contains(label);
 }
 
 constexpr double kNear = 40.0;  // m
@@ -132,8 +160,7 @@ std::vector<std::vector<Eigen::Vector3d>> ways_of(const City& city, const CityMa
   return ways;
 }
 
-void judge_map(const City& city, const std::vector<Measured>& measured,
-               const std::set<std::uint32_t>& at_end, Result& result) {
+void judge_map(const City& city, const std::vector<Day>& days, Result& result) {
   const CityMap map(city);
   const auto last = static_cast<std::uint32_t>(map.sessions().size() - 1);
   const std::vector<std::vector<Eigen::Vector3d>> ways = ways_of(city, map);
@@ -157,7 +184,7 @@ void judge_map(const City& city, const std::vector<Measured>& measured,
     for (std::size_t session = 0; session <= last; ++session) {
       for (std::size_t i = 0; i < history.points(session).size(); ++i) {
         const SessionPoint& point = history.points(session)[i];
-        if (is_gone(point.label, session == last, at_end)) {
+        if (is_gone(point.label, session, days)) {
           const bool stands = in_map.count({session, i}) > 0;
           Count& gone = session == last ? result.gone_last : result.gone;
           gone.kept += stands ? 1 : 0;
@@ -172,17 +199,17 @@ void judge_map(const City& city, const std::vector<Measured>& measured,
     }
   }
   std::map<TileIndex, VoxelHashTable<>> seen_of;
-  for (std::size_t session = 0; session < measured.size(); ++session) {
-    const bool is_last = session + 1 == measured.size();
-    measured[session].near.for_each_tile(
+  for (std::size_t session = 0; session < days.size(); ++session) {
+    const bool is_last = session + 1 == days.size();
+    days[session].near.for_each_tile(
         [&](const TileIndex& tile, const std::vector<SessionPoint>& points) {
           for (const SessionPoint& point : points) {
-            if (!is_gone(point.label, is_last, at_end)) continue;
+            if (!is_gone(point.label, session, days)) continue;
             ++(is_last ? result.gone_last : result.gone).of;
             if (is_near_later_way(map.position(tile, point), session)) ++result.gone_near.of;
           }
         });
-    measured[session].all.for_each_tile(
+    days[session].all.for_each_tile(
         [&](const TileIndex& tile, const std::vector<SessionPoint>& points) {
           for (const SessionPoint& point : points) {
             if (instance_of(point.label) != 0) continue;
@@ -199,7 +226,7 @@ void judge_map(const City& city, const std::vector<Measured>& measured,
 /// One point of `diff`.
 struct DiffPoint {
   Eigen::Vector3d position;  // m
-  std::uint32_t label;
+  bool is_of_change;         ///< of an object that stands in one of both maps
 };
 
 constexpr double kClusterCell = 0.5;  // m
@@ -244,7 +271,8 @@ void for_each_cluster(const std::vector<DiffPoint>& points, Visitor&& visit) {
 }
 
 /// Counts the clusters that are larger than 0.5 m; true ones are mostly of objects that stand.
-/// A parked car that stands on one of the two days only is a change, like a container.
+/// A parked car that stands on one of the two days only is a change, like a container. So is a car
+/// that waits for as long as the sensor sees it.
 void judge_clusters(const std::vector<DiffPoint>& points, Count& count) {
   constexpr double kLeastExtent = 0.5;  // m
   for_each_cluster(points, [&](const std::vector<std::uint32_t>& cluster) {
@@ -252,14 +280,13 @@ void judge_clusters(const std::vector<DiffPoint>& points, Count& count) {
     std::size_t objects = 0;
     for (const std::uint32_t i : cluster) {
       box.extend(points[i].position);
-      objects += instance_of(points[i].label) != 0 && !is_moving(points[i].label) ? 1 : 0;
+      objects += points[i].is_of_change ? 1 : 0;
     }
     if (box.sizes().maxCoeff() > kLeastExtent) count.add(2 * objects > cluster.size());
   });
 }
 
-void judge_diff(const City& city, const std::set<std::uint32_t>& before,
-                const std::set<std::uint32_t>& after, Result& result) {
+void judge_diff(const City& city, const std::vector<Day>& days, Result& result) {
   const CityMap map(city);
   const auto last = static_cast<std::uint32_t>(map.sessions().size() - 1);
   struct Share {
@@ -276,13 +303,18 @@ void judge_diff(const City& city, const std::set<std::uint32_t>& before,
     };
     count(0, left);
     count(last, came);
-    const CityChanges changes = map.changes(tile, 0, last);
+    const CityChanges changes = map.changes(tile, history, 0, last);
+    const auto diff_point = [&](const CityPoint& p) {
+      const bool stands =
+          instance_of(p.point.label) != 0 && !days[p.session].moved.contains(p.point.label);
+      return DiffPoint{map.position(tile, p.point), stands};
+    };
     for (const CityPoint& p : changes.added) {
-      added.push_back({map.position(tile, p.point), p.point.label});
+      added.push_back(diff_point(p));
       ++came[instance_of(p.point.label)].changed;
     }
     for (const CityPoint& p : changes.removed) {
-      removed.push_back({map.position(tile, p.point), p.point.label});
+      removed.push_back(diff_point(p));
       ++left[instance_of(p.point.label)].changed;
     }
   }
@@ -291,6 +323,7 @@ void judge_diff(const City& city, const std::set<std::uint32_t>& before,
   const auto judge = [&](const Share& share) {
     result.changes.add(share.changed > 0 && 2 * share.changed >= share.of);
   };
+  const std::set<std::uint32_t>&before = days.front().changes, &after = days.back().changes;
   for (const std::uint32_t change : after) {
     if (before.count(change) == 0) judge(came[change]);
   }
@@ -302,15 +335,14 @@ void judge_diff(const City& city, const std::set<std::uint32_t>& before,
 Result try_days(const fs::path& folder, int days, simulation::Config config) {
   constexpr SessionPointsConfig kAnyDistance{300.0};
   const City city = City::open_or_make(folder, {});
-  std::vector<std::set<std::uint32_t>> changes;
-  std::vector<Measured> measured;
+  std::vector<Day> measured;
   for (config.day = 1; config.day <= days; ++config.day) {
     measured.push_back({SessionPoints(city.grid()), SessionPoints(city.grid(), kAnyDistance)});
-    changes.push_back(add_day(city, config, measured.back()));
+    add_day(city, config, measured.back());
   }
   Result result;
-  judge_map(city, measured, changes.back(), result);
-  judge_diff(city, changes.front(), changes.back(), result);
+  judge_map(city, measured, result);
+  judge_diff(city, measured, result);
   return result;
 }
 

@@ -1,5 +1,3 @@
-#include "figure.hpp"
-
 #include <png.h>
 
 #include <algorithm>
@@ -9,12 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "change_picture.hpp"
 #include "chart.hpp"
 #include "dynains/errors.hpp"
 #include "picture.hpp"
 #include "sequences.hpp"
 #include "support/catch.hpp"
 #include "verdict_cloud.hpp"
+#include "verdict_figure.hpp"
 
 namespace dynains::program {
 
@@ -25,6 +25,34 @@ namespace {
 constexpr Colour kWhite = {255, 255, 255};
 constexpr Colour kRed = {255, 0, 0};
 constexpr Colour kBlue = {0, 0, 255};
+
+/// A PNG file as a picture.
+Picture read_picture(const std::filesystem::path& path) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  REQUIRE(png_image_begin_read_from_file(&image, path.c_str()) != 0);
+  image.format = PNG_FORMAT_RGB;
+  std::vector<unsigned char> bytes(PNG_IMAGE_SIZE(image));
+  REQUIRE(png_image_finish_read(&image, nullptr, bytes.data(), 0, nullptr) != 0);
+  Picture picture(static_cast<int>(image.width), static_cast<int>(image.height));
+  for (int y = 0; y < picture.height(); ++y) {
+    for (int x = 0; x < picture.width(); ++x) {
+      const unsigned char* p = &bytes[static_cast<std::size_t>(3 * (picture.width() * y + x))];
+      picture.set(x, y, {p[0], p[1], p[2]});
+    }
+  }
+  return picture;
+}
+
+/// Whether a pixel at most 3 pixels away has a colour.
+bool has_colour_near(const Picture& picture, int x, int y, Colour colour) {
+  for (int row = y - 3; row <= y + 3; ++row) {
+    for (int column = x - 3; column <= x + 3; ++column) {
+      if (picture.at(column, row) == colour) return true;
+    }
+  }
+  return false;
+}
 
 /// One point for each of the four outcomes, 10 m from the sensor.
 VerdictCloud four_fates() {
@@ -91,19 +119,11 @@ TEST_CASE("A picture is read back from its PNG file") {
   const auto path = folder.path() / "picture.png";
   picture.write_png(path);
 
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  REQUIRE(png_image_begin_read_from_file(&image, path.c_str()) != 0);
-  CHECK(image.width == 7);
-  CHECK(image.height == 3);
-  image.format = PNG_FORMAT_RGB;
-  std::vector<unsigned char> bytes(PNG_IMAGE_SIZE(image));
-  REQUIRE(png_image_finish_read(&image, nullptr, bytes.data(), 0, nullptr) != 0);
+  const Picture read = read_picture(path);
+  REQUIRE(read.width() == 7);
+  REQUIRE(read.height() == 3);
   for (int y = 0; y < 3; ++y) {
-    for (int x = 0; x < 7; ++x) {
-      const unsigned char* pixel = &bytes[static_cast<std::size_t>(3 * (7 * y + x))];
-      CHECK(picture.at(x, y) == Colour{pixel[0], pixel[1], pixel[2]});
-    }
+    for (int x = 0; x < 7; ++x) CHECK(picture.at(x, y) == read.at(x, y));
   }
   CHECK_THROWS_AS(picture.write_png(folder.path() / "missing" / "picture.png"), IoError);
 }
@@ -207,28 +227,14 @@ TEST_CASE("gnuplot draws a figure from files in any folder") {
   CHECK(has(script, "removed dynamic"));
   CHECK(!has(script, folder.path().string()));
 
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  REQUIRE(png_image_begin_read_from_file(&image, (strange / "cleaned.png").c_str()) != 0);
-  image.format = PNG_FORMAT_RGB;
-  std::vector<unsigned char> bytes(PNG_IMAGE_SIZE(image));
-  REQUIRE(png_image_finish_read(&image, nullptr, bytes.data(), 0, nullptr) != 0);
-  CHECK(image.width == 640);
-  CHECK(image.height == 510);
+  const Picture picture = read_picture(strange / "cleaned.png");
+  CHECK(picture.width() == 640);
+  CHECK(picture.height() == 510);
   // 20 m on 400 pixels, from 80 pixels on the left and 40 at the top.
-  const auto has_colour_near = [&](int x, int y, Colour colour) {
-    for (int row = y - 3; row <= y + 3; ++row) {
-      for (int column = x - 3; column <= x + 3; ++column) {
-        const unsigned char* p = &bytes[static_cast<std::size_t>(3 * (640 * row + column))];
-        if (Colour{p[0], p[1], p[2]} == colour) return true;
-      }
-    }
-    return false;
-  };
-  CHECK(has_colour_near(280, 41, kFateColours[1]));
-  CHECK(has_colour_near(81, 240, kFateColours[2]));
-  CHECK(has_colour_near(280, 438, kFateColours[3]));
-  CHECK(!has_colour_near(150, 150, kFateColours[3]));
+  CHECK(has_colour_near(picture, 280, 41, kFateColours[1]));
+  CHECK(has_colour_near(picture, 81, 240, kFateColours[2]));
+  CHECK(has_colour_near(picture, 280, 438, kFateColours[3]));
+  CHECK(!has_colour_near(picture, 150, 150, kFateColours[3]));
   // A second call writes equal bytes.
   write_figure(figure, folder.path(), "cleaned");
   draw_figure(folder.path(), "cleaned");
@@ -253,6 +259,64 @@ TEST_CASE("Without gnuplot, the data stay, and the error names the package") {
   CHECK(std::filesystem::exists(folder.path() / "map.gp"));
   CHECK(std::filesystem::exists(folder.path() / "map.dat"));
   CHECK(!std::filesystem::exists(folder.path() / "map.png"));
+}
+
+TEST_CASE("A picture of changes shows what came, what left and what stands, also far away") {
+  SessionInfo first, second;
+  first.lowest = Eigen::Vector3d(512310.0, -5403020.0, 0.0);
+  first.highest = Eigen::Vector3d(512340.0, -5403000.0, 5.0);
+  second.lowest = Eigen::Vector3d(512320.0, -5403020.0, 0.0);
+  second.highest = Eigen::Vector3d(512350.0, -5403010.0, 5.0);
+  ChangePicture changes({first, second}, 401);
+  const auto at = [&](double x, double y, double z) {
+    return Eigen::Vector3d(first.lowest + Eigen::Vector3d(x, y, z));
+  };
+  changes.add_standing(at(5.0, 5.0, 0.0), false);
+  changes.add_standing(at(10.0, 5.0, 0.0), false);
+  changes.add_standing(at(10.0, 5.0, 2.0), true);  // above the ground
+  changes.add_removed(at(20.0, 15.0, 1.0));
+  changes.add_standing(at(20.0, 15.0, 4.0), true);  // higher, but no change
+  changes.add_added(at(30.0, 5.0, 1.0));
+  changes.add_removed(at(30.0, 5.0, 2.0));
+  changes.add_added(at(-1.0, 5.0, 1.0));  // outside
+  const Figure figure = changes.figure();
+  CHECK(figure.width == 401);  // 40 m
+  CHECK(figure.height == 201);
+  CHECK(figure.layers[0].size() == 2);
+  CHECK(figure.layers[1].size() == 1);
+  CHECK(figure.layers[2].size() == 1);
+  CHECK(figure.legend.size() == 4);
+
+  const TemporaryFolder folder;
+  write_figure(figure, folder.path(), "changes");
+  const std::string script = read_text(folder.path() / "changes.gp");
+  CHECK(has(script, "\"x - 510000 (m)\""));
+  CHECK(has(script, "\"y + 5400000 (m)\""));
+  CHECK(has(script, "\"10 m\""));
+  CHECK(has(script, "\"removed\""));
+  try {
+    draw_figure(folder.path(), "changes");
+  } catch (const IoError& error) {
+    if (!has(error.what(), "is not installed")) throw;
+    WARN("SKIPPED: no gnuplot");
+    return;
+  }
+  // 10 pixels per m, from 80 pixels on the left; y = 0 is 40 + 201 pixels below the top.
+  const Picture picture = read_picture(folder.path() / "changes.png");
+  CHECK(has_colour_near(picture, 80 + 50, 241 - 50, kStandingGroundColour));
+  CHECK(has_colour_near(picture, 80 + 100, 241 - 50, kStandingObjectColour));
+  CHECK(has_colour_near(picture, 80 + 200, 241 - 150, kRemovedColour));
+  CHECK(!has_colour_near(picture, 80 + 200, 241 - 150, kStandingObjectColour));
+  CHECK(has_colour_near(picture, 80 + 300, 241 - 50, kAddedColour));
+  CHECK(!has_colour_near(picture, 80 + 300, 241 - 50, kRemovedColour));
+  CHECK(!has_colour_near(picture, 80 + 300, 241 - 150, kRemovedColour));
+}
+
+TEST_CASE("A picture of a map without sessions is empty") {
+  const Figure figure = ChangePicture({}, 100).figure();
+  CHECK(count_dots(figure) == 0);
+  CHECK(figure.width == 100);
+  CHECK(figure.origin_x == 0.0);
 }
 
 TEST_CASE("The script of a chart has its data, with gaps, and texts that are only texts") {

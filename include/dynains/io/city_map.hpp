@@ -47,7 +47,12 @@ class CityMap {
   /// Objects larger than 0.5 m that came or left from the map after session `a` to the map after
   /// session `b`, see ChangeClusters. Places that only one of both maps has seen are no changes.
   /// Throws ConfigError unless `a` is before `b`; IoError.
-  CityChanges changes(const TileIndex& tile, std::uint32_t a, std::uint32_t b) const;
+  CityChanges changes(const TileIndex& tile, std::uint32_t a, std::uint32_t b) const {
+    return changes(tile, history(tile, b), a, b);
+  }
+  /// With the history of the tile over sessions 0 to `b`, or more.
+  CityChanges changes(const TileIndex& tile, const TileHistory& history, std::uint32_t a,
+                      std::uint32_t b) const;
 
   /// World position of a point of a tile, m.
   Eigen::Vector3d position(const TileIndex& tile, const SessionPoint& point) const {
