@@ -13,8 +13,8 @@ struct Candidates {
   std::vector<ChangedPoint> points;
   std::vector<std::uint32_t> sessions;
 
-  void add(std::size_t session, const SessionPoint& point, std::uint32_t hits) {
-    points.push_back({point, hits});
+  void add(std::size_t session, const ChangedPoint& point) {
+    points.push_back(point);
     sessions.push_back(static_cast<std::uint32_t>(session));
   }
   void keep(const std::vector<bool>& is_kept) {
@@ -95,7 +95,8 @@ CityChanges CityMap::changes(const TileIndex& tile, const TileHistory& history, 
     if (other.find(session_voxel(grid, point)) != VoxelHashTable<>::kNone) {
       clusters.add_standing(point);
     } else {
-      candidates.add(session, point, history.own_hits(session, i));
+      candidates.add(session,
+                     {point, history.own_hits(session, i), history.own_beams_passed(session, i)});
     }
   };
   history.for_each_standing(a, [&](std::size_t session, std::size_t i) {

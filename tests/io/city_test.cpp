@@ -263,7 +263,7 @@ TEST_CASE("clusters of changes: small ones, parts and what was seen too briefly 
     for (int column = 0; column < 10; ++column) {
       const float x = 5.1F + 0.2F * static_cast<float>(column);
       for (float z = 0.1F; z < height; z += 0.2F) {
-        points.push_back({{x, 5.1F, z, 0, 0, false}, hits});
+        points.push_back({{x, 5.1F, z, 0, 0, false}, hits, false});
       }
     }
     return points;
@@ -278,6 +278,12 @@ TEST_CASE("clusters of changes: small ones, parts and what was seen too briefly 
   CHECK(selected(alone, wall(0.4F, 5)) == 0);  // lower than 0.4 m
   CHECK(selected(alone, wall(1.6F, 2)) == 0);
   CHECK(selected(alone, {}) == 0);
+  // What stood there for a part of its session moved.
+  std::vector<ChangedPoint> waiting = wall(1.6F, 5);
+  for (std::size_t i = 0; i < 4; ++i) waiting[10 * i].is_passed = true;
+  CHECK(selected(alone, waiting) == 80);  // 5 %
+  waiting.back().is_passed = true;
+  CHECK(selected(alone, waiting) == 0);
   ChangeClusters in_a_corner(grid), in_a_bush(grid);
   for (const ChangedPoint& changed : wall(1.6F, 5)) {
     SessionPoint beside = changed.point;

@@ -14,11 +14,12 @@ namespace dynains {
 /// A point that stands in one state of a tile and not in the other.
 struct ChangedPoint {
   SessionPoint point;
-  std::uint32_t hits;  ///< references of its own session that hit its place
+  std::uint32_t hits;      ///< references of its own session that hit its place
+  bool is_passed = false;  ///< whether beams of its own session passed through its place, too
 };
 
 /// Finds the clusters of changed points that are objects: larger than 0.5 m, seen standing by
-/// their own session, and not a part of something that stands in both states.
+/// their own session all the time, and not a part of something that stands in both states.
 class ChangeClusters {
  public:
   explicit ChangeClusters(const SessionGrid& grid) : grid_((grid.validate(), grid)) {}
@@ -75,11 +76,12 @@ class ChangeClusters {
   static constexpr float kLeastHeight = 0.4F;  // m
   static constexpr std::size_t kLeastCells = 8;
   static constexpr float kLeastHits = 3.0F;    // references, mean of the points
-  static constexpr float kMostContact = 0.5F;  // ratio of the cells beside what stands to all
+  static constexpr float kMostPassed = 0.05F;  // ratio of the points
+  static constexpr float kMostContact = 0.7F;  // ratio of the cells beside what stands to all
 
   struct Shape {
     float lowest[3] = {1e9F, 1e9F, 1e9F}, highest[3] = {-1e9F, -1e9F, -1e9F};  // m
-    std::size_t points = 0, hits = 0;
+    std::size_t points = 0, hits = 0, passed = 0;
     std::size_t contacts = 0;  // cells beside what stands
 
     void add(const ChangedPoint& changed) {
@@ -90,6 +92,7 @@ class ChangeClusters {
       }
       ++points;
       hits += changed.hits;
+      passed += changed.is_passed ? 1 : 0;
     }
   };
 
@@ -99,6 +102,7 @@ class ChangeClusters {
         std::max({height, shape.highest[0] - shape.lowest[0], shape.highest[1] - shape.lowest[1]});
     return cells >= kLeastCells && extent > kLeastExtent && height > kLeastHeight &&
            static_cast<float>(shape.hits) >= kLeastHits * static_cast<float>(shape.points) &&
+           static_cast<float>(shape.passed) <= kMostPassed * static_cast<float>(shape.points) &&
            static_cast<float>(shape.contacts) <= kMostContact * static_cast<float>(cells);
   }
 

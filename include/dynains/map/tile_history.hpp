@@ -28,8 +28,10 @@ namespace dynains {
 ///   stands there. What does not stand does not come in.
 /// - A later session that passes through it removes it.
 /// Touching blocks above the ground form components. A component that has mostly left leaves as a
-/// whole. Blocks of different sessions do not influence each other, except that the lowest ground
-/// of all sessions tells what is ground.
+/// whole; if it is larger than a vehicle, each of its cubes of 8 blocks decides for itself. Blocks
+/// of different sessions do not influence each other, except that the ground of all sessions tells
+/// what is ground: ground points above it, where no other session has any and nothing stands,
+/// leave.
 class TileHistory {
  public:
   static constexpr std::uint32_t kNever = std::numeric_limits<std::uint32_t>::max();
@@ -37,7 +39,7 @@ class TileHistory {
   /// The session that removed a point, and its latest reference scan that passed through.
   struct Removal {
     std::uint32_t session = kNever;  ///< number in the order of the sessions
-    std::uint32_t scan = 0;
+    std::uint32_t scan = 0;          ///< 0 if none passed: ground of another height removed it
   };
 
   /// Throws ConfigError.
@@ -59,6 +61,11 @@ class TileHistory {
   /// Number of references of its own session that hit the block of a point, up to 255.
   std::uint32_t own_hits(std::size_t session, std::size_t point) const {
     return sessions_[session].own_hits[sessions_[session].block_of[point]];
+  }
+  /// Whether a reference of its own session passed through the block of a point at some time.
+  bool own_beams_passed(std::size_t session, std::size_t point) const {
+    const Session& own = sessions_[session];
+    return own.most_own_level[own.block_of[point]] >= level_;
   }
   /// Whether a point is no ground, or higher than the lowest ground around of the sessions that
   /// have tested.
@@ -83,7 +90,7 @@ class TileHistory {
     Session session;
     session.number = static_cast<std::uint32_t>(sessions_.size());
     session.points = std::move(points);
-    VoxelHashTable<> blocks;
+    VoxelHashTable<>& blocks = session.blocks;
     session.block_of.reserve(session.points.size());
     for (const SessionPoint& point : session.points) {
       const VoxelKey voxel = session_voxel(grid_, point);
@@ -103,6 +110,8 @@ class TileHistory {
     }
     session.level.assign(blocks.size(), 0.0F);
     session.own_hits.assign(blocks.size(), 0);
+    session.own_level.assign(blocks.size(), 0.0F);
+    session.most_own_level.assign(blocks.size(), 0.0F);
     session.free_scan.assign(blocks.size(), 0);
     session.removal_of.assign(blocks.size(), Removal());
     sessions_.push_back(std::move(session));
@@ -135,6 +144,7 @@ class TileHistory {
     for (std::uint32_t i = 0; i <= by; ++i) {
       remove_blocks(by, sessions_[i]);
       remove_components(by, sessions_[i]);
+      remove_unconfirmed_ground(by, sessions_[i]);
     }
     for (std::size_t i = 0; i < sessions_.size(); ++i) {
       // Whatever the earlier sessions have seen, a few references of its own show that it stands.
@@ -169,6 +179,8 @@ class TileHistory {
   static constexpr float kNoLimit = std::numeric_limits<float>::max();
   static constexpr float kGroundCell = 1.0F;   // m
   static constexpr float kGroundRise = 0.35F;  // m above the lowest ground around
+  static constexpr double kLowCell = 0.4;      // m
+  static constexpr float kLowRise = 0.2F;      // m above the lowest ground of a low cell
   static constexpr double kCompactLength = 18.0, kCompactHeight = 4.5;  // m
 
   /// Least numbers of free blocks from which a component has left.
@@ -178,16 +190,33 @@ class TileHistory {
   };
   static constexpr Limits kNotStanding = {2.0F, 0.3F};   // in its own session
   static constexpr Limits kCompactLeft = {0.25F, 0.1F};  // the size of a vehicle
-  static constexpr Limits kLeft = {1.0F, 0.5F};
+  static constexpr Limits kLeft = {1.0F, 0.2F};
+  static constexpr int kCubeBits = 3;  // cubes of 8 blocks
+
+  /// The sessions that have measured a place, as far as it matters.
+  struct SeenBy {
+    std::uint32_t first;
+    bool has_others = false;
+
+    void add(std::uint32_t session) { has_others = has_others || session != first; }
+    bool has_other_than(std::size_t session) const { return has_others || session != first; }
+  };
+  struct LowGround {
+    float z;  // m
+    SeenBy sessions;
+  };
 
   struct Session {
     std::uint32_t number = 0;
     std::vector<SessionPoint> points;
+    VoxelHashTable<> blocks;                  // numbers of the keys
     std::vector<VoxelKey> keys;               // by block
     std::vector<std::uint32_t> block_of;      // by point
     std::vector<std::uint32_t> begin;         // by block: in by_block
     std::vector<std::uint32_t> by_block;      // points, sorted by block
     std::vector<float> level;                 // by block: log-odds of being free
+    std::vector<float> own_level;             // by block: sum of this session, never below zero
+    std::vector<float> most_own_level;        // by block: highest own_level
     std::vector<std::uint8_t> own_hits;       // by block: references of this session that hit
     std::vector<std::uint32_t> free_scan;     // by block: latest reference that passed
     std::vector<std::uint32_t> component_of;  // by block, or kNone for ground
@@ -200,20 +229,72 @@ class TileHistory {
                      static_cast<std::int64_t>(point.y / kGroundCell), 0);
   }
 
+  static VoxelKey low_cell(const SessionPoint& point) {
+    return voxel_key(static_cast<std::int64_t>(static_cast<double>(point.x) / kLowCell),
+                     static_cast<std::int64_t>(static_cast<double>(point.y) / kLowCell), 0);
+  }
+
   void add_ground(const Session& session) {
     for (const SessionPoint& point : session.points) {
+      const std::uint32_t voxel = filled_.insert(session_voxel(grid_, point));
+      if (voxel == filled_by_.size()) filled_by_.push_back({session.number});
+      filled_by_[voxel].add(session.number);
       if (!point.is_ground) continue;
       const std::uint32_t cell = ground_cells_.insert(ground_cell(point));
       if (cell == lowest_ground_.size()) lowest_ground_.push_back(point.z);
       lowest_ground_[cell] = std::min(lowest_ground_[cell], point.z);
+      const std::uint32_t low = low_cells_.insert(low_cell(point));
+      if (low == low_ground_.size()) low_ground_.push_back({point.z, {session.number}});
+      low_ground_[low].z = std::min(low_ground_[low].z, point.z);
+      low_ground_[low].sessions.add(session.number);
     }
+  }
+
+  // Whether a ground point of a session is an object's: above the ground that another session saw
+  // in its cell, at a place where no other session has a point. The ground has one height.
+  bool is_unconfirmed_ground(std::size_t session, const SessionPoint& point) const {
+    if (!point.is_ground) return false;
+    const std::uint32_t cell = low_cells_.find(low_cell(point));
+    if (cell == kNone || !low_ground_[cell].sessions.has_other_than(session)) return false;
+    if (point.z <= low_ground_[cell].z + kLowRise) return false;
+    const VoxelKey voxel = session_voxel(grid_, point);
+    for (int i = 0; i < 27; ++i) {
+      const std::uint32_t filled =
+          filled_.find(voxel + voxel_key_step(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
+      if (filled != kNone && filled_by_[filled].has_other_than(session)) return false;
+    }
+    return true;
+  }
+
+  // Removes the blocks that mostly are unconfirmed ground after session number `by`.
+  void remove_unconfirmed_ground(std::uint32_t by, Session& session) const {
+    for (std::size_t block = 0; block < session.keys.size(); ++block) {
+      if (session.removal_of[block].session != kNever) continue;
+      std::uint32_t unconfirmed = 0;
+      for (std::uint32_t i = session.begin[block]; i < session.begin[block + 1]; ++i) {
+        unconfirmed +=
+            is_unconfirmed_ground(session.number, session.points[session.by_block[i]]) ? 1 : 0;
+      }
+      const bool is_object = 2 * unconfirmed > session.begin[block + 1] - session.begin[block];
+      if (is_object && !touches_standing_object(session, session.keys[block])) {
+        session.removal_of[block] = {by, session.free_scan[block]};
+      }
+    }
+  }
+
+  static bool touches_standing_object(const Session& session, const VoxelKey& key) {
+    for (int i = 0; i < 27; ++i) {
+      const std::uint32_t block =
+          session.blocks.find(key + voxel_key_step(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
+      if (block == kNone || session.component_of[block] == kNone) continue;
+      if (session.removal_of[block].session == kNever) return true;
+    }
+    return false;
   }
 
   // Numbers the components of touching blocks with points above the ground.
   void find_components(Session& session) const {
     const std::vector<VoxelKey>& keys = session.keys;
-    VoxelHashTable<> blocks;
-    for (const VoxelKey& key : keys) blocks.insert(key);
     std::vector<std::uint8_t> is_object(keys.size(), 0);
     for (std::size_t i = 0; i < session.points.size(); ++i) {
       if (is_above_ground(session.points[i])) is_object[session.block_of[i]] = 1;
@@ -227,7 +308,7 @@ class TileHistory {
       members.assign(1, first);
       for (std::size_t next = 0; next < members.size(); ++next) {
         for (int i = 0; i < 27; ++i) {
-          const std::uint32_t block = blocks.find(
+          const std::uint32_t block = session.blocks.find(
               keys[members[next]] + voxel_key_step(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
           const bool is_new =
               block != kNone && is_object[block] != 0 && session.component_of[block] == kNone;
@@ -236,8 +317,25 @@ class TileHistory {
           members.push_back(block);
         }
       }
-      session.is_compact.push_back(is_compact(keys, members) ? 1 : 0);
+      if (is_compact(keys, members)) {
+        session.is_compact.push_back(1);
+      } else {
+        divide(members, session);
+      }
     }
+  }
+
+  // Makes a component of each cube of a larger one: a tree that was felled beside others leaves
+  // alone.
+  static void divide(const std::vector<std::uint32_t>& members, Session& session) {
+    const auto first = static_cast<std::uint32_t>(session.is_compact.size());
+    VoxelHashTable<> cubes;
+    for (const std::uint32_t block : members) {
+      const VoxelKey& key = session.keys[block];
+      const auto cube = [&](int axis) { return voxel_index(key, axis) >> kCubeBits; };
+      session.component_of[block] = first + cubes.insert(voxel_key(cube(0), cube(1), cube(2)));
+    }
+    session.is_compact.resize(first + cubes.size(), 0);
   }
 
   bool is_compact(const std::vector<VoxelKey>& keys,
@@ -331,15 +429,18 @@ class TileHistory {
     const auto least = static_cast<float>(std::min(2U, samples));
     if (visible < std::max(least, kLeastVisible * static_cast<float>(samples))) return;
     const float free_ratio = static_cast<float>(free) / visible;
-    if (free_ratio >= detail::FreeSpaceSum::kFreeRatio) {
-      session.level[block] += free_;
-      session.free_scan[block] = scan;
-    }
-    if (free_ratio <= detail::FreeSpaceSum::kHitRatio) {
-      session.level[block] += hit_;
-      std::uint8_t& hits = session.own_hits[block];
-      if (session.number == tested_count_ && hits < 255) ++hits;
-    }
+    const bool is_free = free_ratio >= detail::FreeSpaceSum::kFreeRatio;
+    const bool is_hit = free_ratio <= detail::FreeSpaceSum::kHitRatio;
+    if (!is_free && !is_hit) return;
+    const float step = is_free ? free_ : hit_;
+    session.level[block] += step;
+    if (is_free) session.free_scan[block] = scan;
+    if (session.number != tested_count_) return;
+    session.own_level[block] = std::max(0.0F, session.own_level[block] + step);
+    session.most_own_level[block] =
+        std::max(session.most_own_level[block], session.own_level[block]);
+    std::uint8_t& hits = session.own_hits[block];
+    if (is_hit && hits < 255) ++hits;
   }
 
   SessionGrid grid_;
@@ -349,7 +450,11 @@ class TileHistory {
   std::vector<Session> sessions_;
   std::size_t tested_count_ = 0;
   VoxelHashTable<> ground_cells_;
-  std::vector<float> lowest_ground_;   // m, by cell
+  std::vector<float> lowest_ground_;  // m, by cell
+  VoxelHashTable<> low_cells_;
+  std::vector<LowGround> low_ground_;  // by low cell
+  VoxelHashTable<> filled_;            // voxels of all sessions
+  std::vector<SeenBy> filled_by_;      // by voxel
   std::vector<std::uint32_t> tested_;  // blocks
   std::vector<std::uint32_t> begin_;   // by tested block: first sample, and the end
   PointBuffer samples_;
