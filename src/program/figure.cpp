@@ -126,9 +126,11 @@ Figure DotGrid::figure() const {
   for (std::size_t i = 0; i < cells_.size(); ++i) {
     const Cell& cell = cells_[i];
     if (cell.layer < 0) continue;
+    const std::size_t row = i / columns;
+    const std::size_t column = i % columns;
     figure.layers[static_cast<std::size_t>(cell.layer)].push_back(
-        {static_cast<float>(figure.low_x + (static_cast<double>(i % columns) + 0.5) * step_x),
-         static_cast<float>(figure.low_y + (static_cast<double>(i / columns) + 0.5) * step_y),
+        {static_cast<float>(figure.low_x + (static_cast<double>(column) + 0.5) * step_x),
+         static_cast<float>(figure.low_y + (static_cast<double>(row) + 0.5) * step_y),
          cell.colour});
   }
   return figure;
