@@ -40,6 +40,10 @@ BodyMotion motion_under(const Recording& recording, const PoseConvention& conven
   };
 }
 
+std::optional<Eigen::Isometry3d> no_motion(const RegisteredMotion& /*motion*/) {
+  return Eigen::Isometry3d::Identity();
+}
+
 BodyMotion motion_after(const Recording& recording, double offset) {
   return [&recording, offset](const RegisteredMotion& m) -> std::optional<Eigen::Isometry3d> {
     const auto T_world_a = recording.pose_after(m.first, offset);
@@ -241,9 +245,12 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
   const double before = all.at_points;
   if (d.verdict == PoseVerdict::kAgree && before > kFarOff) {
     // In traffic of the own speed, a registration can find no motion, though the poses agree with
-    // all that stands still.
-    d.registered_pairs = 0;
-    return;
+    // all that stands still. Any other motion contradicts the poses.
+    if (motions.size() < kFewestMotions || error_at_points(motions, no_motion) < 0.5 * before) {
+      d.registered_pairs = 0;
+      return;
+    }
+    d.verdict = PoseVerdict::kDisagree;
   }
   const double exact = std::max(kExact, 2.0 * all.noise);
   d.translation_error = steps.translation;
