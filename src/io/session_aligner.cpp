@@ -410,7 +410,8 @@ SessionAlignment SessionAligner::align(const Eigen::Isometry3d& T_city_start) co
   double farthest = 0.0;
   for (const Scan& scan : scans_) farthest = std::max(farthest, to_fit(scan.sensor).norm());
   std::set<std::string> names;
-  // What is near the seed determines the rotation first, so that it is known for what is farther.
+  // Scans near the seed come first: they determine the rotation. A wrong rotation displaces distant
+  // scans by more than the registration can correct.
   constexpr double kFirstRadius = 25.0;  // m
   for (double radius = kFirstRadius;; radius *= 2.0) {
     const bool is_first = radius == kFirstRadius;

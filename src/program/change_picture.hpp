@@ -15,7 +15,7 @@ inline constexpr Colour kStandingObjectColour = {130, 130, 130};
 inline constexpr Colour kAddedColour = {30, 80, 220};
 inline constexpr Colour kRemovedColour = {220, 20, 30};
 
-/// What came is drawn over what left, and both over what stands.
+/// Added points cover removed points, and both cover standing points.
 class ChangePicture {
  public:
   /// Shows the places of all sessions; the longer side has `pixels` pixels.

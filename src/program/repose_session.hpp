@@ -9,7 +9,7 @@
 
 namespace dynains::program {
 
-/// What replaces a session.
+/// The run and the poses from which a session is written again.
 struct ReposedSession {
   std::filesystem::path city;
   std::string name;

@@ -99,10 +99,10 @@ TEST_CASE("a tile: ground above the ground of another session leaves, unless ano
   std::vector<SessionPoint> parked = with_car;
   add_box(parked, 2.0F, 6.0F, 0.5F, 1.5F, 10);
   CHECK(count_standing(history_of({street(0.19F), parked}), 1, 1, is_raised) == raised);
-  // A session that did not see the street there tells nothing.
+  // A session without points at this place removes nothing there.
   CHECK(count_standing(history_of({with_car, {point_at(20.0F, 20.0F, 0.0F, 1)}}), 1, 0,
                        is_raised) == raised);
-  // Nor does a kerb.
+  // A height difference of a kerb removes no ground.
   CHECK(history_of({street(0.35F), street(0.19F)}).stands(0, 0, 1));
 }
 

@@ -278,7 +278,7 @@ TEST_CASE("clusters of changes: small ones, parts and what was seen too briefly 
   CHECK(selected(alone, wall(0.4F, 5)) == 0);  // lower than 0.4 m
   CHECK(selected(alone, wall(1.6F, 2)) == 0);
   CHECK(selected(alone, {}) == 0);
-  // What stood there for a part of its session moved.
+  // An object moved if beams of its own session passed through its place.
   std::vector<ChangedPoint> waiting = wall(1.6F, 5);
   for (std::size_t i = 0; i < 4; ++i) waiting[10 * i].is_passed = true;
   CHECK(selected(alone, waiting) == 80);  // 5 %

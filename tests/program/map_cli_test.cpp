@@ -150,7 +150,7 @@ TEST_CASE("map: diff writes points and a picture, and replaces nothing unasked")
   const auto content = content_of(days.at("changes"));
   CHECK(content.size() == 5);
   CHECK(content.at("changes.png").substr(1, 3) == "PNG");
-  // What stands is drawn.
+  // The picture contains the points of the map, not only the changes.
   CHECK(content.at("changes.dat").size() > 1000);
   CHECK(diff({"--picture", picture, "--pixels", "300", "--force"}).code == 0);
   CHECK(content_of(days.at("changes")) == content);
@@ -180,7 +180,7 @@ TEST_CASE("map: a session twice, another voxel edge and bad names are refused, a
   // Nothing to do for a complete run; no second session.
   CHECK(days.update(0, "city", "out", {"--resume"}).code == 0);
   CHECK(content_of(days.at("city")) == before);
-  // What left comes back with the same bytes.
+  // Removed points come back with the same bytes.
   CHECK(start({"map", days.at("city"), "drop", "day0"}).code == 0);
   CHECK(days.update(0, "city", "out", {"--resume"}).code == 0);
   CHECK(content_of(days.at("city")) == before);

@@ -35,11 +35,7 @@ class VerdictWriter {
   /// Ensures capacity for a scan of `points` points and writes to the memory, so that later scans
   /// cause no page faults.
   void touch(std::size_t points) {
-    const auto touch_all = [points](auto&... values) {
-      (ensure_capacity(values, points), ...);
-      (values.resize(points), ...);
-    };
-    touch_all(labels_, instances_, beliefs_, causes_, is_kept_, group_of_input_);
+    resize_all(points, labels_, instances_, beliefs_, causes_, is_kept_, group_of_input_);
   }
 
   /// Ensures capacity for the number of groups of `other`.
@@ -58,7 +54,7 @@ class VerdictWriter {
     std::uint32_t* const instances = instances_.data();
     const std::size_t non_ground_count = scan.instances.size();
     for (std::size_t i = 0; i < non_ground_count; ++i) instances[input[i]] = ids[i];
-    resize_all(count);
+    resize_all(count, labels_, beliefs_, causes_);
   }
 
   /// Writes the verdict of the windows so far on all points: dynamic with at least `votes_needed`
@@ -147,12 +143,10 @@ class VerdictWriter {
   static constexpr std::uint32_t kGroundPoints = 1;
   static constexpr std::uint32_t kFirstGroup = 2;
 
-  void resize_all(std::size_t count) {
-    const auto resize = [count](auto&... values) {
-      (ensure_capacity(values, count), ...);
-      (values.resize(count), ...);
-    };
-    resize(labels_, beliefs_, causes_);
+  template <class... Vectors>
+  static void resize_all(std::size_t count, Vectors&... values) {
+    (ensure_capacity(values, count), ...);
+    (values.resize(count), ...);
   }
 
   // Writes the verdict on ground and on invalid points; other points get that of the ground.
