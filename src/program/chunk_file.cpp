@@ -58,14 +58,6 @@ std::uint64_t Checksum::value() const {
   return result;
 }
 
-void ChunkScan::take(const ScanVerdict& verdict, bool with_beliefs) {
-  labels.assign(verdict.labels.begin(), verdict.labels.end());
-  causes.assign(verdict.causes.begin(), verdict.causes.end());
-  instances.assign(verdict.instances.begin(), verdict.instances.end());
-  beliefs.clear();
-  if (with_beliefs) beliefs.assign(verdict.beliefs.begin(), verdict.beliefs.end());
-}
-
 void VerdictRuns::assign(const ChunkScan& scan) {
   ends.clear();
   instances.clear();

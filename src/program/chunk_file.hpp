@@ -17,6 +17,7 @@
 #include "label_counts.hpp"
 #include "overview.hpp"
 #include "run_timing.hpp"
+#include "verdict_arrays.hpp"
 
 namespace dynains::program {
 
@@ -39,16 +40,9 @@ struct MovingPoint {
 
 /// The final verdict on one scan, with ids of the chunk. Each array has one value per point, or is
 /// empty if no output needs it.
-struct ChunkScan {
-  std::vector<PointLabel> labels;
-  std::vector<Cause> causes;
-  std::vector<std::uint32_t> instances;
-  std::vector<float> beliefs;
+struct ChunkScan : VerdictArrays {
   std::vector<PointLabel> online;  ///< labels of the first verdict
   std::vector<MovingPoint> moving;
-
-  /// Copies a verdict, but for `online` and `moving`.
-  void take(const ScanVerdict& verdict, bool with_beliefs);
 };
 
 /// The verdicts of a ChunkScan by run of consecutive points with one label, cause and instance:

@@ -155,15 +155,12 @@ void RunResults::take_newest(const ScanVerdict& verdict) {
 
 void JudgedScan::take(RecordedScan& other, const ScanVerdict& other_verdict) {
   std::swap(scan, other);
-  labels.assign(other_verdict.labels.begin(), other_verdict.labels.end());
-  instances.assign(other_verdict.instances.begin(), other_verdict.instances.end());
-  beliefs.assign(other_verdict.beliefs.begin(), other_verdict.beliefs.end());
-  causes.assign(other_verdict.causes.begin(), other_verdict.causes.end());
+  arrays.take(other_verdict, true);
   verdict = other_verdict;
-  verdict.labels = labels;
-  verdict.instances = instances;
-  verdict.beliefs = beliefs;
-  verdict.causes = causes;
+  verdict.labels = arrays.labels;
+  verdict.instances = arrays.instances;
+  verdict.beliefs = arrays.beliefs;
+  verdict.causes = arrays.causes;
 }
 
 void RunResults::take_final(RecordedScan& scan, const ScanVerdict& verdict) {

@@ -24,6 +24,7 @@
 #include "overview.hpp"
 #include "scan_range.hpp"
 #include "session_contribution.hpp"
+#include "verdict_arrays.hpp"
 #include "verdict_log.hpp"
 
 namespace dynains::program {
@@ -76,10 +77,7 @@ std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recor
 /// A scan and a copy of its final verdict.
 struct JudgedScan {
   RecordedScan scan;
-  std::vector<PointLabel> labels;
-  std::vector<std::uint32_t> instances;
-  std::vector<float> beliefs;
-  std::vector<Cause> causes;
+  VerdictArrays arrays;
   ScanVerdict verdict;  ///< with these arrays
 
   /// Exchanges `other` for the scan, and copies its verdict.
