@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "dynains/stage/voxel_hash_table.hpp"
 #include "finite_points.hpp"
 #include "median.hpp"
 #include "pose_diagnosis.hpp"
@@ -382,19 +383,19 @@ Landmarks::Landmarks(PointsView points, const Mounting& mounting, double farthes
   constexpr double kNearest = 2.0;     // m; nearer points belong to the own vehicle
   constexpr double kOverGround = 0.5;  // m; ground agrees under every motion along it
   constexpr double kThinned = 0.25;    // m
-  std::vector<std::pair<std::uint64_t, Eigen::Vector3d>> kept;
+  VoxelHashTable<> occupied;
+  std::vector<std::pair<std::uint64_t, Eigen::Vector3d>> kept;  // the first point of each cell
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d p(points.x[i], points.y[i], points.z[i]);
     const double range = p.norm();
     if (!(range > kNearest && range < farthest)) continue;
     if (mounting.known && mounting.up_sensor.dot(p) + mounting.height < kOverGround) continue;
-    kept.emplace_back(cell_of(p, kThinned), p);
+    const std::uint64_t cell = cell_of(p, kThinned);
+    const bool is_first = occupied.insert(cell) + 1 > kept.size();
+    if (is_first) kept.emplace_back(cell, p);
   }
   const auto by_cell = [](const auto& a, const auto& b) { return a.first < b.first; };
-  std::stable_sort(kept.begin(), kept.end(), by_cell);
-  kept.erase(std::unique(kept.begin(), kept.end(),
-                         [](const auto& a, const auto& b) { return a.first == b.first; }),
-             kept.end());
+  std::sort(kept.begin(), kept.end(), by_cell);
   for (auto& [cell, p] : kept) cell = cell_of(p, kFarthestGap);
   std::stable_sort(kept.begin(), kept.end(), by_cell);
   for (const auto& [cell, p] : kept) {

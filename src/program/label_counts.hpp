@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "dynains/points.hpp"
+#include "dynains/simd/pack_loops.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::program {
@@ -14,7 +15,13 @@ struct LabelCounts {
   std::array<std::uint64_t, 5> of{};  ///< by PointLabel
 
   void add(Span<const PointLabel> labels) {
-    for (const PointLabel label : labels) ++of[static_cast<std::size_t>(label)];
+    detail::run_max_packs([&](auto) {
+      for (std::size_t value = 0; value < of.size(); ++value) {
+        std::uint32_t count = 0;
+        for (const PointLabel label : labels) count += label == static_cast<PointLabel>(value);
+        of[value] += count;
+      }
+    });
   }
   LabelCounts& operator+=(const LabelCounts& other) {
     for (std::size_t i = 0; i < of.size(); ++i) of[i] += other.of[i];

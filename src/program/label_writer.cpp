@@ -8,24 +8,35 @@
 
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_bytes.hpp"
+#include "dynains/simd/pack_loops.hpp"
 #include "labelled_sequence.hpp"
 #include "output_folder.hpp"
 
 namespace dynains::program {
 namespace {
 
-std::uint32_t mos_class(PointLabel label) {
-  switch (label) {
-    case PointLabel::kDynamic:
-      return kRunMoving;
-    case PointLabel::kGround:
-    case PointLabel::kStatic:
-      return kRunStatic;
-    case PointLabel::kInvalid:
-    case PointLabel::kOutOfRange:
-      return kRunNotJudged;
+constexpr std::uint32_t kMostIds = 65535;
+
+constexpr std::uint32_t mos_class(PointLabel label) {
+  if (label == PointLabel::kDynamic) return kRunMoving;
+  return is_static(label) ? kRunStatic : kRunNotJudged;
+}
+
+/// mos_label() of all points of a scan.
+void fill_mos_labels(const ScanVerdict& verdict, std::vector<std::uint32_t>& labels) {
+  const std::size_t count = verdict.labels.size();
+  labels.resize(count);
+  std::uint32_t all_ids = 0;
+  detail::run_max_packs([&](auto) {
+    for (std::size_t i = 0; i < count; ++i) {
+      all_ids |= verdict.instances[i];
+      labels[i] = mos_class(verdict.labels[i]) | verdict.instances[i] << 16U;
+    }
+  });
+  if (all_ids <= kMostIds) return;
+  for (std::size_t i = 0; i < count; ++i) {
+    labels[i] = mos_label(verdict.labels[i], verdict.instances[i]);
   }
-  return kRunNotJudged;
 }
 
 /// Whether a file has exactly this content.
@@ -41,7 +52,6 @@ bool has_bytes(const std::filesystem::path& file, const void* data, std::size_t 
 }  // namespace
 
 std::uint32_t mos_label(PointLabel label, std::uint32_t instance) {
-  constexpr std::uint32_t kMostIds = 65535;
   const std::uint32_t id = instance == kNoInstance ? 0 : (instance - 1) % kMostIds + 1;
   return mos_class(label) | id << 16;
 }
@@ -59,10 +69,7 @@ void LabelFiles::create_folders() const {
 }
 
 void LabelFiles::take(const ScanVerdict& verdict) {
-  labels_.resize(verdict.labels.size());
-  for (std::size_t i = 0; i < labels_.size(); ++i) {
-    labels_[i] = mos_label(verdict.labels[i], verdict.instances[i]);
-  }
+  fill_mos_labels(verdict, labels_);
   if (!cause_folder_.empty()) {
     causes_.resize(verdict.causes.size());
     std::transform(verdict.causes.begin(), verdict.causes.end(), causes_.begin(),

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "moving_points.hpp"
 #include "verdict_cloud.hpp"
 
 namespace dynains::program {
@@ -47,25 +48,29 @@ Overview::Overview(const std::vector<Eigen::Vector3d>& path)
 }
 
 void Overview::add(const RecordedScan& scan, const ScanVerdict& verdict) {
-  const double sensor_height = verdict.T_world_sensor.translation().z();
-  std::size_t next_static = 0;
-  for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
-    const bool is_moving = verdict.labels[i] == PointLabel::kDynamic;
-    const bool is_in_step = i == next_static;
-    if (is_in_step) next_static += static_step_;
-    if (!is_moving && !(is_in_step && is_static(verdict.labels[i]))) continue;
-    const Eigen::Vector3d p = verdict.T_world_sensor * scan.point(i).position;
-    const double x = (p.x() - low_.x()) * scale_;
-    const double y = height_ - (p.y() - low_.y()) * scale_;
-    if (!(x >= 0 && x < width_ && y >= 0 && y < height_)) continue;
-    const auto row = static_cast<std::size_t>(y), column = static_cast<std::size_t>(x);
-    Pixel& pixel = pixels_[row * static_cast<std::size_t>(width_) + column];
-    if (is_moving) {
-      pixel.has_moving = true;
-    } else {
-      pixel.add_static(static_cast<float>(p.z()), shade(p.z() - sensor_height));
+  const Eigen::Isometry3d& T_world_sensor = verdict.T_world_sensor;
+  const double sensor_height = T_world_sensor.translation().z();
+  static_points_.clear();
+  for (std::size_t i = 0; i < verdict.labels.size(); i += static_step_) {
+    if (!is_static(verdict.labels[i])) continue;
+    const Eigen::Vector3d p = T_world_sensor * scan.point(i).position;
+    if (Pixel* pixel = pixel_at(p)) {
+      __builtin_prefetch(pixel, 1);
+      static_points_.push_back({pixel, static_cast<float>(p.z()), shade(p.z() - sensor_height)});
     }
   }
+  for (const StaticPoint& point : static_points_) point.pixel->add_static(point.height, point.grey);
+  for_each_moving(verdict.labels, [&](std::size_t i) {
+    if (Pixel* pixel = pixel_at(T_world_sensor * scan.point(i).position)) pixel->has_moving = true;
+  });
+}
+
+Overview::Pixel* Overview::pixel_at(const Eigen::Vector3d& p) {
+  const double x = (p.x() - low_.x()) * scale_;
+  const double y = height_ - (p.y() - low_.y()) * scale_;
+  if (!(x >= 0 && x < width_ && y >= 0 && y < height_)) return nullptr;
+  const auto row = static_cast<std::size_t>(y), column = static_cast<std::size_t>(x);
+  return &pixels_[row * static_cast<std::size_t>(width_) + column];
 }
 
 std::vector<Overview::Place> Overview::places() const {

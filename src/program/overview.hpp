@@ -52,12 +52,22 @@ class Overview {
     bool has_static() const { return height > -std::numeric_limits<float>::infinity(); }
   };
 
+  struct StaticPoint {
+    Pixel* pixel;
+    float height;  // m
+    std::uint8_t grey;
+  };
+
+  /// The pixel of a point (m, world); null outside of the picture.
+  Pixel* pixel_at(const Eigen::Vector3d& p);
+
   std::size_t static_step_;
   Eigen::Vector2d low_;  // m, world, left and lower border
   double scale_;         // pixels per m
   int width_;            // pixels of a panel
   int height_;           // pixels of a panel
   std::vector<Pixel> pixels_;
+  std::vector<StaticPoint> static_points_;  // of one scan
 };
 
 }  // namespace dynains::program

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "dynains/io/coordinate_system.hpp"
+#include "moving_points.hpp"
 #include "output_folder.hpp"
 #include "tileset_writer.hpp"
 
@@ -129,7 +130,8 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
       overview_(path_of(recording, range)),
       overview_file_(outputs.folder / kOverviewPicture),
       map_(std::move(outside_map)),
-      map_is_outside_(map_ != nullptr) {
+      map_is_outside_(map_ != nullptr),
+      writes_beliefs_(outputs.write_beliefs) {
   final_labels_.create_folders();
   if (outputs.write_online) online_labels_.emplace(outputs.folder / "online");
   if (outputs.write_clean) clean_scans_.emplace(outputs.folder / "clean", recording);
@@ -153,9 +155,9 @@ void RunResults::take_newest(const ScanVerdict& verdict) {
   if (online_labels_) online_labels_->write(recording_.name(range_.first + verdict.scan), verdict);
 }
 
-void JudgedScan::take(RecordedScan& other, const ScanVerdict& other_verdict) {
+void JudgedScan::take(RecordedScan& other, const ScanVerdict& other_verdict, bool with_beliefs) {
   std::swap(scan, other);
-  arrays.take(other_verdict, true);
+  arrays.take(other_verdict, with_beliefs);
   verdict = other_verdict;
   verdict.labels = arrays.labels;
   verdict.instances = arrays.instances;
@@ -165,7 +167,7 @@ void JudgedScan::take(RecordedScan& other, const ScanVerdict& other_verdict) {
 
 void RunResults::take_final(RecordedScan& scan, const ScanVerdict& verdict) {
   finish();
-  judged_.take(scan, verdict);
+  judged_.take(scan, verdict, writes_beliefs_ || needs_scans());
   writing_ = std::async(std::launch::async, [this] { write_final(judged_.scan, judged_.verdict); });
   ++finished_;
 }
@@ -180,13 +182,12 @@ void RunResults::write_final(const RecordedScan& scan, const ScanVerdict& verdic
   labels_.add(verdict.labels);
   add_scan(scan, verdict);
   overview_.add(scan, verdict);
-  for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
-    if (verdict.labels[i] != PointLabel::kDynamic) continue;
+  for_each_moving(verdict.labels, [&](std::size_t i) {
     FilePoint point = scan.point(i);
     point.position = verdict.T_world_sensor * point.position;
     point.label = mos_label(verdict.labels[i], verdict.instances[i]);
     dynamic_points_.add(point);
-  }
+  });
 }
 
 bool RunResults::needs_scans() const {
@@ -202,11 +203,10 @@ void RunResults::add_scan(const RecordedScan& scan, const ScanVerdict& verdict) 
   if (map_attributes_) map_attributes_->add(scan, verdict, labels);
   if (session_ != nullptr) session_->add(scan, verdict, labels, index);
   if (!dynamic_las_) return;
-  for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
-    if (verdict.labels[i] != PointLabel::kDynamic) continue;
+  for_each_moving(verdict.labels, [&](std::size_t i) {
     const Eigen::Vector3d position = verdict.T_world_sensor * scan.point(i).position;
     dynamic_las_->add(position, attributes_of(scan, verdict, labels, i));
-  }
+  });
 }
 
 bool RunResults::add_chunk(std::size_t scans, const ChunkSummary& summary) {

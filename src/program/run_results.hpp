@@ -80,8 +80,9 @@ struct JudgedScan {
   VerdictArrays arrays;
   ScanVerdict verdict;  ///< with these arrays
 
-  /// Exchanges `other` for the scan, and copies its verdict.
-  void take(RecordedScan& other, const ScanVerdict& other_verdict);
+  /// Exchanges `other` for the scan, and copies its verdict; without `with_beliefs`, the copy has
+  /// none.
+  void take(RecordedScan& other, const ScanVerdict& other_verdict, bool with_beliefs);
 };
 
 /// Takes verdicts as they come and streams them to files.
@@ -140,6 +141,7 @@ class RunResults {
   std::unique_ptr<MapFile> dynamic_las_;  ///< moving points beside a LAS map
   std::optional<MapAttributeTable> map_attributes_;
   bool map_is_outside_;
+  bool writes_beliefs_;
   SessionContribution* session_ = nullptr;
   std::size_t finished_ = 0;
   std::uint64_t points_ = 0;
