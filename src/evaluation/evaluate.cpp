@@ -1,5 +1,6 @@
 #include "dynains/evaluation/evaluate.hpp"
 
+#include <future>
 #include <stdexcept>
 
 #include "dynains/evaluation/map_protocol.hpp"
@@ -54,10 +55,11 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
   for (; source(result.scans, scan); ++result.scans) {
     check_lengths(scan, result.scans);
     result.points += scan.size();
-    voxels.add(scan);
+    std::future<void> adding = std::async(std::launch::async, [&] { voxels.add(scan); });
     points.add(scan);
     for (MapProtocol& map : map_protocols) map.add(scan);
     if (result.errors) result.errors->add(scan);
+    adding.get();
   }
   for (std::size_t index = 0; index < result.scans && source(index, scan); ++index) {
     check_lengths(scan, index);

@@ -30,12 +30,6 @@ double positive(double value, const char* name) {
                     " must be positive and finite");
 }
 
-/// Squared distance from a point to the cube at `corner`.
-double squared_distance(const Eigen::Vector3d& p, const Eigen::Vector3d& corner, double edge) {
-  const Eigen::Vector3d local = p - corner;
-  return (local - local.cwiseMax(0.0).cwiseMin(edge)).squaredNorm();
-}
-
 }  // namespace
 
 class MapProtocol::Impl {
@@ -74,8 +68,8 @@ class MapProtocol::Impl {
     raw.for_each(VoxelProtocol::kIdentity, [&](const VoxelPoint& point) {
       const VoxelKey key = grid_.key(point.p_world);
       detail::count(score, point.truth,
-                    key != detail::kNoKey && detail::is_preserved(point, key, settings_.voxel,
-                                                                  groups_.index(), point_at));
+                    key != detail::kNoKey &&
+                        detail::is_preserved(point, key, grid_, groups_.index(), point_at));
     });
     return score;
   }
@@ -162,9 +156,7 @@ class MapProtocol::Impl {
       const std::uint32_t cell = groups_.index().find(key + offset);
       if (cell == VoxelIndex::kNone || !is_mixed(cell)) continue;
       // Skips voxels whose points all have a nearer measured point already: most, in dense maps.
-      if (squared_distance(p, grid_.corner(key + offset), grid_.edge()) >= farthest_[cell]) {
-        continue;
-      }
+      if (grid_.squared_distance(p, key + offset) >= farthest_[cell]) continue;
       Mixed* mixed = &mixed_[groups_.first(cell)];
       double farthest = 0;
       for (const std::uint32_t i : groups_.points(cell)) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "detail/located_points.hpp"
 #include "detail/nearest.hpp"
 #include "detail/preservation.hpp"
 #include "detail/range_gate.hpp"
@@ -39,10 +40,11 @@ class VoxelProtocol::Impl {
 
   void add(const LabelledScan& scan) {
     if (!grid_) grid_.emplace(settings_.voxel, scan.T_world_sensor.translation());
-    const Points points(*this, scan);
-    voxelise(scan, points, [](VoxelKey) { return true; });
+    Points points(*this, scan);
+    voxelise(points, [](VoxelKey) { return true; });
     scan_voxels_.for_each(
-        all_layers_, points, [this](VoxelKey key) { prefetch(key); },
+        all_layers_, points, [this](VoxelKey key) { prefetch_index(key); },
+        [this](VoxelKey key) { prefetch(key); },
         [this](VoxelKey key, LayerMask layers, const Eigen::Vector3d& centroid, Truth truth) {
           accumulate(key, layers, centroid, truth);
         });
@@ -52,11 +54,17 @@ class VoxelProtocol::Impl {
   void resolve(const LabelledScan& scan) {
     finish_first_pass();
     if (pending_.size() == 0) return;
-    const Points points(*this, scan);
-    voxelise(scan, points,
-             [this](VoxelKey key) { return pending_.find(key) != detail::VoxelIndex::kNone; });
+    Points points(*this, scan);
+    // Consecutive points often have one voxel.
+    VoxelKey last = detail::kNoKey;
+    bool is_last_pending = false;
+    voxelise(points, [&](VoxelKey key) {
+      if (key != last) is_last_pending = pending_.find(key) != detail::VoxelIndex::kNone;
+      last = key;
+      return is_last_pending;
+    });
     scan_voxels_.for_each(
-        all_layers_, points, [](VoxelKey) {},
+        all_layers_, points, [](VoxelKey) {}, [](VoxelKey) {},
         [this](VoxelKey key, LayerMask layers, const Eigen::Vector3d& centroid, Truth truth) {
           const Voxel& voxel = voxels_[index_.find(key)];
           double* nearest = &nearest_[pending_.find(key) * layers_];
@@ -83,7 +91,7 @@ class VoxelProtocol::Impl {
         continue;
       }
       detail::count(score, raw.truth,
-                    detail::is_preserved(raw, voxel.key, settings_.voxel, index_, point_at));
+                    detail::is_preserved(raw, voxel.key, *grid_, index_, point_at));
     }
     return score;
   }
@@ -139,21 +147,22 @@ class VoxelProtocol::Impl {
   class Points {
    public:
     Points(const Impl& protocol, const LabelledScan& scan)
-        : protocol_(protocol),
-          scan_(scan),
-          rotation_(scan.T_world_sensor.linear()),
-          translation_(scan.T_world_sensor.translation()) {}
+        : protocol_(protocol), scan_(scan), located_(scan, *protocol.grid_) {}
 
     // False for a point that is not judged.
     bool is_judged(std::size_t i) const {
       return protocol_.settings_.truth(scan_.truth[i]) != Truth::kIgnored &&
              protocol_.gate_.passes(scan_.xyz + i * scan_.stride);
     }
+    detail::LocatedPoints& located() { return located_; }
     detail::ScanPoint operator()(std::size_t i) const {
-      const float* p = scan_.xyz + i * scan_.stride;
+      const Eigen::Vector3d p_world = located_.p_world(i);
+      return at(i, p_world, protocol_.grid_->key(p_world));
+    }
+    detail::ScanPoint at(std::size_t i, const Eigen::Vector3d& p_world, VoxelKey key) const {
       detail::ScanPoint point;
-      point.p_world = rotation_ * Eigen::Vector3d(p[0], p[1], p[2]) + translation_;
-      point.key = protocol_.grid_->key(point.p_world);
+      point.p_world = p_world;
+      point.key = key;
       point.truth = protocol_.settings_.truth(scan_.truth[i]);
       unsigned layers = 1U << kIdentity;
       if (point.truth == Truth::kStatic) layers |= 1U << kOracle;
@@ -165,21 +174,29 @@ class VoxelProtocol::Impl {
    private:
     const Impl& protocol_;
     const LabelledScan& scan_;
-    Eigen::Matrix3d rotation_;
-    Eigen::Vector3d translation_;
+    detail::LocatedPoints located_;
   };
 
   template <class Wanted>
-  void voxelise(const LabelledScan& scan, const Points& points, Wanted&& wanted) {
+  void voxelise(Points& points, Wanted&& wanted) {
     scan_voxels_.clear();
-    for (std::size_t i = 0; i < scan.size(); ++i) {
-      if (!points.is_judged(i)) continue;
-      const detail::ScanPoint point = points(i);
-      if (point.key != detail::kNoKey && wanted(point.key)) scan_voxels_.add(point, i);
-    }
+    points.located().for_each([&](VoxelKey key) { scan_voxels_.prefetch(key); },
+                              [&](std::size_t i, const Eigen::Vector3d& p_world, VoxelKey key) {
+                                if (key == detail::kNoKey || !wanted(key) || !points.is_judged(i))
+                                  return;
+                                scan_voxels_.add(points.at(i, p_world, key), i);
+                              });
   }
 
-  void prefetch(VoxelKey key) const { __builtin_prefetch(&index_.first_slot(voxel_hash(key))); }
+  void prefetch_index(VoxelKey key) const {
+    __builtin_prefetch(&index_.first_slot(voxel_hash(key)));
+  }
+  void prefetch(VoxelKey key) const {
+    const detail::VoxelIndex::Slot& slot = index_.first_slot(voxel_hash(key));
+    if (slot.number >= voxels_.size()) return;
+    __builtin_prefetch(&voxels_[slot.number]);
+    __builtin_prefetch(&voxels_[slot.number].fork);
+  }
 
   void accumulate(VoxelKey key, LayerMask layers, const Eigen::Vector3d& centroid, Truth truth) {
     const std::uint32_t number = index_.insert(key);

@@ -49,37 +49,52 @@ bool LabelledSequence::every_run_has(std::size_t index) const {
 
 bool LabelledSequence::read(std::size_t i, evaluation::LabelledScan& scan) {
   if (i >= size()) return false;
-  const std::size_t index = first_ + i;
-  sequence_.read_scan(index, points_);
-  truth_ = sequence_.read_labels(index);
-  in_map_.assign(runs_.empty() ? 0 : truth_.size(), 0);
-  instances_.clear();
-  causes_.clear();
-  for (std::size_t run = 0; run < runs_.size(); ++run) read_run(run, sequence_.name(index));
-  if (!runs_.empty() && runs_.front().kind == "labels") {
-    const fs::path causes = runs_.front().folder / "causes";
-    causes_ = read_point_bytes(causes / (sequence_.name(index) + ".cause"), truth_.size());
+  if (reading_.valid() && next_index_ == i) {
+    reading_.get();
+  } else {
+    if (reading_.valid()) reading_.wait();
+    load(i, next_);
   }
+  std::swap(scan_, next_);
+  next_index_ = i + 1 < size() ? i + 1 : 0;  // the evaluation reads all scans twice
+  reading_ = std::async(std::launch::async, [this] { load(next_index_, next_); });
 
-  scan.xyz = points_.xyzi.data();
+  const std::size_t index = first_ + i;
+  scan.xyz = scan_.points.xyzi.data();
   scan.stride = 4;
   scan.T_world_sensor = sequence_.T_world_sensor(index);
   scan.time = sequence_.time(index);
-  scan.truth = truth_;
-  scan.in_map = in_map_;
-  scan.instances = instances_;
-  scan.causes = causes_;
+  scan.truth = scan_.truth;
+  scan.in_map = scan_.in_map;
+  scan.instances = scan_.instances;
+  scan.causes = scan_.causes;
   return true;
 }
 
-void LabelledSequence::read_run(std::size_t run, const std::string& name) {
+void LabelledSequence::load(std::size_t i, Scan& scan) const {
+  const std::size_t index = first_ + i;
+  sequence_.read_scan(index, scan.points);
+  scan.truth = sequence_.read_labels(index);
+  scan.in_map.assign(runs_.empty() ? 0 : scan.truth.size(), 0);
+  scan.instances.clear();
+  scan.causes.clear();
+  for (std::size_t run = 0; run < runs_.size(); ++run) {
+    load_run(run, sequence_.name(index), scan);
+  }
+  if (!runs_.empty() && runs_.front().kind == "labels") {
+    const fs::path causes = runs_.front().folder / "causes";
+    scan.causes = read_point_bytes(causes / (sequence_.name(index) + ".cause"), scan.truth.size());
+  }
+}
+
+void LabelledSequence::load_run(std::size_t run, const std::string& name, Scan& scan) const {
   const fs::path file = runs_[run].folder / runs_[run].kind / (name + ".label");
-  const std::vector<std::uint32_t> labels = read_labels(file, truth_.size());
-  if (run == 0) instances_.resize(labels.size());
+  const std::vector<std::uint32_t> labels = read_labels(file, scan.truth.size());
+  if (run == 0) scan.instances.resize(labels.size());
   for (std::size_t p = 0; p < labels.size(); ++p) {
     const std::uint32_t id = run_class(labels[p], p, file);
-    if (id == kRunStatic) in_map_[p] = static_cast<std::uint8_t>(in_map_[p] | (1U << run));
-    if (run == 0) instances_[p] = labels[p] >> 16U;
+    if (id == kRunStatic) scan.in_map[p] = static_cast<std::uint8_t>(scan.in_map[p] | (1U << run));
+    if (run == 0) scan.instances[p] = labels[p] >> 16U;
   }
 }
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <future>
 #include <optional>
 #include <string>
 #include <vector>
@@ -44,13 +45,15 @@ struct RunLabels {
   std::string kind = "labels";   ///< or "online"
 };
 
-/// Reads scan by scan; holds one scan at a time.
+/// Reads scan by scan, the next one in another thread; holds two scans at a time.
 class LabelledSequence {
  public:
   /// Takes a recording and chooses its scans: those within `window`; without a window, from the
   /// first to the last scan that every run has labels for. Throws IoError if the sequence has no
   /// ground truth, or no scan is left.
   LabelledSequence(Recording recording, const ScanWindow& window, std::vector<RunLabels> runs = {});
+  LabelledSequence(const LabelledSequence&) = delete;
+  LabelledSequence& operator=(const LabelledSequence&) = delete;
 
   const Recording& sequence() const { return sequence_; }
   std::size_t size() const { return last_ - first_; }
@@ -62,18 +65,26 @@ class LabelledSequence {
   bool read(std::size_t i, evaluation::LabelledScan& scan);
 
  private:
+  struct Scan {
+    RecordedScan points;
+    std::vector<std::uint32_t> truth;
+    std::vector<std::uint8_t> in_map;
+    std::vector<std::uint32_t> instances;  // of run 0
+    std::vector<std::uint8_t> causes;      // of run 0
+  };
+
   bool every_run_has(std::size_t index) const;
-  void read_run(std::size_t run, const std::string& name);
+  void load(std::size_t i, Scan& scan) const;
+  void load_run(std::size_t run, const std::string& name, Scan& scan) const;
 
   Recording sequence_;
   std::vector<RunLabels> runs_;
   std::size_t first_ = 0;  // half-open range within sequence_
   std::size_t last_ = 0;
-  RecordedScan points_;
-  std::vector<std::uint32_t> truth_;
-  std::vector<std::uint8_t> in_map_;
-  std::vector<std::uint32_t> instances_;  // of run 0
-  std::vector<std::uint8_t> causes_;      // of run 0
+  Scan scan_;
+  Scan next_;  // the reading thread's, while reading_ is valid
+  std::size_t next_index_ = 0;
+  std::future<void> reading_;
 };
 
 }  // namespace dynains::program

@@ -73,10 +73,10 @@ struct Evaluation {
   std::optional<ErrorAnalysis> errors;
 };
 
-/// Evaluates estimates and maps. Reads `source` twice. `estimates`: name of the estimate of each
-/// bit of LabelledScan::in_map. Throws ConfigError for settings out of bounds,
-/// std::invalid_argument for a scan with spans of different lengths or a stride below 3, and the
-/// exceptions of `source`.
+/// Evaluates estimates and maps, in two threads. Reads `source` twice, in the caller's thread.
+/// `estimates`: name of the estimate of each bit of LabelledScan::in_map. Throws ConfigError for
+/// settings out of bounds, std::invalid_argument for a scan with spans of different lengths or a
+/// stride below 3, and the exceptions of `source`.
 Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& estimates,
                     const std::vector<MapEstimate>& maps, const EvaluationConfig& config = {});
 

@@ -10,27 +10,38 @@
 namespace dynains::evaluation::detail {
 
 /// Whether the estimate's point nearest to `raw` is nearer than edge * sqrt(3) / 2 and has the same
-/// class. `key`: voxel of `raw`; `point_at(number)`: the estimate's point in voxel `number` of
-/// `index`, a std::optional<VoxelPoint>.
+/// class. `key`: voxel of `raw` in `grid`; `point_at(number)`: the estimate's point in voxel
+/// `number` of `index`, a std::optional<VoxelPoint>.
 ///
 /// Exact: the radius is less than an edge, so the nearest point is in the 27 voxels around `raw`.
 /// The margin of 0.13 edges exceeds the rounding of a centroid.
 template <class PointAt>
-bool is_preserved(const VoxelPoint& raw, VoxelKey key, double edge, const VoxelIndex& index,
-                  PointAt&& point_at) {
-  double nearest = 0.75 * edge * edge;
+bool is_preserved(const VoxelPoint& raw, VoxelKey key, const VoxelGrid& grid,
+                  const VoxelIndex& index, PointAt&& point_at) {
+  const double squared_edge = grid.edge() * grid.edge();
+  const double rounding = 1e-6 * squared_edge;  // of a centroid at a face of its voxel
+  double nearest = 0.75 * squared_edge;
   bool same = false;
-  for (const VoxelKey offset : kNeighbours) {
-    const std::uint32_t number = index.find(key + offset);
-    if (number == VoxelIndex::kNone) continue;
+  const auto compare = [&](VoxelKey at) {
+    const std::uint32_t number = index.find(at);
+    if (number == VoxelIndex::kNone) return;
     const std::optional<VoxelPoint> candidate = point_at(number);
-    if (!candidate) continue;
+    if (!candidate) return;
     const double distance = (candidate->p_world - raw.p_world).squaredNorm();
-    if (distance < nearest) {
-      nearest = distance;
-      same = candidate->truth == raw.truth;
-      if (distance == 0) break;
-    }
+    if (!(distance < nearest)) return;
+    nearest = distance;
+    same = candidate->truth == raw.truth;
+  };
+  const auto is_in_reach = [&](VoxelKey at) {
+    return grid.squared_distance(raw.p_world, at) <= nearest + rounding;
+  };
+  compare(key);
+  if (nearest == 0) return same;
+  for (const VoxelKey offset : kNeighbours) {
+    if (is_in_reach(key + offset)) __builtin_prefetch(&index.first_slot(voxel_hash(key + offset)));
+  }
+  for (const VoxelKey offset : kNeighbours) {
+    if (offset != 0 && is_in_reach(key + offset)) compare(key + offset);
   }
   return same;
 }

@@ -41,13 +41,11 @@ class ScanVoxels {
     points_.clear();
   }
 
+  void prefetch(VoxelKey key) const { __builtin_prefetch(&index_.first_slot(voxel_hash(key))); }
+
   /// `number`: of the point in its scan.
   void add(const ScanPoint& point, std::size_t number) {
-    const std::uint32_t hash = voxel_hash(point.key);
-    const VoxelIndex::Slot& slot = index_.first_slot(hash);
-    const bool is_known = slot.key == point.key && slot.number != VoxelIndex::kNone;
-    const std::uint32_t at = is_known ? slot.number : index_.insert(point.key, hash);
-    if (at == voxels_.size()) voxels_.push_back({point.key});
+    const std::uint32_t at = voxel_of(point.key);
     Voxel& voxel = voxels_[at];
     voxel.sum += point.p_world;
     ++voxel.count;
@@ -59,14 +57,16 @@ class ScanVoxels {
 
   /// visit(key, layers, centroid, truth) for every voxel, once or once per layer: the centroid of
   /// the layer's points in the voxel and the truth of the point nearest to it. Voxels come in the
-  /// order of their first points. `point(number)`: the ScanPoint of add(). `announce(key)` is
-  /// called some voxels before `visit`, to prefetch memory.
-  template <class Point, class Announce, class Visit>
-  void for_each(LayerMask all_layers, Point&& point, Announce&& announce, Visit&& visit) {
+  /// order of their first points. `point(number)`: the ScanPoint of add(). `prefetch_index(key)`
+  /// and then `prefetch(key)` are called some voxels before `visit`.
+  template <class Point, class PrefetchIndex, class Prefetch, class Visit>
+  void for_each(LayerMask all_layers, Point&& point, PrefetchIndex&& prefetch_index,
+                Prefetch&& prefetch, Visit&& visit) {
     gather_mixed(point);
     for (std::size_t v = 0; v < voxels_.size(); ++v) {
       const Voxel& voxel = voxels_[v];
-      announce(voxels_[std::min(v + kAhead, voxels_.size() - 1)].key);
+      prefetch_index(voxels_[std::min(v + 2 * kAhead, voxels_.size() - 1)].key);
+      prefetch(voxels_[std::min(v + kAhead, voxels_.size() - 1)].key);
       if (!voxel.mixed()) {
         const Truth truth =
             voxel.truths == truth_bit(Truth::kStatic) ? Truth::kStatic : Truth::kDynamic;
@@ -81,7 +81,7 @@ class ScanVoxels {
   }
 
  private:
-  static constexpr std::size_t kAhead = 16;  // voxels
+  static constexpr std::size_t kAhead = 8;  // voxels
 
   struct Voxel {
     VoxelKey key;
@@ -98,6 +98,17 @@ class ScanVoxels {
 
   static Eigen::Vector3d centroid(const Eigen::Vector3d& sum, std::uint32_t count) {
     return sum / static_cast<double>(count);
+  }
+
+  std::uint32_t voxel_of(VoxelKey key) {
+    // Consecutive points often have one voxel.
+    if (!points_.empty() && voxels_[points_.back().voxel].key == key) return points_.back().voxel;
+    const std::uint32_t hash = voxel_hash(key);
+    const VoxelIndex::Slot& slot = index_.first_slot(hash);
+    const bool is_known = slot.key == key && slot.number != VoxelIndex::kNone;
+    const std::uint32_t at = is_known ? slot.number : index_.insert(key, hash);
+    if (at == voxels_.size()) voxels_.push_back({key});
+    return at;
   }
 
   /// Groups the points of the mixed voxels by voxel, in scan order.

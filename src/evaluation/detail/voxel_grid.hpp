@@ -37,19 +37,26 @@ class VoxelGrid {
   /// kNoKey for a point that is not finite or that lies 2^20 cells or more from the anchor along
   /// some axis (210 km at 0.2 m).
   VoxelKey key(const Eigen::Vector3d& p_world) const {
-    std::array<std::int64_t, 3> numbers;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double cell = p_world[static_cast<Eigen::Index>(axis)] / edge_;
-      if (!(std::abs(cell) < 0x1p53)) return kNoKey;
+    return key(p_world.x(), p_world.y(), p_world.z());
+  }
+  VoxelKey key(double x, double y, double z) const {
+    bool is_inside = true;
+    const auto number = [&](double coordinate, std::int64_t anchor) {
+      const double quotient = coordinate / edge_;
+      const bool is_exact = std::abs(quotient) < 0x1p53;
+      const double cell = is_exact ? quotient : 0.0;
       // floor() without a call into libm, which the baseline instruction set would need.
-      auto number = static_cast<std::int64_t>(cell);
-      number -= static_cast<double>(number) > cell;
-      number -= anchor_[axis];
+      auto result = static_cast<std::int64_t>(cell);
+      result -= static_cast<double>(result) > cell ? 1 : 0;
+      result -= anchor;
       // One cell at either end is kept free for the neighbours.
-      if (number < 1 - kVoxelKeyOffset || number > kVoxelKeyOffset - 2) return kNoKey;
-      numbers[axis] = number;
-    }
-    return voxel_key(numbers[0], numbers[1], numbers[2]);
+      is_inside &= is_exact && result >= 1 - kVoxelKeyOffset && result <= kVoxelKeyOffset - 2;
+      return result;
+    };
+    const std::int64_t i = number(x, anchor_[0]);
+    const std::int64_t j = number(y, anchor_[1]);
+    const std::int64_t k = number(z, anchor_[2]);
+    return is_inside ? voxel_key(i, j, k) : kNoKey;
   }
 
   /// Lower corner of a voxel.
@@ -60,6 +67,12 @@ class VoxelGrid {
       corner[axis] = static_cast<double>(number) * edge_;
     }
     return corner;
+  }
+
+  /// Squared distance from a point to the cube of a voxel, m^2.
+  double squared_distance(const Eigen::Vector3d& p_world, VoxelKey key) const {
+    const Eigen::Vector3d local = p_world - corner(key);
+    return (local - local.cwiseMax(0.0).cwiseMin(edge_)).squaredNorm();
   }
 
  private:
