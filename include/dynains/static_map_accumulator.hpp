@@ -10,6 +10,7 @@
 #include <limits>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "dynains/map/block_table.hpp"
@@ -78,7 +79,7 @@ class StaticMapAccumulator {
     const detail::PackTransform to_corner(T_corner_sensor);
     const BlockIndex first = {first_block[0], first_block[1], first_block[2]};
 
-    recent_.resize(kRecent, kNone);
+    recent_.resize(kRecent, nullptr);
     Batch batch;
     for (std::size_t begin = 0; begin < points.size(); begin += kBatch) {
       const std::size_t count = std::min(kBatch, points.size() - begin);
@@ -109,9 +110,10 @@ class StaticMapAccumulator {
   /// Calls `visit(Eigen::Vector3d)` for every point (m, world frame).
   template <class Visitor>
   void for_each(Visitor&& visit) const {
-    for (std::uint32_t block = 0; block < blocks_.size(); ++block) {
-      prefetch_points_after(block);
-      visit_block(block, visit);
+    for (std::uint32_t first = 0; first < blocks_.size(); first += kGroup) {
+      const std::uint32_t last = std::min(blocks_.size(), first + kGroup);
+      prefetch_points(first, last);
+      for (std::uint32_t block = first; block < last; ++block) visit_block(block, visit);
     }
   }
 
@@ -201,6 +203,8 @@ class StaticMapAccumulator {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
   static constexpr int kBlockVoxels[3] = {8, 4, 2};
   static constexpr int kLongestBlock = 8;  // voxels
+  static constexpr int kVoxelsOfBlock = 64;
+  static constexpr std::uint32_t kGroup = 32;  // blocks whose points are prefetched together
 
   struct Point {
     float x, y, z;       // m, relative to the corner of the block
@@ -211,8 +215,10 @@ class StaticMapAccumulator {
     std::uint64_t occupied;  // one bit per voxel
     std::uint32_t first;     // first point of the block, or kNone
   };
+  using Blocks = detail::BlockTable<BlockContent>;
+  using Block = Blocks::Block;  // never moves in memory
 
-  // Size of recent_, a direct-mapped cache of block numbers by the low bits of block indices. With
+  // Size of recent_, a direct-mapped cache of blocks by the low bits of their indices. With
   // voxels of 0.2 m, these bits repeat every 51.2 m, and every 6.4 m in height.
   static constexpr std::size_t kRecent = std::size_t{32} * 64 * 16;
 
@@ -225,7 +231,7 @@ class StaticMapAccumulator {
     alignas(64) float point[3][kBatch];            // m, relative to the corner of the block
     alignas(64) std::int32_t block[3][kCapacity];  // indices in the world
     alignas(64) std::int32_t voxel[kCapacity];     // index in the block
-    alignas(64) std::int32_t recent[kBatch];       // index of the block in recent_
+    alignas(64) std::int32_t recent[kBatch];       // place of the block in recent_
     std::uint32_t chosen[kCapacity];               // indices of the points to add
     std::size_t chosen_count;
   };
@@ -339,21 +345,19 @@ class StaticMapAccumulator {
   }
 
   void insert_chosen(const Batch& batch) {
-    std::uint32_t* const recent = recent_.data();
     for (std::size_t k = 0; k < batch.chosen_count; ++k) {
-      const std::uint32_t known = recent[batch.recent[batch.chosen[k]]];
-      if (known < blocks_.size()) __builtin_prefetch(&blocks_[known]);
+      __builtin_prefetch(recent_[static_cast<std::size_t>(batch.recent[batch.chosen[k]])]);
     }
     for (std::size_t k = 0; k < batch.chosen_count; ++k) {
       const std::size_t i = batch.chosen[k];
-      const std::int32_t x = batch.block[0][Batch::kFirst + i];
-      const std::int32_t y = batch.block[1][Batch::kFirst + i];
-      const std::int32_t z = batch.block[2][Batch::kFirst + i];
-      std::uint32_t& known = recent[batch.recent[i]];
-      if (known >= blocks_.size() || !(blocks_[known].index == BlockIndex{x, y, z})) {
-        known = blocks_.find_or_add({x, y, z}, {0, kNone});
+      const BlockIndex index = {batch.block[0][Batch::kFirst + i],
+                                batch.block[1][Batch::kFirst + i],
+                                batch.block[2][Batch::kFirst + i]};
+      Block*& known = recent_[static_cast<std::size_t>(batch.recent[i])];
+      if (known == nullptr || !(known->index == index)) {
+        known = &blocks_[blocks_.find_or_add(index, {0, kNone})];
       }
-      BlockContent& block = blocks_[known].data;
+      BlockContent& block = known->data;
       const std::uint64_t bit = std::uint64_t{1} << batch.voxel[Batch::kFirst + i];
       if ((block.occupied & bit) != 0 && !keep_all_) continue;
       block.first =
@@ -375,16 +379,20 @@ class StaticMapAccumulator {
     return index;
   }
 
-  // Prefetches the first points of a later block, and the next ones of nearer blocks.
-  void prefetch_points_after(std::uint32_t block) const {
-    constexpr std::uint32_t kDepth = 4;     // points of a block
-    constexpr std::uint32_t kDistance = 4;  // blocks
-    for (std::uint32_t depth = 0; depth < kDepth; ++depth) {
-      const std::uint32_t later = block + (kDepth - depth) * kDistance;
-      if (later >= blocks_.size()) continue;
-      std::uint32_t point = blocks_[later].data.first;
-      for (std::uint32_t k = 0; k < depth && point != kNone; ++k) point = points_[point].next;
-      if (point != kNone) __builtin_prefetch(&points_[point]);
+  // Prefetches the points of the blocks from `first` to `last`, exclusive. Each point of a block
+  // gives the place of the next one, so the points of many blocks are looked up side by side.
+  void prefetch_points(std::uint32_t first, std::uint32_t last) const {
+    std::array<std::uint32_t, kGroup> points;
+    std::size_t count = 0;
+    const auto add = [&](std::uint32_t point) {
+      if (point == kNone) return;
+      __builtin_prefetch(&points_[point]);
+      points[count++] = point;
+    };
+    for (std::uint32_t block = first; block < last; ++block) add(blocks_[block].data.first);
+    for (int depth = 1; depth < kVoxelsOfBlock && count > 0; ++depth) {
+      const std::size_t before = std::exchange(count, 0);
+      for (std::size_t i = 0; i < before; ++i) add(points_[points[i]].next);
     }
   }
 
@@ -402,10 +410,10 @@ class StaticMapAccumulator {
   double voxel_;
   bool keep_all_;
   std::size_t size_ = 0;
-  detail::BlockTable<BlockContent> blocks_;
+  Blocks blocks_;
   detail::ChunkedVector<Point, 512> points_;
-  std::uint32_t free_ = kNone;         // first erased point; Point::next links the others
-  std::vector<std::uint32_t> recent_;  // by cache slot: number of the last block, or kNone
+  std::uint32_t free_ = kNone;  // first erased point; Point::next links the others
+  std::vector<Block*> recent_;  // by cache slot: the last block, or null
 };
 
 }  // namespace dynains

@@ -39,12 +39,19 @@ Faults fill(const float* xyzi, const std::uint32_t* labels, std::size_t count, B
   std::uint32_t foreign = 0;
   std::uint32_t infinite = 0;
   detail::run_max_packs([&](auto) {
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::uint32_t id = labels[i] & 0xffffU;
-      const std::uint32_t kept = id == kRunStatic ? 1 : 0;
-      const std::uint32_t other = id == kRunMoving || id == kRunNotJudged ? 1 : 0;
-      foreign |= (kept | other) ^ 1U;
-      block.keep[i] = static_cast<std::uint8_t>(kept);
+    // Compilers use vectors only if nothing that the loop reads can be changed by its bytes.
+    const std::size_t size = count;
+    const std::uint32_t* const classes = labels;
+    std::uint8_t* const keep = block.keep.data();
+    std::uint32_t any_foreign = 0;
+    std::uint32_t any_infinite = 0;
+    for (std::size_t i = 0; i < size; ++i) {
+      const std::uint32_t id = classes[i] & 0xffffU;
+      const auto kept = static_cast<std::uint32_t>(id == kRunStatic);
+      const std::uint32_t known = kept | static_cast<std::uint32_t>(id == kRunMoving) |
+                                  static_cast<std::uint32_t>(id == kRunNotJudged);
+      any_foreign |= known ^ 1U;
+      keep[i] = static_cast<std::uint8_t>(kept);
     }
     for (std::size_t i = 0; i < count; ++i) {
       const float x = xyzi[4 * i];
@@ -57,10 +64,12 @@ Faults fill(const float* xyzi, const std::uint32_t* labels, std::size_t count, B
     }
     constexpr float kMost = std::numeric_limits<float>::max();
     for (std::size_t i = 0; i < count; ++i) {
-      infinite |= std::abs(block.x[i]) <= kMost ? 0U : 1U;
-      infinite |= std::abs(block.y[i]) <= kMost ? 0U : 1U;
-      infinite |= std::abs(block.z[i]) <= kMost ? 0U : 1U;
+      any_infinite |= static_cast<std::uint32_t>(!(std::abs(block.x[i]) <= kMost)) |
+                      static_cast<std::uint32_t>(!(std::abs(block.y[i]) <= kMost)) |
+                      static_cast<std::uint32_t>(!(std::abs(block.z[i]) <= kMost));
     }
+    foreign = any_foreign;
+    infinite = any_infinite;
   });
   return {foreign != 0, infinite != 0};
 }
