@@ -20,6 +20,7 @@ ChunkOutputs outputs_of_chunks(const RunPlan& plan) {
   outputs.with_online = run.write_online;
   outputs.with_map = plan.config.build_map;
   outputs.map = plan.config.map;
+  outputs.moving = moving_columns(plan.sequence, plan.range);
   return outputs;
 }
 

@@ -303,14 +303,16 @@ class ChunkedRun {
     // An earlier run may have written the labels of its chunks.
     const bool is_kept = states_[number].is_kept;
     ChunkFileReader reader = chunks_.open(number);
+    VerdictRuns runs;
     ChunkScan scan;
     for (std::size_t i = chunks_[number].own.first; i <= chunks_[number].own.last; ++i) {
-      reader.next(scan);
-      for (std::uint32_t& id : scan.instances) id = numbers(id);
-      ScanVerdict verdict = verdict_of(i, scan);
-      labels.take(verdict);
+      reader.next_runs(runs, scan);
+      for (std::uint32_t& id : runs.instances) id = numbers(id);
+      labels.take(runs, scan.beliefs);
       labels.write(plan_.sequence.name(i), is_kept);
       if (!chunks_.outputs().with_online) continue;
+      runs.expand(scan);
+      ScanVerdict verdict = verdict_of(i, scan);
       verdict.labels = scan.online;
       online.take(verdict);
       online.write(plan_.sequence.name(i), is_kept);
@@ -366,18 +368,20 @@ class ChunkedRun {
     if (needs_scans) scans.emplace(plan_.sequence, own.first, own.last);
     RecordedScan points;
     ChunkFileReader reader = chunks_.open(number);
+    PointRecords moving(chunks_.outputs().moving);
     ChunkScan scan;
     for (std::size_t i = own.first; i <= own.last; ++i) {
-      reader.next(scan, !needs_scans);
-      for (const MovingPoint& moving : scan.moving) {
-        FilePoint point;
-        point.position = {moving.position[0], moving.position[1], moving.position[2]};
-        point.time = moving.time;
-        point.intensity = moving.intensity;
-        point.ring = moving.ring;
-        point.label = mos_label(PointLabel::kDynamic, numbers(moving.instance));
-        results_.add_moving_point(point);
+      if (needs_scans) {
+        reader.next(scan);
+      } else {
+        reader.next_moving(scan.moving);
       }
+      if (!moving.assign(scan.moving)) {
+        throw IoError(chunks_.file(number).string() + ": has other moving points");
+      }
+      moving.replace_labels(
+          [&](std::uint32_t id) { return mos_label(PointLabel::kDynamic, numbers(id)); });
+      results_.add_moving_points(moving);
       if (!needs_scans) continue;
       for (std::uint32_t& id : scan.instances) id = numbers(id);
       points = scans->next(std::move(points));
@@ -392,10 +396,10 @@ class ChunkedRun {
       row.scan = plan_.sequence.name(own.first + i);
       timing_.rows.push_back(std::move(row));
     }
-    ++timing_.chunks;
-    const std::lock_guard<std::mutex> lock(mutex_);
-    timing_.pipeline += summary.timing.pipeline;
     map.add(reader, plan_.sequence.T_world_sensor(own.first));
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++timing_.chunks;
+    timing_.pipeline += summary.timing.pipeline;
   }
 
   void join() {
