@@ -161,6 +161,12 @@ class AtomicFile::Buffer : public std::streambuf {
     return traits_type::not_eof(c);
   }
 
+  /// What is larger than the buffer is written from where it lies.
+  std::streamsize xsputn(const char* data, std::streamsize count) override {
+    if (count < epptr() - pbase()) return std::streambuf::xsputn(data, count);
+    return sync() == 0 && write_all(data, data + count) ? count : 0;
+  }
+
   /// Absolute positions only: enough to complete a header at the end.
   pos_type seekpos(pos_type position, std::ios_base::openmode) override {
     if (sync() != 0 || ::lseek(descriptor_, position, SEEK_SET) < 0) return pos_type(off_type(-1));
@@ -168,17 +174,21 @@ class AtomicFile::Buffer : public std::streambuf {
   }
 
   int sync() override {
-    const char* next = pbase();
-    while (error_ == 0 && next != pptr()) {
-      const ssize_t count = ::write(descriptor_, next, static_cast<std::size_t>(pptr() - next));
-      if (count > 0) next += count;
-      if (count < 0 && errno != EINTR) error_ = errno;
-    }
+    const bool is_written = write_all(pbase(), pptr());
     setp(bytes_.data(), bytes_.data() + bytes_.size());
-    return error_ == 0 ? 0 : -1;
+    return is_written ? 0 : -1;
   }
 
  private:
+  bool write_all(const char* next, const char* end) {
+    while (error_ == 0 && next != end) {
+      const ssize_t count = ::write(descriptor_, next, static_cast<std::size_t>(end - next));
+      if (count > 0) next += count;
+      if (count < 0 && errno != EINTR) error_ = errno;
+    }
+    return error_ == 0;
+  }
+
   int descriptor_;
   int error_ = 0;
   std::vector<char> bytes_;

@@ -1,6 +1,5 @@
 #include "dynains/io/point_file.hpp"
 
-#include <cstring>
 #include <limits>
 #include <ostream>
 #include <sstream>
@@ -99,28 +98,15 @@ std::string pcd_header(std::size_t count, const PointColumns& columns, const std
          viewpoint_line(viewpoint) + "\nPOINTS " + size + "\nDATA binary\n";
 }
 
-/// One record, packed.
-class Record {
- public:
-  template <class T>
-  void put(const T& value) {
-    std::memcpy(bytes_.data() + size_, &value, sizeof(T));
-    size_ += sizeof(T);
-  }
-  void write_to(std::ostream& out) const {
-    out.write(bytes_.data(), static_cast<std::streamsize>(size_));
-  }
-
- private:
-  std::array<char, 64> bytes_{};
-  std::size_t size_ = 0;
-};
-
 }  // namespace
 
 PointFileWriter::PointFileWriter(const fs::path& path, const PointColumns& columns,
                                  const Eigen::Isometry3d& viewpoint)
-    : columns_(columns), viewpoint_(viewpoint), pcd_(is_pcd(path)), file_(path) {
+    : columns_(columns),
+      viewpoint_(viewpoint),
+      pcd_(is_pcd(path)),
+      buffer_(columns, pcd_),
+      file_(path) {
   file_.stream() << header();
 }
 
@@ -134,31 +120,27 @@ std::string PointFileWriter::header() const {
 }
 
 void PointFileWriter::add(const FilePoint& point) {
-  Record record;
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    if (columns_.double_xyz) {
-      record.put(point.position[i]);
-    } else {
-      record.put(static_cast<float>(point.position[i]));
-    }
-  }
-  if (columns_.intensity) record.put(point.intensity);
-  if (columns_.rgb) {
-    if (pcd_) {
-      record.put(static_cast<std::uint32_t>(point.rgb[0] << 16 | point.rgb[1] << 8 | point.rgb[2]));
-    } else {
-      record.put(point.rgb);
-    }
-  }
-  if (columns_.label) record.put(point.label);
-  if (columns_.ring) record.put(point.ring);
-  if (columns_.time) record.put(point.time);
-  if (columns_.session) record.put(point.session);
-  record.write_to(file_.stream());
+  constexpr std::size_t kMostBytes = std::size_t{1} << 16U;
+  buffer_.add(point);
   ++size_;
+  if (buffer_.bytes().size() >= kMostBytes) write_buffer();
+}
+
+void PointFileWriter::add(const PointRecords& points) {
+  write_buffer();
+  const Span<const char> bytes = points.bytes();
+  file_.stream().write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  size_ += points.size();
+}
+
+void PointFileWriter::write_buffer() {
+  const Span<const char> bytes = buffer_.bytes();
+  file_.stream().write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  buffer_.clear();
 }
 
 void PointFileWriter::commit(AtomicFile::Sync sync) {
+  write_buffer();
   file_.stream().seekp(0);
   file_.stream() << header();
   file_.commit(sync);

@@ -10,12 +10,13 @@
 namespace dynains::program {
 namespace {
 
-// A file is a sequence of words of 8 bytes: magic and version, key; for each scan its arrays; the
-// summary; the map; and last the position of the summary and the checksum of all words before. An
-// array is the number of its bytes, the bytes, and zeros up to a whole word. Numbers have the byte
-// order of the machine, which the version tells.
+// A file is a sequence of words of 8 bytes: magic and version, key; for each scan the number of
+// bytes of its verdict, the arrays of the verdict and its moving points; the summary; the map, in
+// parts of some blocks; and last the position of the summary and the checksum of all words before.
+// An array is the number of its bytes, the bytes, and zeros up to a whole word. Numbers have the
+// byte order of the machine, which the version tells.
 constexpr std::uint64_t kMagic = 0x4B4E5543594E5944U;
-constexpr std::uint64_t kVersion = 3;
+constexpr std::uint64_t kVersion = 4;
 constexpr std::size_t kWord = 8;
 constexpr std::uint64_t kHeader = 5 * kWord;
 constexpr std::uint64_t kTrailer = 2 * kWord;
@@ -58,46 +59,6 @@ std::uint64_t Checksum::value() const {
   return result;
 }
 
-void VerdictRuns::assign(const ChunkScan& scan) {
-  ends.clear();
-  instances.clear();
-  labels.clear();
-  causes.clear();
-  const std::size_t count = scan.labels.size();
-  for (std::size_t i = 0; i < count; ++i) {
-    const bool continues = i + 1 < count && scan.instances[i + 1] == scan.instances[i] &&
-                           scan.causes[i + 1] == scan.causes[i] &&
-                           scan.labels[i + 1] == scan.labels[i];
-    if (continues) continue;
-    ends.push_back(static_cast<std::uint32_t>(i + 1));
-    instances.push_back(scan.instances[i]);
-    labels.push_back(scan.labels[i]);
-    causes.push_back(scan.causes[i]);
-  }
-}
-
-bool VerdictRuns::expand(ChunkScan& scan) const {
-  constexpr std::uint32_t kMostPoints = std::uint32_t{1} << 26U;
-  const std::size_t count = ends.size();
-  const std::size_t points = count > 0 ? ends.back() : 0;
-  if (instances.size() != count || labels.size() != count || causes.size() != count ||
-      points > kMostPoints || !std::is_sorted(ends.begin(), ends.end())) {
-    return false;
-  }
-  scan.instances.resize(points);
-  scan.labels.resize(points);
-  scan.causes.resize(points);
-  std::uint32_t begin = 0;
-  for (std::size_t run = 0; run < count; ++run) {
-    const std::size_t length = ends[run] - begin;
-    std::fill_n(scan.instances.begin() + begin, length, instances[run]);
-    std::fill_n(scan.labels.begin() + begin, length, labels[run]);
-    std::fill_n(scan.causes.begin() + begin, length, causes[run]);
-    begin = ends[run];
-  }
-  return true;
-}
-
 ChunkFileWriter::ChunkFileWriter(const std::filesystem::path& file, const ChunkKey& key)
     : file_(file) {
   for (const std::uint64_t number : {kMagic, kVersion, key.request, key.first, key.scans}) {
@@ -129,14 +90,19 @@ void ChunkFileWriter::put(Span<const T> values) {
 void ChunkFileWriter::put_number(std::uint64_t value) { write(&value, sizeof(value)); }
 
 void ChunkFileWriter::add(const ChunkScan& scan) {
-  put<const MovingPoint>(scan.moving);
   runs_.assign(scan);
+  const auto stored = [](const auto& values) {
+    return kWord + padded(values.size() * sizeof(values[0]));
+  };
+  put_number(stored(runs_.ends) + stored(runs_.instances) + stored(runs_.labels) +
+             stored(runs_.causes) + stored(scan.beliefs) + stored(scan.online));
   put<const std::uint32_t>(runs_.ends);
   put<const std::uint32_t>(runs_.instances);
   put<const PointLabel>(runs_.labels);
   put<const Cause>(runs_.causes);
   put<const float>(scan.beliefs);
   put<const PointLabel>(scan.online);
+  put<const char>(scan.moving);
 }
 
 void ChunkFileWriter::finish(const ChunkSummary& summary, const StaticMapAccumulator& map) {
@@ -174,14 +140,28 @@ void ChunkFileWriter::finish(const ChunkSummary& summary, const StaticMapAccumul
   }
   put<const double>(times);
 
+  constexpr std::uint32_t kBlocks = 4096;  // of a part
+  std::vector<std::int32_t> indices;
+  std::vector<std::uint32_t> ends;
   std::vector<float> xyz;
-  for (std::uint32_t block = 0; block < map.block_count(); ++block) {
+  for (std::uint32_t first = 0; first < map.block_count(); first += kBlocks) {
+    indices.clear();
+    ends.clear();
     xyz.clear();
-    map.visit_in_block(block, [&](float x, float y, float z) { xyz.insert(xyz.end(), {z, y, x}); });
-    // Blocks give their newest point first: in the other order, a map fills up as this one did.
-    std::reverse(xyz.begin(), xyz.end());
-    const std::array<std::int32_t, 3> index = map.block_index(block);
-    put<const std::int32_t>(index);
+    for (std::uint32_t block = first; block < std::min(first + kBlocks, map.block_count());
+         ++block) {
+      const auto begin_of_block = static_cast<std::ptrdiff_t>(xyz.size());
+      map.visit_in_block(block, [&](float x, float y, float z) {
+        xyz.insert(xyz.end(), {z, y, x});
+      });
+      // Blocks give their newest point first: in the other order, a map fills up as this one did.
+      std::reverse(xyz.begin() + begin_of_block, xyz.end());
+      const std::array<std::int32_t, 3> index = map.block_index(block);
+      indices.insert(indices.end(), index.begin(), index.end());
+      ends.push_back(static_cast<std::uint32_t>(xyz.size()));
+    }
+    put<const std::int32_t>(indices);
+    put<const std::uint32_t>(ends);
     put<const float>(xyz);
   }
   put_number(begin);
@@ -200,10 +180,10 @@ ChunkFileReader::ChunkFileReader(std::filesystem::path file, const ChunkKey& key
   if (get_number() != key.request) fail("belongs to another run");
   const std::uint64_t first = get_number();
   if (first != key.first || get_number() != key.scans) fail("belongs to another chunk");
-  file_.seekg(static_cast<std::streamoff>(size_ - kTrailer));
+  seek(size_ - kTrailer);
   summary_ = get_number();
   checksum_ = get_number();
-  file_.seekg(kHeader);
+  seek(kHeader);
 }
 
 void ChunkFileReader::fail(const std::string& reason) const {
@@ -212,7 +192,7 @@ void ChunkFileReader::fail(const std::string& reason) const {
 
 void ChunkFileReader::verify() {
   constexpr std::size_t kPart = std::size_t{1} << 20U;
-  file_.seekg(0);
+  seek(0);
   std::vector<char> bytes;
   Checksum sum;
   for (std::uint64_t left = size_ - kWord; left > 0; left -= bytes.size()) {
@@ -221,13 +201,25 @@ void ChunkFileReader::verify() {
     sum.add(bytes.data(), bytes.size());
   }
   if (sum.value() != checksum_) fail("does not have the bytes that were written");
-  file_.seekg(kHeader);
+  seek(kHeader);
 }
 
 void ChunkFileReader::read(void* data, std::size_t size) {
   if (!file_.read(static_cast<char*>(data), static_cast<std::streamsize>(size))) {
     fail("cannot be read");
   }
+  position_ += size;
+}
+
+void ChunkFileReader::seek(std::uint64_t position) {
+  file_.seekg(static_cast<std::streamoff>(position));
+  position_ = position;
+}
+
+std::uint64_t ChunkFileReader::get_size() {
+  const std::uint64_t size = get_number();
+  if (size > size_) fail("has an array of " + std::to_string(size) + " bytes");
+  return size;
 }
 
 std::uint64_t ChunkFileReader::get_number() {
@@ -238,9 +230,8 @@ std::uint64_t ChunkFileReader::get_number() {
 
 template <class T>
 void ChunkFileReader::get(std::vector<T>& values) {
-  const std::uint64_t size = get_number();
-  if (size > size_ || size % sizeof(T) != 0)
-    fail("has an array of " + std::to_string(size) + " bytes");
+  const std::uint64_t size = get_size();
+  if (size % sizeof(T) != 0) fail("has an array of " + std::to_string(size) + " bytes");
   values.resize(static_cast<std::size_t>(size / sizeof(T)));
   read(values.data(), static_cast<std::size_t>(size));
   const std::size_t rest = padded(static_cast<std::size_t>(size)) - static_cast<std::size_t>(size);
@@ -248,29 +239,37 @@ void ChunkFileReader::get(std::vector<T>& values) {
   read(zeros.data(), rest);
 }
 
-void ChunkFileReader::next(ChunkScan& scan, bool moving_only) {
+void ChunkFileReader::next(ChunkScan& scan) {
+  get_verdict(runs_, scan);
+  runs_.expand(scan);
   get(scan.moving);
-  if (moving_only) {
-    constexpr int kOtherArrays = 6;
-    for (int i = 0; i < kOtherArrays; ++i) {
-      const std::uint64_t size = get_number();
-      if (size > size_) fail("has an array of " + std::to_string(size) + " bytes");
-      file_.seekg(static_cast<std::streamoff>(padded(static_cast<std::size_t>(size))),
-                  std::ios::cur);
-    }
-    return;
-  }
-  get(runs_.ends);
-  get(runs_.instances);
-  get(runs_.labels);
-  get(runs_.causes);
-  if (!runs_.expand(scan)) fail("has other runs of points");
+}
+
+void ChunkFileReader::next_runs(VerdictRuns& runs, ChunkScan& scan) {
+  get_verdict(runs, scan);
+  const std::uint64_t size = get_size();
+  seek(position_ + padded(static_cast<std::size_t>(size)));
+}
+
+void ChunkFileReader::next_moving(std::vector<char>& moving) {
+  const std::uint64_t size = get_size();
+  seek(position_ + size);
+  get(moving);
+}
+
+void ChunkFileReader::get_verdict(VerdictRuns& runs, ChunkScan& scan) {
+  get_size();
+  get(runs.ends);
+  get(runs.instances);
+  get(runs.labels);
+  get(runs.causes);
+  if (!runs.is_valid()) fail("has other runs of points");
   get(scan.beliefs);
   get(scan.online);
 }
 
 ChunkSummary ChunkFileReader::read_summary() {
-  file_.seekg(static_cast<std::streamoff>(summary_));
+  seek(summary_);
   ChunkSummary summary;
   summary.points = get_number();
   std::vector<std::uint64_t> labels;
@@ -325,13 +324,24 @@ ChunkSummary ChunkFileReader::read_summary() {
 }
 
 void ChunkFileReader::add_map(StaticMapAccumulator& map) {
-  std::vector<std::int32_t> index;
+  std::vector<std::int32_t> indices;
+  std::vector<std::uint32_t> ends;
   std::vector<float> xyz;
-  while (static_cast<std::uint64_t>(file_.tellg()) < size_ - kTrailer) {
-    get(index);
+  while (position_ < size_ - kTrailer) {
+    get(indices);
+    get(ends);
     get(xyz);
-    if (index.size() != 3) fail("has a block of the map without a place");
-    map.insert_in_block({index[0], index[1], index[2]}, xyz);
+    const bool fits = indices.size() == 3 * ends.size() &&
+                      (ends.empty() ? 0 : ends.back()) == xyz.size() &&
+                      std::is_sorted(ends.begin(), ends.end());
+    if (!fits) fail("has another part of the map");
+    std::size_t first = 0;
+    for (std::size_t block = 0; block < ends.size(); ++block) {
+      const std::int32_t* const index = indices.data() + 3 * block;
+      map.insert_in_block({index[0], index[1], index[2]},
+                          {xyz.data() + first, ends[block] - first});
+      first = ends[block];
+    }
   }
 }
 

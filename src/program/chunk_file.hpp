@@ -18,6 +18,7 @@
 #include "overview.hpp"
 #include "run_timing.hpp"
 #include "verdict_arrays.hpp"
+#include "verdict_runs.hpp"
 
 namespace dynains::program {
 
@@ -28,34 +29,11 @@ struct ChunkKey {
   std::uint64_t scans = 0;    ///< number of own scans
 };
 
-/// A dynamic point, world frame, m, with its columns in the recording.
-struct MovingPoint {
-  std::array<double, 3> position{};
-  double time = 0.0;
-  float intensity = 0.0F;
-  std::uint32_t instance = kNoInstance;  ///< id in the chunk
-  std::uint16_t ring = 0;
-  std::array<std::uint16_t, 3> unused{};  ///< no undefined bytes in the file
-};
-
 /// The final verdict on one scan, with ids of the chunk. Each array has one value per point, or is
 /// empty if no output needs it.
 struct ChunkScan : VerdictArrays {
   std::vector<PointLabel> online;  ///< labels of the first verdict
-  std::vector<MovingPoint> moving;
-};
-
-/// The verdicts of a ChunkScan by run of consecutive points with one label, cause and instance:
-/// about a quarter of the bytes.
-struct VerdictRuns {
-  std::vector<std::uint32_t> ends;  ///< index behind the last point of the run
-  std::vector<std::uint32_t> instances;
-  std::vector<PointLabel> labels;
-  std::vector<Cause> causes;
-
-  void assign(const ChunkScan& scan);
-  /// Writes the verdicts of all points. False if the arrays do not fit together.
-  bool expand(ChunkScan& scan) const;
+  std::vector<char> moving;        ///< bytes of PointRecords whose labels are ids
 };
 
 /// Results of a chunk, except the verdicts on its scans and its map.
@@ -109,8 +87,14 @@ class ChunkFileReader {
   /// Throws unless the checksum is that of the content. Reads the whole file.
   void verify();
 
-  /// Reads the next of the own scans; all arrays, or `moving` alone.
-  void next(ChunkScan& scan, bool moving_only = false);
+  /// @name The next of the own scans
+  /// @{
+  void next(ChunkScan& scan);
+  /// Only the verdict, of which `scan` gets `beliefs` and `online`.
+  void next_runs(VerdictRuns& runs, ChunkScan& scan);
+  /// Only ChunkScan::moving.
+  void next_moving(std::vector<char>& moving);
+  /// @}
   /// Ends the scans.
   ChunkSummary read_summary();
   /// Adds the points of the map to `map`. To be called once, after read_summary().
@@ -123,9 +107,14 @@ class ChunkFileReader {
   std::uint64_t size_ = 0;
   std::uint64_t summary_ = 0;   // position
   std::uint64_t checksum_ = 0;  // as the file says
+  std::uint64_t position_ = 0;
 
   [[noreturn]] void fail(const std::string& reason) const;
   void read(void* data, std::size_t size);
+  void seek(std::uint64_t position);
+  /// Number of bytes of what comes next.
+  std::uint64_t get_size();
+  void get_verdict(VerdictRuns& runs, ChunkScan& scan);
   template <class T>
   void get(std::vector<T>& values);
   std::uint64_t get_number();

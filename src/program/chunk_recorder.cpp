@@ -46,7 +46,8 @@ ChunkRecorder::ChunkRecorder(const Chunk& chunk, std::optional<std::size_t> shar
       outputs_(outputs),
       writer_(writer),
       overview_(path),
-      map_(outputs.map) {}
+      map_(outputs.map),
+      moving_(outputs.moving) {}
 
 void ChunkRecorder::take_newest(std::size_t i, TimingRow row, const ScanVerdict& verdict) {
   const Span<const std::uint32_t> ids = verdict.instances;
@@ -99,19 +100,15 @@ void ChunkRecorder::count_instances(std::size_t i, const ScanVerdict& verdict) {
 }
 
 void ChunkRecorder::add_moving_points(const RecordedScan& scan, const ScanVerdict& verdict) {
-  record_.moving.clear();
+  moving_.clear();
   for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
     if (verdict.labels[i] != PointLabel::kDynamic) continue;
-    const FilePoint point = scan.point(i);
-    const Eigen::Vector3d position = verdict.T_world_sensor * point.position;
-    MovingPoint moving;
-    moving.position = {position.x(), position.y(), position.z()};
-    moving.time = point.time;
-    moving.intensity = point.intensity;
-    moving.instance = verdict.instances[i];
-    moving.ring = point.ring;
-    record_.moving.push_back(moving);
+    FilePoint point = scan.point(i);
+    point.position = verdict.T_world_sensor * point.position;
+    point.label = verdict.instances[i];
+    moving_.add(point);
   }
+  record_.moving.assign(moving_.bytes().begin(), moving_.bytes().end());
 }
 
 void ChunkRecorder::add_to_map(const RecordedScan& scan, const ScanVerdict& verdict) {

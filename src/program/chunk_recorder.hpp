@@ -12,6 +12,7 @@
 
 #include "chunk_file.hpp"
 #include "chunk_grid.hpp"
+#include "dynains/io/point_records.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
 #include "dynains/static_map_accumulator.hpp"
@@ -27,6 +28,7 @@ struct ChunkOutputs {
   bool with_online = false;
   bool with_map = true;
   StaticMapAccumulator::Config map;
+  PointColumns moving;  ///< columns of moving points
 };
 
 /// Number of points of each instance in one scan.
@@ -86,6 +88,7 @@ class ChunkRecorder {
   std::set<std::uint32_t> still_before_;               // static in an own scan
   std::map<std::uint32_t, std::size_t> moving_scans_;  // of the last own scans, by id
   ChunkScan record_;
+  PointRecords moving_;
   PointBuffer kept_;
 };
 

@@ -15,28 +15,18 @@
 
 #include "chunk_file.hpp"
 #include "chunk_recorder.hpp"
+#include "chunk_store.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/remover.hpp"
 #include "instance_numbers.hpp"
 #include "interrupt.hpp"
 #include "label_writer.hpp"
-#include "run_chunk.hpp"
 
 namespace dynains::program {
 namespace {
 
 namespace fs = std::filesystem;
-
-fs::path file_of(const RunPlan& plan, const fs::path& folder, const Chunk& chunk) {
-  return folder / kChunkFolder / (plan.sequence.name(chunk.own.first) + kChunkExtension);
-}
-
-/// Each chunk builds its map from the final labels of its own scans.
-DynaInsRemover::Config without_map(DynaInsRemover::Config config) {
-  config.build_map = false;
-  return config;
-}
 
 /// The static map of all chunks, in memory or on the disk.
 class MergedMap {
@@ -92,14 +82,8 @@ class ChunkedRun {
         listener_(listener),
         folder_(folder),
         results_(results),
-        config_(without_map(plan.config)),
-        path_(path_of(plan.sequence, plan.range)),
-        states_(plan.chunks.size()) {
-    outputs_.with_beliefs = plan.outputs.write_beliefs || results.needs_scans();
-    outputs_.with_online = plan.outputs.write_online;
-    outputs_.with_map = plan.config.build_map;
-    outputs_.map = plan.config.map;
-  }
+        chunks_(plan, folder),
+        states_(plan.chunks.size()) {}
   ~ChunkedRun() { join(); }
   ChunkedRun(const ChunkedRun&) = delete;
   ChunkedRun& operator=(const ChunkedRun&) = delete;
@@ -135,13 +119,6 @@ class ChunkedRun {
     bool is_labels;
   };
 
-  const Chunk& chunk(std::size_t number) const { return plan_.chunks[number]; }
-  fs::path file(std::size_t number) const { return file_of(plan_, folder_, chunk(number)); }
-  ChunkKey key(std::size_t number) const {
-    const ScanRange& own = chunk(number).own;
-    return {plan_.fingerprint, own.first, own.size()};
-  }
-
   // Labels come first, so that few chunks wait for them. Empty if nothing is left to do.
   std::optional<Task> next_task() {
     std::unique_lock<std::mutex> lock(mutex_);
@@ -174,7 +151,7 @@ class ChunkedRun {
           finish(task->chunk);
           is_done = true;
         } else if (is_usable(task->chunk) || judge(task->chunk, remover)) {
-          instances = open(task->chunk).read_summary().instances;
+          instances = chunks_.open(task->chunk).read_summary().instances;
           is_done = true;
         }
       } catch (...) {
@@ -225,21 +202,17 @@ class ChunkedRun {
     moving.assign(ids.begin(), ids.end());
   }
 
-  ChunkFileReader open(std::size_t number) const { return {file(number), key(number)}; }
-
   // Whether an earlier run left a whole file of the chunk.
   bool is_usable(std::size_t number) {
-    std::error_code ignored;
-    if (!fs::exists(file(number), ignored)) return false;
     try {
-      open(number).verify();
+      if (!chunks_.has(number)) return false;
     } catch (const IoError& error) {
       const std::lock_guard<std::mutex> lock(mutex_);
       warnings_.push_back(std::string(error.what()) + "; the chunk is processed again");
       return false;
     }
     const std::lock_guard<std::mutex> lock(mutex_);
-    done_ += chunk(number).own.size();
+    done_ += chunks_[number].own.size();
     ++timing_.kept_chunks;
     states_[number].is_kept = true;
     return true;
@@ -247,38 +220,22 @@ class ChunkedRun {
 
   // False if a signal or an error elsewhere ended it.
   bool judge(std::size_t number, std::optional<DynaInsRemover>& remover) {
-    if (!remover) remover.emplace(config_);
-    const auto shared = [&](std::size_t before) -> std::optional<std::size_t> {
-      if (before + 1 >= states_.size()) return std::nullopt;
-      return shared_scan(chunk(before), chunk(before + 1));
-    };
-    ChunkFileWriter writer(file(number), key(number));
-    ChunkRecorder recorder(chunk(number), number > 0 ? shared(number - 1) : std::nullopt,
-                           shared(number), path_, outputs_, writer);
-    std::size_t finished = 0;
-    const bool is_finished =
-        run_chunk(*remover, plan_.sequence, plan_.range, chunk(number), recorder, [&] {
-          const std::size_t more =
-              recorder.finished() - std::exchange(finished, recorder.finished());
-          const std::lock_guard<std::mutex> lock(mutex_);
-          done_ += more;
-          changed_.notify_all();
-          return !is_stopping_ && InterruptGuard::signal() == 0;
-        });
-    if (!is_finished) return false;
-    recorder.finish();
-    const std::lock_guard<std::mutex> lock(mutex_);
-    done_ += recorder.finished() - finished;
-    return true;
+    return chunks_.judge(number, remover, [this](std::size_t more) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      done_ += more;
+      changed_.notify_all();
+      return !is_stopping_ && InterruptGuard::signal() == 0;
+    });
   }
 
   void finish(std::size_t number) const {
-    const std::vector<std::uint32_t> still = open(number).read_summary().instances.still_before;
+    const std::vector<std::uint32_t> still =
+        chunks_.open(number).read_summary().instances.still_before;
     const InstanceNumbers& numbers = *states_[number].numbers;
-    const bool is_contradicted =
-        config_.uses_free_space() && std::any_of(still.begin(), still.end(), [&](std::uint32_t id) {
-          return numbers.moved_before(id);
-        });
+    const bool is_contradicted = plan_.config.uses_free_space() &&
+                                 std::any_of(still.begin(), still.end(), [&](std::uint32_t id) {
+                                   return numbers.moved_before(id);
+                                 });
     if (is_contradicted) hand_over(number);
     write_labels(number);
   }
@@ -286,12 +243,13 @@ class ChunkedRun {
   // Evidence of motion can be older than the warm-up, if an object stands for long. What the chunk
   // before calls dynamic up to the border therefore stays dynamic: the file is written again.
   void hand_over(std::size_t number) const {
-    const Chunk& own = chunk(number);
+    const Chunk& own = chunks_[number];
     const InstanceNumbers& numbers = *states_[number].numbers;
-    ChunkSummary summary = open(number).read_summary();
-    ChunkFileReader reader = open(number);
-    ChunkFileWriter writer(file(number), key(number));
-    ChunkRecorder recorder(own, std::nullopt, std::nullopt, path_, outputs_, writer);
+    ChunkSummary summary = chunks_.open(number).read_summary();
+    ChunkFileReader reader = chunks_.open(number);
+    ChunkFileWriter writer = chunks_.create(number);
+    ChunkRecorder recorder(own, std::nullopt, std::nullopt, chunks_.path(), chunks_.outputs(),
+                           writer);
     recorder.take_shared(std::move(summary.instances.shared_before),
                          std::move(summary.instances.shared_behind));
     recorder.add_pipeline_time(summary.timing.pipeline);
@@ -320,7 +278,7 @@ class ChunkedRun {
   }
 
   void mark_moved(const std::set<std::uint32_t>& moved, ChunkScan& scan) const {
-    const auto belief = static_cast<float>(config_.evidence.tau_track);
+    const auto belief = static_cast<float>(plan_.config.evidence.tau_track);
     for (std::size_t i = 0; i < scan.instances.size(); ++i) {
       if (scan.labels[i] != PointLabel::kStatic || moved.count(scan.instances[i]) == 0) continue;
       scan.labels[i] = PointLabel::kDynamic;
@@ -344,15 +302,17 @@ class ChunkedRun {
     const InstanceNumbers& numbers = *states_[number].numbers;
     // An earlier run may have written the labels of its chunks.
     const bool is_kept = states_[number].is_kept;
-    ChunkFileReader reader = open(number);
+    ChunkFileReader reader = chunks_.open(number);
+    VerdictRuns runs;
     ChunkScan scan;
-    for (std::size_t i = chunk(number).own.first; i <= chunk(number).own.last; ++i) {
-      reader.next(scan);
-      for (std::uint32_t& id : scan.instances) id = numbers(id);
-      ScanVerdict verdict = verdict_of(i, scan);
-      labels.take(verdict);
+    for (std::size_t i = chunks_[number].own.first; i <= chunks_[number].own.last; ++i) {
+      reader.next_runs(runs, scan);
+      for (std::uint32_t& id : runs.instances) id = numbers(id);
+      labels.take(runs, scan.beliefs);
       labels.write(plan_.sequence.name(i), is_kept);
-      if (!outputs_.with_online) continue;
+      if (!chunks_.outputs().with_online) continue;
+      runs.expand(scan);
+      ScanVerdict verdict = verdict_of(i, scan);
       verdict.labels = scan.online;
       online.take(verdict);
       online.write(plan_.sequence.name(i), is_kept);
@@ -401,25 +361,27 @@ class ChunkedRun {
   }
   // Gives everything but the labels to the results. All chunks before are merged.
   void merge(std::size_t number, MergedMap& map) {
-    const ScanRange& own = chunk(number).own;
+    const ScanRange& own = chunks_[number].own;
     const InstanceNumbers& numbers = *states_[number].numbers;
     const bool needs_scans = results_.needs_scans();
     std::optional<ReadAhead> scans;
     if (needs_scans) scans.emplace(plan_.sequence, own.first, own.last);
     RecordedScan points;
-    ChunkFileReader reader = open(number);
+    ChunkFileReader reader = chunks_.open(number);
+    PointRecords moving(chunks_.outputs().moving);
     ChunkScan scan;
     for (std::size_t i = own.first; i <= own.last; ++i) {
-      reader.next(scan, !needs_scans);
-      for (const MovingPoint& moving : scan.moving) {
-        FilePoint point;
-        point.position = {moving.position[0], moving.position[1], moving.position[2]};
-        point.time = moving.time;
-        point.intensity = moving.intensity;
-        point.ring = moving.ring;
-        point.label = mos_label(PointLabel::kDynamic, numbers(moving.instance));
-        results_.add_moving_point(point);
+      if (needs_scans) {
+        reader.next(scan);
+      } else {
+        reader.next_moving(scan.moving);
       }
+      if (!moving.assign(scan.moving)) {
+        throw IoError(chunks_.file(number).string() + ": has other moving points");
+      }
+      moving.replace_labels(
+          [&](std::uint32_t id) { return mos_label(PointLabel::kDynamic, numbers(id)); });
+      results_.add_moving_points(moving);
       if (!needs_scans) continue;
       for (std::uint32_t& id : scan.instances) id = numbers(id);
       points = scans->next(std::move(points));
@@ -427,17 +389,17 @@ class ChunkedRun {
     }
     ChunkSummary summary = reader.read_summary();
     if (!results_.add_chunk(own.size(), summary)) {
-      throw IoError(file(number).string() + ": has another picture");
+      throw IoError(chunks_.file(number).string() + ": has another picture");
     }
     for (std::size_t i = 0; i < summary.timing.rows.size(); ++i) {
       TimingRow& row = summary.timing.rows[i];
       row.scan = plan_.sequence.name(own.first + i);
       timing_.rows.push_back(std::move(row));
     }
-    ++timing_.chunks;
-    const std::lock_guard<std::mutex> lock(mutex_);
-    timing_.pipeline += summary.timing.pipeline;
     map.add(reader, plan_.sequence.T_world_sensor(own.first));
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++timing_.chunks;
+    timing_.pipeline += summary.timing.pipeline;
   }
 
   void join() {
@@ -455,9 +417,7 @@ class ChunkedRun {
   const RunListener& listener_;
   const fs::path& folder_;
   RunResults& results_;
-  DynaInsRemover::Config config_;
-  std::vector<Eigen::Vector3d> path_;
-  ChunkOutputs outputs_;
+  ChunkStore chunks_;
 
   // The members below are guarded by the mutex, but for numbers of linked chunks, which stay.
   std::mutex mutex_;
@@ -482,12 +442,6 @@ RunTiming run_in_chunks(const RunPlan& plan, const RunListener& listener, const 
                         RunResults& results) {
   create_folder(folder / kChunkFolder);
   return ChunkedRun(plan, listener, folder, results).run();
-}
-
-void remove_chunks(const RunPlan& plan, const fs::path& folder) {
-  std::error_code ignored;
-  for (const Chunk& chunk : plan.chunks) fs::remove(file_of(plan, folder, chunk), ignored);
-  fs::remove(folder / kChunkFolder, ignored);
 }
 
 }  // namespace dynains::program

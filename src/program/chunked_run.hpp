@@ -17,7 +17,4 @@ namespace dynains::program {
 RunTiming run_in_chunks(const RunPlan& plan, const RunListener& listener,
                         const std::filesystem::path& folder, RunResults& results);
 
-/// Removes the files of chunks, which are needed no more.
-void remove_chunks(const RunPlan& plan, const std::filesystem::path& folder);
-
 }  // namespace dynains::program

@@ -43,10 +43,18 @@ void fill_mos_labels(const ScanVerdict& verdict, std::vector<std::uint32_t>& lab
 bool has_bytes(const std::filesystem::path& file, const void* data, std::size_t size) {
   std::error_code error;
   if (std::filesystem::file_size(file, error) != size || error) return false;
-  std::vector<char> content(size);
+  constexpr std::size_t kBlock = std::size_t{1} << 16U;
+  std::vector<char> block(std::min(size, kBlock));
   std::ifstream stream(file, std::ios::binary);
-  return stream.read(content.data(), static_cast<std::streamsize>(size)) &&
-         std::equal(content.begin(), content.end(), static_cast<const char*>(data));
+  const auto* expected = static_cast<const char*>(data);
+  for (std::size_t left = size; left > 0;) {
+    const std::size_t count = std::min(left, block.size());
+    if (!stream.read(block.data(), static_cast<std::streamsize>(count))) return false;
+    if (!std::equal(expected, expected + count, block.data())) return false;
+    expected += count;
+    left -= count;
+  }
+  return true;
 }
 
 }  // namespace
@@ -75,12 +83,26 @@ void LabelFiles::take(const ScanVerdict& verdict) {
     std::transform(verdict.causes.begin(), verdict.causes.end(), causes_.begin(),
                    [](Cause cause) { return static_cast<std::uint8_t>(cause); });
   }
-  if (!belief_folder_.empty()) {
-    beliefs_.resize(verdict.beliefs.size());
-    std::transform(
-        verdict.beliefs.begin(), verdict.beliefs.end(), beliefs_.begin(),
-        [](float belief) { return static_cast<std::uint8_t>(std::lround(255.0F * belief)); });
-  }
+  take_beliefs(verdict.beliefs);
+}
+
+void LabelFiles::take(const VerdictRuns& runs, Span<const float> beliefs) {
+  labels_.resize(runs.points());
+  if (!cause_folder_.empty()) causes_.resize(runs.points());
+  runs.for_each([&](std::size_t run, std::size_t first, std::size_t count) {
+    std::fill_n(labels_.data() + first, count, mos_label(runs.labels[run], runs.instances[run]));
+    if (cause_folder_.empty()) return;
+    std::fill_n(causes_.data() + first, count, static_cast<std::uint8_t>(runs.causes[run]));
+  });
+  take_beliefs(beliefs);
+}
+
+void LabelFiles::take_beliefs(Span<const float> beliefs) {
+  if (belief_folder_.empty()) return;
+  beliefs_.resize(beliefs.size());
+  std::transform(beliefs.begin(), beliefs.end(), beliefs_.begin(), [](float belief) {
+    return static_cast<std::uint8_t>(std::lround(255.0F * belief));
+  });
 }
 
 void LabelFiles::write(const std::string& name, bool keep_equal) const {

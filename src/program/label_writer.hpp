@@ -7,7 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "dynains/points.hpp"
 #include "dynains/verdict.hpp"
+#include "verdict_runs.hpp"
 
 namespace dynains::program {
 
@@ -26,6 +28,7 @@ class LabelFiles {
   void create_folders() const;
   /// Copies a verdict into the form of the files.
   void take(const ScanVerdict& verdict);
+  void take(const VerdictRuns& runs, Span<const float> beliefs);
   /// Writes the verdict of take() to `labels`/`name`.label, `causes`/`name`.cause and
   /// `beliefs`/`name`.belief (255 is a belief of 1). With `keep_equal`, files that have these bytes
   /// already stay. Throws IoError.
@@ -38,6 +41,8 @@ class LabelFiles {
   std::vector<std::uint32_t> labels_;
   std::vector<std::uint8_t> causes_;
   std::vector<std::uint8_t> beliefs_;
+
+  void take_beliefs(Span<const float> beliefs);
 };
 
 /// Writes LabelFiles in a thread. One thread at most; one scan at most waits for the disk.

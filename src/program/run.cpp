@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "chunk_store.hpp"
 #include "chunked_run.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/diagnosis.hpp"
@@ -16,6 +17,7 @@
 #include "lone_scans.hpp"
 #include "output_folder.hpp"
 #include "run_plan.hpp"
+#include "run_request.hpp"
 #include "run_sequence.hpp"
 #include "write_view.hpp"
 
@@ -126,6 +128,13 @@ RunOutcome outcome_of(const RunPlan& plan, const RunResults& results, const RunT
   return outcome;
 }
 
+/// Report of a run that is not finished.
+nlohmann::ordered_json marker_of(const RunPlan& plan) {
+  nlohmann::ordered_json marker = unfinished_report(plan.outputs.map_name());
+  marker["request"] = plan.request;
+  return marker;
+}
+
 /// Writes the results into `out`, from the first scan on, or until a signal comes.
 RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
                          const RunListener& listener, OutputFolder& out, OutputChange::Mode mode,
@@ -143,9 +152,7 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   }
 
   const InterruptGuard interrupt(listener.second_signal);
-  nlohmann::ordered_json marker = unfinished_report(plan.outputs.map_name());
-  marker["request"] = plan.request;
-  OutputChange change(out, mode, marker, plan.listing);
+  OutputChange change(out, mode, marker_of(plan), plan.listing);
   if (!change.is_staged()) out.remove_folder_results(kTileFolder);
   RunOutputs outputs = plan.outputs;
   outputs.folder = change.folder();
@@ -162,12 +169,12 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   results.commit();
   write_timing(outputs.folder / "timing.csv", timing);
   // An earlier folder keeps the chunks until all other files are on the disk.
-  if (change.is_staged()) remove_chunks(plan, outputs.folder);
+  if (change.is_staged()) ChunkStore(plan, outputs.folder).remove();
   change.put_in_place([&] {
     results.commit_outside_map();
     if (session && outcome.complete) session->commit();
   });
-  if (!change.is_staged() && outcome.complete) remove_chunks(plan, outputs.folder);
+  if (!change.is_staged() && outcome.complete) ChunkStore(plan, outputs.folder).remove();
   outcome.map_points = results.map_points();
   outcome.wall = wall_time(ms_since(settings.started), timing);
   RunDescription description = describe(plan, settings, agreement, results);
@@ -204,6 +211,47 @@ RunOutcome run(const RunSettings& settings, Recording recording, const RunListen
     outcome.page = write_view(out, plan.sequence, kDefaultViewPoints);
   }
   return outcome;
+}
+
+std::size_t begin_chunks(const RunSettings& settings, Recording recording,
+                         const RunListener& listener) {
+  const RunPlan plan = make_plan(settings, std::move(recording));
+  if (plan.chunks.size() < 2) return 0;
+  const LockedFolder lock(plan.outputs.folder);
+  OutputFolder out(Folder(plan.outputs.folder), run_output_kind());
+  if (choose_task(plan, settings, out) != RunTask::kWrite) return 0;
+  out.check(plan.listing, plan.inputs);
+  warn_of_doubts(plan, settings, listener,
+                 pose_agreement(plan.sequence, plan.range.first, plan.range.last));
+  const OutputChange change(out, OutputChange::Mode::kInPlace, marker_of(plan), plan.listing);
+  create_folder(plan.outputs.folder / kChunkFolder);
+  return plan.chunks.size();
+}
+
+bool judge_chunk(const RunSettings& settings, Recording recording, std::size_t number,
+                 const RunListener& listener) {
+  const RunPlan plan = make_plan(settings, std::move(recording));
+  if (number >= plan.chunks.size()) {
+    throw ConfigError("chunk " + std::to_string(number) + ": the run has " +
+                      std::to_string(plan.chunks.size()) + " chunks, numbered from 0");
+  }
+  const FolderLock lock(plan.outputs.folder, FolderLock::Mode::kShared);
+  const OutputFolder out(Folder(plan.outputs.folder), run_output_kind());
+  const std::string differing = request_differences(out.marker(), plan.request);
+  if (!differing.empty()) {
+    throw IoError(out.path().string() +
+                  ": holds no run in chunks that was begun with these flags (" + differing + ")");
+  }
+  if (out.is_complete()) return true;
+  const ChunkStore chunks(plan, plan.outputs.folder);
+  try {
+    if (chunks.has(number)) return true;
+  } catch (const IoError& error) {
+    warn(listener, error.what() + std::string("; the chunk is processed again"));
+  }
+  const InterruptGuard interrupt(listener.second_signal);
+  std::optional<DynaInsRemover> remover;
+  return chunks.judge(number, remover, [](std::size_t) { return InterruptGuard::signal() == 0; });
 }
 
 }  // namespace dynains::program

@@ -46,14 +46,15 @@ LasOptions las_options(const Recording& recording, const ScanRange& range, const
   return options;
 }
 
-PointColumns dynamic_columns(bool far, PointColumns columns) {
-  columns.double_xyz = far;
+}  // namespace
+
+PointColumns moving_columns(const Recording& recording, const ScanRange& range) {
+  PointColumns columns = recording.columns();
+  columns.double_xyz = is_far(recording, range);
   columns.intensity = true;
   columns.label = true;
   return columns;
 }
-
-}  // namespace
 
 std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange& range) {
   std::vector<Eigen::Vector3d> path;
@@ -125,8 +126,7 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
       range_(range),
       final_labels_(outputs.folder / "labels", outputs.folder / "causes",
                     outputs.write_beliefs ? outputs.folder / "beliefs" : std::filesystem::path()),
-      dynamic_points_(outputs.folder / "dynamic_points.ply",
-                      dynamic_columns(is_far(recording, range), recording.columns())),
+      dynamic_points_(outputs.folder / "dynamic_points.ply", moving_columns(recording, range)),
       overview_(path_of(recording, range)),
       overview_file_(outputs.folder / kOverviewPicture),
       map_(std::move(outside_map)),

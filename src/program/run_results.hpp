@@ -74,6 +74,9 @@ std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange
 std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recording& recording,
                                   const ScanRange& range, const RunOutputs& outputs);
 
+/// Columns of the file of moving points.
+PointColumns moving_columns(const Recording& recording, const ScanRange& range);
+
 /// A scan and a copy of its final verdict.
 struct JudgedScan {
   RecordedScan scan;
@@ -112,7 +115,8 @@ class RunResults {
   bool needs_scans() const;
   /// A scan with its final verdict.
   void add_scan(const RecordedScan& scan, const ScanVerdict& verdict);
-  void add_moving_point(const FilePoint& point) { dynamic_points_.add(point); }
+  /// `points` have moving_columns().
+  void add_moving_points(const PointRecords& points) { dynamic_points_.add(points); }
   /// A chunk of `scans` scans. False, and nothing changes, if its picture is another one.
   bool add_chunk(std::size_t scans, const ChunkSummary& summary);
   /// @}

@@ -223,7 +223,13 @@ struct RunResult {
   fs::path file(const char* name) const { return outcome.outputs.folder / name; }
 };
 
-RunResult run(const py::object& recording, const fs::path& out, const py::kwargs& values) {
+// A run that is about to begin.
+struct PreparedRun {
+  RunArguments arguments;
+  std::shared_ptr<SharedRecording> recording;
+};
+
+PreparedRun prepare(const py::object& recording, const fs::path& out, const py::kwargs& values) {
   py::dict options(values);
   RunArguments arguments = take_arguments(options);
   take_config(arguments);
@@ -236,12 +242,16 @@ RunResult run(const py::object& recording, const fs::path& out, const py::kwargs
   const py::dict flags = to_flags(shared->options());
   settings.recording_flags = to_json(flags);
   settings.recording_as_given = as_given(settings.recording, flags);
+  return {std::move(arguments), shared};
+}
 
-  const program::RunListener listener = listen(arguments);
+RunResult run(const py::object& recording, const fs::path& out, const py::kwargs& values) {
+  const PreparedRun prepared = prepare(recording, out, values);
+  const program::RunListener listener = listen(prepared.arguments);
   RunOutcome outcome;
   {
     const py::gil_scoped_release release;
-    outcome = program::run(settings, shared->get(), listener);
+    outcome = program::run(prepared.arguments.settings, prepared.recording->get(), listener);
   }
   if (!outcome.complete) raise_signal(outcome);
   RunResult result{std::move(outcome), {}};
@@ -249,6 +259,23 @@ RunResult run(const py::object& recording, const fs::path& out, const py::kwargs
       py::module_::import("pathlib").attr("Path")(result.file("report.json")).attr("read_bytes")();
   result.report = py::module_::import("json").attr("loads")(text);
   return result;
+}
+
+std::size_t begin_chunks(const py::object& recording, const fs::path& out,
+                         const py::kwargs& values) {
+  const PreparedRun prepared = prepare(recording, out, values);
+  const program::RunListener listener = listen(prepared.arguments);
+  const py::gil_scoped_release release;
+  return program::begin_chunks(prepared.arguments.settings, prepared.recording->get(), listener);
+}
+
+bool judge_chunk(const py::object& recording, const fs::path& out, std::size_t number,
+                 const py::kwargs& values) {
+  const PreparedRun prepared = prepare(recording, out, values);
+  const program::RunListener listener = listen(prepared.arguments);
+  const py::gil_scoped_release release;
+  return program::judge_chunk(prepared.arguments.settings, prepared.recording->get(), number,
+                              listener);
 }
 
 std::string represent(const RunResult& result) {
@@ -337,6 +364,9 @@ void bind_run(py::module_& module) {
       "ConfigError, PoseError, and UsageError if another run writes to the folder. Warns by "
       "RuntimeWarning. Other threads run meanwhile.";
   module.def("run", &run, py::arg("recording"), py::arg("out"), doc.c_str());
+  // For dynains.fleet.
+  module.def("_begin_chunks", &begin_chunks, py::arg("recording"), py::arg("out"));
+  module.def("_judge_chunk", &judge_chunk, py::arg("recording"), py::arg("out"), py::arg("number"));
   module.def("_write_page", &write_page, py::arg("out"), py::arg("recording") = py::none(),
              py::arg("max_points") = program::kDefaultViewPoints);
 }

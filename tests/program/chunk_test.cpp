@@ -26,9 +26,7 @@ ChunkScan scan_of(std::size_t points, std::uint32_t id) {
   scan.labels.assign(points, PointLabel::kStatic);
   scan.causes.assign(points, Cause::kOccupied);
   scan.instances.assign(points, id);
-  scan.moving.resize(1);
-  scan.moving[0].position = {1.0, 2.0, static_cast<double>(id)};
-  scan.moving[0].instance = id;
+  scan.moving.assign(3, static_cast<char>(id));
   return scan;
 }
 
@@ -230,7 +228,8 @@ TEST_CASE("runs of points with one verdict expand to the verdicts of all points"
     runs.assign(scan);
     CHECK(runs.ends.size() <= points);
     ChunkScan expanded = scan_of(7, 3);
-    REQUIRE(runs.expand(expanded));
+    REQUIRE(runs.is_valid());
+    runs.expand(expanded);
     CHECK(expanded.labels == scan.labels);
     CHECK(expanded.causes == scan.causes);
     CHECK(expanded.instances == scan.instances);
@@ -238,22 +237,21 @@ TEST_CASE("runs of points with one verdict expand to the verdicts of all points"
 }
 
 TEST_CASE("runs that do not fit together are refused") {
-  ChunkScan scan;
   VerdictRuns runs;
   runs.assign(scan_of(5, 3));
   REQUIRE(runs.ends == Ids{5});
   runs.causes.clear();
-  CHECK_FALSE(runs.expand(scan));
+  CHECK_FALSE(runs.is_valid());
   runs.assign(scan_of(5, 3));
   runs.ends = {0xFFFFFFFF};
-  CHECK_FALSE(runs.expand(scan));
+  CHECK_FALSE(runs.is_valid());
   runs.ends = {5, 4};
   runs.instances = {1, 2};
   runs.labels.assign(2, PointLabel::kStatic);
   runs.causes.assign(2, Cause::kOccupied);
-  CHECK_FALSE(runs.expand(scan));
+  CHECK_FALSE(runs.is_valid());
   runs.ends = {4, 5};
-  CHECK(runs.expand(scan));
+  CHECK(runs.is_valid());
 }
 
 TEST_CASE("the file of a chunk gives back what was written") {
@@ -268,10 +266,17 @@ TEST_CASE("the file of a chunk gives back what was written") {
   CHECK(scan.causes == std::vector<Cause>(5, Cause::kOccupied));
   CHECK(scan.beliefs.empty());
   CHECK(scan.online.empty());
-  reader.next(scan, true);
-  REQUIRE(scan.moving.size() == 1);
-  CHECK(scan.moving[0].instance == 4);
-  CHECK(scan.moving[0].position[2] == 4.0);
+  CHECK(scan.moving == std::vector<char>(3, 3));
+  reader.next_moving(scan.moving);
+  CHECK(scan.moving == std::vector<char>(3, 4));
+
+  ChunkFileReader again(folder / "a.chunk", kKey);
+  VerdictRuns runs;
+  again.next_runs(runs, scan);
+  CHECK(runs.ends == Ids{5});
+  CHECK(runs.instances == Ids{3});
+  again.next_runs(runs, scan);
+  CHECK(runs.ends.empty());
 
   const ChunkSummary summary = reader.read_summary();
   const ChunkSummary expected = example_summary();

@@ -1,3 +1,4 @@
+import fcntl
 import json
 import os
 import signal
@@ -18,11 +19,15 @@ def drives(tmp_path_factory):
     folder = tmp_path_factory.mktemp("drives")
     for seed in range(6):
         dynains.Simulator("urban", "vlp16", scans=20, seed=seed).write(folder / f"drive{seed}")
+    dynains.Simulator("crowd", "vlp16", scans=150, seed=6).write(folder / "drive6")
     broken = folder / "broken"
     (broken / "velodyne").mkdir(parents=True)
     (broken / "velodyne" / "000000.bin").write_bytes(b"x")
     (broken / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
     return folder
+
+
+CHUNK = 40  # scans: drive6 has four chunks, the others are shorter
 
 
 def results_in(folder):
@@ -36,7 +41,7 @@ def expected(drives, tmp_path_factory):
     """Results of one process."""
     out = tmp_path_factory.mktemp("expected")
     for drive in drives.glob("drive*"):
-        dynains.run(drive, out / drive.name)
+        dynains.run(drive, out / drive.name, chunk=CHUNK)
     return results_in(out)
 
 
@@ -73,27 +78,57 @@ def workers(tmp_path):
 
 
 def test_a_worker_that_dies_and_one_that_stops_change_no_byte(drives, expected, workers, tmp_path):
+    out = tmp_path / "out"
     disturbed = []
 
-    def disturb(done, total, name, result):
-        if not disturbed:
-            disturbed.append(name)
-            workers.workers[0].send_signal(signal.SIGKILL)
-            workers.workers[1].send_signal(signal.SIGSTOP)
-            threading.Timer(20.0, workers.workers[1].send_signal, [signal.SIGCONT]).start()
+    def disturb():
+        while not disturbed:
+            disturbed.extend(out.glob("drive6/chunks/*.chunk"))
+            time.sleep(0.01)
+        workers.workers[0].send_signal(signal.SIGKILL)
+        workers.workers[1].send_signal(signal.SIGSTOP)
+        threading.Timer(20.0, workers.workers[1].send_signal, [signal.SIGCONT]).start()
 
-    out = tmp_path / "out"
+    threading.Thread(target=disturb, daemon=True).start()
     results = fleet.clean(
         fleet.find_recordings(drives.glob("drive*")),
         out,
         scheduler=workers.address,
-        progress=disturb,
+        chunk=CHUNK,
     )
     assert disturbed and workers.workers[0].wait() == -signal.SIGKILL
     assert not [name for name, result in results.items() if "error" in result]
-    assert list(results) == [f"drive{seed}" for seed in range(6)]
+    assert list(results) == [f"drive{seed}" for seed in range(7)]
     assert results_in(out) == expected
     assert json.loads((out / "fleet.json").read_text()) == results
+
+
+def test_chunks_in_any_order_give_the_results_of_one_run(drives, expected, tmp_path):
+    arguments = {"chunk": CHUNK, "resume": True, "jobs": 1}
+    job = (str(drives / "drive6"), str(tmp_path / "drive6"), arguments)
+    assert "cannot be opened" in fleet._judge(*job, 0)
+    assert fleet._begin(*job) == 4
+    files = tmp_path / "drive6" / "chunks"
+    for number in (2, 0, 3):
+        assert fleet._judge(*job, number) is None
+    (finished,) = files.glob("000080.chunk")
+    written = finished.stat().st_mtime_ns
+    assert fleet._begin(*job) == 4 and fleet._judge(*job, 2) is None
+    assert finished.stat().st_mtime_ns == written
+    (files / "000000.chunk").write_bytes(b"broken")
+    with pytest.warns(RuntimeWarning, match="000000.chunk: is cut off"):
+        assert fleet._judge(*job, 0) is None
+    assert "chunk 4: the run has 4 chunks" in fleet._judge(*job, 4)
+    other = (*job[:2], {**arguments, "chunk": 30})
+    assert "was begun with these flags (chunk was 40, is 30)" in fleet._judge(*other, 0)
+
+    # Chunk 1 is missing: the last task judges it.
+    assert fleet._finish(*job, [None, "disk full"])["error"] == "disk full"
+    assert fleet._finish(*job, [None])["scans"] == 150
+    names = {name for name in expected if name.startswith("drive6")}
+    assert results_in(tmp_path) == {name: expected[name] for name in names}
+    assert not files.exists()
+    assert fleet._judge(*job, 0) is None and not files.exists()
 
 
 def test_the_map_of_a_fleet_is_that_of_one_process(drives, tmp_path):
@@ -108,6 +143,20 @@ def test_the_map_of_a_fleet_is_that_of_one_process(drives, tmp_path):
         dynains.run(some[name], tmp_path / "alone" / name, update=tmp_path / "map", session=name)
     assert bytes_of(tmp_path / "city") == bytes_of(tmp_path / "map")
     assert {"drive0", "drive1", "drive2"} <= {f.name for f in (tmp_path / "city").iterdir()}
+
+
+def test_workers_share_a_folder_for_chunks_but_not_for_the_rest(drives, tmp_path, monkeypatch):
+    monkeypatch.setattr(fleet, "_PATIENCE", 0.0)
+    job = (str(drives / "drive6"), str(tmp_path / "out"), {"chunk": CHUNK, "resume": True})
+    assert fleet._begin(*job) == 4
+    other = os.open(tmp_path / "out", os.O_RDONLY)
+    fcntl.flock(other, fcntl.LOCK_SH)
+    assert fleet._judge(*job, 3) is None
+    assert "is in use" in fleet._begin(*job)["error"]
+    assert "is in use" in fleet._finish(*job, [None])["error"]
+    fcntl.flock(other, fcntl.LOCK_EX)
+    assert "is in use" in fleet._judge(*job, 3)
+    os.close(other)
 
 
 def test_a_recording_that_fails_is_reported_and_does_not_stop_the_others(drives, tmp_path, capsys):

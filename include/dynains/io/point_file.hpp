@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "dynains/io/atomic_file.hpp"
+#include "dynains/io/point_records.hpp"
 
 namespace dynains {
 
@@ -19,30 +19,7 @@ namespace dynains {
 /// coordinates require doubles: UTM coordinates as floats have errors of up to 0.25 m.
 inline constexpr double kFloatCoordinateLimit = 1e4;
 
-/// One point to write. Members without a column in the file are ignored. Units are those of the
-/// caller.
-struct FilePoint {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  float intensity = 0.0F;
-  std::array<std::uint8_t, 3> rgb{};
-  std::uint32_t label = 0;
-  std::uint16_t ring = 0;
-  double time = 0.0;
-  std::uint16_t session = 0;
-};
-
-/// Columns in addition to x y z.
-struct PointColumns {
-  bool double_xyz = false;  ///< x y z as double; some PCD readers support floats only
-  bool intensity = false;   ///< float `intensity`
-  bool rgb = false;         ///< PLY: uchar `red` `green` `blue`; PCD: packed `rgb`
-  bool label = false;       ///< uint32 `label`
-  bool ring = false;        ///< uint16 `ring`
-  bool time = false;        ///< double `time`
-  bool session = false;     ///< uint16 `session`, of a map of many sessions
-};
-
-/// Writes a binary point file, point by point, without points in memory. The number of points need
+/// Writes a binary point file, point by point, with few points in memory. The number of points need
 /// not be known in advance. `commit()` creates or replaces the file atomically.
 class PointFileWriter {
  public:
@@ -53,17 +30,21 @@ class PointFileWriter {
                            const Eigen::Isometry3d& viewpoint = Eigen::Isometry3d::Identity());
 
   void add(const FilePoint& point);
+  /// Adds records with the columns and the format of this file.
+  void add(const PointRecords& points);
   std::size_t size() const { return size_; }
   /// Throws IoError unless the file was written completely.
   void commit(AtomicFile::Sync sync = AtomicFile::Sync::kNow);
 
  private:
   std::string header() const;
+  void write_buffer();
 
   PointColumns columns_;
   Eigen::Isometry3d viewpoint_;
   bool pcd_;
   std::size_t size_ = 0;
+  PointRecords buffer_;
   AtomicFile file_;
 };
 

@@ -2,10 +2,11 @@
 
     dynains fleet LOGS... --out OUT [--city CITY] [--scheduler tcp://HOST:PORT]
 
-Each recording is a task. Its results go to OUT/NAME, as `dynains run` writes them, so they do not
-depend on the worker, the number of workers, or the order. A task of a worker that dies is given to
-another worker, which keeps the chunks that are finished. A recording that fails does not stop the
-others; OUT/fleet.json tells the reason. Run the command again to complete what is missing.
+A short recording is a task. Of a long one, each chunk is a task, and one more task puts the chunks
+together. Its results go to OUT/NAME, as `dynains run` writes them, so they do not depend on the
+workers, their number, or the order. A task of a worker that dies is given to another worker; chunks
+that are finished are kept. A recording that fails does not stop the others; OUT/fleet.json tells
+the reason. Run the command again to complete what is missing.
 """
 
 import argparse
@@ -16,9 +17,10 @@ import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterable, List, Optional, Union
+from typing import Any, Callable, Dict, Iterable, List, Optional, Tuple, TypeVar, Union
 
 from . import ConfigError, IoError, PoseError, Recording, UsageError, run
+from ._dynains import _begin_chunks, _judge_chunk
 
 __all__ = ["clean", "find_recordings"]
 
@@ -27,6 +29,7 @@ _LOCK = ".fleet.lock"
 _PATIENCE = 600.0  # s, for a folder that another process holds
 
 PathLike = Union[str, "os.PathLike[str]"]
+Result = TypeVar("Result")
 
 
 def find_recordings(paths: Iterable[PathLike]) -> Dict[str, Path]:
@@ -71,20 +74,54 @@ def _opens(path: Path) -> bool:
     return True
 
 
-def _clean_one(recording: str, out: str, arguments: Dict[str, Any]) -> Dict[str, Any]:
-    """Runs on a worker. Errors are results: another attempt would fail, too."""
+def _when_free(work: Callable[[], Result]) -> Result:
+    """Calls `work`; if another process holds the folder, again until it does not.
+
+    A worker that was taken for dead may still hold it. Raises UsageError if it does so too long.
+    """
     end = time.monotonic() + _PATIENCE
     while True:
         try:
-            result = run(recording, out, resume=True, jobs=1, **arguments)
-            break
-        except UsageError as error:
-            # A worker that was taken for dead may still hold the folder.
+            return work()
+        except UsageError:
             if time.monotonic() > end:
-                return {"recording": recording, "error": str(error)}
+                raise
             time.sleep(1.0)
-        except (ConfigError, IoError, PoseError) as error:
-            return {"recording": recording, "error": str(error)}
+
+
+# The functions below run on workers. Errors are results: another attempt would fail, too.
+_ERRORS = (ConfigError, IoError, PoseError, UsageError)
+
+
+def _begin(recording: str, out: str, arguments: Dict[str, Any]) -> Union[int, Dict[str, Any]]:
+    """The number of chunks of a long recording; the result of a short one."""
+    try:
+        chunks = _when_free(lambda: _begin_chunks(recording, out, **arguments))
+    except _ERRORS as error:
+        return {"recording": recording, "error": str(error)}
+    return chunks or _finish(recording, out, arguments, [])
+
+
+def _judge(recording: str, out: str, arguments: Dict[str, Any], number: int) -> Optional[str]:
+    """Judges a chunk. Returns what failed."""
+    try:
+        is_finished = _when_free(lambda: _judge_chunk(recording, out, number, **arguments))
+    except _ERRORS as error:
+        return str(error)
+    return None if is_finished else f"chunk {number} was interrupted"
+
+
+def _finish(
+    recording: str, out: str, arguments: Dict[str, Any], failures: List[Optional[str]]
+) -> Dict[str, Any]:
+    """Completes a run whose chunks are judged, or all of a short one."""
+    failed = next(filter(None, failures), None)
+    if failed:
+        return {"recording": recording, "error": failed}
+    try:
+        result = _when_free(lambda: run(recording, out, **arguments))
+    except _ERRORS as error:
+        return {"recording": recording, "error": str(error)}
     return {
         "recording": recording,
         "scans": result.scans,
@@ -126,49 +163,64 @@ def clean(
 
     recordings: by name, see find_recordings(). out: a folder that all workers reach. city: folder
     of a map of many sessions that each recording is added to, under its name. scheduler: address of
-    a scheduler of Dask, or its scheduler file (.json); None: workers on this machine. workers: their number on this machine; None:
-    one for each core. progress: called with the numbers of finished and of all
-    recordings, the name of the one that finished and its result. arguments: of dynains.run().
+    a scheduler of Dask, or its scheduler file (.json); None: workers on this machine. workers:
+    their number on this machine; None: one for each core. progress: called with the numbers of
+    finished and of all recordings, the name of the one that finished and its result. arguments: of
+    dynains.run().
 
     Raises ImportError without Dask, UsageError if another fleet works in the folder, OSError if the
     scheduler does not answer.
     """
-    from distributed import Client, LocalCluster, as_completed
+    from distributed import Client, LocalCluster
 
     out = Path(out).resolve()
-    results: Dict[str, Dict[str, Any]] = {}
+    common = {**arguments, "resume": True, "jobs": 1}
+    jobs = {
+        name: (str(path), str(out / name), {**common, **_session(city, name)})
+        for name, path in recordings.items()
+    }
     with _locked(out):
         cluster = scheduler or LocalCluster(
             n_workers=workers, threads_per_worker=1, dashboard_address=None
         )
         is_file = isinstance(cluster, str) and cluster.endswith(".json")
         with Client(scheduler_file=cluster) if is_file else Client(cluster) as client:
-            # The longest first, so that no worker is left with one at the end.
-            order = sorted(recordings, key=lambda name: (-_size_of(recordings[name]), name))
-            tasks = {
-                client.submit(
-                    _clean_one,
-                    str(recordings[name]),
-                    str(out / name),
-                    {**arguments, **_session(city, name)},
-                    pure=False,
-                ): name
-                for name in order
-            }
-            for task in as_completed(tasks):
-                name = tasks[task]
-                error = task.exception()
-                results[name] = (
-                    {"recording": str(recordings[name]), "error": f"{error}"}
-                    if error
-                    else task.result()
-                )
-                if progress:
-                    progress(len(results), len(recordings), name, results[name])
+            results = _results_of(client, jobs, progress)
         if scheduler is None:
             cluster.close()
         _write_report(out, results)
     return {name: results[name] for name in sorted(results)}
+
+
+def _results_of(
+    client: Any,
+    jobs: Dict[str, Tuple[str, str, Dict[str, Any]]],
+    progress: Optional[Callable[[int, int, str, Dict[str, Any]], object]],
+) -> Dict[str, Dict[str, Any]]:
+    from distributed import as_completed
+
+    # The longest first, so that no worker is left with one at the end.
+    order = sorted(jobs, key=lambda name: (-_size_of(Path(jobs[name][0])), name))
+    names = {client.submit(_begin, *jobs[name], pure=False): name for name in order}
+    finished = as_completed(names)
+    results: Dict[str, Dict[str, Any]] = {}
+    for task in finished:
+        name = names.pop(task)
+        error = task.exception()
+        result = {"recording": jobs[name][0], "error": f"{error}"} if error else task.result()
+        if isinstance(result, int):
+            chunks = [
+                client.submit(_judge, *jobs[name], number, pure=False, priority=1)
+                for number in range(result)
+            ]
+            last = client.submit(_finish, *jobs[name], chunks, pure=False, priority=2)
+            names[last] = name
+            finished.add(last)
+            continue
+        results[name] = result
+        if progress:
+            progress(len(results), len(jobs), name, result)
+    return results
 
 
 def _session(city: Optional[PathLike], name: str) -> Dict[str, str]:
@@ -194,8 +246,16 @@ def main(words: Optional[List[str]] = None) -> int:
     parser.add_argument("logs", nargs="+", help="recordings, or folders of recordings")
     parser.add_argument("--out", required=True, help="folder that all workers reach")
     parser.add_argument("--city", help="map of many sessions that each recording is added to")
-    parser.add_argument("--scheduler", help="address or scheduler file (.json) of a scheduler [workers on this machine]")
+    parser.add_argument(
+        "--scheduler",
+        help="address or scheduler file (.json) of a scheduler [workers on this machine]",
+    )
     parser.add_argument("--workers", type=int, help="on this machine [one for each core]")
+    parser.add_argument(
+        "--chunk",
+        type=int,
+        help="scans of a task, 0: a recording is one task [0 for less than 1000, else about 500]",
+    )
     parser.add_argument("--preset", default="default", choices=["default", "offline", "paper"])
     parser.add_argument("--accept-poses", action="store_true")
     options = parser.parse_args(words)
@@ -211,6 +271,7 @@ def main(words: Optional[List[str]] = None) -> int:
             scheduler=options.scheduler,
             workers=options.workers,
             progress=_tell,
+            chunk=options.chunk,
             preset=options.preset,
             accept_poses=options.accept_poses,
         )
