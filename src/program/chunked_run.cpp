@@ -253,7 +253,7 @@ class ChunkedRun {
     recorder.take_shared(std::move(summary.instances.shared_before),
                          std::move(summary.instances.shared_behind));
     recorder.add_pipeline_time(summary.timing.pipeline);
-    ReadAhead scans(plan_.sequence, own.own.first, own.own.last);
+    ReadAhead scans(plan_.sequence, own.own.first, own.own.last, std::launch::deferred);
     RecordedScan recorded;
     InstancePoints points;
     ChunkScan scan;
@@ -365,7 +365,7 @@ class ChunkedRun {
     const InstanceNumbers& numbers = *states_[number].numbers;
     const bool needs_scans = results_.needs_scans();
     std::optional<ReadAhead> scans;
-    if (needs_scans) scans.emplace(plan_.sequence, own.first, own.last);
+    if (needs_scans) scans.emplace(plan_.sequence, own.first, own.last, std::launch::deferred);
     RecordedScan points;
     ChunkFileReader reader = chunks_.open(number);
     PointRecords moving(chunks_.outputs().moving);

@@ -117,16 +117,15 @@ void LabelFiles::write(const std::string& name, bool keep_equal) const {
   if (!belief_folder_.empty() && !is_kept(beliefs, beliefs_)) write_point_bytes(beliefs, beliefs_);
 }
 
-LabelWriter::LabelWriter(std::filesystem::path folder, std::filesystem::path causes,
-                         std::filesystem::path beliefs)
-    : files_(std::move(folder), std::move(causes), std::move(beliefs)) {
+LabelWriter::LabelWriter(std::filesystem::path folder, std::launch thread)
+    : files_(std::move(folder)), thread_(thread) {
   files_.create_folders();
 }
 
 void LabelWriter::write(const std::string& name, const ScanVerdict& verdict) {
   finish();
   files_.take(verdict);
-  pending_ = std::async(std::launch::async, [this, name] { files_.write(name); });
+  pending_ = std::async(thread_, [this, name] { files_.write(name); });
 }
 
 void LabelWriter::finish() {

@@ -45,12 +45,12 @@ class LabelFiles {
   void take_beliefs(Span<const float> beliefs);
 };
 
-/// Writes LabelFiles in a thread. One thread at most; one scan at most waits for the disk.
+/// Writes LabelFiles in a thread, if there is one for it. One scan at most waits for the disk.
 class LabelWriter {
  public:
-  /// As LabelFiles. Creates the folders. Throws IoError.
-  explicit LabelWriter(std::filesystem::path folder, std::filesystem::path causes = {},
-                       std::filesystem::path beliefs = {});
+  /// Creates the folder. `thread`: async for another thread, deferred for that of the next call.
+  /// Throws IoError.
+  LabelWriter(std::filesystem::path folder, std::launch thread);
   LabelWriter(const LabelWriter&) = delete;
   LabelWriter& operator=(const LabelWriter&) = delete;
 
@@ -61,6 +61,7 @@ class LabelWriter {
 
  private:
   LabelFiles files_;  // the writing thread's, while pending_ is valid
+  std::launch thread_;
   std::future<void> pending_;
 };
 

@@ -5,11 +5,11 @@
 namespace dynains::program {
 
 OpenScans::OpenScans(const Recording& recording, const ScanRange& pushed, const ScanRange& judged,
-                     std::size_t latency)
-    : judged_(judged), next_(pushed.first), reader_(recording, pushed.first, pushed.last) {
+                     std::size_t latency, std::launch thread)
+    : judged_(judged), next_(pushed.first), reader_(recording, pushed.first, pushed.last, thread) {
   constexpr std::size_t kFewScans = 8;
   if (latency > kFewScans && recording.format() == ScanFormat::kBin) {
-    second_reader_.emplace(recording, judged.first, judged.last);
+    second_reader_.emplace(recording, judged.first, judged.last, thread);
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <deque>
+#include <future>
 #include <optional>
 
 #include "dynains/io/recording.hpp"
@@ -17,8 +18,9 @@ class OpenScans {
  public:
   /// `pushed`: the scans to push, of a recording that outlives this. `judged`: those of them that
   /// are needed for their final verdict. `latency`: pushes after a scan before its final verdict.
+  /// `thread`: as of ReadAhead.
   OpenScans(const Recording& recording, const ScanRange& pushed, const ScanRange& judged,
-            std::size_t latency);
+            std::size_t latency, std::launch thread);
 
   /// To be called once for each scan of `pushed`. The scan is valid until the next call of a
   /// member. Throws IoError if it could not be read.

@@ -4,8 +4,9 @@
 
 namespace dynains::program {
 
-ReadAhead::ReadAhead(const Recording& recording, std::size_t first, std::size_t last)
-    : recording_(recording), next_(first), last_(last) {
+ReadAhead::ReadAhead(const Recording& recording, std::size_t first, std::size_t last,
+                     std::launch thread)
+    : recording_(recording), next_(first), last_(last), thread_(thread) {
   launch({});
 }
 
@@ -17,7 +18,7 @@ RecordedScan ReadAhead::next(RecordedScan recycled) {
 
 void ReadAhead::launch(RecordedScan buffer) {
   if (next_ > last_) return;
-  pending_ = std::async(std::launch::async,
+  pending_ = std::async(thread_,
                         [&recording = recording_, i = next_++, scan = std::move(buffer)]() mutable {
                           recording.read_scan(i, scan);
                           return std::move(scan);

@@ -1,4 +1,4 @@
-// The next scan is read while the pipeline works on this one.
+// The next scan is read while the pipeline works on this one, if there is a thread for it.
 #pragma once
 
 #include <cstddef>
@@ -10,8 +10,9 @@ namespace dynains::program {
 
 class ReadAhead {
  public:
-  /// Scans `first` to `last`, both inclusive, of a recording that outlives this.
-  ReadAhead(const Recording& recording, std::size_t first, std::size_t last);
+  /// Scans `first` to `last`, both inclusive, of a recording that outlives this. `thread`: async to
+  /// read in another thread, deferred to read in next().
+  ReadAhead(const Recording& recording, std::size_t first, std::size_t last, std::launch thread);
 
   /// To be called once for each scan. The next one; throws IoError if it could not be read.
   /// `recycled` gives its memory to the scan after it.
@@ -23,6 +24,7 @@ class ReadAhead {
   const Recording& recording_;
   std::size_t next_;
   std::size_t last_;
+  std::launch thread_;
   std::future<RecordedScan> pending_;
 };
 

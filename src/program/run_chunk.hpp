@@ -15,6 +15,7 @@ namespace dynains::program {
 /// scans then. The remover begins as a new one, with the model of the sensor from the first scan of
 /// the range, so that chunks differ in nothing but their scans. Calls `keep_going()` after each
 /// scan; if it returns false, the chunk ends there, unfinished. Returns whether it is finished.
+/// One thread does it all: others work on other chunks.
 template <class Remover, class KeepGoing>
 bool run_chunk(Remover& remover, const Recording& recording, const ScanRange& range,
                const Chunk& chunk, ChunkRecorder& recorder, KeepGoing&& keep_going) {
@@ -28,7 +29,8 @@ bool run_chunk(Remover& remover, const Recording& recording, const ScanRange& ra
     recorder.add_pipeline_time(ms);
     return std::make_pair(frame, ms);
   };
-  OpenScans scans(recording, {chunk.first, chunk.last}, chunk.own, remover.latency());
+  OpenScans scans(recording, {chunk.first, chunk.last}, chunk.own, remover.latency(),
+                  std::launch::deferred);
   const auto finish = [&](const ScanVerdict& verdict) {
     if (verdict.scan < extra) return;
     const std::size_t i = chunk.first + verdict.scan - extra;

@@ -138,9 +138,11 @@ void add_run_command(CLI::App& app) {
       ->type_name("FILE");
   const char* const kCores = "Cores and chunks";
   command
-      .add_option("--jobs", options->jobs,
-                  "threads that process chunks of the recording; changes no result [one for each "
-                  "core]")
+      .add_option(
+          "--jobs", options->jobs,
+          "threads that process chunks of the recording; changes no result. 1 of one stream: "
+          "that thread also reads and writes, for machines on which many runs use all "
+          "cores [one for each core]")
       ->type_name("N")
       ->group(kCores);
   command

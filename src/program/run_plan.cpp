@@ -255,6 +255,7 @@ RunPlan make_plan(const RunSettings& settings, Recording sequence) {
   std::vector<Chunk> chunks;
   if (chunk_settings.scans > 0) chunks = chunk_grid(range, chunk_settings, latency);
   outputs.in_chunks = !chunks.empty();
+  if (settings.jobs) outputs.thread = std::launch::deferred;
   const nlohmann::ordered_json configuration = parameters_of(config);
   nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);
   request["chunk"] = chunk_settings.scans;

@@ -124,6 +124,7 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
                        const RunOutputs& outputs, std::unique_ptr<MapFile> outside_map)
     : recording_(recording),
       range_(range),
+      thread_(outputs.thread),
       final_labels_(outputs.folder / "labels", outputs.folder / "causes",
                     outputs.write_beliefs ? outputs.folder / "beliefs" : std::filesystem::path()),
       dynamic_points_(outputs.folder / "dynamic_points.ply", moving_columns(recording, range)),
@@ -133,7 +134,7 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
       map_is_outside_(map_ != nullptr),
       writes_beliefs_(outputs.write_beliefs) {
   final_labels_.create_folders();
-  if (outputs.write_online) online_labels_.emplace(outputs.folder / "online");
+  if (outputs.write_online) online_labels_.emplace(outputs.folder / "online", outputs.thread);
   if (outputs.write_clean) clean_scans_.emplace(outputs.folder / "clean", recording);
   if (!outputs.map.empty() && !map_is_outside_) {
     map_ = open_map(outputs.folder / outputs.map.filename(), recording, range, outputs);
@@ -168,7 +169,7 @@ void JudgedScan::take(RecordedScan& other, const ScanVerdict& other_verdict, boo
 void RunResults::take_final(RecordedScan& scan, const ScanVerdict& verdict) {
   finish();
   judged_.take(scan, verdict, writes_beliefs_ || needs_scans());
-  writing_ = std::async(std::launch::async, [this] { write_final(judged_.scan, judged_.verdict); });
+  writing_ = std::async(thread_, [this] { write_final(judged_.scan, judged_.verdict); });
   ++finished_;
 }
 

@@ -54,9 +54,10 @@ struct RunOutputs {
   bool write_beliefs = false;
   bool map_on_disk = false;
   bool in_chunks = false;
-  bool map_attributes = false;  ///< the map holds attributes of its points
-  std::string crs;              ///< of a LAS map, for example "EPSG:25832"; empty: none
-  double map_voxel = 0.0;       ///< m, of attributes
+  std::launch thread = std::launch::async;  ///< for reading and writing; deferred: the caller's
+  bool map_attributes = false;              ///< the map holds attributes of its points
+  std::string crs;                          ///< of a LAS map, for example "EPSG:25832"; empty: none
+  double map_voxel = 0.0;                   ///< m, of attributes
 
   bool has_outside_map() const;
   bool has_las_map() const { return is_las(map); }
@@ -99,13 +100,16 @@ class RunResults {
 
   /// The verdict on the scan just pushed.
   void take_newest(const ScanVerdict& verdict);
-  /// The final verdict on a scan, in the order of the scans. Another thread writes the results of
-  /// the scan, which is exchanged for an earlier one. Throws IoError, for the scan before as well.
+  /// The final verdict on a scan, in the order of the scans. By default, another thread writes the
+  /// results of the scan, which is exchanged for an earlier one. Throws IoError, for the scan
+  /// before as well.
   void take_final(RecordedScan& scan, const ScanVerdict& verdict);
   /// Waits for the results of the last scan. Throws IoError.
   void finish();
   /// Final verdicts also go to `session`, which outlives this.
   void contribute_to(SessionContribution& session) { session_ = &session; }
+  /// Whether results are written in a thread of their own, RunOutputs::thread.
+  std::launch thread() const { return thread_; }
 
   /// @name Results of chunks
   /// In the place of take_newest() and take_final(), in the order of the scans. The caller writes
@@ -134,6 +138,7 @@ class RunResults {
  private:
   const Recording& recording_;
   ScanRange range_;
+  std::launch thread_;
   LabelFiles final_labels_;
   std::optional<LabelWriter> online_labels_;
   std::optional<CleanWriter> clean_scans_;

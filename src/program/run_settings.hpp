@@ -24,7 +24,9 @@ struct RunSettings {
   bool map_attributes = false;
   std::string crs;  ///< of a LAS map, for example "EPSG:25832"; empty: none
   ScanWindow window;
-  std::optional<std::int64_t> jobs;      ///< threads; empty: one for each core
+  /// Threads; empty: one for each core. One stream with a number is one thread; without, others
+  /// read and write.
+  std::optional<std::int64_t> jobs;
   std::optional<std::int64_t> chunk;     ///< scans, 0 for one stream; empty: default_chunk()
   std::optional<std::int64_t> lookback;  ///< scans of the warm-up of a chunk; needs `chunk`
   bool write_online = false;

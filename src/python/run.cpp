@@ -113,7 +113,9 @@ const std::array<RunSetting, 25> kRunSettings{{
      [](RunArguments& run, const py::handle& value) {
        if (!value.is_none()) run.settings.align_start = value.cast<std::string>();
      }},
-    {"jobs", "int from 1 on", "threads that process chunks of the recording; changes no result",
+    {"jobs", "int from 1 on",
+     "threads that process chunks of the recording; changes no result. 1 of one stream: that "
+     "thread also reads and writes",
      &set_count<&RunSettings::jobs, 1>},
     {"chunk", "int from 0 on", "scans of a chunk; 0: the recording is one stream",
      &set_count<&RunSettings::chunk, 0>},

@@ -29,6 +29,15 @@ TEST_CASE("AtomicFile replaces the target at commit and not before") {
   CHECK(count_entries(folder.path()) == 1);
 }
 
+TEST_CASE("Small and large writes come in their order") {
+  TemporaryFolder folder;
+  const std::string small = "small", large(100000, 'l'), buffer(std::size_t{1} << 16, 'b');
+  AtomicFile file(folder / "a.txt");
+  file.stream() << small << large << small << buffer << buffer << small;
+  file.commit();
+  CHECK(read_text(folder / "a.txt") == small + large + small + buffer + buffer + small);
+}
+
 TEST_CASE("Files can be synced to the disk later, all at once") {
   TemporaryFolder folder;
   AtomicFile file(folder / "a.txt");

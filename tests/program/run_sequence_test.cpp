@@ -124,8 +124,9 @@ TEST_CASE("Labels: 251 moving, 9 static, 0 not judged; instances wrap but never 
 TEST_CASE("Scans are the same again for their final verdict, kept or read a second time") {
   Fixture fixture(7);
   const Recording& recording = *fixture.sequence;
+  const std::launch thread = GENERATE(std::launch::async, std::launch::deferred);
   for (const std::size_t latency : {std::size_t{2}, std::size_t{30}}) {
-    OpenScans scans(recording, {1, 6}, {2, 5}, latency);
+    OpenScans scans(recording, {1, 6}, {2, 5}, latency, thread);
     std::size_t judged = 2;
     const auto judge_next = [&] {
       CHECK(scans.next_judged().xyzi == recording.read_scan(judged++).xyzi);
@@ -141,7 +142,9 @@ TEST_CASE("Scans are the same again for their final verdict, kept or read a seco
 TEST_CASE("Every scan gets its final labels, every dynamic point its place in the world") {
   Fixture fixture(5);
   const ScanRange range{1, 4};
-  RunResults results(*fixture.sequence, range, fixture.outputs());
+  RunOutputs outputs = fixture.outputs();
+  outputs.thread = GENERATE(std::launch::async, std::launch::deferred);
+  RunResults results(*fixture.sequence, range, outputs);
   const RunTiming timing =
       run_sequence(fixture.remover, *fixture.sequence, range, results, kAlways);
   results.commit();
