@@ -161,7 +161,7 @@ class AtomicFile::Buffer : public std::streambuf {
     return traits_type::not_eof(c);
   }
 
-  /// What is larger than the buffer is written from where it lies.
+  /// Writes an array that is larger than the buffer directly, without a copy.
   std::streamsize xsputn(const char* data, std::streamsize count) override {
     if (count < epptr() - pbase()) return std::streambuf::xsputn(data, count);
     return sync() == 0 && write_all(data, data + count) ? count : 0;

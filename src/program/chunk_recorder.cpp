@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "moving_points.hpp"
+
 namespace dynains::program {
 namespace {
 
@@ -101,13 +103,9 @@ void ChunkRecorder::count_instances(std::size_t i, const ScanVerdict& verdict) {
 
 void ChunkRecorder::add_moving_points(const RecordedScan& scan, const ScanVerdict& verdict) {
   moving_.clear();
-  for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
-    if (verdict.labels[i] != PointLabel::kDynamic) continue;
-    FilePoint point = scan.point(i);
-    point.position = verdict.T_world_sensor * point.position;
-    point.label = verdict.instances[i];
-    moving_.add(point);
-  }
+  for_each_moving_point(
+      scan, verdict, [&](std::size_t i) { return verdict.instances[i]; },
+      [&](const FilePoint& point) { moving_.add(point); });
   record_.moving.assign(moving_.bytes().begin(), moving_.bytes().end());
 }
 

@@ -15,8 +15,7 @@ namespace fs = std::filesystem;
 ChunkOutputs outputs_of_chunks(const RunPlan& plan) {
   const RunOutputs& run = plan.outputs;
   ChunkOutputs outputs;
-  outputs.with_beliefs =
-      run.write_beliefs || run.write_mcap || run.map_attributes || !plan.session.city.empty();
+  outputs.with_beliefs = run.needs_beliefs();
   outputs.with_online = run.write_online;
   outputs.with_map = plan.config.build_map;
   outputs.map = plan.config.map;

@@ -39,7 +39,7 @@ Faults fill(const float* xyzi, const std::uint32_t* labels, std::size_t count, B
   std::uint32_t foreign = 0;
   std::uint32_t infinite = 0;
   detail::run_max_packs([&](auto) {
-    // Compilers use vectors only if nothing that the loop reads can be changed by its bytes.
+    // Local copies: a store of a byte could change what the loop reads, which prevents vectors.
     const std::size_t size = count;
     const std::uint32_t* const classes = labels;
     std::uint8_t* const keep = block.keep.data();

@@ -132,7 +132,7 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
       overview_file_(outputs.folder / kOverviewPicture),
       map_(std::move(outside_map)),
       map_is_outside_(map_ != nullptr),
-      writes_beliefs_(outputs.write_beliefs) {
+      needs_beliefs_(outputs.needs_beliefs()) {
   final_labels_.create_folders();
   if (outputs.write_online) online_labels_.emplace(outputs.folder / "online", outputs.thread);
   if (outputs.write_clean) clean_scans_.emplace(outputs.folder / "clean", recording);
@@ -168,7 +168,7 @@ void JudgedScan::take(RecordedScan& other, const ScanVerdict& other_verdict, boo
 
 void RunResults::take_final(RecordedScan& scan, const ScanVerdict& verdict) {
   finish();
-  judged_.take(scan, verdict, writes_beliefs_ || needs_scans());
+  judged_.take(scan, verdict, needs_beliefs_);
   writing_ = std::async(thread_, [this] { write_final(judged_.scan, judged_.verdict); });
   ++finished_;
 }
@@ -183,12 +183,10 @@ void RunResults::write_final(const RecordedScan& scan, const ScanVerdict& verdic
   labels_.add(verdict.labels);
   add_scan(scan, verdict);
   overview_.add(scan, verdict);
-  for_each_moving(verdict.labels, [&](std::size_t i) {
-    FilePoint point = scan.point(i);
-    point.position = verdict.T_world_sensor * point.position;
-    point.label = mos_label(verdict.labels[i], verdict.instances[i]);
-    dynamic_points_.add(point);
-  });
+  for_each_moving_point(
+      scan, verdict,
+      [&](std::size_t i) { return mos_label(verdict.labels[i], verdict.instances[i]); },
+      [&](const FilePoint& point) { dynamic_points_.add(point); });
 }
 
 bool RunResults::needs_scans() const {

@@ -59,6 +59,8 @@ struct RunOutputs {
   std::string crs;                          ///< of a LAS map, for example "EPSG:25832"; empty: none
   double map_voxel = 0.0;                   ///< m, of attributes
 
+  /// Whether a result holds beliefs.
+  bool needs_beliefs() const { return write_beliefs || write_mcap || map_attributes; }
   bool has_outside_map() const;
   bool has_las_map() const { return is_las(map); }
   /// The map relative to the folder if it lies there, so that the folder can be moved; else
@@ -150,7 +152,7 @@ class RunResults {
   std::unique_ptr<MapFile> dynamic_las_;  ///< moving points beside a LAS map
   std::optional<MapAttributeTable> map_attributes_;
   bool map_is_outside_;
-  bool writes_beliefs_;
+  bool needs_beliefs_;
   SessionContribution* session_ = nullptr;
   std::size_t finished_ = 0;
   std::uint64_t points_ = 0;
