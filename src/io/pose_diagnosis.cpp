@@ -22,6 +22,7 @@ constexpr std::size_t kFewestFirstPairs = 2;  // at the start of the recording
 constexpr double kClearlyWorse = 3.0;         // ratio of errors at the start and elsewhere
 constexpr double kInexactTranslation = 0.05;  // m, from one scan to the next
 constexpr double kInexactRotation = 0.0045;   // rad
+constexpr double kSmaller = 0.75;             // ratio of errors, beside a proof by single motions
 constexpr double kFarOff = 1.0;               // m at points 10 m away
 constexpr double kRough = 0.4;  // m at points 10 m away; more is not inexact but wrong
 
@@ -198,22 +199,30 @@ std::optional<Explanation> explain_by_reading(const Recording& recording,
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return flags_of(readings[a]) < flags_of(readings[b]);
   });
+  // An error that noise of the registration nearly hides must be smaller at most motions.
+  const auto explains_more = [&](double error, const PoseReading& reading) {
+    return is_much_better(error, before) ||
+           (error < kSmaller * before &&
+            is_mostly_better(motions, motion_under(recording, reading.convention),
+                             motion_under(recording, recording.convention())));
+  };
   std::size_t best = 0;
   double least = before;
   for (const std::size_t i : order) {
     const double error = error_of(readings[i]);
-    const bool has_as_few_flags =
-        least < before && flags_of(readings[i]) == flags_of(readings[best]);
+    const bool is_first = !(least < before);
+    const bool has_as_few_flags = !is_first && flags_of(readings[i]) == flags_of(readings[best]);
     // A further flag must explain clearly more.
-    if (!(error < (has_as_few_flags ? 1.0 : 0.5) * least)) continue;
+    const bool is_better = is_first ? explains_more(error, readings[i])
+                                    : error < (has_as_few_flags ? 1.0 : 0.5) * least;
+    if (!is_better) continue;
     best = i;
     least = error;
   }
   // Small motions differ little from any others, so no motion must be clearly worse, too.
   const double standing = error_at_points(
       motions, [](const RegisteredMotion&) { return Eigen::Isometry3d::Identity(); });
-  const bool explains = is_much_better(least, before) && least < std::min(kRough, 0.5 * standing);
-  if (!explains) return std::nullopt;
+  if (!(least < before && least < std::min(kRough, 0.5 * standing))) return std::nullopt;
   const auto found = readings.begin() + static_cast<std::ptrdiff_t>(best);
   std::rotate(readings.begin(), found, found + 1);
   return Explanation{PoseVerdict::kOtherwise, least, readings.front().convention,
@@ -258,16 +267,21 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
   d.registered_pairs = steps.pairs;
   if (motions.size() < kFewestMotions || steps.pairs < kFewestPairs) return;
 
-  if (before > exact) {
+  if (before > kExact) {
     auto reading = explain_by_reading(recording, motions, d.readings, before);
-    const auto offset = explain_by_offset(recording, motions, before);
-    const auto body = explain_by_body(recording, motions, before);
+    std::optional<Explanation> offset;
+    std::optional<Explanation> body;
+    if (before > exact) {
+      offset = explain_by_offset(recording, motions, before);
+      body = explain_by_body(recording, motions, before);
+    }
     // A shift by scans is a coarse offset.
     const bool is_shift = reading && reading->convention.shift != recording.convention().shift;
     if (is_shift && offset && offset->error < reading->error) reading.reset();
     const Explanation* best = nullptr;
     // A mistake has no number to fit, an offset has one, a body has six.
-    for (const auto* candidate : {&std::as_const(reading), &offset, &body}) {
+    for (const auto* candidate :
+         {&std::as_const(reading), &std::as_const(offset), &std::as_const(body)}) {
       if (!*candidate) continue;
       const bool is_better =
           best == nullptr || (best->error > exact && (*candidate)->error < 0.6 * best->error);

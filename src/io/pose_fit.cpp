@@ -81,11 +81,11 @@ std::vector<Eigen::Isometry3d> first_guesses(const Eigen::Isometry3d& given,
   return guesses;
 }
 
-bool is_certain(const std::optional<Registration>& registration) {
+/// `uncertain`: m, uncertainty of the translation.
+bool is_certain(const std::optional<Registration>& registration, double uncertain) {
   constexpr double kLeastScore = 0.45;
-  constexpr double kUncertain = 0.06;  // m
   return registration && registration->score > kLeastScore &&
-         registration->uncertainty < kUncertain && !registration->is_ambiguous;
+         registration->uncertainty < uncertain && !registration->is_ambiguous;
 }
 
 /// Residual of a motion: rotation times kLever, and translation, m.
@@ -106,45 +106,81 @@ struct CheckedMotion {
 };
 
 std::optional<CheckedMotion> checked(const std::optional<Registration>& forth,
-                                     const std::optional<Registration>& back, double deviation) {
+                                     const std::optional<Registration>& back, double uncertain,
+                                     double deviation) {
   constexpr double kNoisy = 0.25;  // m, 10 m from the sensor
-  if (!is_certain(forth) || !is_certain(back)) return std::nullopt;
+  if (!is_certain(forth, uncertain) || !is_certain(back, uncertain)) return std::nullopt;
   const Vector6 difference =
       residual(forth->T_a_b, back->T_a_b.inverse(), Eigen::Isometry3d::Identity());
   if (difference.norm() > kNoisy) return std::nullopt;
   return CheckedMotion{forth->T_a_b, difference, deviation};
 }
 
+/// A registration by planes and landmarks, and the direction along which landmarks decide.
+struct GuidedRegistration {
+  Registration registration;
+  KnownWay way;
+};
+
+/// Moves `T_a_b` along `direction` to where landmarks meet, less than `farthest` (m), and registers
+/// again.
+std::optional<GuidedRegistration> register_along(ChainScan& a, ChainScan& b,
+                                                 const Eigen::Isometry3d& T_a_b,
+                                                 const Eigen::Vector3d& direction,
+                                                 double farthest) {
+  constexpr double kDeviation = 0.04;  // m, of search_way()
+  const auto guess = search_way(a.landmarks(), b.landmarks(), T_a_b, direction, farthest);
+  if (!guess) return std::nullopt;
+  const KnownWay way{direction, kDeviation};
+  const auto found = register_near(a.planes(), b.planes(), *guess, way);
+  if (!found) return std::nullopt;
+  return GuidedRegistration{*found, way};
+}
+
 /// Completes a registration by planes that leaves a direction open: landmarks tell the way along
 /// it, less than `farthest` (m) from what planes say. The least certain direction is not always the
-/// open one: the back of a vehicle ahead is a plane, too.
+/// open one: the back of a vehicle ahead is a plane, too. Empty if landmarks agree better without
+/// motion along it.
 std::optional<CheckedMotion> complete(ChainScan& a, ChainScan& b, const Registration& by_planes,
                                       double farthest) {
-  constexpr double kDeviation = 0.04;  // m, of search_way()
+  constexpr double kUncertain = 0.08;  // m; a narrow view tells less of other directions, too
+  constexpr double kNear = 1.0;        // m
+  std::optional<GuidedRegistration> best;
+  double least_gap = 1.0;
   for (const Eigen::Vector3d& direction : by_planes.uncertain) {
-    const auto guess =
-        search_way(a.landmarks(), b.landmarks(), by_planes.T_a_b, direction, farthest);
-    if (!guess) continue;
-    const auto forth = register_near(a.planes(), b.planes(), *guess, {direction, kDeviation});
-    if (!is_certain(forth)) continue;
-    const Eigen::Isometry3d T_b_a = forth->T_a_b.inverse();
-    return checked(
-        forth,
-        register_near(b.planes(), a.planes(), T_b_a, {T_b_a.linear() * direction, kDeviation}),
-        kDeviation);
+    auto found = register_along(a, b, by_planes.T_a_b, direction, farthest);
+    if (!found) continue;
+    // What is in sight without the motion shows the open direction less well.
+    if (const auto again = register_along(a, b, found->registration.T_a_b,
+                                          found->registration.uncertain[0], kNear)) {
+      found = again;
+    }
+    const double gap = mean_gap(a.landmarks(), b.landmarks(), found->registration.T_a_b);
+    Eigen::Isometry3d standing = by_planes.T_a_b;
+    standing.translation() -= direction.dot(standing.translation()) * direction;
+    if (gap < least_gap && gap <= mean_gap(a.landmarks(), b.landmarks(), standing)) {
+      best = found;
+      least_gap = gap;
+    }
   }
-  return std::nullopt;
+  if (!best) return std::nullopt;
+  const Eigen::Isometry3d T_b_a = best->registration.T_a_b.inverse();
+  const KnownWay way{T_b_a.linear() * best->way.direction, best->way.deviation};
+  return checked(best->registration, register_near(b.planes(), a.planes(), T_b_a, way), kUncertain,
+                 best->way.deviation);
 }
 
 /// Registers b to a. Empty if the motion is uncertain.
 std::optional<CheckedMotion> register_both_ways(ChainScan& a, ChainScan& b,
                                                 const std::vector<Eigen::Isometry3d>& guesses,
                                                 double farthest) {
-  constexpr double kOpen = 0.025;  // m, uncertainty of a direction that planes leave open
+  constexpr double kOpen = 0.025;      // m, uncertainty of a direction that planes leave open
+  constexpr double kUncertain = 0.06;  // m
   const auto found = register_scans(a.planes(), b.planes(), guesses);
   if (!found) return std::nullopt;
   if (found->is_ambiguous || found->uncertainty > kOpen) return complete(a, b, *found, farthest);
-  return checked(found, register_scans(b.planes(), a.planes(), {found->T_a_b.inverse()}), 0.0);
+  return checked(found, register_scans(b.planes(), a.planes(), {found->T_a_b.inverse()}),
+                 kUncertain, 0.0);
 }
 
 struct BothMotions {
@@ -270,7 +306,11 @@ std::vector<RegisteredMotion> register_motions(const Recording& recording) {
     for (std::size_t step = 1; step <= kLongest && first + step < recording.size(); step *= 2) {
       const auto found = register_both_ways(scans.get(first), scans.get(first + step), guesses,
                                             step == 1 ? kFarthestStep : kFarthestFromGuess);
-      if (!found) break;
+      const bool is_steady =
+          found &&
+          (step == 1 || (found->T_a_b.translation() - guesses.front().translation()).norm() <
+                            kFarthestFromGuess);
+      if (!is_steady) break;
       motions.push_back(
           {chain, first, first + step, found->T_a_b, found->difference, found->deviation});
       if (step == 1) elsewhere = found->T_a_b;
@@ -327,6 +367,28 @@ MotionError motion_error(const std::vector<RegisteredMotion>& motions, const Bod
   error.at_points = median(std::move(both));
   error.noise = median(std::move(noise));
   return error;
+}
+
+bool is_mostly_better(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
+                      const BodyMotion& other) {
+  constexpr std::size_t kFewest = 12;
+  constexpr double kMost =
+      0.7;  // share of the motions; by chance, 17 of 24 are better in 3 % of cases
+  const Vector6 weights = weights_of_axes(motions);
+  std::size_t better = 0;
+  std::size_t count = 0;
+  for (const RegisteredMotion& motion : motions) {
+    const auto T_body = body(motion);
+    const auto T_other = other(motion);
+    if (!T_body || !T_other) continue;
+    const auto error = [&](const Eigen::Isometry3d& T) {
+      const auto identity = Eigen::Isometry3d::Identity();
+      return residual(T, motion.T_first_second, identity).cwiseProduct(weights).norm();
+    };
+    if (error(*T_body) < error(*T_other)) ++better;
+    ++count;
+  }
+  return count >= kFewest && static_cast<double>(better) > kMost * static_cast<double>(count);
 }
 
 std::optional<Eigen::Isometry3d> fit_extrinsic(const std::vector<RegisteredMotion>& registered,

@@ -53,6 +53,12 @@ enum class Motions { kAll, kSteps, kFirstSteps };  ///< steps: between neighbour
 MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
                          const Eigen::Isometry3d& T_body_sensor, Motions which = Motions::kAll);
 
+/// Whether most motions agree better with `body` than with `other`, each compared with itself:
+/// noise of the registration hides small differences of medians. False for fewer than 12 motions
+/// with both.
+bool is_mostly_better(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
+                      const BodyMotion& other);
+
 /// Hand-eye calibration: T_body_sensor for which the motions of the body and of the sensor agree
 /// best. Directions that the motions do not determine stay 0. Empty for fewer than 4 motions.
 std::optional<Eigen::Isometry3d> fit_extrinsic(const std::vector<RegisteredMotion>& registered,

@@ -193,20 +193,25 @@ constexpr double kFine = 0.1;  // m
 // Residuals of neighbouring points are correlated, so the deviation of a point is a large value.
 constexpr double kDeviation = 0.2;  // m
 
+/// Covariance of the translation, for points with a deviation of 1.
+Eigen::Matrix3d covariance_of(const Linearization& step) {
+  return (step.H + 1e-6 * Matrix6::Identity()).inverse().bottomRightCorner<3, 3>();
+}
+
 /// The result at `T` after the last step; empty if too few points meet a cell.
 std::optional<Registration> registration_at(const RegistrationScan& a, const RegistrationScan& b,
                                             const Eigen::Isometry3d& T, const Prior* prior) {
   constexpr std::size_t kFewest = 200;  // points that meet a cell
   Linearization step = linearize(a, b, T, 2, kFine, 1);
   if (step.met < kFewest) return std::nullopt;
-  if (prior != nullptr) prior->add_to(step, T);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(
-      (step.H + 1e-6 * Matrix6::Identity()).inverse().bottomRightCorner<3, 3>());
   Registration result;
   result.T_a_b = T;
   result.score = step.weight / static_cast<double>(step.met);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> by_planes(covariance_of(step));
+  result.uncertain = {by_planes.eigenvectors().col(2), by_planes.eigenvectors().col(1)};
+  if (prior != nullptr) prior->add_to(step, T);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance_of(step));
   result.uncertainty = kDeviation * std::sqrt(std::max(0.0, solver.eigenvalues()[2]));
-  result.uncertain = {solver.eigenvectors().col(2), solver.eigenvectors().col(1)};
   return result;
 }
 

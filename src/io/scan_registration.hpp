@@ -43,7 +43,7 @@ struct Registration {
   Eigen::Isometry3d T_a_b = Eigen::Isometry3d::Identity();
   double score = 0.0;        ///< mean weight of the points of b, [0, 1]; higher is better
   double uncertainty = 0.0;  ///< m, of the translation along its least certain direction
-  /// The two least certain directions, the least certain first; unit vectors, frame of a.
+  /// The two directions that planes determine worst, the worst first; unit vectors, frame of a.
   std::array<Eigen::Vector3d, 2> uncertain = {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY()};
   /// Whether another result is nearly as good, as in traffic that moves with the sensor.
   bool is_ambiguous = false;

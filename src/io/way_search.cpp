@@ -25,7 +25,7 @@ Eigen::Isometry3d moved(Eigen::Isometry3d T, const Eigen::Vector3d& way) {
   return T;
 }
 
-double mean_gap(const Landmarks& a, const Points& points, const Eigen::Isometry3d& T) {
+double gap_of(const Landmarks& a, const Points& points, const Eigen::Isometry3d& T) {
   double sum = 0.0;
   for (const Eigen::Vector3d& p : points) sum += a.distance_to(T * p);
   return sum / static_cast<double>(points.size());
@@ -46,6 +46,11 @@ std::optional<std::size_t> clear_minimum(const std::vector<double>& gaps) {
 }
 
 }  // namespace
+
+double mean_gap(const Landmarks& a, const Landmarks& b, const Eigen::Isometry3d& T_a_b) {
+  return 0.5 *
+         (gap_of(a, thinned(b.points()), T_a_b) + gap_of(b, thinned(a.points()), T_a_b.inverse()));
+}
 
 std::optional<Eigen::Isometry3d> search_way(const Landmarks& a, const Landmarks& b,
                                             const Eigen::Isometry3d& T_a_b,
@@ -69,7 +74,7 @@ std::optional<Eigen::Isometry3d> search_way(const Landmarks& a, const Landmarks&
   std::vector<double> gaps;
   const auto steps = static_cast<int>(std::ceil(farthest / kCoarse));
   for (int k = -steps; k <= steps; ++k) {
-    gaps.push_back(mean_gap(a, decisive, moved(T_a_b, kCoarse * k * direction)));
+    gaps.push_back(gap_of(a, decisive, moved(T_a_b, kCoarse * k * direction)));
   }
   const auto least_gap = clear_minimum(gaps);
   if (!least_gap) return std::nullopt;
@@ -78,7 +83,7 @@ std::optional<Eigen::Isometry3d> search_way(const Landmarks& a, const Landmarks&
   // Fine steps count all points, in both directions.
   const auto gap_at = [&](double displacement) {
     const Eigen::Isometry3d T = moved(T_a_b, displacement * direction);
-    return 0.5 * (mean_gap(a, of_b, T) + mean_gap(b, of_a, T.inverse()));
+    return 0.5 * (gap_of(a, of_b, T) + gap_of(b, of_a, T.inverse()));
   };
   double best = coarse;
   double least = gap_at(best);
@@ -88,7 +93,6 @@ std::optional<Eigen::Isometry3d> search_way(const Landmarks& a, const Landmarks&
     least = gap;
     best = coarse + kFine * k;
   }
-  if (std::abs(best + way) > kKeptPlace && !(least < gap_at(-way))) return std::nullopt;
   const double before = gap_at(best - 2.0 * kFine);
   const double behind = gap_at(best + 2.0 * kFine);
   const double curvature = before - 2.0 * least + behind;

@@ -294,6 +294,24 @@ TEST_CASE("On a motorway, plants and posts tell the way that walls and rails lea
   CHECK(Eigen::AngleAxisd(R.transpose() * T_body_sensor.linear()).angle() < 0.03);
 }
 
+TEST_CASE("A narrow view along a motorway tells the way, too") {
+  simulation::Config config;
+  config.scene = simulation::Scene::kHighway;
+  config.sensor = simulation::Sensor::kLivox;
+  config.scans = 40;
+  config.seed = 910;
+  const Street road(config);
+  const Diagnosis sound = road.diagnose([](const Eigen::Isometry3d& T) { return T; });
+  CHECK(sound.sound());
+  CHECK(sound.option.empty());
+  CHECK(sound.registered_pairs >= 6);
+  CHECK(sound.translation_error < 0.1);
+  CHECK(road.diagnose([](const Eigen::Isometry3d& T) { return T.inverse(); }).option ==
+        "--invert-poses");
+  CHECK(road.diagnose([](const Eigen::Isometry3d& T) { return scaled(T, 1000.0); }).option ==
+        "--pose-units mm");
+}
+
 TEST_CASE("few beams ahead on a fast empty road give no warning about the poses") {
   simulation::Config config;
   config.scene = simulation::Scene::kHighway;
