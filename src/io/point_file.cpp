@@ -158,9 +158,15 @@ void PointFileWriter::add(const FilePoint& point) {
   ++size_;
 }
 
-void PointFileWriter::commit(AtomicFile::Sync sync) {
+void PointFileWriter::prepare(AtomicFile::Sync sync) {
   file_.stream().seekp(0);
   file_.stream() << header();
+  file_.prepare(sync);
+  is_prepared_ = true;
+}
+
+void PointFileWriter::commit(AtomicFile::Sync sync) {
+  if (!is_prepared_) prepare(sync);
   file_.commit(sync);
 }
 

@@ -54,7 +54,9 @@ class PointFileWriter {
 
   void add(const FilePoint& point);
   std::size_t size() const { return size_; }
-  /// Throws IoError unless the file was written completely.
+  /// Writes all but the name of the file. No point can be added then. Throws IoError.
+  void prepare(AtomicFile::Sync sync = AtomicFile::Sync::kNow);
+  /// prepare(), and puts the file in place. Throws IoError unless it was written completely.
   void commit(AtomicFile::Sync sync = AtomicFile::Sync::kNow);
 
  private:
@@ -64,6 +66,7 @@ class PointFileWriter {
   Eigen::Isometry3d viewpoint_;
   bool pcd_;
   std::size_t size_ = 0;
+  bool is_prepared_ = false;
   AtomicFile file_;
 };
 
