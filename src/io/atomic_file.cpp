@@ -213,11 +213,15 @@ AtomicFile::~AtomicFile() {
   fs::remove(temporary_, ignored);
 }
 
-void AtomicFile::commit(Sync sync) {
+void AtomicFile::prepare(Sync sync) {
   buffer_->flush(sync);
   buffer_->check_close();
   if (buffer_->error() != 0)
     fail_by_system(target_, "cannot be written to the end", buffer_->error());
+}
+
+void AtomicFile::commit(Sync sync) {
+  prepare(sync);
   std::error_code error;
   fs::rename(temporary_, target_, error);
   if (error) fail_by_system(target_, "cannot be put in place", error.value());

@@ -48,7 +48,13 @@ void ByteReader::skip(std::uint64_t count, const char* purpose) {
     position_ = size_;
     fail_here(std::string("file ends, expected ") + purpose);
   }
-  file_.ignore(static_cast<std::streamsize>(count));
+  constexpr std::uint64_t kFewBytes = 4096;  // that are in the buffer of the stream, mostly
+  if (count > kFewBytes) {
+    file_.seekg(static_cast<std::streamoff>(count), std::ios::cur);
+    if (!file_) fail_to_read(file_, path_, position_, size_);
+  } else {
+    file_.ignore(static_cast<std::streamsize>(count));
+  }
   position_ += count;
 }
 

@@ -138,9 +138,15 @@ void LasWriter::add(const LasPoint& point) {
   ++size_;
 }
 
-void LasWriter::commit(AtomicFile::Sync sync) {
+void LasWriter::prepare(AtomicFile::Sync sync) {
   file_.stream().seekp(0);
   file_.stream() << header();
+  file_.prepare(sync);
+  is_prepared_ = true;
+}
+
+void LasWriter::commit(AtomicFile::Sync sync) {
+  if (!is_prepared_) prepare(sync);
   file_.commit(sync);
 }
 

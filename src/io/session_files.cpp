@@ -52,6 +52,11 @@ T number_at(const std::string& bytes, std::size_t offset) {
   return value;
 }
 
+template <class T>
+void put_number(const T& value, char* to) {
+  std::memcpy(to, &value, sizeof(value));
+}
+
 std::string read_block(ByteReader& file, std::uint64_t size, const char* purpose) {
   std::string bytes(static_cast<std::size_t>(size), '\0');
   file.read(bytes.data(), bytes.size(), purpose);
@@ -101,13 +106,16 @@ std::string tile_bytes(const SessionGrid& grid, const TileIndex& tile,
   append_number(tile[0], bytes);
   append_number(tile[1], bytes);
   append_number(static_cast<std::uint64_t>(points.size()), bytes);
+  bytes.resize(kTileHeaderBytes + kPointBytes * points.size());
+  char* to = bytes.data() + kTileHeaderBytes;
   for (const SessionPoint& point : points) {
-    append_number(point.x, bytes);
-    append_number(point.y, bytes);
-    append_number(point.z, bytes);
-    append_number(point.scan, bytes);
-    append_number(point.label, bytes);
-    append_number(std::uint32_t{point.is_ground ? 1U : 0U}, bytes);
+    put_number(point.x, to);
+    put_number(point.y, to + 4);
+    put_number(point.z, to + 8);
+    put_number(point.scan, to + 12);
+    put_number(point.label, to + 16);
+    put_number(std::uint32_t{point.is_ground ? 1U : 0U}, to + 20);
+    to += kPointBytes;
   }
   append_number(checksum(bytes.data(), bytes.size()), bytes);
   return bytes;
@@ -161,19 +169,20 @@ std::string reference_header(const RangeImageGrid& grid) {
   return bytes;
 }
 
-std::string reference_record(const SessionReference& reference) {
-  std::string bytes;
-  const std::vector<std::uint8_t> image = pack_image(reference.image);
-  append_number(static_cast<std::uint64_t>(reference.scan), bytes);
-  for (Eigen::Index row = 0; row < 3; ++row) {
-    for (Eigen::Index column = 0; column < 4; ++column) {
-      append_number(reference.T_world_beams(row, column), bytes);
-    }
+Span<const char> reference_record(const SessionReference& reference, std::vector<char>& buffer) {
+  detail::grow(buffer, kRecordHeaderBytes + most_packed_bytes(reference.image.grid()) + 8);
+  char* const image = buffer.data() + kRecordHeaderBytes;
+  auto* const packed = reinterpret_cast<std::uint8_t*>(image);
+  const auto size = static_cast<std::size_t>(pack_image(reference.image, packed) - packed);
+  put_number(std::uint64_t{reference.scan}, buffer.data());
+  for (std::size_t i = 0; i < 12; ++i) {
+    put_number(
+        reference.T_world_beams(static_cast<Eigen::Index>(i / 4), static_cast<Eigen::Index>(i % 4)),
+        buffer.data() + 8 + 8 * i);
   }
-  append_number(static_cast<std::uint64_t>(image.size()), bytes);
-  bytes.append(image.begin(), image.end());
-  append_number(checksum(bytes.data(), bytes.size()), bytes);
-  return bytes;
+  put_number(std::uint64_t{size}, buffer.data() + 104);
+  put_number(checksum(buffer.data(), kRecordHeaderBytes + size), image + size);
+  return {buffer.data(), kRecordHeaderBytes + size + 8};
 }
 
 FolderLock lock_city(const fs::path& folder) {
@@ -508,15 +517,16 @@ void SessionReferenceReader::read(const Entry& entry, SessionReference& referenc
   std::string record = read_block(file, kRecordHeaderBytes, "a reference");
   const auto size = number_at<std::uint64_t>(record, 104);
   if (size > kMostImageBytes) fail_at_byte(path_, entry.offset + 104, "expected at most 64 MB");
-  record += read_block(file, size + 8, "the image of a reference");
+  record.resize(kRecordHeaderBytes + size + 8);
+  file.read(record.data() + kRecordHeaderBytes, size + 8, "the image of a reference");
   check_sum(path_, record, entry.offset + kRecordHeaderBytes + size);
   reference.scan = entry.scan;
   for (std::size_t i = 0; i < 12; ++i) {
     reference.T_world_beams(static_cast<Eigen::Index>(i / 4), static_cast<Eigen::Index>(i % 4)) =
         number_at<double>(record, 8 + 8 * i);
   }
-  const std::vector<std::uint8_t> image(record.begin() + kRecordHeaderBytes, record.end() - 8);
-  if (!unpack_image(grid_, image, reference.image)) {
+  const auto* const image = reinterpret_cast<const std::uint8_t*>(record.data());
+  if (!unpack_image(grid_, {image + kRecordHeaderBytes, size}, reference.image)) {
     fail_at_byte(path_, entry.offset + kRecordHeaderBytes, "expected a coded range image");
   }
 }

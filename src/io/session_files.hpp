@@ -29,7 +29,8 @@ std::vector<SessionPoint> read_tile(const std::filesystem::path& path, const Ses
 
 inline constexpr std::uint64_t kReferenceHeaderBytes = 48;
 std::string reference_header(const RangeImageGrid& grid);
-std::string reference_record(const SessionReference& reference);
+/// The bytes of a record, held by `buffer`, whose memory is used again.
+Span<const char> reference_record(const SessionReference& reference, std::vector<char>& buffer);
 
 /// The text of city.json and session.json. Throws IoError without JSON.
 std::string city_text(const SessionGrid& grid);

@@ -10,6 +10,7 @@
 #include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
@@ -98,18 +99,27 @@ class SessionWriter::Files {
   Files& operator=(const Files&) = delete;
 
   void add_reference(const RangeImageGrid& grid, const SessionReference& reference) {
-    if (!has_header_) write_reference(session_files::reference_header(grid));
-    has_header_ = true;
-    write_reference(session_files::reference_record(reference));
+    if (!has_header_) {
+      const std::string header = session_files::reference_header(grid);
+      write_reference(header);
+      has_header_ = true;
+    }
+    write_reference(session_files::reference_record(reference, record_));
   }
   void write_tile(const TileIndex& tile, const std::string& bytes) {
-    write_file(folder_ / session_files::kTileFolder / session_files::tile_name(tile), bytes);
+    write_file(tile_path(tile), bytes);
   }
-  void commit(const fs::path& target, const std::string& session_text, bool replaces) {
+  std::vector<SessionPoint> read_tile(const SessionGrid& grid, const TileIndex& tile) const {
+    return session_files::read_tile(tile_path(tile), grid, tile);
+  }
+  /// Writes the rest to the disk.
+  void finish(const std::string& session_text) {
     check_stream(references_, reference_path());
     references_.close();
     write_file(folder_ / session_files::kSessionFile, session_text);
     sync_files(folder_);
+  }
+  void commit(const fs::path& target, bool replaces) {
     if (replaces) {
       // The staging folder has the earlier session then, which the destructor removes.
       exchange(folder_, target);
@@ -124,7 +134,10 @@ class SessionWriter::Files {
 
  private:
   fs::path reference_path() const { return folder_ / session_files::kReferenceFile; }
-  void write_reference(const std::string& bytes) {
+  fs::path tile_path(const TileIndex& tile) const {
+    return folder_ / session_files::kTileFolder / session_files::tile_name(tile);
+  }
+  void write_reference(Span<const char> bytes) {
     references_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
     if (!references_) fail(reference_path(), "cannot be written to the end");
   }
@@ -132,6 +145,7 @@ class SessionWriter::Files {
   fs::path folder_;
   FolderLock lock_;
   std::ofstream references_;
+  std::vector<char> record_;
   bool has_header_ = false;
   bool is_committed_ = false;
 };
@@ -169,33 +183,59 @@ void SessionWriter::add(PointsView points, Span<const PointLabel> verdicts,
                         Span<const std::uint32_t> labels, const Eigen::Isometry3d& T_world_sensor,
                         std::uint32_t scan) {
   ++session_.scans;
+  restore_near(T_world_sensor.translation());
   points_.add(points, verdicts, labels, T_world_sensor, scan);
+  points_.release_far(T_world_sensor.translation(),
+                      [&](const TileIndex& tile, const std::vector<SessionPoint>& of_tile) {
+                        write_tile(tile, of_tile);
+                        released_.insert(tile);
+                      });
   const SessionReference* const reference = references_.add(points, verdicts, T_world_sensor, scan);
   if (reference == nullptr) return;
   files_->add_reference(references_.grid(), *reference);
   ++session_.references;
 }
 
-void SessionWriter::commit() {
-  points_.for_each_tile([&](const TileIndex& tile, const std::vector<SessionPoint>& points) {
-    files_->write_tile(tile, session_files::tile_bytes(city_.grid(), tile, points));
-    session_.tiles[tile] = points.size();
-    session_.points += points.size();
-    for (const SessionPoint& point : points) {
-      const Eigen::Vector3d position =
-          tile_corner(city_.grid(), tile) + Eigen::Vector3d(static_cast<double>(point.x),
-                                                            static_cast<double>(point.y),
-                                                            static_cast<double>(point.z));
-      session_.lowest = session_.lowest.cwiseMin(position);
-      session_.highest = session_.highest.cwiseMax(position);
+void SessionWriter::restore_near(const Eigen::Vector3d& sensor) {
+  for (auto tile = released_.begin(); tile != released_.end();) {
+    if (!points_.reaches(sensor, *tile)) {
+      ++tile;
+      continue;
     }
+    points_.restore(*tile, files_->read_tile(city_.grid(), *tile));
+    tile = released_.erase(tile);
+  }
+}
+
+void SessionWriter::write_tile(const TileIndex& tile, const std::vector<SessionPoint>& points) {
+  files_->write_tile(tile, session_files::tile_bytes(city_.grid(), tile, points));
+  session_.tiles[tile] = points.size();
+  for (const SessionPoint& point : points) {
+    const Eigen::Vector3d position =
+        tile_corner(city_.grid(), tile) + Eigen::Vector3d(static_cast<double>(point.x),
+                                                          static_cast<double>(point.y),
+                                                          static_cast<double>(point.z));
+    session_.lowest = session_.lowest.cwiseMin(position);
+    session_.highest = session_.highest.cwiseMax(position);
+  }
+}
+
+void SessionWriter::prepare() {
+  points_.for_each_tile([&](const TileIndex& tile, const std::vector<SessionPoint>& points) {
+    write_tile(tile, points);
   });
+  for (const auto& tile : session_.tiles) session_.points += tile.second;
   if (session_.points == 0) session_.lowest = session_.highest = Eigen::Vector3d::Zero();
-  const std::string text = session_files::session_text(session_);
+  files_->finish(session_files::session_text(session_));
+  is_prepared_ = true;
+}
+
+void SessionWriter::commit() {
+  if (!is_prepared_) prepare();
   const FolderLock lock = session_files::lock_city(city_.folder());
   const bool replaces = mode_ == Mode::kReplace;
   check_session(city_, session_, replaces);
-  files_->commit(city_.session_folder(session_.name), text, replaces);
+  files_->commit(city_.session_folder(session_.name), replaces);
 }
 
 }  // namespace dynains

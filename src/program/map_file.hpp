@@ -38,6 +38,8 @@ class MapFile {
   /// `position`: m, world frame.
   virtual void add(const Eigen::Vector3d& position, const MapAttributes& attributes) = 0;
   virtual std::size_t size() const = 0;
+  /// Writes all but the name of the file. No point can be added then.
+  virtual void prepare() = 0;
   virtual void commit() = 0;
 };
 

@@ -168,9 +168,14 @@ class NewMap {
 
   const fs::path& path() const { return path_; }
 
-  void write(const StaticMapAccumulator& map, Json report, const Json& description) {
+  /// Calls `publish_more()` when all bytes are on the disk and only names are left to change.
+  template <class Publish>
+  void write(const StaticMapAccumulator& map, Json report, const Json& description,
+             Publish&& publish_more) {
     map.for_each([&](const Eigen::Vector3d& point) { writer_->add(point, MapAttributes()); });
+    writer_->prepare();
     if (!is_inside_) {
+      publish_more();
       writer_->commit();
       return;
     }
@@ -179,6 +184,7 @@ class NewMap {
     report.erase(kField);
     out_.mark(report, listing);
     out_.remove_temporaries();
+    publish_more();
     writer_->commit();
     report[kField] = description;
     out_.mark(report, listing);
@@ -233,22 +239,27 @@ void remap(const RemapOptions& options) {
   const StaticMapAccumulator map =
       build_map(corrected, original ? *original : corrected, scans, out.path() / "labels",
                 options.map_voxel.value_or(run.map_voxel), options.quiet);
+  std::unique_ptr<SessionWriter> session;
   if (!options.update.empty()) {
     const auto name = Json::json_pointer("/request/session");
     const bool has_name = run.report.contains(name) && run.report[name].is_string();
     if (options.session.empty() && !has_name) {
       throw ConfigError("the run has added no session; name one by --session");
     }
-    repose_session({whole_path(options.update),
-                    options.session.empty() ? run.report[name].get<std::string>() : options.session,
-                    out.path(), pose_fingerprint(corrected, range), scans},
-                   original ? *original : corrected, corrected);
+    session = repose_session(
+        {whole_path(options.update),
+         options.session.empty() ? run.report[name].get<std::string>() : options.session,
+         out.path(), pose_fingerprint(corrected, range), scans},
+        original ? *original : corrected, corrected);
   }
   file.write(map, run.report,
              {{"file", kRemappedMap},
               {"points", map.size()},
               {"map_voxel", map.config().map_voxel},
-              {"poses_and_times", pose_fingerprint(corrected, range)}});
+              {"poses_and_times", pose_fingerprint(corrected, range)}},
+             [&] {
+               if (session) session->commit();
+             });
   if (options.quiet) return;
   std::cout << scans.size() << " scans, static map: " << file.path().string() << " (" << map.size()
             << " points)" << std::endl;

@@ -7,7 +7,6 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_bytes.hpp"
-#include "dynains/io/session_writer.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/verdict.hpp"
 #include "interrupt.hpp"
@@ -36,13 +35,13 @@ PointLabel label_of(std::uint32_t run_label, std::uint8_t cause, const float* po
 
 }  // namespace
 
-void repose_session(const ReposedSession& request, const Recording& points,
-                    const Recording& corrected) {
+std::unique_ptr<SessionWriter> repose_session(const ReposedSession& request,
+                                              const Recording& points, const Recording& corrected) {
   const City city(request.city);
   SessionInfo info = session_of(city, request.name);
   info.fingerprint = request.fingerprint;
   info.alignment.reset();
-  SessionWriter writer(city, info, SessionWriter::Mode::kReplace);
+  auto writer = std::make_unique<SessionWriter>(city, info, SessionWriter::Mode::kReplace);
   RecordedScan scan;
   PointBuffer cloud;
   std::vector<PointLabel> verdicts;
@@ -64,10 +63,11 @@ void repose_session(const ReposedSession& request, const Recording& points,
       verdicts[k] = label_of(run_class(run_labels[k], k, file), causes[k], p);
     }
     const auto labels = points.has_labels() ? points.read_labels(i) : std::vector<std::uint32_t>();
-    writer.add(cloud, verdicts, labels, orthonormalized(corrected.T_world_sensor(i)),
-               static_cast<std::uint32_t>(i));
+    writer->add(cloud, verdicts, labels, orthonormalized(corrected.T_world_sensor(i)),
+                static_cast<std::uint32_t>(i));
   }
-  writer.commit();
+  writer->prepare();
+  return writer;
 }
 
 }  // namespace dynains::program

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "dynains/io/recording.hpp"
+#include "dynains/io/session_writer.hpp"
 
 namespace dynains::program {
 
@@ -18,11 +20,12 @@ struct ReposedSession {
   std::vector<std::size_t> scans;  ///< of the run, indices in the recordings
 };
 
-/// Replaces a session by the verdicts of a run at the poses of `corrected`. Begin, recording and
-/// configuration stay; an alignment ends: the poses are those of the map. Until the end, and after
-/// any error or signal, the map is as it was. `points`: the recording as the run read it. Throws
-/// ConfigError, IoError, UsageError, Interrupted.
-void repose_session(const ReposedSession& request, const Recording& points,
-                    const Recording& corrected);
+/// Stages a session of the verdicts of a run at the poses of `corrected`; commit() of the result
+/// puts it in the place of the earlier one. Begin, recording and configuration stay; an alignment
+/// ends: the poses are those of the map. Until the commit, and after any error or signal, the map
+/// is as it was. `points`: the recording as the run read it. Throws ConfigError, IoError,
+/// UsageError, Interrupted.
+std::unique_ptr<SessionWriter> repose_session(const ReposedSession& request,
+                                              const Recording& points, const Recording& corrected);
 
 }  // namespace dynains::program

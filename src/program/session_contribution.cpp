@@ -11,11 +11,16 @@ namespace dynains::program {
 namespace {
 
 void copy_points(const RecordedScan& scan, PointBuffer& points) {
-  points.resize(scan.size());
-  for (std::size_t i = 0; i < scan.size(); ++i) {
-    points.x[i] = scan.xyzi[4 * i];
-    points.y[i] = scan.xyzi[4 * i + 1];
-    points.z[i] = scan.xyzi[4 * i + 2];
+  const std::size_t size = scan.size();
+  points.resize(size);
+  const float* const from = scan.xyzi.data();
+  float* const x = points.x.data();
+  float* const y = points.y.data();
+  float* const z = points.z.data();
+  for (std::size_t i = 0; i < size; ++i) {
+    x[i] = from[4 * i];
+    y[i] = from[4 * i + 1];
+    z[i] = from[4 * i + 2];
   }
 }
 

@@ -310,6 +310,47 @@ TEST_CASE("a city: points beyond the contribution range do not come in") {
   CHECK_THROWS_WITH(add(city, kDays[1], scans, near), ContainsSubstring("contribution_range"));
 }
 
+TEST_CASE("a city: tiles behind the sensor are on the disk, and come back with it") {
+  const test::TemporaryFolder folder;
+  SessionGrid grid;
+  grid.tile = 10.0;
+  SessionPointsConfig config;
+  config.contribution_range = 15.0;
+  const City city = City::open_or_make(folder.path() / "city", grid);
+  const test::BoxScan scan = test::scan_boxes({kParkedCar}, 0.0, 0.0);
+  SessionInfo info;
+  info.name = "monday";
+  SessionWriter writer(city, info, config);
+  SessionPoints all(grid, config);
+  std::size_t most = 0;
+  // Away, back, and over the same places again, at other heights within their voxels.
+  for (std::uint32_t number = 0; number < 60; ++number) {
+    const double way = 8.0 * (number < 40 ? number : 80 - number);
+    Eigen::Isometry3d T_world_sensor = scan.T_world_sensor;
+    T_world_sensor.translation() += Eigen::Vector3d(way, 0.3 * way, 0.01 * number);
+    writer.add(scan.points, scan.verdicts, scan.labels, T_world_sensor, number);
+    all.add(scan.points, scan.verdicts, scan.labels, T_world_sensor, number);
+    most = std::max(most, writer.held_points());
+  }
+  CHECK(most < all.size() / 4);
+  writer.commit();
+  const SessionInfo session = city.sessions().at(0);
+  CHECK(session.points == all.size());
+  std::size_t tiles = 0;
+  all.for_each_tile([&](const TileIndex& tile, const std::vector<SessionPoint>& expected) {
+    ++tiles;
+    const std::vector<SessionPoint> found = city.read_tile(session, tile);
+    REQUIRE(found.size() == expected.size());
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      REQUIRE(found[i].x == expected[i].x);
+      REQUIRE(found[i].y == expected[i].y);
+      REQUIRE(found[i].z == expected[i].z);
+      REQUIRE(found[i].scan == expected[i].scan);
+    }
+  });
+  CHECK(session.tiles.size() == tiles);
+}
+
 TEST_CASE("a city: a dropped session leaves the bytes of never having had it") {
   const test::TemporaryFolder folder;
   const City without = city_of(folder.path() / "without", {kDays[0]});
@@ -456,7 +497,9 @@ TEST_CASE("references of a session: coded images are the images") {
       recorder.add(scan.points, scan.verdicts, scan.T_world_sensor, 0);
   REQUIRE(reference != nullptr);
   const RangeImageGrid& grid = recorder.grid();
-  std::vector<std::uint8_t> bytes = pack_image(reference->image);
+  std::vector<std::uint8_t> bytes(most_packed_bytes(grid));
+  const std::uint8_t* const end = pack_image(reference->image, bytes.data());
+  bytes.resize(static_cast<std::size_t>(end - bytes.data()));
   CHECK(bytes.size() < grid.cell_count() * 2);
   RangeImage image;
   REQUIRE(unpack_image(grid, bytes, image));

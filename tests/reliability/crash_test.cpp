@@ -116,6 +116,10 @@ TEST_CASE("power cut while a result with its map in another folder is replaced")
   check(replacing_run({"--map", "/maps/map.ply"}, {"--map", "/maps/map.ply"}));
 }
 
+TEST_CASE("power cut while a session of a map is moved to corrected poses") {
+  check(moved_session());
+}
+
 TEST_CASE("power cut during a simulation") { check(simulation()); }
 
 TEST_CASE("power cut while a simulation is replaced") { check(replacing_simulation()); }

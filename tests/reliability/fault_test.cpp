@@ -111,6 +111,28 @@ TEST_CASE("every call of a run that replaces a result fails once") {
 
 TEST_CASE("every call of a run that is resumed fails once") { check(resumed_run({})); }
 
+TEST_CASE(
+    "a disk that gets full leaves a moved session and the map of its run both old or both new") {
+  const Scenario scenario = moved_session();
+  Rehearsal rehearsal(scenario);
+  std::size_t failed = 0;
+  for (std::size_t n = 1; true; ++n) {
+    const std::string fault = "write " + std::to_string(n) + " 28 on";
+    const Recorded run = rehearsal.disturb(fault);
+    if (run.outcome.code == 0) break;
+    ++failed;
+    CAPTURE(fault, run.outcome.err);
+    const Tree state = read_tree(rehearsal.root());
+    CHECK(rehearsal.problem(state) == "");
+    const auto has_changed = [&](const std::string& part) {
+      return below(state, part) != below(rehearsal.before(), part);
+    };
+    const bool has_map = state.count(scenario.parts[1]) > 0;
+    CHECK(has_changed(scenario.parts[0]) == has_map);
+  }
+  CHECK(failed > 4);
+}
+
 TEST_CASE("every call of a simulation fails once") { check(replacing_simulation()); }
 
 TEST_CASE("every call of an evaluation fails once") {

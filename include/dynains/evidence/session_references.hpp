@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -20,53 +21,68 @@
 
 namespace dynains {
 
+/// Room that pack_image() needs for an image of this grid. A difference has 17 bits, so that its
+/// code has three bytes at most, and four are written at once.
+inline std::size_t most_packed_bytes(const RangeImageGrid& grid) {
+  return 6 * static_cast<std::size_t>(grid.rows) * static_cast<std::size_t>(grid.columns) + 8;
+}
+
 /// Bytes of a range image: for each of the two values of Cell, the cells row by row. A value is the
 /// difference to the previous value of its row (to 0 for the first), zigzag-coded as 2d or -2d - 1,
 /// in groups of 7 bits, the lowest first; bit 7 tells that another group follows. A byte 0 is a
 /// difference of 0, and the coded number behind it counts further differences of 0.
-inline std::vector<std::uint8_t> pack_image(const RangeImage& image) {
-  std::vector<std::uint8_t> bytes;
-  const auto put = [&bytes](std::uint32_t value) {
-    for (; value >= 0x80U; value >>= 7U) bytes.push_back(static_cast<std::uint8_t>(value | 0x80U));
-    bytes.push_back(static_cast<std::uint8_t>(value));
-  };
+/// Writes to `to`, which must have room for most_packed_bytes(), and returns the end.
+inline std::uint8_t* pack_image(const RangeImage& image, std::uint8_t* to) {
   const RangeImageGrid& grid = image.grid();
+  const auto put = [&to](std::uint32_t value) {
+    constexpr std::uint32_t kMore[] = {0, 0x80U, 0x8080U};  // bit 7 of the groups before the last
+    const std::uint32_t more = (value >= 1U << 7U ? 1U : 0U) + (value >= 1U << 14U ? 1U : 0U);
+    const std::uint32_t code =
+        (value & 0x7FU) | (value & 0x3F80U) << 1U | (value & 0x1FC000U) << 2U | kMore[more];
+    std::memcpy(to, &code, sizeof(code));
+    to += more + 1;
+  };
+  std::vector<std::uint32_t> codes(static_cast<std::size_t>(grid.columns));
   std::uint32_t zeros = 0;
   const auto end_zeros = [&] {
-    if (zeros == 0) return;
-    put(0);
-    put(zeros - 1);
+    *to++ = 0;
+    for (--zeros; zeros >= 0x80U; zeros >>= 7U) *to++ = static_cast<std::uint8_t>(zeros | 0x80U);
+    *to++ = static_cast<std::uint8_t>(zeros);
     zeros = 0;
   };
   for (const auto value_of : {&RangeImage::Cell::nearest, &RangeImage::Cell::around}) {
     for (std::int32_t row = 0; row < grid.rows; ++row) {
-      std::int32_t previous = 0;
-      for (std::int32_t column = 0; column < grid.columns; ++column) {
-        const std::int32_t value = image[grid.cell(row, column)].*value_of;
-        const std::int32_t step = value - previous;
-        previous = value;
-        if (step == 0) {
+      const RangeImage::Cell* const cells = &image[grid.cell(row, 0)];
+      const auto code_of = [](std::int32_t step) {
+        return static_cast<std::uint32_t>(step) << 1U ^ static_cast<std::uint32_t>(step >> 31);
+      };
+      codes[0] = code_of(cells[0].*value_of);
+      for (std::size_t i = 1; i < codes.size(); ++i) {
+        codes[i] = code_of(cells[i].*value_of - cells[i - 1].*value_of);
+      }
+      for (const std::uint32_t code : codes) {
+        if (code == 0) {
           ++zeros;
           continue;
         }
-        end_zeros();
-        put(static_cast<std::uint32_t>(step > 0 ? 2 * step : -2 * step - 1));
+        if (zeros > 0) end_zeros();
+        put(code);
       }
     }
   }
-  end_zeros();
-  return bytes;
+  if (zeros > 0) end_zeros();
+  return to;
 }
 
 /// Inverse of pack_image(). Returns false if `bytes` is not an image of this grid.
 inline bool unpack_image(const RangeImageGrid& grid, Span<const std::uint8_t> bytes,
                          RangeImage& image) {
-  std::size_t at = 0;
+  const std::uint8_t* at = bytes.begin();
   bool is_valid = true;
   const auto get = [&]() -> std::uint32_t {
     std::uint32_t value = 0;
-    for (std::uint32_t shift = 0; shift < 32 && at < bytes.size(); shift += 7) {
-      const std::uint8_t byte = bytes[at++];
+    for (std::uint32_t shift = 0; shift < 32 && at != bytes.end(); shift += 7) {
+      const std::uint8_t byte = *at++;
       value |= static_cast<std::uint32_t>(byte & 0x7FU) << shift;
       if (byte < 0x80U) return value;
     }
@@ -74,30 +90,27 @@ inline bool unpack_image(const RangeImageGrid& grid, Span<const std::uint8_t> by
     return 0;
   };
   image.reserve(grid);
-  std::uint32_t zeros = 0;
+  std::uint64_t zeros = 0;
   for (const auto value_of : {&RangeImage::Cell::nearest, &RangeImage::Cell::around}) {
     for (std::int32_t row = 0; row < grid.rows; ++row) {
+      RangeImage::Cell* const cells = &image.cell(grid.cell(row, 0));
       std::int32_t value = 0;
-      for (std::int32_t column = 0; column < grid.columns && is_valid; ++column) {
+      for (std::int32_t column = 0; column < grid.columns; ++column) {
         if (zeros > 0) {
           --zeros;
+        } else if (const std::uint32_t code = get(); code == 0) {
+          zeros = get();
         } else {
-          const std::uint32_t code = get();
-          if (code == 0) {
-            zeros = get();
-          } else {
-            const auto half = static_cast<std::int32_t>(code >> 1U);
-            value += (code & 1U) == 0 ? half : -half - 1;
-          }
+          const auto half = static_cast<std::int32_t>(code >> 1U);
+          value += (code & 1U) == 0 ? half : -half - 1;
+          is_valid = is_valid && value >= INT16_MIN && value <= INT16_MAX;
         }
-        is_valid = is_valid && value >= INT16_MIN && value <= INT16_MAX;
-        if (is_valid) {
-          image.cell(grid.cell(row, column)).*value_of = static_cast<std::int16_t>(value);
-        }
+        if (!is_valid) return false;
+        cells[column].*value_of = static_cast<std::int16_t>(value);
       }
     }
   }
-  return is_valid && zeros == 0 && at == bytes.size();
+  return zeros == 0 && at == bytes.end();
 }
 
 /// One reference scan of a session.
@@ -168,18 +181,27 @@ class SessionReferences {
   }
 
   void split(PointsView points, Span<const PointLabel> verdicts) {
-    ground_.clear();
-    objects_.clear();
-    moving_.clear();
+    const auto put = [&](PointBuffer& to, std::size_t at, std::size_t i) {
+      to.x[at] = points.x[i];
+      to.y[at] = points.y[i];
+      to.z[at] = points.z[i];
+    };
+    ground_.resize(points.size());
+    objects_.resize(points.size());
+    moving_.resize(points.size());
+    std::size_t ground = 0, objects = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (verdicts[i] == PointLabel::kInvalid) continue;
       if (verdicts[i] == PointLabel::kGround) {
-        ground_.push_back(points.x[i], points.y[i], points.z[i]);
+        put(ground_, ground++, i);
         continue;
       }
-      objects_.push_back(points.x[i], points.y[i], points.z[i]);
-      moving_.push_back(verdicts[i] == PointLabel::kDynamic ? 1 : 0);
+      moving_[objects] = verdicts[i] == PointLabel::kDynamic ? 1 : 0;
+      put(objects_, objects++, i);
     }
+    ground_.resize(ground);
+    objects_.resize(objects);
+    moving_.resize(objects);
   }
 
   bool choose_grid() {

@@ -56,6 +56,15 @@ class Visibility {
     sum.hit += count_ones(word_from(hit_, begin) & left);
     return sum;
   }
+  struct Bits {
+    std::uint64_t free;
+    std::uint64_t hit;
+  };
+  /// Bits of the samples in [begin, end), at most 56; the lowest one is that of sample `begin`.
+  Bits bits(std::size_t begin, std::size_t end) const {
+    const std::uint64_t all = (std::uint64_t{1} << (end - begin)) - 1;
+    return {word_from(free_, begin) & all, word_from(hit_, begin) & all};
+  }
   /// For each of the first `count` samples, increments its number of "free" references in `free`
   /// and its number of "hit" references in `hit`; the results must be below 256. The sizes of both
   /// arrays are at least `count`, rounded up to a multiple of eight.

@@ -36,9 +36,12 @@ class AtomicFile {
     kLater  ///< the file is on the disk after `sync_files()`; faster for many files
   };
 
-  /// Renames the temporary file to the target. Throws IoError with the reason of the first failure
-  /// if a write failed; the target is then unchanged. Throws IoError also if the rename succeeded,
-  /// but the synchronization of the folder failed.
+  /// Writes the temporary file to its end, so that nothing but renaming is left. Throws IoError.
+  void prepare(Sync sync = Sync::kNow);
+
+  /// prepare(), and renames the temporary file to the target. Throws IoError with the reason of the
+  /// first failure if a write failed; the target is then unchanged. Throws IoError also if the
+  /// rename succeeded, but the synchronization of the folder failed.
   void commit(Sync sync = Sync::kNow);
 
  private:

@@ -33,7 +33,9 @@ class PointFileWriter {
   /// Adds records with the columns and the format of this file.
   void add(const PointRecords& points);
   std::size_t size() const { return size_; }
-  /// Throws IoError unless the file was written completely.
+  /// Writes all but the name of the file. No point can be added then. Throws IoError.
+  void prepare(AtomicFile::Sync sync = AtomicFile::Sync::kNow);
+  /// prepare(), and puts the file in place. Throws IoError unless it was written completely.
   void commit(AtomicFile::Sync sync = AtomicFile::Sync::kNow);
 
  private:
@@ -45,6 +47,7 @@ class PointFileWriter {
   bool pcd_;
   std::size_t size_ = 0;
   PointRecords buffer_;
+  bool is_prepared_ = false;
   AtomicFile file_;
 };
 

@@ -2,67 +2,22 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <utility>
 #include <vector>
 
+#include "dynains/map/filled_voxels.hpp"
+#include "dynains/map/session_grid.hpp"
+#include "dynains/map/session_voxel_locator.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
-#include "dynains/stage/voxel_hash_table.hpp"
+#include "dynains/simd/bits.hpp"
 
 namespace dynains {
-
-/// Grid of a map of many sessions. All its sessions have the same grid.
-struct SessionGrid {
-  double map_voxel = 0.2;  ///< m, edge of a voxel, which holds one point
-  double tile = 50.0;      ///< m, edge of a tile
-
-  template <class Self, class Visitor>
-  static void visit(Self& self, Visitor&& visitor) {
-    visitor(Parameter{"map_voxel", self.map_voxel, closed(0.02, 5), "m",
-                      "resolution of the map of many sessions"});
-    visitor(Parameter{"tile", self.tile, closed(10, 500), "m",
-                      "edge of the tiles of the map of many sessions"});
-  }
-
-  /// Throws ConfigError.
-  void validate() const { validate_parameters("SessionGrid", *this); }
-};
-
-/// Indices of a tile along x and y of the world. A tile is not bounded in z.
-using TileIndex = std::array<std::int32_t, 2>;
-
-/// One static point of a session.
-struct SessionPoint {
-  float x, y;           ///< m, relative to the corner of its tile with the lowest x and y
-  float z;              ///< m, world frame
-  std::uint32_t scan;   ///< number of the scan that measured it
-  std::uint32_t label;  ///< of the recording, 0 without labels
-  bool is_ground;       ///< by its verdict
-};
-
-inline Eigen::Vector3d tile_corner(const SessionGrid& grid, const TileIndex& tile) {
-  return {grid.tile * tile[0], grid.tile * tile[1], 0.0};
-}
-
-/// Indices of the voxel of a point in its tile.
-inline std::array<std::int64_t, 3> session_voxel_index(const SessionGrid& grid,
-                                                       const SessionPoint& point) {
-  const auto index = [&](float metres) {
-    return static_cast<std::int64_t>(std::floor(static_cast<double>(metres) / grid.map_voxel));
-  };
-  return {index(point.x), index(point.y), index(point.z)};
-}
-
-/// Voxel of a point in its tile.
-inline VoxelKey session_voxel(const SessionGrid& grid, const SessionPoint& point) {
-  const std::array<std::int64_t, 3> index = session_voxel_index(grid, point);
-  return voxel_key(index[0], index[1], index[2]);
-}
 
 struct SessionPointsConfig {
   double contribution_range = 60.0;  ///< m
@@ -78,13 +33,16 @@ struct SessionPointsConfig {
 };
 
 /// Collects the static points of the scans of one session. The first point of each voxel is kept.
-/// The result depends on the scans of this session only. Memory: 24 bytes per kept point, with
-/// the margin of a growing vector, and up to 48 for each block of 8 x 4 x 2 voxels.
+/// The result depends on the scans of this session only. Tiles behind the sensor can be taken out
+/// (release_far) and put back. Memory: 24 bytes per kept point, with
+/// the margin of a growing vector, and those of FilledVoxels.
 class SessionPoints {
  public:
   /// Throws ConfigError.
   explicit SessionPoints(const SessionGrid& grid, const SessionPointsConfig& config = {})
-      : grid_((grid.validate(), grid)), config_((config.validate(), config)) {}
+      : grid_((grid.validate(), grid)),
+        config_((config.validate(), config)),
+        locator_(grid, config.contribution_range) {}
 
   const SessionGrid& grid() const { return grid_; }
 
@@ -92,18 +50,46 @@ class SessionPoints {
   /// `labels`: label of the recording by point, or empty. `scan`: its number; ascending.
   void add(PointsView points, Span<const PointLabel> verdicts, Span<const std::uint32_t> labels,
            const Eigen::Isometry3d& T_world_sensor, std::uint32_t scan) {
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (!is_static(verdicts[i])) continue;
-      const Eigen::Vector3d local(static_cast<double>(points.x[i]),
-                                  static_cast<double>(points.y[i]),
-                                  static_cast<double>(points.z[i]));
-      if (local.squaredNorm() > config_.contribution_range * config_.contribution_range) continue;
-      add_point(T_world_sensor * local, {0.0F, 0.0F, 0.0F, scan, labels.empty() ? 0 : labels[i],
-                                         verdicts[i] == PointLabel::kGround});
+    locator_.begin_scan(T_world_sensor);
+    around_.assign(locator_.tile_count(), nullptr);
+    const Scan all = {points, verdicts, labels, T_world_sensor, scan};
+    for (std::size_t begin = 0; begin < points.size(); begin += SessionVoxelLocator::kMost) {
+      const std::size_t size = std::min(SessionVoxelLocator::kMost, points.size() - begin);
+      locator_.locate(points.subview(begin, size), voxels_);
+      find_candidates(verdicts.subspan(begin, size));
+      for (const std::uint16_t at : candidates_) prefetch(at);
+      for (const std::uint16_t at : candidates_) add_point(all, begin + at, at);
     }
   }
 
+  /// Number of points in memory.
   std::size_t size() const { return size_; }
+
+  /// Takes out the tiles that are beyond the contribution range around `sensor` (m, world frame) by
+  /// more than a tile. Calls `visit(TileIndex, const std::vector<SessionPoint>&)` for each.
+  template <class Visitor>
+  void release_far(const Eigen::Vector3d& sensor, Visitor&& visit) {
+    for (auto tile = tiles_.begin(); tile != tiles_.end();) {
+      if (distance(tile->first, sensor) <= config_.contribution_range + grid_.tile) {
+        ++tile;
+        continue;
+      }
+      visit(tile->first, tile->second.points);
+      size_ -= tile->second.points.size();
+      tile = tiles_.erase(tile);
+    }
+  }
+  /// Whether a scan at `sensor` (m, world frame) may add points to a tile.
+  bool reaches(const Eigen::Vector3d& sensor, const TileIndex& tile) const {
+    return distance(tile, sensor) <= config_.contribution_range + kAhead * grid_.tile;
+  }
+  /// Puts back a tile that was taken out, before a scan that reaches it.
+  void restore(const TileIndex& index, std::vector<SessionPoint> points) {
+    Tile& tile = tiles_[index];
+    for (const SessionPoint& point : points) tile.filled.add(session_voxel_index(grid_, point));
+    size_ += points.size();
+    tile.points = std::move(points);
+  }
 
   /// Calls `visit(TileIndex, const std::vector<SessionPoint>&)` in the order of the indices.
   template <class Visitor>
@@ -112,52 +98,89 @@ class SessionPoints {
   }
 
  private:
-  // Blocks of 8 x 4 x 2 voxels: neighbouring points of a scan mostly lie in one.
+  static constexpr double kAhead = 0.01;  // tiles: more than the rounding of positions
+
+  // Distance of a position from a tile along the axis where it is larger, m.
+  double distance(const TileIndex& tile, const Eigen::Vector3d& position) const {
+    const Eigen::Vector2d middle =
+        tile_corner(grid_, tile).head<2>() + Eigen::Vector2d::Constant(0.5 * grid_.tile);
+    return (position.head<2>() - middle).cwiseAbs().maxCoeff() - 0.5 * grid_.tile;
+  }
+
   struct Tile {
     std::vector<SessionPoint> points;
-    VoxelHashTable<> blocks;
-    std::vector<std::uint64_t> filled;  // by block: a bit for each voxel with a point
-    VoxelKey newest_key = {};           // of the block of the newest point
-    std::uint32_t newest_block = 0;
-
-    // False if the voxel has a point already.
-    bool fill(const std::array<std::int64_t, 3>& voxel) {
-      const VoxelKey key = voxel_key(voxel[0] >> 3, voxel[1] >> 2, voxel[2] >> 1);
-      if (filled.empty() || key != newest_key) {
-        newest_key = key;
-        newest_block = blocks.insert(key);
-        if (newest_block == filled.size()) filled.push_back(0);
-      }
-      const std::int64_t place = (voxel[0] & 7) | (voxel[1] & 3) << 3 | (voxel[2] & 1) << 5;
-      const std::uint64_t bit = std::uint64_t{1} << static_cast<std::uint64_t>(place);
-      const bool is_new = (filled[newest_block] & bit) == 0;
-      filled[newest_block] |= bit;
-      return is_new;
-    }
+    FilledVoxels filled;
   };
 
-  // `point`: all but the coordinates.
-  void add_point(const Eigen::Vector3d& position, SessionPoint point) {
-    const TileIndex index = {static_cast<std::int32_t>(std::floor(position.x() / grid_.tile)),
-                             static_cast<std::int32_t>(std::floor(position.y() / grid_.tile))};
-    if (newest_ == nullptr || index != newest_index_) {
-      newest_ = &tiles_[index];
-      newest_index_ = index;
+  struct Scan {
+    PointsView points;
+    Span<const PointLabel> verdicts;
+    Span<const std::uint32_t> labels;
+    const Eigen::Isometry3d& T_world_sensor;
+    std::uint32_t number;
+  };
+
+  // Finds the static points that may be the first ones of their voxels.
+  void find_candidates(Span<const PointLabel> verdicts) {
+    candidates_.clear();
+    std::array<std::uint8_t, SessionVoxelLocator::kMost> is_candidate = {};
+    for (std::size_t i = 0; i < verdicts.size(); ++i) is_candidate[i] = is_static(verdicts[i]);
+    for (std::size_t first = 0; first < verdicts.size(); first += 64) {
+      const std::uint64_t statics = detail::nonzero_bytes(&is_candidate[first]);
+      // A static point in the voxel of the static point before it is not the first one there.
+      const std::uint64_t changes = voxels_.changes[first / 64] | ~(statics << 1U);
+      detail::for_each_bit(statics & changes, [&](std::size_t bit) {
+        candidates_.push_back(static_cast<std::uint16_t>(first + bit));
+      });
     }
+  }
+
+  void prefetch(std::size_t at) const {
+    if (voxels_.tile[at] < 0) return;
+    const Tile* const tile = around_[static_cast<std::size_t>(voxels_.tile[at])];
+    if (tile != nullptr) tile->filled.prefetch(voxels_.index(at));
+  }
+
+  // Adds static point i of a scan. `at`: its number in voxels_.
+  void add_point(const Scan& scan, std::size_t i, std::size_t at) {
+    const std::int32_t number = voxels_.tile[at];
+    if (number == SessionVoxelLocator::kOutOfRange) return;
+    const bool is_sure = number != SessionVoxelLocator::kUnsure;
+    Tile** const tile = is_sure ? &around_[static_cast<std::size_t>(number)] : nullptr;
+    // Most voxels have a point already.
+    if (tile != nullptr && *tile != nullptr && (*tile)->filled.has(voxels_.index(at))) return;
+    const Eigen::Vector3d local(static_cast<double>(scan.points.x[i]),
+                                static_cast<double>(scan.points.y[i]),
+                                static_cast<double>(scan.points.z[i]));
+    if (local.squaredNorm() > config_.contribution_range * config_.contribution_range) return;
+    Tile& own = add_point(scan.T_world_sensor * local,
+                          {0.0F, 0.0F, 0.0F, scan.number, scan.labels.empty() ? 0 : scan.labels[i],
+                           scan.verdicts[i] == PointLabel::kGround});
+    if (tile != nullptr) *tile = &own;
+  }
+
+  // `point`: all but the coordinates. Returns its tile.
+  Tile& add_point(const Eigen::Vector3d& position, SessionPoint point) {
+    const TileIndex index = tile_index(grid_, position);
+    Tile& tile = tiles_[index];
     const Eigen::Vector3d relative = position - tile_corner(grid_, index);
     point.x = static_cast<float>(relative.x());
     point.y = static_cast<float>(relative.y());
     point.z = static_cast<float>(relative.z());
-    if (!newest_->fill(session_voxel_index(grid_, point))) return;
-    newest_->points.push_back(point);
-    ++size_;
+    if (tile.filled.add(session_voxel_index(grid_, point))) {
+      tile.points.push_back(point);
+      ++size_;
+    }
+    return tile;
   }
 
   SessionGrid grid_;
   SessionPointsConfig config_;
-  std::map<TileIndex, Tile> tiles_;
-  Tile* newest_ = nullptr;  // elements of a map do not move
-  TileIndex newest_index_ = {};
+  SessionVoxelLocator locator_;
+  SessionVoxelLocator::Voxels voxels_;
+  std::map<TileIndex, Tile> tiles_;        // its elements do not move
+  std::vector<std::uint16_t> candidates_;  // in voxels_
+  std::vector<Tile*> around_;              // by number of the tile in locator_; null: unknown
   std::size_t size_ = 0;
 };
 

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/map/common_blocks.hpp"
 #include "dynains/map/session_points.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/pack_loops.hpp"
@@ -22,16 +23,18 @@ namespace dynains {
 ///
 /// First the points of all sessions are added, in the order of their time; then, in the same order,
 /// the reference scans of each session test the points of all sessions. The points of a session
-/// form blocks of 2 x 2 x 2 voxels. A block sums its log-odds of being free session by session, by
-/// the rules of MapRevision:
+/// form blocks of 2 x 2 x 2 voxels. References test the blocks of their own session by its points,
+/// and those of other sessions by common samples: of each voxel, the point of the first session
+/// that has one (detail::CommonBlocks). A block sums its log-odds of being free session by session,
+/// by the rules of MapRevision:
 /// - Sessions before its own tell whether its place was free. Its own session tells whether it
 ///   stands there. What does not stand does not come in.
 /// - A later session that passes through it removes it.
 /// Touching blocks above the ground form components. A component that has mostly left leaves as a
-/// whole; if it is larger than a vehicle, each of its cubes of 8 blocks decides for itself. Blocks
-/// of different sessions do not influence each other, except that the ground of all sessions tells
-/// what is ground: ground points above it, where no other session has any and nothing stands,
-/// leave.
+/// whole; if it is larger than a vehicle, each of its cubes of 8 blocks decides for itself. Later
+/// sessions influence the blocks of a session by their references only, except that the ground of
+/// all sessions tells what is ground: ground points above it, where no other session has any and
+/// nothing stands, leave.
 class TileHistory {
  public:
   static constexpr std::uint32_t kNever = std::numeric_limits<std::uint32_t>::max();
@@ -92,12 +95,26 @@ class TileHistory {
     session.points = std::move(points);
     VoxelHashTable<>& blocks = session.blocks;
     session.block_of.reserve(session.points.size());
+    std::vector<std::uint8_t> filled;  // by block: octants with points
     for (const SessionPoint& point : session.points) {
       const VoxelKey voxel = session_voxel(grid_, point);
-      const VoxelKey block = voxel_key(voxel_index(voxel, 0) >> 1, voxel_index(voxel, 1) >> 1,
-                                       voxel_index(voxel, 2) >> 1);
-      session.block_of.push_back(blocks.insert(block));
-      if (session.block_of.back() == session.keys.size()) session.keys.push_back(block);
+      const VoxelKey key = voxel_key(voxel_index(voxel, 0) >> 1, voxel_index(voxel, 1) >> 1,
+                                     voxel_index(voxel, 2) >> 1);
+      const auto octant = static_cast<std::uint32_t>((voxel_index(voxel, 0) & 1) |
+                                                     (voxel_index(voxel, 1) & 1) << 1 |
+                                                     (voxel_index(voxel, 2) & 1) << 2);
+      const std::uint32_t common = common_.add(key, octant, point);
+      const std::uint32_t block = blocks.insert(key);
+      session.block_of.push_back(block);
+      if (block == session.keys.size()) {
+        session.keys.push_back(key);
+        session.common_of.push_back(common);
+        filled.push_back(0);
+      }
+      filled[block] = static_cast<std::uint8_t>(filled[block] | 1U << octant);
+    }
+    for (std::size_t block = 0; block < filled.size(); ++block) {
+      session.shape_of.push_back(common_.shape(session.common_of[block], filled[block]));
     }
     // Counting sort by block.
     session.begin.assign(blocks.size() + 1, 0);
@@ -122,15 +139,18 @@ class TileHistory {
   /// detail::test_visibility(); points in the frame of SessionPoint, relative to `sensor`.
   template <class TestVisibility>
   void revise(std::uint32_t scan, const Eigen::Vector3d& sensor, TestVisibility&& test_visibility) {
-    for (Session& session : sessions_) {
-      gather(session, sensor);
-      if (tested_.empty()) continue;
+    if (!has_begun_session_) begin_session();
+    Session& own = sessions_[tested_count_];
+    gather(own, sensor);
+    if (!tested_.empty()) {
       const auto& visibility = test_visibility(samples_, std::size_t{begin_.back()});
       for (std::size_t i = 0; i < tested_.size(); ++i) {
         const auto count = visibility.count(begin_[i], begin_[i + 1]);
-        update(count.free, count.hit, begin_[i + 1] - begin_[i], scan, session, tested_[i]);
+        const int verdict = judge(count.free, count.hit, begin_[i + 1] - begin_[i]);
+        if (verdict != 0) update(verdict > 0, scan, own, tested_[i]);
       }
     }
+    common_.test(scan, sensor, config_.revision_range, test_visibility, judge);
   }
 
   /// Number of sessions whose references have tested the points.
@@ -138,7 +158,12 @@ class TileHistory {
 
   /// Ends the references of session number tested_count().
   void end_session() {
+    if (!has_begun_session_) begin_session();
+    has_begun_session_ = false;
     const auto by = static_cast<std::uint32_t>(tested_count_++);
+    for (Session& session : sessions_) {
+      if (session.number != by) take_evidence(session);
+    }
     add_ground(sessions_[by]);
     find_components(sessions_[by]);
     for (std::uint32_t i = 0; i <= by; ++i) {
@@ -211,6 +236,8 @@ class TileHistory {
     std::vector<SessionPoint> points;
     VoxelHashTable<> blocks;                  // numbers of the keys
     std::vector<VoxelKey> keys;               // by block
+    std::vector<std::uint32_t> common_of;     // by block: number in CommonBlocks
+    std::vector<std::uint32_t> shape_of;      // by block: number in CommonBlocks
     std::vector<std::uint32_t> block_of;      // by point
     std::vector<std::uint32_t> begin;         // by block: in by_block
     std::vector<std::uint32_t> by_block;      // points, sorted by block
@@ -423,24 +450,51 @@ class TileHistory {
     }
   }
 
-  void update(std::uint32_t free, std::uint32_t hit, std::uint32_t samples, std::uint32_t scan,
-              Session& session, std::uint32_t block) const {
+  // 1 if so many free and hit samples of a block tell that it is free, -1 if it is hit, else 0.
+  static int judge(std::uint32_t free, std::uint32_t hit, std::uint32_t samples) {
     const auto visible = static_cast<float>(free + hit);
     const auto least = static_cast<float>(std::min(2U, samples));
-    if (visible < std::max(least, kLeastVisible * static_cast<float>(samples))) return;
+    if (visible < std::max(least, kLeastVisible * static_cast<float>(samples))) return 0;
     const float free_ratio = static_cast<float>(free) / visible;
-    const bool is_free = free_ratio >= detail::FreeSpaceSum::kFreeRatio;
-    const bool is_hit = free_ratio <= detail::FreeSpaceSum::kHitRatio;
-    if (!is_free && !is_hit) return;
+    if (free_ratio >= detail::FreeSpaceSum::kFreeRatio) return 1;
+    return free_ratio <= detail::FreeSpaceSum::kHitRatio ? -1 : 0;
+  }
+
+  // Adds what a reference of the own session tells.
+  void update(bool is_free, std::uint32_t scan, Session& session, std::uint32_t block) const {
     const float step = is_free ? free_ : hit_;
     session.level[block] += step;
     if (is_free) session.free_scan[block] = scan;
-    if (session.number != tested_count_) return;
     session.own_level[block] = std::max(0.0F, session.own_level[block] + step);
     session.most_own_level[block] =
         std::max(session.most_own_level[block], session.own_level[block]);
     std::uint8_t& hits = session.own_hits[block];
-    if (is_hit && hits < 255) ++hits;
+    if (!is_free && hits < 255) ++hits;
+  }
+
+  // Enables the common samples of what stands of the other sessions.
+  void begin_session() {
+    has_begun_session_ = true;
+    common_.clear();
+    for (const Session& session : sessions_) {
+      if (session.number == tested_count_) continue;
+      for (std::size_t block = 0; block < session.keys.size(); ++block) {
+        if (session.removal_of[block].session != kNever) continue;
+        common_.enable(session.common_of[block], session.shape_of[block]);
+      }
+    }
+    common_.finish();
+  }
+
+  // Adds what the references of another session told.
+  void take_evidence(Session& session) const {
+    for (std::size_t block = 0; block < session.keys.size(); ++block) {
+      if (session.removal_of[block].session != kNever) continue;
+      const detail::CommonBlocks::Evidence& evidence = common_.evidence(session.shape_of[block]);
+      session.level[block] +=
+          static_cast<float>(evidence.free) * free_ + static_cast<float>(evidence.hit) * hit_;
+      if (evidence.free > 0) session.free_scan[block] = evidence.free_scan;
+    }
   }
 
   SessionGrid grid_;
@@ -448,7 +502,9 @@ class TileHistory {
   float free_, hit_;  // log-odds
   float level_;       // log-odds from which a block is free
   std::vector<Session> sessions_;
+  detail::CommonBlocks common_;
   std::size_t tested_count_ = 0;
+  bool has_begun_session_ = false;
   VoxelHashTable<> ground_cells_;
   std::vector<float> lowest_ground_;  // m, by cell
   VoxelHashTable<> low_cells_;
