@@ -46,7 +46,7 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
                               config.point_max_range, config.point_radius, config.truth},
         map.points_world);
   }
-  if (!estimates.empty()) {
+  if (!estimates.empty() && config.analyses_errors) {
     result.errors.emplace(ErrorAnalysis::Settings{config.min_range, config.point_max_range,
                                                   config.ring_width, config.truth});
   }
@@ -55,11 +55,13 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
   for (; source(result.scans, scan); ++result.scans) {
     check_lengths(scan, result.scans);
     result.points += scan.size();
-    std::future<void> adding = std::async(std::launch::async, [&] { voxels.add(scan); });
-    points.add(scan);
-    for (MapProtocol& map : map_protocols) map.add(scan);
-    if (result.errors) result.errors->add(scan);
-    adding.get();
+    std::future<void> others = std::async(std::launch::async, [&] {
+      points.add(scan);
+      for (MapProtocol& map : map_protocols) map.add(scan);
+      if (result.errors) result.errors->add(scan);
+    });
+    voxels.add(scan);
+    others.get();
   }
   for (std::size_t index = 0; index < result.scans && source(index, scan); ++index) {
     check_lengths(scan, index);
@@ -69,11 +71,16 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
 
   result.rows.push_back({"identity", voxels.score(VoxelProtocol::kIdentity), points.identity(),
                          std::nullopt, std::nullopt});
-  result.rows.push_back({"oracle", voxels.score(VoxelProtocol::kOracle), points.oracle(),
-                         std::nullopt, std::nullopt});
+  std::vector<std::future<VoxelScore>> scores;
+  for (std::size_t row = VoxelProtocol::kOracle;
+       row < VoxelProtocol::kFirstEstimate + estimates.size(); ++row) {
+    scores.push_back(std::async(std::launch::async, [&voxels, row] { return voxels.score(row); }));
+  }
+  result.rows.push_back(
+      {"oracle", scores.front().get(), points.oracle(), std::nullopt, std::nullopt});
   for (std::size_t e = 0; e < estimates.size(); ++e) {
-    result.rows.push_back({estimates[e], voxels.score(VoxelProtocol::kFirstEstimate + e),
-                           points.score(e), std::nullopt, std::nullopt});
+    result.rows.push_back(
+        {estimates[e], scores[e + 1].get(), points.score(e), std::nullopt, std::nullopt});
   }
   for (std::size_t m = 0; m < maps.size(); ++m) {
     result.rows.push_back({maps[m].name, map_protocols[m].voxel_score(voxels),

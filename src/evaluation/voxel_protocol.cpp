@@ -1,7 +1,9 @@
 #include "dynains/evaluation/voxel_protocol.hpp"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <future>
 #include <limits>
 #include <optional>
 #include <string>
@@ -40,44 +42,39 @@ class VoxelProtocol::Impl {
 
   void add(const LabelledScan& scan) {
     if (!grid_) grid_.emplace(settings_.voxel, scan.T_world_sensor.translation());
-    Points points(*this, scan);
-    voxelise(points, [](VoxelKey) { return true; });
-    scan_voxels_.for_each(
-        all_layers_, points, [this](VoxelKey key) { prefetch_index(key); },
-        [this](VoxelKey key) { prefetch(key); },
-        [this](VoxelKey key, LayerMask layers, const Eigen::Vector3d& centroid, Truth truth) {
-          accumulate(key, layers, centroid, truth);
-        });
+    next_.clear();
+    voxelise(
+        scan, [this](VoxelKey key) { scan_voxels_.prefetch(key); }, [](VoxelKey) { return true; },
+        [this](const detail::ScanVoxel& voxel) { next_.push_back(voxel); });
+    // The voxels of this scan are accumulated while the caller prepares the next one.
+    wait();
+    next_.swap(accumulated_);
+    accumulating_ = std::async(std::launch::async, [this] { accumulate(accumulated_); });
     finished_first_pass_ = false;
   }
 
   void resolve(const LabelledScan& scan) {
     finish_first_pass();
     if (pending_.size() == 0) return;
-    Points points(*this, scan);
-    // Consecutive points often have one voxel.
-    VoxelKey last = detail::kNoKey;
-    bool is_last_pending = false;
-    voxelise(points, [&](VoxelKey key) {
-      if (key != last) is_last_pending = pending_.find(key) != detail::VoxelIndex::kNone;
-      last = key;
-      return is_last_pending;
+    const auto is_pending = [this](VoxelKey key) {
+      return pending_.find(key) != detail::VoxelIndex::kNone;
+    };
+    const auto prefetch = [this](VoxelKey key) {
+      __builtin_prefetch(&pending_.first_slot(voxel_hash(key)));
+    };
+    voxelise(scan, prefetch, is_pending, [this](const detail::ScanVoxel& found) {
+      const Voxel& voxel = voxels_[index_.find(found.key)];
+      double* nearest = &nearest_[pending_.find(found.key) * layers_];
+      for (std::size_t layer = 0; layer < layers_; ++layer) {
+        if ((found.layers >> layer & 1U) == 0) continue;
+        Cell& cell = forks_[voxel.fork + layer];
+        const double distance = (found.centroid - cell.centroid()).squaredNorm();
+        if (detail::is_nearer(distance, nearest[layer])) {
+          nearest[layer] = distance;
+          cell.truths = truth_bit(found.truth);
+        }
+      }
     });
-    scan_voxels_.for_each(
-        all_layers_, points, [](VoxelKey) {}, [](VoxelKey) {},
-        [this](VoxelKey key, LayerMask layers, const Eigen::Vector3d& centroid, Truth truth) {
-          const Voxel& voxel = voxels_[index_.find(key)];
-          double* nearest = &nearest_[pending_.find(key) * layers_];
-          for (std::size_t layer = 0; layer < layers_; ++layer) {
-            if ((layers >> layer & 1U) == 0) continue;
-            Cell& cell = forks_[voxel.fork + layer];
-            const double distance = (centroid - cell.centroid()).squaredNorm();
-            if (detail::is_nearer(distance, nearest[layer])) {
-              nearest[layer] = distance;
-              cell.truths = truth_bit(truth);
-            }
-          }
-        });
   }
 
   VoxelScore score(std::size_t row) {
@@ -143,67 +140,56 @@ class VoxelProtocol::Impl {
     return VoxelPoint{held.centroid(), held.truth()};
   }
 
-  // The points of a scan with their voxels.
-  class Points {
-   public:
-    Points(const Impl& protocol, const LabelledScan& scan)
-        : protocol_(protocol), scan_(scan), located_(scan, *protocol.grid_) {}
-
-    // False for a point that is not judged.
-    bool is_judged(std::size_t i) const {
-      return protocol_.settings_.truth(scan_.truth[i]) != Truth::kIgnored &&
-             protocol_.gate_.passes(scan_.xyz + i * scan_.stride);
-    }
-    detail::LocatedPoints& located() { return located_; }
-    detail::ScanPoint operator()(std::size_t i) const {
-      const Eigen::Vector3d p_world = located_.p_world(i);
-      return at(i, p_world, protocol_.grid_->key(p_world));
-    }
-    detail::ScanPoint at(std::size_t i, const Eigen::Vector3d& p_world, VoxelKey key) const {
-      detail::ScanPoint point;
-      point.p_world = p_world;
-      point.key = key;
-      point.truth = protocol_.settings_.truth(scan_.truth[i]);
+  /// Calls `visit(ScanVoxel)` for the voxels of a scan that are wanted. `prefetch(key)` is called
+  /// some points before `wanted(key)`.
+  template <class Prefetch, class Wanted, class Visit>
+  void voxelise(const LabelledScan& scan, Prefetch&& prefetch, Wanted&& wanted, Visit&& visit) {
+    // Consecutive points mostly have one label.
+    std::uint32_t last_label = scan.size() > 0 ? scan.truth[0] : 0;
+    Truth last_truth = settings_.truth(last_label);
+    const auto label_of = [&](std::size_t i) {
+      if (scan.truth[i] != last_label) {
+        last_label = scan.truth[i];
+        last_truth = settings_.truth(last_label);
+      }
       unsigned layers = 1U << kIdentity;
-      if (point.truth == Truth::kStatic) layers |= 1U << kOracle;
-      if (!scan_.in_map.empty()) layers |= static_cast<unsigned>(scan_.in_map[i]) << kFirstEstimate;
-      point.layers = static_cast<LayerMask>(layers & protocol_.all_layers_);
-      return point;
-    }
-
-   private:
-    const Impl& protocol_;
-    const LabelledScan& scan_;
-    detail::LocatedPoints located_;
-  };
-
-  template <class Wanted>
-  void voxelise(Points& points, Wanted&& wanted) {
+      if (last_truth == Truth::kStatic) layers |= 1U << kOracle;
+      if (!scan.in_map.empty()) layers |= static_cast<unsigned>(scan.in_map[i]) << kFirstEstimate;
+      return detail::LayeredTruth{last_truth, static_cast<LayerMask>(layers & all_layers_)};
+    };
+    detail::LocatedPoints points(scan, *grid_, gate_);
     scan_voxels_.clear();
-    points.located().for_each([&](VoxelKey key) { scan_voxels_.prefetch(key); },
-                              [&](std::size_t i, const Eigen::Vector3d& p_world, VoxelKey key) {
-                                if (key == detail::kNoKey || !wanted(key) || !points.is_judged(i))
-                                  return;
-                                scan_voxels_.add(points.at(i, p_world, key), i);
-                              });
+    points.for_each_run(prefetch, [&](const detail::PointRun& run) {
+      if (wanted(run.key)) scan_voxels_.add(run, label_of);
+    });
+    scan_voxels_.for_each(
+        all_layers_, label_of, [&](std::size_t i) { return points.p_world(i); }, visit);
   }
 
+  void accumulate(const std::vector<detail::ScanVoxel>& voxels) {
+    constexpr std::size_t kAhead = 8;
+    for (std::size_t v = 0; v < voxels.size(); ++v) {
+      prefetch_index(voxels[std::min(v + 2 * kAhead, voxels.size() - 1)].key);
+      prefetch_voxel(voxels[std::min(v + kAhead, voxels.size() - 1)].key);
+      accumulate(voxels[v]);
+    }
+  }
   void prefetch_index(VoxelKey key) const {
     __builtin_prefetch(&index_.first_slot(voxel_hash(key)));
   }
-  void prefetch(VoxelKey key) const {
+  void prefetch_voxel(VoxelKey key) const {
     const detail::VoxelIndex::Slot& slot = index_.first_slot(voxel_hash(key));
     if (slot.number >= voxels_.size()) return;
     __builtin_prefetch(&voxels_[slot.number]);
     __builtin_prefetch(&voxels_[slot.number].fork);
   }
 
-  void accumulate(VoxelKey key, LayerMask layers, const Eigen::Vector3d& centroid, Truth truth) {
-    const std::uint32_t number = index_.insert(key);
-    if (number == voxels_.size()) voxels_.push_back({key, {}, kNotForked});
+  void accumulate(const detail::ScanVoxel& found) {
+    const std::uint32_t number = index_.insert(found.key);
+    if (number == voxels_.size()) voxels_.push_back({found.key, {}, kNotForked});
     Voxel& voxel = voxels_[number];
-    if (voxel.fork == kNotForked && layers == all_layers_) {
-      voxel.shared.add(centroid, truth);
+    if (voxel.fork == kNotForked && found.layers == all_layers_) {
+      voxel.shared.add(found.centroid, found.truth);
       return;
     }
     if (voxel.fork == kNotForked) {
@@ -211,14 +197,19 @@ class VoxelProtocol::Impl {
       forks_.resize(forks_.size() + layers_, voxel.shared);
     }
     for (std::size_t layer = 0; layer < layers_; ++layer) {
-      if ((layers >> layer & 1U) != 0) forks_[voxel.fork + layer].add(centroid, truth);
+      if ((found.layers >> layer & 1U) == 0) continue;
+      forks_[voxel.fork + layer].add(found.centroid, found.truth);
     }
+  }
+  void wait() {
+    if (accumulating_.valid()) accumulating_.get();
   }
 
   /// Collects the voxels with points of both classes in some layer. All of them are forked: a voxel
   /// with equal layers has no dynamic point, because the oracle layer has none.
   void finish_first_pass() {
     if (finished_first_pass_) return;
+    wait();
     finished_first_pass_ = true;
     pending_.clear();
     for (const Voxel& voxel : voxels_) {
@@ -237,13 +228,18 @@ class VoxelProtocol::Impl {
   std::optional<detail::VoxelGrid> grid_;
   detail::ScanVoxels scan_voxels_;
 
+  std::vector<detail::ScanVoxel> next_;
+
+  // Of the accumulating thread while `accumulating_` is valid.
+  std::vector<detail::ScanVoxel> accumulated_;
   detail::VoxelIndex index_;
   std::vector<Voxel> voxels_;
   std::vector<Cell> forks_;
 
   bool finished_first_pass_ = false;
   detail::VoxelIndex pending_;
-  std::vector<double> nearest_;  // squared distance, m^2, by pending voxel and layer
+  std::vector<double> nearest_;     // squared distance, m^2, by pending voxel and layer
+  std::future<void> accumulating_;  // last member: its destructor waits
 };
 
 VoxelProtocol::VoxelProtocol(const Settings& settings, std::size_t estimates)

@@ -62,7 +62,8 @@ void check_are_finished(const EvalOptions& options) {
 }
 
 void eval(const EvalOptions& options) {
-  const evaluation::EvaluationConfig config = options.evaluation.config();
+  evaluation::EvaluationConfig config = options.evaluation.config();
+  config.analyses_errors = options.errors || !options.json.empty();
   if (options.runs.size() > evaluation::kMaxEstimates) {
     throw ConfigError("at most " + std::to_string(evaluation::kMaxEstimates) +
                       " runs can be evaluated at once, not " + std::to_string(options.runs.size()));

@@ -143,6 +143,17 @@ TEST_CASE("Errors are counted by class, instance, range, cause and cluster") {
   CHECK(text.find("similarity too high") != std::string::npos);
 }
 
+TEST_CASE("Scores are equal with and without the analysis of errors") {
+  const auto scans = street();
+  EvaluationConfig config;
+  const Evaluation with = evaluate(source_of(scans), {"run"}, {}, config);
+  config.analyses_errors = false;
+  const Evaluation without = evaluate(source_of(scans), {"run"}, {}, config);
+  CHECK(with.errors);
+  CHECK_FALSE(without.errors);
+  CHECK(to_table(with) == to_table(without));
+}
+
 TEST_CASE("All reports have equal numbers") {
   const auto scans = street();
   const Evaluation result = evaluate(source_of(scans), {"my \"run\""}, {});

@@ -224,6 +224,18 @@ TEST_CASE("Shares of zero points are not numbers") {
   CHECK(run({bad}, settings(0.2), 1).score(0).static_total == 0);
 }
 
+TEST_CASE("The grid ends 2^20 voxels from the first pose, one voxel at either end is free") {
+  const auto total = [](float x) {
+    OwnedScan scan;
+    scan.add(x, 0.5F, 0.5F, kRoad, 1);
+    return run({scan}, settings(1.0), 1).score(0).static_total;
+  };
+  CHECK(total(1048574.5F) == 1);
+  CHECK(total(1048575.5F) == 0);
+  CHECK(total(-1048574.5F) == 1);
+  CHECK(total(-1048575.5F) == 0);
+}
+
 TEST_CASE("Settings out of bounds are refused") {
   CHECK_THROWS_AS(VoxelProtocol(settings(0.0), 1), ConfigError);
   CHECK_THROWS_AS(VoxelProtocol(settings(0.2, -1.0), 1), ConfigError);

@@ -24,6 +24,7 @@ struct EvaluationConfig {
   double point_radius = 0.05;
   double ring_width = 10.0;
   TruthClasses truth;
+  bool analyses_errors = true;  ///< whether Evaluation::errors is made
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
@@ -69,11 +70,11 @@ struct Evaluation {
   /// "identity" (no point removed), "oracle" (exactly the dynamic points removed), the estimates
   /// and the maps, in this order.
   std::vector<EvaluationRow> rows;
-  /// Errors of estimate 0; empty without estimates.
+  /// Errors of estimate 0; empty without estimates or without `analyses_errors`.
   std::optional<ErrorAnalysis> errors;
 };
 
-/// Evaluates estimates and maps, in two threads. Reads `source` twice, in the caller's thread.
+/// Evaluates estimates and maps, in several threads. Reads `source` twice, in the caller's thread.
 /// `estimates`: name of the estimate of each bit of LabelledScan::in_map. Throws ConfigError for
 /// settings out of bounds, std::invalid_argument for a scan with spans of different lengths or a
 /// stride below 3, and the exceptions of `source`.

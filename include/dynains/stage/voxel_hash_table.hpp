@@ -82,11 +82,13 @@ class VoxelHashTable {
   /// Number of a key; adds a new key with the number size(). `hash`: voxel_hash(key).
   std::uint32_t insert(const Key& key, std::uint32_t hash) {
     if (2 * size_ >= slots_.size()) grow();
-    const std::size_t at = slot_of(key, hash);
-    if (slots_[at].number == kNone) slots_[at] = {key, static_cast<std::uint32_t>(size_++)};
+    Slot& slot = slots_[slot_of(key, hash)];
     Slot& first = slots_[first_of(hash)];
-    std::swap(first, slots_[at]);
-    return first.number;
+    const std::uint32_t number =
+        slot.number == kNone ? static_cast<std::uint32_t>(size_++) : slot.number;
+    slot = first;
+    first = {key, number};
+    return number;
   }
   std::uint32_t insert(const Key& key) { return insert(key, voxel_hash(key)); }
 

@@ -32,17 +32,33 @@ bool is_preserved(const VoxelPoint& raw, VoxelKey key, const VoxelGrid& grid,
     nearest = distance;
     same = candidate->truth == raw.truth;
   };
-  const auto is_in_reach = [&](VoxelKey at) {
-    return grid.squared_distance(raw.p_world, at) <= nearest + rounding;
-  };
   compare(key);
   if (nearest == 0) return same;
-  for (const VoxelKey offset : kNeighbours) {
-    if (is_in_reach(key + offset)) __builtin_prefetch(&index.first_slot(voxel_hash(key + offset)));
-  }
-  for (const VoxelKey offset : kNeighbours) {
-    if (offset != 0 && is_in_reach(key + offset)) compare(key + offset);
-  }
+
+  const Eigen::Vector3d from_corner = raw.p_world - grid.corner(key);
+  const auto is_in_reach = [&](double squared_distance) {
+    return squared_distance <= nearest + rounding;
+  };
+  const auto squared_gap = [&](int axis, int step) {
+    const double below = from_corner[axis];
+    const double gap = step < 0 ? below : step > 0 ? grid.edge() - below : 0.0;
+    return gap * gap;
+  };
+  const auto for_each_neighbour_in_reach = [&](auto&& visit) {
+    for (int z = -1; z <= 1; ++z) {
+      for (int y = -1; y <= 1; ++y) {
+        const double squared = squared_gap(2, z) + squared_gap(1, y);
+        if (!is_in_reach(squared)) continue;
+        for (int x = -1; x <= 1; ++x) {
+          if (x == 0 && y == 0 && z == 0) continue;
+          if (is_in_reach(squared + squared_gap(0, x))) visit(key + voxel_key_step(x, y, z));
+        }
+      }
+    }
+  };
+  for_each_neighbour_in_reach(
+      [&](VoxelKey at) { __builtin_prefetch(&index.first_slot(voxel_hash(at))); });
+  for_each_neighbour_in_reach(compare);
   return same;
 }
 

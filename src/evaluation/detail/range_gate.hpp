@@ -25,12 +25,13 @@ class RangeGate {
   }
 
   /// False for points that are not finite and for "no return" (all zero).
-  bool passes(const float* xyz) const {
-    const double x = xyz[0], y = xyz[1];
+  bool passes(double x, double y, double z) const {
     const double squared = x * x + y * y;
-    if (!(squared >= min_squared_ && squared <= max_squared_)) return false;
-    return std::isfinite(xyz[2]) && (squared > 0 || xyz[2] != 0);
+    const bool is_inside = (squared >= min_squared_) & (squared <= max_squared_);
+    const bool is_return = (squared > 0) | (z != 0);
+    return is_inside & is_return & (std::abs(z) <= std::numeric_limits<double>::max());
   }
+  bool passes(const float* xyz) const { return passes(xyz[0], xyz[1], xyz[2]); }
 
  private:
   double min_squared_;

@@ -2,12 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <vector>
 
+#include "detail/located_points.hpp"
 #include "detail/nearest.hpp"
 #include "detail/voxel_grid.hpp"
 #include "dynains/evaluation/truth.hpp"
@@ -24,67 +24,77 @@ constexpr TruthMask truth_bit(Truth truth) {
 }
 inline constexpr TruthMask kBothTruths = truth_bit(Truth::kStatic) | truth_bit(Truth::kDynamic);
 
-/// A point of a scan that is in at least one layer.
-struct ScanPoint {
-  Eigen::Vector3d p_world;
-  VoxelKey key;
-  Truth truth;
+/// Class and layers of a point of a scan.
+struct LayeredTruth {
+  Truth truth;  ///< kIgnored: the point is in no layer
   LayerMask layers;
 };
 
-/// Voxelises one scan at a time; memory is reused. Only the numbers of the points are stored.
+/// The points of some layers of a scan in one voxel.
+struct ScanVoxel {
+  VoxelKey key;
+  Eigen::Vector3d centroid;  ///< m, world frame
+  Truth truth;               ///< of the point nearest to the centroid
+  LayerMask layers;
+};
+
+/// Voxelises one scan at a time; memory is reused. Of the points, only their numbers are stored.
 class ScanVoxels {
  public:
   void clear() {
     index_.clear();
     voxels_.clear();
-    points_.clear();
+    runs_.clear();
   }
 
   void prefetch(VoxelKey key) const { __builtin_prefetch(&index_.first_slot(voxel_hash(key))); }
 
-  /// `number`: of the point in its scan.
-  void add(const ScanPoint& point, std::size_t number) {
-    const std::uint32_t at = voxel_of(point.key);
-    Voxel& voxel = voxels_[at];
-    voxel.sum += point.p_world;
-    ++voxel.count;
-    voxel.truths |= truth_bit(point.truth);
-    voxel.in_all &= point.layers;
-    voxel.in_any |= point.layers;
-    points_.push_back({static_cast<std::uint32_t>(number), at});
+  /// `label_of(number)`: the label of a point by its number in the scan.
+  template <class LabelOf>
+  void add(const PointRun& run, LabelOf&& label_of) {
+    std::uint32_t at = VoxelIndex::kNone;
+    Voxel voxel;
+    for (std::size_t i = 0; i < run.count; ++i) {
+      const LayeredTruth label = label_of(run.first + i);
+      if (label.truth == Truth::kIgnored) continue;
+      if (at == VoxelIndex::kNone) {
+        at = voxel_of(run.key);
+        voxel = voxels_[at];
+      }
+      voxel.sum += run.p_world(i);
+      ++voxel.count;
+      voxel.truths |= truth_bit(label.truth);
+      voxel.in_all &= label.layers;
+      voxel.in_any |= label.layers;
+    }
+    if (at == VoxelIndex::kNone) return;
+    voxels_[at] = voxel;
+    runs_.emplace_back(static_cast<std::uint32_t>(run.first), static_cast<std::uint32_t>(run.count),
+                       at);
   }
 
-  /// visit(key, layers, centroid, truth) for every voxel, once or once per layer: the centroid of
-  /// the layer's points in the voxel and the truth of the point nearest to it. Voxels come in the
-  /// order of their first points. `point(number)`: the ScanPoint of add(). `prefetch_index(key)`
-  /// and then `prefetch(key)` are called some voxels before `visit`.
-  template <class Point, class PrefetchIndex, class Prefetch, class Visit>
-  void for_each(LayerMask all_layers, Point&& point, PrefetchIndex&& prefetch_index,
-                Prefetch&& prefetch, Visit&& visit) {
-    gather_mixed(point);
-    for (std::size_t v = 0; v < voxels_.size(); ++v) {
-      const Voxel& voxel = voxels_[v];
-      prefetch_index(voxels_[std::min(v + 2 * kAhead, voxels_.size() - 1)].key);
-      prefetch(voxels_[std::min(v + kAhead, voxels_.size() - 1)].key);
+  /// Calls `visit(ScanVoxel)` for every voxel, once or once per layer, in the order of their first
+  /// points. `label_of` as in add(); `p_world(number)`: position of a point.
+  template <class LabelOf, class Position, class Visit>
+  void for_each(LayerMask all_layers, LabelOf&& label_of, Position&& p_world, Visit&& visit) {
+    gather_mixed(label_of, p_world);
+    for (const Voxel& voxel : voxels_) {
       if (!voxel.mixed()) {
         const Truth truth =
             voxel.truths == truth_bit(Truth::kStatic) ? Truth::kStatic : Truth::kDynamic;
-        visit(voxel.key, voxel.in_any, centroid(voxel.sum, voxel.count), truth);
+        visit(ScanVoxel{voxel.key, centroid(voxel.sum, voxel.count), truth, voxel.in_any});
         continue;
       }
       for (LayerMask layer = 1; layer != 0 && layer <= all_layers;
            layer = static_cast<LayerMask>(layer << 1)) {
-        if ((voxel.in_any & layer) != 0) visit_layer(voxel, layer, visit);
+        if ((voxel.in_any & layer) != 0) visit(of_layer(voxel, layer));
       }
     }
   }
 
  private:
-  static constexpr std::size_t kAhead = 8;  // voxels
-
   struct Voxel {
-    VoxelKey key;
+    VoxelKey key = kNoKey;
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     std::uint32_t count = 0;
     std::uint32_t first_mixed = 0;  // range in mixed_points_
@@ -101,8 +111,6 @@ class ScanVoxels {
   }
 
   std::uint32_t voxel_of(VoxelKey key) {
-    // Consecutive points often have one voxel.
-    if (!points_.empty() && voxels_[points_.back().voxel].key == key) return points_.back().voxel;
     const std::uint32_t hash = voxel_hash(key);
     const VoxelIndex::Slot& slot = index_.first_slot(hash);
     const bool is_known = slot.key == key && slot.number != VoxelIndex::kNone;
@@ -112,8 +120,8 @@ class ScanVoxels {
   }
 
   /// Groups the points of the mixed voxels by voxel, in scan order.
-  template <class Point>
-  void gather_mixed(Point&& point) {
+  template <class LabelOf, class Position>
+  void gather_mixed(LabelOf&& label_of, Position&& p_world) {
     std::uint32_t total = 0;
     for (Voxel& voxel : voxels_) {
       voxel.first_mixed = total;
@@ -123,45 +131,56 @@ class ScanVoxels {
     if (total == 0) return;
     next_.resize(voxels_.size());
     for (std::size_t v = 0; v < voxels_.size(); ++v) next_[v] = voxels_[v].first_mixed;
-    for (const Member& member : points_) {
-      if (voxels_[member.voxel].mixed()) mixed_points_[next_[member.voxel]++] = point(member.point);
+    for (const Run& run : runs_) {
+      if (!voxels_[run.voxel].mixed()) continue;
+      for (std::size_t number = run.first; number < std::size_t{run.first} + run.count; ++number) {
+        const LayeredTruth label = label_of(number);
+        if (label.truth == Truth::kIgnored) continue;
+        mixed_points_[next_[run.voxel]++] = {p_world(number), label};
+      }
     }
   }
 
-  template <class Visit>
-  void visit_layer(const Voxel& voxel, LayerMask layer, Visit&& visit) {
+  ScanVoxel of_layer(const Voxel& voxel, LayerMask layer) const {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     std::uint32_t count = 0;
-    const auto* first = mixed_points_.data() + voxel.first_mixed;
-    const auto* last = first + voxel.count;
-    for (const auto* i = first; i != last; ++i) {
-      if ((i->layers & layer) == 0) continue;
+    const MixedPoint* first = mixed_points_.data() + voxel.first_mixed;
+    const MixedPoint* last = first + voxel.count;
+    for (const MixedPoint* i = first; i != last; ++i) {
+      if ((i->label.layers & layer) == 0) continue;
       sum += i->p_world;
       ++count;
     }
-    const Eigen::Vector3d center = centroid(sum, count);
+    ScanVoxel found{voxel.key, centroid(sum, count), Truth::kStatic, layer};
     double best = std::numeric_limits<double>::infinity();
-    Truth truth = Truth::kStatic;
-    for (const auto* i = first; i != last; ++i) {
-      if ((i->layers & layer) == 0) continue;
-      const double distance = (i->p_world - center).squaredNorm();
+    for (const MixedPoint* i = first; i != last; ++i) {
+      if ((i->label.layers & layer) == 0) continue;
+      const double distance = (i->p_world - found.centroid).squaredNorm();
       if (is_nearer(distance, best)) {
         best = distance;
-        truth = i->truth;
+        found.truth = i->label.truth;
       }
     }
-    visit(voxel.key, layer, center, truth);
+    return found;
   }
 
-  struct Member {
-    std::uint32_t point;
+  struct Run {
+    std::uint32_t first;  // number of a point
+    std::uint32_t count;
     std::uint32_t voxel;
+    // Constructed in place: a temporary object would be copied by a slow load after its stores.
+    Run(std::uint32_t first_point, std::uint32_t point_count, std::uint32_t of_voxel)
+        : first(first_point), count(point_count), voxel(of_voxel) {}
+  };
+  struct MixedPoint {
+    Eigen::Vector3d p_world;
+    LayeredTruth label;
   };
 
   VoxelIndex index_;
   std::vector<Voxel> voxels_;
-  std::vector<Member> points_;
-  std::vector<ScanPoint> mixed_points_;
+  std::vector<Run> runs_;
+  std::vector<MixedPoint> mixed_points_;
   std::vector<std::uint32_t> next_;
 };
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <string>
 
 #include "dynains/errors.hpp"
@@ -24,11 +25,11 @@ class VoxelGrid {
   VoxelGrid(double edge, const Eigen::Vector3d& anchor) : edge_(edge) {
     for (int axis = 0; axis < 3; ++axis) {
       const double cell = std::floor(anchor[axis] / edge);
-      if (!(std::abs(cell) < 0x1p52)) {
+      if (!(std::abs(cell) < 0x1p50)) {
         throw PoseError("the first pose lies too far from the world's origin for a grid of " +
                         std::to_string(edge) + " m");
       }
-      anchor_[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(cell);
+      anchor_[static_cast<std::size_t>(axis)] = cell;
     }
   }
 
@@ -39,32 +40,22 @@ class VoxelGrid {
   VoxelKey key(const Eigen::Vector3d& p_world) const {
     return key(p_world.x(), p_world.y(), p_world.z());
   }
+  /// Without branches and without conversions between numbers, so that loops can use vectors.
   VoxelKey key(double x, double y, double z) const {
-    bool is_inside = true;
-    const auto number = [&](double coordinate, std::int64_t anchor) {
-      const double quotient = coordinate / edge_;
-      const bool is_exact = std::abs(quotient) < 0x1p53;
-      const double cell = is_exact ? quotient : 0.0;
-      // floor() without a call into libm, which the baseline instruction set would need.
-      auto result = static_cast<std::int64_t>(cell);
-      result -= static_cast<double>(result) > cell ? 1 : 0;
-      result -= anchor;
-      // One cell at either end is kept free for the neighbours.
-      is_inside &= is_exact && result >= 1 - kVoxelKeyOffset && result <= kVoxelKeyOffset - 2;
-      return result;
-    };
-    const std::int64_t i = number(x, anchor_[0]);
-    const std::int64_t j = number(y, anchor_[1]);
-    const std::int64_t k = number(z, anchor_[2]);
-    return is_inside ? voxel_key(i, j, k) : kNoKey;
+    const double i = floor(x / edge_) - anchor_[0];
+    const double j = floor(y / edge_) - anchor_[1];
+    const double k = floor(z / edge_) - anchor_[2];
+    const bool is_inside = is_number(i) & is_number(j) & is_number(k);
+    const auto outside = static_cast<VoxelKey>(static_cast<std::int64_t>(is_inside) - 1);
+    return outside | bits(i) << (2 * kVoxelKeyBits) | bits(j) << kVoxelKeyBits | bits(k);
   }
 
   /// Lower corner of a voxel.
   Eigen::Vector3d corner(VoxelKey key) const {
     Eigen::Vector3d corner;
     for (int axis = 0; axis < 3; ++axis) {
-      const std::int64_t number = voxel_index(key, axis) + anchor_[static_cast<std::size_t>(axis)];
-      corner[axis] = static_cast<double>(number) * edge_;
+      const auto number = static_cast<double>(voxel_index(key, axis));
+      corner[axis] = (number + anchor_[static_cast<std::size_t>(axis)]) * edge_;
     }
     return corner;
   }
@@ -76,8 +67,28 @@ class VoxelGrid {
   }
 
  private:
+  /// Doubles in [2^52, 2^53) are integers, which their lowest bits are.
+  static constexpr double kIntegers = 0x1.8p52;
+
+  /// std::floor() for numbers below 2^51, which the baseline instruction set lacks.
+  static double floor(double number) {
+    const double nearest = (number + kIntegers) - kIntegers;
+    return nearest - (nearest > number ? 1.0 : 0.0);
+  }
+  /// One cell at either end is kept free for the neighbours.
+  static bool is_number(double cell) {
+    constexpr auto kEnd = static_cast<double>(kVoxelKeyOffset);
+    return (cell >= 1 - kEnd) & (cell <= kEnd - 2);
+  }
+  static VoxelKey bits(double cell) {
+    const double integer = cell + (kIntegers + static_cast<double>(kVoxelKeyOffset));
+    VoxelKey bits = 0;
+    std::memcpy(&bits, &integer, sizeof(bits));
+    return bits & ((VoxelKey{1} << kVoxelKeyBits) - 1);
+  }
+
   double edge_;
-  std::array<std::int64_t, 3> anchor_{};  // cell numbers
+  std::array<double, 3> anchor_{};  // cell numbers
 };
 
 /// Offsets from a key to itself (first) and to its 26 neighbours.
