@@ -6,6 +6,7 @@
 #include "dynains/evaluation/map_protocol.hpp"
 #include "dynains/evaluation/point_protocol.hpp"
 #include "dynains/evaluation/voxel_protocol.hpp"
+#include "threads/background.hpp"
 
 namespace dynains::evaluation {
 namespace {
@@ -52,16 +53,17 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
   }
 
   LabelledScan scan;
+  Background others;
   for (; source(result.scans, scan); ++result.scans) {
     check_lengths(scan, result.scans);
     result.points += scan.size();
-    std::future<void> others = std::async(std::launch::async, [&] {
+    others.begin([&] {
       points.add(scan);
       for (MapProtocol& map : map_protocols) map.add(scan);
       if (result.errors) result.errors->add(scan);
     });
     voxels.add(scan);
-    others.get();
+    others.wait();
   }
   for (std::size_t index = 0; index < result.scans && source(index, scan); ++index) {
     check_lengths(scan, index);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <future>
 #include <limits>
 #include <optional>
 #include <string>
@@ -16,6 +15,7 @@
 #include "detail/scan_voxels.hpp"
 #include "detail/voxel_grid.hpp"
 #include "dynains/errors.hpp"
+#include "threads/background.hpp"
 
 namespace dynains::evaluation {
 
@@ -47,9 +47,9 @@ class VoxelProtocol::Impl {
         scan, [this](VoxelKey key) { scan_voxels_.prefetch(key); }, [](VoxelKey) { return true; },
         [this](const detail::ScanVoxel& voxel) { next_.push_back(voxel); });
     // The voxels of this scan are accumulated while the caller prepares the next one.
-    wait();
+    accumulating_.wait();
     next_.swap(accumulated_);
-    accumulating_ = std::async(std::launch::async, [this] { accumulate(accumulated_); });
+    accumulating_.begin([this] { accumulate(accumulated_); });
     finished_first_pass_ = false;
   }
 
@@ -201,15 +201,12 @@ class VoxelProtocol::Impl {
       forks_[voxel.fork + layer].add(found.centroid, found.truth);
     }
   }
-  void wait() {
-    if (accumulating_.valid()) accumulating_.get();
-  }
 
   /// Collects the voxels with points of both classes in some layer. All of them are forked: a voxel
   /// with equal layers has no dynamic point, because the oracle layer has none.
   void finish_first_pass() {
     if (finished_first_pass_) return;
-    wait();
+    accumulating_.wait();
     finished_first_pass_ = true;
     pending_.clear();
     for (const Voxel& voxel : voxels_) {
@@ -230,7 +227,7 @@ class VoxelProtocol::Impl {
 
   std::vector<detail::ScanVoxel> next_;
 
-  // Of the accumulating thread while `accumulating_` is valid.
+  // The accumulating thread's until accumulating_.wait().
   std::vector<detail::ScanVoxel> accumulated_;
   detail::VoxelIndex index_;
   std::vector<Voxel> voxels_;
@@ -238,8 +235,8 @@ class VoxelProtocol::Impl {
 
   bool finished_first_pass_ = false;
   detail::VoxelIndex pending_;
-  std::vector<double> nearest_;     // squared distance, m^2, by pending voxel and layer
-  std::future<void> accumulating_;  // last member: its destructor waits
+  std::vector<double> nearest_;  // squared distance, m^2, by pending voxel and layer
+  Background accumulating_;      // last member: its destructor waits
 };
 
 VoxelProtocol::VoxelProtocol(const Settings& settings, std::size_t estimates)

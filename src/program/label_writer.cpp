@@ -118,18 +118,16 @@ void LabelFiles::write(const std::string& name, bool keep_equal) const {
 }
 
 LabelWriter::LabelWriter(std::filesystem::path folder, std::launch thread)
-    : files_(std::move(folder)), thread_(thread) {
+    : files_(std::move(folder)), writing_(thread) {
   files_.create_folders();
 }
 
 void LabelWriter::write(const std::string& name, const ScanVerdict& verdict) {
   finish();
   files_.take(verdict);
-  pending_ = std::async(thread_, [this, name] { files_.write(name); });
+  writing_.begin([this, name] { files_.write(name); });
 }
 
-void LabelWriter::finish() {
-  if (pending_.valid()) pending_.get();
-}
+void LabelWriter::finish() { writing_.wait(); }
 
 }  // namespace dynains::program

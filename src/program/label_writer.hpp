@@ -9,6 +9,7 @@
 
 #include "dynains/points.hpp"
 #include "dynains/verdict.hpp"
+#include "threads/background.hpp"
 #include "verdict_runs.hpp"
 
 namespace dynains::program {
@@ -60,9 +61,8 @@ class LabelWriter {
   void finish();
 
  private:
-  LabelFiles files_;  // the writing thread's, while pending_ is valid
-  std::launch thread_;
-  std::future<void> pending_;
+  LabelFiles files_;  // the writing thread's until writing_.wait()
+  Background writing_;
 };
 
 }  // namespace dynains::program

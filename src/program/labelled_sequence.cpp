@@ -49,15 +49,12 @@ bool LabelledSequence::every_run_has(std::size_t index) const {
 
 bool LabelledSequence::read(std::size_t i, evaluation::LabelledScan& scan) {
   if (i >= size()) return false;
-  if (reading_.valid() && next_index_ == i) {
-    reading_.get();
-  } else {
-    if (reading_.valid()) reading_.wait();
-    load(i, next_);
-  }
+  const bool is_ahead = reading_.is_busy() && next_index_ == i;
+  reading_.wait();
+  if (!is_ahead) load(i, next_);
   std::swap(scan_, next_);
   next_index_ = i + 1 < size() ? i + 1 : 0;  // the evaluation reads all scans twice
-  reading_ = std::async(std::launch::async, [this] { load(next_index_, next_); });
+  reading_.begin([this] { load(next_index_, next_); });
 
   const std::size_t index = first_ + i;
   scan.xyz = scan_.points.xyzi.data();

@@ -5,13 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <future>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "dynains/evaluation/scan.hpp"
 #include "dynains/io/recording.hpp"
+#include "threads/background.hpp"
 
 namespace dynains::program {
 
@@ -82,9 +82,9 @@ class LabelledSequence {
   std::size_t first_ = 0;  // half-open range within sequence_
   std::size_t last_ = 0;
   Scan scan_;
-  Scan next_;  // the reading thread's, while reading_ is valid
+  Scan next_;  // the reading thread's until reading_.wait()
   std::size_t next_index_ = 0;
-  std::future<void> reading_;
+  Background reading_;
 };
 
 }  // namespace dynains::program

@@ -6,23 +6,20 @@ namespace dynains::program {
 
 ReadAhead::ReadAhead(const Recording& recording, std::size_t first, std::size_t last,
                      std::launch thread)
-    : recording_(recording), next_(first), last_(last), thread_(thread) {
-  launch({});
+    : recording_(recording), next_(first), last_(last), reading_(thread) {
+  launch();
 }
 
 RecordedScan ReadAhead::next(RecordedScan recycled) {
-  RecordedScan scan = pending_.get();
-  launch(std::move(recycled));
-  return scan;
+  reading_.wait();
+  std::swap(scan_, recycled);
+  launch();
+  return recycled;
 }
 
-void ReadAhead::launch(RecordedScan buffer) {
+void ReadAhead::launch() {
   if (next_ > last_) return;
-  pending_ = std::async(thread_,
-                        [&recording = recording_, i = next_++, scan = std::move(buffer)]() mutable {
-                          recording.read_scan(i, scan);
-                          return std::move(scan);
-                        });
+  reading_.begin([this, i = next_++] { recording_.read_scan(i, scan_); });
 }
 
 }  // namespace dynains::program

@@ -5,6 +5,7 @@
 #include <future>
 
 #include "dynains/io/recording.hpp"
+#include "threads/background.hpp"
 
 namespace dynains::program {
 
@@ -19,13 +20,13 @@ class ReadAhead {
   RecordedScan next(RecordedScan recycled);
 
  private:
-  void launch(RecordedScan buffer);
+  void launch();
 
   const Recording& recording_;
   std::size_t next_;
   std::size_t last_;
-  std::launch thread_;
-  std::future<RecordedScan> pending_;
+  RecordedScan scan_;  // the reading thread's until reading_.wait()
+  Background reading_;
 };
 
 }  // namespace dynains::program

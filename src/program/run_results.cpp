@@ -124,7 +124,6 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
                        const RunOutputs& outputs, std::unique_ptr<MapFile> outside_map)
     : recording_(recording),
       range_(range),
-      thread_(outputs.thread),
       final_labels_(outputs.folder / "labels", outputs.folder / "causes",
                     outputs.write_beliefs ? outputs.folder / "beliefs" : std::filesystem::path()),
       dynamic_points_(outputs.folder / "dynamic_points.ply", moving_columns(recording, range)),
@@ -132,7 +131,8 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
       overview_file_(outputs.folder / kOverviewPicture),
       map_(std::move(outside_map)),
       map_is_outside_(map_ != nullptr),
-      needs_beliefs_(outputs.needs_beliefs()) {
+      needs_beliefs_(outputs.needs_beliefs()),
+      writing_(outputs.thread) {
   final_labels_.create_folders();
   if (outputs.write_online) online_labels_.emplace(outputs.folder / "online", outputs.thread);
   if (outputs.write_clean) clean_scans_.emplace(outputs.folder / "clean", recording);
@@ -169,13 +169,11 @@ void JudgedScan::take(RecordedScan& other, const ScanVerdict& other_verdict, boo
 void RunResults::take_final(RecordedScan& scan, const ScanVerdict& verdict) {
   finish();
   judged_.take(scan, verdict, needs_beliefs_);
-  writing_ = std::async(thread_, [this] { write_final(judged_.scan, judged_.verdict); });
+  writing_.begin([this] { write_final(judged_.scan, judged_.verdict); });
   ++finished_;
 }
 
-void RunResults::finish() {
-  if (writing_.valid()) writing_.get();
-}
+void RunResults::finish() { writing_.wait(); }
 
 void RunResults::write_final(const RecordedScan& scan, const ScanVerdict& verdict) {
   final_labels_.take(verdict);

@@ -24,6 +24,7 @@
 #include "overview.hpp"
 #include "scan_range.hpp"
 #include "session_contribution.hpp"
+#include "threads/background.hpp"
 #include "verdict_arrays.hpp"
 #include "verdict_log.hpp"
 
@@ -111,7 +112,7 @@ class RunResults {
   /// Final verdicts also go to `session`, which outlives this.
   void contribute_to(SessionContribution& session) { session_ = &session; }
   /// Whether results are written in a thread of their own, RunOutputs::thread.
-  std::launch thread() const { return thread_; }
+  std::launch thread() const { return writing_.policy(); }
 
   /// @name Results of chunks
   /// In the place of take_newest() and take_final(), in the order of the scans. The caller writes
@@ -140,7 +141,6 @@ class RunResults {
  private:
   const Recording& recording_;
   ScanRange range_;
-  std::launch thread_;
   LabelFiles final_labels_;
   std::optional<LabelWriter> online_labels_;
   std::optional<CleanWriter> clean_scans_;
@@ -157,8 +157,8 @@ class RunResults {
   std::size_t finished_ = 0;
   std::uint64_t points_ = 0;
   LabelCounts labels_;
-  JudgedScan judged_;  // the writing thread's, while writing_ is valid
-  std::future<void> writing_;
+  JudgedScan judged_;  // the writing thread's until writing_.wait()
+  Background writing_;
 
   void write_final(const RecordedScan& scan, const ScanVerdict& verdict);
 };

@@ -1,0 +1,56 @@
+#include "threads/background.hpp"
+
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include "support/catch.hpp"
+
+namespace dynains {
+
+TEST_CASE("background tasks run one after the other in one other thread") {
+  Background background;
+  std::vector<std::thread::id> threads;
+  for (int i = 0; i < 100; ++i) {
+    background.begin([&] { threads.push_back(std::this_thread::get_id()); });
+    CHECK(background.is_busy());
+    background.wait();
+    CHECK_FALSE(background.is_busy());
+  }
+  REQUIRE(threads.size() == 100);
+  CHECK(threads == std::vector<std::thread::id>(100, threads.front()));
+  CHECK(threads.front() != std::this_thread::get_id());
+}
+
+TEST_CASE("a deferred task runs in the thread that waits for it") {
+  Background background(std::launch::deferred);
+  std::thread::id thread;
+  background.begin([&] { thread = std::this_thread::get_id(); });
+  CHECK(thread == std::thread::id());
+  background.wait();
+  CHECK(thread == std::this_thread::get_id());
+}
+
+TEST_CASE("the exception of a background task comes to the one who waits, once") {
+  const auto policy = GENERATE(std::launch::async, std::launch::deferred);
+  Background background(policy);
+  background.wait();
+  background.begin([] { throw std::runtime_error("no disk"); });
+  CHECK_THROWS_WITH(background.wait(), "no disk");
+  CHECK_NOTHROW(background.wait());
+  int done = 0;
+  background.begin([&] { ++done; });
+  background.wait();
+  CHECK(done == 1);
+}
+
+TEST_CASE("the end of a background waits for its task") {
+  int done = 0;
+  {
+    Background background;
+    background.begin([&] { ++done; });
+  }
+  CHECK(done == 1);
+}
+
+}  // namespace dynains
