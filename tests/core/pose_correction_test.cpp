@@ -245,7 +245,7 @@ double last_position(int doubtful, double error) {
   PoseCorrection correction(kTolerance);
   correction.begin_epoch(Eigen::Isometry3d::Identity());
   for (int scan = 0; scan < doubtful + 2; ++scan) {
-    const auto seed = static_cast<std::uint64_t>(100 * scan);
+    const std::uint64_t seed = 100 * static_cast<std::uint64_t>(scan);
     const bool is_first = scan == 0, is_last = scan == doubtful + 1;
     GroundSplit split = corridor(seed, 0.0F, 0.0F, false);
     if (!is_last) add_wall_across(seed + 1, 8.5F, 0.9F, split);
@@ -269,14 +269,16 @@ TEST_CASE("a scan in doubt by more than 10 cm is left out of the planes, but nev
 
 // A plane needs six points. Other scans than the first give every second of so many points.
 TEST_CASE("all points of the first scan make its planes") {
-  const int points_per_voxel = GENERATE(5, 6);
+  const std::size_t points_per_voxel = GENERATE(std::size_t{5}, std::size_t{6});
+  constexpr std::size_t kVoxels = 90;  // along each side
   GroundSplit split;
-  split.resize(static_cast<std::size_t>(90 * 90 * points_per_voxel));
+  split.resize(kVoxels * kVoxels * points_per_voxel);
   Random random(9);
   for (std::size_t i = 0; i < split.count; ++i) {
-    const auto voxel = static_cast<int>(i) / points_per_voxel;
-    split.points.x[i] = static_cast<float>(voxel % 90 - 45) + random.uniform_float(0.1, 0.9);
-    split.points.y[i] = static_cast<float>(voxel / 90 - 45) + random.uniform_float(0.1, 0.9);
+    const std::size_t voxel = i / points_per_voxel;
+    const std::size_t row = voxel / kVoxels, column = voxel % kVoxels;
+    split.points.x[i] = static_cast<float>(row) - 45.0F + random.uniform_float(0.1, 0.9);
+    split.points.y[i] = static_cast<float>(column) - 45.0F + random.uniform_float(0.1, 0.9);
     split.points.z[i] = -1.6F;
   }
   PoseCorrection correction(kTolerance);
