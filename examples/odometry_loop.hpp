@@ -46,8 +46,8 @@ class RefinedOdometry {
  private:
   static dynains::DynaInsRemover::Config without_map() {
     dynains::DynaInsRemover::Config config;
-    config.build_map = false;               // pushed poses are not final
-    config.evidence.pose_tolerance = 0.01;  // m; motions of odometries add up
+    config.build_map = false;                // pushed poses are not final
+    config.evidence.pose_tolerance = 0.003;  // m; small errors of single motions count, too
     return config;
   }
 

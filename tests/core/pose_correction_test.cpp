@@ -226,6 +226,70 @@ TEST_CASE("one object alone does not decide about a direction") {
   }
 }
 
+// Adds a wall across the corridor at `x` (m), 2,000 points.
+void add_wall_across(std::uint64_t seed, float x, float half_width, GroundSplit& split) {
+  Random random(seed);
+  const std::size_t begin = split.count;
+  split.resize(begin + 2000);
+  for (std::size_t i = begin; i < split.count; ++i) {
+    split.points.x[i] = x + 0.01F * static_cast<float>(normal(random));
+    split.points.y[i] = random.uniform_float(-half_width, half_width);
+    split.points.z[i] = random.uniform_float(-1.5, 0.9);
+  }
+}
+
+// Position along the corridor that is found for the last scan. One object alone gives the position
+// of the earlier scans. `doubtful` scans with walls across the corridor are pushed wrong by `error`
+// (m), and so are their walls if they are in the planes.
+double last_position(int doubtful, double error) {
+  PoseCorrection correction(kTolerance);
+  correction.begin_epoch(Eigen::Isometry3d::Identity());
+  for (int scan = 0; scan < doubtful + 2; ++scan) {
+    const std::uint64_t seed = 100 * static_cast<std::uint64_t>(scan);
+    const bool is_first = scan == 0, is_last = scan == doubtful + 1;
+    GroundSplit split = corridor(seed, 0.0F, 0.0F, false);
+    if (!is_last) add_wall_across(seed + 1, 8.5F, 0.9F, split);
+    for (const float x : {-22.5F, -15.5F, 15.5F, 22.5F}) {
+      if (!is_first) add_wall_across(seed + 2, x, 3.5F, split);
+    }
+    const double pushed_x = is_first || is_last ? 0.0 : error;
+    const Eigen::Isometry3d T =
+        correction.correct(Eigen::Isometry3d(Eigen::Translation3d(pushed_x, 0.0, 0.0)), split);
+    if (is_last) return T.translation().x();
+    correction.insert(T, split, {});
+  }
+  return 0.0;
+}
+
+TEST_CASE("a scan in doubt by more than 10 cm is left out of the planes, but never two in a row") {
+  CHECK(last_position(1, 0.07) == Approx(0.07).margin(0.01));
+  CHECK(last_position(1, 0.15) == Approx(0.0).margin(0.01));
+  CHECK(last_position(2, 0.15) == Approx(0.15).margin(0.01));
+}
+
+// A plane needs six points. Other scans than the first give every second of so many points.
+TEST_CASE("all points of the first scan make its planes") {
+  const std::size_t points_per_voxel = GENERATE(std::size_t{5}, std::size_t{6});
+  constexpr std::size_t kVoxels = 90;  // along each side
+  GroundSplit split;
+  split.resize(kVoxels * kVoxels * points_per_voxel);
+  Random random(9);
+  for (std::size_t i = 0; i < split.count; ++i) {
+    const std::size_t voxel = i / points_per_voxel;
+    const std::size_t row = voxel / kVoxels, column = voxel % kVoxels;
+    split.points.x[i] = static_cast<float>(row) - 45.0F + random.uniform_float(0.1, 0.9);
+    split.points.y[i] = static_cast<float>(column) - 45.0F + random.uniform_float(0.1, 0.9);
+    split.points.z[i] = -1.6F;
+  }
+  PoseCorrection correction(kTolerance);
+  correction.begin_epoch(Eigen::Isometry3d::Identity());
+  correction.insert(Eigen::Isometry3d::Identity(), split, {});
+  const Eigen::Isometry3d T =
+      correction.correct(Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, 0.1)), split);
+  CHECK(correction.residual().has_value() == (points_per_voxel == 6));
+  CHECK(T.translation().z() == Approx(points_per_voxel == 6 ? 0.0 : 0.1).margin(0.01));
+}
+
 TEST_CASE("an error of one pose alone does not last") {
   const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 8);
   PoseCorrection correction(kTolerance);

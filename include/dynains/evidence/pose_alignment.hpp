@@ -48,6 +48,7 @@ struct Alignment {
   /// Root mean square of the change of the distances between points and planes by the supported
   /// step, m. Unlike the change of the pose, it does not grow in directions without information.
   double change = 0.0;
+  double doubt = 0.0;  ///< length of the translation in `found` that is not supported, m
 };
 
 /// Aligns scans with planes.
@@ -86,6 +87,9 @@ class PlaneAligner {
     collect_sectors(points, kScale);
     result.supported = support_.supported(result.found, equations);
     result.change = equations.change(result.supported);
+    result.doubt =
+        std::hypot(result.found[0] - result.supported[0], result.found[1] - result.supported[1],
+                   result.found[2] - result.supported[2]);
     result.T_map_sensor = moved(T_guess, result.supported);
     return result;
   }
@@ -130,7 +134,7 @@ class PlaneAligner {
   // weigh at most as much as kMost points.
   template <class Add>
   void weigh_matches(double scale, Add&& add) const {
-    constexpr double kMost = 20.0;
+    constexpr double kMost = 8.0;
     for (const Match& match : matches_) {
       const double(&n)[3] = match.plane->normal;
       const double(&arm)[3] = match.arm;

@@ -49,6 +49,7 @@ class PoseCorrection {
     offset_.reset();
     open_ = {};
     residual_.reset();
+    is_doubtful_ = was_left_out_ = false;
   }
 
   /// Pose of a scan for comparisons with other scans. `T_world_level`, `split`: pushed pose and
@@ -56,7 +57,7 @@ class PoseCorrection {
   Eigen::Isometry3d correct(const Eigen::Isometry3d& T_world_level, const GroundSplit& split) {
     if (!is_active()) return T_world_level;
     residual_.reset();
-    is_lost_ = false;
+    is_lost_ = is_doubtful_ = false;
     const Eigen::Isometry3d T_pushed = detail::composed(T_origin_world_, T_world_level);
     const Eigen::Isometry3d T_guess = offset_ ? detail::composed(*offset_, T_pushed) : T_pushed;
     correction_ = offset_;
@@ -75,13 +76,18 @@ class PoseCorrection {
         detail::composed(*correction_, detail::composed(T_origin_world_, T_world_frame)));
   }
 
-  /// Adds the static points of a scan to the planes. `T_world_level`: result of correct().
-  /// `moving`: by non-ground point, 1 for a point that may move, else 0; empty if no point does.
+  /// Adds the static points of a scan to the planes, or leaves it out if its pose is in doubt, but
+  /// never two in a row. `T_world_level`: result of correct(). `moving`: by non-ground point, 1 for
+  /// a point that may move, else 0; empty if no point does.
   void insert(const Eigen::Isometry3d& T_world_level, const GroundSplit& split,
               Span<const std::uint8_t> moving) {
     if (!is_active()) return;
+    was_left_out_ = is_doubtful_ && !was_left_out_;
+    if (was_left_out_) return;
     const Eigen::Isometry3d T = detail::composed(T_origin_world_, T_world_level);
-    const std::size_t wanted = inserted_ < kFirstScans ? kFirstInserted : kInserted;
+    const std::size_t wanted = inserted_ == 0            ? split.count + 1  // all points
+                               : inserted_ < kFirstScans ? kFirstInserted
+                                                         : kInserted;
     ++inserted_;
     planes_.begin_scan();
     VoxelPlanes::Block block;
@@ -105,10 +111,11 @@ class PoseCorrection {
   static constexpr std::size_t kSelected = 3000;        // points that are aligned
   static constexpr std::size_t kMostSelected = 3072;    // with padding
   static constexpr std::size_t kInserted = 12000;       // points of a scan in the planes
-  static constexpr std::size_t kFirstInserted = 24000;  // the same for the first scans
+  static constexpr std::size_t kFirstInserted = 24000;  // the same for the scans after the first
   static constexpr std::size_t kFirstScans = 5;
   static constexpr std::size_t kFewestMatches = 100;
-  static constexpr double kLeastInliers = 0.6;               // ratio to the matches
+  static constexpr double kMostDoubt = 0.1;     // m, of the translation of an inserted scan
+  static constexpr double kLeastInliers = 0.6;  // ratio to the matches
   static constexpr double kNearest = 3.0, kFarthest = 50.0;  // m, horizontal
 
   bool is_active() const { return tolerance_ > 0.0; }
@@ -152,6 +159,7 @@ class PoseCorrection {
     const Eigen::Isometry3d T_motion =
         detail::composed(detail::inverted(T_origin_pushed_), T_pushed);
     residual_ = difference(detail::composed(T_origin_newest_, T_motion), alignment.T_map_sensor);
+    is_doubtful_ = alignment.doubt > kMostDoubt;
     open_ = alignment.found;
     if (alignment.change > tolerance_) {
       T_newest = alignment.T_map_sensor;
@@ -207,6 +215,8 @@ class PoseCorrection {
   Eigen::Isometry3d T_origin_pushed_ = Eigen::Isometry3d::Identity();  // as pushed
   std::optional<PoseResidual> residual_;
   bool is_lost_ = false;
+  bool is_doubtful_ = false;   // whether the pose of the last scan may be wrong
+  bool was_left_out_ = false;  // whether the last insert() left its scan out
   PointBuffer selected_;
   detail::PlaneAligner aligner_;
 };
