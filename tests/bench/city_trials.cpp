@@ -42,11 +42,11 @@ PointBuffer points_of(const simulation::SimulatedScan& scan) {
   return points;
 }
 
-/// The objects whose points a day measured at different places, up to the range of contributions.
-/// Labels do not tell this: they call a car moving that drove off out of sight.
-class MovedObjects {
+/// Where the objects were whose points a day measured, up to the range of contributions. Labels do
+/// not tell this: they call a car moving that drove off out of sight.
+class MeasuredObjects {
  public:
-  void add(const simulation::SimulatedScan& scan) {
+  void add(const simulation::SimulatedScan& scan, std::uint32_t number) {
     constexpr float kRange = static_cast<float>(SessionPointsConfig().contribution_range);
     std::set<std::uint32_t> measured;
     for (std::size_t i = 0; i < scan.labels.size(); ++i) {
@@ -57,17 +57,46 @@ class MovedObjects {
     }
     for (const simulation::ObjectState& object : scan.objects) {
       if (measured.count(object.instance) == 0) continue;
-      const Eigen::Vector3d at = object.T_world_object.translation();
-      const Eigen::Vector3d& first = first_.emplace(object.instance, at).first->second;
-      if ((at - first).head<2>().norm() > kMovedWay) moved_.insert(object.instance);
+      places_[object.instance].push_back({number, object.T_world_object.translation().head<2>()});
     }
   }
-  bool contains(std::uint32_t label) const { return moved_.count(instance_of(label)) > 0; }
+
+  /// Whether an object was measured at different places.
+  bool moved(std::uint32_t label) const {
+    const std::vector<Place>* const places = places_of(label);
+    return places != nullptr &&
+           std::any_of(places->begin(), places->end(),
+                       [&](const Place& place) { return is_far(place, places->front()); });
+  }
+
+  /// Whether an object stood where it was in scan `scan` until it was measured for the last time:
+  /// it did not move, or it stopped by then and stood for kLeastStand scans.
+  bool stood_to_the_end(std::uint32_t label, std::uint32_t scan) const {
+    if (!moved(label)) return true;
+    const std::vector<Place>& places = *places_of(label);
+    const Place& last = places.back();
+    const auto stopped = std::find_if(places.rbegin(), places.rend(), [&](const Place& place) {
+                           return is_far(place, last);
+                         }).base();
+    return scan >= stopped->scan && last.scan - stopped->scan >= kLeastStand;
+  }
 
  private:
-  static constexpr double kMovedWay = 0.5;  // m
-  std::map<std::uint32_t, Eigen::Vector3d> first_;
-  std::set<std::uint32_t> moved_;
+  static constexpr double kMovedWay = 0.5;          // m
+  static constexpr std::uint32_t kLeastStand = 30;  // scans: 3 s
+
+  struct Place {
+    std::uint32_t scan;
+    Eigen::Vector2d at;  // m
+  };
+
+  static bool is_far(const Place& a, const Place& b) { return (a.at - b.at).norm() > kMovedWay; }
+  const std::vector<Place>* places_of(std::uint32_t label) const {
+    const auto found = places_.find(instance_of(label));
+    return found == places_.end() ? nullptr : &found->second;
+  }
+
+  std::map<std::uint32_t, std::vector<Place>> places_;  // by instance, in the order of the scans
 };
 
 /// One simulated day.
@@ -75,7 +104,7 @@ struct Day {
   SessionPoints near;  ///< static and moving points, up to the range of contributions
   SessionPoints all;
   std::set<std::uint32_t> changes = {};  ///< changes of the place that stand there
-  MovedObjects moved = {};
+  MeasuredObjects objects = {};
 };
 
 /// Runs over one day and adds it to the city.
@@ -106,7 +135,7 @@ void add_day(const City& city, const simulation::Config& config, Day& day) {
     for (const simulation::ObjectState& object : scan.objects) {
       if (object.instance >= simulation::kFirstChange) day.changes.insert(object.instance);
     }
-    day.moved.add(scan);
+    day.objects.add(scan, static_cast<std::uint32_t>(i));
     const RawPoints<float> points{scan.xyzi.data(), scan.labels.size(), 4};
     const FrameResult frame = remover.push(points, scan.T_world_sensor, scan.time);
     if (frame.finished) take_final(*frame.finished);
@@ -144,7 +173,7 @@ bool is_gone(std::uint32_t label, std::size_t session, const std::vector<Day>& d
   const std::uint32_t instance = instance_of(label);
   if (instance == 0) return false;
   if (instance >= simulation::kFirstChange) return days.back().changes.count(instance) == 0;
-  return session + 1 < days.size() || days.back().moved.contains(label);
+  return session + 1 < days.size() || days.back().objects.moved(label);
 }
 
 constexpr double kNear = 40.0;  // m
@@ -229,7 +258,7 @@ struct DiffPoint {
   bool is_of_change;         ///< of an object that stands in one of both maps
 };
 
-constexpr double kClusterCell = 0.5;  // m
+constexpr double kClusterCell = 0.4;  // m, as ChangeClusters with the grid of the trials
 
 /// Calls `visit(members)` for the clusters of points in touching cells of kClusterCell.
 template <class Visitor>
@@ -272,7 +301,7 @@ void for_each_cluster(const std::vector<DiffPoint>& points, Visitor&& visit) {
 
 /// Counts the clusters that are larger than 0.5 m; true ones are mostly of objects that stand.
 /// A parked car that stands on one of the two days only is a change, like a container. So is a car
-/// that waits for as long as the sensor sees it.
+/// that stands, or has stopped, for as long as the sensor sees it: nobody has seen it drive off.
 void judge_clusters(const std::vector<DiffPoint>& points, Count& count) {
   constexpr double kLeastExtent = 0.5;  // m
   for_each_cluster(points, [&](const std::vector<std::uint32_t>& cluster) {
@@ -305,8 +334,8 @@ void judge_diff(const City& city, const std::vector<Day>& days, Result& result) 
     count(last, came);
     const CityChanges changes = map.changes(tile, history, 0, last);
     const auto diff_point = [&](const CityPoint& p) {
-      const bool stands =
-          instance_of(p.point.label) != 0 && !days[p.session].moved.contains(p.point.label);
+      const bool stands = instance_of(p.point.label) != 0 &&
+                          days[p.session].objects.stood_to_the_end(p.point.label, p.point.scan);
       return DiffPoint{map.position(tile, p.point), stands};
     };
     for (const CityPoint& p : changes.added) {
