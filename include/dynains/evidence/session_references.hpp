@@ -54,7 +54,7 @@ inline std::uint8_t* pack_image(const RangeImage& image, std::uint8_t* to) {
     for (std::int32_t row = 0; row < grid.rows; ++row) {
       const RangeImage::Cell* const cells = &image[grid.cell(row, 0)];
       const auto code_of = [](std::int32_t step) {
-        return static_cast<std::uint32_t>(step) << 1U ^ static_cast<std::uint32_t>(step >> 31);
+        return static_cast<std::uint32_t>(step) << 1U ^ (step < 0 ? ~0U : 0U);
       };
       codes[0] = code_of(cells[0].*value_of);
       for (std::size_t i = 1; i < codes.size(); ++i) {

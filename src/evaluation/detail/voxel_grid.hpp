@@ -45,8 +45,8 @@ class VoxelGrid {
     const double i = floor(x / edge_) - anchor_[0];
     const double j = floor(y / edge_) - anchor_[1];
     const double k = floor(z / edge_) - anchor_[2];
-    const bool is_inside = is_number(i) & is_number(j) & is_number(k);
-    const auto outside = static_cast<VoxelKey>(static_cast<std::int64_t>(is_inside) - 1);
+    const bool is_i = is_number(i), is_j = is_number(j), is_k = is_number(k);
+    const auto outside = static_cast<VoxelKey>(static_cast<std::int64_t>(is_i & is_j & is_k) - 1);
     return outside | bits(i) << (2 * kVoxelKeyBits) | bits(j) << kVoxelKeyBits | bits(k);
   }
 
