@@ -104,9 +104,9 @@ CityChanges CityMap::changes(const TileIndex& tile, const TileHistory& history, 
   });
   history.for_each_standing(
       b, [&](std::size_t session, std::size_t i) { sort(session, i, before, added); });
-  // A point was added if beams of the earlier sessions passed through its place. Places that they
-  // did not see are no changes.
-  added.keep(free_before(tile, a, added.points));
+  // A point was added if beams of a session before its own passed through its place. Places that
+  // none of them saw are no changes.
+  added.keep(free_before(tile, added.points, added.sessions));
 
   CityChanges changes;
   changes.removed = removed.selected(clusters);
@@ -114,22 +114,26 @@ CityChanges CityMap::changes(const TileIndex& tile, const TileHistory& history, 
   return changes;
 }
 
-std::vector<bool> CityMap::free_before(const TileIndex& tile, std::uint32_t last,
-                                       const std::vector<ChangedPoint>& points) const {
+std::vector<bool> CityMap::free_before(const TileIndex& tile,
+                                       const std::vector<ChangedPoint>& points,
+                                       const std::vector<std::uint32_t>& sessions) const {
+  if (points.empty()) return {};
+  const std::uint32_t end = *std::max_element(sessions.begin(), sessions.end());
+  // The points are session 0 here, and session i of the map is session i + 1.
   TileHistory reversed(city_.grid(), config_);
   std::vector<SessionPoint> places;
   places.reserve(points.size());
   for (const ChangedPoint& changed : points) places.push_back(changed.point);
   reversed.add_session(std::move(places));
-  for (std::size_t session = 0; session <= last; ++session) reversed.add_session({});
+  for (std::uint32_t session = 0; session < end; ++session) reversed.add_session({});
   reversed.end_session();
-  for (std::size_t session = 0; session <= last; ++session) {
+  for (std::uint32_t session = 0; session < end; ++session) {
     revise(reversed, tile, session);
     reversed.end_session();
   }
   std::vector<bool> is_free;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    is_free.push_back(!reversed.stands(0, i, last + 1));
+    is_free.push_back(!reversed.stands(0, i, sessions[i]));
   }
   return is_free;
 }

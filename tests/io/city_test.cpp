@@ -255,6 +255,28 @@ TEST_CASE("a city: changes are objects that came or left") {
   CHECK_THROWS_AS(map.changes(map.tiles().front(), 1, 1), ConfigError);
 }
 
+TEST_CASE("a city: an object has come if a session before its own saw its place empty") {
+  // On monday, a wall hides the place of the container.
+  const test::StreetBox wall = {{-40, -3.2, 0}, {40, -3.0, 5}, 50};
+  const bool is_seen_on_tuesday = GENERATE(false, true);
+  CAPTURE(is_seen_on_tuesday);
+  const std::vector<test::StreetBox> tuesday =
+      is_seen_on_tuesday ? std::vector<test::StreetBox>() : std::vector{wall};
+  const test::TemporaryFolder folder;
+  const City city = city_of(folder.path() / "city",
+                            {{"monday", 0.0, {wall}}, {"tuesday", 86400.0, tuesday}, kDays[2]});
+  const CityMap map(city);
+  std::size_t added = 0;
+  for (const TileIndex& tile : map.tiles()) {
+    for (const CityPoint& p : map.changes(tile, 0, 2).added) {
+      added += p.point.label == kContainer ? 1 : 0;
+    }
+  }
+  CHECK(label_counts(city)[kContainer] > 100);
+  CHECK((added > 100) == is_seen_on_tuesday);
+  CHECK((added == 0) != is_seen_on_tuesday);
+}
+
 TEST_CASE("clusters of changes: small ones, parts and what was seen too briefly are none") {
   const SessionGrid grid;
   // A wall of points 0.2 m apart, 2 m long and 1.6 m high.

@@ -62,9 +62,10 @@ class CityMap {
   }
 
  private:
-  // Whether beams of sessions 0 to `last` passed through the places of points.
-  std::vector<bool> free_before(const TileIndex& tile, std::uint32_t last,
-                                const std::vector<ChangedPoint>& points) const;
+  // Whether beams of sessions before its own passed through the place of a point. `sessions`:
+  // session of each point.
+  std::vector<bool> free_before(const TileIndex& tile, const std::vector<ChangedPoint>& points,
+                                const std::vector<std::uint32_t>& sessions) const;
   void revise(TileHistory& history, const TileIndex& tile, std::size_t session) const;
 
   City city_;
