@@ -150,7 +150,7 @@ std::optional<CheckedMotion> complete(ChainScan& a, ChainScan& b, const Registra
   for (const Eigen::Vector3d& direction : by_planes.uncertain) {
     auto found = register_along(a, b, by_planes.T_a_b, direction, farthest);
     if (!found) continue;
-    // What is in sight without the motion shows the open direction less well.
+    // The planes that meet at the found pose determine the open direction better.
     if (const auto again = register_along(a, b, found->registration.T_a_b,
                                           found->registration.uncertain[0], kNear)) {
       found = again;
