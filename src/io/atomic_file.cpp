@@ -9,7 +9,6 @@
 #include <array>
 #include <cerrno>
 #include <cstdint>
-#include <streambuf>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -17,6 +16,7 @@
 #include <vector>
 
 #include "failure.hpp"
+#include "file_buffer.hpp"
 
 namespace dynains {
 namespace {
@@ -123,77 +123,6 @@ LockState lock_state_of(const fs::path& path) {
 
 }  // namespace
 
-/// A stream buffer with the error of a failed write and with sync, which std::filebuf has not.
-class AtomicFile::Buffer : public std::streambuf {
- public:
-  explicit Buffer(int descriptor) : descriptor_(descriptor), bytes_(std::size_t{1} << 16) {
-    setp(bytes_.data(), bytes_.data() + bytes_.size());
-  }
-  ~Buffer() override { close(); }
-  Buffer(const Buffer&) = delete;
-  Buffer& operator=(const Buffer&) = delete;
-
-  /// errno of the first failure, 0 if none.
-  int error() const { return error_; }
-
-  void flush(Sync when) {
-    if (sync() != 0 || when == Sync::kLater) return;
-    // Without this, a power cut after the rename can leave an empty file under the final name.
-    // Some file systems cannot sync single files (EINVAL); the rename is still atomic there.
-    if (::fsync(descriptor_) != 0 && errno != EINVAL) error_ = errno;
-  }
-
-  /// Some file systems report a failed write only to close(). The lock stays with descriptor_.
-  void check_close() {
-    const int copy = ::fcntl(descriptor_, F_DUPFD_CLOEXEC, 0);
-    if (copy >= 0 && ::close(copy) != 0 && error_ == 0) error_ = errno;
-  }
-
-  void close() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-    descriptor_ = -1;
-  }
-
- protected:
-  int_type overflow(int_type c) override {
-    if (sync() != 0) return traits_type::eof();
-    if (!traits_type::eq_int_type(c, traits_type::eof())) sputc(traits_type::to_char_type(c));
-    return traits_type::not_eof(c);
-  }
-
-  /// Writes an array that is larger than the buffer directly, without a copy.
-  std::streamsize xsputn(const char* data, std::streamsize count) override {
-    if (count < epptr() - pbase()) return std::streambuf::xsputn(data, count);
-    return sync() == 0 && write_all(data, data + count) ? count : 0;
-  }
-
-  /// Absolute positions only: enough to complete a header at the end.
-  pos_type seekpos(pos_type position, std::ios_base::openmode) override {
-    if (sync() != 0 || ::lseek(descriptor_, position, SEEK_SET) < 0) return pos_type(off_type(-1));
-    return position;
-  }
-
-  int sync() override {
-    const bool is_written = write_all(pbase(), pptr());
-    setp(bytes_.data(), bytes_.data() + bytes_.size());
-    return is_written ? 0 : -1;
-  }
-
- private:
-  bool write_all(const char* next, const char* end) {
-    while (error_ == 0 && next != end) {
-      const ssize_t count = ::write(descriptor_, next, static_cast<std::size_t>(end - next));
-      if (count > 0) next += count;
-      if (count < 0 && errno != EINTR) error_ = errno;
-    }
-    return error_ == 0;
-  }
-
-  int descriptor_;
-  int error_ = 0;
-  std::vector<char> bytes_;
-};
-
 AtomicFile::AtomicFile(fs::path target)
     : target_(follow_links(std::move(target))), stream_(nullptr) {
   std::error_code error;
@@ -203,7 +132,7 @@ AtomicFile::AtomicFile(fs::path target)
   }
   OpenTemporary file = open_temporary(target_);
   temporary_ = std::move(file.path);
-  buffer_ = std::make_unique<Buffer>(file.descriptor);
+  buffer_ = std::make_unique<FileBuffer>(file.descriptor);
   stream_.rdbuf(buffer_.get());
 }
 
@@ -214,7 +143,8 @@ AtomicFile::~AtomicFile() {
 }
 
 void AtomicFile::prepare(Sync sync) {
-  buffer_->flush(sync);
+  buffer_->pubsync();
+  if (sync == Sync::kNow) buffer_->sync_disk();
   buffer_->check_close();
   if (buffer_->error() != 0)
     fail_by_system(target_, "cannot be written to the end", buffer_->error());

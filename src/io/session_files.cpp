@@ -239,24 +239,40 @@ fs::path foreign_entry(const fs::path& folder) {
 }
 
 void remove_session_files(const fs::path& folder) {
+  fs::path kept;
+  std::error_code first_error;
+  const auto note = [&](const fs::path& path, const std::error_code& error) {
+    if (!error || first_error) return;
+    kept = path;
+    first_error = error;
+  };
   std::error_code error;
-  if (fs::is_symlink(folder, error)) return;
+  const auto remove = [&](const fs::path& path) {
+    fs::remove(path, error);
+    if (error != std::errc::directory_not_empty) note(path, error);
+  };
+  const auto is_folder = [&](const fs::path& path) {
+    return fs::is_directory(fs::symlink_status(path, error));
+  };
+  if (!is_folder(folder)) return;
   const fs::path tiles = folder / kTileFolder;
-  if (fs::is_directory(fs::symlink_status(tiles, error))) {
+  if (is_folder(tiles)) {
     std::vector<fs::path> files;
     for (fs::directory_iterator entry(tiles, error), end; !error && entry != end;
          entry.increment(error)) {
-      if (entry->path().extension() == kTileEnd && !entry->is_directory(error)) {
-        files.push_back(entry->path());
-      }
+      if (entry->path().extension() == kTileEnd) files.push_back(entry->path());
     }
-    for (const fs::path& file : files) fs::remove(file, error);
-    fs::remove(tiles, error);
+    note(tiles, error);
+    for (const fs::path& file : files) {
+      if (!is_folder(file)) remove(file);
+    }
+    remove(tiles);
   }
   for (const char* const name : {kReferenceFile, kSessionFile}) {
-    if (!fs::is_directory(folder / name, error)) fs::remove(folder / name, error);
+    if (!is_folder(folder / name)) remove(folder / name);
   }
-  fs::remove(folder, error);
+  remove(folder);
+  if (first_error) fail_by_system(kept, "cannot be removed", first_error.value());
 }
 
 #if defined(DYNAINS_HAS_JSON)

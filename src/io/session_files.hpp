@@ -49,7 +49,7 @@ bool is_staging_name(const std::string& name);
 /// A new folder of that kind for a session. Throws IoError.
 std::filesystem::path make_staging(const std::filesystem::path& city, const std::string& session);
 /// Removes the files of a session from a folder, and the folder. Foreign files stay, and the folder
-/// with them. Throws nothing.
+/// with them. What can be removed is removed; then throws IoError if something of ours stays.
 void remove_session_files(const std::filesystem::path& folder);
 /// Path of the first entry of a folder that is not part of a session; empty if there is none.
 std::filesystem::path foreign_entry(const std::filesystem::path& folder);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <fstream>
 #include <limits>
 #include <string>
 #include <system_error>
@@ -16,6 +15,7 @@
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/io/folder_lock.hpp"
 #include "failure.hpp"
+#include "new_file.hpp"
 #include "session_files.hpp"
 
 namespace dynains {
@@ -37,6 +37,8 @@ void remove_stale_staging(const fs::path& city) {
       session_files::remove_session_files(folder);
     } catch (const UsageError&) {
       // Its writer lives.
+    } catch (const IoError&) {
+      // Files of another user, for example: they do not stop this writer.
     }
   }
 }
@@ -68,32 +70,27 @@ void exchange(const fs::path& a, const fs::path& b) {
   fail_by_system(b, "cannot be replaced in one step; drop the session and add it again", errno);
 }
 
-void check_stream(std::ofstream& file, const fs::path& path) {
-  file.flush();
-  if (!file) fail(path, "cannot be written to the end");
-}
-
-void write_file(const fs::path& path, const std::string& bytes) {
-  std::ofstream file(path, std::ios::binary);
-  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  check_stream(file, path);
-}
-
 }  // namespace
 
 /// The staging folder of a session.
 class SessionWriter::Files {
  public:
   Files(const fs::path& city, const std::string& session)
-      : folder_(session_files::make_staging(city, session)), lock_(folder_) {
+      : folder_(session_files::make_staging(city, session)),
+        lock_(folder_),
+        references_(reference_path()) {
     std::error_code error;
     if (!fs::create_directory(folder_ / session_files::kTileFolder, error)) {
       fail_by_system(folder_, "cannot be written", error.value());
     }
-    references_.open(reference_path(), std::ios::binary);
   }
   ~Files() {
-    if (!is_committed_) session_files::remove_session_files(folder_);
+    if (is_committed_) return;
+    try {
+      session_files::remove_session_files(folder_);
+    } catch (const IoError&) {
+      // The next writer removes the rest.
+    }
   }
   Files(const Files&) = delete;
   Files& operator=(const Files&) = delete;
@@ -101,10 +98,10 @@ class SessionWriter::Files {
   void add_reference(const RangeImageGrid& grid, const SessionReference& reference) {
     if (!has_header_) {
       const std::string header = session_files::reference_header(grid);
-      write_reference(header);
+      references_.write(header);
       has_header_ = true;
     }
-    write_reference(session_files::reference_record(reference, record_));
+    references_.write(session_files::reference_record(reference, record_));
   }
   void write_tile(const TileIndex& tile, const std::string& bytes) {
     write_file(tile_path(tile), bytes);
@@ -114,14 +111,12 @@ class SessionWriter::Files {
   }
   /// Writes the rest to the disk.
   void finish(const std::string& session_text) {
-    check_stream(references_, reference_path());
     references_.close();
     write_file(folder_ / session_files::kSessionFile, session_text);
     sync_files(folder_);
   }
   void commit(const fs::path& target, bool replaces) {
     if (replaces) {
-      // The staging folder has the earlier session then, which the destructor removes.
       exchange(folder_, target);
     } else {
       std::error_code error;
@@ -130,6 +125,8 @@ class SessionWriter::Files {
       is_committed_ = true;
     }
     sync_files(target);
+    // The staging folder has the earlier session now.
+    if (replaces) session_files::remove_session_files(folder_);
   }
 
  private:
@@ -137,14 +134,10 @@ class SessionWriter::Files {
   fs::path tile_path(const TileIndex& tile) const {
     return folder_ / session_files::kTileFolder / session_files::tile_name(tile);
   }
-  void write_reference(Span<const char> bytes) {
-    references_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    if (!references_) fail(reference_path(), "cannot be written to the end");
-  }
 
   fs::path folder_;
   FolderLock lock_;
-  std::ofstream references_;
+  NewFile references_;
   std::vector<char> record_;
   bool has_header_ = false;
   bool is_committed_ = false;

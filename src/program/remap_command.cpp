@@ -163,6 +163,9 @@ class NewMap {
       throw IoError(path_.string() +
                     ": is in the way, and was not written by dynains remap; move it away");
     }
+    // Before the file of this command: a file system without locks does not tell which is whose.
+    out.remove_temporaries();
+    remove_leftovers(folder, [](const std::string& name) { return name == kRemappedMap; });
     writer_ = open_map(path_, recording, range, RunOutputs());
   }
 
@@ -183,7 +186,6 @@ class NewMap {
     listing.files.insert(kRemappedMap);
     report.erase(kField);
     out_.mark(report, listing);
-    out_.remove_temporaries();
     publish_more();
     writer_->commit();
     report[kField] = description;
@@ -212,7 +214,9 @@ InputFiles inputs_of(const Recording& corrected, const std::optional<Recording>&
 
 void check_run_folder(const fs::path& folder) {
   std::error_code error;
-  if (fs::is_directory(folder, error)) return;
+  const fs::file_type type = fs::status(folder, error).type();
+  if (type == fs::file_type::directory) return;
+  if (type == fs::file_type::none) throw IoError(folder.string() + ": " + error.message());
   throw IoError(folder.string() + ": is not a folder; expected the results of dynains run");
 }
 

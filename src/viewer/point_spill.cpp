@@ -23,9 +23,7 @@ void PointSpill::add(List& list, const TilePoint& point) {
   std::ostream& stream = file_.stream();
   stream.seekp(static_cast<std::streamoff>(block * kBlock * sizeof(TilePoint)));
   stream.write(reinterpret_cast<const char*>(list.rest_.data()), kBlock * sizeof(TilePoint));
-  if (!stream) {
-    throw IoError(target_.string() + ": its temporary file cannot be written to the end");
-  }
+  if (!stream) file_.prepare(AtomicFile::Sync::kLater);  // throws the cause
   list.blocks_.push_back(block);
   list.rest_.clear();
 }

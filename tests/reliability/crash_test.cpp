@@ -56,7 +56,7 @@ bool needs_syncs(const Rehearsal& rehearsal) {
                      [&](const State& state) { return !rehearsal.problem(state.tree).empty(); });
 }
 
-void check(const Scenario& scenario) {
+void check_crashes(const Scenario& scenario) {
   Rehearsal rehearsal(scenario);
   const CrashModel model(rehearsal.before(), rehearsal.events(), rehearsal.root());
   // A difference means that the shim missed a change.
@@ -79,18 +79,18 @@ void check(const Scenario& scenario) {
 
 }  // namespace
 
-TEST_CASE("power cut during a run") { check(fresh_run({})); }
+TEST_CASE("power cut during a run") { check_crashes(fresh_run({})); }
 
 TEST_CASE("power cut during a run that writes all outputs") {
-  check(fresh_run({"--write-online", "--write-clean"}));
+  check_crashes(fresh_run({"--write-online", "--write-clean"}));
 }
 
 TEST_CASE("power cut during a run with its map in another folder") {
-  check(fresh_run({"--map", "/maps/map.ply"}));
+  check_crashes(fresh_run({"--map", "/maps/map.ply"}));
 }
 
 TEST_CASE("power cut during a run with its map on the disk") {
-  check(fresh_run({"--map-memory", "0"}));
+  check_crashes(fresh_run({"--map-memory", "0"}));
 }
 
 namespace {
@@ -100,28 +100,30 @@ const std::vector<std::string> kChunks = {"--chunk", "2", "--lookback",        "
 
 }  // namespace
 
-TEST_CASE("power cut during a run in chunks") { check(fresh_run(kChunks)); }
+TEST_CASE("power cut during a run in chunks") { check_crashes(fresh_run(kChunks)); }
 
 TEST_CASE("power cut while a result is replaced by one of chunks") {
-  check(replacing_run({}, kChunks));
+  check_crashes(replacing_run({}, kChunks));
 }
 
-TEST_CASE("power cut while a stopped run is resumed") { check(resumed_run({"--write-clean"})); }
+TEST_CASE("power cut while a stopped run is resumed") {
+  check_crashes(resumed_run({"--write-clean"}));
+}
 
 TEST_CASE("power cut while a result is replaced") {
-  check(replacing_run({"--write-online", "--write-clean"}, {}));
+  check_crashes(replacing_run({"--write-online", "--write-clean"}, {}));
 }
 
 TEST_CASE("power cut while a result with its map in another folder is replaced") {
-  check(replacing_run({"--map", "/maps/map.ply"}, {"--map", "/maps/map.ply"}));
+  check_crashes(replacing_run({"--map", "/maps/map.ply"}, {"--map", "/maps/map.ply"}));
 }
 
 TEST_CASE("power cut while a session of a map is moved to corrected poses") {
-  check(moved_session());
+  check_crashes(moved_session());
 }
 
-TEST_CASE("power cut during a simulation") { check(simulation()); }
+TEST_CASE("power cut during a simulation") { check_crashes(simulation()); }
 
-TEST_CASE("power cut while a simulation is replaced") { check(replacing_simulation()); }
+TEST_CASE("power cut while a simulation is replaced") { check_crashes(replacing_simulation()); }
 
 }  // namespace dynains::test

@@ -93,23 +93,23 @@ class FaultTest {
   std::set<std::size_t> states_;  ///< states from which the command was started again
 };
 
-void check(const Scenario& scenario) { FaultTest(scenario).check(); }
+void check_faults(const Scenario& scenario) { FaultTest(scenario).check(); }
 
 }  // namespace
 
 TEST_CASE("every call of a run fails once") {
-  check(fresh_run({"--write-clean", "--config", "/seq/run.cfg"}));
+  check_faults(fresh_run({"--write-clean", "--config", "/seq/run.cfg"}));
 }
 
 TEST_CASE("every call of a run with its map on the disk fails once") {
-  check(fresh_run({"--map-memory", "0"}));
+  check_faults(fresh_run({"--map-memory", "0"}));
 }
 
 TEST_CASE("every call of a run that replaces a result fails once") {
-  check(replacing_run({"--write-clean"}, {"--map", "/maps/map.ply"}));
+  check_faults(replacing_run({"--write-clean"}, {"--map", "/maps/map.ply"}));
 }
 
-TEST_CASE("every call of a run that is resumed fails once") { check(resumed_run({})); }
+TEST_CASE("every call of a run that is resumed fails once") { check_faults(resumed_run({})); }
 
 TEST_CASE(
     "a disk that gets full leaves a moved session and the map of its run both old or both new") {
@@ -133,11 +133,25 @@ TEST_CASE(
   CHECK(failed > 4);
 }
 
-TEST_CASE("every call of a simulation fails once") { check(replacing_simulation()); }
+TEST_CASE("every call of a run that adds a session fails once") { check_faults(added_session()); }
+
+TEST_CASE("every call of a moved session fails once") { check_faults(moved_session()); }
+
+TEST_CASE("a dropped session is out of the map even if its files cannot be removed") {
+  const Arguments command = {"map", "/maps/city", "drop", "seq"};
+  Rehearsal rehearsal({{run_with({"--update", "/maps/city", "--accept-poses"})}, {}, command, {}});
+  const Recorded drop = rehearsal.disturb("remove 1 " + std::to_string(EACCES) + " once");
+  CHECK(drop.outcome.code == 1);
+  CHECK(problem_of_message(drop.outcome.err, EACCES, rehearsal.root()) == "");
+  CHECK(below(rehearsal.before(), "maps/city/seq").size() > 3);
+  CHECK(below(read_tree(rehearsal.root()), "maps/city/seq").empty());
+}
+
+TEST_CASE("every call of a simulation fails once") { check_faults(replacing_simulation()); }
 
 TEST_CASE("every call of an evaluation fails once") {
   const Arguments command = {"eval", "/seq", "/disk/out", "--json", "/maps/eval.json"};
-  check({{run_with({})}, {}, command, command});
+  check_faults({{run_with({})}, {}, command, command});
 }
 
 }  // namespace dynains::test

@@ -222,6 +222,14 @@ inline Scenario replacing_run(const Arguments& earlier, const Arguments& flags) 
   return scenario;
 }
 
+/// A run that adds a session to a map of many sessions.
+inline Scenario added_session() {
+  Scenario scenario = fresh_run({"--update", "/maps/city", "--accept-poses"});
+  scenario.before = {{"run", "/seq", "--out", "/disk/earlier", "--start", "2", "--update",
+                      "/maps/city", "--session", "earlier", "--accept-poses", "--quiet"}};
+  return scenario;
+}
+
 /// remap that moves the session of a run in a map of many sessions.
 inline Scenario moved_session() {
   const Arguments command = {"remap",    "/seq",       "/disk/out", "--poses", "/seq/corrected.txt",

@@ -10,6 +10,8 @@
 
 namespace dynains {
 
+class FileBuffer;
+
 /// Writes a temporary file beside the target, `.NAME.0123456789abcdef.tmp` with random digits.
 /// `commit()` renames it to the target; until then, the target is unchanged. Without a commit, the
 /// destructor removes the temporary file. The temporary file is always created, never opened
@@ -45,11 +47,9 @@ class AtomicFile {
   void commit(Sync sync = Sync::kNow);
 
  private:
-  class Buffer;
-
   std::filesystem::path target_;
   std::filesystem::path temporary_;
-  std::unique_ptr<Buffer> buffer_;
+  std::unique_ptr<FileBuffer> buffer_;
   std::ostream stream_;
   bool committed_ = false;
 };
