@@ -12,8 +12,6 @@
 namespace dynains::test {
 namespace {
 
-using Config = GroundSegmenter::Config;
-
 // For each point of the scan, whether it is ground. Checks that the split is a permutation of the
 // scan.
 std::vector<bool> ground_of(GroundSegmenter& segmenter, PointsView scan) {
@@ -38,7 +36,7 @@ std::vector<bool> ground_of(GroundSegmenter& segmenter, PointsView scan) {
   return result;
 }
 
-std::vector<bool> ground_of(const Config& config, PointsView scan) {
+std::vector<bool> ground_of(const GroundConfig& config, PointsView scan) {
   GroundSegmenter segmenter(config);
   return ground_of(segmenter, scan);
 }
@@ -77,7 +75,7 @@ double share_of_differences(const std::vector<bool>& a, const std::vector<bool>&
 constexpr double kOnBorders = 1e-3;
 
 TEST_CASE("ground equals that of Patchwork in double precision") {
-  GroundSegmenter segmenter(Config::paper());  // one object for all scans, as in the pipeline
+  GroundSegmenter segmenter(GroundConfig::paper());  // one object for all scans, as in the pipeline
   const auto compare = [&](PointsView scan) {
     const std::vector<bool> expected = reference_ground(segmenter.config(), scan);
     const auto ground = std::count(expected.begin(), expected.end(), true);
@@ -91,7 +89,7 @@ TEST_CASE("ground equals that of Patchwork in double precision") {
 }
 
 TEST_CASE("planes are fitted to some points of a patch that has many") {
-  Config config = Config::paper();
+  GroundConfig config = GroundConfig::paper();
   const PointBuffer scan = rough_terrain(7, 400000);
   config.ground_fit_points = 1000000;
   const std::vector<bool> by_all = ground_of(config, scan);
@@ -106,7 +104,7 @@ TEST_CASE("planes are fitted to some points of a patch that has many") {
 
 // All points are below the first plane, but it was fitted to some of them only.
 TEST_CASE("a slope that flattens within its patch is fitted again") {
-  Config config = Config::paper();
+  GroundConfig config = GroundConfig::paper();
   const double depth = (config.ground_max_range - config.ground_min_range) / 8.0;  // outer rings
   const double begin = 0.5 * (config.ground_min_range + config.ground_max_range);
   Random random(3);
@@ -127,7 +125,7 @@ TEST_CASE("a slope that flattens within its patch is fitted again") {
 }
 
 TEST_CASE("ground equals that of Patchwork for other parameters") {
-  Config config;
+  GroundConfig config;
   config.sensor_height = 0.6;
   config.ground_min_range = 2.0;
   config.ground_max_range = 60.0;
@@ -158,7 +156,7 @@ TEST_CASE("patches far above their neighbours are not ground, as in the referenc
     scan.push_back(static_cast<float>(x), static_cast<float>(y),
                    static_cast<float>(-kSensorHeight + 0.02 * x + terrace[place]));
   }
-  Config config = Config::paper();
+  GroundConfig config = GroundConfig::paper();
   const std::vector<bool> patchwork = ground_of(config, scan);
   config.ground_step = 0.5;
   const std::vector<bool> expected = reference_ground(config, scan);
@@ -168,7 +166,7 @@ TEST_CASE("patches far above their neighbours are not ground, as in the referenc
 
 TEST_CASE("a flat floor is ground, pillars and vans are not") {
   const Scan scan = yard_with(van(10.0, 3.0)).scan(sensor_at(0.0), 0.0);
-  const std::vector<bool> ground = ground_of(Config(), buffer_of(scan.points));
+  const std::vector<bool> ground = ground_of(GroundConfig(), buffer_of(scan.points));
   std::size_t missed = 0;
   std::size_t wrong = 0;
   std::size_t high = 0;
@@ -202,7 +200,7 @@ TEST_CASE("points are ground up to ground_distance over the plane") {
   points.push_back(10.3F, 0.6F, static_cast<float>(-kSensorHeight + 0.115));
   points.push_back(10.3F, 0.6F, static_cast<float>(-kSensorHeight + 0.135));
   points.push_back(10.3F, 0.6F, static_cast<float>(-kSensorHeight - 0.2));
-  const std::vector<bool> ground = ground_of(Config(), points);
+  const std::vector<bool> ground = ground_of(GroundConfig(), points);
   CHECK(ground[0]);
   CHECK(ground[400]);
   CHECK_FALSE(ground[401]);
@@ -210,13 +208,13 @@ TEST_CASE("points are ground up to ground_distance over the plane") {
 }
 
 TEST_CASE("a patch needs ground_min_points") {
-  CHECK_FALSE(ground_of(Config(), patch_of_plane(0.0, 10))[0]);
-  CHECK(ground_of(Config(), patch_of_plane(0.0, 11))[0]);
+  CHECK_FALSE(ground_of(GroundConfig(), patch_of_plane(0.0, 10))[0]);
+  CHECK(ground_of(GroundConfig(), patch_of_plane(0.0, 11))[0]);
 }
 
 TEST_CASE("a plane is fitted to all points of a patch up to ground_fit_points") {
   // Only the last point seeds the plane. It is too low for any other point to be near it.
-  Config config;
+  GroundConfig config;
   config.ground_fit_points = 64;
   config.ground_lowest_points = 1;
   config.ground_below = 10.0;
@@ -234,7 +232,7 @@ TEST_CASE("a plane is fitted to all points of a patch up to ground_fit_points") 
 
 TEST_CASE("a plane steeper than ground_uprightness is not ground") {
   // Smallest vertical component 0.95: slope tan(acos(0.95)) = 0.3287.
-  Config config;
+  GroundConfig config;
   config.ground_uprightness = 0.95;
   config.ground_elevation = {100, 100, 100, 100};
   CHECK(ground_of(config, patch_of_plane(0.32))[0]);
@@ -243,7 +241,7 @@ TEST_CASE("a plane steeper than ground_uprightness is not ground") {
 
 TEST_CASE("a patch over ground_elevation is ground only if it is flat") {
   // With the default zones, points at 10 m are in ring 2.
-  Config config;
+  GroundConfig config;
   config.ground_elevation[1] = 0.7;
   config.ground_flatness[1] = 1e-4;
   CHECK(ground_of(config, patch_of_plane(0.0, 400, 0.69))[0]);
@@ -289,7 +287,7 @@ TEST_CASE("a patch more than ground_step over most of those around it is not gro
       const double lift = i < scene.low ? 0.0 : scene.lift;
       add_patch(scene.zone, kAround[i][0], scene.sector + kAround[i][1], lift, scene.slope, points);
     }
-    Config config;
+    GroundConfig config;
     config.ground_step = scene.step;
     const std::vector<bool> ground = ground_of(config, points);
     CHECK(std::count(ground.begin() + 40, ground.end(), true) ==
@@ -332,7 +330,7 @@ TEST_CASE("heights of the previous scan do not decide whether a patch is ground"
 TEST_CASE("ground_elevation counts from the ground of the sensor, given or estimated") {
   // 0.6 m above the ground of a sensor as high as kSensorHeight, 0.1 m below that of a lower one.
   const PointBuffer points = patch_of_plane(0.0, 400, 0.6);
-  Config config;
+  GroundConfig config;
   config.ground_elevation[1] = 0.5;
   config.ground_flatness[1] = 0.0;
   SensorModel low = SensorModel::typical();
@@ -350,7 +348,7 @@ TEST_CASE("ground_elevation counts from the ground of the sensor, given or estim
 }
 
 TEST_CASE("points outside the rings are not ground") {
-  Config config;
+  GroundConfig config;
   config.ground_min_range = 5.0;
   config.ground_max_range = 20.0;
   PointBuffer points;
@@ -370,7 +368,7 @@ TEST_CASE("points outside the rings are not ground") {
 TEST_CASE("reflections under the floor do not pull the ground down near the sensor") {
   PointBuffer points = patch_of_plane(0.0);
   for (int i = 0; i < 2; ++i) points.push_back(10.3F, 0.6F, -3.0F);
-  Config config;
+  GroundConfig config;
   config.ground_lowest_points = 2;
   CHECK(ground_of(config, points)[0]);
   config.ground_below = 10.0;  // the two points seed the plane, and no other is near it
@@ -378,13 +376,13 @@ TEST_CASE("reflections under the floor do not pull the ground down near the sens
 }
 
 TEST_CASE("an empty scan, a single point and equal points are segmented") {
-  CHECK(ground_of(Config(), PointsView()).empty());
+  CHECK(ground_of(GroundConfig(), PointsView()).empty());
   PointBuffer one;
   one.push_back(10.0F, 0.0F, -1.7F);
-  CHECK_FALSE(ground_of(Config(), one)[0]);
+  CHECK_FALSE(ground_of(GroundConfig(), one)[0]);
   PointBuffer equal;
   for (int i = 0; i < 1000; ++i) equal.push_back(10.0F, 0.5F, -1.7F);
-  const std::vector<bool> ground = ground_of(Config(), equal);
+  const std::vector<bool> ground = ground_of(GroundConfig(), equal);
   CHECK(std::count(ground.begin(), ground.end(), true) == 1000);
 }
 

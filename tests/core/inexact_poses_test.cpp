@@ -26,13 +26,6 @@ const std::vector<SimulatedScan>& street() {
   return scans;
 }
 
-// Sum of twelve uniform numbers, which is nearly normal.
-double normal(Random& random) {
-  double sum = -6.0;
-  for (int i = 0; i < 12; ++i) sum += random.uniform(0.0, 1.0);
-  return sum;
-}
-
 // The street with `disturb(i, T_world_sensor)` as poses.
 template <class Disturb>
 std::vector<SimulatedScan> with_poses(Disturb&& disturb) {
@@ -48,8 +41,8 @@ std::vector<SimulatedScan> with_noise(double metres, double degrees) {
   return with_poses([&](std::size_t, Eigen::Isometry3d T) {
     Eigen::Vector3d turn;
     for (int k = 0; k < 3; ++k) {
-      T.translation()[k] += metres * normal(random);
-      turn[k] = degrees * M_PI / 180.0 * normal(random);
+      T.translation()[k] += metres * random.normal();
+      turn[k] = degrees * M_PI / 180.0 * random.normal();
     }
     T.linear() =
         T.linear() * Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()).toRotationMatrix();

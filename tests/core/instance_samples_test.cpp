@@ -21,7 +21,7 @@ namespace {
 using Place = std::tuple<std::uint32_t, std::int32_t, std::int32_t, std::int32_t>;
 using Point = std::array<float, 3>;
 
-struct Scan {
+struct SampledScan {
   PointBuffer points;
   std::vector<std::uint32_t> instance_of;
 
@@ -35,9 +35,9 @@ struct Scan {
 constexpr std::size_t kInstances = 5;
 
 // Points of some instances and points without instance, in a box around the sensor.
-Scan random_scan(std::uint64_t seed, std::size_t count, double reach) {
+SampledScan random_scan(std::uint64_t seed, std::size_t count, double reach) {
   Random random(seed);
-  Scan scan;
+  SampledScan scan;
   for (std::size_t i = 0; i < count; ++i) {
     const Eigen::Vector3f p =
         random.vector({-reach, -reach, -2.0}, {reach, reach, 2.0}).cast<float>();
@@ -48,8 +48,8 @@ Scan random_scan(std::uint64_t seed, std::size_t count, double reach) {
   return scan;
 }
 
-Scan shuffled(const Scan& scan, std::uint64_t seed) {
-  Scan result;
+SampledScan shuffled(const SampledScan& scan, std::uint64_t seed) {
+  SampledScan result;
   for (const std::size_t i : Random(seed).permutation(scan.points.size())) {
     result.add(scan.point(i), scan.instance_of[i]);
   }
@@ -105,7 +105,7 @@ std::vector<std::uint32_t> supervoxel_of(const InstanceSamples& samples, std::si
 TEST_CASE("a supervoxel has as many samples as permitted, and every point has a supervoxel") {
   constexpr float kSize = 0.9F;
   constexpr float kRange = 10.0F;
-  const Scan scan = random_scan(7, 4000, 12.0);
+  const SampledScan scan = random_scan(7, 4000, 12.0);
   for (const std::uint32_t most : {1U, 2U, 3U, 4U, 64U}) {
     CAPTURE(most);
     InstanceSampler sampler(kSize, kRange, most);
@@ -142,13 +142,13 @@ TEST_CASE("the choice of samples does not depend on the order of the scan") {
   // Near and crowded, then so wide that memory grows while points are added.
   for (const double reach : {6.0, 60.0}) {
     CAPTURE(reach);
-    const Scan scan = random_scan(21, 30000, reach);
+    const SampledScan scan = random_scan(21, 30000, reach);
     InstanceSamples samples, other;
     InstanceSampler sampler(0.9, 100.0, 4);
     sampler.sample(scan.points, scan.instance_of, kInstances, samples);
     const auto expected = by_supervoxel(samples, 0.9F);
     for (const std::uint64_t seed : {1U, 2U, 3U}) {
-      const Scan again = shuffled(scan, seed);
+      const SampledScan again = shuffled(scan, seed);
       sampler.sample(again.points, again.instance_of, kInstances, other);
       CHECK((by_supervoxel(other, 0.9F) == expected));
     }
@@ -156,8 +156,8 @@ TEST_CASE("the choice of samples does not depend on the order of the scan") {
 }
 
 TEST_CASE("a change of the last bit of a coordinate changes few samples") {
-  const Scan scan = random_scan(5, 30000, 30.0);
-  Scan moved;
+  const SampledScan scan = random_scan(5, 30000, 30.0);
+  SampledScan moved;
   Random random(6);
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     Point p = scan.point(i);
@@ -168,7 +168,7 @@ TEST_CASE("a change of the last bit of a coordinate changes few samples") {
   InstanceSampler sampler(0.9, 100.0, 4);
   sampler.sample(scan.points, scan.instance_of, kInstances, samples);
   sampler.sample(moved.points, moved.instance_of, kInstances, other);
-  const auto number = [](const Scan& of, const InstanceSamples& which) {
+  const auto number = [](const SampledScan& of, const InstanceSamples& which) {
     std::map<Point, std::size_t> at;
     for (std::size_t i = 0; i < of.points.size(); ++i) at[of.point(i)] = i;
     std::set<std::size_t> chosen;
@@ -189,7 +189,7 @@ TEST_CASE("a change of the last bit of a coordinate changes few samples") {
 TEST_CASE("the number of samples in each part of a supervoxel is proportional to its points") {
   // Points of one supervoxel at a time, twice as many in its right half as in its left half.
   Random random(9);
-  Scan scan;
+  SampledScan scan;
   for (int corner = 0; corner < 2000; ++corner) {
     const float x = static_cast<float>(corner % 50), y = static_cast<float>(corner / 50);
     for (int i = 0; i < 30; ++i) {

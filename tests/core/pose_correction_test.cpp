@@ -73,13 +73,6 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-// Sum of twelve uniform numbers, which is nearly normal.
-double normal(Random& random) {
-  double sum = -6.0;
-  for (int i = 0; i < 12; ++i) sum += random.uniform(0.0, 1.0);
-  return sum;
-}
-
 TEST_CASE("exact poses stay, with residuals below 1 cm and 0.02 deg") {
   const auto [scene, sensor] = GENERATE(
       table<Scene, Sensor>({{Scene::kUrban, Sensor::kHdl64}, {Scene::kCrowd, Sensor::kOs1_64}}));
@@ -176,7 +169,7 @@ GroundSplit corridor(std::uint64_t seed, float x, float y, bool vehicle) {
     split.points.z[i] = side == 0 ? -1.7F : random.uniform_float(-1.7, 2.0);
   }
   for (std::size_t i = 20000; i < split.count; ++i) {
-    split.points.x[i] = 8.0F + 0.01F * static_cast<float>(normal(random));
+    split.points.x[i] = 8.0F + 0.01F * static_cast<float>(random.normal());
     split.points.y[i] = random.uniform_float(-0.9, 0.9) - y;
     split.points.z[i] = random.uniform_float(-1.5, 0.0);
   }
@@ -232,7 +225,7 @@ void add_wall_across(std::uint64_t seed, float x, float half_width, GroundSplit&
   const std::size_t begin = split.count;
   split.resize(begin + 2000);
   for (std::size_t i = begin; i < split.count; ++i) {
-    split.points.x[i] = x + 0.01F * static_cast<float>(normal(random));
+    split.points.x[i] = x + 0.01F * static_cast<float>(random.normal());
     split.points.y[i] = random.uniform_float(-half_width, half_width);
     split.points.z[i] = random.uniform_float(-1.5, 0.9);
   }

@@ -17,7 +17,7 @@ namespace {
 
 using Coordinates = std::array<double, 3>;
 
-RebasableStaticMap make(double voxel) {
+RebasableStaticMap make_rebasable(double voxel) {
   RebasableStaticMap::Config config;
   config.map_voxel = voxel;
   config.scan_voxel = 1.5 * voxel;
@@ -84,7 +84,7 @@ TEST_CASE("After any insertions and updates the map equals a new one with the la
   const unsigned seed = GENERATE(range(1U, 9U));
   const double voxel = seed % 2 == 0 ? 0.25 : 0.4;
   Random random(seed);
-  RebasableStaticMap map = make(voxel);
+  RebasableStaticMap map = make_rebasable(voxel);
   std::vector<TestScan> scans;
   std::vector<Eigen::Isometry3d> poses;
   for (int step = 0; step < 40; ++step) {
@@ -103,7 +103,7 @@ TEST_CASE("After any insertions and updates the map equals a new one with the la
     }
     map.update_poses(updates);
   }
-  RebasableStaticMap fresh = make(voxel);
+  RebasableStaticMap fresh = make_rebasable(voxel);
   for (std::size_t s = 0; s < scans.size(); ++s) {
     fresh.insert(scans[s].points, scans[s].keep, poses[s]);
   }
@@ -140,7 +140,7 @@ TEST_CASE("After any insertions and updates the map equals a new one with the la
 
 TEST_CASE("A refused update leaves the map as it was") {
   Random random(3);
-  RebasableStaticMap map = make(0.3);
+  RebasableStaticMap map = make_rebasable(0.3);
   for (int i = 0; i < 5; ++i) {
     const TestScan scan = random_scan(random);
     map.insert(scan.points, scan.keep, random_pose(random));
@@ -173,8 +173,8 @@ TEST_CASE("Scans without points have a number, and clear() begins with scan 0") 
 }
 
 TEST_CASE("A voxel size out of bounds is refused") {
-  CHECK_THROWS_AS(make(0.0), ConfigError);
-  CHECK_THROWS_AS(make(11.0), ConfigError);
+  CHECK_THROWS_AS(make_rebasable(0.0), ConfigError);
+  CHECK_THROWS_AS(make_rebasable(11.0), ConfigError);
 }
 
 }  // namespace dynains::test

@@ -17,7 +17,7 @@ namespace {
 
 using Coordinates = std::array<double, 3>;
 
-StaticMapAccumulator make(double voxel) {
+StaticMapAccumulator make_map(double voxel) {
   StaticMapAccumulator::Config config;
   config.map_voxel = voxel;
   return StaticMapAccumulator(config);
@@ -90,7 +90,7 @@ TEST_CASE("the map holds the first measured point of every voxel, exactly, and n
   const Eigen::Vector3d origin = GENERATE(values<Eigen::Vector3d>(
       {{0.0, 0.0, 0.0}, {-300.5, 17.25, -8.0}, {412345.25, 5654321.5, 312.75}}));
   for (const double voxel : {0.125, 0.25, 1.0}) {
-    StaticMapAccumulator map = make(voxel);
+    StaticMapAccumulator map = make_map(voxel);
     ReferenceMap reference(voxel);
     Random random(7);
     for (int scan = 0; scan < 12; ++scan) {
@@ -109,7 +109,7 @@ TEST_CASE("the map holds the first measured point of every voxel, exactly, and n
 }
 
 TEST_CASE("a point on a voxel border belongs to the upper voxel") {
-  StaticMapAccumulator map = make(0.5);
+  StaticMapAccumulator map = make_map(0.5);
   PointBuffer points;
   for (const float x : {0.0F, 0.499F, 0.5F, -0.5F, -0.001F, 1.0F}) points.push_back(x, 0.0F, 0.0F);
   map.insert(points, {}, Eigen::Isometry3d::Identity());
@@ -119,7 +119,7 @@ TEST_CASE("a point on a voxel border belongs to the upper voxel") {
 }
 
 TEST_CASE("resolution 0 keeps every point") {
-  StaticMapAccumulator map = make(0.0);
+  StaticMapAccumulator map = make_map(0.0);
   Random random(5);
   const PointBuffer points = grid_points(random, 3000, 3.0);
   for (int i = 0; i < 3; ++i) map.insert(points, {}, Eigen::Isometry3d::Identity());
@@ -130,7 +130,7 @@ TEST_CASE("resolution 0 keeps every point") {
 }
 
 TEST_CASE("at UTM coordinates the map keeps a tenth of a millimetre") {
-  StaticMapAccumulator map = make(0.0);
+  StaticMapAccumulator map = make_map(0.0);
   Random random(11);
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   T.linear() = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
@@ -139,7 +139,7 @@ TEST_CASE("at UTM coordinates the map keeps a tenth of a millimetre") {
     PointBuffer one;
     const Eigen::Vector3f p = random.vector({-80, -80, -3}, {80, 80, 3}).cast<float>();
     one.push_back(p.x(), p.y(), p.z());
-    StaticMapAccumulator single = make(0.0);
+    StaticMapAccumulator single = make_map(0.0);
     single.insert(one, {}, T);
     const Eigen::Vector3d expected = T * Eigen::Vector3d(one.x[0], one.y[0], one.z[0]);
     single.for_each([&](const Eigen::Vector3d& q) { REQUIRE((q - expected).norm() < 1e-4); });
@@ -151,7 +151,7 @@ TEST_CASE("the finest map reaches the farthest pose that is accepted") {
   PointBuffer point;
   point.push_back(100.0F, -100.0F, 100.0F);
   for (const double side : {-1.0, 1.0}) {
-    StaticMapAccumulator map = make(0.005);
+    StaticMapAccumulator map = make_map(0.005);
     Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
     T.translation().setConstant(side * kMaxTranslation);
     CHECK_NOTHROW(validate_pose("T", T));
@@ -168,7 +168,7 @@ TEST_CASE("the finest map reaches the farthest pose that is accepted") {
 }
 
 TEST_CASE("a region has exactly the points that a filter over the map finds") {
-  StaticMapAccumulator map = make(0.25);
+  StaticMapAccumulator map = make_map(0.25);
   Random random(13);
   for (int i = 0; i < 40; ++i) {
     const PointBuffer points = grid_points(random, 300, 30.0);
@@ -205,7 +205,7 @@ TEST_CASE("a region has exactly the points that a filter over the map finds") {
 }
 
 TEST_CASE("every stored point is found at its place, for any rounding of floats") {
-  StaticMapAccumulator map = make(0.05);
+  StaticMapAccumulator map = make_map(0.05);
   Random random(14);
   for (int i = 0; i < 20; ++i) {
     PointBuffer points;
@@ -239,7 +239,7 @@ TEST_CASE("every stored point is found at its place, for any rounding of floats"
 }
 
 TEST_CASE("a cleared map is empty and can be filled again") {
-  StaticMapAccumulator map = make(0.25);
+  StaticMapAccumulator map = make_map(0.25);
   CHECK(map.empty());
   Random random(17);
   const PointBuffer points = grid_points(random, 500, 10.0);

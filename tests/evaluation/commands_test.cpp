@@ -54,10 +54,6 @@ std::string message_of(const std::vector<std::string>& arguments) {
   return {};
 }
 
-bool has(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 /// A street of three scans with a correct run, whose score is written to `json`.
 struct JudgedStreet {
   JudgedStreet() { write_run(run, scans, 0); }

@@ -71,10 +71,6 @@ VerdictCloud four_fates() {
   return cloud;
 }
 
-bool has(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 std::size_t count_dots(const Figure& figure) {
   std::size_t count = 0;
   for (const auto& layer : figure.layers) count += layer.size();

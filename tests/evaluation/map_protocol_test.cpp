@@ -32,7 +32,7 @@ Result run(const std::vector<OwnedScan>& scans, const std::vector<Eigen::Vector3
   return {protocol.voxel_score(raw), protocol.point_score(), protocol.foreign_points()};
 }
 
-MapProtocol::Settings settings(double voxel, double radius) {
+MapProtocol::Settings map_settings(double voxel, double radius) {
   return {voxel, 0, 0, 0, radius, TruthClasses()};
 }
 
@@ -46,7 +46,7 @@ TEST_CASE("A map point takes the class of the nearest measured point") {
   // The first map point is the road's, the second the car's; the third lies between road and car
   // but nearer to the road (0.9 against 1.1).
   const std::vector<Eigen::Vector3d> map = {{0.55, 0.5, 0.5}, {2.45, 0.5, 0.5}, {3.6, 0.5, 0.5}};
-  const Result result = run({scan}, map, settings(1.0, 0.05));
+  const Result result = run({scan}, map, map_settings(1.0, 0.05));
   CHECK(result.voxels.static_total == 2);
   CHECK(result.voxels.dynamic_total == 1);
   // The third map point is 0.9 > 0.866 from the second road voxel.
@@ -60,7 +60,7 @@ TEST_CASE("Map points far from all measured points are left out and counted") {
   scan.add(0.5F, 0.5F, 0.5F, kRoad);
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<Eigen::Vector3d> map = {{0.5, 0.5, 0.5}, {9, 9, 9}, {1e30, 0, 0}, {0, kNan, 0}};
-  const Result result = run({scan}, map, settings(1.0, 0.05));
+  const Result result = run({scan}, map, map_settings(1.0, 0.05));
   CHECK(result.foreign == 3);
   CHECK(result.voxels.static_preserved == 1);
 }
@@ -73,7 +73,7 @@ TEST_CASE("A measured point is in the map up to the radius, inclusive") {
   scan.add(12.5F, 0.5F, 0.5F, kMovingCar);
   const std::vector<Eigen::Vector3d> map = {
       {0.75, 0.5, 0.5}, {4.7578125, 0.5, 0.5}, {12.5, 0.5, 0.5}};
-  const PointScore score = run({scan}, map, settings(1.0, 0.25)).points;
+  const PointScore score = run({scan}, map, map_settings(1.0, 0.25)).points;
   CHECK(score.static_total == 2);
   CHECK(score.static_kept == 1);
   CHECK(score.dynamic_total == 2);
@@ -98,7 +98,7 @@ TEST_CASE("Map files get the score of the simple reference implementation", "[re
                                               random.uniform(-1, 1)));
       }
     }
-    MapProtocol::Settings with = settings(0.2, 0.05);
+    MapProtocol::Settings with = map_settings(0.2, 0.05);
     with.min_range = 0.8;
     with.point_max_range = 2.5;
     const Result result = run(scans, map, with);
@@ -151,9 +151,9 @@ TEST_CASE("Map files get the score of the simple reference implementation", "[re
 
 TEST_CASE("Settings of a map comparison out of bounds are refused") {
   const std::vector<Eigen::Vector3d> map;
-  CHECK_THROWS_AS(MapProtocol(settings(0.2, 0.0), map), ConfigError);
-  CHECK_THROWS_AS(MapProtocol(settings(-0.2, 0.05), map), ConfigError);
-  CHECK_NOTHROW(MapProtocol(settings(0.2, 0.05), map));
+  CHECK_THROWS_AS(MapProtocol(map_settings(0.2, 0.0), map), ConfigError);
+  CHECK_THROWS_AS(MapProtocol(map_settings(-0.2, 0.05), map), ConfigError);
+  CHECK_NOTHROW(MapProtocol(map_settings(0.2, 0.05), map));
 }
 
 }  // namespace dynains::evaluation::testing

@@ -17,6 +17,10 @@ namespace dynains::evaluation::testing {
 using test::read_text;
 using test::TemporaryFolder;
 
+inline bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
 inline std::string scan_name(std::size_t number) {
   const std::string digits = std::to_string(number);
   return std::string(6 - digits.size(), '0') + digits;

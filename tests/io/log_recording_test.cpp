@@ -63,7 +63,7 @@ std::vector<std::string> three_odometries(const std::string& child) {
   return messages;
 }
 
-std::string error_of(const fs::path& log, const RecordingOptions& options = {}) {
+std::string log_error(const fs::path& log, const RecordingOptions& options = {}) {
   return message_of<IoError>([&] { Recording(log, options); });
 }
 
@@ -118,7 +118,7 @@ TEST_CASE("Poses of a file belong to the clouds of a log by time") {
   CHECK(recording.T_world_sensor(2).translation().x() == Approx(7.0));
   CHECK(recording.files() == std::vector<fs::path>{folder / "drive.mcap", folder / "poses.tum"});
   options.times = folder / "times.txt";
-  CHECK_THAT(error_of(folder / "drive.mcap", options),
+  CHECK_THAT(log_error(folder / "drive.mcap", options),
              StartsWith((folder / "times.txt").string() + ": expected no file of times"));
 }
 
@@ -173,24 +173,25 @@ TEST_CASE("Topics are found if there is only one, and listed otherwise") {
                              {"/wheels", "nav_msgs/msg/Odometry"}},
                             messages, {}));
   RecordingOptions options;
-  CHECK(error_of(log) == log.string() +
-                             ": expected one topic with clouds, or --cloud-topic; found /points "
-                             "(sensor_msgs/PointCloud2, 3 messages), /rear "
-                             "(sensor_msgs/PointCloud2, 3 messages)");
+  CHECK(log_error(log) == log.string() +
+                              ": expected one topic with clouds, or --cloud-topic; found /points "
+                              "(sensor_msgs/PointCloud2, 3 messages), /rear "
+                              "(sensor_msgs/PointCloud2, 3 messages)");
   options.cloud_topic = "/none";
-  CHECK_THAT(error_of(log, options), ContainsSubstring("expected clouds on topic /none; found /p"));
+  CHECK_THAT(log_error(log, options),
+             ContainsSubstring("expected clouds on topic /none; found /p"));
   options.cloud_topic = "/points";
-  CHECK_THAT(error_of(log, options),
+  CHECK_THAT(log_error(log, options),
              ContainsSubstring("expected one topic with poses, or --pose-topic; found /odom"));
   options.pose_topic = "/points";
-  CHECK_THAT(error_of(log, options), ContainsSubstring("expected poses on topic /points; found"));
+  CHECK_THAT(log_error(log, options), ContainsSubstring("expected poses on topic /points; found"));
   options.pose_topic = "/odom";
   CHECK(Recording(log, options).size() == 3);
 
   write_text(log, mcap_file({kPoints}, clouds_with("lidar", {}), {}));
-  CHECK_THAT(error_of(log), ContainsSubstring("expected a topic with poses, or a file of poses"));
+  CHECK_THAT(log_error(log), ContainsSubstring("expected a topic with poses, or a file of poses"));
   write_text(log, mcap_file({kOdometry}, {{0, 1, three_odometries("base")[0]}}, {}));
-  CHECK_THAT(error_of(log), ContainsSubstring("expected a topic with clouds; found /odom"));
+  CHECK_THAT(log_error(log), ContainsSubstring("expected a topic with clouds; found /odom"));
 }
 
 TEST_CASE("Flag --pose-frame-id takes the poses from transforms, in that frame") {
@@ -210,7 +211,7 @@ TEST_CASE("Flag --pose-frame-id takes the poses from transforms, in that frame")
             .T_world_sensor(0)
             .isApprox(pose_at(0, 0) * kT_base_lidar, 1e-9));
   options.pose_frame = "utm";
-  CHECK_THAT(error_of(folder / "drive.mcap", options),
+  CHECK_THAT(log_error(folder / "drive.mcap", options),
              ContainsSubstring("expected poses of frame lidar in utm at the times of the clouds"));
 }
 
@@ -240,13 +241,14 @@ TEST_CASE("Contradictory poses and clouds are refused with their place") {
   };
   for (const Case& one : cases) {
     write_text(log, mcap_file({kPoints, one.poses}, clouds_with("lidar", one.messages), {}));
-    CHECK_THAT(error_of(log), StartsWith(log.string() + ": ") && ContainsSubstring(one.expected));
+    CHECK_THAT(log_error(log), StartsWith(log.string() + ": ") && ContainsSubstring(one.expected));
   }
   std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
   messages.back().data = small_cloud(1.3, "rear");
   write_text(log, mcap_file({kPoints, kTf, kStaticTf}, messages, {}));
-  CHECK_THAT(error_of(log), ContainsSubstring("/points at 1330000000 ns: expected a cloud of frame "
-                                              "lidar, as before; found frame rear"));
+  CHECK_THAT(log_error(log),
+             ContainsSubstring("/points at 1330000000 ns: expected a cloud of frame "
+                               "lidar, as before; found frame rear"));
 }
 
 TEST_CASE("Clouds whose stamps do not increase are left out and counted") {
@@ -263,7 +265,7 @@ TEST_CASE("Clouds whose stamps do not increase are left out and counted") {
     if (message.channel == 0) message.data = small_cloud(1.0, "lidar");
   }
   write_text(log, mcap_file({kPoints, kTf, kStaticTf}, messages, {}));
-  CHECK_THAT(error_of(log), ContainsSubstring("expected stamps that increase: 4 of 5 clouds"));
+  CHECK_THAT(log_error(log), ContainsSubstring("expected stamps that increase: 4 of 5 clouds"));
 }
 
 TEST_CASE("A field label gives the labels, and a truncated log gives the scans before its end") {
@@ -291,7 +293,7 @@ TEST_CASE("A field label gives the labels, and a truncated log gives the scans b
   CHECK(has_note(cut, "the log ends early"));
 
   write_text(folder / "first_bytes.mcap", whole.substr(0, 40));
-  CHECK_THAT(error_of(folder / "first_bytes.mcap"),
+  CHECK_THAT(log_error(folder / "first_bytes.mcap"),
              ContainsSubstring("found no topic") && ContainsSubstring("the log ends early"));
 }
 

@@ -21,13 +21,13 @@ RecordingOptions scene(const std::string& name) {
   return options;
 }
 
-std::string error_of(const fs::path& path, const RecordingOptions& options) {
+std::string opening_error(const fs::path& path, const RecordingOptions& options) {
   return message_of<IoError>([&] { Recording recording(path, options); });
 }
 
 /// Whether this build has JSON; without, the error must name its package.
 bool can_read(const fs::path& folder) {
-  const std::string error = error_of(folder, scene("scene-0061"));
+  const std::string error = opening_error(folder, scene("scene-0061"));
   const bool has_json = error.find("nlohmann-json3-dev") == std::string::npos;
   return has_json;
 }
@@ -63,13 +63,13 @@ TEST_CASE("nuScenes: a scene that is not clear or not there is refused with the 
   write_nuscenes(folder.path());
   if (!can_read(folder.path())) return;
   for (const std::string name : {"", "scene-1"}) {
-    CHECK_THAT(error_of(folder.path(), scene(name)),
+    CHECK_THAT(opening_error(folder.path(), scene(name)),
                ContainsSubstring("scene.json: expected one scene, by --nuscenes-scene; found "
                                  "scene-0061, scene-0103"));
   }
   fs::remove(folder / "v1.0-mini" / "scene.json");
   CHECK(Recording(folder.path()).size() == 4);
-  CHECK_THAT(error_of(folder.path(), scene("scene-0061")),
+  CHECK_THAT(opening_error(folder.path(), scene("scene-0061")),
              ContainsSubstring("scene.json: expected"));
 }
 
@@ -102,7 +102,7 @@ TEST_CASE("nuScenes: malformed tables and sweeps are refused with file and place
     write_nuscenes(folder.path());
     if (!can_read(folder.path())) return;
     write_text(folder / "v1.0-mini" / (wrong.table + ".json"), wrong.content);
-    const std::string error = error_of(folder.path(), scene("scene-0061"));
+    const std::string error = opening_error(folder.path(), scene("scene-0061"));
     CHECK_THAT(error, StartsWith((folder / "v1.0-mini" / (wrong.table + ".json")).string()) &&
                           ContainsSubstring(wrong.expected));
   }

@@ -25,8 +25,8 @@ using Flags = std::vector<std::string>;
 
 constexpr std::size_t kBoxPoints = 24 * 8;  // last points of a tiny scan
 
-struct Fixture {
-  explicit Fixture(std::size_t scans = 23) : seq(folder / "seq") {
+struct ChunkFixture {
+  explicit ChunkFixture(std::size_t scans = 23) : seq(folder / "seq") {
     write_tiny_sequence(seq, scans, {100.0, 200.0, 300.0});
   }
   Flags arguments(const std::string& out, const Flags& more) const {
@@ -94,7 +94,7 @@ void kill_after_chunks(const Process& process, const fs::path& chunks, std::size
 }  // namespace
 
 TEST_CASE("in chunks, the number of jobs changes no byte, for any kinds of output") {
-  const Fixture fixture;
+  const ChunkFixture fixture;
   const std::vector<Flags> kinds = {
       {},
       {"--write-online", "--write-clean", "--write-beliefs", "--write-mcap"},
@@ -133,7 +133,7 @@ TEST_CASE("in chunks, the number of jobs changes no byte, for any kinds of outpu
 }
 
 TEST_CASE("a single chunk gives the labels of one stream") {
-  const Fixture fixture;
+  const ChunkFixture fixture;
   REQUIRE(fixture.run("stream", {"--chunk", "0", "--jobs", "1"}).code == 0);
   REQUIRE(fixture.run("default", {}).code == 0);
   check_same_files(fixture.folder / "stream", fixture.folder / "default");
@@ -157,7 +157,7 @@ TEST_CASE("a single chunk gives the labels of one stream") {
 }
 
 TEST_CASE("chunks of one scan: each scan has its labels, and the report its times") {
-  const Fixture fixture(7);
+  const ChunkFixture fixture(7);
   const Outcome outcome = fixture.run("out", {"--chunk", "1", "--jobs", "2"});
   REQUIRE(outcome.code == 0);
   CHECK_THAT(outcome.out, ContainsSubstring("2 jobs"));
@@ -196,7 +196,7 @@ std::vector<float> scan_with_stopping_box(std::size_t i, std::size_t stop) {
 
 TEST_CASE("behind a border, an object that stopped keeps its id and stays dynamic") {
   constexpr std::size_t kScans = 150, kStop = 40;
-  const Fixture fixture(kScans);
+  const ChunkFixture fixture(kScans);
   for (std::size_t i = 0; i < kScans; ++i) {
     const std::vector<float> scan = scan_with_stopping_box(i, kStop);
     write_scan(fixture.seq + "/velodyne/" + scan_name(i) + ".bin", scan);
@@ -225,7 +225,7 @@ TEST_CASE("behind a border, an object that stopped keeps its id and stays dynami
 }
 
 TEST_CASE("a killed run in chunks is resumed with the chunks that it had finished") {
-  const Fixture fixture(60);
+  const ChunkFixture fixture(60);
   const Flags flags = {"--chunk", "5", "--jobs", "2", "--lookback", "4"};
   REQUIRE(fixture.run("expected", flags).code == 0);
   for (const std::size_t chunks : {std::size_t{1}, std::size_t{4}, std::size_t{9}}) {
@@ -249,7 +249,7 @@ TEST_CASE("a killed run in chunks is resumed with the chunks that it had finishe
 }
 
 TEST_CASE("a broken chunk is processed again, and one of another grid is refused") {
-  const Fixture fixture(60);
+  const ChunkFixture fixture(60);
   const Flags flags = {"--chunk", "5", "--jobs", "1", "--lookback", "4"};
   REQUIRE(fixture.run("expected", flags).code == 0);
   {
@@ -280,7 +280,7 @@ TEST_CASE("a broken chunk is processed again, and one of another grid is refused
 }
 
 TEST_CASE("after Ctrl-C a run in chunks keeps the finished ones and says that it is unfinished") {
-  const Fixture fixture(60);
+  const ChunkFixture fixture(60);
   const Flags flags = {"--chunk", "5", "--jobs", "2", "--lookback", "4"};
   REQUIRE(fixture.run("expected", flags).code == 0);
   Outcome interrupted;
@@ -307,7 +307,7 @@ TEST_CASE("after Ctrl-C a run in chunks keeps the finished ones and says that it
 }
 
 TEST_CASE("flag --force replaces results by those of a run in chunks") {
-  const Fixture fixture;
+  const ChunkFixture fixture;
   REQUIRE(fixture.run("out", {"--write-online"}).code == 0);
   REQUIRE(fixture.run("out", {"--chunk", "6", "--force"}).code == 0);
   REQUIRE(fixture.run("expected", {"--chunk", "6"}).code == 0);
@@ -315,7 +315,7 @@ TEST_CASE("flag --force replaces results by those of a run in chunks") {
 }
 
 TEST_CASE("flags of chunks that are wrong or do not fit together: exit code 2, nothing written") {
-  const Fixture fixture(3);
+  const ChunkFixture fixture(3);
   const std::vector<std::pair<Flags, std::string>> cases = {
       {{"--jobs", "0"}, "--jobs 0: expected at least 1"},
       {{"--jobs", "-2"}, "--jobs -2: expected at least 1"},

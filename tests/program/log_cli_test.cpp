@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t kScans = 12;
+constexpr std::size_t kLogScans = 12;
 const Eigen::Vector3d kPosition(30.0, 4.0, 0.0);
 
 /// The tiny sequence as a log whose points have a label.
@@ -28,7 +28,7 @@ std::string tiny_log() {
   const std::vector<CloudField> fields = {
       {"x", 0, 7}, {"y", 4, 7}, {"z", 8, 7}, {"intensity", 12, 7}, {"label", 16, 6}};
   std::vector<WrittenMessage> messages;
-  for (std::size_t i = 0; i < kScans; ++i) {
+  for (std::size_t i = 0; i < kLogScans; ++i) {
     const double time = 0.1 * static_cast<double>(i);
     const std::vector<float> scan = tiny_scan(i);
     ByteWriter points;
@@ -49,7 +49,7 @@ std::string tiny_log() {
 
 std::string all_labels(const fs::path& out) {
   std::string all;
-  for (std::size_t i = 0; i < kScans; ++i) {
+  for (std::size_t i = 0; i < kLogScans; ++i) {
     all += read_text(out / "labels" / (scan_name(i) + ".label"));
   }
   return all;
@@ -63,7 +63,7 @@ std::size_t count_lines(const std::string& text) {
 
 TEST_CASE("run on a log gives the labels of run on the folder; check and eval read it, too") {
   const TemporaryFolder folder;
-  write_tiny_sequence(folder / "seq", kScans, kPosition);
+  write_tiny_sequence(folder / "seq", kLogScans, kPosition);
   write_text(folder / "drive.mcap", tiny_log());
   const std::string log = folder / "drive.mcap";
   REQUIRE(start({"run", folder / "seq", "--out", folder / "of_folder"}).code == 0);
@@ -73,7 +73,7 @@ TEST_CASE("run on a log gives the labels of run on the folder; check and eval re
   CHECK_THAT(outcome.err, !ContainsSubstring("ends early"));
   CHECK(all_labels(folder / "of_log") == all_labels(folder / "of_folder"));
   const auto report = nlohmann::json::parse(read_text(folder / "of_log" / "report.json"));
-  CHECK(report["scans"] == kScans);
+  CHECK(report["scans"] == kLogScans);
   CHECK(report["log_ends_early"] == false);
   CHECK(start({"eval", log, folder / "of_log"}).code == 0);
   const Outcome check = start({"check", log});
@@ -171,7 +171,7 @@ TEST_CASE(
 
 TEST_CASE("The log of --write-mcap is a recording with the scans of the input") {
   const TemporaryFolder folder;
-  write_tiny_sequence(folder / "seq", kScans, kPosition);
+  write_tiny_sequence(folder / "seq", kLogScans, kPosition);
   const std::string out = folder / "out";
   REQUIRE(start({"run", folder / "seq", "--out", out}).code == 0);
   const std::string labels = all_labels(out);
@@ -233,7 +233,7 @@ TEST_CASE("Memory for reading does not grow with the log") {
 
 TEST_CASE("simulate --format: run on a log of each format gives the labels of run on the folder") {
   const TemporaryFolder folder;
-  const std::vector<std::string> flags = {"--sensor", "vlp16", "--scans", std::to_string(kScans),
+  const std::vector<std::string> flags = {"--sensor", "vlp16", "--scans", std::to_string(kLogScans),
                                           "--seed",   "5"};
   const auto simulate = [&](const std::string& out, std::vector<std::string> more) {
     std::vector<std::string> arguments = {"simulate", out};

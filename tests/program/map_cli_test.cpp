@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t kScans = 12;
+constexpr std::size_t kDayScans = 12;
 
 /// Path below a folder and content of every file; folders, too.
 std::map<std::string, std::string> content_of(const fs::path& folder) {
@@ -40,7 +40,7 @@ class Days {
  public:
   Days() {
     for (int day = 0; day < 3; ++day) {
-      write_tiny_sequence(folder_ / name(day), kScans, {3.0 * day, 0.5 * day, 0.0});
+      write_tiny_sequence(folder_ / name(day), kDayScans, {3.0 * day, 0.5 * day, 0.0});
     }
   }
 
@@ -253,7 +253,7 @@ TEST_CASE("map: remap --update moves one session to corrected poses, as if it ha
   // comparable.
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.translation() = Eigen::Vector3d(64.0, -32.0, 2.0);
-  const std::vector<Eigen::Isometry3d> poses(kScans, pose);
+  const std::vector<Eigen::Isometry3d> poses(kDayScans, pose);
   write_poses(days.at("corrected.txt"), poses);
   REQUIRE(remap("corrected.txt", "city").code == 0);
   REQUIRE(days.update(0, "expected", "out2").code == 0);

@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t kScans = 12;
+constexpr std::size_t kRunScans = 12;
 
 std::vector<Eigen::Isometry3d> other_poses(std::size_t count, unsigned seed) {
   std::mt19937 random(seed);
@@ -48,10 +48,10 @@ void write_other_poses(const std::string& file, std::size_t count, unsigned seed
 }
 
 /// A finished run over a small sequence, and a file of corrected poses.
-struct Fixture {
-  explicit Fixture(std::vector<std::string> more = {}) {
-    write_tiny_sequence(seq, kScans);
-    write_other_poses(corrected, kScans, 7);
+struct RemapFixture {
+  explicit RemapFixture(std::vector<std::string> more = {}) {
+    write_tiny_sequence(seq, kRunScans);
+    write_other_poses(corrected, kRunScans, 7);
     std::vector<std::string> arguments = {"run", seq, "--out", out};
     arguments.insert(arguments.end(), more.begin(), more.end());
     if (start(arguments).code != 0) throw std::runtime_error("run failed");
@@ -96,7 +96,7 @@ std::string expected_map(const Recording& points, const Recording& corrected,
   return read_text(file);
 }
 
-std::string expected_map(const Fixture& f) {
+std::string expected_map(const RemapFixture& f) {
   RecordingOptions options;
   options.poses = f.corrected;
   const Recording recording(f.seq, options);
@@ -106,7 +106,7 @@ std::string expected_map(const Fixture& f) {
 }  // namespace
 
 TEST_CASE("remap gives the bytes of a map of the labels and the corrected poses") {
-  const Fixture f;
+  const RemapFixture f;
   const std::string own_map = read_text(f.out + "/static_map.ply");
   const Outcome outcome = f.remap({"--poses", f.corrected});
   CAPTURE(outcome.err);
@@ -119,7 +119,7 @@ TEST_CASE("remap gives the bytes of a map of the labels and the corrected poses"
   CHECK(report["complete"] == true);
 
   SECTION("a further correction replaces the map") {
-    write_other_poses(f.corrected, kScans, 8);
+    write_other_poses(f.corrected, kRunScans, 8);
     REQUIRE(f.remap({"--poses", f.corrected, "-q"}).code == 0);
     CHECK(read_text(f.map) == expected_map(f));
   }
@@ -143,7 +143,7 @@ TEST_CASE("remap gives the bytes of a map of the labels and the corrected poses"
 }
 
 TEST_CASE("remap of scans of thousands of points gives the same bytes") {
-  const Fixture f;
+  const RemapFixture f;
   std::mt19937 random(11);
   std::uniform_real_distribution<float> place(-30.0F, 30.0F);
   constexpr std::uint32_t kClasses[] = {9, 9, 9, 251, 0};
@@ -166,7 +166,7 @@ TEST_CASE("remap of scans of thousands of points gives the same bytes") {
 }
 
 TEST_CASE("remap with the poses of the run fills the voxels of the run's map") {
-  const Fixture f({"--level", "false"});
+  const RemapFixture f({"--level", "false"});
   REQUIRE(f.remap().code == 0);
   CHECK(read_points(f.map).positions.size() ==
         read_points(f.out + "/static_map.ply").positions.size());
@@ -177,18 +177,18 @@ TEST_CASE("remap with the poses of the run fills the voxels of the run's map") {
 }
 
 TEST_CASE("remap takes a run over some of the scans") {
-  const Fixture f({"--start", "3", "--end", "8"});
+  const RemapFixture f({"--start", "3", "--end", "8"});
   const Outcome outcome = f.remap({"--poses", f.corrected});
   REQUIRE(outcome.code == 0);
   CHECK_THAT(outcome.out, ContainsSubstring("6 scans"));
 }
 
 TEST_CASE("remap of points in the frame of the world leads through the poses of the run") {
-  Fixture f;
+  RemapFixture f;
   const std::string seq = f.folder / "world";
   fs::create_directories(seq + "/pcd");
-  const std::vector<Eigen::Isometry3d> poses = other_poses(kScans, 3);
-  for (std::size_t i = 0; i < kScans; ++i) {
+  const std::vector<Eigen::Isometry3d> poses = other_poses(kRunScans, 3);
+  for (std::size_t i = 0; i < kRunScans; ++i) {
     PointFileWriter writer(seq + "/pcd/" + scan_name(i) + ".pcd", {}, poses[i]);
     const std::vector<float> scan = tiny_scan(i);
     for (std::size_t k = 0; k < scan.size(); k += 4) {
@@ -213,7 +213,7 @@ TEST_CASE("remap of points in the frame of the world leads through the poses of 
 
   // The poses of the run came from elsewhere.
   const std::string other = f.folder / "other.txt";
-  write_other_poses(other, kScans, 4);
+  write_other_poses(other, kRunScans, 4);
   const std::string other_out = f.folder / "other out";
   REQUIRE(start({"run", seq, "--out", other_out, "--frame", "world", "--poses", other,
                  "--accept-poses"})
@@ -224,13 +224,13 @@ TEST_CASE("remap of points in the frame of the world leads through the poses of 
 }
 
 TEST_CASE("remap refuses what does not belong together, and writes nothing then") {
-  const Fixture f;
+  const RemapFixture f;
   const std::string report_file = f.out + "/report.json";
   std::vector<std::string> arguments = {"--poses", f.corrected};
   std::string expected;
   int code = 1;
   SECTION("fewer poses than scans") {
-    write_other_poses(f.corrected, kScans - 1, 7);
+    write_other_poses(f.corrected, kRunScans - 1, 7);
     expected = "expected";
   }
   SECTION("poses in time for some scans only") {
@@ -238,7 +238,7 @@ TEST_CASE("remap refuses what does not belong together, and writes nothing then"
     for (int i = 0; i < 8; ++i) rows += std::to_string(0.1 * i) + " 0 0 0 0 0 0 1\n";
     write_text(f.corrected, rows);
     std::string times;
-    for (std::size_t i = 0; i < kScans; ++i) times += std::to_string(0.1 * double(i)) + "\n";
+    for (std::size_t i = 0; i < kRunScans; ++i) times += std::to_string(0.1 * double(i)) + "\n";
     write_text(f.seq + "/times.txt", times);
     expected = "has no pose or no scan for 4 of 12 scans of the run, 000008 first";
   }

@@ -12,8 +12,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-struct Fixture {
-  Fixture() : seq(folder / "seq"), out(folder / "out"), page(out + "/view.html") {
+struct PageFixture {
+  PageFixture() : seq(folder / "seq"), out(folder / "out"), page(out + "/view.html") {
     write_tiny_sequence(seq, 4);
   }
 
@@ -30,7 +30,7 @@ bool contains(const std::string& text, const std::string& part) {
 }  // namespace
 
 TEST_CASE("the page of a run has its description and is listed among the results") {
-  const Fixture fixture;
+  const PageFixture fixture;
   const Outcome run = start({"run", fixture.seq, "--out", fixture.out, "--view"});
   CAPTURE(run.err);
   REQUIRE(run.code == 0);
@@ -54,7 +54,7 @@ TEST_CASE("the page of a run has its description and is listed among the results
 }
 
 TEST_CASE("view refuses what is no finished run, and files of others") {
-  const Fixture fixture;
+  const PageFixture fixture;
   CHECK(contains(start({"view", fixture.out}).err, "no such folder"));
   fs::create_directory(fixture.out);
   CHECK(contains(start({"view", fixture.out}).err, "holds no results"));
@@ -67,7 +67,7 @@ TEST_CASE("view refuses what is no finished run, and files of others") {
 }
 
 TEST_CASE("view finds the recording by the report, with its flags, or by its new place") {
-  const Fixture fixture;
+  const PageFixture fixture;
   const std::string poses = fixture.folder / "my poses.txt";
   fs::rename(fixture.seq + "/poses.txt", poses);
   REQUIRE(start({"run", fixture.seq, "--out", fixture.out, "--poses", poses}).code == 0);
@@ -81,7 +81,7 @@ TEST_CASE("view finds the recording by the report, with its flags, or by its new
 }
 
 TEST_CASE("beliefs are written on demand, one byte per point") {
-  const Fixture fixture;
+  const PageFixture fixture;
   REQUIRE(start({"run", fixture.seq, "--out", fixture.out, "--write-beliefs"}).code == 0);
   CHECK(fs::file_size(fixture.out + "/beliefs/000003.belief") ==
         fs::file_size(fixture.out + "/causes/000003.cause"));
@@ -93,7 +93,7 @@ TEST_CASE("beliefs are written on demand, one byte per point") {
 
 TEST_CASE(
     "view --serve refuses what is no finished run, a run without a map, and files of others") {
-  const Fixture fixture;
+  const PageFixture fixture;
   CHECK(contains(start({"view", fixture.out, "--serve"}).err, "no such folder"));
   fs::create_directory(fixture.out);
   CHECK(contains(start({"view", fixture.out, "--serve"}).err, "holds no results"));

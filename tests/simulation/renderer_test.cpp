@@ -10,7 +10,7 @@ namespace dynains::simulation {
 
 namespace {
 
-const Material kSolid{50, 0.3F, 0, 0, 0, 0, 0};
+const Material kSurface{50, 0.3F, 0, 0, 0, 0, 0};
 
 /// Tests every beam against every primitive, without any bounds.
 float nearest_by_force(const std::vector<Primitive>& primitives, Vec3 direction, float max_range) {
@@ -38,14 +38,14 @@ TEST_CASE("rendering by solid angle gives the result of testing all pairs") {
       const auto a = static_cast<float>(random.uniform(0.05, 3));
       const auto b = static_cast<float>(random.uniform(0.05, 3));
       const auto c = static_cast<float>(random.uniform(0.05, 3));
-      primitives.push_back(make_primitive(shape, kSolid,
+      primitives.push_back(make_primitive(shape, kSurface,
                                           {static_cast<float>(far * std::cos(azimuth)),
                                            static_cast<float>(far * std::sin(azimuth)), up},
                                           {a, b, c}, rotation_z(turn) * rotation_x(tilt)));
     }
     // One primitive straight above, and one across the seam at +-pi.
-    primitives.push_back(make_primitive(Shape::kBox, kSolid, {0, 0, 6}, {8, 8, 0.2F}));
-    primitives.push_back(make_primitive(Shape::kBox, kSolid, {-9, 0, 0}, {0.3F, 4, 2}));
+    primitives.push_back(make_primitive(Shape::kBox, kSurface, {0, 0, 6}, {8, 8, 0.2F}));
+    primitives.push_back(make_primitive(Shape::kBox, kSurface, {-9, 0, 0}, {0.3F, 4, 2}));
     Renderer renderer;
     renderer.start(beams, 50, 1);
     for (const Primitive& primitive : primitives) renderer.add(primitive, 0, 0);
@@ -67,8 +67,8 @@ TEST_CASE("a wall hides everything behind it") {
   beams.fill(sensor_model(Sensor::kHdl64), 1, 0);
   Renderer renderer;
   renderer.start(beams, 100, 1);
-  renderer.add(make_primitive(Shape::kBox, kSolid, {20, 0, 0}, {0.5F, 1, 1}), 1, 0);
-  renderer.add(make_primitive(Shape::kBox, kSolid, {10, 0, 0}, {0.5F, 10, 10}), 2, 0);
+  renderer.add(make_primitive(Shape::kBox, kSurface, {20, 0, 0}, {0.5F, 1, 1}), 1, 0);
+  renderer.add(make_primitive(Shape::kBox, kSurface, {10, 0, 0}, {0.5F, 10, 10}), 2, 0);
   renderer.draw();
   std::size_t wall = 0;
   for (const Renderer::Hit& hit : renderer.hits()) {

@@ -26,6 +26,12 @@ class Random {
     for (int i = 0; i < 3; ++i) result[i] = uniform(low[i], high[i]);
     return result;
   }
+  /// Sum of twelve uniform numbers: mean 0, standard deviation 1, and nearly normal.
+  double normal() {
+    double sum = -6.0;
+    for (int i = 0; i < 12; ++i) sum += uniform(0.0, 1.0);
+    return sum;
+  }
   /// Uniform in [0, count).
   std::size_t index(std::size_t count) { return static_cast<std::size_t>(engine_() % count); }
 
