@@ -43,6 +43,12 @@ void ByteReader::read(char* target, std::size_t count, const char* purpose) {
   if (got != count) fail_here(std::string("file ends, expected ") + purpose);
 }
 
+std::string ByteReader::read_block(std::uint64_t count, const char* purpose) {
+  std::string bytes(static_cast<std::size_t>(count), '\0');
+  read(bytes.data(), bytes.size(), purpose);
+  return bytes;
+}
+
 void ByteReader::skip(std::uint64_t count, const char* purpose) {
   if (count > remaining()) {
     position_ = size_;

@@ -26,6 +26,7 @@ class ByteReader {
 
   /// Reads exactly `count` bytes. Throws IoError with `purpose` if the file ends before.
   void read(char* target, std::size_t count, const char* purpose);
+  std::string read_block(std::uint64_t count, const char* purpose);
   void skip(std::uint64_t count, const char* purpose);
 
   [[noreturn]] void fail_here(const std::string& what) const;     ///< names the current byte

@@ -10,6 +10,8 @@
 #include "dynains/io/folder_lock.hpp"
 #include "failure.hpp"
 #include "session_files.hpp"
+#include "session_folder.hpp"
+#include "session_json.hpp"
 
 namespace dynains {
 namespace {

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "cell_surfaces.hpp"
 #include "finite_points.hpp"
 #include "median.hpp"
 #include "scan_registration.hpp"
@@ -15,9 +16,6 @@
 
 namespace dynains {
 namespace {
-
-using Vector6 = Eigen::Matrix<double, 6, 1>;
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 constexpr double kLever = 10.0;  // m, distance of the points at which a rotation is judged
 

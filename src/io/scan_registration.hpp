@@ -7,36 +7,26 @@
 #include <optional>
 #include <vector>
 
+#include "cell_surfaces.hpp"
 #include "dynains/points.hpp"
-#include "dynains/stage/voxel_hash_table.hpp"
 
 namespace dynains {
 
 /// One scan as a reference and as a source of a registration.
 class RegistrationScan {
  public:
-  static constexpr std::size_t kLevels = 3;
-
-  /// Plane, or pole, through the points of a cell.
-  struct Cell {
-    Eigen::Vector3d mean;  ///< m, sensor frame
-    std::array<Eigen::Vector3d, 2>
-        directions;               ///< orthonormal; the cell determines places along them
-    std::size_t direction_count;  ///< 1: plane, 2: pole
-  };
-
   /// `points`: m, sensor frame, finite.
   explicit RegistrationScan(PointsView points);
 
   /// One point for each voxel of 0.4 m, 2 to 60 m from the sensor.
   const std::vector<Eigen::Vector3d>& points() const { return points_; }
-  /// The cell around a point; null if it has too few points or no plane.
-  const Cell* find(std::size_t level, const Eigen::Vector3d& point) const;
+  /// The surface in the cell around a point; null if it has too few points or no surface.
+  const CellSurface* find(std::size_t level, const Eigen::Vector3d& point) const;
 
  private:
   std::vector<Eigen::Vector3d> points_;
-  std::array<VoxelHashTable<>, kLevels> index_;
-  std::array<std::vector<Cell>, kLevels> cells_;
+  std::array<VoxelHashTable<>, kCellLevels> index_;
+  std::array<std::vector<CellSurface>, kCellLevels> surfaces_;
 };
 
 struct Registration {
@@ -63,8 +53,5 @@ struct KnownWay {
 /// As register_scans(), by small steps from `guess`, whose translation along `way` is known.
 std::optional<Registration> register_near(const RegistrationScan& a, const RegistrationScan& b,
                                           const Eigen::Isometry3d& guess, const KnownWay& way);
-
-/// Rigid motion of a rotation vector (rad) and a translation (m).
-Eigen::Isometry3d motion_of(const Eigen::Matrix<double, 6, 1>& rotation_and_translation);
 
 }  // namespace dynains

@@ -1,6 +1,5 @@
 #include "dynains/io/session_aligner.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
@@ -12,72 +11,17 @@
 #include <string>
 #include <utility>
 
+#include "cell_surfaces.hpp"
 #include "dynains/errors.hpp"
-#include "scan_registration.hpp"
 
 namespace dynains {
 namespace {
 
-using Vector6 = Eigen::Matrix<double, 6, 1>;
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
-
-constexpr double kReach = 40.0;   // m, points of a scan that count
-constexpr double kNearest = 2.0;  // m
-constexpr double kThinned = 0.4;  // m, edge of the voxels that keep one point of the session
-constexpr std::size_t kLevels = 3;
-constexpr std::array<double, kLevels> kEdges = {4.0, 2.0, 1.0};  // m, of cells
-constexpr std::size_t kNewest = 3;                               // sessions in a tile that count
+constexpr double kReach = 40.0;     // m, points of a scan that count
+constexpr double kNearest = 2.0;    // m
+constexpr double kThinned = 0.4;    // m, edge of the voxels that keep one point of the session
+constexpr std::size_t kNewest = 3;  // sessions in a tile that count
 constexpr double kDegree = M_PI / 180.0;
-
-VoxelKey key_of(const Eigen::Vector3d& p, double edge) {
-  const auto index = [&](double metres) {
-    return static_cast<std::int64_t>(std::floor(metres / edge));
-  };
-  return voxel_key(index(p.x()), index(p.y()), index(p.z()));
-}
-
-/// Sums over the points of a cell, relative to its corner.
-struct Moments {
-  Eigen::Vector3d origin;
-  double count = 0.0;
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-};
-
-/// Plane, or upright pole, through the points of a cell.
-struct Surface {
-  Eigen::Vector3d mean;                       // m
-  std::array<Eigen::Vector3d, 2> directions;  // orthonormal; determined places along them
-  std::uint8_t direction_count = 0;           // 0: no surface; 1: plane; 2: pole
-  bool is_upright = false;
-};
-
-Surface surface_of(const Moments& m, double edge) {
-  constexpr double kFewest = 6.0;   // points
-  constexpr double kThin = 0.15;    // ratio of the extents across and along a plane
-  constexpr double kNarrow = 0.2;   // ratio of the extents of a line
-  constexpr double kSteep = 0.8;    // z of a pole
-  constexpr double kUpright = 0.5;  // most z of the normal of an upright plane
-  Surface surface;
-  if (m.count < kFewest) return surface;
-  const Eigen::Vector3d mean = m.sum / m.count;
-  surface.mean = m.origin + mean;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(m.squares / m.count -
-                                                              mean * mean.transpose());
-  const Eigen::Vector3d extent = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-  const Eigen::Matrix3d& axes = solver.eigenvectors();
-  if (extent[2] < 0.05 * edge) return surface;
-  surface.directions = {axes.col(0), axes.col(1)};
-  if (extent[1] < kNarrow * extent[2]) {
-    if (std::abs(axes(2, 2)) < kSteep) return surface;
-    surface.direction_count = 2;
-    surface.is_upright = true;
-  } else if (extent[0] <= kThin * extent[1] + 0.03) {
-    surface.direction_count = 1;
-    surface.is_upright = std::abs(axes(2, 0)) < kUpright;
-  }
-  return surface;
-}
 
 /// Surfaces of the map in cells of one size.
 class SurfaceGrid {
@@ -85,36 +29,32 @@ class SurfaceGrid {
   explicit SurfaceGrid(double edge) : edge_(edge) {}
 
   void add(const Eigen::Vector3d& point) {
-    const VoxelKey key = key_of(point, edge_);
+    const VoxelKey key = cell_key(point, edge_);
     const std::uint32_t number = index_.insert(key);
     if (number == moments_.size()) {
       moments_.emplace_back();
       moments_.back().origin = (point / edge_).array().floor() * edge_;
     }
-    Moments& m = moments_[number];
-    const Eigen::Vector3d relative = point - m.origin;
-    m.count += 1.0;
-    m.sum += relative;
-    m.squares += relative * relative.transpose();
+    moments_[number].add(point);
   }
   void finish() {
     surfaces_.reserve(moments_.size());
-    for (const Moments& m : moments_) surfaces_.push_back(surface_of(m, edge_));
+    for (const CellMoments& m : moments_) surfaces_.push_back(surface_of(m, edge_));
     moments_ = {};
   }
   /// The surface around a point, or null. Ground at the border of two layers of cells may be in
   /// one of them only, so that the next layer counts if the cell of the point has no surface.
-  const Surface* find(const Eigen::Vector3d& point) const {
-    const Surface* found = find_at(key_of(point, edge_));
+  const CellSurface* find(const Eigen::Vector3d& point) const {
+    const CellSurface* found = find_at(cell_key(point, edge_));
     if (found != nullptr) return found;
     const double layer = point.z() / edge_;
     const double step = layer - std::floor(layer) < 0.5 ? -edge_ : edge_;
-    found = find_at(key_of({point.x(), point.y(), point.z() + step}, edge_));
+    found = find_at(cell_key({point.x(), point.y(), point.z() + step}, edge_));
     return found != nullptr && found->is_upright ? nullptr : found;
   }
 
  private:
-  const Surface* find_at(VoxelKey key) const {
+  const CellSurface* find_at(VoxelKey key) const {
     const std::uint32_t number = index_.find(key);
     if (number == VoxelHashTable<>::kNone || surfaces_[number].direction_count == 0) return nullptr;
     return &surfaces_[number];
@@ -122,17 +62,15 @@ class SurfaceGrid {
 
   double edge_;
   VoxelHashTable<> index_;
-  std::vector<Moments> moments_;
-  std::vector<Surface> surfaces_;
+  std::vector<CellMoments> moments_;
+  std::vector<CellSurface> surfaces_;
 };
 
-using SurfaceMap = std::array<SurfaceGrid, kLevels>;
+using SurfaceMap = std::array<SurfaceGrid, kCellLevels>;
 
-/// Normal equations at one motion, and how well it fits.
-struct Linearization {
-  Matrix6 H = Matrix6::Zero();
-  Vector6 g = Vector6::Zero();
-  std::size_t met = 0;  // points that meet a surface
+/// Normal equations at one motion, and how well its points fit.
+struct SurfaceFit {
+  NormalEquations equations;
   std::size_t upright = 0, upright_inliers = 0;
   double upright_weight = 0.0, other_weight = 0.0;
   std::size_t inliers = 0;
@@ -148,28 +86,13 @@ class Fit {
       : map_(map), points_(points) {}
 
   /// `scale`: m, distance at which the weight of a point is a fourth.
-  Linearization linearize(const Eigen::Isometry3d& T, std::size_t level, double scale) const {
-    Linearization sum;
-    auto H = sum.H.selfadjointView<Eigen::Lower>();
+  SurfaceFit linearize(const Eigen::Isometry3d& T, std::size_t level, double scale) const {
+    SurfaceFit sum;
     for (const Eigen::Vector3d& point : points_) {
       const Eigen::Vector3d p = T * point;
-      const Surface* const surface = map_[level].find(p);
+      const CellSurface* const surface = map_[level].find(p);
       if (surface == nullptr) continue;
-      ++sum.met;
-      std::array<double, 2> distances{};
-      double squared = 0.0;
-      for (std::size_t k = 0; k < surface->direction_count; ++k) {
-        distances[k] = surface->directions[k].dot(p - surface->mean);
-        squared += distances[k] * distances[k];
-      }
-      const double root = 1.0 / (1.0 + squared / (scale * scale));
-      const double weight = root * root;
-      for (std::size_t k = 0; k < surface->direction_count; ++k) {
-        Vector6 J;
-        J << p.cross(surface->directions[k]), surface->directions[k];
-        H.rankUpdate(J, weight);
-        sum.g += (weight * distances[k]) * J;
-      }
+      const auto [squared, weight] = sum.equations.add(p, *surface, scale);
       const bool is_inlier = squared <= kInlier * kInlier;
       if (surface->is_upright) {
         ++sum.upright;
@@ -182,23 +105,14 @@ class Fit {
       ++sum.inliers;
       sum.squares += squared;
     }
-    sum.H.triangularView<Eigen::StrictlyUpper>() = sum.H.transpose();
     return sum;
   }
 
-  /// Gauss-Newton steps until they are short.
-  Eigen::Isometry3d refine(Eigen::Isometry3d T, std::size_t level, double scale, int most) const {
-    constexpr std::size_t kFewest = 30;
-    for (int k = 0; k < most; ++k) {
-      const Linearization sum = linearize(T, level, scale);
-      if (sum.met < kFewest) break;
-      const Matrix6 damped = sum.H + 1e-3 * Matrix6::Identity();
-      const Vector6 change = -damped.ldlt().solve(sum.g);
-      if (!change.allFinite()) break;
-      T = motion_of(change) * T;
-      if (change.head<3>().norm() < 1e-6 && change.tail<3>().norm() < 1e-4) break;
-    }
-    return T;
+  Eigen::Isometry3d refine(const Eigen::Isometry3d& T, std::size_t level, double scale,
+                           int most) const {
+    return gauss_newton(T, most, 1e-6, [&](const Eigen::Isometry3d& at) {
+      return linearize(at, level, scale).equations;
+    });
   }
 
  private:
@@ -251,7 +165,7 @@ Coarse search(const Fit& fit) {
     Eigen::Isometry3d T = fit.refine(guess, 0, 1.0, 12);
     T = fit.refine(T, 1, 0.4, 10);
     T = fit.refine(T, 2, 0.2, 5);
-    const Linearization sum = fit.linearize(T, 2, 0.15);
+    const SurfaceFit sum = fit.linearize(T, 2, 0.15);
     // Both what is upright and the ground have to fit.
     results.emplace_back(std::sqrt(sum.upright_weight * (1.0 + sum.other_weight)), T);
   }
@@ -330,7 +244,7 @@ std::vector<Eigen::Vector3d> thinned(const std::vector<Eigen::Vector3d>& points,
 }
 
 /// Throws ConfigError unless a result is a fit.
-void check_fit(const City& city, const Linearization& sum, const Eigen::Isometry3d& T_correction,
+void check_fit(const City& city, const SurfaceFit& sum, const Eigen::Isometry3d& T_correction,
                bool is_ambiguous, const SessionAlignment& alignment) {
   constexpr std::size_t kFewest = 200;  // points at upright surfaces
   constexpr double kLeastFitting = 0.7;
@@ -364,12 +278,10 @@ void check_fit(const City& city, const Linearization& sum, const Eigen::Isometry
 }
 
 /// Deviation (m) of the translation along its least certain direction.
-double uncertainty_of(const Linearization& sum) {
-  // Distances of neighbouring points are correlated, so the deviation of a point is a large value.
-  constexpr double kDeviation = 0.2;  // m
+double uncertainty_of(const SurfaceFit& sum) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(
-      (sum.H + 1e-6 * Matrix6::Identity()).inverse().bottomRightCorner<3, 3>());
-  return kDeviation * std::sqrt(std::max(0.0, solver.eigenvalues()[2]));
+      sum.equations.translation_covariance());
+  return kPointDeviation * std::sqrt(std::max(0.0, solver.eigenvalues()[2]));
 }
 
 }  // namespace
@@ -384,7 +296,7 @@ void SessionAligner::add(PointsView points, const Eigen::Isometry3d& T_session_s
     if (!(range > kNearest && range < kReach)) continue;
     const Eigen::Vector3d point = T_session_sensor * local;
     const std::size_t count = taken_.size();
-    if (taken_.insert(key_of(point - origin, kThinned)) == count) points_.push_back(point);
+    if (taken_.insert(cell_key(point - origin, kThinned)) == count) points_.push_back(point);
   }
   scan.end = points_.size();
   scans_.push_back(scan);
@@ -405,7 +317,7 @@ SessionAlignment SessionAligner::align(const Eigen::Isometry3d& T_city_start) co
   SessionAlignment alignment;
   alignment.T_city_start = T_city_start;
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  Linearization sum;
+  SurfaceFit sum;
   bool is_ambiguous = false;
   double farthest = 0.0;
   for (const Scan& scan : scans_) farthest = std::max(farthest, to_fit(scan.sensor).norm());
@@ -422,7 +334,8 @@ SessionAlignment SessionAligner::align(const Eigen::Isometry3d& T_city_start) co
       places.push_back(centre + T * sensor);
       for (std::size_t i = scan.begin; i < scan.end; ++i) points.push_back(to_fit(points_[i]));
     }
-    SurfaceMap map = {SurfaceGrid(kEdges[0]), SurfaceGrid(kEdges[1]), SurfaceGrid(kEdges[2])};
+    SurfaceMap map = {SurfaceGrid(kCellEdges[0]), SurfaceGrid(kCellEdges[1]),
+                      SurfaceGrid(kCellEdges[2])};
     const double slack = is_first ? 8.0 : 3.0;  // m
     tiles.for_each_near(places, kReach + slack, names, [&](const Eigen::Vector3d& position) {
       for (SurfaceGrid& grid : map) grid.add(position - centre);

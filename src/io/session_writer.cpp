@@ -17,6 +17,8 @@
 #include "failure.hpp"
 #include "new_file.hpp"
 #include "session_files.hpp"
+#include "session_folder.hpp"
+#include "session_json.hpp"
 
 namespace dynains {
 namespace {

@@ -33,7 +33,7 @@ struct JudgedScan {
 }
 
 // The object as a NumPy array; null if NumPy cannot convert it.
-py::array to_array(const py::handle& values) {
+py::array as_array(const py::handle& values) {
   py::array array = py::array::ensure(py::reinterpret_borrow<py::object>(values));
   if (!array) PyErr_Clear();
   return array;
@@ -74,8 +74,8 @@ void expect_length(const char* what, std::size_t scan, const py::array& array, p
 JudgedScan make_scan(std::size_t index, const py::handle& points, const py::handle& pose,
                      const py::handle& truth, const py::handle& kept) {
   JudgedScan scan{Contiguous<float>::ensure(points),
-                  to_truth(index, to_array(truth)),
-                  to_numbers<std::uint8_t>("kept", index, to_array(kept), 1,
+                  to_truth(index, as_array(truth)),
+                  to_numbers<std::uint8_t>("kept", index, as_array(kept), 1,
                                            "bool, for example is_static(verdict.labels)"),
                   {}};
   if (!scan.points) refuse("points", index, "an array (N, 3) or (N, 4) of numbers");

@@ -1,0 +1,334 @@
+// Poses and times of a recording, and how they belong to its scans.
+#include <algorithm>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/kitti.hpp"
+#include "dynains/io/point_file.hpp"
+#include "dynains/io/recording.hpp"
+#include "failure.hpp"
+#include "input_file.hpp"
+#include "kitti_files.hpp"
+#include "median.hpp"
+#include "scan_files.hpp"
+#include "text.hpp"
+
+namespace dynains {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_identity(const Eigen::Isometry3d& pose) {
+  return pose.isApprox(Eigen::Isometry3d::Identity(), 1e-12);
+}
+
+std::string in_seconds(double time) {
+  std::ostringstream text;
+  text::exact(text);
+  text.precision(15);
+  text << time << " s";
+  return text.str();
+}
+
+/// Proposes a longer gap if most gaps of the trajectory are too long; else empty.
+std::string gap_hint(const Trajectory& trajectory, double longest) {
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < trajectory.times.size(); ++i) {
+    gaps.push_back(trajectory.times[i] - trajectory.times[i - 1]);
+  }
+  const double usual = median(std::move(gaps));
+  if (!(usual > longest)) return {};
+  return ". Poses are " + in_seconds(usual) +
+         " apart: --pose-gap takes them, at the cost of the error of a linear motion between them";
+}
+
+std::string shown(const fs::path& path, const fs::path& folder) {
+  const fs::path shorter = path.lexically_relative(folder);
+  return shorter.empty() || *shorter.begin() == ".." ? path.string() : shorter.string();
+}
+
+}  // namespace
+
+fs::path Recording::find_poses() const {
+  if (!options_.poses.empty()) return options_.poses;
+  std::vector<fs::path> folders = {folder_};
+  if (scan_folder_ != folder_) {
+    folders.push_back(scan_folder_);
+  } else {
+    folders.push_back(fs::absolute(folder_).lexically_normal() / "..");
+  }
+  for (const fs::path& folder : folders) {
+    for (const char* name : kPoseFiles) {
+      if (is_file(folder / name)) return (folder / name).lexically_normal();
+    }
+  }
+  fail(folder_ / "poses.txt",
+       "not found: expected a pose for each scan, there (12 numbers a row, or time x y z qx qy qz "
+       "qw), in VIEWPOINT of .pcd scans, or in a file given by --poses");
+}
+
+void Recording::read_viewpoints() {
+  Trajectory viewpoints;
+  viewpoints.order = QuaternionOrder::kWxyz;
+  for (const Scan& scan : scans_) {
+    viewpoints.poses.push_back(read_point_file_header(scan.file).viewpoint);
+    has_viewpoints_ = has_viewpoints_ || !is_identity(viewpoints.poses.back());
+  }
+  if (has_viewpoints_) trajectory_ = std::move(viewpoints);
+}
+
+/// The first existing file of `names` in the folder or beside the poses; empty if there is none.
+fs::path Recording::find_beside(const fs::path& poses_file,
+                                const std::vector<const char*>& names) const {
+  std::vector<fs::path> folders = {folder_};
+  if (!poses_file.empty()) folders.push_back(poses_file.parent_path());
+  for (const fs::path& folder : folders) {
+    for (const char* name : names) {
+      if (is_file(folder / name)) return folder / name;
+    }
+  }
+  return {};
+}
+
+/// Reads calib.txt, which poses of a camera need.
+void Recording::read_calibration(const fs::path& poses_file) {
+  const fs::path file = find_beside(poses_file, {"calib.txt"});
+  if (file.empty()) return;
+  files_.push_back(file);
+  const PoseFrame frame = options_.convention.frame;
+  const bool is_matrix = trajectory_.order == QuaternionOrder::kNone;
+  try {
+    Tr_ = read_kitti_calib(file);
+    has_calibration_ = true;
+  } catch (const IoError& error) {
+    if (frame == PoseFrame::kCamera || (frame == PoseFrame::kAuto && is_matrix)) throw;
+    notes_.push_back(std::string("not used: ") + error.what());
+  }
+}
+
+void Recording::read_poses() {
+  if (options_.poses.empty() && format_ == ScanFormat::kPcd) read_viewpoints();
+  fs::path file;
+  if (has_viewpoints_) {
+    notes_.push_back("poses from VIEWPOINT of the scans");
+  } else {
+    file = find_poses();
+    files_.push_back(file);
+    trajectory_ = read_trajectory(file);
+    notes_.push_back("poses from " + shown(file, folder_));
+  }
+  read_calibration(file);
+  match_scans(file);
+  place_scans(has_viewpoints_ ? scan_folder_ : file);
+}
+
+std::optional<std::vector<double>> Recording::times_of_names() const {
+  std::vector<double> times;
+  for (const Scan& scan : scans_) {
+    const std::optional<double> time = time_of_name(scan.name);
+    if (!time) return std::nullopt;
+    times.push_back(*time);
+  }
+  return times;
+}
+
+/// Times of the scan files from a file of times or from their names.
+std::optional<std::vector<double>> Recording::find_times(const fs::path& poses_file) {
+  const fs::path file = options_.times.empty()
+                            ? find_beside(poses_file, {"times.txt", "timestamps.txt"})
+                            : options_.times;
+  if (file.empty()) return times_of_names();
+  files_.push_back(file);
+  std::vector<double> rows = read_kitti_times(file);
+  for (double& time : rows) time = to_seconds(time);
+  if (rows.size() == scans_.size()) return rows;
+  const bool has_all_numbers = numbered_ && rows.size() > scans_.back().number;
+  const bool is_ours = !options_.times.empty() || file.parent_path() == folder_;
+  if (!is_ours && !has_all_numbers) {
+    notes_.push_back("not used: " + shown(file, folder_) + " has " + std::to_string(rows.size()) +
+                     " rows for " + std::to_string(scans_.size()) + " scans");
+    return times_of_names();
+  }
+  if (!numbered_) {
+    fail_at_line(file, std::min(rows.size(), scans_.size()) + 1,
+                 "expected a row for each of " + std::to_string(scans_.size()) + " scans, found " +
+                     std::to_string(rows.size()));
+  }
+  check_rows(file, rows.size(), scans_.back().number + 1);
+  std::vector<double> times;
+  for (const Scan& scan : scans_) times.push_back(rows[scan.number]);
+  return times;
+}
+
+/// Matches rows to scans by order if there are equally many, else by the number of the scan.
+void Recording::match_rows(const fs::path& file) {
+  const std::size_t rows = trajectory_.poses.size();
+  const bool by_order = rows == scans_.size();
+  if (!by_order && !numbered_) {
+    fail_at_line(file, std::min(rows, scans_.size()) + 1,
+                 "expected a row for each of " + std::to_string(scans_.size()) +
+                     " scans, or rows and scans with times; found " + std::to_string(rows));
+  }
+  if (!by_order) check_rows(file, rows, scans_.back().number + 1);
+  for (std::size_t i = 0; i < scans_.size(); ++i) {
+    const std::size_t row = by_order ? i : static_cast<std::size_t>(scans_[i].number);
+    matches_.push_back(TrajectoryMatch{row, row, 0.0});
+  }
+}
+
+void Recording::match_times(const fs::path& file, const std::vector<double>& times) {
+  std::size_t found = 0;
+  for (const double time : times) {
+    matches_.push_back(match_time(trajectory_, time + options_.time_offset, options_.pose_gap));
+    if (matches_.back()) ++found;
+  }
+  if (2 * found >= times.size()) return;
+  fail(file, "has poses from " + in_seconds(trajectory_.times.front()) + " to " +
+                 in_seconds(trajectory_.times.back()) + " for " + std::to_string(found) + " of " +
+                 std::to_string(times.size()) + " scans, which are from " +
+                 in_seconds(times.front()) + " to " + in_seconds(times.back()) +
+                 "; expected times of one clock, with gaps of at most " +
+                 in_seconds(options_.pose_gap) + gap_hint(trajectory_, options_.pose_gap));
+}
+
+void Recording::match_scans(const fs::path& file) {
+  // Times beside a file of --poses may belong to another recording.
+  const std::optional<std::vector<double>> times =
+      find_times(options_.poses.empty() ? file : fs::path());
+  if (times) {
+    for (std::size_t i = 0; i < scans_.size(); ++i) {
+      scans_[i].time = (*times)[i];
+      if (i > 0 && !(scans_[i].time > scans_[i - 1].time)) {
+        fail(scans_[i].file, "expected a time after that of the scan before, " +
+                                 in_seconds(scans_[i - 1].time) + "; found " +
+                                 in_seconds(scans_[i].time));
+      }
+    }
+  }
+  if (!trajectory_.times.empty() && times) {
+    match_times(file, *times);
+    notes_.push_back("poses belong to scans by time, interpolated");
+    return;
+  }
+  match_rows(file);
+  note_rows(file);
+  for (std::size_t i = 0; i < scans_.size() && !times; ++i) {
+    const std::size_t row = matches_[i]->before;
+    scans_[i].time = trajectory_.times.empty() ? kKittiPeriod * static_cast<double>(row)
+                                               : trajectory_.times[row];
+  }
+  if (!times && trajectory_.times.empty()) notes_.push_back("no times: 0.1 s from scan to scan");
+  if (options_.time_offset != 0.0) shift_times(file);
+}
+
+/// Notes how rows without times belong to scans.
+void Recording::note_rows(const fs::path& file) {
+  const std::size_t rows = trajectory_.poses.size();
+  if (rows == scans_.size()) {
+    notes_.push_back("poses belong to scans one by one");
+    return;
+  }
+  notes_.push_back(std::to_string(rows) + " poses for " + std::to_string(scans_.size()) +
+                   " scans in " + shown(file, folder_) +
+                   ": row N belongs to the scan with number N, counted from 0");
+}
+
+/// Matches scans to the times of their rows plus the offset.
+void Recording::shift_times(const fs::path& file) {
+  if (trajectory_.times.empty()) {
+    fail(file, "has no times, which an offset of the time needs; expected rows with times");
+  }
+  std::vector<double> times;
+  for (const Scan& scan : scans_) times.push_back(scan.time);
+  matches_.clear();
+  match_times(file, times);
+}
+
+/// Sets the poses of scans and leaves out scans without one. `poses`: their file or folder.
+void Recording::place_scans(const fs::path& poses) {
+  const std::size_t all = scans_.size();
+  std::vector<Scan> placed;
+  std::string missing;
+  for (std::size_t i = 0; i < all; ++i) scans_[i].match = i;
+  for (std::size_t i = 0; i < all; ++i) {
+    const auto pose = pose_under(options_.convention, i);
+    if (pose) {
+      placed.push_back(scans_[i]);
+      placed.back().T_world_sensor = *pose;
+    } else if (missing.empty()) {
+      missing = scans_[i].name;
+    }
+  }
+  if (placed.empty()) fail(poses, "has no pose for any scan; check --pose-shift");
+  if (placed.size() < all) {
+    notes_.push_back(std::to_string(all - placed.size()) + " of " + std::to_string(all) +
+                     " scans have no pose and are left out, " + missing + " first");
+  }
+  scans_ = std::move(placed);
+}
+
+std::optional<Eigen::Isometry3d> Recording::pose_under(const PoseConvention& convention,
+                                                       std::size_t i) const {
+  const auto at = static_cast<std::ptrdiff_t>(scans_.at(i).match) + convention.shift;
+  if (at < 0 || at >= static_cast<std::ptrdiff_t>(matches_.size())) return std::nullopt;
+  const std::optional<TrajectoryMatch>& match = matches_[static_cast<std::size_t>(at)];
+  if (!match) return std::nullopt;
+  return pose_of(convention, *match);
+}
+
+std::optional<Eigen::Isometry3d> Recording::pose_after(std::size_t i, double offset) const {
+  const double time = scans_.at(i).time + options_.time_offset + offset;
+  const auto match = match_time(trajectory_, time, options_.pose_gap);
+  if (!match) return std::nullopt;
+  return pose_of(options_.convention, *match);
+}
+
+Eigen::Isometry3d Recording::pose_of(const PoseConvention& convention,
+                                     const TrajectoryMatch& match) const {
+  const QuaternionOrder order = trajectory_.order;
+  return to_sensor_pose(
+      convention,
+      interpolate(apply(convention, trajectory_.poses[match.before], order),
+                  apply(convention, trajectory_.poses[match.after], order), match.share));
+}
+
+/// T_world_sensor of a pose to which the rest of the convention was applied.
+Eigen::Isometry3d Recording::to_sensor_pose(const PoseConvention& convention,
+                                            const Eigen::Isometry3d& pose) const {
+  const bool is_matrix = trajectory_.order == QuaternionOrder::kNone;
+  const bool is_camera = convention.frame == PoseFrame::kCamera ||
+                         (convention.frame == PoseFrame::kAuto && has_calibration_ && is_matrix);
+  if (!is_camera) return pose * convention.T_body_sensor;
+  const Eigen::Isometry3d T_camera_sensor = has_calibration_ ? Tr_ : camera_axes();
+  return T_camera_sensor.inverse() * pose * T_camera_sensor * convention.T_body_sensor;
+}
+
+/// The trajectory if it has times of its own, else the poses of the scans.
+void Recording::prepare_deskewing() {
+  if (!columns_.time) fail(folder_, "de-skewing needs a time for each point, a column time");
+  if (frame_ == PointFrame::kWorld) {
+    fail(folder_, "de-skewing needs points in the frame of the sensor");
+  }
+  notes_.push_back("points are de-skewed by their times");
+  const Trajectory& rows = motion_.times.empty() ? trajectory_ : motion_;
+  const PoseConvention& convention = options_.convention;
+  Trajectory motion;
+  if (convention.shift == 0 && rows.times.size() > 1) {
+    // A scan at time t has the pose at t + time_offset.
+    for (const double time : rows.times) motion.times.push_back(time - options_.time_offset);
+    for (const Eigen::Isometry3d& row : rows.poses) {
+      motion.poses.push_back(to_sensor_pose(convention, apply(convention, row, trajectory_.order)));
+    }
+  } else {
+    for (const Scan& scan : scans_) {
+      motion.times.push_back(scan.time);
+      motion.poses.push_back(scan.T_world_sensor);
+    }
+  }
+  motion_ = std::move(motion);
+}
+
+}  // namespace dynains

@@ -1,0 +1,37 @@
+// Files of scans in a folder: formats, names and order.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dynains/io/recording.hpp"
+
+namespace dynains {
+
+/// Names of files of poses, which are no scans.
+inline constexpr std::array<const char*, 6> kPoseFiles = {
+    "poses.txt", "poses.csv", "poses.tum", "trajectory.txt", "trajectory.csv", "trajectory.tum"};
+
+/// By the extension; empty for files that are no scans.
+std::optional<ScanFormat> scan_format_of(const std::filesystem::path& path);
+
+/// Scan files directly in `folder`, except hidden ones, in the order of the numbers in their names.
+/// Throws IoError.
+std::vector<std::filesystem::path> scan_files(const std::filesystem::path& folder);
+
+/// The file name without extensions.
+std::string name_of_scan(const std::filesystem::path& file);
+
+/// Whether a name is a number, of at most 9 digits.
+bool is_number(const std::string& name);
+
+/// Time in seconds of a name that is a time.
+std::optional<double> time_of_name(const std::string& name);
+
+/// For a folder whose only scans are in known formats that are not read: how to convert them.
+std::optional<std::string> conversion_of_scans(const std::filesystem::path& folder);
+
+}  // namespace dynains
