@@ -14,6 +14,7 @@
 #include "detail/range_gate.hpp"
 #include "detail/scan_voxels.hpp"
 #include "detail/voxel_grid.hpp"
+#include "detail/voxel_index.hpp"
 #include "dynains/errors.hpp"
 
 namespace dynains::evaluation {
@@ -131,7 +132,7 @@ class MapProtocol::Impl {
     truths_.assign(groups_.size(), 0);
     farthest_.assign(groups_.size(), kFar);
     mixed_.assign(groups_.grouped_points(), {});
-    near_mixed_.clear();
+    near_mixed_ = {};
     for (std::size_t cell = 0; cell < groups_.size(); ++cell) {
       for (const VoxelKey offset : detail::kNeighbours) {
         const std::uint32_t number = measured_.find(groups_.key(cell) + offset);

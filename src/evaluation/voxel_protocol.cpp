@@ -1,6 +1,7 @@
 #include "dynains/evaluation/voxel_protocol.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -13,7 +14,9 @@
 #include "detail/preservation.hpp"
 #include "detail/range_gate.hpp"
 #include "detail/scan_voxels.hpp"
+#include "detail/voxel_filter.hpp"
 #include "detail/voxel_grid.hpp"
+#include "detail/voxel_index.hpp"
 #include "dynains/errors.hpp"
 #include "threads/background.hpp"
 
@@ -43,8 +46,14 @@ class VoxelProtocol::Impl {
   void add(const LabelledScan& scan) {
     if (!grid_) grid_.emplace(settings_.voxel, scan.T_world_sensor.translation());
     next_.clear();
+    const auto number = [this](const VoxelKey* keys, std::size_t count, std::uint32_t* numbers) {
+      index_.insert(keys, count, numbers);
+      for (std::size_t k = 0; k < count; ++k) {
+        if (numbers[k] == keys_.size()) keys_.push_back(keys[k]);
+      }
+    };
     voxelise(
-        scan, [this](VoxelKey key) { scan_voxels_.prefetch(key); }, [](VoxelKey) { return true; },
+        scan, [](detail::PointBlock&) { return true; }, number,
         [this](const detail::ScanVoxel& voxel) { next_.push_back(voxel); });
     // The voxels of this scan are accumulated while the caller prepares the next one.
     accumulating_.wait();
@@ -56,39 +65,27 @@ class VoxelProtocol::Impl {
   void resolve(const LabelledScan& scan) {
     finish_first_pass();
     if (pending_.size() == 0) return;
-    const auto is_pending = [this](VoxelKey key) {
-      return pending_.find(key) != detail::VoxelIndex::kNone;
+    const auto number = [this](const VoxelKey* keys, std::size_t count, std::uint32_t* numbers) {
+      pending_.find(keys, count, numbers);
     };
-    const auto prefetch = [this](VoxelKey key) {
-      __builtin_prefetch(&pending_.first_slot(voxel_hash(key)));
-    };
-    voxelise(scan, prefetch, is_pending, [this](const detail::ScanVoxel& found) {
-      const Voxel& voxel = voxels_[index_.find(found.key)];
-      double* nearest = &nearest_[pending_.find(found.key) * layers_];
-      for (std::size_t layer = 0; layer < layers_; ++layer) {
-        if ((found.layers >> layer & 1U) == 0) continue;
-        Cell& cell = forks_[voxel.fork + layer];
-        const double distance = (found.centroid - cell.centroid()).squaredNorm();
-        if (detail::is_nearer(distance, nearest[layer])) {
-          nearest[layer] = distance;
-          cell.truths = truth_bit(found.truth);
-        }
-      }
-    });
+    voxelise(
+        scan, [this](detail::PointBlock& block) { return pending_filter_.filter(block); }, number,
+        [this](const detail::ScanVoxel& found) { compare(found); });
   }
 
   VoxelScore score(std::size_t row) {
     finish_first_pass();
     VoxelScore score;
     const auto point_at = [&](std::uint32_t number) { return point(voxels_[number], row); };
-    for (const Voxel& voxel : voxels_) {
-      const VoxelPoint raw = *point(voxel, kIdentity);
+    for (std::size_t number = 0; number < voxels_.size(); ++number) {
+      const Voxel& voxel = voxels_[number];
       if (voxel.fork == kNotForked) {  // the estimate has the same point
-        detail::count(score, raw.truth, true);
+        detail::count(score, voxel.shared.truth(), true);
         continue;
       }
+      const VoxelPoint raw = *point(voxel, kIdentity);
       detail::count(score, raw.truth,
-                    detail::is_preserved(raw, voxel.key, *grid_, index_, point_at));
+                    detail::is_preserved(raw, keys_[number], *grid_, index_, point_at));
     }
     return score;
   }
@@ -125,7 +122,6 @@ class VoxelProtocol::Impl {
   /// Most voxels have the same points in every layer, stored once in `shared`. The first scan in
   /// which layers differ gives each layer a cell of its own, `forks_[fork + layer]`.
   struct Voxel {
-    VoxelKey key;
     Cell shared;
     std::uint32_t fork = kNotForked;
   };
@@ -140,54 +136,56 @@ class VoxelProtocol::Impl {
     return VoxelPoint{held.centroid(), held.truth()};
   }
 
-  /// Calls `visit(ScanVoxel)` for the voxels of a scan that are wanted. `prefetch(key)` is called
-  /// some points before `wanted(key)`.
-  template <class Prefetch, class Wanted, class Visit>
-  void voxelise(const LabelledScan& scan, Prefetch&& prefetch, Wanted&& wanted, Visit&& visit) {
-    // Consecutive points mostly have one label.
-    std::uint32_t last_label = scan.size() > 0 ? scan.truth[0] : 0;
-    Truth last_truth = settings_.truth(last_label);
-    const auto label_of = [&](std::size_t i) {
-      if (scan.truth[i] != last_label) {
-        last_label = scan.truth[i];
-        last_truth = settings_.truth(last_label);
-      }
-      unsigned layers = 1U << kIdentity;
-      if (last_truth == Truth::kStatic) layers |= 1U << kOracle;
-      if (!scan.in_map.empty()) layers |= static_cast<unsigned>(scan.in_map[i]) << kFirstEstimate;
-      return detail::LayeredTruth{last_truth, static_cast<LayerMask>(layers & all_layers_)};
-    };
+  /// Calls `visit(ScanVoxel)` for the voxels of a scan. `filter(block)` may take the keys of points
+  /// that are not needed, and is false if no point is. `number`: see ScanVoxels::add().
+  template <class Filter, class Number, class Visit>
+  void voxelise(const LabelledScan& scan, Filter&& filter, Number&& number, Visit&& visit) {
     detail::LocatedPoints points(scan, *grid_, gate_);
     scan_voxels_.clear();
-    points.for_each_run(prefetch, [&](const detail::PointRun& run) {
-      if (wanted(run.key)) scan_voxels_.add(run, label_of);
+    points.for_each_block([&](detail::PointBlock& block) {
+      if (!filter(block)) return;
+      label(scan, block);
+      scan_voxels_.add(block, labels_.data(), number);
     });
     scan_voxels_.for_each(
-        all_layers_, label_of, [&](std::size_t i) { return points.p_world(i); }, visit);
+        all_layers_, [&](std::size_t i) { return points.p_world(i); }, visit);
+  }
+
+  /// Labels the points of a block. Those that are ignored lose their key.
+  void label(const LabelledScan& scan, detail::PointBlock& block) {
+    // Consecutive points mostly have one label. Local copies avoid reloads after stores that could
+    // alias the originals.
+    const std::uint32_t* const labels = scan.truth.data() + block.first;
+    const std::uint8_t* const in_map =
+        scan.in_map.empty() ? nullptr : scan.in_map.data() + block.first;
+    const LayerMask all_layers = all_layers_;
+    std::uint32_t last_label = labels[0];
+    Truth truth = settings_.truth(last_label);
+    for (std::size_t k = 0, count = block.count; k < count; ++k) {
+      if (labels[k] != last_label) {
+        last_label = labels[k];
+        truth = settings_.truth(last_label);
+      }
+      unsigned layers = 1U << kIdentity;
+      if (truth == Truth::kStatic) layers |= 1U << kOracle;
+      if (in_map != nullptr) layers |= static_cast<unsigned>(in_map[k]) << kFirstEstimate;
+      labels_[k] = {truth, static_cast<LayerMask>(layers & all_layers)};
+      if (truth == Truth::kIgnored) block.key[k] = detail::kNoKey;
+    }
   }
 
   void accumulate(const std::vector<detail::ScanVoxel>& voxels) {
     constexpr std::size_t kAhead = 8;
     for (std::size_t v = 0; v < voxels.size(); ++v) {
-      prefetch_index(voxels[std::min(v + 2 * kAhead, voxels.size() - 1)].key);
-      prefetch_voxel(voxels[std::min(v + kAhead, voxels.size() - 1)].key);
+      const std::uint32_t ahead = voxels[std::min(v + kAhead, voxels.size() - 1)].number;
+      if (ahead < voxels_.size()) __builtin_prefetch(&voxels_[ahead]);
       accumulate(voxels[v]);
     }
   }
-  void prefetch_index(VoxelKey key) const {
-    __builtin_prefetch(&index_.first_slot(voxel_hash(key)));
-  }
-  void prefetch_voxel(VoxelKey key) const {
-    const detail::VoxelIndex::Slot& slot = index_.first_slot(voxel_hash(key));
-    if (slot.number >= voxels_.size()) return;
-    __builtin_prefetch(&voxels_[slot.number]);
-    __builtin_prefetch(&voxels_[slot.number].fork);
-  }
 
   void accumulate(const detail::ScanVoxel& found) {
-    const std::uint32_t number = index_.insert(found.key);
-    if (number == voxels_.size()) voxels_.push_back({found.key, {}, kNotForked});
-    Voxel& voxel = voxels_[number];
+    if (found.number == voxels_.size()) voxels_.emplace_back();
+    Voxel& voxel = voxels_[found.number];
     if (voxel.fork == kNotForked && found.layers == all_layers_) {
       voxel.shared.add(found.centroid, found.truth);
       return;
@@ -202,20 +200,43 @@ class VoxelProtocol::Impl {
     }
   }
 
+  void compare(const detail::ScanVoxel& found) {
+    const Voxel& voxel = voxels_[pending_voxels_[found.number]];
+    double* nearest = &nearest_[found.number * layers_];
+    for (std::size_t layer = 0; layer < layers_; ++layer) {
+      if ((found.layers >> layer & 1U) == 0) continue;
+      Cell& cell = forks_[voxel.fork + layer];
+      const double distance = (found.centroid - cell.centroid()).squaredNorm();
+      if (detail::is_nearer(distance, nearest[layer])) {
+        nearest[layer] = distance;
+        cell.truths = truth_bit(found.truth);
+      }
+    }
+  }
+
   /// Collects the voxels with points of both classes in some layer. All of them are forked: a voxel
   /// with equal layers has no dynamic point, because the oracle layer has none.
   void finish_first_pass() {
     if (finished_first_pass_) return;
     accumulating_.wait();
     finished_first_pass_ = true;
-    pending_.clear();
-    for (const Voxel& voxel : voxels_) {
-      if (voxel.fork == kNotForked) continue;
-      for (std::size_t layer = 0; layer < layers_; ++layer) {
-        if (forks_[voxel.fork + layer].truths == detail::kBothTruths) pending_.insert(voxel.key);
-      }
+    pending_ = {};
+    pending_filter_ = {};
+    pending_voxels_.clear();
+    for (std::size_t number = 0; number < voxels_.size(); ++number) {
+      if (!is_undecided(voxels_[number])) continue;
+      pending_.insert(keys_[number]);
+      pending_filter_.add(keys_[number]);
+      pending_voxels_.push_back(static_cast<std::uint32_t>(number));
     }
     nearest_.assign(pending_.size() * layers_, std::numeric_limits<double>::infinity());
+  }
+
+  bool is_undecided(const Voxel& voxel) const {
+    if (voxel.fork == kNotForked) return false;
+    const Cell* cells = &forks_[voxel.fork];
+    return std::any_of(cells, cells + layers_,
+                       [](const Cell& cell) { return cell.truths == detail::kBothTruths; });
   }
 
   Settings settings_;
@@ -223,20 +244,24 @@ class VoxelProtocol::Impl {
   std::size_t layers_;
   LayerMask all_layers_;
   std::optional<detail::VoxelGrid> grid_;
+  std::array<detail::LayeredTruth, detail::PointBlock::kMost> labels_;
   detail::ScanVoxels scan_voxels_;
 
+  detail::VoxelIndex index_;
+  std::vector<VoxelKey> keys_;  // by number of voxel
   std::vector<detail::ScanVoxel> next_;
 
   // The accumulating thread's until accumulating_.wait().
   std::vector<detail::ScanVoxel> accumulated_;
-  detail::VoxelIndex index_;
-  std::vector<Voxel> voxels_;
+  std::vector<Voxel> voxels_;  // by number
   std::vector<Cell> forks_;
 
   bool finished_first_pass_ = false;
   detail::VoxelIndex pending_;
-  std::vector<double> nearest_;  // squared distance, m^2, by pending voxel and layer
-  Background accumulating_;      // last member: its destructor waits
+  detail::VoxelFilter pending_filter_;
+  std::vector<std::uint32_t> pending_voxels_;  // numbers of voxels, by pending voxel
+  std::vector<double> nearest_;                // squared distance, m^2, by pending voxel and layer
+  Background accumulating_;                    // last member: its destructor waits
 };
 
 VoxelProtocol::VoxelProtocol(const Settings& settings, std::size_t estimates)

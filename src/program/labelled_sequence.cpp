@@ -6,6 +6,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_bytes.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains::program {
 namespace fs = std::filesystem;
@@ -73,8 +74,6 @@ void LabelledSequence::load(std::size_t i, Scan& scan) const {
   sequence_.read_scan(index, scan.points);
   scan.truth = sequence_.read_labels(index);
   scan.in_map.assign(runs_.empty() ? 0 : scan.truth.size(), 0);
-  scan.instances.clear();
-  scan.causes.clear();
   for (std::size_t run = 0; run < runs_.size(); ++run) {
     load_run(run, sequence_.name(index), scan);
   }
@@ -88,10 +87,23 @@ void LabelledSequence::load_run(std::size_t run, const std::string& name, Scan& 
   const fs::path file = runs_[run].folder / runs_[run].kind / (name + ".label");
   const std::vector<std::uint32_t> labels = read_labels(file, scan.truth.size());
   if (run == 0) scan.instances.resize(labels.size());
-  for (std::size_t p = 0; p < labels.size(); ++p) {
-    const std::uint32_t id = run_class(labels[p], p, file);
-    if (id == kRunStatic) scan.in_map[p] = static_cast<std::uint8_t>(scan.in_map[p] | (1U << run));
-    if (run == 0) scan.instances[p] = labels[p] >> 16U;
+  unsigned unknown = 0;
+  dynains::detail::run_max_packs([&](auto) {
+    // Local copies avoid reloads after stores that could alias the originals.
+    const std::size_t size = labels.size(), bit = run;
+    const std::uint32_t* const label = labels.data();
+    std::uint8_t* const in_map = scan.in_map.data();
+    unsigned bad = 0;
+    for (std::size_t p = 0; p < size; ++p) bad |= is_run_class(label[p]) ? 0U : 1U;
+    for (std::size_t p = 0; p < size; ++p) {
+      const unsigned kept = (label[p] & 0xffffU) == kRunStatic ? 1U : 0U;
+      in_map[p] = static_cast<std::uint8_t>(in_map[p] | kept << bit);
+    }
+    unknown = bad;
+  });
+  for (std::size_t p = 0; unknown != 0 && p < labels.size(); ++p) run_class(labels[p], p, file);
+  for (std::size_t p = 0; run == 0 && p < labels.size(); ++p) {
+    scan.instances[p] = labels[p] >> 16U;
   }
 }
 

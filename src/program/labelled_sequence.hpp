@@ -24,13 +24,18 @@ inline constexpr std::uint32_t kRunMoving = 251;
 [[noreturn]] void refuse_class(std::uint32_t id, std::size_t point,
                                const std::filesystem::path& file);
 
+/// Whether the class of a label is one of these; without branches.
+constexpr bool is_run_class(std::uint32_t label) {
+  const std::uint32_t id = label & 0xffffU;
+  return (id == kRunStatic) | (id == kRunMoving) | (id == kRunNotJudged);
+}
+
 /// Class id of a label that `dynains run` wrote for `point` in `file`. Throws IoError for a label
 /// of another program.
 inline std::uint32_t run_class(std::uint32_t label, std::size_t point,
                                const std::filesystem::path& file) {
-  const std::uint32_t id = label & 0xffffU;
-  if (id != kRunStatic && id != kRunMoving && id != kRunNotJudged) refuse_class(id, point, file);
-  return id;
+  if (!is_run_class(label)) refuse_class(label & 0xffffU, point, file);
+  return label & 0xffffU;
 }
 
 /// Scan numbers, both inclusive; an empty end is the sequence's own.

@@ -3,29 +3,32 @@
 #include <utility>
 
 namespace dynains::program {
+namespace {
+
+constexpr std::size_t kFewScans = 8;
+
+}  // namespace
 
 OpenScans::OpenScans(const Recording& recording, const ScanRange& pushed, const ScanRange& judged,
                      std::size_t latency, std::launch thread)
-    : judged_(judged), next_(pushed.first), reader_(recording, pushed.first, pushed.last, thread) {
-  constexpr std::size_t kFewScans = 8;
-  if (latency > kFewScans && recording.format() == ScanFormat::kBin) {
-    second_reader_.emplace(recording, judged.first, judged.last, thread);
-  }
-}
+    : judged_(judged),
+      next_(pushed.first),
+      are_kept_(latency <= kFewScans || recording.format() != ScanFormat::kBin),
+      reader_(recording, pushed.first, pushed.last, thread) {}
 
 const RecordedScan& OpenScans::next() {
-  const bool is_kept = !second_reader_ && is_judged(next_++);
+  const bool is_kept = are_kept_ && is_judged(next_++);
   if (!is_kept) return pushed_scan_ = reader_.next(std::move(pushed_scan_));
   kept_.push_back(reader_.next(std::move(judged_scan_)));
   judged_scan_ = {};
   return kept_.back();
 }
 
-RecordedScan& OpenScans::next_judged() {
-  if (second_reader_) return judged_scan_ = second_reader_->next(std::move(judged_scan_));
+RecordedScan* OpenScans::next_judged() {
+  if (!are_kept_) return nullptr;
   judged_scan_ = std::move(kept_.front());
   kept_.pop_front();
-  return judged_scan_;
+  return &judged_scan_;
 }
 
 }  // namespace dynains::program

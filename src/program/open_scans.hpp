@@ -1,10 +1,9 @@
-// The scans of a run: read ahead for their push, and again for their final verdict.
+// The scans of a run: read ahead for their push, and kept for their final verdict.
 #pragma once
 
 #include <cstddef>
 #include <deque>
 #include <future>
-#include <optional>
 
 #include "dynains/io/recording.hpp"
 #include "read_ahead.hpp"
@@ -25,17 +24,18 @@ class OpenScans {
   /// To be called once for each scan of `pushed`. The scan is valid until the next call of a
   /// member. Throws IoError if it could not be read.
   const RecordedScan& next();
-  /// To be called once for each scan of `judged`, behind its next(). As next(). The caller may
-  /// exchange it for another scan, whose memory is used again.
-  RecordedScan& next_judged();
+  /// To be called once for each scan of `judged`, behind its next(). Null if scans are not kept,
+  /// but to be read a second time; else as next(). The caller may exchange the scan for another
+  /// one, whose memory is used again.
+  RecordedScan* next_judged();
 
  private:
   bool is_judged(std::size_t i) const { return i >= judged_.first && i <= judged_.last; }
 
   ScanRange judged_;
   std::size_t next_;
+  bool are_kept_;
   ReadAhead reader_;
-  std::optional<ReadAhead> second_reader_;
   std::deque<RecordedScan> kept_;  // oldest first; the last one is the pushed scan
   RecordedScan pushed_scan_;       // unless it is kept
   RecordedScan judged_scan_;

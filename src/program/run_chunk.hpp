@@ -31,11 +31,14 @@ bool run_chunk(Remover& remover, const Recording& recording, const ScanRange& ra
   };
   OpenScans scans(recording, {chunk.first, chunk.last}, chunk.own, remover.latency(),
                   std::launch::deferred);
+  RecordedScan judged;
   const auto finish = [&](const ScanVerdict& verdict) {
     if (verdict.scan < extra) return;
     const std::size_t i = chunk.first + verdict.scan - extra;
     if (i >= chunk.own.first && i <= chunk.own.last) {
-      recorder.take_final(i, scans.next_judged(), verdict);
+      const RecordedScan* const kept = scans.next_judged();
+      if (kept == nullptr) recording.read_scan(i, judged);
+      recorder.take_final(i, kept == nullptr ? judged : *kept, verdict);
     }
   };
   if (extra > 0) push(range.first, recording.read_scan(range.first));

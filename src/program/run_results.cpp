@@ -156,20 +156,23 @@ void RunResults::take_newest(const ScanVerdict& verdict) {
   if (online_labels_) online_labels_->write(recording_.name(range_.first + verdict.scan), verdict);
 }
 
-void JudgedScan::take(RecordedScan& other, const ScanVerdict& other_verdict, bool with_beliefs) {
-  std::swap(scan, other);
-  arrays.take(other_verdict, with_beliefs);
-  verdict = other_verdict;
+void JudgedScan::take(const ScanVerdict& other, bool with_beliefs) {
+  arrays.take(other, with_beliefs);
+  verdict = other;
   verdict.labels = arrays.labels;
   verdict.instances = arrays.instances;
   verdict.beliefs = arrays.beliefs;
   verdict.causes = arrays.causes;
 }
 
-void RunResults::take_final(RecordedScan& scan, const ScanVerdict& verdict) {
+void RunResults::take_final(RecordedScan* scan, const ScanVerdict& verdict) {
   finish();
-  judged_.take(scan, verdict, needs_beliefs_);
-  writing_.begin([this] { write_final(judged_.scan, judged_.verdict); });
+  judged_.take(verdict, needs_beliefs_);
+  if (scan != nullptr) std::swap(judged_.scan, *scan);
+  writing_.begin([this, reads = scan == nullptr] {
+    if (reads) recording_.read_scan(range_.first + judged_.verdict.scan, judged_.scan);
+    write_final(judged_.scan, judged_.verdict);
+  });
   ++finished_;
 }
 

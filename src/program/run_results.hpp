@@ -87,9 +87,8 @@ struct JudgedScan {
   VerdictArrays arrays;
   ScanVerdict verdict;  ///< with these arrays
 
-  /// Exchanges `other` for the scan, and copies its verdict; without `with_beliefs`, the copy has
-  /// none.
-  void take(RecordedScan& other, const ScanVerdict& other_verdict, bool with_beliefs);
+  /// Copies the verdict; without `with_beliefs`, the copy has none.
+  void take(const ScanVerdict& other, bool with_beliefs);
 };
 
 /// Takes verdicts as they come and streams them to files.
@@ -104,9 +103,9 @@ class RunResults {
   /// The verdict on the scan just pushed.
   void take_newest(const ScanVerdict& verdict);
   /// The final verdict on a scan, in the order of the scans. By default, another thread writes the
-  /// results of the scan, which is exchanged for an earlier one. Throws IoError, for the scan
-  /// before as well.
-  void take_final(RecordedScan& scan, const ScanVerdict& verdict);
+  /// results of the scan, which is exchanged for an earlier one; null: that thread reads it. Throws
+  /// IoError, for the scan before as well.
+  void take_final(RecordedScan* scan, const ScanVerdict& verdict);
   /// Waits for the results of the last scan. Throws IoError.
   void finish();
   /// Final verdicts also go to `session`, which outlives this.

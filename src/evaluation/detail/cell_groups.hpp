@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "detail/voxel_grid.hpp"
+#include "detail/voxel_index.hpp"
 #include "dynains/points.hpp"
 
 namespace dynains::evaluation::detail {

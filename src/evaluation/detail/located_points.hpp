@@ -14,43 +14,36 @@
 
 namespace dynains::evaluation::detail {
 
-/// Consecutive points of a scan in one voxel.
-struct PointRun {
-  VoxelKey key;
+/// Consecutive points of a scan.
+struct PointBlock {
+  static constexpr std::size_t kMost = 512;  // few enough for the fastest cache
+
   std::size_t first;  ///< number of the first point in its scan
   std::size_t count;
-  const double* x;  ///< world coordinates of the points, m
-  const double* y;
-  const double* z;
+  std::array<double, kMost> x, y, z;  ///< world coordinates, m
+  std::array<VoxelKey, kMost> key;    ///< kNoKey: does not pass the gate, or outside of the grid
 
   Eigen::Vector3d p_world(std::size_t i) const { return {x[i], y[i], z[i]}; }
 };
 
-/// Computes a block of points at a time, few enough for the fastest cache.
+/// Computes a block of points at a time.
 class LocatedPoints {
  public:
   LocatedPoints(const LabelledScan& scan, const VoxelGrid& grid, const RangeGate& gate)
       : scan_(scan), grid_(grid), gate_(gate), T_world_sensor_(scan.T_world_sensor) {}
 
-  /// Calls `visit(run)` for the runs of the scan in order, without points that do not pass the gate
-  /// or lie outside of the grid. `prefetch(key)` is called some points before.
-  template <class Prefetch, class Visit>
-  void for_each_run(Prefetch&& prefetch, Visit&& visit) {
-    for (std::size_t begin = 0; begin < scan_.size(); begin += kBlock) {
-      const std::size_t count = std::min(kBlock, scan_.size() - begin);
-      locate(begin, count);
-      for (std::size_t k = 0; k < count;) {
-        prefetch(key_[std::min(k + kAhead, count - 1)]);
-        const VoxelKey key = key_[k];
-        std::size_t end = k + 1;
-        while (end < count && key_[end] == key) ++end;
-        if (key != kNoKey) visit(PointRun{key, begin + k, end - k, &x_[k], &y_[k], &z_[k]});
-        k = end;
-      }
+  /// Calls `visit(PointBlock&)` for the blocks of the scan in order.
+  template <class Visit>
+  void for_each_block(Visit&& visit) {
+    for (std::size_t begin = 0; begin < scan_.size(); begin += PointBlock::kMost) {
+      block_.first = begin;
+      block_.count = std::min(PointBlock::kMost, scan_.size() - begin);
+      locate();
+      visit(block_);
     }
   }
 
-  /// World coordinates of one point: the same bits as for_each_run().
+  /// World coordinates of one point: the same bits as in its block.
   Eigen::Vector3d p_world(std::size_t i) const {
     const Eigen::Vector3d p = scan_.point(i);
     const Transform& transform = T_world_sensor_;
@@ -59,9 +52,6 @@ class LocatedPoints {
   }
 
  private:
-  static constexpr std::size_t kBlock = 512;
-  static constexpr std::size_t kAhead = 12;
-
   /// The upper three rows of a pose.
   struct Transform {
     double of[3][4];
@@ -76,18 +66,18 @@ class LocatedPoints {
     }
   };
 
-  void locate(std::size_t begin, std::size_t count) {
+  void locate() {
     dynains::detail::run_max_packs([&](auto) {
       // Local copies avoid reloads after stores that could alias the originals.
-      const std::size_t size = count;
+      const std::size_t size = block_.count;
       const Transform transform = T_world_sensor_;
       const VoxelGrid grid = grid_;
       const RangeGate gate = gate_;
-      const float* const xyz = scan_.xyz + begin * scan_.stride;
-      double* const x = x_.data();
-      double* const y = y_.data();
-      double* const z = z_.data();
-      VoxelKey* const key = key_.data();
+      const float* const xyz = scan_.xyz + block_.first * scan_.stride;
+      double* const x = block_.x.data();
+      double* const y = block_.y.data();
+      double* const z = block_.z.data();
+      VoxelKey* const key = block_.key.data();
       const auto transform_all = [=](std::size_t stride) {
         for (std::size_t k = 0; k < size; ++k) {
           const float* const p = xyz + k * stride;
@@ -112,8 +102,7 @@ class LocatedPoints {
   const VoxelGrid& grid_;
   const RangeGate& gate_;
   Transform T_world_sensor_;
-  std::array<double, kBlock> x_, y_, z_;
-  std::array<VoxelKey, kBlock> key_;
+  PointBlock block_;
 };
 
 }  // namespace dynains::evaluation::detail

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "detail/voxel_grid.hpp"
+#include "detail/voxel_index.hpp"
 #include "dynains/evaluation/voxel_protocol.hpp"
 
 namespace dynains::evaluation::detail {
@@ -56,8 +57,7 @@ bool is_preserved(const VoxelPoint& raw, VoxelKey key, const VoxelGrid& grid,
       }
     }
   };
-  for_each_neighbour_in_reach(
-      [&](VoxelKey at) { __builtin_prefetch(&index.first_slot(voxel_hash(at))); });
+  for_each_neighbour_in_reach([&](VoxelKey at) { index.prefetch(at); });
   for_each_neighbour_in_reach(compare);
   return same;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -9,7 +10,7 @@
 
 #include "detail/located_points.hpp"
 #include "detail/nearest.hpp"
-#include "detail/voxel_grid.hpp"
+#include "detail/voxel_index.hpp"
 #include "dynains/evaluation/truth.hpp"
 
 namespace dynains::evaluation::detail {
@@ -26,13 +27,16 @@ inline constexpr TruthMask kBothTruths = truth_bit(Truth::kStatic) | truth_bit(T
 
 /// Class and layers of a point of a scan.
 struct LayeredTruth {
-  Truth truth;  ///< kIgnored: the point is in no layer
+  Truth truth;
   LayerMask layers;
+  friend bool operator==(const LayeredTruth& a, const LayeredTruth& b) {
+    return (a.truth == b.truth) & (a.layers == b.layers);
+  }
 };
 
 /// The points of some layers of a scan in one voxel.
 struct ScanVoxel {
-  VoxelKey key;
+  std::uint32_t number;      ///< of the voxel
   Eigen::Vector3d centroid;  ///< m, world frame
   Truth truth;               ///< of the point nearest to the centroid
   LayerMask layers;
@@ -42,47 +46,40 @@ struct ScanVoxel {
 class ScanVoxels {
  public:
   void clear() {
-    index_.clear();
     voxels_.clear();
     runs_.clear();
   }
 
-  void prefetch(VoxelKey key) const { __builtin_prefetch(&index_.first_slot(voxel_hash(key))); }
-
-  /// `label_of(number)`: the label of a point by its number in the scan.
-  template <class LabelOf>
-  void add(const PointRun& run, LabelOf&& label_of) {
-    std::uint32_t at = VoxelIndex::kNone;
-    Voxel voxel;
-    for (std::size_t i = 0; i < run.count; ++i) {
-      const LayeredTruth label = label_of(run.first + i);
-      if (label.truth == Truth::kIgnored) continue;
-      if (at == VoxelIndex::kNone) {
-        at = voxel_of(run.key);
-        voxel = voxels_[at];
-      }
-      voxel.sum += run.p_world(i);
-      ++voxel.count;
-      voxel.truths |= truth_bit(label.truth);
-      voxel.in_all &= label.layers;
-      voxel.in_any |= label.layers;
+  /// Adds the points of a block that have a key. `labels`: of its points, none of them ignored.
+  /// `number(keys, count, numbers)`: numbers of voxels, from 0 without gaps, or VoxelIndex::kNone
+  /// for a voxel to leave out.
+  template <class Number>
+  void add(const PointBlock& block, const LayeredTruth* labels, Number&& number) {
+    const std::size_t count = find_runs(block, labels);
+    number(run_keys_.data(), count, numbers_.data());
+    for (std::size_t r = 0; r < count; ++r) {
+      if (numbers_[r] < place_of_.size()) __builtin_prefetch(&place_of_[numbers_[r]]);
     }
-    if (at == VoxelIndex::kNone) return;
-    voxels_[at] = voxel;
-    runs_.emplace_back(static_cast<std::uint32_t>(run.first), static_cast<std::uint32_t>(run.count),
-                       at);
+    for (std::size_t r = 0; r < count; ++r) {
+      if (numbers_[r] == VoxelIndex::kNone) continue;
+      const std::size_t begin = begins_[r], end = ends_[r];
+      const std::uint32_t place = place_of(numbers_[r]);
+      voxels_[place].add(block, begin, end, labels[begin]);
+      runs_.emplace_back(static_cast<std::uint32_t>(block.first + begin),
+                         static_cast<std::uint32_t>(end - begin), place, labels[begin]);
+    }
   }
 
   /// Calls `visit(ScanVoxel)` for every voxel, once or once per layer, in the order of their first
-  /// points. `label_of` as in add(); `p_world(number)`: position of a point.
-  template <class LabelOf, class Position, class Visit>
-  void for_each(LayerMask all_layers, LabelOf&& label_of, Position&& p_world, Visit&& visit) {
-    gather_mixed(label_of, p_world);
+  /// points. `p_world(number)`: position of a point by its number in the scan.
+  template <class Position, class Visit>
+  void for_each(LayerMask all_layers, Position&& p_world, Visit&& visit) {
+    gather_mixed(p_world);
     for (const Voxel& voxel : voxels_) {
       if (!voxel.mixed()) {
         const Truth truth =
             voxel.truths == truth_bit(Truth::kStatic) ? Truth::kStatic : Truth::kDynamic;
-        visit(ScanVoxel{voxel.key, centroid(voxel.sum, voxel.count), truth, voxel.in_any});
+        visit(ScanVoxel{voxel.number, centroid(voxel.sum, voxel.count), truth, voxel.in_any});
         continue;
       }
       for (LayerMask layer = 1; layer != 0 && layer <= all_layers;
@@ -94,13 +91,23 @@ class ScanVoxels {
 
  private:
   struct Voxel {
-    VoxelKey key = kNoKey;
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    std::uint32_t number = VoxelIndex::kNone;
     std::uint32_t count = 0;
     std::uint32_t first_mixed = 0;  // range in mixed_points_
     TruthMask truths = 0;
     LayerMask in_all = 0xff;
     LayerMask in_any = 0;
+
+    void add(const PointBlock& block, std::size_t begin, std::size_t end, LayeredTruth label) {
+      Eigen::Vector3d total = sum;
+      for (std::size_t i = begin; i < end; ++i) total += block.p_world(i);
+      sum = total;
+      count += static_cast<std::uint32_t>(end - begin);
+      truths |= truth_bit(label.truth);
+      in_all &= label.layers;
+      in_any |= label.layers;
+    }
 
     /// The layers differ, or the points have several classes.
     bool mixed() const { return in_all != in_any || truths == kBothTruths; }
@@ -110,18 +117,35 @@ class ScanVoxels {
     return sum / static_cast<double>(count);
   }
 
-  std::uint32_t voxel_of(VoxelKey key) {
-    const std::uint32_t hash = voxel_hash(key);
-    const VoxelIndex::Slot& slot = index_.first_slot(hash);
-    const bool is_known = slot.key == key && slot.number != VoxelIndex::kNone;
-    const std::uint32_t at = is_known ? slot.number : index_.insert(key, hash);
-    if (at == voxels_.size()) voxels_.push_back({key});
-    return at;
+  /// Finds runs of points with one voxel and one label: `run_keys_`, `begins_`, `ends_`.
+  std::size_t find_runs(const PointBlock& block, const LayeredTruth* labels) {
+    std::size_t begin = 0, count = 0;
+    for (std::size_t i = 0; i < block.count; ++i) {
+      run_keys_[count] = block.key[i];
+      begins_[count] = static_cast<std::uint32_t>(begin);
+      ends_[count] = static_cast<std::uint32_t>(i + 1);
+      const bool is_last =
+          i + 1 == block.count || block.key[i + 1] != block.key[i] || !(labels[i + 1] == labels[i]);
+      begin = is_last ? i + 1 : begin;
+      count += is_last & (block.key[i] != kNoKey);
+    }
+    return count;
+  }
+
+  /// Index in voxels_; adds a voxel that the scan does not have yet.
+  std::uint32_t place_of(std::uint32_t number) {
+    if (number >= place_of_.size()) place_of_.resize(2 * std::size_t{number} + 1);
+    std::uint32_t& place = place_of_[number];
+    if (place >= voxels_.size() || voxels_[place].number != number) {
+      place = static_cast<std::uint32_t>(voxels_.size());
+      voxels_.emplace_back().number = number;
+    }
+    return place;
   }
 
   /// Groups the points of the mixed voxels by voxel, in scan order.
-  template <class LabelOf, class Position>
-  void gather_mixed(LabelOf&& label_of, Position&& p_world) {
+  template <class Position>
+  void gather_mixed(Position&& p_world) {
     std::uint32_t total = 0;
     for (Voxel& voxel : voxels_) {
       voxel.first_mixed = total;
@@ -134,9 +158,7 @@ class ScanVoxels {
     for (const Run& run : runs_) {
       if (!voxels_[run.voxel].mixed()) continue;
       for (std::size_t number = run.first; number < std::size_t{run.first} + run.count; ++number) {
-        const LayeredTruth label = label_of(number);
-        if (label.truth == Truth::kIgnored) continue;
-        mixed_points_[next_[run.voxel]++] = {p_world(number), label};
+        mixed_points_[next_[run.voxel]++] = {p_world(number), run.label};
       }
     }
   }
@@ -151,7 +173,7 @@ class ScanVoxels {
       sum += i->p_world;
       ++count;
     }
-    ScanVoxel found{voxel.key, centroid(sum, count), Truth::kStatic, layer};
+    ScanVoxel found{voxel.number, centroid(sum, count), Truth::kStatic, layer};
     double best = std::numeric_limits<double>::infinity();
     for (const MixedPoint* i = first; i != last; ++i) {
       if ((i->label.layers & layer) == 0) continue;
@@ -168,17 +190,23 @@ class ScanVoxels {
     std::uint32_t first;  // number of a point
     std::uint32_t count;
     std::uint32_t voxel;
+    LayeredTruth label;
     // Constructed in place: a temporary object would be copied by a slow load after its stores.
-    Run(std::uint32_t first_point, std::uint32_t point_count, std::uint32_t of_voxel)
-        : first(first_point), count(point_count), voxel(of_voxel) {}
+    Run(std::uint32_t first_point, std::uint32_t point_count, std::uint32_t of_voxel,
+        LayeredTruth of_points)
+        : first(first_point), count(point_count), voxel(of_voxel), label(of_points) {}
   };
   struct MixedPoint {
     Eigen::Vector3d p_world;
     LayeredTruth label;
   };
 
-  VoxelIndex index_;
+  // The runs of a block.
+  std::array<VoxelKey, PointBlock::kMost> run_keys_;
+  std::array<std::uint32_t, PointBlock::kMost> begins_, ends_, numbers_;
+
   std::vector<Voxel> voxels_;
+  std::vector<std::uint32_t> place_of_;  // by number; of an earlier scan, if voxels_ does not agree
   std::vector<Run> runs_;
   std::vector<MixedPoint> mixed_points_;
   std::vector<std::uint32_t> next_;

@@ -42,12 +42,11 @@ class VoxelGrid {
   }
   /// Without branches and without conversions between numbers, so that loops can use vectors.
   VoxelKey key(double x, double y, double z) const {
-    const double i = floor(x / edge_) - anchor_[0];
-    const double j = floor(y / edge_) - anchor_[1];
-    const double k = floor(z / edge_) - anchor_[2];
-    const bool is_i = is_number(i), is_j = is_number(j), is_k = is_number(k);
-    const auto outside = static_cast<VoxelKey>(static_cast<std::int64_t>(is_i & is_j & is_k) - 1);
-    return outside | bits(i) << (2 * kVoxelKeyBits) | bits(j) << kVoxelKeyBits | bits(k);
+    const VoxelKey i = cell(x, anchor_[0]), j = cell(y, anchor_[1]), k = cell(z, anchor_[2]);
+    // One cell at either end is kept free for the neighbours.
+    const VoxelKey beyond = (i - 1) | (i + 1) | (j - 1) | (j + 1) | (k - 1) | (k + 1);
+    const VoxelKey outside = beyond >> kVoxelKeyBits == 0 ? 0 : kNoKey;
+    return outside | i << (2 * kVoxelKeyBits) | j << kVoxelKeyBits | k;
   }
 
   /// Lower corner of a voxel.
@@ -67,24 +66,21 @@ class VoxelGrid {
   }
 
  private:
-  /// Doubles in [2^52, 2^53) are integers, which their lowest bits are.
-  static constexpr double kIntegers = 0x1.8p52;
-
-  /// std::floor() for numbers below 2^51, which the baseline instruction set lacks.
-  static double floor(double number) {
+  /// Number of the cell of a coordinate, from 0; at least 2^kVoxelKeyBits if it is outside.
+  VoxelKey cell(double coordinate, double anchor) const {
+    // Doubles in [2^52, 2^53) are integers, which their lowest bits are.
+    constexpr double kIntegers = 0x1.8p52;
+    constexpr VoxelKey kIntegerBits = VoxelKey{0x433} << 52U | VoxelKey{1} << 51U;
+    const double number = coordinate / edge_;
     const double nearest = (number + kIntegers) - kIntegers;
-    return nearest - (nearest > number ? 1.0 : 0.0);
+    const VoxelKey is_above = bits(number - nearest + 0.0) >> 63U;  // 0.0: not the sign of -0
+    return bits(nearest - anchor + (kIntegers + static_cast<double>(kVoxelKeyOffset))) -
+           kIntegerBits - is_above;
   }
-  /// One cell at either end is kept free for the neighbours.
-  static bool is_number(double cell) {
-    constexpr auto kEnd = static_cast<double>(kVoxelKeyOffset);
-    return (cell >= 1 - kEnd) & (cell <= kEnd - 2);
-  }
-  static VoxelKey bits(double cell) {
-    const double integer = cell + (kIntegers + static_cast<double>(kVoxelKeyOffset));
+  static VoxelKey bits(double number) {
     VoxelKey bits = 0;
-    std::memcpy(&bits, &integer, sizeof(bits));
-    return bits & ((VoxelKey{1} << kVoxelKeyBits) - 1);
+    std::memcpy(&bits, &number, sizeof(bits));
+    return bits;
   }
 
   double edge_;
@@ -106,7 +102,5 @@ inline constexpr std::array<VoxelKey, 27> neighbour_offsets() {
   return offsets;
 }
 inline constexpr std::array<VoxelKey, 27> kNeighbours = neighbour_offsets();
-
-using VoxelIndex = VoxelHashTable<>;
 
 }  // namespace dynains::evaluation::detail
