@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 
 #include "arrays.hpp"
 #include "dynains/io/extrinsic.hpp"
@@ -18,8 +17,6 @@ bool is_text(const py::handle& value) {
 Eigen::Isometry3d to_extrinsic(const py::handle& value) {
   return is_text(value) ? read_extrinsic(to_path(value).string()) : to_pose(value);
 }
-
-constexpr double kMost = std::numeric_limits<double>::max();
 
 const std::array<Setting<RecordingOptions>, 17> kRecordingSettings{{
     {"poses", "a path",
@@ -57,7 +54,7 @@ const std::array<Setting<RecordingOptions>, 17> kRecordingSettings{{
        o.convention.T_body_sensor = to_extrinsic(v);
      }},
     {"time_offset", "finite float", "a scan at time t has the pose at t + time_offset, s",
-     [](RecordingOptions& o, const py::handle& v) { o.time_offset = to_number(v, -kMost, kMost); }},
+     [](RecordingOptions& o, const py::handle& v) { o.time_offset = to_number(v); }},
     {"pose_gap", "float in [0, 1000]",
      "longest time between two poses of a file for interpolation, s",
      [](RecordingOptions& o, const py::handle& v) { o.pose_gap = to_number(v, 0.0, 1000.0); }},

@@ -90,7 +90,7 @@ const std::array<RunSetting, 25> kRunSettings{{
     {"map_memory", "float, MB", "bound of the memory of the map; the rest goes to files in out",
      [](RunArguments& run, const py::handle& value) {
        if (!value.is_none()) {
-         run.settings.map_memory = to_number(value, 0.0, std::numeric_limits<double>::max());
+         run.settings.map_memory = to_number(value, 0.0);
        }
      }},
     {"update", "a path", "folder of a map of many sessions that the session is added to",
@@ -103,8 +103,7 @@ const std::array<RunSetting, 25> kRunSettings{{
      }},
     {"session_begin", "float, s", "time by which sessions are ordered; default: of the first scan",
      [](RunArguments& run, const py::handle& value) {
-       constexpr double kMost = std::numeric_limits<double>::max();
-       if (!value.is_none()) run.settings.session_begin = to_number(value, -kMost, kMost);
+       if (!value.is_none()) run.settings.session_begin = to_number(value);
      }},
     {"align", "bool", "moves the session into the frame of the map in update",
      &set_flag<&RunSettings::align>},

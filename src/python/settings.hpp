@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <initializer_list>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -78,7 +79,8 @@ inline bool to_flag(const py::handle& value) {
 }
 
 /// A finite number in [least, most].
-double to_number(const py::handle& value, double least, double most);
+double to_number(const py::handle& value, double least = std::numeric_limits<double>::lowest(),
+                 double most = std::numeric_limits<double>::max());
 /// A whole number in [least, most].
 std::int64_t to_whole_number(const py::handle& value, std::int64_t least, std::int64_t most);
 
