@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -34,7 +35,7 @@ namespace dynains {
 /// whole; if it is larger than a vehicle, each of its cubes of 8 blocks decides for itself. Later
 /// sessions influence the blocks of a session by their references only, except that the ground of
 /// all sessions tells what is ground: ground points above it, where no other session has any and
-/// nothing stands, leave.
+/// nothing stands, leave point by point.
 class TileHistory {
  public:
   static constexpr std::uint32_t kNever = std::numeric_limits<std::uint32_t>::max();
@@ -57,9 +58,11 @@ class TileHistory {
   const std::vector<SessionPoint>& points(std::size_t session) const {
     return sessions_[session].points;
   }
-  const Removal& removal(std::size_t session, std::size_t point) const {
+  Removal removal(std::size_t session, std::size_t point) const {
     const Session& own = sessions_[session];
-    return own.removal_of[own.block_of[point]];
+    const Removal& of_block = own.removal_of[own.block_of[point]];
+    const std::uint32_t by = own.unconfirmed_by[point];
+    return by < of_block.session ? Removal{by, 0} : of_block;
   }
   /// Number of references of its own session that hit the block of a point, up to 255.
   std::uint32_t own_hits(std::size_t session, std::size_t point) const {
@@ -73,13 +76,7 @@ class TileHistory {
   /// Whether a point is no ground, or higher than the lowest ground around of the sessions that
   /// have tested.
   bool is_above_ground(const SessionPoint& point) const {
-    if (!point.is_ground) return true;
-    for (int i = 0; i < 9; ++i) {
-      const std::uint32_t cell =
-          ground_cells_.find(ground_cell(point) + voxel_key_step(i % 3 - 1, i / 3 - 1, 0));
-      if (cell != kNone && point.z > lowest_ground_[cell] + kGroundRise) return true;
-    }
-    return false;
+    return !point.is_ground || point.z > ground_.lowest_around(point) + kGroundRise;
   }
   /// Whether a point is neither removed by a session up to number `last`, nor newer than `last`.
   bool stands(std::size_t session, std::size_t point, std::uint32_t last) const {
@@ -131,6 +128,7 @@ class TileHistory {
     session.most_own_level.assign(blocks.size(), 0.0F);
     session.free_scan.assign(blocks.size(), 0);
     session.removal_of.assign(blocks.size(), Removal());
+    session.unconfirmed_by.assign(session.points.size(), kNever);
     sessions_.push_back(std::move(session));
   }
 
@@ -205,7 +203,8 @@ class TileHistory {
   static constexpr float kGroundCell = 1.0F;   // m
   static constexpr float kGroundRise = 0.35F;  // m above the lowest ground around
   static constexpr double kLowCell = 0.4;      // m
-  static constexpr float kLowRise = 0.2F;      // m above the lowest ground of a low cell
+  static constexpr float kLowRise = 0.1F;      // m above the lowest ground of low cells
+  static constexpr double kFlatHeight = 0.05;  // m
   static constexpr double kCompactLength = 18.0, kCompactHeight = 4.5;  // m
 
   /// Least numbers of free blocks from which a component has left.
@@ -224,52 +223,85 @@ class TileHistory {
     bool has_others = false;
 
     void add(std::uint32_t session) { has_others = has_others || session != first; }
-    bool has_other_than(std::size_t session) const { return has_others || session != first; }
+    bool has_other_than(std::uint32_t session) const { return has_others || session != first; }
   };
   struct LowGround {
     float z;  // m
     SeenBy sessions;
   };
 
+  /// Lowest ground of cells of kGroundCell.
+  class LowestGround {
+   public:
+    void add(const SessionPoint& point) {
+      const std::uint32_t cell = cells_.insert(key_of(point));
+      if (cell == z_.size()) z_.push_back(point.z);
+      z_[cell] = std::min(z_[cell], point.z);
+    }
+    /// m, in the cell of a point and those that touch it; kNoLimit if there is none.
+    float lowest_around(const SessionPoint& point) const {
+      float lowest = kNoLimit;
+      for (int i = 0; i < 9; ++i) {
+        const std::uint32_t cell =
+            cells_.find(key_of(point) + voxel_key_step(i % 3 - 1, i / 3 - 1, 0));
+        if (cell != kNone) lowest = std::min(lowest, z_[cell]);
+      }
+      return lowest;
+    }
+
+   private:
+    static VoxelKey key_of(const SessionPoint& point) {
+      return voxel_key(static_cast<std::int64_t>(point.x / kGroundCell),
+                       static_cast<std::int64_t>(point.y / kGroundCell), 0);
+    }
+
+    VoxelHashTable<> cells_;
+    std::vector<float> z_;  // m, by cell
+  };
+
   struct Session {
     std::uint32_t number = 0;
     std::vector<SessionPoint> points;
-    VoxelHashTable<> blocks;                  // numbers of the keys
-    std::vector<VoxelKey> keys;               // by block
-    std::vector<std::uint32_t> common_of;     // by block: number in CommonBlocks
-    std::vector<std::uint32_t> shape_of;      // by block: number in CommonBlocks
-    std::vector<std::uint32_t> block_of;      // by point
-    std::vector<std::uint32_t> begin;         // by block: in by_block
-    std::vector<std::uint32_t> by_block;      // points, sorted by block
-    std::vector<float> level;                 // by block: log-odds of being free
-    std::vector<float> own_level;             // by block: sum of this session, never below zero
-    std::vector<float> most_own_level;        // by block: highest own_level
-    std::vector<std::uint8_t> own_hits;       // by block: references of this session that hit
-    std::vector<std::uint32_t> free_scan;     // by block: latest reference that passed
-    std::vector<std::uint32_t> component_of;  // by block, or kNone for ground
-    std::vector<std::uint8_t> is_compact;     // by component
-    std::vector<Removal> removal_of;          // by block
+    VoxelHashTable<> blocks;                    // numbers of the keys
+    std::vector<VoxelKey> keys;                 // by block
+    std::vector<std::uint32_t> common_of;       // by block: number in CommonBlocks
+    std::vector<std::uint32_t> shape_of;        // by block: number in CommonBlocks
+    std::vector<std::uint32_t> block_of;        // by point
+    std::vector<std::uint32_t> begin;           // by block: in by_block
+    std::vector<std::uint32_t> by_block;        // points, sorted by block
+    std::vector<float> level;                   // by block: log-odds of being free
+    std::vector<float> own_level;               // by block: sum of this session, never below zero
+    std::vector<float> most_own_level;          // by block: highest own_level
+    std::vector<std::uint8_t> own_hits;         // by block: references of this session that hit
+    std::vector<std::uint32_t> free_scan;       // by block: latest reference that passed
+    std::vector<std::uint32_t> component_of;    // by block, or kNone for ground
+    std::vector<std::uint8_t> is_compact;       // by component
+    std::vector<Removal> removal_of;            // by block
+    std::vector<std::uint32_t> unconfirmed_by;  // by point: session that removed it alone
+    LowestGround ground;
   };
-
-  static VoxelKey ground_cell(const SessionPoint& point) {
-    return voxel_key(static_cast<std::int64_t>(point.x / kGroundCell),
-                     static_cast<std::int64_t>(point.y / kGroundCell), 0);
-  }
 
   static VoxelKey low_cell(const SessionPoint& point) {
     return voxel_key(static_cast<std::int64_t>(static_cast<double>(point.x) / kLowCell),
                      static_cast<std::int64_t>(static_cast<double>(point.y) / kLowCell), 0);
   }
 
-  void add_ground(const Session& session) {
+  // A voxel of less height.
+  VoxelKey flat_cell(const SessionPoint& point) const {
+    const VoxelKey voxel = session_voxel(grid_, point);
+    const double layer = std::floor(static_cast<double>(point.z) / kFlatHeight);
+    return voxel_key(voxel_index(voxel, 0), voxel_index(voxel, 1),
+                     static_cast<std::int64_t>(layer));
+  }
+
+  void add_ground(Session& session) {
     for (const SessionPoint& point : session.points) {
-      const std::uint32_t voxel = filled_.insert(session_voxel(grid_, point));
-      if (voxel == filled_by_.size()) filled_by_.push_back({session.number});
-      filled_by_[voxel].add(session.number);
+      const std::uint32_t flat = flat_cells_.insert(flat_cell(point));
+      if (flat == filled_by_.size()) filled_by_.push_back({session.number});
+      filled_by_[flat].add(session.number);
       if (!point.is_ground) continue;
-      const std::uint32_t cell = ground_cells_.insert(ground_cell(point));
-      if (cell == lowest_ground_.size()) lowest_ground_.push_back(point.z);
-      lowest_ground_[cell] = std::min(lowest_ground_[cell], point.z);
+      ground_.add(point);
+      session.ground.add(point);
       const std::uint32_t low = low_cells_.insert(low_cell(point));
       if (low == low_ground_.size()) low_ground_.push_back({point.z, {session.number}});
       low_ground_[low].z = std::min(low_ground_[low].z, point.z);
@@ -278,34 +310,42 @@ class TileHistory {
   }
 
   // Whether a ground point of a session is an object's: above the ground that another session saw
-  // in its cell, at a place where no other session has a point. The ground has one height.
-  bool is_unconfirmed_ground(std::size_t session, const SessionPoint& point) const {
-    if (!point.is_ground) return false;
-    const std::uint32_t cell = low_cells_.find(low_cell(point));
-    if (cell == kNone || !low_ground_[cell].sessions.has_other_than(session)) return false;
-    if (point.z <= low_ground_[cell].z + kLowRise) return false;
-    const VoxelKey voxel = session_voxel(grid_, point);
-    for (int i = 0; i < 27; ++i) {
-      const std::uint32_t filled =
-          filled_.find(voxel + voxel_key_step(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
-      if (filled != kNone && filled_by_[filled].has_other_than(session)) return false;
-    }
-    return true;
+  // beside it, at a height where no other session has a point. The ground has one height, and the
+  // session itself saw it around.
+  bool is_unconfirmed_ground(const Session& session, const SessionPoint& point) const {
+    return point.is_ground && is_above_other_ground(session.number, point) &&
+           session.ground.lowest_around(point) <= ground_.lowest_around(point) + kLowRise &&
+           !is_confirmed(session.number, point);
   }
 
-  // Removes the blocks that mostly are unconfirmed ground after session number `by`.
+  bool is_above_other_ground(std::uint32_t session, const SessionPoint& point) const {
+    for (int i = 0; i < 9; ++i) {
+      const std::uint32_t cell =
+          low_cells_.find(low_cell(point) + voxel_key_step(i % 3 - 1, i / 3 - 1, 0));
+      if (cell == kNone || !low_ground_[cell].sessions.has_other_than(session)) continue;
+      if (point.z > low_ground_[cell].z + kLowRise) return true;
+    }
+    return false;
+  }
+
+  bool is_confirmed(std::uint32_t session, const SessionPoint& point) const {
+    const VoxelKey key = flat_cell(point);
+    for (int i = 0; i < 27; ++i) {
+      const std::uint32_t flat =
+          flat_cells_.find(key + voxel_key_step(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
+      if (flat != kNone && filled_by_[flat].has_other_than(session)) return true;
+    }
+    return false;
+  }
+
+  // Removes the points that are unconfirmed ground after session number `by`, unless an object
+  // stands beside them.
   void remove_unconfirmed_ground(std::uint32_t by, Session& session) const {
-    for (std::size_t block = 0; block < session.keys.size(); ++block) {
-      if (session.removal_of[block].session != kNever) continue;
-      std::uint32_t unconfirmed = 0;
-      for (std::uint32_t i = session.begin[block]; i < session.begin[block + 1]; ++i) {
-        unconfirmed +=
-            is_unconfirmed_ground(session.number, session.points[session.by_block[i]]) ? 1 : 0;
-      }
-      const bool is_object = 2 * unconfirmed > session.begin[block + 1] - session.begin[block];
-      if (is_object && !touches_standing_object(session, session.keys[block])) {
-        session.removal_of[block] = {by, session.free_scan[block]};
-      }
+    for (std::uint32_t i = 0; i < session.points.size(); ++i) {
+      const std::uint32_t block = session.block_of[i];
+      if (removal(session.number, i).session != kNever) continue;
+      if (!is_unconfirmed_ground(session, session.points[i])) continue;
+      if (!touches_standing_object(session, session.keys[block])) session.unconfirmed_by[i] = by;
     }
   }
 
@@ -505,12 +545,11 @@ class TileHistory {
   detail::CommonBlocks common_;
   std::size_t tested_count_ = 0;
   bool has_begun_session_ = false;
-  VoxelHashTable<> ground_cells_;
-  std::vector<float> lowest_ground_;  // m, by cell
+  LowestGround ground_;  // of the sessions that have tested
   VoxelHashTable<> low_cells_;
   std::vector<LowGround> low_ground_;  // by low cell
-  VoxelHashTable<> filled_;            // voxels of all sessions
-  std::vector<SeenBy> filled_by_;      // by voxel
+  VoxelHashTable<> flat_cells_;        // with points of any session that has tested
+  std::vector<SeenBy> filled_by_;      // by flat cell
   std::vector<std::uint32_t> tested_;  // blocks
   std::vector<std::uint32_t> begin_;   // by tested block: first sample, and the end
   PointBuffer samples_;
