@@ -3,7 +3,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "dynains/map/common_blocks.hpp"
+#include "dynains/map/session_ground.hpp"
 #include "dynains/map/session_points.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/pack_loops.hpp"
@@ -52,7 +52,8 @@ class TileHistory {
         config_((config.validate(), config)),
         free_(static_cast<float>(log_odds(config.revision_free))),
         hit_(static_cast<float>(log_odds(config.revision_hit))),
-        level_(static_cast<float>(log_odds(config.tau_revise))) {}
+        level_(static_cast<float>(log_odds(config.tau_revise))),
+        ground_(grid) {}
 
   std::size_t session_count() const { return sessions_.size(); }
   const std::vector<SessionPoint>& points(std::size_t session) const {
@@ -76,7 +77,7 @@ class TileHistory {
   /// Whether a point is no ground, or higher than the lowest ground around of the sessions that
   /// have tested.
   bool is_above_ground(const SessionPoint& point) const {
-    return !point.is_ground || point.z > ground_.lowest_around(point) + kGroundRise;
+    return !point.is_ground || ground_.is_below(point);
   }
   /// Whether a point is neither removed by a session up to number `last`, nor newer than `last`.
   bool stands(std::size_t session, std::size_t point, std::uint32_t last) const {
@@ -162,7 +163,7 @@ class TileHistory {
     for (Session& session : sessions_) {
       if (session.number != by) take_evidence(session);
     }
-    add_ground(sessions_[by]);
+    sessions_[by].ground = ground_.add(by, sessions_[by].points);
     find_components(sessions_[by]);
     for (std::uint32_t i = 0; i <= by; ++i) {
       remove_blocks(by, sessions_[i]);
@@ -200,11 +201,6 @@ class TileHistory {
   static constexpr std::uint32_t kNone = VoxelHashTable<>::kNone;
   static constexpr float kLeastVisible = 0.3F;  // ratio of visible to all samples of a block
   static constexpr float kNoLimit = std::numeric_limits<float>::max();
-  static constexpr float kGroundCell = 1.0F;   // m
-  static constexpr float kGroundRise = 0.35F;  // m above the lowest ground around
-  static constexpr double kLowCell = 0.4;      // m
-  static constexpr float kLowRise = 0.1F;      // m above the lowest ground of low cells
-  static constexpr double kFlatHeight = 0.05;  // m
   static constexpr double kCompactLength = 18.0, kCompactHeight = 4.5;  // m
 
   /// Least numbers of free blocks from which a component has left.
@@ -216,48 +212,6 @@ class TileHistory {
   static constexpr Limits kCompactLeft = {0.25F, 0.1F};  // the size of a vehicle
   static constexpr Limits kLeft = {1.0F, 0.2F};
   static constexpr int kCubeBits = 3;  // cubes of 8 blocks
-
-  /// The sessions that have measured a place, as far as it matters.
-  struct SeenBy {
-    std::uint32_t first;
-    bool has_others = false;
-
-    void add(std::uint32_t session) { has_others = has_others || session != first; }
-    bool has_other_than(std::uint32_t session) const { return has_others || session != first; }
-  };
-  struct LowGround {
-    float z;  // m
-    SeenBy sessions;
-  };
-
-  /// Lowest ground of cells of kGroundCell.
-  class LowestGround {
-   public:
-    void add(const SessionPoint& point) {
-      const std::uint32_t cell = cells_.insert(key_of(point));
-      if (cell == z_.size()) z_.push_back(point.z);
-      z_[cell] = std::min(z_[cell], point.z);
-    }
-    /// m, in the cell of a point and those that touch it; kNoLimit if there is none.
-    float lowest_around(const SessionPoint& point) const {
-      float lowest = kNoLimit;
-      for (int i = 0; i < 9; ++i) {
-        const std::uint32_t cell =
-            cells_.find(key_of(point) + voxel_key_step(i % 3 - 1, i / 3 - 1, 0));
-        if (cell != kNone) lowest = std::min(lowest, z_[cell]);
-      }
-      return lowest;
-    }
-
-   private:
-    static VoxelKey key_of(const SessionPoint& point) {
-      return voxel_key(static_cast<std::int64_t>(point.x / kGroundCell),
-                       static_cast<std::int64_t>(point.y / kGroundCell), 0);
-    }
-
-    VoxelHashTable<> cells_;
-    std::vector<float> z_;  // m, by cell
-  };
 
   struct Session {
     std::uint32_t number = 0;
@@ -278,65 +232,8 @@ class TileHistory {
     std::vector<std::uint8_t> is_compact;       // by component
     std::vector<Removal> removal_of;            // by block
     std::vector<std::uint32_t> unconfirmed_by;  // by point: session that removed it alone
-    LowestGround ground;
+    detail::LowestGround ground;
   };
-
-  static VoxelKey low_cell(const SessionPoint& point) {
-    return voxel_key(static_cast<std::int64_t>(static_cast<double>(point.x) / kLowCell),
-                     static_cast<std::int64_t>(static_cast<double>(point.y) / kLowCell), 0);
-  }
-
-  // A voxel of less height.
-  VoxelKey flat_cell(const SessionPoint& point) const {
-    const VoxelKey voxel = session_voxel(grid_, point);
-    const double layer = std::floor(static_cast<double>(point.z) / kFlatHeight);
-    return voxel_key(voxel_index(voxel, 0), voxel_index(voxel, 1),
-                     static_cast<std::int64_t>(layer));
-  }
-
-  void add_ground(Session& session) {
-    for (const SessionPoint& point : session.points) {
-      const std::uint32_t flat = flat_cells_.insert(flat_cell(point));
-      if (flat == filled_by_.size()) filled_by_.push_back({session.number});
-      filled_by_[flat].add(session.number);
-      if (!point.is_ground) continue;
-      ground_.add(point);
-      session.ground.add(point);
-      const std::uint32_t low = low_cells_.insert(low_cell(point));
-      if (low == low_ground_.size()) low_ground_.push_back({point.z, {session.number}});
-      low_ground_[low].z = std::min(low_ground_[low].z, point.z);
-      low_ground_[low].sessions.add(session.number);
-    }
-  }
-
-  // Whether a ground point of a session is an object's: above the ground that another session saw
-  // beside it, at a height where no other session has a point. The ground has one height, and the
-  // session itself saw it around.
-  bool is_unconfirmed_ground(const Session& session, const SessionPoint& point) const {
-    return point.is_ground && is_above_other_ground(session.number, point) &&
-           session.ground.lowest_around(point) <= ground_.lowest_around(point) + kLowRise &&
-           !is_confirmed(session.number, point);
-  }
-
-  bool is_above_other_ground(std::uint32_t session, const SessionPoint& point) const {
-    for (int i = 0; i < 9; ++i) {
-      const std::uint32_t cell =
-          low_cells_.find(low_cell(point) + voxel_key_step(i % 3 - 1, i / 3 - 1, 0));
-      if (cell == kNone || !low_ground_[cell].sessions.has_other_than(session)) continue;
-      if (point.z > low_ground_[cell].z + kLowRise) return true;
-    }
-    return false;
-  }
-
-  bool is_confirmed(std::uint32_t session, const SessionPoint& point) const {
-    const VoxelKey key = flat_cell(point);
-    for (int i = 0; i < 27; ++i) {
-      const std::uint32_t flat =
-          flat_cells_.find(key + voxel_key_step(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
-      if (flat != kNone && filled_by_[flat].has_other_than(session)) return true;
-    }
-    return false;
-  }
 
   // Removes the points that are unconfirmed ground after session number `by`, unless an object
   // stands beside them.
@@ -344,7 +241,7 @@ class TileHistory {
     for (std::uint32_t i = 0; i < session.points.size(); ++i) {
       const std::uint32_t block = session.block_of[i];
       if (removal(session.number, i).session != kNever) continue;
-      if (!is_unconfirmed_ground(session, session.points[i])) continue;
+      if (!ground_.is_unconfirmed(session.number, session.ground, session.points[i])) continue;
       if (!touches_standing_object(session, session.keys[block])) session.unconfirmed_by[i] = by;
     }
   }
@@ -545,11 +442,7 @@ class TileHistory {
   detail::CommonBlocks common_;
   std::size_t tested_count_ = 0;
   bool has_begun_session_ = false;
-  LowestGround ground_;  // of the sessions that have tested
-  VoxelHashTable<> low_cells_;
-  std::vector<LowGround> low_ground_;  // by low cell
-  VoxelHashTable<> flat_cells_;        // with points of any session that has tested
-  std::vector<SeenBy> filled_by_;      // by flat cell
+  detail::SessionGround ground_;       // of the sessions that have tested
   std::vector<std::uint32_t> tested_;  // blocks
   std::vector<std::uint32_t> begin_;   // by tested block: first sample, and the end
   PointBuffer samples_;
