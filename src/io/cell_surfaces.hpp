@@ -82,33 +82,32 @@ class NormalEquations {
     for (std::size_t k = 0; k < surface.direction_count; ++k) {
       Vector6 J;
       J << point.cross(surface.directions[k]), surface.directions[k];
-      H_.selfadjointView<Eigen::Lower>().rankUpdate(J, weight);
-      g_ += (weight * distances[k]) * J;
+      add(J, distances[k], weight);
     }
     ++count_;
     return {squared, weight};
   }
-  /// Adds that a moved point or vector is `distance` (m) from its place along J.
-  void add(const Vector6& J, double distance, double weight) {
-    H_.selfadjointView<Eigen::Lower>().rankUpdate(J, weight);
-    g_ += (weight * distance) * J;
+  /// Adds a point that is `distance` (m) from its place, with the derivative of this distance.
+  void add(const Vector6& jacobian, double distance, double weight) {
+    hessian_.selfadjointView<Eigen::Lower>().rankUpdate(jacobian, weight);
+    gradient_ += (weight * distance) * jacobian;
   }
 
   std::size_t count() const { return count_; }  ///< points
-  Matrix6 H() const { return H_.selfadjointView<Eigen::Lower>(); }
+  Matrix6 hessian() const { return hessian_.selfadjointView<Eigen::Lower>(); }
   /// The step that solves the equations, slightly damped.
   Vector6 step() const {
-    const Matrix6 damped = H() + 1e-3 * Matrix6::Identity();
-    return -damped.ldlt().solve(g_);
+    const Matrix6 damped = hessian() + 1e-3 * Matrix6::Identity();
+    return -damped.ldlt().solve(gradient_);
   }
   /// Covariance of the translation (m^2) for points with a deviation of 1 m.
   Eigen::Matrix3d translation_covariance() const {
-    return (H() + 1e-6 * Matrix6::Identity()).inverse().bottomRightCorner<3, 3>();
+    return (hessian() + 1e-6 * Matrix6::Identity()).inverse().bottomRightCorner<3, 3>();
   }
 
  private:
-  Matrix6 H_ = Matrix6::Zero();  // lower triangle
-  Vector6 g_ = Vector6::Zero();
+  Matrix6 hessian_ = Matrix6::Zero();  // lower triangle
+  Vector6 gradient_ = Vector6::Zero();
   std::size_t count_ = 0;
 };
 

@@ -43,8 +43,9 @@ bool is_before(const std::string& a, const std::string& b) {
     if (x.size() != y.size()) return x.size() < y.size();
     if (x != y) return x < y;
   }
-  if (a.size() - i != b.size() - k) return a.size() - i < b.size() - k;
-  return a < b;
+  const bool a_ends = i == a.size();
+  const bool b_ends = k == b.size();
+  return a_ends == b_ends ? a < b : a_ends;
 }
 
 }  // namespace

@@ -35,11 +35,12 @@ class LocatedPoints {
   /// Calls `visit(PointBlock&)` for the blocks of the scan in order.
   template <class Visit>
   void for_each_block(Visit&& visit) {
+    PointBlock block;
     for (std::size_t begin = 0; begin < scan_.size(); begin += PointBlock::kMost) {
-      block_.first = begin;
-      block_.count = std::min(PointBlock::kMost, scan_.size() - begin);
-      locate();
-      visit(block_);
+      block.first = begin;
+      block.count = std::min(PointBlock::kMost, scan_.size() - begin);
+      locate(block);
+      visit(block);
     }
   }
 
@@ -66,18 +67,18 @@ class LocatedPoints {
     }
   };
 
-  void locate() {
+  void locate(PointBlock& block) {
     dynains::detail::run_max_packs([&](auto) {
       // Local copies avoid reloads after stores that could alias the originals.
-      const std::size_t size = block_.count;
+      const std::size_t size = block.count;
       const Transform transform = T_world_sensor_;
       const VoxelGrid grid = grid_;
       const RangeGate gate = gate_;
-      const float* const xyz = scan_.xyz + block_.first * scan_.stride;
-      double* const x = block_.x.data();
-      double* const y = block_.y.data();
-      double* const z = block_.z.data();
-      VoxelKey* const key = block_.key.data();
+      const float* const xyz = scan_.xyz + block.first * scan_.stride;
+      double* const x = block.x.data();
+      double* const y = block.y.data();
+      double* const z = block.z.data();
+      VoxelKey* const key = block.key.data();
       const auto transform_all = [=](std::size_t stride) {
         for (std::size_t k = 0; k < size; ++k) {
           const float* const p = xyz + k * stride;
@@ -102,7 +103,6 @@ class LocatedPoints {
   const VoxelGrid& grid_;
   const RangeGate& gate_;
   Transform T_world_sensor_;
-  PointBlock block_;
 };
 
 }  // namespace dynains::evaluation::detail
