@@ -1,6 +1,7 @@
 #include "cell_surfaces.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 namespace dynains {
@@ -39,6 +40,11 @@ Eigen::Isometry3d motion_of(const Vector6& rotation_and_translation) {
   if (angle > 0.0) T.linear() = Eigen::AngleAxisd(angle, w / angle).toRotationMatrix();
   T.translation() = rotation_and_translation.tail<3>();
   return T;
+}
+
+double NormalEquations::uncertainty() const {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(translation_covariance());
+  return kPointDeviation * std::sqrt(std::max(0.0, solver.eigenvalues()[2]));
 }
 
 }  // namespace dynains

@@ -100,6 +100,8 @@ class NormalEquations {
     const Matrix6 damped = hessian() + 1e-3 * Matrix6::Identity();
     return -damped.ldlt().solve(gradient_);
   }
+  /// Deviation (m) of the translation along its least certain direction.
+  double uncertainty() const;
   /// Covariance of the translation (m^2) for points with a deviation of 1 m.
   Eigen::Matrix3d translation_covariance() const {
     return (hessian() + 1e-6 * Matrix6::Identity()).inverse().bottomRightCorner<3, 3>();

@@ -117,9 +117,7 @@ std::optional<Registration> registration_at(const RegistrationScan& a, const Reg
       step.equations.translation_covariance());
   result.uncertain = {by_planes.eigenvectors().col(2), by_planes.eigenvectors().col(1)};
   if (prior != nullptr) prior->add_to(step.equations, T);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(
-      step.equations.translation_covariance());
-  result.uncertainty = kPointDeviation * std::sqrt(std::max(0.0, solver.eigenvalues()[2]));
+  result.uncertainty = step.equations.uncertainty();
   return result;
 }
 

@@ -1,6 +1,5 @@
 #include "dynains/io/session_aligner.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -277,13 +276,6 @@ void check_fit(const City& city, const SurfaceFit& sum, const Eigen::Isometry3d&
   }
 }
 
-/// Deviation (m) of the translation along its least certain direction.
-double uncertainty_of(const SurfaceFit& sum) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(
-      sum.equations.translation_covariance());
-  return kPointDeviation * std::sqrt(std::max(0.0, solver.eigenvalues()[2]));
-}
-
 }  // namespace
 
 void SessionAligner::add(PointsView points, const Eigen::Isometry3d& T_session_sensor) {
@@ -362,7 +354,7 @@ SessionAlignment SessionAligner::align(const Eigen::Isometry3d& T_city_start) co
       std::sqrt(sum.squares / static_cast<double>(std::max<std::size_t>(sum.inliers, 1)));
   alignment.fitting = static_cast<double>(sum.upright_inliers) /
                       static_cast<double>(std::max<std::size_t>(sum.upright, 1));
-  alignment.uncertainty = uncertainty_of(sum);
+  alignment.uncertainty = sum.equations.uncertainty();
   alignment.sessions.assign(names.begin(), names.end());
   check_fit(city_, sum, T, is_ambiguous, alignment);
   return alignment;

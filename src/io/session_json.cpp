@@ -1,5 +1,6 @@
 #include "session_json.hpp"
 
+#include <array>
 #include <cstdint>
 #include <string>
 
@@ -71,16 +72,24 @@ std::string text_field(const fs::path& path, const Json& json, const char* name)
   return field<std::string>(path, json, name, &Json::is_string, "a text");
 }
 
-Eigen::Vector3d vector_field(const fs::path& path, const Json& json, const char* name) {
-  const auto values = field<Json>(path, json, name, &Json::is_array, "three numbers");
-  Eigen::Vector3d result;
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (values.size() != 3 || !values[i].is_number()) {
-      fail(path, std::string("/") + name + ": expected three numbers");
+/// `where`: path of the object that has the field, for messages.
+template <std::size_t kCount>
+std::array<double, kCount> numbers_field(const fs::path& path, const Json& json, const char* name,
+                                         const std::string& where, const char* expectation) {
+  const auto values = field<Json>(path, json, name, &Json::is_array, expectation);
+  std::array<double, kCount> numbers{};
+  for (std::size_t i = 0; i < kCount; ++i) {
+    if (values.size() != kCount || !values[i].is_number()) {
+      fail(path, where + name + ": expected " + expectation);
     }
-    result(static_cast<Eigen::Index>(i)) = values[i].get<double>();
+    numbers[i] = values[i].template get<double>();
   }
-  return result;
+  return numbers;
+}
+
+Eigen::Vector3d vector_field(const fs::path& path, const Json& json, const char* name) {
+  const auto numbers = numbers_field<3>(path, json, name, "/", "three numbers");
+  return Eigen::Vector3d(numbers.data());
 }
 
 /// The upper three rows, row by row.
@@ -93,13 +102,10 @@ Json json_of(const Eigen::Isometry3d& T) {
 }
 
 Eigen::Isometry3d transform_field(const fs::path& path, const Json& json, const char* name) {
-  const auto values = field<Json>(path, json, name, &Json::is_array, "twelve numbers");
+  const auto numbers = numbers_field<12>(path, json, name, "/alignment/", "twelve numbers");
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   for (std::size_t i = 0; i < 12; ++i) {
-    if (values.size() != 12 || !values[i].is_number()) {
-      fail(path, std::string("/alignment/") + name + ": expected twelve numbers");
-    }
-    T(static_cast<Eigen::Index>(i / 4), static_cast<Eigen::Index>(i % 4)) = values[i].get<double>();
+    T(static_cast<Eigen::Index>(i / 4), static_cast<Eigen::Index>(i % 4)) = numbers[i];
   }
   return T;
 }
