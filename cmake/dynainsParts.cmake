@@ -57,8 +57,8 @@ if(dynains_has_program OR dynains_has_python)
   set(dynains_has_components ON)
   set(dynains_has_evaluation ON)
 else()
-  dynains_part(components DYNAINS_BUILD_COMPONENTS "io and simulation components")
-  dynains_part(evaluation DYNAINS_BUILD_COMPONENTS "evaluation component" ${json})
+  dynains_part(components DYNAINS_BUILD_COMPONENTS "io, poses and simulation components")
+  dynains_part(evaluation DYNAINS_BUILD_COMPONENTS "city and evaluation components" ${json})
 endif()
 
 # dynains_log_library(<name> <header> <description> [<package>]): a library that some files need. It
@@ -107,4 +107,4 @@ dynains_part(tests DYNAINS_BUILD_TESTS "tests" Catch2=catch2)
 dynains_part(examples DYNAINS_BUILD_EXAMPLES "examples")
 
 # Folders of src/ and include/dynains/ that form one compiled component each.
-set(dynains_component_folders io evaluation simulation)
+set(dynains_component_folders io poses city evaluation simulation)

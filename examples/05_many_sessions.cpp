@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "dynains/io/city.hpp"
-#include "dynains/io/city_map.hpp"
-#include "dynains/io/session_writer.hpp"
+#include "dynains/city/city.hpp"
+#include "dynains/city/city_map.hpp"
+#include "dynains/city/session_writer.hpp"
 
 namespace {
 

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "dynains/io/city.hpp"
+#include "dynains/city/city.hpp"
 #include "figure.hpp"
 
 namespace dynains::program {

@@ -2,8 +2,8 @@
 #include <memory>
 
 #include "command.hpp"
-#include "recording_check.hpp"
 #include "recording_options.hpp"
+#include "run/recording_check.hpp"
 
 namespace dynains::program {
 namespace {

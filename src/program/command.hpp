@@ -27,9 +27,4 @@ inline constexpr int kExitUsage = 2;
 /// The checked recording has a defect, which the command has printed.
 struct Finding {};
 
-/// A signal ended the work early; finished results are written.
-struct Interrupted {
-  int signal;
-};
-
 }  // namespace dynains::program

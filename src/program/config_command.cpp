@@ -7,7 +7,7 @@
 #include "command.hpp"
 #include "dynains/remover.hpp"
 #include "parameter_flags.hpp"
-#include "preset.hpp"
+#include "run/preset.hpp"
 
 namespace dynains::program {
 namespace {

@@ -11,11 +11,11 @@
 #include "dynains/evaluation/report.hpp"
 #include "dynains/io/point_file.hpp"
 #include "evaluation_options.hpp"
-#include "finished_run.hpp"
-#include "input_files.hpp"
-#include "labelled_sequence.hpp"
-#include "output_folder.hpp"
 #include "recording_options.hpp"
+#include "run/finished_run.hpp"
+#include "run/input_files.hpp"
+#include "run/labelled_sequence.hpp"
+#include "run/output_folder.hpp"
 
 namespace dynains::program {
 namespace {

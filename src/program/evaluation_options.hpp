@@ -7,7 +7,7 @@
 
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/io/atomic_file.hpp"
-#include "labelled_sequence.hpp"
+#include "run/labelled_sequence.hpp"
 
 namespace dynains::program {
 

@@ -9,14 +9,14 @@
 #include "dynains/io/point_file.hpp"
 #include "evaluation_options.hpp"
 #include "experiment.hpp"
-#include "finished_run.hpp"
-#include "labelled_sequence.hpp"
-#include "output_folder.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "remover_options.hpp"
+#include "run/finished_run.hpp"
+#include "run/labelled_sequence.hpp"
+#include "run/output_folder.hpp"
+#include "run/verdict_cloud.hpp"
 #include "variants.hpp"
-#include "verdict_cloud.hpp"
 #include "verdict_figure.hpp"
 
 namespace dynains::program {

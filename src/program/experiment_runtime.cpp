@@ -15,7 +15,7 @@
 #include "experiment.hpp"
 #include "recording_options.hpp"
 #include "remover_options.hpp"
-#include "run_sequence.hpp"
+#include "run/run_sequence.hpp"
 
 namespace dynains::program {
 namespace {

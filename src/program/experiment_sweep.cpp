@@ -11,10 +11,10 @@
 #include "evaluation_options.hpp"
 #include "experiment.hpp"
 #include "gnuplot.hpp"
-#include "labelled_sequence.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "remover_options.hpp"
+#include "run/labelled_sequence.hpp"
 #include "variants.hpp"
 
 namespace dynains::program {

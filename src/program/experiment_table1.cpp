@@ -11,11 +11,11 @@
 #include "dynains/evaluation/text_table.hpp"
 #include "evaluation_options.hpp"
 #include "experiment.hpp"
-#include "labelled_sequence.hpp"
-#include "preset.hpp"
 #include "progress.hpp"
 #include "published_table.hpp"
 #include "recording_options.hpp"
+#include "run/labelled_sequence.hpp"
+#include "run/preset.hpp"
 #include "variants.hpp"
 
 namespace dynains::program {

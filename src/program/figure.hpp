@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "picture.hpp"
+#include "run/picture.hpp"
 
 namespace dynains::program {
 

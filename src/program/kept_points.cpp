@@ -12,7 +12,7 @@
 #include "dynains/points.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "io/sequential_file.hpp"
-#include "labelled_sequence.hpp"
+#include "run/labelled_sequence.hpp"
 
 namespace dynains::program {
 namespace {

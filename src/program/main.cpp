@@ -14,7 +14,8 @@
 #include "eval.hpp"
 #include "experiment.hpp"
 #include "help_formatter.hpp"
-#include "printable.hpp"
+#include "run/interrupt.hpp"
+#include "run/printable.hpp"
 #include "unknown_command.hpp"
 
 namespace {

@@ -12,17 +12,17 @@
 
 #include "change_picture.hpp"
 #include "command.hpp"
+#include "dynains/city/city.hpp"
+#include "dynains/city/city_map.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/io/city.hpp"
-#include "dynains/io/city_map.hpp"
 #include "dynains/io/las_file.hpp"
 #include "dynains/io/point_file.hpp"
 #include "figure.hpp"
-#include "interrupt.hpp"
-#include "map_file.hpp"
-#include "output_folder.hpp"
+#include "run/interrupt.hpp"
+#include "run/map_file.hpp"
+#include "run/output_folder.hpp"
 #include "tileset_files.hpp"
-#include "tileset_writer.hpp"
+#include "viewer/tileset_writer.hpp"
 
 namespace dynains::program {
 namespace {

@@ -10,7 +10,7 @@
 #include <system_error>
 
 #include "dynains/parameters.hpp"
-#include "nearest_name.hpp"
+#include "run/nearest_name.hpp"
 
 namespace dynains::program {
 namespace {

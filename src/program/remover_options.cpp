@@ -3,7 +3,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "preset.hpp"
+#include "run/preset.hpp"
 
 namespace dynains::program {
 

@@ -13,8 +13,9 @@
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "remover_options.hpp"
-#include "run.hpp"
-#include "run_plan.hpp"
+#include "run/interrupt.hpp"
+#include "run/run.hpp"
+#include "run/run_plan.hpp"
 
 namespace dynains::program {
 namespace {

@@ -10,11 +10,11 @@
 #include "dynains/simulation/write_log.hpp"
 #include "dynains/simulation/write_sequence.hpp"
 #include "dynains/version.hpp"
-#include "interrupt.hpp"
-#include "output_folder.hpp"
 #include "parameter_flags.hpp"
 #include "progress.hpp"
-#include "run_report.hpp"
+#include "run/interrupt.hpp"
+#include "run/output_folder.hpp"
+#include "run/run_report.hpp"
 
 namespace dynains::program {
 namespace {

@@ -5,9 +5,9 @@
 #include <unistd.h>
 
 #include "dynains/errors.hpp"
-#include "page.hpp"
-#include "tile_point.hpp"
-#include "tileset_writer.hpp"
+#include "viewer/page.hpp"
+#include "viewer/tile_point.hpp"
+#include "viewer/tileset_writer.hpp"
 
 namespace dynains::program {
 

@@ -8,10 +8,10 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/version.hpp"
-#include "interrupt.hpp"
-#include "json_file.hpp"
 #include "progress.hpp"
-#include "tileset_writer.hpp"
+#include "run/interrupt.hpp"
+#include "run/json_file.hpp"
+#include "viewer/tileset_writer.hpp"
 
 namespace dynains::program {
 namespace {

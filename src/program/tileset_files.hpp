@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "output_folder.hpp"
-#include "output_listing.hpp"
+#include "run/output_folder.hpp"
+#include "run/output_listing.hpp"
 
 namespace dynains::program {
 

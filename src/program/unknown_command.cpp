@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "nearest_name.hpp"
+#include "run/nearest_name.hpp"
 
 namespace dynains::program {
 namespace {

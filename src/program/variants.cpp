@@ -2,7 +2,7 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/point_cloud_traits.hpp"
-#include "naming_scan.hpp"
+#include "run/naming_scan.hpp"
 
 namespace dynains::program {
 

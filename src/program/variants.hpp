@@ -8,7 +8,7 @@
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/remover.hpp"
 #include "dynains/verdict.hpp"
-#include "labelled_sequence.hpp"
+#include "run/labelled_sequence.hpp"
 
 namespace dynains::program {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "figure.hpp"
-#include "verdict_cloud.hpp"
+#include "run/verdict_cloud.hpp"
 
 namespace dynains::program {
 

@@ -4,14 +4,14 @@
 
 #include "command.hpp"
 #include "dynains/errors.hpp"
-#include "interrupt.hpp"
-#include "json_file.hpp"
-#include "output_folder.hpp"
 #include "recording_options.hpp"
+#include "run/interrupt.hpp"
+#include "run/json_file.hpp"
+#include "run/output_folder.hpp"
+#include "run/write_view.hpp"
 #include "tile_server.hpp"
 #include "tileset_files.hpp"
 #include "web_server.hpp"
-#include "write_view.hpp"
 
 namespace dynains::program {
 namespace {

@@ -11,7 +11,7 @@
 #include <chrono>
 #include <thread>
 
-#include "interrupt.hpp"
+#include "run/interrupt.hpp"
 
 namespace dynains::program {
 namespace {

@@ -8,8 +8,8 @@
 #include "bindings.hpp"
 #include "parameters.hpp"
 #include "recording.hpp"
-#include "recording_check.hpp"
 #include "recording_settings.hpp"
+#include "run/recording_check.hpp"
 
 namespace dynains::python {
 namespace {

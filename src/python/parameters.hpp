@@ -13,7 +13,7 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/parameters.hpp"
-#include "nearest_name.hpp"
+#include "run/nearest_name.hpp"
 
 namespace dynains::python {
 

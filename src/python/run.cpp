@@ -1,4 +1,4 @@
-#include "run.hpp"
+#include "run/run.hpp"
 
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
@@ -16,13 +16,13 @@
 
 #include "bindings.hpp"
 #include "dynains/errors.hpp"
-#include "json_file.hpp"
-#include "preset.hpp"
 #include "recording.hpp"
 #include "recording_settings.hpp"
-#include "run_plan.hpp"
+#include "run/json_file.hpp"
+#include "run/preset.hpp"
+#include "run/run_plan.hpp"
+#include "run/write_view.hpp"
 #include "settings.hpp"
-#include "write_view.hpp"
 
 namespace dynains::python {
 namespace {

@@ -27,7 +27,7 @@ embed(style "${style}")
 embed(script "${joined_SCRIPTS}")
 embed(map_html "${map_html}")
 embed(map_script "${joined_MAP_SCRIPTS}")
-set(file "#include \"page_files.hpp\"\n\nnamespace dynains::viewer {\nnamespace {\n\n${text}
+set(file "#include \"viewer/page_files.hpp\"\n\nnamespace dynains::viewer {\nnamespace {\n\n${text}
 template <std::size_t kSize>
 std::string_view text_of(const unsigned char (&bytes)[kSize]) {
   return {reinterpret_cast<const char*>(bytes), kSize - 1};

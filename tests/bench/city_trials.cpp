@@ -17,10 +17,10 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/city/city.hpp"
+#include "dynains/city/city_map.hpp"
+#include "dynains/city/session_writer.hpp"
 #include "dynains/dyna_ins_remover.hpp"
-#include "dynains/io/city.hpp"
-#include "dynains/io/city_map.hpp"
-#include "dynains/io/session_writer.hpp"
 #include "dynains/remover.hpp"
 #include "dynains/simulation/simulator.hpp"
 

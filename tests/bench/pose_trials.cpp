@@ -17,8 +17,8 @@
 #include <vector>
 
 #include "dynains/errors.hpp"
-#include "dynains/io/diagnosis.hpp"
 #include "dynains/io/kitti.hpp"
+#include "dynains/poses/diagnosis.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
 

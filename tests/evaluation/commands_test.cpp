@@ -13,12 +13,12 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
-#include "eval.hpp"
-#include "experiment.hpp"
-#include "labelled_sequence.hpp"
+#include "program/eval.hpp"
+#include "program/experiment.hpp"
+#include "program/variants.hpp"
+#include "run/labelled_sequence.hpp"
 #include "sequences.hpp"
 #include "support/catch.hpp"
-#include "variants.hpp"
 
 namespace dynains::program {
 

@@ -7,14 +7,14 @@
 #include <string>
 #include <vector>
 
-#include "change_picture.hpp"
-#include "chart.hpp"
 #include "dynains/errors.hpp"
-#include "picture.hpp"
+#include "program/change_picture.hpp"
+#include "program/chart.hpp"
+#include "program/verdict_figure.hpp"
+#include "run/picture.hpp"
+#include "run/verdict_cloud.hpp"
 #include "sequences.hpp"
 #include "support/catch.hpp"
-#include "verdict_cloud.hpp"
-#include "verdict_figure.hpp"
 
 namespace dynains::program {
 

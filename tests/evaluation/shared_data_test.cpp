@@ -2,7 +2,7 @@
 #include <string>
 
 #include "dynains/evaluation/evaluate.hpp"
-#include "labelled_sequence.hpp"
+#include "run/labelled_sequence.hpp"
 #include "support/catch.hpp"
 #include "support/recordings.hpp"
 

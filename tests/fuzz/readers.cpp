@@ -12,9 +12,9 @@
 #include "dynains/pose.hpp"
 #include "dynains/remover.hpp"
 #include "io/files.hpp"
+#include "io/kitti_files.hpp"
 #include "io/point_format_writer.hpp"
-#include "kitti_files.hpp"
-#include "parameter_flags.hpp"
+#include "program/parameter_flags.hpp"
 #include "targets.hpp"
 
 namespace dynains::fuzz {

@@ -9,8 +9,8 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/io/trajectory.hpp"
-#include "frame_file.hpp"
 #include "io/files.hpp"
+#include "io/frame_file.hpp"
 #include "targets.hpp"
 
 namespace dynains::fuzz {

@@ -1,4 +1,4 @@
-#include "log/log_file.hpp"
+#include "io/log/log_file.hpp"
 
 #include <string>
 #include <utility>
@@ -7,7 +7,7 @@
 #include "db3_writer.hpp"
 #include "dynains/errors.hpp"
 #include "files.hpp"
-#include "log/decompress.hpp"
+#include "io/log/decompress.hpp"
 #include "log_writer.hpp"
 #include "support/catch.hpp"
 

@@ -1,4 +1,4 @@
-#include "lzf.hpp"
+#include "io/lzf.hpp"
 
 #include <string>
 #include <vector>

@@ -6,7 +6,7 @@
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
 #include "files.hpp"
-#include "log/decompress.hpp"
+#include "io/log/decompress.hpp"
 #include "point_format_writer.hpp"
 #include "support/catch.hpp"
 

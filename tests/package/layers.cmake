@@ -9,7 +9,9 @@ set(layers
   "^(ground_segmenter|curved_voxel_clusterer|occupancy_descriptor)\\.hpp$|^(belief_updater|free_space_evidence|static_map_accumulator)\\.hpp$|^config\\.hpp$"
   "^pipeline/"
   "^(remover|dyna_ins_remover)\\.hpp$"
-  "^(adapters|io|evaluation|simulation)/")
+  "^(adapters|io|evaluation)/"
+  "^(poses|simulation)/"
+  "^city/")
 
 # Number of the layer of a header, from 0.
 function(find_layer header result)

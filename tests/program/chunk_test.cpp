@@ -4,12 +4,12 @@
 #include <utility>
 #include <vector>
 
-#include "chunk_file.hpp"
-#include "chunk_grid.hpp"
-#include "chunk_recorder.hpp"
 #include "dynains/errors.hpp"
-#include "instance_numbers.hpp"
 #include "io/files.hpp"
+#include "run/chunk_file.hpp"
+#include "run/chunk_grid.hpp"
+#include "run/chunk_recorder.hpp"
+#include "run/instance_numbers.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 

@@ -6,7 +6,7 @@
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
 #include "program/tiny_sequence.hpp"
-#include "run.hpp"
+#include "run/run.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains;

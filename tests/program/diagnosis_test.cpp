@@ -1,5 +1,5 @@
 // Findings of `dynains check` on simulated streets with all usual mistakes in the poses.
-#include "dynains/io/diagnosis.hpp"
+#include "dynains/poses/diagnosis.hpp"
 
 #include <algorithm>
 #include <cmath>

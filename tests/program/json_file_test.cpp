@@ -1,4 +1,4 @@
-#include "json_file.hpp"
+#include "run/json_file.hpp"
 
 #include <string>
 

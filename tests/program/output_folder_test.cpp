@@ -1,4 +1,4 @@
-#include "output_folder.hpp"
+#include "run/output_folder.hpp"
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"

@@ -1,4 +1,4 @@
-#include "parameter_flags.hpp"
+#include "program/parameter_flags.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
-#include "run_report.hpp"
+#include "run/run_report.hpp"
 
 #include "io/files.hpp"
-#include "progress.hpp"
+#include "program/progress.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains::program;

@@ -1,5 +1,5 @@
 // The loop of `dynains run`, with a remover that gives predefined answers.
-#include "run_sequence.hpp"
+#include "run/run_sequence.hpp"
 
 #include <algorithm>
 #include <optional>
@@ -7,9 +7,9 @@
 
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
-#include "label_writer.hpp"
-#include "open_scans.hpp"
 #include "program/tiny_sequence.hpp"
+#include "run/label_writer.hpp"
+#include "run/open_scans.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains;

@@ -1,4 +1,4 @@
-#include "tile_server.hpp"
+#include "program/tile_server.hpp"
 
 #include <Eigen/Core>
 #include <filesystem>
@@ -7,7 +7,7 @@
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
-#include "tileset_writer.hpp"
+#include "viewer/tileset_writer.hpp"
 
 using dynains::program::TileServer;
 using dynains::test::read_text;

@@ -1,4 +1,4 @@
-#include "sightings.hpp"
+#include "viewer/sightings.hpp"
 
 #include <Eigen/Geometry>
 #include <array>

@@ -16,7 +16,7 @@
 #include "io/files.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
-#include "tileset_writer.hpp"
+#include "viewer/tileset_writer.hpp"
 
 namespace {
 

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "detail/voxel_grid.hpp"
-#include "detail/voxel_index.hpp"
 #include "dynains/points.hpp"
+#include "evaluation/detail/voxel_grid.hpp"
+#include "evaluation/detail/voxel_index.hpp"
 
 namespace dynains::evaluation::detail {
 

@@ -7,10 +7,10 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "detail/range_gate.hpp"
-#include "detail/voxel_grid.hpp"
 #include "dynains/evaluation/scan.hpp"
 #include "dynains/simd/pack_loops.hpp"
+#include "evaluation/detail/range_gate.hpp"
+#include "evaluation/detail/voxel_grid.hpp"
 
 namespace dynains::evaluation::detail {
 

@@ -4,9 +4,9 @@
 #include <Eigen/Core>
 #include <optional>
 
-#include "detail/voxel_grid.hpp"
-#include "detail/voxel_index.hpp"
 #include "dynains/evaluation/voxel_protocol.hpp"
+#include "evaluation/detail/voxel_grid.hpp"
+#include "evaluation/detail/voxel_index.hpp"
 
 namespace dynains::evaluation::detail {
 

@@ -4,9 +4,9 @@
 #include <Eigen/Core>
 #include <cstdint>
 
-#include "detail/cell_groups.hpp"
-#include "detail/voxel_grid.hpp"
 #include "dynains/points.hpp"
+#include "evaluation/detail/cell_groups.hpp"
+#include "evaluation/detail/voxel_grid.hpp"
 
 namespace dynains::evaluation::detail {
 

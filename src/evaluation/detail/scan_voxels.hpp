@@ -8,10 +8,10 @@
 #include <limits>
 #include <vector>
 
-#include "detail/located_points.hpp"
-#include "detail/nearest.hpp"
-#include "detail/voxel_index.hpp"
 #include "dynains/evaluation/truth.hpp"
+#include "evaluation/detail/located_points.hpp"
+#include "evaluation/detail/nearest.hpp"
+#include "evaluation/detail/voxel_index.hpp"
 
 namespace dynains::evaluation::detail {
 

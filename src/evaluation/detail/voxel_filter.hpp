@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "detail/located_points.hpp"
-#include "detail/voxel_grid.hpp"
+#include "evaluation/detail/located_points.hpp"
+#include "evaluation/detail/voxel_grid.hpp"
 
 namespace dynains::evaluation::detail {
 

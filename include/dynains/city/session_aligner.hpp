@@ -1,0 +1,49 @@
+// Alignment of a session with a map of many sessions whose frame is slightly different.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <vector>
+
+#include "dynains/city/city.hpp"
+#include "dynains/city/session_alignment.hpp"
+#include "dynains/points.hpp"
+#include "dynains/stage/voxel_hash_table.hpp"
+
+namespace dynains {
+
+/// Takes scans of a session and registers their points to planes and poles through the points of
+/// the map. Points that move have little weight, so that scans without verdicts can be given.
+/// Points of all sessions of the map count, but in each tile those of its newest three sessions
+/// only. The result depends on the scans, the start and these sessions. Memory: about 100 MB for
+/// kMostScans scans that lie far apart.
+class SessionAligner {
+ public:
+  /// More scans make the result hardly better.
+  static constexpr std::size_t kMostScans = 40;
+  static constexpr double kMostTranslation = 2.0;  ///< m, at the first scan in the map
+  static constexpr double kMostRotation = 5.0;     ///< deg
+
+  explicit SessionAligner(const City& city) : city_(city) {}
+
+  /// Adds one scan. `points`: m, sensor frame; others than finite ones are left out.
+  void add(PointsView points, const Eigen::Isometry3d& T_session_sensor);
+
+  /// Refines an estimate that is at most kMostTranslation and kMostRotation away. Throws
+  /// ConfigError, with the figures, if the map has no points there, or if the scans do not fit, fit
+  /// at several places or leave a direction open; IoError.
+  SessionAlignment align(const Eigen::Isometry3d& T_city_start) const;
+
+ private:
+  struct Scan {
+    Eigen::Vector3d sensor;  // m, session frame
+    std::size_t begin, end;  // in points_
+  };
+
+  City city_;
+  std::vector<Scan> scans_;
+  std::vector<Eigen::Vector3d> points_;  // m, session frame; one for each small voxel
+  VoxelHashTable<> taken_;
+};
+
+}  // namespace dynains

@@ -1,0 +1,597 @@
+#include "dynains/poses/diagnosis.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <iomanip>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <utility>
+
+#include "dynains/stage/voxel_hash_table.hpp"
+#include "io/finite_points.hpp"
+#include "io/median.hpp"
+#include "io/text.hpp"
+#include "pose_diagnosis.hpp"
+#include "pose_shift.hpp"
+
+namespace dynains {
+namespace {
+
+constexpr std::size_t kPairs = 8;       // pairs of scans that are compared
+constexpr std::size_t kStride = 5;      // from one scan of a pair to the other
+constexpr double kFast = 2.0;           // m from scan to scan; overlap of pairs is small beyond it
+constexpr std::size_t kQueries = 1200;  // points of a scan that are compared
+constexpr double kAgreeing = 0.3;       // m
+constexpr double kFarthestGap = 1.0;    // m
+
+/// Number of a cell of a grid around the sensor; cells above each other have consecutive numbers.
+std::uint64_t cell_of(const Eigen::Vector3d& p, double edge) {
+  std::uint64_t key = 0;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    key = key << 16U | static_cast<std::uint64_t>(std::floor(p[axis] / edge) + 4096.0);
+  }
+  return key;
+}
+
+Landmarks landmarks_of(const Recording& recording, std::size_t i, RecordedScan& scan) {
+  recording.read_scan(i, scan);
+  const PointBuffer points = finite_points(scan);
+  return Landmarks(points, estimate_mounting(points));
+}
+
+/// Two scans, some scans apart.
+struct Pair {
+  std::size_t first;
+  std::size_t second;
+  Landmarks a;
+  Landmarks b;
+};
+
+/// At most `most` evenly spread pairs (i, i + stride) of the scans `first` to `last`; `load(i)`
+/// gives the landmarks of a scan.
+template <class Load>
+std::vector<Pair> take_pairs(std::size_t first, std::size_t last, std::size_t stride,
+                             std::size_t most, Load&& load) {
+  const std::size_t starts = last - first + 1 - stride;
+  const std::size_t count = std::min(most, starts);
+  std::vector<Pair> pairs;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t at = first + (count == 1 ? 0 : k * (starts - 1) / (count - 1));
+    Landmarks a = load(at);
+    Landmarks b = load(at + stride);
+    pairs.push_back({at, at + stride, std::move(a), std::move(b)});
+  }
+  return pairs;
+}
+
+/// Mean of agreements, weighted by their points.
+class AgreementSum {
+ public:
+  void add(const Agreement& one) {
+    share_ += one.share * static_cast<double>(one.points);
+    gap_ += one.gap * static_cast<double>(one.points);
+    points_ += one.points;
+  }
+  Agreement mean() const {
+    if (points_ == 0) return {};
+    const auto count = static_cast<double>(points_);
+    return {share_ / count, gap_ / count, points_};
+  }
+
+ private:
+  double share_ = 0.0;
+  double gap_ = 0.0;
+  std::size_t points_ = 0;
+};
+
+Agreement agreement_under(const PoseConvention& convention, const Recording& recording,
+                          const std::vector<Pair>& pairs) {
+  AgreementSum sum;
+  for (const Pair& pair : pairs) {
+    const auto T_world_a = recording.pose_under(convention, pair.first);
+    const auto T_world_b = recording.pose_under(convention, pair.second);
+    if (!T_world_a || !T_world_b) continue;
+    sum.add(pair.a.compare(pair.b, T_world_a->inverse() * *T_world_b));
+  }
+  return sum.mean();
+}
+
+/// Agreement under the identity: no motion.
+Agreement standing_agreement(const std::vector<Pair>& pairs) {
+  AgreementSum sum;
+  for (const Pair& pair : pairs) sum.add(pair.a.compare(pair.b, Eigen::Isometry3d::Identity()));
+  return sum.mean();
+}
+
+/// A changed convention, and the options that select it.
+struct Change {
+  std::string meaning;
+  std::string option;
+  PoseConvention convention;
+};
+
+/// Appends a copy of each of `changes` that is also changed by `edit`.
+template <class Edit>
+void add_change(std::vector<Change>& changes, const std::string& meaning, const std::string& option,
+                Edit&& edit) {
+  const std::size_t count = changes.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    Change change = changes[i];
+    change.meaning += (change.meaning.empty() ? "" : ", and ") + meaning;
+    change.option += (change.option.empty() ? "" : " ") + option;
+    edit(change.convention);
+    changes.push_back(std::move(change));
+  }
+}
+
+/// Appends copies of `changes` in millimetres, then copies in centimetres.
+void add_units(std::vector<Change>& changes) {
+  struct Unit {
+    const char* name;
+    const char* flag;
+    double metres;
+  };
+  const std::vector<Change> before = changes;
+  for (const Unit& unit : {Unit{"millimetres", "mm", 0.001}, Unit{"centimetres", "cm", 0.01}}) {
+    std::vector<Change> changed = before;
+    add_change(changed, std::string("translations are in ") + unit.name,
+               std::string("--pose-units ") + unit.flag,
+               [&](PoseConvention& c) { c.unit = unit.metres; });
+    changes.insert(changes.end(), changed.begin() + static_cast<std::ptrdiff_t>(before.size()),
+                   changed.end());
+  }
+}
+
+/// A shift is not combined with other changes: its effect is small.
+void add_shifts(std::vector<Change>& changes, const PoseConvention& given) {
+  for (const int shift : {1, -1, 2, -2}) {
+    Change change{
+        std::abs(shift) == 1 ? "the poses are off by one scan" : "the poses are off by two scans",
+        "--pose-shift " + std::to_string(given.shift + shift), given};
+    change.convention.shift = given.shift + shift;
+    changes.push_back(std::move(change));
+  }
+}
+
+/// All combinations of common mistakes, except options that were given.
+std::vector<Change> usual_mistakes(const Recording& recording) {
+  const PoseConvention& given = recording.convention();
+  std::vector<Change> changes = {{"", "", given}};
+  if (!given.invert) {
+    add_change(changes, "the poses are inverse (from the world to the sensor)", "--invert-poses",
+               [](PoseConvention& c) { c.invert = true; });
+  }
+  if (recording.has_quaternions() && given.quaternion == QuaternionOrder::kNone) {
+    const bool to_wxyz = recording.quaternion_order() == QuaternionOrder::kXyzw;
+    add_change(
+        changes,
+        to_wxyz ? "quaternions are in the order w x y z" : "quaternions are in the order x y z w",
+        to_wxyz ? "--quaternion-order wxyz" : "--quaternion-order xyzw",
+        [to_wxyz](PoseConvention& c) {
+          c.quaternion = to_wxyz ? QuaternionOrder::kWxyz : QuaternionOrder::kXyzw;
+        });
+  }
+  if (!given.left_handed) {
+    add_change(changes, "the poses are left-handed", "--left-handed-poses",
+               [](PoseConvention& c) { c.left_handed = true; });
+  }
+  if (given.frame == PoseFrame::kAuto) {
+    const bool is_camera = recording.has_calibration() && !recording.has_quaternions();
+    if (is_camera) {
+      add_change(changes, "the poses are those of the lidar, not of the camera",
+                 "--pose-frame lidar", [](PoseConvention& c) { c.frame = PoseFrame::kLidar; });
+    } else {
+      add_change(changes, "the poses are those of a camera", "--pose-frame camera",
+                 [](PoseConvention& c) { c.frame = PoseFrame::kCamera; });
+    }
+  }
+  if (given.unit == 1.0) add_units(changes);
+  changes.erase(changes.begin());  // no change at all
+  add_shifts(changes, given);
+  std::stable_sort(changes.begin(), changes.end(), [](const Change& a, const Change& b) {
+    const auto flags = [](const Change& c) {
+      return std::count(c.option.begin(), c.option.end(), '-');
+    };
+    return flags(a) < flags(b);
+  });
+  return changes;
+}
+
+PoseVerdict judge(const Recording& recording, const Diagnosis& d) {
+  if (d.as_given.points < 200) return PoseVerdict::kUnknown;
+  const bool given_fits = fits(d.as_given, d.standing);
+  if (recording.frame() == PointFrame::kWorld) {
+    return given_fits ? PoseVerdict::kWorldFrame : PoseVerdict::kDisagree;
+  }
+  const Agreement* best = d.readings.empty() ? &d.as_given : &d.readings.front().agreement;
+  if (is_clearly_better(*best, d.as_given) && fits(*best, d.standing) &&
+      is_clearly_better(*best, d.standing)) {
+    return PoseVerdict::kOtherwise;
+  }
+  if (given_fits && !is_clearly_better(d.standing, d.as_given)) {
+    return is_clearly_better(d.as_given, d.standing) ? PoseVerdict::kAgree : PoseVerdict::kNoMotion;
+  }
+  return PoseVerdict::kDisagree;
+}
+
+/// Whether no other reading of the poses is clearly better.
+bool is_best(const Diagnosis& d) {
+  return is_passable(d.as_given, d.standing) &&
+         (d.readings.empty() || !is_clearly_better(d.readings.front().agreement, d.as_given));
+}
+
+/// Computes the agreement of `pairs` under the poses and under common mistakes.
+void compare(const Recording& recording, const std::vector<Pair>& pairs, std::size_t stride,
+             Diagnosis& d) {
+  d.stride = stride;
+  d.standing = standing_agreement(pairs);
+  d.as_given = agreement_under(recording.convention(), recording, pairs);
+  d.readings.clear();
+  if (recording.frame() == PointFrame::kSensor) {
+    for (const Change& change : usual_mistakes(recording)) {
+      d.readings.push_back({change.meaning, change.option, change.convention,
+                            agreement_under(change.convention, recording, pairs)});
+    }
+    // A reading with fewer changes stays first unless another one is clearly better.
+    for (std::size_t i = 1; i < d.readings.size(); ++i) {
+      if (is_clearly_better(d.readings[i].agreement, d.readings.front().agreement)) {
+        std::rotate(d.readings.begin(), d.readings.begin() + static_cast<std::ptrdiff_t>(i),
+                    d.readings.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+      }
+    }
+  }
+  d.verdict = judge(recording, d);
+}
+
+/// Gaps of a pair under shifted poses; nothing if a pose is missing.
+std::optional<ShiftedGaps> shifted_gaps(const Recording& recording, const Pair& pair) {
+  ShiftedGaps gaps{};
+  PoseConvention convention = recording.convention();
+  convention.shift -= kFarthestShift;
+  for (double& gap : gaps) {
+    const auto T_world_a = recording.pose_under(convention, pair.first);
+    const auto T_world_b = recording.pose_under(convention, pair.second);
+    if (!T_world_a || !T_world_b) return std::nullopt;
+    gap = pair.a.compare(pair.b, T_world_a->inverse() * *T_world_b).gap;
+    ++convention.shift;
+  }
+  return gaps;
+}
+
+/// Looks for poses that are shifted by one or two scans: that changes the agreement little, so it
+/// takes more pairs.
+void look_for_shift(const Recording& recording, Diagnosis& d) {
+  constexpr std::size_t kManyPairs = 24;
+  const auto margin = static_cast<std::size_t>(kFarthestShift);
+  if (recording.size() < kLeastShiftPairs + kStride + 2 * margin) return;
+  RecordedScan scan;
+  const std::vector<Pair> pairs =
+      take_pairs(margin, recording.size() - 1 - margin, kStride, kManyPairs,
+                 [&](std::size_t i) { return landmarks_of(recording, i, scan); });
+  std::vector<ShiftedGaps> gaps;
+  for (const Pair& pair : pairs) {
+    if (const auto of_pair = shifted_gaps(recording, pair)) gaps.push_back(*of_pair);
+  }
+  const int shift = best_shift(gaps);
+  if (shift == 0) return;
+  // All readings that are shown come from the same pairs.
+  compare(recording, pairs, kStride, d);
+  const auto found = std::find_if(d.readings.begin(), d.readings.end(), [&](const PoseReading& r) {
+    return r.convention.shift == recording.convention().shift + shift;
+  });
+  std::rotate(d.readings.begin(), found, found + 1);
+  d.verdict = PoseVerdict::kOtherwise;
+}
+
+void describe_motion(const Recording& recording, Diagnosis& d) {
+  std::vector<double> periods;
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < recording.size(); ++i) {
+    periods.push_back(recording.time(i) - recording.time(i - 1));
+    steps.push_back(
+        (recording.T_world_sensor(i).translation() - recording.T_world_sensor(i - 1).translation())
+            .norm());
+  }
+  d.period = median(periods);
+  d.step = median(steps);
+  if (!steps.empty()) d.longest_step = *std::max_element(steps.begin(), steps.end());
+}
+
+/// Reads scans and counts their points.
+class ScanSample {
+ public:
+  explicit ScanSample(const Recording& recording) : recording_(recording) {}
+
+  Landmarks read(std::size_t i) {
+    recording_.read_scan(i, scan_);
+    const PointBuffer points = finite_points(scan_);
+    all_ += scan_.size();
+    valid_ += points.size();
+    ++read_;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const double range = std::hypot(points.x[k], points.y[k], points.z[k]);
+      if (range < 2.0) ++near_;
+      if (k % 37 == 0) ranges_.push_back(range);
+    }
+    const Mounting mounting = estimate_mounting(points);
+    if (mounting.known) {
+      heights_.push_back(mounting.height);
+      up_ += mounting.up_sensor;
+    }
+    return Landmarks(points, mounting);
+  }
+
+  /// Sets the members of `d` that describe points and mounting.
+  void describe(Diagnosis& d) {
+    d.points = read_ == 0 ? 0.0 : static_cast<double>(all_) / static_cast<double>(read_);
+    if (all_ > 0) d.invalid_share = static_cast<double>(all_ - valid_) / static_cast<double>(all_);
+    if (valid_ > 0) d.ego_share = static_cast<double>(near_) / static_cast<double>(valid_);
+    if (!ranges_.empty()) {
+      const auto at =
+          ranges_.begin() + static_cast<std::ptrdiff_t>(99 * (ranges_.size() - 1) / 100);
+      std::nth_element(ranges_.begin(), at, ranges_.end());
+      d.farthest = *at;
+    }
+    if (2 * heights_.size() > read_) d.mounting = {median(heights_), up_.normalized(), true};
+  }
+
+ private:
+  const Recording& recording_;
+  RecordedScan scan_;
+  std::size_t all_ = 0;  // points
+  std::size_t valid_ = 0;
+  std::size_t near_ = 0;
+  std::size_t read_ = 0;  // scans
+  std::vector<double> ranges_;
+  std::vector<double> heights_;
+  Eigen::Vector3d up_ = Eigen::Vector3d::Zero();
+};
+
+struct SampledPairs {
+  std::vector<Pair> pairs;  // (i, i + stride)
+  std::size_t stride = 0;
+  std::vector<Pair> neighbours;  // (i, i + 1); empty if stride is 1
+};
+
+/// Increases the stride until the pairs do not agree without motion: scans farther apart show more
+/// of the motion of a slow sensor.
+SampledPairs sample_pairs(const Recording& recording, ScanSample& sample) {
+  const auto read = [&](std::size_t i) { return sample.read(i); };
+  SampledPairs result;
+  for (const std::size_t wanted : {std::size_t{1}, kStride, 4 * kStride, 16 * kStride}) {
+    const std::size_t next = std::min(wanted, recording.size() - 1);
+    if (next == 0 || (!result.pairs.empty() && 2 * next > recording.size())) break;
+    result.stride = next;
+    if (!result.pairs.empty() && result.neighbours.empty()) {
+      result.neighbours = std::move(result.pairs);
+    }
+    result.pairs = take_pairs(0, recording.size() - 1, next, kPairs, read);
+    if (standing_agreement(result.pairs).share < (next == 1 ? 0.35 : kLeastAgreement)) break;
+  }
+  if (result.pairs.empty() && recording.size() > 0) sample.read(0);
+  return result;
+}
+
+}  // namespace
+
+Landmarks::Landmarks(PointsView points, const Mounting& mounting, double farthest)
+    : farthest_(farthest) {
+  constexpr double kNearest = 2.0;     // m; nearer points belong to the own vehicle
+  constexpr double kOverGround = 0.5;  // m; ground agrees under every motion along it
+  constexpr double kThinned = 0.25;    // m
+  VoxelHashTable<> occupied;
+  std::vector<std::pair<std::uint64_t, Eigen::Vector3d>> kept;  // the first point of each cell
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d p(points.x[i], points.y[i], points.z[i]);
+    const double range = p.norm();
+    if (!(range > kNearest && range < farthest)) continue;
+    if (mounting.known && mounting.up_sensor.dot(p) + mounting.height < kOverGround) continue;
+    const std::uint64_t cell = cell_of(p, kThinned);
+    const bool is_first = occupied.insert(cell) + 1 > kept.size();
+    if (is_first) kept.emplace_back(cell, p);
+  }
+  const auto by_cell = [](const auto& a, const auto& b) { return a.first < b.first; };
+  std::sort(kept.begin(), kept.end(), by_cell);
+  for (auto& [cell, p] : kept) cell = cell_of(p, kFarthestGap);
+  std::stable_sort(kept.begin(), kept.end(), by_cell);
+  for (const auto& [cell, p] : kept) {
+    cells_.push_back(cell);
+    points_.push_back(p);
+  }
+}
+
+double Landmarks::distance_to(const Eigen::Vector3d& p) const {
+  if (!(p.cwiseAbs().maxCoeff() < farthest_ + kFarthestGap)) return kFarthestGap;
+  double squared = kFarthestGap * kFarthestGap;
+  for (const double x : {-kFarthestGap, 0.0, kFarthestGap}) {
+    for (const double y : {-kFarthestGap, 0.0, kFarthestGap}) {
+      // Three cells above each other have consecutive numbers.
+      const std::uint64_t middle = cell_of(p + Eigen::Vector3d(x, y, 0.0), kFarthestGap);
+      auto cell = std::lower_bound(cells_.begin(), cells_.end(), middle - 1);
+      for (; cell != cells_.end() && *cell <= middle + 1; ++cell) {
+        const Eigen::Vector3d& q = points_[static_cast<std::size_t>(cell - cells_.begin())];
+        squared = std::min(squared, (p - q).squaredNorm());
+      }
+    }
+  }
+  return std::sqrt(squared);
+}
+
+Agreement Landmarks::compare(const Landmarks& other, const Eigen::Isometry3d& T_this_other) const {
+  if (points_.empty() || other.points_.empty()) return {};
+  const std::size_t step = std::max<std::size_t>(1, other.points_.size() / kQueries);
+  std::size_t close = 0;
+  std::size_t count = 0;
+  double sum = 0.0;
+  for (std::size_t i = 0; i < other.points_.size(); i += step) {
+    const double gap = distance_to(T_this_other * other.points_[i]);
+    sum += gap;
+    if (gap < kAgreeing) ++close;
+    ++count;
+  }
+  return {static_cast<double>(close) / static_cast<double>(count), sum / static_cast<double>(count),
+          count};
+}
+
+namespace {
+
+/// Diagnosis by the agreement of scans.
+Diagnosis diagnose_agreement(const Recording& recording) {
+  Diagnosis d;
+  d.scan_files = recording.scan_file_count();
+  d.pose_rows = recording.pose_count();
+  d.scans = recording.size();
+  describe_motion(recording, d);
+  ScanSample sample(recording);
+  const SampledPairs sampled = sample_pairs(recording, sample);
+  sample.describe(d);
+
+  compare(recording, sampled.pairs, sampled.stride, d);
+  if (d.verdict == PoseVerdict::kDisagree && sampled.stride > 1 && d.step > kFast) {
+    // Fast and with few objects in sight, as on a motorway: such pairs may have only traffic in
+    // common, while neighbouring scans overlap.
+    Diagnosis near_by = d;
+    compare(recording, sampled.neighbours, 1, near_by);
+    if (near_by.verdict == PoseVerdict::kDisagree && is_best(near_by)) {
+      near_by.verdict = PoseVerdict::kNoMotion;
+    }
+    if (near_by.sound()) return near_by;
+  }
+  if (d.verdict == PoseVerdict::kAgree) look_for_shift(recording, d);
+  return d;
+}
+
+/// Agreement of a few pairs (i, i + stride) of the scans `first` to `last`.
+PoseAgreement agreement_at(const Recording& recording, std::size_t first, std::size_t last,
+                           std::size_t stride) {
+  constexpr std::size_t kFewPairs = 4;
+  RecordedScan scan;
+  const auto load = [&](std::size_t i) { return landmarks_of(recording, i, scan); };
+  const std::vector<Pair> pairs = take_pairs(first, last, stride, kFewPairs, load);
+  AgreementSum as_given;
+  for (const Pair& pair : pairs) {
+    as_given.add(pair.a.compare(pair.b, recording.T_world_sensor(pair.first).inverse() *
+                                            recording.T_world_sensor(pair.second)));
+  }
+  return {as_given.mean(), standing_agreement(pairs), stride};
+}
+
+}  // namespace
+
+Diagnosis diagnose(const Recording& recording) {
+  Diagnosis d = diagnose_agreement(recording);
+  compare_with_registration(recording, d);
+  return d;
+}
+
+PoseAgreement pose_agreement(const Recording& recording, std::size_t first, std::size_t last) {
+  const std::size_t stride = std::min(kStride, last - first);
+  if (stride == 0) return {};
+  const PoseAgreement agreement = agreement_at(recording, first, last, stride);
+  const double way = (recording.T_world_sensor(first + stride).translation() -
+                      recording.T_world_sensor(first).translation())
+                         .norm();
+  const bool is_fast = way > kFast * static_cast<double>(stride);
+  if (!agreement.doubtful() || stride == 1 || !is_fast) return agreement;
+  // As in diagnose(): neighbouring scans overlap more.
+  const PoseAgreement of_neighbours = agreement_at(recording, first, last, 1);
+  return of_neighbours.doubtful() ? agreement : of_neighbours;
+}
+
+namespace {
+
+constexpr double kDegrees = 180.0 / 3.14159265358979323846;
+
+std::string fixed(double value, int digits) {
+  std::ostringstream text;
+  text::exact(text);
+  text << std::fixed << std::setprecision(digits) << value;
+  return text.str();
+}
+
+/// "12 cm and 0.3 deg from one scan to the next".
+std::string error_text(double translation, double rotation) {
+  return fixed(100.0 * translation, 0) + " cm and " + fixed(kDegrees * rotation, 1) +
+         " deg from one scan to the next";
+}
+
+std::string error_text(const Diagnosis& d) {
+  return error_text(d.translation_error, d.rotation_error);
+}
+
+std::string body_text(const Eigen::Isometry3d& T_body_sensor) {
+  constexpr double kUpright = 0.98;
+  const Eigen::AngleAxisd rotation(T_body_sensor.linear());
+  const Eigen::Vector3d t = T_body_sensor.translation();
+  std::string text;
+  if (std::abs(rotation.angle()) > 1e-6) {
+    const Eigen::Vector3d& axis = rotation.axis();
+    const bool is_yaw = std::abs(axis.z()) > kUpright;
+    const double degrees = kDegrees * rotation.angle() * (is_yaw && axis.z() < 0.0 ? -1.0 : 1.0);
+    text = std::string(is_yaw ? "is yawed by " : "is turned by ") + fixed(degrees, 1) + " deg";
+  }
+  if (t.norm() > 0.0) {
+    text += std::string(text.empty() ? "" : " and ") + "lies at (" + fixed(t.x(), 2) + ' ' +
+            fixed(t.y(), 2) + ' ' + fixed(t.z(), 2) + ") m";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string advice(const Diagnosis& d) {
+  switch (d.verdict) {
+    case PoseVerdict::kAgree:
+      return "Scans and poses agree as they are; no option is needed.";
+    case PoseVerdict::kOtherwise:
+      return (fits(d.as_given, d.standing) ? "Scans agree better if " : "Scans agree if ") +
+             d.readings.front().meaning + ": pass " + d.readings.front().option + ".";
+    case PoseVerdict::kBodyFrame:
+      return "Scans agree if the poses are those of a body, such as an IMU or a vehicle, in which "
+             "the "
+             "lidar " +
+             body_text(d.convention.T_body_sensor) +
+             " (parts that the drive does not determine are 0): pass " + d.option + ".";
+    case PoseVerdict::kTimeOffset:
+      return "Scans agree better under the poses " + fixed(std::abs(d.time_offset), 3) + " s " +
+             (d.time_offset > 0.0 ? "after" : "before") + " their times: pass " + d.option + ".";
+    case PoseVerdict::kInexact:
+      if (d.is_inexact_at_start) {
+        return "Scans and poses agree, but the poses of the first scans are inexact by about " +
+               error_text(d.start_translation_error, d.start_rotation_error) +
+               ", as those of an odometry that has not converged yet: expect losses there; run "
+               "--start leaves "
+               "them out.";
+      }
+      return "Scans and poses agree roughly, but the poses are inexact by about " + error_text(d) +
+             ": expect losses; poses of a LiDAR odometry would do better.";
+    case PoseVerdict::kNoMotion:
+      if (d.step * static_cast<double>(d.stride) > 1.0) {
+        return "Too little stands beside the way to tell what the poses mean; nothing speaks "
+               "against them.";
+      }
+      return "The sensor hardly moves, so that scans agree whatever the poses mean; nothing speaks "
+             "against them.";
+    case PoseVerdict::kDisagree:
+      if (d.standing.share >= kLeastAgreement && is_clearly_better(d.standing, d.as_given)) {
+        return "Scans agree best as if the sensor stood still, though the poses move: if the "
+               "points are in the frame of the world, pass --frame world; if the sensor did stand "
+               "still, the poses are wrong.";
+      }
+      return "Scans do not agree under these poses, nor under any usual mistake: they belong to "
+             "another recording or clock, or are far too inexact" +
+             (d.registered_pairs > 0 ? " (off by " + error_text(d) + ")." : std::string("."));
+    case PoseVerdict::kWorldFrame:
+      return "Points are in the frame of the world and agree there; no option is needed.";
+    case PoseVerdict::kUnknown:
+      return "There is too little to compare: at least two scans with walls, poles or trees within "
+             "40 m are needed.";
+  }
+  return {};
+}
+
+}  // namespace dynains

@@ -1,0 +1,426 @@
+#include "pose_fit.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <numeric>
+#include <utility>
+
+#include "cell_surfaces.hpp"
+#include "io/finite_points.hpp"
+#include "io/median.hpp"
+#include "scan_registration.hpp"
+#include "way_search.hpp"
+
+namespace dynains {
+namespace {
+
+constexpr double kLever = 10.0;  // m, distance of the points at which a rotation is judged
+
+double angle_of(const Eigen::Matrix3d& R) { return std::abs(Eigen::AngleAxisd(R).angle()); }
+
+/// A scan, as planes and as landmarks.
+class ChainScan {
+ public:
+  explicit ChainScan(PointBuffer points) : points_(std::move(points)), planes_(points_) {}
+
+  const RegistrationScan& planes() const { return planes_; }
+  const Landmarks& landmarks() {
+    if (!landmarks_) landmarks_.emplace(points_, estimate_mounting(points_), kWayRange);
+    return *landmarks_;
+  }
+
+ private:
+  PointBuffer points_;
+  RegistrationScan planes_;
+  std::optional<Landmarks> landmarks_;
+};
+
+/// Reads scans on demand and keeps those of one chain.
+class ChainScans {
+ public:
+  explicit ChainScans(const Recording& recording) : recording_(recording) {}
+
+  ChainScan& get(std::size_t i) {
+    std::unique_ptr<ChainScan>& entry = scans_[i];
+    if (entry == nullptr) {
+      recording_.read_scan(i, scan_);
+      entry = std::make_unique<ChainScan>(finite_points(scan_));
+    }
+    return *entry;
+  }
+  void clear() { scans_.clear(); }
+
+ private:
+  const Recording& recording_;
+  RecordedScan scan_;
+  std::map<std::size_t, std::unique_ptr<ChainScan>> scans_;
+};
+
+/// Guesses of the motion to the next scan: as given, none, the given distance in each direction,
+/// and the motion at another place.
+std::vector<Eigen::Isometry3d> first_guesses(const Eigen::Isometry3d& given,
+                                             const std::optional<Eigen::Isometry3d>& elsewhere) {
+  constexpr double kFarthest = 6.0;  // m
+  std::vector<Eigen::Isometry3d> guesses = {Eigen::Isometry3d::Identity()};
+  const double way = given.translation().norm();
+  if (way < kFarthest) {
+    guesses.push_back(given);
+    for (const Eigen::Vector2d& direction : {Eigen::Vector2d(1, 0), Eigen::Vector2d(-1, 0),
+                                             Eigen::Vector2d(0, 1), Eigen::Vector2d(0, -1)}) {
+      if (way < 0.3) continue;
+      guesses.push_back(Eigen::Isometry3d::Identity());
+      guesses.back().translation().head<2>() = way * direction;
+    }
+  }
+  if (elsewhere) guesses.push_back(*elsewhere);
+  return guesses;
+}
+
+/// `uncertain`: m, uncertainty of the translation.
+bool is_certain(const std::optional<Registration>& registration, double uncertain) {
+  constexpr double kLeastScore = 0.45;
+  return registration && registration->score > kLeastScore &&
+         registration->uncertainty < uncertain && !registration->is_ambiguous;
+}
+
+/// Residual of a motion: rotation times kLever, and translation, m.
+Vector6 residual(const Eigen::Isometry3d& body, const Eigen::Isometry3d& sensor,
+                 const Eigen::Isometry3d& T_body_sensor) {
+  const Eigen::Isometry3d E = (body * T_body_sensor).inverse() * T_body_sensor * sensor;
+  const Eigen::AngleAxisd rotation(E.linear());
+  Vector6 r;
+  r << kLever * rotation.angle() * rotation.axis(), E.translation();
+  return r;
+}
+
+/// A motion by two registrations, forth and back.
+struct CheckedMotion {
+  Eigen::Isometry3d T_a_b;
+  Vector6 difference;
+  double deviation;  // m
+};
+
+std::optional<CheckedMotion> checked(const std::optional<Registration>& forth,
+                                     const std::optional<Registration>& back, double uncertain,
+                                     double deviation) {
+  constexpr double kNoisy = 0.25;  // m, 10 m from the sensor
+  if (!is_certain(forth, uncertain) || !is_certain(back, uncertain)) return std::nullopt;
+  const Vector6 difference =
+      residual(forth->T_a_b, back->T_a_b.inverse(), Eigen::Isometry3d::Identity());
+  if (difference.norm() > kNoisy) return std::nullopt;
+  return CheckedMotion{forth->T_a_b, difference, deviation};
+}
+
+/// A registration by planes and landmarks, and the direction along which landmarks decide.
+struct GuidedRegistration {
+  Registration registration;
+  KnownWay way;
+};
+
+/// Moves `T_a_b` along `direction` to where landmarks meet, less than `farthest` (m), and registers
+/// again.
+std::optional<GuidedRegistration> register_along(ChainScan& a, ChainScan& b,
+                                                 const Eigen::Isometry3d& T_a_b,
+                                                 const Eigen::Vector3d& direction,
+                                                 double farthest) {
+  constexpr double kDeviation = 0.04;  // m, of search_way()
+  const auto guess = search_way(a.landmarks(), b.landmarks(), T_a_b, direction, farthest);
+  if (!guess) return std::nullopt;
+  const KnownWay way{direction, kDeviation};
+  const auto found = register_near(a.planes(), b.planes(), *guess, way);
+  if (!found) return std::nullopt;
+  return GuidedRegistration{*found, way};
+}
+
+/// Completes a registration by planes that leaves a direction open: landmarks tell the way along
+/// it, less than `farthest` (m) from what planes say. The least certain direction is not always the
+/// open one: the back of a vehicle ahead is a plane, too. Empty if landmarks agree better without
+/// motion along it.
+std::optional<CheckedMotion> complete(ChainScan& a, ChainScan& b, const Registration& by_planes,
+                                      double farthest) {
+  constexpr double kUncertain = 0.08;  // m; a narrow view tells less of other directions, too
+  constexpr double kNear = 1.0;        // m
+  std::optional<GuidedRegistration> best;
+  double least_gap = 1.0;
+  for (const Eigen::Vector3d& direction : by_planes.uncertain) {
+    auto found = register_along(a, b, by_planes.T_a_b, direction, farthest);
+    if (!found) continue;
+    // The planes that meet at the found pose determine the open direction better.
+    if (const auto again = register_along(a, b, found->registration.T_a_b,
+                                          found->registration.uncertain[0], kNear)) {
+      found = again;
+    }
+    const double gap = mean_gap(a.landmarks(), b.landmarks(), found->registration.T_a_b);
+    Eigen::Isometry3d standing = by_planes.T_a_b;
+    standing.translation() -= direction.dot(standing.translation()) * direction;
+    if (gap < least_gap && gap <= mean_gap(a.landmarks(), b.landmarks(), standing)) {
+      best = found;
+      least_gap = gap;
+    }
+  }
+  if (!best) return std::nullopt;
+  const Eigen::Isometry3d T_b_a = best->registration.T_a_b.inverse();
+  const KnownWay way{T_b_a.linear() * best->way.direction, best->way.deviation};
+  return checked(best->registration, register_near(b.planes(), a.planes(), T_b_a, way), kUncertain,
+                 best->way.deviation);
+}
+
+/// Registers b to a. Empty if the motion is uncertain.
+std::optional<CheckedMotion> register_both_ways(ChainScan& a, ChainScan& b,
+                                                const std::vector<Eigen::Isometry3d>& guesses,
+                                                double farthest) {
+  constexpr double kOpen = 0.025;      // m, uncertainty of a direction that planes leave open
+  constexpr double kUncertain = 0.06;  // m
+  const auto found = register_scans(a.planes(), b.planes(), guesses);
+  if (!found) return std::nullopt;
+  if (found->is_ambiguous || found->uncertainty > kOpen) return complete(a, b, *found, farthest);
+  return checked(found, register_scans(b.planes(), a.planes(), {found->T_a_b.inverse()}),
+                 kUncertain, 0.0);
+}
+
+struct BothMotions {
+  Eigen::Isometry3d body;
+  Eigen::Isometry3d sensor;
+};
+
+double robust_cost(const std::vector<BothMotions>& motions,
+                   const Eigen::Isometry3d& T_body_sensor) {
+  double cost = 0.0;
+  for (const BothMotions& m : motions)
+    cost += std::log1p(residual(m.body, m.sensor, T_body_sensor).squaredNorm() / 0.01);
+  return cost;
+}
+
+/// Gauss-Newton with Cauchy weights and a weak prior that the lever arm is 0.
+Eigen::Isometry3d refine(const std::vector<BothMotions>& motions, Eigen::Isometry3d T_body_sensor) {
+  constexpr double kScale = 0.1;   // m, of a residual
+  constexpr double kPrior = 0.02;  // m per m of the lever arm
+  constexpr double kStep = 1e-6;
+  for (int k = 0; k < 25; ++k) {
+    Matrix6 H = 1e-6 * Matrix6::Identity();
+    Vector6 g = Vector6::Zero();
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      H(3 + axis, 3 + axis) += kPrior * kPrior;
+      g[3 + axis] += kPrior * kPrior * T_body_sensor.translation()[axis];
+    }
+    for (const BothMotions& m : motions) {
+      const Vector6 r = residual(m.body, m.sensor, T_body_sensor);
+      Matrix6 J;
+      for (Eigen::Index j = 0; j < 6; ++j) {
+        Vector6 change = Vector6::Zero();
+        change[j] = kStep;
+        Eigen::Isometry3d moved = T_body_sensor;
+        const Eigen::Isometry3d T = motion_of(change);
+        moved.linear() = (T.linear() * T_body_sensor.linear()).eval();
+        moved.translation() += T.translation();
+        J.col(j) = (residual(m.body, m.sensor, moved) - r) / kStep;
+      }
+      const double weight = 1.0 / (1.0 + r.squaredNorm() / (kScale * kScale));
+      H += weight * J.transpose() * J;
+      g += weight * J.transpose() * r;
+    }
+    const Vector6 change = -H.ldlt().solve(g);
+    if (!change.allFinite()) break;
+    const Eigen::Isometry3d T = motion_of(change);
+    T_body_sensor.linear() = (T.linear() * T_body_sensor.linear()).eval();
+    T_body_sensor.translation() += T.translation();
+    if (change.norm() < 1e-7) break;
+  }
+  T_body_sensor.linear() =
+      Eigen::Quaterniond(T_body_sensor.linear()).normalized().toRotationMatrix();
+  return T_body_sensor;
+}
+
+/// The 24 rotations that map axes to axes.
+std::vector<Eigen::Matrix3d> axis_rotations() {
+  std::vector<Eigen::Matrix3d> rotations;
+  for (int x = 0; x < 3; ++x) {
+    for (int y = 0; y < 3; ++y) {
+      if (x == y) continue;
+      for (const double x_sign : {1.0, -1.0}) {
+        for (const double y_sign : {1.0, -1.0}) {
+          Eigen::Matrix3d R;
+          R.col(0) = x_sign * Eigen::Vector3d::Unit(x);
+          R.col(1) = y_sign * Eigen::Vector3d::Unit(y);
+          R.col(2) = R.col(0).cross(R.col(1));
+          rotations.push_back(R);
+        }
+      }
+    }
+  }
+  std::stable_sort(rotations.begin(), rotations.end(),
+                   [](const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
+                     return angle_of(a) < angle_of(b) - 1e-6;
+                   });
+  return rotations;
+}
+
+}  // namespace
+
+namespace {
+
+/// Scans at which chains begin: 0, 2 and 4, the others evenly spread. `scans`: at least 2.
+std::vector<std::size_t> starts_of_chains(std::size_t scans) {
+  constexpr std::size_t kChains = 12;
+  constexpr std::size_t kAtStart = kStartScans / 2;
+  std::vector<std::size_t> starts;
+  if (scans - 1 <= kChains) {
+    starts.resize(scans - 1);
+    std::iota(starts.begin(), starts.end(), std::size_t{0});
+    return starts;
+  }
+  for (std::size_t k = 0; k < kAtStart; ++k) starts.push_back(2 * k);
+  constexpr std::size_t kLast = kChains - kAtStart;
+  for (std::size_t k = 1; k <= kLast; ++k) {
+    const std::size_t start = k * (scans - 2) / kLast;
+    if (start > starts.back()) starts.push_back(start);
+  }
+  return starts;
+}
+
+}  // namespace
+
+std::vector<RegisteredMotion> register_motions(const Recording& recording) {
+  constexpr std::size_t kLongest = 16;        // scans
+  constexpr std::size_t kLongEnough = 4;      // scans
+  constexpr double kFar = 3.0;                // m
+  constexpr double kFarthestStep = 6.0;       // m
+  constexpr double kFarthestFromGuess = 1.5;  // m
+  constexpr double kTurned = 0.25;            // rad
+  std::vector<RegisteredMotion> motions;
+  if (recording.size() < 2) return motions;
+  const std::vector<std::size_t> starts = starts_of_chains(recording.size());
+  ChainScans scans(recording);
+  std::optional<Eigen::Isometry3d> elsewhere;
+  for (std::size_t chain = 0; chain < starts.size(); ++chain) {
+    scans.clear();
+    const std::size_t first = starts[chain];
+    const Eigen::Isometry3d given =
+        recording.T_world_sensor(first).inverse() * recording.T_world_sensor(first + 1);
+    std::vector<Eigen::Isometry3d> guesses = first_guesses(given, elsewhere);
+    for (std::size_t step = 1; step <= kLongest && first + step < recording.size(); step *= 2) {
+      const auto found = register_both_ways(scans.get(first), scans.get(first + step), guesses,
+                                            step == 1 ? kFarthestStep : kFarthestFromGuess);
+      const bool is_steady =
+          found &&
+          (step == 1 || (found->T_a_b.translation() - guesses.front().translation()).norm() <
+                            kFarthestFromGuess);
+      if (!is_steady) break;
+      motions.push_back(
+          {chain, first, first + step, found->T_a_b, found->difference, found->deviation});
+      if (step == 1) elsewhere = found->T_a_b;
+      const bool is_far = found->T_a_b.translation().norm() > kFar && step >= kLongEnough;
+      if (is_far || angle_of(found->T_a_b.linear()) > kTurned) break;
+      guesses = {found->T_a_b * found->T_a_b};
+    }
+  }
+  return motions;
+}
+
+namespace {
+
+/// Weights of the axes of residuals, at most 1, from the differences of both registrations.
+Vector6 weights_of_axes(const std::vector<RegisteredMotion>& motions) {
+  constexpr double kGood = 0.02;  // m
+  Vector6 weights;
+  for (Eigen::Index axis = 0; axis < 6; ++axis) {
+    std::vector<double> differences;
+    differences.reserve(motions.size());
+    for (const RegisteredMotion& m : motions) differences.push_back(std::abs(m.difference[axis]));
+    weights[axis] = kGood / std::max(kGood, median(std::move(differences)));
+  }
+  return weights;
+}
+
+}  // namespace
+
+MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
+                         const Eigen::Isometry3d& T_body_sensor, Motions which) {
+  std::vector<double> translations, rotations, translation_noise, rotation_noise, both, noise;
+  const Vector6 weights = weights_of_axes(motions);
+  for (const RegisteredMotion& motion : motions) {
+    const bool is_step = motion.second == motion.first + 1;
+    if (which != Motions::kAll && !is_step) continue;
+    if (which == Motions::kFirstSteps && motion.second >= kStartScans) continue;
+    const auto T_body = body(motion);
+    if (!T_body) continue;
+    const Vector6 r = residual(*T_body, motion.T_first_second, T_body_sensor);
+    const Vector6& d = motion.difference;
+    translations.push_back(r.tail<3>().norm());
+    rotations.push_back(r.head<3>().norm() / kLever);
+    translation_noise.push_back(std::hypot(d.tail<3>().norm(), motion.deviation));
+    rotation_noise.push_back(d.head<3>().norm() / kLever);
+    both.push_back(r.cwiseProduct(weights).norm());
+    noise.push_back(std::hypot(d.cwiseProduct(weights).norm(), motion.deviation));
+  }
+  MotionError error;
+  error.pairs = both.size();
+  error.translation = median(std::move(translations));
+  error.rotation = median(std::move(rotations));
+  error.translation_noise = median(std::move(translation_noise));
+  error.rotation_noise = median(std::move(rotation_noise));
+  error.at_points = median(std::move(both));
+  error.noise = median(std::move(noise));
+  return error;
+}
+
+bool is_mostly_better(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
+                      const BodyMotion& other) {
+  constexpr std::size_t kFewest = 12;
+  constexpr double kMost =
+      0.7;  // share of the motions; by chance, 17 of 24 are better in 3 % of cases
+  const Vector6 weights = weights_of_axes(motions);
+  std::size_t better = 0;
+  std::size_t count = 0;
+  for (const RegisteredMotion& motion : motions) {
+    const auto T_body = body(motion);
+    const auto T_other = other(motion);
+    if (!T_body || !T_other) continue;
+    const auto error = [&](const Eigen::Isometry3d& T) {
+      const auto identity = Eigen::Isometry3d::Identity();
+      return residual(T, motion.T_first_second, identity).cwiseProduct(weights).norm();
+    };
+    if (error(*T_body) < error(*T_other)) ++better;
+    ++count;
+  }
+  return count >= kFewest && static_cast<double>(better) > kMost * static_cast<double>(count);
+}
+
+std::optional<Eigen::Isometry3d> fit_extrinsic(const std::vector<RegisteredMotion>& registered,
+                                               const BodyMotion& body) {
+  constexpr std::size_t kFewest = 4;
+  constexpr double kClearly = 0.9;  // ratio of costs
+  std::vector<BothMotions> motions;
+  for (const RegisteredMotion& motion : registered) {
+    const auto T_body = body(motion);
+    if (T_body) motions.push_back({*T_body, motion.T_first_second});
+  }
+  if (motions.size() < kFewest) return std::nullopt;
+  std::optional<Eigen::Isometry3d> best;
+  double least = 0.0;
+  for (const Eigen::Matrix3d& R : axis_rotations()) {
+    Eigen::Isometry3d T_body_sensor = Eigen::Isometry3d::Identity();
+    T_body_sensor.linear() = R;
+    T_body_sensor = refine(motions, T_body_sensor);
+    const double cost = robust_cost(motions, T_body_sensor);
+    // The rotations are sorted by their angle: the first of equal results stays.
+    if (best && !(cost < kClearly * least)) continue;
+    best = T_body_sensor;
+    least = cost;
+  }
+  return best;
+}
+
+std::vector<RegisteredMotion> half_of(const std::vector<RegisteredMotion>& motions,
+                                      std::size_t which) {
+  std::vector<RegisteredMotion> half;
+  for (const RegisteredMotion& motion : motions) {
+    if (motion.chain % 2 == which) half.push_back(motion);
+  }
+  return half;
+}
+
+}  // namespace dynains

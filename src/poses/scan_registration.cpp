@@ -1,0 +1,164 @@
+#include "scan_registration.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace dynains {
+namespace {
+
+/// Whether `key` was new to `table`, which has it now.
+bool adds(VoxelHashTable<>& table, VoxelKey key) {
+  const std::size_t count = table.size();
+  return table.insert(key) == count;
+}
+
+/// Normal equations at one motion, and how well it fits.
+struct Linearization {
+  NormalEquations equations;
+  double weight = 0.0;
+};
+
+/// `scale`: m, residual at which the weight of a point is a fourth.
+Linearization linearize(const RegistrationScan& a, const RegistrationScan& b,
+                        const Eigen::Isometry3d& T, std::size_t level, double scale,
+                        std::size_t stride) {
+  Linearization result;
+  for (std::size_t i = 0; i < b.points().size(); i += stride) {
+    const Eigen::Vector3d p = T * b.points()[i];
+    const CellSurface* const surface = a.find(level, p);
+    if (surface != nullptr) result.weight += result.equations.add(p, *surface, scale).weight;
+  }
+  return result;
+}
+
+/// A known component of the translation, as a term of the normal equations.
+struct Prior {
+  Eigen::Vector3d direction;
+  double place;  // m, along direction
+  double weight;
+
+  void add_to(NormalEquations& equations, const Eigen::Isometry3d& T) const {
+    Vector6 J;
+    J << T.translation().cross(direction), direction;
+    equations.add(J, direction.dot(T.translation()) - place, weight);
+  }
+};
+
+Eigen::Isometry3d refine(const RegistrationScan& a, const RegistrationScan& b,
+                         const Eigen::Isometry3d& T, std::size_t level, double scale,
+                         std::size_t stride, int most, const Prior* prior = nullptr) {
+  return gauss_newton(T, most, 1e-5, [&](const Eigen::Isometry3d& at) {
+    Linearization result = linearize(a, b, at, level, scale, stride);
+    if (prior != nullptr) prior->add_to(result.equations, at);
+    return result.equations;
+  });
+}
+
+}  // namespace
+
+RegistrationScan::RegistrationScan(PointsView points) {
+  constexpr double kThinned = 0.4;  // m
+  constexpr double kNearest = 2.0, kFarthest = 60.0;
+  struct Cell {
+    VoxelKey key;
+    CellMoments moments;
+  };
+  std::array<VoxelHashTable<>, kCellLevels> numbers;
+  std::array<std::vector<Cell>, kCellLevels> cells;
+  VoxelHashTable<> taken, thinned;
+  constexpr std::size_t kMost = 40000;  // points
+  const std::size_t stride = 1 + points.size() / kMost;
+  for (std::size_t i = 0; i < points.size(); i += stride) {
+    const Eigen::Vector3d p(static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
+                            static_cast<double>(points.z[i]));
+    const double range = p.norm();
+    if (!(range > kNearest && range < kFarthest)) continue;
+    // Dense rings would outweigh others: a cell takes one point for each small voxel.
+    if (!adds(taken, cell_key(p, 0.1))) continue;
+    for (std::size_t level = 0; level < kCellLevels; ++level) {
+      const VoxelKey key = cell_key(p, kCellEdges[level]);
+      const std::uint32_t number = numbers[level].insert(key);
+      if (number == cells[level].size()) cells[level].push_back({key, {}});
+      cells[level][number].moments.add(p);
+    }
+    if (adds(thinned, cell_key(p, kThinned))) points_.push_back(p);
+  }
+  for (std::size_t level = 0; level < kCellLevels; ++level) {
+    for (const Cell& cell : cells[level]) {
+      const CellSurface surface = surface_of(cell.moments, kCellEdges[level]);
+      if (surface.direction_count == 0) continue;
+      index_[level].insert(cell.key);
+      surfaces_[level].push_back(surface);
+    }
+  }
+}
+
+const CellSurface* RegistrationScan::find(std::size_t level, const Eigen::Vector3d& point) const {
+  const std::uint32_t number = index_[level].find(cell_key(point, kCellEdges[level]));
+  return number == VoxelHashTable<>::kNone ? nullptr : &surfaces_[level][number];
+}
+
+namespace {
+
+constexpr double kFineStep = 0.1;  // m
+
+/// The result at `T` after the last step; empty if too few points meet a cell.
+std::optional<Registration> registration_at(const RegistrationScan& a, const RegistrationScan& b,
+                                            const Eigen::Isometry3d& T, const Prior* prior) {
+  constexpr std::size_t kFewest = 200;  // points that meet a cell
+  Linearization step = linearize(a, b, T, 2, kFineStep, 1);
+  if (step.equations.count() < kFewest) return std::nullopt;
+  Registration result;
+  result.T_a_b = T;
+  result.score = step.weight / static_cast<double>(step.equations.count());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> by_planes(
+      step.equations.translation_covariance());
+  result.uncertain = {by_planes.eigenvectors().col(2), by_planes.eigenvectors().col(1)};
+  if (prior != nullptr) prior->add_to(step.equations, T);
+  result.uncertainty = step.equations.uncertainty();
+  return result;
+}
+
+}  // namespace
+
+std::optional<Registration> register_scans(const RegistrationScan& a, const RegistrationScan& b,
+                                           const std::vector<Eigen::Isometry3d>& guesses) {
+  constexpr double kDistinct = 0.5;  // m
+  constexpr double kAlmost = 0.93;   // ratio of scores
+  Eigen::Isometry3d best = Eigen::Isometry3d::Identity();
+  double best_score = 0.0;
+  std::vector<std::pair<Eigen::Vector3d, double>> results;  // translation and score
+  for (const Eigen::Isometry3d& guess : guesses) {
+    Eigen::Isometry3d T = refine(a, b, guess, 0, 1.0, 4, 12);
+    T = refine(a, b, T, 1, 0.4, 3, 10);
+    const Linearization step = linearize(a, b, T, 1, 0.3, 2);
+    const double score =
+        step.weight / (0.5 * static_cast<double>(std::max<std::size_t>(1, b.points().size())));
+    results.emplace_back(T.translation(), score);
+    if (score <= best_score) continue;
+    best = T;
+    best_score = score;
+  }
+  const bool is_ambiguous = std::any_of(results.begin(), results.end(), [&](const auto& result) {
+    return (result.first - best.translation()).norm() > kDistinct &&
+           result.second > kAlmost * best_score;
+  });
+  best = refine(a, b, best, 1, 0.2, 1, 8);
+  best = refine(a, b, best, 2, kFineStep, 1, 15);
+  auto result = registration_at(a, b, best, nullptr);
+  if (result) result->is_ambiguous = is_ambiguous;
+  return result;
+}
+
+std::optional<Registration> register_near(const RegistrationScan& a, const RegistrationScan& b,
+                                          const Eigen::Isometry3d& guess, const KnownWay& way) {
+  const double ratio = kPointDeviation / way.deviation;
+  const Prior prior{way.direction, way.direction.dot(guess.translation()), ratio * ratio};
+  Eigen::Isometry3d T = refine(a, b, guess, 1, 0.2, 1, 8, &prior);
+  T = refine(a, b, T, 2, kFineStep, 1, 15, &prior);
+  return registration_at(a, b, T, &prior);
+}
+
+}  // namespace dynains

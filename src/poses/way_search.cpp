@@ -1,0 +1,105 @@
+#include "way_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace dynains {
+namespace {
+
+using Points = std::vector<Eigen::Vector3d>;
+
+constexpr double kCoarse = 0.5;     // m
+constexpr double kFineShift = 0.1;  // m
+
+Points thinned(const Points& points) {
+  constexpr std::size_t kMost = 800;
+  const std::size_t stride = 1 + points.size() / kMost;
+  Points kept;
+  for (std::size_t i = 0; i < points.size(); i += stride) kept.push_back(points[i]);
+  return kept;
+}
+
+Eigen::Isometry3d moved(Eigen::Isometry3d T, const Eigen::Vector3d& way) {
+  T.translation() += way;
+  return T;
+}
+
+double gap_of(const Landmarks& a, const Points& points, const Eigen::Isometry3d& T) {
+  double sum = 0.0;
+  for (const Eigen::Vector3d& p : points) sum += a.distance_to(T * p);
+  return sum / static_cast<double>(points.size());
+}
+
+/// The index of the least gap; empty if it is at an end, or if another minimum is nearly as low.
+std::optional<std::size_t> clear_minimum(const std::vector<double>& gaps) {
+  constexpr double kClearly = 1.08;  // ratio to the next minimum
+  const auto least =
+      static_cast<std::size_t>(std::min_element(gaps.begin(), gaps.end()) - gaps.begin());
+  if (least == 0 || least + 1 == gaps.size()) return std::nullopt;
+  for (std::size_t k = 1; k + 1 < gaps.size(); ++k) {
+    const bool is_minimum = gaps[k] <= gaps[k - 1] && gaps[k] <= gaps[k + 1];
+    const bool is_other = std::max(k, least) - std::min(k, least) > 1;
+    if (is_minimum && is_other && gaps[k] < kClearly * gaps[least]) return std::nullopt;
+  }
+  return least;
+}
+
+}  // namespace
+
+double mean_gap(const Landmarks& a, const Landmarks& b, const Eigen::Isometry3d& T_a_b) {
+  return 0.5 *
+         (gap_of(a, thinned(b.points()), T_a_b) + gap_of(b, thinned(a.points()), T_a_b.inverse()));
+}
+
+std::optional<Eigen::Isometry3d> search_way(const Landmarks& a, const Landmarks& b,
+                                            const Eigen::Isometry3d& T_a_b,
+                                            const Eigen::Vector3d& direction, double farthest) {
+  constexpr double kKeptPlace = 0.5;    // m
+  constexpr std::size_t kFewest = 60;   // points
+  constexpr double kLeastShare = 0.15;  // of the points, that do not keep their place
+  const Points of_a = thinned(a.points());
+  const Points of_b = thinned(b.points());
+  if (of_a.size() < kFewest || of_b.size() < kFewest) return std::nullopt;
+  const double way = direction.dot(T_a_b.translation());
+  const Eigen::Isometry3d standing = moved(T_a_b, -way * direction);
+  Points decisive;
+  for (const Eigen::Vector3d& p : of_b) {
+    if (a.distance_to(standing * p) > kKeptPlace) decisive.push_back(p);
+  }
+  const double least_count = kLeastShare * static_cast<double>(of_b.size());
+  if (static_cast<double>(decisive.size()) < least_count || decisive.size() < kFewest) {
+    decisive = of_b;
+  }
+  std::vector<double> gaps;
+  const auto steps = static_cast<int>(std::ceil(farthest / kCoarse));
+  for (int k = -steps; k <= steps; ++k) {
+    gaps.push_back(gap_of(a, decisive, moved(T_a_b, kCoarse * k * direction)));
+  }
+  const auto least_gap = clear_minimum(gaps);
+  if (!least_gap) return std::nullopt;
+  const double coarse = kCoarse * (static_cast<double>(*least_gap) - static_cast<double>(steps));
+
+  // Fine steps count all points, in both directions.
+  const auto gap_at = [&](double displacement) {
+    const Eigen::Isometry3d T = moved(T_a_b, displacement * direction);
+    return 0.5 * (gap_of(a, of_b, T) + gap_of(b, of_a, T.inverse()));
+  };
+  double best = coarse;
+  double least = gap_at(best);
+  for (int k = -4; k <= 4; ++k) {
+    const double gap = k == 0 ? least : gap_at(coarse + kFineShift * k);
+    if (!(gap < least)) continue;
+    least = gap;
+    best = coarse + kFineShift * k;
+  }
+  const double before = gap_at(best - 2.0 * kFineShift);
+  const double behind = gap_at(best + 2.0 * kFineShift);
+  const double curvature = before - 2.0 * least + behind;
+  if (curvature > 0.0) {
+    best += std::clamp(kFineShift * (before - behind) / curvature, -kFineShift, kFineShift);
+  }
+  return moved(T_a_b, best * direction);
+}
+
+}  // namespace dynains

@@ -1,0 +1,25 @@
+// Displacement of two scans along a direction that planes leave open, such as a road.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+
+#include "dynains/poses/diagnosis.hpp"
+
+namespace dynains {
+
+/// Range (m) of landmarks for the search: beside a motorway, near ones may be traffic and rails.
+inline constexpr double kWayRange = 80.0;
+
+/// Mean distance (m) of the points of each scan from those of the other one, at most 1 m.
+double mean_gap(const Landmarks& a, const Landmarks& b, const Eigen::Isometry3d& T_a_b);
+
+/// Moves `T_a_b` along `direction` (unit vector, frame of a) by less than `farthest` (m) to where
+/// plants, posts and signs meet. What keeps its place without motion along `direction`, as traffic
+/// of the own speed and walls do, has no say. Empty if too few points remain, or if no place is
+/// clearly best.
+std::optional<Eigen::Isometry3d> search_way(const Landmarks& a, const Landmarks& b,
+                                            const Eigen::Isometry3d& T_a_b,
+                                            const Eigen::Vector3d& direction, double farthest);
+
+}  // namespace dynains

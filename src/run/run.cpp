@@ -1,0 +1,257 @@
+#include "run.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "chunk_store.hpp"
+#include "chunked_run.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/poses/diagnosis.hpp"
+#include "dynains/remover.hpp"
+#include "interrupt.hpp"
+#include "lone_scans.hpp"
+#include "output_folder.hpp"
+#include "run_plan.hpp"
+#include "run_request.hpp"
+#include "run_sequence.hpp"
+#include "write_view.hpp"
+
+namespace dynains::program {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Processes all scans, or those that come before a signal. Returns the times.
+RunTiming process(const RunPlan& plan, const RunListener& listener, const fs::path& folder,
+                  RunResults& results) {
+  const std::size_t total = plan.range.size();
+  const auto report_progress = [&](std::size_t done) {
+    if (listener.progress) listener.progress(done, total);
+  };
+  if (!plan.chunks.empty()) return run_in_chunks(plan, listener, folder, results);
+  RunTiming timing;
+  const auto work = [&](auto& remover) {
+    report_progress(0);
+    timing = run_sequence(remover, plan.sequence, plan.range, results, [&](std::size_t done) {
+      report_progress(done);
+      return InterruptGuard::signal() == 0;
+    });
+  };
+  if (plan.map_on_disk) {
+    RemoverWithMapOnDisk::Config config = *plan.map_on_disk;
+    config.map.map_folder = folder / kTileFolder;
+    RemoverWithMapOnDisk remover(config);
+    work(remover);
+    remover.reset();
+    std::error_code ignored;
+    fs::remove(config.map.map_folder, ignored);
+  } else {
+    DynaInsRemover remover(plan.config);
+    work(remover);
+  }
+  return timing;
+}
+
+void warn(const RunListener& listener, const std::string& text) {
+  if (listener.warn) listener.warn(text);
+}
+
+/// Throws ConfigError if the scans disagree with the poses beyond doubt, unless they are accepted.
+/// Warns if it is not beyond doubt.
+void judge_poses(const RunPlan& plan, const RunSettings& settings, const RunListener& listener,
+                 const Agreement& agreement) {
+  const std::string share = std::to_string(std::lround(100.0 * agreement.share)) +
+                            " % of the points of neighbouring scans agree under these poses";
+  constexpr std::size_t kFewestScans = 8;  // for a judgement beyond doubt
+  if (!settings.accept_poses && plan.range.size() >= kFewestScans) {
+    const Diagnosis diagnosis = diagnose(plan.sequence);
+    // A shift changes little: some broken scans can make one look better.
+    const bool is_shift = diagnosis.verdict == PoseVerdict::kOtherwise &&
+                          diagnosis.convention.shift != plan.sequence.convention().shift;
+    if (!diagnosis.sound() && diagnosis.verdict != PoseVerdict::kUnknown && !is_shift) {
+      throw ConfigError("only " + share + ". " + advice(diagnosis) + " See: dynains check " +
+                        settings.recording_as_given +
+                        "; or run with these poses by --accept-poses");
+    }
+  }
+  warn(listener, "only " + share + "; see: dynains check " + settings.recording_as_given);
+}
+
+void warn_of_doubts(const RunPlan& plan, const RunSettings& settings, const RunListener& listener,
+                    const PoseAgreement& agreement) {
+  if (agreement.doubtful()) judge_poses(plan, settings, listener, agreement.as_given);
+  const auto lone =
+      remark_on_lone_scans(plan.sequence, plan.range.first, plan.range.last, plan.config);
+  if (lone) warn(listener, *lone);
+}
+
+RunDescription describe(const RunPlan& plan, const RunSettings& settings,
+                        const PoseAgreement& agreement, const RunResults& results) {
+  const Recording& sequence = plan.sequence;
+  RunDescription description;
+  description.sequence = settings.recording;
+  description.sequence_flags = settings.recording_flags;
+  description.first_scan = sequence.name(plan.range.first);
+  // Without a finished scan, as after a signal within the first chunk: the first one.
+  description.last_scan =
+      sequence.name(plan.range.first + std::max<std::size_t>(results.finished(), 1) - 1);
+  description.missing_poses = sequence.missing_pose_count();
+  description.log_ends_early = sequence.early_end().has_value();
+  description.agreement = agreement.as_given;
+  description.preset = settings.preset;
+  description.complete = results.finished() == plan.range.size();
+  description.map = plan.outputs.map_name();
+  description.configuration = plan.configuration;
+  if (plan.map_on_disk) {
+    description.configuration["map_memory"] = plan.map_on_disk->map.map_memory;
+  }
+  return description;
+}
+
+RunOutcome outcome_of(const RunPlan& plan, const RunResults& results, const RunTiming& timing) {
+  RunOutcome outcome;
+  outcome.outputs = plan.outputs;
+  outcome.complete = results.finished() == plan.range.size();
+  outcome.scans = results.finished();
+  outcome.points = results.points();
+  outcome.labels = results.labels();
+  outcome.map_points = results.map_points();
+  std::vector<double> totals;
+  for (const TimingRow& row : timing.rows) totals.push_back(row.total);
+  outcome.time = statistics(std::move(totals));
+  outcome.jobs = timing.jobs;
+  return outcome;
+}
+
+/// Report of a run that is not finished.
+nlohmann::ordered_json marker_of(const RunPlan& plan) {
+  nlohmann::ordered_json marker = unfinished_report(plan.outputs.map_name());
+  marker["request"] = plan.request;
+  return marker;
+}
+
+/// Writes the results into `out`, from the first scan on, or until a signal comes.
+RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
+                         const RunListener& listener, OutputFolder& out, OutputChange::Mode mode,
+                         OutsideMap& outside_map) {
+  const PoseAgreement agreement = pose_agreement(plan.sequence, plan.range.first, plan.range.last);
+  warn_of_doubts(plan, settings, listener, agreement);
+
+  std::optional<SessionContribution> session;
+  std::optional<SessionAlignment> alignment;
+  // A run that is resumed may have added its session already.
+  if (!plan.session.city.empty() && !(settings.resume && plan.session.is_fulfilled())) {
+    const SessionRequest request = aligned(plan.session, plan.sequence, plan.range);
+    alignment = request.info.alignment;
+    session.emplace(request);
+  }
+
+  const InterruptGuard interrupt(listener.second_signal);
+  OutputChange change(out, mode, marker_of(plan), plan.listing);
+  if (!change.is_staged()) out.remove_folder_results(kTileFolder);
+  RunOutputs outputs = plan.outputs;
+  outputs.folder = change.folder();
+  RunResults results(plan.sequence, plan.range, outputs, outside_map.take_writer());
+  if (session) results.contribute_to(*session);
+  const RunTiming timing = process(plan, listener, outputs.folder, results);
+  RunOutcome outcome = outcome_of(plan, results, timing);
+  outcome.alignment = alignment;
+  if (!outcome.complete) outcome.signal = InterruptGuard::signal();
+  if (change.is_staged() && !outcome.complete) {
+    outcome.earlier_results_stay = true;
+    return outcome;
+  }
+  results.commit();
+  write_timing(outputs.folder / "timing.csv", timing);
+  // An earlier folder keeps the chunks until all other files are on the disk.
+  if (change.is_staged()) ChunkStore(plan, outputs.folder).remove();
+  change.put_in_place([&] {
+    results.commit_outside_map();
+    if (session && outcome.complete) session->commit();
+  });
+  if (!change.is_staged() && outcome.complete) ChunkStore(plan, outputs.folder).remove();
+  outcome.map_points = results.map_points();
+  outcome.wall = wall_time(ms_since(settings.started), timing);
+  RunDescription description = describe(plan, settings, agreement, results);
+  description.wall = outcome.wall;
+  nlohmann::ordered_json report = make_report(description, results, timing);
+  report["request"] = plan.request;
+  change.finish(report, plan.outputs.listing(plan.sequence, plan.range,
+                                             plan.outputs.in_chunks && !outcome.complete));
+  return outcome;
+}
+
+}  // namespace
+
+RunOutcome run(const RunSettings& settings, Recording recording, const RunListener& listener) {
+  const RunPlan plan = make_plan(settings, std::move(recording));
+  const LockedFolder lock(plan.outputs.folder);
+  OutputFolder out(Folder(plan.outputs.folder), run_output_kind());
+  const RunTask task = choose_task(plan, settings, out);
+  RunOutcome outcome;
+  if (task == RunTask::kNothing) {
+    out.discard_staging();
+    outcome.outputs = plan.outputs;
+    outcome.was_complete_before = true;
+  } else {
+    out.check(plan.listing, plan.inputs);
+    if (task == RunTask::kReplace) check_space(plan);
+    OutsideMap outside_map(plan, settings.force || out.has_results());
+    outcome = write_results(
+        plan, settings, listener, out,
+        task == RunTask::kReplace ? OutputChange::Mode::kStaged : OutputChange::Mode::kInPlace,
+        outside_map);
+  }
+  if (settings.view && outcome.complete) {
+    outcome.page = write_view(out, plan.sequence, kDefaultViewPoints);
+  }
+  return outcome;
+}
+
+std::size_t begin_chunks(const RunSettings& settings, Recording recording,
+                         const RunListener& listener) {
+  const RunPlan plan = make_plan(settings, std::move(recording));
+  if (plan.chunks.size() < 2) return 0;
+  const LockedFolder lock(plan.outputs.folder);
+  OutputFolder out(Folder(plan.outputs.folder), run_output_kind());
+  if (choose_task(plan, settings, out) != RunTask::kWrite) return 0;
+  out.check(plan.listing, plan.inputs);
+  warn_of_doubts(plan, settings, listener,
+                 pose_agreement(plan.sequence, plan.range.first, plan.range.last));
+  const OutputChange change(out, OutputChange::Mode::kInPlace, marker_of(plan), plan.listing);
+  create_folder(plan.outputs.folder / kChunkFolder);
+  return plan.chunks.size();
+}
+
+bool judge_chunk(const RunSettings& settings, Recording recording, std::size_t number,
+                 const RunListener& listener) {
+  const RunPlan plan = make_plan(settings, std::move(recording));
+  if (number >= plan.chunks.size()) {
+    throw ConfigError("chunk " + std::to_string(number) + ": the run has " +
+                      std::to_string(plan.chunks.size()) + " chunks, numbered from 0");
+  }
+  const FolderLock lock(plan.outputs.folder, FolderLock::Mode::kShared);
+  const OutputFolder out(Folder(plan.outputs.folder), run_output_kind());
+  const std::string differing = request_differences(out.marker(), plan.request);
+  if (!differing.empty()) {
+    throw IoError(out.path().string() +
+                  ": holds no run in chunks that was begun with these flags (" + differing + ")");
+  }
+  if (out.is_complete()) return true;
+  const ChunkStore chunks(plan, plan.outputs.folder);
+  try {
+    if (chunks.has(number)) return true;
+  } catch (const IoError& error) {
+    warn(listener, error.what() + std::string("; the chunk is processed again"));
+  }
+  const InterruptGuard interrupt(listener.second_signal);
+  std::optional<DynaInsRemover> remover;
+  return chunks.judge(number, remover, [](std::size_t) { return InterruptGuard::signal() == 0; });
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,64 @@
+// report.json and timing.csv.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "dynains/poses/diagnosis.hpp"
+#include "run_results.hpp"
+#include "run_timing.hpp"
+
+namespace dynains::program {
+
+/// Statistics of one number, for example milliseconds, over all scans. Quantiles are the smallest
+/// value that at least that share of the values does not exceed; all 0 if there are none.
+struct Statistics {
+  double median = 0.0;
+  double p95 = 0.0;
+  double p99 = 0.0;
+  double max = 0.0;
+};
+Statistics statistics(std::vector<double> values);
+
+/// Highest resident memory of this process so far.
+std::uint64_t peak_memory_bytes();
+
+/// Time of a whole run.
+struct WallTime {
+  double ms = 0.0;       ///< from the start of the command to the report
+  double outside = 0.0;  ///< share of the jobs' time that is not the pipeline, [0, 1]
+};
+/// `ms`: from the start of the command on.
+WallTime wall_time(double ms, const RunTiming& timing);
+
+struct RunDescription {
+  std::string sequence;
+  nlohmann::ordered_json sequence_flags;  ///< flag -> value, those that describe the files
+  std::string first_scan;
+  std::string last_scan;
+  std::size_t missing_poses = 0;  ///< scans of the recording that were left out for want of one
+  bool log_ends_early = false;    ///< scans behind the early end are missing
+  std::string preset;
+  Agreement agreement;   ///< of the scans under the poses, by a sample
+  bool complete = true;  ///< false after a signal
+  std::string map;       ///< file, relative to the folder of results if it lies there; empty: none
+  nlohmann::ordered_json configuration;  ///< parameter name -> value
+  WallTime wall;
+};
+
+nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& results,
+                                   const RunTiming& timing);
+
+/// The report of a run that is not finished.
+nlohmann::ordered_json unfinished_report(const std::string& map);
+
+/// Text of a report, as in the file.
+std::string to_text(const nlohmann::ordered_json& report);
+
+/// Throws IoError.
+void write_timing(const std::filesystem::path& path, const RunTiming& timing);
+
+}  // namespace dynains::program

@@ -1,0 +1,244 @@
+#include "run_results.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "dynains/io/coordinate_system.hpp"
+#include "moving_points.hpp"
+#include "output_folder.hpp"
+#include "viewer/tileset_writer.hpp"
+
+namespace dynains::program {
+namespace {
+
+/// Points lie around the poses; near the limit doubles cost little and lose nothing.
+bool is_far(const Recording& recording, const ScanRange& range) {
+  constexpr double kReach = 500.0;  // m, of any sensor
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    const Eigen::Vector3d position = recording.T_world_sensor(i).translation();
+    if (position.cwiseAbs().maxCoeff() > kFloatCoordinateLimit - kReach) return true;
+  }
+  return false;
+}
+
+constexpr const char* kDynamicLas = "dynamic_points.las";
+constexpr const char* kVerdictLog = "verdicts.mcap";
+
+PointColumns map_columns(bool far, const Recording& recording, bool with_attributes) {
+  PointColumns columns;
+  columns.double_xyz = far;
+  if (!with_attributes) return columns;
+  columns.intensity = recording.columns().intensity;
+  columns.time = recording.columns().time;
+  columns.label = recording.has_labels();
+  return columns;
+}
+
+float most_intensity(const RecordedScan& scan) {
+  float most = 0.0F;
+  for (std::size_t i = 0; i < scan.size(); ++i) most = std::max(most, scan.xyzi[4 * i + 3]);
+  return most;
+}
+
+LasOptions las_options(const Recording& recording, const ScanRange& range, const std::string& crs) {
+  LasOptions options = las_options_near(recording.T_world_sensor(range.first).translation());
+  if (!crs.empty()) options.wkt = wkt_of(crs);
+  return options;
+}
+
+}  // namespace
+
+PointColumns moving_columns(const Recording& recording, const ScanRange& range) {
+  PointColumns columns = recording.columns();
+  columns.double_xyz = is_far(recording, range);
+  columns.intensity = true;
+  columns.label = true;
+  return columns;
+}
+
+std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange& range) {
+  std::vector<Eigen::Vector3d> path;
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    path.emplace_back(recording.T_world_sensor(i).translation());
+  }
+  return path;
+}
+
+const OutputKind& run_output_kind() {
+  static const OutputKind kind = {"run",
+                                  "report.json",
+                                  {"timing.csv", "dynamic_points.ply", kDynamicLas, kVerdictLog,
+                                   kOverviewPicture, kViewPage, viewer::kTilesetFile},
+                                  true,
+                                  {{"labels", {".label"}},
+                                   {"online", {".label"}},
+                                   {"causes", {".cause"}},
+                                   {"beliefs", {".belief"}},
+                                   {"clean", {".bin", ".pcd", ".ply"}},
+                                   {kChunkFolder, {kChunkExtension}},
+                                   {kTileFolder, {kTileExtension}},
+                                   {viewer::kTilesetFolder, {viewer::kPointTileExtension}}}};
+  return kind;
+}
+
+bool RunOutputs::has_outside_map() const {
+  return !map.empty() && map.parent_path() != whole_path(folder);
+}
+
+std::string RunOutputs::map_name() const {
+  return (has_outside_map() ? map : map.filename()).string();
+}
+
+OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& range,
+                                  bool lasts) const {
+  OutputListing listing;
+  listing.files = {"timing.csv", "dynamic_points.ply", kOverviewPicture};
+  if (!map.empty() && !has_outside_map()) listing.files.insert(map_name());
+  if (has_las_map()) listing.files.insert(kDynamicLas);
+  if (write_mcap) listing.files.insert(kVerdictLog);
+  listing.folders = {{"labels", ".label"}, {"causes", ".cause"}};
+  if (write_beliefs) listing.folders["beliefs"] = ".belief";
+  if (write_online) listing.folders["online"] = ".label";
+  if (write_clean) {
+    listing.folders["clean"] =
+        std::filesystem::path(CleanWriter::name(recording, range.first)).extension().string();
+  }
+  if (in_chunks && lasts) listing.folders[kChunkFolder] = kChunkExtension;
+  if (map_on_disk && lasts) listing.folders[kTileFolder] = kTileExtension;
+  for (std::size_t i = range.first; i <= range.last; ++i) listing.scans.insert(recording.name(i));
+  return listing;
+}
+
+std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recording& recording,
+                                  const ScanRange& range, const RunOutputs& outputs) {
+  MapFileOptions options;
+  options.columns = map_columns(is_far(recording, range), recording, outputs.map_attributes);
+  if (is_las(file)) {
+    options.las = las_options(recording, range, outputs.crs);
+    options.intensity_scale = las_intensity_scale(most_intensity(recording.read_scan(range.first)));
+  }
+  return MapFile::open(file, options);
+}
+
+RunResults::RunResults(const Recording& recording, const ScanRange& range,
+                       const RunOutputs& outputs, std::unique_ptr<MapFile> outside_map)
+    : recording_(recording),
+      range_(range),
+      final_labels_(outputs.folder / "labels", outputs.folder / "causes",
+                    outputs.write_beliefs ? outputs.folder / "beliefs" : std::filesystem::path()),
+      dynamic_points_(outputs.folder / "dynamic_points.ply", moving_columns(recording, range)),
+      overview_(path_of(recording, range)),
+      overview_file_(outputs.folder / kOverviewPicture),
+      map_(std::move(outside_map)),
+      map_is_outside_(map_ != nullptr),
+      needs_beliefs_(outputs.needs_beliefs()),
+      writing_(outputs.thread) {
+  final_labels_.create_folders();
+  if (outputs.write_online) online_labels_.emplace(outputs.folder / "online", outputs.thread);
+  if (outputs.write_clean) clean_scans_.emplace(outputs.folder / "clean", recording);
+  if (!outputs.map.empty() && !map_is_outside_) {
+    map_ = open_map(outputs.folder / outputs.map.filename(), recording, range, outputs);
+  }
+  if (outputs.write_mcap) {
+    log_ = std::make_unique<VerdictLog>(outputs.folder / kVerdictLog, recording, range.first,
+                                        is_far(recording, range));
+  }
+  if (outputs.has_las_map()) {
+    dynamic_las_ = open_map(outputs.folder / kDynamicLas, recording, range, outputs);
+  }
+  if (outputs.map_attributes) {
+    map_attributes_.emplace(outputs.map_voxel, recording.T_world_sensor(range.first).translation());
+  }
+}
+
+void RunResults::take_newest(const ScanVerdict& verdict) {
+  points_ += verdict.labels.size();
+  if (online_labels_) online_labels_->write(recording_.name(range_.first + verdict.scan), verdict);
+}
+
+void JudgedScan::take(const ScanVerdict& other, bool with_beliefs) {
+  arrays.take(other, with_beliefs);
+  verdict = other;
+  verdict.labels = arrays.labels;
+  verdict.instances = arrays.instances;
+  verdict.beliefs = arrays.beliefs;
+  verdict.causes = arrays.causes;
+}
+
+void RunResults::take_final(RecordedScan* scan, const ScanVerdict& verdict) {
+  finish();
+  judged_.take(verdict, needs_beliefs_);
+  if (scan != nullptr) std::swap(judged_.scan, *scan);
+  writing_.begin([this, reads = scan == nullptr] {
+    if (reads) recording_.read_scan(range_.first + judged_.verdict.scan, judged_.scan);
+    write_final(judged_.scan, judged_.verdict);
+  });
+  ++finished_;
+}
+
+void RunResults::finish() { writing_.wait(); }
+
+void RunResults::write_final(const RecordedScan& scan, const ScanVerdict& verdict) {
+  final_labels_.take(verdict);
+  final_labels_.write(recording_.name(range_.first + verdict.scan));
+  labels_.add(verdict.labels);
+  add_scan(scan, verdict);
+  overview_.add(scan, verdict);
+  for_each_moving_point(
+      scan, verdict,
+      [&](std::size_t i) { return mos_label(verdict.labels[i], verdict.instances[i]); },
+      [&](const FilePoint& point) { dynamic_points_.add(point); });
+}
+
+bool RunResults::needs_scans() const {
+  return clean_scans_ || log_ || map_attributes_ || dynamic_las_ || session_ != nullptr;
+}
+
+void RunResults::add_scan(const RecordedScan& scan, const ScanVerdict& verdict) {
+  const std::size_t index = range_.first + verdict.scan;
+  if (clean_scans_) clean_scans_->write(index, scan, verdict.labels);
+  if (log_) log_->add(scan, verdict);
+  const bool has_labels = (map_attributes_ || session_ != nullptr) && recording_.has_labels();
+  const auto labels = has_labels ? recording_.read_labels(index) : std::vector<std::uint32_t>();
+  if (map_attributes_) map_attributes_->add(scan, verdict, labels);
+  if (session_ != nullptr) session_->add(scan, verdict, labels, index);
+  if (!dynamic_las_) return;
+  for_each_moving(verdict.labels, [&](std::size_t i) {
+    const Eigen::Vector3d position = verdict.T_world_sensor * scan.point(i).position;
+    dynamic_las_->add(position, attributes_of(scan, verdict, labels, i));
+  });
+}
+
+bool RunResults::add_chunk(std::size_t scans, const ChunkSummary& summary) {
+  if (!overview_.merge(summary.overview)) return false;
+  points_ += summary.points;
+  labels_ += summary.labels;
+  finished_ += scans;
+  return true;
+}
+
+void RunResults::add_map_point(const Eigen::Vector3d& point) {
+  if (log_) log_->add_map_point(point);
+  map_->add(point, map_attributes_ ? map_attributes_->at(point) : MapAttributes());
+}
+
+void RunResults::commit() {
+  finish();
+  if (online_labels_) online_labels_->finish();
+  dynamic_points_.commit();
+  if (dynamic_las_) dynamic_las_->commit();
+  if (log_) log_->commit();
+  overview_.picture().write_png(overview_file_);
+  if (map_ && !map_is_outside_) map_->commit();
+}
+
+void RunResults::commit_outside_map() {
+  if (map_ && map_is_outside_) map_->commit();
+}
+
+std::optional<std::size_t> RunResults::map_points() const {
+  if (!map_) return std::nullopt;
+  return map_->size();
+}
+
+}  // namespace dynains::program

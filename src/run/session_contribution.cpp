@@ -1,0 +1,82 @@
+#include "session_contribution.hpp"
+
+#include <algorithm>
+
+#include "dynains/city/city.hpp"
+#include "dynains/city/session_aligner.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/pose.hpp"
+
+namespace dynains::program {
+namespace {
+
+void copy_points(const RecordedScan& scan, PointBuffer& points) {
+  const std::size_t size = scan.size();
+  points.resize(size);
+  const float* const from = scan.xyzi.data();
+  float* const x = points.x.data();
+  float* const y = points.y.data();
+  float* const z = points.z.data();
+  for (std::size_t i = 0; i < size; ++i) {
+    x[i] = from[4 * i];
+    y[i] = from[4 * i + 1];
+    z[i] = from[4 * i + 2];
+  }
+}
+
+/// Whether a session was aligned as the request asks for.
+bool has_alignment(const SessionRequest& request, const SessionInfo& session) {
+  if (session.alignment.has_value() != request.T_city_start.has_value()) return false;
+  return !session.alignment ||
+         session.alignment->T_city_start.matrix() == request.T_city_start->matrix();
+}
+
+}  // namespace
+
+bool SessionRequest::is_fulfilled() const {
+  if (!std::filesystem::exists(city / "city.json")) return false;
+  const std::vector<SessionInfo> sessions = City(city).sessions();
+  return std::any_of(sessions.begin(), sessions.end(), [&](const SessionInfo& session) {
+    return session.name == info.name && session.fingerprint == info.fingerprint &&
+           session.begin == info.begin && has_alignment(*this, session) &&
+           nlohmann::json::parse(session.config, nullptr, false) ==
+               nlohmann::json::parse(info.config, nullptr, false);
+  });
+}
+
+SessionRequest aligned(SessionRequest request, const Recording& recording, const ScanRange& range) {
+  if (!request.T_city_start) return request;
+  if (!std::filesystem::exists(request.city / "city.json")) {
+    throw ConfigError(request.city.string() +
+                      ": there is no map to align with; add its first session without --align");
+  }
+  SessionAligner aligner{City(request.city)};
+  RecordedScan scan;
+  PointBuffer points;
+  const std::size_t count = std::min(range.size(), SessionAligner::kMostScans);
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t i =
+        range.first + k * (range.size() - 1) / std::max<std::size_t>(count - 1, 1);
+    recording.read_scan(i, scan);
+    copy_points(scan, points);
+    aligner.add(points, orthonormalized(recording.T_world_sensor(i)));
+  }
+  request.info.alignment = aligner.align(*request.T_city_start);
+  return request;
+}
+
+SessionContribution::SessionContribution(const SessionRequest& request)
+    : writer_(City::open_or_make(request.city, request.grid), request.info) {
+  if (request.info.alignment) T_city_session_ = request.info.alignment->T_city_session;
+}
+
+void SessionContribution::add(const RecordedScan& scan, const ScanVerdict& verdict,
+                              const std::vector<std::uint32_t>& labels, std::size_t number) {
+  copy_points(scan, points_);
+  const Eigen::Isometry3d T_city_sensor =
+      T_city_session_ ? orthonormalized(*T_city_session_ * verdict.T_world_sensor)
+                      : verdict.T_world_sensor;
+  writer_.add(points_, verdict.labels, labels, T_city_sensor, static_cast<std::uint32_t>(number));
+}
+
+}  // namespace dynains::program
