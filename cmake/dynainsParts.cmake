@@ -93,16 +93,6 @@ if(dynains_has_components)
   dynains_log_library(sqlite3 sqlite3.h "logs in SQLite (.db3)")
 endif()
 
-# cpp-httplib has a pkg-config file, whose flags its library was built with.
-if(dynains_has_program)
-  find_package(PkgConfig QUIET)
-  if(PkgConfig_FOUND)
-    pkg_check_modules(httplib QUIET IMPORTED_TARGET cpp-httplib)
-  endif()
-  dynains_part(httplib DYNAINS_WITH_HTTPLIB "server of maps (dynains view --serve)"
-    httplib=libcpp-httplib-dev)
-endif()
-
 dynains_part(tests DYNAINS_BUILD_TESTS "tests" Catch2=catch2)
 dynains_part(examples DYNAINS_BUILD_EXAMPLES "examples")
 

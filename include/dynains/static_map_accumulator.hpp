@@ -158,32 +158,6 @@ class StaticMapAccumulator {
       visit(points_[i].x, points_[i].y, points_[i].z);
     }
   }
-  /// Index of a block: its lowest corner is at these multiples of the edges of blocks. `block` is
-  /// below block_count().
-  std::array<std::int32_t, 3> block_index(std::uint32_t block) const {
-    const BlockIndex& index = blocks_[block].index;
-    return {index.x, index.y, index.z};
-  }
-  /// Adds points of the block with this index, as another map of the same `map_voxel` has them. A
-  /// voxel with a point ignores further points. `xyz`: interleaved, m, relative to the lowest
-  /// corner of the block. Throws std::length_error and std::bad_alloc as insert() does.
-  void insert_in_block(const std::array<std::int32_t, 3>& index, Span<const float> xyz) {
-    BlockContent& block =
-        blocks_[blocks_.find_or_add({index[0], index[1], index[2]}, {0, kNone})].data;
-    const auto scale = static_cast<float>(1.0 / voxel_);
-    for (std::size_t i = 0; i + 2 < xyz.size(); i += 3) {
-      int voxel = 0;
-      for (int axis = 2; axis >= 0; --axis) {
-        // Rounding can move a point on a border slightly out of its block.
-        const int place = static_cast<int>(xyz[i + static_cast<std::size_t>(axis)] * scale);
-        voxel = voxel * kBlockVoxels[axis] + std::clamp(place, 0, kBlockVoxels[axis] - 1);
-      }
-      const std::uint64_t bit = std::uint64_t{1} << voxel;
-      if ((block.occupied & bit) != 0 && !keep_all_) continue;
-      block.first = add_point({xyz[i], xyz[i + 1], xyz[i + 2], block.first});
-      block.occupied |= bit;
-    }
-  }
   /// Removes all points of a block; later points can fill its voxels again. `block` is below
   /// block_count().
   void erase_block(std::uint32_t block) {

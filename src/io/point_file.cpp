@@ -126,13 +126,6 @@ void PointFileWriter::add(const FilePoint& point) {
   if (buffer_.bytes().size() >= kMostBytes) write_buffer();
 }
 
-void PointFileWriter::add(const PointRecords& points) {
-  write_buffer();
-  const Span<const char> bytes = points.bytes();
-  file_.stream().write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  size_ += points.size();
-}
-
 void PointFileWriter::write_buffer() {
   const Span<const char> bytes = buffer_.bytes();
   file_.stream().write(bytes.data(), static_cast<std::streamsize>(bytes.size()));

@@ -14,10 +14,10 @@ char* put(const T& value, char* to) {
 PointRecords::PointRecords(const PointColumns& columns, bool is_pcd)
     : columns_(columns), is_pcd_(is_pcd) {
   const auto bytes_of = [](bool has_column, std::size_t bytes) { return has_column ? bytes : 0; };
-  label_ = 3 * (columns.double_xyz ? sizeof(double) : sizeof(float)) +
-           bytes_of(columns.intensity, sizeof(float)) +
-           bytes_of(columns.rgb, is_pcd ? sizeof(std::uint32_t) : 3);
-  record_size_ = label_ + bytes_of(columns.label, sizeof(std::uint32_t)) +
+  record_size_ = 3 * (columns.double_xyz ? sizeof(double) : sizeof(float)) +
+                 bytes_of(columns.intensity, sizeof(float)) +
+                 bytes_of(columns.rgb, is_pcd ? sizeof(std::uint32_t) : 3) +
+                 bytes_of(columns.label, sizeof(std::uint32_t)) +
                  bytes_of(columns.ring, sizeof(std::uint16_t)) +
                  bytes_of(columns.time, sizeof(double)) +
                  bytes_of(columns.session, sizeof(std::uint16_t));
@@ -42,12 +42,6 @@ void PointRecords::add(const FilePoint& point) {
   if (columns_.ring) to = put(point.ring, to);
   if (columns_.time) to = put(point.time, to);
   if (columns_.session) put(point.session, to);
-}
-
-bool PointRecords::assign(Span<const char> bytes) {
-  if (bytes.size() % record_size_ != 0) return false;
-  bytes_.assign(bytes.begin(), bytes.end());
-  return true;
 }
 
 }  // namespace dynains

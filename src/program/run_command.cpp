@@ -44,8 +44,7 @@ void print_results(const RunOutcome& run) {
             << "time per scan: median " << run.time.median << " ms, p95 " << run.time.p95
             << " ms, max " << run.time.max << " ms\n"
             << "wall time: " << run.wall.ms / 1000.0 << " s"
-            << (run.jobs > 1 ? ", " + std::to_string(run.jobs) + " jobs" : std::string()) << "; "
-            << 100.0 * run.wall.outside
+            << "; " << 100.0 * run.wall.outside
             << " % of it outside the pipeline (reading, writing, starting)\n";
   if (run.map_points) {
     std::cout << "static map: " << (outputs.folder / outputs.map_name()).string() << " ("
@@ -129,34 +128,14 @@ void add_run_command(CLI::App& app) {
   command
       .add_flag("--resume", options->resume,
                 "complete a run with the same flags that was interrupted or killed, if --out holds "
-                "one; nothing to do if it is complete. Finished chunks are kept; one stream begins "
-                "with the first scan again, for verdicts depend on earlier scans")
+                "one; nothing to do if it is complete. It begins with the first scan again, for "
+                "verdicts depend on earlier scans")
       ->excludes(force);
   add_window_options(command, options->window);
   command
       .add_option("--map", options->map,
                   "static map, .ply, .pcd or .las [static_map.ply in the folder of --out]")
       ->type_name("FILE");
-  const char* const kCores = "Cores and chunks";
-  command
-      .add_option(
-          "--jobs", options->jobs,
-          "threads that process chunks of the recording; changes no result. 1 of one stream: "
-          "that thread also reads and writes, for machines on which many runs use all "
-          "cores [one for each core]")
-      ->type_name("N")
-      ->group(kCores);
-  command
-      .add_option("--chunk", options->chunk,
-                  "scans of a chunk, 0: the recording is one stream [0 for less than 1000 scans, "
-                  "else about 500]")
-      ->type_name("SCANS")
-      ->group(kCores);
-  command
-      .add_option("--lookback", options->lookback,
-                  "scans before a chunk that prepare it [those whose evidence counts for a scan]")
-      ->type_name("SCANS")
-      ->group(kCores);
   const char* const kOutputs = "More outputs, and memory";
   command
       .add_flag("--map-attributes", options->map_attributes,
@@ -216,6 +195,11 @@ void add_run_command(CLI::App& app) {
   add_output("--write-mcap", options->write_mcap,
              "also write verdicts.mcap, a log of ROS 2 with all scans, their labels, instances, "
              "beliefs and causes, the poses and the map");
+  command
+      .add_flag("--one-thread", options->one_thread,
+                "the thread of the run also reads and writes, for machines on which many runs use "
+                "all cores")
+      ->group(kOutputs);
   command.add_flag("--view", options->view,
                    "also write the page view.html, which shows the results (see `dynains view`), "
                    "and the folder beliefs");

@@ -20,6 +20,7 @@ namespace fs = std::filesystem;
 using viewer::kPointTileExtension;
 using viewer::kTilesetFile;
 using viewer::kTilesetFolder;
+using viewer::kTilesetPage;
 
 /// The file of the static map of a run. Throws IoError.
 fs::path map_of(const OutputFolder& out) {
@@ -67,7 +68,7 @@ void write_tileset(const fs::path& map, const fs::path& folder, bool quiet) {
 const OutputKind& tileset_output_kind() {
   static const OutputKind kind = {"map export",
                                   "export.json",
-                                  {kTilesetFile},
+                                  {kTilesetFile, kTilesetPage},
                                   false,
                                   {{kTilesetFolder, {kPointTileExtension}}}};
   return kind;
@@ -75,7 +76,7 @@ const OutputKind& tileset_output_kind() {
 
 OutputListing tileset_listing() {
   OutputListing listing;
-  listing.files = {kTilesetFile};
+  listing.files = {kTilesetFile, kTilesetPage};
   listing.folders = {{kTilesetFolder, kPointTileExtension}};
   return listing;
 }
@@ -91,7 +92,7 @@ void write_run_tileset(OutputFolder& out, bool quiet) {
   const fs::path map = map_of(out);
   const fs::path tileset = out.path() / kTilesetFile;
   OutputListing listing = out.listing();
-  listing.files.insert(kTilesetFile);
+  listing.files.insert({kTilesetFile, kTilesetPage});
   listing.folders[kTilesetFolder] = kPointTileExtension;
   if (out.listing().contains(listing) && is_newer(tileset, map)) return;
   out.check(listing, InputFiles());
@@ -99,6 +100,7 @@ void write_run_tileset(OutputFolder& out, bool quiet) {
   out.mark(nlohmann::ordered_json(out.marker()), listing);
   out.remove_temporaries();
   out.folder().remove_file(kTilesetFile);
+  out.folder().remove_file(kTilesetPage);
   out.remove_folder_results(kTilesetFolder);
   write_tileset(map, out.path(), quiet);
 }

@@ -9,9 +9,8 @@
 #include "run/json_file.hpp"
 #include "run/output_folder.hpp"
 #include "run/write_view.hpp"
-#include "tile_server.hpp"
 #include "tileset_files.hpp"
-#include "web_server.hpp"
+#include "viewer/tileset_writer.hpp"
 
 namespace dynains::program {
 namespace {
@@ -29,8 +28,7 @@ struct ViewOptions {
   CLI::Option* out_option;  // the first positional argument
   RecordingFlags sequence;
   std::size_t max_points = kDefaultViewPoints;
-  bool serve = false;
-  int port = 0;
+  bool tiles = false;
   bool quiet = false;
 };
 
@@ -83,14 +81,13 @@ void prepare_tileset(const fs::path& folder, bool quiet) {
   write_run_tileset(out, quiet);
 }
 
-void serve(const ViewOptions& options) {
+void view_tiles(const ViewOptions& options) {
   prepare_tileset(options.out, options.quiet);
-  const TileServer server(options.out);
-  serve_web(
-      options.port, [&](const std::string& path) { return server.answer(path); },
-      [](int port) {
-        std::cout << "map: http://127.0.0.1:" << port << "/ (Ctrl-C stops)" << std::endl;
-      });
+  if (options.quiet) return;
+  std::cout << "map: " << (fs::path(options.out) / viewer::kTilesetPage).string()
+            << "\nIts tiles need a web server: python3 -m http.server --bind 127.0.0.1 --directory "
+            << options.out << "\nThen open http://127.0.0.1:8000/" << viewer::kTilesetPage
+            << std::endl;
 }
 
 }  // namespace
@@ -105,20 +102,16 @@ void add_view_command(CLI::App& app) {
       ->check(CLI::Range(std::size_t{1000}, std::size_t{100000000}))
       ->capture_default_str()
       ->type_name("N");
-  CLI::Option* const serve_option =
-      command.add_flag("--serve", options->serve,
-                       "for large maps: serve the static map in tiles (OGC 3D Tiles) until Ctrl-C");
-  command.add_option("--port", options->port, "of --serve, on this machine alone [a free one]")
-      ->check(CLI::Range(1, 65535))
-      ->needs(serve_option)
-      ->type_name("N");
+  command.add_flag("--tiles", options->tiles,
+                   "for large maps: write the static map in tiles (OGC 3D Tiles) and a page that "
+                   "loads them");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   command.footer(
       "Writes OUT/view.html: one file that needs no server and no network. SEQ and its flags are\n"
-      "those of the run unless you give them. With --serve, writes OUT/tileset.json and "
-      "OUT/tileset\n"
-      "instead, and OUT may be a folder of dynains map CITY export OUT --format 3dtiles.");
-  command.callback([options] { options->serve ? serve(*options) : view(*options); });
+      "those of the run unless you give them. With --tiles, writes OUT/map.html, OUT/tileset.json\n"
+      "and OUT/tileset instead, which any web server of static files shows, and OUT may be a\n"
+      "folder of dynains map CITY export OUT --format 3dtiles.");
+  command.callback([options] { options->tiles ? view_tiles(*options) : view(*options); });
 }
 
 }  // namespace dynains::program

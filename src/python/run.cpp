@@ -51,13 +51,7 @@ void set_scan(RunArguments& run, const py::handle& value) {
   if (!value.is_none()) run.settings.window.*Field = value.cast<std::size_t>();
 }
 
-template <std::optional<std::int64_t> RunSettings::*Field, std::int64_t kLeast>
-void set_count(RunArguments& run, const py::handle& value) {
-  if (value.is_none()) return;
-  run.settings.*Field = to_whole_number(value, kLeast, std::numeric_limits<std::int32_t>::max());
-}
-
-const std::array<RunSetting, 25> kRunSettings{{
+const std::array<RunSetting, 23> kRunSettings{{
     {"preset", "'default', 'offline' or 'paper'", "parameters to start from",
      [](RunArguments& run, const py::handle& value) {
        const auto& names = program::preset_names();
@@ -112,14 +106,8 @@ const std::array<RunSetting, 25> kRunSettings{{
      [](RunArguments& run, const py::handle& value) {
        if (!value.is_none()) run.settings.align_start = value.cast<std::string>();
      }},
-    {"jobs", "int from 1 on",
-     "threads that process chunks of the recording; changes no result. 1 of one stream: that "
-     "thread also reads and writes",
-     &set_count<&RunSettings::jobs, 1>},
-    {"chunk", "int from 0 on", "scans of a chunk; 0: the recording is one stream",
-     &set_count<&RunSettings::chunk, 0>},
-    {"lookback", "int from 0 on", "scans before a chunk that prepare it; needs chunk",
-     &set_count<&RunSettings::lookback, 0>},
+    {"one_thread", "bool", "the thread of the run also reads and writes files",
+     &set_flag<&RunSettings::one_thread>},
     {"write_online", "bool", "also write the verdicts without latency",
      &set_flag<&RunSettings::write_online>},
     {"write_clean", "bool", "also write every scan without its moving points",
@@ -262,23 +250,6 @@ RunResult run(const py::object& recording, const fs::path& out, const py::kwargs
   return result;
 }
 
-std::size_t begin_chunks(const py::object& recording, const fs::path& out,
-                         const py::kwargs& values) {
-  const PreparedRun prepared = prepare(recording, out, values);
-  const program::RunListener listener = listen(prepared.arguments);
-  const py::gil_scoped_release release;
-  return program::begin_chunks(prepared.arguments.settings, prepared.recording->get(), listener);
-}
-
-bool judge_chunk(const py::object& recording, const fs::path& out, std::size_t number,
-                 const py::kwargs& values) {
-  const PreparedRun prepared = prepare(recording, out, values);
-  const program::RunListener listener = listen(prepared.arguments);
-  const py::gil_scoped_release release;
-  return program::judge_chunk(prepared.arguments.settings, prepared.recording->get(), number,
-                              listener);
-}
-
 std::string represent(const RunResult& result) {
   const auto field = [&](const char* name) {
     return py::str(result.report[name]).cast<std::string>();
@@ -366,8 +337,6 @@ void bind_run(py::module_& module) {
       "RuntimeWarning. Other threads run meanwhile.";
   module.def("run", &run, py::arg("recording"), py::arg("out"), doc.c_str());
   // For dynains.fleet.
-  module.def("_begin_chunks", &begin_chunks, py::arg("recording"), py::arg("out"));
-  module.def("_judge_chunk", &judge_chunk, py::arg("recording"), py::arg("out"), py::arg("number"));
   module.def("_write_page", &write_page, py::arg("out"), py::arg("recording") = py::none(),
              py::arg("max_points") = program::kDefaultViewPoints);
 }

@@ -86,17 +86,6 @@ void LabelFiles::take(const ScanVerdict& verdict) {
   take_beliefs(verdict.beliefs);
 }
 
-void LabelFiles::take(const VerdictRuns& runs, Span<const float> beliefs) {
-  labels_.resize(runs.points());
-  if (!cause_folder_.empty()) causes_.resize(runs.points());
-  runs.for_each([&](std::size_t run, std::size_t first, std::size_t count) {
-    std::fill_n(labels_.data() + first, count, mos_label(runs.labels[run], runs.instances[run]));
-    if (cause_folder_.empty()) return;
-    std::fill_n(causes_.data() + first, count, static_cast<std::uint8_t>(runs.causes[run]));
-  });
-  take_beliefs(beliefs);
-}
-
 void LabelFiles::take_beliefs(Span<const float> beliefs) {
   if (belief_folder_.empty()) return;
   beliefs_.resize(beliefs.size());

@@ -10,7 +10,6 @@
 #include "dynains/points.hpp"
 #include "dynains/verdict.hpp"
 #include "threads/background.hpp"
-#include "verdict_runs.hpp"
 
 namespace dynains::program {
 
@@ -29,7 +28,6 @@ class LabelFiles {
   void create_folders() const;
   /// Copies a verdict into the form of the files.
   void take(const ScanVerdict& verdict);
-  void take(const VerdictRuns& runs, Span<const float> beliefs);
   /// Writes the verdict of take() to `labels`/`name`.label, `causes`/`name`.cause and
   /// `beliefs`/`name`.belief (255 is a belief of 1). With `keep_equal`, files that have these bytes
   /// already stay. Throws IoError.

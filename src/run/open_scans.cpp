@@ -9,16 +9,13 @@ constexpr std::size_t kFewScans = 8;
 
 }  // namespace
 
-OpenScans::OpenScans(const Recording& recording, const ScanRange& pushed, const ScanRange& judged,
-                     std::size_t latency, std::launch thread)
-    : judged_(judged),
-      next_(pushed.first),
-      are_kept_(latency <= kFewScans || recording.format() != ScanFormat::kBin),
+OpenScans::OpenScans(const Recording& recording, const ScanRange& pushed, std::size_t latency,
+                     std::launch thread)
+    : are_kept_(latency <= kFewScans || recording.format() != ScanFormat::kBin),
       reader_(recording, pushed.first, pushed.last, thread) {}
 
 const RecordedScan& OpenScans::next() {
-  const bool is_kept = are_kept_ && is_judged(next_++);
-  if (!is_kept) return pushed_scan_ = reader_.next(std::move(pushed_scan_));
+  if (!are_kept_) return pushed_scan_ = reader_.next(std::move(pushed_scan_));
   kept_.push_back(reader_.next(std::move(judged_scan_)));
   judged_scan_ = {};
   return kept_.back();

@@ -73,30 +73,6 @@ Overview::Pixel* Overview::pixel_at(const Eigen::Vector3d& p) {
   return &pixels_[row * static_cast<std::size_t>(width_) + column];
 }
 
-std::vector<Overview::Place> Overview::places() const {
-  std::vector<Place> places;
-  for (std::size_t i = 0; i < pixels_.size(); ++i) {
-    const Pixel& pixel = pixels_[i];
-    if (!pixel.has_static() && !pixel.has_moving) continue;
-    places.push_back({static_cast<std::uint32_t>(i), pixel.height, pixel.grey,
-                      static_cast<std::uint8_t>(pixel.has_moving ? 1 : 0)});
-  }
-  return places;
-}
-
-bool Overview::merge(const std::vector<Place>& places) {
-  const bool is_inside = std::all_of(places.begin(), places.end(), [&](const Place& place) {
-    return place.pixel < pixels_.size();
-  });
-  if (!is_inside) return false;
-  for (const Place& place : places) {
-    Pixel& pixel = pixels_[place.pixel];
-    pixel.add_static(place.height, place.grey);
-    pixel.has_moving = pixel.has_moving || place.has_moving != 0;
-  }
-  return true;
-}
-
 Picture Overview::picture() const {
   constexpr Colour kRemoved = kFateColours[static_cast<std::size_t>(Fate::kRemovedDynamic)];
   constexpr Colour kPale = {232, 232, 232};

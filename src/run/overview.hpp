@@ -21,19 +21,6 @@ class Overview {
   /// Adds all removed points of a scan, and some of its static points.
   void add(const RecordedScan& scan, const ScanVerdict& verdict);
 
-  /// A place of the picture with points. All panels follow from it.
-  struct Place {
-    std::uint32_t pixel;  ///< number
-    float height;         ///< m, of the highest static point; -infinity without one
-    std::uint8_t grey;    ///< of the highest static point
-    std::uint8_t has_moving;
-  };
-  /// All places with points, in the order of their numbers.
-  std::vector<Place> places() const;
-  /// Adds the places of a picture with the same path whose scans come behind those of this one.
-  /// False, and nothing changes, if a number is not that of a pixel.
-  bool merge(const std::vector<Place>& places);
-
   /// Three panels of one size, side by side or below each other: before (static points grey, moving
   /// ones blue), after (static points), removed (moving points green, the others pale).
   Picture picture() const;

@@ -8,8 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "chunk_store.hpp"
-#include "chunked_run.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/poses/diagnosis.hpp"
 #include "dynains/remover.hpp"
@@ -33,7 +31,6 @@ RunTiming process(const RunPlan& plan, const RunListener& listener, const fs::pa
   const auto report_progress = [&](std::size_t done) {
     if (listener.progress) listener.progress(done, total);
   };
-  if (!plan.chunks.empty()) return run_in_chunks(plan, listener, folder, results);
   RunTiming timing;
   const auto work = [&](auto& remover) {
     report_progress(0);
@@ -97,7 +94,7 @@ RunDescription describe(const RunPlan& plan, const RunSettings& settings,
   description.sequence = settings.recording;
   description.sequence_flags = settings.recording_flags;
   description.first_scan = sequence.name(plan.range.first);
-  // Without a finished scan, as after a signal within the first chunk: the first one.
+  // Without a finished scan: the first one.
   description.last_scan =
       sequence.name(plan.range.first + std::max<std::size_t>(results.finished(), 1) - 1);
   description.missing_poses = sequence.missing_pose_count();
@@ -124,7 +121,6 @@ RunOutcome outcome_of(const RunPlan& plan, const RunResults& results, const RunT
   std::vector<double> totals;
   for (const TimingRow& row : timing.rows) totals.push_back(row.total);
   outcome.time = statistics(std::move(totals));
-  outcome.jobs = timing.jobs;
   return outcome;
 }
 
@@ -168,21 +164,17 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   }
   results.commit();
   write_timing(outputs.folder / "timing.csv", timing);
-  // An earlier folder keeps the chunks until all other files are on the disk.
-  if (change.is_staged()) ChunkStore(plan, outputs.folder).remove();
   change.put_in_place([&] {
     results.commit_outside_map();
     if (session && outcome.complete) session->commit();
   });
-  if (!change.is_staged() && outcome.complete) ChunkStore(plan, outputs.folder).remove();
   outcome.map_points = results.map_points();
   outcome.wall = wall_time(ms_since(settings.started), timing);
   RunDescription description = describe(plan, settings, agreement, results);
   description.wall = outcome.wall;
   nlohmann::ordered_json report = make_report(description, results, timing);
   report["request"] = plan.request;
-  change.finish(report, plan.outputs.listing(plan.sequence, plan.range,
-                                             plan.outputs.in_chunks && !outcome.complete));
+  change.finish(report, plan.outputs.listing(plan.sequence, plan.range, false));
   return outcome;
 }
 
@@ -211,47 +203,6 @@ RunOutcome run(const RunSettings& settings, Recording recording, const RunListen
     outcome.page = write_view(out, plan.sequence, kDefaultViewPoints);
   }
   return outcome;
-}
-
-std::size_t begin_chunks(const RunSettings& settings, Recording recording,
-                         const RunListener& listener) {
-  const RunPlan plan = make_plan(settings, std::move(recording));
-  if (plan.chunks.size() < 2) return 0;
-  const LockedFolder lock(plan.outputs.folder);
-  OutputFolder out(Folder(plan.outputs.folder), run_output_kind());
-  if (choose_task(plan, settings, out) != RunTask::kWrite) return 0;
-  out.check(plan.listing, plan.inputs);
-  warn_of_doubts(plan, settings, listener,
-                 pose_agreement(plan.sequence, plan.range.first, plan.range.last));
-  const OutputChange change(out, OutputChange::Mode::kInPlace, marker_of(plan), plan.listing);
-  create_folder(plan.outputs.folder / kChunkFolder);
-  return plan.chunks.size();
-}
-
-bool judge_chunk(const RunSettings& settings, Recording recording, std::size_t number,
-                 const RunListener& listener) {
-  const RunPlan plan = make_plan(settings, std::move(recording));
-  if (number >= plan.chunks.size()) {
-    throw ConfigError("chunk " + std::to_string(number) + ": the run has " +
-                      std::to_string(plan.chunks.size()) + " chunks, numbered from 0");
-  }
-  const FolderLock lock(plan.outputs.folder, FolderLock::Mode::kShared);
-  const OutputFolder out(Folder(plan.outputs.folder), run_output_kind());
-  const std::string differing = request_differences(out.marker(), plan.request);
-  if (!differing.empty()) {
-    throw IoError(out.path().string() +
-                  ": holds no run in chunks that was begun with these flags (" + differing + ")");
-  }
-  if (out.is_complete()) return true;
-  const ChunkStore chunks(plan, plan.outputs.folder);
-  try {
-    if (chunks.has(number)) return true;
-  } catch (const IoError& error) {
-    warn(listener, error.what() + std::string("; the chunk is processed again"));
-  }
-  const InterruptGuard interrupt(listener.second_signal);
-  std::optional<DynaInsRemover> remover;
-  return chunks.judge(number, remover, [](std::size_t) { return InterruptGuard::signal() == 0; });
 }
 
 }  // namespace dynains::program

@@ -37,7 +37,6 @@ struct RunOutcome {
   std::optional<std::size_t> map_points;
   Statistics time;  ///< ms per scan
   WallTime wall;
-  std::size_t jobs = 1;
   std::optional<SessionAlignment> alignment;  ///< of the session in a map of many sessions
   std::filesystem::path page;                 ///< empty: none was asked for
 };
@@ -46,22 +45,5 @@ struct RunOutcome {
 /// holds the results so far, and earlier results stay. Throws ConfigError, IoError, PoseError,
 /// UsageError.
 RunOutcome run(const RunSettings& settings, Recording recording, const RunListener& listener);
-
-/// @name A run in chunks by several processes
-/// One calls begin_chunks(), then any call judge_chunk(), then one calls run() with `resume`. All
-/// have the same settings. Each throws UsageError while another needs the folder for itself, and
-/// can be repeated after a failure.
-/// @{
-/// Checks a run and marks its folder as that of an unfinished run. Returns the number of its
-/// chunks; 0 if run() does all of it: it has less than two chunks, is complete, or replaces other
-/// results. Throws as run().
-std::size_t begin_chunks(const RunSettings& settings, Recording recording,
-                         const RunListener& listener);
-/// Writes the file of one chunk, numbered from 0, unless it is there and whole, or the run is
-/// complete. False after SIGINT or SIGTERM. Throws as run(), and IoError for a folder without such
-/// a run.
-bool judge_chunk(const RunSettings& settings, Recording recording, std::size_t number,
-                 const RunListener& listener);
-/// @}
 
 }  // namespace dynains::program

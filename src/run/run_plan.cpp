@@ -1,7 +1,6 @@
 #include "run_plan.hpp"
 
 #include <algorithm>
-#include <thread>
 #include <utility>
 
 #include "dynains/errors.hpp"
@@ -11,7 +10,6 @@
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/pose.hpp"
-#include "io/fingerprint.hpp"
 #include "naming_scan.hpp"
 #include "run_request.hpp"
 
@@ -76,53 +74,6 @@ void add_map_attributes(const RunSettings& settings, const DynaInsRemover::Confi
   if (outputs.crs.empty()) return;
   if (!outputs.has_las_map()) throw ConfigError("--crs needs --map FILE.las");
   wkt_of(outputs.crs);
-}
-
-/// Scans before another one whose evidence counts for it.
-std::size_t evidence_horizon(const DynaInsRemover::Config& config) {
-  const int window = config.uses_window() ? config.window - 1 : 0;
-  const int references = config.uses_free_space() ? config.evidence.lookback_scans : 0;
-  return static_cast<std::size_t>(std::max(window, references));
-}
-
-/// Throws ConfigError unless a flag has at least this value.
-void check_least(const char* flag, const std::optional<std::int64_t>& value, std::int64_t least) {
-  if (!value || *value >= least) return;
-  throw ConfigError(std::string(flag) + " " + std::to_string(*value) + ": expected at least " +
-                    std::to_string(least));
-}
-
-/// Nothing of it depends on the machine. Throws ConfigError.
-ChunkSettings choose_chunks(const RunSettings& settings, const DynaInsRemover::Config& config,
-                            std::size_t scans, std::size_t latency) {
-  check_least("--jobs", settings.jobs, 1);
-  check_least("--chunk", settings.chunk, 0);
-  check_least("--lookback", settings.lookback, 0);
-  const bool is_stream = settings.chunk && *settings.chunk == 0;
-  if (settings.lookback && (!settings.chunk || is_stream)) {
-    throw ConfigError("--lookback needs --chunk: without chunks there is no warm-up");
-  }
-  if (is_stream && settings.jobs && *settings.jobs > 1) {
-    throw ConfigError("--jobs " + std::to_string(*settings.jobs) +
-                      " with --chunk 0: one stream is processed by one job");
-  }
-  if (config.revision.revise_map && settings.chunk && !is_stream) {
-    throw ConfigError(
-        "--revise-map with --chunk: the map is revised by all later scans; use --chunk 0");
-  }
-  ChunkSettings chunks;
-  if (config.revision.revise_map) return chunks;
-  chunks.lookback =
-      settings.lookback ? static_cast<std::size_t>(*settings.lookback) : evidence_horizon(config);
-  chunks.scans = settings.chunk ? static_cast<std::size_t>(*settings.chunk)
-                                : default_chunk(scans, chunks.lookback, latency);
-  return chunks;
-}
-
-std::size_t choose_jobs(const RunSettings& settings, std::size_t chunks) {
-  const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
-  const std::size_t jobs = settings.jobs ? static_cast<std::size_t>(*settings.jobs) : cores;
-  return std::max<std::size_t>(1, std::min(jobs, chunks));
 }
 
 /// Outputs of the run. Throws ConfigError.
@@ -250,25 +201,15 @@ RunPlan make_plan(const RunSettings& settings, Recording sequence) {
   const auto map_on_disk = map_on_disk_of(settings, outputs);
   const ScanRange range = select_scans(sequence, settings.window);
   check_scans(sequence, range);
-  const std::size_t latency = DynaInsRemover(config).latency();
-  const ChunkSettings chunk_settings = choose_chunks(settings, config, range.size(), latency);
-  std::vector<Chunk> chunks;
-  if (chunk_settings.scans > 0) chunks = chunk_grid(range, chunk_settings, latency);
-  outputs.in_chunks = !chunks.empty();
-  if (settings.jobs) outputs.thread = std::launch::deferred;
+  if (settings.one_thread) outputs.thread = std::launch::deferred;
   const nlohmann::ordered_json configuration = parameters_of(config);
   nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);
-  request["chunk"] = chunk_settings.scans;
-  request["lookback"] = chunks.empty() ? 0 : chunk_settings.lookback;
   SessionRequest session = session_request(settings, sequence, range, configuration);
   if (!session.city.empty()) {
     request["update"] = session.city.string();
     request["session"] = session.info.name;
     if (session.T_city_start) request["align_start"] = extrinsic_text(*session.T_city_start);
   }
-  Fingerprint fingerprint;
-  fingerprint.add(request.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
-  const std::size_t jobs = choose_jobs(settings, chunks.size());
   OutputListing listing = outputs.listing(sequence, range, true);
   InputFiles inputs = inputs_of(settings, sequence);
   return {config,
@@ -280,11 +221,7 @@ RunPlan make_plan(const RunSettings& settings, Recording sequence) {
           std::move(inputs),
           configuration,
           std::move(request),
-          std::move(session),
-          latency,
-          std::move(chunks),
-          jobs,
-          fingerprint.value()};
+          std::move(session)};
 }
 
 RunTask choose_task(const RunPlan& plan, const RunSettings& settings, const OutputFolder& out) {

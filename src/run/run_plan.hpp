@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "chunk_grid.hpp"
 #include "dynains/io/folder_lock.hpp"
 #include "dynains/io/recording.hpp"
 #include "input_files.hpp"
@@ -16,6 +15,7 @@
 #include "output_folder.hpp"
 #include "run_results.hpp"
 #include "run_settings.hpp"
+#include "scan_range.hpp"
 #include "session_contribution.hpp"
 
 namespace dynains::program {
@@ -31,10 +31,6 @@ struct RunPlan {
   nlohmann::ordered_json configuration;  ///< parameter name -> value
   nlohmann::ordered_json request;        ///< see describe_request()
   SessionRequest session;
-  std::size_t latency = 0;        ///< scans from a scan to its final verdict
-  std::vector<Chunk> chunks;      ///< empty: the recording is one stream
-  std::size_t jobs = 1;           ///< threads that process chunks
-  std::uint64_t fingerprint = 0;  ///< of the request
 };
 
 /// Path of the file that a flag --map names, links followed. `out`: folder of the results, by

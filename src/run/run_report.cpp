@@ -65,9 +65,8 @@ std::uint64_t peak_memory_bytes() {
 }
 
 WallTime wall_time(double ms, const RunTiming& timing) {
-  const double available = ms * static_cast<double>(timing.jobs);
-  if (!(available > 0.0)) return {ms, 0.0};
-  return {ms, std::clamp(1.0 - timing.pipeline / available, 0.0, 1.0)};
+  if (!(ms > 0.0)) return {ms, 0.0};
+  return {ms, std::clamp(1.0 - timing.pipeline / ms, 0.0, 1.0)};
 }
 
 nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& results,
@@ -93,9 +92,6 @@ nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& 
   report["flush_milliseconds"] = timing.flush;
   report["wall_milliseconds"] = run.wall.ms;
   report["share_outside_pipeline"] = run.wall.outside;
-  report["jobs"] = timing.jobs;
-  report["chunks"] = timing.chunks;
-  report["kept_chunks"] = timing.kept_chunks;
   report["peak_memory_bytes"] = peak_memory_bytes();
   report["pose_agreement"] = nullptr;
   if (run.agreement.points > 0) report["pose_agreement"] = run.agreement.share;

@@ -65,19 +65,19 @@ std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange
 }
 
 const OutputKind& run_output_kind() {
-  static const OutputKind kind = {"run",
-                                  "report.json",
-                                  {"timing.csv", "dynamic_points.ply", kDynamicLas, kVerdictLog,
-                                   kOverviewPicture, kViewPage, viewer::kTilesetFile},
-                                  true,
-                                  {{"labels", {".label"}},
-                                   {"online", {".label"}},
-                                   {"causes", {".cause"}},
-                                   {"beliefs", {".belief"}},
-                                   {"clean", {".bin", ".pcd", ".ply"}},
-                                   {kChunkFolder, {kChunkExtension}},
-                                   {kTileFolder, {kTileExtension}},
-                                   {viewer::kTilesetFolder, {viewer::kPointTileExtension}}}};
+  static const OutputKind kind = {
+      "run",
+      "report.json",
+      {"timing.csv", "dynamic_points.ply", kDynamicLas, kVerdictLog, kOverviewPicture, kViewPage,
+       viewer::kTilesetFile, viewer::kTilesetPage},
+      true,
+      {{"labels", {".label"}},
+       {"online", {".label"}},
+       {"causes", {".cause"}},
+       {"beliefs", {".belief"}},
+       {"clean", {".bin", ".pcd", ".ply"}},
+       {kTileFolder, {kTileExtension}},
+       {viewer::kTilesetFolder, {viewer::kPointTileExtension}}}};
   return kind;
 }
 
@@ -103,7 +103,6 @@ OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& r
     listing.folders["clean"] =
         std::filesystem::path(CleanWriter::name(recording, range.first)).extension().string();
   }
-  if (in_chunks && lasts) listing.folders[kChunkFolder] = kChunkExtension;
   if (map_on_disk && lasts) listing.folders[kTileFolder] = kTileExtension;
   for (std::size_t i = range.first; i <= range.last; ++i) listing.scans.insert(recording.name(i));
   return listing;
@@ -190,10 +189,6 @@ void RunResults::write_final(const RecordedScan& scan, const ScanVerdict& verdic
       [&](const FilePoint& point) { dynamic_points_.add(point); });
 }
 
-bool RunResults::needs_scans() const {
-  return clean_scans_ || log_ || map_attributes_ || dynamic_las_ || session_ != nullptr;
-}
-
 void RunResults::add_scan(const RecordedScan& scan, const ScanVerdict& verdict) {
   const std::size_t index = range_.first + verdict.scan;
   if (clean_scans_) clean_scans_->write(index, scan, verdict.labels);
@@ -207,14 +202,6 @@ void RunResults::add_scan(const RecordedScan& scan, const ScanVerdict& verdict) 
     const Eigen::Vector3d position = verdict.T_world_sensor * scan.point(i).position;
     dynamic_las_->add(position, attributes_of(scan, verdict, labels, i));
   });
-}
-
-bool RunResults::add_chunk(std::size_t scans, const ChunkSummary& summary) {
-  if (!overview_.merge(summary.overview)) return false;
-  points_ += summary.points;
-  labels_ += summary.labels;
-  finished_ += scans;
-  return true;
 }
 
 void RunResults::add_map_point(const Eigen::Vector3d& point) {

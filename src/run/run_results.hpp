@@ -12,7 +12,6 @@
 #include <string>
 #include <vector>
 
-#include "chunk_file.hpp"
 #include "clean_writer.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
@@ -38,11 +37,6 @@ inline constexpr const char* kOverviewPicture = "overview.png";
 /// The page of `dynains view` in the folder of results.
 inline constexpr const char* kViewPage = "view.html";
 
-/// In the folder of results, while a run in chunks lasts: a file for each chunk, named by its first
-/// scan.
-inline constexpr const char* kChunkFolder = "chunks";
-inline constexpr const char* kChunkExtension = ".chunk";
-
 /// The names that `dynains run` may use in its folder.
 const OutputKind& run_output_kind();
 
@@ -54,7 +48,6 @@ struct RunOutputs {
   bool write_mcap = false;
   bool write_beliefs = false;
   bool map_on_disk = false;
-  bool in_chunks = false;
   std::launch thread = std::launch::async;  ///< for reading and writing; deferred: the caller's
   bool map_attributes = false;              ///< the map holds attributes of its points
   std::string crs;                          ///< of a LAS map, for example "EPSG:25832"; empty: none
@@ -102,9 +95,9 @@ class RunResults {
 
   /// The verdict on the scan just pushed.
   void take_newest(const ScanVerdict& verdict);
-  /// The final verdict on a scan, in the order of the scans. By default, another thread writes the
-  /// results of the scan, which is exchanged for an earlier one; null: that thread reads it. Throws
-  /// IoError, for the scan before as well.
+  /// The final verdict on a scan, in the order of the scans. `scan` is exchanged for an
+  /// earlier one, whose memory the caller uses again; null: the scan is read from its file. By
+  /// default, another thread reads and writes. Throws IoError, for the scan before as well.
   void take_final(RecordedScan* scan, const ScanVerdict& verdict);
   /// Waits for the results of the last scan. Throws IoError.
   void finish();
@@ -112,20 +105,6 @@ class RunResults {
   void contribute_to(SessionContribution& session) { session_ = &session; }
   /// Whether results are written in a thread of their own, RunOutputs::thread.
   std::launch thread() const { return writing_.policy(); }
-
-  /// @name Results of chunks
-  /// In the place of take_newest() and take_final(), in the order of the scans. The caller writes
-  /// the label files.
-  /// @{
-  /// Whether an output needs add_scan().
-  bool needs_scans() const;
-  /// A scan with its final verdict.
-  void add_scan(const RecordedScan& scan, const ScanVerdict& verdict);
-  /// `points` have moving_columns().
-  void add_moving_points(const PointRecords& points) { dynamic_points_.add(points); }
-  /// A chunk of `scans` scans. False, and nothing changes, if its picture is another one.
-  bool add_chunk(std::size_t scans, const ChunkSummary& summary);
-  /// @}
 
   void add_map_point(const Eigen::Vector3d& point);
   /// Puts all files in place, but for a map outside of the folder.
@@ -160,6 +139,7 @@ class RunResults {
   Background writing_;
 
   void write_final(const RecordedScan& scan, const ScanVerdict& verdict);
+  void add_scan(const RecordedScan& scan, const ScanVerdict& verdict);
 };
 
 }  // namespace dynains::program

@@ -38,7 +38,7 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
   using Clock = std::chrono::steady_clock;
   RunTiming timing;
   timing.stages = stage_names();
-  OpenScans scans(recording, range, range, remover.latency(), results.thread());
+  OpenScans scans(recording, range, remover.latency(), results.thread());
   for (std::size_t i = range.first; i <= range.last; ++i) {
     const RecordedScan& scan = scans.next();
     const Clock::time_point begin = Clock::now();

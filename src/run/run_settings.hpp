@@ -24,11 +24,7 @@ struct RunSettings {
   bool map_attributes = false;
   std::string crs;  ///< of a LAS map, for example "EPSG:25832"; empty: none
   ScanWindow window;
-  /// Threads; empty: one for each core. One stream with a number is one thread; without, others
-  /// read and write.
-  std::optional<std::int64_t> jobs;
-  std::optional<std::int64_t> chunk;     ///< scans, 0 for one stream; empty: default_chunk()
-  std::optional<std::int64_t> lookback;  ///< scans of the warm-up of a chunk; needs `chunk`
+  bool one_thread = false;  ///< the thread of the run also reads and writes files
   bool write_online = false;
   bool write_clean = false;
   bool write_mcap = false;

@@ -22,12 +22,8 @@ struct TimingRow {
 struct RunTiming {
   std::vector<std::string> stages;
   std::vector<TimingRow> rows;
-  double flush = 0.0;  ///< ms for the verdicts that were open after the last scan
-  double pipeline =
-      0.0;               ///< ms in the pipeline, of all workers together, all of the above included
-  std::size_t jobs = 1;  ///< workers
-  std::size_t chunks = 0;       ///< finished ones; 0 for one stream
-  std::size_t kept_chunks = 0;  ///< those of them that an earlier run had finished
+  double flush = 0.0;     ///< ms for the verdicts that were open after the last scan
+  double pipeline = 0.0;  ///< ms in the pipeline, all of the above included
 };
 
 /// Names of the stages, RunTiming::stages.

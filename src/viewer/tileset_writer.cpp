@@ -7,6 +7,7 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
+#include "page.hpp"
 #include "point_tile.hpp"
 
 namespace dynains::viewer {
@@ -171,6 +172,9 @@ void TilesetWriter::commit() {
                         {"root", std::move(root.json)},
                         {"extras", {{"points", size_}, {"attributes", names}}}};
   sync_files(folder_);
+  AtomicFile page(folder_ / kTilesetPage);
+  page.stream() << map_page();
+  page.commit();
   AtomicFile file(folder_ / kTilesetFile);
   file.stream() << tileset.dump() << '\n';
   file.commit();

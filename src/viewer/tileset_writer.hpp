@@ -19,6 +19,8 @@
 namespace dynains::viewer {
 
 inline constexpr const char* kTilesetFile = "tileset.json";
+/// The page that shows the tiles, beside kTilesetFile.
+inline constexpr const char* kTilesetPage = "map.html";
 inline constexpr const char* kTilesetFolder = "tileset";  ///< beside it, of the tiles
 inline constexpr const char* kPointTileExtension = ".pnts";
 
@@ -50,8 +52,8 @@ class TilesetWriter {
   void add(const FilePoint& point);
   std::size_t size() const { return size_; }
 
-  /// Writes the tiles into the folder kTilesetFolder and then kTilesetFile, each atomically. All
-  /// are on the disk afterwards. Throws IoError.
+  /// Writes the tiles into the folder kTilesetFolder, then kTilesetPage and kTilesetFile, each
+  /// atomically. All are on the disk afterwards. Throws IoError.
   void commit();
 
  private:

@@ -1,17 +1,15 @@
 // node tiles_bench.mjs PROGRAM FOLDER
 // Frames per second of the page of a served map in headless Chromium, without a graphics processor:
 // a flight over the map, drawn for several numbers of points.
-import {spawn} from 'node:child_process';
+import {execFileSync} from 'node:child_process';
+import {serveFolder} from '../viewer/static_server.mjs';
 import {withPage} from '../viewer/browser.mjs';
 
 const [program, folder] = process.argv.slice(2);
 const kFrames = 20;
 const kSize = {width: 1280, height: 720};
 
-const server = spawn(program, ['view', folder, '--serve']);
-const address = await new Promise((resolve) => {
-  server.stdout.on('data', (text) => resolve(/http:\S+/.exec(text)[0]));
-});
+execFileSync(program, ['view', folder, '--tiles']);
 
 // Draws a flight low over the map. Reading a pixel waits for the end of a frame.
 async function fly(page, budget) {
@@ -50,10 +48,11 @@ async function fly(page, budget) {
 
 console.log(`${kSize.width} x ${kSize.height} pixels`);
 console.log('most points | s to load the first view | shown, mean | most loaded | frames per second');
-await withPage(address, kSize, async (page) => {
+const server = await serveFolder(folder);
+await withPage(server.address + 'map.html', kSize, async (page) => {
   for (const budget of [250000, 500000, 1000000]) {
     const {loading, shown, most, rate} = await fly(page, budget);
     console.log([budget, (loading / 1000).toFixed(1), Math.round(shown), most, rate.toFixed(1)].join(' | '));
   }
 });
-server.kill('SIGTERM');
+server.close();

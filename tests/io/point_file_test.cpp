@@ -86,43 +86,6 @@ TEST_CASE("Written point files are read back") {
   CHECK(file.viewpoint.isApprox(Eigen::Isometry3d::Identity()));
 }
 
-TEST_CASE("Records of many points give the file of single points") {
-  TemporaryFolder folder;
-  const std::string extension = GENERATE(".ply", ".pcd");
-  const bool is_wide = GENERATE(false, true);
-  PointColumns columns;
-  columns.label = true;
-  columns.double_xyz = columns.intensity = columns.rgb = is_wide;
-  columns.ring = columns.time = columns.session = is_wide;
-  PointFileWriter single(folder / ("single" + extension), columns);
-  PointFileWriter packed(folder / ("packed" + extension), columns);
-  PointRecords records(columns, extension == ".pcd");
-  constexpr std::uint32_t kPoints = 10000;  // more than a file keeps in memory
-  for (std::uint32_t i = 0; i < kPoints; ++i) {
-    FilePoint point;
-    point.position = {0.5 * i, -1.0 * i, 2.0};
-    point.label = i;
-    point.time = 0.1 * i;
-    point.ring = static_cast<std::uint16_t>(i);
-    point.session = 3;
-    records.add(point);
-    point.label = 7 * i;
-    single.add(point);
-    if (i == 0) packed.add(point);
-  }
-  PointRecords rest(columns, extension == ".pcd");
-  const std::size_t record = records.bytes().size() / kPoints;
-  CHECK_FALSE(rest.assign(records.bytes().subspan(record, record + 1)));
-  REQUIRE(rest.assign(records.bytes().subspan(record, (kPoints - 1) * record)));
-  CHECK(rest.size() == kPoints - 1);
-  rest.replace_labels([](std::uint32_t label) { return 7 * label; });
-  packed.add(rest);
-  CHECK(packed.size() == kPoints);
-  single.commit();
-  packed.commit();
-  CHECK(read_text(folder / ("packed" + extension)) == read_text(folder / ("single" + extension)));
-}
-
 TEST_CASE("Points are visited one by one, as they are read at once") {
   TemporaryFolder folder;
   const std::string extension = GENERATE(".ply", ".pcd");

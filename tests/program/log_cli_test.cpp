@@ -55,10 +55,6 @@ std::string all_labels(const fs::path& out) {
   return all;
 }
 
-std::size_t count_lines(const std::string& text) {
-  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
-}
-
 }  // namespace
 
 TEST_CASE("run on a log gives the labels of run on the folder; check and eval read it, too") {

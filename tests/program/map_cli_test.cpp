@@ -310,7 +310,7 @@ TEST_CASE("map: a city is exported as tiles, the same bytes each time, and files
   CHECK(read_text(days.at("mine/tileset.json")) == "{}");
   CHECK(export_to("city/tiles").code == 2);
   CHECK_FALSE(fs::exists(days.at("city/tiles")));
-  const Outcome served = start({"view", days.at("city"), "--serve"});
+  const Outcome served = start({"view", days.at("city"), "--tiles"});
   CHECK(served.code == 1);
   CHECK_THAT(served.err, ContainsSubstring("write its tiles first: dynains map"));
 }
@@ -373,7 +373,6 @@ TEST_CASE("map: a session of a slightly different frame is aligned, or refused b
 
   const auto first = content_of(at("city/day2"));
   REQUIRE(start({"map", at("city"), "drop", "day2"}).code == 0);
-  REQUIRE(start(update("day2", {"--force", "--jobs", "1", align[0], align[1], align[2]})).code ==
-          0);
+  REQUIRE(start(update("day2", {"--force", align[0], align[1], align[2]})).code == 0);
   CHECK(content_of(at("city/day2")) == first);
 }

@@ -42,10 +42,6 @@ struct Fixture {
   std::string out;
 };
 
-std::size_t count_lines(const std::string& text) {
-  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
-}
-
 }  // namespace
 
 TEST_CASE("with --map-memory the map is kept on the disk, and the results are equal") {

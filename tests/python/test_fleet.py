@@ -27,9 +27,6 @@ def drives(tmp_path_factory):
     return folder
 
 
-CHUNK = 40  # scans: drive6 has four chunks, the others are shorter
-
-
 def results_in(folder):
     """Bytes of labels, causes and maps; reports hold times."""
     files = sorted(f for f in folder.rglob("*") if f.suffix in (".label", ".cause", ".ply"))
@@ -41,7 +38,7 @@ def expected(drives, tmp_path_factory):
     """Results of one process."""
     out = tmp_path_factory.mktemp("expected")
     for drive in drives.glob("drive*"):
-        dynains.run(drive, out / drive.name, chunk=CHUNK)
+        dynains.run(drive, out / drive.name)
     return results_in(out)
 
 
@@ -83,7 +80,7 @@ def test_a_worker_that_dies_and_one_that_stops_change_no_byte(drives, expected, 
 
     def disturb():
         while not disturbed:
-            disturbed.extend(out.glob("drive6/chunks/*.chunk"))
+            disturbed.extend(out.glob("drive6/labels/*.label"))
             time.sleep(0.01)
         workers.workers[0].send_signal(signal.SIGKILL)
         workers.workers[1].send_signal(signal.SIGSTOP)
@@ -94,41 +91,12 @@ def test_a_worker_that_dies_and_one_that_stops_change_no_byte(drives, expected, 
         fleet.find_recordings(drives.glob("drive*")),
         out,
         scheduler=workers.address,
-        chunk=CHUNK,
     )
     assert disturbed and workers.workers[0].wait() == -signal.SIGKILL
     assert not [name for name, result in results.items() if "error" in result]
     assert list(results) == [f"drive{seed}" for seed in range(7)]
     assert results_in(out) == expected
     assert json.loads((out / "fleet.json").read_text()) == results
-
-
-def test_chunks_in_any_order_give_the_results_of_one_run(drives, expected, tmp_path):
-    arguments = {"chunk": CHUNK, "resume": True, "jobs": 1}
-    job = (str(drives / "drive6"), str(tmp_path / "drive6"), arguments)
-    assert "cannot be opened" in fleet._judge(*job, 0)
-    assert fleet._begin(*job) == 4
-    files = tmp_path / "drive6" / "chunks"
-    for number in (2, 0, 3):
-        assert fleet._judge(*job, number) is None
-    (finished,) = files.glob("000080.chunk")
-    written = finished.stat().st_mtime_ns
-    assert fleet._begin(*job) == 4 and fleet._judge(*job, 2) is None
-    assert finished.stat().st_mtime_ns == written
-    (files / "000000.chunk").write_bytes(b"broken")
-    with pytest.warns(RuntimeWarning, match="000000.chunk: is cut off"):
-        assert fleet._judge(*job, 0) is None
-    assert "chunk 4: the run has 4 chunks" in fleet._judge(*job, 4)
-    other = (*job[:2], {**arguments, "chunk": 30})
-    assert "was begun with these flags (chunk was 40, is 30)" in fleet._judge(*other, 0)
-
-    # Chunk 1 is missing: the last task judges it.
-    assert fleet._finish(*job, [None, "disk full"])["error"] == "disk full"
-    assert fleet._finish(*job, [None])["scans"] == 150
-    names = {name for name in expected if name.startswith("drive6")}
-    assert results_in(tmp_path) == {name: expected[name] for name in names}
-    assert not files.exists()
-    assert fleet._judge(*job, 0) is None and not files.exists()
 
 
 def test_the_map_of_a_fleet_is_that_of_one_process(drives, tmp_path):
@@ -145,17 +113,13 @@ def test_the_map_of_a_fleet_is_that_of_one_process(drives, tmp_path):
     assert {"drive0", "drive1", "drive2"} <= {f.name for f in (tmp_path / "city").iterdir()}
 
 
-def test_workers_share_a_folder_for_chunks_but_not_for_the_rest(drives, tmp_path, monkeypatch):
+def test_a_worker_waits_for_a_folder_that_another_holds(drives, tmp_path, monkeypatch):
     monkeypatch.setattr(fleet, "_PATIENCE", 0.0)
-    job = (str(drives / "drive6"), str(tmp_path / "out"), {"chunk": CHUNK, "resume": True})
-    assert fleet._begin(*job) == 4
+    job = (str(drives / "drive1"), str(tmp_path / "out"), {"resume": True})
+    assert fleet._clean_one(*job)["scans"] == 20
     other = os.open(tmp_path / "out", os.O_RDONLY)
     fcntl.flock(other, fcntl.LOCK_SH)
-    assert fleet._judge(*job, 3) is None
-    assert "is in use" in fleet._begin(*job)["error"]
-    assert "is in use" in fleet._finish(*job, [None])["error"]
-    fcntl.flock(other, fcntl.LOCK_EX)
-    assert "is in use" in fleet._judge(*job, 3)
+    assert "is in use" in fleet._clean_one(*job)["error"]
     os.close(other)
 
 

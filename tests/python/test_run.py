@@ -228,42 +228,11 @@ def test_runs_in_threads(drive, finished, tmp_path):
     assert_python_has_the_signals_back()
 
 
-def test_a_run_in_chunks(drive, tmp_path):
-    counts = []
-    for jobs in 1, 2:
-        result = dynains.run(
-            drive,
-            tmp_path / str(jobs),
-            chunk=4,
-            lookback=2,
-            jobs=jobs,
-            progress=lambda done, total: counts.append((done, total)),
-        )
-        assert result.scans == 12 and counts[-1] == (12, 12)
-    assert read_labels(tmp_path / "1") == read_labels(tmp_path / "2")
-    for wrong in {"jobs": 0}, {"chunk": -1}, {"lookback": 1.5}:
-        with pytest.raises(TypeError, match="expected int"):
-            dynains.run(drive, tmp_path / "out", **wrong)
-    with pytest.raises(dynains.ConfigError, match="lookback"):
-        dynains.run(drive, tmp_path / "out", lookback=2)
-
-
-def test_ctrl_c_and_errors_end_a_run_in_chunks(drive, tmp_path):
-    def fail(done, total):
-        raise LookupError("enough")
-
-    def interrupt(done, total):
-        os.kill(os.getpid(), signal.SIGINT)
-
-    whole = dynains.run(drive, tmp_path / "whole", chunk=4)
-    for error, progress in (LookupError, fail), (KeyboardInterrupt, interrupt):
-        out = tmp_path / error.__name__
-        with pytest.raises(error):
-            dynains.run(drive, out, chunk=4, jobs=1, progress=progress)
-        assert not json.loads((out / "report.json").read_text())["complete"]
-        dynains.run(drive, out, chunk=4, resume=True)
-        assert read_labels(out) == read_labels(whole.folder)
-    assert_python_has_the_signals_back()
+def test_a_run_of_one_thread_has_the_same_results(drive, finished, tmp_path):
+    result = dynains.run(drive, tmp_path / "out", one_thread=True)
+    assert read_labels(result.folder) == read_labels(finished.folder)
+    with pytest.raises(TypeError, match="expected bool"):
+        dynains.run(drive, tmp_path / "other", one_thread=2)
 
 
 class Frames(HTMLParser):

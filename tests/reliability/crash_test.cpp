@@ -93,19 +93,6 @@ TEST_CASE("power cut during a run with its map on the disk") {
   check_crashes(fresh_run({"--map-memory", "0"}));
 }
 
-namespace {
-
-const std::vector<std::string> kChunks = {"--chunk", "2", "--lookback",        "1",
-                                          "--jobs",  "1", "--lookahead-scans", "1"};
-
-}  // namespace
-
-TEST_CASE("power cut during a run in chunks") { check_crashes(fresh_run(kChunks)); }
-
-TEST_CASE("power cut while a result is replaced by one of chunks") {
-  check_crashes(replacing_run({}, kChunks));
-}
-
 TEST_CASE("power cut while a stopped run is resumed") {
   check_crashes(resumed_run({"--write-clean"}));
 }

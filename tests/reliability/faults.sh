@@ -69,7 +69,7 @@ kill_runs() {
       "$program" run "$seq" --out "$out" --resume --quiet "$@" || fail "kill $i: --resume"
       complete "$out" || fail "kill $i: not complete after --resume"
       same "$expected" "$out" || fail "kill $i: other bytes after --resume"
-      [[ -z $(find "$out" -name '.*.tmp' -o -name '*.tile' -o -name '*.chunk') ]] ||
+      [[ -z $(find "$out" -name '.*.tmp' -o -name '*.tile') ]] ||
         fail "kill $i: leftovers after --resume"
     fi
   done
@@ -81,9 +81,6 @@ kill_runs "$kills" "$work/expected"
 diff -r "$work/expected/labels" "$work/expected_tiles/labels" ||
   fail "labels depend on where the map is"
 kill_runs "$((kills / 4))" "$work/expected_tiles" --map-memory 0
-chunks=(--chunk 5 --lookback 4 --lookahead-scans 4)
-"$program" run "$seq" --out "$work/expected_chunks" "${chunks[@]}" --jobs 1 --quiet
-kill_runs "$((kills / 2))" "$work/expected_chunks" "${chunks[@]}" --jobs 2
 
 echo "--- kill -9 of --force: the earlier results, whole, or unfinished ones that --resume completes"
 "$program" run "$seq" --out "$work/earlier" --end 9 --write-online --quiet

@@ -38,7 +38,7 @@ export async function withPage(address, size, work) {
     page.on('pageerror', (error) => complaints.push(error.message));
     page.on('request', (request) => {
       const isOwn = /^(data|blob):/.test(request.url()) ||
-        request.url().startsWith(address.startsWith('file:') ? 'file:' : address);
+        request.url().startsWith(address.startsWith('file:') ? 'file:' : new URL('.', address).href);
       if (!isOwn) complaints.push(`request ${request.url()}`);
     });
     await page.setViewport(size);

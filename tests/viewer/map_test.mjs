@@ -1,10 +1,10 @@
 // node map_test.mjs PROGRAM FOLDER
-// Serves the map of a simulated street in tiles, and shows it in a browser.
+// Writes the map of a simulated street in tiles, and shows it in a browser from a static server.
 import assert from 'node:assert/strict';
-import {execFileSync, spawn, spawnSync} from 'node:child_process';
-import {existsSync, mkdirSync, readdirSync, readFileSync, statSync, symlinkSync, rmSync} from 'node:fs';
-import {request} from 'node:http';
+import {execFileSync} from 'node:child_process';
+import {existsSync, mkdirSync, readdirSync, readFileSync, statSync} from 'node:fs';
 import {withPage, set} from './browser.mjs';
+import {serveFolder} from './static_server.mjs';
 
 const [program, folder] = process.argv.slice(2);
 const out = `${folder}/cleaned`;
@@ -26,64 +26,6 @@ function tileCount(uri) {
   const bytes = readFileSync(`${out}/${uri}`);
   const features = bytes.subarray(28, 28 + bytes.readUInt32LE(12)).toString();
   return JSON.parse(features).POINTS_LENGTH;
-}
-
-// Calls work(address, server) while the server runs.
-async function withServer(words, work) {
-  const server = spawn(program, ['view', out, '--serve', ...words]);
-  const ended = new Promise((resolve) => server.on('exit', (code) => resolve(code)));
-  try {
-    const address = await new Promise((resolve, reject) => {
-      let text = '';
-      server.stdout.on('data', (data) => {
-        text += data;
-        const match = /map: (http:\/\/127\.0\.0\.1:\d+\/)/.exec(text);
-        if (match) resolve(match[1]);
-      });
-      let errors = '';
-      server.stderr.on('data', (data) => { errors += data; });
-      server.on('close', () => {
-        if (/built without a web server/.test(errors)) {
-          console.log(`SKIPPED: ${errors}`);
-          process.exit(0);
-        }
-        reject(new Error(`the server ended: ${text}${errors}`));
-      });
-    });
-    await work(address, server, ended);
-  } finally {
-    server.kill('SIGKILL');
-  }
-}
-
-// The status of a request with this very path, which no client has made safe.
-function statusOf(address, path, headers = {}) {
-  const {hostname, port} = new URL(address);
-  return new Promise((resolve, reject) => {
-    request({hostname, port, path, headers}, (answer) => {
-      answer.resume();
-      answer.on('end', () => resolve(answer.statusCode));
-    }).on('error', reject).end();
-  });
-}
-
-async function testAnswers(address) {
-  for (const path of ['/', '/tileset.json', '/tileset/r.pnts']) {
-    assert.equal(await statusOf(address, path), 200, path);
-  }
-  symlinkSync('../report.json', `${out}/tileset/r7777.pnts`);
-  for (const path of ['/report.json', '/static_map.ply', '/tileset', '/tileset/', '/tileset/r9.pnts',
-    '/tileset/../report.json', '/tileset/%2e%2e/report.json', '/tileset/..%2freport.json',
-    '/../../../../etc/passwd', '//etc/passwd', '/tileset/r.pnts/../../report.json',
-    '/tileset/r.pnts%00', '/tileset/r7777.pnts']) {
-    assert.ok([400, 404].includes(await statusOf(address, path)), path);
-  }
-  rmSync(`${out}/tileset/r7777.pnts`);
-  assert.equal(await statusOf(address, '/tileset.json', {host: 'example.org'}), 403);
-  const {port} = new URL(address);
-  const second = spawnSync(program, ['view', out, '--serve', '--port', port]);
-  assert.equal(second.status, 2);
-  assert.match(second.stderr.toString(), new RegExp(`--port ${port}: cannot be opened, another program`));
 }
 
 function testTileset() {
@@ -193,26 +135,24 @@ async function testControls(page) {
 }
 
 makeRun();
-await withServer([], async (address, server, ended) => {
-  await testAnswers(address);
-  testTileset();
-  await withPage(address, {width: 720, height: 450}, async (page, complaints) => {
-    await settled(page);
-    await testTiles(page);
-    await testControls(page);
-    assert.deepEqual(complaints, [], 'the console is empty, and nothing else is requested');
-    // The page tells when the server is gone.
-    server.kill('SIGTERM');
-    assert.equal(await ended, 0, 'a signal stops the server');
-    await look(page, 0.8, 0.2, 10).catch(() => {});
-    assert.equal(await page.$eval('#failure', (node) => node.hidden), false);
-  });
+execFileSync(program, ['view', out, '--tiles', '-q']);
+testTileset();
+const server = await serveFolder(out);
+// The browser asks for the icon of a page by itself; the server has none.
+await withPage(server.address + 'map.html', {width: 720, height: 450}, async (page, complaints) => {
+  await settled(page);
+  await testTiles(page);
+  await testControls(page);
+  assert.deepEqual(complaints, [], 'the console is empty, and nothing else is requested');
+  // The page tells when the server is gone.
+  await server.close();
+  await look(page, 0.8, 0.2, 10).catch(() => {});
+  assert.equal(await page.$eval('#failure', (node) => node.hidden), false);
 });
 // The tiles are used again; a run with --force removes them.
 const written = statSync(`${out}/tileset.json`).mtimeMs;
-await withServer([], async () => {
-  assert.equal(statSync(`${out}/tileset.json`).mtimeMs, written);
-});
+execFileSync(program, ['view', out, '--tiles', '-q']);
+assert.equal(statSync(`${out}/tileset.json`).mtimeMs, written);
 execFileSync(program, ['run', 'street', '--out', 'cleaned', '--force', '-q'], {cwd: folder});
-assert.ok(!existsSync(`${out}/tileset.json`) && !existsSync(`${out}/tileset`));
+for (const name of ['tileset.json', 'tileset', 'map.html']) assert.ok(!existsSync(`${out}/${name}`), name);
 console.log('the browser shows the map in tiles');

@@ -30,8 +30,6 @@ class PointFileWriter {
                            const Eigen::Isometry3d& viewpoint = Eigen::Isometry3d::Identity());
 
   void add(const FilePoint& point);
-  /// Adds records with the columns and the format of this file.
-  void add(const PointRecords& points);
   std::size_t size() const { return size_; }
   /// Writes all but the name of the file. No point can be added then. Throws IoError.
   void prepare(AtomicFile::Sync sync = AtomicFile::Sync::kNow);

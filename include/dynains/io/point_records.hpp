@@ -42,28 +42,11 @@ class PointRecords {
 
   void add(const FilePoint& point);
   void clear() { bytes_.clear(); }
-  /// Number of points.
-  std::size_t size() const { return bytes_.size() / record_size_; }
   Span<const char> bytes() const { return {bytes_.data(), bytes_.size()}; }
-  /// Takes the bytes of other records with these columns. False, and nothing changes, if they are
-  /// no whole number of points.
-  bool assign(Span<const char> bytes);
-
-  /// Replaces each label by `new_label(label)`. To be called with a column `label` only.
-  template <class NewLabel>
-  void replace_labels(NewLabel&& new_label) {
-    for (std::size_t at = label_; at < bytes_.size(); at += record_size_) {
-      std::uint32_t label = 0;
-      std::memcpy(&label, bytes_.data() + at, sizeof(label));
-      label = new_label(label);
-      std::memcpy(bytes_.data() + at, &label, sizeof(label));
-    }
-  }
 
  private:
   PointColumns columns_;
   bool is_pcd_;
-  std::size_t label_;        // bytes before the label of a record
   std::size_t record_size_;  // bytes
   std::vector<char> bytes_;
 };

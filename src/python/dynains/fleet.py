@@ -2,11 +2,9 @@
 
     dynains fleet LOGS... --out OUT [--city CITY] [--scheduler tcp://HOST:PORT]
 
-A short recording is a task. Of a long one, each chunk is a task, and one more task puts the chunks
-together. Its results go to OUT/NAME, as `dynains run` writes them, so they do not depend on the
-workers, their number, or the order. A task of a worker that dies is given to another worker; chunks
-that are finished are kept. A recording that fails does not stop the others; OUT/fleet.json tells
-the reason. Run the command again to complete what is missing.
+A recording is a task. Its results go to OUT/NAME, as `dynains run` writes them, so they do not
+depend on the workers, their number, or the order. A task of a worker that dies is given to another
+worker. A recording that fails does not stop the others; OUT/fleet.json tells the reason. Run the command again to complete what is missing.
 """
 
 import argparse
@@ -20,7 +18,6 @@ from pathlib import Path
 from typing import Any, Callable, Dict, Iterable, List, Optional, Tuple, TypeVar, Union
 
 from . import ConfigError, IoError, PoseError, Recording, UsageError, run
-from ._dynains import _begin_chunks, _judge_chunk
 
 __all__ = ["clean", "find_recordings"]
 
@@ -93,31 +90,8 @@ def _when_free(work: Callable[[], Result]) -> Result:
 _ERRORS = (ConfigError, IoError, PoseError, UsageError)
 
 
-def _begin(recording: str, out: str, arguments: Dict[str, Any]) -> Union[int, Dict[str, Any]]:
-    """The number of chunks of a long recording; the result of a short one."""
-    try:
-        chunks = _when_free(lambda: _begin_chunks(recording, out, **arguments))
-    except _ERRORS as error:
-        return {"recording": recording, "error": str(error)}
-    return chunks or _finish(recording, out, arguments, [])
-
-
-def _judge(recording: str, out: str, arguments: Dict[str, Any], number: int) -> Optional[str]:
-    """Judges a chunk. Returns what failed."""
-    try:
-        is_finished = _when_free(lambda: _judge_chunk(recording, out, number, **arguments))
-    except _ERRORS as error:
-        return str(error)
-    return None if is_finished else f"chunk {number} was interrupted"
-
-
-def _finish(
-    recording: str, out: str, arguments: Dict[str, Any], failures: List[Optional[str]]
-) -> Dict[str, Any]:
-    """Completes a run whose chunks are judged, or all of a short one."""
-    failed = next(filter(None, failures), None)
-    if failed:
-        return {"recording": recording, "error": failed}
+def _clean_one(recording: str, out: str, arguments: Dict[str, Any]) -> Dict[str, Any]:
+    """Runs over one recording. Returns its result or its error."""
     try:
         result = _when_free(lambda: run(recording, out, **arguments))
     except _ERRORS as error:
@@ -174,7 +148,7 @@ def clean(
     from distributed import Client, LocalCluster
 
     out = Path(out).resolve()
-    common = {**arguments, "resume": True, "jobs": 1}
+    common = {**arguments, "resume": True, "one_thread": True}
     jobs = {
         name: (str(path), str(out / name), {**common, **_session(city, name)})
         for name, path in recordings.items()
@@ -201,22 +175,12 @@ def _results_of(
 
     # The longest first, so that no worker is left with one at the end.
     order = sorted(jobs, key=lambda name: (-_size_of(Path(jobs[name][0])), name))
-    names = {client.submit(_begin, *jobs[name], pure=False): name for name in order}
-    finished = as_completed(names)
+    names = {client.submit(_clean_one, *jobs[name], pure=False): name for name in order}
     results: Dict[str, Dict[str, Any]] = {}
-    for task in finished:
+    for task in as_completed(names):
         name = names.pop(task)
         error = task.exception()
         result = {"recording": jobs[name][0], "error": f"{error}"} if error else task.result()
-        if isinstance(result, int):
-            chunks = [
-                client.submit(_judge, *jobs[name], number, pure=False, priority=1)
-                for number in range(result)
-            ]
-            last = client.submit(_finish, *jobs[name], chunks, pure=False, priority=2)
-            names[last] = name
-            finished.add(last)
-            continue
         results[name] = result
         if progress:
             progress(len(results), len(jobs), name, result)
@@ -251,11 +215,6 @@ def main(words: Optional[List[str]] = None) -> int:
         help="address or scheduler file (.json) of a scheduler [workers on this machine]",
     )
     parser.add_argument("--workers", type=int, help="on this machine [one for each core]")
-    parser.add_argument(
-        "--chunk",
-        type=int,
-        help="scans of a task, 0: a recording is one task [0 for less than 1000, else about 500]",
-    )
     parser.add_argument("--preset", default="default", choices=["default", "offline", "paper"])
     parser.add_argument("--accept-poses", action="store_true")
     options = parser.parse_args(words)
@@ -271,7 +230,6 @@ def main(words: Optional[List[str]] = None) -> int:
             scheduler=options.scheduler,
             workers=options.workers,
             progress=_tell,
-            chunk=options.chunk,
             preset=options.preset,
             accept_poses=options.accept_poses,
         )
