@@ -82,12 +82,9 @@ using Offline = decltype(Config::offline());
 enum class Decision {
   kWindow,     ///< occupancy of clusters within a sliding window of scans: the paper, Eq. 3-19
   kFreeSpace,  ///< beams of other scans through the position of a point; not in the paper
-  kBoth,       ///< a point is dynamic if kWindow or kFreeSpace classifies it as dynamic
 };
 
-constexpr std::array<const char*, 3> value_names(Decision) {
-  return {"window", "free_space", "both"};
-}
+constexpr std::array<const char*, 2> value_names(Decision) { return {"window", "free_space"}; }
 
 /// Observations of a cluster that update its belief sequentially (Eq. 15, 16).
 enum class BeliefObservations {
@@ -126,10 +123,11 @@ struct RemoverConfig {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
-    visitor(Parameter{"decision", self.decision, Bounds(), "",
-                      "evidence by which points are called dynamic: occupancy of clusters within a "
-                      "sliding window of scans (the paper), free space that beams of other scans "
-                      "passed through, or both"});
+    visitor(
+        Parameter{"decision", self.decision, Bounds(), "",
+                  "evidence by which points are called dynamic: occupancy of clusters within a "
+                  "sliding window of scans (the paper), or free space that beams of other scans "
+                  "passed through"});
     visitor(Parameter{"window", self.window, closed(2, 64), "scans",
                       "sliding window K (Eq. 3); without effect on decision = free_space"});
     visitor(Parameter{"use_belief", self.use_belief, Bounds(), "",
@@ -164,11 +162,6 @@ struct RemoverConfig {
                       "tilt of the sensor about its x axis, left side up"});
     visitor(Parameter{"build_map", self.build_map, Bounds(), "", "accumulate the static map"});
   }
-
-  /// Whether the decision uses the window (kWindow or kBoth).
-  bool uses_window() const { return decision != Decision::kFreeSpace; }
-  /// Whether the decision uses free space (kFreeSpace or kBoth).
-  bool uses_free_space() const { return decision != Decision::kWindow; }
 
   /// Whether a scan starts a new epoch. `pause`: s since the previous scan. `distance`: m from its
   /// pose.
@@ -253,8 +246,8 @@ struct PipelineConfig : RemoverConfig {
   void validate() const {
     visit_sections(*this, [](const char*, const auto& section) { section.validate(); });
     if (!revision.revise_map) return;
-    if (!uses_free_space()) {
-      throw ConfigError("MapRevision.revise_map = true needs decision = free_space or both");
+    if (decision != Decision::kFreeSpace) {
+      throw ConfigError("MapRevision.revise_map = true needs decision = free_space");
     }
     if (!build_map) throw ConfigError("MapRevision.revise_map = true needs build_map = true");
     // Each reference scan must update the belief of a map block at most once.

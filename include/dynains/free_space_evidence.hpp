@@ -75,10 +75,6 @@ class FreeSpaceEvidence {
     moved_ground_.adapt(sensor);
   }
 
-  /// Extends judge() to the last `scans` scans before the newest; no effect if `scans` is below
-  /// lookahead_scans(). Call it before the first scan.
-  void keep(std::size_t scans) { records_.resize(std::max(records_.size(), scans + 2)); }
-
   /// Allocates memory for `scans` scans: images for the sensor of adapt(), and records for scans of
   /// the size of the scans already observed. Discards the observed scans, so call it before scan 0.
   void reserve(std::size_t scans) {

@@ -79,7 +79,7 @@ auto plain_value(T value) {
   }
 }
 
-/// Names of all values of an enum, for example "window|free_space|both".
+/// Names of all values of an enum, for example "window|free_space".
 template <class Enum>
 std::string all_value_names() {
   std::string result;
@@ -119,37 +119,6 @@ void validate_parameters(const char* owner, const Config& config) {
     }
     throw ConfigError(text.str() + ": " + parameter.help);
   });
-}
-
-struct RenamedParameter {
-  const char* former_name;  ///< snake_case
-  const char* present_name;
-  const char* note;  ///< conversion of values; empty if values are unchanged
-};
-
-inline constexpr RenamedParameter kRenamedParameters[] = {
-    {"use_free_space", "decision", "true: free_space or both, false: window"},
-    {"horizon", "lookahead_scans", ""},
-    {"memory", "lookback_scans", ""},
-    {"ground_reach", "test_ground", "0: false, else true"},
-    {"ground_test_distance", "test_ground", "0: false, else true"},
-    {"remove_share", "removal_ratio", ""},
-    {"see_share", "pass_ratio", ""},
-    {"passage_cell", "dynamic_grid_cell", ""},
-    {"passage_share", "dynamic_grid_ratio", ""},
-    {"see_past_movers", "ignore_dynamic_returns", ""},
-};
-
-/// Part of an error message with the present name of `former_name`; empty if no parameter had that
-/// name.
-inline std::string renaming_of(const std::string& former_name) {
-  for (const RenamedParameter& renamed : kRenamedParameters) {
-    if (former_name != renamed.former_name) continue;
-    const std::string note = renamed.note;
-    return std::string("is now called ") + renamed.present_name +
-           (note.empty() ? "" : " (" + note + ")");
-  }
-  return {};
 }
 
 }  // namespace dynains

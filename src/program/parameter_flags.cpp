@@ -138,27 +138,16 @@ ParameterValues read_config_file(const std::filesystem::path& path) {
 
 void ParameterValues::refuse(const std::string& name, const std::string& where,
                              const std::vector<std::string>& names) {
-  std::string former = name;
-  std::replace(former.begin(), former.end(), '-', '_');
-  const std::string renaming = renaming_of(former);
-  if (!renaming.empty()) throw ConfigError(where + ": " + renaming);
   const std::string like = nearest_name(name, names);
   throw ConfigError(where + ": unknown parameter" +
                     (like.empty() ? "" : "; did you mean " + like + "?") + ", see dynains config");
-}
-
-void ParameterFlags::add_former_names_to(CLI::App& command) {
-  for (const RenamedParameter& renamed : kRenamedParameters) {
-    options_.push_back(
-        command.add_option("--" + flag_name(renamed.former_name))->expected(0, 1)->group(""));
-  }
 }
 
 ParameterValues ParameterFlags::values() const {
   ParameterValues values;
   for (const CLI::Option* option : options_) {
     if (option->count() == 0) continue;
-    const std::string& name = option->get_lnames().front();  // get_name() hides former names
+    const std::string& name = option->get_lnames().front();
     values.set(name, option->results().empty() ? "" : option->results().back(), "--" + name);
   }
   return values;

@@ -139,9 +139,6 @@ class ParameterFlags {
     });
   }
 
-  /// Adds hidden flags of former names, which values() gives like others, to be refused by name.
-  void add_former_names_to(CLI::App& command);
-
   /// The flags that were given.
   ParameterValues values() const;
 

@@ -20,7 +20,6 @@ RemoverOptions::RemoverOptions(CLI::App& command, std::string default_preset)
   DynaInsRemover::Config::visit_sections(defaults, [&](const char* name, const auto& section) {
     flags_.add_to(command, section, name);
   });
-  flags_.add_former_names_to(command);
 }
 
 DynaInsRemover::Config RemoverOptions::config() const {

@@ -65,7 +65,6 @@ void bind_config(py::module_& module) {
   add_preset("offline", &Config::offline,
              "For recordings: verdicts wait for more later scans, at the cost of memory.");
   add_properties<Config>(config);
-  add_former_names(config);
   config.def("to_dict", &to_dict<Config>, "Values by name.");
   config.def("validate", &Config::validate, "Raises ConfigError if parameters contradict.");
   config.def_static("parameters", &list_parameters,

@@ -78,16 +78,14 @@ void assign(const Parameter<T>& parameter, const py::handle& value) {
   parameter.value = wanted;
 }
 
-/// Throws ConfigError with the present name of a former one, or the nearest of `names`.
+/// Throws ConfigError with the nearest of `names`.
 [[noreturn]] inline void refuse(const std::string& name, const std::vector<std::string>& names) {
-  const std::string renaming = renaming_of(name);
-  if (!renaming.empty()) throw ConfigError(name + ' ' + renaming);
   const std::string like = program::nearest_name(name, names);
   throw ConfigError("unknown parameter " + name +
                     (like.empty() ? "" : "; did you mean " + like + "?"));
 }
 
-/// Sets the parameters that `values` names. Throws ConfigError for unknown and for former names.
+/// Sets the parameters that `values` names. Throws ConfigError for unknown names.
 template <class Config>
 void assign_all(Config& config, const py::dict& values) {
   for (const std::pair<py::handle, py::handle> item : values) {
@@ -141,20 +139,6 @@ void add_properties(Class& bound) {
         },
         describe(parameter).c_str());
   });
-}
-
-/// Properties of former names: reading and writing raises an AttributeError with the present name.
-template <class Class>
-void add_former_names(Class& bound) {
-  for (const RenamedParameter& renamed : kRenamedParameters) {
-    const std::string text =
-        std::string(renamed.former_name) + ' ' + renaming_of(renamed.former_name);
-    bound.def_property(
-        renamed.former_name,
-        [text](const py::object&) -> py::object { throw py::attribute_error(text); },
-        [text](const py::object&, const py::object&) { throw py::attribute_error(text); },
-        text.c_str());
-  }
 }
 
 }  // namespace dynains::python

@@ -41,7 +41,7 @@ TEST_CASE("a warm remover allocates nothing, except for the map when it grows") 
   DynaInsRemover::Config config = base;
   const bool build_map = GENERATE(false, true);
   config.build_map = build_map;
-  config.revision.revise_map = build_map && config.uses_free_space();
+  config.revision.revise_map = build_map && config.decision == Decision::kFreeSpace;
   // Short rings: after seven rounds of twelve scans, every place in them has held every scan.
   config.evidence.lookahead_scans = 6;
   config.evidence.lookback_scans = 20;

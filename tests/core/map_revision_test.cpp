@@ -246,9 +246,8 @@ struct CountingStages : DefaultStages {
 TEST_CASE("a map is revised by free-space evidence, and only if its type can remove points") {
   DynaInsRemover::Config config = DynaInsRemover::Config::paper();
   config.revision.revise_map = true;
-  CHECK_THROWS_WITH(
-      DynaInsRemover(config),
-      ContainsSubstring("MapRevision.revise_map = true needs decision = free_space or both"));
+  CHECK_THROWS_WITH(DynaInsRemover(config),
+                    ContainsSubstring("MapRevision.revise_map = true needs decision = free_space"));
   config.decision = Decision::kFreeSpace;
   CHECK_NOTHROW(config.validate());
   config.build_map = false;

@@ -402,27 +402,6 @@ TEST_CASE("votes: the more windows must agree, the less is removed") {
   CHECK(dynamic_points(looser.back()).empty());
 }
 
-TEST_CASE("windows may decide later than the evidence, which then has no influence") {
-  std::vector<Scan> scans = drive(oncoming(), 12, 5.0);
-  for (std::size_t s = 1; s < scans.size(); s += 2) {
-    scans[s].points.resize(scans[s].points.size() / 3);  // every second scan has fewer points
-  }
-  Config config;
-  config.window = 5;
-  config.votes = 2;
-  config.decision = Decision::kWindow;
-  const Run by_windows = run(config, scans);
-  config.decision = Decision::kBoth;
-  config.evidence.lookahead_scans = 0;
-  config.evidence.lookback_scans = 0;
-  config.evidence.presume_dynamic = false;
-  const Run with_evidence = run(config, scans);
-  for (std::size_t s = 0; s < scans.size(); ++s) {
-    CHECK(with_evidence.final[s].labels == by_windows.final[s].labels);
-  }
-  CHECK(dynamic_count(by_windows.final) > 0);
-}
-
 TEST_CASE("instance ids continue from scan to scan, however soon a verdict is final") {
   const std::vector<Scan> scans = drive(oncoming(), 10, 5.0);
   Config config;

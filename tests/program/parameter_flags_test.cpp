@@ -110,9 +110,6 @@ TEST_CASE("Config files are refused by line") {
     return message_of<ConfigError>([&] { read(text); });
   };
   CHECK_THAT(error("\ntau-x = 1\n"), ContainsSubstring("a.cfg:2: tau-x: unknown parameter"));
-  CHECK_THAT(
-      error("\nuse-free-space = on\n"),
-      ContainsSubstring("a.cfg:2: use-free-space: is now called decision (true: free_space"));
   CHECK_THAT(error("window = 1\n"), ContainsSubstring("a.cfg:1: window = 1: expected INT in"));
   CHECK_THAT(error("window\n"), ContainsSubstring("a.cfg:1: expected a line such as"));
   CHECK_THAT(error("window =\n"), ContainsSubstring("a.cfg:1: expected a line such as"));

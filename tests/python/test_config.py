@@ -61,8 +61,7 @@ def test_the_configuration_of_a_remover_is_a_copy():
         ({"level": None}, TypeError, "level = None: expected bool"),
         ({"level": 0.5}, TypeError, "level = 0.5: expected bool"),
         ({"tau": 0.5}, dynains.ConfigError, "unknown parameter tau; did you mean tau_s\\?"),
-        ({"use_free_space": True}, dynains.ConfigError, "use_free_space is now called decision"),
-        ({"decision": "paper"}, TypeError, "expected str, one of window|free_space|both"),
+        ({"decision": "paper"}, TypeError, "expected str, one of window|free_space"),
         ({"decision": 1}, TypeError, "decision = 1: expected str"),
     ],
 )
@@ -97,18 +96,11 @@ def test_a_misspelt_attribute_is_an_error():
         dynains.Config().tau = 0.5
 
 
-def test_a_former_name_is_an_error_that_gives_the_present_one():
-    config = dynains.Config()
-    with pytest.raises(AttributeError, match="use_free_space is now called decision"):
-        config.use_free_space = False
-    assert not hasattr(config, "use_free_space")
-
-
 def test_a_parameter_with_named_values_is_a_text():
-    config = dynains.Config(decision="both")
-    assert config.decision == "both" and "decision='both'" in repr(config)
+    config = dynains.Config(decision="window")
+    assert config.decision == "window" and "decision='window'" in repr(config)
     (entry,) = [p for p in dynains.Config.parameters() if p["name"] == "decision"]
-    assert entry["values"] == ["window", "free_space", "both"]
+    assert entry["values"] == ["window", "free_space"]
     assert dynains.Config.paper().decision == "window"
     assert pickle.loads(pickle.dumps(config)) == config
 

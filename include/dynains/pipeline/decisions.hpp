@@ -1,4 +1,4 @@
-// Implementations of Config::decision: window, free_space and both.
+// Implementations of Config::decision: window and free_space.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -113,11 +113,8 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
   }
 
   void judge_final(const ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) override {
-    timer.measure(&StageTimes::verdict, [&] { writer.write_windows(scan, votes_needed()); });
+    timer.measure(&StageTimes::verdict, [&] { writer.write_windows(scan, std::max(1, votes_)); });
   }
-
-  /// Smallest number of votes for a final dynamic verdict on a point.
-  int votes_needed() const { return std::max(1, votes_); }
 
  private:
   // Eq. 5-19 for each cluster with points in both the oldest and the newest scan. Other clusters
@@ -210,42 +207,25 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
     instance_ids_.clear();
   }
 
-  /// Extends the age at which scans can be judged to `scans` scans. At least latency() scans are
-  /// kept.
-  void keep(std::size_t scans) { keep_in_stage(evidence_, scans); }
-
   void observe(ScanRing& scans, const ScanWindow& window, StageTimer& timer) override {
     timer.measure(&StageTimes::evidence, [&] {
-      observe_instances(scans.newest(), window);
+      const ScanSlot& newest = scans.newest();
+      evidence_.observe(newest.scan, newest.epoch, newest.T_world_level, newest.split,
+                        window.newest_cluster_of(), window.cluster_count());
       propagate_ids(scans);
     });
   }
-  /// Adds the newest scan and assigns no instance ids.
-  void observe_instances(const ScanSlot& newest, const ScanWindow& window) {
-    evidence_.observe(newest.scan, newest.epoch, newest.T_world_level, newest.split,
-                      window.newest_cluster_of(), window.cluster_count());
-  }
 
   void judge_newest(const ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) override {
-    write_newest(newest, writer, timer);
-  }
-  void judge_final(const ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) override {
-    write_final(scan, writer, timer);
-  }
-  /// As judge_newest(). Returns the written verdict, which is valid until the next call.
-  EvidenceVerdict write_newest(const ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) {
     const EvidenceVerdict verdict = judge(newest, false, timer);
     timer.measure(&StageTimes::verdict, [&] { writer.write_groups(newest, verdict); });
-    return verdict;
   }
-  /// As judge_final(). Returns the written verdict, which is valid until the next call.
-  EvidenceVerdict write_final(const ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) {
+  void judge_final(const ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) override {
     const EvidenceVerdict verdict = judge(scan, true, timer);
     timer.measure(&StageTimes::verdict, [&] {
       writer.write_groups(scan, verdict);
       writer.flag_groups(scan, verdict);
     });
-    return verdict;
   }
 
   std::optional<PoseResidual> pose_residual() const override { return pose_residual_of(evidence_); }
@@ -284,83 +264,11 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
   InstanceIds instance_ids_;
 };
 
-/// Combines two verdicts: dynamic if one of them is dynamic. The cause is that of `first` unless
-/// only `second` is dynamic; the belief is the larger one.
-inline PointVerdict stronger(const PointVerdict& first, const PointVerdict& second) {
-  const bool takes_second = !is_dynamic(first.cause) && is_dynamic(second.cause);
-  return {takes_second ? second.cause : first.cause, std::max(first.belief, second.belief)};
-}
-
-/// Combines the verdict by free space, written before, with the proposals of the windows so far.
-inline void add_proposals(const ScanSlot& scan, const EvidenceVerdict& by_free_space,
-                          int votes_needed, VerdictWriter& writer) {
-  const VerdictWriter::Points points = writer.points(scan);
-  const std::size_t first = scan.split.ground_count;
-  for (std::size_t i = 0; i < scan.non_ground_count(); ++i) {
-    if (scan.windows.stage[i] != DecisionStage::kProposed) continue;
-    const PointVerdict& group = by_free_space.groups[by_free_space.group_of[i]];
-    points.write(first + i, stronger(group, point_verdict(scan.windows, i, votes_needed)));
-  }
-}
-
-/// A point is dynamic if free space or the windows classify it as dynamic. Clusters and instance
-/// ids come from the windows.
-template <class Stages>
-class BothDecisions final : public ScanDecision<typename Stages::Map> {
- public:
-  explicit BothDecisions(const PipelineConfig<Stages>& config)
-      : window_(config), free_space_(config) {
-    free_space_.keep(latency());
-  }
-
-  std::size_t window_length() const override { return window_.window_length(); }
-  std::size_t latency() const override {
-    return std::max(window_.latency(), free_space_.latency());
-  }
-  bool needs_sensor() const override { return free_space_.needs_sensor(); }
-  void adapt(const SensorModel& sensor) override { free_space_.adapt(sensor); }
-  void reserve(std::size_t scans) override { free_space_.reserve(scans); }
-  void clear() override {
-    window_.clear();
-    free_space_.clear();
-  }
-
-  void observe(ScanRing& scans, const ScanWindow& window, StageTimer& timer) override {
-    window_.observe(scans, window, timer);
-    timer.measure(&StageTimes::evidence,
-                  [&] { free_space_.observe_instances(scans.newest(), window); });
-  }
-  void judge_newest(const ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) override {
-    const EvidenceVerdict by_free_space = free_space_.write_newest(newest, writer, timer);
-    timer.measure(&StageTimes::verdict, [&] { add_proposals(newest, by_free_space, 1, writer); });
-  }
-  void judge_final(const ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) override {
-    const EvidenceVerdict by_free_space = free_space_.write_final(scan, writer, timer);
-    timer.measure(&StageTimes::verdict,
-                  [&] { add_proposals(scan, by_free_space, window_.votes_needed(), writer); });
-  }
-  std::optional<PoseResidual> pose_residual() const override { return free_space_.pose_residual(); }
-  void revise(typename Stages::Map& map, const ScanSlot& newest) override {
-    free_space_.revise(map, newest);
-  }
-
- private:
-  WindowDecision<Stages> window_;
-  FreeSpaceDecision<Stages> free_space_;
-};
-
 /// Creates the implementation of `config.decision`.
 template <class Stages>
 std::unique_ptr<ScanDecision<typename Stages::Map>> make_decision(
     const PipelineConfig<Stages>& config) {
-  switch (config.decision) {
-    case Decision::kWindow:
-      return std::make_unique<WindowDecision<Stages>>(config);
-    case Decision::kBoth:
-      return std::make_unique<BothDecisions<Stages>>(config);
-    case Decision::kFreeSpace:
-      break;
-  }
+  if (config.decision == Decision::kWindow) return std::make_unique<WindowDecision<Stages>>(config);
   return std::make_unique<FreeSpaceDecision<Stages>>(config);
 }
 

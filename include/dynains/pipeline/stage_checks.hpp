@@ -159,15 +159,6 @@ void reserve_stage(Stage& stage, std::size_t scans) {
   if constexpr (Offers<Reserve, Stage>::value) stage.reserve(scans);
 }
 
-/// Calls the optional member `keep(std::size_t scans)` of a stage: scans up to that age, in scans,
-/// can then be judged.
-template <class Stage>
-using Keep = decltype(std::declval<Stage&>().keep(std::size_t{}));
-template <class Stage>
-void keep_in_stage(Stage& stage, std::size_t scans) {
-  if constexpr (Offers<Keep, Stage>::value) stage.keep(scans);
-}
-
 /// Result of the optional member `pose_residual()` of a stage; empty without it.
 template <class Stage>
 using HasPoseResidual = decltype(std::declval<const Stage&>().pose_residual());

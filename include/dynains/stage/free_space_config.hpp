@@ -163,7 +163,7 @@ struct MapRevisionConfig {
   static void visit(Self& self, Visitor&& visitor) {
     visitor(Parameter{"revise_map", self.revise_map, Bounds(), "",
                       "remove blocks of the static map that are free in later scans; needs "
-                      "decision free_space or both, and a map in memory"});
+                      "decision free_space, and a map in memory"});
     visitor(Parameter{"revision_range", self.revision_range, closed(5, 300), "m",
                       "blocks of the map at a larger horizontal range are not tested"});
     visitor(Parameter{"revision_period", self.revision_period, closed(1, 100), "scans",
