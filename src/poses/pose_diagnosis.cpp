@@ -279,7 +279,8 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
     const bool is_shift = reading && reading->convention.shift != recording.convention().shift;
     if (is_shift && offset && offset->error < reading->error) reading.reset();
     const Explanation* best = nullptr;
-    // A mistake has no number to fit, an offset has one, a body has six.
+    // In the order of fitted numbers: a usual mistake has none, an offset one, an extrinsic six. A
+    // later one must be clearly better.
     for (const auto* candidate :
          {&std::as_const(reading), &std::as_const(offset), &std::as_const(body)}) {
       if (!*candidate) continue;

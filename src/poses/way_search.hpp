@@ -15,9 +15,9 @@ inline constexpr double kWayRange = 80.0;
 double mean_gap(const Landmarks& a, const Landmarks& b, const Eigen::Isometry3d& T_a_b);
 
 /// Moves `T_a_b` along `direction` (unit vector, frame of a) by less than `farthest` (m) to where
-/// plants, posts and signs meet. What keeps its place without motion along `direction`, as traffic
-/// of the own speed and walls do, has no say. Empty if too few points remain, or if no place is
-/// clearly best.
+/// plants, posts and signs meet. Points that fit without a motion along `direction` (walls,
+/// traffic at the speed of the sensor) are left out. Empty if too few points remain, or if no place
+/// is clearly best.
 std::optional<Eigen::Isometry3d> search_way(const Landmarks& a, const Landmarks& b,
                                             const Eigen::Isometry3d& T_a_b,
                                             const Eigen::Vector3d& direction, double farthest);

@@ -26,7 +26,7 @@ struct RunFlags {
 
   RecordingFlags recording;
   RemoverOptions remover;
-  RunSettings settings;  // but for what the two above give after parsing
+  RunSettings settings;  // recording and configuration are filled in after parsing
   bool quiet = false;
 };
 

@@ -31,7 +31,7 @@ namespace fs = std::filesystem;
 using program::RunOutcome;
 using program::RunSettings;
 
-// The arguments of run() but for the recording and its options.
+// The arguments of run() without the recording and its options.
 struct RunArguments {
   RunSettings settings;
   std::optional<std::string> preset;

@@ -8,7 +8,7 @@
 namespace dynains::program {
 
 /// Replaces control characters by \xNN, so that file names cannot steer a terminal. Line feeds and
-/// tabs stay; UTF-8 stays, but for its control characters (U+0080 to U+009F).
+/// tabs stay; UTF-8 stays, except its control characters (U+0080 to U+009F).
 class PrintableStream {
  public:
   /// Filters `stream` as long as this object lives.

@@ -1,4 +1,4 @@
-// Everything that a run leaves behind, but for the report.
+// The results of a run, without the report.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -107,7 +107,7 @@ class RunResults {
   std::launch thread() const { return writing_.policy(); }
 
   void add_map_point(const Eigen::Vector3d& point);
-  /// Puts all files in place, but for a map outside of the folder.
+  /// Puts all files in place, except a map outside of the folder.
   void commit();
   void commit_outside_map();
 

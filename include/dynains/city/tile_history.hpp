@@ -29,7 +29,8 @@ namespace dynains {
 /// that has one (detail::CommonBlocks). A block sums its log-odds of being free session by session,
 /// by the rules of MapRevision:
 /// - Sessions before its own tell whether its place was free. Its own session tells whether it
-///   stands there. What does not stand does not come in.
+///   stands there. A block whose place was free, and that its own session hit too seldom, does not
+///   enter the map.
 /// - A later session that passes through it removes it.
 /// Touching blocks above the ground form components. A component that has mostly left leaves as a
 /// whole; if it is larger than a vehicle, each of its cubes of 8 blocks decides for itself. Later
