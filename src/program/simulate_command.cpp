@@ -1,4 +1,5 @@
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -6,6 +7,7 @@
 
 #include "command.hpp"
 #include "dynains/errors.hpp"
+#include "dynains/simulation/random_world.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_log.hpp"
 #include "dynains/simulation/write_sequence.hpp"
@@ -20,6 +22,7 @@ namespace dynains::program {
 namespace {
 
 constexpr const char* kFolder = "kitti";
+constexpr const char* kRandom = "random";  // everything is drawn from the seed
 constexpr const char* kLogs[] = {"mcap", "bag", "db3"};
 
 std::string log_name(const std::string& format) { return "drive." + format; }
@@ -33,19 +36,29 @@ struct SimulateOptions {
   bool force = false;
   bool quiet = false;
   ParameterFlags flags;
+  std::function<bool()> has_sensor;  ///< whether a sensor was asked for
 };
 
 simulation::Config make_config(const SimulateOptions& options) {
   simulation::Config config;
-  config.scene = simulation::scene_from_name(options.scene);
-  config.sensor = simulation::sensor_from_name(options.sensor);
+  const ParameterValues values = options.flags.values();
+  if (options.scene == kRandom) {
+    values.apply(config);  // the seed
+    config = simulation::random_world(config.seed);
+  } else {
+    config.scene = simulation::scene_from_name(options.scene);
+  }
+  if (options.scene != kRandom || options.has_sensor()) {
+    config.sensor = simulation::sensor_from_name(options.sensor);
+  }
   config.labelling = simulation::labelling_from_name(options.labelling);
-  options.flags.values().apply(config);
+  values.apply(config);
   config.validate();
-  if (config.rolling_shutter && options.format == kFolder) {
+  if (config.rolling_shutter && config.deskewed <= 0 && options.format == kFolder) {
     throw ConfigError(
-        "--rolling-shutter needs --format mcap, bag or db3: a folder as of KITTI has no times of "
-        "points");
+        "--rolling-shutter needs --deskewed, or --format mcap, bag or db3: a folder as of KITTI "
+        "has "
+        "no times of points");
   }
   return config;
 }
@@ -68,7 +81,7 @@ OutputListing listing_of(const simulation::Simulator& simulator, const std::stri
     return listing;
   }
   listing.files = {"poses.txt", "times.txt", "calib.txt"};
-  if (config.pose_noise_translation > 0 || config.pose_noise_rotation > 0) {
+  if (config.has_pose_errors()) {
     listing.files.insert("poses_true.txt");
   }
   listing.folders = {{"velodyne", ".bin"}, {"labels", ".label"}};
@@ -78,6 +91,11 @@ OutputListing listing_of(const simulation::Simulator& simulator, const std::stri
   return listing;
 }
 
+template <class Enum>
+const std::string& name_of(Enum value, const std::vector<std::string>& names) {
+  return names.at(static_cast<std::size_t>(value));
+}
+
 /// Everything that is needed to make this sequence again.
 nlohmann::ordered_json describe(const SimulateOptions& options, const simulation::Config& config,
                                 bool complete) {
@@ -85,8 +103,8 @@ nlohmann::ordered_json describe(const SimulateOptions& options, const simulation
                                  {"version", kVersionString},
                                  {"command", simulation_output_kind().command},
                                  {"complete", complete},
-                                 {"scene", options.scene},
-                                 {"sensor", options.sensor},
+                                 {"scene", name_of(config.scene, simulation::scene_names())},
+                                 {"sensor", name_of(config.sensor, simulation::sensor_names())},
                                  {"labelling", options.labelling},
                                  {"format", options.format}};
   simulation::Config::visit(
@@ -153,12 +171,15 @@ void add_simulate_command(CLI::App& app) {
   command.add_flag("--force", options->force, "replace an earlier simulation in OUT");
   const auto add_choice = [&](const char* flag, std::string& value,
                               const std::vector<std::string>& names) {
-    command.add_option(flag, value, list(names) + " [" + value + ']')
+    return command.add_option(flag, value, list(names) + " [" + value + ']')
         ->check(CLI::IsMember(names))
         ->type_name("NAME");
   };
-  add_choice("--scene", options->scene, simulation::scene_names());
-  add_choice("--sensor", options->sensor, simulation::sensor_names());
+  std::vector<std::string> scenes = simulation::scene_names();
+  scenes.push_back(kRandom);
+  add_choice("--scene", options->scene, scenes);
+  const CLI::Option* sensor = add_choice("--sensor", options->sensor, simulation::sensor_names());
+  options->has_sensor = [sensor] { return sensor->count() > 0; };
   add_choice("--labelling", options->labelling, simulation::labelling_names());
   command
       .add_option("--format", options->format,
@@ -169,7 +190,8 @@ void add_simulate_command(CLI::App& app) {
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   options->flags.add_to(command, simulation::Config(), "Parameters");
   command.footer(
-      "The same flags give the same files. simulation.json keeps them, and says \"complete\": "
+      "The same flags give the same files. --scene random draws scene, sensor and every parameter "
+      "that is not given from the seed. simulation.json keeps them, and says \"complete\": "
       "false until "
       "the end.");
   command.callback([options] { simulate(*options); });

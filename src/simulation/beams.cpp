@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "simulation/random.hpp"
 
@@ -15,9 +16,38 @@ void append_rings(std::vector<double>& elevations, double top, double step, int 
   for (int i = 0; i < count; ++i) elevations.push_back((top - step * i) * kDegree);
 }
 
+/// A sensor with rings as it may be built: number of beams, field of view, spacing, range.
+void draw_rings(SensorModel& model, Random random) {
+  constexpr int kBeams[] = {16, 32, 32, 40, 64, 64, 80, 128};
+  const int beams = kBeams[random.index(std::size(kBeams))];
+  const double shape = random.unit();
+  const bool wide = shape < 0.25, even = shape < 0.6;  // sensors for indoors, symmetric, for cars
+  const double top = wide   ? random.uniform(22, 45)
+                     : even ? random.uniform(10, 22.5)
+                            : random.uniform(2, 15);
+  const double bottom = even ? -top : -random.uniform(16, 30);
+  const double gather = random.chance(0.4) ? random.uniform(0.3, 0.8) : 0;  // about the horizon
+  for (int i = 0; i < beams; ++i) {
+    const double u = static_cast<double>(i) / (beams - 1);
+    const double horizon = top / (top - bottom);
+    const double from = u < horizon ? horizon : 1 - horizon;
+    const double v = std::abs(u - horizon) / from;
+    const double away = from * ((1 - gather) * v + gather * v * v * v);
+    const double at = u < horizon ? horizon - away : horizon + away;
+    model.elevations.push_back((top + (bottom - top) * at) * kDegree);
+  }
+  constexpr int kColumns[] = {900, 1024, 1800, 2048};
+  model.columns = beams > 64 ? 1024 : kColumns[random.index(std::size(kColumns))];
+  model.height = random.uniform(1.2, 2.2);
+  model.max_range = wide ? random.uniform(30, 60) : random.uniform(60, 150);
+  model.min_range = random.uniform(0.3, 1.0);
+  model.dark_range = model.max_range * random.uniform(0.35, 0.6);
+  model.yaw = random.chance(0.5) ? 0 : kPi / 2 * std::floor(random.uniform(-1, 3));
+}
+
 }  // namespace
 
-SensorModel sensor_model(Sensor sensor) {
+SensorModel sensor_model(Sensor sensor, std::uint64_t seed) {
   SensorModel model;
   auto set = [&model](int columns, double height, double max_range, double min_range,
                       double dark_range) {
@@ -59,6 +89,20 @@ SensorModel sensor_model(Sensor sensor) {
       break;
     case Sensor::kLivox:
       set(30000, 1.2, 100, 0.5, 60);
+      model.lasers = 6;
+      break;
+    case Sensor::kMid360:
+      set(20000, 0.6, 50, 0.3, 25);
+      model.dome = true;
+      model.lasers = 4;
+      break;
+    case Sensor::kRaster:
+      append_rings(model.elevations, 12.5, 0.2, 126);
+      set(630, 1.6, 150, 0.5, 70);
+      model.width = 120 * kDegree;
+      break;
+    case Sensor::kRings:
+      draw_rings(model, Random(mix(seed, 14)));
       break;
   }
   return model;
@@ -96,15 +140,31 @@ void BeamTable::add_rosette(const SensorModel& model, std::size_t scan, Columns 
   }
 }
 
+// A fast turn, and lasers that swing up and down between two elevations.
+void BeamTable::add_dome(const SensorModel& model, std::size_t scan, Columns part) {
+  const double bottom = -7 * kDegree, top = 52 * kDegree;
+  const double first = static_cast<double>(scan) * model.columns;
+  for (int i = part.first; i < part.last; ++i) {
+    const double t = (first + i) / model.columns;
+    const double laser = static_cast<double>(i % model.lasers) / model.lasers;
+    const double turn = t * 17.4142135624 + 0.02 * laser;
+    const double swing = t * 79.6180339887 + 0.5 * laser;
+    const double share = std::abs(2 * (swing - std::floor(swing)) - 1);
+    const double elevation = bottom + (top - bottom) * share;
+    add(2 * kPi * (turn - std::floor(turn)) - kPi, std::cos(elevation), std::sin(elevation),
+        row_of(elevation));
+  }
+}
+
 void BeamTable::add_rings(const SensorModel& model, std::uint64_t seed, std::size_t scan,
                           Columns part) {
-  const double step = 2 * kPi / model.columns;
+  const double step = model.width / model.columns;
   const double phase = static_cast<double>(unit_float(mix(mix(seed, 11), scan)));
   Random calibration(mix(seed, 12));
   // Trigonometry once per column and ring.
   std::vector<double> sines, cosines;
   for (int i = part.first; i < part.last; ++i) {
-    const double azimuth = kPi - step * (i + phase);
+    const double azimuth = model.width / 2 - step * (i + phase);
     sines.push_back(std::sin(azimuth));
     cosines.push_back(std::cos(azimuth));
   }
@@ -116,7 +176,7 @@ void BeamTable::add_rings(const SensorModel& model, std::uint64_t seed, std::siz
     const int row = row_of(elevation);
     for (int i = part.first; i < part.last; ++i) {
       const auto k = static_cast<std::size_t>(i - part.first);
-      const double azimuth = kPi - step * (i + phase) + turn;
+      const double azimuth = model.width / 2 - step * (i + phase) + turn;
       const double x = cosines[k] * cos_turn - sines[k] * sin_turn;
       const double y = sines[k] * cos_turn + cosines[k] * sin_turn;
       unordered_.push_back(
@@ -147,7 +207,9 @@ void BeamTable::sort_by_cell() {
 void BeamTable::fill(const SensorModel& model, std::uint64_t seed, std::size_t scan, Columns part) {
   unordered_.clear();
   cells_.clear();
-  if (model.elevations.empty()) {
+  if (model.dome) {
+    add_dome(model, scan, part);
+  } else if (model.elevations.empty()) {
     add_rosette(model, scan, part);
   } else {
     add_rings(model, seed, scan, part);

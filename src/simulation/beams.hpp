@@ -20,9 +20,19 @@ struct SensorModel {
   double min_range = 0;            ///< m
   double dark_range = 0;           ///< m, where 10 % reflectivity is found nine times out of ten
   double yaw = 0;                  ///< sensor x axis from the vehicle's forward direction
+  double width = 2 * kPi;          ///< of the rings, around the x axis
+  bool dome = false;               ///< without rings: all around instead of a rosette
+  int lasers = 0;                  ///< in turn, for beams without rings
+
+  /// Laser of the beam that is measured as number `i` of `columns` columns.
+  int laser_of(std::size_t i, std::size_t measured_columns) const {
+    return elevations.empty() ? static_cast<int>(i) % lasers
+                              : static_cast<int>(i / measured_columns);
+  }
 };
 
-SensorModel sensor_model(Sensor sensor);
+/// `seed` determines the numbers of Sensor::kRings.
+SensorModel sensor_model(Sensor sensor, std::uint64_t seed = 0);
 
 /// Beams of one scan, grouped by direction so that all beams towards a small object are
 /// contiguous row by row.
@@ -61,6 +71,7 @@ class BeamTable {
  private:
   void add(double azimuth, double cos_elevation, double sin_elevation, int row);
   void add_rosette(const SensorModel& model, std::size_t scan, Columns part);
+  void add_dome(const SensorModel& model, std::size_t scan, Columns part);
   void add_rings(const SensorModel& model, std::uint64_t seed, std::size_t scan, Columns part);
   void sort_by_cell();
 

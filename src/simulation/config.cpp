@@ -18,15 +18,15 @@ std::size_t position_of(const std::string& name, const std::vector<std::string>&
 }  // namespace
 
 const std::vector<std::string>& scene_names() {
-  static const std::vector<std::string> names{"urban",       "highway", "vegetation", "crowd",
-                                              "stop-and-go", "canopy",  "hill",       "car-park",
-                                              "static",      "hall",    "forest",     "garage"};
+  static const std::vector<std::string> names{
+      "urban",    "highway", "vegetation", "crowd",  "stop-and-go", "canopy", "hill",
+      "car-park", "static",  "hall",       "forest", "garage",      "mixed"};
   return names;
 }
 
 const std::vector<std::string>& sensor_names() {
-  static const std::vector<std::string> names{"hdl64",   "vlp16",    "hdl32", "os1-64",
-                                              "os0-128", "pandar64", "livox"};
+  static const std::vector<std::string> names{"hdl64",    "vlp16", "hdl32",   "os1-64", "os0-128",
+                                              "pandar64", "livox", "mid-360", "raster", "rings"};
   return names;
 }
 

@@ -46,6 +46,11 @@ inline constexpr Material kBrightCloth{semantic::kPerson, 0.5F, 0.01F, 0, 0, 0.0
 inline constexpr Material kDarkCloth{semantic::kPerson, 0.2F, 0.05F, 0, 0, 0.01F, 0};
 inline constexpr Material kSkin{semantic::kPerson, 0.4F, 0.02F, 0, 0, 0.005F, 0};
 inline constexpr Material kMetal{semantic::kBicycle, 0.3F, 0.2F, 3.0F, 0, 0, 0};
+inline constexpr Material kBicycleFrame{semantic::kBicycle, 0.3F, 0.05F, 0, 0, 0, 0};
+inline constexpr Material kRailing{semantic::kFence, 0.5F, 0.03F, 0, 0, 0, 0};
+inline constexpr Material kWire{semantic::kOtherObject, 0.3F, 0.1F, 0, 0, 0, 0};
+inline constexpr Material kMesh{semantic::kOtherObject, 0.4F, 0.1F, 4.0F, 0, 0, 0};
+inline constexpr Material kPram{semantic::kPerson, 0.25F, 0.05F, 0, 0, 0.01F, 0};
 inline constexpr Material kEgoRoof{semantic::kOutlier, 0.3F, 0.1F, 0, 0, 0, 0};
 }  // namespace materials
 

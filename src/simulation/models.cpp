@@ -167,7 +167,8 @@ Model vehicle_model(Kind kind, const Size& size, Random& random) {
   return model;
 }
 
-Model pedestrian_model(const Size& size, std::uint64_t seed, double phase, double stride) {
+Model pedestrian_model(const Size& size, std::uint64_t seed, double phase, double stride,
+                       bool pushes_pram) {
   Random random(seed);
   const double h = size.height, w = size.width / 2;
   const Material& top = random.chance(0.4) ? materials::kDarkCloth : materials::kBrightCloth;
@@ -184,6 +185,14 @@ Model pedestrian_model(const Size& size, std::uint64_t seed, double phase, doubl
   model.push_back(ball(materials::kSkin, 0.02, 0, 0.93 * h, 0.1, 0.085, 0.075 * h));
   if (bag)
     model.push_back(block(materials::kDarkCloth, -0.3, -0.12, -0.15, 0.15, 0.55 * h, 0.8 * h));
+  if (pushes_pram) {
+    model.push_back(block(materials::kPram, 0.55, 1.25, -0.22, 0.22, 0.35, 0.75));
+    model.push_back(block(materials::kPram, 0.55, 0.85, -0.2, 0.2, 0.75, 1.05));
+    model.push_back(block(materials::kPram, 0.35, 0.55, -0.2, 0.2, 0.92, 0.96));
+    for (const double x : {0.65, 1.15}) {
+      model.push_back(block(materials::kPram, x - 0.1, x + 0.1, -0.25, 0.25, 0.02, 0.22));
+    }
+  }
   return model;
 }
 

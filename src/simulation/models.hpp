@@ -24,7 +24,8 @@ Size random_size(Kind kind, Random& random);
 /// Vehicles do not change their shape.
 Model vehicle_model(Kind kind, const Size& size, Random& random);
 /// People do: `phase` is the angle of the gait or of the pedals, `stride` its amplitude, 0 to 1.
-Model pedestrian_model(const Size& size, std::uint64_t seed, double phase, double stride);
+Model pedestrian_model(const Size& size, std::uint64_t seed, double phase, double stride,
+                       bool pushes_pram = false);
 Model cyclist_model(const Size& size, std::uint64_t seed, double phase);
 
 Model tree_model(double height, double crown_radius, double clear_height, Random& random);
@@ -44,6 +45,14 @@ Model bridge_model(double span, double width, double clearance);
 /// A roof on four posts.
 Model shelter_model(double length, double width, double height);
 Model furniture_model(Random& random);
+/// Thin things.
+Model bicycle_model();
+Model railing_model(double length, double height, Random& random);
+Model paling_model(double length, double height, Random& random);
+/// A wire along x between two poles at its ends; they are not part of it.
+Model wire_model(double length, double height, Random& random);
+Model sign_model(Random& random);
+Model trolley_model(Random& random);
 
 /// Parts of buildings from inside. A ceiling or a floor between two heights (m).
 Model slab_model(double length, double width, double bottom, double top);

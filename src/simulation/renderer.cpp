@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "simulation/materials.hpp"
 #include "simulation/random.hpp"
 
 namespace dynains::simulation {
@@ -77,10 +78,12 @@ void look_through_window(const Primitive& primitive, std::uint64_t salt, Vec3 di
 
 }  // namespace
 
-void Renderer::start(const BeamTable& beams, float max_range, std::uint64_t seed) {
+void Renderer::start(const BeamTable& beams, float max_range, std::uint64_t seed,
+                     float glass_passes) {
   beams_ = &beams;
   max_range_ = max_range;
   seed_ = seed;
+  glass_passes_ = glass_passes;
   drawn_.clear();
   order_.clear();
   hits_.assign(beams.size(), Hit{max_range, kNothing, 0});
@@ -133,6 +136,7 @@ void Renderer::draw_slots(const Drawn& drawn, std::uint32_t index, std::size_t b
   const Primitive& primitive = drawn.primitive;
   const bool porous = primitive.material->density > 0;
   const bool windows = primitive.material->window_spacing > 0;
+  const bool pane = glass_passes_ > 0 && primitive.material == &materials::kGlass;
   const float near = order_[index].first;
   for (std::size_t slot = begin; slot < end; ++slot) {
     Hit& hit = hits_[slot];
@@ -140,6 +144,7 @@ void Renderer::draw_slots(const Drawn& drawn, std::uint32_t index, std::size_t b
     const Vec3 direction = beams_->direction(slot);
     const Interval interval = intersect(primitive, {}, direction);
     if (interval.empty() || interval.leave <= 0) continue;
+    if (pane && unit_float(mix(~seed_ ^ drawn.salt, slot)) < glass_passes_) continue;
     float range = interval.enter, loss = 0;
     if (porous) {
       range = porous_hit(primitive, drawn.salt, direction, std::max(range, 0.0F),

@@ -28,8 +28,9 @@ class Renderer {
     float extra_loss = 0;            ///< chance of no return at all: glass
   };
 
-  /// Forgets the last scan; every beam can see as far as `max_range`.
-  void start(const BeamTable& beams, float max_range, std::uint64_t seed);
+  /// Forgets the last scan; every beam can see as far as `max_range`. A share of the beams passes
+  /// through the panes of vehicles.
+  void start(const BeamTable& beams, float max_range, std::uint64_t seed, float glass_passes = 0);
   /// Takes note of a primitive, unless it is out of reach.
   void add(const Primitive& primitive, std::uint32_t object, std::uint64_t salt);
   /// Finds the nearest primitive of every beam; random numbers depend on seed, beam and salt only.
@@ -48,6 +49,7 @@ class Renderer {
   const BeamTable* beams_ = nullptr;
   float max_range_ = 0;
   std::uint64_t seed_ = 0;
+  float glass_passes_ = 0;
   std::vector<Drawn> drawn_;
   std::vector<std::pair<float, std::uint32_t>> order_;
   std::vector<Hit> hits_;

@@ -1,6 +1,7 @@
 #include "dynains/simulation/simulator.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -9,6 +10,7 @@
 #include "simulation/materials.hpp"
 #include "simulation/random.hpp"
 #include "simulation/renderer.hpp"
+#include "simulation/returns.hpp"
 #include "simulation/world.hpp"
 
 namespace dynains::simulation {
@@ -17,7 +19,8 @@ namespace {
 constexpr double kMovingSpeed = 0.5;  // m/s
 constexpr double kMovedWay = 0.5;     // m
 constexpr double kSecondsOfDay = 86400.0;
-constexpr int kShutterParts = 40;  // of a scan, each measured at one time
+constexpr int kShutterParts = 40;     // of a scan, each measured at one time
+constexpr int kFewShutterParts = 12;  // of a scan whose points have no times
 
 /// Rotation Rz(yaw) Ry(pitch) Rx(roll) in doubles, without vector instructions that might differ.
 Eigen::Matrix3d rotation(double yaw, double pitch, double roll) {
@@ -100,11 +103,13 @@ class Simulator::Implementation {
  public:
   explicit Implementation(const Config& config)
       : config_((config.validate(), config)),
-        model_(sensor_model(config.sensor)),
-        world_(build_world(config)) {
+        model_(sensor_model(config.sensor, config.seed)),
+        world_(build_world(config)),
+        returns_(config_, model_) {
     if (config_.max_range > 0) model_.max_range = config_.max_range;
     if (config_.sensor_height > 0) model_.height = config_.sensor_height;
     play();
+    draw_drift();
   }
 
   const Config& config() const { return config_; }
@@ -122,24 +127,25 @@ class Simulator::Implementation {
       measure_part(index, moment, {0, model_.columns}, scan_seed, result);
       return result;
     }
-    for (int part = 0; part < kShutterParts; ++part) {
-      const BeamTable::Columns columns{model_.columns * part / kShutterParts,
-                                       model_.columns * (part + 1) / kShutterParts};
+    const bool has_times = config_.deskewed <= 0;
+    const int parts = has_times ? kShutterParts : kFewShutterParts;
+    for (int part = 0; part < parts; ++part) {
+      const BeamTable::Columns columns{model_.columns * part / parts,
+                                       model_.columns * (part + 1) / parts};
       const double share = 0.5 * (columns.first + columns.last) / model_.columns;
       const Moment now = between(moment, moments_.at(index + 1), share);
+      const std::size_t first = result.labels.size();
       measure_part(index, now, columns, mix(scan_seed, static_cast<std::uint64_t>(part)), result);
-      result.times.resize(result.labels.size(), static_cast<float>(now.time - moment.time));
+      if (has_times) {
+        result.times.resize(result.labels.size(), static_cast<float>(now.time - moment.time));
+      } else {
+        deskew(moment, now, first, result);
+      }
     }
     return result;
   }
 
  private:
-  /// Seed for a purpose, which differs from day to day.
-  std::uint64_t seed_of_day(std::uint64_t purpose) const {
-    const std::uint64_t seed = mix(config_.seed, purpose);
-    return config_.day == 0 ? seed : mix(seed, static_cast<std::uint64_t>(config_.day));
-  }
-
   /// Where everything is at one time.
   struct Moment {
     double time = 0;
@@ -147,6 +153,33 @@ class Simulator::Implementation {
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
     std::vector<ObjectPose> objects;
   };
+
+  /// Moves the points from number `first` on from the frame at `now` to that at `stamp`, as far as
+  /// the motion is known.
+  void deskew(const Moment& stamp, const Moment& now, std::size_t first,
+              SimulatedScan& scan) const {
+    const Eigen::Isometry3d step = product(inverse(stamp.T_world_sensor), now.T_world_sensor);
+    const double share = config_.deskewed;
+    // Turns within a scan are small.
+    const Eigen::Matrix3d turn =
+        rotation(share * 0.5 * (step(1, 0) - step(0, 1)), share * 0.5 * (step(0, 2) - step(2, 0)),
+                 share * 0.5 * (step(2, 1) - step(1, 2)));
+    const Rigid T_stamp_now =
+        to_rigid(isometry(turn, share * step(0, 3), share * step(1, 3), share * step(2, 3)));
+    for (std::size_t i = first; i < scan.labels.size(); ++i) {
+      float* point = &scan.xyzi[4 * i];
+      const Vec3 p = T_stamp_now * Vec3{point[0], point[1], point[2]};
+      point[0] = p.x;
+      point[1] = p.y;
+      point[2] = p.z;
+    }
+  }
+
+  /// Seed for a purpose, which differs from day to day.
+  std::uint64_t seed_of_day(std::uint64_t purpose) const {
+    const std::uint64_t seed = mix(config_.seed, purpose);
+    return config_.day == 0 ? seed : mix(seed, static_cast<std::uint64_t>(config_.day));
+  }
 
   /// Moves everybody through the whole sequence.
   void play() {
@@ -263,11 +296,25 @@ class Simulator::Implementation {
     Random random(mix(seed_of_day(600), index));
     double offset[3], turn[3];
     for (double& v : offset) v = config_.pose_noise_translation * random.normal();
+    for (int i = 0; i < 3; ++i) offset[i] += drift_.at(index)[static_cast<std::size_t>(i)];
     for (double& v : turn) v = config_.pose_noise_rotation * kPi / 180 * random.normal();
     Eigen::Isometry3d result =
         product(pose, isometry(rotation(turn[0], turn[1], turn[2]), 0, 0, 0));
     for (int i = 0; i < 3; ++i) result(i, 3) = pose(i, 3) + offset[i];
     return result;
+  }
+
+  /// A random walk of the written poses with the way.
+  void draw_drift() {
+    Random random(seed_of_day(700));
+    drift_.assign(moments_.size(), {0, 0, 0});
+    for (std::size_t i = 1; i < moments_.size(); ++i) {
+      const double way = norm(moments_[i].ego.at.position - moments_[i - 1].ego.at.position);
+      for (std::size_t k = 0; k < 3; ++k) {
+        drift_[i][k] =
+            drift_[i - 1][k] + config_.pose_drift * std::sqrt(way / 100) * random.normal();
+      }
+    }
   }
 
   void draw_world(const Moment& moment, std::vector<ObjectState>& states) {
@@ -276,13 +323,14 @@ class Simulator::Implementation {
     const Rigid turn{transposed(T_world_sensor.rotation), {}};
     const Vec3 origin = T_world_sensor.translation;
     const Vec2 centre{moment.T_world_sensor(0, 3), moment.T_world_sensor(1, 3)};
-    world_.statics.visit_near(centre, model_.max_range,
-                              [&](const Primitive& primitive, std::uint64_t salt) {
-                                // Subtract first: large coordinates must not cost precision.
-                                Primitive near = primitive;
-                                near.centre = near.centre - origin;
-                                renderer_.add(transformed(turn, near), kNoObject, mix(salt, 1));
-                              });
+    world_.statics.visit_near(
+        centre, model_.max_range,
+        [&](const Primitive& primitive, std::uint64_t salt, std::uint32_t model) {
+          // Subtract first: large coordinates must not cost precision.
+          Primitive near = primitive;
+          near.centre = near.centre - origin;
+          renderer_.add(transformed(turn, near), static_object(model), mix(salt, 1));
+        });
     for (const ObjectPose& pose : moment.objects) {
       const Object& object = world_.traffic.objects[pose.object];
       const bool person = object.kind == Kind::kPedestrian;
@@ -297,7 +345,7 @@ class Simulator::Implementation {
       Model shape;
       if (person) {
         const double stride = std::min(1.0, pose.speed / 1.0);
-        shape = pedestrian_model(object.size, object.seed, pose.phase, stride);
+        shape = pedestrian_model(object.size, object.seed, pose.phase, stride, object.pushes_pram);
       } else if (object.kind == Kind::kCyclist) {
         shape = cyclist_model(object.size, object.seed, pose.phase);
       }
@@ -310,7 +358,7 @@ class Simulator::Implementation {
       renderer_.add(make_primitive(Shape::kBox, materials::kEgoRoof,
                                    {-0.6F, 0, -static_cast<float>(model_.height) + 0.75F},
                                    {1.9F, 0.85F, 0.55F}, rotation_z(-model_.yaw)),
-                    kNoObject, 3);
+                    kStatic, 3);
     }
     renderer_.draw();
   }
@@ -323,16 +371,6 @@ class Simulator::Implementation {
                                                               : pose.speed > kMovingSpeed;
     return moving ? moving_label(kind) : resting_label(kind);
   }
-
-  /// Place where a beam meets the ground or an object.
-  struct Surface {
-    float range = 0;   ///< m
-    float cosine = 1;  ///< of the angle of incidence
-    float loss = 0;    ///< probability of no return, besides that of weak returns
-    float reflectivity = 0;
-    float roughness = 0;  ///< m, added to the noise of the range
-    std::uint32_t label = 0;
-  };
 
   /// The ground nearer than `reach` (m) along a beam from `origin`; needs a prepared terrain.
   std::optional<Surface> ground_surface(Vec3 origin, Vec3 world_direction, float reach) {
@@ -360,7 +398,9 @@ class Simulator::Implementation {
     Surface surface;
     surface.range = hit.range;
     surface.label = material.label;
-    if (drawn.object != kNoObject) {
+    if (drawn.object >= kStatic) {
+      surface.label |= (drawn.object - kStatic) << 16;
+    } else {
       const ObjectState& state = objects[drawn.object];
       surface.label = state.label | (state.instance << 16);
     }
@@ -378,29 +418,36 @@ class Simulator::Implementation {
   void measure_part(std::size_t index, const Moment& moment, BeamTable::Columns columns,
                     std::uint64_t seed, SimulatedScan& scan) {
     beams_.fill(model_, config_.seed, index, columns);
-    renderer_.start(beams_, static_cast<float>(model_.max_range), seed);
+    renderer_.start(beams_, static_cast<float>(model_.max_range), seed,
+                    static_cast<float>(config_.glass_passes));
     std::vector<ObjectState> states;
     draw_world(moment, states);
-    measure(moment, states, scan, seed);
+    measure(moment, states, columns, scan, seed);
     if (columns.first == 0) scan.objects = std::move(states);
   }
 
   /// Turns surfaces into points with noise, losses and labels.
-  void measure(const Moment& moment, const std::vector<ObjectState>& objects, SimulatedScan& scan,
-               std::uint64_t scan_seed) {
+  void measure(const Moment& moment, const std::vector<ObjectState>& objects,
+               BeamTable::Columns columns, SimulatedScan& scan, std::uint64_t scan_seed) {
     const Rigid T_world_sensor = to_rigid(moment.T_world_sensor);
     const Vec3 origin = T_world_sensor.translation;
     world_.terrain.prepare({moment.T_world_sensor(0, 3), moment.T_world_sensor(1, 3)},
                            model_.max_range);
     scan.xyzi.reserve(scan.xyzi.size() + beams_.size() * 4);
     scan.labels.reserve(scan.labels.size() + beams_.size());
-    for (const std::uint32_t slot : beams_.measured_order()) {
+    surfaces_.clear();
+    const std::vector<std::uint32_t>& order = beams_.measured_order();
+    for (const std::uint32_t slot : order) {
       const Renderer::Hit& hit = renderer_.hits()[slot];
       const Vec3 direction = beams_.direction(slot);
       const Vec3 world_direction = T_world_sensor.rotation * direction;
       std::optional<Surface> surface = ground_surface(origin, world_direction, hit.range);
       if (!surface) surface = object_surface(hit, direction, objects);
-      if (surface) add_point(*surface, direction, mix(scan_seed, slot), scan);
+      surfaces_.push_back(surface);
+    }
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      const std::optional<Surface> seen = returns_.at(surfaces_, beams_, i, columns, scan_seed);
+      if (seen) add_point(*seen, beams_.direction(order[i]), mix(scan_seed, order[i]), scan);
     }
   }
 
@@ -439,15 +486,24 @@ class Simulator::Implementation {
     return (1 / norm(beside)) * beside;
   }
 
-  static constexpr std::uint32_t kNoObject = 0xffffffff;
+  /// Number of a static thing for the renderer: kStatic and its instance id, or kStatic alone.
+  std::uint32_t static_object(std::uint32_t model) const {
+    constexpr std::uint32_t kIds = kFirstChange - kFirstStatic;
+    return config_.static_instances ? kStatic + kFirstStatic + model % kIds : kStatic;
+  }
+
+  static constexpr std::uint32_t kStatic = 0x80000000;
 
   Config config_;
   SensorModel model_;
   World world_;
   std::vector<Moment> moments_;
   std::vector<bool> ever_moved_;
+  std::vector<std::array<double, 3>> drift_;  ///< m, of each moment
   BeamTable beams_;
   Renderer renderer_;
+  Returns returns_;
+  Surfaces surfaces_;
 };
 
 Simulator::Simulator(const Config& config)

@@ -23,6 +23,7 @@ struct Object {
   Model model;                 ///< empty for people, whose shape changes
   std::uint16_t label = 0;     ///< SemanticKITTI class; 0: that of its kind
   std::uint32_t instance = 0;  ///< 0: by its number
+  bool pushes_pram = false;    ///< people only
 };
 
 /// Pose of an object at the time of one scan.

@@ -10,6 +10,7 @@ void StaticGeometry::add(const Rigid& T_world_model, const Model& model) {
   for (const Primitive& primitive : model) {
     const auto index = static_cast<std::uint32_t>(primitives_.size());
     primitives_.push_back(transformed(T_world_model, primitive));
+    model_of_.push_back(models_);
     const Vec3 c = primitives_.back().centre;
     const double ix = std::floor(static_cast<double>(c.x) / kCell);
     const double iy = std::floor(static_cast<double>(c.y) / kCell);
@@ -21,6 +22,7 @@ void StaticGeometry::add(const Rigid& T_world_model, const Model& model) {
     if (found.second) cells_.push_back({{(ix + 0.5) * kCell, (iy + 0.5) * kCell}, {}});
     cells_[found.first->second].members.push_back(index);
   }
+  ++models_;
 }
 
 namespace {
@@ -47,6 +49,8 @@ World build_scene(const Config& config) {
       return forest(config);
     case Scene::kGarage:
       return garage(config);
+    case Scene::kMixed:
+      return mixed(config);
     case Scene::kUrban:
     case Scene::kStatic:
       break;

@@ -16,13 +16,15 @@ namespace dynains::simulation {
 class StaticGeometry {
  public:
   void add(const Rigid& T_world_model, const Model& model);
-  /// Calls `visitor(primitive, salt)` for the cells within `radius` of `centre`.
+  /// Calls `visitor(primitive, salt, model)` for the cells within `radius` of `centre`; `model`
+  /// counts the calls of add().
   template <class Visitor>
   void visit_near(Vec2 centre, double radius, Visitor&& visitor) const {
     for (const Cell& cell : cells_) {
       const Vec2 d = cell.centre - centre;
       if (norm(d) > radius + kCell) continue;
-      for (const std::uint32_t i : cell.members) visitor(primitives_[i], std::uint64_t{i});
+      for (const std::uint32_t i : cell.members)
+        visitor(primitives_[i], std::uint64_t{i}, model_of_[i]);
     }
   }
 
@@ -33,6 +35,8 @@ class StaticGeometry {
     std::vector<std::uint32_t> members;
   };
   std::vector<Primitive> primitives_;
+  std::vector<std::uint32_t> model_of_;
+  std::uint32_t models_ = 0;
   std::vector<Cell> cells_;
   std::unordered_map<std::uint64_t, std::size_t> cell_of_;
 };

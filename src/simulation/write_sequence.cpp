@@ -55,7 +55,7 @@ bool write_sequence(Simulator& simulator, const std::filesystem::path& folder,
   write_calib(folder / "calib.txt", Tr);
   write_times(folder / "times.txt", times);
   const Config& config = simulator.config();
-  if (config.pose_noise_translation > 0 || config.pose_noise_rotation > 0) {
+  if (config.has_pose_errors()) {
     write_poses(folder / "poses_true.txt", true_poses);
   }
   write_poses(folder / "poses.txt", poses);

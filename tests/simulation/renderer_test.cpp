@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "simulation/materials.hpp"
 #include "simulation/random.hpp"
 #include "support/catch.hpp"
 
@@ -101,9 +102,28 @@ TEST_CASE("porous shapes let the expected share of beams through") {
         Approx(std::exp(-2.0)).margin(0.02));
 }
 
+TEST_CASE("a share of the beams passes through panes of vehicles, none through other things") {
+  BeamTable beams;
+  beams.fill(sensor_model(Sensor::kOs0_128), 1, 0);
+  const auto met = [&beams](const Material& material, float passes) {
+    Renderer renderer;
+    renderer.start(beams, 100, 1, passes);
+    renderer.add(make_primitive(Shape::kBox, material, {10, 0, 0}, {0.5F, 5, 5}), 1, 5);
+    renderer.draw();
+    return std::count_if(renderer.hits().begin(), renderer.hits().end(),
+                         [](const auto& hit) { return hit.drawn != Renderer::kNothing; });
+  };
+  const auto all = static_cast<double>(met(materials::kGlass, 0));
+  REQUIRE(all > 5000);
+  CHECK(static_cast<double>(met(materials::kGlass, 0.4F)) / all == Approx(0.6).margin(0.03));
+  CHECK(met(materials::kGlass, 1) == 0);
+  CHECK(static_cast<double>(met(materials::kBrightPaint, 1)) == all);
+}
+
 TEST_CASE("beam patterns have the right size and never repeat") {
-  for (const Sensor sensor : {Sensor::kHdl64, Sensor::kVlp16, Sensor::kHdl32, Sensor::kOs1_64,
-                              Sensor::kOs0_128, Sensor::kPandar64, Sensor::kLivox}) {
+  for (const Sensor sensor :
+       {Sensor::kHdl64, Sensor::kVlp16, Sensor::kHdl32, Sensor::kOs1_64, Sensor::kOs0_128,
+        Sensor::kPandar64, Sensor::kLivox, Sensor::kMid360, Sensor::kRaster, Sensor::kRings}) {
     const SensorModel model = sensor_model(sensor);
     BeamTable first, second;
     first.fill(model, 1, 0);

@@ -87,7 +87,8 @@ TEST_CASE("every scene gives points with every sensor") {
       const SimulatedScan scan = simulator.scan(0);
       INFO(scene_names()[static_cast<std::size_t>(scene)]
            << ' ' << sensor_names()[static_cast<std::size_t>(sensor)]);
-      CHECK(scan.labels.size() > 5000);
+      // Most beams of the dome end in the sky.
+      CHECK(scan.labels.size() > (static_cast<Sensor>(sensor) == Sensor::kMid360 ? 2000 : 5000));
       CHECK(scan.xyzi.size() == 4 * scan.labels.size());
       std::size_t bad = 0;
       for (std::size_t i = 0; i < scan.labels.size(); ++i) {

@@ -24,6 +24,7 @@ enum class Scene {
   kHall,        ///< indoor hall: walls, ceiling, columns, stands, a glass front, people
   kForest,      ///< track through a wood, walkers and cyclists
   kGarage,      ///< one storey of a multi-storey car park: low ceiling, columns, walls
+  kMixed,       ///< a street whose every part is drawn from the seed
 };
 
 /// Beam pattern with a typical mounting height and range.
@@ -35,6 +36,9 @@ enum class Sensor {
   kOs0_128,   ///< 128 beams, +-45 deg, 1024 columns
   kPandar64,  ///< 64 beams, dense around the horizon, 1800 columns; forward is -y
   kLivox,     ///< non-repetitive rosette, 70 deg cone forward, 30,000 beams a scan
+  kMid360,    ///< non-repetitive, all around from -7 to 52 deg, 20,000 beams a scan
+  kRaster,    ///< solid state: 126 rows of 630 beams, 120 by 25 deg forward
+  kRings,     ///< 16 to 128 beams around, all numbers drawn from the seed
 };
 
 /// Rule for the moving labels of an object.
@@ -100,6 +104,14 @@ struct Config {
   double direction_noise = 0.0;  ///< deg, standard deviation of the direction of a beam
   bool ego_points = false;       ///< whether scans contain the roof below the sensor
   bool rolling_shutter = false;  ///< whether the beams of a scan are spread over 1 / rate seconds
+  double deskewed = 0.0;         ///< share of the motion within a scan that is corrected
+  double beam_bias = 0.0;        ///< m, standard deviation of the constant error of each beam
+  double divergence = 0.0;       ///< deg, full width of a beam
+  double glass_passes = 0.0;     ///< share of the beams that pass through panes of vehicles
+  double packet_loss = 0.0;      ///< share of lost packets, each of some columns
+  double pose_drift = 0.0;  ///< m after 100 m, standard deviation per axis of the written poses
+  double clutter = 0.0;     ///< ratio of thin things and furniture to the usual number
+  bool static_instances = false;  ///< whether static things have instance ids, too
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
@@ -143,8 +155,33 @@ struct Config {
     visitor(Parameter{"ego_points", self.ego_points, Bounds{}, "",
                       "whether scans contain points on the roof of the ego vehicle"});
     visitor(Parameter{"rolling_shutter", self.rolling_shutter, Bounds{}, "",
-                      "whether sensor and objects move while a scan is measured; needs a --format "
-                      "with times of points"});
+                      "whether sensor and objects move while a scan is measured; needs deskewed or "
+                      "a --format with times of points"});
+    visitor(
+        Parameter{"deskewed", self.deskewed, closed(0, 1), "",
+                  "share of the sensor's motion within a scan that is corrected; 0: points stay "
+                  "in the frames of their times"});
+    visitor(Parameter{"beam_bias", self.beam_bias, closed(0, 1), "m",
+                      "standard deviation of the constant range error of each beam"});
+    visitor(Parameter{"divergence", self.divergence, closed(0, 2), "deg",
+                      "full width of a beam: mixed returns at edges"});
+    visitor(Parameter{"glass_passes", self.glass_passes, closed(0, 1), "",
+                      "share of the beams that pass through the panes of vehicles"});
+    visitor(Parameter{"packet_loss", self.packet_loss, closed(0, 1), "",
+                      "share of the packets of some columns that are lost"});
+    visitor(
+        Parameter{"pose_drift", self.pose_drift, closed(0, 10), "m",
+                  "standard deviation of the drift of the written poses after 100 m, per axis"});
+    visitor(Parameter{"clutter", self.clutter, closed(0, 4), "",
+                      "ratio of thin things (wires, railings, signs, bicycles, trolleys) to their "
+                      "usual number in a street"});
+    visitor(Parameter{"static_instances", self.static_instances, Bounds{}, "",
+                      "whether buildings, poles, fences and plants have instance ids, too"});
+  }
+
+  /// Whether the written poses differ from the true ones.
+  bool has_pose_errors() const {
+    return pose_noise_translation > 0 || pose_noise_rotation > 0 || pose_drift > 0;
   }
 
   /// Throws ConfigError for a field out of bounds.

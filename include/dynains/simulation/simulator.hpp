@@ -13,6 +13,8 @@ namespace dynains::simulation {
 
 /// Least instance id of the changes of a place from day to day.
 inline constexpr std::uint32_t kFirstChange = 0xF000;
+/// Least instance id of static things, with Config::static_instances.
+inline constexpr std::uint32_t kFirstStatic = 0x4000;
 
 /// True state of an object at the time of a scan.
 struct ObjectState {

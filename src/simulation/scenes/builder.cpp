@@ -1,8 +1,14 @@
 #include "simulation/scenes/builder.hpp"
 
 #include "simulation/materials.hpp"
+#include "simulation/scenes/clutter.hpp"
 
 namespace dynains::simulation {
+
+World Builder::finish() {
+  if (config_.clutter > 0) add_clutter(*this, config_.clutter);
+  return std::move(world_);
+}
 
 int Builder::count(double usual) const {
   return lively() ? static_cast<int>(std::lround(usual * config_.traffic)) : 0;

@@ -37,7 +37,8 @@ class Builder {
   Traffic& traffic() { return world_.traffic; }
   Terrain& terrain() { return world_.terrain; }
   const Street& street(std::size_t i) const { return world_.terrain.streets()[i]; }
-  World finish() { return std::move(world_); }
+  World finish();
+  const Config& config() const { return config_; }
   bool lively() const { return config_.scene != Scene::kStatic && config_.traffic > 0; }
   double traffic_scale() const { return std::max(config_.traffic, 1e-3); }
   int count(double usual) const;

@@ -14,6 +14,7 @@ World canopy(const Config& config);
 World hill(const Config& config);
 World car_park(const Config& config);
 World garage(const Config& config);
+World mixed(const Config& config);
 World hall(const Config& config);
 World forest(const Config& config);
 

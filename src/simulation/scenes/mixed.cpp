@@ -1,0 +1,149 @@
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "simulation/scenes/lanes.hpp"
+#include "simulation/scenes/scenes.hpp"
+
+namespace dynains::simulation {
+namespace {
+
+constexpr double kUsualSpeed = 8;      // m/s, of a vehicle
+constexpr double kWalkingSpeed = 1.2;  // m/s
+
+bool is_carried(const Config& config) { return config.gait != Gait::kVehicle; }
+
+double usual_speed(const Config& config) {
+  return is_carried(config) ? kWalkingSpeed : kUsualSpeed;
+}
+
+TerrainConfig draw_ground(Random& random) {
+  TerrainConfig ground;
+  ground.hill_slope = random.chance(0.3) ? random.uniform(0.03, 0.09) : random.uniform(0, 0.03);
+  ground.hill_length = random.uniform(50, 400);
+  const double rough = random.unit();
+  ground.roughness = 0.005 + 0.15 * rough * rough;
+  ground.kerb = random.chance(0.2) ? 0 : random.uniform(0.03, 0.2);
+  return ground;
+}
+
+Frontage draw_frontage(Random& random) {
+  Frontage look;
+  look.buildings = random.uniform(0.1, 1.0);
+  look.setback = random.uniform(0.2, 8);
+  look.height = random.uniform(4, 20);
+  look.street_trees = random.uniform(0, 0.8);
+  look.poles = random.uniform(0.2, 0.9);
+  look.gardens = random.uniform(0.3, 1);
+  look.parked = random.uniform(0, 1);
+  look.furniture = random.uniform(0.2, 0.9);
+  return look;
+}
+
+/// Cars beside one another, at an angle to the street.
+void park_angled(Builder& builder, Random& random, const Street& street, int side) {
+  const double angle = random.uniform(40, 90) * kPi / 180, occupied = random.uniform(0.4, 1);
+  const double pitch = random.uniform(2.3, 2.8) / std::sin(angle);
+  const bool nose_in = random.chance(0.6);
+  for (double s = random.uniform(3, 8); s < street.centre.length() - 4; s += pitch) {
+    const double deep = 2.4 * std::sin(angle) + 0.9 * std::cos(angle) + 0.15 * random.unit();
+    const bool used = random.chance(occupied), odd = random.chance(0.1);
+    Waypoint at = street.centre.beside(s, side * (street.half_width - deep));
+    at.heading += (side > 0 ? angle : -angle) + (nose_in != odd ? 0 : kPi) + 0.04 * random.normal();
+    // Not on a side street.
+    bool crossing = false;
+    for (const Street& other : builder.terrain().streets()) {
+      if (&other == &street) continue;
+      const Waypoint q = other.centre.at(other.centre.nearest(at.position));
+      crossing = crossing || norm(q.position - at.position) < other.half_width + 6;
+    }
+    const Kind kind = builder.parked_kind();
+    if (used && !crossing && kind != Kind::kTruck) builder.park(at, kind);
+  }
+}
+
+/// The sensor on the street, or on the pavement if it is carried.
+void add_sensor(Builder& builder, const StreetLanes& lanes, double speed) {
+  if (!is_carried(builder.config())) {
+    builder.ego(lanes.forward, kBefore, speed);
+    return;
+  }
+  const Street& street = builder.street(0);
+  const std::size_t way = builder.lane(street, -(street.half_width + 0.6 * street.pavement));
+  builder.ego(way, kBefore, speed);
+  Traffic& traffic = builder.traffic();
+  traffic.objects[0].size = {0.8, 0.6, 0.9};
+  traffic.drivers[0].rest_gap = 0.3;
+  traffic.drivers[0].foresight = 0.2;
+}
+
+/// A vehicle that stays ahead, and traffic both ways.
+void add_vehicles(Builder& builder, Random& random, const StreetLanes& lanes, double speed) {
+  Traffic& traffic = builder.traffic();
+  if (!is_carried(builder.config()) && random.chance(0.4)) {
+    const Kind kind = random.chance(0.8) ? Kind::kCar : Kind::kVan;
+    traffic.add_driver(traffic.add_object(kind), lanes.forward, kBefore + random.uniform(9, 40),
+                       traffic.drivers[0].cruise);
+  }
+  const double trucks = random.uniform(0, 0.2), buses = random.uniform(0, 0.1),
+               cyclists = random.uniform(0, 0.25);
+  const double spacing = random.uniform(20, 80), oncoming_spacing = random.uniform(14, 70);
+  const double oncoming_speed = speed * random.uniform(0.6, 1.4);
+  fill_lane(builder, lanes.forward, spacing, speed, trucks, buses, cyclists);
+  fill_lane(builder, lanes.backward, oncoming_spacing, oncoming_speed, trucks, buses, cyclists);
+}
+
+}  // namespace
+
+World mixed(const Config& config) {
+  const double speed = usual_speed(config), way = travel(config, speed);
+  Random random(mix(config.seed, 77));
+  const double length = 2 * kBefore + way + 30;
+  const double width = random.unit();
+  const bool angled = width > 0.65;
+  const double half_width = angled         ? random.uniform(8.6, 9.8)
+                            : width < 0.25 ? random.uniform(3.4, 4.2)
+                                           : random.uniform(5.6, 7.2);
+  const double pavement = is_carried(config) ? random.uniform(3, 6) : random.uniform(0.5, 5);
+  const double gentle = random.uniform(0.001, 0.015), corners = random.uniform(0, 0.4);
+  std::vector<Street> streets;
+  streets.push_back(
+      {route_of_bends(winding(random, length, gentle, corners, 17)), half_width, pavement});
+  const auto crossings = random.chance(0.6)
+                             ? add_side_streets(random, streets, random.uniform(50, 140), 4.0)
+                             : std::vector<Crossing>();
+  const TerrainConfig ground = draw_ground(random);
+  Builder builder(config, ground, std::move(streets));
+  const Street& street = builder.street(0);
+  const StreetLanes lanes{builder.lane(street, -kLaneHalf), builder.lane(street, kLaneHalf)};
+  add_sensor(builder, lanes, speed);
+  const double end = kBefore + way + 40;
+  Frontage look = draw_frontage(random);
+  if (builder.lively()) {
+    if (half_width > 5 && !angled) {
+      add_parking_moves(builder, kBefore - 20, end, builder.count(random.uniform(0, 10)), 7);
+    }
+    add_vehicles(builder, random, lanes, kUsualSpeed * random.uniform(0.5, 1.4));
+  }
+  for (const int side : {-1, 1}) {
+    if (random.chance(0.4)) look = draw_frontage(random);
+    if (angled && random.chance(0.75)) {
+      park_angled(builder, random, street, side);
+      look.parked = 0;
+    }
+    builder.furnish(street, side, look);
+  }
+  for (const Crossing& crossing : crossings) {
+    for (const int side : {-1, 1}) builder.furnish(builder.street(crossing.street), side, look);
+  }
+  if (random.chance(0.4)) {
+    const double trees = random.uniform(2, 40), bushes = random.uniform(4, 60);
+    builder.plant(street, half_width + pavement + 1, 50, trees, bushes);
+  }
+  builder.pavement_walkers(street, kBefore - 40, end,
+                           builder.count(random.uniform(0.02, 0.25) * (end - kBefore + 40)));
+  builder.crossing_walkers(street, kBefore - 10, end, builder.count(random.uniform(0, 6)));
+  return builder.finish();
+}
+
+}  // namespace dynains::simulation
