@@ -110,7 +110,11 @@ class Collector {
     if (!scan_.causes.empty() && scan_.causes[k] < kCauseCount) point.cause = scan_.causes[k];
     if (!scan_.truth.empty()) {
       const evaluation::Truth truth = truth_(scan_.truth[k]);
-      if (truth == evaluation::Truth::kStatic) point.truth = ViewTruth::kStatic;
+      const bool is_ground =
+          evaluation::is_ground_class(evaluation::semantic_class(scan_.truth[k]));
+      if (truth == evaluation::Truth::kStatic) {
+        point.truth = is_ground ? ViewTruth::kStatic : ViewTruth::kStaticObject;
+      }
       if (truth == evaluation::Truth::kDynamic) point.truth = ViewTruth::kMoving;
     }
     return point;
@@ -122,7 +126,9 @@ class Collector {
     ++counts.by_cause[point.cause];
     const bool is_moving = point.label == ViewLabel::kMoving;
     counts.moving += is_moving ? 1U : 0U;
-    counts.lost += is_moving && point.truth == ViewTruth::kStatic ? 1U : 0U;
+    const bool stands =
+        point.truth == ViewTruth::kStatic || point.truth == ViewTruth::kStaticObject;
+    counts.lost += is_moving && stands ? 1U : 0U;
     counts.missed +=
         point.label == ViewLabel::kStatic && point.truth == ViewTruth::kMoving ? 1U : 0U;
   }

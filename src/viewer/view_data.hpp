@@ -17,7 +17,12 @@ namespace dynains::viewer {
 enum class ViewLabel : std::uint8_t { kNotJudged = 0, kStatic = 1, kMoving = 2 };
 
 /// Ground truth of a point.
-enum class ViewTruth : std::uint8_t { kUnknown = 0, kStatic = 1, kMoving = 2 };
+enum class ViewTruth : std::uint8_t {
+  kUnknown = 0,
+  kStatic = 1,  ///< ground
+  kMoving = 2,
+  kStaticObject = 3,  ///< anything else that stands
+};
 
 /// A measured point with its verdict.
 struct ViewPoint {

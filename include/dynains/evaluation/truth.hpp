@@ -56,6 +56,12 @@ class TruthClasses {
   Unlabeled unlabeled_;
 };
 
+/// Whether a class of SemanticKITTI is ground: road, parking, sidewalk, other ground, lane
+/// markings, terrain.
+constexpr bool is_ground_class(std::uint16_t id) {
+  return id == 40 || id == 44 || id == 48 || id == 49 || id == 60 || id == 72;
+}
+
 /// SemanticKITTI name of a class id; "class <id>" for an unknown id.
 std::string semantic_class_name(std::uint16_t id);
 

@@ -51,8 +51,9 @@ function summaryOf(description, points) {
 
 function errorOf(point) {
   if (point.truth === 0) return 'not known';
-  const truth = LABELS[point.truth];
-  if (point.truth === point.label) return `${truth}: right`;
+  const moves = point.truth === 2;
+  const truth = LABELS[moves ? 2 : 1];
+  if (moves === (point.label === 2)) return `${truth}: right`;
   return truth + (point.label === 2 ? ': lost static point' : ': missed moving point');
 }
 
@@ -111,8 +112,9 @@ function legendOf(mode, description) {
     3: [['ground', [0.55, 0.47, 0.38]], ['static', [0.45, 0.62, 0.80]],
       ['moving', [0.95, 0.25, 0.20]]],
     4: [['belief 0', [0.16, 0.23, 0.55]], ['belief 1', [0.98, 0.86, 0.30]]],
-    6: [['right static', [0.6, 0.6, 0.6]], ['removed moving', [0.12, 0.63, 0.24]],
-      ['lost static', [1, 0.55, 0]], ['missed moving', [0.86, 0.08, 0.12]],
+    6: [['ground', [0.6, 0.6, 0.6]], ['static object', [0.45, 0.62, 0.80]],
+      ['lost static object', [0.95, 0.30, 0.90]], ['lost ground', [1, 0.55, 0]],
+      ['removed moving', [0.12, 0.63, 0.24]], ['missed moving', [0.86, 0.08, 0.12]],
       ['no ground truth', [0.25, 0.27, 0.32]]],
   }[mode] ?? [];
   const parts = entries.flatMap(([name, colour]) => [swatch(colour), name + '  ']);

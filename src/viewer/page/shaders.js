@@ -37,8 +37,12 @@ vec3 colour_of(float height) {
   if (colour_mode == 5) return cause_colours[min(bytes.z, 16u)];
   if (colour_mode == 6) {
     if (truth == 0u) return vec3(0.25, 0.27, 0.32);
-    if (label == 2u) return truth == 2u ? vec3(0.12, 0.63, 0.24) : vec3(1.0, 0.55, 0.0);
-    return truth == 2u ? vec3(0.86, 0.08, 0.12) : grey;
+    if (label == 2u) {
+      return truth == 2u ? vec3(0.12, 0.63, 0.24)
+        : truth == 3u ? vec3(0.95, 0.30, 0.90) : vec3(1.0, 0.55, 0.0);
+    }
+    return truth == 2u ? vec3(0.86, 0.08, 0.12)
+      : truth == 3u ? vec3(0.45, 0.62, 0.80) * (0.7 + 0.3 * clamp(t, 0.0, 1.0)) : grey;
   }
   return label == 2u ? by_instance : grey;
 }
