@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "dynains/evaluation/map_protocol.hpp"
+#include "dynains/evaluation/object_protocol.hpp"
 #include "dynains/evaluation/point_protocol.hpp"
 #include "dynains/evaluation/voxel_protocol.hpp"
 #include "threads/background.hpp"
@@ -39,6 +40,8 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
   VoxelProtocol voxels({config.voxel, config.min_range, config.max_range, config.truth},
                        estimates.size());
   PointProtocol points({config.min_range, config.point_max_range, config.truth}, estimates.size());
+  ObjectProtocol objects({config.min_range, config.point_max_range, config.truth},
+                         estimates.size());
   std::vector<MapProtocol> map_protocols;
   map_protocols.reserve(maps.size());
   for (const MapEstimate& map : maps) {
@@ -59,6 +62,7 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
     result.points += scan.size();
     others.begin([&] {
       points.add(scan);
+      objects.add(scan);
       for (MapProtocol& map : map_protocols) map.add(scan);
       if (result.errors) result.errors->add(scan);
     });
@@ -71,22 +75,36 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
     for (MapProtocol& map : map_protocols) map.resolve(scan);
   }
 
-  result.rows.push_back({"identity", voxels.score(VoxelProtocol::kIdentity), points.identity(),
-                         std::nullopt, std::nullopt});
+  result.rows.push_back({"identity",
+                         voxels.score(VoxelProtocol::kIdentity),
+                         points.identity(),
+                         objects.identity(),
+                         {},
+                         std::nullopt,
+                         std::nullopt});
   std::vector<std::future<VoxelScore>> scores;
   for (std::size_t row = VoxelProtocol::kOracle;
        row < VoxelProtocol::kFirstEstimate + estimates.size(); ++row) {
     scores.push_back(std::async(std::launch::async, [&voxels, row] { return voxels.score(row); }));
   }
-  result.rows.push_back(
-      {"oracle", scores.front().get(), points.oracle(), std::nullopt, std::nullopt});
+  result.rows.push_back({"oracle",
+                         scores.front().get(),
+                         points.oracle(),
+                         objects.oracle(),
+                         {},
+                         std::nullopt,
+                         std::nullopt});
   for (std::size_t e = 0; e < estimates.size(); ++e) {
-    result.rows.push_back(
-        {estimates[e], scores[e + 1].get(), points.score(e), std::nullopt, std::nullopt});
+    result.rows.push_back({estimates[e], scores[e + 1].get(), points.score(e), objects.score(e),
+                           objects.by_class(e), std::nullopt, std::nullopt});
   }
   for (std::size_t m = 0; m < maps.size(); ++m) {
-    result.rows.push_back({maps[m].name, map_protocols[m].voxel_score(voxels),
-                           map_protocols[m].point_score(), map_protocols[m].foreign_points(),
+    result.rows.push_back({maps[m].name,
+                           map_protocols[m].voxel_score(voxels),
+                           map_protocols[m].point_score(),
+                           std::nullopt,
+                           {},
+                           map_protocols[m].foreign_points(),
                            maps[m].points_world.size()});
   }
   return result;

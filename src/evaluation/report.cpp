@@ -46,6 +46,41 @@ Json to_json(const PointScore& score) {
           {"dynamic_removed", score.dynamic_removed}};
 }
 
+Json to_json(const ObjectScore& score) {
+  return {{"static_kept_percent", json_number(score.kept())},
+          {"dynamic_removed_percent", json_number(score.removed())},
+          {"static_total", score.static_total},
+          {"static_kept", score.static_kept},
+          {"dynamic_total", score.dynamic_total},
+          {"dynamic_removed", score.dynamic_removed}};
+}
+
+Json to_json(const std::vector<ClassScore>& classes) {
+  Json json = Json::array();
+  for (const ClassScore& one : classes) {
+    json.push_back({{"class", one.id},
+                    {"name", semantic_class_name(one.id)},
+                    {"truth", name(one.truth)},
+                    {"objects", one.objects},
+                    {"objects_right", one.right},
+                    {"points", one.points},
+                    {"points_kept", one.points_kept},
+                    {"kept_percent", json_number(percent(one.points_kept, one.points))}});
+  }
+  return json;
+}
+
+/// Objects of one estimate by class.
+std::string objects_to_table(const EvaluationRow& row) {
+  TextTable table({"class", "truth", "objects", "right", "right %", "points", "points kept %"});
+  for (const ClassScore& one : row.object_classes) {
+    table.add({semantic_class_name(one.id), name(one.truth), std::to_string(one.objects),
+               std::to_string(one.right), format_number(percent(one.right, one.objects), 1),
+               std::to_string(one.points), format_number(percent(one.points_kept, one.points), 2)});
+  }
+  return "\nobjects, " + row.name + '\n' + table.to_string();
+}
+
 Json to_json(const ErrorAnalysis& errors) {
   Json json;
   json["by_class"] = Json::array();
@@ -137,17 +172,25 @@ std::string to_table(const Evaluation& evaluation) {
        << '\n'
        << "PR RR F1: voxels of " << format_number(config.voxel, 3) << " m, "
        << range_text(config.min_range, config.max_range)
-       << "; SA DA AA HA: " << range_text(config.min_range, config.point_max_range) << '\n';
-  TextTable table({"", "PR %", "RR %", "F1", "SA %", "DA %", "AA %", "HA %"});
+       << "; SA DA AA HA, objects: " << range_text(config.min_range, config.point_max_range)
+       << "\nkept, left: instances of " << ObjectProtocol::kMinPoints
+       << " and more points; static ones that keep 90 % (people left out), moving ones that lose "
+          "95 %\n";
+  TextTable table({"", "PR %", "RR %", "F1", "SA %", "DA %", "AA %", "HA %", "kept %", "left %"});
   for (const EvaluationRow& row : evaluation.rows) {
     table.add({row.name, format_number(row.voxels.preservation_rate(), 3),
                format_number(row.voxels.rejection_rate(), 3), format_number(row.voxels.f1(), 4),
                format_number(row.points.static_accuracy(), 3),
                format_number(row.points.dynamic_accuracy(), 3),
                format_number(row.points.associated_accuracy(), 3),
-               format_number(row.points.harmonic_accuracy(), 3)});
+               format_number(row.points.harmonic_accuracy(), 3),
+               row.objects ? format_number(row.objects->kept(), 1) : "-",
+               row.objects ? format_number(row.objects->removed(), 1) : "-"});
   }
   text << table.to_string();
+  for (const EvaluationRow& row : evaluation.rows) {
+    if (!row.object_classes.empty()) text << objects_to_table(row);
+  }
   for (const EvaluationRow& row : evaluation.rows) {
     if (!row.foreign_points || *row.foreign_points == 0) continue;
     text << row.name << ": " << *row.foreign_points << " of " << *row.map_points
@@ -218,6 +261,8 @@ std::string to_json(const Evaluation& evaluation) {
   for (const EvaluationRow& row : evaluation.rows) {
     Json json = {
         {"name", row.name}, {"voxels", to_json(row.voxels)}, {"points", to_json(row.points)}};
+    if (row.objects) json["objects"] = to_json(*row.objects);
+    if (!row.object_classes.empty()) json["object_classes"] = to_json(row.object_classes);
     if (row.map_points) json["map_points"] = *row.map_points;
     if (row.foreign_points) json["foreign_points"] = *row.foreign_points;
     rows.push_back(json);
@@ -235,7 +280,8 @@ std::string to_csv(const Evaluation& evaluation) {
   std::ostringstream text;
   text << "name,pr,rr,f1,sa,da,aa,ha,static_voxels,static_voxels_preserved,dynamic_voxels,"
           "dynamic_voxels_preserved,static_points,static_points_kept,dynamic_points,"
-          "dynamic_points_removed\n";
+          "dynamic_points_removed,static_objects,static_objects_kept,dynamic_objects,"
+          "dynamic_objects_removed\n";
   for (const EvaluationRow& row : evaluation.rows) {
     text << csv_field(row.name);
     for (const double value :
@@ -249,6 +295,12 @@ std::string to_csv(const Evaluation& evaluation) {
           row.voxels.dynamic_preserved, row.points.static_total, row.points.static_kept,
           row.points.dynamic_total, row.points.dynamic_removed}) {
       text << ',' << value;
+    }
+    if (row.objects) {
+      text << ',' << row.objects->static_total << ',' << row.objects->static_kept << ','
+           << row.objects->dynamic_total << ',' << row.objects->dynamic_removed;
+    } else {
+      text << ",,,,";
     }
     text << '\n';
   }

@@ -101,6 +101,10 @@ py::dict to_dict(const evaluation::EvaluationRow& row) {
   result["DA"] = row.points.dynamic_accuracy();
   result["AA"] = row.points.associated_accuracy();
   result["HA"] = row.points.harmonic_accuracy();
+  if (row.objects) {
+    result["kept"] = row.objects->kept();
+    result["left"] = row.objects->removed();
+  }
   return result;
 }
 
@@ -148,7 +152,8 @@ void bind_evaluation(py::module_& module) {
       "metres, sensor frame. poses: (4, 4), T_world_sensor. truth: (N,) labels of SemanticKITTI, "
       "or bool (True moves). kept: (N,) bool, for example is_static(verdict.labels).\n"
       "Returns {'identity': row, 'oracle': row, 'estimate': row}. A row has PR, RR (percent) and "
-      "F1 (0 to 1) after ERASOR, SA, DA, AA and HA (percent) after KTH's DynamicMap_Benchmark; "
+      "F1 (0 to 1) after ERASOR, SA, DA, AA and HA (percent) after KTH's DynamicMap_Benchmark, "
+      "kept and left (percent of the static and moving objects, by instance id; nan without); "
       "NaN is a share of nothing.\n"
       "dynamic_classes: ids and ranges. unlabeled: 'ignore' or 'static' (classes 0 and 1).\n"
       "Settings by name:\n";

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynains/evaluation/error_analysis.hpp"
+#include "dynains/evaluation/object_protocol.hpp"
 #include "dynains/evaluation/scan.hpp"
 #include "dynains/evaluation/scores.hpp"
 #include "dynains/evaluation/truth.hpp"
@@ -57,6 +58,8 @@ struct EvaluationRow {
   std::string name;
   VoxelScore voxels;
   PointScore points;
+  std::optional<ObjectScore> objects;      ///< not of maps
+  std::vector<ClassScore> object_classes;  ///< of estimates only
   /// Maps only: number of points without a measured point nearby (MapProtocol::foreign_points()),
   /// and number of all points.
   std::optional<std::uint64_t> foreign_points;
