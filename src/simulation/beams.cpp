@@ -92,7 +92,7 @@ SensorModel sensor_model(Sensor sensor, std::uint64_t seed) {
       model.lasers = 6;
       break;
     case Sensor::kMid360:
-      set(20000, 0.6, 50, 0.3, 25);
+      set(20000, 0.6, 70, 0.3, 40);
       model.dome = true;
       model.lasers = 4;
       break;

@@ -104,6 +104,9 @@ Config random_world(std::uint64_t seed) {
   config.clutter = random.uniform(0.2, 1.6);
   config.foliage = random.chance(0.5) ? Foliage::kOpen : Foliage::kSolid;
   if (random.chance(0.2)) config.halt = random.uniform(1, 4);
+  // Not every recording has the far points, or the ground that the vehicle hides.
+  if (random.chance(0.3)) config.max_range = random.uniform(40, 90);
+  config.ego_points = random.chance(0.5) && config.sensor_height > 1.5;
   config.static_instances = true;
   return config;
 }

@@ -1,0 +1,258 @@
+// Trials of the remover on random worlds, in process: each world is simulated, judged and scored.
+// A setting is a list of parameters of the remover, `name=value,name=value`; `default` changes
+// none. All settings judge the same scans.
+//   world_trials [--from SEED] [--worlds N] [--scans N] [--set name=value,...]
+//                [--csv FILE] [--list] [SETTING...]
+// --set changes every world (parameters of `dynains simulate`); --list prints the worlds only.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <exception>
+#include <fstream>
+#include <iomanip>
+#include <iostream>
+#include <map>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/evaluation/evaluate.hpp"
+#include "dynains/remover.hpp"
+#include "dynains/simulation/random_world.hpp"
+#include "dynains/simulation/simulator.hpp"
+#include "program/parameter_flags.hpp"
+
+using namespace dynains;
+
+namespace {
+
+using Scans = std::vector<simulation::SimulatedScan>;
+
+struct Options {
+  std::uint64_t from = 1;
+  std::uint64_t worlds = 10;
+  int scans = 60;
+  std::string set;
+  std::string csv;
+  bool list = false;
+  std::vector<std::string> settings;
+};
+
+/// The parameters of `list`, such as "tau-contested=0.97,beta=2".
+program::ParameterValues values_of(const std::string& list) {
+  program::ParameterValues values;
+  if (list == "default") return values;
+  std::istringstream stream(list);
+  for (std::string item; std::getline(stream, item, ',');) {
+    const std::size_t equals = item.find('=');
+    if (equals == std::string::npos) {
+      throw ConfigError("\"" + item + "\": expected name=value");
+    }
+    const std::string name = program::flag_name(item.substr(0, equals));
+    values.set(name, item.substr(equals + 1), name);
+  }
+  return values;
+}
+
+simulation::Config world_of(std::uint64_t seed, const Options& options) {
+  simulation::Config config = simulation::random_world(seed);
+  config.scans = options.scans;
+  values_of(options.set).apply(config);
+  config.validate();
+  return config;
+}
+
+std::string name_of(const simulation::Config& config) {
+  std::ostringstream text;
+  text << config.seed << ' ' << simulation::scene_names()[static_cast<std::size_t>(config.scene)]
+       << ' ' << simulation::sensor_names()[static_cast<std::size_t>(config.sensor)] << ' '
+       << simulation::kGaitNames[static_cast<std::size_t>(config.gait)] << std::setprecision(2)
+       << ' ' << config.sensor_height << "m " << config.ego_speed << "m/s " << config.rate << "Hz";
+  return text.str();
+}
+
+Scans scans_of(const simulation::Config& config) {
+  simulation::Simulator simulator(config);
+  Scans scans;
+  for (std::size_t i = 0; i < simulator.size(); ++i) scans.push_back(simulator.scan(i));
+  return scans;
+}
+
+/// For each scan and point, bit `bit` is set if the point is static.
+using InMap = std::vector<std::vector<std::uint8_t>>;
+
+void judge(const Scans& scans, const DynaInsRemover::Config& config, unsigned bit, InMap& in_map) {
+  const auto keep = [&](const ScanVerdict& verdict) {
+    std::vector<std::uint8_t>& bits = in_map.at(verdict.scan);
+    for (std::size_t i = 0; i < bits.size(); ++i) {
+      if (is_static(verdict.labels[i])) bits[i] |= static_cast<std::uint8_t>(1U << bit);
+    }
+  };
+  DynaInsRemover remover(config);
+  for (const simulation::SimulatedScan& scan : scans) {
+    const RawPoints<float> points{scan.xyzi.data(), scan.labels.size(), 4};
+    const FrameResult frame = remover.push(points, scan.T_world_sensor_noisy, scan.time);
+    if (frame.finished) keep(*frame.finished);
+  }
+  remover.flush(keep);
+}
+
+evaluation::Evaluation evaluate(const Scans& scans, const InMap& in_map,
+                                const std::vector<std::string>& names) {
+  const auto source = [&](std::size_t i, evaluation::LabelledScan& scan) {
+    if (i == scans.size()) return false;
+    scan.xyz = scans[i].xyzi.data();
+    scan.stride = 4;
+    scan.T_world_sensor = scans[i].T_world_sensor;
+    scan.time = scans[i].time;
+    scan.truth = scans[i].labels;
+    scan.in_map = in_map[i];
+    return true;
+  };
+  evaluation::EvaluationConfig config;
+  config.max_range = 50.0;
+  config.analyses_errors = false;
+  return evaluation::evaluate(source, names, {}, config);
+}
+
+/// Scores of one setting in one world; NaN where a world has none.
+using Scores = std::vector<double>;
+
+const std::vector<std::string>& score_names() {
+  static const std::vector<std::string> names = {"F1",   "SA",     "DA",    "objects", "movers",
+                                                 "cars", "fences", "poles", "plants",  "walls"};
+  return names;
+}
+
+double points_kept(const evaluation::EvaluationRow& row,
+                   const std::vector<std::uint16_t>& classes) {
+  std::uint64_t points = 0, kept = 0;
+  for (const evaluation::ClassScore& one : row.object_classes) {
+    if (std::find(classes.begin(), classes.end(), one.id) == classes.end()) continue;
+    points += one.points;
+    kept += one.points_kept;
+  }
+  return evaluation::percent(kept, points);
+}
+
+Scores scores_of(const evaluation::EvaluationRow& row) {
+  return {100 * row.voxels.f1(),     row.points.static_accuracy(), row.points.dynamic_accuracy(),
+          row.objects->kept(),       row.objects->removed(),       points_kept(row, {10, 13, 18}),
+          points_kept(row, {51}),    points_kept(row, {80, 81}),   points_kept(row, {70, 71}),
+          points_kept(row, {50, 52})};
+}
+
+void print_row(const std::string& name, const Scores& scores) {
+  std::cout << "| " << name << " |" << std::fixed << std::setprecision(2);
+  for (const double score : scores) {
+    if (std::isfinite(score)) {
+      std::cout << ' ' << score << " |";
+    } else {
+      std::cout << " - |";
+    }
+  }
+  std::cout << std::endl;
+}
+
+void print_header(const std::string& first) {
+  std::cout << "| " << first << " |";
+  for (const std::string& name : score_names()) std::cout << ' ' << name << " |";
+  std::cout << "\n|---|";
+  for (std::size_t i = 0; i < score_names().size(); ++i) std::cout << "---:|";
+  std::cout << std::endl;
+}
+
+/// Lowest decile, median and mean over the worlds that have the score.
+void print_summary(const std::string& setting, const std::vector<Scores>& worlds) {
+  Scores decile, median, mean;
+  for (std::size_t k = 0; k < score_names().size(); ++k) {
+    std::vector<double> values;
+    for (const Scores& scores : worlds) {
+      if (std::isfinite(scores[k])) values.push_back(scores[k]);
+    }
+    std::sort(values.begin(), values.end());
+    double sum = 0;
+    for (const double value : values) sum += value;
+    const auto quantile = [&values](double share) {
+      if (values.empty()) return std::nan("");
+      return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+    };
+    decile.push_back(quantile(0.1));
+    median.push_back(quantile(0.5));
+    mean.push_back(sum / static_cast<double>(values.size()));
+  }
+  print_row(setting + ", lowest decile", decile);
+  print_row(setting + ", median", median);
+  print_row(setting + ", mean", mean);
+}
+
+Options parse(int argc, char** argv) {
+  Options options;
+  CLI::App app("Trials of the remover on random worlds");
+  app.add_option("--from", options.from, "first seed [1]");
+  app.add_option("--worlds", options.worlds, "number of seeds [10]");
+  app.add_option("--scans", options.scans, "scans of each world [60]");
+  app.add_option("--set", options.set, "name=value,...: parameters of every world");
+  app.add_option("--csv", options.csv, "file for the scores of each world and setting");
+  app.add_flag("--list", options.list, "print the worlds only");
+  app.add_option("SETTING", options.settings, "name=value,...: parameters of the remover");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    std::exit(app.exit(error));
+  }
+  if (options.settings.empty()) options.settings = {"default"};
+  return options;
+}
+
+void run(const Options& options) {
+  const std::vector<std::string>& settings = options.settings;
+  std::vector<DynaInsRemover::Config> configs(settings.size());
+  for (std::size_t s = 0; s < settings.size(); ++s) values_of(settings[s]).apply(configs[s]);
+  std::ofstream csv;
+  if (!options.csv.empty()) csv.open(options.csv);
+  std::map<std::string, std::vector<Scores>> worlds;
+  if (!options.list) print_header("world");
+  for (std::uint64_t seed = options.from; seed < options.from + options.worlds; ++seed) {
+    const simulation::Config world = world_of(seed, options);
+    if (options.list) {
+      std::cout << name_of(world) << '\n';
+      continue;
+    }
+    const Scans scans = scans_of(world);
+    InMap in_map;
+    for (const auto& scan : scans) in_map.emplace_back(scan.labels.size(), std::uint8_t{0});
+    for (std::size_t s = 0; s < settings.size(); ++s) {
+      judge(scans, configs[s], static_cast<unsigned>(s), in_map);
+    }
+    const evaluation::Evaluation result = evaluate(scans, in_map, settings);
+    for (std::size_t s = 0; s < settings.size(); ++s) {
+      const Scores scores = scores_of(result.rows[2 + s]);
+      print_row(settings.size() == 1 ? name_of(world) : name_of(world) + ": " + settings[s],
+                scores);
+      worlds[settings[s]].push_back(scores);
+      csv << seed << ',' << settings[s];
+      for (const double score : scores) csv << ',' << score;
+      csv << std::endl;
+    }
+  }
+  if (options.list) return;
+  std::cout << '\n';
+  print_header("over " + std::to_string(options.worlds) + " worlds");
+  for (const std::string& setting : settings) print_summary(setting, worlds[setting]);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    run(parse(argc, argv));
+  } catch (const std::exception& error) {
+    std::cerr << "world_trials: " << error.what() << '\n';
+    return 1;
+  }
+  return 0;
+}
