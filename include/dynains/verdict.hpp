@@ -106,7 +106,8 @@ struct PoseResidual {
 
 /// Result of one push.
 struct FrameResult {
-  /// Verdict on the pushed scan by this and earlier scans; final if latency() is 0.
+  /// Verdict on the pushed scan by this and earlier scans; final if latency() is 0. Its spans are
+  /// empty if RemoverConfig::newest_verdict is false.
   ScanVerdict newest;
   std::optional<ScanVerdict> finished;  ///< final verdict on the scan latency() pushes ago
   StageTimes times;

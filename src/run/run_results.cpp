@@ -151,7 +151,6 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
 }
 
 void RunResults::take_newest(const ScanVerdict& verdict) {
-  points_ += verdict.labels.size();
   if (online_labels_) online_labels_->write(recording_.name(range_.first + verdict.scan), verdict);
 }
 
@@ -180,6 +179,7 @@ void RunResults::finish() { writing_.wait(); }
 void RunResults::write_final(const RecordedScan& scan, const ScanVerdict& verdict) {
   final_labels_.take(verdict);
   final_labels_.write(recording_.name(range_.first + verdict.scan));
+  points_ += verdict.labels.size();
   labels_.add(verdict.labels);
   add_scan(scan, verdict);
   overview_.add(scan, verdict);

@@ -402,6 +402,31 @@ TEST_CASE("votes: the more windows must agree, the less is removed") {
   CHECK(dynamic_points(looser.back()).empty());
 }
 
+TEST_CASE("without the verdict on the newest scan, final verdicts and the map are the same") {
+  const std::vector<Scan> scans = drive(oncoming(), 12, 5.0);
+  Config config = GENERATE(Config::paper(), Config());
+  config.evidence.lookahead_scans = 4;
+  const Run with = run(config, scans);
+  config.newest_verdict = false;
+  DynaInsRemover remover(config);
+  std::vector<Verdict> finals;
+  const auto take = [&](const ScanVerdict& verdict) { finals.emplace_back(verdict); };
+  for (const Scan& scan : scans) {
+    const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
+    CHECK(frame.newest.labels.empty());
+    CHECK(frame.newest.causes.empty());
+    CHECK(frame.newest.time == scan.time);
+    if (frame.finished) take(*frame.finished);
+  }
+  remover.flush(take);
+  REQUIRE(finals.size() == scans.size());
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    CHECK(finals[s].labels == with.final[s].labels);
+    CHECK(finals[s].instances == with.final[s].instances);
+  }
+  CHECK(remover.map().size() > 0);
+}
+
 TEST_CASE("instance ids continue from scan to scan, however soon a verdict is final") {
   const std::vector<Scan> scans = drive(oncoming(), 10, 5.0);
   Config config;

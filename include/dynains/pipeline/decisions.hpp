@@ -63,9 +63,9 @@ class ScanDecision {
 
   /// Adds the newest scan and assigns an instance id to each of its clusters.
   virtual void observe(ScanRing& scans, const ScanWindow& window, StageTimer& timer) = 0;
-  /// Writes the verdict on the newest scan, without evidence of later scans, after
-  /// VerdictWriter::begin().
-  virtual void judge_newest(const ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) = 0;
+  /// Judges the newest scan, without evidence of later scans, and writes the verdict after
+  /// VerdictWriter::begin(). Without a writer, only later verdicts use the judgement.
+  virtual void judge_newest(const ScanSlot& newest, VerdictWriter* writer, StageTimer& timer) = 0;
   /// Writes the final verdict on `scan`, with keep flags, after VerdictWriter::begin().
   virtual void judge_final(const ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) = 0;
 
@@ -108,8 +108,9 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
     timer.measure(&StageTimes::verdict, [&] { record(scans, window.first_scan()); });
   }
 
-  void judge_newest(const ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) override {
-    timer.measure(&StageTimes::verdict, [&] { writer.write_windows(newest, 1); });
+  void judge_newest(const ScanSlot& newest, VerdictWriter* writer, StageTimer& timer) override {
+    if (writer == nullptr) return;
+    timer.measure(&StageTimes::verdict, [&] { writer->write_windows(newest, 1); });
   }
 
   void judge_final(const ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) override {
@@ -216,9 +217,10 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
     });
   }
 
-  void judge_newest(const ScanSlot& newest, VerdictWriter& writer, StageTimer& timer) override {
+  void judge_newest(const ScanSlot& newest, VerdictWriter* writer, StageTimer& timer) override {
     const EvidenceVerdict verdict = judge(newest, false, timer);
-    timer.measure(&StageTimes::verdict, [&] { writer.write_groups(newest, verdict); });
+    if (writer == nullptr) return;
+    timer.measure(&StageTimes::verdict, [&] { writer->write_groups(newest, verdict); });
   }
   void judge_final(const ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) override {
     const EvidenceVerdict verdict = judge(scan, true, timer);

@@ -203,11 +203,12 @@ FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Eigen::Isometry
 
 template <class Stages>
 void Pipeline<Stages>::judge_newest(ScanSlot& newest, StageTimer& timer) {
+  VerdictWriter* const writer = config_.newest_verdict ? &newest_verdict_ : nullptr;
   timer.measure(&StageTimes::verdict, [&] {
     newest.assign_instances(window_.newest_cluster_of());
-    newest_verdict_.begin(newest);
+    if (writer != nullptr) writer->begin(newest);
   });
-  decision_->judge_newest(newest, newest_verdict_, timer);
+  decision_->judge_newest(newest, writer, timer);
 }
 
 /// The scan becomes final even if the map throws, because the ring reuses its slot.
@@ -289,7 +290,7 @@ void Pipeline<Stages>::reserve_like(const CloudView& example, std::size_t scans)
   // Margin: scans of one sensor differ slightly in size.
   const std::size_t points = example.size() + example.size() / 16;
   for (std::size_t i = 0; i < std::min(scans, scans_.capacity()); ++i) scans_[i].touch(points);
-  newest_verdict_.touch(points);
+  if (config_.newest_verdict) newest_verdict_.touch(points);
   final_verdict_.touch(points);
   const WarmUp<Pipeline> warm_up(*this);
   // After four scans, each kind of decision has compared a scan with a reference.
