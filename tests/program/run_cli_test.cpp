@@ -1057,11 +1057,12 @@ TEST_CASE("a run without ground truth leaves a picture, also without a map") {
   REQUIRE(fixture.run({"--build-map", "false"}).code == 0);
   const std::string png = read_text(fixture.out + "/overview.png");
   CHECK(png.substr(1, 3) == "PNG");
-  // The sensor stands: three panels of 100 m at 8 pixels per m, below each other.
+  // The sensor stands: three panels of 100 m at 8 pixels per m, below each other, each with a title
+  // of 22 pixels, and a scale bar below.
   const auto side = [&](std::size_t byte) {
     return 256 * static_cast<unsigned char>(png[byte + 2]) +
            static_cast<unsigned char>(png[byte + 3]);
   };
   CHECK(side(16) == 800);
-  CHECK(side(20) == 3 * 800 + 2 * 8);
+  CHECK(side(20) == 3 * (800 + 22) + 2 * 8 + 22);
 }
