@@ -30,7 +30,7 @@ class RefinedOdometry {
   Result push(const Points& scan, double time) {
     // 1. Register all points.
     const Eigen::Isometry3d T_odometry = odometry_(scan);
-    const Eigen::Isometry3d T_last_newest = T_odometry_last_.inverse() * T_odometry;
+    Eigen::Isometry3d T_last_newest = T_odometry_last_.inverse() * T_odometry;
     T_odometry_last_ = T_odometry;
 
     // 2. Push the scan with the pose of the odometry, not with the refined one: the remover
@@ -38,8 +38,8 @@ class RefinedOdometry {
     const dynains::FrameResult frame = remover_.push(scan, T_odometry, time);
 
     // 3. Take the corrected motion. Without common surfaces there is none.
-    T_world_last_ = T_world_last_ *
-                    (frame.pose_residual ? frame.pose_residual->T_previous_newest : T_last_newest);
+    if (frame.pose_residual) T_last_newest = frame.pose_residual->T_previous_newest;
+    T_world_last_ = T_world_last_ * T_last_newest;
     return {T_world_last_, frame};
   }
 

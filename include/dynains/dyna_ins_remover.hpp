@@ -9,6 +9,7 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/pipeline/pipeline.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/remover.hpp"
 
 namespace dynains {
@@ -79,7 +80,7 @@ void BasicDynaInsRemover<Stages>::reserve(std::size_t points) {
 
 template <class Stages>
 FrameResult BasicDynaInsRemover<Stages>::push_view(const detail::CloudView& cloud,
-                                                   const Eigen::Isometry3d& T_world_sensor,
+                                                   const Pose& T_world_sensor,
                                                    std::optional<double> time) {
   const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
   return pipeline().push(cloud, T_world_sensor, time.value_or(pipeline().next_time()));

@@ -96,7 +96,7 @@ class FreeSpaceEvidence {
   /// An inexact pose is corrected for the comparisons. If the static surfaces of the scan do not
   /// fit to those of earlier scans, it is not compared with them. `instance_of`: by non-ground
   /// point of `split`, instance below `instance_count`, or kNoCluster.
-  void observe(std::uint64_t scan, std::uint64_t epoch, const Eigen::Isometry3d& T_world_sensor,
+  void observe(std::uint64_t scan, std::uint64_t epoch, const Pose& T_world_sensor,
                const GroundSplit& split, Span<const std::uint32_t> instance_of,
                std::size_t instance_count) {
     if (scan == 0) forget_scans();
@@ -140,7 +140,7 @@ class FreeSpaceEvidence {
   /// Visibility of the first `count` points (m; padded for packs) from the newest reference, which
   /// is one of the last `reference_step` scans. The result is valid until the next call.
   const detail::Visibility& test_visibility(const PointBuffer& points, std::size_t count,
-                                            const Eigen::Isometry3d& T_world_points) {
+                                            const Pose& T_world_points) {
     return references_.test(points, count, pose_correction_.corrected(T_world_points),
                             references_.newest());
   }
@@ -156,7 +156,7 @@ class FreeSpaceEvidence {
   using Instance = TrackedInstances::Instance;
   struct Record {
     std::uint64_t epoch = ReferenceScan::kNoEpoch;
-    Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+    Pose T_world_sensor = Pose::Identity();
     std::uint64_t since_begin = 0;  // scans since the first scan of the epoch
     InstanceEvidence evidence;
     std::vector<DynamicOccupancyGrid::Count> counted;  // by supervoxel
@@ -169,7 +169,7 @@ class FreeSpaceEvidence {
     for (Record& record : records_) record.epoch = ReferenceScan::kNoEpoch;
   }
 
-  void begin_epoch(std::uint64_t scan, const Eigen::Isometry3d& T_world_sensor) {
+  void begin_epoch(std::uint64_t scan, const Pose& T_world_sensor) {
     T_origin_world_ = detail::inverted(T_world_sensor);
     ++epoch_;
     epoch_begin_ = scan;
@@ -178,9 +178,8 @@ class FreeSpaceEvidence {
   }
 
   // The pose of a scan for comparisons. Begins an epoch if the scan does not fit to earlier ones.
-  Eigen::Isometry3d correct(std::uint64_t scan, const Eigen::Isometry3d& T_world_sensor,
-                            const GroundSplit& split) {
-    const Eigen::Isometry3d T_corrected = pose_correction_.correct(T_world_sensor, split);
+  Pose correct(std::uint64_t scan, const Pose& T_world_sensor, const GroundSplit& split) {
+    const Pose T_corrected = pose_correction_.correct(T_world_sensor, split);
     if (!pose_correction_.is_lost()) return T_corrected;
     begin_epoch(scan, T_world_sensor);
     return T_world_sensor;
@@ -376,7 +375,7 @@ class FreeSpaceEvidence {
   MovedGround moved_ground_;
   // The origin frame is the sensor frame of the first scan of the epoch. It is the frame of the
   // cells of tracks and of the dynamic occupancy grid, which thus do not depend on the world frame.
-  Eigen::Isometry3d T_origin_world_ = Eigen::Isometry3d::Identity();
+  Pose T_origin_world_ = Pose::Identity();
   std::uint64_t pushed_epoch_ = 0;  // epoch of the newest scan, as given to observe()
   std::uint64_t epoch_ = 0;         // number of the begun epochs
   std::uint64_t epoch_begin_ = 0;   // first scan of the epoch of the newest scan

@@ -1,4 +1,4 @@
-// Validation of poses, and operations on rigid transforms.
+// The pose type, validation of poses, and operations on rigid transforms.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -11,6 +11,11 @@
 
 namespace dynains {
 
+/// Rigid transform, T_target_source. It converts from and to Eigen::Isometry3d, whose alignment
+/// depends on the flags of the compiler. The layout of this type does not, so a program may use
+/// compiled components that were built with other flags.
+using Pose = Eigen::Transform<double, 3, Eigen::Isometry, Eigen::DontAlign>;
+
 /// Largest accepted deviation of an element of R^T R from identity. Text files round rotations.
 inline constexpr double kRotationTolerance = 1e-3;
 
@@ -20,11 +25,14 @@ inline constexpr double kMaxTranslation = 2.1e7;
 
 namespace detail {
 
+/// Without the alignment that depends on flags, as Pose.
+using Quaternion = Eigen::Quaternion<double, Eigen::DontAlign>;
+
 // These operations use coefficients instead of Eigen's expression templates, which compile slowly.
 
 /// T_a_c = T_a_b T_b_c.
-inline Eigen::Isometry3d composed(const Eigen::Isometry3d& T_a_b, const Eigen::Isometry3d& T_b_c) {
-  Eigen::Isometry3d T_a_c = T_a_b;
+inline Pose composed(const Pose& T_a_b, const Pose& T_b_c) {
+  Pose T_a_c = T_a_b;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 4; ++j) {
       T_a_c(i, j) =
@@ -48,8 +56,8 @@ inline Eigen::Matrix3d composed(const Eigen::Matrix3d& R_a_b, const Eigen::Matri
 }
 
 /// T_b_a, the inverse of the rigid transform T_a_b.
-inline Eigen::Isometry3d inverted(const Eigen::Isometry3d& T_a_b) {
-  Eigen::Isometry3d T_b_a = T_a_b;
+inline Pose inverted(const Pose& T_a_b) {
+  Pose T_b_a = T_a_b;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) T_b_a(i, j) = T_a_b(j, i);
     T_b_a(i, 3) =
@@ -59,8 +67,8 @@ inline Eigen::Isometry3d inverted(const Eigen::Isometry3d& T_a_b) {
 }
 
 /// T_a_b from T_a_c and R_b_c. Frames b and c have a common origin.
-inline Eigen::Isometry3d rotated(const Eigen::Isometry3d& T_a_c, const Eigen::Matrix3d& R_b_c) {
-  Eigen::Isometry3d T_a_b = T_a_c;
+inline Pose rotated(const Pose& T_a_c, const Eigen::Matrix3d& R_b_c) {
+  Pose T_a_b = T_a_c;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
       T_a_b(i, j) =
@@ -79,13 +87,13 @@ inline Eigen::Matrix3d transposed(const Eigen::Matrix3d& R) {
 }
 
 /// Distance between the origins of two poses, m.
-inline double distance(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
+inline double distance(const Pose& a, const Pose& b) {
   double squared = 0.0;
   for (int i = 0; i < 3; ++i) squared += (a(i, 3) - b(i, 3)) * (a(i, 3) - b(i, 3));
   return std::sqrt(squared);
 }
 
-inline bool is_finite(const Eigen::Isometry3d& T) {
+inline bool is_finite(const Pose& T) {
   for (int i = 0; i < 4; ++i) {
     for (int j = 0; j < 4; ++j) {
       if (!std::isfinite(T(i, j))) return false;
@@ -95,7 +103,7 @@ inline bool is_finite(const Eigen::Isometry3d& T) {
 }
 
 /// Largest deviation of an element of R^T R from identity. `T` must be finite.
-inline double rotation_error(const Eigen::Isometry3d& T) {
+inline double rotation_error(const Pose& T) {
   double largest = 0.0;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
@@ -106,7 +114,7 @@ inline double rotation_error(const Eigen::Isometry3d& T) {
   return largest;
 }
 
-inline double rotation_determinant(const Eigen::Isometry3d& T) {
+inline double rotation_determinant(const Pose& T) {
   return T(0, 0) * (T(1, 1) * T(2, 2) - T(1, 2) * T(2, 1)) -
          T(0, 1) * (T(1, 0) * T(2, 2) - T(1, 2) * T(2, 0)) +
          T(0, 2) * (T(1, 0) * T(2, 1) - T(1, 1) * T(2, 0));
@@ -116,7 +124,7 @@ inline double rotation_determinant(const Eigen::Isometry3d& T) {
 
 /// Throws PoseError unless `T` is finite, rigid and within kMaxTranslation. The message starts with
 /// `name`.
-inline void validate_pose(const std::string& name, const Eigen::Isometry3d& T) {
+inline void validate_pose(const std::string& name, const Pose& T) {
   if (!detail::is_finite(T)) throw PoseError(name + " has NaN or infinite entries");
   if (T(3, 0) != 0.0 || T(3, 1) != 0.0 || T(3, 2) != 0.0 || T(3, 3) != 1.0) {
     throw PoseError(name + " is no transform: its last row must be 0 0 0 1");
@@ -139,9 +147,9 @@ inline void validate_pose(const std::string& name, const Eigen::Isometry3d& T) {
 }
 
 /// `T` with an orthonormalized rotation.
-inline Eigen::Isometry3d orthonormalized(const Eigen::Isometry3d& T) {
-  Eigen::Isometry3d result = T;
-  result.linear() = Eigen::Quaterniond(T.linear()).normalized().toRotationMatrix();
+inline Pose orthonormalized(const Pose& T) {
+  Pose result = T;
+  result.linear() = detail::Quaternion(T.linear()).normalized().toRotationMatrix();
   return result;
 }
 

@@ -18,6 +18,7 @@
 #include "dynains/occupancy_descriptor.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/static_map_accumulator.hpp"
 #include "dynains/verdict.hpp"
@@ -137,14 +138,14 @@ class BasicDynaInsRemover {
   /// a new epoch; evidence of the discarded scan on older scans may remain. If the finalization of
   /// an older scan throws, for example in the map, only the final verdict on that scan is lost.
   template <class Cloud>
-  FrameResult push(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor, double time) {
+  FrameResult push(const Cloud& cloud, const Pose& T_world_sensor, double time) {
     return push_view(detail::CloudView(cloud), T_world_sensor, time);
   }
 
   /// Pushes a scan with a default time: 0 s for the first scan, else 0.1 s after the previous scan,
   /// or the next double if 0.1 s is below the resolution.
   template <class Cloud>
-  FrameResult push(const Cloud& cloud, const Eigen::Isometry3d& T_world_sensor) {
+  FrameResult push(const Cloud& cloud, const Pose& T_world_sensor) {
     return push_view(detail::CloudView(cloud), T_world_sensor, std::nullopt);
   }
 
@@ -166,7 +167,7 @@ class BasicDynaInsRemover {
   using Pipeline = detail::Pipeline<Stages>;
 
   Pipeline& pipeline() const;
-  FrameResult push_view(const detail::CloudView& cloud, const Eigen::Isometry3d& T_world_sensor,
+  FrameResult push_view(const detail::CloudView& cloud, const Pose& T_world_sensor,
                         std::optional<double> time);
   void reserve_view(const detail::CloudView& example, std::size_t scans);
   std::optional<ScanVerdict> finish_oldest();

@@ -16,6 +16,7 @@
 #include "dynains/map/block_table.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
@@ -64,12 +65,11 @@ class StaticMapAccumulator {
   /// an empty `keep` adds all points. A voxel with a point ignores further points.
   /// `T_world_sensor`: rigid, translation within kMaxTranslation. Throws std::length_error beyond
   /// 2^32 - 2 points, and std::bad_alloc.
-  void insert(PointsView points, Span<const std::uint8_t> keep,
-              const Eigen::Isometry3d& T_world_sensor) {
+  void insert(PointsView points, Span<const std::uint8_t> keep, const Pose& T_world_sensor) {
     // Transforms to a corner next to the sensor, an exact multiple of all block edges, so that
     // single precision is sufficient.
     const double step = voxel_ * kLongestBlock;
-    Eigen::Isometry3d T_corner_sensor = T_world_sensor;
+    Pose T_corner_sensor = T_world_sensor;
     std::int32_t first_block[3];
     for (int axis = 0; axis < 3; ++axis) {
       const double corner = std::floor(T_world_sensor(axis, 3) / step);

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 
 namespace dynains {
 
@@ -83,7 +84,7 @@ struct StageTimes {
 struct ScanVerdict {
   std::uint64_t scan = 0;  ///< number of the push, from 0
   double time = 0.0;       ///< s, as pushed
-  Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+  Pose T_world_sensor = Pose::Identity();
   Span<const PointLabel> labels;
   Span<const std::uint32_t> instances;  ///< kNoInstance for ground and points without a cluster
   /// Probability of being dynamic, [0, 1]. It is 0 for points without a belief: static ground,
@@ -101,7 +102,7 @@ struct PoseResidual {
   double rotation = 0.0;     ///< deg
   /// Corrected motion: pose of this scan in the sensor frame of the previous one. It is the pushed
   /// motion, except for rounding, if neither of both poses was corrected.
-  Eigen::Isometry3d T_previous_newest = Eigen::Isometry3d::Identity();
+  Pose T_previous_newest = Pose::Identity();
 };
 
 /// Result of one push.

@@ -149,7 +149,7 @@ void CityMap::revise(TileHistory& history, const TileIndex& tile, std::size_t se
   for (const SessionReferenceReader::Entry& entry : references_[session].entries()) {
     if ((entry.sensor - middle).head<2>().norm() > reach) continue;
     references_[session].read(entry, reference);
-    const Eigen::Isometry3d T_world_points(Eigen::Translation3d(entry.sensor));
+    const Pose T_world_points(Eigen::Translation3d(entry.sensor));
     history.revise(entry.scan, entry.sensor - corner,
                    [&](const PointBuffer& points, std::size_t count) -> const detail::Visibility& {
                      return test(reference, points, count, T_world_points);

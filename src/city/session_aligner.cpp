@@ -85,7 +85,7 @@ class Fit {
       : map_(map), points_(points) {}
 
   /// `scale`: m, distance at which the weight of a point is a fourth.
-  SurfaceFit linearize(const Eigen::Isometry3d& T, std::size_t level, double scale) const {
+  SurfaceFit linearize(const Pose& T, std::size_t level, double scale) const {
     SurfaceFit sum;
     for (const Eigen::Vector3d& point : points_) {
       const Eigen::Vector3d p = T * point;
@@ -107,11 +107,9 @@ class Fit {
     return sum;
   }
 
-  Eigen::Isometry3d refine(const Eigen::Isometry3d& T, std::size_t level, double scale,
-                           int most) const {
-    return gauss_newton(T, most, 1e-6, [&](const Eigen::Isometry3d& at) {
-      return linearize(at, level, scale).equations;
-    });
+  Pose refine(const Pose& T, std::size_t level, double scale, int most) const {
+    return gauss_newton(T, most, 1e-6,
+                        [&](const Pose& at) { return linearize(at, level, scale).equations; });
   }
 
  private:
@@ -119,8 +117,8 @@ class Fit {
   const std::vector<Eigen::Vector3d>& points_;
 };
 
-double rotation_angle(const Eigen::Isometry3d& T) {
-  return Eigen::AngleAxisd(T.linear()).angle() / kDegree;
+double rotation_angle(const Pose& T) {
+  return Eigen::AngleAxisd(detail::Quaternion(T.linear())).angle() / kDegree;
 }
 
 std::string rounded(double value, int digits) {
@@ -136,12 +134,12 @@ std::string rounded(double value, int digits) {
 }
 
 /// Motions around the start from which the search begins.
-std::vector<Eigen::Isometry3d> guesses() {
-  std::vector<Eigen::Isometry3d> result;
+std::vector<Pose> guesses() {
+  std::vector<Pose> result;
   for (const double yaw : {0.0, -2.0, 2.0, -4.0, 4.0}) {
     for (const double x : {0.0, -1.3, 1.3}) {
       for (const double y : {0.0, -1.3, 1.3}) {
-        Eigen::Isometry3d T(Eigen::AngleAxisd(yaw * kDegree, Eigen::Vector3d::UnitZ()));
+        Pose T(Eigen::AngleAxisd(yaw * kDegree, Eigen::Vector3d::UnitZ()));
         T.translation() = Eigen::Vector3d(x, y, 0.0);
         result.push_back(T);
       }
@@ -151,17 +149,17 @@ std::vector<Eigen::Isometry3d> guesses() {
 }
 
 struct Coarse {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  Pose T = Pose::Identity();
   bool is_ambiguous = false;
 };
 
 /// Best of the results of all guesses.
 Coarse search(const Fit& fit) {
-  constexpr double kDistinct = 0.5;                           // m
-  constexpr double kAlmost = 0.95;                            // ratio of scores
-  std::vector<std::pair<double, Eigen::Isometry3d>> results;  // score, motion
-  for (const Eigen::Isometry3d& guess : guesses()) {
-    Eigen::Isometry3d T = fit.refine(guess, 0, 1.0, 12);
+  constexpr double kDistinct = 0.5;              // m
+  constexpr double kAlmost = 0.95;               // ratio of scores
+  std::vector<std::pair<double, Pose>> results;  // score, motion
+  for (const Pose& guess : guesses()) {
+    Pose T = fit.refine(guess, 0, 1.0, 12);
     T = fit.refine(T, 1, 0.4, 10);
     T = fit.refine(T, 2, 0.2, 5);
     const SurfaceFit sum = fit.linearize(T, 2, 0.15);
@@ -243,8 +241,8 @@ std::vector<Eigen::Vector3d> thinned(const std::vector<Eigen::Vector3d>& points,
 }
 
 /// Throws ConfigError unless a result is a fit.
-void check_fit(const City& city, const SurfaceFit& sum, const Eigen::Isometry3d& T_correction,
-               bool is_ambiguous, const SessionAlignment& alignment) {
+void check_fit(const City& city, const SurfaceFit& sum, const Pose& T_correction, bool is_ambiguous,
+               const SessionAlignment& alignment) {
   constexpr std::size_t kFewest = 200;  // points at upright surfaces
   constexpr double kLeastFitting = 0.7;
   constexpr double kMostUncertain = 0.05;  // m
@@ -278,7 +276,7 @@ void check_fit(const City& city, const SurfaceFit& sum, const Eigen::Isometry3d&
 
 }  // namespace
 
-void SessionAligner::add(PointsView points, const Eigen::Isometry3d& T_session_sensor) {
+void SessionAligner::add(PointsView points, const Pose& T_session_sensor) {
   Scan scan{T_session_sensor.translation(), points_.size(), 0};
   const Eigen::Vector3d origin = scans_.empty() ? scan.sensor : scans_.front().sensor;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -294,7 +292,7 @@ void SessionAligner::add(PointsView points, const Eigen::Isometry3d& T_session_s
   scans_.push_back(scan);
 }
 
-SessionAlignment SessionAligner::align(const Eigen::Isometry3d& T_city_start) const {
+SessionAlignment SessionAligner::align(const Pose& T_city_start) const {
   const TileSessions tiles(city_);
   const auto seed = std::find_if(scans_.begin(), scans_.end(), [&](const Scan& scan) {
     return tiles.has(tiles.tile_at(T_city_start * scan.sensor));
@@ -308,7 +306,7 @@ SessionAlignment SessionAligner::align(const Eigen::Isometry3d& T_city_start) co
 
   SessionAlignment alignment;
   alignment.T_city_start = T_city_start;
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  Pose T = Pose::Identity();
   SurfaceFit sum;
   bool is_ambiguous = false;
   double farthest = 0.0;
@@ -347,9 +345,10 @@ SessionAlignment SessionAligner::align(const Eigen::Isometry3d& T_city_start) co
     sum = fit.linearize(T, 2, 0.1);
     break;
   }
-  alignment.T_city_session = Eigen::Translation3d(centre) * T *
-                             Eigen::Isometry3d(T_city_start.linear()) *
-                             Eigen::Translation3d(-seed->sensor);
+  alignment.T_city_session = T;
+  alignment.T_city_session.pretranslate(centre);
+  alignment.T_city_session = alignment.T_city_session * Pose(T_city_start.linear());
+  alignment.T_city_session.translate(-seed->sensor);
   alignment.residual =
       std::sqrt(sum.squares / static_cast<double>(std::max<std::size_t>(sum.inliers, 1)));
   alignment.fitting = static_cast<double>(sum.upright_inliers) /

@@ -84,7 +84,7 @@ Eigen::Vector3d vector_field(const fs::path& path, const Json& json, const char*
 }
 
 /// The upper three rows, row by row.
-Json json_of(const Eigen::Isometry3d& T) {
+Json json_of(const Pose& T) {
   Json values = Json::array();
   for (Eigen::Index row = 0; row < 3; ++row) {
     for (Eigen::Index column = 0; column < 4; ++column) values.push_back(T(row, column));
@@ -92,9 +92,9 @@ Json json_of(const Eigen::Isometry3d& T) {
   return values;
 }
 
-Eigen::Isometry3d transform_field(const fs::path& path, const Json& json, const char* name) {
+Pose transform_field(const fs::path& path, const Json& json, const char* name) {
   const auto numbers = numbers_field<12>(path, json, name, "/alignment/", "twelve numbers");
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  Pose T = Pose::Identity();
   for (std::size_t i = 0; i < 12; ++i) {
     T(static_cast<Eigen::Index>(i / 4), static_cast<Eigen::Index>(i % 4)) = numbers[i];
   }

@@ -175,7 +175,7 @@ SessionWriter::SessionWriter(const City& city, SessionInfo session,
 SessionWriter::~SessionWriter() = default;
 
 void SessionWriter::add(PointsView points, Span<const PointLabel> verdicts,
-                        Span<const std::uint32_t> labels, const Eigen::Isometry3d& T_world_sensor,
+                        Span<const std::uint32_t> labels, const Pose& T_world_sensor,
                         std::uint32_t scan) {
   ++session_.scans;
   restore_near(T_world_sensor.translation());

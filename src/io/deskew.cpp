@@ -49,22 +49,22 @@ Clock clock_of(const TimeRange& range, double stamp) {
 }
 
 /// T_world_sensor at `time`, by the poses around it or by the two nearest ones.
-std::optional<Eigen::Isometry3d> motion_at(const Trajectory& motion, double time) {
+std::optional<Pose> motion_at(const Trajectory& motion, double time) {
   const std::vector<double>& times = motion.times;
   if (times.size() < 2) return std::nullopt;
   const auto after = std::upper_bound(times.begin() + 1, times.end() - 1, time);
   const auto k = static_cast<std::size_t>(after - times.begin());
-  const auto along = [&](std::size_t end) -> std::optional<Eigen::Isometry3d> {
+  const auto along = [&](std::size_t end) -> std::optional<Pose> {
     const double gap = times[end] - times[end - 1];
     const double beyond = std::max(times[end - 1] - time, time - times[end]);
     if (gap > kLongestPoseGap || beyond > kLongestScan) return std::nullopt;
     const double share = (time - times[end - 1]) / gap;
-    const Eigen::Isometry3d& a = motion.poses[end - 1];
-    const Eigen::Isometry3d& b = motion.poses[end];
-    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    const Eigen::Quaterniond from(a.linear());
+    const Pose& a = motion.poses[end - 1];
+    const Pose& b = motion.poses[end];
+    Pose pose = Pose::Identity();
+    const detail::Quaternion from(a.linear());
     pose.linear() =
-        from.slerp(share, Eigen::Quaterniond(b.linear())).normalized().toRotationMatrix();
+        from.slerp(share, detail::Quaternion(b.linear())).normalized().toRotationMatrix();
     pose.translation() = a.translation() + share * (b.translation() - a.translation());
     return pose;
   };
@@ -79,10 +79,10 @@ std::optional<Eigen::Isometry3d> motion_at(const Trajectory& motion, double time
 /// nearest one is off by at most half a step: 1.5 mm at 30 m/s in a scan of 0.1 s.
 class Motion {
  public:
-  Motion(const Trajectory& motion, double stamp, const Eigen::Isometry3d& T_world_sensor,
-         double first, double last, const std::filesystem::path& place)
+  Motion(const Trajectory& motion, double stamp, const Pose& T_world_sensor, double first,
+         double last, const std::filesystem::path& place)
       : first_(first), step_((last - first) / kSteps) {
-    const Eigen::Isometry3d T_stamp_world = T_world_sensor.inverse();
+    const Pose T_stamp_world = T_world_sensor.inverse();
     for (std::size_t i = 0; i <= (step_ > 0.0 ? kSteps : 0); ++i) {
       const double offset = first + static_cast<double>(i) * step_;
       const auto pose = motion_at(motion, stamp + offset);
@@ -95,7 +95,7 @@ class Motion {
     }
   }
 
-  const Eigen::Isometry3d& at(double offset) const {
+  const Pose& at(double offset) const {
     if (T_stamp_sensor_.size() == 1) return T_stamp_sensor_.front();
     const double index = std::round((offset - first_) / step_);
     return T_stamp_sensor_[static_cast<std::size_t>(std::clamp(index, 0.0, double{kSteps}))];
@@ -106,12 +106,12 @@ class Motion {
 
   double first_;
   double step_;
-  std::vector<Eigen::Isometry3d> T_stamp_sensor_;
+  std::vector<Pose> T_stamp_sensor_;
 };
 
 }  // namespace
 
-void deskew(const Trajectory& motion, double stamp, const Eigen::Isometry3d& T_world_sensor,
+void deskew(const Trajectory& motion, double stamp, const Pose& T_world_sensor,
             const std::filesystem::path& place, RecordedScan& scan) {
   if (scan.time.size() != scan.size()) {
     fail(place, "the scan cannot be de-skewed: expected a column time");

@@ -6,6 +6,7 @@
 
 #include "dynains/io/recording.hpp"
 #include "dynains/io/trajectory.hpp"
+#include "dynains/pose.hpp"
 
 namespace dynains {
 
@@ -26,7 +27,7 @@ inline constexpr double kLongestScan = 1.0;
 ///
 /// Throws IoError that begins with `place` for scans without a time for each point, for times that
 /// are not those of the scan, and if the motion at the time of a point is not known.
-void deskew(const Trajectory& motion, double stamp, const Eigen::Isometry3d& T_world_sensor,
+void deskew(const Trajectory& motion, double stamp, const Pose& T_world_sensor,
             const std::filesystem::path& place, RecordedScan& scan);
 
 }  // namespace dynains

@@ -51,7 +51,7 @@ std::optional<NamedFrames> named_frames(const std::string& text) {
 }
 
 /// T_body_lidar of a file with named frames.
-Eigen::Isometry3d transform_of(const NamedFrames& named) {
+Pose transform_of(const NamedFrames& named) {
   const TransformTree tree = read_frame_file(named.file);
   std::set<std::string> known;
   for (const std::string& frame : tree.frames()) {
@@ -70,7 +70,7 @@ Eigen::Isometry3d transform_of(const NamedFrames& named) {
 
 }  // namespace
 
-Eigen::Isometry3d read_extrinsic(const std::string& text) {
+Pose read_extrinsic(const std::string& text) {
   if (const auto named = named_frames(text)) return transform_of(*named);
   const auto numbers = seven_numbers(text);
   if (!numbers) {
@@ -81,21 +81,21 @@ Eigen::Isometry3d read_extrinsic(const std::string& text) {
     throw IoError(text + ": has " + std::to_string(file.poses.size()) + " poses; " + kExpected);
   }
   const auto& n = *numbers;
-  const Eigen::Quaterniond q(n[6], n[3], n[4], n[5]);
+  const detail::Quaternion q(n[6], n[3], n[4], n[5]);
   const Eigen::Vector3d t(n[0], n[1], n[2]);
   if (!t.allFinite() || !(std::abs(q.norm() - 1.0) < 0.01)) {
     throw ConfigError("extrinsic \"" + text +
                       "\": expected finite numbers and a quaternion of length 1");
   }
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  Pose pose = Pose::Identity();
   pose.linear() = q.normalized().toRotationMatrix();
   pose.translation() = t;
   return pose;
 }
 
-std::string extrinsic_text(const Eigen::Isometry3d& T_body_sensor) {
+std::string extrinsic_text(const Pose& T_body_sensor) {
   const Eigen::Vector3d t = T_body_sensor.translation();
-  Eigen::Quaterniond q(T_body_sensor.linear());
+  detail::Quaternion q(T_body_sensor.linear());
   if (q.w() < 0.0) q.coeffs() *= -1.0;
   std::ostringstream text;
   text.imbue(std::locale::classic());

@@ -37,7 +37,7 @@ std::string read_whole(const fs::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-Eigen::Quaterniond of_angles(double roll, double pitch, double yaw) {
+detail::Quaternion of_angles(double roll, double pitch, double yaw) {
   return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
          Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
          Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());
@@ -287,7 +287,7 @@ class YamlFile {
     const auto q = transform != nullptr ? numbers_of<4>(map, {"x", "y", "z", "w"})
                                         : numbers_of<4>(map, {"qx", "qy", "qz", "qw"});
     if (q) {
-      const Eigen::Quaterniond rotation((*q)[3], (*q)[0], (*q)[1], (*q)[2]);
+      const detail::Quaternion rotation((*q)[3], (*q)[0], (*q)[1], (*q)[2]);
       if (!(std::abs(rotation.norm() - 1.0) < 0.01)) {
         fail_at_line(path_, line_of(map), "expected a quaternion of length 1");
       }

@@ -52,7 +52,7 @@ KittiSequence::KittiSequence(const fs::path& folder) : folder_(folder) {
   if (!is_there(poses_path)) {
     fail(poses_path, "not found: expected a row of 12 numbers for each scan");
   }
-  const std::vector<Eigen::Isometry3d> poses = read_kitti_poses(poses_path);
+  const std::vector<Pose> poses = read_kitti_poses(poses_path);
   const std::uint64_t last = scans.back().number;
   const bool by_order = last >= poses.size() && poses.size() == scans.size();
   const std::size_t needed = by_order ? scans.size() : static_cast<std::size_t>(last) + 1;
@@ -67,8 +67,7 @@ KittiSequence::KittiSequence(const fs::path& folder) : folder_(folder) {
   }
 
   const fs::path calib_path = folder / "calib.txt";
-  const Eigen::Isometry3d Tr =
-      is_there(calib_path) ? read_kitti_calib(calib_path) : Eigen::Isometry3d::Identity();
+  const Pose Tr = is_there(calib_path) ? read_kitti_calib(calib_path) : Pose::Identity();
 
   scans_.resize(scans.size());
   for (std::size_t i = 0; i < scans.size(); ++i) {
@@ -146,10 +145,10 @@ void write_labels(const fs::path& file, Span<const std::uint32_t> labels) {
   write_all(file, labels);
 }
 
-void write_poses(const fs::path& file, Span<const Eigen::Isometry3d> poses) {
+void write_poses(const fs::path& file, Span<const Pose> poses) {
   AtomicFile out(file);
   text::exact(out.stream());
-  for (const Eigen::Isometry3d& pose : poses) {
+  for (const Pose& pose : poses) {
     for (Eigen::Index i = 0; i < 12; ++i) {
       out.stream() << pose(i / 4, i % 4) << (i == 11 ? '\n' : ' ');
     }
@@ -164,7 +163,7 @@ void write_times(const fs::path& file, Span<const double> times) {
   out.commit();
 }
 
-void write_calib(const fs::path& file, const Eigen::Isometry3d& Tr) {
+void write_calib(const fs::path& file, const Pose& Tr) {
   AtomicFile out(file);
   text::exact(out.stream()) << "Tr:";
   for (Eigen::Index i = 0; i < 12; ++i) out.stream() << ' ' << Tr(i / 4, i % 4);

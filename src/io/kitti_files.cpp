@@ -39,9 +39,9 @@ std::array<double, kCount> parse_row(std::string_view line, const fs::path& path
 }
 
 /// Pose from 3x4 numbers; the rotation is orthonormalized.
-Eigen::Isometry3d parse_pose(std::string_view line, const fs::path& path, std::size_t number) {
+Pose parse_pose(std::string_view line, const fs::path& path, std::size_t number) {
   const std::array<double, 12> row = parse_row<12>(line, path, number);
-  const std::optional<Eigen::Isometry3d> pose = nearest_rigid(row.data());
+  const std::optional<Pose> pose = nearest_rigid(row.data());
   if (!pose) {
     fail_at_line(path, number,
                  "expected a rigid transform (columns 1-3 of the 3x4 matrix are a rotation)");
@@ -75,7 +75,7 @@ void for_each_row(const fs::path& path, Parse&& parse) {
 
 }  // namespace
 
-std::optional<Eigen::Isometry3d> nearest_rigid(const double* rows) {
+std::optional<Pose> nearest_rigid(const double* rows) {
   using RowMajor34 = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
   const RowMajor34 matrix = Eigen::Map<const RowMajor34>(rows);
   const Eigen::Matrix3d rotation = matrix.leftCols<3>();
@@ -83,14 +83,14 @@ std::optional<Eigen::Isometry3d> nearest_rigid(const double* rows) {
   if (!(error.cwiseAbs().maxCoeff() <= kRotationTolerance) || !(rotation.determinant() > 0.0)) {
     return std::nullopt;
   }
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.linear() = Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
+  Pose pose = Pose::Identity();
+  pose.linear() = detail::Quaternion(rotation).normalized().toRotationMatrix();
   pose.translation() = matrix.col(3);
   return pose;
 }
 
-std::vector<Eigen::Isometry3d> read_kitti_poses(const fs::path& path) {
-  std::vector<Eigen::Isometry3d> poses;
+std::vector<Pose> read_kitti_poses(const fs::path& path) {
+  std::vector<Pose> poses;
   for_each_row(path, [&](std::string_view line, std::size_t number) {
     poses.push_back(parse_pose(line, path, number));
   });
@@ -109,7 +109,7 @@ std::vector<double> read_kitti_times(const fs::path& path) {
   return times;
 }
 
-Eigen::Isometry3d read_kitti_calib(const fs::path& path) {
+Pose read_kitti_calib(const fs::path& path) {
   std::ifstream file = open_input(path);
   std::size_t number = 0;
   for (std::string text; std::getline(file, text);) {

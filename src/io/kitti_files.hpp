@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "dynains/pose.hpp"
+
 namespace dynains {
 
 inline constexpr double kKittiPeriod = 0.1;  // s, the 10 Hz of KITTI
@@ -21,17 +23,17 @@ struct NumberedScan {
 /// Scans NNNNNN.bin of a folder in the order of their numbers, at least one.
 std::vector<NumberedScan> list_kitti_scans(const std::filesystem::path& folder);
 
-std::vector<Eigen::Isometry3d> read_kitti_poses(const std::filesystem::path& path);
+std::vector<Pose> read_kitti_poses(const std::filesystem::path& path);
 /// Strictly increasing.
 std::vector<double> read_kitti_times(const std::filesystem::path& path);
 /// `Tr`, from the sensor to the frame of the poses.
-Eigen::Isometry3d read_kitti_calib(const std::filesystem::path& path);
+Pose read_kitti_calib(const std::filesystem::path& path);
 
 /// Throws IoError if `rows` < `needed`.
 void check_rows(const std::filesystem::path& path, std::size_t rows, std::size_t needed);
 
 /// The rigid transform nearest to 12 numbers (upper 3x4, row by row); nothing if they differ from
 /// one by more than rounding.
-std::optional<Eigen::Isometry3d> nearest_rigid(const double* rows);
+std::optional<Pose> nearest_rigid(const double* rows);
 
 }  // namespace dynains

@@ -192,7 +192,7 @@ PointFileHeader read_las_header(const std::filesystem::path& path) {
   RawFile file(path);
   PointSink sink;
   const LasHeader header = read_header(file, sink);
-  return {Eigen::Isometry3d::Identity(), sink.columns(), header.point_count};
+  return {Pose::Identity(), sink.columns(), header.point_count};
 }
 
 void check_las(const std::filesystem::path& path) {

@@ -169,7 +169,7 @@ PointFile read_npy(const std::filesystem::path& path) {
 PointFileHeader read_npy_header(const std::filesystem::path& path) {
   PointSink sink;
   const NpyFile file = open_npy(path, sink, false);
-  return {Eigen::Isometry3d::Identity(), sink.columns(), file.points.count};
+  return {Pose::Identity(), sink.columns(), file.points.count};
 }
 
 void check_npy(const std::filesystem::path& path) { read_npy_header(path); }
@@ -191,7 +191,7 @@ PointFile read_npz(const std::filesystem::path& path) {
 PointFileHeader read_npz_header(const std::filesystem::path& path) {
   PointSink sink;
   const std::vector<NpzColumns> all = open_npz(path, sink);
-  return {Eigen::Isometry3d::Identity(), sink.columns(), all.front().points.count};
+  return {Pose::Identity(), sink.columns(), all.front().points.count};
 }
 
 void check_npz(const std::filesystem::path& path) { read_npz_header(path); }

@@ -46,10 +46,10 @@ class TableRow {
     return found->second;
   }
   /// `translation` and `rotation` (w x y z).
-  Eigen::Isometry3d pose() const {
+  Pose pose() const {
     const std::vector<double>& p = list("translation", 3);
     const std::vector<double>& q = list("rotation", 4);
-    const Eigen::Quaterniond rotation(q[0], q[1], q[2], q[3]);
+    const detail::Quaternion rotation(q[0], q[1], q[2], q[3]);
     const Eigen::Vector3d translation(p[0], p[1], p[2]);
     if (!translation.allFinite() || !(std::abs(rotation.norm() - 1.0) < 0.01)) {
       fail("expected a finite translation and a quaternion of length 1");
@@ -197,7 +197,7 @@ void choose_scene(const fs::path& tables, const std::string& wanted, std::vector
       sweeps.end());
 }
 
-using Poses = std::unordered_map<std::string, Eigen::Isometry3d>;
+using Poses = std::unordered_map<std::string, Pose>;
 
 /// The poses of a table whose tokens are `wanted`.
 Poses read_poses_by_token(const fs::path& table, const std::set<std::string>& wanted) {

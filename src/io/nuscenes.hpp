@@ -7,12 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "dynains/pose.hpp"
+
 namespace dynains {
 
 struct NuScenesSweep {
   std::filesystem::path file;  ///< .pcd.bin
   double time = 0.0;           ///< s
-  Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+  Pose T_world_sensor = Pose::Identity();
 };
 
 struct NuScenesSweeps {

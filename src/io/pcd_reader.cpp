@@ -80,7 +80,7 @@ void for_each_field(const ByteReader& reader, PcdHeader& header, std::string_vie
   }
 }
 
-Eigen::Isometry3d parse_viewpoint(const ByteReader& reader, std::string_view line) {
+Pose parse_viewpoint(const ByteReader& reader, std::string_view line) {
   const std::string expected = "expected VIEWPOINT tx ty tz qw qx qy qz with a rotation";
   std::array<double, 7> v{};
   for (double& value : v) {
@@ -88,9 +88,9 @@ Eigen::Isometry3d parse_viewpoint(const ByteReader& reader, std::string_view lin
     if (!number || !std::isfinite(*number)) reader.fail_on_line(expected);
     value = *number;
   }
-  const Eigen::Quaterniond rotation(v[3], v[4], v[5], v[6]);
+  const detail::Quaternion rotation(v[3], v[4], v[5], v[6]);
   if (!(std::abs(rotation.norm() - 1.0) < 0.1)) reader.fail_on_line(expected);
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  Pose pose = Pose::Identity();
   pose.linear() = rotation.normalized().toRotationMatrix();
   pose.translation() = Eigen::Vector3d(v[0], v[1], v[2]);
   return pose;

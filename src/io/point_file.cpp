@@ -49,7 +49,7 @@ const PointFileFormat& format_to_read(const fs::path& path) {
 }
 
 std::string ply_header(std::size_t count, const PointColumns& columns, const std::string& padding,
-                       const Eigen::Isometry3d&) {
+                       const Pose&) {
   const std::string coordinate = columns.double_xyz ? "double" : "float";
   std::string text = "ply\nformat binary_little_endian 1.0\ncomment dynains" + padding +
                      "\nelement vertex " + std::to_string(count) + '\n';
@@ -63,8 +63,8 @@ std::string ply_header(std::size_t count, const PointColumns& columns, const std
   return text + "end_header\n";
 }
 
-std::string viewpoint_line(const Eigen::Isometry3d& pose) {
-  const Eigen::Quaterniond q(pose.linear());
+std::string viewpoint_line(const Pose& pose) {
+  const detail::Quaternion q(pose.linear());
   std::ostringstream line;
   text::exact(line) << "VIEWPOINT";
   for (const double value : {pose.translation().x(), pose.translation().y(), pose.translation().z(),
@@ -75,7 +75,7 @@ std::string viewpoint_line(const Eigen::Isometry3d& pose) {
 }
 
 std::string pcd_header(std::size_t count, const PointColumns& columns, const std::string& padding,
-                       const Eigen::Isometry3d& viewpoint) {
+                       const Pose& viewpoint) {
   std::string fields = "FIELDS x y z";
   std::string sizes = columns.double_xyz ? "SIZE 8 8 8" : "SIZE 4 4 4";
   std::string types = "TYPE F F F";
@@ -101,7 +101,7 @@ std::string pcd_header(std::size_t count, const PointColumns& columns, const std
 }  // namespace
 
 PointFileWriter::PointFileWriter(const fs::path& path, const PointColumns& columns,
-                                 const Eigen::Isometry3d& viewpoint)
+                                 const Pose& viewpoint)
     : columns_(columns),
       viewpoint_(viewpoint),
       pcd_(is_pcd(path)),

@@ -233,7 +233,7 @@ std::uint64_t Recording::point_count(std::size_t i) const {
 void Recording::check_scan(std::size_t i) const { reader_->check(address(i)); }
 
 void Recording::read_scan(std::size_t i, RecordedScan& scan) const {
-  const Eigen::Isometry3d T_sensor_world = T_world_sensor(i).inverse();
+  const Pose T_sensor_world = T_world_sensor(i).inverse();
   reader_->read(address(i), frame_ == PointFrame::kWorld ? &T_sensor_world : nullptr, scan);
   if (options_.deskew) deskew(motion_, time(i), T_world_sensor(i), file(i), scan);
 }

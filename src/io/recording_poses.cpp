@@ -21,9 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_identity(const Eigen::Isometry3d& pose) {
-  return pose.isApprox(Eigen::Isometry3d::Identity(), 1e-12);
-}
+bool is_identity(const Pose& pose) { return pose.isApprox(Pose::Identity(), 1e-12); }
 
 std::string in_seconds(double time) {
   std::ostringstream text;
@@ -270,8 +268,7 @@ void Recording::place_scans(const fs::path& poses) {
   scans_ = std::move(placed);
 }
 
-std::optional<Eigen::Isometry3d> Recording::pose_under(const PoseConvention& convention,
-                                                       std::size_t i) const {
+std::optional<Pose> Recording::pose_under(const PoseConvention& convention, std::size_t i) const {
   const auto at = static_cast<std::ptrdiff_t>(scans_.at(i).match) + convention.shift;
   if (at < 0 || at >= static_cast<std::ptrdiff_t>(matches_.size())) return std::nullopt;
   const std::optional<TrajectoryMatch>& match = matches_[static_cast<std::size_t>(at)];
@@ -279,15 +276,14 @@ std::optional<Eigen::Isometry3d> Recording::pose_under(const PoseConvention& con
   return pose_of(convention, *match);
 }
 
-std::optional<Eigen::Isometry3d> Recording::pose_after(std::size_t i, double offset) const {
+std::optional<Pose> Recording::pose_after(std::size_t i, double offset) const {
   const double time = scans_.at(i).time + options_.time_offset + offset;
   const auto match = match_time(trajectory_, time, options_.pose_gap);
   if (!match) return std::nullopt;
   return pose_of(options_.convention, *match);
 }
 
-Eigen::Isometry3d Recording::pose_of(const PoseConvention& convention,
-                                     const TrajectoryMatch& match) const {
+Pose Recording::pose_of(const PoseConvention& convention, const TrajectoryMatch& match) const {
   const QuaternionOrder order = trajectory_.order;
   return to_sensor_pose(
       convention,
@@ -296,13 +292,12 @@ Eigen::Isometry3d Recording::pose_of(const PoseConvention& convention,
 }
 
 /// T_world_sensor of a pose to which the rest of the convention was applied.
-Eigen::Isometry3d Recording::to_sensor_pose(const PoseConvention& convention,
-                                            const Eigen::Isometry3d& pose) const {
+Pose Recording::to_sensor_pose(const PoseConvention& convention, const Pose& pose) const {
   const bool is_matrix = trajectory_.order == QuaternionOrder::kNone;
   const bool is_camera = convention.frame == PoseFrame::kCamera ||
                          (convention.frame == PoseFrame::kAuto && has_calibration_ && is_matrix);
   if (!is_camera) return pose * convention.T_body_sensor;
-  const Eigen::Isometry3d T_camera_sensor = has_calibration_ ? Tr_ : camera_axes();
+  const Pose T_camera_sensor = has_calibration_ ? Tr_ : camera_axes();
   return T_camera_sensor.inverse() * pose * T_camera_sensor * convention.T_body_sensor;
 }
 
@@ -319,7 +314,7 @@ void Recording::prepare_deskewing() {
   if (convention.shift == 0 && rows.times.size() > 1) {
     // A scan at time t has the pose at t + time_offset.
     for (const double time : rows.times) motion.times.push_back(time - options_.time_offset);
-    for (const Eigen::Isometry3d& row : rows.poses) {
+    for (const Pose& row : rows.poses) {
       motion.poses.push_back(to_sensor_pose(convention, apply(convention, row, trajectory_.order)));
     }
   } else {

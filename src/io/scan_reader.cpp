@@ -14,7 +14,7 @@
 namespace dynains {
 namespace {
 
-void transform(const Eigen::Isometry3d* T_target_file, RecordedScan& points) {
+void transform(const Pose* T_target_file, RecordedScan& points) {
   if (T_target_file == nullptr) return;
   for (std::size_t k = 0; k < points.size(); ++k) {
     Eigen::Map<Eigen::Vector3f> p(points.xyzi.data() + 4 * k);
@@ -34,7 +34,7 @@ class BinReader final : public ScanReader {
   std::uint64_t point_count(const ScanAddress& scan) const override {
     return count_scan_points(scan.file);
   }
-  void read(const ScanAddress& scan, const Eigen::Isometry3d* T_target_file,
+  void read(const ScanAddress& scan, const Pose* T_target_file,
             RecordedScan& points) const override {
     points.ring.clear();
     points.time.clear();
@@ -62,7 +62,7 @@ class NuScenesReader final : public ScanReader {
     fail(scan.file, "has " + std::to_string(bytes) +
                         " bytes, expected a multiple of 20: float32 x y z intensity ring");
   }
-  void read(const ScanAddress& scan, const Eigen::Isometry3d* T_target_file,
+  void read(const ScanAddress& scan, const Pose* T_target_file,
             RecordedScan& points) const override {
     const std::uint64_t count = point_count(scan);
     const auto bytes = RawFile(scan.file).read(0, count * kPoint, "points");
@@ -96,7 +96,7 @@ class PointFileReader final : public ScanReader {
   std::uint64_t point_count(const ScanAddress& scan) const override {
     return read_point_file_header(scan.file).point_count;
   }
-  void read(const ScanAddress& scan, const Eigen::Isometry3d* T_target_file,
+  void read(const ScanAddress& scan, const Pose* T_target_file,
             RecordedScan& points) const override {
     PointFile file = read_points(scan.file);
     points.xyzi.resize(4 * file.positions.size());
@@ -129,7 +129,7 @@ class LogReader final : public ScanReader {
   std::uint64_t point_count(const ScanAddress& scan) const override {
     return scans_->point_count(scan.index);
   }
-  void read(const ScanAddress& scan, const Eigen::Isometry3d* T_target_file,
+  void read(const ScanAddress& scan, const Pose* T_target_file,
             RecordedScan& points) const override {
     {
       const std::lock_guard<std::mutex> lock(mutex_);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dynains/io/recording.hpp"
+#include "dynains/pose.hpp"
 
 namespace dynains {
 
@@ -34,7 +35,7 @@ class ScanReader {
   virtual std::uint64_t point_count(const ScanAddress& scan) const = 0;
   /// Reads the points (m), transformed by `T_target_file` if there is one. Columns that the scan
   /// lacks become empty; memory of `points` is reused.
-  virtual void read(const ScanAddress& scan, const Eigen::Isometry3d* T_target_file,
+  virtual void read(const ScanAddress& scan, const Pose* T_target_file,
                     RecordedScan& points) const = 0;
   /// The column `label`.
   virtual std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const = 0;

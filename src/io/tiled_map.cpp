@@ -109,7 +109,7 @@ TiledStaticMap::TiledStaticMap(const Config& config)
 }
 
 void TiledStaticMap::insert(PointsView points, Span<const std::uint8_t> keep,
-                            const Eigen::Isometry3d& T_world_sensor) {
+                            const Pose& T_world_sensor) {
   const bool keep_all = config_.map_voxel == 0.0;
   Place last{};
   Tile* tile = nullptr;

@@ -128,14 +128,14 @@ double number_in(const ByteReader& reader, const std::vector<std::string>& cells
   return *value;
 }
 
-Eigen::Isometry3d pose_of(const ByteReader& reader, const std::vector<std::string>& cells,
-                          const Columns& columns) {
+Pose pose_of(const ByteReader& reader, const std::vector<std::string>& cells,
+             const Columns& columns) {
   if (columns.matrix != kNoColumn) {
     std::array<double, 12> rows{};
     for (std::size_t i = 0; i < rows.size(); ++i) {
       rows[i] = number_in(reader, cells, columns.matrix + i);
     }
-    const std::optional<Eigen::Isometry3d> pose = nearest_rigid(rows.data());
+    const std::optional<Pose> pose = nearest_rigid(rows.data());
     if (!pose) {
       reader.fail_on_line(
           "expected a rigid transform (columns 1-3 of the matrix are a rotation that does not "
@@ -145,12 +145,12 @@ Eigen::Isometry3d pose_of(const ByteReader& reader, const std::vector<std::strin
   }
   std::array<double, 4> q{};
   for (std::size_t i = 0; i < 4; ++i) q[i] = number_in(reader, cells, columns.rotation[i]);
-  const Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
+  const detail::Quaternion rotation(q[3], q[0], q[1], q[2]);
   if (!(std::abs(rotation.norm() - 1.0) < 0.01)) {
     reader.fail_on_line("expected a quaternion of length 1, found one of length " +
                         std::to_string(rotation.norm()));
   }
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  Pose pose = Pose::Identity();
   pose.linear() = rotation.normalized().toRotationMatrix();
   for (std::size_t i = 0; i < 3; ++i) {
     pose.translation()[static_cast<Eigen::Index>(i)] =
@@ -217,13 +217,12 @@ std::optional<TrajectoryMatch> match_time(const Trajectory& trajectory, double t
   return TrajectoryMatch{after - 1, after, share};
 }
 
-Eigen::Isometry3d interpolate(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b,
-                              double share) {
+Pose interpolate(const Pose& a, const Pose& b, double share) {
   if (share <= 0.0) return a;
   if (share >= 1.0) return b;
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  const Eigen::Quaterniond from(a.linear());
-  const Eigen::Quaterniond to(b.linear());
+  Pose pose = Pose::Identity();
+  const detail::Quaternion from(a.linear());
+  const detail::Quaternion to(b.linear());
   pose.linear() = from.slerp(share, to).normalized().toRotationMatrix();
   pose.translation() = a.translation() + share * (b.translation() - a.translation());
   return pose;

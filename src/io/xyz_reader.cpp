@@ -141,7 +141,7 @@ PointFile read_xyz(const std::filesystem::path& path) {
 PointFileHeader read_xyz_header(const std::filesystem::path& path) {
   PointSink sink;
   const std::size_t count = count_points(path, sink);
-  return {Eigen::Isometry3d::Identity(), sink.columns(), count};
+  return {Pose::Identity(), sink.columns(), count};
 }
 
 void check_xyz(const std::filesystem::path& path) {

@@ -33,10 +33,10 @@ CellSurface surface_of(const CellMoments& moments, double edge) {
   return surface;
 }
 
-Eigen::Isometry3d motion_of(const Vector6& rotation_and_translation) {
+Pose motion_of(const Vector6& rotation_and_translation) {
   const Eigen::Vector3d w = rotation_and_translation.head<3>();
   const double angle = w.norm();
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  Pose T = Pose::Identity();
   if (angle > 0.0) T.linear() = Eigen::AngleAxisd(angle, w / angle).toRotationMatrix();
   T.translation() = rotation_and_translation.tail<3>();
   return T;

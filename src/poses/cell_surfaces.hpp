@@ -7,12 +7,13 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "dynains/pose.hpp"
 #include "dynains/stage/voxel_hash_table.hpp"
 
 namespace dynains {
 
-using Vector6 = Eigen::Matrix<double, 6, 1>;
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1, Eigen::DontAlign>;
+using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::DontAlign>;
 
 /// Edges of the cells (m) by level, from coarse to fine.
 inline constexpr std::size_t kCellLevels = 3;
@@ -60,7 +61,7 @@ struct CellSurface {
 CellSurface surface_of(const CellMoments& moments, double edge);
 
 /// Rigid motion of a rotation vector (rad) and a translation (m).
-Eigen::Isometry3d motion_of(const Vector6& rotation_and_translation);
+Pose motion_of(const Vector6& rotation_and_translation);
 
 /// Normal equations of a motion that moves points to surfaces. Rotation comes before translation.
 class NormalEquations {
@@ -116,8 +117,7 @@ class NormalEquations {
 /// Gauss-Newton steps from `T`, at most `most`, until they are shorter than 0.1 mm and `turn` (rad)
 /// or fewer than 30 points meet a surface. `equations_at(T)` returns NormalEquations.
 template <class EquationsAt>
-Eigen::Isometry3d gauss_newton(Eigen::Isometry3d T, int most, double turn,
-                               EquationsAt&& equations_at) {
+Pose gauss_newton(Pose T, int most, double turn, EquationsAt&& equations_at) {
   constexpr std::size_t kFewest = 30;
   for (int k = 0; k < most; ++k) {
     const NormalEquations equations = equations_at(T);

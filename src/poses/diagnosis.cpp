@@ -103,7 +103,7 @@ Agreement agreement_under(const PoseConvention& convention, const Recording& rec
 /// Agreement under the identity: no motion.
 Agreement standing_agreement(const std::vector<Pair>& pairs) {
   AgreementSum sum;
-  for (const Pair& pair : pairs) sum.add(pair.a.compare(pair.b, Eigen::Isometry3d::Identity()));
+  for (const Pair& pair : pairs) sum.add(pair.a.compare(pair.b, Pose::Identity()));
   return sum.mean();
 }
 
@@ -421,7 +421,7 @@ double Landmarks::distance_to(const Eigen::Vector3d& p) const {
   return std::sqrt(squared);
 }
 
-Agreement Landmarks::compare(const Landmarks& other, const Eigen::Isometry3d& T_this_other) const {
+Agreement Landmarks::compare(const Landmarks& other, const Pose& T_this_other) const {
   if (points_.empty() || other.points_.empty()) return {};
   const std::size_t step = std::max<std::size_t>(1, other.points_.size() / kQueries);
   std::size_t close = 0;
@@ -523,9 +523,9 @@ std::string error_text(const Diagnosis& d) {
   return error_text(d.translation_error, d.rotation_error);
 }
 
-std::string body_text(const Eigen::Isometry3d& T_body_sensor) {
+std::string body_text(const Pose& T_body_sensor) {
   constexpr double kUpright = 0.98;
-  const Eigen::AngleAxisd rotation(T_body_sensor.linear());
+  const Eigen::AngleAxisd rotation(detail::Quaternion(T_body_sensor.linear()));
   const Eigen::Vector3d t = T_body_sensor.translation();
   std::string text;
   if (std::abs(rotation.angle()) > 1e-6) {

@@ -33,7 +33,7 @@ bool is_inexact(const MotionError& error, const MotionError& all) {
 }
 
 BodyMotion motion_under(const Recording& recording, const PoseConvention& convention) {
-  return [&recording, convention](const RegisteredMotion& m) -> std::optional<Eigen::Isometry3d> {
+  return [&recording, convention](const RegisteredMotion& m) -> std::optional<Pose> {
     const auto T_world_a = recording.pose_under(convention, m.first);
     const auto T_world_b = recording.pose_under(convention, m.second);
     if (!T_world_a || !T_world_b) return std::nullopt;
@@ -41,12 +41,10 @@ BodyMotion motion_under(const Recording& recording, const PoseConvention& conven
   };
 }
 
-std::optional<Eigen::Isometry3d> no_motion(const RegisteredMotion& /*motion*/) {
-  return Eigen::Isometry3d::Identity();
-}
+std::optional<Pose> no_motion(const RegisteredMotion& /*motion*/) { return Pose::Identity(); }
 
 BodyMotion motion_after(const Recording& recording, double offset) {
-  return [&recording, offset](const RegisteredMotion& m) -> std::optional<Eigen::Isometry3d> {
+  return [&recording, offset](const RegisteredMotion& m) -> std::optional<Pose> {
     const auto T_world_a = recording.pose_after(m.first, offset);
     const auto T_world_b = recording.pose_after(m.second, offset);
     if (!T_world_a || !T_world_b) return std::nullopt;
@@ -55,7 +53,7 @@ BodyMotion motion_after(const Recording& recording, double offset) {
 }
 
 double error_at_points(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
-                       const Eigen::Isometry3d& T_body_sensor = Eigen::Isometry3d::Identity()) {
+                       const Pose& T_body_sensor = Pose::Identity()) {
   return motion_error(motions, body, T_body_sensor).at_points;
 }
 
@@ -75,19 +73,19 @@ struct Explanation {
 
 /// Without parts that explain nothing: a rotation or translation near 0, or one that the motions do
 /// not determine.
-Eigen::Isometry3d simplified(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
-                             const Eigen::Isometry3d& T_body_sensor) {
+Pose simplified(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
+                const Pose& T_body_sensor) {
   const double error = error_at_points(motions, body, T_body_sensor);
-  const auto is_enough = [&](const Eigen::Isometry3d& simpler) {
+  const auto is_enough = [&](const Pose& simpler) {
     return error_at_points(motions, body, simpler) < 1.1 * error + 0.002;
   };
-  Eigen::Isometry3d unturned = T_body_sensor;
+  Pose unturned = T_body_sensor;
   unturned.linear().setIdentity();
-  Eigen::Isometry3d result = is_enough(unturned) ? unturned : T_body_sensor;
-  Eigen::Isometry3d unmoved = result;
+  Pose result = is_enough(unturned) ? unturned : T_body_sensor;
+  Pose unmoved = result;
   unmoved.translation().setZero();
   if (is_enough(unmoved)) return unmoved;
-  Eigen::Isometry3d level = result;
+  Pose level = result;
   level.translation().z() = 0.0;
   return is_enough(level) ? level : result;
 }
@@ -103,7 +101,7 @@ std::optional<Explanation> explain_by_body(const Recording& recording,
   if (!is_much_better(error_at_points(others, body, *of_half), before)) return std::nullopt;
   const auto fitted = fit_extrinsic(motions, body);
   if (!fitted) return std::nullopt;
-  const Eigen::Isometry3d T_body_sensor = simplified(motions, body, *fitted);
+  const Pose T_body_sensor = simplified(motions, body, *fitted);
   Explanation result;
   result.error = error_at_points(motions, body, T_body_sensor);
   if (!is_much_better(result.error, before)) return std::nullopt;
@@ -149,7 +147,7 @@ double best_offset(const Recording& recording, const std::vector<RegisteredMotio
   const auto look = [&](double from, double to, double step) {
     for (double offset = from; offset < to + 0.5 * step; offset += step) {
       const MotionError error =
-          motion_error(motions, motion_after(recording, offset), Eigen::Isometry3d::Identity());
+          motion_error(motions, motion_after(recording, offset), Pose::Identity());
       if (2 * error.pairs < motions.size() || !(error.at_points < least)) continue;
       least = error.at_points;
       best = offset;
@@ -220,8 +218,8 @@ std::optional<Explanation> explain_by_reading(const Recording& recording,
     least = error;
   }
   // Small motions differ little from any others, so no motion must be clearly worse, too.
-  const double standing = error_at_points(
-      motions, [](const RegisteredMotion&) { return Eigen::Isometry3d::Identity(); });
+  const double standing =
+      error_at_points(motions, [](const RegisteredMotion&) { return Pose::Identity(); });
   if (!(least < before && least < std::min(kRough, 0.5 * standing))) return std::nullopt;
   const auto found = readings.begin() + static_cast<std::ptrdiff_t>(best);
   std::rotate(readings.begin(), found, found + 1);
@@ -247,7 +245,7 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
   if (recording.frame() != PointFrame::kSensor || d.verdict == PoseVerdict::kUnknown) return;
   const std::vector<RegisteredMotion> motions = register_motions(recording);
   const BodyMotion given = motion_under(recording, recording.convention());
-  const auto identity = Eigen::Isometry3d::Identity();
+  const auto identity = Pose::Identity();
   const MotionError steps = motion_error(motions, given, identity, Motions::kSteps);
   const MotionError first_steps = motion_error(motions, given, identity, Motions::kFirstSteps);
   const MotionError all = motion_error(motions, given, identity);

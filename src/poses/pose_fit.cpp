@@ -19,7 +19,9 @@ namespace {
 
 constexpr double kLever = 10.0;  // m, distance of the points at which a rotation is judged
 
-double angle_of(const Eigen::Matrix3d& R) { return std::abs(Eigen::AngleAxisd(R).angle()); }
+double angle_of(const Eigen::Matrix3d& R) {
+  return std::abs(Eigen::AngleAxisd(detail::Quaternion(R)).angle());
+}
 
 /// A scan, as planes and as landmarks.
 class ChainScan {
@@ -61,17 +63,16 @@ class ChainScans {
 
 /// Guesses of the motion to the next scan: as given, none, the given distance in each direction,
 /// and the motion at another place.
-std::vector<Eigen::Isometry3d> first_guesses(const Eigen::Isometry3d& given,
-                                             const std::optional<Eigen::Isometry3d>& elsewhere) {
+std::vector<Pose> first_guesses(const Pose& given, const std::optional<Pose>& elsewhere) {
   constexpr double kFarthest = 6.0;  // m
-  std::vector<Eigen::Isometry3d> guesses = {Eigen::Isometry3d::Identity()};
+  std::vector<Pose> guesses = {Pose::Identity()};
   const double way = given.translation().norm();
   if (way < kFarthest) {
     guesses.push_back(given);
     for (const Eigen::Vector2d& direction : {Eigen::Vector2d(1, 0), Eigen::Vector2d(-1, 0),
                                              Eigen::Vector2d(0, 1), Eigen::Vector2d(0, -1)}) {
       if (way < 0.3) continue;
-      guesses.push_back(Eigen::Isometry3d::Identity());
+      guesses.push_back(Pose::Identity());
       guesses.back().translation().head<2>() = way * direction;
     }
   }
@@ -87,10 +88,9 @@ bool is_certain(const std::optional<Registration>& registration, double uncertai
 }
 
 /// Residual of a motion: rotation times kLever, and translation, m.
-Vector6 residual(const Eigen::Isometry3d& body, const Eigen::Isometry3d& sensor,
-                 const Eigen::Isometry3d& T_body_sensor) {
-  const Eigen::Isometry3d E = (body * T_body_sensor).inverse() * T_body_sensor * sensor;
-  const Eigen::AngleAxisd rotation(E.linear());
+Vector6 residual(const Pose& body, const Pose& sensor, const Pose& T_body_sensor) {
+  const Pose E = (body * T_body_sensor).inverse() * T_body_sensor * sensor;
+  const Eigen::AngleAxisd rotation(detail::Quaternion(E.linear()));
   Vector6 r;
   r << kLever * rotation.angle() * rotation.axis(), E.translation();
   return r;
@@ -98,7 +98,7 @@ Vector6 residual(const Eigen::Isometry3d& body, const Eigen::Isometry3d& sensor,
 
 /// A motion by two registrations, forth and back.
 struct CheckedMotion {
-  Eigen::Isometry3d T_a_b;
+  Pose T_a_b;
   Vector6 difference;
   double deviation;  // m
 };
@@ -108,8 +108,7 @@ std::optional<CheckedMotion> checked(const std::optional<Registration>& forth,
                                      double deviation) {
   constexpr double kNoisy = 0.25;  // m, 10 m from the sensor
   if (!is_certain(forth, uncertain) || !is_certain(back, uncertain)) return std::nullopt;
-  const Vector6 difference =
-      residual(forth->T_a_b, back->T_a_b.inverse(), Eigen::Isometry3d::Identity());
+  const Vector6 difference = residual(forth->T_a_b, back->T_a_b.inverse(), Pose::Identity());
   if (difference.norm() > kNoisy) return std::nullopt;
   return CheckedMotion{forth->T_a_b, difference, deviation};
 }
@@ -122,8 +121,7 @@ struct GuidedRegistration {
 
 /// Moves `T_a_b` along `direction` to where landmarks meet, less than `farthest` (m), and registers
 /// again.
-std::optional<GuidedRegistration> register_along(ChainScan& a, ChainScan& b,
-                                                 const Eigen::Isometry3d& T_a_b,
+std::optional<GuidedRegistration> register_along(ChainScan& a, ChainScan& b, const Pose& T_a_b,
                                                  const Eigen::Vector3d& direction,
                                                  double farthest) {
   constexpr double kDeviation = 0.04;  // m, of search_way()
@@ -154,7 +152,7 @@ std::optional<CheckedMotion> complete(ChainScan& a, ChainScan& b, const Registra
       found = again;
     }
     const double gap = mean_gap(a.landmarks(), b.landmarks(), found->registration.T_a_b);
-    Eigen::Isometry3d standing = by_planes.T_a_b;
+    Pose standing = by_planes.T_a_b;
     standing.translation() -= direction.dot(standing.translation()) * direction;
     if (gap < least_gap && gap <= mean_gap(a.landmarks(), b.landmarks(), standing)) {
       best = found;
@@ -162,7 +160,7 @@ std::optional<CheckedMotion> complete(ChainScan& a, ChainScan& b, const Registra
     }
   }
   if (!best) return std::nullopt;
-  const Eigen::Isometry3d T_b_a = best->registration.T_a_b.inverse();
+  const Pose T_b_a = best->registration.T_a_b.inverse();
   const KnownWay way{T_b_a.linear() * best->way.direction, best->way.deviation};
   return checked(best->registration, register_near(b.planes(), a.planes(), T_b_a, way), kUncertain,
                  best->way.deviation);
@@ -170,8 +168,7 @@ std::optional<CheckedMotion> complete(ChainScan& a, ChainScan& b, const Registra
 
 /// Registers b to a. Empty if the motion is uncertain.
 std::optional<CheckedMotion> register_both_ways(ChainScan& a, ChainScan& b,
-                                                const std::vector<Eigen::Isometry3d>& guesses,
-                                                double farthest) {
+                                                const std::vector<Pose>& guesses, double farthest) {
   constexpr double kOpen = 0.025;      // m, uncertainty of a direction that planes leave open
   constexpr double kUncertain = 0.06;  // m
   const auto found = register_scans(a.planes(), b.planes(), guesses);
@@ -182,12 +179,11 @@ std::optional<CheckedMotion> register_both_ways(ChainScan& a, ChainScan& b,
 }
 
 struct BothMotions {
-  Eigen::Isometry3d body;
-  Eigen::Isometry3d sensor;
+  Pose body;
+  Pose sensor;
 };
 
-double robust_cost(const std::vector<BothMotions>& motions,
-                   const Eigen::Isometry3d& T_body_sensor) {
+double robust_cost(const std::vector<BothMotions>& motions, const Pose& T_body_sensor) {
   double cost = 0.0;
   for (const BothMotions& m : motions)
     cost += std::log1p(residual(m.body, m.sensor, T_body_sensor).squaredNorm() / 0.01);
@@ -195,7 +191,7 @@ double robust_cost(const std::vector<BothMotions>& motions,
 }
 
 /// Gauss-Newton with Cauchy weights and a weak prior that the lever arm is 0.
-Eigen::Isometry3d refine(const std::vector<BothMotions>& motions, Eigen::Isometry3d T_body_sensor) {
+Pose refine(const std::vector<BothMotions>& motions, Pose T_body_sensor) {
   constexpr double kScale = 0.1;   // m, of a residual
   constexpr double kPrior = 0.02;  // m per m of the lever arm
   constexpr double kStep = 1e-6;
@@ -212,8 +208,8 @@ Eigen::Isometry3d refine(const std::vector<BothMotions>& motions, Eigen::Isometr
       for (Eigen::Index j = 0; j < 6; ++j) {
         Vector6 change = Vector6::Zero();
         change[j] = kStep;
-        Eigen::Isometry3d moved = T_body_sensor;
-        const Eigen::Isometry3d T = motion_of(change);
+        Pose moved = T_body_sensor;
+        const Pose T = motion_of(change);
         moved.linear() = (T.linear() * T_body_sensor.linear()).eval();
         moved.translation() += T.translation();
         J.col(j) = (residual(m.body, m.sensor, moved) - r) / kStep;
@@ -224,13 +220,13 @@ Eigen::Isometry3d refine(const std::vector<BothMotions>& motions, Eigen::Isometr
     }
     const Vector6 change = -H.ldlt().solve(g);
     if (!change.allFinite()) break;
-    const Eigen::Isometry3d T = motion_of(change);
+    const Pose T = motion_of(change);
     T_body_sensor.linear() = (T.linear() * T_body_sensor.linear()).eval();
     T_body_sensor.translation() += T.translation();
     if (change.norm() < 1e-7) break;
   }
   T_body_sensor.linear() =
-      Eigen::Quaterniond(T_body_sensor.linear()).normalized().toRotationMatrix();
+      detail::Quaternion(T_body_sensor.linear()).normalized().toRotationMatrix();
   return T_body_sensor;
 }
 
@@ -294,13 +290,13 @@ std::vector<RegisteredMotion> register_motions(const Recording& recording) {
   if (recording.size() < 2) return motions;
   const std::vector<std::size_t> starts = starts_of_chains(recording.size());
   ChainScans scans(recording);
-  std::optional<Eigen::Isometry3d> elsewhere;
+  std::optional<Pose> elsewhere;
   for (std::size_t chain = 0; chain < starts.size(); ++chain) {
     scans.clear();
     const std::size_t first = starts[chain];
-    const Eigen::Isometry3d given =
+    const Pose given =
         recording.T_world_sensor(first).inverse() * recording.T_world_sensor(first + 1);
-    std::vector<Eigen::Isometry3d> guesses = first_guesses(given, elsewhere);
+    std::vector<Pose> guesses = first_guesses(given, elsewhere);
     for (std::size_t step = 1; step <= kLongest && first + step < recording.size(); step *= 2) {
       const auto found = register_both_ways(scans.get(first), scans.get(first + step), guesses,
                                             step == 1 ? kFarthestStep : kFarthestFromGuess);
@@ -338,7 +334,7 @@ Vector6 weights_of_axes(const std::vector<RegisteredMotion>& motions) {
 }  // namespace
 
 MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
-                         const Eigen::Isometry3d& T_body_sensor, Motions which) {
+                         const Pose& T_body_sensor, Motions which) {
   std::vector<double> translations, rotations, translation_noise, rotation_noise, both, noise;
   const Vector6 weights = weights_of_axes(motions);
   for (const RegisteredMotion& motion : motions) {
@@ -379,8 +375,8 @@ bool is_mostly_better(const std::vector<RegisteredMotion>& motions, const BodyMo
     const auto T_body = body(motion);
     const auto T_other = other(motion);
     if (!T_body || !T_other) continue;
-    const auto error = [&](const Eigen::Isometry3d& T) {
-      const auto identity = Eigen::Isometry3d::Identity();
+    const auto error = [&](const Pose& T) {
+      const auto identity = Pose::Identity();
       return residual(T, motion.T_first_second, identity).cwiseProduct(weights).norm();
     };
     if (error(*T_body) < error(*T_other)) ++better;
@@ -389,8 +385,8 @@ bool is_mostly_better(const std::vector<RegisteredMotion>& motions, const BodyMo
   return count >= kFewest && static_cast<double>(better) > kMost * static_cast<double>(count);
 }
 
-std::optional<Eigen::Isometry3d> fit_extrinsic(const std::vector<RegisteredMotion>& registered,
-                                               const BodyMotion& body) {
+std::optional<Pose> fit_extrinsic(const std::vector<RegisteredMotion>& registered,
+                                  const BodyMotion& body) {
   constexpr std::size_t kFewest = 4;
   constexpr double kClearly = 0.9;  // ratio of costs
   std::vector<BothMotions> motions;
@@ -399,10 +395,10 @@ std::optional<Eigen::Isometry3d> fit_extrinsic(const std::vector<RegisteredMotio
     if (T_body) motions.push_back({*T_body, motion.T_first_second});
   }
   if (motions.size() < kFewest) return std::nullopt;
-  std::optional<Eigen::Isometry3d> best;
+  std::optional<Pose> best;
   double least = 0.0;
   for (const Eigen::Matrix3d& R : axis_rotations()) {
-    Eigen::Isometry3d T_body_sensor = Eigen::Isometry3d::Identity();
+    Pose T_body_sensor = Pose::Identity();
     T_body_sensor.linear() = R;
     T_body_sensor = refine(motions, T_body_sensor);
     const double cost = robust_cost(motions, T_body_sensor);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dynains/io/recording.hpp"
+#include "dynains/pose.hpp"
 
 namespace dynains {
 
@@ -16,9 +17,9 @@ struct RegisteredMotion {
   std::size_t chain;   ///< motions of one chain begin at one scan
   std::size_t first;   ///< scan
   std::size_t second;  ///< scan
-  Eigen::Isometry3d T_first_second;
+  Pose T_first_second;
   /// Difference of both directions of the registration: rotation times 10 m, and translation, m.
-  Eigen::Matrix<double, 6, 1> difference;
+  Eigen::Matrix<double, 6, 1, Eigen::DontAlign> difference;
   double deviation;  ///< m, of a direction that landmarks determine; 0: none
 };
 
@@ -32,7 +33,7 @@ inline constexpr std::size_t kStartScans = 6;
 std::vector<RegisteredMotion> register_motions(const Recording& recording);
 
 /// Motion of the body between two scans under some reading of the poses; empty without poses.
-using BodyMotion = std::function<std::optional<Eigen::Isometry3d>(const RegisteredMotion&)>;
+using BodyMotion = std::function<std::optional<Pose>(const RegisteredMotion&)>;
 
 /// Difference of poses and registered motions: medians over pairs.
 struct MotionError {
@@ -51,7 +52,7 @@ enum class Motions { kAll, kSteps, kFirstSteps };  ///< steps: between neighbour
 
 /// `T_body_sensor`: of the body that moves.
 MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
-                         const Eigen::Isometry3d& T_body_sensor, Motions which = Motions::kAll);
+                         const Pose& T_body_sensor, Motions which = Motions::kAll);
 
 /// Whether most motions agree better with `body` than with `other`, each compared with itself:
 /// noise of the registration hides small differences of medians. False for fewer than 12 motions
@@ -61,8 +62,8 @@ bool is_mostly_better(const std::vector<RegisteredMotion>& motions, const BodyMo
 
 /// Hand-eye calibration: T_body_sensor for which the motions of the body and of the sensor agree
 /// best. Directions that the motions do not determine stay 0. Empty for fewer than 4 motions.
-std::optional<Eigen::Isometry3d> fit_extrinsic(const std::vector<RegisteredMotion>& registered,
-                                               const BodyMotion& body);
+std::optional<Pose> fit_extrinsic(const std::vector<RegisteredMotion>& registered,
+                                  const BodyMotion& body);
 
 /// The motions of even (0) or odd (1) chains.
 std::vector<RegisteredMotion> half_of(const std::vector<RegisteredMotion>& motions,

@@ -21,9 +21,8 @@ struct Linearization {
 };
 
 /// `scale`: m, residual at which the weight of a point is a fourth.
-Linearization linearize(const RegistrationScan& a, const RegistrationScan& b,
-                        const Eigen::Isometry3d& T, std::size_t level, double scale,
-                        std::size_t stride) {
+Linearization linearize(const RegistrationScan& a, const RegistrationScan& b, const Pose& T,
+                        std::size_t level, double scale, std::size_t stride) {
   Linearization result;
   for (std::size_t i = 0; i < b.points().size(); i += stride) {
     const Eigen::Vector3d p = T * b.points()[i];
@@ -39,17 +38,16 @@ struct Prior {
   double place;  // m, along direction
   double weight;
 
-  void add_to(NormalEquations& equations, const Eigen::Isometry3d& T) const {
+  void add_to(NormalEquations& equations, const Pose& T) const {
     Vector6 J;
     J << T.translation().cross(direction), direction;
     equations.add(J, direction.dot(T.translation()) - place, weight);
   }
 };
 
-Eigen::Isometry3d refine(const RegistrationScan& a, const RegistrationScan& b,
-                         const Eigen::Isometry3d& T, std::size_t level, double scale,
-                         std::size_t stride, int most, const Prior* prior = nullptr) {
-  return gauss_newton(T, most, 1e-5, [&](const Eigen::Isometry3d& at) {
+Pose refine(const RegistrationScan& a, const RegistrationScan& b, const Pose& T, std::size_t level,
+            double scale, std::size_t stride, int most, const Prior* prior = nullptr) {
+  return gauss_newton(T, most, 1e-5, [&](const Pose& at) {
     Linearization result = linearize(a, b, at, level, scale, stride);
     if (prior != nullptr) prior->add_to(result.equations, at);
     return result.equations;
@@ -106,7 +104,7 @@ constexpr double kFineStep = 0.1;  // m
 
 /// The result at `T` after the last step; empty if too few points meet a cell.
 std::optional<Registration> registration_at(const RegistrationScan& a, const RegistrationScan& b,
-                                            const Eigen::Isometry3d& T, const Prior* prior) {
+                                            const Pose& T, const Prior* prior) {
   constexpr std::size_t kFewest = 200;  // points that meet a cell
   Linearization step = linearize(a, b, T, 2, kFineStep, 1);
   if (step.equations.count() < kFewest) return std::nullopt;
@@ -124,14 +122,14 @@ std::optional<Registration> registration_at(const RegistrationScan& a, const Reg
 }  // namespace
 
 std::optional<Registration> register_scans(const RegistrationScan& a, const RegistrationScan& b,
-                                           const std::vector<Eigen::Isometry3d>& guesses) {
+                                           const std::vector<Pose>& guesses) {
   constexpr double kDistinct = 0.5;  // m
   constexpr double kAlmost = 0.93;   // ratio of scores
-  Eigen::Isometry3d best = Eigen::Isometry3d::Identity();
+  Pose best = Pose::Identity();
   double best_score = 0.0;
   std::vector<std::pair<Eigen::Vector3d, double>> results;  // translation and score
-  for (const Eigen::Isometry3d& guess : guesses) {
-    Eigen::Isometry3d T = refine(a, b, guess, 0, 1.0, 4, 12);
+  for (const Pose& guess : guesses) {
+    Pose T = refine(a, b, guess, 0, 1.0, 4, 12);
     T = refine(a, b, T, 1, 0.4, 3, 10);
     const Linearization step = linearize(a, b, T, 1, 0.3, 2);
     const double score =
@@ -153,10 +151,10 @@ std::optional<Registration> register_scans(const RegistrationScan& a, const Regi
 }
 
 std::optional<Registration> register_near(const RegistrationScan& a, const RegistrationScan& b,
-                                          const Eigen::Isometry3d& guess, const KnownWay& way) {
+                                          const Pose& guess, const KnownWay& way) {
   const double ratio = kPointDeviation / way.deviation;
   const Prior prior{way.direction, way.direction.dot(guess.translation()), ratio * ratio};
-  Eigen::Isometry3d T = refine(a, b, guess, 1, 0.2, 1, 8, &prior);
+  Pose T = refine(a, b, guess, 1, 0.2, 1, 8, &prior);
   T = refine(a, b, T, 2, kFineStep, 1, 15, &prior);
   return registration_at(a, b, T, &prior);
 }

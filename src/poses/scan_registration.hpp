@@ -9,6 +9,7 @@
 
 #include "cell_surfaces.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 
 namespace dynains {
 
@@ -30,7 +31,7 @@ class RegistrationScan {
 };
 
 struct Registration {
-  Eigen::Isometry3d T_a_b = Eigen::Isometry3d::Identity();
+  Pose T_a_b = Pose::Identity();
   double score = 0.0;        ///< mean weight of the points of b, [0, 1]; higher is better
   double uncertainty = 0.0;  ///< m, of the translation along its least certain direction
   /// The two directions that planes determine worst, the worst first; unit vectors, frame of a.
@@ -42,7 +43,7 @@ struct Registration {
 /// Registers `b` to `a` from several guesses of T_a_b; the best result counts. Empty if too few
 /// points of `b` meet a cell of `a`.
 std::optional<Registration> register_scans(const RegistrationScan& a, const RegistrationScan& b,
-                                           const std::vector<Eigen::Isometry3d>& guesses);
+                                           const std::vector<Pose>& guesses);
 
 /// A component of the translation that is known otherwise.
 struct KnownWay {
@@ -52,6 +53,6 @@ struct KnownWay {
 
 /// As register_scans(), by small steps from `guess`, whose translation along `way` is known.
 std::optional<Registration> register_near(const RegistrationScan& a, const RegistrationScan& b,
-                                          const Eigen::Isometry3d& guess, const KnownWay& way);
+                                          const Pose& guess, const KnownWay& way);
 
 }  // namespace dynains

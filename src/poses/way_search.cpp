@@ -20,12 +20,12 @@ Points thinned(const Points& points) {
   return kept;
 }
 
-Eigen::Isometry3d moved(Eigen::Isometry3d T, const Eigen::Vector3d& way) {
+Pose moved(Pose T, const Eigen::Vector3d& way) {
   T.translation() += way;
   return T;
 }
 
-double gap_of(const Landmarks& a, const Points& points, const Eigen::Isometry3d& T) {
+double gap_of(const Landmarks& a, const Points& points, const Pose& T) {
   double sum = 0.0;
   for (const Eigen::Vector3d& p : points) sum += a.distance_to(T * p);
   return sum / static_cast<double>(points.size());
@@ -47,14 +47,13 @@ std::optional<std::size_t> clear_minimum(const std::vector<double>& gaps) {
 
 }  // namespace
 
-double mean_gap(const Landmarks& a, const Landmarks& b, const Eigen::Isometry3d& T_a_b) {
+double mean_gap(const Landmarks& a, const Landmarks& b, const Pose& T_a_b) {
   return 0.5 *
          (gap_of(a, thinned(b.points()), T_a_b) + gap_of(b, thinned(a.points()), T_a_b.inverse()));
 }
 
-std::optional<Eigen::Isometry3d> search_way(const Landmarks& a, const Landmarks& b,
-                                            const Eigen::Isometry3d& T_a_b,
-                                            const Eigen::Vector3d& direction, double farthest) {
+std::optional<Pose> search_way(const Landmarks& a, const Landmarks& b, const Pose& T_a_b,
+                               const Eigen::Vector3d& direction, double farthest) {
   constexpr double kKeptPlace = 0.5;    // m
   constexpr std::size_t kFewest = 60;   // points
   constexpr double kLeastShare = 0.15;  // of the points, that do not keep their place
@@ -62,7 +61,7 @@ std::optional<Eigen::Isometry3d> search_way(const Landmarks& a, const Landmarks&
   const Points of_b = thinned(b.points());
   if (of_a.size() < kFewest || of_b.size() < kFewest) return std::nullopt;
   const double way = direction.dot(T_a_b.translation());
-  const Eigen::Isometry3d standing = moved(T_a_b, -way * direction);
+  const Pose standing = moved(T_a_b, -way * direction);
   Points decisive;
   for (const Eigen::Vector3d& p : of_b) {
     if (a.distance_to(standing * p) > kKeptPlace) decisive.push_back(p);
@@ -82,7 +81,7 @@ std::optional<Eigen::Isometry3d> search_way(const Landmarks& a, const Landmarks&
 
   // Fine steps count all points, in both directions.
   const auto gap_at = [&](double displacement) {
-    const Eigen::Isometry3d T = moved(T_a_b, displacement * direction);
+    const Pose T = moved(T_a_b, displacement * direction);
     return 0.5 * (gap_of(a, of_b, T) + gap_of(b, of_a, T.inverse()));
   };
   double best = coarse;

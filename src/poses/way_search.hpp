@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <optional>
 
+#include "dynains/pose.hpp"
 #include "dynains/poses/diagnosis.hpp"
 
 namespace dynains {
@@ -12,14 +13,13 @@ namespace dynains {
 inline constexpr double kWayRange = 80.0;
 
 /// Mean distance (m) of the points of each scan from those of the other one, at most 1 m.
-double mean_gap(const Landmarks& a, const Landmarks& b, const Eigen::Isometry3d& T_a_b);
+double mean_gap(const Landmarks& a, const Landmarks& b, const Pose& T_a_b);
 
 /// Moves `T_a_b` along `direction` (unit vector, frame of a) by less than `farthest` (m) to where
 /// plants, posts and signs meet. Points that fit without a motion along `direction` (walls,
 /// traffic at the speed of the sensor) are left out. Empty if too few points remain, or if no place
 /// is clearly best.
-std::optional<Eigen::Isometry3d> search_way(const Landmarks& a, const Landmarks& b,
-                                            const Eigen::Isometry3d& T_a_b,
-                                            const Eigen::Vector3d& direction, double farthest);
+std::optional<Pose> search_way(const Landmarks& a, const Landmarks& b, const Pose& T_a_b,
+                               const Eigen::Vector3d& direction, double farthest);
 
 }  // namespace dynains

@@ -117,8 +117,7 @@ class ScanPoints {
 
 }  // namespace
 
-void KeptPoints::insert_into(StaticMapAccumulator& map, std::size_t i,
-                             const Eigen::Isometry3d& T_world_sensor) {
+void KeptPoints::insert_into(StaticMapAccumulator& map, std::size_t i, const Pose& T_world_sensor) {
   ScanPoints points(recording_, i, scan_);
   const std::filesystem::path file = labels_ / (recording_.name(i) + ".label");
   check_labels(file, points.size());

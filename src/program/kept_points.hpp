@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dynains/io/recording.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/static_map_accumulator.hpp"
 
 namespace dynains::program {
@@ -23,8 +24,7 @@ class KeptPoints {
   /// Inserts the static points of scan `i` in the order of the file. Throws IoError for files that
   /// cannot be read, labels of other scans, and labels that no run writes; the map is then
   /// incomplete.
-  void insert_into(StaticMapAccumulator& map, std::size_t i,
-                   const Eigen::Isometry3d& T_world_sensor);
+  void insert_into(StaticMapAccumulator& map, std::size_t i, const Pose& T_world_sensor);
 
  private:
   const Recording& recording_;

@@ -128,7 +128,7 @@ StaticMapAccumulator build_map(const Recording& corrected, const Recording& orig
   Progress progress(scans.size(), "scans", quiet);
   for (std::size_t k = 0; k < scans.size(); ++k) {
     if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
-    const Eigen::Isometry3d& pose = corrected.T_world_sensor(scans[k]);
+    const Pose& pose = corrected.T_world_sensor(scans[k]);
     kept.insert_into(map, scans[k], orthonormalized(pose));
     progress.update(k + 1);
   }

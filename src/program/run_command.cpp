@@ -58,7 +58,7 @@ void print_results(const RunOutcome& run) {
 }
 
 void print_alignment(const SessionAlignment& alignment) {
-  const Eigen::Isometry3d& T = alignment.T_city_session;
+  const Pose& T = alignment.T_city_session;
   const Eigen::Vector3d t = T.translation();
   std::cout << std::fixed << std::setprecision(3) << "aligned with " << alignment.sessions.size()
             << (alignment.sessions.size() == 1 ? " session" : " sessions") << ": moved by ("

@@ -14,6 +14,7 @@
 #include "dynains/adapters/matrix_pose.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/point_cloud_traits.hpp"
+#include "dynains/pose.hpp"
 
 namespace dynains::python {
 
@@ -80,7 +81,7 @@ using PoseArray = py::array_t<double, py::array::c_style | py::array::forcecast>
 
 /// Throws PoseError unless `pose` is a 4 x 4 rigid transform, TypeError if NumPy cannot convert it
 /// to an array of numbers.
-inline Eigen::Isometry3d to_pose(const py::handle& pose) {
+inline Pose to_pose(const py::handle& pose) {
   const PoseArray array = PoseArray::ensure(pose);
   if (!array) throw py::type_error("a pose is " + type_text(pose) + ", expected (4, 4) numbers");
   if (array.ndim() != 2 || array.shape(0) != 4 || array.shape(1) != 4) {
@@ -89,7 +90,7 @@ inline Eigen::Isometry3d to_pose(const py::handle& pose) {
   return pose_from_row_major(array.data());
 }
 
-inline py::array_t<double> to_array(const Eigen::Isometry3d& T) {
+inline py::array_t<double> to_array(const Pose& T) {
   py::array_t<double> array({4, 4});
   Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(array.mutable_data()) = T.matrix();
   return array;

@@ -14,7 +14,7 @@ bool is_text(const py::handle& value) {
   return py::isinstance<py::str>(value) || py::hasattr(value, "__fspath__");
 }
 
-Eigen::Isometry3d to_extrinsic(const py::handle& value) {
+Pose to_extrinsic(const py::handle& value) {
   return is_text(value) ? read_extrinsic(to_path(value).string()) : to_pose(value);
 }
 

@@ -22,7 +22,7 @@ namespace {
 struct OwnedVerdict {
   std::uint64_t scan;
   double time;
-  Eigen::Isometry3d T_world_sensor;
+  Pose T_world_sensor;
   std::vector<std::uint8_t> labels;
   std::vector<std::uint32_t> instances;
   std::vector<float> beliefs;
@@ -76,7 +76,7 @@ class Remover {
   explicit Remover(const DynaInsRemover::Config& config) : remover_(config) {}
 
   Frame push(const py::object& points, const py::object& pose, std::optional<double> time) {
-    const Eigen::Isometry3d T_world_sensor = to_pose(pose);
+    const Pose T_world_sensor = to_pose(pose);
     std::optional<OwnedVerdict> newest, finished;
     StageTimes times;
     std::optional<PoseResidual> pose_residual;

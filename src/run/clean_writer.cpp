@@ -39,9 +39,8 @@ std::string CleanWriter::name(const Recording& recording, std::size_t i) {
   return recording.name(i) + ".ply";
 }
 
-Eigen::Isometry3d CleanWriter::T_file_sensor(std::size_t i) const {
-  return recording_.frame() == PointFrame::kWorld ? recording_.T_world_sensor(i)
-                                                  : Eigen::Isometry3d::Identity();
+Pose CleanWriter::T_file_sensor(std::size_t i) const {
+  return recording_.frame() == PointFrame::kWorld ? recording_.T_world_sensor(i) : Pose::Identity();
 }
 
 void CleanWriter::write_bin(const std::filesystem::path& file, std::size_t i,
@@ -65,14 +64,13 @@ void CleanWriter::write(std::size_t i, const RecordedScan& scan,
     write_bin(file, i, scan, labels);
     return;
   }
-  const Eigen::Isometry3d T = T_file_sensor(i);
+  const Pose T = T_file_sensor(i);
   PointColumns columns = recording_.columns();
   columns.label = false;
   columns.double_xyz = T.translation().cwiseAbs().maxCoeff() > kFloatCoordinateLimit;
   const bool has_pose = recording_.has_viewpoints() || recording_.format() == ScanFormat::kLog ||
                         recording_.frame() == PointFrame::kWorld;
-  PointFileWriter writer(file, columns,
-                         has_pose ? recording_.T_world_sensor(i) : Eigen::Isometry3d::Identity());
+  PointFileWriter writer(file, columns, has_pose ? recording_.T_world_sensor(i) : Pose::Identity());
   for (std::size_t k = 0; k < labels.size(); ++k) {
     if (!is_kept(labels[k])) continue;
     FilePoint point = scan.point(k);

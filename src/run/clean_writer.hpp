@@ -7,6 +7,7 @@
 
 #include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 
 namespace dynains::program {
 
@@ -25,7 +26,7 @@ class CleanWriter {
  private:
   void write_bin(const std::filesystem::path& file, std::size_t i, const RecordedScan& scan,
                  Span<const PointLabel> labels) const;
-  Eigen::Isometry3d T_file_sensor(std::size_t i) const;
+  Pose T_file_sensor(std::size_t i) const;
 
   std::filesystem::path folder_;
   const Recording& recording_;

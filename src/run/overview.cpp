@@ -95,7 +95,7 @@ Overview::Overview(const std::vector<Eigen::Vector3d>& path)
 }
 
 void Overview::add(const RecordedScan& scan, const ScanVerdict& verdict) {
-  const Eigen::Isometry3d& T_world_sensor = verdict.T_world_sensor;
+  const Pose& T_world_sensor = verdict.T_world_sensor;
   const double sensor_height = T_world_sensor.translation().z();
   static_points_.clear();
   for (std::size_t i = 0; i < verdict.labels.size(); i += static_step_) {

@@ -125,7 +125,7 @@ std::string describe(const Recording& recording, const Diagnosis& d) {
     add_line(text, "", to_text(d.readings[i].agreement));
   }
   text << '\n';
-  if (recording.convention().T_body_sensor.isApprox(Eigen::Isometry3d::Identity(), 0.0)) {
+  if (recording.convention().T_body_sensor.isApprox(Pose::Identity(), 0.0)) {
     for (const std::string& file : frame_files(recording)) {
       text << "note: for poses of another frame than the lidar: --extrinsic " << file
            << ":BODY:LIDAR\n";

@@ -158,8 +158,8 @@ SessionRequest session_request(const RunSettings& settings, const Recording& seq
   request.info.fingerprint = pose_fingerprint(sequence, range);
   request.info.config = configuration.dump();
   if (settings.align) {
-    request.T_city_start = settings.align_start.empty() ? Eigen::Isometry3d::Identity()
-                                                        : read_extrinsic(settings.align_start);
+    request.T_city_start =
+        settings.align_start.empty() ? Pose::Identity() : read_extrinsic(settings.align_start);
   }
   return request;
 }

@@ -73,9 +73,9 @@ SessionContribution::SessionContribution(const SessionRequest& request)
 void SessionContribution::add(const RecordedScan& scan, const ScanVerdict& verdict,
                               const std::vector<std::uint32_t>& labels, std::size_t number) {
   copy_points(scan, points_);
-  const Eigen::Isometry3d T_city_sensor =
-      T_city_session_ ? orthonormalized(*T_city_session_ * verdict.T_world_sensor)
-                      : verdict.T_world_sensor;
+  const Pose T_city_sensor = T_city_session_
+                                 ? orthonormalized(*T_city_session_ * verdict.T_world_sensor)
+                                 : verdict.T_world_sensor;
   writer_.add(points_, verdict.labels, labels, T_city_sensor, static_cast<std::uint32_t>(number));
 }
 

@@ -13,6 +13,7 @@
 #include "dynains/city/session_writer.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/verdict.hpp"
 #include "scan_range.hpp"
 
@@ -23,7 +24,7 @@ struct SessionRequest {
   std::filesystem::path city;  ///< by whole_path(); empty: none
   SessionInfo info;            ///< without counts
   SessionGrid grid;
-  std::optional<Eigen::Isometry3d> T_city_start;  ///< of the alignment; empty: none is asked for
+  std::optional<Pose> T_city_start;  ///< of the alignment; empty: none is asked for
 
   /// Whether the city has this session already, from the same scans, poses, times and
   /// configuration. Throws IoError.
@@ -47,7 +48,7 @@ class SessionContribution {
 
  private:
   SessionWriter writer_;
-  std::optional<Eigen::Isometry3d> T_city_session_;
+  std::optional<Pose> T_city_session_;
   PointBuffer points_;
 };
 

@@ -33,7 +33,7 @@ void VerdictCloud::drop_covered() {
 
 void VerdictCloud::add(const evaluation::LabelledScan& scan) {
   if (path_.empty()) origin_ = scan.T_world_sensor.translation();
-  Eigen::Isometry3d T_local_sensor = scan.T_world_sensor;
+  Pose T_local_sensor = scan.T_world_sensor;
   T_local_sensor.translation() -= origin_;
   path_.push_back(T_local_sensor.translation());
   constexpr double kReach = 1 << 19;  // cells per axis and side

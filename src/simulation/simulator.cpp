@@ -34,8 +34,8 @@ Eigen::Matrix3d rotation(double yaw, double pitch, double roll) {
   return m;
 }
 
-Eigen::Isometry3d product(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
-  Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
+Pose product(const Pose& a, const Pose& b) {
+  Pose result = Pose::Identity();
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 4; ++c) {
       double sum = c == 3 ? a(r, 3) : 0.0;
@@ -46,8 +46,8 @@ Eigen::Isometry3d product(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b
   return result;
 }
 
-Eigen::Isometry3d inverse(const Eigen::Isometry3d& t) {
-  Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
+Pose inverse(const Pose& t) {
+  Pose result = Pose::Identity();
   for (int r = 0; r < 3; ++r) {
     double sum = 0;
     for (int k = 0; k < 3; ++k) {
@@ -59,14 +59,14 @@ Eigen::Isometry3d inverse(const Eigen::Isometry3d& t) {
   return result;
 }
 
-Rigid to_rigid(const Eigen::Isometry3d& t) {
+Rigid to_rigid(const Pose& t) {
   auto f = [&t](int r, int c) { return static_cast<float>(t(r, c)); };
   return {{{f(0, 0), f(0, 1), f(0, 2)}, {f(1, 0), f(1, 1), f(1, 2)}, {f(2, 0), f(2, 1), f(2, 2)}},
           {f(0, 3), f(1, 3), f(2, 3)}};
 }
 
-Eigen::Isometry3d isometry(const Eigen::Matrix3d& r, double x, double y, double z) {
-  Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
+Pose isometry(const Eigen::Matrix3d& r, double x, double y, double z) {
+  Pose result = Pose::Identity();
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) result(i, j) = r(i, j);
   }
@@ -77,7 +77,7 @@ Eigen::Isometry3d isometry(const Eigen::Matrix3d& r, double x, double y, double 
 }
 
 /// A body of the given length and width on uneven ground.
-Eigen::Isometry3d stand_on(Terrain& terrain, const Waypoint& at, double length, double width) {
+Pose stand_on(Terrain& terrain, const Waypoint& at, double length, double width) {
   const Vec2 u = direction(at.heading), v = left_of(u);
   double front = 0, rear = 0, left = 0, right = 0;
   // Several places under each axle: tyres and springs swallow the smallest bumps.
@@ -150,7 +150,7 @@ class Simulator::Implementation {
   struct Moment {
     double time = 0;
     EgoPose ego;
-    Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+    Pose T_world_sensor = Pose::Identity();
     std::vector<ObjectPose> objects;
   };
 
@@ -235,16 +235,16 @@ class Simulator::Implementation {
     return moment;
   }
 
-  Eigen::Isometry3d sensor_pose(const EgoPose& ego, double time) {
+  Pose sensor_pose(const EgoPose& ego, double time) {
     const Eigen::Matrix3d tilt =
         rotation(0, config_.mounting_pitch * kPi / 180, config_.mounting_roll * kPi / 180);
-    const Eigen::Isometry3d T_body_mount = isometry(tilt, 0, 0, model_.height);
-    const Eigen::Isometry3d T_mount_sensor = isometry(rotation(model_.yaw, 0, 0), 0, 0, 0);
+    const Pose T_body_mount = isometry(tilt, 0, 0, model_.height);
+    const Pose T_mount_sensor = isometry(rotation(model_.yaw, 0, 0), 0, 0, 0);
     return product(product(body_pose(ego, time), T_body_mount), T_mount_sensor);
   }
 
   /// Pose of the body that carries the sensor, at the ground.
-  Eigen::Isometry3d body_pose(const EgoPose& ego, double time) {
+  Pose body_pose(const EgoPose& ego, double time) {
     switch (config_.gait) {
       case Gait::kHandHeld:
         return product(upright(ego.at), hand_held_sway(std::min(1.0, ego.speed), time));
@@ -257,13 +257,13 @@ class Simulator::Implementation {
     return product(stand_on(world_.terrain, ego.at, 4.3, 1.8), springs(ego, time));
   }
 
-  Eigen::Isometry3d upright(const Waypoint& at) {
+  Pose upright(const Waypoint& at) {
     return isometry(rotation(at.heading, 0, 0), at.position.x, at.position.y,
                     world_.terrain.height(at.position));
   }
 
   /// Braking, bends, and a little swaying while driving.
-  static Eigen::Isometry3d springs(const EgoPose& ego, double time) {
+  static Pose springs(const EgoPose& ego, double time) {
     const double sway = std::min(1.0, ego.speed / 5) * 0.12 * kPi / 180;
     const double pitch = -0.0035 * std::clamp(ego.acceleration, -4.0, 2.0) +
                          sway * (std::sin(2 * kPi * 1.3 * time) + std::sin(2 * kPi * 0.71 * time));
@@ -273,7 +273,7 @@ class Simulator::Implementation {
   }
 
   /// A person looks around all the time, and bobs with `stride` (0 to 1) at 1.8 steps a second.
-  static Eigen::Isometry3d hand_held_sway(double stride, double time) {
+  static Pose hand_held_sway(double stride, double time) {
     constexpr double kLook = 1.15;  // rad/s; with the amplitude below up to 40 deg/s
     const double step = 2 * kPi * 1.8 * time, deg = kPi / 180;
     const double yaw = 0.6 * std::sin(kLook * time);
@@ -284,7 +284,7 @@ class Simulator::Implementation {
   }
 
   /// A robot on four legs, with two steps of each pair of legs a second.
-  static Eigen::Isometry3d trot(double stride, double time) {
+  static Pose trot(double stride, double time) {
     const double step = 2 * kPi * 2 * time, deg = kPi / 180;
     return isometry(
         rotation(stride * deg * 2 * std::sin(step / 2), stride * deg * 1.2 * std::sin(2 * step),
@@ -292,14 +292,13 @@ class Simulator::Implementation {
         0.01 * stride * std::sin(2 * step), 0, 0.015 * stride * std::sin(2 * step));
   }
 
-  Eigen::Isometry3d with_noise(const Eigen::Isometry3d& pose, std::size_t index) const {
+  Pose with_noise(const Pose& pose, std::size_t index) const {
     Random random(mix(seed_of_day(600), index));
     double offset[3], turn[3];
     for (double& v : offset) v = config_.pose_noise_translation * random.normal();
     for (int i = 0; i < 3; ++i) offset[i] += drift_.at(index)[static_cast<std::size_t>(i)];
     for (double& v : turn) v = config_.pose_noise_rotation * kPi / 180 * random.normal();
-    Eigen::Isometry3d result =
-        product(pose, isometry(rotation(turn[0], turn[1], turn[2]), 0, 0, 0));
+    Pose result = product(pose, isometry(rotation(turn[0], turn[1], turn[2]), 0, 0, 0));
     for (int i = 0; i < 3; ++i) result(i, 3) = pose(i, 3) + offset[i];
     return result;
   }
@@ -318,7 +317,7 @@ class Simulator::Implementation {
   }
 
   void draw_world(const Moment& moment, std::vector<ObjectState>& states) {
-    const Eigen::Isometry3d T_sensor_world = inverse(moment.T_world_sensor);
+    const Pose T_sensor_world = inverse(moment.T_world_sensor);
     const Rigid T_world_sensor = to_rigid(moment.T_world_sensor);
     const Rigid turn{transposed(T_world_sensor.rotation), {}};
     const Vec3 origin = T_world_sensor.translation;
@@ -334,7 +333,7 @@ class Simulator::Implementation {
     for (const ObjectPose& pose : moment.objects) {
       const Object& object = world_.traffic.objects[pose.object];
       const bool person = object.kind == Kind::kPedestrian;
-      const Eigen::Isometry3d T_world_object =
+      const Pose T_world_object =
           person ? isometry(rotation(pose.at.heading, 0, 0), pose.at.position.x, pose.at.position.y,
                             world_.terrain.height(pose.at.position))
                  : stand_on(world_.terrain, pose.at, object.size.length, object.size.width);

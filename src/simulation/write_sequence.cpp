@@ -12,8 +12,8 @@ namespace dynains::simulation {
 namespace {
 
 /// Sensor to camera axes, as in a KITTI recording: x right, y down, z forward.
-Eigen::Isometry3d camera_from_sensor() {
-  Eigen::Isometry3d Tr = Eigen::Isometry3d::Identity();
+Pose camera_from_sensor() {
+  Pose Tr = Pose::Identity();
   Tr.linear() << 0, -1, 0, 0, 0, -1, 1, 0, 0;
   Tr.translation() << 0.0, -0.08, -0.27;
   return Tr;
@@ -37,9 +37,9 @@ bool write_sequence(Simulator& simulator, const std::filesystem::path& folder,
                     const std::function<bool(std::size_t, std::size_t)>& progress) {
   make_folder(folder / "velodyne");
   make_folder(folder / "labels");
-  const Eigen::Isometry3d Tr = camera_from_sensor();
-  const Eigen::Isometry3d Tr_inverse = Tr.inverse();
-  std::vector<Eigen::Isometry3d> poses, true_poses;
+  const Pose Tr = camera_from_sensor();
+  const Pose Tr_inverse = Tr.inverse();
+  std::vector<Pose> poses, true_poses;
   std::vector<double> times;
   for (std::size_t i = 0; i < simulator.size(); ++i) {
     const SimulatedScan scan = simulator.scan(i);

@@ -134,7 +134,7 @@ class Collector {
   }
 
   void add_scan(std::size_t i, const MapIndex& map) {
-    Eigen::Isometry3d T_local_sensor = recording_.T_world_sensor(i);
+    Pose T_local_sensor = recording_.T_world_sensor(i);
     T_local_sensor.translation() -= data_.origin;
     for (std::size_t k = 0; k < scan_.labels.size(); ++k) {
       ViewPoint point = describe(k);
@@ -159,7 +159,7 @@ class Collector {
     for (std::size_t i = files_.first; i <= files_.last; ++i) {
       if (!files_.references.is_reference(i - files_.first)) continue;
       recording_.read_scan(i, scan_.points);
-      Eigen::Isometry3d T_local_sensor = recording_.T_world_sensor(i);
+      Pose T_local_sensor = recording_.T_world_sensor(i);
       T_local_sensor.translation() -= data_.origin;
       finder.compare(i - files_.first, T_local_sensor.inverse(), scan_.points.xyzi);
     }

@@ -44,7 +44,7 @@ SightingFinder::SightingFinder(const std::vector<ViewPoint>& points, const Refer
   }
 }
 
-void SightingFinder::compare(std::size_t reference, const Eigen::Isometry3d& T_sensor_local,
+void SightingFinder::compare(std::size_t reference, const Pose& T_sensor_local,
                              const std::vector<float>& xyzi) {
   make_image(xyzi);
   const Eigen::Isometry3f T = T_sensor_local.cast<float>();

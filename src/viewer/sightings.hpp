@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/pose.hpp"
 #include "view_data.hpp"
 
 namespace dynains::viewer {
@@ -54,8 +55,7 @@ class SightingFinder {
 
   /// Compares the points whose window has the scan `reference`. `xyzi`: x y z intensity of its
   /// points, interleaved, m, sensor frame. `T_sensor_local`: from the frame of ViewPoint::local.
-  void compare(std::size_t reference, const Eigen::Isometry3d& T_sensor_local,
-               const std::vector<float>& xyzi);
+  void compare(std::size_t reference, const Pose& T_sensor_local, const std::vector<float>& xyzi);
 
   /// By point. Call it after the last scan.
   std::vector<Sightings> take() { return std::move(sightings_); }

@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-using Poses = std::vector<Eigen::Isometry3d>;
+using Poses = std::vector<Pose>;
 
 constexpr std::size_t kScans = 60;
 constexpr double kPeriod = 0.1;  // s

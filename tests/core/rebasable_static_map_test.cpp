@@ -57,7 +57,7 @@ Eigen::Isometry3d random_pose(Random& random) {
 
 /// The definition of the map, point by point.
 std::map<std::array<std::int64_t, 3>, Coordinates> reference_of(
-    const std::vector<TestScan>& scans, const std::vector<Eigen::Isometry3d>& poses, double voxel) {
+    const std::vector<TestScan>& scans, const std::vector<Pose>& poses, double voxel) {
   const auto voxel_of = [](const Eigen::Vector3d& p, double edge) {
     return std::array<std::int64_t, 3>{static_cast<std::int64_t>(std::floor(p.x() / edge)),
                                        static_cast<std::int64_t>(std::floor(p.y() / edge)),
@@ -86,7 +86,7 @@ TEST_CASE("After any insertions and updates the map equals a new one with the la
   Random random(seed);
   RebasableStaticMap map = make_rebasable(voxel);
   std::vector<TestScan> scans;
-  std::vector<Eigen::Isometry3d> poses;
+  std::vector<Pose> poses;
   for (int step = 0; step < 40; ++step) {
     if (scans.empty() || random.index(2) == 0) {
       scans.push_back(random_scan(random));

@@ -60,7 +60,7 @@ inline std::vector<OwnedScan> write_street(const std::filesystem::path& folder, 
   std::filesystem::create_directories(folder / "velodyne");
   std::filesystem::create_directories(folder / "labels");
   std::vector<OwnedScan> result;
-  std::vector<Eigen::Isometry3d> poses;
+  std::vector<Pose> poses;
   std::vector<double> times;
   for (std::size_t number = 0; number < scans; ++number) {
     result.push_back(street_scan(number, speed));

@@ -42,7 +42,7 @@ TEST_CASE("Written sequences are read back") {
   pose.linear() =
       Eigen::AngleAxisd(0.3, Eigen::Vector3d(1.0, 2.0, 3.0).normalized()).toRotationMatrix();
   pose.translation() << 691234.123456, 5334567.654321, 512.25;  // UTM
-  const std::vector<Eigen::Isometry3d> poses(3, pose);
+  const std::vector<Pose> poses(3, pose);
   const std::vector<double> times = {1571.123456789, 1571.2, 1600000000.000001};
 
   write_scan(folder / "velodyne/000001.bin", scan);

@@ -35,7 +35,7 @@ struct Drive {
     return [this](const RegisteredMotion& m) { return std::optional(bodies[m.first]); };
   }
 
-  std::vector<Eigen::Isometry3d> bodies;
+  std::vector<Pose> bodies;
   std::vector<RegisteredMotion> motions;
 };
 
@@ -112,7 +112,7 @@ TEST_CASE("Poses fit mostly better if they do at more than 70 % of at least 12 m
   const std::vector<RegisteredMotion> eleven(drive.motions.begin(), drive.motions.begin() + 11);
   CHECK_FALSE(is_mostly_better(eleven, drive.body(), everywhere_by_3_cm));
   const BodyMotion in_no_trajectory = [](const RegisteredMotion&) {
-    return std::optional<Eigen::Isometry3d>();
+    return std::optional<Pose>();
   };
   CHECK_FALSE(is_mostly_better(twelve, drive.body(), in_no_trajectory));
 }

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-using Poses = std::vector<Eigen::Isometry3d>;
+using Poses = std::vector<Pose>;
 
 /// A drive around the bends of a hilly street.
 simulation::Config bends() {

@@ -253,7 +253,7 @@ TEST_CASE("map: remap --update moves one session to corrected poses, as if it ha
   // comparable.
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.translation() = Eigen::Vector3d(64.0, -32.0, 2.0);
-  const std::vector<Eigen::Isometry3d> poses(kDayScans, pose);
+  const std::vector<Pose> poses(kDayScans, pose);
   write_poses(days.at("corrected.txt"), poses);
   REQUIRE(remap("corrected.txt", "city").code == 0);
   REQUIRE(days.update(0, "expected", "out2").code == 0);

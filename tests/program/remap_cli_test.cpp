@@ -27,10 +27,10 @@ namespace {
 
 constexpr std::size_t kRunScans = 12;
 
-std::vector<Eigen::Isometry3d> other_poses(std::size_t count, unsigned seed) {
+std::vector<Pose> other_poses(std::size_t count, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> any(-1.0, 1.0);
-  std::vector<Eigen::Isometry3d> poses;
+  std::vector<Pose> poses;
   for (std::size_t i = 0; i < count; ++i) {
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     pose.translation() = 20.0 * Eigen::Vector3d(any(random), any(random), any(random));
@@ -43,7 +43,7 @@ std::vector<Eigen::Isometry3d> other_poses(std::size_t count, unsigned seed) {
 }
 
 void write_other_poses(const std::string& file, std::size_t count, unsigned seed) {
-  const std::vector<Eigen::Isometry3d> poses = other_poses(count, seed);
+  const std::vector<Pose> poses = other_poses(count, seed);
   write_poses(file, poses);
 }
 
@@ -187,7 +187,7 @@ TEST_CASE("remap of points in the frame of the world leads through the poses of 
   RemapFixture f;
   const std::string seq = f.folder / "world";
   fs::create_directories(seq + "/pcd");
-  const std::vector<Eigen::Isometry3d> poses = other_poses(kRunScans, 3);
+  const std::vector<Pose> poses = other_poses(kRunScans, 3);
   for (std::size_t i = 0; i < kRunScans; ++i) {
     PointFileWriter writer(seq + "/pcd/" + scan_name(i) + ".pcd", {}, poses[i]);
     const std::vector<float> scan = tiny_scan(i);

@@ -51,7 +51,7 @@ inline void write_tiny_sequence(const std::filesystem::path& folder, std::size_t
   }
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.translation() = position;
-  const std::vector<Eigen::Isometry3d> poses(scans, pose);
+  const std::vector<Pose> poses(scans, pose);
   write_poses(folder / "poses.txt", poses);
 }
 

@@ -42,7 +42,7 @@ class Rehearsal {
     write_text(root_ + "/seq/run.cfg", "window = 3\n");
     Eigen::Isometry3d corrected = Eigen::Isometry3d::Identity();
     corrected.translation() << 64.0, -32.0, 2.0;
-    const std::vector<Eigen::Isometry3d> poses(4, corrected);
+    const std::vector<Pose> poses(4, corrected);
     write_poses(root_ + "/seq/corrected.txt", poses);
     for (const Arguments& arguments : scenario.before) {
       REQUIRE(start_or_stop(with_root(arguments)).code == 0);

@@ -13,9 +13,9 @@ namespace dynains {
 namespace detail {
 
 template <int kStorage, class Scalar>
-Eigen::Isometry3d pose_from_array(const Scalar* values, const char* order, const char* other) {
+Pose pose_from_array(const Scalar* values, const char* order, const char* other) {
   static_assert(std::is_floating_point_v<Scalar>, "poses are float or double");
-  Eigen::Isometry3d T;
+  Pose T;
   T.matrix() =
       Eigen::Map<const Eigen::Matrix<Scalar, 4, 4, kStorage>>(values).template cast<double>();
   const Eigen::RowVector4d unit(0, 0, 0, 1);
@@ -33,14 +33,14 @@ Eigen::Isometry3d pose_from_array(const Scalar* values, const char* order, const
 /// m. Throws PoseError unless it is a rigid transform; the message for a transposed matrix names
 /// the other order.
 template <class Scalar>
-Eigen::Isometry3d pose_from_row_major(const Scalar* values) {
+Pose pose_from_row_major(const Scalar* values) {
   return detail::pose_from_array<Eigen::RowMajor>(values, "row-major", "column-major");
 }
 
 /// Pose from a 4x4 matrix in column-major order, as in Eigen, OpenGL and MATLAB: 16 numbers,
 /// translation in m. Throws PoseError like pose_from_row_major().
 template <class Scalar>
-Eigen::Isometry3d pose_from_column_major(const Scalar* values) {
+Pose pose_from_column_major(const Scalar* values) {
   return detail::pose_from_array<Eigen::ColMajor>(values, "column-major", "row-major");
 }
 

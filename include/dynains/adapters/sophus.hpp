@@ -10,15 +10,15 @@ namespace dynains {
 
 /// Converts a pose of float or double to the type of DynaInsRemover::push().
 template <class Scalar, int kOptions>
-Eigen::Isometry3d to_isometry(const Sophus::SE3<Scalar, kOptions>& T_world_sensor) {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+Pose to_isometry(const Sophus::SE3<Scalar, kOptions>& T_world_sensor) {
+  Pose T = Pose::Identity();
   T.linear() = T_world_sensor.unit_quaternion().template cast<double>().toRotationMatrix();
   T.translation() = T_world_sensor.translation().template cast<double>();
   return T;
 }
 
 /// Converts a pose, for example that of a ScanVerdict. Throws PoseError if `T` is not rigid.
-inline Sophus::SE3<double> to_sophus(const Eigen::Isometry3d& T) {
+inline Sophus::SE3<double> to_sophus(const Pose& T) {
   validate_pose("T", T);
   return {Eigen::Quaterniond(T.linear()).normalized(), T.translation()};
 }

@@ -8,6 +8,7 @@
 #include "dynains/city/city.hpp"
 #include "dynains/city/session_alignment.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/stage/voxel_hash_table.hpp"
 
 namespace dynains {
@@ -27,12 +28,12 @@ class SessionAligner {
   explicit SessionAligner(const City& city) : city_(city) {}
 
   /// Adds one scan. `points`: m, sensor frame; others than finite ones are left out.
-  void add(PointsView points, const Eigen::Isometry3d& T_session_sensor);
+  void add(PointsView points, const Pose& T_session_sensor);
 
   /// Refines an estimate that is at most kMostTranslation and kMostRotation away. Throws
   /// ConfigError, with the figures, if the map has no points there, or if the scans do not fit, fit
   /// at several places or leave a direction open; IoError.
-  SessionAlignment align(const Eigen::Isometry3d& T_city_start) const;
+  SessionAlignment align(const Pose& T_city_start) const;
 
  private:
   struct Scan {

@@ -5,14 +5,16 @@
 #include <string>
 #include <vector>
 
+#include "dynains/pose.hpp"
+
 namespace dynains {
 
 /// Result of SessionAligner; session.json keeps it.
 struct SessionAlignment {
   /// The poses of the session are multiplied by it, from the left.
-  Eigen::Isometry3d T_city_session = Eigen::Isometry3d::Identity();
+  Pose T_city_session = Pose::Identity();
   /// The estimate that was refined.
-  Eigen::Isometry3d T_city_start = Eigen::Isometry3d::Identity();
+  Pose T_city_start = Pose::Identity();
   double residual = 0.0;     ///< m, root mean square distance of the points that fit to the map
   double fitting = 0.0;      ///< [0, 1], share of the points at upright surfaces that fit
   double uncertainty = 0.0;  ///< m, of the translation along its least certain direction

@@ -15,6 +15,7 @@
 #include "dynains/city/session_voxel_locator.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/simd/bits.hpp"
 
 namespace dynains {
@@ -49,7 +50,7 @@ class SessionPoints {
   /// Adds the static points of one scan (m, sensor frame). `verdicts`: final verdict by point.
   /// `labels`: label of the recording by point, or empty. `scan`: its number; ascending.
   void add(PointsView points, Span<const PointLabel> verdicts, Span<const std::uint32_t> labels,
-           const Eigen::Isometry3d& T_world_sensor, std::uint32_t scan) {
+           const Pose& T_world_sensor, std::uint32_t scan) {
     locator_.begin_scan(T_world_sensor);
     around_.assign(locator_.tile_count(), nullptr);
     const Scan all = {points, verdicts, labels, T_world_sensor, scan};
@@ -116,7 +117,7 @@ class SessionPoints {
     PointsView points;
     Span<const PointLabel> verdicts;
     Span<const std::uint32_t> labels;
-    const Eigen::Isometry3d& T_world_sensor;
+    const Pose& T_world_sensor;
     std::uint32_t number;
   };
 

@@ -116,7 +116,7 @@ inline bool unpack_image(const RangeImageGrid& grid, Span<const std::uint8_t> by
 /// One reference scan of a session.
 struct SessionReference {
   std::uint32_t scan = 0;  ///< its number in the session
-  Eigen::Isometry3d T_world_beams = Eigen::Isometry3d::Identity();
+  Pose T_world_beams = Pose::Identity();
   RangeImage image;  ///< in the frame of the sensor
 };
 
@@ -151,7 +151,7 @@ class SessionReferences {
   /// m, sensor frame. `verdicts`: final verdict by point. The directions of dynamic points are
   /// unknown: if their verdicts are wrong, nothing else is removed by them.
   const SessionReference* add(PointsView points, Span<const PointLabel> verdicts,
-                              const Eigen::Isometry3d& T_world_sensor, std::uint32_t scan) {
+                              const Pose& T_world_sensor, std::uint32_t scan) {
     if (is_near_latest(T_world_sensor.translation(), scan)) return nullptr;
     split(points, verdicts);
     if (grid_.rows == 0 && !choose_grid()) return nullptr;
@@ -233,7 +233,7 @@ class ReferenceTest {
 
   /// Tests the first `count` points (m; padded for packs). The result is valid until the next call.
   const detail::Visibility& operator()(const SessionReference& reference, const PointBuffer& points,
-                                       std::size_t count, const Eigen::Isometry3d& T_world_points) {
+                                       std::size_t count, const Pose& T_world_points) {
     detail::test_visibility(
         reference.image,
         detail::composed(detail::inverted(reference.T_world_beams), T_world_points), points, count,

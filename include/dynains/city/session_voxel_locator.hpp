@@ -10,6 +10,7 @@
 
 #include "dynains/city/session_grid.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
 
@@ -37,7 +38,7 @@ class SessionVoxelLocator {
   SessionVoxelLocator(const SessionGrid& grid, double range) : grid_(grid), range_(range) {}
 
   /// Begins a scan.
-  void begin_scan(const Eigen::Isometry3d& T_world_sensor) {
+  void begin_scan(const Pose& T_world_sensor) {
     const Eigen::Vector3d sensor = T_world_sensor.translation();
     first_ = tile_at(sensor.head<2>() - Eigen::Vector2d::Constant(range_));
     const TileIndex last = tile_at(sensor.head<2>() + Eigen::Vector2d::Constant(range_));
@@ -133,7 +134,7 @@ class SessionVoxelLocator {
   std::int32_t lowest_ = 0;              // voxel along z
   float margin_ = 0.0F;                  // voxels
   // From the sensor to the corner of the first tile, at the height of the lowest voxel.
-  Eigen::Isometry3d T_origin_sensor_ = Eigen::Isometry3d::Identity();
+  Pose T_origin_sensor_ = Pose::Identity();
 };
 
 }  // namespace dynains

@@ -14,6 +14,7 @@
 #include "dynains/city/session_points.hpp"
 #include "dynains/city/session_references.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 
 namespace dynains {
 
@@ -43,7 +44,7 @@ class SessionWriter {
   /// Adds one scan. `points`: m, sensor frame. `verdicts`: final verdict by point. `labels`: label
   /// of the recording by point, or empty. `scan`: its number; ascending. Throws IoError.
   void add(PointsView points, Span<const PointLabel> verdicts, Span<const std::uint32_t> labels,
-           const Eigen::Isometry3d& T_world_sensor, std::uint32_t scan);
+           const Pose& T_world_sensor, std::uint32_t scan);
 
   /// Number of points in memory.
   std::size_t held_points() const { return points_.size(); }

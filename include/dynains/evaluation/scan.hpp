@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 
 namespace dynains::evaluation {
 
@@ -18,7 +19,7 @@ inline constexpr std::size_t kMaxEstimates = 6;
 struct LabelledScan {
   const float* xyz = nullptr;  ///< x y z of each point, m, sensor frame
   std::size_t stride = 3;      ///< floats per point, at least 3
-  Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+  Pose T_world_sensor = Pose::Identity();
   double time = std::numeric_limits<double>::quiet_NaN();  ///< s; NaN if unknown
   Span<const std::uint32_t> truth;                         ///< SemanticKITTI labels
   /// Bit e is set if the map of estimate e contains the point. Empty if no map contains a point.

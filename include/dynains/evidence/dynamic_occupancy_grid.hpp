@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dynains/evidence/instance_samples.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/stage/free_space_config.hpp"
 #include "dynains/stage/voxel_hash_table.hpp"
 #include "dynains/verdict.hpp"
@@ -44,9 +45,8 @@ class DynamicOccupancyGrid {
   /// supervoxels in dynamic cells to kDynamicOccupancy. `counted`: by supervoxel, counts of the
   /// preceding call for the scan, which this call replaces; kNone before the first call.
   /// `verdicts`: by supervoxel. The origin frame is fixed until clear() and near all scans.
-  void judge(std::uint64_t scan, const InstanceSamples& samples,
-             const Eigen::Isometry3d& T_origin_sensor, std::vector<Count>& counted,
-             std::vector<Verdict>& verdicts) {
+  void judge(std::uint64_t scan, const InstanceSamples& samples, const Pose& T_origin_sensor,
+             std::vector<Count>& counted, std::vector<Verdict>& verdicts) {
     if (lines_.empty()) return;
     detail::find_cells(samples, cell_, T_origin_sensor, keys_);
     const std::uint32_t now = static_cast<std::uint32_t>(scan) + 1;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "dynains/stage/voxel_hash_table.hpp"
@@ -124,8 +125,8 @@ namespace detail {
 
 /// Computes the key of the cell of each sample, in a grid in the origin frame with cells of edge
 /// `cell` (m).
-inline void find_cells(const InstanceSamples& samples, double cell,
-                       const Eigen::Isometry3d& T_origin_sensor, std::vector<VoxelKey>& keys) {
+inline void find_cells(const InstanceSamples& samples, double cell, const Pose& T_origin_sensor,
+                       std::vector<VoxelKey>& keys) {
   const PackTransform to_cells(T_origin_sensor, 1.0 / cell);
   keys.resize(samples.size());
   VoxelKey* const key = keys.data();

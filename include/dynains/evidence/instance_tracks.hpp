@@ -11,6 +11,7 @@
 
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/stage/voxel_hash_table.hpp"
 
 namespace dynains {
@@ -68,8 +69,7 @@ class InstanceLinker {
 
   /// Computes the shapes and the cells of the instances of one scan, and resets their log-odds. All
   /// linked scans must have one origin frame, which should be near them.
-  void measure(const InstanceSamples& samples, const Eigen::Isometry3d& T_origin_sensor,
-               TrackedInstances& out) {
+  void measure(const InstanceSamples& samples, const Pose& T_origin_sensor, TrackedInstances& out) {
     out.instances.assign(samples.instance_count(), TrackedInstances::Instance());
     out.shapes.assign(samples.instance_count(), TrackedInstances::Shape());
     out.cells.clear();

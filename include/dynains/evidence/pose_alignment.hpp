@@ -19,7 +19,7 @@ namespace dynains::detail {
 
 /// Rotates `T` by a small rotation vector (rad) about its own origin, along the axes of the outer
 /// frame, and translates it.
-inline Eigen::Isometry3d moved(const Eigen::Isometry3d& T, const NormalEquations::Vector& step) {
+inline Pose moved(const Pose& T, const NormalEquations::Vector& step) {
   const double w[3] = {step[3] / 2.0, step[4] / 2.0, step[5] / 2.0};
   const double scale = 1.0 / std::sqrt(1.0 + w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
   const double a = scale, b = scale * w[0], c = scale * w[1], d = scale * w[2];
@@ -27,7 +27,7 @@ inline Eigen::Isometry3d moved(const Eigen::Isometry3d& T, const NormalEquations
       {1.0 - 2.0 * (c * c + d * d), 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)},
       {2.0 * (b * c + a * d), 1.0 - 2.0 * (b * b + d * d), 2.0 * (c * d - a * b)},
       {2.0 * (b * d - a * c), 2.0 * (c * d + a * b), 1.0 - 2.0 * (b * b + c * c)}};
-  Eigen::Isometry3d result = T;
+  Pose result = T;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
       result(i, j) = R[i][0] * T(0, j) + R[i][1] * T(1, j) + R[i][2] * T(2, j);
@@ -42,9 +42,9 @@ struct Alignment {
   NormalEquations::Vector found = {};  ///< step from the first estimate to the best fit
   /// The part of `found` that is certain, see CorrectionSupport.
   NormalEquations::Vector supported = {};
-  Eigen::Isometry3d T_map_sensor = Eigen::Isometry3d::Identity();  ///< after the supported step
-  std::size_t matched = 0;  ///< points in voxels with a plane
-  std::size_t inliers = 0;  ///< matched points at a small distance from their plane
+  Pose T_map_sensor = Pose::Identity();  ///< after the supported step
+  std::size_t matched = 0;               ///< points in voxels with a plane
+  std::size_t inliers = 0;               ///< matched points at a small distance from their plane
   /// Root mean square of the change of the distances between points and planes by the supported
   /// step, m. Unlike the change of the pose, it does not grow in directions without information.
   double change = 0.0;
@@ -59,7 +59,7 @@ class PlaneAligner {
 
   /// Aligns points (m, sensor frame) with planes, from a first estimate of the pose that is wrong
   /// by at most half a voxel. Directions without information keep the first estimate.
-  Alignment align(PointsView points, VoxelPlanes& planes, const Eigen::Isometry3d& T_guess) {
+  Alignment align(PointsView points, VoxelPlanes& planes, const Pose& T_guess) {
     constexpr double kCoarseScales[] = {0.4, 0.25, 0.15, 0.1};  // m, by iteration
     constexpr std::size_t kCoarseStep = 3;                      // one of so many points
     constexpr double kSmall = 0.01;                             // m, change by one iteration
@@ -67,7 +67,7 @@ class PlaneAligner {
     constexpr int kMostIterations = 3;
     constexpr double kConverged = 0.002;  // m
     Alignment result;
-    Eigen::Isometry3d T = T_guess;
+    Pose T = T_guess;
     NormalEquations equations;
     for (const double scale : kCoarseScales) {
       find_planes(points, kCoarseStep, planes, T);
@@ -106,8 +106,7 @@ class PlaneAligner {
   };
 
   // Matches every `step`-th point.
-  void find_planes(PointsView points, std::size_t step, VoxelPlanes& planes,
-                   const Eigen::Isometry3d& T) {
+  void find_planes(PointsView points, std::size_t step, VoxelPlanes& planes, const Pose& T) {
     using Block = VoxelPlanes::Block;
     matches_.clear();
     for (std::size_t begin = 0; begin < points.size(); begin += Block::kMost * step) {
@@ -166,7 +165,7 @@ class PlaneAligner {
     });
   }
 
-  static void advance(const NormalEquations::Vector& step, Eigen::Isometry3d& T,
+  static void advance(const NormalEquations::Vector& step, Pose& T,
                       NormalEquations::Vector& found) {
     for (std::size_t i = 0; i < 6; ++i) found[i] += step[i];
     T = moved(T, step);

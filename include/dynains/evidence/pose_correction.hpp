@@ -38,13 +38,13 @@ class PoseCorrection {
   }
 
   /// Forgets all scans. `T_world_sensor`: pose of the first scan of the next epoch.
-  void begin_epoch(const Eigen::Isometry3d& T_world_sensor) {
+  void begin_epoch(const Pose& T_world_sensor) {
     planes_.clear();
     inserted_ = 0;
     T_world_origin_ = T_world_sensor;
     T_origin_world_ = detail::inverted(T_world_sensor);
-    T_origin_newest_ = Eigen::Isometry3d::Identity();
-    T_origin_pushed_ = Eigen::Isometry3d::Identity();
+    T_origin_newest_ = Pose::Identity();
+    T_origin_pushed_ = Pose::Identity();
     correction_.reset();
     offset_.reset();
     open_ = {};
@@ -54,14 +54,14 @@ class PoseCorrection {
 
   /// Pose of a scan for comparisons with other scans. `T_world_level`, `split`: pushed pose and
   /// points, m. Updates residual() and is_lost().
-  Eigen::Isometry3d correct(const Eigen::Isometry3d& T_world_level, const GroundSplit& split) {
+  Pose correct(const Pose& T_world_level, const GroundSplit& split) {
     if (!is_active()) return T_world_level;
     residual_.reset();
     is_lost_ = is_doubtful_ = false;
-    const Eigen::Isometry3d T_pushed = detail::composed(T_origin_world_, T_world_level);
-    const Eigen::Isometry3d T_guess = offset_ ? detail::composed(*offset_, T_pushed) : T_pushed;
+    const Pose T_pushed = detail::composed(T_origin_world_, T_world_level);
+    const Pose T_guess = offset_ ? detail::composed(*offset_, T_pushed) : T_pushed;
     correction_ = offset_;
-    Eigen::Isometry3d T_newest = T_guess;
+    Pose T_newest = T_guess;
     if (inserted_ > 0) align(split, T_pushed, T_guess, T_newest);
     T_origin_newest_ = T_newest;
     T_origin_pushed_ = T_pushed;
@@ -69,7 +69,7 @@ class PoseCorrection {
   }
 
   /// The pose `T_world_frame` with the newest correction.
-  Eigen::Isometry3d corrected(const Eigen::Isometry3d& T_world_frame) const {
+  Pose corrected(const Pose& T_world_frame) const {
     if (!correction_) return T_world_frame;
     return detail::composed(
         T_world_origin_,
@@ -79,12 +79,12 @@ class PoseCorrection {
   /// Adds the static points of a scan to the planes, or leaves it out if its pose is in doubt, but
   /// never two in a row. `T_world_level`: result of correct(). `moving`: by non-ground point, 1 for
   /// a point that may move, else 0; empty if no point does.
-  void insert(const Eigen::Isometry3d& T_world_level, const GroundSplit& split,
+  void insert(const Pose& T_world_level, const GroundSplit& split,
               Span<const std::uint8_t> moving) {
     if (!is_active()) return;
     was_left_out_ = is_doubtful_ && !was_left_out_;
     if (was_left_out_) return;
-    const Eigen::Isometry3d T = detail::composed(T_origin_world_, T_world_level);
+    const Pose T = detail::composed(T_origin_world_, T_world_level);
     const std::size_t wanted = inserted_ == 0            ? split.count + 1  // all points
                                : inserted_ < kFirstScans ? kFirstInserted
                                                          : kInserted;
@@ -147,8 +147,7 @@ class PoseCorrection {
   }
 
   // Aligns the newest scan from its pose `T_guess` with the lasting offset, and writes `T_newest`.
-  void align(const GroundSplit& split, const Eigen::Isometry3d& T_pushed,
-             const Eigen::Isometry3d& T_guess, Eigen::Isometry3d& T_newest) {
+  void align(const GroundSplit& split, const Pose& T_pushed, const Pose& T_guess, Pose& T_newest) {
     const Step before = open_;
     open_ = {};
     const detail::Alignment alignment = aligner_.align(select(split), planes_, T_guess);
@@ -156,8 +155,7 @@ class PoseCorrection {
     is_lost_ = static_cast<double>(alignment.inliers) <
                kLeastInliers * static_cast<double>(alignment.matched);
     if (is_lost_) return;
-    const Eigen::Isometry3d T_motion =
-        detail::composed(detail::inverted(T_origin_pushed_), T_pushed);
+    const Pose T_motion = detail::composed(detail::inverted(T_origin_pushed_), T_pushed);
     residual_ = difference(detail::composed(T_origin_newest_, T_motion), alignment.T_map_sensor);
     is_doubtful_ = alignment.doubt > kMostDoubt;
     open_ = alignment.found;
@@ -189,9 +187,8 @@ class PoseCorrection {
   }
 
   // Rotation and translation of the sensor from one pose to another.
-  static PoseResidual difference(const Eigen::Isometry3d& T_map_a,
-                                 const Eigen::Isometry3d& T_map_b) {
-    const Eigen::Isometry3d T_a_b = detail::composed(detail::inverted(T_map_a), T_map_b);
+  static PoseResidual difference(const Pose& T_map_a, const Pose& T_map_b) {
+    const Pose T_a_b = detail::composed(detail::inverted(T_map_a), T_map_b);
     const double x = T_a_b(2, 1) - T_a_b(1, 2);
     const double y = T_a_b(0, 2) - T_a_b(2, 0);
     const double z = T_a_b(1, 0) - T_a_b(0, 1);
@@ -205,14 +202,14 @@ class PoseCorrection {
   double tolerance_;
   VoxelPlanes planes_;  // in the origin frame: the first scan of the epoch
   std::size_t inserted_ = 0;
-  Eigen::Isometry3d T_world_origin_ = Eigen::Isometry3d::Identity();
-  Eigen::Isometry3d T_origin_world_ = Eigen::Isometry3d::Identity();
+  Pose T_world_origin_ = Pose::Identity();
+  Pose T_origin_world_ = Pose::Identity();
   // Corrections in the origin frame, multiplied from the left: of the newest scan, and the part
   // that lasts.
-  std::optional<Eigen::Isometry3d> correction_, offset_;
+  std::optional<Pose> correction_, offset_;
   Step open_ = {};  // step that aligns the last scan, without the part that lasts
-  Eigen::Isometry3d T_origin_newest_ = Eigen::Isometry3d::Identity();  // corrected
-  Eigen::Isometry3d T_origin_pushed_ = Eigen::Isometry3d::Identity();  // as pushed
+  Pose T_origin_newest_ = Pose::Identity();  // corrected
+  Pose T_origin_pushed_ = Pose::Identity();  // as pushed
   std::optional<PoseResidual> residual_;
   bool is_lost_ = false;
   bool is_doubtful_ = false;   // whether the pose of the last scan may be wrong

@@ -88,7 +88,7 @@ struct ReferenceScan {
   std::uint64_t scan = 0;
   std::uint64_t since_begin = 0;  ///< scans since the first scan of the epoch
   std::uint64_t epoch = kNoEpoch;
-  Eigen::Isometry3d T_world_beams = Eigen::Isometry3d::Identity();
+  Pose T_world_beams = Pose::Identity();
   RangeImage image;
 };
 
@@ -143,8 +143,8 @@ class ReferenceScans {
   /// Makes the image of the newest reference in the tilted frame of the sensor, in which each beam
   /// is a row of the image. `epoch`: as in begin(). `T_world_level`: pose of the frame of `split`.
   /// `moving`: by non-ground point, as in RangeImage::build().
-  void make_image(std::uint64_t epoch, const Eigen::Isometry3d& T_world_level,
-                  const GroundSplit& split, Span<const std::uint8_t> moving) {
+  void make_image(std::uint64_t epoch, const Pose& T_world_level, const GroundSplit& split,
+                  Span<const std::uint8_t> moving) {
     ReferenceScan& reference = references_[newest_];
     reference.T_world_beams = T_world_level;
     PointsView ground = split.ground();
@@ -173,9 +173,8 @@ class ReferenceScans {
   /// Visibility of the first `count` points (m; padded for packs) from a reference. The result is
   /// valid until the next call.
   const detail::Visibility& test(const PointBuffer& points, std::size_t count,
-                                 const Eigen::Isometry3d& T_world_points,
-                                 const ReferenceScan& reference) {
-    const Eigen::Isometry3d T_reference_points =
+                                 const Pose& T_world_points, const ReferenceScan& reference) {
+    const Pose T_reference_points =
         detail::composed(detail::inverted(reference.T_world_beams), T_world_points);
     detail::test_visibility(reference.image, T_reference_points, points, count, margin_,
                             margin_slope_, visibility_);

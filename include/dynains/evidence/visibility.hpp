@@ -10,6 +10,7 @@
 
 #include "dynains/evidence/range_image.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
@@ -126,7 +127,7 @@ void compare_ranges(const typename Packs::Int& cells, const typename Packs::Mask
 /// behind a sample if its range is larger by more than `margin` (m) + `slope` (m/m) * range of the
 /// sample. A sample at a return of a moving point is neither "free" nor "hit".
 /// `T_reference_sample`: rigid, from the frame of the samples to the frame of the image.
-inline void test_visibility(const RangeImage& image, const Eigen::Isometry3d& T_reference_sample,
+inline void test_visibility(const RangeImage& image, const Pose& T_reference_sample,
                             const PointBuffer& samples, std::size_t count, float margin,
                             float slope, Visibility& visibility) {
   constexpr float kCentimetres = 100.0F;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/pose.hpp"
 #include "dynains/sensor/plane_fit.hpp"
 #include "dynains/stage/voxel_hash_table.hpp"
 
@@ -39,7 +40,7 @@ class VoxelPlanes {
 
     bool is_full() const { return count == kMost; }
     /// Adds the point (x, y, z) (m), transformed by `T`. The block must not be full.
-    void push_back(const Eigen::Isometry3d& T, double x, double y, double z) {
+    void push_back(const Pose& T, double x, double y, double z) {
       double(&point)[3] = points[count++];
       for (int k = 0; k < 3; ++k) point[k] = T(k, 0) * x + T(k, 1) * y + T(k, 2) * z + T(k, 3);
     }

@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <string>
 
+#include "dynains/pose.hpp"
+
 namespace dynains {
 
 /// Pose of the sensor in the body, T_body_sensor, m. `text` is `x y z qx qy qz qw`, with blanks or
@@ -14,9 +16,9 @@ namespace dynains {
 /// Or `FILE:BODY:LIDAR`, for example "robot.urdf:base_link:velodyne": two frames of a robot
 /// description (.urdf), or of static transforms (.yaml, .yml). Throws ConfigError that lists the
 /// frames of the file if it does not connect the two.
-Eigen::Isometry3d read_extrinsic(const std::string& text);
+Pose read_extrinsic(const std::string& text);
 
 /// `x y z qx qy qz qw` of a pose, with six decimals.
-std::string extrinsic_text(const Eigen::Isometry3d& T_body_sensor);
+std::string extrinsic_text(const Pose& T_body_sensor);
 
 }  // namespace dynains

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 
 namespace dynains {
 
@@ -42,9 +43,7 @@ class KittiSequence {
   double time(std::size_t i) const { return scans_.at(i).time; }
   /// Pose of the sensor in the world at scan i: Tr^-1 P Tr. The world frame is the sensor frame for
   /// P = identity.
-  const Eigen::Isometry3d& T_world_sensor(std::size_t i) const {
-    return scans_.at(i).T_world_sensor;
-  }
+  const Pose& T_world_sensor(std::size_t i) const { return scans_.at(i).T_world_sensor; }
 
   /// Number of points of scan i, from the size of its file. Throws unless the size is a multiple of
   /// 16 bytes.
@@ -62,7 +61,7 @@ class KittiSequence {
  private:
   struct Scan {
     std::string name;
-    Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+    Pose T_world_sensor = Pose::Identity();
     double time = 0.0;
   };
 
@@ -89,8 +88,8 @@ void check_labels(const std::filesystem::path& file, std::size_t count);
 void write_scan(const std::filesystem::path& file, Span<const float> xyzi);
 void write_labels(const std::filesystem::path& file, Span<const std::uint32_t> labels);
 /// `poses`: the poses P of poses.txt, equal to T_world_sensor without calib.txt.
-void write_poses(const std::filesystem::path& file, Span<const Eigen::Isometry3d> poses);
+void write_poses(const std::filesystem::path& file, Span<const Pose> poses);
 void write_times(const std::filesystem::path& file, Span<const double> times);
-void write_calib(const std::filesystem::path& file, const Eigen::Isometry3d& Tr);
+void write_calib(const std::filesystem::path& file, const Pose& Tr);
 
 }  // namespace dynains

@@ -12,6 +12,7 @@
 
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/io/point_records.hpp"
+#include "dynains/pose.hpp"
 
 namespace dynains {
 
@@ -27,7 +28,7 @@ class PointFileWriter {
   /// header of PCD; ignored for PLY. Throws IoError for another extension or a folder that is not
   /// writable.
   explicit PointFileWriter(const std::filesystem::path& path, const PointColumns& columns = {},
-                           const Eigen::Isometry3d& viewpoint = Eigen::Isometry3d::Identity());
+                           const Pose& viewpoint = Pose::Identity());
 
   void add(const FilePoint& point);
   std::size_t size() const { return size_; }
@@ -41,7 +42,7 @@ class PointFileWriter {
   void write_buffer();
 
   PointColumns columns_;
-  Eigen::Isometry3d viewpoint_;
+  Pose viewpoint_;
   bool pcd_;
   std::size_t size_ = 0;
   PointRecords buffer_;
@@ -65,7 +66,7 @@ struct PointFile {
   std::vector<double> time;                ///< time, t, timestamp, offset_time, scalar_time
   std::vector<std::uint32_t> label;        ///< label, class, scalar_label
   /// Pose of the sensor: VIEWPOINT of PCD, else identity.
-  Eigen::Isometry3d viewpoint = Eigen::Isometry3d::Identity();
+  Pose viewpoint = Pose::Identity();
 };
 
 /// Reads a point file. The extension determines the format:
@@ -93,8 +94,8 @@ void for_each_point(const std::filesystem::path& path,
 
 /// Header of a point file.
 struct PointFileHeader {
-  Eigen::Isometry3d viewpoint = Eigen::Isometry3d::Identity();  ///< as in PointFile
-  PointColumns columns;                                         ///< without rgb and double_xyz
+  Pose viewpoint = Pose::Identity();  ///< as in PointFile
+  PointColumns columns;               ///< without rgb and double_xyz
   std::uint64_t point_count = 0;  ///< as in the header; check_point_file() compares the file size
 };
 /// Reads the header of a point file; lines of a text are counted. Throws IoError like

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "dynains/io/trajectory.hpp"
+#include "dynains/pose.hpp"
 
 namespace dynains {
 
@@ -29,20 +30,19 @@ struct PoseConvention {
   QuaternionOrder quaternion = QuaternionOrder::kNone;
   int shift = 0;  ///< scan i has the pose of scan i + shift
   /// Extrinsic calibration: pose of the sensor in the body whose poses the file has, m.
-  Eigen::Isometry3d T_body_sensor = Eigen::Isometry3d::Identity();
+  Pose T_body_sensor = Pose::Identity();
 };
 
 /// Applies a convention, except `frame`, `shift` and `T_body_sensor`, to a row. `read_as`: order in
 /// which the quaternion of the row was read.
-inline Eigen::Isometry3d apply(const PoseConvention& convention, const Eigen::Isometry3d& row,
-                               QuaternionOrder read_as) {
-  Eigen::Isometry3d pose = row;
+inline Pose apply(const PoseConvention& convention, const Pose& row, QuaternionOrder read_as) {
+  Pose pose = row;
   const QuaternionOrder meant = convention.quaternion;
   if (meant != QuaternionOrder::kNone && read_as != QuaternionOrder::kNone && meant != read_as) {
-    const Eigen::Quaterniond q(row.linear());
-    const Eigen::Quaterniond other = meant == QuaternionOrder::kWxyz
-                                         ? Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w())
-                                         : Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y());
+    const detail::Quaternion q(row.linear());
+    const detail::Quaternion other = meant == QuaternionOrder::kWxyz
+                                         ? detail::Quaternion(q.x(), q.y(), q.z(), q.w())
+                                         : detail::Quaternion(q.z(), q.w(), q.x(), q.y());
     pose.linear() = other.normalized().toRotationMatrix();
   }
   pose.translation() *= convention.unit;
@@ -57,8 +57,8 @@ inline Eigen::Isometry3d apply(const PoseConvention& convention, const Eigen::Is
 
 /// T_camera_sensor for a sensor with x forward, y left, z up and a camera with z forward, x right,
 /// y down, and a common origin.
-inline Eigen::Isometry3d camera_axes() {
-  Eigen::Isometry3d T_camera_sensor = Eigen::Isometry3d::Identity();
+inline Pose camera_axes() {
+  Pose T_camera_sensor = Pose::Identity();
   T_camera_sensor.linear() << 0, -1, 0, 0, 0, -1, 1, 0, 0;
   return T_camera_sensor;
 }

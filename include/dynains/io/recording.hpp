@@ -15,6 +15,7 @@
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/pose_convention.hpp"
 #include "dynains/io/trajectory.hpp"
+#include "dynains/pose.hpp"
 
 namespace dynains {
 
@@ -147,9 +148,7 @@ class Recording {
   std::uint64_t number(std::size_t i) const { return scans_.at(i).number; }
   /// Time of scan i, s, strictly increasing.
   double time(std::size_t i) const { return scans_.at(i).time; }
-  const Eigen::Isometry3d& T_world_sensor(std::size_t i) const {
-    return scans_.at(i).T_world_sensor;
-  }
+  const Pose& T_world_sensor(std::size_t i) const { return scans_.at(i).T_world_sensor; }
 
   /// Number of points of scan i, from the size of its file or from its header.
   std::uint64_t point_count(std::size_t i) const;
@@ -167,11 +166,10 @@ class Recording {
   const PoseConvention& convention() const { return options_.convention; }
   double time_offset() const { return options_.time_offset; }
   /// Pose of scan i under another convention; empty if its shift leads out of the trajectory.
-  std::optional<Eigen::Isometry3d> pose_under(const PoseConvention& convention,
-                                              std::size_t i) const;
+  std::optional<Pose> pose_under(const PoseConvention& convention, std::size_t i) const;
   /// Pose of the sensor at `offset` (s) after the pose of scan i, by the times of the poses; empty
   /// without times and outside of the trajectory.
-  std::optional<Eigen::Isometry3d> pose_after(std::size_t i, double offset) const;
+  std::optional<Pose> pose_after(std::size_t i, double offset) const;
   bool has_quaternions() const { return trajectory_.order != QuaternionOrder::kNone; }
   QuaternionOrder quaternion_order() const { return trajectory_.order; }
   bool has_calibration() const { return has_calibration_; }
@@ -188,7 +186,7 @@ class Recording {
     std::uint64_t number = 0;
     double time = 0.0;
     std::size_t match = 0;  ///< index in matches_
-    Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+    Pose T_world_sensor = Pose::Identity();
   };
   enum class Labels { kNone, kFiles, kColumn };
 
@@ -211,10 +209,9 @@ class Recording {
   void match_times(const std::filesystem::path& poses_file, const std::vector<double>& times);
   void place_scans(const std::filesystem::path& poses);
   void find_columns();
-  Eigen::Isometry3d pose_of(const PoseConvention& convention, const TrajectoryMatch& match) const;
+  Pose pose_of(const PoseConvention& convention, const TrajectoryMatch& match) const;
   PointFrame guess_frame() const;
-  Eigen::Isometry3d to_sensor_pose(const PoseConvention& convention,
-                                   const Eigen::Isometry3d& pose) const;
+  Pose to_sensor_pose(const PoseConvention& convention, const Pose& pose) const;
   void prepare_deskewing();
   ScanAddress address(std::size_t i) const;
 
@@ -229,7 +226,7 @@ class Recording {
   bool numbered_ = false;  ///< all names are numbers
   bool has_viewpoints_ = false;
   bool has_calibration_ = false;
-  Eigen::Isometry3d Tr_ = Eigen::Isometry3d::Identity();  ///< of calib.txt
+  Pose Tr_ = Pose::Identity();  ///< of calib.txt
   Trajectory trajectory_;
   std::vector<std::optional<TrajectoryMatch>> matches_;  ///< per scan file
   Trajectory motion_;                                    ///< T_world_sensor, for de-skewing

@@ -12,6 +12,7 @@
 #include "dynains/io/folder_lock.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/stage/voxel_hash_table.hpp"
 
 namespace dynains {
@@ -62,8 +63,7 @@ class TiledStaticMap {
   /// Adds the points of one scan (m, sensor frame) whose `keep` flag is not zero. `keep`: by point;
   /// empty for all points. Throws IoError if a tile cannot be read or written. Points that were not
   /// written stay in memory, beyond the budget if necessary, and the next `insert` writes them.
-  void insert(PointsView points, Span<const std::uint8_t> keep,
-              const Eigen::Isometry3d& T_world_sensor);
+  void insert(PointsView points, Span<const std::uint8_t> keep, const Pose& T_world_sensor);
 
   /// Number of points.
   std::size_t size() const { return size_; }

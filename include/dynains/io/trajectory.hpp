@@ -8,6 +8,8 @@
 #include <optional>
 #include <vector>
 
+#include "dynains/pose.hpp"
+
 namespace dynains {
 
 enum class QuaternionOrder { kNone, kXyzw, kWxyz };
@@ -19,7 +21,7 @@ constexpr std::array<const char*, 3> value_names(QuaternionOrder) {
 
 /// Rows of a trajectory file. Frame, direction and unit of translation are those of the file.
 struct Trajectory {
-  std::vector<Eigen::Isometry3d> poses;
+  std::vector<Pose> poses;
   std::vector<double> times;  ///< s, strictly increasing; empty if the file has none
   QuaternionOrder order = QuaternionOrder::kNone;  ///< kNone for matrices
 };
@@ -57,7 +59,7 @@ std::optional<TrajectoryMatch> match_time(const Trajectory& trajectory, double t
 
 /// Interpolates linearly in translation and by slerp in rotation. `share`: [0, 1]; 0 gives exactly
 /// `a`, 1 exactly `b`.
-Eigen::Isometry3d interpolate(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double share);
+Pose interpolate(const Pose& a, const Pose& b, double share);
 
 /// Converts a stamp to seconds. Numbers above 1e11, 1e14 and 1e17 are in ms, us and ns since 1970.
 double to_seconds(double stamp);

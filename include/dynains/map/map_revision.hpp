@@ -11,6 +11,7 @@
 
 #include "dynains/map/block_table.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "dynains/stage/free_space_config.hpp"
 #include "dynains/stage/log_odds.hpp"
@@ -44,8 +45,8 @@ class MapRevision {
     add_new_blocks(map);
     gather(map, scan, sensor_world);
     if (blocks_.empty()) return;
-    const auto& visibility = test_visibility(samples_, begin_.back(),
-                                             Eigen::Isometry3d(Eigen::Translation3d(sensor_world)));
+    const auto& visibility =
+        test_visibility(samples_, begin_.back(), Pose(Eigen::Translation3d(sensor_world)));
     for (std::size_t i = 0; i < blocks_.size(); ++i) {
       const auto count = visibility.count(begin_[i], begin_[i + 1]);
       float& level = levels_[blocks_[i]];

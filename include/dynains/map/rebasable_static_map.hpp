@@ -24,7 +24,7 @@ namespace dynains {
 /// The corrected pose of an inserted scan.
 struct ScanPose {
   std::uint64_t scan = 0;  ///< number of the insertion, from 0; in a remover, ScanVerdict::scan
-  Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();  ///< m, rigid
+  Pose T_world_sensor = Pose::Identity();  ///< m, rigid
 };
 
 /// Sparse voxel map of measured points, at most one per voxel, as StaticMapAccumulator. It keeps
@@ -81,14 +81,13 @@ class RebasableStaticMap {
   /// frame. `keep`: by point, 0 for points to ignore; an empty `keep` adds all points. Coordinates
   /// beyond 2^19 voxels of `scan_voxel` are ignored. `T_world_sensor`: rigid, translation within
   /// kMaxTranslation. Throws std::length_error beyond 2^32 - 2 points, and std::bad_alloc.
-  void insert(PointsView points, Span<const std::uint8_t> keep,
-              const Eigen::Isometry3d& T_world_sensor) {
+  void insert(PointsView points, Span<const std::uint8_t> keep, const Pose& T_world_sensor) {
     insert(points, keep, T_world_sensor, T_world_sensor);
   }
 
   /// As above, for points in a frame with the origin of the sensor and other axes.
-  void insert(PointsView points, Span<const std::uint8_t> keep,
-              const Eigen::Isometry3d& T_world_points, const Eigen::Isometry3d& T_world_sensor) {
+  void insert(PointsView points, Span<const std::uint8_t> keep, const Pose& T_world_points,
+              const Pose& T_world_sensor) {
     const std::uint32_t first = points_.size();
     taken_.clear();
     const bool is_turned = T_world_points.matrix() != T_world_sensor.matrix();
@@ -133,9 +132,7 @@ class RebasableStaticMap {
   /// Number of inserted scans.
   std::size_t scan_count() const { return scans_.size(); }
   /// Last pose of a scan below scan_count().
-  const Eigen::Isometry3d& T_world_sensor(std::size_t scan) const {
-    return scans_.at(scan).T_world_sensor;
-  }
+  const Pose& T_world_sensor(std::size_t scan) const { return scans_.at(scan).T_world_sensor; }
   /// Number of points in memory, in all scans.
   std::size_t stored_points() const { return points_.size(); }
   /// Number of points that for_each() visits. It passes over the whole map.
@@ -195,7 +192,7 @@ class RebasableStaticMap {
     float x, y, z;  // m, sensor frame
   };
   struct Scan {
-    Eigen::Isometry3d T_world_sensor;
+    Pose T_world_sensor;
     std::uint32_t first;  // point
     std::uint32_t count;  // points
   };
@@ -222,7 +219,7 @@ class RebasableStaticMap {
     return taken_.size() > before;
   }
 
-  static Eigen::Vector3d to_world(const Eigen::Isometry3d& T, const Point& p) {
+  static Eigen::Vector3d to_world(const Pose& T, const Point& p) {
     const auto x = static_cast<double>(p.x), y = static_cast<double>(p.y),
                z = static_cast<double>(p.z);
     return {T(0, 0) * x + T(0, 1) * y + T(0, 2) * z + T(0, 3),
@@ -331,7 +328,7 @@ class RebasableStaticMap {
     std::array<First, kVoxels> first;
     const BlockIndex& index = blocks_[block].index;
     for (const Run& run : blocks_[block].data) {
-      const Eigen::Isometry3d& T = scans_[run.scan].T_world_sensor;
+      const Pose& T = scans_[run.scan].T_world_sensor;
       for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
         First& entry = first[voxel_in(index, to_world(T, points_[i]))];
         if (i < entry.point) entry = {i, run.scan};

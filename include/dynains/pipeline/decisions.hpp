@@ -19,6 +19,7 @@
 #include "dynains/pipeline/verdict_writer.hpp"
 #include "dynains/pipeline/window_votes.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/stage/cluster_set.hpp"
 #include "dynains/verdict.hpp"
@@ -236,10 +237,8 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
       if (!revision_.config().revise_map) return;
       revision_.revise(
           map, newest.scan, newest.T_world_sensor.translation(),
-          [this](const PointBuffer& points, std::size_t count,
-                 const Eigen::Isometry3d& T_world_points) -> const auto& {
-            return evidence_.test_visibility(points, count, T_world_points);
-          });
+          [this](const PointBuffer& points, std::size_t count, const Pose& T_world_points)
+              -> const auto& { return evidence_.test_visibility(points, count, T_world_points); });
     }
   }
 

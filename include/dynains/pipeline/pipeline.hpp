@@ -119,7 +119,7 @@ class Pipeline {
   const SensorModel& sensor() const { return frame_.sensor(); }
   double next_time() const { return scans_.next_time(); }
 
-  FrameResult push(const CloudView& cloud, const Eigen::Isometry3d& T_world_sensor, double time);
+  FrameResult push(const CloudView& cloud, const Pose& T_world_sensor, double time);
 
   /// Makes the verdict on the oldest open scan final. Empty if no scan is open.
   std::optional<ScanVerdict> finish_oldest() {
@@ -178,7 +178,7 @@ class Pipeline {
 };
 
 template <class Stages>
-FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Eigen::Isometry3d& T_world_sensor,
+FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Pose& T_world_sensor,
                                    double time) {
   StageTimer timer;
   ScanSlot& newest = scans_.prepare(T_world_sensor, time, config_);
@@ -275,7 +275,7 @@ template <class Stages>
 std::optional<PoseResidual> Pipeline<Stages>::pose_residual() const {
   std::optional<PoseResidual> residual = decision_->pose_residual();
   if (residual && frame_.rotates_scans()) {
-    Eigen::Isometry3d T_sensor_level = Eigen::Isometry3d::Identity();
+    Pose T_sensor_level = Pose::Identity();
     T_sensor_level.linear() = transposed(sensor().R_level_sensor());
     residual->T_previous_newest =
         composed(composed(T_sensor_level, residual->T_previous_newest), inverted(T_sensor_level));
@@ -296,7 +296,7 @@ void Pipeline<Stages>::reserve_like(const CloudView& example, std::size_t scans)
   // After four scans, each kind of decision has compared a scan with a reference.
   const std::size_t enough = std::max<std::size_t>(decision_->window_length(), 4);
   for (std::size_t i = 0; i < std::min(scans, enough); ++i) {
-    push(example, Eigen::Isometry3d::Identity(), next_time());
+    push(example, Pose::Identity(), next_time());
   }
   for (ScanSlot& slot : scans_.slots()) slot.ensure_capacity_like(scans_.newest());
   final_verdict_.ensure_capacity_like(newest_verdict_);

@@ -25,8 +25,8 @@ struct ScanSlot {
   std::uint64_t scan = 0;   ///< number of the push, from 0
   std::uint64_t epoch = 0;  ///< only scans of one epoch are compared
   double time = 0.0;        ///< s
-  Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
-  Eigen::Isometry3d T_world_level = Eigen::Isometry3d::Identity();  ///< frame of split.points
+  Pose T_world_sensor = Pose::Identity();
+  Pose T_world_level = Pose::Identity();  ///< frame of split.points
 
   GroundSplit split;
   std::vector<PointLabel> input_labels;  ///< by input point: kGround for valid points
@@ -95,8 +95,7 @@ class ScanRing {
 
   /// Initializes the slot of the next scan. A PushTransaction adds the scan to the ring. Throws
   /// PoseError for an invalid pose or a time (s) not greater than the previous one.
-  ScanSlot& prepare(const Eigen::Isometry3d& T_world_sensor, double time,
-                    const RemoverConfig& config) {
+  ScanSlot& prepare(const Pose& T_world_sensor, double time, const RemoverConfig& config) {
     validate_pose("T_world_sensor", T_world_sensor);
     validate_time(time);
     ScanSlot& next = (*this)[pushed_];

@@ -26,7 +26,7 @@ class ScanWindow {
     while (scans[first_scan_].epoch != newest.epoch) ++first_scan_;
     points_.clear();
     scan_begin_.assign(1, 0);
-    const Eigen::Isometry3d T_newest_world = inverted(newest.T_world_level);
+    const Pose T_newest_world = inverted(newest.T_world_level);
     for (std::uint64_t scan = first_scan_; scan < scans.pushed(); ++scan) {
       points_.append(scans[scan].split.non_ground(),
                      composed(T_newest_world, scans[scan].T_world_level));

@@ -11,6 +11,7 @@
 
 #include "dynains/config.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/stage/cluster_set.hpp"
 #include "dynains/stage/ground_split.hpp"
@@ -81,7 +82,7 @@ struct IsEvidence<
     std::void_t<
         decltype(std::declval<Stage&>().adapt(SensorModel())),
         decltype(std::declval<Stage&>().observe(
-            std::uint64_t{}, std::uint64_t{}, std::declval<const Eigen::Isometry3d&>(),
+            std::uint64_t{}, std::uint64_t{}, std::declval<const Pose&>(),
             std::declval<const GroundSplit&>(), Span<const std::uint32_t>(), std::size_t{})),
         std::enable_if_t<
             std::is_convertible_v<decltype(std::declval<Stage&>().judge(
@@ -95,19 +96,19 @@ struct IsEvidence<
 template <class Stage, class = void>
 struct IsMap : std::false_type {};
 template <class Stage>
-struct IsMap<Stage, std::void_t<decltype(std::declval<Stage&>().insert(
-                                    PointsView(), Span<const std::uint8_t>(),
-                                    std::declval<const Eigen::Isometry3d&>())),
-                                decltype(std::declval<Stage&>().clear())>> : std::true_type {};
+struct IsMap<
+    Stage, std::void_t<decltype(std::declval<Stage&>().insert(
+                           PointsView(), Span<const std::uint8_t>(), std::declval<const Pose&>())),
+                       decltype(std::declval<Stage&>().clear())>> : std::true_type {};
 
 /// Inserts a scan. A map that takes the pose of the sensor as well can correct it later.
 template <class Map>
-using InsertWithSensor = decltype(std::declval<Map&>().insert(
-    PointsView(), Span<const std::uint8_t>(), std::declval<const Eigen::Isometry3d&>(),
-    std::declval<const Eigen::Isometry3d&>()));
+using InsertWithSensor =
+    decltype(std::declval<Map&>().insert(PointsView(), Span<const std::uint8_t>(),
+                                         std::declval<const Pose&>(), std::declval<const Pose&>()));
 template <class Map>
 void insert_scan(Map& map, PointsView points, Span<const std::uint8_t> keep,
-                 const Eigen::Isometry3d& T_world_points, const Eigen::Isometry3d& T_world_sensor) {
+                 const Pose& T_world_points, const Pose& T_world_sensor) {
   if constexpr (Offers<InsertWithSensor, Map>::value) {
     map.insert(points, keep, T_world_points, T_world_sensor);
   } else {
@@ -127,7 +128,7 @@ struct IsRevisable<Map, Evidence,
                                    std::uint32_t{}, std::declval<void (*)(float, float, float)>())),
                                decltype(std::declval<Evidence&>().test_visibility(
                                    std::declval<const PointBuffer&>(), std::size_t{},
-                                   std::declval<const Eigen::Isometry3d&>()))>> : std::true_type {};
+                                   std::declval<const Pose&>()))>> : std::true_type {};
 
 /// Whether a stage has the optional members `needs_sensor()` and `adapt(const SensorModel&)`.
 template <class Stage, class = void>

@@ -9,6 +9,7 @@
 
 #include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/sensor/mounting.hpp"
 
 namespace dynains {
@@ -32,7 +33,7 @@ class Landmarks {
   const std::vector<Eigen::Vector3d>& points() const { return points_; }
   /// Agreement of `other` with this scan under the pose `T_this_other`. It is symmetric except for
   /// occlusion.
-  Agreement compare(const Landmarks& other, const Eigen::Isometry3d& T_this_other) const;
+  Agreement compare(const Landmarks& other, const Pose& T_this_other) const;
   /// Distance from `p` (m, sensor frame) to the nearest point, m, at most 1.
   double distance_to(const Eigen::Vector3d& p) const;
 

@@ -50,11 +50,11 @@ Float elevation_of(const Float& z, const Float& range, const Float& length) {
 
 /// An affine transform of points in packs: the first three rows of `scale * T`, in floats.
 struct PackTransform {
-  explicit PackTransform(const Eigen::Isometry3d& T, double scale = 1.0)
+  explicit PackTransform(const Pose& T, double scale = 1.0)
       : row{row_of(T, scale, 0), row_of(T, scale, 1), row_of(T, scale, 2)} {}
 
   static PackTransform rotation(const Eigen::Matrix3d& R) {
-    return PackTransform(rotated(Eigen::Isometry3d::Identity(), transposed(R)));
+    return PackTransform(rotated(Pose::Identity(), transposed(R)));
   }
 
   /// Coordinate number `axis` of the transformed points.
@@ -66,7 +66,7 @@ struct PackTransform {
   std::array<PackConstant, 4> row[3];
 
  private:
-  static std::array<PackConstant, 4> row_of(const Eigen::Isometry3d& T, double scale, int i) {
+  static std::array<PackConstant, 4> row_of(const Pose& T, double scale, int i) {
     const auto element = [&](int j) { return static_cast<float>(scale * T(i, j)); };
     return {element(0), element(1), element(2), element(3)};
   }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "dynains/pose.hpp"
 #include "dynains/simulation/config.hpp"
 
 namespace dynains::simulation {
@@ -21,10 +22,10 @@ struct ObjectState {
   /// Instance id from 1, the upper 16 bits of its labels; from kFirstChange on for a change of the
   /// place, which has its id on all days
   std::uint32_t instance;
-  std::uint32_t label;               ///< SemanticKITTI class, the lower 16 bits in this scan
-  Eigen::Isometry3d T_world_object;  ///< origin: centre of the footprint on the ground; x forward
-  double speed;                      ///< m/s
-  double length, width, height;      ///< m
+  std::uint32_t label;           ///< SemanticKITTI class, the lower 16 bits in this scan
+  Pose T_world_object;           ///< origin: centre of the footprint on the ground; x forward
+  double speed;                  ///< m/s
+  double length, width, height;  ///< m
 };
 
 /// One scan with its ground truth.
@@ -35,8 +36,8 @@ struct SimulatedScan {
   std::vector<float> xyzi;            ///< interleaved; m, sensor frame; reflectivity in [0, 1]
   std::vector<std::uint32_t> labels;  ///< by point: SemanticKITTI class | instance << 16
   std::vector<float> times;           ///< by point: s after `time`; empty without a rolling shutter
-  Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
-  Eigen::Isometry3d T_world_sensor_noisy = Eigen::Isometry3d::Identity();
+  Pose T_world_sensor = Pose::Identity();
+  Pose T_world_sensor_noisy = Pose::Identity();
   std::vector<ObjectState> objects;  ///< vehicles and people near the sensor, also parked ones
 };
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
 
@@ -43,7 +44,7 @@ class PolarBuffer {
   }
 
   /// Appends `points` (m, source frame), transformed to the target frame in single precision.
-  void append(PointsView points, const Eigen::Isometry3d& T_target_source) {
+  void append(PointsView points, const Pose& T_target_source) {
     const std::size_t begin = size_;
     resize(begin + points.size());
     const detail::PackTransform transform(T_target_source);

@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include "dynains/evaluation/scan.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "evaluation/detail/range_gate.hpp"
 #include "evaluation/detail/voxel_grid.hpp"
@@ -57,7 +58,7 @@ class LocatedPoints {
   struct Transform {
     double of[3][4];
 
-    explicit Transform(const Eigen::Isometry3d& T) {
+    explicit Transform(const Pose& T) {
       for (int i = 0; i < 3; ++i) {
         for (int j = 0; j < 4; ++j) of[i][j] = T(i, j);
       }

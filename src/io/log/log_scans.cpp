@@ -181,7 +181,7 @@ void LogScans::place_scans() {
                      " transforms contradict earlier ones of their frame, and are left out");
   }
   for (const double time : times_) {
-    const std::optional<Eigen::Isometry3d> T_world_sensor = pose_at(time);
+    const std::optional<Pose> T_world_sensor = pose_at(time);
     if (!T_world_sensor) continue;
     trajectory_.times.push_back(time);
     trajectory_.poses.push_back(*T_world_sensor);
@@ -196,7 +196,7 @@ void LogScans::place_scans() {
 Trajectory LogScans::motion() const {
   Trajectory motion;
   for (const double time : pose_topic_ ? poses_.times : transforms_.times()) {
-    const std::optional<Eigen::Isometry3d> T_world_sensor = pose_at(time);
+    const std::optional<Pose> T_world_sensor = pose_at(time);
     if (!T_world_sensor) continue;
     motion.times.push_back(time);
     motion.poses.push_back(*T_world_sensor);
@@ -236,11 +236,11 @@ void LogScans::describe_extrinsic() {
 }
 
 /// T_world_sensor at `time`, s.
-std::optional<Eigen::Isometry3d> LogScans::pose_at(double time) const {
+std::optional<Pose> LogScans::pose_at(double time) const {
   if (!pose_topic_) return transforms_.find(pose_frame_, cloud_frame_, time);
   const std::optional<TrajectoryMatch> match = match_time(poses_, time);
   if (!match) return std::nullopt;
-  const Eigen::Isometry3d T_world_child =
+  const Pose T_world_child =
       interpolate(poses_.poses[match->before], poses_.poses[match->after], match->share);
   if (pose_child_.empty() || is_in_world_) return T_world_child;
   const auto T_child_sensor = transforms_.find(pose_child_, cloud_frame_, time);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dynains/io/trajectory.hpp"
+#include "dynains/pose.hpp"
 #include "log_file.hpp"
 #include "ros_messages.hpp"
 #include "transform_tree.hpp"
@@ -57,7 +58,7 @@ class LogScans {
   void place_scans();
   std::string world_frame() const;
   void describe_extrinsic();
-  std::optional<Eigen::Isometry3d> pose_at(double time) const;
+  std::optional<Pose> pose_at(double time) const;
   SerialisedMessage load(const LogMessage& message);
 
   std::unique_ptr<LogFile> log_;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "../scalar.hpp"
+#include "dynains/pose.hpp"
 #include "log_file.hpp"
 
 namespace dynains {
@@ -49,13 +50,13 @@ class MessageWriter {
 /// tf2_msgs/TFMessage with one transform; `time`: ns.
 inline std::string transform_message(MessageEncoding encoding, std::uint64_t time,
                                      const std::string& parent, const std::string& child,
-                                     const Eigen::Isometry3d& T_parent_child) {
+                                     const Pose& T_parent_child) {
   MessageWriter out(encoding);
   out.number(std::uint32_t{1});
   out.header(time, parent);
   out.string(child);
   for (const double value : Eigen::Vector3d(T_parent_child.translation())) out.number(value);
-  const Eigen::Quaterniond rotation(T_parent_child.linear());
+  const detail::Quaternion rotation(T_parent_child.linear());
   for (const double value : Eigen::Vector4d(rotation.coeffs())) out.number(value);
   return out.bytes();
 }

@@ -39,7 +39,7 @@ Header read_header(MessageReader& in) {
 }
 
 /// Position and quaternion, as in geometry_msgs/Pose and geometry_msgs/Transform.
-Eigen::Isometry3d read_pose(MessageReader& in) {
+Pose read_pose(MessageReader& in) {
   Eigen::Vector3d position;
   for (double& value : position) value = in.number<double>("a position");
   Eigen::Vector4d xyzw;
@@ -47,8 +47,8 @@ Eigen::Isometry3d read_pose(MessageReader& in) {
   if (!position.allFinite() || !(std::abs(xyzw.norm() - 1.0) < 0.01)) {
     in.fail("expected a finite position and a quaternion of length 1");
   }
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.linear() = Eigen::Quaterniond(xyzw).normalized().toRotationMatrix();
+  Pose T = Pose::Identity();
+  T.linear() = detail::Quaternion(xyzw).normalized().toRotationMatrix();
   T.translation() = position;
   return T;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dynains/io/recording.hpp"
+#include "dynains/pose.hpp"
 #include "log_file.hpp"
 
 namespace dynains {
@@ -25,7 +26,7 @@ struct StampedPose {
   double time = 0.0;  ///< s, stamp of the header
   std::string frame;  ///< the parent, for example "odom"
   std::string child;  ///< for example "base_link"; empty if the type does not name it
-  Eigen::Isometry3d T_frame_child = Eigen::Isometry3d::Identity();
+  Pose T_frame_child = Pose::Identity();
 };
 
 /// Everything about a cloud except its points.

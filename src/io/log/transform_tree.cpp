@@ -6,7 +6,7 @@
 namespace dynains {
 namespace {
 
-std::optional<Eigen::Isometry3d> pose_at(const Trajectory& trajectory, double time) {
+std::optional<Pose> pose_at(const Trajectory& trajectory, double time) {
   if (trajectory.times.empty()) return trajectory.poses.front();
   const std::optional<TrajectoryMatch> match = match_time(trajectory, time);
   if (!match) return std::nullopt;
@@ -15,7 +15,7 @@ std::optional<Eigen::Isometry3d> pose_at(const Trajectory& trajectory, double ti
 
 }  // namespace
 
-void add_in_order(double time, const Eigen::Isometry3d& pose, Trajectory& trajectory) {
+void add_in_order(double time, const Pose& pose, Trajectory& trajectory) {
   // Most come by increasing time.
   const auto at = std::lower_bound(trajectory.times.begin(), trajectory.times.end(), time);
   if (at != trajectory.times.end() && *at == time) return;
@@ -51,19 +51,19 @@ std::optional<std::string> TransformTree::root_of(const std::string& frame) cons
 /// `source` and the frames above it, as far as transforms lead at that time.
 std::vector<TransformTree::Step> TransformTree::climb(const std::string& source,
                                                       double time) const {
-  std::vector<Step> steps = {{source, Eigen::Isometry3d::Identity()}};
+  std::vector<Step> steps = {{source, Pose::Identity()}};
   while (steps.size() <= edges_.size()) {
     const auto edge = edges_.find(steps.back().frame);
     if (edge == edges_.end()) break;
-    const std::optional<Eigen::Isometry3d> T_parent_child = pose_at(edge->second.poses, time);
+    const std::optional<Pose> T_parent_child = pose_at(edge->second.poses, time);
     if (!T_parent_child) break;
     steps.push_back({edge->second.parent, *T_parent_child * steps.back().T_frame_source});
   }
   return steps;
 }
 
-std::optional<Eigen::Isometry3d> TransformTree::find(const std::string& target,
-                                                     const std::string& source, double time) const {
+std::optional<Pose> TransformTree::find(const std::string& target, const std::string& source,
+                                        double time) const {
   const std::vector<Step> from_source = climb(source, time);
   for (const Step& above_target : climb(target, time)) {
     for (const Step& above_source : from_source) {

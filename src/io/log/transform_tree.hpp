@@ -9,12 +9,13 @@
 #include <vector>
 
 #include "dynains/io/trajectory.hpp"
+#include "dynains/pose.hpp"
 #include "ros_messages.hpp"
 
 namespace dynains {
 
 /// Adds a pose by its time (s). A second pose of one time is left out.
-void add_in_order(double time, const Eigen::Isometry3d& pose, Trajectory& trajectory);
+void add_in_order(double time, const Pose& pose, Trajectory& trajectory);
 
 /// Each frame has one parent. An edge is static, or a trajectory that is interpolated.
 class TransformTree {
@@ -29,8 +30,7 @@ class TransformTree {
   std::optional<std::string> root_of(const std::string& frame) const;
   /// T_target_source at `time` (s), by the nearest frame above both. Nothing if there is none, or
   /// if a moving edge on the way has no pose at that time (see match_time()).
-  std::optional<Eigen::Isometry3d> find(const std::string& target, const std::string& source,
-                                        double time) const;
+  std::optional<Pose> find(const std::string& target, const std::string& source, double time) const;
   /// Times of all moving transforms, s, strictly increasing.
   std::vector<double> times() const;
   /// Names of all frames that have a parent.
@@ -45,7 +45,7 @@ class TransformTree {
   /// A frame above another one, and the transform to it.
   struct Step {
     std::string frame;
-    Eigen::Isometry3d T_frame_source = Eigen::Isometry3d::Identity();
+    Pose T_frame_source = Pose::Identity();
   };
 
   std::vector<Step> climb(const std::string& source, double time) const;

@@ -1,0 +1,20 @@
+# Runs PROGRAMS in WORK_DIR and compares what they print with the file REFERENCE, or with the output
+# of the first program, which is written to WORK_DIR/checksums.txt.
+set(expected "")
+if(REFERENCE)
+  file(READ ${REFERENCE} expected)
+endif()
+foreach(program IN LISTS PROGRAMS)
+  execute_process(COMMAND ${program} WORKING_DIRECTORY ${WORK_DIR}
+    OUTPUT_VARIABLE output RESULT_VARIABLE result)
+  if(result EQUAL 77)
+    message("SKIPPED: not with this processor: ${program}")
+  elseif(NOT result EQUAL 0)
+    message(SEND_ERROR "${program} ended with ${result}")
+  elseif(expected STREQUAL "")
+    set(expected "${output}")
+    file(WRITE ${WORK_DIR}/checksums.txt "${output}")
+  elseif(NOT output STREQUAL expected)
+    message(SEND_ERROR "${program} printed\n${output}instead of\n${expected}")
+  endif()
+endforeach()
