@@ -158,7 +158,7 @@ class Simulator::Implementation {
   /// the motion is known.
   void deskew(const Moment& stamp, const Moment& now, std::size_t first,
               SimulatedScan& scan) const {
-    const Eigen::Isometry3d step = product(inverse(stamp.T_world_sensor), now.T_world_sensor);
+    const Pose step = product(inverse(stamp.T_world_sensor), now.T_world_sensor);
     const double share = config_.deskewed;
     // Turns within a scan are small.
     const Eigen::Matrix3d turn =

@@ -12,7 +12,6 @@ using namespace dynains;
 
 namespace {
 
-using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 /// Motions of a sensor that is mounted at `X` on a body; `limits`: rotation (rad) and translation
 /// (m) of the body along each axis. Noise of 5 mm.
