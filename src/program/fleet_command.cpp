@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <iostream>
 #include <string>
@@ -13,8 +14,10 @@
 namespace dynains::program {
 namespace {
 
+/// No code comes from the current folder: -c puts it first in the path of modules.
 constexpr const char* kStart = R"(
 import sys
+sys.path[:] = [folder for folder in sys.path if folder]
 try:
     from dynains import fleet
 except ImportError as error:
@@ -31,6 +34,7 @@ sys.exit(fleet.main())
   for (std::string& word : command) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   std::cout.flush();
+  ::setenv("PYTHONSAFEPATH", "1", 1);  // for the workers, which Python starts with -c, too
   ::execvp(arguments.front(), arguments.data());
   throw IoError(std::string("python3, which fleet needs: ") + std::strerror(errno));
 }

@@ -147,6 +147,42 @@ def test_wrong_arguments_of_a_fleet(drives, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
+def test_what_does_not_open_in_a_folder_is_reported(drives, tmp_path, capsys):
+    logs = tmp_path / "logs"
+    (logs / "notes").mkdir(parents=True)
+    (logs / "notes" / "readme.txt").write_text("no recording")
+    (logs / "list.txt").write_text("no recording")
+    (logs / "results").mkdir()
+    (logs / "results" / "report.json").write_text("{}")
+    (logs / "results" / "static_map.ply").write_text("ply")
+    (logs / "good").symlink_to(drives / "drive1")
+    (logs / "foreign.bag").write_text("a bag of another program")
+    (logs / "cut.db3").write_bytes(b"SQLite format 3\0")
+    (logs / "split").mkdir()
+    (logs / "split" / "metadata.yaml").write_text("rosbag2_bagfile_information:")
+    (logs / "clouds_only").mkdir()
+    (logs / "clouds_only" / "000000.pcd").write_text("x")
+    assert fleet.main([str(logs), "--out", str(tmp_path / "out"), "--workers", "1"]) == 1
+    report = json.loads((tmp_path / "out" / "fleet.json").read_text())
+    assert report.keys() == {"good", "foreign", "cut", "split", "clouds_only"}
+    assert report["good"]["scans"] == 20
+    assert all(name in report[name]["error"] for name in report if name != "good")
+    assert "5 of 5 recordings" in capsys.readouterr().err
+
+
+def test_names_of_files_of_the_fleet_are_refused(drives, tmp_path, capsys):
+    (tmp_path / "fleet.json").mkdir()
+    for file in (drives / "drive1").iterdir():
+        (tmp_path / "fleet.json" / file.name).symlink_to(file)
+    (tmp_path / "fleet.json.part.mcap").write_text("x")
+    for name in ("fleet.json", "fleet.json.part.mcap"):
+        with pytest.raises(dynains.IoError, match=f"{name}: its results would"):
+            fleet.find_recordings([tmp_path / name])
+    with pytest.raises(dynains.IoError, match="drive1: its results would"):
+        fleet.clean({"fleet.json": drives / "drive1"}, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
 def test_recordings_of_one_name_are_refused(drives, tmp_path):
     other = tmp_path / "drive1"
     other.mkdir()
@@ -162,10 +198,10 @@ def test_the_program_starts_a_fleet_and_says_what_it_lacks(drives, tmp_path):
     (tmp_path / "bin" / "python3").symlink_to(sys.executable)
     path = f"{tmp_path / 'bin'}:{os.environ['PATH']}"
 
-    def fleet_command(*words, **environment):
+    def fleet_command(*words, cwd=None, **environment):
         command = [os.environ["DYNAINS_PROGRAM"], "fleet", *map(str, words)]
         environment = {**os.environ, "PATH": path, **environment}
-        return subprocess.run(command, env=environment, capture_output=True, text=True)
+        return subprocess.run(command, env=environment, capture_output=True, text=True, cwd=cwd)
 
     out = tmp_path / "out"
     done = fleet_command(drives / "drive1", "--out", out, "--workers", "1")
@@ -174,6 +210,13 @@ def test_the_program_starts_a_fleet_and_says_what_it_lacks(drives, tmp_path):
     wrong = fleet_command(drives / "drive1", "--out", out, "--workers", "0")
     assert wrong.returncode == 2 and "expected at least 1" in wrong.stderr
     assert "usage: dynains fleet" in fleet_command("--help").stdout
+
+    data = tmp_path / "data"  # the current folder holds modules that nobody asked for
+    data.mkdir()
+    for name in ("dynains", "distributed", "json", "pickle", "multiprocessing", "socket"):
+        (data / f"{name}.py").write_text("open('executed', 'w')")
+    again = fleet_command(drives / "drive1", "--out", out, "--workers", "1", cwd=data)
+    assert again.returncode == 0 and not (data / "executed").exists()
 
     (tmp_path / "dynains.py").write_text("raise ImportError('not here')")
     missing = fleet_command("x", PYTHONPATH=str(tmp_path))

@@ -25,6 +25,11 @@ _REPORT = "fleet.json"
 _LOCK = ".fleet.lock"
 _PATIENCE = 600.0  # s, for a folder that another process holds
 
+_LOGS = {".mcap", ".db3", ".bag"}
+_SCANS = {".bin", ".pcd", ".ply", ".las", ".npy", ".npz", ".xyz", ".csv"}
+_SCAN_FOLDERS = {"velodyne", "pcd", "ply", "scans", "points", "clouds", "lidar", "samples"}
+_MARKERS = {"report.json", "city.json"}  # results of dynains, which are no recordings
+
 PathLike = Union[str, "os.PathLike[str]"]
 Result = TypeVar("Result")
 
@@ -32,13 +37,15 @@ Result = TypeVar("Result")
 def find_recordings(paths: Iterable[PathLike]) -> Dict[str, Path]:
     """Recordings by the name of their results.
 
-    paths: recordings, or folders of recordings. Raises IoError for a path that is neither, and for
-    two recordings of one name.
+    paths: recordings, or folders of recordings. What looks like a recording in a folder counts as
+    one, also if it does not open: its result is the error. Raises IoError for a path that is
+    neither, for two recordings of one name, and for names of files of a fleet.
     """
     found: Dict[str, Path] = {}
     for path in map(Path, paths):
         for recording in _recordings_at(path):
             name = recording.stem if recording.is_file() else recording.name
+            _check_name(name, recording)
             if found.get(name, recording) != recording:
                 raise IoError(
                     f"{recording}: has the same name as {found[name]}; results go to a folder of "
@@ -50,6 +57,13 @@ def find_recordings(paths: Iterable[PathLike]) -> Dict[str, Path]:
     return found
 
 
+def _check_name(name: str, recording: PathLike) -> None:
+    if name in (_REPORT, _REPORT + ".part", _LOCK):
+        raise IoError(
+            f"{recording}: its results would have the name of a file of the fleet, {name}; rename it"
+        )
+
+
 def _recordings_at(path: Path) -> List[Path]:
     path = path.resolve()
     if not path.exists():
@@ -57,7 +71,7 @@ def _recordings_at(path: Path) -> List[Path]:
     if not path.is_dir() or _opens(path):
         return [path]
     entries = sorted(entry for entry in path.iterdir() if not entry.name.startswith("."))
-    recordings = [entry for entry in entries if _opens(entry)]
+    recordings = [entry for entry in entries if _opens(entry) or _looks_like_one(entry)]
     if not recordings:
         raise IoError(f"{path}: neither a recording nor a folder of recordings")
     return recordings
@@ -69,6 +83,21 @@ def _opens(path: Path) -> bool:
     except (IoError, ConfigError, PoseError):
         return False
     return True
+
+
+def _looks_like_one(path: Path) -> bool:
+    """Whether a path that does not open has files of a recording. Results are none."""
+    if path.is_file():
+        return bool(_LOGS & set(path.suffixes))
+    try:
+        names = {entry.name for entry in path.iterdir()}
+    except OSError:
+        return True  # nobody knows what it holds
+    if _MARKERS & names:
+        return False
+    if "metadata.yaml" in names or _SCAN_FOLDERS & {name.lower() for name in names}:
+        return True
+    return any((_LOGS | _SCANS) & set(Path(name).suffixes) for name in names)
 
 
 def _when_free(work: Callable[[], Result]) -> Result:
@@ -148,6 +177,8 @@ def clean(
     from distributed import Client, LocalCluster
 
     out = Path(out).resolve()
+    for name, path in recordings.items():
+        _check_name(name, path)
     common = {**arguments, "resume": True, "one_thread": True}
     jobs = {
         name: (str(path), str(out / name), {**common, **_session(city, name)})
