@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <fstream>
 #include <iterator>
@@ -27,6 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kLargest = 64U << 20U;  // bytes
+constexpr std::size_t kDeepest = 64;             // nested elements; libraries are slow beyond
 
 std::string read_whole(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
@@ -108,7 +110,7 @@ class UrdfReader {
   }
 
   void start(std::string_view name, const char** attributes) {
-    ++depth_;
+    if (++depth_ > kDeepest) refuse("expected at most 64 nested elements");
     if (depth_ == 1) {
       has_robot_ = name == "robot";
       if (!has_robot_) refuse("expected an element <robot>, found <" + std::string(name) + ">");
@@ -180,10 +182,23 @@ TransformTree read_urdf(const fs::path& path) {
 
 #if defined(DYNAINS_HAS_YAML)
 
+/// Throws for a text with more than kDeepest nested brackets.
+void check_nesting(const fs::path& path, const std::string& text) {
+  std::size_t depth = 0;
+  std::uint64_t line = 1;
+  for (const char c : text) {
+    if (c == '\n') ++line;
+    if (c == '[' || c == '{') ++depth;
+    if ((c == ']' || c == '}') && depth > 0) --depth;
+    if (depth > kDeepest) fail_at_line(path, line, "expected at most 64 nested brackets");
+  }
+}
+
 /// The nodes of a document.
 class YamlFile {
  public:
   explicit YamlFile(const fs::path& path) : path_(path), text_(read_whole(path)) {
+    check_nesting(path, text_);
     yaml_parser_t parser;
     if (yaml_parser_initialize(&parser) == 0) throw std::bad_alloc();
     const std::unique_ptr<yaml_parser_t, decltype(&yaml_parser_delete)> owner(&parser,

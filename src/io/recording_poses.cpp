@@ -9,6 +9,7 @@
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
+#include "dynains/pose.hpp"
 #include "failure.hpp"
 #include "input_file.hpp"
 #include "kitti_files.hpp"
@@ -41,6 +42,15 @@ std::string gap_hint(const Trajectory& trajectory, double longest) {
   if (!(usual > longest)) return {};
   return ". Poses are " + in_seconds(usual) +
          " apart: --pose-gap takes them, at the cost of the error of a linear motion between them";
+}
+
+/// Throws for a pose that no map can take, with the file of the poses and the scan.
+void check_pose(const fs::path& poses, const std::string& scan, const Pose& T_world_sensor) {
+  try {
+    validate_pose("T_world_sensor", T_world_sensor);
+  } catch (const PoseError& error) {
+    fail(poses, "pose of scan " + scan + ": " + error.what());
+  }
 }
 
 std::string shown(const fs::path& path, const fs::path& folder) {
@@ -256,6 +266,7 @@ void Recording::place_scans(const fs::path& poses) {
     if (pose) {
       placed.push_back(scans_[i]);
       placed.back().T_world_sensor = *pose;
+      check_pose(poses, scans_[i].name, *pose);
     } else if (missing.empty()) {
       missing = scans_[i].name;
     }

@@ -141,6 +141,28 @@ TEST_CASE("An extrinsic is found in static transforms by two frames") {
   check_refused("i.yaml", "- 7\n", "1", "expected x, y and z");
 }
 
+TEST_CASE("Files of frames have a limit of nesting") {
+  if (!kHasUrdf || !kHasYaml) return;
+  const auto nested = [](std::size_t count, const std::string& open, const std::string& close) {
+    std::string text;
+    for (std::size_t i = 0; i < count; ++i) text += open;
+    for (std::size_t i = 0; i < count; ++i) text += close;
+    return text;
+  };
+  const TemporaryFolder folder;
+  for (const bool is_deep : {false, true}) {
+    const std::size_t depth = is_deep ? 200000 : 60;
+    write_text(folder / "frames.yaml", nested(depth, "[", "]"));
+    write_text(folder / "robot.urdf", "<robot>" + nested(depth, "<a>", "</a>") + "</robot>");
+    for (const std::string file : {"frames.yaml", "robot.urdf"}) {
+      const std::string text = (folder / file).string() + ":a:b";
+      const std::string message = message_of<std::exception>([&] { read_extrinsic(text); });
+      CHECK_THAT(message, ContainsSubstring(file));
+      CHECK((message.find("at most 64 nested") != std::string::npos) == is_deep);
+    }
+  }
+}
+
 TEST_CASE("Poses of a body become poses of the sensor by the extrinsic") {
   const TemporaryFolder folder;
   write_recording(folder.path(),

@@ -119,6 +119,24 @@ TEST_CASE("Times in names find their poses by interpolation, and scans without p
              ContainsSubstring("trajectory.tum: has poses from 5 s to 6 s for 0 of 4 scans"));
 }
 
+TEST_CASE("A pose that no map can take is refused with its file and scan") {
+  const TemporaryFolder folder;
+  write_text(folder / "a.pcd", pcd({0, 0, 0}));
+  write_text(folder / "b.pcd", pcd({0, 0, 0}));
+  for (const bool is_far : {false, true}) {
+    write_text(folder / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 " +
+                                         std::string(is_far ? "1e300" : "2e7") +
+                                         " 0 1 0 0 0 0 1 0\n");
+    const std::string error = error_of(folder.path());
+    if (is_far) {
+      CHECK_THAT(error, StartsWith((folder / "poses.txt").string() + ": pose of scan b: ") &&
+                            ContainsSubstring("a translation of 1e+300 m"));
+    } else {
+      CHECK(error == "(nothing was thrown)");
+    }
+  }
+}
+
 TEST_CASE("A shift gives every scan the pose of a neighbour") {
   const TemporaryFolder folder;
   for (const char* name : {"0", "1", "2"}) {

@@ -158,6 +158,7 @@ TEST_CASE("Transforms are chained and interpolated, by the nearest frame above b
   tree.add({0.1, "odom", "base", pose_at(99, 0)}, false);  // a second transform of one time
   tree.add({0.0, "base", "lidar", pose_at(0.5, M_PI / 2)}, true);
   tree.add({0.0, "base", "imu", pose_at(-0.5, 1.0)}, true);
+  tree.sort();
   CHECK(tree.root_of("lidar") == std::string("odom"));
   const Eigen::Isometry3d T_odom_lidar = pose_at(1.5, 0) * pose_at(0.5, M_PI / 2);
   CHECK(tree.find("odom", "lidar", 0.15)->isApprox(T_odom_lidar, 1e-12));
@@ -174,6 +175,30 @@ TEST_CASE("Transforms are chained and interpolated, by the nearest frame above b
   tree.add({0.0, "lidar", "odom", pose_at(0, 0)}, true);  // a loop
   CHECK_FALSE(tree.root_of("lidar"));
   CHECK_FALSE(tree.find("map", "lidar", 0.1));
+}
+
+TEST_CASE("Poses in any order take the time of sorting, and chains of frames have a limit") {
+  TransformTree tree;
+  constexpr int kPoses = 300000;
+  for (int i = kPoses; i > 0; --i) {
+    tree.add({i * 1e-3, "odom", "base", pose_at(i * 1e-3, 0)}, false);
+  }
+  tree.sort();
+  CHECK(tree.times().size() == kPoses);
+  CHECK(tree.find("odom", "base", 100.0005)->translation().x() == Approx(100.0005));
+
+  constexpr std::size_t kLevels = TransformTree::kDeepest;
+  for (const std::size_t levels : {kLevels, kLevels + 1}) {
+    TransformTree chain;
+    for (std::size_t i = 0; i < levels; ++i) {
+      chain.add({0.0, std::to_string(i), std::to_string(i + 1), pose_at(1, 0)}, true);
+    }
+    const std::string last = std::to_string(levels);
+    const std::string middle = std::to_string(levels / 2);
+    CHECK(chain.root_of(last).has_value() == (levels == kLevels));
+    CHECK(chain.find("0", last, 0.0).has_value() == (levels == kLevels));
+    CHECK(chain.find(middle, last, 0.0).has_value() == (levels == kLevels));
+  }
 }
 
 }  // namespace dynains

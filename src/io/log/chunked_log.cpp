@@ -9,8 +9,17 @@
 namespace dynains {
 namespace {
 
-/// Recorders write chunks of some megabytes.
+/// Recorders write chunks of some megabytes. Also the memory for the chunks that are kept.
 constexpr std::uint64_t kLargestChunk = std::uint64_t{1} << 28;
+/// Chunks of this size need not be larger in the file; of others, each byte gives at most as many.
+constexpr std::uint64_t kSmallChunk = std::uint64_t{1} << 24;
+constexpr std::uint64_t kLargestRatio = 1000;
+constexpr std::size_t kMostChunks = 16;  // that are kept if their messages alternate
+
+std::uint64_t most_bytes_of(std::uint64_t compressed_size) {
+  const std::uint64_t most = std::min(compressed_size, kLargestChunk) * kLargestRatio;
+  return std::clamp(most, kSmallChunk, kLargestChunk);
+}
 
 }  // namespace
 
@@ -48,9 +57,10 @@ void ChunkedLog::add_chunk(std::uint64_t position, Chunk header) {
                  "expected a chunk of at most " + std::to_string(file_.size() - header.content) +
                      " bytes, found the size " + std::to_string(header.compressed_size));
   }
-  if (header.uncompressed_size > kLargestChunk) {
+  if (header.uncompressed_size > most_bytes_of(header.compressed_size)) {
     fail_at_byte(path_, position,
-                 "expected a chunk of at most " + std::to_string(kLargestChunk) +
+                 "expected a chunk of at most " +
+                     std::to_string(most_bytes_of(header.compressed_size)) +
                      " bytes, found the size " + std::to_string(header.uncompressed_size));
   }
   chunks_[position] = std::move(header);
@@ -58,10 +68,18 @@ void ChunkedLog::add_chunk(std::uint64_t position, Chunk header) {
   first_of_last_ = entries_.size();
 }
 
+/// The times of messages alone take more than a byte each, also in compressed chunks.
+void ChunkedLog::add_entry(const Entry& entry) {
+  if (entries_.size() >= file_.size()) {
+    fail_at_byte(path_, entry.block, "expected at most one message for each byte of the log");
+  }
+  entries_.push_back(entry);
+}
+
 void ChunkedLog::add_indexed(std::uint32_t channel, std::uint64_t time, std::uint64_t offset) {
   if (last_chunk_ == 0) return;
   chunks_[last_chunk_].has_index = true;
-  entries_.push_back({time, last_chunk_, offset, channel});
+  add_entry({time, last_chunk_, offset, channel});
 }
 
 /// Some of the index may be missing at the end of a file.
@@ -84,7 +102,7 @@ void ChunkedLog::read_chunk_records(std::uint64_t chunk, bool with_messages) {
     const std::uint64_t offset = rest.position();
     const std::optional<Message> message = parse_record(rest);
     if (message && with_messages) {
-      entries_.push_back({message->time, chunk, offset, message->channel});
+      add_entry({message->time, chunk, offset, message->channel});
     }
   }
 }
@@ -134,31 +152,62 @@ void ChunkedLog::read(const LogMessage& message, std::vector<std::uint8_t>& byte
 
 /// The uncompressed records of a chunk; the last ones are kept.
 const std::vector<std::uint8_t>& ChunkedLog::load(std::uint64_t chunk) {
-  if (loaded_ == chunk) return records_;
-  loaded_ = 0;
+  const auto is_wanted = [chunk](const LoadedChunk& loaded) { return loaded.chunk == chunk; };
+  auto loaded = std::find_if(loaded_.begin(), loaded_.end(), is_wanted);
+  if (loaded == loaded_.end()) {
+    LoadedChunk& free = make_room(chunks_.at(chunk).uncompressed_size);
+    free.chunk = 0;
+    decompress_to(chunk, free.records);
+    free.chunk = chunk;
+    loaded = loaded_.begin() + (&free - loaded_.data());
+  }
+  loaded->last_use = ++loads_;
+  chunk_place_ = path_.string() + ": chunk at byte " + std::to_string(chunk);
+  return loaded->records;
+}
+
+/// A place for a chunk of `size` bytes: a new one, or that of the chunk that was not used longest.
+ChunkedLog::LoadedChunk& ChunkedLog::make_room(std::uint64_t size) {
+  const auto is_older = [](const LoadedChunk& a, const LoadedChunk& b) {
+    return a.last_use < b.last_use;
+  };
+  std::uint64_t kept = 0;
+  for (const LoadedChunk& loaded : loaded_) kept += loaded.records.capacity();
+  std::optional<LoadedChunk> reused;
+  while (!loaded_.empty() && (kept + size > kLargestChunk || loaded_.size() >= wanted_chunks_)) {
+    const auto oldest = std::min_element(loaded_.begin(), loaded_.end(), is_older);
+    kept -= oldest->records.capacity();
+    if (oldest->records.capacity() <= 2 * size) reused = std::move(*oldest);
+    loaded_.erase(oldest);
+  }
+  loaded_.push_back(reused ? std::move(*reused) : LoadedChunk());
+  return loaded_.back();
+}
+
+void ChunkedLog::decompress_to(std::uint64_t chunk, std::vector<std::uint8_t>& records) {
   Chunk& header = chunks_.at(chunk);
+  ++decompressions_;
+  const std::uint64_t before = std::exchange(header.decompression, decompressions_);
+  if (before != 0 && decompressions_ - before <= kMostChunks) wanted_chunks_ = kMostChunks;
   file_.read(header.content, header.compressed_size, "a chunk", compressed_);
   if (header.compression.empty()) {
-    records_.swap(compressed_);
-    if (records_.size() != header.uncompressed_size) {
+    records.swap(compressed_);
+    if (records.size() != header.uncompressed_size) {
       fail_at_byte(path_, chunk,
                    "expected a chunk of " + std::to_string(header.uncompressed_size) +
-                       " bytes, found " + std::to_string(records_.size()));
+                       " bytes, found " + std::to_string(records.size()));
     }
   } else {
     const std::string obstacle =
-        decompress(header.compression, compressed_, header.uncompressed_size, records_);
+        decompress(header.compression, compressed_, header.uncompressed_size, records);
     if (!obstacle.empty()) fail_at_byte(path_, header.content, "compressed chunk: " + obstacle);
   }
   if (has_crc32() && header.uncompressed_crc != 0 &&
-      header.uncompressed_crc != crc32(records_.data(), records_.size())) {
+      header.uncompressed_crc != crc32(records.data(), records.size())) {
     fail_at_byte(path_, header.content,
                  "expected the checksum of the chunk, found that of other bytes");
   }
   header.uncompressed_crc = 0;
-  loaded_ = chunk;
-  chunk_place_ = path_.string() + ": chunk at byte " + std::to_string(chunk);
-  return records_;
 }
 
 }  // namespace dynains

@@ -17,9 +17,17 @@ namespace dynains {
 /// The part that both formats have in common. A chunk is followed by an index of its messages. A
 /// chunk without index, and the last chunk of a file that ends early, is decompressed for its
 /// messages. So a file is read in the same way whether its summary was written or not.
+///
+/// Memory is bounded by the size of the file: 100 bytes of index for each byte, and 256 MiB of
+/// uncompressed chunks, of which each is at most 1,000 times its compressed size (16 MiB for small
+/// ones).
 class ChunkedLog : public LogFile {
  public:
   void read(const LogMessage& message, std::vector<std::uint8_t>& bytes) override;
+  void release() override {
+    loaded_.clear();
+    compressed_ = {};
+  }
 
  protected:
   /// The part of the header of a chunk that reading needs.
@@ -30,6 +38,7 @@ class ChunkedLog : public LogFile {
     std::uint32_t uncompressed_crc = 0;  ///< 0: not given, or compared already
     std::string compression;             ///< empty: none
     bool has_index = false;
+    std::uint64_t decompression = 0;  ///< number of the last one
   };
   struct Message {
     std::uint32_t channel = 0;
@@ -76,11 +85,21 @@ class ChunkedLog : public LogFile {
     std::uint32_t channel;
   };
 
+  /// The uncompressed records of a chunk.
+  struct LoadedChunk {
+    std::uint64_t chunk = 0;     ///< byte of its record
+    std::uint64_t last_use = 0;  ///< number of the load
+    std::vector<std::uint8_t> records;
+  };
+
+  void add_entry(const Entry& entry);
   void drop_index_of_last_chunk();
   void read_chunk_records(std::uint64_t chunk, bool with_messages);
   void find_missing_channels();
   void make_messages();
   const std::vector<std::uint8_t>& load(std::uint64_t chunk);
+  LoadedChunk& make_room(std::uint64_t size);
+  void decompress_to(std::uint64_t chunk, std::vector<std::uint8_t>& records);
 
   std::map<std::uint32_t, LogTopic> channels_;  ///< several may have one topic
   std::map<std::uint64_t, Chunk> chunks_;       ///< by byte of the record
@@ -88,10 +107,12 @@ class ChunkedLog : public LogFile {
   // No record is at byte 0.
   std::uint64_t last_chunk_ = 0;   ///< the chunk whose index is read; 0: none
   std::size_t first_of_last_ = 0;  ///< its first entry
-  std::uint64_t loaded_ = 0;       ///< the chunk whose records are in memory; 0: none
+  std::vector<LoadedChunk> loaded_;
+  std::size_t wanted_chunks_ = 1;  ///< more if the messages of chunks alternate in time
+  std::uint64_t loads_ = 0;
+  std::uint64_t decompressions_ = 0;
   std::vector<std::uint8_t> compressed_;
-  std::vector<std::uint8_t> records_;
-  std::filesystem::path chunk_place_;  ///< path and byte of the loaded chunk, for errors
+  std::filesystem::path chunk_place_;  ///< path and byte of the last chunk, for errors
 };
 
 }  // namespace dynains

@@ -58,6 +58,7 @@ class SplitLog final : public LogFile {
     for (const fs::path& file : files) {
       parts_.push_back(open_file(file));
       add(*parts_.back(), static_cast<std::uint32_t>(parts_.size() - 1));
+      parts_.back()->release();
     }
     finish_index();
   }
@@ -68,8 +69,11 @@ class SplitLog final : public LogFile {
     return files;
   }
   void read(const LogMessage& message, std::vector<std::uint8_t>& bytes) override {
+    if (message.part != last_part_) parts_[last_part_]->release();
+    last_part_ = message.part;
     parts_[message.part]->read(message, bytes);
   }
+  void release() override { parts_[last_part_]->release(); }
 
  private:
   void add(const LogFile& part, std::uint32_t number) {
@@ -84,6 +88,7 @@ class SplitLog final : public LogFile {
   }
 
   std::vector<std::unique_ptr<LogFile>> parts_;
+  std::size_t last_part_ = 0;  ///< the part that was read last
 };
 
 }  // namespace

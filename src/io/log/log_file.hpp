@@ -56,6 +56,8 @@ class LogFile {
 
   /// Replaces `bytes` by the serialised message. Memory of `bytes` is reused.
   virtual void read(const LogMessage& message, std::vector<std::uint8_t>& bytes) = 0;
+  /// Gives memory back that the next read() would reuse.
+  virtual void release() {}
 
  protected:
   explicit LogFile(std::filesystem::path path) : path_(std::move(path)) {}

@@ -124,6 +124,8 @@ void LogScans::read_log() {
         message.topic == pose_topic_ || (is_readable(topic) && is_transform_type(topic.type));
     if (choice_.with_poses && has_poses) take_poses(message);
   }
+  transforms_.sort();
+  sort_by_time(poses_);
 }
 
 void LogScans::take_cloud(const LogMessage& message) {
@@ -158,7 +160,7 @@ void LogScans::take_poses(const LogMessage& message) {
       pose_frame_ = pose.frame;
       pose_child_ = pose.child;
     }
-    add_in_order(pose.time, pose.T_frame_child, poses_);
+    append(pose.time, pose.T_frame_child, poses_);
   }
 }
 
@@ -213,8 +215,9 @@ std::string LogScans::world_frame() const {
   }
   const std::optional<std::string> root = transforms_.root_of(cloud_frame_);
   if (!root) {
-    fail(log_->path(),
-         "expected transforms that form a tree, found a loop above frame " + cloud_frame_);
+    fail(log_->path(), "expected transforms that form a tree of at most " +
+                           std::to_string(TransformTree::kDeepest) +
+                           " levels, found a loop or more above frame " + cloud_frame_);
   }
   return choice_.pose_frame.empty() ? *root : choice_.pose_frame;
 }

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <map>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "../failure.hpp"
@@ -52,6 +53,12 @@ bool is_shorter_than_announced(const std::filesystem::path& path) {
   return pages * (page_size == 1 ? 65536 : page_size) > file.size();
 }
 
+/// Work of the database in virtual steps. Reading a row takes about ten.
+constexpr int kStepsOfProgress = 100000;
+
+/// Called after each kStepsOfProgress; another number than 0 ends the query.
+int spend(void* budget) { return --*static_cast<std::int64_t*>(budget) < 0 ? 1 : 0; }
+
 std::string row_of(std::int64_t row) { return "row " + std::to_string(row) + " of messages: "; }
 
 constexpr const char* kUnreadable = "cannot be read";
@@ -62,8 +69,11 @@ SqliteBag::SqliteBag(const std::filesystem::path& path) : LogFile(path) {
   const bool is_cut_off = is_shorter_than_announced(path);
   database_ =
       open_database(uri_of(path), SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, path, "cannot be opened");
+  limit(RawFile(path).size());
   // Lets SQLite read a database that is shorter than its header says. Nothing is written.
   step(prepare("PRAGMA writable_schema = ON").get());
+  check_table("topics");
+  check_table("messages");
   select_message_ = prepare("SELECT data FROM messages WHERE id = ?");
   read_topics();
   read_messages();
@@ -72,9 +82,54 @@ SqliteBag::SqliteBag(const std::filesystem::path& path) : LogFile(path) {
   finish_index();
 }
 
+/// No SQL of the file runs, and nothing is larger or takes longer than a file of `size` bytes can
+/// need.
+void SqliteBag::limit(std::uint64_t size) {
+  constexpr std::uint64_t kLeast = 1U << 20U;
+  constexpr std::uint64_t kMost = 1U << 30U;
+  sqlite3* const database = database_.get();
+  sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+  sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  sqlite3_db_config(database, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_limit(database, SQLITE_LIMIT_LENGTH, static_cast<int>(std::clamp(size, kLeast, kMost)));
+  most_rows_ = size;
+  budget_ = static_cast<std::int64_t>(100 + size / 1000);
+  sqlite3_progress_handler(database, kStepsOfProgress, spend, &budget_);
+}
+
+/// Throws unless `table` is a table with stored columns and, if it has messages, found by id.
+void SqliteBag::check_table(const std::string& table) {
+  const SqliteStatement kind = prepare(
+      ("SELECT sql FROM sqlite_master WHERE type = 'table' AND name = '" + table + "'").c_str());
+  const bool is_table = step(kind.get());
+  constexpr std::string_view kVirtual = "CREATE VIRTUAL";
+  const std::string sql = is_table ? text_of(kind.get(), 0) : std::string();
+  if (!is_table || sql.compare(0, kVirtual.size(), kVirtual) == 0) {
+    fail(path_, "expected the tables of rosbag2: " + table + " is no table");
+  }
+  const SqliteStatement columns = prepare(("PRAGMA table_xinfo(" + table + ")").c_str());
+  bool has_key = false;
+  while (step(columns.get())) {
+    const std::string column = text_of(columns.get(), 1);
+    has_key = has_key || (column == "id" && sqlite3_column_int(columns.get(), 5) == 1);
+    if (sqlite3_column_int(columns.get(), 6) == 0) continue;
+    fail(path_,
+         "expected the tables of rosbag2: column " + column + " of " + table + " is computed");
+  }
+  if (table == "messages" && !has_key) {
+    fail(path_, "expected the tables of rosbag2: id is no primary key of messages");
+  }
+}
+
+/// Counts a row that was read. A file with loops or links among its pages has rows without end.
+void SqliteBag::count_row() {
+  if (most_rows_-- == 0) fail(path_, "has more rows than its size allows");
+}
+
 void SqliteBag::read_topics() {
   const SqliteStatement topics = prepare("SELECT id, name, type, serialization_format FROM topics");
   while (step(topics.get())) {
+    count_row();
     LogTopic topic;
     topic.name = text_of(topics.get(), 1);
     topic.type = plain_type(text_of(topics.get(), 2));
@@ -90,6 +145,7 @@ void SqliteBag::read_messages() {
   std::int64_t row = 0;
   int result = sqlite3_step(messages.get());
   for (; result == SQLITE_ROW; result = sqlite3_step(messages.get())) {
+    count_row();
     row = sqlite3_column_int64(messages.get(), 0);
     const auto topic = topic_of_.find(sqlite3_column_int64(messages.get(), 1));
     if (topic == topic_of_.end()) fail(path_, row_of(row) + "expected the id of a topic");
@@ -112,6 +168,7 @@ void SqliteBag::drop_unreadable() {
 
 /// Result of the search for the data of a message.
 int SqliteBag::select(const LogMessage& message) {
+  budget_ = std::max<std::int64_t>(budget_, 100);
   sqlite3_reset(select_message_.get());
   sqlite3_bind_int64(select_message_.get(), 1, static_cast<std::int64_t>(message.block));
   return sqlite3_step(select_message_.get());

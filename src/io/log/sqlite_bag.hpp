@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <string>
 #include <vector>
 
 #include "log_file.hpp"
@@ -10,13 +11,17 @@
 
 namespace dynains {
 
-/// Opens the database read-only. LogMessage::block is the row of a message.
+/// Opens the database read-only. Views, virtual tables and computed columns are refused, since they
+/// are programs. LogMessage::block is the row of a message.
 class SqliteBag final : public LogFile {
  public:
   explicit SqliteBag(const std::filesystem::path& path);
   void read(const LogMessage& message, std::vector<std::uint8_t>& bytes) override;
 
  private:
+  void limit(std::uint64_t size);
+  void check_table(const std::string& table);
+  void count_row();
   void read_topics();
   void read_messages();
   void drop_unreadable();
@@ -24,6 +29,8 @@ class SqliteBag final : public LogFile {
   SqliteStatement prepare(const char* sql);
   bool step(sqlite3_stmt* statement);
 
+  std::uint64_t most_rows_ = 0;  ///< that are still accepted
+  std::int64_t budget_ = 0;      ///< of the progress handler; outlives the database
   SqliteDatabase database_;
   SqliteStatement select_message_;
   std::map<std::int64_t, std::uint32_t> topic_of_;  ///< by id in the database

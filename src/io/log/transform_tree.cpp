@@ -1,7 +1,10 @@
 #include "transform_tree.hpp"
 
 #include <algorithm>
-#include <set>
+#include <cstddef>
+#include <iterator>
+#include <numeric>
+#include <utility>
 
 namespace dynains {
 namespace {
@@ -15,12 +18,26 @@ std::optional<Pose> pose_at(const Trajectory& trajectory, double time) {
 
 }  // namespace
 
-void add_in_order(double time, const Pose& pose, Trajectory& trajectory) {
-  // Most come by increasing time.
-  const auto at = std::lower_bound(trajectory.times.begin(), trajectory.times.end(), time);
-  if (at != trajectory.times.end() && *at == time) return;
-  trajectory.poses.insert(trajectory.poses.begin() + (at - trajectory.times.begin()), pose);
-  trajectory.times.insert(at, time);
+void append(double time, const Pose& pose, Trajectory& trajectory) {
+  trajectory.times.push_back(time);
+  trajectory.poses.push_back(pose);
+}
+
+void sort_by_time(Trajectory& trajectory) {
+  const std::vector<double>& times = trajectory.times;
+  const auto is_late = [](double a, double b) { return !(a < b); };
+  if (std::adjacent_find(times.begin(), times.end(), is_late) == times.end()) return;
+  std::vector<std::size_t> order(times.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return times[a] < times[b]; });
+  Trajectory sorted;
+  sorted.order = trajectory.order;
+  for (const std::size_t i : order) {
+    if (!sorted.times.empty() && sorted.times.back() == times[i]) continue;
+    append(times[i], trajectory.poses[i], sorted);
+  }
+  trajectory = std::move(sorted);
 }
 
 void TransformTree::add(const StampedPose& pose, bool is_static) {
@@ -34,15 +51,19 @@ void TransformTree::add(const StampedPose& pose, bool is_static) {
     edge.poses.poses.assign(1, pose.T_frame_child);
     edge.poses.times.clear();
   } else {
-    add_in_order(pose.time, pose.T_frame_child, edge.poses);
+    append(pose.time, pose.T_frame_child, edge.poses);
   }
+}
+
+void TransformTree::sort() {
+  for (auto& edge : edges_) sort_by_time(edge.second.poses);
 }
 
 std::optional<std::string> TransformTree::root_of(const std::string& frame) const {
   std::string root = frame;
   std::size_t steps = 0;
   for (auto edge = edges_.find(root); edge != edges_.end(); edge = edges_.find(root)) {
-    if (++steps > edges_.size()) return std::nullopt;
+    if (++steps > kDeepest) return std::nullopt;
     root = edge->second.parent;
   }
   return root;
@@ -52,7 +73,7 @@ std::optional<std::string> TransformTree::root_of(const std::string& frame) cons
 std::vector<TransformTree::Step> TransformTree::climb(const std::string& source,
                                                       double time) const {
   std::vector<Step> steps = {{source, Pose::Identity()}};
-  while (steps.size() <= edges_.size()) {
+  while (steps.size() <= kDeepest) {
     const auto edge = edges_.find(steps.back().frame);
     if (edge == edges_.end()) break;
     const std::optional<Pose> T_parent_child = pose_at(edge->second.poses, time);
@@ -65,21 +86,28 @@ std::vector<TransformTree::Step> TransformTree::climb(const std::string& source,
 std::optional<Pose> TransformTree::find(const std::string& target, const std::string& source,
                                         double time) const {
   const std::vector<Step> from_source = climb(source, time);
-  for (const Step& above_target : climb(target, time)) {
-    for (const Step& above_source : from_source) {
-      if (above_source.frame != above_target.frame) continue;
-      return above_target.T_frame_source.inverse() * above_source.T_frame_source;
-    }
+  const std::vector<Step> from_target = climb(target, time);
+  auto above_source = from_source.rbegin();
+  auto above_target = from_target.rbegin();
+  if (above_source->frame != above_target->frame) return std::nullopt;
+  // From the top down to the last frame that both have.
+  while (std::next(above_source) != from_source.rend() &&
+         std::next(above_target) != from_target.rend() &&
+         std::next(above_source)->frame == std::next(above_target)->frame) {
+    ++above_source;
+    ++above_target;
   }
-  return std::nullopt;
+  return above_target->T_frame_source.inverse() * above_source->T_frame_source;
 }
 
 std::vector<double> TransformTree::times() const {
-  std::set<double> times;
+  std::vector<double> times;
   for (const auto& edge : edges_) {
-    times.insert(edge.second.poses.times.begin(), edge.second.poses.times.end());
+    times.insert(times.end(), edge.second.poses.times.begin(), edge.second.poses.times.end());
   }
-  return {times.begin(), times.end()};
+  std::sort(times.begin(), times.end());
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  return times;
 }
 
 std::vector<std::string> TransformTree::frames() const {

@@ -14,19 +14,28 @@
 
 namespace dynains {
 
-/// Adds a pose by its time (s). A second pose of one time is left out.
-void add_in_order(double time, const Pose& pose, Trajectory& trajectory);
+/// Adds a pose with its time (s), in any order.
+void append(double time, const Pose& pose, Trajectory& trajectory);
+/// Orders poses by time. Of several poses of one time, the first one stays.
+void sort_by_time(Trajectory& trajectory);
 
 /// Each frame has one parent. An edge is static, or a trajectory that is interpolated.
 class TransformTree {
  public:
+  /// Most edges between a frame and its root. Robots have fewer than 100.
+  static constexpr std::size_t kDeepest = 256;
+
   /// Adds T_frame_child of a pose. A static transform replaces earlier ones of its frame. A pose
   /// that gives a frame a second parent is left out and counted.
   void add(const StampedPose& pose, bool is_static);
   std::size_t left_out() const { return left_out_; }
 
+  /// Orders the poses of each edge by time, for the members below.
+  void sort();
+
   bool has(const std::string& frame) const { return edges_.count(frame) > 0; }
-  /// The frame above `frame` that has no parent; nothing if the frames above it form a loop.
+  /// The frame above `frame` that has no parent; nothing if the frames above it form a loop
+  /// or are more than kDeepest.
   std::optional<std::string> root_of(const std::string& frame) const;
   /// T_target_source at `time` (s), by the nearest frame above both. Nothing if there is none, or
   /// if a moving edge on the way has no pose at that time (see match_time()).
