@@ -18,18 +18,51 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Names of the session folders of a city, sorted.
+/// Names of the session folders of a city, sorted. A link is no session.
 std::vector<std::string> session_names(const fs::path& city) {
   std::vector<std::string> names;
   std::error_code error;
   for (fs::directory_iterator entry(city, error), end; !error && entry != end;
        entry.increment(error)) {
     std::string name = entry->path().filename().string();
-    if (is_session_name(name) && entry->is_directory()) names.push_back(std::move(name));
+    const bool is_folder = entry->is_directory() && !entry->is_symlink();
+    if (is_session_name(name) && is_folder) names.push_back(std::move(name));
   }
   if (error) fail_by_system(city, "cannot be read", error.value());
   std::sort(names.begin(), names.end());
   return names;
+}
+
+/// Links that have the place of a session.
+std::vector<fs::path> linked_sessions(const fs::path& city) {
+  std::vector<fs::path> links;
+  for (const auto& entry : fs::directory_iterator(city)) {
+    const bool is_link = entry.is_symlink() && entry.is_directory();
+    if (is_link && is_session_name(entry.path().filename().string())) links.push_back(entry.path());
+  }
+  std::sort(links.begin(), links.end());
+  return links;
+}
+
+/// Throws unless session.json tells the number of points of its tiles.
+void check_count(const fs::path& file, const SessionInfo& session) {
+  std::uint64_t points = 0;
+  for (const auto& tile : session.tiles) points += tile.second;
+  if (points == session.points) return;
+  fail(file, "/points: expected " + std::to_string(points) + ", the sum over /tiles");
+}
+
+/// Throws unless every point of a tile lies within the bounds that session.json tells.
+void check_bounds(const fs::path& file, const SessionGrid& grid, const SessionInfo& session,
+                  const TileIndex& tile, const std::vector<SessionPoint>& points) {
+  const Eigen::Vector3d corner = tile_corner(grid, tile);
+  for (const SessionPoint& point : points) {
+    const Eigen::Vector3d position =
+        corner + Eigen::Vector3f(point.x, point.y, point.z).cast<double>();
+    const bool is_within = (position.array() >= session.lowest.array()).all() &&
+                           (position.array() <= session.highest.array()).all();
+    if (!is_within) fail(file, "expected points between lowest and highest of session.json");
+  }
 }
 
 std::string number_text(double value) {
@@ -141,14 +174,24 @@ std::vector<std::string> City::check() const {
       defects.emplace_back(error.what());
     }
   };
+  for (const fs::path& link : linked_sessions(folder_)) {
+    defects.push_back(link.string() + ": is a link, which is no session");
+  }
   for (const std::string& name : session_names(folder_)) {
     note([&] {
       const fs::path folder = session_folder(name);
-      const SessionInfo session = session_files::read_session(folder / session_files::kSessionFile);
+      const fs::path file = folder / session_files::kSessionFile;
+      const SessionInfo session =
+          session_files::read_session(file, session_files::Checksum::kRequired);
+      check_count(file, session);
       const fs::path foreign = session_files::foreign_entry(folder);
       if (!foreign.empty()) fail(foreign, "is not part of the session");
       for (const auto& tile : session.tiles) {
-        note([&] { read_tile(session, tile.first); });
+        note([&] {
+          const fs::path tiles = folder / session_files::kTileFolder;
+          check_bounds(tiles / session_files::tile_name(tile.first), grid_, session, tile.first,
+                       read_tile(session, tile.first));
+        });
       }
       for (const auto& entry : fs::directory_iterator(folder / session_files::kTileFolder)) {
         const bool is_listed =
@@ -159,6 +202,9 @@ std::vector<std::string> City::check() const {
           defects.push_back(entry.path().string() + ": session.json does not list it");
       }
       const SessionReferenceReader references(*this, session);
+      if (references.entries().size() != session.references) {
+        fail(file, "/references: expected " + std::to_string(references.entries().size()));
+      }
       SessionReference reference;
       for (const auto& entry : references.entries()) {
         note([&] { references.read(entry, reference); });

@@ -8,6 +8,7 @@
 #include "dynains/errors.hpp"
 #include "io/byte_reader.hpp"
 #include "io/failure.hpp"
+#include "io/fingerprint.hpp"
 #include "io/scalar.hpp"
 #include "session_files.hpp"
 
@@ -20,6 +21,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kCityFormat = "dynains city";
 constexpr const char* kSessionFormat = "dynains session";
+constexpr const char* kChecksum = "checksum";
 constexpr std::uint64_t kMostJsonBytes = std::uint64_t{64} << 20U;
 
 Json read_json(const fs::path& path, const char* format) {
@@ -29,6 +31,8 @@ Json read_json(const fs::path& path, const char* format) {
   Json json;
   try {
     json = Json::parse(text);
+    const std::size_t zero = text.find('\0');  // the parser ends there
+    if (zero != std::string::npos) fail_at_byte(path, zero, "expected nothing behind the JSON");
   } catch (const Json::parse_error& error) {
     fail_at_byte(path, error.byte, "expected JSON");
   }
@@ -129,6 +133,22 @@ std::string text_of(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 
+/// The checksum of all fields that precede it.
+std::string checksum_of(const Json& fields) {
+  Fingerprint fingerprint;
+  fingerprint.add(text_of(fields));
+  return fingerprint.text();
+}
+
+void check_sum(const fs::path& path, Json json, Checksum checksum) {
+  const auto found = json.find(kChecksum);
+  if (found == json.end() && checksum == Checksum::kIfPresent) return;
+  const std::string expected = found == json.end() ? "" : found->dump();
+  json.erase(kChecksum);
+  if (expected == '"' + checksum_of(json) + '"') return;
+  fail(path, "/checksum: expected that of the other fields; the file was changed");
+}
+
 }  // namespace
 
 std::string city_text(const SessionGrid& grid) {
@@ -168,11 +188,13 @@ std::string session_text(const SessionInfo& session) {
                {"tiles", tiles},
                {"configuration", session.config.empty() ? Json() : Json::parse(session.config)}};
   if (session.alignment) json["alignment"] = json_of(*session.alignment);
+  json[kChecksum] = checksum_of(json);
   return text_of(json);
 }
 
-SessionInfo read_session(const fs::path& path) {
+SessionInfo read_session(const fs::path& path, Checksum checksum) {
   const Json json = read_json(path, kSessionFormat);
+  check_sum(path, json, checksum);
   SessionInfo session;
   session.name = path.parent_path().filename().string();
   session.begin = number_field(path, json, "begin");

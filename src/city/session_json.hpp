@@ -12,7 +12,10 @@ namespace dynains::session_files {
 std::string city_text(const SessionGrid& grid);
 SessionGrid read_city(const std::filesystem::path& path);
 std::string session_text(const SessionInfo& session);
-SessionInfo read_session(const std::filesystem::path& path);
+/// Sessions of earlier versions have no checksum.
+enum class Checksum { kIfPresent, kRequired };
+SessionInfo read_session(const std::filesystem::path& path,
+                         Checksum checksum = Checksum::kIfPresent);
 /// Throws ConfigError unless `text` is empty or JSON.
 void check_config_text(const std::string& text);
 

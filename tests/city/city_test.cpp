@@ -477,6 +477,43 @@ TEST_CASE("a city: every damage is named by path and position") {
   CHECK(names(defects, "77_77.tile: session.json does not list it"));
 }
 
+TEST_CASE("a city: a change of session.json and a link in place of a session are defects") {
+  const test::TemporaryFolder folder;
+  City city = city_of(folder.path() / "city", {kDays[0]});
+  const fs::path file = city.session_folder("monday") / "session.json";
+  const auto text_of = [](const fs::path& path) {
+    std::ifstream stream(path, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(stream), {});
+  };
+  const std::string whole = text_of(file);
+  REQUIRE(city.check().empty());
+  for (const std::string name : {"begin", "scans", "points", "lowest", "highest", "recording"}) {
+    CAPTURE(name);
+    std::string changed = whole;
+    const std::size_t at =
+        changed.find_first_of("0123456789y", changed.find('"' + name + "\":") + name.size() + 3);
+    changed[at] = changed[at] == '1' ? '2' : '1';
+    std::ofstream(file, std::ios::binary) << changed;
+    CHECK(names(city.check(), file.string() + ": /checksum: expected"));
+    CHECK_THROWS_AS(city.sessions(), IoError);
+    // Whoever removes the checksum cannot hide it.
+    changed.erase(changed.rfind(',', changed.find("\"checksum\"")));
+    std::ofstream(file, std::ios::binary) << changed << "\n}\n";
+    CHECK(names(city.check(), file.string() + ": /checksum: expected"));
+  }
+  std::ofstream(file, std::ios::binary) << whole << std::string(1, '\0') << "more";
+  CHECK(names(city.check(), file.string() + ": byte " + std::to_string(whole.size()) +
+                                ": expected nothing behind the JSON"));
+  std::ofstream(file, std::ios::binary) << whole;
+  REQUIRE(city.check().empty());
+
+  fs::rename(city.session_folder("monday"), folder.path() / "elsewhere");
+  fs::create_directory_symlink(folder.path() / "elsewhere", city.session_folder("monday"));
+  CHECK(city.sessions().empty());
+  CHECK(names(city.check(), "monday: is a link, which is no session"));
+  CHECK_THROWS_WITH(city.drop("monday"), ContainsSubstring("has no session \"monday\""));
+}
+
 TEST_CASE("a city: a session that is not committed changes nothing") {
   const test::TemporaryFolder folder;
   const City city = city_of(folder.path() / "city", {kDays[0]});
