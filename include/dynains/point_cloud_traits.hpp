@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "dynains/errors.hpp"
@@ -121,12 +122,30 @@ struct PointCloudTraits<
 
 namespace dynains::detail {
 
+template <class Cloud, class = void>
+struct HasPointCloudTraits : std::false_type {};
+template <class Cloud>
+struct HasPointCloudTraits<
+    Cloud,
+    std::void_t<
+        decltype(std::size_t{PointCloudTraits<Cloud>::size(std::declval<const Cloud&>())}),
+        decltype(PointCloudTraits<Cloud>::point(std::declval<const Cloud&>(), std::size_t{}).x())>>
+    : std::true_type {};
+
 /// Type-erased view of a cloud with PointCloudTraits. The cloud must outlive the view.
 class CloudView {
  public:
   template <class Cloud>
-  explicit CloudView(const Cloud& cloud)
-      : cloud_(&cloud), size_(PointCloudTraits<Cloud>::size(cloud)), copy_(&copy_from<Cloud>) {
+  explicit CloudView(const Cloud& cloud) : cloud_(&cloud) {
+    static_assert(HasPointCloudTraits<Cloud>::value,
+                  "no cloud of points: specialise dynains::PointCloudTraits<Cloud> with "
+                  "static std::size_t size(const Cloud&) and static Eigen::Vector3f point(const "
+                  "Cloud&, std::size_t), as in examples/02_own_cloud_type.cpp; for interleaved "
+                  "numbers pass dynains::RawPoints{numbers.data(), points, numbers_per_point}");
+    if constexpr (HasPointCloudTraits<Cloud>::value) {  // else one error is enough
+      size_ = PointCloudTraits<Cloud>::size(cloud);
+      copy_ = &copy_from<Cloud>;
+    }
     if constexpr (std::is_same_v<Cloud, RawPoints<float>>) raw_ = &cloud;
   }
 
@@ -153,8 +172,8 @@ class CloudView {
   }
 
   const void* cloud_;
-  std::size_t size_;
-  void (*copy_)(const void*, std::size_t, std::size_t, float*, float*, float*);
+  std::size_t size_ = 0;
+  void (*copy_)(const void*, std::size_t, std::size_t, float*, float*, float*) = nullptr;
   const RawPoints<float>* raw_ = nullptr;
 };
 

@@ -103,6 +103,16 @@ struct PoseResidual {
   /// Corrected motion: pose of this scan in the sensor frame of the previous one. It is the pushed
   /// motion, except for rounding, if neither of both poses was corrected.
   Pose T_previous_newest = Pose::Identity();
+  /// The previous scan: the last one that was taken. A push that threw is not.
+  std::uint64_t previous_scan = 0;  ///< number of its push, as ScanVerdict::scan
+  double previous_time = 0.0;       ///< s, as pushed
+};
+
+/// Doubt about the times of the last four scans.
+enum class TimeDoubt : std::uint8_t {
+  kNone,
+  kTooSlow,  ///< all more than max_gap apart: no scan is compared. Milliseconds for seconds?
+  kTooFast   ///< all less than 1 ms apart: no LiDAR is as fast
 };
 
 /// Result of one push.
@@ -115,6 +125,7 @@ struct FrameResult {
   /// Empty for the first scan of an epoch, without enough common surfaces, and if free space is not
   /// used (decision = window) or `pose_tolerance` is 0.
   std::optional<PoseResidual> pose_residual;
+  TimeDoubt time_doubt = TimeDoubt::kNone;
 };
 
 /// Verdict by free space on one scan. Each non-ground point belongs to a group with one verdict;

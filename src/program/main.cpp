@@ -60,6 +60,16 @@ int print_help(const CLI::App& app, const CLI::Success& success) {
   return code;
 }
 
+/// The first path of the command line, for errors that do not know it.
+std::string place_of(const CLI::App& app) {
+  for (const CLI::App* const command : app.get_subcommands()) {
+    for (const CLI::Option* const option : command->get_options()) {
+      if (option->get_positional() && option->count() > 0) return option->results().front() + ": ";
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -111,7 +121,7 @@ int main(int argc, char** argv) {
     const std::string path = error.path1().empty() ? "\"\"" : error.path1().string();
     return fail(kExitFailure, path + ": " + error.code().message());
   } catch (const std::bad_alloc&) {
-    return fail(kExitFailure, "out of memory");
+    return fail(kExitFailure, place_of(app) + "out of memory");
   } catch (const std::exception& error) {
     return fail(kExitFailure, error.what());
   }

@@ -61,6 +61,11 @@ auto with_points(const py::object& points, Use&& use) {
     throw py::type_error("points are " + type_text(points) +
                          ", expected a NumPy array (N, 3) or (N, 4) of float32 or float64");
   }
+  if (py::hasattr(points, "mask")) {
+    throw py::type_error(
+        "points are masked: pass points.filled(numpy.nan) to have the masked ones "
+        "as invalid points, or points.data to have them all");
+  }
   const auto array = py::reinterpret_borrow<py::array>(points);
   expect_rows_of_points("points have shape ", array);
   const auto* const data = static_cast<const char*>(array.data());

@@ -68,6 +68,7 @@ struct Frame {
   py::object finished;
   py::dict times;
   std::optional<PoseResidual> pose_residual;
+  TimeDoubt time_doubt = TimeDoubt::kNone;
 };
 
 // The remover without the interpreter's lock: a mutex keeps threads that share it apart.
@@ -80,6 +81,7 @@ class Remover {
     std::optional<OwnedVerdict> newest, finished;
     StageTimes times;
     std::optional<PoseResidual> pose_residual;
+    TimeDoubt time_doubt = TimeDoubt::kNone;
     with_points(points, [&](const auto& cloud) {
       const py::gil_scoped_release release;
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -89,9 +91,11 @@ class Remover {
       if (result.finished) finished.emplace(*result.finished);
       times = result.times;
       pose_residual = result.pose_residual;
+      time_doubt = result.time_doubt;
     });
     Frame frame;
     frame.pose_residual = pose_residual;
+    frame.time_doubt = time_doubt;
     frame.newest = py::cast(Verdict(std::move(*newest)));
     if (finished) {
       frame.finished = py::cast(Verdict(std::move(*finished)));
@@ -233,6 +237,9 @@ void bind_remover(py::module_& module) {
           "T_previous_newest",
           [](const PoseResidual& residual) { return to_array(residual.T_previous_newest); },
           "(4, 4) float64: corrected pose of this scan in the sensor frame of the previous one.")
+      .def_readonly("previous_scan", &PoseResidual::previous_scan,
+                    "Number of the previous scan, the last one that was taken, from 0.")
+      .def_readonly("previous_time", &PoseResidual::previous_time, "s, of that scan")
       .def("__repr__", [](const PoseResidual& residual) { return represent(residual); });
 
   py::class_<Frame>(module, "FrameResult", "Answer to one scan.")
@@ -244,6 +251,14 @@ void bind_remover(py::module_& module) {
       .def_readonly("pose_residual", &Frame::pose_residual,
                     "PoseResidual: error of the pushed pose relative to earlier scans; None if it "
                     "is unknown.")
+      .def_property_readonly(
+          "time_doubt",
+          [](const Frame& frame) -> std::optional<std::string> {
+            if (frame.time_doubt == TimeDoubt::kNone) return std::nullopt;
+            return frame.time_doubt == TimeDoubt::kTooSlow ? "too slow" : "too fast";
+          },
+          "\"too slow\": the last four scans are more than max_gap apart, so no scan is compared; "
+          "\"too fast\": less than 1 ms. The unit of time may be wrong. Else None.")
       .def("__repr__", [](const Frame& frame) { return represent(frame); });
 
   py::class_<Remover>(module, "DynaInsRemover",

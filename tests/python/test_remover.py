@@ -100,6 +100,27 @@ def test_the_first_pose_has_no_residual(identity):
     assert remover.push(np.ones((10, 3)), identity).pose_residual is None
 
 
+def test_a_residual_names_its_scan_and_odd_times_are_doubted(street, identity):
+    remover = dynains.DynaInsRemover()
+    scans = list(street)
+    frames = [remover.push(scan.points, scan.T_world_sensor, scan.time) for scan in scans]
+    frame = next(frame for frame in frames if frame.pose_residual is not None)
+    assert frame.pose_residual.previous_scan == frame.newest.scan - 1
+    assert frame.pose_residual.previous_time == scans[frame.newest.scan - 1].time
+    assert all(frame.time_doubt is None for frame in frames)
+    for unit, doubt in [(1e3, "too slow"), (1e-3, "too fast")]:
+        remover = dynains.DynaInsRemover()
+        for i in range(4):
+            frame = remover.push(np.ones((10, 3)), identity, 0.1 * unit * i)
+        assert frame.time_doubt == doubt
+
+
+def test_masks_are_not_ignored(identity):
+    points = np.ma.masked_array(np.ones((10, 3)), mask=False)
+    with pytest.raises(TypeError, match="points are masked: pass points.filled"):
+        dynains.DynaInsRemover().push(points, identity)
+
+
 def test_times_are_optional_and_stages_are_timed(identity):
     remover = dynains.DynaInsRemover()
     for _ in range(3):

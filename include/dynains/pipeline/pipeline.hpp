@@ -16,6 +16,7 @@
 #include "dynains/ground_segmenter.hpp"
 #include "dynains/pipeline/decisions.hpp"
 #include "dynains/pipeline/ingest.hpp"
+#include "dynains/pipeline/scan_rate.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
 #include "dynains/pipeline/scan_window.hpp"
 #include "dynains/pipeline/stage_checks.hpp"
@@ -154,13 +155,15 @@ class Pipeline {
   Eigen::Matrix3d level(ScanSlot& scan) const;
   void judge_newest(ScanSlot& newest, StageTimer& timer);
   ScanVerdict finish_oldest(StageTimer& timer);
-  std::optional<PoseResidual> pose_residual() const;
+  std::optional<PoseResidual> pose_residual();
+  TimeDoubt time_doubt();
 
   // Removes all scans. The map and the capacity of buffers stay.
   void forget_scans() {
     decision_->clear();
     frame_.forget();
     scans_.clear();
+    rate_ = {};
   }
 
   Config config_;
@@ -175,6 +178,7 @@ class Pipeline {
   VerdictWriter final_verdict_;
   Map map_;
   ScanRing scans_;
+  ScanRate rate_;
 };
 
 template <class Stages>
@@ -198,7 +202,7 @@ FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Pose& T_world_s
   timer.measure(&StageTimes::revision, [&] { decision_->revise(map_, newest); });
   const bool is_final = finished && finished->scan == newest.scan;
   return {is_final ? *finished : newest_verdict_.verdict(newest), finished, timer.times(),
-          pose_residual()};
+          pose_residual(), time_doubt()};
 }
 
 template <class Stages>
@@ -272,8 +276,12 @@ Eigen::Matrix3d Pipeline<Stages>::level(ScanSlot& scan) const {
 
 /// The residual of the newest scan, with its motion in the sensor frame.
 template <class Stages>
-std::optional<PoseResidual> Pipeline<Stages>::pose_residual() const {
+std::optional<PoseResidual> Pipeline<Stages>::pose_residual() {
   std::optional<PoseResidual> residual = decision_->pose_residual();
+  if (residual) {
+    residual->previous_scan = scans_.newest().scan - 1;
+    residual->previous_time = scans_[residual->previous_scan].time;
+  }
   if (residual && frame_.rotates_scans()) {
     Pose T_sensor_level = Pose::Identity();
     T_sensor_level.linear() = transposed(sensor().R_level_sensor());
@@ -281,6 +289,14 @@ std::optional<PoseResidual> Pipeline<Stages>::pose_residual() const {
         composed(composed(T_sensor_level, residual->T_previous_newest), inverted(T_sensor_level));
   }
   return residual;
+}
+
+/// After a push: the doubt about the times of the last scans.
+template <class Stages>
+TimeDoubt Pipeline<Stages>::time_doubt() {
+  const ScanSlot& newest = scans_.newest();
+  if (newest.scan == 0) return TimeDoubt::kNone;
+  return rate_.add(newest.time - scans_[newest.scan - 1].time, config_.max_gap);
 }
 
 template <class Stages>

@@ -1,0 +1,73 @@
+// What a push tells of the times of scans.
+#include <vector>
+
+#include "dynains/remover.hpp"
+#include "support/catch.hpp"
+#include "support/scene.hpp"
+
+namespace dynains::test {
+namespace {
+
+/// The doubts about scans at these times, s.
+std::vector<TimeDoubt> doubts_at(DynaInsRemover& remover, const std::vector<double>& times) {
+  const std::vector<Eigen::Vector3f> cloud(20, {5.0F, 1.0F, -1.0F});
+  std::vector<TimeDoubt> doubts;
+  for (const double time : times) {
+    doubts.push_back(remover.push(cloud, Eigen::Isometry3d::Identity(), time).time_doubt);
+  }
+  return doubts;
+}
+
+std::vector<TimeDoubt> doubts_of(double interval) {
+  DynaInsRemover remover;
+  return doubts_at(remover, {0, interval, 2 * interval, 3 * interval, 4 * interval});
+}
+
+TEST_CASE("a residual names the scan that its motion begins with, also after a refused push") {
+  const std::vector<Scan> scans = drive(yard(), 4, 5.0);
+  DynaInsRemover remover;
+  const auto push = [&](const Scan& scan, double time) {
+    return remover.push(scan.points, scan.T_world_sensor, time);
+  };
+  CHECK_FALSE(push(scans[0], 0.0).pose_residual);
+  REQUIRE(push(scans[1], 0.1).pose_residual);
+  CHECK_THROWS_AS(push(scans[2], 0.05), PoseError);
+  const FrameResult frame = push(scans[3], 0.3);
+  REQUIRE(frame.pose_residual);
+  CHECK(frame.newest.scan == 2);
+  CHECK(frame.pose_residual->previous_scan == 1);
+  CHECK(frame.pose_residual->previous_time == 0.1);
+  const Eigen::Vector3d motion =
+      (scans[1].T_world_sensor.inverse() * scans[3].T_world_sensor).translation();
+  CHECK((frame.pose_residual->T_previous_newest.translation() - motion).norm() < 0.02);
+}
+
+TEST_CASE("times in another unit than seconds are doubted from the fourth scan on") {
+  const TimeDoubt none = TimeDoubt::kNone;
+  const auto all = [none](TimeDoubt last) {
+    return std::vector<TimeDoubt>{none, none, none, last, last};
+  };
+  for (const double seconds : {0.1, 0.05, 0.01, 1.0, 1.1e-3}) {
+    CAPTURE(seconds);
+    CHECK((doubts_of(seconds) == all(none)));
+  }
+  for (const double unit : {1e3, 1e6, 1e9}) {
+    CAPTURE(unit);
+    CHECK((doubts_of(0.1 * unit) == all(TimeDoubt::kTooSlow)));
+  }
+  CHECK((doubts_of(1.01) == all(TimeDoubt::kTooSlow)));
+  CHECK((doubts_of(0.1e-3) == all(TimeDoubt::kTooFast)));
+  CHECK((doubts_of(0.9e-3) == all(TimeDoubt::kTooFast)));
+}
+
+TEST_CASE("pauses are no reason to doubt times, and a reset forgets them") {
+  DynaInsRemover remover;
+  const std::vector<TimeDoubt> none(7, TimeDoubt::kNone);
+  CHECK((doubts_at(remover, {0, 100, 200, 200.1, 300, 400, 400.1}) == none));
+  CHECK(doubts_at(remover, {500, 600, 700}).back() == TimeDoubt::kTooSlow);
+  remover.reset();
+  CHECK((doubts_at(remover, {0, 100, 200}) == std::vector<TimeDoubt>(3, TimeDoubt::kNone)));
+}
+
+}  // namespace
+}  // namespace dynains::test
