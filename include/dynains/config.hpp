@@ -1,6 +1,7 @@
 // All parameters of a remover: RemoverConfig and the Config of each stage.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <string>
 #include <type_traits>
@@ -103,11 +104,14 @@ struct RemoverConfig {
   int window = 4;          ///< scans, K of Eq. 3
   bool use_belief = true;  ///< Eq. 13-19
   BeliefObservations belief_observations = BeliefObservations::kNewest;
-  int votes = 1;           ///< number of windows
-  double min_range = 2.7;  ///< m, in the sensor's x-y plane
-  double max_range = 250;  ///< m, in the sensor's x-y plane, and along its z axis
-  double max_gap = 1.0;    ///< s
-  double max_speed = 100;  ///< m/s
+  int votes = 1;                 ///< number of windows
+  double min_range = 2.7;        ///< m, in the sensor's x-y plane
+  double max_range = 250;        ///< m, in the sensor's x-y plane, and along its z axis
+  double sensor_origin_x = 0.0;  ///< m, frame of the pushed clouds
+  double sensor_origin_y = 0.0;  ///< m
+  double sensor_origin_z = 0.0;  ///< m
+  double max_gap = 1.0;          ///< s
+  double max_speed = 100;        ///< m/s
   bool level = true;
   double mounting_pitch = 0.0;  ///< deg, nose down
   double mounting_roll = 0.0;   ///< deg, left side up
@@ -149,6 +153,13 @@ struct RemoverConfig {
     visitor(Parameter{"max_range", self.max_range, half_open_below(0, 10000), "m",
                       "farther points (in the sensor's own x-y plane, or along its z axis) are not "
                       "judged"});
+    visitor(Parameter{"sensor_origin_x", self.sensor_origin_x, closed(-1000, 1000), "m",
+                      "x of the sensor in the frame of the pushed clouds and poses: not 0 for "
+                      "clouds that were moved into a body frame, such as base_link"});
+    visitor(Parameter{"sensor_origin_y", self.sensor_origin_y, closed(-1000, 1000), "m",
+                      "y of the sensor in that frame"});
+    visitor(Parameter{"sensor_origin_z", self.sensor_origin_z, closed(-1000, 1000), "m",
+                      "z of the sensor in that frame"});
     visitor(Parameter{"max_gap", self.max_gap, half_open_below(0, 1e9), "s",
                       "a longer pause between two scans starts a new epoch: scans before and after "
                       "it are not compared"});
@@ -165,6 +176,11 @@ struct RemoverConfig {
                       "give a verdict on the newest scan, without latency; false saves its time, and "
                       "only scans whose verdict is final have labels"});
     visitor(Parameter{"build_map", self.build_map, Bounds(), "", "accumulate the static map"});
+  }
+
+  /// Position of the sensor, where all rays begin, in the frame of the pushed clouds, m.
+  Eigen::Vector3d sensor_origin() const {
+    return {sensor_origin_x, sensor_origin_y, sensor_origin_z};
   }
 
   /// Whether a scan starts a new epoch. `pause`: s since the previous scan. `distance`: m from its

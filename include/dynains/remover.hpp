@@ -130,8 +130,10 @@ class BasicDynaInsRemover {
   ///
   /// `cloud`: m, sensor frame, z up (RemoverConfig::level handles tilted sensors); any type with
   /// PointCloudTraits, any size. Invalid points get PointLabel::kInvalid or kOutOfRange.
-  /// `T_world_sensor`: pose of the sensor at the time of the scan. `time`: s, greater than the time
-  /// of the previous scan.
+  /// `T_world_sensor`: pose of the frame of the cloud at the time of the scan. Both are those of a
+  /// body, such as base_link, if RemoverConfig::sensor_origin() is the position of the sensor in
+  /// it; clouds of several sensors are pushed one by one. `time`: s, greater than the time of the
+  /// previous scan.
   ///
   /// Throws PoseError, or the exceptions of PointCloudTraits such as CloudError; the state is then
   /// unchanged. If a stage throws (std::bad_alloc), the scan is discarded and the next scan starts

@@ -18,10 +18,11 @@ namespace {
 
 constexpr const char* kExpected = "expected \"x y z qx qy qz qw\" or a file with one pose";
 
-/// The numbers that `text` consists of; empty if it has other words, or not seven of them.
-std::optional<std::array<double, 7>> seven_numbers(std::string text) {
+/// The numbers that `text` consists of; empty if it has other words, or not `kCount` of them.
+template <std::size_t kCount>
+std::optional<std::array<double, kCount>> numbers_of(std::string text) {
   for (char& c : text) c = c == ',' ? ' ' : c;
-  std::array<double, 7> numbers{};
+  std::array<double, kCount> numbers{};
   std::size_t count = 0;
   std::string_view rest = text;
   for (auto token = text::next_token(rest); !token.empty(); token = text::next_token(rest)) {
@@ -72,7 +73,7 @@ Pose transform_of(const NamedFrames& named) {
 
 Pose read_extrinsic(const std::string& text) {
   if (const auto named = named_frames(text)) return transform_of(*named);
-  const auto numbers = seven_numbers(text);
+  const auto numbers = numbers_of<7>(text);
   if (!numbers) {
     const bool is_number = text::parse_number(text.substr(0, text.find_first_of(" ,"))).has_value();
     if (is_number) throw ConfigError("extrinsic \"" + text + "\": " + kExpected);
@@ -91,6 +92,12 @@ Pose read_extrinsic(const std::string& text) {
   pose.linear() = q.normalized().toRotationMatrix();
   pose.translation() = t;
   return pose;
+}
+
+Eigen::Vector3d read_sensor_origin(const std::string& text) {
+  const auto position = numbers_of<3>(text);
+  if (!position) return read_extrinsic(text).translation();
+  return {(*position)[0], (*position)[1], (*position)[2]};
 }
 
 std::string extrinsic_text(const Pose& T_body_sensor) {

@@ -25,6 +25,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double kFarthestSensor = 1000.0;  // m, as RemoverConfig::sensor_origin_x
+
 constexpr const char* kAccepted =
     "expected a KITTI folder (velodyne/NNNNNN.bin, poses.txt), or a folder of .pcd, .ply, .bin, "
     ".las, .npy, .npz, .xyz or .csv scans (or with them in pcd/, ply/, scans/, points/, clouds/ or "
@@ -32,10 +34,23 @@ constexpr const char* kAccepted =
     "(.mcap, "
     ".db3, .bag, or a folder with metadata.yaml)";
 
+/// Beams without a return stay at the origin.
+void subtract_origin(const Eigen::Vector3f& origin, RecordedScan& scan) {
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    Eigen::Map<Eigen::Vector3f> p(scan.xyzi.data() + 4 * i);
+    if (!p.isZero(0.0F)) p -= origin;
+  }
+}
+
 }  // namespace
 
 Recording::Recording(const fs::path& path, const RecordingOptions& options)
     : folder_(path), options_(options) {
+  if (!(options.sensor_origin.cwiseAbs().maxCoeff() <= kFarthestSensor)) {
+    throw ConfigError("the origin of the sensor must be finite and within " +
+                      std::to_string(static_cast<int>(kFarthestSensor)) +
+                      " m of that of the clouds");
+  }
   const auto tables = is_folder(path) ? nuscenes_tables(path) : std::nullopt;
   if (is_log(path)) {
     open_log();
@@ -50,10 +65,19 @@ Recording::Recording(const fs::path& path, const RecordingOptions& options)
     reader_ = make_file_reader(format_);
     read_poses();
   }
+  if (!options.sensor_frame.empty() && format_ != ScanFormat::kLog) {
+    fail(path, "has no frames; expected a log of ROS for the frame of the sensor");
+  }
   find_columns();
   frame_ = options.frame == PointFrame::kAuto ? guess_frame() : options.frame;
   notes_.push_back(frame_ == PointFrame::kWorld ? "points are in the frame of the world"
                                                 : "points are in the frame of the sensor");
+  if (!sensor_origin().isZero(0.0)) {
+    std::ostringstream note;
+    text::exact(note);
+    note << "the sensor is at (" << sensor_origin().transpose() << ") m in the frame of the clouds";
+    notes_.push_back(note.str());
+  }
   if (options.deskew) prepare_deskewing();
 }
 
@@ -64,8 +88,8 @@ void Recording::open_log() {
   }
   const bool has_file = !options_.poses.empty();
   auto log = std::make_unique<LogScans>(
-      folder_,
-      LogChoice{options_.cloud_topic, options_.pose_topic, options_.pose_frame, !has_file});
+      folder_, LogChoice{options_.cloud_topic, options_.pose_topic, options_.pose_frame, !has_file,
+                         !options_.sensor_frame.empty()});
   scan_folder_ = folder_;
   format_ = ScanFormat::kLog;
   frame_ = log->is_in_world() ? PointFrame::kWorld : PointFrame::kSensor;
@@ -83,9 +107,19 @@ void Recording::open_log() {
   trajectory_ = has_file ? read_trajectory(options_.poses) : log->trajectory();
   if (options_.deskew && !has_file) motion_ = log->motion();
   const fs::path& poses = has_file ? options_.poses : folder_;
+  if (!options_.sensor_frame.empty()) take_sensor_frame(*log);
   trajectory_.times.empty() ? match_rows(poses) : match_times(poses, log->times());
   reader_ = make_log_reader(std::move(log));
   place_scans(poses);
+}
+
+void Recording::take_sensor_frame(const LogScans& log) {
+  const auto T_cloud_sensor = log.T_cloud_frame(options_.sensor_frame);
+  if (!T_cloud_sensor) {
+    fail(folder_, "expected a transform from the frame of the clouds to frame " +
+                      options_.sensor_frame + "; found transforms of " + log.known_frames());
+  }
+  options_.sensor_origin = T_cloud_sensor->translation();
 }
 
 /// Takes the sweeps of one scene. Poses of a file belong to the sweeps by time.
@@ -235,6 +269,9 @@ void Recording::check_scan(std::size_t i) const { reader_->check(address(i)); }
 void Recording::read_scan(std::size_t i, RecordedScan& scan) const {
   const Pose T_sensor_world = T_world_sensor(i).inverse();
   reader_->read(address(i), frame_ == PointFrame::kWorld ? &T_sensor_world : nullptr, scan);
+  if (frame_ == PointFrame::kSensor && !sensor_origin().isZero(0.0)) {
+    subtract_origin(sensor_origin().cast<float>(), scan);
+  }
   if (options_.deskew) deskew(motion_, time(i), T_world_sensor(i), file(i), scan);
 }
 

@@ -307,9 +307,13 @@ Pose Recording::to_sensor_pose(const PoseConvention& convention, const Pose& pos
   const bool is_matrix = trajectory_.order == QuaternionOrder::kNone;
   const bool is_camera = convention.frame == PoseFrame::kCamera ||
                          (convention.frame == PoseFrame::kAuto && has_calibration_ && is_matrix);
-  if (!is_camera) return pose * convention.T_body_sensor;
-  const Pose T_camera_sensor = has_calibration_ ? Tr_ : camera_axes();
-  return T_camera_sensor.inverse() * pose * T_camera_sensor * convention.T_body_sensor;
+  Pose T_world_sensor = pose * convention.T_body_sensor;
+  if (is_camera) {
+    const Pose T_camera_sensor = has_calibration_ ? Tr_ : camera_axes();
+    T_world_sensor = T_camera_sensor.inverse() * pose * T_camera_sensor * convention.T_body_sensor;
+  }
+  if (!sensor_origin().isZero(0.0)) T_world_sensor.translate(sensor_origin());
+  return T_world_sensor;
 }
 
 /// The trajectory if it has times of its own, else the poses of the scans.

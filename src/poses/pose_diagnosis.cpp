@@ -106,7 +106,10 @@ std::optional<Explanation> explain_by_body(const Recording& recording,
   result.error = error_at_points(motions, body, T_body_sensor);
   if (!is_much_better(result.error, before)) return std::nullopt;
   result.convention = convention;
-  result.convention.T_body_sensor = convention.T_body_sensor * T_body_sensor;
+  // The convention gives the pose of the frame of the clouds, in which the sensor has a position.
+  const Eigen::Translation3d origin(recording.sensor_origin());
+  result.convention.T_body_sensor =
+      convention.T_body_sensor * origin * T_body_sensor * origin.inverse();
   result.time_offset = recording.time_offset();
   result.option = flags + "--extrinsic \"" + extrinsic_text(result.convention.T_body_sensor) + '"';
   return result;

@@ -100,6 +100,13 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool 
       ->type_name("POSE")
       ->group(kGroup);
   command
+      .add_option("--sensor-origin", sensor_origin_,
+                  "position of the lidar in the frame of the clouds, for clouds that were moved "
+                  "into a body frame (base_link) before they were recorded: \"x y z\" in m, or a "
+                  "pose as of --extrinsic [0 0 0]")
+      ->type_name("XYZ")
+      ->group(kGroup);
+  command
       .add_option("--time-offset", time_offset_,
                   "a scan at time t has the pose at t + S, for clocks that differ [0]")
       ->type_name("S")
@@ -119,6 +126,8 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool 
            "topic of the poses of a log: Odometry, PoseStamped or TF [the only one, else TF]");
   add_name("--pose-frame-id", pose_frame_id_,
            "take the poses of a log from TF, in this fixed frame [the root of the tree]");
+  add_name("--sensor-frame", sensor_frame_,
+           "frame of the lidar in TF of a log; gives --sensor-origin [that of the clouds]");
 }
 
 nlohmann::ordered_json RecordingFlags::given_flags() const {
@@ -164,6 +173,11 @@ RecordingOptions RecordingFlags::options() const {
   if (!std::isfinite(time_offset_)) throw ConfigError("--time-offset: expected a finite number");
   options.time_offset = time_offset_;
   options.pose_gap = pose_gap_;
+  if (!sensor_origin_.empty() && !sensor_frame_.empty()) {
+    throw ConfigError("--sensor-origin and --sensor-frame exclude each other");
+  }
+  if (!sensor_origin_.empty()) options.sensor_origin = read_sensor_origin(sensor_origin_);
+  options.sensor_frame = sensor_frame_;
   return options;
 }
 

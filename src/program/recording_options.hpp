@@ -49,6 +49,8 @@ class RecordingFlags {
   int shift_ = 0;
   bool deskew_ = false;
   std::string extrinsic_;
+  std::string sensor_origin_;
+  std::string sensor_frame_;
   double time_offset_ = 0.0;           // s
   double pose_gap_ = kLongestPoseGap;  // s
   std::string cloud_topic_;

@@ -18,7 +18,17 @@ Pose to_extrinsic(const py::handle& value) {
   return is_text(value) ? read_extrinsic(to_path(value).string()) : to_pose(value);
 }
 
-const std::array<Setting<RecordingOptions>, 17> kRecordingSettings{{
+/// The text of --sensor-origin.
+std::string to_origin(const py::handle& value) {
+  if (is_text(value)) return to_path(value).string();
+  std::string text;
+  for (const py::handle& number : py::list(py::reinterpret_borrow<py::object>(value))) {
+    text += (text.empty() ? "" : " ") + py::repr(py::float_(number)).cast<std::string>();
+  }
+  return text;
+}
+
+const std::array<Setting<RecordingOptions>, 19> kRecordingSettings{{
     {"poses", "a path",
      "file of poses: 12 numbers a row (KITTI), time x y z qx qy qz qw (TUM), or CSV with named "
      "columns",
@@ -53,6 +63,12 @@ const std::array<Setting<RecordingOptions>, 17> kRecordingSettings{{
      [](RecordingOptions& o, const py::handle& v) {
        o.convention.T_body_sensor = to_extrinsic(v);
      }},
+    {"sensor_origin", "three numbers, 'x y z' in m, or a path as for extrinsic",
+     "position of the lidar in the frame of the clouds, for clouds that were moved into a body "
+     "frame before they were recorded",
+     [](RecordingOptions& o, const py::handle& v) {
+       o.sensor_origin = read_sensor_origin(to_origin(v));
+     }},
     {"time_offset", "finite float", "a scan at time t has the pose at t + time_offset, s",
      [](RecordingOptions& o, const py::handle& v) { o.time_offset = to_number(v); }},
     {"pose_gap", "float in [0, 1000]",
@@ -64,6 +80,8 @@ const std::array<Setting<RecordingOptions>, 17> kRecordingSettings{{
      [](RecordingOptions& o, const py::handle& v) { o.pose_topic = v.cast<std::string>(); }},
     {"pose_frame_id", "str", "take the poses of a log from TF, in this fixed frame",
      [](RecordingOptions& o, const py::handle& v) { o.pose_frame = v.cast<std::string>(); }},
+    {"sensor_frame", "str", "frame of the lidar in TF of a log; gives sensor_origin",
+     [](RecordingOptions& o, const py::handle& v) { o.sensor_frame = v.cast<std::string>(); }},
     {"nuscenes_scene", "str", "scene of nuScenes, for example 'scene-0061'",
      [](RecordingOptions& o, const py::handle& v) { o.scene = v.cast<std::string>(); }},
 }};
@@ -97,6 +115,8 @@ py::dict to_flags(const py::dict& values) {
     } else if (flag == "--extrinsic") {
       flags[flag.c_str()] = is_text(value) ? py::str(to_path(value).string())
                                            : py::str(extrinsic_text(to_pose(value)));
+    } else if (flag == "--sensor-origin") {
+      flags[flag.c_str()] = py::str(to_origin(value));
     } else {
       flags[flag.c_str()] = py::str(is_text(value) ? py::cast(to_path(value).string())
                                                    : py::reinterpret_borrow<py::object>(value));

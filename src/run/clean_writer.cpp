@@ -40,19 +40,22 @@ std::string CleanWriter::name(const Recording& recording, std::size_t i) {
 }
 
 Pose CleanWriter::T_file_sensor(std::size_t i) const {
-  return recording_.frame() == PointFrame::kWorld ? recording_.T_world_sensor(i) : Pose::Identity();
+  if (recording_.frame() == PointFrame::kWorld) return recording_.T_world_sensor(i);
+  return Pose(Eigen::Translation3d(recording_.sensor_origin()));
 }
 
 void CleanWriter::write_bin(const std::filesystem::path& file, std::size_t i,
                             const RecordedScan& scan, Span<const PointLabel> labels) const {
+  const Eigen::Isometry3d T = T_file_sensor(i);
+  const bool is_moved = T.matrix() != Eigen::Isometry3d::Identity().matrix();
   std::vector<float> xyzi;
   for (std::size_t k = 0; k < labels.size(); ++k) {
     if (!is_kept(labels[k])) continue;
     const float* point = scan.xyzi.data() + 4 * k;
     xyzi.insert(xyzi.end(), point, point + 4);
-    if (recording_.frame() != PointFrame::kWorld) continue;
+    if (!is_moved) continue;
     Eigen::Map<Eigen::Vector3f> p(xyzi.data() + xyzi.size() - 4);
-    p = (T_file_sensor(i) * p.cast<double>()).cast<float>();
+    p = (T * p.cast<double>()).cast<float>();
   }
   write_scan(file, xyzi);
 }
@@ -70,7 +73,12 @@ void CleanWriter::write(std::size_t i, const RecordedScan& scan,
   columns.double_xyz = T.translation().cwiseAbs().maxCoeff() > kFloatCoordinateLimit;
   const bool has_pose = recording_.has_viewpoints() || recording_.format() == ScanFormat::kLog ||
                         recording_.frame() == PointFrame::kWorld;
-  PointFileWriter writer(file, columns, has_pose ? recording_.T_world_sensor(i) : Pose::Identity());
+  Pose viewpoint = Pose::Identity();
+  if (has_pose) {
+    viewpoint = recording_.T_world_sensor(i);
+    viewpoint.translate(-recording_.sensor_origin());
+  }
+  PointFileWriter writer(file, columns, viewpoint);
   for (std::size_t k = 0; k < labels.size(); ++k) {
     if (!is_kept(labels[k])) continue;
     FilePoint point = scan.point(k);

@@ -113,7 +113,7 @@ TEST_CASE("Ingest takes good points in order and labels the others, in any mixtu
         }
         std::vector<PointLabel> labels(count / 2, PointLabel::kDynamic);  // of an earlier scan
         const RawPoints<float> points{cloud.data(), count, stride};
-        ingest.read(detail::CloudView(points), min_range, 50.0F, nullptr, labels);
+        ingest.read(detail::CloudView(points), {min_range, 50.0F}, nullptr, labels);
 
         CAPTURE(stride, min_range, count);
         REQUIRE(labels.size() == count);

@@ -138,6 +138,27 @@ TEST_CASE("After any insertions and updates the map equals a new one with the la
   }
 }
 
+TEST_CASE("Points may be given in another frame than that of the pose") {
+  Random random(5);
+  const TestScan scan = random_scan(random);
+  const Eigen::Isometry3d T_world_sensor = random_pose(random);
+  const Eigen::Isometry3d T_points_sensor = random_pose(random);
+  PointBuffer turned;
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const Eigen::Vector3d p(scan.points.x[i], scan.points.y[i], scan.points.z[i]);
+    const Eigen::Vector3f q = (T_points_sensor * p).cast<float>();
+    turned.push_back(q.x(), q.y(), q.z());
+  }
+  RebasableStaticMap expected, map;
+  expected.insert(scan.points, scan.keep, T_world_sensor);
+  map.insert(turned, scan.keep, T_world_sensor * T_points_sensor.inverse(), T_world_sensor);
+  const std::vector<Coordinates> a = points_of(expected), b = points_of(map);
+  REQUIRE(a.size() == b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    for (std::size_t axis = 0; axis < 3; ++axis) CHECK(std::abs(a[i][axis] - b[i][axis]) < 1e-4);
+  }
+}
+
 TEST_CASE("A refused update leaves the map as it was") {
   Random random(3);
   RebasableStaticMap map = make_rebasable(0.3);

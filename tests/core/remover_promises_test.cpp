@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 #include <thread>
 #include <vector>
@@ -570,6 +571,72 @@ TEST_CASE("both sides of min_range and max_range, horizontally") {
   CHECK((std::vector<L>(frame.newest.labels.begin(), frame.newest.labels.end()) ==
          std::vector<L>{L::kOutOfRange, L::kStatic, L::kStatic, L::kOutOfRange, L::kOutOfRange,
                         L::kStatic}));
+}
+
+// Copies of `scans` in the frame of a body, in which the sensor is at `origin`.
+std::vector<Scan> moved_into_body(std::vector<Scan> scans, const Eigen::Vector3f& origin) {
+  for (Scan& scan : scans) {
+    for (Eigen::Vector3f& p : scan.points) p += origin;
+    scan.T_world_sensor.translate(-origin.cast<double>());
+  }
+  return scans;
+}
+
+TEST_CASE("rays begin at sensor_origin: clouds of a body frame get the verdicts of the sensor") {
+  Config config = GENERATE(Config::paper(), Config());
+  const Eigen::Vector3f origin(1.0F, -0.5F, 1.5F);
+  std::vector<Scan> scans = drive(oncoming(), 10, 5.0, 0.7);
+  for (Scan& scan : scans) {  // coordinates that both frames hold exactly
+    for (Eigen::Vector3f& p : scan.points) p = ((1024.0F * p).array().round() / 1024.0F).matrix();
+    scan.points.emplace_back(Eigen::Vector3f::Zero());  // a beam without a return
+    scan.object.push_back(kGroundObject);
+  }
+  std::vector<Scan> in_body = moved_into_body(scans, origin);
+  for (Scan& scan : in_body) scan.points.back().setZero();
+  DynaInsRemover expected(config);
+  const Run by_sensor = run(expected, scans);
+
+  SECTION("with the position of the sensor") {
+    config.sensor_origin_x = 1.0;
+    config.sensor_origin_y = -0.5;
+    config.sensor_origin_z = 1.5;
+    DynaInsRemover remover(config);
+    const Run by_body = run(remover, in_body);
+    REQUIRE(by_body.final.size() == by_sensor.final.size());
+    CHECK(disagreement(by_body.final, by_sensor.final) < 1e-4);
+    for (const Verdict& verdict : by_body.final) {
+      CHECK(verdict.labels.back() == PointLabel::kInvalid);
+    }
+    CHECK(remover.map().size() == Approx(expected.map().size()).epsilon(0.001));
+  }
+  SECTION("without it, they differ") {
+    CHECK(disagreement(run(config, in_body).final, by_sensor.final) > 0.002);
+  }
+}
+
+TEST_CASE("the corrected motion is that of the pushed frame, wherever the sensor is in it") {
+  Config config;
+  config.sensor_origin_x = 3.0;
+  std::vector<Scan> scans;
+  for (int i = 0; i < 6; ++i) {
+    scans.push_back(yard().scan(sensor_at(0.5 * i, 0.0, 0.05 * i), 0.1 * i));
+  }
+  scans = moved_into_body(std::move(scans), Eigen::Vector3f(3.0F, 0.0F, 0.0F));
+  DynaInsRemover remover(config);
+  std::optional<Eigen::Isometry3d> T_world_previous;
+  std::size_t residuals = 0;
+  for (const Scan& scan : scans) {
+    const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
+    if (frame.pose_residual && T_world_previous) {
+      const Eigen::Isometry3d pushed = T_world_previous->inverse() * scan.T_world_sensor;
+      // A turn of the body also moves the sensor, here by 0.15 m.
+      CHECK((frame.pose_residual->T_previous_newest.translation() - pushed.translation()).norm() <
+            0.02);
+      ++residuals;
+    }
+    T_world_previous = scan.T_world_sensor;
+  }
+  CHECK(residuals > 0);
 }
 
 TEST_CASE("times of the stages add up to the total") {

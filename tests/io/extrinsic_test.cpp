@@ -34,6 +34,14 @@ void write_recording(const std::filesystem::path& folder, const std::string& pos
 
 }  // namespace
 
+TEST_CASE("The position of the sensor is three numbers or that of an extrinsic") {
+  CHECK(read_sensor_origin("1, -2.5 3").isApprox(Eigen::Vector3d(1.0, -2.5, 3.0)));
+  CHECK(read_sensor_origin("1 2 3 0 0 0 1").isApprox(Eigen::Vector3d(1.0, 2.0, 3.0)));
+  for (const std::string wrong : {"1 2", "1 2 3 4", "1 2 x"}) {
+    CHECK_THROWS_AS(read_sensor_origin(wrong), ConfigError);
+  }
+}
+
 TEST_CASE("An extrinsic is seven numbers or a file with one pose") {
   const Eigen::Isometry3d pose = read_extrinsic("1, 2.5 -3,0 0 0.70710678 0.70710678");
   CHECK(pose.translation().isApprox(Eigen::Vector3d(1, 2.5, -3)));

@@ -91,6 +91,34 @@ void check_drive(const fs::path& log) {
 
 }  // namespace
 
+TEST_CASE("A frame of the log gives the position of the sensor in the clouds") {
+  const TemporaryFolder folder;
+  const fs::path log = folder / "base.mcap";
+  std::vector<WrittenMessage> messages = {
+      {2, nanoseconds(1.0), transform(1.0, "base", "lidar", kT_base_lidar)}};
+  for (int i = 0; i < 4; ++i) {
+    const double time = 1.0 + 0.1 * i;
+    messages.push_back({1, nanoseconds(time), transform(time, "odom", "base", pose_at(i, 0))});
+    messages.push_back({0, nanoseconds(time + 0.03), small_cloud(time, "base")});
+  }
+  write_text(log, mcap_file({kPoints, kTf, kStaticTf}, messages, {}));
+  RecordingOptions options;
+  options.sensor_frame = "lidar";
+  const Recording recording(log, options);
+  CHECK(recording.sensor_origin().isApprox(kT_base_lidar.translation()));
+  CHECK(recording.T_world_sensor(2).translation().isApprox(Eigen::Vector3d(2.5, 0, 0)));
+  CHECK(recording.read_scan(1).xyzi == std::vector<float>{0.5F, 2, 3, 0, 3.5F, 5, 6, 0});
+
+  write_text(folder / "poses.txt", "1 0 0 0 0 0 0 1\n1.4 4 0 0 0 0 0 1\n");
+  options.poses = folder / "poses.txt";
+  CHECK(
+      Recording(log, options).T_world_sensor(2).translation().isApprox(Eigen::Vector3d(2.5, 0, 0)));
+
+  options.sensor_frame = "radar";
+  CHECK_THAT(log_error(log, options),
+             ContainsSubstring("to frame radar; found transforms of base, lidar"));
+}
+
 TEST_CASE("A log of each format is a recording with clouds and with poses from transforms") {
   const TemporaryFolder folder;
   write_text(folder / "drive.mcap", drive_mcap());

@@ -71,6 +71,45 @@ TEST_CASE("Scans in the world frame with VIEWPOINT come back in the sensor frame
   CHECK(scan.time == std::vector<double>{7.25, 7.25, 7.25});
 }
 
+TEST_CASE(
+    "With the position of the sensor in the clouds, points and poses are those of the sensor") {
+  const TemporaryFolder folder;
+  RecordingOptions options;
+  options.sensor_origin = {1.0, 0.0, 1.5};
+  SECTION("clouds of a body") {
+    write_text(folder / "a1.pcd", pcd({4, 5, 6}));
+    write_text(folder / "poses.txt", "0 -1 0 10 1 0 0 20 0 0 1 30\n");
+    const Recording recording(folder.path(), options);
+    const RecordedScan scan = recording.read_scan(0);
+    CHECK(Eigen::Vector3f(scan.xyzi[0], scan.xyzi[1], scan.xyzi[2])
+              .isApprox(Eigen::Vector3f(4.0F, 5.0F, 4.5F)));
+    CHECK(recording.T_world_sensor(0).translation().isApprox(Eigen::Vector3d(10.0, 21.0, 31.5)));
+    CHECK(tells(recording, "the sensor is at (1 0 1.5) m in the frame of the clouds"));
+  }
+  SECTION("clouds of the world, placed by poses of a body") {
+    write_text(folder / "a1.pcd", pcd({100, 0, 0}, "100 0 0 1 0 0 0"));
+    options.frame = PointFrame::kWorld;
+    const Recording recording(folder.path(), options);
+    const RecordedScan scan = recording.read_scan(0);
+    CHECK(Eigen::Vector3f(scan.xyzi[0], scan.xyzi[1], scan.xyzi[2])
+              .isApprox(Eigen::Vector3f(0.0F, 0.0F, -1.5F)));
+  }
+  SECTION("a position that no sensor has") {
+    write_text(folder / "a1.pcd", pcd({4, 5, 6}, "1 0 0 1 0 0 0"));
+    options.sensor_origin.y() = 1000.0;
+    CHECK_NOTHROW(Recording(folder.path(), options));
+    for (const double wrong : {1000.1, std::nan("")}) {
+      options.sensor_origin.y() = wrong;
+      CHECK_THROWS_AS(Recording(folder.path(), options), ConfigError);
+    }
+  }
+  SECTION("a frame without a log") {
+    write_text(folder / "a1.pcd", pcd({4, 5, 6}, "1 0 0 1 0 0 0"));
+    options.sensor_frame = "lidar";
+    CHECK_THAT(error_of(folder.path(), options), ContainsSubstring("expected a log of ROS"));
+  }
+}
+
 TEST_CASE("The frame of the points is detected, and can be forced") {
   const TemporaryFolder folder;
   write_text(folder / "a1.pcd", pcd({0, 0, 0}, "100 0 0 1 0 0 0"));

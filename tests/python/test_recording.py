@@ -88,6 +88,11 @@ def test_what_the_files_mean_is_told_by_name(drive):
     as_text = dynains.Recording(drive, extrinsic="2 0 0 0 0 0 1")
     np.testing.assert_allclose(as_array.poses, as_text.poses, atol=1e-9)
     np.testing.assert_allclose(as_array.poses, plain.poses @ T, atol=1e-9)
+    moved = dynains.Recording(drive, sensor_origin=[1.0, 0, 1.5])
+    as_text = dynains.Recording(drive, sensor_origin="1 0 1.5")
+    np.testing.assert_array_equal(moved.poses, as_text.poses)
+    T[:3, 3] = 1.0, 0.0, 1.5
+    np.testing.assert_allclose(moved.poses, plain.poses @ T, atol=1e-9)
     with pytest.warns(RuntimeWarning, match="1 of 12 scans"):
         shifted = dynains.Recording(drive, pose_shift=1)
     np.testing.assert_array_equal(shifted.poses, plain.poses[1:])

@@ -18,6 +18,10 @@ namespace dynains {
 /// frames of the file if it does not connect the two.
 Pose read_extrinsic(const std::string& text);
 
+/// Position of the sensor in the frame of the clouds, m. `text` is `x y z`, with blanks or commas,
+/// or a pose as for read_extrinsic(). Throws ConfigError and IoError.
+Eigen::Vector3d read_sensor_origin(const std::string& text);
+
 /// `x y z qx qy qz qw` of a pose, with six decimals.
 std::string extrinsic_text(const Pose& T_body_sensor);
 

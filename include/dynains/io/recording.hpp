@@ -43,6 +43,11 @@ struct RecordingOptions {
   /// Whether points are moved to the sensor frame at the time of their scan. Needs a time for each
   /// point, and points in the sensor frame.
   bool deskew = false;
+  /// Position of the sensor in the frame of the clouds, m: not zero for clouds that were moved into
+  /// a body frame, such as base_link, before they were recorded.
+  Eigen::Vector3d sensor_origin = Eigen::Vector3d::Zero();
+  /// For logs: frame of the sensor; its transform to the frame of the clouds gives the origin.
+  std::string sensor_frame;
 };
 
 /// One scan. Each column has one value per point, or is empty if the recording lacks it.
@@ -67,6 +72,7 @@ struct RecordedScan {
 /// Format of the scans: one file per scan, or messages of a log.
 enum class ScanFormat { kBin, kPcd, kPly, kLas, kNpy, kNpz, kXyz, kCsv, kNuScenes, kLog };
 
+class LogScans;
 class ScanReader;
 struct ScanAddress;
 
@@ -112,6 +118,9 @@ struct ScanAddress;
 /// clouds; without such transforms, the poses are used as poses of the sensor. If the clouds are in
 /// the fixed frame of the poses, PointFrame is kWorld.
 ///
+/// With a sensor origin, points and poses are those of a frame at the sensor, with the axes of the
+/// clouds.
+///
 /// Labels (SemanticKITTI classes) are in labels/NAME.label or in a column `label`.
 ///
 /// All members throw IoError with path, position and expected content.
@@ -136,6 +145,8 @@ class Recording {
   bool has_labels() const { return labels_ != Labels::kNone; }
   /// Whether read_scan() moves points to the sensor frame at the time of the scan.
   bool is_deskewed() const { return options_.deskew; }
+  /// Position of the sensor in the frame of the clouds, m.
+  const Eigen::Vector3d& sensor_origin() const { return options_.sensor_origin; }
   /// Path, position and reason if a log is truncated. The clouds before that position are valid.
   const std::optional<std::string>& early_end() const { return early_end_; }
   /// Automatic choices of files, frames and times, and excluded scans, one sentence each.
@@ -191,6 +202,7 @@ class Recording {
   enum class Labels { kNone, kFiles, kColumn };
 
   void open_log();
+  void take_sensor_frame(const LogScans& log);
   void open_nuscenes(const std::filesystem::path& tables);
   void list_scans();
   void check_names() const;

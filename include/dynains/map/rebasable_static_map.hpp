@@ -85,18 +85,21 @@ class RebasableStaticMap {
     insert(points, keep, T_world_sensor, T_world_sensor);
   }
 
-  /// As above, for points in a frame with the origin of the sensor and other axes.
-  void insert(PointsView points, Span<const std::uint8_t> keep, const Pose& T_world_points,
-              const Pose& T_world_sensor) {
+  /// As above, for points in another frame.
+  void insert(PointsView points, Span<const std::uint8_t> keep,
+              const Pose& T_world_points, const Pose& T_world_sensor) {
     const std::uint32_t first = points_.size();
     taken_.clear();
     const bool is_turned = T_world_points.matrix() != T_world_sensor.matrix();
     const Eigen::Matrix3d R_sensor_points =
         T_world_sensor.linear().transpose() * T_world_points.linear();
+    const Eigen::Vector3d points_in_sensor =
+        T_world_sensor.linear().transpose() *
+        (T_world_points.translation() - T_world_sensor.translation());
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (!keep.empty() && keep[i] == 0) continue;
       Eigen::Vector3f p(points.x[i], points.y[i], points.z[i]);
-      if (is_turned) p = (R_sensor_points * p.cast<double>()).cast<float>();
+      if (is_turned) p = (R_sensor_points * p.cast<double>() + points_in_sensor).cast<float>();
       if (is_first_of_voxel(p)) points_.push_back({p.x(), p.y(), p.z()});
     }
     scans_.push_back({orthonormalized(T_world_sensor), first, points_.size() - first});

@@ -236,9 +236,11 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
     if constexpr (IsRevisable<Map, Evidence>::value) {
       if (!revision_.config().revise_map) return;
       revision_.revise(
-          map, newest.scan, newest.T_world_sensor.translation(),
-          [this](const PointBuffer& points, std::size_t count, const Pose& T_world_points)
-              -> const auto& { return evidence_.test_visibility(points, count, T_world_points); });
+          map, newest.scan, newest.T_world_level.translation(),
+          [this](const PointBuffer& points, std::size_t count,
+                 const Pose& T_world_points) -> const auto& {
+            return evidence_.test_visibility(points, count, T_world_points);
+          });
     }
   }
 

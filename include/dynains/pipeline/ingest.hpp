@@ -16,15 +16,23 @@
 
 namespace dynains::detail {
 
+/// The points of a cloud that are judged.
+struct JudgedRegion {
+  float min_range = 0.0F;  ///< m, in the sensor's x-y plane
+  float max_range = 0.0F;  ///< m, in the sensor's x-y plane, and along its z axis
+  /// Position of the sensor in the frame of the cloud, m.
+  Eigen::Vector3f origin = Eigen::Vector3f::Zero();
+};
+
 /// Copies the valid points of a cloud as floats and labels every input point. A valid point has
-/// finite coordinates and lies within the range limits; its first label is kGround.
+/// finite coordinates and lies within the judged region; its first label is kGround. The copies
+/// are relative to the position of the sensor.
 class Ingest {
  public:
-  /// `cloud`: m, sensor frame. `min_range` and `max_range`: m, in the sensor's x-y plane; the
-  /// absolute z coordinate must not exceed `max_range` either. Points at the origin are beams
-  /// without a return and get kInvalid, as do NaN and infinity. `R`: rotation of the valid points
-  /// after the range test, or null for none. `labels`: by input point.
-  void read(const CloudView& cloud, float min_range, float max_range, const Eigen::Matrix3d* R,
+  /// `cloud`: m. Points at the origin of the cloud or at the sensor are beams without a return and
+  /// get kInvalid, as do NaN and infinity. `R`: rotation of the valid points after the range test,
+  /// or null for none. `labels`: by input point.
+  void read(const CloudView& cloud, const JudgedRegion& region, const Eigen::Matrix3d* R,
             std::vector<PointLabel>& labels) {
     const auto rotation = PackTransform::rotation(R != nullptr ? *R : Eigen::Matrix3d::Identity());
     const std::size_t count = cloud.size();
@@ -36,8 +44,9 @@ class Ingest {
     for (std::size_t begin = 0; begin < count; begin += kChunk) {
       const std::size_t length = std::min(kChunk, count - begin);
       copy(cloud, begin, length);
-      const std::size_t valid_count =
-          filter(begin, length, min_range * min_range, max_range * max_range, labels.data());
+      if (!region.origin.isZero(0.0F)) subtract(region.origin, length);
+      const std::size_t valid_count = filter(begin, length, region.min_range * region.min_range,
+                                             region.max_range * region.max_range, labels.data());
       if (R != nullptr) {
         transform_points(PointsView(points_).subview(count_, valid_count), rotation, points_,
                          count_);
@@ -92,6 +101,19 @@ class Ingest {
       x[i] = point(begin + i)[0];
       y[i] = point(begin + i)[1];
       z[i] = point(begin + i)[2];
+    }
+  }
+
+  // Moves the appended points, except beams without a return, which stay at the origin.
+  void subtract(const Eigen::Vector3f& origin, std::size_t length) {
+    float* const x = points_.x.data() + count_;
+    float* const y = points_.y.data() + count_;
+    float* const z = points_.z.data() + count_;
+    for (std::size_t i = 0; i < length; ++i) {
+      const bool is_return = x[i] != 0.0F || y[i] != 0.0F || z[i] != 0.0F;
+      x[i] -= is_return ? origin.x() : 0.0F;
+      y[i] -= is_return ? origin.y() : 0.0F;
+      z[i] -= is_return ? origin.z() : 0.0F;
     }
   }
 

@@ -234,13 +234,14 @@ ScanVerdict Pipeline<Stages>::finish_oldest(StageTimer& timer) {
 /// frame.
 template <class Stages>
 void Pipeline<Stages>::ingest(const CloudView& cloud, ScanSlot& next) {
-  const auto nearest = static_cast<float>(config_.min_range);
-  const auto farthest = static_cast<float>(config_.max_range);
+  const JudgedRegion region = {static_cast<float>(config_.min_range),
+                               static_cast<float>(config_.max_range),
+                               config_.sensor_origin().template cast<float>()};
   if (frame_.rotates_scans()) {
     const Eigen::Matrix3d R_level_sensor = level(next);
-    ingest_.read(cloud, nearest, farthest, &R_level_sensor, next.input_labels);
+    ingest_.read(cloud, region, &R_level_sensor, next.input_labels);
   } else {
-    ingest_.read(cloud, nearest, farthest, nullptr, next.input_labels);
+    ingest_.read(cloud, region, nullptr, next.input_labels);
   }
   next.ensure_capacity(next.input_labels.size());
 }
@@ -274,7 +275,7 @@ Eigen::Matrix3d Pipeline<Stages>::level(ScanSlot& scan) const {
   return R_level_sensor;
 }
 
-/// The residual of the newest scan, with its motion in the sensor frame.
+/// The residual of the newest scan, with its motion in the frame of the pushed cloud.
 template <class Stages>
 std::optional<PoseResidual> Pipeline<Stages>::pose_residual() {
   std::optional<PoseResidual> residual = decision_->pose_residual();
@@ -282,11 +283,13 @@ std::optional<PoseResidual> Pipeline<Stages>::pose_residual() {
     residual->previous_scan = scans_.newest().scan - 1;
     residual->previous_time = scans_[residual->previous_scan].time;
   }
-  if (residual && frame_.rotates_scans()) {
-    Pose T_sensor_level = Pose::Identity();
-    T_sensor_level.linear() = transposed(sensor().R_level_sensor());
+  const Eigen::Vector3d origin = config_.sensor_origin();
+  if (residual && (frame_.rotates_scans() || !origin.isZero(0.0))) {
+    Pose T_cloud_level = Pose::Identity();
+    T_cloud_level.linear() = transposed(sensor().R_level_sensor());
+    T_cloud_level.translation() = origin;
     residual->T_previous_newest =
-        composed(composed(T_sensor_level, residual->T_previous_newest), inverted(T_sensor_level));
+        composed(composed(T_cloud_level, residual->T_previous_newest), inverted(T_cloud_level));
   }
   return residual;
 }

@@ -108,6 +108,7 @@ class ScanRing {
     next.time = time;
     next.T_world_sensor = orthonormalized(T_world_sensor);
     next.T_world_level = next.T_world_sensor;
+    next.T_world_level.translation() = next.T_world_sensor * config.sensor_origin();
     return next;
   }
 

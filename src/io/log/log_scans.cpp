@@ -120,9 +120,10 @@ void LogScans::read_log() {
   for (const LogMessage& message : log_->messages()) {
     const LogTopic& topic = log_->topics()[message.topic];
     if (message.topic == cloud_topic_) take_cloud(message);
-    const bool has_poses =
-        message.topic == pose_topic_ || (is_readable(topic) && is_transform_type(topic.type));
-    if (choice_.with_poses && has_poses) take_poses(message);
+    const bool is_transform = is_readable(topic) && is_transform_type(topic.type);
+    const bool is_wanted = choice_.with_poses ? message.topic == pose_topic_ || is_transform
+                                              : choice_.with_transforms && is_transform;
+    if (is_wanted) take_poses(message);
   }
   transforms_.sort();
   sort_by_time(poses_);
@@ -194,6 +195,12 @@ void LogScans::place_scans() {
                            pose_frame_ + " at the times of the clouds, found none");
   }
 }
+
+std::optional<Eigen::Isometry3d> LogScans::T_cloud_frame(const std::string& frame) const {
+  return transforms_.find(cloud_frame_, frame, times_.front());
+}
+
+std::string LogScans::known_frames() const { return joined(transforms_.frames()); }
 
 Trajectory LogScans::motion() const {
   Trajectory motion;

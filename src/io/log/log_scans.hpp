@@ -19,8 +19,9 @@ namespace dynains {
 struct LogChoice {
   std::string cloud_topic;
   std::string pose_topic;
-  std::string pose_frame;  ///< the fixed frame, if poses come from transforms
-  bool with_poses = true;  ///< false: the log's poses are not used
+  std::string pose_frame;        ///< the fixed frame, if poses come from transforms
+  bool with_poses = true;        ///< false: the log's poses are not used
+  bool with_transforms = false;  ///< transforms are read even if its poses are not used
 };
 
 /// Finds the cloud topic and the poses of a log. Reads it once from begin to end, checks every
@@ -40,6 +41,11 @@ class LogScans {
   Trajectory motion() const;
   /// Whether the frame of the clouds is the fixed frame of the poses.
   bool is_in_world() const { return is_in_world_; }
+  /// Pose of `frame` in the frame of the clouds at the time of the first one; empty if the log does
+  /// not connect them.
+  std::optional<Eigen::Isometry3d> T_cloud_frame(const std::string& frame) const;
+  /// Names of the frames with a transform, or "none".
+  std::string known_frames() const;
   /// Columns of the first cloud.
   const PointColumns& columns() const { return columns_; }
   std::size_t point_count(std::size_t i) const { return point_counts_.at(i); }
