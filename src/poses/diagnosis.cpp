@@ -485,6 +485,11 @@ PoseAgreement agreement_at(const Recording& recording, std::size_t first, std::s
 Diagnosis diagnose(const Recording& recording) {
   Diagnosis d = diagnose_agreement(recording);
   compare_with_registration(recording, d);
+  if (d.sound() && d.scans > 0) d.ray_origin = find_ray_origin(recording, 0, d.scans - 1);
+  if (d.ray_origin) {
+    d.verdict = PoseVerdict::kRayOrigin;
+    d.option = option_for(*d.ray_origin);
+  }
   return d;
 }
 
@@ -569,6 +574,8 @@ std::string advice(const Diagnosis& d) {
       }
       return "Scans and poses agree roughly, but the poses are inexact by about " + error_text(d) +
              ": expect losses; poses of a LiDAR odometry would do better.";
+    case PoseVerdict::kRayOrigin:
+      return advice(*d.ray_origin);
     case PoseVerdict::kNoMotion:
       if (d.step * static_cast<double>(d.stride) > 1.0) {
         return "Too little stands beside the way to tell what the poses mean; nothing speaks "

@@ -4,12 +4,14 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/poses/sensor_origin.hpp"
 #include "dynains/sensor/mounting.hpp"
 
 namespace dynains {
@@ -59,6 +61,7 @@ enum class PoseVerdict {
   kInexact,     ///< scans agree, but the motion between neighbouring scans is inexact
   kNoMotion,    ///< too little motion or too few objects for a decision
   kDisagree,    ///< scans agree under no convention
+  kRayOrigin,   ///< scans agree, but rays begin elsewhere; see `ray_origin`
   kWorldFrame,  ///< points are in the world frame and agree there; poses have no effect
   kUnknown      ///< too few points or scans
 };
@@ -91,8 +94,9 @@ struct Diagnosis {
   double start_rotation_error = 0.0;
   /// Under which scans agree, for kOtherwise, kBodyFrame and kTimeOffset.
   PoseConvention convention;
-  double time_offset = 0.0;  ///< s, as RecordingOptions::time_offset
-  std::string option;        ///< flags of `dynains run` for both; empty: none
+  double time_offset = 0.0;             ///< s, as RecordingOptions::time_offset
+  std::optional<RayOrigin> ray_origin;  ///< if it is not that of the clouds
+  std::string option;                   ///< flags of `dynains run` for all of these; empty: none
   PoseVerdict verdict = PoseVerdict::kUnknown;
 
   /// Whether a run can use the given poses.

@@ -1,0 +1,330 @@
+#include "dynains/poses/sensor_origin.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iomanip>
+#include <limits>
+#include <sstream>
+#include <vector>
+
+#include "dynains/simd/pack_geometry.hpp"
+#include "dynains/simd/pack_loops.hpp"
+#include "io/finite_points.hpp"
+#include "io/text.hpp"
+
+namespace dynains {
+namespace {
+
+constexpr float kNearest = 1.5F;    // m; nearer points belong to the vehicle, or are noise
+constexpr float kFarthest = 50.0F;  // m; farther points hardly depend on the origin
+constexpr double kDegrees = 180.0 / M_PI;
+
+/// Directions of points around a candidate for the origin.
+struct Directions {
+  std::vector<float> azimuth, elevation, range;  // deg, deg, m
+
+  template <bool kWithAzimuth>
+  void measure(PointsView points, const Eigen::Vector3d& origin) {
+    range.resize(points.size() + detail::kMaxPackWidth);
+    elevation.resize(range.size());
+    if (kWithAzimuth) azimuth.resize(range.size());
+    const std::array<detail::PackConstant, 3> o = {
+        detail::PackConstant(static_cast<float>(origin.x())),
+        detail::PackConstant(static_cast<float>(origin.y())),
+        detail::PackConstant(static_cast<float>(origin.z()))};
+    static constexpr detail::PackConstant kToDegrees(static_cast<float>(kDegrees));
+    detail::for_packs(points.size(), [&](auto at) {
+      const auto x = at.load(points.x.data()) - o[0];
+      const auto y = at.load(points.y.data()) - o[1];
+      const auto z = at.load(points.z.data()) - o[2];
+      const auto planar = sqrt(x * x + y * y);
+      const auto length = sqrt(planar * planar + z * z);
+      if constexpr (kWithAzimuth) {
+        (detail::azimuth_of(y, x, planar) * kToDegrees).store(&azimuth[at.begin]);
+      }
+      (detail::elevation_of(z, planar, length) * kToDegrees).store(&elevation[at.begin]);
+      length.store(&range[at.begin]);
+    });
+  }
+
+  bool is_within(std::size_t i) const { return range[i] > kNearest && range[i] < kFarthest; }
+};
+
+/// Tells how sharply the elevations of points gather, as those of the beams of a spinning sensor do
+/// around its origin: about 1 for smooth distributions.
+class BeamSharpness {
+ public:
+  explicit BeamSharpness(PointBuffer points) : points_(std::move(points)) {}
+
+  double at(const Eigen::Vector3d& origin) {
+    directions_.measure<false>(points_, origin);
+    counts_.fill(0);
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      if (!directions_.is_within(i)) continue;
+      const auto bin = static_cast<std::size_t>((directions_.elevation[i] + 90.5F) / kBin);
+      ++counts_[std::min(bin, kBins - 1)];
+    }
+    double squares = 0.0;
+    double smooth_squares = 0.0;  // of each count with the mean of its surroundings
+    double around = 0.0;
+    for (std::size_t i = 0; i < kBins + kReach; ++i) {
+      if (i < kBins) around += counts_[i];
+      if (i >= 2 * kReach + 1) around -= counts_[i - 2 * kReach - 1];
+      if (i < kReach) continue;
+      const double count = counts_[i - kReach];
+      squares += count * count;
+      smooth_squares += count * around / static_cast<double>(2 * kReach + 1);
+    }
+    return smooth_squares > 0.0 ? squares / smooth_squares : 0.0;
+  }
+
+ private:
+  static constexpr float kBin = 0.1F;  // deg
+  static constexpr std::size_t kBins = 1820;
+  static constexpr std::size_t kReach = 20;  // bins on both sides
+
+  PointBuffer points_;
+  Directions directions_;
+  std::array<std::uint32_t, kBins> counts_{};
+};
+
+/// Ratio of points that are clearly farther than another point in their direction. Around the
+/// origin of the rays, only points beside the edges of objects are.
+class HiddenPoints {
+ public:
+  explicit HiddenPoints(const std::vector<PointBuffer>& scans) : scans_(scans) {}
+
+  double at(const Eigen::Vector3d& origin) {
+    std::size_t hidden = 0;
+    std::size_t all = 0;
+    for (const PointBuffer& scan : scans_) {
+      directions_.measure<true>(scan, origin);
+      nearest_.assign(kColumns * kRows, std::numeric_limits<float>::max());
+      for (std::size_t i = 0; i < scan.size(); ++i) {
+        if (!directions_.is_within(i)) continue;
+        float& nearest = nearest_[cell(i)];
+        nearest = std::min(nearest, directions_.range[i]);
+      }
+      for (std::size_t i = 0; i < scan.size(); ++i) {
+        if (!directions_.is_within(i)) continue;
+        ++all;
+        if (directions_.range[i] > 1.25F * nearest_[cell(i)] + 0.5F) ++hidden;
+      }
+    }
+    return all == 0 ? 0.0 : static_cast<double>(hidden) / static_cast<double>(all);
+  }
+
+ private:
+  static constexpr float kCell = 0.8F;  // deg
+  static constexpr std::size_t kColumns = 452;
+  static constexpr std::size_t kRows = 227;
+
+  std::size_t cell(std::size_t i) const {
+    const auto column = static_cast<std::size_t>((directions_.azimuth[i] + 180.5F) / kCell);
+    const auto row = static_cast<std::size_t>((directions_.elevation[i] + 90.5F) / kCell);
+    return std::min(column, kColumns - 1) * kRows + std::min(row, kRows - 1);
+  }
+
+  const std::vector<PointBuffer>& scans_;
+  Directions directions_;
+  std::vector<float> nearest_;
+};
+
+/// About `count` points of all scans.
+PointBuffer sample_of(const std::vector<PointBuffer>& scans, std::size_t count) {
+  std::size_t all = 0;
+  for (const PointBuffer& scan : scans) all += scan.size();
+  const std::size_t step = std::max<std::size_t>(1, all / count) | 1U;
+  PointBuffer sample;
+  for (const PointBuffer& scan : scans) {
+    for (std::size_t i = 0; i < scan.size(); i += step) {
+      sample.push_back(scan.x[i], scan.y[i], scan.z[i]);
+    }
+  }
+  return sample;
+}
+
+struct Candidate {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  double value = 0.0;
+};
+
+// Positions that sensors have on usual vehicles, m.
+const Eigen::Vector3d kLowest(-4.0, -1.0, -2.0);
+const Eigen::Vector3d kHighest(4.0, 1.0, 3.0);
+
+/// The best positions of a grid, best first, at least 0.6 m apart.
+std::vector<Candidate> best_on_grid(BeamSharpness& sharpness) {
+  constexpr double kStep = 0.25;  // m
+  constexpr std::size_t kKept = 4;
+  std::vector<Candidate> all;
+  for (double x = kLowest.x(); x <= kHighest.x(); x += kStep) {
+    for (double y = kLowest.y(); y <= kHighest.y(); y += kStep) {
+      for (double z = kLowest.z(); z <= kHighest.z(); z += kStep) {
+        const Eigen::Vector3d position(x, y, z);
+        all.push_back({position, sharpness.at(position)});
+      }
+    }
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.value > b.value; });
+  std::vector<Candidate> kept;
+  for (const Candidate& candidate : all) {
+    const bool is_apart = std::all_of(kept.begin(), kept.end(), [&](const Candidate& other) {
+      return (candidate.position - other.position).norm() > 0.6;
+    });
+    if (is_apart) kept.push_back(candidate);
+    if (kept.size() == kKept) break;
+  }
+  return kept;
+}
+
+/// The largest value at `distance` (m) along each axis.
+double largest_around(BeamSharpness& sharpness, double distance) {
+  double largest = 0.0;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    for (const double sign : {-1.0, 1.0}) {
+      largest = std::max(largest, sharpness.at(sign * distance * Eigen::Vector3d::Unit(axis)));
+    }
+  }
+  return largest;
+}
+
+/// Climbs from `start` in ever smaller steps along the first `axes` axes while `gain(value, best)`.
+template <class Measure, class Gain>
+Candidate climbed(Measure& measure, Candidate start, std::vector<double> steps, Eigen::Index axes,
+                  Gain&& gain) {
+  Candidate best = start;
+  best.value = measure.at(best.position);
+  for (const double step : steps) {
+    for (bool is_better = true; is_better;) {
+      is_better = false;
+      for (Eigen::Index axis = 0; axis < axes; ++axis) {
+        for (const double sign : {-1.0, 1.0}) {
+          Eigen::Vector3d position = best.position;
+          position[axis] += sign * step;
+          if ((position - kLowest).minCoeff() < -0.25 || (kHighest - position).minCoeff() < -0.25) {
+            continue;
+          }
+          const double value = measure.at(position);
+          if (!gain(value, best.value)) continue;
+          best = {position, value};
+          is_better = true;
+        }
+      }
+    }
+  }
+  return best;
+}
+
+constexpr double kLeastOffset = 0.4;  // m; beams of one sensor begin at places that differ less
+
+/// What the elevations of beams tell of the origin.
+enum class BeamFinding { kAsGiven, kElsewhere, kNothing };
+
+BeamFinding origin_of_beams(const std::vector<PointBuffer>& scans, Eigen::Vector3d& position) {
+  constexpr double kSharper = 1.3;
+  BeamSharpness fine(sample_of(scans, 32000));
+  const double given = std::max(fine.at(Eigen::Vector3d::Zero()), largest_around(fine, 0.1));
+  if (given > 1.5 * largest_around(fine, 0.5)) return BeamFinding::kAsGiven;
+  BeamSharpness coarse(sample_of(scans, 4000));
+  Candidate found;
+  for (const Candidate& start : best_on_grid(coarse)) {
+    const Candidate top = climbed(fine, start, {0.1, 0.05, 0.02}, 3,
+                                  [](double value, double best) { return value > best; });
+    if (top.value > found.value) found = top;
+  }
+  if (found.position.norm() < kLeastOffset || !(found.value > kSharper * given)) {
+    return BeamFinding::kNothing;
+  }
+  position = found.position;
+  return BeamFinding::kElsewhere;
+}
+
+/// By points that are hidden by nearer ones. Seen from above, few are, so that this shows x and y
+/// only.
+std::optional<RayOrigin> origin_of_shadows(HiddenPoints& hidden, double as_given) {
+  constexpr double kFewer = 0.7;
+  constexpr double kLeastHidden = 0.01;
+  constexpr double kTooMany = 0.13;  // more than in any scan of one sensor that was measured
+  const Candidate found = climbed(hidden, {}, {1.0, 0.5, 0.25, 0.1}, 2,
+                                  [](double value, double best) { return value < 0.99 * best; });
+  const bool is_there = found.position.norm() > kLeastOffset &&
+                        as_given - found.value > kLeastHidden && found.value < kFewer * as_given;
+  if (is_there) {
+    return RayOrigin{RayOrigin::Known::kHorizontal, found.position, as_given, found.value};
+  }
+  if (as_given < kTooMany) return std::nullopt;
+  return RayOrigin{RayOrigin::Known::kNothing, Eigen::Vector3d::Zero(), as_given, as_given};
+}
+
+}  // namespace
+
+std::optional<RayOrigin> find_ray_origin(const std::vector<PointBuffer>& scans) {
+  RayOrigin result;
+  const BeamFinding by_beams = origin_of_beams(scans, result.position);
+  if (by_beams == BeamFinding::kAsGiven) return std::nullopt;
+  HiddenPoints hidden(scans);
+  result.hidden_as_given = hidden.at(Eigen::Vector3d::Zero());
+  if (by_beams == BeamFinding::kElsewhere) {
+    constexpr double kFewer = 0.9;
+    result.hidden = hidden.at(result.position);
+    result.known = RayOrigin::Known::kPosition;
+    if (result.hidden < kFewer * result.hidden_as_given) return result;
+  }
+  return origin_of_shadows(hidden, result.hidden_as_given);
+}
+
+std::optional<RayOrigin> find_ray_origin(const Recording& recording, std::size_t first,
+                                         std::size_t last) {
+  constexpr std::size_t kScans = 4;
+  const std::size_t count = std::min(kScans, last - first + 1);
+  std::vector<PointBuffer> scans;
+  RecordedScan scan;
+  for (std::size_t k = 0; k < count; ++k) {
+    recording.read_scan(first + (count == 1 ? 0 : k * (last - first) / (count - 1)), scan);
+    scans.push_back(finite_points(scan));
+  }
+  std::optional<RayOrigin> origin = find_ray_origin(scans);
+  if (origin) origin->position += recording.sensor_origin();
+  return origin;
+}
+
+std::string option_for(const RayOrigin& origin) {
+  if (origin.known == RayOrigin::Known::kNothing) return {};
+  std::ostringstream text;
+  text::exact(text);
+  text << std::fixed << std::setprecision(2) << "--sensor-origin \"";
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const double value = origin.position[axis];
+    text << (axis > 0 ? " " : "") << (std::abs(value) < 0.005 ? 0.0 : value);
+  }
+  text << '"';
+  return text.str();
+}
+
+std::string advice(const RayOrigin& origin) {
+  std::ostringstream text;
+  text::exact(text);
+  text << std::fixed << std::setprecision(1)
+       << "The rays do not begin at the origin of the clouds, as if these were moved into a body "
+          "frame: seen from there, "
+       << 100.0 * origin.hidden_as_given << " % of the points lie behind nearer ones";
+  switch (origin.known) {
+    case RayOrigin::Known::kNothing:
+      text << ". Pass the position of the sensor in the clouds, --sensor-origin \"X Y Z\".";
+      break;
+    case RayOrigin::Known::kHorizontal:
+      text << "; seen from the best place, " << 100.0 * origin.hidden << " %: pass "
+           << option_for(origin) << ", with the height of the sensor in place of 0.";
+      break;
+    case RayOrigin::Known::kPosition:
+      text << "; seen from the place where all beams meet, " << 100.0 * origin.hidden << " %: pass "
+           << option_for(origin) << '.';
+      break;
+  }
+  return text.str();
+}
+
+}  // namespace dynains

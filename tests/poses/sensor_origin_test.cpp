@@ -1,0 +1,84 @@
+// The place where rays begin, in clouds that were moved into a body frame.
+#include "dynains/poses/sensor_origin.hpp"
+
+#include <string>
+#include <vector>
+
+#include "dynains/simulation/simulator.hpp"
+#include "support/catch.hpp"
+
+namespace dynains::test {
+namespace {
+
+using simulation::Scene;
+using simulation::Sensor;
+
+/// Four scans of a drive, with the sensor at `origin` (m) in their frame.
+std::vector<PointBuffer> scans_of(Scene scene, Sensor sensor, const Eigen::Vector3f& origin) {
+  simulation::Config config;
+  config.scene = scene;
+  config.sensor = sensor;
+  config.scans = 40;
+  config.seed = 8;
+  simulation::Simulator simulator(config);
+  std::vector<PointBuffer> scans;
+  for (const std::size_t i : {0U, 13U, 26U, 39U}) {
+    const simulation::SimulatedScan scan = simulator.scan(i);
+    scans.emplace_back();
+    for (std::size_t k = 0; k + 3 < scan.xyzi.size(); k += 4) {
+      scans.back().push_back(scan.xyzi[k] + origin.x(), scan.xyzi[k + 1] + origin.y(),
+                             scan.xyzi[k + 2] + origin.z());
+    }
+  }
+  return scans;
+}
+
+TEST_CASE("The place where beams meet is found, and nothing if it is the origin") {
+  const auto [scene, sensor] = GENERATE(table<Scene, Sensor>({{Scene::kUrban, Sensor::kOs1_64},
+                                                              {Scene::kCrowd, Sensor::kVlp16},
+                                                              {Scene::kHighway, Sensor::kHdl32}}));
+  CHECK_FALSE(find_ray_origin(scans_of(scene, sensor, Eigen::Vector3f::Zero())));
+  CHECK_FALSE(find_ray_origin(scans_of(scene, sensor, {0.0F, 0.0F, 0.2F})));
+  for (const Eigen::Vector3f& origin :
+       {Eigen::Vector3f(1.0F, 0.0F, 1.5F), Eigen::Vector3f(1.0F, 0.0F, 0.0F),
+        Eigen::Vector3f(0.0F, 0.0F, 1.5F), Eigen::Vector3f(-1.2F, 0.3F, 0.6F)}) {
+    INFO("sensor at " << origin.transpose());
+    const auto found = find_ray_origin(scans_of(scene, sensor, origin));
+    REQUIRE(found);
+    REQUIRE(found->known == RayOrigin::Known::kPosition);
+    CHECK((found->position - origin.cast<double>()).norm() < 0.1);
+    CHECK(found->hidden < found->hidden_as_given);
+  }
+}
+
+TEST_CASE("Without beams of fixed elevations, shadows tell that rays begin elsewhere") {
+  CHECK_FALSE(find_ray_origin(scans_of(Scene::kUrban, Sensor::kLivox, Eigen::Vector3f::Zero())));
+  const auto beside = find_ray_origin(scans_of(Scene::kUrban, Sensor::kLivox, {1.5F, -1.0F, 0.0F}));
+  REQUIRE(beside);
+  CHECK(beside->known == RayOrigin::Known::kHorizontal);
+  CHECK((beside->position - Eigen::Vector3d(1.5, -1.0, 0.0)).norm() < 0.4);
+  const auto below = find_ray_origin(scans_of(Scene::kUrban, Sensor::kLivox, {0.0F, 0.0F, 1.2F}));
+  REQUIRE(below);
+  CHECK(option_for(*below).empty() == (below->known == RayOrigin::Known::kNothing));
+}
+
+TEST_CASE("The advice names the option with numbers") {
+  RayOrigin origin;
+  origin.known = RayOrigin::Known::kPosition;
+  origin.position = {1.0, -0.001, 1.5};
+  CHECK(option_for(origin) == "--sensor-origin \"1.00 0.00 1.50\"");
+  CHECK_THAT(advice(origin), ContainsSubstring("pass --sensor-origin \"1.00 0.00 1.50\"."));
+  origin.known = RayOrigin::Known::kNothing;
+  CHECK_THAT(advice(origin), ContainsSubstring("--sensor-origin \"X Y Z\""));
+}
+
+TEST_CASE("Scans with few or no points show nothing") {
+  CHECK_FALSE(find_ray_origin(std::vector<PointBuffer>()));
+  CHECK_FALSE(find_ray_origin(std::vector<PointBuffer>(3)));
+  std::vector<PointBuffer> one(1);
+  one[0].push_back(5.0F, 1.0F, 2.0F);
+  CHECK_FALSE(find_ray_origin(one));
+}
+
+}  // namespace
+}  // namespace dynains::test
