@@ -89,6 +89,8 @@ class ParameterValues {
   }
 
   bool empty() const { return values_.empty(); }
+  /// Whether a value has this flag name.
+  bool has(const std::string& name) const { return values_.count(name) > 0; }
 
   /// Assigns all values to the parameters of `config`. Throws ConfigError, also for unknown and for
   /// former names.

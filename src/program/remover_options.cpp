@@ -30,4 +30,9 @@ DynaInsRemover::Config RemoverOptions::config() const {
   return config;
 }
 
+bool RemoverOptions::sets(const std::string& flag_name) const {
+  return flags_.values().has(flag_name) ||
+         (!config_file_.empty() && read_config_file(config_file_).has(flag_name));
+}
+
 }  // namespace dynains::program

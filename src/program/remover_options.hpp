@@ -23,6 +23,8 @@ class RemoverOptions {
 
   /// Throws ConfigError.
   DynaInsRemover::Config config() const;
+  /// Whether the flag, or a line of that name in the config file, sets a parameter.
+  bool sets(const std::string& flag_name) const;
 
  private:
   std::string preset_;

@@ -83,6 +83,7 @@ void run_as_asked(RunFlags& flags) {
   settings.config = flags.remover.config();
   settings.preset = flags.remover.preset_name();
   settings.config_file = flags.remover.config_file();
+  settings.find_own_body = settings.preset != "paper" && !flags.remover.sets("min-range");
   settings.recording = flags.recording.folder();
   settings.recording_as_given = flags.recording.as_given();
   settings.recording_flags = flags.recording.given_flags();
@@ -190,6 +191,15 @@ void add_run_command(CLI::App& app) {
   add_output("--write-clean", options->write_clean,
              "also write every scan without its moving points, to the folder clean, in the form it "
              "has in SEQ");
+  command
+      .add_option_function<std::string>(
+          "--not-judged",
+          [options](const std::string& value) { options->drop_not_judged = value == "drop"; },
+          "points of --write-clean that are not judged, as too near or too far [keep]; the map "
+          "never has them")
+      ->check(CLI::IsMember({"keep", "drop"}))
+      ->type_name("keep|drop")
+      ->group(kOutputs);
   add_output("--write-beliefs", options->write_beliefs,
              "also write the probability that a point moves, to the folder beliefs");
   add_output("--write-mcap", options->write_mcap,

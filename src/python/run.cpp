@@ -51,7 +51,7 @@ void set_scan(RunArguments& run, const py::handle& value) {
   if (!value.is_none()) run.settings.window.*Field = value.cast<std::size_t>();
 }
 
-const std::array<RunSetting, 23> kRunSettings{{
+const std::array<RunSetting, 24> kRunSettings{{
     {"preset", "'default', 'offline' or 'paper'", "parameters to start from",
      [](RunArguments& run, const py::handle& value) {
        const auto& names = program::preset_names();
@@ -112,6 +112,8 @@ const std::array<RunSetting, 23> kRunSettings{{
      &set_flag<&RunSettings::write_online>},
     {"write_clean", "bool", "also write every scan without its moving points",
      &set_flag<&RunSettings::write_clean>},
+    {"drop_not_judged", "bool", "write_clean leaves out points that are not judged, too",
+     &set_flag<&RunSettings::drop_not_judged>},
     {"write_beliefs", "bool", "also write the probability that a point moves",
      &set_flag<&RunSettings::write_beliefs>},
     {"write_mcap", "bool", "also write verdicts.mcap, a log of ROS 2",
@@ -169,6 +171,7 @@ void take_config(RunArguments& run) {
   settings.preset = run.preset.value_or("default");
   settings.config = run.config ? *run.config : program::preset(settings.preset);
   settings.config.validate();
+  settings.find_own_body = !run.config && settings.preset != "paper";
 }
 
 program::RunListener listen(const RunArguments& run) {

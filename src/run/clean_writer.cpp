@@ -7,17 +7,16 @@
 #include "output_folder.hpp"
 
 namespace dynains::program {
-namespace {
 
-bool is_kept(PointLabel label) {
-  return label != PointLabel::kDynamic && label != PointLabel::kInvalid;
+CleanWriter::CleanWriter(std::filesystem::path folder, const Recording& recording,
+                         bool drop_not_judged)
+    : folder_(std::move(folder)), recording_(recording), drop_not_judged_(drop_not_judged) {
+  create_folder(folder_);
 }
 
-}  // namespace
-
-CleanWriter::CleanWriter(std::filesystem::path folder, const Recording& recording)
-    : folder_(std::move(folder)), recording_(recording) {
-  create_folder(folder_);
+bool CleanWriter::is_kept(PointLabel label) const {
+  if (label == PointLabel::kOutOfRange) return !drop_not_judged_;
+  return label != PointLabel::kDynamic && label != PointLabel::kInvalid;
 }
 
 std::string CleanWriter::name(const Recording& recording, std::size_t i) {

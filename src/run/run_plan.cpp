@@ -11,6 +11,7 @@
 #include "dynains/io/point_file.hpp"
 #include "dynains/pose.hpp"
 #include "naming_scan.hpp"
+#include "own_body_range.hpp"
 #include "run_request.hpp"
 
 namespace dynains::program {
@@ -94,6 +95,7 @@ RunOutputs outputs_of(const RunSettings& settings) {
   outputs.map = choose_map(settings, config);
   outputs.write_online = settings.write_online;
   outputs.write_clean = settings.write_clean;
+  outputs.drop_not_judged = settings.drop_not_judged;
   outputs.write_mcap = settings.write_mcap;
   outputs.write_beliefs = settings.view || settings.write_beliefs;
   outputs.map_on_disk = settings.map_memory.has_value();
@@ -208,12 +210,18 @@ void check_settings(const RunSettings& settings) {
   map_on_disk_of(settings, outputs_of(settings));
 }
 
-RunPlan make_plan(const RunSettings& settings, Recording sequence) {
-  const DynaInsRemover::Config config = config_of(settings);
+RunPlan make_plan(const RunSettings& given, Recording sequence) {
+  RunSettings settings = given;
+  settings.config = config_of(given);
+  DynaInsRemover::Config& config = settings.config;
   RunOutputs outputs = outputs_of(settings);
-  const auto map_on_disk = map_on_disk_of(settings, outputs);
   const ScanRange range = select_scans(sequence, settings.window);
   check_scans(sequence, range);
+  if (settings.find_own_body) {
+    config.min_range = own_body_range(sequence, range, config.min_range);
+    config.validate();
+  }
+  const auto map_on_disk = map_on_disk_of(settings, outputs);
   if (settings.one_thread) outputs.thread = std::launch::deferred;
   const nlohmann::ordered_json configuration = parameters_of(config);
   nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);

@@ -69,6 +69,7 @@ nlohmann::ordered_json describe_request(const Recording& recording, const ScanRa
           {"crs", outputs.crs},
           {"write_online", outputs.write_online},
           {"write_clean", outputs.write_clean},
+          {"drop_not_judged", outputs.drop_not_judged},
           {"write_mcap", outputs.write_mcap},
           {"write_beliefs", outputs.write_beliefs},
           {"configuration", configuration}};

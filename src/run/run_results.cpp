@@ -134,7 +134,8 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
       writing_(outputs.thread) {
   final_labels_.create_folders();
   if (outputs.write_online) online_labels_.emplace(outputs.folder / "online", outputs.thread);
-  if (outputs.write_clean) clean_scans_.emplace(outputs.folder / "clean", recording);
+  if (outputs.write_clean)
+    clean_scans_.emplace(outputs.folder / "clean", recording, outputs.drop_not_judged);
   if (!outputs.map.empty() && !map_is_outside_) {
     map_ = open_map(outputs.folder / outputs.map.filename(), recording, range, outputs);
   }

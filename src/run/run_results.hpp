@@ -45,6 +45,7 @@ struct RunOutputs {
   std::filesystem::path map;  ///< by whole_path(); empty: no map
   bool write_online = false;
   bool write_clean = false;
+  bool drop_not_judged = false;  ///< from clean/
   bool write_mcap = false;
   bool write_beliefs = false;
   bool map_on_disk = false;

@@ -33,6 +33,9 @@ struct RunSettings {
   bool force = false;
   bool resume = false;
   bool accept_poses = false;
+  bool drop_not_judged = false;  ///< clean/ has no points that are not judged
+  /// Whether `config.min_range` follows what the sensor sees of its own body.
+  bool find_own_body = false;
 
   DynaInsRemover::Config config;
   std::string preset = "default";  ///< name of the preset that `config` began with
