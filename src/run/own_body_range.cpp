@@ -25,7 +25,7 @@ double own_body_range(const Recording& recording, const ScanRange& range, double
   }
   if (motion < kLeastMotion) return otherwise;
   const OwnBody body = estimate_own_body(scans);
-  return body.known ? body.min_range() : otherwise;
+  return body.known ? std::min(body.min_range(), otherwise) : otherwise;
 }
 
 }  // namespace dynains::program
