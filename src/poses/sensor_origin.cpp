@@ -180,12 +180,13 @@ std::vector<Candidate> best_on_grid(BeamSharpness& sharpness) {
   return kept;
 }
 
-/// The largest value at `distance` (m) along each axis.
-double largest_around(BeamSharpness& sharpness, double distance) {
+/// The largest value at `distance` (m) from `centre` along each axis.
+double largest_around(BeamSharpness& sharpness, const Eigen::Vector3d& centre, double distance) {
   double largest = 0.0;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     for (const double sign : {-1.0, 1.0}) {
-      largest = std::max(largest, sharpness.at(sign * distance * Eigen::Vector3d::Unit(axis)));
+      largest =
+          std::max(largest, sharpness.at(centre + sign * distance * Eigen::Vector3d::Unit(axis)));
     }
   }
   return largest;
@@ -226,8 +227,9 @@ enum class BeamFinding { kAsGiven, kElsewhere, kNothing };
 BeamFinding origin_of_beams(const std::vector<PointBuffer>& scans, Eigen::Vector3d& position) {
   constexpr double kSharper = 1.3;
   BeamSharpness fine(sample_of(scans, 32000));
-  const double given = std::max(fine.at(Eigen::Vector3d::Zero()), largest_around(fine, 0.1));
-  if (given > 1.5 * largest_around(fine, 0.5)) return BeamFinding::kAsGiven;
+  const Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  const double given = std::max(fine.at(origin), largest_around(fine, origin, 0.1));
+  if (given > 1.5 * largest_around(fine, origin, 0.5)) return BeamFinding::kAsGiven;
   BeamSharpness coarse(sample_of(scans, 4000));
   Candidate found;
   for (const Candidate& start : best_on_grid(coarse)) {
@@ -235,7 +237,9 @@ BeamFinding origin_of_beams(const std::vector<PointBuffer>& scans, Eigen::Vector
                                   [](double value, double best) { return value > best; });
     if (top.value > found.value) found = top;
   }
-  if (found.position.norm() < kLeastOffset || !(found.value > kSharper * given)) {
+  // On open ground, rings are rings seen from any height: then the maximum is not sharp.
+  const double others = std::max(given, largest_around(fine, found.position, 0.5));
+  if (found.position.norm() < kLeastOffset || !(found.value > kSharper * others)) {
     return BeamFinding::kNothing;
   }
   position = found.position;
@@ -262,6 +266,10 @@ std::optional<RayOrigin> origin_of_shadows(HiddenPoints& hidden, double as_given
 }  // namespace
 
 std::optional<RayOrigin> find_ray_origin(const std::vector<PointBuffer>& scans) {
+  constexpr std::size_t kFewestPoints = 4000;
+  std::size_t points = 0;
+  for (const PointBuffer& scan : scans) points += scan.size();
+  if (points < kFewestPoints) return std::nullopt;
   RayOrigin result;
   const BeamFinding by_beams = origin_of_beams(scans, result.position);
   if (by_beams == BeamFinding::kAsGiven) return std::nullopt;

@@ -79,19 +79,26 @@ void judge_poses(const RunPlan& plan, const RunSettings& settings, const RunList
   warn(listener, "only " + share + "; see: dynains check " + settings.recording_as_given);
 }
 
-/// Throws ConfigError if rays begin elsewhere than at the origin of the clouds.
-void judge_ray_origin(const RunPlan& plan, const RunSettings& settings) {
-  if (settings.accept_poses) return;
+/// Throws ConfigError if rays begin elsewhere than at the origin of the clouds, unless the clouds
+/// are accepted. Warns if only shadows tell it.
+void judge_ray_origin(const RunPlan& plan, const RunSettings& settings,
+                      const RunListener& listener) {
+  constexpr std::size_t kFewestScans = 8;  // as for the poses
+  if (settings.accept_poses || plan.range.size() < kFewestScans) return;
   const auto origin = find_ray_origin(plan.sequence, plan.range.first, plan.range.last);
   if (!origin) return;
-  throw ConfigError(advice(*origin) + " See: dynains check " + settings.recording_as_given +
-                    "; or run with these clouds by --accept-poses");
+  const std::string text = advice(*origin) + " See: dynains check " + settings.recording_as_given;
+  if (origin->known == RayOrigin::Known::kHorizontal) {
+    warn(listener, text);
+    return;
+  }
+  throw ConfigError(text + "; or run with these clouds by --accept-poses");
 }
 
 void warn_of_doubts(const RunPlan& plan, const RunSettings& settings, const RunListener& listener,
                     const PoseAgreement& agreement) {
   if (agreement.doubtful()) judge_poses(plan, settings, listener, agreement.as_given);
-  judge_ray_origin(plan, settings);
+  judge_ray_origin(plan, settings, listener);
   const auto lone =
       remark_on_lone_scans(plan.sequence, plan.range.first, plan.range.last, plan.config);
   if (lone) warn(listener, *lone);
