@@ -91,6 +91,9 @@ class FreeSpaceEvidence {
     for (std::size_t i = 0; i < std::min(scans, records_.size()); ++i) records_[i] = roomy;
   }
 
+  /// Sets the time (s) of the next scan. Without times, scans are taken at equal distances.
+  void set_time(double time) { time_ = time; }
+
   /// Adds a scan. `scan`: its number, consecutive from 0; 0 discards all earlier scans. `epoch`:
   /// only scans of one epoch are compared. `T_world_sensor`: rigid, pose of the frame of `split`.
   /// An inexact pose is corrected for the comparisons. If the static surfaces of the scan do not
@@ -100,7 +103,10 @@ class FreeSpaceEvidence {
                const GroundSplit& split, Span<const std::uint32_t> instance_of,
                std::size_t instance_count) {
     if (scan == 0) forget_scans();
-    if (scan == 0 || pushed_epoch_ != epoch) begin_epoch(scan, T_world_sensor);
+    if (scan == 0 || pushed_epoch_ != epoch) {
+      begin_epoch(scan, T_world_sensor);
+      pose_correction_.begin_epoch(T_world_sensor);
+    }
     pushed_epoch_ = epoch;
     newest_ = scan;
     Record& record = record_of(scan);
@@ -148,6 +154,9 @@ class FreeSpaceEvidence {
   /// Alignment of the newest scan with earlier scans, in the frame of its pose.
   const std::optional<PoseResidual>& pose_residual() const { return pose_correction_.residual(); }
 
+  /// Why the newest scan is not compared with earlier scans of its pushed epoch; empty if it is.
+  const std::optional<EpochReason>& misfit() const { return pose_correction_.misfit(); }
+
   /// By instance of the newest scan: the linked instance of the scan before it, or kNoCluster.
   Span<const std::uint32_t> predecessors() const { return predecessors_; }
 
@@ -174,14 +183,15 @@ class FreeSpaceEvidence {
     ++epoch_;
     epoch_begin_ = scan;
     dynamic_grid_.clear();
-    pose_correction_.begin_epoch(T_world_sensor);
   }
 
   // The pose of a scan for comparisons. Begins an epoch if the scan does not fit to earlier ones.
-  Pose correct(std::uint64_t scan, const Pose& T_world_sensor, const GroundSplit& split) {
-    const Pose T_corrected = pose_correction_.correct(T_world_sensor, split);
-    if (!pose_correction_.is_lost()) return T_corrected;
+  Pose correct(std::uint64_t scan, const Pose& T_world_sensor,
+                            const GroundSplit& split) {
+    const Pose T_corrected = pose_correction_.correct(T_world_sensor, split, time_);
+    if (!pose_correction_.misfit()) return T_corrected;
     begin_epoch(scan, T_world_sensor);
+    pose_correction_.begin_planes(T_world_sensor);
     return T_world_sensor;
   }
 
@@ -296,7 +306,10 @@ class FreeSpaceEvidence {
   }
 
   void judge_instances(bool is_final, const Record& record) {
-    judge_.judge(record.evidence, updater_, !is_final, verdicts_,
+    // In the first scans of an epoch, nearly everything is without evidence of earlier scans.
+    constexpr std::uint64_t kFirstScans = 5;
+    const bool may_presume = !is_final && record.since_begin >= kFirstScans;
+    judge_.judge(record.evidence, updater_, may_presume, verdicts_,
                  [&](std::size_t instance) { add_hull(record.evidence, instance); });
   }
 
@@ -367,6 +380,7 @@ class FreeSpaceEvidence {
   GroundSampler ground_sampler_;
   ReferenceScans references_;
   PoseCorrection pose_correction_;
+  std::optional<double> time_;  // of the newest scan, s
   InstanceBeliefUpdater updater_;
   InstanceLinker linker_;
   TrackBelief track_belief_;

@@ -93,6 +93,27 @@ inline double distance(const Pose& a, const Pose& b) {
   return std::sqrt(squared);
 }
 
+/// `ratio` times a motion: its translation and its turn, of less than half a revolution.
+inline Pose scaled_motion(const Pose& T_a_b, double ratio) {
+  const double w[3] = {T_a_b(2, 1) - T_a_b(1, 2), T_a_b(0, 2) - T_a_b(2, 0),
+                       T_a_b(1, 0) - T_a_b(0, 1)};  // twice the sine times the axis
+  const double length = std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+  const double twice_cosine = T_a_b(0, 0) + T_a_b(1, 1) + T_a_b(2, 2) - 1.0;
+  const double angle = ratio * std::atan2(length, twice_cosine);
+  const double scale = length > 0.0 ? 1.0 / length : 0.0;
+  const double x = scale * w[0], y = scale * w[1], z = scale * w[2];
+  const double s = std::sin(angle), c = std::cos(angle), d = 1.0 - c;
+  const double R[3][3] = {{c + d * x * x, d * x * y - s * z, d * x * z + s * y},
+                          {d * x * y + s * z, c + d * y * y, d * y * z - s * x},
+                          {d * x * z - s * y, d * y * z + s * x, c + d * z * z}};
+  Pose result = Pose::Identity();
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3 && length > 0.0; ++j) result(i, j) = R[i][j];  // Rodrigues' formula
+    result(i, 3) = ratio * T_a_b(i, 3);
+  }
+  return result;
+}
+
 inline bool is_finite(const Pose& T) {
   for (int i = 0; i < 4; ++i) {
     for (int j = 0; j < 4; ++j) {

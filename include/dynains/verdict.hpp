@@ -115,6 +115,15 @@ enum class TimeDoubt : std::uint8_t {
   kTooFast   ///< all less than 1 ms apart: no LiDAR is as fast
 };
 
+/// Why a scan begins an epoch: it is not compared with earlier scans.
+enum class EpochReason : std::uint8_t {
+  kStart,   ///< first scan, also after flush(), start_epoch(), reset() or an exception
+  kSensor,  ///< first scan with enough points for the model of the sensor
+  kPause,   ///< a longer time than `max_gap` since the scan before
+  kJump,    ///< the pose jumped: no motion leads to it, or its surfaces fit to the motion before it
+  kMisfit,  ///< its surfaces do not fit to those of earlier scans
+};
+
 /// Result of one push.
 struct FrameResult {
   /// Verdict on the pushed scan by this and earlier scans; final if latency() is 0. Its spans are
@@ -126,6 +135,9 @@ struct FrameResult {
   /// used (decision = window) or `pose_tolerance` is 0.
   std::optional<PoseResidual> pose_residual;
   TimeDoubt time_doubt = TimeDoubt::kNone;
+  /// Set if the scan begins an epoch. After kJump and kMisfit, the pushed motion since the previous
+  /// scan is wrong.
+  std::optional<EpochReason> began_epoch;
 };
 
 /// Verdict by free space on one scan. Each non-ground point belongs to a group with one verdict;

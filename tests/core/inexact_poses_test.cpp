@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "dynains/evidence/motion_prediction.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 #include "support/simulated_runs.hpp"
@@ -93,6 +94,147 @@ TEST_CASE("noise, a jump and a drift of poses cost little") {
     return T;
   }));
   CHECK(drift.f1() == Approx(exact.f1()).margin(0.003));
+}
+
+struct Epochs {
+  std::vector<std::size_t> scans;  // that begin an epoch, without the first one
+  std::vector<std::optional<EpochReason>> reasons;
+  double static_share = 0.0;  // of the static points more than 5 scans from scan kJump
+};
+
+constexpr std::size_t kJump = 20;
+
+bool is_moving(const SimulatedScan& scan, std::size_t point) {
+  const std::uint32_t kind = scan.labels[point] & 0xFFFFU;
+  return kind >= 252 && kind <= 259;
+}
+
+Epochs epochs_of(const std::vector<SimulatedScan>& scans) {
+  Epochs epochs;
+  DynaInsRemover::Config config;
+  config.build_map = false;
+  DynaInsRemover remover(config);
+  double still = 0.0, kept = 0.0;
+  const auto count = [&](const ScanVerdict& verdict) {
+    if (verdict.scan + 5 >= kJump && verdict.scan <= kJump + 5) return;
+    for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
+      if (verdict.labels[i] == PointLabel::kInvalid || is_moving(scans[verdict.scan], i)) continue;
+      still += 1.0;
+      kept += is_static(verdict.labels[i]) ? 1.0 : 0.0;
+    }
+  };
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    const RawPoints<float> points{scans[i].xyzi.data(), scans[i].labels.size(), 4};
+    const FrameResult frame = remover.push(points, scans[i].T_world_sensor, scans[i].time);
+    if (frame.finished) count(*frame.finished);
+    if (!frame.began_epoch || i == 0) continue;
+    epochs.scans.push_back(i);
+    epochs.reasons.push_back(frame.began_epoch);
+    CHECK_FALSE(frame.pose_residual);
+  }
+  remover.flush(count);
+  epochs.static_share = kept / still;
+  return epochs;
+}
+
+TEST_CASE("a pose that jumps begins an epoch, or is corrected") {
+  const auto [metres, degrees] = GENERATE(table<double, double>({{0.3, 0.0},
+                                                                 {1.0, 0.3},
+                                                                 {3.0, 2.0},
+                                                                 {9.0, 0.0},
+                                                                 {20.0, 90.0},
+                                                                 {0.0, 1.0},
+                                                                 {0.0, 5.0},
+                                                                 {0.0, 20.0},
+                                                                 {0.0, 90.0}}));
+  const Eigen::Isometry3d T_sensor = street()[kJump].T_world_sensor;
+  const Eigen::Isometry3d T_jump =
+      T_sensor * Eigen::Translation3d(0.6 * metres, 0.8 * metres, 0.0) *
+      Eigen::AngleAxisd(degrees * M_PI / 180.0, Eigen::Vector3d::UnitZ()) * T_sensor.inverse();
+  static const double without = epochs_of(street()).static_share;
+  const Epochs epochs = epochs_of(with_poses(
+      [&](std::size_t i, const Eigen::Isometry3d& T) { return i < kJump ? T : T_jump * T; }));
+  INFO(metres << " m, " << degrees << " deg");
+  const bool is_small = metres < 0.5 && degrees < 2.0;
+  if (!is_small) {
+    CHECK(epochs.scans == std::vector<std::size_t>{kJump});
+    CHECK(epochs.reasons.front() == EpochReason::kJump);
+  }
+  CHECK(epochs.static_share > without - 0.005);
+}
+
+TEST_CASE("exact poses begin no epoch: sparse sensors, two scans a second, lost scans") {
+  using simulation::Scene;
+  using simulation::Sensor;
+  const auto [scene, sensor] = GENERATE(table<Scene, Sensor>({{Scene::kCrowd, Sensor::kLivox},
+                                                              {Scene::kGarage, Sensor::kVlp16},
+                                                              {Scene::kHighway, Sensor::kVlp16},
+                                                              {Scene::kUrban, Sensor::kLivox}}));
+  simulation::Config config;
+  config.scene = scene;
+  config.sensor = sensor;
+  config.scans = 40;
+  config.seed = 61;
+  const std::vector<SimulatedScan> all = simulate(config);
+  std::vector<SimulatedScan> slow, lossy;
+  Random random(4);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (i % 5 == 0) slow.push_back(all[i]);
+    if (random.uniform(0.0, 1.0) > 0.3) lossy.push_back(all[i]);
+  }
+  CHECK(epochs_of(all).scans.empty());
+  CHECK(epochs_of(slow).scans.empty());
+  CHECK(epochs_of(lossy).scans.empty());
+}
+
+TEST_CASE("a push tells why it begins an epoch") {
+  DynaInsRemover::Config config;
+  config.build_map = false;
+  DynaInsRemover remover(config);
+  double time = 0.0;
+  const auto push = [&](std::size_t i, double pause, double shift) {
+    time += pause;
+    const RawPoints<float> points{street()[i].xyzi.data(), street()[i].labels.size(), 4};
+    const Eigen::Isometry3d T = Eigen::Translation3d(shift, 0.0, 0.0) * street()[i].T_world_sensor;
+    return remover.push(points, T, time).began_epoch;
+  };
+  CHECK(push(0, 0.1, 0.0) == EpochReason::kStart);
+  CHECK_FALSE(push(1, 0.1, 0.0));
+  CHECK(push(2, config.max_gap + 0.1, 0.0) == EpochReason::kPause);
+  CHECK(push(3, 0.1, 100.0) == EpochReason::kJump);
+  remover.flush([](const ScanVerdict&) {});
+  CHECK(push(4, 0.1, 100.0) == EpochReason::kStart);
+}
+
+TEST_CASE("a motion is impossible beyond four times gravity, unless such motions are usual") {
+  detail::MotionPrediction motion;
+  const Eigen::Isometry3d T_step(Eigen::Translation3d(1.0, 0.0, 0.0));
+  motion.begin_scan(1.0);
+  CHECK_FALSE(motion.predict(T_step));
+  motion.end_scan(T_step, {});
+  motion.begin_scan(1.1);
+  motion.end_scan(T_step, {});
+  motion.begin_scan(1.3);  // a lost scan: 40 m/s^2 * 0.2 s * 0.15 s, and 0.1 m
+  REQUIRE(motion.predict(T_step));
+  CHECK(motion.predict(T_step)->translation().x() == Approx(3.0));
+  CHECK_FALSE(motion.is_impossible(1.29));
+  CHECK(motion.is_impossible(1.31));
+  for (int i = 0; i < 30; ++i) motion.end_scan(T_step, 1.0);
+  CHECK_FALSE(motion.is_impossible(4.7));
+  CHECK(motion.is_impossible(5.0));
+  motion.clear();
+  CHECK_FALSE(motion.predict(T_step));
+}
+
+TEST_CASE("a motion is scaled along its turn") {
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear() = Eigen::AngleAxisd(0.3, Eigen::Vector3d(0.6, 0.0, 0.8)).toRotationMatrix();
+  T.translation() = Eigen::Vector3d(1.0, -2.0, 0.5);
+  const Eigen::Isometry3d T_double = detail::scaled_motion(T, 2.0);
+  CHECK((T_double.linear() - (T * T).linear()).norm() < 1e-12);
+  CHECK((T_double.translation() - 2.0 * T.translation()).norm() < 1e-12);
+  const Eigen::Isometry3d T_none = detail::scaled_motion(Eigen::Isometry3d::Identity(), 2.0);
+  CHECK((T_none.matrix() - Eigen::Matrix4d::Identity()).norm() == 0.0);
 }
 
 TEST_CASE("a push gives the residual of its pose") {

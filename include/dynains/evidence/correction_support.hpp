@@ -11,7 +11,8 @@
 
 namespace dynains::detail {
 
-/// Estimates the uncertainty of a correction and removes the parts that it may explain.
+/// Tests a correction against its uncertainty, and removes the parts that the uncertainty may
+/// explain.
 ///
 /// The uncertainty is the sum of two covariances: that of the distances (their variance times the
 /// inverse of the normal equations), and that of the choice of surfaces (jackknife: the spread of
@@ -22,20 +23,36 @@ class CorrectionSupport {
   using Vector = NormalEquations::Vector;
   using Matrix = NormalEquations::Matrix;
 
+  /// What is presumed about the pose that is corrected.
+  enum class Prior {
+    kExact,    ///< exact, unless the correction is far from what its uncertainty explains
+    kInexact,  ///< as uncertain as a pose whose errors are known
+  };
+
+  struct Result {
+    Vector step = {};  ///< the part of the correction that is certain
+    /// Whether some direction of the correction shows that the pose is inexact.
+    bool is_significant = false;
+  };
+
+  /// Whether a plane with this z of its unit normal is a wall rather than ground.
+  static bool is_upright(double normal_z) { return std::abs(normal_z) < 0.7; }
+
   /// Forgets all distances.
-  void clear() { sectors_.fill(NormalEquations()); }
+  void clear() {
+    sectors_.fill(NormalEquations());
+    kinds_.fill(NormalEquations());
+  }
 
   /// Adds the distance (m) of a point from its plane, as for NormalEquations. `x`, `y`: the point
   /// in the frame of the sensor.
   void add(float x, float y, const Vector& derivatives, double distance, double weight) {
     sectors_[sector_of(x, y)].add(derivatives, distance, weight);
+    kinds_[is_upright(derivatives[2]) ? 1 : 0].add(derivatives, distance, weight);
   }
 
-  /// Removes from `correction` what its uncertainty may explain, by direction: all of it within
-  /// kDeviations standard deviations. `equations`: those of all added distances,
-  /// with attractions.
-  Vector supported(const Vector& correction, const NormalEquations& equations) const {
-    constexpr double kDeviations = 3.0;
+  /// Tests `correction` by direction. `equations`: those of all added distances, with attractions.
+  Result test(const Vector& correction, const NormalEquations& equations, Prior prior) const {
     Matrix covariance = covariance_of(equations);
     Vector scaled = correction;
     for (std::size_t i = 0; i < 6; ++i) {
@@ -43,21 +60,39 @@ class CorrectionSupport {
       for (std::size_t j = 0; j < 6; ++j) covariance[i][j] *= unit(i) * unit(j);
     }
     const SymmetricEigen<6> eigen = symmetric_eigen<6>(covariance);
-    Vector result = {};
+    Result result;
     for (std::size_t k = 0; k < 6; ++k) {
-      const Vector& direction = eigen.vectors[k];
+      Vector step;
       double along = 0.0;
-      for (std::size_t i = 0; i < 6; ++i) along += direction[i] * scaled[i];
-      const double doubt = kDeviations * kDeviations * std::max(eigen.values[k], 0.0);
-      if (along * along <= doubt) continue;
-      along *= 1.0 - doubt / (along * along);
-      for (std::size_t i = 0; i < 6; ++i) result[i] += along * direction[i] / unit(i);
+      for (std::size_t i = 0; i < 6; ++i) {
+        along += eigen.vectors[k][i] * scaled[i];
+        step[i] = eigen.vectors[k][i] / unit(i);
+      }
+      const double sectors = sectors_that_tell(step);
+      if (sectors < kFewestSectors) continue;
+      const double variance = std::max(eigen.values[k], 0.0);
+      const double deviations = deviations_of_exact(sectors);
+      const bool is_significant = along * along > deviations * deviations * variance;
+      if (is_significant) result.is_significant = true;
+      const bool is_certain = prior == Prior::kExact
+                                  ? is_significant
+                                  : along * along > kDeviations * kDeviations * variance;
+      if (!is_certain) continue;
+      const double kept = 1.0 - kShrink * kShrink * variance / (along * along);
+      for (std::size_t i = 0; i < 6; ++i) result.step[i] += kept * along * step[i];
     }
     return result;
   }
 
  private:
   static constexpr std::size_t kSectors = 32;
+  static constexpr double kFewestSectors = 3.0;
+  static constexpr double kDeviations = 3.0;  // of a step that is certain
+  static constexpr double kShrink = 1.5;      // standard deviations, see James and Stein
+
+  // Standard deviations that show an error of an exact pose. A variance that few sectors tell is
+  // uncertain itself, as in the quantiles of Student's distribution.
+  static double deviations_of_exact(double sectors) { return kDeviations * (1.0 + 6.0 / sectors); }
 
   // Rotations are compared with translations as the movement of a point at this distance.
   static double unit(std::size_t i) {
@@ -74,13 +109,38 @@ class CorrectionSupport {
     return std::min(static_cast<std::size_t>(angle * (kSectors / 4.0)), kSectors - 1);
   }
 
-  Matrix covariance_of(const NormalEquations& all) const {
-    Matrix covariance = {};
+  // Effective number of sectors with information on a step.
+  double sectors_that_tell(const Vector& step) const {
+    double sum = 0.0, squares = 0.0;
+    for (const NormalEquations& sector : sectors_) {
+      const double information = sector.product(step, step);
+      sum += information;
+      squares += information * information;
+    }
+    return squares > 0.0 ? sum * sum / squares : 0.0;
+  }
+
+  // Each kind of surface has its own variance: walls of sparse sensors deviate more than ground.
+  Matrix covariance_of_distances(const NormalEquations& all) const {
+    Matrix inverse;
     for (std::size_t i = 0; i < 6; ++i) {
       Vector one = {};
-      one[i] = all.variance();
-      covariance[i] = all.solve(one);
+      one[i] = 1.0;
+      inverse[i] = all.solve(one);
     }
+    Matrix covariance = {};
+    for (const NormalEquations& kind : kinds_) {
+      for (std::size_t i = 0; i < 6; ++i) {
+        for (std::size_t j = 0; j < 6; ++j) {
+          covariance[i][j] += kind.variance() * kind.product(inverse[i], inverse[j]);
+        }
+      }
+    }
+    return covariance;
+  }
+
+  Matrix covariance_of(const NormalEquations& all) const {
+    Matrix covariance = covariance_of_distances(all);
     // Pairs of adjacent sectors, so that no object is divided. They overlap, so each counts half.
     const Vector step = all.solve();
     for (std::size_t sector = 0; sector < kSectors; ++sector) {
@@ -99,6 +159,7 @@ class CorrectionSupport {
   }
 
   std::array<NormalEquations, kSectors> sectors_;
+  std::array<NormalEquations, 2> kinds_;  // level and upright surfaces
 };
 
 }  // namespace dynains::detail

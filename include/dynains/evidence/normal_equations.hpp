@@ -40,14 +40,19 @@ class NormalEquations {
   /// Mean square of the distances, m^2.
   double variance() const { return squares_ / std::max(weights_, 1e-12); }
 
-  /// Root mean square of the change of the distances by a step, m.
-  double change(const Vector& step) const {
+  /// Product of `a`, the sum of the products of derivatives without attractions, and `b`.
+  double product(const Vector& a, const Vector& b) const {
     double sum = 0.0;
     for (std::size_t i = 0; i < 6; ++i) {
-      for (std::size_t j = 0; j < i; ++j) sum += 2.0 * matrix_[i][j] * step[i] * step[j];
-      sum += matrix_[i][i] * step[i] * step[i];
+      for (std::size_t j = 0; j < i; ++j) sum += matrix_[i][j] * (a[i] * b[j] + a[j] * b[i]);
+      sum += matrix_[i][i] * a[i] * b[i];
     }
-    return std::sqrt(std::max(sum, 0.0) / std::max(weights_, 1e-12));
+    return sum;
+  }
+
+  /// Root mean square of the change of the distances by a step, m.
+  double change(const Vector& step) const {
+    return std::sqrt(std::max(product(step, step), 0.0) / std::max(weights_, 1e-12));
   }
 
   /// Solution. Each unknown must have an attraction.

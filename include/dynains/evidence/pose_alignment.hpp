@@ -48,7 +48,8 @@ struct Alignment {
   /// Root mean square of the change of the distances between points and planes by the supported
   /// step, m. Unlike the change of the pose, it does not grow in directions without information.
   double change = 0.0;
-  double doubt = 0.0;  ///< length of the translation in `found` that is not supported, m
+  bool is_significant = false;  ///< see CorrectionSupport::Result
+  double doubt = 0.0;           ///< length of the translation in `found` that is not supported, m
 };
 
 /// Aligns scans with planes.
@@ -58,10 +59,11 @@ class PlaneAligner {
   void reserve(std::size_t count) { matches_.reserve(count); }
 
   /// Aligns points (m, sensor frame) with planes, from a first estimate of the pose that is wrong
-  /// by at most half a voxel. Directions without information keep the first estimate.
-  Alignment align(PointsView points, VoxelPlanes& planes, const Pose& T_guess) {
+  /// by at most half a voxel. `prior`: what is presumed about it. Directions without information
+  /// keep the first estimate.
+  Alignment align(PointsView points, VoxelPlanes& planes, const Pose& T_guess,
+                  CorrectionSupport::Prior prior) {
     constexpr double kCoarseScales[] = {0.4, 0.25, 0.15, 0.1};  // m, by iteration
-    constexpr std::size_t kCoarseStep = 3;                      // one of so many points
     constexpr double kSmall = 0.01;                             // m, change by one iteration
     constexpr double kScale = 0.06;                             // m
     constexpr int kMostIterations = 3;
@@ -85,7 +87,9 @@ class PlaneAligner {
     }
     count_inliers(result);
     collect_sectors(points, kScale);
-    result.supported = support_.supported(result.found, equations);
+    const CorrectionSupport::Result certain = support_.test(result.found, equations, prior);
+    result.supported = certain.step;
+    result.is_significant = certain.is_significant;
     result.change = equations.change(result.supported);
     result.doubt =
         std::hypot(result.found[0] - result.supported[0], result.found[1] - result.supported[1],
@@ -94,7 +98,21 @@ class PlaneAligner {
     return result;
   }
 
+  /// How well the upright surfaces of a scan fit at a pose: number of points at a small distance
+  /// from an upright plane, of which the points of one plane count as at most 8. Points without a
+  /// plane do not count. `points`: as for align().
+  double upright_fit(PointsView points, VoxelPlanes& planes, const Pose& T) {
+    constexpr double kScale = 0.15;  // m
+    find_planes(points, kCoarseStep, planes, T);
+    double sum = 0.0;
+    weigh_matches(kScale, [&](const Match& match, const auto&, double weight) {
+      if (CorrectionSupport::is_upright(match.plane->normal[2])) sum += weight;
+    });
+    return sum;
+  }
+
  private:
+  static constexpr std::size_t kCoarseStep = 3;  // one of so many points
   // Weights of the first estimate. They decide only in directions without information.
   static constexpr NormalEquations::Vector kAttraction = {0.2, 0.2, 0.2, 100.0, 100.0, 100.0};
 
@@ -138,7 +156,8 @@ class PlaneAligner {
       const double(&n)[3] = match.plane->normal;
       const double(&arm)[3] = match.arm;
       const double loss = scale * scale / (scale * scale + match.distance * match.distance);
-      const double share = kMost / (kMost + static_cast<double>(match.plane->matches));
+      const double most = std::min(kMost, match.plane->points / 3.0);
+      const double share = most / (most + static_cast<double>(match.plane->matches));
       add(match,
           NormalEquations::Vector{n[0], n[1], n[2], arm[1] * n[2] - arm[2] * n[1],
                                   arm[2] * n[0] - arm[0] * n[2], arm[0] * n[1] - arm[1] * n[0]},

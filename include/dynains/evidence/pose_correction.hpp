@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "dynains/evidence/motion_prediction.hpp"
 #include "dynains/evidence/pose_alignment.hpp"
 #include "dynains/evidence/voxel_planes.hpp"
 #include "dynains/points.hpp"
@@ -37,8 +38,15 @@ class PoseCorrection {
     aligner_.reserve(kMostSelected);
   }
 
-  /// Forgets all scans. `T_world_sensor`: pose of the first scan of the next epoch.
+  /// Forgets all scans and the motion. `T_world_sensor`: pose of the first scan of the next epoch.
   void begin_epoch(const Pose& T_world_sensor) {
+    motion_.clear();
+    inexact_scans_ = 0;
+    begin_planes(T_world_sensor);
+  }
+
+  /// As begin_epoch(), after a scan that does not fit to earlier ones: the motion goes on.
+  void begin_planes(const Pose& T_world_sensor) {
     planes_.clear();
     inserted_ = 0;
     T_world_origin_ = T_world_sensor;
@@ -48,21 +56,29 @@ class PoseCorrection {
     correction_.reset();
     offset_.reset();
     open_ = {};
+    fitted_ = 0;
+    usual_inliers_ = 0.0;
     residual_.reset();
     is_doubtful_ = was_left_out_ = false;
   }
 
   /// Pose of a scan for comparisons with other scans. `T_world_level`, `split`: pushed pose and
-  /// points, m. Updates residual() and is_lost().
-  Pose correct(const Pose& T_world_level, const GroundSplit& split) {
+  /// points, m. `time`: s, if known. Updates residual() and misfit().
+  Pose correct(const Pose& T_world_level, const GroundSplit& split,
+                            const std::optional<double>& time = {}) {
     if (!is_active()) return T_world_level;
     residual_.reset();
-    is_lost_ = is_doubtful_ = false;
+    misfit_.reset();
+    is_doubtful_ = false;
     const Pose T_pushed = detail::composed(T_origin_world_, T_world_level);
     const Pose T_guess = offset_ ? detail::composed(*offset_, T_pushed) : T_pushed;
     correction_ = offset_;
     Pose T_newest = T_guess;
-    if (inserted_ > 0) align(split, T_pushed, T_guess, T_newest);
+    motion_.begin_scan(time);
+    if (inserted_ > 0) {
+      align(split, T_pushed, T_guess, T_newest);
+      check_motion(T_newest);
+    }
     T_origin_newest_ = T_newest;
     T_origin_pushed_ = T_pushed;
     return corrected(T_world_level);
@@ -102,9 +118,9 @@ class PoseCorrection {
   /// Result of the last correct(), in the frame of its pose; empty without enough common planes.
   const std::optional<PoseResidual>& residual() const { return residual_; }
 
-  /// Whether the static world of the last scan does not fit to that of the scans before it, so that
-  /// motion and errors of poses cannot be told apart.
-  bool is_lost() const { return is_lost_; }
+  /// Why the static world of the last scan does not fit to that of the scans before it, so that
+  /// motion and errors of poses cannot be told apart; empty if it fits.
+  const std::optional<EpochReason>& misfit() const { return misfit_; }
 
  private:
   using Step = detail::NormalEquations::Vector;
@@ -114,8 +130,11 @@ class PoseCorrection {
   static constexpr std::size_t kFirstInserted = 24000;  // the same for the scans after the first
   static constexpr std::size_t kFirstScans = 5;
   static constexpr std::size_t kFewestMatches = 100;
-  static constexpr double kMostDoubt = 0.1;     // m, of the translation of an inserted scan
-  static constexpr double kLeastInliers = 0.6;  // ratio to the matches
+  static constexpr int kInexactScans = 30;
+  static constexpr double kMostDoubt = 0.1;      // m, of the translation of an inserted scan
+  static constexpr double kLeastInliers = 0.65;  // ratio to the usual share of inliers
+  static constexpr int kFewestFits = 2;          // scans that tell the usual share
+  static constexpr double kLever = 10.0;         // m
   static constexpr double kNearest = 3.0, kFarthest = 50.0;  // m, horizontal
 
   bool is_active() const { return tolerance_ > 0.0; }
@@ -150,23 +169,97 @@ class PoseCorrection {
   void align(const GroundSplit& split, const Pose& T_pushed, const Pose& T_guess, Pose& T_newest) {
     const Step before = open_;
     open_ = {};
-    const detail::Alignment alignment = aligner_.align(select(split), planes_, T_guess);
+    const detail::Alignment alignment = aligner_.align(select(split), planes_, T_guess, prior());
+    if (inexact_scans_ > 0) --inexact_scans_;
     if (alignment.matched < kFewestMatches) return;
-    is_lost_ = static_cast<double>(alignment.inliers) <
-               kLeastInliers * static_cast<double>(alignment.matched);
-    if (is_lost_) return;
-    const Pose T_motion = detail::composed(detail::inverted(T_origin_pushed_), T_pushed);
-    residual_ = difference(detail::composed(T_origin_newest_, T_motion), alignment.T_map_sensor);
+    if (!fits(static_cast<double>(alignment.inliers) / static_cast<double>(alignment.matched))) {
+      misfit_ = EpochReason::kMisfit;
+      return;
+    }
     is_doubtful_ = alignment.doubt > kMostDoubt;
     open_ = alignment.found;
+    Pose T_aligned = alignment.T_map_sensor;
     if (alignment.change > tolerance_) {
-      T_newest = alignment.T_map_sensor;
-      correction_ = detail::composed(T_newest, detail::inverted(T_pushed));
-      const Step lasting = confirmed(alignment.supported, before);
-      offset_ = detail::composed(detail::moved(T_guess, lasting), detail::inverted(T_pushed));
-      for (std::size_t i = 0; i < lasting.size(); ++i) open_[i] -= lasting[i];
+      if (is_credible(alignment, before, T_guess)) {
+        if (alignment.is_significant) inexact_scans_ = kInexactScans;
+        T_newest = T_aligned;
+        correction_ = detail::composed(T_newest, detail::inverted(T_pushed));
+        const Step lasting = confirmed(alignment.supported, before);
+        offset_ = detail::composed(detail::moved(T_guess, lasting), detail::inverted(T_pushed));
+        for (std::size_t i = 0; i < lasting.size(); ++i) open_[i] -= lasting[i];
+      } else {
+        T_aligned = T_guess;
+      }
     }
+    const Pose T_motion =
+        detail::composed(detail::inverted(T_origin_pushed_), T_pushed);
+    residual_ = difference(detail::composed(T_origin_newest_, T_motion), T_aligned);
     residual_->T_previous_newest = detail::composed(detail::inverted(T_origin_newest_), T_newest);
+  }
+
+  // Whether the static world fits, compared with earlier scans of the epoch. `inliers`: ratio to
+  // the matches.
+  bool fits(double inliers) {
+    constexpr double kNewest = 0.2;  // weight
+    const bool is_usual = fitted_ < kFewestFits || inliers >= kLeastInliers * usual_inliers_;
+    if (is_usual) usual_inliers_ += (fitted_ == 0 ? 1.0 : kNewest) * (inliers - usual_inliers_);
+    ++fitted_;
+    return is_usual;
+  }
+
+  // Whether evidence beside the planes of this scan supports a correction: the scan before needs it
+  // as well, or the motion becomes smoother. Small corrections of poses that are known to be
+  // inexact need no more support.
+  bool is_credible(const detail::Alignment& alignment, const Step& before,
+                   const Pose& T_guess) const {
+    const double size = movement(alignment.supported);
+    if (inexact_scans_ > 0 && size <= kMostDoubt) return true;
+    if (2.0 * movement(confirmed(alignment.supported, before)) >= size) return true;
+    const std::optional<Pose> T_predicted = motion_.predict(T_origin_newest_);
+    return T_predicted && movement(difference(*T_predicted, alignment.T_map_sensor)) <
+                              movement(difference(*T_predicted, T_guess));
+  }
+
+  // Movement (m) of a point at a distance of kLever.
+  static double movement(const Step& step) {
+    return std::hypot(std::hypot(step[0], step[1], step[2]),
+                      kLever * std::hypot(step[3], step[4], step[5]));
+  }
+  static double movement(const PoseResidual& residual) {
+    return std::hypot(residual.translation, kLever * residual.rotation * M_PI / 180.0);
+  }
+
+  // Compares the pose of the newest scan with the one that the motion predicts. If only the
+  // predicted one fits to the upright surfaces, or none is possible, the pose has jumped. (Ground
+  // fits anywhere.)
+  void check_motion(const Pose& T_newest) {
+    constexpr double kNear = 0.1, kNearDegrees = 0.5;  // m, deg
+    constexpr double kFewestPoints = 8.0;              // see PlaneAligner::upright_fit()
+    constexpr double kLeastRatio = 0.7;
+    const std::optional<Pose> T_predicted = motion_.predict(T_origin_newest_);
+    std::optional<double> error;
+    if (T_predicted) {
+      const PoseResidual deviation = difference(*T_predicted, T_newest);
+      error = deviation.translation;
+      bool has_jumped = motion_.is_impossible(*error);
+      if (!has_jumped && (*error > kNear || deviation.rotation > kNearDegrees)) {
+        const double expected = aligner_.upright_fit(selected_, planes_, *T_predicted);
+        has_jumped = expected > kFewestPoints &&
+                     aligner_.upright_fit(selected_, planes_, T_newest) < kLeastRatio * expected;
+      }
+      if (has_jumped) misfit_ = EpochReason::kJump;
+    }
+    if (misfit_) {
+      residual_.reset();
+      return;
+    }
+    motion_.end_scan(detail::composed(detail::inverted(T_origin_newest_), T_newest), error);
+  }
+
+  // Poses are presumed to be exact until a correction shows that they are not.
+  detail::CorrectionSupport::Prior prior() const {
+    using Prior = detail::CorrectionSupport::Prior;
+    return inexact_scans_ > 0 ? Prior::kInexact : Prior::kExact;
   }
 
   // The part of a step that an earlier step confirms: the projection of the earlier one, at most
@@ -211,9 +304,13 @@ class PoseCorrection {
   Pose T_origin_newest_ = Pose::Identity();  // corrected
   Pose T_origin_pushed_ = Pose::Identity();  // as pushed
   std::optional<PoseResidual> residual_;
-  bool is_lost_ = false;
-  bool is_doubtful_ = false;   // whether the pose of the last scan may be wrong
-  bool was_left_out_ = false;  // whether the last insert() left its scan out
+  std::optional<EpochReason> misfit_;
+  detail::MotionPrediction motion_;
+  int fitted_ = 0;              // scans of the epoch with an alignment
+  double usual_inliers_ = 0.0;  // ratio to the matches
+  int inexact_scans_ = 0;       // number of next scans whose poses are presumed to be inexact
+  bool is_doubtful_ = false;    // whether the pose of the last scan may be wrong
+  bool was_left_out_ = false;   // whether the last insert() left its scan out
   PointBuffer selected_;
   detail::PlaneAligner aligner_;
 };

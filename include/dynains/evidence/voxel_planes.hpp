@@ -25,6 +25,7 @@ class VoxelPlanes {
     bool is_fitted = false;
     bool is_flat = false;
     std::uint32_t matches = 0;  ///< number of matched points, for alignments
+    double points = 0.0;        ///< number of points of the fit
 
     double distance(const double (&p)[3]) const {
       return normal[0] * (p[0] - mean[0]) + normal[1] * (p[1] - mean[1]) +
@@ -105,7 +106,8 @@ class VoxelPlanes {
   std::size_t size() const { return keys_.size(); }
 
  private:
-  static constexpr double kFewestPoints = 6.0;
+  // Fewer points lie on a plane by chance, for example in foliage.
+  static constexpr double kFewestPoints = 12.0;
   static constexpr double kMostThickness = 0.06;  // m, standard deviation along the normal
   static constexpr double kMostFlatness = 0.04;   // smallest eigenvalue to the sum
   static constexpr double kLeastBreadth = 0.04;   // product of the other two to their squared sum
@@ -161,14 +163,17 @@ class VoxelPlanes {
     plane.is_fitted = true;
     if (moments.sums.count < kFewestPoints) return plane;
     const detail::Plane fitted = detail::fit_plane(moments.sums);
-    const double thickness_squared = fitted.flatness * fitted.spread;
+    // Without the bias: the fit of three parameters takes up a part of the deviations.
+    const double flatness = fitted.flatness * moments.sums.count / (moments.sums.count - 3.0);
+    const double thickness_squared = flatness * fitted.spread;
     return {{fitted.normal_x, fitted.normal_y, fitted.normal_z},
             {centre(key, 0) + fitted.mean_x, centre(key, 1) + fitted.mean_y,
              centre(key, 2) + fitted.mean_z},
             true,
-            fitted.flatness <= kMostFlatness && fitted.breadth >= kLeastBreadth &&
+            flatness <= kMostFlatness && fitted.breadth >= kLeastBreadth &&
                 thickness_squared <= kMostThickness * kMostThickness,
-            0};
+            0,
+            moments.sums.count};
   }
 
   // Keeps the voxels that have received a point in the last scans, at most half of the maximum.

@@ -73,6 +73,9 @@ class ScanDecision {
   /// Alignment of the newest scan with earlier scans, in the level frame.
   virtual std::optional<PoseResidual> pose_residual() const { return std::nullopt; }
 
+  /// Why the newest scan is not compared with earlier scans, although its pose and time allow it.
+  virtual std::optional<EpochReason> misfit() const { return std::nullopt; }
+
   /// Updates the beliefs of map blocks by the newest scan and removes the blocks that are free.
   virtual void revise(Map& /*map*/, const ScanSlot& /*newest*/) {}
   /// Restores the state after construction. Buffers keep their capacity.
@@ -212,6 +215,7 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
   void observe(ScanRing& scans, const ScanWindow& window, StageTimer& timer) override {
     timer.measure(&StageTimes::evidence, [&] {
       const ScanSlot& newest = scans.newest();
+      set_time_in_stage(evidence_, newest.time);
       evidence_.observe(newest.scan, newest.epoch, newest.T_world_level, newest.split,
                         window.newest_cluster_of(), window.cluster_count());
       propagate_ids(scans);
@@ -232,6 +236,7 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
   }
 
   std::optional<PoseResidual> pose_residual() const override { return pose_residual_of(evidence_); }
+  std::optional<EpochReason> misfit() const override { return misfit_of(evidence_); }
   void revise(Map& map, const ScanSlot& newest) override {
     if constexpr (IsRevisable<Map, Evidence>::value) {
       if (!revision_.config().revise_map) return;

@@ -202,7 +202,8 @@ FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Pose& T_world_s
   timer.measure(&StageTimes::revision, [&] { decision_->revise(map_, newest); });
   const bool is_final = finished && finished->scan == newest.scan;
   return {is_final ? *finished : newest_verdict_.verdict(newest), finished, timer.times(),
-          pose_residual(), time_doubt()};
+          pose_residual(), time_doubt(),
+          newest.began_epoch ? newest.began_epoch : decision_->misfit()};
 }
 
 template <class Stages>
@@ -254,7 +255,10 @@ void Pipeline<Stages>::find_sensor(ScanSlot& newest) {
                          needs_sensor(clusterer_);
   if (!is_needed || sensor().known()) return;
   frame_.estimate(ingest_.points());
-  if (sensor().known() && newest.scan > 0) newest.epoch = scans_.start_epoch();
+  if (sensor().known() && newest.scan > 0) {
+    newest.epoch = scans_.start_epoch();
+    newest.began_epoch = EpochReason::kSensor;
+  }
   const SensorModel model = sensor().known() ? sensor() : SensorModel::typical();
   try {
     adapt_stage(ground_, model);

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,7 +25,8 @@ namespace dynains::detail {
 struct ScanSlot {
   std::uint64_t scan = 0;   ///< number of the push, from 0
   std::uint64_t epoch = 0;  ///< only scans of one epoch are compared
-  double time = 0.0;        ///< s
+  std::optional<EpochReason> began_epoch;
+  double time = 0.0;  ///< s
   Pose T_world_sensor = Pose::Identity();
   Pose T_world_level = Pose::Identity();  ///< frame of split.points
 
@@ -101,10 +103,8 @@ class ScanRing {
     ScanSlot& next = (*this)[pushed_];
     next.scan = pushed_;
     next.epoch = epoch_;
-    if (pushed_ > 0) {
-      const double step = distance(T_world_sensor, newest().T_world_sensor);
-      if (config.starts_epoch(time - last_time_, step)) ++next.epoch;
-    }
+    next.began_epoch = reason_to_begin(T_world_sensor, time, config);
+    if (next.began_epoch && *next.began_epoch != EpochReason::kStart) ++next.epoch;
     next.time = time;
     next.T_world_sensor = orthonormalized(T_world_sensor);
     next.T_world_level = next.T_world_sensor;
@@ -126,6 +126,14 @@ class ScanRing {
 
  private:
   friend class PushTransaction;
+
+  std::optional<EpochReason> reason_to_begin(const Pose& T_world_sensor, double time,
+                                             const RemoverConfig& config) {
+    if (pushed_ == 0 || newest().epoch != epoch_) return EpochReason::kStart;
+    const double pause = time - last_time_;
+    if (!config.starts_epoch(pause, distance(T_world_sensor, newest().T_world_sensor))) return {};
+    return pause > config.max_gap ? EpochReason::kPause : EpochReason::kJump;
+  }
 
   void validate_time(double time) const {
     if (std::isfinite(time) && (pushed_ == 0 || time > last_time_)) return;

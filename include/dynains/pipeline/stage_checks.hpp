@@ -160,6 +160,14 @@ void reserve_stage(Stage& stage, std::size_t scans) {
   if constexpr (Offers<Reserve, Stage>::value) stage.reserve(scans);
 }
 
+/// Calls the optional member `set_time(double time)` of a stage: the time (s) of the next scan.
+template <class Stage>
+using SetTime = decltype(std::declval<Stage&>().set_time(0.0));
+template <class Stage>
+void set_time_in_stage(Stage& stage, double time) {
+  if constexpr (Offers<SetTime, Stage>::value) stage.set_time(time);
+}
+
 /// Result of the optional member `pose_residual()` of a stage; empty without it.
 template <class Stage>
 using HasPoseResidual = decltype(std::declval<const Stage&>().pose_residual());
@@ -167,6 +175,18 @@ template <class Stage>
 std::optional<PoseResidual> pose_residual_of(const Stage& stage) {
   if constexpr (Offers<HasPoseResidual, Stage>::value) {
     return stage.pose_residual();
+  } else {
+    return std::nullopt;
+  }
+}
+
+/// Result of the optional member `misfit()` of a stage; empty without it.
+template <class Stage>
+using HasMisfit = decltype(std::declval<const Stage&>().misfit());
+template <class Stage>
+std::optional<EpochReason> misfit_of(const Stage& stage) {
+  if constexpr (Offers<HasMisfit, Stage>::value) {
+    return stage.misfit();
   } else {
     return std::nullopt;
   }
