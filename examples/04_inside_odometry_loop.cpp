@@ -30,9 +30,7 @@ Eigen::Isometry3d register_motion(const Cloud& /*scan*/) {
 
 int main() {
   using dynains::PointLabel;
-  dynains::DynaInsRemover::Config config;
-  config.build_map = false;  // pushed poses are not final, and an odometry has its own map
-  dynains::DynaInsRemover remover(config);
+  dynains::DynaInsRemover remover(dynains::DynaInsRemover::Config::odometry());
   Eigen::Isometry3d T_odometry = Eigen::Isometry3d::Identity();      // poses of the odometry alone
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();  // corrected
   Cloud map;  // replaces the map of the odometry

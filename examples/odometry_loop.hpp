@@ -24,7 +24,7 @@ class RefinedOdometry {
   };
 
   explicit RefinedOdometry(Register odometry)
-      : odometry_(std::move(odometry)), remover_(without_map()) {}
+      : odometry_(std::move(odometry)), remover_(dynains::DynaInsRemover::Config::odometry()) {}
 
   /// Takes the next scan. `time`: s.
   Result push(const Points& scan, double time) {
@@ -44,13 +44,6 @@ class RefinedOdometry {
   }
 
  private:
-  static dynains::DynaInsRemover::Config without_map() {
-    dynains::DynaInsRemover::Config config;
-    config.build_map = false;                // pushed poses are not final
-    config.evidence.pose_tolerance = 0.003;  // m; small errors of single motions count, too
-    return config;
-  }
-
   Register odometry_;
   dynains::DynaInsRemover remover_;
   Eigen::Isometry3d T_odometry_last_ = Eigen::Isometry3d::Identity();

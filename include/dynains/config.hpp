@@ -76,6 +76,8 @@ Config paper_config() {
 
 template <class Config>
 using Offline = decltype(Config::offline());
+template <class Config>
+using Odometry = decltype(Config::odometry());
 
 }  // namespace detail
 
@@ -236,6 +238,18 @@ struct PipelineConfig : RemoverConfig {
     using EvidenceConfig = decltype(config.evidence);
     if constexpr (detail::Offers<detail::Offline, EvidenceConfig>::value) {
       config.evidence = EvidenceConfig::offline();
+    }
+    return config;
+  }
+
+  /// For the loop around an odometry: corrects motions from 3 mm on, and builds no map, since the
+  /// pushed poses are not final.
+  static PipelineConfig odometry() {
+    PipelineConfig config;
+    config.build_map = false;
+    using EvidenceConfig = decltype(config.evidence);
+    if constexpr (detail::Offers<detail::Odometry, EvidenceConfig>::value) {
+      config.evidence = EvidenceConfig::odometry();
     }
     return config;
   }

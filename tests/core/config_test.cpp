@@ -89,6 +89,9 @@ TEST_CASE("cells of a descriptor are bounded, since a cluster may reach all arou
 TEST_CASE("the presets are valid, and the offline one differs by its later scans alone") {
   CHECK_NOTHROW(Config().validate());
   CHECK_NOTHROW(Config::offline().validate());
+  CHECK_NOTHROW(Config::odometry().validate());
+  CHECK_FALSE(Config::odometry().build_map);
+  CHECK(Config::odometry().evidence.pose_tolerance < Config().evidence.pose_tolerance);
   std::set<std::string> differing;
   const auto defaults = fields_of(Config()), offline = fields_of(Config::offline());
   for (std::size_t i = 0; i < defaults.size(); ++i) {

@@ -88,10 +88,10 @@ FreeSpaceConfig every_scan_a_reference() {
   return config;
 }
 
-TEST_CASE("only compact instances are presumed to move, from the first scan of an epoch on") {
+TEST_CASE("only compact instances are presumed to move, from the sixth scan of an epoch on") {
   struct Case {
     float length, height;
-    std::size_t scan = 2;
+    std::size_t scan = 5;
     std::size_t begin = 0;  // of its epoch
     bool presumed = false;
   };
@@ -110,11 +110,12 @@ TEST_CASE("only compact instances are presumed to move, from the first scan of a
     return at_once == Causes{Cause::kPresumed};
   };
   for (const Case& c : {
-           Case{2.0F, 1.5F, 2, 0, true}, Case{2.0F, 1.5F, 0, 0, true}, Case{2.0F, 1.5F, 5, 5, true},
-           Case{14.7F, 1.5F, 2, 0, true}, Case{15.6F, 1.5F, 2, 0, false},
-           Case{2.0F, 3.4F, 2, 0, true}, Case{2.0F, 4.1F, 2, 0, false},
-           Case{0.75F, 0.1F, 2, 0, false},  // twelve points of one supervoxel: four samples
-           Case{0.78F, 0.1F, 2, 0, true},   // one more point in another supervoxel: five samples
+           Case{2.0F, 1.5F, 4, 0, false}, Case{2.0F, 1.5F, 5, 0, true},
+           Case{2.0F, 1.5F, 9, 5, false}, Case{2.0F, 1.5F, 10, 5, true},
+           Case{14.7F, 1.5F, 5, 0, true}, Case{15.6F, 1.5F, 5, 0, false},
+           Case{2.0F, 3.4F, 5, 0, true}, Case{2.0F, 4.1F, 5, 0, false},
+           Case{0.75F, 0.1F, 5, 0, false},  // twelve points of one supervoxel: four samples
+           Case{0.78F, 0.1F, 5, 0, true},   // one more point in another supervoxel: five samples
        }) {
     CAPTURE(c.length, c.height, c.scan, c.begin);
     CHECK(is_presumed(c) == c.presumed);
@@ -257,12 +258,12 @@ TEST_CASE("the part of a removed instance that was not seen free still contests 
 
 TEST_CASE("returns of a static object contest, even if it was presumed to move") {
   Watch watch(every_scan_a_reference());
-  for (int i = 0; i < 2; ++i) watch.see(PointBuffer(), PointBuffer());
+  for (int i = 0; i < 5; ++i) watch.see(PointBuffer(), PointBuffer());
   watch.see(car(), PointBuffer());
-  CHECK(watch.causes(2, false) == Causes{Cause::kPresumed});
+  CHECK(watch.causes(5, false) == Causes{Cause::kPresumed});
   for (int i = 0; i < 4; ++i) watch.see(car(), PointBuffer());
-  CHECK(watch.causes(2) == Causes{Cause::kOccupied});
-  CHECK(watch.causes(6) == Causes{Cause::kOccupied});
+  CHECK(watch.causes(5) == Causes{Cause::kOccupied});
+  CHECK(watch.causes(9) == Causes{Cause::kOccupied});
 }
 
 }  // namespace

@@ -49,6 +49,13 @@ struct FreeSpaceConfig {
     return config;
   }
 
+  /// For an odometry, whose map shows errors of millimetres.
+  static FreeSpaceConfig odometry() {
+    FreeSpaceConfig config;
+    config.pose_tolerance = 0.003;
+    return config;
+  }
+
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
     visit_visibility(self, visitor);
@@ -141,10 +148,10 @@ struct FreeSpaceConfig {
     visitor(Parameter{"ignore_dynamic_returns", self.ignore_dynamic_returns, Bounds(), "",
                       "returns of surely dynamic points neither count as hits nor as lateral or "
                       "3x3 protection"});
-    visitor(
-        Parameter{"presume_dynamic", self.presume_dynamic, Bounds(), "",
-                  "the zero-latency verdict removes compact instances at places without "
-                  "earlier evidence, from the first scan on; no effect with lookahead_scans 0"});
+    visitor(Parameter{
+        "presume_dynamic", self.presume_dynamic, Bounds(), "",
+        "the zero-latency verdict removes compact instances at places without "
+        "earlier evidence, from the sixth scan of an epoch on; no effect with lookahead_scans 0"});
   }
 };
 
