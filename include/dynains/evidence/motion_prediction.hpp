@@ -25,7 +25,7 @@ class MotionPrediction {
 
   /// Pose of the scan if the motion went on, from the pose of the scan before. Empty if no motion
   /// is known.
-  std::optional<Eigen::Isometry3d> predict(const Eigen::Isometry3d& T_map_before) const {
+  std::optional<Pose> predict(const Pose& T_map_before) const {
     if (!T_before_newest_ || !(period_before_ > 0.0)) return std::nullopt;
     const double ratio = std::min(period_ / period_before_, kMostRatio);
     return composed(T_map_before, scaled_motion(*T_before_newest_, ratio));
@@ -39,7 +39,7 @@ class MotionPrediction {
   }
 
   /// Ends a scan. `distance`: from the predicted pose, m, if there was one.
-  void end_scan(const Eigen::Isometry3d& T_before_newest, const std::optional<double>& distance) {
+  void end_scan(const Pose& T_before_newest, const std::optional<double>& distance) {
     constexpr double kNewest = 0.1;  // weight
     T_before_newest_ = T_before_newest;
     if (distance) usual_ += kNewest * (*distance - usual_);
@@ -52,7 +52,7 @@ class MotionPrediction {
   static constexpr double kOutlier = 5.0;        // ratio to the usual distance
   static constexpr double kMostRatio = 10.0;
 
-  std::optional<Eigen::Isometry3d> T_before_newest_;
+  std::optional<Pose> T_before_newest_;
   double time_ = 0.0, period_ = 0.0, period_before_ = 0.0;  // s
   double usual_ = 0.0;                                      // m, of the distances
 };
