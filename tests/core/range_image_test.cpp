@@ -142,7 +142,9 @@ class ReferenceImage {
     }
     const int here = cells_[at(row, column)];
     if (!is_between_beams(row, column)) return is_moving(here) ? here : RangeImage::kBeyond;
-    if (count < 2) return is_moving(here) ? here : RangeImage::kUnknown;
+    if (count < 2 || !is_crossed(row, column)) {
+      return is_moving(here) ? here : RangeImage::kUnknown;
+    }
     return is_moving(here) ? std::min(least, here) : least;
   }
   std::size_t at(int row, int column) const {
@@ -168,6 +170,14 @@ class ReferenceImage {
   bool is_between_beams(int row, int column) const {
     const bool both_sides = has_return(row - 1, column) && has_return(row + 1, column);
     return both_sides || (row <= grid_.last_inner_row && has_return(row, column));
+  }
+
+  // The cell, or both cells beside it, have a return.
+  bool is_crossed(int row, int column) const {
+    const auto returns = [&](int c) {
+      return cells_[at(row, (c + grid_.columns) % grid_.columns)] != kNothing;
+    };
+    return returns(column) || (returns(column - 1) && returns(column + 1));
   }
 
   // The 3x3 cells.
@@ -405,6 +415,40 @@ TEST_CASE(
     INFO("sample " << i);
     CHECK(visibility.is_free(i) == (free[i] != 0));
     CHECK(visibility.is_hit(i) == (hit[i] != 0));
+  }
+}
+
+// Beams of a sparse sensor pass beside a pole, and none ends at it.
+TEST_CASE("a place is free only if a beam crosses its cell, or both cells beside it") {
+  const RangeImageGrid grid = small_grid();
+  const double cell = 2.0 * M_PI / grid.columns;
+  struct Case {
+    const char* beams;
+    std::vector<int> columns;  // of the beams, relative to that of the sample
+    bool free;
+  };
+  for (const Case& c : {Case{"one side", {-1}, false}, Case{"both sides", {-1, 1}, true},
+                        Case{"through it", {0}, true}, Case{"farther beside", {-2, 2}, false}}) {
+    PointBuffer wall;
+    for (const int column : c.columns) {
+      const double azimuth = (column + 0.5) * cell;
+      for (const double elevation : {-0.8, -0.4, 0.0, 0.4, 0.8}) {
+        wall.push_back(static_cast<float>(30.0 * std::cos(azimuth)),
+                       static_cast<float>(30.0 * std::sin(azimuth)),
+                       static_cast<float>(30.0 * std::tan(elevation / kDegrees)));
+      }
+    }
+    RangeImage image;
+    RangeImage::Scratch scratch;
+    image.build(grid, PointsView(), wall, {}, 0.0F, scratch);
+    PointBuffer pole;
+    pole.push_back(static_cast<float>(5.0 * std::cos(0.5 * cell)),
+                   static_cast<float>(5.0 * std::sin(0.5 * cell)), 0.0F);
+    pole.resize(1 + detail::kPackWidth);
+    detail::Visibility visibility;
+    detail::test_visibility(image, Eigen::Isometry3d::Identity(), pole, 1, 0.25F, 0.0F, visibility);
+    INFO(c.beams);
+    CHECK(visibility.is_free(0) == c.free);
   }
 }
 

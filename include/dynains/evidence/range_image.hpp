@@ -27,8 +27,9 @@ class RangeImage {
     /// nearest return in this cell; without a return, kNothing.
     std::int16_t nearest;
     /// Range of the nearest return in the 3x3 cells, except returns of moving points in the eight
-    /// outer cells. kUnknown if fewer than two cells have such a return; kBeyond if the cell may
-    /// lie beyond the outermost beam.
+    /// outer cells. kUnknown if fewer than two cells have such a return, or if no beam crosses the
+    /// cell: neither it nor both cells beside it have a return. kBeyond if the cell may lie beyond
+    /// the outermost beam.
     std::int16_t around;
   };
   static constexpr std::int16_t kMoving = 1;  ///< bit that is set in ranges of moving points
@@ -290,10 +291,10 @@ class RangeImage {
     }
   }
 
-  // Writes one row of cells. A cell is unknown if its 3x3 cells have a single static return, unless
-  // this is the return of a near object. A cell lies beyond the outermost beam if only rows on one
-  // side have returns. In the row of the highest beam and above, its own row is not enough, because
-  // a slanted surface a little above that beam is much nearer than its return.
+  // Writes one row of cells. A cell is unknown if its 3x3 cells have a single static return, or if
+  // no beam crosses it, unless near objects protect it. A cell lies beyond the outermost beam if
+  // only rows on one side have returns. In the row of the highest beam and above, its own row is
+  // not enough, because a slanted surface a little above that beam is much nearer than its return.
   template <class Short>
   void store_row(const RangeImageGrid& grid, const ProtectionLimits& limits, std::size_t row,
                  const Scratch& scratch) {
@@ -324,14 +325,16 @@ class RangeImage {
           Short::load(row_bits - 1) | Short::load(row_bits) | Short::load(row_bits + 1);
       const Short is_between = ((bits & same) == same) | ((bits & both_sides) == both_sides);
       const Short here = Short::load(middle + column);
+      const Short is_crossed = (here < nothing) | ((Short::load(middle + column - 1) < nothing) &
+                                                   (Short::load(middle + column + 1) < nothing));
+      const Short known = (returns < one_return) & is_between & is_crossed;
       Short alone = unknown;
-      const Short guarded = select(is_between, returns == one_return, is_moving(here));
+      const Short guarded = select(is_between, ~known, is_moving(here));
       if (guarded.any()) {
         const Short object = min(min(least_object(row - 1, column), least_object(row, column)),
                                  least_object(row + 1, column));
         alone = select(guarded & (object < near), object, unknown);
       }
-      const Short known = (returns < one_return) & is_between;
       const Short staying = select(known, least_of_three(leasts + column), alone);
       // A moving point in the cell itself occludes the points behind it.
       const Short hiding = min(select(staying < zero, nothing, staying), here);
