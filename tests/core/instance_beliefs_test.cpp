@@ -92,13 +92,13 @@ TEST_CASE("one reference changes the belief of a supervoxel by one of three step
            Case{4, {4, 0}, 2.0F * kFreeStep, kNone},  // wholly free
            Case{10, {9, 1}, kFreeStep, kNone},        // 0.9 is not more than 0.9
            Case{20, {19, 1}, 2.0F * kFreeStep, kNone},
-           Case{5, {3, 2}, kFreeStep, kNone},          // 0.6 raises the belief
-           Case{9, {5, 4}, 0.0F, kNone},               // 0.56 does not change the belief
-           Case{10, {2, 0}, 2.0F * kFreeStep, kNone},  // two of ten are enough
-           Case{10, {1, 0}, 0.0F, kNone},              // one is not
-           Case{10, {3, 7}, 0.0F, kOccupied},          // one is not enough
-           Case{9, {3, 6}, 0.0F, kNone},               // 0.33 is not
-           Case{4, {0, 2}, 0.0F, kOccupied},           // two hits
+           Case{5, {3, 2}, kFreeStep, kNone},         // 0.6 raises the belief
+           Case{9, {5, 4}, 0.0F, kNone},              // 0.56 does not change the belief
+           Case{8, {2, 0}, 2.0F * kFreeStep, kNone},  // two of eight are enough
+           Case{8, {1, 0}, 0.0F, kNone},              // one is not
+           Case{10, {3, 7}, 0.0F, kOccupied},         // one is not enough
+           Case{9, {3, 6}, 0.0F, kNone},              // 0.33 is not
+           Case{4, {0, 2}, 0.0F, kOccupied},          // two hits
            Case{4, {0, 1}, 0.0F, kContested},  // a single hit of several samples may be chance
            Case{1, {0, 1}, 0.0F, kOccupied},   // the only sample is hit
            Case{12, {0, 3}, 0.0F, kOccupied},  // a quarter of many
@@ -160,6 +160,54 @@ TEST_CASE("references before and after a scan do not add up, but the higher side
   CHECK(scan.is_free());
 }
 
+TEST_CASE(
+    "free samples of an instance that is mostly hit count half, and later hits take them back") {
+  const std::vector<Scan::Seen> standing = {{0, 5}, {0, 12}}, part = {{5, 0}, {0, 12}},
+                                more = {{5, 0}, {0, 11}};  // 0.29 and 0.31 of the instance
+  Scan left(Instances{{5, 12}});
+  left.see(standing);
+  left.see(more);
+  left.see(more);
+  CHECK(left.belief().peak == Approx(4.0F * kFreeStep));
+  left.see(standing);
+  CHECK(left.is_free());
+
+  Scan stands(Instances{{5, 12}});
+  stands.see(standing);
+  stands.see(part);
+  stands.see(part);
+  CHECK(stands.belief().level == Approx(2.0F * kFreeStep));
+  CHECK_FALSE(stands.is_free());
+  stands.see(part);
+  CHECK(stands.is_free());
+  CHECK(stands.belief().peak == 0.0F);
+  stands.see(standing);
+  CHECK_FALSE(stands.is_free());
+
+  Scan merged(Instances{{5, 12}});  // somebody who left a wall
+  merged.beliefs.merged[0] = 1;
+  merged.see(standing);
+  merged.see(part);
+  merged.see(part);
+  CHECK(merged.belief().peak == Approx(4.0F * kFreeStep));
+
+  // Five of 20 samples are enough for the whole, four are not.
+  for (const std::size_t seen : {4U, 5U}) {
+    Scan partly(Instances{{5, 15}});
+    partly.see({{seen, 0}, {0, 0}});
+    CHECK(partly.belief().peak == Approx(seen == 5 ? 2.0F * kFreeStep : 0.0F));
+    CHECK(partly.belief().level == Approx(seen == 5 ? 2.0F * kFreeStep : kFreeStep));
+  }
+
+  // References on the other side of time take nothing back.
+  stands.see(part);
+  stands.see(part);
+  CHECK(stands.is_free());
+  stands.updater.begin_other_side(stands.samples, stands.beliefs);
+  stands.see(standing);
+  CHECK(stands.is_free());
+}
+
 TEST_CASE("an instance is removed if a fifth of its known samples moved") {
   Scan enough(Instances{{2, 8}});
   enough.see({{2, 0}, {0, 8}});
@@ -200,11 +248,13 @@ Scan scan_of_layers(std::size_t per_layer) {
   return scan;
 }
 
-// Some supervoxels are free in two references, and may be hit in another one. All others are hit.
+// All supervoxels are hit. Then two references see some of them free and hit one other. All may be
+// hit again.
 void see_free_and_hit(Scan& scan, const std::vector<std::size_t>& free, bool again) {
-  std::vector<Scan::Seen> seen(scan.samples.supervoxel_count(), {0, 4});
-  scan.see(seen);
+  std::vector<Scan::Seen> seen(scan.samples.supervoxel_count(), {0, 0});
+  scan.see(std::vector<Scan::Seen>(seen.size(), {0, 4}));
   for (const std::size_t s : free) seen[s] = {4, 0};
+  std::find_if(seen.begin(), seen.end(), [](const Scan::Seen& s) { return s.free == 0; })->hit = 4;
   scan.see(seen);
   scan.see(seen);
   if (again) scan.see(std::vector<Scan::Seen>(seen.size(), {0, 4}));
@@ -275,7 +325,7 @@ TEST_CASE("an instance with few known samples in its lower half is removed by th
     std::vector<Scan::Seen> hit = seen;
     hit[1].hit = is_known ? 4 : 0;
     scan.see(hit);
-    std::vector<Scan::Seen> free = hit;
+    std::vector<Scan::Seen> free(8, {0, 0});
     free[4] = free[5] = {4, 0};
     scan.see(free);
     scan.see(free);
@@ -389,10 +439,10 @@ void add_slowly(const InstanceSamples& samples, const std::vector<BeamResult>& v
                                          visibility.begin() + static_cast<std::ptrdiff_t>(end),
                                          result));
   };
-  const auto add = [&](Belief& belief, float share, bool raises, bool lowers) {
+  const auto add = [&](Belief& belief, float share, bool stands, bool raises, bool lowers) {
     if (raises) {
-      belief.level += share > 0.9F ? 2.0F * increment : increment;
-      belief.peak = std::max(belief.peak, belief.level);
+      belief.level += (share > 0.9F ? 2.0F : 1.0F) * (stands ? 0.5F : 1.0F) * increment;
+      if (!stands) belief.peak = std::max(belief.peak, belief.level);
     } else if (lowers) {
       belief.contested = 1;
       if (belief.level > 0.0F) belief.hit_again = 1;
@@ -406,7 +456,14 @@ void add_slowly(const InstanceSamples& samples, const std::vector<BeamResult>& v
                 hit = count(begin, end, BeamResult::kHit);
     if (free + hit == 0.0F) continue;
     const float share = free / (free + hit);
-    add(supervoxels[s], share, free >= 0.15F * size && share >= 0.6F, share <= 0.3F);
+    const std::uint32_t instance = samples.instance_of[s];
+    const std::size_t first = samples.sample_begin[samples.supervoxel_begin[instance]];
+    const std::size_t last = samples.sample_begin[samples.supervoxel_begin[instance + 1]];
+    const float all_free = count(first, last, BeamResult::kFree);
+    const float all_seen = all_free + count(first, last, BeamResult::kHit);
+    const bool stands =
+        all_seen < 0.25F * static_cast<float>(last - first) || all_free / all_seen <= 0.3F;
+    add(supervoxels[s], share, stands, free >= 0.15F * size && share >= 0.6F, share <= 0.3F);
     if (share <= 0.3F && hit >= std::min(2.0F, size) && 4.0F * hit >= size) {
       supervoxels[s].occupied = 1;
     }
@@ -418,7 +475,7 @@ void add_slowly(const InstanceSamples& samples, const std::vector<BeamResult>& v
                 hit = count(begin, end, BeamResult::kHit);
     if (free + hit < std::max(2.0F, 0.25F * static_cast<float>(end - begin))) continue;
     const float share = free / (free + hit);
-    add(wholes[i], share, share >= 0.6F, share <= 0.3F);
+    add(wholes[i], share, false, share >= 0.6F, share <= 0.3F);
   }
 }
 
@@ -437,7 +494,10 @@ TEST_CASE("beliefs equal those of the slow reference sum") {
     for (int reference = 0; reference < 24; ++reference) {
       if (reference == 12) {
         scan.updater.begin_other_side(scan.samples, scan.beliefs);
-        for (Belief& belief : supervoxels) belief.level = 0.0F;
+        for (Belief& belief : supervoxels) {
+          belief.peak = std::max(belief.peak, belief.level);
+          belief.level = 0.0F;
+        }
         for (Belief& belief : wholes) belief.level = 0.0F;
       }
       // Whole supervoxels often have equal results.

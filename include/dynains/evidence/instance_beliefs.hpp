@@ -21,11 +21,13 @@ struct InstanceBeliefs {
   /// Log-odds that a supervoxel or a whole instance was free, a detail::FreeSpaceSum. Thin objects,
   /// which some beams pass, have too many hits for the sum to grow.
   struct Belief {
-    float level = 0.0F;          ///< log-odds by the references of one side of time, >= 0
-    float peak = 0.0F;           ///< maximum of `level`, over both sides of time
+    float level = 0.0F;  ///< log-odds by the references of one side of time, >= 0
+    float peak = 0.0F;   ///< maximum of `level` that hits cannot take back, over both sides of time
     std::uint8_t contested = 0;  ///< 1 after a reference with mostly hits
     std::uint8_t occupied = 0;   ///< 1 after a reference with hits on enough samples
     std::uint8_t hit_again = 0;  ///< 1 after a reference with mostly hits while `level` > 0
+
+    float highest() const { return std::max(peak, level); }
   };
   /// Numbers of samples of an instance, or of a part of it.
   struct Counts {
@@ -37,6 +39,7 @@ struct InstanceBeliefs {
   std::vector<Belief> supervoxels;
   std::vector<Belief> wholes;         ///< by instance: belief on all its samples together
   std::vector<Counts> counts;         ///< by instance
+  std::vector<std::uint8_t> merged;   ///< by instance: 1 if larger than one object; the caller's
   std::vector<std::uint64_t> open;    ///< bit by sample: a hit may change its supervoxel's belief
   std::vector<std::uint8_t> changed;  ///< by instance: 1 if a belief changed; the caller resets it
 };
@@ -70,6 +73,7 @@ class InstanceBeliefUpdater {
     out.supervoxels.assign(samples.supervoxel_count(), Belief());
     out.wholes.assign(instances, Belief());
     out.changed.assign(instances, 1);
+    out.merged.assign(instances, 0);
     out.counts.resize(instances);
     for (std::size_t instance = 0; instance < instances; ++instance) {
       out.counts[instance] = {samples.count(instance), 0, 0};
@@ -82,6 +86,7 @@ class InstanceBeliefUpdater {
     for (std::uint32_t s = 0; s < beliefs.supervoxels.size(); ++s) {
       Belief& belief = beliefs.supervoxels[s];
       if (belief.occupied != 0 && belief.level > 0.0F) flip_open(samples, s, beliefs);
+      belief.peak = belief.highest();
       belief.level = 0.0F;
     }
     for (Belief& belief : beliefs.wholes) belief.level = 0.0F;
@@ -94,13 +99,13 @@ class InstanceBeliefUpdater {
               InstanceBeliefs& beliefs, OnHit&& on_hit) {
     // AVX2 processors have instructions that find and count bits.
     detail::run_packs([&](auto) {
-      update_supervoxels(samples, visibility, beliefs);
       update_wholes(samples, visibility, beliefs, on_hit);
+      update_supervoxels(samples, visibility, beliefs);
     });
   }
 
   bool is_free(const Belief& belief) const {
-    return belief.peak >= (belief.contested != 0 ? contested_level_ : free_level_);
+    return belief.highest() >= (belief.contested != 0 ? contested_level_ : free_level_);
   }
 
   /// Whether an instance is dynamic as a whole: its belief as a whole reaches the threshold, or
@@ -127,6 +132,7 @@ class InstanceBeliefUpdater {
 
  private:
   static constexpr float kLeastVisible = 0.25F;       // ratio of visible samples of an instance
+  static constexpr float kPartWeight = 0.5F;          // of a reference that passes a small part
   static constexpr float kLeastFree = 0.15F;          // ratio of free samples of a supervoxel
   static constexpr std::uint32_t kLeastBody = 12;     // decided samples of the lower half
   static constexpr float kContradictingHits = 0.85F;  // ratio of hits to visible samples
@@ -219,10 +225,11 @@ class InstanceBeliefUpdater {
     Belief& belief = beliefs.supervoxels[s];
     const bool was_open = is_open(belief);
     const Counts before = counts_of(belief, end - begin);
-    const bool changed = update(belief, visibility.count(begin, end), end - begin);
+    const std::uint32_t instance = samples.instance_of[s];
+    const bool changed =
+        update(belief, visibility.count(begin, end), end - begin, may_stand_[instance] != 0);
     if (is_open(belief) != was_open) flip_open(samples, s, beliefs);
     if (!changed) return;
-    const std::uint32_t instance = samples.instance_of[s];
     Counts& counts = beliefs.counts[instance];
     const Counts now = counts_of(belief, end - begin);
     counts.moved += now.moved - before.moved;
@@ -245,7 +252,8 @@ class InstanceBeliefUpdater {
   // Updates the beliefs on whole instances.
   template <class OnHit>
   void update_wholes(const InstanceSamples& samples, const detail::Visibility& visibility,
-                     InstanceBeliefs& beliefs, OnHit&& on_hit) const {
+                     InstanceBeliefs& beliefs, OnHit&& on_hit) {
+    detail::grow(may_stand_, samples.instance_count());
     std::uint32_t end = 0;
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
       const std::uint32_t begin = end;
@@ -253,12 +261,15 @@ class InstanceBeliefUpdater {
       const detail::Visibility::Count all = visibility.count(begin, end);
       const auto count = static_cast<float>(end - begin);
       const auto visible = static_cast<float>(all.free + all.hit);
-      if (visible < std::max(2.0F, kLeastVisible * count)) continue;
-      const float free_ratio = static_cast<float>(all.free) / visible;
+      const float least = kLeastVisible * count;
+      const float free_ratio = visible >= least ? static_cast<float>(all.free) / visible : 0.0F;
+      const bool is_hit = free_ratio <= detail::FreeSpaceSum::kHitRatio;
+      may_stand_[instance] = is_hit && beliefs.merged[instance] == 0 ? 1 : 0;
+      if (visible < std::max(2.0F, least)) continue;
       if (free_ratio >= pass_ratio_) {
         raise(beliefs.wholes[instance], free_ratio);
         beliefs.changed[instance] = 1;
-      } else if (free_ratio <= detail::FreeSpaceSum::kHitRatio) {
+      } else if (is_hit) {
         lower(beliefs.wholes[instance]);
         beliefs.changed[instance] = 1;
         const auto hits = static_cast<float>(all.hit);
@@ -271,14 +282,21 @@ class InstanceBeliefUpdater {
 
   // Updates the belief on a supervoxel by one reference (Eq. 15), with `samples` samples and at
   // least one visible sample. No change if the ratio of free to visible samples lies between the
-  // limits of FreeSpaceSum, or if few samples are free. A single hit sets `contested`, but not
-  // `occupied`. Returns whether a verdict may change.
-  bool update(Belief& belief, detail::Visibility::Count visible, std::uint32_t samples) const {
+  // limits of FreeSpaceSum, or if few samples are free. `may_stand`: the reference mostly hits the
+  // instance or sees little of it, and it is not larger than one object. Its free samples may then
+  // lie at an edge of a standing object: they count half, and later hits take them back. A single
+  // hit sets `contested`, but not `occupied`. Returns whether a verdict may change.
+  bool update(Belief& belief, detail::Visibility::Count visible, std::uint32_t samples,
+              bool may_stand) const {
     const auto free = static_cast<float>(visible.free);
     const float free_ratio = free / static_cast<float>(visible.free + visible.hit);
     if (free >= kLeastFree * static_cast<float>(samples) &&
         free_ratio >= detail::FreeSpaceSum::kFreeRatio) {
-      raise(belief, free_ratio);
+      if (may_stand) {
+        sum_.raise(belief.level, free_ratio, kPartWeight);
+      } else {
+        raise(belief, free_ratio);
+      }
       return true;
     }
     if (visible.hit == 0 || free_ratio > detail::FreeSpaceSum::kHitRatio) return false;
@@ -287,7 +305,7 @@ class InstanceBeliefUpdater {
     const std::uint32_t least_hits = (samples + kSamplesPerHit - 1) / kSamplesPerHit;
     if (visible.hit >= std::max(std::min(2U, samples), least_hits)) belief.occupied = 1;
     return belief.contested != before.contested || belief.occupied != before.occupied ||
-           belief.hit_again != before.hit_again;
+           belief.hit_again != before.hit_again || belief.level != before.level;
   }
 
   void raise(Belief& belief, float free_ratio) const {
@@ -307,7 +325,9 @@ class InstanceBeliefUpdater {
   float free_level_;
   float contested_level_;
   float whole_level_;
-  std::vector<std::uint32_t> touched_;  // supervoxels that the current reference can change
+  std::vector<std::uint8_t> may_stand_;  // by instance: 1 if the current reference mostly hits it
+                                         // or sees too little of it
+  std::vector<std::uint32_t> touched_;   // supervoxels that the current reference can change
 };
 
 }  // namespace dynains

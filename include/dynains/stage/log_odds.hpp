@@ -36,10 +36,10 @@ class FreeSpaceSum {
   float increment() const { return increment_; }
 
   /// Adds the increment once, or twice if nearly all visible samples are free. `free_ratio`: ratio
-  /// of free to visible samples.
-  void raise(float& level, float free_ratio) const {
+  /// of free to visible samples. `weight`: factor of the increment.
+  void raise(float& level, float free_ratio, float weight = 1.0F) const {
     constexpr float kWhollyFree = 0.9F;
-    level += (free_ratio > kWhollyFree ? 2.0F : 1.0F) * increment_;
+    level += (free_ratio > kWhollyFree ? 2.0F : 1.0F) * weight * increment_;
   }
   void lower(float& level) const { level = std::max(0.0F, level + decrement_); }
 
