@@ -133,13 +133,13 @@ TEST_CASE("a perturbed pose is found and corrected") {
 
 TEST_CASE("a lasting offset is one residual, and later poses are corrected by it") {
   const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 12);
-  const Eigen::Isometry3d T_moved_world(Eigen::Translation3d(0.3, -0.4, 0.0));
+  const Pose T_moved_world(Eigen::Translation3d(0.3, -0.4, 0.0));
   PoseCorrection correction(kTolerance);
   correction.begin_epoch(scans.front().T_world_sensor);
   for (std::size_t i = 0; i < scans.size(); ++i) {
     const bool is_moved = i >= 6;
     const GroundSplit split = split_of(scans[i]);
-    const Eigen::Isometry3d T_pushed =
+    const Pose T_pushed =
         is_moved ? T_moved_world * scans[i].T_world_sensor : scans[i].T_world_sensor;
     const Eigen::Isometry3d T = correction.correct(T_pushed, split);
     correction.insert(T, split, {});
