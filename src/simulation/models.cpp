@@ -167,6 +167,12 @@ Model vehicle_model(Kind kind, const Size& size, Random& random) {
   return model;
 }
 
+Model door_model(double height) {
+  const double belt = 0.62 * height;
+  return {block(materials::kBrightPaint, -1.05, 0, -0.04, 0.04, 0.28, belt),
+          block(materials::kGlass, -0.95, -0.2, -0.02, 0.02, belt, height - 0.1)};
+}
+
 Model pedestrian_model(const Size& size, std::uint64_t seed, double phase, double stride,
                        bool pushes_pram) {
   Random random(seed);

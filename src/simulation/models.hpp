@@ -45,6 +45,8 @@ Model bridge_model(double span, double width, double clearance);
 /// A roof on four posts.
 Model shelter_model(double length, double width, double height);
 Model furniture_model(Random& random);
+/// Door of a car, from the hinge backwards.
+Model door_model(double height);
 /// Thin things.
 Model bicycle_model();
 Model railing_model(double length, double height, Random& random);

@@ -94,6 +94,16 @@ class Traffic {
     double phase = 0;
   };
 
+  /// Door of a parked car: an object of its own, seen while it is open.
+  struct Door {
+    std::size_t object = 0;
+    Waypoint hinge;                   ///< the door closed, with the heading of the car
+    int side = 1;                     ///< 1 left, -1 right
+    double open = 0;                  ///< s; begins to open
+    double close = 1e9;               ///< s; begins to close
+    double angle(double time) const;  ///< rad
+  };
+
   /// New vehicles enter a lane at its start.
   struct Flow {
     std::size_t lane = 0;
@@ -112,6 +122,7 @@ class Traffic {
   std::vector<Signal> signals;
   std::vector<Driver> drivers;  ///< the first is the ego vehicle
   std::vector<Walker> walkers;
+  std::vector<Door> doors;
   std::vector<Flow> flows;
 
   std::size_t add_object(Kind kind);

@@ -92,6 +92,34 @@ class Kerbside {
     }
   }
 
+  /// Doors of cars that are parked along the first `way` (m), opened within `seconds`.
+  void add_doors(double way, double seconds, int doors) {
+    Traffic& traffic = builder_.traffic();
+    const Vec2 start = way_->at(traffic.drivers[0].s + 0.5 * way).position;
+    std::vector<ObjectPose> cars;
+    for (const ObjectPose& pose : traffic.parked) {
+      const bool is_car = traffic.objects[pose.object].kind == Kind::kCar;
+      if (is_car && norm(pose.at.position - start) < 0.5 * way + 20) cars.push_back(pose);
+    }
+    for (int i = 0; i < doors && !cars.empty(); ++i) {
+      const ObjectPose car = cars[random_.index(cars.size())];
+      const Size size = traffic.objects[car.object].size;
+      const int side = random_.chance(0.5) ? 1 : -1;
+      const double open = random_.uniform(0.2, seconds), pause = random_.uniform(2, 12);
+      const Vec2 ahead = direction(car.at.heading);
+      Traffic::Door door;
+      door.object = traffic.add_object(Kind::kCar, {1.05, 0.08, size.height});
+      traffic.objects[door.object].model = door_model(size.height);
+      door.hinge = {car.at.position + (0.2 * size.length) * ahead +
+                        (side * (0.5 * size.width + 0.02)) * left_of(ahead),
+                    car.at.heading};
+      door.side = side;
+      door.open = open;
+      door.close = open + pause;
+      traffic.doors.push_back(door);
+    }
+  }
+
  private:
   void add_bicycles(const Waypoint& at) {
     const auto bicycles = static_cast<int>(1 + random_.index(6));
@@ -135,6 +163,8 @@ void add_clutter(Builder& builder, double amount) {
     const double s = start + random.uniform(-20, 90);
     kerbside.add_loiterer(s, random.chance(0.5) ? 1 : -1);
   }
+  const double seconds = builder.config().scans / builder.config().rate;
+  kerbside.add_doors(30 + travel(builder.config(), 8), seconds, builder.count(4 * amount));
   for (int i = 0; i < builder.count(5 * amount); ++i) {
     const double s = start + random.uniform(-20, 90);
     kerbside.add_group(s, random.chance(0.5) ? 1 : -1);

@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kUsualSpeed = 8;      // m/s, of a vehicle
 constexpr double kWalkingSpeed = 1.2;  // m/s
+constexpr double kLong = 20;           // s; longer recordings have vehicles that wait
 
 bool is_carried(const Config& config) { return config.gait != Gait::kVehicle; }
 
@@ -77,6 +78,32 @@ void add_sensor(Builder& builder, const StreetLanes& lanes, double speed) {
   traffic.drivers[0].foresight = 0.2;
 }
 
+/// What long recordings show: deliveries and buses at stops against the way, which wait and go, and
+/// parked cars that leave while the sensor is near.
+void add_waiting(Builder& builder, Random random, const StreetLanes& lanes, double speed) {
+  const Config& config = builder.config();
+  const double seconds = config.scans / config.rate, way = travel(config, speed);
+  if (seconds < kLong) return;
+  Traffic& traffic = builder.traffic();
+  const Street& street = builder.street(0);
+  for (double s = random.uniform(20, 60); s < way + 40; s += random.uniform(60, 160)) {
+    const Kind kind = random.chance(0.5) ? Kind::kVan : Kind::kBus;
+    const double begin = random.uniform(0, 0.5 * seconds), wait = random.uniform(10, 40);
+    const double place = street.centre.length() - kBefore - s;
+    if (!builder.is_free_of_drivers(traffic.lanes[lanes.backward].route.at(place), 8)) continue;
+    Traffic::Driver& driver =
+        traffic.add_driver(traffic.add_object(kind), lanes.backward, place, kUsualSpeed);
+    driver.speed = 0;
+    driver.schedule = {{0, 0}, {begin + wait, kUsualSpeed}};
+  }
+  if (street.half_width < 5) return;
+  for (double t = random.uniform(2, 15); t < seconds; t += random.uniform(5, 20)) {
+    const int side = random.chance(0.5) ? 1 : -1;
+    const double s = kBefore + speed * t + random.uniform(-20, 40);
+    builder.leaving_car(street, s, side * (street.half_width - 1.12), side * kLaneHalf, t, 7);
+  }
+}
+
 /// A vehicle that stays ahead, and traffic both ways.
 void add_vehicles(Builder& builder, Random& random, const StreetLanes& lanes, double speed) {
   Traffic& traffic = builder.traffic();
@@ -123,6 +150,7 @@ World mixed(const Config& config) {
     if (half_width > 5 && !angled) {
       add_parking_moves(builder, kBefore - 20, end, builder.count(random.uniform(0, 10)), 7);
     }
+    add_waiting(builder, random.fork(41), lanes, config.ego_speed < 0 ? speed : config.ego_speed);
     add_vehicles(builder, random, lanes, kUsualSpeed * random.uniform(0.5, 1.4));
   }
   for (const int side : {-1, 1}) {
