@@ -45,8 +45,8 @@ Pose CleanWriter::T_file_sensor(std::size_t i) const {
 
 void CleanWriter::write_bin(const std::filesystem::path& file, std::size_t i,
                             const RecordedScan& scan, Span<const PointLabel> labels) const {
-  const Eigen::Isometry3d T = T_file_sensor(i);
-  const bool is_moved = T.matrix() != Eigen::Isometry3d::Identity().matrix();
+  const Pose T = T_file_sensor(i);
+  const bool is_moved = T.matrix() != Pose::Identity().matrix();
   std::vector<float> xyzi;
   for (std::size_t k = 0; k < labels.size(); ++k) {
     if (!is_kept(labels[k])) continue;

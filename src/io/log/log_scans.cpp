@@ -196,7 +196,7 @@ void LogScans::place_scans() {
   }
 }
 
-std::optional<Eigen::Isometry3d> LogScans::T_cloud_frame(const std::string& frame) const {
+std::optional<Pose> LogScans::T_cloud_frame(const std::string& frame) const {
   return transforms_.find(cloud_frame_, frame, times_.front());
 }
 

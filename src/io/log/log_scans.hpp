@@ -43,7 +43,7 @@ class LogScans {
   bool is_in_world() const { return is_in_world_; }
   /// Pose of `frame` in the frame of the clouds at the time of the first one; empty if the log does
   /// not connect them.
-  std::optional<Eigen::Isometry3d> T_cloud_frame(const std::string& frame) const;
+  std::optional<Pose> T_cloud_frame(const std::string& frame) const;
   /// Names of the frames with a transform, or "none".
   std::string known_frames() const;
   /// Columns of the first cloud.
