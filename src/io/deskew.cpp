@@ -59,14 +59,7 @@ std::optional<Pose> motion_at(const Trajectory& motion, double time) {
     const double beyond = std::max(times[end - 1] - time, time - times[end]);
     if (gap > kLongestPoseGap || beyond > kLongestScan) return std::nullopt;
     const double share = (time - times[end - 1]) / gap;
-    const Pose& a = motion.poses[end - 1];
-    const Pose& b = motion.poses[end];
-    Pose pose = Pose::Identity();
-    const detail::Quaternion from(a.linear());
-    pose.linear() =
-        from.slerp(share, detail::Quaternion(b.linear())).normalized().toRotationMatrix();
-    pose.translation() = a.translation() + share * (b.translation() - a.translation());
-    return pose;
+    return extrapolate(motion.poses[end - 1], motion.poses[end], share);
   };
   for (const std::size_t end : {k, k - 1, k + 1}) {
     if (end < 1 || end >= times.size()) continue;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <string_view>
 
@@ -220,10 +221,25 @@ std::optional<TrajectoryMatch> match_time(const Trajectory& trajectory, double t
 Pose interpolate(const Pose& a, const Pose& b, double share) {
   if (share <= 0.0) return a;
   if (share >= 1.0) return b;
-  Pose pose = Pose::Identity();
+  return extrapolate(a, b, share);
+}
+
+Pose extrapolate(const Pose& a, const Pose& b, double share) {
+  // Spherical linear interpolation. That of Eigen returns a type with alignment.
   const detail::Quaternion from(a.linear());
   const detail::Quaternion to(b.linear());
-  pose.linear() = from.slerp(share, to).normalized().toRotationMatrix();
+  const double cosine = from.dot(to);
+  double of_from = 1.0 - share;
+  double of_to = share;
+  if (std::abs(cosine) < 1.0 - std::numeric_limits<double>::epsilon()) {
+    const double angle = std::acos(std::abs(cosine));
+    of_from = std::sin((1.0 - share) * angle) / std::sin(angle);
+    of_to = std::sin(share * angle) / std::sin(angle);
+  }
+  if (cosine < 0.0) of_to = -of_to;
+  const detail::Quaternion rotation(of_from * from.coeffs() + of_to * to.coeffs());
+  Pose pose = Pose::Identity();
+  pose.linear() = rotation.normalized().toRotationMatrix();
   pose.translation() = a.translation() + share * (b.translation() - a.translation());
   return pose;
 }

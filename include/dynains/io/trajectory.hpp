@@ -60,6 +60,8 @@ std::optional<TrajectoryMatch> match_time(const Trajectory& trajectory, double t
 /// Interpolates linearly in translation and by slerp in rotation. `share`: [0, 1]; 0 gives exactly
 /// `a`, 1 exactly `b`.
 Pose interpolate(const Pose& a, const Pose& b, double share);
+/// As interpolate(), also before `a` (share < 0) and behind `b` (share > 1), at the same velocity.
+Pose extrapolate(const Pose& a, const Pose& b, double share);
 
 /// Converts a stamp to seconds. Numbers above 1e11, 1e14 and 1e17 are in ms, us and ns since 1970.
 double to_seconds(double stamp);
