@@ -13,8 +13,20 @@ namespace {
 using simulation::Scene;
 using simulation::Sensor;
 
-/// Four scans of a drive, with the sensor at `origin` (m) in their frame.
-std::vector<PointBuffer> scans_of(Scene scene, Sensor sensor, const Eigen::Vector3f& origin) {
+/// Scans with the sensor at `origin` (m) in their frame.
+std::vector<PointBuffer> moved(std::vector<PointBuffer> scans, const Eigen::Vector3f& origin) {
+  for (PointBuffer& scan : scans) {
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+      scan.x[i] += origin.x();
+      scan.y[i] += origin.y();
+      scan.z[i] += origin.z();
+    }
+  }
+  return scans;
+}
+
+/// Four scans of a drive, sensor frame.
+std::vector<PointBuffer> scans_of(Scene scene, Sensor sensor) {
   simulation::Config config;
   config.scene = scene;
   config.sensor = sensor;
@@ -26,8 +38,7 @@ std::vector<PointBuffer> scans_of(Scene scene, Sensor sensor, const Eigen::Vecto
     const simulation::SimulatedScan scan = simulator.scan(i);
     scans.emplace_back();
     for (std::size_t k = 0; k + 3 < scan.xyzi.size(); k += 4) {
-      scans.back().push_back(scan.xyzi[k] + origin.x(), scan.xyzi[k + 1] + origin.y(),
-                             scan.xyzi[k + 2] + origin.z());
+      scans.back().push_back(scan.xyzi[k], scan.xyzi[k + 1], scan.xyzi[k + 2]);
     }
   }
   return scans;
@@ -37,13 +48,14 @@ TEST_CASE("The place where beams meet is found, and nothing if it is the origin"
   const auto [scene, sensor] = GENERATE(table<Scene, Sensor>({{Scene::kUrban, Sensor::kOs1_64},
                                                               {Scene::kCrowd, Sensor::kVlp16},
                                                               {Scene::kHighway, Sensor::kHdl32}}));
-  CHECK_FALSE(find_ray_origin(scans_of(scene, sensor, Eigen::Vector3f::Zero())));
-  CHECK_FALSE(find_ray_origin(scans_of(scene, sensor, {0.0F, 0.0F, 0.2F})));
+  const std::vector<PointBuffer> scans = scans_of(scene, sensor);
+  CHECK_FALSE(find_ray_origin(scans));
+  CHECK_FALSE(find_ray_origin(moved(scans, {0.0F, 0.0F, 0.2F})));
   for (const Eigen::Vector3f& origin :
        {Eigen::Vector3f(1.0F, 0.0F, 1.5F), Eigen::Vector3f(1.0F, 0.0F, 0.0F),
         Eigen::Vector3f(0.0F, 0.0F, 1.5F), Eigen::Vector3f(-1.2F, 0.3F, 0.6F)}) {
     INFO("sensor at " << origin.transpose());
-    const auto found = find_ray_origin(scans_of(scene, sensor, origin));
+    const auto found = find_ray_origin(moved(scans, origin));
     REQUIRE(found);
     REQUIRE(found->known == RayOrigin::Known::kPosition);
     CHECK((found->position - origin.cast<double>()).norm() < 0.1);
@@ -52,12 +64,13 @@ TEST_CASE("The place where beams meet is found, and nothing if it is the origin"
 }
 
 TEST_CASE("Without beams of fixed elevations, shadows tell that rays begin elsewhere") {
-  CHECK_FALSE(find_ray_origin(scans_of(Scene::kUrban, Sensor::kLivox, Eigen::Vector3f::Zero())));
-  const auto beside = find_ray_origin(scans_of(Scene::kUrban, Sensor::kLivox, {1.5F, -1.0F, 0.0F}));
+  const std::vector<PointBuffer> scans = scans_of(Scene::kUrban, Sensor::kLivox);
+  CHECK_FALSE(find_ray_origin(scans));
+  const auto beside = find_ray_origin(moved(scans, {1.5F, -1.0F, 0.0F}));
   REQUIRE(beside);
   CHECK(beside->known == RayOrigin::Known::kHorizontal);
   CHECK((beside->position - Eigen::Vector3d(1.5, -1.0, 0.0)).norm() < 0.4);
-  const auto below = find_ray_origin(scans_of(Scene::kUrban, Sensor::kLivox, {0.0F, 0.0F, 1.2F}));
+  const auto below = find_ray_origin(moved(scans, {0.0F, 0.0F, 1.2F}));
   REQUIRE(below);
   CHECK(option_for(*below).empty() == (below->known == RayOrigin::Known::kNothing));
 }
