@@ -56,9 +56,8 @@ simulation::Config make_config(const SimulateOptions& options) {
   config.validate();
   if (config.rolling_shutter && config.deskewed <= 0 && options.format == kFolder) {
     throw ConfigError(
-        "--rolling-shutter needs --deskewed, or --format mcap, bag or db3: a folder as of KITTI "
-        "has "
-        "no times of points");
+        "--rolling-shutter needs --format mcap, bag or db3, or --deskewed: a folder as of "
+        "KITTI has no times of points");
   }
   return config;
 }
