@@ -344,9 +344,9 @@ TEST_CASE("a full map of planes forgets the oldest voxels") {
     planes.begin_scan();
     VoxelPlanes::Block block;
     for (int y = 0; y < 100; ++y) {
-      for (int k = 0; k < 8; ++k) {
-        block.push_back(Eigen::Isometry3d::Identity(), scan + 0.1 + 0.1 * k,
-                        y + 0.1 + 0.1 * (k * 3 % 8), 0.2);
+      for (int k = 0; k < 12; ++k) {
+        block.push_back(Eigen::Isometry3d::Identity(), scan + 0.1 + 0.06 * k,
+                        y + 0.1 + 0.06 * (k * 5 % 12), 0.2);
         if (block.is_full()) planes.add(block);
       }
     }

@@ -209,14 +209,14 @@ class PoseCorrection {
 
   // Whether evidence beside the planes of this scan supports a correction: the scan before needs it
   // as well, or the motion becomes smoother. Small corrections of poses that are known to be
-  // inexact need no more support.
+  // inexact need no more support, and neither do the first scans, without a motion before them.
   bool is_credible(const detail::Alignment& alignment, const Step& before,
                    const Pose& T_guess) const {
     const double size = movement(alignment.supported);
     if (inexact_scans_ > 0 && size <= kMostDoubt) return true;
     if (2.0 * movement(confirmed(alignment.supported, before)) >= size) return true;
     const std::optional<Pose> T_predicted = motion_.predict(T_origin_newest_);
-    return T_predicted && movement(difference(*T_predicted, alignment.T_map_sensor)) <
+    return !T_predicted || movement(difference(*T_predicted, alignment.T_map_sensor)) <
                               movement(difference(*T_predicted, T_guess));
   }
 
