@@ -13,6 +13,7 @@
 namespace dynains {
 
 using Vector6 = Eigen::Matrix<double, 6, 1, Eigen::DontAlign>;
+// Not ldlt() and inverse(), whose types have the alignment that depends on flags.
 using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::DontAlign>;
 
 /// Edges of the cells (m) by level, from coarse to fine.
@@ -99,13 +100,15 @@ class NormalEquations {
   /// The step that solves the equations, slightly damped.
   Vector6 step() const {
     const Matrix6 damped = hessian() + 1e-3 * Matrix6::Identity();
-    return -damped.ldlt().solve(gradient_);
+    return -Eigen::LDLT<Matrix6>(damped).solve(gradient_);
   }
   /// Deviation (m) of the translation along its least certain direction.
   double uncertainty() const;
   /// Covariance of the translation (m^2) for points with a deviation of 1 m.
   Eigen::Matrix3d translation_covariance() const {
-    return (hessian() + 1e-6 * Matrix6::Identity()).inverse().bottomRightCorner<3, 3>();
+    const Matrix6 damped = hessian() + 1e-6 * Matrix6::Identity();
+    const Matrix6 covariance = Eigen::PartialPivLU<Matrix6>(damped).inverse();
+    return covariance.bottomRightCorner<3, 3>();
   }
 
  private:

@@ -218,7 +218,7 @@ Pose refine(const std::vector<BothMotions>& motions, Pose T_body_sensor) {
       H += weight * J.transpose() * J;
       g += weight * J.transpose() * r;
     }
-    const Vector6 change = -H.ldlt().solve(g);
+    const Vector6 change = -Eigen::LDLT<Matrix6>(H).solve(g);
     if (!change.allFinite()) break;
     const Pose T = motion_of(change);
     T_body_sensor.linear() = (T.linear() * T_body_sensor.linear()).eval();

@@ -18,6 +18,8 @@ foreach(library IN LISTS libraries)
   endif()
   string(REGEX MATCHALL "[^\n]* W [^\n]*Eigen::[^\n]*" weak "${symbols}")
   list(FILTER weak INCLUDE REGEX "${aligned}")
+  # Consumers have no functions on both kinds of types.
+  list(FILTER weak EXCLUDE REGEX "Matrix<double, [0-9], [0-9], 2,|Quaternion<double, 2>")
   if(weak)
     list(REMOVE_DUPLICATES weak)
     string(REPLACE ";" "\n  " weak "${weak}")
