@@ -3,50 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "failure.hpp"
+#include "text.hpp"
 
 namespace dynains {
 namespace {
-
-struct TimeRange {
-  double first = std::numeric_limits<double>::infinity();
-  double last = -std::numeric_limits<double>::infinity();
-
-  bool is_empty() const { return last < first; }
-};
-
-TimeRange range_of(const std::vector<double>& times) {
-  TimeRange range;
-  for (const double time : times) {
-    if (!std::isfinite(time)) continue;
-    range.first = std::min(range.first, time);
-    range.last = std::max(range.last, time);
-  }
-  return range;
-}
-
-/// Seconds after the stamp of a scan = unit * time - origin.
-struct Clock {
-  double unit = 1.0;
-  double origin = 0.0;
-
-  double operator()(double time) const { return unit * time - origin; }
-};
-
-Clock clock_of(const TimeRange& range, double stamp) {
-  constexpr double kAbsolute = 10.0;  // s
-  Clock clock;
-  while (clock.unit > 1e-9 && clock.unit * (range.last - range.first) > kLongestScan) {
-    clock.unit *= 1e-3;
-  }
-  if (std::abs(clock.unit * range.first) > kAbsolute) clock.origin = stamp;
-  return clock;
-}
 
 /// T_world_sensor at `time`, by the poses around it or by the two nearest ones.
 std::optional<Pose> motion_at(const Trajectory& motion, double time) {
@@ -105,26 +70,28 @@ class Motion {
 }  // namespace
 
 void deskew(const Trajectory& motion, double stamp, const Pose& T_world_sensor,
-            const std::filesystem::path& place, RecordedScan& scan) {
+            const PointClock& clock, const std::filesystem::path& place, RecordedScan& scan) {
   if (scan.time.size() != scan.size()) {
     fail(place, "the scan cannot be de-skewed: expected a column time");
   }
-  const TimeRange range = range_of(scan.time);
-  if (range.is_empty()) return;
-  const Clock seconds = clock_of(range, stamp);
-  const double first = seconds(range.first);
-  const double last = seconds(range.last);
+  const PointTimes times = times_of_scan(scan, clock);
+  if (times.is_empty()) return;
+  const double first = clock.after(stamp, times.first);
+  const double last = clock.after(stamp, times.last);
   if (std::max(std::abs(first), std::abs(last)) > kLongestScan) {
     fail(place,
-         "the scan cannot be de-skewed: expected times of points within 1 s of the "
-         "time of the scan, found " +
-             std::to_string(first) + " s to " + std::to_string(last) + " s after it");
+         "the scan cannot be de-skewed: expected times of points within 1 s of the time of the "
+         "scan, " +
+             text::to_text(stamp) + " s; found " + text::to_text(times.first) + " to " +
+             text::to_text(times.last) + ", which is in s " +
+             text::to_text(clock.unit * times.first) + " to " +
+             text::to_text(clock.unit * times.last) + (clock.is_absolute ? "" : " after it"));
   }
   const Motion T_stamp_sensor(motion, stamp, T_world_sensor, first, last, place);
   for (std::size_t k = 0; k < scan.size(); ++k) {
     Eigen::Map<Eigen::Vector3f> p(scan.xyzi.data() + 4 * k);
-    if (!std::isfinite(scan.time[k]) || p.isZero(0.0F)) continue;
-    p = (T_stamp_sensor.at(seconds(scan.time[k])) * p.cast<double>()).cast<float>();
+    if (!times.holds(scan.time[k]) || p.isZero(0.0F)) continue;
+    p = (T_stamp_sensor.at(clock.after(stamp, scan.time[k])) * p.cast<double>()).cast<float>();
   }
 }
 

@@ -7,11 +7,9 @@
 #include "dynains/io/recording.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "dynains/pose.hpp"
+#include "point_clock.hpp"
 
 namespace dynains {
-
-/// Longest interval between the stamp of a scan and the time of one of its points, s.
-inline constexpr double kLongestScan = 1.0;
 
 /// Moves the points of a scan (sensor frame at the time of each point) to the sensor frame at the
 /// stamp of the scan. Columns keep their values; points at the origin and points without a finite
@@ -21,13 +19,12 @@ inline constexpr double kLongestScan = 1.0;
 /// kLongestPoseGap, and continued with constant velocity by at most kLongestScan. `stamp`: s,
 /// `T_world_sensor`: the pose at that time.
 ///
-/// The unit of the column `time` is found by the time between the first and the last point, which
-/// is at most kLongestScan: s, ms, us or ns. Times count from the stamp, or from the origin of
-/// stamps if they are more than 10 s.
+/// `clock` tells the seconds from the stamp to the time of a point. Points whose time cannot be
+/// that of the scan (see times_of_scan()) keep their place.
 ///
 /// Throws IoError that begins with `place` for scans without a time for each point, for times that
 /// are not those of the scan, and if the motion at the time of a point is not known.
 void deskew(const Trajectory& motion, double stamp, const Pose& T_world_sensor,
-            const std::filesystem::path& place, RecordedScan& scan);
+            const PointClock& clock, const std::filesystem::path& place, RecordedScan& scan);
 
 }  // namespace dynains

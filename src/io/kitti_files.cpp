@@ -68,7 +68,7 @@ void for_each_row(const fs::path& path, Parse&& parse) {
       continue;
     }
     if (blank != 0) fail_at_line(path, blank, "expected a row, found a blank line");
-    parse(std::string_view(line), number);
+    parse(number == 1 ? text::without_utf8_mark(line) : std::string_view(line), number);
   }
   if (file.bad()) fail_after_line(path, number, errno);
 }
@@ -135,7 +135,7 @@ std::vector<NumberedScan> list_kitti_scans(const fs::path& folder) {
     if (file.extension() != ".bin" || file.filename().string().front() == '.') continue;
     const std::string name = file.stem().string();
     const bool digits = name.find_first_not_of("0123456789") == std::string::npos;
-    if (!digits || name.size() > 18) fail(file, "expected a number as name, such as 000123.bin");
+    if (!digits || name.size() > 19) fail(file, "expected a number as name, such as 000123.bin");
     scans.push_back({std::stoull(name), name});
   }
   if (error) fail(folder, "cannot be listed: " + error.message());

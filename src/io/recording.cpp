@@ -7,15 +7,18 @@
 #include <string_view>
 #include <utility>
 
+#include "bin_layout.hpp"
 #include "deskew.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "failure.hpp"
 #include "input_file.hpp"
+#include "keyframes.hpp"
 #include "kitti_files.hpp"
 #include "log/log_scans.hpp"
 #include "nuscenes.hpp"
+#include "point_clock.hpp"
 #include "scan_files.hpp"
 #include "scan_reader.hpp"
 #include "text.hpp"
@@ -61,9 +64,13 @@ Recording::Recording(const fs::path& path, const RecordingOptions& options)
       const auto conversion = conversion_of(path);
       fail(path, conversion ? *conversion : std::string("is not a folder; ") + kAccepted);
     }
-    list_scans();
-    reader_ = make_file_reader(format_);
-    read_poses();
+    if (!find_scan_folder() && has_logs(path)) {
+      open_log();
+    } else {
+      list_scans();
+      reader_ = make_file_reader(format_, options_.bin_layout);
+      has_keyframes_ ? read_keyframes() : read_poses();
+    }
   }
   if (!options.sensor_frame.empty() && format_ != ScanFormat::kLog) {
     fail(path, "has no frames; expected a log of ROS for the frame of the sensor");
@@ -87,14 +94,23 @@ void Recording::open_log() {
     fail(options_.times, "expected no file of times: " + folder_.string() + " has stamps");
   }
   const bool has_file = !options_.poses.empty();
-  auto log = std::make_unique<LogScans>(
-      folder_, LogChoice{options_.cloud_topic, options_.pose_topic, options_.pose_frame, !has_file,
-                         !options_.sensor_frame.empty()});
+  LogChoice choice;
+  choice.cloud_topic = options_.cloud_topic;
+  choice.pose_topic = options_.pose_topic;
+  choice.pose_frame = options_.pose_frame;
+  choice.with_poses = !has_file;
+  choice.with_transforms = !options_.sensor_frame.empty();
+  choice.point_time_unit = options_.point_time_unit;
+  choice.time_offset = options_.time_offset;
+  choice.has_extrinsic = !options_.convention.T_body_sensor.isApprox(Pose::Identity(), 0.0);
+  choice.accept_missing = options_.accept_missing;
+  auto log = std::make_unique<LogScans>(folder_, choice);
   scan_folder_ = folder_;
   format_ = ScanFormat::kLog;
   frame_ = log->is_in_world() ? PointFrame::kWorld : PointFrame::kSensor;
   files_ = log->log().files();
   early_end_ = log->log().early_end();
+  if (log->log().missing_parts()) warnings_.push_back(*log->log().missing_parts());
   notes_ = log->notes();
   numbered_ = true;
   for (std::size_t i = 0; i < log->size(); ++i) {
@@ -109,6 +125,11 @@ void Recording::open_log() {
   const fs::path& poses = has_file ? options_.poses : folder_;
   if (!options_.sensor_frame.empty()) take_sensor_frame(*log);
   trajectory_.times.empty() ? match_rows(poses) : match_times(poses, log->times());
+  if (options_.deskew) {
+    PointClockFinding finding = log->point_clock();
+    if (finding.clock) finding.clock = PointClock{1.0, false, finding.clock->longest_scan};
+    take_clock(finding);
+  }
   reader_ = make_log_reader(std::move(log));
   place_scans(poses);
 }
@@ -131,7 +152,7 @@ void Recording::open_nuscenes(const fs::path& tables) {
   files_ = nuscenes.tables;
   scan_folder_ = nuscenes.sweeps.front().file.parent_path();
   format_ = ScanFormat::kNuScenes;
-  reader_ = make_file_reader(format_);
+  reader_ = make_file_reader(format_, options_.bin_layout);
   notes_.push_back("sweeps, poses and times of nuScenes");
   std::vector<double> times;
   for (const NuScenesSweep& sweep : nuscenes.sweeps) {
@@ -155,16 +176,25 @@ void Recording::open_nuscenes(const fs::path& tables) {
   place_scans(poses);
 }
 
-void Recording::list_scans() {
+/// False if neither the folder nor one below it has scans.
+bool Recording::find_scan_folder() {
   scan_folder_ = folder_;
-  for (const char* name : {"velodyne", "pcd", "ply", "scans", "points", "clouds", "lidar"}) {
+  for (const char* name : {"velodyne", "pcd", "ply", "scans", "points", "clouds", "lidar", "Scans",
+                           "velodyne_points/data"}) {
     if (is_folder(folder_ / name) &&
         (!scan_files(folder_ / name).empty() || std::string_view(name) == "velodyne")) {
       scan_folder_ = folder_ / name;
-      break;
+      return true;
     }
   }
+  return !scan_files(folder_).empty();
+}
+
+void Recording::list_scans() {
   const std::vector<fs::path> files = scan_files(scan_folder_);
+  const std::vector<fs::path> keyframes =
+      files.empty() ? keyframe_folders(scan_folder_) : std::vector<fs::path>();
+  if (!keyframes.empty()) return list_keyframes(keyframes);
   if (files.empty()) {
     const auto conversion = conversion_of_scans(scan_folder_);
     fail(scan_folder_, conversion ? *conversion : std::string("has no scans; ") + kAccepted);
@@ -177,6 +207,8 @@ void Recording::list_scans() {
                            " and " + file.filename().string());
   }
 
+  const bool is_usual = options_.bin_layout.columns == 4 && !options_.bin_layout.is_double;
+  if (format_ == ScanFormat::kBin && is_usual) check_bin_content(files.front());
   if (scan_folder_ == folder_ / "velodyne" && format_ == ScanFormat::kBin) {
     numbered_ = true;
     for (const NumberedScan& scan : list_kitti_scans(scan_folder_)) {
@@ -202,6 +234,20 @@ void Recording::list_scans() {
            "two scans with one number: " + scans_[i - 1].name + " and " + scans_[i].name);
     }
   }
+}
+
+void Recording::list_keyframes(const std::vector<fs::path>& folders) {
+  has_keyframes_ = true;
+  numbered_ = true;
+  format_ = ScanFormat::kPcd;
+  for (const fs::path& folder : folders) {
+    scans_.emplace_back();
+    scans_.back().file = folder / kKeyframeCloud;
+    scans_.back().name = folder.filename().string();
+    scans_.back().number = std::stoull(scans_.back().name);
+    files_.push_back(scans_.back().file);
+  }
+  check_names();
 }
 
 /// Results of a scan are named like the scan, so no two scans may have one name.
@@ -252,7 +298,8 @@ PointFrame Recording::guess_frame() const {
   if (position.norm() < kFarPose) return usual;
   std::size_t around_origin = 0;
   std::size_t around_pose = 0;
-  for (const Eigen::Vector3d& p : read_points(farthest->file).positions) {
+  for (const Eigen::Vector3d& read : read_points(farthest->file).positions) {
+    const Eigen::Vector3d p = options_.point_unit * read;
     if (p.norm() < kNear) ++around_origin;
     if ((p - position).norm() < kNear) ++around_pose;
   }
@@ -264,15 +311,31 @@ std::uint64_t Recording::point_count(std::size_t i) const {
   return reader_->point_count(address(i));
 }
 
+bool Recording::is_verbatim() const {
+  return format_ == ScanFormat::kBin && frame_ == PointFrame::kSensor && !options_.deskew &&
+         sensor_origin().isZero(0.0) && options_.point_unit == 1.0 &&
+         options_.bin_layout.columns == 4 && !options_.bin_layout.is_double;
+}
+
+/// From the coordinates of a file to the sensor frame, m; nothing if they are the same.
+std::optional<FileTransform> Recording::T_sensor_file(std::size_t i) const {
+  const bool is_in_world = frame_ == PointFrame::kWorld;
+  if (!is_in_world && options_.point_unit == 1.0) return std::nullopt;
+  FileTransform T = FileTransform::Identity();
+  if (is_in_world) T = T_world_sensor(i).inverse();
+  if (options_.point_unit != 1.0) T.scale(options_.point_unit);
+  return T;
+}
+
 void Recording::check_scan(std::size_t i) const { reader_->check(address(i)); }
 
 void Recording::read_scan(std::size_t i, RecordedScan& scan) const {
-  const Pose T_sensor_world = T_world_sensor(i).inverse();
-  reader_->read(address(i), frame_ == PointFrame::kWorld ? &T_sensor_world : nullptr, scan);
+  const std::optional<FileTransform> T = T_sensor_file(i);
+  reader_->read(address(i), T ? &*T : nullptr, scan);
   if (frame_ == PointFrame::kSensor && !sensor_origin().isZero(0.0)) {
     subtract_origin(sensor_origin().cast<float>(), scan);
   }
-  if (options_.deskew) deskew(motion_, time(i), T_world_sensor(i), file(i), scan);
+  if (options_.deskew) deskew(motion_, time(i), T_world_sensor(i), *clock_, file(i), scan);
 }
 
 RecordedScan Recording::read_scan(std::size_t i) const {

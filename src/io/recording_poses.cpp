@@ -1,6 +1,6 @@
 // Poses and times of a recording, and how they belong to its scans.
 #include <algorithm>
-#include <sstream>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,9 +12,12 @@
 #include "dynains/pose.hpp"
 #include "failure.hpp"
 #include "input_file.hpp"
+#include "keyframes.hpp"
 #include "kitti_files.hpp"
 #include "median.hpp"
+#include "point_clock.hpp"
 #include "scan_files.hpp"
+#include "scan_reader.hpp"
 #include "text.hpp"
 
 namespace dynains {
@@ -24,13 +27,7 @@ namespace fs = std::filesystem;
 
 bool is_identity(const Pose& pose) { return pose.isApprox(Pose::Identity(), 1e-12); }
 
-std::string in_seconds(double time) {
-  std::ostringstream text;
-  text::exact(text);
-  text.precision(15);
-  text << time << " s";
-  return text.str();
-}
+using text::in_seconds;
 
 /// Proposes a longer gap if most gaps of the trajectory are too long; else empty.
 std::string gap_hint(const Trajectory& trajectory, double longest) {
@@ -133,6 +130,32 @@ void Recording::read_poses() {
   place_scans(has_viewpoints_ ? scan_folder_ : file);
 }
 
+/// Poses and times of keyframes; with --poses, those of the file.
+void Recording::read_keyframes() {
+  std::vector<double> times;
+  for (Scan& scan : scans_) {
+    const fs::path file = scan.file.parent_path() / "data";
+    const Keyframe keyframe = read_keyframe(file);
+    files_.push_back(file);
+    if (!times.empty() && !(keyframe.time > times.back())) {
+      fail(file, "expected a stamp after that of the keyframe before, " + in_seconds(times.back()) +
+                     "; found " + in_seconds(keyframe.time));
+    }
+    times.push_back(keyframe.time);
+    scan.time = keyframe.time;
+    trajectory_.poses.push_back(keyframe.T_world_sensor);
+  }
+  notes_.push_back("keyframes with stamps and estimates of hdl_graph_slam");
+  trajectory_.times = times;
+  if (!options_.poses.empty()) {
+    files_.push_back(options_.poses);
+    trajectory_ = read_trajectory(options_.poses);
+  }
+  const fs::path& poses = options_.poses.empty() ? folder_ : options_.poses;
+  trajectory_.times.empty() ? match_rows(poses) : match_times(poses, times);
+  place_scans(poses);
+}
+
 std::optional<std::vector<double>> Recording::times_of_names() const {
   std::vector<double> times;
   for (const Scan& scan : scans_) {
@@ -221,15 +244,54 @@ void Recording::match_scans(const fs::path& file) {
     notes_.push_back("poses belong to scans by time, interpolated");
     return;
   }
-  match_rows(file);
-  note_rows(file);
-  for (std::size_t i = 0; i < scans_.size() && !times; ++i) {
+  if (times || !match_indices()) {
+    match_rows(file);
+    note_rows(file);
+  }
+  for (std::size_t i = 0; i < scans_.size() && !times && has_times_; ++i) {
     const std::size_t row = matches_[i]->before;
     scans_[i].time = trajectory_.times.empty() ? kKittiPeriod * static_cast<double>(row)
                                                : trajectory_.times[row];
   }
-  if (!times && trajectory_.times.empty()) notes_.push_back("no times: 0.1 s from scan to scan");
+  if (!times && trajectory_.times.empty()) {
+    has_times_ = false;
+    notes_.push_back("no times: 0.1 s from scan to scan");
+  }
   if (options_.time_offset != 0.0) shift_times(file);
+}
+
+/// The first column of KITTI-360 is the number of the scan. False unless the rows begin with the
+/// numbers of most scans.
+bool Recording::match_indices() {
+  const bool is_matrix = trajectory_.order == QuaternionOrder::kNone;
+  if (!numbered_ || !is_matrix || trajectory_.times.empty()) return false;
+  const std::vector<double>& indices = trajectory_.times;
+  const auto is_index = [](double time) { return time >= 0.0 && time == std::floor(time); };
+  if (!std::all_of(indices.begin(), indices.end(), is_index)) return false;
+  std::size_t found = 0;
+  matches_.clear();
+  for (const Scan& scan : scans_) {
+    const auto number = static_cast<double>(scan.number);
+    const auto row = std::lower_bound(indices.begin(), indices.end(), number);
+    if (row == indices.end() || *row != number) {
+      matches_.emplace_back();
+      continue;
+    }
+    const auto at = static_cast<std::size_t>(row - indices.begin());
+    matches_.push_back(TrajectoryMatch{at, at, 0.0});
+    ++found;
+  }
+  if (2 * found < scans_.size()) {
+    matches_.clear();
+    return false;
+  }
+  for (double& time : trajectory_.times) time *= kKittiPeriod;
+  for (Scan& scan : scans_) scan.time = kKittiPeriod * static_cast<double>(scan.number);
+  has_times_ = false;
+  notes_.push_back(
+      "the first column of the poses counts scans: each row belongs to the scan of that number, "
+      "0.1 s from number to number");
+  return true;
 }
 
 /// Notes how rows without times belong to scans.
@@ -316,12 +378,34 @@ Pose Recording::to_sensor_pose(const PoseConvention& convention, const Pose& pos
   return T_world_sensor;
 }
 
+void Recording::find_point_clock() {
+  std::vector<double> times;
+  for (const Scan& scan : scans_) times.push_back(scan.time);
+  RecordedScan scan;
+  take_clock(find_clock(times, has_times_, options_.point_time_unit,
+                        [&](std::size_t i) -> const RecordedScan& {
+                          reader_->read(address(i), nullptr, scan);
+                          return scan;
+                        }));
+}
+
+void Recording::take_clock(const PointClockFinding& finding) {
+  if (!finding.clock && !finding.text.empty()) {
+    fail(folder_, "cannot be de-skewed: " + finding.text);
+  }
+  if (!finding.text.empty()) warnings_.push_back(finding.text);
+  PointClock clock = finding.clock.value_or(PointClock());
+  if (!finding.clock && options_.point_time_unit > 0.0) clock.unit = options_.point_time_unit;
+  clock_ = std::make_shared<const PointClock>(clock);
+}
+
 /// The trajectory if it has times of its own, else the poses of the scans.
 void Recording::prepare_deskewing() {
   if (!columns_.time) fail(folder_, "de-skewing needs a time for each point, a column time");
   if (frame_ == PointFrame::kWorld) {
     fail(folder_, "de-skewing needs points in the frame of the sensor");
   }
+  if (!clock_) find_point_clock();
   notes_.push_back("points are de-skewed by their times");
   const Trajectory& rows = motion_.times.empty() ? trajectory_ : motion_;
   const PoseConvention& convention = options_.convention;

@@ -12,8 +12,9 @@
 namespace dynains {
 
 /// Names of files of poses, which are no scans.
-inline constexpr std::array<const char*, 6> kPoseFiles = {
-    "poses.txt", "poses.csv", "poses.tum", "trajectory.txt", "trajectory.csv", "trajectory.tum"};
+inline constexpr std::array<const char*, 7> kPoseFiles = {
+    "poses.txt",      "poses.csv",      "poses.tum",          "trajectory.txt",
+    "trajectory.csv", "trajectory.tum", "optimized_poses.txt"};
 
 /// By the extension; empty for files that are no scans.
 std::optional<ScanFormat> scan_format_of(const std::filesystem::path& path);

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "bin_layout.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "failure.hpp"
@@ -14,7 +15,7 @@
 namespace dynains {
 namespace {
 
-void transform(const Pose* T_target_file, RecordedScan& points) {
+void transform(const FileTransform* T_target_file, RecordedScan& points) {
   if (T_target_file == nullptr) return;
   for (std::size_t k = 0; k < points.size(); ++k) {
     Eigen::Map<Eigen::Vector3f> p(points.xyzi.data() + 4 * k);
@@ -22,28 +23,34 @@ void transform(const Pose* T_target_file, RecordedScan& points) {
   }
 }
 
-/// .bin: float32 x y z intensity.
+/// .bin: float32 x y z intensity, or other columns.
 class BinReader final : public ScanReader {
  public:
+  explicit BinReader(const BinLayout& layout) : layout_(layout) {}
+
   PointColumns columns(const ScanAddress&) const override {
     PointColumns columns;
-    columns.intensity = true;
+    columns.intensity = layout_.columns > 3;
     return columns;
   }
-  void check(const ScanAddress& scan) const override { count_scan_points(scan.file); }
+  void check(const ScanAddress& scan) const override { count_bin_points(scan.file, layout_); }
   std::uint64_t point_count(const ScanAddress& scan) const override {
-    return count_scan_points(scan.file);
+    return count_bin_points(scan.file, layout_);
   }
-  void read(const ScanAddress& scan, const Pose* T_target_file,
+  void read(const ScanAddress& scan, const FileTransform* T_target_file,
             RecordedScan& points) const override {
     points.ring.clear();
     points.time.clear();
-    read_scan(scan.file, points.xyzi);
+    const bool is_usual = layout_.columns == 4 && !layout_.is_double;
+    is_usual ? read_scan(scan.file, points.xyzi) : read_bin_points(scan.file, layout_, points.xyzi);
     transform(T_target_file, points);
   }
   std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
     fail(scan.file, "has no labels");
   }
+
+ private:
+  BinLayout layout_;
 };
 
 /// .pcd.bin: float32 x y z intensity ring.
@@ -62,7 +69,7 @@ class NuScenesReader final : public ScanReader {
     fail(scan.file, "has " + std::to_string(bytes) +
                         " bytes, expected a multiple of 20: float32 x y z intensity ring");
   }
-  void read(const ScanAddress& scan, const Pose* T_target_file,
+  void read(const ScanAddress& scan, const FileTransform* T_target_file,
             RecordedScan& points) const override {
     const std::uint64_t count = point_count(scan);
     const auto bytes = RawFile(scan.file).read(0, count * kPoint, "points");
@@ -96,7 +103,7 @@ class PointFileReader final : public ScanReader {
   std::uint64_t point_count(const ScanAddress& scan) const override {
     return read_point_file_header(scan.file).point_count;
   }
-  void read(const ScanAddress& scan, const Pose* T_target_file,
+  void read(const ScanAddress& scan, const FileTransform* T_target_file,
             RecordedScan& points) const override {
     PointFile file = read_points(scan.file);
     points.xyzi.resize(4 * file.positions.size());
@@ -129,7 +136,7 @@ class LogReader final : public ScanReader {
   std::uint64_t point_count(const ScanAddress& scan) const override {
     return scans_->point_count(scan.index);
   }
-  void read(const ScanAddress& scan, const Pose* T_target_file,
+  void read(const ScanAddress& scan, const FileTransform* T_target_file,
             RecordedScan& points) const override {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -149,8 +156,8 @@ class LogReader final : public ScanReader {
 
 }  // namespace
 
-std::unique_ptr<ScanReader> make_file_reader(ScanFormat format) {
-  if (format == ScanFormat::kBin) return std::make_unique<BinReader>();
+std::unique_ptr<ScanReader> make_file_reader(ScanFormat format, const BinLayout& layout) {
+  if (format == ScanFormat::kBin) return std::make_unique<BinReader>(layout);
   if (format == ScanFormat::kNuScenes) return std::make_unique<NuScenesReader>();
   return std::make_unique<PointFileReader>();
 }

@@ -15,6 +15,9 @@ namespace dynains {
 
 class LogScans;
 
+/// From the coordinates of a file to those that are wanted, with the unit of length.
+using FileTransform = Eigen::Transform<double, 3, Eigen::Affine, Eigen::DontAlign>;
+
 /// A scan of a recording: a file, or a cloud of a log by its index.
 struct ScanAddress {
   std::filesystem::path file;
@@ -33,16 +36,16 @@ class ScanReader {
   virtual void check(const ScanAddress& scan) const = 0;
   /// Points by the header or the size of the file.
   virtual std::uint64_t point_count(const ScanAddress& scan) const = 0;
-  /// Reads the points (m), transformed by `T_target_file` if there is one. Columns that the scan
+  /// Reads the points, transformed by `T_target_file` if there is one. Columns that the scan
   /// lacks become empty; memory of `points` is reused.
-  virtual void read(const ScanAddress& scan, const Pose* T_target_file,
+  virtual void read(const ScanAddress& scan, const FileTransform* T_target_file,
                     RecordedScan& points) const = 0;
   /// The column `label`.
   virtual std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const = 0;
 };
 
 /// For scans in files, one each.
-std::unique_ptr<ScanReader> make_file_reader(ScanFormat format);
+std::unique_ptr<ScanReader> make_file_reader(ScanFormat format, const BinLayout& layout);
 std::unique_ptr<ScanReader> make_log_reader(std::unique_ptr<LogScans> scans);
 
 }  // namespace dynains

@@ -12,6 +12,22 @@ std::string lower_case(std::string text) {
   return text;
 }
 
+std::string to_text(double value) {
+  std::ostringstream text;
+  exact(text);
+  text.precision(15);
+  text << value;
+  return text.str();
+}
+
+std::string in_seconds(double time) { return to_text(time) + " s"; }
+
+std::string_view without_utf8_mark(std::string_view text) {
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";
+  if (text.substr(0, kMark.size()) == kMark) text.remove_prefix(kMark.size());
+  return text;
+}
+
 std::optional<double> parse_number(std::string_view token) {
   if (token.size() > 1 && token[0] == '+' && token[1] != '-') token.remove_prefix(1);
   double value = 0.0;

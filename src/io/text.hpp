@@ -20,6 +20,14 @@ std::string_view next_token(std::string_view& line);
 /// The text with its ASCII letters in lower case.
 std::string lower_case(std::string text);
 
+/// The shortest form with at most 15 digits, independent of the locale.
+std::string to_text(double value);
+/// "12.5 s".
+std::string in_seconds(double time);
+
+/// The text without a mark of UTF-8 at its begin.
+std::string_view without_utf8_mark(std::string_view text);
+
 /// Makes a stream write doubles that read back exactly, independent of the locale.
 inline std::ostream& exact(std::ostream& stream) {
   stream.imbue(std::locale::classic());

@@ -167,6 +167,7 @@ Trajectory read_trajectory(const std::filesystem::path& path) {
   Trajectory trajectory;
   Columns columns;
   for (std::string line; reader.read_line(line);) {
+    if (reader.line() == 1) line = text::without_utf8_mark(line);
     std::string_view rest = line;
     const std::string_view first = text::next_token(rest);
     if (first.empty()) continue;

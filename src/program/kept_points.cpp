@@ -80,8 +80,7 @@ class ScanPoints {
  public:
   /// `scan`: memory for points that need a conversion.
   ScanPoints(const Recording& recording, std::size_t i, RecordedScan& scan) {
-    if (recording.format() == ScanFormat::kBin && recording.frame() == PointFrame::kSensor &&
-        !recording.is_deskewed()) {
+    if (recording.is_verbatim()) {
       size_ = count_scan_points(recording.file(i));
       file_.emplace(recording.file(i), kValues * size_ * sizeof(float));
       block_.resize(kValues * Block::kCapacity);

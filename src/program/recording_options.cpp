@@ -91,6 +91,25 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool 
                 "each point")
       ->group(kGroup);
   command
+      .add_option("--point-time-unit", point_time_unit_,
+                  "unit of the times of points: s, ms, us, ns, or seconds, such as 0.1 for times "
+                  "from 0 to 1 in scans of 0.1 s [auto: by their span]")
+      ->type_name("UNIT")
+      ->group(kGroup);
+  command.add_option("--point-units", point_units_, "unit of the coordinates of points [m]")
+      ->check(CLI::IsMember({"m", "cm", "mm"}))
+      ->type_name("m|cm|mm")
+      ->group(kGroup);
+  command
+      .add_option("--bin-columns", bin_columns_,
+                  "columns of .bin scans: x y z, intensity, others; float32, or float64 by a d, "
+                  "such as 3d [4]")
+      ->type_name("N|Nd")
+      ->group(kGroup);
+  command
+      .add_flag("--accept-missing", accept_missing_, "read a log although parts of it are missing")
+      ->group(kGroup);
+  command
       .add_option(
           "--extrinsic", extrinsic_,
           "pose of the lidar in the body whose poses are given (IMU, base_link, antenna): "
@@ -151,6 +170,29 @@ void RecordingFlags::complete(const std::string& folder, const nlohmann::ordered
   }
 }
 
+namespace {
+
+double metres_of(const std::string& unit) {
+  if (unit == "mm") return 0.001;
+  return unit == "cm" ? 0.01 : 1.0;
+}
+
+/// Seconds of a unit of time; 0 for "auto".
+double point_time_unit(const std::string& text) {
+  constexpr std::pair<const char*, double> kUnits[] = {
+      {"auto", 0.0}, {"s", 1.0}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}};
+  for (const auto& [name, seconds] : kUnits) {
+    if (text == name) return seconds;
+  }
+  double seconds = 0.0;
+  if (CLI::detail::lexical_cast(text, seconds) && seconds > 0.0 && std::isfinite(seconds)) {
+    return seconds;
+  }
+  throw ConfigError("--point-time-unit " + text + ": expected s, ms, us, ns or seconds above 0");
+}
+
+}  // namespace
+
 RecordingOptions RecordingFlags::options() const {
   RecordingOptions options;
   options.poses = poses_;
@@ -159,14 +201,17 @@ RecordingOptions RecordingFlags::options() const {
   options.pose_topic = pose_topic_;
   options.pose_frame = pose_frame_id_;
   options.deskew = deskew_;
+  options.point_time_unit = point_time_unit(point_time_unit_);
+  options.point_unit = metres_of(point_units_);
+  options.bin_layout = parse_bin_layout(bin_columns_);
+  options.accept_missing = accept_missing_;
   options.scene = scene_;
   options.frame = value_of_name<PointFrame>(frame_).value();
   PoseConvention& convention = options.convention;
   convention.invert = invert_;
   convention.left_handed = left_handed_;
   convention.shift = shift_;
-  if (units_ == "cm") convention.unit = 0.01;
-  if (units_ == "mm") convention.unit = 0.001;
+  convention.unit = metres_of(units_);
   convention.quaternion = value_of_name<QuaternionOrder>(quaternion_).value();
   convention.frame = value_of_name<PoseFrame>(pose_frame_).value();
   if (!extrinsic_.empty()) convention.T_body_sensor = read_extrinsic(extrinsic_);
@@ -204,6 +249,9 @@ Recording RecordingFlags::open(const std::filesystem::path& folder) const {
   if (recording.early_end()) {
     std::cerr << "dynains: warning: " << *recording.early_end() << "; "
               << recording.scan_file_count() << " scans before it are read" << std::endl;
+  }
+  for (const std::string& warning : recording.warnings()) {
+    std::cerr << "dynains: warning: " << warning << std::endl;
   }
   return recording;
 }

@@ -48,6 +48,10 @@ class RecordingFlags {
   bool left_handed_ = false;
   int shift_ = 0;
   bool deskew_ = false;
+  std::string point_time_unit_ = "auto";
+  std::string point_units_ = "m";
+  std::string bin_columns_ = "4";
+  bool accept_missing_ = false;
   std::string extrinsic_;
   std::string sensor_origin_;
   std::string sensor_frame_;

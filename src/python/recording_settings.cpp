@@ -28,7 +28,7 @@ std::string to_origin(const py::handle& value) {
   return text;
 }
 
-const std::array<Setting<RecordingOptions>, 19> kRecordingSettings{{
+const std::array<Setting<RecordingOptions>, 23> kRecordingSettings{{
     {"poses", "a path",
      "file of poses: 12 numbers a row (KITTI), time x y z qx qy qz qw (TUM), or CSV with named "
      "columns",
@@ -58,6 +58,26 @@ const std::array<Setting<RecordingOptions>, 19> kRecordingSettings{{
     {"deskew", "bool",
      "move points by the interpolated poses to the time of their scan; needs a time for each point",
      [](RecordingOptions& o, const py::handle& v) { o.deskew = to_flag(v); }},
+    {"point_time_unit", "'auto', 's', 'ms', 'us', 'ns' or float above 0",
+     "unit of the times of points, or its seconds",
+     [](RecordingOptions& o, const py::handle& v) {
+       o.point_time_unit =
+           is_text(v)
+               ? choose<double>(
+                     v, {{"auto", 0.0}, {"s", 1.0}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}})
+               : to_number(v, 1e-12, 1e12);
+     }},
+    {"point_units", "'m', 'cm' or 'mm'", "unit of the coordinates of points",
+     [](RecordingOptions& o, const py::handle& v) {
+       o.point_unit = choose<double>(v, {{"m", 1.0}, {"cm", 0.01}, {"mm", 0.001}});
+     }},
+    {"bin_columns", "str",
+     "columns of .bin scans: x y z, intensity, others; '5' for float32, '3d' for float64",
+     [](RecordingOptions& o, const py::handle& v) {
+       o.bin_layout = parse_bin_layout(py::str(v).cast<std::string>());
+     }},
+    {"accept_missing", "bool", "read a log although parts of it are missing",
+     [](RecordingOptions& o, const py::handle& v) { o.accept_missing = to_flag(v); }},
     {"extrinsic", "(4, 4) numbers, 'x y z qx qy qz qw' in m, or a path",
      "pose of the lidar in the body whose poses are given (IMU, base_link, antenna)",
      [](RecordingOptions& o, const py::handle& v) {

@@ -63,8 +63,8 @@ void add_remarks(std::ostream& text, const Diagnosis& d) {
     text << "note: more than half of the points are NaN, infinite or zero\n";
   }
   if (d.farthest > 1000.0) {
-    text << "note: ranges beyond 1 km: points seem not to be in metres, or not in the frame "
-            "of the sensor (--frame world)\n";
+    text << "note: ranges beyond 1 km: points seem not to be in metres (--point-units mm, cm), or "
+            "not in the frame of the sensor (--frame world)\n";
   } else if (d.farthest > 0.0 && d.farthest < 2.0) {
     text << "note: all ranges are below 2 m: points seem not to be in metres\n";
   }
@@ -100,6 +100,7 @@ std::string describe(const Recording& recording, const Diagnosis& d) {
            std::to_string(d.scan_files) + " files, " + std::to_string(d.pose_rows) + " poses, " +
                std::to_string(d.scans) + " scans with a pose");
   for (const std::string& note : recording.notes()) add_line(text, "", note);
+  for (const std::string& warning : recording.warnings()) add_line(text, "", "note: " + warning);
   add_line(text, "time", fixed(d.period, 3, " s from scan to scan"));
   add_line(text, "points",
            fixed(d.points, 0, " a scan, ") + fixed(100.0 * d.invalid_share, 1) + " % invalid, " +

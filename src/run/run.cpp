@@ -14,6 +14,7 @@
 #include "interrupt.hpp"
 #include "lone_scans.hpp"
 #include "output_folder.hpp"
+#include "range_check.hpp"
 #include "run_plan.hpp"
 #include "run_request.hpp"
 #include "run_sequence.hpp"
@@ -95,6 +96,22 @@ void judge_ray_origin(const RunPlan& plan, const RunSettings& settings,
   throw ConfigError(text + "; or run with these clouds by --accept-poses");
 }
 
+/// Throws IoError if nothing was judged, or nothing is static: the scans are then not what the run
+/// takes them for.
+void check_not_empty(const RunPlan& plan, const RunResults& results) {
+  if (results.finished() < plan.range.size()) return;
+  const LabelCounts& labels = results.labels();
+  const std::uint64_t kept = labels[PointLabel::kGround] + labels[PointLabel::kStatic];
+  const bool is_empty = results.map_points() && *results.map_points() == 0;
+  if (kept > 0 && !is_empty) return;
+  throw IoError(plan.sequence.folder().string() + ": the map is empty: of " +
+                std::to_string(results.points()) + " points, " + std::to_string(kept) +
+                " are static, " + std::to_string(labels[PointLabel::kDynamic]) + " moving, " +
+                std::to_string(labels[PointLabel::kOutOfRange]) + " out of range and " +
+                std::to_string(labels[PointLabel::kInvalid]) +
+                " invalid (NaN, infinite or at the origin)");
+}
+
 void warn_of_doubts(const RunPlan& plan, const RunSettings& settings, const RunListener& listener,
                     const PoseAgreement& agreement) {
   if (agreement.doubtful()) judge_poses(plan, settings, listener, agreement.as_given);
@@ -152,6 +169,8 @@ nlohmann::ordered_json marker_of(const RunPlan& plan) {
 RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
                          const RunListener& listener, OutputFolder& out, OutputChange::Mode mode,
                          OutsideMap& outside_map) {
+  check_ranges(plan.sequence, plan.range, plan.config,
+               settings.recording_flags.contains("--point-units"));
   const PoseAgreement agreement = pose_agreement(plan.sequence, plan.range.first, plan.range.last);
   warn_of_doubts(plan, settings, listener, agreement);
 
@@ -174,6 +193,7 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   const RunTiming timing = process(plan, listener, outputs.folder, results);
   RunOutcome outcome = outcome_of(plan, results, timing);
   outcome.alignment = alignment;
+  check_not_empty(plan, results);
   if (!outcome.complete) outcome.signal = InterruptGuard::signal();
   if (change.is_staged() && !outcome.complete) {
     outcome.earlier_results_stay = true;

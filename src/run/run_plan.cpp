@@ -225,6 +225,9 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
   if (settings.one_thread) outputs.thread = std::launch::deferred;
   const nlohmann::ordered_json configuration = parameters_of(config);
   nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);
+  for (const char* const flag : {"--point-units", "--point-time-unit", "--bin-columns"}) {
+    if (settings.recording_flags.contains(flag)) request[flag] = settings.recording_flags[flag];
+  }
   SessionRequest session = session_request(settings, sequence, range, configuration);
   if (!session.city.empty()) {
     request["update"] = session.city.string();

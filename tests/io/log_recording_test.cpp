@@ -8,6 +8,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
 #include "files.hpp"
+#include "io/log/decompress.hpp"
 #include "log_writer.hpp"
 #include "support/catch.hpp"
 
@@ -243,6 +244,159 @@ TEST_CASE("Flag --pose-frame-id takes the poses from transforms, in that frame")
              ContainsSubstring("expected poses of frame lidar in utm at the times of the clouds"));
 }
 
+TEST_CASE("A time offset is applied before poses of the log are taken") {
+  const TemporaryFolder folder;
+  const fs::path log = folder / "drive.mcap";
+  for (const double ahead : {0.15, 40.0}) {
+    for (const bool by_transforms : {false, true}) {
+      CAPTURE(ahead, by_transforms);
+      std::vector<WrittenMessage> messages = clouds_with("lidar", {});
+      for (int i = 0; i < 6; ++i) {
+        const double time = 1.0 + 0.1 * i + ahead;
+        messages.push_back({1, nanoseconds(time),
+                            by_transforms ? transform(time, "odom", "lidar", pose_at(i, 0))
+                                          : odometry(time, "lidar", pose_at(i, 0))});
+      }
+      write_text(log, mcap_file({kPoints, by_transforms ? kTf : kOdometry}, messages, {}));
+      RecordingOptions options;
+      options.time_offset = ahead;
+      const Recording recording(log, options);
+      REQUIRE(recording.size() == 3);
+      for (std::size_t i = 0; i < 3; ++i) {
+        CHECK(recording.T_world_sensor(i).translation().x() == Approx(i).margin(1e-6));
+      }
+      options.time_offset = ahead + 7;
+      CHECK_THAT(log_error(log, options),
+                 ContainsSubstring("found none for 3 clouds, which are from 1 s to 1.2 s (by "
+                                   "--time-offset ") &&
+                     ContainsSubstring("poses are from "));
+    }
+  }
+}
+
+TEST_CASE("An extrinsic calibration of the user stands for a transform that the log lacks") {
+  const TemporaryFolder folder;
+  const fs::path log = folder / "drive.mcap";
+  std::vector<WrittenMessage> messages;
+  for (const WrittenMessage& message : drive_by_transforms(MessageEncoding::kCdr)) {
+    if (message.channel != 2) messages.push_back(message);
+  }
+  const auto write = [&] { write_text(log, mcap_file({kPoints, kTf, kStaticTf}, messages, {})); };
+  write();
+  RecordingOptions options;
+  CHECK_THAT(log_error(log, options),
+             ContainsSubstring("--extrinsic gives the pose of lidar in base"));
+  options.convention.T_body_sensor = kT_base_lidar;
+  const auto check = [&] {
+    const Recording recording(log, options);
+    CHECK(recording.T_world_sensor(2).isApprox(pose_at(2, 0) * kT_base_lidar, 1e-9));
+    CHECK(has_note(recording, "poses of base, in which --extrinsic places the sensor"));
+  };
+  check();
+  // Wheels of the body move, too, and a static transform of the lidar leads nowhere.
+  for (int i = 0; i < 4; ++i) {
+    for (const char* wheel : {"left", "right"}) {
+      messages.push_back(
+          {1, nanoseconds(1.0 + 0.1 * i), transform(1.0 + 0.1 * i, "base", wheel, pose_at(0, i))});
+    }
+  }
+  write();
+  check();
+  messages.push_back({2, nanoseconds(1.0), transform(1.0, "mast", "lidar", kT_base_lidar)});
+  write();
+  check();
+  CHECK_THAT(log_error(log), ContainsSubstring("--extrinsic gives the pose of lidar in base"));
+  // Two bodies that nothing connects.
+  messages.push_back({1, nanoseconds(1.0), transform(1.0, "world", "trailer", pose_at(0, 0))});
+  write();
+  CHECK_THAT(log_error(log, options),
+             ContainsSubstring("expected one moving body for --extrinsic, found moving transforms "
+                               "of base, left, right, trailer"));
+}
+
+TEST_CASE("Parts of a log that are missing are named, and accepted on demand") {
+  const TemporaryFolder folder;
+  const std::vector<WrittenMessage> all = drive_by_transforms(MessageEncoding::kCdr);
+  const auto write = [&](const std::string& name, std::size_t first, std::size_t last) {
+    const auto begin = all.begin();
+    write_text(folder / name, mcap_file({kPoints, kTf, kStaticTf},
+                                        {begin + static_cast<std::ptrdiff_t>(first),
+                                         begin + static_cast<std::ptrdiff_t>(last)},
+                                        {}));
+  };
+  write("drive_0.mcap", 0, 5);
+  write("drive_1.mcap", 5, 9);
+  CHECK(Recording(folder.path()).size() == 4);
+  write_text(folder / "metadata.yaml",
+             "rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths:\n    - "
+             "drive/drive_0.mcap\n    - \"drive_1.mcap.zstd\"\n  duration:\n    nanoseconds: 3\n");
+  CHECK(Recording(folder.path()).size() == 4);
+  CHECK(Recording(folder.path()).warnings().empty());
+
+  fs::remove(folder / "drive_1.mcap");
+  CHECK(
+      log_error(folder.path()) ==
+      folder.path().string() +
+          ": 1 of 2 parts of the log are missing: drive_1.mcap; --accept-missing reads the others");
+  RecordingOptions options;
+  options.accept_missing = true;
+  const Recording half(folder.path(), options);
+  CHECK(half.size() == 2);
+  CHECK(half.warnings() ==
+        std::vector<std::string>{"1 of 2 parts of the log are missing: drive_1.mcap"});
+
+  fs::remove(folder / "metadata.yaml");
+  CHECK(Recording(folder.path()).size() == 2);
+  write("drive_2.mcap", 5, 9);
+  CHECK_THAT(log_error(folder.path()),
+             ContainsSubstring("1 of 3 parts of the log are missing: drive_1"));
+  write("other.mcap", 5, 9);
+  CHECK_THAT(log_error(folder.path()), ContainsSubstring("has 3 logs (drive_0.mcap, drive_2.mcap, "
+                                                         "other.mcap) and no metadata.yaml"));
+}
+
+TEST_CASE("Messages that rosbag2 compressed are read, and compressed files are named") {
+  const TemporaryFolder folder;
+  std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
+  for (WrittenMessage& message : messages) message.data = compressed("zstd", message.data);
+  write_text(folder / "drive.mcap", mcap_file({kPoints, kTf, kStaticTf}, messages, {}));
+#if defined(DYNAINS_HAS_SQLITE3)
+  write_db3(folder / "drive.db3", {kPoints, kTf, kStaticTf}, messages);
+#endif
+  std::vector<std::uint8_t> bytes, spare;
+  const std::string frame = compressed("zstd", "a");
+  bytes.assign(frame.begin(), frame.end());
+  if (decompress_frame(bytes, spare).empty()) {
+    check_drive(folder / "drive.mcap");
+#if defined(DYNAINS_HAS_SQLITE3)
+    check_drive(folder / "drive.db3");
+#endif
+    messages[2].data.resize(messages[2].data.size() - 1);
+    write_text(folder / "cut.mcap", mcap_file({kPoints, kTf, kStaticTf}, messages, {}));
+    CHECK_THAT(log_error(folder / "cut.mcap"), ContainsSubstring("/points at 1030000000 ns: "));
+  } else {
+    CHECK_THAT(log_error(folder / "drive.mcap"), ContainsSubstring("this build has no zstd"));
+  }
+
+  const fs::path part = folder / "bag/drive_0.mcap.zstd";
+  write_text(part, "no matter");
+  write_text(folder / "bag/metadata.yaml", "  relative_file_paths:\n    - drive_0.mcap.zstd\n");
+  const std::string expected =
+      part.string() + ": is compressed as a whole; decompress it: zstd -d --rm " + part.string();
+  CHECK(log_error(folder / "bag") == expected);
+  CHECK(log_error(part) == expected);
+}
+
+TEST_CASE("A bag whose recorder still runs is read") {
+  const TemporaryFolder folder;
+  write_text(folder / "drive.bag.active",
+             bag_file({{"/points", "sensor_msgs/PointCloud2"},
+                       {"/tf", "tf/tfMessage"},
+                       {"/tf_static", "tf2_msgs/TFMessage"}},
+                      drive_by_transforms(MessageEncoding::kRos1), {}));
+  check_drive(folder / "drive.bag.active");
+}
+
 TEST_CASE("Contradictory poses and clouds are refused with their place") {
   const TemporaryFolder folder;
   const fs::path log = folder / "drive.mcap";
@@ -265,7 +419,9 @@ TEST_CASE("Contradictory poses and clouds are refused with their place") {
        "found a loop above frame lidar"},
       {kOdometry,
        {odometry(50, "", pose_at(0, 0))},
-       "expected poses of frame lidar in odom at the times of the clouds, found none"},
+       "expected poses of frame lidar in odom at the times of the clouds, found none for 3 clouds, "
+       "which are from 1 s to 1.2 s; poses are from 50 s to 50 s. If the clocks differ, "
+       "--time-offset"},
   };
   for (const Case& one : cases) {
     write_text(log, mcap_file({kPoints, one.poses}, clouds_with("lidar", one.messages), {}));

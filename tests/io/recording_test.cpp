@@ -383,3 +383,153 @@ TEST_CASE("Two scans with one name are refused") {
   CHECK(error.find("a.pcd") != std::string::npos);
   CHECK(error.find("a.PCD") != std::string::npos);
 }
+
+namespace {
+
+/// Points of a floor in rows; `columns` values each, the fourth and later ones 7.
+template <class Number>
+std::string raw_scan(int columns, int points = 300) {
+  std::string bytes;
+  for (int i = 0; i < points; ++i) {
+    for (int column = 0; column < columns; ++column) {
+      const double values[] = {5.0 + 0.05 * (i % 100), 2.0 + 0.5 * (i / 100), -1.5};
+      const auto value = static_cast<Number>(column < 3 ? values[column] : 7.0);
+      bytes.append(reinterpret_cast<const char*>(&value), sizeof(value));
+    }
+  }
+  return bytes;
+}
+
+std::string row12(double x) { return "1 0 0 " + std::to_string(x) + " 0 1 0 0 0 0 1 0\n"; }
+
+}  // namespace
+
+TEST_CASE("Raw scans with other columns are refused with the option, and read with it") {
+  const TemporaryFolder folder;
+  write_text(folder / "poses.txt", row12(0));
+  const fs::path file = folder / "velodyne/000000.bin";
+  struct Case {
+    std::string bytes;
+    std::string option;
+  };
+  // 300 points of 3, 5, 6 or 8 floats are a multiple of 16 bytes, too.
+  for (const Case& one :
+       {Case{raw_scan<float>(3), "3"}, Case{raw_scan<float>(5), "5"}, Case{raw_scan<float>(6), "6"},
+        Case{raw_scan<double>(3), "3d"}, Case{raw_scan<double>(4), "4d"}}) {
+    CAPTURE(one.option);
+    write_text(file, one.bytes);
+    CHECK_THAT(error_of(folder.path()),
+               StartsWith(file.string() + ": does not ") && ContainsSubstring("--bin-columns"));
+    RecordingOptions options;
+    options.bin_layout = parse_bin_layout(one.option);
+    const Recording recording(folder.path(), options);
+    const RecordedScan scan = recording.read_scan(0);
+    REQUIRE(scan.size() == 300);
+    CHECK(recording.point_count(0) == 300);
+    CHECK_FALSE(recording.is_verbatim());
+    CHECK(scan.xyzi[4 * 101] == 5.05F);
+    CHECK(scan.xyzi[4 * 101 + 2] == -1.5F);
+    CHECK(scan.xyzi[3] == (options.bin_layout.columns > 3 ? 7.0F : 0.0F));
+    CHECK(recording.columns().intensity == (options.bin_layout.columns > 3));
+  }
+  write_text(file, raw_scan<float>(4));
+  CHECK(Recording(folder.path()).is_verbatim());
+  CHECK(Recording(folder.path()).read_scan(0).xyzi[4 * 101] == 5.05F);
+  write_text(file, raw_scan<float>(5, 299));
+  CHECK_THAT(message_of<IoError>([&] { Recording(folder.path()).check_scan(0); }),
+             ContainsSubstring("truncated at byte 5980: expected a multiple of 16 bytes") &&
+                 ContainsSubstring("299 points of 5 columns of float32 by --bin-columns 5"));
+  for (const char* wrong : {"", "d", "2", "65", "4.5", "4f"}) {
+    CHECK_THAT(message_of<ConfigError>([&] { parse_bin_layout(wrong); }),
+               ContainsSubstring(": expected 3 to 64"));
+  }
+}
+
+TEST_CASE("Coordinates in millimetres become metres, also in the world frame") {
+  const TemporaryFolder folder;
+  write_text(folder / "1.pcd", pcd({100000, 0, 0}, "100 0 0 0.70710678 0 0 0.70710678"));
+  write_text(folder / "2.pcd", pcd({101000, 0, 0}, "101 0 0 0.70710678 0 0 0.70710678"));
+  RecordingOptions options;
+  options.point_unit = 0.001;
+  const Recording world(folder.path(), options);
+  CHECK(world.frame() == PointFrame::kWorld);
+  CHECK(Eigen::Vector3f(world.read_scan(1).xyzi.data())
+            .isApprox(Eigen::Vector3f(0.0F, -0.001F, 0.0F), 1e-3F));
+  options.frame = PointFrame::kSensor;
+  CHECK(Recording(folder.path(), options).read_scan(0).xyzi[0] == Approx(100.001F));
+}
+
+TEST_CASE("Poses may begin with a mark of UTF-8") {
+  const TemporaryFolder folder;
+  write_text(folder / "velodyne/000000.bin", std::string(16, 'B'));
+  for (const std::string& rows : {row12(7), tum(1, 7)}) {
+    write_text(folder / "poses.txt", "\xEF\xBB\xBF" + rows);
+    CHECK(Recording(folder.path()).T_world_sensor(0).translation().x() == 7.0);
+  }
+  write_text(folder / "times.txt",
+             "\xEF\xBB\xBF"
+             "2.5\n");
+  CHECK(Recording(folder.path()).time(0) == 2.5);
+}
+
+TEST_CASE("Rows of KITTI-360 belong to the scans of their number") {
+  const TemporaryFolder folder;
+  for (const char* name : {"0000000001", "0000000002", "0000000004"}) {
+    write_text(folder / "velodyne" / (std::string(name) + ".bin"), std::string(16, 'B'));
+  }
+  write_text(folder / "poses.txt", "1 " + row12(10) + "3 " + row12(30) + "4 " + row12(40));
+  const Recording recording(folder.path());
+  REQUIRE(recording.size() == 2);
+  CHECK(recording.T_world_sensor(1).translation().x() == 40.0);
+  CHECK(recording.time(1) - recording.time(0) == Approx(0.3));
+  CHECK(recording.missing_pose_count() == 1);
+  // Times of a matrix are no numbers of scans.
+  write_text(folder / "poses.txt", "0.5 " + row12(10) + "1.5 " + row12(30) + "4 " + row12(40));
+  CHECK(Recording(folder.path()).time(2) == 4.0);
+}
+
+TEST_CASE("Names of 19 digits are times") {
+  const TemporaryFolder folder;
+  for (const char* name : {"1566535940000000000", "1566535940100000000"}) {
+    write_text(folder / "velodyne" / (std::string(name) + ".bin"), std::string(16, 'B'));
+  }
+  write_text(folder / "poses.txt",
+             "1566535940000000000 " + row12(1) + "1566535940100000000 " + row12(2));
+  const Recording recording(folder.path());
+  REQUIRE(recording.size() == 2);
+  CHECK(recording.time(1) - recording.time(0) == Approx(0.1));
+  CHECK(recording.T_world_sensor(1).translation().x() == 2.0);
+}
+
+TEST_CASE("Folders of SC-LIO-SAM, KITTI raw and hdl_graph_slam are read") {
+  const TemporaryFolder folder;
+  write_text(folder / "sc/Scans/000000.pcd", pcd({1, 0, 0}));
+  write_text(folder / "sc/optimized_poses.txt", row12(3));
+  CHECK(Recording(folder / "sc").T_world_sensor(0).translation().x() == 3.0);
+
+  write_text(folder / "raw/velodyne_points/data/0000000000.bin", std::string(16, 'B'));
+  write_text(folder / "raw/poses.txt", row12(4));
+  CHECK(Recording(folder / "raw").T_world_sensor(0).translation().x() == 4.0);
+
+  const auto data = [](int nanoseconds, double x) {
+    return "stamp 1700000000 " + std::to_string(nanoseconds) + "\nestimate\n1 0 0 " +
+           std::to_string(x) +
+           "\n0 1 0 2\n0 0 1 3\n0 0 0 1\nodom\n1 0 0 99\n0 1 0 0\n0 0 1 0\n0 0 "
+           "0 1\naccum_distance -1\nid 1\n";
+  };
+  const fs::path dump = folder / "dump";
+  write_text(dump / "000000/cloud.pcd", pcd({1, 0, 0}));
+  write_text(dump / "000000/data", data(0, 5));
+  write_text(dump / "000001/cloud.pcd", pcd({1, 0, 0}));
+  write_text(dump / "000001/data", data(500000000, 6));
+  const Recording recording(dump);
+  REQUIRE(recording.size() == 2);
+  CHECK(recording.name(1) == "000001");
+  CHECK(recording.time(1) == 1700000000.5);
+  CHECK(recording.T_world_sensor(1).translation().isApprox(Eigen::Vector3d(6, 2, 3)));
+  CHECK(recording.read_scan(1).size() == 3);
+  write_text(dump / "000001/data", "stamp 1700000001 0\n");
+  CHECK_THAT(error_of(dump), StartsWith((dump / "000001/data").string() + ": expected a line"));
+  write_text(dump / "000001/data", "stamp 1700000001 0\nestimate\n1 0 0\n");
+  CHECK_THAT(error_of(dump), ContainsSubstring("data:3: expected 4 finite numbers"));
+}

@@ -25,7 +25,7 @@ SerialisedMessage view(const std::string& bytes, MessageEncoding encoding) {
 
 RecordedScan decode(const std::string& bytes, MessageEncoding encoding) {
   RecordedScan scan;
-  read_cloud("sensor_msgs/PointCloud2", view(bytes, encoding), scan);
+  read_cloud("sensor_msgs/PointCloud2", view(bytes, encoding), nullptr, scan);
   return scan;
 }
 
@@ -62,6 +62,37 @@ TEST_CASE("Clouds of any layout are read, from ROS 1 and ROS 2") {
   }
 }
 
+TEST_CASE("Clouds may be big-endian, and their row step may be that of another cloud") {
+  const auto message = [](std::uint8_t is_big_endian, std::uint32_t row_step, std::uint32_t rows,
+                          const std::string& data) {
+    FieldWriter out(MessageEncoding::kRos1);
+    out.header(1.0, "l").number(rows).number(std::uint32_t{2}).number(std::uint32_t{3});
+    for (const CloudField& field : kXyz) {
+      out.string(field.name).number(field.offset).number(field.type).number(std::uint32_t{1});
+    }
+    out.number(is_big_endian).number(std::uint32_t{12}).number(row_step);
+    out.number(static_cast<std::uint32_t>(data.size())).raw(data).number(std::uint8_t{1});
+    return out.text();
+  };
+  const std::vector<float> values = {1, 2, 3, 4, 5, 6};
+  std::string swapped;
+  for (const float value : values) {
+    const std::string bytes = xyz_of({value});
+    swapped.append(bytes.rbegin(), bytes.rend());
+  }
+  const std::vector<float> expected = {1, 2, 3, 0, 4, 5, 6, 0};
+  CHECK(decode(message(0, 24, 1, xyz_of(values)), MessageEncoding::kRos1).xyzi == expected);
+  CHECK(decode(message(1, 24, 1, swapped), MessageEncoding::kRos1).xyzi == expected);
+  const std::string two_rows = xyz_of(values) + xyz_of({7, 8, 9, 1, 1, 1});
+  for (const std::uint32_t row_step : {0U, 24U, 4000U}) {
+    CAPTURE(row_step);
+    CHECK(decode(message(0, row_step, 2, two_rows), MessageEncoding::kRos1).xyzi[8] == 7.0F);
+  }
+  CHECK_THAT(message_of<IoError>(
+                 [&] { decode(message(0, 4000, 2, two_rows + "1234"), MessageEncoding::kRos1); }),
+             ContainsSubstring("expected 2 rows of 4000 bytes, found 52 bytes"));
+}
+
 TEST_CASE("Absolute times of points become relative to the stamp") {
   ByteWriter data;
   for (int i = 0; i < 2; ++i) data.raw(xyz_of({1, 2, 3})).number(1000.0 + 0.05 * i);
@@ -88,7 +119,7 @@ TEST_CASE("Livox messages are read as clouds") {
       out.number(std::uint8_t{99}).number(std::uint8_t{0}).number(static_cast<std::uint8_t>(i));
     }
     RecordedScan scan;
-    read_cloud("livox_ros_driver/CustomMsg", view(out.text(), encoding), scan);
+    read_cloud("livox_ros_driver/CustomMsg", view(out.text(), encoding), nullptr, scan);
     REQUIRE(scan.size() == 2);
     CHECK(scan.xyzi[6] == 4.0F);
     CHECK(scan.xyzi[7] == 99.0F);

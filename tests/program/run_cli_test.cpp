@@ -1066,3 +1066,59 @@ TEST_CASE("a run without ground truth leaves a picture, also without a map") {
   CHECK(side(16) == 800);
   CHECK(side(20) == 3 * (800 + 22) + 2 * 8 + 22);
 }
+
+TEST_CASE("Coordinates in millimetres are refused before any output, and read by --point-units") {
+  const Fixture fixture;
+  REQUIRE(fixture.run().code == 0);
+  const std::string label = fixture.out + "/labels/" + scan_name(5) + ".label";
+  const std::string before = read_text(label);
+  const auto counts = fixture.report()["labels"];
+  for (std::size_t i = 0; i < 12; ++i) {
+    std::vector<float> scan = tiny_scan(i);
+    for (std::size_t k = 0; k < scan.size(); ++k) scan[k] *= k % 4 == 3 ? 1.0F : 1000.0F;
+    write_scan(fs::path(fixture.seq) / "velodyne" / (scan_name(i) + ".bin"), scan);
+  }
+  const Outcome refused = fixture.run({"--force"});
+  CHECK(refused.code == 2);
+  CHECK_THAT(refused.err, ContainsSubstring("0.0 % of the points can be judged") &&
+                              ContainsSubstring("--point-units mm"));
+  CHECK(read_text(label) == before);
+  CHECK(fixture.report()["complete"] == true);
+  CHECK(start({"run", fixture.seq, "--out", fixture.out + "2"}).code == 2);
+  CHECK_FALSE(fs::exists(fixture.out + "2/labels"));
+  CHECK_THAT(start({"check", fixture.seq}).out, ContainsSubstring("--point-units mm"));
+
+  REQUIRE(fixture.run({"--force", "--point-units", "mm"}).code == 0);
+  for (const char* name : {"ground", "static", "dynamic"}) {
+    CAPTURE(name);
+    CHECK(fixture.report()["labels"][name].get<double>() ==
+          Approx(counts[name].get<double>()).epsilon(0.01));
+  }
+  // The map of remap is in metres, too: the flag comes from the report of the run.
+  REQUIRE(start({"remap", fixture.seq, fixture.out, "--poses", fixture.seq + "/poses.txt"}).code ==
+          0);
+  for (const Eigen::Vector3d& p : read_points(fixture.out + "/static_map_remapped.ply").positions) {
+    REQUIRE(p.norm() < 100.0);
+  }
+}
+
+TEST_CASE("A run that judges nothing is no success, and keeps earlier results") {
+  const Fixture fixture;
+  REQUIRE(fixture.run().code == 0);
+  const std::string label = fixture.out + "/labels/" + scan_name(5) + ".label";
+  const std::string before = read_text(label);
+  for (std::size_t i = 0; i < 12; ++i) {
+    write_scan(fs::path(fixture.seq) / "velodyne" / (scan_name(i) + ".bin"),
+               std::vector<float>(4000, 0.0F));
+  }
+  for (const char* build_map : {"true", "false"}) {
+    const Outcome outcome = fixture.run({"--force", "--build-map", build_map});
+    CHECK(outcome.code == 1);
+    CHECK_THAT(outcome.err,
+               ContainsSubstring(fixture.seq + ": the map is empty: of 12000 points, 0 are static, "
+                                               "0 moving, 0 out of range and 12000 invalid"));
+    CHECK(read_text(label) == before);
+  }
+  CHECK(start({"run", fixture.seq, "--out", fixture.out + "2"}).code == 1);
+  CHECK(nlohmann::json::parse(read_text(fixture.out + "2/report.json"))["complete"] == false);
+}

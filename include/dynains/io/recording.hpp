@@ -29,6 +29,15 @@ enum class PointFrame {
 /// Names as in options.
 constexpr std::array<const char*, 3> value_names(PointFrame) { return {"auto", "sensor", "world"}; }
 
+/// Columns of a raw scan (.bin): x y z, intensity, and others that are ignored.
+struct BinLayout {
+  int columns = 4;         ///< values of a point, [3, 64]
+  bool is_double = false;  ///< float64 instead of float32
+};
+
+/// "4" for columns of float32, "4d" for float64. Throws ConfigError.
+BinLayout parse_bin_layout(const std::string& text);
+
 struct RecordingOptions {
   std::filesystem::path poses;  ///< trajectory file; empty: search the recording
   std::filesystem::path times;  ///< file with one time per scan, s; empty: search the recording
@@ -48,6 +57,10 @@ struct RecordingOptions {
   Eigen::Vector3d sensor_origin = Eigen::Vector3d::Zero();
   /// For logs: frame of the sensor; its transform to the frame of the clouds gives the origin.
   std::string sensor_frame;
+  double point_time_unit = 0.0;  ///< s per unit of the times of points; 0: found by their span
+  double point_unit = 1.0;       ///< m per unit of the coordinates of points
+  BinLayout bin_layout;          ///< of scans in .bin files
+  bool accept_missing = false;   ///< for logs: whether parts may be missing
 };
 
 /// One scan. Each column has one value per point, or is empty if the recording lacks it.
@@ -74,29 +87,35 @@ enum class ScanFormat { kBin, kPcd, kPly, kLas, kNpy, kNpz, kXyz, kCsv, kNuScene
 
 class LogScans;
 class ScanReader;
+struct PointClock;
+struct PointClockFinding;
 struct ScanAddress;
 
 /// Recorded scans with poses. Supported recordings:
 ///
 /// - KITTI and SemanticKITTI: see KittiSequence. With `options.poses`, poses.txt may be missing.
 /// - Folder of point files (see read_points()), directly in the folder or in a subfolder (clouds,
-///   lidar, pcd, ply, points, scans, velodyne). Beside .pcd, .ply or .bin files, files of the other
-///   formats are no scans. Scans are ordered by name, with numbers in names by value.
-/// - Folder of .bin files in the format of KITTI.
+///   lidar, pcd, ply, points, scans, Scans, velodyne, velodyne_points/data). Beside .pcd, .ply or
+///   .bin files, files of the other formats are no scans. Scans are ordered by name, with numbers
+///   in names by value.
+/// - Folder of .bin files in the format of KITTI, or with RecordingOptions::bin_layout.
+/// - Folder of keyframes as hdl_graph_slam dumps them: a folder NNNNNN for each scan, with
+/// cloud.pcd
+///   and `data` (stamp and estimate).
 /// - nuScenes: a folder with samples/, sweeps/ and v1.0-*/, or the folder of its tables. Scans are
 ///   the .pcd.bin files of one scene; poses and times are those of sample_data.json, ego_pose.json
 ///   and calibrated_sensor.json.
-/// - ROS log: .mcap, .db3 or .bag, or a folder with metadata.yaml and .mcap or .db3 files. The
-///   constructor reads the log once; points stay in the file. Scans are the clouds of one topic,
-///   named by their number, with the times of their stamps.
+/// - ROS log: .mcap, .db3 or .bag, or a folder of such files: with metadata.yaml, or one file, or
+///   parts NAME_0, NAME_1, ... The constructor reads the log once; points stay in the file. Scans
+///   are the clouds of one topic, named by their number, with the times of their stamps.
 ///
 /// Two scan files whose names differ only in the extension are an error.
 ///
 /// Poses: the first available of
 /// 1. `options.poses`;
 /// 2. VIEWPOINT, if any scan has one;
-/// 3. poses.txt, poses.csv, poses.tum, trajectory.txt, trajectory.csv or trajectory.tum, in the
-///    folder or beside the folder of the scans (see read_trajectory).
+/// 3. poses.txt, poses.csv, poses.tum, trajectory.txt, trajectory.csv, trajectory.tum or
+///    optimized_poses.txt, in the folder or beside the folder of the scans (see read_trajectory).
 ///
 /// Times: the first available of
 /// 1. `options.times`;
@@ -105,6 +124,9 @@ struct ScanAddress;
 ///    1970; SECONDS_NANOSECONDS);
 /// 4. the times of the pose rows, if the numbers of rows and scans are equal;
 /// 5. intervals of 0.1 s.
+///
+/// Rows of a matrix whose times are whole numbers belong to the scans of these numbers, as in
+/// KITTI-360, if scans have no times.
 ///
 /// calib.txt is in the folder or beside the file of poses. An unreadable calib.txt is an error only
 /// if the poses are those of a camera. Rows without times are assigned to scans by order, or by the
@@ -147,10 +169,14 @@ class Recording {
   bool is_deskewed() const { return options_.deskew; }
   /// Position of the sensor in the frame of the clouds, m.
   const Eigen::Vector3d& sensor_origin() const { return options_.sensor_origin; }
+  /// Whether files hold points as read_scan() gives them: float32 x y z intensity.
+  bool is_verbatim() const;
   /// Path, position and reason if a log is truncated. The clouds before that position are valid.
   const std::optional<std::string>& early_end() const { return early_end_; }
   /// Automatic choices of files, frames and times, and excluded scans, one sentence each.
   const std::vector<std::string>& notes() const { return notes_; }
+  /// Defects of the recording that results depend on, one sentence each.
+  const std::vector<std::string>& warnings() const { return warnings_; }
 
   /// File name of scan i without extension.
   const std::string& name(std::size_t i) const { return scans_.at(i).name; }
@@ -167,7 +193,8 @@ class Recording {
   void check_scan(std::size_t i) const;
   /// Reads scan i, m, sensor frame, and reuses the memory of `scan`. May contain NaN and infinity.
   /// With RecordingOptions::deskew, the poses of the recording between the scans are interpolated
-  /// at the time of each point; times of points keep their values.
+  /// at the time of each point; times of points keep their values. Points whose time cannot be that
+  /// of their scan keep their place.
   void read_scan(std::size_t i, RecordedScan& scan) const;
   RecordedScan read_scan(std::size_t i) const;
   /// One label per point of scan i.
@@ -205,9 +232,12 @@ class Recording {
   void take_sensor_frame(const LogScans& log);
   void open_nuscenes(const std::filesystem::path& tables);
   void list_scans();
+  void list_keyframes(const std::vector<std::filesystem::path>& folders);
+  bool find_scan_folder();
   void check_names() const;
   void read_poses();
   void read_viewpoints();
+  void read_keyframes();
   void read_calibration(const std::filesystem::path& poses_file);
   std::filesystem::path find_poses() const;
   std::filesystem::path find_beside(const std::filesystem::path& poses_file,
@@ -216,6 +246,7 @@ class Recording {
   std::optional<std::vector<double>> times_of_names() const;
   void match_scans(const std::filesystem::path& poses_file);
   void match_rows(const std::filesystem::path& poses_file);
+  bool match_indices();
   void note_rows(const std::filesystem::path& poses_file);
   void shift_times(const std::filesystem::path& poses_file);
   void match_times(const std::filesystem::path& poses_file, const std::vector<double>& times);
@@ -224,7 +255,11 @@ class Recording {
   Pose pose_of(const PoseConvention& convention, const TrajectoryMatch& match) const;
   PointFrame guess_frame() const;
   Pose to_sensor_pose(const PoseConvention& convention, const Pose& pose) const;
+  std::optional<Eigen::Transform<double, 3, Eigen::Affine, Eigen::DontAlign>> T_sensor_file(
+      std::size_t i) const;
   void prepare_deskewing();
+  void find_point_clock();
+  void take_clock(const PointClockFinding& finding);
   ScanAddress address(std::size_t i) const;
 
   std::filesystem::path folder_;
@@ -236,16 +271,20 @@ class Recording {
   Labels labels_ = Labels::kNone;
   PointColumns columns_;
   bool numbered_ = false;  ///< all names are numbers
+  bool has_times_ = true;  ///< times of scans are measured, and not 0.1 s apart for want of any
+  bool has_keyframes_ = false;  ///< each scan lies in a folder with its pose
   bool has_viewpoints_ = false;
   bool has_calibration_ = false;
   Pose Tr_ = Pose::Identity();  ///< of calib.txt
   Trajectory trajectory_;
   std::vector<std::optional<TrajectoryMatch>> matches_;  ///< per scan file
   Trajectory motion_;                                    ///< T_world_sensor, for de-skewing
+  std::shared_ptr<const PointClock> clock_;              ///< for de-skewing
   std::vector<Scan> scans_;
   std::vector<std::filesystem::path> files_;  ///< without files of labels
   std::optional<std::string> early_end_;
   std::vector<std::string> notes_;
+  std::vector<std::string> warnings_;
 };
 
 }  // namespace dynains

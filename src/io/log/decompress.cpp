@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <iterator>
 
 #if defined(DYNAINS_HAS_BZ2)
 #include <bzlib.h>
@@ -178,6 +179,25 @@ std::string decompress(const std::string& method,
     if (method == known) return "this build has no " + known + " (Debian: lib" + known + "-dev)";
   }
   return "expected lz4, zstd, bz2 or none, found \"" + method + '"';
+}
+
+std::string decompress_frame(std::vector<std::uint8_t>& bytes, std::vector<std::uint8_t>& spare) {
+  constexpr std::uint8_t kMagic[] = {0x28, 0xB5, 0x2F, 0xFD};
+  if (bytes.size() < sizeof(kMagic) ||
+      !std::equal(std::begin(kMagic), std::end(kMagic), bytes.begin())) {
+    return {};
+  }
+#if defined(DYNAINS_HAS_ZSTD)
+  const auto size = ZSTD_getFrameContentSize(bytes.data(), bytes.size());
+  if (size == ZSTD_CONTENTSIZE_ERROR) return "expected a frame of zstd";
+  if (size == ZSTD_CONTENTSIZE_UNKNOWN) return "expected a frame of zstd that tells its size";
+  std::string error = decompress("zstd", bytes, size, spare);
+  bytes.swap(spare);
+  return error;
+#else
+  static_cast<void>(spare);
+  return "this build has no zstd (Debian: libzstd-dev)";
+#endif
 }
 
 bool has_crc32() {

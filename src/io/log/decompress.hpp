@@ -14,6 +14,10 @@ namespace dynains {
 std::string decompress(const std::string& method, const std::vector<std::uint8_t>& input,
                        std::uint64_t size, std::vector<std::uint8_t>& output);
 
+/// Replaces a whole frame of zstd by its content, as rosbag2 compresses messages; `spare` is memory
+/// for that. Other bytes stay. Returns an empty text, or the reason why that is not possible.
+std::string decompress_frame(std::vector<std::uint8_t>& bytes, std::vector<std::uint8_t>& spare);
+
 /// Whether this build has zlib, and with it crc32().
 bool has_crc32();
 

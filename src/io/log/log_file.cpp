@@ -1,14 +1,13 @@
 #include "log_file.hpp"
 
 #include <algorithm>
-#include <system_error>
 
 #include "../failure.hpp"
 #include "../input_file.hpp"
+#include "log_folder.hpp"
 #include "mcap.hpp"
 #include "ros_bag.hpp"
 #if defined(DYNAINS_HAS_SQLITE3)
-#include "../text.hpp"
 #include "sqlite_bag.hpp"
 #endif
 
@@ -17,30 +16,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string extension_of(const fs::path& path) {
-  return text::lower_case(path.extension().string());
-}
-
-bool is_log_name(const fs::path& path) {
-  const std::string extension = extension_of(path);
-  return extension == ".mcap" || extension == ".bag" || extension == ".db3";
-}
-
-/// The logs directly in a folder, by name.
-std::vector<fs::path> logs_in_folder(const fs::path& folder) {
-  std::vector<fs::path> logs;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    if (is_log_name(entry->path())) logs.push_back(entry->path());
-  }
-  if (error) fail(folder, "cannot be listed: " + error.message());
-  std::sort(logs.begin(), logs.end());
-  return logs;
-}
-
 std::unique_ptr<LogFile> open_file(const fs::path& path) {
-  const std::string extension = extension_of(path);
+  const std::string extension = log_extension(path);
+  if (is_compressed_log(path) && !extension.empty()) {
+    fail(path, "is compressed as a whole; decompress it: zstd -d --rm " + path.string());
+  }
   if (extension == ".mcap") return std::make_unique<McapFile>(path);
   if (extension == ".bag") return std::make_unique<RosBag>(path);
 #if defined(DYNAINS_HAS_SQLITE3)
@@ -54,8 +34,10 @@ std::unique_ptr<LogFile> open_file(const fs::path& path) {
 /// A log that rosbag2 split into several files.
 class SplitLog final : public LogFile {
  public:
-  SplitLog(const fs::path& folder, const std::vector<fs::path>& files) : LogFile(folder) {
-    for (const fs::path& file : files) {
+  SplitLog(const fs::path& folder, const LogParts& parts)
+      : LogFile(folder), metadata_(parts.metadata) {
+    missing_parts_ = parts.missing;
+    for (const fs::path& file : parts.files) {
       parts_.push_back(open_file(file));
       add(*parts_.back(), static_cast<std::uint32_t>(parts_.size() - 1));
       parts_.back()->release();
@@ -64,7 +46,8 @@ class SplitLog final : public LogFile {
   }
 
   std::vector<fs::path> files() const override {
-    std::vector<fs::path> files = {path_ / "metadata.yaml"};
+    std::vector<fs::path> files;
+    if (metadata_) files.push_back(*metadata_);
     for (const auto& part : parts_) files.push_back(part->path());
     return files;
   }
@@ -87,6 +70,7 @@ class SplitLog final : public LogFile {
     }
   }
 
+  std::optional<fs::path> metadata_;
   std::vector<std::unique_ptr<LogFile>> parts_;
   std::size_t last_part_ = 0;  ///< the part that was read last
 };
@@ -109,13 +93,19 @@ void LogFile::finish_index() {
 }
 
 bool is_log(const fs::path& path) {
-  if (!is_folder(path)) return is_log_name(path);
-  return is_file(path / "metadata.yaml") && !logs_in_folder(path).empty();
+  if (!is_folder(path)) return !log_extension(path).empty();
+  return is_file(path / "metadata.yaml") && has_logs(path);
 }
 
-std::unique_ptr<LogFile> open_log(const fs::path& path) {
+bool has_logs(const fs::path& folder) { return !logs_in_folder(folder).empty(); }
+
+std::unique_ptr<LogFile> open_log(const fs::path& path, bool accept_missing) {
   if (!is_folder(path)) return open_file(path);
-  return std::make_unique<SplitLog>(path, logs_in_folder(path));
+  const LogParts parts = find_parts(path);
+  if (parts.missing && !accept_missing) {
+    fail(path, *parts.missing + "; --accept-missing reads the others");
+  }
+  return std::make_unique<SplitLog>(path, parts);
 }
 
 std::string plain_type(std::string type) {

@@ -53,6 +53,8 @@ class LogFile {
   const std::vector<LogMessage>& messages() const { return messages_; }
   /// Path, position and reason, if the log ends early.
   const std::optional<std::string>& early_end() const { return early_end_; }
+  /// Which parts are missing, if the log has several and some are not there.
+  const std::optional<std::string>& missing_parts() const { return missing_parts_; }
 
   /// Replaces `bytes` by the serialised message. Memory of `bytes` is reused.
   virtual void read(const LogMessage& message, std::vector<std::uint8_t>& bytes) = 0;
@@ -70,16 +72,21 @@ class LogFile {
   std::vector<LogTopic> topics_;
   std::vector<LogMessage> messages_;
   std::optional<std::string> early_end_;
+  std::optional<std::string> missing_parts_;
 };
 
-/// Whether `path` is a log by its name: *.mcap, *.bag, *.db3, or a folder with metadata.yaml and
-/// one or more of these. Throws IoError if the system cannot tell.
+/// Whether `path` is a log by its name: *.mcap, *.bag, *.bag.active, *.db3, one of these compressed
+/// as a whole (which open_log() refuses), or a folder with metadata.yaml and one or more of these.
+/// Throws IoError if the system cannot tell.
 bool is_log(const std::filesystem::path& path);
 
-/// Opens a log of ROS 1 (.bag) or ROS 2 (.mcap, .db3, or a folder with one or more of these beside
-/// metadata.yaml). Throws IoError, also if this build lacks the library that the format needs; the
-/// message names its package.
-std::unique_ptr<LogFile> open_log(const std::filesystem::path& path);
+/// Whether files with the name of a log lie directly in a folder. Throws IoError.
+bool has_logs(const std::filesystem::path& folder);
+
+/// Opens a log of ROS 1 (.bag) or ROS 2 (.mcap, .db3), or a folder with the parts of one. Throws
+/// IoError, also for parts that are missing unless these are accepted, and if this build lacks the
+/// library that the format needs; the message names its package.
+std::unique_ptr<LogFile> open_log(const std::filesystem::path& path, bool accept_missing = false);
 
 /// "sensor_msgs/msg/PointCloud2" of ROS 2 as in ROS 1.
 std::string plain_type(std::string type);

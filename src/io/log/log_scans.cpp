@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "../failure.hpp"
+#include "../text.hpp"
+#include "decompress.hpp"
 
 namespace dynains {
 namespace {
@@ -60,11 +62,12 @@ std::string joined(const std::vector<std::string>& names) {
 }  // namespace
 
 LogScans::LogScans(const std::filesystem::path& path, const LogChoice& choice)
-    : log_(open_log(path)), choice_(choice) {
+    : log_(open_log(path, choice.accept_missing)), choice_(choice) {
   choose_cloud_topic();
   if (choice.with_poses) choose_pose_topic();
   read_log();
   check_clouds();
+  if (columns_.time) find_point_clock();
   if (choice.with_poses) place_scans();
   if (log_->early_end()) notes_.push_back(*log_->early_end());
 }
@@ -175,25 +178,56 @@ void LogScans::check_clouds() {
   notes_.push_back(count + ", and are left out");
 }
 
+void LogScans::find_point_clock() {
+  const PointClock raw;
+  RecordedScan scan;
+  point_clock_ = find_clock(
+      times_, true, choice_.point_time_unit, [&](std::size_t i) -> const auto& {
+        const LogMessage& message = clouds_[i];
+        read_cloud(log_->topics()[message.topic].type, load(message), &raw, scan);
+        return scan;
+      });
+}
+
 void LogScans::place_scans() {
-  if (!pose_topic_) pose_frame_ = world_frame();
+  posed_frame_ = cloud_frame_;
+  if (!pose_topic_) choose_frames();
   is_in_world_ = pose_topic_ && cloud_frame_ == pose_frame_ && cloud_frame_ != pose_child_;
   if (pose_topic_ && !is_in_world_) describe_extrinsic();
   if (transforms_.left_out() > 0) {
     notes_.push_back(std::to_string(transforms_.left_out()) +
                      " transforms contradict earlier ones of their frame, and are left out");
   }
-  for (const double time : times_) {
+  for (const double stamp : times_) {
+    const double time = stamp + choice_.time_offset;
     const std::optional<Pose> T_world_sensor = pose_at(time);
     if (!T_world_sensor) continue;
     trajectory_.times.push_back(time);
     trajectory_.poses.push_back(*T_world_sensor);
   }
-  if (trajectory_.poses.empty()) {
-    fail(log_->path(), "expected poses of frame " +
-                           (pose_child_.empty() ? cloud_frame_ : pose_child_) + " in " +
-                           pose_frame_ + " at the times of the clouds, found none");
+  if (2 * trajectory_.poses.size() < times_.size()) fail_without_poses();
+}
+
+/// Names both ranges of time, for the usual reason is two clocks.
+void LogScans::fail_without_poses() const {
+  const std::vector<double> poses = pose_topic_ ? poses_.times : transforms_.times();
+  const std::size_t found = trajectory_.poses.size();
+  std::string text = "expected poses of frame " +
+                     (pose_child_.empty() ? posed_frame_ : pose_child_) + " in " + pose_frame_ +
+                     " at the times of the clouds, found " +
+                     (found == 0 ? "none" : std::to_string(found)) + " for " +
+                     std::to_string(size()) + " clouds, which are from " +
+                     text::in_seconds(times_.front()) + " to " + text::in_seconds(times_.back());
+  if (choice_.time_offset != 0.0) {
+    text += " (by --time-offset " + text::in_seconds(choice_.time_offset) + " later)";
   }
+  if (!poses.empty()) {
+    text += "; poses are from " + text::in_seconds(poses.front()) + " to " +
+            text::in_seconds(poses.back());
+  }
+  fail(log_->path(), text +
+                         ". If the clocks differ, --time-offset S takes the pose at t + S for a "
+                         "cloud at t");
 }
 
 std::optional<Pose> LogScans::T_cloud_frame(const std::string& frame) const {
@@ -213,20 +247,46 @@ Trajectory LogScans::motion() const {
   return motion;
 }
 
-/// The fixed frame of poses from transforms: that of the options, or the root of the tree.
-std::string LogScans::world_frame() const {
-  if (!transforms_.has(cloud_frame_)) {
-    fail(log_->path(), "expected a transform of frame " + cloud_frame_ +
-                           ", that of the clouds; found transforms of " +
-                           joined(transforms_.frames()));
+/// The fixed frame of poses from transforms is that of the options, or the root of the tree.
+void LogScans::choose_frames() {
+  const bool is_led = !choice_.pose_frame.empty() || transforms_.is_moving(cloud_frame_) ||
+                      transforms_.moving_frames().empty();
+  if (!transforms_.has(cloud_frame_) || !is_led) {
+    posed_frame_ = body_frame();
+    notes_.push_back("poses of " + posed_frame_ +
+                     ", in which --extrinsic places the sensor: the log has no transform between "
+                     "the two");
   }
-  const std::optional<std::string> root = transforms_.root_of(cloud_frame_);
+  const std::optional<std::string> root = transforms_.root_of(posed_frame_);
   if (!root) {
     fail(log_->path(), "expected transforms that form a tree of at most " +
                            std::to_string(TransformTree::kDeepest) +
-                           " levels, found a loop or more above frame " + cloud_frame_);
+                           " levels, found a loop or more above frame " + posed_frame_);
   }
-  return choice_.pose_frame.empty() ? *root : choice_.pose_frame;
+  pose_frame_ = choice_.pose_frame.empty() ? *root : choice_.pose_frame;
+}
+
+/// The frame of the robot whose pose in the world transforms give.
+std::string LogScans::body_frame() const {
+  const std::vector<std::string> moving = transforms_.moving_frames();
+  if (!choice_.has_extrinsic) {
+    const bool is_known = transforms_.has(cloud_frame_);
+    const std::string body = moving.empty() ? std::string("that frame") : moving.front();
+    fail(
+        log_->path(),
+        std::string("expected a ") + (is_known ? "moving transform above" : "transform of") +
+            " frame " + cloud_frame_ + ", that of the clouds; found " +
+            (is_known ? "moving transforms of " + joined(moving)
+                      : "transforms of " + joined(transforms_.frames())) +
+            ". If the log lacks the calibration, --extrinsic gives the pose of " + cloud_frame_ +
+            " in " + body +
+            (is_known ? "; if the sensor stands still, --pose-frame-id names the frame it stands in"
+                      : ""));
+  }
+  const std::optional<std::string> body = transforms_.moving_body();
+  if (body) return *body;
+  fail(log_->path(),
+       "expected one moving body for --extrinsic, found moving transforms of " + joined(moving));
 }
 
 /// Poses of a topic are those of a frame of the robot, mostly not of the sensor.
@@ -247,7 +307,7 @@ void LogScans::describe_extrinsic() {
 
 /// T_world_sensor at `time`, s.
 std::optional<Pose> LogScans::pose_at(double time) const {
-  if (!pose_topic_) return transforms_.find(pose_frame_, cloud_frame_, time);
+  if (!pose_topic_) return transforms_.find(pose_frame_, posed_frame_, time);
   const std::optional<TrajectoryMatch> match = match_time(poses_, time);
   if (!match) return std::nullopt;
   const Pose T_world_child =
@@ -262,14 +322,19 @@ std::optional<Pose> LogScans::pose_at(double time) const {
 SerialisedMessage LogScans::load(const LogMessage& message) {
   const LogTopic& topic = log_->topics()[message.topic];
   log_->read(message, bytes_);
-  return {
-      bytes_.data(), bytes_.size(), topic.encoding,
-      log_->path().string() + ": " + topic.name + " at " + std::to_string(message.time) + " ns"};
+  std::string place =
+      log_->path().string() + ": " + topic.name + " at " + std::to_string(message.time) + " ns";
+  if (topic.encoding == MessageEncoding::kCdr) {
+    const std::string error = decompress_frame(bytes_, compressed_);
+    if (!error.empty()) throw IoError(place + ": " + error);
+  }
+  return {bytes_.data(), bytes_.size(), topic.encoding, std::move(place)};
 }
 
 void LogScans::read(std::size_t i, RecordedScan& scan) {
   const LogMessage& message = clouds_.at(i);
-  read_cloud(log_->topics()[message.topic].type, load(message), scan);
+  const PointClock* const clock = point_clock_.clock ? &*point_clock_.clock : nullptr;
+  read_cloud(log_->topics()[message.topic].type, load(message), clock, scan);
 }
 
 std::vector<std::uint32_t> LogScans::read_labels(std::size_t i) {

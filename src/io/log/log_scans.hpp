@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "../point_clock.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "dynains/pose.hpp"
 #include "log_file.hpp"
@@ -22,6 +23,11 @@ struct LogChoice {
   std::string pose_frame;        ///< the fixed frame, if poses come from transforms
   bool with_poses = true;        ///< false: the log's poses are not used
   bool with_transforms = false;  ///< transforms are read even if its poses are not used
+  double point_time_unit = 0.0;  ///< s per unit of times of points; 0: to be found
+  double time_offset = 0.0;      ///< s; a cloud at time t has the pose at t + time_offset
+  /// Whether the user gives the pose of the sensor in the body, which transforms then may lack.
+  bool has_extrinsic = false;
+  bool accept_missing = false;  ///< whether parts of the log may be missing
 };
 
 /// Finds the cloud topic and the poses of a log. Reads it once from begin to end, checks every
@@ -35,9 +41,10 @@ class LogScans {
   std::size_t size() const { return clouds_.size(); }
   /// Stamps of the clouds, s, increasing.
   const std::vector<double>& times() const { return times_; }
-  /// T_world_sensor at the times of the scans that have a pose; empty without poses.
+  /// T_world_sensor (T_world_body if the extrinsic calibration is the user's), at the times of the
+  /// scans that have a pose plus `time_offset`; empty without poses.
   const Trajectory& trajectory() const { return trajectory_; }
-  /// T_world_sensor at all times of poses, for de-skewing.
+  /// As trajectory(), at all times of poses, for de-skewing.
   Trajectory motion() const;
   /// Whether the frame of the clouds is the fixed frame of the poses.
   bool is_in_world() const { return is_in_world_; }
@@ -50,6 +57,8 @@ class LogScans {
   const PointColumns& columns() const { return columns_; }
   std::size_t point_count(std::size_t i) const { return point_counts_.at(i); }
   const std::vector<std::string>& notes() const { return notes_; }
+  /// How times of points were understood. read() makes them seconds after the stamp.
+  const PointClockFinding& point_clock() const { return point_clock_; }
 
   void read(std::size_t i, RecordedScan& scan);
   std::vector<std::uint32_t> read_labels(std::size_t i);
@@ -61,8 +70,11 @@ class LogScans {
   void take_cloud(const LogMessage& message);
   void take_poses(const LogMessage& message);
   void check_clouds();
+  void find_point_clock();
   void place_scans();
-  std::string world_frame() const;
+  void choose_frames();
+  std::string body_frame() const;
+  void fail_without_poses() const;
   void describe_extrinsic();
   std::optional<Pose> pose_at(double time) const;
   SerialisedMessage load(const LogMessage& message);
@@ -72,19 +84,22 @@ class LogScans {
   std::uint32_t cloud_topic_ = 0;
   std::optional<std::uint32_t> pose_topic_;  ///< without, poses come from transforms
   std::string cloud_frame_;
-  std::string pose_frame_;  ///< fixed frame of the poses
-  std::string pose_child_;  ///< moving frame of the poses; empty: the sensor
+  std::string pose_frame_;   ///< fixed frame of the poses
+  std::string posed_frame_;  ///< whose poses come from transforms: the sensor, or a body
+  std::string pose_child_;   ///< moving frame of the poses; empty: the sensor
   std::vector<LogMessage> clouds_;
   std::vector<double> times_;
   std::vector<std::size_t> point_counts_;
   std::size_t disordered_ = 0;  ///< clouds whose stamp is not after that of the cloud before
   PointColumns columns_;
+  PointClockFinding point_clock_;
   Trajectory poses_;  ///< of the pose topic
   TransformTree transforms_;
   bool is_in_world_ = false;
   Trajectory trajectory_;
   std::vector<std::string> notes_;
   std::vector<std::uint8_t> bytes_;
+  std::vector<std::uint8_t> compressed_;
 };
 
 }  // namespace dynains

@@ -21,7 +21,10 @@ PointCloud2::PointCloud2(MessageReader& in) {
   height_ = in.number<std::uint32_t>("a height");
   width_ = in.number<std::uint32_t>("a width");
   read_fields(in);
-  if (in.number<std::uint8_t>("is_bigendian") != 0) in.fail("expected little-endian points");
+  const bool is_big_endian = in.number<std::uint8_t>("is_bigendian") != 0;
+  for (Field* const field : {&x, &y, &z, &intensity, &ring, &time, &label}) {
+    field->is_big_endian = is_big_endian;
+  }
   point_step_ = in.number<std::uint32_t>("a point step");
   row_step_ = in.number<std::uint32_t>("a row step");
   const std::uint32_t bytes = in.length(1, "data");
@@ -83,7 +86,7 @@ void PointCloud2::read_fields(MessageReader& in) {
       in.fail("expected a datatype from 1 to 8 of field " + name + ", found " +
               std::to_string(datatype));
     }
-    *field = {true, offset, *type};
+    *field = {true, offset, *type, false};
   }
 }
 
@@ -101,10 +104,10 @@ void PointCloud2::check_fields(const MessageReader& in) const {
   }
 }
 
-/// Rows may be padded; some drivers leave the row step 0.
+/// Rows may be padded; some drivers leave the row step 0, or that of the cloud before a filter.
 void PointCloud2::check_size(const MessageReader& in, std::uint64_t bytes) {
   const std::uint64_t packed = width_ * point_step_;
-  if (height_ == 1 || row_step_ < packed) row_step_ = packed;
+  if (height_ == 1 || row_step_ < packed || packed * height_ == bytes) row_step_ = packed;
   if (packed <= bytes && (bytes - packed) / row_step_ >= height_ - 1) return;
   in.fail("expected " + std::to_string(height_) + " rows of " + std::to_string(row_step_) +
           " bytes, found " + std::to_string(bytes) + " bytes");

@@ -19,9 +19,10 @@ class PointCloud2 {
     bool is_there = false;
     std::uint32_t offset = 0;  ///< bytes from the begin of a point
     Scalar type = Scalar::kFloat;
+    bool is_big_endian = false;
 
     double value(const std::uint8_t* point) const {
-      return load_scalar(type, reinterpret_cast<const char*>(point) + offset, false);
+      return load_scalar(type, reinterpret_cast<const char*>(point) + offset, is_big_endian);
     }
     bool is_integer() const { return type != Scalar::kFloat && type != Scalar::kDouble; }
   };

@@ -59,17 +59,18 @@ StampedPose read_transform(MessageReader& in) {
   return {header.time, header.frame, std::move(child), read_pose(in)};
 }
 
-/// Converts times of points (seconds, or nanoseconds if integer) to seconds after the stamp.
-void make_relative(bool is_integer, double stamp, std::vector<double>& times) {
+/// The clock of times whose meaning nobody told: seconds, or nanoseconds if integer or huge.
+PointClock usual_clock(bool is_integer, const std::vector<double>& times) {
   constexpr double kLongestScan = 10.0;  // s
   constexpr double kNanoseconds = 1e14;  // of an absolute time; as seconds it is in year 3170000
   double least = std::numeric_limits<double>::infinity();
   for (const double time : times) {
     if (std::isfinite(time)) least = std::min(least, time);
   }
-  const double unit = is_integer || least > kNanoseconds ? 1e-9 : 1.0;
-  const double origin = std::abs(least * unit) > kLongestScan ? stamp : 0.0;
-  for (double& time : times) time = time * unit - origin;
+  PointClock clock;
+  clock.unit = is_integer || least > kNanoseconds ? 1e-9 : 1.0;
+  clock.is_absolute = std::abs(least * clock.unit) > kLongestScan;
+  return clock;
 }
 
 std::uint16_t ring_of(double value) {
@@ -82,7 +83,7 @@ void resize(RecordedScan& scan, std::size_t points, const PointColumns& columns)
   scan.time.resize(columns.time ? points : 0);
 }
 
-void read_point_cloud2(MessageReader& in, RecordedScan& scan) {
+void read_point_cloud2(MessageReader& in, const PointClock* clock, RecordedScan& scan) {
   const double stamp = read_header(in).time;
   const PointCloud2 cloud(in);
   resize(scan, cloud.size(), cloud.columns());
@@ -97,7 +98,9 @@ void read_point_cloud2(MessageReader& in, RecordedScan& scan) {
     if (cloud.ring.is_there) scan.ring[i] = ring_of(cloud.ring.value(point));
     if (cloud.time.is_there) scan.time[i] = cloud.time.value(point);
   }
-  make_relative(cloud.time.is_integer(), stamp, scan.time);
+  const PointClock seconds =
+      clock != nullptr ? *clock : usual_clock(cloud.time.is_integer(), scan.time);
+  for (double& time : scan.time) time = seconds.after(stamp, time);
 }
 
 PointColumns livox_columns() {
@@ -118,12 +121,15 @@ std::uint32_t read_livox_size(MessageReader& in) {
   return in.length(kLeastPoint, "points");
 }
 
-void read_livox(MessageReader& in, RecordedScan& scan) {
-  read_header(in);
+void read_livox(MessageReader& in, const PointClock* clock, RecordedScan& scan) {
+  const double stamp = read_header(in).time;
+  PointClock seconds;
+  seconds.unit = 1e-9;
+  if (clock != nullptr) seconds = *clock;
   const std::uint32_t points = read_livox_size(in);
   resize(scan, points, livox_columns());
   for (std::uint32_t i = 0; i < points; ++i) {
-    scan.time[i] = 1e-9 * static_cast<double>(in.number<std::uint32_t>("an offset time"));
+    scan.time[i] = seconds.after(stamp, in.number<std::uint32_t>("an offset time"));
     float* const xyzi = scan.xyzi.data() + 4 * std::size_t{i};
     for (int axis = 0; axis < 3; ++axis) xyzi[axis] = in.number<float>("a coordinate");
     xyzi[3] = static_cast<float>(in.number<std::uint8_t>("a reflectivity"));
@@ -166,9 +172,10 @@ CloudInfo inspect_cloud(const std::string& type, const SerialisedMessage& messag
   return {header.time, header.frame, cloud.size(), cloud.columns()};
 }
 
-void read_cloud(const std::string& type, const SerialisedMessage& message, RecordedScan& scan) {
+void read_cloud(const std::string& type, const SerialisedMessage& message, const PointClock* clock,
+                RecordedScan& scan) {
   MessageReader in(message);
-  is_livox(type) ? read_livox(in, scan) : read_point_cloud2(in, scan);
+  is_livox(type) ? read_livox(in, clock, scan) : read_point_cloud2(in, clock, scan);
 }
 
 std::vector<std::uint32_t> read_cloud_labels(const std::string& type,

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "../point_clock.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/pose.hpp"
 #include "log_file.hpp"
@@ -57,12 +58,14 @@ CloudInfo inspect_cloud(const std::string& type, const SerialisedMessage& messag
 ///   x y z      float32 or float64
 ///   intensity  also i, reflectivity: any type
 ///   ring       also channel, line: any type
-///   time       also t, timestamp, time_stamp, offset_time: seconds if floating-point, nanoseconds
-///              if integer. `scan.time` is relative to the stamp, s.
+///   time       also t, timestamp, time_stamp, offset_time: by `clock`. `scan.time` is relative to
+///              the stamp, s.
 ///
-/// A floating-point time above 1e14 is in nanoseconds. Times that are more than 10 s are absolute.
-/// Throws IoError that begins with the place of the message.
-void read_cloud(const std::string& type, const SerialisedMessage& message, RecordedScan& scan);
+/// Without a clock (null), times are seconds if floating-point, and nanoseconds if integer or above
+/// 1e14; if they are more than 10 s, they are absolute. Throws IoError that begins with the place
+/// of the message.
+void read_cloud(const std::string& type, const SerialisedMessage& message, const PointClock* clock,
+                RecordedScan& scan);
 
 /// The field `label` (also class) of a PointCloud2.
 std::vector<std::uint32_t> read_cloud_labels(const std::string& type,

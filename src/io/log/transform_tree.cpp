@@ -69,6 +69,54 @@ std::optional<std::string> TransformTree::root_of(const std::string& frame) cons
   return root;
 }
 
+/// `frame` and the frames above it, at most kDeepest.
+std::vector<std::string> TransformTree::frames_above(const std::string& frame) const {
+  std::vector<std::string> frames = {frame};
+  for (auto edge = edges_.find(frame); edge != edges_.end() && frames.size() <= kDeepest;
+       edge = edges_.find(frames.back())) {
+    frames.push_back(edge->second.parent);
+  }
+  return frames;
+}
+
+bool TransformTree::is_moving(const std::string& frame) const {
+  const std::vector<std::string> frames = frames_above(frame);
+  return std::any_of(frames.begin(), frames.end(), [this](const std::string& one) {
+    const auto edge = edges_.find(one);
+    return edge != edges_.end() && !edge->second.is_static;
+  });
+}
+
+std::vector<std::string> TransformTree::moving_frames() const {
+  std::vector<std::string> names;
+  for (const auto& [name, edge] : edges_) {
+    if (!edge.is_static) names.push_back(name);
+  }
+  return names;
+}
+
+std::optional<std::string> TransformTree::moving_body() const {
+  std::map<std::string, std::size_t> below;  // moving frames at or below each frame
+  std::vector<std::string> longest;
+  const std::vector<std::string> moving = moving_frames();
+  for (const std::string& frame : moving) {
+    const std::vector<std::string> chain = frames_above(frame);
+    for (const std::string& one : chain) ++below[one];
+    if (chain.size() > longest.size()) longest = chain;
+  }
+  // Every moving frame lies above the body, or at or below it.
+  std::size_t above = 0;
+  std::optional<std::string> body;
+  for (auto frame = longest.rbegin(); frame != longest.rend(); ++frame) {
+    const bool is_moving = std::binary_search(moving.begin(), moving.end(), *frame);
+    if (!is_moving) continue;
+    if (below[*frame] + above < moving.size()) break;
+    body = *frame;
+    ++above;
+  }
+  return body;
+}
+
 /// `source` and the frames above it, as far as transforms lead at that time.
 std::vector<TransformTree::Step> TransformTree::climb(const std::string& source,
                                                       double time) const {

@@ -37,6 +37,13 @@ class TransformTree {
   /// The frame above `frame` that has no parent; nothing if the frames above it form a loop
   /// or are more than kDeepest.
   std::optional<std::string> root_of(const std::string& frame) const;
+  /// Whether a moving transform leads to `frame` from a frame above it.
+  bool is_moving(const std::string& frame) const;
+  /// Frames with a moving transform to their parent.
+  std::vector<std::string> moving_frames() const;
+  /// The lowest of the moving frames that all others lie above or below: the body of a robot, also
+  /// if its wheels move. Nothing if there is none.
+  std::optional<std::string> moving_body() const;
   /// T_target_source at `time` (s), by the nearest frame above both. Nothing if there is none, or
   /// if a moving edge on the way has no pose at that time (see match_time()).
   std::optional<Pose> find(const std::string& target, const std::string& source, double time) const;
@@ -57,6 +64,7 @@ class TransformTree {
     Pose T_frame_source = Pose::Identity();
   };
 
+  std::vector<std::string> frames_above(const std::string& frame) const;
   std::vector<Step> climb(const std::string& source, double time) const;
 
   std::map<std::string, Edge> edges_;  ///< by child

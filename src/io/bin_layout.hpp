@@ -1,0 +1,37 @@
+// Columns of raw scans (.bin).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "dynains/io/recording.hpp"
+
+namespace dynains {
+
+inline std::size_t value_size(const BinLayout& layout) {
+  return layout.is_double ? sizeof(double) : sizeof(float);
+}
+inline std::size_t point_size(const BinLayout& layout) {
+  return static_cast<std::size_t>(layout.columns) * value_size(layout);
+}
+
+/// "float32 x y z intensity", "5 columns of float32".
+std::string to_text(const BinLayout& layout);
+
+/// Number of points by the size of the file. Throws IoError, which names other layouts that fit,
+/// unless the size is a multiple of that of a point.
+std::uint64_t count_bin_points(const std::filesystem::path& file, const BinLayout& layout);
+
+/// Reads x y z intensity of each point, interleaved; without a fourth column, intensities are 0.
+void read_bin_points(const std::filesystem::path& file, const BinLayout& layout,
+                     std::vector<float>& xyzi);
+
+/// Throws IoError if the content of the file speaks against float32 x y z intensity, and for
+/// another layout: numbers are as points have them only as float64, or neighbours in the file are
+/// neighbours in space only with another number of columns.
+void check_bin_content(const std::filesystem::path& file);
+
+}  // namespace dynains

@@ -1,0 +1,179 @@
+#include "point_clock.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "text.hpp"
+
+namespace dynains {
+namespace {
+
+constexpr double kUnits[] = {1.0, 1e-3, 1e-6, 1e-9};
+constexpr double kAbsolute = 10.0;       // s; larger times count from the origin of stamps
+constexpr double kUsualPeriod = 0.1;     // s
+constexpr double kShortestShare = 0.05;  // of the interval between scans
+
+bool has_return(const float* xyz) {
+  const float sum = std::abs(xyz[0]) + std::abs(xyz[1]) + std::abs(xyz[2]);
+  return std::isfinite(sum) && sum > 0.0F;
+}
+
+/// Finite times of the points with a return.
+std::vector<double> times_with_return(const RecordedScan& scan) {
+  std::vector<double> times;
+  times.reserve(scan.time.size());
+  for (std::size_t k = 0; k < scan.time.size(); ++k) {
+    if (std::isfinite(scan.time[k]) && has_return(scan.xyzi.data() + 4 * k)) {
+      times.push_back(scan.time[k]);
+    }
+  }
+  return times;
+}
+
+PointTimes range_of(const std::vector<double>& times, double least, double most) {
+  PointTimes range{std::numeric_limits<double>::infinity(),
+                   -std::numeric_limits<double>::infinity()};
+  for (const double time : times) {
+    if (!(least <= time && time <= most)) continue;
+    range.first = std::min(range.first, time);
+    range.last = std::max(range.last, time);
+  }
+  return range;
+}
+
+}  // namespace
+
+PointTimes times_of_scan(const RecordedScan& scan, const PointClock& clock) {
+  constexpr double kFinite = std::numeric_limits<double>::max();
+  const double longest = clock.longest_scan / clock.unit;
+  const PointTimes all = range_of(scan.time, -kFinite, kFinite);
+  if (all.is_empty() || all.last - all.first <= longest) return all;
+  const std::vector<double> times = times_with_return(scan);
+  if (times.empty()) return {};
+  const double middle = median(times);
+  return range_of(times, middle - longest, middle + longest);
+}
+
+void PointClockSearch::add(double stamp, const RecordedScan& scan) {
+  Sample sample{stamp, times_with_return(scan)};
+  if (sample.times.empty()) return;
+  std::sort(sample.times.begin(), sample.times.end());
+  points_ += sample.times.size();
+  samples_.push_back(std::move(sample));
+}
+
+double PointClockSearch::Sample::quantile(double share) const {
+  const double rank = std::round(share * static_cast<double>(times.size() - 1));
+  return times[static_cast<std::size_t>(rank)];
+}
+
+/// A unit that is given decides alone, also for scans that overlap.
+double PointClockSearch::longest_scan() const {
+  const bool is_known = period_ > 0.0 && !(unit_ > 0.0);
+  return is_known ? std::min(kLongestScan, 1.5 * period_) : kLongestScan;
+}
+
+double PointClockSearch::shortest_scan() const {
+  const double period = period_ > 0.0 ? std::min(period_, kUsualPeriod) : kUsualPeriod;
+  return kShortestShare * period;
+}
+
+/// Points whose time is farther from the median of their scan than a scan takes.
+std::size_t PointClockSearch::count_outside(double unit) const {
+  const double longest = longest_scan() / unit;
+  std::size_t inside = 0;
+  for (const Sample& sample : samples_) {
+    const double middle = sample.median();
+    const auto first = std::lower_bound(sample.times.begin(), sample.times.end(), middle - longest);
+    const auto last = std::upper_bound(first, sample.times.end(), middle + longest);
+    inside += static_cast<std::size_t>(last - first);
+  }
+  return points_ - inside;
+}
+
+/// Time that the middle 90 % of the points of a scan take, s.
+double PointClockSearch::duration(double unit) const {
+  std::vector<double> durations;
+  for (const Sample& sample : samples_) {
+    durations.push_back(unit * (sample.quantile(0.95) - sample.quantile(0.05)));
+  }
+  return median(std::move(durations));
+}
+
+/// Whether times look like shares of a scan, from 0 to 1.
+bool PointClockSearch::is_share() const {
+  return std::all_of(samples_.begin(), samples_.end(), [](const Sample& sample) {
+    return sample.quantile(0.01) >= 0.0 && sample.quantile(0.99) <= 1.0 &&
+           sample.quantile(0.95) > 0.85;
+  });
+}
+
+std::optional<double> PointClockSearch::find_unit() const {
+  constexpr double kNoGap = 0.125;  // s; scans that are farther apart may be some of all scans
+  // Scans with a given unit may have more garbage.
+  const auto fits = [this](double unit) { return 10 * count_outside(unit) <= points_; };
+  if (unit_ > 0.0) {
+    return 2 * count_outside(unit_) < points_ ? std::optional<double>(unit_) : std::nullopt;
+  }
+  const auto unit = std::find_if(std::begin(kUnits), std::end(kUnits), fits);
+  const bool is_plausible = unit != std::end(kUnits) && duration(*unit) >= shortest_scan();
+  if (!is_share()) return is_plausible ? std::optional<double>(*unit) : std::nullopt;
+  // Seconds of a slow sensor, or shares of a scan.
+  if (is_plausible && *unit == 1.0) return std::nullopt;
+  if (is_plausible) return *unit;
+  if (period_ > 0.0 && period_ <= kNoGap) return period_;
+  return std::nullopt;
+}
+
+/// "0 to 0.0997 (quantiles ...)", the values of a scan in the middle of the sample.
+std::string PointClockSearch::found() const {
+  const Sample& sample = samples_[samples_.size() / 2];
+  std::string text = "times of points from " + text::to_text(sample.quantile(0.05)) + " to " +
+                     text::to_text(sample.quantile(0.95)) + " (without the first and the last 5 %)";
+  return period_ > 0.0 ? text + " in scans that are " + text::to_text(period_) + " s apart" : text;
+}
+
+std::string PointClockSearch::outside_text(double unit) const {
+  const std::size_t outside = count_outside(unit);
+  if (outside == 0) return {};
+  const Sample& sample = samples_[samples_.size() / 2];
+  return std::to_string(outside) + " of " + std::to_string(points_) + " points in " +
+         std::to_string(samples_.size()) +
+         " scans have times that cannot be those of their scan (" +
+         text::to_text(sample.times.front()) + " to " + text::to_text(sample.times.back()) +
+         ", with the median " + text::to_text(sample.median()) + ")";
+}
+
+PointClockFinding PointClockSearch::result() const {
+  if (samples_.empty()) return {std::nullopt, "found no point with a return and a finite time"};
+  const std::string option =
+      "; --point-time-unit tells the unit: s, ms, us, ns, or seconds, such as 0.1 for times from 0 "
+      "to 1 in scans of 0.1 s";
+  constexpr std::size_t kFewPoints = 3;  // in a scan; they may have one time by chance
+  if (duration(1.0) == 0.0) {
+    if (points_ <= kFewPoints * samples_.size()) return {};
+    return {std::nullopt, "expected times that differ from point to point, found " + found()};
+  }
+  const std::optional<double> unit = find_unit();
+  if (!unit) {
+    return {std::nullopt,
+            "expected times in s, ms, us or ns that fit the interval of scans, found " + found() +
+                option};
+  }
+  PointClock clock;
+  clock.unit = *unit;
+  clock.longest_scan = longest_scan();
+  const Sample& sample = samples_[samples_.size() / 2];
+  clock.is_absolute = std::abs(clock.unit * sample.median()) > kAbsolute;
+  const std::string outside = outside_text(clock.unit);
+  std::string text;
+  if (clock.unit == period_ && !(unit_ > 0.0) && is_share()) {
+    text =
+        "times of points from 0 to 1 count as shares of a scan of " + text::to_text(period_) + " s";
+  }
+  if (!outside.empty()) text += (text.empty() ? "" : "; ") + outside + ": they keep their place";
+  return {clock, text};
+}
+
+}  // namespace dynains
