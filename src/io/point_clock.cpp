@@ -31,6 +31,9 @@ std::vector<double> times_with_return(const RecordedScan& scan) {
   return times;
 }
 
+/// In s, rounded to us.
+std::string rounded(double period) { return text::to_text(1e-6 * std::round(1e6 * period)); }
+
 PointTimes range_of(const std::vector<double>& times, double least, double most) {
   PointTimes range{std::numeric_limits<double>::infinity(),
                    -std::numeric_limits<double>::infinity()};
@@ -131,7 +134,7 @@ std::string PointClockSearch::found() const {
   const Sample& sample = samples_[samples_.size() / 2];
   std::string text = "times of points from " + text::to_text(sample.quantile(0.05)) + " to " +
                      text::to_text(sample.quantile(0.95)) + " (without the first and the last 5 %)";
-  return period_ > 0.0 ? text + " in scans that are " + text::to_text(period_) + " s apart" : text;
+  return period_ > 0.0 ? text + " in scans that are " + rounded(period_) + " s apart" : text;
 }
 
 std::string PointClockSearch::outside_text(double unit) const {
@@ -169,8 +172,7 @@ PointClockFinding PointClockSearch::result() const {
   const std::string outside = outside_text(clock.unit);
   std::string text;
   if (clock.unit == period_ && !(unit_ > 0.0) && is_share()) {
-    text =
-        "times of points from 0 to 1 count as shares of a scan of " + text::to_text(period_) + " s";
+    text = "times of points from 0 to 1 count as shares of a scan of " + rounded(period_) + " s";
   }
   if (!outside.empty()) text += (text.empty() ? "" : "; ") + outside + ": they keep their place";
   return {clock, text};

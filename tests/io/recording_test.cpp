@@ -435,10 +435,10 @@ TEST_CASE("Raw scans with other columns are refused with the option, and read wi
   write_text(file, raw_scan<float>(4));
   CHECK(Recording(folder.path()).is_verbatim());
   CHECK(Recording(folder.path()).read_scan(0).xyzi[4 * 101] == 5.05F);
-  write_text(file, raw_scan<float>(5, 299));
+  write_text(file, raw_scan<float>(5, 21));
   CHECK_THAT(message_of<IoError>([&] { Recording(folder.path()).check_scan(0); }),
-             ContainsSubstring("truncated at byte 5980: expected a multiple of 16 bytes") &&
-                 ContainsSubstring("299 points of 5 columns of float32 by --bin-columns 5"));
+             ContainsSubstring("truncated at byte 420: expected a multiple of 16 bytes") &&
+                 ContainsSubstring("21 points of 5 columns of float32 by --bin-columns 5"));
   for (const char* wrong : {"", "d", "2", "65", "4.5", "4f"}) {
     CHECK_THAT(message_of<ConfigError>([&] { parse_bin_layout(wrong); }),
                ContainsSubstring(": expected 3 to 64"));
