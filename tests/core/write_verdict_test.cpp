@@ -196,15 +196,7 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
     Random random(seed);
     JudgedScan scan(random);
     detail::ScanSlot& slot = scan.slot;
-    const bool has_windows = random.index(2) == 0;
     const std::size_t above = scan.group_of.size();
-    if (has_windows) {
-      for (std::size_t i = 0; i < above; ++i) {
-        slot.windows.stage.push_back(kStages[random.index(4)]);
-        slot.windows.votes.push_back(static_cast<std::uint8_t>(random.index(4)));
-        slot.windows.belief.push_back(random.uniform_float(0.0, 1.0));
-      }
-    }
     std::vector<EvidenceVerdict::Group> groups(kGroups);
     groups[0] = {Cause::kNotJudged, 0.0F};
     std::vector<EvidenceVerdict::GroundPoint> moved;
@@ -217,17 +209,11 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
         if (random.index(5) == 0) moved.push_back({i, {Cause::kUnderInstance, 0.75F}});
       }
     };
-    const auto check = [&](int votes, bool is_final) {
+    const auto check = [&](bool is_final) {
       const ScanVerdict verdict = writer.verdict(slot);
       for (std::size_t i = 0; i < above; ++i) {
         const std::uint32_t to = slot.split.input[scan.ground + i];
-        EvidenceVerdict::Group expected = groups[scan.group_of[i]];
-        if (has_windows && slot.windows.stage[i] == DecisionStage::kProposed) {
-          expected.belief = std::max(expected.belief, slot.windows.belief[i]);
-          if (!is_dynamic(expected.cause) && slot.windows.votes[i] >= votes) {
-            expected.cause = Cause::kProposed;
-          }
-        }
+        const EvidenceVerdict::Group& expected = groups[scan.group_of[i]];
         const bool dynamic = is_dynamic(expected.cause);
         REQUIRE(verdict.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kStatic));
         REQUIRE(verdict.causes[to] == expected.cause);
@@ -261,31 +247,15 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
     slot.assign_instances(scan.cluster_of);
     writer.begin(slot);
     writer.write_groups(slot, {groups, scan.group_of, moved});
-    if (has_windows) detail::add_proposals(slot, {groups, scan.group_of, moved}, 1, writer);
-    check(1, false);
+    check(false);
     for (int again = 0; again < 2; ++again) {
       change();
-      for (DecisionStage& stage : slot.windows.stage) {
-        if (random.index(4) == 0) stage = DecisionStage::kProposed;
-      }
       writer.begin(slot);
       writer.write_groups(slot, {groups, scan.group_of, moved});
       writer.flag_groups(slot, {groups, scan.group_of, moved});
-      if (has_windows) detail::add_proposals(slot, {groups, scan.group_of, moved}, 2, writer);
-      check(2, true);
+      check(true);
     }
   }
-}
-
-TEST_CASE("the dynamic one of two verdicts wins, else the first, with the higher belief") {
-  const EvidenceVerdict::Group stays = {Cause::kOccupied, 0.5F};
-  const EvidenceVerdict::Group goes = {Cause::kFreeSpace, 0.8F};
-  const EvidenceVerdict::Group proposed = {Cause::kProposed, 0.9F};
-  const EvidenceVerdict::Group reverted = {Cause::kReverted, 0.6F};
-  CHECK((detail::stronger(stays, proposed) == proposed));
-  CHECK((detail::stronger(goes, proposed) == EvidenceVerdict::Group{Cause::kFreeSpace, 0.9F}));
-  CHECK((detail::stronger(stays, reverted) == EvidenceVerdict::Group{Cause::kOccupied, 0.6F}));
-  CHECK((detail::stronger(goes, reverted) == goes));
 }
 
 TEST_CASE("ids go to the cluster that has most points, for any point_runs") {
