@@ -61,7 +61,7 @@ StampedPose read_transform(MessageReader& in) {
 
 /// The clock of times whose meaning nobody told: seconds, or nanoseconds if integer or huge.
 PointClock usual_clock(bool is_integer, const std::vector<double>& times) {
-  constexpr double kLongestScan = 10.0;  // s
+  constexpr double kLongestOffset = 10.0;  // s
   constexpr double kNanoseconds = 1e14;  // of an absolute time; as seconds it is in year 3170000
   double least = std::numeric_limits<double>::infinity();
   for (const double time : times) {
@@ -69,7 +69,7 @@ PointClock usual_clock(bool is_integer, const std::vector<double>& times) {
   }
   PointClock clock;
   clock.unit = is_integer || least > kNanoseconds ? 1e-9 : 1.0;
-  clock.is_absolute = std::abs(least * clock.unit) > kLongestScan;
+  clock.is_absolute = std::abs(least * clock.unit) > kLongestOffset;
   return clock;
 }
 
