@@ -23,7 +23,8 @@ std::string to_origin(const py::handle& value) {
   if (is_text(value)) return to_path(value).string();
   std::string text;
   for (const py::handle& number : py::list(py::reinterpret_borrow<py::object>(value))) {
-    text += (text.empty() ? "" : " ") + py::repr(py::float_(number)).cast<std::string>();
+    text += (text.empty() ? "" : " ") +
+            py::repr(py::float_(py::reinterpret_borrow<py::object>(number))).cast<std::string>();
   }
   return text;
 }
