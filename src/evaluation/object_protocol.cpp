@@ -66,6 +66,7 @@ std::vector<ClassScore> ObjectProtocol::by_class(std::size_t estimate) const {
     of_class.right += is_right(truth, counts, estimate);
   }
   std::vector<ClassScore> result;
+  result.reserve(classes.size());
   for (const auto& one : classes) result.push_back(one.second);
   return result;
 }

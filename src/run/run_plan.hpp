@@ -43,7 +43,7 @@ std::filesystem::path map_path(const std::string& name, const std::filesystem::p
 void check_settings(const RunSettings& settings);
 
 /// Checks everything but the points. Throws ConfigError, IoError, PoseError.
-RunPlan make_plan(const RunSettings& settings, Recording sequence);
+RunPlan make_plan(const RunSettings& given, Recording sequence);
 
 /// Treatment of a folder of results.
 enum class RunTask { kNothing, kWrite, kReplace };

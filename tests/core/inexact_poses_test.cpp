@@ -157,7 +157,7 @@ TEST_CASE("a pose that jumps begins an epoch, or is corrected") {
   INFO(metres << " m, " << degrees << " deg");
   const bool is_small = metres < 0.5 && degrees < 2.0;
   if (!is_small) {
-    CHECK(epochs.scans == std::vector<std::size_t>{kJump});
+    REQUIRE(epochs.scans == std::vector<std::size_t>{kJump});
     CHECK(epochs.reasons.front() == EpochReason::kJump);
   }
   CHECK(epochs.static_share > without - 0.005);
