@@ -154,18 +154,24 @@ struct Candidate {
 const Eigen::Vector3d kLowest(-4.0, -1.0, -2.0);
 const Eigen::Vector3d kHighest(4.0, 1.0, 3.0);
 
-/// The best positions of a grid, best first, at least 0.6 m apart.
+/// The positions of a grid that stand out most among those of their height, best first, at least
+/// 0.6 m apart. Seen from near the ground, all elevations are alike, wherever the rays begin.
 std::vector<Candidate> best_on_grid(BeamSharpness& sharpness) {
   constexpr double kStep = 0.25;  // m
-  constexpr std::size_t kKept = 4;
+  constexpr std::size_t kKept = 6;
   std::vector<Candidate> all;
-  for (double x = kLowest.x(); x <= kHighest.x(); x += kStep) {
-    for (double y = kLowest.y(); y <= kHighest.y(); y += kStep) {
-      for (double z = kLowest.z(); z <= kHighest.z(); z += kStep) {
+  for (double z = kLowest.z(); z <= kHighest.z(); z += kStep) {
+    const std::size_t first = all.size();
+    double sum = 0.0;
+    for (double x = kLowest.x(); x <= kHighest.x(); x += kStep) {
+      for (double y = kLowest.y(); y <= kHighest.y(); y += kStep) {
         const Eigen::Vector3d position(x, y, z);
         all.push_back({position, sharpness.at(position)});
+        sum += all.back().value;
       }
     }
+    const double mean = sum / static_cast<double>(all.size() - first);
+    for (std::size_t k = first; k < all.size(); ++k) all[k].value /= std::max(mean, 1e-9);
   }
   std::stable_sort(all.begin(), all.end(),
                    [](const Candidate& a, const Candidate& b) { return a.value > b.value; });
