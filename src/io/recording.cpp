@@ -49,7 +49,7 @@ void subtract_origin(const Eigen::Vector3f& origin, RecordedScan& scan) {
 
 Recording::Recording(const fs::path& path, const RecordingOptions& options)
     : folder_(path), options_(options) {
-  if (!(options.sensor_origin.cwiseAbs().maxCoeff() <= kFarthestSensor)) {
+  if (!(options.sensor_origin.array().abs() <= kFarthestSensor).all()) {
     throw ConfigError("the origin of the sensor must be finite and within " +
                       std::to_string(static_cast<int>(kFarthestSensor)) +
                       " m of that of the clouds");
@@ -82,7 +82,9 @@ Recording::Recording(const fs::path& path, const RecordingOptions& options)
   if (!sensor_origin().isZero(0.0)) {
     std::ostringstream note;
     text::exact(note);
-    note << "the sensor is at (" << sensor_origin().transpose() << ") m in the frame of the clouds";
+    const Eigen::Vector3d& at = sensor_origin();
+    note << "the sensor is at (" << at.x() << ' ' << at.y() << ' ' << at.z()
+         << ") m in the frame of the clouds";
     notes_.push_back(note.str());
   }
   if (options.deskew) prepare_deskewing();

@@ -155,7 +155,7 @@ TEST_CASE("a pose that jumps begins an epoch, or is corrected") {
   const Epochs epochs = epochs_of(with_poses(
       [&](std::size_t i, const Eigen::Isometry3d& T) { return i < kJump ? T : T_jump * T; }));
   INFO(metres << " m, " << degrees << " deg");
-  const bool is_small = metres < 0.5 && degrees < 2.0;
+  const bool is_small = metres < 2.0 && degrees < 2.0;
   if (!is_small) {
     REQUIRE(epochs.scans == std::vector<std::size_t>{kJump});
     CHECK(epochs.reasons.front() == EpochReason::kJump);

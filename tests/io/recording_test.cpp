@@ -466,6 +466,7 @@ TEST_CASE("Poses may begin with a mark of UTF-8") {
     write_text(folder / "poses.txt", "\xEF\xBB\xBF" + rows);
     CHECK(Recording(folder.path()).T_world_sensor(0).translation().x() == 7.0);
   }
+  write_text(folder / "poses.txt", row12(7));
   write_text(folder / "times.txt",
              "\xEF\xBB\xBF"
              "2.5\n");
