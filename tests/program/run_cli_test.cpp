@@ -1107,9 +1107,9 @@ TEST_CASE("A run that judges nothing is no success, and keeps earlier results") 
   REQUIRE(fixture.run().code == 0);
   const std::string label = fixture.out + "/labels/" + scan_name(5) + ".label";
   const std::string before = read_text(label);
+  std::vector<float> nothing(4000, 0.0F);
   for (std::size_t i = 0; i < 12; ++i) {
-    write_scan(fs::path(fixture.seq) / "velodyne" / (scan_name(i) + ".bin"),
-               std::vector<float>(4000, 0.0F));
+    write_scan(fs::path(fixture.seq) / "velodyne" / (scan_name(i) + ".bin"), nothing);
   }
   for (const char* build_map : {"true", "false"}) {
     const Outcome outcome = fixture.run({"--force", "--build-map", build_map});
