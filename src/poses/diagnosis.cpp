@@ -11,7 +11,6 @@
 #include <string>
 #include <utility>
 
-#include "agreement_sum.hpp"
 #include "dynains/stage/voxel_hash_table.hpp"
 #include "io/finite_points.hpp"
 #include "io/median.hpp"
@@ -68,6 +67,26 @@ std::vector<Pair> take_pairs(std::size_t first, std::size_t last, std::size_t st
   }
   return pairs;
 }
+
+/// Mean of agreements, weighted by their points.
+class AgreementSum {
+ public:
+  void add(const Agreement& one) {
+    share_ += one.share * static_cast<double>(one.points);
+    gap_ += one.gap * static_cast<double>(one.points);
+    points_ += one.points;
+  }
+  Agreement mean() const {
+    if (points_ == 0) return {};
+    const auto count = static_cast<double>(points_);
+    return {share_ / count, gap_ / count, points_};
+  }
+
+ private:
+  double share_ = 0.0;
+  double gap_ = 0.0;
+  std::size_t points_ = 0;
+};
 
 Agreement agreement_under(const PoseConvention& convention, const Recording& recording,
                           const std::vector<Pair>& pairs) {
@@ -282,11 +301,15 @@ void describe_motion(const Recording& recording, Diagnosis& d) {
   if (!steps.empty()) d.longest_step = *std::max_element(steps.begin(), steps.end());
 }
 
-/// Counts points of scans.
-class ScanStatistics {
+/// Reads scans and counts their points.
+class ScanSample {
  public:
-  void add(const RecordedScan& scan, PointsView points) {
-    all_ += scan.size();
+  explicit ScanSample(const Recording& recording) : recording_(recording) {}
+
+  Landmarks read(std::size_t i) {
+    recording_.read_scan(i, scan_);
+    const PointBuffer points = finite_points(scan_);
+    all_ += scan_.size();
     valid_ += points.size();
     ++read_;
     for (std::size_t k = 0; k < points.size(); ++k) {
@@ -294,14 +317,13 @@ class ScanStatistics {
       if (range < 2.0) ++near_;
       if (k % 37 == 0) ranges_.push_back(range);
     }
+    const Mounting mounting = estimate_mounting(points);
+    if (mounting.known) {
+      heights_.push_back(mounting.height);
+      up_ += mounting.up_sensor;
+    }
+    return Landmarks(points, mounting);
   }
-  void add(const Mounting& mounting) {
-    ++looked_for_ground_;
-    if (!mounting.known) return;
-    heights_.push_back(mounting.height);
-    up_ += mounting.up_sensor;
-  }
-  bool empty() const { return read_ == 0; }
 
   /// Sets the members of `d` that describe points and mounting.
   void describe(Diagnosis& d) {
@@ -314,17 +336,16 @@ class ScanStatistics {
       std::nth_element(ranges_.begin(), at, ranges_.end());
       d.farthest = *at;
     }
-    if (2 * heights_.size() > looked_for_ground_) {
-      d.mounting = {median(heights_), up_.normalized(), true};
-    }
+    if (2 * heights_.size() > read_) d.mounting = {median(heights_), up_.normalized(), true};
   }
 
  private:
+  const Recording& recording_;
+  RecordedScan scan_;
   std::size_t all_ = 0;  // points
   std::size_t valid_ = 0;
   std::size_t near_ = 0;
   std::size_t read_ = 0;  // scans
-  std::size_t looked_for_ground_ = 0;
   std::vector<double> ranges_;
   std::vector<double> heights_;
   Eigen::Vector3d up_ = Eigen::Vector3d::Zero();
@@ -338,9 +359,8 @@ struct SampledPairs {
 
 /// Increases the stride until the pairs do not agree without motion: scans farther apart show more
 /// of the motion of a slow sensor.
-SampledPairs sample_pairs(const Recording& recording) {
-  RecordedScan scan;
-  const auto read = [&](std::size_t i) { return landmarks_of(recording, i, scan); };
+SampledPairs sample_pairs(const Recording& recording, ScanSample& sample) {
+  const auto read = [&](std::size_t i) { return sample.read(i); };
   SampledPairs result;
   for (const std::size_t wanted : {std::size_t{1}, kStride, 4 * kStride, 16 * kStride}) {
     const std::size_t next = std::min(wanted, recording.size() - 1);
@@ -352,6 +372,7 @@ SampledPairs sample_pairs(const Recording& recording) {
     result.pairs = take_pairs(0, recording.size() - 1, next, kPairs, read);
     if (standing_agreement(result.pairs).share < (next == 1 ? 0.35 : kLeastAgreement)) break;
   }
+  if (result.pairs.empty() && recording.size() > 0) sample.read(0);
   return result;
 }
 
@@ -418,9 +439,17 @@ Agreement Landmarks::compare(const Landmarks& other, const Pose& T_this_other) c
 
 namespace {
 
-/// Adds the agreement of scans under the given poses and under usual mistakes to `d`.
-Diagnosis diagnose_agreement(const Recording& recording, Diagnosis d) {
-  const SampledPairs sampled = sample_pairs(recording);
+/// Diagnosis by the agreement of scans.
+Diagnosis diagnose_agreement(const Recording& recording) {
+  Diagnosis d;
+  d.scan_files = recording.scan_file_count();
+  d.pose_rows = recording.pose_count();
+  d.scans = recording.size();
+  describe_motion(recording, d);
+  ScanSample sample(recording);
+  const SampledPairs sampled = sample_pairs(recording, sample);
+  sample.describe(d);
+
   compare(recording, sampled.pairs, sampled.stride, d);
   if (d.verdict == PoseVerdict::kDisagree && sampled.stride > 1 && d.step > kFast) {
     // Fast and with few objects in sight, as on a motorway: such pairs may have only traffic in
@@ -448,47 +477,14 @@ PoseAgreement agreement_at(const Recording& recording, std::size_t first, std::s
     as_given.add(pair.a.compare(pair.b, recording.T_world_sensor(pair.first).inverse() *
                                             recording.T_world_sensor(pair.second)));
   }
-  return {as_given.mean(), standing_agreement(pairs), stride, false};
-}
-
-}  // namespace
-
-namespace {
-
-/// Tests the given poses at `places`.
-PoseTest test_given(const Recording& recording, const TestPlaces& places,
-                    const ScanMerger::OnScan& on_scan = {}) {
-  const auto given = [&](std::size_t i) { return std::optional(recording.T_world_sensor(i)); };
-  return test_poses(recording, given, places, on_scan);
+  return {as_given.mean(), standing_agreement(pairs), stride};
 }
 
 }  // namespace
 
 Diagnosis diagnose(const Recording& recording) {
-  Diagnosis d;
-  d.scan_files = recording.scan_file_count();
-  d.pose_rows = recording.pose_count();
-  d.scans = recording.size();
-  describe_motion(recording, d);
-  ScanStatistics statistics;
-  const auto count = [&](const RecordedScan& scan, PointsView points) {
-    statistics.add(scan, points);
-  };
-  TestPlaces places;
-  places.last = std::max<std::size_t>(1, recording.size()) - 1;
-  const PoseTest test = test_given(recording, places, count);
-  for (const Mounting& mounting : test.mountings) statistics.add(mounting);
-  if (statistics.empty() && recording.size() > 0) {
-    const RecordedScan scan = recording.read_scan(0);
-    const PointBuffer points = finite_points(scan);
-    statistics.add(scan, points);
-    statistics.add(estimate_mounting(points));
-  }
-  statistics.describe(d);
-  if (!is_settled(recording, test, d)) {
-    d = diagnose_agreement(recording, d);
-    compare_with_registration(recording, test, d);
-  }
+  Diagnosis d = diagnose_agreement(recording);
+  compare_with_registration(recording, d);
   if (d.sound() && d.scans > 0) d.ray_origin = find_ray_origin(recording, 0, d.scans - 1);
   if (d.ray_origin) {
     d.verdict = PoseVerdict::kRayOrigin;
@@ -500,12 +496,6 @@ Diagnosis diagnose(const Recording& recording) {
 PoseAgreement pose_agreement(const Recording& recording, std::size_t first, std::size_t last) {
   const std::size_t stride = std::min(kStride, last - first);
   if (stride == 0) return {};
-  constexpr std::size_t kFewPlaces = 4;
-  const PoseTest test = test_given(recording, {first, last, kFewPlaces, false});
-  Diagnosis of_test;
-  if (is_settled(recording, test, of_test)) {
-    return {of_test.as_given, of_test.standing, of_test.stride, true};
-  }
   const PoseAgreement agreement = agreement_at(recording, first, last, stride);
   const double way = (recording.T_world_sensor(first + stride).translation() -
                       recording.T_world_sensor(first).translation())

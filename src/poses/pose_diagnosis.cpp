@@ -237,188 +237,78 @@ void take(const Explanation& explanation, Diagnosis& d) {
   d.option = explanation.option;
 }
 
-/// Errors of the given poses.
-struct GivenErrors {
-  MotionError steps;
-  MotionError first_steps;
-  MotionError all;
+}  // namespace
 
-  GivenErrors(const Recording& recording, const std::vector<RegisteredMotion>& motions) {
-    const BodyMotion given = motion_under(recording, recording.convention());
-    const auto identity = Pose::Identity();
-    steps = motion_error(motions, given, identity, Motions::kSteps);
-    first_steps = motion_error(motions, given, identity, Motions::kFirstSteps);
-    all = motion_error(motions, given, identity);
+void compare_with_registration(const Recording& recording, Diagnosis& d) {
+  d.time_offset = recording.time_offset();
+  if (d.verdict == PoseVerdict::kOtherwise) {
+    d.convention = d.readings.front().convention;
+    d.option = d.readings.front().option;
   }
-  /// Whether there are enough motions for statements.
-  bool are_known() const { return all.pairs >= kFewestMotions && steps.pairs >= kFewestPairs; }
-};
-
-/// Sets the errors of `d`, also whether only the first poses are inexact.
-void set_errors(const GivenErrors& errors, Diagnosis& d) {
-  const MotionError& steps = errors.steps;
-  const MotionError& first_steps = errors.first_steps;
-  d.translation_error = steps.translation;
-  d.rotation_error = steps.rotation;
-  d.registered_pairs = steps.pairs;
-  if (!errors.are_known()) return;
-  const bool is_worse_at_start = first_steps.translation > kClearlyWorse * steps.translation ||
-                                 first_steps.rotation > kClearlyWorse * steps.rotation;
-  d.is_inexact_at_start = first_steps.pairs >= kFewestFirstPairs && is_worse_at_start &&
-                          is_inexact(first_steps, steps) && !is_inexact(steps, steps);
-  if (!d.is_inexact_at_start) return;
-  d.start_translation_error = first_steps.translation;
-  d.start_rotation_error = first_steps.rotation;
-}
-
-/// The best of all hypotheses beside the given poses.
-std::optional<Explanation> explain(const Recording& recording,
-                                   const std::vector<RegisteredMotion>& motions, Diagnosis& d) {
-  const GivenErrors errors(recording, motions);
-  const double before = errors.all.at_points;
-  if (!errors.are_known() || before <= kExact) return std::nullopt;
-  const double exact = std::max(kExact, 2.0 * errors.all.noise);
-  auto reading = explain_by_reading(recording, motions, d.readings, before);
-  std::optional<Explanation> offset;
-  std::optional<Explanation> body;
-  if (before > exact) {
-    offset = explain_by_offset(recording, motions, before);
-    body = explain_by_body(recording, motions, before);
-  }
-  // A shift by scans is a coarse offset.
-  const bool is_shift = reading && reading->convention.shift != recording.convention().shift;
-  if (is_shift && offset && offset->error < reading->error) reading.reset();
-  std::optional<Explanation> best;
-  // In the order of fitted numbers: a usual mistake has none, an offset one, an extrinsic six. A
-  // later one must be clearly better.
-  for (const auto* candidate :
-       {&std::as_const(reading), &std::as_const(offset), &std::as_const(body)}) {
-    if (!*candidate) continue;
-    if (!best || (best->error > exact && (*candidate)->error < 0.6 * best->error)) {
-      best = *candidate;
-    }
-  }
-  return best;
-}
-
-PoseOfScan poses_under(const Recording& recording, const Explanation& explanation) {
-  if (explanation.verdict == PoseVerdict::kTimeOffset) {
-    const double offset = explanation.time_offset - recording.time_offset();
-    return [&recording, offset](std::size_t i) { return recording.pose_after(i, offset); };
-  }
-  const PoseConvention convention = explanation.convention;
-  return [&recording, convention](std::size_t i) { return recording.pose_under(convention, i); };
-}
-
-/// Whether merged scans agree with an explanation no better than with the given poses. False if
-/// they tell nothing about one of them.
-bool is_refuted(const Recording& recording, const PoseTest& given, const Explanation& explanation) {
-  constexpr double kBetter = 0.7;  // ratio of errors
-  const GivenErrors before(recording, given.motions);
-  if (!before.are_known() || before.all.at_points > kRough) return false;
-  const PoseOfScan pose_of = poses_under(recording, explanation);
-  TestPlaces places;
-  places.last = recording.size() - 1;
-  const PoseTest test = test_poses(recording, pose_of, places);
-  if (test.motions.size() < kFewestMotions) return true;
-  const BodyMotion motion = [&](const RegisteredMotion& m) -> std::optional<Pose> {
-    const auto T_world_a = pose_of(m.first);
-    const auto T_world_b = pose_of(m.second);
-    if (!T_world_a || !T_world_b) return std::nullopt;
-    return T_world_a->inverse() * *T_world_b;
-  };
-  return error_at_points(test.motions, motion) > kBetter * before.all.at_points;
-}
-
-/// What registrations say about the given poses, if no other hypothesis explains more.
-void judge_given(const Recording& recording, const PoseTest& test,
-                 const std::vector<RegisteredMotion>& motions, Diagnosis& d) {
-  const GivenErrors tested(recording, test.motions);
-  const bool is_tested = tested.are_known();
-  const GivenErrors errors = is_tested ? tested : GivenErrors(recording, motions);
-  const double before = errors.all.at_points;
+  if (recording.frame() != PointFrame::kSensor || d.verdict == PoseVerdict::kUnknown) return;
+  const std::vector<RegisteredMotion> motions = register_motions(recording);
+  const BodyMotion given = motion_under(recording, recording.convention());
+  const auto identity = Pose::Identity();
+  const MotionError steps = motion_error(motions, given, identity, Motions::kSteps);
+  const MotionError first_steps = motion_error(motions, given, identity, Motions::kFirstSteps);
+  const MotionError all = motion_error(motions, given, identity);
+  const double before = all.at_points;
   if (d.verdict == PoseVerdict::kAgree && before > kFarOff) {
     // In traffic of the own speed, a registration can find no motion, though the poses agree with
     // all that stands still. Any other motion contradicts the poses.
-    const auto& used = is_tested ? test.motions : motions;
-    if (used.size() < kFewestMotions || error_at_points(used, no_motion) < 0.5 * before) {
+    if (motions.size() < kFewestMotions || error_at_points(motions, no_motion) < 0.5 * before) {
       d.registered_pairs = 0;
       return;
     }
     d.verdict = PoseVerdict::kDisagree;
   }
-  set_errors(errors, d);
-  // Merged scans agree more often than single ones of a sparse sensor.
-  const bool is_agreed =
-      fits(test.as_given, test.standing) && is_clearly_better(test.as_given, test.standing);
-  if (!errors.are_known()) {
-    if (d.verdict == PoseVerdict::kDisagree && is_agreed) d.verdict = PoseVerdict::kAgree;
-    return;
+  const double exact = std::max(kExact, 2.0 * all.noise);
+  d.translation_error = steps.translation;
+  d.rotation_error = steps.rotation;
+  d.registered_pairs = steps.pairs;
+  if (motions.size() < kFewestMotions || steps.pairs < kFewestPairs) return;
+
+  if (before > kExact) {
+    auto reading = explain_by_reading(recording, motions, d.readings, before);
+    std::optional<Explanation> offset;
+    std::optional<Explanation> body;
+    if (before > exact) {
+      offset = explain_by_offset(recording, motions, before);
+      body = explain_by_body(recording, motions, before);
+    }
+    // A shift by scans is a coarse offset.
+    const bool is_shift = reading && reading->convention.shift != recording.convention().shift;
+    if (is_shift && offset && offset->error < reading->error) reading.reset();
+    const Explanation* best = nullptr;
+    // In the order of fitted numbers: a usual mistake has none, an offset one, an extrinsic six. A
+    // later one must be clearly better.
+    for (const auto* candidate :
+         {&std::as_const(reading), &std::as_const(offset), &std::as_const(body)}) {
+      if (!*candidate) continue;
+      const bool is_better =
+          best == nullptr || (best->error > exact && (*candidate)->error < 0.6 * best->error);
+      if (is_better) best = &**candidate;
+    }
+    if (best != nullptr) {
+      take(*best, d);
+      return;
+    }
   }
-  const double exact = std::max(kExact, 2.0 * errors.all.noise);
+  const bool is_worse_at_start = first_steps.translation > kClearlyWorse * steps.translation ||
+                                 first_steps.rotation > kClearlyWorse * steps.rotation;
+  d.is_inexact_at_start = first_steps.pairs >= kFewestFirstPairs && is_worse_at_start &&
+                          is_inexact(first_steps, steps) && !is_inexact(steps, steps);
+  if (d.is_inexact_at_start) {
+    d.start_translation_error = first_steps.translation;
+    d.start_rotation_error = first_steps.rotation;
+  }
   if (d.verdict == PoseVerdict::kDisagree && before < exact) d.verdict = PoseVerdict::kAgree;
   if (d.verdict == PoseVerdict::kDisagree && before < kRough) d.verdict = PoseVerdict::kInexact;
   if (d.verdict == PoseVerdict::kNoMotion && before > kRough) d.verdict = PoseVerdict::kDisagree;
   const bool may_be_inexact =
       d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion;
-  if (may_be_inexact && (is_inexact(errors.steps, errors.steps) || d.is_inexact_at_start)) {
+  if (may_be_inexact && (is_inexact(steps, steps) || d.is_inexact_at_start))
     d.verdict = PoseVerdict::kInexact;
-  }
-}
-
-/// Whether the sensor moved or turned over the longer motions.
-bool has_moved(const std::vector<RegisteredMotion>& motions) {
-  constexpr double kMoved = 0.3;  // m at points 10 m away
-  std::vector<RegisteredMotion> longer;
-  for (const RegisteredMotion& m : motions) {
-    if (m.second > m.first + 1) longer.push_back(m);
-  }
-  return error_at_points(longer.empty() ? motions : longer, no_motion) > kMoved;
-}
-
-}  // namespace
-
-bool is_settled(const Recording& recording, const PoseTest& test, Diagnosis& d) {
-  const GivenErrors errors(recording, test.motions);
-  if (!errors.are_known() || errors.all.at_points > kExact ||
-      is_inexact(errors.steps, errors.steps) || is_clearly_better(test.standing, test.as_given)) {
-    return false;
-  }
-  set_errors(errors, d);
-  d.convention = recording.convention();
-  d.time_offset = recording.time_offset();
-  d.as_given = test.as_given;
-  d.standing = test.standing;
-  d.stride = test.stride;
-  if (recording.frame() == PointFrame::kWorld) {
-    d.verdict = PoseVerdict::kWorldFrame;
-  } else if (d.is_inexact_at_start) {
-    d.verdict = PoseVerdict::kInexact;
-  } else {
-    d.verdict = has_moved(test.motions) ? PoseVerdict::kAgree : PoseVerdict::kNoMotion;
-  }
-  return true;
-}
-
-void compare_with_registration(const Recording& recording, const PoseTest& test, Diagnosis& d) {
-  d.convention = recording.convention();
-  d.time_offset = recording.time_offset();
-  if (recording.frame() != PointFrame::kSensor || d.verdict == PoseVerdict::kUnknown) return;
-  std::optional<Explanation> explanation;
-  if (d.verdict == PoseVerdict::kOtherwise) {
-    const PoseReading& reading = d.readings.front();
-    explanation = Explanation{PoseVerdict::kOtherwise, 0.0, reading.convention, d.time_offset,
-                              reading.option};
-  }
-  const std::vector<RegisteredMotion> motions = register_motions(recording);
-  if (auto found = explain(recording, motions, d)) explanation = std::move(found);
-  if (explanation && !is_refuted(recording, test, *explanation)) {
-    set_errors(GivenErrors(recording, motions), d);
-    take(*explanation, d);
-    return;
-  }
-  if (d.verdict == PoseVerdict::kOtherwise) d.verdict = PoseVerdict::kDisagree;
-  judge_given(recording, test, motions, d);
 }
 
 }  // namespace dynains

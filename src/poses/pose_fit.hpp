@@ -7,9 +7,30 @@
 #include <optional>
 #include <vector>
 
-#include "motion_registration.hpp"
+#include "dynains/io/recording.hpp"
+#include "dynains/pose.hpp"
 
 namespace dynains {
+
+/// Motion of the sensor between two scans, by their registration.
+struct RegisteredMotion {
+  std::size_t chain;   ///< motions of one chain begin at one scan
+  std::size_t first;   ///< scan
+  std::size_t second;  ///< scan
+  Pose T_first_second;
+  /// Difference of both directions of the registration: rotation times 10 m, and translation, m.
+  Eigen::Matrix<double, 6, 1, Eigen::DontAlign> difference;
+  double deviation;  ///< m, of a direction that landmarks determine; 0: none
+};
+
+/// Scans at the start of a recording, where an odometry has not converged yet.
+inline constexpr std::size_t kStartScans = 6;
+
+/// Registers pairs of scans at some places of a recording, three of them among the first
+/// kStartScans, neighbours and scans farther apart. The
+/// given poses are one of several first guesses. Pairs that determine no motion are left out.
+/// Throws IoError.
+std::vector<RegisteredMotion> register_motions(const Recording& recording);
 
 /// Motion of the body between two scans under some reading of the poses; empty without poses.
 using BodyMotion = std::function<std::optional<Pose>(const RegisteredMotion&)>;

@@ -151,16 +151,12 @@ std::optional<Registration> register_scans(const RegistrationScan& a, const Regi
 }
 
 std::optional<Registration> register_near(const RegistrationScan& a, const RegistrationScan& b,
-                                          const Pose& guess, const std::optional<KnownWay>& way) {
-  std::optional<Prior> prior;
-  if (way) {
-    const double ratio = kPointDeviation / way->deviation;
-    prior = Prior{way->direction, way->direction.dot(guess.translation()), ratio * ratio};
-  }
-  const Prior* const known = prior ? &*prior : nullptr;
-  Pose T = refine(a, b, guess, 1, 0.2, 1, 8, known);
-  T = refine(a, b, T, 2, kFineStep, 1, 15, known);
-  return registration_at(a, b, T, known);
+                                          const Pose& guess, const KnownWay& way) {
+  const double ratio = kPointDeviation / way.deviation;
+  const Prior prior{way.direction, way.direction.dot(guess.translation()), ratio * ratio};
+  Pose T = refine(a, b, guess, 1, 0.2, 1, 8, &prior);
+  T = refine(a, b, T, 2, kFineStep, 1, 15, &prior);
+  return registration_at(a, b, T, &prior);
 }
 
 }  // namespace dynains

@@ -51,10 +51,8 @@ struct KnownWay {
   double deviation;           ///< m
 };
 
-/// As register_scans(), by small steps from `guess`. `way`: if given, the translation of `guess`
-/// along it is known.
+/// As register_scans(), by small steps from `guess`, whose translation along `way` is known.
 std::optional<Registration> register_near(const RegistrationScan& a, const RegistrationScan& b,
-                                          const Pose& guess,
-                                          const std::optional<KnownWay>& way = std::nullopt);
+                                          const Pose& guess, const KnownWay& way);
 
 }  // namespace dynains

@@ -59,37 +59,25 @@ void warn(const RunListener& listener, const std::string& text) {
   if (listener.warn) listener.warn(text);
 }
 
-/// Whether poses that are shifted by some scans fit so much better that the map would suffer.
-bool is_large_shift(const Diagnosis& d) {
-  constexpr double kTranslation = 0.05;  // m, from one scan to the next
-  constexpr double kRotation = 0.0045;   // rad
-  return d.translation_error > kTranslation || d.rotation_error > kRotation;
-}
-
-/// Throws ConfigError unless `dynains check` accepts the poses, or they are accepted by a flag.
-/// Warns if they are inexact, or too few scans are there for a judgement.
+/// Throws ConfigError if the scans disagree with the poses beyond doubt, unless they are accepted.
+/// Warns if it is not beyond doubt.
 void judge_poses(const RunPlan& plan, const RunSettings& settings, const RunListener& listener,
-                 const PoseAgreement& agreement) {
-  const std::string share = "only " +
-                            std::to_string(std::lround(100.0 * agreement.as_given.share)) +
+                 const Agreement& agreement) {
+  const std::string share = std::to_string(std::lround(100.0 * agreement.share)) +
                             " % of the points of neighbouring scans agree under these poses";
-  const std::string see = "dynains check " + settings.recording_as_given;
   constexpr std::size_t kFewestScans = 8;  // for a judgement beyond doubt
   if (!settings.accept_poses && plan.range.size() >= kFewestScans) {
     const Diagnosis diagnosis = diagnose(plan.sequence);
-    if (diagnosis.verdict == PoseVerdict::kInexact) warn(listener, advice(diagnosis));
-    if (diagnosis.sound()) return;
-    const bool is_small_shift = diagnosis.verdict == PoseVerdict::kOtherwise &&
-                                diagnosis.convention.shift != plan.sequence.convention().shift &&
-                                !is_large_shift(diagnosis);
-    if (is_small_shift) {
-      warn(listener, advice(diagnosis));
-    } else if (diagnosis.verdict != PoseVerdict::kUnknown) {
-      throw ConfigError((agreement.doubtful() ? share + ". " : std::string()) + advice(diagnosis) +
-                        " See: " + see + "; or run with these poses by --accept-poses");
+    // A shift changes little: some broken scans can make one look better.
+    const bool is_shift = diagnosis.verdict == PoseVerdict::kOtherwise &&
+                          diagnosis.convention.shift != plan.sequence.convention().shift;
+    if (!diagnosis.sound() && diagnosis.verdict != PoseVerdict::kUnknown && !is_shift) {
+      throw ConfigError("only " + share + ". " + advice(diagnosis) + " See: dynains check " +
+                        settings.recording_as_given +
+                        "; or run with these poses by --accept-poses");
     }
   }
-  if (agreement.doubtful()) warn(listener, share + "; see: " + see);
+  warn(listener, "only " + share + "; see: dynains check " + settings.recording_as_given);
 }
 
 /// Throws ConfigError if rays begin elsewhere than at the origin of the clouds, unless the clouds
@@ -126,10 +114,7 @@ void check_not_empty(const RunPlan& plan, const RunResults& results) {
 
 void warn_of_doubts(const RunPlan& plan, const RunSettings& settings, const RunListener& listener,
                     const PoseAgreement& agreement) {
-  constexpr std::size_t kFewestPoints = 200;  // for a comparison
-  if (!agreement.is_confirmed && agreement.as_given.points >= kFewestPoints) {
-    judge_poses(plan, settings, listener, agreement);
-  }
+  if (agreement.doubtful()) judge_poses(plan, settings, listener, agreement.as_given);
   judge_ray_origin(plan, settings, listener);
   const auto lone =
       remark_on_lone_scans(plan.sequence, plan.range.first, plan.range.last, plan.config);

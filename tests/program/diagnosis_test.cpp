@@ -208,53 +208,6 @@ TEST_CASE("check names a robot description beside the recording") {
              !ContainsSubstring("robot.urdf"));
 }
 
-TEST_CASE("run stops before its first output if the poses are those of a turned body") {
-  const Street street(dense());
-  Eigen::Isometry3d T_body_sensor = Eigen::Isometry3d::Identity();
-  T_body_sensor.linear() = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  Poses of_body;
-  for (const Eigen::Isometry3d& pose : street.poses()) {
-    of_body.push_back(pose * T_body_sensor.inverse());
-  }
-  write_poses(street.path() / "poses.txt", of_body);
-  const TemporaryFolder out;
-  const Outcome stopped = start({"run", street.path(), "-o", out / "out", "-q"});
-  CHECK(stopped.code == 2);
-  CHECK_THAT(stopped.err, ContainsSubstring("the lidar is yawed by ") &&
-                              ContainsSubstring("pass --extrinsic \"") &&
-                              ContainsSubstring("--accept-poses"));
-  CHECK_FALSE(fs::exists(out / "out"));
-  write_poses(street.path() / "poses.txt", street.poses());
-  const Outcome fine = start({"run", street.path(), "-o", out / "out", "-q"});
-  CHECK(fine.code == 0);
-  CHECK(fine.err.empty());
-}
-
-TEST_CASE("Exact poses of a sparse sensor that repeats no place are accepted, wrong ones are not") {
-  simulation::Config config;
-  config.scene = simulation::Scene::kCrowd;
-  config.sensor = simulation::Sensor::kMid360;
-  config.scans = 40;
-  config.seed = GENERATE(71U, 72U);
-  const Street street(config);
-  INFO("seed " << config.seed);
-  const Diagnosis exact = street.diagnose([](const Eigen::Isometry3d& T) { return T; });
-  CHECK(exact.sound());
-  CHECK(exact.verdict != PoseVerdict::kInexact);
-  CHECK(exact.translation_error < 0.02);
-  CHECK(pose_agreement(Recording(street.path()), 0, 39).is_confirmed);
-  CHECK_FALSE(street.diagnose([](const Eigen::Isometry3d& T) { return T.inverse(); }).sound());
-  CHECK_FALSE(pose_agreement(Recording(street.path()), 0, 39).is_confirmed);
-  std::mt19937 random(3);
-  std::normal_distribution<double> metres(0.0, 0.2);
-  const Diagnosis noisy = street.diagnose([&](Eigen::Isometry3d T) {
-    T.translation() += Eigen::Vector3d(metres(random), metres(random), metres(random));
-    return T;
-  });
-  CHECK(noisy.verdict != PoseVerdict::kAgree);
-  CHECK(noisy.verdict != PoseVerdict::kNoMotion);
-}
-
 TEST_CASE("check estimates the offset of the clocks") {
   const Street street(dense());
   std::string scan_times;

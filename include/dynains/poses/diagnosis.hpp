@@ -133,12 +133,10 @@ struct PoseAgreement {
   Agreement as_given;
   Agreement standing;
   std::size_t stride = 0;  ///< scan i was compared with scan i + stride
-  /// Whether registrations of (merged) scans that begin at the poses stay there.
-  bool is_confirmed = false;
 
   /// Whether the poses are probably wrong.
   bool doubtful() const {
-    return !is_confirmed && as_given.points >= 200 && !fits(as_given, standing) &&
+    return as_given.points >= 200 && !fits(as_given, standing) &&
            !(stride == 1 && is_passable(as_given, standing));
   }
 };
@@ -147,8 +145,8 @@ struct PoseAgreement {
 /// recording. Throws IoError.
 Diagnosis diagnose(const Recording& recording);
 
-/// Tests the given poses at a few places of the scans `first` to `last` (inclusive), for the start
-/// of a run. Throws IoError.
+/// Compares a small sample of the scans `first` to `last` (inclusive) under the given poses, for
+/// the start of a run. Throws IoError.
 PoseAgreement pose_agreement(const Recording& recording, std::size_t first, std::size_t last);
 
 /// One sentence with the verdict on the poses and the recommended option.
