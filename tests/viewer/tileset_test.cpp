@@ -193,8 +193,8 @@ TEST_CASE("A small map is one tile with all its points, in their order") {
   CHECK(tree.tiles == 1);
   for (std::size_t i = 0; i < points.size(); ++i) REQUIRE(tree.points[i].label == i);
   check_points(points, tree.points);
-  // Nothing but the set is left.
-  CHECK(dynains::test::count_entries(folder.path()) == 2);
+  // Nothing but the set and its page is left.
+  CHECK(dynains::test::count_entries(folder.path()) == 3);
   CHECK(dynains::test::count_entries(folder / "tileset") == 1);
 }
 
