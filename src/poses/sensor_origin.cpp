@@ -227,7 +227,7 @@ Candidate climbed(Measure& measure, Candidate start, std::vector<double> steps, 
 
 constexpr double kLeastOffset = 0.4;  // m; beams of one sensor begin at places that differ less
 
-/// What the elevations of beams tell of the origin.
+/// Estimate of the origin by the elevations of beams.
 enum class BeamFinding { kAsGiven, kElsewhere, kNothing };
 
 BeamFinding origin_of_beams(const std::vector<PointBuffer>& scans, Eigen::Vector3d& position) {

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <system_error>
 #include <utility>
 
 #include "dynains/io/kitti.hpp"
@@ -37,24 +35,6 @@ void fill_mos_labels(const ScanVerdict& verdict, std::vector<std::uint32_t>& lab
   for (std::size_t i = 0; i < count; ++i) {
     labels[i] = mos_label(verdict.labels[i], verdict.instances[i]);
   }
-}
-
-/// Whether a file has exactly this content.
-bool has_bytes(const std::filesystem::path& file, const void* data, std::size_t size) {
-  std::error_code error;
-  if (std::filesystem::file_size(file, error) != size || error) return false;
-  constexpr std::size_t kBlock = std::size_t{1} << 16U;
-  std::vector<char> block(std::min(size, kBlock));
-  std::ifstream stream(file, std::ios::binary);
-  const auto* expected = static_cast<const char*>(data);
-  for (std::size_t left = size; left > 0;) {
-    const std::size_t count = std::min(left, block.size());
-    if (!stream.read(block.data(), static_cast<std::streamsize>(count))) return false;
-    if (!std::equal(expected, expected + count, block.data())) return false;
-    expected += count;
-    left -= count;
-  }
-  return true;
 }
 
 }  // namespace
@@ -94,16 +74,10 @@ void LabelFiles::take_beliefs(Span<const float> beliefs) {
   });
 }
 
-void LabelFiles::write(const std::string& name, bool keep_equal) const {
-  const auto is_kept = [&](const std::filesystem::path& file, const auto& values) {
-    return keep_equal && has_bytes(file, values.data(), sizeof(values[0]) * values.size());
-  };
-  const std::filesystem::path labels = folder_ / (name + ".label");
-  if (!is_kept(labels, labels_)) write_labels(labels, labels_);
-  const std::filesystem::path causes = cause_folder_ / (name + ".cause");
-  if (!cause_folder_.empty() && !is_kept(causes, causes_)) write_point_bytes(causes, causes_);
-  const std::filesystem::path beliefs = belief_folder_ / (name + ".belief");
-  if (!belief_folder_.empty() && !is_kept(beliefs, beliefs_)) write_point_bytes(beliefs, beliefs_);
+void LabelFiles::write(const std::string& name) const {
+  write_labels(folder_ / (name + ".label"), labels_);
+  if (!cause_folder_.empty()) write_point_bytes(cause_folder_ / (name + ".cause"), causes_);
+  if (!belief_folder_.empty()) write_point_bytes(belief_folder_ / (name + ".belief"), beliefs_);
 }
 
 LabelWriter::LabelWriter(std::filesystem::path folder, std::launch thread)

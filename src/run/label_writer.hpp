@@ -29,9 +29,8 @@ class LabelFiles {
   /// Copies a verdict into the form of the files.
   void take(const ScanVerdict& verdict);
   /// Writes the verdict of take() to `labels`/`name`.label, `causes`/`name`.cause and
-  /// `beliefs`/`name`.belief (255 is a belief of 1). With `keep_equal`, files that have these bytes
-  /// already stay. Throws IoError.
-  void write(const std::string& name, bool keep_equal = false) const;
+  /// `beliefs`/`name`.belief (255 is a belief of 1). Throws IoError.
+  void write(const std::string& name) const;
 
  private:
   std::filesystem::path folder_;

@@ -1,4 +1,4 @@
-// What a sensor makes of the surfaces that its beams meet.
+// Returns of a sensor from the surfaces that its beams meet.
 #pragma once
 
 #include <cstddef>

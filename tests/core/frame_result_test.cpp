@@ -1,4 +1,4 @@
-// What a push tells of the times of scans.
+// Doubts of a push about the times of scans.
 #include <vector>
 
 #include "dynains/remover.hpp"

@@ -278,7 +278,7 @@ std::string mcap_of(const std::string& records) {
 
 }  // namespace
 
-TEST_CASE("A small file of MCAP takes little memory, whatever its chunks unpack to") {
+TEST_CASE("A small file of MCAP takes little memory, even if its chunks unpack to much") {
   const TemporaryFolder folder;
   const fs::path path = folder / "log.mcap";
   std::string empty;

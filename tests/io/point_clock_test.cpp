@@ -174,7 +174,7 @@ TEST_CASE("Times that cannot be those of the scan are counted up to a tenth, and
     CHECK_FALSE(find(with_outliers(8, 3.9 / unit, unit)).clock);
     CHECK(find(with_outliers(8, 3.9 / unit, unit), kPeriod, unit).clock->unit == unit);
   }
-  // Points without a return do not count, whatever their time is.
+  // Points without a return do not count, even if they have a time.
   const PointClockFinding finding =
       find([](std::size_t k, double offset, double) { return k % 10 == 9 ? 4.29 : offset; });
   REQUIRE(finding.clock);

@@ -1,4 +1,4 @@
-// What users see: static objects that stay whole, and moving objects that leave.
+// Scores by object: the share of static objects that stay whole, and of moving objects that leave.
 #pragma once
 
 #include <array>

@@ -23,7 +23,7 @@ class CorrectionSupport {
   using Vector = NormalEquations::Vector;
   using Matrix = NormalEquations::Matrix;
 
-  /// What is presumed about the pose that is corrected.
+  /// Presumption about the pose that is corrected.
   enum class Prior {
     kExact,    ///< exact, unless the correction is far from what its uncertainty explains
     kInexact,  ///< as uncertain as a pose whose errors are known

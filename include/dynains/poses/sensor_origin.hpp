@@ -30,7 +30,7 @@ struct RayOrigin {
 std::optional<RayOrigin> find_ray_origin(const std::vector<PointBuffer>& scans);
 
 /// As above, for a sample of the scans `first` to `last` (inclusive). The position is relative to
-/// the clouds as recorded, whatever Recording::sensor_origin() is. Throws IoError.
+/// the clouds as recorded; Recording::sensor_origin() does not change it. Throws IoError.
 std::optional<RayOrigin> find_ray_origin(const Recording& recording, std::size_t first,
                                          std::size_t last);
 

@@ -1,4 +1,4 @@
-// What a sensor sees of the vehicle or robot that carries it.
+// Returns from the vehicle or robot that carries the sensor.
 #pragma once
 
 #include <Eigen/Core>

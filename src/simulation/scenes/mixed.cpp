@@ -78,7 +78,7 @@ void add_sensor(Builder& builder, const StreetLanes& lanes, double speed) {
   traffic.drivers[0].foresight = 0.2;
 }
 
-/// What long recordings show: deliveries and buses at stops against the way, which wait and go, and
+/// Events of long recordings: deliveries and buses at stops against the way, which wait and go, and
 /// parked cars that leave while the sensor is near.
 void add_waiting(Builder& builder, Random random, const StreetLanes& lanes, double speed) {
   const Config& config = builder.config();
