@@ -1,4 +1,25 @@
-// Tiles and references of a session of a city. docs/scale.md describes them byte by byte.
+// Tiles and references of a session of a city. Numbers are little endian, checksums FNV-1a of 64
+// bits. By byte:
+//
+// X_Y.tile, X = floor(x / tile), Y = floor(y / tile)
+//  0  "DYNSTILE"; uint32 version; uint32 0
+// 16  double map_voxel, tile (m); int32 X, Y; uint64 number of points
+// 48  for each point: float x, y (m, from the corner X tile, Y tile), z (m, world);
+//     uint32 scan; uint32 label of the recording or 0; uint32 1 for ground, else 0
+//     uint64 checksum of all bytes before
+//
+// references.bin
+//  0  "DYNSREFS"; uint32 version
+// 12  int32 rows, columns of the images; float lowest level, rows per level, columns per radian;
+//     int32 last inner row, hole rows; uint64 checksum of bytes 0 to 39
+// 48  for each reference: uint64 scan; 12 double, the upper three rows of T_world_sensor, row by
+//     row; uint64 size of the image; image; uint64 checksum of this record
+//
+// An image holds two ranges per cell, in cm (RangeImage::Cell): `nearest` of all cells row by row,
+// then `around`. A range is coded as the difference d to the range before it in its row (the first
+// to 0), as the number 2 d for d > 0 and -2 d - 1 for d < 0, in groups of 7 bits, the lowest first,
+// bit 7 set in all but the last group. A byte 0 is d = 0; the number behind it counts further
+// differences of 0.
 #pragma once
 
 #include <cstdint>
