@@ -1,6 +1,6 @@
 // Input: scans as plain arrays. Output: labels and a static map.
 #include <cstdio>
-#include <dynains/remover.hpp>
+#include <dynains/compiled_remover.hpp>
 #include <vector>
 
 // Replaces a driver: a wall 10 m ahead, and a box that moves to the left at 5 m/s.

@@ -1,6 +1,6 @@
 // A cloud type of your own: CloudTraits gives dynains the number of points and their coordinates.
 #include <cstdio>
-#include <dynains/remover.hpp>
+#include <dynains/compiled_remover.hpp>
 #include <vector>
 
 struct Return {

@@ -1,7 +1,7 @@
 // Behind an odometry: the pose of the newest scan is corrected, and its moving points are removed.
 #include <cmath>
 #include <cstdio>
-#include <dynains/remover.hpp>
+#include <dynains/compiled_remover.hpp>
 #include <vector>
 
 using Cloud = std::vector<Eigen::Vector3d>;

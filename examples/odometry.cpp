@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <dynains/remover.hpp>
+#include <dynains/compiled_remover.hpp>
 #include <dynains/simulation/simulator.hpp>
 #include <vector>
 

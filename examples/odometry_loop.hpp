@@ -3,7 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
-#include <dynains/remover.hpp>
+#include <dynains/compiled_remover.hpp>
 #include <functional>
 #include <utility>
 #include <vector>

@@ -18,7 +18,7 @@
 #include <string>
 
 #include "dynains/adapters/point_cloud2.hpp"
-#include "dynains/remover.hpp"
+#include "dynains/compiled_remover.hpp"
 
 namespace {
 

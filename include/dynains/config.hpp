@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "dynains/errors.hpp"
+#include "dynains/evidence/free_space_config.hpp"
+#include "dynains/ground/ground_config.hpp"
 #include "dynains/parameters.hpp"
-#include "dynains/stage/free_space_config.hpp"
-#include "dynains/stage/ground_config.hpp"
 
 namespace dynains {
 
@@ -174,9 +174,10 @@ struct RemoverConfig {
                       "roll; if pitch and roll are 0, the tilt is found in the first scan"});
     visitor(Parameter{"mounting_roll", self.mounting_roll, closed(-180, 180), "deg",
                       "tilt of the sensor about its x axis, left side up"});
-    visitor(Parameter{"newest_verdict", self.newest_verdict, Bounds(), "",
-                      "give a verdict on the newest scan, without latency; false saves its time, and "
-                      "only scans whose verdict is final have labels"});
+    visitor(
+        Parameter{"newest_verdict", self.newest_verdict, Bounds(), "",
+                  "give a verdict on the newest scan, without latency; false saves its time, and "
+                  "only scans whose verdict is final have labels"});
     visitor(Parameter{"build_map", self.build_map, Bounds(), "", "accumulate the static map"});
   }
 

@@ -7,10 +7,10 @@
 #include <optional>
 #include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/pipeline/pipeline.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/remover.hpp"
 
 namespace dynains {
 

@@ -8,7 +8,7 @@
 #include <cstdint>
 
 #include "dynains/pose.hpp"
-#include "dynains/stage/voxel_hash_table.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
 

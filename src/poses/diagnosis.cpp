@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-#include "dynains/stage/voxel_hash_table.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 #include "io/finite_points.hpp"
 #include "io/median.hpp"
 #include "io/text.hpp"

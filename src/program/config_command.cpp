@@ -5,7 +5,7 @@
 #include <string>
 
 #include "command.hpp"
-#include "dynains/remover.hpp"
+#include "dynains/compiled_remover.hpp"
 #include "parameter_flags.hpp"
 #include "run/preset.hpp"
 

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/text_table.hpp"
 #include "dynains/io/recording.hpp"
-#include "dynains/remover.hpp"
 #include "evaluation_options.hpp"
 #include "experiment.hpp"
 #include "recording_options.hpp"

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "dynains/io/recording.hpp"
+#include "dynains/map/static_map_accumulator.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/static_map_accumulator.hpp"
 
 namespace dynains::program {
 

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "command.hpp"
+#include "dynains/map/static_map_accumulator.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/static_map_accumulator.hpp"
 #include "kept_points.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"

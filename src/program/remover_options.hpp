@@ -4,7 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include "dynains/remover.hpp"
+#include "dynains/compiled_remover.hpp"
 #include "parameter_flags.hpp"
 
 namespace dynains::program {

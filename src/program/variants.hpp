@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/evaluation/evaluate.hpp"
-#include "dynains/remover.hpp"
 #include "dynains/verdict.hpp"
 #include "run/labelled_sequence.hpp"
 

@@ -1,5 +1,5 @@
 #include "bindings.hpp"
-#include "dynains/remover.hpp"
+#include "dynains/compiled_remover.hpp"
 #include "parameters.hpp"
 
 namespace dynains::python {

@@ -1,5 +1,3 @@
-#include "dynains/remover.hpp"
-
 #include <pybind11/stl.h>
 
 #include <algorithm>
@@ -13,6 +11,7 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "dynains/compiled_remover.hpp"
 #include "parameters.hpp"
 
 namespace dynains::python {

@@ -5,9 +5,9 @@
 #include <string>
 #include <type_traits>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/parameters.hpp"
-#include "dynains/remover.hpp"
 #include "dynains/simulation/config.hpp"
 
 namespace {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "dynains/io/recording.hpp"
-#include "dynains/stage/voxel_hash_table.hpp"
 #include "dynains/verdict.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains::program {
 

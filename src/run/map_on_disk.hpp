@@ -3,8 +3,8 @@
 
 #include <filesystem>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/io/tiled_map.hpp"
-#include "dynains/remover.hpp"
 
 namespace dynains::program {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "dynains/remover.hpp"
+#include "dynains/compiled_remover.hpp"
 
 namespace dynains::program {
 

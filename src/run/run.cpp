@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/poses/diagnosis.hpp"
-#include "dynains/remover.hpp"
 #include "interrupt.hpp"
 #include "lone_scans.hpp"
 #include "output_folder.hpp"

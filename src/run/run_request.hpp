@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/io/recording.hpp"
-#include "dynains/remover.hpp"
 #include "run_results.hpp"
 
 namespace dynains::program {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "dynains/remover.hpp"
+#include "dynains/compiled_remover.hpp"
 #include "labelled_sequence.hpp"
 
 namespace dynains::program {

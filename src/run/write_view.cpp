@@ -4,8 +4,8 @@
 #include <string>
 
 #include "dynains/errors.hpp"
+#include "dynains/evidence/free_space_config.hpp"
 #include "dynains/io/atomic_file.hpp"
-#include "dynains/stage/free_space_config.hpp"
 #include "json_file.hpp"
 #include "run_results.hpp"
 #include "viewer/page.hpp"

@@ -6,7 +6,7 @@
 
 #include "adapters/message.hpp"
 #include "dynains/adapters/point_cloud2.hpp"
-#include "dynains/remover.hpp"
+#include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"

@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "adapters/message.hpp"
-#include "dynains/remover.hpp"
+#include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"

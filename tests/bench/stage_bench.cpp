@@ -5,12 +5,12 @@
 #include <vector>
 
 #include "bench/street.hpp"
-#include "dynains/curved_voxel_clusterer.hpp"
-#include "dynains/ground_segmenter.hpp"
-#include "dynains/occupancy_descriptor.hpp"
-#include "dynains/stage/cluster_set.hpp"
-#include "dynains/stage/polar_points.hpp"
-#include "dynains/static_map_accumulator.hpp"
+#include "dynains/clusters/cluster_set.hpp"
+#include "dynains/clusters/curved_voxel_clusterer.hpp"
+#include "dynains/clusters/polar_points.hpp"
+#include "dynains/descriptors/occupancy_descriptor.hpp"
+#include "dynains/ground/ground_segmenter.hpp"
+#include "dynains/map/static_map_accumulator.hpp"
 
 namespace dynains::bench {
 namespace {

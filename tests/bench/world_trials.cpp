@@ -18,9 +18,9 @@
 #include <string>
 #include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/evaluate.hpp"
-#include "dynains/remover.hpp"
 #include "dynains/simulation/random_world.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "program/parameter_flags.hpp"

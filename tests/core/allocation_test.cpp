@@ -5,7 +5,7 @@
 #include <new>
 #include <vector>
 
-#include "dynains/remover.hpp"
+#include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"

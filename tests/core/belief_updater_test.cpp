@@ -1,4 +1,4 @@
-#include "dynains/belief_updater.hpp"
+#include "dynains/belief/belief_updater.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "dynains/stage/cluster_set.hpp"
+#include "dynains/clusters/cluster_set.hpp"
 
 #include <map>
 #include <tuple>

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/parameters.hpp"
-#include "dynains/remover.hpp"
 #include "support/catch.hpp"
 
 namespace dynains::test {

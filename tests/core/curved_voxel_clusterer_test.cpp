@@ -1,4 +1,4 @@
-#include "dynains/curved_voxel_clusterer.hpp"
+#include "dynains/clusters/curved_voxel_clusterer.hpp"
 
 #include <limits>
 #include <vector>

@@ -1,7 +1,7 @@
 // Doubts of a push about the times of scans.
 #include <vector>
 
-#include "dynains/remover.hpp"
+#include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
 #include "support/scene.hpp"
 

@@ -1,5 +1,5 @@
 // The evidence of a few scans as a whole, on panels in front of a wall.
-#include "dynains/free_space_evidence.hpp"
+#include "dynains/evidence/free_space_evidence.hpp"
 
 #include <algorithm>
 #include <cstddef>

@@ -1,4 +1,4 @@
-#include "dynains/ground_segmenter.hpp"
+#include "dynains/ground/ground_segmenter.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "dynains/remover.hpp"
+#include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/dyna_ins_remover.hpp"
 #include "dynains/evidence/visibility.hpp"
-#include "dynains/remover.hpp"
-#include "dynains/static_map_accumulator.hpp"
+#include "dynains/map/static_map_accumulator.hpp"
 #include "support/catch.hpp"
 #include "support/counting_map.hpp"
 #include "support/runs.hpp"

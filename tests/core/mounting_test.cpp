@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/io/kitti.hpp"
-#include "dynains/remover.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"

@@ -1,4 +1,4 @@
-#include "dynains/occupancy_descriptor.hpp"
+#include "dynains/descriptors/occupancy_descriptor.hpp"
 
 #include <cmath>
 #include <vector>

@@ -5,9 +5,9 @@
 #include <limits>
 #include <vector>
 
-#include "dynains/ground/point_record.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
+#include "dynains/simd/point_record.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 

@@ -1,4 +1,4 @@
-#include "dynains/stage/polar_points.hpp"
+#include "dynains/clusters/polar_points.hpp"
 
 #include <Eigen/Geometry>
 #include <cmath>

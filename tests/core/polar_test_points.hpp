@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "dynains/stage/cluster_set.hpp"
-#include "dynains/stage/polar_points.hpp"
+#include "dynains/clusters/cluster_set.hpp"
+#include "dynains/clusters/polar_points.hpp"
 
 namespace dynains::test {
 

@@ -1,9 +1,9 @@
 // A recorded clip, if the machine has it.
 #include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/io/kitti.hpp"
-#include "dynains/remover.hpp"
 #include "support/catch.hpp"
 #include "support/recordings.hpp"
 

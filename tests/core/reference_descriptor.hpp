@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "dynains/occupancy_descriptor.hpp"
+#include "dynains/descriptors/occupancy_descriptor.hpp"
 #include "polar_test_points.hpp"
 
 namespace dynains::test {

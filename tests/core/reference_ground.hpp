@@ -11,7 +11,7 @@
 #include <map>
 #include <vector>
 
-#include "dynains/ground_segmenter.hpp"
+#include "dynains/ground/ground_segmenter.hpp"
 
 namespace dynains::test {
 

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/dyna_ins_remover.hpp"
-#include "dynains/remover.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"

@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "dynains/remover.hpp"
+#include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"

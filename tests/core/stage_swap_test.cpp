@@ -2,9 +2,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/dyna_ins_remover.hpp"
 #include "dynains/map/rebasable_static_map.hpp"
-#include "dynains/remover.hpp"
 #include "support/catch.hpp"
 #include "support/counting_map.hpp"
 #include "support/runs.hpp"

@@ -1,4 +1,4 @@
-#include "dynains/static_map_accumulator.hpp"
+#include "dynains/map/static_map_accumulator.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

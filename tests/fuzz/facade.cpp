@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/remover.hpp"
 #include "targets.hpp"
 
 namespace dynains::fuzz {

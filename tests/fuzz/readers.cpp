@@ -5,12 +5,12 @@
 #include <optional>
 #include <string>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/tiled_map.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/remover.hpp"
 #include "io/files.hpp"
 #include "io/kitti_files.hpp"
 #include "io/point_format_writer.hpp"

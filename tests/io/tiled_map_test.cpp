@@ -12,10 +12,10 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/dyna_ins_remover.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/remover.hpp"
-#include "dynains/static_map_accumulator.hpp"
+#include "dynains/map/static_map_accumulator.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"

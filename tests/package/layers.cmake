@@ -3,15 +3,19 @@
 # that precede its own in the list.
 set(layers
   "^(simd/.*|errors|points|pose|parameters|verdict|point_cloud_traits|version)\\.hpp$"
-  "^sensor/"
-  "^stage/"
-  "^(ground|evidence|map)/"
-  "^(ground_segmenter|curved_voxel_clusterer|occupancy_descriptor)\\.hpp$|^(belief_updater|free_space_evidence|static_map_accumulator)\\.hpp$|^config\\.hpp$"
+  "^(sensor|voxels)/"
+  "^(ground|clusters|belief)/"
+  "^(descriptors|evidence)/"
+  "^map/"
+  "^config\\.hpp$"
   "^pipeline/"
-  "^(remover|dyna_ins_remover)\\.hpp$"
+  "^(compiled_remover|dyna_ins_remover)\\.hpp$"
   "^(adapters|io|evaluation)/"
   "^(poses|simulation)/"
   "^city/")
+# Classes of stages. They meet in the pipeline alone: a stage includes no other stage.
+set(stages
+  "/(ground_segmenter|curved_voxel_clusterer|occupancy_descriptor|belief_updater)\\.hpp$|/(free_space_evidence|static_map_accumulator)\\.hpp$")
 
 # Number of the layer of a header, from 0.
 function(find_layer header result)
@@ -28,7 +32,8 @@ function(find_layer header result)
 endfunction()
 
 set(basic_layer 0)
-set(facade_layer 6)
+set(stage_layers_end 5)
+set(facade_layer 7)
 set(upward "")
 file(GLOB_RECURSE headers RELATIVE ${INCLUDE_DIR}/dynains ${INCLUDE_DIR}/dynains/*.hpp)
 foreach(header IN LISTS headers)
@@ -39,14 +44,16 @@ foreach(header IN LISTS headers)
     string(REGEX REPLACE "^#include \"dynains/(.*)\"" "\\1" included ${include})
     find_layer(${included} included_layer)
     get_filename_component(included_folder ${included} DIRECTORY)
-    # A stage includes no other stage.
-    if(included_layer LESS layer OR
+    if(layer LESS stage_layers_end AND included MATCHES "${stages}")
+      list(APPEND upward "${header} includes the stage ${included}")
+    elseif(included_layer LESS layer OR
        (included_layer EQUAL layer AND
         (layer EQUAL basic_layer OR layer EQUAL facade_layer OR
          (folder AND folder STREQUAL included_folder))))
       continue()
+    else()
+      list(APPEND upward "${header} includes ${included}")
     endif()
-    list(APPEND upward "${header} includes ${included}")
   endforeach()
 endforeach()
 

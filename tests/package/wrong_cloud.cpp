@@ -1,7 +1,7 @@
 // Pushes a value of type CLOUD.
 #include <vector>
 
-#include "dynains/remover.hpp"
+#include "dynains/compiled_remover.hpp"
 
 struct MyPoint {
   float x, y, z;

@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/io/folder_lock.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/tiled_map.hpp"
-#include "dynains/remover.hpp"
 #include "io/files.hpp"
 #include "program/start.hpp"
 #include "program/tiny_sequence.hpp"

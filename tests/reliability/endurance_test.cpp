@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "dynains/remover.hpp"
+#include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 #include "support/runs.hpp"

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/remover.hpp"
+#include "dynains/compiled_remover.hpp"
 #include "support/scene.hpp"
 
 namespace dynains::test {

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/evaluation/evaluate.hpp"
-#include "dynains/remover.hpp"
 #include "dynains/simulation/simulator.hpp"
 
 namespace dynains::test {

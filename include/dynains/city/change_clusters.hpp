@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "dynains/city/session_points.hpp"
-#include "dynains/stage/voxel_hash_table.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
 

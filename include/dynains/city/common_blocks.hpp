@@ -11,7 +11,7 @@
 #include "dynains/points.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_loops.hpp"
-#include "dynains/stage/voxel_hash_table.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains::detail {
 

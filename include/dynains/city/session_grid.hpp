@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "dynains/parameters.hpp"
-#include "dynains/stage/voxel_hash_table.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
 

@@ -10,7 +10,7 @@
 
 #include "dynains/city/session_grid.hpp"
 #include "dynains/city/session_points.hpp"
-#include "dynains/stage/voxel_hash_table.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains::detail {
 

@@ -11,13 +11,13 @@
 #include <vector>
 
 #include "dynains/errors.hpp"
+#include "dynains/evidence/free_space_config.hpp"
 #include "dynains/evidence/range_image.hpp"
 #include "dynains/evidence/visibility.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
-#include "dynains/stage/free_space_config.hpp"
 
 namespace dynains {
 

@@ -9,14 +9,14 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/belief/log_odds.hpp"
 #include "dynains/city/common_blocks.hpp"
 #include "dynains/city/session_ground.hpp"
 #include "dynains/city/session_points.hpp"
+#include "dynains/evidence/free_space_config.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/pack_loops.hpp"
-#include "dynains/stage/free_space_config.hpp"
-#include "dynains/stage/log_odds.hpp"
-#include "dynains/stage/voxel_hash_table.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
 

@@ -8,11 +8,11 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/evidence/free_space_config.hpp"
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/stage/free_space_config.hpp"
-#include "dynains/stage/voxel_hash_table.hpp"
 #include "dynains/verdict.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
 

@@ -6,12 +6,12 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/evidence/free_space_config.hpp"
 #include "dynains/evidence/ground_footprint.hpp"
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/visibility.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/bits.hpp"
-#include "dynains/stage/free_space_config.hpp"
 
 namespace dynains {
 

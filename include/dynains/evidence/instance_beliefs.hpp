@@ -6,13 +6,13 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/belief/log_odds.hpp"
+#include "dynains/evidence/free_space_config.hpp"
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/visibility.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_loops.hpp"
-#include "dynains/stage/free_space_config.hpp"
-#include "dynains/stage/log_odds.hpp"
 
 namespace dynains {
 

@@ -7,10 +7,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/evidence/free_space_config.hpp"
 #include "dynains/evidence/instance_beliefs.hpp"
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/instance_tracks.hpp"
-#include "dynains/stage/free_space_config.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains {

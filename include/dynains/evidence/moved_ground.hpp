@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/evidence/free_space_config.hpp"
 #include "dynains/evidence/ground_footprint.hpp"
 #include "dynains/evidence/ground_samples.hpp"
 #include "dynains/evidence/instance_hull.hpp"
@@ -15,7 +16,6 @@
 #include "dynains/points.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/simd/bits.hpp"
-#include "dynains/stage/free_space_config.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains {

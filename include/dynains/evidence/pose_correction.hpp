@@ -12,9 +12,9 @@
 #include "dynains/evidence/motion_prediction.hpp"
 #include "dynains/evidence/pose_alignment.hpp"
 #include "dynains/evidence/voxel_planes.hpp"
+#include "dynains/ground/ground_split.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/stage/ground_split.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains {
@@ -65,7 +65,7 @@ class PoseCorrection {
   /// Pose of a scan for comparisons with other scans. `T_world_level`, `split`: pushed pose and
   /// points, m. `time`: s, if known. Updates residual() and misfit().
   Pose correct(const Pose& T_world_level, const GroundSplit& split,
-                            const std::optional<double>& time = {}) {
+               const std::optional<double>& time = {}) {
     if (!is_active()) return T_world_level;
     residual_.reset();
     misfit_.reset();
@@ -191,8 +191,7 @@ class PoseCorrection {
         T_aligned = T_guess;
       }
     }
-    const Pose T_motion =
-        detail::composed(detail::inverted(T_origin_pushed_), T_pushed);
+    const Pose T_motion = detail::composed(detail::inverted(T_origin_pushed_), T_pushed);
     residual_ = difference(detail::composed(T_origin_newest_, T_motion), T_aligned);
     residual_->T_previous_newest = detail::composed(detail::inverted(T_origin_newest_), T_newest);
   }
@@ -217,7 +216,7 @@ class PoseCorrection {
     if (2.0 * movement(confirmed(alignment.supported, before)) >= size) return true;
     const std::optional<Pose> T_predicted = motion_.predict(T_origin_newest_);
     return !T_predicted || movement(difference(*T_predicted, alignment.T_map_sensor)) <
-                              movement(difference(*T_predicted, T_guess));
+                               movement(difference(*T_predicted, T_guess));
   }
 
   // Movement (m) of a point at a distance of kLever.

@@ -9,14 +9,14 @@
 #include <optional>
 #include <vector>
 
+#include "dynains/evidence/free_space_config.hpp"
 #include "dynains/evidence/range_image.hpp"
 #include "dynains/evidence/visibility.hpp"
+#include "dynains/ground/ground_split.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/simd/pack_geometry.hpp"
-#include "dynains/stage/free_space_config.hpp"
-#include "dynains/stage/ground_split.hpp"
 
 namespace dynains {
 

@@ -9,7 +9,7 @@
 
 #include "dynains/pose.hpp"
 #include "dynains/sensor/plane_fit.hpp"
-#include "dynains/stage/voxel_hash_table.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
 

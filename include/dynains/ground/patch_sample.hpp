@@ -6,10 +6,10 @@
 #include <cstddef>
 #include <limits>
 
-#include "dynains/ground/point_record.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor/plane_fit.hpp"
 #include "dynains/simd/pack_loops.hpp"
+#include "dynains/simd/point_record.hpp"
 
 namespace dynains::detail {
 

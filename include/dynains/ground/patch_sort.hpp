@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/ground/point_record.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/pack_loops.hpp"
+#include "dynains/simd/point_record.hpp"
 
 namespace dynains::detail {
 

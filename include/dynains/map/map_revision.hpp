@@ -9,12 +9,12 @@
 #include <unordered_map>
 #include <vector>
 
-#include "dynains/map/block_table.hpp"
+#include "dynains/belief/log_odds.hpp"
+#include "dynains/evidence/free_space_config.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/simd/pack_loops.hpp"
-#include "dynains/stage/free_space_config.hpp"
-#include "dynains/stage/log_odds.hpp"
+#include "dynains/voxels/block_table.hpp"
 
 namespace dynains {
 

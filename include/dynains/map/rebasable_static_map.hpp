@@ -13,11 +13,11 @@
 #include <vector>
 
 #include "dynains/errors.hpp"
-#include "dynains/map/block_table.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/stage/voxel_hash_table.hpp"
+#include "dynains/voxels/block_table.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
 
@@ -86,8 +86,8 @@ class RebasableStaticMap {
   }
 
   /// As above, for points in another frame.
-  void insert(PointsView points, Span<const std::uint8_t> keep,
-              const Pose& T_world_points, const Pose& T_world_sensor) {
+  void insert(PointsView points, Span<const std::uint8_t> keep, const Pose& T_world_points,
+              const Pose& T_world_sensor) {
     const std::uint32_t first = points_.size();
     taken_.clear();
     const bool is_turned = T_world_points.matrix() != T_world_sensor.matrix();

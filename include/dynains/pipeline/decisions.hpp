@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "dynains/clusters/cluster_set.hpp"
 #include "dynains/config.hpp"
 #include "dynains/map/map_revision.hpp"
 #include "dynains/pipeline/instance_ids.hpp"
@@ -21,7 +22,6 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
-#include "dynains/stage/cluster_set.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {
@@ -242,10 +242,8 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
       if (!revision_.config().revise_map) return;
       revision_.revise(
           map, newest.scan, newest.T_world_level.translation(),
-          [this](const PointBuffer& points, std::size_t count,
-                 const Pose& T_world_points) -> const auto& {
-            return evidence_.test_visibility(points, count, T_world_points);
-          });
+          [this](const PointBuffer& points, std::size_t count, const Pose& T_world_points)
+              -> const auto& { return evidence_.test_visibility(points, count, T_world_points); });
     }
   }
 

@@ -8,11 +8,11 @@
 #include <limits>
 #include <vector>
 
-#include "dynains/ground/point_record.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
+#include "dynains/simd/point_record.hpp"
 
 namespace dynains::detail {
 

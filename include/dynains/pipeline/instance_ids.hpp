@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/clusters/cluster_set.hpp"
 #include "dynains/points.hpp"
-#include "dynains/stage/cluster_set.hpp"
 
 namespace dynains::detail {
 

@@ -12,8 +12,8 @@
 
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/free_space_evidence.hpp"
-#include "dynains/ground_segmenter.hpp"
+#include "dynains/evidence/free_space_evidence.hpp"
+#include "dynains/ground/ground_segmenter.hpp"
 #include "dynains/pipeline/decisions.hpp"
 #include "dynains/pipeline/ingest.hpp"
 #include "dynains/pipeline/scan_rate.hpp"
@@ -201,8 +201,11 @@ FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Pose& T_world_s
   if (scans_.open() > latency()) finished = finish_oldest(timer);  // Eq. 2, 1
   timer.measure(&StageTimes::revision, [&] { decision_->revise(map_, newest); });
   const bool is_final = finished && finished->scan == newest.scan;
-  return {is_final ? *finished : newest_verdict_.verdict(newest), finished, timer.times(),
-          pose_residual(), time_doubt(),
+  return {is_final ? *finished : newest_verdict_.verdict(newest),
+          finished,
+          timer.times(),
+          pose_residual(),
+          time_doubt(),
           newest.began_epoch ? newest.began_epoch : decision_->misfit()};
 }
 

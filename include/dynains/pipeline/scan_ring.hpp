@@ -13,10 +13,10 @@
 
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
+#include "dynains/ground/ground_split.hpp"
 #include "dynains/pipeline/window_votes.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/stage/ground_split.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {

@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "dynains/clusters/polar_points.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/stage/polar_points.hpp"
 
 namespace dynains::detail {
 

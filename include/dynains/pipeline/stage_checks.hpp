@@ -9,13 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/clusters/cluster_set.hpp"
+#include "dynains/clusters/polar_points.hpp"
 #include "dynains/config.hpp"
+#include "dynains/ground/ground_split.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
-#include "dynains/stage/cluster_set.hpp"
-#include "dynains/stage/ground_split.hpp"
-#include "dynains/stage/polar_points.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {

@@ -8,8 +8,8 @@
 #include <cstring>
 #include <vector>
 
+#include "dynains/clusters/cluster_set.hpp"
 #include "dynains/points.hpp"
-#include "dynains/stage/cluster_set.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {

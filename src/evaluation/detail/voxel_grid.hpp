@@ -10,7 +10,7 @@
 #include <string>
 
 #include "dynains/errors.hpp"
-#include "dynains/stage/voxel_hash_table.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains::evaluation::detail {
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/stage/voxel_hash_table.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains::evaluation::detail {
 

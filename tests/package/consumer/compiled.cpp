@@ -2,7 +2,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "dynains/remover.hpp"
+#include "dynains/compiled_remover.hpp"
 
 int main() {
   dynains::DynaInsRemover remover;

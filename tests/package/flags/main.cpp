@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/io/trajectory.hpp"
-#include "dynains/remover.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
 

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "dynains/belief/log_odds.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
-#include "dynains/stage/log_odds.hpp"
 
 namespace dynains {
 

@@ -15,17 +15,17 @@
 #include <vector>
 
 #include "dynains/ground/concentric_zones.hpp"
+#include "dynains/ground/ground_config.hpp"
+#include "dynains/ground/ground_split.hpp"
 #include "dynains/ground/lowest_mean.hpp"
 #include "dynains/ground/patch_sample.hpp"
 #include "dynains/ground/patch_sort.hpp"
-#include "dynains/ground/point_record.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor/plane_fit.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_loops.hpp"
-#include "dynains/stage/ground_config.hpp"
-#include "dynains/stage/ground_split.hpp"
+#include "dynains/simd/point_record.hpp"
 
 namespace dynains {
 

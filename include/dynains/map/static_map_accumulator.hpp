@@ -13,13 +13,13 @@
 #include <utility>
 #include <vector>
 
-#include "dynains/map/block_table.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
+#include "dynains/voxels/block_table.hpp"
 
 namespace dynains {
 

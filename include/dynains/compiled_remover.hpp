@@ -11,16 +11,16 @@
 #include <optional>
 #include <utility>
 
-#include "dynains/belief_updater.hpp"
+#include "dynains/belief/belief_updater.hpp"
+#include "dynains/clusters/curved_voxel_clusterer.hpp"
 #include "dynains/config.hpp"
-#include "dynains/curved_voxel_clusterer.hpp"
+#include "dynains/descriptors/occupancy_descriptor.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/occupancy_descriptor.hpp"
+#include "dynains/map/static_map_accumulator.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
-#include "dynains/static_map_accumulator.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {

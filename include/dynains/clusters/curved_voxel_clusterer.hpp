@@ -11,13 +11,13 @@
 #include <string>
 #include <vector>
 
+#include "dynains/clusters/polar_points.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
-#include "dynains/stage/polar_points.hpp"
 
 namespace dynains {
 

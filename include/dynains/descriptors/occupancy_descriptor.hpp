@@ -8,12 +8,12 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/clusters/cluster_set.hpp"
+#include "dynains/clusters/polar_points.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
-#include "dynains/stage/cluster_set.hpp"
-#include "dynains/stage/polar_points.hpp"
 
 namespace dynains {
 

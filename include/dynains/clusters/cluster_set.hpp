@@ -7,10 +7,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/clusters/polar_points.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_loops.hpp"
-#include "dynains/stage/polar_points.hpp"
 
 namespace dynains {
 

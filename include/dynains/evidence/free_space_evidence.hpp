@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "dynains/evidence/dynamic_occupancy_grid.hpp"
+#include "dynains/evidence/free_space_config.hpp"
 #include "dynains/evidence/ground_samples.hpp"
 #include "dynains/evidence/instance_beliefs.hpp"
 #include "dynains/evidence/instance_judge.hpp"
@@ -20,11 +21,10 @@
 #include "dynains/evidence/moved_ground.hpp"
 #include "dynains/evidence/pose_correction.hpp"
 #include "dynains/evidence/reference_scans.hpp"
+#include "dynains/ground/ground_split.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
-#include "dynains/stage/free_space_config.hpp"
-#include "dynains/stage/ground_split.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains {
@@ -186,8 +186,7 @@ class FreeSpaceEvidence {
   }
 
   // The pose of a scan for comparisons. Begins an epoch if the scan does not fit to earlier ones.
-  Pose correct(std::uint64_t scan, const Pose& T_world_sensor,
-                            const GroundSplit& split) {
+  Pose correct(std::uint64_t scan, const Pose& T_world_sensor, const GroundSplit& split) {
     const Pose T_corrected = pose_correction_.correct(T_world_sensor, split, time_);
     if (!pose_correction_.misfit()) return T_corrected;
     begin_epoch(scan, T_world_sensor);
