@@ -47,16 +47,15 @@ constexpr bool is_dynamic(Cause cause) {
 
 /// Time per stage of one call, ms.
 struct StageTimes {
-  double ingest = 0.0;      ///< copy of the cloud, labels of invalid points
-  double ground = 0.0;      ///< ground segmentation
-  double window = 0.0;      ///< Eq. 3
-  double cluster = 0.0;     ///< curved voxels and separation by scan, Eq. 4
-  double descriptor = 0.0;  ///< Eq. 5-12 and, for proposals, the belief of Eq. 13-19
-  double evidence = 0.0;    ///< update of the free-space evidence by the newest scan
-  double judge = 0.0;       ///< verdicts by free space, also on ground; images of references
-  double verdict = 0.0;     ///< conversion of verdicts on clusters and groups to points
-  double map = 0.0;         ///< Eq. 1
-  double revision = 0.0;    ///< revision of the map by the newest scan
+  double ingest = 0.0;    ///< copy of the cloud, labels of invalid points
+  double ground = 0.0;    ///< ground segmentation
+  double window = 0.0;    ///< Eq. 3
+  double cluster = 0.0;   ///< curved voxels
+  double evidence = 0.0;  ///< Eq. 4-19 of the window, or the free-space evidence of the newest scan
+  double judge = 0.0;     ///< verdicts by free space, also on ground; images of references
+  double verdict = 0.0;   ///< conversion of verdicts on clusters and groups to points
+  double map = 0.0;       ///< Eq. 1
+  double revision = 0.0;  ///< revision of the map by the newest scan
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
@@ -64,7 +63,6 @@ struct StageTimes {
     visitor("ground", self.ground);
     visitor("window", self.window);
     visitor("cluster", self.cluster);
-    visitor("descriptor", self.descriptor);
     visitor("evidence", self.evidence);
     visitor("judge", self.judge);
     visitor("verdict", self.verdict);

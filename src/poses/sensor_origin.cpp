@@ -200,8 +200,8 @@ double largest_around(BeamSharpness& sharpness, const Eigen::Vector3d& centre, d
 
 /// Climbs from `start` in ever smaller steps along the first `axes` axes while `gain(value, best)`.
 template <class Measure, class Gain>
-Candidate climbed(Measure& measure, Candidate start, std::vector<double> steps, Eigen::Index axes,
-                  Gain&& gain) {
+Candidate climbed(Measure& measure, const Candidate& start, const std::vector<double>& steps,
+                  Eigen::Index axes, Gain&& gain) {
   Candidate best = start;
   best.value = measure.at(best.position);
   for (const double step : steps) {

@@ -419,7 +419,7 @@ TEST_CASE("The experiments run on any labelled sequence") {
   SECTION("runtime") {
     const std::string text = call({"experiment", "runtime", street, "--repeat", "2"});
     CHECK(has(text, "12 frames (2 times 6)"));
-    CHECK(has(text, "descriptor"));
+    CHECK(has(text, "evidence"));
     CHECK(has(text, "total"));
   }
   SECTION("figures") {

@@ -3,7 +3,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -26,27 +25,9 @@
 
 namespace dynains::detail {
 
-/// Measures the time of each stage in one call, in milliseconds.
-class StageTimer {
- public:
-  const StageTimes& times() const { return times_; }
-
-  /// Runs `work` and adds its time to a field of times().
-  template <class Work>
-  void measure(double StageTimes::*stage, Work&& work) {
-    const auto begin = std::chrono::steady_clock::now();
-    work();
-    const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - begin;
-    times_.*stage += time.count();
-  }
-
- private:
-  StageTimes times_;
-};
-
 /// Collects evidence on scans and classifies their points as static or dynamic. The caller calls
-/// observe() and judge_newest() for each scan, and judge_final() for the same scan after latency()
-/// later scans.
+/// observe() and judge() for each scan, and judge() again for the same scan after latency() later
+/// scans. Each verdict is written before the next call of judge().
 template <class Map>
 class ScanDecision {
  public:
@@ -54,7 +35,7 @@ class ScanDecision {
 
   /// Number of scans that are clustered together.
   virtual std::size_t window_length() const = 0;
-  /// Number of later scans before judge_final().
+  /// Number of later scans before the final judge().
   virtual std::size_t latency() const = 0;
 
   virtual bool needs_sensor() const = 0;
@@ -63,12 +44,14 @@ class ScanDecision {
   virtual void reserve(std::size_t scans) = 0;
 
   /// Adds the newest scan and assigns an instance id to each of its clusters.
-  virtual void observe(ScanRing& scans, const ScanWindow& window, StageTimer& timer) = 0;
-  /// Judges the newest scan, without evidence of later scans, and writes the verdict after
-  /// VerdictWriter::begin(). Without a writer, only later verdicts use the judgement.
-  virtual void judge_newest(const ScanSlot& newest, VerdictWriter* writer, StageTimer& timer) = 0;
-  /// Writes the final verdict on `scan`, with keep flags, after VerdictWriter::begin().
-  virtual void judge_final(const ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) = 0;
+  virtual void observe(ScanRing& scans, const ScanWindow& window) = 0;
+  /// Judges `scan`. Without `is_final` it is the newest scan, and evidence of later scans is
+  /// missing.
+  virtual void judge(const ScanSlot& scan, bool is_final) = 0;
+  /// Writes the verdict without latency of the last judge(), after VerdictWriter::begin().
+  virtual void write_newest(const ScanSlot& newest, VerdictWriter& writer) = 0;
+  /// Writes the final verdict of the last judge(), with keep flags, after VerdictWriter::begin().
+  virtual void write_final(const ScanSlot& scan, VerdictWriter& writer) = 0;
 
   /// Alignment of the newest scan with earlier scans, in the level frame.
   virtual std::optional<PoseResidual> pose_residual() const { return std::nullopt; }
@@ -103,22 +86,20 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
   void reserve(std::size_t) override {}
   void clear() override { instance_ids_.clear(); }
 
-  void observe(ScanRing& scans, const ScanWindow& window, StageTimer& timer) override {
-    timer.measure(&StageTimes::cluster, [&] {
-      clusters_.build(window.points(), window.scan_begin(), window.cluster_of(),
-                      window.cluster_count());
-    });
-    timer.measure(&StageTimes::descriptor, [&] { judge_clusters(); });
-    timer.measure(&StageTimes::verdict, [&] { record(scans, window.first_scan()); });
+  void observe(ScanRing& scans, const ScanWindow& window) override {
+    clusters_.build(window.points(), window.scan_begin(), window.cluster_of(),
+                    window.cluster_count());
+    judge_clusters();
+    record(scans, window.first_scan());
   }
 
-  void judge_newest(const ScanSlot& newest, VerdictWriter* writer, StageTimer& timer) override {
-    if (writer == nullptr) return;
-    timer.measure(&StageTimes::verdict, [&] { writer->write_windows(newest, 1); });
+  // The windows have voted already.
+  void judge(const ScanSlot&, bool) override {}
+  void write_newest(const ScanSlot& newest, VerdictWriter& writer) override {
+    writer.write_windows(newest, 1);
   }
-
-  void judge_final(const ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) override {
-    timer.measure(&StageTimes::verdict, [&] { writer.write_windows(scan, std::max(1, votes_)); });
+  void write_final(const ScanSlot& scan, VerdictWriter& writer) override {
+    writer.write_windows(scan, std::max(1, votes_));
   }
 
  private:
@@ -212,27 +193,23 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
     instance_ids_.clear();
   }
 
-  void observe(ScanRing& scans, const ScanWindow& window, StageTimer& timer) override {
-    timer.measure(&StageTimes::evidence, [&] {
-      const ScanSlot& newest = scans.newest();
-      set_time_in_stage(evidence_, newest.time);
-      evidence_.observe(newest.scan, newest.epoch, newest.T_world_level, newest.split,
-                        window.newest_cluster_of(), window.cluster_count());
-      propagate_ids(scans);
-    });
+  void observe(ScanRing& scans, const ScanWindow& window) override {
+    const ScanSlot& newest = scans.newest();
+    set_time_in_stage(evidence_, newest.time);
+    evidence_.observe(newest.scan, newest.epoch, newest.T_world_level, newest.split,
+                      window.newest_cluster_of(), window.cluster_count());
+    propagate_ids(scans);
   }
 
-  void judge_newest(const ScanSlot& newest, VerdictWriter* writer, StageTimer& timer) override {
-    const EvidenceVerdict verdict = judge(newest, false, timer);
-    if (writer == nullptr) return;
-    timer.measure(&StageTimes::verdict, [&] { writer->write_groups(newest, verdict); });
+  void judge(const ScanSlot& scan, bool is_final) override {
+    verdict_ = evidence_.judge(scan.scan, is_final, scan.split);
   }
-  void judge_final(const ScanSlot& scan, VerdictWriter& writer, StageTimer& timer) override {
-    const EvidenceVerdict verdict = judge(scan, true, timer);
-    timer.measure(&StageTimes::verdict, [&] {
-      writer.write_groups(scan, verdict);
-      writer.flag_groups(scan, verdict);
-    });
+  void write_newest(const ScanSlot& newest, VerdictWriter& writer) override {
+    writer.write_groups(newest, verdict_);
+  }
+  void write_final(const ScanSlot& scan, VerdictWriter& writer) override {
+    writer.write_groups(scan, verdict_);
+    writer.flag_groups(scan, verdict_);
   }
 
   std::optional<PoseResidual> pose_residual() const override { return pose_residual_of(evidence_); }
@@ -248,13 +225,6 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
   }
 
  private:
-  EvidenceVerdict judge(const ScanSlot& scan, bool is_final, StageTimer& timer) {
-    EvidenceVerdict verdict;
-    timer.measure(&StageTimes::judge,
-                  [&] { verdict = evidence_.judge(scan.scan, is_final, scan.split); });
-    return verdict;
-  }
-
   void propagate_ids(ScanRing& scans) {
     ScanSlot& newest = scans.newest();
     Span<const std::uint32_t> old_ids;
@@ -266,6 +236,7 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
   }
 
   Evidence evidence_;
+  EvidenceVerdict verdict_;  // of the last judge(); views of evidence_
   MapRevision revision_;
   InstanceIds instance_ids_;
 };

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -71,6 +72,15 @@ class WarmUp {
   Pipeline& pipeline_;
 };
 
+/// Runs `work` and adds its time to `milliseconds`.
+template <class Work>
+void timed(double& milliseconds, Work&& work) {
+  const auto begin = std::chrono::steady_clock::now();
+  work();
+  const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - begin;
+  milliseconds += time.count();
+}
+
 /// Implementation of BasicDynaInsRemover, with the same calls and errors. Owns the stages and every
 /// buffer.
 template <class Stages>
@@ -124,9 +134,9 @@ class Pipeline {
 
   /// Makes the verdict on the oldest open scan final. Empty if no scan is open.
   std::optional<ScanVerdict> finish_oldest() {
-    StageTimer timer;
     if (scans_.open() == 0) return std::nullopt;
-    return finish_oldest(timer);
+    StageTimes times;
+    return finish_oldest(times);
   }
 
   void start_epoch() { scans_.start_epoch(); }
@@ -153,8 +163,8 @@ class Pipeline {
   void ingest(const CloudView& cloud, ScanSlot& next);
   void find_sensor(ScanSlot& newest);
   Eigen::Matrix3d level(ScanSlot& scan) const;
-  void judge_newest(ScanSlot& newest, StageTimer& timer);
-  ScanVerdict finish_oldest(StageTimer& timer);
+  void write_newest(ScanSlot& newest);
+  ScanVerdict finish_oldest(StageTimes& times);
   std::optional<PoseResidual> pose_residual();
   TimeDoubt time_doubt();
 
@@ -184,50 +194,50 @@ class Pipeline {
 template <class Stages>
 FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Pose& T_world_sensor,
                                    double time) {
-  StageTimer timer;
+  StageTimes times;
   ScanSlot& newest = scans_.prepare(T_world_sensor, time, config_);
-  timer.measure(&StageTimes::ingest, [&] { ingest(cloud, newest); });
+  timed(times.ingest, [&] { ingest(cloud, newest); });
   PushTransaction transaction(scans_, newest);
-  timer.measure(&StageTimes::ingest, [&] { find_sensor(newest); });
-  timer.measure(&StageTimes::ground,
-                [&] { ground_.segment(ingest_.points(), ingest_.input(), newest.split); });
-  timer.measure(&StageTimes::window,
-                [&] { window_.gather(scans_, decision_->window_length()); });  // Eq. 3
-  timer.measure(&StageTimes::cluster, [&] { window_.cluster(clusterer_); });   // Eq. 4
-  decision_->observe(scans_, window_, timer);                                  // Eq. 4-18
-  judge_newest(newest, timer);                                                 // Eq. 19, 2
+  timed(times.ingest, [&] { find_sensor(newest); });
+  timed(times.ground, [&] { ground_.segment(ingest_.points(), ingest_.input(), newest.split); });
+  timed(times.window, [&] { window_.gather(scans_, decision_->window_length()); });  // Eq. 3
+  timed(times.cluster, [&] { window_.cluster(clusterer_); });                        // Eq. 4
+  timed(times.evidence, [&] { decision_->observe(scans_, window_); });               // Eq. 4-18
+  timed(times.judge, [&] { decision_->judge(newest, false); });                      // Eq. 19
+  timed(times.verdict, [&] { write_newest(newest); });                               // Eq. 2
   transaction.commit();
   std::optional<ScanVerdict> finished;
-  if (scans_.open() > latency()) finished = finish_oldest(timer);  // Eq. 2, 1
-  timer.measure(&StageTimes::revision, [&] { decision_->revise(map_, newest); });
+  if (scans_.open() > latency()) finished = finish_oldest(times);  // Eq. 2, 1
+  timed(times.revision, [&] { decision_->revise(map_, newest); });
   const bool is_final = finished && finished->scan == newest.scan;
   return {is_final ? *finished : newest_verdict_.verdict(newest),
           finished,
-          timer.times(),
+          times,
           pose_residual(),
           time_doubt(),
           newest.began_epoch ? newest.began_epoch : decision_->misfit()};
 }
 
 template <class Stages>
-void Pipeline<Stages>::judge_newest(ScanSlot& newest, StageTimer& timer) {
-  VerdictWriter* const writer = config_.newest_verdict ? &newest_verdict_ : nullptr;
-  timer.measure(&StageTimes::verdict, [&] {
-    newest.assign_instances(window_.newest_cluster_of());
-    if (writer != nullptr) writer->begin(newest);
-  });
-  decision_->judge_newest(newest, writer, timer);
+void Pipeline<Stages>::write_newest(ScanSlot& newest) {
+  newest.assign_instances(window_.newest_cluster_of());
+  if (!config_.newest_verdict) return;
+  newest_verdict_.begin(newest);
+  decision_->write_newest(newest, newest_verdict_);
 }
 
 /// The scan becomes final even if the map throws, because the ring reuses its slot.
 template <class Stages>
-ScanVerdict Pipeline<Stages>::finish_oldest(StageTimer& timer) {
+ScanVerdict Pipeline<Stages>::finish_oldest(StageTimes& times) {
   const ScanSlot& scan = scans_.finish_oldest();
-  timer.measure(&StageTimes::verdict, [&] { final_verdict_.begin(scan); });
-  decision_->judge_final(scan, final_verdict_, timer);
+  timed(times.judge, [&] { decision_->judge(scan, true); });
+  timed(times.verdict, [&] {
+    final_verdict_.begin(scan);
+    decision_->write_final(scan, final_verdict_);
+  });
   if (build_map_) {
     const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
-    timer.measure(&StageTimes::map, [&] {
+    timed(times.map, [&] {
       insert_scan(map_, points, final_verdict_.is_kept(), scan.T_world_level, scan.T_world_sensor);
     });
   }
