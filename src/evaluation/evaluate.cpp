@@ -29,6 +29,12 @@ void check_lengths(const LabelledScan& scan, std::size_t index) {
   check(scan.instances.size(), "instance ids");
 }
 
+/// The row of `name` by voxels, points and objects; the columns of maps are empty.
+EvaluationRow row_of(const std::string& name, const VoxelScore& voxels, const PointScore& points,
+                     const ObjectScore& objects, std::vector<ClassScore> classes = {}) {
+  return {name, voxels, points, objects, std::move(classes), std::nullopt, std::nullopt};
+}
+
 }  // namespace
 
 Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& estimates,
@@ -75,28 +81,17 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
     for (MapProtocol& map : map_protocols) map.resolve(scan);
   }
 
-  result.rows.push_back({"identity",
-                         voxels.score(VoxelProtocol::kIdentity),
-                         points.identity(),
-                         objects.identity(),
-                         {},
-                         std::nullopt,
-                         std::nullopt});
+  result.rows.push_back(row_of("identity", voxels.score(VoxelProtocol::kIdentity),
+                               points.identity(), objects.identity()));
   std::vector<std::future<VoxelScore>> scores;
   for (std::size_t row = VoxelProtocol::kOracle;
        row < VoxelProtocol::kFirstEstimate + estimates.size(); ++row) {
     scores.push_back(std::async(std::launch::async, [&voxels, row] { return voxels.score(row); }));
   }
-  result.rows.push_back({"oracle",
-                         scores.front().get(),
-                         points.oracle(),
-                         objects.oracle(),
-                         {},
-                         std::nullopt,
-                         std::nullopt});
+  result.rows.push_back(row_of("oracle", scores.front().get(), points.oracle(), objects.oracle()));
   for (std::size_t e = 0; e < estimates.size(); ++e) {
-    result.rows.push_back({estimates[e], scores[e + 1].get(), points.score(e), objects.score(e),
-                           objects.by_class(e), std::nullopt, std::nullopt});
+    result.rows.push_back(row_of(estimates[e], scores[e + 1].get(), points.score(e),
+                                 objects.score(e), objects.by_class(e)));
   }
   for (std::size_t m = 0; m < maps.size(); ++m) {
     result.rows.push_back({maps[m].name,

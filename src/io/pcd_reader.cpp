@@ -118,38 +118,52 @@ Scalar scalar_of(const ByteReader& reader, const Field& field) {
   return field.size == 4 ? Scalar::kFloat : Scalar::kDouble;
 }
 
+void parse_fields(const ByteReader& reader, std::string_view line, PcdHeader& header) {
+  if (!header.fields.empty()) reader.fail_on_line("expected FIELDS once");
+  for (auto name = text::next_token(line); !name.empty(); name = text::next_token(line)) {
+    if (header.fields.size() == kMaxFields) reader.fail_on_line("expected fewer fields");
+    Field field;
+    field.name = name;
+    header.fields.push_back(std::move(field));
+  }
+  if (header.fields.empty()) reader.fail_on_line("expected the names of the fields");
+}
+
+void parse_size(const ByteReader& reader, Field& field, std::string_view token) {
+  if (token != "1" && token != "2" && token != "4" && token != "8") {
+    reader.fail_on_line("expected SIZE 1, 2, 4 or 8 for field " + field.name);
+  }
+  field.size = static_cast<std::size_t>(token.front() - '0');
+}
+
+void parse_type(const ByteReader& reader, Field& field, std::string_view token) {
+  if (token != "I" && token != "U" && token != "F") {
+    reader.fail_on_line("expected TYPE I, U or F for field " + field.name);
+  }
+  field.type_letter = token.front();
+}
+
+void parse_count(const ByteReader& reader, Field& field, std::string_view token) {
+  const std::string what = "a COUNT from 0 to 65536 for field " + field.name;
+  const std::uint64_t count = parse_unsigned(reader, token, what);
+  if (count > kMaxFieldCount) reader.fail_on_line("expected " + what);
+  field.count = static_cast<std::size_t>(count);
+}
+
 void parse_header_line(const ByteReader& reader, std::string_view keyword, std::string_view line,
                        PcdHeader& header, PointSink& sink) {
   if (keyword == "VERSION") return;
   if (keyword == "FIELDS" || keyword == "COLUMNS") {
-    if (!header.fields.empty()) reader.fail_on_line("expected FIELDS once");
-    for (auto name = text::next_token(line); !name.empty(); name = text::next_token(line)) {
-      if (header.fields.size() == kMaxFields) reader.fail_on_line("expected fewer fields");
-      Field field;
-      field.name = name;
-      header.fields.push_back(std::move(field));
-    }
-    if (header.fields.empty()) reader.fail_on_line("expected the names of the fields");
+    parse_fields(reader, line, header);
   } else if (keyword == "SIZE") {
-    for_each_field(reader, header, line, [&](Field& field, std::string_view token) {
-      if (token != "1" && token != "2" && token != "4" && token != "8") {
-        reader.fail_on_line("expected SIZE 1, 2, 4 or 8 for field " + field.name);
-      }
-      field.size = static_cast<std::size_t>(token.front() - '0');
-    });
+    for_each_field(reader, header, line,
+                   [&](Field& field, std::string_view token) { parse_size(reader, field, token); });
   } else if (keyword == "TYPE") {
-    for_each_field(reader, header, line, [&](Field& field, std::string_view token) {
-      if (token != "I" && token != "U" && token != "F") {
-        reader.fail_on_line("expected TYPE I, U or F for field " + field.name);
-      }
-      field.type_letter = token.front();
-    });
+    for_each_field(reader, header, line,
+                   [&](Field& field, std::string_view token) { parse_type(reader, field, token); });
   } else if (keyword == "COUNT") {
     for_each_field(reader, header, line, [&](Field& field, std::string_view token) {
-      const std::string what = "a COUNT from 0 to 65536 for field " + field.name;
-      const std::uint64_t count = parse_unsigned(reader, token, what);
-      if (count > kMaxFieldCount) reader.fail_on_line("expected " + what);
-      field.count = static_cast<std::size_t>(count);
+      parse_count(reader, field, token);
     });
   } else if (keyword == "WIDTH") {
     header.width = parse_unsigned(reader, text::next_token(line), "WIDTH as a whole number");

@@ -88,15 +88,44 @@ Property parse_property(const ByteReader& reader, std::string_view line) {
   return property;
 }
 
+/// The lines of a header so far.
+struct HeaderProgress {
+  PlyHeader header;
+  bool has_format = false;
+  bool has_vertices = false;
+  bool past_vertices = false;  ///< later elements are not read
+};
+
+void parse_element(const ByteReader& reader, std::string_view line, HeaderProgress& progress) {
+  progress.past_vertices = progress.has_vertices;
+  Element element;
+  element.is_vertex = text::next_token(line) == "vertex";
+  element.count = parse_count(reader, text::next_token(line));
+  progress.has_vertices = progress.has_vertices || element.is_vertex;
+  if (!progress.past_vertices) progress.header.elements.push_back(std::move(element));
+}
+
+void add_property(const ByteReader& reader, std::string_view line, HeaderProgress& progress,
+                  PointSink& sink) {
+  if (progress.header.elements.empty()) {
+    reader.fail_on_line("expected an element before a property");
+  }
+  Property property = parse_property(reader, line);
+  if (progress.past_vertices) return;
+  Element& element = progress.header.elements.back();
+  if (element.is_vertex && !property.is_list) {
+    const Role role = role_of(property.name);
+    if (role != Role::kNone && sink.claim(role)) property.role = role;
+  }
+  element.properties.push_back(std::move(property));
+}
+
 PlyHeader parse_ply_header(ByteReader& reader, PointSink& sink) {
   std::string line;
   if (!reader.read_line(line) || line != "ply") {
     reader.fail_on_line("expected \"ply\" as first line");
   }
-  PlyHeader header;
-  bool has_format = false;
-  bool has_vertices = false;
-  bool past_vertices = false;
+  HeaderProgress progress;
   std::size_t items = 0;
   for (;;) {
     if (!reader.read_line(line)) reader.fail_on_line("file ends, expected end_header");
@@ -106,36 +135,23 @@ PlyHeader parse_ply_header(ByteReader& reader, PointSink& sink) {
     if (keyword == "end_header") break;
     if (keyword == "comment" || keyword == "obj_info") continue;
     if (keyword == "format") {
-      header.encoding = parse_format(reader, rest);
-      has_format = true;
+      progress.header.encoding = parse_format(reader, rest);
+      progress.has_format = true;
     } else if (keyword == "element") {
-      past_vertices = has_vertices;
-      Element element;
-      element.is_vertex = text::next_token(rest) == "vertex";
-      element.count = parse_count(reader, text::next_token(rest));
-      has_vertices = has_vertices || element.is_vertex;
-      if (!past_vertices) header.elements.push_back(std::move(element));
+      parse_element(reader, rest, progress);
     } else if (keyword == "property") {
-      if (header.elements.empty()) reader.fail_on_line("expected an element before a property");
-      Property property = parse_property(reader, rest);
-      if (past_vertices) continue;
-      Element& element = header.elements.back();
-      if (element.is_vertex && !property.is_list) {
-        const Role role = role_of(property.name);
-        if (role != Role::kNone && sink.claim(role)) property.role = role;
-      }
-      element.properties.push_back(std::move(property));
+      add_property(reader, rest, progress, sink);
     } else {
       reader.fail_on_line("expected element, property, comment or end_header, found \"" +
                           std::string(keyword.substr(0, 40)) + "\"");
     }
   }
-  if (!has_format) reader.fail_on_line("expected a line \"format\" before end_header");
-  if (!has_vertices) reader.fail_on_line("expected \"element vertex\" before end_header");
+  if (!progress.has_format) reader.fail_on_line("expected a line \"format\" before end_header");
+  if (!progress.has_vertices) reader.fail_on_line("expected \"element vertex\" before end_header");
   if (const auto name = sink.missing()) {
     reader.fail_on_line("expected a number property " + *name + " of the vertices");
   }
-  return header;
+  return std::move(progress.header);
 }
 
 /// Reads one element. Calls `store(property, value)` for values that are not in lists.

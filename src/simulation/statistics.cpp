@@ -26,6 +26,58 @@ struct Car {
   std::size_t points = 0;
   double x = 0, y = 0;
 };
+using Cars = std::unordered_map<std::uint32_t, Car>;
+
+/// Height of the lowest point of each cell, m.
+class LowestPoints {
+ public:
+  void add(const float* p) {
+    const int cell = near_cell(p);
+    if (cell < 0) return;
+    float& low = lowest_[static_cast<std::size_t>(cell)];
+    low = std::min(low, p[2]);
+  }
+
+  /// Whether a point is at most 0.2 m above the lowest point around it, which lies below a slope
+  /// that rises with the distance.
+  bool is_ground(const float* p) const {
+    const int cell = near_cell(p);
+    if (cell < 0) return false;
+    float low = std::numeric_limits<float>::infinity();
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const int beside = cell + dy * kCells + dx;
+        low = std::min(low, lowest_[static_cast<std::size_t>(beside)]);
+      }
+    }
+    const float range = std::sqrt(p[0] * p[0] + p[1] * p[1]);
+    return p[2] - low < 0.2F && low < -0.9F + 0.03F * range;
+  }
+
+ private:
+  static int near_cell(const float* p) {
+    return std::abs(p[0]) < kReach && std::abs(p[1]) < kReach ? cell_of(p[0], p[1]) : -1;
+  }
+
+  std::vector<float> lowest_ =
+      std::vector<float>(grid_index(kCells, 0, kCells), std::numeric_limits<float>::infinity());
+};
+
+double range_of(const float* p) {
+  return std::sqrt(static_cast<double>(p[0]) * static_cast<double>(p[0]) +
+                   static_cast<double>(p[1]) * static_cast<double>(p[1]) +
+                   static_cast<double>(p[2]) * static_cast<double>(p[2]));
+}
+
+void add_car_point(const float* p, std::uint32_t label, Cars& cars) {
+  const std::uint32_t kind = label & 0xffff;
+  const std::uint32_t instance = label >> 16;
+  if ((kind != 10 && kind != 252) || instance == 0) return;
+  Car& car = cars[instance];
+  ++car.points;
+  car.x += static_cast<double>(p[0]);
+  car.y += static_cast<double>(p[1]);
+}
 
 double share(std::size_t part, std::size_t whole) {
   return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
@@ -40,49 +92,22 @@ void ScanStatistics::add(Span<const float> xyzi, Span<const std::uint32_t> label
                      std::to_string(count) + " points");
   }
   ++scans_;
-  std::vector<float> lowest(grid_index(kCells, 0, kCells), std::numeric_limits<float>::infinity());
-  std::unordered_map<std::uint32_t, Car> cars;
+  LowestPoints lowest;
+  Cars cars;
   for (std::size_t i = 0; i < count; ++i) {
     const float* p = xyzi.data() + 4 * i;
-    const double range = std::sqrt(static_cast<double>(p[0]) * static_cast<double>(p[0]) +
-                                   static_cast<double>(p[1]) * static_cast<double>(p[1]) +
-                                   static_cast<double>(p[2]) * static_cast<double>(p[2]));
+    const double range = range_of(p);
     if (!(range > 0.1)) continue;
     ++points_;
     const auto bin = std::upper_bound(kRangeLimits.begin(), kRangeLimits.end(), range);
     ++ranges_[static_cast<std::size_t>(bin - kRangeLimits.begin())];
-    if (std::abs(p[0]) < kReach && std::abs(p[1]) < kReach) {
-      const int cell = cell_of(p[0], p[1]);
-      if (cell >= 0) {
-        float& low = lowest[static_cast<std::size_t>(cell)];
-        low = std::min(low, p[2]);
-      }
-    }
+    lowest.add(p);
     if (labels.empty()) continue;
-    const std::uint32_t label = labels[i] & 0xffff;
-    moving_ += label >= 252 && label <= 259;
-    if ((label == 10 || label == 252) && labels[i] >> 16 != 0) {
-      Car& car = cars[labels[i] >> 16];
-      ++car.points;
-      car.x += static_cast<double>(p[0]);
-      car.y += static_cast<double>(p[1]);
-    }
+    const std::uint32_t kind = labels[i] & 0xffff;
+    moving_ += kind >= 252 && kind <= 259;
+    add_car_point(p, labels[i], cars);
   }
-  for (std::size_t i = 0; i < count; ++i) {
-    const float* p = xyzi.data() + 4 * i;
-    if (!(std::abs(p[0]) < kReach && std::abs(p[1]) < kReach)) continue;
-    const int cell = cell_of(p[0], p[1]);
-    if (cell < 0) continue;
-    float low = std::numeric_limits<float>::infinity();
-    for (int dy = -1; dy <= 1; ++dy) {
-      for (int dx = -1; dx <= 1; ++dx) {
-        const int beside = cell + dy * kCells + dx;
-        low = std::min(low, lowest[static_cast<std::size_t>(beside)]);
-      }
-    }
-    const float range = std::sqrt(p[0] * p[0] + p[1] * p[1]);
-    ground_ += p[2] - low < 0.2F && low < -0.9F + 0.03F * range;
-  }
+  for (std::size_t i = 0; i < count; ++i) ground_ += lowest.is_ground(xyzi.data() + 4 * i);
   for (const auto& entry : cars) {
     const Car& car = entry.second;
     const auto n = static_cast<double>(car.points);

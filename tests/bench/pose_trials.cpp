@@ -75,7 +75,7 @@ void write_timed(const fs::path& folder, const std::vector<double>& times, const
 void write_rows(const fs::path& folder, const Poses& poses,
                 const std::function<Eigen::Isometry3d(const Eigen::Isometry3d&)>& spoil) {
   Poses rows;
-  for (const Eigen::Isometry3d& pose : poses) rows.push_back(spoil(pose));
+  for (const Pose& pose : poses) rows.push_back(spoil(pose));
   write_poses(folder / "poses.txt", rows);
 }
 

@@ -102,7 +102,7 @@ void run_labels(Bytes bytes) {
 
 void run_poses(Bytes bytes) {
   expect_value_or<IoError>(file_of("poses.txt", bytes), [](const fs::path& path) {
-    for (const Eigen::Isometry3d& pose : read_kitti_poses(path)) {
+    for (const Pose& pose : read_kitti_poses(path)) {
       require(pose.matrix().allFinite(), "poses are finite");
       const Eigen::Matrix3d R = pose.linear();
       require((R.transpose() * R).isIdentity(1e-9), "poses are rigid");

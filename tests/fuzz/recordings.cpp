@@ -142,7 +142,7 @@ void run_trajectory(Bytes bytes) {
   test::write_text(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   expect_value_or_place(path, [&] {
     const Trajectory trajectory = read_trajectory(path);
-    for (const Eigen::Isometry3d& pose : trajectory.poses) require_rigid(pose);
+    for (const Pose& pose : trajectory.poses) require_rigid(pose);
     const std::vector<double>& times = trajectory.times;
     require(times.empty() || times.size() == trajectory.poses.size(), "a time for each pose");
     for (std::size_t i = 0; i < times.size(); ++i) {

@@ -64,7 +64,7 @@ class Street {
 
   Diagnosis diagnose(const std::function<Eigen::Isometry3d(Eigen::Isometry3d)>& spoil) const {
     Poses rows;
-    for (const Eigen::Isometry3d& pose : poses_) rows.push_back(spoil(pose));
+    for (const Pose& pose : poses_) rows.push_back(spoil(pose));
     write_poses(folder_ / "poses.txt", rows);
     return dynains::diagnose(Recording(folder_.path()));
   }
@@ -352,7 +352,7 @@ TEST_CASE("check reports what it cannot decide") {
 TEST_CASE("check and run report a problem in one sentence") {
   const Street street;
   Poses inverse;
-  for (const Eigen::Isometry3d& pose : street.poses()) inverse.push_back(pose.inverse());
+  for (const Pose& pose : street.poses()) inverse.push_back(pose.inverse());
   write_poses(street.path() / "poses.txt", inverse);
   const std::string seq = street.path();
 
@@ -384,7 +384,7 @@ TEST_CASE("check and run report a problem in one sentence") {
 TEST_CASE("Proposed commands repeat the flags of the user, as a shell reads them") {
   const Street street;
   Poses millimetres;
-  for (const Eigen::Isometry3d& pose : street.poses()) {
+  for (const Pose& pose : street.poses()) {
     millimetres.push_back(scaled(pose, 1000.0).inverse());
   }
   const std::string poses = street.path() / "a user's poses.txt";

@@ -273,7 +273,7 @@ TEST_CASE("poses are rigid and smooth, with the configured noise") {
   for (std::size_t i = 0; i < simulator.size(); ++i) {
     SimulatedScan scan = simulator.scan(i);
     CHECK(scan.time == Approx(0.1 * static_cast<double>(i)));
-    for (const Eigen::Isometry3d& T : {scan.T_world_sensor, scan.T_world_sensor_noisy}) {
+    for (const Pose& T : {scan.T_world_sensor, scan.T_world_sensor_noisy}) {
       const Eigen::Matrix3d R = T.linear();
       CHECK((R.transpose() * R - Eigen::Matrix3d::Identity()).norm() < 1e-9);
       CHECK(R.determinant() == Approx(1));
