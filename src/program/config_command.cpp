@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -44,36 +43,44 @@ std::string member_of(const DynaInsRemover::Config& config, const void* section)
   return members.at(section);
 }
 
-// The parameter table of the documentation.
-void print_markdown() {
-  std::string heading = "| name |";
-  std::string rule = "|---|";
-  std::map<std::string, std::string> values;  // by parameter: the columns of the presets
+// By parameter: its default, and the values of the presets that differ from it.
+std::map<std::string, std::string> describe_values() {
+  std::map<std::string, std::string> values;
+  std::map<std::string, std::string> defaults;
   for (const std::string& name : preset_names()) {
-    heading += ' ' + name + " |";
-    rule += "---|";
     const DynaInsRemover::Config config = preset(name);
     DynaInsRemover::Config::visit(config, [&](const auto& parameter) {
-      values[parameter.name] += ' ' + format_value(parameter.value) + " |";
+      const std::string value = format_value(parameter.value);
+      if (defaults.emplace(parameter.name, value).second) {
+        values[parameter.name] = value;
+      } else if (value != defaults[parameter.name]) {
+        values[parameter.name] += " (" + name + ": " + value + ')';
+      }
     });
   }
+  return values;
+}
+
+// The parameters in the documentation.
+void print_markdown() {
+  std::map<std::string, std::string> values = describe_values();
+  const std::string number = "FLOAT in ";
   std::cout
       << "# Parameters\n\n"
          "Written by `dynains config --markdown`; a test compares. As flags and in config files "
          "names have hyphens\n(`--tau-s 0.5`); in C++ they are fields of the member that the "
          "heading names (`config.belief.tau_p`), in\nPython of the configuration itself "
-         "(`config.tau_p`).\n";
+         "(`config.tau_p`). Each name is followed by its default, the values of other\npresets "
+         "that differ, and its range.\n";
   const DynaInsRemover::Config config;
   DynaInsRemover::Config::visit_sections(config, [&](const char* name, const auto& section) {
-    std::cout << "\n## " << name << ": `" << member_of(config, &section) << '`' << "\n\n"
-              << heading << " range | meaning |\n"
-              << rule << "---|---|\n";
+    std::cout << "\n## " << name << ": `" << member_of(config, &section) << "`\n\n";
     using Section = std::remove_const_t<std::remove_reference_t<decltype(section)>>;
     Section::visit(section, [&](const auto& parameter) {
       std::string range = describe_range(parameter);
-      std::replace(range.begin(), range.end(), '|', '/');  // a bar would start a column
-      std::cout << "| `" << parameter.name << "` |" << values[parameter.name] << ' ' << range
-                << " | " << parameter.help << " |\n";
+      if (range.rfind(number, 0) == 0) range.erase(0, number.size());
+      std::cout << "- `" << parameter.name << "` " << values[parameter.name] << ", " << range
+                << ": " << parameter.help << '\n';
     });
   });
 }
