@@ -120,7 +120,7 @@ class VoxelProtocol::Impl {
   };
 
   /// Most voxels have the same points in every layer, stored once in `shared`. The first scan in
-  /// which layers differ gives each layer a cell of its own, `forks_[fork + layer]`.
+  /// which layers differ gives each layer a separate cell, `forks_[fork + layer]`.
   struct Voxel {
     Cell shared;
     std::uint32_t fork = kNotForked;
@@ -251,7 +251,7 @@ class VoxelProtocol::Impl {
   std::vector<VoxelKey> keys_;  // by number of voxel
   std::vector<detail::ScanVoxel> next_;
 
-  // The accumulating thread's until accumulating_.wait().
+  // Belongs to the accumulating thread until accumulating_.wait().
   std::vector<detail::ScanVoxel> accumulated_;
   std::vector<Voxel> voxels_;  // by number
   std::vector<Cell> forks_;

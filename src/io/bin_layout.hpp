@@ -29,7 +29,7 @@ std::uint64_t count_bin_points(const std::filesystem::path& file, const BinLayou
 void read_bin_points(const std::filesystem::path& file, const BinLayout& layout,
                      std::vector<float>& xyzi);
 
-/// Throws IoError if the content of the file speaks against float32 x y z intensity, and for
+/// Throws IoError if the content of the file does not look like float32 x y z intensity, and for
 /// another layout: numbers are as points have them only as float64, or neighbours in the file are
 /// neighbours in space only with another number of columns.
 void check_bin_content(const std::filesystem::path& file);

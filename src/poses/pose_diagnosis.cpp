@@ -254,8 +254,8 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
   const MotionError all = motion_error(motions, given, identity);
   const double before = all.at_points;
   if (d.verdict == PoseVerdict::kAgree && before > kFarOff) {
-    // In traffic of the own speed, a registration can find no motion, though the poses agree with
-    // all that stands still. Any other motion contradicts the poses.
+    // In traffic at the speed of the sensor, a registration can find no motion, though the poses
+    // agree with all that stands still. Any other motion contradicts the poses.
     if (motions.size() < kFewestMotions || error_at_points(motions, no_motion) < 0.5 * before) {
       d.registered_pairs = 0;
       return;

@@ -27,7 +27,7 @@ void print_config(const std::string& preset_name) {
   });
 }
 
-// How C++ gets at a section of `config`. Asked by address, so that no name here can be out of date:
+// The C++ expression of a section of `config`, found by the address of the section:
 // a member that is renamed does not compile, a section that is missing throws.
 std::string member_of(const DynaInsRemover::Config& config, const void* section) {
   const std::map<const void*, std::string> members = {

@@ -31,7 +31,8 @@ class EvaluationOptions {
 /// `--start` and `--end`.
 void add_window_options(CLI::App& command, ScanWindow& window);
 
-/// A file for text that takes long to find out: whether it can be written is known before.
+/// A file for text that takes long to compute. Opening it tells beforehand whether it can be
+/// written.
 class TextFile {
  public:
   /// Opens it unless `path` is empty: then there is none. Throws IoError.

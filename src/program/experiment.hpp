@@ -5,7 +5,7 @@
 
 namespace dynains::program {
 
-/// `dynains experiment`, with all that follow.
+/// `dynains experiment` with its subcommands.
 void add_experiment_command(CLI::App& app);
 
 void add_table1_command(CLI::App& experiment);   ///< Table I

@@ -1,4 +1,4 @@
-// Pictures by gnuplot, a program of its own.
+// Pictures that the program gnuplot draws.
 #pragma once
 
 #include <filesystem>

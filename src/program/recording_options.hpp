@@ -29,8 +29,8 @@ class RecordingFlags {
   void complete(const std::string& folder, const nlohmann::ordered_json& flags);
   /// Whether a file is named that belongs to one recording only.
   bool names_files() const { return !poses_.empty() || !times_.empty(); }
-  /// Throws IoError. Warns of scans that are left out for want of a pose, and of a log that ends
-  /// early.
+  /// Throws IoError. Warns of scans that are left out because they have no pose, and of a log that
+  /// ends early.
   Recording open() const { return open(folder_); }
   /// Opens another folder with these flags.
   Recording open(const std::filesystem::path& folder) const;

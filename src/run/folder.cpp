@@ -58,7 +58,7 @@ FileIdentity Folder::identity() const {
 }
 
 std::vector<std::string> Folder::names() const {
-  // A descriptor of its own: readdir() moves the position of the one it is given.
+  // A second descriptor, because readdir() moves the position of the one that it is given.
   const int descriptor = ::openat(descriptor_, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   const std::unique_ptr<DIR, int (*)(DIR*)> entries(
       descriptor < 0 ? nullptr : ::fdopendir(descriptor), ::closedir);

@@ -1,4 +1,5 @@
-// Verdicts as SemanticKITTI-MOS labels and their causes, written behind the pipeline's back.
+// Verdicts as SemanticKITTI-MOS labels and their causes, written by another thread while the
+// pipeline works.
 #pragma once
 
 #include <cstdint>
@@ -46,7 +47,7 @@ class LabelFiles {
 /// Writes LabelFiles in a thread, if there is one for it. One scan at most waits for the disk.
 class LabelWriter {
  public:
-  /// Creates the folder. `thread`: async for another thread, deferred for that of the next call.
+  /// Creates the folder. `thread`: async for another thread, deferred for the caller's.
   /// Throws IoError.
   LabelWriter(std::filesystem::path folder, std::launch thread);
   LabelWriter(const LabelWriter&) = delete;
@@ -58,7 +59,7 @@ class LabelWriter {
   void finish();
 
  private:
-  LabelFiles files_;  // the writing thread's until writing_.wait()
+  LabelFiles files_;  // belongs to the writing thread until writing_.wait()
   Background writing_;
 };
 

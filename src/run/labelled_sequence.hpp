@@ -38,7 +38,7 @@ inline std::uint32_t run_class(std::uint32_t label, std::size_t point,
   return label & 0xffffU;
 }
 
-/// Scan numbers, both inclusive; an empty end is the sequence's own.
+/// Scan numbers, both inclusive; an empty end is that of the sequence.
 struct ScanWindow {
   std::optional<std::size_t> start;
   std::optional<std::size_t> end;
@@ -87,7 +87,7 @@ class LabelledSequence {
   std::size_t first_ = 0;  // half-open range within sequence_
   std::size_t last_ = 0;
   Scan scan_;
-  Scan next_;  // the reading thread's until reading_.wait()
+  Scan next_;  // belongs to the reading thread until reading_.wait()
   std::size_t next_index_ = 0;
   Background reading_;
 };

@@ -38,7 +38,7 @@ class LasMapFile final : public MapFile {
     const double intensity = std::round(intensity_scale_ * attributes.intensity);
     LasPoint point;
     point.position = position;
-    // Also for NaN, which no comparison holds for.
+    // NaN is not >= 0 and becomes 0.
     point.intensity = intensity >= 0.0 ? static_cast<std::uint16_t>(std::min(intensity, 65535.0))
                                        : std::uint16_t{0};
     point.classification = attributes.is_ground ? LasClass::kGround : LasClass::kUnclassified;

@@ -222,7 +222,7 @@ void OutputFolder::move_results(const Folder& target) const {
 void OutputFolder::discard_staging() {
   if (!staging_) return;
   staging_->remove_results();
-  // The marker goes when nothing that it lists can come back.
+  // The marker is removed last: it lists the files that a power cut could bring back.
   sync_files(staging_->path());
   for (const auto& folder : kind_.folders) staging_->folder_.remove_folder(folder.first);
   staging_->folder_.remove_file(kind_.marker);
@@ -255,7 +255,7 @@ OutputChange::~OutputChange() {
   try {
     if (is_staged()) out_.discard_staging();
   } catch (const IoError&) {
-    // The next command with this folder removes it.
+    // The next command with this folder removes the staging folder.
   }
 }
 

@@ -1,4 +1,4 @@
-// Scans whose points a run cannot judge, for the coordinates are not in metres.
+// Scans whose points a run cannot judge, because their coordinates are not in metres.
 #pragma once
 
 #include "dynains/config.hpp"

@@ -25,7 +25,7 @@ class ReadAhead {
   const Recording& recording_;
   std::size_t next_;
   std::size_t last_;
-  RecordedScan scan_;  // the reading thread's until reading_.wait()
+  RecordedScan scan_;  // belongs to the reading thread until reading_.wait()
   Background reading_;
 };
 

@@ -39,7 +39,7 @@ struct RunDescription {
   nlohmann::ordered_json sequence_flags;  ///< flag -> value, those that describe the files
   std::string first_scan;
   std::string last_scan;
-  std::size_t missing_poses = 0;  ///< scans of the recording that were left out for want of one
+  std::size_t missing_poses = 0;  ///< scans that were left out because they have no pose
   bool log_ends_early = false;    ///< scans behind the early end are missing
   std::string preset;
   Agreement agreement;   ///< of the scans under the poses, by a sample

@@ -49,7 +49,7 @@ struct RunOutputs {
   bool write_mcap = false;
   bool write_beliefs = false;
   bool map_on_disk = false;
-  std::launch thread = std::launch::async;  ///< for reading and writing; deferred: the caller's
+  std::launch thread = std::launch::async;  ///< deferred: the caller reads and writes
   bool map_attributes = false;              ///< the map holds attributes of its points
   std::string crs;                          ///< of a LAS map, for example "EPSG:25832"; empty: none
   double map_voxel = 0.0;                   ///< m, of attributes
@@ -96,15 +96,15 @@ class RunResults {
 
   /// The verdict on the scan just pushed.
   void take_newest(const ScanVerdict& verdict);
-  /// The final verdict on a scan, in the order of the scans. `scan` is exchanged for an
-  /// earlier one, whose memory the caller uses again; null: the scan is read from its file. By
-  /// default, another thread reads and writes. Throws IoError, for the scan before as well.
+  /// The final verdict on a scan, in the order of the scans. Keeps the content of `scan` and gives
+  /// the content of an earlier scan back, whose memory the caller can use again. If `scan` is null,
+  /// the scan is read from its file. Throws IoError, for the scan before as well.
   void take_final(RecordedScan* scan, const ScanVerdict& verdict);
   /// Waits for the results of the last scan. Throws IoError.
   void finish();
   /// Final verdicts also go to `session`, which outlives this.
   void contribute_to(SessionContribution& session) { session_ = &session; }
-  /// Whether results are written in a thread of their own, RunOutputs::thread.
+  /// The thread that reads and writes, RunOutputs::thread.
   std::launch thread() const { return writing_.policy(); }
 
   void add_map_point(const Eigen::Vector3d& point);
@@ -136,7 +136,7 @@ class RunResults {
   std::size_t finished_ = 0;
   std::uint64_t points_ = 0;
   LabelCounts labels_;
-  JudgedScan judged_;  // the writing thread's until writing_.wait()
+  JudgedScan judged_;  // belongs to the writing thread until writing_.wait()
   Background writing_;
 
   void write_final(const RecordedScan& scan, const ScanVerdict& verdict);

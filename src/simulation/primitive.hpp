@@ -18,7 +18,7 @@ enum class Shape : std::uint8_t {
 
 /// How a surface answers to light. Constants live in materials.hpp.
 struct Material {
-  std::uint16_t label = 0;      ///< SemanticKITTI class if the object has none of its own
+  std::uint16_t label = 0;      ///< SemanticKITTI class, unless the object has one
   float reflectivity = 0.3F;    ///< intensity at perpendicular incidence, [0, 1]
   float loss = 0.0F;            ///< share of beams without a return
   float density = 0.0F;         ///< 1/m; above 0 the shape is porous: beams end inside at random

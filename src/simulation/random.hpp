@@ -51,7 +51,7 @@ class Random {
   std::size_t index(std::size_t count) {
     return static_cast<std::size_t>(unit() * static_cast<double>(count));
   }
-  /// A stream of its own for one purpose.
+  /// A separate stream for one purpose.
   Random fork(std::uint64_t purpose) const { return Random(mix(state_, purpose)); }
 
  private:

@@ -94,7 +94,7 @@ class Traffic {
     double phase = 0;
   };
 
-  /// Door of a parked car: an object of its own, seen while it is open.
+  /// Door of a parked car: a separate object, seen while the door is open.
   struct Door {
     std::size_t object = 0;
     Waypoint hinge;                   ///< the door closed, with the heading of the car

@@ -12,7 +12,7 @@ namespace dynains::viewer {
 /// DecompressionStream to be shown (Firefox from 113 on, Chromium from 80 on).
 void write_page(std::ostream& out, const ViewData& data);
 
-/// The page of a map in tiles. It loads tileset.json and tiles from the folder of its own address.
+/// The page of a map in tiles. It loads tileset.json and tiles from its folder.
 std::string map_page();
 
 }  // namespace dynains::viewer

@@ -45,7 +45,7 @@ Json box_of(const Eigen::AlignedBox3d& bounds, double edge) {
 
 }  // namespace
 
-/// A node while points come in: a list of points, or divided.
+/// A node while points are added: a list of points, or divided.
 struct TilesetWriter::Node {
   explicit Node(TileNode node) : place(std::move(node)) {}
 

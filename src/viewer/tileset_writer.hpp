@@ -33,7 +33,7 @@ inline constexpr const char* kPointTileExtension = ".pnts";
 /// points that are about 2 pixels apart.
 ///
 /// Memory does not grow with the number of points, except by some 300 kB for each million of them:
-/// nodes that more than kMostPointsInMemory points reach are divided while points come in, and
+/// nodes that more than kMostPointsInMemory points reach are divided while points are added, and
 /// lists of points are in a temporary file of some 32 bytes per point.
 class TilesetWriter {
  public:

@@ -172,7 +172,7 @@ class TileHistory {
       remove_unconfirmed_ground(by, sessions_[i]);
     }
     for (std::size_t i = 0; i < sessions_.size(); ++i) {
-      // Whatever the earlier sessions have seen, a few references of its own show that it stands.
+      // A few references of the session itself outweigh whatever earlier sessions have seen.
       const float most = i == tested_count_ ? level_ : kNoLimit;
       for (float& level : sessions_[i].level) level = std::clamp(level, 0.0F, most);
     }
@@ -318,8 +318,8 @@ class TileHistory {
     return true;
   }
 
-  // Removes the blocks that are free after session number `by`. In their own session, components
-  // come in or not as a whole.
+  // Removes the blocks that are free after session number `by`. In the session that measured them,
+  // remove_components() decides about the blocks of a component.
   void remove_blocks(std::uint32_t by, Session& session) const {
     for (std::size_t block = 0; block < session.level.size(); ++block) {
       const bool is_undivided = by == session.number && session.component_of[block] != kNone;
