@@ -227,11 +227,22 @@ void check_poses(const Recording& recording, const std::vector<std::size_t>& sca
   }
 }
 
-void remap(const RemapOptions& options) {
+/// The flags that tell how the points of the run are stored.
+Json point_flags(const EarlierRun& run) {
+  Json flags = Json::object();
+  for (const char* const flag : kPointFlags) {
+    const auto& request = run.report.at("request");
+    if (request.contains(flag)) flags[flag] = request[flag];
+  }
+  return flags;
+}
+
+void remap(RemapOptions& options) {
   check_run_folder(options.run);
   const LockedFolder lock(options.run);
   OutputFolder out(Folder(options.run), run_output_kind());
   const EarlierRun run = read_run(out);
+  options.sequence.complete(options.sequence.folder(), point_flags(run));
   const Recording corrected = open_corrected(options, run);
   const std::vector<std::size_t> scans = scans_of(corrected, run);
   check_poses(corrected, scans);

@@ -77,7 +77,8 @@ void add_map_attributes(const RunSettings& settings, const DynaInsRemover::Confi
   wkt_of(outputs.crs);
 }
 
-/// The verdict without latency takes time, so it is made for --write-online alone. Throws ConfigError.
+/// The verdict without latency takes time, so it is made for --write-online alone. Throws
+/// ConfigError.
 DynaInsRemover::Config config_of(const RunSettings& settings) {
   DynaInsRemover::Config config = settings.config;
   if (settings.write_online && !config.newest_verdict) {
@@ -225,7 +226,7 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
   if (settings.one_thread) outputs.thread = std::launch::deferred;
   const nlohmann::ordered_json configuration = parameters_of(config);
   nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);
-  for (const char* const flag : {"--point-units", "--point-time-unit", "--bin-columns"}) {
+  for (const char* const flag : kPointFlags) {
     if (settings.recording_flags.contains(flag)) request[flag] = settings.recording_flags[flag];
   }
   SessionRequest session = session_request(settings, sequence, range, configuration);

@@ -1,6 +1,7 @@
 // Everything that determines the results of a run, so that `--resume` can compare two runs.
 #pragma once
 
+#include <array>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -16,6 +17,9 @@ namespace dynains::program {
 nlohmann::ordered_json describe_request(const Recording& recording, const ScanRange& range,
                                         const RunOutputs& outputs,
                                         const nlohmann::ordered_json& configuration);
+
+/// Flags of a recording that tell how its points are stored. A request holds those that were given.
+inline constexpr std::array kPointFlags = {"--point-units", "--point-time-unit", "--bin-columns"};
 
 /// Fingerprint of the names, poses and times of the scans, as in describe_request().
 std::string pose_fingerprint(const Recording& recording, const ScanRange& range);
