@@ -3,7 +3,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <sstream>
 #include <string>
 
@@ -82,6 +84,42 @@ inline Eigen::Matrix3d transposed(const Eigen::Matrix3d& R) {
   Eigen::Matrix3d result;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) result(i, j) = R(j, i);
+  }
+  return result;
+}
+
+/// Covariance (row-major, 6 x 6) of an error e of a pose T_c_a, if `covariance` is that of an error
+/// of T_c_b. An error is a translation (m) and a rotation (rad) along the axes of the inner frame:
+/// exact pose = pose * Exp(e).
+inline std::array<double, 36> transported_covariance(const std::array<double, 36>& covariance,
+                                                     const Pose& T_a_b) {
+  const auto at = [](std::size_t i, std::size_t j) { return 6 * i + j; };
+  std::array<double, 36> adjoint = {};  // R and [t]_x R; 0 and R
+  const Eigen::Vector3d t = T_a_b.translation();
+  for (int j = 0; j < 3; ++j) {
+    const Eigen::Vector3d column = T_a_b.linear().col(j);
+    const double arm[3] = {t[1] * column[2] - t[2] * column[1], t[2] * column[0] - t[0] * column[2],
+                           t[0] * column[1] - t[1] * column[0]};
+    for (int i = 0; i < 3; ++i) {
+      const auto row = static_cast<std::size_t>(i), to = static_cast<std::size_t>(j);
+      adjoint[at(row, to)] = adjoint[at(row + 3, to + 3)] = column[i];
+      adjoint[at(row, to + 3)] = arm[i];
+    }
+  }
+  std::array<double, 36> product = {}, result = {};
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = 0; j < 6; ++j) {
+      for (std::size_t k = 0; k < 6; ++k) {
+        product[at(i, j)] += adjoint[at(i, k)] * covariance[at(k, j)];
+      }
+    }
+  }
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = 0; j < 6; ++j) {
+      for (std::size_t k = 0; k < 6; ++k) {
+        result[at(i, j)] += product[at(i, k)] * adjoint[at(j, k)];
+      }
+    }
   }
   return result;
 }

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -101,6 +103,20 @@ struct PoseResidual {
   /// Corrected motion: pose of this scan in the sensor frame of the previous one. It is the pushed
   /// motion, except for rounding, if neither of both poses was corrected.
   Pose T_previous_newest = Pose::Identity();
+  /// The motion that fits best, whether or not it is certain: with its covariance, a measurement to
+  /// be fused with others. It depends on the pushed motion where is_supported() is false.
+  Pose T_previous_aligned = Pose::Identity();
+  /// Covariance of an error e of T_previous_aligned, row-major: translation along the axes x, y, z
+  /// of the newest sensor frame (m), and rotation about them (rad); exact motion = aligned motion *
+  /// Exp(e). The pose of the previous scan is taken as exact.
+  std::array<double, 36> covariance = {};
+
+  /// Whether the surfaces tell the error along an axis (0 to 5, as in `covariance`) to 10 cm: three
+  /// standard deviations; rotation: of a point 10 m away.
+  bool is_supported(std::size_t axis) const {
+    const double deviation = std::sqrt(covariance[7 * axis]) * (axis < 3 ? 1.0 : 10.0);
+    return 3.0 * deviation <= 0.1;
+  }
   /// The previous scan: the last one that was taken. A push that threw is not.
   std::uint64_t previous_scan = 0;  ///< number of its push, as ScanVerdict::scan
   double previous_time = 0.0;       ///< s, as pushed

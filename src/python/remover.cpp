@@ -1,6 +1,7 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <iomanip>
 #include <mutex>
@@ -236,6 +237,25 @@ void bind_remover(py::module_& module) {
           "T_previous_newest",
           [](const PoseResidual& residual) { return to_array(residual.T_previous_newest); },
           "(4, 4) float64: corrected pose of this scan in the sensor frame of the previous one.")
+      .def_property_readonly(
+          "T_previous_aligned",
+          [](const PoseResidual& residual) { return to_array(residual.T_previous_aligned); },
+          "(4, 4) float64: the motion that fits best, whether or not it is certain.")
+      .def_property_readonly(
+          "covariance",
+          [](const PoseResidual& residual) {
+            return py::array_t<double>({6, 6}, residual.covariance.data());
+          },
+          "(6, 6) float64, of an error e of T_previous_aligned: translation (m) and rotation (rad) "
+          "along the axes of the newest sensor frame; exact motion = aligned motion * Exp(e).")
+      .def_property_readonly(
+          "supported",
+          [](const PoseResidual& residual) {
+            std::array<bool, 6> supported{};
+            for (std::size_t i = 0; i < 6; ++i) supported[i] = residual.is_supported(i);
+            return supported;
+          },
+          "Six bools, as the axes of `covariance`: whether the surfaces tell the error to 10 cm.")
       .def_readonly("previous_scan", &PoseResidual::previous_scan,
                     "Number of the previous scan, the last one that was taken, from 0.")
       .def_readonly("previous_time", &PoseResidual::previous_time, "s, of that scan")

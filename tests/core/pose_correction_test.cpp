@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -129,6 +130,72 @@ TEST_CASE("a perturbed pose is found and corrected") {
       T_motion.inverse() * correction.residual()->T_previous_newest;
   CHECK(T_difference.translation().norm() < kMetres);
   CHECK(degrees(T_difference) < kDegreesLeft);
+}
+
+// Errors of the best fit, in standard deviations along each axis. Of normal errors, 99.7 % are
+// below three.
+TEST_CASE("the covariance of the best fit explains its errors") {
+  const auto [scene, sensor] = GENERATE(
+      table<Scene, Sensor>({{Scene::kUrban, Sensor::kHdl64}, {Scene::kCrowd, Sensor::kVlp16}}));
+  const std::vector<SimulatedScan> scans = drive(scene, sensor, 8);
+  const Eigen::Isometry3d T_motion =
+      scans[scans.size() - 2].T_world_sensor.inverse() * scans.back().T_world_sensor;
+  const GroundSplit split = split_of(scans.back());
+  Random random(5);
+  int errors = 0, large = 0;
+  double largest_deviation = 0.0;
+  for (int trial = 0; trial < 20; ++trial) {
+    const auto draw = [&](double most) {
+      return Eigen::Vector3d(random.uniform(-most, most), random.uniform(-most, most),
+                             random.uniform(-most, most));
+    };
+    PoseCorrection correction = after_all_but_last(scans);
+    const Eigen::Vector3d metres = draw(0.1), turn = draw(0.2);
+    correction.correct(scans.back().T_world_sensor * perturbation(metres, turn), split);
+    REQUIRE(correction.residual());
+    const PoseResidual& residual = *correction.residual();
+    const Eigen::Isometry3d T_error =
+        Eigen::Isometry3d(residual.T_previous_aligned).inverse() * T_motion;
+    const Eigen::AngleAxisd rotation(T_error.linear());
+    for (std::size_t axis = 0; axis < 6; ++axis) {
+      const auto k = static_cast<int>(axis % 3);
+      const double error =
+          axis < 3 ? T_error.translation()[k] : rotation.angle() * rotation.axis()[k];
+      const double deviation = std::sqrt(residual.covariance[7 * axis]);
+      ++errors;
+      large += std::abs(error) > 3.0 * deviation;
+      if (residual.is_supported(axis) && axis < 3) {
+        largest_deviation = std::max(largest_deviation, deviation);
+      }
+    }
+  }
+  CHECK(large <= errors / 20);
+  CHECK(largest_deviation > 0.0);
+  CHECK(largest_deviation <= 0.1 / 3.0);
+}
+
+TEST_CASE("a covariance goes to another frame as the errors that it describes") {
+  const Eigen::Isometry3d T_a_b = perturbation({1.0, -2.0, 0.5}, {20.0, -40.0, 70.0});
+  constexpr double kSmall = 1e-6;
+  for (std::size_t axis = 0; axis < 6; ++axis) {
+    std::array<double, 36> covariance = {};
+    covariance[7 * axis] = 1.0;
+    Eigen::Vector3d metres = Eigen::Vector3d::Zero(), turn = Eigen::Vector3d::Zero();
+    (axis < 3 ? metres : turn)[static_cast<int>(axis % 3)] = kSmall;
+    const Eigen::Isometry3d T_error =
+        T_a_b * perturbation(metres, turn / kDegrees) * T_a_b.inverse();
+    const Eigen::AngleAxisd rotation(T_error.linear());
+    Eigen::Matrix<double, 6, 1> error;
+    error << T_error.translation(), rotation.angle() * rotation.axis();
+    error /= kSmall;
+    const std::array<double, 36> moved = detail::transported_covariance(covariance, T_a_b);
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j < 6; ++j) {
+        CHECK(moved[static_cast<std::size_t>(6 * i + j)] ==
+              Approx(error[i] * error[j]).margin(1e-4));
+      }
+    }
+  }
 }
 
 TEST_CASE("a lasting offset is one residual, and later poses are corrected by it") {

@@ -33,6 +33,7 @@ class CorrectionSupport {
     Vector step = {};  ///< the part of the correction that is certain
     /// Whether some direction of the correction shows that the pose is inexact.
     bool is_significant = false;
+    Matrix covariance = {};  ///< of the correction
   };
 
   /// Whether a plane with this z of its unit normal is a wall rather than ground.
@@ -53,14 +54,15 @@ class CorrectionSupport {
 
   /// Tests `correction` by direction. `equations`: those of all added distances, with attractions.
   Result test(const Vector& correction, const NormalEquations& equations, Prior prior) const {
-    Matrix covariance = covariance_of(equations);
+    Result result;
+    result.covariance = covariance_of(equations);
+    Matrix covariance = result.covariance;
     Vector scaled = correction;
     for (std::size_t i = 0; i < 6; ++i) {
       scaled[i] *= unit(i);
       for (std::size_t j = 0; j < 6; ++j) covariance[i][j] *= unit(i) * unit(j);
     }
     const SymmetricEigen<6> eigen = symmetric_eigen<6>(covariance);
-    Result result;
     for (std::size_t k = 0; k < 6; ++k) {
       Vector step;
       double along = 0.0;
@@ -88,6 +90,7 @@ class CorrectionSupport {
   static constexpr std::size_t kSectors = 32;
   static constexpr double kFewestSectors = 3.0;
   static constexpr double kDeviations = 3.0;  // of a step that is certain
+  static constexpr double kFirstError = 1.0;  // m, standard deviation of the first estimate
   static constexpr double kShrink = 1.5;      // standard deviations, see James and Stein
 
   // Standard deviations that show an error of an exact pose. A variance that few sectors tell is
@@ -129,10 +132,15 @@ class CorrectionSupport {
       inverse[i] = all.solve(one);
     }
     Matrix covariance = {};
-    for (const NormalEquations& kind : kinds_) {
-      for (std::size_t i = 0; i < 6; ++i) {
-        for (std::size_t j = 0; j < 6; ++j) {
+    for (std::size_t i = 0; i < 6; ++i) {
+      for (std::size_t j = 0; j < 6; ++j) {
+        for (const NormalEquations& kind : kinds_) {
           covariance[i][j] += kind.variance() * kind.product(inverse[i], inverse[j]);
+        }
+        // Without information, the attractions keep the error of the first estimate.
+        for (std::size_t k = 0; k < 6; ++k) {
+          const double kept = all.attraction(k) * kFirstError / unit(k);
+          covariance[i][j] += kept * kept * inverse[i][k] * inverse[j][k];
         }
       }
     }

@@ -35,6 +35,9 @@ class NormalEquations {
     right_[i] += weight * value;
   }
 
+  /// Weight of the attraction of unknown number `i`.
+  double attraction(std::size_t i) const { return attraction_[i]; }
+
   /// Whether no distance with a positive weight was added.
   bool empty() const { return weights_ <= 0.0; }
   /// Mean square of the distances, m^2.

@@ -48,8 +48,9 @@ struct Alignment {
   /// Root mean square of the change of the distances between points and planes by the supported
   /// step, m. Unlike the change of the pose, it does not grow in directions without information.
   double change = 0.0;
-  bool is_significant = false;  ///< see CorrectionSupport::Result
-  double doubt = 0.0;           ///< length of the translation in `found` that is not supported, m
+  CorrectionSupport::Matrix covariance = {};  ///< of `found`, along the axes of the map
+  bool is_significant = false;                ///< see CorrectionSupport::Result
+  double doubt = 0.0;  ///< length of the translation in `found` that is not supported, m
 };
 
 /// Aligns scans with planes.
@@ -90,6 +91,7 @@ class PlaneAligner {
     const CorrectionSupport::Result certain = support_.test(result.found, equations, prior);
     result.supported = certain.step;
     result.is_significant = certain.is_significant;
+    result.covariance = certain.covariance;
     result.change = equations.change(result.supported);
     result.doubt =
         std::hypot(result.found[0] - result.supported[0], result.found[1] - result.supported[1],

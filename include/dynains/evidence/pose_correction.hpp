@@ -193,7 +193,22 @@ class PoseCorrection {
     }
     const Pose T_motion = detail::composed(detail::inverted(T_origin_pushed_), T_pushed);
     residual_ = difference(detail::composed(T_origin_newest_, T_motion), T_aligned);
-    residual_->T_previous_newest = detail::composed(detail::inverted(T_origin_newest_), T_newest);
+    const Pose T_previous_origin = detail::inverted(T_origin_newest_);
+    residual_->T_previous_newest = detail::composed(T_previous_origin, T_newest);
+    const Pose T_found = detail::moved(T_guess, alignment.found);
+    residual_->T_previous_aligned = detail::composed(T_previous_origin, T_found);
+    set_covariance(alignment.covariance, T_found);
+  }
+
+  // Writes the covariance of an alignment, along the axes of the map, to the residual.
+  void set_covariance(const detail::CorrectionSupport::Matrix& covariance,
+                      const Pose& T_origin_sensor) {
+    for (std::size_t i = 0; i < 6; ++i) {
+      for (std::size_t j = 0; j < 6; ++j) residual_->covariance[6 * i + j] = covariance[i][j];
+    }
+    Pose R_sensor_origin = Pose::Identity();
+    R_sensor_origin.linear() = detail::transposed(T_origin_sensor.linear());
+    residual_->covariance = detail::transported_covariance(residual_->covariance, R_sensor_origin);
   }
 
   // Whether the static world fits, compared with earlier scans of the epoch. `inliers`: ratio to

@@ -305,8 +305,11 @@ std::optional<PoseResidual> Pipeline<Stages>::pose_residual() {
     Pose T_cloud_level = Pose::Identity();
     T_cloud_level.linear() = transposed(sensor().R_level_sensor());
     T_cloud_level.translation() = origin;
-    residual->T_previous_newest =
-        composed(composed(T_cloud_level, residual->T_previous_newest), inverted(T_cloud_level));
+    const Pose T_level_sensor = inverted(T_cloud_level);
+    for (auto* T : {&residual->T_previous_newest, &residual->T_previous_aligned}) {
+      *T = composed(composed(T_cloud_level, *T), T_level_sensor);
+    }
+    residual->covariance = transported_covariance(residual->covariance, T_cloud_level);
   }
   return residual;
 }
