@@ -54,9 +54,11 @@ class CorrectionSupport {
 
   /// Tests `correction` by direction. `equations`: those of all added distances, with attractions.
   Result test(const Vector& correction, const NormalEquations& equations, Prior prior) const {
+    const Matrix inverse = inverse_of(equations);
+    Matrix covariance = covariance_of(equations, inverse);
     Result result;
-    result.covariance = covariance_of(equations);
-    Matrix covariance = result.covariance;
+    result.covariance = covariance;
+    add_first_error(equations, inverse, result.covariance);
     Vector scaled = correction;
     for (std::size_t i = 0; i < 6; ++i) {
       scaled[i] *= unit(i);
@@ -123,32 +125,44 @@ class CorrectionSupport {
     return squares > 0.0 ? sum * sum / squares : 0.0;
   }
 
-  // Each kind of surface has its own variance: walls of sparse sensors deviate more than ground.
-  Matrix covariance_of_distances(const NormalEquations& all) const {
+  static Matrix inverse_of(const NormalEquations& all) {
     Matrix inverse;
     for (std::size_t i = 0; i < 6; ++i) {
       Vector one = {};
       one[i] = 1.0;
       inverse[i] = all.solve(one);
     }
+    return inverse;
+  }
+
+  // Each kind of surface has its own variance: walls of sparse sensors deviate more than ground.
+  Matrix covariance_of_distances(const Matrix& inverse) const {
     Matrix covariance = {};
-    for (std::size_t i = 0; i < 6; ++i) {
-      for (std::size_t j = 0; j < 6; ++j) {
-        for (const NormalEquations& kind : kinds_) {
+    for (const NormalEquations& kind : kinds_) {
+      for (std::size_t i = 0; i < 6; ++i) {
+        for (std::size_t j = 0; j < 6; ++j) {
           covariance[i][j] += kind.variance() * kind.product(inverse[i], inverse[j]);
-        }
-        // Without information, the attractions keep the error of the first estimate.
-        for (std::size_t k = 0; k < 6; ++k) {
-          const double kept = all.attraction(k) * kFirstError / unit(k);
-          covariance[i][j] += kept * kept * inverse[i][k] * inverse[j][k];
         }
       }
     }
     return covariance;
   }
 
-  Matrix covariance_of(const NormalEquations& all) const {
-    Matrix covariance = covariance_of_distances(all);
+  // Where the surfaces tell nothing, attractions keep the first estimate and its error.
+  static void add_first_error(const NormalEquations& all, const Matrix& inverse,
+                              Matrix& covariance) {
+    for (std::size_t k = 0; k < 6; ++k) {
+      const double kept = all.attraction(k) * kFirstError / unit(k);
+      for (std::size_t i = 0; i < 6; ++i) {
+        for (std::size_t j = 0; j < 6; ++j) {
+          covariance[i][j] += kept * kept * inverse[i][k] * inverse[j][k];
+        }
+      }
+    }
+  }
+
+  Matrix covariance_of(const NormalEquations& all, const Matrix& inverse) const {
+    Matrix covariance = covariance_of_distances(inverse);
     // Pairs of adjacent sectors, so that no object is divided. They overlap, so each counts half.
     const Vector step = all.solve();
     for (std::size_t sector = 0; sector < kSectors; ++sector) {
