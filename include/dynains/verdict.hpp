@@ -111,15 +111,16 @@ struct PoseResidual {
   /// Exp(e). The pose of the previous scan is taken as exact.
   std::array<double, 36> covariance = {};
 
+  /// The previous scan: the last one that was taken. A push that threw is not.
+  std::uint64_t previous_scan = 0;  ///< number of its push, as ScanVerdict::scan
+  double previous_time = 0.0;       ///< s, as pushed
+
   /// Whether the surfaces tell the error along an axis (0 to 5, as in `covariance`) to 10 cm: three
   /// standard deviations; rotation: of a point 10 m away.
   bool is_supported(std::size_t axis) const {
     const double deviation = std::sqrt(covariance[7 * axis]) * (axis < 3 ? 1.0 : 10.0);
     return 3.0 * deviation <= 0.1;
   }
-  /// The previous scan: the last one that was taken. A push that threw is not.
-  std::uint64_t previous_scan = 0;  ///< number of its push, as ScanVerdict::scan
-  double previous_time = 0.0;       ///< s, as pushed
 };
 
 /// Doubt about the times of the last four scans.

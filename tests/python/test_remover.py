@@ -107,6 +107,12 @@ def test_a_residual_names_its_scan_and_odd_times_are_doubted(street, identity):
     frame = next(frame for frame in frames if frame.pose_residual is not None)
     assert frame.pose_residual.previous_scan == frame.newest.scan - 1
     assert frame.pose_residual.previous_time == scans[frame.newest.scan - 1].time
+    assert frame.pose_residual.T_previous_aligned.shape == (4, 4)
+    covariance = frame.pose_residual.covariance
+    assert covariance.shape == (6, 6) and np.allclose(covariance, covariance.T)
+    assert frame.pose_residual.supported == [
+        bool(3 * np.sqrt(covariance[i, i]) * (1 if i < 3 else 10) <= 0.1) for i in range(6)
+    ]
     assert all(frame.time_doubt is None for frame in frames)
     for unit, doubt in [(1e3, "too slow"), (1e-3, "too fast")]:
         remover = dynains.DynaInsRemover()
