@@ -98,7 +98,7 @@ class RemoverNode {
   double tf_timeout_ = 0.2;
   double map_period_ = 2.0;
   tf2_ros::Buffer transforms_;
-  tf2_ros::TransformListener listener_;  // has a thread of its own
+  tf2_ros::TransformListener listener_;  // runs in a separate thread
   ros::Publisher static_, dynamic_, map_;
   ros::Subscriber clouds_;
   ros::WallTimer timer_;

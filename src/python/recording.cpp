@@ -219,7 +219,7 @@ void bind_recording(py::module_& module) {
       .def_property_readonly(
           "missing_poses",
           [](const SharedRecording& recording) { return recording.get().missing_pose_count(); },
-          "Number of scans that are left out for want of a pose.")
+          "Number of scans that are left out because they have no pose.")
       .def_property_readonly(
           "early_end", [](const SharedRecording& recording) { return recording.get().early_end(); },
           "Path, position and reason if a log is cut off, else None.")

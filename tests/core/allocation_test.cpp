@@ -1,4 +1,4 @@
-// Counts the calls of the global operator new. This test is an executable of its own.
+// Counts the calls of the global operator new. This test is a separate executable.
 #include <atomic>
 #include <cstddef>
 #include <cstdlib>

@@ -16,7 +16,7 @@ namespace {
 using Count = DynamicOccupancyGrid::Count;
 using Verdict = DynamicOccupancyGrid::Verdict;
 
-// A scan of single points, each a supervoxel of its own, with a verdict for each.
+// A scan of single points, each in a separate supervoxel, with a verdict for each.
 struct SparseScan {
   InstanceSamples samples;
   std::vector<Count> counted;

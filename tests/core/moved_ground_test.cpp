@@ -217,7 +217,7 @@ TEST_CASE(
   CHECK(ground_that_goes(config, ground).empty());
 
   const auto rise = static_cast<float>(config.footprint_rise);
-  // Each in a cell of its own: the sides of cells are whole multiples of 0.3 m from the sensor.
+  // Each in a separate cell: the sides of cells are whole multiples of 0.3 m from the sensor.
   ground.push_back(20.25F, 0.15F, street(20.25F, 0.15F) + rise + 0.005F);
   ground.push_back(20.20F, 0.10F, street(20.20F, 0.10F));
   ground.push_back(19.65F, 0.75F, street(19.65F, 0.75F) + rise - 0.005F);
