@@ -270,8 +270,8 @@ class Recording {
   PointFrame frame_ = PointFrame::kSensor;
   Labels labels_ = Labels::kNone;
   PointColumns columns_;
-  bool numbered_ = false;  ///< all names are numbers
-  bool has_times_ = true;  ///< times of scans are measured; else scans count as 0.1 s apart
+  bool numbered_ = false;       ///< all names are numbers
+  bool has_times_ = true;       ///< times of scans are measured; else scans count as 0.1 s apart
   bool has_keyframes_ = false;  ///< each scan lies in a folder with its pose
   bool has_viewpoints_ = false;
   bool has_calibration_ = false;
