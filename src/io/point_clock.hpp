@@ -41,8 +41,8 @@ struct PointTimes {
 /// that are within this interval of the median.
 PointTimes times_of_scan(const RecordedScan& scan, const PointClock& clock);
 
-/// Meaning of the times of points in a recording. Without a clock, `text` says why, or is empty if the scans
-/// have too few points. With one, `text` is empty or says what the user has to know.
+/// Meaning of the times of points in a recording. Without a clock, `text` says why, or is empty if
+/// the scans have too few points. With one, `text` is empty or says what the user has to know.
 struct PointClockFinding {
   std::optional<PointClock> clock;
   std::string text;

@@ -62,7 +62,7 @@ StampedPose read_transform(MessageReader& in) {
 /// The clock of times whose meaning nobody told: seconds, or nanoseconds if integer or huge.
 PointClock usual_clock(bool is_integer, const std::vector<double>& times) {
   constexpr double kLongestOffset = 10.0;  // s
-  constexpr double kNanoseconds = 1e14;  // of an absolute time; as seconds it is in year 3170000
+  constexpr double kNanoseconds = 1e14;    // of an absolute time; as seconds it is in year 3170000
   double least = std::numeric_limits<double>::infinity();
   for (const double time : times) {
     if (std::isfinite(time)) least = std::min(least, time);
