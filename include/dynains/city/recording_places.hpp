@@ -1,0 +1,461 @@
+// Places of a recording, and what all of its scans saw of them.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "dynains/parameters.hpp"
+#include "dynains/points.hpp"
+#include "dynains/pose.hpp"
+#include "dynains/simd/bits.hpp"
+#include "dynains/simd/pack_loops.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
+
+namespace dynains {
+
+/// Parameters of the second pass over a recording.
+struct RecordingPlacesConfig {
+  double place_range = 60;  ///< m
+  double look_way = 3;      ///< m
+  double look_time = 1;     ///< s
+  int free_looks = 4;
+  int object_places = 6;
+  double most_contact = 1.5;
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& visitor) {
+    visitor(Parameter{"place_range", self.place_range, closed(5, 300), "m",
+                      "places at a larger horizontal range are not tested by a scan"});
+    visitor(Parameter{"look_way", self.look_way, closed(0, 100), "m",
+                      "way of the sensor between two independent looks at a place"});
+    visitor(Parameter{"look_time", self.look_time, closed(0.01, 1000), "s",
+                      "time between two independent looks at a place"});
+    visitor(Parameter{"free_looks", self.free_looks, closed(1, 100), "",
+                      "independent looks in a row that must pass a place, and none hit it"});
+    visitor(Parameter{"object_places", self.object_places, closed(1, 1000), "",
+                      "places of an object that came or went, at least"});
+    visitor(Parameter{"most_contact", self.most_contact, closed(0, 26), "",
+                      "most places that stay and touch an object, ratio to its own places"});
+  }
+
+  /// Throws ConfigError.
+  void validate() const { validate_parameters("RecordingPlaces", *this); }
+};
+
+/// What all looks tell of a place.
+enum class PlaceState : std::uint8_t {
+  kUnknown,  ///< no look sees it well
+  kStays,
+  kChanged  ///< looks in a row passed it: what was measured there came or went
+};
+
+/// Places are cubes of 0.4 m with points that the first pass called static. Reference scans test
+/// the points of each place, in the order of their times. References near each other in time and
+/// in the place of the sensor repeat the same error, and are one look. A look is free if beams
+/// passed the place and none hit it. A place has changed if `free_looks` looks in a row are free
+/// and no hit lies between: its state over time, not the sum of its looks, so that an object that
+/// stands for long and then leaves is found. Looks from farther away than the hits of a place do
+/// not count, for beams that are far apart miss what is thin.
+///
+/// The memory is that of the places: about 100 bytes each.
+class RecordingPlaces {
+ public:
+  static constexpr double kPlace = 0.4;      // m
+  static constexpr std::int64_t kTile = 64;  // places
+
+  struct Place {
+    std::array<std::array<std::uint8_t, 3>, 8> samples;  // by octant, in 1/256 of a place
+    std::uint8_t filled = 0;                             // octants with a sample
+    PlaceState state = PlaceState::kUnknown;
+    std::uint8_t farthest = 0;                                 // m, range of its points
+    std::uint8_t look_free = 0, look_hit = 0, look_range = 0;  // of the open look
+    std::uint8_t hits = 0;                                     // looks
+    std::array<std::uint8_t, 4> run = {}, longest = {};        // free looks in a row, by kNear
+    std::array<std::uint16_t, 4> run_begin = {}, begin = {}, end = {};  // looks
+    std::uint32_t object = 0;  // number, from 1 on; 0: none
+  };
+
+  /// Throws ConfigError.
+  explicit RecordingPlaces(const RecordingPlacesConfig& config)
+      : config_((config.validate(), config)) {}
+
+  const RecordingPlacesConfig& config() const { return config_; }
+
+  /// Adds the places of the static points above the ground of a scan (m, sensor frame).
+  void add(PointsView points, Span<const PointLabel> verdicts, const Pose& T_world_sensor) {
+    for_each_in_range(points, verdicts, T_world_sensor, [&](std::size_t i, const Position& at) {
+      Tile& tile = at_tile(at);
+      const std::uint32_t number = tile.numbers.insert(at.key);
+      if (number == tile.places.size()) {
+        tile.places.emplace_back();
+        tile.keys.push_back(at.key);
+      }
+      Place& place = tile.places[number];
+      const float range = std::sqrt(points.x[i] * points.x[i] + points.y[i] * points.y[i]);
+      place.farthest = std::max(place.farthest, whole_metres(range));
+      const auto bit = static_cast<std::uint8_t>(1U << at.octant);
+      if ((place.filled & bit) != 0) return;
+      place.filled = static_cast<std::uint8_t>(place.filled | bit);
+      place.samples[at.octant] = at.within;
+    });
+  }
+
+  /// Tests all places around the sensor by a reference scan. `sensor`: m, world frame. `scan`: its
+  /// number; ascending. `test_visibility(points, count)`: see detail::test_visibility(); points
+  /// relative to `sensor`, with the axes of the world frame.
+  template <class TestVisibility>
+  void test(std::uint32_t scan, double time, const Eigen::Vector3d& sensor,
+            TestVisibility&& test_visibility) {
+    begin_reference(scan, time, sensor);
+    gather(sensor);
+    if (tested_.empty()) return;
+    const auto& visibility = test_visibility(samples_, std::size_t{begin_.back()});
+    for (std::size_t i = 0; i < tested_.size(); ++i) {
+      const auto count = visibility.count(begin_[i], begin_[i + 1]);
+      const int verdict = judge(count.free, count.hit, begin_[i + 1] - begin_[i]);
+      if (verdict == 0) continue;
+      Place& place = *tested_[i];
+      if (place.look_free == 0 && place.look_hit == 0) touched_.push_back(&place);
+      std::uint8_t& number = verdict > 0 ? place.look_free : place.look_hit;
+      if (number < 255) ++number;
+      place.look_range = std::max(place.look_range, ranges_[i]);
+    }
+  }
+
+  /// Ends the last look, and decides on all places and objects.
+  void decide() {
+    end_look();
+    for (auto& tile : tiles_) {
+      for (Place& place : tile.second.places) place.state = state_of(place);
+    }
+    find_objects();
+  }
+
+  /// Calls `visit(i, place)` for each static point above the ground, m, sensor frame; null: no
+  /// scan brought a place there. A scan without changed places around it visits nothing.
+  template <class Visitor>
+  void for_each_place(PointsView points, Span<const PointLabel> verdicts,
+                      const Pose& T_world_sensor, Visitor&& visit) const {
+    if (!has_changes_around(T_world_sensor.translation())) return;
+    for_each_in_range(points, verdicts, T_world_sensor,
+                      [&](std::size_t i, const Position& at) { visit(i, find(at.tile, at.key)); });
+  }
+
+  std::size_t size() const {
+    std::size_t size = 0;
+    for (const auto& tile : tiles_) size += tile.second.places.size();
+    return size;
+  }
+
+  /// First and last scan of the looks in a row that passed a changed place.
+  std::pair<std::uint32_t, std::uint32_t> free_scans(const Place& place) const {
+    const std::size_t k = class_of(place);
+    return {look_scans_[place.begin[k]].first, look_scans_[place.end[k]].second};
+  }
+  std::uint32_t object_count() const { return objects_; }
+
+  template <class Visitor>
+  void for_each(Visitor&& visit) const {
+    for (const auto& tile : tiles_) {
+      for (std::size_t i = 0; i < tile.second.places.size(); ++i) {
+        const VoxelKey key = tile.second.keys[i];
+        Eigen::Vector3d middle;
+        for (int axis = 0; axis < 3; ++axis) {
+          const std::int64_t corner = axis < 2 ? tile.first[static_cast<std::size_t>(axis)] : 0;
+          middle[axis] =
+              kPlace * (static_cast<double>(corner * kTile + voxel_index(key, axis)) + 0.5);
+        }
+        visit(middle, tile.second.places[i]);
+      }
+    }
+  }
+
+ private:
+  static constexpr std::uint32_t kNone = VoxelHashTable<>::kNone;
+  static constexpr float kLeastVisible = 0.3F;  // ratio of visible to all samples of a place
+  static constexpr float kFreeRatio = 0.6F, kHitRatio = 0.3F;
+  static constexpr std::array<std::uint8_t, 4> kNear = {12, 20, 35, 60};  // m
+
+  using TileIndex = std::array<std::int64_t, 2>;
+  struct Tile {
+    VoxelHashTable<> numbers;
+    std::vector<VoxelKey> keys;
+    std::vector<Place> places;
+    std::uint32_t changed = 0;
+  };
+  struct Position {
+    TileIndex tile;
+    VoxelKey key;  // of the place in the tile
+    std::size_t octant;
+    std::array<std::uint8_t, 3> within;
+  };
+
+  static std::uint8_t whole_metres(float metres) {
+    return static_cast<std::uint8_t>(std::min(metres, 255.0F));
+  }
+
+  static Position position_of(const Eigen::Vector3d& point) {
+    Position position;
+    std::array<std::int64_t, 3> index;
+    position.octant = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double places = point[axis] / kPlace;
+      const double whole = std::floor(places);
+      index[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(whole);
+      const auto part = static_cast<std::uint32_t>(std::min(255.0, 256.0 * (places - whole)));
+      position.within[static_cast<std::size_t>(axis)] = static_cast<std::uint8_t>(part);
+      position.octant |= static_cast<std::size_t>(part >> 7U) << axis;
+    }
+    // Arithmetic shifts and masks are floor division and remainder.
+    position.tile = {index[0] >> 6, index[1] >> 6};
+    position.key = voxel_key(index[0] & (kTile - 1), index[1] & (kTile - 1), index[2]);
+    return position;
+  }
+
+  template <class Visitor>
+  void for_each_in_range(PointsView points, Span<const PointLabel> verdicts,
+                         const Pose& T_world_sensor, Visitor&& visit) const {
+    const auto range = static_cast<float>(config_.place_range);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (verdicts[i] != PointLabel::kStatic) continue;
+      const float x = points.x[i], y = points.y[i];
+      if (x * x + y * y > range * range) continue;
+      visit(i, position_of(T_world_sensor * Eigen::Vector3d(static_cast<double>(x),
+                                                            static_cast<double>(y),
+                                                            static_cast<double>(points.z[i]))));
+    }
+  }
+
+  Tile& at_tile(const Position& at) {
+    if (recent_ == nullptr || recent_index_ != at.tile) {
+      recent_ = &tiles_[at.tile];
+      recent_index_ = at.tile;
+    }
+    return *recent_;
+  }
+
+  const Place* find(const TileIndex& tile, VoxelKey key) const {
+    const auto found = tiles_.find(tile);
+    if (found == tiles_.end()) return nullptr;
+    const std::uint32_t number = found->second.numbers.find(key);
+    return number == kNone ? nullptr : &found->second.places[number];
+  }
+
+  void begin_reference(std::uint32_t scan, double time, const Eigen::Vector3d& sensor) {
+    const bool is_near = has_look_ && (sensor - look_at_).norm() < config_.look_way &&
+                         time - look_time_ < config_.look_time;
+    if (is_near) {
+      look_scans_.back().second = scan;
+      return;
+    }
+    if (has_look_) end_look();
+    has_look_ = true;
+    look_at_ = sensor;
+    look_time_ = time;
+    look_scans_.push_back({scan, scan});
+  }
+
+  // Adds the open look to the states of the places that it saw.
+  void end_look() {
+    if (look_scans_.empty()) return;
+    const auto look =
+        static_cast<std::uint16_t>(std::min<std::size_t>(look_scans_.size() - 1, UINT16_MAX));
+    for (Place* const place : touched_) {
+      if (place->look_hit > 0) {
+        const bool is_hit = place->look_hit >= place->look_free;
+        if (is_hit && place->hits < 255) ++place->hits;
+        place->run = {};
+      } else {
+        for (std::size_t k = 0; k < kNear.size(); ++k) {
+          if (place->look_range > kNear[k]) continue;
+          add_free(*place, k, look);
+        }
+      }
+      place->look_free = place->look_hit = place->look_range = 0;
+    }
+    touched_.clear();
+  }
+
+  static void add_free(Place& place, std::size_t k, std::uint16_t look) {
+    if (place.run[k] == 0) place.run_begin[k] = look;
+    if (place.run[k] < 255) ++place.run[k];
+    if (place.run[k] < place.longest[k]) return;
+    place.longest[k] = place.run[k];
+    place.begin[k] = place.run_begin[k];
+    place.end[k] = look;
+  }
+
+  // The class of ranges from which looks at a place count: ranges at which it was measured.
+  static std::size_t class_of(const Place& place) {
+    std::size_t k = kNear.size() - 1;
+    while (k > 0 && kNear[k] > place.farthest) --k;
+    return k;
+  }
+
+  PlaceState state_of(const Place& place) const {
+    const std::uint8_t longest = place.longest[class_of(place)];
+    if (longest >= config_.free_looks) return PlaceState::kChanged;
+    return place.hits > 0 || longest > 0 ? PlaceState::kStays : PlaceState::kUnknown;
+  }
+
+  // Numbers the components of touching changed places that have enough of them.
+  void find_objects() {
+    std::vector<std::pair<TileIndex, std::uint32_t>> members;
+    std::vector<std::pair<TileIndex, std::uint32_t>> rejected;
+    std::vector<const Place*> contacts;
+    for (auto& tile : tiles_) {
+      for (std::uint32_t first = 0; first < tile.second.places.size(); ++first) {
+        Place& place = tile.second.places[first];
+        if (place.state != PlaceState::kChanged || place.object != 0) continue;
+        members.assign(1, {tile.first, first});
+        place.object = kNone;
+        contacts.clear();
+        for (std::size_t i = 0; i < members.size(); ++i) {
+          add_neighbours(members[i], members, contacts);
+        }
+        std::sort(contacts.begin(), contacts.end());
+        contacts.erase(std::unique(contacts.begin(), contacts.end()), contacts.end());
+        const bool is_object = is_whole(members.size(), contacts.size());
+        const std::uint32_t number = is_object ? ++objects_ : kNone;
+        for (const auto& member : members) {
+          Tile& of = tiles_[member.first];
+          of.places[member.second].object = number;
+          ++of.changed;
+        }
+        if (!is_object) rejected.insert(rejected.end(), members.begin(), members.end());
+      }
+    }
+    for (const auto& member : rejected) {
+      Tile& of = tiles_[member.first];
+      of.places[member.second].state = PlaceState::kStays;
+      of.places[member.second].object = 0;
+      --of.changed;
+    }
+  }
+
+  // An object is large enough, and no part of something that stays.
+  bool is_whole(std::size_t places, std::size_t contacts) const {
+    return places >= static_cast<std::size_t>(config_.object_places) &&
+           static_cast<double>(contacts) <= config_.most_contact * static_cast<double>(places);
+  }
+
+  // Adds the changed places that touch a member to its component, and those that stay to
+  // `contacts`.
+  void add_neighbours(std::pair<TileIndex, std::uint32_t> member,
+                      std::vector<std::pair<TileIndex, std::uint32_t>>& members,
+                      std::vector<const Place*>& contacts) {
+    const VoxelKey key = tiles_[member.first].keys[member.second];
+    for (int n = 0; n < 27; ++n) {
+      std::array<std::int64_t, 3> index;
+      for (int axis = 0; axis < 3; ++axis) {
+        const int step = (axis == 0 ? n : axis == 1 ? n / 3 : n / 9) % 3 - 1;
+        index[static_cast<std::size_t>(axis)] = voxel_index(key, axis) + step;
+      }
+      const TileIndex tile = {member.first[0] + (index[0] >> 6), member.first[1] + (index[1] >> 6)};
+      const auto found = tiles_.find(tile);
+      if (found == tiles_.end()) continue;
+      const std::uint32_t number = found->second.numbers.find(
+          voxel_key(index[0] & (kTile - 1), index[1] & (kTile - 1), index[2]));
+      if (number == kNone) continue;
+      Place& place = found->second.places[number];
+      if (place.state == PlaceState::kStays && place.hits > 0) contacts.push_back(&place);
+      if (place.state != PlaceState::kChanged || place.object != 0) continue;
+      place.object = kNone;
+      members.push_back({tile, number});
+    }
+  }
+
+  // Whether a tile within the range of the sensor has changed places.
+  bool has_changes_around(const Eigen::Vector3d& sensor) const {
+    for (const auto& tile : tiles_) {
+      if (tile.second.changed > 0 && distance(tile.first, sensor) <= config_.place_range) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  // Distance of a position from a tile along the axis where it is larger, m.
+  static double distance(const TileIndex& tile, const Eigen::Vector3d& position) {
+    constexpr double kEdge = kPlace * kTile;
+    const Eigen::Vector2d middle(kEdge * (static_cast<double>(tile[0]) + 0.5),
+                                 kEdge * (static_cast<double>(tile[1]) + 0.5));
+    return (position.head<2>() - middle).cwiseAbs().maxCoeff() - 0.5 * kEdge;
+  }
+
+  // Collects the samples of the places that are near the sensor.
+  void gather(const Eigen::Vector3d& sensor) {
+    tested_.clear();
+    ranges_.clear();
+    begin_.assign(1, 0);
+    const auto range = static_cast<float>(config_.place_range);
+    constexpr auto kStep = static_cast<float>(kPlace / 256.0);
+    for (auto& [index, tile] : tiles_) {
+      if (distance(index, sensor) > config_.place_range) continue;
+      const Eigen::Vector3f corner =
+          (kPlace * static_cast<double>(kTile) *
+               Eigen::Vector3d(static_cast<double>(index[0]), static_cast<double>(index[1]), 0.0) -
+           sensor)
+              .cast<float>();
+      for (std::size_t i = 0; i < tile.places.size(); ++i) {
+        const VoxelKey key = tile.keys[i];
+        const auto at = [&](int axis) {
+          return corner[axis] +
+                 static_cast<float>(kPlace) * static_cast<float>(voxel_index(key, axis));
+        };
+        const float x = at(0), y = at(1), z = at(2);
+        const float metres = std::sqrt(x * x + y * y);
+        if (metres > range) continue;
+        Place& place = tile.places[i];
+        std::uint32_t count = begin_.back();
+        samples_.grow(count + 8 + detail::kPackWidth);
+        detail::for_each_bit(place.filled, [&](std::size_t octant) {
+          const std::array<std::uint8_t, 3>& within = place.samples[octant];
+          samples_.x[count] = x + kStep * (static_cast<float>(within[0]) + 0.5F);
+          samples_.y[count] = y + kStep * (static_cast<float>(within[1]) + 0.5F);
+          samples_.z[count] = z + kStep * (static_cast<float>(within[2]) + 0.5F);
+          ++count;
+        });
+        tested_.push_back(&place);
+        ranges_.push_back(whole_metres(metres));
+        begin_.push_back(count);
+      }
+    }
+  }
+
+  // 1 if so many free and hit samples of a place tell that it is free, -1 if it is hit, else 0.
+  static int judge(std::uint32_t free, std::uint32_t hit, std::uint32_t samples) {
+    const auto visible = static_cast<float>(free + hit);
+    const auto least = static_cast<float>(std::min(2U, samples));
+    if (visible < std::max(least, kLeastVisible * static_cast<float>(samples))) return 0;
+    const float free_ratio = static_cast<float>(free) / visible;
+    if (free_ratio >= kFreeRatio) return 1;
+    return free_ratio <= kHitRatio ? -1 : 0;
+  }
+
+  RecordingPlacesConfig config_;
+  std::map<TileIndex, Tile> tiles_;  // its elements do not move
+  Tile* recent_ = nullptr;
+  TileIndex recent_index_ = {};
+  std::uint32_t objects_ = 0;
+
+  bool has_look_ = false;
+  Eigen::Vector3d look_at_ = Eigen::Vector3d::Zero();  // m, sensor at the begin of the look
+  double look_time_ = 0.0;                             // s
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> look_scans_;  // first and last, by look
+  std::vector<Place*> touched_;                                      // by the open look
+
+  std::vector<Place*> tested_;
+  std::vector<std::uint8_t> ranges_;  // m, by tested place
+  std::vector<std::uint32_t> begin_;  // by tested place: first sample, and the end
+  PointBuffer samples_;
+};
+
+}  // namespace dynains

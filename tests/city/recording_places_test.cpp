@@ -1,0 +1,207 @@
+#include "dynains/city/recording_places.hpp"
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/visibility.hpp"
+
+using namespace dynains;
+using test::BeamResult;
+
+namespace {
+
+using Beam = std::function<BeamResult(const Eigen::Vector3d& position)>;
+
+/// A sensor at rest at the origin, 10 m beside a row of places; one reference each second.
+class Recorder {
+ public:
+  explicit Recorder(const RecordingPlacesConfig& config = {}) : places(config) {}
+
+  /// Measures `count` places in a row along y, from place `first` on, at x = `x` m.
+  void measure(int count, int first = 0, float x = 10.1F) {
+    PointBuffer points;
+    for (int i = 0; i < count; ++i) {
+      points.push_back(x, 0.4F * static_cast<float>(first + i) + 0.1F, 0.1F);
+      points.push_back(x + 0.2F, 0.4F * static_cast<float>(first + i) + 0.3F, 0.3F);
+    }
+    const std::vector<PointLabel> labels(points.size(), PointLabel::kStatic);
+    places.add(points, labels, Pose::Identity());
+  }
+  void look(BeamResult seen, int times = 1) {
+    look_by([seen](const Eigen::Vector3d&) { return seen; }, times);
+  }
+  void look_by(const Beam& beam, int times = 1) {
+    for (int i = 0; i < times; ++i, ++scan_, time_ += step) {
+      places.test(scan_, time_, sensor,
+                  [&](const PointBuffer& points, std::size_t size) -> const detail::Visibility& {
+                    std::vector<BeamResult> seen(size);
+                    for (std::size_t k = 0; k < size; ++k) {
+                      const Eigen::Vector3f local(points.x[k], points.y[k], points.z[k]);
+                      seen[k] = beam(sensor + local.cast<double>());
+                    }
+                    visibility_ = test::visibility_of(seen);
+                    return visibility_;
+                  });
+    }
+  }
+  std::size_t changed() {
+    places.decide();
+    std::size_t count = 0;
+    places.for_each([&](const Eigen::Vector3d&, const RecordingPlaces::Place& place) {
+      if (place.state == PlaceState::kChanged) ++count;
+    });
+    return count;
+  }
+
+  RecordingPlaces places;
+  double step = 1.0;  // s
+  Eigen::Vector3d sensor = Eigen::Vector3d::Zero();
+
+ private:
+  std::uint32_t scan_ = 0;
+  double time_ = 0.0;  // s
+  detail::Visibility visibility_;
+};
+
+RecordingPlacesConfig any_size() {
+  RecordingPlacesConfig config;
+  config.object_places = 1;
+  return config;
+}
+
+TEST_CASE("a place that enough looks in a row passed has changed") {
+  const int enough = RecordingPlacesConfig().free_looks;
+  Recorder left(any_size());
+  left.measure(1);
+  left.look(BeamResult::kHit, 60);  // however long it stood
+  left.look(BeamResult::kFree, enough);
+  CHECK(left.changed() == 1);
+
+  Recorder came(any_size());
+  came.measure(1);
+  came.look(BeamResult::kFree, enough);
+  came.look(BeamResult::kHit, 60);
+  CHECK(came.changed() == 1);
+
+  Recorder few(any_size());
+  few.measure(1);
+  few.look(BeamResult::kHit, 60);
+  few.look(BeamResult::kFree, enough - 1);
+  CHECK(few.changed() == 0);
+}
+
+TEST_CASE("a hit between free looks begins a new row of them") {
+  const int enough = RecordingPlacesConfig().free_looks;
+  Recorder fence(any_size());
+  fence.measure(1);
+  for (int i = 0; i < 20; ++i) {
+    fence.look(BeamResult::kFree, enough - 1);
+    fence.look(BeamResult::kHit);
+  }
+  CHECK(fence.changed() == 0);
+
+  Recorder hidden(any_size());
+  hidden.measure(1);
+  for (int i = 0; i < enough; ++i) {
+    hidden.look(BeamResult::kFree);
+    hidden.look(BeamResult::kUnknown);
+  }
+  CHECK(hidden.changed() == 1);
+}
+
+TEST_CASE("references near each other in time and place are one look") {
+  Recorder repeated(any_size());
+  repeated.measure(1);
+  repeated.step = 0.05;
+  repeated.look(BeamResult::kFree, 20);  // 0.95 s from first to last
+  CHECK(repeated.changed() == 0);
+
+  Recorder moving(any_size());
+  moving.measure(1);
+  moving.step = 0.05;
+  moving.sensor.y() = -4.5;
+  for (int i = 0; i < 4; ++i) {
+    moving.look(BeamResult::kFree);
+    moving.sensor.y() += RecordingPlacesConfig().look_way;
+  }
+  CHECK(moving.changed() == 1);
+}
+
+TEST_CASE("looks from farther away than any point of a place was measured do not count") {
+  Recorder near(any_size());
+  near.measure(1, 0, 18.9F);
+  near.sensor.x() = 5.0;  // 14 m from the place, which was measured from 19 m
+  near.look(BeamResult::kFree, 10);
+  CHECK(near.changed() == 0);
+
+  Recorder far(any_size());
+  far.measure(1, 0, 20.9F);
+  far.sensor.x() = 7.0;
+  far.look(BeamResult::kFree, 10);
+  CHECK(far.changed() == 1);
+}
+
+TEST_CASE("an object needs enough places") {
+  const int enough = RecordingPlacesConfig().object_places;
+  for (const int places : {enough - 1, enough}) {
+    Recorder recorder;
+    recorder.measure(places);
+    recorder.look(BeamResult::kHit, 5);
+    recorder.look(BeamResult::kFree, 10);
+    CHECK(recorder.changed() == (places < enough ? 0U : static_cast<std::size_t>(places)));
+  }
+}
+
+TEST_CASE("a part of something that stays stays") {
+  RecordingPlacesConfig config;
+  config.object_places = 2;
+  config.most_contact = 1.0;
+  for (const int touching : {2, 3}) {
+    Recorder recorder(config);
+    recorder.measure(2);                   // these leave
+    recorder.measure(touching, 0, 10.5F);  // beside them
+    recorder.look(BeamResult::kHit, 5);
+    recorder.look_by(
+        [](const Eigen::Vector3d& at) {
+          return at.x() < 10.4 ? BeamResult::kFree : BeamResult::kHit;
+        },
+        10);
+    CHECK(recorder.changed() == (touching == 2 ? 2U : 0U));
+  }
+}
+
+TEST_CASE("an object across the border of tiles is one object") {
+  Recorder recorder;
+  const int border = RecordingPlaces::kTile;  // places
+  recorder.measure(6, border - 3);
+  recorder.sensor.y() = 25.0;
+  recorder.look(BeamResult::kHit, 5);
+  recorder.look(BeamResult::kFree, 10);
+  CHECK(recorder.changed() == 6);
+  CHECK(recorder.places.object_count() == 1);
+}
+
+TEST_CASE("a changed place tells the scans that passed it") {
+  Recorder recorder(any_size());
+  recorder.measure(1);
+  recorder.look(BeamResult::kHit, 7);
+  recorder.look(BeamResult::kFree, 5);
+  REQUIRE(recorder.changed() == 1);
+  recorder.places.for_each([&](const Eigen::Vector3d& at, const RecordingPlaces::Place& place) {
+    CHECK(recorder.places.free_scans(place) == std::make_pair(7U, 11U));
+    CHECK((at - Eigen::Vector3d(10.2, 0.2, 0.2)).norm() < 1e-9);
+  });
+}
+
+TEST_CASE("parameters of places have bounds") {
+  RecordingPlacesConfig config;
+  config.free_looks = 0;
+  CHECK_THROWS_AS(RecordingPlaces(config), ConfigError);
+}
+
+}  // namespace
