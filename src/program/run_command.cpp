@@ -137,6 +137,12 @@ void add_run_command(CLI::App& app) {
       .add_option("--map", options->map,
                   "static map, .ply, .pcd or .las [static_map.ply in the folder of --out]")
       ->type_name("FILE");
+  command
+      .add_option("--passes", options->passes,
+                  "2: after the last scan, scans of the whole recording test what is static, and "
+                  "remove what came or went at any time [1]")
+      ->check(CLI::Range(1, 2))
+      ->type_name("1|2");
   const char* const kOutputs = "More outputs, and memory";
   command
       .add_flag("--map-attributes", options->map_attributes,

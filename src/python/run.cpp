@@ -51,7 +51,7 @@ void set_scan(RunArguments& run, const py::handle& value) {
   if (!value.is_none()) run.settings.window.*Field = value.cast<std::size_t>();
 }
 
-const std::array<RunSetting, 24> kRunSettings{{
+const std::array<RunSetting, 25> kRunSettings{{
     {"preset", "'default', 'offline' or 'paper'", "parameters to start from",
      [](RunArguments& run, const py::handle& value) {
        const auto& names = program::preset_names();
@@ -106,6 +106,8 @@ const std::array<RunSetting, 24> kRunSettings{{
      [](RunArguments& run, const py::handle& value) {
        if (!value.is_none()) run.settings.align_start = value.cast<std::string>();
      }},
+    {"passes", "1 or 2", "2: scans of the whole recording test what the first pass keeps",
+     [](RunArguments& run, const py::handle& value) { run.settings.passes = value.cast<int>(); }},
     {"one_thread", "bool", "the thread of the run also reads and writes files",
      &set_flag<&RunSettings::one_thread>},
     {"write_online", "bool", "also write the verdicts without latency",

@@ -20,6 +20,16 @@ constexpr std::uint32_t mos_class(PointLabel label) {
   return is_static(label) ? kRunStatic : kRunNotJudged;
 }
 
+/// Inverse of mos_class(). `point`: x y z.
+PointLabel point_label(std::uint32_t mos, Cause cause, const float* point) {
+  if (mos == kRunMoving) return PointLabel::kDynamic;
+  if (mos == kRunStatic) return cause == Cause::kGround ? PointLabel::kGround : PointLabel::kStatic;
+  const auto is_finite = [](float value) { return std::isfinite(value); };
+  const bool is_measured = std::all_of(point, point + 3, is_finite) &&
+                           std::any_of(point, point + 3, [](float v) { return v < 0 || v > 0; });
+  return is_measured ? PointLabel::kOutOfRange : PointLabel::kInvalid;
+}
+
 /// mos_label() of all points of a scan.
 void fill_mos_labels(const ScanVerdict& verdict, std::vector<std::uint32_t>& labels) {
   const std::size_t count = verdict.labels.size();
@@ -78,6 +88,26 @@ void LabelFiles::write(const std::string& name) const {
   write_labels(folder_ / (name + ".label"), labels_);
   if (!cause_folder_.empty()) write_point_bytes(cause_folder_ / (name + ".cause"), causes_);
   if (!belief_folder_.empty()) write_point_bytes(belief_folder_ / (name + ".belief"), beliefs_);
+}
+
+void LabelFiles::read(const std::string& name, const RecordedScan& scan,
+                      VerdictArrays& verdict) const {
+  const std::size_t count = scan.size();
+  const auto labels = read_labels(folder_ / (name + ".label"), count);
+  const auto causes = read_point_bytes(cause_folder_ / (name + ".cause"), count);
+  verdict.labels.resize(count);
+  verdict.causes.resize(count);
+  verdict.instances.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    verdict.causes[i] = static_cast<Cause>(causes[i]);
+    verdict.instances[i] = labels[i] >> 16U;
+    verdict.labels[i] = point_label(labels[i] & 0xffffU, verdict.causes[i], &scan.xyzi[4 * i]);
+  }
+  verdict.beliefs.clear();
+  if (belief_folder_.empty()) return;
+  for (const std::uint8_t belief : read_point_bytes(belief_folder_ / (name + ".belief"), count)) {
+    verdict.beliefs.push_back(static_cast<float>(belief) / 255.0F);
+  }
 }
 
 LabelWriter::LabelWriter(std::filesystem::path folder, std::launch thread)

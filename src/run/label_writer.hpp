@@ -8,9 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
 #include "dynains/verdict.hpp"
 #include "threads/background.hpp"
+#include "verdict_arrays.hpp"
 
 namespace dynains::program {
 
@@ -32,6 +34,9 @@ class LabelFiles {
   /// Writes the verdict of take() to `labels`/`name`.label, `causes`/`name`.cause and
   /// `beliefs`/`name`.belief (255 is a belief of 1). Throws IoError.
   void write(const std::string& name) const;
+  /// Reads what write() wrote for `scan`: ids as far as the files hold them, beliefs in steps of
+  /// 1/255, none without a folder of beliefs. Throws IoError.
+  void read(const std::string& name, const RecordedScan& scan, VerdictArrays& verdict) const;
 
  private:
   std::filesystem::path folder_;

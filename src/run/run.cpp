@@ -18,12 +18,27 @@
 #include "run_plan.hpp"
 #include "run_request.hpp"
 #include "run_sequence.hpp"
+#include "second_pass.hpp"
 #include "write_view.hpp"
 
 namespace dynains::program {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// Tests the first verdicts, if there is a second pass, and makes all results of what is left.
+/// After a signal, the first verdicts stay.
+template <class Remover>
+void finish_second_pass(Remover& remover, RunResults& results) {
+  SecondPass* const pass = results.second_pass();
+  if (pass == nullptr) return;
+  pass->test([] { return InterruptGuard::signal() == 0; });
+  results.revise([&](PointsView points, Span<const std::uint8_t> keep, const Pose& T) {
+    remover.mutable_map().insert(points, keep, T);
+  });
+  if (!results.map_points()) return;
+  remover.map().for_each([&](const Eigen::Vector3d& point) { results.add_map_point(point); });
+}
 
 /// Processes all scans, or those that come before a signal. Returns the times.
 RunTiming process(const RunPlan& plan, const RunListener& listener, const fs::path& folder,
@@ -33,15 +48,19 @@ RunTiming process(const RunPlan& plan, const RunListener& listener, const fs::pa
     if (listener.progress) listener.progress(done, total);
   };
   RunTiming timing;
+  // The second pass makes the map.
+  const bool builds_map = results.second_pass() == nullptr;
   const auto work = [&](auto& remover) {
     report_progress(0);
     timing = run_sequence(remover, plan.sequence, plan.range, results, [&](std::size_t done) {
       report_progress(done);
       return InterruptGuard::signal() == 0;
     });
+    finish_second_pass(remover, results);
   };
   if (plan.map_on_disk) {
     RemoverWithMapOnDisk::Config config = *plan.map_on_disk;
+    config.build_map = builds_map;
     config.map.map_folder = folder / kTileFolder;
     RemoverWithMapOnDisk remover(config);
     work(remover);
@@ -49,7 +68,9 @@ RunTiming process(const RunPlan& plan, const RunListener& listener, const fs::pa
     std::error_code ignored;
     fs::remove(config.map.map_folder, ignored);
   } else {
-    DynaInsRemover remover(plan.config);
+    DynaInsRemover::Config config = plan.config;
+    config.build_map = config.build_map && builds_map;
+    DynaInsRemover remover(config);
     work(remover);
   }
   return timing;
@@ -135,7 +156,7 @@ RunDescription describe(const RunPlan& plan, const RunSettings& settings,
   description.log_ends_early = sequence.early_end().has_value();
   description.agreement = agreement.as_given;
   description.preset = settings.preset;
-  description.complete = results.finished() == plan.range.size();
+  description.complete = results.is_complete();
   description.map = plan.outputs.map_name();
   description.configuration = plan.configuration;
   if (plan.map_on_disk) {
@@ -147,7 +168,7 @@ RunDescription describe(const RunPlan& plan, const RunSettings& settings,
 RunOutcome outcome_of(const RunPlan& plan, const RunResults& results, const RunTiming& timing) {
   RunOutcome outcome;
   outcome.outputs = plan.outputs;
-  outcome.complete = results.finished() == plan.range.size();
+  outcome.complete = results.is_complete();
   outcome.scans = results.finished();
   outcome.points = results.points();
   outcome.labels = results.labels();
@@ -156,6 +177,26 @@ RunOutcome outcome_of(const RunPlan& plan, const RunResults& results, const RunT
   for (const TimingRow& row : timing.rows) totals.push_back(row.total);
   outcome.time = statistics(std::move(totals));
   return outcome;
+}
+
+/// What came or went, with the scans that tell of it.
+nlohmann::ordered_json to_json(const SecondPass& pass, const RunPlan& plan) {
+  const auto name = [&](std::uint32_t scan) { return plan.sequence.name(plan.range.first + scan); };
+  const auto metres = [](const Eigen::Vector3d& v) {
+    return std::vector<double>{v.x(), v.y(), v.z()};
+  };
+  auto objects = nlohmann::ordered_json::array();
+  for (const SecondPass::Object& object : pass.objects()) {
+    if (object.points == 0) continue;
+    objects.push_back({{"lowest", metres(object.lowest)},
+                       {"highest", metres(object.highest)},
+                       {"points", object.points},
+                       {"measured", {name(object.first_measured), name(object.last_measured)}},
+                       {"passed", {name(object.first_passed), name(object.last_passed)}}});
+  }
+  return {{"places", pass.place_count()},
+          {"removed_points", pass.removed()},
+          {"objects", std::move(objects)}};
 }
 
 /// Report of a run that is not finished.
@@ -190,6 +231,8 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   outputs.folder = change.folder();
   RunResults results(plan.sequence, plan.range, outputs, outside_map.take_writer());
   if (session) results.contribute_to(*session);
+  std::optional<SecondPass> second_pass;
+  if (plan.passes > 1) results.wait_for(second_pass.emplace(outputs.folder));
   const RunTiming timing = process(plan, listener, outputs.folder, results);
   RunOutcome outcome = outcome_of(plan, results, timing);
   outcome.alignment = alignment;
@@ -211,6 +254,7 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   description.wall = outcome.wall;
   nlohmann::ordered_json report = make_report(description, results, timing);
   report["request"] = plan.request;
+  if (second_pass) report["second_pass"] = to_json(*second_pass, plan);
   change.finish(report, plan.outputs.listing(plan.sequence, plan.range, false));
   return outcome;
 }

@@ -1,6 +1,7 @@
 #include "run_plan.hpp"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 
 #include "dynains/errors.hpp"
@@ -88,6 +89,16 @@ DynaInsRemover::Config config_of(const RunSettings& settings) {
   return config;
 }
 
+/// Throws ConfigError.
+void check_passes(const RunSettings& settings) {
+  if (settings.passes < 1 || settings.passes > 2) {
+    throw ConfigError("--passes " + std::to_string(settings.passes) + ": expected 1 or 2");
+  }
+  if (settings.passes > 1 && settings.config.revision.revise_map) {
+    throw ConfigError("--revise-map true changes the map of one pass; --passes 2 finds more");
+  }
+}
+
 /// Outputs of the run. Throws ConfigError.
 RunOutputs outputs_of(const RunSettings& settings) {
   const DynaInsRemover::Config& config = settings.config;
@@ -101,6 +112,9 @@ RunOutputs outputs_of(const RunSettings& settings) {
   outputs.write_beliefs = settings.view || settings.write_beliefs;
   outputs.map_on_disk = settings.map_memory.has_value();
   add_map_attributes(settings, config, outputs);
+  check_passes(settings);
+  // The second pass reads the beliefs of the first one.
+  if (settings.passes > 1 && outputs.needs_beliefs()) outputs.write_beliefs = true;
   return outputs;
 }
 
@@ -235,6 +249,7 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
     request["session"] = session.info.name;
     if (session.T_city_start) request["align_start"] = extrinsic_text(*session.T_city_start);
   }
+  if (settings.passes > 1) request["passes"] = settings.passes;
   OutputListing listing = outputs.listing(sequence, range, true);
   InputFiles inputs = inputs_of(settings, sequence);
   return {config,
@@ -246,7 +261,8 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
           std::move(inputs),
           configuration,
           std::move(request),
-          std::move(session)};
+          std::move(session),
+          settings.passes};
 }
 
 RunTask choose_task(const RunPlan& plan, const RunSettings& settings, const OutputFolder& out) {

@@ -31,6 +31,7 @@ struct RunPlan {
   nlohmann::ordered_json configuration;  ///< parameter name -> value
   nlohmann::ordered_json request;        ///< see describe_request()
   SessionRequest session;
+  int passes = 1;  ///< over the recording
 };
 
 /// Path of the file that a flag --map names, links followed. `out`: folder of the results, by

@@ -4,8 +4,12 @@
 #include <utility>
 
 #include "dynains/io/coordinate_system.hpp"
+#include "dynains/pose.hpp"
 #include "moving_points.hpp"
 #include "output_folder.hpp"
+#include "points_of.hpp"
+#include "read_ahead.hpp"
+#include "second_pass.hpp"
 #include "viewer/tileset_writer.hpp"
 
 namespace dynains::program {
@@ -180,6 +184,54 @@ void RunResults::finish() { writing_.wait(); }
 void RunResults::write_final(const RecordedScan& scan, const ScanVerdict& verdict) {
   final_labels_.take(verdict);
   final_labels_.write(recording_.name(range_.first + verdict.scan));
+  if (second_pass_ != nullptr) {
+    second_pass_->add(scan, verdict);
+  } else {
+    complete_scan(scan, verdict);
+  }
+}
+
+void RunResults::revise(const AddToMap& add_to_map) {
+  if (finished_ == 0) return;
+  ReadAhead reader(recording_, range_.first, range_.first + finished_ - 1, thread());
+  RecordedScan scan;
+  VerdictArrays arrays;
+  PointBuffer points;
+  std::vector<std::uint8_t> keep;
+  for (std::size_t i = 0; i < finished_; ++i) {
+    const std::string& name = recording_.name(range_.first + i);
+    scan = reader.next(std::move(scan));
+    final_labels_.read(name, scan, arrays);
+    ScanVerdict verdict;
+    verdict.scan = i;
+    verdict.time = recording_.time(range_.first + i);
+    verdict.T_world_sensor = orthonormalized(recording_.T_world_sensor(range_.first + i));
+    const bool is_revised =
+        second_pass_->revise(scan, static_cast<std::uint32_t>(i), verdict.T_world_sensor, arrays);
+    verdict.labels = arrays.labels;
+    verdict.causes = arrays.causes;
+    verdict.instances = arrays.instances;
+    verdict.beliefs = arrays.beliefs;
+    if (is_revised) {
+      final_labels_.take(verdict);
+      final_labels_.write(name);
+    }
+    complete_scan(scan, verdict);
+    if (!map_) continue;
+    copy_points(scan, points);
+    keep.resize(points.size());
+    std::transform(arrays.labels.begin(), arrays.labels.end(), keep.begin(), [](PointLabel label) {
+      return static_cast<std::uint8_t>(is_static(label) ? 1 : 0);
+    });
+    add_to_map(points, keep, verdict.T_world_sensor);
+  }
+}
+
+bool RunResults::is_complete() const {
+  return finished_ == range_.size() && (second_pass_ == nullptr || second_pass_->is_decided());
+}
+
+void RunResults::complete_scan(const RecordedScan& scan, const ScanVerdict& verdict) {
   points_ += verdict.labels.size();
   labels_.add(verdict.labels);
   add_scan(scan, verdict);

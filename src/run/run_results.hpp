@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <future>
 #include <memory>
 #include <optional>
@@ -28,6 +29,8 @@
 #include "verdict_log.hpp"
 
 namespace dynains::program {
+
+class SecondPass;
 
 /// In the folder of results, while a run with --map-memory lasts.
 inline constexpr const char* kTileFolder = "map_tiles";
@@ -104,6 +107,16 @@ class RunResults {
   void finish();
   /// Final verdicts also go to `session`, which outlives this.
   void contribute_to(SessionContribution& session) { session_ = &session; }
+  /// Final verdicts are first ones, which `pass` takes; revise() completes the results. It outlives
+  /// this.
+  void wait_for(SecondPass& pass) { second_pass_ = &pass; }
+  SecondPass* second_pass() const { return second_pass_; }
+  /// Adds the points with `keep` to the map; m, sensor frame.
+  using AddToMap =
+      std::function<void(PointsView, Span<const std::uint8_t> keep, const Pose& T_world_sensor)>;
+  /// Reads all scans and first verdicts again, revises them by the second pass, and makes all other
+  /// results of them. Throws IoError.
+  void revise(const AddToMap& add_to_map);
   /// The thread that reads and writes, RunOutputs::thread.
   std::launch thread() const { return writing_.policy(); }
 
@@ -113,6 +126,8 @@ class RunResults {
   void commit_outside_map();
 
   std::size_t finished() const { return finished_; }
+  /// Whether all scans are finished.
+  bool is_complete() const;
   std::uint64_t points() const { return points_; }
   const LabelCounts& labels() const { return labels_; }
   std::optional<std::size_t> map_points() const;
@@ -133,6 +148,7 @@ class RunResults {
   bool map_is_outside_;
   bool needs_beliefs_;
   SessionContribution* session_ = nullptr;
+  SecondPass* second_pass_ = nullptr;
   std::size_t finished_ = 0;
   std::uint64_t points_ = 0;
   LabelCounts labels_;
@@ -140,6 +156,7 @@ class RunResults {
   Background writing_;
 
   void write_final(const RecordedScan& scan, const ScanVerdict& verdict);
+  void complete_scan(const RecordedScan& scan, const ScanVerdict& verdict);
   void add_scan(const RecordedScan& scan, const ScanVerdict& verdict);
 };
 

@@ -6,23 +6,10 @@
 #include "dynains/city/session_aligner.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/pose.hpp"
+#include "points_of.hpp"
 
 namespace dynains::program {
 namespace {
-
-void copy_points(const RecordedScan& scan, PointBuffer& points) {
-  const std::size_t size = scan.size();
-  points.resize(size);
-  const float* const from = scan.xyzi.data();
-  float* const x = points.x.data();
-  float* const y = points.y.data();
-  float* const z = points.z.data();
-  for (std::size_t i = 0; i < size; ++i) {
-    x[i] = from[4 * i];
-    y[i] = from[4 * i + 1];
-    z[i] = from[4 * i + 2];
-  }
-}
 
 /// Whether a session was aligned as the request asks for.
 bool has_alignment(const SessionRequest& request, const SessionInfo& session) {

@@ -1,0 +1,34 @@
+// Bytes that do not fit into the memory, in a file without a name.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "dynains/points.hpp"
+
+namespace dynains::program {
+
+/// A file that no folder lists: it ends with this object or with the process, however that ends.
+/// Errors throw IoError and name the folder.
+class ScratchFile {
+ public:
+  /// Makes the file on the file system of `folder`.
+  explicit ScratchFile(const std::filesystem::path& folder);
+  ~ScratchFile();
+  ScratchFile(const ScratchFile&) = delete;
+  ScratchFile& operator=(const ScratchFile&) = delete;
+
+  /// Adds bytes to the end. Returns their offset.
+  std::uint64_t append(Span<const std::uint8_t> bytes);
+  /// Reads `size` bytes at `offset` into `bytes`.
+  void read(std::uint64_t offset, std::size_t size, std::vector<std::uint8_t>& bytes) const;
+
+ private:
+  std::filesystem::path folder_;
+  int file_;
+  std::uint64_t size_ = 0;
+};
+
+}  // namespace dynains::program

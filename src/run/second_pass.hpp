@@ -1,0 +1,92 @@
+// Second pass of a run: all scans of the recording test what the first pass called static.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <vector>
+
+#include "dynains/city/recording_places.hpp"
+#include "dynains/city/session_references.hpp"
+#include "dynains/io/recording.hpp"
+#include "dynains/points.hpp"
+#include "dynains/pose.hpp"
+#include "dynains/verdict.hpp"
+#include "scratch_file.hpp"
+#include "verdict_arrays.hpp"
+
+namespace dynains::program {
+
+/// The first pass judges a scan by the scans around it. The second one tests the places of all
+/// static points by scans of the whole recording, and removes what came or went: see
+/// RecordingPlaces. An instance of the first pass leaves as a whole if enough of its places have
+/// changed. No point that moves by the first pass is kept by the second one.
+class SecondPass {
+ public:
+  /// Touching places that came or went, and the scans that tell of it, numbered from 0 on.
+  struct Object {
+    Eigen::Vector3d lowest = Eigen::Vector3d::Constant(1e9);    // m, world frame
+    Eigen::Vector3d highest = Eigen::Vector3d::Constant(-1e9);  // m
+    std::uint64_t points = 0;                                   // removed in its places
+    std::uint32_t first_measured = 0, last_measured = 0;
+    std::uint32_t first_passed = 0, last_passed = 0;
+  };
+
+  /// References of the scans wait in a file without a name in `folder`. Throws IoError.
+  explicit SecondPass(const std::filesystem::path& folder);
+
+  /// Takes the first verdict on a scan, in the order of the scans. Throws IoError.
+  void add(const RecordedScan& scan, const ScanVerdict& verdict);
+  /// Tests all places. Ends without a result if `keep_going()` returns false. Throws IoError.
+  void test(const std::function<bool()>& keep_going);
+  /// Revises the first verdict on scan `number`. Returns whether anything changed.
+  bool revise(const RecordedScan& scan, std::uint32_t number, const Pose& T_world_sensor,
+              VerdictArrays& verdict);
+
+  /// Whether test() came to its end.
+  bool is_decided() const { return is_decided_; }
+  std::size_t place_count() const { return places_.size(); }
+  /// Complete when all scans are revised, in their order.
+  const std::vector<Object>& objects() const { return objects_; }
+  /// Number of points that left by revise().
+  std::uint64_t removed() const { return removed_; }
+
+ private:
+  struct Reference {
+    std::uint32_t scan;
+    double time;  // s
+    Pose T_world_sensor;
+    std::uint64_t offset;  // in the file
+    std::size_t size;      // bytes
+  };
+  using Place = RecordingPlaces::Place;
+  /// Points of an instance of the first pass in one scan.
+  struct Instance {
+    std::uint32_t known = 0, changed = 0;          // in places of this state
+    std::uint32_t low_known = 0, low_changed = 0;  // of these in the lower half
+    Eigen::Vector3f lowest = Eigen::Vector3f::Constant(1e9F);
+    Eigen::Vector3f highest = Eigen::Vector3f::Constant(-1e9F);  // m, axes of the world
+
+    bool leaves() const;
+  };
+
+  void list_objects();
+  void find_instances(const Pose& T_world_sensor, const VerdictArrays& verdict);
+
+  RecordingPlaces places_;
+  SessionReferences references_;
+  std::vector<Reference> kept_;
+  ScratchFile file_;
+  std::vector<std::uint8_t> packed_;
+  PointBuffer points_;
+  std::vector<const Place*> place_of_;  // by point; null: none, or nothing is known of it
+  std::vector<Instance> instances_;     // by id
+  std::vector<Eigen::Vector3f> world_;  // m, from the sensor, axes of the world; by point
+  std::vector<Object> objects_;
+  bool is_decided_ = false;
+  std::uint64_t removed_ = 0;
+};
+
+}  // namespace dynains::program

@@ -1,0 +1,122 @@
+// `dynains run --passes 2` as a user starts it.
+#include <chrono>
+#include <csignal>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "dynains/io/kitti.hpp"
+#include "io/files.hpp"
+#include "program/start.hpp"
+#include "support/catch.hpp"
+
+using namespace dynains;
+using namespace dynains::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// Parked cars leave and come in this recording.
+struct CarPark {
+  CarPark() {
+    const Outcome outcome = start({"simulate", seq, "--scene", "car-park", "--sensor", "vlp16",
+                                   "--scans", "120", "--rate", "5", "--seed", "7"});
+    if (outcome.code != 0) throw std::runtime_error(outcome.err);
+  }
+  Outcome run(const std::string& out, std::vector<std::string> more) const {
+    more.insert(more.begin(), {"run", seq, "--out", folder / out});
+    return start(more);
+  }
+  fs::path path(const std::string& name) const { return folder / name; }
+  std::vector<std::uint32_t> labels(const std::string& out, const std::string& scan) const {
+    const fs::path file = path(out) / "labels" / (scan + ".label");
+    return read_labels(file, fs::file_size(file) / 4);
+  }
+
+  TemporaryFolder folder;
+  std::string seq = folder / "seq";
+};
+
+/// Names of the files of results that differ, but for times.
+std::vector<std::string> differing(const fs::path& a, const fs::path& b) {
+  std::vector<std::string> names;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(a)) {
+    const std::string name = fs::relative(entry.path(), a).string();
+    const bool has_times = name == "report.json" || name == "timing.csv";
+    if (entry.is_directory() || has_times) continue;
+    if (!fs::exists(b / name) || read_text(entry.path()) != read_text(b / name)) {
+      names.push_back(name);
+    }
+  }
+  return names;
+}
+
+}  // namespace
+
+TEST_CASE("the second pass removes more, and its results agree") {
+  const CarPark recording;
+  REQUIRE(recording.run("one", {}).code == 0);
+  REQUIRE(recording.run("two", {"--passes", "2"}).code == 0);
+  REQUIRE(recording.run("alone", {"--passes", "2", "--one-thread"}).code == 0);
+  CHECK(differing(recording.path("two"), recording.path("alone")).empty());
+  CHECK(differing(recording.path("alone"), recording.path("two")).empty());
+
+  std::size_t removed = 0, kept_again = 0, moving = 0;
+  for (const fs::directory_entry& entry :
+       fs::directory_iterator(recording.path("one") / "labels")) {
+    const std::string scan = entry.path().stem().string();
+    const auto before = recording.labels("one", scan), after = recording.labels("two", scan);
+    REQUIRE(before.size() == after.size());
+    for (std::size_t i = 0; i < after.size(); ++i) {
+      const bool did_move = (before[i] & 0xffffU) == 251, moves = (after[i] & 0xffffU) == 251;
+      removed += moves && !did_move ? 1 : 0;
+      kept_again += did_move && !moves ? 1 : 0;
+      moving += moves ? 1 : 0;
+    }
+  }
+  CHECK(removed > 0);
+  CHECK(kept_again == 0);
+
+  const auto report = nlohmann::json::parse(read_text(recording.path("two") / "report.json"));
+  CHECK(report["labels"]["dynamic"] == moving);
+  CHECK(report["second_pass"]["removed_points"] == removed);
+  CHECK(report["second_pass"]["objects"].size() > 0);
+  CHECK(report["complete"] == true);
+
+  // remap builds the map of the static labels.
+  REQUIRE(start({"remap", recording.seq, recording.path("two").string()}).code == 0);
+  CHECK(read_text(recording.path("two") / "static_map.ply") ==
+        read_text(recording.path("two") / "static_map_remapped.ply"));
+}
+
+TEST_CASE("a run of two passes that was killed is resumed to the same bytes") {
+  const CarPark recording;
+  REQUIRE(recording.run("whole", {"--passes", "2"}).code == 0);
+  Process process({"run", recording.seq, "--out", recording.folder / "out", "--passes", "2"});
+  const fs::path late = recording.path("out") / "labels" / "000060.label";
+  while (!fs::exists(late)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  ::kill(process.id(), SIGKILL);
+  process.wait();
+  const Outcome other = recording.run("out", {"--resume"});
+  CHECK(other.code == 1);
+  CHECK(other.err.find("passes") != std::string::npos);
+  CHECK(recording.run("out", {"--passes", "2", "--resume"}).code == 0);
+  CHECK(differing(recording.path("whole"), recording.path("out")).empty());
+  CHECK(differing(recording.path("out"), recording.path("whole")).empty());
+}
+
+TEST_CASE("passes are one or two, and revise_map is part of one") {
+  const TemporaryFolder folder;
+  for (const char* const passes : {"0", "3"}) {
+    CHECK(start({"run", folder / "seq", "--out", folder / "out", "--passes", passes}).code == 2);
+  }
+  const Outcome both = start(
+      {"run", folder / "seq", "--out", folder / "out", "--passes", "2", "--revise-map", "true"});
+  CHECK(both.code == 2);
+  CHECK(both.err.find("--passes 2") != std::string::npos);
+  CHECK(!fs::exists(folder / "out"));
+}

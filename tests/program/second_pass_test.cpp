@@ -1,0 +1,154 @@
+// The second pass of a run over first verdicts that keep everything.
+#include "run/second_pass.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "io/files.hpp"
+#include "support/box_street.hpp"
+#include "support/catch.hpp"
+
+using namespace dynains;
+using namespace dynains::program;
+using namespace dynains::test;
+
+namespace {
+
+constexpr std::uint32_t kHouse = 50, kTree = 70, kCar = 10;
+
+StreetBox car_at(double x) { return {{x, 4.0, 0.0}, {x + 4.0, 5.8, 1.5}, kCar}; }
+
+std::vector<StreetBox> street() {
+  return {{{-12, 8, 0}, {-6, 11, 4}, kHouse},
+          {{20, 7, 0}, {20.5, 7.5, 3}, kTree},
+          {{8, -7, 0}, {12, -5, 1.6}, kHouse}};
+}
+
+/// The scans of a drive to and fro, one each half a second.
+struct Recorded {
+  std::vector<BoxScan> scans;
+
+  void drive(const std::vector<StreetBox>& boxes, double from, double to) {
+    const double step = from < to ? 1.0 : -1.0;
+    for (double x = from; x != to; x += step) scans.push_back(scan_boxes(boxes, x, 0.0));
+  }
+};
+
+RecordedScan recorded(const BoxScan& scan) {
+  RecordedScan result;
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const float values[] = {scan.points.x[i], scan.points.y[i], scan.points.z[i], 0.5F};
+    result.xyzi.insert(result.xyzi.end(), values, values + 4);
+  }
+  return result;
+}
+
+/// Verdicts that call everything static; the boxes of one label are one instance.
+VerdictArrays first_verdict(const BoxScan& scan) {
+  VerdictArrays verdict;
+  verdict.labels = scan.verdicts;
+  for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+    const bool is_ground = scan.verdicts[i] == PointLabel::kGround;
+    verdict.causes.push_back(is_ground ? Cause::kGround : Cause::kOccupied);
+    verdict.instances.push_back(is_ground ? kNoInstance : scan.labels[i]);
+    verdict.beliefs.push_back(0.5F);
+  }
+  return verdict;
+}
+
+struct Counts {
+  std::size_t kept = 0, removed = 0;
+};
+
+/// Points of each scan with a label, after both passes.
+std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool tests = true) {
+  const TemporaryFolder folder;
+  SecondPass pass(folder.path());
+  for (std::size_t i = 0; i < recording.scans.size(); ++i) {
+    const VerdictArrays arrays = first_verdict(recording.scans[i]);
+    ScanVerdict verdict;
+    verdict.scan = i;
+    verdict.time = 0.5 * static_cast<double>(i);
+    verdict.T_world_sensor = recording.scans[i].T_world_sensor;
+    verdict.labels = arrays.labels;
+    pass.add(recorded(recording.scans[i]), verdict);
+  }
+  CHECK(count_entries(folder.path()) == 0);  // nothing is left when the process is killed
+  pass.test([tests] { return tests; });
+  CHECK(pass.is_decided() == tests);
+  std::vector<Counts> counts;
+  std::uint32_t number = 0;
+  std::size_t disagreeing = 0;  // labels, causes and beliefs
+  for (const BoxScan& scan : recording.scans) {
+    VerdictArrays arrays = first_verdict(scan);
+    const VerdictArrays before = arrays;
+    const bool has_changed = pass.revise(recorded(scan), number++, scan.T_world_sensor, arrays);
+    CHECK(has_changed == (arrays.labels != before.labels));
+    counts.emplace_back();
+    for (std::size_t i = 0; i < arrays.labels.size(); ++i) {
+      const bool is_removed = arrays.labels[i] == PointLabel::kDynamic;
+      const bool agrees =
+          is_removed == is_dynamic(arrays.causes[i]) && is_removed == arrays.beliefs[i] > 0.9F;
+      disagreeing += agrees ? 0 : 1;
+      if (scan.labels[i] != label) continue;
+      ++(is_removed ? counts.back().removed : counts.back().kept);
+    }
+  }
+  CHECK(disagreeing == 0);
+  return counts;
+}
+
+Counts sum(const std::vector<Counts>& counts) {
+  Counts all;
+  for (const Counts& of_scan : counts) {
+    all.kept += of_scan.kept;
+    all.removed += of_scan.removed;
+  }
+  return all;
+}
+
+/// A car that is parked during the first drive, and gone in the second one.
+Recorded with_parked_car() {
+  Recorded recording;
+  std::vector<StreetBox> boxes = street();
+  boxes.push_back(car_at(4.0));
+  recording.drive(boxes, -15.0, 15.0);
+  boxes.pop_back();
+  recording.drive(boxes, 15.0, -15.0);
+  return recording;
+}
+
+}  // namespace
+
+TEST_CASE("a car that leaves after a minute leaves all scans, and nothing else does") {
+  const Recorded recording = with_parked_car();
+  const std::vector<Counts> car = count(recording, kCar);
+  std::size_t seen = 0;
+  for (const Counts& of_scan : car) {
+    if (of_scan.kept + of_scan.removed == 0) continue;
+    ++seen;
+    CHECK(of_scan.removed >= 9 * of_scan.kept);
+  }
+  CHECK(seen > 20);
+  CHECK(sum(count(recording, kHouse)).removed == 0);
+  CHECK(sum(count(recording, kTree)).removed == 0);
+}
+
+TEST_CASE("a car that stays, and a street where nothing moves, lose nothing") {
+  Recorded recording;
+  std::vector<StreetBox> boxes = street();
+  boxes.push_back(car_at(4.0));
+  recording.drive(boxes, -15.0, 15.0);
+  recording.drive(boxes, 15.0, -15.0);
+  for (const std::uint32_t label : {kCar, kHouse, kTree}) {
+    const Counts all = sum(count(recording, label));
+    CHECK(all.kept > 0);
+    CHECK(all.removed == 0);
+  }
+}
+
+TEST_CASE("a second pass that was interrupted changes nothing") {
+  CHECK(sum(count(with_parked_car(), kCar, false)).removed == 0);
+}
