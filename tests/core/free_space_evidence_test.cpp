@@ -246,6 +246,7 @@ TEST_CASE("the part of a removed instance that was not seen free still contests 
   config.lookback_scans = 2;
   config.lookahead_scans = 0;
   config.dynamic_grid_ratio = 1.0;
+  config.track_ratio = 0.0;
   const PointBuffer hedge = panel(10.0F, -3.0F, 1.4F, -1.5F, 0.5F);
   const PointBuffer passing = panel(10.0F, 1.4F, 3.0F, -1.5F, 0.5F);
   Watch watch(config);
@@ -254,6 +255,18 @@ TEST_CASE("the part of a removed instance that was not seen free still contests 
   CHECK(watch.causes(6) == Causes{Cause::kFreeSpace, Cause::kWithInstance});
   watch.see(hedge).see(hedge);
   CHECK(watch.causes(8) == Causes{Cause::kOccupied});
+}
+
+TEST_CASE("a hedge that stands in the scans beside stays when an object was merged with it") {
+  FreeSpaceConfig config = every_scan_a_reference();
+  config.lookahead_scans = 0;
+  config.dynamic_grid_ratio = 1.0;
+  const PointBuffer hedge = panel(10.0F, -3.0F, 1.4F, -1.5F, 0.5F);
+  const PointBuffer passing = panel(10.0F, 1.4F, 3.0F, -1.5F, 0.5F);
+  Watch watch(config);
+  for (int i = 0; i < 6; ++i) watch.see(hedge);
+  watch.see(both(hedge, passing));
+  CHECK(watch.causes(6) == Causes{Cause::kFreeSpace, Cause::kOccupied});
 }
 
 TEST_CASE("returns of a static object contest, even if it was presumed to move") {

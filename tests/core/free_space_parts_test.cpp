@@ -430,6 +430,30 @@ TEST_CASE("belief along a track fades by 0.95 a scan, and old hits contradict it
   CHECK(before.instances[0].future.log_odds == 0.0F);
 }
 
+TEST_CASE("samples along a track are summed on both sides, and fade by 0.95 a scan") {
+  const TrackBelief belief(1.0F);
+  using Instance = TrackedInstances::Instance;
+  std::vector<TrackedInstances> scans(3);
+  for (TrackedInstances& scan : scans) scan.instances.resize(1);
+  scans[0].instances[0].seen = {0.0F, 40.0F};
+  scans[1].instances[0].seen = {10.0F, 40.0F};
+  scans[2].instances[0].seen = {2.0F, 40.0F};
+  scans[1].instances[0].past.instance = 0;
+  scans[1].instances[0].future.instance = 0;
+  belief.propagate(&Instance::past, nullptr, scans[0]);
+  belief.propagate(&Instance::past, &scans[0], scans[1]);
+  belief.propagate(&Instance::future, nullptr, scans[2]);
+  belief.propagate(&Instance::future, &scans[2], scans[1]);
+  const Instance& middle = scans[1].instances[0];
+  CHECK(middle.past.seen.moved == Approx(10.0F));
+  CHECK(middle.past.seen.decided == Approx(40.0F + 0.95F * 40.0F));
+  CHECK(middle.future.seen.moved == Approx(10.0F + 0.95F * 2.0F));
+  // 11.9 of 116 samples; those of the scan itself count once.
+  CHECK(middle.moved(0.1025F));
+  CHECK_FALSE(middle.moved(0.1027F));
+  CHECK(TrackedInstances::Instance().moved(0.15F));  // nothing is decided
+}
+
 TEST_CASE("the beam spacing of a sensor is measured from one scan") {
   // 40 beams 0.5 deg apart, a point every 0.3 deg, at 20 m.
   PointBuffer points;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/evidence/instance_judge.hpp"
 #include "dynains/evidence/reference_scans.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
@@ -397,6 +398,34 @@ TEST_CASE("an instance that was hit is removed only if nearly all of it is free 
   CHECK(gone.beliefs.wholes[0].peak == Approx(2.0F * kFreeStep));
   CHECK(gone.beliefs.counts[0].moved == 0);
   CHECK(gone.removes());  // 1.69 is above tau_whole, though below the 2.20 of tau_contested
+}
+
+// Ten supervoxels, of which some are seen free twice and all others are hit.
+Cause cause_with_track(std::size_t free, float moved_on_track, bool use_tracks = true) {
+  FreeSpaceConfig config;
+  config.use_tracks = use_tracks;
+  Scan scan(Instances{std::vector<std::uint32_t>(10, 4)});
+  std::vector<Scan::Seen> seen(10, {0, 4});
+  std::fill_n(seen.begin(), free, Scan::Seen{4, 0});
+  for (int i = 0; i < 2; ++i) scan.see(seen);
+  InstanceEvidence evidence;
+  evidence.samples = scan.samples;
+  evidence.beliefs = scan.beliefs;
+  evidence.tracked.instances.resize(1);
+  evidence.tracked.shapes.resize(1);
+  evidence.tracked.shapes[0].carried = true;
+  evidence.tracked.instances[0].past.seen = {moved_on_track, 100.0F};
+  InstanceJudge judge(config);
+  std::vector<InstanceJudge::Verdict> verdicts;
+  judge.judge(evidence, scan.updater, false, verdicts, [](std::size_t) {});
+  return verdicts.back().cause;
+}
+
+TEST_CASE("few free samples remove an instance only if enough samples along its track moved") {
+  CHECK(cause_with_track(4, 10.1F) == Cause::kWithInstance);  // 0.1 of those of the track
+  CHECK(cause_with_track(4, 9.9F) == Cause::kOccupied);
+  CHECK(cause_with_track(5, 0.0F) == Cause::kWithInstance);  // half of its own are free
+  CHECK(cause_with_track(4, 0.0F, false) == Cause::kWithInstance);
 }
 
 TEST_CASE("the caller gets the instances whose beliefs changed") {

@@ -33,6 +33,7 @@ struct FreeSpaceConfig {
   bool use_tracks = true;
   double tau_track = 0.87;  ///< form of Eq. 19
   double still_weight = 0.1;
+  double track_ratio = 0.1;
   double track_cell = 1.2;  ///< m
   double track_overlap = 0.25;
   double track_length = 18.0;      ///< m
@@ -131,6 +132,9 @@ struct FreeSpaceConfig {
     visitor(Parameter{"still_weight", self.still_weight, closed(0, 10), "",
                       "decrease of the belief along a track by a scan in which the instance stood "
                       "still, in increments of p_free"});
+    visitor(Parameter{"track_ratio", self.track_ratio, closed(0, 1), "",
+                      "ratio of free to decided samples along its track from which an instance is "
+                      "removed whole although less than half of its own are free"});
     visitor(Parameter{"track_cell", self.track_cell, closed(0.2, 5), "m",
                       "cells whose overlap links instances of consecutive scans"});
     visitor(Parameter{"track_overlap", self.track_overlap, half_open_below(0, 1), "",

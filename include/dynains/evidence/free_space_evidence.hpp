@@ -280,7 +280,10 @@ class FreeSpaceEvidence {
     for (std::size_t instance = 0; instance < changed.size(); ++instance) {
       if (changed[instance] == 0) continue;
       changed[instance] = 0;
-      evidence.tracked.instances[instance].own = judge_.own_log_odds(evidence, updater_, instance);
+      Instance& tracked = evidence.tracked.instances[instance];
+      const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
+      tracked.own = judge_.own_log_odds(evidence, updater_, instance);
+      tracked.seen = {static_cast<float>(counts.moved), static_cast<float>(counts.decided)};
     }
   }
 

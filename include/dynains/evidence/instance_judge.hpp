@@ -94,6 +94,7 @@ class InstanceJudge {
       : use_tracks_(config.use_tracks),
         presume_dynamic_(config.presume_dynamic),
         still_weight_(static_cast<float>(config.still_weight)),
+        track_ratio_(static_cast<float>(config.track_ratio)),
         track_level_(static_cast<float>(log_odds(config.tau_track))) {}
 
   /// Log-odds that an instance moved, by the free-space evidence on its own scan without its track:
@@ -185,7 +186,7 @@ class InstanceJudge {
   // the track of the instance if these are larger.
   Cause cause_of_whole(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
                        bool may_presume, std::size_t instance, float& level) const {
-    if (removes_whole(evidence, updater, instance)) {
+    if (removes_whole(evidence, updater, instance) && track_agrees(evidence, instance)) {
       return Cause::kWithInstance;
     }
     if (!use_tracks_ || !evidence.tracked.shapes[instance].carried) return Cause::kNoEvidence;
@@ -193,6 +194,14 @@ class InstanceJudge {
     level = std::max(level, along_track);
     if (along_track >= track_level_) return Cause::kAlongTrack;
     return may_presume && is_presumed(evidence, instance) ? Cause::kPresumed : Cause::kNoEvidence;
+  }
+
+  // Whether half of the decided samples of an instance moved, or enough of those of its track: few
+  // free samples in one scan weigh little where the track stands still.
+  bool track_agrees(const InstanceEvidence& evidence, std::size_t instance) const {
+    const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
+    return !use_tracks_ || (2 * counts.moved >= counts.decided && counts.moved > 0) ||
+           evidence.tracked.instances[instance].moved(track_ratio_);
   }
 
   // Whether a provisional verdict removes a compact instance without evidence: it may be a moving
@@ -217,6 +226,7 @@ class InstanceJudge {
   bool use_tracks_;
   bool presume_dynamic_;
   float still_weight_;
+  float track_ratio_;
   float track_level_;
   SupervoxelGroups groups_;
   std::vector<std::uint32_t> free_;  // free supervoxels of the current instance

@@ -18,21 +18,34 @@ namespace dynains {
 
 /// The instances of one scan, with links to the instances of the adjacent scans.
 struct TrackedInstances {
+  /// Sums of samples of the instances of a track; those of other scans count less.
+  struct Seen {
+    float moved = 0.0F;    ///< in free supervoxels
+    float decided = 0.0F;  ///< in free or occupied supervoxels
+  };
   /// The part of a track in the past, or in the future, of a scan.
   struct Side {
     std::uint32_t instance = kNoCluster;  ///< linked instance of the adjacent scan, or kNoCluster
     float log_odds = 0.0F;                ///< of motion, by this scan and the scans on this side
+    Seen seen;                            ///< in this scan and the scans on this side
     int scans_since_motion = 0;           ///< scans to the nearest scan with positive own log-odds
     std::int16_t farthest_hit = 0;        ///< scans to the farthest reference that hit it; 0: none
   };
   struct Instance {
     float own = 0.0F;  ///< log-odds of motion, by the evidence on this scan alone
+    Seen seen;         ///< in this scan alone
     Side past;
     Side future;
 
     /// Log-odds of motion, by the whole track. The own log-odds count once.
     float track_log_odds() const {
       return own + std::max(0.0F, past.log_odds - own) + std::max(0.0F, future.log_odds - own);
+    }
+    /// Whether at least `ratio` of the decided samples of the whole track moved, or none is
+    /// decided.
+    bool moved(float ratio) const {
+      const float decided = past.seen.decided + future.seen.decided - seen.decided;
+      return past.seen.moved + future.seen.moved - seen.moved >= ratio * decided;
     }
   };
   std::vector<Instance> instances;
@@ -192,22 +205,26 @@ class TrackBelief {
     for (Instance& instance : now.instances) {
       Side& own_side = instance.*side;
       float inherited = 0.0F;
+      own_side.seen = instance.seen;
       own_side.scans_since_motion = 0;
       if (adjacent != nullptr && own_side.instance != kNoCluster) {
         const Side& parent = adjacent->instances[own_side.instance].*side;
         inherited = inherit(parent, instance.own, own_side);
+        own_side.seen.moved += kFade * parent.seen.moved;
+        own_side.seen.decided += kFade * parent.seen.decided;
       }
       own_side.log_odds = std::clamp(inherited + instance.own, floor_, ceiling_);
     }
   }
 
  private:
+  static constexpr float kFade = 0.95F;  // factor per scan
+
   // Log-odds that an instance inherits from its linked instance, `parent`. Hits from references
   // long before (or after) the motion of the track contradict this motion, and then the instance
   // inherits nothing, unless its own log-odds are positive.
   static float inherit(const Side& parent, float own, Side& side) {
-    constexpr float kFade = 0.95F;  // factor per scan
-    constexpr int kSlack = 8;       // scans
+    constexpr int kSlack = 8;  // scans
     const int since = parent.scans_since_motion + 1;
     side.scans_since_motion = own > 0.0F ? 0 : since;
     const bool contradicted = own <= 0.0F && side.farthest_hit > since + kSlack;
