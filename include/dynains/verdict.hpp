@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "dynains/plausibility.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 
@@ -153,6 +154,8 @@ struct FrameResult {
   /// Set if the scan begins an epoch. After kJump and kMisfit, the pushed motion since the previous
   /// scan is wrong.
   std::optional<EpochReason> began_epoch;
+  /// Plausibility of the last scans, by free space; zero for decision = window, except `not_judged`.
+  Plausibility plausibility;
 };
 
 /// Verdict by free space on one scan. Each non-ground point belongs to a group with one verdict;

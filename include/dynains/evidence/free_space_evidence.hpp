@@ -25,6 +25,7 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
+#include "dynains/evidence/surface_counts.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains {
@@ -156,6 +157,21 @@ class FreeSpaceEvidence {
 
   /// Why the newest scan is not compared with earlier scans of its pushed epoch; empty if it is.
   const std::optional<EpochReason>& misfit() const { return pose_correction_.misfit(); }
+
+  /// What earlier scans say about the surfaces of the newest scan.
+  SurfaceCounts surfaces() const {
+    const Record& record = records_[newest_ % records_.size()];
+    SurfaceCounts counts;
+    for (std::size_t i = 0; i < record.ground.size(); ++i) {
+      counts.ground_hit += record.ground.hit[i];
+      counts.ground_free += record.ground.free[i];
+    }
+    for (const InstanceBeliefs::Counts& instance : record.evidence.beliefs.counts) {
+      counts.instances_decided += instance.decided;
+      counts.instances_free += instance.moved;
+    }
+    return counts;
+  }
 
   /// By instance of the newest scan: the linked instance of the scan before it, or kNoCluster.
   Span<const std::uint32_t> predecessors() const { return predecessors_; }

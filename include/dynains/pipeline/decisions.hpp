@@ -59,6 +59,9 @@ class ScanDecision {
   /// Why the newest scan is not compared with earlier scans, although its pose and time allow it.
   virtual std::optional<EpochReason> misfit() const { return std::nullopt; }
 
+  /// What earlier scans say about the surfaces of the newest scan.
+  virtual std::optional<SurfaceCounts> surfaces() const { return std::nullopt; }
+
   /// Updates the beliefs of map blocks by the newest scan and removes the blocks that are free.
   virtual void revise(Map& /*map*/, const ScanSlot& /*newest*/) {}
   /// Restores the state after construction. Buffers keep their capacity.
@@ -214,6 +217,7 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
 
   std::optional<PoseResidual> pose_residual() const override { return pose_residual_of(evidence_); }
   std::optional<EpochReason> misfit() const override { return misfit_of(evidence_); }
+  std::optional<SurfaceCounts> surfaces() const override { return surfaces_of(evidence_); }
   void revise(Map& map, const ScanSlot& newest) override {
     if constexpr (IsRevisable<Map, Evidence>::value) {
       if (!revision_.config().revise_map) return;

@@ -17,6 +17,7 @@
 #include "dynains/ground/ground_segmenter.hpp"
 #include "dynains/pipeline/decisions.hpp"
 #include "dynains/pipeline/ingest.hpp"
+#include "dynains/pipeline/plausibility_check.hpp"
 #include "dynains/pipeline/scan_rate.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
 #include "dynains/pipeline/scan_window.hpp"
@@ -167,6 +168,7 @@ class Pipeline {
   ScanVerdict finish_oldest(StageTimes& times);
   std::optional<PoseResidual> pose_residual();
   TimeDoubt time_doubt();
+  Plausibility plausibility(const ScanSlot& newest, const FrameResult& result);
 
   // Removes all scans. The map and the capacity of buffers stay.
   void forget_scans() {
@@ -174,6 +176,7 @@ class Pipeline {
     frame_.forget();
     scans_.clear();
     rate_ = {};
+    plausibility_ = {};
   }
 
   Config config_;
@@ -189,6 +192,7 @@ class Pipeline {
   Map map_;
   ScanRing scans_;
   ScanRate rate_;
+  PlausibilityCheck plausibility_;
 };
 
 template <class Stages>
@@ -210,12 +214,15 @@ FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Pose& T_world_s
   if (scans_.open() > latency()) finished = finish_oldest(times);  // Eq. 2, 1
   timed(times.revision, [&] { decision_->revise(map_, newest); });
   const bool is_final = finished && finished->scan == newest.scan;
-  return {is_final ? *finished : newest_verdict_.verdict(newest),
-          finished,
-          times,
-          pose_residual(),
-          time_doubt(),
-          newest.began_epoch ? newest.began_epoch : decision_->misfit()};
+  FrameResult result = {is_final ? *finished : newest_verdict_.verdict(newest),
+                        finished,
+                        times,
+                        pose_residual(),
+                        time_doubt(),
+                        newest.began_epoch ? newest.began_epoch : decision_->misfit(),
+                        Plausibility()};
+  result.plausibility = plausibility(newest, result);
+  return result;
 }
 
 template <class Stages>
@@ -320,6 +327,20 @@ TimeDoubt Pipeline<Stages>::time_doubt() {
   const ScanSlot& newest = scans_.newest();
   if (newest.scan == 0) return TimeDoubt::kNone;
   return rate_.add(newest.time - scans_[newest.scan - 1].time, config_.max_gap);
+}
+
+/// Adds the newest scan to the running window.
+template <class Stages>
+Plausibility Pipeline<Stages>::plausibility(const ScanSlot& newest, const FrameResult& result) {
+  PlausibilityCheck::Scan scan;
+  scan.scan = newest.scan;
+  scan.points = newest.input_labels.size();
+  scan.judged = newest.split.count;
+  scan.surfaces = decision_->surfaces().value_or(SurfaceCounts());
+  if (result.pose_residual) scan.residual = result.pose_residual->translation;
+  scan.is_misfit =
+      result.began_epoch == EpochReason::kJump || result.began_epoch == EpochReason::kMisfit;
+  return plausibility_.add(scan);
 }
 
 template <class Stages>

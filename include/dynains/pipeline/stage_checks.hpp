@@ -16,6 +16,7 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
+#include "dynains/evidence/surface_counts.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {
@@ -187,6 +188,18 @@ template <class Stage>
 std::optional<EpochReason> misfit_of(const Stage& stage) {
   if constexpr (Offers<HasMisfit, Stage>::value) {
     return stage.misfit();
+  } else {
+    return std::nullopt;
+  }
+}
+
+/// Result of the optional member `surfaces()` of a stage; empty without it.
+template <class Stage>
+using HasSurfaces = decltype(std::declval<const Stage&>().surfaces());
+template <class Stage>
+std::optional<SurfaceCounts> surfaces_of(const Stage& stage) {
+  if constexpr (Offers<HasSurfaces, Stage>::value) {
+    return stage.surfaces();
   } else {
     return std::nullopt;
   }

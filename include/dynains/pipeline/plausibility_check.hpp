@@ -1,0 +1,100 @@
+// Sums of the signs of plausibility over a running window of scans.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "dynains/evidence/surface_counts.hpp"
+#include "dynains/plausibility.hpp"
+#include "dynains/verdict.hpp"
+
+namespace dynains::detail {
+
+/// Finds windows of scans that no correct recording gives. docs/reliability.md has the distribution
+/// behind the bounds.
+class PlausibilityCheck {
+ public:
+  static constexpr float kMostUnjudged = 0.98F;
+  static constexpr float kMostGroundFree = 0.35F, kMostInstanceFree = 0.5F;  // each alone
+  static constexpr float kGroundFree = 0.12F, kInstanceFree = 0.2F;          // together
+  static constexpr float kMostMisfits = 0.35F;
+  static constexpr float kMostResidual = 0.05F;  // m
+
+  struct Scan {
+    std::uint64_t scan = 0;          ///< number of the push
+    std::size_t points = 0;          ///< pushed
+    std::size_t judged = 0;          ///< of them
+    SurfaceCounts surfaces;          ///< zero without comparisons
+    std::optional<double> residual;  ///< m
+    bool is_misfit = false;          ///< begins an epoch against the poses
+  };
+
+  /// Adds a scan; the result is that of the window which ends with it.
+  Plausibility add(const Scan& scan) {
+    scans_[count_++ % kWindow] = scan;
+    Plausibility result = summary();
+    result.suspicion = judge(result);
+    if (result.suspicion != last_.suspicion) {
+      const std::uint64_t back = std::min<std::uint64_t>(scan.scan, kWindow - 1);
+      result.since = result.suspicion == Suspicion::kNone ? 0 : scan.scan - back;
+    } else {
+      result.since = last_.since;
+    }
+    last_ = result;
+    return result;
+  }
+
+ private:
+  static constexpr double kMostCounted = 0.15;          // m, residual of one jump
+  static constexpr std::size_t kWindow = 10;            // scans
+  static constexpr std::uint64_t kFewestBeams = 300;    // for a share of the ground
+  static constexpr std::uint64_t kFewestSamples = 500;  // for a share of instances
+
+  static float ratio(std::uint64_t part, std::uint64_t whole, std::uint64_t fewest) {
+    return whole < fewest ? 0.0F : static_cast<float>(part) / static_cast<float>(whole);
+  }
+
+  Plausibility summary() const {
+    const std::size_t count = std::min(count_, kWindow);
+    SurfaceCounts sum;
+    std::uint64_t points = 0, judged = 0, misfits = 0, residuals = 0;
+    double residual = 0.0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Scan& scan = scans_[i];
+      sum += scan.surfaces;
+      points += scan.points;
+      judged += scan.judged;
+      misfits += scan.is_misfit ? 1 : 0;
+      residuals += scan.residual ? 1 : 0;
+      residual += std::min(scan.residual.value_or(0.0), kMostCounted);
+    }
+    Plausibility result;
+    result.not_judged = ratio(points - judged, points, 1);
+    result.ground_free = ratio(sum.ground_free, sum.ground_free + sum.ground_hit, kFewestBeams);
+    result.instance_free = ratio(sum.instances_free, sum.instances_decided, kFewestSamples);
+    result.misfits = ratio(misfits, count, kWindow);
+    if (2 * residuals >= kWindow) {
+      result.residual = static_cast<float>(residual / static_cast<double>(residuals));
+    }
+    return result;
+  }
+
+  Suspicion judge(const Plausibility& window) const {
+    if (count_ < kWindow) return Suspicion::kNone;
+    if (window.not_judged > kMostUnjudged) return Suspicion::kUnits;
+    if (window.misfits > kMostMisfits || window.residual > kMostResidual) return Suspicion::kPoses;
+    const bool is_free = window.ground_free > kMostGroundFree ||
+                         window.instance_free > kMostInstanceFree ||
+                         (window.ground_free > kGroundFree && window.instance_free > kInstanceFree);
+    return is_free ? Suspicion::kRays : Suspicion::kNone;
+  }
+
+  std::array<Scan, kWindow> scans_;
+  std::size_t count_ = 0;
+  Plausibility last_;
+};
+
+}  // namespace dynains::detail

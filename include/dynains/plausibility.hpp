@@ -1,0 +1,27 @@
+// Plausibility of scans and poses by running window: what no correct recording gives.
+#pragma once
+
+#include <cstdint>
+
+namespace dynains {
+
+/// What a running window of scans contradicts.
+enum class Suspicion : std::uint8_t {
+  kNone,
+  kUnits,  ///< nearly no point can be judged: units, frame or ranges of the points
+  kPoses,  ///< scans do not fit to each other under the poses
+  kRays,   ///< scans fit, but beams pass through what stands still: origin of rays, times of points
+};
+
+/// Shares over the last scans, [0, 1].
+struct Plausibility {
+  float not_judged = 0.0F;     ///< points that are invalid, too near or too far
+  float ground_free = 0.0F;    ///< beams through the ground, of those that reach or pass it
+  float instance_free = 0.0F;  ///< samples above the ground seen free, of those seen free or hit
+  float misfits = 0.0F;        ///< scans that begin an epoch because poses or surfaces do not fit
+  float residual = 0.0F;       ///< m, mean translation of PoseResidual, each at most 0.15 m
+  Suspicion suspicion = Suspicion::kNone;
+  std::uint64_t since = 0;  ///< number of the push at which the suspicious window began
+};
+
+}  // namespace dynains

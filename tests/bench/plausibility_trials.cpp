@@ -1,0 +1,250 @@
+// Trials of the plausibility check: random worlds times faults of poses and clouds, in process. A
+// fault counts as harmful if at least 5 % more of the static points within 50 m are called moving
+// than with right poses, or if nothing is judged.
+//   plausibility_trials [FROM [WORLDS [SCANS [right|all]]]]
+// Prints a row for each world and kind with the largest shares of any window, then the counts.
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <functional>
+#include <iomanip>
+#include <iostream>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "dynains/compiled_remover.hpp"
+#include "dynains/simulation/random_world.hpp"
+#include "dynains/simulation/simulator.hpp"
+
+using namespace dynains;
+
+namespace {
+
+using Scans = std::vector<simulation::SimulatedScan>;
+
+/// What a host pushes in the place of a scan.
+struct Pushed {
+  std::vector<float> xyzi;
+  Pose T_world_sensor;
+};
+
+using Fault = std::function<Pushed(const Scans&, std::size_t)>;
+
+struct Kind {
+  std::string name;
+  Fault fault;
+};
+
+Pose moved(double x, double y, double z) {
+  Pose T = Pose::Identity();
+  T.translation() = Eigen::Vector3d(x, y, z);
+  return T;
+}
+
+Pose turned(double degrees, const Eigen::Vector3d& axis = Eigen::Vector3d::UnitZ()) {
+  Pose T = Pose::Identity();
+  T.linear() = Eigen::AngleAxisd(degrees * M_PI / 180.0, axis).toRotationMatrix();
+  return T;
+}
+
+/// Poses that `change(scans, i)` gives.
+Fault posed(const std::function<Pose(const Scans&, std::size_t)>& change) {
+  return [change](const Scans& scans, std::size_t i) {
+    return Pushed{scans[i].xyzi, change(scans, i)};
+  };
+}
+
+Fault of_body(const Pose& T_sensor_body) {
+  return posed([T_sensor_body](const Scans& scans, std::size_t i) {
+    return Pose(scans[i].T_world_sensor * T_sensor_body);
+  });
+}
+
+Fault scaled_poses(double factor) {
+  return posed([factor](const Scans& scans, std::size_t i) {
+    Pose T = scans[i].T_world_sensor;
+    T.translation() *= factor;
+    return T;
+  });
+}
+
+Fault scaled_points(float factor) {
+  return [factor](const Scans& scans, std::size_t i) {
+    Pushed pushed{scans[i].xyzi, scans[i].T_world_sensor};
+    for (std::size_t k = 0; k < pushed.xyzi.size(); ++k) {
+      if (k % 4 != 3) pushed.xyzi[k] *= factor;
+    }
+    return pushed;
+  };
+}
+
+/// Clouds that were moved into a body in which the sensor lies at (x, y, z), with poses of the
+/// body.
+Fault in_body(float x, float y, float z) {
+  return [x, y, z](const Scans& scans, std::size_t i) {
+    Pushed pushed{scans[i].xyzi, scans[i].T_world_sensor * moved(-x, -y, -z)};
+    for (std::size_t k = 0; k + 3 < pushed.xyzi.size(); k += 4) {
+      pushed.xyzi[k] += x;
+      pushed.xyzi[k + 1] += y;
+      pushed.xyzi[k + 2] += z;
+    }
+    return pushed;
+  };
+}
+
+Pose noise(std::size_t i, double metres, double degrees) {
+  std::mt19937 random(static_cast<unsigned>(i));
+  std::normal_distribution<double> normal;
+  const Eigen::Vector3d t(metres * normal(random), metres * normal(random),
+                          metres * normal(random));
+  return moved(t.x(), t.y(), t.z()) * turned(degrees * normal(random));
+}
+
+std::vector<Kind> kinds() {
+  const auto jump = [](double metres, double degrees) {
+    return posed([=](const Scans& scans, std::size_t i) {
+      const std::size_t middle = scans.size() / 2;
+      const Pose& T = scans[middle].T_world_sensor;
+      const Pose change = T * moved(0, metres, 0) * turned(degrees) * T.inverse();
+      return i < middle ? scans[i].T_world_sensor : Pose(change * scans[i].T_world_sensor);
+    });
+  };
+  const auto right =
+      posed([](const Scans& scans, std::size_t i) { return scans[i].T_world_sensor; });
+  return {{"right", right},
+          {"clouds of a body", in_body(1.0F, 0.0F, 1.5F)},
+          {"jump of 3 m", jump(3, 2)},
+          {"points in mm", scaled_points(1000.0F)},
+          {"points in cm", scaled_points(100.0F)},
+          {"poses in mm", scaled_poses(1000.0)},
+          {"poses in km", scaled_poses(0.001)},
+          {"poses 10 % too long", scaled_poses(1.1)},
+          {"inverse", posed([](const Scans& scans, std::size_t i) {
+             return Pose((scans[0].T_world_sensor.inverse() * scans[i].T_world_sensor).inverse());
+           })},
+          {"yawed by 90 deg", of_body(turned(90))},
+          {"yawed by 180 deg", of_body(turned(180))},
+          {"upside down", of_body(turned(180, Eigen::Vector3d::UnitX()))},
+          {"late by two scans", posed([](const Scans& scans, std::size_t i) {
+             return scans[std::min(i + 2, scans.size() - 1)].T_world_sensor;
+           })},
+          {"noise of 20 cm and 1 deg", posed([](const Scans& scans, std::size_t i) {
+             return Pose(scans[i].T_world_sensor * noise(i, 0.2, 1.0));
+           })},
+          {"no motion",
+           posed([](const Scans& scans, std::size_t) { return scans[0].T_world_sensor; })}};
+}
+
+struct Outcome {
+  double lost = 0.0;  // share of the static points
+  Plausibility worst;
+  Suspicion first = Suspicion::kNone;
+  std::uint64_t since = 0;
+};
+
+void raise(const Plausibility& window, Plausibility& worst) {
+  worst.not_judged = std::max(worst.not_judged, window.not_judged);
+  worst.ground_free = std::max(worst.ground_free, window.ground_free);
+  worst.instance_free = std::max(worst.instance_free, window.instance_free);
+  worst.misfits = std::max(worst.misfits, window.misfits);
+  worst.residual = std::max(worst.residual, window.residual);
+}
+
+Outcome judge(const Scans& scans, const Fault& fault) {
+  constexpr float kFarthest = 50.0F;  // m
+  Outcome outcome;
+  std::uint64_t fixed = 0, lost = 0;
+  const auto count = [&](const ScanVerdict& verdict) {
+    const simulation::SimulatedScan& scan = scans[verdict.scan];
+    for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
+      const std::uint32_t label = scan.labels[i] & 0xFFFFU;
+      const bool is_fixed = label > 1 && label < 252;
+      if (!is_fixed || std::hypot(scan.xyzi[4 * i], scan.xyzi[4 * i + 1]) > kFarthest) continue;
+      ++fixed;
+      lost += verdict.labels[i] == PointLabel::kDynamic ? 1 : 0;
+    }
+  };
+  DynaInsRemover remover;
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    const Pushed pushed = fault(scans, i);
+    const RawPoints<float> points{pushed.xyzi.data(), scans[i].labels.size(), 4};
+    const FrameResult frame = remover.push(points, pushed.T_world_sensor, scans[i].time);
+    raise(frame.plausibility, outcome.worst);
+    if (outcome.first == Suspicion::kNone && frame.plausibility.suspicion != Suspicion::kNone) {
+      outcome.first = frame.plausibility.suspicion;
+      outcome.since = frame.plausibility.since;
+    }
+    if (frame.finished) count(*frame.finished);
+  }
+  remover.flush(count);
+  outcome.lost = fixed == 0 ? 0.0 : static_cast<double>(lost) / static_cast<double>(fixed);
+  return outcome;
+}
+
+struct Counts {
+  int trials = 0, harmful = 0, told = 0, alarms = 0;
+};
+
+void take(const std::string& world, const std::string& kind, const Outcome& outcome, double usual,
+          std::map<std::string, Counts>& counts) {
+  constexpr double kHarm = 0.05;
+  const bool is_told = outcome.first != Suspicion::kNone;
+  const bool is_harmful = outcome.lost > usual + kHarm || outcome.worst.not_judged > 0.98F;
+  Counts& sum = counts[kind];
+  ++sum.trials;
+  sum.alarms += is_told ? 1 : 0;
+  sum.harmful += is_harmful ? 1 : 0;
+  sum.told += is_harmful && is_told ? 1 : 0;
+  const Plausibility& worst = outcome.worst;
+  std::cout << std::fixed << std::setprecision(3) << world << ' ' << std::left << std::setw(26)
+            << kind << " lost " << outcome.lost << " ground " << worst.ground_free << " instances "
+            << worst.instance_free << " residual " << worst.residual << " misfits " << worst.misfits
+            << " unjudged " << worst.not_judged << " told " << static_cast<int>(outcome.first)
+            << " since " << outcome.since << std::endl;
+}
+
+Scans scans_of(const simulation::Config& config) {
+  simulation::Simulator simulator(config);
+  Scans scans;
+  for (std::size_t i = 0; i < simulator.size(); ++i) scans.push_back(simulator.scan(i));
+  return scans;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto number = [&](int k, std::uint64_t usual) {
+    return argc > k ? std::strtoull(argv[k], nullptr, 10) : usual;
+  };
+  const std::uint64_t from = number(1, 1), worlds = number(2, 10);
+  const bool only_right = argc > 4 && std::string(argv[4]) == "right";
+  std::map<std::string, Counts> counts;
+  for (std::uint64_t seed = from; seed < from + worlds; ++seed) {
+    simulation::Config config = simulation::random_world(seed);
+    config.scans = static_cast<int>(number(3, 40));
+    const std::string world = std::to_string(seed) + ' ' +
+                              simulation::scene_names()[static_cast<std::size_t>(config.scene)] +
+                              ' ' +
+                              simulation::sensor_names()[static_cast<std::size_t>(config.sensor)];
+    const Scans scans = scans_of(config);
+    double usual = 0.0;
+    for (const Kind& kind : kinds()) {
+      const Outcome outcome = judge(scans, kind.fault);
+      if (kind.name == "right") usual = outcome.lost;
+      take(world, kind.name, outcome, usual, counts);
+      if (only_right) break;
+    }
+    if (only_right) continue;
+    config.rolling_shutter = true;
+    config.deskewed = 0.0;
+    take(world, "not de-skewed", judge(scans_of(config), kinds().front().fault), usual, counts);
+  }
+  std::cout << "| kind | trials | harmful | of them told | alarms |\n|---|---|---|---|---|\n";
+  for (const auto& [kind, sum] : counts) {
+    std::cout << "| " << kind << " | " << sum.trials << " | " << sum.harmful << " | " << sum.told
+              << " | " << sum.alarms << " |\n";
+  }
+}
