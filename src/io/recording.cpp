@@ -114,6 +114,7 @@ void Recording::open_log() {
   early_end_ = log->log().early_end();
   if (log->log().missing_parts()) warnings_.push_back(*log->log().missing_parts());
   notes_ = log->notes();
+  warnings_.insert(warnings_.end(), log->warnings().begin(), log->warnings().end());
   numbered_ = true;
   for (std::size_t i = 0; i < log->size(); ++i) {
     std::ostringstream name;

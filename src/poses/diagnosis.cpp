@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "agreement_sum.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 #include "io/finite_points.hpp"
 #include "io/median.hpp"
@@ -67,26 +68,6 @@ std::vector<Pair> take_pairs(std::size_t first, std::size_t last, std::size_t st
   }
   return pairs;
 }
-
-/// Mean of agreements, weighted by their points.
-class AgreementSum {
- public:
-  void add(const Agreement& one) {
-    share_ += one.share * static_cast<double>(one.points);
-    gap_ += one.gap * static_cast<double>(one.points);
-    points_ += one.points;
-  }
-  Agreement mean() const {
-    if (points_ == 0) return {};
-    const auto count = static_cast<double>(points_);
-    return {share_ / count, gap_ / count, points_};
-  }
-
- private:
-  double share_ = 0.0;
-  double gap_ = 0.0;
-  std::size_t points_ = 0;
-};
 
 Agreement agreement_under(const PoseConvention& convention, const Recording& recording,
                           const std::vector<Pair>& pairs) {
@@ -485,6 +466,7 @@ PoseAgreement agreement_at(const Recording& recording, std::size_t first, std::s
 Diagnosis diagnose(const Recording& recording) {
   Diagnosis d = diagnose_agreement(recording);
   compare_with_registration(recording, d);
+  accept_proven_poses(recording, d);
   if (d.sound() && d.scans > 0) d.ray_origin = find_ray_origin(recording, 0, d.scans - 1);
   if (d.ray_origin) {
     d.verdict = PoseVerdict::kRayOrigin;

@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "dynains/io/extrinsic.hpp"
+#include "merged_scans.hpp"
 #include "pose_fit.hpp"
+#include "pose_proof.hpp"
 
 namespace dynains {
 namespace {
@@ -309,6 +311,44 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
       d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion;
   if (may_be_inexact && (is_inexact(steps, steps) || d.is_inexact_at_start))
     d.verdict = PoseVerdict::kInexact;
+}
+
+void accept_proven_poses(const Recording& recording, Diagnosis& d) {
+  constexpr std::size_t kPlaces = 5;
+  const bool is_doubted = d.verdict != PoseVerdict::kAgree && d.verdict != PoseVerdict::kNoMotion &&
+                          d.verdict != PoseVerdict::kUnknown;
+  if (!is_doubted || recording.frame() != PointFrame::kSensor || scans_to_merge(recording) == 1) {
+    return;
+  }
+  const GivenMotions motions = register_given(recording, 0, recording.size() - 1, kPlaces);
+  if (motions.certain.size() < kFewestMotions || 2 * motions.certain.size() < motions.tested)
+    return;
+  const BodyMotion given = motion_under(recording, recording.convention());
+  const auto identity = Pose::Identity();
+  const MotionError all = motion_error(motions.certain, given, identity);
+  const MotionError steps = motion_error(motions.certain, given, identity, Motions::kSteps);
+  if (!(all.at_points < std::max(kExact, 2.0 * all.noise)) || is_inexact(steps, steps)) return;
+  if (!agrees_best(recording, d.readings, d.mounting)) return;
+  d.verdict = PoseVerdict::kAgree;
+  d.convention = recording.convention();
+  d.time_offset = recording.time_offset();
+  d.option.clear();
+  d.translation_error = steps.translation;
+  d.rotation_error = steps.rotation;
+  d.registered_pairs = steps.pairs;
+  d.is_inexact_at_start = false;
+}
+
+bool confirms_poses(const Recording& recording, std::size_t first, std::size_t last) {
+  constexpr std::size_t kEnough = 3;
+  constexpr double kNear = 0.04;   // m at points 10 m away, over some scans
+  constexpr double kNoisy = 0.05;  // m, likewise
+  const GivenMotions motions = register_given(recording, first, last, 1);
+  const BodyMotion given = motion_under(recording, recording.convention());
+  return motions.certain.size() >= kEnough &&
+         std::all_of(motions.certain.begin(), motions.certain.end(), [&](const auto& motion) {
+           return motion.difference.norm() < kNoisy && error_at_points({motion}, given) < kNear;
+         });
 }
 
 }  // namespace dynains

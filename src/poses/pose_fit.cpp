@@ -316,6 +316,23 @@ std::vector<RegisteredMotion> register_motions(const Recording& recording) {
   return motions;
 }
 
+std::optional<RegisteredMotion> register_from(PointsView a, PointsView b, const Pose& given,
+                                              std::size_t first, std::size_t second) {
+  constexpr double kUncertain = 0.05;  // m
+  constexpr double kDistinct = 0.5;    // m
+  std::vector<Pose> guesses = {given};
+  // In traffic of the own speed, no motion may fit as well.
+  if (given.translation().norm() > kDistinct) guesses.push_back(Pose::Identity());
+  const RegistrationScan scan_a(a);
+  const RegistrationScan scan_b(b);
+  const auto forth = register_scans(scan_a, scan_b, guesses);
+  if (!forth) return std::nullopt;
+  const auto found =
+      checked(forth, register_scans(scan_b, scan_a, {forth->T_a_b.inverse()}), kUncertain, 0.0);
+  if (!found) return std::nullopt;
+  return RegisteredMotion{first, first, second, found->T_a_b, found->difference, 0.0};
+}
+
 namespace {
 
 /// Weights of the axes of residuals, at most 1, from the differences of both registrations.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dynains/io/recording.hpp"
+#include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 
 namespace dynains {
@@ -31,6 +32,11 @@ inline constexpr std::size_t kStartScans = 6;
 /// given poses are one of several first guesses. Pairs that determine no motion are left out.
 /// Throws IoError.
 std::vector<RegisteredMotion> register_motions(const Recording& recording);
+
+/// The motion at which a registration of two scans ends that begins at `given`; empty if it is not
+/// certain. `a`, `b`: finite points, m, of the scans `first` and `second`.
+std::optional<RegisteredMotion> register_from(PointsView a, PointsView b, const Pose& given,
+                                              std::size_t first, std::size_t second);
 
 /// Motion of the body between two scans under some reading of the poses; empty without poses.
 using BodyMotion = std::function<std::optional<Pose>(const RegisteredMotion&)>;

@@ -255,9 +255,9 @@ BeamFinding origin_of_beams(const std::vector<PointBuffer>& scans, Eigen::Vector
 /// By points that are hidden by nearer ones. Seen from above, few are, so that this shows x and y
 /// only.
 std::optional<RayOrigin> origin_of_shadows(HiddenPoints& hidden, double as_given) {
-  constexpr double kFewer = 0.7;
+  constexpr double kFewer = 0.6;
   constexpr double kLeastHidden = 0.01;
-  constexpr double kTooMany = 0.13;  // more than in any scan of one sensor that was measured
+  constexpr double kTooMany = 0.18;  // scans of one sensor had up to 0.14
   const Candidate found = climbed(hidden, {}, {1.0, 0.5, 0.25, 0.1}, 2,
                                   [](double value, double best) { return value < 0.99 * best; });
   const bool is_there = found.position.norm() > kLeastOffset &&

@@ -12,10 +12,13 @@
 namespace dynains::program {
 
 /// A remark for the user if most of the scans `first` to `last` (inclusive) begin a new window,
-/// because the time or distance from the scan before is too large.
+/// because the time or distance from the scan before is too large, or if there is only one.
 inline std::optional<std::string> remark_on_lone_scans(const Recording& recording,
                                                        std::size_t first, std::size_t last,
                                                        const RemoverConfig& config) {
+  if (first == last) {
+    return "one scan alone is compared with no other, and nothing is removed from it";
+  }
   std::size_t breaks = 0;
   for (std::size_t i = first + 1; i <= last; ++i) {
     const Eigen::Vector3d step =

@@ -10,8 +10,10 @@
 #include <system_error>
 #include <vector>
 
+#include "cloud_remarks.hpp"
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
+#include "dynains/poses/pose_jumps.hpp"
 #include "lone_scans.hpp"
 
 namespace dynains::program {
@@ -71,9 +73,18 @@ void add_remarks(std::ostream& text, const Diagnosis& d) {
   if (d.ego_share > 0.3) {
     text << "note: many points are nearer than 2 m; see --min-range\n";
   }
-  if (!d.mounting.known) {
-    text << "note: without ground in sight, height and tilt are not known\n";
+}
+
+/// What only some more scans tell. Throws IoError.
+void add_findings_in_scans(const Recording& recording, const Diagnosis& d, std::ostream& text) {
+  for (const auto& remark :
+       {remark_on_stripes(recording), remark_on_mounting(recording, d.mounting)}) {
+    if (remark) text << "note: " << *remark << '\n';
   }
+  if (recording.frame() != PointFrame::kSensor || recording.size() < 3) return;
+  const std::vector<PoseJump> jumps = find_pose_jumps(recording, 0, recording.size() - 1);
+  if (jumps.empty()) return;
+  text << "note: " << sentence_on(recording, jumps) << '\n';
 }
 
 /// The diagnosis reads a sample; this looks at every file, for scans that were cut off. Throws
@@ -133,6 +144,7 @@ std::string describe(const Recording& recording, const Diagnosis& d) {
     }
   }
   add_remarks(text, d);
+  add_findings_in_scans(recording, d, text);
   return text.str();
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "cloud_remarks.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/poses/diagnosis.hpp"
@@ -15,6 +16,7 @@
 #include "lone_scans.hpp"
 #include "output_folder.hpp"
 #include "range_check.hpp"
+#include "run_doubts.hpp"
 #include "run_plan.hpp"
 #include "run_request.hpp"
 #include "run_sequence.hpp"
@@ -80,34 +82,62 @@ void warn(const RunListener& listener, const std::string& text) {
   if (listener.warn) listener.warn(text);
 }
 
-/// Throws ConfigError if the scans disagree with the poses beyond doubt, unless they are accepted.
-/// Warns if it is not beyond doubt.
+/// Whether poses and clouds are judged: they are not accepted unseen, and there are enough scans
+/// for a judgement beyond doubt.
+bool are_judged(const RunPlan& plan, const RunSettings& settings) {
+  constexpr std::size_t kFewestScans = 8;
+  return !settings.accept_poses && plan.range.size() >= kFewestScans;
+}
+
+/// What `dynains check` finds; empty if a few registrations prove the poses already, or if they are
+/// not judged.
+std::optional<Diagnosis> diagnosed(const RunPlan& plan, const RunSettings& settings) {
+  if (!are_judged(plan, settings) ||
+      confirms_poses(plan.sequence, plan.range.first, plan.range.last)) {
+    return std::nullopt;
+  }
+  return diagnose(plan.sequence);
+}
+
+/// Whether poses that are shifted by some scans fit so little better that the map hardly suffers.
+bool is_small_shift(const Diagnosis& d, const PoseConvention& given) {
+  constexpr double kTranslation = 0.05;  // m, from one scan to the next
+  constexpr double kRotation = 0.0045;   // rad
+  return d.verdict == PoseVerdict::kOtherwise && d.convention.shift != given.shift &&
+         d.translation_error < kTranslation && d.rotation_error < kRotation;
+}
+
+/// Throws ConfigError unless `dynains check` accepts the poses. Warns if they are inexact, or too
+/// few scans are there for a judgement.
 void judge_poses(const RunPlan& plan, const RunSettings& settings, const RunListener& listener,
-                 const Agreement& agreement) {
-  const std::string share = std::to_string(std::lround(100.0 * agreement.share)) +
+                 const PoseAgreement& agreement, const std::optional<Diagnosis>& diagnosis) {
+  const std::string share = "only " +
+                            std::to_string(std::lround(100.0 * agreement.as_given.share)) +
                             " % of the points of neighbouring scans agree under these poses";
-  constexpr std::size_t kFewestScans = 8;  // for a judgement beyond doubt
-  if (!settings.accept_poses && plan.range.size() >= kFewestScans) {
-    const Diagnosis diagnosis = diagnose(plan.sequence);
-    // A shift changes little: some broken scans can make one look better.
-    const bool is_shift = diagnosis.verdict == PoseVerdict::kOtherwise &&
-                          diagnosis.convention.shift != plan.sequence.convention().shift;
-    if (!diagnosis.sound() && diagnosis.verdict != PoseVerdict::kUnknown && !is_shift) {
-      throw ConfigError("only " + share + ". " + advice(diagnosis) + " See: dynains check " +
-                        settings.recording_as_given +
-                        "; or run with these poses by --accept-poses");
+  const std::string see = "dynains check " + settings.recording_as_given;
+  if (diagnosis) {
+    if (diagnosis->verdict == PoseVerdict::kInexact) warn(listener, advice(*diagnosis));
+    if (diagnosis->sound() || diagnosis->verdict == PoseVerdict::kRayOrigin) return;
+    if (is_small_shift(*diagnosis, plan.sequence.convention())) {
+      warn(listener, advice(*diagnosis));
+    } else if (diagnosis->verdict != PoseVerdict::kUnknown) {
+      throw ConfigError((agreement.doubtful() ? share + ". " : std::string()) + advice(*diagnosis) +
+                        " See: " + see + "; or run with these poses by --accept-poses");
     }
   }
-  warn(listener, "only " + share + "; see: dynains check " + settings.recording_as_given);
+  const bool is_confirmed = !diagnosis && are_judged(plan, settings);
+  if (agreement.doubtful() && !is_confirmed) warn(listener, share + "; see: " + see);
 }
 
 /// Throws ConfigError if rays begin elsewhere than at the origin of the clouds, unless the clouds
 /// are accepted. Warns if only shadows tell it.
-void judge_ray_origin(const RunPlan& plan, const RunSettings& settings,
-                      const RunListener& listener) {
-  constexpr std::size_t kFewestScans = 8;  // as for the poses
-  if (settings.accept_poses || plan.range.size() < kFewestScans) return;
-  const auto origin = find_ray_origin(plan.sequence, plan.range.first, plan.range.last);
+void judge_ray_origin(const RunPlan& plan, const RunSettings& settings, const RunListener& listener,
+                      const std::optional<Diagnosis>& diagnosis) {
+  if (!are_judged(plan, settings)) return;
+  const bool was_searched = diagnosis && (diagnosis->sound() || diagnosis->ray_origin);
+  const auto origin = was_searched
+                          ? diagnosis->ray_origin
+                          : find_ray_origin(plan.sequence, plan.range.first, plan.range.last);
   if (!origin) return;
   const std::string text = advice(*origin) + " See: dynains check " + settings.recording_as_given;
   if (origin->known == RayOrigin::Known::kHorizontal) {
@@ -135,11 +165,14 @@ void check_not_empty(const RunPlan& plan, const RunResults& results) {
 
 void warn_of_doubts(const RunPlan& plan, const RunSettings& settings, const RunListener& listener,
                     const PoseAgreement& agreement) {
-  if (agreement.doubtful()) judge_poses(plan, settings, listener, agreement.as_given);
-  judge_ray_origin(plan, settings, listener);
+  const std::optional<Diagnosis> diagnosis = diagnosed(plan, settings);
+  judge_poses(plan, settings, listener, agreement, diagnosis);
+  judge_ray_origin(plan, settings, listener, diagnosis);
   const auto lone =
       remark_on_lone_scans(plan.sequence, plan.range.first, plan.range.last, plan.config);
   if (lone) warn(listener, *lone);
+  const auto stripes = remark_on_stripes(plan.sequence);
+  if (stripes) warn(listener, *stripes);
 }
 
 RunDescription describe(const RunPlan& plan, const RunSettings& settings,
@@ -242,6 +275,8 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
     outcome.earlier_results_stay = true;
     return outcome;
   }
+  const RunDoubts doubts = find_doubts(plan.sequence, plan.range, timing);
+  for (const std::string& text : sentences(doubts, plan.sequence)) warn(listener, text);
   results.commit();
   write_timing(outputs.folder / "timing.csv", timing);
   change.put_in_place([&] {
@@ -252,6 +287,7 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   outcome.wall = wall_time(ms_since(settings.started), timing);
   RunDescription description = describe(plan, settings, agreement, results);
   description.wall = outcome.wall;
+  description.doubts = to_json(doubts, plan.sequence);
   nlohmann::ordered_json report = make_report(description, results, timing);
   report["request"] = plan.request;
   if (second_pass) report["second_pass"] = to_json(*second_pass, plan);

@@ -96,6 +96,7 @@ nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& 
   report["pose_agreement"] = nullptr;
   if (run.agreement.points > 0) report["pose_agreement"] = run.agreement.share;
   report["pose_residual"] = pose_residual_to_json(timing);
+  report["doubts"] = run.doubts;
   report["preset"] = run.preset;
   report["configuration"] = run.configuration;
   return report;

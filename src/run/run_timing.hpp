@@ -17,6 +17,8 @@ struct TimingRow {
   std::vector<double> stages;  ///< ms, in the order of RunTiming::stages
   double total = 0.0;          ///< ms in the pipeline, reading and writing of files apart
   std::optional<PoseResidual> pose_residual;
+  std::optional<EpochReason> began_epoch = std::nullopt;
+  Plausibility plausibility = {};
 };
 
 struct RunTiming {
@@ -37,7 +39,8 @@ inline std::vector<std::string> stage_names() {
 /// The row of a push that took `total` ms.
 inline TimingRow timing_row(std::string scan, std::size_t points, double total,
                             const FrameResult& frame) {
-  TimingRow row{std::move(scan), points, {}, total, frame.pose_residual};
+  TimingRow row{std::move(scan),   points, {}, total, frame.pose_residual, frame.began_epoch,
+                frame.plausibility};
   StageTimes::visit(frame.times, [&](const char*, double ms) { row.stages.push_back(ms); });
   return row;
 }

@@ -149,6 +149,12 @@ Diagnosis diagnose(const Recording& recording);
 /// the start of a run. Throws IoError.
 PoseAgreement pose_agreement(const Recording& recording, std::size_t first, std::size_t last);
 
+/// Whether the scans `first` to `last` (inclusive) prove the given poses, at the places where most
+/// mistakes would show: in the sharpest turn, at the largest change of speed and at the highest
+/// speed. It costs a few registrations. That they do not is no finding: see diagnose(). Throws
+/// IoError.
+bool confirms_poses(const Recording& recording, std::size_t first, std::size_t last);
+
 /// One sentence with the verdict on the poses and the recommended option.
 std::string advice(const Diagnosis& diagnosis);
 

@@ -175,7 +175,8 @@ void LogScans::check_clouds() {
                             std::to_string(disordered_ + size()) +
                             " clouds have a stamp that is not after that of the cloud before";
   if (disordered_ >= size()) fail(log_->path(), "expected stamps that increase: " + count);
-  notes_.push_back(count + ", and are left out");
+  const bool are_many = 10 * disordered_ > size();
+  (are_many ? warnings_ : notes_).push_back(count + ", and are left out");
 }
 
 void LogScans::find_point_clock() {

@@ -57,6 +57,8 @@ class LogScans {
   const PointColumns& columns() const { return columns_; }
   std::size_t point_count(std::size_t i) const { return point_counts_.at(i); }
   const std::vector<std::string>& notes() const { return notes_; }
+  /// Defects that results depend on.
+  const std::vector<std::string>& warnings() const { return warnings_; }
   /// How times of points were understood. read() makes them seconds after the stamp.
   const PointClockFinding& point_clock() const { return point_clock_; }
 
@@ -97,7 +99,7 @@ class LogScans {
   TransformTree transforms_;
   bool is_in_world_ = false;
   Trajectory trajectory_;
-  std::vector<std::string> notes_;
+  std::vector<std::string> notes_, warnings_;
   std::vector<std::uint8_t> bytes_;
   std::vector<std::uint8_t> compressed_;
 };

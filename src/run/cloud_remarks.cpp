@@ -1,0 +1,131 @@
+#include "cloud_remarks.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <iomanip>
+#include <locale>
+#include <sstream>
+#include <vector>
+
+namespace dynains::program {
+namespace {
+
+constexpr double kDegrees = 180.0 / 3.14159265358979323846;
+
+std::ostringstream plain_text() {
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text << std::fixed;
+  return text;
+}
+
+/// Whether nearly all coordinates of an axis are multiples of `step` (m).
+bool are_multiples(const RecordedScan& scan, const Pose& T_world_sensor, Eigen::Index axis,
+                   double step) {
+  constexpr std::size_t kFewest = 100;
+  constexpr double kNear = 0.1;  // of a step
+  std::size_t count = 0, on_grid = 0;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const Eigen::Vector3d p = scan.point(i).position;
+    if (!p.allFinite() || p.isZero(0.0)) continue;
+    const double steps = (T_world_sensor * p)[axis] / step;
+    on_grid += std::abs(steps - std::round(steps)) < kNear ? 1 : 0;
+    ++count;
+  }
+  return count >= kFewest && on_grid * 20 >= count * 19;
+}
+
+/// Upward normals (sensor frame) under which scan i has ground below the sensor, for a sensor that
+/// lies on one of its sides.
+std::vector<Eigen::Vector3d> sideways_normals(const RecordedScan& scan) {
+  std::vector<Eigen::Vector3d> normals;
+  const auto z = Eigen::Vector3d::UnitZ();
+  for (const Eigen::Vector3d& up : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(-1, 0, 0),
+                                    Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, -1, 0)}) {
+    Eigen::Matrix3d R;  // from the sensor to a frame whose z axis is `up`
+    R.row(0) = z;
+    R.row(1) = up.cross(Eigen::Vector3d(z));
+    R.row(2) = up;
+    PointBuffer turned;
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+      const Eigen::Vector3d p = R * scan.point(i).position;
+      if (!p.allFinite() || p.isZero(0.0)) continue;
+      turned.push_back(static_cast<float>(p.x()), static_cast<float>(p.y()),
+                       static_cast<float>(p.z()));
+    }
+    const Mounting mounting = estimate_mounting(turned);
+    const bool is_upright = mounting.known && mounting.up_sensor.z() > 0.0;
+    if (is_upright) normals.emplace_back(R.transpose() * mounting.up_sensor);
+  }
+  return normals;
+}
+
+/// The normal of all scans of a sample that lies nearest to the z axis of the world; empty if they
+/// have none in common.
+std::optional<Eigen::Vector3d> common_normal(const Recording& recording) {
+  constexpr double kNear = 0.99;  // cosine
+  const std::size_t last = recording.size() - 1;
+  std::vector<Eigen::Vector3d> common;
+  for (const std::size_t i : {std::size_t{0}, last / 2, last}) {
+    const std::vector<Eigen::Vector3d> found = sideways_normals(recording.read_scan(i));
+    if (i == 0) common = found;
+    const auto is_missing = [&](const Eigen::Vector3d& normal) {
+      return std::none_of(found.begin(), found.end(),
+                          [&](const Eigen::Vector3d& n) { return n.dot(normal) > kNear; });
+    };
+    common.erase(std::remove_if(common.begin(), common.end(), is_missing), common.end());
+  }
+  if (common.empty()) return std::nullopt;
+  const Eigen::Vector3d z_sensor = recording.T_world_sensor(0).linear().row(2);
+  return *std::max_element(common.begin(), common.end(),
+                           [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+                             return a.dot(z_sensor) < b.dot(z_sensor);
+                           });
+}
+
+}  // namespace
+
+std::optional<std::string> remark_on_stripes(const Recording& recording) {
+  constexpr double kLeast = 0.01;  // m
+  if (recording.frame() != PointFrame::kWorld || recording.size() == 0) return std::nullopt;
+  const RecordedScan scan = recording.read_scan(0);
+  const Pose& T_world_sensor = recording.T_world_sensor(0);
+  double widest = 0.0;
+  double far = 0.0;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const double place = std::abs(T_world_sensor.translation()[axis]);
+    if (!(place > 1.0)) continue;
+    const double step = std::exp2(std::floor(std::log2(place)) - 23.0);  // of a float32
+    if (step < kLeast || !are_multiples(scan, T_world_sensor, axis, step)) continue;
+    widest = std::max(widest, step);
+    far = std::max(far, place);
+  }
+  if (widest == 0.0) return std::nullopt;
+  std::ostringstream text = plain_text();
+  text << "points were stored as float32 " << std::setprecision(0) << far
+       << " m from the origin of the world, and lie in stripes of " << std::setprecision(2)
+       << widest
+       << " m: store float64, or subtract an offset from points and poses before they are stored";
+  return text.str();
+}
+
+std::optional<std::string> remark_on_mounting(const Recording& recording,
+                                              const Mounting& mounting) {
+  if (mounting.known || recording.size() == 0) return std::nullopt;
+  const auto up = common_normal(recording);
+  if (!up) {
+    return "no ground in sight below the sensor, so that height and tilt are not known; if it is "
+           "tilted by more than 45 deg: --mounting-pitch, --mounting-roll";
+  }
+  std::ostringstream text = plain_text();
+  text << std::setprecision(0) << "the sensor seems to be tilted by "
+       << kDegrees * std::acos(std::clamp(up->z(), -1.0, 1.0)) << " deg: pass --mounting-pitch "
+       << kDegrees * std::asin(std::clamp(-up->x(), -1.0, 1.0)) << " --mounting-roll "
+       << kDegrees * std::atan2(up->y(), up->z());
+  return text.str();
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,136 @@
+#include "run_doubts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <locale>
+#include <sstream>
+
+namespace dynains::program {
+namespace {
+
+std::string percent(float share) { return std::to_string(std::lround(100.0F * share)) + " %"; }
+
+std::string metres(float value) {
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text << std::fixed << std::setprecision(2) << value << " m";
+  return text.str();
+}
+
+const char* name_of(Suspicion suspicion) {
+  switch (suspicion) {
+    case Suspicion::kNone:
+      return "none";
+    case Suspicion::kUnits:
+      return "units";
+    case Suspicion::kPoses:
+      return "poses";
+    case Suspicion::kRays:
+      return "rays";
+  }
+  return "none";
+}
+
+void raise(const Plausibility& window, Plausibility& worst) {
+  worst.not_judged = std::max(worst.not_judged, window.not_judged);
+  worst.ground_free = std::max(worst.ground_free, window.ground_free);
+  worst.instance_free = std::max(worst.instance_free, window.instance_free);
+  worst.misfits = std::max(worst.misfits, window.misfits);
+  worst.residual = std::max(worst.residual, window.residual);
+}
+
+/// Adds a scan that begins an epoch against its pose, unless it follows a known jump at once.
+void add_misfit(const Recording& recording, std::size_t scan, std::vector<PoseJump>& jumps) {
+  const bool is_known = std::any_of(jumps.begin(), jumps.end(), [&](const PoseJump& jump) {
+    return jump.scan <= scan && scan <= jump.scan + 1;
+  });
+  if (!is_known) jumps.push_back(deviation_at(recording, scan));
+}
+
+std::string text_of(const SuspiciousScans& part, const Recording& recording) {
+  const Plausibility& worst = part.worst;
+  const std::string since = "suspicious since scan " + recording.name(part.first) + ": ";
+  switch (part.suspicion) {
+    case Suspicion::kNone:
+      return {};
+    case Suspicion::kUnits:
+      return since + percent(worst.not_judged) +
+             " of the points cannot be judged; are they in metres (--point-units), in the frame of "
+             "the sensor (--frame world), within --max-range?";
+    case Suspicion::kPoses:
+      return since + "scans do not fit to each other under the poses (" + percent(worst.misfits) +
+             " of the scans begin anew, residual " + metres(worst.residual) +
+             "): the poses are wrong, inexact or those of another body; see: dynains check";
+    case Suspicion::kRays:
+      break;
+  }
+  const bool may_be_skewed = recording.columns().time && !recording.is_deskewed();
+  return since + "beams pass through " + percent(worst.ground_free) + " of the ground and " +
+         percent(worst.instance_free) + " of what stands above it: " +
+         (may_be_skewed ? "points may keep the frames of their times (--deskew), or " : "") +
+         "rays may not begin at the origin of the clouds (--sensor-origin), or poses be inexact; "
+         "see: dynains check";
+}
+
+}  // namespace
+
+RunDoubts find_doubts(const Recording& recording, const ScanRange& range, const RunTiming& timing) {
+  RunDoubts doubts;
+  if (recording.frame() == PointFrame::kSensor && timing.rows.size() > 1) {
+    doubts.jumps = find_pose_jumps(recording, range.first, range.first + timing.rows.size() - 1);
+  }
+  for (std::size_t k = 0; k < timing.rows.size(); ++k) {
+    const TimingRow& row = timing.rows[k];
+    const std::size_t scan = range.first + k;
+    const bool is_misfit =
+        row.began_epoch == EpochReason::kJump || row.began_epoch == EpochReason::kMisfit;
+    if (is_misfit && scan > range.first) add_misfit(recording, scan, doubts.jumps);
+    const Plausibility& window = row.plausibility;
+    if (window.suspicion == Suspicion::kNone) continue;
+    const auto same = [&](const SuspiciousScans& part) {
+      return part.suspicion == window.suspicion;
+    };
+    auto part = std::find_if(doubts.parts.begin(), doubts.parts.end(), same);
+    if (part == doubts.parts.end()) {
+      doubts.parts.push_back(
+          {window.suspicion, range.first + static_cast<std::size_t>(window.since), 0, {}});
+      part = doubts.parts.end() - 1;
+    }
+    ++part->count;
+    raise(window, part->worst);
+  }
+  return doubts;
+}
+
+std::vector<std::string> sentences(const RunDoubts& doubts, const Recording& recording) {
+  std::vector<std::string> result;
+  if (!doubts.jumps.empty()) {
+    result.push_back(sentence_on(recording, doubts.jumps));
+  }
+  for (const SuspiciousScans& part : doubts.parts) result.push_back(text_of(part, recording));
+  return result;
+}
+
+nlohmann::ordered_json to_json(const RunDoubts& doubts, const Recording& recording) {
+  nlohmann::ordered_json jumps = nlohmann::ordered_json::array();
+  for (const PoseJump& jump : doubts.jumps) {
+    jumps.push_back({{"scan", recording.name(jump.scan)},
+                     {"metres", jump.translation},
+                     {"degrees", jump.rotation}});
+  }
+  nlohmann::ordered_json parts = nlohmann::ordered_json::array();
+  for (const SuspiciousScans& part : doubts.parts) {
+    parts.push_back({{"suspicion", name_of(part.suspicion)},
+                     {"first_scan", recording.name(part.first)},
+                     {"scans", part.count},
+                     {"not_judged", part.worst.not_judged},
+                     {"ground_free", part.worst.ground_free},
+                     {"instance_free", part.worst.instance_free},
+                     {"misfits", part.worst.misfits},
+                     {"residual_metres", part.worst.residual}});
+  }
+  return {{"jumps", jumps}, {"suspicious", parts}};
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,41 @@
+// What a run finds suspicious in its own results.
+#pragma once
+
+#include <cstddef>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dynains/io/recording.hpp"
+#include "dynains/plausibility.hpp"
+#include "dynains/poses/pose_jumps.hpp"
+#include "run_timing.hpp"
+#include "scan_range.hpp"
+
+namespace dynains::program {
+
+/// Scans in a row that no correct recording gives.
+struct SuspiciousScans {
+  Suspicion suspicion = Suspicion::kNone;
+  std::size_t first = 0;  ///< scan of the recording
+  std::size_t count = 0;
+  Plausibility worst;  ///< of the window with the largest shares
+};
+
+struct RunDoubts {
+  /// Jumps of the poses, and scans that begin an epoch because their surfaces do not fit.
+  std::vector<PoseJump> jumps;
+  std::vector<SuspiciousScans> parts;  ///< at most one for each kind: the first one
+};
+
+/// `timing`: of the scans of `range` that were pushed. Throws IoError.
+RunDoubts find_doubts(const Recording& recording, const ScanRange& range, const RunTiming& timing);
+
+/// One sentence for each doubt.
+std::vector<std::string> sentences(const RunDoubts& doubts, const Recording& recording);
+
+/// "jumps" and "suspicious" of a report.
+nlohmann::ordered_json to_json(const RunDoubts& doubts, const Recording& recording);
+
+}  // namespace dynains::program

@@ -1,0 +1,116 @@
+// Right poses of sparse sensors are accepted, and jumps of poses are found, in written recordings.
+#include <Eigen/Geometry>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "dynains/io/kitti.hpp"
+#include "dynains/poses/diagnosis.hpp"
+#include "dynains/poses/pose_jumps.hpp"
+#include "dynains/simulation/simulator.hpp"
+#include "dynains/simulation/write_sequence.hpp"
+#include "io/files.hpp"
+#include "support/catch.hpp"
+
+namespace dynains::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A recording whose poses can be replaced.
+class Drive {
+ public:
+  Drive(simulation::Scene scene, simulation::Sensor sensor, std::uint32_t seed) {
+    simulation::Config config;
+    config.scene = scene;
+    config.sensor = sensor;
+    config.scans = 40;
+    config.seed = seed;
+    simulation::Simulator simulator(config);
+    fs::create_directories(folder_ / "velodyne");
+    for (std::size_t i = 0; i < simulator.size(); ++i) {
+      const simulation::SimulatedScan scan = simulator.scan(i);
+      write_scan(folder_ / ("velodyne/" + simulation::scan_name(i) + ".bin"), scan.xyzi);
+      poses_.push_back(scan.T_world_sensor);
+    }
+  }
+
+  Recording recording(const std::function<Pose(std::size_t, const Pose&)>& spoil) const {
+    std::vector<Pose> rows;
+    for (std::size_t i = 0; i < poses_.size(); ++i) rows.push_back(spoil(i, poses_[i]));
+    write_poses(folder_ / "poses.txt", rows);
+    return Recording(folder_.path());
+  }
+  Recording recording() const {
+    return recording([](std::size_t, const Pose& T) { return T; });
+  }
+  const Pose& pose(std::size_t i) const { return poses_[i]; }
+
+ private:
+  TemporaryFolder folder_;
+  std::vector<Pose> poses_;
+};
+
+Pose sideways(double metres, double degrees) {
+  Pose T = Pose::Identity();
+  T.linear() =
+      Eigen::AngleAxisd(degrees * M_PI / 180.0, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  T.translation().y() = metres;
+  return T;
+}
+
+TEST_CASE("Right poses of a sparse sensor in a crowd raise no doubt, wrong ones do") {
+  const auto seed = GENERATE(71U, 72U);
+  INFO("seed " << seed);
+  const Drive drive(simulation::Scene::kCrowd, simulation::Sensor::kMid360, seed);
+  const Diagnosis right = diagnose(drive.recording());
+  CHECK((right.verdict == PoseVerdict::kAgree || right.verdict == PoseVerdict::kNoMotion));
+  CHECK(right.option.empty());
+
+  const auto is_accepted = [&](const Diagnosis& d) {
+    return d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion;
+  };
+  CHECK_FALSE(is_accepted(
+      diagnose(drive.recording([](std::size_t, const Pose& T) { return Pose(T.inverse()); }))));
+  std::mt19937 random(3);
+  std::normal_distribution<double> metres(0.0, 0.2);
+  const Diagnosis noisy = diagnose(drive.recording([&](std::size_t, Pose T) {
+    T.translation() += Eigen::Vector3d(metres(random), metres(random), metres(random));
+    return T;
+  }));
+  CHECK_FALSE(is_accepted(noisy));
+}
+
+TEST_CASE("A few registrations confirm right poses, and never those of a turned body") {
+  const Drive drive(simulation::Scene::kStopAndGo, simulation::Sensor::kOs1_64, 4);
+  CHECK(confirms_poses(drive.recording(), 0, 39));
+  CHECK_FALSE(confirms_poses(
+      drive.recording([](std::size_t, const Pose& T) { return Pose(T * sideways(0.0, 90.0)); }), 0,
+      39));
+  CHECK_FALSE(confirms_poses(
+      drive.recording([](std::size_t, const Pose& T) { return Pose(T.inverse()); }), 0, 39));
+}
+
+TEST_CASE("Jumps of poses are found with scan and size, and none in right poses") {
+  const Drive drive(simulation::Scene::kUrban, simulation::Sensor::kOs1_64, 41);
+  CHECK(find_pose_jumps(drive.recording(), 0, 39).empty());
+  const auto [metres, degrees] = GENERATE(
+      table<double, double>({{0.3, 0.3}, {1.5, 0.0}, {3.0, 2.0}, {0.0, 5.0}, {20.0, 0.0}}));
+  INFO(metres << " m, " << degrees << " deg");
+  const Pose& T_world_c = drive.pose(20);
+  const Pose change = T_world_c * sideways(metres, degrees) * T_world_c.inverse();
+  const Recording recording =
+      drive.recording([&](std::size_t i, const Pose& T) { return i < 20 ? T : Pose(change * T); });
+  const std::vector<PoseJump> jumps = find_pose_jumps(recording, 0, 39);
+  REQUIRE(jumps.size() == 1);
+  CHECK(jumps[0].scan == 20);
+  CHECK(jumps[0].translation == Approx(metres).margin(0.1));
+  CHECK(jumps[0].rotation == Approx(degrees).margin(0.3));
+  CHECK_THAT(sentence_on(recording, jumps), StartsWith("poses jump 1 time, at scan 000020 by "));
+}
+
+}  // namespace
+}  // namespace dynains::test

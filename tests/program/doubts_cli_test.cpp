@@ -1,0 +1,192 @@
+// What the program says of recordings that go wrong, and that it is silent about right ones.
+#include <Eigen/Geometry>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "dynains/io/kitti.hpp"
+#include "dynains/simulation/simulator.hpp"
+#include "dynains/simulation/write_sequence.hpp"
+#include "io/files.hpp"
+#include "program/start.hpp"
+#include "support/catch.hpp"
+
+using namespace dynains;
+using namespace dynains::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+simulation::Config street() {
+  simulation::Config config;
+  config.scene = simulation::Scene::kStopAndGo;
+  config.sensor = simulation::Sensor::kVlp16;
+  config.scans = 30;
+  config.seed = 4;
+  return config;
+}
+
+/// A recording whose poses and scans can be replaced.
+class Drive {
+ public:
+  using Spoil = std::function<Pose(std::size_t, const Pose&)>;
+
+  explicit Drive(const simulation::Config& config = street()) {
+    simulation::Simulator simulator(config);
+    fs::create_directories(folder_ / "seq/velodyne");
+    for (std::size_t i = 0; i < simulator.size(); ++i) {
+      scans_.push_back(simulator.scan(i));
+      write_scan(file_of(i), scans_.back().xyzi);
+    }
+    pose([](std::size_t, const Pose& T) { return T; });
+  }
+
+  std::string path() const { return folder_ / "seq"; }
+  std::string out() const { return folder_ / "out"; }
+  const simulation::SimulatedScan& scan(std::size_t i) const { return scans_[i]; }
+  std::size_t size() const { return scans_.size(); }
+  fs::path file_of(std::size_t i) const {
+    return folder_ / ("seq/velodyne/" + simulation::scan_name(i) + ".bin");
+  }
+
+  void pose(const Spoil& spoil) const {
+    std::vector<Pose> rows;
+    for (std::size_t i = 0; i < scans_.size(); ++i) {
+      rows.push_back(spoil(i, scans_[i].T_world_sensor));
+    }
+    write_poses(folder_ / "seq/poses.txt", rows);
+  }
+
+  Outcome run(std::vector<std::string> flags = {}) const {
+    std::vector<std::string> arguments = {"run", path(), "-o", out(), "-q"};
+    arguments.insert(arguments.end(), flags.begin(), flags.end());
+    fs::remove_all(out());
+    return start(arguments);
+  }
+  nlohmann::json report() const {
+    return nlohmann::json::parse(read_text(fs::path(out()) / "report.json"));
+  }
+
+ private:
+  TemporaryFolder folder_;
+  std::vector<simulation::SimulatedScan> scans_;
+};
+
+Pose yawed(double degrees) {
+  Pose T = Pose::Identity();
+  T.linear() =
+      Eigen::AngleAxisd(degrees * M_PI / 180.0, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  return T;
+}
+
+}  // namespace
+
+TEST_CASE("run says nothing about a right recording, and its report has no doubts") {
+  const Drive drive;
+  const Outcome outcome = drive.run();
+  CHECK(outcome.code == 0);
+  CHECK(outcome.err.empty());
+  CHECK(drive.report()["doubts"]["jumps"].empty());
+  CHECK(drive.report()["doubts"]["suspicious"].empty());
+}
+
+TEST_CASE("run stops before its first output if the poses are those of a turned body") {
+  const Drive drive;
+  drive.pose([](std::size_t, const Pose& T) { return Pose(T * yawed(90.0)); });
+  const Outcome stopped = drive.run();
+  CHECK(stopped.code == 2);
+  CHECK_THAT(stopped.err,
+             ContainsSubstring("--accept-poses") && ContainsSubstring("See: dynains check"));
+  CHECK_FALSE(fs::exists(drive.out()));
+  CHECK(start({"check", drive.path()}).code == 1);
+
+  // Who insists is told afterwards, with the first scan.
+  const Outcome accepted = drive.run({"--accept-poses"});
+  CHECK(accepted.code == 0);
+  CHECK_THAT(accepted.err, ContainsSubstring("suspicious since scan 0000"));
+  REQUIRE_FALSE(drive.report()["doubts"]["suspicious"].empty());
+  CHECK(drive.report()["doubts"]["suspicious"][0]["suspicion"] != "none");
+}
+
+TEST_CASE("check and run name the scan at which poses jump, and the size") {
+  const Drive drive;
+  const Pose& T_world_c = drive.scan(15).T_world_sensor;
+  Pose sideways = yawed(2.0);
+  sideways.translation().y() = 3.0;
+  const Pose change = T_world_c * sideways * T_world_c.inverse();
+  drive.pose([&](std::size_t i, const Pose& T) { return i < 15 ? T : Pose(change * T); });
+  CHECK_THAT(start({"check", drive.path()}).out,
+             ContainsSubstring("poses jump 1 time, at scan 000015 by ") &&
+                 ContainsSubstring(" m and 2.0 deg"));
+  const Outcome outcome = drive.run();
+  CHECK(outcome.code == 0);
+  CHECK_THAT(outcome.err, ContainsSubstring("poses jump 1 time, at scan 000015 by 3.0"));
+  const nlohmann::json jumps = drive.report()["doubts"]["jumps"];
+  REQUIRE(jumps.size() == 1);
+  CHECK(jumps[0]["scan"] == "000015");
+  CHECK(jumps[0]["metres"].get<double>() == Approx(3.0).margin(0.3));
+  CHECK(jumps[0]["degrees"].get<double>() == Approx(2.0).margin(1.0));
+}
+
+TEST_CASE("check and run tell coordinates that float32 put into stripes") {
+  const Drive drive;
+  const Eigen::Vector3d utm(512345.0, 5412345.0, 100.0);
+  const auto write_world = [&](std::size_t i, bool in_stripes) {
+    const simulation::SimulatedScan& scan = drive.scan(i);
+    std::vector<float> world;
+    const Eigen::Vector3d origin = in_stripes ? utm : Eigen::Vector3d(12.0, 34.0, 1.0);
+    for (std::size_t k = 0; k + 3 < scan.xyzi.size(); k += 4) {
+      const Eigen::Vector3d p =
+          scan.T_world_sensor *
+              Eigen::Vector3f(scan.xyzi[k], scan.xyzi[k + 1], scan.xyzi[k + 2]).cast<double>() +
+          origin;
+      for (const double value : {p.x(), p.y(), p.z()}) world.push_back(static_cast<float>(value));
+      world.push_back(0.0F);
+    }
+    write_scan(drive.file_of(i), world);
+  };
+  for (const bool in_stripes : {true, false}) {
+    for (std::size_t i = 0; i < drive.size(); ++i) write_world(i, in_stripes);
+    drive.pose([&](std::size_t, Pose T) {
+      T.translation() += in_stripes ? utm : Eigen::Vector3d(12.0, 34.0, 1.0);
+      return T;
+    });
+    const Outcome checked = start({"check", drive.path(), "--frame", "world"});
+    CHECK((checked.out.find("lie in stripes of 0.50 m") != std::string::npos) == in_stripes);
+    const Outcome outcome = drive.run({"--frame", "world", "--accept-poses"});
+    CHECK((outcome.err.find("lie in stripes of 0.50 m") != std::string::npos) == in_stripes);
+  }
+}
+
+TEST_CASE("one scan alone is told") {
+  const Drive drive;
+  const Outcome outcome = drive.run({"--start", "3", "--end", "3"});
+  CHECK(outcome.code == 0);
+  CHECK_THAT(outcome.err, ContainsSubstring("one scan alone"));
+}
+
+TEST_CASE("check proposes the mounting of a sensor that lies on its side") {
+  const Drive drive;
+  // Nose down by 60 deg, which the estimate of the mounting does not reach.
+  const double pitch = 60.0 * M_PI / 180.0;
+  Pose T_level_sensor = Pose::Identity();
+  T_level_sensor.linear() = Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  for (std::size_t i = 0; i < drive.size(); ++i) {
+    std::vector<float> xyzi = drive.scan(i).xyzi;
+    for (std::size_t k = 0; k + 3 < xyzi.size(); k += 4) {
+      const Eigen::Vector3d p = T_level_sensor.linear().transpose() *
+                                Eigen::Vector3f(xyzi[k], xyzi[k + 1], xyzi[k + 2]).cast<double>();
+      for (int axis = 0; axis < 3; ++axis) xyzi[k + axis] = static_cast<float>(p[axis]);
+    }
+    write_scan(drive.file_of(i), xyzi);
+  }
+  drive.pose([&](std::size_t, const Pose& T) { return Pose(T * T_level_sensor); });
+  const std::string told = start({"check", drive.path()}).out;
+  CAPTURE(told);
+  const std::size_t at = told.find("--mounting-pitch ");
+  REQUIRE(at != std::string::npos);
+  CHECK(std::stod(told.substr(at + 17)) == Approx(60.0).margin(3.0));
+}
