@@ -154,7 +154,8 @@ struct FrameResult {
   /// Set if the scan begins an epoch. After kJump and kMisfit, the pushed motion since the previous
   /// scan is wrong.
   std::optional<EpochReason> began_epoch;
-  /// Plausibility of the last scans, by free space; zero for decision = window, except `not_judged`.
+  /// Plausibility of the last scans, by free space; zero for decision = window, except
+  /// `not_judged`.
   Plausibility plausibility;
 };
 

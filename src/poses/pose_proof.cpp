@@ -12,9 +12,9 @@
 namespace dynains {
 namespace {
 
-constexpr std::size_t kSteps = 5;  // scans
-constexpr double kLongWay = 4.0;   // m; scans farther apart see other surfaces
-constexpr double kProofLever = 10.0;    // m
+constexpr std::size_t kSteps = 5;     // scans
+constexpr double kLongWay = 4.0;      // m; scans farther apart see other surfaces
+constexpr double kProofLever = 10.0;  // m
 
 Pose motion_between(const Recording& recording, std::size_t i, std::size_t k) {
   return recording.T_world_sensor(i).inverse() * recording.T_world_sensor(k);

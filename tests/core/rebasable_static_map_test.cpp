@@ -56,8 +56,9 @@ Eigen::Isometry3d random_pose(Random& random) {
 }
 
 /// The definition of the map, point by point.
-std::map<std::array<std::int64_t, 3>, Coordinates> reference_of(
-    const std::vector<TestScan>& scans, const std::vector<Pose>& poses, double voxel) {
+std::map<std::array<std::int64_t, 3>, Coordinates> reference_of(const std::vector<TestScan>& scans,
+                                                                const std::vector<Pose>& poses,
+                                                                double voxel) {
   const auto voxel_of = [](const Eigen::Vector3d& p, double edge) {
     return std::array<std::int64_t, 3>{static_cast<std::int64_t>(std::floor(p.x() / edge)),
                                        static_cast<std::int64_t>(std::floor(p.y() / edge)),

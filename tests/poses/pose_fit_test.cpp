@@ -12,7 +12,6 @@ using namespace dynains;
 
 namespace {
 
-
 /// Motions of a sensor that is mounted at `X` on a body; `limits`: rotation (rad) and translation
 /// (m) of the body along each axis. Noise of 5 mm.
 struct Drive {
@@ -110,8 +109,6 @@ TEST_CASE("Poses fit mostly better if they do at more than 70 % of at least 12 m
   CHECK(is_mostly_better(twelve, drive.body(), everywhere_by_3_cm));
   const std::vector<RegisteredMotion> eleven(drive.motions.begin(), drive.motions.begin() + 11);
   CHECK_FALSE(is_mostly_better(eleven, drive.body(), everywhere_by_3_cm));
-  const BodyMotion in_no_trajectory = [](const RegisteredMotion&) {
-    return std::optional<Pose>();
-  };
+  const BodyMotion in_no_trajectory = [](const RegisteredMotion&) { return std::optional<Pose>(); };
   CHECK_FALSE(is_mostly_better(twelve, drive.body(), in_no_trajectory));
 }

@@ -21,11 +21,11 @@
 #include "dynains/evidence/moved_ground.hpp"
 #include "dynains/evidence/pose_correction.hpp"
 #include "dynains/evidence/reference_scans.hpp"
+#include "dynains/evidence/surface_counts.hpp"
 #include "dynains/ground/ground_split.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
-#include "dynains/evidence/surface_counts.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains {

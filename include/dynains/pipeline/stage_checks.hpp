@@ -12,11 +12,11 @@
 #include "dynains/clusters/cluster_set.hpp"
 #include "dynains/clusters/polar_points.hpp"
 #include "dynains/config.hpp"
+#include "dynains/evidence/surface_counts.hpp"
 #include "dynains/ground/ground_split.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
-#include "dynains/evidence/surface_counts.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {
