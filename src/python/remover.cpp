@@ -69,7 +69,40 @@ struct Frame {
   py::dict times;
   std::optional<PoseResidual> pose_residual;
   TimeDoubt time_doubt = TimeDoubt::kNone;
+  std::optional<EpochReason> began_epoch;
+  Suspicion suspicion = Suspicion::kNone;
 };
+
+std::optional<std::string> name_of(const std::optional<EpochReason>& reason) {
+  if (!reason) return std::nullopt;
+  switch (*reason) {
+    case EpochReason::kStart:
+      return "start";
+    case EpochReason::kSensor:
+      return "sensor";
+    case EpochReason::kPause:
+      return "pause";
+    case EpochReason::kJump:
+      return "jump";
+    case EpochReason::kMisfit:
+      return "misfit";
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> name_of(Suspicion suspicion) {
+  switch (suspicion) {
+    case Suspicion::kNone:
+      return std::nullopt;
+    case Suspicion::kUnits:
+      return "units";
+    case Suspicion::kPoses:
+      return "poses";
+    case Suspicion::kRays:
+      return "rays";
+  }
+  return std::nullopt;
+}
 
 // The remover without the interpreter's lock: a mutex keeps threads that share it apart.
 class Remover {
@@ -80,8 +113,7 @@ class Remover {
     const Pose T_world_sensor = to_pose(pose);
     std::optional<OwnedVerdict> newest, finished;
     StageTimes times;
-    std::optional<PoseResidual> pose_residual;
-    TimeDoubt time_doubt = TimeDoubt::kNone;
+    Frame frame;
     with_points(points, [&](const auto& cloud) {
       const py::gil_scoped_release release;
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -90,12 +122,11 @@ class Remover {
       newest.emplace(result.newest);
       if (result.finished) finished.emplace(*result.finished);
       times = result.times;
-      pose_residual = result.pose_residual;
-      time_doubt = result.time_doubt;
+      frame.pose_residual = result.pose_residual;
+      frame.time_doubt = result.time_doubt;
+      frame.began_epoch = result.began_epoch;
+      frame.suspicion = result.plausibility.suspicion;
     });
-    Frame frame;
-    frame.pose_residual = pose_residual;
-    frame.time_doubt = time_doubt;
     frame.newest = py::cast(Verdict(std::move(*newest)));
     if (finished) {
       frame.finished = py::cast(Verdict(std::move(*finished)));
@@ -270,6 +301,14 @@ void bind_remover(py::module_& module) {
       .def_readonly("pose_residual", &Frame::pose_residual,
                     "PoseResidual: error of the pushed pose relative to earlier scans; None if it "
                     "is unknown.")
+      .def_property_readonly(
+          "began_epoch", [](const Frame& frame) { return name_of(frame.began_epoch); },
+          "Why the scan is not compared with earlier ones: \"start\", \"sensor\", \"pause\", "
+          "\"jump\" or \"misfit\". Else None.")
+      .def_property_readonly(
+          "suspicion", [](const Frame& frame) { return name_of(frame.suspicion); },
+          "What the last scans contradict: \"units\", \"poses\" or \"rays\" (origin of rays, "
+          "times of points). Else None.")
       .def_property_readonly(
           "time_doubt",
           [](const Frame& frame) -> std::optional<std::string> {

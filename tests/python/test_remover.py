@@ -114,6 +114,8 @@ def test_a_residual_names_its_scan_and_odd_times_are_doubted(street, identity):
         bool(3 * np.sqrt(covariance[i, i]) * (1 if i < 3 else 10) <= 0.1) for i in range(6)
     ]
     assert all(frame.time_doubt is None for frame in frames)
+    assert all(frame.suspicion is None for frame in frames)
+    assert frames[0].began_epoch is not None and frames[-1].began_epoch is None
     for unit, doubt in [(1e3, "too slow"), (1e-3, "too fast")]:
         remover = dynains.DynaInsRemover()
         for i in range(4):
