@@ -6,7 +6,7 @@
 namespace dynains {
 namespace {
 
-constexpr std::size_t kAsGiven = kFarthestShift;
+constexpr std::size_t kUnshifted = kFarthestShift;
 
 /// Decrease of the gaps under another shift, over all pairs.
 struct Gain {
@@ -22,7 +22,7 @@ Gain gain_of(const std::vector<ShiftedGaps>& pairs, std::size_t shift) {
   Gain gain;
   double squares = 0.0;
   for (const ShiftedGaps& gaps : pairs) {
-    const double difference = gaps[kAsGiven] - gaps[shift];
+    const double difference = gaps[kUnshifted] - gaps[shift];
     gain.mean += difference / count;
     squares += difference * difference / count;
     gain.better += difference > kEqual ? 1 : 0;
@@ -51,10 +51,10 @@ int best_shift(const std::vector<ShiftedGaps>& pairs) {
       static_cast<std::size_t>(std::min_element(mean.begin(), mean.end()) - mean.begin());
   // A minimum at the largest shift that was tried is no minimum.
   const bool is_at_end = best == 0 || best + 1 == mean.size();
-  if (best == kAsGiven || is_at_end) return 0;
+  if (best == kUnshifted || is_at_end) return 0;
   const Gain gain = gain_of(pairs, best);
   const bool is_certain =
-      gain.mean > kLeastGain * mean[kAsGiven] && gain.mean > kLeastErrors * gain.error &&
+      gain.mean > kLeastGain * mean[kUnshifted] && gain.mean > kLeastErrors * gain.error &&
       gain.better >= kLeastShiftPairs && gain.better >= kLeastRatio * gain.worse;
   return is_certain ? static_cast<int>(best) - kFarthestShift : 0;
 }
