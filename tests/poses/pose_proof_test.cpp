@@ -85,7 +85,8 @@ TEST_CASE("Right poses of a sparse sensor in a crowd raise no doubt, wrong ones 
 }
 
 TEST_CASE("A few registrations confirm right poses, and never those of a turned body") {
-  const Drive drive(simulation::Scene::kStopAndGo, simulation::Sensor::kOs1_64, 4);
+  const auto sensor = GENERATE(simulation::Sensor::kOs1_64, simulation::Sensor::kVlp16);
+  const Drive drive(simulation::Scene::kStopAndGo, sensor, 4);
   CHECK(confirms_poses(drive.recording(), 0, 39));
   CHECK_FALSE(confirms_poses(
       drive.recording([](std::size_t, const Pose& T) { return Pose(T * sideways(0.0, 90.0)); }), 0,
