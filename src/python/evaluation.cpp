@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <stdexcept>
@@ -93,11 +92,6 @@ JudgedScan make_scan(std::size_t index, const py::handle& points, const py::hand
   return scan;
 }
 
-/// None for a ratio of no objects.
-py::object ratio_or_none(double ratio) {
-  return std::isnan(ratio) ? py::object(py::none()) : py::object(py::float_(ratio));
-}
-
 py::dict to_dict(const evaluation::EvaluationRow& row) {
   py::dict result;
   result["PR"] = row.voxels.preservation_rate();
@@ -108,8 +102,8 @@ py::dict to_dict(const evaluation::EvaluationRow& row) {
   result["AA"] = row.points.associated_accuracy();
   result["HA"] = row.points.harmonic_accuracy();
   if (row.objects) {
-    result["kept"] = ratio_or_none(row.objects->kept());
-    result["left"] = ratio_or_none(row.objects->removed());
+    result["kept"] = row.objects->kept();
+    result["left"] = row.objects->removed();
   }
   return result;
 }
