@@ -24,7 +24,7 @@ if(NOT result EQUAL 0)
   message(FATAL_ERROR "cannot be configured with Eigen and a compiler alone:\n${output}")
 endif()
 expect("no program: not found: CLI11 .Debian: libcli11-dev." "no Python module: not found: "
-  "no evaluation component: not found: nlohmann_json" "no tests: not found: Catch2")
+  "no city and evaluation components: not found: nlohmann_json" "no tests: not found: Catch2")
 
 execute_process(
   COMMAND ${CMAKE_COMMAND} -S ${SOURCE_DIR} -B ${WORK_DIR}/parts/required ${common} ${without}
