@@ -1,17 +1,23 @@
 // Plausibility of scans and poses by running window: what no correct recording gives.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 
 namespace dynains {
 
-/// What a running window of scans contradicts.
+/// Why no correct recording gives the scans of a running window.
 enum class Suspicion : std::uint8_t {
   kNone,
   kUnits,  ///< nearly no point can be judged: units, frame or ranges of the points
   kPoses,  ///< scans do not fit to each other under the poses
   kRays,   ///< scans fit, but beams pass through what stands still: origin of rays, times of points
 };
+
+constexpr std::array<const char*, 4> value_names(Suspicion) {
+  return {"none", "units", "poses", "rays"};
+}
 
 /// Shares over the last scans, [0, 1].
 struct Plausibility {
@@ -22,6 +28,15 @@ struct Plausibility {
   float residual = 0.0F;       ///< m, mean translation of PoseResidual, each at most 0.15 m
   Suspicion suspicion = Suspicion::kNone;
   std::uint64_t since = 0;  ///< number of the push at which the suspicious window began
+
+  /// Raises each share to that of another window.
+  void raise_shares(const Plausibility& other) {
+    not_judged = std::max(not_judged, other.not_judged);
+    ground_free = std::max(ground_free, other.ground_free);
+    instance_free = std::max(instance_free, other.instance_free);
+    misfits = std::max(misfits, other.misfits);
+    residual = std::max(residual, other.residual);
+  }
 };
 
 }  // namespace dynains

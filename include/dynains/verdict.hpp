@@ -140,6 +140,10 @@ enum class EpochReason : std::uint8_t {
   kMisfit,  ///< its surfaces do not fit to those of earlier scans
 };
 
+constexpr std::array<const char*, 5> value_names(EpochReason) {
+  return {"start", "sensor", "pause", "jump", "misfit"};
+}
+
 /// Result of one push.
 struct FrameResult {
   /// Verdict on the pushed scan by this and earlier scans; final if latency() is 0. Its spans are

@@ -42,7 +42,7 @@ struct PointTimes {
 PointTimes times_of_scan(const RecordedScan& scan, const PointClock& clock);
 
 /// Meaning of the times of points in a recording. Without a clock, `text` says why, or is empty if
-/// the scans have too few points. With one, `text` is empty or says what the user has to know.
+/// the scans have too few points. With a clock, `text` is a warning for the user, or empty.
 struct PointClockFinding {
   std::optional<PointClock> clock;
   std::string text;

@@ -343,8 +343,9 @@ bool confirms_poses(const Recording& recording, std::size_t first, std::size_t l
   constexpr std::size_t kEnough = 3;
   // Largest error and noise at points 10 m away, over some scans, m. Registrations of sparse scans
   // are less exact; the mistakes that a run refuses are larger.
-  const double near = scans_to_merge(recording) == 1 ? 0.04 : 0.1;
-  const double noisy = scans_to_merge(recording) == 1 ? 0.05 : 0.1;
+  const bool is_dense = scans_to_merge(recording) == 1;
+  const double near = is_dense ? 0.04 : 0.1;
+  const double noisy = is_dense ? 0.05 : 0.1;
   const GivenMotions motions = register_given(recording, first, last, 1);
   const BodyMotion given = motion_under(recording, recording.convention());
   std::size_t confirmed = 0;

@@ -73,37 +73,6 @@ struct Frame {
   Suspicion suspicion = Suspicion::kNone;
 };
 
-std::optional<std::string> name_of(const std::optional<EpochReason>& reason) {
-  if (!reason) return std::nullopt;
-  switch (*reason) {
-    case EpochReason::kStart:
-      return "start";
-    case EpochReason::kSensor:
-      return "sensor";
-    case EpochReason::kPause:
-      return "pause";
-    case EpochReason::kJump:
-      return "jump";
-    case EpochReason::kMisfit:
-      return "misfit";
-  }
-  return std::nullopt;
-}
-
-std::optional<std::string> name_of(Suspicion suspicion) {
-  switch (suspicion) {
-    case Suspicion::kNone:
-      return std::nullopt;
-    case Suspicion::kUnits:
-      return "units";
-    case Suspicion::kPoses:
-      return "poses";
-    case Suspicion::kRays:
-      return "rays";
-  }
-  return std::nullopt;
-}
-
 // The remover without the interpreter's lock: a mutex keeps threads that share it apart.
 class Remover {
  public:
@@ -302,11 +271,19 @@ void bind_remover(py::module_& module) {
                     "PoseResidual: error of the pushed pose relative to earlier scans; None if it "
                     "is unknown.")
       .def_property_readonly(
-          "began_epoch", [](const Frame& frame) { return name_of(frame.began_epoch); },
+          "began_epoch",
+          [](const Frame& frame) -> std::optional<std::string> {
+            if (!frame.began_epoch) return std::nullopt;
+            return plain_value(*frame.began_epoch);
+          },
           "Why the scan is not compared with earlier ones: \"start\", \"sensor\", \"pause\", "
           "\"jump\" or \"misfit\". Else None.")
       .def_property_readonly(
-          "suspicion", [](const Frame& frame) { return name_of(frame.suspicion); },
+          "suspicion",
+          [](const Frame& frame) -> std::optional<std::string> {
+            if (frame.suspicion == Suspicion::kNone) return std::nullopt;
+            return plain_value(frame.suspicion);
+          },
           "What the last scans contradict: \"units\", \"poses\" or \"rays\" (origin of rays, "
           "times of points). Else None.")
       .def_property_readonly(

@@ -75,7 +75,7 @@ void add_remarks(std::ostream& text, const Diagnosis& d) {
   }
 }
 
-/// What only some more scans tell. Throws IoError.
+/// Adds the findings that need more scans than the diagnosis reads. Throws IoError.
 void add_findings_in_scans(const Recording& recording, const Diagnosis& d, std::ostream& text) {
   for (const auto& remark :
        {remark_on_stripes(recording), remark_on_mounting(recording, d.mounting)}) {

@@ -89,8 +89,8 @@ bool are_judged(const RunPlan& plan, const RunSettings& settings) {
   return !settings.accept_poses && plan.range.size() >= kFewestScans;
 }
 
-/// What `dynains check` finds; empty if a few registrations prove the poses already, or if they are
-/// not judged.
+/// The diagnosis of `dynains check`. Empty if a few registrations prove the poses, or if the poses
+/// are not judged.
 std::optional<Diagnosis> diagnosed(const RunPlan& plan, const RunSettings& settings) {
   if (!are_judged(plan, settings) ||
       confirms_poses(plan.sequence, plan.range.first, plan.range.last)) {
@@ -212,7 +212,7 @@ RunOutcome outcome_of(const RunPlan& plan, const RunResults& results, const RunT
   return outcome;
 }
 
-/// What came or went, with the scans that tell of it.
+/// Objects that came or went, with the scans that measured them and those that passed them.
 nlohmann::ordered_json to_json(const SecondPass& pass, const RunPlan& plan) {
   const auto name = [&](std::uint32_t scan) { return plan.sequence.name(plan.range.first + scan); };
   const auto metres = [](const Eigen::Vector3d& v) {

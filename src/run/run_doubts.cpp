@@ -2,43 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
-#include <locale>
-#include <sstream>
+
+#include "dynains/evaluation/text_table.hpp"
+#include "dynains/parameters.hpp"
 
 namespace dynains::program {
 namespace {
 
 std::string percent(float share) { return std::to_string(std::lround(100.0F * share)) + " %"; }
-
-std::string metres(float value) {
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text << std::fixed << std::setprecision(2) << value << " m";
-  return text.str();
-}
-
-const char* name_of(Suspicion suspicion) {
-  switch (suspicion) {
-    case Suspicion::kNone:
-      return "none";
-    case Suspicion::kUnits:
-      return "units";
-    case Suspicion::kPoses:
-      return "poses";
-    case Suspicion::kRays:
-      return "rays";
-  }
-  return "none";
-}
-
-void raise(const Plausibility& window, Plausibility& worst) {
-  worst.not_judged = std::max(worst.not_judged, window.not_judged);
-  worst.ground_free = std::max(worst.ground_free, window.ground_free);
-  worst.instance_free = std::max(worst.instance_free, window.instance_free);
-  worst.misfits = std::max(worst.misfits, window.misfits);
-  worst.residual = std::max(worst.residual, window.residual);
-}
 
 /// Adds a scan that begins an epoch against its pose, unless it follows a known jump at once.
 void add_misfit(const Recording& recording, std::size_t scan, std::vector<PoseJump>& jumps) {
@@ -60,7 +31,8 @@ std::string text_of(const SuspiciousScans& part, const Recording& recording) {
              "the sensor (--frame world), within --max-range?";
     case Suspicion::kPoses:
       return since + "scans do not fit to each other under the poses (" + percent(worst.misfits) +
-             " of the scans begin anew, residual " + metres(worst.residual) +
+             " of the scans begin anew, residual " +
+             evaluation::format_number(static_cast<double>(worst.residual), 2) + " m" +
              "): the poses are wrong, inexact or those of another body; see: dynains check";
     case Suspicion::kRays:
       break;
@@ -98,7 +70,7 @@ RunDoubts find_doubts(const Recording& recording, const ScanRange& range, const 
       part = doubts.parts.end() - 1;
     }
     ++part->count;
-    raise(window, part->worst);
+    part->worst.raise_shares(window);
   }
   return doubts;
 }
@@ -121,7 +93,7 @@ nlohmann::ordered_json to_json(const RunDoubts& doubts, const Recording& recordi
   }
   nlohmann::ordered_json parts = nlohmann::ordered_json::array();
   for (const SuspiciousScans& part : doubts.parts) {
-    parts.push_back({{"suspicion", name_of(part.suspicion)},
+    parts.push_back({{"suspicion", plain_value(part.suspicion)},
                      {"first_scan", recording.name(part.first)},
                      {"scans", part.count},
                      {"not_judged", part.worst.not_judged},

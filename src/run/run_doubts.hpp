@@ -1,4 +1,4 @@
-// What a run finds suspicious in its own results.
+// Suspicious scans and poses of a run.
 #pragma once
 
 #include <cstddef>

@@ -18,6 +18,7 @@
 #include "dynains/compiled_remover.hpp"
 #include "dynains/simulation/random_world.hpp"
 #include "dynains/simulation/simulator.hpp"
+#include "support/simulated_runs.hpp"
 
 using namespace dynains;
 
@@ -25,7 +26,7 @@ namespace {
 
 using Scans = std::vector<simulation::SimulatedScan>;
 
-/// What a host pushes in the place of a scan.
+/// Cloud and pose that a host pushes instead of the right ones.
 struct Pushed {
   std::vector<float> xyzi;
   Pose T_world_sensor;
@@ -145,14 +146,6 @@ struct Outcome {
   std::uint64_t since = 0;
 };
 
-void raise(const Plausibility& window, Plausibility& worst) {
-  worst.not_judged = std::max(worst.not_judged, window.not_judged);
-  worst.ground_free = std::max(worst.ground_free, window.ground_free);
-  worst.instance_free = std::max(worst.instance_free, window.instance_free);
-  worst.misfits = std::max(worst.misfits, window.misfits);
-  worst.residual = std::max(worst.residual, window.residual);
-}
-
 Outcome judge(const Scans& scans, const Fault& fault) {
   constexpr float kFarthest = 50.0F;  // m
   Outcome outcome;
@@ -172,7 +165,7 @@ Outcome judge(const Scans& scans, const Fault& fault) {
     const Pushed pushed = fault(scans, i);
     const RawPoints<float> points{pushed.xyzi.data(), scans[i].labels.size(), 4};
     const FrameResult frame = remover.push(points, pushed.T_world_sensor, scans[i].time);
-    raise(frame.plausibility, outcome.worst);
+    outcome.worst.raise_shares(frame.plausibility);
     if (outcome.first == Suspicion::kNone && frame.plausibility.suspicion != Suspicion::kNone) {
       outcome.first = frame.plausibility.suspicion;
       outcome.since = frame.plausibility.since;
@@ -206,13 +199,6 @@ void take(const std::string& world, const std::string& kind, const Outcome& outc
             << " since " << outcome.since << std::endl;
 }
 
-Scans scans_of(const simulation::Config& config) {
-  simulation::Simulator simulator(config);
-  Scans scans;
-  for (std::size_t i = 0; i < simulator.size(); ++i) scans.push_back(simulator.scan(i));
-  return scans;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -229,7 +215,7 @@ int main(int argc, char** argv) {
                               simulation::scene_names()[static_cast<std::size_t>(config.scene)] +
                               ' ' +
                               simulation::sensor_names()[static_cast<std::size_t>(config.sensor)];
-    const Scans scans = scans_of(config);
+    const Scans scans = test::simulate(config);
     double usual = 0.0;
     for (const Kind& kind : kinds()) {
       const Outcome outcome = judge(scans, kind.fault);
@@ -240,7 +226,8 @@ int main(int argc, char** argv) {
     if (only_right) continue;
     config.rolling_shutter = true;
     config.deskewed = 0.0;
-    take(world, "not de-skewed", judge(scans_of(config), kinds().front().fault), usual, counts);
+    take(world, "not de-skewed", judge(test::simulate(config), kinds().front().fault), usual,
+         counts);
   }
   std::cout << "| kind | trials | harmful | of them told | alarms |\n|---|---|---|---|---|\n";
   for (const auto& [kind, sum] : counts) {

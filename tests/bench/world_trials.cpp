@@ -24,6 +24,7 @@
 #include "dynains/simulation/random_world.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "program/parameter_flags.hpp"
+#include "support/simulated_runs.hpp"
 
 using namespace dynains;
 
@@ -72,13 +73,6 @@ std::string name_of(const simulation::Config& config) {
        << simulation::kGaitNames[static_cast<std::size_t>(config.gait)] << std::setprecision(2)
        << ' ' << config.sensor_height << "m " << config.ego_speed << "m/s " << config.rate << "Hz";
   return text.str();
-}
-
-Scans scans_of(const simulation::Config& config) {
-  simulation::Simulator simulator(config);
-  Scans scans;
-  for (std::size_t i = 0; i < simulator.size(); ++i) scans.push_back(simulator.scan(i));
-  return scans;
 }
 
 /// For each scan and point, bit `bit` is set if the point is static.
@@ -222,7 +216,7 @@ void run(const Options& options) {
       std::cout << name_of(world) << '\n';
       continue;
     }
-    const Scans scans = scans_of(world);
+    const Scans scans = test::simulate(world);
     InMap in_map;
     for (const auto& scan : scans) in_map.emplace_back(scan.labels.size(), std::uint8_t{0});
     for (std::size_t s = 0; s < settings.size(); ++s) {

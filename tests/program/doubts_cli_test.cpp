@@ -1,4 +1,4 @@
-// What the program says of recordings that go wrong, and that it is silent about right ones.
+// Messages about faulty recordings, and no message about right ones.
 #include <Eigen/Geometry>
 #include <cmath>
 #include <filesystem>
@@ -103,7 +103,7 @@ TEST_CASE("run stops before its first output if the poses are those of a turned 
   CHECK_FALSE(fs::exists(drive.out()));
   CHECK(start({"check", drive.path()}).code == 1);
 
-  // Who insists is told afterwards, with the first scan.
+  // With --accept-poses, the run goes on and names the first suspicious scan.
   const Outcome accepted = drive.run({"--accept-poses"});
   CHECK(accepted.code == 0);
   CHECK_THAT(accepted.err, ContainsSubstring("suspicious since scan 0000"));

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <optional>
 
 namespace dynains {
 
@@ -34,6 +36,25 @@ class FreeSpaceSum {
         decrement_(static_cast<float>(log_odds(p_hit))) {}
 
   float increment() const { return increment_; }
+
+  /// Ratio of free to visible samples of a block in one reference scan. Empty if too few of its
+  /// `samples` are visible: less than 30 %, or less than two unless it has only one.
+  static std::optional<float> free_ratio(std::uint32_t free, std::uint32_t hit,
+                                         std::uint32_t samples) {
+    constexpr float kLeastVisible = 0.3F;
+    const auto visible = static_cast<float>(free + hit);
+    const auto least = static_cast<float>(std::min(2U, samples));
+    if (free + hit == 0 || visible < std::max(least, kLeastVisible * static_cast<float>(samples))) {
+      return std::nullopt;
+    }
+    return static_cast<float>(free) / visible;
+  }
+  /// 1 if so many free and hit samples show that a block is free, -1 if it is hit, else 0.
+  static int judge(std::uint32_t free, std::uint32_t hit, std::uint32_t samples) {
+    const std::optional<float> ratio = free_ratio(free, hit, samples);
+    if (!ratio) return 0;
+    return *ratio >= kFreeRatio ? 1 : *ratio <= kHitRatio ? -1 : 0;
+  }
 
   /// Adds the increment once, or twice if nearly all visible samples are free. `free_ratio`: ratio
   /// of free to visible samples. `weight`: factor of the increment.

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/belief/log_odds.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
@@ -49,7 +50,7 @@ struct RecordingPlacesConfig {
   void validate() const { validate_parameters("RecordingPlaces", *this); }
 };
 
-/// What all looks tell of a place.
+/// State of a place over the recording.
 enum class PlaceState : std::uint8_t {
   kUnknown,  ///< no look sees it well
   kStays,
@@ -119,7 +120,8 @@ class RecordingPlaces {
     const auto& visibility = test_visibility(samples_, std::size_t{begin_.back()});
     for (std::size_t i = 0; i < tested_.size(); ++i) {
       const auto count = visibility.count(begin_[i], begin_[i + 1]);
-      const int verdict = judge(count.free, count.hit, begin_[i + 1] - begin_[i]);
+      const int verdict =
+          detail::FreeSpaceSum::judge(count.free, count.hit, begin_[i + 1] - begin_[i]);
       if (verdict == 0) continue;
       Place& place = *tested_[i];
       if (place.look_free == 0 && place.look_hit == 0) touched_.push_back(&place);
@@ -179,8 +181,6 @@ class RecordingPlaces {
 
  private:
   static constexpr std::uint32_t kNone = VoxelHashTable<>::kNone;
-  static constexpr float kLeastVisible = 0.3F;  // ratio of visible to all samples of a place
-  static constexpr float kFreeRatio = 0.6F, kHitRatio = 0.3F;
   static constexpr std::array<std::uint8_t, 4> kNear = {12, 20, 35, 60};  // m
 
   using TileIndex = std::array<std::int64_t, 2>;
@@ -428,16 +428,6 @@ class RecordingPlaces {
         begin_.push_back(count);
       }
     }
-  }
-
-  // 1 if so many free and hit samples of a place tell that it is free, -1 if it is hit, else 0.
-  static int judge(std::uint32_t free, std::uint32_t hit, std::uint32_t samples) {
-    const auto visible = static_cast<float>(free + hit);
-    const auto least = static_cast<float>(std::min(2U, samples));
-    if (visible < std::max(least, kLeastVisible * static_cast<float>(samples))) return 0;
-    const float free_ratio = static_cast<float>(free) / visible;
-    if (free_ratio >= kFreeRatio) return 1;
-    return free_ratio <= kHitRatio ? -1 : 0;
   }
 
   RecordingPlacesConfig config_;

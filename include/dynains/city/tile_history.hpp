@@ -146,11 +146,13 @@ class TileHistory {
       const auto& visibility = test_visibility(samples_, std::size_t{begin_.back()});
       for (std::size_t i = 0; i < tested_.size(); ++i) {
         const auto count = visibility.count(begin_[i], begin_[i + 1]);
-        const int verdict = judge(count.free, count.hit, begin_[i + 1] - begin_[i]);
+        const int verdict =
+            detail::FreeSpaceSum::judge(count.free, count.hit, begin_[i + 1] - begin_[i]);
         if (verdict != 0) update(verdict > 0, scan, own, tested_[i]);
       }
     }
-    common_.test(scan, sensor, config_.revision_range, test_visibility, judge);
+    common_.test(scan, sensor, config_.revision_range, test_visibility,
+                 detail::FreeSpaceSum::judge);
   }
 
   /// Number of sessions whose references have tested the points.
@@ -200,7 +202,6 @@ class TileHistory {
 
  private:
   static constexpr std::uint32_t kNone = VoxelHashTable<>::kNone;
-  static constexpr float kLeastVisible = 0.3F;  // ratio of visible to all samples of a block
   static constexpr float kNoLimit = std::numeric_limits<float>::max();
   static constexpr double kCompactLength = 18.0, kCompactHeight = 4.5;  // m
 
@@ -386,16 +387,6 @@ class TileHistory {
       tested_.push_back(block);
       begin_.push_back(count);
     }
-  }
-
-  // 1 if so many free and hit samples of a block tell that it is free, -1 if it is hit, else 0.
-  static int judge(std::uint32_t free, std::uint32_t hit, std::uint32_t samples) {
-    const auto visible = static_cast<float>(free + hit);
-    const auto least = static_cast<float>(std::min(2U, samples));
-    if (visible < std::max(least, kLeastVisible * static_cast<float>(samples))) return 0;
-    const float free_ratio = static_cast<float>(free) / visible;
-    if (free_ratio >= detail::FreeSpaceSum::kFreeRatio) return 1;
-    return free_ratio <= detail::FreeSpaceSum::kHitRatio ? -1 : 0;
   }
 
   // Adds what a reference of the own session tells.

@@ -158,7 +158,7 @@ class FreeSpaceEvidence {
   /// Why the newest scan is not compared with earlier scans of its pushed epoch; empty if it is.
   const std::optional<EpochReason>& misfit() const { return pose_correction_.misfit(); }
 
-  /// What earlier scans say about the surfaces of the newest scan.
+  /// Free and hit samples of the newest scan, by references of earlier scans.
   SurfaceCounts surfaces() const {
     const Record& record = records_[newest_ % records_.size()];
     SurfaceCounts counts;

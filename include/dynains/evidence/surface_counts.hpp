@@ -1,4 +1,4 @@
-// What the references of one scan say about the surfaces that it sees.
+// Numbers of free and hit samples of one scan, by its references.
 #pragma once
 
 #include <cstdint>

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -66,7 +67,6 @@ class MapRevision {
  private:
   static constexpr double kTile = 25.0;             // m
   static constexpr std::uint32_t kMostSamples = 8;  // per block
-  static constexpr float kLeastVisible = 0.3F;      // ratio of visible to all samples of a block
 
   static std::int64_t tile_of(double metres) {
     return static_cast<std::int64_t>(std::floor(metres / kTile));
@@ -126,12 +126,10 @@ class MapRevision {
   }
 
   void update(std::uint32_t free, std::uint32_t hit, std::uint32_t samples, float& level) const {
-    const auto visible = static_cast<float>(free + hit);
-    const auto least = static_cast<float>(std::min(2U, samples));
-    if (visible < std::max(least, kLeastVisible * static_cast<float>(samples))) return;
-    const float free_ratio = static_cast<float>(free) / visible;
-    if (free_ratio >= detail::FreeSpaceSum::kFreeRatio) sum_.raise(level, free_ratio);
-    if (free_ratio <= detail::FreeSpaceSum::kHitRatio) sum_.lower(level);
+    const std::optional<float> ratio = detail::FreeSpaceSum::free_ratio(free, hit, samples);
+    if (!ratio) return;
+    if (*ratio >= detail::FreeSpaceSum::kFreeRatio) sum_.raise(level, *ratio);
+    if (*ratio <= detail::FreeSpaceSum::kHitRatio) sum_.lower(level);
   }
 
   Config config_;

@@ -59,7 +59,7 @@ class ScanDecision {
   /// Why the newest scan is not compared with earlier scans, although its pose and time allow it.
   virtual std::optional<EpochReason> misfit() const { return std::nullopt; }
 
-  /// What earlier scans say about the surfaces of the newest scan.
+  /// Free and hit samples of the newest scan, by references of earlier scans.
   virtual std::optional<SurfaceCounts> surfaces() const { return std::nullopt; }
 
   /// Updates the beliefs of map blocks by the newest scan and removes the blocks that are free.
