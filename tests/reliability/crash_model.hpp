@@ -24,6 +24,7 @@
 #include <random>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "shim/log.hpp"
@@ -80,13 +81,16 @@ class CrashModel {
     std::string bytes;
     bool cuts;  ///< the file ends at the offset
   };
+  /// What the disk keeps of each write: zeros, nothing, or so many bytes.
+  using Fates = std::vector<std::pair<DataLoss, std::size_t>>;
   /// A file, a folder or a link, independent of its name.
   struct Node {
     Kind kind;
-    std::string bytes;  ///< before the first event
+    Bytes bytes;  ///< before the first event
     NodeId file_system;
     std::vector<Write> writes;
-    std::vector<std::size_t> syncs;  ///< events
+    std::vector<std::size_t> syncs;          ///< events
+    mutable std::map<Fates, Bytes> known{};  ///< contents after some fates of the writes
   };
   struct Place {
     NodeId folder;
@@ -112,7 +116,7 @@ class CrashModel {
     }
   }
 
-  NodeId add_node(Kind kind, const std::string& bytes, NodeId folder) {
+  NodeId add_node(Kind kind, const Bytes& bytes, NodeId folder) {
     const NodeId id = nodes_.size();
     nodes_.push_back({kind, bytes, folder == 0 ? id : nodes_[folder].file_system, {}, {}});
     return id;
@@ -249,20 +253,33 @@ class CrashModel {
     return names;
   }
 
-  static std::string data_after(const Node& node, const Crash& crash, std::mt19937& random) {
+  static Bytes data_after(const Node& node, const Crash& crash, std::mt19937& random) {
     const std::size_t synced = last_sync(node, crash);
     DataLoss of_file = crash.data;
     if (of_file == DataLoss::kMixed) of_file = static_cast<DataLoss>(random() % 4);
-    std::string bytes = node.bytes;
+    Fates fates;
     for (const Write& write : node.writes) {
       if (write.at >= crash.length) break;
       DataLoss loss = write.at < synced ? DataLoss::kNothing : of_file;
-      std::string written = write.bytes;
+      std::size_t kept = write.bytes.size();
       if (loss == DataLoss::kTorn) {
         loss = static_cast<DataLoss>(random() % 4);
-        if (loss == DataLoss::kTorn) written.resize(random() % (written.size() + 1));
+        if (loss == DataLoss::kTorn) kept = random() % (kept + 1);
       }
+      fates.push_back({loss, kept});
+    }
+    const auto known = node.known.find(fates);
+    if (known != node.known.end()) return known->second;
+    return node.known[fates] = data_after(node, fates);
+  }
+
+  static std::string data_after(const Node& node, const Fates& fates) {
+    std::string bytes = node.bytes.text();
+    for (std::size_t i = 0; i < fates.size(); ++i) {
+      const Write& write = node.writes[i];
+      const auto [loss, kept] = fates[i];
       if (loss == DataLoss::kAll) continue;
+      std::string written = write.bytes.substr(0, kept);
       if (loss == DataLoss::kZeros) written.assign(written.size(), '\0');
       if (write.cuts) {
         bytes.resize(write.offset);

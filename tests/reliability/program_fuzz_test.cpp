@@ -29,7 +29,8 @@ std::size_t number_in(const char* variable, std::size_t otherwise) {
 }
 
 Tree recording_of_clouds() {
-  Tree clouds = {{"poses.txt", {Kind::kFile, {}}}};
+  Tree clouds;
+  std::string poses;
   for (const std::string name : {"a", "b,\"1\"", "c\n\x1b[31m"}) {
     std::string text =
         "ply\nformat ascii 1.0\nelement vertex 60\nproperty float x\n"
@@ -38,8 +39,9 @@ Tree recording_of_clouds() {
       text += std::to_string(4 + i % 10) + ' ' + std::to_string(i / 10 - 3) + " -1.7\n";
     }
     clouds[name + ".ply"] = {Kind::kFile, text};
-    clouds["poses.txt"].bytes += "1 0 0 0 0 1 0 0 0 0 1 0\n";
+    poses += "1 0 0 0 0 1 0 0 0 0 1 0\n";
   }
+  clouds["poses.txt"] = {Kind::kFile, poses};
   return clouds;
 }
 

@@ -59,6 +59,10 @@ class Rehearsal {
     REQUIRE(recorded.outcome.code == 0);
     after_ = read_tree(root_);
     REQUIRE(claim_of(below(after_, "disk/out")) == Claim::kComplete);
+    results_before_ = results(before_);
+    results_after_ = results(after_);
+    comparable_after_ = comparable(after_);
+    not_ours_before_ = not_ours(before_);
     events_ = recorded.events;
   }
 
@@ -75,21 +79,21 @@ class Rehearsal {
 
   /// Description of a problem in a state that the command left; empty if there is none.
   std::string problem(const Tree& state) const {
-    const std::string foreign = difference(not_ours(state), not_ours(before_));
+    const std::string foreign = difference(not_ours(state), not_ours_before_);
     if (!foreign.empty()) return "not ours: " + foreign;
-    const Tree results = below(state, "disk/out");
-    switch (claim_of(results)) {
+    const Tree folder = below(state, "disk/out");
+    switch (claim_of(folder)) {
       case Claim::kUnreadable:
         return "the marker cannot be read";
       case Claim::kUnfinished:
         return {};
       case Claim::kComplete: {
-        const std::string wrong = difference_of_results(state, after_);
+        const std::string wrong = difference(results(state), results_after_);
         if (wrong.empty() || is_earlier(state) || is_between(state)) return {};
         return "called complete, but " + wrong;
       }
       case Claim::kNone:
-        for (const auto& [path, item] : results) {
+        for (const auto& [path, item] : folder) {
           const bool hidden = is_hidden('/' + path) || is_foreign('/' + path);
           if (item.kind == Kind::kFile && !hidden) return path + " without a marker";
         }
@@ -115,7 +119,7 @@ class Rehearsal {
 
   /// Empty if the state has the complete results of the command, else the first difference.
   std::string difference_from_end(const Tree& state) const {
-    return difference(comparable(state), comparable(after_));
+    return difference(comparable(state), comparable_after_);
   }
 
  private:
@@ -144,10 +148,7 @@ class Rehearsal {
     return comparable(
         select(tree, [](const std::string& path) { return is_ours(path) && !is_hidden(path); }));
   }
-  static std::string difference_of_results(const Tree& found, const Tree& expected) {
-    return difference(results(found), results(expected));
-  }
-  bool is_earlier(const Tree& state) const { return results(state) == results(before_); }
+  bool is_earlier(const Tree& state) const { return results(state) == results_before_; }
 
   /// Whether each part is as before or as after the command, and the rest is as before. The marker
   /// may be between.
@@ -193,6 +194,10 @@ class Rehearsal {
   std::string root_ = std::filesystem::canonical(folder_.path()).string() + "/root";
   Tree before_;
   Tree after_;
+  Tree not_ours_before_;
+  Tree results_before_;
+  Tree results_after_;
+  Tree comparable_after_;
   std::vector<shim::Entry> events_;
 };
 

@@ -21,7 +21,7 @@ inline Claim claim_of(const Tree& results) {
   for (const char* marker : {"report.json", "simulation.json"}) {
     const auto file = results.find(marker);
     if (file == results.end()) continue;
-    const auto json = nlohmann::json::parse(file->second.bytes, nullptr, false);
+    const auto json = nlohmann::json::parse(file->second.bytes.text(), nullptr, false);
     if (!json.is_object() || json.value("program", "") != "dynains") return Claim::kUnreadable;
     return json.value("complete", false) ? Claim::kComplete : Claim::kUnfinished;
   }
@@ -32,7 +32,7 @@ inline Claim claim_of(const Tree& results) {
 inline Tree without_measurements(Tree tree) {
   for (auto& [name, item] : tree) {
     if (ends_with(name, "report.json")) {
-      auto json = nlohmann::json::parse(item.bytes, nullptr, false);
+      auto json = nlohmann::json::parse(item.bytes.text(), nullptr, false);
       if (!json.is_object()) continue;
       for (const char* field : {"milliseconds", "flush_milliseconds", "wall_milliseconds",
                                 "share_outside_pipeline", "peak_memory_bytes"}) {
@@ -41,7 +41,7 @@ inline Tree without_measurements(Tree tree) {
       item.bytes = json.dump();
     }
     if (ends_with(name, "timing.csv")) {
-      item.bytes = std::regex_replace(item.bytes, std::regex("[0-9]+\\.[0-9]{4}"), "time");
+      item.bytes = std::regex_replace(item.bytes.text(), std::regex("[0-9]+\\.[0-9]{4}"), "time");
     }
   }
   return tree;

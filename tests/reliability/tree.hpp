@@ -8,6 +8,7 @@
 #include <map>
 #include <string>
 
+#include "bytes.hpp"
 #include "io/files.hpp"
 
 namespace dynains::test {
@@ -17,7 +18,7 @@ enum class Kind { kFolder, kFile, kLink };
 /// Bytes of a file, target of a link, nothing for a folder.
 struct Item {
   Kind kind;
-  std::string bytes;
+  Bytes bytes;
 
   bool operator==(const Item& other) const { return kind == other.kind && bytes == other.bytes; }
   bool operator!=(const Item& other) const { return !(*this == other); }
@@ -50,9 +51,9 @@ inline void write_tree(const std::filesystem::path& folder, const Tree& tree) {
   fs::create_directories(folder);
   for (const auto& [name, item] : tree) {
     if (item.kind == Kind::kFolder) fs::create_directory(folder / name);
-    if (item.kind == Kind::kLink) fs::create_symlink(item.bytes, folder / name);
+    if (item.kind == Kind::kLink) fs::create_symlink(item.bytes.text(), folder / name);
     if (item.kind == Kind::kFile) {
-      std::ofstream(folder / name, std::ios::binary) << item.bytes;
+      std::ofstream(folder / name, std::ios::binary) << item.bytes.text();
     }
   }
 }
@@ -80,7 +81,8 @@ inline Tree without_empty_folders(Tree tree) {
 /// Different for different trees.
 inline std::size_t fingerprint(const Tree& tree) {
   std::string all;
-  for (const auto& [name, item] : tree) all += name + '\0' + item.bytes + '\0';
+  for (const auto& [name, item] : tree)
+    all += name + '\0' + std::to_string(item.bytes.hash()) + '\0';
   return std::hash<std::string>()(all);
 }
 

@@ -222,7 +222,7 @@ class WorldMaker {
           {"", "{}", "[", "null", std::string(50000, '['), "{\"a\":" + std::string(300, '['),
            program + "}", program + ", \"complete\": true}", program + ", \"files\": 3}",
            program + ", \"complete\": true, \"files\": [\"../" + world.foreign + "/mine.txt\"]}",
-           world.tree[path].bytes.substr(0, world.tree[path].bytes.size() / 2)});
+           world.tree[path].bytes.text().substr(0, world.tree[path].bytes.size() / 2)});
       world.tree[path].bytes = bytes;
     }
     disown(world, world.out);
@@ -232,7 +232,7 @@ class WorldMaker {
     const std::string path =
         world.kitti + pick<std::string>({"/velodyne/000001.bin", "/poses.txt", "/times.txt",
                                          "/labels/000000.label", "/run.cfg"});
-    const std::string bytes = world.tree[path].bytes;
+    const std::string bytes = world.tree[path].bytes.text();
     erase(world, path);
     switch (random_.index(4)) {
       case 0:
