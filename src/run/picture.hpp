@@ -29,6 +29,9 @@ class Picture {
 
   Colour at(int x, int y) const { return pixels_[index(x, y)]; }
 
+  /// The `width()` pixels of a row.
+  const Colour* row(int y) const { return pixels_.data() + index(0, y); }
+
   /// Writes a PNG file, whole or not at all. Throws IoError.
   void write_png(const std::filesystem::path& path) const;
 
