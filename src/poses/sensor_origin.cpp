@@ -269,6 +269,12 @@ std::optional<RayOrigin> origin_of_shadows(HiddenPoints& hidden, double as_given
   return RayOrigin{RayOrigin::Known::kNothing, Eigen::Vector3d::Zero(), as_given, as_given};
 }
 
+/// Between the sensor at scans i and k, m.
+double distance(const Recording& recording, std::size_t i, std::size_t k) {
+  return (recording.T_world_sensor(k).translation() - recording.T_world_sensor(i).translation())
+      .norm();
+}
+
 }  // namespace
 
 std::optional<RayOrigin> find_ray_origin(const std::vector<PointBuffer>& scans) {
@@ -293,14 +299,24 @@ std::optional<RayOrigin> find_ray_origin(const std::vector<PointBuffer>& scans) 
 std::optional<RayOrigin> find_ray_origin(const Recording& recording, std::size_t first,
                                          std::size_t last) {
   constexpr std::size_t kScans = 4;
+  constexpr double kOfStep = 0.75;
   const std::size_t count = std::min(kScans, last - first + 1);
   std::vector<PointBuffer> scans;
   RecordedScan scan;
+  double step = 0.0;  // m, longest way during a scan
   for (std::size_t k = 0; k < count; ++k) {
-    recording.read_scan(first + (count == 1 ? 0 : k * (last - first) / (count - 1)), scan);
+    const std::size_t i = first + (count == 1 ? 0 : k * (last - first) / (count - 1));
+    recording.read_scan(i, scan);
     scans.push_back(finite_points(scan));
+    const std::size_t neighbour = i < last ? i + 1 : std::max(first + 1, i) - 1;
+    step = std::max(step, distance(recording, i, neighbour));
   }
   std::optional<RayOrigin> origin = find_ray_origin(scans);
+  // If the motion during a scan was compensated, rays begin along a step, with its middle half a
+  // step from the origin. Only beams that meet in one point contradict that.
+  const bool may_be_compensated = origin && origin->known == RayOrigin::Known::kHorizontal &&
+                                  origin->position.norm() < kOfStep * step;
+  if (may_be_compensated) return std::nullopt;
   if (origin) origin->position += recording.sensor_origin();
   return origin;
 }

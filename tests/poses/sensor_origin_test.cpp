@@ -1,10 +1,15 @@
 // The place where rays begin, in clouds that were moved into a body frame.
 #include "dynains/poses/sensor_origin.hpp"
 
+#include <cmath>
+#include <filesystem>
 #include <string>
 #include <vector>
 
+#include "dynains/io/kitti.hpp"
 #include "dynains/simulation/simulator.hpp"
+#include "dynains/simulation/write_sequence.hpp"
+#include "io/files.hpp"
 #include "support/catch.hpp"
 
 namespace dynains::test {
@@ -12,6 +17,7 @@ namespace {
 
 using simulation::Scene;
 using simulation::Sensor;
+namespace fs = std::filesystem;
 
 /// Scans with the sensor at `origin` (m) in their frame.
 std::vector<PointBuffer> moved(std::vector<PointBuffer> scans, const Eigen::Vector3f& origin) {
@@ -61,6 +67,39 @@ TEST_CASE("The place where beams meet is found, and nothing if it is the origin"
     CHECK((found->position - origin.cast<double>()).norm() < 0.1);
     CHECK(found->hidden < found->hidden_as_given);
   }
+}
+
+TEST_CASE("Rays that begin along the way of a scan are those of compensated motion") {
+  constexpr float kWay = 3.0F;  // m during a scan, which begins at azimuth 0
+  std::vector<PointBuffer> scans = scans_of(Scene::kUrban, Sensor::kOs1_64);
+  for (PointBuffer& scan : scans) {
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+      const double turn = std::atan2(scan.y[i], scan.x[i]) / (2.0 * M_PI);
+      scan.x[i] += kWay * static_cast<float>(turn < 0.0 ? turn + 1.0 : turn);
+    }
+  }
+  const auto by_scans = find_ray_origin(scans);
+  REQUIRE(by_scans);
+  REQUIRE(by_scans->known == RayOrigin::Known::kHorizontal);
+  const double distance = by_scans->position.norm();
+
+  const TemporaryFolder folder;
+  const auto finds_at_step = [&](double step) {
+    std::vector<Pose> poses(scans.size(), Pose::Identity());
+    for (std::size_t i = 0; i < scans.size(); ++i) {
+      std::vector<float> xyzi;
+      for (std::size_t k = 0; k < scans[i].size(); ++k) {
+        xyzi.insert(xyzi.end(), {scans[i].x[k], scans[i].y[k], scans[i].z[k], 0.0F});
+      }
+      fs::create_directories(folder / "velodyne");
+      write_scan(folder / ("velodyne/" + simulation::scan_name(i) + ".bin"), xyzi);
+      poses[i].translation().x() = static_cast<double>(i) * step;
+    }
+    write_poses(folder / "poses.txt", poses);
+    return find_ray_origin(Recording(folder.path()), 0, scans.size() - 1).has_value();
+  };
+  CHECK(finds_at_step(distance / 0.76));
+  CHECK_FALSE(finds_at_step(distance / 0.74));
 }
 
 TEST_CASE("Without beams of fixed elevations, clouds of the sensor raise no alarm") {

@@ -30,7 +30,8 @@ struct RayOrigin {
 std::optional<RayOrigin> find_ray_origin(const std::vector<PointBuffer>& scans);
 
 /// As above, for a sample of the scans `first` to `last` (inclusive). The position is relative to
-/// the clouds as recorded; Recording::sensor_origin() does not change it. Throws IoError.
+/// the clouds as recorded; Recording::sensor_origin() does not change it. Empty, too, if
+/// compensated motion during a scan explains what the scans show. Throws IoError.
 std::optional<RayOrigin> find_ray_origin(const Recording& recording, std::size_t first,
                                          std::size_t last);
 
