@@ -62,11 +62,9 @@ Pose transform_of(const NamedFrames& named) {
   const bool has_both = known.count(named.body) > 0 && known.count(named.lidar) > 0;
   const auto found = has_both ? tree.find(named.body, named.lidar, 0.0) : std::nullopt;
   if (found) return *found;
-  std::string list;
-  for (const std::string& frame : known) list += (list.empty() ? "" : ", ") + frame;
   throw ConfigError("extrinsic: expected " + named.file +
                     ":BODY:LIDAR with two frames that the file connects; it has " +
-                    (list.empty() ? "none" : list));
+                    text::listed({known.begin(), known.end()}));
 }
 
 }  // namespace

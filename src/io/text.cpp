@@ -1,5 +1,6 @@
 #include "text.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <sstream>
 
@@ -21,6 +22,16 @@ std::string to_text(double value) {
 }
 
 std::string in_seconds(double time) { return to_text(time) + " s"; }
+
+std::string listed(const std::vector<std::string>& names) {
+  constexpr std::size_t kShown = 50;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(names.size(), kShown); ++i) {
+    text += (i > 0 ? ", " : "") + names[i];
+  }
+  if (names.size() > kShown) text += " and " + std::to_string(names.size() - kShown) + " more";
+  return text.empty() ? "none" : text;
+}
 
 std::string_view without_utf8_mark(std::string_view text) {
   constexpr std::string_view kMark = "\xEF\xBB\xBF";

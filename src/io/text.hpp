@@ -8,6 +8,7 @@
 #include <ostream>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace dynains::text {
 
@@ -24,6 +25,9 @@ std::string lower_case(std::string text);
 std::string to_text(double value);
 /// "12.5 s".
 std::string in_seconds(double time);
+
+/// "a, b, c", at most 50 names and the number of others; "none" without names.
+std::string listed(const std::vector<std::string>& names);
 
 /// The text without a mark of UTF-8 at its begin.
 std::string_view without_utf8_mark(std::string_view text);

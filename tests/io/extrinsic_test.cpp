@@ -125,6 +125,13 @@ TEST_CASE("An extrinsic is found in static transforms by two frames") {
              " yaw: 1.5707963267948966}\n"
              "- {frame_id: mast, child_frame_id: lidar, x: 1, y: 0, z: 0}\n");
   check_mast(folder / "flat.yaml");
+  std::string star;
+  for (int i = 0; i < 60; ++i) {
+    star += "- {parent: base_link, child: f" + std::to_string(i) + ", x: 0, y: 0, z: 0}\n";
+  }
+  write_text(folder / "star.yaml", star);
+  CHECK_THAT(message_of<ConfigError>([&] { read_extrinsic(folder / "star.yaml"); }),
+             ContainsSubstring("it has base_link, f0, f1, ") && ContainsSubstring(" and 11 more"));
   write_text(folder / "message.yml",
              "transforms:\n- header:\n    frame_id: base_link\n  child_frame_id: mast\n"
              "  transform:\n    translation: {x: 0, y: 0, z: 2}\n"

@@ -53,12 +53,6 @@ LogTopic named(const Topics& topics, const std::string& name) {
                        [&](const LogTopic& topic) { return topic.name == name; });
 }
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text.empty() ? "none" : text;
-}
-
 }  // namespace
 
 LogScans::LogScans(const std::filesystem::path& path, const LogChoice& choice)
@@ -235,7 +229,7 @@ std::optional<Pose> LogScans::T_cloud_frame(const std::string& frame) const {
   return transforms_.find(cloud_frame_, frame, times_.front());
 }
 
-std::string LogScans::known_frames() const { return joined(transforms_.frames()); }
+std::string LogScans::known_frames() const { return text::listed(transforms_.frames()); }
 
 Trajectory LogScans::motion() const {
   Trajectory motion;
@@ -277,8 +271,8 @@ std::string LogScans::body_frame() const {
         log_->path(),
         std::string("expected a ") + (is_known ? "moving transform above" : "transform of") +
             " frame " + cloud_frame_ + ", that of the clouds; found " +
-            (is_known ? "moving transforms of " + joined(moving)
-                      : "transforms of " + joined(transforms_.frames())) +
+            (is_known ? "moving transforms of " + text::listed(moving)
+                      : "transforms of " + text::listed(transforms_.frames())) +
             ". If the log lacks the calibration, --extrinsic gives the pose of " + cloud_frame_ +
             " in " + body +
             (is_known ? "; if the sensor stands still, --pose-frame-id names the frame it stands in"
@@ -286,8 +280,8 @@ std::string LogScans::body_frame() const {
   }
   const std::optional<std::string> body = transforms_.moving_body();
   if (body) return *body;
-  fail(log_->path(),
-       "expected one moving body for --extrinsic, found moving transforms of " + joined(moving));
+  fail(log_->path(), "expected one moving body for --extrinsic, found moving transforms of " +
+                         text::listed(moving));
 }
 
 /// Poses of a topic are those of a frame of the robot, mostly not of the sensor.
