@@ -1,6 +1,7 @@
 #include "dynains/io/recording.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iomanip>
 #include <map>
 #include <sstream>
@@ -45,7 +46,43 @@ void subtract_origin(const Eigen::Vector3f& origin, RecordedScan& scan) {
   }
 }
 
+/// Points of the own vehicle become beams without a return.
+void clear_boxes(const std::vector<Eigen::AlignedBox3d>& boxes, RecordedScan& scan) {
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    Eigen::Map<Eigen::Vector3f> p(scan.xyzi.data() + 4 * i);
+    const auto holds = [&](const Eigen::AlignedBox3d& box) {
+      return box.contains(p.cast<double>());
+    };
+    if (std::any_of(boxes.begin(), boxes.end(), holds)) p.setZero();
+  }
+}
+
 }  // namespace
+
+std::vector<Eigen::AlignedBox3d> parse_self_boxes(const std::string& text) {
+  std::string words = text;
+  std::replace_if(
+      words.begin(), words.end(), [](char c) { return c == ',' || c == ';'; }, ' ');
+  std::vector<double> numbers;
+  bool is_valid = true;
+  std::string_view rest = words;
+  for (auto token = text::next_token(rest); !token.empty(); token = text::next_token(rest)) {
+    const auto number = text::parse_number(token);
+    is_valid = is_valid && number && std::isfinite(*number);
+    numbers.push_back(number.value_or(0.0));
+  }
+  if (!is_valid || numbers.empty() || numbers.size() % 6 != 0) {
+    throw ConfigError("self-box \"" + text +
+                      "\": expected six finite numbers for each box, \"x y z x y z\", two opposite "
+                      "corners in m");
+  }
+  std::vector<Eigen::AlignedBox3d> boxes;
+  for (std::size_t i = 0; i < numbers.size(); i += 6) {
+    Eigen::AlignedBox3d box(Eigen::Vector3d::Map(numbers.data() + i));
+    boxes.push_back(box.extend(Eigen::Vector3d::Map(numbers.data() + i + 3)));
+  }
+  return boxes;
+}
 
 Recording::Recording(const fs::path& path, const RecordingOptions& options)
     : folder_(path), options_(options) {
@@ -317,7 +354,8 @@ std::uint64_t Recording::point_count(std::size_t i) const {
 bool Recording::is_verbatim() const {
   return format_ == ScanFormat::kBin && frame_ == PointFrame::kSensor && !options_.deskew &&
          sensor_origin().isZero(0.0) && options_.point_unit == 1.0 &&
-         options_.bin_layout.columns == 4 && !options_.bin_layout.is_double;
+         options_.bin_layout.columns == 4 && !options_.bin_layout.is_double &&
+         options_.self_boxes.empty();
 }
 
 /// From the coordinates of a file to the sensor frame, m; nothing if they are the same.
@@ -338,6 +376,7 @@ void Recording::read_scan(std::size_t i, RecordedScan& scan) const {
   if (frame_ == PointFrame::kSensor && !sensor_origin().isZero(0.0)) {
     subtract_origin(sensor_origin().cast<float>(), scan);
   }
+  if (!options_.self_boxes.empty()) clear_boxes(options_.self_boxes, scan);
   if (options_.deskew) deskew(motion_, time(i), T_world_sensor(i), *clock_, file(i), scan);
 }
 

@@ -107,6 +107,12 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool 
       ->type_name("N|Nd")
       ->group(kGroup);
   command
+      .add_option("--self-box", self_box_,
+                  "box around a part of the own vehicle, whose points are left out: two opposite "
+                  "corners in m, frame of the lidar; further boxes follow in the same text")
+      ->type_name("\"X Y Z X Y Z\"")
+      ->group(kGroup);
+  command
       .add_flag("--accept-missing", accept_missing_, "read a log although parts of it are missing")
       ->group(kGroup);
   command
@@ -205,6 +211,7 @@ RecordingOptions RecordingFlags::options() const {
   options.point_unit = metres_of(point_units_);
   options.bin_layout = parse_bin_layout(bin_columns_);
   options.accept_missing = accept_missing_;
+  if (!self_box_.empty()) options.self_boxes = parse_self_boxes(self_box_);
   options.scene = scene_;
   options.frame = value_of_name<PointFrame>(frame_).value();
   PoseConvention& convention = options.convention;

@@ -51,6 +51,7 @@ class RecordingFlags {
   std::string point_time_unit_ = "auto";
   std::string point_units_ = "m";
   std::string bin_columns_ = "4";
+  std::string self_box_;
   bool accept_missing_ = false;
   std::string extrinsic_;
   std::string sensor_origin_;

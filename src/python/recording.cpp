@@ -139,8 +139,12 @@ void warn_of_missing_scans(const Recording& recording) {
     warn(recording.folder().string() + ": " + std::to_string(recording.missing_pose_count()) +
          " of " + total + " scans have no pose and are left out; see the notes of the recording");
   }
-  if (recording.early_end())
+  if (recording.early_end()) {
     warn(*recording.early_end() + "; " + total + " scans before it are read");
+  }
+  for (const std::string& text : recording.warnings()) {
+    warn(recording.folder().string() + ": " + text);
+  }
 }
 
 void bind_recording(py::module_& module) {

@@ -29,7 +29,7 @@ std::string to_origin(const py::handle& value) {
   return text;
 }
 
-const std::array<Setting<RecordingOptions>, 23> kRecordingSettings{{
+const std::array<Setting<RecordingOptions>, 24> kRecordingSettings{{
     {"poses", "a path",
      "file of poses: 12 numbers a row (KITTI), time x y z qx qy qz qw (TUM), or CSV with named "
      "columns",
@@ -76,6 +76,12 @@ const std::array<Setting<RecordingOptions>, 23> kRecordingSettings{{
      "columns of .bin scans: x y z, intensity, others; '5' for float32, '3d' for float64",
      [](RecordingOptions& o, const py::handle& v) {
        o.bin_layout = parse_bin_layout(py::str(v).cast<std::string>());
+     }},
+    {"self_box", "'x y z x y z'",
+     "boxes around parts of the own vehicle, whose points are left out: two opposite corners each, "
+     "m, frame of the lidar",
+     [](RecordingOptions& o, const py::handle& v) {
+       o.self_boxes = parse_self_boxes(v.cast<std::string>());
      }},
     {"accept_missing", "bool", "read a log although parts of it are missing",
      [](RecordingOptions& o, const py::handle& v) { o.accept_missing = to_flag(v); }},

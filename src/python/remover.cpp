@@ -70,7 +70,7 @@ struct Frame {
   std::optional<PoseResidual> pose_residual;
   TimeDoubt time_doubt = TimeDoubt::kNone;
   std::optional<EpochReason> began_epoch;
-  Suspicion suspicion = Suspicion::kNone;
+  Plausibility plausibility;
 };
 
 // The remover without the interpreter's lock: a mutex keeps threads that share it apart.
@@ -94,7 +94,7 @@ class Remover {
       frame.pose_residual = result.pose_residual;
       frame.time_doubt = result.time_doubt;
       frame.began_epoch = result.began_epoch;
-      frame.suspicion = result.plausibility.suspicion;
+      frame.plausibility = result.plausibility;
     });
     frame.newest = py::cast(Verdict(std::move(*newest)));
     if (finished) {
@@ -169,6 +169,15 @@ std::string represent(const PoseResidual& residual) {
   text << std::setprecision(3) << "<dynains.PoseResidual: " << residual.translation << " m, "
        << residual.rotation << " deg>";
   return text.str();
+}
+
+std::optional<std::string> suspicion_of(const Plausibility& window) {
+  if (window.suspicion == Suspicion::kNone) return std::nullopt;
+  return plain_value(window.suspicion);
+}
+
+std::string represent(const Plausibility& window) {
+  return "<dynains.Plausibility: " + suspicion_of(window).value_or("no suspicion") + '>';
 }
 
 std::string represent(const Frame& frame) {
@@ -261,6 +270,26 @@ void bind_remover(py::module_& module) {
       .def_readonly("previous_time", &PoseResidual::previous_time, "s, of that scan")
       .def("__repr__", [](const PoseResidual& residual) { return represent(residual); });
 
+  py::class_<Plausibility>(module, "Plausibility",
+                           "Shares over the last ten scans, 0 to 1, and what they contradict.")
+      .def_readonly("not_judged", &Plausibility::not_judged,
+                    "Points that are invalid, too near or too far.")
+      .def_readonly("ground_free", &Plausibility::ground_free,
+                    "Beams through the ground, of those that reach or pass it.")
+      .def_readonly("instance_free", &Plausibility::instance_free,
+                    "Samples above the ground seen free, of those seen free or hit.")
+      .def_readonly("misfits", &Plausibility::misfits,
+                    "Scans that begin an epoch because poses or surfaces do not fit.")
+      .def_readonly("residual", &Plausibility::residual,
+                    "m, mean translation of PoseResidual, each at most 0.15 m.")
+      .def_property_readonly(
+          "suspicion", &suspicion_of,
+          "What the scans contradict: \"units\", \"poses\" or \"rays\" (origin of rays, times of "
+          "points). Else None.")
+      .def_readonly("since", &Plausibility::since,
+                    "Number of the scan at which the suspicious window began.")
+      .def("__repr__", [](const Plausibility& window) { return represent(window); });
+
   py::class_<Frame>(module, "FrameResult", "Answer to one scan.")
       .def_readonly("newest", &Frame::newest,
                     "ScanVerdict: what the past alone says of the scan just pushed.")
@@ -279,13 +308,10 @@ void bind_remover(py::module_& module) {
           "Why the scan is not compared with earlier ones: \"start\", \"sensor\", \"pause\", "
           "\"jump\" or \"misfit\". Else None.")
       .def_property_readonly(
-          "suspicion",
-          [](const Frame& frame) -> std::optional<std::string> {
-            if (frame.suspicion == Suspicion::kNone) return std::nullopt;
-            return plain_value(frame.suspicion);
-          },
+          "suspicion", [](const Frame& frame) { return suspicion_of(frame.plausibility); },
           "What the last scans contradict: \"units\", \"poses\" or \"rays\" (origin of rays, "
           "times of points). Else None.")
+      .def_readonly("plausibility", &Frame::plausibility, "Plausibility of the last scans.")
       .def_property_readonly(
           "time_doubt",
           [](const Frame& frame) -> std::optional<std::string> {

@@ -19,7 +19,8 @@ nlohmann::ordered_json describe_request(const Recording& recording, const ScanRa
                                         const nlohmann::ordered_json& configuration);
 
 /// Flags of a recording that tell how its points are stored. A request holds those that were given.
-inline constexpr std::array kPointFlags = {"--point-units", "--point-time-unit", "--bin-columns"};
+inline constexpr std::array kPointFlags = {"--point-units", "--point-time-unit", "--bin-columns",
+                                           "--self-box"};
 
 /// Fingerprint of the names, poses and times of the scans, as in describe_request().
 std::string pose_fingerprint(const Recording& recording, const ScanRange& range);

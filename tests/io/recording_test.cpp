@@ -445,6 +445,29 @@ TEST_CASE("Raw scans with other columns are refused with the option, and read wi
   }
 }
 
+TEST_CASE("Points in the boxes of the own vehicle count as beams without a return") {
+  const TemporaryFolder folder;
+  write_text(folder / "1.pcd", pcd({-0.5, 0, 0}, "100 0 0 1 0 0 0"));
+  const auto x_of_first = [&](const std::string& boxes) {
+    RecordingOptions options;
+    options.frame = PointFrame::kSensor;
+    options.self_boxes = parse_self_boxes(boxes);
+    const Recording recording(folder.path(), options);
+    CHECK_FALSE(recording.is_verbatim());
+    const RecordedScan scan = recording.read_scan(0);
+    CHECK(scan.size() == recording.point_count(0));
+    return scan.xyzi[0];
+  };
+  CHECK(x_of_first("0.51 -1 -1 1 1 1") == 0.5F);
+  CHECK(x_of_first("0.49 -1 -1 1 1 1") == 0.0F);
+  CHECK(x_of_first("1, 1, 1, 0.49, -1, -1") == 0.0F);
+  CHECK(x_of_first("2 2 2 3 3 3; 0 -1 -1 1 1 1") == 0.0F);
+  for (const char* wrong : {"", "1 2 3 4 5", "1 2 3 4 5 6 7", "1 2 3 4 5 x", "1 2 3 4 5 inf"}) {
+    CHECK_THAT(message_of<ConfigError>([&] { parse_self_boxes(wrong); }),
+               ContainsSubstring("expected six finite numbers for each box"));
+  }
+}
+
 TEST_CASE("Coordinates in millimetres become metres, also in the world frame") {
   const TemporaryFolder folder;
   write_text(folder / "1.pcd", pcd({100000, 0, 0}, "100 0 0 0.70710678 0 0 0.70710678"));

@@ -155,6 +155,18 @@ def test_a_log_that_is_cut_off(drive, tmp_path):
     assert 0 < len(recording) < 12 and "cut.mcap" in recording.early_end
 
 
+def test_parts_of_a_log_that_are_missing(drive, tmp_path):
+    log = dynains.run(drive, tmp_path / "out", write_mcap=True).folder / "verdicts.mcap"
+    (tmp_path / "log").mkdir()
+    log.rename(tmp_path / "log" / "part_0.mcap")
+    (tmp_path / "log" / "metadata.yaml").write_text(
+        "rosbag2_bagfile_information:\n  relative_file_paths:\n"
+        "    - part_0.mcap\n    - part_1.mcap\n"
+    )
+    with pytest.warns(RuntimeWarning, match="part_1.mcap"):
+        dynains.Recording(tmp_path / "log", accept_missing=True, cloud_topic="/points")
+
+
 def test_check_of_a_good_recording(drive):
     recording = dynains.Recording(drive)
     diagnosis = dynains.check(recording)

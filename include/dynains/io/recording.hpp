@@ -38,6 +38,10 @@ struct BinLayout {
 /// "4" for columns of float32, "4d" for float64. Throws ConfigError.
 BinLayout parse_bin_layout(const std::string& text);
 
+/// "x y z x y z": two opposite corners of a box, m; further boxes follow. Blanks, commas and
+/// semicolons separate numbers. Throws ConfigError.
+std::vector<Eigen::AlignedBox3d> parse_self_boxes(const std::string& text);
+
 struct RecordingOptions {
   std::filesystem::path poses;  ///< trajectory file; empty: search the recording
   std::filesystem::path times;  ///< file with one time per scan, s; empty: search the recording
@@ -60,7 +64,10 @@ struct RecordingOptions {
   double point_time_unit = 0.0;  ///< s per unit of the times of points; 0: found by their span
   double point_unit = 1.0;       ///< m per unit of the coordinates of points
   BinLayout bin_layout;          ///< of scans in .bin files
-  bool accept_missing = false;   ///< for logs: whether parts may be missing
+  /// Boxes around parts of the own vehicle, frame of the sensor, m: points inside count as beams
+  /// without a return.
+  std::vector<Eigen::AlignedBox3d> self_boxes;
+  bool accept_missing = false;  ///< for logs: whether parts may be missing
 };
 
 /// One scan. Each column has one value per point, or is empty if the recording lacks it.
@@ -194,7 +201,7 @@ class Recording {
   /// Reads scan i, m, sensor frame, and reuses the memory of `scan`. May contain NaN and infinity.
   /// With RecordingOptions::deskew, the poses of the recording between the scans are interpolated
   /// at the time of each point; times of points keep their values. Points whose time cannot be that
-  /// of their scan keep their place.
+  /// of their scan keep their place. Points in RecordingOptions::self_boxes are at the origin.
   void read_scan(std::size_t i, RecordedScan& scan) const;
   RecordedScan read_scan(std::size_t i) const;
   /// One label per point of scan i.
