@@ -461,10 +461,36 @@ PoseAgreement agreement_at(const Recording& recording, std::size_t first, std::s
   return {as_given.mean(), standing_agreement(pairs), stride};
 }
 
+constexpr const char* kWorldOption = "--frame world";
+
+/// Whether no point of a scan lies around the origin of the clouds, but most lie around the
+/// position of the sensor in the world.
+bool seems_in_world(const Recording& recording) {
+  constexpr double kNear = 40.0, kAround = 80.0;  // m
+  if (recording.frame() != PointFrame::kSensor || recording.size() == 0) return false;
+  const std::size_t middle = recording.size() / 2;
+  const RecordedScan scan = recording.read_scan(middle);
+  const Eigen::Vector3d position = recording.T_world_sensor(middle).translation();
+  std::size_t valid = 0, near_sensor = 0, near_origin = 0;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const Eigen::Vector3d p = scan.point(i).position;
+    if (!p.allFinite() || p.isZero(0.0)) continue;
+    ++valid;
+    if ((p - position).norm() < kAround) ++near_sensor;
+    if (p.norm() < kNear) ++near_origin;
+  }
+  return near_origin == 0 && valid > 0 && 2 * near_sensor > valid;
+}
+
 }  // namespace
 
 Diagnosis diagnose(const Recording& recording) {
   Diagnosis d = diagnose_agreement(recording);
+  if (d.verdict == PoseVerdict::kUnknown && seems_in_world(recording)) {
+    d.verdict = PoseVerdict::kDisagree;
+    d.option = kWorldOption;
+    return d;
+  }
   compare_with_registration(recording, d);
   accept_proven_poses(recording, d);
   if (d.sound() && d.scans > 0) d.ray_origin = find_ray_origin(recording, 0, d.scans - 1);
@@ -566,6 +592,12 @@ std::string advice(const Diagnosis& d) {
       return "The sensor hardly moves, so that scans agree whatever the poses mean; nothing speaks "
              "against them.";
     case PoseVerdict::kDisagree:
+      if (d.option == kWorldOption) {
+        return std::string(
+                   "No point lies around the origin of the clouds, but most lie around the "
+                   "position of the sensor in the world: pass ") +
+               kWorldOption + '.';
+      }
       if (d.standing.share >= kLeastAgreement && is_clearly_better(d.standing, d.as_given)) {
         return "Scans agree best as if the sensor stood still, though the poses move: if the "
                "points are in the frame of the world, pass --frame world; if the sensor did stand "

@@ -311,6 +311,9 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
       d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion;
   if (may_be_inexact && (is_inexact(steps, steps) || d.is_inexact_at_start))
     d.verdict = PoseVerdict::kInexact;
+  const bool is_still = error_at_points(motions, no_motion) < 0.5 * before &&
+                        is_clearly_better(d.standing, d.as_given);
+  if (d.verdict == PoseVerdict::kInexact && is_still) d.verdict = PoseVerdict::kDisagree;
 }
 
 void accept_proven_poses(const Recording& recording, Diagnosis& d) {

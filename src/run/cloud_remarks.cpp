@@ -5,10 +5,14 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 #include <iomanip>
 #include <locale>
 #include <sstream>
+#include <utility>
 #include <vector>
+
+#include "io/finite_points.hpp"
 
 namespace dynains::program {
 namespace {
@@ -22,16 +26,19 @@ std::ostringstream plain_text() {
   return text;
 }
 
-/// Whether nearly all coordinates of an axis are multiples of `step` (m).
-bool are_multiples(const RecordedScan& scan, const Pose& T_world_sensor, Eigen::Index axis,
+/// Whether nearly all coordinates of an axis in the frame `file` lie multiples of `step` (m) apart.
+bool are_multiples(const RecordedScan& scan, const Pose& T_file_sensor, Eigen::Index axis,
                    double step) {
   constexpr std::size_t kFewest = 100;
   constexpr double kNear = 0.1;  // of a step
   std::size_t count = 0, on_grid = 0;
+  double first = 0.0;
   for (std::size_t i = 0; i < scan.size(); ++i) {
     const Eigen::Vector3d p = scan.point(i).position;
     if (!p.allFinite() || p.isZero(0.0)) continue;
-    const double steps = (T_world_sensor * p)[axis] / step;
+    const double place = (T_file_sensor * p)[axis];
+    if (count == 0) first = place;
+    const double steps = (place - first) / step;
     on_grid += std::abs(steps - std::round(steps)) < kNear ? 1 : 0;
     ++count;
   }
@@ -86,12 +93,47 @@ std::optional<Eigen::Vector3d> common_normal(const Recording& recording) {
                            });
 }
 
+/// The mounting of a sensor that lies on one of its sides; empty if scans do not show it.
+std::optional<std::string> remark_on_tilt(const Recording& recording) {
+  const auto up = common_normal(recording);
+  if (!up) return std::nullopt;
+  const auto rounded = [](double radians) { return std::round(kDegrees * radians) + 0.0; };
+  std::ostringstream text = plain_text();
+  text << std::setprecision(0) << "the sensor seems to be tilted by "
+       << rounded(std::acos(std::clamp(up->z(), -1.0, 1.0))) << " deg: pass --mounting-pitch "
+       << rounded(std::asin(std::clamp(-up->x(), -1.0, 1.0))) << " --mounting-roll "
+       << rounded(std::atan2(up->y(), up->z()));
+  return text.str();
+}
+
+/// A remark if the points of a scan lie on a grid of 5 cm or more.
+std::optional<std::string> remark_on_grid(const RecordedScan& scan, const Pose& T_file_sensor) {
+  for (const double step : {1.0, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05}) {
+    if (!are_multiples(scan, T_file_sensor, 0, step) ||
+        !are_multiples(scan, T_file_sensor, 1, step)) {
+      continue;
+    }
+    std::ostringstream text = plain_text();
+    text << std::setprecision(2) << "points lie on a grid of " << step
+         << " m, as after a voxel filter or a coarse conversion: record the clouds before it";
+    return text.str();
+  }
+  return std::nullopt;
+}
+
+/// Whether two scans have points, all of them with equal bits.
+bool are_equal(const RecordedScan& a, const RecordedScan& b) {
+  return a.size() > 0 && a.size() == b.size() &&
+         std::memcmp(a.xyzi.data(), b.xyzi.data(), a.xyzi.size() * sizeof(float)) == 0;
+}
+
 }  // namespace
 
 std::optional<std::string> remark_on_stripes(const Recording& recording) {
   constexpr double kLeast = 0.01;  // m
-  if (recording.frame() != PointFrame::kWorld || recording.size() == 0) return std::nullopt;
+  if (recording.size() == 0) return std::nullopt;
   const RecordedScan scan = recording.read_scan(0);
+  if (recording.frame() != PointFrame::kWorld) return remark_on_grid(scan, Pose::Identity());
   const Pose& T_world_sensor = recording.T_world_sensor(0);
   double widest = 0.0;
   double far = 0.0;
@@ -103,7 +145,7 @@ std::optional<std::string> remark_on_stripes(const Recording& recording) {
     widest = std::max(widest, step);
     far = std::max(far, place);
   }
-  if (widest == 0.0) return std::nullopt;
+  if (widest == 0.0) return remark_on_grid(scan, T_world_sensor);
   std::ostringstream text = plain_text();
   text << "points were stored as float32 " << std::setprecision(0) << far
        << " m from the origin of the world, and lie in stripes of " << std::setprecision(2)
@@ -112,20 +154,41 @@ std::optional<std::string> remark_on_stripes(const Recording& recording) {
   return text.str();
 }
 
+std::optional<std::string> remark_on_copies(const Recording& recording, const ScanRange& range) {
+  constexpr std::size_t kPlaces = 3;
+  constexpr double kLeastMotion = 0.05;  // m
+  RecordedScan scan, next;
+  for (std::size_t k = 0; k < kPlaces && range.size() > 2; ++k) {
+    const std::size_t first = range.first + k * (range.size() - 3) / (kPlaces - 1);
+    recording.read_scan(first, scan);
+    for (std::size_t i = first; i < first + 2; ++i) {
+      recording.read_scan(i + 1, next);
+      const Pose T = recording.T_world_sensor(i).inverse() * recording.T_world_sensor(i + 1);
+      if (T.translation().norm() > kLeastMotion && are_equal(scan, next)) {
+        return "clouds " + recording.name(i) + " and " + recording.name(i + 1) +
+               " are equal, though the sensor moves between them: leave copies of clouds out";
+      }
+      std::swap(scan, next);
+    }
+  }
+  return std::nullopt;
+}
+
 std::optional<std::string> remark_on_mounting(const Recording& recording,
                                               const Mounting& mounting) {
   if (mounting.known || recording.size() == 0) return std::nullopt;
-  const auto up = common_normal(recording);
-  if (!up) {
-    return "no ground in sight below the sensor, so that height and tilt are not known; if it is "
-           "tilted by more than 45 deg: --mounting-pitch, --mounting-roll";
+  const auto tilt = remark_on_tilt(recording);
+  if (tilt) return tilt;
+  return "no ground in sight below the sensor, so that height and tilt are not known; if it is "
+         "tilted by more than 45 deg: --mounting-pitch, --mounting-roll";
+}
+
+std::optional<std::string> remark_on_tilted_scans(const Recording& recording,
+                                                  const ScanRange& range) {
+  for (const std::size_t i : {range.first, range.first + range.size() / 2, range.last}) {
+    if (estimate_mounting(finite_points(recording.read_scan(i))).known) return std::nullopt;
   }
-  std::ostringstream text = plain_text();
-  text << std::setprecision(0) << "the sensor seems to be tilted by "
-       << kDegrees * std::acos(std::clamp(up->z(), -1.0, 1.0)) << " deg: pass --mounting-pitch "
-       << kDegrees * std::asin(std::clamp(-up->x(), -1.0, 1.0)) << " --mounting-roll "
-       << kDegrees * std::atan2(up->y(), up->z());
-  return text.str();
+  return remark_on_tilt(recording);
 }
 
 }  // namespace dynains::program

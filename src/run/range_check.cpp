@@ -50,7 +50,8 @@ void check_ranges(const Recording& recording, const ScanRange& range, const Remo
        << " m (--max-range) from the sensor; half of the points are beyond "
        << ranges[ranges.size() / 2]
        << " m. If coordinates are in millimetres or centimetres: --point-units mm, --point-units "
-          "cm; else --point-units m runs unless nothing can be judged";
+          "cm; in the frame of the world: --frame world; else --point-units m runs unless nothing "
+          "can be judged";
   throw ConfigError(text.str());
 }
 

@@ -77,8 +77,10 @@ void add_remarks(std::ostream& text, const Diagnosis& d) {
 
 /// Adds the findings that need more scans than the diagnosis reads. Throws IoError.
 void add_findings_in_scans(const Recording& recording, const Diagnosis& d, std::ostream& text) {
+  if (recording.size() == 0) return;
   for (const auto& remark :
-       {remark_on_stripes(recording), remark_on_mounting(recording, d.mounting)}) {
+       {remark_on_stripes(recording), remark_on_copies(recording, {0, recording.size() - 1}),
+        remark_on_mounting(recording, d.mounting)}) {
     if (remark) text << "note: " << *remark << '\n';
   }
   if (recording.frame() != PointFrame::kSensor || recording.size() < 3) return;
@@ -162,6 +164,11 @@ RecordingCheck check_recording(const Recording& recording) {
   }
   check.passed = sound && !lone;
   if (!lone || !sound) check.advice = advice(check.diagnosis) + '\n';
+  // The remark on the mounting has an option.
+  const std::size_t none = check.advice.find("; no option is needed");
+  if (!check.diagnosis.mounting.known && none != std::string::npos) {
+    check.advice.replace(none, std::string::npos, ".\n");
+  }
   if (lone) check.remark = *lone + ".\n";
   return check;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -82,6 +83,16 @@ void warn(const RunListener& listener, const std::string& text) {
   if (listener.warn) listener.warn(text);
 }
 
+/// The listener, whose warnings are also added to `warnings`. Both must outlive the result.
+RunListener with_memory(const RunListener& listener, std::vector<std::string>& warnings) {
+  RunListener result = listener;
+  result.warn = [&](const std::string& text) {
+    warnings.push_back(text);
+    warn(listener, text);
+  };
+  return result;
+}
+
 /// Whether poses and clouds are judged: they are not accepted unseen, and there are enough scans
 /// for a judgement beyond doubt.
 bool are_judged(const RunPlan& plan, const RunSettings& settings) {
@@ -118,9 +129,10 @@ void judge_poses(const RunPlan& plan, const RunSettings& settings, const RunList
   if (diagnosis) {
     if (diagnosis->verdict == PoseVerdict::kInexact) warn(listener, advice(*diagnosis));
     if (diagnosis->sound() || diagnosis->verdict == PoseVerdict::kRayOrigin) return;
-    if (is_small_shift(*diagnosis, plan.sequence.convention())) {
+    if (diagnosis->verdict == PoseVerdict::kUnknown ||
+        is_small_shift(*diagnosis, plan.sequence.convention())) {
       warn(listener, advice(*diagnosis));
-    } else if (diagnosis->verdict != PoseVerdict::kUnknown) {
+    } else {
       throw ConfigError((agreement.doubtful() ? share + ". " : std::string()) + advice(*diagnosis) +
                         " See: " + see + "; or run with these poses by --accept-poses");
     }
@@ -171,8 +183,16 @@ void warn_of_doubts(const RunPlan& plan, const RunSettings& settings, const RunL
   const auto lone =
       remark_on_lone_scans(plan.sequence, plan.range.first, plan.range.last, plan.config);
   if (lone) warn(listener, *lone);
-  const auto stripes = remark_on_stripes(plan.sequence);
-  if (stripes) warn(listener, *stripes);
+  for (const auto& remark :
+       {remark_on_stripes(plan.sequence), remark_on_copies(plan.sequence, plan.range)}) {
+    if (remark) warn(listener, *remark);
+  }
+  const RemoverConfig& config = plan.config;
+  const bool finds_mounting =
+      config.level && config.mounting_pitch == 0.0 && config.mounting_roll == 0.0;
+  const auto tilt =
+      finds_mounting ? remark_on_tilted_scans(plan.sequence, plan.range) : std::nullopt;
+  if (tilt) warn(listener, *tilt);
 }
 
 RunDescription describe(const RunPlan& plan, const RunSettings& settings,
@@ -241,8 +261,10 @@ nlohmann::ordered_json marker_of(const RunPlan& plan) {
 
 /// Writes the results into `out`, from the first scan on, or until a signal comes.
 RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
-                         const RunListener& listener, OutputFolder& out, OutputChange::Mode mode,
+                         const RunListener& caller, OutputFolder& out, OutputChange::Mode mode,
                          OutsideMap& outside_map) {
+  std::vector<std::string> warnings = plan.sequence.warnings();
+  const RunListener listener = with_memory(caller, warnings);
   check_ranges(plan.sequence, plan.range, plan.config,
                settings.recording_flags.contains("--point-units"));
   const PoseAgreement agreement = pose_agreement(plan.sequence, plan.range.first, plan.range.last);
@@ -288,6 +310,7 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   RunDescription description = describe(plan, settings, agreement, results);
   description.wall = outcome.wall;
   description.doubts = to_json(doubts, plan.sequence);
+  description.doubts["warnings"] = warnings;
   nlohmann::ordered_json report = make_report(description, results, timing);
   report["request"] = plan.request;
   if (second_pass) report["second_pass"] = to_json(*second_pass, plan);

@@ -47,7 +47,7 @@ struct RunDescription {
   std::string map;       ///< file, relative to the folder of results if it lies there; empty: none
   nlohmann::ordered_json configuration;  ///< parameter name -> value
   WallTime wall;
-  nlohmann::ordered_json doubts;  ///< see to_json(RunDoubts)
+  nlohmann::ordered_json doubts;  ///< see to_json(RunDoubts), and "warnings"
 };
 
 nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& results,

@@ -91,6 +91,7 @@ TEST_CASE("run says nothing about a right recording, and its report has no doubt
   CHECK(outcome.err.empty());
   CHECK(drive.report()["doubts"]["jumps"].empty());
   CHECK(drive.report()["doubts"]["suspicious"].empty());
+  CHECK(drive.report()["doubts"]["warnings"].empty());
 }
 
 TEST_CASE("run stops before its first output if the poses are those of a turned body") {
@@ -127,6 +128,9 @@ TEST_CASE("check and run name the scan at which poses jump, and the size") {
   const nlohmann::json jumps = drive.report()["doubts"]["jumps"];
   REQUIRE(jumps.size() == 1);
   CHECK(jumps[0]["scan"] == "000015");
+  const nlohmann::json warnings = drive.report()["doubts"]["warnings"];
+  REQUIRE(warnings.size() == 1);
+  CHECK_THAT(outcome.err, ContainsSubstring("warning: " + warnings[0].get<std::string>()));
   CHECK(jumps[0]["metres"].get<double>() == Approx(3.0).margin(0.3));
   CHECK(jumps[0]["degrees"].get<double>() == Approx(2.0).margin(1.0));
 }
@@ -161,6 +165,68 @@ TEST_CASE("check and run tell coordinates that float32 put into stripes") {
   }
 }
 
+TEST_CASE("check and run tell points of the world that are taken for those of the sensor") {
+  const Drive drive;
+  const auto write_world = [&](const Eigen::Vector3d& shift) {
+    for (std::size_t i = 0; i < drive.size(); ++i) {
+      std::vector<float> xyzi = drive.scan(i).xyzi;
+      for (std::size_t k = 0; k + 3 < xyzi.size(); k += 4) {
+        const Eigen::Vector3d p =
+            drive.scan(i).T_world_sensor *
+                Eigen::Vector3f(xyzi[k], xyzi[k + 1], xyzi[k + 2]).cast<double>() +
+            shift;
+        for (int axis = 0; axis < 3; ++axis) xyzi[k + axis] = static_cast<float>(p[axis]);
+      }
+      write_scan(drive.file_of(i), xyzi);
+    }
+    drive.pose([&](std::size_t, Pose T) {
+      T.translation() += shift;
+      return T;
+    });
+  };
+  const Eigen::Vector3d first = drive.scan(0).T_world_sensor.translation();
+  for (const Eigen::Vector3d& shift :
+       {Eigen::Vector3d(-first), Eigen::Vector3d(400.0, -300.0, 5.0)}) {
+    write_world(shift);
+    CHECK_THAT(start({"check", drive.path()}).out, ContainsSubstring("pass --frame world"));
+    const Outcome stopped = drive.run();
+    CHECK(stopped.code == 2);
+    CHECK_THAT(stopped.err, ContainsSubstring("--frame world"));
+    CHECK(drive.run({"--frame", "world"}).code == 0);
+  }
+}
+
+TEST_CASE("check and run tell points that lie on a grid") {
+  const Drive drive;
+  for (const float step : {0.2F, 0.02F}) {
+    for (std::size_t i = 0; i < drive.size(); ++i) {
+      std::vector<float> xyzi = drive.scan(i).xyzi;
+      for (std::size_t k = 0; k < xyzi.size(); ++k) {
+        // Centres of voxels.
+        if (k % 4 < 3) xyzi[k] = step * (std::floor(xyzi[k] / step) + 0.5F);
+      }
+      write_scan(drive.file_of(i), xyzi);
+    }
+    const bool is_coarse = step > 0.1F;
+    const auto is_told = [](const std::string& text) {
+      return text.find("points lie on a grid of 0.20 m") != std::string::npos;
+    };
+    CHECK(is_told(start({"check", drive.path()}).out) == is_coarse);
+    CHECK(is_told(drive.run().err) == is_coarse);
+  }
+}
+
+TEST_CASE("check and run tell clouds that were recorded twice") {
+  const Drive drive;
+  for (std::size_t i = 1; i < drive.size(); i += 2) {
+    write_scan(drive.file_of(i), drive.scan(i - 1).xyzi);
+  }
+  for (const std::string& told :
+       {start({"check", drive.path()}).out, drive.run({"--accept-poses"}).err}) {
+    CHECK_THAT(told, ContainsSubstring("are equal, though the sensor moves"));
+  }
+}
+
 TEST_CASE("one scan alone is told") {
   const Drive drive;
   const Outcome outcome = drive.run({"--start", "3", "--end", "3"});
@@ -168,7 +234,7 @@ TEST_CASE("one scan alone is told") {
   CHECK_THAT(outcome.err, ContainsSubstring("one scan alone"));
 }
 
-TEST_CASE("check proposes the mounting of a sensor that lies on its side") {
+TEST_CASE("check and run propose the mounting of a sensor that lies on its side") {
   const Drive drive;
   // Nose down by 60 deg, which the estimate of the mounting does not reach.
   const double pitch = 60.0 * M_PI / 180.0;
@@ -189,4 +255,7 @@ TEST_CASE("check proposes the mounting of a sensor that lies on its side") {
   const std::size_t at = told.find("--mounting-pitch ");
   REQUIRE(at != std::string::npos);
   CHECK(std::stod(told.substr(at + 17)) == Approx(60.0).margin(3.0));
+  CHECK_THAT(told, !ContainsSubstring("no option is needed"));
+  CHECK_THAT(drive.run().err, ContainsSubstring("tilted by 60 deg: pass --mounting-pitch "));
+  CHECK(drive.run({"--mounting-pitch", "60"}).err.empty());
 }

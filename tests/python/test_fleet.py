@@ -129,7 +129,15 @@ def test_a_recording_that_fails_is_reported_and_does_not_stop_the_others(drives,
     report = json.loads((tmp_path / "out" / "fleet.json").read_text())
     assert "000000.bin: truncated at byte" in report["broken"]["error"]
     assert [report[name]["scans"] for name in ("drive1", "drive2")] == [20, 20]
+    assert report["drive1"]["warnings"] == []
     assert "3 of 3 recordings" in capsys.readouterr().err
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_the_warnings_of_a_run_are_part_of_its_result(drives, tmp_path):
+    job = (str(drives / "drive1"), str(tmp_path / "out"))
+    result = fleet._clean_one(*job, {"pose_units": "mm", "accept_poses": True})
+    assert any("agree under these poses" in warning for warning in result["warnings"])
 
 
 def test_wrong_arguments_of_a_fleet(drives, tmp_path, capsys):

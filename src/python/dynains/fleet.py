@@ -120,7 +120,7 @@ _ERRORS = (ConfigError, IoError, PoseError, UsageError)
 
 
 def _clean_one(recording: str, out: str, arguments: Dict[str, Any]) -> Dict[str, Any]:
-    """Runs over one recording. Returns its result or its error."""
+    """Runs over one recording. Returns its result, with the warnings, or its error."""
     try:
         result = _when_free(lambda: run(recording, out, **arguments))
     except _ERRORS as error:
@@ -130,6 +130,7 @@ def _clean_one(recording: str, out: str, arguments: Dict[str, Any]) -> Dict[str,
         "scans": result.scans,
         "points": result.points,
         "labels": result.label_counts,
+        "warnings": result.report.get("doubts", {}).get("warnings", []),
     }
 
 
@@ -230,6 +231,8 @@ def _size_of(path: Path) -> int:
 
 def _tell(done: int, total: int, name: str, result: Dict[str, Any]) -> None:
     outcome = f"failed: {result['error']}" if "error" in result else f"{result['scans']} scans"
+    for warning in result.get("warnings", []):
+        outcome += f"; warning: {warning}"
     print(f"{done} of {total} recordings: {name}: {outcome}", file=sys.stderr, flush=True)
 
 
