@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "dynains/evidence/instance_judge.hpp"
@@ -24,6 +25,7 @@ constexpr float kHitStep = -1.6959109F;  // log-odds of p_hit = 0.155
 // Supervoxels of each instance, by their numbers of samples.
 using Instances = std::vector<std::vector<std::uint32_t>>;
 
+// All samples lie 10 m ahead of the sensor.
 InstanceSamples samples_of(const Instances& instances) {
   InstanceSamples samples;
   samples.sample_begin = {0};
@@ -33,6 +35,7 @@ InstanceSamples samples_of(const Instances& instances) {
     for (const std::uint32_t count : supervoxels) {
       samples.supervoxel_of.insert(samples.supervoxel_of.end(), count,
                                    static_cast<std::uint32_t>(samples.supervoxel_count()));
+      for (std::uint32_t i = 0; i < count; ++i) samples.points.push_back(10.0F, 0.0F, 0.0F);
       samples.sample_begin.push_back(samples.sample_begin.back() + count);
       samples.instance_of.push_back(instance);
       samples.place.push_back(voxel_key(0, 0, 0));
@@ -55,7 +58,7 @@ struct Scan {
   struct Seen {
     std::size_t free, hit;
   };
-  void see(const std::vector<Seen>& seen) {
+  void see(const std::vector<Seen>& seen, const InstanceViews::Position& reference = {}) {
     std::vector<BeamResult> visibility(samples.size(), BeamResult::kUnknown);
     for (std::size_t s = 0; s < seen.size(); ++s) {
       const auto begin = visibility.begin() + samples.sample_begin[s];
@@ -63,7 +66,7 @@ struct Scan {
       std::fill_n(begin + static_cast<std::ptrdiff_t>(seen[s].free), seen[s].hit, BeamResult::kHit);
     }
     hits.clear();
-    updater.update(samples, visibility_of(visibility), beliefs,
+    updater.update(samples, visibility_of(visibility), reference, beliefs,
                    [&](std::size_t instance) { hits.push_back(instance); });
   }
   const Belief& belief(std::size_t supervoxel = 0) const { return beliefs.supervoxels[supervoxel]; }
@@ -138,13 +141,16 @@ TEST_CASE("a place that was hit needs more evidence, and starts again from zero"
   scan.see({{0, 4}});
   CHECK(scan.belief().level == 0.0F);  // never below zero
   CHECK(scan.belief().peak == Approx(2.0F * kFreeStep));
-  scan.see({{3, 1}});
-  CHECK_FALSE(scan.is_free());
-  scan.see({{4, 0}});
-  CHECK(scan.is_free());  // 2.54
-  scan.see({{0, 4}});
-  CHECK(scan.is_free());  // the peak of the belief decides
-  CHECK(scan.belief().level == Approx(3.0F * kFreeStep + kHitStep));
+
+  Scan hit(Instances{{4}});
+  hit.see({{0, 4}});
+  hit.see({{3, 1}});
+  CHECK_FALSE(hit.is_free());
+  hit.see({{4, 0}});
+  CHECK(hit.is_free());  // 2.54
+  hit.see({{0, 4}});
+  CHECK(hit.is_free());  // the peak of the belief decides
+  CHECK(hit.belief().level == Approx(3.0F * kFreeStep + kHitStep));
 }
 
 TEST_CASE("references before and after a scan do not add up, but the higher side counts") {
@@ -428,6 +434,59 @@ TEST_CASE("few free samples remove an instance only if enough samples along its 
   CHECK(cause_with_track(4, 0.0F, false) == Cause::kWithInstance);
 }
 
+TEST_CASE("a place that is hit again twice after it was free is seen through by chance") {
+  const auto see = [](const std::string& references) {
+    Scan scan(Instances{{4}});
+    for (const char reference : references) {
+      if (reference == '|') scan.updater.begin_other_side(scan.samples, scan.beliefs);
+      if (reference == 'F') scan.see({{4, 0}});
+      if (reference == 'H') scan.see({{0, 4}});
+    }
+    return scan.is_free();
+  };
+  CHECK(see("HFFFF"));
+  CHECK(see("HFFFFHH"));  // another object came to the place
+  CHECK(see("HFFFFHHFF"));
+  CHECK_FALSE(see("HFFFFHHFFH"));
+  CHECK_FALSE(see("HFFFFHHFFHFFFF"));
+  CHECK_FALSE(see("HFFFFH|HFFH"));
+  CHECK(see("HFFFF|HFFH"));  // the other side of time is no hit
+}
+
+// Reference at an angle (deg), seen from the samples, to the direction to the sensor.
+InstanceViews::Position beside(double angle, double range = 6.0) {
+  const double radians = angle * M_PI / 180.0;
+  return {static_cast<float>(10.0 - range * std::cos(radians)),
+          static_cast<float>(range * std::sin(radians)), 0.0F};
+}
+
+TEST_CASE("what is hit from its own side is not free because another side sees through it") {
+  const auto is_free = [](int hits, double angle, bool was_free = false) {
+    Scan scan(Instances{{4, 4}});
+    for (int i = 0; i < hits; ++i) scan.see({{0, 4}, {0, 4}}, beside(10.0));
+    if (was_free) scan.see({{4, 0}, {1, 3}}, beside(10.0));
+    for (int i = 0; i < 4; ++i) scan.see({{4, 0}, {4, 0}}, beside(angle));
+    CHECK(scan.is_free(0) == scan.is_free(1));
+    CHECK(scan.removes() == scan.is_free());
+    return scan.is_free();
+  };
+  CHECK(is_free(5, 90.0));
+  CHECK_FALSE(is_free(6, 90.0));
+  CHECK(is_free(6, 19.9));
+  CHECK_FALSE(is_free(6, 20.1));
+  CHECK_FALSE(is_free(6, 180.0));
+  CHECK(is_free(6, 90.0, true));  // five of eight samples were free from its own side, too
+}
+
+TEST_CASE("references that see little of an instance do not tell that it stands") {
+  for (const std::size_t seen : {2U, 1U}) {  // of eight; a quarter is enough
+    Scan scan(Instances{{8}});
+    for (int i = 0; i < 6; ++i) scan.see({{0, seen}}, beside(0.0));
+    for (int i = 0; i < 4; ++i) scan.see({{8, 0}}, beside(90.0));
+    CHECK(scan.is_free() == (seen < 2U));
+  }
+}
+
 TEST_CASE("the caller gets the instances whose beliefs changed") {
   Scan scan(Instances{{4, 4}, {20, 20, 20, 20, 20}, {20, 20, 20, 20, 20}, {4}});
   for (int round = 0; round < 2; ++round) {
@@ -470,12 +529,14 @@ void add_slowly(const InstanceSamples& samples, const std::vector<BeamResult>& v
   };
   const auto add = [&](Belief& belief, float share, bool stands, bool raises, bool lowers) {
     if (raises) {
+      belief.turns |= 1U;
       belief.level += (share > 0.9F ? 2.0F : 1.0F) * (stands ? 0.5F : 1.0F) * increment;
       if (!stands) belief.peak = std::max(belief.peak, belief.level);
     } else if (lowers) {
       belief.contested = 1;
       if (belief.level > 0.0F) belief.hit_again = 1;
       belief.level = std::max(0.0F, belief.level + decrement);
+      if (belief.turns % 2 == 1 && belief.turns < 4) ++belief.turns;
     }
   };
   for (std::size_t s = 0; s < supervoxels.size(); ++s) {
@@ -526,6 +587,7 @@ TEST_CASE("beliefs equal those of the slow reference sum") {
         for (Belief& belief : supervoxels) {
           belief.peak = std::max(belief.peak, belief.level);
           belief.level = 0.0F;
+          if (belief.turns % 2 == 1) --belief.turns;
         }
         for (Belief& belief : wholes) belief.level = 0.0F;
       }
@@ -542,7 +604,7 @@ TEST_CASE("beliefs equal those of the slow reference sum") {
                                     : BeamResult::kHit;
         }
       }
-      scan.updater.update(scan.samples, visibility_of(visibility), scan.beliefs,
+      scan.updater.update(scan.samples, visibility_of(visibility), {}, scan.beliefs,
                           [](std::size_t) {});
       add_slowly(scan.samples, visibility, supervoxels, wholes);
     }
@@ -552,6 +614,7 @@ TEST_CASE("beliefs equal those of the slow reference sum") {
       REQUIRE(scan.belief(s).contested == supervoxels[s].contested);
       REQUIRE(scan.belief(s).occupied == supervoxels[s].occupied);
       REQUIRE(scan.belief(s).hit_again == supervoxels[s].hit_again);
+      REQUIRE(scan.belief(s).turns == supervoxels[s].turns);
     }
     for (std::size_t i = 0; i < wholes.size(); ++i) {
       REQUIRE(scan.beliefs.wholes[i].peak == wholes[i].peak);

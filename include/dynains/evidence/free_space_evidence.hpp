@@ -256,12 +256,18 @@ class FreeSpaceEvidence {
     InstanceEvidence& evidence = record.evidence;
     const detail::Visibility& visibility = references_.test(
         evidence.samples.points, evidence.samples.size(), record.T_world_sensor, reference);
-    updater_.update(evidence.samples, visibility, evidence.beliefs, [&](std::size_t instance) {
-      if (!config_.use_tracks) return;
-      Instance& tracked = evidence.tracked.instances[instance];
-      (lag < 0 ? tracked.past : tracked.future).farthest_hit =
-          static_cast<std::int16_t>(std::abs(lag));
-    });
+    const Pose T_sensor_reference =
+        detail::composed(detail::inverted(record.T_world_sensor), reference.T_world_beams);
+    const InstanceViews::Position position = {static_cast<float>(T_sensor_reference(0, 3)),
+                                              static_cast<float>(T_sensor_reference(1, 3)),
+                                              static_cast<float>(T_sensor_reference(2, 3))};
+    updater_.update(evidence.samples, visibility, position, evidence.beliefs,
+                    [&](std::size_t instance) {
+                      if (!config_.use_tracks) return;
+                      Instance& tracked = evidence.tracked.instances[instance];
+                      (lag < 0 ? tracked.past : tracked.future).farthest_hit =
+                          static_cast<std::int16_t>(std::abs(lag));
+                    });
   }
 
   // Delay (scans) between a new image and the tests of the older scans of a phase against it. The

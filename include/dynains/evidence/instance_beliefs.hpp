@@ -9,6 +9,7 @@
 #include "dynains/belief/log_odds.hpp"
 #include "dynains/evidence/free_space_config.hpp"
 #include "dynains/evidence/instance_samples.hpp"
+#include "dynains/evidence/instance_views.hpp"
 #include "dynains/evidence/visibility.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/bits.hpp"
@@ -26,6 +27,7 @@ struct InstanceBeliefs {
     std::uint8_t contested = 0;  ///< 1 after a reference with mostly hits
     std::uint8_t occupied = 0;   ///< 1 after a reference with hits on enough samples
     std::uint8_t hit_again = 0;  ///< 1 after a reference with mostly hits while `level` > 0
+    std::uint8_t turns = 0;  ///< number of changes from hit to free and back; odd while it is free
 
     float highest() const { return std::max(peak, level); }
   };
@@ -37,8 +39,9 @@ struct InstanceBeliefs {
   };
 
   std::vector<Belief> supervoxels;
-  std::vector<Belief> wholes;         ///< by instance: belief on all its samples together
-  std::vector<Counts> counts;         ///< by instance
+  std::vector<Belief> wholes;  ///< by instance: belief on all its samples together
+  std::vector<Counts> counts;  ///< by instance
+  InstanceViews views;
   std::vector<std::uint8_t> merged;   ///< by instance: 1 if larger than one object; the caller's
   std::vector<std::uint64_t> open;    ///< bit by sample: a hit may change its supervoxel's belief
   std::vector<std::uint8_t> changed;  ///< by instance: 1 if a belief changed; the caller resets it
@@ -78,6 +81,7 @@ class InstanceBeliefUpdater {
     for (std::size_t instance = 0; instance < instances; ++instance) {
       out.counts[instance] = {samples.count(instance), 0, 0};
     }
+    out.views.begin(samples);
     out.open.assign(samples.size() / 64 + 1, ~std::uint64_t{0});
   }
 
@@ -88,15 +92,18 @@ class InstanceBeliefUpdater {
       if (belief.occupied != 0 && belief.level > 0.0F) flip_open(samples, s, beliefs);
       belief.peak = belief.highest();
       belief.level = 0.0F;
+      belief.turns &= static_cast<std::uint8_t>(~1U);
     }
     for (Belief& belief : beliefs.wholes) belief.level = 0.0F;
   }
 
-  /// Updates the beliefs by the visibility of `samples` from one reference. Calls
-  /// `on_hit(instance)` for each instance with enough visible samples of which nearly all are hit.
+  /// Updates the beliefs by the visibility of `samples` from one reference. `reference`: its
+  /// position, m, in the sensor frame of the scan. Calls `on_hit(instance)` for each instance with
+  /// enough visible samples of which nearly all are hit.
   template <class OnHit>
   void update(const InstanceSamples& samples, const detail::Visibility& visibility,
-              InstanceBeliefs& beliefs, OnHit&& on_hit) {
+              const InstanceViews::Position& reference, InstanceBeliefs& beliefs, OnHit&& on_hit) {
+    beliefs.views.look_from(reference);
     // AVX2 processors have instructions that find and count bits.
     detail::run_packs([&](auto) {
       update_wholes(samples, visibility, beliefs, on_hit);
@@ -104,8 +111,11 @@ class InstanceBeliefUpdater {
     });
   }
 
+  /// Whether a supervoxel was free. A place that was hit again after it was free, twice, is one
+  /// that beams pass by chance, such as foliage.
   bool is_free(const Belief& belief) const {
-    return belief.highest() >= (belief.contested != 0 ? contested_level_ : free_level_);
+    return belief.turns < kTurnsByChance &&
+           belief.highest() >= (belief.contested != 0 ? contested_level_ : free_level_);
   }
 
   /// Whether an instance is dynamic as a whole: its belief as a whole reaches the threshold, or
@@ -133,6 +143,7 @@ class InstanceBeliefUpdater {
  private:
   static constexpr float kLeastVisible = 0.25F;       // ratio of visible samples of an instance
   static constexpr float kPartWeight = 0.5F;          // of a reference that passes a small part
+  static constexpr std::uint8_t kTurnsByChance = 4;   // hit, free, hit, free, hit
   static constexpr float kLeastFree = 0.15F;          // ratio of free samples of a supervoxel
   static constexpr std::uint32_t kLeastBody = 12;     // decided samples of the lower half
   static constexpr float kContradictingHits = 0.85F;  // ratio of hits to visible samples
@@ -227,7 +238,7 @@ class InstanceBeliefUpdater {
     const Counts before = counts_of(belief, end - begin);
     const std::uint32_t instance = samples.instance_of[s];
     const bool changed =
-        update(belief, visibility.count(begin, end), end - begin, may_stand_[instance] != 0);
+        update(belief, visibility.count(begin, end), end - begin, weight_of_free_[instance]);
     if (is_open(belief) != was_open) flip_open(samples, s, beliefs);
     if (!changed) return;
     Counts& counts = beliefs.counts[instance];
@@ -253,7 +264,7 @@ class InstanceBeliefUpdater {
   template <class OnHit>
   void update_wholes(const InstanceSamples& samples, const detail::Visibility& visibility,
                      InstanceBeliefs& beliefs, OnHit&& on_hit) {
-    detail::grow(may_stand_, samples.instance_count());
+    detail::grow(weight_of_free_, samples.instance_count());
     std::uint32_t end = 0;
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
       const std::uint32_t begin = end;
@@ -264,9 +275,14 @@ class InstanceBeliefUpdater {
       const float least = kLeastVisible * count;
       const float free_ratio = visible >= least ? static_cast<float>(all.free) / visible : 0.0F;
       const bool is_hit = free_ratio <= detail::FreeSpaceSum::kHitRatio;
-      may_stand_[instance] = is_hit && beliefs.merged[instance] == 0 ? 1 : 0;
+      const bool is_contradicted = beliefs.views.is_contradicted(instance);
+      weight_of_free_[instance] = is_contradicted                           ? 0.0F
+                                  : is_hit && beliefs.merged[instance] == 0 ? kPartWeight
+                                                                            : 1.0F;
       if (visible < std::max(2.0F, least)) continue;
+      beliefs.views.add(instance, free_ratio);
       if (free_ratio >= pass_ratio_) {
+        if (is_contradicted) continue;
         raise(beliefs.wholes[instance], free_ratio);
         beliefs.changed[instance] = 1;
       } else if (is_hit) {
@@ -282,30 +298,32 @@ class InstanceBeliefUpdater {
 
   // Updates the belief on a supervoxel by one reference (Eq. 15), with `samples` samples and at
   // least one visible sample. No change if the ratio of free to visible samples lies between the
-  // limits of FreeSpaceSum, or if few samples are free. `may_stand`: the reference mostly hits the
-  // instance or sees little of it, and it is not larger than one object. Its free samples may then
-  // lie at an edge of a standing object: they count half, and later hits take them back. A single
-  // hit sets `contested`, but not `occupied`. Returns whether a verdict may change.
+  // limits of FreeSpaceSum, or if few samples are free. `weight`: of free samples. Those of a
+  // reference that mostly hits an instance, or sees little of it, may lie at an edge of a standing
+  // object, if the instance is not larger than one object: they count half, and later hits take
+  // them back. A single hit sets `contested`, but not `occupied`. Returns whether a verdict may
+  // change.
   bool update(Belief& belief, detail::Visibility::Count visible, std::uint32_t samples,
-              bool may_stand) const {
+              float weight) const {
     const auto free = static_cast<float>(visible.free);
     const float free_ratio = free / static_cast<float>(visible.free + visible.hit);
     if (free >= kLeastFree * static_cast<float>(samples) &&
         free_ratio >= detail::FreeSpaceSum::kFreeRatio) {
-      if (may_stand) {
-        sum_.raise(belief.level, free_ratio, kPartWeight);
-      } else {
-        raise(belief, free_ratio);
-      }
+      if (weight <= 0.0F) return false;
+      belief.turns |= 1U;
+      sum_.raise(belief.level, free_ratio, weight);
+      if (weight >= 1.0F) belief.peak = std::max(belief.peak, belief.level);
       return true;
     }
     if (visible.hit == 0 || free_ratio > detail::FreeSpaceSum::kHitRatio) return false;
     const Belief before = belief;
     lower(belief);
+    if (belief.turns % 2 != 0 && belief.turns < kTurnsByChance) ++belief.turns;
     const std::uint32_t least_hits = (samples + kSamplesPerHit - 1) / kSamplesPerHit;
     if (visible.hit >= std::max(std::min(2U, samples), least_hits)) belief.occupied = 1;
     return belief.contested != before.contested || belief.occupied != before.occupied ||
-           belief.hit_again != before.hit_again || belief.level != before.level;
+           belief.hit_again != before.hit_again || belief.level != before.level ||
+           belief.turns != before.turns;
   }
 
   void raise(Belief& belief, float free_ratio) const {
@@ -325,9 +343,8 @@ class InstanceBeliefUpdater {
   float free_level_;
   float contested_level_;
   float whole_level_;
-  std::vector<std::uint8_t> may_stand_;  // by instance: 1 if the current reference mostly hits it
-                                         // or sees too little of it
-  std::vector<std::uint32_t> touched_;   // supervoxels that the current reference can change
+  std::vector<float> weight_of_free_;   // by instance: of free samples of the current reference
+  std::vector<std::uint32_t> touched_;  // supervoxels that the current reference can change
 };
 
 }  // namespace dynains
