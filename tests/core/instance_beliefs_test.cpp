@@ -670,11 +670,9 @@ TEST_CASE("a reference is found as long as scans need it, and every scan finds i
     };
     for (std::uint64_t scan = 0; scan < kScans; ++scan) {
       if (since_begin(scan) % static_cast<std::uint64_t>(step) == 0) {
-        views.begin(scan, epoch_of(scan), since_begin(scan));
-        REQUIRE(views.awaits_image());
         REQUIRE(views.find(scan, epoch_of(scan)) == nullptr);
-        views.make_image(epoch_of(scan), Eigen::Isometry3d::Identity(),
-                         wall(5.0F + 0.1F * static_cast<float>(scan)), {});
+        views.add(scan, epoch_of(scan), since_begin(scan), Eigen::Isometry3d::Identity(),
+                  wall(5.0F + 0.1F * static_cast<float>(scan)), {});
         REQUIRE(views.newest().scan == scan);
       }
       const auto phase =

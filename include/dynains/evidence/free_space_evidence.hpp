@@ -114,7 +114,6 @@ class FreeSpaceEvidence {
     record.T_world_sensor = correct(scan, T_world_sensor, split);
     record.epoch = epoch_;
     record.since_begin = scan - epoch_begin_;
-    if (phase_of(record) == 0) references_.begin(scan, epoch_, record.since_begin);
     moved_ground_.bound(split.ground(), record.ground_boxes);
     ground_sampler_.sample(split.ground(), record.ground);
     begin_evidence(split.non_ground(), instance_of, instance_count, record);
@@ -127,14 +126,11 @@ class FreeSpaceEvidence {
   /// Verdict on scan number `scan` by the evidence of all observed scans. The scan is at most
   /// lookahead_scans(), or the argument of keep(), scans before the newest. `is_final`: no presumed
   /// instances. `split`: points of the scan, as in observe(). The spans are valid until the next
-  /// call. The first verdict on the newest scan also makes its range image, if it is a reference.
+  /// judge().
   EvidenceVerdict judge(std::uint64_t scan, bool is_final, const GroundSplit& split) {
     Record& record = record_of(scan);
     judge_instances(is_final, record);
     judge_by_dynamic_grid(scan, record);
-    if (scan == newest_ && phase_of(record) == 0 && references_.awaits_image()) {
-      make_reference(record, split);
-    }
     const InstanceSamples& samples = record.evidence.samples;
     groups_.assign(1, {Cause::kNotJudged, 0.0F});
     groups_.resize(samples.met.size());
@@ -142,6 +138,29 @@ class FreeSpaceEvidence {
     moved_ground_.add(split.non_ground(), samples.met_of, groups_);
     return {groups_, samples.met_of,
             moved_ground_.find(split.ground(), record.ground_boxes, record.ground)};
+  }
+
+  /// Makes the range image of the newest scan, if it is a reference, without what surely moves.
+  /// Call it once for each scan, after the first judge() of the scan. `split`: points of the scan.
+  void make_reference(const GroundSplit& split) {
+    const Record& record = record_of(newest_);
+    if (phase_of(record) != 0) return;
+    const InstanceEvidence& evidence = record.evidence;
+    is_moving_.clear();
+    if (config_.ignore_dynamic_returns) {
+      mark_points(
+          evidence.samples, [&](std::uint32_t s) { return surely_moves(evidence, s); }, is_moving_);
+    }
+    references_.add(newest_, record.epoch, record.since_begin, record.T_world_sensor, split,
+                    is_moving_);
+    mark_points(
+        evidence.samples,
+        [&](std::uint32_t s) { return surely_moves(evidence, s) || may_move(evidence, s); },
+        may_move_);
+    pose_correction_.insert(record.T_world_sensor, split, may_move_);
+    if (delay_of(0) != 0) return;
+    test_older_scans(0);
+    propagate_beliefs(newest_);
   }
 
   /// Visibility of the first `count` points (m; padded for packs) from the newest reference, which
@@ -279,7 +298,7 @@ class FreeSpaceEvidence {
 
   // Tests older scans of the phases with this delay against the newest image.
   void test_older_scans(std::uint64_t delay) {
-    if (references_.awaits_image()) return;
+    if (references_.newest().scan + phase_of(record_of(newest_)) != newest_) return;
     for (std::uint64_t phase = 0; phase < lags_after_.size(); ++phase) {
       if (delay_of(phase) == delay) test_older_scans_of_phase(phase, references_.newest());
     }
@@ -355,25 +374,6 @@ class FreeSpaceEvidence {
     dynamic_grid_.judge(scan, record.evidence.samples,
                         detail::composed(T_origin_world_, record.T_world_sensor), record.counted,
                         verdicts_);
-  }
-
-  // Makes the range image of the newest scan.
-  void make_reference(const Record& record, const GroundSplit& split) {
-    const InstanceEvidence& evidence = record.evidence;
-    is_moving_.clear();
-    if (config_.ignore_dynamic_returns) {
-      mark_points(
-          evidence.samples, [&](std::uint32_t s) { return surely_moves(evidence, s); }, is_moving_);
-    }
-    references_.make_image(record.epoch, record.T_world_sensor, split, is_moving_);
-    mark_points(
-        evidence.samples,
-        [&](std::uint32_t s) { return surely_moves(evidence, s) || may_move(evidence, s); },
-        may_move_);
-    pose_correction_.insert(record.T_world_sensor, split, may_move_);
-    if (delay_of(0) != 0) return;
-    test_older_scans(0);
-    propagate_beliefs(newest_);
   }
 
   bool surely_moves(const InstanceEvidence& evidence, std::uint32_t supervoxel) const {

@@ -125,27 +125,23 @@ class ReferenceScans {
     for (ReferenceScan& reference : references_) reference.epoch = ReferenceScan::kNoEpoch;
   }
 
-  /// Begins a reference, which requires make_image(), in the place of one that is not needed any
-  /// more. `scan`, `epoch`: numbers of the scan and of its epoch. `since_begin`: scans since the
-  /// first scan of the epoch, a multiple of `reference_step`.
-  void begin(std::uint64_t scan, std::uint64_t epoch, std::uint64_t since_begin) {
+  /// Adds a reference in the place of one that is not needed any more. Its image is in the tilted
+  /// frame of the sensor, in which each beam is a row. `scan`, `epoch`: numbers of the scan and of
+  /// its epoch. `since_begin`: scans since the first scan of the epoch, a multiple of
+  /// `reference_step`. `T_world_level`: pose of the frame of `split`. `moving`: by non-ground
+  /// point, as in RangeImage::build().
+  void add(std::uint64_t scan, std::uint64_t epoch, std::uint64_t since_begin,
+           const Pose& T_world_level, const GroundSplit& split, Span<const std::uint8_t> moving) {
     const auto unneeded =
         std::find_if(references_.begin(), references_.end(), [&](const ReferenceScan& reference) {
           return reference.epoch != epoch ||
                  !span_.needs(reference.since_begin, scan - reference.scan);
         });
     newest_ = static_cast<std::size_t>(unneeded - references_.begin());
-    references_[newest_].scan = scan;
-    references_[newest_].since_begin = since_begin;
-    references_[newest_].epoch = ReferenceScan::kNoEpoch;  // until make_image()
-  }
-
-  /// Makes the image of the newest reference in the tilted frame of the sensor, in which each beam
-  /// is a row of the image. `epoch`: as in begin(). `T_world_level`: pose of the frame of `split`.
-  /// `moving`: by non-ground point, as in RangeImage::build().
-  void make_image(std::uint64_t epoch, const Pose& T_world_level, const GroundSplit& split,
-                  Span<const std::uint8_t> moving) {
-    ReferenceScan& reference = references_[newest_];
+    ReferenceScan& reference = *unneeded;
+    reference.scan = scan;
+    reference.epoch = epoch;
+    reference.since_begin = since_begin;
     reference.T_world_beams = T_world_level;
     PointsView ground = split.ground();
     PointsView rest = split.non_ground();
@@ -155,11 +151,8 @@ class ReferenceScans {
       rest = detail::rotate(rest, *R_beams_level_, rotated_rest_);
     }
     reference.image.build(grid_, ground, rest, moving, lateral_margin_, scratch_);
-    reference.epoch = epoch;
   }
 
-  /// Whether the newest reference has no image yet.
-  bool awaits_image() const { return newest().epoch == ReferenceScan::kNoEpoch; }
   const ReferenceScan& newest() const { return references_[newest_]; }
 
   /// The reference that is scan number `scan` of an epoch; null if there is none.

@@ -206,6 +206,7 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
 
   void judge(const ScanSlot& scan, bool is_final) override {
     verdict_ = evidence_.judge(scan.scan, is_final, scan.split);
+    if (!is_final) evidence_.make_reference(scan.split);
   }
   void write_newest(const ScanSlot& newest, VerdictWriter& writer) override {
     writer.write_groups(newest, verdict_);

@@ -107,7 +107,7 @@ class Pipeline {
                 "is_dynamic()");
   static_assert(IsConfigurable<Evidence>::value && IsEvidence<Evidence>::value,
                 "Stages::Evidence needs Config, adapt(SensorModel), observe(...), judge(...), "
-                "predecessors() and lookahead_scans()");
+                "make_reference(GroundSplit), predecessors() and lookahead_scans()");
   static_assert(IsConfigurable<Map>::value && IsMap<Map>::value,
                 "Stages::Map needs Config, insert(PointsView, flags, T_world_sensor) and clear()");
 

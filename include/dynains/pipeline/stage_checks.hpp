@@ -85,6 +85,7 @@ struct IsEvidence<
         decltype(std::declval<Stage&>().observe(
             std::uint64_t{}, std::uint64_t{}, std::declval<const Pose&>(),
             std::declval<const GroundSplit&>(), Span<const std::uint32_t>(), std::size_t{})),
+        decltype(std::declval<Stage&>().make_reference(std::declval<const GroundSplit&>())),
         std::enable_if_t<
             std::is_convertible_v<decltype(std::declval<Stage&>().judge(
                                       std::uint64_t{}, bool{}, std::declval<const GroundSplit&>())),
