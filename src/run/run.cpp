@@ -328,6 +328,7 @@ RunOutcome run(const RunSettings& settings, Recording recording, const RunListen
   RunOutcome outcome;
   if (task == RunTask::kNothing) {
     out.discard_staging();
+    out.remove_temporaries();
     outcome.outputs = plan.outputs;
     outcome.was_complete_before = true;
   } else {
