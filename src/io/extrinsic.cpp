@@ -1,5 +1,6 @@
 #include "dynains/io/extrinsic.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -20,17 +21,12 @@ constexpr const char* kExpected = "expected \"x y z qx qy qz qw\" or a file with
 
 /// The numbers that `text` consists of; empty if it has other words, or not `kCount` of them.
 template <std::size_t kCount>
-std::optional<std::array<double, kCount>> numbers_of(std::string text) {
-  for (char& c : text) c = c == ',' ? ' ' : c;
+std::optional<std::array<double, kCount>> numbers_of(const std::string& text) {
+  const auto all = text::numbers_in(text, ",");
+  if (!all || all->size() != kCount) return std::nullopt;
   std::array<double, kCount> numbers{};
-  std::size_t count = 0;
-  std::string_view rest = text;
-  for (auto token = text::next_token(rest); !token.empty(); token = text::next_token(rest)) {
-    const auto number = text::parse_number(token);
-    if (!number || count == numbers.size()) return std::nullopt;
-    numbers[count++] = *number;
-  }
-  return count == numbers.size() ? std::optional(numbers) : std::nullopt;
+  std::copy(all->begin(), all->end(), numbers.begin());
+  return numbers;
 }
 
 /// `FILE:BODY:LIDAR`.

@@ -60,18 +60,10 @@ void clear_boxes(const std::vector<Eigen::AlignedBox3d>& boxes, RecordedScan& sc
 }  // namespace
 
 std::vector<Eigen::AlignedBox3d> parse_self_boxes(const std::string& text) {
-  std::string words = text;
-  std::replace_if(
-      words.begin(), words.end(), [](char c) { return c == ',' || c == ';'; }, ' ');
-  std::vector<double> numbers;
-  bool is_valid = true;
-  std::string_view rest = words;
-  for (auto token = text::next_token(rest); !token.empty(); token = text::next_token(rest)) {
-    const auto number = text::parse_number(token);
-    is_valid = is_valid && number && std::isfinite(*number);
-    numbers.push_back(number.value_or(0.0));
-  }
-  if (!is_valid || numbers.empty() || numbers.size() % 6 != 0) {
+  const std::vector<double> numbers = text::numbers_in(text, ",;").value_or(std::vector<double>());
+  const bool are_finite = std::all_of(numbers.begin(), numbers.end(),
+                                      [](double number) { return std::isfinite(number); });
+  if (!are_finite || numbers.empty() || numbers.size() % 6 != 0) {
     throw ConfigError("self-box \"" + text +
                       "\": expected six finite numbers for each box, \"x y z x y z\", two opposite "
                       "corners in m");

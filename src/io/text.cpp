@@ -23,6 +23,19 @@ std::string to_text(double value) {
 
 std::string in_seconds(double time) { return to_text(time) + " s"; }
 
+std::optional<std::vector<double>> numbers_in(std::string text, std::string_view separators) {
+  const auto is_separator = [&](char c) { return separators.find(c) != std::string_view::npos; };
+  std::replace_if(text.begin(), text.end(), is_separator, ' ');
+  std::vector<double> numbers;
+  std::string_view rest = text;
+  for (auto token = next_token(rest); !token.empty(); token = next_token(rest)) {
+    const auto number = parse_number(token);
+    if (!number) return std::nullopt;
+    numbers.push_back(*number);
+  }
+  return numbers;
+}
+
 std::string listed(const std::vector<std::string>& names) {
   constexpr std::size_t kShown = 50;
   std::string text;

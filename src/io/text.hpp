@@ -26,6 +26,10 @@ std::string to_text(double value);
 /// "12.5 s".
 std::string in_seconds(double time);
 
+/// The numbers that the text consists of. Blanks and `separators` stand between them. Empty if the
+/// text has other words.
+std::optional<std::vector<double>> numbers_in(std::string text, std::string_view separators);
+
 /// "a, b, c", at most 50 names and the number of others; "none" without names.
 std::string listed(const std::vector<std::string>& names);
 
