@@ -557,9 +557,11 @@ std::string body_text(const Pose& T_body_sensor) {
 }  // namespace
 
 std::string advice(const Diagnosis& d) {
+  // Without a known mounting, an option for it may be needed.
+  const std::string end = d.mounting.known ? "; no option is needed." : ".";
   switch (d.verdict) {
     case PoseVerdict::kAgree:
-      return "Scans and poses agree as they are; no option is needed.";
+      return "Scans and poses agree as they are" + end;
     case PoseVerdict::kOtherwise:
       return (fits(d.as_given, d.standing) ? "Scans agree better if " : "Scans agree if ") +
              d.readings.front().meaning + ": pass " + d.readings.front().option + ".";
@@ -607,7 +609,7 @@ std::string advice(const Diagnosis& d) {
              "another recording or clock, or are far too inexact" +
              (d.registered_pairs > 0 ? " (off by " + error_text(d) + ")." : std::string("."));
     case PoseVerdict::kWorldFrame:
-      return "Points are in the frame of the world and agree there; no option is needed.";
+      return "Points are in the frame of the world and agree there" + end;
     case PoseVerdict::kUnknown:
       return "There is too little to compare: at least two scans with walls, poles or trees within "
              "40 m are needed.";

@@ -164,11 +164,6 @@ RecordingCheck check_recording(const Recording& recording) {
   }
   check.passed = sound && !lone;
   if (!lone || !sound) check.advice = advice(check.diagnosis) + '\n';
-  // The remark on the mounting has an option.
-  const std::size_t none = check.advice.find("; no option is needed");
-  if (!check.diagnosis.mounting.known && none != std::string::npos) {
-    check.advice.replace(none, std::string::npos, ".\n");
-  }
   if (lone) check.remark = *lone + ".\n";
   return check;
 }
