@@ -9,7 +9,6 @@
 #include <iomanip>
 #include <locale>
 #include <sstream>
-#include <utility>
 #include <vector>
 
 #include "io/finite_points.hpp"
@@ -121,10 +120,13 @@ std::optional<std::string> remark_on_grid(const RecordedScan& scan, const Pose& 
   return std::nullopt;
 }
 
-/// Whether two scans have points, all of them with equal bits.
-bool are_equal(const RecordedScan& a, const RecordedScan& b) {
-  return a.size() > 0 && a.size() == b.size() &&
-         std::memcmp(a.xyzi.data(), b.xyzi.data(), a.xyzi.size() * sizeof(float)) == 0;
+/// Whether cloud `i` and the next one have points, all of them with equal bits.
+bool is_repeated(const Recording& recording, std::size_t i) {
+  if (recording.point_count(i) == 0 || recording.point_count(i) != recording.point_count(i + 1)) {
+    return false;
+  }
+  const RecordedScan a = recording.read_scan(i), b = recording.read_scan(i + 1);
+  return std::memcmp(a.xyzi.data(), b.xyzi.data(), a.xyzi.size() * sizeof(float)) == 0;
 }
 
 }  // namespace
@@ -157,18 +159,14 @@ std::optional<std::string> remark_on_stripes(const Recording& recording) {
 std::optional<std::string> remark_on_copies(const Recording& recording, const ScanRange& range) {
   constexpr std::size_t kPlaces = 3;
   constexpr double kLeastMotion = 0.05;  // m
-  RecordedScan scan, next;
   for (std::size_t k = 0; k < kPlaces && range.size() > 2; ++k) {
     const std::size_t first = range.first + k * (range.size() - 3) / (kPlaces - 1);
-    recording.read_scan(first, scan);
     for (std::size_t i = first; i < first + 2; ++i) {
-      recording.read_scan(i + 1, next);
       const Pose T = recording.T_world_sensor(i).inverse() * recording.T_world_sensor(i + 1);
-      if (T.translation().norm() > kLeastMotion && are_equal(scan, next)) {
+      if (T.translation().norm() > kLeastMotion && is_repeated(recording, i)) {
         return "clouds " + recording.name(i) + " and " + recording.name(i + 1) +
                " are equal, though the sensor moves between them: leave copies of clouds out";
       }
-      std::swap(scan, next);
     }
   }
   return std::nullopt;
