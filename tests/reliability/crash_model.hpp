@@ -81,7 +81,7 @@ class CrashModel {
     std::string bytes;
     bool cuts;  ///< the file ends at the offset
   };
-  /// What the disk keeps of each write: zeros, nothing, or so many bytes.
+  /// By write: how the disk loses its bytes, and the number of bytes that reach it.
   using Fates = std::vector<std::pair<DataLoss, std::size_t>>;
   /// A file, a folder or a link, independent of its name.
   struct Node {
