@@ -72,7 +72,7 @@ TEST_CASE("LAS: points that the file cannot hold are refused, and no file appear
 
 TEST_CASE("Names of coordinate reference systems give their WKT") {
   const std::string unknown = message_of<ConfigError>([] { wkt_of("EPSG:1"); });
-  if (unknown.find("libproj-dev") != std::string::npos) return;  // this build has no PROJ
+  if (unknown.find("this build has no PROJ") != std::string::npos) return;
   CHECK_THAT(wkt_of("EPSG:25832"), StartsWith("PROJCS[\"ETRS89 / UTM zone 32N\""));
   CHECK_THAT(unknown, ContainsSubstring("found EPSG:1"));
   CHECK_THROWS_AS(wkt_of(""), ConfigError);
