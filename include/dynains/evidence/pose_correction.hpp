@@ -105,7 +105,7 @@ class PoseCorrection {
                                : inserted_ < kFirstScans ? kFirstInserted
                                                          : kInserted;
     ++inserted_;
-    planes_.begin_scan();
+    planes_.begin_scan(T);
     VoxelPlanes::Block block;
     visit_some(split, wanted, [&](std::size_t i, double x, double y, double z) {
       if (!moving.empty() && i >= split.ground_count && moving[i - split.ground_count] != 0) return;

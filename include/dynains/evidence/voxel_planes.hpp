@@ -3,6 +3,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -67,8 +69,11 @@ class VoxelPlanes {
     planes_.reserve(kMostVoxels);
   }
 
-  /// Begins the insertion of the points of the next scan.
-  void begin_scan() {
+  /// Begins the insertion of the points of the next scan. `T_map_sensor`: its pose.
+  void begin_scan(const Pose& T_map_sensor) {
+    for (int axis = 0; axis < 3; ++axis) {
+      sensor_[static_cast<std::size_t>(axis)] = T_map_sensor(axis, 3);
+    }
     ++scans_;
     if (size() > kMostVoxels / 4 * 3) forget_oldest();
   }
@@ -111,6 +116,9 @@ class VoxelPlanes {
   static constexpr double kMostThickness = 0.06;  // m, standard deviation along the normal
   static constexpr double kMostFlatness = 0.04;   // smallest eigenvalue to the sum
   static constexpr double kLeastBreadth = 0.04;   // product of the other two to their squared sum
+
+  static constexpr double kGrazing = 0.3;      // sine of the angle between beam and plane
+  static constexpr double kLeastLength = 0.2;  // m, standard deviation along the beam
 
   static constexpr std::uint32_t kNone = VoxelHashTable<>::kNone;
 
@@ -158,7 +166,7 @@ class VoxelPlanes {
     planes_[number].is_fitted = false;
   }
 
-  static Plane fit(VoxelKey key, const Moments& moments) {
+  Plane fit(VoxelKey key, const Moments& moments) const {
     Plane plane = {};
     plane.is_fitted = true;
     if (moments.sums.count < kFewestPoints) return plane;
@@ -166,14 +174,31 @@ class VoxelPlanes {
     // Without the bias: the fit of three parameters takes up a part of the deviations.
     const double flatness = fitted.flatness * moments.sums.count / (moments.sums.count - 3.0);
     const double thickness_squared = flatness * fitted.spread;
-    return {{fitted.normal_x, fitted.normal_y, fitted.normal_z},
-            {centre(key, 0) + fitted.mean_x, centre(key, 1) + fitted.mean_y,
-             centre(key, 2) + fitted.mean_z},
-            true,
-            flatness <= kMostFlatness && fitted.breadth >= kLeastBreadth &&
-                thickness_squared <= kMostThickness * kMostThickness,
-            0,
-            moments.sums.count};
+    plane = {{fitted.normal_x, fitted.normal_y, fitted.normal_z},
+             {centre(key, 0) + fitted.mean_x, centre(key, 1) + fitted.mean_y,
+              centre(key, 2) + fitted.mean_z},
+             true,
+             false,
+             0,
+             moments.sums.count};
+    plane.is_flat = flatness <= kMostFlatness && fitted.breadth >= kLeastBreadth &&
+                    thickness_squared <= kMostThickness * kMostThickness &&
+                    !is_trace_of_beam(plane, moments.sums);
+    return plane;
+  }
+
+  // The noise of the ranges spreads the points of one beam over a plane that contains the beam. It
+  // moves with the sensor. A surface at such an angle is longer along the beams than the noise.
+  bool is_trace_of_beam(const Plane& plane, const detail::PlaneMoments& points) const {
+    double beam[3];
+    for (std::size_t k = 0; k < 3; ++k) beam[k] = plane.mean[k] - sensor_[k];
+    const double range = std::sqrt(beam[0] * beam[0] + beam[1] * beam[1] + beam[2] * beam[2]);
+    const double(&n)[3] = plane.normal;
+    const double across = beam[0] * n[0] + beam[1] * n[1] + beam[2] * n[2];
+    if (std::abs(across) >= kGrazing * range) return false;
+    const double length = std::sqrt(range * range - across * across);
+    for (std::size_t k = 0; k < 3; ++k) beam[k] = (beam[k] - across * n[k]) / length;
+    return detail::variance_along(points, beam) < kLeastLength * kLeastLength;
   }
 
   // Keeps the voxels that have received a point in the last scans, at most half of the maximum.
@@ -207,6 +232,7 @@ class VoxelPlanes {
   std::vector<Moments> moments_;  // by voxel
   std::vector<Plane> planes_;     // by voxel
   std::uint32_t scans_ = 0;
+  std::array<double, 3> sensor_ = {};  // position at the newest scan, m
 };
 
 }  // namespace dynains

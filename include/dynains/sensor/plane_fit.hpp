@@ -34,6 +34,15 @@ struct PlaneMoments {
   }
 };
 
+/// Variance (m^2) of a point set along the unit vector `u`. Requires `count` > 0.
+inline double variance_along(const PlaneMoments& m, const double (&u)[3]) {
+  const double mean = (u[0] * m.x + u[1] * m.y + u[2] * m.z) / m.count;
+  const double square = (u[0] * u[0] * m.xx + u[1] * u[1] * m.yy + u[2] * u[2] * m.zz +
+                         2.0 * (u[0] * u[1] * m.xy + u[0] * u[2] * m.xz + u[1] * u[2] * m.yz)) /
+                        m.count;
+  return square - mean * mean;
+}
+
 /// Plane through a mean point with an upward unit normal, in the frame of the moments.
 struct Plane {
   double normal_x = 0.0, normal_y = 0.0, normal_z = 1.0;
