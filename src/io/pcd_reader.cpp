@@ -10,6 +10,7 @@
 
 #include "byte_reader.hpp"
 #include "lzf.hpp"
+#include "point_file_copy.hpp"
 #include "point_readers.hpp"
 #include "point_sink.hpp"
 #include "scalar.hpp"
@@ -323,7 +324,7 @@ void read_binary(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
 }
 
 /// One compressed block with the values of all points field by field.
-void read_compressed(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
+std::vector<char> read_block(ByteReader& reader, const PcdHeader& header) {
   const auto [compressed_size, plain_size] = read_block_sizes(reader, header);
   std::vector<char> compressed(compressed_size);
   reader.read(compressed.data(), compressed.size(), "compressed points");
@@ -331,6 +332,11 @@ void read_compressed(ByteReader& reader, const PcdHeader& header, PointSink& sin
   if (!decode_lzf(compressed, plain)) {
     reader.fail_here("expected a sound compressed block (LZF) before this byte");
   }
+  return plain;
+}
+
+void read_compressed(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
+  const std::vector<char> plain = read_block(reader, header);
   const auto count = static_cast<std::size_t>(header.points);
   sink.resize(count);
   const char* column = plain.data();
@@ -344,7 +350,56 @@ void read_compressed(ByteReader& reader, const PcdHeader& header, PointSink& sin
   }
 }
 
+void copy_pcd_header(const std::filesystem::path& path, std::uint64_t size, std::size_t count,
+                     std::ostream& target) {
+  copy_lines(path, size, target, [&](const std::string& line) -> std::string {
+    std::string_view rest = line;
+    const std::string_view keyword = text::next_token(rest);
+    if (keyword == "WIDTH") return "WIDTH " + std::to_string(count);
+    if (keyword == "HEIGHT") return "HEIGHT 1";
+    if (keyword == "POINTS") return "POINTS " + std::to_string(count);
+    if (keyword == "DATA" && text::next_token(rest) == "binary_compressed") return "DATA binary";
+    return line;
+  });
+}
+
+/// Writes the values of point `i` of a block with the values of all points field by field.
+void copy_point(const std::vector<char>& block, const PcdHeader& header, std::size_t i,
+                std::ostream& target) {
+  const char* column = block.data();
+  for (const Field& field : header.fields) {
+    target.write(column + i * field.bytes(), static_cast<std::streamsize>(field.bytes()));
+    column += field.bytes() * static_cast<std::size_t>(header.points);
+  }
+}
+
 }  // namespace
+
+void copy_pcd(const std::filesystem::path& path, Span<const std::uint8_t> keep,
+              std::ostream& target) {
+  ByteReader reader(path);
+  PointSink sink;
+  const PcdHeader header = parse_pcd_header(reader, sink);
+  const auto kept = std::count_if(keep.begin(), keep.end(), [](auto value) { return value != 0; });
+  copy_pcd_header(path, reader.position(), static_cast<std::size_t>(kept), target);
+  const bool is_compressed = header.encoding == PcdEncoding::kCompressed;
+  const std::vector<char> block = is_compressed ? read_block(reader, header) : std::vector<char>();
+  std::string record(header.record_bytes(), '\0');
+  for (std::size_t i = 0; i < keep.size(); ++i) {
+    if (header.encoding == PcdEncoding::kAscii) {
+      if (!reader.read_line(record)) reader.fail_on_line("file ends, expected one more point");
+    } else if (!is_compressed) {
+      reader.read(record.data(), record.size(), "a point");
+    }
+    if (keep[i] == 0) continue;
+    if (is_compressed) {
+      copy_point(block, header, i, target);
+    } else {
+      target << record;
+      if (header.encoding == PcdEncoding::kAscii) target << '\n';
+    }
+  }
+}
 
 PointFile read_pcd(const std::filesystem::path& path) {
   ByteReader reader(path);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <functional>
@@ -6,6 +7,8 @@
 #include <vector>
 
 #include "byte_reader.hpp"
+#include "failure.hpp"
+#include "point_file_copy.hpp"
 #include "point_readers.hpp"
 #include "point_sink.hpp"
 #include "scalar.hpp"
@@ -252,7 +255,45 @@ void read_elements(ByteReader& reader, const PlyHeader& header, PointSink& sink,
   }
 }
 
+/// Copies the header for a file with `count` vertices. Throws IoError for further elements.
+void copy_ply_header(const std::filesystem::path& path, std::uint64_t size, std::size_t count,
+                     std::ostream& target) {
+  const ByteReader reader(path);
+  copy_lines(path, size, target, [&](const std::string& line) {
+    std::string_view rest = line;
+    if (text::next_token(rest) != "element") return line;
+    if (text::next_token(rest) == "vertex") return "element vertex " + std::to_string(count);
+    if (parse_count(reader, text::next_token(rest)) == 0) return line;
+    fail(path, "expected points alone, found \"" + line.substr(0, 60) + "\"");
+  });
+}
+
 }  // namespace
+
+void copy_ply(const std::filesystem::path& path, Span<const std::uint8_t> keep,
+              std::ostream& target) {
+  ByteReader reader(path);
+  PointSink sink;
+  const PlyHeader header = parse_ply_header(reader, sink);
+  const auto kept = std::count_if(keep.begin(), keep.end(), [](auto value) { return value != 0; });
+  copy_ply_header(path, reader.position(), static_cast<std::size_t>(kept), target);
+  const Element& vertex = header.elements.back();
+  for (const Property& property : vertex.properties) {
+    if (property.is_list) reader.fail_here("expected vertices without the list " + property.name);
+  }
+  const bool is_text = header.encoding == PlyEncoding::kAscii;
+  std::string record(static_cast<std::size_t>(min_bytes(vertex, header.encoding)), '\0');
+  for (const std::uint8_t is_kept : keep) {
+    if (is_text) {
+      if (!reader.read_line(record)) reader.fail_on_line("file ends, expected one more vertex");
+    } else {
+      reader.read(record.data(), record.size(), "a vertex");
+    }
+    if (is_kept == 0) continue;
+    target << record;
+    if (is_text) target << '\n';
+  }
+}
 
 PointFile read_ply(const std::filesystem::path& path) {
   ByteReader reader(path);

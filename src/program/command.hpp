@@ -10,6 +10,7 @@ namespace dynains::program {
 // them.
 void add_run_command(CLI::App& app);
 void add_remap_command(CLI::App& app);
+void add_clean_command(CLI::App& app);
 void add_map_command(CLI::App& app);
 void add_fleet_command(CLI::App& app);
 void add_check_command(CLI::App& app);

@@ -87,6 +87,7 @@ int main(int argc, char** argv) {
   app.set_help_all_flag("--help-all", "print the help with all options and exit");
   add_run_command(app);
   add_remap_command(app);
+  add_clean_command(app);
   add_map_command(app);
   add_fleet_command(app);
   add_check_command(app);

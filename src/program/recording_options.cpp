@@ -8,6 +8,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/extrinsic.hpp"
 #include "dynains/parameters.hpp"
+#include "run/json_file.hpp"
 
 namespace dynains::program {
 namespace {
@@ -244,6 +245,22 @@ std::string RecordingFlags::as_given(const std::string& further) const {
     for (const std::string& value : option->results()) text += ' ' + quoted(value);
   }
   return further.empty() ? text : text + ' ' + further;
+}
+
+Recording RecordingFlags::open_of_run(const std::filesystem::path& report_file,
+                                      const nlohmann::ordered_json& report,
+                                      const std::string& command) {
+  try {
+    complete(required_json_field<std::string>(report_file, report, "/sequence"),
+             report.value("sequence_flags", nlohmann::ordered_json::object()));
+  } catch (const CLI::Error& error) {
+    throw IoError(report_file.string() + ": /sequence_flags: " + error.what());
+  }
+  if (!std::filesystem::exists(folder_)) {
+    throw IoError(folder_ + ": no such recording; name the place of the run's recording: " +
+                  command + " SEQ");
+  }
+  return open();
 }
 
 Recording RecordingFlags::open(const std::filesystem::path& folder) const {

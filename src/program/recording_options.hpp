@@ -34,6 +34,11 @@ class RecordingFlags {
   Recording open() const { return open(folder_); }
   /// Opens another folder with these flags.
   Recording open(const std::filesystem::path& folder) const;
+  /// Opens the recording of a finished run with the flags of the run, as far as the command line
+  /// names no others. `report`: content of `report_file`. `command`: the command line without SEQ,
+  /// for messages. Throws IoError.
+  Recording open_of_run(const std::filesystem::path& report_file,
+                        const nlohmann::ordered_json& report, const std::string& command);
 
  private:
   CLI::App* command_;

@@ -6,7 +6,6 @@
 #include "dynains/errors.hpp"
 #include "recording_options.hpp"
 #include "run/interrupt.hpp"
-#include "run/json_file.hpp"
 #include "run/output_folder.hpp"
 #include "run/write_view.hpp"
 #include "tileset_files.hpp"
@@ -32,27 +31,11 @@ struct ViewOptions {
   bool quiet = false;
 };
 
-Recording open_recording(ViewOptions& options, const fs::path& report_file,
-                         const nlohmann::ordered_json& report) {
-  try {
-    options.sequence.complete(required_json_field<std::string>(report_file, report, "/sequence"),
-                              report.value("sequence_flags", nlohmann::ordered_json::object()));
-  } catch (const CLI::Error& error) {
-    throw IoError(report_file.string() + ": /sequence_flags: " + error.what());
-  }
-  if (!fs::exists(options.sequence.folder())) {
-    throw IoError(options.sequence.folder() +
-                  ": no such recording; name the place of the run's recording: dynains view " +
-                  options.out + " SEQ");
-  }
-  return options.sequence.open();
-}
-
 void view(ViewOptions& options) {
   const fs::path page = write_view(
       options.out,
       [&](const fs::path& report_file, const nlohmann::ordered_json& report) {
-        return open_recording(options, report_file, report);
+        return options.sequence.open_of_run(report_file, report, "dynains view " + options.out);
       },
       options.max_points);
   if (!options.quiet) std::cout << "page: " << page.string() << std::endl;

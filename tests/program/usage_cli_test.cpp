@@ -67,7 +67,7 @@ TEST_CASE("An unknown command or option gives the nearest one") {
     std::string expected;
   };
   const std::string all =
-      "xpected one of run, remap, map, fleet, check, config, simulate, statistics, eval, "
+      "xpected one of run, remap, clean, map, fleet, check, config, simulate, statistics, eval, "
       "experiment, "
       "view, "
       "man, completion (";

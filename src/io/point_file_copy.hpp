@@ -1,0 +1,30 @@
+// Copies of point files without some of their points.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <ostream>
+#include <string>
+
+#include "dynains/points.hpp"
+
+namespace dynains {
+
+/// Writes the PLY or PCD file `path` to `target` without some of its points. All columns and
+/// comments stay as they are; compressed points of PCD become binary ones. `keep`: for each point
+/// of read_points(), 0 if it is left out. Throws IoError, also for a PLY file that has more than
+/// points, such as faces.
+void copy_points(const std::filesystem::path& path, Span<const std::uint8_t> keep,
+                 std::ostream& target);
+
+/// Writes the first `size` bytes of `path`, lines of text, with `edit` applied to each of them.
+void copy_lines(const std::filesystem::path& path, std::uint64_t size, std::ostream& target,
+                const std::function<std::string(const std::string&)>& edit);
+
+void copy_ply(const std::filesystem::path& path, Span<const std::uint8_t> keep,
+              std::ostream& target);
+void copy_pcd(const std::filesystem::path& path, Span<const std::uint8_t> keep,
+              std::ostream& target);
+
+}  // namespace dynains

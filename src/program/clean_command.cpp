@@ -1,0 +1,184 @@
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "command.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/io/atomic_file.hpp"
+#include "dynains/io/kitti.hpp"
+#include "dynains/io/point_file.hpp"
+#include "io/point_file_copy.hpp"
+#include "progress.hpp"
+#include "recording_options.hpp"
+#include "run/input_files.hpp"
+#include "run/interrupt.hpp"
+#include "run/labelled_sequence.hpp"
+#include "run/map_votes.hpp"
+#include "run/output_folder.hpp"
+#include "run/write_view.hpp"
+
+namespace dynains::program {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct CleanOptions {
+  explicit CleanOptions(CLI::App& command)
+      : map_option(command.add_option("MAP", map, "map of the recording, .ply or .pcd")),
+        run_option(command.add_option("OUT", run, "folder of `dynains run` over the recording")),
+        sequence(command, "recording of the run", false) {
+    map_option->required()->type_name("");
+    run_option->required()->type_name("");
+  }
+
+  std::string map, run;
+  CLI::Option* map_option;  // the first positional arguments
+  CLI::Option* run_option;
+  RecordingFlags sequence;
+  std::string cleaned;
+  double voxel = 0.2;  // m
+  bool force = false;
+  bool quiet = false;
+};
+
+fs::path target_of(const CleanOptions& options) {
+  const fs::path map = options.map;
+  const fs::path target =
+      options.cleaned.empty()
+          ? map.parent_path() / (map.stem().string() + "_static" + map.extension().string())
+          : fs::path(options.cleaned);
+  if (target.extension() != map.extension()) {
+    throw ConfigError("--map " + target.string() + ": expected a name that ends in " +
+                      map.extension().string() + ", as that of the map");
+  }
+  if (fs::exists(target) && !options.force) {
+    throw UsageError(target.string() + ": exists; replace it with --force");
+  }
+  return target;
+}
+
+/// Throws IoError for a file that the command reads, and for a place among the results of the run.
+void check_target(const fs::path& target, const fs::path& map, const Recording& recording,
+                  const OutputFolder& out) {
+  InputFiles inputs;
+  inputs.add(map);
+  for (const fs::path& file : recording.files()) inputs.add(file);
+  inputs.refuse(target);
+  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  for (const fs::path& taken : {recording.scan_folder(), out.path(), out.path() / "labels"}) {
+    if (identity_of(folder) != identity_of(taken)) continue;
+    throw IoError(target.string() + ": lies in " + taken.string() +
+                  ", which is read; choose another folder for --map");
+  }
+}
+
+/// Adds the points of all scans of the run with their labels. Throws Interrupted.
+void add_scans(const Recording& recording, const OutputFolder& out, bool quiet, MapVotes& votes) {
+  const auto& names = out.listing().scans;
+  Progress progress(names.size(), "scans", quiet);
+  RecordedScan scan;
+  std::size_t done = 0;
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    if (names.count(recording.name(i)) == 0) continue;
+    if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
+    recording.read_scan(i, scan);
+    const fs::path file = out.path() / "labels" / (recording.name(i) + ".label");
+    const std::vector<std::uint32_t> labels = read_labels(file, scan.size());
+    for (std::size_t k = 0; k < labels.size(); ++k) {
+      const std::uint32_t label = run_class(labels[k], k, file);
+      if (label == kRunNotJudged) continue;
+      const float* const p = &scan.xyzi[4 * k];
+      votes.add(recording.T_world_sensor(i) * Eigen::Vector3d(p[0], p[1], p[2]),
+                label == kRunMoving);
+    }
+    progress.update(++done);
+  }
+  if (done == names.size()) return;
+  throw IoError(recording.folder().string() + ": has " + std::to_string(done) + " of the " +
+                std::to_string(names.size()) + " scans of the run; expected its recording");
+}
+
+struct Verdicts {
+  std::vector<std::uint8_t> keep;  // by point of the map
+  std::size_t moving = 0;
+  std::size_t unseen = 0;
+};
+
+/// Throws IoError if no point of the map is near a point of a scan.
+Verdicts judge(const MapVotes& votes, std::size_t count, const fs::path& map) {
+  Verdicts verdicts;
+  for (std::size_t i = 0; i < count; ++i) {
+    const MapVotes::Verdict verdict = votes.verdict(i);
+    verdicts.keep.push_back(verdict == MapVotes::Verdict::kMoving ? 0 : 1);
+    if (verdict == MapVotes::Verdict::kMoving) ++verdicts.moving;
+    if (verdict == MapVotes::Verdict::kUnseen) ++verdicts.unseen;
+  }
+  if (count > 0 && verdicts.unseen == count) {
+    throw IoError(map.string() +
+                  ": no point lies near a point of the scans; expected a map in the frame of the "
+                  "poses of the run");
+  }
+  return verdicts;
+}
+
+void clean(CleanOptions& options) {
+  const fs::path target = target_of(options);
+  const LockedFolder lock(options.run);
+  const OutputFolder out = open_finished_run(options.run);
+  const Recording recording =
+      options.sequence.open_of_run(out.path() / out.kind().marker, out.marker(),
+                                   "dynains clean " + options.map + ' ' + options.run);
+  check_target(target, options.map, recording, out);
+  const std::vector<Eigen::Vector3d> positions = read_points(options.map).positions;
+
+  const InterruptGuard interrupt;
+  MapVotes votes(positions, options.voxel);
+  add_scans(recording, out, options.quiet, votes);
+  const Verdicts verdicts = judge(votes, positions.size(), options.map);
+  AtomicFile file(target);
+  copy_points(options.map, verdicts.keep, file.stream());
+  file.commit();
+
+  if (2 * verdicts.unseen > positions.size()) {
+    std::cerr << "dynains: warning: " << verdicts.unseen << " of " << positions.size()
+              << " points of the map lie near no point of the scans and stay: the map is that of "
+                 "another recording, or its poses are not those of the run"
+              << std::endl;
+  }
+  if (options.quiet) return;
+  std::cout << positions.size() << " points, " << verdicts.moving << " left as moving, "
+            << verdicts.unseen
+            << " stay without a point of a scan near them\nstatic map: " << target.string()
+            << std::endl;
+}
+
+}  // namespace
+
+void add_clean_command(CLI::App& app) {
+  CLI::App& command = *app.add_subcommand(
+      "clean", "Remove moving points from a map that another program has made of a recording");
+  const auto options = std::make_shared<CleanOptions>(command);
+  command
+      .add_option("--map", options->cleaned,
+                  "the cleaned map, in the format of MAP [MAP with _static before its ending]")
+      ->type_name("FILE");
+  command
+      .add_option("--voxel", options->voxel,
+                  "edge of the voxels in which points of the scans decide about those of the map")
+      ->check(CLI::Range(0.01, 10.0))
+      ->capture_default_str()
+      ->type_name("M");
+  command.add_flag("--force", options->force, "replace the cleaned map if it exists");
+  command.add_flag("-q,--quiet", options->quiet, "print errors only");
+  command.footer(
+      "A point of the map leaves if its voxel holds more moving than static points of the scans.\n"
+      "The map must lie in the frame of the poses of the run. All columns of the points stay.");
+  command.callback([options] { clean(*options); });
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,122 @@
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "dynains/io/kitti.hpp"
+#include "dynains/io/recording.hpp"
+#include "io/files.hpp"
+#include "program/start.hpp"
+#include "program/tiny_sequence.hpp"
+#include "support/catch.hpp"
+
+using namespace dynains;
+using namespace dynains::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t kScans = 12;
+
+/// A finished run whose labels call the box of each scan moving, and a map of all points.
+struct CleanFixture {
+  CleanFixture() {
+    write_tiny_sequence(seq, kScans, {100.0, 200.0, 3.0});
+    if (start({"run", seq, "--out", out, "-q"}).code != 0) throw std::runtime_error("run failed");
+    const Recording recording(seq);
+    for (std::size_t i = 0; i < recording.size(); ++i) {
+      const RecordedScan scan = recording.read_scan(i);
+      std::vector<std::uint32_t> labels;
+      for (std::size_t k = 0; k < scan.size(); ++k) {
+        std::ostringstream line;
+        line << 100.0 + scan.xyzi[4 * k] << ' ' << 200.0 + scan.xyzi[4 * k + 1] << ' '
+             << 3.0 + scan.xyzi[4 * k + 2] << ' ' << points << ' ' << i << '\n';
+        all += line.str();
+        // The box is the only thing at this distance above the floor.
+        const bool is_box = scan.xyzi[4 * k] == 10.0F && scan.xyzi[4 * k + 2] > -1.5F;
+        if (!is_box) standing += line.str();
+        labels.push_back(is_box ? 251 : 9);
+        ++points;
+      }
+      write_labels(out + "/labels/" + recording.name(i) + ".label", labels);
+    }
+    write_text(map, header(points) + all);
+  }
+  static std::string header(std::size_t count) {
+    return "ply\nformat ascii 1.0\ncomment made by another program\nelement vertex " +
+           std::to_string(count) +
+           "\nproperty double x\nproperty double y\nproperty double z\nproperty int number\n"
+           "property uchar day\nend_header\n";
+  }
+  Outcome clean(std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {"clean", map, out});
+    return start(more);
+  }
+
+  TemporaryFolder folder;
+  std::string seq = folder / "a seq";
+  std::string out = folder / "an out";
+  std::string map = folder / "merged.ply";
+  std::string cleaned = folder / "merged_static.ply";
+  std::string all, standing;  // lines of points
+  std::size_t points = 0;
+};
+
+}  // namespace
+
+TEST_CASE("clean removes the trail of a mover from a map that another program has made") {
+  const CleanFixture f;
+  const Outcome outcome = f.clean();
+  CAPTURE(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK(outcome.err.find("warning") == std::string::npos);
+  const std::size_t kept = count_lines(f.standing);
+  CHECK(read_text(f.cleaned) == CleanFixture::header(kept) + f.standing);
+  CHECK_THAT(outcome.out, ContainsSubstring(std::to_string(f.points) + " points, " +
+                                            std::to_string(f.points - kept) + " left as moving"));
+  CHECK(read_text(f.map) == CleanFixture::header(f.points) + f.all);
+
+  SECTION("an earlier result is replaced by --force alone") {
+    const Outcome again = f.clean();
+    CHECK(again.code == 2);
+    CHECK_THAT(again.err, ContainsSubstring("exists; replace it with --force"));
+    CHECK(f.clean({"--force"}).code == 0);
+  }
+}
+
+TEST_CASE("clean refuses a map or a recording that does not belong to the run") {
+  const CleanFixture f;
+  SECTION("a map in another frame") {
+    write_text(f.map, CleanFixture::header(1) + "0 0 0 0 0\n");
+    const Outcome outcome = f.clean();
+    CHECK(outcome.code == 1);
+    CHECK_THAT(outcome.err, ContainsSubstring("merged.ply: no point lies near a point of the "
+                                              "scans; expected a map in the frame of the poses"));
+  }
+  SECTION("a map of which most lies elsewhere is cleaned with a warning") {
+    const std::string first = f.standing.substr(0, f.standing.find('\n') + 1);
+    write_text(f.map, CleanFixture::header(3) + first + "0 0 0 0 0\n0 0 1 0 0\n");
+    const Outcome outcome = f.clean();
+    CHECK(outcome.code == 0);
+    CHECK_THAT(outcome.err, ContainsSubstring("lie near no point of the scans and stay"));
+    CHECK(read_text(f.cleaned) == read_text(f.map));
+  }
+  SECTION("scans that are gone") {
+    fs::remove(f.seq + "/velodyne/000011.bin");
+    const Outcome outcome = f.clean();
+    CHECK(outcome.code != 0);
+    CHECK_FALSE(fs::exists(f.cleaned));
+  }
+  SECTION("a folder without results, another format, and the map itself") {
+    CHECK_THAT(start({"clean", f.map, f.seq}).err, ContainsSubstring("a seq"));
+    CHECK_THAT(f.clean({"--map", f.folder / "map.pcd"}).err,
+               ContainsSubstring("expected a name that ends in .ply"));
+    CHECK_THAT(f.clean({"--map", f.map, "--force"}).err, ContainsSubstring("merged.ply"));
+    CHECK(read_text(f.map) == CleanFixture::header(f.points) + f.all);
+    CHECK_THAT(f.clean({"--map", f.out + "/static_map.ply", "--force"}).err,
+               ContainsSubstring("choose another folder for --map"));
+  }
+}
