@@ -1,4 +1,6 @@
-# Static analysis of include/ and src/, in a few minutes:  cmake --build build --target analysis
+# Static analysis of include/ and src/:
+#   cmake --build build --target analysis              all files, in some minutes
+#   cmake --build build --target analysis_of_changes   after a build: files that differ from $CI_BASE
 #
 # .clang-tidy lists the checks of clang-tidy, .cppcheck the suppressed checks of cppcheck, each with
 # its reason. A finding makes the target fail.
@@ -22,4 +24,8 @@ add_custom_target(analysis
   COMMAND ${dynains_cppcheck_call} -I include src/remover/remover.cpp
   COMMAND ${dynains_run_clang_tidy} -quiet -p ${PROJECT_BINARY_DIR} -extra-arg=-std=c++17
           "^${PROJECT_SOURCE_DIR}/src/|^${PROJECT_BINARY_DIR}/src/.*/unity_"
+  WORKING_DIRECTORY ${PROJECT_SOURCE_DIR} USES_TERMINAL VERBATIM)
+add_custom_target(analysis_of_changes
+  COMMAND bash ${CMAKE_CURRENT_LIST_DIR}/analyse_changes.sh ${PROJECT_BINARY_DIR}
+    ${dynains_run_clang_tidy} ${dynains_cppcheck_call}
   WORKING_DIRECTORY ${PROJECT_SOURCE_DIR} USES_TERMINAL VERBATIM)
