@@ -110,11 +110,11 @@ std::vector<Landmarks> landmarks_of(const Recording& recording,
 using PoseOfScan = std::function<std::optional<Pose>(std::size_t)>;
 
 Agreement agreement_at(const Place& place, const PoseOfScan& pose_of) {
-  constexpr std::size_t kQueries = 600;
-  constexpr double kAgreeing = 0.3;  // m
+  constexpr std::size_t kComparedPoints = 600;
+  constexpr double kMostGap = 0.3;  // m
   std::size_t points = 0;
   for (const Landmarks& b : place.b) points += b.size();
-  const std::size_t stride = 1 + points / kQueries;
+  const std::size_t stride = 1 + points / kComparedPoints;
   Agreement sum{0.0, 0.0, 0};
   for (std::size_t k = 0; k < place.b.size(); ++k) {
     const auto T_world_b = pose_of(place.scans_b[k]);
@@ -130,7 +130,7 @@ Agreement agreement_at(const Place& place, const PoseOfScan& pose_of) {
       for (std::size_t a = 0; a < place.a.size(); ++a) {
         gap = std::min(gap, place.a[a].distance_to(T_a_b[a] * place.b[k].points()[i]));
       }
-      sum.share += gap < kAgreeing ? 1.0 : 0.0;
+      sum.share += gap < kMostGap ? 1.0 : 0.0;
       sum.gap += gap;
       ++sum.points;
     }

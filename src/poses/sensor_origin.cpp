@@ -18,7 +18,6 @@ namespace {
 
 constexpr float kNearest = 1.5F;    // m; nearer points belong to the vehicle, or are noise
 constexpr float kFarthest = 50.0F;  // m; farther points hardly depend on the origin
-constexpr double kDegrees = 180.0 / M_PI;
 
 /// Directions of points around a candidate for the origin.
 struct Directions {
@@ -33,7 +32,7 @@ struct Directions {
         detail::PackConstant(static_cast<float>(origin.x())),
         detail::PackConstant(static_cast<float>(origin.y())),
         detail::PackConstant(static_cast<float>(origin.z()))};
-    static constexpr detail::PackConstant kToDegrees(static_cast<float>(kDegrees));
+    static constexpr detail::PackConstant kToDegrees(static_cast<float>(180.0 / M_PI));
     detail::for_packs(points.size(), [&](auto at) {
       const auto x = at.load(points.x.data()) - o[0];
       const auto y = at.load(points.y.data()) - o[1];

@@ -15,13 +15,13 @@ constexpr float kNothing = std::numeric_limits<float>::infinity();
 
 float margin_at(float range) { return 0.3F + 0.01F * range; }
 
-struct Cell {
+struct ImageCell {
   int row;
   int column;
 };
 
 /// `range`: norm of `p`, above 0.
-Cell cell_of(const Eigen::Vector3f& p, float range) {
+ImageCell cell_of(const Eigen::Vector3f& p, float range) {
   const float azimuth = std::atan2(p.y(), p.x()) + static_cast<float>(M_PI);
   const float elevation =
       std::asin(std::clamp(p.z() / range, -1.0F, 1.0F)) + static_cast<float>(0.5 * M_PI);
@@ -71,14 +71,14 @@ void SightingFinder::make_image(const std::vector<float>& xyzi) {
     const Eigen::Vector3f p(xyzi[i], xyzi[i + 1], xyzi[i + 2]);
     const float range = p.norm();
     if (!std::isfinite(range) || !(range > 0.0F)) continue;
-    const Cell cell = cell_of(p, range);
+    const ImageCell cell = cell_of(p, range);
     float& nearest = image_[index_of(cell.row, cell.column)];
     nearest = std::min(nearest, range);
   }
 }
 
 float SightingFinder::nearest_around(const Eigen::Vector3f& p) const {
-  const Cell cell = cell_of(p, p.norm());
+  const ImageCell cell = cell_of(p, p.norm());
   float nearest = kNothing;
   for (int row = std::max(cell.row - 1, 0); row <= std::min(cell.row + 1, kRows - 1); ++row) {
     for (int step = -1; step <= 1; ++step) {

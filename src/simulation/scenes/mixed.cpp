@@ -9,13 +9,13 @@ namespace dynains::simulation {
 namespace {
 
 constexpr double kUsualSpeed = 8;      // m/s, of a vehicle
-constexpr double kWalkingSpeed = 1.2;  // m/s
+constexpr double kCarriedSpeed = 1.2;  // m/s
 constexpr double kLong = 20;           // s; longer recordings have vehicles that wait
 
 bool is_carried(const Config& config) { return config.gait != Gait::kVehicle; }
 
 double usual_speed(const Config& config) {
-  return is_carried(config) ? kWalkingSpeed : kUsualSpeed;
+  return is_carried(config) ? kCarriedSpeed : kUsualSpeed;
 }
 
 TerrainConfig draw_ground(Random& random) {
