@@ -139,8 +139,8 @@ void add_run_command(CLI::App& app) {
       ->type_name("FILE");
   command
       .add_option("--passes", options->passes,
-                  "2: after the last scan, scans of the whole recording test what is static, and "
-                  "remove what came or went at any time [1]")
+                  "2: after the last scan, scans of the whole recording remove what came or went "
+                  "at any time, and bring back what stands [1]")
       ->check(CLI::Range(1, 2))
       ->type_name("1|2");
   const char* const kOutputs = "More outputs, and memory";

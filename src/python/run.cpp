@@ -106,7 +106,7 @@ const std::array<RunSetting, 25> kRunSettings{{
      [](RunArguments& run, const py::handle& value) {
        if (!value.is_none()) run.settings.align_start = value.cast<std::string>();
      }},
-    {"passes", "1 or 2", "2: scans of the whole recording test what the first pass keeps",
+    {"passes", "1 or 2", "2: scans of the whole recording revise what the first pass says",
      [](RunArguments& run, const py::handle& value) { run.settings.passes = value.cast<int>(); }},
     {"one_thread", "bool", "the thread of the run also reads and writes files",
      &set_flag<&RunSettings::one_thread>},

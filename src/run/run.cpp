@@ -249,6 +249,7 @@ nlohmann::ordered_json to_json(const SecondPass& pass, const RunPlan& plan) {
   }
   return {{"places", pass.place_count()},
           {"removed_points", pass.removed()},
+          {"restored_points", pass.restored()},
           {"objects", std::move(objects)}};
 }
 

@@ -24,7 +24,7 @@ struct RunSettings {
   bool map_attributes = false;
   std::string crs;  ///< of a LAS map, for example "EPSG:25832"; empty: none
   ScanWindow window;
-  int passes = 1;           ///< 2: scans of the whole recording test what the first pass keeps
+  int passes = 1;           ///< 2: scans of the whole recording revise the first verdicts
   bool one_thread = false;  ///< the thread of the run also reads and writes files
   bool write_online = false;
   bool write_clean = false;

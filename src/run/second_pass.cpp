@@ -12,20 +12,31 @@ constexpr float kChangedRatio = 0.25F;      // of the known points of an instanc
 constexpr float kLowChangedRatio = 0.2F;    // of those in its lower half: panes are higher
 constexpr float kLargeChangedRatio = 0.5F;  // of a larger instance
 constexpr float kCompactLength = 18.0F, kCompactHeight = 4.5F;  // m
-constexpr float kBelief = 0.95F;  // of points that the second pass removes
+constexpr float kBelief = 0.95F;         // of points that the second pass removes
+constexpr float kRestoredBelief = 0.5F;  // of objects that it brings back
 
 }  // namespace
 
 bool SecondPass::Instance::leaves() const {
-  if (changed == 0) return false;
   const Eigen::Vector3f size = highest - lowest;
   const bool is_compact =
       std::max(size.x(), size.y()) <= kCompactLength && size.z() <= kCompactHeight;
-  const auto has = [](std::uint32_t part, float ratio, std::uint32_t all) {
-    return static_cast<float>(part) >= ratio * static_cast<float>(all);
+  const float ratio = is_compact ? kChangedRatio : kLargeChangedRatio;
+  return points.leave(ratio) || places.leave(ratio);
+}
+
+void SecondPass::Share::add(bool has_changed, bool is_low) {
+  ++known;
+  changed += has_changed ? 1 : 0;
+  low_known += is_low ? 1 : 0;
+  low_changed += has_changed && is_low ? 1 : 0;
+}
+
+bool SecondPass::Share::leave(float ratio) const {
+  const auto has = [](std::uint32_t part, float of, std::uint32_t all) {
+    return static_cast<float>(part) >= of * static_cast<float>(all);
   };
-  return has(changed, is_compact ? kChangedRatio : kLargeChangedRatio, known) &&
-         has(low_changed, kLowChangedRatio, low_known);
+  return changed > 0 && has(changed, ratio, known) && has(low_changed, kLowChangedRatio, low_known);
 }
 
 SecondPass::SecondPass(const std::filesystem::path& folder)
@@ -35,7 +46,9 @@ SecondPass::SecondPass(const std::filesystem::path& folder)
 
 void SecondPass::add(const RecordedScan& scan, const ScanVerdict& verdict) {
   copy_points(scan, points_);
-  places_.add(points_, verdict.labels, verdict.T_world_sensor);
+  places_.add(points_, verdict.labels, verdict.causes, verdict.T_world_sensor, verdict.time,
+              static_cast<std::uint32_t>(verdict.scan));
+  ground_.add(points_, verdict.labels, verdict.T_world_sensor);
   const auto number = static_cast<std::uint32_t>(verdict.scan);
   const SessionReference* const reference =
       references_.add(points_, verdict.labels, verdict.T_world_sensor, number);
@@ -75,13 +88,13 @@ void SecondPass::list_objects() {
   places_.for_each([&](const Eigen::Vector3d& middle, const Place& place) {
     if (place.state != PlaceState::kChanged) return;
     Object& object = objects_[place.object - 1];
-    const auto [first, last] = places_.free_scans(place);
-    const bool is_new = object.highest.x() < object.lowest.x();
-    object.first_passed = is_new ? first : std::min(object.first_passed, first);
-    object.last_passed = is_new ? last : std::max(object.last_passed, last);
     const Eigen::Vector3d half = Eigen::Vector3d::Constant(0.5 * RecordingPlaces::kPlace);
     object.lowest = object.lowest.cwiseMin(middle - half);
     object.highest = object.highest.cwiseMax(middle + half);
+    if (!place.was_passed()) return;
+    const auto [first, last] = places_.free_scans(place);
+    object.first_passed = std::min(object.first_passed, first);
+    object.last_passed = std::max(object.last_passed, last);
   });
 }
 
@@ -89,17 +102,39 @@ bool SecondPass::revise(const RecordedScan& scan, std::uint32_t number, const Po
                         VerdictArrays& verdict) {
   copy_points(scan, points_);
   place_of_.assign(points_.size(), nullptr);
+  is_restored_.assign(points_.size(), 0);
+  if (!is_decided_) return false;
+  const std::uint64_t before = restored_ + removed_;
   bool has_changed = false;
   places_.for_each_place(points_, verdict.labels, T_world_sensor,
                          [&](std::size_t i, const Place* place) {
-                           if (place == nullptr || place->state == PlaceState::kUnknown) return;
-                           place_of_[i] = place;
-                           has_changed = has_changed || place->state == PlaceState::kChanged;
+                           if (place == nullptr) return;
+                           if (verdict.labels[i] == PointLabel::kDynamic) {
+                             if (place->stands()) restore(i, verdict);
+                           } else if (place->state != PlaceState::kUnknown) {
+                             place_of_[i] = place;
+                             has_changed = has_changed || place->state == PlaceState::kChanged;
+                           }
                          });
-  if (!has_changed) return false;
+  restored_ += ground_.restore(points_, T_world_sensor, verdict);
+  if (has_changed) remove_objects(number, T_world_sensor, verdict);
+  return restored_ + removed_ > before;
+}
+
+void SecondPass::restore(std::size_t point, VerdictArrays& verdict) {
+  if (verdict.causes[point] == Cause::kUnderInstance) return;
+  verdict.labels[point] = PointLabel::kStatic;
+  verdict.causes[point] = Cause::kReverted;
+  if (!verdict.beliefs.empty()) verdict.beliefs[point] = kRestoredBelief;
+  is_restored_[point] = 1;
+  ++restored_;
+}
+
+void SecondPass::remove_objects(std::uint32_t number, const Pose& T_world_sensor,
+                                VerdictArrays& verdict) {
   find_instances(T_world_sensor, verdict);
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    if (verdict.labels[i] != PointLabel::kStatic) continue;
+    if (verdict.labels[i] != PointLabel::kStatic || is_restored_[i] != 0) continue;
     const std::uint32_t id = verdict.instances[i];
     const bool is_free = place_of_[i] != nullptr && place_of_[i]->state == PlaceState::kChanged;
     const bool leaves = id != kNoInstance && id < instances_.size() && instances_[id].leaves();
@@ -113,7 +148,6 @@ bool SecondPass::revise(const RecordedScan& scan, std::uint32_t number, const Po
     if (object.points++ == 0) object.first_measured = number;
     object.last_measured = number;
   }
-  return true;
 }
 
 void SecondPass::find_instances(const Pose& T_world_sensor, const VerdictArrays& verdict) {
@@ -136,16 +170,22 @@ void SecondPass::find_instances(const Pose& T_world_sensor, const VerdictArrays&
     instance.lowest = instance.lowest.cwiseMin(world_[i]);
     instance.highest = instance.highest.cwiseMax(world_[i]);
   });
+  seen_.clear();
   for_each_object_point([&](std::size_t i, std::uint32_t id) {
     if (place_of_[i] == nullptr) return;
     Instance& instance = instances_[id];
-    const std::uint32_t changed = place_of_[i]->state == PlaceState::kChanged ? 1 : 0;
-    ++instance.known;
-    instance.changed += changed;
-    if (world_[i].z() > 0.5F * (instance.lowest.z() + instance.highest.z())) return;
-    ++instance.low_known;
-    instance.low_changed += changed;
+    const bool is_low = world_[i].z() <= 0.5F * (instance.lowest.z() + instance.highest.z());
+    instance.points.add(place_of_[i]->state == PlaceState::kChanged, is_low);
+    seen_.push_back({id, place_of_[i], is_low});
   });
+  // A place is low if any of its points is.
+  std::sort(seen_.begin(), seen_.end());
+  for (std::size_t i = 0; i < seen_.size(); ++i) {
+    const auto [id, place, is_low] = seen_[i];
+    const bool goes_on = i + 1 < seen_.size() && std::get<0>(seen_[i + 1]) == id &&
+                         std::get<1>(seen_[i + 1]) == place;
+    if (!goes_on) instances_[id].places.add(place->state == PlaceState::kChanged, is_low);
+  }
 }
 
 }  // namespace dynains::program

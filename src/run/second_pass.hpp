@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <tuple>
 #include <vector>
 
 #include "dynains/city/recording_places.hpp"
@@ -14,15 +15,16 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/verdict.hpp"
+#include "restored_ground.hpp"
 #include "scratch_file.hpp"
 #include "verdict_arrays.hpp"
 
 namespace dynains::program {
 
 /// The first pass judges a scan by the scans around it. The second one tests the places of all
-/// static points by scans of the whole recording, and removes what came or went: see
-/// RecordingPlaces. An instance of the first pass leaves as a whole if enough of its places have
-/// changed. No point that moves by the first pass is kept by the second one.
+/// points above the ground by scans of the whole recording, removes what came or went, and brings
+/// back what stands (see RecordingPlaces) and the ground. An instance of the first pass leaves as a
+/// whole if enough of its points or places have changed.
 class SecondPass {
  public:
   /// Touching places that came or went, and the scans that tell of it, numbered from 0 on.
@@ -31,7 +33,7 @@ class SecondPass {
     Eigen::Vector3d highest = Eigen::Vector3d::Constant(-1e9);  // m
     std::uint64_t points = 0;                                   // removed in its places
     std::uint32_t first_measured = 0, last_measured = 0;
-    std::uint32_t first_passed = 0, last_passed = 0;
+    std::uint32_t first_passed = UINT32_MAX, last_passed = 0;
   };
 
   /// References of the scans wait in a file without a name in `folder`. Throws IoError.
@@ -52,6 +54,8 @@ class SecondPass {
   const std::vector<Object>& objects() const { return objects_; }
   /// Number of points that left by revise().
   std::uint64_t removed() const { return removed_; }
+  /// Number of points that came back by revise().
+  std::uint64_t restored() const { return restored_; }
 
  private:
   struct Reference {
@@ -62,10 +66,18 @@ class SecondPass {
     std::size_t size;      // bytes
   };
   using Place = RecordingPlaces::Place;
-  /// Points of an instance of the first pass in one scan.
+  /// Points or places of known state, and those of them that have changed.
+  struct Share {
+    std::uint32_t known = 0, changed = 0;
+    std::uint32_t low_known = 0, low_changed = 0;  // in the lower half of the instance
+
+    void add(bool has_changed, bool is_low);
+    bool leave(float ratio) const;
+  };
+  /// An instance of the first pass in one scan. Its faces near the sensor have most of the points:
+  /// places count once.
   struct Instance {
-    std::uint32_t known = 0, changed = 0;          // in places of this state
-    std::uint32_t low_known = 0, low_changed = 0;  // of these in the lower half
+    Share points, places;
     Eigen::Vector3f lowest = Eigen::Vector3f::Constant(1e9F);
     Eigen::Vector3f highest = Eigen::Vector3f::Constant(-1e9F);  // m, axes of the world
 
@@ -73,20 +85,25 @@ class SecondPass {
   };
 
   void list_objects();
+  void restore(std::size_t point, VerdictArrays& verdict);
+  void remove_objects(std::uint32_t number, const Pose& T_world_sensor, VerdictArrays& verdict);
   void find_instances(const Pose& T_world_sensor, const VerdictArrays& verdict);
 
   RecordingPlaces places_;
+  RestoredGround ground_;
   SessionReferences references_;
   std::vector<Reference> kept_;
   ScratchFile file_;
   std::vector<std::uint8_t> packed_;
   PointBuffer points_;
-  std::vector<const Place*> place_of_;  // by point; null: none, or nothing is known of it
-  std::vector<Instance> instances_;     // by id
+  std::vector<const Place*> place_of_;     // by point; null: none, or nothing is known of it
+  std::vector<std::uint8_t> is_restored_;  // by point
+  std::vector<Instance> instances_;        // by id
+  std::vector<std::tuple<std::uint32_t, const Place*, bool>> seen_;  // instance, place, low
   std::vector<Eigen::Vector3f> world_;  // m, from the sensor, axes of the world; by point
   std::vector<Object> objects_;
   bool is_decided_ = false;
-  std::uint64_t removed_ = 0;
+  std::uint64_t removed_ = 0, restored_ = 0;
 };
 
 }  // namespace dynains::program

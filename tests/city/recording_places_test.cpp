@@ -23,14 +23,25 @@ class Recorder {
   explicit Recorder(const RecordingPlacesConfig& config = {}) : places(config) {}
 
   /// Measures `count` places in a row along y, from place `first` on, at x = `x` m.
-  void measure(int count, int first = 0, float x = 10.1F) {
+  void measure(int count, int first = 0, float x = 10.1F, PointLabel label = PointLabel::kStatic) {
     PointBuffer points;
     for (int i = 0; i < count; ++i) {
       points.push_back(x, 0.4F * static_cast<float>(first + i) + 0.1F, 0.1F);
       points.push_back(x + 0.2F, 0.4F * static_cast<float>(first + i) + 0.3F, 0.3F);
     }
-    const std::vector<PointLabel> labels(points.size(), PointLabel::kStatic);
-    places.add(points, labels, Pose::Identity());
+    const std::vector<PointLabel> labels(points.size(), label);
+    const std::vector<Cause> causes(points.size(), Cause::kUnknown);
+    places.add(points, labels, causes, Pose::Identity(), time_, scan_);
+  }
+  /// The first pass judges the points of places in each of these scans, 1 s apart.
+  void judge(std::uint32_t first, const std::vector<PointLabel>& verdicts, int count = 6) {
+    for (const PointLabel verdict : verdicts) {
+      scan_ = first;
+      time_ = first++;
+      measure(count, 0, 10.1F, verdict);
+    }
+    scan_ = 0;
+    time_ = 0.0;
   }
   void look(BeamResult seen, int times = 1) {
     look_by([seen](const Eigen::Vector3d&) { return seen; }, times);
@@ -196,6 +207,46 @@ TEST_CASE("a changed place tells the scans that passed it") {
     CHECK(recorder.places.free_scans(place) == std::make_pair(7U, 11U));
     CHECK((at - Eigen::Vector3d(10.2, 0.2, 0.2)).norm() < 1e-9);
   });
+}
+
+constexpr PointLabel kKept = PointLabel::kStatic, kRemoved = PointLabel::kDynamic;
+
+TEST_CASE("what the first pass saw coming has changed, if looks passed its place before") {
+  for (const bool was_empty : {false, true}) {
+    for (const PointLabel first : {kKept, kRemoved}) {
+      Recorder recorder;
+      recorder.judge(2, {first, kKept, kKept});
+      recorder.look(was_empty ? BeamResult::kFree : BeamResult::kUnknown);
+      recorder.look(BeamResult::kUnknown);
+      recorder.look(BeamResult::kHit, 20);
+      CHECK(recorder.changed() == (was_empty && first == kRemoved ? 6U : 0U));
+    }
+  }
+}
+
+TEST_CASE("what the first pass saw leaving has changed, if looks passed its place afterwards") {
+  for (const BeamResult after : {BeamResult::kFree, BeamResult::kUnknown, BeamResult::kHit}) {
+    Recorder recorder;
+    recorder.judge(0, {kKept, kKept, kRemoved});
+    recorder.look(BeamResult::kHit, 3);
+    recorder.look(after);
+    CHECK(recorder.changed() == (after == BeamResult::kFree ? 6U : 0U));
+  }
+}
+
+TEST_CASE("places beside those that changed join them, if the first pass removed their points") {
+  for (const int removed : {1, 2}) {
+    Recorder recorder;
+    const std::vector<PointLabel> came = removed == 1
+                                             ? std::vector<PointLabel>{kRemoved, kKept, kKept}
+                                             : std::vector<PointLabel>{kRemoved, kRemoved, kKept};
+    recorder.judge(2, came, 10);
+    recorder.look_by([](const Eigen::Vector3d& at) {
+      return at.y() < 2.4 ? BeamResult::kFree : BeamResult::kUnknown;
+    });
+    recorder.look(BeamResult::kHit, 5);
+    CHECK(recorder.changed() == (removed == 1 ? 6U : 10U));
+  }
 }
 
 TEST_CASE("parameters of places have bounds") {

@@ -1,9 +1,10 @@
-// The second pass of a run over first verdicts that keep everything.
+// The second pass of a run over first verdicts.
 #include "run/second_pass.hpp"
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "io/files.hpp"
@@ -45,15 +46,24 @@ RecordedScan recorded(const BoxScan& scan) {
   return result;
 }
 
-/// Verdicts that call everything static; the boxes of one label are one instance.
-VerdictArrays first_verdict(const BoxScan& scan) {
+using Removes = std::function<bool(std::size_t scan, std::uint32_t label)>;
+
+bool removes_nothing(std::size_t, std::uint32_t) { return false; }
+
+/// Verdicts that call everything static but what `removes` tells; the boxes of one label are one
+/// instance.
+VerdictArrays first_verdict(const BoxScan& scan, std::size_t number, const Removes& removes) {
   VerdictArrays verdict;
-  verdict.labels = scan.verdicts;
   for (std::size_t i = 0; i < scan.labels.size(); ++i) {
     const bool is_ground = scan.verdicts[i] == PointLabel::kGround;
+    verdict.labels.push_back(scan.verdicts[i]);
     verdict.causes.push_back(is_ground ? Cause::kGround : Cause::kOccupied);
     verdict.instances.push_back(is_ground ? kNoInstance : scan.labels[i]);
     verdict.beliefs.push_back(0.5F);
+    if (!removes(number, scan.labels[i])) continue;
+    verdict.labels.back() = PointLabel::kDynamic;
+    verdict.causes.back() = is_ground ? Cause::kUnderInstance : Cause::kWithInstance;
+    verdict.beliefs.back() = 0.99F;
   }
   return verdict;
 }
@@ -63,16 +73,18 @@ struct Counts {
 };
 
 /// Points of each scan with a label, after both passes.
-std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool tests = true) {
+std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool tests = true,
+                          const Removes& removes = removes_nothing) {
   const TemporaryFolder folder;
   SecondPass pass(folder.path());
   for (std::size_t i = 0; i < recording.scans.size(); ++i) {
-    const VerdictArrays arrays = first_verdict(recording.scans[i]);
+    const VerdictArrays arrays = first_verdict(recording.scans[i], i, removes);
     ScanVerdict verdict;
     verdict.scan = i;
     verdict.time = 0.5 * static_cast<double>(i);
     verdict.T_world_sensor = recording.scans[i].T_world_sensor;
     verdict.labels = arrays.labels;
+    verdict.causes = arrays.causes;
     pass.add(recorded(recording.scans[i]), verdict);
   }
   CHECK(count_entries(folder.path()) == 0);  // nothing is left when the process is killed
@@ -82,7 +94,7 @@ std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool t
   std::uint32_t number = 0;
   std::size_t disagreeing = 0;  // labels, causes and beliefs
   for (const BoxScan& scan : recording.scans) {
-    VerdictArrays arrays = first_verdict(scan);
+    VerdictArrays arrays = first_verdict(scan, number, removes);
     const VerdictArrays before = arrays;
     const bool has_changed = pass.revise(recorded(scan), number++, scan.T_world_sensor, arrays);
     CHECK(has_changed == (arrays.labels != before.labels));
@@ -151,4 +163,31 @@ TEST_CASE("a car that stays, and a street where nothing moves, lose nothing") {
 
 TEST_CASE("a second pass that was interrupted changes nothing") {
   CHECK(sum(count(with_parked_car(), kCar, false)).removed == 0);
+}
+
+TEST_CASE("what the first pass removed for a while comes back if it stands") {
+  Recorded recording;
+  std::vector<StreetBox> boxes = street();
+  boxes.push_back(car_at(4.0));
+  recording.drive(boxes, -15.0, 15.0);
+  const auto removes = [](std::size_t scan, std::uint32_t label) {
+    return scan >= 12 && scan < 15 && label == kCar;
+  };
+  const std::vector<Counts> car = count(recording, kCar, true, removes);
+  for (std::size_t scan = 12; scan < 15; ++scan) {
+    CHECK(car[scan].kept > 9 * car[scan].removed);
+  }
+  // Without a test, the first verdicts stay.
+  CHECK(count(recording, kCar, false, removes)[13].kept == 0);
+}
+
+TEST_CASE("removed ground comes back") {
+  Recorded recording;
+  recording.drive(street(), -15.0, 15.0);
+  constexpr std::uint32_t kRoad = 40;
+  const auto removes = [](std::size_t scan, std::uint32_t label) {
+    return scan == 15 && label == kRoad;
+  };
+  const Counts road = count(recording, kRoad, true, removes)[15];
+  CHECK(road.kept > 3 * road.removed);
 }

@@ -12,11 +12,13 @@
 #include <vector>
 
 #include "dynains/belief/log_odds.hpp"
+#include "dynains/city/recording_place.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_loops.hpp"
+#include "dynains/verdict.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
@@ -50,38 +52,26 @@ struct RecordingPlacesConfig {
   void validate() const { validate_parameters("RecordingPlaces", *this); }
 };
 
-/// State of a place over the recording.
-enum class PlaceState : std::uint8_t {
-  kUnknown,  ///< no look sees it well
-  kStays,
-  kChanged  ///< looks in a row passed it: what was measured there came or went
-};
-
-/// Places are cubes of 0.4 m with points that the first pass called static. Reference scans test
-/// the points of each place, in the order of their times. References near each other in time and
-/// in the place of the sensor repeat the same error, and are one look. A look is free if beams
-/// passed the place and none hit it. A place has changed if `free_looks` looks in a row are free
-/// and no hit lies between: its state over time, not the sum of its looks, so that an object that
-/// stands for long and then leaves is found. Looks from farther away than the hits of a place do
-/// not count, for beams that are far apart miss what is thin.
+/// Places are cubes of 0.4 m with points above the ground. The verdicts of the first pass on them
+/// are kept by epochs. Then reference scans test the points of each place, in the order of their
+/// times. References near each other in time and in the place of the sensor repeat the same error,
+/// and are one look; an epoch is the same for scans. A look is free if beams passed the place and
+/// none hit it. A place has changed by its state over time, not by the sum of its looks, in one of
+/// these ways:
+/// - `free_looks` looks in a row are free and no hit lies between. Looks from farther away than the
+///   points of a place do not count, for beams that are far apart miss what is thin.
+/// - What came: looks passed it before any scan measured it, and the first epoch removed its
+/// points.
+///   What left: the same in reverse.
+/// - It touches such places, and its first or last two epochs removed its points.
 ///
-/// The memory is that of the places: about 100 bytes each.
+/// The memory is that of the places: about 120 bytes each.
 class RecordingPlaces {
  public:
   static constexpr double kPlace = 0.4;      // m
   static constexpr std::int64_t kTile = 64;  // places
 
-  struct Place {
-    std::array<std::array<std::uint8_t, 3>, 8> samples;  // by octant, in 1/256 of a place
-    std::uint8_t filled = 0;                             // octants with a sample
-    PlaceState state = PlaceState::kUnknown;
-    std::uint8_t farthest = 0;                                 // m, range of its points
-    std::uint8_t look_free = 0, look_hit = 0, look_range = 0;  // of the open look
-    std::uint8_t hits = 0;                                     // looks
-    std::array<std::uint8_t, 4> run = {}, longest = {};        // free looks in a row, by kNear
-    std::array<std::uint16_t, 4> run_begin = {}, begin = {}, end = {};  // looks
-    std::uint32_t object = 0;  // number, from 1 on; 0: none
-  };
+  using Place = RecordingPlace;
 
   /// Throws ConfigError.
   explicit RecordingPlaces(const RecordingPlacesConfig& config)
@@ -89,9 +79,14 @@ class RecordingPlaces {
 
   const RecordingPlacesConfig& config() const { return config_; }
 
-  /// Adds the places of the static points above the ground of a scan (m, sensor frame).
-  void add(PointsView points, Span<const PointLabel> verdicts, const Pose& T_world_sensor) {
+  /// Adds the places of the points above the ground of a scan (m, sensor frame). `time`: s. `scan`:
+  /// its number; ascending.
+  void add(PointsView points, Span<const PointLabel> verdicts, Span<const Cause> causes,
+           const Pose& T_world_sensor, double time, std::uint32_t scan) {
+    begin_epoch(T_world_sensor.translation(), time);
     for_each_in_range(points, verdicts, T_world_sensor, [&](std::size_t i, const Position& at) {
+      const bool is_removed = verdicts[i] == PointLabel::kDynamic;
+      if (is_removed && causes[i] == Cause::kUnderInstance) return;
       Tile& tile = at_tile(at);
       const std::uint32_t number = tile.numbers.insert(at.key);
       if (number == tile.places.size()) {
@@ -99,6 +94,7 @@ class RecordingPlaces {
         tile.keys.push_back(at.key);
       }
       Place& place = tile.places[number];
+      place.first.add(is_removed, epoch_, scan);
       const float range = std::sqrt(points.x[i] * points.x[i] + points.y[i] * points.y[i]);
       place.farthest = std::max(place.farthest, whole_metres(range));
       const auto bit = static_cast<std::uint8_t>(1U << at.octant);
@@ -140,12 +136,11 @@ class RecordingPlaces {
     find_objects();
   }
 
-  /// Calls `visit(i, place)` for each static point above the ground, m, sensor frame; null: no
-  /// scan brought a place there. A scan without changed places around it visits nothing.
+  /// Calls `visit(i, place)` for each static or moving point above the ground within the range, m,
+  /// sensor frame; null: no scan brought a place there.
   template <class Visitor>
   void for_each_place(PointsView points, Span<const PointLabel> verdicts,
                       const Pose& T_world_sensor, Visitor&& visit) const {
-    if (!has_changes_around(T_world_sensor.translation())) return;
     for_each_in_range(points, verdicts, T_world_sensor,
                       [&](std::size_t i, const Position& at) { visit(i, find(at.tile, at.key)); });
   }
@@ -156,9 +151,11 @@ class RecordingPlaces {
     return size;
   }
 
-  /// First and last scan of the looks in a row that passed a changed place.
+  /// First and last scan of the longest row of looks that passed a place; was_passed() must be
+  /// true.
   std::pair<std::uint32_t, std::uint32_t> free_scans(const Place& place) const {
-    const std::size_t k = class_of(place);
+    std::size_t k = class_of(place);
+    if (place.longest[k] == 0) k = kNear.size() - 1;
     return {look_scans_[place.begin[k]].first, look_scans_[place.end[k]].second};
   }
   std::uint32_t object_count() const { return objects_; }
@@ -188,7 +185,6 @@ class RecordingPlaces {
     VoxelHashTable<> numbers;
     std::vector<VoxelKey> keys;
     std::vector<Place> places;
-    std::uint32_t changed = 0;
   };
   struct Position {
     TileIndex tile;
@@ -224,7 +220,7 @@ class RecordingPlaces {
                          const Pose& T_world_sensor, Visitor&& visit) const {
     const auto range = static_cast<float>(config_.place_range);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      if (verdicts[i] != PointLabel::kStatic) continue;
+      if (verdicts[i] != PointLabel::kStatic && verdicts[i] != PointLabel::kDynamic) continue;
       const float x = points.x[i], y = points.y[i];
       if (x * x + y * y > range * range) continue;
       visit(i, position_of(T_world_sensor * Eigen::Vector3d(static_cast<double>(x),
@@ -271,8 +267,14 @@ class RecordingPlaces {
       if (place->look_hit > 0) {
         const bool is_hit = place->look_hit >= place->look_free;
         if (is_hit && place->hits < 255) ++place->hits;
+        place->free_after = false;
         place->run = {};
       } else {
+        place->was_free = true;
+        const auto [first, last] = look_scans_.back();
+        const bool is_before = place->hits == 0 && last < place->first.first_scan;
+        place->free_before = place->free_before || is_before;
+        place->free_after = place->free_after || first > place->first.last_scan;
         for (std::size_t k = 0; k < kNear.size(); ++k) {
           if (place->look_range > kNear[k]) continue;
           add_free(*place, k, look);
@@ -281,6 +283,16 @@ class RecordingPlaces {
       place->look_free = place->look_hit = place->look_range = 0;
     }
     touched_.clear();
+  }
+
+  // Begins an epoch unless the sensor is near that of the open one.
+  void begin_epoch(const Eigen::Vector3d& sensor, double time) {
+    const bool is_near = epoch_ > 0 && (sensor - epoch_at_).norm() < config_.look_way &&
+                         time - epoch_time_ < config_.look_time;
+    if (is_near) return;
+    if (epoch_ < UINT16_MAX) ++epoch_;
+    epoch_at_ = sensor;
+    epoch_time_ = time;
   }
 
   static void add_free(Place& place, std::size_t k, std::uint16_t look) {
@@ -299,13 +311,16 @@ class RecordingPlaces {
     return k;
   }
 
-  PlaceState state_of(const Place& place) const {
+  PlaceState state_of(Place& place) const {
+    place.first.end_epoch();
+    if (place.came_or_left()) return PlaceState::kChanged;
     const std::uint8_t longest = place.longest[class_of(place)];
     if (longest >= config_.free_looks) return PlaceState::kChanged;
     return place.hits > 0 || longest > 0 ? PlaceState::kStays : PlaceState::kUnknown;
   }
 
-  // Numbers the components of touching changed places that have enough of them.
+  // Numbers the components of touching changed places, and of those beside them that the first pass
+  // removed early or late.
   void find_objects() {
     std::vector<std::pair<TileIndex, std::uint32_t>> members;
     std::vector<std::pair<TileIndex, std::uint32_t>> rejected;
@@ -322,27 +337,30 @@ class RecordingPlaces {
         }
         std::sort(contacts.begin(), contacts.end());
         contacts.erase(std::unique(contacts.begin(), contacts.end()), contacts.end());
-        const bool is_object = is_whole(members.size(), contacts.size());
+        const auto sure = static_cast<std::size_t>(
+            std::count_if(members.begin(), members.end(), [&](const auto& member) {
+              return tiles_[member.first].places[member.second].state == PlaceState::kChanged;
+            }));
+        const bool is_object = is_whole(sure, members.size(), contacts.size());
         const std::uint32_t number = is_object ? ++objects_ : kNone;
         for (const auto& member : members) {
-          Tile& of = tiles_[member.first];
-          of.places[member.second].object = number;
-          ++of.changed;
+          Place& place_of_member = tiles_[member.first].places[member.second];
+          place_of_member.object = number;
+          place_of_member.state = PlaceState::kChanged;
         }
         if (!is_object) rejected.insert(rejected.end(), members.begin(), members.end());
       }
     }
     for (const auto& member : rejected) {
-      Tile& of = tiles_[member.first];
-      of.places[member.second].state = PlaceState::kStays;
-      of.places[member.second].object = 0;
-      --of.changed;
+      Place& place = tiles_[member.first].places[member.second];
+      place.state = PlaceState::kStays;
+      place.object = 0;
     }
   }
 
-  // An object is large enough, and no part of something that stays.
-  bool is_whole(std::size_t places, std::size_t contacts) const {
-    return places >= static_cast<std::size_t>(config_.object_places) &&
+  // An object is large enough, no part of something that stays, and looks passed a third of it.
+  bool is_whole(std::size_t places, std::size_t members, std::size_t contacts) const {
+    return places >= static_cast<std::size_t>(config_.object_places) && 3 * places >= members &&
            static_cast<double>(contacts) <= config_.most_contact * static_cast<double>(places);
   }
 
@@ -365,21 +383,14 @@ class RecordingPlaces {
           voxel_key(index[0] & (kTile - 1), index[1] & (kTile - 1), index[2]));
       if (number == kNone) continue;
       Place& place = found->second.places[number];
-      if (place.state == PlaceState::kStays && place.hits > 0) contacts.push_back(&place);
-      if (place.state != PlaceState::kChanged || place.object != 0) continue;
+      if (place.state == PlaceState::kStays && place.hits > 0 && !place.first.moved()) {
+        contacts.push_back(&place);
+      }
+      const bool joins = place.state == PlaceState::kChanged || place.first.moved();
+      if (!joins || place.object != 0) continue;
       place.object = kNone;
       members.push_back({tile, number});
     }
-  }
-
-  // Whether a tile within the range of the sensor has changed places.
-  bool has_changes_around(const Eigen::Vector3d& sensor) const {
-    for (const auto& tile : tiles_) {
-      if (tile.second.changed > 0 && distance(tile.first, sensor) <= config_.place_range) {
-        return true;
-      }
-    }
-    return false;
   }
 
   // Distance of a position from a tile along the axis where it is larger, m.
@@ -436,6 +447,9 @@ class RecordingPlaces {
   TileIndex recent_index_ = {};
   std::uint32_t objects_ = 0;
 
+  std::uint16_t epoch_ = 0;
+  Eigen::Vector3d epoch_at_ = Eigen::Vector3d::Zero();  // m, sensor at the begin of the epoch
+  double epoch_time_ = 0.0;                             // s
   bool has_look_ = false;
   Eigen::Vector3d look_at_ = Eigen::Vector3d::Zero();  // m, sensor at the begin of the look
   double look_time_ = 0.0;                             // s

@@ -1,0 +1,91 @@
+// Height of the ground of a recording.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "dynains/points.hpp"
+#include "dynains/pose.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
+
+namespace dynains {
+
+/// Mean height of the ground in cells of 0.4 m, from all scans of a recording: single scans have
+/// noise and hidden ground, the recording has neither.
+class RecordingGround {
+ public:
+  /// Adds the ground points of a scan (m, sensor frame).
+  void add(PointsView points, Span<const PointLabel> verdicts, const Pose& T_world_sensor) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (verdicts[i] != PointLabel::kGround) continue;
+      const Eigen::Vector3d at = T_world_sensor * Eigen::Vector3d(static_cast<double>(points.x[i]),
+                                                                  static_cast<double>(points.y[i]),
+                                                                  static_cast<double>(points.z[i]));
+      const Index index = index_of(at);
+      Tile& tile = at_tile({index[0] >> kShift, index[1] >> kShift});
+      const std::uint32_t number = tile.numbers.insert(key_of(index));
+      if (number == tile.cells.size()) tile.cells.push_back({at.z(), 0.0F, 0});
+      Cell& cell = tile.cells[number];
+      ++cell.count;
+      cell.mean +=
+          (static_cast<float>(at.z() - cell.origin) - cell.mean) / static_cast<float>(cell.count);
+    }
+  }
+
+  /// Height of a point (m, world frame) above the ground in its cell. Empty where the recording has
+  /// less than three points of the ground.
+  std::optional<double> rise(const Eigen::Vector3d& point) const {
+    const Index index = index_of(point);
+    const auto tile = tiles_.find({index[0] >> kShift, index[1] >> kShift});
+    if (tile == tiles_.end()) return std::nullopt;
+    const std::uint32_t number = tile->second.numbers.find(key_of(index));
+    if (number == VoxelHashTable<>::kNone) return std::nullopt;
+    const Cell& cell = tile->second.cells[number];
+    if (cell.count < kFewest) return std::nullopt;
+    return point.z() - cell.origin - static_cast<double>(cell.mean);
+  }
+
+ private:
+  static constexpr double kCell = 0.4;  // m
+  static constexpr int kShift = 6;      // cells of a tile: 64 x 64
+  static constexpr std::uint32_t kFewest = 20;
+
+  using Index = std::array<std::int64_t, 2>;
+  struct Cell {
+    double origin;  // m, the first height
+    float mean;     // m, above it
+    std::uint32_t count;
+  };
+  struct Tile {
+    VoxelHashTable<> numbers;
+    std::vector<Cell> cells;
+  };
+
+  static Index index_of(const Eigen::Vector3d& at) {
+    return {static_cast<std::int64_t>(std::floor(at.x() / kCell)),
+            static_cast<std::int64_t>(std::floor(at.y() / kCell))};
+  }
+  static VoxelKey key_of(const Index& index) {
+    constexpr std::int64_t kMask = (std::int64_t{1} << kShift) - 1;
+    return voxel_key(index[0] & kMask, index[1] & kMask, 0);
+  }
+  Tile& at_tile(const Index& index) {
+    if (recent_ == nullptr || recent_index_ != index) {
+      recent_ = &tiles_[index];
+      recent_index_ = index;
+    }
+    return *recent_;
+  }
+
+  std::map<Index, Tile> tiles_;  // its elements do not move
+  Tile* recent_ = nullptr;
+  Index recent_index_ = {};
+};
+
+}  // namespace dynains

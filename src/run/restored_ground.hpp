@@ -1,0 +1,41 @@
+// Ground that the first pass removed with what stood or moved on it.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <vector>
+
+#include "dynains/city/recording_ground.hpp"
+#include "dynains/points.hpp"
+#include "dynains/pose.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
+#include "verdict_arrays.hpp"
+
+namespace dynains::program {
+
+/// Gives removed points back to the ground if they are not above the ground of the whole recording.
+/// Points beside removed ones that rise above it stay removed: feet and tyres.
+class RestoredGround {
+ public:
+  /// Takes the ground of a scan.
+  void add(PointsView points, Span<const PointLabel> verdicts, const Pose& T_world_sensor) {
+    ground_.add(points, verdicts, T_world_sensor);
+  }
+  /// Restores points of a scan. Returns their number.
+  std::size_t restore(PointsView points, const Pose& T_world_sensor, VerdictArrays& verdict);
+
+ private:
+  struct Removed {
+    std::size_t point;
+    Eigen::Vector3d at;  // m, world frame
+  };
+
+  void find_removed(PointsView points, const Pose& T_world_sensor, const VerdictArrays& verdict);
+  bool is_beside_foot(const Eigen::Vector3d& at) const;
+
+  RecordingGround ground_;
+  std::vector<Removed> removed_;  // that do not rise above the ground
+  VoxelHashTable<> feet_;         // columns with removed points little above the ground
+};
+
+}  // namespace dynains::program
