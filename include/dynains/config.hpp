@@ -118,6 +118,7 @@ struct RemoverConfig {
   double mounting_pitch = 0.0;  ///< deg, nose down
   double mounting_roll = 0.0;   ///< deg, left side up
   bool newest_verdict = true;
+  int threads = 1;
   bool build_map = true;
 
   /// Verdicts by the method of the paper (Eq. 3-19).
@@ -178,6 +179,10 @@ struct RemoverConfig {
         Parameter{"newest_verdict", self.newest_verdict, Bounds(), "",
                   "give a verdict on the newest scan, without latency; false saves its time, and "
                   "only scans whose verdict is final have labels"});
+    visitor(Parameter{
+        "threads", self.threads, closed(1, 2), "threads",
+        "2: stages work in two threads at a time, with the same verdicts; a final verdict "
+        "comes one scan later, unless it has no latency or revise_map is true"});
     visitor(Parameter{"build_map", self.build_map, Bounds(), "", "accumulate the static map"});
   }
 

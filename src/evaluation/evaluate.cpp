@@ -7,7 +7,7 @@
 #include "dynains/evaluation/object_protocol.hpp"
 #include "dynains/evaluation/point_protocol.hpp"
 #include "dynains/evaluation/voxel_protocol.hpp"
-#include "threads/background.hpp"
+#include "dynains/threads/background.hpp"
 
 namespace dynains::evaluation {
 namespace {

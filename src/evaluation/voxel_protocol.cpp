@@ -18,7 +18,7 @@
 #include "detail/voxel_grid.hpp"
 #include "detail/voxel_index.hpp"
 #include "dynains/errors.hpp"
-#include "threads/background.hpp"
+#include "dynains/threads/background.hpp"
 
 namespace dynains::evaluation {
 

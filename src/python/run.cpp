@@ -108,7 +108,7 @@ const std::array<RunSetting, 25> kRunSettings{{
      }},
     {"passes", "1 or 2", "2: scans of the whole recording revise what the first pass says",
      [](RunArguments& run, const py::handle& value) { run.settings.passes = value.cast<int>(); }},
-    {"one_thread", "bool", "the thread of the run also reads and writes files",
+    {"one_thread", "bool", "the run works, reads and writes in one thread",
      &set_flag<&RunSettings::one_thread>},
     {"write_online", "bool", "also write the verdicts without latency",
      &set_flag<&RunSettings::write_online>},

@@ -11,7 +11,7 @@
 #include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
 #include "dynains/verdict.hpp"
-#include "threads/background.hpp"
+#include "dynains/threads/background.hpp"
 #include "verdict_arrays.hpp"
 
 namespace dynains::program {

@@ -11,7 +11,7 @@
 
 #include "dynains/evaluation/scan.hpp"
 #include "dynains/io/recording.hpp"
-#include "threads/background.hpp"
+#include "dynains/threads/background.hpp"
 
 namespace dynains::program {
 

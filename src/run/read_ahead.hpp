@@ -5,7 +5,7 @@
 #include <future>
 
 #include "dynains/io/recording.hpp"
-#include "threads/background.hpp"
+#include "dynains/threads/background.hpp"
 
 namespace dynains::program {
 

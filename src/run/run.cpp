@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <system_error>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -43,6 +44,12 @@ void finish_second_pass(Remover& remover, RunResults& results) {
   remover.map().for_each([&](const Eigen::Vector3d& point) { results.add_map_point(point); });
 }
 
+/// Threads of the remover: two, if the machine has two cores or the configuration says so.
+int remover_threads(const RunPlan& plan) {
+  if (plan.outputs.thread != std::launch::async) return 1;
+  return std::thread::hardware_concurrency() > 1 ? 2 : plan.config.threads;
+}
+
 /// Processes all scans, or those that come before a signal. Returns the times.
 RunTiming process(const RunPlan& plan, const RunListener& listener, const fs::path& folder,
                   RunResults& results) {
@@ -64,6 +71,7 @@ RunTiming process(const RunPlan& plan, const RunListener& listener, const fs::pa
   if (plan.map_on_disk) {
     RemoverWithMapOnDisk::Config config = *plan.map_on_disk;
     config.build_map = builds_map;
+    config.threads = remover_threads(plan);
     config.map.map_folder = folder / kTileFolder;
     RemoverWithMapOnDisk remover(config);
     work(remover);
@@ -73,6 +81,7 @@ RunTiming process(const RunPlan& plan, const RunListener& listener, const fs::pa
   } else {
     DynaInsRemover::Config config = plan.config;
     config.build_map = config.build_map && builds_map;
+    config.threads = remover_threads(plan);
     DynaInsRemover remover(config);
     work(remover);
   }

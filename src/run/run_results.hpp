@@ -24,7 +24,7 @@
 #include "overview.hpp"
 #include "scan_range.hpp"
 #include "session_contribution.hpp"
-#include "threads/background.hpp"
+#include "dynains/threads/background.hpp"
 #include "verdict_arrays.hpp"
 #include "verdict_log.hpp"
 

@@ -25,7 +25,7 @@ struct RunSettings {
   std::string crs;  ///< of a LAS map, for example "EPSG:25832"; empty: none
   ScanWindow window;
   int passes = 1;           ///< 2: scans of the whole recording revise the first verdicts
-  bool one_thread = false;  ///< the thread of the run also reads and writes files
+  bool one_thread = false;  ///< works, reads and writes in one thread
   bool write_online = false;
   bool write_clean = false;
   bool write_mcap = false;

@@ -41,6 +41,7 @@ TEST_CASE("a warm remover allocates nothing, except for the map when it grows") 
   DynaInsRemover::Config config = base;
   const bool build_map = GENERATE(false, true);
   config.build_map = build_map;
+  config.threads = GENERATE(1, 2);
   config.revision.revise_map = build_map && config.decision == Decision::kFreeSpace;
   // Short rings: after seven rounds of twelve scans, every place in them has held every scan.
   config.evidence.lookahead_scans = 6;
@@ -74,6 +75,7 @@ TEST_CASE("a remover with reserved memory allocates nothing from the second scan
   DynaInsRemover::Config config =
       GENERATE(DynaInsRemover::Config::paper(), DynaInsRemover::Config());
   config.build_map = false;
+  config.threads = GENERATE(1, 2);
   const Scene scene = yard_with(van(14.0, 3.5, {-6.0, 0.0, 0.0}));
   const Scan scan = scene.scan(sensor_at(0.0), 0.0);
   const auto allocations_of_later_scans = [&](DynaInsRemover& remover) {

@@ -324,9 +324,11 @@ TEST_CASE("a scan on which a stage throws is dropped, and a new window begins") 
   using Remover = BasicDynaInsRemover<ForgetfulStages>;
   const bool is_paper = GENERATE(true, false);
   const int failing = GENERATE(0, 3, 35);
-  CAPTURE(is_paper, failing);
+  const int threads = GENERATE(1, 2);
+  CAPTURE(is_paper, failing, threads);
   Remover::Config config = is_paper ? Remover::Config::paper() : Remover::Config();
   config.clusterer.failing_call = failing;
+  config.threads = threads;
   Remover remover(config);
   const std::vector<Scan> scans = drive(oncoming(), 72, 0.0);
   std::vector<std::size_t> finished;  // number of points of each scan, in the order of verdicts
@@ -387,6 +389,7 @@ TEST_CASE("only the final verdict that throws is lost") {
   using Remover = BasicDynaInsRemover<FaintingStages>;
   Remover::Config config;
   config.evidence.failing_verdict = 2;
+  config.threads = GENERATE(1, 2);
   Remover remover(config);
   const std::vector<Scan> scans = drive(oncoming(), 40, 0.0);
   std::vector<std::uint64_t> finished;

@@ -2,7 +2,7 @@
 # of the list below form a layer. A header may include headers of its own folder and of the layers
 # that precede its own in the list.
 set(layers
-  "^(simd/.*|errors|points|pose|parameters|plausibility|verdict|point_cloud_traits|version)\\.hpp$"
+  "^((simd|threads)/.*|errors|points|pose|parameters|plausibility|verdict|point_cloud_traits|version)\\.hpp$"
   "^(sensor|voxels)/"
   "^(ground|clusters|belief)/"
   "^(descriptors|evidence)/"

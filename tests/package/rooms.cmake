@@ -1,6 +1,5 @@
 # Refuses an include of a folder of src/ or of a component whose target is not linked. ROOMS: a list
 # of FOLDER=LINKED,LINKED: each folder of src/ and the folders of the targets that it links.
-# src/threads has headers alone, which need no target.
 cmake_minimum_required(VERSION 3.16)
 set(wrong "")
 set(count 0)
@@ -8,7 +7,7 @@ foreach(room IN LISTS ROOMS)
   string(REGEX MATCH "^([^=]+)=(.*)$" room ${room})
   set(folder ${CMAKE_MATCH_1})
   string(REPLACE "," ";" linked "${CMAKE_MATCH_2}")
-  list(APPEND linked ${folder} threads)
+  list(APPEND linked ${folder})
   file(GLOB_RECURSE files ${SOURCE_DIR}/src/${folder}/*.hpp ${SOURCE_DIR}/src/${folder}/*.cpp
     ${SOURCE_DIR}/include/dynains/${folder}/*.hpp)
   foreach(file IN LISTS files)

@@ -1,4 +1,4 @@
-#include "threads/background.hpp"
+#include "dynains/threads/background.hpp"
 
 #include <stdexcept>
 #include <thread>
@@ -51,6 +51,28 @@ TEST_CASE("the end of a background waits for its task") {
     background.begin([&] { ++done; });
   }
   CHECK(done == 1);
+}
+
+TEST_CASE("both tasks end before run_both() does, and the exception of this thread comes first") {
+  Background other;
+  Background* const thread = GENERATE_COPY(&other, static_cast<Background*>(nullptr));
+  std::thread::id here, there;
+  const auto id = [] { return std::this_thread::get_id(); };
+  run_both(
+      thread, [&] { here = id(); }, [&] { there = id(); });
+  CHECK(here == id());
+  CHECK((there == id()) == (thread == nullptr));
+  const auto fail = [](const char* text) { throw std::runtime_error(text); };
+  CHECK_THROWS_WITH(run_both(
+                        thread, [&] { fail("here"); }, [&] { fail("there"); }),
+                    "here");
+  int done = 0;
+  CHECK_THROWS_WITH(run_both(
+                        thread, [&] { ++done; }, [&] { fail("there"); }),
+                    "there");
+  run_both(
+      thread, [] {}, [&] { ++done; });
+  CHECK(done == 2);
 }
 
 }  // namespace dynains

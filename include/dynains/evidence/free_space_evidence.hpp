@@ -26,6 +26,7 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
+#include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains {
@@ -47,9 +48,10 @@ class FreeSpaceEvidence {
         ground_sampler_(config),
         references_(config),
         pose_correction_(config.pose_tolerance),
-        updater_(config),
+        newest_tester_(config),
+        older_tester_(config),
         linker_(config.track_cell, config.track_length, config.track_height, config.track_overlap),
-        track_belief_(updater_.increment()),
+        track_belief_(updater().increment()),
         judge_(config),
         dynamic_grid_(config),
         moved_ground_(config),
@@ -92,6 +94,10 @@ class FreeSpaceEvidence {
     for (std::size_t i = 0; i < std::min(scans, records_.size()); ++i) records_[i] = roomy;
   }
 
+  /// Lets `other`, which outlives this, work for observe() and make_reference(). Results stay the
+  /// same. Null: none.
+  void share_work(Background* other) { other_ = other; }
+
   /// Sets the time (s) of the next scan. Without times, scans are taken at equal distances.
   void set_time(double time) { time_ = time; }
 
@@ -114,12 +120,20 @@ class FreeSpaceEvidence {
     record.T_world_sensor = correct(scan, T_world_sensor, split);
     record.epoch = epoch_;
     record.since_begin = scan - epoch_begin_;
-    moved_ground_.bound(split.ground(), record.ground_boxes);
-    ground_sampler_.sample(split.ground(), record.ground);
-    begin_evidence(split.non_ground(), instance_of, instance_count, record);
-    link_to_previous(scan, record);
-    test_against_earlier_references(scan, record);
-    if (phase_of(record) != 0) test_older_scans(phase_of(record));
+    const std::uint64_t phase = phase_of(record);
+    run_both(
+        phase != 0 ? other_ : nullptr,
+        [&] {
+          moved_ground_.bound(split.ground(), record.ground_boxes);
+          ground_sampler_.sample(split.ground(), record.ground);
+          begin_evidence(split.non_ground(), instance_of, instance_count, record);
+          link_to_previous(scan, record);
+          test_against_earlier_references(scan, record);
+        },
+        // The older scans are at least two scans older, so the other thread does not use them.
+        [&] {
+          if (phase != 0) test_older_scans(phase);
+        });
     propagate_beliefs(scan);
   }
 
@@ -151,13 +165,17 @@ class FreeSpaceEvidence {
       mark_points(
           evidence.samples, [&](std::uint32_t s) { return surely_moves(evidence, s); }, is_moving_);
     }
-    references_.add(newest_, record.epoch, record.since_begin, record.T_world_sensor, split,
-                    is_moving_);
     mark_points(
         evidence.samples,
         [&](std::uint32_t s) { return surely_moves(evidence, s) || may_move(evidence, s); },
         may_move_);
-    pose_correction_.insert(record.T_world_sensor, split, may_move_);
+    run_both(
+        other_,
+        [&] {
+          references_.add(newest_, record.epoch, record.since_begin, record.T_world_sensor, split,
+                          is_moving_);
+        },
+        [&] { pose_correction_.insert(record.T_world_sensor, split, may_move_); });
     if (delay_of(0) != 0) return;
     test_older_scans(0);
     propagate_beliefs(newest_);
@@ -168,7 +186,7 @@ class FreeSpaceEvidence {
   const detail::Visibility& test_visibility(const PointBuffer& points, std::size_t count,
                                             const Pose& T_world_points) {
     return references_.test(points, count, pose_correction_.corrected(T_world_points),
-                            references_.newest());
+                            references_.newest(), newest_tester_.visibility);
   }
 
   /// Alignment of the newest scan with earlier scans, in the frame of its pose.
@@ -207,6 +225,13 @@ class FreeSpaceEvidence {
     std::vector<GroundBox> ground_boxes;               // by block of 64 ground points
     GroundSamples ground;
   };
+  // What one thread needs to test samples.
+  struct Tester {
+    explicit Tester(const FreeSpaceConfig& config) : updater(config) {}
+    InstanceBeliefUpdater updater;
+    detail::Visibility visibility;
+  };
+  const InstanceBeliefUpdater& updater() const { return newest_tester_.updater; }
 
   void forget_scans() {
     references_.forget();
@@ -235,7 +260,7 @@ class FreeSpaceEvidence {
                       std::size_t instance_count, Record& record) {
     InstanceEvidence& evidence = record.evidence;
     sampler_.sample(points, instance_of, instance_count, evidence.samples);
-    updater_.begin(evidence.samples, evidence.beliefs);
+    updater().begin(evidence.samples, evidence.beliefs);
     record.counted.assign(evidence.samples.supervoxel_count(), DynamicOccupancyGrid::Count::kNone);
     predecessors_.assign(instance_count, kNoCluster);
   }
@@ -257,9 +282,9 @@ class FreeSpaceEvidence {
       const auto back = static_cast<std::uint64_t>(lag);
       if (back > record.since_begin) break;
       const ReferenceScan* const reference = references_.find(scan - back, record.epoch);
-      if (reference != nullptr) test(record, *reference, -lag);
+      if (reference != nullptr) test(newest_tester_, record, *reference, -lag);
     }
-    updater_.begin_other_side(record.evidence.samples, record.evidence.beliefs);
+    updater().begin_other_side(record.evidence.samples, record.evidence.beliefs);
     update_own_log_odds(record);
   }
 
@@ -269,24 +294,25 @@ class FreeSpaceEvidence {
   }
 
   // Tests all samples of a scan against one reference. `lag`: scans from the scan to the reference.
-  void test(Record& record, const ReferenceScan& reference, int lag) {
+  void test(Tester& tester, Record& record, const ReferenceScan& reference, int lag) const {
     record.ground.add(references_.test(record.ground.samples.points, record.ground.size(),
-                                       record.T_world_sensor, reference));
+                                       record.T_world_sensor, reference, tester.visibility));
     InstanceEvidence& evidence = record.evidence;
-    const detail::Visibility& visibility = references_.test(
-        evidence.samples.points, evidence.samples.size(), record.T_world_sensor, reference);
+    const detail::Visibility& visibility =
+        references_.test(evidence.samples.points, evidence.samples.size(), record.T_world_sensor,
+                         reference, tester.visibility);
     const Pose T_sensor_reference =
         detail::composed(detail::inverted(record.T_world_sensor), reference.T_world_beams);
     const InstanceViews::Position position = {static_cast<float>(T_sensor_reference(0, 3)),
                                               static_cast<float>(T_sensor_reference(1, 3)),
                                               static_cast<float>(T_sensor_reference(2, 3))};
-    updater_.update(evidence.samples, visibility, position, evidence.beliefs,
-                    [&](std::size_t instance) {
-                      if (!config_.use_tracks) return;
-                      Instance& tracked = evidence.tracked.instances[instance];
-                      (lag < 0 ? tracked.past : tracked.future).farthest_hit =
-                          static_cast<std::int16_t>(std::abs(lag));
-                    });
+    tester.updater.update(evidence.samples, visibility, position, evidence.beliefs,
+                          [&](std::size_t instance) {
+                            if (!config_.use_tracks) return;
+                            Instance& tracked = evidence.tracked.instances[instance];
+                            (lag < 0 ? tracked.past : tracked.future).farthest_hit =
+                                static_cast<std::int16_t>(std::abs(lag));
+                          });
   }
 
   // Delay (scans) between a new image and the tests of the older scans of a phase against it. The
@@ -309,7 +335,7 @@ class FreeSpaceEvidence {
       if (back > reference.scan) break;
       Record& older = record_of(reference.scan - back);
       if (older.epoch != reference.epoch) continue;
-      test(older, reference, lag);
+      test(older_tester_, older, reference, lag);
       update_own_log_odds(older);
     }
   }
@@ -323,7 +349,7 @@ class FreeSpaceEvidence {
       changed[instance] = 0;
       Instance& tracked = evidence.tracked.instances[instance];
       const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
-      tracked.own = judge_.own_log_odds(evidence, updater_, instance);
+      tracked.own = judge_.own_log_odds(evidence, updater(), instance);
       tracked.seen = {static_cast<float>(counts.moved), static_cast<float>(counts.decided)};
     }
   }
@@ -353,7 +379,7 @@ class FreeSpaceEvidence {
     // In the first scans of an epoch, nearly everything is without evidence of earlier scans.
     constexpr std::uint64_t kFirstScans = 5;
     const bool may_presume = !is_final && record.since_begin >= kFirstScans;
-    judge_.judge(record.evidence, updater_, may_presume, verdicts_,
+    judge_.judge(record.evidence, updater(), may_presume, verdicts_,
                  [&](std::size_t instance) { add_hull(record.evidence, instance); });
   }
 
@@ -406,7 +432,8 @@ class FreeSpaceEvidence {
   ReferenceScans references_;
   PoseCorrection pose_correction_;
   std::optional<double> time_;  // of the newest scan, s
-  InstanceBeliefUpdater updater_;
+  Tester newest_tester_, older_tester_;
+  Background* other_ = nullptr;
   InstanceLinker linker_;
   TrackBelief track_belief_;
   InstanceJudge judge_;

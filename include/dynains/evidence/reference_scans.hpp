@@ -163,15 +163,15 @@ class ReferenceScans {
     return nullptr;
   }
 
-  /// Visibility of the first `count` points (m; padded for packs) from a reference. The result is
-  /// valid until the next call.
+  /// Visibility of the first `count` points (m; padded for packs) from a reference. Returns `out`.
   const detail::Visibility& test(const PointBuffer& points, std::size_t count,
-                                 const Pose& T_world_points, const ReferenceScan& reference) {
+                                 const Pose& T_world_points, const ReferenceScan& reference,
+                                 detail::Visibility& out) const {
     const Pose T_reference_points =
         detail::composed(detail::inverted(reference.T_world_beams), T_world_points);
     detail::test_visibility(reference.image, T_reference_points, points, count, margin_,
-                            margin_slope_, visibility_);
-    return visibility_;
+                            margin_slope_, out);
+    return out;
   }
 
  private:
@@ -186,7 +186,6 @@ class ReferenceScans {
   PointBuffer rotated_ground_;
   PointBuffer rotated_rest_;
   RangeImage::Scratch scratch_;
-  detail::Visibility visibility_;
 };
 
 }  // namespace dynains

@@ -21,6 +21,7 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
+#include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {
@@ -183,8 +184,10 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
   using Map = typename Stages::Map;
   using Evidence = typename PipelineConfig<Stages>::Evidence;
 
-  explicit FreeSpaceDecision(const PipelineConfig<Stages>& config)
-      : evidence_(config.evidence), revision_(config.revision) {}
+  FreeSpaceDecision(const PipelineConfig<Stages>& config, Background* other)
+      : evidence_(config.evidence), revision_(config.revision) {
+    share_work_of_stage(evidence_, other);
+  }
 
   std::size_t window_length() const override { return 1; }
   std::size_t latency() const override { return evidence_.lookahead_scans(); }
@@ -246,12 +249,13 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
   InstanceIds instance_ids_;
 };
 
-/// Creates the implementation of `config.decision`.
+/// Creates the implementation of `config.decision`. `other`: its second thread, which outlives it;
+/// null for none.
 template <class Stages>
 std::unique_ptr<ScanDecision<typename Stages::Map>> make_decision(
-    const PipelineConfig<Stages>& config) {
+    const PipelineConfig<Stages>& config, Background* other) {
   if (config.decision == Decision::kWindow) return std::make_unique<WindowDecision<Stages>>(config);
-  return std::make_unique<FreeSpaceDecision<Stages>>(config);
+  return std::make_unique<FreeSpaceDecision<Stages>>(config, other);
 }
 
 }  // namespace dynains::detail

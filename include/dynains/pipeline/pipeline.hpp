@@ -7,8 +7,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "dynains/config.hpp"
@@ -28,6 +30,7 @@
 #include "dynains/pose.hpp"
 #include "dynains/sensor/mounting.hpp"
 #include "dynains/sensor/sensor_model.hpp"
+#include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {
@@ -114,10 +117,12 @@ class Pipeline {
   explicit Pipeline(const Config& config)
       : config_(validated(config)),
         build_map_(config.build_map),
+        other_(config.threads > 1 ? std::make_unique<Background>() : nullptr),
         frame_(config.level, config.mounting_pitch, config.mounting_roll),
         ground_(config.ground),
         clusterer_(config.clusterer),
-        decision_(make_decision<Stages>(config)),
+        decision_(make_decision<Stages>(config, other_.get())),
+        finishes_later_(other_ && decision_->latency() > 0 && !config.revision.revise_map),
         map_(config.map),
         scans_(std::max({decision_->window_length(), latency() + 1, kFewestSlots})) {}
   // Not copyable: window_ refers to memory of clusterer_.
@@ -127,7 +132,7 @@ class Pipeline {
   const Config& config() const { return config_; }
   const Map& map() const { return map_; }
   Map& mutable_map() { return map_; }
-  std::size_t latency() const { return decision_->latency(); }
+  std::size_t latency() const { return decision_->latency() + (finishes_later_ ? 1 : 0); }
   const SensorModel& sensor() const { return frame_.sensor(); }
   double next_time() const { return scans_.next_time(); }
 
@@ -135,6 +140,7 @@ class Pipeline {
 
   /// Makes the verdict on the oldest open scan final. Empty if no scan is open.
   std::optional<ScanVerdict> finish_oldest() {
+    if (is_finished_known()) return take_finished();
     if (scans_.open() == 0) return std::nullopt;
     StageTimes times;
     return finish_oldest(times);
@@ -162,10 +168,14 @@ class Pipeline {
   }
 
   void ingest(const CloudView& cloud, ScanSlot& next);
+  bool is_sensor_wanted() const;
   void find_sensor(ScanSlot& newest);
   Eigen::Matrix3d level(ScanSlot& scan) const;
   void write_newest(ScanSlot& newest);
   ScanVerdict finish_oldest(StageTimes& times);
+  void finish_due(StageTimes& times);
+  bool is_finished_known() const { return finished_ || finishing_error_; }
+  std::optional<ScanVerdict> take_finished();
   std::optional<PoseResidual> pose_residual();
   TimeDoubt time_doubt();
   Plausibility plausibility(const ScanSlot& newest, const FrameResult& result);
@@ -177,22 +187,29 @@ class Pipeline {
     scans_.clear();
     rate_ = {};
     plausibility_ = {};
+    finished_.reset();
+    finishing_error_ = nullptr;
   }
 
   Config config_;
   bool build_map_;
+  std::unique_ptr<Background> other_;  // null: one thread
   LevelFrame frame_;
   Ingest ingest_;
   Ground ground_;
   ScanWindow window_;
   Clusterer clusterer_;
   std::unique_ptr<ScanDecision<Map>> decision_;
+  bool finishes_later_;  // the next push finishes a scan, beside its first stages
   VerdictWriter newest_verdict_;
   VerdictWriter final_verdict_;
   Map map_;
   ScanRing scans_;
   ScanRate rate_;
   PlausibilityCheck plausibility_;
+  // Outcome of finish_due() for push() or finish_oldest().
+  std::optional<ScanVerdict> finished_;
+  std::exception_ptr finishing_error_;
 };
 
 template <class Stages>
@@ -202,16 +219,26 @@ FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Pose& T_world_s
   ScanSlot& newest = scans_.prepare(T_world_sensor, time, config_);
   timed(times.ingest, [&] { ingest(cloud, newest); });
   PushTransaction transaction(scans_, newest);
-  timed(times.ingest, [&] { find_sensor(newest); });
-  timed(times.ground, [&] { ground_.segment(ingest_.points(), ingest_.input(), newest.split); });
-  timed(times.window, [&] { window_.gather(scans_, decision_->window_length()); });  // Eq. 3
-  timed(times.cluster, [&] { window_.cluster(clusterer_); });                        // Eq. 4
-  timed(times.evidence, [&] { decision_->observe(scans_, window_); });               // Eq. 4-18
-  timed(times.judge, [&] { decision_->judge(newest, false); });                      // Eq. 19
-  timed(times.verdict, [&] { write_newest(newest); });                               // Eq. 2
+  if (is_sensor_wanted()) {
+    if (finishes_later_) finish_due(times);  // before the stages are adapted
+    timed(times.ingest, [&] { find_sensor(newest); });
+  }
+  const auto cluster = [&] {
+    timed(times.ground, [&] { ground_.segment(ingest_.points(), ingest_.input(), newest.split); });
+    timed(times.window, [&] { window_.gather(scans_, decision_->window_length()); });  // Eq. 3
+    timed(times.cluster, [&] { window_.cluster(clusterer_); });                        // Eq. 4
+  };
+  if (finishes_later_) {
+    run_both(other_.get(), cluster, [&] { finish_due(times); });
+  } else {
+    cluster();
+  }
+  timed(times.evidence, [&] { decision_->observe(scans_, window_); });  // Eq. 4-18
+  timed(times.judge, [&] { decision_->judge(newest, false); });         // Eq. 19
+  timed(times.verdict, [&] { write_newest(newest); });                  // Eq. 2
   transaction.commit();
-  std::optional<ScanVerdict> finished;
-  if (scans_.open() > latency()) finished = finish_oldest(times);  // Eq. 2, 1
+  if (!finishes_later_) finish_due(times);
+  const std::optional<ScanVerdict> finished = take_finished();
   timed(times.revision, [&] { decision_->revise(map_, newest); });
   const bool is_final = finished && finished->scan == newest.scan;
   FrameResult result = {is_final ? *finished : newest_verdict_.verdict(newest),
@@ -231,6 +258,23 @@ void Pipeline<Stages>::write_newest(ScanSlot& newest) {
   if (!config_.newest_verdict) return;
   newest_verdict_.begin(newest);
   decision_->write_newest(newest, newest_verdict_);
+}
+
+/// Finishes the oldest scan if its verdict is due and no other one waits for take_finished().
+template <class Stages>
+void Pipeline<Stages>::finish_due(StageTimes& times) {
+  if (scans_.open() <= latency() || is_finished_known()) return;
+  try {
+    finished_ = finish_oldest(times);
+  } catch (...) {
+    finishing_error_ = std::current_exception();
+  }
+}
+
+template <class Stages>
+std::optional<ScanVerdict> Pipeline<Stages>::take_finished() {
+  if (finishing_error_) std::rethrow_exception(std::exchange(finishing_error_, nullptr));
+  return std::exchange(finished_, std::nullopt);
 }
 
 /// The scan becomes final even if the map throws, because the ring reuses its slot.
@@ -267,13 +311,17 @@ void Pipeline<Stages>::ingest(const CloudView& cloud, ScanSlot& next) {
   next.ensure_capacity(next.input_labels.size());
 }
 
-/// Estimates the sensor model from the newest scan, unless it is known or not needed, and adapts
-/// the stages to it. Stages use SensorModel::typical() until a scan has enough points.
+template <class Stages>
+bool Pipeline<Stages>::is_sensor_wanted() const {
+  if (sensor().known()) return false;
+  return decision_->needs_sensor() || config_.level || needs_sensor(ground_) ||
+         needs_sensor(clusterer_);
+}
+
+/// Estimates the sensor model from the newest scan and adapts the stages to it. Stages use
+/// SensorModel::typical() until a scan has enough points.
 template <class Stages>
 void Pipeline<Stages>::find_sensor(ScanSlot& newest) {
-  const bool is_needed = decision_->needs_sensor() || config_.level || needs_sensor(ground_) ||
-                         needs_sensor(clusterer_);
-  if (!is_needed || sensor().known()) return;
   frame_.estimate(ingest_.points());
   if (sensor().known() && newest.scan > 0) {
     newest.epoch = scans_.start_epoch();

@@ -17,6 +17,7 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
+#include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {
@@ -168,6 +169,15 @@ using SetTime = decltype(std::declval<Stage&>().set_time(0.0));
 template <class Stage>
 void set_time_in_stage(Stage& stage, double time) {
   if constexpr (Offers<SetTime, Stage>::value) stage.set_time(time);
+}
+
+/// Calls the optional member `share_work(Background* other)` of a stage: its second thread, or
+/// null.
+template <class Stage>
+using ShareWork = decltype(std::declval<Stage&>().share_work(std::declval<Background*>()));
+template <class Stage>
+void share_work_of_stage(Stage& stage, Background* other) {
+  if constexpr (Offers<ShareWork, Stage>::value) stage.share_work(other);
 }
 
 /// Result of the optional member `pose_residual()` of a stage; empty without it.

@@ -86,4 +86,27 @@ class Background {
   std::thread thread_;
 };
 
+/// Calls `here` in this thread and `there` in the thread of `other`, which is not busy, and returns
+/// at the end of both. Without `other`, `there` is called after `here`. Throws the exception of
+/// `here`, else that of `there`.
+template <class Here, class There>
+void run_both(Background* other, Here&& here, There&& there) {
+  if (other == nullptr) {
+    here();
+    there();
+    return;
+  }
+  other->begin([&there] { there(); });
+  try {
+    here();
+  } catch (...) {
+    try {
+      other->wait();
+    } catch (...) {  // the first exception is thrown
+    }
+    throw;
+  }
+  other->wait();
+}
+
 }  // namespace dynains
