@@ -16,7 +16,7 @@ execute_process(COMMAND ${PKG_CONFIG} --cflags --libs dynains
   OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE)
 separate_arguments(flags)
 foreach(flag IN LISTS flags)
-  if(NOT flag MATCHES "^-I")
+  if(NOT flag MATCHES "^(-I|-pthread$)")
     message(FATAL_ERROR "the package forces the flag ${flag} on its users")
   endif()
 endforeach()
