@@ -98,7 +98,11 @@ Recording::Recording(const fs::path& path, const RecordingOptions& options)
     } else {
       list_scans();
       reader_ = make_file_reader(format_, options_.bin_layout);
-      has_keyframes_ ? read_keyframes() : read_poses();
+      if (has_keyframes_) {
+        read_keyframes();
+      } else {
+        options.without_poses ? leave_unplaced() : read_poses();
+      }
     }
   }
   if (!options.sensor_frame.empty() && format_ != ScanFormat::kLog) {
@@ -116,7 +120,13 @@ Recording::Recording(const fs::path& path, const RecordingOptions& options)
          << ") m in the frame of the clouds";
     notes_.push_back(note.str());
   }
-  if (options.deskew) prepare_deskewing();
+  if (options.without_poses && frame_ == PointFrame::kWorld) {
+    fail(folder_,
+         "points are in the frame of the world, so their scans had poses; expected points "
+         "in the frame of the sensor (--frame sensor)");
+  }
+  if (options.without_poses && columns_.time && !options.is_compensated) options_.deskew = true;
+  if (options_.deskew) prepare_deskewing();
 }
 
 /// Takes scans, times and poses of a log. Poses of a file belong to the clouds by time.
@@ -129,7 +139,7 @@ void Recording::open_log() {
   choice.cloud_topic = options_.cloud_topic;
   choice.pose_topic = options_.pose_topic;
   choice.pose_frame = options_.pose_frame;
-  choice.with_poses = !has_file;
+  choice.with_poses = !has_file && !options_.without_poses;
   choice.with_transforms = !options_.sensor_frame.empty();
   choice.point_time_unit = options_.point_time_unit;
   choice.time_offset = options_.time_offset;
@@ -152,6 +162,16 @@ void Recording::open_log() {
     scans_.push_back({folder_, name.str(), i, log->times()[i]});
   }
   if (has_file) files_.push_back(options_.poses);
+  if (options_.without_poses) {
+    if (!options_.sensor_frame.empty()) take_sensor_frame(*log);
+    if (log->columns().time && !options_.is_compensated) {
+      PointClockFinding finding = log->point_clock();
+      if (finding.clock) finding.clock = PointClock{1.0, false, finding.clock->longest_scan};
+      take_clock(finding);
+    }
+    reader_ = make_log_reader(std::move(log));
+    return leave_unplaced();
+  }
   trajectory_ = has_file ? read_trajectory(options_.poses) : log->trajectory();
   if (options_.deskew && !has_file) motion_ = log->motion();
   const fs::path& poses = has_file ? options_.poses : folder_;
@@ -198,6 +218,10 @@ void Recording::open_nuscenes(const fs::path& tables) {
     trajectory_.poses.push_back(sweep.T_world_sensor);
   }
   check_names();
+  if (options_.without_poses) {
+    trajectory_ = Trajectory();
+    return leave_unplaced();
+  }
   trajectory_.times = times;
   if (!options_.poses.empty()) {
     files_.push_back(options_.poses);
@@ -369,7 +393,8 @@ void Recording::read_scan(std::size_t i, RecordedScan& scan) const {
     subtract_origin(sensor_origin().cast<float>(), scan);
   }
   if (!options_.self_boxes.empty()) clear_boxes(options_.self_boxes, scan);
-  if (options_.deskew) deskew(motion_, time(i), T_world_sensor(i), *clock_, file(i), scan);
+  if (options_.deskew && !motion_.poses.empty())
+    deskew(motion_, time(i), T_world_sensor(i), *clock_, file(i), scan);
 }
 
 RecordedScan Recording::read_scan(std::size_t i) const {

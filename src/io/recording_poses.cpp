@@ -1,6 +1,7 @@
 // Poses and times of a recording, and how they belong to its scans.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -72,7 +73,8 @@ fs::path Recording::find_poses() const {
   }
   fail(folder_ / "poses.txt",
        "not found: expected a pose for each scan, there (12 numbers a row, or time x y z qx qy qz "
-       "qw), in VIEWPOINT of .pcd scans, or in a file given by --poses");
+       "qw), in VIEWPOINT of .pcd scans, or in a file given by --poses; without poses, dynains run "
+       "--odometry estimates them");
 }
 
 void Recording::read_viewpoints() {
@@ -114,6 +116,53 @@ void Recording::read_calibration(const fs::path& poses_file) {
   }
 }
 
+/// Scans without poses: they have times, and count as matched when they get poses.
+void Recording::leave_unplaced() {
+  if (format_ == ScanFormat::kPcd && !has_keyframes_) read_viewpoints();
+  const bool has_stamps = format_ == ScanFormat::kLog || format_ == ScanFormat::kNuScenes;
+  const auto times = has_stamps || has_keyframes_ ? std::nullopt : find_times({});
+  take_times(times);
+  has_times_ = times || has_stamps || has_keyframes_;
+  for (std::size_t i = 0; i < scans_.size(); ++i) {
+    scans_[i].match = i;
+    if (!has_times_) scans_[i].time = kKittiPeriod * static_cast<double>(i);
+  }
+  if (!has_times_) notes_.push_back("no times: 0.1 s from scan to scan");
+  matches_.assign(scans_.size(), std::nullopt);
+}
+
+void Recording::take_poses(std::size_t first, const std::vector<Pose>& T_world_sensor) {
+  if (!options_.without_poses || T_world_sensor.empty() || first >= scans_.size() ||
+      T_world_sensor.size() > scans_.size() - first) {
+    throw UsageError("a recording without poses takes at most one for each scan");
+  }
+  const auto begin = scans_.begin() + static_cast<std::ptrdiff_t>(first);
+  scans_ = std::vector<Scan>(begin, begin + static_cast<std::ptrdiff_t>(T_world_sensor.size()));
+  trajectory_ = Trajectory();
+  trajectory_.order = QuaternionOrder::kXyzw;
+  motion_ = Trajectory();
+  for (std::size_t i = 0; i < scans_.size(); ++i) {
+    scans_[i].T_world_sensor = T_world_sensor[i];
+    matches_[scans_[i].match] = TrajectoryMatch{i, i, 0.0};
+    motion_.times.push_back(scans_[i].time);
+    trajectory_.poses.push_back(T_world_sensor[i]);
+    trajectory_.poses.back().translate(-sensor_origin());
+  }
+  motion_.poses = T_world_sensor;
+  if (has_times_) trajectory_.times = motion_.times;
+}
+
+std::vector<double> Recording::point_offsets(std::size_t i, const RecordedScan& scan) const {
+  std::vector<double> offsets;
+  if (!options_.deskew || scan.time.size() != scan.size()) return offsets;
+  const PointTimes times = times_of_scan(scan, *clock_);
+  for (const double point_time : scan.time) {
+    offsets.push_back(times.holds(point_time) ? clock_->after(time(i), point_time)
+                                              : std::numeric_limits<double>::quiet_NaN());
+  }
+  return offsets;
+}
+
 void Recording::read_poses() {
   if (options_.poses.empty() && format_ == ScanFormat::kPcd) read_viewpoints();
   fs::path file;
@@ -143,8 +192,10 @@ void Recording::read_keyframes() {
     }
     times.push_back(keyframe.time);
     scan.time = keyframe.time;
+    if (options_.without_poses) continue;
     trajectory_.poses.push_back(keyframe.T_world_sensor);
   }
+  if (options_.without_poses) return leave_unplaced();
   notes_.push_back("keyframes with stamps and estimates of hdl_graph_slam");
   trajectory_.times = times;
   if (!options_.poses.empty()) {
@@ -225,20 +276,23 @@ void Recording::match_times(const fs::path& file, const std::vector<double>& tim
                  in_seconds(options_.pose_gap) + gap_hint(trajectory_, options_.pose_gap));
 }
 
+/// Sets the times of scans, if there are any. Throws IoError unless they increase.
+void Recording::take_times(const std::optional<std::vector<double>>& times) {
+  for (std::size_t i = 0; times && i < scans_.size(); ++i) {
+    scans_[i].time = (*times)[i];
+    if (i > 0 && !(scans_[i].time > scans_[i - 1].time)) {
+      fail(scans_[i].file, "expected a time after that of the scan before, " +
+                               in_seconds(scans_[i - 1].time) + "; found " +
+                               in_seconds(scans_[i].time));
+    }
+  }
+}
+
 void Recording::match_scans(const fs::path& file) {
   // Times beside a file of --poses may belong to another recording.
   const std::optional<std::vector<double>> times =
       find_times(options_.poses.empty() ? file : fs::path());
-  if (times) {
-    for (std::size_t i = 0; i < scans_.size(); ++i) {
-      scans_[i].time = (*times)[i];
-      if (i > 0 && !(scans_[i].time > scans_[i - 1].time)) {
-        fail(scans_[i].file, "expected a time after that of the scan before, " +
-                                 in_seconds(scans_[i - 1].time) + "; found " +
-                                 in_seconds(scans_[i].time));
-      }
-    }
-  }
+  take_times(times);
   if (!trajectory_.times.empty() && times) {
     match_times(file, *times);
     notes_.push_back("poses belong to scans by time, interpolated");
@@ -407,6 +461,7 @@ void Recording::prepare_deskewing() {
   }
   if (!clock_) find_point_clock();
   notes_.push_back("points are de-skewed by their times");
+  if (options_.without_poses) return;
   const Trajectory& rows = motion_.times.empty() ? trajectory_ : motion_;
   const PoseConvention& convention = options_.convention;
   Trajectory motion;

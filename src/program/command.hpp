@@ -24,6 +24,7 @@ void add_reference_commands(CLI::App& app);
 /// Exit codes; an interrupted run exits with 128 + the number of the signal.
 inline constexpr int kExitFailure = 1;
 inline constexpr int kExitUsage = 2;
+inline constexpr int kExitLostTrack = 3;  ///< of the odometry; results before it are complete
 
 /// The checked recording has a defect, which the command has printed.
 struct Finding {};

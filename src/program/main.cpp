@@ -14,6 +14,7 @@
 #include "eval.hpp"
 #include "experiment.hpp"
 #include "help_formatter.hpp"
+#include "odometry_command.hpp"
 #include "run/interrupt.hpp"
 #include "run/printable.hpp"
 #include "unknown_command.hpp"
@@ -91,6 +92,7 @@ int main(int argc, char** argv) {
   add_map_command(app);
   add_fleet_command(app);
   add_check_command(app);
+  add_odometry_command(app);
   add_config_command(app);
   add_simulate_command(app);
   add_statistics_command(app);
@@ -114,6 +116,8 @@ int main(int argc, char** argv) {
     return fail(kExitUsage, error.what());
   } catch (const dynains::UsageError& error) {
     return fail(kExitUsage, error.what());
+  } catch (const LostTrack& lost) {
+    return fail(kExitLostTrack, lost.what());
   } catch (const Finding&) {
     return kExitFailure;
   } catch (const Interrupted& interrupted) {

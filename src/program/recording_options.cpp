@@ -234,6 +234,19 @@ RecordingOptions RecordingFlags::options() const {
   return options;
 }
 
+RecordingOptions RecordingFlags::options_without_poses() const {
+  for (const char* const flag :
+       {"--poses", "--invert-poses", "--pose-units", "--quaternion-order", "--pose-frame",
+        "--left-handed-poses", "--pose-shift", "--extrinsic", "--time-offset", "--pose-gap",
+        "--pose-topic", "--pose-frame-id"}) {
+    if (command_->get_option(flag)->count() == 0) continue;
+    throw ConfigError(std::string(flag) + " tells of given poses, which the odometry does not use");
+  }
+  RecordingOptions result = options();
+  result.without_poses = true;
+  return result;
+}
+
 std::string RecordingFlags::as_given(const std::string& further) const {
   std::string text = quoted(folder_);
   for (const CLI::Option* option : command_->get_options()) {
@@ -263,13 +276,9 @@ Recording RecordingFlags::open_of_run(const std::filesystem::path& report_file,
   return open();
 }
 
-Recording RecordingFlags::open(const std::filesystem::path& folder) const {
-  Recording recording(folder, options());
-  if (recording.missing_pose_count() > 0) {
-    std::cerr << "dynains: warning: " << recording.missing_pose_count() << " of "
-              << recording.scan_file_count() << " scans have no pose and are left out; see: dynains"
-              << " check " << as_given() << std::endl;
-  }
+namespace {
+
+void print_warnings(const Recording& recording) {
   if (recording.early_end()) {
     std::cerr << "dynains: warning: " << *recording.early_end() << "; "
               << recording.scan_file_count() << " scans before it are read" << std::endl;
@@ -277,6 +286,26 @@ Recording RecordingFlags::open(const std::filesystem::path& folder) const {
   for (const std::string& warning : recording.warnings()) {
     std::cerr << "dynains: warning: " << warning << std::endl;
   }
+}
+
+}  // namespace
+
+Recording RecordingFlags::open(const std::filesystem::path& folder) const {
+  Recording recording(folder, options());
+  if (recording.missing_pose_count() > 0) {
+    std::cerr << "dynains: warning: " << recording.missing_pose_count() << " of "
+              << recording.scan_file_count() << " scans have no pose and are left out; see: dynains"
+              << " check " << as_given() << std::endl;
+  }
+  print_warnings(recording);
+  return recording;
+}
+
+Recording RecordingFlags::open_without_poses(bool is_compensated) const {
+  RecordingOptions options = options_without_poses();
+  options.is_compensated = is_compensated;
+  Recording recording(folder_, options);
+  print_warnings(recording);
   return recording;
 }
 

@@ -19,6 +19,9 @@ class RecordingFlags {
   const std::string& folder() const { return folder_; }
   /// Throws ConfigError, and IoError for a file of --extrinsic.
   RecordingOptions options() const;
+  /// As options(), of a recording whose poses are to be estimated. Throws ConfigError for flags
+  /// that tell of poses.
+  RecordingOptions options_without_poses() const;
   /// SEQ and the flags as a shell reads them, so that a message can propose a command. Flags in
   /// `further` replace those that were given.
   std::string as_given(const std::string& further = "") const;
@@ -39,6 +42,8 @@ class RecordingFlags {
   /// for messages. Throws IoError.
   Recording open_of_run(const std::filesystem::path& report_file,
                         const nlohmann::ordered_json& report, const std::string& command);
+  /// Opens the folder without poses. `is_compensated`: see RecordingOptions.
+  Recording open_without_poses(bool is_compensated) const;
 
  private:
   CLI::App* command_;

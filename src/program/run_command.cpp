@@ -10,6 +10,7 @@
 
 #include "command.hpp"
 #include "evaluation_options.hpp"
+#include "odometry_command.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "remover_options.hpp"
@@ -27,6 +28,8 @@ struct RunFlags {
   RecordingFlags recording;
   RemoverOptions remover;
   RunSettings settings;  // recording and configuration are filled in after parsing
+  bool odometry = false;
+  bool is_compensated = false;
   bool quiet = false;
 };
 
@@ -78,6 +81,22 @@ void print_summary(const RunOutcome& run) {
   if (!run.page.empty()) std::cout << "page: " << run.page.string() << std::endl;
 }
 
+/// The recording, with its poses or those of the odometry.
+Recording open(RunFlags& flags, PoseEstimate& estimate) {
+  RunSettings& settings = flags.settings;
+  if (!flags.odometry) {
+    if (flags.is_compensated) throw ConfigError("--no-deskew needs --odometry");
+    return flags.recording.open();
+  }
+  Recording recording = open_with_odometry(flags.recording, flags.is_compensated, settings.window,
+                                           settings.one_thread, flags.quiet, estimate);
+  settings.poses_are_estimated = true;
+  // Commands over the results take the poses from there.
+  settings.recording_flags["--poses"] = (whole_path(settings.out) / kEstimatedPoses).string();
+  if (recording.is_deskewed()) settings.recording_flags["--deskew"] = "true";
+  return recording;
+}
+
 void run_as_asked(RunFlags& flags) {
   RunSettings& settings = flags.settings;
   settings.config = flags.remover.config();
@@ -98,7 +117,8 @@ void run_as_asked(RunFlags& flags) {
     if (!progress) progress.emplace(total, "scans", flags.quiet);
     if (done > 0) progress->update(done);
   };
-  const RunOutcome outcome = run(settings, flags.recording.open(), listener);
+  PoseEstimate estimate;
+  const RunOutcome outcome = run(settings, open(flags, estimate), listener);
   progress.reset();
 
   if (outcome.earlier_results_stay) {
@@ -108,6 +128,7 @@ void run_as_asked(RunFlags& flags) {
     print_summary(outcome);
   }
   if (!outcome.complete) throw Interrupted{outcome.signal};
+  if (estimate.loss) throw LostTrack(*estimate.loss);
 }
 
 }  // namespace
@@ -224,6 +245,10 @@ void add_run_command(CLI::App& app) {
       "--accept-poses", options->accept_poses,
       "run even if the scans disagree with the poses, which else ends the command with "
       "exit code 2 before anything is written");
+  command.add_flag("--odometry", flags->odometry,
+                   "estimate the poses from the scans, for a recording without poses (see `dynains "
+                   "odometry`); also writes them to poses.txt");
+  add_compensated_flag(command, flags->is_compensated);
   command.add_flag("-q,--quiet", flags->quiet, "print errors only");
   command.footer(
       "Writes labels/NNNNNN.label (uint32 a point: 251 moving, 9 static, 0 not judged; instance id "
@@ -235,7 +260,8 @@ void add_run_command(CLI::App& app) {
       "the scan at hand, writes what is there and exits\nwith 130. Other exit codes: 0; 1 if a "
       "file "
       "cannot be read or written; 2 for wrong flags, refused outputs and\nposes that the scans "
-      "disagree with.");
+      "disagree with; 3 if the odometry loses track: the results of the scans before are "
+      "complete.");
   command.callback([flags] { run_as_asked(*flags); });
 }
 

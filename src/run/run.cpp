@@ -14,6 +14,7 @@
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/poses/diagnosis.hpp"
+#include "estimate_poses.hpp"
 #include "interrupt.hpp"
 #include "lone_scans.hpp"
 #include "output_folder.hpp"
@@ -311,6 +312,7 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   for (const std::string& text : sentences(doubts, plan.sequence)) warn(listener, text);
   results.commit();
   write_timing(outputs.folder / "timing.csv", timing);
+  if (outputs.write_poses) write_trajectory(outputs.folder / kEstimatedPoses, plan.sequence);
   change.put_in_place([&] {
     results.commit_outside_map();
     if (session && outcome.complete) session->commit();

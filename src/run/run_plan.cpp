@@ -27,21 +27,6 @@ nlohmann::ordered_json parameters_of(const DynaInsRemover::Config& config) {
   return json;
 }
 
-ScanRange select_scans(const Recording& sequence, const ScanWindow& window) {
-  const auto number = [&](std::size_t i) { return sequence.number(i); };
-  ScanRange range{0, sequence.size() - 1};
-  while (range.first <= range.last && window.start && number(range.first) < *window.start) {
-    ++range.first;
-  }
-  while (range.last > range.first && window.end && number(range.last) > *window.end) --range.last;
-  const bool none = range.first > range.last || (window.end && number(range.last) > *window.end);
-  if (none) {
-    throw ConfigError("--start and --end leave no scan of " + sequence.name(0) + " to " +
-                      sequence.name(sequence.size() - 1));
-  }
-  return range;
-}
-
 /// So that a broken file or pose is noticed before anything is written.
 void check_scans(const Recording& sequence, const ScanRange& range) {
   for (std::size_t i = range.first; i <= range.last; ++i) {
@@ -108,6 +93,7 @@ RunOutputs outputs_of(const RunSettings& settings) {
   outputs.write_online = settings.write_online;
   outputs.write_clean = settings.write_clean;
   outputs.drop_not_judged = settings.drop_not_judged;
+  outputs.write_poses = settings.poses_are_estimated;
   outputs.write_mcap = settings.write_mcap;
   outputs.write_beliefs = settings.view || settings.write_beliefs;
   outputs.map_on_disk = settings.map_memory.has_value();
@@ -201,6 +187,21 @@ bool is_whole(const RunPlan& plan, const OutputFolder& out) {
 }
 
 }  // namespace
+
+ScanRange select_scans(const Recording& sequence, const ScanWindow& window) {
+  const auto number = [&](std::size_t i) { return sequence.number(i); };
+  ScanRange range{0, sequence.size() - 1};
+  while (range.first <= range.last && window.start && number(range.first) < *window.start) {
+    ++range.first;
+  }
+  while (range.last > range.first && window.end && number(range.last) > *window.end) --range.last;
+  const bool none = range.first > range.last || (window.end && number(range.last) > *window.end);
+  if (none) {
+    throw ConfigError("--start and --end leave no scan of " + sequence.name(0) + " to " +
+                      sequence.name(sequence.size() - 1));
+  }
+  return range;
+}
 
 fs::path map_path(const std::string& name, const fs::path& out) {
   fs::path map = whole_path(name);

@@ -46,6 +46,9 @@ void check_settings(const RunSettings& settings);
 /// Checks everything but the points. Throws ConfigError, IoError, PoseError.
 RunPlan make_plan(const RunSettings& given, Recording sequence);
 
+/// The scans in a window. Throws ConfigError if there is none.
+ScanRange select_scans(const Recording& sequence, const ScanWindow& window);
+
 /// Treatment of a folder of results.
 enum class RunTask { kNothing, kWrite, kReplace };
 

@@ -72,8 +72,8 @@ const OutputKind& run_output_kind() {
   static const OutputKind kind = {
       "run",
       "report.json",
-      {"timing.csv", "dynamic_points.ply", kDynamicLas, kVerdictLog, kOverviewPicture, kViewPage,
-       viewer::kTilesetFile, viewer::kTilesetPage},
+      {"timing.csv", "dynamic_points.ply", kDynamicLas, kVerdictLog, kOverviewPicture,
+       kEstimatedPoses, kViewPage, viewer::kTilesetFile, viewer::kTilesetPage},
       true,
       {{"labels", {".label"}},
        {"online", {".label"}},
@@ -100,6 +100,7 @@ OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& r
   if (!map.empty() && !has_outside_map()) listing.files.insert(map_name());
   if (has_las_map()) listing.files.insert(kDynamicLas);
   if (write_mcap) listing.files.insert(kVerdictLog);
+  if (write_poses) listing.files.insert(kEstimatedPoses);
   listing.folders = {{"labels", ".label"}, {"causes", ".cause"}};
   if (write_beliefs) listing.folders["beliefs"] = ".belief";
   if (write_online) listing.folders["online"] = ".label";

@@ -37,6 +37,7 @@ inline constexpr const char* kTileFolder = "map_tiles";
 
 /// The picture of a run, see Overview.
 inline constexpr const char* kOverviewPicture = "overview.png";
+inline constexpr const char* kEstimatedPoses = "poses.txt";
 /// The page of `dynains view` in the folder of results.
 inline constexpr const char* kViewPage = "view.html";
 
@@ -50,6 +51,7 @@ struct RunOutputs {
   bool write_clean = false;
   bool drop_not_judged = false;  ///< from clean/
   bool write_mcap = false;
+  bool write_poses = false;
   bool write_beliefs = false;
   bool map_on_disk = false;
   std::launch thread = std::launch::async;  ///< deferred: the caller reads and writes

@@ -43,6 +43,9 @@ class NormalEquations {
   /// Mean square of the distances, m^2.
   double variance() const { return squares_ / std::max(weights_, 1e-12); }
 
+  /// The right side.
+  const Vector& right() const { return right_; }
+
   /// Product of `a`, the sum of the products of derivatives without attractions, and `b`.
   double product(const Vector& a, const Vector& b) const {
     double sum = 0.0;

@@ -67,6 +67,10 @@ struct RecordingOptions {
   /// Boxes around parts of the own vehicle, frame of the sensor, m: points inside count as beams
   /// without a return.
   std::vector<Eigen::AlignedBox3d> self_boxes;
+  /// Poses are not looked for: scans have none until take_poses(). Points with times are given as
+  /// measured until then, and de-skewed by the new poses unless `is_compensated`.
+  bool without_poses = false;
+  bool is_compensated = false;  ///< points have times, but the recorder has de-skewed them
   bool accept_missing = false;  ///< for logs: whether parts may be missing
 };
 
@@ -204,6 +208,14 @@ class Recording {
   /// of their scan keep their place. Points in RecordingOptions::self_boxes are at the origin.
   void read_scan(std::size_t i, RecordedScan& scan) const;
   RecordedScan read_scan(std::size_t i) const;
+  /// For each point of scan i the seconds from the time of the scan until it was measured; NaN for
+  /// points whose time cannot be that of their scan. Empty if scans are not to be de-skewed.
+  /// `scan`: as read by read_scan(), whose times count.
+  std::vector<double> point_offsets(std::size_t i, const RecordedScan& scan) const;
+  /// Poses for the scans from `first` on, of a recording without poses: at least one, at most one
+  /// for each scan. Other scans are left out.
+  void take_poses(std::size_t first, const std::vector<Pose>& T_world_sensor);
+
   /// One label per point of scan i.
   std::vector<std::uint32_t> read_labels(std::size_t i) const;
 
@@ -252,6 +264,8 @@ class Recording {
   std::optional<std::vector<double>> find_times(const std::filesystem::path& poses_file);
   std::optional<std::vector<double>> times_of_names() const;
   void match_scans(const std::filesystem::path& poses_file);
+  void take_times(const std::optional<std::vector<double>>& times);
+  void leave_unplaced();
   void match_rows(const std::filesystem::path& poses_file);
   bool match_indices();
   void note_rows(const std::filesystem::path& poses_file);

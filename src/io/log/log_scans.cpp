@@ -93,7 +93,8 @@ void LogScans::choose_pose_topic() {
   const std::string& wanted = choice_.pose_topic;
   if (poses.empty()) {
     fail(log_->path(), "expected a topic with poses, or a file of poses by --poses; found " +
-                           list(log_->topics()));
+                           list(log_->topics()) +
+                           "; without poses, dynains run --odometry estimates them");
   }
   if (!wanted.empty() && !has(poses, wanted)) {
     fail(log_->path(), "expected poses on topic " + wanted + "; found " + list(poses));

@@ -1,0 +1,70 @@
+#include "scan_preparation.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynains/io/trajectory.hpp"
+
+namespace dynains::odometry {
+namespace {
+
+bool is_first_in_voxel(VoxelHashTable<>& taken, const Eigen::Vector3d& p, double edge) {
+  const auto index = [&](double coordinate) {
+    return static_cast<std::int64_t>(std::floor(coordinate / edge));
+  };
+  const std::size_t count = taken.size();
+  return taken.insert(voxel_key(index(p.x()), index(p.y()), index(p.z()))) == count;
+}
+
+}  // namespace
+
+/// Moves points by the nearest of equally spaced poses of the sensor.
+void ScanPreparation::deskew(RawPoints<float> points, Span<const double> offsets,
+                             const Pose& motion, double period) {
+  constexpr double kStep = 0.0005, kLongest = 0.5;  // s
+  constexpr auto kSteps = static_cast<std::size_t>(2.0 * kLongest / kStep);
+  std::vector<Pose> T_scan_point(kSteps + 1);
+  for (std::size_t k = 0; k <= kSteps; ++k) {
+    T_scan_point[k] =
+        extrapolate(Pose::Identity(), motion, (static_cast<double>(k) * kStep - kLongest) / period);
+  }
+  for (std::size_t i = 0; i < points.count; ++i) {
+    Eigen::Map<Eigen::Vector3f> p(&cloud_[3 * i]);
+    if (!(std::abs(offsets[i]) <= kLongest) || p.isZero(0.0F)) continue;
+    const auto k = static_cast<std::size_t>(std::lround((offsets[i] + kLongest) / kStep));
+    p = (T_scan_point[k] * p.cast<double>()).cast<float>();
+  }
+}
+
+void ScanPreparation::prepare(RawPoints<float> points, Span<const double> offsets,
+                              const Pose& motion, double period) {
+  cloud_.resize(3 * points.count);
+  for (std::size_t i = 0; i < points.count; ++i) {
+    std::copy_n(points.data + i * points.stride, 3, &cloud_[3 * i]);
+  }
+  if (!offsets.empty() && period > 0.0) deskew(points, offsets, motion, period);
+  thin_out();
+}
+
+void ScanPreparation::thin_out() {
+  constexpr double kSmall = 0.25;                    // m
+  constexpr double kWanted = 2000.0;                 // points
+  constexpr double kSmallest = 0.3, kLargest = 1.5;  // m
+  map_points_.clear();
+  taken_.clear();
+  for (std::size_t i = 0; 3 * i < cloud_.size(); ++i) {
+    const Eigen::Vector3d p = Eigen::Map<const Eigen::Vector3f>(&cloud_[3 * i]).cast<double>();
+    const double squared = p.squaredNorm();
+    if (!(squared > nearest_ * nearest_ && squared < farthest_ * farthest_)) continue;
+    if (is_first_in_voxel(taken_, p, kSmall)) map_points_.push_back({p, i});
+  }
+  keypoints_.clear();
+  taken_.clear();
+  for (const Point& point : map_points_) {
+    if (is_first_in_voxel(taken_, point.position, edge_)) keypoints_.push_back(point.position);
+  }
+  const double share = static_cast<double>(keypoints_.size()) / kWanted;
+  edge_ = std::clamp(edge_ * std::sqrt(std::clamp(share, 0.5, 2.0)), kSmallest, kLargest);
+}
+
+}  // namespace dynains::odometry

@@ -1,0 +1,95 @@
+#include "odometry_command.hpp"
+
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "dynains/errors.hpp"
+#include "evaluation_options.hpp"
+#include "progress.hpp"
+
+namespace dynains::program {
+namespace {
+
+struct OdometryFlags {
+  explicit OdometryFlags(CLI::App& command) : recording(command, "recording") {}
+
+  RecordingFlags recording;
+  std::string out;
+  ScanWindow window;
+  bool is_compensated = false;
+  bool one_thread = false;
+  bool force = false;
+  bool quiet = false;
+};
+
+void write_poses(const OdometryFlags& flags) {
+  const std::filesystem::path out = flags.out;
+  if (std::filesystem::exists(std::filesystem::symlink_status(out)) && !flags.force) {
+    throw IoError(flags.out + ": exists; choose another name for --out, or replace it by --force");
+  }
+  PoseEstimate estimate;
+  const Recording recording = open_with_odometry(
+      flags.recording, flags.is_compensated, flags.window, flags.one_thread, flags.quiet, estimate);
+  for (const std::filesystem::path& file : recording.files()) {
+    if (std::filesystem::exists(out) && std::filesystem::equivalent(file, out)) {
+      throw IoError(flags.out + ": belongs to the recording");
+    }
+  }
+  write_trajectory(out, recording);
+  if (!flags.quiet) {
+    std::cout << recording.size() << " poses: " << flags.out << std::endl;
+  }
+  if (estimate.loss) throw LostTrack(*estimate.loss);
+}
+
+}  // namespace
+
+void add_compensated_flag(CLI::App& command, bool& is_compensated) {
+  command.add_flag("--no-deskew", is_compensated,
+                   "points with times keep their place, for a recorder that compensated the motion "
+                   "[the odometry de-skews points with times]");
+}
+
+Recording open_with_odometry(const RecordingFlags& flags, bool is_compensated,
+                             const ScanWindow& window, bool one_thread, bool quiet,
+                             PoseEstimate& estimate) {
+  Recording recording = flags.open_without_poses(is_compensated);
+  std::optional<Progress> progress;
+  estimate = estimate_poses(recording, window, one_thread, [&](std::size_t done, std::size_t all) {
+    if (!progress) progress.emplace(all, "poses", quiet);
+    if (done > 0) progress->update(done);
+  });
+  progress.reset();
+  if (estimate.uncertain_scans > 0) {
+    std::cerr << "dynains: warning: the surfaces of " << estimate.uncertain_scans << " of "
+              << recording.size()
+              << " scans do not determine the whole motion, as along a corridor: there it is "
+                 "that of the scans before"
+              << std::endl;
+  }
+  return recording;
+}
+
+void add_odometry_command(CLI::App& app) {
+  CLI::App& command =
+      *app.add_subcommand("odometry", "Estimate the poses of a recording from its scans");
+  const auto flags = std::make_shared<OdometryFlags>(command);
+  command.add_option("-o,--out", flags->out, "file of poses, rows of time x y z qx qy qz qw (TUM)")
+      ->required()
+      ->type_name("FILE");
+  command.add_flag("--force", flags->force, "replace the file of --out if it exists");
+  add_window_options(command, flags->window);
+  add_compensated_flag(command, flags->is_compensated);
+  command.add_flag("--one-thread", flags->one_thread, "the thread that registers also reads");
+  command.add_flag("-q,--quiet", flags->quiet, "print errors only");
+  command.footer(
+      "Registers each scan to a map of earlier ones, without what moves. The first scan is the "
+      "frame of the poses. Exits with\n3 if it loses track, after it has written the poses "
+      "before.");
+  command.callback([flags] { write_poses(*flags); });
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,28 @@
+// Poses by the odometry: flags and the work that `dynains odometry` and `dynains run` share.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <stdexcept>
+
+#include "recording_options.hpp"
+#include "run/estimate_poses.hpp"
+
+namespace dynains::program {
+
+/// The odometry lost track; results of the scans before it are complete.
+struct LostTrack : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Adds --no-deskew.
+void add_compensated_flag(CLI::App& command, bool& is_compensated);
+
+/// Opens the recording without its poses and estimates them, with progress on standard error.
+/// Warns of directions that nothing determines.
+Recording open_with_odometry(const RecordingFlags& flags, bool is_compensated,
+                             const ScanWindow& window, bool one_thread, bool quiet,
+                             PoseEstimate& estimate);
+
+void add_odometry_command(CLI::App& app);
+
+}  // namespace dynains::program

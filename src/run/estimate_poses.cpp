@@ -1,0 +1,81 @@
+#include "estimate_poses.hpp"
+
+#include <future>
+#include <ostream>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/atomic_file.hpp"
+#include "dynains/odometry/odometry.hpp"
+#include "interrupt.hpp"
+#include "io/text.hpp"
+#include "points_of.hpp"
+#include "read_ahead.hpp"
+#include "run_plan.hpp"
+
+namespace dynains::program {
+namespace {
+
+std::string loss_at(const Recording& recording, std::size_t scan, std::size_t done,
+                    const OdometryResult& result) {
+  std::string text = recording.folder().string() + ": the odometry lost track at scan " +
+                     recording.name(scan) + ": " +
+                     value_names(result.loss)[static_cast<std::size_t>(result.loss)];
+  if (result.loss == OdometryLoss::kNoOverlap) {
+    text += " (" + std::to_string(static_cast<int>(100.0 * result.fit)) +
+            " % of its points lie on their surfaces)";
+  }
+  return text + "; " + std::to_string(done) + " scans before it have poses";
+}
+
+}  // namespace
+
+PoseEstimate estimate_poses(Recording& recording, const ScanWindow& window, bool one_thread,
+                            const std::function<void(std::size_t, std::size_t)>& progress) {
+  const ScanRange range = select_scans(recording, window);
+  if (range.size() < 2) {
+    throw ConfigError(recording.folder().string() +
+                      ": the odometry needs two scans or more, found one");
+  }
+  const InterruptGuard interrupt;
+  Odometry odometry{OdometryConfig()};
+  PoseEstimate estimate;
+  std::vector<Pose> poses;
+  RecordedScan scan;
+  ReadAhead scans(recording, range.first, range.last,
+                  one_thread ? std::launch::deferred : std::launch::async);
+  progress(0, range.size());
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    scan = scans.next(std::move(scan));
+    const std::vector<double> offsets = recording.point_offsets(i, scan);
+    const OdometryResult result = odometry.push(points_of(scan), offsets, recording.time(i));
+    if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
+    if (result.loss != OdometryLoss::kNone) {
+      estimate.loss = loss_at(recording, i, poses.size(), result);
+      break;
+    }
+    if (result.free_directions > 0) ++estimate.uncertain_scans;
+    poses.push_back(result.T_world_sensor);
+    progress(poses.size(), range.size());
+  }
+  if (poses.size() < 2) throw IoError(*estimate.loss);
+  recording.take_poses(range.first, poses);
+  return estimate;
+}
+
+void write_trajectory(const std::filesystem::path& path, const Recording& recording) {
+  AtomicFile file(path);
+  std::ostream& out = file.stream();
+  text::exact(out);
+  out << "# time x y z qx qy qz qw\n";
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    const Pose& T = recording.T_world_sensor(i);
+    const Eigen::Vector3d t = T.translation();
+    const Eigen::Quaterniond q(T.linear());
+    out << recording.time(i) << ' ' << t.x() << ' ' << t.y() << ' ' << t.z() << ' ' << q.x() << ' '
+        << q.y() << ' ' << q.z() << ' ' << q.w() << '\n';
+  }
+  file.commit();
+}
+
+}  // namespace dynains::program

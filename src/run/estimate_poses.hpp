@@ -1,0 +1,32 @@
+// Poses of a recording without poses, by the odometry.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "dynains/io/recording.hpp"
+#include "labelled_sequence.hpp"
+
+namespace dynains::program {
+
+/// What the odometry found, beside the poses.
+struct PoseEstimate {
+  /// Where and why the odometry lost track, one sentence; empty: it did not.
+  std::optional<std::string> loss;
+  /// Scans whose surfaces do not determine all directions of motion.
+  std::size_t uncertain_scans = 0;
+};
+
+/// Gives poses to the scans in `window`, up to the first one that the odometry loses, and leaves
+/// out the others. The first scan is the world frame. Calls `progress(done, total)` before the
+/// first scan and after each; a signal ends the command. `one_thread`: this thread also reads.
+/// Throws IoError, ConfigError for a window with fewer than two scans, and Interrupted.
+PoseEstimate estimate_poses(Recording& recording, const ScanWindow& window, bool one_thread,
+                            const std::function<void(std::size_t, std::size_t)>& progress);
+
+/// Writes "time x y z qx qy qz qw" for each scan. Throws IoError.
+void write_trajectory(const std::filesystem::path& file, const Recording& recording);
+
+}  // namespace dynains::program

@@ -1,0 +1,125 @@
+// The odometry in simulated places, and its answers to wrong input.
+#include "dynains/odometry/odometry.hpp"
+
+#include <Eigen/Geometry>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/simulation/simulator.hpp"
+#include "support/catch.hpp"
+
+namespace dynains::test {
+namespace {
+
+simulation::Config place(simulation::Scene scene, std::size_t scans) {
+  simulation::Config config;
+  config.scene = scene;
+  config.sensor = simulation::Sensor::kVlp16;
+  config.scans = static_cast<int>(scans);
+  config.seed = 4711;
+  return config;
+}
+
+RawPoints<float> points_of(const simulation::SimulatedScan& scan) {
+  return {scan.xyzi.data(), scan.xyzi.size() / 4, 4};
+}
+
+struct Drive {
+  std::vector<Pose> estimated;
+  std::vector<Pose> exact;  ///< in the frame of the first scan
+};
+
+Drive drive(const simulation::Config& config, const OdometryConfig& odometry_config) {
+  simulation::Simulator simulator(config);
+  Odometry odometry(odometry_config);
+  Drive result;
+  const Pose T_first_world = simulator.scan(0).T_world_sensor.inverse();
+  for (std::size_t i = 0; i < simulator.size(); ++i) {
+    const simulation::SimulatedScan scan = simulator.scan(i);
+    const OdometryResult found = odometry.push(points_of(scan), {}, scan.time);
+    REQUIRE(found.loss == OdometryLoss::kNone);
+    result.estimated.push_back(found.T_world_sensor);
+    result.exact.push_back(T_first_world * scan.T_world_sensor);
+  }
+  return result;
+}
+
+double worst_error(const Drive& drive) {
+  double worst = 0.0;
+  for (std::size_t i = 0; i < drive.exact.size(); ++i) {
+    const Eigen::Vector3d error = drive.estimated[i].translation() - drive.exact[i].translation();
+    worst = std::max(worst, error.norm());
+  }
+  return worst;
+}
+
+TEST_CASE("In a hall and in a crowd, poses are found to centimetres, with and without removal") {
+  for (const simulation::Scene scene : {simulation::Scene::kHall, simulation::Scene::kCrowd}) {
+    for (const bool remove : {true, false}) {
+      OdometryConfig config;
+      config.remove = remove;
+      const Drive found = drive(place(scene, 25), config);
+      CAPTURE(static_cast<int>(scene), remove, worst_error(found));
+      CHECK((found.exact.back().translation()).norm() > 0.5);
+      CHECK(worst_error(found) < 0.1);
+    }
+  }
+}
+
+TEST_CASE("Same scans, same bits") {
+  const simulation::Config config = place(simulation::Scene::kCrowd, 8);
+  const Drive a = drive(config, {}), b = drive(config, {});
+  for (std::size_t i = 0; i < a.estimated.size(); ++i) {
+    CHECK(std::memcmp(a.estimated[i].data(), b.estimated[i].data(), 16 * sizeof(double)) == 0);
+  }
+}
+
+TEST_CASE("A lost scan is told and does not enter the map") {
+  simulation::Simulator hall(place(simulation::Scene::kHall, 8));
+  simulation::Simulator street(place(simulation::Scene::kUrban, 8));
+  Odometry with_loss{OdometryConfig()}, without{OdometryConfig()};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto scan = hall.scan(i);
+    with_loss.push(points_of(scan), {}, scan.time);
+    without.push(points_of(scan), {}, scan.time);
+  }
+  const auto lost = street.scan(4);
+  CHECK(with_loss.push(points_of(lost), {}, lost.time).loss == OdometryLoss::kNoOverlap);
+  const std::vector<float> few(4 * 50, 5.0F);
+  const RawPoints<float> few_points{few.data(), 50, 4};
+  CHECK(with_loss.push(few_points, {}, lost.time).loss == OdometryLoss::kFewPoints);
+  const auto next = hall.scan(4);
+  const Pose a = with_loss.push(points_of(next), {}, next.time).T_world_sensor;
+  const Pose b = without.push(points_of(next), {}, next.time).T_world_sensor;
+  CHECK((a.translation() - b.translation()).norm() < 1e-3);
+}
+
+TEST_CASE("Wrong input throws and changes nothing") {
+  simulation::Simulator hall(place(simulation::Scene::kHall, 3));
+  Odometry odometry{OdometryConfig()};
+  const auto first = hall.scan(0), second = hall.scan(1);
+  odometry.push(points_of(first), {}, first.time);
+  const std::vector<double> offsets(7, 0.0);
+  CHECK_THROWS_AS(odometry.push(points_of(second), offsets, second.time), CloudError);
+  CHECK_THROWS_AS(odometry.push(points_of(second), {}, first.time), PoseError);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  CHECK_THROWS_AS(odometry.push(points_of(second), {}, nan), PoseError);
+  CHECK_THROWS_AS(odometry.push({nullptr, 10, 4}, {}, second.time), CloudError);
+  CHECK(odometry.push(points_of(second), {}, second.time).loss == OdometryLoss::kNone);
+}
+
+TEST_CASE("Configurations out of bounds are refused by name") {
+  OdometryConfig config;
+  config.nearest = -1.0;
+  CHECK_THROWS_WITH(Odometry(config), ContainsSubstring("nearest"));
+  config.nearest = 100.0;
+  config.farthest = 100.0;
+  CHECK_THROWS_WITH(Odometry(config), ContainsSubstring("less than farthest"));
+  config.farthest = 100.5;
+  CHECK_NOTHROW(Odometry(config));
+}
+
+}  // namespace
+}  // namespace dynains::test

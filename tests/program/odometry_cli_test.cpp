@@ -1,0 +1,132 @@
+// Recordings without poses: dynains odometry, dynains run --odometry and what they say.
+#include <filesystem>
+#include <iterator>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dynains/io/recording.hpp"
+#include "dynains/io/trajectory.hpp"
+#include "io/files.hpp"
+#include "program/start.hpp"
+#include "support/catch.hpp"
+
+namespace dynains::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A simulated hall without its poses. `lost_from`: these scans are those of a street.
+class Unposed {
+ public:
+  explicit Unposed(int scans = 12, int lost_from = 1000) {
+    simulate("hall", scans);
+    const fs::path velodyne = sequence() / "velodyne";
+    if (lost_from < scans) {
+      const fs::path street = folder_ / "street";
+      REQUIRE(start({"simulate", street, "--scene", "urban", "--sensor", "vlp16", "--scans",
+                     std::to_string(scans), "-q"})
+                  .code == 0);
+      for (int i = lost_from; i < scans; ++i) {
+        const std::string name = (i < 10 ? "00000" : "0000") + std::to_string(i) + ".bin";
+        fs::copy_file(street / "velodyne" / name, velodyne / name,
+                      fs::copy_options::overwrite_existing);
+      }
+      fs::remove_all(sequence() / "labels");
+    }
+    exact_ = Recording(sequence());
+    fs::remove(sequence() / "poses.txt");
+  }
+
+  fs::path sequence() const { return folder_ / "sequence"; }
+  fs::path operator/(const std::string& name) const { return folder_ / name; }
+  const Recording& exact() const { return *exact_; }
+
+ private:
+  void simulate(const char* scene, int scans) {
+    REQUIRE(start({"simulate", sequence(), "--scene", scene, "--sensor", "vlp16", "--seed", "8",
+                   "--scans", std::to_string(scans), "-q"})
+                .code == 0);
+  }
+
+  TemporaryFolder folder_;
+  std::optional<Recording> exact_;
+};
+
+std::size_t count_files(const fs::path& folder) {
+  return static_cast<std::size_t>(
+      std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+}
+
+TEST_CASE("Without poses, commands propose the odometry, and it finds the poses") {
+  const Unposed recording;
+  for (const char* command : {"check", "run"}) {
+    std::vector<std::string> arguments = {command, recording.sequence()};
+    if (std::string(command) == "run")
+      arguments.insert(arguments.end(), {"--out", recording / "x"});
+    const Outcome outcome = start(arguments);
+    CHECK(outcome.code == 1);
+    CHECK_THAT(outcome.err, ContainsSubstring("run --odometry estimates them"));
+  }
+
+  const fs::path poses = recording / "poses.txt";
+  REQUIRE(start({"odometry", recording.sequence(), "--out", poses, "-q"}).code == 0);
+  const Trajectory found = read_trajectory(poses);
+  REQUIRE(found.poses.size() == 12);
+  const Pose T_first_world = recording.exact().T_world_sensor(0).inverse();
+  for (std::size_t i = 0; i < 12; ++i) {
+    const Pose exact = T_first_world * recording.exact().T_world_sensor(i);
+    CHECK((found.poses[i].translation() - exact.translation()).norm() < 0.1);
+  }
+  CHECK_THAT(start({"odometry", recording.sequence(), "--out", poses}).err,
+             ContainsSubstring("--force"));
+  CHECK(start({"odometry", recording.sequence(), "--out", poses, "--force", "--one-thread", "-q"})
+            .code == 0);
+  CHECK(read_trajectory(poses).poses.back().matrix() == found.poses.back().matrix());
+
+  const fs::path out = recording / "out";
+  REQUIRE(start({"run", recording.sequence(), "--odometry", "--out", out, "-q"}).code == 0);
+  CHECK(read_trajectory(out / "poses.txt").poses.back().matrix() == found.poses.back().matrix());
+  CHECK(count_files(out / "labels") == 12);
+  CHECK(start({"run", recording.sequence(), "--odometry", "--out", out, "--resume", "-q"}).code ==
+        0);
+  CHECK(start({"view", out}).code == 0);
+}
+
+TEST_CASE("After a loss of track, the scans before it have results") {
+  const Unposed recording(12, 8);
+  const fs::path poses = recording / "poses.txt";
+  const Outcome odometry = start({"odometry", recording.sequence(), "--out", poses, "-q"});
+  CHECK(odometry.code == 3);
+  CHECK_THAT(odometry.err, ContainsSubstring("lost track at scan 000008"));
+  CHECK(read_trajectory(poses).poses.size() == 8);
+  const fs::path out = recording / "out";
+  const Outcome outcome = start({"run", recording.sequence(), "--odometry", "--out", out, "-q"});
+  CHECK(outcome.code == 3);
+  CHECK_THAT(outcome.err, ContainsSubstring("lost track at scan 000008"));
+  CHECK(count_files(out / "labels") == 8);
+}
+
+TEST_CASE("The odometry refuses what it cannot use") {
+  const Unposed recording(3);
+  const auto error = [&](std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"odometry", recording.sequence(), "--out",
+                                          recording / "new.txt"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = start(arguments);
+    CHECK_FALSE(fs::exists(recording / "new.txt"));
+    return std::to_string(outcome.code) + outcome.err;
+  };
+  CHECK_THAT(error({"--start", "1", "--end", "1"}), StartsWith("2"));
+  CHECK_THAT(error({"--start", "1", "--end", "1"}), ContainsSubstring("two scans or more"));
+  CHECK_THAT(error({"--invert-poses"}), StartsWith("2"));
+  CHECK_THAT(error({"--invert-poses"}), ContainsSubstring("--invert-poses tells of given poses"));
+  CHECK_THAT(error({"--frame", "world"}), ContainsSubstring("frame of the world"));
+  const Outcome outcome =
+      start({"run", recording.sequence(), "--no-deskew", "--out", recording / "out"});
+  CHECK(outcome.code == 2);
+  CHECK_THAT(outcome.err, ContainsSubstring("needs --odometry"));
+}
+
+}  // namespace
+}  // namespace dynains::test
