@@ -52,6 +52,7 @@ class Odometry::Loop {
     T_last_newest_ = T_world_last_.inverse() * result.T_world_sensor;
     period_ = scan_count_ > 0 ? time - time_ : 0.0;
     time_ = time;
+    preparation_.adapt();
     ++scan_count_;
     T_world_last_ = result.T_world_sensor;
     return result;

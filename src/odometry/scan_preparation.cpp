@@ -47,9 +47,7 @@ void ScanPreparation::prepare(RawPoints<float> points, Span<const double> offset
 }
 
 void ScanPreparation::thin_out() {
-  constexpr double kSmall = 0.25;                    // m
-  constexpr double kWanted = 2000.0;                 // points
-  constexpr double kSmallest = 0.3, kLargest = 1.5;  // m
+  constexpr double kSmall = 0.25;  // m
   map_points_.clear();
   taken_.clear();
   for (std::size_t i = 0; 3 * i < cloud_.size(); ++i) {
@@ -63,6 +61,11 @@ void ScanPreparation::thin_out() {
   for (const Point& point : map_points_) {
     if (is_first_in_voxel(taken_, point.position, edge_)) keypoints_.push_back(point.position);
   }
+}
+
+void ScanPreparation::adapt() {
+  constexpr double kWanted = 2000.0;                 // points
+  constexpr double kSmallest = 0.3, kLargest = 1.5;  // m
   const double share = static_cast<double>(keypoints_.size()) / kWanted;
   edge_ = std::clamp(edge_ * std::sqrt(std::clamp(share, 0.5, 2.0)), kSmallest, kLargest);
 }

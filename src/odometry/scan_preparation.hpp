@@ -26,6 +26,9 @@ class ScanPreparation {
   void prepare(RawPoints<float> points, Span<const double> offsets, const Pose& motion,
                double period);
 
+  /// Adapts the large voxels to the scan, for the scans after it.
+  void adapt();
+
   /// All points, de-skewed.
   RawPoints<float> cloud() const { return {cloud_.data(), cloud_.size() / 3, 3}; }
   /// One point for each small voxel.

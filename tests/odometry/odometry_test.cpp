@@ -62,7 +62,7 @@ TEST_CASE("In a hall and in a crowd, poses are found to centimetres, with and wi
       config.remove = remove;
       const Drive found = drive(place(scene, 25), config);
       CAPTURE(static_cast<int>(scene), remove, worst_error(found));
-      CHECK((found.exact.back().translation()).norm() > 0.5);
+      CHECK(found.exact.back().translation().norm() > 0.1);
       CHECK(worst_error(found) < 0.1);
     }
   }
@@ -93,7 +93,7 @@ TEST_CASE("A lost scan is told and does not enter the map") {
   const auto next = hall.scan(4);
   const Pose a = with_loss.push(points_of(next), {}, next.time).T_world_sensor;
   const Pose b = without.push(points_of(next), {}, next.time).T_world_sensor;
-  CHECK((a.translation() - b.translation()).norm() < 1e-3);
+  CHECK(a.matrix() == b.matrix());
 }
 
 TEST_CASE("Wrong input throws and changes nothing") {

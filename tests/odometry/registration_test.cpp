@@ -14,6 +14,8 @@ namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
 
+constexpr double kFinest = 0.1;  // m
+
 /// Random points on the floor and two walls of a corridor of 40 m along x, with 1 cm of noise. A
 /// closed one has a wall at one end.
 Points corridor(bool is_closed, unsigned seed, std::size_t count) {
@@ -71,7 +73,7 @@ TEST_CASE("Known motions are recovered") {
   for (const double degrees : {-4.0, 0.0, 4.0}) {
     const Pose T = motion({0.3, -0.2, 0.1}, degrees);
     const Points scan = seen_from(T, corridor(true, 2, 2000));
-    const Alignment found = align(scan, map, Pose::Identity(), 1.0);
+    const Alignment found = align(scan, map, Pose::Identity(), 1.0, kFinest);
     CAPTURE(degrees, (found.T_map_scan.translation() - T.translation()).norm());
     CHECK(found.free_directions == 0);
     CHECK((found.T_map_scan.translation() - T.translation()).norm() < 0.005);
@@ -87,7 +89,7 @@ TEST_CASE("Along an open corridor the motion stays the predicted one, and this i
   for (const Eigen::Vector3d& p : seen_from(T, corridor(false, 2, 2000))) {
     if (std::abs(p.x()) < 10.0) scan.push_back(p);  // no end of the map in sight
   }
-  const Alignment found = align(scan, map, motion({0.7, 0.0, 0.0}, 0.0), 1.0);
+  const Alignment found = align(scan, map, motion({0.7, 0.0, 0.0}, 0.0), 1.0, kFinest);
   CHECK(found.free_directions == 1);
   CHECK(found.T_map_scan.translation().x() == Approx(0.7).margin(0.01));
   CHECK(found.T_map_scan.translation().y() == Approx(0.1).margin(0.005));
@@ -97,11 +99,11 @@ TEST_CASE("A search finds a motion that a prediction is too far from") {
   const LocalMap map = map_of(corridor(true, 1, 20000));
   const Pose T = motion({2.2, 0.0, 0.0}, 0.0);
   const Points scan = seen_from(T, corridor(true, 2, 2000));
-  CHECK(
-      (align(scan, map, Pose::Identity(), 0.1).T_map_scan.translation() - T.translation()).norm() >
-      0.5);
-  CHECK((search(scan, map, Pose::Identity()).T_map_scan.translation() - T.translation()).norm() <
-        0.005);
+  CHECK((align(scan, map, Pose::Identity(), kFinest, kFinest).T_map_scan.translation() -
+         T.translation())
+            .norm() > 0.5);
+  CHECK((search(scan, map, Pose::Identity(), kFinest).T_map_scan.translation() - T.translation())
+            .norm() < 0.005);
 }
 
 TEST_CASE("A scan of another place does not fit") {
@@ -109,10 +111,11 @@ TEST_CASE("A scan of another place does not fit") {
   std::mt19937 random(3);
   Points scan;
   for (int i = 0; i < 2000; ++i) {
-    scan.emplace_back(Eigen::Vector3d(random() % 1000, random() % 1000, random() % 1000) / 25.0);
+    const auto coordinate = [&] { return 0.04 * static_cast<double>(random() % 1000); };
+    scan.emplace_back(coordinate(), coordinate(), coordinate());
   }
-  CHECK(align(scan, map, Pose::Identity(), 1.0).fit < 0.2);
-  CHECK(align(scan, LocalMap(), Pose::Identity(), 1.0).fit == 0.0);
+  CHECK(align(scan, map, Pose::Identity(), 1.0, kFinest).fit < 0.2);
+  CHECK(align(scan, LocalMap(), Pose::Identity(), 1.0, kFinest).fit == 0.0);
 }
 
 TEST_CASE("What is far is forgotten") {
@@ -147,7 +150,8 @@ TEST_CASE("Points are moved by the motion until they were measured") {
   preparation.prepare({xyz.data(), 4, 3}, offsets, T, 0.1);
   const Eigen::Vector3d half(1.0 + 5.0 * std::cos(0.1), 5.0 * std::sin(0.1), 1.0);
   CHECK((point(0) - half).norm() < 1e-5);
-  CHECK((point(1) - T.inverse() * Eigen::Vector3d(5.0, 0.0, 1.0)).norm() < 0.05);
+  const Eigen::Vector3d before(-2.0 + 5.0 * std::cos(0.2), -5.0 * std::sin(0.2), 1.0);
+  CHECK((point(1) - before).norm() < 1e-5);
   CHECK(point(2) == Eigen::Vector3d(5.0, 0.0, 1.0));
   CHECK(point(3).isZero(0.0));
   preparation.prepare({xyz.data(), 4, 3}, offsets, T, 0.0);  // no motion is known

@@ -11,7 +11,7 @@ set(layers
   "^pipeline/"
   "^(compiled_remover|dyna_ins_remover)\\.hpp$"
   "^(adapters|io|evaluation)/"
-  "^(poses|simulation)/"
+  "^(poses|odometry|simulation)/"
   "^city/")
 # Classes of stages. They meet in the pipeline alone: a stage includes no other stage.
 set(stages
