@@ -59,15 +59,28 @@ PointGrid::Neighbours PointGrid::neighbours_of(const Eigen::Vector3d& point) con
   const std::int64_t x = index_of(point.x(), edge_);
   const std::int64_t y = index_of(point.y(), edge_);
   const std::int64_t z = index_of(point.z(), edge_);
-  for (std::int64_t dx = -1; dx <= 1; ++dx) {
-    for (std::int64_t dy = -1; dy <= 1; ++dy) {
-      for (std::int64_t dz = -1; dz <= 1; ++dz) {
-        const std::uint32_t number = numbers_.find(voxel_key(x + dx, y + dy, z + dz));
+  // Squared distances to the voxels before, at and behind the point along each axis.
+  std::array<std::array<double, 3>, 3> gaps;
+  const std::array<std::int64_t, 3> at = {x, y, z};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double inside =
+        point[static_cast<Eigen::Index>(axis)] - static_cast<double>(at[axis]) * edge_;
+    gaps[axis] = {inside * inside, 0.0, (edge_ - inside) * (edge_ - inside)};
+  }
+  constexpr std::array<std::size_t, 3> kCentreFirst = {1, 0, 2};
+  for (const std::size_t i : kCentreFirst) {
+    for (const std::size_t j : kCentreFirst) {
+      for (const std::size_t k : kCentreFirst) {
+        const double gap = gaps[0][i] + gaps[1][j] + gaps[2][k];
+        if (gap >= nearest.reach(edge_ * edge_)) continue;
+        const auto step = [](std::size_t index) { return static_cast<std::int64_t>(index) - 1; };
+        const std::uint32_t number =
+            numbers_.find(voxel_key(x + step(i), y + step(j), z + step(k)));
         if (number == VoxelHashTable<>::kNone) continue;
         const Voxel& voxel = voxels_[number];
-        for (std::uint32_t i = 0; i < voxel.count; ++i) {
-          const double squared = (voxel.points[i] - point).squaredNorm();
-          if (squared < edge_ * edge_) nearest.add(voxel.points[i], squared);
+        for (std::uint32_t n = 0; n < voxel.count; ++n) {
+          const double squared = (voxel.points[n] - point).squaredNorm();
+          if (squared < edge_ * edge_) nearest.add(voxel.points[n], squared);
         }
       }
     }

@@ -46,6 +46,8 @@ class PointGrid {
     std::size_t count = 0;
 
     void add(const Eigen::Vector3d& point, double squared_distance);
+    /// Squared distance from which a point does not count.
+    double reach(double most) const { return count < kNeighbours ? most : squared[count - 1]; }
   };
 
   Neighbours neighbours_of(const Eigen::Vector3d& point) const;

@@ -79,7 +79,7 @@ class Odometry::Loop {
 
   OdometryLoss register_scan(const Pose& T_predicted, OdometryResult& result) {
     constexpr std::size_t kFewest = 100;  // points
-    constexpr double kLeastFit = 0.35;
+    constexpr double kLeastFit = 0.2;
     // m. The surfaces of a few scans are rough.
     constexpr double kFirst = 0.8, kDecay = 0.9, kFinest = 0.1;
     if (preparation_.keypoints().size() < kFewest) return OdometryLoss::kFewPoints;

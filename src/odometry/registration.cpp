@@ -132,7 +132,7 @@ void rate(const std::vector<Match>& matches, std::size_t points, Alignment& alig
 Alignment align(const std::vector<Eigen::Vector3d>& points, const LocalMap& map,
                 const Pose& T_map_predicted, double scale, double finest) {
   constexpr int kMostMatchings = 12, kStepsOfMatching = 2;
-  constexpr double kConverged = 1e-3, kExact = 1e-4;  // m
+  constexpr double kConverged = 3e-3, kExact = 1e-4;  // m
   Alignment result;
   result.T_map_scan = T_map_predicted;
   std::vector<Match> matches;
