@@ -698,8 +698,8 @@ TEST_CASE("a reference is found as long as scans need it, and every scan finds i
     points.push_back(newest, 0.0F, 0.0F);
     points.push_back(newest + 2.0F, 0.0F, 0.0F);
     points.grow(3 + detail::kPackWidth);
-    const detail::Visibility& visibility =
-        views.test(points, 3, Eigen::Isometry3d::Identity(), views.newest());
+    detail::Visibility visibility;
+    views.test(points, 3, Eigen::Isometry3d::Identity(), views.newest(), visibility);
     CHECK(visibility.is_free(0));
     CHECK_FALSE(visibility.is_hit(0));
     CHECK(visibility.is_hit(1));
