@@ -166,12 +166,13 @@ Alignment search(const std::vector<Eigen::Vector3d>& points, const LocalMap& map
     const Alignment found = align(few, map, T_map_near * T_near_guess, kScale, finest);
     if (found.score > best.score) best = found;
   };
-  for (int i = 0; i < kDirections * kRings; ++i) {
-    const double angle = 2.0 * M_PI * (i % kDirections) / kDirections;
-    const double distance = 1.0 + i / kDirections;  // m
-    Pose guess = Pose::Identity();
-    guess.translation() = distance * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0.0);
-    attempt(guess);
+  for (int ring = 1; ring <= kRings; ++ring) {  // its radius in m
+    for (int i = 0; i < kDirections; ++i) {
+      const double angle = 2.0 * M_PI * i / kDirections;
+      Pose guess = Pose::Identity();
+      guess.translation() = ring * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0.0);
+      attempt(guess);
+    }
   }
   for (const double degrees : {-30.0, -20.0, -10.0, 10.0, 20.0, 30.0}) {
     Pose guess = Pose::Identity();

@@ -63,9 +63,9 @@ PoseEstimate estimate_poses(Recording& recording, const ScanWindow& window, bool
   return estimate;
 }
 
-void write_trajectory(const std::filesystem::path& path, const Recording& recording) {
-  AtomicFile file(path);
-  std::ostream& out = file.stream();
+void write_trajectory(const std::filesystem::path& file, const Recording& recording) {
+  AtomicFile writer(file);
+  std::ostream& out = writer.stream();
   text::exact(out);
   out << "# time x y z qx qy qz qw\n";
   for (std::size_t i = 0; i < recording.size(); ++i) {
@@ -75,7 +75,7 @@ void write_trajectory(const std::filesystem::path& path, const Recording& record
     out << recording.time(i) << ' ' << t.x() << ' ' << t.y() << ' ' << t.z() << ' ' << q.x() << ' '
         << q.y() << ' ' << q.z() << ' ' << q.w() << '\n';
   }
-  file.commit();
+  writer.commit();
 }
 
 }  // namespace dynains::program
