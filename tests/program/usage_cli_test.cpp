@@ -67,10 +67,8 @@ TEST_CASE("An unknown command or option gives the nearest one") {
     std::string expected;
   };
   const std::string all =
-      "xpected one of run, remap, clean, map, fleet, check, config, simulate, statistics, eval, "
-      "experiment, "
-      "view, "
-      "man, completion (";
+      "xpected one of run, remap, clean, map, fleet, check, odometry, config, simulate, "
+      "statistics, eval, experiment, view, man, completion (";
   const std::vector<Case> cases = {
       {{"runn", "seq", "--out", "out"}, "\"runn\" is no command; did you mean run? E" + all},
       {{"sim", "out"}, "\"sim\" is no command; did you mean simulate? E" + all},
