@@ -10,8 +10,8 @@
 
 #include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
-#include "dynains/verdict.hpp"
 #include "dynains/threads/background.hpp"
+#include "dynains/verdict.hpp"
 #include "verdict_arrays.hpp"
 
 namespace dynains::program {

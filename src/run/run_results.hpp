@@ -16,6 +16,7 @@
 #include "clean_writer.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
+#include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
 #include "label_counts.hpp"
 #include "label_writer.hpp"
@@ -24,7 +25,6 @@
 #include "overview.hpp"
 #include "scan_range.hpp"
 #include "session_contribution.hpp"
-#include "dynains/threads/background.hpp"
 #include "verdict_arrays.hpp"
 #include "verdict_log.hpp"
 

@@ -35,7 +35,7 @@ struct RunSettings {
   bool resume = false;
   bool accept_poses = false;
   bool poses_are_estimated = false;  ///< by the odometry; they are a result
-  bool drop_not_judged = false;  ///< clean/ has no points that are not judged
+  bool drop_not_judged = false;      ///< clean/ has no points that are not judged
   /// Whether `config.min_range` follows what the sensor sees of its own body.
   bool find_own_body = false;
 
