@@ -104,8 +104,10 @@ class Odometry::Loop {
   void note_prediction(const Pose& T_predicted_found) {
     constexpr double kShare = 0.1, kArm = 10.0;  // m
     if (period_ <= 0.0) return;
-    const double error = T_predicted_found.translation().norm() +
-                         kArm * Eigen::AngleAxisd(T_predicted_found.linear()).angle();
+    const Eigen::Matrix3d R = T_predicted_found.linear();
+    const Eigen::Vector3d axis(R(2, 1) - R(1, 2), R(0, 2) - R(2, 0), R(1, 0) - R(0, 1));
+    const double turn = std::atan2(axis.norm(), R.trace() - 1.0);  // rad
+    const double error = T_predicted_found.translation().norm() + kArm * turn;
     expected_error_ += kShare * (error - expected_error_);
   }
 
