@@ -380,24 +380,14 @@ void copy_pcd(const std::filesystem::path& path, Span<const std::uint8_t> keep,
   ByteReader reader(path);
   PointSink sink;
   const PcdHeader header = parse_pcd_header(reader, sink);
-  const auto kept = std::count_if(keep.begin(), keep.end(), [](auto value) { return value != 0; });
-  copy_pcd_header(path, reader.position(), static_cast<std::size_t>(kept), target);
-  const bool is_compressed = header.encoding == PcdEncoding::kCompressed;
-  const std::vector<char> block = is_compressed ? read_block(reader, header) : std::vector<char>();
-  std::string record(header.record_bytes(), '\0');
+  copy_pcd_header(path, reader.position(), kept_count(keep), target);
+  if (header.encoding != PcdEncoding::kCompressed) {
+    const bool is_text = header.encoding == PcdEncoding::kAscii;
+    return copy_records(reader, is_text ? 0 : header.record_bytes(), "a point", keep, target);
+  }
+  const std::vector<char> block = read_block(reader, header);
   for (std::size_t i = 0; i < keep.size(); ++i) {
-    if (header.encoding == PcdEncoding::kAscii) {
-      if (!reader.read_line(record)) reader.fail_on_line("file ends, expected one more point");
-    } else if (!is_compressed) {
-      reader.read(record.data(), record.size(), "a point");
-    }
-    if (keep[i] == 0) continue;
-    if (is_compressed) {
-      copy_point(block, header, i, target);
-    } else {
-      target << record;
-      if (header.encoding == PcdEncoding::kAscii) target << '\n';
-    }
+    if (keep[i] != 0) copy_point(block, header, i, target);
   }
 }
 

@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <array>
 #include <charconv>
 #include <functional>
@@ -275,24 +274,14 @@ void copy_ply(const std::filesystem::path& path, Span<const std::uint8_t> keep,
   ByteReader reader(path);
   PointSink sink;
   const PlyHeader header = parse_ply_header(reader, sink);
-  const auto kept = std::count_if(keep.begin(), keep.end(), [](auto value) { return value != 0; });
-  copy_ply_header(path, reader.position(), static_cast<std::size_t>(kept), target);
+  copy_ply_header(path, reader.position(), kept_count(keep), target);
   const Element& vertex = header.elements.back();
   for (const Property& property : vertex.properties) {
     if (property.is_list) reader.fail_here("expected vertices without the list " + property.name);
   }
   const bool is_text = header.encoding == PlyEncoding::kAscii;
-  std::string record(static_cast<std::size_t>(min_bytes(vertex, header.encoding)), '\0');
-  for (const std::uint8_t is_kept : keep) {
-    if (is_text) {
-      if (!reader.read_line(record)) reader.fail_on_line("file ends, expected one more vertex");
-    } else {
-      reader.read(record.data(), record.size(), "a vertex");
-    }
-    if (is_kept == 0) continue;
-    target << record;
-    if (is_text) target << '\n';
-  }
+  const std::uint64_t size = is_text ? 0 : min_bytes(vertex, header.encoding);
+  copy_records(reader, static_cast<std::size_t>(size), "a vertex", keep, target);
 }
 
 PointFile read_ply(const std::filesystem::path& path) {

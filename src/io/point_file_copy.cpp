@@ -1,5 +1,7 @@
 #include "point_file_copy.hpp"
 
+#include <algorithm>
+
 #include "byte_reader.hpp"
 #include "failure.hpp"
 #include "text.hpp"
@@ -19,6 +21,26 @@ void copy_lines(const std::filesystem::path& path, std::uint64_t size, std::ostr
   ByteReader reader(path);
   std::string line;
   while (reader.position() < size && reader.read_line(line)) target << edit(line) << '\n';
+}
+
+void copy_records(ByteReader& reader, std::size_t size, const char* record,
+                  Span<const std::uint8_t> keep, std::ostream& target) {
+  std::string bytes(size, '\0');
+  for (const std::uint8_t is_kept : keep) {
+    if (size > 0) {
+      reader.read(bytes.data(), size, record);
+    } else if (!reader.read_line(bytes)) {
+      reader.fail_on_line(std::string("file ends, expected ") + record);
+    }
+    if (is_kept == 0) continue;
+    target << bytes;
+    if (size == 0) target << '\n';
+  }
+}
+
+std::size_t kept_count(Span<const std::uint8_t> keep) {
+  return static_cast<std::size_t>(
+      std::count_if(keep.begin(), keep.end(), [](auto value) { return value != 0; }));
 }
 
 }  // namespace dynains

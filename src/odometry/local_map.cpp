@@ -13,14 +13,14 @@ std::int64_t index_of(double coordinate, double edge) {
   return static_cast<std::int64_t>(std::floor(coordinate / edge));
 }
 
-VoxelKey key_of(const Eigen::Vector3d& p, double edge) {
+}  // namespace
+
+VoxelKey voxel_of(const Eigen::Vector3d& p, double edge) {
   return voxel_key(index_of(p.x(), edge), index_of(p.y(), edge), index_of(p.z(), edge));
 }
 
-}  // namespace
-
 void PointGrid::insert(const Eigen::Vector3d& point) {
-  const VoxelKey key = key_of(point, edge_);
+  const VoxelKey key = voxel_of(point, edge_);
   const std::uint32_t number = numbers_.insert(key);
   if (number == voxels_.size()) {
     voxels_.emplace_back();

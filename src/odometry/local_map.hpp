@@ -11,6 +11,9 @@
 
 namespace dynains::odometry {
 
+/// Voxel of a point in a grid of this edge (m).
+VoxelKey voxel_of(const Eigen::Vector3d& point, double edge);
+
 /// A plane, an upright pole, or clutter: directions in which it tells where a point is.
 struct Surface {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();  ///< m; of clutter: its nearest point

@@ -4,16 +4,14 @@
 #include <cmath>
 
 #include "dynains/io/trajectory.hpp"
+#include "local_map.hpp"
 
 namespace dynains::odometry {
 namespace {
 
 bool is_first_in_voxel(VoxelHashTable<>& taken, const Eigen::Vector3d& p, double edge) {
-  const auto index = [&](double coordinate) {
-    return static_cast<std::int64_t>(std::floor(coordinate / edge));
-  };
   const std::size_t count = taken.size();
-  return taken.insert(voxel_key(index(p.x()), index(p.y()), index(p.z()))) == count;
+  return taken.insert(voxel_of(p, edge)) == count;
 }
 
 }  // namespace

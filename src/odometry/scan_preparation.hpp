@@ -1,4 +1,4 @@
-// What a registration takes of a scan: de-skewed points, and a few of them.
+// Preparation of a scan for its registration: points are de-skewed and thinned out.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -9,6 +9,7 @@
 #include "dynains/errors.hpp"
 #include "evaluation_options.hpp"
 #include "progress.hpp"
+#include "run/input_files.hpp"
 
 namespace dynains::program {
 namespace {
@@ -33,11 +34,9 @@ void write_poses(const OdometryFlags& flags) {
   PoseEstimate estimate;
   const Recording recording = open_with_odometry(
       flags.recording, flags.is_compensated, flags.window, flags.one_thread, flags.quiet, estimate);
-  for (const std::filesystem::path& file : recording.files()) {
-    if (std::filesystem::exists(out) && std::filesystem::equivalent(file, out)) {
-      throw IoError(flags.out + ": belongs to the recording");
-    }
-  }
+  InputFiles inputs;
+  for (const std::filesystem::path& file : recording.files()) inputs.add(file);
+  inputs.refuse(out);
   write_trajectory(out, recording);
   if (!flags.quiet) {
     std::cout << recording.size() << " poses: " << flags.out << std::endl;

@@ -11,7 +11,7 @@
 
 namespace dynains::program {
 
-/// What the odometry found, beside the poses.
+/// Findings of the odometry about a recording.
 struct PoseEstimate {
   /// Where and why the odometry lost track, one sentence; empty: it did not.
   std::optional<std::string> loss;

@@ -39,7 +39,7 @@ class RecordingGround {
   }
 
   /// Height of a point (m, world frame) above the ground in its cell. Empty where the recording has
-  /// less than three points of the ground.
+  /// less than 20 points of the ground.
   std::optional<double> rise(const Eigen::Vector3d& point) const {
     const Index index = index_of(point);
     const auto tile = tiles_.find({index[0] >> kShift, index[1] >> kShift});

@@ -60,9 +60,9 @@ struct RecordingPlacesConfig {
 /// these ways:
 /// - `free_looks` looks in a row are free and no hit lies between. Looks from farther away than the
 ///   points of a place do not count, for beams that are far apart miss what is thin.
-/// - What came: looks passed it before any scan measured it, and the first epoch removed its
-/// points.
-///   What left: the same in reverse.
+/// - An object came: looks passed the place before any scan measured it, and the first epoch
+///   removed its points.
+/// - An object left: the last epoch removed its points, and looks passed the place after it.
 /// - It touches such places, and its first or last two epochs removed its points.
 ///
 /// The memory is that of the places: about 120 bytes each.

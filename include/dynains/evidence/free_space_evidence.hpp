@@ -225,7 +225,7 @@ class FreeSpaceEvidence {
     std::vector<GroundBox> ground_boxes;               // by block of 64 ground points
     GroundSamples ground;
   };
-  // What one thread needs to test samples.
+  // Working memory of a thread that tests samples.
   struct Tester {
     explicit Tester(const FreeSpaceConfig& config) : updater(config) {}
     InstanceBeliefUpdater updater;
