@@ -52,7 +52,7 @@ case "${1:-}" in
     ;;
   disturbed)
     build build -DDYNAINS_CRASH_STATES=100000 -DDYNAINS_ALL_FAULTS=ON
-    ctest --test-dir build --output-on-failure -R '^disturbed:'
+    DYNAINS_FAULTS_OF=1 ctest --test-dir build --output-on-failure -R '^disturbed:'
     TMPDIR=/dev/shm DYNAINS_PROGRAM_STARTS=$2 \
       build/tests/reliability/test_disturbed "the program is started at random"
     ;;

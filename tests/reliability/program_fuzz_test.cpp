@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <cctype>
 #include <chrono>
-#include <cstdlib>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,11 +21,6 @@ namespace dynains::test {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::size_t number_in(const char* variable, std::size_t otherwise) {
-  const char* const value = std::getenv(variable);
-  return value == nullptr ? otherwise : static_cast<std::size_t>(std::stoul(value));
-}
 
 Tree recording_of_clouds() {
   Tree clouds;

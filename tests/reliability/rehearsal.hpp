@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -14,6 +16,12 @@
 #include "support/catch.hpp"
 
 namespace dynains::test {
+
+/// The number in an environment variable.
+inline std::size_t number_in(const char* variable, std::size_t otherwise) {
+  const char* const value = std::getenv(variable);
+  return value == nullptr ? otherwise : static_cast<std::size_t>(std::stoul(value));
+}
 
 using Arguments = std::vector<std::string>;
 
