@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "bench/street.hpp"
-#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/compiled_remover.hpp"
 
 namespace dynains::bench {
 namespace {
