@@ -91,7 +91,7 @@ Overview::Overview(const std::vector<Eigen::Vector3d>& path)
   };
   width_ = pixels(size.x());
   height_ = pixels(size.y());
-  pixels_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  rows_.resize(static_cast<std::size_t>(height_));
 }
 
 void Overview::add(const RecordedScan& scan, const ScanVerdict& verdict) {
@@ -116,8 +116,9 @@ Overview::Pixel* Overview::pixel_at(const Eigen::Vector3d& p) {
   const double x = (p.x() - low_.x()) * scale_;
   const double y = height_ - (p.y() - low_.y()) * scale_;
   if (!(x >= 0 && x < width_ && y >= 0 && y < height_)) return nullptr;
-  const auto row = static_cast<std::size_t>(y), column = static_cast<std::size_t>(x);
-  return &pixels_[row * static_cast<std::size_t>(width_) + column];
+  std::vector<Pixel>& row = rows_[static_cast<std::size_t>(y)];
+  if (row.empty()) row.resize(static_cast<std::size_t>(width_));
+  return &row[static_cast<std::size_t>(x)];
 }
 
 Picture Overview::picture() const {
@@ -129,10 +130,10 @@ Picture Overview::picture() const {
   const auto draw = [&](int panel, int x, int y, Colour colour) {
     picture.set(x + panel * step_x, y + kStrip + panel * step_y, colour);
   };
-  std::size_t next = 0;
   for (int y = 0; y < height_; ++y) {
-    for (int x = 0; x < width_; ++x) {
-      const Pixel& pixel = pixels_[next++];
+    const std::vector<Pixel>& row = rows_[static_cast<std::size_t>(y)];
+    for (int x = 0; x < static_cast<int>(row.size()); ++x) {
+      const Pixel& pixel = row[static_cast<std::size_t>(x)];
       const Colour grey = {pixel.grey, pixel.grey, pixel.grey};
       if (pixel.has_moving) {
         draw(0, x, y, kRawDynamicColour);

@@ -50,11 +50,11 @@ class Overview {
   Pixel* pixel_at(const Eigen::Vector3d& p);
 
   std::size_t static_step_;
-  Eigen::Vector2d low_;  // m, world, left and lower border
-  double scale_;         // pixels per m
-  int width_;            // pixels of a panel
-  int height_;           // pixels of a panel
-  std::vector<Pixel> pixels_;
+  Eigen::Vector2d low_;                     // m, world, left and lower border
+  double scale_;                            // pixels per m
+  int width_;                               // pixels of a panel
+  int height_;                              // pixels of a panel
+  std::vector<std::vector<Pixel>> rows_;    // of a panel; empty before the first point of a row
   std::vector<StaticPoint> static_points_;  // of one scan
 };
 

@@ -53,7 +53,7 @@ void encode(const Picture& picture, Encoded& encoded) {
     png_set_filter(writer, PNG_FILTER_TYPE_BASE, PNG_FILTER_NONE);
     png_write_info(writer, info);
     for (int y = 0; y < picture.height(); ++y) {
-      png_write_row(writer, reinterpret_cast<png_const_bytep>(picture.row(y)));
+      png_write_row(writer, picture.row(y));
     }
     png_write_end(writer, info);
   }
@@ -65,11 +65,9 @@ void encode(const Picture& picture, Encoded& encoded) {
 Picture::Picture(int width, int height)
     : width_(checked_side(width)),
       height_(checked_side(height)),
-      pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height),
-              Colour{255, 255, 255}) {}
+      bytes_(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 255) {}
 
 void Picture::write_png(const std::filesystem::path& path) const {
-  static_assert(sizeof(Colour) == 3, "rows are handed to libpng as they are");
   png_image size{};
   size.width = static_cast<png_uint_32>(width_);
   size.height = static_cast<png_uint_32>(height_);

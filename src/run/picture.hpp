@@ -25,25 +25,31 @@ class Picture {
   int height() const { return height_; }
 
   /// `x`, `y`: pixels from the upper left corner, within the picture.
-  void set(int x, int y, Colour colour) { pixels_[index(x, y)] = colour; }
+  void set(int x, int y, Colour colour) {
+    std::uint8_t* const bytes = bytes_.data() + index(x, y);
+    bytes[0] = colour.r, bytes[1] = colour.g, bytes[2] = colour.b;
+  }
 
-  Colour at(int x, int y) const { return pixels_[index(x, y)]; }
+  Colour at(int x, int y) const {
+    const std::uint8_t* const bytes = bytes_.data() + index(x, y);
+    return {bytes[0], bytes[1], bytes[2]};
+  }
 
-  /// The `width()` pixels of a row.
-  const Colour* row(int y) const { return pixels_.data() + index(0, y); }
+  /// Red, green and blue of the `width()` pixels of a row.
+  const std::uint8_t* row(int y) const { return bytes_.data() + index(0, y); }
 
   /// Writes a PNG file, whole or not at all. Throws IoError.
   void write_png(const std::filesystem::path& path) const;
 
  private:
   std::size_t index(int x, int y) const {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
-           static_cast<std::size_t>(x);
+    return 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+                static_cast<std::size_t>(x));
   }
 
   int width_;
   int height_;
-  std::vector<Colour> pixels_;
+  std::vector<std::uint8_t> bytes_;
 };
 
 }  // namespace dynains::program
