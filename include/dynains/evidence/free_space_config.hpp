@@ -28,8 +28,8 @@ struct FreeSpaceConfig {
   double removal_ratio = 0.2;
   double large_removal_ratio = 0.5;
   double pass_ratio = 0.6;
-  double footprint = 0.3;        ///< m
-  double footprint_rise = 0.03;  ///< m
+  double footprint = 0.3;         ///< m
+  double footprint_rise = 0.025;  ///< m
   bool use_tracks = true;
   double tau_track = 0.87;  ///< form of Eq. 19
   double still_weight = 0.1;
@@ -123,8 +123,8 @@ struct FreeSpaceConfig {
     visitor(Parameter{"footprint", self.footprint, closed(0, 2), "m",
                       "ground at a smaller distance from removed points is removed; 0: none"});
     visitor(Parameter{"footprint_rise", self.footprint_rise, closed(0, 1), "m",
-                      "a footprint cell is removed only if one of its points lies this much above "
-                      "the ground around; 0: every cell is removed"});
+                      "ground in the footprint is removed only if it lies this much above the "
+                      "ground around; 0: all of it is removed"});
     visitor(Parameter{"use_tracks", self.use_tracks, Bounds(), "",
                       "propagate beliefs along instances that overlap from scan to scan"});
     visitor(Parameter{"tau_track", self.tau_track, open(0.5, 1), "",

@@ -109,28 +109,9 @@ class GroundFootprint {
     return holds(box) ? find_under(block, clearance) : 0;
   }
 
-  /// Marks the cells of the points of a block whose bits are set in `which`. All these points must
-  /// lie under removed points.
-  void mark(PointsView block, std::uint64_t which) {
-    const Located located = locate(block);
-    detail::for_each_bit(which, [&](std::size_t i) {
-      cell_at(static_cast<std::uint32_t>(located.tile[i]),
-              static_cast<std::uint32_t>(located.cell[i]))
-          .marked = true;
-    });
-  }
-  /// The bits of `which` whose points lie in marked cells.
-  std::uint64_t find_marked(PointsView block, std::uint64_t which) const {
-    const Located located = locate(block);
-    std::uint64_t marked = 0;
-    detail::for_each_bit(
-        which, [&](std::size_t i) { marked |= std::uint64_t{cell_of(located, i).marked} << i; });
-    return marked;
-  }
-
   bool empty() const { return touched_.empty(); }
 
-  /// Removes all points and marks.
+  /// Removes all points.
   void clear() {
     for (const std::uint32_t tile : used_) tile_of_[tile] = 0;
     used_.clear();
@@ -149,7 +130,6 @@ class GroundFootprint {
   struct Cell {
     float own = kNothing;     // m, height of the lowest removed point in the cell
     float lowest = kNothing;  // m, height of the lowest removed point in its 3x3 cells
-    bool marked = false;
   };
   struct Touched {
     std::uint32_t tile, cell;

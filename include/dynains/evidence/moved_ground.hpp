@@ -94,8 +94,8 @@ class MovedGround {
   static constexpr std::uint32_t kLeastFree = 2;  // "free" references of a moved voxel
   static constexpr float kLeastRatio = 0.3F;      // "free" to "hit" references of a moved voxel
 
-  // Removes ground points under removed points, in cells with a point that rises above the
-  // surrounding ground (the foot of an object) or whose surrounding ground is unknown.
+  // Removes the ground points under removed points that rise above the surrounding ground (the foot
+  // of an object), or whose surrounding ground is unknown.
   void find_under(PointsView ground, Span<const GroundBox> boxes, const GroundSamples& samples) {
     footprint_.spread();
     bool any = false;
@@ -104,19 +104,17 @@ class MovedGround {
       any |= under_[i] != 0;
     }
     if (!any) return;
-    if (rise_ > 0.0F) mark_rising_cells(ground, samples);
+    if (rise_ > 0.0F) find_surroundings(ground, samples);
     for (std::size_t i = 0; i < under_.size(); ++i) {
-      if (under_[i] == 0) continue;
       const std::uint64_t removed =
-          rise_ > 0.0F ? footprint_.find_marked(block_of(ground, i), under_[i]) : under_[i];
+          rise_ > 0.0F ? rising(block_of(ground, i), under_[i]) : under_[i];
       remove(i, removed, Cause::kUnderInstance);
     }
   }
 
-  // Marks the cells of the footprint with a ground point that rises. The first points of the runs
-  // beside the removed points give the height of the surrounding ground, which is unknown without
-  // samples.
-  void mark_rising_cells(PointsView ground, const GroundSamples& samples) {
+  // The first points of the runs beside the removed points give the height of the surrounding
+  // ground, which is unknown without samples.
+  void find_surroundings(PointsView ground, const GroundSamples& samples) {
     around_points_.grow(ground.size());
     std::size_t count = 0;
     for (std::size_t i = 0; samples.size() > 0 && i < under_.size(); ++i) {
@@ -131,15 +129,16 @@ class MovedGround {
       });
     }
     around_.assign(PointsView(around_points_).subview(0, count), rise_);
-    for (std::size_t i = 0; i < under_.size(); ++i) {
-      const PointsView points = block_of(ground, i);
-      std::uint64_t rising = 0;
-      detail::for_each_bit(under_[i], [&](std::size_t k) {
-        const bool rises = around_.height(points.x[k], points.y[k], points.z[k]) >= rise_;
-        rising |= std::uint64_t{rises} << k;
-      });
-      if (rising != 0) footprint_.mark(points, rising);
-    }
+  }
+
+  // The bits of `which` whose points rise above the surrounding ground.
+  std::uint64_t rising(PointsView block, std::uint64_t which) {
+    std::uint64_t bits = 0;
+    detail::for_each_bit(which, [&](std::size_t k) {
+      const bool rises = around_.height(block.x[k], block.y[k], block.z[k]) >= rise_;
+      bits |= std::uint64_t{rises} << k;
+    });
+    return bits;
   }
 
   static PointsView block_of(PointsView ground, std::size_t block) {
