@@ -434,6 +434,38 @@ TEST_CASE("few free samples remove an instance only if enough samples along its 
   CHECK(cause_with_track(4, 0.0F, false) == Cause::kWithInstance);
 }
 
+// Twenty supervoxels of an instance whose track moves, of which some are seen free twice and others
+// are hit.
+Cause cause_of_long(float length, std::size_t free, std::size_t hit, bool may_presume = false) {
+  const FreeSpaceConfig config;
+  Scan scan(Instances{std::vector<std::uint32_t>(20, 8)});
+  std::vector<Scan::Seen> seen(20, {0, 0});
+  std::fill_n(seen.begin(), free, Scan::Seen{8, 0});
+  std::fill_n(seen.begin() + static_cast<std::ptrdiff_t>(free), hit, Scan::Seen{0, 8});
+  for (int i = 0; i < 2; ++i) scan.see(seen);
+  InstanceEvidence evidence;
+  evidence.samples = scan.samples;
+  evidence.beliefs = scan.beliefs;
+  evidence.tracked.instances.resize(1);
+  evidence.tracked.shapes.resize(1);
+  evidence.tracked.shapes[0].carried = true;
+  evidence.tracked.shapes[0].length = length;
+  evidence.tracked.instances[0].past.log_odds = 4.0F * kFreeStep;
+  InstanceJudge judge(config);
+  std::vector<InstanceJudge::Verdict> verdicts;
+  judge.judge(evidence, scan.updater, may_presume, verdicts, [](std::size_t) {});
+  return verdicts.back().cause;
+}
+
+TEST_CASE("a track does not remove a long instance of which most stands and some moved") {
+  CHECK(cause_of_long(9.1F, 1, 19) == Cause::kOccupied);
+  CHECK(cause_of_long(8.9F, 1, 19) == Cause::kAlongTrack);        // a car
+  CHECK(cause_of_long(9.1F, 0, 20) == Cause::kAlongTrack);        // a lorry before it starts
+  CHECK(cause_of_long(9.1F, 1, 9) == Cause::kNoEvidence);         // half are decided
+  CHECK(cause_of_long(9.1F, 1, 8) == Cause::kAlongTrack);         // fewer
+  CHECK(cause_of_long(9.1F, 1, 19, true) == Cause::kAlongTrack);  // provisional
+}
+
 TEST_CASE("a place that is hit again twice after it was free is seen through by chance") {
   const auto see = [](const std::string& references) {
     Scan scan(Instances{{4}});

@@ -114,9 +114,9 @@ class InstanceJudge {
     return is_known && moved < kStillRatio * decided ? -still_weight_ * unit : 0.0F;
   }
 
-  /// Writes one verdict per supervoxel. `may_presume`: allows kPresumed, for provisional verdicts.
-  /// Calls `on_removed(instance)` for each instance that is
-  /// removed as a whole.
+  /// Writes one verdict per supervoxel. `may_presume`: for provisional verdicts; allows kPresumed,
+  /// and kAlongTrack for an instance that merges a mover with what stands beside it. Calls
+  /// `on_removed(instance)` for each instance that is removed as a whole.
   template <class OnRemoved>
   void judge(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
              bool may_presume, std::vector<Verdict>& verdicts, OnRemoved&& on_removed) {
@@ -192,8 +192,20 @@ class InstanceJudge {
     if (!use_tracks_ || !evidence.tracked.shapes[instance].carried) return Cause::kNoEvidence;
     const float along_track = evidence.tracked.instances[instance].track_log_odds();
     level = std::max(level, along_track);
-    if (along_track >= track_level_) return Cause::kAlongTrack;
+    const bool is_of_track = may_presume || !is_mostly_standing(evidence, instance);
+    if (along_track >= track_level_ && is_of_track) return Cause::kAlongTrack;
     return may_presume && is_presumed(evidence, instance) ? Cause::kPresumed : Cause::kNoEvidence;
+  }
+
+  // Whether an instance longer than a car merges a mover with what stands beside it: most of its
+  // samples are decided, some of these moved, and more stand. Its track is that of the mover.
+  static bool is_mostly_standing(const InstanceEvidence& evidence, std::size_t instance) {
+    constexpr float kLongestCar = 9.0F;  // m, also with a trailer
+    const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
+    const auto moved = static_cast<float>(counts.moved);
+    return evidence.tracked.shapes[instance].length > kLongestCar &&
+           2 * counts.decided >= counts.total && 2 * counts.moved < counts.decided &&
+           moved >= kStillRatio * static_cast<float>(counts.decided);
   }
 
   // Whether half of the decided samples of an instance moved, or enough of those of its track: few
