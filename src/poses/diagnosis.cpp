@@ -12,31 +12,19 @@
 #include <utility>
 
 #include "agreement_sum.hpp"
-#include "dynains/voxels/voxel_hash_table.hpp"
 #include "io/finite_points.hpp"
 #include "io/median.hpp"
 #include "io/text.hpp"
+#include "landmarks.hpp"
 #include "pose_diagnosis.hpp"
 #include "pose_shift.hpp"
 
 namespace dynains {
 namespace {
 
-constexpr std::size_t kPairs = 8;       // pairs of scans that are compared
-constexpr std::size_t kStride = 5;      // from one scan of a pair to the other
-constexpr double kFast = 2.0;           // m from scan to scan; overlap of pairs is small beyond it
-constexpr std::size_t kQueries = 1200;  // points of a scan that are compared
-constexpr double kAgreeing = 0.3;       // m
-constexpr double kFarthestGap = 1.0;    // m
-
-/// Number of a cell of a grid around the sensor; cells above each other have consecutive numbers.
-std::uint64_t cell_of(const Eigen::Vector3d& p, double edge) {
-  std::uint64_t key = 0;
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    key = key << 16U | static_cast<std::uint64_t>(std::floor(p[axis] / edge) + 4096.0);
-  }
-  return key;
-}
+constexpr std::size_t kPairs = 8;   // pairs of scans that are compared
+constexpr std::size_t kStride = 5;  // from one scan of a pair to the other
+constexpr double kFast = 2.0;       // m from scan to scan; overlap of pairs is small beyond it
 
 Landmarks landmarks_of(const Recording& recording, std::size_t i, RecordedScan& scan) {
   recording.read_scan(i, scan);
@@ -356,69 +344,6 @@ SampledPairs sample_pairs(const Recording& recording, ScanSample& sample) {
   if (result.pairs.empty() && recording.size() > 0) sample.read(0);
   return result;
 }
-
-}  // namespace
-
-Landmarks::Landmarks(PointsView points, const Mounting& mounting, double farthest)
-    : farthest_(farthest) {
-  constexpr double kNearest = 2.0;     // m; nearer points belong to the own vehicle
-  constexpr double kOverGround = 0.5;  // m; ground agrees under every motion along it
-  constexpr double kThinned = 0.25;    // m
-  VoxelHashTable<> occupied;
-  std::vector<std::pair<std::uint64_t, Eigen::Vector3d>> kept;  // the first point of each cell
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3d p(points.x[i], points.y[i], points.z[i]);
-    const double range = p.norm();
-    if (!(range > kNearest && range < farthest)) continue;
-    if (mounting.known && mounting.up_sensor.dot(p) + mounting.height < kOverGround) continue;
-    const std::uint64_t cell = cell_of(p, kThinned);
-    const bool is_first = occupied.insert(cell) + 1 > kept.size();
-    if (is_first) kept.emplace_back(cell, p);
-  }
-  const auto by_cell = [](const auto& a, const auto& b) { return a.first < b.first; };
-  std::sort(kept.begin(), kept.end(), by_cell);
-  for (auto& [cell, p] : kept) cell = cell_of(p, kFarthestGap);
-  std::stable_sort(kept.begin(), kept.end(), by_cell);
-  for (const auto& [cell, p] : kept) {
-    cells_.push_back(cell);
-    points_.push_back(p);
-  }
-}
-
-double Landmarks::distance_to(const Eigen::Vector3d& p) const {
-  if (!(p.cwiseAbs().maxCoeff() < farthest_ + kFarthestGap)) return kFarthestGap;
-  double squared = kFarthestGap * kFarthestGap;
-  for (const double x : {-kFarthestGap, 0.0, kFarthestGap}) {
-    for (const double y : {-kFarthestGap, 0.0, kFarthestGap}) {
-      // Three cells above each other have consecutive numbers.
-      const std::uint64_t middle = cell_of(p + Eigen::Vector3d(x, y, 0.0), kFarthestGap);
-      auto cell = std::lower_bound(cells_.begin(), cells_.end(), middle - 1);
-      for (; cell != cells_.end() && *cell <= middle + 1; ++cell) {
-        const Eigen::Vector3d& q = points_[static_cast<std::size_t>(cell - cells_.begin())];
-        squared = std::min(squared, (p - q).squaredNorm());
-      }
-    }
-  }
-  return std::sqrt(squared);
-}
-
-Agreement Landmarks::compare(const Landmarks& other, const Pose& T_this_other) const {
-  if (points_.empty() || other.points_.empty()) return {};
-  const std::size_t step = std::max<std::size_t>(1, other.points_.size() / kQueries);
-  std::size_t close = 0;
-  std::size_t count = 0;
-  double sum = 0.0;
-  for (std::size_t i = 0; i < other.points_.size(); i += step) {
-    const double gap = distance_to(T_this_other * other.points_[i]);
-    sum += gap;
-    if (gap < kAgreeing) ++close;
-    ++count;
-  }
-  return {static_cast<double>(close) / static_cast<double>(count), sum / static_cast<double>(count),
-          count};
-}
-
-namespace {
 
 /// Diagnosis by the agreement of scans.
 Diagnosis diagnose_agreement(const Recording& recording) {

@@ -11,6 +11,7 @@
 #include "cell_surfaces.hpp"
 #include "io/finite_points.hpp"
 #include "io/median.hpp"
+#include "landmarks.hpp"
 #include "scan_registration.hpp"
 #include "way_search.hpp"
 

@@ -7,6 +7,7 @@
 
 #include "agreement_sum.hpp"
 #include "io/finite_points.hpp"
+#include "landmarks.hpp"
 #include "merged_scans.hpp"
 
 namespace dynains {

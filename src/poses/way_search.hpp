@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "dynains/pose.hpp"
-#include "dynains/poses/diagnosis.hpp"
+#include "landmarks.hpp"
 
 namespace dynains {
 

@@ -23,28 +23,6 @@ struct Agreement {
   std::size_t points = 0;  ///< number of compared points
 };
 
-/// Points of one scan for the comparison with other scans: above the ground, 2 m to `farthest` from
-/// the sensor, one per voxel of 0.25 m.
-class Landmarks {
- public:
-  /// `points`: m, sensor frame. If `mounting` is known, points near the ground are excluded.
-  /// `farthest`: m, (2, 1000].
-  Landmarks(PointsView points, const Mounting& mounting, double farthest = 40.0);
-
-  std::size_t size() const { return points_.size(); }
-  const std::vector<Eigen::Vector3d>& points() const { return points_; }
-  /// Agreement of `other` with this scan under the pose `T_this_other`. It is symmetric except for
-  /// occlusion.
-  Agreement compare(const Landmarks& other, const Pose& T_this_other) const;
-  /// Distance from `p` (m, sensor frame) to the nearest point, m, at most 1.
-  double distance_to(const Eigen::Vector3d& p) const;
-
- private:
-  double farthest_;
-  std::vector<std::uint64_t> cells_;  // voxel (1 m) of each point, ascending
-  std::vector<Eigen::Vector3d> points_;
-};
-
 /// Agreement under one pose convention.
 struct PoseReading {
   std::string meaning;  ///< for messages, for example "the poses are inverse ..."
