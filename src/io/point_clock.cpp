@@ -13,6 +13,7 @@ constexpr double kUnits[] = {1.0, 1e-3, 1e-6, 1e-9};
 constexpr double kAbsolute = 10.0;       // s; larger times count from the origin of stamps
 constexpr double kUsualPeriod = 0.1;     // s
 constexpr double kShortestShare = 0.05;  // of the interval between scans
+constexpr double kNoGap = 0.125;         // s; scans that are farther apart may be some of all scans
 
 bool has_return(const float* xyz) {
   const float sum = std::abs(xyz[0]) + std::abs(xyz[1]) + std::abs(xyz[2]);
@@ -33,6 +34,60 @@ std::vector<double> times_with_return(const RecordedScan& scan) {
 
 /// In s, rounded to us.
 std::string rounded(double period) { return text::to_text(1e-6 * std::round(1e6 * period)); }
+
+/// Ratio of neighbours in `times` that are more than a tenth of `span` apart: 0.8 if times are
+/// random.
+double share_of_leaps(const std::vector<double>& times, double span) {
+  std::size_t leaps = 0;
+  for (std::size_t k = 1; k < times.size(); ++k) {
+    leaps += std::abs(times[k] - times[k - 1]) > 0.1 * span ? 1 : 0;
+  }
+  return times.size() < 2 ? 0.0
+                          : static_cast<double>(leaps) / static_cast<double>(times.size() - 1);
+}
+
+struct DirectedTime {
+  float azimuth;  // rad
+  double time;
+};
+
+/// Some of the points with a return, by azimuth.
+std::vector<DirectedTime> times_by_direction(const RecordedScan& scan) {
+  constexpr std::size_t kMost = 4096;
+  const std::size_t step = 1 + scan.time.size() / kMost;
+  std::vector<DirectedTime> times;
+  for (std::size_t k = 0; k < scan.time.size(); k += step) {
+    const float* const xyz = scan.xyzi.data() + 4 * k;
+    if (!std::isfinite(scan.time[k]) || !has_return(xyz)) continue;
+    times.push_back({std::atan2(xyz[1], xyz[0]), scan.time[k]});
+  }
+  std::sort(times.begin(), times.end(),
+            [](const DirectedTime& a, const DirectedTime& b) { return a.azimuth < b.azimuth; });
+  return times;
+}
+
+/// Whether times follow neither the order of the points, as in files of drivers, nor their azimuth,
+/// as those of a spinning sensor do in any order.
+bool are_random(const std::vector<double>& times, const std::vector<DirectedTime>& by_direction,
+                double span) {
+  constexpr double kMostLeaps = 0.5;
+  constexpr std::size_t kFewest = 100;
+  if (by_direction.size() < kFewest || !(share_of_leaps(times, span) > kMostLeaps)) return false;
+  std::vector<double> directed;
+  for (const DirectedTime& one : by_direction) directed.push_back(one.time);
+  return share_of_leaps(directed, span) > kMostLeaps;
+}
+
+/// Whether no sector of 30 deg is empty.
+bool are_all_around(const std::vector<DirectedTime>& by_direction) {
+  constexpr float kSector = 3.1415927F / 6.0F;
+  float before = -3.1415927F;
+  for (const DirectedTime& one : by_direction) {
+    if (one.azimuth - before > kSector) return false;
+    before = one.azimuth;
+  }
+  return !by_direction.empty() && 3.1415927F - before <= kSector;
+}
 
 PointTimes range_of(const std::vector<double>& times, double least, double most) {
   PointTimes range{std::numeric_limits<double>::infinity(),
@@ -61,7 +116,12 @@ PointTimes times_of_scan(const RecordedScan& scan, const PointClock& clock) {
 void PointClockSearch::add(double stamp, const RecordedScan& scan) {
   Sample sample{stamp, times_with_return(scan)};
   if (sample.times.empty()) return;
+  const std::vector<double> in_order = sample.times;
   std::sort(sample.times.begin(), sample.times.end());
+  const std::vector<DirectedTime> by_direction = times_by_direction(scan);
+  sample.is_all_around = are_all_around(by_direction);
+  sample.is_random =
+      are_random(in_order, by_direction, sample.quantile(0.95) - sample.quantile(0.05));
   points_ += sample.times.size();
   samples_.push_back(std::move(sample));
 }
@@ -113,7 +173,6 @@ bool PointClockSearch::is_share() const {
 }
 
 std::optional<double> PointClockSearch::find_unit() const {
-  constexpr double kNoGap = 0.125;  // s; scans that are farther apart may be some of all scans
   // Scans with a given unit may have more garbage.
   const auto fits = [this](double unit) { return 10 * count_outside(unit) <= points_; };
   if (unit_ > 0.0) {
@@ -148,6 +207,33 @@ std::string PointClockSearch::outside_text(double unit) const {
          ", with the median " + text::to_text(sample.median()) + ")";
 }
 
+bool PointClockSearch::do_most(bool Sample::*property) const {
+  const auto count = std::count_if(samples_.begin(), samples_.end(),
+                                   [&](const Sample& sample) { return sample.*property; });
+  return 2 * static_cast<std::size_t>(count) > samples_.size();
+}
+
+std::string PointClockSearch::random_text() const {
+  if (!do_most(&Sample::is_random)) return {};
+  return "times of points follow neither the order of the points nor their direction, as garbage "
+         "does; if they are none, the points were sorted";
+}
+
+/// A remark on scans that take another time than the sensor has from scan to scan.
+std::string PointClockSearch::duration_text(double unit) const {
+  constexpr double kMiddle = 0.9;     // of the points, as in duration()
+  constexpr double kLongest = 1.15;   // of the interval between scans
+  constexpr double kShortest = 0.45;  // likewise, if every second scan of a sensor was recorded
+  const double whole = duration(unit) / kMiddle;
+  const bool is_long = whole > kLongest * period_;
+  const bool is_short =
+      do_most(&Sample::is_all_around) && period_ <= kNoGap && whole < kShortest * period_;
+  if (!(period_ > 0.0) || !(is_long || is_short)) return {};
+  return "times of points in units of " + text::to_text(unit) + " s give a scan " +
+         (is_short ? "all around " : "") + "that takes " + rounded(whole) + " s, but scans are " +
+         rounded(period_) + " s apart: see --point-time-unit for another unit";
+}
+
 PointClockFinding PointClockSearch::result() const {
   if (samples_.empty()) return {std::nullopt, "found no point with a return and a finite time"};
   const std::string option =
@@ -169,12 +255,17 @@ PointClockFinding PointClockSearch::result() const {
   clock.longest_scan = longest_scan();
   const Sample& sample = samples_[samples_.size() / 2];
   clock.is_absolute = std::abs(clock.unit * sample.median()) > kAbsolute;
-  const std::string outside = outside_text(clock.unit);
   std::string text;
+  const auto add = [&](const std::string& remark) {
+    if (!remark.empty()) text += (text.empty() ? "" : "; ") + remark;
+  };
   if (clock.unit == period_ && !(unit_ > 0.0) && is_share()) {
-    text = "times of points from 0 to 1 count as shares of a scan of " + rounded(period_) + " s";
+    add("times of points from 0 to 1 count as shares of a scan of " + rounded(period_) + " s");
   }
-  if (!outside.empty()) text += (text.empty() ? "" : "; ") + outside + ": they keep their place";
+  const std::string outside = outside_text(clock.unit);
+  if (!outside.empty()) add(outside + ": they keep their place");
+  add(random_text());
+  add(duration_text(clock.unit));
   return {clock, text};
 }
 

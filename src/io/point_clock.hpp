@@ -66,7 +66,9 @@ class PointClockSearch {
   /// One scan of the sample.
   struct Sample {
     double stamp;
-    std::vector<double> times;  ///< of points with a return, ascending
+    std::vector<double> times;   ///< of points with a return, ascending
+    bool is_random = false;      ///< times follow neither the order nor the direction of points
+    bool is_all_around = false;  ///< points lie in all directions
 
     double quantile(double share) const;
     double median() const { return quantile(0.5); }
@@ -80,6 +82,9 @@ class PointClockSearch {
   std::optional<double> find_unit() const;
   std::string found() const;
   std::string outside_text(double unit) const;
+  std::string random_text() const;
+  std::string duration_text(double unit) const;
+  bool do_most(bool Sample::*property) const;
 
   double period_;
   double unit_;

@@ -181,6 +181,68 @@ TEST_CASE("Times that cannot be those of the scan are counted up to a tenth, and
   CHECK(finding.text.empty());
 }
 
+/// A scan of 360 points around the sensor, the first one behind it, in order or not. `share`: of a
+/// turn that the points cover; `stored(azimuth, share)` gives the time of the point at this share
+/// of the scan.
+PointClockFinding find_around(bool is_sorted, double share, double unit,
+                              const std::function<double(std::size_t, double)>& stored,
+                              double period = kPeriod) {
+  std::vector<double> times;
+  for (int i = 0; i < 8; ++i) times.push_back(kStart + period * i);
+  RecordedScan scan;
+  constexpr std::size_t kAround = 360;
+  for (std::size_t k = 0; k < kAround; ++k) {
+    const std::size_t at = is_sorted ? k : 89 * k % kAround;
+    const double turn = static_cast<double>(at) / kAround;
+    const double azimuth = 2.0 * M_PI * share * turn - M_PI;
+    for (const double value : {9.0 * std::cos(azimuth), 9.0 * std::sin(azimuth), 0.0, 0.5}) {
+      scan.xyzi.push_back(static_cast<float>(value));
+    }
+    scan.time.push_back(stored(k, turn));
+  }
+  return find_clock(times, true, unit, [&](std::size_t) -> const RecordedScan& { return scan; });
+}
+
+TEST_CASE("Times that follow neither order nor direction of the points are told") {
+  const auto by_direction = [](std::size_t, double turn) { return 0.0995 * turn; };
+  const auto by_order = [](std::size_t k, double) { return 0.0995 * static_cast<double>(k) / 360; };
+  const auto random = [](std::size_t k, double) {
+    return 0.0995 * static_cast<double>(211 * k % 360) / 360;
+  };
+  CHECK(find_around(true, 1.0, 0.0, by_direction).text.empty());
+  CHECK(find_around(false, 1.0, 0.0, by_direction).text.empty());
+  CHECK(find_around(false, 1.0, 0.0, by_order).text.empty());
+  for (const bool is_sorted : {true, false}) {
+    const PointClockFinding finding = find_around(is_sorted, 1.0, 0.0, random);
+    REQUIRE(finding.clock);
+    CHECK_THAT(finding.text, StartsWith("times of points follow neither the order"));
+  }
+}
+
+TEST_CASE("Scans that take another time than the interval of scans are told") {
+  const auto of_duration = [](double duration, double unit = 1.0) {
+    return [=](std::size_t, double turn) { return duration * turn / unit; };
+  };
+  for (const double duration : {0.05, 0.0995, 0.11}) {
+    CHECK(find_around(true, 1.0, 0.0, of_duration(duration)).text.empty());
+  }
+  for (const double duration : {0.01, 0.04, 0.13}) {
+    const PointClockFinding finding = find_around(true, 1.0, 0.0, of_duration(duration));
+    REQUIRE(finding.clock);
+    CHECK_THAT(finding.text, StartsWith("times of points in units of 1 s give a scan"));
+  }
+  // Hundredths of a second look like milliseconds.
+  CHECK_THAT(find_around(true, 1.0, 0.0, of_duration(0.0995, 0.01)).text,
+             StartsWith("times of points in units of 0.001 s"));
+  CHECK(find_around(true, 1.0, 0.01, of_duration(0.0995, 0.01)).text.empty());
+  // A unit that is given is told, too.
+  CHECK_THAT(find_around(true, 1.0, 1e-4, of_duration(0.0995, 1e-3)).text,
+             StartsWith("times of points in units of"));
+  // A quarter of a turn takes a quarter of the time, and keyframes are farther apart.
+  CHECK(find_around(true, 0.25, 0.0, of_duration(0.025)).text.empty());
+  CHECK(find_around(true, 1.0, 0.0, of_duration(0.0995), 1.0).text.empty());
+}
+
 TEST_CASE("Files are de-skewed by times of any unit, and garbage keeps its place") {
   const TemporaryFolder folder;
   const fs::path drive = folder / "drive";
