@@ -57,6 +57,16 @@ void clear_boxes(const std::vector<Eigen::AlignedBox3d>& boxes, RecordedScan& sc
   }
 }
 
+/// Classes of SemanticKITTI for intensities 0 and 1.
+std::vector<std::uint32_t> labels_of_intensity(const RecordedScan& scan) {
+  constexpr std::uint32_t kOtherObject = 99, kMovingOtherVehicle = 259;
+  std::vector<std::uint32_t> labels;
+  for (std::size_t k = 3; k < scan.xyzi.size(); k += 4) {
+    labels.push_back(scan.xyzi[k] > 0.0F ? kMovingOtherVehicle : kOtherObject);
+  }
+  return labels;
+}
+
 }  // namespace
 
 std::vector<Eigen::AlignedBox3d> parse_self_boxes(const std::string& text) {
@@ -329,6 +339,26 @@ void Recording::find_columns() {
   columns_ = reader_->columns(address(0));
   if (columns_.label) labels_ = Labels::kColumn;
   if (is_folder(folder_ / "labels")) labels_ = Labels::kFiles;
+  if (labels_ != Labels::kNone || !has_labels_as_intensity()) return;
+  labels_ = Labels::kIntensity;
+  notes_.push_back("intensity 1 labels moving points, 0 static ones");
+}
+
+/// Whether some scans in the form of DynamicMap_Benchmark have the intensities 0 and 1, and no
+/// others.
+bool Recording::has_labels_as_intensity() const {
+  if (!has_viewpoints_ || !columns_.intensity) return false;
+  bool has_moving = false, has_static = false;
+  RecordedScan scan;
+  for (const std::size_t i : {std::size_t{0}, size() / 2, size() - 1}) {
+    reader_->read(address(i), nullptr, scan);
+    for (std::size_t k = 3; k < scan.xyzi.size(); k += 4) {
+      const float intensity = scan.xyzi[k];
+      if (intensity != 0.0F && intensity != 1.0F) return false;
+      (intensity == 1.0F ? has_moving : has_static) = true;
+    }
+  }
+  return has_moving && has_static;
 }
 
 ScanAddress Recording::address(std::size_t i) const {
@@ -404,6 +434,7 @@ RecordedScan Recording::read_scan(std::size_t i) const {
 }
 
 std::vector<std::uint32_t> Recording::read_labels(std::size_t i) const {
+  if (labels_ == Labels::kIntensity) return labels_of_intensity(read_scan(i));
   if (labels_ != Labels::kFiles) return reader_->read_labels(address(i));
   return dynains::read_labels(folder_ / "labels" / (name(i) + ".label"), point_count(i));
 }

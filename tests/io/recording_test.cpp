@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -69,6 +70,35 @@ TEST_CASE("Scans in the world frame with VIEWPOINT come back in the sensor frame
   CHECK(scan.xyzi[3] == 0.5F);
   CHECK(scan.ring == std::vector<std::uint16_t>{1, 2, 3});
   CHECK(scan.time == std::vector<double>{7.25, 7.25, 7.25});
+}
+
+TEST_CASE("Intensities 0 and 1 of scans with VIEWPOINT are labels, others are not") {
+  const auto labelled = [](const std::string& intensities, const std::string& viewpoint) {
+    std::string text =
+        "VERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH "
+        "3\nHEIGHT 1\nVIEWPOINT " +
+        viewpoint + "\nPOINTS 3\nDATA ascii\n";
+    std::istringstream values(intensities);
+    for (std::string value; values >> value;) text += "100 0 0 " + value + '\n';
+    return text;
+  };
+  const std::string placed = "100 0 0 1 0 0 0";
+  const auto labels_of = [&](const std::string& first, const std::string& second) {
+    const TemporaryFolder folder;
+    write_text(folder / "pcd/1.pcd", labelled(first, placed));
+    write_text(folder / "pcd/2.pcd", labelled(second, placed));
+    const Recording recording(folder.path());
+    return recording.has_labels() ? recording.read_labels(1) : std::vector<std::uint32_t>();
+  };
+  CHECK(labels_of("0 0 0", "0 1 0") == std::vector<std::uint32_t>{99, 259, 99});
+  CHECK(labels_of("0 0 0", "0 0.5 1").empty());
+  CHECK(labels_of("0 0 0", "0 0 0").empty());
+  CHECK(labels_of("1 1 1", "1 1 1").empty());
+
+  const TemporaryFolder folder;
+  write_text(folder / "pcd/1.pcd", labelled("0 1 0", "0 0 0 1 0 0 0"));
+  write_text(folder / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  CHECK_FALSE(Recording(folder.path()).has_labels());
 }
 
 TEST_CASE(

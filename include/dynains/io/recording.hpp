@@ -154,7 +154,8 @@ struct ScanAddress;
 /// With a sensor origin, points and poses are those of a frame at the sensor, with the axes of the
 /// clouds.
 ///
-/// Labels (SemanticKITTI classes) are in labels/NAME.label or in a column `label`.
+/// Labels (SemanticKITTI classes) are in labels/NAME.label or in a column `label`. In PCD scans with
+/// VIEWPOINT whose intensities are 0 and 1 alone, as in DynamicMap_Benchmark, 1 means moving.
 ///
 /// All members throw IoError with path, position and expected content.
 class Recording {
@@ -220,6 +221,7 @@ class Recording {
   std::vector<std::uint32_t> read_labels(std::size_t i) const;
 
   // Members for comparisons with other conventions.
+  const RecordingOptions& options() const { return options_; }
   const PoseConvention& convention() const { return options_.convention; }
   double time_offset() const { return options_.time_offset; }
   /// Pose of scan i under another convention; empty if its shift leads out of the trajectory.
@@ -245,7 +247,7 @@ class Recording {
     std::size_t match = 0;  ///< index in matches_
     Pose T_world_sensor = Pose::Identity();
   };
-  enum class Labels { kNone, kFiles, kColumn };
+  enum class Labels { kNone, kFiles, kColumn, kIntensity };
 
   void open_log();
   void take_sensor_frame(const LogScans& log);
@@ -273,6 +275,7 @@ class Recording {
   void match_times(const std::filesystem::path& poses_file, const std::vector<double>& times);
   void place_scans(const std::filesystem::path& poses);
   void find_columns();
+  bool has_labels_as_intensity() const;
   Pose pose_of(const PoseConvention& convention, const TrajectoryMatch& match) const;
   PointFrame guess_frame() const;
   Pose to_sensor_pose(const PoseConvention& convention, const Pose& pose) const;
