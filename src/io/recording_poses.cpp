@@ -355,9 +355,20 @@ void Recording::note_rows(const fs::path& file) {
     notes_.push_back("poses belong to scans one by one");
     return;
   }
-  notes_.push_back(std::to_string(rows) + " poses for " + std::to_string(scans_.size()) +
-                   " scans in " + shown(file, folder_) +
-                   ": row N belongs to the scan with number N, counted from 0");
+  const std::string text = std::to_string(rows) + " poses for " + std::to_string(scans_.size()) +
+                           " scans in " + shown(file, folder_) +
+                           ": row N belongs to the scan with number N, counted from 0";
+  // Scans with numbers of their own have gaps, or begin elsewhere; many more rows are those of a
+  // longer recording.
+  const bool may_be_renumbered = scans_.front().number <= 1 &&
+                                 scans_.back().number - scans_.front().number + 1 == scans_.size();
+  if (may_be_renumbered && 2 * rows <= 3 * scans_.size()) {
+    warnings_.push_back(text +
+                        "; if clouds were lost and the others renumbered, poses are wrong "
+                        "behind the loss");
+  } else {
+    notes_.push_back(text);
+  }
 }
 
 /// Matches scans to the times of their rows plus the offset.

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "agreement_sum.hpp"
+#include "dynains/errors.hpp"
 #include "io/finite_points.hpp"
 #include "io/median.hpp"
 #include "io/text.hpp"
@@ -407,9 +408,10 @@ bool seems_in_world(const Recording& recording) {
   return near_origin == 0 && valid > 0 && 2 * near_sensor > valid;
 }
 
-}  // namespace
+constexpr const char* kDeskewOption = "--deskew";
 
-Diagnosis diagnose(const Recording& recording) {
+/// Diagnosis of the poses, without that of the rays.
+Diagnosis diagnose_poses(const Recording& recording) {
   Diagnosis d = diagnose_agreement(recording);
   if (d.verdict == PoseVerdict::kUnknown && seems_in_world(recording)) {
     d.verdict = PoseVerdict::kDisagree;
@@ -418,6 +420,39 @@ Diagnosis diagnose(const Recording& recording) {
   }
   compare_with_registration(recording, d);
   accept_proven_poses(recording, d);
+  return d;
+}
+
+/// Whether scans that do not agree as they are would agree if their points were de-skewed.
+bool would_agree_deskewed(const Recording& recording, const Diagnosis& d) {
+  const bool is_doubted =
+      d.verdict == PoseVerdict::kOtherwise || d.verdict == PoseVerdict::kBodyFrame ||
+      d.verdict == PoseVerdict::kTimeOffset || d.verdict == PoseVerdict::kScaled ||
+      d.verdict == PoseVerdict::kInexact || d.verdict == PoseVerdict::kDisagree;
+  const bool may_be_skewed = recording.columns().time && !recording.is_deskewed() &&
+                             recording.frame() == PointFrame::kSensor;
+  if (!is_doubted || !may_be_skewed) return false;
+  RecordingOptions options = recording.options();
+  options.deskew = true;
+  try {
+    const Recording deskewed(recording.folder(), options);
+    return diagnose_poses(deskewed).verdict == PoseVerdict::kAgree;
+  } catch (const IoError&) {
+    return false;  // the times of its points cannot be used
+  }
+}
+
+}  // namespace
+
+Diagnosis diagnose(const Recording& recording) {
+  Diagnosis d = diagnose_poses(recording);
+  if (would_agree_deskewed(recording, d)) {
+    d.verdict = PoseVerdict::kSkewed;
+    d.convention = recording.convention();
+    d.time_offset = recording.time_offset();
+    d.option = kDeskewOption;
+    return d;
+  }
   if (d.sound() && d.scans > 0) d.ray_origin = find_ray_origin(recording, 0, d.scans - 1);
   if (d.ray_origin) {
     d.verdict = PoseVerdict::kRayOrigin;
@@ -499,6 +534,18 @@ std::string advice(const Diagnosis& d) {
     case PoseVerdict::kTimeOffset:
       return "Scans agree better under the poses " + fixed(std::abs(d.time_offset), 3) + " s " +
              (d.time_offset > 0.0 ? "after" : "before") + " their times: pass " + d.option + ".";
+    case PoseVerdict::kScaled:
+      return "Scans agree if all ways of the poses are " + fixed(d.convention.scale, 3) +
+             " times as long, as after an odometry with a wrong radius of wheels: pass " +
+             d.option + ".";
+    case PoseVerdict::kLostScans:
+      return std::string(d.lost_scans->shift > 0 ? "Clouds" : "Poses") +
+             " seem to be missing between the scans " + std::to_string(d.lost_scans->first) +
+             " and " + std::to_string(d.lost_scans->last) +
+             " (counted from 0): behind, scans agree with the poses " +
+             std::to_string(std::abs(d.lost_scans->shift)) + " rows " +
+             (d.lost_scans->shift > 0 ? "later" : "earlier") +
+             ". Give scans and poses times, or scans the numbers of their rows.";
     case PoseVerdict::kInexact:
       if (d.is_inexact_at_start) {
         return "Scans and poses agree, but the poses of the first scans are inexact by about " +
@@ -509,6 +556,11 @@ std::string advice(const Diagnosis& d) {
       }
       return "Scans and poses agree roughly, but the poses are inexact by about " + error_text(d) +
              ": expect losses; poses of a LiDAR odometry would do better.";
+    case PoseVerdict::kSkewed:
+      return std::string(
+                 "Scans agree if their points are moved to the place of the sensor at the time of "
+                 "the scan: pass ") +
+             kDeskewOption + ".";
     case PoseVerdict::kRayOrigin:
       return advice(*d.ray_origin);
     case PoseVerdict::kNoMotion:

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "dynains/io/extrinsic.hpp"
+#include "io/median.hpp"
+#include "lost_scans.hpp"
 #include "merged_scans.hpp"
 #include "pose_fit.hpp"
 #include "pose_proof.hpp"
@@ -187,6 +189,52 @@ std::optional<Explanation> explain_by_offset(const Recording& recording,
   return result;
 }
 
+/// Factor of the translations under which most motions agree; 1 without motion.
+double fitted_scale(const std::vector<RegisteredMotion>& motions, const BodyMotion& body) {
+  constexpr double kLeastWay = 0.2;  // m
+  std::vector<double> scales;
+  for (const RegisteredMotion& motion : motions) {
+    const auto T_body = body(motion);
+    if (!T_body || !(T_body->translation().norm() > kLeastWay)) continue;
+    const Eigen::Vector3d way = T_body->translation();
+    scales.push_back(way.dot(motion.T_first_second.translation()) / way.squaredNorm());
+  }
+  return scales.empty() ? 1.0 : median(std::move(scales));
+}
+
+/// Ways that are too long or too short throughout, as by a wrong radius of wheels.
+std::optional<Explanation> explain_by_scale(const Recording& recording,
+                                            const std::vector<RegisteredMotion>& motions,
+                                            double before) {
+  constexpr double kLeastFactor = 0.5;
+  const auto scaled = [&](double factor) {
+    PoseConvention convention = recording.convention();
+    convention.scale = std::clamp(convention.scale * factor, kLeastPoseScale, kLargestPoseScale);
+    return convention;
+  };
+  const auto error_under = [&](const std::vector<RegisteredMotion>& some, double factor) {
+    return error_at_points(some, motion_under(recording, scaled(factor)));
+  };
+  const BodyMotion given = motion_under(recording, recording.convention());
+  const double of_half = fitted_scale(half_of(motions, 0), given);
+  if (!is_much_better(error_under(half_of(motions, 1), of_half), before)) return std::nullopt;
+  // Three digits: more are not known.
+  const double factor = std::round(1e3 * fitted_scale(motions, given)) / 1e3;
+  Explanation result;
+  result.verdict = PoseVerdict::kScaled;
+  result.error = error_under(motions, factor);
+  // Ways of nearly nothing agree with a sensor that stands, and with points of the world.
+  const bool is_usual = kLeastFactor < factor && factor < 1.0 / kLeastFactor;
+  const bool is_motion = result.error < 0.5 * error_at_points(motions, no_motion);
+  if (!is_usual || !is_motion || !is_much_better(result.error, before)) return std::nullopt;
+  result.convention = scaled(factor);
+  result.time_offset = recording.time_offset();
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.4g", result.convention.scale);
+  result.option = std::string("--pose-scale ") + text;
+  return result;
+}
+
 /// The usual mistake under which poses and motions agree best; it becomes the first of `readings`.
 std::optional<Explanation> explain_by_reading(const Recording& recording,
                                               const std::vector<RegisteredMotion>& motions,
@@ -265,6 +313,11 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
     d.verdict = PoseVerdict::kDisagree;
   }
   const double exact = std::max(kExact, 2.0 * all.noise);
+  d.lost_scans = find_lost_scans(recording, motions, exact);
+  if (d.lost_scans) {
+    d.verdict = PoseVerdict::kLostScans;
+    return;
+  }
   d.translation_error = steps.translation;
   d.rotation_error = steps.rotation;
   d.registered_pairs = steps.pairs;
@@ -273,19 +326,20 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
   if (before > kExact) {
     auto reading = explain_by_reading(recording, motions, d.readings, before);
     std::optional<Explanation> offset;
-    std::optional<Explanation> body;
+    std::optional<Explanation> scale, body;
     if (before > exact) {
       offset = explain_by_offset(recording, motions, before);
+      scale = explain_by_scale(recording, motions, before);
       body = explain_by_body(recording, motions, before);
     }
     // A shift by scans is a coarse offset.
     const bool is_shift = reading && reading->convention.shift != recording.convention().shift;
     if (is_shift && offset && offset->error < reading->error) reading.reset();
     const Explanation* best = nullptr;
-    // In the order of fitted numbers: a usual mistake has none, an offset one, an extrinsic six. A
-    // later one must be clearly better.
-    for (const auto* candidate :
-         {&std::as_const(reading), &std::as_const(offset), &std::as_const(body)}) {
+    // In the order of fitted numbers: a usual mistake has none, a scale or an offset one, an
+    // extrinsic six. A later one must be clearly better.
+    for (const auto* candidate : {&std::as_const(reading), &std::as_const(scale),
+                                  &std::as_const(offset), &std::as_const(body)}) {
       if (!*candidate) continue;
       const bool is_better =
           best == nullptr || (best->error > exact && (*candidate)->error < 0.6 * best->error);

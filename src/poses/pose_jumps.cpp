@@ -135,6 +135,12 @@ std::string sentence_on(const Recording& recording, const std::vector<PoseJump>&
   }
   if (jumps.size() > kShown) text << " and " << jumps.size() - kShown << " more";
   text << "; scans are not compared across a large jump";
+  constexpr double kEven = 0.1;  // m at points 10 m away
+  const bool are_even = std::all_of(jumps.begin(), jumps.end(),
+                                    [](const PoseJump& jump) { return size_of(jump) < kEven; });
+  if (are_even) {
+    text << "; poses go on evenly there, so that clouds may be missing, or poses of other scans";
+  }
   return text.str();
 }
 

@@ -66,6 +66,12 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool 
       ->type_name("m|cm|mm")
       ->group(kGroup);
   command
+      .add_option("--pose-scale", pose_scale_,
+                  "factor of the translations, for an odometry with a wrong scale [1]")
+      ->check(CLI::Range(kLeastPoseScale, kLargestPoseScale))
+      ->type_name("N")
+      ->group(kGroup);
+  command
       .add_option("--quaternion-order", quaternion_,
                   "order of quaternions in the file [auto: as the form of the file has it]")
       ->check(is_name_of<QuaternionOrder>())
@@ -220,6 +226,7 @@ RecordingOptions RecordingFlags::options() const {
   convention.left_handed = left_handed_;
   convention.shift = shift_;
   convention.unit = metres_of(units_);
+  convention.scale = pose_scale_;
   convention.quaternion = value_of_name<QuaternionOrder>(quaternion_).value();
   convention.frame = value_of_name<PoseFrame>(pose_frame_).value();
   if (!extrinsic_.empty()) convention.T_body_sensor = read_extrinsic(extrinsic_);
@@ -236,9 +243,9 @@ RecordingOptions RecordingFlags::options() const {
 
 RecordingOptions RecordingFlags::options_without_poses() const {
   for (const char* const flag :
-       {"--poses", "--invert-poses", "--pose-units", "--quaternion-order", "--pose-frame",
-        "--left-handed-poses", "--pose-shift", "--extrinsic", "--time-offset", "--pose-gap",
-        "--pose-topic", "--pose-frame-id"}) {
+       {"--poses", "--invert-poses", "--pose-units", "--pose-scale", "--quaternion-order",
+        "--pose-frame", "--left-handed-poses", "--pose-shift", "--extrinsic", "--time-offset",
+        "--pose-gap", "--pose-topic", "--pose-frame-id"}) {
     if (command_->get_option(flag)->count() == 0) continue;
     throw ConfigError(std::string(flag) + " tells of given poses, which the odometry does not use");
   }

@@ -66,7 +66,8 @@ class RecordingFlags {
   std::string extrinsic_;
   std::string sensor_origin_;
   std::string sensor_frame_;
-  double time_offset_ = 0.0;           // s
+  double time_offset_ = 0.0;  // s
+  double pose_scale_ = 1.0;
   double pose_gap_ = kLongestPoseGap;  // s
   std::string cloud_topic_;
   std::string pose_topic_;

@@ -29,7 +29,7 @@ std::string to_origin(const py::handle& value) {
   return text;
 }
 
-const std::array<Setting<RecordingOptions>, 24> kRecordingSettings{{
+const std::array<Setting<RecordingOptions>, 25> kRecordingSettings{{
     {"poses", "a path",
      "file of poses: 12 numbers a row (KITTI), time x y z qx qy qz qw (TUM), or CSV with named "
      "columns",
@@ -43,6 +43,11 @@ const std::array<Setting<RecordingOptions>, 24> kRecordingSettings{{
     {"pose_units", "'m', 'cm' or 'mm'", "unit of the translations",
      [](RecordingOptions& o, const py::handle& v) {
        o.convention.unit = choose<double>(v, {{"m", 1.0}, {"cm", 0.01}, {"mm", 0.001}});
+     }},
+    {"pose_scale", "float in [0.1, 10]",
+     "factor of the translations, for an odometry with a wrong scale",
+     [](RecordingOptions& o, const py::handle& v) {
+       o.convention.scale = to_number(v, kLeastPoseScale, kLargestPoseScale);
      }},
     {"quaternion_order", "'auto', 'xyzw' or 'wxyz'", "order of quaternions in the file of poses",
      [](RecordingOptions& o, const py::handle& v) {

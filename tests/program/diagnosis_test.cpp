@@ -408,7 +408,11 @@ TEST_CASE("check tells if there are more poses than scans") {
   const Outcome outcome = start({"check", street.path()});
   CHECK(outcome.code == 0);
   CHECK_THAT(outcome.out, ContainsSubstring(" 30 poses for 24 scans in poses.txt: row N belongs to "
-                                            "the scan with number N, counted from 0\n"));
+                                            "the scan with number N, counted from 0; if clouds"));
+  poses.resize(60, poses.back());  // of a longer recording
+  write_poses(street.path() / "poses.txt", poses);
+  CHECK_THAT(start({"check", street.path()}).out,
+             !ContainsSubstring("if clouds were lost") && ContainsSubstring("counted from 0\n"));
 }
 
 TEST_CASE("check verifies the size of every scan file") {

@@ -259,3 +259,68 @@ TEST_CASE("check and run propose the mounting of a sensor that lies on its side"
   CHECK_THAT(drive.run().err, ContainsSubstring("tilted by 60 deg: pass --mounting-pitch "));
   CHECK(drive.run({"--mounting-pitch", "60"}).err.empty());
 }
+
+TEST_CASE("check names ways of the poses that are too long, and the factor") {
+  simulation::Config config;
+  config.sensor = simulation::Sensor::kOs1_64;
+  config.scans = 30;
+  config.seed = 41;
+  const Drive drive(config);
+  for (const double factor : {1.1, 0.9}) {
+    drive.pose([&](std::size_t, const Pose& T) {
+      Pose scaled = T;
+      scaled.translation() *= factor;
+      return scaled;
+    });
+    const Outcome outcome = start({"check", drive.path()});
+    CHECK(outcome.code == 1);
+    CHECK_THAT(outcome.out, ContainsSubstring("--pose-scale") &&
+                                ContainsSubstring(factor > 1.0 ? "0.909 times" : "1.11"));
+    CHECK(start({"check", drive.path(), "--pose-scale", std::to_string(1.0 / factor)}).code == 0);
+  }
+  CHECK(start({"check", drive.path(), "--pose-scale", "0.01"}).code == 2);
+}
+
+TEST_CASE("check proposes to de-skew points whose times explain what the poses do not") {
+  const TemporaryFolder folder;
+  const std::string path = folder / "drive";
+  REQUIRE(start({"simulate", path, "-q", "--format", "mcap", "--sensor", "os1-64", "--scans", "30",
+                 "--seed", "43", "--ego-speed", "12", "--rolling-shutter", "true"})
+              .code == 0);
+  const Outcome raw = start({"check", path});
+  CHECK(raw.code == 1);
+  CHECK_THAT(raw.out, ContainsSubstring("pass --deskew"));
+  const Outcome deskewed = start({"check", path, "--deskew"});
+  CHECK(deskewed.code == 0);
+  CHECK_THAT(deskewed.out, ContainsSubstring("agree as they are"));
+}
+
+TEST_CASE("check and run tell poses of other scans behind clouds that were lost") {
+  simulation::Config config;
+  config.scene = simulation::Scene::kHill;
+  config.sensor = simulation::Sensor::kOs1_64;
+  config.scans = 60;
+  config.seed = 7;
+  const Drive drive(config);
+  constexpr std::size_t kLost = 3, kFirst = 20;
+  for (std::size_t i = kFirst; i + kLost < drive.size(); ++i) {
+    fs::rename(drive.file_of(i + kLost), drive.file_of(i));
+  }
+  for (std::size_t i = drive.size() - kLost; i < drive.size(); ++i) fs::remove(drive.file_of(i));
+  // The rows of the poses are as many as the scans, or more.
+  for (const bool has_equal_rows : {true, false}) {
+    std::vector<Pose> rows;
+    for (std::size_t i = 0; i + (has_equal_rows ? kLost : 0) < drive.size(); ++i) {
+      rows.push_back(drive.scan(i).T_world_sensor);
+    }
+    write_poses(drive.path() + "/poses.txt", rows);
+    const Outcome outcome = start({"check", drive.path()});
+    CHECK(outcome.code == 1);
+    CHECK_THAT(outcome.out, ContainsSubstring("Clouds seem to be missing between the scans") &&
+                                ContainsSubstring("3 rows later"));
+    CHECK((outcome.out.find("if clouds were lost") == std::string::npos) == has_equal_rows);
+    const Outcome run = drive.run();
+    CHECK(run.code == 2);
+    CHECK_THAT(run.err, ContainsSubstring("Clouds seem to be missing"));
+  }
+}

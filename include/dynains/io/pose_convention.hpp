@@ -19,11 +19,16 @@ enum class PoseFrame {
 /// Names as in options.
 constexpr std::array<const char*, 3> value_names(PoseFrame) { return {"auto", "lidar", "camera"}; }
 
+/// Range of PoseConvention::scale.
+inline constexpr double kLeastPoseScale = 0.1;
+inline constexpr double kLargestPoseScale = 10.0;
+
 /// Conversion of the rows of a pose file to poses of the sensor in the world frame, m. By default,
 /// rows are used without conversion.
 struct PoseConvention {
   bool invert = false;       ///< rows are T_sensor_world
   double unit = 1.0;         ///< m per unit of translation, for example 0.001 for millimetres
+  double scale = 1.0;        ///< factor of translations, for an odometry with a wrong scale
   bool left_handed = false;  ///< the y axis of the poses is mirrored, as in some simulators
   PoseFrame frame = PoseFrame::kAuto;
   /// Order of the quaternions in the file; kNone: the order that its format defines.
@@ -45,7 +50,7 @@ inline Pose apply(const PoseConvention& convention, const Pose& row, QuaternionO
                                          : detail::Quaternion(q.z(), q.w(), q.x(), q.y());
     pose.linear() = other.normalized().toRotationMatrix();
   }
-  pose.translation() *= convention.unit;
+  pose.translation() *= convention.unit * convention.scale;
   if (convention.invert) pose = pose.inverse();
   if (convention.left_handed) {
     const Eigen::Vector3d mirror(1.0, -1.0, 1.0);

@@ -36,12 +36,22 @@ enum class PoseVerdict {
   kOtherwise,   ///< scans agree under another convention, the first of `readings`
   kBodyFrame,   ///< scans agree if the poses are those of a body; see `convention`
   kTimeOffset,  ///< scans agree under poses of another time; see `time_offset`
+  kScaled,      ///< scans agree if ways are longer or shorter; see `convention`
+  kLostScans,   ///< poses of other rows fit from some scan on; see `lost_scans`
   kInexact,     ///< scans agree, but the motion between neighbouring scans is inexact
   kNoMotion,    ///< too little motion or too few objects for a decision
   kDisagree,    ///< scans agree under no convention
+  kSkewed,      ///< scans agree if their points are de-skewed
   kRayOrigin,   ///< scans agree, but rays begin elsewhere; see `ray_origin`
   kWorldFrame,  ///< points are in the world frame and agree there; poses have no effect
   kUnknown      ///< too few points or scans
+};
+
+/// Clouds or rows of poses that are missing somewhere, so that poses belong to other scans behind.
+struct LostScans {
+  std::size_t first = 0;  ///< scan; poses of their own rows fit up to here
+  std::size_t last = 0;   ///< scan; from here on, those `shift` rows later fit
+  int shift = 0;
 };
 
 struct Diagnosis {
@@ -70,9 +80,10 @@ struct Diagnosis {
   bool is_inexact_at_start = false;
   double start_translation_error = 0.0;
   double start_rotation_error = 0.0;
-  /// Under which scans agree, for kOtherwise, kBodyFrame and kTimeOffset.
+  /// Under which scans agree, for kOtherwise, kBodyFrame, kTimeOffset and kScaled.
   PoseConvention convention;
   double time_offset = 0.0;             ///< s, as RecordingOptions::time_offset
+  std::optional<LostScans> lost_scans;  ///< for kLostScans
   std::optional<RayOrigin> ray_origin;  ///< if it is not that of the clouds
   std::string option;                   ///< flags of `dynains run` for all of these; empty: none
   PoseVerdict verdict = PoseVerdict::kUnknown;
