@@ -41,7 +41,8 @@ std::string text_of(const SuspiciousScans& part, const Recording& recording) {
   return since + "beams pass through " + percent(worst.ground_free) + " of the ground and " +
          percent(worst.instance_free) + " of what stands above it: " +
          (may_be_skewed ? "points may keep the frames of their times (--deskew), or " : "") +
-         "rays may not begin at the origin of the clouds (--sensor-origin), or poses be inexact; "
+         "rays may not begin at the origin of the clouds (--sensor-origin), poses be inexact, or "
+         "many points be noise; "
          "see: dynains check";
 }
 

@@ -148,6 +148,8 @@ std::vector<Kind> kinds() {
              [axes](const Eigen::Isometry3d& T) {
                return scaled((axes * T * axes.inverse()).inverse(), 1000.0);
              }),
+      spoilt("odometry, ways 10 % too long",
+             [](const Eigen::Isometry3d& T) { return scaled(T, 1.1); }),
       {"rows of two scans later", Answer::kOption,
        [](const fs::path& folder, const Poses& poses) {
          Poses rows(poses.begin() + 2, poses.end());
