@@ -154,8 +154,8 @@ struct ScanAddress;
 /// With a sensor origin, points and poses are those of a frame at the sensor, with the axes of the
 /// clouds.
 ///
-/// Labels (SemanticKITTI classes) are in labels/NAME.label or in a column `label`. In PCD scans with
-/// VIEWPOINT whose intensities are 0 and 1 alone, as in DynamicMap_Benchmark, 1 means moving.
+/// Labels (SemanticKITTI classes) are in labels/NAME.label or in a column `label`. In PCD scans
+/// with VIEWPOINT whose intensities are 0 and 1 alone, as in DynamicMap_Benchmark, 1 means moving.
 ///
 /// All members throw IoError with path, position and expected content.
 class Recording {
