@@ -117,7 +117,7 @@ std::optional<CheckedMotion> checked(const std::optional<Registration>& forth,
 /// A registration by planes and landmarks, and the direction along which landmarks decide.
 struct GuidedRegistration {
   Registration registration;
-  KnownWay way;
+  KnownTranslation way;
 };
 
 /// Moves `T_a_b` along `direction` to where landmarks meet, less than `farthest` (m), and registers
@@ -128,7 +128,7 @@ std::optional<GuidedRegistration> register_along(ChainScan& a, ChainScan& b, con
   constexpr double kDeviation = 0.04;  // m, of search_way()
   const auto guess = search_way(a.landmarks(), b.landmarks(), T_a_b, direction, farthest);
   if (!guess) return std::nullopt;
-  const KnownWay way{direction, kDeviation};
+  const KnownTranslation way{direction, kDeviation};
   const auto found = register_near(a.planes(), b.planes(), *guess, way);
   if (!found) return std::nullopt;
   return GuidedRegistration{*found, way};
@@ -162,7 +162,7 @@ std::optional<CheckedMotion> complete(ChainScan& a, ChainScan& b, const Registra
   }
   if (!best) return std::nullopt;
   const Pose T_b_a = best->registration.T_a_b.inverse();
-  const KnownWay way{T_b_a.linear() * best->way.direction, best->way.deviation};
+  const KnownTranslation way{T_b_a.linear() * best->way.direction, best->way.deviation};
   return checked(best->registration, register_near(b.planes(), a.planes(), T_b_a, way), kUncertain,
                  best->way.deviation);
 }

@@ -151,7 +151,7 @@ std::optional<Registration> register_scans(const RegistrationScan& a, const Regi
 }
 
 std::optional<Registration> register_near(const RegistrationScan& a, const RegistrationScan& b,
-                                          const Pose& guess, const KnownWay& way) {
+                                          const Pose& guess, const KnownTranslation& way) {
   const double ratio = kPointDeviation / way.deviation;
   const Prior prior{way.direction, way.direction.dot(guess.translation()), ratio * ratio};
   Pose T = refine(a, b, guess, 1, 0.2, 1, 8, &prior);

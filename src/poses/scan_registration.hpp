@@ -46,13 +46,13 @@ std::optional<Registration> register_scans(const RegistrationScan& a, const Regi
                                            const std::vector<Pose>& guesses);
 
 /// A component of the translation that is known otherwise.
-struct KnownWay {
+struct KnownTranslation {
   Eigen::Vector3d direction;  ///< unit vector, frame of a
   double deviation;           ///< m
 };
 
 /// As register_scans(), by small steps from `guess`, whose translation along `way` is known.
 std::optional<Registration> register_near(const RegistrationScan& a, const RegistrationScan& b,
-                                          const Pose& guess, const KnownWay& way);
+                                          const Pose& guess, const KnownTranslation& way);
 
 }  // namespace dynains

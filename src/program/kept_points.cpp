@@ -38,7 +38,7 @@ struct Faults {
 Faults fill(const float* xyzi, const std::uint32_t* labels, std::size_t count, Block& block) {
   std::uint32_t foreign = 0;
   std::uint32_t infinite = 0;
-  detail::run_max_packs([&](auto) {
+  detail::with_largest_packs([&](auto) {
     // Local copies: a store of a byte could change what the loop reads, which prevents vectors.
     const std::size_t size = count;
     const std::uint32_t* const classes = labels;

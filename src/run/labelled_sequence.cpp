@@ -88,7 +88,7 @@ void LabelledSequence::load_run(std::size_t run, const std::string& name, Scan& 
   const std::vector<std::uint32_t> labels = read_labels(file, scan.truth.size());
   if (run == 0) scan.instances.resize(labels.size());
   unsigned unknown = 0;
-  dynains::detail::run_max_packs([&](auto) {
+  dynains::detail::with_largest_packs([&](auto) {
     // Local copies avoid reloads after stores that could alias the originals.
     const std::size_t size = labels.size(), bit = run;
     const std::uint32_t* const label = labels.data();

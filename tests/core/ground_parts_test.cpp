@@ -77,7 +77,7 @@ TEST_CASE("LowestMean gives the bits of sorting for few values, ties, rising and
           const float expected = mean_by_sorting(values, wanted, floor);
           CAPTURE(count, wanted, kind, floor);
           float found = 0.0F;
-          detail::run_packs([&](auto packs) {
+          detail::with_packs([&](auto packs) {
             detail::LowestMean<64, decltype(packs)> lowest(wanted);
             found = lowest.of(padded.data(), count, floor);
           });

@@ -158,7 +158,7 @@ TEST_CASE("references before and after a scan do not add up, but the higher side
   scan.see({{0, 4}});
   scan.see({{4, 0}});
   CHECK(scan.belief().peak == Approx(2.0F * kFreeStep));
-  scan.updater.begin_other_side(scan.samples, scan.beliefs);
+  scan.updater.begin_later_references(scan.samples, scan.beliefs);
   CHECK(scan.belief().level == 0.0F);
   scan.see({{3, 1}});
   CHECK(scan.belief().peak == Approx(2.0F * kFreeStep));
@@ -210,7 +210,7 @@ TEST_CASE(
   stands.see(part);
   stands.see(part);
   CHECK(stands.is_free());
-  stands.updater.begin_other_side(stands.samples, stands.beliefs);
+  stands.updater.begin_later_references(stands.samples, stands.beliefs);
   stands.see(standing);
   CHECK(stands.is_free());
 }
@@ -310,11 +310,11 @@ TEST_CASE(
     return scan;
   };
   Scan parked = see_windows(0);
-  CHECK(parked.beliefs.wholes[0].peak == Approx(4.0F * kFreeStep));
-  CHECK(parked.beliefs.wholes[0].hit_again == 0);
+  CHECK(parked.beliefs.instances[0].peak == Approx(4.0F * kFreeStep));
+  CHECK(parked.beliefs.instances[0].hit_again == 0);
   CHECK(parked.removes());
   parked.see(std::vector<Scan::Seen>(20, {0, 4}));
-  CHECK(parked.beliefs.wholes[0].hit_again != 0);
+  CHECK(parked.beliefs.instances[0].hit_again != 0);
   CHECK_FALSE(parked.removes());
 
   Scan moved = see_windows(2);
@@ -358,7 +358,7 @@ TEST_CASE("with an odd number of layers the middle layer belongs to the lower ha
 TEST_CASE("a hit before a place was seen free, or on the other side, is not a hit again") {
   Scan scan = scan_of_layers(5);
   see_free_and_hit(scan, {10, 12, 16, 19}, false);
-  scan.updater.begin_other_side(scan.samples, scan.beliefs);
+  scan.updater.begin_later_references(scan.samples, scan.beliefs);
   scan.see(std::vector<Scan::Seen>(20, {0, 4}));
   CHECK(scan.belief(10).hit_again == 0);
   CHECK(scan.removes());
@@ -371,22 +371,22 @@ TEST_CASE("an instance that is free as a whole in one reference is removed") {
   Scan scan(Instances{supervoxels});
   scan.see(contesting);
   scan.see({{5, 3}, {5, 3}, {5, 3}, {5, 3}, {5, 3}});  // 25 of 40: 0.63
-  CHECK(scan.beliefs.wholes[0].level == Approx(kFreeStep));
+  CHECK(scan.beliefs.instances[0].level == Approx(kFreeStep));
   CHECK(scan.beliefs.counts[0].moved == 0);
   CHECK(scan.removes());
 
   Scan half(Instances{supervoxels});
   half.see(contesting);
   half.see({{5, 4}, {5, 4}, {5, 4}, {5, 4}, {5, 4}});  // 25 of 45: 0.56
-  CHECK(half.beliefs.wholes[0].level == 0.0F);
+  CHECK(half.beliefs.instances[0].level == 0.0F);
   CHECK_FALSE(half.removes());
 
   // 24 of a hundred samples are not enough for the whole, 25 are.
   Scan few(Instances{supervoxels});
   few.see({{5, 0}, {5, 0}, {5, 0}, {5, 0}, {4, 0}});
-  CHECK(few.beliefs.wholes[0].level == 0.0F);
+  CHECK(few.beliefs.instances[0].level == 0.0F);
   few.see({{5, 0}, {5, 0}, {5, 0}, {5, 0}, {5, 0}});
-  CHECK(few.beliefs.wholes[0].level == Approx(2.0F * kFreeStep));
+  CHECK(few.beliefs.instances[0].level == Approx(2.0F * kFreeStep));
 }
 
 TEST_CASE("an instance that was hit is removed only if nearly all of it is free in one reference") {
@@ -395,13 +395,13 @@ TEST_CASE("an instance that was hit is removed only if nearly all of it is free 
   Scan scan(Instances{supervoxels});
   scan.see(standing);
   scan.see({{5, 3}, {5, 3}, {5, 3}, {5, 3}, {5, 3}});
-  CHECK(scan.beliefs.wholes[0].peak == Approx(kFreeStep));
+  CHECK(scan.beliefs.instances[0].peak == Approx(kFreeStep));
   CHECK_FALSE(scan.removes());  // below tau_whole: 1.66
 
   Scan gone(Instances{supervoxels});
   gone.see(standing);
   gone.see(wholly);
-  CHECK(gone.beliefs.wholes[0].peak == Approx(2.0F * kFreeStep));
+  CHECK(gone.beliefs.instances[0].peak == Approx(2.0F * kFreeStep));
   CHECK(gone.beliefs.counts[0].moved == 0);
   CHECK(gone.removes());  // 1.69 is above tau_whole, though below the 2.20 of tau_contested
 }
@@ -470,7 +470,7 @@ TEST_CASE("a place that is hit again twice after it was free is seen through by 
   const auto see = [](const std::string& references) {
     Scan scan(Instances{{4}});
     for (const char reference : references) {
-      if (reference == '|') scan.updater.begin_other_side(scan.samples, scan.beliefs);
+      if (reference == '|') scan.updater.begin_later_references(scan.samples, scan.beliefs);
       if (reference == 'F') scan.see({{4, 0}});
       if (reference == 'H') scan.see({{0, 4}});
     }
@@ -615,7 +615,7 @@ TEST_CASE("beliefs equal those of the slow reference sum") {
     std::vector<Belief> supervoxels(scan.samples.supervoxel_count()), wholes(instances.size());
     for (int reference = 0; reference < 24; ++reference) {
       if (reference == 12) {
-        scan.updater.begin_other_side(scan.samples, scan.beliefs);
+        scan.updater.begin_later_references(scan.samples, scan.beliefs);
         for (Belief& belief : supervoxels) {
           belief.peak = std::max(belief.peak, belief.level);
           belief.level = 0.0F;
@@ -649,9 +649,9 @@ TEST_CASE("beliefs equal those of the slow reference sum") {
       REQUIRE(scan.belief(s).turns == supervoxels[s].turns);
     }
     for (std::size_t i = 0; i < wholes.size(); ++i) {
-      REQUIRE(scan.beliefs.wholes[i].peak == wholes[i].peak);
-      REQUIRE(scan.beliefs.wholes[i].contested == wholes[i].contested);
-      REQUIRE(scan.beliefs.wholes[i].hit_again == wholes[i].hit_again);
+      REQUIRE(scan.beliefs.instances[i].peak == wholes[i].peak);
+      REQUIRE(scan.beliefs.instances[i].contested == wholes[i].contested);
+      REQUIRE(scan.beliefs.instances[i].hit_again == wholes[i].hit_again);
       std::uint32_t total = 0, moved = 0, decided = 0;
       for (std::uint32_t s = scan.samples.supervoxel_begin[i];
            s < scan.samples.supervoxel_begin[i + 1]; ++s) {

@@ -93,11 +93,11 @@ constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
 // Supervoxel per point.
 std::vector<std::uint32_t> supervoxel_of(const InstanceSamples& samples, std::size_t points) {
-  REQUIRE(samples.met_of.size() == points);
+  REQUIRE(samples.number_of_point.size() == points);
   std::vector<std::uint32_t> result;
-  for (const std::uint32_t met : samples.met_of) {
-    REQUIRE(met < samples.met.size());
-    result.push_back(met == 0 ? kNone : samples.met[met]);
+  for (const std::uint32_t number : samples.number_of_point) {
+    REQUIRE(number < samples.supervoxel_of_number.size());
+    result.push_back(number == 0 ? kNone : samples.supervoxel_of_number[number]);
   }
   return result;
 }

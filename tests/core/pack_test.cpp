@@ -101,12 +101,12 @@ template <class Test>
 void with_larger_registers(Test&& test) {
   if (detail::has_avx2()) {
     INFO("eight numbers in one register");
-    detail::run_avx2(test);
+    detail::with_avx2(test);
   }
   if constexpr (detail::kHasAvx512Code) {
     if (detail::has_avx512()) {
       INFO("sixteen numbers in one register");
-      detail::run_avx512(test);
+      detail::with_avx512(test);
     }
   }
 }

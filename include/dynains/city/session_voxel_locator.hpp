@@ -79,7 +79,7 @@ class SessionVoxelLocator {
     constexpr double kRounding = 1e-5;  // of squares in floats, relative
     const PackConstant near = constant(range_ * range_ * (1.0 - kRounding));
     const PackConstant far = constant(range_ * range_ * (1.0 + kRounding));
-    run_packs([&](auto packs) {
+    with_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       using Int = typename Packs::Int;

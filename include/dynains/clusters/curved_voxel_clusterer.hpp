@@ -122,8 +122,8 @@ class CurvedVoxelClusterer {
     find_cells(points);
     mark_cells(points.size());
     // Run as kernels for the popcnt instruction of processors with AVX2.
-    detail::run_packs([&](auto) { find_runs(); });
-    detail::run_packs([&](auto) { join_runs(); });
+    detail::with_packs([&](auto) { find_runs(); });
+    detail::with_packs([&](auto) { join_runs(); });
     number_runs();
     number_points(points.size());
     clear_cells();
@@ -160,7 +160,7 @@ class CurvedVoxelClusterer {
     auto* const cells = reinterpret_cast<std::int32_t*>(cell_or_cluster_.data());
     const PackConstant above_all(static_cast<float>(elevations_));
     const PackConstant below_all(-1.0F);
-    detail::run_max_packs([&](auto packs) {
+    detail::with_largest_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       using Int = typename Packs::Int;
@@ -378,7 +378,7 @@ class CurvedVoxelClusterer {
 
   // Replaces the cell of each point by its cluster number.
   void number_points(std::size_t count) {
-    detail::run_packs([&](auto) {
+    detail::with_packs([&](auto) {
       for (std::size_t i = 0; i < count; ++i) {
         cell_or_cluster_[i] = number_of_run_[run_of(cell_or_cluster_[i] - first_cell_)];
       }

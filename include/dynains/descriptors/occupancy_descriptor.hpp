@@ -149,7 +149,7 @@ class OccupancyDescriptor {
     // Azimuth extents for a seam at +-pi and for a seam at 0. The smaller extent is the smallest
     // arc if it is at most pi.
     float range_max = 0.0F, low = 0.0F, high = 0.0F, low_wrapped = 0.0F, high_wrapped = 0.0F;
-    detail::run_packs([&](auto packs) {
+    detail::with_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       Float range_low = first_range, range_high = first_range, z_low = first_z;
@@ -278,7 +278,7 @@ class OccupancyDescriptor {
         highest = std::max(highest, height[i]);
       }
     };
-    detail::run_packs([&](auto packs) {
+    detail::with_packs([&](auto packs) {
       for (const PointRange& part : cluster_.scan(k)) {
         detail::for_overlapping_slices<decltype(packs)>(part.begin, part.end, raise);
       }

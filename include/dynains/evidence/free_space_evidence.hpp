@@ -89,7 +89,7 @@ class FreeSpaceEvidence {
         });
     // Some spare capacity, since a copy has none and scans of one sensor differ in size.
     Record roomy = *largest;
-    std::vector<std::uint32_t>& by_point = roomy.evidence.samples.met_of;
+    std::vector<std::uint32_t>& by_point = roomy.evidence.samples.number_of_point;
     by_point.resize(by_point.size() + by_point.size() / 8);
     for (std::size_t i = 0; i < std::min(scans, records_.size()); ++i) records_[i] = roomy;
   }
@@ -147,10 +147,11 @@ class FreeSpaceEvidence {
     judge_by_dynamic_grid(scan, record);
     const InstanceSamples& samples = record.evidence.samples;
     groups_.assign(1, {Cause::kNotJudged, 0.0F});
-    groups_.resize(samples.met.size());
-    for (std::size_t i = 1; i < samples.met.size(); ++i) groups_[i] = verdicts_[samples.met[i]];
-    moved_ground_.add(split.non_ground(), samples.met_of, groups_);
-    return {groups_, samples.met_of,
+    groups_.resize(samples.supervoxel_of_number.size());
+    for (std::size_t i = 1; i < samples.supervoxel_of_number.size(); ++i)
+      groups_[i] = verdicts_[samples.supervoxel_of_number[i]];
+    moved_ground_.add(split.non_ground(), samples.number_of_point, groups_);
+    return {groups_, samples.number_of_point,
             moved_ground_.find(split.ground(), record.ground_boxes, record.ground)};
   }
 
@@ -284,7 +285,7 @@ class FreeSpaceEvidence {
       const ReferenceScan* const reference = references_.find(scan - back, record.epoch);
       if (reference != nullptr) test(newest_tester_, record, *reference, -lag);
     }
-    updater().begin_other_side(record.evidence.samples, record.evidence.beliefs);
+    updater().begin_later_references(record.evidence.samples, record.evidence.beliefs);
     update_own_log_odds(record);
   }
 
@@ -417,13 +418,14 @@ class FreeSpaceEvidence {
   // Writes by non-ground point whether `test(supervoxel)` holds.
   template <class Test>
   void mark_points(const InstanceSamples& samples, Test&& test, std::vector<std::uint8_t>& marks) {
-    is_marked_group_.assign(samples.met.size(), 0);
-    for (std::size_t i = 1; i < samples.met.size(); ++i) {
-      is_marked_group_[i] = test(samples.met[i]) ? 1 : 0;
+    is_marked_group_.assign(samples.supervoxel_of_number.size(), 0);
+    for (std::size_t i = 1; i < samples.supervoxel_of_number.size(); ++i) {
+      is_marked_group_[i] = test(samples.supervoxel_of_number[i]) ? 1 : 0;
     }
-    detail::ensure_capacity(marks, samples.met_of.size());
-    marks.resize(samples.met_of.size());
-    for (std::size_t i = 0; i < marks.size(); ++i) marks[i] = is_marked_group_[samples.met_of[i]];
+    detail::ensure_capacity(marks, samples.number_of_point.size());
+    marks.resize(samples.number_of_point.size());
+    for (std::size_t i = 0; i < marks.size(); ++i)
+      marks[i] = is_marked_group_[samples.number_of_point[i]];
   }
 
   Config config_;
@@ -446,12 +448,12 @@ class FreeSpaceEvidence {
   std::uint64_t epoch_ = 0;         // number of the begun epochs
   std::uint64_t epoch_begin_ = 0;   // first scan of the epoch of the newest scan
   std::uint64_t newest_ = 0;
-  std::vector<std::vector<int>> lags_before_;       // by scan since the begin, modulo their number
-  std::vector<std::vector<int>> lags_after_;        // by scans since the latest reference
-  std::vector<Record> records_;                     // ring buffer, by scan number
-  std::vector<Verdict> verdicts_;                   // by supervoxel
-  std::vector<Verdict> groups_;                     // by index in InstanceSamples::met
-  std::vector<std::uint8_t> is_marked_group_;       // by index in InstanceSamples::met
+  std::vector<std::vector<int>> lags_before_;  // by scan since the begin, modulo their number
+  std::vector<std::vector<int>> lags_after_;   // by scans since the latest reference
+  std::vector<Record> records_;                // ring buffer, by scan number
+  std::vector<Verdict> verdicts_;              // by supervoxel
+  std::vector<Verdict> groups_;                // by index in InstanceSamples::supervoxel_of_number
+  std::vector<std::uint8_t> is_marked_group_;  // by index in InstanceSamples::supervoxel_of_number
   std::vector<std::uint8_t> is_moving_, may_move_;  // by non-ground point
   std::vector<std::uint32_t> predecessors_;
 };

@@ -82,7 +82,7 @@ class GroundFootprint {
     const std::size_t count = (points.size() + kBlock - 1) / kBlock;
     detail::ensure_capacity(boxes, count);
     boxes.resize(count);
-    detail::run_packs([&](auto packs) {
+    detail::with_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       for (std::size_t b = 0; b < boxes.size(); ++b) {

@@ -39,8 +39,8 @@ struct InstanceBeliefs {
   };
 
   std::vector<Belief> supervoxels;
-  std::vector<Belief> wholes;  ///< by instance: belief on all its samples together
-  std::vector<Counts> counts;  ///< by instance
+  std::vector<Belief> instances;  ///< by instance: belief on all its samples together
+  std::vector<Counts> counts;     ///< by instance
   InstanceViews views;
   std::vector<std::uint8_t> merged;   ///< by instance: 1 if larger than one object; the caller's
   std::vector<std::uint64_t> open;    ///< bit by sample: a hit may change its supervoxel's belief
@@ -74,7 +74,7 @@ class InstanceBeliefUpdater {
   void begin(const InstanceSamples& samples, InstanceBeliefs& out) const {
     const std::size_t instances = samples.instance_count();
     out.supervoxels.assign(samples.supervoxel_count(), Belief());
-    out.wholes.assign(instances, Belief());
+    out.instances.assign(instances, Belief());
     out.changed.assign(instances, 1);
     out.merged.assign(instances, 0);
     out.counts.resize(instances);
@@ -86,7 +86,7 @@ class InstanceBeliefUpdater {
   }
 
   /// Restarts the sums for the references on the other side of time; keeps the peaks.
-  void begin_other_side(const InstanceSamples& samples, InstanceBeliefs& beliefs) const {
+  void begin_later_references(const InstanceSamples& samples, InstanceBeliefs& beliefs) const {
     for (std::uint32_t s = 0; s < beliefs.supervoxels.size(); ++s) {
       Belief& belief = beliefs.supervoxels[s];
       if (belief.occupied != 0 && belief.level > 0.0F) flip_open(samples, s, beliefs);
@@ -94,7 +94,7 @@ class InstanceBeliefUpdater {
       belief.level = 0.0F;
       belief.turns &= static_cast<std::uint8_t>(~1U);
     }
-    for (Belief& belief : beliefs.wholes) belief.level = 0.0F;
+    for (Belief& belief : beliefs.instances) belief.level = 0.0F;
   }
 
   /// Updates the beliefs by the visibility of `samples` from one reference. `reference`: its
@@ -105,8 +105,8 @@ class InstanceBeliefUpdater {
               const InstanceViews::Position& reference, InstanceBeliefs& beliefs, OnHit&& on_hit) {
     beliefs.views.look_from(reference);
     // AVX2 processors have instructions that find and count bits.
-    detail::run_packs([&](auto) {
-      update_wholes(samples, visibility, beliefs, on_hit);
+    detail::with_packs([&](auto) {
+      update_instances(samples, visibility, beliefs, on_hit);
       update_supervoxels(samples, visibility, beliefs);
     });
   }
@@ -127,7 +127,7 @@ class InstanceBeliefUpdater {
   bool removes_whole(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
                      std::size_t instance, bool is_large) const {
     const Counts& counts = beliefs.counts[instance];
-    const Belief& whole = beliefs.wholes[instance];
+    const Belief& whole = beliefs.instances[instance];
     const bool whole_is_free = whole.peak >= (whole.contested != 0 ? whole_level_ : free_level_);
     if (!whole_is_free && !is_enough(counts, is_large ? large_removal_ratio_ : removal_ratio_)) {
       return false;
@@ -262,8 +262,8 @@ class InstanceBeliefUpdater {
 
   // Updates the beliefs on whole instances.
   template <class OnHit>
-  void update_wholes(const InstanceSamples& samples, const detail::Visibility& visibility,
-                     InstanceBeliefs& beliefs, OnHit&& on_hit) {
+  void update_instances(const InstanceSamples& samples, const detail::Visibility& visibility,
+                        InstanceBeliefs& beliefs, OnHit&& on_hit) {
     detail::grow(weight_of_free_, samples.instance_count());
     std::uint32_t end = 0;
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
@@ -283,10 +283,10 @@ class InstanceBeliefUpdater {
       beliefs.views.add(instance, free_ratio);
       if (free_ratio >= pass_ratio_) {
         if (is_contradicted) continue;
-        raise(beliefs.wholes[instance], free_ratio);
+        raise(beliefs.instances[instance], free_ratio);
         beliefs.changed[instance] = 1;
       } else if (is_hit) {
-        lower(beliefs.wholes[instance]);
+        lower(beliefs.instances[instance]);
         beliefs.changed[instance] = 1;
         const auto hits = static_cast<float>(all.hit);
         if (free_ratio <= 1.0F - kContradictingHits && hits >= kLeastKnown * count) {

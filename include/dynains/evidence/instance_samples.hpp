@@ -105,8 +105,9 @@ struct InstanceSamples {
   std::vector<std::uint32_t> supervoxel_begin;  ///< by instance: first supervoxel, and the end
   std::vector<std::uint32_t> supervoxel_of;     ///< by sample; padded at the end
   std::vector<std::uint32_t> instance_of;       ///< by supervoxel
-  std::vector<std::uint32_t> met_of;            ///< by point: index in `met`; 0: no supervoxel
-  std::vector<std::uint32_t> met;  ///< supervoxels in scan order, from index 1 on; [0]: kNoCluster
+  std::vector<std::uint32_t> number_of_point;   ///< by point: number of its supervoxel; 0: none
+  std::vector<std::uint32_t>
+      supervoxel_of_number;  ///< supervoxels by number, which follows the points; [0]: kNoCluster
 
   std::size_t size() const { return sample_begin.empty() ? 0 : sample_begin.back(); }
   std::size_t supervoxel_count() const {
@@ -164,7 +165,7 @@ class InstanceSampler {
     const PackConstant per_metre(supervoxels_per_metre_);
     std::array<std::array<std::int32_t, kBlock + kPackWidth>, 3> voxel;
     std::uint64_t changes = 0;
-    run_packs([&](auto packs) {
+    with_packs([&](auto packs) {
       using Packs = decltype(packs);
       for_slices<Packs>(points.size(), [&](const auto& at) {
         floor(at.load(points.x.data()) * per_metre).store(&voxel[0][at.begin + 1]);
@@ -184,13 +185,13 @@ class InstanceSampler {
   void sample(PointsView points, Span<const std::uint32_t> instance_of, std::size_t instance_count,
               InstanceSamples& out) {
     begin_scan();
-    detail::ensure_capacity(out.met_of, points.size());
-    out.met_of.resize(points.size());
+    detail::ensure_capacity(out.number_of_point, points.size());
+    out.number_of_point.resize(points.size());
     for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
       const PointsView block = points.subview(begin, std::min(kBlock, points.size() - begin));
       find_supervoxels(block, instance_of.data() + begin);
-      meet_supervoxels(block.size(), out.met_of.data() + begin);
-      rank_points(begin, block.size(), out.met_of.data() + begin);
+      meet_supervoxels(block.size(), out.number_of_point.data() + begin);
+      rank_points(begin, block.size(), out.number_of_point.data() + begin);
     }
     order(points, instance_count, out);
   }
@@ -253,13 +254,13 @@ class InstanceSampler {
 
   // Numbers the supervoxels of a block in the order of the points. For most points, the first slot
   // of the hash holds their supervoxel.
-  void meet_supervoxels(std::size_t count, std::uint32_t* met_of) {
+  void meet_supervoxels(std::size_t count, std::uint32_t* number_of_point) {
     detail::grow(supervoxels_, table_.size() + kBlock);
     table_.reserve(table_.size() + kBlock);
     for (std::size_t i = 0; i < count; ++i) {
       const Supervoxel supervoxel = {xy_[i], z_[i], instance_[i]};
       const SupervoxelTable::Slot& slot = table_.first_slot(static_cast<std::uint32_t>(hash_[i]));
-      met_of[i] = slot.key == supervoxel ? slot.number : meet_supervoxel(supervoxel, i);
+      number_of_point[i] = slot.key == supervoxel ? slot.number : meet_supervoxel(supervoxel, i);
     }
   }
 
@@ -272,11 +273,11 @@ class InstanceSampler {
   // Adds the points of a block to the rows of their supervoxels. Consecutive points mostly share a
   // row, and an insertion depends on the result of the preceding insertion into the row. The loop
   // alternates between four parts of the block, so that their insertions can overlap in time.
-  void rank_points(std::size_t begin, std::size_t count, const std::uint32_t* met_of) {
+  void rank_points(std::size_t begin, std::size_t count, const std::uint32_t* number_of_point) {
     constexpr std::size_t kParts = 4, kLength = kBlock / kParts;
     samples_.make_rows(table_.size());
     const auto rank = [&](std::size_t i) {
-      samples_.add(met_of[i], static_cast<std::uint32_t>(rank_[i]),
+      samples_.add(number_of_point[i], static_cast<std::uint32_t>(rank_[i]),
                    static_cast<std::uint32_t>(begin + i));
     };
     if (count < kBlock) {
@@ -296,26 +297,26 @@ class InstanceSampler {
   void order(PointsView points, std::size_t instance_count, InstanceSamples& out) {
     const std::size_t supervoxel_count = table_.size() - 1;
     out.supervoxel_begin.assign(instance_count + 1, 0);
-    for (std::size_t met = 1; met <= supervoxel_count; ++met) {
-      ++out.supervoxel_begin[static_cast<std::uint32_t>(supervoxels_[met].instance) + 1];
+    for (std::size_t number = 1; number <= supervoxel_count; ++number) {
+      ++out.supervoxel_begin[static_cast<std::uint32_t>(supervoxels_[number].instance) + 1];
     }
     for (std::size_t i = 1; i <= instance_count; ++i) {
       out.supervoxel_begin[i] += out.supervoxel_begin[i - 1];
     }
     next_.assign(out.supervoxel_begin.begin(), out.supervoxel_begin.end());
-    out.met.resize(supervoxel_count + 1);
-    out.met[0] = kNoCluster;
+    out.supervoxel_of_number.resize(supervoxel_count + 1);
+    out.supervoxel_of_number[0] = kNoCluster;
     out.place.resize(supervoxel_count);
     out.instance_of.resize(supervoxel_count);
     detail::grow(ordered_, supervoxel_count);
-    for (std::size_t met = 1; met <= supervoxel_count; ++met) {
-      const Supervoxel& supervoxel = supervoxels_[met];
+    for (std::size_t number = 1; number <= supervoxel_count; ++number) {
+      const Supervoxel& supervoxel = supervoxels_[number];
       const auto instance = static_cast<std::uint32_t>(supervoxel.instance);
       const std::uint32_t to = next_[instance]++;
-      out.met[met] = to;
+      out.supervoxel_of_number[number] = to;
       out.place[to] = place_of(supervoxel);
       out.instance_of[to] = instance;
-      ordered_[to] = static_cast<std::uint32_t>(met);
+      ordered_[to] = static_cast<std::uint32_t>(number);
     }
     copy_samples(points, supervoxel_count, out);
   }
@@ -336,22 +337,22 @@ class InstanceSampler {
     std::size_t to = 0;
     for (std::size_t s = 0; s < supervoxel_count; ++s) {
       out.sample_begin[s] = static_cast<std::uint32_t>(to);
-      const std::uint32_t met = ordered_[s];
+      const std::uint32_t number = ordered_[s];
       for (std::size_t k = 0; k < most; ++k) {
-        const std::size_t i = samples_.number(met, k);
+        const std::size_t i = samples_.number(number, k);
         x[to + k] = points.x[i];
         y[to + k] = points.y[i];
         z[to + k] = points.z[i];
         supervoxel_of[to + k] = static_cast<std::uint32_t>(s);
       }
-      to += samples_.count(met);
+      to += samples_.count(number);
     }
     out.sample_begin[supervoxel_count] = static_cast<std::uint32_t>(to);
   }
 
   float supervoxels_per_metre_;
   float max_range_;
-  SupervoxelTable table_{4096};  // its numbers are indices in InstanceSamples::met
+  SupervoxelTable table_{4096};  // its numbers are indices in InstanceSamples::supervoxel_of_number
   // By point of a block.
   std::array<std::int32_t, kBlock> xy_ = {}, z_ = {}, instance_ = {}, hash_ = {}, rank_ = {};
   detail::SmallestK samples_;            // by number in the table: indices of points

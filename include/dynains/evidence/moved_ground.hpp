@@ -157,19 +157,20 @@ class MovedGround {
     });
   }
 
-  // Sets `moved_` by index in InstanceSamples::met; returns whether any voxel has moved.
+  // Sets `moved_` by index in InstanceSamples::supervoxel_of_number; returns whether any voxel has
+  // moved.
   bool find_free_voxels(const GroundSamples& ground) {
     const InstanceSamples& samples = ground.samples;
     bool any = false;
-    detail::grow(moved_, samples.met.size() + 1);
+    detail::grow(moved_, samples.supervoxel_of_number.size() + 1);
     moved_[0] = 0;
-    for (std::size_t met = 1; met < samples.met.size(); ++met) {
-      const std::uint32_t sample = samples.sample_begin[samples.met[met]];
+    for (std::size_t number = 1; number < samples.supervoxel_of_number.size(); ++number) {
+      const std::uint32_t sample = samples.sample_begin[samples.supervoxel_of_number[number]];
       const std::uint8_t free = ground.free[sample];
       const bool moved =
           free >= kLeastFree &&
           static_cast<float>(free) >= kLeastRatio * static_cast<float>(ground.hit[sample]);
-      moved_[met] = moved ? 1 : 0;
+      moved_[number] = moved ? 1 : 0;
       any |= moved;
     }
     return any;
@@ -178,11 +179,11 @@ class MovedGround {
   // Removes the runs in moved voxels, except points under removed points.
   void remove_free_runs(PointsView ground, const GroundSamples& samples) {
     const auto lowest = [](std::uint64_t bits) { return bits & (~bits + 1); };
-    const std::uint32_t* met = samples.samples.met_of.data();
+    const std::uint32_t* number = samples.samples.number_of_point.data();
     for (std::size_t i = 0; i < samples.run_begins.size(); ++i) {
       const std::uint64_t all = all_of(block_of(ground, i));
       for (std::uint64_t left = samples.run_begins[i]; left != 0; left &= left - 1) {
-        if (moved_[*met++] == 0) continue;
+        if (moved_[*number++] == 0) continue;
         const std::uint64_t first = lowest(left);
         const std::uint64_t next = lowest(left ^ first);  // 0 behind the last run
         remove(i, (next - 1) & ~(first - 1) & all & ~under_[i], Cause::kFreeSpace);
@@ -200,7 +201,8 @@ class MovedGround {
   InstanceHull hull_;
   Clearance clearance_ = {0.4F, 0.0F};  // between the ground and objects on it
   std::vector<EvidenceVerdict::GroundPoint> found_;
-  std::vector<std::uint8_t> moved_;  // by group, then by index in InstanceSamples::met
+  std::vector<std::uint8_t>
+      moved_;  // by group, then by index in InstanceSamples::supervoxel_of_number
 };
 
 }  // namespace dynains

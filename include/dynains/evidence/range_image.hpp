@@ -107,7 +107,7 @@ class RangeImage {
     constexpr std::size_t kBlock = 128;
     const ImageLocator locator(grid);
     static constexpr detail::PackConstant kMost(kFarthest), kScale(kCentimetres);
-    detail::run_packs([&](auto packs) {
+    detail::with_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       using Int = typename Packs::Int;
@@ -168,7 +168,7 @@ class RangeImage {
     const auto rows = static_cast<std::size_t>(grid.rows);
     scratch.objects.resize(grid.cell_count());
     scratch.reach.assign(rows * group_stride(grid), 0);
-    detail::run_packs([&](auto packs) {
+    detail::with_packs([&](auto packs) {
       using Short = typename decltype(packs)::Short;
       const Short far(limits.limit[1]);
       for (std::size_t row = 0; row < rows; ++row) {
@@ -196,7 +196,7 @@ class RangeImage {
     // By column: the last return below the row, and the number of empty rows above that return.
     scratch.below.assign(stride, kNothing);
     scratch.gap.assign(stride, static_cast<std::int16_t>(grid.hole_rows + 1));
-    run_packs([&](auto packs) {
+    with_packs([&](auto packs) {
       using Short = typename decltype(packs)::Short;
       const Short zero(0), one(1), nothing(kNothing);
       const Short widest(static_cast<std::int16_t>(grid.hole_rows));
@@ -240,7 +240,7 @@ class RangeImage {
     for (std::size_t row = 0; row < rows; ++row) {
       wrap(&scratch.nearest[row * stride], static_cast<std::size_t>(grid.columns), 1);
     }
-    detail::run_packs([&](auto packs) {
+    detail::with_packs([&](auto packs) {
       using Short = typename decltype(packs)::Short;
       for (std::size_t row = 0; row < rows; ++row) {
         merge_three_rows<Short>(grid, row, scratch);
@@ -349,7 +349,7 @@ class RangeImage {
   void widen(const RangeImageGrid& grid, const ProtectionLimits& limits, Scratch& scratch) {
     const auto rows = static_cast<std::size_t>(grid.rows);
     for (std::vector<std::int16_t>& line : scratch.lines) line.resize(grid.stride());
-    detail::run_packs([&](auto packs) {
+    detail::with_packs([&](auto packs) {
       using Short = typename decltype(packs)::Short;
       for (std::size_t row = 0; row < rows; ++row) {
         if (!find_nearby(grid, row, scratch)) continue;

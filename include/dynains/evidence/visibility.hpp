@@ -136,7 +136,7 @@ inline void test_visibility(const RangeImage& image, const Pose& T_reference_sam
   const PackConstant base(margin * kCentimetres), growth(slope * kCentimetres);
   const ImageLocator locator(image.grid());
   visibility.resize(count);
-  run_packs([&](auto packs) {
+  with_packs([&](auto packs) {
     using Packs = decltype(packs);
     using Float = typename Packs::Float;
     using Int = typename Packs::Int;

@@ -55,7 +55,7 @@ class ConcentricZones {
   /// Writes the patch of each point (m, sensor frame), and kPatches for points outside the zones.
   /// `patch_of` must have room for kMaxPackWidth more numbers.
   void find_patches(PointsView points, std::int32_t* patch_of) const {
-    run_max_packs([&](auto packs) {
+    with_largest_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       using Int = typename Packs::Int;

@@ -65,7 +65,7 @@ class GroundSegmenter {
     sample_.reserve(std::min(scan.size(), static_cast<std::size_t>(config_.ground_fit_points)));
     heights_.fill(kNoGround);
     split.resize(scan.size());
-    detail::run_max_packs([&](auto packs) {
+    detail::with_largest_packs([&](auto packs) {
       using Packs = decltype(packs);
       Output<Packs> out(split);
       // By patch: begin of its ground in the split, and number of its other points.
@@ -214,7 +214,7 @@ class GroundSegmenter {
                                                                  const detail::PointRecord* records,
                                                                  std::size_t count) {
     std::optional<detail::HalfSpace> result;
-    detail::run_packs([&](auto packs) {
+    detail::with_packs([&](auto packs) {
       using Packs = decltype(packs);
       sample_.take<Packs>(records, count, static_cast<std::size_t>(config_.ground_fit_points));
       detail::LowestMean<GroundConfig::kMaxLowest, Packs> lowest(

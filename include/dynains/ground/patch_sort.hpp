@@ -28,7 +28,7 @@ class PatchSort {
     strand_length_ = count / (kStrands * kStep) * kStep;
     count_points(patch_of, count);
     add_up_counts();
-    run_packs([&](auto) { move(points, input, patch_of); });
+    with_packs([&](auto) { move(points, input, patch_of); });
   }
 
   /// The points of all patches, with kMaxPackWidth more records behind them.

@@ -296,7 +296,7 @@ class StaticMapAccumulator {
     batch.voxel[kBefore] = 0;
     for (auto& block : batch.block) block[kBefore] = 0;
     std::size_t chosen = 0;
-    detail::run_max_packs([&](auto packs) {
+    detail::with_largest_packs([&](auto packs) {
       using Packs = decltype(packs);
       constexpr std::size_t kWord = 64;
       std::uint64_t was_kept = 0;

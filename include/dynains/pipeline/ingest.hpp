@@ -122,7 +122,7 @@ class Ingest {
   std::size_t filter(std::size_t begin, std::size_t length, float min_squared, float max_squared,
                      PointLabel* label_of) {
     std::size_t result = 0;
-    run_max_packs([&](auto packs) {
+    with_largest_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       using Int = typename Packs::Int;

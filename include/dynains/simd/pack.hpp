@@ -11,7 +11,7 @@
 
 namespace dynains::detail {
 
-inline constexpr std::size_t kPackWidth = 8;        ///< 32-bit numbers in the packs of run_packs
+inline constexpr std::size_t kPackWidth = 8;        ///< 32-bit numbers in the packs of with_packs
 inline constexpr std::size_t kShortPackWidth = 16;  ///< 16-bit numbers in these packs
 inline constexpr std::size_t kMaxPackWidth = 16;    ///< 32-bit numbers in the largest pack
 

@@ -2,7 +2,7 @@
 //
 // A kernel is a generic function object that takes a kind of packs, or a slice of arrays, and works
 // with its types. It is compiled for each kind; results are equal bit by bit. Vectors must not be
-// passed to or returned from run_avx2 and run_avx512, whose callers pass vectors differently.
+// passed to or returned from with_avx2 and with_avx512, whose callers pass vectors differently.
 #pragma once
 
 #include <cstddef>
@@ -30,11 +30,11 @@ using Avx512Packs = PackKind<16, 1>;
 
 #if defined(__x86_64__) && defined(__SSE2__)
 template <class Kernel>
-[[gnu::target("avx2"), gnu::flatten]] void run_avx2(Kernel& kernel) {
+[[gnu::target("avx2"), gnu::flatten]] void with_avx2(Kernel& kernel) {
   kernel(Avx2Packs());
 }
 template <class Kernel>
-[[gnu::target("avx512f,avx512bw,avx512dq,avx512vl"), gnu::flatten]] void run_avx512(
+[[gnu::target("avx512f,avx512bw,avx512dq,avx512vl"), gnu::flatten]] void with_avx512(
     Kernel& kernel) {
   kernel(Avx512Packs());
 }
@@ -47,11 +47,11 @@ inline bool has_avx512() {
 }
 #else
 template <class Kernel>
-void run_avx2(Kernel& kernel) {
+void with_avx2(Kernel& kernel) {
   kernel(Avx2Packs());
 }
 template <class Kernel>
-void run_avx512(Kernel& kernel) {
+void with_avx512(Kernel& kernel) {
   kernel(Avx512Packs());
 }
 inline bool has_avx2() { return false; }
@@ -60,22 +60,22 @@ inline bool has_avx512() { return false; }
 
 /// Calls `kernel` with packs of eight numbers: Avx2Packs or BaselinePacks.
 template <class Kernel>
-void run_packs(Kernel&& kernel) {
-  if (has_avx2()) return run_avx2(kernel);
+void with_packs(Kernel&& kernel) {
+  if (has_avx2()) return with_avx2(kernel);
   kernel(BaselinePacks());
 }
 
 /// Calls `kernel` with the largest packs that the processor supports.
 template <class Kernel>
-void run_max_packs(Kernel&& kernel) {
+void with_largest_packs(Kernel&& kernel) {
   if constexpr (kHasAvx512Code) {
-    if (has_avx512()) return run_avx512(kernel);
+    if (has_avx512()) return with_avx512(kernel);
   }
-  run_packs(kernel);
+  with_packs(kernel);
 }
 
 #if defined(__clang__)
-// Without these attributes, Clang inlines only direct calls into run_avx2.
+// Without these attributes, Clang inlines only direct calls into with_avx2.
 template <class Packs, class Kernel>
 [[gnu::always_inline, gnu::flatten]] void for_slices(std::size_t count, Kernel&& kernel);
 template <class Packs, class Kernel>
@@ -173,7 +173,7 @@ struct PaddedPackSlice : PackSlice<Packs, kTail> {
   }
 };
 
-/// Calls `kernel(PackSlice)` for [0, count) in order. For use within a kernel of run_packs.
+/// Calls `kernel(PackSlice)` for [0, count) in order. For use within a kernel of with_packs.
 template <class Packs, class Kernel>
 void for_slices(std::size_t count, Kernel&& kernel) {
   std::size_t begin = 0;
@@ -198,7 +198,7 @@ void for_overlapping_slices(std::size_t begin, std::size_t end, Kernel&& kernel)
 /// Calls `kernel(PackSlice)` for [0, count) in order, with the largest packs of the processor.
 template <class Kernel>
 void for_packs(std::size_t count, Kernel&& kernel) {
-  run_max_packs([&](auto packs) { for_slices<decltype(packs)>(count, kernel); });
+  with_largest_packs([&](auto packs) { for_slices<decltype(packs)>(count, kernel); });
 }
 
 }  // namespace dynains::detail
