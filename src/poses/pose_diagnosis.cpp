@@ -287,6 +287,79 @@ void take(const Explanation& explanation, Diagnosis& d) {
   d.option = explanation.option;
 }
 
+/// Errors of the given poses by registered motions.
+struct ErrorsAsGiven {
+  MotionError all, steps, first_steps;
+  double exact = kExact;  // m at points 10 m away; errors of exact poses are smaller
+
+  ErrorsAsGiven(const Recording& recording, const std::vector<RegisteredMotion>& motions) {
+    const BodyMotion given = motion_under(recording, recording.convention());
+    const auto identity = Pose::Identity();
+    all = motion_error(motions, given, identity);
+    steps = motion_error(motions, given, identity, Motions::kSteps);
+    first_steps = motion_error(motions, given, identity, Motions::kFirstSteps);
+    exact = std::max(kExact, 2.0 * all.noise);
+  }
+};
+
+/// The meaning of the poses that explains their error best, in the order of fitted numbers: a usual
+/// mistake has none, a scale or an offset one, an extrinsic six. A later one must be clearly
+/// better.
+std::optional<Explanation> explain(const Recording& recording,
+                                   const std::vector<RegisteredMotion>& motions,
+                                   std::vector<PoseReading>& readings, double before,
+                                   double exact) {
+  auto reading = explain_by_reading(recording, motions, readings, before);
+  std::optional<Explanation> scale, offset, body;
+  if (before > exact) {
+    scale = explain_by_scale(recording, motions, before);
+    offset = explain_by_offset(recording, motions, before);
+    body = explain_by_body(recording, motions, before);
+  }
+  // A shift by scans is a coarse offset.
+  const bool is_shift = reading && reading->convention.shift != recording.convention().shift;
+  if (is_shift && offset && offset->error < reading->error) reading.reset();
+  std::optional<Explanation> best;
+  for (const auto* candidate : {&std::as_const(reading), &std::as_const(scale),
+                                &std::as_const(offset), &std::as_const(body)}) {
+    if (!*candidate) continue;
+    if (!best || (best->error > exact && (*candidate)->error < 0.6 * best->error)) {
+      best = *candidate;
+    }
+  }
+  return best;
+}
+
+/// Finds poses that are inexact only in the first scans.
+void judge_start(const ErrorsAsGiven& errors, Diagnosis& d) {
+  const MotionError& first = errors.first_steps;
+  const MotionError& steps = errors.steps;
+  const bool is_worse = first.translation > kClearlyWorse * steps.translation ||
+                        first.rotation > kClearlyWorse * steps.rotation;
+  d.is_inexact_at_start = first.pairs >= kFewestFirstPairs && is_worse &&
+                          is_inexact(first, steps) && !is_inexact(steps, steps);
+  if (!d.is_inexact_at_start) return;
+  d.start_translation_error = first.translation;
+  d.start_rotation_error = first.rotation;
+}
+
+/// Corrects the verdict by the errors of poses that nothing explains.
+void judge_exactness(const std::vector<RegisteredMotion>& motions, const ErrorsAsGiven& errors,
+                     Diagnosis& d) {
+  const double error = errors.all.at_points;
+  if (d.verdict == PoseVerdict::kDisagree && error < errors.exact) d.verdict = PoseVerdict::kAgree;
+  if (d.verdict == PoseVerdict::kDisagree && error < kRough) d.verdict = PoseVerdict::kInexact;
+  if (d.verdict == PoseVerdict::kNoMotion && error > kRough) d.verdict = PoseVerdict::kDisagree;
+  const bool may_be_inexact =
+      d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion;
+  if (may_be_inexact && (is_inexact(errors.steps, errors.steps) || d.is_inexact_at_start)) {
+    d.verdict = PoseVerdict::kInexact;
+  }
+  const bool is_still = error_at_points(motions, no_motion) < 0.5 * error &&
+                        is_clearly_better(d.standing, d.as_given);
+  if (d.verdict == PoseVerdict::kInexact && is_still) d.verdict = PoseVerdict::kDisagree;
+}
+
 }  // namespace
 
 void compare_with_registration(const Recording& recording, Diagnosis& d) {
@@ -297,12 +370,8 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
   }
   if (recording.frame() != PointFrame::kSensor || d.verdict == PoseVerdict::kUnknown) return;
   const std::vector<RegisteredMotion> motions = register_motions(recording);
-  const BodyMotion given = motion_under(recording, recording.convention());
-  const auto identity = Pose::Identity();
-  const MotionError steps = motion_error(motions, given, identity, Motions::kSteps);
-  const MotionError first_steps = motion_error(motions, given, identity, Motions::kFirstSteps);
-  const MotionError all = motion_error(motions, given, identity);
-  const double before = all.at_points;
+  const ErrorsAsGiven errors(recording, motions);
+  const double before = errors.all.at_points;
   if (d.verdict == PoseVerdict::kAgree && before > kFarOff) {
     // In traffic at the speed of the sensor, a registration can find no motion, though the poses
     // agree with all that stands still. Any other motion contradicts the poses.
@@ -312,62 +381,24 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
     }
     d.verdict = PoseVerdict::kDisagree;
   }
-  const double exact = std::max(kExact, 2.0 * all.noise);
-  d.lost_scans = find_lost_scans(recording, motions, exact);
+  d.lost_scans = find_lost_scans(recording, motions, errors.exact);
   if (d.lost_scans) {
     d.verdict = PoseVerdict::kLostScans;
     return;
   }
-  d.translation_error = steps.translation;
-  d.rotation_error = steps.rotation;
-  d.registered_pairs = steps.pairs;
-  if (motions.size() < kFewestMotions || steps.pairs < kFewestPairs) return;
-
+  d.translation_error = errors.steps.translation;
+  d.rotation_error = errors.steps.rotation;
+  d.registered_pairs = errors.steps.pairs;
+  if (motions.size() < kFewestMotions || errors.steps.pairs < kFewestPairs) return;
   if (before > kExact) {
-    auto reading = explain_by_reading(recording, motions, d.readings, before);
-    std::optional<Explanation> offset;
-    std::optional<Explanation> scale, body;
-    if (before > exact) {
-      offset = explain_by_offset(recording, motions, before);
-      scale = explain_by_scale(recording, motions, before);
-      body = explain_by_body(recording, motions, before);
-    }
-    // A shift by scans is a coarse offset.
-    const bool is_shift = reading && reading->convention.shift != recording.convention().shift;
-    if (is_shift && offset && offset->error < reading->error) reading.reset();
-    const Explanation* best = nullptr;
-    // In the order of fitted numbers: a usual mistake has none, a scale or an offset one, an
-    // extrinsic six. A later one must be clearly better.
-    for (const auto* candidate : {&std::as_const(reading), &std::as_const(scale),
-                                  &std::as_const(offset), &std::as_const(body)}) {
-      if (!*candidate) continue;
-      const bool is_better =
-          best == nullptr || (best->error > exact && (*candidate)->error < 0.6 * best->error);
-      if (is_better) best = &**candidate;
-    }
-    if (best != nullptr) {
-      take(*best, d);
+    const auto meaning = explain(recording, motions, d.readings, before, errors.exact);
+    if (meaning) {
+      take(*meaning, d);
       return;
     }
   }
-  const bool is_worse_at_start = first_steps.translation > kClearlyWorse * steps.translation ||
-                                 first_steps.rotation > kClearlyWorse * steps.rotation;
-  d.is_inexact_at_start = first_steps.pairs >= kFewestFirstPairs && is_worse_at_start &&
-                          is_inexact(first_steps, steps) && !is_inexact(steps, steps);
-  if (d.is_inexact_at_start) {
-    d.start_translation_error = first_steps.translation;
-    d.start_rotation_error = first_steps.rotation;
-  }
-  if (d.verdict == PoseVerdict::kDisagree && before < exact) d.verdict = PoseVerdict::kAgree;
-  if (d.verdict == PoseVerdict::kDisagree && before < kRough) d.verdict = PoseVerdict::kInexact;
-  if (d.verdict == PoseVerdict::kNoMotion && before > kRough) d.verdict = PoseVerdict::kDisagree;
-  const bool may_be_inexact =
-      d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion;
-  if (may_be_inexact && (is_inexact(steps, steps) || d.is_inexact_at_start))
-    d.verdict = PoseVerdict::kInexact;
-  const bool is_still = error_at_points(motions, no_motion) < 0.5 * before &&
-                        is_clearly_better(d.standing, d.as_given);
-  if (d.verdict == PoseVerdict::kInexact && is_still) d.verdict = PoseVerdict::kDisagree;
+  judge_start(errors, d);
+  judge_exactness(motions, errors, d);
 }
 
 void accept_proven_poses(const Recording& recording, Diagnosis& d) {
