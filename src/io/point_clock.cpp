@@ -74,6 +74,7 @@ bool are_random(const std::vector<double>& times, const std::vector<DirectedTime
   constexpr std::size_t kFewest = 100;
   if (by_direction.size() < kFewest || !(share_of_leaps(times, span) > kMostLeaps)) return false;
   std::vector<double> directed;
+  directed.reserve(by_direction.size());
   for (const DirectedTime& one : by_direction) directed.push_back(one.time);
   return share_of_leaps(directed, span) > kMostLeaps;
 }

@@ -31,7 +31,7 @@ double distance_to_cell(double in_cell, int offset) {
 
 Landmarks::Landmarks(PointsView points, const Mounting& mounting, double farthest)
     : half_(static_cast<int>(std::ceil((farthest + kFarthestGap) / kCell)) + 1),
-      columns_(static_cast<std::size_t>(4 * half_ * half_)) {
+      columns_(4 * static_cast<std::size_t>(half_) * static_cast<std::size_t>(half_)) {
   constexpr double kNearest = 2.0;     // m; nearer points belong to the own vehicle
   constexpr double kOverGround = 0.5;  // m; ground agrees under every motion along it
   constexpr double kThinned = 0.25;    // m
@@ -111,7 +111,8 @@ int Landmarks::column_of(double coordinate) const {
 }
 
 std::size_t Landmarks::index_of(int column_x, int column_y) const {
-  return static_cast<std::size_t>(column_y + 2 * half_ * column_x);
+  return static_cast<std::size_t>(column_y) +
+         2 * static_cast<std::size_t>(half_) * static_cast<std::size_t>(column_x);
 }
 
 }  // namespace dynains
