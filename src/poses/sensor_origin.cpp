@@ -227,10 +227,11 @@ Candidate climbed(Measure& measure, const Candidate& start, const std::vector<do
 constexpr double kLeastOffset = 0.4;  // m; beams of one sensor begin at places that differ less
 
 /// Estimate of the origin by the elevations of beams.
-enum class BeamFinding { kAsGiven, kElsewhere, kNothing };
+enum class BeamFinding { kAsGiven, kElsewhere, kPerhapsElsewhere, kNothing };
 
 BeamFinding origin_of_beams(const std::vector<PointBuffer>& scans, Eigen::Vector3d& position) {
-  constexpr double kSharper = 1.3;
+  constexpr double kSharper = 1.3;      // up to 1.33 in de-skewed clouds of fast drives
+  constexpr double kMuchSharper = 2.0;  // origins that were moved gave 3 and more
   BeamSharpness fine(sample_of(scans, 32000));
   const Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   const double given = std::max(fine.at(origin), largest_around(fine, origin, 0.1));
@@ -248,19 +249,25 @@ BeamFinding origin_of_beams(const std::vector<PointBuffer>& scans, Eigen::Vector
     return BeamFinding::kNothing;
   }
   position = found.position;
-  return BeamFinding::kElsewhere;
+  return found.value > kMuchSharper * others ? BeamFinding::kElsewhere
+                                             : BeamFinding::kPerhapsElsewhere;
+}
+
+/// Whether clearly fewer points are hidden from elsewhere than from the origin as given.
+bool are_fewer_hidden(double elsewhere, double as_given) {
+  constexpr double kFewer = 0.6;
+  constexpr double kLeast = 0.01;
+  return as_given - elsewhere > kLeast && elsewhere < kFewer * as_given;
 }
 
 /// By points that are hidden by nearer ones. Seen from above, few are, so that this shows x and y
 /// only.
 std::optional<RayOrigin> origin_of_shadows(HiddenPoints& hidden, double as_given) {
-  constexpr double kFewer = 0.6;
-  constexpr double kLeastHidden = 0.01;
   constexpr double kTooMany = 0.18;  // scans of one sensor had up to 0.14
   const Candidate found = climbed(hidden, {}, {1.0, 0.5, 0.25, 0.1}, 2,
                                   [](double value, double best) { return value < 0.99 * best; });
-  const bool is_there = found.position.norm() > kLeastOffset &&
-                        as_given - found.value > kLeastHidden && found.value < kFewer * as_given;
+  const bool is_there =
+      found.position.norm() > kLeastOffset && are_fewer_hidden(found.value, as_given);
   if (is_there) {
     return RayOrigin{RayOrigin::Known::kHorizontal, found.position, as_given, found.value};
   }
@@ -286,11 +293,14 @@ std::optional<RayOrigin> find_ray_origin(const std::vector<PointBuffer>& scans) 
   if (by_beams == BeamFinding::kAsGiven) return std::nullopt;
   HiddenPoints hidden(scans);
   result.hidden_as_given = hidden.at(Eigen::Vector3d::Zero());
-  if (by_beams == BeamFinding::kElsewhere) {
+  if (by_beams != BeamFinding::kNothing) {
     constexpr double kFewer = 0.9;
     result.hidden = hidden.at(result.position);
     result.known = RayOrigin::Known::kPosition;
-    if (result.hidden < kFewer * result.hidden_as_given) return result;
+    const bool is_there = by_beams == BeamFinding::kElsewhere
+                              ? result.hidden < kFewer * result.hidden_as_given
+                              : are_fewer_hidden(result.hidden, result.hidden_as_given);
+    if (is_there) return result;
   }
   return origin_of_shadows(hidden, result.hidden_as_given);
 }
