@@ -18,7 +18,7 @@ namespace dynains::detail {
 class PlausibilityCheck {
  public:
   static constexpr float kMostUnjudged = 0.98F;
-  static constexpr float kMostGroundFree = 0.35F, kMostInstanceFree = 0.4F;  // each alone
+  static constexpr float kMostGroundFree = 0.35F, kMostInstanceFree = 0.5F;  // each alone
   static constexpr float kGroundFree = 0.12F, kInstanceFree = 0.2F;          // together
   static constexpr float kMostMisfits = 0.35F;
   static constexpr float kMostResidual = 0.05F;  // m
