@@ -18,6 +18,7 @@
 #include "io/text.hpp"
 #include "landmarks.hpp"
 #include "pose_diagnosis.hpp"
+#include "pose_fit.hpp"
 #include "pose_shift.hpp"
 
 namespace dynains {
@@ -62,10 +63,8 @@ Agreement agreement_under(const PoseConvention& convention, const Recording& rec
                           const std::vector<Pair>& pairs) {
   AgreementSum sum;
   for (const Pair& pair : pairs) {
-    const auto T_world_a = recording.pose_under(convention, pair.first);
-    const auto T_world_b = recording.pose_under(convention, pair.second);
-    if (!T_world_a || !T_world_b) continue;
-    sum.add(pair.a.compare(pair.b, T_world_a->inverse() * *T_world_b));
+    const auto T_a_b = motion_under(recording, convention, pair.first, pair.second);
+    if (T_a_b) sum.add(pair.a.compare(pair.b, *T_a_b));
   }
   return sum.mean();
 }
@@ -223,10 +222,9 @@ std::optional<ShiftedGaps> shifted_gaps(const Recording& recording, const Pair& 
   PoseConvention convention = recording.convention();
   convention.shift -= kFarthestShift;
   for (double& gap : gaps) {
-    const auto T_world_a = recording.pose_under(convention, pair.first);
-    const auto T_world_b = recording.pose_under(convention, pair.second);
-    if (!T_world_a || !T_world_b) return std::nullopt;
-    gap = pair.a.compare(pair.b, T_world_a->inverse() * *T_world_b).gap;
+    const auto T_a_b = motion_under(recording, convention, pair.first, pair.second);
+    if (!T_a_b) return std::nullopt;
+    gap = pair.a.compare(pair.b, *T_a_b).gap;
     ++convention.shift;
   }
   return gaps;

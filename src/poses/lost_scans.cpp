@@ -22,18 +22,9 @@ std::vector<ChainErrors> errors_by_chain(const Recording& recording,
                                          const std::vector<RegisteredMotion>& motions, int shift) {
   PoseConvention convention = recording.convention();
   convention.shift += shift;
-  const BodyMotion body = [&](const RegisteredMotion& m) -> std::optional<Pose> {
-    const auto T_world_a = recording.pose_under(convention, m.first);
-    const auto T_world_b = recording.pose_under(convention, m.second);
-    if (!T_world_a || !T_world_b) return std::nullopt;
-    return T_world_a->inverse() * *T_world_b;
-  };
-  std::vector<RegisteredMotion> sorted = motions;
-  std::stable_sort(
-      sorted.begin(), sorted.end(),
-      [](const RegisteredMotion& a, const RegisteredMotion& b) { return a.first < b.first; });
+  const BodyMotion body = motion_under(recording, convention);
   std::vector<ChainErrors> chains;
-  for (const RegisteredMotion& motion : sorted) {
+  for (const RegisteredMotion& motion : motions) {
     if (chains.empty() || chains.back().first_scan != motion.first) {
       chains.push_back({motion.first, {}});
     }

@@ -36,15 +36,6 @@ bool is_inexact(const MotionError& error, const MotionError& all) {
          error.rotation > std::max(kInexactRotation, 3.0 * all.rotation_noise);
 }
 
-BodyMotion motion_under(const Recording& recording, const PoseConvention& convention) {
-  return [&recording, convention](const RegisteredMotion& m) -> std::optional<Pose> {
-    const auto T_world_a = recording.pose_under(convention, m.first);
-    const auto T_world_b = recording.pose_under(convention, m.second);
-    if (!T_world_a || !T_world_b) return std::nullopt;
-    return T_world_a->inverse() * *T_world_b;
-  };
-}
-
 std::optional<Pose> no_motion(const RegisteredMotion& /*motion*/) { return Pose::Identity(); }
 
 BodyMotion motion_after(const Recording& recording, double offset) {

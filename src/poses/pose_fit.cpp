@@ -317,6 +317,20 @@ std::vector<RegisteredMotion> register_motions(const Recording& recording) {
   return motions;
 }
 
+std::optional<Pose> motion_under(const Recording& recording, const PoseConvention& convention,
+                                 std::size_t first, std::size_t second) {
+  const auto T_world_a = recording.pose_under(convention, first);
+  const auto T_world_b = recording.pose_under(convention, second);
+  if (!T_world_a || !T_world_b) return std::nullopt;
+  return T_world_a->inverse() * *T_world_b;
+}
+
+BodyMotion motion_under(const Recording& recording, const PoseConvention& convention) {
+  return [&recording, convention](const RegisteredMotion& motion) {
+    return motion_under(recording, convention, motion.first, motion.second);
+  };
+}
+
 std::optional<RegisteredMotion> register_from(PointsView a, PointsView b, const Pose& given,
                                               std::size_t first, std::size_t second) {
   constexpr double kUncertain = 0.05;  // m

@@ -28,9 +28,8 @@ struct RegisteredMotion {
 inline constexpr std::size_t kStartScans = 6;
 
 /// Registers pairs of scans at some places of a recording, three of them among the first
-/// kStartScans, neighbours and scans farther apart. The
-/// given poses are one of several first guesses. Pairs that determine no motion are left out.
-/// Throws IoError.
+/// kStartScans, neighbours and scans farther apart, in the order of the recording. The given poses
+/// are one of several first guesses. Pairs that determine no motion are left out. Throws IoError.
 std::vector<RegisteredMotion> register_motions(const Recording& recording);
 
 /// The motion at which a registration of two scans ends that begins at `given`; empty if it is not
@@ -40,6 +39,13 @@ std::optional<RegisteredMotion> register_from(PointsView a, PointsView b, const 
 
 /// Motion of the body between two scans under some reading of the poses; empty without poses.
 using BodyMotion = std::function<std::optional<Pose>(const RegisteredMotion&)>;
+
+/// Motion of the sensor between two scans, T_first_second, under a reading of the poses; empty if
+/// one of both has no pose.
+std::optional<Pose> motion_under(const Recording& recording, const PoseConvention& convention,
+                                 std::size_t first, std::size_t second);
+/// The same for registered motions. `recording` must outlive the result.
+BodyMotion motion_under(const Recording& recording, const PoseConvention& convention);
 
 /// Difference of poses and registered motions: medians over pairs.
 struct MotionError {
