@@ -21,7 +21,6 @@
 #include "dynains/city/city_map.hpp"
 #include "dynains/city/session_writer.hpp"
 #include "dynains/compiled_remover.hpp"
-#include "dynains/compiled_remover.hpp"
 #include "dynains/simulation/simulator.hpp"
 
 using namespace dynains;

@@ -1,8 +1,8 @@
-// Trials of what is said about faulty recordings: random worlds times faults of poses and clouds. A
-// fault counts as harmful if at least 5 % more of the static points within 50 m are called moving
-// than with right poses, or if nothing is judged. It is told if the plausibility check of the
-// remover says so, or if `dynains run` would refuse or warn before its first scan; the cause is
-// right if that text has the words of the kind.
+// Trials of the warnings about faulty recordings. Each random world is spoilt by each kind of fault
+// of poses and clouds. A fault counts as harmful if at least 5 % more of the static points within
+// 50 m are called moving than with right poses, or if nothing is judged. It is told if the
+// plausibility check of the remover says so, or if `dynains run` would refuse or warn before its
+// first scan; the cause is right if that text has the words of the kind.
 //   plausibility_trials [FROM [WORLDS [SCANS [right|all]]]]
 // Prints a row for each world and kind with the largest shares of any window, then the counts.
 #include <unistd.h>
@@ -83,14 +83,22 @@ Fault scaled_poses(double factor) {
   });
 }
 
-Fault scaled_points(float factor) {
-  return [factor](const Scans& scans, std::size_t i) {
+/// `change_of_scan(i)` gives the function that changes each coordinate of scan i.
+template <class ChangeOfScan>
+Fault changed_points(ChangeOfScan change_of_scan) {
+  return [change_of_scan](const Scans& scans, std::size_t i) {
     Pushed pushed{scans[i].xyzi, scans[i].T_world_sensor};
+    auto change = change_of_scan(i);
     for (std::size_t k = 0; k < pushed.xyzi.size(); ++k) {
-      if (k % 4 != 3) pushed.xyzi[k] *= factor;
+      if (k % 4 != 3) pushed.xyzi[k] = change(pushed.xyzi[k]);
     }
     return pushed;
   };
+}
+
+Fault scaled_points(float factor) {
+  return changed_points(
+      [factor](std::size_t) { return [factor](float coordinate) { return coordinate * factor; }; });
 }
 
 /// Clouds that were moved into a body in which the sensor lies at (x, y, z), with poses of the
@@ -126,24 +134,18 @@ std::vector<Kind> kinds() {
   };
   const auto right =
       posed([](const Scans& scans, std::size_t i) { return scans[i].T_world_sensor; });
-  const auto random_points = [](const Scans& scans, std::size_t i) {
-    Pushed pushed{scans[i].xyzi, scans[i].T_world_sensor};
-    std::mt19937 random(static_cast<unsigned>(i));
-    std::uniform_real_distribution<float> place(-40.0F, 40.0F);
-    for (std::size_t k = 0; k < pushed.xyzi.size(); ++k) {
-      if (k % 4 != 3) pushed.xyzi[k] = place(random);
-    }
-    return pushed;
-  };
-  const auto noisy_points = [](const Scans& scans, std::size_t i) {
-    Pushed pushed{scans[i].xyzi, scans[i].T_world_sensor};
-    std::mt19937 random(static_cast<unsigned>(i));
-    std::normal_distribution<float> error(0.0F, 0.3F);
-    for (std::size_t k = 0; k < pushed.xyzi.size(); ++k) {
-      if (k % 4 != 3) pushed.xyzi[k] += error(random);
-    }
-    return pushed;
-  };
+  const auto random_points = changed_points([](std::size_t i) {
+    return [random = std::mt19937(static_cast<unsigned>(i)),
+            place = std::uniform_real_distribution<float>(-40.0F, 40.0F)](float) mutable {
+      return place(random);
+    };
+  });
+  const auto noisy_points = changed_points([](std::size_t i) {
+    return [random = std::mt19937(static_cast<unsigned>(i)),
+            error = std::normal_distribution<float>(0.0F, 0.3F)](float coordinate) mutable {
+      return coordinate + error(random);
+    };
+  });
   // Clouds that are lost a third through, so that later ones get the poses of earlier ones.
   const auto lost = [](std::size_t count) {
     return [count](const Scans& scans, std::size_t i) {
@@ -183,7 +185,8 @@ std::vector<Kind> kinds() {
           {"points with noise of 30 cm", none, noisy_points}};
 }
 
-/// What `dynains run` says about the poses before its first scan; empty: nothing.
+/// Text by which `dynains run` would warn or refuse the poses before its first scan; empty if it
+/// accepts them.
 std::string said_by_run(const Scans& scans, const Fault& fault,
                         const std::filesystem::path& folder) {
   std::filesystem::remove_all(folder / "velodyne");

@@ -406,6 +406,23 @@ TEST_CASE("an instance that was hit is removed only if nearly all of it is free 
   CHECK(gone.removes());  // 1.69 is above tau_whole, though below the 2.20 of tau_contested
 }
 
+// Cause of the last supervoxel of a scan whose only instance is tracked.
+Cause last_cause(const Scan& scan, const FreeSpaceConfig& config,
+                 const TrackedInstances::Instance& tracked, float length = 0.0F,
+                 bool may_presume = false) {
+  InstanceEvidence evidence;
+  evidence.samples = scan.samples;
+  evidence.beliefs = scan.beliefs;
+  evidence.tracked.instances = {tracked};
+  evidence.tracked.shapes.resize(1);
+  evidence.tracked.shapes[0].carried = true;
+  evidence.tracked.shapes[0].length = length;
+  InstanceJudge judge(config);
+  std::vector<InstanceJudge::Verdict> verdicts;
+  judge.judge(evidence, scan.updater, may_presume, verdicts, [](std::size_t) {});
+  return verdicts.back().cause;
+}
+
 // Ten supervoxels, of which some are seen free twice and all others are hit.
 Cause cause_with_track(std::size_t free, float moved_on_track, bool use_tracks = true) {
   FreeSpaceConfig config;
@@ -414,17 +431,9 @@ Cause cause_with_track(std::size_t free, float moved_on_track, bool use_tracks =
   std::vector<Scan::Seen> seen(10, {0, 4});
   std::fill_n(seen.begin(), free, Scan::Seen{4, 0});
   for (int i = 0; i < 2; ++i) scan.see(seen);
-  InstanceEvidence evidence;
-  evidence.samples = scan.samples;
-  evidence.beliefs = scan.beliefs;
-  evidence.tracked.instances.resize(1);
-  evidence.tracked.shapes.resize(1);
-  evidence.tracked.shapes[0].carried = true;
-  evidence.tracked.instances[0].past.seen = {moved_on_track, 100.0F};
-  InstanceJudge judge(config);
-  std::vector<InstanceJudge::Verdict> verdicts;
-  judge.judge(evidence, scan.updater, false, verdicts, [](std::size_t) {});
-  return verdicts.back().cause;
+  TrackedInstances::Instance tracked;
+  tracked.past.seen = {moved_on_track, 100.0F};
+  return last_cause(scan, config, tracked);
 }
 
 TEST_CASE("few free samples remove an instance only if enough samples along its track moved") {
@@ -443,18 +452,9 @@ Cause cause_of_long(float length, std::size_t free, std::size_t hit, bool may_pr
   std::fill_n(seen.begin(), free, Scan::Seen{8, 0});
   std::fill_n(seen.begin() + static_cast<std::ptrdiff_t>(free), hit, Scan::Seen{0, 8});
   for (int i = 0; i < 2; ++i) scan.see(seen);
-  InstanceEvidence evidence;
-  evidence.samples = scan.samples;
-  evidence.beliefs = scan.beliefs;
-  evidence.tracked.instances.resize(1);
-  evidence.tracked.shapes.resize(1);
-  evidence.tracked.shapes[0].carried = true;
-  evidence.tracked.shapes[0].length = length;
-  evidence.tracked.instances[0].past.log_odds = 4.0F * kFreeStep;
-  InstanceJudge judge(config);
-  std::vector<InstanceJudge::Verdict> verdicts;
-  judge.judge(evidence, scan.updater, may_presume, verdicts, [](std::size_t) {});
-  return verdicts.back().cause;
+  TrackedInstances::Instance tracked;
+  tracked.past.log_odds = 4.0F * kFreeStep;
+  return last_cause(scan, config, tracked, length, may_presume);
 }
 
 TEST_CASE("a track does not remove a long instance of which most stands and some moved") {
