@@ -148,8 +148,9 @@ class FreeSpaceEvidence {
     const InstanceSamples& samples = record.evidence.samples;
     groups_.assign(1, {Cause::kNotJudged, 0.0F});
     groups_.resize(samples.supervoxel_of_number.size());
-    for (std::size_t i = 1; i < samples.supervoxel_of_number.size(); ++i)
+    for (std::size_t i = 1; i < groups_.size(); ++i) {
       groups_[i] = verdicts_[samples.supervoxel_of_number[i]];
+    }
     moved_ground_.add(split.non_ground(), samples.number_of_point, groups_);
     return {groups_, samples.number_of_point,
             moved_ground_.find(split.ground(), record.ground_boxes, record.ground)};
@@ -424,8 +425,9 @@ class FreeSpaceEvidence {
     }
     detail::ensure_capacity(marks, samples.number_of_point.size());
     marks.resize(samples.number_of_point.size());
-    for (std::size_t i = 0; i < marks.size(); ++i)
+    for (std::size_t i = 0; i < marks.size(); ++i) {
       marks[i] = is_marked_group_[samples.number_of_point[i]];
+    }
   }
 
   Config config_;
@@ -448,12 +450,12 @@ class FreeSpaceEvidence {
   std::uint64_t epoch_ = 0;         // number of the begun epochs
   std::uint64_t epoch_begin_ = 0;   // first scan of the epoch of the newest scan
   std::uint64_t newest_ = 0;
-  std::vector<std::vector<int>> lags_before_;  // by scan since the begin, modulo their number
-  std::vector<std::vector<int>> lags_after_;   // by scans since the latest reference
-  std::vector<Record> records_;                // ring buffer, by scan number
-  std::vector<Verdict> verdicts_;              // by supervoxel
-  std::vector<Verdict> groups_;                // by index in InstanceSamples::supervoxel_of_number
-  std::vector<std::uint8_t> is_marked_group_;  // by index in InstanceSamples::supervoxel_of_number
+  std::vector<std::vector<int>> lags_before_;       // by scan since the begin, modulo their number
+  std::vector<std::vector<int>> lags_after_;        // by scans since the latest reference
+  std::vector<Record> records_;                     // ring buffer, by scan number
+  std::vector<Verdict> verdicts_;                   // by supervoxel
+  std::vector<Verdict> groups_;                     // by number of the supervoxel
+  std::vector<std::uint8_t> is_marked_group_;       // by number of the supervoxel
   std::vector<std::uint8_t> is_moving_, may_move_;  // by non-ground point
   std::vector<std::uint32_t> predecessors_;
 };

@@ -106,8 +106,8 @@ struct InstanceSamples {
   std::vector<std::uint32_t> supervoxel_of;     ///< by sample; padded at the end
   std::vector<std::uint32_t> instance_of;       ///< by supervoxel
   std::vector<std::uint32_t> number_of_point;   ///< by point: number of its supervoxel; 0: none
-  std::vector<std::uint32_t>
-      supervoxel_of_number;  ///< supervoxels by number, which follows the points; [0]: kNoCluster
+  /// By number, which follows the points: index of the supervoxel; [0]: kNoCluster.
+  std::vector<std::uint32_t> supervoxel_of_number;
 
   std::size_t size() const { return sample_begin.empty() ? 0 : sample_begin.back(); }
   std::size_t supervoxel_count() const {
@@ -352,7 +352,7 @@ class InstanceSampler {
 
   float supervoxels_per_metre_;
   float max_range_;
-  SupervoxelTable table_{4096};  // its numbers are indices in InstanceSamples::supervoxel_of_number
+  SupervoxelTable table_{4096};  // numbers of supervoxels
   // By point of a block.
   std::array<std::int32_t, kBlock> xy_ = {}, z_ = {}, instance_ = {}, hash_ = {}, rank_ = {};
   detail::SmallestK samples_;            // by number in the table: indices of points

@@ -157,8 +157,7 @@ class MovedGround {
     });
   }
 
-  // Sets `moved_` by index in InstanceSamples::supervoxel_of_number; returns whether any voxel has
-  // moved.
+  // Sets `moved_` by number of the voxel; returns whether any voxel has moved.
   bool find_free_voxels(const GroundSamples& ground) {
     const InstanceSamples& samples = ground.samples;
     bool any = false;
@@ -201,8 +200,7 @@ class MovedGround {
   InstanceHull hull_;
   Clearance clearance_ = {0.4F, 0.0F};  // between the ground and objects on it
   std::vector<EvidenceVerdict::GroundPoint> found_;
-  std::vector<std::uint8_t>
-      moved_;  // by group, then by index in InstanceSamples::supervoxel_of_number
+  std::vector<std::uint8_t> moved_;  // by group, then by number of the voxel
 };
 
 }  // namespace dynains
