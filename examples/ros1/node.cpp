@@ -5,112 +5,158 @@
 //   publishes   ~static        the static points of each cloud, with all fields
 //               ~dynamic       its moving points
 //               ~map           the map of scans with a final verdict (30 scans later), latched
+//               ~residual      geometry_msgs/PoseWithCovarianceStamped: the aligned motion
 //   parameters  ~fixed_frame   a frame without jumps ["odom"]
 //               ~tf_timeout    how long a cloud waits for its transform, s [0.2]
+//               ~queue         clouds that wait [20]
 //               ~map_period    time between two maps, s [2]
+//               ~preset        "default", "paper", "offline" or "odometry" ["default"]
+//               all parameters of the remover, by their names
+#include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <ros/ros.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <tf2_ros/transform_listener.h>
 
-#include <Eigen/Geometry>
-#include <cstring>
+#include <cstdint>
 #include <exception>
 #include <string>
 
 #include "dynains/adapters/point_cloud2.hpp"
 #include "dynains/compiled_remover.hpp"
+#include "ros_common/find_pose.hpp"
+#include "ros_common/messages.hpp"
+#include "ros_common/remover_loop.hpp"
+#include "ros_common/remover_parameters.hpp"
+#include "ros_common/worker.hpp"
 
+namespace dynains_ros {
 namespace {
 
-Eigen::Isometry3d to_isometry(const geometry_msgs::Transform& transform) {
-  const auto& p = transform.translation;
-  const auto& q = transform.rotation;
-  return Eigen::Translation3d(p.x, p.y, p.z) * Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized();
+using Cloud = sensor_msgs::PointCloud2;
+using Residual = geometry_msgs::PoseWithCovarianceStamped;
+using Loop = RemoverLoop<Cloud::ConstPtr>;
+
+/// Reads private parameters. Without a value, the default stays.
+struct PrivateParameters {
+  ros::NodeHandle node{"~"};
+
+  template <class Value>
+  Value operator()(const std::string& name, Value value) const {
+    node.param(name, value, value);
+    return value;
+  }
+  std::int64_t operator()(const std::string& name, std::int64_t value) const {
+    return (*this)(name, static_cast<int>(value));
+  }
+  template <class Value>
+  Value operator()(const ParameterText& text, const Value& value) const {
+    return (*this)(text.name, value);
+  }
+};
+
+RemoverConfig read_config(const PrivateParameters& parameters) {
+  RemoverConfig config = preset(parameters("preset", std::string("default")));
+  set_parameters(config, parameters);
+  return config;
 }
 
-/// The map as a message with float x y z.
-sensor_msgs::PointCloud2 map_message(const dynains::DynaInsRemover& remover,
-                                     const std::string& frame, ros::Time time) {
-  sensor_msgs::PointCloud2 message;
-  message.header.frame_id = frame;
-  message.header.stamp = time;
-  for (const char* name : {"x", "y", "z"}) {
-    sensor_msgs::PointField field;
-    field.name = name;
-    field.offset = static_cast<std::uint32_t>(4 * message.fields.size());
-    field.datatype = sensor_msgs::PointField::FLOAT32;
-    field.count = 1;
-    message.fields.push_back(field);
-  }
-  message.height = 1;
-  message.width = static_cast<std::uint32_t>(remover.map().size());
-  message.point_step = 12;
-  message.row_step = message.point_step * message.width;
-  message.is_dense = 1;
-  message.data.resize(message.row_step);
-  std::uint8_t* to = message.data.data();
-  remover.map().for_each([&](const Eigen::Vector3d& point) {
-    const Eigen::Vector3f xyz = point.cast<float>();
-    std::memcpy(to, xyz.data(), message.point_step);
-    to += message.point_step;
-  });
-  return message;
+Loop::Config read_loop_config(const PrivateParameters& parameters) {
+  Loop::Config config;
+  config.patience = parameters("tf_timeout", config.patience);
+  config.map_period = parameters("map_period", config.map_period);
+  const int capacity = parameters("queue", static_cast<int>(config.capacity));
+  if (capacity < 1) throw dynains::ConfigError("queue = " + std::to_string(capacity) + " < 1");
+  config.capacity = static_cast<std::size_t>(capacity);
+  return config;
 }
 
 class RemoverNode {
  public:
-  RemoverNode() : listener_(transforms_) {
-    private_.param("fixed_frame", fixed_frame_, fixed_frame_);
-    private_.param("tf_timeout", tf_timeout_, tf_timeout_);
-    private_.param("map_period", map_period_, map_period_);
-    static_ = private_.advertise<sensor_msgs::PointCloud2>("static", kQueue);
-    dynamic_ = private_.advertise<sensor_msgs::PointCloud2>("dynamic", kQueue);
-    map_ = private_.advertise<sensor_msgs::PointCloud2>("map", 1, true);
-    clouds_ = public_.subscribe("points", kQueue, &RemoverNode::on_cloud, this);
-    timer_ = public_.createWallTimer(ros::WallDuration(map_period_), &RemoverNode::on_timer, this);
-  }
+  RemoverNode()
+      : fixed_frame_(parameters_("fixed_frame", std::string("odom"))),
+        listener_(transforms_),
+        static_(parameters_.node.advertise<Cloud>("static", kQueue)),
+        dynamic_(parameters_.node.advertise<Cloud>("dynamic", kQueue)),
+        residual_(parameters_.node.advertise<Residual>("residual", kQueue)),
+        map_(parameters_.node.advertise<Cloud>("map", 1, true)),
+        loop_(read_config(parameters_), read_loop_config(parameters_)),
+        worker_([this] { return step(); }),
+        clouds_(public_.subscribe("points", kQueue, &RemoverNode::on_cloud, this)),
+        timer_(public_.createWallTimer(ros::WallDuration(kReportPeriod), &RemoverNode::on_timer,
+                                       this)) {}
 
  private:
   static constexpr std::uint32_t kQueue = 100;
+  static constexpr double kReportPeriod = 1.0;  // s
 
-  void on_cloud(const sensor_msgs::PointCloud2& message) {
-    try {
-      const geometry_msgs::TransformStamped T_fixed_sensor = transforms_.lookupTransform(
-          fixed_frame_, message.header.frame_id, message.header.stamp, ros::Duration(tf_timeout_));
-      const dynains::FrameResult frame =
-          remover_.push(dynains::PointCloud2View(message), to_isometry(T_fixed_sensor.transform),
-                        dynains::message_time(message));
-      static_.publish(dynains::static_points(message, frame.newest.labels));
-      dynamic_.publish(dynains::dynamic_points(message, frame.newest.labels));
-      newest_ = message.header.stamp;
-    } catch (const std::exception& error) {  // no transform, or an invalid cloud or pose
-      ROS_WARN("cloud left out: %s", error.what());
+  void on_cloud(const Cloud::ConstPtr& message) {
+    if (loop_.add(message, ros::Time::now().toSec())) transforms_.clear();
+    worker_.wake();
+  }
+
+  Worker::Wait step() {
+    const bool has_cleaned = loop_.clean_next(
+        ros::Time::now().toSec(), [this](const Cloud::ConstPtr& cloud) { return pose_of(*cloud); },
+        [this](const Cloud::ConstPtr& cloud, const dynains::FrameResult& frame) {
+          publish(*cloud, frame);
+        });
+    loop_.publish_map(ros::WallTime::now().toSec(), map_.getNumSubscribers() > 0,
+                      [this](const auto& map) {
+                        Cloud message = map_message<Cloud>(map, fixed_frame_);
+                        message.header.stamp = newest_;
+                        map_.publish(message);
+                      });
+    if (has_cleaned) return Worker::Wait(0);
+    return Worker::Wait(loop_.is_waiting() ? 5 : 50);
+  }
+
+  PoseAnswer pose_of(const Cloud& cloud) const {
+    const ros::Time stamp = cloud.header.stamp;
+    return find_pose(transforms_, fixed_frame_, cloud.header.frame_id, stamp, ros::Time(0),
+                     [&](const ros::Time& newest) { return newest < stamp; });
+  }
+
+  void publish(const Cloud& cloud, const dynains::FrameResult& frame) {
+    newest_ = cloud.header.stamp;
+    static_.publish(dynains::static_points(cloud, frame.newest.labels));
+    dynamic_.publish(dynains::dynamic_points(cloud, frame.newest.labels));
+    if (frame.pose_residual) {
+      residual_.publish(residual_message<Residual>(*frame.pose_residual, cloud.header));
     }
   }
 
   void on_timer(const ros::WallTimerEvent&) {
-    if (!remover_.map().empty()) map_.publish(map_message(remover_, fixed_frame_, newest_));
+    const Diagnosis diagnosis = loop_.report(kReportPeriod);
+    if (diagnosis.message == told_) return;
+    told_ = diagnosis.message;
+    if (diagnosis.level != Diagnosis::Level::kOk) ROS_WARN("%s", told_.c_str());
   }
 
   ros::NodeHandle public_;
-  ros::NodeHandle private_{"~"};
-  std::string fixed_frame_ = "odom";
-  double tf_timeout_ = 0.2;
-  double map_period_ = 2.0;
+  PrivateParameters parameters_;
+  std::string fixed_frame_;
   tf2_ros::Buffer transforms_;
   tf2_ros::TransformListener listener_;  // runs in a separate thread
-  ros::Publisher static_, dynamic_, map_;
+  ros::Publisher static_, dynamic_, residual_, map_;
+  ros::Time newest_;
+  Loop loop_;
+  Worker worker_;
   ros::Subscriber clouds_;
   ros::WallTimer timer_;
-  dynains::DynaInsRemover remover_;
-  ros::Time newest_;
+  std::string told_;  // the last report
 };
 
 }  // namespace
+}  // namespace dynains_ros
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "dynains");
-  const RemoverNode node;
-  ros::spin();  // one thread: no call of the remover during another one
+  try {
+    const dynains_ros::RemoverNode node;
+    ros::spin();
+  } catch (const std::exception& error) {  // an invalid parameter
+    ROS_FATAL("%s", error.what());
+    return 1;
+  }
   return 0;
 }

@@ -14,6 +14,7 @@ import time
 
 try:
     import rospy
+    from geometry_msgs.msg import PoseWithCovarianceStamped
     from sensor_msgs.msg import PointCloud2
 except ImportError as error:
     print("SKIPPED:", error)
@@ -56,8 +57,7 @@ def main(program, node, work):
     bag = work / "log" / "drive.bag"
     subprocess.run([program, "simulate", work / "log", "--format", "bag", "--sensor", "vlp16",
                     "--scans", str(SCANS), "--quiet"], check=True)
-    # The node has the default range; a run would look for the body of the robot.
-    subprocess.run([program, "run", bag, "--out", work / "out", "--min-range", "2.7",
+    subprocess.run([program, "run", bag, "--out", work / "out", "--min-range", "2.5",
                     "--write-online", "--quiet"], check=True)
     expected = [counts_of(file) for file in sorted((work / "out" / "online").iterdir())]
     assert len(expected) == SCANS and sum(moving for _, moving in expected) > 0
@@ -77,7 +77,10 @@ def main(program, node, work):
         received = {"static": [], "dynamic": [], "map": []}
         for topic, messages in received.items():
             rospy.Subscriber("/dynains/" + topic, PointCloud2, messages.append)
-        start(node, "_fixed_frame:=map", "_map_period:=0.3")
+        residuals = []
+        rospy.Subscriber("/dynains/residual", PoseWithCovarianceStamped, residuals.append)
+        start(node, "_fixed_frame:=map", "_map_period:=0.3", "_queue:=100", "_tf_timeout:=10",
+              "_min_range:=2.5")
         start("rosbag", "play", "--quiet", "--wait-for-subscribers", "--delay=1", "--rate=2",
               bag)
         wait_for(lambda: len(received["dynamic"]) == SCANS and len(received["static"]) == SCANS,
@@ -94,6 +97,11 @@ def main(program, node, work):
     map_message = received["map"][-1]
     assert map_message.header.frame_id == "map" and map_message.width > 1000
     assert len(map_message.data) == 12 * map_message.width
+    assert len(residuals) > SCANS / 2, f"{len(residuals)} residuals"
+    way = sum((r.pose.pose.position.x ** 2 + r.pose.pose.position.y ** 2) ** 0.5
+              for r in residuals)
+    assert 5 < way < 40, f"{way} m"
+    assert all(0 < r.pose.covariance[0] < 1 for r in residuals)
     print(SCANS, "clouds and", map_message.width, "points of the map")
 
 

@@ -1,0 +1,78 @@
+// Messages of results. The message type is a template parameter, of ROS 1 or ROS 2.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <string>
+
+#include "dynains/verdict.hpp"
+
+namespace dynains_ros {
+
+/// A PointCloud2 with the float fields x, y and z of all points of a map, m, in the frame `frame`.
+template <class Message, class Map>
+Message map_message(const Map& map, const std::string& frame) {
+  Message message;
+  message.header.frame_id = frame;
+  for (const char* name : {"x", "y", "z"}) {
+    message.fields.emplace_back();
+    auto& field = message.fields.back();
+    field.name = name;
+    field.offset = static_cast<std::uint32_t>(4 * (message.fields.size() - 1));
+    field.datatype = 7;  // FLOAT32
+    field.count = 1;
+  }
+  message.height = 1;
+  message.width = static_cast<std::uint32_t>(map.size());
+  message.point_step = 12;
+  message.row_step = message.point_step * message.width;
+  message.is_dense = true;
+  message.data.resize(std::size_t{12} * map.size());
+  std::uint8_t* to = message.data.data();
+  map.for_each([&](const Eigen::Vector3d& point) {
+    const Eigen::Vector3f xyz = point.cast<float>();
+    std::memcpy(to, xyz.data(), 12);
+    to += 12;
+  });
+  return message;
+}
+
+/// Covariance of the aligned motion as geometry_msgs/PoseWithCovariance has it: about the axes of
+/// the previous scan, not of the newest one. Row-major: translation (m), rotation (rad).
+inline std::array<double, 36> covariance_of_message(const dynains::PoseResidual& residual) {
+  using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+  Matrix6 to_previous = Matrix6::Zero();
+  const Eigen::Matrix3d R = residual.T_previous_aligned.linear();
+  to_previous.topLeftCorner<3, 3>() = R;
+  to_previous.bottomRightCorner<3, 3>() = R;
+  std::array<double, 36> result;
+  Eigen::Map<Matrix6>(result.data()) =
+      to_previous * Eigen::Map<const Matrix6>(residual.covariance.data()) * to_previous.transpose();
+  return result;
+}
+
+/// The aligned motion since the previous scan, with its covariance, as a
+/// geometry_msgs/PoseWithCovarianceStamped. `header`: that of the newest cloud. The frame of the
+/// message is that of the sensor at the previous scan.
+template <class Message, class Header>
+Message residual_message(const dynains::PoseResidual& residual, const Header& header) {
+  Message message;
+  message.header = header;
+  auto& pose = message.pose.pose;
+  const Eigen::Vector3d p = residual.T_previous_aligned.translation();
+  const Eigen::Quaterniond q(Eigen::Matrix3d(residual.T_previous_aligned.linear()));
+  pose.position.x = p.x();
+  pose.position.y = p.y();
+  pose.position.z = p.z();
+  pose.orientation.x = q.x();
+  pose.orientation.y = q.y();
+  pose.orientation.z = q.z();
+  pose.orientation.w = q.w();
+  const std::array<double, 36> covariance = covariance_of_message(residual);
+  for (std::size_t i = 0; i < covariance.size(); ++i) message.pose.covariance[i] = covariance[i];
+  return message;
+}
+
+}  // namespace dynains_ros

@@ -1,0 +1,158 @@
+// The work of a node: clouds wait for their poses, are cleaned in order, and are counted. Without
+// types of ROS.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "dynains/adapters/point_cloud2.hpp"
+#include "dynains/compiled_remover.hpp"
+#include "ros_common/cloud_queue.hpp"
+#include "ros_common/loop_report.hpp"
+
+namespace dynains_ros {
+
+/// `CloudPtr` points to a PointCloud2 message. add() and report() may be called by any thread, the
+/// other functions by one thread. Times are in seconds.
+template <class CloudPtr>
+class RemoverLoop {
+ public:
+  struct Config {
+    double patience = 0.2;      ///< s, how long a cloud waits for its pose
+    std::size_t capacity = 20;  ///< clouds that wait
+    double map_period = 2.0;    ///< s, between two maps
+  };
+
+  /// Throws dynains::ConfigError.
+  RemoverLoop(const dynains::DynaInsRemover::Config& remover, const Config& config)
+      : remover_(remover), config_(config), queue_(config.patience, config.capacity) {}
+
+  /// Lets a cloud wait for its pose. Returns whether the time jumped backwards: the caller forgets
+  /// its transforms, and the remover starts anew with this cloud.
+  bool add(CloudPtr cloud, double now) {
+    const double stamp = dynains::message_time(*cloud);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++counts_.arrived;
+    const bool has_jumped =
+        queue_.add(std::move(cloud), stamp, now, [this](Drop reason) { count(reason); });
+    if (has_jumped) {
+      must_reset_ = true;
+      ++totals_.resets;
+    }
+    return has_jumped;
+  }
+
+  bool is_waiting() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return !queue_.empty();
+  }
+
+  /// Cleans the oldest cloud if its pose is known, and calls `publish(cloud, frame)`. `find_pose`:
+  /// see CloudQueue::take(). Returns whether a cloud was taken.
+  template <class FindPose, class Publish>
+  bool clean_next(double now, FindPose&& find_pose, Publish&& publish) {
+    const auto next = take(now, find_pose);
+    if (!next) return false;
+    const auto begin = std::chrono::steady_clock::now();
+    std::optional<dynains::FrameResult> frame;
+    try {
+      frame =
+          remover_.push(dynains::PointCloud2View(*next->cloud), next->T_fixed_sensor, next->stamp);
+    } catch (const std::exception& error) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      count(Drop::kInvalid, error.what());
+      return true;
+    }
+    attempt([&] { publish(next->cloud, std::as_const(*frame)); });
+    const std::chrono::duration<double> time = std::chrono::steady_clock::now() - begin;
+    count(*frame, time.count());
+    return true;
+  }
+
+  /// Calls `publish(map)` if somebody reads maps, the map has changed and the last one is old
+  /// enough. `now`: of a clock that never jumps.
+  template <class Publish>
+  void publish_map(double now, bool has_readers, Publish&& publish) {
+    const bool has_changed = remover_.map().size() != map_points_;
+    if (!has_readers || !has_changed || now < next_map_) return;
+    map_points_ = remover_.map().size();
+    next_map_ = now + config_.map_period;
+    attempt([&] { publish(remover_.map()); });
+  }
+
+  /// Calls `publish()`. A message that cannot be published costs no more than itself. For any
+  /// thread.
+  template <class Publish>
+  void attempt(Publish&& publish) {
+    try {
+      publish();
+    } catch (const std::exception&) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ++counts_.failures;
+    }
+  }
+
+  /// Report since the last one, `seconds` ago; starts a new period.
+  Diagnosis report(double seconds) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    state_.waiting = queue_.size();
+    return diagnose(std::exchange(counts_, LoopCounts()), totals_, state_, seconds);
+  }
+
+ private:
+  template <class FindPose>
+  auto take(double now, FindPose&& find_pose) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (std::exchange(must_reset_, false)) {
+      remover_.reset();
+      state_ = LoopState();
+    }
+    return queue_.take(now, find_pose,
+                       [this](Drop reason, const std::string& text) { count(reason, text); });
+  }
+
+  void count(Drop reason, const std::string& text = "") {
+    ++counts_.dropped[static_cast<std::size_t>(reason)];
+    ++totals_.left_out;
+    if (!text.empty()) counts_.last_reason = text;
+  }
+
+  void count(const dynains::FrameResult& frame, double seconds) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++counts_.taken;
+    ++totals_.taken;
+    counts_.busy += seconds;
+    counts_.slowest = std::max(counts_.slowest, seconds);
+    if (frame.began_epoch == dynains::EpochReason::kJump ||
+        frame.began_epoch == dynains::EpochReason::kMisfit) {
+      ++counts_.misfits;
+    }
+    if (frame.pose_residual) {
+      ++counts_.residuals;
+      counts_.residual += frame.pose_residual->translation;
+    }
+    state_.map_points = remover_.map().size();
+    state_.suspicion = frame.plausibility.suspicion;
+    state_.time_doubt = frame.time_doubt;
+  }
+
+  dynains::DynaInsRemover remover_;
+  Config config_;
+  std::size_t map_points_ = 0;  // of the last map that was published
+  double next_map_ = 0.0;       // s
+
+  mutable std::mutex mutex_;  // guards all below
+  CloudQueue<CloudPtr> queue_;
+  bool must_reset_ = false;
+  LoopCounts counts_;
+  LoopTotals totals_;
+  LoopState state_;
+};
+
+}  // namespace dynains_ros

@@ -1,0 +1,89 @@
+#include "ros_common/loop_report.hpp"
+
+#include <algorithm>
+
+#include "support/catch.hpp"
+
+namespace dynains_ros {
+namespace {
+
+using Level = Diagnosis::Level;
+
+LoopCounts ten_clouds() {
+  LoopCounts counts;
+  counts.arrived = counts.taken = 10;
+  counts.busy = 0.25;
+  counts.slowest = 0.0305;
+  return counts;
+}
+
+std::string value_of(const Diagnosis& diagnosis, const std::string& name) {
+  const auto found = std::find_if(diagnosis.values.begin(), diagnosis.values.end(),
+                                  [&](const auto& value) { return value.first == name; });
+  return found == diagnosis.values.end() ? "missing" : found->second;
+}
+
+TEST_CASE("a report has the rates and times of its period") {
+  LoopCounts counts = ten_clouds();
+  counts.residuals = 4;
+  counts.residual = 0.01;
+  const Diagnosis diagnosis = diagnose(counts, {123, 4, 1}, {2, 5000}, 2.0);
+  CHECK(diagnosis.level == Level::kOk);
+  CHECK(diagnosis.message == "clouds are cleaned");
+  CHECK(value_of(diagnosis, "arriving (Hz)") == "5.0");
+  CHECK(value_of(diagnosis, "cleaned (Hz)") == "5.0");
+  CHECK(value_of(diagnosis, "time per scan (ms)") == "25.0");
+  CHECK(value_of(diagnosis, "slowest scan (ms)") == "30.5");
+  CHECK(value_of(diagnosis, "load (%)") == "12");
+  CHECK(value_of(diagnosis, "waiting") == "2");
+  CHECK(value_of(diagnosis, "mean residual (mm)") == "2.5");
+  CHECK(value_of(diagnosis, "points of the map") == "5000");
+  CHECK(value_of(diagnosis, "cleaned since the start") == "123");
+  CHECK(value_of(diagnosis, "left out since the start") == "4");
+  CHECK(value_of(diagnosis, "resets since the start") == "1");
+}
+
+TEST_CASE("a report tells what is wrong") {
+  LoopCounts counts = ten_clouds();
+  LoopState state;
+  Level level = Level::kWarn;
+  std::string message;
+  SECTION("no cloud") {
+    counts = LoopCounts();
+    message = "no cloud arrives";
+  }
+  SECTION("some clouds are left out") {
+    counts.dropped[static_cast<std::size_t>(Drop::kOverflow)] = 2;
+    counts.dropped[static_cast<std::size_t>(Drop::kNoTransform)] = 3;
+    counts.last_reason = "no frame 'odom'";
+    message = "clouds are left out: 2 queue full, 3 no transform (no frame 'odom')";
+  }
+  SECTION("all clouds are left out") {
+    counts.taken = 0;
+    counts.dropped[static_cast<std::size_t>(Drop::kInvalid)] = 10;
+    level = Level::kError;
+    message = "no cloud is taken: 10 refused";
+  }
+  SECTION("implausible scans, and what else there is") {
+    state.suspicion = dynains::Suspicion::kPoses;
+    counts.misfits = 1;
+    level = Level::kError;
+    message =
+        "scans do not fit to each other: check the transforms; "
+        "poses that do not fit to their scans: 1";
+  }
+  SECTION("doubtful stamps") {
+    state.time_doubt = dynains::TimeDoubt::kTooFast;
+    message = "stamps are less than 1 ms apart";
+  }
+  SECTION("messages that nobody took") {
+    counts.failures = 2;
+    message = "messages that could not be published: 2";
+  }
+  const Diagnosis diagnosis = diagnose(counts, {}, state, 1.0);
+  CHECK(diagnosis.level == level);
+  CHECK(diagnosis.message == message);
+}
+
+}  // namespace
+}  // namespace dynains_ros

@@ -1,0 +1,76 @@
+#include "ros_common/messages.hpp"
+
+#include <vector>
+
+#include "adapters/message.hpp"
+#include "dynains/adapters/point_cloud2.hpp"
+#include "dynains/map/static_map_accumulator.hpp"
+#include "support/catch.hpp"
+
+namespace dynains_ros {
+namespace {
+
+using dynains::test::LookAlike;
+
+struct LookAlikePose {
+  decltype(LookAlike::header) header;
+  struct {
+    struct {
+      struct {
+        double x, y, z;
+      } position;
+      struct {
+        double x, y, z, w;
+      } orientation;
+    } pose;
+    std::array<double, 36> covariance;
+  } pose;
+};
+
+TEST_CASE("a map becomes a message with its points") {
+  dynains::PointBuffer points;
+  points.push_back(1.0F, 2.0F, 3.0F);
+  points.push_back(-4.0F, 5.0F, 0.5F);
+  dynains::StaticMapAccumulator map;
+  map.insert(points, {}, dynains::Pose::Identity());
+  const auto message = map_message<LookAlike>(map, "odom");
+  CHECK(message.header.frame_id == "odom");
+  const dynains::PointCloud2View view(message);
+  REQUIRE(view.size() == 2);
+  CHECK(view.point(0).x() + view.point(1).x() == Approx(-3.0F));
+  CHECK(message.data.size() == 24);
+
+  const auto nothing = map_message<LookAlike>(dynains::StaticMapAccumulator(), "odom");
+  CHECK(nothing.width == 0);
+  CHECK(nothing.data.empty());
+  CHECK(nothing.fields.size() == 3);
+}
+
+TEST_CASE("a residual becomes a pose whose covariance has the axes of the previous scan") {
+  dynains::PoseResidual residual;
+  // The newest scan looks to the left of the previous one: its x is the previous y.
+  residual.T_previous_aligned =
+      Eigen::Translation3d(1, 2, 3) * Eigen::AngleAxisd(M_PI / 2.0, Eigen::Vector3d::UnitZ());
+  residual.covariance[0] = 4.0;                            // x of the newest scan
+  residual.covariance[7 * 3] = 9.0;                        // about x
+  residual.covariance[3] = residual.covariance[18] = 5.0;  // x and about x
+  LookAlike cloud;
+  cloud.header.frame_id = "lidar";
+  const auto message = residual_message<LookAlikePose>(residual, cloud.header);
+  CHECK(message.header.frame_id == "lidar");
+  CHECK(message.pose.pose.position.y == 2.0);
+  CHECK(message.pose.pose.orientation.z == Approx(std::sqrt(0.5)));
+  CHECK(message.pose.pose.orientation.w == Approx(std::sqrt(0.5)));
+  for (std::size_t row = 0; row < 6; ++row) {
+    for (std::size_t column = 0; column < 6; ++column) {
+      double expected = 0.0;
+      if (row == 1 && column == 1) expected = 4.0;
+      if (row == 4 && column == 4) expected = 9.0;
+      if ((row == 1 && column == 4) || (row == 4 && column == 1)) expected = 5.0;
+      CHECK(message.pose.covariance[6 * row + column] == Approx(expected).margin(1e-12));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dynains_ros
