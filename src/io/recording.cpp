@@ -393,6 +393,8 @@ PointFrame Recording::guess_frame() const {
   return around_pose > around_origin ? PointFrame::kWorld : PointFrame::kSensor;
 }
 
+const LogScans* Recording::log() const { return reader_->log(); }
+
 std::uint64_t Recording::point_count(std::size_t i) const {
   return reader_->point_count(address(i));
 }

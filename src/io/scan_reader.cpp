@@ -148,6 +148,7 @@ class LogReader final : public ScanReader {
     const std::lock_guard<std::mutex> lock(mutex_);
     return scans_->read_labels(scan.index);
   }
+  const LogScans* log() const override { return scans_.get(); }
 
  private:
   std::unique_ptr<LogScans> scans_;

@@ -42,6 +42,8 @@ class ScanReader {
                     RecordedScan& points) const = 0;
   /// The column `label`.
   virtual std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const = 0;
+  /// Null if the scans are files.
+  virtual const LogScans* log() const { return nullptr; }
 };
 
 /// For scans in files, one each.

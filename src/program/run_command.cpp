@@ -78,6 +78,7 @@ void print_summary(const RunOutcome& run) {
     print_results(run);
     if (run.alignment) print_alignment(*run.alignment);
   }
+  if (!run.log.empty()) std::cout << "log: " << run.log.string() << std::endl;
   if (!run.page.empty()) std::cout << "page: " << run.page.string() << std::endl;
 }
 
@@ -219,11 +220,20 @@ void add_run_command(CLI::App& app) {
              "also write every scan without its moving points, to the folder clean, in the form it "
              "has in SEQ");
   command
+      .add_option("--write-log", options->log,
+                  "also write the log of SEQ again, as a file or folder of its kind: all messages "
+                  "as they are, except that clouds of the topic have no moving points")
+      ->type_name("FILE")
+      ->group(kOutputs);
+  add_output("--mark", options->mark_log,
+             "clouds of --write-log keep all points and get a field `label` (uint8): 251 moving, "
+             "9 static, 0 not judged");
+  command
       .add_option_function<std::string>(
           "--not-judged",
           [options](const std::string& value) { options->drop_not_judged = value == "drop"; },
-          "points of --write-clean that are not judged, as too near or too far [keep]; the map "
-          "never has them")
+          "points of --write-clean and --write-log that are not judged, as too near or too far "
+          "[keep]; the map never has them")
       ->check(CLI::IsMember({"keep", "drop"}))
       ->type_name("keep|drop")
       ->group(kOutputs);

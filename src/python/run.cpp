@@ -51,7 +51,7 @@ void set_scan(RunArguments& run, const py::handle& value) {
   if (!value.is_none()) run.settings.window.*Field = value.cast<std::size_t>();
 }
 
-const std::array<RunSetting, 25> kRunSettings{{
+const std::array<RunSetting, 27> kRunSettings{{
     {"preset", "'default', 'offline' or 'paper'", "parameters to start from",
      [](RunArguments& run, const py::handle& value) {
        const auto& names = program::preset_names();
@@ -114,7 +114,14 @@ const std::array<RunSetting, 25> kRunSettings{{
      &set_flag<&RunSettings::write_online>},
     {"write_clean", "bool", "also write every scan without its moving points",
      &set_flag<&RunSettings::write_clean>},
-    {"drop_not_judged", "bool", "write_clean leaves out points that are not judged, too",
+    {"write_log", "a path", "file or folder for the log without its moving points",
+     [](RunArguments& run, const py::handle& value) {
+       if (!value.is_none()) run.settings.log = to_path(value).string();
+     }},
+    {"mark", "bool", "clouds of write_log keep all points and get a field label",
+     &set_flag<&RunSettings::mark_log>},
+    {"drop_not_judged", "bool",
+     "write_clean and write_log leave out points that are not judged, too",
      &set_flag<&RunSettings::drop_not_judged>},
     {"write_beliefs", "bool", "also write the probability that a point moves",
      &set_flag<&RunSettings::write_beliefs>},

@@ -16,6 +16,7 @@
 #include "dynains/poses/diagnosis.hpp"
 #include "estimate_poses.hpp"
 #include "interrupt.hpp"
+#include "log_output.hpp"
 #include "lone_scans.hpp"
 #include "output_folder.hpp"
 #include "range_check.hpp"
@@ -263,6 +264,24 @@ nlohmann::ordered_json to_json(const SecondPass& pass, const RunPlan& plan) {
           {"objects", std::move(objects)}};
 }
 
+/// Writes the log of complete results.
+void write_log(const LogOutput& log, const RunPlan& plan, const RunListener& listener,
+               RunOutcome& outcome) {
+  const InterruptGuard interrupt(listener.second_signal);
+  const std::optional<std::size_t> unjudged = log.write(plan.outputs.folder);
+  if (!unjudged) {
+    outcome.complete = false;
+    outcome.signal = InterruptGuard::signal();
+    warn(listener, plan.outputs.log.string() + ": not written; the other results are complete");
+    return;
+  }
+  outcome.log = plan.outputs.log;
+  if (*unjudged == 0) return;
+  warn(listener, outcome.log.string() + ": " + std::to_string(*unjudged) +
+                     " clouds have no verdict, for lack of a pose, by their stamps or by --start "
+                     "and --end; they keep all points");
+}
+
 /// Report of a run that is not finished.
 nlohmann::ordered_json marker_of(const RunPlan& plan) {
   nlohmann::ordered_json marker = unfinished_report(plan.outputs.map_name());
@@ -337,6 +356,8 @@ RunOutcome run(const RunSettings& settings, Recording recording, const RunListen
   const LockedFolder lock(plan.outputs.folder);
   OutputFolder out(Folder(plan.outputs.folder), run_output_kind());
   const RunTask task = choose_task(plan, settings, out);
+  std::optional<LogOutput> log;
+  if (!plan.outputs.log.empty()) log.emplace(plan, settings.force || out.has_results());
   RunOutcome outcome;
   if (task == RunTask::kNothing) {
     out.discard_staging();
@@ -351,6 +372,9 @@ RunOutcome run(const RunSettings& settings, Recording recording, const RunListen
         plan, settings, listener, out,
         task == RunTask::kReplace ? OutputChange::Mode::kStaged : OutputChange::Mode::kInPlace,
         outside_map);
+  }
+  if (log && outcome.complete && !(outcome.was_complete_before && fs::exists(plan.outputs.log))) {
+    write_log(*log, plan, listener, outcome);
   }
   if (settings.view && outcome.complete) {
     outcome.page = write_view(out, plan.sequence, kDefaultViewPoints);

@@ -39,6 +39,7 @@ struct RunOutcome {
   WallTime wall;
   std::optional<SessionAlignment> alignment;  ///< of the session in a map of many sessions
   std::filesystem::path page;                 ///< empty: none was asked for
+  std::filesystem::path log;                  ///< empty: none was written
 };
 
 /// Runs over a recording. SIGINT and SIGTERM end the run after the scan at hand: a new folder then

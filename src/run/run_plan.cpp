@@ -43,6 +43,20 @@ fs::path choose_map(const RunSettings& settings, const DynaInsRemover::Config& c
   return map_path(settings.map, out);
 }
 
+/// Place of the log that is written; empty if there is none. Throws ConfigError.
+fs::path choose_log(const RunSettings& settings) {
+  if (settings.log.empty()) {
+    if (settings.mark_log) throw ConfigError("--mark needs --write-log");
+    return {};
+  }
+  const fs::path out = whole_path(settings.out);
+  const fs::path log = whole_path(settings.log);
+  if (std::mismatch(out.begin(), out.end(), log.begin(), log.end()).first == out.end()) {
+    throw ConfigError("--write-log " + settings.log + ": choose a place outside of --out");
+  }
+  return log;
+}
+
 /// Throws ConfigError.
 void add_map_attributes(const RunSettings& settings, const DynaInsRemover::Config& config,
                         RunOutputs& outputs) {
@@ -95,6 +109,8 @@ RunOutputs outputs_of(const RunSettings& settings) {
   outputs.drop_not_judged = settings.drop_not_judged;
   outputs.write_poses = settings.poses_are_estimated;
   outputs.write_mcap = settings.write_mcap;
+  outputs.log = choose_log(settings);
+  outputs.mark_log = settings.mark_log;
   outputs.write_beliefs = settings.view || settings.write_beliefs;
   outputs.map_on_disk = settings.map_memory.has_value();
   add_map_attributes(settings, config, outputs);
@@ -251,6 +267,10 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
     if (session.T_city_start) request["align_start"] = extrinsic_text(*session.T_city_start);
   }
   if (settings.passes > 1) request["passes"] = settings.passes;
+  if (!outputs.log.empty()) {
+    request["write_log"] = outputs.log.string();
+    request["mark"] = outputs.mark_log;
+  }
   OutputListing listing = outputs.listing(sequence, range, true);
   InputFiles inputs = inputs_of(settings, sequence);
   return {config,

@@ -51,6 +51,8 @@ struct RunOutputs {
   bool write_clean = false;
   bool drop_not_judged = false;  ///< from clean/
   bool write_mcap = false;
+  std::filesystem::path log;  ///< by whole_path(); empty: none
+  bool mark_log = false;      ///< adds labels to its clouds, which keep all points
   bool write_poses = false;
   bool write_beliefs = false;
   bool map_on_disk = false;

@@ -29,6 +29,8 @@ struct RunSettings {
   bool write_online = false;
   bool write_clean = false;
   bool write_mcap = false;
+  std::string log;        ///< file or folder of the log without moving points; empty: none
+  bool mark_log = false;  ///< the log keeps all points, with their labels
   bool write_beliefs = false;
   bool view = false;
   bool force = false;

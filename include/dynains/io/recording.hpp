@@ -220,6 +220,11 @@ class Recording {
   /// One label per point of scan i.
   std::vector<std::uint32_t> read_labels(std::size_t i) const;
 
+  /// The log of ROS, for those who copy it; null for other formats.
+  const LogScans* log() const;
+  /// Index of scan i among the clouds of the log, or the files of scans, with and without a pose.
+  std::size_t file_index(std::size_t i) const { return scans_.at(i).match; }
+
   // Members for comparisons with other conventions.
   const RecordingOptions& options() const { return options_; }
   const PoseConvention& convention() const { return options_.convention; }

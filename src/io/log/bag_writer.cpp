@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
+
+#include "compress.hpp"
 
 namespace dynains {
 namespace {
@@ -62,43 +65,57 @@ std::string BagWriter::file_header() const {
 
 std::uint16_t BagWriter::add_channel(const std::string& topic, const MessageType& type) {
   const auto channel = static_cast<std::uint16_t>(connections_.size());
-  connections_.push_back(bag_record(
-      BagOpcode::kConnection, field("conn", raw(std::uint32_t{channel})) + field("topic", topic),
-      field("topic", topic) + field("type", type.name) + field("md5sum", type.md5) +
-          field("message_definition", type.definition(MessageEncoding::kRos1))));
-  records_ += connections_.back();
+  define(channel,
+         bag_record(BagOpcode::kConnection,
+                    field("conn", raw(std::uint32_t{channel})) + field("topic", topic),
+                    field("topic", topic) + field("type", type.name) + field("md5sum", type.md5) +
+                        field("message_definition", type.definition(MessageEncoding::kRos1))));
   return channel;
 }
 
-void BagWriter::write(std::uint16_t channel, std::uint64_t time, const std::string& message) {
-  index_[channel].push_back({time, static_cast<std::uint32_t>(records_.size())});
-  records_ += bag_record(BagOpcode::kMessage,
-                         field("conn", raw(std::uint32_t{channel})) + field("time", bag_time(time)),
-                         message);
-  if (records_.size() >= kBagChunkSize) finish_chunk();
+void BagWriter::define(std::uint32_t connection, const std::string& record) {
+  connections_[connection] = record;
+  records_ += record;
 }
 
-void BagWriter::finish_chunk() {
+void BagWriter::write(std::uint16_t channel, std::uint64_t time, const std::string& message) {
+  write(channel, time, message.data(), message.size());
+  if (records_.size() >= kBagChunkSize) finish_chunk("");
+}
+
+void BagWriter::write(std::uint32_t connection, std::uint64_t time, const char* data,
+                      std::size_t size) {
+  index_[connection].push_back({time, static_cast<std::uint32_t>(records_.size())});
+  records_ += sized(field("op", raw(BagOpcode::kMessage)) + field("conn", raw(connection)) +
+                    field("time", bag_time(time)));
+  records_ += raw(static_cast<std::uint32_t>(size));
+  records_.append(data, size);
+}
+
+void BagWriter::finish_chunk(const std::string& compression) {
   if (index_.empty()) return;
+  const std::size_t size = records_.size();
   const std::uint64_t chunk = position_;
   append(bag_record(BagOpcode::kChunk,
-                    field("compression", "none") +
-                        field("size", raw(static_cast<std::uint32_t>(records_.size()))),
-                    records_));
+                    field("compression", compression.empty() ? "none" : compression) +
+                        field("size", raw(static_cast<std::uint32_t>(size))),
+                    compress(compression, std::move(records_))));
   std::uint64_t first = index_.begin()->second.front().time;
   std::uint64_t last = first;
   std::string counts;
-  for (const auto& [channel, entries] : index_) {
+  for (const auto& [connection, entries] : index_) {
     const auto count = static_cast<std::uint32_t>(entries.size());
     std::string places;
-    for (const Entry& entry : entries) places += bag_time(entry.time) + raw(entry.offset);
+    for (const Entry& entry : entries) {
+      places += bag_time(entry.time) + raw(entry.offset);
+      first = std::min(first, entry.time);
+      last = std::max(last, entry.time);
+    }
     append(bag_record(BagOpcode::kIndex,
-                      field("ver", raw(std::uint32_t{1})) +
-                          field("conn", raw(std::uint32_t{channel})) + field("count", raw(count)),
+                      field("ver", raw(std::uint32_t{1})) + field("conn", raw(connection)) +
+                          field("count", raw(count)),
                       places));
-    counts += raw(std::uint32_t{channel}) + raw(count);
-    first = std::min(first, entries.front().time);
-    last = std::max(last, entries.back().time);
+    counts += raw(connection) + raw(count);
   }
   chunk_infos_ +=
       bag_record(BagOpcode::kChunkInfo,
@@ -112,9 +129,9 @@ void BagWriter::finish_chunk() {
 }
 
 void BagWriter::commit() {
-  finish_chunk();
+  finish_chunk("");
   index_position_ = position_;
-  for (const std::string& connection : connections_) append(connection);
+  for (const auto& [id, connection] : connections_) append(connection);
   append(chunk_infos_);
   file_.stream().seekp(static_cast<std::streamoff>(std::strlen(kBagMagic)));
   const std::string header = file_header();

@@ -1,6 +1,7 @@
 // Writer of bags of ROS 1 (version 2.0).
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -22,23 +23,29 @@ class BagWriter final : public LogWriter {
   void write(std::uint16_t channel, std::uint64_t time, const std::string& message) override;
   void commit() override;
 
+  // For copies, which keep connections, chunks and compression.
+  /// Adds the record of a connection to the chunk at work.
+  void define(std::uint32_t connection, const std::string& record);
+  void write(std::uint32_t connection, std::uint64_t time, const char* data, std::size_t size);
+  /// `compression`: "lz4", "bz2" or empty.
+  void finish_chunk(const std::string& compression);
+
  private:
   struct Entry {
     std::uint64_t time;    ///< ns
     std::uint32_t offset;  ///< bytes from the begin of the chunk
   };
-  using Index = std::map<std::uint16_t, std::vector<Entry>>;
+  using Index = std::map<std::uint32_t, std::vector<Entry>>;
 
   void append(const std::string& bytes);
-  void finish_chunk();
   std::string file_header() const;
 
   AtomicFile file_;
   std::uint64_t position_ = 0;
-  std::vector<std::string> connections_;  ///< records
-  std::string records_;                   ///< of the chunk at work
-  Index index_;                           ///< of the chunk at work
-  std::string chunk_infos_;               ///< records
+  std::map<std::uint32_t, std::string> connections_;  ///< records
+  std::string records_;                               ///< of the chunk at work
+  Index index_;                                       ///< of the chunk at work
+  std::string chunk_infos_;                           ///< records
   std::uint32_t chunk_count_ = 0;
   std::uint64_t index_position_ = 0;  ///< 0 until the end
 };

@@ -74,6 +74,13 @@ class ChunkedLog : public LogFile {
   }
   void add_channel(std::uint32_t id, LogTopic channel) { channels_[id] = std::move(channel); }
 
+  // For copies.
+  /// The uncompressed records of the chunk, in memory until the next one.
+  const std::vector<std::uint8_t>& load(std::uint64_t chunk);
+  const std::string& compression_of(std::uint64_t chunk) const {
+    return chunks_.at(chunk).compression;
+  }
+
   RawFile file_;
 
  private:
@@ -97,7 +104,6 @@ class ChunkedLog : public LogFile {
   void read_chunk_records(std::uint64_t chunk, bool with_messages);
   void find_missing_channels();
   void make_messages();
-  const std::vector<std::uint8_t>& load(std::uint64_t chunk);
   LoadedChunk& make_room(std::uint64_t size);
   void decompress_to(std::uint64_t chunk, std::vector<std::uint8_t>& records);
 

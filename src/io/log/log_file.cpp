@@ -4,9 +4,13 @@
 
 #include "../failure.hpp"
 #include "../input_file.hpp"
+#include "dynains/io/atomic_file.hpp"
 #include "log_folder.hpp"
 #include "mcap.hpp"
+#include "message_editor.hpp"
+#include "raw_file.hpp"
 #include "ros_bag.hpp"
+#include "staged_folder.hpp"
 #if defined(DYNAINS_HAS_SQLITE3)
 #include "sqlite_bag.hpp"
 #endif
@@ -31,6 +35,36 @@ std::unique_ptr<LogFile> open_file(const fs::path& path) {
   fail(path, "expected a log with the name *.mcap, *.db3 or *.bag");
 }
 
+/// Tells the editor of a log the part of each message.
+class PartEditor final : public MessageEditor {
+ public:
+  PartEditor(MessageEditor& whole, std::uint32_t part) : whole_(whole), part_(part) {}
+
+  void pause() override { whole_.pause(); }
+  bool changes(const LogMessage& place) override { return whole_.changes(in_part(place)); }
+  std::string edited(const LogMessage& place, const std::vector<std::uint8_t>& message) override {
+    return whole_.edited(in_part(place), message);
+  }
+
+ private:
+  LogMessage in_part(LogMessage place) const {
+    place.part = part_;
+    return place;
+  }
+
+  MessageEditor& whole_;
+  std::uint32_t part_;
+};
+
+void copy_text(const fs::path& source, const fs::path& target) {
+  RawFile input(source);
+  const auto bytes = input.read(0, input.size(), "a file");
+  AtomicFile file(target);
+  file.stream().write(reinterpret_cast<const char*>(bytes.data()),
+                      static_cast<std::streamsize>(bytes.size()));
+  file.commit();
+}
+
 /// A log that rosbag2 split into several files.
 class SplitLog final : public LogFile {
  public:
@@ -45,6 +79,7 @@ class SplitLog final : public LogFile {
     finish_index();
   }
 
+  bool is_folder() const override { return true; }
   std::vector<fs::path> files() const override {
     std::vector<fs::path> files;
     if (metadata_) files.push_back(*metadata_);
@@ -55,6 +90,16 @@ class SplitLog final : public LogFile {
     if (message.part != last_part_) parts_[last_part_]->release();
     last_part_ = message.part;
     parts_[message.part]->read(message, bytes);
+  }
+  void copy(const fs::path& target, MessageEditor& editor) override {
+    StagedFolder folder(target);
+    if (metadata_) copy_text(*metadata_, folder.path() / metadata_->filename());
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      PartEditor part(editor, static_cast<std::uint32_t>(i));
+      parts_[i]->copy(folder.path() / parts_[i]->path().filename(), part);
+      parts_[i]->release();
+    }
+    folder.commit();
   }
   void release() override { parts_[last_part_]->release(); }
 

@@ -12,6 +12,8 @@
 
 namespace dynains {
 
+class MessageEditor;
+
 /// How the fields of a message are serialised.
 enum class MessageEncoding : std::uint8_t {
   kRos1,  ///< little endian, without padding
@@ -46,6 +48,8 @@ class LogFile {
   virtual ~LogFile() = default;
 
   const std::filesystem::path& path() const { return path_; }
+  /// Whether the log is a folder of files.
+  virtual bool is_folder() const { return false; }
   /// Every file that belongs to the log.
   virtual std::vector<std::filesystem::path> files() const { return {path_}; }
   const std::vector<LogTopic>& topics() const { return topics_; }
@@ -58,6 +62,11 @@ class LogFile {
 
   /// Replaces `bytes` by the serialised message. Memory of `bytes` is reused.
   virtual void read(const LogMessage& message, std::vector<std::uint8_t>& bytes) = 0;
+  /// Writes the log with the same messages, except those that `editor` replaces: with their topics,
+  /// times and definitions, the attachments, chunks and compression. `target` appears whole or not
+  /// at all; it is a folder if the log is one, and is replaced if it is there. A log that ends
+  /// early is copied up to its end; one in SQLite is an error then.
+  virtual void copy(const std::filesystem::path& target, MessageEditor& editor) = 0;
   /// Gives memory back that the next read() would reuse.
   virtual void release() {}
 

@@ -39,6 +39,9 @@ class LogScans {
 
   const LogFile& log() const { return *log_; }
   std::size_t size() const { return clouds_.size(); }
+  /// Places of the clouds; of topic cloud_topic(), which may have further ones.
+  const std::vector<LogMessage>& clouds() const { return clouds_; }
+  std::uint32_t cloud_topic() const { return cloud_topic_; }
   /// Stamps of the clouds, s, increasing.
   const std::vector<double>& times() const { return times_; }
   /// T_world_sensor (T_world_body if the extrinsic calibration is the user's), at the times of the

@@ -1,8 +1,10 @@
 #include "mcap_writer.hpp"
 
+#include <algorithm>
+
 #include "../scalar.hpp"
+#include "compress.hpp"
 #include "decompress.hpp"
-#include "mcap_format.hpp"
 
 namespace dynains {
 namespace {
@@ -46,52 +48,73 @@ Fields list(const Pairs& pairs) {
 
 }  // namespace
 
-McapWriter::McapWriter(const std::filesystem::path& path) : file_(path) {
-  append(mcap::kMagic + record(mcap::kHeader, Fields().string("ros2").string("dynains")));
+McapWriter::McapWriter(const std::filesystem::path& path)
+    : McapWriter(path, record(mcap::kHeader, Fields().string("ros2").string("dynains"))) {}
+
+McapWriter::McapWriter(const std::filesystem::path& path, const std::string& header) : file_(path) {
+  append(mcap::kMagic + header);
 }
 
 std::uint16_t McapWriter::add_channel(const std::string& topic, const MessageType& type) {
   const auto channel = static_cast<std::uint16_t>(counts_.size());
   const auto schema = static_cast<std::uint16_t>(channel + 1);  // 0 is no schema
-  const std::string records =
-      record(mcap::kSchema, Fields()
-                                .number(schema)
-                                .string(type.ros2_name())
-                                .string("ros2msg")
-                                .string(type.definition(encoding()))) +
-      record(mcap::kChannel,
-             Fields().number(channel).number(schema).string(topic).string("cdr").string(""));
-  definitions_ += records;
-  records_ += records;
-  counts_.push_back(0);
+  define(record(mcap::kSchema, Fields()
+                                   .number(schema)
+                                   .string(type.ros2_name())
+                                   .string("ros2msg")
+                                   .string(type.definition(encoding()))));
+  define(record(mcap::kChannel,
+                Fields().number(channel).number(schema).string(topic).string("cdr").string("")));
+  counts_[channel] = 0;
   return channel;
 }
 
-void McapWriter::write(std::uint16_t channel, std::uint64_t time, const std::string& message) {
-  if (index_.empty()) first_time_ = time;
-  last_time_ = time;
-  index_[channel].push_back({time, records_.size()});
-  const auto sequence = static_cast<std::uint32_t>(counts_.at(channel)++);
-  records_ +=
-      record(mcap::kMessage,
-             Fields().number(channel).number(sequence).number(time).number(time).raw(message));
-  if (records_.size() >= kChunkSize) finish_chunk();
+void McapWriter::define(const std::string& record) {
+  if (defined_.insert(record).second) definitions_ += record;
+  records_ += record;
 }
 
-void McapWriter::finish_chunk() {
+void McapWriter::write(std::uint16_t channel, std::uint64_t time, const std::string& message) {
+  const auto sequence = static_cast<std::uint32_t>(counts_.at(channel));
+  write({channel, sequence, time, time}, message.data(), message.size());
+  if (records_.size() >= kChunkSize) finish_chunk("");
+}
+
+void McapWriter::write(const MessageHead& head, const char* data, std::size_t size) {
+  const bool is_first = index_.empty();
+  first_time_ = is_first ? head.log_time : std::min(first_time_, head.log_time);
+  last_time_ = is_first ? head.log_time : std::max(last_time_, head.log_time);
+  index_[head.channel].push_back({head.log_time, records_.size()});
+  ++counts_[head.channel];
+  const Fields fields = Fields()
+                            .number(head.channel)
+                            .number(head.sequence)
+                            .number(head.log_time)
+                            .number(head.publish_time);
+  records_ += Fields()
+                  .number(mcap::kMessage)
+                  .number(std::uint64_t{fields.bytes().size() + size})
+                  .raw(fields.bytes())
+                  .bytes();
+  records_.append(data, size);
+}
+
+void McapWriter::finish_chunk(const std::string& compression) {
   if (index_.empty()) return;
   const std::uint64_t records_size = records_.size();
   const std::uint32_t checksum =
       crc32(reinterpret_cast<const std::uint8_t*>(records_.data()), records_.size());
-  ChunkPlace chunk{first_time_, last_time_, position_, 0, records_size, {}, 0};
+  const std::string compressed = compress(compression, std::move(records_));
+  ChunkPlace chunk{first_time_,  last_time_,  position_, 0, compressed.size(),
+                   records_size, compression, {},        0};
   append(record(mcap::kChunk, Fields()
                                   .number(first_time_)
                                   .number(last_time_)
                                   .number(records_size)
                                   .number(checksum)
-                                  .string("")
-                                  .number(records_size)
-                                  .raw(records_)));
+                                  .string(compression)
+                                  .number(std::uint64_t{compressed.size()})
+                                  .raw(compressed)));
   chunk.size = position_ - chunk.position;
   for (const auto& [channel, entries] : index_) {
     chunk.indexes[channel] = position_;
@@ -103,25 +126,45 @@ void McapWriter::finish_chunk() {
   index_.clear();
 }
 
+void McapWriter::copy_record(RawFile& source, std::uint64_t position, std::uint64_t size,
+                             std::optional<mcap::Opcode> index_opcode, const std::string& index) {
+  finish_chunk("");
+  if (index_opcode) {
+    (*index_opcode == mcap::kAttachmentIndex ? attachments_ : metadata_) += 1;
+    other_indexes_ += record(*index_opcode, Fields().number(position_).number(size).raw(index));
+  }
+  constexpr std::uint64_t kPart = std::uint64_t{1} << 20;  // bytes
+  for (std::uint64_t done = 0; done < size; done += kPart) {
+    const auto part =
+        source.read(position + done, std::min(kPart, size - done), "a part of a record");
+    append(std::string(part.begin(), part.end()));
+  }
+}
+
 std::string McapWriter::summary() const {
   std::string bytes = definitions_;
+  const auto schemas = static_cast<std::uint16_t>(
+      std::count_if(defined_.begin(), defined_.end(), [](const std::string& definition) {
+        return definition.front() == static_cast<char>(mcap::kSchema);
+      }));
   std::uint64_t messages = 0;
-  std::vector<std::pair<std::uint16_t, std::uint64_t>> counts;
-  for (const std::uint64_t count : counts_) {
-    counts.emplace_back(static_cast<std::uint16_t>(counts.size()), count);
-    messages += count;
+  for (const auto& [channel, count] : counts_) messages += count;
+  std::uint64_t begin = chunks_.empty() ? 0 : chunks_.front().begin_time;
+  std::uint64_t end = 0;
+  for (const ChunkPlace& chunk : chunks_) {
+    begin = std::min(begin, chunk.begin_time);
+    end = std::max(end, chunk.end_time);
   }
-  const std::uint64_t begin = chunks_.empty() ? 0 : chunks_.front().begin_time;
   bytes += record(mcap::kStatistics, Fields()
                                          .number(messages)
-                                         .number(static_cast<std::uint16_t>(counts_.size()))
+                                         .number(schemas)
                                          .number(static_cast<std::uint32_t>(counts_.size()))
-                                         .number(std::uint32_t{0})  // attachments
-                                         .number(std::uint32_t{0})  // metadata
+                                         .number(attachments_)
+                                         .number(metadata_)
                                          .number(static_cast<std::uint32_t>(chunks_.size()))
                                          .number(begin)
-                                         .number(last_time_)
-                                         .raw(list(counts).bytes()));
+                                         .number(end)
+                                         .raw(list(counts_).bytes()));
   for (const ChunkPlace& chunk : chunks_) {
     bytes += record(mcap::kChunkIndex, Fields()
                                            .number(chunk.begin_time)
@@ -130,15 +173,15 @@ std::string McapWriter::summary() const {
                                            .number(chunk.size)
                                            .raw(list(chunk.indexes).bytes())
                                            .number(chunk.indexes_size)
-                                           .string("")
-                                           .number(chunk.records_size)
+                                           .string(chunk.compression)
+                                           .number(chunk.compressed_size)
                                            .number(chunk.records_size));
   }
-  return bytes;
+  return bytes + other_indexes_;
 }
 
 void McapWriter::commit() {
-  finish_chunk();
+  finish_chunk("");
   append(record(mcap::kDataEnd, Fields().number(std::uint32_t{0})));
   const std::uint64_t summary_begin = position_;
   append(summary());

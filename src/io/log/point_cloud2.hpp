@@ -32,6 +32,10 @@ class PointCloud2 {
   explicit PointCloud2(MessageReader& in);
 
   std::size_t size() const { return static_cast<std::size_t>(height_) * width_; }
+  std::uint32_t width() const { return width_; }
+  std::uint32_t point_step() const { return static_cast<std::uint32_t>(point_step_); }
+  /// The points of all rows.
+  const std::uint8_t* data() const { return data_; }
   /// Point i < size().
   const std::uint8_t* point(std::size_t i) const {
     return data_ + i / width_ * row_step_ + i % width_ * point_step_;

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "../failure.hpp"
+#include "bag_writer.hpp"
+#include "message_editor.hpp"
 
 namespace dynains {
 namespace {
@@ -62,6 +64,31 @@ std::uint64_t read_time(Bytes& in) {
   constexpr std::uint64_t kSecond = 1000000000;
   const auto seconds = in.number<std::uint32_t>("seconds");
   return kSecond * seconds + in.number<std::uint32_t>("nanoseconds");
+}
+
+/// Copies the records of a chunk, or one of them. `block`: the byte of the chunk or record.
+void copy_records(Bytes records, std::uint64_t block, MessageEditor& editor, BagWriter& writer) {
+  while (records.remaining() > 0) {
+    LogMessage place;
+    place.block = block;
+    place.offset = records.position();
+    const auto* const begin = reinterpret_cast<const char*>(records.here());
+    const Bytes header = next_header(records);
+    const Bytes content = records.block(records.number<std::uint32_t>("a data length"), "data");
+    const auto opcode = number_in<std::uint8_t>(header, "op");
+    if (opcode != bag::kConnection && opcode != bag::kMessageData) continue;
+    const auto connection = number_in<std::uint32_t>(header, "conn");
+    if (opcode == bag::kConnection) {
+      writer.define(connection, std::string(begin, records.position() - place.offset));
+      continue;
+    }
+    Bytes time = field_of(header, "time");
+    place.time = read_time(time);
+    write_edited(editor, place, content.here(), content.remaining(),
+                 [&](const char* data, std::size_t size) {
+                   writer.write(connection, place.time, data, size);
+                 });
+  }
 }
 
 }  // namespace
@@ -157,6 +184,27 @@ void RosBag::take_connection(const Bytes& header, Bytes content) {
   topic.type = text_in(content, "type");
   topic.encoding = MessageEncoding::kRos1;
   add_channel(number_in<std::uint32_t>(header, "conn"), std::move(topic));
+}
+
+void RosBag::copy(const std::filesystem::path& target, MessageEditor& editor) {
+  BagWriter writer(target);
+  std::uint64_t position = bag::kMagic.size();
+  while (const auto size = record_size(position)) {
+    constexpr std::uint64_t kLongestHead = 4096;
+    const auto head = file_.read(position, std::min(*size, kLongestHead), "a record");
+    Bytes rest(path_, position, head.data(), head.size());
+    const auto opcode = number_in<std::uint8_t>(next_header(rest), "op");
+    if (opcode == bag::kChunk) {
+      const std::vector<std::uint8_t>& records = load(position);
+      copy_records(Bytes(path_, 0, records.data(), records.size()), position, editor, writer);
+      writer.finish_chunk(compression_of(position));
+    } else if (opcode == bag::kConnection || opcode == bag::kMessageData) {
+      const auto record = file_.read(position, *size, "a record");
+      copy_records(Bytes(path_, position, record.data(), record.size()), position, editor, writer);
+    }
+    position += *size;
+  }
+  writer.commit();
 }
 
 }  // namespace dynains

@@ -11,6 +11,8 @@
 
 #include "../failure.hpp"
 #include "../input_file.hpp"
+#include "dynains/io/atomic_file.hpp"
+#include "message_editor.hpp"
 #include "raw_file.hpp"
 
 namespace dynains {
@@ -62,6 +64,19 @@ int spend(void* budget) { return --*static_cast<std::int64_t*>(budget) < 0 ? 1 :
 std::string row_of(std::int64_t row) { return "row " + std::to_string(row) + " of messages: "; }
 
 constexpr const char* kUnreadable = "cannot be read";
+constexpr const char* kNotWritable = "cannot be written";
+
+/// SQL that is stored in the database does not run.
+void refuse_programs(sqlite3* database) {
+  sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+  sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  sqlite3_db_config(database, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+}
+
+void execute(const SqliteDatabase& database, const char* sql, const std::filesystem::path& path) {
+  if (sqlite3_exec(database.get(), sql, nullptr, nullptr, nullptr) == SQLITE_OK) return;
+  fail_by_database(database, path, kNotWritable);
+}
 
 }  // namespace
 
@@ -88,9 +103,7 @@ void SqliteBag::limit(std::uint64_t size) {
   constexpr std::uint64_t kLeast = 1U << 20U;
   constexpr std::uint64_t kMost = 1U << 30U;
   sqlite3* const database = database_.get();
-  sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
-  sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
-  sqlite3_db_config(database, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  refuse_programs(database);
   sqlite3_limit(database, SQLITE_LIMIT_LENGTH, static_cast<int>(std::clamp(size, kLeast, kMost)));
   most_rows_ = size;
   budget_ = static_cast<std::int64_t>(100 + size / 1000);
@@ -194,6 +207,59 @@ bool SqliteBag::step(sqlite3_stmt* statement) {
   if (result == SQLITE_ROW) return true;
   if (result != SQLITE_DONE) fail_by_database(database_, path_, kUnreadable);
   return false;
+}
+
+/// Copies all pages, so that every table stays as it is, and replaces messages afterwards.
+void SqliteBag::copy(const std::filesystem::path& target, MessageEditor& editor) {
+  if (early_end_) fail(path_, "ends early; expected a whole database for a copy");
+  AtomicFile file(target);
+  SqliteDatabase copy =
+      open_database(file.temporary_path(), SQLITE_OPEN_READWRITE, target, kNotWritable);
+  refuse_programs(copy.get());
+  copy_pages(copy, target, editor);
+  // The file takes its name when it is whole: a journal would have no use. What leaves a message
+  // is overwritten by zeros.
+  for (const char* const sql : {"PRAGMA journal_mode = OFF", "PRAGMA synchronous = OFF",
+                                "PRAGMA secure_delete = ON", "BEGIN"}) {
+    execute(copy, sql, target);
+  }
+  SqliteStatement update =
+      prepare_statement(copy, "UPDATE messages SET data = ? WHERE id = ?", target, kNotWritable);
+  std::vector<std::uint8_t> bytes;
+  for (const LogMessage& message : messages_) {
+    if (!editor.changes(message)) continue;
+    read(message, bytes);
+    const std::string edited = editor.edited(message, bytes);
+    sqlite3_reset(update.get());
+    sqlite3_bind_blob64(update.get(), 1, edited.data(), edited.size(), SQLITE_STATIC);
+    sqlite3_bind_int64(update.get(), 2, static_cast<std::int64_t>(message.block));
+    if (sqlite3_step(update.get()) != SQLITE_DONE) fail_by_database(copy, target, kNotWritable);
+    sqlite3_clear_bindings(update.get());
+  }
+  update.reset();
+  execute(copy, "COMMIT", target);
+  if (sqlite3_close(copy.release()) != SQLITE_OK) fail(target, "cannot be written to the end");
+  file.commit();
+}
+
+void SqliteBag::copy_pages(const SqliteDatabase& copy, const std::filesystem::path& target,
+                           MessageEditor& editor) {
+  constexpr int kPages = 4096;
+  sqlite3_backup* const backup = sqlite3_backup_init(copy.get(), "main", database_.get(), "main");
+  if (backup == nullptr) fail_by_database(copy, target, kNotWritable);
+  int result = SQLITE_OK;
+  const auto finish = [&] { return sqlite3_backup_finish(backup); };
+  try {
+    while (result == SQLITE_OK) {
+      editor.pause();
+      budget_ = std::max<std::int64_t>(budget_, 100);
+      result = sqlite3_backup_step(backup, kPages);
+    }
+  } catch (...) {
+    finish();
+    throw;
+  }
+  if (finish() != SQLITE_OK || result != SQLITE_DONE) fail_by_database(copy, target, kNotWritable);
 }
 
 }  // namespace dynains

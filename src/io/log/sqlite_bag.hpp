@@ -17,6 +17,7 @@ class SqliteBag final : public LogFile {
  public:
   explicit SqliteBag(const std::filesystem::path& path);
   void read(const LogMessage& message, std::vector<std::uint8_t>& bytes) override;
+  void copy(const std::filesystem::path& target, MessageEditor& editor) override;
 
  private:
   void limit(std::uint64_t size);
@@ -28,6 +29,8 @@ class SqliteBag final : public LogFile {
   int select(const LogMessage& message);
   SqliteStatement prepare(const char* sql);
   bool step(sqlite3_stmt* statement);
+  void copy_pages(const SqliteDatabase& copy, const std::filesystem::path& target,
+                  MessageEditor& editor);
 
   std::uint64_t most_rows_ = 0;  ///< that are still accepted
   std::int64_t budget_ = 0;      ///< of the progress handler; outlives the database

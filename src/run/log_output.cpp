@@ -1,0 +1,183 @@
+#include "log_output.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/atomic_file.hpp"
+#include "dynains/io/kitti.hpp"
+#include "interrupt.hpp"
+#include "io/log/cloud_edit.hpp"
+#include "io/log/compress.hpp"
+#include "io/log/decompress.hpp"
+#include "io/log/log_folder.hpp"
+#include "io/log/log_scans.hpp"
+#include "io/log/message_editor.hpp"
+#include "labelled_sequence.hpp"
+
+namespace dynains::program {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Part, block and offset of a message.
+using Place = std::tuple<std::uint32_t, std::uint64_t, std::uint64_t>;
+
+Place place_of(const LogMessage& message) { return {message.part, message.block, message.offset}; }
+
+/// Replaces clouds by the labels of a run.
+class CloudEditor final : public MessageEditor {
+ public:
+  /// `labels`: the folder of labels of the scans in `range`.
+  CloudEditor(const Recording& recording, const ScanRange& range, fs::path labels, bool adds_labels,
+              bool drops_not_judged)
+      : log_(*recording.log()),
+        labels_(std::move(labels)),
+        adds_labels_(adds_labels),
+        drops_not_judged_(drops_not_judged) {
+    for (const LogMessage& message : log_.log().messages()) {
+      if (message.topic == log_.cloud_topic()) names_[place_of(message)];
+    }
+    unjudged_ = names_.size();
+    for (std::size_t i = range.first; i <= range.last; ++i) {
+      names_[place_of(log_.clouds()[recording.file_index(i)])] = recording.name(i);
+      --unjudged_;
+    }
+  }
+
+  std::size_t unjudged() const { return unjudged_; }
+
+  void pause() override {
+    if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
+  }
+  bool changes(const LogMessage& place) override {
+    const auto name = names_.find(place_of(place));
+    return name != names_.end() && (adds_labels_ || !name->second.empty());
+  }
+  std::string edited(const LogMessage& place, const std::vector<std::uint8_t>& message) override {
+    const LogTopic& topic = log_.log().topics()[log_.cloud_topic()];
+    const std::string& name = names_.at(place_of(place));
+    std::string text = log_.log().path().string() + ": " + topic.name + " at " +
+                       std::to_string(place.time) + " ns";
+    std::vector<std::uint8_t> bytes = message;
+    std::vector<std::uint8_t> spare;
+    const std::string error =
+        topic.encoding == MessageEncoding::kCdr ? decompress_frame(bytes, spare) : std::string();
+    if (!error.empty()) throw IoError(text + ": " + error);
+    const bool was_compressed = bytes != message;
+    const SerialisedMessage cloud{bytes.data(), bytes.size(), topic.encoding, std::move(text)};
+    const std::vector<std::uint8_t> classes =
+        classes_of(name, inspect_cloud(topic.type, cloud).points);
+    const std::vector<std::uint8_t> stay = kept(classes);
+    std::string result = adds_labels_ ? with_labels(topic.type, cloud, classes)
+                                      : without_points(topic.type, cloud, stay);
+    return compress(was_compressed ? "zstd" : "", std::move(result));
+  }
+
+ private:
+  std::vector<std::uint8_t> classes_of(const std::string& name, std::size_t points) const {
+    std::vector<std::uint8_t> classes(points, static_cast<std::uint8_t>(kRunNotJudged));
+    if (name.empty()) return classes;
+    const fs::path file = labels_ / (name + ".label");
+    const std::vector<std::uint32_t> labels = read_labels(file, points);
+    for (std::size_t i = 0; i < points; ++i) {
+      classes[i] = static_cast<std::uint8_t>(run_class(labels[i], i, file));
+    }
+    return classes;
+  }
+  std::vector<std::uint8_t> kept(std::vector<std::uint8_t> classes) const {
+    for (std::uint8_t& value : classes) {
+      const bool stays = value == kRunStatic || (value == kRunNotJudged && !drops_not_judged_);
+      value = stays ? 1 : 0;
+    }
+    return classes;
+  }
+
+  const LogScans& log_;
+  fs::path labels_;
+  bool adds_labels_;
+  bool drops_not_judged_;
+  std::map<Place, std::string> names_;  ///< of the clouds on the topic; empty: without labels
+  std::size_t unjudged_ = 0;
+};
+
+}  // namespace
+
+LogOutput::LogOutput(const RunPlan& plan, bool may_replace)
+    : recording_(plan.sequence),
+      range_(plan.range),
+      target_(plan.outputs.log),
+      adds_labels_(plan.outputs.mark_log),
+      drops_not_judged_(plan.outputs.drop_not_judged) {
+  check_kind();
+  check_place(plan.inputs, may_replace);
+  const fs::path folder = target_.parent_path();
+  lock_.emplace(folder, FolderLock::Mode::kShared);
+  if (recording_.log()->log().is_folder()) return;
+  remove_leftovers(folder, [&](const std::string& name) { return name == target_.filename(); });
+  const AtomicFile trial(target_);
+  if (count_writers(target_) > 1) {
+    throw UsageError(target_.string() + ": is being written by another run");
+  }
+}
+
+void LogOutput::check_kind() const {
+  const std::string flag = "--write-log " + target_.string() + ": ";
+  if (recording_.log() == nullptr) {
+    throw ConfigError(flag + "the recording is no log; --write-clean writes its scans");
+  }
+  const LogFile& log = recording_.log()->log();
+  const std::string kind = log_extension(log.path());
+  if (log.is_folder() && !log_extension(target_).empty()) {
+    throw ConfigError(flag + "expected the name of a folder, for the log is one");
+  }
+  if (!log.is_folder() && (log_extension(target_) != kind || target_.extension() != kind)) {
+    throw ConfigError(flag + "expected a name that ends in " + kind + ", as that of the log");
+  }
+  if (!adds_labels_) return;
+  const std::string& type = log.topics()[recording_.log()->cloud_topic()].type;
+  if (!can_have_labels(type)) throw ConfigError("--mark: clouds of " + type + " have no labels");
+  if (recording_.columns().label) throw ConfigError("--mark: the clouds have labels already");
+}
+
+void LogOutput::check_place(const InputFiles& inputs, bool may_replace) const {
+  inputs.refuse(target_);
+  const fs::path folder = target_.parent_path();
+  if (!fs::is_directory(folder)) throw IoError(folder.string() + ": is no folder");
+  if (identity_of(folder) == identity_of(recording_.scan_folder())) {
+    throw IoError(target_.string() + ": the log is there; choose another folder for --write-log");
+  }
+  if (!fs::exists(fs::symlink_status(target_))) return;
+  if (!may_replace) {
+    throw IoError(target_.string() +
+                  ": exists; choose another name for --write-log, or replace it by --force");
+  }
+  if (!recording_.log()->log().is_folder()) return;
+  std::set<fs::path> names;
+  for (const fs::path& file : recording_.log()->log().files()) names.insert(file.filename());
+  for (const fs::directory_entry& entry : fs::directory_iterator(target_)) {
+    if (names.count(entry.path().filename()) > 0 && entry.is_regular_file()) continue;
+    throw IoError(target_.string() + ": holds " + entry.path().filename().string() +
+                  ", which is no part of the log; choose another folder for --write-log");
+  }
+}
+
+std::optional<std::size_t> LogOutput::write(const fs::path& results) const {
+  CloudEditor editor(recording_, range_, results / "labels", adds_labels_, drops_not_judged_);
+  try {
+    open_log(recording_.log()->log().path(), recording_.options().accept_missing)
+        ->copy(target_, editor);
+  } catch (const Interrupted&) {
+    return std::nullopt;
+  }
+  return editor.unjudged();
+}
+
+}  // namespace dynains::program

@@ -1,0 +1,38 @@
+// The log of a recording, written again with its clouds cleaned or marked.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+
+#include "dynains/io/folder_lock.hpp"
+#include "dynains/io/recording.hpp"
+#include "run_plan.hpp"
+
+namespace dynains::program {
+
+/// Where the log of a run goes. It is checked before the work begins, and appears whole, when the
+/// results are complete, or not at all.
+class LogOutput {
+ public:
+  /// `outputs.log` is not empty. Throws ConfigError if the recording has no log that can be written
+  /// so, IoError if the target is in the way or read, and UsageError if another run has its folder.
+  LogOutput(const RunPlan& plan, bool may_replace);
+
+  /// Copies the log with the labels of the run in `results`. Returns the number of clouds on the
+  /// topic that have none, which stay as they are; nothing after a signal. Throws IoError.
+  std::optional<std::size_t> write(const std::filesystem::path& results) const;
+
+ private:
+  void check_kind() const;
+  void check_place(const InputFiles& inputs, bool may_replace) const;
+
+  const Recording& recording_;
+  ScanRange range_;
+  std::filesystem::path target_;
+  bool adds_labels_;
+  bool drops_not_judged_;
+  std::optional<FolderLock> lock_;
+};
+
+}  // namespace dynains::program

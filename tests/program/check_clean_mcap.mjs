@@ -1,0 +1,86 @@
+// node check_clean_mcap.mjs LOG.mcap COPY.mcap LABELS: by @mcap/core, the copy that `dynains run
+// --write-log` made has the same schemas, channels and messages, and clouds without the points that
+// are moving by the files in the folder LABELS.
+import assert from "node:assert";
+import { execFileSync } from "node:child_process";
+import fs from "node:fs";
+
+import { packages, require } from "../support/node_check.mjs";
+
+const { core, rosmsg, serialization } = await packages(() => ({
+  core: require("@mcap/core"),
+  rosmsg: require("@foxglove/rosmsg"),
+  serialization: require("@foxglove/rosmsg2-serialization"),
+}));
+
+const [log, copy, folder] = process.argv.slice(2);
+
+const decompress = (command) => (data) =>
+  execFileSync(command, ["-d", "-c", "-q"], { input: data, maxBuffer: 1 << 28 });
+
+async function open(file) {
+  const bytes = fs.readFileSync(file);
+  return core.McapIndexedReader.Initialize({
+    readable: {
+      size: async () => BigInt(bytes.length),
+      read: async (offset, length) =>
+        new Uint8Array(bytes.subarray(Number(offset), Number(offset + length))),
+    },
+    decompressHandlers: { lz4: decompress("lz4"), zstd: decompress("zstd") },
+  });
+}
+
+async function all(messages) {
+  const result = [];
+  for await (const message of messages) result.push(message);
+  return result;
+}
+
+const a = await open(log);
+const b = await open(copy);
+assert.deepStrictEqual(b.header, a.header);
+assert.deepStrictEqual(b.schemasById, a.schemasById);
+assert.deepStrictEqual(b.channelsById, a.channelsById);
+assert.deepStrictEqual(b.statistics, a.statistics);
+const compressions = (reader) => reader.chunkIndexes.map((chunk) => chunk.compression);
+assert.deepStrictEqual(compressions(b), compressions(a));
+const before = await all(a.readMessages());
+const after = await all(b.readMessages());
+assert.strictEqual(after.length, before.length);
+
+const labels = fs.readdirSync(folder).sort();
+let moving = 0;
+for (let i = 0; i < before.length; ++i) {
+  const { data, ...head } = before[i];
+  const { data: cleanData, ...cleanHead } = after[i];
+  assert.deepStrictEqual(cleanHead, head);
+  const schema = a.schemasById.get(a.channelsById.get(head.channelId).schemaId);
+  if (schema.name !== "sensor_msgs/msg/PointCloud2") {
+    assert.ok(Buffer.from(data).equals(Buffer.from(cleanData)));
+    continue;
+  }
+  const definitions = rosmsg.parse(new TextDecoder().decode(schema.data), { ros2: true });
+  const reader = new serialization.MessageReader(definitions);
+  const cloud = reader.readMessage(data);
+  const clean = reader.readMessage(cleanData);
+  const file = fs.readFileSync(`${folder}/${labels.shift()}`);
+  const kept = [];
+  for (let k = 0; k < cloud.width * cloud.height; ++k) {
+    if (file.readUInt16LE(4 * k) === 251) continue;
+    kept.push(Buffer.from(cloud.data.slice(k * cloud.point_step, (k + 1) * cloud.point_step)));
+  }
+  moving += cloud.width - kept.length;
+  assert.ok(Buffer.concat(kept).equals(Buffer.from(clean.data)));
+  assert.deepStrictEqual(
+    { ...clean, data: null },
+    {
+      ...cloud,
+      data: null,
+      height: 1,
+      width: kept.length,
+      row_step: kept.length * cloud.point_step,
+    },
+  );
+}
+assert.ok(moving > 0 && labels.length === 0);
+console.log(`the copy lacks ${moving} moving points and is equal`);

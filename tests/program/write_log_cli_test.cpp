@@ -1,0 +1,262 @@
+// `dynains run --write-log`: the log again, with other clouds.
+#include <sys/resource.h>
+
+#include <csignal>
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "dynains/io/kitti.hpp"
+#include "io/files.hpp"
+#include "io/log/log_file.hpp"
+#include "io/log_writer.hpp"
+#include "program/start.hpp"
+#include "program/tiny_sequence.hpp"
+#include "support/catch.hpp"
+
+using namespace dynains;
+using namespace dynains::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t kScans = 12;
+constexpr std::size_t kPointBytes = 19;
+constexpr std::uint8_t kUint8 = 2, kUint16 = 4;
+
+/// Points with columns that nothing here reads.
+std::string points_of_scan(std::size_t i, const std::vector<bool>& keep = {}) {
+  const std::vector<float> scan = tiny_scan(i);
+  ByteWriter points;
+  for (std::size_t k = 0; k < scan.size() / 4; ++k) {
+    if (!keep.empty() && !keep[k]) continue;
+    for (std::size_t c = 0; c < 4; ++c) points.number(scan[4 * k + c]);
+    points.number(static_cast<std::uint16_t>(k)).number(static_cast<std::uint8_t>(i));
+  }
+  return points.text();
+}
+
+std::string cloud_of(std::size_t i, const std::string& points) {
+  std::vector<CloudField> fields = kXyz;
+  fields.push_back({"intensity", 12, 7});
+  fields.push_back({"ambient", 16, kUint16});
+  fields.push_back({"tag", 18, kUint8});
+  return cloud_message(MessageEncoding::kCdr, 0.1 * static_cast<double>(i), "lidar", fields,
+                       kPointBytes, points);
+}
+
+/// The tiny sequence as a log, with messages of another kind.
+std::string tiny_log() {
+  std::vector<WrittenMessage> messages;
+  for (std::size_t i = 0; i < kScans; ++i) {
+    const double time = 0.1 * static_cast<double>(i);
+    messages.push_back({0, nanoseconds(time), cloud_of(i, points_of_scan(i))});
+    messages.push_back({1, nanoseconds(time), odometry(time, "lidar", pose_at(0, 0))});
+    messages.push_back({2, nanoseconds(time) + 5, "{\"scan\": " + std::to_string(i) + "}"});
+  }
+  return mcap_file({{"/points", "sensor_msgs/msg/PointCloud2"},
+                    {"/odom", "nav_msgs/msg/Odometry"},
+                    {"/camera", "any/msg/Thing", "json"}},
+                   messages, {});
+}
+
+using Message = std::pair<std::string, std::string>;  // topic and time; bytes
+
+std::vector<Message> messages_of(const fs::path& path) {
+  const auto log = open_log(path);
+  std::vector<Message> messages;
+  std::vector<std::uint8_t> bytes;
+  for (const LogMessage& message : log->messages()) {
+    log->read(message, bytes);
+    messages.emplace_back(log->topics()[message.topic].name + ' ' + std::to_string(message.time),
+                          std::string(bytes.begin(), bytes.end()));
+  }
+  return messages;
+}
+
+/// By point of scan i: whether the run calls it moving.
+std::vector<bool> moving_in(const fs::path& out, std::size_t i) {
+  std::vector<bool> moving;
+  const std::size_t count = tiny_scan(i).size() / 4;
+  for (const std::uint32_t label : read_labels(out / "labels" / (scan_name(i) + ".label"), count)) {
+    moving.push_back((label & 0xffffU) == 251);
+  }
+  return moving;
+}
+
+/// The messages that the log without moving points of scans from `first` on has.
+std::vector<Message> cleaned(const fs::path& log, const fs::path& out, std::size_t first) {
+  std::vector<Message> messages = messages_of(log);
+  std::size_t scan = 0;
+  for (Message& message : messages) {
+    if (message.first.rfind("/points", 0) != 0) continue;
+    const std::size_t i = scan++;
+    if (i < first) continue;
+    std::vector<bool> keep = moving_in(out, i);
+    keep.flip();
+    message.second = cloud_of(i, points_of_scan(i, keep));
+  }
+  CHECK(scan == kScans);
+  return messages;
+}
+
+struct Fixture {
+  Fixture() { write_text(log, tiny_log()); }
+
+  Outcome run(const std::vector<std::string>& flags) const {
+    std::vector<std::string> arguments = {"run", log, "--out", out, "--quiet"};
+    arguments.insert(arguments.end(), flags.begin(), flags.end());
+    return start(arguments);
+  }
+
+  TemporaryFolder folder;
+  std::string log = folder / "drive.mcap";
+  std::string out = folder / "out";
+  std::string target = folder / "clean" / "drive.mcap";
+};
+
+}  // namespace
+
+TEST_CASE("--write-log writes the log again: clouds without moving points, all else as it was") {
+  Fixture fixture;
+  fs::create_directory(fixture.folder / "clean");
+  const Outcome outcome = fixture.run({"--write-log", fixture.target});
+  CAPTURE(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK(outcome.err.empty());
+  const std::vector<Message> expected = cleaned(fixture.log, fixture.out, 0);
+  CHECK(expected != messages_of(fixture.log));
+  CHECK(messages_of(fixture.target) == expected);
+  CHECK(count_entries(fixture.folder / "clean") == 1);
+
+  // The log can be run over again, and a complete run needs no second one.
+  CHECK(start({"run", fixture.target, "--out", fixture.folder / "again"}).code == 0);
+  const std::string bytes = read_text(fixture.target);
+  CHECK(fixture.run({"--write-log", fixture.target, "--resume"}).code == 0);
+  fs::remove(fixture.target);
+  CHECK(fixture.run({"--write-log", fixture.target, "--resume"}).code == 0);
+  CHECK(read_text(fixture.target) == bytes);
+}
+
+TEST_CASE("Clouds without a verdict stay in the log as they are, and their number is told") {
+  Fixture fixture;
+  const std::string target = fixture.folder / "window.mcap";
+  const Outcome outcome = fixture.run({"--write-log", target, "--start", "3"});
+  REQUIRE(outcome.code == 0);
+  CHECK_THAT(outcome.err, ContainsSubstring("window.mcap: 3 clouds have no verdict"));
+  CHECK(messages_of(target) == cleaned(fixture.log, fixture.out, 3));
+}
+
+TEST_CASE("--mark adds the labels of the run to all clouds") {
+  Fixture fixture;
+  const std::string target = fixture.folder / "marked.mcap";
+  REQUIRE(fixture.run({"--write-log", target, "--mark", "--start", "3"}).code == 0);
+  const std::vector<Message> before = messages_of(fixture.log);
+  const std::vector<Message> after = messages_of(target);
+  REQUIRE(after.size() == before.size());
+  std::size_t scan = 0;
+  for (std::size_t m = 0; m < before.size(); ++m) {
+    CHECK(after[m].first == before[m].first);
+    if (before[m].first.rfind("/points", 0) != 0) {
+      CHECK(after[m].second == before[m].second);
+      continue;
+    }
+    const std::size_t i = scan++;
+    const std::size_t count = tiny_scan(i).size() / 4;
+    const std::vector<std::uint32_t> labels =
+        i < 3 ? std::vector<std::uint32_t>(count, 0)
+              : read_labels(fs::path(fixture.out) / "labels" / (scan_name(i) + ".label"), count);
+    const std::string points = points_of_scan(i);
+    std::string expected;
+    for (std::size_t k = 0; k < count; ++k) {
+      expected += points.substr(kPointBytes * k, kPointBytes);
+      expected += static_cast<char>(labels[k] & 0xffU);
+      expected += std::string(3, '\0');
+    }
+    // The flag of dense clouds is behind the points.
+    const std::string& cloud = after[m].second;
+    CHECK(cloud.substr(cloud.size() - 1 - expected.size(), expected.size()) == expected);
+  }
+  // The marked log is a recording with labels.
+  CHECK(start({"eval", target, fixture.out}).code == 0);
+  const Outcome again = start({"run", target, "--out", fixture.folder / "again", "--write-log",
+                               fixture.folder / "twice.mcap", "--mark"});
+  CHECK(again.code == 2);
+  CHECK_THAT(again.err, ContainsSubstring("have labels already"));
+}
+
+TEST_CASE("A log that is a folder is written as a folder") {
+  Fixture fixture;
+  const fs::path parts = fixture.folder / "parts";
+  fs::create_directory(parts);
+  fs::rename(fixture.log, parts / "parts_0.mcap");
+  write_text(parts / "metadata.yaml", "relative_file_paths:\n  - parts_0.mcap\n");
+  fixture.log = parts;
+  const fs::path target = fixture.folder / "clean_parts";
+  REQUIRE(fixture.run({"--write-log", target}).code == 0);
+  CHECK(messages_of(target) == cleaned(parts, fixture.out, 0));
+  CHECK(count_entries(target) == 2);
+  CHECK(fixture.run({"--write-log", target, "--force"}).code == 0);
+  write_text(target / "notes.txt", "mine");
+  const Outcome outcome = fixture.run({"--write-log", target, "--force"});
+  CHECK(outcome.code == 1);
+  CHECK_THAT(outcome.err, ContainsSubstring("notes.txt, which is no part of the log"));
+}
+
+TEST_CASE("--write-log refuses places and recordings before the run, and changes nothing") {
+  Fixture fixture;
+  write_tiny_sequence(fixture.folder / "seq", 4);
+  write_text(fixture.folder / "mine.mcap", "mine");
+  const std::string there = fixture.folder / "mine.mcap";
+  const std::string before = read_text(fixture.log);
+  struct Case {
+    std::vector<std::string> flags;
+    int code;
+    std::string text;
+  };
+  const std::vector<Case> cases = {
+      {{"--write-log", there}, 1, "exists; choose another name"},
+      {{"--write-log", fixture.log, "--force"}, 1, "drive.mcap"},
+      {{"--write-log", fixture.folder / "a.bag"}, 2, "ends in .mcap"},
+      {{"--write-log", fixture.folder / "folder"}, 2, "ends in .mcap"},
+      {{"--write-log", fs::path(fixture.out) / "a.mcap"}, 2, "outside of --out"},
+      {{"--write-log", fixture.folder / "none" / "a.mcap"}, 1, "is no folder"},
+      {{"--mark"}, 2, "--mark needs --write-log"}};
+  for (const Case& one : cases) {
+    const Outcome outcome = fixture.run(one.flags);
+    CAPTURE(one.text, outcome.err);
+    CHECK(outcome.code == one.code);
+    CHECK_THAT(outcome.err, ContainsSubstring(one.text));
+    CHECK_FALSE(fs::exists(fixture.out));
+  }
+  fixture.log = fixture.folder / "seq";
+  const Outcome outcome = fixture.run({"--write-log", fixture.folder / "a.mcap"});
+  CHECK(outcome.code == 2);
+  CHECK_THAT(outcome.err, ContainsSubstring("the recording is no log"));
+  CHECK(read_text(there) == "mine");
+  CHECK(read_text(fixture.folder / "drive.mcap") == before);
+}
+
+TEST_CASE("A log that does not fit on the disk is not there, and the other results are complete") {
+  Fixture fixture;
+  const std::string target = fixture.folder / "big.mcap";
+  const auto limit_files = [&] {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{900000, 900000};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  };
+  REQUIRE(fs::file_size(fixture.log) > 1000000);
+  const Outcome outcome = start(
+      {"run", fixture.log, "--out", fixture.out, "--quiet", "--write-log", target}, limit_files);
+  CHECK(outcome.code == 1);
+  CHECK_THAT(outcome.err, ContainsSubstring("big.mcap"));
+  CHECK(count_entries(fixture.folder.path()) == 2);
+  const auto report = nlohmann::json::parse(read_text(fs::path(fixture.out) / "report.json"));
+  CHECK(report["complete"] == true);
+  // --resume makes up for it.
+  CHECK(fixture.run({"--write-log", target, "--resume"}).code == 0);
+  CHECK(messages_of(target) == cleaned(fixture.log, fixture.out, 0));
+}
