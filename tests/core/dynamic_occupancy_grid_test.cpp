@@ -13,6 +13,8 @@
 namespace dynains::test {
 namespace {
 
+using namespace detail;
+
 using Count = DynamicOccupancyGrid::Count;
 using Verdict = DynamicOccupancyGrid::Verdict;
 

@@ -21,6 +21,8 @@
 namespace dynains::test {
 namespace {
 
+using namespace detail;
+
 constexpr std::uint32_t kNoLimit = 64;
 
 TEST_CASE("references are the nearest scans with an image behind the wanted ones") {

@@ -17,6 +17,8 @@
 namespace dynains::test {
 namespace {
 
+using namespace detail;
+
 using Belief = InstanceBeliefs::Belief;
 
 constexpr float kFreeStep = 0.8472979F;  // log-odds of p_free = 0.7

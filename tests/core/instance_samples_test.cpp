@@ -18,6 +18,8 @@
 namespace dynains::test {
 namespace {
 
+using namespace detail;
+
 using Place = std::tuple<std::uint32_t, std::int32_t, std::int32_t, std::int32_t>;
 using Point = std::array<float, 3>;
 
@@ -216,7 +218,7 @@ TEST_CASE("the number of samples in each part of a supervoxel is proportional to
 TEST_CASE("rows of ranks keep the least of all given ranks, in order") {
   Random random(3);
   for (const std::size_t most : {1U, 2U, 3U, 4U, 5U, 64U}) {
-    detail::SmallestK ranks(most);
+    SmallestK ranks(most);
     for (int round = 0; round < 3; ++round) {
       ranks.clear();
       std::map<std::size_t, std::vector<std::pair<std::uint32_t, std::uint32_t>>> rows;

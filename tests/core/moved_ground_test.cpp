@@ -17,6 +17,8 @@
 namespace dynains::test {
 namespace {
 
+using namespace detail;
+
 constexpr float kUnknown = SurroundingGround::kUnknown;
 constexpr float kAnyRise = 100.0F;  // m, so that every point is kept
 

@@ -18,6 +18,8 @@
 namespace dynains::test {
 namespace {
 
+using namespace detail;
+
 using simulation::Scene;
 using simulation::Sensor;
 using simulation::SimulatedScan;

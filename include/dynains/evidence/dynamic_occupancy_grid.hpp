@@ -14,7 +14,7 @@
 #include "dynains/verdict.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
-namespace dynains {
+namespace dynains::detail {
 
 /// Counts dynamic and static samples per cell of the world. In cells where nearly all samples are
 /// dynamic, the remaining samples become dynamic, too. Reason: in a crowd, pedestrians occlude each
@@ -48,7 +48,7 @@ class DynamicOccupancyGrid {
   void judge(std::uint64_t scan, const InstanceSamples& samples, const Pose& T_origin_sensor,
              std::vector<Count>& counted, std::vector<Verdict>& verdicts) {
     if (lines_.empty()) return;
-    detail::find_cells(samples, cell_, T_origin_sensor, keys_);
+    find_cells(samples, cell_, T_origin_sensor, keys_);
     const std::uint32_t now = static_cast<std::uint32_t>(scan) + 1;
     for (std::size_t s = 0; s < samples.supervoxel_count(); ++s) {
       const Count count = count_of(verdicts[s].cause);
@@ -172,4 +172,4 @@ class DynamicOccupancyGrid {
   std::vector<VoxelKey> keys_;  // by sample
 };
 
-}  // namespace dynains
+}  // namespace dynains::detail

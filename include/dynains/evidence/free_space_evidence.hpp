@@ -56,14 +56,14 @@ class FreeSpaceEvidence {
         dynamic_grid_(config),
         moved_ground_(config),
         records_(static_cast<std::size_t>(config.lookahead_scans) + 2) {
-    const ReferenceSpan& span = references_.span();
+    const detail::ReferenceSpan& span = references_.span();
     for (int phase = 0; phase < span.sparse_step; ++phase) {
       lags_before_.push_back(span.lags_before(phase));
     }
     for (int phase = 0; phase < span.step; ++phase) {
       const auto delay = static_cast<int>(delay_of(static_cast<std::uint64_t>(phase)));
       lags_after_.push_back(
-          reference_lags(config.lookahead_scans - delay, span.step - phase, span.step));
+          detail::reference_lags(config.lookahead_scans - delay, span.step - phase, span.step));
     }
   }
 
@@ -145,7 +145,7 @@ class FreeSpaceEvidence {
     Record& record = record_of(scan);
     judge_instances(is_final, record);
     judge_by_dynamic_grid(scan, record);
-    const InstanceSamples& samples = record.evidence.samples;
+    const detail::InstanceSamples& samples = record.evidence.samples;
     groups_.assign(1, {Cause::kNotJudged, 0.0F});
     groups_.resize(samples.supervoxel_of_number.size());
     for (std::size_t i = 1; i < groups_.size(); ++i) {
@@ -161,7 +161,7 @@ class FreeSpaceEvidence {
   void make_reference(const GroundSplit& split) {
     const Record& record = record_of(newest_);
     if (phase_of(record) != 0) return;
-    const InstanceEvidence& evidence = record.evidence;
+    const detail::InstanceEvidence& evidence = record.evidence;
     is_moving_.clear();
     if (config_.ignore_dynamic_returns) {
       mark_points(
@@ -198,14 +198,14 @@ class FreeSpaceEvidence {
   const std::optional<EpochReason>& misfit() const { return pose_correction_.misfit(); }
 
   /// Free and hit samples of the newest scan, by references of earlier scans.
-  SurfaceCounts surfaces() const {
+  detail::SurfaceCounts surfaces() const {
     const Record& record = records_[newest_ % records_.size()];
-    SurfaceCounts counts;
+    detail::SurfaceCounts counts;
     for (std::size_t i = 0; i < record.ground.size(); ++i) {
       counts.ground_hit += record.ground.hit[i];
       counts.ground_free += record.ground.free[i];
     }
-    for (const InstanceBeliefs::Counts& instance : record.evidence.beliefs.counts) {
+    for (const detail::InstanceBeliefs::Counts& instance : record.evidence.beliefs.counts) {
       counts.instances_decided += instance.decided;
       counts.instances_free += instance.moved;
     }
@@ -217,27 +217,27 @@ class FreeSpaceEvidence {
 
  private:
   using Verdict = EvidenceVerdict::Group;
-  using Instance = TrackedInstances::Instance;
+  using Instance = detail::TrackedInstances::Instance;
   struct Record {
-    std::uint64_t epoch = ReferenceScan::kNoEpoch;
+    std::uint64_t epoch = detail::ReferenceScan::kNoEpoch;
     Pose T_world_sensor = Pose::Identity();
     std::uint64_t since_begin = 0;  // scans since the first scan of the epoch
-    InstanceEvidence evidence;
-    std::vector<DynamicOccupancyGrid::Count> counted;  // by supervoxel
-    std::vector<GroundBox> ground_boxes;               // by block of 64 ground points
-    GroundSamples ground;
+    detail::InstanceEvidence evidence;
+    std::vector<detail::DynamicOccupancyGrid::Count> counted;  // by supervoxel
+    std::vector<detail::GroundBox> ground_boxes;               // by block of 64 ground points
+    detail::GroundSamples ground;
   };
   // Working memory of a thread that tests samples.
   struct Tester {
     explicit Tester(const FreeSpaceConfig& config) : updater(config) {}
-    InstanceBeliefUpdater updater;
+    detail::InstanceBeliefUpdater updater;
     detail::Visibility visibility;
   };
-  const InstanceBeliefUpdater& updater() const { return newest_tester_.updater; }
+  const detail::InstanceBeliefUpdater& updater() const { return newest_tester_.updater; }
 
   void forget_scans() {
     references_.forget();
-    for (Record& record : records_) record.epoch = ReferenceScan::kNoEpoch;
+    for (Record& record : records_) record.epoch = detail::ReferenceScan::kNoEpoch;
   }
 
   void begin_epoch(std::uint64_t scan, const Pose& T_world_sensor) {
@@ -260,16 +260,17 @@ class FreeSpaceEvidence {
 
   void begin_evidence(PointsView points, Span<const std::uint32_t> instance_of,
                       std::size_t instance_count, Record& record) {
-    InstanceEvidence& evidence = record.evidence;
+    detail::InstanceEvidence& evidence = record.evidence;
     sampler_.sample(points, instance_of, instance_count, evidence.samples);
     updater().begin(evidence.samples, evidence.beliefs);
-    record.counted.assign(evidence.samples.supervoxel_count(), DynamicOccupancyGrid::Count::kNone);
+    record.counted.assign(evidence.samples.supervoxel_count(),
+                          detail::DynamicOccupancyGrid::Count::kNone);
     predecessors_.assign(instance_count, kNoCluster);
   }
 
   void link_to_previous(std::uint64_t scan, Record& record) {
     if (!config_.use_tracks) return;
-    InstanceEvidence& evidence = record.evidence;
+    detail::InstanceEvidence& evidence = record.evidence;
     linker_.measure(evidence.samples, detail::composed(T_origin_world_, record.T_world_sensor),
                     evidence.tracked);
     if (scan > epoch_begin_) linker_.link(record_of(scan - 1).evidence.tracked, evidence.tracked);
@@ -283,7 +284,7 @@ class FreeSpaceEvidence {
     for (const int lag : lags_before_[record.since_begin % lags_before_.size()]) {
       const auto back = static_cast<std::uint64_t>(lag);
       if (back > record.since_begin) break;
-      const ReferenceScan* const reference = references_.find(scan - back, record.epoch);
+      const detail::ReferenceScan* const reference = references_.find(scan - back, record.epoch);
       if (reference != nullptr) test(newest_tester_, record, *reference, -lag);
     }
     updater().begin_later_references(record.evidence.samples, record.evidence.beliefs);
@@ -296,18 +297,18 @@ class FreeSpaceEvidence {
   }
 
   // Tests all samples of a scan against one reference. `lag`: scans from the scan to the reference.
-  void test(Tester& tester, Record& record, const ReferenceScan& reference, int lag) const {
+  void test(Tester& tester, Record& record, const detail::ReferenceScan& reference, int lag) const {
     record.ground.add(references_.test(record.ground.samples.points, record.ground.size(),
                                        record.T_world_sensor, reference, tester.visibility));
-    InstanceEvidence& evidence = record.evidence;
+    detail::InstanceEvidence& evidence = record.evidence;
     const detail::Visibility& visibility =
         references_.test(evidence.samples.points, evidence.samples.size(), record.T_world_sensor,
                          reference, tester.visibility);
     const Pose T_sensor_reference =
         detail::composed(detail::inverted(record.T_world_sensor), reference.T_world_beams);
-    const InstanceViews::Position position = {static_cast<float>(T_sensor_reference(0, 3)),
-                                              static_cast<float>(T_sensor_reference(1, 3)),
-                                              static_cast<float>(T_sensor_reference(2, 3))};
+    const detail::InstanceViews::Position position = {static_cast<float>(T_sensor_reference(0, 3)),
+                                                      static_cast<float>(T_sensor_reference(1, 3)),
+                                                      static_cast<float>(T_sensor_reference(2, 3))};
     tester.updater.update(evidence.samples, visibility, position, evidence.beliefs,
                           [&](std::size_t instance) {
                             if (!config_.use_tracks) return;
@@ -331,7 +332,7 @@ class FreeSpaceEvidence {
       if (delay_of(phase) == delay) test_older_scans_of_phase(phase, references_.newest());
     }
   }
-  void test_older_scans_of_phase(std::uint64_t phase, const ReferenceScan& reference) {
+  void test_older_scans_of_phase(std::uint64_t phase, const detail::ReferenceScan& reference) {
     for (const int lag : lags_after_[phase]) {
       const auto back = static_cast<std::uint64_t>(lag);
       if (back > reference.scan) break;
@@ -344,13 +345,13 @@ class FreeSpaceEvidence {
 
   void update_own_log_odds(Record& record) const {
     if (!config_.use_tracks) return;
-    InstanceEvidence& evidence = record.evidence;
+    detail::InstanceEvidence& evidence = record.evidence;
     std::vector<std::uint8_t>& changed = evidence.beliefs.changed;
     for (std::size_t instance = 0; instance < changed.size(); ++instance) {
       if (changed[instance] == 0) continue;
       changed[instance] = 0;
       Instance& tracked = evidence.tracked.instances[instance];
-      const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
+      const detail::InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
       tracked.own = judge_.own_log_odds(evidence, updater(), instance);
       tracked.seen = {static_cast<float>(counts.moved), static_cast<float>(counts.decided)};
     }
@@ -386,12 +387,12 @@ class FreeSpaceEvidence {
   }
 
   // Adds the ground below a compact instance that is removed as a whole.
-  void add_hull(const InstanceEvidence& evidence, std::size_t instance) {
+  void add_hull(const detail::InstanceEvidence& evidence, std::size_t instance) {
     constexpr float kLeastHeight = 0.3F;  // m
     if (!config_.use_tracks) return;
-    const TrackedInstances::Shape& shape = evidence.tracked.shapes[instance];
+    const detail::TrackedInstances::Shape& shape = evidence.tracked.shapes[instance];
     if (!shape.carried || shape.height < kLeastHeight) return;
-    const InstanceSamples& samples = evidence.samples;
+    const detail::InstanceSamples& samples = evidence.samples;
     const std::uint32_t begin = samples.sample_begin[samples.supervoxel_begin[instance]];
     const std::uint32_t end = samples.sample_begin[samples.supervoxel_begin[instance + 1]];
     moved_ground_.add_hull(PointsView(samples.points).subview(begin, end - begin));
@@ -404,12 +405,12 @@ class FreeSpaceEvidence {
                         verdicts_);
   }
 
-  bool surely_moves(const InstanceEvidence& evidence, std::uint32_t supervoxel) const {
+  bool surely_moves(const detail::InstanceEvidence& evidence, std::uint32_t supervoxel) const {
     return judge_.surely_moves(evidence, supervoxel, verdicts_[supervoxel].cause);
   }
   // Whether the instance of a supervoxel is small enough to move, and does not stand still by the
   // evidence on this scan. Slow vehicles around the sensor would pull its pose along.
-  bool may_move(const InstanceEvidence& evidence, std::uint32_t supervoxel) const {
+  bool may_move(const detail::InstanceEvidence& evidence, std::uint32_t supervoxel) const {
     if (!config_.use_tracks) return false;
     const std::uint32_t instance = evidence.samples.instance_of[supervoxel];
     return evidence.tracked.shapes[instance].carried &&
@@ -418,7 +419,8 @@ class FreeSpaceEvidence {
 
   // Writes by non-ground point whether `test(supervoxel)` holds.
   template <class Test>
-  void mark_points(const InstanceSamples& samples, Test&& test, std::vector<std::uint8_t>& marks) {
+  void mark_points(const detail::InstanceSamples& samples, Test&& test,
+                   std::vector<std::uint8_t>& marks) {
     is_marked_group_.assign(samples.supervoxel_of_number.size(), 0);
     for (std::size_t i = 1; i < samples.supervoxel_of_number.size(); ++i) {
       is_marked_group_[i] = test(samples.supervoxel_of_number[i]) ? 1 : 0;
@@ -431,18 +433,18 @@ class FreeSpaceEvidence {
   }
 
   Config config_;
-  InstanceSampler sampler_;
-  GroundSampler ground_sampler_;
-  ReferenceScans references_;
-  PoseCorrection pose_correction_;
+  detail::InstanceSampler sampler_;
+  detail::GroundSampler ground_sampler_;
+  detail::ReferenceScans references_;
+  detail::PoseCorrection pose_correction_;
   std::optional<double> time_;  // of the newest scan, s
   Tester newest_tester_, older_tester_;
   Background* other_ = nullptr;
-  InstanceLinker linker_;
-  TrackBelief track_belief_;
-  InstanceJudge judge_;
-  DynamicOccupancyGrid dynamic_grid_;
-  MovedGround moved_ground_;
+  detail::InstanceLinker linker_;
+  detail::TrackBelief track_belief_;
+  detail::InstanceJudge judge_;
+  detail::DynamicOccupancyGrid dynamic_grid_;
+  detail::MovedGround moved_ground_;
   // The origin frame is the sensor frame of the first scan of the epoch. It is the frame of the
   // cells of tracks and of the dynamic occupancy grid, which thus do not depend on the world frame.
   Pose T_origin_world_ = Pose::Identity();

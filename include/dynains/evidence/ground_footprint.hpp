@@ -13,7 +13,7 @@
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_loops.hpp"
 
-namespace dynains {
+namespace dynains::detail {
 
 /// Largest height above the ground of the lowest return of an object that stands on it: the greater
 /// of `least` and `slope` * horizontal range. The gap between two beams defines `slope`.
@@ -59,7 +59,7 @@ class GroundFootprint {
   /// Adds the points of a block whose bits are set in `which`.
   void add(PointsView block, std::uint64_t which) {
     const Located located = locate(block);
-    detail::for_each_bit(which & located.inside, [&](std::size_t i) {
+    for_each_bit(which & located.inside, [&](std::size_t i) {
       add_to(static_cast<std::uint32_t>(located.tile[i]),
              static_cast<std::uint32_t>(located.cell[i]), block.z[i]);
     });
@@ -80,16 +80,16 @@ class GroundFootprint {
   /// Computes the box of each block of points, for find_under().
   void bound(PointsView points, std::vector<GroundBox>& boxes) const {
     const std::size_t count = (points.size() + kBlock - 1) / kBlock;
-    detail::ensure_capacity(boxes, count);
+    ensure_capacity(boxes, count);
     boxes.resize(count);
-    detail::with_packs([&](auto packs) {
+    with_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       for (std::size_t b = 0; b < boxes.size(); ++b) {
         const PointsView block = block_of(points, b * kBlock);
-        const detail::PackConstant first_x(block.x[0]), first_y(block.y[0]);
+        const PackConstant first_x(block.x[0]), first_y(block.y[0]);
         Float x_min = first_x, x_max = first_x, y_min = first_y, y_max = first_y;
-        detail::for_slices<Packs>(block.size(), [&](const auto& at) {
+        for_slices<Packs>(block.size(), [&](const auto& at) {
           const Float x = at.padded(at.load(block.x.data()), first_x);
           const Float y = at.padded(at.load(block.y.data()), first_y);
           x_min = min(x_min, x);
@@ -161,10 +161,10 @@ class GroundFootprint {
     /// Rows (or columns) of points by their coordinates; the border for points outside the grid.
     template <class Float>
     auto line(const Float& coordinate) const {
-      static constexpr detail::PackConstant kZero(0.0F);
-      const Float centre(detail::PackConstant(static_cast<float>(half_)));
-      const Float last(detail::PackConstant(static_cast<float>(width() - 1)));
-      const Float per_metre = detail::PackConstant(per_metre_);
+      static constexpr PackConstant kZero(0.0F);
+      const Float centre(PackConstant(static_cast<float>(half_)));
+      const Float last(PackConstant(static_cast<float>(width() - 1)));
+      const Float per_metre = PackConstant(per_metre_);
       return truncate(min(max(coordinate * per_metre + centre, Float(kZero)), last));
     }
     /// Row (or column) of one point; the border for a point outside the grid.
@@ -217,7 +217,7 @@ class GroundFootprint {
     located.inside = 0;
     const auto side = static_cast<std::int32_t>(tiles_along_side());
     const auto border = static_cast<std::int32_t>(grid_.width()) - 1;
-    detail::for_packs(block.size(), [&](auto at) {
+    for_packs(block.size(), [&](auto at) {
       using Int = typename decltype(at)::Int;
       const Int column = grid_.line(at.load(block.x.data()));
       const Int row = grid_.line(at.load(block.y.data()));
@@ -235,8 +235,8 @@ class GroundFootprint {
   std::uint64_t find_under(PointsView block, const Clearance& clearance) const {
     const Located located = locate(block);
     float top[kBlock];
-    const detail::PackConstant least(clearance.least), slope(clearance.slope);
-    detail::for_packs(block.size(), [&](auto at) {
+    const PackConstant least(clearance.least), slope(clearance.slope);
+    for_packs(block.size(), [&](auto at) {
       using Float = typename decltype(at)::Float;
       const Float x = at.load(block.x.data());
       const Float y = at.load(block.y.data());
@@ -291,4 +291,4 @@ class GroundFootprint {
   std::vector<Touched> touched_;  // cells with removed points, each once
 };
 
-}  // namespace dynains
+}  // namespace dynains::detail

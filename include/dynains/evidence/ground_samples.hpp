@@ -13,7 +13,7 @@
 #include "dynains/points.hpp"
 #include "dynains/simd/bits.hpp"
 
-namespace dynains {
+namespace dynains::detail {
 
 /// The ground of one scan. Consecutive ground points in one voxel are a run, and the first point of
 /// a run represents it. Each voxel has one sample among the first points of its runs.
@@ -26,9 +26,7 @@ struct GroundSamples {
   std::size_t size() const { return samples.size(); }
 
   /// Adds the visibility of the samples from one reference. At most 255 references.
-  void add(const detail::Visibility& visibility) {
-    visibility.add_to(size(), free.data(), hit.data());
-  }
+  void add(const Visibility& visibility) { visibility.add_to(size(), free.data(), hit.data()); }
 };
 
 /// Selects the samples of the ground.
@@ -42,7 +40,7 @@ class GroundSampler {
   void sample(PointsView ground, GroundSamples& out) {
     constexpr std::size_t kBlock = GroundFootprint::kBlock;
     const std::size_t blocks = (ground.size() + kBlock - 1) / kBlock;
-    detail::ensure_capacity(out.run_begins, blocks);
+    ensure_capacity(out.run_begins, blocks);
     out.run_begins.assign(blocks, 0);
     if (!is_active_) return;
     std::size_t runs = 0;
@@ -50,19 +48,19 @@ class GroundSampler {
     for (std::size_t i = 0; i < blocks; ++i) {
       const PointsView block = GroundFootprint::block_of(ground, i * kBlock);
       out.run_begins[i] = sampler_.find_changes(block);
-      detail::for_each_bit(out.run_begins[i], [&](std::size_t k) {
+      for_each_bit(out.run_begins[i], [&](std::size_t k) {
         firsts_.x[runs] = block.x[k];
         firsts_.y[runs] = block.y[k];
         firsts_.z[runs] = block.z[k];
         ++runs;
       });
     }
-    detail::grow(instance_of_, runs);
+    grow(instance_of_, runs);
     sampler_.sample(PointsView(firsts_).subview(0, runs),
                     Span<const std::uint32_t>(instance_of_).subspan(0, runs), 1, out.samples);
     const std::size_t counts = (out.size() + 7) / 8 * 8;
-    detail::ensure_capacity(out.free, counts);
-    detail::ensure_capacity(out.hit, counts);
+    ensure_capacity(out.free, counts);
+    ensure_capacity(out.hit, counts);
     out.free.assign(counts, 0);
     out.hit.assign(counts, 0);
   }
@@ -74,4 +72,4 @@ class GroundSampler {
   std::vector<std::uint32_t> instance_of_;  // by run: instance 0
 };
 
-}  // namespace dynains
+}  // namespace dynains::detail

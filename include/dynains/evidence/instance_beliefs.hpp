@@ -15,11 +15,11 @@
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_loops.hpp"
 
-namespace dynains {
+namespace dynains::detail {
 
 /// Beliefs on the samples of one scan.
 struct InstanceBeliefs {
-  /// Log-odds that a supervoxel or a whole instance was free, a detail::FreeSpaceSum. Thin objects,
+  /// Log-odds that a supervoxel or a whole instance was free, a FreeSpaceSum. Thin objects,
   /// which some beams pass, have too many hits for the sum to grow.
   struct Belief {
     float level = 0.0F;  ///< log-odds by the references of one side of time, >= 0
@@ -101,11 +101,11 @@ class InstanceBeliefUpdater {
   /// position, m, in the sensor frame of the scan. Calls `on_hit(instance)` for each instance with
   /// enough visible samples of which nearly all are hit.
   template <class OnHit>
-  void update(const InstanceSamples& samples, const detail::Visibility& visibility,
+  void update(const InstanceSamples& samples, const Visibility& visibility,
               const InstanceViews::Position& reference, InstanceBeliefs& beliefs, OnHit&& on_hit) {
     beliefs.views.look_from(reference);
     // AVX2 processors have instructions that find and count bits.
-    detail::with_packs([&](auto) {
+    with_packs([&](auto) {
       update_instances(samples, visibility, beliefs, on_hit);
       update_supervoxels(samples, visibility, beliefs);
     });
@@ -196,7 +196,7 @@ class InstanceBeliefUpdater {
   // Only supervoxels with a free sample, or with a hit while they are open, can change. Their
   // number is small after the first references. The beliefs of all of them are prefetched before
   // the first update, since beliefs of older scans are not in the cache.
-  void update_supervoxels(const InstanceSamples& samples, const detail::Visibility& visibility,
+  void update_supervoxels(const InstanceSamples& samples, const Visibility& visibility,
                           InstanceBeliefs& beliefs) {
     const std::size_t count = find_touched(samples, visibility, beliefs);
     for (std::size_t i = 0; i < count; ++i) {
@@ -205,10 +205,10 @@ class InstanceBeliefUpdater {
   }
 
   // Writes the supervoxels that can change to `touched_`, in ascending order; returns their number.
-  std::size_t find_touched(const InstanceSamples& samples, const detail::Visibility& visibility,
+  std::size_t find_touched(const InstanceSamples& samples, const Visibility& visibility,
                            const InstanceBeliefs& beliefs) {
     constexpr std::size_t kBits = 64;
-    detail::grow(touched_, samples.supervoxel_count() + 1);
+    grow(touched_, samples.supervoxel_count() + 1);
     std::size_t count = 0;
     std::uint32_t last = kNoCluster;
     for (std::size_t begin = 0; begin < samples.size(); begin += kBits) {
@@ -216,7 +216,7 @@ class InstanceBeliefUpdater {
           visibility.free_word(begin) | (visibility.hit_word(begin) & beliefs.open[begin / kBits]);
       const std::size_t left = samples.size() - begin;
       if (left < kBits) touched &= (std::uint64_t{1} << left) - 1;
-      detail::for_each_bit(touched, [&](std::size_t i) {
+      for_each_bit(touched, [&](std::size_t i) {
         const std::uint32_t s = samples.supervoxel_of[begin + i];
         touched_[count] = s;
         count += s != last ? 1 : 0;
@@ -229,7 +229,7 @@ class InstanceBeliefUpdater {
     return count;
   }
 
-  void update_supervoxel(const InstanceSamples& samples, const detail::Visibility& visibility,
+  void update_supervoxel(const InstanceSamples& samples, const Visibility& visibility,
                          std::uint32_t s, InstanceBeliefs& beliefs) const {
     const std::uint32_t begin = samples.sample_begin[s];
     const std::uint32_t end = samples.sample_begin[s + 1];
@@ -262,19 +262,19 @@ class InstanceBeliefUpdater {
 
   // Updates the beliefs on whole instances.
   template <class OnHit>
-  void update_instances(const InstanceSamples& samples, const detail::Visibility& visibility,
+  void update_instances(const InstanceSamples& samples, const Visibility& visibility,
                         InstanceBeliefs& beliefs, OnHit&& on_hit) {
-    detail::grow(weight_of_free_, samples.instance_count());
+    grow(weight_of_free_, samples.instance_count());
     std::uint32_t end = 0;
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
       const std::uint32_t begin = end;
       end += beliefs.counts[instance].total;
-      const detail::Visibility::Count all = visibility.count(begin, end);
+      const Visibility::Count all = visibility.count(begin, end);
       const auto count = static_cast<float>(end - begin);
       const auto visible = static_cast<float>(all.free + all.hit);
       const float least = kLeastVisible * count;
       const float free_ratio = visible >= least ? static_cast<float>(all.free) / visible : 0.0F;
-      const bool is_hit = free_ratio <= detail::FreeSpaceSum::kHitRatio;
+      const bool is_hit = free_ratio <= FreeSpaceSum::kHitRatio;
       const bool is_contradicted = beliefs.views.is_contradicted(instance);
       weight_of_free_[instance] = is_contradicted                           ? 0.0F
                                   : is_hit && beliefs.merged[instance] == 0 ? kPartWeight
@@ -303,19 +303,19 @@ class InstanceBeliefUpdater {
   // object, if the instance is not larger than one object: they count half, and later hits take
   // them back. A single hit sets `contested`, but not `occupied`. Returns whether a verdict may
   // change.
-  bool update(Belief& belief, detail::Visibility::Count visible, std::uint32_t samples,
+  bool update(Belief& belief, Visibility::Count visible, std::uint32_t samples,
               float weight) const {
     const auto free = static_cast<float>(visible.free);
     const float free_ratio = free / static_cast<float>(visible.free + visible.hit);
     if (free >= kLeastFree * static_cast<float>(samples) &&
-        free_ratio >= detail::FreeSpaceSum::kFreeRatio) {
+        free_ratio >= FreeSpaceSum::kFreeRatio) {
       if (weight <= 0.0F) return false;
       belief.turns |= 1U;
       sum_.raise(belief.level, free_ratio, weight);
       if (weight >= 1.0F) belief.peak = std::max(belief.peak, belief.level);
       return true;
     }
-    if (visible.hit == 0 || free_ratio > detail::FreeSpaceSum::kHitRatio) return false;
+    if (visible.hit == 0 || free_ratio > FreeSpaceSum::kHitRatio) return false;
     const Belief before = belief;
     lower(belief);
     if (belief.turns % 2 != 0 && belief.turns < kTurnsByChance) ++belief.turns;
@@ -339,7 +339,7 @@ class InstanceBeliefUpdater {
   float pass_ratio_;
   float removal_ratio_;
   float large_removal_ratio_;
-  detail::FreeSpaceSum sum_;
+  FreeSpaceSum sum_;
   float free_level_;
   float contested_level_;
   float whole_level_;
@@ -347,4 +347,4 @@ class InstanceBeliefUpdater {
   std::vector<std::uint32_t> touched_;  // supervoxels that the current reference can change
 };
 
-}  // namespace dynains
+}  // namespace dynains::detail

@@ -10,7 +10,7 @@
 
 #include "dynains/points.hpp"
 
-namespace dynains {
+namespace dynains::detail {
 
 /// Horizontal hull of points on a grid. A cell belongs to the hull if it lies between the first and
 /// the last occupied cell of its row, and of its column.
@@ -71,4 +71,4 @@ class InstanceHull {
   std::vector<Extent> in_column_;
 };
 
-}  // namespace dynains
+}  // namespace dynains::detail

@@ -13,7 +13,7 @@
 #include "dynains/evidence/instance_tracks.hpp"
 #include "dynains/verdict.hpp"
 
-namespace dynains {
+namespace dynains::detail {
 
 /// Finds groups of supervoxels that are connected in the 26-neighbourhood.
 class SupervoxelGroups {
@@ -244,4 +244,4 @@ class InstanceJudge {
   std::vector<std::uint32_t> free_;  // free supervoxels of the current instance
 };
 
-}  // namespace dynains
+}  // namespace dynains::detail

@@ -6,9 +6,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <vector>
 
+#include "dynains/evidence/smallest_k.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/simd/pack_geometry.hpp"
@@ -16,85 +16,6 @@
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains::detail {
-
-/// Rows of numbers. Each row keeps the numbers of the smallest ranks, sorted by rank, and by number
-/// for equal ranks. The last three bits of a rank are ignored.
-class SmallestK {
- public:
-  /// `most`: maximum size of a row, at least 1.
-  explicit SmallestK(std::size_t most) : most_(most), pairs_per_row_((most + 1) / 2) {}
-
-  /// Empties all rows.
-  void clear() { pairs_.assign(pairs_.size(), kEmpty); }
-
-  /// Makes at least `count` rows; new rows are empty.
-  void make_rows(std::size_t count) {
-    const std::size_t pairs = count * pairs_per_row_;
-    if (pairs_.size() < pairs) pairs_.resize(pairs + pairs / 8, kEmpty);
-  }
-
-  /// Adds a number to a row; removes the last number of a full row. Each key of the row becomes
-  /// min(key, max(new key, preceding key)). This insertion has no branch, because a branch would
-  /// depend on every third point of a scan and would not be predictable.
-  void add(std::size_t row, std::uint32_t rank, std::uint32_t number) {
-    const double key = key_of(rank, number);
-    const Pair keys = {key, key};
-    Pair* const pairs = &pairs_[row * pairs_per_row_];
-    for (std::size_t p = pairs_per_row_ - 1;; --p) {
-      const Pair here = pairs[p];
-      const Pair before = p > 0 ? pairs[p - 1] : Pair{0.0, 0.0};
-      const Pair predecessors = {before[1], here[0]};
-      const Pair moved = predecessors > keys ? predecessors : keys;
-      pairs[p] = here < moved ? here : moved;
-      if (p == 0) return;
-    }
-  }
-
-  /// Maximum size of a row.
-  std::size_t most() const { return most_; }
-
-  /// Size of a row.
-  std::size_t count(std::size_t row) const {
-    std::size_t count = 0;
-    for (std::size_t k = 0; k < most_; ++k) count += key(row, k) < kNone ? 1 : 0;
-    return count;
-  }
-
-  /// The k-th number of a row, k below most(); 0 if the row has fewer numbers.
-  std::uint32_t number(std::size_t row, std::size_t k) const {
-    const double wanted = key(row, k);
-    std::uint64_t bits;
-    std::memcpy(&bits, &wanted, sizeof(bits));
-    return static_cast<std::uint32_t>(bits);
-  }
-
- private:
-  using Pair = double __attribute__((vector_size(16)));
-  static constexpr double kNone = 2.0;  // above all keys; its lower 32 bits are zero
-  static constexpr Pair kEmpty = {kNone, kNone};
-
-  // A key is a double, since baseline x86-64 has no other minimum of 64-bit numbers. Its upper half
-  // contains the rank without the last three bits, its lower half the number. The exponent bits
-  // make it a normal number between 0 and 2.
-  static double key_of(std::uint32_t rank, std::uint32_t number) {
-    const std::uint64_t bits = std::uint64_t{0x20000000U + (rank >> 3)} << 32 | number;
-    double key;
-    std::memcpy(&key, &bits, sizeof(key));
-    return key;
-  }
-
-  double key(std::size_t row, std::size_t k) const {
-    return pairs_[row * pairs_per_row_ + k / 2][k % 2];
-  }
-
-  std::size_t most_;
-  std::size_t pairs_per_row_;
-  std::vector<Pair> pairs_;
-};
-
-}  // namespace dynains::detail
-
-namespace dynains {
 
 /// The samples of one scan, ordered by instance, then by supervoxel: each instance and each
 /// supervoxel is one range of samples.
@@ -122,8 +43,6 @@ struct InstanceSamples {
   }
 };
 
-namespace detail {
-
 /// Computes the key of the cell of each sample, in a grid in the origin frame with cells of edge
 /// `cell` (m).
 inline void find_cells(const InstanceSamples& samples, double cell, const Pose& T_origin_sensor,
@@ -143,8 +62,6 @@ inline void find_cells(const InstanceSamples& samples, double cell, const Pose& 
     }
   });
 }
-
-}  // namespace detail
 
 /// Selects samples of instances: in each supervoxel, up to `most_samples` points of the smallest
 /// hashes of their coordinates. A supervoxel is the part of one instance in one voxel. The
@@ -185,7 +102,7 @@ class InstanceSampler {
   void sample(PointsView points, Span<const std::uint32_t> instance_of, std::size_t instance_count,
               InstanceSamples& out) {
     begin_scan();
-    detail::ensure_capacity(out.number_of_point, points.size());
+    ensure_capacity(out.number_of_point, points.size());
     out.number_of_point.resize(points.size());
     for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
       const PointsView block = points.subview(begin, std::min(kBlock, points.size() - begin));
@@ -208,7 +125,7 @@ class InstanceSampler {
       return ((a.xy ^ b.xy) | (a.z ^ b.z) | (a.instance ^ b.instance)) == 0;
     }
     friend std::uint32_t voxel_hash(const Supervoxel& s) {
-      return static_cast<std::uint32_t>(detail::mixed_hash(s.xy, s.z, s.instance));
+      return static_cast<std::uint32_t>(mixed_hash(s.xy, s.z, s.instance));
     }
   };
   using SupervoxelTable = VoxelHashTable<Supervoxel>;
@@ -255,7 +172,7 @@ class InstanceSampler {
   // Numbers the supervoxels of a block in the order of the points. For most points, the first slot
   // of the hash holds their supervoxel.
   void meet_supervoxels(std::size_t count, std::uint32_t* number_of_point) {
-    detail::grow(supervoxels_, table_.size() + kBlock);
+    grow(supervoxels_, table_.size() + kBlock);
     table_.reserve(table_.size() + kBlock);
     for (std::size_t i = 0; i < count; ++i) {
       const Supervoxel supervoxel = {xy_[i], z_[i], instance_[i]};
@@ -308,7 +225,7 @@ class InstanceSampler {
     out.supervoxel_of_number[0] = kNoCluster;
     out.place.resize(supervoxel_count);
     out.instance_of.resize(supervoxel_count);
-    detail::grow(ordered_, supervoxel_count);
+    grow(ordered_, supervoxel_count);
     for (std::size_t number = 1; number <= supervoxel_count; ++number) {
       const Supervoxel& supervoxel = supervoxels_[number];
       const auto instance = static_cast<std::uint32_t>(supervoxel.instance);
@@ -326,9 +243,9 @@ class InstanceSampler {
   void copy_samples(PointsView points, std::size_t supervoxel_count, InstanceSamples& out) {
     const std::size_t most = samples_.most();
     const std::size_t capacity =
-        std::min(supervoxel_count * most, points.size() + most) + detail::kMaxPackWidth;
+        std::min(supervoxel_count * most, points.size() + most) + kMaxPackWidth;
     out.points.grow(capacity);
-    detail::grow(out.supervoxel_of, capacity);
+    grow(out.supervoxel_of, capacity);
     out.sample_begin.resize(supervoxel_count + 1);
     float* const x = out.points.x.data();
     float* const y = out.points.y.data();
@@ -355,10 +272,10 @@ class InstanceSampler {
   SupervoxelTable table_{4096};  // numbers of supervoxels
   // By point of a block.
   std::array<std::int32_t, kBlock> xy_ = {}, z_ = {}, instance_ = {}, hash_ = {}, rank_ = {};
-  detail::SmallestK samples_;            // by number in the table: indices of points
+  SmallestK samples_;                    // by number in the table: indices of points
   std::vector<Supervoxel> supervoxels_;  // by number in the table; padded at the end
   std::vector<std::uint32_t> next_;      // by instance: position of its next supervoxel
   std::vector<std::uint32_t> ordered_;   // by supervoxel: number in the table
 };
 
-}  // namespace dynains
+}  // namespace dynains::detail

@@ -14,7 +14,7 @@
 #include "dynains/pose.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
-namespace dynains {
+namespace dynains::detail {
 
 /// The instances of one scan, with links to the instances of the adjacent scans.
 struct TrackedInstances {
@@ -86,7 +86,7 @@ class InstanceLinker {
     out.instances.assign(samples.instance_count(), TrackedInstances::Instance());
     out.shapes.assign(samples.instance_count(), TrackedInstances::Shape());
     out.cells.clear();
-    detail::find_cells(samples, cell_, T_origin_sensor, place_);
+    find_cells(samples, cell_, T_origin_sensor, place_);
     table_.assign(kTable, kEmpty);
     for (std::uint32_t i = 0; i < samples.instance_count(); ++i) {
       TrackedInstances::Shape& shape = out.shapes[i];
@@ -235,4 +235,4 @@ class TrackBelief {
   float ceiling_;
 };
 
-}  // namespace dynains
+}  // namespace dynains::detail

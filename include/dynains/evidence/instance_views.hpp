@@ -12,7 +12,7 @@
 
 #include "dynains/evidence/instance_samples.hpp"
 
-namespace dynains {
+namespace dynains::detail {
 
 /// An object that stands hides from other sides the surfaces that a scan measured, and beams that
 /// graze its edges pass them. So free samples of a reference on another side are no evidence where
@@ -88,4 +88,4 @@ class InstanceViews {
   std::vector<View> views_;  // by instance
 };
 
-}  // namespace dynains
+}  // namespace dynains::detail

@@ -18,7 +18,7 @@
 #include "dynains/simd/bits.hpp"
 #include "dynains/verdict.hpp"
 
-namespace dynains {
+namespace dynains::detail {
 
 /// Finds the moved ground points of one scan: those under removed points, and those in voxels that
 /// are free in reference scans. Call add() and add_hull() for the removed points, then find(). All
@@ -56,7 +56,7 @@ class MovedGround {
 
   /// Adds the points of dynamic groups. `group_of`: by point, index in `groups`.
   void add(PointsView points, Span<const std::uint32_t> group_of, Span<const Verdict> groups) {
-    detail::grow(moved_, groups.size());
+    grow(moved_, groups.size());
     bool any = false;
     for (std::size_t i = 0; i < groups.size(); ++i) {
       const bool moved = is_dynamic(groups[i].cause);
@@ -121,7 +121,7 @@ class MovedGround {
       const PointsView block = block_of(ground, i);
       const std::uint64_t beside = ~under_[i] & all_of(block);
       const std::uint64_t first = beside & (samples.run_begins[i] | ~(beside << 1U));
-      detail::for_each_bit(first, [&](std::size_t k) {
+      for_each_bit(first, [&](std::size_t k) {
         around_points_.x[count] = block.x[k];
         around_points_.y[count] = block.y[k];
         around_points_.z[count] = block.z[k];
@@ -134,7 +134,7 @@ class MovedGround {
   // The bits of `which` whose points rise above the surrounding ground.
   std::uint64_t rising(PointsView block, std::uint64_t which) {
     std::uint64_t bits = 0;
-    detail::for_each_bit(which, [&](std::size_t k) {
+    for_each_bit(which, [&](std::size_t k) {
       const bool rises = around_.height(block.x[k], block.y[k], block.z[k]) >= rise_;
       bits |= std::uint64_t{rises} << k;
     });
@@ -152,7 +152,7 @@ class MovedGround {
   // Adds the points of a block whose bits are set in `which` to the result.
   void remove(std::size_t block, std::uint64_t which, Cause cause) {
     const std::size_t begin = block * GroundFootprint::kBlock;
-    detail::for_each_bit(which, [&](std::size_t i) {
+    for_each_bit(which, [&](std::size_t i) {
       found_.push_back({static_cast<std::uint32_t>(begin + i), {cause, belief_}});
     });
   }
@@ -161,7 +161,7 @@ class MovedGround {
   bool find_free_voxels(const GroundSamples& ground) {
     const InstanceSamples& samples = ground.samples;
     bool any = false;
-    detail::grow(moved_, samples.supervoxel_of_number.size() + 1);
+    grow(moved_, samples.supervoxel_of_number.size() + 1);
     moved_[0] = 0;
     for (std::size_t number = 1; number < samples.supervoxel_of_number.size(); ++number) {
       const std::uint32_t sample = samples.sample_begin[samples.supervoxel_of_number[number]];
@@ -203,4 +203,4 @@ class MovedGround {
   std::vector<std::uint8_t> moved_;  // by group, then by number of the voxel
 };
 
-}  // namespace dynains
+}  // namespace dynains::detail

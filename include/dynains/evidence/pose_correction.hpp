@@ -17,7 +17,7 @@
 #include "dynains/pose.hpp"
 #include "dynains/verdict.hpp"
 
-namespace dynains {
+namespace dynains::detail {
 
 /// Aligns each scan with the planes of earlier scans of its epoch. If a pose is inexact, so that
 /// static surfaces of the scan lie too far from the planes, it is replaced by the aligned pose.
@@ -50,7 +50,7 @@ class PoseCorrection {
     planes_.clear();
     inserted_ = 0;
     T_world_origin_ = T_world_sensor;
-    T_origin_world_ = detail::inverted(T_world_sensor);
+    T_origin_world_ = inverted(T_world_sensor);
     T_origin_newest_ = Pose::Identity();
     T_origin_pushed_ = Pose::Identity();
     correction_.reset();
@@ -70,8 +70,8 @@ class PoseCorrection {
     residual_.reset();
     misfit_.reset();
     is_doubtful_ = false;
-    const Pose T_pushed = detail::composed(T_origin_world_, T_world_level);
-    const Pose T_guess = offset_ ? detail::composed(*offset_, T_pushed) : T_pushed;
+    const Pose T_pushed = composed(T_origin_world_, T_world_level);
+    const Pose T_guess = offset_ ? composed(*offset_, T_pushed) : T_pushed;
     correction_ = offset_;
     Pose T_newest = T_guess;
     motion_.begin_scan(time);
@@ -87,9 +87,8 @@ class PoseCorrection {
   /// The pose `T_world_frame` with the newest correction.
   Pose corrected(const Pose& T_world_frame) const {
     if (!correction_) return T_world_frame;
-    return detail::composed(
-        T_world_origin_,
-        detail::composed(*correction_, detail::composed(T_origin_world_, T_world_frame)));
+    return composed(T_world_origin_,
+                    composed(*correction_, composed(T_origin_world_, T_world_frame)));
   }
 
   /// Adds the static points of a scan to the planes, or leaves it out if its pose is in doubt, but
@@ -100,7 +99,7 @@ class PoseCorrection {
     if (!is_active()) return;
     was_left_out_ = is_doubtful_ && !was_left_out_;
     if (was_left_out_) return;
-    const Pose T = detail::composed(T_origin_world_, T_world_level);
+    const Pose T = composed(T_origin_world_, T_world_level);
     const std::size_t wanted = inserted_ == 0            ? split.count + 1  // all points
                                : inserted_ < kFirstScans ? kFirstInserted
                                                          : kInserted;
@@ -123,7 +122,7 @@ class PoseCorrection {
   const std::optional<EpochReason>& misfit() const { return misfit_; }
 
  private:
-  using Step = detail::NormalEquations::Vector;
+  using Step = NormalEquations::Vector;
   static constexpr std::size_t kSelected = 3000;        // points that are aligned
   static constexpr std::size_t kMostSelected = 3072;    // with padding
   static constexpr std::size_t kInserted = 12000;       // points of a scan in the planes
@@ -169,7 +168,7 @@ class PoseCorrection {
   void align(const GroundSplit& split, const Pose& T_pushed, const Pose& T_guess, Pose& T_newest) {
     const Step before = open_;
     open_ = {};
-    const detail::Alignment alignment = aligner_.align(select(split), planes_, T_guess, prior());
+    const Alignment alignment = aligner_.align(select(split), planes_, T_guess, prior());
     if (inexact_scans_ > 0) --inexact_scans_;
     if (alignment.matched < kFewestMatches) return;
     if (!fits(static_cast<double>(alignment.inliers) / static_cast<double>(alignment.matched))) {
@@ -183,32 +182,31 @@ class PoseCorrection {
       if (is_credible(alignment, before, T_guess)) {
         if (alignment.is_significant) inexact_scans_ = kInexactScans;
         T_newest = T_aligned;
-        correction_ = detail::composed(T_newest, detail::inverted(T_pushed));
+        correction_ = composed(T_newest, inverted(T_pushed));
         const Step lasting = confirmed(alignment.supported, before);
-        offset_ = detail::composed(detail::moved(T_guess, lasting), detail::inverted(T_pushed));
+        offset_ = composed(moved(T_guess, lasting), inverted(T_pushed));
         for (std::size_t i = 0; i < lasting.size(); ++i) open_[i] -= lasting[i];
       } else {
         T_aligned = T_guess;
       }
     }
-    const Pose T_motion = detail::composed(detail::inverted(T_origin_pushed_), T_pushed);
-    residual_ = difference(detail::composed(T_origin_newest_, T_motion), T_aligned);
-    const Pose T_previous_origin = detail::inverted(T_origin_newest_);
-    residual_->T_previous_newest = detail::composed(T_previous_origin, T_newest);
-    const Pose T_found = detail::moved(T_guess, alignment.found);
-    residual_->T_previous_aligned = detail::composed(T_previous_origin, T_found);
+    const Pose T_motion = composed(inverted(T_origin_pushed_), T_pushed);
+    residual_ = difference(composed(T_origin_newest_, T_motion), T_aligned);
+    const Pose T_previous_origin = inverted(T_origin_newest_);
+    residual_->T_previous_newest = composed(T_previous_origin, T_newest);
+    const Pose T_found = moved(T_guess, alignment.found);
+    residual_->T_previous_aligned = composed(T_previous_origin, T_found);
     set_covariance(alignment.covariance, T_found);
   }
 
   // Writes the covariance of an alignment, along the axes of the map, to the residual.
-  void set_covariance(const detail::CorrectionSupport::Matrix& covariance,
-                      const Pose& T_origin_sensor) {
+  void set_covariance(const CorrectionSupport::Matrix& covariance, const Pose& T_origin_sensor) {
     for (std::size_t i = 0; i < 6; ++i) {
       for (std::size_t j = 0; j < 6; ++j) residual_->covariance[6 * i + j] = covariance[i][j];
     }
     Pose R_sensor_origin = Pose::Identity();
-    R_sensor_origin.linear() = detail::transposed(T_origin_sensor.linear());
-    residual_->covariance = detail::transported_covariance(residual_->covariance, R_sensor_origin);
+    R_sensor_origin.linear() = transposed(T_origin_sensor.linear());
+    residual_->covariance = transported_covariance(residual_->covariance, R_sensor_origin);
   }
 
   // Whether the static world fits, compared with earlier scans of the epoch. `inliers`: ratio to
@@ -224,8 +222,7 @@ class PoseCorrection {
   // Whether evidence beside the planes of this scan supports a correction: the scan before needs it
   // as well, or the motion becomes smoother. Small corrections of poses that are known to be
   // inexact need no more support, and neither do the first scans, without a motion before them.
-  bool is_credible(const detail::Alignment& alignment, const Step& before,
-                   const Pose& T_guess) const {
+  bool is_credible(const Alignment& alignment, const Step& before, const Pose& T_guess) const {
     const double size = movement(alignment.supported);
     if (inexact_scans_ > 0 && size <= kMostDoubt) return true;
     if (2.0 * movement(confirmed(alignment.supported, before)) >= size) return true;
@@ -267,12 +264,12 @@ class PoseCorrection {
       residual_.reset();
       return;
     }
-    motion_.end_scan(detail::composed(detail::inverted(T_origin_newest_), T_newest), error);
+    motion_.end_scan(composed(inverted(T_origin_newest_), T_newest), error);
   }
 
   // Poses are presumed to be exact until a correction shows that they are not.
-  detail::CorrectionSupport::Prior prior() const {
-    using Prior = detail::CorrectionSupport::Prior;
+  CorrectionSupport::Prior prior() const {
+    using Prior = CorrectionSupport::Prior;
     return inexact_scans_ > 0 ? Prior::kInexact : Prior::kExact;
   }
 
@@ -295,13 +292,13 @@ class PoseCorrection {
 
   // Rotation and translation of the sensor from one pose to another.
   static PoseResidual difference(const Pose& T_map_a, const Pose& T_map_b) {
-    const Pose T_a_b = detail::composed(detail::inverted(T_map_a), T_map_b);
+    const Pose T_a_b = composed(inverted(T_map_a), T_map_b);
     const double x = T_a_b(2, 1) - T_a_b(1, 2);
     const double y = T_a_b(0, 2) - T_a_b(2, 0);
     const double z = T_a_b(1, 0) - T_a_b(0, 1);
     const double sine = 0.5 * std::sqrt(x * x + y * y + z * z);  // of an angle below 90 deg
     PoseResidual residual;
-    residual.translation = detail::distance(T_map_a, T_map_b);
+    residual.translation = distance(T_map_a, T_map_b);
     residual.rotation = std::asin(std::min(sine, 1.0)) * 180.0 / M_PI;
     return residual;
   }
@@ -319,14 +316,14 @@ class PoseCorrection {
   Pose T_origin_pushed_ = Pose::Identity();  // as pushed
   std::optional<PoseResidual> residual_;
   std::optional<EpochReason> misfit_;
-  detail::MotionPrediction motion_;
+  MotionPrediction motion_;
   int fitted_ = 0;              // scans of the epoch with an alignment
   double usual_inliers_ = 0.0;  // ratio to the matches
   int inexact_scans_ = 0;       // number of next scans whose poses are presumed to be inexact
   bool is_doubtful_ = false;    // whether the pose of the last scan may be wrong
   bool was_left_out_ = false;   // whether the last insert() left its scan out
   PointBuffer selected_;
-  detail::PlaneAligner aligner_;
+  PlaneAligner aligner_;
 };
 
-}  // namespace dynains
+}  // namespace dynains::detail

@@ -18,7 +18,7 @@
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 
-namespace dynains {
+namespace dynains::detail {
 
 /// Distances (scans) from a scan to its references, before and after it. References are dense near
 /// the scan and sparse far from it. The adjacent scans are excluded, because objects move little in
@@ -107,7 +107,7 @@ class ReferenceScans {
   void adapt(const SensorModel& sensor) {
     grid_ = RangeImageGrid::for_sensor(sensor);
     R_beams_level_.reset();
-    if (!sensor.is_level()) R_beams_level_ = detail::transposed(sensor.R_level_headed);
+    if (!sensor.is_level()) R_beams_level_ = transposed(sensor.R_level_headed);
   }
 
   const ReferenceSpan& span() const { return span_; }
@@ -146,9 +146,9 @@ class ReferenceScans {
     PointsView ground = split.ground();
     PointsView rest = split.non_ground();
     if (R_beams_level_) {
-      reference.T_world_beams = detail::rotated(T_world_level, *R_beams_level_);
-      ground = detail::rotate(ground, *R_beams_level_, rotated_ground_);
-      rest = detail::rotate(rest, *R_beams_level_, rotated_rest_);
+      reference.T_world_beams = rotated(T_world_level, *R_beams_level_);
+      ground = rotate(ground, *R_beams_level_, rotated_ground_);
+      rest = rotate(rest, *R_beams_level_, rotated_rest_);
     }
     reference.image.build(grid_, ground, rest, moving, lateral_margin_, scratch_);
   }
@@ -164,13 +164,11 @@ class ReferenceScans {
   }
 
   /// Visibility of the first `count` points (m; padded for packs) from a reference. Returns `out`.
-  const detail::Visibility& test(const PointBuffer& points, std::size_t count,
-                                 const Pose& T_world_points, const ReferenceScan& reference,
-                                 detail::Visibility& out) const {
-    const Pose T_reference_points =
-        detail::composed(detail::inverted(reference.T_world_beams), T_world_points);
-    detail::test_visibility(reference.image, T_reference_points, points, count, margin_,
-                            margin_slope_, out);
+  const Visibility& test(const PointBuffer& points, std::size_t count, const Pose& T_world_points,
+                         const ReferenceScan& reference, Visibility& out) const {
+    const Pose T_reference_points = composed(inverted(reference.T_world_beams), T_world_points);
+    test_visibility(reference.image, T_reference_points, points, count, margin_, margin_slope_,
+                    out);
     return out;
   }
 
@@ -188,4 +186,4 @@ class ReferenceScans {
   RangeImage::Scratch scratch_;
 };
 
-}  // namespace dynains
+}  // namespace dynains::detail

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-namespace dynains {
+namespace dynains::detail {
 
 /// Samples of one scan on the ground and on the instances above it.
 struct SurfaceCounts {
@@ -21,4 +21,4 @@ struct SurfaceCounts {
   }
 };
 
-}  // namespace dynains
+}  // namespace dynains::detail

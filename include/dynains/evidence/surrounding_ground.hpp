@@ -11,7 +11,7 @@
 #include "dynains/points.hpp"
 #include "dynains/sensor/plane_fit.hpp"
 
-namespace dynains {
+namespace dynains::detail {
 
 /// Ground planes by horizontal cells of 2 m in the sensor frame. Each plane is fitted to the ground
 /// points of its cell and of the eight cells around it.
@@ -37,7 +37,7 @@ class SurroundingGround {
     forget();
     points_ = points;
     rise_ = rise;
-    detail::grow(next_, points.size());
+    grow(next_, points.size());
     for (std::size_t i = points.size(); i-- > 0;) {
       Cell& cell = cell_at(index_of(points.x[i], points.y[i]));
       next_[i] = cell.first;
@@ -76,7 +76,7 @@ class SurroundingGround {
   };
   struct Cell {
     std::uint32_t first = kNoPoint;  // its points are a list, see next_
-    detail::PlaneMoments all, kept;  // of all its points, and of those that do not rise
+    PlaneMoments all, kept;          // of all its points, and of those that do not rise
     Plane plane;                     // through the kept points around
     bool has_all = false, has_kept = false, has_plane = false;
   };
@@ -116,7 +116,7 @@ class SurroundingGround {
       visit(points_.x[i], points_.y[i], points_.z[i]);
     }
   }
-  static void add(float x, float y, float z, double weight, detail::PlaneMoments& moments) {
+  static void add(float x, float y, float z, double weight, PlaneMoments& moments) {
     moments.add(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z), weight);
   }
 
@@ -143,8 +143,8 @@ class SurroundingGround {
   // Plane through the points of a cell and of the cells around it. Their `moments` are valid after
   // `find(place)`.
   template <class Find>
-  Plane plane_around(std::size_t index, Find&& find, detail::PlaneMoments Cell::*moments) {
-    detail::PlaneMoments sum;
+  Plane plane_around(std::size_t index, Find&& find, PlaneMoments Cell::*moments) {
+    PlaneMoments sum;
     for (const std::size_t row : {index - width_, index, index + width_}) {
       for (const std::size_t place : {row - 1, row, row + 1}) {
         find(place);
@@ -155,7 +155,7 @@ class SurroundingGround {
   }
 
   // Least squares of z.
-  static Plane fit(const detail::PlaneMoments& sum) {
+  static Plane fit(const PlaneMoments& sum) {
     Plane plane;
     if (sum.count < kLeastPoints) return plane;
     const double weight = 1.0 / sum.count;
@@ -187,4 +187,4 @@ class SurroundingGround {
   float rise_ = 0.0F;
 };
 
-}  // namespace dynains
+}  // namespace dynains::detail

@@ -13,7 +13,7 @@
 #include "dynains/sensor/plane_fit.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
-namespace dynains {
+namespace dynains::detail {
 
 /// Map of planes: each voxel has the plane of its points, if these lie on a plane. The number of
 /// voxels is limited; a full map forgets the voxels that have received no point for the longest
@@ -124,7 +124,7 @@ class VoxelPlanes {
 
   // The points of a voxel, relative to its centre.
   struct Moments {
-    detail::PlaneMoments sums;
+    PlaneMoments sums;
     std::uint32_t last_scan = 0;
   };
 
@@ -170,7 +170,7 @@ class VoxelPlanes {
     Plane plane = {};
     plane.is_fitted = true;
     if (moments.sums.count < kFewestPoints) return plane;
-    const detail::Plane fitted = detail::fit_plane(moments.sums);
+    const detail::Plane fitted = fit_plane(moments.sums);
     // Without the bias: the fit of three parameters takes up a part of the deviations.
     const double flatness = fitted.flatness * moments.sums.count / (moments.sums.count - 3.0);
     const double thickness_squared = flatness * fitted.spread;
@@ -189,7 +189,7 @@ class VoxelPlanes {
 
   // The noise of the ranges spreads the points of one beam over a plane that contains the beam. It
   // moves with the sensor. A surface at such an angle is longer along the beams than the noise.
-  bool is_trace_of_beam(const Plane& plane, const detail::PlaneMoments& points) const {
+  bool is_trace_of_beam(const Plane& plane, const PlaneMoments& points) const {
     double beam[3];
     for (std::size_t k = 0; k < 3; ++k) beam[k] = plane.mean[k] - sensor_[k];
     const double range = std::sqrt(beam[0] * beam[0] + beam[1] * beam[1] + beam[2] * beam[2]);
@@ -198,7 +198,7 @@ class VoxelPlanes {
     if (std::abs(across) >= kGrazing * range) return false;
     const double length = std::sqrt(range * range - across * across);
     for (std::size_t k = 0; k < 3; ++k) beam[k] = (beam[k] - across * n[k]) / length;
-    return detail::variance_along(points, beam) < kLeastLength * kLeastLength;
+    return variance_along(points, beam) < kLeastLength * kLeastLength;
   }
 
   // Keeps the voxels that have received a point in the last scans, at most half of the maximum.
@@ -235,4 +235,4 @@ class VoxelPlanes {
   std::array<double, 3> sensor_ = {};  // position at the newest scan, m
 };
 
-}  // namespace dynains
+}  // namespace dynains::detail
