@@ -10,14 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include "cloud_remarks.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/poses/diagnosis.hpp"
 #include "estimate_poses.hpp"
 #include "interrupt.hpp"
 #include "log_output.hpp"
-#include "lone_scans.hpp"
 #include "output_folder.hpp"
 #include "range_check.hpp"
 #include "run_doubts.hpp"
@@ -25,6 +22,7 @@
 #include "run_request.hpp"
 #include "run_sequence.hpp"
 #include "second_pass.hpp"
+#include "start_check.hpp"
 #include "write_view.hpp"
 
 namespace dynains::program {
@@ -104,72 +102,6 @@ RunListener with_memory(const RunListener& listener, std::vector<std::string>& w
   return result;
 }
 
-/// Whether poses and clouds are judged: they are not accepted unseen, and there are enough scans
-/// for a judgement beyond doubt.
-bool are_judged(const RunPlan& plan, const RunSettings& settings) {
-  constexpr std::size_t kFewestScans = 8;
-  return !settings.accept_poses && plan.range.size() >= kFewestScans;
-}
-
-/// The diagnosis of `dynains check`. Empty if a few registrations prove the poses, or if the poses
-/// are not judged.
-std::optional<Diagnosis> diagnosed(const RunPlan& plan, const RunSettings& settings) {
-  if (!are_judged(plan, settings) ||
-      confirms_poses(plan.sequence, plan.range.first, plan.range.last)) {
-    return std::nullopt;
-  }
-  return diagnose(plan.sequence);
-}
-
-/// Whether poses that are shifted by some scans fit so little better that the map hardly suffers.
-bool is_small_shift(const Diagnosis& d, const PoseConvention& given) {
-  constexpr double kTranslation = 0.05;  // m, from one scan to the next
-  constexpr double kRotation = 0.0045;   // rad
-  return d.verdict == PoseVerdict::kOtherwise && d.convention.shift != given.shift &&
-         d.translation_error < kTranslation && d.rotation_error < kRotation;
-}
-
-/// Throws ConfigError unless `dynains check` accepts the poses. Warns if they are inexact, or too
-/// few scans are there for a judgement.
-void judge_poses(const RunPlan& plan, const RunSettings& settings, const RunListener& listener,
-                 const PoseAgreement& agreement, const std::optional<Diagnosis>& diagnosis) {
-  const std::string share = "only " +
-                            std::to_string(std::lround(100.0 * agreement.as_given.share)) +
-                            " % of the points of neighbouring scans agree under these poses";
-  const std::string see = "dynains check " + settings.recording_as_given;
-  if (diagnosis) {
-    if (diagnosis->verdict == PoseVerdict::kInexact) warn(listener, advice(*diagnosis));
-    if (diagnosis->sound() || diagnosis->verdict == PoseVerdict::kRayOrigin) return;
-    if (diagnosis->verdict == PoseVerdict::kUnknown ||
-        is_small_shift(*diagnosis, plan.sequence.convention())) {
-      warn(listener, advice(*diagnosis));
-    } else {
-      throw ConfigError((agreement.doubtful() ? share + ". " : std::string()) + advice(*diagnosis) +
-                        " See: " + see + "; or run with these poses by --accept-poses");
-    }
-  }
-  const bool is_confirmed = !diagnosis && are_judged(plan, settings);
-  if (agreement.doubtful() && !is_confirmed) warn(listener, share + "; see: " + see);
-}
-
-/// Throws ConfigError if rays begin elsewhere than at the origin of the clouds, unless the clouds
-/// are accepted. Warns if only shadows tell it.
-void judge_ray_origin(const RunPlan& plan, const RunSettings& settings, const RunListener& listener,
-                      const std::optional<Diagnosis>& diagnosis) {
-  if (!are_judged(plan, settings)) return;
-  const bool was_searched = diagnosis && (diagnosis->sound() || diagnosis->ray_origin);
-  const auto origin = was_searched
-                          ? diagnosis->ray_origin
-                          : find_ray_origin(plan.sequence, plan.range.first, plan.range.last);
-  if (!origin) return;
-  const std::string text = advice(*origin) + " See: dynains check " + settings.recording_as_given;
-  if (origin->known == RayOrigin::Known::kHorizontal) {
-    warn(listener, text);
-    return;
-  }
-  throw ConfigError(text + "; or run with these clouds by --accept-poses");
-}
-
 /// Throws IoError if nothing was judged, or nothing is static: the scans are then not what the run
 /// takes them for.
 void check_not_empty(const RunPlan& plan, const RunResults& results) {
@@ -184,26 +116,6 @@ void check_not_empty(const RunPlan& plan, const RunResults& results) {
                 std::to_string(labels[PointLabel::kOutOfRange]) + " out of range and " +
                 std::to_string(labels[PointLabel::kInvalid]) +
                 " invalid (NaN, infinite or at the origin)");
-}
-
-void warn_of_doubts(const RunPlan& plan, const RunSettings& settings, const RunListener& listener,
-                    const PoseAgreement& agreement) {
-  const std::optional<Diagnosis> diagnosis = diagnosed(plan, settings);
-  judge_poses(plan, settings, listener, agreement, diagnosis);
-  judge_ray_origin(plan, settings, listener, diagnosis);
-  const auto lone =
-      remark_on_lone_scans(plan.sequence, plan.range.first, plan.range.last, plan.config);
-  if (lone) warn(listener, *lone);
-  for (const auto& remark :
-       {remark_on_stripes(plan.sequence), remark_on_copies(plan.sequence, plan.range)}) {
-    if (remark) warn(listener, *remark);
-  }
-  const RemoverConfig& config = plan.config;
-  const bool finds_mounting =
-      config.level && config.mounting_pitch == 0.0 && config.mounting_roll == 0.0;
-  const auto tilt =
-      finds_mounting ? remark_on_tilted_scans(plan.sequence, plan.range) : std::nullopt;
-  if (tilt) warn(listener, *tilt);
 }
 
 RunDescription describe(const RunPlan& plan, const RunSettings& settings,
@@ -297,8 +209,13 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   const RunListener listener = with_memory(caller, warnings);
   check_ranges(plan.sequence, plan.range, plan.config,
                settings.recording_flags.contains("--point-units"));
-  const PoseAgreement agreement = pose_agreement(plan.sequence, plan.range.first, plan.range.last);
-  warn_of_doubts(plan, settings, listener, agreement);
+  const StartCheck start = check_start(plan.sequence, plan.range, plan.config,
+                                       settings.accept_poses, settings.recording_as_given);
+  for (const std::string& text : start.warnings) warn(listener, text);
+  if (!start.refusal.empty()) {
+    throw ConfigError(start.refusal + " See: dynains check " + settings.recording_as_given +
+                      "; or run with these poses and clouds by --accept-poses");
+  }
 
   std::optional<SessionContribution> session;
   std::optional<SessionAlignment> alignment;
@@ -338,7 +255,7 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   });
   outcome.map_points = results.map_points();
   outcome.wall = wall_time(ms_since(settings.started), timing);
-  RunDescription description = describe(plan, settings, agreement, results);
+  RunDescription description = describe(plan, settings, start.agreement, results);
   description.wall = outcome.wall;
   description.doubts = to_json(doubts, plan.sequence);
   description.doubts["warnings"] = warnings;

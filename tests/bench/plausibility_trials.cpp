@@ -22,11 +22,11 @@
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/io/kitti.hpp"
-#include "dynains/poses/diagnosis.hpp"
 #include "dynains/poses/pose_jumps.hpp"
 #include "dynains/simulation/random_world.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
+#include "run/start_check.hpp"
 #include "support/simulated_runs.hpp"
 
 using namespace dynains;
@@ -204,12 +204,10 @@ std::string said_by_run(const Scans& scans, const Fault& fault,
   std::string text;
   const std::vector<PoseJump> jumps = find_pose_jumps(recording, 0, last);
   if (!jumps.empty()) text = sentence_on(recording, jumps) + ' ';
-  if (confirms_poses(recording, 0, last)) {
-    const auto origin = find_ray_origin(recording, 0, last);
-    return origin ? text + advice(*origin) : text;
-  }
-  const Diagnosis d = diagnose(recording);
-  return d.sound() && d.verdict != PoseVerdict::kInexact ? text : text + advice(d);
+  const program::StartCheck start =
+      program::check_start(recording, {0, last}, RemoverConfig(), false, folder.string());
+  for (const std::string& warning : start.warnings) text += warning + ' ';
+  return text + start.refusal;
 }
 
 struct Outcome {
