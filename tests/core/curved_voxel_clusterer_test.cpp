@@ -33,7 +33,7 @@ std::vector<std::uint32_t> clusters(const Config& config, PolarView points) {
   return clusters(clusterer, points);
 }
 
-Config make(double range, double azimuth, double elevation, double reach = 90.0) {
+Config with_voxels(double range, double azimuth, double elevation, double reach = 90.0) {
   Config config;
   config.voxel_range = range;
   config.voxel_azimuth = azimuth;
@@ -80,28 +80,31 @@ TEST_CASE("clusters are those of a breadth-first search over all 26 neighbours")
     std::size_t count;
   };
   const auto c = GENERATE(values<Case>({
-      {"a whole scan, sparse", make(0.5, 0.5, 3.0), {3, 80, -180, 180, -25, 15}, 3000},
-      {"many clusters that nearly touch", make(1.0, 4.0, 6.0), {3, 40, -180, 180, -25, 15}, 2000},
-      {"one dense lump", make(0.5, 0.5, 3.0), {10, 14, 20, 30, -5, 5}, 2000},
-      {"across the azimuth seam", make(0.5, 2.0, 3.0), {5, 15, 160, 200, -10, 10}, 500},
-      {"straight up and down", make(0.5, 10.0, 3.0), {3, 10, -180, 180, -90, 90}, 1500},
-      {"the zenith alone", make(0.5, 30.0, 5.0), {3, 6, -180, 180, 80, 90}, 100},
-      {"tiny voxels", make(0.05, 0.1, 0.5, 10.0), {5, 7, -5, 5, -5, 5}, 2000},
-      {"huge voxels", make(20.0, 30.0, 45.0), {3, 90, -180, 180, -90, 90}, 40},
+      {"a whole scan, sparse", with_voxels(0.5, 0.5, 3.0), {3, 80, -180, 180, -25, 15}, 3000},
+      {"many clusters that nearly touch",
+       with_voxels(1.0, 4.0, 6.0),
+       {3, 40, -180, 180, -25, 15},
+       2000},
+      {"one dense lump", with_voxels(0.5, 0.5, 3.0), {10, 14, 20, 30, -5, 5}, 2000},
+      {"across the azimuth seam", with_voxels(0.5, 2.0, 3.0), {5, 15, 160, 200, -10, 10}, 500},
+      {"straight up and down", with_voxels(0.5, 10.0, 3.0), {3, 10, -180, 180, -90, 90}, 1500},
+      {"the zenith alone", with_voxels(0.5, 30.0, 5.0), {3, 6, -180, 180, 80, 90}, 100},
+      {"tiny voxels", with_voxels(0.05, 0.1, 0.5, 10.0), {5, 7, -5, 5, -5, 5}, 2000},
+      {"huge voxels", with_voxels(20.0, 30.0, 45.0), {3, 90, -180, 180, -90, 90}, 40},
       {"an azimuth size that does not divide the circle",
-       make(1.0, 7.0, 3.0),
+       with_voxels(1.0, 7.0, 3.0),
        {3, 40, -180, 180, -25, 15},
        700},
       {"an elevation size that does not divide the half circle",
-       make(1.0, 5.0, 7.0),
+       with_voxels(1.0, 5.0, 7.0),
        {3, 40, -180, 180, -90, 90},
        700},
       {"beyond the horizon of clustering",
-       make(0.5, 2.0, 3.0, 30.0),
+       with_voxels(0.5, 2.0, 3.0, 30.0),
        {25, 35, -180, 180, -10, 10},
        1500},
       {"a horizon in the middle of a voxel",
-       make(0.5, 2.0, 3.0, 30.3),
+       with_voxels(0.5, 2.0, 3.0, 30.3),
        {25, 35, -180, 180, -10, 10},
        1500},
   }));
@@ -114,7 +117,7 @@ TEST_CASE("clusters are those of a breadth-first search over all 26 neighbours")
 }
 
 TEST_CASE("a clusterer keeps nothing of the previous scan") {
-  const Config config = make(0.5, 1.0, 3.0);
+  const Config config = with_voxels(0.5, 1.0, 3.0);
   CurvedVoxelClusterer clusterer(config);
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     // Alternately many elevations and few, so that the grid grows and shrinks.
@@ -126,7 +129,7 @@ TEST_CASE("a clusterer keeps nothing of the previous scan") {
 }
 
 TEST_CASE("cluster numbers do not depend on the order of the points") {
-  const Config config = make(0.5, 1.0, 3.0);
+  const Config config = with_voxels(0.5, 1.0, 3.0);
   const PolarBuffer points = random_points(config, {3, 40, -180, 180, -20, 20}, 500, 1);
   const auto order = Random(1).permutation(points.size());
   PolarBuffer shuffled;
@@ -145,7 +148,7 @@ TEST_CASE("cluster numbers do not depend on the order of the points") {
 }
 
 TEST_CASE("voxels that touch at a corner join, voxels one apart do not") {
-  const Config config = make(1.0, 10.0, 10.0);
+  const Config config = with_voxels(1.0, 10.0, 10.0);
   // Azimuth voxels begin at multiples of 10 deg, elevation voxels too, range voxels at whole
   // metres.
   const auto at = [](PolarBuffer& points, double distance, double azimuth, double elevation) {
@@ -182,7 +185,8 @@ TEST_CASE("an object behind the sensor is one cluster, +180 and -180 degrees are
   points.z[3] = points.z[4] = 0.0F;
   points.azimuth[3] = detail::kPi;  // both ends of the interval of azimuths
   points.azimuth[4] = -detail::kPi;
-  CHECK(clusters(make(0.5, 0.5, 3.0), points.view()) == std::vector<std::uint32_t>{0, 0, 1, 0, 0});
+  CHECK(clusters(with_voxels(0.5, 0.5, 3.0), points.view()) ==
+        std::vector<std::uint32_t>{0, 0, 1, 0, 0});
 }
 
 TEST_CASE("a point at exactly the clustering range belongs to a cluster, the next float does not") {
@@ -191,12 +195,13 @@ TEST_CASE("a point at exactly the clustering range belongs to a cluster, the nex
   points.resize(2);
   points.range[1] = std::nextafter(90.0F, 100.0F);
   points.azimuth[1] = points.z[1] = 0.0F;
-  CHECK(clusters(make(0.5, 0.5, 3.0), points.view()) == std::vector<std::uint32_t>{0, kNoCluster});
+  CHECK(clusters(with_voxels(0.5, 0.5, 3.0), points.view()) ==
+        std::vector<std::uint32_t>{0, kNoCluster});
 }
 
 TEST_CASE(
     "a point straight below or above the sensor is a cluster, independently of earlier scans") {
-  const Config config = make(0.5, 0.5, 3.0);
+  const Config config = with_voxels(0.5, 0.5, 3.0);
   CurvedVoxelClusterer clusterer(config);
   for (const double z : {-5.0, 5.0, -0.1}) {
     PolarBuffer points;
@@ -216,7 +221,7 @@ TEST_CASE("points that are not finite belong to no cluster and change no cluster
   points.range[1] = nan;
   points.range[2] = infinity;
   points.z[3] = -infinity;
-  CHECK(clusters(make(0.5, 0.5, 3.0), points.view()) ==
+  CHECK(clusters(with_voxels(0.5, 0.5, 3.0), points.view()) ==
         std::vector<std::uint32_t>{0, kNoCluster, kNoCluster, kNoCluster, 0});
   CHECK(clusters(Config(), PolarView()).empty());
 }
@@ -234,13 +239,13 @@ TEST_CASE("default voxels are derived from the beams of the sensor, given voxels
   const Config dense = Config().resolved(SensorModel());
   CHECK(dense.voxel_azimuth == 0.5);
   CHECK(dense.voxel_elevation == 1.0);
-  const Config given = make(0.5, 0.7, 4.0).resolved(sensor);
+  const Config given = with_voxels(0.5, 0.7, 4.0).resolved(sensor);
   CHECK(given.voxel_azimuth == 0.7);
   CHECK(given.voxel_elevation == 4.0);
 
-  CHECK(CurvedVoxelClusterer(make(0.5, 0.7, 0.0)).needs_sensor());
-  CHECK(CurvedVoxelClusterer(make(0.5, 0.0, 4.0)).needs_sensor());
-  CHECK_FALSE(CurvedVoxelClusterer(make(0.5, 0.7, 4.0)).needs_sensor());
+  CHECK(CurvedVoxelClusterer(with_voxels(0.5, 0.7, 0.0)).needs_sensor());
+  CHECK(CurvedVoxelClusterer(with_voxels(0.5, 0.0, 4.0)).needs_sensor());
+  CHECK_FALSE(CurvedVoxelClusterer(with_voxels(0.5, 0.7, 4.0)).needs_sensor());
 
   // Neighbouring voxels of 1.8 deg, but not of 0.5 deg, the default for a typical sensor.
   PolarBuffer points;
@@ -254,7 +259,7 @@ TEST_CASE("default voxels are derived from the beams of the sensor, given voxels
 
 TEST_CASE("voxels of the largest permitted grid are distinguished") {
   // 12 azimuths, 1800 elevations: the row numbers of the grid run into the millions.
-  Config config = make(0.05, 30.0, 0.1, 1000.0);
+  Config config = with_voxels(0.05, 30.0, 0.1, 1000.0);
   double low = 1.0;
   double high = 1000.0;
   for (int i = 0; i < 60; ++i) {  // the farthest range that passes validation

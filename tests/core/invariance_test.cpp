@@ -15,7 +15,7 @@ namespace {
 
 using simulation::SimulatedScan;
 
-std::vector<SimulatedScan> street() {
+std::vector<SimulatedScan> short_street() {
   simulation::Config config;
   config.scene = simulation::Scene::kUrban;
   config.sensor = simulation::Sensor::kOs1_64;
@@ -59,7 +59,7 @@ std::vector<SimulatedScan> shuffled(const std::vector<SimulatedScan>& scans) {
 }
 
 TEST_CASE("a moved world, a turned sensor and shuffled points change F1 by at most 0.002") {
-  const std::vector<SimulatedScan> scans = street();
+  const std::vector<SimulatedScan> scans = short_street();
   const StaticPoints in_map = static_points(scans).final;
   const double plain = f1(scans, in_map);
   INFO("F1 " << plain);

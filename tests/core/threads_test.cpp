@@ -57,13 +57,13 @@ class FaintingMap : public StaticMapAccumulator {
   int inserts_left_;
 };
 
-struct FaintingStages : DefaultStages {
+struct FaintingGroundAndMap : DefaultStages {
   using Ground = FaintingGround;
   using Map = FaintingMap;
 };
 
-using Remover = BasicDynaInsRemover<FaintingStages>;
-using Config = Remover::Config;
+using FaintingRemover = BasicDynaInsRemover<FaintingGroundAndMap>;
+using FaintingConfig = FaintingRemover::Config;
 
 struct Answers {
   Run verdicts;
@@ -74,9 +74,9 @@ struct Answers {
   std::size_t failures = 0;
 };
 
-Answers answers(Config config, int threads, const std::vector<Scan>& scans) {
+Answers answers(FaintingConfig config, int threads, const std::vector<Scan>& scans) {
   config.threads = threads;
-  Remover remover(config);
+  FaintingRemover remover(config);
   Answers result;
   std::uint64_t pushes = 0;
   const auto take = [&](const ScanVerdict& verdict) {
@@ -103,7 +103,7 @@ Answers answers(Config config, int threads, const std::vector<Scan>& scans) {
 }
 
 // Runs both and compares; returns the answers of one thread.
-Answers check_equal(const Config& config, const std::vector<Scan>& scans) {
+Answers check_equal(const FaintingConfig& config, const std::vector<Scan>& scans) {
   const Answers one = answers(config, 1, scans);
   const Answers two = answers(config, 2, scans);
   CHECK((one.verdicts.final == two.verdicts.final));
@@ -113,7 +113,7 @@ Answers check_equal(const Config& config, const std::vector<Scan>& scans) {
   CHECK(one.failures == two.failures);
   if (one.failures == 0) {
     CHECK((one.verdicts.newest == two.verdicts.newest));
-    const std::size_t latency = Remover(config).latency();
+    const std::size_t latency = FaintingRemover(config).latency();
     const std::uint64_t delay = latency > 0 && !config.revision.revise_map ? 1 : 0;
     for (std::size_t i = 0; i < scans.size(); ++i) {
       CHECK(one.finished_after[i] == std::min(i + latency + 1, scans.size()));
@@ -123,47 +123,47 @@ Answers check_equal(const Config& config, const std::vector<Scan>& scans) {
   return one;
 }
 
-Config with_lookahead(int scans, int reference_step = 2) {
-  Config config;
+FaintingConfig with_lookahead(int scans, int reference_step = 2) {
+  FaintingConfig config;
   config.evidence.lookahead_scans = scans;
   config.evidence.reference_step = reference_step;
   return config;
 }
 
-std::vector<Config> configs() {
-  Config by_newest_window = Config::paper();
+std::vector<FaintingConfig> configs() {
+  FaintingConfig by_newest_window = FaintingConfig::paper();
   by_newest_window.votes = 0;
-  Config revised = with_lookahead(8);
+  FaintingConfig revised = with_lookahead(8);
   revised.revision.revise_map = true;
-  Config crowd = with_lookahead(8);
+  FaintingConfig crowd = with_lookahead(8);
   crowd.evidence.dynamic_grid_ratio = 0.4;
-  return {Config::paper(),
+  return {FaintingConfig::paper(),
           by_newest_window,
           with_lookahead(30),
           with_lookahead(5, 1),
           with_lookahead(7, 3),
           with_lookahead(0),
-          Config::offline(),
+          FaintingConfig::offline(),
           revised,
           crowd};
 }
 
-const std::vector<Scan>& passing_van() {
+const std::vector<Scan>& one_passing_van() {
   static const std::vector<Scan> scans = drive(oncoming(), 36, 5.0);
   return scans;
 }
 
 TEST_CASE("two threads give the answers of one thread, with every configuration") {
-  for (const Config& config : configs()) {
-    const Answers one = check_equal(config, passing_van());
-    CHECK(one.verdicts.final.size() == passing_van().size());
+  for (const FaintingConfig& config : configs()) {
+    const Answers one = check_equal(config, one_passing_van());
+    CHECK(one.verdicts.final.size() == one_passing_van().size());
     CHECK(one.failures == 0);
     CHECK_FALSE(one.map.empty());
   }
 }
 
 TEST_CASE("two threads give the same answers where poses are corrected") {
-  std::vector<Scan> scans = passing_van();
+  std::vector<Scan> scans = one_passing_van();
   Random random(7);
   for (Scan& scan : scans) {
     for (int i = 0; i < 3; ++i) {
@@ -176,21 +176,21 @@ TEST_CASE("two threads give the same answers where poses are corrected") {
 }
 
 TEST_CASE("two threads give the same answers where epochs begin again") {
-  std::vector<Scan> scans = passing_van();
+  std::vector<Scan> scans = one_passing_van();
   for (std::size_t i = 12; i < scans.size(); ++i) scans[i].time += 2.0;  // a pause
   for (std::size_t i = 20; i < scans.size(); ++i) {                      // a jump
     scans[i].T_world_sensor.translation() += Eigen::Vector3d(500.0, 0.0, 0.0);
   }
   scans[25].points.clear();
   scans[25].object.clear();
-  for (const Config& config : configs()) {
+  for (const FaintingConfig& config : configs()) {
     if (config.revision.revise_map) continue;
     CHECK(check_equal(config, scans).epochs >= 3);
   }
 }
 
 TEST_CASE("two threads give the same answers where the first scans do not tell the sensor") {
-  std::vector<Scan> scans = passing_van();
+  std::vector<Scan> scans = one_passing_van();
   for (std::size_t i = 0; i < 10; ++i) {
     scans[i].points.resize(20);
     scans[i].object.resize(20);
@@ -199,9 +199,9 @@ TEST_CASE("two threads give the same answers where the first scans do not tell t
 }
 
 TEST_CASE("after a scan that is refused or fails, two threads give the answers of one thread") {
-  std::vector<Scan> scans = passing_van();
+  std::vector<Scan> scans = one_passing_van();
   scans[15].T_world_sensor.translation().x() = std::numeric_limits<double>::quiet_NaN();
-  for (Config config : {Config::paper(), with_lookahead(8)}) {
+  for (FaintingConfig config : {FaintingConfig::paper(), with_lookahead(8)}) {
     config.ground.failing_call = 20;
     const Answers one = check_equal(config, scans);
     CHECK(one.failures == 2);
@@ -210,23 +210,23 @@ TEST_CASE("after a scan that is refused or fails, two threads give the answers o
 }
 
 TEST_CASE("an exception of the second thread reaches the caller, and the scan is taken") {
-  for (Config config : {Config::paper(), with_lookahead(8)}) {
+  for (FaintingConfig config : {FaintingConfig::paper(), with_lookahead(8)}) {
     config.map.failing_insert = 3;
-    const Answers one = check_equal(config, passing_van());
+    const Answers one = check_equal(config, one_passing_van());
     CHECK(one.failures == 1);
-    CHECK(one.verdicts.newest.size() == passing_van().size() - 1);
-    CHECK(one.verdicts.final.size() == passing_van().size() - 1);
+    CHECK(one.verdicts.newest.size() == one_passing_van().size() - 1);
+    CHECK(one.verdicts.final.size() == one_passing_van().size() - 1);
   }
 }
 
 TEST_CASE("with two threads, one more scan than with one is open, and flush() gives it") {
-  for (Config config : {Config::paper(), with_lookahead(8)}) {
-    const std::size_t latency = Remover(config).latency();
+  for (FaintingConfig config : {FaintingConfig::paper(), with_lookahead(8)}) {
+    const std::size_t latency = FaintingRemover(config).latency();
     config.threads = 2;
-    config.map.failing_insert = static_cast<int>(passing_van().size()) - 1;
-    Remover remover(config);
+    config.map.failing_insert = static_cast<int>(one_passing_van().size()) - 1;
+    FaintingRemover remover(config);
     CHECK(remover.latency() == latency + 1);
-    for (const Scan& scan : passing_van()) {
+    for (const Scan& scan : one_passing_van()) {
       remover.push(scan.points, scan.T_world_sensor, scan.time);
     }
     std::size_t flushed = 0;

@@ -122,7 +122,7 @@ void add_wall(Stream& stream, std::vector<Point>& points) {
 }
 
 /// `dense`: whether floors are dense.
-std::vector<Point> read_points(Stream& stream, unsigned kind, bool dense) {
+std::vector<Point> points_of(Stream& stream, unsigned kind, bool dense) {
   std::vector<Point> points;
   if ((kind & 1U) != 0) add_floor(stream, dense, points);
   if ((kind & 2U) != 0) add_wall(stream, points);
@@ -303,7 +303,7 @@ std::uint64_t play(Stream stream, DynaInsRemover& remover) {
       // The scan that gives the sensor model is only a floor, so that range images have few rows.
       const bool tells_sensor = what != kPushAlone && witness.is_new();
       const std::vector<Point> points =
-          read_points(stream, tells_sensor ? 1U : kind & 15U, tells_sensor);
+          points_of(stream, tells_sensor ? 1U : kind & 15U, tells_sensor);
       const Eigen::Isometry3d T = read_pose(stream, kind >> 4U);
       const unsigned clock = stream.byte();
       if (clock == 255) {

@@ -17,7 +17,7 @@ using test::LogChannel;
 using test::WrittenMessage;
 
 // The first byte of an input chooses the format.
-const char* const kNames[] = {"log.mcap", "log.bag", "log.db3"};
+const char* const kLogNames[] = {"log.mcap", "log.bag", "log.db3"};
 
 void read_whole(const fs::path& log, std::size_t bytes) {
   const Recording recording(log);
@@ -69,7 +69,7 @@ std::vector<LogChannel> channels(bool by_transforms) {
 void run_log(Bytes bytes) {
   if (bytes.empty()) return;
   static const test::TemporaryFolder folder;
-  const fs::path log = folder / kNames[bytes[0] % 3];
+  const fs::path log = folder / kLogNames[bytes[0] % 3];
   test::write_text(log, {reinterpret_cast<const char*>(bytes.data()) + 1, bytes.size() - 1});
   try {
     read_whole(log, bytes.size());
