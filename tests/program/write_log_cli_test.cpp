@@ -120,7 +120,8 @@ struct Fixture {
 
 }  // namespace
 
-TEST_CASE("--write-log writes the log again: clouds without moving points, all else as it was") {
+TEST_CASE(
+    "run --write-log writes the log again: clouds without moving points, all else as it was") {
   Fixture fixture;
   fs::create_directory(fixture.folder / "clean");
   const Outcome outcome = fixture.run({"--write-log", fixture.target});
@@ -150,7 +151,7 @@ TEST_CASE("Clouds without a verdict stay in the log as they are, and their numbe
   CHECK(messages_of(target) == cleaned(fixture.log, fixture.out, 3));
 }
 
-TEST_CASE("--mark adds the labels of the run to all clouds") {
+TEST_CASE("run --mark adds the labels of the run to all clouds") {
   Fixture fixture;
   const std::string target = fixture.folder / "marked.mcap";
   REQUIRE(fixture.run({"--write-log", target, "--mark", "--start", "3"}).code == 0);
@@ -206,7 +207,7 @@ TEST_CASE("A log that is a folder is written as a folder") {
   CHECK_THAT(outcome.err, ContainsSubstring("notes.txt, which is no part of the log"));
 }
 
-TEST_CASE("--write-log refuses places and recordings before the run, and changes nothing") {
+TEST_CASE("run --write-log refuses places and recordings before the run, and changes nothing") {
   Fixture fixture;
   write_tiny_sequence(fixture.folder / "seq", 4);
   write_text(fixture.folder / "mine.mcap", "mine");
