@@ -25,7 +25,7 @@ TEST_CASE("Flags --version and --help") {
   }
 }
 
-TEST_CASE("--help shows the options that matter, --help-all the rest too") {
+TEST_CASE("run --help shows the options that matter, --help-all the rest too") {
   const std::string help = start({"run", "--help"}).out;
   const std::string all = start({"run", "--help-all"}).out;
   for (const char* option : {"--out", "--preset", "--view", "--map "}) {
