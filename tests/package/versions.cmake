@@ -1,4 +1,5 @@
-# VERSION of the project, the header, the installed package files and the program have one version.
+# VERSION of the project, the header, the installed package files, the program and the recipes of
+# packagers have one version.
 
 function(expect_version where found)
   if(NOT found STREQUAL VERSION)
@@ -33,4 +34,18 @@ if(PROGRAM)
   if(NOT result EQUAL 0)
     message(SEND_ERROR "${PROGRAM} --version ended with ${result}")
   endif()
+endif()
+
+if(PYTHON)
+  execute_process(COMMAND ${PYTHON} -B ${CMAKE_CURRENT_LIST_DIR}/recipes.py ${SOURCE_DIR}
+    OUTPUT_VARIABLE output RESULT_VARIABLE result)
+  string(REGEX MATCHALL "[^\n]+" lines "${output}")
+  list(LENGTH lines count)
+  if(NOT result EQUAL 0 OR NOT count EQUAL 4)
+    message(SEND_ERROR "Recipes of packagers: ${result}\n${output}")
+  endif()
+  foreach(line IN LISTS lines)
+    string(REGEX MATCH "^([^ ]+) (.*)$" line "${line}")
+    expect_version("${CMAKE_MATCH_1}" "${CMAKE_MATCH_2}")
+  endforeach()
 endif()
