@@ -1,7 +1,11 @@
 // Poses by tf2, which ROS 1 and ROS 2 share, without waiting.
 #pragma once
 
+#if __has_include(<tf2/exceptions.hpp>)  // newer releases
+#include <tf2/exceptions.hpp>
+#else
 #include <tf2/exceptions.h>
+#endif
 
 #include <Eigen/Geometry>
 #include <string>

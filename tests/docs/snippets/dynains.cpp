@@ -4,31 +4,9 @@
 #include <cstddef>
 #include <vector>
 
-#include "adapters/message.hpp"
-#include "dynains/adapters/point_cloud2.hpp"
-#include "dynains/adapters/sophus.hpp"
 #include "dynains/dyna_ins_remover.hpp"
 #include "dynains/io/tiled_map.hpp"
 #include "dynains/map/rebasable_static_map.hpp"
-
-namespace sensor_msgs {
-using PointCloud2 = dynains::test::LookAlike;
-}
-
-namespace {
-
-/// What a block uses of kiss_icp::pipeline::KissICP.
-struct KissIcpLookAlike {
-  void RegisterFrame(const std::vector<Eigen::Vector3d>& points,
-                     const std::vector<double>& timestamps);
-  const Sophus::SE3d& pose() const;
-};
-
-struct Publisher {
-  void publish(const sensor_msgs::PointCloud2& message);
-};
-
-}  // namespace
 
 void getting_started(const std::vector<float>& xyzi, const Eigen::Isometry3d& T_world_sensor,
                      double time) {
@@ -37,29 +15,16 @@ void getting_started(const std::vector<float>& xyzi, const Eigen::Isometry3d& T_
 #include "getting_started_1.inc"
 }
 
-void kiss_icp_loop(KissIcpLookAlike& odometry, const std::vector<Eigen::Vector3d>& points,
-                   const std::vector<double>& timestamps, double time,
-                   Eigen::Isometry3d& T_odometry_last, Eigen::Isometry3d& T_world_last) {
 #include "embedding_2.inc"
-}
-
-struct FilterNode {
-  dynains::DynaInsRemover remover;
-  Publisher publisher;
-  Eigen::Isometry3d T_odom_lidar;
-#include "embedding_3.inc"
-};
-
-#include "embedding_4.inc"
 
 void reserve(dynains::DynaInsRemover& remover, const dynains::RawPoints<float>& first_cloud) {
-#include "embedding_5.inc"
+#include "embedding_3.inc"
 }
 
 void long_drive() {
-#include "embedding_6.inc"
+#include "embedding_4.inc"
 }
 
 void move_scans() {
-#include "embedding_7.inc"
+#include "embedding_5.inc"
 }

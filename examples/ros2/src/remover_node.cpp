@@ -1,0 +1,251 @@
+#include "dynains_ros/remover_node.hpp"
+
+#if __has_include(<tf2_ros/buffer.hpp>)  // newer releases
+#include <tf2_ros/buffer.hpp>
+#include <tf2_ros/transform_listener.hpp>
+#else
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_listener.h>
+#endif
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <diagnostic_msgs/msg/diagnostic_array.hpp>
+#include <geometry_msgs/msg/pose_with_covariance_stamped.hpp>
+#include <memory>
+#include <optional>
+#include <rclcpp_components/register_node_macro.hpp>
+#include <sensor_msgs/msg/point_cloud2.hpp>
+#include <string>
+#include <utility>
+
+#include "dynains/adapters/point_cloud2.hpp"
+#include "ros_common/find_pose.hpp"
+#include "ros_common/messages.hpp"
+#include "ros_common/remover_loop.hpp"
+#include "ros_common/remover_parameters.hpp"
+#include "ros_common/worker.hpp"
+
+namespace dynains_ros {
+namespace {
+
+using Cloud = sensor_msgs::msg::PointCloud2;
+using Residual = geometry_msgs::msg::PoseWithCovarianceStamped;
+using Diagnostics = diagnostic_msgs::msg::DiagnosticArray;
+using Loop = RemoverLoop<Cloud::ConstSharedPtr>;
+
+/// Declares parameters that are fixed while the node runs: rclcpp refuses to change them.
+class FixedParameters {
+ public:
+  explicit FixedParameters(rclcpp::Node& node) : node_(node) {}
+
+  template <class Value>
+  Value operator()(const ParameterText& text, const Value& value) const {
+    rcl_interfaces::msg::ParameterDescriptor descriptor;
+    descriptor.description = text.description;
+    descriptor.read_only = true;
+    if (text.is_bounded) set_range(descriptor, text, value);
+    return node_.declare_parameter(text.name, value, descriptor);
+  }
+
+ private:
+  static void set_range(rcl_interfaces::msg::ParameterDescriptor& descriptor,
+                        const ParameterText& text, double) {
+    descriptor.floating_point_range.emplace_back();
+    descriptor.floating_point_range[0].from_value = text.min;
+    descriptor.floating_point_range[0].to_value = text.max;
+  }
+  static void set_range(rcl_interfaces::msg::ParameterDescriptor& descriptor,
+                        const ParameterText& text, std::int64_t) {
+    constexpr double kMost = 9e18;  // an integer of 64 bits holds it
+    descriptor.integer_range.emplace_back();
+    descriptor.integer_range[0].from_value = static_cast<std::int64_t>(std::max(text.min, -kMost));
+    descriptor.integer_range[0].to_value = static_cast<std::int64_t>(std::min(text.max, kMost));
+    descriptor.integer_range[0].step = 1;
+  }
+  template <class Value>
+  static void set_range(rcl_interfaces::msg::ParameterDescriptor&, const ParameterText&,
+                        const Value&) {}
+
+  rclcpp::Node& node_;
+};
+
+RemoverConfig declare_remover(rclcpp::Node& node) {
+  const FixedParameters declare(node);
+  RemoverConfig config = preset(declare({"preset",
+                                         "configuration whose values the other parameters replace: "
+                                         "default|paper|offline|odometry"},
+                                        std::string("default")));
+  set_parameters(config, declare);
+  return config;
+}
+
+Loop::Config declare_loop(rclcpp::Node& node) {
+  const FixedParameters declare(node);
+  Loop::Config config;
+  config.patience = declare({"tf_timeout",
+                             "how long a cloud waits for its transform, by the clock of the node "
+                             "[s]",
+                             true, 0.0, 60.0},
+                            config.patience);
+  config.capacity = static_cast<std::size_t>(
+      declare({"queue", "clouds that wait; of more, the oldest is left out", true, 1, 1000},
+              static_cast<std::int64_t>(config.capacity)));
+  config.map_period = declare({"map_period", "least time between two maps [s]", true, 0.0, 3600.0},
+                              config.map_period);
+  return config;
+}
+
+/// The user may override the quality of service by parameters qos_overrides./TOPIC.
+template <class Options>
+Options overridable() {
+  Options options;
+  options.qos_overriding_options = rclcpp::QosOverridingOptions::with_default_policies();
+  return options;
+}
+
+/// rclcpp has no transient local topics within a process.
+rclcpp::SubscriptionOptions between_processes() {
+  rclcpp::SubscriptionOptions options;
+  options.use_intra_process_comm = rclcpp::IntraProcessSetting::Disable;
+  return options;
+}
+
+}  // namespace
+
+class RemoverNode::Work {
+ public:
+  explicit Work(RemoverNode& node)
+      : node_(node),
+        fixed_frame_(
+            FixedParameters(node)({"fixed_frame", "frame without jumps, in which the map is built"},
+                                  std::string("odom"))),
+        loop_(declare_remover(node), declare_loop(node)),
+        transforms_(node.get_clock()),
+        listener_(transforms_, &node, true, tf2_ros::DynamicListenerQoS(),
+                  tf2_ros::StaticListenerQoS(), between_processes(), between_processes()) {
+    const auto options = overridable<rclcpp::PublisherOptions>();
+    const rclcpp::SensorDataQoS sensor;
+    static_ = node.create_publisher<Cloud>("static", sensor, options);
+    dynamic_ = node.create_publisher<Cloud>("dynamic", sensor, options);
+    residual_ = node.create_publisher<Residual>("~/residual", sensor, options);
+    auto map_options = options;
+    map_options.use_intra_process_comm = rclcpp::IntraProcessSetting::Disable;
+    map_ = node.create_publisher<Cloud>("map", rclcpp::QoS(1).reliable().transient_local(),
+                                        map_options);
+    diagnostics_ = node.create_publisher<Diagnostics>("/diagnostics", 10);
+    maps_.emplace([this](std::unique_ptr<Cloud> map) {
+      loop_.attempt([&] { map_->publish(std::move(map)); });
+    });
+    worker_.emplace([this] { return step(); });
+    clouds_ = node.create_subscription<Cloud>(
+        "points", sensor, [this](Cloud::ConstSharedPtr cloud) { on_cloud(std::move(cloud)); },
+        overridable<rclcpp::SubscriptionOptions>());
+    timer_ = node.create_wall_timer(kReportPeriod, [this] { report(); });
+  }
+
+ private:
+  static constexpr std::chrono::seconds kReportPeriod{1};
+
+  void on_cloud(Cloud::ConstSharedPtr cloud) {
+    if (loop_.add(std::move(cloud), node_.now().seconds())) transforms_.clear();
+    worker_->wake();
+  }
+
+  Worker::Wait step() {
+    const bool has_cleaned = loop_.clean_next(
+        node_.now().seconds(),
+        [this](const Cloud::ConstSharedPtr& cloud) { return pose_of(*cloud); },
+        [this](const Cloud::ConstSharedPtr& cloud, const dynains::FrameResult& frame) {
+          publish(*cloud, frame);
+        });
+    const std::chrono::duration<double> uptime =
+        std::chrono::steady_clock::now().time_since_epoch();
+    loop_.publish_map(uptime.count(), has_readers(*map_), [this](const auto& map) {
+      auto message = std::make_unique<Cloud>(map_message<Cloud>(map, fixed_frame_));
+      message->header.stamp = newest_;
+      maps_->post(std::move(message));
+    });
+    if (has_cleaned) return Worker::Wait(0);
+    return Worker::Wait(loop_.is_waiting() ? 5 : 50);
+  }
+
+  PoseAnswer pose_of(const Cloud& cloud) const {
+    const tf2::TimePoint stamp = tf2_ros::fromMsg(cloud.header.stamp);
+    return find_pose(static_cast<const tf2::BufferCore&>(transforms_), fixed_frame_,
+                     cloud.header.frame_id, stamp, tf2::TimePointZero,
+                     [&](const auto& newest) { return tf2_ros::fromMsg(newest) < stamp; });
+  }
+
+  /// Messages are moved to readers of this process.
+  void publish(const Cloud& cloud, const dynains::FrameResult& frame) {
+    newest_ = cloud.header.stamp;
+    const dynains::Span<const dynains::PointLabel> labels = frame.newest.labels;
+    if (has_readers(*static_)) {
+      static_->publish(std::make_unique<Cloud>(dynains::static_points(cloud, labels)));
+    }
+    if (has_readers(*dynamic_)) {
+      dynamic_->publish(std::make_unique<Cloud>(dynains::dynamic_points(cloud, labels)));
+    }
+    if (frame.pose_residual) {
+      residual_->publish(std::make_unique<Residual>(
+          residual_message<Residual>(*frame.pose_residual, cloud.header)));
+    }
+  }
+
+  static bool has_readers(const rclcpp::PublisherBase& publisher) {
+    return publisher.get_subscription_count() + publisher.get_intra_process_subscription_count() >
+           0;
+  }
+
+  void report() {
+    const std::chrono::duration<double> period = kReportPeriod;
+    const Diagnosis diagnosis = loop_.report(period.count());
+    auto message = std::make_unique<Diagnostics>();
+    message->header.stamp = node_.now();
+    message->status.emplace_back();
+    auto& status = message->status.back();
+    status.level = static_cast<std::uint8_t>(diagnosis.level);
+    status.name = std::string(node_.get_fully_qualified_name()) + ": remover";
+    status.message = diagnosis.message;
+    for (const auto& [name, value] : diagnosis.values) {
+      status.values.emplace_back();
+      status.values.back().key = name;
+      status.values.back().value = value;
+    }
+    loop_.attempt([&] { diagnostics_->publish(std::move(message)); });
+    if (diagnosis.message == told_) return;
+    told_ = diagnosis.message;
+    if (diagnosis.level == Diagnosis::Level::kOk) {
+      RCLCPP_INFO(node_.get_logger(), "%s", told_.c_str());
+    } else {
+      RCLCPP_WARN(node_.get_logger(), "%s", told_.c_str());
+    }
+  }
+
+  RemoverNode& node_;
+  std::string fixed_frame_;
+  Loop loop_;
+  tf2_ros::Buffer transforms_;
+  tf2_ros::TransformListener listener_;  // has a thread of its own
+  rclcpp::Publisher<Cloud>::SharedPtr static_, dynamic_, map_;
+  rclcpp::Publisher<Residual>::SharedPtr residual_;
+  rclcpp::Publisher<Diagnostics>::SharedPtr diagnostics_;
+  builtin_interfaces::msg::Time newest_;  // used by the worker alone
+  std::string told_;                      // the last report
+  // A reader of the map that hangs holds up further maps, and no clouds.
+  std::optional<Outbox<std::unique_ptr<Cloud>>> maps_;
+  std::optional<Worker> worker_;
+  rclcpp::Subscription<Cloud>::SharedPtr clouds_;
+  rclcpp::TimerBase::SharedPtr timer_;
+};
+
+RemoverNode::RemoverNode(const rclcpp::NodeOptions& options)
+    : Node("remover", options), work_(std::make_unique<Work>(*this)) {}
+
+RemoverNode::~RemoverNode() = default;
+
+}  // namespace dynains_ros
+
+RCLCPP_COMPONENTS_REGISTER_NODE(dynains_ros::RemoverNode)
