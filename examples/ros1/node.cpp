@@ -8,7 +8,7 @@
 //               ~residual      geometry_msgs/PoseWithCovarianceStamped: the aligned motion
 //   parameters  ~fixed_frame   a frame without jumps ["odom"]
 //               ~tf_timeout    how long a cloud waits for its transform, s [0.2]
-//               ~queue         clouds that wait [20]
+//               ~queue         clouds that wait [10]
 //               ~map_period    time between two maps, s [2]
 //               ~preset        "default", "paper", "offline" or "odometry" ["default"]
 //               all parameters of the remover, by their names

@@ -132,7 +132,9 @@ inline void tell_problems(const LoopCounts& counts, const LoopState& state, Diag
   if (counts.failures > 0) {
     tell(Level::kWarn, "messages that could not be published: " + std::to_string(counts.failures));
   }
-  if (diagnosis.message.empty()) diagnosis.message = "clouds are cleaned";
+  if (diagnosis.message.empty()) {
+    diagnosis.message = counts.taken > 0 ? "clouds are cleaned" : "clouds wait for transforms";
+  }
 }
 
 }  // namespace detail

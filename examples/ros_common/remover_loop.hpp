@@ -25,7 +25,7 @@ class RemoverLoop {
  public:
   struct Config {
     double patience = 0.2;      ///< s, how long a cloud waits for its pose
-    std::size_t capacity = 20;  ///< clouds that wait
+    std::size_t capacity = 10;  ///< clouds that wait
     double map_period = 2.0;    ///< s, between two maps
   };
 

@@ -43,6 +43,14 @@ TEST_CASE("a report has the rates and times of its period") {
   CHECK(value_of(diagnosis, "resets since the start") == "1");
 }
 
+TEST_CASE("clouds that only wait are not cleaned, and not wrong yet") {
+  LoopCounts counts;
+  counts.arrived = 1;
+  const Diagnosis diagnosis = diagnose(counts, {}, {}, 1.0);
+  CHECK(diagnosis.level == Level::kOk);
+  CHECK(diagnosis.message == "clouds wait for transforms");
+}
+
 TEST_CASE("a report tells what is wrong") {
   LoopCounts counts = ten_clouds();
   LoopState state;
