@@ -79,7 +79,7 @@ std::string name_of(const simulation::Config& config) {
 using InMap = std::vector<std::vector<std::uint8_t>>;
 
 /// Sets the bits of `in_map`. Returns how far the corrected motions, one after the other, lead from
-/// the pushed poses at most, m; a scan without a corrected motion is where it was pushed.
+/// the true poses at most, m; a scan without a corrected motion keeps the pushed one.
 double judge(const Scans& scans, const DynaInsRemover::Config& config, unsigned bit,
              InMap& in_map) {
   const auto keep = [&](const ScanVerdict& verdict) {
@@ -99,8 +99,8 @@ double judge(const Scans& scans, const DynaInsRemover::Config& config, unsigned 
     const Pose T_corrected_newest =
         T_corrected_previous * (frame.pose_residual ? frame.pose_residual->T_previous_newest
                                                     : T_world_previous.inverse() * T_world_newest);
-    farthest = std::max(farthest,
-                        (T_corrected_newest.translation() - T_world_newest.translation()).norm());
+    farthest = std::max(
+        farthest, (T_corrected_newest.translation() - scan.T_world_sensor.translation()).norm());
     T_world_previous = T_world_newest;
     T_corrected_previous = T_corrected_newest;
   }
@@ -131,9 +131,9 @@ evaluation::Evaluation evaluate(const Scans& scans, const InMap& in_map,
 using Scores = std::vector<double>;
 
 const std::vector<std::string>& score_names() {
-  static const std::vector<std::string> names = {"F1",     "SA",    "DA",       "objects",
-                                                 "movers", "cars",  "fences",   "poles",
-                                                 "plants", "walls", "moved, mm"};
+  static const std::vector<std::string> names = {"F1",     "SA",    "DA",      "objects",
+                                                 "movers", "cars",  "fences",  "poles",
+                                                 "plants", "walls", "pose, mm"};
   return names;
 }
 
