@@ -7,6 +7,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "dynains/clusters/comparison.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evidence/free_space_config.hpp"
 #include "dynains/ground/ground_config.hpp"
@@ -74,6 +75,18 @@ Config paper_config() {
   }
 }
 
+/// `Config::published()`, or that of paper_config() if the config has no such member.
+template <class Config>
+using Published = decltype(Config::published());
+template <class Config>
+Config published_config() {
+  if constexpr (Offers<Published, Config>::value) {
+    return Config::published();
+  } else {
+    return paper_config<Config>();
+  }
+}
+
 template <class Config>
 using Offline = decltype(Config::offline());
 template <class Config>
@@ -94,10 +107,11 @@ enum class BeliefObservations {
   kNewest,    ///< only the newest observation, compared with the whole cluster
   kSequence,  ///< observations 2 to K, each compared with the cluster up to that observation
   kAll,       ///< all observations, each compared with the whole cluster
+  kOthers,    ///< all observations, each compared with all others
 };
 
-constexpr std::array<const char*, 3> value_names(BeliefObservations) {
-  return {"newest", "sequence", "all"};
+constexpr std::array<const char*, 4> value_names(BeliefObservations) {
+  return {"newest", "sequence", "all", "others"};
 }
 
 /// Parameters of BasicDynaInsRemover itself. visit() gives their meaning and bounds.
@@ -106,6 +120,8 @@ struct RemoverConfig {
   int window = 4;          ///< scans, K of Eq. 3
   bool use_belief = true;  ///< Eq. 13-19
   BeliefObservations belief_observations = BeliefObservations::kNewest;
+  Comparison compared_clusters = Comparison::kEnds;
+  bool big_is_static = false;
   int votes = 1;                 ///< number of windows
   double min_range = 2.7;        ///< m, in the sensor's x-y plane
   double max_range = 250;        ///< m, in the sensor's x-y plane, and along its z axis
@@ -129,6 +145,16 @@ struct RemoverConfig {
     return config;
   }
 
+  /// Verdicts as the public implementation of the paper gives them.
+  static RemoverConfig published() {
+    RemoverConfig config = paper();
+    config.belief_observations = BeliefObservations::kOthers;
+    config.compared_clusters = Comparison::kAnyBefore;
+    config.big_is_static = true;
+    config.votes = 0;
+    return config;
+  }
+
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
     visitor(
@@ -145,7 +171,16 @@ struct RemoverConfig {
                       "observations that update the belief (Eq. 15, 16); newest: only the newest, "
                       "compared with the whole cluster; sequence: the second to the newest, each "
                       "compared with the cluster up to that observation; all: all observations, "
-                      "each compared with the whole cluster"});
+                      "each compared with the whole cluster; others: all, each compared with all "
+                      "others"});
+    visitor(Parameter{"compared_clusters", self.compared_clusters, Bounds(), "",
+                      "clusters of a window that can be dynamic: with points in both its ends, or "
+                      "in the newest scan and any before it, where those without points in the "
+                      "oldest scan have no belief (public implementation of the paper)"});
+    visitor(Parameter{"big_is_static", self.big_is_static, Bounds(), "",
+                      "clusters of the window that are longer than 25 m, higher than 3.5 m, reach "
+                      "3.5 m over the sensor or have at most three points in each end are static "
+                      "(public implementation of the paper)"});
     visitor(Parameter{"votes", self.votes, closed(0, 64), "windows",
                       "windows that must call a point dynamic for the final verdict; 0: the newest "
                       "window alone decides, without latency"});
@@ -234,6 +269,17 @@ struct PipelineConfig : RemoverConfig {
     config.descriptor = detail::paper_config<decltype(config.descriptor)>();
     config.belief = detail::paper_config<decltype(config.belief)>();
     config.map = detail::paper_config<decltype(config.map)>();
+    return config;
+  }
+
+  /// Method and parameters of the paper's public implementation, where it departs from the text.
+  static PipelineConfig published() {
+    PipelineConfig config = paper();
+    static_cast<RemoverConfig&>(config) = RemoverConfig::published();
+    config.ground = detail::published_config<decltype(config.ground)>();
+    config.clusterer = detail::published_config<decltype(config.clusterer)>();
+    config.descriptor = detail::published_config<decltype(config.descriptor)>();
+    config.belief = detail::published_config<decltype(config.belief)>();
     return config;
   }
 

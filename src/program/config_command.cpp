@@ -93,8 +93,8 @@ void add_config_command(CLI::App& app) {
   command
       .add_option(
           "--preset", *name,
-          "default; offline: verdicts wait for 100 later scans; paper: the paper to the letter "
-          "[default]")
+          "default; offline: verdicts wait for 100 later scans; paper: the paper to the letter; "
+          "published: its public implementation [default]")
       ->check(CLI::IsMember(preset_names()))
       ->type_name("NAME");
   auto markdown = std::make_shared<bool>(false);

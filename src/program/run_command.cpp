@@ -15,6 +15,7 @@
 #include "recording_options.hpp"
 #include "remover_options.hpp"
 #include "run/interrupt.hpp"
+#include "run/preset.hpp"
 #include "run/run.hpp"
 #include "run/run_plan.hpp"
 
@@ -103,7 +104,8 @@ void run_as_asked(RunFlags& flags) {
   settings.config = flags.remover.config();
   settings.preset = flags.remover.preset_name();
   settings.config_file = flags.remover.config_file();
-  settings.find_own_body = settings.preset != "paper" && !flags.remover.sets("min-range");
+  settings.find_own_body =
+      !has_ranges_of_paper(settings.preset) && !flags.remover.sets("min-range");
   settings.recording = flags.recording.folder();
   settings.recording_as_given = flags.recording.as_given();
   settings.recording_flags = flags.recording.given_flags();

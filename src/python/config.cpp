@@ -62,6 +62,8 @@ void bind_config(py::module_& module) {
         help);
   };
   add_preset("paper", &Config::paper, "The paper to the letter, with its published parameters.");
+  add_preset("published", &Config::published,
+             "The paper's public implementation, where it departs from the text.");
   add_preset("offline", &Config::offline,
              "For recordings: verdicts wait for more later scans, at the cost of memory.");
   add_properties<Config>(config);

@@ -52,7 +52,7 @@ void set_scan(RunArguments& run, const py::handle& value) {
 }
 
 const std::array<RunSetting, 27> kRunSettings{{
-    {"preset", "'default', 'offline' or 'paper'", "parameters to start from",
+    {"preset", "'default', 'offline', 'paper' or 'published'", "parameters to start from",
      [](RunArguments& run, const py::handle& value) {
        const auto& names = program::preset_names();
        run.preset = value.cast<std::string>();
@@ -180,7 +180,7 @@ void take_config(RunArguments& run) {
   settings.preset = run.preset.value_or("default");
   settings.config = run.config ? *run.config : program::preset(settings.preset);
   settings.config.validate();
-  settings.find_own_body = !run.config && settings.preset != "paper";
+  settings.find_own_body = !run.config && !program::has_ranges_of_paper(settings.preset);
 }
 
 program::RunListener listen(const RunArguments& run) {

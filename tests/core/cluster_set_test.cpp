@@ -82,5 +82,22 @@ TEST_CASE("a cluster without points in the newest or the oldest scan is not comp
   CHECK_FALSE(clusters.comparable(2));
 }
 
+TEST_CASE("a cluster of the newest scan and any other is compared on demand") {
+  PolarBuffer window;
+  for (int i = 0; i < 8; ++i) add(window, 10.0, 0.0, 0.0);
+  const std::vector<std::uint32_t> scan_begin = {0, 2, 5, 8};
+  // Cluster 0: middle and newest. 1: oldest and middle. 2: newest alone. 3: oldest and newest.
+  const std::vector<std::uint32_t> cluster_of = {1, 3, 1, 0, 1, 0, 2, 3};
+  ClusterSet clusters;
+  clusters.build(window.view(), scan_begin, cluster_of, 4, Comparison::kAnyBefore);
+  CHECK(clusters.comparable(0));
+  CHECK(clusters[0].oldest() == 1);
+  CHECK(clusters[0].ranges.size() == 2);
+  CHECK_FALSE(clusters.comparable(1));
+  CHECK_FALSE(clusters.comparable(2));
+  CHECK(clusters.comparable(3));
+  CHECK(clusters[3].oldest() == 0);
+}
+
 }  // namespace
 }  // namespace dynains::test

@@ -76,6 +76,22 @@ TEST_CASE("the paper's configuration has the published parameters") {
   CHECK(config.map.map_voxel == 0.2);
 }
 
+TEST_CASE("the configuration of the public implementation is that of the paper but for its rules") {
+  const Config config = Config::published();
+  CHECK_NOTHROW(config.validate());
+  CHECK(config.decision == Decision::kWindow);
+  CHECK(config.descriptor.tau_s == 0.6);
+  CHECK(config.belief_observations == BeliefObservations::kOthers);
+  CHECK(config.compared_clusters == Comparison::kAnyBefore);
+  CHECK(config.big_is_static);
+  CHECK(config.votes == 0);
+  CHECK(config.descriptor.belief_cells == 2.0);
+  CHECK(config.descriptor.ignored_low == 0.2);
+  CHECK(config.descriptor.bounds_of_ends);
+  CHECK(config.belief.vanished_weight == 1.0);
+  CHECK(config.ground.ground_fit_points == 1000000);
+}
+
 TEST_CASE("cells of a descriptor are bounded, since a cluster may reach all around the sensor") {
   Config config = Config::paper();
   config.descriptor.cell_azimuth = 0.125;  // 2880 sectors, of up to 1 km

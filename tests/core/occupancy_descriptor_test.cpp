@@ -1,5 +1,6 @@
 #include "dynains/descriptors/occupancy_descriptor.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -112,6 +113,58 @@ TEST_CASE("a similarity of exactly tau_s is no proposal") {
   CHECK(described(make(0.5, 10.0), make_cluster(4.0)).similarity() == 0.6);
   CHECK_FALSE(described(make(0.5, 10.0), make_cluster(4.0)).proposes_dynamic());
   CHECK(described(make(0.5, 10.0), make_cluster(4.001)).proposes_dynamic());
+}
+
+TEST_CASE("the low share of tall objects has no height") {
+  // z from -1 to `top`: over 1 m, the lowest 20 % do not count.
+  const auto cluster = [](double top) {
+    return Cluster()
+        .point(10.0, 0.0, -1.0)
+        .point(10.6, 0.0, -1.0 + 0.19 * (top + 1.0))
+        .point(11.2, 0.0, -1.0 + 0.21 * (top + 1.0))
+        .end_of_scan()
+        .point(11.7, 0.0, top)
+        .end_of_scan();
+  };
+  OccupancyDescriptor::Config config = make(0.5, 10.0);
+  config.ignored_low = 0.2;
+  check_heights(described(config, cluster(0.01)).heights(0), {0.0, 0.0, 0.21 * 1.01, 0.0});
+  check_heights(described(config, cluster(-0.01)).heights(0), {0.0, 0.19 * 0.99, 0.21 * 0.99, 0.0});
+  config.ignored_low = 0.0;
+  check_heights(described(config, cluster(0.01)).heights(0), {0.0, 0.19 * 1.01, 0.21 * 1.01, 0.0});
+}
+
+TEST_CASE(
+    "bounds of the ends leave out observations between them, and the belief has its own grid") {
+  const Cluster cluster = Cluster()
+                              .end_of_scan()  // no observation
+                              .point(10.0, 0.0, 0.0)
+                              .point(10.9, 0.0, 1.0)
+                              .end_of_scan()
+                              .point(5.0, 90.0, -3.0)
+                              .end_of_scan()
+                              .point(10.2, 4.0, 2.0)
+                              .end_of_scan();
+  OccupancyDescriptor::Config config = make(0.5, 10.0);
+  CHECK_FALSE(config.of_belief());
+  config.bounds_of_ends = true;
+  OccupancyDescriptor descriptor(config);
+  descriptor.describe(cluster.view());
+  CHECK(descriptor.oldest() == 1);
+  CHECK(descriptor.radial_cells() == 2);
+  CHECK(descriptor.azimuth_cells() == 1);
+  check_heights(descriptor.heights(1), {0.0, 1.0});
+  check_heights(descriptor.heights(3), {2.0, 0.0});
+  CHECK(descriptor.similarity() == 0.0);
+
+  config.belief_cells = 2.0;
+  const auto of_belief = config.of_belief();
+  REQUIRE(of_belief);
+  const OccupancyDescriptor belief = described(*of_belief, cluster);
+  CHECK(belief.radial_cells() == 6);   // 5.9 m in cells of 1 m
+  CHECK(belief.azimuth_cells() == 5);  // 90 deg in cells of 20 deg
+  check_heights(belief.heights(0), std::vector<double>(30, 0.0));
+  CHECK(*std::max_element(belief.heights(3).begin(), belief.heights(3).end()) == Approx(5.0));
 }
 
 TEST_CASE("descriptors are those of Eq. 5-11 in double on random clusters") {

@@ -465,6 +465,35 @@ TEST_CASE("belief reverts a wall that comes into view, and no van") {
   CHECK(removed(kWall) < wall_without_belief / 10);
   config.belief_observations = BeliefObservations::kAll;
   CHECK(removed(kWall) == wall_without_belief);
+  config.belief_observations = BeliefObservations::kOthers;
+  CHECK(removed(kWall) == wall_without_belief);
+}
+
+TEST_CASE("rules of the public implementation: big instances, and those that come into view") {
+  // A van passes a long wall that comes into view behind the corner of a house.
+  Scene scene;
+  scene.boxes = {van(22.0, -3.5, {-12.0, 0.0, 0.0}),
+                 {{-20.0, 4.0, 0.0}, {4.0, 10.0, 6.0}},
+                 {{6.0, 16.0, 0.0}, {15.0, 16.5, 4.0}},
+                 van(40.0, 6.0, {-12.0, 0.0, 0.0})};
+  scene.boxes[3].high.z() = 6.0;  // m: too high to be judged
+  constexpr int kVan = 0, kHighVan = 3;
+  const std::vector<Scan> scans = drive(scene, 16, 4.0);
+  Config config = Config::paper();
+  const auto removed = [&](int object) {
+    return share(scans, run(config, scans).final, PointLabel::kDynamic, object).labelled;
+  };
+  const std::size_t van = removed(kVan), high_van = removed(kHighVan);
+  REQUIRE(van > 2000);
+  REQUIRE(high_van > 500);
+  config.big_is_static = true;
+  CHECK(removed(kVan) == van);
+  CHECK(removed(kHighVan) == 0);
+  config.compared_clusters = Comparison::kAnyBefore;
+  CHECK(removed(kVan) >= van);
+  config = Config::published();
+  CHECK(removed(kVan) > van / 2);
+  CHECK(removed(kHighVan) == 0);
 }
 
 TEST_CASE("without belief every proposal is a verdict, and belief only reverts proposals") {

@@ -130,7 +130,7 @@ def test_earlier_results_stay_unless_they_are_replaced(drive, finished):
 
 
 def test_presets(drive, tmp_path):
-    for name in "default", "offline", "paper":
+    for name in "default", "offline", "paper", "published":
         report = dynains.run(drive, tmp_path / name, preset=name, end=2).report
         assert report["preset"] == name
         config = getattr(dynains.Config, name, dynains.Config)()

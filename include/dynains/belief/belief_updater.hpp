@@ -22,6 +22,13 @@ class BeliefUpdater {
     double prior = 0.5;            ///< p(m) (Eq. 14)
     double vanished_weight = 2.0;  ///< weight of a cell with rho = 0 (Eq. 18)
 
+    /// The public implementation of the paper.
+    static Config published() {
+      Config config;
+      config.vanished_weight = 1.0;
+      return config;
+    }
+
     template <class Self, class Visitor>
     static void visit(Self& self, Visitor&& visitor) {
       visitor(Parameter{"p_inc", self.p_inc, open(0.5, 1), "",

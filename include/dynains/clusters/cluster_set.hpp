@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/clusters/comparison.hpp"
 #include "dynains/clusters/polar_points.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/bits.hpp"
@@ -27,14 +28,20 @@ struct ClusterView {
   Span<const std::uint32_t> first_range;
 
   std::size_t scan_count() const { return first_range.size() - 1; }
+  /// The first scan with points of the cluster, which has points.
+  std::size_t oldest() const {
+    std::size_t k = 0;
+    while (first_range[k] == first_range[k + 1]) ++k;
+    return k;
+  }
   /// S_k of Eq. 4; `k` is below scan_count().
   Span<const PointRange> scan(std::size_t k) const {
     return ranges.subspan(first_range[k] - first_range[0], first_range[k + 1] - first_range[k]);
   }
 };
 
-/// Counting sort of a window by cluster and scan. Eq. 11 compares only clusters with points in both
-/// the oldest and the newest scan; the order leaves out all other clusters.
+/// Counting sort of a window by cluster and scan. The order leaves out clusters that are not
+/// compared.
 ///
 /// Consecutive points mostly share a cluster, so the sort moves runs of points, not single points.
 class ClusterSet {
@@ -50,7 +57,9 @@ class ClusterSet {
   /// `cluster_count`, or kNoCluster. Views of the set are valid until the next build() and as long
   /// as `window` is valid.
   void build(PolarView window, Span<const std::uint32_t> scan_begin,
-             Span<const std::uint32_t> cluster_of, std::size_t cluster_count) {
+             Span<const std::uint32_t> cluster_of, std::size_t cluster_count,
+             Comparison comparison = Comparison::kEnds) {
+    comparison_ = comparison;
     window_ = window;
     scan_count_ = scan_begin.size() - 1;
     cluster_count_ = cluster_count;
@@ -61,7 +70,7 @@ class ClusterSet {
 
   std::size_t size() const { return cluster_count_; }
   std::size_t scan_count() const { return scan_count_; }
-  /// Whether the cluster has points in both the oldest and the newest scan.
+  /// Whether the cluster is compared.
   bool comparable(std::size_t cluster) const { return comparable_[cluster] != 0; }
 
   /// The runs of all points of scan k, in scan order.
@@ -128,7 +137,7 @@ class ClusterSet {
     std::uint32_t total = 0;
     for (std::size_t c = 0; c < cluster_count_; ++c) {
       std::uint32_t* const counts = begin_.data() + c * slots;
-      comparable_[c] = scan_count_ > 1 && counts[0] > 0 && counts[scan_count_ - 1] > 0;
+      comparable_[c] = is_compared({counts, scan_count_}) ? 1 : 0;
       for (std::size_t k = 0; k < slots; ++k) {
         const std::uint32_t count = comparable_[c] != 0 ? counts[k] : 0;
         counts[k] = total;
@@ -136,6 +145,14 @@ class ClusterSet {
       }
     }
     ranges_.resize(total);
+  }
+
+  // `counts`: ranges by scan.
+  bool is_compared(Span<const std::uint32_t> counts) const {
+    if (counts.size() < 2 || counts[counts.size() - 1] == 0) return false;
+    if (comparison_ == Comparison::kEnds) return counts[0] > 0;
+    return std::any_of(counts.begin(), counts.end() - 1,
+                       [](std::uint32_t count) { return count > 0; });
   }
 
   void order_runs(Span<const std::uint32_t> scan_begin) {
@@ -151,6 +168,7 @@ class ClusterSet {
   }
 
   PolarView window_;
+  Comparison comparison_ = Comparison::kEnds;
   std::size_t scan_count_ = 0;
   std::size_t cluster_count_ = 0;
   std::size_t run_count_ = 0;

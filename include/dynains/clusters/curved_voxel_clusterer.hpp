@@ -43,6 +43,13 @@ class CurvedVoxelClusterer {
       return config;
     }
 
+    /// The public implementation of the paper.
+    static Config published() {
+      Config config = paper();
+      config.cluster_range = 80.0;
+      return config;
+    }
+
     /// Copy with the voxel sizes that are 0 derived from the sensor, so that neighbouring beams hit
     /// the same or neighbouring voxels.
     Config resolved(const SensorModel& sensor) const {

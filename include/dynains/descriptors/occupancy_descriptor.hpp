@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "dynains/clusters/cluster_set.hpp"
@@ -30,6 +31,29 @@ class OccupancyDescriptor {
     double cell_range = 0.25;   ///< m, s_r of Eq. 6
     double cell_azimuth = 1.5;  ///< deg, s_theta of Eq. 7
     double tau_s = 0.6;         ///< similarity below which a cluster is proposed as dynamic
+    double belief_cells = 1.0;  ///< size of the cells of the belief relative to the others
+    double ignored_low = 0.0;   ///< share of the height of objects over 1 m
+    bool bounds_of_ends = false;
+
+    /// The public implementation of the paper.
+    static Config published() {
+      Config config;
+      config.belief_cells = 2.0;
+      config.ignored_low = 0.2;
+      config.bounds_of_ends = true;
+      return config;
+    }
+
+    /// The descriptor whose heights the belief compares, or nothing if it is this one.
+    std::optional<Config> of_belief() const {
+      if (belief_cells == 1.0 && !bounds_of_ends) return std::nullopt;
+      Config config = *this;
+      config.cell_range = belief_cells * cell_range;
+      config.cell_azimuth = belief_cells * cell_azimuth;
+      config.belief_cells = 1.0;
+      config.bounds_of_ends = false;
+      return config;
+    }
 
     template <class Self, class Visitor>
     static void visit(Self& self, Visitor&& visitor) {
@@ -39,6 +63,15 @@ class OccupancyDescriptor {
                         "angular size s_theta of a descriptor cell (Eq. 7)"});
       visitor(Parameter{"tau_s", self.tau_s, closed(0, 1), "",
                         "similarity below which a cluster is proposed as dynamic (Eq. 12)"});
+      visitor(Parameter{"belief_cells", self.belief_cells, closed(1, 10), "",
+                        "size of the cells of the belief relative to those of the descriptor "
+                        "(public implementation of the paper: 2)"});
+      visitor(Parameter{"ignored_low", self.ignored_low, closed(0, 0.9), "",
+                        "lowest share of an object of more than 1 m that no descriptor counts "
+                        "(public implementation of the paper: 0.2)"});
+      visitor(Parameter{"bounds_of_ends", self.bounds_of_ends, Bounds(), "",
+                        "the descriptor spans the oldest and the newest observation alone, as in "
+                        "the public implementation of the paper; else all"});
     }
 
     /// Throws ConfigError.
@@ -65,22 +98,26 @@ class OccupancyDescriptor {
   const Config& config() const { return config_; }
 
   /// Computes the grid of Eq. 5-8 for a cluster and the heights of its oldest and newest
-  /// observation. The cluster must be comparable (ClusterSet::comparable). The memory that the view
+  /// observation. The cluster must be comparable (ClusterSet::comparable): it has points in the
+  /// newest scan and in an earlier one. The memory that the view
   /// refers to must stay valid until the next call.
   void describe(const ClusterView& cluster) {
     cluster_ = cluster;
+    oldest_ = cluster.oldest();
     compute_grid();
     const std::size_t scans = cluster_.scan_count();
     heights_.resize(std::max(heights_.size(), 2 * scans * cell_count()));
-    fill(0);
+    fill(oldest_);
     fill(scans - 1);
   }
 
   /// Computes the heights of the other observations, and cluster_heights(). The belief requires
-  /// them, the similarity does not.
+  /// them, the similarity does not. Not with `bounds_of_ends`.
   void describe_rest() {
     const std::size_t scans = cluster_.scan_count();
-    for (std::size_t k = 1; k + 1 < scans; ++k) fill(k);
+    for (std::size_t k = 0; k + 1 < scans; ++k) {
+      if (k != oldest_) fill(k);
+    }
     const std::size_t cells = cell_count();
     float* cluster = heights_.data() + scans * cells;
     std::copy_n(heights_.data(), cells, cluster);
@@ -96,6 +133,8 @@ class OccupancyDescriptor {
   std::size_t azimuth_cells() const { return azimuth_cells_; }  ///< N_theta (Eq. 7)
   std::size_t cell_count() const { return radial_cells_ * azimuth_cells_; }
   std::size_t scan_count() const { return cluster_.scan_count(); }
+  /// The first scan with an observation.
+  std::size_t oldest() const { return oldest_; }
 
   /// H_k by cell, radial index slowest: height of the highest point over the lowest point of the
   /// cluster, m (Eq. 9-10). 0 <= k < scan_count().
@@ -110,7 +149,7 @@ class OccupancyDescriptor {
   /// Cosine similarity d of newest and oldest observation (Eq. 11), in [0, 1]. If all heights of
   /// one observation are 0, the similarity is 0; if all heights of both are 0, it is 1.
   double similarity() const {
-    const Span<const float> a = heights(0);
+    const Span<const float> a = heights(oldest_);
     const Span<const float> b = heights(scan_count() - 1);
     detail::Float8 dot(0.0F), aa(0.0F), bb(0.0F);
     std::size_t i = 0;
@@ -145,6 +184,7 @@ class OccupancyDescriptor {
     const std::size_t first = cluster_.ranges[0].begin;
     const PackConstant first_range(points.range[first]), first_azimuth(points.azimuth[first]);
     const PackConstant first_z(points.z[first]), first_wrapped(wrapped(points.azimuth[first]));
+    float z_max = 0.0F;
     const PackConstant zero(0.0F), turn(2.0F * detail::kPi);
     // Azimuth extents for a seam at +-pi and for a seam at 0. The smaller extent is the smallest
     // arc if it is at most pi.
@@ -152,7 +192,8 @@ class OccupancyDescriptor {
     detail::with_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
-      Float range_low = first_range, range_high = first_range, z_low = first_z;
+      Float range_low = first_range, range_high = first_range;
+      Float z_low = first_z, z_high = first_z;
       Float azimuth_low = first_azimuth, azimuth_high = first_azimuth;
       Float wrapped_low = first_wrapped, wrapped_high = first_wrapped;
       const auto extend = [&](const auto& at) {
@@ -162,18 +203,20 @@ class OccupancyDescriptor {
         range_low = min(range_low, range);
         range_high = max(range_high, range);
         z_low = min(z_low, z);
+        z_high = max(z_high, z);
         azimuth_low = min(azimuth_low, azimuth);
         azimuth_high = max(azimuth_high, azimuth);
         const Float on = azimuth + keep(azimuth < zero, Float(turn));
         wrapped_low = min(wrapped_low, on);
         wrapped_high = max(wrapped_high, on);
       };
-      for (const PointRange& part : cluster_.ranges) {
+      for_bounding_ranges([&](const PointRange& part) {
         detail::for_overlapping_slices<Packs>(part.begin, part.end, extend);
-      }
+      });
       range_min_ = smallest(range_low);
       range_max = largest(range_high);
       z_min_ = smallest(z_low);
+      z_max = largest(z_high);
       low = smallest(azimuth_low);
       high = largest(azimuth_high);
       low_wrapped = smallest(wrapped_low);
@@ -187,10 +230,25 @@ class OccupancyDescriptor {
     }
     if (extent > detail::kPi) extent = find_smallest_arc(extent);
 
+    constexpr float kTall = 1.0F;  // m
+    const float height = z_max - z_min_;
+    lowest_counted_ = height > kTall ? static_cast<float>(config_.ignored_low) * height : 0.0F;
     cells_per_metre_ = static_cast<float>(1.0 / config_.cell_range);
     cells_per_radian_ = static_cast<float>(180.0 / (M_PI * config_.cell_azimuth));
     radial_cells_ = cells((range_max - range_min_) * cells_per_metre_);
     azimuth_cells_ = cells(extent * cells_per_radian_);
+  }
+
+  // Calls `work` with the ranges of points that the grid spans.
+  template <class Work>
+  void for_bounding_ranges(Work&& work) const {
+    if (!config_.bounds_of_ends) {
+      for (const PointRange& part : cluster_.ranges) work(part);
+      return;
+    }
+    for (const std::size_t k : {oldest_, cluster_.scan_count() - 1}) {
+      for (const PointRange& part : cluster_.scan(k)) work(part);
+    }
   }
 
   static std::size_t cells(float extent) {
@@ -209,12 +267,12 @@ class OccupancyDescriptor {
     constexpr float kBinsPerRadian = static_cast<float>(kBins) / (2.0F * detail::kPi);
     bin_is_occupied_.assign(kBins, 0);
     const float* const azimuth = cluster_.window.azimuth.data();
-    for (const PointRange& part : cluster_.ranges) {
+    for_bounding_ranges([&](const PointRange& part) {
       for (std::size_t i = part.begin; i < part.end; ++i) {
         const auto bin = static_cast<std::size_t>(wrapped(azimuth[i]) * kBinsPerRadian);
         bin_is_occupied_[std::min(bin, kBins - 1)] = 1;
       }
-    }
+    });
     std::size_t widest = 0;
     std::size_t seam = kBins;  // first occupied bin behind the widest gap
     std::size_t gap = 0;
@@ -233,14 +291,14 @@ class OccupancyDescriptor {
     const float origin = static_cast<float>(seam) / kBinsPerRadian;
     float low = 2.0F * detail::kPi;
     float high = 0.0F;
-    for (const PointRange& part : cluster_.ranges) {
+    for_bounding_ranges([&](const PointRange& part) {
       for (std::size_t i = part.begin; i < part.end; ++i) {
         float offset = wrapped(azimuth[i]) - origin;
         if (offset < -0.5F / kBinsPerRadian) offset += 2.0F * detail::kPi;
         low = std::min(low, offset);
         high = std::max(high, offset);
       }
-    }
+    });
     azimuth_min_ = origin + low;
     // In (-pi, pi], as azimuths are, so that an offset is at most one turn.
     if (azimuth_min_ > detail::kPi) azimuth_min_ -= 2.0F * detail::kPi;
@@ -259,6 +317,7 @@ class OccupancyDescriptor {
     const PackConstant cells_per_metre(cells_per_metre_), cells_per_radian(cells_per_radian_);
     const PackConstant zero(0.0F), just_below(-detail::kPi * 1e-4F), turn(2.0F * detail::kPi);
     const auto row = static_cast<std::int32_t>(azimuth_cells_);
+    const float lowest = lowest_counted_;
     const PackConstant last_radial(static_cast<float>(radial_cells_ - 1));
     const PackConstant last_azimuth(static_cast<float>(azimuth_cells_ - 1));
     const auto raise = [&](auto at) {
@@ -275,7 +334,7 @@ class OccupancyDescriptor {
       const std::size_t size = at.size();
       for (std::size_t i = 0; i < size; ++i) {
         float& highest = heights[cell[i]];
-        highest = std::max(highest, height[i]);
+        highest = height[i] > lowest ? std::max(highest, height[i]) : highest;
       }
     };
     detail::with_packs([&](auto packs) {
@@ -289,7 +348,9 @@ class OccupancyDescriptor {
   ClusterView cluster_;
   float range_min_ = 0.0F;
   float azimuth_min_ = 0.0F;
+  std::size_t oldest_ = 0;
   float z_min_ = 0.0F;
+  float lowest_counted_ = 0.0F;  ///< m over z_min_; points above it have a height
   float cells_per_metre_ = 1.0F;
   float cells_per_radian_ = 1.0F;
   std::size_t radial_cells_ = 0;

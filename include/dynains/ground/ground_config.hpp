@@ -40,6 +40,14 @@ struct GroundConfig {
     return config;
   }
 
+  /// The public implementation of the paper.
+  static GroundConfig published() {
+    GroundConfig config = paper();
+    config.ground_min_points = 6;
+    config.ground_fit_points = 1000000;
+    return config;
+  }
+
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
     visitor(Parameter{"sensor_height", self.sensor_height, closed(0, 100), "m",

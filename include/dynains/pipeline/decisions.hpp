@@ -3,10 +3,12 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "dynains/clusters/cluster_set.hpp"
@@ -80,8 +82,15 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
         votes_(config.votes),
         use_belief_(config.use_belief),
         observations_(config.belief_observations),
+        compared_(config.compared_clusters),
+        big_is_static_(config.big_is_static),
         descriptor_(config.descriptor),
-        belief_(config.belief) {}
+        belief_(config.belief) {
+    if constexpr (HasBeliefGrid<DescriptorConfig>::value) {
+      const auto of_belief = config.descriptor.of_belief();
+      if (of_belief) belief_descriptor_.emplace(*of_belief);
+    }
+  }
 
   std::size_t window_length() const override { return length_; }
   std::size_t latency() const override { return votes_ == 0 ? 0 : length_ - 1; }
@@ -92,7 +101,7 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
 
   void observe(ScanRing& scans, const ScanWindow& window) override {
     clusters_.build(window.points(), window.scan_begin(), window.cluster_of(),
-                    window.cluster_count());
+                    window.cluster_count(), compared_);
     judge_clusters();
     record(scans, window.first_scan());
   }
@@ -107,8 +116,13 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
   }
 
  private:
-  // Eq. 5-19 for each cluster with points in both the oldest and the newest scan. Other clusters
-  // are static.
+  using DescriptorConfig = ConfigOf<typename Stages::Descriptor>;
+  template <class Config>
+  using BeliefGrid = decltype(std::declval<const Config&>().of_belief());
+  template <class Config>
+  using HasBeliefGrid = Offers<BeliefGrid, Config>;
+
+  // Eq. 5-19 for each cluster that is compared. Other clusters are static.
   void judge_clusters() {
     verdicts_.assign(clusters_.size(), {0.0F, 0, DecisionStage::kTooFewScans});
     for (std::size_t c = 0; c < clusters_.size(); ++c) {
@@ -117,13 +131,42 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
       descriptor_.describe(clusters_[c]);             // Eq. 5-10
       if (!descriptor_.proposes_dynamic()) continue;  // Eq. 11-12
       verdicts_[c] = {1.0F, 1, DecisionStage::kProposed};
-      if (use_belief_) update_belief(verdicts_[c]);
+      if (big_is_static_ && is_big(clusters_[c]))
+        verdicts_[c] = {0.0F, 0, DecisionStage::kProposed};
+      const bool has_belief = compared_ == Comparison::kEnds || clusters_[c].oldest() == 0;
+      if (use_belief_ && has_belief && verdicts_[c].is_dynamic != 0) {
+        update_belief(clusters_[c], verdicts_[c]);
+      }
     }
   }
 
+  // The rules of the public implementation for clusters that are not judged.
+  static bool is_big(const ClusterView& cluster) {
+    constexpr float kLength = 25.0F, kHeight = 3.5F, kTop = 3.5F;  // m
+    constexpr std::uint32_t kFewPoints = 3;
+    Eigen::AlignedBox3f box;
+    for (const PointRange& part : cluster.ranges) {
+      for (std::size_t i = part.begin; i < part.end; ++i) {
+        const float range = cluster.window.range[i], azimuth = cluster.window.azimuth[i];
+        box.extend(Eigen::Vector3f(range * std::cos(azimuth), range * std::sin(azimuth),
+                                   cluster.window.z[i]));
+      }
+    }
+    const auto points = [&](std::size_t k) {
+      std::uint32_t count = 0;
+      for (const PointRange& part : cluster.scan(k)) count += part.end - part.begin;
+      return count;
+    };
+    return box.diagonal().head<2>().norm() > kLength || box.diagonal().z() > kHeight ||
+           box.max().z() > kTop ||
+           std::max(points(cluster.oldest()), points(cluster.scan_count() - 1)) <= kFewPoints;
+  }
+
   // Eq. 13-19 for the cluster of the last call of describe().
-  void update_belief(ClusterVerdict& verdict) {
-    descriptor_.describe_rest();
+  void update_belief(const ClusterView& cluster, ClusterVerdict& verdict) {
+    if (belief_descriptor_) belief_descriptor_->describe(cluster);
+    auto& descriptor = belief_descriptor_ ? *belief_descriptor_ : descriptor_;
+    descriptor.describe_rest();
     belief_.reset();
     const std::size_t last = clusters_.scan_count() - 1;
     const bool is_sequence = observations_ == BeliefObservations::kSequence;
@@ -131,10 +174,28 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
                               : observations_ == BeliefObservations::kNewest ? last
                                                                              : 0;
     for (std::size_t k = first; k <= last; ++k) {
-      belief_.update(descriptor_.heights(k), descriptor_.cluster_heights(is_sequence ? k : last));
+      if (observations_ != BeliefObservations::kOthers) {
+        belief_.update(descriptor.heights(k), descriptor.cluster_heights(is_sequence ? k : last));
+      } else if (!cluster.scan(k).empty()) {
+        belief_.update(descriptor.heights(k),
+                       heights_of_others(descriptor, cluster.scan_count(), k));
+      }
     }
     verdict.belief = static_cast<float>(belief_.posterior());
     verdict.is_dynamic = belief_.is_dynamic() ? 1 : 0;
+  }
+
+  // Maximum of the heights of all `scans` observations but k, by cell.
+  Span<const float> heights_of_others(typename Stages::Descriptor& descriptor, std::size_t scans,
+                                      std::size_t k) {
+    others_.assign(descriptor.heights(k).size(), 0.0F);
+    for (std::size_t other = 0; other < scans; ++other) {
+      if (other == k) continue;
+      const Span<const float> heights = descriptor.heights(other);
+      for (std::size_t i = 0; i < others_.size(); ++i)
+        others_[i] = std::max(others_[i], heights[i]);
+    }
+    return others_;
   }
 
   // Records the verdicts on clusters as votes on the points of every scan in the window.
@@ -168,7 +229,11 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
   int votes_;
   bool use_belief_;
   BeliefObservations observations_;
+  Comparison compared_;
+  bool big_is_static_;
   typename Stages::Descriptor descriptor_;
+  std::optional<typename Stages::Descriptor> belief_descriptor_;  // nothing: descriptor_
+  std::vector<float> others_;
   typename Stages::Belief belief_;
   ClusterSet clusters_;
   std::vector<ClusterVerdict> verdicts_;  // by cluster of the current window

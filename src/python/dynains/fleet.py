@@ -249,7 +249,7 @@ def main(words: Optional[List[str]] = None) -> int:
         help="address or scheduler file (.json) of a scheduler [workers on this machine]",
     )
     parser.add_argument("--workers", type=int, help="on this machine [one for each core]")
-    parser.add_argument("--preset", default="default", choices=["default", "offline", "paper"])
+    parser.add_argument("--preset", default="default", choices=["default", "offline", "paper", "published"])
     parser.add_argument("--accept-poses", action="store_true")
     options = parser.parse_args(words)
     if options.scheduler and options.workers:
