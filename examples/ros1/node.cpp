@@ -10,7 +10,7 @@
 //               ~tf_timeout    how long a cloud waits for its transform, s [0.2]
 //               ~queue         clouds that wait [10]
 //               ~map_period    time between two maps, s [2]
-//               ~preset        "default", "paper", "offline" or "odometry" ["default"]
+//               ~preset        "default", "paper", "published", "offline" or "odometry" ["default"]
 //               all parameters of the remover, by their names
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <ros/ros.h>

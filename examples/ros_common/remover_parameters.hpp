@@ -16,14 +16,16 @@ namespace dynains_ros {
 
 using RemoverConfig = dynains::DynaInsRemover::Config;
 
-/// The configuration with this name: "default", "paper", "offline" or "odometry". Throws
-/// dynains::ConfigError.
+/// The configuration with this name: "default", "paper", "published", "offline" or "odometry".
+/// Throws dynains::ConfigError.
 inline RemoverConfig preset(const std::string& name) {
   if (name == "default") return RemoverConfig();
   if (name == "paper") return RemoverConfig::paper();
+  if (name == "published") return RemoverConfig::published();
   if (name == "offline") return RemoverConfig::offline();
   if (name == "odometry") return RemoverConfig::odometry();
-  throw dynains::ConfigError("preset = " + name + ": expected default|paper|offline|odometry");
+  throw dynains::ConfigError("preset = " + name +
+                             ": expected default|paper|published|offline|odometry");
 }
 
 /// What a node declares of a parameter, except for its value. `min` and `max` are valid values.

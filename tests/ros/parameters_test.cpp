@@ -121,6 +121,9 @@ TEST_CASE("floats are declared as they are written") {
 
 TEST_CASE("presets have names") {
   CHECK(preset("paper").decision == dynains::Decision::kWindow);
+  for (const char* name : {"default", "published", "offline", "odometry"}) {
+    CHECK_NOTHROW(preset(name).validate());
+  }
   CHECK_THROWS_AS(preset("Paper"), dynains::ConfigError);
 }
 

@@ -75,7 +75,7 @@ RemoverConfig declare_remover(rclcpp::Node& node) {
   const FixedParameters declare(node);
   RemoverConfig config = preset(declare({"preset",
                                          "configuration whose values the other parameters replace: "
-                                         "default|paper|offline|odometry"},
+                                         "default|paper|published|offline|odometry"},
                                         std::string("default")));
   set_parameters(config, declare);
   return config;
