@@ -34,9 +34,11 @@ enum class Cause : std::uint8_t {
   kOccupied = 14,          ///< static: its position is occupied according to other scans
   kTooLittleFree = 15,     ///< static: too few scans with free space, or too few free samples
   kDynamicOccupancy = 16,  ///< dynamic: most other points in its dynamic grid cell are dynamic
+  kCameOrWent = 17,        ///< dynamic: scans of the whole recording saw it come or go
+  kStands = 18,            ///< static: removed at first, but it stands in the whole recording
 };
 
-inline constexpr std::size_t kCauseCount = 17;
+inline constexpr std::size_t kCauseCount = 19;
 
 /// Whether a point with this cause is removed.
 constexpr bool is_dynamic(Cause cause) {
@@ -44,7 +46,7 @@ constexpr bool is_dynamic(Cause cause) {
   constexpr unsigned kDynamic = bit(Cause::kProposed) | bit(Cause::kFreeSpace) |
                                 bit(Cause::kWithInstance) | bit(Cause::kUnderInstance) |
                                 bit(Cause::kAlongTrack) | bit(Cause::kPresumed) |
-                                bit(Cause::kDynamicOccupancy);
+                                bit(Cause::kDynamicOccupancy) | bit(Cause::kCameOrWent);
   return (kDynamic >> static_cast<unsigned>(cause) & 1U) != 0;
 }
 

@@ -167,6 +167,16 @@ void add_run_command(CLI::App& app) {
                   "at any time, and bring back what stands [1]")
       ->check(CLI::Range(1, 2))
       ->type_name("1|2");
+  command
+      .add_option_function<std::string>(
+          "--static",
+          [options](const std::string& value) {
+            options->static_policy = value == "last" ? StaticPolicy::kLast : StaticPolicy::kAlways;
+          },
+          "with --passes 2: what never came or went, or what stands at last, as a car that has "
+          "parked [always]")
+      ->check(CLI::IsMember({"always", "last"}))
+      ->type_name("always|last");
   const char* const kOutputs = "More outputs, and memory";
   command
       .add_flag("--map-attributes", options->map_attributes,

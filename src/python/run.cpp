@@ -51,7 +51,7 @@ void set_scan(RunArguments& run, const py::handle& value) {
   if (!value.is_none()) run.settings.window.*Field = value.cast<std::size_t>();
 }
 
-const std::array<RunSetting, 27> kRunSettings{{
+const std::array<RunSetting, 28> kRunSettings{{
     {"preset", "'default', 'offline', 'paper' or 'published'", "parameters to start from",
      [](RunArguments& run, const py::handle& value) {
        const auto& names = program::preset_names();
@@ -108,6 +108,14 @@ const std::array<RunSetting, 27> kRunSettings{{
      }},
     {"passes", "1 or 2", "2: scans of the whole recording revise what the first pass says",
      [](RunArguments& run, const py::handle& value) { run.settings.passes = value.cast<int>(); }},
+    {"static", "'always' or 'last'",
+     "of two passes: what never came or went, or what stands at last",
+     [](RunArguments& run, const py::handle& value) {
+       const auto policy = value.cast<std::string>();
+       if (policy != "always" && policy != "last") throw py::cast_error();
+       run.settings.static_policy =
+           policy == "last" ? program::StaticPolicy::kLast : program::StaticPolicy::kAlways;
+     }},
     {"one_thread", "bool", "the run works, reads and writes in one thread",
      &set_flag<&RunSettings::one_thread>},
     {"write_online", "bool", "also write the verdicts without latency",

@@ -30,7 +30,7 @@ void RestoredGround::find_removed(PointsView points, const Pose& T_world_sensor,
                                                                 static_cast<double>(points.z[i]));
     const auto rise = ground_.rise(at);
     if (!rise) continue;
-    if (*rise <= kMostRise) removed_.push_back({i, at});
+    if (*rise <= kMostRise && ground_.is_level(at)) removed_.push_back({i, at});
     if (*rise >= kFootBegin && *rise <= kFootEnd) feet_.insert(column_of(at));
   }
 }

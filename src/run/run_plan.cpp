@@ -93,6 +93,9 @@ void check_passes(const RunSettings& settings) {
   if (settings.passes < 1 || settings.passes > 2) {
     throw ConfigError("--passes " + std::to_string(settings.passes) + ": expected 1 or 2");
   }
+  if (settings.passes == 1 && settings.static_policy != StaticPolicy::kAlways) {
+    throw ConfigError("--static last needs --passes 2: one pass does not know what stands at last");
+  }
   if (settings.passes > 1 && settings.config.revision.revise_map) {
     throw ConfigError("--revise-map true changes the map of one pass; --passes 2 finds more");
   }
@@ -271,6 +274,7 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
     request["write_log"] = outputs.log.string();
     request["mark"] = outputs.mark_log;
   }
+  if (settings.static_policy == StaticPolicy::kLast) request["static"] = "last";
   OutputListing listing = outputs.listing(sequence, range, true);
   InputFiles inputs = inputs_of(settings, sequence);
   return {config,
@@ -283,7 +287,8 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
           configuration,
           std::move(request),
           std::move(session),
-          settings.passes};
+          settings.passes,
+          settings.static_policy};
 }
 
 RunTask choose_task(const RunPlan& plan, const RunSettings& settings, const OutputFolder& out) {

@@ -32,6 +32,7 @@ struct RunPlan {
   nlohmann::ordered_json request;        ///< see describe_request()
   SessionRequest session;
   int passes = 1;  ///< over the recording
+  StaticPolicy static_policy = StaticPolicy::kAlways;
 };
 
 /// Path of the file that a flag --map names, links followed. `out`: folder of the results, by

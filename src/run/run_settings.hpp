@@ -9,6 +9,7 @@
 
 #include "dynains/compiled_remover.hpp"
 #include "labelled_sequence.hpp"
+#include "static_policy.hpp"
 
 namespace dynains::program {
 
@@ -24,8 +25,9 @@ struct RunSettings {
   bool map_attributes = false;
   std::string crs;  ///< of a LAS map, for example "EPSG:25832"; empty: none
   ScanWindow window;
-  int passes = 1;           ///< 2: scans of the whole recording revise the first verdicts
-  bool one_thread = false;  ///< works, reads and writes in one thread
+  int passes = 1;  ///< 2: scans of the whole recording revise the first verdicts
+  StaticPolicy static_policy = StaticPolicy::kAlways;  ///< of two passes
+  bool one_thread = false;                             ///< works, reads and writes in one thread
   bool write_online = false;
   bool write_clean = false;
   bool write_mcap = false;

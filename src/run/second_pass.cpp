@@ -1,6 +1,7 @@
 #include "second_pass.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "dynains/errors.hpp"
 #include "points_of.hpp"
@@ -8,12 +9,14 @@
 namespace dynains::program {
 namespace {
 
-constexpr float kChangedRatio = 0.25F;      // of the known points of an instance that leaves
-constexpr float kLowChangedRatio = 0.2F;    // of those in its lower half: panes are higher
-constexpr float kLargeChangedRatio = 0.5F;  // of a larger instance
+constexpr float kChangedRatio = 0.25F;       // of the known points of an instance that leaves
+constexpr float kLowChangedRatio = 0.2F;     // of those in its lower half: panes are higher
+constexpr float kLeastChangedRatio = 0.15F;  // of all known ones
+constexpr float kLargeChangedRatio = 0.5F;   // of a larger instance
 constexpr float kCompactLength = 18.0F, kCompactHeight = 4.5F;  // m
-constexpr float kBelief = 0.95F;         // of points that the second pass removes
-constexpr float kRestoredBelief = 0.5F;  // of objects that it brings back
+constexpr std::uint32_t kIndependent = 30;  // scans, which the first pass looks ahead
+constexpr float kBelief = 0.95F;            // of points that the second pass removes
+constexpr float kRestoredBelief = 0.5F;     // of objects that it brings back
 
 }  // namespace
 
@@ -22,25 +25,22 @@ bool SecondPass::Instance::leaves() const {
   const bool is_compact =
       std::max(size.x(), size.y()) <= kCompactLength && size.z() <= kCompactHeight;
   const float ratio = is_compact ? kChangedRatio : kLargeChangedRatio;
+  if (moved && 4 * places.stays <= places.known) return true;
   return points.leave(ratio) || places.leave(ratio);
-}
-
-void SecondPass::Share::add(bool has_changed, bool is_low) {
-  ++known;
-  changed += has_changed ? 1 : 0;
-  low_known += is_low ? 1 : 0;
-  low_changed += has_changed && is_low ? 1 : 0;
 }
 
 bool SecondPass::Share::leave(float ratio) const {
   const auto has = [](std::uint32_t part, float of, std::uint32_t all) {
     return static_cast<float>(part) >= of * static_cast<float>(all);
   };
-  return changed > 0 && has(changed, ratio, known) && has(low_changed, kLowChangedRatio, low_known);
+  return has(changed, kLeastChangedRatio, known) && changed > 0 &&
+         has(changed, ratio, changed + stays) &&
+         has(low_changed, kLowChangedRatio, low_changed + low_stays);
 }
 
-SecondPass::SecondPass(const std::filesystem::path& folder)
-    : places_(RecordingPlacesConfig()),
+SecondPass::SecondPass(const std::filesystem::path& folder, StaticPolicy policy)
+    : policy_(policy),
+      places_(RecordingPlacesConfig()),
       references_(SessionReferencesConfig{1.0, 5}),
       file_(folder) {}
 
@@ -48,8 +48,10 @@ void SecondPass::add(const RecordedScan& scan, const ScanVerdict& verdict) {
   copy_points(scan, points_);
   places_.add(points_, verdict.labels, verdict.causes, verdict.T_world_sensor, verdict.time,
               static_cast<std::uint32_t>(verdict.scan));
+  chains_.add(points_, verdict.labels, verdict.instances, verdict.T_world_sensor);
   ground_.add(points_, verdict.labels, verdict.T_world_sensor);
   const auto number = static_cast<std::uint32_t>(verdict.scan);
+  newest_ = number;
   const SessionReference* const reference =
       references_.add(points_, verdict.labels, verdict.T_world_sensor, number);
   if (reference == nullptr) return;
@@ -79,6 +81,7 @@ void SecondPass::test(const std::function<bool()>& keep_going) {
                  });
   }
   places_.decide();
+  chains_.find_moves();
   list_objects();
   is_decided_ = true;
 }
@@ -105,26 +108,35 @@ bool SecondPass::revise(const RecordedScan& scan, std::uint32_t number, const Po
   is_restored_.assign(points_.size(), 0);
   if (!is_decided_) return false;
   const std::uint64_t before = restored_ + removed_;
-  bool has_changed = false;
   places_.for_each_place(points_, verdict.labels, T_world_sensor,
                          [&](std::size_t i, const Place* place) {
                            if (place == nullptr) return;
                            if (verdict.labels[i] == PointLabel::kDynamic) {
-                             if (place->stands()) restore(i, verdict);
+                             if (stands(*place, number)) restore(i, verdict);
                            } else if (place->state != PlaceState::kUnknown) {
                              place_of_[i] = place;
-                             has_changed = has_changed || place->state == PlaceState::kChanged;
                            }
                          });
   restored_ += ground_.restore(points_, T_world_sensor, verdict);
-  if (has_changed) remove_objects(number, T_world_sensor, verdict);
+  remove_objects(number, T_world_sensor, verdict);
   return restored_ + removed_ > before;
+}
+
+// Whether what scan `number` measured in a place is no part of the static map.
+bool SecondPass::has_changed(const Place& place, std::uint32_t number) const {
+  const bool stays = policy_ == StaticPolicy::kLast && place.stands_since(number);
+  return place.state == PlaceState::kChanged && !stays;
+}
+
+bool SecondPass::stands(const Place& place, std::uint32_t number) const {
+  const bool has_come = policy_ == StaticPolicy::kLast && place.state == PlaceState::kChanged;
+  return place.stands() || (has_come && place.stands_since(number));
 }
 
 void SecondPass::restore(std::size_t point, VerdictArrays& verdict) {
   if (verdict.causes[point] == Cause::kUnderInstance) return;
   verdict.labels[point] = PointLabel::kStatic;
-  verdict.causes[point] = Cause::kReverted;
+  verdict.causes[point] = Cause::kStands;
   if (!verdict.beliefs.empty()) verdict.beliefs[point] = kRestoredBelief;
   is_restored_[point] = 1;
   ++restored_;
@@ -132,15 +144,15 @@ void SecondPass::restore(std::size_t point, VerdictArrays& verdict) {
 
 void SecondPass::remove_objects(std::uint32_t number, const Pose& T_world_sensor,
                                 VerdictArrays& verdict) {
-  find_instances(T_world_sensor, verdict);
+  find_instances(number, T_world_sensor, verdict);
   for (std::size_t i = 0; i < points_.size(); ++i) {
     if (verdict.labels[i] != PointLabel::kStatic || is_restored_[i] != 0) continue;
     const std::uint32_t id = verdict.instances[i];
-    const bool is_free = place_of_[i] != nullptr && place_of_[i]->state == PlaceState::kChanged;
+    const bool is_free = place_of_[i] != nullptr && has_changed(*place_of_[i], number);
     const bool leaves = id != kNoInstance && id < instances_.size() && instances_[id].leaves();
     if (!is_free && !leaves) continue;
     verdict.labels[i] = PointLabel::kDynamic;
-    verdict.causes[i] = is_free ? Cause::kFreeSpace : Cause::kWithInstance;
+    verdict.causes[i] = Cause::kCameOrWent;
     if (!verdict.beliefs.empty()) verdict.beliefs[i] = std::max(verdict.beliefs[i], kBelief);
     ++removed_;
     if (!is_free) continue;
@@ -150,16 +162,13 @@ void SecondPass::remove_objects(std::uint32_t number, const Pose& T_world_sensor
   }
 }
 
-void SecondPass::find_instances(const Pose& T_world_sensor, const VerdictArrays& verdict) {
+void SecondPass::find_instances(std::uint32_t number, const Pose& T_world_sensor,
+                                const VerdictArrays& verdict) {
   instances_.clear();
   world_.resize(points_.size());
-  const auto for_each_object_point = [&](auto&& visit) {
-    for (std::size_t i = 0; i < points_.size(); ++i) {
-      const std::uint32_t id = verdict.instances[i];
-      if (verdict.labels[i] == PointLabel::kStatic && id != kNoInstance) visit(i, id);
-    }
-  };
-  for_each_object_point([&](std::size_t i, std::uint32_t id) {
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const std::uint32_t id = verdict.instances[i];
+    if (verdict.labels[i] != PointLabel::kStatic || id == kNoInstance) continue;
     if (id >= instances_.size()) instances_.resize(id + 1);
     const Eigen::Vector3d point(static_cast<double>(points_.x[i]),
                                 static_cast<double>(points_.y[i]),
@@ -169,22 +178,82 @@ void SecondPass::find_instances(const Pose& T_world_sensor, const VerdictArrays&
     Instance& instance = instances_[id];
     instance.lowest = instance.lowest.cwiseMin(world_[i]);
     instance.highest = instance.highest.cwiseMax(world_[i]);
-  });
+  }
+  list_seen(verdict);
+  for (std::size_t begin = 0, end; begin < seen_.size(); begin = end) {
+    end = begin;
+    while (end < seen_.size() && seen_[end].instance == seen_[begin].instance) ++end;
+    judge(number, seen_.data() + begin, seen_.data() + end);
+  }
+}
+
+// Lists the places of instances. A place is low if any of its points is.
+void SecondPass::list_seen(const VerdictArrays& verdict) {
   seen_.clear();
-  for_each_object_point([&](std::size_t i, std::uint32_t id) {
-    if (place_of_[i] == nullptr) return;
-    Instance& instance = instances_[id];
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const std::uint32_t id = verdict.instances[i];
+    if (verdict.labels[i] != PointLabel::kStatic || id == kNoInstance) continue;
+    if (place_of_[i] == nullptr) continue;
+    const Instance& instance = instances_[id];
     const bool is_low = world_[i].z() <= 0.5F * (instance.lowest.z() + instance.highest.z());
-    instance.points.add(place_of_[i]->state == PlaceState::kChanged, is_low);
-    seen_.push_back({id, place_of_[i], is_low});
+    seen_.push_back({id, place_of_[i], 1, is_low});
+  }
+  std::sort(seen_.begin(), seen_.end(), [](const Seen& a, const Seen& b) {
+    return std::make_pair(a.instance, a.place) < std::make_pair(b.instance, b.place);
   });
-  // A place is low if any of its points is.
-  std::sort(seen_.begin(), seen_.end());
-  for (std::size_t i = 0; i < seen_.size(); ++i) {
-    const auto [id, place, is_low] = seen_[i];
-    const bool goes_on = i + 1 < seen_.size() && std::get<0>(seen_[i + 1]) == id &&
-                         std::get<1>(seen_[i + 1]) == place;
-    if (!goes_on) instances_[id].places.add(place->state == PlaceState::kChanged, is_low);
+  std::size_t size = 0;
+  for (const Seen& seen : seen_) {
+    const bool is_same = size > 0 && seen_[size - 1].instance == seen.instance &&
+                         seen_[size - 1].place == seen.place;
+    if (!is_same) {
+      seen_[size++] = seen;
+    } else {
+      ++seen_[size - 1].points;
+      seen_[size - 1].is_low = seen_[size - 1].is_low || seen.is_low;
+    }
+  }
+  seen_.resize(size);
+}
+
+// Scans in which an instance was not there: medians over its places that have changed.
+ScanSpan SecondPass::absence(std::uint32_t number, const Seen* begin, const Seen* end) {
+  firsts_.clear();
+  lasts_.clear();
+  for (const Seen* seen = begin; seen != end; ++seen) {
+    if (!has_changed(*seen->place, number)) continue;
+    const ScanSpan span = places_.absence(*seen->place);
+    firsts_.push_back(span.first);
+    lasts_.push_back(span.last);
+  }
+  if (firsts_.empty()) return {};
+  const auto median = [](std::vector<std::uint32_t>& scans) {
+    const auto middle = scans.begin() + static_cast<std::ptrdiff_t>(scans.size() / 2);
+    std::nth_element(scans.begin(), middle, scans.end());
+    return *middle;
+  };
+  const ScanSpan span = {median(firsts_), median(lasts_)};
+  // Of fewer scans, the first pass has weighed what they tell.
+  const std::uint32_t scans = std::min(span.last, newest_) - std::min(span.first, newest_);
+  return scans >= kIndependent ? span : ScanSpan();
+}
+
+void SecondPass::judge(std::uint32_t number, const Seen* begin, const Seen* end) {
+  Instance& instance = instances_[begin->instance];
+  const InstanceChains::Move* const move = chains_.move_of(number, begin->instance);
+  instance.moved = move != nullptr && (move->is_later || policy_ == StaticPolicy::kAlways);
+  const ScanSpan span = instance.moved ? move->elsewhere : absence(number, begin, end);
+  for (const Seen* seen = begin; seen != end; ++seen) {
+    const bool is_gone = has_changed(*seen->place, number);
+    const bool stays = !is_gone && seen->place->present.any_within(span);
+    const auto add = [&](Share& share, std::uint32_t count) {
+      share.known += count;
+      share.changed += is_gone ? count : 0;
+      share.stays += stays ? count : 0;
+      share.low_changed += is_gone && seen->is_low ? count : 0;
+      share.low_stays += stays && seen->is_low ? count : 0;
+    };
+    add(instance.points, seen->points);
+    add(instance.places, 1);
   }
 }
 

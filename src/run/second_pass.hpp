@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <tuple>
 #include <vector>
 
 #include "dynains/city/recording_places.hpp"
@@ -15,8 +14,10 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/verdict.hpp"
+#include "instance_chains.hpp"
 #include "restored_ground.hpp"
 #include "scratch_file.hpp"
+#include "static_policy.hpp"
 #include "verdict_arrays.hpp"
 
 namespace dynains::program {
@@ -37,7 +38,8 @@ class SecondPass {
   };
 
   /// References of the scans wait in a file without a name in `folder`. Throws IoError.
-  explicit SecondPass(const std::filesystem::path& folder);
+  explicit SecondPass(const std::filesystem::path& folder,
+                      StaticPolicy policy = StaticPolicy::kAlways);
 
   /// Takes the first verdict on a scan, in the order of the scans. Throws IoError.
   void add(const RecordedScan& scan, const ScanVerdict& verdict);
@@ -66,12 +68,13 @@ class SecondPass {
     std::size_t size;      // bytes
   };
   using Place = RecordingPlaces::Place;
-  /// Points or places of known state, and those of them that have changed.
+  /// Points or places of an instance.
   struct Share {
-    std::uint32_t known = 0, changed = 0;
-    std::uint32_t low_known = 0, low_changed = 0;  // in the lower half of the instance
+    std::uint32_t known = 0;                       // with a state
+    std::uint32_t changed = 0;                     // came or went
+    std::uint32_t stays = 0;                       // were there when the instance was not
+    std::uint32_t low_changed = 0, low_stays = 0;  // in the lower half of the instance
 
-    void add(bool has_changed, bool is_low);
     bool leave(float ratio) const;
   };
   /// An instance of the first pass in one scan. Its faces near the sensor have most of the points:
@@ -80,29 +83,47 @@ class SecondPass {
     Share points, places;
     Eigen::Vector3f lowest = Eigen::Vector3f::Constant(1e9F);
     Eigen::Vector3f highest = Eigen::Vector3f::Constant(-1e9F);  // m, axes of the world
+    bool moved = false;
 
     bool leaves() const;
   };
+  /// Points of an instance in one place.
+  struct Seen {
+    std::uint32_t instance;
+    const Place* place;
+    std::uint32_t points;
+    bool is_low;
+  };
 
   void list_objects();
+  bool has_changed(const Place& place, std::uint32_t number) const;
+  bool stands(const Place& place, std::uint32_t number) const;
   void restore(std::size_t point, VerdictArrays& verdict);
   void remove_objects(std::uint32_t number, const Pose& T_world_sensor, VerdictArrays& verdict);
-  void find_instances(const Pose& T_world_sensor, const VerdictArrays& verdict);
+  void find_instances(std::uint32_t number, const Pose& T_world_sensor,
+                      const VerdictArrays& verdict);
+  void list_seen(const VerdictArrays& verdict);
+  ScanSpan absence(std::uint32_t number, const Seen* begin, const Seen* end);
+  void judge(std::uint32_t number, const Seen* begin, const Seen* end);
 
+  StaticPolicy policy_;
   RecordingPlaces places_;
+  InstanceChains chains_;
   RestoredGround ground_;
   SessionReferences references_;
   std::vector<Reference> kept_;
   ScratchFile file_;
   std::vector<std::uint8_t> packed_;
   PointBuffer points_;
-  std::vector<const Place*> place_of_;     // by point; null: none, or nothing is known of it
-  std::vector<std::uint8_t> is_restored_;  // by point
-  std::vector<Instance> instances_;        // by id
-  std::vector<std::tuple<std::uint32_t, const Place*, bool>> seen_;  // instance, place, low
-  std::vector<Eigen::Vector3f> world_;  // m, from the sensor, axes of the world; by point
+  std::vector<const Place*> place_of_;         // by point; null: none, or nothing is known of it
+  std::vector<std::uint8_t> is_restored_;      // by point
+  std::vector<Instance> instances_;            // by id
+  std::vector<Seen> seen_;                     // sorted by instance
+  std::vector<std::uint32_t> firsts_, lasts_;  // scans
+  std::vector<Eigen::Vector3f> world_;         // m, from the sensor, axes of the world; by point
   std::vector<Object> objects_;
   bool is_decided_ = false;
+  std::uint32_t newest_ = 0;  // scan
   std::uint64_t removed_ = 0, restored_ = 0;
 };
 

@@ -47,7 +47,8 @@ class Recorder {
     look_by([seen](const Eigen::Vector3d&) { return seen; }, times);
   }
   void look_by(const Beam& beam, int times = 1) {
-    for (int i = 0; i < times; ++i, ++scan_, time_ += step) {
+    for (int i = 0; i < times; ++i, time_ += step) {
+      ++scan_;
       places.test(scan_, time_, sensor,
                   [&](const PointBuffer& points, std::size_t size) -> const detail::Visibility& {
                     std::vector<BeamResult> seen(size);
@@ -204,7 +205,7 @@ TEST_CASE("a changed place tells the scans that passed it") {
   recorder.look(BeamResult::kFree, 5);
   REQUIRE(recorder.changed() == 1);
   recorder.places.for_each([&](const Eigen::Vector3d& at, const RecordingPlaces::Place& place) {
-    CHECK(recorder.places.free_scans(place) == std::make_pair(7U, 11U));
+    CHECK(recorder.places.free_scans(place) == std::make_pair(8U, 12U));
     CHECK((at - Eigen::Vector3d(10.2, 0.2, 0.2)).norm() < 1e-9);
   });
 }
@@ -222,6 +223,69 @@ TEST_CASE("what the first pass saw coming has changed, if looks passed its place
       CHECK(recorder.changed() == (was_empty && first == kRemoved ? 6U : 0U));
     }
   }
+}
+
+TEST_CASE("looks from too far away tell only of places beside those that changed") {
+  for (const double back : {0.0, 5.0}) {  // m: 10.1 and 15.1 m from the places
+    Recorder alone;
+    alone.judge(2, {kRemoved, kKept, kKept});
+    alone.sensor.x() = -back;
+    alone.look(BeamResult::kFree);
+    alone.look(BeamResult::kHit, 5);
+    CHECK(alone.changed() == (back > 0.0 ? 0U : 6U));
+  }
+  Recorder beside;
+  beside.judge(3, {kRemoved, kKept, kKept}, 10);
+  beside.look_by([](const Eigen::Vector3d& at) {
+    return at.y() < 2.4 ? BeamResult::kFree : BeamResult::kUnknown;
+  });
+  beside.sensor.x() = -5.0;
+  beside.look(BeamResult::kFree);
+  beside.look(BeamResult::kHit, 5);
+  CHECK(beside.changed() == 10);
+}
+
+TEST_CASE("what beams pass while others hit it is porous, and stays") {
+  for (const bool is_kept_in_between : {false, true}) {
+    Recorder recorder;
+    recorder.judge(is_kept_in_between ? 3 : 20, {kKept, kKept, kKept});
+    recorder.look(BeamResult::kFree, 8);
+    CHECK(recorder.changed() == (is_kept_in_between ? 0U : 6U));
+  }
+}
+
+TEST_CASE("presence is known by slices of time that double") {
+  Presence presence;
+  presence.add(10);
+  CHECK(presence.any_within({10, 10}));
+  CHECK_FALSE(presence.any_within({0, 9}));
+  CHECK_FALSE(presence.any_within({11, UINT32_MAX}));
+  presence.add(200);  // slices of 4 scans
+  CHECK(presence.any_within({8, 11}));
+  CHECK_FALSE(presence.any_within({9, 11}));  // holds no slice
+  CHECK_FALSE(presence.any_within({12, 199}));
+  CHECK(presence.any_within({12, 203}));
+  CHECK(presence.any_within({0, UINT32_MAX}));
+}
+
+TEST_CASE("what came and is hit at last stands since the last look that passed its place") {
+  Recorder recorder;
+  recorder.judge(6, {kKept, kKept, kKept});
+  recorder.look(BeamResult::kFree, 5);
+  recorder.look(BeamResult::kHit, 3);
+  CHECK(recorder.changed() == 6);
+  recorder.places.for_each([](const Eigen::Vector3d&, const RecordingPlaces::Place& place) {
+    CHECK_FALSE(place.stands_since(5));
+    CHECK(place.stands_since(6));
+  });
+  Recorder left;
+  left.judge(0, {kKept, kKept, kKept});
+  left.look(BeamResult::kHit, 3);
+  left.look(BeamResult::kFree, 5);
+  CHECK(left.changed() == 6);
+  left.places.for_each([](const Eigen::Vector3d&, const RecordingPlaces::Place& place) {
+    CHECK_FALSE(place.stands_since(20));
+  });
 }
 
 TEST_CASE("what the first pass saw leaving has changed, if looks passed its place afterwards") {

@@ -53,3 +53,26 @@ TEST_CASE("feet stay removed with what stands on them") {
   CHECK_FALSE(comes_back(0.0F, 0.05F, 0.06F, cause));
   CHECK(comes_back(0.0F, 0.05F, 0.04F, cause));
 }
+
+TEST_CASE("ground that is a step above the ground around is none") {
+  for (const float step : {0.1F, 0.3F}) {
+    RestoredGround ground;
+    PointBuffer points;
+    for (int i = 0; i < 100; ++i) {
+      points.push_back(5.05F, 5.05F, -1.7F);
+      points.push_back(5.45F, 5.05F, -1.7F + step);
+    }
+    const std::vector<PointLabel> labels(points.size(), PointLabel::kGround);
+    ground.add(points, labels, Pose::Identity());
+    PointBuffer removed;
+    removed.push_back(5.45F, 5.05F, -1.7F + step);
+    removed.push_back(5.05F, 5.05F, -1.7F);
+    VerdictArrays verdict;
+    verdict.labels.assign(2, PointLabel::kDynamic);
+    verdict.causes.assign(2, Cause::kWithInstance);
+    verdict.instances.assign(2, 7);
+    ground.restore(removed, Pose::Identity(), verdict);
+    CHECK((verdict.labels[0] == PointLabel::kGround) == (step < 0.2F));
+    CHECK(verdict.labels[1] == PointLabel::kGround);
+  }
+}

@@ -119,5 +119,8 @@ TEST_CASE("passes are one or two, and revise_map is part of one") {
       {"run", folder / "seq", "--out", folder / "out", "--passes", "2", "--revise-map", "true"});
   CHECK(both.code == 2);
   CHECK(both.err.find("--passes 2") != std::string::npos);
+  const Outcome last = start({"run", folder / "seq", "--out", folder / "out", "--static", "last"});
+  CHECK(last.code == 2);
+  CHECK(last.err.find("--static last needs --passes 2") != std::string::npos);
   CHECK(!fs::exists(folder / "out"));
 }

@@ -74,9 +74,10 @@ struct Counts {
 
 /// Points of each scan with a label, after both passes.
 std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool tests = true,
-                          const Removes& removes = removes_nothing) {
+                          const Removes& removes = removes_nothing,
+                          StaticPolicy policy = StaticPolicy::kAlways) {
   const TemporaryFolder folder;
-  SecondPass pass(folder.path());
+  SecondPass pass(folder.path(), policy);
   for (std::size_t i = 0; i < recording.scans.size(); ++i) {
     const VerdictArrays arrays = first_verdict(recording.scans[i], i, removes);
     ScanVerdict verdict;
@@ -85,6 +86,7 @@ std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool t
     verdict.T_world_sensor = recording.scans[i].T_world_sensor;
     verdict.labels = arrays.labels;
     verdict.causes = arrays.causes;
+    verdict.instances = arrays.instances;
     pass.add(recorded(recording.scans[i]), verdict);
   }
   CHECK(count_entries(folder.path()) == 0);  // nothing is left when the process is killed
@@ -101,8 +103,13 @@ std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool t
     counts.emplace_back();
     for (std::size_t i = 0; i < arrays.labels.size(); ++i) {
       const bool is_removed = arrays.labels[i] == PointLabel::kDynamic;
-      const bool agrees =
-          is_removed == is_dynamic(arrays.causes[i]) && is_removed == arrays.beliefs[i] > 0.9F;
+      const bool is_new = arrays.labels[i] != before.labels[i];
+      const bool has_own_cause = arrays.causes[i] == Cause::kCameOrWent ||
+                                 arrays.causes[i] == Cause::kStands ||
+                                 arrays.labels[i] == PointLabel::kGround;
+      const bool agrees = (!is_new || has_own_cause) &&
+                          is_removed == is_dynamic(arrays.causes[i]) &&
+                          is_removed == arrays.beliefs[i] > 0.9F;
       disagreeing += agrees ? 0 : 1;
       if (scan.labels[i] != label) continue;
       ++(is_removed ? counts.back().removed : counts.back().kept);
@@ -159,6 +166,24 @@ TEST_CASE("a car that stays, and a street where nothing moves, lose nothing") {
     CHECK(all.kept > 0);
     CHECK(all.removed == 0);
   }
+}
+
+TEST_CASE("a car that parks and stays is static if what stands at last is, and since it stands") {
+  Recorded recording;
+  std::vector<StreetBox> boxes = street();
+  recording.drive(boxes, -15.0, 15.0);
+  boxes.push_back(car_at(4.0));
+  recording.drive(boxes, 15.0, -15.0);
+  const Counts always = sum(count(recording, kCar));
+  CHECK(always.removed > 9 * always.kept);
+  const Counts last = sum(count(recording, kCar, true, removes_nothing, StaticPolicy::kLast));
+  CHECK(last.kept > 0);
+  CHECK(last.removed == 0);
+  // A car that left is in neither map.
+  const Counts left =
+      sum(count(with_parked_car(), kCar, true, removes_nothing, StaticPolicy::kLast));
+  CHECK(left.removed > 9 * left.kept);
+  CHECK(sum(count(recording, kHouse, true, removes_nothing, StaticPolicy::kLast)).removed == 0);
 }
 
 TEST_CASE("a second pass that was interrupted changes nothing") {

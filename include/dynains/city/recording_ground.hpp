@@ -41,14 +41,26 @@ class RecordingGround {
   /// Height of a point (m, world frame) above the ground in its cell. Empty where the recording has
   /// less than 20 points of the ground.
   std::optional<double> rise(const Eigen::Vector3d& point) const {
+    const std::optional<double> height = height_of(index_of(point));
+    if (!height) return std::nullopt;
+    return point.z() - *height;
+  }
+
+  /// Whether the ground in the cell of a point (m, world frame) is not a step above that of any
+  /// cell around: the underside of a vehicle can look like ground.
+  bool is_level(const Eigen::Vector3d& point) const {
+    constexpr std::int64_t kReach = 2;  // cells
+    constexpr double kStep = 0.2;       // m
     const Index index = index_of(point);
-    const auto tile = tiles_.find({index[0] >> kShift, index[1] >> kShift});
-    if (tile == tiles_.end()) return std::nullopt;
-    const std::uint32_t number = tile->second.numbers.find(key_of(index));
-    if (number == VoxelHashTable<>::kNone) return std::nullopt;
-    const Cell& cell = tile->second.cells[number];
-    if (cell.count < kFewest) return std::nullopt;
-    return point.z() - cell.origin - static_cast<double>(cell.mean);
+    const std::optional<double> height = height_of(index);
+    if (!height) return false;
+    for (std::int64_t dx = -kReach; dx <= kReach; ++dx) {
+      for (std::int64_t dy = -kReach; dy <= kReach; ++dy) {
+        const std::optional<double> other = height_of({index[0] + dx, index[1] + dy});
+        if (other && *height > *other + kStep) return false;
+      }
+    }
+    return true;
   }
 
  private:
@@ -74,6 +86,16 @@ class RecordingGround {
   static VoxelKey key_of(const Index& index) {
     constexpr std::int64_t kMask = (std::int64_t{1} << kShift) - 1;
     return voxel_key(index[0] & kMask, index[1] & kMask, 0);
+  }
+  // Mean height of the ground in a cell with enough points, m.
+  std::optional<double> height_of(const Index& index) const {
+    const auto tile = tiles_.find({index[0] >> kShift, index[1] >> kShift});
+    if (tile == tiles_.end()) return std::nullopt;
+    const std::uint32_t number = tile->second.numbers.find(key_of(index));
+    if (number == VoxelHashTable<>::kNone) return std::nullopt;
+    const Cell& cell = tile->second.cells[number];
+    if (cell.count < kFewest) return std::nullopt;
+    return cell.origin + static_cast<double>(cell.mean);
   }
   Tile& at_tile(const Index& index) {
     if (recent_ == nullptr || recent_index_ != index) {

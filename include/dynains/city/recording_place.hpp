@@ -1,7 +1,9 @@
 // One place of a recording: what its scans and the first pass tell of it.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 namespace dynains {
@@ -11,6 +13,47 @@ enum class PlaceState : std::uint8_t {
   kUnknown,  ///< no look sees it well
   kStays,
   kChanged  ///< looks in a row passed it: what was measured there came or went
+};
+
+/// Scans from `first` to `last`.
+struct ScanSpan {
+  std::uint32_t first = 0, last = UINT32_MAX;
+};
+
+/// Scans in which something was in a place: 64 slices of time, which double when the recording
+/// gets longer.
+class Presence {
+ public:
+  void add(std::uint32_t scan) {
+    for (; scan >> shift_ >= kSlices; ++shift_) fold();
+    bits_ |= std::uint64_t{1} << (scan >> shift_);
+  }
+  /// Whether something was there in a slice that lies in the span as a whole.
+  bool any_within(const ScanSpan& scans) const { return (bits_ & within(scans)) != 0; }
+
+ private:
+  static constexpr std::uint32_t kSlices = 64;
+
+  // Bits of the slices that lie in the span.
+  std::uint64_t within(const ScanSpan& scans) const {
+    const std::uint64_t width = std::uint64_t{1} << shift_;
+    const std::uint64_t first = (scans.first + width - 1) >> shift_;
+    const std::uint64_t end =
+        std::min<std::uint64_t>(kSlices, (scans.last + std::uint64_t{1}) >> shift_);
+    if (first >= end) return 0;
+    return (~std::uint64_t{0} >> (kSlices - (end - first))) << first;
+  }
+  // Two slices become one.
+  void fold() {
+    std::uint64_t half = 0;
+    for (std::uint32_t i = 0; i < kSlices / 2; ++i) {
+      half |= static_cast<std::uint64_t>((bits_ >> (2 * i) & 3U) != 0) << i;
+    }
+    bits_ = half;
+  }
+
+  std::uint64_t bits_ = 0;
+  std::uint8_t shift_ = 0;
 };
 
 /// Verdicts of the first pass on the points of a place, by epochs: scans that are near each other
@@ -63,19 +106,30 @@ struct RecordingPlace {
   std::uint8_t farthest = 0;                                 ///< m, range of its points
   std::uint8_t look_free = 0, look_hit = 0, look_range = 0;  ///< of the open look
   std::uint8_t hits = 0;                                     ///< looks
-  bool was_free = false;                                     ///< some look passed it,
-  bool free_before = false, free_after = false;              ///< before, after any scan measured it
-  std::array<std::uint8_t, 4> run = {}, longest = {};        ///< free looks in a row, by range
+  bool was_free = false;                                     ///< some look passed it
+  std::uint8_t free_before = 0, free_after = 0;  ///< before, after any scan measured it; by range
+  std::array<std::uint8_t, 4> run = {}, longest = {};  ///< free looks in a row, by range
   std::array<std::uint16_t, 4> run_begin = {}, begin = {}, end = {};  ///< looks
   FirstVerdicts first;
-  std::uint32_t object = 0;  ///< number, from 1 on; 0: none
+  /// In scans that hit it, or of which the first pass kept points in it.
+  Presence present;
+  std::uint32_t last_free = 0;  ///< last scan of the last look that passed it
+  bool is_hit_at_last = false;  ///< by the last look that passed or hit it
+  std::uint32_t object = 0;     ///< number, from 1 on; 0: none
 
   bool was_passed() const { return longest.back() > 0; }
-  /// Whether it was empty before the first pass saw something move into it, or after something
-  /// moved out of it.
-  bool came_or_left() const {
-    return first.any_kept &&
-           ((first.removed_first > 0 && free_before) || (first.removed_last > 0 && free_after));
+  /// Whether looks of a class of ranges passed it before the first pass saw something move into it.
+  bool came(std::size_t range) const {
+    return first.any_kept && first.removed_first > 0 && (free_before >> range & 1U) != 0;
+  }
+  /// Whether looks of a class of ranges passed it after the first pass saw something move out of
+  /// it.
+  bool left(std::size_t range) const {
+    return first.any_kept && first.removed_last > 0 && (free_after >> range & 1U) != 0;
+  }
+  /// Whether what a scan measured in it is there in the end of the recording.
+  bool stands_since(std::uint32_t scan) const {
+    return is_hit_at_last && first.removed_last == 0 && scan > last_free;
   }
   /// Whether the first pass removed points of something that stands: it kept them before and after,
   /// and looks hit the place and never passed it.

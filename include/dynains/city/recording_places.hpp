@@ -58,14 +58,16 @@ struct RecordingPlacesConfig {
 /// and are one look; an epoch is the same for scans. A look is free if beams passed the place and
 /// none hit it. A place has changed by its state over time, not by the sum of its looks, in one of
 /// these ways:
-/// - `free_looks` looks in a row are free and no hit lies between. Looks from farther away than the
-///   points of a place do not count, for beams that are far apart miss what is thin.
+/// - `free_looks` looks in a row are free, no hit lies between, and the first pass kept no points
+///   of that time: beams that pass what others hit tell of something porous. Looks from farther
+///   away than the points of a place do not count, for beams that are far apart miss what is thin.
 /// - An object came: looks passed the place before any scan measured it, and the first epoch
 ///   removed its points.
 /// - An object left: the last epoch removed its points, and looks passed the place after it.
-/// - It touches such places, and its first or last two epochs removed its points.
+/// - It touches such places, and its first or last two epochs removed its points, or looks from
+///   farther away tell that it came or left.
 ///
-/// The memory is that of the places: about 120 bytes each.
+/// The memory is that of the places: about 150 bytes each.
 class RecordingPlaces {
  public:
   static constexpr double kPlace = 0.4;      // m
@@ -95,6 +97,7 @@ class RecordingPlaces {
       }
       Place& place = tile.places[number];
       place.first.add(is_removed, epoch_, scan);
+      if (!is_removed) place.present.add(scan);
       const float range = std::sqrt(points.x[i] * points.x[i] + points.y[i] * points.y[i]);
       place.farthest = std::max(place.farthest, whole_metres(range));
       const auto bit = static_cast<std::uint8_t>(1U << at.octant);
@@ -121,6 +124,7 @@ class RecordingPlaces {
       if (verdict == 0) continue;
       Place& place = *tested_[i];
       if (place.look_free == 0 && place.look_hit == 0) touched_.push_back(&place);
+      if (verdict < 0) place.present.add(scan);
       std::uint8_t& number = verdict > 0 ? place.look_free : place.look_hit;
       if (number < 255) ++number;
       place.look_range = std::max(place.look_range, ranges_[i]);
@@ -154,9 +158,19 @@ class RecordingPlaces {
   /// First and last scan of the longest row of looks that passed a place; was_passed() must be
   /// true.
   std::pair<std::uint32_t, std::uint32_t> free_scans(const Place& place) const {
-    std::size_t k = class_of(place);
-    if (place.longest[k] == 0) k = kNear.size() - 1;
-    return {look_scans_[place.begin[k]].first, look_scans_[place.end[k]].second};
+    const std::size_t k = class_of(place);
+    const ScanSpan span = span_of(place, place.longest[k] > 0 ? k : kAnyRange);
+    return {span.first, span.last};
+  }
+  /// Scans before a place that has changed was filled for the first time, or after the last time.
+  /// All scans if it was empty in between.
+  ScanSpan absence(const Place& place) const {
+    const ScanSpan before = {0, place.first.first_scan - 1};
+    const ScanSpan after = {place.first.last_scan + 1, UINT32_MAX};
+    if (place.came(kAnyRange)) return before;
+    if (place.left(kAnyRange)) return after;
+    if (!place.first.moved()) return {};
+    return place.first.removed_first >= 2 ? before : after;
   }
   std::uint32_t object_count() const { return objects_; }
 
@@ -179,6 +193,7 @@ class RecordingPlaces {
  private:
   static constexpr std::uint32_t kNone = VoxelHashTable<>::kNone;
   static constexpr std::array<std::uint8_t, 4> kNear = {12, 20, 35, 60};  // m
+  static constexpr std::size_t kAnyRange = kNear.size() - 1;
 
   using TileIndex = std::array<std::int64_t, 2>;
   struct Tile {
@@ -267,16 +282,21 @@ class RecordingPlaces {
       if (place->look_hit > 0) {
         const bool is_hit = place->look_hit >= place->look_free;
         if (is_hit && place->hits < 255) ++place->hits;
-        place->free_after = false;
+        place->free_after = 0;
+        place->is_hit_at_last = true;
         place->run = {};
       } else {
         place->was_free = true;
+        place->is_hit_at_last = false;
+        place->last_free = look_scans_.back().second;
         const auto [first, last] = look_scans_.back();
         const bool is_before = place->hits == 0 && last < place->first.first_scan;
-        place->free_before = place->free_before || is_before;
-        place->free_after = place->free_after || first > place->first.last_scan;
+        const bool is_after = first > place->first.last_scan;
         for (std::size_t k = 0; k < kNear.size(); ++k) {
           if (place->look_range > kNear[k]) continue;
+          const auto bit = static_cast<std::uint8_t>(1U << k);
+          if (is_before) place->free_before |= bit;
+          if (is_after) place->free_after |= bit;
           add_free(*place, k, look);
         }
       }
@@ -306,16 +326,24 @@ class RecordingPlaces {
 
   // The class of ranges from which looks at a place count: ranges at which it was measured.
   static std::size_t class_of(const Place& place) {
-    std::size_t k = kNear.size() - 1;
+    std::size_t k = kAnyRange;
     while (k > 0 && kNear[k] > place.farthest) --k;
     return k;
   }
 
+  // Scans of the longest row of looks of a class of ranges that passed a place.
+  ScanSpan span_of(const Place& place, std::size_t k) const {
+    return {look_scans_[place.begin[k]].first, look_scans_[place.end[k]].second};
+  }
+
   PlaceState state_of(Place& place) const {
     place.first.end_epoch();
-    if (place.came_or_left()) return PlaceState::kChanged;
-    const std::uint8_t longest = place.longest[class_of(place)];
-    if (longest >= config_.free_looks) return PlaceState::kChanged;
+    const std::size_t k = class_of(place);
+    if (place.came(k) || place.left(k)) return PlaceState::kChanged;
+    const std::uint8_t longest = place.longest[k];
+    const bool is_free = longest >= config_.free_looks;
+    // Beams that pass what others hit tell of something porous.
+    if (is_free && !place.present.any_within(span_of(place, k))) return PlaceState::kChanged;
     return place.hits > 0 || longest > 0 ? PlaceState::kStays : PlaceState::kUnknown;
   }
 
@@ -386,7 +414,8 @@ class RecordingPlaces {
       if (place.state == PlaceState::kStays && place.hits > 0 && !place.first.moved()) {
         contacts.push_back(&place);
       }
-      const bool joins = place.state == PlaceState::kChanged || place.first.moved();
+      const bool joins = place.state == PlaceState::kChanged || place.first.moved() ||
+                         place.came(kAnyRange) || place.left(kAnyRange);
       if (!joins || place.object != 0) continue;
       place.object = kNone;
       members.push_back({tile, number});

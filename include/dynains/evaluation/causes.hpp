@@ -26,6 +26,8 @@ inline constexpr std::array<const char*, kCauseCount> kCauseNames = {"unknown",
                                                                      "presumed",
                                                                      "seen occupied",
                                                                      "seen free too little",
-                                                                     "dynamic occupancy"};
+                                                                     "dynamic occupancy",
+                                                                     "came or went",
+                                                                     "stands"};
 
 }  // namespace dynains::evaluation

@@ -5,7 +5,7 @@ const CAUSE_COLOURS = [
   [0.50, 0.50, 0.62], [0.60, 0.56, 0.70], [0.33, 0.35, 0.40], [0.95, 0.35, 0.65],
   [0.95, 0.25, 0.20], [1.00, 0.55, 0.10], [0.80, 0.65, 0.20], [0.55, 0.62, 0.70],
   [0.85, 0.30, 0.85], [0.60, 0.35, 0.95], [0.35, 0.55, 0.90], [0.30, 0.80, 0.45],
-  [0.98, 0.85, 0.35]];
+  [0.98, 0.85, 0.35], [0.70, 0.95, 0.20], [0.20, 0.65, 0.60]];
 
 const CAUSE_SENTENCES = [
   'kept or removed for an unknown cause',
@@ -24,7 +24,9 @@ const CAUSE_SENTENCES = [
   'removed for now: earlier scans give no evidence about its position',
   'kept: its position is occupied according to other scans',
   'kept: too few beams of other scans passed through its position',
-  'removed: most points in its dynamic grid cell are dynamic'];
+  'removed: most points in its dynamic grid cell are dynamic',
+  'removed: scans of the whole recording saw its instance come or go',
+  'kept: scans of the whole recording show that it stands'];
 
 const LABELS = ['not judged', 'static', 'moving'];
 const css = (colour) => `rgb(${colour.map((value) => Math.round(255 * value)).join(' ')})`;

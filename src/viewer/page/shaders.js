@@ -13,7 +13,7 @@ uniform int current_scan;    // -1: all scans
 uniform uint causes;         // bit set
 uniform int colour_mode;
 uniform vec2 heights;
-uniform vec3 cause_colours[17];
+uniform vec3 cause_colours[19];
 uniform bool is_picking;
 flat out vec4 colour;
 
@@ -34,7 +34,7 @@ vec3 colour_of(float height) {
     return bytes.z == 1u ? vec3(0.55, 0.47, 0.38) : vec3(0.45, 0.62, 0.80);
   }
   if (colour_mode == 4) return ramp(float(bytes.y) / 255.0);
-  if (colour_mode == 5) return cause_colours[min(bytes.z, 16u)];
+  if (colour_mode == 5) return cause_colours[min(bytes.z, 18u)];
   if (colour_mode == 6) {
     if (truth == 0u) return vec3(0.25, 0.27, 0.32);
     if (label == 2u) {
