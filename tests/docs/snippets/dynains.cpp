@@ -4,9 +4,17 @@
 #include <cstddef>
 #include <vector>
 
+#include "dynains/adapters/sophus.hpp"
 #include "dynains/dyna_ins_remover.hpp"
 #include "dynains/io/tiled_map.hpp"
 #include "dynains/map/rebasable_static_map.hpp"
+
+/// What a block uses of kiss_icp::pipeline::KissICP.
+struct KissIcpLookAlike {
+  void RegisterFrame(const std::vector<Eigen::Vector3d>& points,
+                     const std::vector<double>& timestamps);
+  const Sophus::SE3d& pose() const;
+};
 
 void getting_started(const std::vector<float>& xyzi, const Eigen::Isometry3d& T_world_sensor,
                      double time) {
@@ -15,16 +23,22 @@ void getting_started(const std::vector<float>& xyzi, const Eigen::Isometry3d& T_
 #include "getting_started_1.inc"
 }
 
+void kiss_icp_loop(KissIcpLookAlike& odometry, const std::vector<Eigen::Vector3d>& points,
+                   const std::vector<double>& timestamps, double time,
+                   Eigen::Isometry3d& T_odometry_last, Eigen::Isometry3d& T_world_last) {
 #include "embedding_2.inc"
-
-void reserve(dynains::DynaInsRemover& remover, const dynains::RawPoints<float>& first_cloud) {
-#include "embedding_3.inc"
 }
 
-void long_drive() {
+#include "embedding_3.inc"
+
+void reserve(dynains::DynaInsRemover& remover, const dynains::RawPoints<float>& first_cloud) {
 #include "embedding_4.inc"
 }
 
-void move_scans() {
+void long_drive() {
 #include "embedding_5.inc"
+}
+
+void move_scans() {
+#include "embedding_6.inc"
 }
