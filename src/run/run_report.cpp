@@ -123,7 +123,7 @@ void write_timing(const std::filesystem::path& path, const RunTiming& timing) {
   out.imbue(std::locale::classic());
   out << std::fixed << std::setprecision(4) << "scan,points";
   for (const std::string& stage : timing.stages) out << ',' << stage << "_ms";
-  out << ",total_ms,pose_residual_m,pose_residual_deg\n";
+  out << ",total_ms,pose_residual_m,pose_residual_deg,time_s\n";
   for (const TimingRow& row : timing.rows) {
     out << evaluation::csv_field(row.scan) << ',' << row.points;
     for (const double ms : row.stages) out << ',' << ms;
@@ -131,7 +131,7 @@ void write_timing(const std::filesystem::path& path, const RunTiming& timing) {
     if (row.pose_residual) out << row.pose_residual->translation;
     out << ',';
     if (row.pose_residual) out << row.pose_residual->rotation;
-    out << '\n';
+    out << ',' << std::setprecision(9) << row.time << std::setprecision(4) << '\n';
   }
   file.commit();
 }

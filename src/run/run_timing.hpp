@@ -19,6 +19,7 @@ struct TimingRow {
   std::optional<PoseResidual> pose_residual;
   std::optional<EpochReason> began_epoch = std::nullopt;
   Plausibility plausibility = {};
+  double time = 0.0;  ///< s, of the scan
 };
 
 struct RunTiming {

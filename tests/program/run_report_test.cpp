@@ -32,11 +32,12 @@ TEST_CASE("timing.csv has a row for each scan") {
   timing.rows.push_back(
       {"000007", 120000, {1.25, 0.5}, 2.0, dynains::PoseResidual{0.0125, 0.5, {}}});
   timing.rows.push_back({"000008", 0, {0.0, 0.0}, 0.00004, {}});
+  timing.rows[1].time = 1700000000.123456;
   write_timing(folder / "timing.csv", timing);
   CHECK(read_text(folder / "timing.csv") ==
-        "scan,points,ground_ms,map_ms,total_ms,pose_residual_m,pose_residual_deg\n"
-        "000007,120000,1.2500,0.5000,2.0000,0.0125,0.5000\n"
-        "000008,0,0.0000,0.0000,0.0000,,\n");
+        "scan,points,ground_ms,map_ms,total_ms,pose_residual_m,pose_residual_deg,time_s\n"
+        "000007,120000,1.2500,0.5000,2.0000,0.0125,0.5000,0.000000000\n"
+        "000008,0,0.0000,0.0000,0.0000,,,1700000000.123456001\n");
 
   timing.rows = {{"a,b\n\"c\"", 1, {0.0, 0.0}, 0.0, {}}};
   write_timing(folder / "timing.csv", timing);
