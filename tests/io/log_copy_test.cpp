@@ -51,7 +51,7 @@ std::string rows_of_points(MessageEncoding encoding, std::uint32_t rows, std::si
   }
   ByteWriter data;
   for (std::uint32_t i = 0; i < 2 * rows; ++i) {
-    for (int axis = 0; axis < 3; ++axis) data.number(static_cast<float>(10 * i) + axis);
+    for (std::uint32_t axis = 0; axis < 3; ++axis) data.number(static_cast<float>(10 * i + axis));
     data.number(static_cast<std::uint16_t>(1000 + i));
     if (i % 2 == 1) data.raw(std::string(padding, 'p'));
   }
@@ -65,7 +65,7 @@ std::string rows_of_points(MessageEncoding encoding, std::uint32_t rows, std::si
 std::string one_row(MessageEncoding encoding, const std::vector<std::uint16_t>& numbers) {
   ByteWriter data;
   for (const std::uint16_t i : numbers) {
-    for (int axis = 0; axis < 3; ++axis) data.number(static_cast<float>(10 * i) + axis);
+    for (std::uint32_t axis = 0; axis < 3; ++axis) data.number(static_cast<float>(10 * i + axis));
     data.number(static_cast<std::uint16_t>(1000 + i));
   }
   std::vector<CloudField> fields = kXyz;
@@ -80,7 +80,7 @@ std::string livox_message(MessageEncoding encoding, const std::vector<std::uint8
   out.number(std::uint8_t{3}).raw("abc").number(static_cast<std::uint32_t>(points.size()));
   for (const std::uint8_t i : points) {
     out.number(std::uint32_t{100U + i});
-    for (int axis = 0; axis < 3; ++axis) out.number(static_cast<float>(i) + axis);
+    for (std::uint32_t axis = 0; axis < 3; ++axis) out.number(static_cast<float>(i + axis));
     out.number(i).number(static_cast<std::uint8_t>(i + 1)).number(static_cast<std::uint8_t>(2));
   }
   return out.text();
