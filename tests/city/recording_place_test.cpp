@@ -1,5 +1,6 @@
 #include "dynains/city/recording_place.hpp"
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -54,22 +55,65 @@ TEST_CASE("two epochs that removed all points at one end tell of motion") {
 }
 
 TEST_CASE("a place was entered or left if it was empty at the end where points were removed") {
+  RecordingPlace place = judged("rk");
+  place.free_after = 0b1111;
+  CHECK_FALSE(place.came(0));
+  CHECK_FALSE(place.left(0));
+  place.free_before = 0b1111;
+  CHECK(place.came(0));
+  CHECK_FALSE(place.left(0));
+
+  place = judged("kr");
+  place.free_before = 0b1111;
+  CHECK_FALSE(place.came(0));
+  CHECK_FALSE(place.left(0));
+  place.free_after = 0b1111;
+  CHECK_FALSE(place.came(0));
+  CHECK(place.left(0));
+
+  place = judged("rr");
+  place.free_before = place.free_after = 0b1111;
+  CHECK_FALSE(place.came(0));
+  CHECK_FALSE(place.left(0));
+}
+
+TEST_CASE("looks from other ranges do not tell that a place was entered or left") {
   RecordingPlace came = judged("rk");
-  CHECK_FALSE(came.came_or_left());
-  came.free_after = true;
-  CHECK_FALSE(came.came_or_left());
-  came.free_before = true;
-  CHECK(came.came_or_left());
-
+  came.free_before = 0b0100;
   RecordingPlace left = judged("kr");
-  left.free_before = true;
-  CHECK_FALSE(left.came_or_left());
-  left.free_after = true;
-  CHECK(left.came_or_left());
+  left.free_after = 0b0100;
+  for (std::size_t range = 0; range < 4; ++range) {
+    CAPTURE(range);
+    CHECK(came.came(range) == (range == 2));
+    CHECK(left.left(range) == (range == 2));
+  }
+}
 
-  RecordingPlace never_kept = judged("rr");
-  never_kept.free_before = never_kept.free_after = true;
-  CHECK_FALSE(never_kept.came_or_left());
+TEST_CASE("what a scan measured stands since the last look that passed its place") {
+  RecordingPlace place = judged("rrkk");
+  place.last_free = 5;
+  CHECK_FALSE(place.stands_since(6));
+  place.is_hit_at_last = true;
+  CHECK(place.stands_since(6));
+  CHECK_FALSE(place.stands_since(5));
+  RecordingPlace left = judged("kkr");
+  left.is_hit_at_last = true;
+  CHECK_FALSE(left.stands_since(6));
+}
+
+TEST_CASE("presence is known by slices of time, which lie in a span as a whole or do not count") {
+  Presence presence;
+  presence.add(10);
+  CHECK(presence.any_within({10, 10}));
+  CHECK(presence.any_within({0, UINT32_MAX}));
+  CHECK_FALSE(presence.any_within({11, 63}));
+  CHECK_FALSE(presence.any_within({0, 9}));
+  presence.add(200);  // slices of four scans from now on
+  CHECK(presence.any_within({8, 11}));
+  CHECK_FALSE(presence.any_within({9, 11}));
+  CHECK_FALSE(presence.any_within({12, 199}));
+  CHECK(presence.any_within({200, 203}));
+  CHECK(presence.any_within({12, UINT32_MAX}));
 }
 
 TEST_CASE("a place knows the scans that measured it") {
