@@ -67,9 +67,11 @@ TEST_CASE("a cause is one of movement if and only if the label is, in newest and
 TEST_CASE("which causes remove a point") {
   std::size_t count = 0;
   for (std::size_t i = 0; i < kCauseCount; ++i) count += is_dynamic(static_cast<Cause>(i)) ? 1 : 0;
-  CHECK(count == 7);
+  CHECK(count == 8);
   CHECK(is_dynamic(Cause::kProposed));
+  CHECK(is_dynamic(Cause::kCameOrWent));
   CHECK_FALSE(is_dynamic(Cause::kReverted));
+  CHECK_FALSE(is_dynamic(Cause::kStands));
 }
 
 TEST_CASE("paper: similar, proposed, reverted by belief, by votes") {
