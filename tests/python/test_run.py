@@ -90,7 +90,11 @@ def test_arguments_by_name(drive, tmp_path):
     [
         ({"forse": True}, dynains.ConfigError, "did you mean force"),
         ({"pose_unit": "mm"}, dynains.ConfigError, "did you mean pose_units"),
-        ({"preset": "fast"}, TypeError, "preset = 'fast': expected 'default', 'offline' or 'paper'"),
+        (
+            {"preset": "fast"},
+            TypeError,
+            "preset = 'fast': expected 'default', 'offline', 'paper' or 'published'",
+        ),
         ({"preset": "paper", "config": dynains.Config()}, dynains.ConfigError, "not both"),
         ({"config": {"window": 4}}, TypeError, "expected a Config"),
         ({"config": dynains.Config(min_range=50, max_range=40)}, dynains.ConfigError, "min_range"),
