@@ -169,12 +169,12 @@ std::string without_points(const std::string& type, const SerialisedMessage& clo
                                : without_points_of_livox(cloud, keep);
 }
 
-std::string with_labels(const std::string& type, const SerialisedMessage& cloud,
+std::string with_labels(const std::string& type, const SerialisedMessage& message,
                         Span<const std::uint8_t> labels) {
   if (!can_have_labels(type)) {
-    throw IoError(cloud.place + ": expected a PointCloud2, for other types have no labels");
+    throw IoError(message.place + ": expected a PointCloud2, for other types have no labels");
   }
-  const CloudBytes bytes(cloud);
+  const CloudBytes bytes(message);
   const PointCloud2& cloud = bytes.cloud();
   check_count(bytes.reader(), cloud.size(), labels.size());
   if (bytes.has_labels()) bytes.reader().fail("expected no field \"label\", which is to be added");

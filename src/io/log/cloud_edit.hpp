@@ -21,7 +21,7 @@ std::string without_points(const std::string& type, const SerialisedMessage& clo
 /// A PointCloud2 with `labels` as its last field, `label` of type uint8. A point takes four more
 /// bytes, so that aligned fields stay aligned. Throws IoError as above, also if the cloud has a
 /// field of that name.
-std::string with_labels(const std::string& type, const SerialisedMessage& cloud,
+std::string with_labels(const std::string& type, const SerialisedMessage& message,
                         Span<const std::uint8_t> labels);
 
 }  // namespace dynains
