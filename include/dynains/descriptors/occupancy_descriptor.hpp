@@ -184,7 +184,6 @@ class OccupancyDescriptor {
     const std::size_t first = cluster_.ranges[0].begin;
     const PackConstant first_range(points.range[first]), first_azimuth(points.azimuth[first]);
     const PackConstant first_z(points.z[first]), first_wrapped(wrapped(points.azimuth[first]));
-    float z_max = 0.0F;
     const PackConstant zero(0.0F), turn(2.0F * detail::kPi);
     // Azimuth extents for a seam at +-pi and for a seam at 0. The smaller extent is the smallest
     // arc if it is at most pi.
@@ -192,8 +191,7 @@ class OccupancyDescriptor {
     detail::with_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
-      Float range_low = first_range, range_high = first_range;
-      Float z_low = first_z, z_high = first_z;
+      Float range_low = first_range, range_high = first_range, z_low = first_z;
       Float azimuth_low = first_azimuth, azimuth_high = first_azimuth;
       Float wrapped_low = first_wrapped, wrapped_high = first_wrapped;
       const auto extend = [&](const auto& at) {
@@ -203,7 +201,6 @@ class OccupancyDescriptor {
         range_low = min(range_low, range);
         range_high = max(range_high, range);
         z_low = min(z_low, z);
-        z_high = max(z_high, z);
         azimuth_low = min(azimuth_low, azimuth);
         azimuth_high = max(azimuth_high, azimuth);
         const Float on = azimuth + keep(azimuth < zero, Float(turn));
@@ -216,7 +213,6 @@ class OccupancyDescriptor {
       range_min_ = smallest(range_low);
       range_max = largest(range_high);
       z_min_ = smallest(z_low);
-      z_max = largest(z_high);
       low = smallest(azimuth_low);
       high = largest(azimuth_high);
       low_wrapped = smallest(wrapped_low);
@@ -230,13 +226,24 @@ class OccupancyDescriptor {
     }
     if (extent > detail::kPi) extent = find_smallest_arc(extent);
 
-    constexpr float kTall = 1.0F;  // m
-    const float height = z_max - z_min_;
-    lowest_counted_ = height > kTall ? static_cast<float>(config_.ignored_low) * height : 0.0F;
+    lowest_counted_ = config_.ignored_low > 0.0 ? find_lowest_counted() : 0.0F;
     cells_per_metre_ = static_cast<float>(1.0 / config_.cell_range);
     cells_per_radian_ = static_cast<float>(180.0 / (M_PI * config_.cell_azimuth));
     radial_cells_ = cells((range_max - range_min_) * cells_per_metre_);
     azimuth_cells_ = cells(extent * cells_per_radian_);
+  }
+
+  // Height over z_min_ (m) above which points of the cluster have a height.
+  float find_lowest_counted() const {
+    constexpr float kTall = 1.0F;  // m
+    float highest = z_min_;
+    for_bounding_ranges([&](const PointRange& part) {
+      for (std::size_t i = part.begin; i < part.end; ++i) {
+        highest = std::max(highest, cluster_.window.z[i]);
+      }
+    });
+    const float height = highest - z_min_;
+    return height > kTall ? static_cast<float>(config_.ignored_low) * height : 0.0F;
   }
 
   // Calls `work` with the ranges of points that the grid spans.
@@ -317,7 +324,7 @@ class OccupancyDescriptor {
     const PackConstant cells_per_metre(cells_per_metre_), cells_per_radian(cells_per_radian_);
     const PackConstant zero(0.0F), just_below(-detail::kPi * 1e-4F), turn(2.0F * detail::kPi);
     const auto row = static_cast<std::int32_t>(azimuth_cells_);
-    const float lowest = lowest_counted_;
+    const PackConstant lowest(lowest_counted_);
     const PackConstant last_radial(static_cast<float>(radial_cells_ - 1));
     const PackConstant last_azimuth(static_cast<float>(azimuth_cells_ - 1));
     const auto raise = [&](auto at) {
@@ -330,11 +337,12 @@ class OccupancyDescriptor {
       float height[detail::kPackWidth];
       (multiply(truncate(min(radial, last_radial)), row) + truncate(min(angular, last_azimuth)))
           .store(cell);
-      (at.load(points.z.data()) - z_min).store(height);
+      const Float above = at.load(points.z.data()) - z_min;
+      keep(Float(lowest) < above, above).store(height);
       const std::size_t size = at.size();
       for (std::size_t i = 0; i < size; ++i) {
         float& highest = heights[cell[i]];
-        highest = height[i] > lowest ? std::max(highest, height[i]) : highest;
+        highest = std::max(highest, height[i]);
       }
     };
     detail::with_packs([&](auto packs) {
