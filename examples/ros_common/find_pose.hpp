@@ -22,6 +22,12 @@ template <class Buffer, class Time, class IsBefore>
 PoseAnswer find_pose(const Buffer& buffer, const std::string& fixed_frame, const std::string& frame,
                      const Time& stamp, const Time& latest, IsBefore&& is_before) {
   PoseAnswer answer;
+  // Asked first, because transforms may come between both questions.
+  bool is_newest_before = true;
+  try {
+    is_newest_before = is_before(buffer.lookupTransform(fixed_frame, frame, latest).header.stamp);
+  } catch (const tf2::TransformException&) {
+  }
   try {
     const auto T = buffer.lookupTransform(fixed_frame, frame, stamp).transform;
     const auto& p = T.translation;
@@ -30,10 +36,7 @@ PoseAnswer find_pose(const Buffer& buffer, const std::string& fixed_frame, const
         Eigen::Translation3d(p.x, p.y, p.z) * Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized();
   } catch (const tf2::ExtrapolationException& error) {
     answer.reason = error.what();
-    try {
-      answer.may_come = is_before(buffer.lookupTransform(fixed_frame, frame, latest).header.stamp);
-    } catch (const tf2::TransformException&) {
-    }
+    answer.may_come = is_newest_before;
   } catch (const tf2::InvalidArgumentException& error) {  // a name that no frame can have
     answer.reason = error.what();
     answer.may_come = false;
