@@ -106,8 +106,7 @@ class RemoverNode {
                         message.header.stamp = newest_;
                         map_.publish(message);
                       });
-    if (has_cleaned) return Worker::Wait(0);
-    return Worker::Wait(loop_.is_waiting() ? 5 : 50);
+    return loop_.pause_after(has_cleaned);
   }
 
   PoseAnswer pose_of(const Cloud& cloud) const {

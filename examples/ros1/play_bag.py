@@ -81,7 +81,7 @@ def main(program, node, work):
         rospy.Subscriber("/dynains/residual", PoseWithCovarianceStamped, residuals.append)
         start(node, "_fixed_frame:=map", "_map_period:=0.3", "_queue:=100", "_tf_timeout:=10",
               "_min_range:=2.5")
-        start("rosbag", "play", "--quiet", "--keep-alive", "--wait-for-subscribers", "--delay=1", "--rate=2",
+        start("rosbag", "play", "--quiet", "--wait-for-subscribers", "--delay=1", "--rate=2",
               bag)
         wait_for(lambda: len(received["dynamic"]) == SCANS and len(received["static"]) == SCANS,
                  f"{SCANS} clouds")

@@ -1,5 +1,5 @@
-// What a node tells of itself: counts since the last report, and what is wrong. Without types of
-// ROS.
+// The report of a node: it counts clouds since the last report, and lists problems. It uses no type
+// of ROS.
 #pragma once
 
 #include <algorithm>

@@ -53,6 +53,14 @@ class RemoverLoop {
     return !queue_.empty();
   }
 
+  /// How long to wait for new clouds or poses before the next call of clean_next(), which has just
+  /// returned `has_cleaned`.
+  std::chrono::milliseconds pause_after(bool has_cleaned) const {
+    constexpr std::chrono::milliseconds kForPose{5}, kForCloud{50};
+    if (has_cleaned) return std::chrono::milliseconds::zero();
+    return is_waiting() ? kForPose : kForCloud;
+  }
+
   /// Cleans the oldest cloud if its pose is known, and calls `publish(cloud, frame)`. `find_pose`:
   /// see CloudQueue::take(). Returns whether a cloud was taken.
   template <class FindPose, class Publish>

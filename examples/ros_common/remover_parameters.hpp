@@ -28,7 +28,8 @@ inline RemoverConfig preset(const std::string& name) {
                              ": expected default|paper|published|offline|odometry");
 }
 
-/// What a node declares of a parameter, except for its value. `min` and `max` are valid values.
+/// The declaration of a parameter without its value. `min` and `max` are its least and its greatest
+/// valid value.
 struct ParameterText {
   std::string name;
   std::string description;

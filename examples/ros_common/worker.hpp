@@ -61,7 +61,7 @@ class Worker {
 };
 
 /// Sends values in a thread of its own, because `send(Value)`, which must not throw, may be slow.
-/// Of values that wait, only the newest is sent.
+/// A new value replaces one that still waits.
 template <class Value>
 class Outbox {
  public:

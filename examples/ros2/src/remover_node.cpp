@@ -167,8 +167,7 @@ class RemoverNode::Work {
       message->header.stamp = newest_;
       maps_->post(std::move(message));
     });
-    if (has_cleaned) return Worker::Wait(0);
-    return Worker::Wait(loop_.is_waiting() ? 5 : 50);
+    return loop_.pause_after(has_cleaned);
   }
 
   PoseAnswer pose_of(const Cloud& cloud) const {
