@@ -9,12 +9,16 @@ namespace dynains::program {
 namespace {
 
 constexpr std::uint32_t kFewestPoints = 10;
-constexpr float kLongest = 18.0F, kHighest = 4.5F;  // m
-constexpr float kMove = 1.0F;                       // m, of both ends of a box
-constexpr std::uint32_t kMostGap = 3;               // scans
-constexpr std::size_t kFewestRemoved = 5;           // scans of a move
+constexpr float kMove = 1.0F;              // m, of both ends of a box
+constexpr std::uint32_t kMostGap = 3;      // scans
+constexpr std::size_t kFewestRemoved = 5;  // scans of a move
 
 }  // namespace
+
+bool is_compact(const Eigen::Vector3f& size) {
+  constexpr float kLongest = 18.0F, kHighest = 4.5F;  // m
+  return std::max(size.x(), size.y()) <= kLongest && size.z() <= kHighest;
+}
 
 bool InstanceChains::Node::is_removed() const { return 5 * removed >= 4 * points; }
 
@@ -41,8 +45,7 @@ void InstanceChains::add(PointsView points, Span<const PointLabel> labels,
   for (std::uint32_t id = 0; id < open_.size(); ++id) {
     Node& node = open_[id];
     if (node.points < kFewestPoints) continue;
-    const Eigen::Array3f size = node.highest - node.lowest;
-    if (size.head<2>().maxCoeff() > kLongest || size.z() > kHighest) continue;
+    if (!is_compact((node.highest - node.lowest).matrix())) continue;
     node.instance = id;
     node.scan = scan;
     std::uint32_t& latest = latest_.try_emplace(id, kNone).first->second;

@@ -14,6 +14,9 @@
 
 namespace dynains::program {
 
+/// Whether a box of this size (m, z up) may hold one vehicle.
+bool is_compact(const Eigen::Vector3f& size);
+
 /// Links instances whose boxes overlap from scan to scan. The first pass sees such an object move
 /// for a while and stand before or after that: it removes it and then keeps it, or the reverse.
 class InstanceChains {
@@ -27,7 +30,8 @@ class InstanceChains {
     ScanSpan elsewhere;     ///< scans in which it was elsewhere
     bool is_later = false;  ///< it leaves its place; else it came, and stays
   };
-  /// What moved the object of an instance to its place, or away from it. Null: nothing.
+  /// The move that brought the object of an instance to its place, or that takes it away later;
+  /// null if it has not moved.
   const Move* move_of(std::uint32_t scan, std::uint32_t instance) const;
 
  private:

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "dynains/errors.hpp"
+#include "io/median.hpp"
 #include "points_of.hpp"
 
 namespace dynains::program {
@@ -13,18 +14,14 @@ constexpr float kChangedRatio = 0.25F;       // of the known points of an instan
 constexpr float kLowChangedRatio = 0.2F;     // of those in its lower half: panes are higher
 constexpr float kLeastChangedRatio = 0.15F;  // of all known ones
 constexpr float kLargeChangedRatio = 0.5F;   // of a larger instance
-constexpr float kCompactLength = 18.0F, kCompactHeight = 4.5F;  // m
-constexpr std::uint32_t kIndependent = 30;  // scans, which the first pass looks ahead
-constexpr float kBelief = 0.95F;            // of points that the second pass removes
-constexpr float kRestoredBelief = 0.5F;     // of objects that it brings back
+constexpr std::uint32_t kIndependent = 30;   // scans, which the first pass looks ahead
+constexpr float kBelief = 0.95F;             // of points that the second pass removes
+constexpr float kRestoredBelief = 0.5F;      // of objects that it brings back
 
 }  // namespace
 
 bool SecondPass::Instance::leaves() const {
-  const Eigen::Vector3f size = highest - lowest;
-  const bool is_compact =
-      std::max(size.x(), size.y()) <= kCompactLength && size.z() <= kCompactHeight;
-  const float ratio = is_compact ? kChangedRatio : kLargeChangedRatio;
+  const float ratio = is_compact(highest - lowest) ? kChangedRatio : kLargeChangedRatio;
   if (moved && 4 * places.stays <= places.known) return true;
   return points.leave(ratio) || places.leave(ratio);
 }
@@ -216,23 +213,17 @@ void SecondPass::list_seen(const VerdictArrays& verdict) {
 }
 
 // Scans in which an instance was not there: medians over its places that have changed.
-ScanSpan SecondPass::absence(std::uint32_t number, const Seen* begin, const Seen* end) {
-  firsts_.clear();
-  lasts_.clear();
+ScanSpan SecondPass::absence(std::uint32_t number, const Seen* begin, const Seen* end) const {
+  std::vector<std::uint32_t> firsts, lasts;
   for (const Seen* seen = begin; seen != end; ++seen) {
     if (!has_changed(*seen->place, number)) continue;
     const ScanSpan span = places_.absence(*seen->place);
-    firsts_.push_back(span.first);
-    lasts_.push_back(span.last);
+    firsts.push_back(span.first);
+    lasts.push_back(span.last);
   }
-  if (firsts_.empty()) return {};
-  const auto median = [](std::vector<std::uint32_t>& scans) {
-    const auto middle = scans.begin() + static_cast<std::ptrdiff_t>(scans.size() / 2);
-    std::nth_element(scans.begin(), middle, scans.end());
-    return *middle;
-  };
-  const ScanSpan span = {median(firsts_), median(lasts_)};
-  // Of fewer scans, the first pass has weighed what they tell.
+  if (firsts.empty()) return {};
+  const ScanSpan span = {median(std::move(firsts)), median(std::move(lasts))};
+  // The first pass has compared scans that are closer in time.
   const std::uint32_t scans = std::min(span.last, newest_) - std::min(span.first, newest_);
   return scans >= kIndependent ? span : ScanSpan();
 }

@@ -103,7 +103,7 @@ class SecondPass {
   void find_instances(std::uint32_t number, const Pose& T_world_sensor,
                       const VerdictArrays& verdict);
   void list_seen(const VerdictArrays& verdict);
-  ScanSpan absence(std::uint32_t number, const Seen* begin, const Seen* end);
+  ScanSpan absence(std::uint32_t number, const Seen* begin, const Seen* end) const;
   void judge(std::uint32_t number, const Seen* begin, const Seen* end);
 
   StaticPolicy policy_;
@@ -115,12 +115,11 @@ class SecondPass {
   ScratchFile file_;
   std::vector<std::uint8_t> packed_;
   PointBuffer points_;
-  std::vector<const Place*> place_of_;         // by point; null: none, or nothing is known of it
-  std::vector<std::uint8_t> is_restored_;      // by point
-  std::vector<Instance> instances_;            // by id
-  std::vector<Seen> seen_;                     // sorted by instance
-  std::vector<std::uint32_t> firsts_, lasts_;  // scans
-  std::vector<Eigen::Vector3f> world_;         // m, from the sensor, axes of the world; by point
+  std::vector<const Place*> place_of_;     // by point; null: none, or nothing is known of it
+  std::vector<std::uint8_t> is_restored_;  // by point
+  std::vector<Instance> instances_;        // by id
+  std::vector<Seen> seen_;                 // sorted by instance
+  std::vector<Eigen::Vector3f> world_;     // m, from the sensor, axes of the world; by point
   std::vector<Object> objects_;
   bool is_decided_ = false;
   std::uint32_t newest_ = 0;  // scan

@@ -1,11 +1,11 @@
-// What the second pass of a run calls static.
+// The choice of static objects in the second pass of a run.
 #pragma once
 
 #include <cstdint>
 
 namespace dynains::program {
 
-/// What of the things that stood for a while is static.
+/// Which objects that stood for a part of the recording are static.
 enum class StaticPolicy : std::uint8_t {
   kAlways,  ///< nothing that came or went
   kLast     ///< what stands at the last look, in the scans since it stands

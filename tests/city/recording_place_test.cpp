@@ -55,26 +55,23 @@ TEST_CASE("two epochs that removed all points at one end tell of motion") {
 }
 
 TEST_CASE("a place was entered or left if it was empty at the end where points were removed") {
-  RecordingPlace place = judged("rk");
-  place.free_after = 0b1111;
-  CHECK_FALSE(place.came(0));
-  CHECK_FALSE(place.left(0));
-  place.free_before = 0b1111;
-  CHECK(place.came(0));
-  CHECK_FALSE(place.left(0));
-
-  place = judged("kr");
-  place.free_before = 0b1111;
-  CHECK_FALSE(place.came(0));
-  CHECK_FALSE(place.left(0));
-  place.free_after = 0b1111;
-  CHECK_FALSE(place.came(0));
-  CHECK(place.left(0));
-
-  place = judged("rr");
-  place.free_before = place.free_after = 0b1111;
-  CHECK_FALSE(place.came(0));
-  CHECK_FALSE(place.left(0));
+  constexpr std::uint8_t kFree = 0b1111;
+  struct Case {
+    std::string epochs;
+    bool came, left;
+  };
+  for (const Case& one : {Case{"rk", true, false}, {"kr", false, true}, {"rr", false, false}}) {
+    CAPTURE(one.epochs);
+    for (const std::uint8_t before : {std::uint8_t{0}, kFree}) {
+      for (const std::uint8_t after : {std::uint8_t{0}, kFree}) {
+        RecordingPlace place = judged(one.epochs);
+        place.free_before = before;
+        place.free_after = after;
+        CHECK(place.came(0) == (one.came && before == kFree));
+        CHECK(place.left(0) == (one.left && after == kFree));
+      }
+    }
+  }
 }
 
 TEST_CASE("looks from other ranges do not tell that a place was entered or left") {
@@ -106,14 +103,17 @@ TEST_CASE("presence is known by slices of time, which lie in a span as a whole o
   presence.add(10);
   CHECK(presence.any_within({10, 10}));
   CHECK(presence.any_within({0, UINT32_MAX}));
-  CHECK_FALSE(presence.any_within({11, 63}));
   CHECK_FALSE(presence.any_within({0, 9}));
+  CHECK_FALSE(presence.any_within({11, 63}));
+  CHECK_FALSE(presence.any_within({11, UINT32_MAX}));
   presence.add(200);  // slices of four scans from now on
   CHECK(presence.any_within({8, 11}));
-  CHECK_FALSE(presence.any_within({9, 11}));
+  CHECK_FALSE(presence.any_within({9, 11}));  // holds no slice
   CHECK_FALSE(presence.any_within({12, 199}));
   CHECK(presence.any_within({200, 203}));
+  CHECK(presence.any_within({12, 203}));
   CHECK(presence.any_within({12, UINT32_MAX}));
+  CHECK(presence.any_within({0, UINT32_MAX}));
 }
 
 TEST_CASE("a place knows the scans that measured it") {

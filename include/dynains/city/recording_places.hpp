@@ -157,10 +157,9 @@ class RecordingPlaces {
 
   /// First and last scan of the longest row of looks that passed a place; was_passed() must be
   /// true.
-  std::pair<std::uint32_t, std::uint32_t> free_scans(const Place& place) const {
+  ScanSpan free_scans(const Place& place) const {
     const std::size_t k = class_of(place);
-    const ScanSpan span = span_of(place, place.longest[k] > 0 ? k : kAnyRange);
-    return {span.first, span.last};
+    return span_of(place, place.longest[k] > 0 ? k : kAnyRange);
   }
   /// Scans before a place that has changed was filled for the first time, or after the last time.
   /// All scans if it was empty in between.
