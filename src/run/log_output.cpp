@@ -16,7 +16,6 @@
 #include "interrupt.hpp"
 #include "io/log/cloud_edit.hpp"
 #include "io/log/compress.hpp"
-#include "io/log/decompress.hpp"
 #include "io/log/log_folder.hpp"
 #include "io/log/log_scans.hpp"
 #include "io/log/message_editor.hpp"
@@ -64,15 +63,10 @@ class CloudEditor final : public MessageEditor {
   std::string edited(const LogMessage& place, const std::vector<std::uint8_t>& message) override {
     const LogTopic& topic = log_.log().topics()[log_.cloud_topic()];
     const std::string& name = names_.at(place_of(place));
-    std::string text = log_.log().path().string() + ": " + topic.name + " at " +
-                       std::to_string(place.time) + " ns";
     std::vector<std::uint8_t> bytes = message;
     std::vector<std::uint8_t> spare;
-    const std::string error =
-        topic.encoding == MessageEncoding::kCdr ? decompress_frame(bytes, spare) : std::string();
-    if (!error.empty()) throw IoError(text + ": " + error);
+    const SerialisedMessage cloud = unpacked(log_.log(), topic, place.time, bytes, spare);
     const bool was_compressed = bytes != message;
-    const SerialisedMessage cloud{bytes.data(), bytes.size(), topic.encoding, std::move(text)};
     const std::vector<std::uint8_t> classes =
         classes_of(name, inspect_cloud(topic.type, cloud).points);
     const std::vector<std::uint8_t> stay = kept(classes);

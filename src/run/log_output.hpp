@@ -15,8 +15,9 @@ namespace dynains::program {
 /// results are complete, or not at all.
 class LogOutput {
  public:
-  /// `outputs.log` is not empty. Throws ConfigError if the recording has no log that can be written
-  /// so, IoError if the target is in the way or read, and UsageError if another run has its folder.
+  /// `outputs.log` is not empty. Throws ConfigError if the recording is no log, or none of the kind
+  /// of the target; IoError if the run reads the target or must not replace it; UsageError if
+  /// another run writes it.
   LogOutput(const RunPlan& plan, bool may_replace);
 
   /// Copies the log with the labels of the run in `results`. Returns the number of clouds on the

@@ -61,7 +61,7 @@ std::string rows_of_points(MessageEncoding encoding, std::uint32_t rows, std::si
   return out.text();
 }
 
-/// The same points in one row, those of `numbers` alone.
+/// A cloud of one row that has only the points with these numbers.
 std::string one_row(MessageEncoding encoding, const std::vector<std::uint16_t>& numbers) {
   ByteWriter data;
   for (const std::uint16_t i : numbers) {

@@ -55,6 +55,17 @@ LogTopic named(const Topics& topics, const std::string& name) {
 
 }  // namespace
 
+SerialisedMessage unpacked(const LogFile& log, const LogTopic& topic, std::uint64_t time,
+                           std::vector<std::uint8_t>& bytes, std::vector<std::uint8_t>& spare) {
+  std::string place =
+      log.path().string() + ": " + topic.name + " at " + std::to_string(time) + " ns";
+  if (topic.encoding == MessageEncoding::kCdr) {
+    const std::string error = decompress_frame(bytes, spare);
+    if (!error.empty()) throw IoError(place + ": " + error);
+  }
+  return {bytes.data(), bytes.size(), topic.encoding, std::move(place)};
+}
+
 LogScans::LogScans(const std::filesystem::path& path, const LogChoice& choice)
     : log_(open_log(path, choice.accept_missing)), choice_(choice) {
   choose_cloud_topic();
@@ -316,15 +327,8 @@ std::optional<Pose> LogScans::pose_at(double time) const {
 
 /// The message, in memory until the next one.
 SerialisedMessage LogScans::load(const LogMessage& message) {
-  const LogTopic& topic = log_->topics()[message.topic];
   log_->read(message, bytes_);
-  std::string place =
-      log_->path().string() + ": " + topic.name + " at " + std::to_string(message.time) + " ns";
-  if (topic.encoding == MessageEncoding::kCdr) {
-    const std::string error = decompress_frame(bytes_, compressed_);
-    if (!error.empty()) throw IoError(place + ": " + error);
-  }
-  return {bytes_.data(), bytes_.size(), topic.encoding, std::move(place)};
+  return unpacked(*log_, log_->topics()[message.topic], message.time, bytes_, compressed_);
 }
 
 void LogScans::read(std::size_t i, RecordedScan& scan) {

@@ -30,6 +30,11 @@ struct LogChoice {
   bool accept_missing = false;  ///< whether parts of the log may be missing
 };
 
+/// A message of a log, of which `bytes` were read. They lose their frame of zstd, if they have one;
+/// `spare` is memory for that. Throws IoError.
+SerialisedMessage unpacked(const LogFile& log, const LogTopic& topic, std::uint64_t time,
+                           std::vector<std::uint8_t>& bytes, std::vector<std::uint8_t>& spare);
+
 /// Finds the cloud topic and the poses of a log. Reads it once from begin to end, checks every
 /// cloud, and keeps the poses and the addresses of the clouds. Throws IoError, also if the choice
 /// of a topic is not clear.

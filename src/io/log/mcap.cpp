@@ -42,7 +42,7 @@ void copy_records(Bytes records, std::uint64_t block, MessageEditor& editor, Mca
   }
 }
 
-/// What the entry of an attachment in a summary has behind its place.
+/// The fields of an index record of an attachment that follow its position and size.
 std::string attachment_index(Bytes fields) {
   const std::uint8_t* const times = fields.here();
   fields.skip(16, "the times of an attachment");

@@ -33,7 +33,7 @@ StagedFolder::StagedFolder(const fs::path& target)
     : target_(target.has_filename() ? target : target.parent_path()),
       staging_(beside(target_, ".dynains_staging")),
       lock_(created(staging_)) {
-  // What a killed process left.
+  // A killed process may have left files.
   for (const fs::directory_entry& left : fs::directory_iterator(staging_)) {
     fs::remove_all(left.path());
   }
