@@ -99,8 +99,8 @@ class OccupancyDescriptor {
 
   /// Computes the grid of Eq. 5-8 for a cluster and the heights of its oldest and newest
   /// observation. The cluster must be comparable (ClusterSet::comparable): it has points in the
-  /// newest scan and in an earlier one. The memory that the view
-  /// refers to must stay valid until the next call.
+  /// newest scan and in an earlier one. The memory that the view refers to must stay valid until
+  /// the next call.
   void describe(const ClusterView& cluster) {
     cluster_ = cluster;
     oldest_ = cluster.oldest();

@@ -130,13 +130,13 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
       verdicts_[c].stage = DecisionStage::kSimilar;
       descriptor_.describe(clusters_[c]);             // Eq. 5-10
       if (!descriptor_.proposes_dynamic()) continue;  // Eq. 11-12
-      verdicts_[c] = {1.0F, 1, DecisionStage::kProposed};
-      if (big_is_static_ && is_big(clusters_[c]))
+      if (big_is_static_ && is_big(clusters_[c])) {
         verdicts_[c] = {0.0F, 0, DecisionStage::kProposed};
-      const bool has_belief = compared_ == Comparison::kEnds || clusters_[c].oldest() == 0;
-      if (use_belief_ && has_belief && verdicts_[c].is_dynamic != 0) {
-        update_belief(clusters_[c], verdicts_[c]);
+        continue;
       }
+      verdicts_[c] = {1.0F, 1, DecisionStage::kProposed};
+      const bool has_belief = compared_ == Comparison::kEnds || clusters_[c].oldest() == 0;
+      if (use_belief_ && has_belief) update_belief(clusters_[c], verdicts_[c]);
     }
   }
 
@@ -192,8 +192,9 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
     for (std::size_t other = 0; other < scans; ++other) {
       if (other == k) continue;
       const Span<const float> heights = descriptor.heights(other);
-      for (std::size_t i = 0; i < others_.size(); ++i)
+      for (std::size_t i = 0; i < others_.size(); ++i) {
         others_[i] = std::max(others_[i], heights[i]);
+      }
     }
     return others_;
   }
