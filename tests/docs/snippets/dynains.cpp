@@ -9,7 +9,7 @@
 #include "dynains/io/tiled_map.hpp"
 #include "dynains/map/rebasable_static_map.hpp"
 
-/// What a block uses of kiss_icp::pipeline::KissICP.
+/// A stand-in for kiss_icp::pipeline::KissICP with the functions that the block calls.
 struct KissIcpLookAlike {
   void RegisterFrame(const std::vector<Eigen::Vector3d>& points,
                      const std::vector<double>& timestamps);
