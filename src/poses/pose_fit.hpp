@@ -44,7 +44,7 @@ using BodyMotion = std::function<std::optional<Pose>(const RegisteredMotion&)>;
 /// one of both has no pose.
 std::optional<Pose> motion_under(const Recording& recording, const PoseConvention& convention,
                                  std::size_t first, std::size_t second);
-/// The same for registered motions. `recording` must outlive the result.
+/// Returns motion_under() as a function of registered motions. `recording` must outlive it.
 BodyMotion motion_under(const Recording& recording, const PoseConvention& convention);
 
 /// Difference of poses and registered motions: medians over pairs.

@@ -32,8 +32,9 @@ class Checker {
   }
 
   void check_poses() {
-    const std::string share = "only " + std::to_string(std::lround(100.0 * agreement().share)) +
-                              " % of the points of neighbouring scans agree under these poses";
+    const std::string share =
+        "only " + std::to_string(std::lround(100.0 * result_.agreement.as_given.share)) +
+        " % of the points of neighbouring scans agree under these poses";
     const bool is_doubtful = result_.agreement.doubtful();
     if (diagnosis_) {
       if (diagnosis_->verdict == PoseVerdict::kInexact) warn(advice(*diagnosis_));
@@ -72,7 +73,6 @@ class Checker {
   StartCheck take() { return std::move(result_); }
 
  private:
-  const Agreement& agreement() const { return result_.agreement.as_given; }
   void warn(std::string text) { result_.warnings.push_back(std::move(text)); }
 
   const Recording& recording_;

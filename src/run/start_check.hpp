@@ -1,4 +1,4 @@
-// What a run says of a recording before its first scan.
+// The judgement of poses and clouds before the first scan of a run.
 #pragma once
 
 #include <string>
