@@ -12,18 +12,17 @@ function(install_tree name)
   endif()
   file(RENAME ${passing} ${WORK_DIR}/${name})
 
-  file(GLOB_RECURSE files ${WORK_DIR}/${name}/*)
-  foreach(file IN LISTS files)
-    # Debug information and instrumentation contain paths of source files.
-    if(file MATCHES "\\.(hpp|cmake|pc)$" OR (CONFIG STREQUAL "Release" AND NOT INSTRUMENTED))
-      foreach(path ${passing} ${BUILD_DIR} ${SOURCE_DIR})
-        execute_process(COMMAND grep -F -q -- ${path} ${file} RESULT_VARIABLE absent)
-        if(NOT absent)
-          message(SEND_ERROR "${file} contains the path ${path}")
-        endif()
-      endforeach()
-    endif()
-  endforeach()
+  # Debug information and instrumentation contain paths of source files.
+  set(searched "")
+  if(INSTRUMENTED OR NOT CONFIG STREQUAL "Release")
+    set(searched --include=*.hpp --include=*.cmake --include=*.pc)
+  endif()
+  execute_process(
+    COMMAND grep -r -F -l ${searched} -e ${passing} -e ${BUILD_DIR} -e ${SOURCE_DIR} ${WORK_DIR}/${name}
+    RESULT_VARIABLE absent OUTPUT_VARIABLE files)
+  if(NOT absent EQUAL 1)
+    message(SEND_ERROR "files contain paths of the install or the build:\n${files}")
+  endif()
 endfunction()
 
 install_tree(prefix)
