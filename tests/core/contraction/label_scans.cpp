@@ -5,7 +5,7 @@
 #include <fstream>
 #include <vector>
 
-#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/compiled_remover.hpp"
 
 int main(int count, char** arguments) {
 #if defined(__FMA__)
