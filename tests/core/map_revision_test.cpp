@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "dynains/compiled_remover.hpp"
-#include "dynains/dyna_ins_remover.hpp"
 #include "dynains/evidence/visibility.hpp"
 #include "dynains/map/static_map_accumulator.hpp"
 #include "support/catch.hpp"
 #include "support/counting_map.hpp"
+#include "support/own_stages.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 #include "support/visibility.hpp"

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "dynains/compiled_remover.hpp"
-#include "dynains/dyna_ins_remover.hpp"
 #include "support/catch.hpp"
+#include "support/own_stages.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 

@@ -3,10 +3,10 @@
 #include <vector>
 
 #include "dynains/compiled_remover.hpp"
-#include "dynains/dyna_ins_remover.hpp"
 #include "dynains/map/rebasable_static_map.hpp"
 #include "support/catch.hpp"
 #include "support/counting_map.hpp"
+#include "support/own_stages.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 

@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "dynains/dyna_ins_remover.hpp"
 #include "support/catch.hpp"
+#include "support/own_stages.hpp"
 #include "support/random.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"

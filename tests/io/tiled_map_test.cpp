@@ -13,11 +13,11 @@
 #include <vector>
 
 #include "dynains/compiled_remover.hpp"
-#include "dynains/dyna_ins_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/map/static_map_accumulator.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
+#include "support/own_stages.hpp"
 #include "support/random.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
