@@ -27,14 +27,19 @@ void InstanceChains::add(PointsView points, Span<const PointLabel> labels,
   const auto scan = static_cast<std::uint32_t>(begin_.size());
   if (scan == 0) origin_ = T_world_sensor.translation();
   open_.clear();
+  numbers_.clear();
   const Eigen::Matrix3f R = T_world_sensor.linear().cast<float>();
   const Eigen::Vector3f t = (T_world_sensor.translation() - origin_).cast<float>();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::uint32_t id = mos_label(labels[i], instances[i]) >> 16U;
     if (id == kNoInstance) continue;
     if (labels[i] != PointLabel::kStatic && labels[i] != PointLabel::kDynamic) continue;
-    if (id >= open_.size()) open_.resize(id + 1);
-    Node& node = open_[id];
+    const std::uint32_t number = numbers_.add(id);
+    if (number == open_.size()) {
+      open_.emplace_back();
+      open_.back().instance = id;
+    }
+    Node& node = open_[number];
     const Eigen::Array3f at = R * Eigen::Vector3f(points.x[i], points.y[i], points.z[i]) + t;
     node.lowest = node.lowest.min(at);
     node.highest = node.highest.max(at);
@@ -42,13 +47,13 @@ void InstanceChains::add(PointsView points, Span<const PointLabel> labels,
     node.removed += labels[i] == PointLabel::kDynamic ? 1 : 0;
   }
   begin_.push_back(static_cast<std::uint32_t>(nodes_.size()));
-  for (std::uint32_t id = 0; id < open_.size(); ++id) {
-    Node& node = open_[id];
+  std::sort(open_.begin(), open_.end(),
+            [](const Node& a, const Node& b) { return a.instance < b.instance; });
+  for (Node& node : open_) {
     if (node.points < kFewestPoints) continue;
     if (!is_compact((node.highest - node.lowest).matrix())) continue;
-    node.instance = id;
     node.scan = scan;
-    std::uint32_t& latest = latest_.try_emplace(id, kNone).first->second;
+    std::uint32_t& latest = latest_.try_emplace(node.instance, kNone).first->second;
     const auto number = static_cast<std::uint32_t>(nodes_.size());
     if (latest != kNone && nodes_[latest].scan + kMostGap >= scan) {
       node.has_previous = true;
@@ -110,14 +115,20 @@ void InstanceChains::set_elsewhere(const std::vector<std::uint32_t>& chain, std:
   }
 }
 
+Span<const InstanceChains::Node> InstanceChains::nodes_of(std::uint32_t scan) const {
+  if (scan >= begin_.size()) return {};
+  const std::size_t begin = begin_[scan];
+  const std::size_t end = scan + 1 < begin_.size() ? begin_[scan + 1] : nodes_.size();
+  return {nodes_.data() + begin, end - begin};
+}
+
 const InstanceChains::Move* InstanceChains::move_of(std::uint32_t scan,
                                                     std::uint32_t instance) const {
-  if (scan >= begin_.size()) return nullptr;
-  const auto begin = nodes_.begin() + begin_[scan];
-  const auto end = scan + 1 < begin_.size() ? nodes_.begin() + begin_[scan + 1] : nodes_.end();
-  const auto at = std::lower_bound(
-      begin, end, instance, [](const Node& node, std::uint32_t id) { return node.instance < id; });
-  if (at == end || at->instance != instance || !at->has_move) return nullptr;
+  const Span<const Node> nodes = nodes_of(scan);
+  const Node* const at =
+      std::lower_bound(nodes.begin(), nodes.end(), instance,
+                       [](const Node& node, std::uint32_t id) { return node.instance < id; });
+  if (at == nodes.end() || at->instance != instance || !at->has_move) return nullptr;
   return &at->move;
 }
 

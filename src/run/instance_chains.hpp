@@ -11,6 +11,7 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/verdict.hpp"
+#include "instance_numbers.hpp"
 
 namespace dynains::program {
 
@@ -33,6 +34,13 @@ class InstanceChains {
   /// The move that brought the object of an instance to its place, or that takes it away later;
   /// null if it has not moved.
   const Move* move_of(std::uint32_t scan, std::uint32_t instance) const;
+  /// Calls `visit(instance)` for the instances of a scan that have a move.
+  template <class Visitor>
+  void for_each_move(std::uint32_t scan, Visitor&& visit) const {
+    for (const Node& node : nodes_of(scan)) {
+      if (node.has_move) visit(node.instance);
+    }
+  }
 
  private:
   static constexpr std::uint32_t kNone = UINT32_MAX;
@@ -50,13 +58,15 @@ class InstanceChains {
     bool is_removed() const;
   };
 
+  Span<const Node> nodes_of(std::uint32_t scan) const;
   static float shift(const Node& a, const Node& b);
   void find_moves(const std::vector<std::uint32_t>& chain);
   void set_elsewhere(const std::vector<std::uint32_t>& chain, std::size_t first, std::size_t last);
 
   std::vector<Node> nodes_;
   std::vector<std::uint32_t> begin_;  // by scan: first node; sorted by instance in a scan
-  std::vector<Node> open_;            // by instance
+  InstanceNumbers numbers_;           // of the open scan
+  std::vector<Node> open_;            // by number
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();  // m, world frame
   std::map<std::uint32_t, std::uint32_t> latest_;     // node, by instance
 };

@@ -233,7 +233,9 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   RunResults results(plan.sequence, plan.range, outputs, outside_map.take_writer());
   if (session) results.contribute_to(*session);
   std::optional<SecondPass> second_pass;
-  if (plan.passes > 1) results.wait_for(second_pass.emplace(outputs.folder, plan.static_policy));
+  if (plan.passes > 1) {
+    results.wait_for(second_pass.emplace(outputs.folder, plan.static_policy, plan.outputs.thread));
+  }
   const RunTiming timing = process(plan, listener, outputs.folder, results);
   RunOutcome outcome = outcome_of(plan, results, timing);
   outcome.alignment = alignment;

@@ -163,6 +163,10 @@ void RunResults::take_newest(const ScanVerdict& verdict) {
 void JudgedScan::take(const ScanVerdict& other, bool with_beliefs) {
   arrays.take(other, with_beliefs);
   verdict = other;
+  refer_to_arrays();
+}
+
+void JudgedScan::refer_to_arrays() {
   verdict.labels = arrays.labels;
   verdict.instances = arrays.instances;
   verdict.beliefs = arrays.beliefs;
@@ -195,37 +199,40 @@ void RunResults::write_final(const RecordedScan& scan, const ScanVerdict& verdic
 void RunResults::revise(const AddToMap& add_to_map) {
   if (finished_ == 0) return;
   ReadAhead reader(recording_, range_.first, range_.first + finished_ - 1, thread());
-  RecordedScan scan;
-  VerdictArrays arrays;
-  PointBuffer points;
-  std::vector<std::uint8_t> keep;
+  JudgedScan judged;
   for (std::size_t i = 0; i < finished_; ++i) {
-    const std::string& name = recording_.name(range_.first + i);
-    scan = reader.next(std::move(scan));
-    final_labels_.read(name, scan, arrays);
-    ScanVerdict verdict;
-    verdict.scan = i;
-    verdict.time = recording_.time(range_.first + i);
-    verdict.T_world_sensor = orthonormalized(recording_.T_world_sensor(range_.first + i));
-    const bool is_revised =
-        second_pass_->revise(scan, static_cast<std::uint32_t>(i), verdict.T_world_sensor, arrays);
-    verdict.labels = arrays.labels;
-    verdict.causes = arrays.causes;
-    verdict.instances = arrays.instances;
-    verdict.beliefs = arrays.beliefs;
-    if (is_revised) {
-      final_labels_.take(verdict);
-      final_labels_.write(name);
-    }
-    complete_scan(scan, verdict);
-    if (!map_) continue;
-    copy_points(scan, points);
-    keep.resize(points.size());
-    std::transform(arrays.labels.begin(), arrays.labels.end(), keep.begin(), [](PointLabel label) {
-      return static_cast<std::uint8_t>(is_static(label) ? 1 : 0);
-    });
-    add_to_map(points, keep, verdict.T_world_sensor);
+    const std::size_t index = range_.first + i;
+    const Pose T_world_sensor = orthonormalized(recording_.T_world_sensor(index));
+    judged.scan = reader.next(std::move(judged.scan));
+    final_labels_.read(recording_.name(index), judged.scan, judged.arrays);
+    const bool is_revised = second_pass_->revise(judged.scan, static_cast<std::uint32_t>(i),
+                                                 T_world_sensor, judged.arrays);
+    finish();
+    std::swap(judged_, judged);
+    judged_.verdict = ScanVerdict();
+    judged_.verdict.scan = i;
+    judged_.verdict.time = recording_.time(index);
+    judged_.verdict.T_world_sensor = T_world_sensor;
+    judged_.refer_to_arrays();
+    writing_.begin([this, is_revised, &add_to_map] { write_revised(is_revised, add_to_map); });
   }
+  finish();
+}
+
+void RunResults::write_revised(bool is_revised, const AddToMap& add_to_map) {
+  const ScanVerdict& verdict = judged_.verdict;
+  if (is_revised) {
+    final_labels_.take(verdict);
+    final_labels_.write(recording_.name(range_.first + verdict.scan));
+  }
+  complete_scan(judged_.scan, verdict);
+  if (!map_) return;
+  copy_points(judged_.scan, points_of_scan_);
+  keep_.resize(points_of_scan_.size());
+  std::transform(verdict.labels.begin(), verdict.labels.end(), keep_.begin(), [](PointLabel label) {
+    return static_cast<std::uint8_t>(is_static(label) ? 1 : 0);
+  });
+  add_to_map(points_of_scan_, keep_, verdict.T_world_sensor);
 }
 
 bool RunResults::is_complete() const {

@@ -90,6 +90,7 @@ struct JudgedScan {
 
   /// Copies the verdict; without `with_beliefs`, the copy has none.
   void take(const ScanVerdict& other, bool with_beliefs);
+  void refer_to_arrays();
 };
 
 /// Takes verdicts as they come and streams them to files.
@@ -156,10 +157,14 @@ class RunResults {
   std::size_t finished_ = 0;
   std::uint64_t points_ = 0;
   LabelCounts labels_;
-  JudgedScan judged_;  // belongs to the writing thread until writing_.wait()
+  // These belong to the writing thread until writing_.wait().
+  JudgedScan judged_;
+  PointBuffer points_of_scan_;
+  std::vector<std::uint8_t> keep_;
   Background writing_;
 
   void write_final(const RecordedScan& scan, const ScanVerdict& verdict);
+  void write_revised(bool is_revised, const AddToMap& add_to_map);
   void complete_scan(const RecordedScan& scan, const ScanVerdict& verdict);
   void add_scan(const RecordedScan& scan, const ScanVerdict& verdict);
 };

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "dynains/errors.hpp"
+#include "dynains/threads/background.hpp"
 #include "io/median.hpp"
 #include "points_of.hpp"
 
@@ -35,8 +36,9 @@ bool SecondPass::Share::leave(float ratio) const {
          has(low_changed, kLowChangedRatio, low_changed + low_stays);
 }
 
-SecondPass::SecondPass(const std::filesystem::path& folder, StaticPolicy policy)
+SecondPass::SecondPass(const std::filesystem::path& folder, StaticPolicy policy, std::launch thread)
     : policy_(policy),
+      thread_(thread),
       places_(RecordingPlacesConfig()),
       references_(SessionReferencesConfig{1.0, 5}),
       file_(folder) {}
@@ -61,26 +63,38 @@ void SecondPass::add(const RecordedScan& scan, const ScanVerdict& verdict) {
 
 void SecondPass::test(const std::function<bool()>& keep_going) {
   ReferenceTest test_visibility{FreeSpaceConfig()};
-  SessionReference reference;
-  for (const Reference& kept : kept_) {
+  SessionReference reference, next;
+  Background reader;
+  Background* const other = thread_ == std::launch::async ? &reader : nullptr;
+  if (!kept_.empty()) read(kept_.front(), next);
+  for (std::size_t i = 0; i < kept_.size(); ++i) {
     if (!keep_going()) return;
-    file_.read(kept.offset, kept.size, packed_);
-    reference.scan = kept.scan;
-    reference.T_world_beams = kept.T_world_sensor;
-    if (!unpack_image(references_.grid(), packed_, reference.image)) {
-      throw IoError("a reference of the second pass was damaged on the disk");
-    }
-    const Eigen::Vector3d sensor = kept.T_world_sensor.translation();
-    places_.test(kept.scan, kept.time, sensor,
-                 [&](const PointBuffer& points, std::size_t count) -> const detail::Visibility& {
-                   return test_visibility(reference, points, count,
-                                          Pose(Eigen::Translation3d(sensor)));
-                 });
+    std::swap(reference, next);
+    const auto test_places = [&] {
+      const Eigen::Vector3d sensor = kept_[i].T_world_sensor.translation();
+      places_.test(kept_[i].scan, kept_[i].time, sensor,
+                   [&](const PointBuffer& points, std::size_t count) -> const detail::Visibility& {
+                     return test_visibility(reference, points, count,
+                                            Pose(Eigen::Translation3d(sensor)));
+                   });
+    };
+    run_both(other, test_places, [&] {
+      if (i + 1 < kept_.size()) read(kept_[i + 1], next);
+    });
   }
   places_.decide();
   chains_.find_moves();
   list_objects();
   is_decided_ = true;
+}
+
+void SecondPass::read(const Reference& kept, SessionReference& reference) {
+  file_.read(kept.offset, kept.size, packed_);
+  reference.scan = kept.scan;
+  reference.T_world_beams = kept.T_world_sensor;
+  if (!unpack_image(references_.grid(), packed_, reference.image)) {
+    throw IoError("a reference of the second pass was damaged on the disk");
+  }
 }
 
 void SecondPass::list_objects() {
@@ -144,9 +158,9 @@ void SecondPass::remove_objects(std::uint32_t number, const Pose& T_world_sensor
   find_instances(number, T_world_sensor, verdict);
   for (std::size_t i = 0; i < points_.size(); ++i) {
     if (verdict.labels[i] != PointLabel::kStatic || is_restored_[i] != 0) continue;
-    const std::uint32_t id = verdict.instances[i];
+    const std::uint32_t instance = numbers_.find(verdict.instances[i]);
     const bool is_free = place_of_[i] != nullptr && has_changed(*place_of_[i], number);
-    const bool leaves = id != kNoInstance && id < instances_.size() && instances_[id].leaves();
+    const bool leaves = instance != InstanceNumbers::kNone && instances_[instance].leaves();
     if (!is_free && !leaves) continue;
     verdict.labels[i] = PointLabel::kDynamic;
     verdict.causes[i] = Cause::kCameOrWent;
@@ -159,20 +173,31 @@ void SecondPass::remove_objects(std::uint32_t number, const Pose& T_world_sensor
   }
 }
 
+// Numbers the instances of which places have changed, or that have moved: no other leaves.
+void SecondPass::choose_instances(std::uint32_t number, const VerdictArrays& verdict) {
+  numbers_.clear();
+  chains_.for_each_move(number, [&](std::uint32_t id) { numbers_.add(id); });
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (verdict.labels[i] != PointLabel::kStatic || place_of_[i] == nullptr) continue;
+    if (verdict.instances[i] == kNoInstance || !has_changed(*place_of_[i], number)) continue;
+    numbers_.add(verdict.instances[i]);
+  }
+}
+
 void SecondPass::find_instances(std::uint32_t number, const Pose& T_world_sensor,
                                 const VerdictArrays& verdict) {
-  instances_.clear();
+  choose_instances(number, verdict);
+  instances_.assign(numbers_.ids().size(), {});
   world_.resize(points_.size());
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    const std::uint32_t id = verdict.instances[i];
-    if (verdict.labels[i] != PointLabel::kStatic || id == kNoInstance) continue;
-    if (id >= instances_.size()) instances_.resize(id + 1);
+    const std::uint32_t chosen = numbers_.find(verdict.instances[i]);
+    if (chosen == InstanceNumbers::kNone || verdict.labels[i] != PointLabel::kStatic) continue;
     const Eigen::Vector3d point(static_cast<double>(points_.x[i]),
                                 static_cast<double>(points_.y[i]),
                                 static_cast<double>(points_.z[i]));
     // Single precision is enough for sizes, if positions are relative to the sensor.
     world_[i] = (T_world_sensor.linear() * point).cast<float>();
-    Instance& instance = instances_[id];
+    Instance& instance = instances_[chosen];
     instance.lowest = instance.lowest.cwiseMin(world_[i]);
     instance.highest = instance.highest.cwiseMax(world_[i]);
   }
@@ -188,25 +213,25 @@ void SecondPass::find_instances(std::uint32_t number, const Pose& T_world_sensor
 void SecondPass::list_seen(const VerdictArrays& verdict) {
   seen_.clear();
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    const std::uint32_t id = verdict.instances[i];
-    if (verdict.labels[i] != PointLabel::kStatic || id == kNoInstance) continue;
-    if (place_of_[i] == nullptr) continue;
-    const Instance& instance = instances_[id];
+    if (verdict.labels[i] != PointLabel::kStatic || place_of_[i] == nullptr) continue;
+    const std::uint32_t chosen = numbers_.find(verdict.instances[i]);
+    if (chosen == InstanceNumbers::kNone) continue;
+    const Instance& instance = instances_[chosen];
     const bool is_low = world_[i].z() <= 0.5F * (instance.lowest.z() + instance.highest.z());
-    seen_.push_back({id, place_of_[i], 1, is_low});
+    if (seen_.empty() || !seen_.back().is_same(chosen, place_of_[i])) {
+      seen_.push_back({chosen, place_of_[i], 0, false});
+    }
+    seen_.back().add(1, is_low);
   }
   std::sort(seen_.begin(), seen_.end(), [](const Seen& a, const Seen& b) {
     return std::make_pair(a.instance, a.place) < std::make_pair(b.instance, b.place);
   });
   std::size_t size = 0;
   for (const Seen& seen : seen_) {
-    const bool is_same = size > 0 && seen_[size - 1].instance == seen.instance &&
-                         seen_[size - 1].place == seen.place;
-    if (!is_same) {
-      seen_[size++] = seen;
+    if (size > 0 && seen_[size - 1].is_same(seen.instance, seen.place)) {
+      seen_[size - 1].add(seen.points, seen.is_low);
     } else {
-      ++seen_[size - 1].points;
-      seen_[size - 1].is_low = seen_[size - 1].is_low || seen.is_low;
+      seen_[size++] = seen;
     }
   }
   seen_.resize(size);
@@ -230,7 +255,7 @@ ScanSpan SecondPass::absence(std::uint32_t number, const Seen* begin, const Seen
 
 void SecondPass::judge(std::uint32_t number, const Seen* begin, const Seen* end) {
   Instance& instance = instances_[begin->instance];
-  const InstanceChains::Move* const move = chains_.move_of(number, begin->instance);
+  const InstanceChains::Move* const move = chains_.move_of(number, numbers_.ids()[begin->instance]);
   instance.moved = move != nullptr && (move->is_later || policy_ == StaticPolicy::kAlways);
   const ScanSpan span = instance.moved ? move->elsewhere : absence(number, begin, end);
   for (const Seen* seen = begin; seen != end; ++seen) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <future>
 #include <vector>
 
 #include "dynains/city/recording_places.hpp"
@@ -15,6 +16,7 @@
 #include "dynains/pose.hpp"
 #include "dynains/verdict.hpp"
 #include "instance_chains.hpp"
+#include "instance_numbers.hpp"
 #include "restored_ground.hpp"
 #include "scratch_file.hpp"
 #include "static_policy.hpp"
@@ -37,9 +39,11 @@ class SecondPass {
     std::uint32_t first_passed = UINT32_MAX, last_passed = 0;
   };
 
-  /// References of the scans wait in a file without a name in `folder`. Throws IoError.
+  /// References of the scans wait in a file without a name in `folder`. `thread`: async if test()
+  /// may read them in another thread. Throws IoError.
   explicit SecondPass(const std::filesystem::path& folder,
-                      StaticPolicy policy = StaticPolicy::kAlways);
+                      StaticPolicy policy = StaticPolicy::kAlways,
+                      std::launch thread = std::launch::async);
 
   /// Takes the first verdict on a scan, in the order of the scans. Throws IoError.
   void add(const RecordedScan& scan, const ScanVerdict& verdict);
@@ -89,17 +93,27 @@ class SecondPass {
   };
   /// Points of an instance in one place.
   struct Seen {
-    std::uint32_t instance;
+    std::uint32_t instance;  // number
     const Place* place;
     std::uint32_t points;
-    bool is_low;
+    bool is_low;  // any of them
+
+    bool is_same(std::uint32_t of_instance, const Place* in_place) const {
+      return instance == of_instance && place == in_place;
+    }
+    void add(std::uint32_t count, bool any_low) {
+      points += count;
+      is_low = is_low || any_low;
+    }
   };
 
+  void read(const Reference& kept, SessionReference& reference);
   void list_objects();
   bool has_changed(const Place& place, std::uint32_t number) const;
   bool stands(const Place& place, std::uint32_t number) const;
   void restore(std::size_t point, VerdictArrays& verdict);
   void remove_objects(std::uint32_t number, const Pose& T_world_sensor, VerdictArrays& verdict);
+  void choose_instances(std::uint32_t number, const VerdictArrays& verdict);
   void find_instances(std::uint32_t number, const Pose& T_world_sensor,
                       const VerdictArrays& verdict);
   void list_seen(const VerdictArrays& verdict);
@@ -107,6 +121,7 @@ class SecondPass {
   void judge(std::uint32_t number, const Seen* begin, const Seen* end);
 
   StaticPolicy policy_;
+  std::launch thread_;
   RecordingPlaces places_;
   InstanceChains chains_;
   RestoredGround ground_;
@@ -117,7 +132,8 @@ class SecondPass {
   PointBuffer points_;
   std::vector<const Place*> place_of_;     // by point; null: none, or nothing is known of it
   std::vector<std::uint8_t> is_restored_;  // by point
-  std::vector<Instance> instances_;        // by id
+  InstanceNumbers numbers_;                // of instances in the scan that may leave
+  std::vector<Instance> instances_;        // by number
   std::vector<Seen> seen_;                 // sorted by instance
   std::vector<Eigen::Vector3f> world_;     // m, from the sensor, axes of the world; by point
   std::vector<Object> objects_;

@@ -98,23 +98,24 @@ struct FirstVerdicts {
   bool moved() const { return any_kept && (removed_first >= 2 || removed_last >= 2); }
 };
 
-/// A cube of 0.4 m.
-struct RecordingPlace {
-  std::array<std::array<std::uint8_t, 3>, 8> samples;  ///< by octant, in 1/256 of a place
-  std::uint8_t filled = 0;                             ///< octants with a sample
-  PlaceState state = PlaceState::kUnknown;
-  std::uint8_t farthest = 0;                                 ///< m, range of its points
-  std::uint8_t look_free = 0, look_hit = 0, look_range = 0;  ///< of the open look
-  std::uint8_t hits = 0;                                     ///< looks
-  bool was_free = false;                                     ///< some look passed it
-  std::uint8_t free_before = 0, free_after = 0;  ///< before, after any scan measured it; by range
-  std::array<std::uint8_t, 4> run = {}, longest = {};  ///< free looks in a row, by range
-  std::array<std::uint16_t, 4> run_begin = {}, begin = {}, end = {};  ///< looks
+/// A cube of 0.4 m. What a scan of the first pass changes lies in one line of the cache.
+struct alignas(64) RecordingPlace {
   FirstVerdicts first;
   /// In scans that hit it, or of which the first pass kept points in it.
   Presence present;
+  std::array<std::array<std::uint8_t, 3>, 8> samples;  ///< by octant, in 1/256 of a place
+  std::uint8_t filled = 0;                             ///< octants with a sample
+  std::uint8_t farthest = 0;                           ///< m, range of its points
+
+  PlaceState state = PlaceState::kUnknown;
+  std::uint8_t look_free = 0, look_hit = 0, look_range = 0;  ///< of the open look
+  std::uint8_t hits = 0;                                     ///< looks
+  bool was_free = false;                                     ///< some look passed it
+  bool is_hit_at_last = false;                   ///< by the last look that passed or hit it
+  std::uint8_t free_before = 0, free_after = 0;  ///< before, after any scan measured it; by range
+  std::array<std::uint8_t, 4> run = {}, longest = {};  ///< free looks in a row, by range
+  std::array<std::uint16_t, 4> run_begin = {}, begin = {}, end = {};  ///< looks
   std::uint32_t last_free = 0;  ///< last scan of the last look that passed it
-  bool is_hit_at_last = false;  ///< by the last look that passed or hit it
   std::uint32_t object = 0;     ///< number, from 1 on; 0: none
 
   bool was_passed() const { return longest.back() > 0; }

@@ -86,24 +86,26 @@ class RecordingPlaces {
   void add(PointsView points, Span<const PointLabel> verdicts, Span<const Cause> causes,
            const Pose& T_world_sensor, double time, std::uint32_t scan) {
     begin_epoch(T_world_sensor.translation(), time);
-    for_each_in_range(points, verdicts, T_world_sensor, [&](std::size_t i, const Position& at) {
-      const bool is_removed = verdicts[i] == PointLabel::kDynamic;
-      if (is_removed && causes[i] == Cause::kUnderInstance) return;
-      Tile& tile = at_tile(at);
-      const std::uint32_t number = tile.numbers.insert(at.key);
-      if (number == tile.places.size()) {
-        tile.places.emplace_back();
-        tile.keys.push_back(at.key);
+    const auto is_taken = [&](std::size_t i) {
+      return is_above_ground(verdicts[i]) &&
+             (verdicts[i] != PointLabel::kDynamic || causes[i] != Cause::kUnderInstance);
+    };
+    for_each_block(points, T_world_sensor, is_taken, [&](const Block& block) {
+      std::array<Tile*, kBlock> tiles;
+      std::array<std::uint32_t, kBlock> numbers;
+      for (std::size_t k = 0; k < block.count; ++k) {
+        tiles[k] = &at_tile(block.at[k].tile);
+        tiles[k]->numbers.prefetch(block.at[k].key);
       }
-      Place& place = tile.places[number];
-      place.first.add(is_removed, epoch_, scan);
-      if (!is_removed) place.present.add(scan);
-      const float range = std::sqrt(points.x[i] * points.x[i] + points.y[i] * points.y[i]);
-      place.farthest = std::max(place.farthest, whole_metres(range));
-      const auto bit = static_cast<std::uint8_t>(1U << at.octant);
-      if ((place.filled & bit) != 0) return;
-      place.filled = static_cast<std::uint8_t>(place.filled | bit);
-      place.samples[at.octant] = at.within;
+      for (std::size_t k = 0; k < block.count; ++k) {
+        numbers[k] = number_of(*tiles[k], block.at[k].key);
+        __builtin_prefetch(&tiles[k]->places[numbers[k]], 1);
+      }
+      for (std::size_t k = 0; k < block.count; ++k) {
+        const std::size_t i = block.points[k];
+        add_point(tiles[k]->places[numbers[k]], block.at[k], range_of(points, i),
+                  verdicts[i] == PointLabel::kDynamic, scan);
+      }
     });
   }
 
@@ -145,8 +147,24 @@ class RecordingPlaces {
   template <class Visitor>
   void for_each_place(PointsView points, Span<const PointLabel> verdicts,
                       const Pose& T_world_sensor, Visitor&& visit) const {
-    for_each_in_range(points, verdicts, T_world_sensor,
-                      [&](std::size_t i, const Position& at) { visit(i, find(at.tile, at.key)); });
+    const auto is_taken = [&](std::size_t i) { return is_above_ground(verdicts[i]); };
+    const Tile* tile = nullptr;
+    TileIndex index = {};
+    for_each_block(points, T_world_sensor, is_taken, [&](const Block& block) {
+      std::array<const Tile*, kBlock> tiles;
+      std::array<const Place*, kBlock> places;
+      for (std::size_t k = 0; k < block.count; ++k) {
+        if (tile == nullptr || index != block.at[k].tile) tile = find_tile(block.at[k].tile);
+        index = block.at[k].tile;
+        tiles[k] = tile;
+        if (tile != nullptr) tile->numbers.prefetch(block.at[k].key);
+      }
+      for (std::size_t k = 0; k < block.count; ++k) {
+        places[k] = tiles[k] == nullptr ? nullptr : tiles[k]->find(block.at[k].key);
+        __builtin_prefetch(places[k]);
+      }
+      for (std::size_t k = 0; k < block.count; ++k) visit(block.points[k], places[k]);
+    });
   }
 
   std::size_t size() const {
@@ -199,12 +217,25 @@ class RecordingPlaces {
     VoxelHashTable<> numbers;
     std::vector<VoxelKey> keys;
     std::vector<Place> places;
+
+    // Null: there is no such place.
+    const Place* find(VoxelKey key) const {
+      const std::uint32_t number = numbers.find(key);
+      return number == kNone ? nullptr : &places[number];
+    }
   };
   struct Position {
     TileIndex tile;
     VoxelKey key;  // of the place in the tile
     std::size_t octant;
     std::array<std::uint8_t, 3> within;
+  };
+  // Points that are worked on together: the memory of their places is fetched at once.
+  static constexpr std::size_t kBlock = 32;
+  struct Block {
+    std::size_t count = 0;
+    std::array<std::size_t, kBlock> points;
+    std::array<Position, kBlock> at;
   };
 
   static std::uint8_t whole_metres(float metres) {
@@ -229,33 +260,69 @@ class RecordingPlaces {
     return position;
   }
 
-  template <class Visitor>
-  void for_each_in_range(PointsView points, Span<const PointLabel> verdicts,
-                         const Pose& T_world_sensor, Visitor&& visit) const {
-    const auto range = static_cast<float>(config_.place_range);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (verdicts[i] != PointLabel::kStatic && verdicts[i] != PointLabel::kDynamic) continue;
-      const float x = points.x[i], y = points.y[i];
-      if (x * x + y * y > range * range) continue;
-      visit(i, position_of(T_world_sensor * Eigen::Vector3d(static_cast<double>(x),
-                                                            static_cast<double>(y),
-                                                            static_cast<double>(points.z[i]))));
-    }
+  static bool is_above_ground(PointLabel verdict) {
+    return verdict == PointLabel::kStatic || verdict == PointLabel::kDynamic;
+  }
+  // Horizontal, m.
+  static float range_of(PointsView points, std::size_t i) {
+    return std::sqrt(points.x[i] * points.x[i] + points.y[i] * points.y[i]);
   }
 
-  Tile& at_tile(const Position& at) {
-    if (recent_ == nullptr || recent_index_ != at.tile) {
-      recent_ = &tiles_[at.tile];
-      recent_index_ = at.tile;
+  // Calls `visit(block)` for the points within the range of which `is_taken(i)`.
+  template <class IsTaken, class Visitor>
+  void for_each_block(PointsView points, const Pose& T_world_sensor, IsTaken&& is_taken,
+                      Visitor&& visit) const {
+    const auto range = static_cast<float>(config_.place_range);
+    Block block;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (!is_taken(i)) continue;
+      const float x = points.x[i], y = points.y[i];
+      if (x * x + y * y > range * range) continue;
+      block.points[block.count] = i;
+      block.at[block.count++] = position_of(
+          T_world_sensor * Eigen::Vector3d(static_cast<double>(x), static_cast<double>(y),
+                                           static_cast<double>(points.z[i])));
+      if (block.count < kBlock) continue;
+      visit(block);
+      block.count = 0;
+    }
+    visit(block);
+  }
+
+  // Adds a point of a scan. `range`: m.
+  void add_point(Place& place, const Position& at, float range, bool is_removed,
+                 std::uint32_t scan) const {
+    place.first.add(is_removed, epoch_, scan);
+    if (!is_removed) place.present.add(scan);
+    place.farthest = std::max(place.farthest, whole_metres(range));
+    const auto bit = static_cast<std::uint8_t>(1U << at.octant);
+    if ((place.filled & bit) != 0) return;
+    place.filled = static_cast<std::uint8_t>(place.filled | bit);
+    place.samples[at.octant] = at.within;
+  }
+
+  Tile& at_tile(const TileIndex& index) {
+    if (recent_ == nullptr || recent_index_ != index) {
+      recent_ = &tiles_[index];
+      recent_index_ = index;
     }
     return *recent_;
   }
 
-  const Place* find(const TileIndex& tile, VoxelKey key) const {
-    const auto found = tiles_.find(tile);
-    if (found == tiles_.end()) return nullptr;
-    const std::uint32_t number = found->second.numbers.find(key);
-    return number == kNone ? nullptr : &found->second.places[number];
+  // Number of the place with a key in its tile, which is new or not.
+  static std::uint32_t number_of(Tile& tile, VoxelKey key) {
+    const std::uint32_t number = tile.numbers.insert(key);
+    if (number == tile.places.size()) {
+      tile.places.emplace_back();
+      tile.keys.push_back(key);
+    }
+    return number;
+  }
+
+  // Null: there is no such tile.
+  const Tile* find_tile(const TileIndex& index) const {
+    const auto found = tiles_.find(index);
+    return found == tiles_.end() ? nullptr : &found->second;
   }
 
   void begin_reference(std::uint32_t scan, double time, const Eigen::Vector3d& sensor) {

@@ -158,7 +158,7 @@ class SessionReferences {
     latest_ = T_world_sensor.translation();
     reference_.scan = scan;
     reference_.T_world_beams = T_world_sensor;
-    reference_.image.build(grid_, ground_, objects_, moving_,
+    reference_.image.build(grid_, ground(), objects(), {moving_.data(), object_count_},
                            static_cast<float>(FreeSpaceConfig().lateral_margin), scratch_);
     forget_moving(reference_.image);
     return &reference_;
@@ -186,28 +186,28 @@ class SessionReferences {
       to.y[at] = points.y[i];
       to.z[at] = points.z[i];
     };
-    ground_.resize(points.size());
-    objects_.resize(points.size());
-    moving_.resize(points.size());
-    std::size_t ground = 0, objects = 0;
+    ground_.grow(points.size());
+    objects_.grow(points.size());
+    detail::grow(moving_, points.size());
+    ground_count_ = object_count_ = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (verdicts[i] == PointLabel::kInvalid) continue;
       if (verdicts[i] == PointLabel::kGround) {
-        put(ground_, ground++, i);
+        put(ground_, ground_count_++, i);
         continue;
       }
-      moving_[objects] = verdicts[i] == PointLabel::kDynamic ? 1 : 0;
-      put(objects_, objects++, i);
+      moving_[object_count_] = verdicts[i] == PointLabel::kDynamic ? 1 : 0;
+      put(objects_, object_count_++, i);
     }
-    ground_.resize(ground);
-    objects_.resize(objects);
-    moving_.resize(objects);
   }
 
+  PointsView ground() const { return PointsView(ground_).subview(0, ground_count_); }
+  PointsView objects() const { return PointsView(objects_).subview(0, object_count_); }
+
   bool choose_grid() {
-    PointBuffer all = objects_;
-    for (std::size_t i = 0; i < ground_.size(); ++i) {
-      all.push_back(ground_.x[i], ground_.y[i], ground_.z[i]);
+    PointBuffer all;
+    for (const PointsView& part : {objects(), ground()}) {
+      for (std::size_t i = 0; i < part.size(); ++i) all.push_back(part.x[i], part.y[i], part.z[i]);
     }
     const SensorModel sensor = estimate_sensor_model(all);
     if (!sensor.known()) return false;
@@ -218,8 +218,9 @@ class SessionReferences {
   SessionReferencesConfig config_;
   RangeImageGrid grid_;
   std::optional<Eigen::Vector3d> latest_;  // m, position of the sensor, world frame
-  PointBuffer ground_, objects_;
+  PointBuffer ground_, objects_;           // with room for more
   std::vector<std::uint8_t> moving_;
+  std::size_t ground_count_ = 0, object_count_ = 0;
   RangeImage::Scratch scratch_;
   SessionReference reference_;
 };

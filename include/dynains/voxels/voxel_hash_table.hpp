@@ -97,6 +97,9 @@ class VoxelHashTable {
   /// empty.
   const Slot& first_slot(std::uint32_t hash) const { return slots_[first_of(hash)]; }
 
+  /// Fetches the memory where a search for a key begins.
+  void prefetch(const Key& key) const { __builtin_prefetch(&slots_[first_of(voxel_hash(key))]); }
+
   /// Reserves memory for `count` keys in total.
   void reserve(std::size_t count) {
     while (2 * count > slots_.size()) grow();
