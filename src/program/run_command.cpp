@@ -164,7 +164,8 @@ void add_run_command(CLI::App& app) {
   command
       .add_option("--passes", options->passes,
                   "2: after the last scan, scans of the whole recording remove what came or went "
-                  "at any time, and bring back what stands [1]")
+                  "at any time, and bring back what stands; 1: the verdicts of the stream [2; 1 "
+                  "with --decision window or --revise-map true]")
       ->check(CLI::Range(1, 2))
       ->type_name("1|2");
   command
@@ -173,7 +174,7 @@ void add_run_command(CLI::App& app) {
           [options](const std::string& value) {
             options->static_policy = value == "last" ? StaticPolicy::kLast : StaticPolicy::kAlways;
           },
-          "with --passes 2: what never came or went, or what stands at last, as a car that has "
+          "with two passes: what never came or went, or what stands at last, as a car that has "
           "parked [always]")
       ->check(CLI::IsMember({"always", "last"}))
       ->type_name("always|last");

@@ -106,8 +106,12 @@ const std::array<RunSetting, 28> kRunSettings{{
      [](RunArguments& run, const py::handle& value) {
        if (!value.is_none()) run.settings.align_start = value.cast<std::string>();
      }},
-    {"passes", "1 or 2", "2: scans of the whole recording revise what the first pass says",
-     [](RunArguments& run, const py::handle& value) { run.settings.passes = value.cast<int>(); }},
+    {"passes", "1 or 2",
+     "2: scans of the whole recording revise what the first pass says; default: 2, and 1 with "
+     "decision window or revise_map",
+     [](RunArguments& run, const py::handle& value) {
+       if (!value.is_none()) run.settings.passes = value.cast<int>();
+     }},
     {"static", "'always' or 'last'",
      "of two passes: what never came or went, or what stands at last",
      [](RunArguments& run, const py::handle& value) {

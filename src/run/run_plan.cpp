@@ -90,13 +90,14 @@ DynaInsRemover::Config config_of(const RunSettings& settings) {
 
 /// Throws ConfigError.
 void check_passes(const RunSettings& settings) {
-  if (settings.passes < 1 || settings.passes > 2) {
-    throw ConfigError("--passes " + std::to_string(settings.passes) + ": expected 1 or 2");
+  const int passes = passes_of(settings);
+  if (passes < 1 || passes > 2) {
+    throw ConfigError("--passes " + std::to_string(passes) + ": expected 1 or 2");
   }
-  if (settings.passes == 1 && settings.static_policy != StaticPolicy::kAlways) {
+  if (passes == 1 && settings.static_policy != StaticPolicy::kAlways) {
     throw ConfigError("--static last needs --passes 2: one pass does not know what stands at last");
   }
-  if (settings.passes > 1 && settings.config.revision.revise_map) {
+  if (passes > 1 && settings.config.revision.revise_map) {
     throw ConfigError("--revise-map true changes the map of one pass; --passes 2 finds more");
   }
 }
@@ -119,7 +120,7 @@ RunOutputs outputs_of(const RunSettings& settings) {
   add_map_attributes(settings, config, outputs);
   check_passes(settings);
   // The second pass reads the beliefs of the first one.
-  if (settings.passes > 1 && outputs.needs_beliefs()) outputs.write_beliefs = true;
+  if (passes_of(settings) > 1 && outputs.needs_beliefs()) outputs.write_beliefs = true;
   return outputs;
 }
 
@@ -269,7 +270,7 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
     request["session"] = session.info.name;
     if (session.T_city_start) request["align_start"] = extrinsic_text(*session.T_city_start);
   }
-  if (settings.passes > 1) request["passes"] = settings.passes;
+  request["passes"] = passes_of(settings);
   if (!outputs.log.empty()) {
     request["write_log"] = outputs.log.string();
     request["mark"] = outputs.mark_log;
@@ -287,7 +288,7 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
           configuration,
           std::move(request),
           std::move(session),
-          settings.passes,
+          passes_of(settings),
           settings.static_policy};
 }
 

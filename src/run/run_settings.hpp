@@ -8,6 +8,7 @@
 #include <string>
 
 #include "dynains/compiled_remover.hpp"
+#include "dynains/config.hpp"
 #include "labelled_sequence.hpp"
 #include "static_policy.hpp"
 
@@ -25,7 +26,8 @@ struct RunSettings {
   bool map_attributes = false;
   std::string crs;  ///< of a LAS map, for example "EPSG:25832"; empty: none
   ScanWindow window;
-  int passes = 1;  ///< 2: scans of the whole recording revise the first verdicts
+  /// 2: scans of the whole recording revise the first verdicts. None: see passes_of().
+  std::optional<int> passes;
   StaticPolicy static_policy = StaticPolicy::kAlways;  ///< of two passes
   bool one_thread = false;                             ///< works, reads and writes in one thread
   bool write_online = false;
@@ -53,5 +55,13 @@ struct RunSettings {
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
   nlohmann::ordered_json recording_flags;  ///< flag -> value, those that describe the files
 };
+
+/// Passes over the recording: as set, else two. One if the run decides by the window, which is what
+/// the paper does, or revises its map in the stream.
+inline int passes_of(const RunSettings& settings) {
+  const bool is_stream =
+      settings.config.decision == Decision::kWindow || settings.config.revision.revise_map;
+  return settings.passes.value_or(is_stream ? 1 : 2);
+}
 
 }  // namespace dynains::program
