@@ -205,7 +205,7 @@ std::vector<std::string> City::check() const {
       if (references.entries().size() != session.references) {
         fail(file, "/references: expected " + std::to_string(references.entries().size()));
       }
-      SessionReference reference;
+      RecordingReference reference;
       for (const auto& entry : references.entries()) {
         note([&] { references.read(entry, reference); });
       }

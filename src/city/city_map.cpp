@@ -140,7 +140,7 @@ std::vector<bool> CityMap::free_before(const TileIndex& tile,
 
 void CityMap::revise(TileHistory& history, const TileIndex& tile, std::size_t session) const {
   ReferenceTest test{FreeSpaceConfig()};
-  SessionReference reference;
+  RecordingReference reference;
   const Eigen::Vector3d corner = tile_corner(city_.grid(), tile);
   const Eigen::Vector3d middle =
       corner + Eigen::Vector3d(0.5 * city_.grid().tile, 0.5 * city_.grid().tile, 0.0);

@@ -146,7 +146,7 @@ std::string reference_header(const RangeImageGrid& grid) {
   return bytes;
 }
 
-Span<const char> reference_record(const SessionReference& reference, std::vector<char>& buffer) {
+Span<const char> reference_record(const RecordingReference& reference, std::vector<char>& buffer) {
   detail::grow(buffer, kRecordHeaderBytes + most_packed_bytes(reference.image.grid()) + 8);
   char* const image = buffer.data() + kRecordHeaderBytes;
   auto* const packed = reinterpret_cast<std::uint8_t*>(image);
@@ -209,7 +209,7 @@ SessionReferenceReader::SessionReferenceReader(const City& city, const SessionIn
   }
 }
 
-void SessionReferenceReader::read(const Entry& entry, SessionReference& reference) const {
+void SessionReferenceReader::read(const Entry& entry, RecordingReference& reference) const {
   using namespace session_files;
   ByteReader file(path_);
   file.skip(entry.offset, "a reference");

@@ -29,7 +29,7 @@
 
 #include "dynains/city/city.hpp"
 #include "dynains/city/session_points.hpp"
-#include "dynains/city/session_references.hpp"
+#include "dynains/recording/references.hpp"
 
 namespace dynains::session_files {
 
@@ -54,6 +54,6 @@ std::vector<SessionPoint> read_tile(const std::filesystem::path& path, const Ses
 inline constexpr std::uint64_t kReferenceHeaderBytes = 48;
 std::string reference_header(const RangeImageGrid& grid);
 /// The bytes of a record, held by `buffer`, whose memory is used again.
-Span<const char> reference_record(const SessionReference& reference, std::vector<char>& buffer);
+Span<const char> reference_record(const RecordingReference& reference, std::vector<char>& buffer);
 
 }  // namespace dynains::session_files

@@ -97,7 +97,7 @@ class SessionWriter::Files {
   Files(const Files&) = delete;
   Files& operator=(const Files&) = delete;
 
-  void add_reference(const RangeImageGrid& grid, const SessionReference& reference) {
+  void add_reference(const RangeImageGrid& grid, const RecordingReference& reference) {
     if (!has_header_) {
       const std::string header = session_files::reference_header(grid);
       references_.write(header);
@@ -147,7 +147,7 @@ class SessionWriter::Files {
 
 SessionWriter::SessionWriter(const City& city, SessionInfo session,
                              const SessionPointsConfig& points,
-                             const SessionReferencesConfig& references, Mode mode)
+                             const RecordingReferencesConfig& references, Mode mode)
     : city_(city),
       session_(std::move(session)),
       mode_(mode),
@@ -185,7 +185,8 @@ void SessionWriter::add(PointsView points, Span<const PointLabel> verdicts,
                         write_tile(tile, of_tile);
                         released_.insert(tile);
                       });
-  const SessionReference* const reference = references_.add(points, verdicts, T_world_sensor, scan);
+  const RecordingReference* const reference =
+      references_.add(points, verdicts, T_world_sensor, scan);
   if (reference == nullptr) return;
   files_->add_reference(references_.grid(), *reference);
   ++session_.references;

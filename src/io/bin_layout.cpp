@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "dynains/errors.hpp"
+#include "dynains/median.hpp"
 #include "failure.hpp"
 #include "log/raw_file.hpp"
-#include "median.hpp"
 #include "text.hpp"
 
 namespace dynains {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "dynains/io/recording.hpp"
-#include "median.hpp"
+#include "dynains/median.hpp"
 
 namespace dynains {
 

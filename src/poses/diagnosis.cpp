@@ -13,8 +13,8 @@
 
 #include "agreement_sum.hpp"
 #include "dynains/errors.hpp"
+#include "dynains/median.hpp"
 #include "io/finite_points.hpp"
-#include "io/median.hpp"
 #include "io/text.hpp"
 #include "landmarks.hpp"
 #include "pose_diagnosis.hpp"

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <numeric>
 
-#include "io/median.hpp"
+#include "dynains/median.hpp"
 
 namespace dynains {
 namespace {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "dynains/io/extrinsic.hpp"
-#include "io/median.hpp"
+#include "dynains/median.hpp"
 #include "lost_scans.hpp"
 #include "merged_scans.hpp"
 #include "pose_fit.hpp"

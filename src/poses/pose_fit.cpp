@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "cell_surfaces.hpp"
+#include "dynains/median.hpp"
 #include "io/finite_points.hpp"
-#include "io/median.hpp"
 #include "landmarks.hpp"
 #include "scan_registration.hpp"
 #include "way_search.hpp"

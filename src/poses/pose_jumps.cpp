@@ -7,9 +7,9 @@
 #include <optional>
 #include <sstream>
 
+#include "dynains/median.hpp"
 #include "dynains/pose.hpp"
 #include "io/finite_points.hpp"
-#include "io/median.hpp"
 #include "io/text.hpp"
 #include "scan_registration.hpp"
 

@@ -6,6 +6,7 @@
 
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_bytes.hpp"
+#include "dynains/recording/instance_numbers.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "labelled_sequence.hpp"
 #include "output_folder.hpp"
@@ -50,8 +51,7 @@ void fill_mos_labels(const ScanVerdict& verdict, std::vector<std::uint32_t>& lab
 }  // namespace
 
 std::uint32_t mos_label(PointLabel label, std::uint32_t instance) {
-  const std::uint32_t id = instance == kNoInstance ? 0 : (instance - 1) % kMostIds + 1;
-  return mos_class(label) | id << 16;
+  return mos_class(label) | short_instance(instance) << 16U;
 }
 
 LabelFiles::LabelFiles(std::filesystem::path labels, std::filesystem::path causes,

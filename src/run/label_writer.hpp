@@ -10,9 +10,9 @@
 
 #include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
+#include "dynains/recording/verdict_arrays.hpp"
 #include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
-#include "verdict_arrays.hpp"
 
 namespace dynains::program {
 

@@ -11,6 +11,7 @@
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
+#include "dynains/recording/second_pass.hpp"
 #include "estimate_poses.hpp"
 #include "interrupt.hpp"
 #include "log_output.hpp"
@@ -20,7 +21,7 @@
 #include "run_plan.hpp"
 #include "run_request.hpp"
 #include "run_sequence.hpp"
-#include "second_pass.hpp"
+#include "scratch_file.hpp"
 #include "start_check.hpp"
 #include "write_view.hpp"
 
@@ -232,9 +233,13 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   outputs.folder = change.folder();
   RunResults results(plan.sequence, plan.range, outputs, outside_map.take_writer());
   if (session) results.contribute_to(*session);
+  std::optional<ScratchFile> store;
   std::optional<SecondPass> second_pass;
   if (plan.passes > 1) {
-    results.wait_for(second_pass.emplace(outputs.folder, plan.static_policy, plan.outputs.thread));
+    SecondPassConfig config;
+    config.static_policy = plan.static_policy;
+    config.threads = outputs.thread == std::launch::async ? 2 : 1;
+    results.wait_for(second_pass.emplace(store.emplace(outputs.folder), config));
   }
   const RunTiming timing = process(plan, listener, outputs.folder, results);
   RunOutcome outcome = outcome_of(plan, results, timing);

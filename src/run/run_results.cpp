@@ -5,11 +5,11 @@
 
 #include "dynains/io/coordinate_system.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/recording/second_pass.hpp"
 #include "moving_points.hpp"
 #include "output_folder.hpp"
 #include "points_of.hpp"
 #include "read_ahead.hpp"
-#include "second_pass.hpp"
 #include "viewer/tileset_writer.hpp"
 
 namespace dynains::program {
@@ -190,7 +190,8 @@ void RunResults::write_final(const RecordedScan& scan, const ScanVerdict& verdic
   final_labels_.take(verdict);
   final_labels_.write(recording_.name(range_.first + verdict.scan));
   if (second_pass_ != nullptr) {
-    second_pass_->add(scan, verdict);
+    copy_points(scan, judged_.points);
+    second_pass_->add(judged_.points, verdict);
   } else {
     complete_scan(scan, verdict);
   }
@@ -204,8 +205,9 @@ void RunResults::revise(const AddToMap& add_to_map) {
     const std::size_t index = range_.first + i;
     const Pose T_world_sensor = orthonormalized(recording_.T_world_sensor(index));
     judged.scan = reader.next(std::move(judged.scan));
+    copy_points(judged.scan, judged.points);
     final_labels_.read(recording_.name(index), judged.scan, judged.arrays);
-    const bool is_revised = second_pass_->revise(judged.scan, static_cast<std::uint32_t>(i),
+    const bool is_revised = second_pass_->revise(judged.points, static_cast<std::uint32_t>(i),
                                                  T_world_sensor, judged.arrays);
     finish();
     std::swap(judged_, judged);
@@ -227,12 +229,11 @@ void RunResults::write_revised(bool is_revised, const AddToMap& add_to_map) {
   }
   complete_scan(judged_.scan, verdict);
   if (!map_) return;
-  copy_points(judged_.scan, points_of_scan_);
-  keep_.resize(points_of_scan_.size());
+  keep_.resize(judged_.points.size());
   std::transform(verdict.labels.begin(), verdict.labels.end(), keep_.begin(), [](PointLabel label) {
     return static_cast<std::uint8_t>(is_static(label) ? 1 : 0);
   });
-  add_to_map(points_of_scan_, keep_, verdict.T_world_sensor);
+  add_to_map(judged_.points, keep_, verdict.T_world_sensor);
 }
 
 bool RunResults::is_complete() const {

@@ -16,6 +16,7 @@
 #include "clean_writer.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
+#include "dynains/recording/verdict_arrays.hpp"
 #include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
 #include "label_counts.hpp"
@@ -25,12 +26,13 @@
 #include "overview.hpp"
 #include "scan_range.hpp"
 #include "session_contribution.hpp"
-#include "verdict_arrays.hpp"
 #include "verdict_log.hpp"
 
-namespace dynains::program {
-
+namespace dynains {
 class SecondPass;
+}
+
+namespace dynains::program {
 
 /// In the folder of results, while a run with --map-memory lasts.
 inline constexpr const char* kTileFolder = "map_tiles";
@@ -85,6 +87,7 @@ PointColumns moving_columns(const Recording& recording, const ScanRange& range);
 /// A scan and a copy of its final verdict.
 struct JudgedScan {
   RecordedScan scan;
+  PointBuffer points;  ///< of the scan, for a second pass
   VerdictArrays arrays;
   ScanVerdict verdict;  ///< with these arrays
 
@@ -159,7 +162,6 @@ class RunResults {
   LabelCounts labels_;
   // These belong to the writing thread until writing_.wait().
   JudgedScan judged_;
-  PointBuffer points_of_scan_;
   std::vector<std::uint8_t> keep_;
   Background writing_;
 

@@ -9,8 +9,8 @@
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/config.hpp"
+#include "dynains/recording/static_policy.hpp"
 #include "labelled_sequence.hpp"
-#include "static_policy.hpp"
 
 namespace dynains::program {
 

@@ -27,7 +27,7 @@ int open_without_name(const std::filesystem::path& folder) {
 
 ScratchFile::ScratchFile(const std::filesystem::path& folder)
     : folder_(folder), file_(open_without_name(folder)) {
-  if (file_ < 0) fail_by_system(folder_, "cannot hold the references of the second pass", errno);
+  if (file_ < 0) fail_by_system(folder_, "cannot hold what the second pass puts there", errno);
 }
 
 ScratchFile::~ScratchFile() {
@@ -40,7 +40,7 @@ std::uint64_t ScratchFile::append(Span<const std::uint8_t> bytes) {
     const ssize_t written = ::write(file_, bytes.data() + done, bytes.size() - done);
     if (written < 0 && errno == EINTR) continue;
     if (written <= 0) {
-      fail_by_system(folder_, "cannot hold the references of the second pass",
+      fail_by_system(folder_, "cannot hold what the second pass puts there",
                      written < 0 ? errno : ENOSPC);
     }
     done += static_cast<std::size_t>(written);
@@ -57,7 +57,7 @@ void ScratchFile::read(std::uint64_t offset, std::size_t size,
         ::pread(file_, bytes.data() + done, size - done, static_cast<off_t>(offset + done));
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) {
-      fail_by_system(folder_, "references of the second pass cannot be read",
+      fail_by_system(folder_, "what the second pass has put there cannot be read",
                      got < 0 ? errno : EIO);
     }
     done += static_cast<std::size_t>(got);

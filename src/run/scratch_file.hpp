@@ -7,23 +7,21 @@
 #include <vector>
 
 #include "dynains/points.hpp"
+#include "dynains/recording/byte_store.hpp"
 
 namespace dynains::program {
 
 /// A file that no folder lists: it ends with this object or with the process, however that ends.
 /// Errors throw IoError and name the folder.
-class ScratchFile {
+class ScratchFile : public ByteStore {
  public:
   /// Makes the file on the file system of `folder`.
   explicit ScratchFile(const std::filesystem::path& folder);
-  ~ScratchFile();
-  ScratchFile(const ScratchFile&) = delete;
-  ScratchFile& operator=(const ScratchFile&) = delete;
+  ~ScratchFile() override;
 
-  /// Adds bytes to the end. Returns their offset.
-  std::uint64_t append(Span<const std::uint8_t> bytes);
-  /// Reads `size` bytes at `offset` into `bytes`.
-  void read(std::uint64_t offset, std::size_t size, std::vector<std::uint8_t>& bytes) const;
+  std::uint64_t append(Span<const std::uint8_t> bytes) override;
+  void read(std::uint64_t offset, std::size_t size,
+            std::vector<std::uint8_t>& bytes) const override;
 
  private:
   std::filesystem::path folder_;

@@ -550,9 +550,9 @@ TEST_CASE("a city: a session that is not committed changes nothing") {
 }
 
 TEST_CASE("references of a session: coded images are the images") {
-  SessionReferences recorder{SessionReferencesConfig()};
+  RecordingReferences recorder{RecordingReferencesConfig()};
   const test::BoxScan scan = test::scan_boxes({kParkedCar}, 0.0, 0.0);
-  const SessionReference* const reference =
+  const RecordingReference* const reference =
       recorder.add(scan.points, scan.verdicts, scan.T_world_sensor, 0);
   REQUIRE(reference != nullptr);
   const RangeImageGrid& grid = recorder.grid();

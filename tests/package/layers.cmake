@@ -2,11 +2,11 @@
 # of the list below form a layer. A header may include headers of its own folder and of the layers
 # that precede its own in the list.
 set(layers
-  "^((simd|threads)/.*|errors|points|pose|parameters|plausibility|verdict|point_cloud_traits|version)\\.hpp$"
+  "^((simd|threads)/.*|errors|median|points|pose|parameters|plausibility|verdict|point_cloud_traits|version)\\.hpp$"
   "^(sensor|voxels)/"
   "^(ground|clusters|belief)/"
   "^(descriptors|evidence)/"
-  "^map/"
+  "^(map|recording)/"
   "^config\\.hpp$"
   "^pipeline/"
   "^(compiled_remover|dyna_ins_remover)\\.hpp$"

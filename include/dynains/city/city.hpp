@@ -11,7 +11,7 @@
 
 #include "dynains/city/session_alignment.hpp"
 #include "dynains/city/session_points.hpp"
-#include "dynains/city/session_references.hpp"
+#include "dynains/recording/references.hpp"
 
 namespace dynains {
 
@@ -85,7 +85,7 @@ class SessionReferenceReader {
   /// All references, in the order of their scans.
   const std::vector<Entry>& entries() const { return entries_; }
   /// Reads one reference into `reference`, whose memory is used again.
-  void read(const Entry& entry, SessionReference& reference) const;
+  void read(const Entry& entry, RecordingReference& reference) const;
 
  private:
   std::filesystem::path path_;

@@ -12,7 +12,7 @@
 
 #include "dynains/city/city.hpp"
 #include "dynains/city/session_points.hpp"
-#include "dynains/city/session_references.hpp"
+#include "dynains/recording/references.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 
@@ -34,7 +34,7 @@ class SessionWriter {
   /// ConfigError for an invalid name or config, UsageError if the city has a session of this name
   /// or of this fingerprint, IoError if the city is not writable.
   SessionWriter(const City& city, SessionInfo session, const SessionPointsConfig& points = {},
-                const SessionReferencesConfig& references = {}, Mode mode = Mode::kNew);
+                const RecordingReferencesConfig& references = {}, Mode mode = Mode::kNew);
   SessionWriter(const City& city, SessionInfo session, Mode mode)
       : SessionWriter(city, std::move(session), {}, {}, mode) {}
   ~SessionWriter();
@@ -68,7 +68,7 @@ class SessionWriter {
   SessionInfo session_;
   Mode mode_;
   SessionPoints points_;
-  SessionReferences references_;
+  RecordingReferences references_;
   std::set<TileIndex> released_;  // tiles on the disk only
   std::unique_ptr<Files> files_;
   bool is_prepared_ = false;

@@ -1,14 +1,14 @@
-#include "second_pass.hpp"
+#include "dynains/recording/second_pass.hpp"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 
 #include "dynains/errors.hpp"
+#include "dynains/median.hpp"
 #include "dynains/threads/background.hpp"
-#include "io/median.hpp"
-#include "points_of.hpp"
 
-namespace dynains::program {
+namespace dynains {
 namespace {
 
 constexpr float kChangedRatio = 0.25F;       // of the known points of an instance that leaves
@@ -18,6 +18,20 @@ constexpr float kLargeChangedRatio = 0.5F;   // of a larger instance
 constexpr std::uint32_t kIndependent = 30;   // scans, which the first pass looks ahead
 constexpr float kBelief = 0.95F;             // of points that the second pass removes
 constexpr float kRestoredBelief = 0.5F;      // of objects that it brings back
+constexpr double kPlaceShare = 0.75;         // of the memory; the rest is for the ground
+
+RecordingPlacesConfig places_config(const SecondPassConfig& config) {
+  RecordingPlacesConfig result;
+  result.place_memory = kPlaceShare * config.memory;
+  return result;
+}
+
+void check_sizes(PointsView points, std::size_t labels, std::size_t causes, std::size_t instances) {
+  if (labels == points.size() && causes == points.size() && instances == points.size()) return;
+  throw UsageError("SecondPass: a verdict of " + std::to_string(labels) + " labels, " +
+                   std::to_string(causes) + " causes and " + std::to_string(instances) +
+                   " instances on " + std::to_string(points.size()) + " points");
+}
 
 }  // namespace
 
@@ -36,36 +50,40 @@ bool SecondPass::Share::leave(float ratio) const {
          has(low_changed, kLowChangedRatio, low_changed + low_stays);
 }
 
-SecondPass::SecondPass(const std::filesystem::path& folder, StaticPolicy policy, std::launch thread)
-    : policy_(policy),
-      thread_(thread),
-      places_(RecordingPlacesConfig()),
-      references_(SessionReferencesConfig{1.0, 5}),
-      file_(folder) {}
+SecondPass::SecondPass(ByteStore& store, const SecondPassConfig& config)
+    : config_((config.validate(), config)),
+      store_(store),
+      places_(places_config(config), store),
+      ground_(store, static_cast<std::size_t>(1e6 * (1.0 - kPlaceShare) * config.memory)),
+      references_(RecordingReferencesConfig{1.0, 5}) {}
 
-void SecondPass::add(const RecordedScan& scan, const ScanVerdict& verdict) {
-  copy_points(scan, points_);
-  places_.add(points_, verdict.labels, verdict.causes, verdict.T_world_sensor, verdict.time,
-              static_cast<std::uint32_t>(verdict.scan));
-  chains_.add(points_, verdict.labels, verdict.instances, verdict.T_world_sensor);
-  ground_.add(points_, verdict.labels, verdict.T_world_sensor);
+void SecondPass::add(PointsView points, const ScanVerdict& verdict) {
   const auto number = static_cast<std::uint32_t>(verdict.scan);
-  newest_ = number;
-  const SessionReference* const reference =
-      references_.add(points_, verdict.labels, verdict.T_world_sensor, number);
+  if (verdict.scan != scans_ || is_decided_) {
+    throw UsageError(
+        "SecondPass::add: scan " + std::to_string(verdict.scan) +
+        (is_decided_ ? " comes after test()" : ", expected scan " + std::to_string(scans_)));
+  }
+  check_sizes(points, verdict.labels.size(), verdict.causes.size(), verdict.instances.size());
+  places_.add(points, verdict.labels, verdict.causes, verdict.T_world_sensor, verdict.time, number);
+  chains_.add(points, verdict.labels, verdict.instances, verdict.T_world_sensor);
+  ground_.add(points, verdict.labels, verdict.T_world_sensor);
+  ++scans_;
+  const RecordingReference* const reference =
+      references_.add(points, verdict.labels, verdict.T_world_sensor, number);
   if (reference == nullptr) return;
   packed_.resize(most_packed_bytes(reference->image.grid()));
   const auto size =
       static_cast<std::size_t>(pack_image(reference->image, packed_.data()) - packed_.data());
-  const std::uint64_t offset = file_.append({packed_.data(), size});
+  const std::uint64_t offset = store_.append({packed_.data(), size});
   kept_.push_back({number, verdict.time, verdict.T_world_sensor, offset, size});
 }
 
 void SecondPass::test(const std::function<bool()>& keep_going) {
   ReferenceTest test_visibility{FreeSpaceConfig()};
-  SessionReference reference, next;
+  RecordingReference reference, next;
   Background reader;
-  Background* const other = thread_ == std::launch::async ? &reader : nullptr;
+  Background* const other = config_.threads > 1 ? &reader : nullptr;
   if (!kept_.empty()) read(kept_.front(), next);
   for (std::size_t i = 0; i < kept_.size(); ++i) {
     if (!keep_going()) return;
@@ -88,12 +106,12 @@ void SecondPass::test(const std::function<bool()>& keep_going) {
   is_decided_ = true;
 }
 
-void SecondPass::read(const Reference& kept, SessionReference& reference) {
-  file_.read(kept.offset, kept.size, packed_);
+void SecondPass::read(const Reference& kept, RecordingReference& reference) {
+  store_.read(kept.offset, kept.size, packed_);
   reference.scan = kept.scan;
   reference.T_world_beams = kept.T_world_sensor;
   if (!unpack_image(references_.grid(), packed_, reference.image)) {
-    throw IoError("a reference of the second pass was damaged on the disk");
+    throw IoError("a reference of the second pass was damaged in its store");
   }
 }
 
@@ -112,9 +130,10 @@ void SecondPass::list_objects() {
   });
 }
 
-bool SecondPass::revise(const RecordedScan& scan, std::uint32_t number, const Pose& T_world_sensor,
+bool SecondPass::revise(PointsView points, std::uint32_t number, const Pose& T_world_sensor,
                         VerdictArrays& verdict) {
-  copy_points(scan, points_);
+  check_sizes(points, verdict.labels.size(), verdict.causes.size(), verdict.instances.size());
+  points_ = points;
   place_of_.assign(points_.size(), nullptr);
   is_restored_.assign(points_.size(), 0);
   if (!is_decided_) return false;
@@ -135,12 +154,13 @@ bool SecondPass::revise(const RecordedScan& scan, std::uint32_t number, const Po
 
 // Whether what scan `number` measured in a place is no part of the static map.
 bool SecondPass::has_changed(const Place& place, std::uint32_t number) const {
-  const bool stays = policy_ == StaticPolicy::kLast && place.stands_since(number);
+  const bool stays = config_.static_policy == StaticPolicy::kLast && place.stands_since(number);
   return place.state == PlaceState::kChanged && !stays;
 }
 
 bool SecondPass::stands(const Place& place, std::uint32_t number) const {
-  const bool has_come = policy_ == StaticPolicy::kLast && place.state == PlaceState::kChanged;
+  const bool has_come =
+      config_.static_policy == StaticPolicy::kLast && place.state == PlaceState::kChanged;
   return place.stands() || (has_come && place.stands_since(number));
 }
 
@@ -248,15 +268,17 @@ ScanSpan SecondPass::absence(std::uint32_t number, const Seen* begin, const Seen
   }
   if (firsts.empty()) return {};
   const ScanSpan span = {median(std::move(firsts)), median(std::move(lasts))};
+  const std::uint32_t newest = scans_ - 1;
   // The first pass has compared scans that are closer in time.
-  const std::uint32_t scans = std::min(span.last, newest_) - std::min(span.first, newest_);
+  const std::uint32_t scans = std::min(span.last, newest) - std::min(span.first, newest);
   return scans >= kIndependent ? span : ScanSpan();
 }
 
 void SecondPass::judge(std::uint32_t number, const Seen* begin, const Seen* end) {
   Instance& instance = instances_[begin->instance];
   const InstanceChains::Move* const move = chains_.move_of(number, numbers_.ids()[begin->instance]);
-  instance.moved = move != nullptr && (move->is_later || policy_ == StaticPolicy::kAlways);
+  instance.moved =
+      move != nullptr && (move->is_later || config_.static_policy == StaticPolicy::kAlways);
   const ScanSpan span = instance.moved ? move->elsewhere : absence(number, begin, end);
   for (const Seen* seen = begin; seen != end; ++seen) {
     const bool is_gone = has_changed(*seen->place, number);
@@ -273,4 +295,4 @@ void SecondPass::judge(std::uint32_t number, const Seen* begin, const Seen* end)
   }
 }
 
-}  // namespace dynains::program
+}  // namespace dynains

@@ -1,5 +1,5 @@
 // Instances that the first pass saw move and stand.
-#include "run/instance_chains.hpp"
+#include "dynains/recording/instance_chains.hpp"
 
 #include <cstdint>
 #include <vector>
@@ -7,7 +7,6 @@
 #include "support/catch.hpp"
 
 using namespace dynains;
-using namespace dynains::program;
 
 namespace {
 

@@ -1,9 +1,9 @@
-#include "restored_ground.hpp"
+#include "dynains/recording/restored_ground.hpp"
 
 #include <cmath>
 #include <cstdint>
 
-namespace dynains::program {
+namespace dynains {
 namespace {
 
 constexpr double kMostRise = 0.01;                    // m, of ground
@@ -23,6 +23,7 @@ void RestoredGround::find_removed(PointsView points, const Pose& T_world_sensor,
                                   const VerdictArrays& verdict) {
   removed_.clear();
   feet_.clear();
+  ground_.free_far(T_world_sensor.translation());
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (verdict.labels[i] != PointLabel::kDynamic) continue;
     const Eigen::Vector3d at = T_world_sensor * Eigen::Vector3d(static_cast<double>(points.x[i]),
@@ -59,4 +60,4 @@ std::size_t RestoredGround::restore(PointsView points, const Pose& T_world_senso
   return count;
 }
 
-}  // namespace dynains::program
+}  // namespace dynains

@@ -1,5 +1,5 @@
 // The second pass of a run over first verdicts.
-#include "run/second_pass.hpp"
+#include "dynains/recording/second_pass.hpp"
 
 #include <algorithm>
 #include <cstddef>
@@ -7,12 +7,10 @@
 #include <functional>
 #include <vector>
 
-#include "io/files.hpp"
 #include "support/box_street.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains;
-using namespace dynains::program;
 using namespace dynains::test;
 
 namespace {
@@ -37,15 +35,6 @@ struct Recorded {
   }
 };
 
-RecordedScan recorded(const BoxScan& scan) {
-  RecordedScan result;
-  for (std::size_t i = 0; i < scan.points.size(); ++i) {
-    const float values[] = {scan.points.x[i], scan.points.y[i], scan.points.z[i], 0.5F};
-    result.xyzi.insert(result.xyzi.end(), values, values + 4);
-  }
-  return result;
-}
-
 using Removes = std::function<bool(std::size_t scan, std::uint32_t label)>;
 
 bool removes_nothing(std::size_t, std::uint32_t) { return false; }
@@ -68,6 +57,12 @@ VerdictArrays first_verdict(const BoxScan& scan, std::size_t number, const Remov
   return verdict;
 }
 
+SecondPassConfig last_policy() {
+  SecondPassConfig config;
+  config.static_policy = StaticPolicy::kLast;
+  return config;
+}
+
 struct Counts {
   std::size_t kept = 0, removed = 0;
 };
@@ -75,9 +70,9 @@ struct Counts {
 /// Points of each scan with a label, after both passes.
 std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool tests = true,
                           const Removes& removes = removes_nothing,
-                          StaticPolicy policy = StaticPolicy::kAlways) {
-  const TemporaryFolder folder;
-  SecondPass pass(folder.path(), policy);
+                          const SecondPassConfig& config = {}) {
+  MemoryStore store;
+  SecondPass pass(store, config);
   for (std::size_t i = 0; i < recording.scans.size(); ++i) {
     const VerdictArrays arrays = first_verdict(recording.scans[i], i, removes);
     ScanVerdict verdict;
@@ -87,9 +82,8 @@ std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool t
     verdict.labels = arrays.labels;
     verdict.causes = arrays.causes;
     verdict.instances = arrays.instances;
-    pass.add(recorded(recording.scans[i]), verdict);
+    pass.add(recording.scans[i].points, verdict);
   }
-  CHECK(count_entries(folder.path()) == 0);  // nothing is left when the process is killed
   pass.test([tests] { return tests; });
   CHECK(pass.is_decided() == tests);
   std::vector<Counts> counts;
@@ -98,7 +92,7 @@ std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool t
   for (const BoxScan& scan : recording.scans) {
     VerdictArrays arrays = first_verdict(scan, number, removes);
     const VerdictArrays before = arrays;
-    const bool has_changed = pass.revise(recorded(scan), number++, scan.T_world_sensor, arrays);
+    const bool has_changed = pass.revise(scan.points, number++, scan.T_world_sensor, arrays);
     CHECK(has_changed == (arrays.labels != before.labels));
     counts.emplace_back();
     for (std::size_t i = 0; i < arrays.labels.size(); ++i) {
@@ -176,14 +170,13 @@ TEST_CASE("a car that parks and stays is static if what stands at last is, and s
   recording.drive(boxes, 15.0, -15.0);
   const Counts always = sum(count(recording, kCar));
   CHECK(always.removed > 9 * always.kept);
-  const Counts last = sum(count(recording, kCar, true, removes_nothing, StaticPolicy::kLast));
+  const Counts last = sum(count(recording, kCar, true, removes_nothing, last_policy()));
   CHECK(last.kept > 0);
   CHECK(last.removed == 0);
   // A car that left is in neither map.
-  const Counts left =
-      sum(count(with_parked_car(), kCar, true, removes_nothing, StaticPolicy::kLast));
+  const Counts left = sum(count(with_parked_car(), kCar, true, removes_nothing, last_policy()));
   CHECK(left.removed > 9 * left.kept);
-  CHECK(sum(count(recording, kHouse, true, removes_nothing, StaticPolicy::kLast)).removed == 0);
+  CHECK(sum(count(recording, kHouse, true, removes_nothing, last_policy())).removed == 0);
 }
 
 TEST_CASE("a second pass that was interrupted changes nothing") {
@@ -215,4 +208,48 @@ TEST_CASE("removed ground comes back") {
   };
   const Counts road = count(recording, kRoad, true, removes)[15];
   CHECK(road.kept > 3 * road.removed);
+}
+
+TEST_CASE("neither memory nor threads change the second pass") {
+  Recorded recording = with_parked_car();
+  const Counts counts = sum(count(recording, kCar));
+  CHECK(counts.removed > 0);
+  for (const double memory : {0.0, 160.0}) {
+    for (const int threads : {1, 2}) {
+      SecondPassConfig config;
+      config.memory = memory;
+      config.threads = threads;
+      const Counts others = sum(count(recording, kCar, true, removes_nothing, config));
+      CHECK(others.removed == counts.removed);
+      CHECK(others.kept == counts.kept);
+    }
+  }
+}
+
+TEST_CASE("the second pass refuses scans out of order and verdicts of another size") {
+  const BoxScan scan = scan_boxes(street(), 0.0, 0.0);
+  const VerdictArrays arrays = first_verdict(scan, 0, removes_nothing);
+  ScanVerdict verdict;
+  verdict.labels = arrays.labels;
+  verdict.causes = arrays.causes;
+  verdict.instances = arrays.instances;
+  MemoryStore store;
+  SecondPass pass(store);
+  verdict.scan = 1;
+  CHECK_THROWS_AS(pass.add(scan.points, verdict), UsageError);
+  verdict.scan = 0;
+  CHECK_THROWS_AS(pass.add(PointBuffer(), verdict), UsageError);
+  pass.add(scan.points, verdict);
+  CHECK_THROWS_AS(pass.add(scan.points, verdict), UsageError);
+  pass.test();
+  verdict.scan = 1;
+  CHECK_THROWS_AS(pass.add(scan.points, verdict), UsageError);
+  VerdictArrays short_one = arrays;
+  short_one.causes.pop_back();
+  CHECK_THROWS_AS(pass.revise(scan.points, 0, scan.T_world_sensor, short_one), UsageError);
+  VerdictArrays whole = arrays;
+  CHECK_FALSE(pass.revise(scan.points, 0, scan.T_world_sensor, whole));
+  SecondPassConfig config;
+  config.threads = 3;
+  CHECK_THROWS_AS(SecondPass(store, config), ConfigError);
 }

@@ -4,10 +4,16 @@
 #include <cstdint>
 #include <vector>
 
-namespace dynains::program {
+namespace dynains {
+
+/// An id as labels of SemanticKITTI hold it, in 16 bits: ids beyond 65535 start again at 1.
+constexpr std::uint32_t short_instance(std::uint32_t instance) {
+  constexpr std::uint32_t kMost = 65535;
+  return instance == 0 ? 0 : (instance - 1) % kMost + 1;
+}
 
 /// Numbers the instances of a scan from 0 on, in the order of their first points. Their ids grow
-/// with the recording, the numbers do not.
+/// with the recording, the numbers do not. Ids are taken as short_instance().
 class InstanceNumbers {
  public:
   static constexpr std::uint32_t kNone = UINT32_MAX;
@@ -18,7 +24,8 @@ class InstanceNumbers {
     ids_.clear();
   }
   /// Number of an instance, which is new or not.
-  std::uint32_t add(std::uint32_t id) {
+  std::uint32_t add(std::uint32_t instance) {
+    const std::uint32_t id = short_instance(instance);
     if (id >= number_.size()) number_.resize(id + 1, kNone);
     if (number_[id] == kNone) {
       number_[id] = static_cast<std::uint32_t>(ids_.size());
@@ -27,7 +34,10 @@ class InstanceNumbers {
     return number_[id];
   }
   /// Number of an instance, or kNone.
-  std::uint32_t find(std::uint32_t id) const { return id < number_.size() ? number_[id] : kNone; }
+  std::uint32_t find(std::uint32_t instance) const {
+    const std::uint32_t id = short_instance(instance);
+    return id < number_.size() ? number_[id] : kNone;
+  }
   /// By number.
   const std::vector<std::uint32_t>& ids() const { return ids_; }
 
@@ -36,4 +46,4 @@ class InstanceNumbers {
   std::vector<std::uint32_t> ids_;
 };
 
-}  // namespace dynains::program
+}  // namespace dynains

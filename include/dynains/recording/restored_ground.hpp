@@ -5,18 +5,21 @@
 #include <cstddef>
 #include <vector>
 
-#include "dynains/city/recording_ground.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/recording/ground.hpp"
+#include "dynains/recording/verdict_arrays.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
-#include "verdict_arrays.hpp"
 
-namespace dynains::program {
+namespace dynains {
 
 /// Gives removed points back to the ground if they are not above the ground of the whole recording.
 /// Points beside removed ones that rise above it stay removed: feet and tyres.
 class RestoredGround {
  public:
+  /// See RecordingGround.
+  RestoredGround(ByteStore& store, std::size_t budget) : ground_(store, budget) {}
+
   /// Takes the ground of a scan.
   void add(PointsView points, Span<const PointLabel> verdicts, const Pose& T_world_sensor) {
     ground_.add(points, verdicts, T_world_sensor);
@@ -38,4 +41,4 @@ class RestoredGround {
   VoxelHashTable<> feet_;         // columns with removed points little above the ground
 };
 
-}  // namespace dynains::program
+}  // namespace dynains

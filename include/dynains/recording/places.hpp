@@ -7,15 +7,15 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <utility>
 #include <vector>
 
 #include "dynains/belief/log_odds.hpp"
-#include "dynains/city/recording_place.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/recording/paged_tiles.hpp"
+#include "dynains/recording/place.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "dynains/verdict.hpp"
@@ -31,6 +31,7 @@ struct RecordingPlacesConfig {
   int free_looks = 4;
   int object_places = 6;
   double most_contact = 1.5;
+  double place_memory = 128;  ///< MB
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
@@ -46,6 +47,8 @@ struct RecordingPlacesConfig {
                       "places of an object that came or went, at least"});
     visitor(Parameter{"most_contact", self.most_contact, closed(0, 26), "",
                       "most places that stay and touch an object, ratio to its own places"});
+    visitor(Parameter{"place_memory", self.place_memory, closed(0, 1e6), "MB",
+                      "places in memory, if those around the sensor take less"});
   }
 
   /// Throws ConfigError.
@@ -67,7 +70,8 @@ struct RecordingPlacesConfig {
 /// - It touches such places, and its first or last two epochs removed its points, or looks from
 ///   farther away tell that it came or left.
 ///
-/// The memory is that of the places: about 150 bytes each.
+/// A place takes about 170 bytes. The result does not depend on `place_memory`: other places wait
+/// in the store.
 class RecordingPlaces {
  public:
   static constexpr double kPlace = 0.4;      // m
@@ -75,9 +79,11 @@ class RecordingPlaces {
 
   using Place = RecordingPlace;
 
-  /// Throws ConfigError.
-  explicit RecordingPlaces(const RecordingPlacesConfig& config)
-      : config_((config.validate(), config)) {}
+  /// The store outlives this, and what it throws comes out of all functions. Throws ConfigError.
+  RecordingPlaces(const RecordingPlacesConfig& config, ByteStore& store)
+      : config_((config.validate(), config)),
+        tiles_(store, kPlace * static_cast<double>(kTile),
+               static_cast<std::size_t>(1e6 * config.place_memory)) {}
 
   const RecordingPlacesConfig& config() const { return config_; }
 
@@ -94,19 +100,20 @@ class RecordingPlaces {
       std::array<Tile*, kBlock> tiles;
       std::array<std::uint32_t, kBlock> numbers;
       for (std::size_t k = 0; k < block.count; ++k) {
-        tiles[k] = &at_tile(block.at[k].tile);
+        tiles[k] = &tiles_.at(block.at[k].tile);
         tiles[k]->numbers.prefetch(block.at[k].key);
       }
       for (std::size_t k = 0; k < block.count; ++k) {
-        numbers[k] = number_of(*tiles[k], block.at[k].key);
-        __builtin_prefetch(&tiles[k]->places[numbers[k]], 1);
+        numbers[k] = tiles[k]->add(block.at[k].key);
+        __builtin_prefetch(&tiles[k]->values[numbers[k]], 1);
       }
       for (std::size_t k = 0; k < block.count; ++k) {
         const std::size_t i = block.points[k];
-        add_point(tiles[k]->places[numbers[k]], block.at[k], range_of(points, i),
+        add_point(tiles[k]->values[numbers[k]], block.at[k], range_of(points, i),
                   verdicts[i] == PointLabel::kDynamic, scan);
       }
     });
+    free_far(T_world_sensor.translation());
   }
 
   /// Tests all places around the sensor by a reference scan. `sensor`: m, world frame. `scan`: its
@@ -116,6 +123,7 @@ class RecordingPlaces {
   void test(std::uint32_t scan, double time, const Eigen::Vector3d& sensor,
             TestVisibility&& test_visibility) {
     begin_reference(scan, time, sensor);
+    free_far(sensor);
     gather(sensor);
     if (tested_.empty()) return;
     const auto& visibility = test_visibility(samples_, std::size_t{begin_.back()});
@@ -136,9 +144,10 @@ class RecordingPlaces {
   /// Ends the last look, and decides on all places and objects.
   void decide() {
     end_look();
-    for (auto& tile : tiles_) {
-      for (Place& place : tile.second.places) place.state = state_of(place);
-    }
+    tiles_.for_each_index([&](const GroundTile& index) {
+      for (Place& place : tiles_.at(index).values) place.state = state_of(place);
+      tiles_.free_far(tiles_.middle(index), 0.0);
+    });
     find_objects();
   }
 
@@ -146,15 +155,16 @@ class RecordingPlaces {
   /// sensor frame; null: no scan brought a place there.
   template <class Visitor>
   void for_each_place(PointsView points, Span<const PointLabel> verdicts,
-                      const Pose& T_world_sensor, Visitor&& visit) const {
+                      const Pose& T_world_sensor, Visitor&& visit) {
+    free_far(T_world_sensor.translation());
     const auto is_taken = [&](std::size_t i) { return is_above_ground(verdicts[i]); };
     const Tile* tile = nullptr;
-    TileIndex index = {};
+    GroundTile index = {};
     for_each_block(points, T_world_sensor, is_taken, [&](const Block& block) {
       std::array<const Tile*, kBlock> tiles;
       std::array<const Place*, kBlock> places;
       for (std::size_t k = 0; k < block.count; ++k) {
-        if (tile == nullptr || index != block.at[k].tile) tile = find_tile(block.at[k].tile);
+        if (tile == nullptr || index != block.at[k].tile) tile = tiles_.find(block.at[k].tile);
         index = block.at[k].tile;
         tiles[k] = tile;
         if (tile != nullptr) tile->numbers.prefetch(block.at[k].key);
@@ -167,11 +177,7 @@ class RecordingPlaces {
     });
   }
 
-  std::size_t size() const {
-    std::size_t size = 0;
-    for (const auto& tile : tiles_) size += tile.second.places.size();
-    return size;
-  }
+  std::size_t size() const { return tiles_.size(); }
 
   /// First and last scan of the longest row of looks that passed a place; was_passed() must be
   /// true.
@@ -191,20 +197,23 @@ class RecordingPlaces {
   }
   std::uint32_t object_count() const { return objects_; }
 
+  /// Calls `visit(middle, place)` for all places; m, world frame.
   template <class Visitor>
-  void for_each(Visitor&& visit) const {
-    for (const auto& tile : tiles_) {
-      for (std::size_t i = 0; i < tile.second.places.size(); ++i) {
-        const VoxelKey key = tile.second.keys[i];
+  void for_each(Visitor&& visit) {
+    tiles_.for_each_index([&](const GroundTile& index) {
+      const Tile& tile = *tiles_.find(index);
+      for (std::size_t i = 0; i < tile.values.size(); ++i) {
         Eigen::Vector3d middle;
         for (int axis = 0; axis < 3; ++axis) {
-          const std::int64_t corner = axis < 2 ? tile.first[static_cast<std::size_t>(axis)] : 0;
+          const std::int64_t corner = axis < 2 ? index[static_cast<std::size_t>(axis)] : 0;
           middle[axis] =
-              kPlace * (static_cast<double>(corner * kTile + voxel_index(key, axis)) + 0.5);
+              kPlace *
+              (static_cast<double>(corner * kTile + voxel_index(tile.keys[i], axis)) + 0.5);
         }
-        visit(middle, tile.second.places[i]);
+        visit(middle, tile.values[i]);
       }
-    }
+      tiles_.free_far(tiles_.middle(index), 0.0);
+    });
   }
 
  private:
@@ -212,20 +221,9 @@ class RecordingPlaces {
   static constexpr std::array<std::uint8_t, 4> kNear = {12, 20, 35, 60};  // m
   static constexpr std::size_t kAnyRange = kNear.size() - 1;
 
-  using TileIndex = std::array<std::int64_t, 2>;
-  struct Tile {
-    VoxelHashTable<> numbers;
-    std::vector<VoxelKey> keys;
-    std::vector<Place> places;
-
-    // Null: there is no such place.
-    const Place* find(VoxelKey key) const {
-      const std::uint32_t number = numbers.find(key);
-      return number == kNone ? nullptr : &places[number];
-    }
-  };
+  using Tile = PagedTiles<Place>::Tile;
   struct Position {
-    TileIndex tile;
+    GroundTile tile;
     VoxelKey key;  // of the place in the tile
     std::size_t octant;
     std::array<std::uint8_t, 3> within;
@@ -301,28 +299,9 @@ class RecordingPlaces {
     place.samples[at.octant] = at.within;
   }
 
-  Tile& at_tile(const TileIndex& index) {
-    if (recent_ == nullptr || recent_index_ != index) {
-      recent_ = &tiles_[index];
-      recent_index_ = index;
-    }
-    return *recent_;
-  }
-
-  // Number of the place with a key in its tile, which is new or not.
-  static std::uint32_t number_of(Tile& tile, VoxelKey key) {
-    const std::uint32_t number = tile.numbers.insert(key);
-    if (number == tile.places.size()) {
-      tile.places.emplace_back();
-      tile.keys.push_back(key);
-    }
-    return number;
-  }
-
-  // Null: there is no such tile.
-  const Tile* find_tile(const TileIndex& index) const {
-    const auto found = tiles_.find(index);
-    return found == tiles_.end() ? nullptr : &found->second;
+  // Places of the open look stay in memory.
+  void free_far(const Eigen::Vector3d& sensor) {
+    tiles_.free_far(sensor, config_.place_range + config_.look_way);
   }
 
   void begin_reference(std::uint32_t scan, double time, const Eigen::Vector3d& sensor) {
@@ -413,42 +392,47 @@ class RecordingPlaces {
     return place.hits > 0 || longest > 0 ? PlaceState::kStays : PlaceState::kUnknown;
   }
 
+  // A place of a tile.
+  using Member = std::pair<GroundTile, std::uint32_t>;
+  const Place& at(const Member& member) { return tiles_.find(member.first)->values[member.second]; }
+  Place& change(const Member& member) { return tiles_.at(member.first).values[member.second]; }
+
   // Numbers the components of touching changed places, and of those beside them that the first pass
   // removed early or late.
   void find_objects() {
-    std::vector<std::pair<TileIndex, std::uint32_t>> members;
-    std::vector<std::pair<TileIndex, std::uint32_t>> rejected;
-    std::vector<const Place*> contacts;
-    for (auto& tile : tiles_) {
-      for (std::uint32_t first = 0; first < tile.second.places.size(); ++first) {
-        Place& place = tile.second.places[first];
-        if (place.state != PlaceState::kChanged || place.object != 0) continue;
-        members.assign(1, {tile.first, first});
-        place.object = kNone;
+    std::vector<Member> members, rejected;
+    std::vector<Member> contacts;
+    tiles_.for_each_index([&](const GroundTile& index) {
+      for (std::uint32_t first = 0; first < tiles_.find(index)->values.size(); ++first) {
+        const Member begin = {index, first};
+        if (at(begin).state != PlaceState::kChanged || at(begin).object != 0) continue;
+        members.assign(1, begin);
+        change(begin).object = kNone;
         contacts.clear();
         for (std::size_t i = 0; i < members.size(); ++i) {
           add_neighbours(members[i], members, contacts);
         }
         std::sort(contacts.begin(), contacts.end());
         contacts.erase(std::unique(contacts.begin(), contacts.end()), contacts.end());
-        const auto sure = static_cast<std::size_t>(
-            std::count_if(members.begin(), members.end(), [&](const auto& member) {
-              return tiles_[member.first].places[member.second].state == PlaceState::kChanged;
-            }));
+        const auto sure = static_cast<std::size_t>(std::count_if(
+            members.begin(), members.end(),
+            [&](const Member& member) { return at(member).state == PlaceState::kChanged; }));
         const bool is_object = is_whole(sure, members.size(), contacts.size());
         const std::uint32_t number = is_object ? ++objects_ : kNone;
-        for (const auto& member : members) {
-          Place& place_of_member = tiles_[member.first].places[member.second];
-          place_of_member.object = number;
-          place_of_member.state = PlaceState::kChanged;
+        for (const Member& member : members) {
+          Place& place = change(member);
+          place.object = number;
+          place.state = PlaceState::kChanged;
         }
         if (!is_object) rejected.insert(rejected.end(), members.begin(), members.end());
       }
-    }
-    for (const auto& member : rejected) {
-      Place& place = tiles_[member.first].places[member.second];
+      tiles_.free_far(tiles_.middle(index), 0.0);
+    });
+    for (const Member& member : rejected) {
+      Place& place = change(member);
       place.state = PlaceState::kStays;
       place.object = 0;
+      tiles_.free_far(tiles_.middle(member.first), 0.0);
     }
   }
 
@@ -460,40 +444,31 @@ class RecordingPlaces {
 
   // Adds the changed places that touch a member to its component, and those that stay to
   // `contacts`.
-  void add_neighbours(std::pair<TileIndex, std::uint32_t> member,
-                      std::vector<std::pair<TileIndex, std::uint32_t>>& members,
-                      std::vector<const Place*>& contacts) {
-    const VoxelKey key = tiles_[member.first].keys[member.second];
+  void add_neighbours(Member member, std::vector<Member>& members, std::vector<Member>& contacts) {
+    const VoxelKey key = tiles_.find(member.first)->keys[member.second];
     for (int n = 0; n < 27; ++n) {
       std::array<std::int64_t, 3> index;
       for (int axis = 0; axis < 3; ++axis) {
         const int step = (axis == 0 ? n : axis == 1 ? n / 3 : n / 9) % 3 - 1;
         index[static_cast<std::size_t>(axis)] = voxel_index(key, axis) + step;
       }
-      const TileIndex tile = {member.first[0] + (index[0] >> 6), member.first[1] + (index[1] >> 6)};
-      const auto found = tiles_.find(tile);
-      if (found == tiles_.end()) continue;
-      const std::uint32_t number = found->second.numbers.find(
-          voxel_key(index[0] & (kTile - 1), index[1] & (kTile - 1), index[2]));
+      const GroundTile beside = {member.first[0] + (index[0] >> 6),
+                                 member.first[1] + (index[1] >> 6)};
+      const Tile* const tile = tiles_.find(beside);
+      if (tile == nullptr) continue;
+      const std::uint32_t number =
+          tile->numbers.find(voxel_key(index[0] & (kTile - 1), index[1] & (kTile - 1), index[2]));
       if (number == kNone) continue;
-      Place& place = found->second.places[number];
+      const Place& place = tile->values[number];
       if (place.state == PlaceState::kStays && place.hits > 0 && !place.first.moved()) {
-        contacts.push_back(&place);
+        contacts.push_back({beside, number});
       }
       const bool joins = place.state == PlaceState::kChanged || place.first.moved() ||
                          place.came(kAnyRange) || place.left(kAnyRange);
       if (!joins || place.object != 0) continue;
-      place.object = kNone;
-      members.push_back({tile, number});
+      change({beside, number}).object = kNone;
+      members.push_back({beside, number});
     }
-  }
-
-  // Distance of a position from a tile along the axis where it is larger, m.
-  static double distance(const TileIndex& tile, const Eigen::Vector3d& position) {
-    constexpr double kEdge = kPlace * kTile;
-    const Eigen::Vector2d middle(kEdge * (static_cast<double>(tile[0]) + 0.5),
-                                 kEdge * (static_cast<double>(tile[1]) + 0.5));
-    return (position.head<2>() - middle).cwiseAbs().maxCoeff() - 0.5 * kEdge;
   }
 
   // Collects the samples of the places that are near the sensor.
@@ -503,14 +478,15 @@ class RecordingPlaces {
     begin_.assign(1, 0);
     const auto range = static_cast<float>(config_.place_range);
     constexpr auto kStep = static_cast<float>(kPlace / 256.0);
-    for (auto& [index, tile] : tiles_) {
-      if (distance(index, sensor) > config_.place_range) continue;
+    tiles_.for_each_index([&](const GroundTile& index) {
+      if (tiles_.distance(index, sensor) > config_.place_range) return;
+      Tile& tile = tiles_.at(index);
       const Eigen::Vector3f corner =
           (kPlace * static_cast<double>(kTile) *
                Eigen::Vector3d(static_cast<double>(index[0]), static_cast<double>(index[1]), 0.0) -
            sensor)
               .cast<float>();
-      for (std::size_t i = 0; i < tile.places.size(); ++i) {
+      for (std::size_t i = 0; i < tile.values.size(); ++i) {
         const VoxelKey key = tile.keys[i];
         const auto at = [&](int axis) {
           return corner[axis] +
@@ -519,7 +495,7 @@ class RecordingPlaces {
         const float x = at(0), y = at(1), z = at(2);
         const float metres = std::sqrt(x * x + y * y);
         if (metres > range) continue;
-        Place& place = tile.places[i];
+        Place& place = tile.values[i];
         std::uint32_t count = begin_.back();
         samples_.grow(count + 8 + detail::kPackWidth);
         detail::for_each_bit(place.filled, [&](std::size_t octant) {
@@ -533,13 +509,11 @@ class RecordingPlaces {
         ranges_.push_back(whole_metres(metres));
         begin_.push_back(count);
       }
-    }
+    });
   }
 
   RecordingPlacesConfig config_;
-  std::map<TileIndex, Tile> tiles_;  // its elements do not move
-  Tile* recent_ = nullptr;
-  TileIndex recent_index_ = {};
+  PagedTiles<Place> tiles_;
   std::uint32_t objects_ = 0;
 
   std::uint16_t epoch_ = 0;

@@ -1,4 +1,4 @@
-#include "dynains/city/recording_ground.hpp"
+#include "dynains/recording/ground.hpp"
 
 #include <vector>
 
@@ -8,7 +8,8 @@ using namespace dynains;
 
 TEST_CASE("the ground of a cell is the mean of its ground points, if there are enough") {
   for (const int count : {19, 20}) {
-    RecordingGround ground;
+    MemoryStore store;
+    RecordingGround ground(store, 0);
     Pose T_world_sensor = Pose::Identity();
     T_world_sensor.translation() = Eigen::Vector3d(1000.0, -2000.0, 500.0);
     for (int i = 0; i < count; ++i) {

@@ -1,4 +1,4 @@
-#include "dynains/city/recording_place.hpp"
+#include "dynains/recording/place.hpp"
 
 #include <cstddef>
 #include <cstdint>

@@ -7,7 +7,7 @@
 #include "dynains/points.hpp"
 #include "dynains/verdict.hpp"
 
-namespace dynains::program {
+namespace dynains {
 
 struct VerdictArrays {
   std::vector<PointLabel> labels;
@@ -25,4 +25,4 @@ struct VerdictArrays {
   }
 };
 
-}  // namespace dynains::program
+}  // namespace dynains

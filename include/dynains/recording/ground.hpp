@@ -6,12 +6,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <optional>
-#include <vector>
 
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/recording/paged_tiles.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
@@ -20,6 +19,11 @@ namespace dynains {
 /// noise and hidden ground, the recording has neither.
 class RecordingGround {
  public:
+  /// `budget`: bytes in memory, if the cells around the sensor take less; the others wait in the
+  /// store, which outlives this, and what it throws comes out of all functions.
+  RecordingGround(ByteStore& store, std::size_t budget)
+      : tiles_(store, kCell * (1 << kShift), budget) {}
+
   /// Adds the ground points of a scan (m, sensor frame).
   void add(PointsView points, Span<const PointLabel> verdicts, const Pose& T_world_sensor) {
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -28,19 +32,24 @@ class RecordingGround {
                                                                   static_cast<double>(points.y[i]),
                                                                   static_cast<double>(points.z[i]));
       const Index index = index_of(at);
-      Tile& tile = at_tile({index[0] >> kShift, index[1] >> kShift});
-      const std::uint32_t number = tile.numbers.insert(key_of(index));
-      if (number == tile.cells.size()) tile.cells.push_back({at.z(), 0.0F, 0});
-      Cell& cell = tile.cells[number];
-      ++cell.count;
+      auto& tile = tiles_.at({index[0] >> kShift, index[1] >> kShift});
+      Cell& cell = tile.values[tile.add(key_of(index))];
+      if (cell.count++ == 0) cell.origin = at.z();
       cell.mean +=
           (static_cast<float>(at.z() - cell.origin) - cell.mean) / static_cast<float>(cell.count);
     }
+    free_far(T_world_sensor.translation());
+  }
+
+  /// Keeps to the budget, while cells around a sensor (m, world frame) are asked for.
+  void free_far(const Eigen::Vector3d& sensor) {
+    constexpr double kNear = 60.0;  // m
+    tiles_.free_far(sensor, kNear);
   }
 
   /// Height of a point (m, world frame) above the ground in its cell. Empty where the recording has
   /// less than 20 points of the ground.
-  std::optional<double> rise(const Eigen::Vector3d& point) const {
+  std::optional<double> rise(const Eigen::Vector3d& point) {
     const std::optional<double> height = height_of(index_of(point));
     if (!height) return std::nullopt;
     return point.z() - *height;
@@ -48,7 +57,7 @@ class RecordingGround {
 
   /// Whether the ground in the cell of a point (m, world frame) is not a step above that of any
   /// cell around: the underside of a vehicle can look like ground.
-  bool is_level(const Eigen::Vector3d& point) const {
+  bool is_level(const Eigen::Vector3d& point) {
     constexpr std::int64_t kReach = 2;  // cells
     constexpr double kStep = 0.2;       // m
     const Index index = index_of(point);
@@ -70,13 +79,9 @@ class RecordingGround {
 
   using Index = std::array<std::int64_t, 2>;
   struct Cell {
-    double origin;  // m, the first height
-    float mean;     // m, above it
-    std::uint32_t count;
-  };
-  struct Tile {
-    VoxelHashTable<> numbers;
-    std::vector<Cell> cells;
+    double origin = 0.0;  // m, the first height
+    float mean = 0.0F;    // m, above it
+    std::uint32_t count = 0;
   };
 
   static Index index_of(const Eigen::Vector3d& at) {
@@ -88,26 +93,14 @@ class RecordingGround {
     return voxel_key(index[0] & kMask, index[1] & kMask, 0);
   }
   // Mean height of the ground in a cell with enough points, m.
-  std::optional<double> height_of(const Index& index) const {
-    const auto tile = tiles_.find({index[0] >> kShift, index[1] >> kShift});
-    if (tile == tiles_.end()) return std::nullopt;
-    const std::uint32_t number = tile->second.numbers.find(key_of(index));
-    if (number == VoxelHashTable<>::kNone) return std::nullopt;
-    const Cell& cell = tile->second.cells[number];
-    if (cell.count < kFewest) return std::nullopt;
-    return cell.origin + static_cast<double>(cell.mean);
-  }
-  Tile& at_tile(const Index& index) {
-    if (recent_ == nullptr || recent_index_ != index) {
-      recent_ = &tiles_[index];
-      recent_index_ = index;
-    }
-    return *recent_;
+  std::optional<double> height_of(const Index& index) {
+    const auto* const tile = tiles_.find({index[0] >> kShift, index[1] >> kShift});
+    const Cell* const cell = tile == nullptr ? nullptr : tile->find(key_of(index));
+    if (cell == nullptr || cell->count < kFewest) return std::nullopt;
+    return cell->origin + static_cast<double>(cell->mean);
   }
 
-  std::map<Index, Tile> tiles_;  // its elements do not move
-  Tile* recent_ = nullptr;
-  Index recent_index_ = {};
+  PagedTiles<Cell> tiles_;
 };
 
 }  // namespace dynains

@@ -1,4 +1,4 @@
-#include "dynains/city/recording_places.hpp"
+#include "dynains/recording/places.hpp"
 
 #include <cmath>
 #include <cstddef>
@@ -20,7 +20,7 @@ using Beam = std::function<BeamResult(const Eigen::Vector3d& position)>;
 /// A sensor at rest at the origin, 10 m beside a row of places; one reference each second.
 class Recorder {
  public:
-  explicit Recorder(const RecordingPlacesConfig& config = {}) : places(config) {}
+  explicit Recorder(const RecordingPlacesConfig& config = {}) : places(config, store) {}
 
   /// Measures `count` places in a row along y, from place `first` on, at x = `x` m.
   void measure(int count, int first = 0, float x = 10.1F, PointLabel label = PointLabel::kStatic) {
@@ -70,6 +70,7 @@ class Recorder {
     return count;
   }
 
+  MemoryStore store;
   RecordingPlaces places;
   double step = 1.0;  // s
   Eigen::Vector3d sensor = Eigen::Vector3d::Zero();
@@ -304,7 +305,8 @@ TEST_CASE("places beside those that changed join them, if the first pass removed
 TEST_CASE("parameters of places have bounds") {
   RecordingPlacesConfig config;
   config.free_looks = 0;
-  CHECK_THROWS_AS(RecordingPlaces(config), ConfigError);
+  MemoryStore store;
+  CHECK_THROWS_AS(RecordingPlaces(config, store), ConfigError);
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-namespace dynains::program {
+namespace dynains {
 
 /// Which objects that stood for a part of the recording are static.
 enum class StaticPolicy : std::uint8_t {
@@ -11,4 +11,4 @@ enum class StaticPolicy : std::uint8_t {
   kLast     ///< what stands at the last look, in the scans since it stands
 };
 
-}  // namespace dynains::program
+}  // namespace dynains

@@ -1,17 +1,17 @@
-#include "run/restored_ground.hpp"
+#include "dynains/recording/restored_ground.hpp"
 
 #include <vector>
 
 #include "support/catch.hpp"
 
 using namespace dynains;
-using namespace dynains::program;
 
 namespace {
 
 /// Whether a removed point comes back to flat ground, with another removed point beside it.
 bool comes_back(float rise, float foot_distance, float foot_rise, Cause cause) {
-  RestoredGround ground;
+  MemoryStore store;
+  RestoredGround ground(store, 0);
   PointBuffer flat;
   for (int i = 0; i < 100; ++i) flat.push_back(5.0F + 0.01F * static_cast<float>(i), 5.05F, -1.7F);
   const std::vector<PointLabel> labels(flat.size(), PointLabel::kGround);
@@ -56,7 +56,8 @@ TEST_CASE("feet stay removed with what stands on them") {
 
 TEST_CASE("ground that is a step above the ground around is none") {
   for (const float step : {0.1F, 0.3F}) {
-    RestoredGround ground;
+    MemoryStore store;
+    RestoredGround ground(store, 0);
     PointBuffer points;
     for (int i = 0; i < 100; ++i) {
       points.push_back(5.05F, 5.05F, -1.7F);

@@ -114,13 +114,13 @@ inline bool unpack_image(const RangeImageGrid& grid, Span<const std::uint8_t> by
 }
 
 /// One reference scan of a session.
-struct SessionReference {
+struct RecordingReference {
   std::uint32_t scan = 0;  ///< its number in the session
   Pose T_world_beams = Pose::Identity();
   RangeImage image;  ///< in the frame of the sensor
 };
 
-struct SessionReferencesConfig {
+struct RecordingReferencesConfig {
   double reference_way = 1.0;  ///< m
   int reference_scans = 10;    ///< scans
 
@@ -133,15 +133,15 @@ struct SessionReferencesConfig {
   }
 
   /// Throws ConfigError.
-  void validate() const { validate_parameters("SessionReferences", *this); }
+  void validate() const { validate_parameters("RecordingReferences", *this); }
 };
 
 /// Makes the reference scans of one session: the first scan, and each scan that is `reference_way`
 /// or `reference_scans` away from the latest reference. The grid of all images is that of the first
 /// scan.
-class SessionReferences {
+class RecordingReferences {
  public:
-  explicit SessionReferences(const SessionReferencesConfig& config)
+  explicit RecordingReferences(const RecordingReferencesConfig& config)
       : config_((config.validate(), config)) {}
 
   /// The grid of the images; without rows until the first scan with a known sensor.
@@ -150,8 +150,8 @@ class SessionReferences {
   /// The reference of a scan, or null if the scan is not one; valid until the next call. `points`:
   /// m, sensor frame. `verdicts`: final verdict by point. The directions of dynamic points are
   /// unknown: if their verdicts are wrong, nothing else is removed by them.
-  const SessionReference* add(PointsView points, Span<const PointLabel> verdicts,
-                              const Pose& T_world_sensor, std::uint32_t scan) {
+  const RecordingReference* add(PointsView points, Span<const PointLabel> verdicts,
+                                const Pose& T_world_sensor, std::uint32_t scan) {
     if (is_near_latest(T_world_sensor.translation(), scan)) return nullptr;
     split(points, verdicts);
     if (grid_.rows == 0 && !choose_grid()) return nullptr;
@@ -215,14 +215,14 @@ class SessionReferences {
     return true;
   }
 
-  SessionReferencesConfig config_;
+  RecordingReferencesConfig config_;
   RangeImageGrid grid_;
   std::optional<Eigen::Vector3d> latest_;  // m, position of the sensor, world frame
   PointBuffer ground_, objects_;           // with room for more
   std::vector<std::uint8_t> moving_;
   std::size_t ground_count_ = 0, object_count_ = 0;
   RangeImage::Scratch scratch_;
-  SessionReference reference_;
+  RecordingReference reference_;
 };
 
 /// Visibility of points from a reference, with the margins of FreeSpaceConfig.
@@ -233,8 +233,9 @@ class ReferenceTest {
         slope_(static_cast<float>(config.margin_slope)) {}
 
   /// Tests the first `count` points (m; padded for packs). The result is valid until the next call.
-  const detail::Visibility& operator()(const SessionReference& reference, const PointBuffer& points,
-                                       std::size_t count, const Pose& T_world_points) {
+  const detail::Visibility& operator()(const RecordingReference& reference,
+                                       const PointBuffer& points, std::size_t count,
+                                       const Pose& T_world_points) {
     detail::test_visibility(
         reference.image,
         detail::composed(detail::inverted(reference.T_world_beams), T_world_points), points, count,

@@ -1,33 +1,52 @@
-// Second pass of a run: all scans of the recording test what the first pass called static.
+// Second pass over a recording: all of its scans test what the first pass called static.
 #pragma once
 
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
-#include <future>
 #include <vector>
 
-#include "dynains/city/recording_places.hpp"
-#include "dynains/city/session_references.hpp"
-#include "dynains/io/recording.hpp"
+#include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/recording/byte_store.hpp"
+#include "dynains/recording/instance_chains.hpp"
+#include "dynains/recording/instance_numbers.hpp"
+#include "dynains/recording/places.hpp"
+#include "dynains/recording/references.hpp"
+#include "dynains/recording/restored_ground.hpp"
+#include "dynains/recording/static_policy.hpp"
+#include "dynains/recording/verdict_arrays.hpp"
 #include "dynains/verdict.hpp"
-#include "instance_chains.hpp"
-#include "instance_numbers.hpp"
-#include "restored_ground.hpp"
-#include "scratch_file.hpp"
-#include "static_policy.hpp"
-#include "verdict_arrays.hpp"
 
-namespace dynains::program {
+namespace dynains {
 
-/// The first pass judges a scan by the scans around it. The second one tests the places of all
-/// points above the ground by scans of the whole recording, removes what came or went, and brings
-/// back what stands (see RecordingPlaces) and the ground. An instance of the first pass leaves as a
-/// whole if enough of its points or places have changed.
+struct SecondPassConfig {
+  StaticPolicy static_policy = StaticPolicy::kAlways;
+  double memory = 160;  ///< MB
+  int threads = 1;
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& visitor) {
+    visitor(Parameter{"memory", self.memory, closed(0, 1e6), "MB",
+                      "places and ground in memory, if those around the sensor take less"});
+    visitor(Parameter{"threads", self.threads, closed(1, 2), "",
+                      "2: references are unpacked by a second thread"});
+  }
+
+  /// Throws ConfigError.
+  void validate() const { validate_parameters("SecondPass", *this); }
+};
+
+/// The first pass judges a scan by the scans around it: DynaInsRemover. The second one tests the
+/// places of all points above the ground by scans of the whole recording, removes what came or
+/// went, and brings back what stands (see RecordingPlaces) and the ground. An instance of the first
+/// pass leaves as a whole if enough of its points or places have changed.
+///
+/// Give all scans with their first verdicts to add(), call test(), and give all scans again to
+/// revise(), in the same order. Not for several callers at once. All functions throw what the store
+/// throws.
 class SecondPass {
  public:
   /// Touching places that came or went, and the scans that tell of it, numbered from 0 on.
@@ -39,18 +58,21 @@ class SecondPass {
     std::uint32_t first_passed = UINT32_MAX, last_passed = 0;
   };
 
-  /// References of the scans wait in a file without a name in `folder`. `thread`: async if test()
-  /// may read them in another thread. Throws IoError.
-  explicit SecondPass(const std::filesystem::path& folder,
-                      StaticPolicy policy = StaticPolicy::kAlways,
-                      std::launch thread = std::launch::async);
+  /// Packed references, and places and ground far from the sensor, wait in `store`, which outlives
+  /// this. Throws ConfigError.
+  explicit SecondPass(ByteStore& store, const SecondPassConfig& config = {});
 
-  /// Takes the first verdict on a scan, in the order of the scans. Throws IoError.
-  void add(const RecordedScan& scan, const ScanVerdict& verdict);
-  /// Tests all places. Ends without a result if `keep_going()` returns false. Throws IoError.
-  void test(const std::function<bool()>& keep_going);
-  /// Revises the first verdict on scan `number`. Returns whether anything changed.
-  bool revise(const RecordedScan& scan, std::uint32_t number, const Pose& T_world_sensor,
+  /// Takes the first verdict on a scan, in the order of the scans: FrameResult::finished. `points`:
+  /// m, sensor frame, all of the scan. Throws UsageError if their numbers differ, if the scan is
+  /// not the next one, or after test().
+  void add(PointsView points, const ScanVerdict& verdict);
+  /// Tests all places. Ends without a result if `keep_going()` returns false; then revise() changes
+  /// nothing.
+  void test(const std::function<bool()>& keep_going = [] { return true; });
+  /// Revises the first verdict on scan `number`, counted from 0. Returns whether anything changed.
+  /// Points that left have Cause::kCameOrWent, those that came back Cause::kStands or
+  /// Cause::kGround. Throws UsageError if the arrays have not the size of `points`.
+  bool revise(PointsView points, std::uint32_t number, const Pose& T_world_sensor,
               VerdictArrays& verdict);
 
   /// Whether test() came to its end.
@@ -107,7 +129,7 @@ class SecondPass {
     }
   };
 
-  void read(const Reference& kept, SessionReference& reference);
+  void read(const Reference& kept, RecordingReference& reference);
   void list_objects();
   bool has_changed(const Place& place, std::uint32_t number) const;
   bool stands(const Place& place, std::uint32_t number) const;
@@ -120,16 +142,15 @@ class SecondPass {
   ScanSpan absence(std::uint32_t number, const Seen* begin, const Seen* end) const;
   void judge(std::uint32_t number, const Seen* begin, const Seen* end);
 
-  StaticPolicy policy_;
-  std::launch thread_;
+  SecondPassConfig config_;
+  ByteStore& store_;
   RecordingPlaces places_;
   InstanceChains chains_;
   RestoredGround ground_;
-  SessionReferences references_;
+  RecordingReferences references_;
   std::vector<Reference> kept_;
-  ScratchFile file_;
   std::vector<std::uint8_t> packed_;
-  PointBuffer points_;
+  PointsView points_;                      // of the scan that is revised
   std::vector<const Place*> place_of_;     // by point; null: none, or nothing is known of it
   std::vector<std::uint8_t> is_restored_;  // by point
   InstanceNumbers numbers_;                // of instances in the scan that may leave
@@ -138,8 +159,8 @@ class SecondPass {
   std::vector<Eigen::Vector3f> world_;     // m, from the sensor, axes of the world; by point
   std::vector<Object> objects_;
   bool is_decided_ = false;
-  std::uint32_t newest_ = 0;  // scan
+  std::uint32_t scans_ = 0;  // added
   std::uint64_t removed_ = 0, restored_ = 0;
 };
 
-}  // namespace dynains::program
+}  // namespace dynains

@@ -1,0 +1,183 @@
+// Tiles of a recording. Those that are far from the sensor wait in a store.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "dynains/recording/byte_store.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
+
+namespace dynains {
+
+/// Index of a square tile, along x and y of the world.
+using GroundTile = std::array<std::int64_t, 2>;
+
+/// Values by voxel of a tile, in the order of their insertion.
+template <class Value>
+struct VoxelTile {
+  static_assert(std::is_trivially_copyable_v<Value>, "values are stored as bytes");
+
+  VoxelHashTable<> numbers;
+  std::vector<VoxelKey> keys;
+  std::vector<Value> values;
+
+  /// Number of a voxel; a new one has the value Value().
+  std::uint32_t add(VoxelKey key) {
+    const std::uint32_t number = numbers.insert(key);
+    if (number == values.size()) {
+      values.emplace_back();
+      keys.push_back(key);
+    }
+    return number;
+  }
+  /// Null: the voxel has no value.
+  const Value* find(VoxelKey key) const {
+    const std::uint32_t number = numbers.find(key);
+    return number == VoxelHashTable<>::kNone ? nullptr : &values[number];
+  }
+  std::size_t memory_bytes() const {
+    return numbers.memory_bytes() + keys.capacity() * sizeof(VoxelKey) +
+           values.capacity() * sizeof(Value);
+  }
+
+  void pack(std::vector<std::uint8_t>& bytes) const {
+    const std::size_t key_bytes = keys.size() * sizeof(VoxelKey);
+    bytes.resize(key_bytes + values.size() * sizeof(Value));
+    if (keys.empty()) return;
+    std::memcpy(bytes.data(), keys.data(), key_bytes);
+    std::memcpy(bytes.data() + key_bytes, values.data(), bytes.size() - key_bytes);
+  }
+  void unpack(const std::vector<std::uint8_t>& bytes) {
+    const std::size_t count = bytes.size() / (sizeof(VoxelKey) + sizeof(Value));
+    const std::size_t key_bytes = count * sizeof(VoxelKey);
+    keys.resize(count);
+    values.resize(count);
+    if (count == 0) return;
+    std::memcpy(keys.data(), bytes.data(), key_bytes);
+    std::memcpy(values.data(), bytes.data() + key_bytes, bytes.size() - key_bytes);
+    numbers.reserve(count);
+    for (const VoxelKey key : keys) numbers.insert(key);
+  }
+};
+
+/// Tiles by index. References to a tile are valid until free_far() frees it.
+template <class Value>
+class PagedTiles {
+ public:
+  using Tile = VoxelTile<Value>;
+
+  /// `edge`: m, of a tile. `budget`: bytes of the tiles that stay in memory, if the others are far.
+  /// The store outlives this.
+  PagedTiles(ByteStore& store, double edge, std::size_t budget)
+      : store_(&store), edge_(edge), budget_(budget) {}
+
+  /// The tile, which is new or not, to be changed. Throws what the store throws.
+  Tile& at(const GroundTile& index) {
+    if (recent_ == nullptr || recent_index_ != index) {
+      recent_ = &entries_[index];
+      recent_index_ = index;
+    }
+    load(*recent_);
+    recent_->is_changed = true;
+    return recent_->tile;
+  }
+  /// Null: there is no such tile. Throws what the store throws.
+  const Tile* find(const GroundTile& index) {
+    const auto found = entries_.find(index);
+    if (found == entries_.end()) return nullptr;
+    load(found->second);
+    return &found->second.tile;
+  }
+
+  /// Calls `visit(index)` for all tiles, in the order of their indices.
+  template <class Visitor>
+  void for_each_index(Visitor&& visit) const {
+    for (const auto& entry : entries_) visit(entry.first);
+  }
+  /// Number of values.
+  std::size_t size() const {
+    std::size_t size = 0;
+    for (const auto& entry : entries_) {
+      size += entry.second.is_loaded ? entry.second.tile.keys.size() : entry.second.count;
+    }
+    return size;
+  }
+
+  /// Distance of a tile from a position (m, world frame) along the axis where it is larger, m.
+  double distance(const GroundTile& index, const Eigen::Vector3d& position) const {
+    const Eigen::Vector3d away = position - middle(index);
+    return away.head<2>().cwiseAbs().maxCoeff() - 0.5 * edge_;
+  }
+  /// m, world frame; z is 0.
+  Eigen::Vector3d middle(const GroundTile& index) const {
+    return {edge_ * (static_cast<double>(index[0]) + 0.5),
+            edge_ * (static_cast<double>(index[1]) + 0.5), 0.0};
+  }
+
+  /// Frees the tiles farthest from a position (m, world frame) until the others keep to the budget.
+  /// Those within `keep` (m) stay. Throws what the store throws.
+  void free_far(const Eigen::Vector3d& position, double keep) {
+    std::size_t bytes = 0;
+    far_.clear();
+    for (auto& [index, entry] : entries_) {
+      if (!entry.is_loaded) continue;
+      bytes += entry.tile.memory_bytes();
+      const double metres = distance(index, position);
+      if (metres > keep) far_.emplace_back(metres, &entry);
+    }
+    if (bytes <= budget_) return;
+    std::sort(far_.rbegin(), far_.rend());
+    for (const auto& far : far_) {
+      if (bytes <= budget_ - budget_ / 4) return;
+      bytes -= far.second->tile.memory_bytes();
+      store(*far.second);
+    }
+  }
+
+ private:
+  struct Entry {
+    Tile tile;
+    bool is_loaded = true;
+    bool is_changed = false;   // since it was stored
+    std::uint64_t offset = 0;  // in the store
+    std::size_t size = 0, count = 0;
+  };
+
+  void load(Entry& entry) {
+    if (entry.is_loaded) return;
+    store_->read(entry.offset, entry.size, bytes_);
+    entry.tile.unpack(bytes_);
+    entry.is_loaded = true;
+    entry.is_changed = false;
+  }
+
+  void store(Entry& entry) {
+    if (entry.is_changed || entry.size == 0) {
+      entry.tile.pack(bytes_);
+      entry.offset = store_->append(bytes_);
+      entry.size = bytes_.size();
+      entry.count = entry.tile.keys.size();
+    }
+    entry.tile = Tile();
+    entry.is_loaded = false;
+  }
+
+  ByteStore* store_;
+  double edge_;
+  std::size_t budget_;
+  std::map<GroundTile, Entry> entries_;  // its elements do not move
+  Entry* recent_ = nullptr;
+  GroundTile recent_index_ = {};
+  std::vector<std::uint8_t> bytes_;
+  std::vector<std::pair<double, Entry*>> far_;
+};
+
+}  // namespace dynains
