@@ -116,10 +116,14 @@ void run_as_asked(RunFlags& flags) {
   listener.warn = [](const std::string& text) {
     std::cerr << "dynains: warning: " << text << std::endl;
   };
-  listener.progress = [&](std::size_t done, std::size_t total) {
-    if (!progress) progress.emplace(total, "scans", flags.quiet);
-    if (done > 0) progress->update(done);
+  const auto tell = [&](const char* unit) {
+    return [&, unit](std::size_t done, std::size_t total) {
+      if (done == 0) progress.emplace(total, unit, flags.quiet);
+      if (done > 0) progress->update(done);
+    };
   };
+  listener.progress = tell("scans");
+  listener.revision_progress = tell("revised scans");
   PoseEstimate estimate;
   const RunOutcome outcome = run(settings, open(flags, estimate), listener);
   progress.reset();

@@ -33,12 +33,15 @@ namespace fs = std::filesystem;
 /// Tests the first verdicts, if there is a second pass, and makes all results of what is left.
 /// After a signal, the first verdicts stay.
 template <class Remover>
-void finish_second_pass(Remover& remover, RunResults& results) {
+void finish_second_pass(Remover& remover, RunResults& results, const RunListener& listener) {
   SecondPass* const pass = results.second_pass();
   if (pass == nullptr) return;
   pass->test([] { return InterruptGuard::signal() == 0; });
-  results.revise([&](PointsView points, Span<const std::uint8_t> keep, const Pose& T) {
+  const auto add_to_map = [&](PointsView points, Span<const std::uint8_t> keep, const Pose& T) {
     remover.mutable_map().insert(points, keep, T);
+  };
+  results.revise(add_to_map, [&](std::size_t done) {
+    if (listener.revision_progress) listener.revision_progress(done, results.finished());
   });
   if (!results.map_points()) return;
   remover.map().for_each([&](const Eigen::Vector3d& point) { results.add_map_point(point); });
@@ -66,7 +69,7 @@ RunTiming process(const RunPlan& plan, const RunListener& listener, const fs::pa
       report_progress(done);
       return InterruptGuard::signal() == 0;
     });
-    finish_second_pass(remover, results);
+    finish_second_pass(remover, results, listener);
   };
   if (plan.map_on_disk) {
     RemoverWithMapOnDisk::Config config = *plan.map_on_disk;

@@ -17,11 +17,13 @@
 
 namespace dynains::program {
 
-/// How a run and its caller reach each other while it lasts. Both functions may be empty.
+/// How a run and its caller reach each other while it lasts. All functions may be empty.
 struct RunListener {
   std::function<void(const std::string&)> warn;
   /// Called before the first scan and after each.
   std::function<void(std::size_t done, std::size_t total)> progress;
+  /// The same for the scans that a second pass revises.
+  std::function<void(std::size_t done, std::size_t total)> revision_progress;
   SecondSignal second_signal = SecondSignal::kEndsProcess;
 };
 

@@ -197,8 +197,10 @@ void RunResults::write_final(const RecordedScan& scan, const ScanVerdict& verdic
   }
 }
 
-void RunResults::revise(const AddToMap& add_to_map) {
+void RunResults::revise(const AddToMap& add_to_map,
+                        const std::function<void(std::size_t done)>& progress) {
   if (finished_ == 0) return;
+  progress(0);
   ReadAhead reader(recording_, range_.first, range_.first + finished_ - 1, thread());
   JudgedScan judged;
   for (std::size_t i = 0; i < finished_; ++i) {
@@ -217,6 +219,7 @@ void RunResults::revise(const AddToMap& add_to_map) {
     judged_.verdict.T_world_sensor = T_world_sensor;
     judged_.refer_to_arrays();
     writing_.begin([this, is_revised, &add_to_map] { write_revised(is_revised, add_to_map); });
+    progress(i + 1);
   }
   finish();
 }

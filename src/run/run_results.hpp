@@ -123,8 +123,8 @@ class RunResults {
   using AddToMap =
       std::function<void(PointsView, Span<const std::uint8_t> keep, const Pose& T_world_sensor)>;
   /// Reads all scans and first verdicts again, revises them by the second pass, and makes all other
-  /// results of them. Throws IoError.
-  void revise(const AddToMap& add_to_map);
+  /// results of them. Calls `progress` before the first scan and after each. Throws IoError.
+  void revise(const AddToMap& add_to_map, const std::function<void(std::size_t done)>& progress);
   /// The thread that reads and writes, RunOutputs::thread.
   std::launch thread() const { return writing_.policy(); }
 
