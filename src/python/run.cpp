@@ -118,7 +118,7 @@ const std::array<RunSetting, 28> kRunSettings{{
        const auto policy = value.cast<std::string>();
        if (policy != "always" && policy != "last") throw py::cast_error();
        run.settings.static_policy =
-           policy == "last" ? program::StaticPolicy::kLast : program::StaticPolicy::kAlways;
+           policy == "last" ? StaticPolicy::kLast : StaticPolicy::kAlways;
      }},
     {"one_thread", "bool", "the run works, reads and writes in one thread",
      &set_flag<&RunSettings::one_thread>},
