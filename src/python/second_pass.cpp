@@ -124,7 +124,11 @@ void bind_second_pass(py::module_& module) {
       .def_property_readonly("removed", &SecondPassInMemory::removed,
                              "Points that left in revise().")
       .def_property_readonly("restored", &SecondPassInMemory::restored,
-                             "Points that came back in revise().");
+                             "Points that came back in revise().")
+      .def("__repr__", [](const SecondPassInMemory& pass) {
+        return "<dynains.SecondPass: " + std::to_string(pass.removed()) + " points left, " +
+               std::to_string(pass.restored()) + " came back>";
+      });
 }
 
 }  // namespace dynains::python
