@@ -14,18 +14,35 @@ double smooth_step(double u) {
   return u * u * (3 - 2 * u);
 }
 
-double distance_to_segment(Vec2 p, Vec2 a, Vec2 b) {
-  const Vec2 ab = b - a, ap = p - a;
-  const double u = std::clamp(dot(ap, ab) / std::max(dot(ab, ab), 1e-9), 0.0, 1.0);
-  return norm(ap - u * ab);
-}
+/// A part of the centre of a street, and what distances to it need.
+struct Segment {
+  Segment(Vec2 from, Vec2 to) : a(from), ab(to - from), square(std::max(dot(ab, ab), 1e-9)) {}
+
+  double squared_distance(Vec2 p) const {
+    const Vec2 ap = p - a;
+    const double u = std::clamp(dot(ap, ab) / square, 0.0, 1.0);
+    const Vec2 off = ap - u * ab;
+    return dot(off, off);
+  }
+
+  Vec2 a, ab;
+  double square;  // m^2, of the length
+};
 
 int tile_index(double v, double size) { return static_cast<int>(std::floor(v / size)); }
 
 /// The part of a street that matters for one place.
 struct Corridor {
+  double distance(Vec2 p) const {
+    double square = 1e18;
+    for (const Segment& segment : segments) {
+      square = std::min(square, segment.squared_distance(p));
+    }
+    return std::sqrt(square);
+  }
+
   const Street* street;
-  std::vector<std::pair<Vec2, Vec2>> segments;
+  std::vector<Segment> segments;
 };
 
 std::vector<Corridor> corridors_near(const std::vector<Street>& streets, Vec2 centre,
@@ -36,27 +53,34 @@ std::vector<Corridor> corridors_near(const std::vector<Street>& streets, Vec2 ce
     const auto& points = street.centre.points();
     const double reach = radius + kFar + street.half_width;
     for (std::size_t i = 1; i < points.size(); ++i) {
-      if (distance_to_segment(centre, points[i - 1], points[i]) < reach) {
-        corridor.segments.push_back({points[i - 1], points[i]});
-      }
+      const Segment segment(points[i - 1], points[i]);
+      if (std::sqrt(segment.squared_distance(centre)) < reach) corridor.segments.push_back(segment);
     }
     if (!corridor.segments.empty()) result.push_back(std::move(corridor));
   }
   return result;
 }
 
-/// Corridors that can be nearest to a point within `radius` of `centre`.
+/// Corridors that can have the nearest edge or the widest pavement for a point within `radius` of
+/// `centre`, with the segments that can be nearest to it.
 std::vector<Corridor> nearest_within(const std::vector<Corridor>& corridors, Vec2 centre,
                                      double radius) {
+  double edge = kFar;   // m; no point has a farther one
+  double pavement = 0;  // m; no point has a narrower one
+  for (const Corridor& corridor : corridors) {
+    const double farthest = corridor.distance(centre) + radius - corridor.street->half_width;
+    edge = std::min(edge, farthest);
+    pavement = std::max(pavement, corridor.street->pavement - farthest);
+  }
   std::vector<Corridor> result;
   for (const Corridor& corridor : corridors) {
-    double nearest = 1e9;
-    for (const auto& segment : corridor.segments) {
-      nearest = std::min(nearest, distance_to_segment(centre, segment.first, segment.second));
-    }
-    Corridor kept{corridor.street, {}};
-    for (const auto& segment : corridor.segments) {
-      if (distance_to_segment(centre, segment.first, segment.second) <= nearest + 2 * radius) {
+    const Street& street = *corridor.street;
+    const double distance = corridor.distance(centre);
+    const double nearest = distance - radius - street.half_width;
+    if (nearest > edge && street.pavement - nearest <= pavement) continue;
+    Corridor kept{&street, {}};
+    for (const Segment& segment : corridor.segments) {
+      if (std::sqrt(segment.squared_distance(centre)) <= distance + 2 * radius) {
         kept.segments.push_back(segment);
       }
     }
@@ -74,11 +98,7 @@ struct Ground {
 Ground ground_at(const std::vector<Corridor>& corridors, Vec2 p) {
   Ground result;
   for (const Corridor& corridor : corridors) {
-    double distance = 1e9;
-    for (const auto& segment : corridor.segments) {
-      distance = std::min(distance, distance_to_segment(p, segment.first, segment.second));
-    }
-    const double edge = distance - corridor.street->half_width;
+    const double edge = corridor.distance(p) - corridor.street->half_width;
     if (edge < result.edge) {
       result.edge = edge;
       result.half_width = corridor.street->half_width;
@@ -115,17 +135,23 @@ double Terrain::hills(Vec2 p) const {
   return sum;
 }
 
-double Terrain::bumps(Vec2 p, double wavelength, std::uint64_t salt) const {
-  const double u = p.x / wavelength, v = p.y / wavelength;
+double Terrain::bumps(Vec2 p, Lattice& lattice) const {
+  const double u = p.x / lattice.wavelength, v = p.y / lattice.wavelength;
   const double iu = std::floor(u), iv = std::floor(v);
-  auto corner = [&](double du, double dv) {
-    const auto a = static_cast<std::uint64_t>(static_cast<std::int64_t>(iu + du));
-    const auto b = static_cast<std::uint64_t>(static_cast<std::int64_t>(iv + dv));
-    return 2 * static_cast<double>(unit_float(mix(mix(salt_ + salt, a), b))) - 1;
-  };
+  if (iu != lattice.column || iv != lattice.row) {
+    const auto corner = [&](double du, double dv) {
+      const auto a = static_cast<std::uint64_t>(static_cast<std::int64_t>(iu + du));
+      const auto b = static_cast<std::uint64_t>(static_cast<std::int64_t>(iv + dv));
+      return 2 * static_cast<double>(unit_float(mix(mix(salt_ + lattice.salt, a), b))) - 1;
+    };
+    lattice.column = iu;
+    lattice.row = iv;
+    lattice.corners = {corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)};
+  }
+  const auto& corners = lattice.corners;
   const double fu = smooth_step(u - iu), fv = smooth_step(v - iv);
-  const double low = corner(0, 0) * (1 - fu) + corner(1, 0) * fu;
-  const double high = corner(0, 1) * (1 - fu) + corner(1, 1) * fu;
+  const double low = corners[0] * (1 - fu) + corners[1] * fu;
+  const double high = corners[2] * (1 - fu) + corners[3] * fu;
   return low * (1 - fv) + high * fv;
 }
 
@@ -144,6 +170,7 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
       blocks.push_back(nearest_within(corridors, middle, 1.42 * half));
     }
   }
+  Lattice coarse{4.0, 1}, fine{1.1, 2};
   for (int row = 0; row <= kCells; ++row) {
     for (int column = 0; column <= kCells; ++column) {
       const Vec2 p = corner + Vec2{column * kCell, row * kCell};
@@ -154,7 +181,7 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
       const double across = std::clamp(1 + ground.edge / ground.half_width, 0.0, 1.0);
       const double wild = off_street * (1 - on_pavement);
       const double uneven = config_.roughness * (0.3 + 0.7 * wild);
-      double height = hills(p) + uneven * (0.6 * bumps(p, 4.0, 1) + 0.4 * bumps(p, 1.1, 2));
+      double height = hills(p) + uneven * (0.6 * bumps(p, coarse) + 0.4 * bumps(p, fine));
       height += config_.kerb * off_street * (0.5 + 0.5 * on_pavement);
       height -= 0.02 * ground.half_width * across * across * (1 - off_street);
       tile.heights[grid_index(row, column, kCells + 1)] = static_cast<float>(height);

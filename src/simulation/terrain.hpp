@@ -54,10 +54,18 @@ class Terrain {
     std::array<std::uint8_t, grid_index(kCells, 0, kCells)> labels;
   };
 
+  /// Random heights, and those of the cell that was asked for last.
+  struct Lattice {
+    double wavelength;  ///< m
+    std::uint64_t salt;
+    double column = 0.5, row = 0.5;  ///< of that cell; whole numbers after the first question
+    std::array<double, 4> corners{};
+  };
+
   const Tile& tile(int ix, int iy);
   void build(int ix, int iy, Tile& tile) const;
   double hills(Vec2 p) const;
-  double bumps(Vec2 p, double wavelength, std::uint64_t salt) const;
+  double bumps(Vec2 p, Lattice& lattice) const;
   float height_near(float x, float y) const;
 
   TerrainConfig config_;
