@@ -1,10 +1,6 @@
 #include "dynains/city/session_writer.hpp"
 
-#include <fcntl.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstdio>
 #include <limits>
 #include <string>
 #include <system_error>
@@ -15,6 +11,7 @@
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/io/folder_lock.hpp"
 #include "io/failure.hpp"
+#include "io/folder_exchange.hpp"
 #include "io/new_file.hpp"
 #include "session_files.hpp"
 #include "session_folder.hpp"
@@ -66,12 +63,6 @@ void check_session(const City& city, const SessionInfo& session, bool replaces) 
   }
 }
 
-/// Exchanges two folders in one step.
-void exchange(const fs::path& a, const fs::path& b) {
-  if (::renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) == 0) return;
-  fail_by_system(b, "cannot be replaced in one step; drop the session and add it again", errno);
-}
-
 }  // namespace
 
 /// The staging folder of a session.
@@ -117,18 +108,12 @@ class SessionWriter::Files {
     write_file(folder_ / session_files::kSessionFile, session_text);
     sync_files(folder_);
   }
-  void commit(const fs::path& target, bool replaces) {
-    if (replaces) {
-      exchange(folder_, target);
-    } else {
-      std::error_code error;
-      fs::rename(folder_, target, error);
-      if (error) fail_by_system(target, "cannot be put in place", error.value());
-      is_committed_ = true;
-    }
+  void commit(const fs::path& target) {
+    const bool has_earlier = put_in_place(folder_, target);
+    is_committed_ = !has_earlier;
     sync_files(target);
     // The staging folder has the earlier session now.
-    if (replaces) session_files::remove_session_files(folder_);
+    if (has_earlier) session_files::remove_session_files(folder_);
   }
 
  private:
@@ -229,9 +214,8 @@ void SessionWriter::prepare() {
 void SessionWriter::commit() {
   if (!is_prepared_) prepare();
   const FolderLock lock = session_files::lock_city(city_.folder());
-  const bool replaces = mode_ == Mode::kReplace;
-  check_session(city_, session_, replaces);
-  files_->commit(city_.session_folder(session_.name), replaces);
+  check_session(city_, session_, mode_ == Mode::kReplace);
+  files_->commit(city_.session_folder(session_.name));
 }
 
 }  // namespace dynains

@@ -6,7 +6,10 @@
 #include <memory>
 
 #include "dynains/errors.hpp"
+#include "dynains/io/folder_lock.hpp"
 #include "io/files.hpp"
+#include "io/folder_exchange.hpp"
+#include "io/log/staged_folder.hpp"
 #include "support/catch.hpp"
 
 namespace fs = std::filesystem;
@@ -165,4 +168,51 @@ TEST_CASE("Only temporary files of the named files without a writer are removed"
   fs::create_directory_symlink(folder.path(), folder / "elsewhere");
   CHECK_THAT(message_of<IoError>([&] { remove_leftovers(folder / "elsewhere", is_a); }),
              ContainsSubstring("elsewhere: is a link"));
+}
+
+TEST_CASE("A folder is put in place in one step, or not at all") {
+  const TemporaryFolder folder;
+  write_text(folder / "new/a.txt", "new");
+  CHECK_FALSE(put_in_place(folder / "new", folder / "target"));
+  CHECK(read_text(folder / "target/a.txt") == "new");
+  write_text(folder / "newer/a.txt", "newer");
+  CHECK(put_in_place(folder / "newer", folder / "target"));
+  CHECK(read_text(folder / "target/a.txt") == "newer");
+  CHECK(read_text(folder / "newer/a.txt") == "new");
+  // A folder cannot take the place of one that holds it.
+  fs::create_directory(folder / "target/inner");
+  CHECK_THAT(message_of<IoError>([&] { put_in_place(folder / "target/inner", folder / "target"); }),
+             ContainsSubstring("target: cannot be replaced in one step"));
+  CHECK_THAT(message_of<IoError>([&] { put_in_place(folder / "newer", folder / "none/target"); }),
+             ContainsSubstring("none/target: cannot be put in place"));
+  CHECK(read_text(folder / "target/a.txt") == "newer");
+  CHECK(read_text(folder / "newer/a.txt") == "new");
+}
+
+TEST_CASE("StagedFolder replaces its target whatever a killed process has left") {
+  const TemporaryFolder folder;
+  const fs::path target = folder / "log";
+  write_text(target / "old.txt", "old");
+  const auto replace = [&](const std::string& text) {
+    StagedFolder staged(target);
+    CHECK(count_entries(staged.path()) == 0);
+    write_text(staged.path() / "new.txt", text);
+    CHECK(count_entries(target) == 1);
+    staged.commit();
+  };
+  // Killed while it wrote, or when the target was complete and the earlier folder was left.
+  write_text(folder / ".log.dynains_staging/inner/half.txt", "half");
+  write_text(folder / ".log.dynains_earlier/old.txt", "old");
+  replace("new");
+  CHECK(read_text(target / "new.txt") == "new");
+  CHECK(count_entries(target) == 1);
+  CHECK_FALSE(fs::exists(folder / ".log.dynains_staging"));
+  replace("newer");
+  CHECK(read_text(target / "new.txt") == "newer");
+  {
+    const StagedFolder given_up(target);
+    CHECK_THROWS_AS(StagedFolder(target), UsageError);
+  }
+  CHECK(read_text(target / "new.txt") == "newer");
+  CHECK(count_entries(folder.path()) == 2);
 }

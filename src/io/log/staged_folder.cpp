@@ -1,17 +1,18 @@
 #include "staged_folder.hpp"
 
+#include <exception>
 #include <system_error>
 
 #include "../failure.hpp"
+#include "../folder_exchange.hpp"
 
 namespace dynains {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// The hidden folder beside `target` for `purpose`.
-fs::path beside(const fs::path& target, const char* purpose) {
-  return target.parent_path() / ('.' + target.filename().string() + purpose);
+fs::path staging_of(const fs::path& target) {
+  return target.parent_path() / ('.' + target.filename().string() + ".dynains_staging");
 }
 
 const fs::path& created(const fs::path& folder) {
@@ -21,17 +22,11 @@ const fs::path& created(const fs::path& folder) {
   return folder;
 }
 
-void rename_folder(const fs::path& from, const fs::path& to) {
-  std::error_code error;
-  fs::rename(from, to, error);
-  if (error) fail(to, "cannot be put in place: " + error.message());
-}
-
 }  // namespace
 
 StagedFolder::StagedFolder(const fs::path& target)
     : target_(target.has_filename() ? target : target.parent_path()),
-      staging_(beside(target_, ".dynains_staging")),
+      staging_(staging_of(target_)),
       lock_(created(staging_)) {
   // A killed process may have left files.
   for (const fs::directory_entry& left : fs::directory_iterator(staging_)) {
@@ -41,21 +36,21 @@ StagedFolder::StagedFolder(const fs::path& target)
 
 StagedFolder::~StagedFolder() {
   std::error_code ignored;
-  fs::remove_all(staging_, ignored);
+  if (!is_committed_) fs::remove_all(staging_, ignored);
 }
 
 void StagedFolder::commit() {
-  if (!fs::exists(target_)) return rename_folder(staging_, target_);
-  const fs::path earlier = beside(target_, ".dynains_earlier");
-  rename_folder(target_, earlier);
+  const bool has_earlier = put_in_place(staging_, target_);
+  is_committed_ = true;
+  if (!has_earlier) return;
+  // The earlier folder is the staging one now, which others may have begun to use.
   try {
-    rename_folder(staging_, target_);
-  } catch (...) {
-    rename_folder(earlier, target_);
-    throw;
+    const FolderLock lock(staging_);
+    std::error_code ignored;
+    fs::remove_all(staging_, ignored);
+  } catch (const std::exception&) {
+    // The next writer removes its files.
   }
-  std::error_code ignored;
-  fs::remove_all(earlier, ignored);
 }
 
 }  // namespace dynains

@@ -7,8 +7,9 @@
 
 namespace dynains {
 
-/// Files of a folder are written into a hidden one beside it, which `commit()` renames. Without a
-/// commit, the destructor removes it. All members throw IoError.
+/// Files of a folder are written into a hidden one beside it, `.NAME.dynains_staging`, which
+/// `commit()` puts in place in one step. Without a commit, the destructor removes it. What a killed
+/// process has left there, the next one removes. All members throw IoError.
 class StagedFolder {
  public:
   /// Throws UsageError if another process writes the same folder.
@@ -26,6 +27,7 @@ class StagedFolder {
   std::filesystem::path target_;
   std::filesystem::path staging_;
   FolderLock lock_;
+  bool is_committed_ = false;
 };
 
 }  // namespace dynains
