@@ -55,7 +55,7 @@ struct PrivateParameters {
 };
 
 RemoverConfig read_config(const PrivateParameters& parameters) {
-  RemoverConfig config = preset(parameters("preset", std::string("default")));
+  RemoverConfig config = RemoverConfig::preset(parameters("preset", std::string("default")));
   set_parameters(config, parameters);
   return config;
 }

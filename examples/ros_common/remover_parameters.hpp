@@ -16,18 +16,6 @@ namespace dynains_ros {
 
 using RemoverConfig = dynains::DynaInsRemover::Config;
 
-/// The configuration with this name: "default", "paper", "published", "offline" or "odometry".
-/// Throws dynains::ConfigError.
-inline RemoverConfig preset(const std::string& name) {
-  if (name == "default") return RemoverConfig();
-  if (name == "paper") return RemoverConfig::paper();
-  if (name == "published") return RemoverConfig::published();
-  if (name == "offline") return RemoverConfig::offline();
-  if (name == "odometry") return RemoverConfig::odometry();
-  throw dynains::ConfigError("preset = " + name +
-                             ": expected default|paper|published|offline|odometry");
-}
-
 /// The declaration of a parameter without its value. `min` and `max` are its least and its greatest
 /// valid value.
 struct ParameterText {

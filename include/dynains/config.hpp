@@ -306,6 +306,17 @@ struct PipelineConfig : RemoverConfig {
     return config;
   }
 
+  /// The configuration with this name: "default", "paper", "published", "offline" or "odometry".
+  /// Throws ConfigError.
+  static PipelineConfig preset(const std::string& name) {
+    if (name == "default") return PipelineConfig();
+    if (name == "paper") return paper();
+    if (name == "published") return published();
+    if (name == "offline") return offline();
+    if (name == "odometry") return odometry();
+    throw ConfigError("preset = " + name + ": expected default|paper|published|offline|odometry");
+  }
+
   /// Calls `visitor(name, config)` for the RemoverConfig and for the Config of each stage.
   template <class Self, class Visitor>
   static void visit_sections(Self& self, Visitor&& visitor) {

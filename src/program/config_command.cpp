@@ -16,7 +16,7 @@ void print_config(const std::string& preset_name) {
       << "# Parameters of dynains, preset " << preset_name
       << ". Use: dynains run ... --config FILE\n"
          "# Lines that are left out keep the value of the preset; flags win over this file.\n";
-  const DynaInsRemover::Config config = preset(preset_name);
+  const DynaInsRemover::Config config = DynaInsRemover::Config::preset(preset_name);
   DynaInsRemover::Config::visit_sections(config, [](const char* name, const auto& section) {
     using Section = std::remove_const_t<std::remove_reference_t<decltype(section)>>;
     std::cout << "\n# ---- " << name << " ----\n";
@@ -48,7 +48,7 @@ std::map<std::string, std::string> describe_values() {
   std::map<std::string, std::string> values;
   std::map<std::string, std::string> defaults;
   for (const std::string& name : preset_names()) {
-    const DynaInsRemover::Config config = preset(name);
+    const DynaInsRemover::Config config = DynaInsRemover::Config::preset(name);
     DynaInsRemover::Config::visit(config, [&](const auto& parameter) {
       const std::string value = format_value(parameter.value);
       if (defaults.emplace(parameter.name, value).second) {

@@ -15,7 +15,6 @@
 #include "published_table.hpp"
 #include "recording_options.hpp"
 #include "run/labelled_sequence.hpp"
-#include "run/preset.hpp"
 #include "variants.hpp"
 
 namespace dynains::program {
@@ -66,9 +65,10 @@ std::vector<Task> find_tasks(const fs::path& root, const ScanWindow& window) {
 }
 
 std::vector<Variant> table1_variants() {
-  std::vector<Variant> variants = {{"dynains, paper preset, IOC only", preset("paper")},
-                                   {"dynains, paper preset, full", preset("paper")},
-                                   {"dynains, default preset", preset("default")}};
+  using Config = DynaInsRemover::Config;
+  std::vector<Variant> variants = {{"dynains, paper preset, IOC only", Config::paper()},
+                                   {"dynains, paper preset, full", Config::paper()},
+                                   {"dynains, default preset", Config()}};
   variants[0].config.use_belief = false;
   return variants;
 }

@@ -16,14 +16,14 @@ RemoverOptions::RemoverOptions(CLI::App& command, std::string default_preset)
       ->check(CLI::IsMember(preset_names()))
       ->capture_default_str();
   command.add_option("--config", config_file_, "config file, see dynains config");
-  const auto defaults = preset(preset_);
+  const auto defaults = DynaInsRemover::Config::preset(preset_);
   DynaInsRemover::Config::visit_sections(defaults, [&](const char* name, const auto& section) {
     flags_.add_to(command, section, name);
   });
 }
 
 DynaInsRemover::Config RemoverOptions::config() const {
-  DynaInsRemover::Config config = preset(preset_);
+  DynaInsRemover::Config config = DynaInsRemover::Config::preset(preset_);
   if (!config_file_.empty()) read_config_file(config_file_).apply(config);
   flags_.values().apply(config);
   config.validate();

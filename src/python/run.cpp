@@ -190,7 +190,7 @@ void take_config(RunArguments& run) {
   if (run.config && run.preset) throw ConfigError("run: give preset or config, not both");
   RunSettings& settings = run.settings;
   settings.preset = run.preset.value_or("default");
-  settings.config = run.config ? *run.config : program::preset(settings.preset);
+  settings.config = run.config ? *run.config : DynaInsRemover::Config::preset(settings.preset);
   settings.config.validate();
   settings.find_own_body = !run.config && !program::has_ranges_of_paper(settings.preset);
 }

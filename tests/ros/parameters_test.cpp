@@ -50,7 +50,7 @@ TEST_CASE("a node declares every parameter of the remover") {
 }
 
 TEST_CASE("defaults stay exactly as they are") {
-  const RemoverConfig expected = preset("odometry");
+  const RemoverConfig expected = RemoverConfig::preset("odometry");
   RemoverConfig config = expected;
   set_parameters(config, User());
   std::map<std::string, double> values;
@@ -120,11 +120,11 @@ TEST_CASE("floats are declared as they are written") {
 }
 
 TEST_CASE("presets have names") {
-  CHECK(preset("paper").decision == dynains::Decision::kWindow);
+  CHECK(RemoverConfig::preset("paper").decision == dynains::Decision::kWindow);
   for (const char* name : {"default", "published", "offline", "odometry"}) {
-    CHECK_NOTHROW(preset(name).validate());
+    CHECK_NOTHROW(RemoverConfig::preset(name).validate());
   }
-  CHECK_THROWS_AS(preset("Paper"), dynains::ConfigError);
+  CHECK_THROWS_AS(RemoverConfig::preset("Paper"), dynains::ConfigError);
 }
 
 }  // namespace

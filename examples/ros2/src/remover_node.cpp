@@ -73,10 +73,11 @@ class FixedParameters {
 
 RemoverConfig declare_remover(rclcpp::Node& node) {
   const FixedParameters declare(node);
-  RemoverConfig config = preset(declare({"preset",
-                                         "configuration whose values the other parameters replace: "
-                                         "default|paper|published|offline|odometry"},
-                                        std::string("default")));
+  RemoverConfig config =
+      RemoverConfig::preset(declare({"preset",
+                                     "configuration whose values the other parameters replace: "
+                                     "default|paper|published|offline|odometry"},
+                                    std::string("default")));
   set_parameters(config, declare);
   return config;
 }
