@@ -17,6 +17,8 @@
 #include "io/finite_points.hpp"
 #include "io/text.hpp"
 #include "landmarks.hpp"
+#include "lost_scans.hpp"
+#include "point_time_faults.hpp"
 #include "pose_diagnosis.hpp"
 #include "pose_fit.hpp"
 #include "pose_shift.hpp"
@@ -418,6 +420,9 @@ Diagnosis diagnose_poses(const Recording& recording) {
   }
   compare_with_registration(recording, d);
   accept_proven_poses(recording, d);
+  if (!d.sound()) return d;
+  d.lost_scans = find_lost_clouds(recording);
+  if (d.lost_scans) d.verdict = PoseVerdict::kLostScans;
   return d;
 }
 
@@ -450,6 +455,14 @@ Diagnosis diagnose(const Recording& recording) {
     d.time_offset = recording.time_offset();
     d.option = kDeskewOption;
     return d;
+  }
+  if (d.verdict != PoseVerdict::kUnknown && recording.is_deskewed()) {
+    d.point_times = text_of(best_reading(point_times_gaps(recording, 0, recording.size() - 1)));
+    if (!d.point_times.empty()) {
+      d.verdict = PoseVerdict::kPointTimes;
+      d.option.clear();
+      return d;
+    }
   }
   if (d.sound() && d.scans > 0) d.ray_origin = find_ray_origin(recording, 0, d.scans - 1);
   if (d.ray_origin) {
@@ -559,6 +572,8 @@ std::string advice(const Diagnosis& d) {
                  "Scans agree if their points are moved to the place of the sensor at the time of "
                  "the scan: pass ") +
              kDeskewOption + ".";
+    case PoseVerdict::kPointTimes:
+      return "The times of points do not fit the motion: scans agree better " + d.point_times + '.';
     case PoseVerdict::kRayOrigin:
       return advice(*d.ray_origin);
     case PoseVerdict::kNoMotion:

@@ -5,6 +5,8 @@
 #include <numeric>
 
 #include "dynains/median.hpp"
+#include "io/finite_points.hpp"
+#include "landmarks.hpp"
 
 namespace dynains {
 namespace {
@@ -92,6 +94,94 @@ std::optional<LostScans> find_lost_scans(const Recording& recording,
     }
   }
   return best;
+}
+
+namespace {
+
+Landmarks landmarks_of(const Recording& recording, std::size_t i) {
+  const PointBuffer points = finite_points(recording.read_scan(i));
+  return Landmarks(points, estimate_mounting(points));
+}
+
+/// The scan behind `from` with which it is compared: a few metres away, so that all scans of a long
+/// recording are covered, or the last one.
+std::size_t next_compared(const Recording& recording, std::size_t from) {
+  constexpr double kWay = 4.0;  // m
+  constexpr std::size_t kMost = 10;
+  const Eigen::Vector3d& start = recording.T_world_sensor(from).translation();
+  std::size_t to = from + 1;
+  while (to + 1 < recording.size() && to < from + kMost &&
+         (recording.T_world_sensor(to + 1).translation() - start).norm() < kWay) {
+    ++to;
+  }
+  return to;
+}
+
+struct PlacedLandmarks {
+  std::size_t scan;
+  const Landmarks& landmarks;
+};
+
+/// Rows by which the pose of the later scan is too early, and the gap that the right one saves, m.
+struct ShiftGain {
+  int shift = 0;
+  double gain = 0.0;
+};
+
+ShiftGain best_later_rows(const Recording& recording, const PlacedLandmarks& a,
+                          const PlacedLandmarks& b) {
+  constexpr std::size_t kMost = 10;
+  constexpr std::size_t kFewestPoints = 200;
+  const Pose T_a_world = recording.T_world_sensor(a.scan).inverse();
+  const auto compare = [&](const Pose& T_world_b) {
+    return a.landmarks.compare(b.landmarks, T_a_world * T_world_b);
+  };
+  const Agreement given = compare(recording.T_world_sensor(b.scan));
+  ShiftGain best;
+  if (given.points < kFewestPoints) return best;
+  const std::size_t more = recording.pose_count() - recording.scan_file_count();
+  PoseConvention convention = recording.convention();
+  for (std::size_t shift = 1; shift <= std::min(kMost, more); ++shift) {
+    ++convention.shift;
+    const auto T_world_b = recording.pose_under(convention, b.scan);
+    if (!T_world_b) break;
+    const Agreement shifted = compare(*T_world_b);
+    const double gain = given.gap - shifted.gap;
+    if (is_clearly_better(shifted, given) && gain > best.gain) {
+      best = {static_cast<int>(shift), gain};
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+bool may_have_lost_clouds(const Recording& recording) {
+  const std::size_t rows = recording.pose_count(), scans = recording.scan_file_count();
+  return recording.frame() == PointFrame::kSensor && recording.missing_pose_count() == 0 &&
+         scans < rows && 2 * rows <= 3 * scans;
+}
+
+std::optional<LostScans> find_lost_clouds(const Recording& recording) {
+  if (!may_have_lost_clouds(recording) || recording.size() < 2) return std::nullopt;
+  std::optional<LostScans> found;
+  double largest_gain = 0.0;
+  std::size_t pairs = 0, doubtful = 0;
+  Landmarks a = landmarks_of(recording, 0);
+  for (std::size_t from = 0; from + 1 < recording.size(); ++pairs) {
+    const std::size_t to = next_compared(recording, from);
+    Landmarks b = landmarks_of(recording, to);
+    const ShiftGain best = best_later_rows(recording, {from, a}, {to, b});
+    doubtful += best.shift > 0 ? 1 : 0;
+    if (best.gain > largest_gain) {
+      largest_gain = best.gain;
+      found = LostScans{from, to, best.shift};
+    }
+    from = to;
+    a = std::move(b);
+  }
+  // Poses that are wrong everywhere are no sign of lost clouds.
+  return 4 * doubtful <= pairs ? found : std::nullopt;
 }
 
 }  // namespace dynains

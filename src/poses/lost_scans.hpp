@@ -18,4 +18,12 @@ std::optional<LostScans> find_lost_scans(const Recording& recording,
                                          const std::vector<RegisteredMotion>& motions,
                                          double exact);
 
+/// Whether there are more rows of poses than scans, though not so many as in a longer recording.
+bool may_have_lost_clouds(const Recording& recording);
+
+/// Looks at all scans of such a recording for the largest loss of clouds: from some scan on, the
+/// later of two neighbouring places fits clearly better under the poses of later rows. Throws
+/// IoError.
+std::optional<LostScans> find_lost_clouds(const Recording& recording);
+
 }  // namespace dynains

@@ -13,6 +13,7 @@
 #include "dynains/median.hpp"
 #include "lost_scans.hpp"
 #include "merged_scans.hpp"
+#include "point_time_faults.hpp"
 #include "pose_fit.hpp"
 #include "pose_proof.hpp"
 
@@ -425,6 +426,7 @@ bool confirms_poses(const Recording& recording, std::size_t first, std::size_t l
   const bool is_dense = scans_to_merge(recording) == 1;
   const double near = is_dense ? 0.04 : 0.1;
   const double noisy = is_dense ? 0.05 : 0.1;
+  if (may_have_lost_clouds(recording)) return false;
   const GivenMotions motions = register_given(recording, first, last, 1);
   const BodyMotion given = motion_under(recording, recording.convention());
   std::size_t confirmed = 0;
@@ -433,7 +435,8 @@ bool confirms_poses(const Recording& recording, std::size_t first, std::size_t l
     if (error_at_points({motion}, given) >= near) return false;
     ++confirmed;
   }
-  return confirmed >= kEnough;
+  if (confirmed < kEnough || !recording.is_deskewed()) return confirmed >= kEnough;
+  return best_reading(point_times_gaps(recording, first, last)) == PointTimesReading::kAsGiven;
 }
 
 }  // namespace dynains

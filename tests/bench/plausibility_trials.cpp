@@ -1,6 +1,6 @@
 // Trials of the warnings about faulty recordings. Each random world is spoilt by each kind of fault
-// of poses and clouds. A fault counts as harmful if at least 5 % more of the static points within
-// 50 m are called moving than with right poses, or if nothing is judged. It is told if the
+// of poses, clouds and times. A fault counts as harmful if at least 5 % more of the static points
+// within 50 m are called moving than with right poses, or if nothing is judged. It is told if the
 // plausibility check of the remover says so, or if `dynains run` would refuse or warn before its
 // first scan; the cause is right if that text has the words of the kind.
 //   plausibility_trials [FROM [WORLDS [SCANS [right|all]]]]
@@ -21,11 +21,14 @@
 #include <vector>
 
 #include "dynains/compiled_remover.hpp"
+#include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
+#include "dynains/io/point_file.hpp"
 #include "dynains/poses/pose_jumps.hpp"
 #include "dynains/simulation/random_world.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
+#include "run/range_check.hpp"
 #include "run/start_check.hpp"
 #include "support/simulated_runs.hpp"
 
@@ -35,19 +38,22 @@ namespace {
 
 using Scans = std::vector<simulation::SimulatedScan>;
 
-/// Cloud and pose that a host pushes instead of the right ones.
-struct Pushed {
+/// Cloud and pose of a scan as they are recorded.
+struct Recorded {
   std::vector<float> xyzi;
   Pose T_world_sensor;
-  bool is_lost = false;  // not pushed at all
+  bool is_lost = false;  // not recorded at all
 };
 
-using Fault = std::function<Pushed(const Scans&, std::size_t)>;
+using Fault = std::function<Recorded(const Scans&, std::size_t)>;
+/// Time of a point, s after that of its scan, of a sensor that takes `period` s for a scan.
+using FaultOfTime = std::function<double(double time, double period)>;
 
 struct Kind {
   std::string name;
   std::vector<std::string> causes;  ///< words of a right text; none: any text is right
   Fault fault;
+  FaultOfTime time = {};  ///< for points that are recorded as measured, and de-skewed by the run
 };
 
 Pose moved(double x, double y, double z) {
@@ -65,7 +71,7 @@ Pose turned(double degrees, const Eigen::Vector3d& axis = Eigen::Vector3d::UnitZ
 /// Poses that `change(scans, i)` gives.
 Fault posed(const std::function<Pose(const Scans&, std::size_t)>& change) {
   return [change](const Scans& scans, std::size_t i) {
-    return Pushed{scans[i].xyzi, change(scans, i)};
+    return Recorded{scans[i].xyzi, change(scans, i)};
   };
 }
 
@@ -87,12 +93,12 @@ Fault scaled_poses(double factor) {
 template <class ChangeOfScan>
 Fault changed_points(ChangeOfScan change_of_scan) {
   return [change_of_scan](const Scans& scans, std::size_t i) {
-    Pushed pushed{scans[i].xyzi, scans[i].T_world_sensor};
+    Recorded recorded{scans[i].xyzi, scans[i].T_world_sensor};
     auto change = change_of_scan(i);
-    for (std::size_t k = 0; k < pushed.xyzi.size(); ++k) {
-      if (k % 4 != 3) pushed.xyzi[k] = change(pushed.xyzi[k]);
+    for (std::size_t k = 0; k < recorded.xyzi.size(); ++k) {
+      if (k % 4 != 3) recorded.xyzi[k] = change(recorded.xyzi[k]);
     }
-    return pushed;
+    return recorded;
   };
 }
 
@@ -105,13 +111,13 @@ Fault scaled_points(float factor) {
 /// body.
 Fault in_body(float x, float y, float z) {
   return [x, y, z](const Scans& scans, std::size_t i) {
-    Pushed pushed{scans[i].xyzi, scans[i].T_world_sensor * moved(-x, -y, -z)};
-    for (std::size_t k = 0; k + 3 < pushed.xyzi.size(); k += 4) {
-      pushed.xyzi[k] += x;
-      pushed.xyzi[k + 1] += y;
-      pushed.xyzi[k + 2] += z;
+    Recorded recorded{scans[i].xyzi, scans[i].T_world_sensor * moved(-x, -y, -z)};
+    for (std::size_t k = 0; k + 3 < recorded.xyzi.size(); k += 4) {
+      recorded.xyzi[k] += x;
+      recorded.xyzi[k + 1] += y;
+      recorded.xyzi[k + 2] += z;
     }
-    return pushed;
+    return recorded;
   };
 }
 
@@ -122,6 +128,9 @@ Pose noise(std::size_t i, double metres, double degrees) {
                           metres * normal(random));
   return moved(t.x(), t.y(), t.z()) * turned(degrees * normal(random));
 }
+
+const std::vector<std::string> kMissing = {"seem to be missing", "may be missing",
+                                           "clouds were lost"};
 
 std::vector<Kind> kinds() {
   const auto jump = [](double metres, double degrees) {
@@ -150,23 +159,31 @@ std::vector<Kind> kinds() {
   const auto lost = [](std::size_t count) {
     return [count](const Scans& scans, std::size_t i) {
       const std::size_t first = scans.size() / 3;
-      const bool is_behind = i >= first + count;
-      return Pushed{scans[i].xyzi, scans[is_behind ? i - count : i].T_world_sensor,
-                    first <= i && !is_behind};
+      return Recorded{scans[i].xyzi, scans[i].T_world_sensor, first <= i && i < first + count};
     };
+  };
+  const auto held =
+      posed([](const Scans& scans, std::size_t i) { return scans[i - i % 3].T_world_sensor; });
+  const auto mirrored = [](const Scans& scans, std::size_t i) {
+    Recorded recorded{scans[i].xyzi, scans[i].T_world_sensor};
+    for (std::size_t k = 1; k < recorded.xyzi.size(); k += 4) recorded.xyzi[k] *= -1.0F;
+    return recorded;
   };
   const std::vector<std::string> body = {"--extrinsic"}, none;
   return {{"right", none, right},
           {"clouds of a body", {"--sensor-origin", "rays do not begin"}, in_body(1.0F, 0.0F, 1.5F)},
           {"jump of 3 m", {"poses jump"}, jump(3, 2)},
-          {"points in mm", {"units"}, scaled_points(1000.0F)},
-          {"points in cm", {"units"}, scaled_points(100.0F)},
+          {"points in mm", {"units", "metres"}, scaled_points(1000.0F)},
+          {"points in cm", {"units", "metres"}, scaled_points(100.0F)},
+          {"points in feet", none, scaled_points(3.2808F)},
+          {"mirrored points", none, mirrored},
           {"poses in mm", {"--pose-units mm"}, scaled_poses(1000.0)},
           {"poses in km", none, scaled_poses(0.001)},
           {"poses 10 % too long", {"--pose-scale"}, scaled_poses(1.1)},
           {"inverse", {"--invert-poses"}, posed([](const Scans& scans, std::size_t i) {
              return Pose((scans[0].T_world_sensor.inverse() * scans[i].T_world_sensor).inverse());
            })},
+          {"yawed by 10 deg", body, of_body(turned(10))},
           {"yawed by 90 deg", body, of_body(turned(90))},
           {"yawed by 180 deg", body, of_body(turned(180))},
           {"upside down", body, of_body(turned(180, Eigen::Vector3d::UnitX()))},
@@ -175,7 +192,9 @@ std::vector<Kind> kinds() {
            posed([](const Scans& scans, std::size_t i) {
              return scans[std::min(i + 2, scans.size() - 1)].T_world_sensor;
            })},
-          {"three clouds lost", {"seem to be missing", "may be missing"}, lost(3)},
+          {"poses held for three scans", none, held},
+          {"one cloud lost", kMissing, lost(1)},
+          {"three clouds lost", kMissing, lost(3)},
           {"noise of 20 cm and 1 deg", {"inexact"}, posed([](const Scans& scans, std::size_t i) {
              return Pose(scans[i].T_world_sensor * noise(i, 0.2, 1.0));
            })},
@@ -185,29 +204,89 @@ std::vector<Kind> kinds() {
           {"points with noise of 30 cm", none, noisy_points}};
 }
 
-/// Text by which `dynains run` would warn or refuse the poses before its first scan; empty if it
-/// accepts them.
-std::string said_by_run(const Scans& scans, const Fault& fault,
-                        const std::filesystem::path& folder) {
-  std::filesystem::remove_all(folder / "velodyne");
-  std::filesystem::create_directory(folder / "velodyne");
-  std::vector<Pose> rows;
+/// Kinds of clouds that are recorded as measured.
+std::vector<Kind> kinds_of_times() {
+  const Fault right = kinds().front().fault;
+  const std::vector<std::string> times = {"times of points", "times in s, ms, us or ns"};
+  return {
+      {"not de-skewed, no times", {}, right},
+      {"right times", {}, right, [](double time, double) { return time; }},
+      {"reversed times", times, right, [](double time, double period) { return period - time; }},
+      {"half times", times, right, [](double time, double) { return 0.5 * time; }},
+      {"double times", times, right, [](double time, double) { return 2.0 * time; }},
+      {"times of another unit", times, right, [](double time, double) { return 1e-4 * time; }},
+      {"times of noise", times, right,
+       [](double time, double period) { return std::fmod(7919.0 * time, period); }}};
+}
+
+struct WrittenScans {
+  Recording recording;
+  std::vector<std::size_t> scans;  ///< simulated, of each recorded one
+};
+
+/// Writes clouds with times if `kind` has them, else the layout of KITTI without times, and poses
+/// also of lost clouds. Throws IoError like `run`.
+WrittenScans write_and_open(const Scans& scans, const Kind& kind,
+                            const std::filesystem::path& folder) {
+  std::filesystem::remove_all(folder);
+  const std::filesystem::path clouds = folder / (kind.time ? "pcd" : "velodyne");
+  std::filesystem::create_directories(clouds);
+  std::vector<Pose> poses;
+  std::vector<double> times;
+  std::vector<std::size_t> written;
   for (std::size_t i = 0; i < scans.size(); ++i) {
-    const Pushed pushed = fault(scans, i);
-    if (pushed.is_lost) continue;
-    write_scan(folder / "velodyne" / (simulation::scan_name(rows.size()) + ".bin"), pushed.xyzi);
-    rows.push_back(pushed.T_world_sensor);
+    const Recorded recorded = kind.fault(scans, i);
+    poses.push_back(recorded.T_world_sensor);
+    if (recorded.is_lost) continue;
+    const std::string name = simulation::scan_name(written.size());
+    if (kind.time) {
+      const double period = scans[1].time - scans[0].time;
+      PointColumns columns;
+      columns.time = true;
+      PointFileWriter file(clouds / (name + ".pcd"), columns);
+      for (std::size_t k = 0; k < scans[i].times.size(); ++k) {
+        FilePoint point;
+        point.position = Eigen::Map<const Eigen::Vector3f>(&recorded.xyzi[4 * k]).cast<double>();
+        point.time = kind.time(static_cast<double>(scans[i].times[k]), period);
+        file.add(point);
+      }
+      file.commit();
+    } else {
+      write_scan(clouds / (name + ".bin"), recorded.xyzi);
+    }
+    times.push_back(scans[written.size()].time);
+    written.push_back(i);
   }
-  write_poses(folder / "poses.txt", rows);
-  const Recording recording(folder);
-  const std::size_t last = recording.size() - 1;
-  std::string text;
-  const std::vector<PoseJump> jumps = find_pose_jumps(recording, 0, last);
-  if (!jumps.empty()) text = sentence_on(recording, jumps) + ' ';
+  write_poses(folder / "poses.txt", poses);
+  if (kind.time) write_times(folder / "times.txt", times);
+  RecordingOptions options;
+  options.deskew = static_cast<bool>(kind.time);
+  return {Recording(folder, options), written};
+}
+
+/// What `dynains run` says before its first scan.
+struct Start {
+  std::string text;  ///< of warnings and a refusal
+  bool is_refused = false;
+};
+
+Start start_of_run(const Recording& recording) {
+  const program::ScanRange range{0, recording.size() - 1};
+  Start said;
+  try {
+    program::check_ranges(recording, range, RemoverConfig(), false);
+  } catch (const ConfigError& error) {
+    return {error.what(), true};
+  }
+  for (const std::string& warning : recording.warnings()) said.text += warning + ' ';
+  const std::vector<PoseJump> jumps = find_pose_jumps(recording, 0, range.last);
+  if (!jumps.empty()) said.text += sentence_on(recording, jumps) + ' ';
   const program::StartCheck start =
-      program::check_start(recording, {0, last}, RemoverConfig(), false, folder.string());
-  for (const std::string& warning : start.warnings) text += warning + ' ';
-  return text + start.refusal;
+      program::check_start(recording, range, RemoverConfig(), false, recording.folder().string());
+  for (const std::string& warning : start.warnings) said.text += warning + ' ';
+  said.text += start.refusal;
+  said.is_refused = !start.refusal.empty();
+  return said;
 }
 
 struct Outcome {
@@ -215,16 +294,16 @@ struct Outcome {
   Plausibility worst;
   Suspicion first = Suspicion::kNone;
   std::uint64_t since = 0;
-  std::string said;  ///< by a run, before its first scan
+  Start said;
 };
 
-Outcome judge(const Scans& scans, const Fault& fault) {
+/// Removes from the recording as a run would if it began; times are those of the simulated scans.
+Outcome judge(const Scans& scans, const WrittenScans& written) {
   constexpr float kFarthest = 50.0F;  // m
   Outcome outcome;
   std::uint64_t fixed = 0, lost = 0;
-  std::vector<std::size_t> pushes;  // scan of each
   const auto count = [&](const ScanVerdict& verdict) {
-    const simulation::SimulatedScan& scan = scans[pushes[verdict.scan]];
+    const simulation::SimulatedScan& scan = scans[written.scans[verdict.scan]];
     for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
       const std::uint32_t label = scan.labels[i] & 0xFFFFU;
       const bool is_fixed = label > 1 && label < 252;
@@ -234,13 +313,12 @@ Outcome judge(const Scans& scans, const Fault& fault) {
     }
   };
   DynaInsRemover remover;
-  for (std::size_t i = 0; i < scans.size(); ++i) {
-    const Pushed pushed = fault(scans, i);
-    if (pushed.is_lost) continue;
-    pushes.push_back(i);
-    const RawPoints<float> points{pushed.xyzi.data(), scans[i].labels.size(), 4};
+  RecordedScan scan;
+  for (std::size_t i = 0; i < written.recording.size(); ++i) {
+    written.recording.read_scan(i, scan);
+    const RawPoints<float> points{scan.xyzi.data(), scan.size(), 4};
     const FrameResult frame =
-        remover.push(points, pushed.T_world_sensor, scans[pushes.size() - 1].time);
+        remover.push(points, written.recording.T_world_sensor(i), scans[i].time);
     outcome.worst.raise_shares(frame.plausibility);
     if (outcome.first == Suspicion::kNone && frame.plausibility.suspicion != Suspicion::kNone) {
       outcome.first = frame.plausibility.suspicion;
@@ -253,37 +331,52 @@ Outcome judge(const Scans& scans, const Fault& fault) {
   return outcome;
 }
 
+/// A recording that cannot be opened counts as refused, with nothing lost.
+Outcome outcome_of(const Scans& scans, const Kind& kind, const std::filesystem::path& folder) {
+  try {
+    const WrittenScans written = write_and_open(scans, kind, folder);
+    Outcome outcome = judge(scans, written);
+    outcome.said = start_of_run(written.recording);
+    return outcome;
+  } catch (const IoError& error) {
+    Outcome outcome;
+    outcome.said = {error.what(), true};
+    return outcome;
+  }
+}
+
 struct Counts {
-  int trials = 0, harmful = 0, told = 0, with_cause = 0, alarms = 0;
+  int trials = 0, harmful = 0, told = 0, with_cause = 0, refused = 0, alarms = 0;
 };
 
 bool has_right_cause(const Outcome& outcome, const std::vector<std::string>& causes) {
-  const std::string text = outcome.said + (outcome.first == Suspicion::kUnits ? " units" : "");
-  return std::any_of(causes.begin(), causes.end(), [&](const std::string& cause) {
-    return text.find(cause) != std::string::npos;
-  });
+  const std::string text = outcome.said.text + (outcome.first == Suspicion::kUnits ? " units" : "");
+  return causes.empty() || std::any_of(causes.begin(), causes.end(), [&](const std::string& cause) {
+           return text.find(cause) != std::string::npos;
+         });
 }
 
-void take(const std::string& world, const Kind& named, const Outcome& outcome, double usual,
+void take(const std::string& world, const Kind& kind, const Outcome& outcome, double usual,
           std::map<std::string, Counts>& counts) {
   constexpr double kHarm = 0.05;
-  const std::string& kind = named.name;
-  const bool is_told = outcome.first != Suspicion::kNone || !outcome.said.empty();
+  const bool is_told = outcome.first != Suspicion::kNone || !outcome.said.text.empty();
   const bool is_harmful = outcome.lost > usual + kHarm || outcome.worst.not_judged > 0.98F;
-  Counts& sum = counts[kind];
+  Counts& sum = counts[kind.name];
   ++sum.trials;
   sum.alarms += is_told ? 1 : 0;
   sum.harmful += is_harmful ? 1 : 0;
-  sum.told += is_harmful && is_told ? 1 : 0;
-  sum.with_cause +=
-      is_harmful && is_told && (named.causes.empty() || has_right_cause(outcome, named.causes)) ? 1
-                                                                                                : 0;
+  if (is_harmful && is_told) {
+    ++sum.told;
+    sum.with_cause += has_right_cause(outcome, kind.causes) ? 1 : 0;
+    sum.refused += outcome.said.is_refused ? 1 : 0;
+  }
   const Plausibility& worst = outcome.worst;
   std::cout << std::fixed << std::setprecision(3) << world << ' ' << std::left << std::setw(26)
-            << kind << " lost " << outcome.lost << " ground " << worst.ground_free << " instances "
-            << worst.instance_free << " residual " << worst.residual << " misfits " << worst.misfits
-            << " unjudged " << worst.not_judged << " told " << static_cast<int>(outcome.first)
-            << " since " << outcome.since << " said " << outcome.said << std::endl;
+            << kind.name << " lost " << outcome.lost << (is_harmful ? " harmful" : "") << " ground "
+            << worst.ground_free << " instances " << worst.instance_free << " residual "
+            << worst.residual << " misfits " << worst.misfits << " unjudged " << worst.not_judged
+            << " told " << static_cast<int>(outcome.first) << " since " << outcome.since
+            << (outcome.said.is_refused ? " refused " : " said ") << outcome.said.text << std::endl;
 }
 
 }  // namespace
@@ -308,26 +401,32 @@ int main(int argc, char** argv) {
     const Scans scans = test::simulate(config);
     double usual = 0.0;
     for (const Kind& kind : kinds()) {
-      Outcome outcome = judge(scans, kind.fault);
-      outcome.said = said_by_run(scans, kind.fault, folder);
+      const Outcome outcome = outcome_of(scans, kind, folder / "recording");
       if (kind.name == "right") usual = outcome.lost;
       take(world, kind, outcome, usual, counts);
       if (only_right) break;
     }
-    if (only_right) continue;
     config.rolling_shutter = true;
     config.deskewed = 0.0;
     const Scans skewed = test::simulate(config);
-    const Fault right = kinds().front().fault;
-    Outcome outcome = judge(skewed, right);
-    outcome.said = said_by_run(skewed, right, folder);
-    take(world, {"not de-skewed", {}, right}, outcome, usual, counts);
+    for (const Kind& kind : kinds_of_times()) {
+      if (only_right && kind.name != "right times") continue;
+      take(world, kind, outcome_of(skewed, kind, folder / "recording"), usual, counts);
+    }
+    if (only_right) continue;
+    Kind twice = kinds_of_times().at(1);
+    const Recording deskewed = write_and_open(skewed, twice, folder / "deskewed").recording;
+    twice.name = "de-skewed twice";
+    twice.fault = [&](const Scans& scans, std::size_t k) {
+      return Recorded{deskewed.read_scan(k).xyzi, scans[k].T_world_sensor};
+    };
+    take(world, twice, outcome_of(skewed, twice, folder / "recording"), usual, counts);
   }
   std::filesystem::remove_all(folder);
-  std::cout << "| kind | trials | harmful | of them told | with the cause | told in all |\n"
-               "|---|---|---|---|---|---|\n";
+  std::cout << "| kind | trials | harmful | of them told | with the cause | refused | told in all "
+               "|\n|---|---|---|---|---|---|---|\n";
   for (const auto& [kind, sum] : counts) {
     std::cout << "| " << kind << " | " << sum.trials << " | " << sum.harmful << " | " << sum.told
-              << " | " << sum.alarms << " |\n";
+              << " | " << sum.with_cause << " | " << sum.refused << " | " << sum.alarms << " |\n";
   }
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dynains/io/kitti.hpp"
+#include "dynains/io/point_file.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
 #include "io/files.hpp"
@@ -323,4 +324,75 @@ TEST_CASE("check and run tell poses of other scans behind clouds that were lost"
     CHECK(run.code == 2);
     CHECK_THAT(run.err, ContainsSubstring("Clouds seem to be missing"));
   }
+}
+
+TEST_CASE("check and run find clouds that were lost at constant speed, if poses are left over") {
+  simulation::Config config;
+  config.scene = simulation::Scene::kUrban;
+  config.sensor = simulation::Sensor::kOs1_64;
+  config.scans = 40;
+  config.seed = 11;
+  config.ego_speed = 12;
+  const Drive drive(config);
+  constexpr std::size_t kLost = 2, kFirst = 17;
+  for (std::size_t i = kFirst; i + kLost < drive.size(); ++i) {
+    fs::rename(drive.file_of(i + kLost), drive.file_of(i));
+  }
+  for (std::size_t i = drive.size() - kLost; i < drive.size(); ++i) fs::remove(drive.file_of(i));
+  const Outcome outcome = start({"check", drive.path()});
+  CHECK(outcome.code == 1);
+  CHECK_THAT(outcome.out, ContainsSubstring("Clouds seem to be missing between the scans") &&
+                              ContainsSubstring("2 rows later"));
+  const Outcome run = drive.run();
+  CHECK(run.code == 2);
+  CHECK_THAT(run.err, ContainsSubstring("Clouds seem to be missing"));
+  // The same scans without a loss, of a drive with poses behind them.
+  const Drive whole(config);
+  fs::remove(whole.file_of(39));
+  fs::remove(whole.file_of(38));
+  CHECK(start({"check", whole.path()}).code == 0);
+  CHECK(whole.run().code == 0);
+}
+
+TEST_CASE("check and run tell times of points that run backwards") {
+  simulation::Config config;
+  config.scene = simulation::Scene::kUrban;
+  config.sensor = simulation::Sensor::kOs1_64;
+  config.scans = 30;
+  config.seed = 43;
+  config.ego_speed = 12;
+  config.rolling_shutter = true;
+  const Drive drive(config);
+  const TemporaryFolder folder;
+  const fs::path seq = folder / "seq";
+  const auto write = [&](const std::function<double(double)>& time) {
+    fs::create_directories(seq / "pcd");
+    for (std::size_t i = 0; i < drive.size(); ++i) {
+      const simulation::SimulatedScan& scan = drive.scan(i);
+      PointColumns columns;
+      columns.time = true;
+      PointFileWriter file(seq / "pcd" / (simulation::scan_name(i) + ".pcd"), columns);
+      for (std::size_t k = 0; k < scan.times.size(); ++k) {
+        FilePoint point;
+        point.position = Eigen::Map<const Eigen::Vector3f>(&scan.xyzi[4 * k]).cast<double>();
+        point.time = time(static_cast<double>(scan.times[k]));
+        file.add(point);
+      }
+      file.commit();
+    }
+    fs::copy_file(drive.path() + "/poses.txt", seq / "poses.txt",
+                  fs::copy_options::overwrite_existing);
+  };
+  const auto run = [&] {
+    return start({"run", seq, "-o", folder / "out", "-q", "--force", "--deskew"});
+  };
+  write([](double time) { return time; });
+  CHECK(start({"check", seq, "--deskew"}).code == 0);
+  CHECK(run().code == 0);
+  write([](double time) { return 0.1 - time; });
+  const Outcome backwards = start({"check", seq, "--deskew"});
+  CHECK(backwards.code == 1);
+  CHECK_THAT(backwards.out, ContainsSubstring("agree better if they run backwards in each scan"));
+  CHECK(run().code == 2);
+  CHECK_THAT(run().err, ContainsSubstring("The times of points do not fit the motion"));
 }

@@ -42,6 +42,7 @@ enum class PoseVerdict {
   kNoMotion,    ///< too little motion or too few objects for a decision
   kDisagree,    ///< scans agree under no convention
   kSkewed,      ///< scans agree if their points are de-skewed
+  kPointTimes,  ///< scans agree better under other times of their points; see `point_times`
   kRayOrigin,   ///< scans agree, but rays begin elsewhere; see `ray_origin`
   kWorldFrame,  ///< points are in the world frame and agree there; poses have no effect
   kUnknown      ///< too few points or scans
@@ -84,6 +85,7 @@ struct Diagnosis {
   PoseConvention convention;
   double time_offset = 0.0;             ///< s, as RecordingOptions::time_offset
   std::optional<LostScans> lost_scans;  ///< for kLostScans
+  std::string point_times;              ///< for kPointTimes: what they seem to be
   std::optional<RayOrigin> ray_origin;  ///< if it is not that of the clouds
   std::string option;                   ///< flags of `dynains run` for all of these; empty: none
   PoseVerdict verdict = PoseVerdict::kUnknown;
@@ -140,8 +142,9 @@ PoseAgreement pose_agreement(const Recording& recording, std::size_t first, std:
 
 /// Whether the scans `first` to `last` (inclusive) prove the given poses, at the places where most
 /// mistakes would show: in the sharpest turn, at the largest change of speed and at the highest
-/// speed. It costs a few registrations. That they do not is no finding: see diagnose(). Throws
-/// IoError.
+/// speed. It costs a few registrations. Poses of more rows than there are scans, which may show
+/// lost clouds, are never proved, nor are scans that agree better under other times of their
+/// points. That they are not is no finding: see diagnose(). Throws IoError.
 bool confirms_poses(const Recording& recording, std::size_t first, std::size_t last);
 
 /// One sentence with the verdict on the poses and the recommended option.
