@@ -160,10 +160,9 @@ void check_size(const RawFile& file, const LasHeader& header) {
 
 }  // namespace
 
-PointFile read_las(const std::filesystem::path& path) {
+void read_las(const std::filesystem::path& path, PointSink& sink) {
   constexpr std::uint64_t kBlock = 1U << 14U;  // points
   RawFile file(path);
-  PointSink sink;
   const LasHeader header = read_header(file, sink);
   check_size(file, header);
   sink.resize(static_cast<std::size_t>(header.point_count));
@@ -185,7 +184,6 @@ PointFile read_las(const std::filesystem::path& path) {
       }
     }
   }
-  return std::move(sink.file());
 }
 
 PointFileHeader read_las_header(const std::filesystem::path& path) {

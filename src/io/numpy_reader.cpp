@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <iterator>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,8 +20,9 @@ struct NpyColumn {
   Role role;
   Scalar type;
   bool swap;
-  std::uint64_t begin;   // byte of the first value
-  std::uint64_t stride;  // bytes from value to value
+  std::uint64_t begin;                    // byte of the first value
+  std::uint64_t stride;                   // bytes from value to value
+  std::optional<std::size_t> other = {};  // place among the other values of a point
 };
 
 struct NpyPoints {
@@ -73,11 +76,55 @@ NpyPoints points_of_array(const Bytes& place, const NpyArray& array, PointSink& 
                                : plain_points(place, array, sink);
 }
 
+/// PLY, which holds the clean clouds of arrays, has no 64-bit integers: they become doubles.
+Scalar type_in_ply(Scalar type) {
+  return type == Scalar::kInt64 || type == Scalar::kUint64 ? Scalar::kDouble : type;
+}
+
+/// Adds the columns that have no role: fields, or those of an array with a row for each point. A
+/// table of several gives them the name of the array and a number.
+void add_other_columns(const NpyArray& array, const std::string& name, NpyPoints& points,
+                       PointSink& sink) {
+  constexpr std::uint64_t kMostColumns = 1000;
+  const auto add = [&](const NpyArray::Field& field, const std::string& column, std::uint64_t begin,
+                       std::uint64_t stride) {
+    begin += array.data_begin;
+    const bool has_role = std::any_of(points.columns.begin(), points.columns.end(),
+                                      [&](const NpyColumn& one) { return one.begin == begin; });
+    if (has_role || !field.type) return;
+    const auto place = sink.claim_other(column, type_in_ply(*field.type));
+    if (!place) return;
+    points.columns.push_back({Role::kNone, *field.type, field.swap, begin, stride, place});
+  };
+  if (array.is_structured()) {
+    for (const NpyArray::Field& field : array.fields) {
+      if (array.item_count() == points.count) add(field, field.name, field.offset, array.item_size);
+    }
+    return;
+  }
+  const std::uint64_t columns = array.shape.size() < 2 ? 1 : array.shape.back();
+  const bool has_rows = columns <= kMostColumns && array.item_count() == columns * points.count;
+  if (!has_rows || (array.is_column_major && array.shape.size() > 2)) return;
+  const std::uint64_t step = array.is_column_major ? points.count : 1;
+  const std::uint64_t stride = array.item_size * (array.is_column_major ? 1 : columns);
+  for (std::uint64_t i = 0; i < columns; ++i) {
+    add(array.fields.front(), columns == 1 ? name : name + '_' + std::to_string(i),
+        i * step * array.item_size, stride);
+  }
+}
+
+/// Whole numbers of 64 bits are rounded to 53 bits.
+bool store_value(const NpyColumn& column, const char* value, std::size_t i, PointSink& sink) {
+  const double number = load_scalar(column.type, value, column.swap);
+  return column.other ? store_scalar(type_in_ply(column.type), number, sink.other(i, *column.other))
+                      : sink.set(i, column.role, number);
+}
+
 void store_column(const Bytes& place, const NpyColumn& column, std::uint64_t count,
                   const std::uint8_t* bytes, PointSink& sink) {
   const char* value = reinterpret_cast<const char*>(bytes) + column.begin;
   for (std::size_t i = 0; i < count; ++i, value += column.stride) {
-    if (sink.set(i, column.role, load_scalar(column.type, value, column.swap))) continue;
+    if (store_value(column, value, i, sink)) continue;
     place.fail("expected whole numbers of at least 0 for rings and labels");
   }
 }
@@ -99,8 +146,10 @@ NpyFile open_npy(const std::filesystem::path& path, PointSink& sink, bool with_p
   const std::uint64_t longest = with_points ? raw.size() : kLongestNpyHeader + 16;
   raw.read(0, std::min(raw.size(), longest), "an array", file.bytes);
   const Bytes bytes(raw.path(), 0, file.bytes.data(), file.bytes.size());
-  file.points = points_of_array(bytes, parse_npy_header(bytes, raw.size()), sink);
+  const NpyArray array = parse_npy_header(bytes, raw.size());
+  file.points = points_of_array(bytes, array, sink);
   require_xyz(path, sink);
+  add_other_columns(array, "column", file.points, sink);
   return file;
 }
 
@@ -108,7 +157,8 @@ NpyFile open_npy(const std::filesystem::path& path, PointSink& sink, bool with_p
 
 struct NpzColumns {
   std::vector<std::uint8_t> bytes;
-  std::string name;
+  std::string name, stem;
+  NpyArray array;
   NpyPoints points;
 };
 
@@ -129,7 +179,7 @@ bool may_be_points(const NpyArray& array, Role role) {
 
 std::vector<NpzColumns> open_npz(const std::filesystem::path& path, PointSink& sink) {
   ZipArchive archive(path);
-  std::vector<NpzColumns> all;
+  std::vector<NpzColumns> all, others;
   for (const ZipArchive::Member& member : archive.members()) {
     const std::filesystem::path member_path(member.name);
     if (member_path.extension() != ".npy") continue;
@@ -138,11 +188,16 @@ std::vector<NpzColumns> open_npz(const std::filesystem::path& path, PointSink& s
     one.name = path.string() + ": " + member.name;
     const std::filesystem::path place(one.name);
     const Bytes bytes(place, 0, one.bytes.data(), one.bytes.size());
-    const NpyArray array = parse_npy_header(bytes, one.bytes.size());
-    const Role role = role_of(member_path.stem().string());
-    if (!may_be_points(array, role)) continue;
-    one.points = points_of_member(bytes, array, role, sink);
-    if (one.points.columns.empty()) continue;
+    one.array = parse_npy_header(bytes, one.bytes.size());
+    one.stem = member_path.stem().string();
+    const Role role = role_of(one.stem);
+    if (may_be_points(one.array, role)) {
+      one.points = points_of_member(bytes, one.array, role, sink);
+    }
+    if (one.points.columns.empty()) {
+      if (sink.wants_others()) others.push_back(std::move(one));
+      continue;
+    }
     if (!all.empty() && one.points.count != all.front().points.count) {
       bytes.fail("expected " + std::to_string(all.front().points.count) + " items, as in " +
                  all.front().name + ", found " + std::to_string(one.points.count));
@@ -150,20 +205,21 @@ std::vector<NpzColumns> open_npz(const std::filesystem::path& path, PointSink& s
     all.push_back(std::move(one));
   }
   require_xyz(path, sink);
+  for (NpzColumns& one : others) one.points.count = all.front().points.count;
+  std::move(others.begin(), others.end(), std::back_inserter(all));
+  for (NpzColumns& one : all) add_other_columns(one.array, one.stem, one.points, sink);
   return all;
 }
 
 }  // namespace
 
-PointFile read_npy(const std::filesystem::path& path) {
-  PointSink sink;
+void read_npy(const std::filesystem::path& path, PointSink& sink) {
   const NpyFile file = open_npy(path, sink, true);
   sink.resize(static_cast<std::size_t>(file.points.count));
   const Bytes place(path, 0, file.bytes.data(), file.bytes.size());
   for (const NpyColumn& column : file.points.columns) {
     store_column(place, column, file.points.count, file.bytes.data(), sink);
   }
-  return std::move(sink.file());
 }
 
 PointFileHeader read_npy_header(const std::filesystem::path& path) {
@@ -174,8 +230,7 @@ PointFileHeader read_npy_header(const std::filesystem::path& path) {
 
 void check_npy(const std::filesystem::path& path) { read_npy_header(path); }
 
-PointFile read_npz(const std::filesystem::path& path) {
-  PointSink sink;
+void read_npz(const std::filesystem::path& path, PointSink& sink) {
   const std::vector<NpzColumns> all = open_npz(path, sink);
   sink.resize(static_cast<std::size_t>(all.front().points.count));
   for (const NpzColumns& one : all) {
@@ -185,7 +240,6 @@ PointFile read_npz(const std::filesystem::path& path) {
       store_column(place, column, one.points.count, one.bytes.data(), sink);
     }
   }
-  return std::move(sink.file());
 }
 
 PointFileHeader read_npz_header(const std::filesystem::path& path) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,6 +27,7 @@ struct Field {
   std::size_t count = 1;
   Scalar type = Scalar::kFloat;
   Role role = Role::kNone;
+  std::optional<std::size_t> other;  ///< place among the other values of a point
 
   std::size_t bytes() const { return size * count; }
 };
@@ -188,7 +190,11 @@ void finish_header(const ByteReader& reader, PcdHeader& header, PointSink& sink)
     if (field.type_letter == 0) reader.fail_on_line("expected TYPE before DATA");
     field.type = scalar_of(reader, field);
     const Role role = field.count == 1 ? role_of(field.name) : Role::kNone;
-    if (role != Role::kNone && sink.claim(role)) field.role = role;
+    if (role != Role::kNone && sink.claim(role)) {
+      field.role = role;
+    } else {
+      field.other = sink.claim_other(field.name, field.type, field.count);
+    }
   }
   if (const auto name = sink.missing()) reader.fail_on_line("expected a field " + *name);
   if (!header.has_width && !header.has_points) {
@@ -278,6 +284,19 @@ BlockSizes read_block_sizes(ByteReader& reader, const PcdHeader& header) {
   return {compressed_size, plain_size};
 }
 
+/// A value of a text among the other values; 64-bit integers keep all digits.
+bool store_other(Scalar type, std::string_view token, double value, char* bytes) {
+  const auto store_whole = [&](auto number) {
+    const auto [stop, error] = std::from_chars(token.data(), token.data() + token.size(), number);
+    if (error != std::errc{} || stop != token.data() + token.size()) return false;
+    std::memcpy(bytes, &number, sizeof(number));
+    return true;
+  };
+  if (type == Scalar::kInt64 && store_whole(std::int64_t{})) return true;
+  if (type == Scalar::kUint64 && store_whole(std::uint64_t{})) return true;
+  return store_scalar(type, value, bytes);
+}
+
 void read_ascii(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
   check_ascii(reader, header);
   sink.resize(static_cast<std::size_t>(header.points));
@@ -296,7 +315,10 @@ void read_ascii(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
                               (token.empty() ? "the end of the line"
                                              : "\"" + std::string(token.substr(0, 40)) + "\""));
         }
-        if (!sink.set(i, field.role, *value)) {
+        const bool is_held = field.other ? store_other(field.type, token, *value,
+                                                       sink.other(i, *field.other + k * field.size))
+                                         : sink.set(i, field.role, *value);
+        if (!is_held) {
           reader.fail_on_line("expected a whole number that " + field.name + " can have");
         }
       }
@@ -318,6 +340,7 @@ void read_binary(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
           !sink.set(i, field.role, load_scalar(field.type, bytes, false))) {
         fail_value(field, i, reader);
       }
+      if (field.other) std::memcpy(sink.other(i, *field.other), bytes, field.bytes());
       bytes += field.bytes();
     }
   }
@@ -345,6 +368,9 @@ void read_compressed(ByteReader& reader, const PcdHeader& header, PointSink& sin
       if (!sink.set(i, field.role, load_scalar(field.type, column + i * field.size, false))) {
         fail_value(field, i, reader);
       }
+    }
+    for (std::size_t i = 0; field.other && i < count; ++i) {
+      std::memcpy(sink.other(i, *field.other), column + i * field.bytes(), field.bytes());
     }
     column += field.bytes() * count;
   }
@@ -391,9 +417,8 @@ void copy_pcd(const std::filesystem::path& path, Span<const std::uint8_t> keep,
   }
 }
 
-PointFile read_pcd(const std::filesystem::path& path) {
+void read_pcd(const std::filesystem::path& path, PointSink& sink) {
   ByteReader reader(path);
-  PointSink sink;
   const PcdHeader header = parse_pcd_header(reader, sink);
   switch (header.encoding) {
     case PcdEncoding::kAscii:
@@ -406,7 +431,6 @@ PointFile read_pcd(const std::filesystem::path& path) {
       read_compressed(reader, header, sink);
       break;
   }
-  return std::move(sink.file());
 }
 
 PointFileHeader read_pcd_header(const std::filesystem::path& path) {

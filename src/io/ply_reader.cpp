@@ -1,6 +1,7 @@
 #include <array>
 #include <charconv>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,6 +22,7 @@ struct Property {
   bool is_list = false;
   Scalar length_type = Scalar::kUint8;  ///< of a list
   Role role = Role::kNone;
+  std::optional<std::size_t> other;  ///< place among the other values of a point
   std::string name;
 };
 
@@ -117,7 +119,11 @@ void add_property(const ByteReader& reader, std::string_view line, HeaderProgres
   Element& element = progress.header.elements.back();
   if (element.is_vertex && !property.is_list) {
     const Role role = role_of(property.name);
-    if (role != Role::kNone && sink.claim(role)) property.role = role;
+    if (role != Role::kNone && sink.claim(role)) {
+      property.role = role;
+    } else {
+      property.other = sink.claim_other(property.name, property.type);
+    }
   }
   element.properties.push_back(std::move(property));
 }
@@ -240,7 +246,11 @@ void read_elements(ByteReader& reader, const PlyHeader& header, PointSink& sink,
     if (element.is_vertex) sink.resize(has_all ? static_cast<std::size_t>(element.count) : 1);
     for (std::size_t i = 0; i < element.count; ++i) {
       const auto store = [&](const Property& property, double value) {
-        if (sink.set(has_all ? i : 0, property.role, value)) return;
+        const std::size_t at = has_all ? i : 0;
+        const bool is_held =
+            property.other ? store_scalar(property.type, value, sink.other(at, *property.other))
+                           : sink.set(at, property.role, value);
+        if (is_held) return;
         const std::string what = "expected a whole number that " + property.name + " can have";
         header.encoding == PlyEncoding::kAscii ? reader.fail_on_line(what) : reader.fail_here(what);
       };
@@ -284,12 +294,10 @@ void copy_ply(const std::filesystem::path& path, Span<const std::uint8_t> keep,
   copy_records(reader, static_cast<std::size_t>(size), "a vertex", keep, target);
 }
 
-PointFile read_ply(const std::filesystem::path& path) {
+void read_ply(const std::filesystem::path& path, PointSink& sink) {
   ByteReader reader(path);
-  PointSink sink;
   const PlyHeader header = parse_ply_header(reader, sink);
   read_elements(reader, header, sink, Storage::kAllPoints, [] {});
-  return std::move(sink.file());
 }
 
 void visit_ply(const std::filesystem::path& path,

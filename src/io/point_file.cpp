@@ -4,9 +4,11 @@
 #include <ostream>
 #include <sstream>
 #include <string>
+#include <utility>
 
 #include "failure.hpp"
 #include "point_readers.hpp"
+#include "point_sink.hpp"
 #include "text.hpp"
 
 namespace dynains {
@@ -26,7 +28,7 @@ bool is_pcd(const fs::path& path) {
 
 struct PointFileFormat {
   const char* extension;
-  PointFile (*read)(const fs::path&);
+  void (*read)(const fs::path&, PointSink&);
   PointFileHeader (*read_header)(const fs::path&);
   void (*check)(const fs::path&);
 };
@@ -48,7 +50,28 @@ const PointFileFormat& format_to_read(const fs::path& path) {
                  : "expected a name that ends in .ply, .pcd, .las, .npy, .npz, .xyz or .csv");
 }
 
-std::string ply_header(std::size_t count, const PointColumns& columns, const std::string& padding,
+/// Type of a property of PLY; empty: PLY has none.
+std::string ply_type(const OtherColumn& column) {
+  if (column.type == 'F') return column.size == 4 ? "float" : "double";
+  const char* const name = column.size == 1   ? "char"
+                           : column.size == 2 ? "short"
+                           : column.size == 4 ? "int"
+                                              : "";
+  return *name != '\0' && column.type == 'U' ? std::string("u") + name : name;
+}
+
+/// "name", or "name_0" to "name_2" for three values.
+std::string ply_properties(const OtherColumn& column) {
+  std::string text;
+  for (std::size_t k = 0; k < column.count; ++k) {
+    text += "property " + ply_type(column) + ' ' + column.name +
+            (column.count == 1 ? "" : '_' + std::to_string(k)) + '\n';
+  }
+  return text;
+}
+
+std::string ply_header(std::size_t count, const PointColumns& columns,
+                       const std::vector<OtherColumn>& others, const std::string& padding,
                        const Pose&) {
   const std::string coordinate = columns.double_xyz ? "double" : "float";
   std::string text = "ply\nformat binary_little_endian 1.0\ncomment dynains" + padding +
@@ -60,6 +83,7 @@ std::string ply_header(std::size_t count, const PointColumns& columns, const std
   if (columns.ring) text += "property ushort ring\n";
   if (columns.time) text += "property double time\n";
   if (columns.session) text += "property ushort session\n";
+  for (const OtherColumn& column : others) text += ply_properties(column);
   return text + "end_header\n";
 }
 
@@ -74,24 +98,27 @@ std::string viewpoint_line(const Pose& pose) {
   return line.str();
 }
 
-std::string pcd_header(std::size_t count, const PointColumns& columns, const std::string& padding,
+std::string pcd_header(std::size_t count, const PointColumns& columns,
+                       const std::vector<OtherColumn>& others, const std::string& padding,
                        const Pose& viewpoint) {
   std::string fields = "FIELDS x y z";
   std::string sizes = columns.double_xyz ? "SIZE 8 8 8" : "SIZE 4 4 4";
   std::string types = "TYPE F F F";
   std::string counts = "COUNT 1 1 1";
-  const auto add = [&](const char* name, const char* type, int bytes = 4) {
-    fields += std::string(" ") + name;
+  const auto add = [&](const std::string& name, char type, std::size_t bytes = 4,
+                       std::size_t values = 1) {
+    fields += ' ' + name;
     sizes += ' ' + std::to_string(bytes);
     types += std::string(" ") + type;
-    counts += " 1";
+    counts += ' ' + std::to_string(values);
   };
-  if (columns.intensity) add("intensity", "F");
-  if (columns.rgb) add("rgb", "F");
-  if (columns.label) add("label", "U");
-  if (columns.ring) add("ring", "U", 2);
-  if (columns.time) add("time", "F", 8);
-  if (columns.session) add("session", "U", 2);
+  if (columns.intensity) add("intensity", 'F');
+  if (columns.rgb) add("rgb", 'F');
+  if (columns.label) add("label", 'U');
+  if (columns.ring) add("ring", 'U', 2);
+  if (columns.time) add("time", 'F', 8);
+  if (columns.session) add("session", 'U', 2);
+  for (const OtherColumn& other : others) add(other.name, other.type, other.size, other.count);
   const std::string size = std::to_string(count);
   return "# .PCD v0.7 - Point Cloud Data file format\n# dynains" + padding + "\nVERSION 0.7\n" +
          fields + '\n' + sizes + '\n' + types + '\n' + counts + "\nWIDTH " + size + "\nHEIGHT 1\n" +
@@ -101,12 +128,16 @@ std::string pcd_header(std::size_t count, const PointColumns& columns, const std
 }  // namespace
 
 PointFileWriter::PointFileWriter(const fs::path& path, const PointColumns& columns,
-                                 const Pose& viewpoint)
+                                 const Pose& viewpoint, std::vector<OtherColumn> others)
     : columns_(columns),
+      others_(std::move(others)),
       viewpoint_(viewpoint),
       pcd_(is_pcd(path)),
       buffer_(columns, pcd_),
       file_(path) {
+  for (const OtherColumn& column : others_) {
+    if (!pcd_ && ply_type(column).empty()) fail(path, "PLY has no type for " + column.name);
+  }
   file_.stream() << header();
 }
 
@@ -114,14 +145,15 @@ PointFileWriter::PointFileWriter(const fs::path& path, const PointColumns& colum
 std::string PointFileWriter::header() const {
   const auto text = pcd_ ? pcd_header : ply_header;
   constexpr std::size_t kMost = std::numeric_limits<std::size_t>::max();
-  const std::size_t length = text(kMost, columns_, "", viewpoint_).size();
-  const std::size_t needed = text(size_, columns_, "", viewpoint_).size();
-  return text(size_, columns_, std::string(length - needed, '.'), viewpoint_);
+  const std::size_t length = text(kMost, columns_, others_, "", viewpoint_).size();
+  const std::size_t needed = text(size_, columns_, others_, "", viewpoint_).size();
+  return text(size_, columns_, others_, std::string(length - needed, '.'), viewpoint_);
 }
 
-void PointFileWriter::add(const FilePoint& point) {
+void PointFileWriter::add(const FilePoint& point, Span<const char> others) {
   constexpr std::size_t kMostBytes = std::size_t{1} << 16U;
   buffer_.add(point);
+  buffer_.add_others(others);
   ++size_;
   if (buffer_.bytes().size() >= kMostBytes) write_buffer();
 }
@@ -172,7 +204,18 @@ std::optional<std::string> conversion_of(const fs::path& path) {
   return std::nullopt;
 }
 
-PointFile read_points(const fs::path& path) { return format_to_read(path).read(path); }
+PointFile read_points(const fs::path& path) {
+  PointSink sink;
+  format_to_read(path).read(path, sink);
+  return std::move(sink.file());
+}
+
+OtherValues read_other_columns(const fs::path& path) {
+  OtherValues others;
+  PointSink sink(&others);
+  format_to_read(path).read(path, sink);
+  return others;
+}
 
 FilePoint point_of(const PointFile& file, std::size_t i) {
   FilePoint point;

@@ -8,12 +8,18 @@
 
 namespace dynains {
 
-PointFile read_ply(const std::filesystem::path& path);
-PointFile read_pcd(const std::filesystem::path& path);
-PointFile read_las(const std::filesystem::path& path);
-PointFile read_npy(const std::filesystem::path& path);
-PointFile read_npz(const std::filesystem::path& path);
-PointFile read_xyz(const std::filesystem::path& path);
+class PointSink;
+
+/// The other columns of a file of read_points(): those of .pcd, .ply, .npy, .npz and named ones of
+/// text; none of LAS. Throws IoError like read_points().
+OtherValues read_other_columns(const std::filesystem::path& path);
+
+void read_ply(const std::filesystem::path& path, PointSink& sink);
+void read_pcd(const std::filesystem::path& path, PointSink& sink);
+void read_las(const std::filesystem::path& path, PointSink& sink);
+void read_npy(const std::filesystem::path& path, PointSink& sink);
+void read_npz(const std::filesystem::path& path, PointSink& sink);
+void read_xyz(const std::filesystem::path& path, PointSink& sink);
 
 /// Reads a PLY file without points in memory.
 void visit_ply(const std::filesystem::path& path,

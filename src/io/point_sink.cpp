@@ -1,8 +1,10 @@
 #include "point_sink.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "scalar.hpp"
 #include "text.hpp"
 
 namespace dynains {
@@ -46,14 +48,6 @@ bool store(double value, Integer& target) {
   return true;
 }
 
-/// Conversion of a double beyond the range of float is undefined: it becomes infinite.
-float to_float(double value) {
-  constexpr double kMax = std::numeric_limits<float>::max();
-  if (value > kMax) return std::numeric_limits<float>::infinity();
-  if (value < -kMax) return -std::numeric_limits<float>::infinity();
-  return static_cast<float>(value);
-}
-
 }  // namespace
 
 Role role_of(std::string_view name) {
@@ -69,6 +63,22 @@ bool PointSink::claim(Role role) {
   if (claimed) return false;
   claimed = true;
   return true;
+}
+
+std::optional<std::size_t> PointSink::claim_other(const std::string& name, Scalar type,
+                                                  std::size_t count) {
+  // A name of PCL for bytes between fields.
+  if (others_ == nullptr || count == 0 || name == "_") return std::nullopt;
+  const std::size_t place = others_->bytes_of_point();
+  others_->columns.push_back({free_name(name), letter_of(type), size_of(type), count});
+  return place;
+}
+
+std::string PointSink::free_name(const std::string& name) const {
+  const bool is_taken = role_of(name) != Role::kNone ||
+                        std::any_of(others_->columns.begin(), others_->columns.end(),
+                                    [&](const OtherColumn& column) { return column.name == name; });
+  return is_taken ? free_name(name + "_other") : name;
 }
 
 std::optional<std::string> PointSink::missing() const {
@@ -91,6 +101,10 @@ PointColumns PointSink::columns() const {
 
 void PointSink::resize(std::size_t count) {
   const auto claimed = [this](Role role) { return claimed_[static_cast<std::size_t>(role)]; };
+  if (others_ != nullptr) {
+    other_bytes_ = others_->bytes_of_point();
+    others_->bytes.resize(count * other_bytes_);
+  }
   file_.positions.resize(count, Eigen::Vector3d::Zero());
   if (claimed(Role::kIntensity)) file_.intensity.resize(count);
   if (claimed(Role::kRing)) file_.ring.resize(count);

@@ -435,6 +435,10 @@ RecordedScan Recording::read_scan(std::size_t i) const {
   return scan;
 }
 
+OtherValues Recording::read_other_values(std::size_t i) const {
+  return reader_->read_other_values(address(i));
+}
+
 std::vector<std::uint32_t> Recording::read_labels(std::size_t i) const {
   if (labels_ == Labels::kIntensity) return labels_of_intensity(read_scan(i));
   if (labels_ != Labels::kFiles) return reader_->read_labels(address(i));

@@ -2,12 +2,23 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <string>
+#include <type_traits>
 
 namespace dynains {
+
+/// Conversion of a double beyond the range of float is undefined: it becomes infinite.
+inline float to_float(double value) {
+  constexpr double kMax = std::numeric_limits<float>::max();
+  if (value > kMax) return std::numeric_limits<float>::infinity();
+  if (value < -kMax) return -std::numeric_limits<float>::infinity();
+  return static_cast<float>(value);
+}
 
 enum class Scalar : std::uint8_t {
   kInt8,
@@ -90,6 +101,61 @@ inline double load_scalar(Scalar type, const char* bytes, bool swap) {
       return load<double>(bytes, swap);
   }
   return 0.0;
+}
+
+/// Stores a number at `bytes`. False, with nothing stored, if an integer type cannot hold it.
+inline bool store_scalar(Scalar type, double value, char* bytes) {
+  const auto store = [&](auto zero) {
+    using Number = decltype(zero);
+    if constexpr (std::is_integral_v<Number>) {
+      // Both limits are exact as doubles.
+      const double beyond = std::ldexp(1.0, std::numeric_limits<Number>::digits);
+      const double least = std::is_signed_v<Number> ? -beyond : 0.0;
+      if (!(value >= least && value < beyond) || value != std::floor(value)) return false;
+    }
+    const auto number = static_cast<Number>(value);
+    std::memcpy(bytes, &number, sizeof(number));
+    return true;
+  };
+  switch (type) {
+    case Scalar::kInt8:
+      return store(std::int8_t{});
+    case Scalar::kUint8:
+      return store(std::uint8_t{});
+    case Scalar::kInt16:
+      return store(std::int16_t{});
+    case Scalar::kUint16:
+      return store(std::uint16_t{});
+    case Scalar::kInt32:
+      return store(std::int32_t{});
+    case Scalar::kUint32:
+      return store(std::uint32_t{});
+    case Scalar::kInt64:
+      return store(std::int64_t{});
+    case Scalar::kUint64:
+      return store(std::uint64_t{});
+    case Scalar::kFloat:
+      return store(to_float(value));
+    case Scalar::kDouble:
+      return store(value);
+  }
+  return false;
+}
+
+/// As in PCD: I integer, U unsigned, F floating-point.
+inline char letter_of(Scalar type) {
+  switch (type) {
+    case Scalar::kInt8:
+    case Scalar::kInt16:
+    case Scalar::kInt32:
+    case Scalar::kInt64:
+      return 'I';
+    case Scalar::kFloat:
+    case Scalar::kDouble:
+      return 'F';
+    default:
+      return 'U';
+  }
 }
 
 }  // namespace dynains

@@ -11,6 +11,7 @@
 #include "failure.hpp"
 #include "log/log_scans.hpp"
 #include "log/raw_file.hpp"
+#include "point_readers.hpp"
 
 namespace dynains {
 namespace {
@@ -45,6 +46,7 @@ class BinReader final : public ScanReader {
     is_usual ? read_scan(scan.file, points.xyzi) : read_bin_points(scan.file, layout_, points.xyzi);
     transform(T_target_file, points);
   }
+  OtherValues read_other_values(const ScanAddress&) const override { return {}; }
   std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
     fail(scan.file, "has no labels");
   }
@@ -85,6 +87,7 @@ class NuScenesReader final : public ScanReader {
     }
     transform(T_target_file, points);
   }
+  OtherValues read_other_values(const ScanAddress&) const override { return {}; }
   std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
     fail(scan.file, "has no labels");
   }
@@ -117,6 +120,9 @@ class PointFileReader final : public ScanReader {
     points.ring = std::move(file.ring);
     points.time = std::move(file.time);
   }
+  OtherValues read_other_values(const ScanAddress& scan) const override {
+    return read_other_columns(scan.file);
+  }
   std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
     PointFile points = read_points(scan.file);
     if (points.label.size() != points.positions.size()) {
@@ -143,6 +149,10 @@ class LogReader final : public ScanReader {
       scans_->read(scan.index, points);
     }
     transform(T_target_file, points);
+  }
+  OtherValues read_other_values(const ScanAddress& scan) const override {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return scans_->read_other_values(scan.index);
   }
   std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
     const std::lock_guard<std::mutex> lock(mutex_);

@@ -124,18 +124,16 @@ std::size_t count_points(const std::filesystem::path& path, PointSink& sink) {
 
 }  // namespace
 
-PointFile read_xyz(const std::filesystem::path& path) {
+void read_xyz(const std::filesystem::path& path, PointSink& sink) {
   PointSink counted;
   const std::size_t count = count_points(path, counted);
   ByteReader reader(path);
-  PointSink sink;
   XyzColumns columns(reader, sink);
   read_lines(reader, columns, [&](const std::vector<std::string_view>& tokens, std::size_t row) {
     if (row == 0) sink.resize(count);
     if (row >= count) reader.fail_on_line("expected no more points than before");
     columns.store(tokens, row);
   });
-  return std::move(sink.file());
 }
 
 PointFileHeader read_xyz_header(const std::filesystem::path& path) {

@@ -10,7 +10,10 @@ namespace dynains::program {
 
 CleanWriter::CleanWriter(std::filesystem::path folder, const Recording& recording,
                          bool drop_not_judged)
-    : folder_(std::move(folder)), recording_(recording), drop_not_judged_(drop_not_judged) {
+    : folder_(std::move(folder)),
+      recording_(recording),
+      drop_not_judged_(drop_not_judged),
+      has_others_(recording.size() > 0 && !recording.read_other_values(0).columns.empty()) {
   create_folder(folder_);
 }
 
@@ -77,12 +80,14 @@ void CleanWriter::write(std::size_t i, const RecordedScan& scan,
     viewpoint = recording_.T_world_sensor(i);
     viewpoint.translate(-recording_.sensor_origin());
   }
-  PointFileWriter writer(file, columns, viewpoint);
+  const OtherValues others = has_others_ ? recording_.read_other_values(i) : OtherValues();
+  const std::size_t other_bytes = others.bytes_of_point();
+  PointFileWriter writer(file, columns, viewpoint, others.columns);
   for (std::size_t k = 0; k < labels.size(); ++k) {
     if (!is_kept(labels[k])) continue;
     FilePoint point = scan.point(k);
     point.position = T * point.position;
-    writer.add(point);
+    writer.add(point, {others.bytes.data() + k * other_bytes, other_bytes});
   }
   writer.commit(AtomicFile::Sync::kLater);
 }

@@ -20,8 +20,8 @@ class CleanWriter {
   static std::string name(const Recording& recording, std::size_t i);
 
   /// Writes scan i of the recording: all finite points that are not dynamic, or with
-  /// `drop_not_judged` all static ones, in their order, with all their columns but labels, in the
-  /// frame they had.
+  /// `drop_not_judged` all static ones, in their order, in the frame they had, with all their
+  /// columns but labels. Columns that a run does not read keep their bytes.
   void write(std::size_t i, const RecordedScan& scan, Span<const PointLabel> labels) const;
 
  private:
@@ -33,6 +33,7 @@ class CleanWriter {
   std::filesystem::path folder_;
   const Recording& recording_;
   bool drop_not_judged_;
+  bool has_others_;  ///< whether scans have columns that a run does not read
 };
 
 }  // namespace dynains::program

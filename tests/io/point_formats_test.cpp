@@ -1,5 +1,6 @@
 // Points in files of LAS, NumPy and text.
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynains/errors.hpp"
@@ -7,6 +8,7 @@
 #include "dynains/io/recording.hpp"
 #include "files.hpp"
 #include "io/log/decompress.hpp"
+#include "io/point_readers.hpp"
 #include "point_format_writer.hpp"
 #include "support/catch.hpp"
 
@@ -84,7 +86,161 @@ std::string las_points(const LasParts& parts, std::uint8_t label) {
   return record + ByteWriter().number(std::uint16_t{17}).number(label).text();
 }
 
+/// "name TYPESIZE COUNT, ..." and the bytes of all points.
+using Others = std::pair<std::string, std::string>;
+
+Others others_of(const fs::path& path) {
+  const OtherValues others = read_other_columns(path);
+  std::string names;
+  for (const OtherColumn& c : others.columns) {
+    names += c.name + ' ' + c.type + std::to_string(c.size) + ' ' + std::to_string(c.count) + ',';
+  }
+  return {names, {others.bytes.begin(), others.bytes.end()}};
+}
+
+Others others(const std::string& name, const std::string& content) {
+  const TemporaryFolder folder;
+  write_text(folder / name, content);
+  return others_of(folder / name);
+}
+
+std::string pcd_with_others(const std::string& data) {
+  return "FIELDS x y z _ rgb normal stamp time timestamp\nSIZE 4 4 4 1 4 2 8 4 4\n"
+         "TYPE F F F U F I U F F\nCOUNT 1 1 1 2 1 2 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA " +
+         data;
+}
+
+/// Values of one point in the other columns of that file, and of all of them.
+std::string pcd_others(float rgb, std::uint64_t stamp, float timestamp) {
+  return ByteWriter()
+      .number(rgb)
+      .number(std::int16_t{-3})
+      .number(std::int16_t{4})
+      .number(stamp)
+      .number(timestamp)
+      .text();
+}
+
 }  // namespace
+
+TEST_CASE("PCD: other columns keep their bytes in each encoding") {
+  constexpr std::uint64_t kStamp = 1700000000123456789U;  // more digits than a double has
+  const Others expected = {"rgb F4 1,normal I2 2,stamp U8 1,timestamp_other F4 1,",
+                           pcd_others(0.5F, kStamp, 9.0F) + pcd_others(1.5F, kStamp + 1, 8.0F)};
+  CHECK(others("a.pcd", pcd_with_others("ascii\n1 2 3 0 0 0.5 -3 4 1700000000123456789 7 9\n"
+                                        "4 5 6 0 0 1.5 -3 4 1700000000123456790 7 8\n")) ==
+        expected);
+  const auto record = [](float rgb, std::uint64_t stamp, float timestamp) {
+    const std::string bytes = pcd_others(rgb, stamp, timestamp);
+    return bytes_of<float>({1, 2, 3}) + "__" + bytes.substr(0, 16) + bytes_of<float>({7}) +
+           bytes.substr(16);
+  };
+  const std::string binary = record(0.5F, kStamp, 9.0F) + record(1.5F, kStamp + 1, 8.0F);
+  CHECK(others("a.pcd", pcd_with_others("binary\n" + binary)) == expected);
+  std::string block;
+  for (const auto& [begin, size] : {std::pair<std::size_t, std::size_t>{0, 4},
+                                    {4, 4},
+                                    {8, 4},
+                                    {12, 2},
+                                    {14, 4},
+                                    {18, 4},
+                                    {22, 8},
+                                    {30, 4},
+                                    {34, 4}}) {
+    block += binary.substr(begin, size) + binary.substr(38 + begin, size);
+  }
+  std::string literals;  // of LZF, at most 32 bytes each
+  for (std::size_t at = 0; at < block.size(); at += 32) {
+    const std::string part = block.substr(at, 32);
+    literals += static_cast<char>(part.size() - 1) + part;
+  }
+  const std::string sizes = ByteWriter()
+                                .number(static_cast<std::uint32_t>(literals.size()))
+                                .number(static_cast<std::uint32_t>(block.size()))
+                                .text();
+  CHECK(others("a.pcd", pcd_with_others("binary_compressed\n" + sizes + literals)) == expected);
+  CHECK_THAT(
+      message_of<IoError>([] {
+        others("a.pcd",
+               pcd_with_others("ascii\n1 2 3 0 0 0.5 40000 4 1 7 9\n1 2 3 0 0 0.5 3 4 1 7 9\n"));
+      }),
+      ContainsSubstring("expected a whole number that normal can have"));
+}
+
+TEST_CASE("PLY: other columns keep their values in each encoding") {
+  const auto ply = [](const std::string& format, const std::string& data) {
+    return "ply\nformat " + format +
+           " 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+           "property uchar red\nproperty short angle\nproperty double i\nproperty float "
+           "range\nend_header\n" +
+           data;
+  };
+  const std::string xyz = bytes_of<float>({1, 2, 3});
+  const std::string values = ByteWriter().number(std::uint8_t{250}).number(std::int16_t{-2}).text();
+  const std::string range = bytes_of<float>({0.1F});
+  const Others expected = {"red U1 1,angle I2 1,range F4 1,", values + range};
+  CHECK(others("a.ply", ply("ascii", "1 2 3 250 -2 0.5 0.1\n")) == expected);
+  CHECK(others("a.ply", ply("binary_little_endian",
+                            xyz + values + bytes_of<double>({0.5}) + range)) == expected);
+  const std::string big = {xyz[3],  xyz[2],  xyz[1], xyz[0], xyz[7],    xyz[6],    xyz[5],   xyz[4],
+                           xyz[11], xyz[10], xyz[9], xyz[8], values[0], values[2], values[1]};
+  const std::string swapped = {range[3], range[2], range[1], range[0]};
+  CHECK(others("a.ply", ply("binary_big_endian", big + std::string(8, '\0') + swapped)) ==
+        expected);
+}
+
+TEST_CASE("NumPy: other columns have the names of fields and arrays") {
+  const Others structured =
+      others("a.npy", npy_file("[('x', '<f4'), ('y', '<f4'), ('z', '<f4'), ('name', '<U2'), "
+                               "('stamp', '>i8'), ('hue', '|u1')]",
+                               "(1,)",
+                               bytes_of<float>({1, 2, 3}) + std::string(8, 'n') +
+                                   std::string("\0\0\0\0\0\0\1\2", 8) + '\7'));
+  CHECK(structured == Others("stamp F8 1,hue U1 1,", bytes_of<double>({258}) + '\7'));
+  const std::string six = bytes_of<float>({1, 2, 3, 0.5F, 7, 8});
+  CHECK(others("a.npy", npy_file("'<f4'", "(1, 6)", six)) ==
+        Others("column_4 F4 1,column_5 F4 1,", six.substr(16)));
+  const auto member = [](const std::string& name, const std::string& content) {
+    return ZipMember{name, content,
+                     crc32(reinterpret_cast<const std::uint8_t*>(content.data()), content.size())};
+  };
+  const std::string normals = bytes_of<float>({0, 0, 1, 0, 1, 0});
+  const Others archive = others(
+      "a.npz",
+      zip_file({member("pose.npy", npy_file("'<f8'", "(16,)", std::string(128, 'p'))),
+                member("ambient.npy", npy_file("'<u2'", "(2,)", bytes_of<std::uint16_t>({5, 6}))),
+                member("points.npy", npy_file("'<f4'", "(2, 4)", kTwoPoints)),
+                member("normals.npy", npy_file("'<f4'", "(2, 3)", normals))}));
+  CHECK(archive == Others("ambient U2 1,normals_0 F4 1,normals_1 F4 1,normals_2 F4 1,",
+                          "\5" + std::string(1, '\0') + normals.substr(0, 12) + "\6" +
+                              std::string(1, '\0') + normals.substr(12)));
+}
+
+TEST_CASE("Other columns are written behind the known ones") {
+  const TemporaryFolder folder;
+  const std::vector<OtherColumn> columns = {{"ambient", 'U', 2, 1}, {"normal", 'F', 4, 2}};
+  const std::string bytes =
+      ByteWriter().number(std::uint16_t{513}).number(0.25F).number(4.0F).text();
+  for (const std::string name : {"a.pcd", "a.ply"}) {
+    PointFileWriter writer(folder / name, {}, Pose::Identity(), columns);
+    FilePoint point;
+    point.position = Position(1, 2, 3);
+    writer.add(point, {bytes.data(), bytes.size()});
+    writer.commit();
+    const std::string text = read_text(folder / name);
+    const std::string record = bytes_of<float>({1, 2, 3}) + bytes;
+    CHECK(text.substr(text.size() - record.size()) == record);
+    CHECK(read_points(folder / name).positions.at(0) == Position(1, 2, 3));
+    CHECK(others_of(folder / name).second == bytes);
+  }
+  CHECK(others_of(folder / "a.pcd").first == "ambient U2 1,normal F4 2,");
+  CHECK(others_of(folder / "a.ply").first == "ambient U2 1,normal_0 F4 1,normal_1 F4 1,");
+  CHECK_THAT(message_of<IoError>([&] {
+               PointFileWriter(folder / "b.ply", {}, Pose::Identity(), {{"stamp", 'U', 8, 1}});
+             }),
+             ContainsSubstring("PLY has no type for stamp"));
+  CHECK_FALSE(fs::exists(folder / "b.ply"));
+}
 
 TEST_CASE("NumPy: rows of x y z and intensity") {
   check_two_points(read("a.npy", npy_file("'<f4'", "(2, 4)", kTwoPoints)));

@@ -62,6 +62,34 @@ TEST_CASE("Clouds of any layout are read, from ROS 1 and ROS 2") {
   }
 }
 
+TEST_CASE("Fields of clouds without a meaning keep their bytes") {
+  for (const MessageEncoding encoding : kBoth) {
+    ByteWriter data;
+    for (int i = 0; i < 3; ++i) {
+      data.raw("??").number(1.0F + static_cast<float>(i)).number(2.0F).number(3.0F);
+      data.number(0.25F).number(-0.5F).number(static_cast<std::uint16_t>(7 + i)).raw("r?");
+    }
+    const std::vector<CloudField> fields = {{"x", 2, 7},          {"y", 6, 7},
+                                            {"z", 10, 7},         {"normal", 14, 7, 2},
+                                            {"ambient", 22, 4},   {"return", 24, 2},
+                                            {"beyond", 25, 7},    {"odd", 0, 99},
+                                            {"intensity", 22, 4}, {"reflectivity", 24, 2}};
+    const std::string message = cloud_message(encoding, 1.0, "l", fields, 26, data.text());
+    const OtherValues others =
+        read_other_values("sensor_msgs/PointCloud2", view(message, encoding));
+    std::string names;
+    for (const OtherColumn& c : others.columns) {
+      names += c.name + ' ' + c.type + std::to_string(c.size) + ' ' + std::to_string(c.count) + ',';
+    }
+    CHECK(names == "normal F4 2,ambient U2 1,return U1 1,reflectivity_other U1 1,");
+    ByteWriter expected;
+    for (int i = 0; i < 3; ++i) {
+      expected.number(0.25F).number(-0.5F).number(static_cast<std::uint16_t>(7 + i)).raw("rr");
+    }
+    CHECK(std::string(others.bytes.begin(), others.bytes.end()) == expected.text());
+  }
+}
+
 TEST_CASE("Clouds may be big-endian, and their row step may be that of another cloud") {
   const auto message = [](std::uint8_t is_big_endian, std::uint32_t row_step, std::uint32_t rows,
                           const std::string& data) {

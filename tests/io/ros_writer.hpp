@@ -82,6 +82,7 @@ struct CloudField {
   std::string name;
   std::uint32_t offset;
   std::uint8_t type;
+  std::uint32_t count = 1;
 };
 
 /// sensor_msgs/PointCloud2 with one row of points.
@@ -93,7 +94,7 @@ inline std::string cloud_message(MessageEncoding encoding, double time, const st
   out.header(time, frame).number(std::uint32_t{1}).number(points);
   out.number(static_cast<std::uint32_t>(fields.size()));
   for (const CloudField& field : fields) {
-    out.string(field.name).number(field.offset).number(field.type).number(std::uint32_t{1});
+    out.string(field.name).number(field.offset).number(field.type).number(field.count);
   }
   out.number(std::uint8_t{0}).number(point_step).number(points * point_step);
   out.number(static_cast<std::uint32_t>(data.size())).raw(data).number(std::uint8_t{1});

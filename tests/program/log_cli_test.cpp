@@ -1,5 +1,6 @@
 // The program with logs of ROS instead of folders of scans.
 #include <algorithm>
+#include <cstring>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -80,6 +81,72 @@ TEST_CASE("run on a log gives the labels of run on the folder; check and eval re
   CHECK_THAT(start({"check", folder / "of_log" / "clean"}).out,
              ContainsSubstring("poses from VIEWPOINT of the scans") &&
                  ContainsSubstring("points are in the frame of the sensor"));
+}
+
+/// The other values that a point has by its x: three, as float and uint16 and uint8.
+std::string others_by(float x) {
+  std::uint32_t bits = 0;
+  std::memcpy(&bits, &x, sizeof(bits));
+  return ByteWriter()
+      .number(0.5F * x)
+      .number(-x)
+      .number(static_cast<std::uint16_t>(bits >> 8U))
+      .number(static_cast<std::uint8_t>(bits % 3U))
+      .text();
+}
+
+/// Checks the points of a binary PCD with these fields, of `bytes` each; returns their number.
+std::size_t check_clean(const fs::path& file, const std::string& fields, std::size_t bytes) {
+  const std::string text = read_text(file);
+  CHECK_THAT(text, ContainsSubstring('\n' + fields + '\n'));
+  const std::string end = "DATA binary\n";
+  const std::size_t begin = text.find(end) + end.size();
+  REQUIRE((text.size() - begin) % bytes == 0);
+  std::size_t wrong = 0;
+  for (std::size_t at = begin; at < text.size(); at += bytes) {
+    float x = 0.0F;
+    std::memcpy(&x, text.data() + at, sizeof(x));
+    const std::string others = others_by(x);
+    wrong += text.compare(at + bytes - others.size(), others.size(), others) == 0 ? 0 : 1;
+  }
+  CHECK(wrong == 0);
+  return (text.size() - begin) / bytes;
+}
+
+TEST_CASE("All columns of clouds come through to clean/, from logs and from files") {
+  const TemporaryFolder folder;
+  const std::vector<CloudField> fields = {
+      {"x", 0, 7},          {"y", 4, 7},        {"z", 8, 7},           {"intensity", 12, 7},
+      {"normal", 16, 7, 2}, {"ambient", 24, 4}, {"return_type", 26, 2}};
+  std::vector<WrittenMessage> messages;
+  for (std::size_t i = 0; i < kLogScans; ++i) {
+    const double time = 0.1 * static_cast<double>(i);
+    const std::vector<float> scan = tiny_scan(i);
+    std::string points;
+    for (std::size_t k = 0; k < scan.size(); k += 4) {
+      points.append(reinterpret_cast<const char*>(&scan[k]), 16);
+      points += others_by(scan[k]) + '?';
+    }
+    messages.push_back({0, nanoseconds(time),
+                        cloud_message(MessageEncoding::kCdr, time, "lidar", fields, 28, points)});
+    messages.push_back(
+        {1, nanoseconds(time),
+         odometry(time, "lidar", Eigen::Isometry3d(Eigen::Translation3d(kPosition)))});
+  }
+  write_text(folder / "drive.mcap", mcap_file({{"/points", "sensor_msgs/msg/PointCloud2"},
+                                               {"/odom", "nav_msgs/msg/Odometry"}},
+                                              messages, {}));
+  REQUIRE(
+      start({"run", folder / "drive.mcap", "-q", "--out", folder / "out", "--write-clean"}).code ==
+      0);
+  const std::string names = "FIELDS x y z intensity normal ambient return_type";
+  const fs::path clean = folder / "out/clean";
+  const std::size_t kept = check_clean(clean / "000003.pcd", names, 27);
+  CHECK(kept > 1000);
+  CHECK(kept < tiny_scan(3).size() / 4);
+  // The clean clouds as a recording of files.
+  REQUIRE(start({"run", clean, "-q", "--out", folder / "again", "--write-clean"}).code == 0);
+  CHECK(check_clean(folder / "again/clean/000003.pcd", names, 27) <= kept);
 }
 
 TEST_CASE("A truncated log is read up to its end, and the program reports it in one line") {

@@ -25,12 +25,15 @@ inline constexpr double kFloatCoordinateLimit = 1e4;
 class PointFileWriter {
  public:
   /// The extension .ply or .pcd determines the format. `viewpoint`: pose of the sensor for the
-  /// header of PCD; ignored for PLY. Throws IoError for another extension or a folder that is not
-  /// writable.
+  /// header of PCD; ignored for PLY. `others`: further columns, behind those of `columns`; PLY gets
+  /// a property for each of their values. Throws IoError for another extension, a folder that is
+  /// not writable, or 64-bit integers for PLY.
   explicit PointFileWriter(const std::filesystem::path& path, const PointColumns& columns = {},
-                           const Pose& viewpoint = Pose::Identity());
+                           const Pose& viewpoint = Pose::Identity(),
+                           std::vector<OtherColumn> others = {});
 
-  void add(const FilePoint& point);
+  /// `others`: the bytes of the point in the other columns.
+  void add(const FilePoint& point, Span<const char> others = {});
   std::size_t size() const { return size_; }
   /// Writes all but the name of the file. No point can be added then. Throws IoError.
   void prepare(AtomicFile::Sync sync = AtomicFile::Sync::kNow);
@@ -42,6 +45,7 @@ class PointFileWriter {
   void write_buffer();
 
   PointColumns columns_;
+  std::vector<OtherColumn> others_;
   Pose viewpoint_;
   bool pcd_;
   std::size_t size_ = 0;

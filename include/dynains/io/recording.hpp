@@ -217,6 +217,9 @@ class Recording {
   /// for each scan. Other scans are left out.
   void take_poses(std::size_t first, const std::vector<Pose>& T_world_sensor);
 
+  /// The columns of scan i beside x y z, those of RecordedScan and labels: of .pcd, .ply, .npy,
+  /// .npz and clouds of logs.
+  OtherValues read_other_values(std::size_t i) const;
   /// One label per point of scan i.
   std::vector<std::uint32_t> read_labels(std::size_t i) const;
 

@@ -337,6 +337,11 @@ void LogScans::read(std::size_t i, RecordedScan& scan) {
   read_cloud(log_->topics()[message.topic].type, load(message), clock, scan);
 }
 
+OtherValues LogScans::read_other_values(std::size_t i) {
+  const LogMessage& message = clouds_.at(i);
+  return dynains::read_other_values(log_->topics()[message.topic].type, load(message));
+}
+
 std::vector<std::uint32_t> LogScans::read_labels(std::size_t i) {
   const LogMessage& message = clouds_.at(i);
   return read_cloud_labels(log_->topics()[message.topic].type, load(message));

@@ -71,6 +71,7 @@ class LogScans {
   const PointClockFinding& point_clock() const { return point_clock_; }
 
   void read(std::size_t i, RecordedScan& scan);
+  OtherValues read_other_values(std::size_t i);
   std::vector<std::uint32_t> read_labels(std::size_t i);
 
  private:

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <iterator>
 #include <limits>
+#include <optional>
 
+#include "../point_sink.hpp"
 #include "message_reader.hpp"
 #include "point_cloud2.hpp"
 
@@ -138,6 +141,42 @@ void read_livox(MessageReader& in, const PointClock* clock, RecordedScan& scan) 
   }
 }
 
+/// The fields that have no meaning here.
+void read_others_of_point_cloud2(MessageReader& in, OtherValues& others) {
+  const PointCloud2 cloud(in);
+  PointSink sink(&others);
+  std::vector<std::optional<std::size_t>> places;
+  for (const PointCloud2::OtherField& field : cloud.others()) {
+    places.push_back(sink.claim_other(field.name, field.first.type, field.count));
+  }
+  sink.resize(cloud.size());
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const auto& [name, first, count] = cloud.others()[k];
+    const std::size_t size = size_of(first.type);
+    for (std::size_t i = 0; places[k] && i < cloud.size(); ++i) {
+      char* const to = sink.other(i, *places[k]);
+      std::memcpy(to, cloud.point(i) + first.offset, size * count);
+      for (std::size_t value = 0; first.is_big_endian && value < count; ++value) {
+        std::reverse(to + value * size, to + (value + 1) * size);
+      }
+    }
+  }
+}
+
+void read_others_of_livox(MessageReader& in, OtherValues& others) {
+  const std::uint32_t points = read_livox_size(in);
+  PointSink sink(&others);
+  const std::size_t place = *sink.claim_other("tag", Scalar::kUint8);
+  sink.resize(points);
+  for (std::uint32_t i = 0; i < points; ++i) {
+    in.number<std::uint32_t>("an offset time");
+    for (int axis = 0; axis < 3; ++axis) in.number<float>("a coordinate");
+    in.number<std::uint8_t>("a reflectivity");
+    *sink.other(i, place) = static_cast<char>(in.number<std::uint8_t>("a tag"));
+    in.number<std::uint8_t>("a line");
+  }
+}
+
 bool is_livox(const std::string& type) {
   return type == "livox_ros_driver/CustomMsg" || type == "livox_ros_driver2/CustomMsg" ||
          type == "livox_interfaces/CustomMsg";
@@ -176,6 +215,14 @@ void read_cloud(const std::string& type, const SerialisedMessage& message, const
                 RecordedScan& scan) {
   MessageReader in(message);
   is_livox(type) ? read_livox(in, clock, scan) : read_point_cloud2(in, clock, scan);
+}
+
+OtherValues read_other_values(const std::string& type, const SerialisedMessage& message) {
+  MessageReader in(message);
+  read_header(in);
+  OtherValues others;
+  is_livox(type) ? read_others_of_livox(in, others) : read_others_of_point_cloud2(in, others);
+  return others;
 }
 
 std::vector<std::uint32_t> read_cloud_labels(const std::string& type,

@@ -67,6 +67,9 @@ CloudInfo inspect_cloud(const std::string& type, const SerialisedMessage& messag
 void read_cloud(const std::string& type, const SerialisedMessage& message, const PointClock* clock,
                 RecordedScan& scan);
 
+/// The fields of a cloud that read_cloud() ignores. Throws IoError likewise.
+OtherValues read_other_values(const std::string& type, const SerialisedMessage& message);
+
 /// The field `label` (also class) of a PointCloud2.
 std::vector<std::uint32_t> read_cloud_labels(const std::string& type,
                                              const SerialisedMessage& message);
