@@ -9,6 +9,7 @@
 
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
+#include "dynains/simulation/random_world.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
 #include "io/files.hpp"
@@ -355,13 +356,10 @@ TEST_CASE("check and run find clouds that were lost at constant speed, if poses 
 }
 
 TEST_CASE("check and run tell times of points that run backwards") {
-  simulation::Config config;
-  config.scene = simulation::Scene::kUrban;
-  config.sensor = simulation::Sensor::kOs1_64;
+  simulation::Config config = simulation::random_world(30005);
   config.scans = 30;
-  config.seed = 43;
-  config.ego_speed = 12;
   config.rolling_shutter = true;
+  config.deskewed = 0.0;
   const Drive drive(config);
   const TemporaryFolder folder;
   const fs::path seq = folder / "seq";
@@ -380,6 +378,9 @@ TEST_CASE("check and run tell times of points that run backwards") {
       }
       file.commit();
     }
+    std::vector<double> times;
+    for (std::size_t i = 0; i < drive.size(); ++i) times.push_back(drive.scan(i).time);
+    write_times(seq / "times.txt", times);
     fs::copy_file(drive.path() + "/poses.txt", seq / "poses.txt",
                   fs::copy_options::overwrite_existing);
   };
@@ -389,7 +390,8 @@ TEST_CASE("check and run tell times of points that run backwards") {
   write([](double time) { return time; });
   CHECK(start({"check", seq, "--deskew"}).code == 0);
   CHECK(run().code == 0);
-  write([](double time) { return 0.1 - time; });
+  const double period = drive.scan(1).time;
+  write([&](double time) { return period - time; });
   const Outcome backwards = start({"check", seq, "--deskew"});
   CHECK(backwards.code == 1);
   CHECK_THAT(backwards.out, ContainsSubstring("agree better if they run backwards in each scan"));
