@@ -33,12 +33,15 @@ class Recorder {
     const std::vector<Cause> causes(points.size(), Cause::kUnknown);
     places.add(points, labels, causes, Pose::Identity(), time_, scan_);
   }
-  /// The first pass judges the points of places in each of these scans, 1 s apart.
-  void judge(std::uint32_t first, const std::vector<PointLabel>& verdicts, int count = 6) {
-    for (const PointLabel verdict : verdicts) {
+  /// The first pass judges the points of places in each of these scans, 1 s apart, and those of as
+  /// many places beside them.
+  void judge(std::uint32_t first, const std::vector<PointLabel>& verdicts, int count = 6,
+             const std::vector<PointLabel>& beside = {}) {
+    for (std::size_t i = 0; i < verdicts.size(); ++i) {
       scan_ = first;
       time_ = first++;
-      measure(count, 0, 10.1F, verdict);
+      measure(count, 0, 10.1F, verdicts[i]);
+      if (!beside.empty()) measure(count, count, 10.1F, beside[i]);
     }
     scan_ = 0;
     time_ = 0.0;
@@ -246,6 +249,20 @@ TEST_CASE("looks from too far away tell only of places beside those that changed
   beside.look(BeamResult::kFree);
   beside.look(BeamResult::kHit, 5);
   CHECK(beside.changed() == 10);
+}
+
+TEST_CASE("what stands beside the way of a mover stays, even if the first pass removed it first") {
+  for (const bool was_kept : {false, true}) {  // what looks passed later
+    Recorder recorder;
+    recorder.judge(2, {kRemoved, kRemoved, was_kept ? kKept : kRemoved}, 6,
+                   {kRemoved, kRemoved, kKept});
+    recorder.look_by(
+        [](const Eigen::Vector3d& at) {
+          return at.y() < 2.4 ? BeamResult::kFree : BeamResult::kUnknown;
+        },
+        6);
+    CHECK(recorder.changed() == (was_kept ? 12U : 0U));
+  }
 }
 
 TEST_CASE("what beams pass while others hit it is porous, and stays") {

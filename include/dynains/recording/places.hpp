@@ -414,10 +414,7 @@ class RecordingPlaces {
         }
         std::sort(contacts.begin(), contacts.end());
         contacts.erase(std::unique(contacts.begin(), contacts.end()), contacts.end());
-        const auto sure = static_cast<std::size_t>(std::count_if(
-            members.begin(), members.end(),
-            [&](const Member& member) { return at(member).state == PlaceState::kChanged; }));
-        const bool is_object = is_whole(sure, members.size(), contacts.size());
+        const bool is_object = is_whole(members, contacts.size());
         const std::uint32_t number = is_object ? ++objects_ : kNone;
         for (const Member& member : members) {
           Place& place = change(member);
@@ -436,10 +433,21 @@ class RecordingPlaces {
     }
   }
 
-  // An object is large enough, no part of something that stays, and looks passed a third of it.
-  bool is_whole(std::size_t places, std::size_t members, std::size_t contacts) const {
-    return places >= static_cast<std::size_t>(config_.object_places) && 3 * places >= members &&
-           static_cast<double>(contacts) <= config_.most_contact * static_cast<double>(places);
+  // An object is large enough, no part of something that stays, and looks passed a third of it, and
+  // of what the first pass kept of it: where it kept nothing, a mover may have passed beside
+  // something that stands.
+  bool is_whole(const std::vector<Member>& members, std::size_t contacts) {
+    std::size_t changed = 0, kept = 0, changed_kept = 0;
+    for (const Member& member : members) {
+      const Place& place = at(member);
+      const bool has_changed = place.state == PlaceState::kChanged;
+      changed += has_changed ? 1 : 0;
+      kept += place.first.any_kept ? 1 : 0;
+      changed_kept += has_changed && place.first.any_kept ? 1 : 0;
+    }
+    return changed >= static_cast<std::size_t>(config_.object_places) &&
+           3 * changed >= members.size() && 3 * changed_kept >= kept &&
+           static_cast<double>(contacts) <= config_.most_contact * static_cast<double>(changed);
   }
 
   // Adds the changed places that touch a member to its component, and those that stay to
