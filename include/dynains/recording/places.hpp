@@ -433,10 +433,11 @@ class RecordingPlaces {
     }
   }
 
-  // An object is large enough, no part of something that stays, and looks passed a third of it, and
-  // of what the first pass kept of it: where it kept nothing, a mover may have passed beside
-  // something that stands.
+  // An object is large enough, no part of something that stays, and looks passed a third of it. The
+  // places of which the first pass kept points are no part of it if looks passed less than a tenth
+  // of them: a mover may have passed beside something that stands.
   bool is_whole(const std::vector<Member>& members, std::size_t contacts) {
+    const auto fewest = static_cast<std::size_t>(config_.object_places);
     std::size_t changed = 0, kept = 0, changed_kept = 0;
     for (const Member& member : members) {
       const Place& place = at(member);
@@ -445,8 +446,8 @@ class RecordingPlaces {
       kept += place.first.any_kept ? 1 : 0;
       changed_kept += has_changed && place.first.any_kept ? 1 : 0;
     }
-    return changed >= static_cast<std::size_t>(config_.object_places) &&
-           3 * changed >= members.size() && 3 * changed_kept >= kept &&
+    const bool is_kept_part_passed = kept < fewest || 10 * changed_kept >= kept;
+    return changed >= fewest && 3 * changed >= members.size() && is_kept_part_passed &&
            static_cast<double>(contacts) <= config_.most_contact * static_cast<double>(changed);
   }
 
