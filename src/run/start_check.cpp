@@ -39,8 +39,7 @@ class Checker {
     if (diagnosis_) {
       if (diagnosis_->verdict == PoseVerdict::kInexact) warn(advice(*diagnosis_));
       if (diagnosis_->sound() || diagnosis_->verdict == PoseVerdict::kRayOrigin) return;
-      if (diagnosis_->verdict == PoseVerdict::kUnknown ||
-          is_small_shift(*diagnosis_, recording_.convention())) {
+      if (is_only_doubtful()) {
         warn(advice(*diagnosis_));
       } else {
         result_.refusal = (is_doubtful ? share + ". " : std::string()) + advice(*diagnosis_);
@@ -73,6 +72,12 @@ class Checker {
   StartCheck take() { return std::move(result_); }
 
  private:
+  // Other times of points are told apart by a few per cent of the gap between scans.
+  bool is_only_doubtful() const {
+    return diagnosis_->verdict == PoseVerdict::kUnknown ||
+           diagnosis_->verdict == PoseVerdict::kPointTimes ||
+           is_small_shift(*diagnosis_, recording_.convention());
+  }
   void warn(std::string text) { result_.warnings.push_back(std::move(text)); }
 
   const Recording& recording_;

@@ -395,6 +395,7 @@ TEST_CASE("check and run tell times of points that run backwards") {
   const Outcome backwards = start({"check", seq, "--deskew"});
   CHECK(backwards.code == 1);
   CHECK_THAT(backwards.out, ContainsSubstring("agree better if they run backwards in each scan"));
-  CHECK(run().code == 2);
-  CHECK_THAT(run().err, ContainsSubstring("The times of points do not fit the motion"));
+  const Outcome warned = run();
+  CHECK(warned.code == 0);
+  CHECK_THAT(warned.err, ContainsSubstring("warning: The times of points do not fit the motion"));
 }
