@@ -26,9 +26,10 @@ struct CheckedRecording {
 };
 
 const char* name_of(PoseVerdict verdict) {
-  constexpr std::array<const char*, 13> kNames{
-      "agree",     "otherwise", "body frame", "time offset", "scaled",      "lost scans", "inexact",
-      "no motion", "disagree",  "skewed",     "ray origin",  "world frame", "unknown"};
+  constexpr std::array<const char*, 14> kNames{
+      "agree",       "otherwise",  "body frame",  "time offset", "scaled",
+      "lost scans",  "inexact",    "no motion",   "disagree",    "skewed",
+      "point times", "ray origin", "world frame", "unknown"};
   static_assert(static_cast<std::size_t>(PoseVerdict::kUnknown) + 1 == kNames.size());
   return kNames.at(static_cast<std::size_t>(verdict));
 }

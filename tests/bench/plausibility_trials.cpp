@@ -417,8 +417,8 @@ int main(int argc, char** argv) {
     Kind twice = kinds_of_times().at(1);
     const Recording deskewed = write_and_open(skewed, twice, folder / "deskewed").recording;
     twice.name = "de-skewed twice";
-    twice.fault = [&](const Scans& scans, std::size_t k) {
-      return Recorded{deskewed.read_scan(k).xyzi, scans[k].T_world_sensor};
+    twice.fault = [&](const Scans& raw, std::size_t k) {
+      return Recorded{deskewed.read_scan(k).xyzi, raw[k].T_world_sensor};
     };
     take(world, twice, outcome_of(skewed, twice, folder / "recording"), usual, counts);
   }
