@@ -201,6 +201,20 @@ void RunResults::revise(const AddToMap& add_to_map,
                         const std::function<void(std::size_t done)>& progress) {
   if (finished_ == 0) return;
   progress(0);
+  try {
+    revise_scans(add_to_map, progress);
+  } catch (...) {
+    // The last task must not outlive what the caller has given.
+    try {
+      finish();
+    } catch (...) {  // the first exception is thrown
+    }
+    throw;
+  }
+}
+
+void RunResults::revise_scans(const AddToMap& add_to_map,
+                              const std::function<void(std::size_t done)>& progress) {
   ReadAhead reader(recording_, range_.first, range_.first + finished_ - 1, thread());
   JudgedScan judged;
   for (std::size_t i = 0; i < finished_; ++i) {

@@ -166,6 +166,8 @@ class RunResults {
   Background writing_;
 
   void write_final(const RecordedScan& scan, const ScanVerdict& verdict);
+  void revise_scans(const AddToMap& add_to_map,
+                    const std::function<void(std::size_t done)>& progress);
   void write_revised(bool is_revised, const AddToMap& add_to_map);
   void complete_scan(const RecordedScan& scan, const ScanVerdict& verdict);
   void add_scan(const RecordedScan& scan, const ScanVerdict& verdict);
