@@ -123,14 +123,14 @@ std::size_t partner_of(const Recording& recording, std::size_t i, std::size_t la
 }  // namespace
 
 PointTimesGaps point_times_gaps(const Recording& recording, std::size_t first, std::size_t last) {
-  constexpr std::size_t kPairs = 10;
+  constexpr std::size_t kMostPairs = 10;
   constexpr double kLever = 10.0;        // m
   constexpr double kLeastMotion = 0.15;  // m, within a scan, at that distance
   constexpr double kClearly = 0.02;
   PointTimesGaps gaps;
   std::array<AgreementSum, kPointTimesReadings> sums;
-  for (std::size_t pair = 0; pair < kPairs && first + 2 < last; ++pair) {
-    const std::size_t i = first + 1 + pair * (last - first - 2) / kPairs;
+  for (std::size_t pair = 0; pair < kMostPairs && first + 2 < last; ++pair) {
+    const std::size_t i = first + 1 + pair * (last - first - 2) / kMostPairs;
     const std::size_t k = partner_of(recording, i, last);
     if (k == 0 || extent_of(given_motion(recording, i, i + 1), kLever) < kLeastMotion) continue;
     const Recorrected a(recording, i), b(recording, k);
