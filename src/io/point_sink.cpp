@@ -1,8 +1,6 @@
 #include "point_sink.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 
 #include "scalar.hpp"
 #include "text.hpp"
@@ -36,17 +34,6 @@ constexpr Alias kAliases[] = {
     {"class", Role::kLabel},
     {"scalar_label", Role::kLabel},
 };
-
-template <class Integer>
-bool store(double value, Integer& target) {
-  // The comparison is false for NaN, which the conversion must never see.
-  if (!(value >= 0.0 && value <= static_cast<double>(std::numeric_limits<Integer>::max()))) {
-    return false;
-  }
-  if (value != std::floor(value)) return false;
-  target = static_cast<Integer>(value);
-  return true;
-}
 
 }  // namespace
 
@@ -123,12 +110,12 @@ bool PointSink::set(std::size_t i, Role role, double value) {
       file_.intensity[i] = to_float(value);
       return true;
     case Role::kRing:
-      return store(value, file_.ring[i]);
+      return store_number(value, file_.ring[i]);
     case Role::kTime:
       file_.time[i] = value;
       return true;
     case Role::kLabel:
-      return store(value, file_.label[i]);
+      return store_number(value, file_.label[i]);
     case Role::kNone:
       return true;
   }
