@@ -30,12 +30,6 @@ constexpr std::size_t kPairs = 8;   // pairs of scans that are compared
 constexpr std::size_t kStride = 5;  // from one scan of a pair to the other
 constexpr double kFast = 2.0;       // m from scan to scan; overlap of pairs is small beyond it
 
-Landmarks landmarks_of(const Recording& recording, std::size_t i, RecordedScan& scan) {
-  recording.read_scan(i, scan);
-  const PointBuffer points = finite_points(scan);
-  return Landmarks(points, estimate_mounting(points));
-}
-
 /// Two scans, some scans apart.
 struct Pair {
   std::size_t first;

@@ -115,4 +115,10 @@ std::size_t Landmarks::index_of(int column_x, int column_y) const {
          2 * static_cast<std::size_t>(half_) * static_cast<std::size_t>(column_x);
 }
 
+Landmarks landmarks_of(const Recording& recording, std::size_t i, RecordedScan& scan) {
+  recording.read_scan(i, scan);
+  const PointBuffer points = finite_points(scan);
+  return Landmarks(points, estimate_mounting(points));
+}
+
 }  // namespace dynains

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/poses/diagnosis.hpp"
@@ -44,5 +45,9 @@ class Landmarks {
   std::vector<Column> columns_;          // square grid around the sensor, row-major
   std::vector<Eigen::Vector3d> points_;  // by column, ascending along z in each
 };
+
+/// Those of scan i, without the ground under its mounting. `scan`: memory for the scan. Throws
+/// IoError.
+Landmarks landmarks_of(const Recording& recording, std::size_t i, RecordedScan& scan);
 
 }  // namespace dynains

@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "dynains/median.hpp"
-#include "io/finite_points.hpp"
 #include "landmarks.hpp"
 
 namespace dynains {
@@ -65,44 +64,6 @@ std::vector<int> shifts_of(const Recording& recording) {
   return shifts;
 }
 
-}  // namespace
-
-std::optional<LostScans> find_lost_scans(const Recording& recording,
-                                         const std::vector<RegisteredMotion>& motions,
-                                         double exact) {
-  constexpr std::size_t kFewestChains = 2;   // on both sides
-  constexpr std::size_t kFewestMotions = 4;  // on both sides
-  const std::vector<ChainErrors> given = errors_by_chain(recording, motions, 0);
-  std::optional<LostScans> best;
-  double least = sum(joined(given, 0, given.size()));
-  for (const int shift : shifts_of(recording)) {
-    const std::vector<ChainErrors> shifted = errors_by_chain(recording, motions, shift);
-    for (std::size_t c = kFewestChains; c + kFewestChains <= given.size(); ++c) {
-      const std::vector<double> before = joined(given, 0, c);
-      const std::vector<double> behind = joined(shifted, c, given.size());
-      const std::vector<double> wrong = joined(given, c, given.size());
-      const double total = sum(before) + sum(behind);
-      if (!(total < least) || before.size() < kFewestMotions || behind.size() < kFewestMotions) {
-        continue;
-      }
-      const bool is_explained = median(wrong) > exact && median(before) < exact &&
-                                median(behind) < 0.5 * median(wrong) &&
-                                sum(before) < sum(joined(shifted, 0, c));
-      if (!is_explained) continue;
-      least = total;
-      best = LostScans{given[c - 1].first_scan, given[c].first_scan, shift};
-    }
-  }
-  return best;
-}
-
-namespace {
-
-Landmarks landmarks_of(const Recording& recording, std::size_t i) {
-  const PointBuffer points = finite_points(recording.read_scan(i));
-  return Landmarks(points, estimate_mounting(points));
-}
-
 /// The scan behind `from` with which it is compared: a few metres away, so that all scans of a long
 /// recording are covered, or the last one.
 std::size_t next_compared(const Recording& recording, std::size_t from) {
@@ -156,6 +117,35 @@ ShiftGain best_later_rows(const Recording& recording, const PlacedLandmarks& a,
 
 }  // namespace
 
+std::optional<LostScans> find_lost_scans(const Recording& recording,
+                                         const std::vector<RegisteredMotion>& motions,
+                                         double exact) {
+  constexpr std::size_t kFewestChains = 2;   // on both sides
+  constexpr std::size_t kFewestMotions = 4;  // on both sides
+  const std::vector<ChainErrors> given = errors_by_chain(recording, motions, 0);
+  std::optional<LostScans> best;
+  double least = sum(joined(given, 0, given.size()));
+  for (const int shift : shifts_of(recording)) {
+    const std::vector<ChainErrors> shifted = errors_by_chain(recording, motions, shift);
+    for (std::size_t c = kFewestChains; c + kFewestChains <= given.size(); ++c) {
+      const std::vector<double> before = joined(given, 0, c);
+      const std::vector<double> behind = joined(shifted, c, given.size());
+      const std::vector<double> wrong = joined(given, c, given.size());
+      const double total = sum(before) + sum(behind);
+      if (!(total < least) || before.size() < kFewestMotions || behind.size() < kFewestMotions) {
+        continue;
+      }
+      const bool is_explained = median(wrong) > exact && median(before) < exact &&
+                                median(behind) < 0.5 * median(wrong) &&
+                                sum(before) < sum(joined(shifted, 0, c));
+      if (!is_explained) continue;
+      least = total;
+      best = LostScans{given[c - 1].first_scan, given[c].first_scan, shift};
+    }
+  }
+  return best;
+}
+
 bool may_have_lost_clouds(const Recording& recording) {
   const std::size_t rows = recording.pose_count(), scans = recording.scan_file_count();
   return recording.frame() == PointFrame::kSensor && recording.missing_pose_count() == 0 &&
@@ -167,10 +157,11 @@ std::optional<LostScans> find_lost_clouds(const Recording& recording) {
   std::optional<LostScans> found;
   double largest_gain = 0.0;
   std::size_t pairs = 0, doubtful = 0;
-  Landmarks a = landmarks_of(recording, 0);
+  RecordedScan scan;
+  Landmarks a = landmarks_of(recording, 0, scan);
   for (std::size_t from = 0; from + 1 < recording.size(); ++pairs) {
     const std::size_t to = next_compared(recording, from);
-    Landmarks b = landmarks_of(recording, to);
+    Landmarks b = landmarks_of(recording, to, scan);
     const ShiftGain best = best_later_rows(recording, {from, a}, {to, b});
     doubtful += best.shift > 0 ? 1 : 0;
     if (best.gain > largest_gain) {

@@ -8,6 +8,7 @@
 
 #include "agreement_sum.hpp"
 #include "dynains/io/trajectory.hpp"
+#include "given_motion.hpp"
 #include "landmarks.hpp"
 
 namespace dynains {
@@ -101,21 +102,12 @@ class Recorrected {
   double last_ = -std::numeric_limits<double>::infinity();
 };
 
-Pose given_motion(const Recording& recording, std::size_t i, std::size_t k) {
-  return recording.T_world_sensor(i).inverse() * recording.T_world_sensor(k);
-}
-
-double extent_of(const Pose& T, double lever) {
-  const Eigen::AngleAxisd rotation(detail::Quaternion(T.linear()));
-  return std::hypot(T.translation().norm(), lever * rotation.angle());
-}
-
 /// The first scan behind i that sees what is beside the way in other directions; 0: none.
 std::size_t partner_of(const Recording& recording, std::size_t i, std::size_t last) {
   constexpr double kWay = 8.0;       // m
   constexpr std::size_t kMost = 50;  // scans
   for (std::size_t k = i + 1; k < last && k <= i + kMost; ++k) {
-    if (extent_of(given_motion(recording, i, k), kWay) >= kWay) return k;
+    if (extent_of(motion_between(recording, i, k), kWay) >= kWay) return k;
   }
   return 0;
 }
@@ -132,7 +124,7 @@ PointTimesGaps point_times_gaps(const Recording& recording, std::size_t first, s
   for (std::size_t pair = 0; pair < kMostPairs && first + 2 < last; ++pair) {
     const std::size_t i = first + 1 + pair * (last - first - 2) / kMostPairs;
     const std::size_t k = partner_of(recording, i, last);
-    if (k == 0 || extent_of(given_motion(recording, i, i + 1), kLever) < kLeastMotion) continue;
+    if (k == 0 || extent_of(motion_between(recording, i, i + 1), kLever) < kLeastMotion) continue;
     const Recorrected a(recording, i), b(recording, k);
     if (a.is_empty() || b.is_empty()) continue;
     const Mounting mounting = estimate_mounting(a.points(PointTimesReading::kAsGiven));
@@ -140,7 +132,7 @@ PointTimesGaps point_times_gaps(const Recording& recording, std::size_t first, s
     for (std::size_t r = 0; r < kPointTimesReadings; ++r) {
       const auto reading = static_cast<PointTimesReading>(r);
       const Landmarks of_a(a.points(reading), mounting), of_b(b.points(reading), mounting);
-      found[r] = of_a.compare(of_b, given_motion(recording, i, k));
+      found[r] = of_a.compare(of_b, motion_between(recording, i, k));
     }
     ++gaps.pairs;
     for (std::size_t r = 0; r < kPointTimesReadings; ++r) {

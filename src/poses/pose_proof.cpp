@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "agreement_sum.hpp"
+#include "given_motion.hpp"
 #include "io/finite_points.hpp"
 #include "landmarks.hpp"
 #include "merged_scans.hpp"
@@ -17,14 +18,7 @@ constexpr std::size_t kSteps = 5;     // scans
 constexpr double kLongWay = 4.0;      // m; scans farther apart see other surfaces
 constexpr double kProofLever = 10.0;  // m
 
-Pose motion_between(const Recording& recording, std::size_t i, std::size_t k) {
-  return recording.T_world_sensor(i).inverse() * recording.T_world_sensor(k);
-}
-
-double size_of(const Pose& T) {
-  const Eigen::AngleAxisd rotation(detail::Quaternion(T.linear()));
-  return std::hypot(T.translation().norm(), kProofLever * rotation.angle());
-}
+double proof_extent(const Pose& T) { return extent_of(T, kProofLever); }
 
 /// Scans at which a tested motion may begin, and their distance to its end.
 struct Starts {
@@ -73,7 +67,7 @@ std::vector<std::size_t> telling_starts(const Recording& recording, const Starts
       best_start(starts,
                  [&](std::size_t i) {
                    if (i < starts.first + step) return 0.0;
-                   return size_of(motion(i - step).inverse() * motion(i));
+                   return proof_extent(motion(i - step).inverse() * motion(i));
                  }),
       best_start(starts, [&](std::size_t i) { return motion(i).translation().norm(); })};
   std::sort(result.begin(), result.end());
@@ -160,7 +154,7 @@ double difference_from_given(const std::vector<Place>& places, const Recording& 
     const auto T_world_b = recording.pose_under(convention, place.scans_b.front());
     if (!T_world_a || !T_world_b) continue;
     const Pose given = motion_between(recording, place.scans_a.back(), place.scans_b.front());
-    most = std::max(most, size_of(given.inverse() * T_world_a->inverse() * *T_world_b));
+    most = std::max(most, proof_extent(given.inverse() * T_world_a->inverse() * *T_world_b));
   }
   return most;
 }

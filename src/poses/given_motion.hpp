@@ -1,0 +1,24 @@
+// Motions by the poses as given.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstddef>
+
+#include "dynains/io/recording.hpp"
+#include "dynains/pose.hpp"
+
+namespace dynains {
+
+/// Pose of scan k in the sensor frame of scan i.
+inline Pose motion_between(const Recording& recording, std::size_t i, std::size_t k) {
+  return recording.T_world_sensor(i).inverse() * recording.T_world_sensor(k);
+}
+
+/// Size of a motion, m, for points `lever` m away.
+inline double extent_of(const Pose& T, double lever) {
+  const Eigen::AngleAxisd rotation(detail::Quaternion(T.linear()));
+  return std::hypot(T.translation().norm(), lever * rotation.angle());
+}
+
+}  // namespace dynains
