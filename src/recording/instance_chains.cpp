@@ -23,28 +23,24 @@ bool is_compact(const Eigen::Vector3f& size) {
 void InstanceChains::add(PointsView points, Span<const PointLabel> labels,
                          Span<const std::uint32_t> instances, const Pose& T_world_sensor) {
   if (scan_ == 0) origin_ = T_world_sensor.translation();
+  end_old_chains();
   take_nodes(points, labels, instances, T_world_sensor);
   for (Node& node : newest_) {
     if (node.points < kFewestPoints) continue;
     if (!is_compact((node.highest - node.lowest).matrix())) continue;
     node.scan = scan_;
-    Chain& chain = chains_[node.instance];
-    if (has_ended(chain)) {
-      end(chain);
-      chain.clear();
-    }
-    chain.push_back(node);
-  }
-  for (auto at = chains_.begin(); at != chains_.end();) {
-    const bool ends = has_ended(at->second);
-    if (ends) end(at->second);
-    at = ends ? chains_.erase(at) : std::next(at);
+    chains_[node.instance].push_back(node);
   }
   ++scan_;
 }
 
-bool InstanceChains::has_ended(const Chain& chain) const {
-  return !chain.empty() && chain.back().scan + kMostGap < scan_;
+// Ends the chains that the newest scan cannot continue.
+void InstanceChains::end_old_chains() {
+  for (auto at = chains_.begin(); at != chains_.end();) {
+    const bool is_old = at->second.back().scan + kMostGap < scan_;
+    if (is_old) end(at->second);
+    at = is_old ? chains_.erase(at) : std::next(at);
+  }
 }
 
 void InstanceChains::take_nodes(PointsView points, Span<const PointLabel> labels,

@@ -26,9 +26,7 @@ void RestoredGround::find_removed(PointsView points, const Pose& T_world_sensor,
   ground_.free_far(T_world_sensor.translation());
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (verdict.labels[i] != PointLabel::kDynamic) continue;
-    const Eigen::Vector3d at = T_world_sensor * Eigen::Vector3d(static_cast<double>(points.x[i]),
-                                                                static_cast<double>(points.y[i]),
-                                                                static_cast<double>(points.z[i]));
+    const Eigen::Vector3d at = world_point(points, i, T_world_sensor);
     const auto rise = ground_.rise(at);
     if (!rise) continue;
     if (*rise <= kMostRise && ground_.is_level(at)) removed_.push_back({i, at});

@@ -20,11 +20,7 @@ constexpr float kBelief = 0.95F;             // of points that the second pass r
 constexpr float kRestoredBelief = 0.5F;      // of objects that it brings back
 constexpr double kPlaceShare = 0.75;         // of the memory; the rest is for the ground
 
-RecordingPlacesConfig places_config(const SecondPassConfig& config) {
-  RecordingPlacesConfig result;
-  result.place_memory = kPlaceShare * config.memory;
-  return result;
-}
+std::size_t bytes_of(double megabytes) { return static_cast<std::size_t>(1e6 * megabytes); }
 
 void check_sizes(PointsView points, std::size_t labels, std::size_t causes, std::size_t instances) {
   if (labels == points.size() && causes == points.size() && instances == points.size()) return;
@@ -53,8 +49,8 @@ bool SecondPass::Share::leave(float ratio) const {
 SecondPass::SecondPass(ByteStore& store, const SecondPassConfig& config)
     : config_((config.validate(), config)),
       store_(store),
-      places_(places_config(config), store),
-      ground_(store, static_cast<std::size_t>(1e6 * (1.0 - kPlaceShare) * config.memory)),
+      places_(RecordingPlacesConfig(), store, bytes_of(kPlaceShare * config.memory)),
+      ground_(store, bytes_of((1.0 - kPlaceShare) * config.memory)),
       references_(RecordingReferencesConfig{1.0, 5}) {}
 
 void SecondPass::add(PointsView points, const ScanVerdict& verdict) {
@@ -180,7 +176,7 @@ void SecondPass::remove_objects(std::uint32_t number, const Pose& T_world_sensor
     if (verdict.labels[i] != PointLabel::kStatic || is_restored_[i] != 0) continue;
     const std::uint32_t instance = numbers_.find(verdict.instances[i]);
     const bool is_free = place_of_[i] != nullptr && has_changed(*place_of_[i], number);
-    const bool leaves = instance != InstanceNumbers::kNone && instances_[instance].leaves();
+    const bool leaves = instance != InstanceNumbers::kNone && instances_[instance].is_leaving;
     if (!is_free && !leaves) continue;
     verdict.labels[i] = PointLabel::kDynamic;
     verdict.causes[i] = Cause::kCameOrWent;
@@ -293,6 +289,7 @@ void SecondPass::judge(std::uint32_t number, const Seen* begin, const Seen* end)
     add(instance.points, seen->points);
     add(instance.places, 1);
   }
+  instance.is_leaving = instance.leaves();
 }
 
 }  // namespace dynains

@@ -15,12 +15,14 @@ using test::BeamResult;
 
 namespace {
 
+constexpr std::size_t kBudget = 128'000'000;
+
 using Beam = std::function<BeamResult(const Eigen::Vector3d& position)>;
 
 /// A sensor at rest at the origin, 10 m beside a row of places; one reference each second.
 class Recorder {
  public:
-  explicit Recorder(const RecordingPlacesConfig& config = {}) : places(config, store) {}
+  explicit Recorder(const RecordingPlacesConfig& config = {}) : places(config, store, kBudget) {}
 
   /// Measures `count` places in a row along y, from place `first` on, at x = `x` m.
   void measure(int count, int first = 0, float x = 10.1F, PointLabel label = PointLabel::kStatic) {
@@ -323,7 +325,7 @@ TEST_CASE("parameters of places have bounds") {
   RecordingPlacesConfig config;
   config.free_looks = 0;
   MemoryStore store;
-  CHECK_THROWS_AS(RecordingPlaces(config, store), ConfigError);
+  CHECK_THROWS_AS(RecordingPlaces(config, store, kBudget), ConfigError);
 }
 
 }  // namespace

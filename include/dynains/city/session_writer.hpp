@@ -12,9 +12,9 @@
 
 #include "dynains/city/city.hpp"
 #include "dynains/city/session_points.hpp"
-#include "dynains/recording/references.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/recording/references.hpp"
 
 namespace dynains {
 

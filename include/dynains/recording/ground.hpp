@@ -11,6 +11,7 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/recording/paged_tiles.hpp"
+#include "dynains/recording/world_point.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
@@ -28,9 +29,7 @@ class RecordingGround {
   void add(PointsView points, Span<const PointLabel> verdicts, const Pose& T_world_sensor) {
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (verdicts[i] != PointLabel::kGround) continue;
-      const Eigen::Vector3d at = T_world_sensor * Eigen::Vector3d(static_cast<double>(points.x[i]),
-                                                                  static_cast<double>(points.y[i]),
-                                                                  static_cast<double>(points.z[i]));
+      const Eigen::Vector3d at = world_point(points, i, T_world_sensor);
       const Index index = index_of(at);
       auto& tile = tiles_.at({index[0] >> kShift, index[1] >> kShift});
       Cell& cell = tile.values[tile.add(key_of(index))];

@@ -65,7 +65,7 @@ class InstanceChains {
   static float shift(const Node& a, const Node& b);
   void take_nodes(PointsView points, Span<const PointLabel> labels,
                   Span<const std::uint32_t> instances, const Pose& T_world_sensor);
-  bool has_ended(const Chain& chain) const;
+  void end_old_chains();
   void end(const Chain& chain);
   void set_elsewhere(const Chain& chain, std::size_t first, std::size_t last);
   Moves::const_iterator first_move(std::uint32_t scan, std::uint32_t instance) const;

@@ -16,6 +16,7 @@
 #include "dynains/pose.hpp"
 #include "dynains/recording/paged_tiles.hpp"
 #include "dynains/recording/place.hpp"
+#include "dynains/recording/world_point.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "dynains/verdict.hpp"
@@ -31,7 +32,6 @@ struct RecordingPlacesConfig {
   int free_looks = 4;
   int object_places = 6;
   double most_contact = 1.5;
-  double place_memory = 128;  ///< MB
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
@@ -47,8 +47,6 @@ struct RecordingPlacesConfig {
                       "places of an object that came or went, at least"});
     visitor(Parameter{"most_contact", self.most_contact, closed(0, 26), "",
                       "most places that stay and touch an object, ratio to its own places"});
-    visitor(Parameter{"place_memory", self.place_memory, closed(0, 1e6), "MB",
-                      "places in memory, if those around the sensor take less"});
   }
 
   /// Throws ConfigError.
@@ -70,8 +68,7 @@ struct RecordingPlacesConfig {
 /// - It touches such places, and its first or last two epochs removed its points, or looks from
 ///   farther away tell that it came or left.
 ///
-/// A place takes about 170 bytes. The result does not depend on `place_memory`: other places wait
-/// in the store.
+/// A place takes about 170 bytes.
 class RecordingPlaces {
  public:
   static constexpr double kPlace = 0.4;      // m
@@ -79,11 +76,12 @@ class RecordingPlaces {
 
   using Place = RecordingPlace;
 
-  /// The store outlives this, and what it throws comes out of all functions. Throws ConfigError.
-  RecordingPlaces(const RecordingPlacesConfig& config, ByteStore& store)
+  /// `budget`: bytes in memory, if the places around the sensor take less; the others wait in the
+  /// store, which outlives this, and what it throws comes out of all functions. Neither changes a
+  /// result. Throws ConfigError.
+  RecordingPlaces(const RecordingPlacesConfig& config, ByteStore& store, std::size_t budget)
       : config_((config.validate(), config)),
-        tiles_(store, kPlace * static_cast<double>(kTile),
-               static_cast<std::size_t>(1e6 * config.place_memory)) {}
+        tiles_(store, kPlace * static_cast<double>(kTile), budget) {}
 
   const RecordingPlacesConfig& config() const { return config_; }
 
@@ -277,9 +275,7 @@ class RecordingPlaces {
       const float x = points.x[i], y = points.y[i];
       if (x * x + y * y > range * range) continue;
       block.points[block.count] = i;
-      block.at[block.count++] = position_of(
-          T_world_sensor * Eigen::Vector3d(static_cast<double>(x), static_cast<double>(y),
-                                           static_cast<double>(points.z[i])));
+      block.at[block.count++] = position_of(world_point(points, i, T_world_sensor));
       if (block.count < kBlock) continue;
       visit(block);
       block.count = 0;
@@ -425,11 +421,12 @@ class RecordingPlaces {
       }
       tiles_.free_far(tiles_.middle(index), 0.0);
     });
-    for (const Member& member : rejected) {
-      Place& place = change(member);
+    for (std::size_t i = 0; i < rejected.size(); ++i) {
+      Place& place = change(rejected[i]);
       place.state = PlaceState::kStays;
       place.object = 0;
-      tiles_.free_far(tiles_.middle(member.first), 0.0);
+      const GroundTile& tile = rejected[i].first;
+      if (i > 0 && tile != rejected[i - 1].first) tiles_.free_far(tiles_.middle(tile), 0.0);
     }
   }
 

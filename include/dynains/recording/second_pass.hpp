@@ -110,6 +110,7 @@ class SecondPass {
     Eigen::Vector3f lowest = Eigen::Vector3f::Constant(1e9F);
     Eigen::Vector3f highest = Eigen::Vector3f::Constant(-1e9F);  // m, axes of the world
     bool moved = false;
+    bool is_leaving = false;  // leaves(), when all of its places are counted
 
     bool leaves() const;
   };
