@@ -6,7 +6,7 @@
 
 namespace dynains::program {
 
-/// Of DynaInsRemover::Config::preset().
+/// The names that a run accepts, a part of those of DynaInsRemover::Config::preset().
 inline const std::vector<std::string>& preset_names() {
   static const std::vector<std::string> names = {"default", "offline", "paper", "published"};
   return names;

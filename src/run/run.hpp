@@ -22,7 +22,7 @@ struct RunListener {
   std::function<void(const std::string&)> warn;
   /// Called before the first scan and after each.
   std::function<void(std::size_t done, std::size_t total)> progress;
-  /// The same for the scans that a second pass revises.
+  /// Called before the second pass revises the first scan and after each.
   std::function<void(std::size_t done, std::size_t total)> revision_progress;
   SecondSignal second_signal = SecondSignal::kEndsProcess;
 };

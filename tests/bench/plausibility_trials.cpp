@@ -264,7 +264,7 @@ WrittenScans write_and_open(const Scans& scans, const Kind& kind,
   return {Recording(folder, options), written};
 }
 
-/// What `dynains run` says before its first scan.
+/// The warnings and the refusal that `dynains run` prints before its first scan.
 struct Start {
   std::string text;  ///< of warnings and a refusal
   bool is_refused = false;

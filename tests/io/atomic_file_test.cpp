@@ -189,7 +189,7 @@ TEST_CASE("A folder is put in place in one step, or not at all") {
   CHECK(read_text(folder / "newer/a.txt") == "new");
 }
 
-TEST_CASE("StagedFolder replaces its target whatever a killed process has left") {
+TEST_CASE("StagedFolder replaces its target, and leftovers of a killed process do not stop it") {
   const TemporaryFolder folder;
   const fs::path target = folder / "log";
   write_text(target / "old.txt", "old");

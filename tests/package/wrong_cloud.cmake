@@ -1,4 +1,4 @@
-# Clouds that the library does not know give one error each, which says what to do.
+# The compiler gives one error for each type that is no cloud. The error says what to do.
 set(system "")
 foreach(folder IN LISTS SYSTEM_INCLUDE_DIRS)
   list(APPEND system -isystem ${folder})

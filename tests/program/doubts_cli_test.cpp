@@ -347,7 +347,7 @@ TEST_CASE("check and run find clouds that were lost at constant speed, if poses 
   const Outcome run = drive.run();
   CHECK(run.code == 2);
   CHECK_THAT(run.err, ContainsSubstring("Clouds seem to be missing"));
-  // The same scans without a loss, of a drive with poses behind them.
+  // No cloud is lost here: the drive has two poses more than clouds at its end.
   const Drive whole(config);
   fs::remove(whole.file_of(39));
   fs::remove(whole.file_of(38));
