@@ -127,12 +127,23 @@ Terrain::Terrain(const TerrainConfig& config, std::vector<Street> streets, Rando
   steepest_ = static_cast<float>(steepness + 0.03 + config_.roughness);
 }
 
-double Terrain::hills(Vec2 p) const {
-  double sum = 0;
+void Terrain::add_hills(Vec2 corner, std::vector<double>& heights) const {
+  constexpr std::size_t kSamples = kCells + 1;
+  std::array<double, kSamples> sines, cosines;
   for (const Wave& wave : waves_) {
-    sum += wave.amplitude * std::sin(dot(wave.number, p) + wave.phase);
+    for (std::size_t i = 0; i < kSamples; ++i) {
+      const double angle = wave.number.x * (corner.x + static_cast<double>(i) * kCell) + wave.phase;
+      sines[i] = wave.amplitude * std::sin(angle);
+      cosines[i] = wave.amplitude * std::cos(angle);
+    }
+    // sin(a + b) = sin(a) cos(b) + cos(a) sin(b), with a by the column and b by the row.
+    for (std::size_t row = 0; row < kSamples; ++row) {
+      const double angle = wave.number.y * (corner.y + static_cast<double>(row) * kCell);
+      const double sine = std::sin(angle), cosine = std::cos(angle);
+      double* const to = &heights[row * kSamples];
+      for (std::size_t i = 0; i < kSamples; ++i) to[i] += sines[i] * cosine + cosines[i] * sine;
+    }
   }
-  return sum;
 }
 
 double Terrain::bumps(Vec2 p, Lattice& lattice) const {
@@ -170,6 +181,8 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
       blocks.push_back(nearest_within(corridors, middle, 1.42 * half));
     }
   }
+  std::vector<double> hills(grid_index(kCells + 1, 0, kCells + 1), 0.0);
+  add_hills(corner, hills);
   Lattice coarse{4.0, 1}, fine{1.1, 2};
   for (int row = 0; row <= kCells; ++row) {
     for (int column = 0; column <= kCells; ++column) {
@@ -181,10 +194,12 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
       const double across = std::clamp(1 + ground.edge / ground.half_width, 0.0, 1.0);
       const double wild = off_street * (1 - on_pavement);
       const double uneven = config_.roughness * (0.3 + 0.7 * wild);
-      double height = hills(p) + uneven * (0.6 * bumps(p, coarse) + 0.4 * bumps(p, fine));
+      const auto sample = grid_index(row, column, kCells + 1);
+      double height = hills[sample];
+      height += uneven * (0.6 * bumps(p, coarse) + 0.4 * bumps(p, fine));
       height += config_.kerb * off_street * (0.5 + 0.5 * on_pavement);
       height -= 0.02 * ground.half_width * across * across * (1 - off_street);
-      tile.heights[grid_index(row, column, kCells + 1)] = static_cast<float>(height);
+      tile.heights[sample] = static_cast<float>(height);
       if (row < kCells && column < kCells) {
         const std::uint16_t label = ground.edge < 0       ? config_.street_label
                                     : ground.pavement > 0 ? kPavementLabel

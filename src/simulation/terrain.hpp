@@ -64,7 +64,8 @@ class Terrain {
 
   const Tile& tile(int ix, int iy);
   void build(int ix, int iy, Tile& tile) const;
-  double hills(Vec2 p) const;
+  /// Adds the hills at the samples of the tile whose lowest corner is `corner`.
+  void add_hills(Vec2 corner, std::vector<double>& heights) const;
   double bumps(Vec2 p, Lattice& lattice) const;
   float height_near(float x, float y) const;
 
