@@ -18,7 +18,7 @@ for compiler in g++ clang++ clang++-14; do
   compilers=$((compilers + 1))
   compile=("$compiler" -std=c++17 -ffp-contract=off -I"$root/include" -I"$root/tests" -isystem "$1")
   "${compile[@]}" -O1 -c "$root/tests/reliability/determinism.cpp" -o "$work/program.o"
-  for level in -O1 "-O3 -DNDEBUG"; do
+  for level in -O0 "-O3 -DNDEBUG"; do
     remover=$library
     if [[ "$path $level" != "$library_by" ]]; then
       remover=$work/remover.o
