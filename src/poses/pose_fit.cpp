@@ -10,6 +10,7 @@
 
 #include "cell_surfaces.hpp"
 #include "dynains/median.hpp"
+#include "given_motion.hpp"
 #include "io/finite_points.hpp"
 #include "landmarks.hpp"
 #include "scan_registration.hpp"
@@ -137,11 +138,12 @@ std::optional<GuidedRegistration> register_along(ChainScan& a, ChainScan& b, con
 /// Completes a registration by planes that leaves a direction open: landmarks tell the way along
 /// it, less than `farthest` (m) from what planes say. The least certain direction is not always the
 /// open one: the back of a vehicle ahead is a plane, too. Empty if landmarks agree better without
-/// motion along it.
+/// motion along it, or with the distant motion `given`: they can meet by oncoming traffic.
 std::optional<CheckedMotion> complete(ChainScan& a, ChainScan& b, const Registration& by_planes,
-                                      double farthest) {
+                                      const Pose& given, double farthest) {
   constexpr double kUncertain = 0.08;  // m; a narrow view tells less of other directions, too
   constexpr double kNear = 1.0;        // m
+  constexpr double kDistant = 0.5;     // m
   std::optional<GuidedRegistration> best;
   double least_gap = 1.0;
   for (const Eigen::Vector3d& direction : by_planes.uncertain) {
@@ -161,6 +163,9 @@ std::optional<CheckedMotion> complete(ChainScan& a, ChainScan& b, const Registra
     }
   }
   if (!best) return std::nullopt;
+  const Pose& found = best->registration.T_a_b;
+  const bool is_distant = (found.translation() - given.translation()).norm() > kDistant;
+  if (is_distant && mean_gap(a.landmarks(), b.landmarks(), given) < least_gap) return std::nullopt;
   const Pose T_b_a = best->registration.T_a_b.inverse();
   const KnownTranslation way{T_b_a.linear() * best->way.direction, best->way.deviation};
   return checked(best->registration, register_near(b.planes(), a.planes(), T_b_a, way), kUncertain,
@@ -168,13 +173,14 @@ std::optional<CheckedMotion> complete(ChainScan& a, ChainScan& b, const Registra
 }
 
 /// Registers b to a. Empty if the motion is uncertain.
-std::optional<CheckedMotion> register_both_ways(ChainScan& a, ChainScan& b,
+std::optional<CheckedMotion> register_both_ways(ChainScan& a, ChainScan& b, const Pose& given,
                                                 const std::vector<Pose>& guesses, double farthest) {
   constexpr double kOpen = 0.025;      // m, uncertainty of a direction that planes leave open
   constexpr double kUncertain = 0.06;  // m
   const auto found = register_scans(a.planes(), b.planes(), guesses);
   if (!found) return std::nullopt;
-  if (found->is_ambiguous || found->uncertainty > kOpen) return complete(a, b, *found, farthest);
+  if (found->is_ambiguous || found->uncertainty > kOpen)
+    return complete(a, b, *found, given, farthest);
   return checked(found, register_scans(b.planes(), a.planes(), {found->T_a_b.inverse()}),
                  kUncertain, 0.0);
 }
@@ -295,11 +301,11 @@ std::vector<RegisteredMotion> register_motions(const Recording& recording) {
   for (std::size_t chain = 0; chain < starts.size(); ++chain) {
     scans.clear();
     const std::size_t first = starts[chain];
-    const Pose given =
-        recording.T_world_sensor(first).inverse() * recording.T_world_sensor(first + 1);
-    std::vector<Pose> guesses = first_guesses(given, elsewhere);
+    std::vector<Pose> guesses =
+        first_guesses(motion_between(recording, first, first + 1), elsewhere);
     for (std::size_t step = 1; step <= kLongest && first + step < recording.size(); step *= 2) {
-      const auto found = register_both_ways(scans.get(first), scans.get(first + step), guesses,
+      const auto found = register_both_ways(scans.get(first), scans.get(first + step),
+                                            motion_between(recording, first, first + step), guesses,
                                             step == 1 ? kFarthestStep : kFarthestFromGuess);
       const bool is_steady =
           found &&
