@@ -11,6 +11,7 @@
 
 #include "dynains/io/extrinsic.hpp"
 #include "dynains/median.hpp"
+#include "given_motion.hpp"
 #include "lost_scans.hpp"
 #include "merged_scans.hpp"
 #include "point_time_faults.hpp"
@@ -31,10 +32,38 @@ constexpr double kSmaller = 0.75;             // ratio of errors, beside a proof
 constexpr double kFarOff = 1.0;               // m at points 10 m away
 constexpr double kRough = 0.4;  // m at points 10 m away; more is not inexact but wrong
 
-/// Whether errors are larger than what `all` registrations explain.
-bool is_inexact(const MotionError& error, const MotionError& all) {
-  return error.translation > std::max(kInexactTranslation, 3.0 * all.translation_noise) ||
-         error.rotation > std::max(kInexactRotation, 3.0 * all.rotation_noise);
+/// Largest errors from one scan to the next that exact poses leave, m and rad.
+struct UsualError {
+  double translation, rotation;
+};
+
+/// Median change of the motion from one step to the next, m and rad.
+UsualError change_of_motion(const Recording& recording) {
+  std::vector<double> translations, rotations;
+  for (std::size_t i = 1; i + 1 < recording.size(); ++i) {
+    const Pose change =
+        motion_between(recording, i - 1, i).inverse() * motion_between(recording, i, i + 1);
+    translations.push_back(change.translation().norm());
+    rotations.push_back(std::abs(Eigen::AngleAxisd(detail::Quaternion(change.linear())).angle()));
+  }
+  return {median(std::move(translations)), median(std::move(rotations))};
+}
+
+/// By the noise of `steps`, and by the motion within de-skewed scans: between two poses it is taken
+/// as even. If a sensor sways, the middle of a scan is off by an eighth of the change of motion or
+/// slightly more, and that of the next scan by as much to the other side.
+UsualError usual_error(const Recording& recording, const MotionError& steps) {
+  constexpr double kUneven = 1.0 / 3.0;
+  UsualError usual{std::max(kInexactTranslation, 3.0 * steps.translation_noise),
+                   std::max(kInexactRotation, 3.0 * steps.rotation_noise)};
+  if (!recording.is_deskewed()) return usual;
+  const UsualError change = change_of_motion(recording);
+  return {std::max(usual.translation, kUneven * change.translation),
+          std::max(usual.rotation, kUneven * change.rotation)};
+}
+
+bool is_inexact(const MotionError& error, const UsualError& usual) {
+  return error.translation > usual.translation || error.rotation > usual.rotation;
 }
 
 std::optional<Pose> no_motion(const RegisteredMotion& /*motion*/) { return Pose::Identity(); }
@@ -282,6 +311,7 @@ void take(const Explanation& explanation, Diagnosis& d) {
 /// Errors of the given poses by registered motions.
 struct ErrorsAsGiven {
   MotionError all, steps, first_steps;
+  UsualError usual;
   double exact = kExact;  // m at points 10 m away; errors of exact poses are smaller
 
   ErrorsAsGiven(const Recording& recording, const std::vector<RegisteredMotion>& motions) {
@@ -290,6 +320,7 @@ struct ErrorsAsGiven {
     all = motion_error(motions, given, identity);
     steps = motion_error(motions, given, identity, Motions::kSteps);
     first_steps = motion_error(motions, given, identity, Motions::kFirstSteps);
+    usual = usual_error(recording, steps);
     exact = std::max(kExact, 2.0 * all.noise);
   }
 };
@@ -329,7 +360,7 @@ void judge_start(const ErrorsAsGiven& errors, Diagnosis& d) {
   const bool is_worse = first.translation > kClearlyWorse * steps.translation ||
                         first.rotation > kClearlyWorse * steps.rotation;
   d.is_inexact_at_start = first.pairs >= kFewestFirstPairs && is_worse &&
-                          is_inexact(first, steps) && !is_inexact(steps, steps);
+                          is_inexact(first, errors.usual) && !is_inexact(steps, errors.usual);
   if (!d.is_inexact_at_start) return;
   d.start_translation_error = first.translation;
   d.start_rotation_error = first.rotation;
@@ -344,7 +375,7 @@ void judge_exactness(const std::vector<RegisteredMotion>& motions, const ErrorsA
   if (d.verdict == PoseVerdict::kNoMotion && error > kRough) d.verdict = PoseVerdict::kDisagree;
   const bool may_be_inexact =
       d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion;
-  if (may_be_inexact && (is_inexact(errors.steps, errors.steps) || d.is_inexact_at_start)) {
+  if (may_be_inexact && (is_inexact(errors.steps, errors.usual) || d.is_inexact_at_start)) {
     d.verdict = PoseVerdict::kInexact;
   }
   const bool is_still = error_at_points(motions, no_motion) < 0.5 * error &&
@@ -407,7 +438,8 @@ void accept_proven_poses(const Recording& recording, Diagnosis& d) {
   const auto identity = Pose::Identity();
   const MotionError all = motion_error(motions.certain, given, identity);
   const MotionError steps = motion_error(motions.certain, given, identity, Motions::kSteps);
-  if (!(all.at_points < std::max(kExact, 2.0 * all.noise)) || is_inexact(steps, steps)) return;
+  if (!(all.at_points < std::max(kExact, 2.0 * all.noise))) return;
+  if (is_inexact(steps, usual_error(recording, steps))) return;
   if (!agrees_best(recording, d.readings, d.mounting)) return;
   d.verdict = PoseVerdict::kAgree;
   d.convention = recording.convention();

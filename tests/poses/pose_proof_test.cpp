@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "dynains/io/kitti.hpp"
+#include "dynains/io/point_file.hpp"
 #include "dynains/poses/diagnosis.hpp"
 #include "dynains/poses/pose_jumps.hpp"
+#include "dynains/simulation/random_world.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
 #include "io/files.hpp"
@@ -23,12 +25,10 @@ namespace fs = std::filesystem;
 /// A recording whose poses can be replaced.
 class Drive {
  public:
-  Drive(simulation::Scene scene, simulation::Sensor sensor, std::uint32_t seed) {
-    simulation::Config config;
-    config.scene = scene;
-    config.sensor = sensor;
-    config.scans = 40;
-    config.seed = seed;
+  Drive(simulation::Scene scene, simulation::Sensor sensor, std::uint32_t seed)
+      : Drive(config_of(scene, sensor, seed)) {}
+
+  explicit Drive(const simulation::Config& config) {
     simulation::Simulator simulator(config);
     fs::create_directories(folder_ / "velodyne");
     for (std::size_t i = 0; i < simulator.size(); ++i) {
@@ -48,6 +48,65 @@ class Drive {
     return recording([](std::size_t, const Pose& T) { return T; });
   }
   const Pose& pose(std::size_t i) const { return poses_[i]; }
+
+ private:
+  static simulation::Config config_of(simulation::Scene scene, simulation::Sensor sensor,
+                                      std::uint32_t seed) {
+    simulation::Config config;
+    config.scene = scene;
+    config.sensor = sensor;
+    config.scans = 40;
+    config.seed = seed;
+    return config;
+  }
+
+  TemporaryFolder folder_;
+  std::vector<Pose> poses_;
+};
+
+simulation::Config short_world(std::uint64_t seed) {
+  simulation::Config config = simulation::random_world(seed);
+  config.scans = 30;
+  return config;
+}
+
+/// A recording as measured, with times of points, whose poses can be replaced.
+class SkewedDrive {
+ public:
+  explicit SkewedDrive(simulation::Config config) {
+    config.rolling_shutter = true;
+    config.deskewed = 0.0;
+    simulation::Simulator simulator(config);
+    fs::create_directories(folder_ / "pcd");
+    std::vector<double> times;
+    PointColumns columns;
+    columns.time = true;
+    for (std::size_t i = 0; i < simulator.size(); ++i) {
+      const simulation::SimulatedScan scan = simulator.scan(i);
+      PointFileWriter file(folder_ / ("pcd/" + simulation::scan_name(i) + ".pcd"), columns);
+      for (std::size_t k = 0; k < scan.times.size(); ++k) {
+        FilePoint point;
+        point.position = Eigen::Map<const Eigen::Vector3f>(&scan.xyzi[4 * k]).cast<double>();
+        point.time = static_cast<double>(scan.times[k]);
+        file.add(point);
+      }
+      file.commit();
+      poses_.push_back(scan.T_world_sensor);
+      times.push_back(scan.time);
+    }
+    write_times(folder_ / "times.txt", times);
+  }
+
+  Diagnosis diagnose_with(double metres) const {
+    std::mt19937 random(3);
+    std::normal_distribution<double> error(0.0, metres);
+    std::vector<Pose> rows = poses_;
+    for (Pose& T : rows) T.translation() += Eigen::Vector3d(error(random), error(random), 0.0);
+    write_poses(folder_ / "poses.txt", rows);
+    RecordingOptions options;
+    options.deskew = true;
+    return diagnose(Recording(folder_.path(), options));
+  }
 
  private:
   TemporaryFolder folder_;
@@ -82,6 +141,26 @@ TEST_CASE("Right poses of a sparse sensor in a crowd raise no doubt, wrong ones 
     return T;
   }));
   CHECK_FALSE(is_accepted(noisy));
+}
+
+TEST_CASE("Uneven motion within de-skewed scans does not make right poses inexact") {
+  const SkewedDrive drive(short_world(21077));
+  CHECK(drive.diagnose_with(0.0).verdict == PoseVerdict::kAgree);
+  CHECK(drive.diagnose_with(0.1).verdict == PoseVerdict::kInexact);
+}
+
+TEST_CASE("Oncoming traffic on a motorway does not contradict right poses") {
+  const Drive drive(short_world(21057));
+  const Diagnosis right = diagnose(drive.recording());
+  CHECK(right.sound());
+  CHECK(right.verdict != PoseVerdict::kInexact);
+  CHECK_FALSE(diagnose(drive.recording([](std::size_t, const Pose& T) {
+                return Pose(T.inverse());
+              })).sound());
+  CHECK_FALSE(diagnose(drive.recording([](std::size_t, Pose T) {
+                T.translation() *= 1000.0;
+                return T;
+              })).sound());
 }
 
 TEST_CASE("A few registrations confirm right poses, and never those of a turned body") {
