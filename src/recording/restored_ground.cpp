@@ -34,6 +34,11 @@ void RestoredGround::find_removed(PointsView points, const Pose& T_world_sensor,
   }
 }
 
+bool RestoredGround::rises(const Eigen::Vector3d& point) {
+  const auto rise = ground_.rise(point);
+  return rise && *rise >= kFootBegin;
+}
+
 bool RestoredGround::is_beside_foot(const Eigen::Vector3d& at) const {
   for (std::int64_t dx = -1; dx <= 1; ++dx) {
     for (std::int64_t dy = -1; dy <= 1; ++dy) {

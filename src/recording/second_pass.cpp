@@ -139,6 +139,10 @@ bool SecondPass::revise(PointsView points, std::uint32_t number, const Pose& T_w
                            if (place == nullptr) return;
                            if (verdict.labels[i] == PointLabel::kDynamic) {
                              if (stands(*place, number)) restore(i, verdict);
+                           } else if (verdict.labels[i] == PointLabel::kGround) {
+                             if (place->state != PlaceState::kChanged) return;
+                             if (!ground_.rises(world_point(points_, i, T_world_sensor))) return;
+                             place_of_[i] = place;
                            } else if (place->state != PlaceState::kUnknown) {
                              place_of_[i] = place;
                            }
@@ -173,7 +177,7 @@ void SecondPass::remove_objects(std::uint32_t number, const Pose& T_world_sensor
                                 VerdictArrays& verdict) {
   find_instances(number, T_world_sensor, verdict);
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    if (verdict.labels[i] != PointLabel::kStatic || is_restored_[i] != 0) continue;
+    if (!is_static(verdict.labels[i]) || is_restored_[i] != 0) continue;
     const std::uint32_t instance = numbers_.find(verdict.instances[i]);
     const bool is_free = place_of_[i] != nullptr && has_changed(*place_of_[i], number);
     const bool leaves = instance != InstanceNumbers::kNone && instances_[instance].is_leaving;

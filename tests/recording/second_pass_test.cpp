@@ -210,6 +210,42 @@ TEST_CASE("removed ground comes back") {
   CHECK(road.kept > 3 * road.removed);
 }
 
+TEST_CASE(
+    "what a scan took for ground on a car that leaves is moving if it rises above the ground") {
+  constexpr std::uint32_t kFlat = 1, kHigh = 2, kRoad = 40;
+  const auto with_ground_on_car = [](Recorded recording) {
+    for (std::size_t number = 0; number < recording.scans.size(); number += 8) {
+      BoxScan& scan = recording.scans[number];
+      for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+        const double height =
+            static_cast<double>(scan.points.z[i]) + scan.T_world_sensor.translation().z();
+        const bool is_flat = height <= 0.04;
+        const bool is_high = height >= 0.45 && height <= 0.7;
+        if (scan.labels[i] != kCar || !(is_flat || is_high)) continue;
+        scan.labels[i] = is_flat ? kFlat : kHigh;
+        scan.verdicts[i] = PointLabel::kGround;
+      }
+    }
+    return recording;
+  };
+  const Recorded left = with_ground_on_car(with_parked_car());
+  const Counts high = sum(count(left, kHigh));
+  CHECK(high.removed > 9 * high.kept);
+  const Counts flat = sum(count(left, kFlat));
+  CHECK(flat.kept > 0);
+  CHECK(flat.removed == 0);
+  CHECK(sum(count(left, kRoad)).removed == 0);
+  // Of a car that stays, all points do.
+  Recorded recording;
+  std::vector<StreetBox> boxes = street();
+  boxes.push_back(car_at(4.0));
+  recording.drive(boxes, -15.0, 15.0);
+  recording.drive(boxes, 15.0, -15.0);
+  const Counts stays = sum(count(with_ground_on_car(recording), kHigh));
+  CHECK(stays.kept > 0);
+  CHECK(stays.removed == 0);
+}
+
 TEST_CASE("neither memory nor threads change the second pass") {
   Recorded recording = with_parked_car();
   const Counts counts = sum(count(recording, kCar));

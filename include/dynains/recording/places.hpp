@@ -149,13 +149,15 @@ class RecordingPlaces {
     find_objects();
   }
 
-  /// Calls `visit(i, place)` for each static or moving point above the ground within the range, m,
-  /// sensor frame; null: no scan brought a place there.
+  /// Calls `visit(i, place)` for each point with a verdict within the range, m, sensor frame; null:
+  /// no scan brought a place there.
   template <class Visitor>
   void for_each_place(PointsView points, Span<const PointLabel> verdicts,
                       const Pose& T_world_sensor, Visitor&& visit) {
     free_far(T_world_sensor.translation());
-    const auto is_taken = [&](std::size_t i) { return is_above_ground(verdicts[i]); };
+    const auto is_taken = [&](std::size_t i) {
+      return is_above_ground(verdicts[i]) || verdicts[i] == PointLabel::kGround;
+    };
     const Tile* tile = nullptr;
     GroundTile index = {};
     for_each_block(points, T_world_sensor, is_taken, [&](const Block& block) {

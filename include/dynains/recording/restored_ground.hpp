@@ -24,6 +24,9 @@ class RestoredGround {
   void add(PointsView points, Span<const PointLabel> verdicts, const Pose& T_world_sensor) {
     ground_.add(points, verdicts, T_world_sensor);
   }
+  /// Whether a point (m, world frame) is higher than the ground of the recording: a foot, a tyre or
+  /// a bumper that a scan took for ground.
+  bool rises(const Eigen::Vector3d& point);
   /// Restores points of a scan. Returns their number.
   std::size_t restore(PointsView points, const Pose& T_world_sensor, VerdictArrays& verdict);
 
