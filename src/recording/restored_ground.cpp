@@ -8,7 +8,8 @@ namespace {
 
 constexpr double kMostRise = 0.01;                    // m, of ground
 constexpr double kFootBegin = 0.05, kFootEnd = 0.60;  // m above the ground
-constexpr double kColumn = 0.1;                       // m
+constexpr double kRise = 0.10;  // m, more than a pose that is off by 0.1 deg moves ground 50 m away
+constexpr double kColumn = 0.1;  // m
 
 VoxelKey column_of(const Eigen::Vector3d& at, std::int64_t dx = 0, std::int64_t dy = 0) {
   // The columns of a scan are nearer to each other than the period of the mask.
@@ -36,7 +37,7 @@ void RestoredGround::find_removed(PointsView points, const Pose& T_world_sensor,
 
 bool RestoredGround::rises(const Eigen::Vector3d& point) {
   const auto rise = ground_.rise(point);
-  return rise && *rise >= kFootBegin;
+  return rise && *rise >= kRise;
 }
 
 bool RestoredGround::is_beside_foot(const Eigen::Vector3d& at) const {

@@ -219,7 +219,7 @@ TEST_CASE(
       for (std::size_t i = 0; i < scan.labels.size(); ++i) {
         const double height =
             static_cast<double>(scan.points.z[i]) + scan.T_world_sensor.translation().z();
-        const bool is_flat = height <= 0.04;
+        const bool is_flat = height <= 0.09;
         const bool is_high = height >= 0.45 && height <= 0.7;
         if (scan.labels[i] != kCar || !(is_flat || is_high)) continue;
         scan.labels[i] = is_flat ? kFlat : kHigh;

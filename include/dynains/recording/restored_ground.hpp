@@ -24,7 +24,7 @@ class RestoredGround {
   void add(PointsView points, Span<const PointLabel> verdicts, const Pose& T_world_sensor) {
     ground_.add(points, verdicts, T_world_sensor);
   }
-  /// Whether a point (m, world frame) is higher than the ground of the recording: a foot, a tyre or
+  /// Whether a point (m, world frame) is 10 cm or more above the ground of the recording: a tyre or
   /// a bumper that a scan took for ground.
   bool rises(const Eigen::Vector3d& point);
   /// Restores points of a scan. Returns their number.
