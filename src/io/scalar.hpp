@@ -101,7 +101,8 @@ bool store_number(double value, Number& target) {
   return true;
 }
 
-/// The same at `bytes`.
+/// Converts a number and stores it at `bytes`. False, with nothing stored, if the type cannot hold
+/// it.
 inline bool store_scalar(Scalar type, double value, char* bytes) {
   return with_type(type, [&](auto number) {
     if (!store_number(value, number)) return false;

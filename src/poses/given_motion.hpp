@@ -1,4 +1,4 @@
-// Motions by the poses as given.
+// Motions by the poses as given, and the sizes of motions.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -15,10 +15,14 @@ inline Pose motion_between(const Recording& recording, std::size_t i, std::size_
   return recording.T_world_sensor(i).inverse() * recording.T_world_sensor(k);
 }
 
+/// Angle of a rotation, rad, not negative.
+inline double angle_of(const Eigen::Matrix3d& R) {
+  return std::abs(Eigen::AngleAxisd(detail::Quaternion(R)).angle());
+}
+
 /// Size of a motion, m, for points `lever` m away.
 inline double extent_of(const Pose& T, double lever) {
-  const Eigen::AngleAxisd rotation(detail::Quaternion(T.linear()));
-  return std::hypot(T.translation().norm(), lever * rotation.angle());
+  return std::hypot(T.translation().norm(), lever * angle_of(T.linear()));
 }
 
 }  // namespace dynains

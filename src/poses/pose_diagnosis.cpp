@@ -44,7 +44,7 @@ UsualError change_of_motion(const Recording& recording) {
     const Pose change =
         motion_between(recording, i - 1, i).inverse() * motion_between(recording, i, i + 1);
     translations.push_back(change.translation().norm());
-    rotations.push_back(std::abs(Eigen::AngleAxisd(detail::Quaternion(change.linear())).angle()));
+    rotations.push_back(angle_of(change.linear()));
   }
   return {median(std::move(translations)), median(std::move(rotations))};
 }

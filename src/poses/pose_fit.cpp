@@ -21,10 +21,6 @@ namespace {
 
 constexpr double kLever = 10.0;  // m, distance of the points at which a rotation is judged
 
-double angle_of(const Eigen::Matrix3d& R) {
-  return std::abs(Eigen::AngleAxisd(detail::Quaternion(R)).angle());
-}
-
 /// A scan, as planes and as landmarks.
 class ChainScan {
  public:

@@ -9,6 +9,7 @@
 
 #include "dynains/median.hpp"
 #include "dynains/pose.hpp"
+#include "given_motion.hpp"
 #include "io/finite_points.hpp"
 #include "io/text.hpp"
 #include "scan_registration.hpp"
@@ -40,8 +41,7 @@ Pose motion_like(const Recording& recording, std::size_t i, std::size_t k) {
 
 PoseJump difference(const Pose& expected, const Pose& given, std::size_t scan) {
   const Pose E = expected.inverse() * given;
-  const Eigen::AngleAxisd rotation(detail::Quaternion(E.linear()));
-  return {scan, E.translation().norm(), kJumpDegrees * std::abs(rotation.angle())};
+  return {scan, E.translation().norm(), kJumpDegrees * angle_of(E.linear())};
 }
 
 /// Size at points 10 m away, m.

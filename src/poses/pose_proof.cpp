@@ -60,10 +60,7 @@ std::vector<std::size_t> telling_starts(const Recording& recording, const Starts
   const std::size_t step = starts.step;
   const auto motion = [&](std::size_t i) { return motion_between(recording, i, i + step); };
   std::vector<std::size_t> result = {
-      best_start(starts,
-                 [&](std::size_t i) {
-                   return Eigen::AngleAxisd(detail::Quaternion(motion(i).linear())).angle();
-                 }),
+      best_start(starts, [&](std::size_t i) { return angle_of(motion(i).linear()); }),
       best_start(starts,
                  [&](std::size_t i) {
                    if (i < starts.first + step) return 0.0;

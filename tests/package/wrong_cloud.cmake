@@ -1,4 +1,4 @@
-# The compiler gives one error for each type that is no cloud. The error says what to do.
+# Each wrong type of cloud causes one compiler error. This error names the remedy.
 set(system "")
 foreach(folder IN LISTS SYSTEM_INCLUDE_DIRS)
   list(APPEND system -isystem ${folder})

@@ -235,7 +235,7 @@ TEST_CASE(
   CHECK(flat.kept > 0);
   CHECK(flat.removed == 0);
   CHECK(sum(count(left, kRoad)).removed == 0);
-  // Of a car that stays, all points do.
+  // The second pass keeps every point of a car that is parked during the whole recording.
   Recorded recording;
   std::vector<StreetBox> boxes = street();
   boxes.push_back(car_at(4.0));
