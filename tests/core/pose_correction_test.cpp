@@ -24,8 +24,13 @@ using simulation::Scene;
 using simulation::Sensor;
 using simulation::SimulatedScan;
 
-constexpr double kTolerance = 0.01;  // m
+constexpr double kTolerance = 0.01;                            // m
+constexpr double kLongestObject = 18.0, kHighestObject = 4.5;  // m
 constexpr double kDegrees = M_PI / 180.0;
+
+PoseCorrection new_correction() {
+  return PoseCorrection(kTolerance, kLongestObject, kHighestObject);
+}
 
 std::vector<SimulatedScan> drive(Scene scene, Sensor sensor, int scans) {
   simulation::Config config;
@@ -50,7 +55,7 @@ GroundSplit split_of(const SimulatedScan& scan) {
 
 // A correction that knows all scans but the last, under their exact poses.
 PoseCorrection after_all_but_last(const std::vector<SimulatedScan>& scans) {
-  PoseCorrection correction(kTolerance);
+  PoseCorrection correction = new_correction();
   correction.begin_epoch(scans.front().T_world_sensor);
   for (std::size_t i = 0; i + 1 < scans.size(); ++i) {
     const GroundSplit split = split_of(scans[i]);
@@ -80,7 +85,7 @@ TEST_CASE("exact poses stay, with residuals below 1 cm and 0.02 deg") {
   const auto [scene, sensor] = GENERATE(
       table<Scene, Sensor>({{Scene::kUrban, Sensor::kHdl64}, {Scene::kCrowd, Sensor::kOs1_64}}));
   const std::vector<SimulatedScan> scans = drive(scene, sensor, 15);
-  PoseCorrection correction(kTolerance);
+  PoseCorrection correction = new_correction();
   correction.begin_epoch(scans.front().T_world_sensor);
   std::vector<double> translations, rotations;
   for (const SimulatedScan& scan : scans) {
@@ -203,7 +208,7 @@ TEST_CASE("a covariance goes to another frame as the errors that it describes") 
 TEST_CASE("a lasting offset is one residual, and later poses are corrected by it") {
   const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 12);
   const Pose T_moved_world(Eigen::Translation3d(0.3, -0.4, 0.0));
-  PoseCorrection correction(kTolerance);
+  PoseCorrection correction = new_correction();
   correction.begin_epoch(scans.front().T_world_sensor);
   for (std::size_t i = 0; i < scans.size(); ++i) {
     const bool is_moved = i >= 6;
@@ -247,7 +252,7 @@ GroundSplit corridor(std::uint64_t seed, float x, float y, bool vehicle) {
 
 // The observable part of the error grows from scan to scan, and so does the other.
 TEST_CASE("between two long walls, errors across them are corrected, those along them stay") {
-  PoseCorrection correction(kTolerance);
+  PoseCorrection correction = new_correction();
   correction.begin_epoch(Eigen::Isometry3d::Identity());
   for (int scan = 0; scan < 12; ++scan) {
     const float x = 0.5F * static_cast<float>(scan);
@@ -272,7 +277,7 @@ TEST_CASE("between two long walls, errors across them are corrected, those along
 }
 
 TEST_CASE("one object alone does not decide about a direction") {
-  PoseCorrection correction(kTolerance);
+  PoseCorrection correction = new_correction();
   correction.begin_epoch(Eigen::Isometry3d::Identity());
   for (int scan = 0; scan < 20; ++scan) {
     // The vehicle ahead drives as fast as the sensor, 2 cm per scan.
@@ -286,6 +291,78 @@ TEST_CASE("one object alone does not decide about a direction") {
     CHECK(T.translation().y() == Approx(0.0).margin(0.02));
     correction.insert(T, split, {});
   }
+}
+
+// Adds the rear of a vehicle around (x, y) (m), 1.8 m wide and 1.5 m high, 500 points.
+void add_rear(std::uint64_t seed, float x, float y, GroundSplit& split) {
+  Random random(seed);
+  const std::size_t begin = split.count;
+  split.resize(begin + 500);
+  for (std::size_t i = begin; i < split.count; ++i) {
+    split.points.x[i] = x + 0.01F * static_cast<float>(random.normal());
+    split.points.y[i] = y + random.uniform_float(-0.9, 0.9);
+    split.points.z[i] = random.uniform_float(-1.5, 0.0);
+  }
+}
+
+// Greatest correction (m) of an exact pose along the corridor in which four vehicles start
+// together, 5 cm per scan. Objects have at most the given size (m).
+double correction_by_traffic(double longest_object, double highest_object) {
+  constexpr float kPlaces[][2] = {{7.0F, -2.0F}, {-9.0F, 2.0F}, {12.0F, 2.0F}, {-14.0F, -2.0F}};
+  PoseCorrection correction(kTolerance, longest_object, highest_object);
+  const Pose T_exact = Eigen::Isometry3d::Identity();
+  correction.begin_epoch(T_exact);
+  double largest = 0.0;
+  for (int scan = 0; scan < 8; ++scan) {
+    GroundSplit split = corridor(70 + static_cast<std::uint64_t>(scan), 0.0F, 0.0F, false);
+    std::vector<std::uint32_t> instance_of(split.count, kNoCluster);
+    std::uint32_t instance = 0;
+    for (const auto& place : kPlaces) {
+      add_rear(900 + instance, place[0] + 0.05F * static_cast<float>(scan), place[1], split);
+      instance_of.resize(split.count, instance++);
+    }
+    const Pose T = correction.correct(T_exact, split, {instance_of, instance});
+    largest = std::max(largest, std::abs(T.translation().x()));
+    correction.insert(T, split, {});
+  }
+  return largest;
+}
+
+TEST_CASE("traffic that starts together does not correct an exact pose, large objects do") {
+  CHECK(correction_by_traffic(1.9, 1.6) == 0.0);
+  CHECK(correction_by_traffic(1.7, 1.6) > 0.05);
+  CHECK(correction_by_traffic(1.9, 1.4) > 0.05);
+}
+
+// Whether the distances between level ground and its planes show that a pose is inexact. Each of 16
+// beams looks into all sectors. `of_beam` (m): standard deviation of the error that all distances
+// of a beam share. All distances share an error of 4 mm, and each has one of 2 cm.
+bool shows_error(double of_beam) {
+  Random random(11);
+  NormalEquations equations;
+  CorrectionSupport support;
+  support.clear();
+  for (int beam = 0; beam < 16; ++beam) {
+    const double shared = 0.004 + of_beam * random.normal();
+    const double range = 5.0 + 2.0 * beam;
+    for (int k = 0; k < 180; ++k) {
+      const double angle = M_PI / 90.0 * k;
+      const double x = range * std::cos(angle), y = range * std::sin(angle);
+      const NormalEquations::Vector derivatives = {0.0, 0.0, 1.0, y, -x, 0.0};
+      const double distance = shared + 0.02 * random.normal();
+      equations.add(derivatives, distance, 1.0);
+      support.add({static_cast<float>(x), static_cast<float>(y), -1.7F, false}, derivatives,
+                  distance, 1.0);
+    }
+  }
+  for (std::size_t i = 0; i < 6; ++i) equations.attract(i, 0.0, 0.2);
+  return support.test(equations.solve(), equations, CorrectionSupport::Prior::kExact)
+      .is_significant;
+}
+
+TEST_CASE("an error shows that an exact pose is none, biases of beams do not") {
+  CHECK(shows_error(0.0));
+  CHECK_FALSE(shows_error(0.02));
 }
 
 // Adds a wall across the corridor at `x` (m), 2,000 points.
@@ -304,7 +381,7 @@ void add_wall_across(std::uint64_t seed, float x, float half_width, GroundSplit&
 // of the earlier scans. `doubtful` scans with walls across the corridor are pushed wrong by `error`
 // (m), and so are their walls if they are in the planes.
 double last_position(int doubtful, double error) {
-  PoseCorrection correction(kTolerance);
+  PoseCorrection correction = new_correction();
   correction.begin_epoch(Eigen::Isometry3d::Identity());
   for (int scan = 0; scan < doubtful + 2; ++scan) {
     const std::uint64_t seed = 100 * static_cast<std::uint64_t>(scan);
@@ -343,7 +420,7 @@ TEST_CASE("all points of the first scan make its planes") {
     split.points.y[i] = static_cast<float>(column) - 45.0F + random.uniform_float(0.1, 0.9);
     split.points.z[i] = -1.6F;
   }
-  PoseCorrection correction(kTolerance);
+  PoseCorrection correction = new_correction();
   correction.begin_epoch(Eigen::Isometry3d::Identity());
   correction.insert(Eigen::Isometry3d::Identity(), split, {});
   const Eigen::Isometry3d T =
@@ -354,7 +431,7 @@ TEST_CASE("all points of the first scan make its planes") {
 
 TEST_CASE("an error of one pose alone does not last") {
   const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 8);
-  PoseCorrection correction(kTolerance);
+  PoseCorrection correction = new_correction();
   correction.begin_epoch(scans.front().T_world_sensor);
   for (std::size_t i = 0; i < scans.size(); ++i) {
     const GroundSplit split = split_of(scans[i]);
@@ -408,22 +485,13 @@ TEST_CASE("a scan of another place is lost, and a scan without points has no res
 
 namespace {
 
-// Number of points on planes of 3000 points of the ground, 1.7 m below the sensor. Two beams
-// measure them at ranges `difference` (m) apart, with a noise along the beams.
-std::size_t points_on_planes(double difference) {
-  std::vector<Eigen::Vector3d> ground;
-  Random random(7);
-  for (int k = 0; k < 3000; ++k) {
-    const double azimuth = 0.002 * k;
-    const double distance = 20.2 + (k % 2) * difference;
-    const Eigen::Vector3d point(distance * std::cos(azimuth), distance * std::sin(azimuth), -1.7);
-    ground.push_back(point + 0.08 * random.normal() * point.normalized());
-  }
+// Number of `points` that lie on the planes which they make.
+std::size_t points_on_planes(const std::vector<Eigen::Vector3d>& points) {
   VoxelPlanes planes;
   planes.begin_scan(Pose::Identity());
   std::size_t found = 0;
   for (const bool is_asked : {false, true}) {
-    for (const Eigen::Vector3d& p : ground) {
+    for (const Eigen::Vector3d& p : points) {
       VoxelPlanes::Block block;
       block.push_back(Pose::Identity(), p.x(), p.y(), p.z());
       if (is_asked) {
@@ -436,11 +504,41 @@ std::size_t points_on_planes(double difference) {
   return found;
 }
 
+// 3000 points of the ground, 1.7 m below the sensor. Two beams measure them at ranges `difference`
+// (m) apart, with a noise along the beams.
+std::vector<Eigen::Vector3d> ground_of_beams(double difference) {
+  std::vector<Eigen::Vector3d> ground;
+  Random random(7);
+  for (int k = 0; k < 3000; ++k) {
+    const double azimuth = 0.002 * k;
+    const double distance = 20.2 + (k % 2) * difference;
+    const Eigen::Vector3d point(distance * std::cos(azimuth), distance * std::sin(azimuth), -1.7);
+    ground.push_back(point + 0.08 * random.normal() * point.normalized());
+  }
+  return ground;
+}
+
+// Points on a level square of 1 m at a distance of 20 m, at the height `z` (m).
+std::vector<Eigen::Vector3d> level_square(double z) {
+  std::vector<Eigen::Vector3d> points;
+  Random random(8);
+  for (int k = 0; k < 100; ++k) {
+    points.emplace_back(20.0 + random.uniform(0.0, 1.0), random.uniform(0.0, 1.0), z);
+  }
+  return points;
+}
+
 }  // namespace
 
 TEST_CASE("noise along a beam makes no plane, ground of two beams does") {
-  CHECK(points_on_planes(0.0) == 0);
-  CHECK(points_on_planes(0.5) > 1500);
+  CHECK(points_on_planes(ground_of_beams(0.0)) == 0);
+  CHECK(points_on_planes(ground_of_beams(0.5)) > 1500);
+}
+
+// For example foliage that one beam sees. The sine of the angle to the beams is 0.034 and 0.046.
+TEST_CASE("points of one beam make no plane at any depth, ground at a small angle does") {
+  CHECK(points_on_planes(level_square(-0.7)) == 0);
+  CHECK(points_on_planes(level_square(-0.95)) == 100);
 }
 
 TEST_CASE("a full map of planes forgets the oldest voxels") {

@@ -18,6 +18,11 @@ namespace dynains::detail {
 /// inverse of the normal equations), and that of the choice of surfaces (jackknife: the spread of
 /// the corrections that leave out two adjacent sectors around the sensor). The second is large if
 /// one object alone decides about a direction, for example a slow vehicle ahead.
+///
+/// Whether a pose is inexact at all is tested against two more errors that many sectors share: all
+/// objects that can move may move together, as traffic that starts does, and each beam has a bias
+/// of its ranges. The first is the change of the correction without all objects, the second a
+/// jackknife over bands of elevation.
 class CorrectionSupport {
  public:
   using Vector = NormalEquations::Vector;
@@ -36,19 +41,28 @@ class CorrectionSupport {
     Matrix covariance = {};  ///< of the correction
   };
 
+  /// Where a distance was measured.
+  struct Witness {
+    float x, y, z;   ///< m, sensor frame
+    bool on_object;  ///< see AlignmentPoints
+  };
+
   /// Whether a plane with this z of its unit normal is a wall rather than ground.
   static bool is_upright(double normal_z) { return std::abs(normal_z) < 0.7; }
 
   /// Forgets all distances.
   void clear() {
     sectors_.fill(NormalEquations());
+    bands_.fill(NormalEquations());
+    objects_ = NormalEquations();
     kinds_.fill(NormalEquations());
   }
 
-  /// Adds the distance (m) of a point from its plane, as for NormalEquations. `x`, `y`: the point
-  /// in the frame of the sensor.
-  void add(float x, float y, const Vector& derivatives, double distance, double weight) {
-    sectors_[sector_of(x, y)].add(derivatives, distance, weight);
+  /// Adds the distance (m) of a point from its plane, as for NormalEquations.
+  void add(const Witness& witness, const Vector& derivatives, double distance, double weight) {
+    sectors_[sector_of(witness.x, witness.y)].add(derivatives, distance, weight);
+    bands_[band_of(witness)].add(derivatives, distance, weight);
+    if (witness.on_object) objects_.add(derivatives, distance, weight);
     kinds_[is_upright(derivatives[2]) ? 1 : 0].add(derivatives, distance, weight);
   }
 
@@ -59,10 +73,14 @@ class CorrectionSupport {
     Result result;
     result.covariance = covariance;
     add_first_error(equations, inverse, result.covariance);
+    Matrix shared = shared_covariance(equations);
     Vector scaled = correction;
     for (std::size_t i = 0; i < 6; ++i) {
       scaled[i] *= unit(i);
-      for (std::size_t j = 0; j < 6; ++j) covariance[i][j] *= unit(i) * unit(j);
+      for (std::size_t j = 0; j < 6; ++j) {
+        covariance[i][j] *= unit(i) * unit(j);
+        shared[i][j] *= unit(i) * unit(j);
+      }
     }
     const SymmetricEigen<6> eigen = symmetric_eigen<6>(covariance);
     for (std::size_t k = 0; k < 6; ++k) {
@@ -74,14 +92,16 @@ class CorrectionSupport {
       }
       const double sectors = sectors_that_tell(step);
       if (sectors < kFewestSectors) continue;
-      const double variance = std::max(eigen.values[k], 0.0);
+      const double own_variance = std::max(eigen.values[k], 0.0);
+      const double exact_variance = own_variance + variance_along(shared, eigen.vectors[k]);
       const double deviations = deviations_of_exact(sectors);
-      const bool is_significant = along * along > deviations * deviations * variance;
+      const bool is_significant = along * along > deviations * deviations * exact_variance;
       if (is_significant) result.is_significant = true;
       const bool is_certain = prior == Prior::kExact
                                   ? is_significant
-                                  : along * along > kDeviations * kDeviations * variance;
+                                  : along * along > kDeviations * kDeviations * own_variance;
       if (!is_certain) continue;
+      const double variance = prior == Prior::kExact ? exact_variance : own_variance;
       const double kept = 1.0 - kShrink * kShrink * variance / (along * along);
       for (std::size_t i = 0; i < 6; ++i) result.step[i] += kept * along * step[i];
     }
@@ -90,6 +110,7 @@ class CorrectionSupport {
 
  private:
   static constexpr std::size_t kSectors = 32;
+  static constexpr std::size_t kBands = 64;
   static constexpr double kFewestSectors = 3.0;
   static constexpr double kDeviations = 3.0;  // of a step that is certain
   static constexpr double kFirstError = 1.0;  // m, standard deviation of the first estimate
@@ -112,6 +133,18 @@ class CorrectionSupport {
     const double t = static_cast<double>(y) / length;
     const double angle = x >= 0.0F ? 1.0 + t : 3.0 - t;  // [0, 4]
     return std::min(static_cast<std::size_t>(angle * (kSectors / 4.0)), kSectors - 1);
+  }
+
+  // Bands of equal sines of the elevation, 0.9 deg at the horizon. The outer ones have no end.
+  static std::size_t band_of(const Witness& witness) {
+    constexpr double kHighest = 0.5;  // sine
+    const double x = static_cast<double>(witness.x), y = static_cast<double>(witness.y);
+    const double z = static_cast<double>(witness.z);
+    const double range = std::sqrt(x * x + y * y + z * z);
+    if (!(range > 0.0)) return 0;
+    const double place = (z / range + kHighest) / (2.0 * kHighest);  // [0, 1) within the limits
+    return static_cast<std::size_t>(
+        std::min(std::max(place, 0.0) * kBands, static_cast<double>(kBands - 1)));
   }
 
   // Effective number of sectors with information on a step.
@@ -166,22 +199,48 @@ class CorrectionSupport {
     // Pairs of adjacent sectors, so that no object is divided. They overlap, so each counts half.
     const Vector step = all.solve();
     for (std::size_t sector = 0; sector < kSectors; ++sector) {
-      const NormalEquations& next = sectors_[(sector + 1) % kSectors];
-      if (sectors_[sector].empty() && next.empty()) continue;
-      NormalEquations others = all;
-      others -= sectors_[sector];
-      others -= next;
-      Vector change = others.solve();
-      for (std::size_t i = 0; i < 6; ++i) change[i] -= step[i];
-      for (std::size_t i = 0; i < 6; ++i) {
-        for (std::size_t j = 0; j < 6; ++j) covariance[i][j] += 0.5 * change[i] * change[j];
-      }
+      NormalEquations pair = sectors_[sector];
+      pair += sectors_[(sector + 1) % kSectors];
+      add_change_without(pair, all, step, 0.5, covariance);
     }
     return covariance;
   }
 
+  // Of errors that many sectors share.
+  Matrix shared_covariance(const NormalEquations& all) const {
+    Matrix covariance = {};
+    const Vector step = all.solve();
+    add_change_without(objects_, all, step, 1.0, covariance);
+    for (const NormalEquations& band : bands_) add_change_without(band, all, step, 1.0, covariance);
+    return covariance;
+  }
+
+  // Adds the square of the change of `step`, the solution of `all`, without a part of the terms.
+  static void add_change_without(const NormalEquations& part, const NormalEquations& all,
+                                 const Vector& step, double weight, Matrix& covariance) {
+    if (part.empty()) return;
+    NormalEquations others = all;
+    others -= part;
+    Vector change = others.solve();
+    for (std::size_t i = 0; i < 6; ++i) change[i] -= step[i];
+    for (std::size_t i = 0; i < 6; ++i) {
+      for (std::size_t j = 0; j < 6; ++j) covariance[i][j] += weight * change[i] * change[j];
+    }
+  }
+
+  static double variance_along(const Matrix& covariance, const Vector& direction) {
+    double variance = 0.0;
+    for (std::size_t i = 0; i < 6; ++i) {
+      for (std::size_t j = 0; j < 6; ++j)
+        variance += direction[i] * covariance[i][j] * direction[j];
+    }
+    return variance;
+  }
+
   std::array<NormalEquations, kSectors> sectors_;
+  std::array<NormalEquations, kBands> bands_;
   std::array<NormalEquations, 2> kinds_;  // level and upright surfaces
+  NormalEquations objects_;
 };
 
 }  // namespace dynains::detail

@@ -47,7 +47,7 @@ class FreeSpaceEvidence {
                  static_cast<std::uint32_t>(config.supervoxel_samples)),
         ground_sampler_(config),
         references_(config),
-        pose_correction_(config.pose_tolerance),
+        pose_correction_(config.pose_tolerance, config.track_length, config.track_height),
         newest_tester_(config),
         older_tester_(config),
         linker_(config.track_cell, config.track_length, config.track_height, config.track_overlap),
@@ -117,7 +117,7 @@ class FreeSpaceEvidence {
     pushed_epoch_ = epoch;
     newest_ = scan;
     Record& record = record_of(scan);
-    record.T_world_sensor = correct(scan, T_world_sensor, split);
+    record.T_world_sensor = correct(scan, T_world_sensor, split, {instance_of, instance_count});
     record.epoch = epoch_;
     record.since_begin = scan - epoch_begin_;
     const std::uint64_t phase = phase_of(record);
@@ -248,8 +248,9 @@ class FreeSpaceEvidence {
   }
 
   // The pose of a scan for comparisons. Begins an epoch if the scan does not fit to earlier ones.
-  Pose correct(std::uint64_t scan, const Pose& T_world_sensor, const GroundSplit& split) {
-    const Pose T_corrected = pose_correction_.correct(T_world_sensor, split, time_);
+  Pose correct(std::uint64_t scan, const Pose& T_world_sensor, const GroundSplit& split,
+               const detail::ScanInstances& instances) {
+    const Pose T_corrected = pose_correction_.correct(T_world_sensor, split, instances, time_);
     if (!pose_correction_.misfit()) return T_corrected;
     begin_epoch(scan, T_world_sensor);
     pose_correction_.begin_planes(T_world_sensor);

@@ -9,6 +9,7 @@
 #include <iterator>
 #include <vector>
 
+#include "dynains/evidence/alignment_points.hpp"
 #include "dynains/evidence/correction_support.hpp"
 #include "dynains/evidence/normal_equations.hpp"
 #include "dynains/evidence/voxel_planes.hpp"
@@ -59,11 +60,12 @@ class PlaneAligner {
   /// Allocates memory for `count` points.
   void reserve(std::size_t count) { matches_.reserve(count); }
 
-  /// Aligns points (m, sensor frame) with planes, from a first estimate of the pose that is wrong
+  /// Aligns points with planes, from a first estimate of the pose that is wrong
   /// by at most half a voxel. `prior`: what is presumed about it. Directions without information
   /// keep the first estimate.
-  Alignment align(PointsView points, VoxelPlanes& planes, const Pose& T_guess,
+  Alignment align(const AlignmentPoints& selected, VoxelPlanes& planes, const Pose& T_guess,
                   CorrectionSupport::Prior prior) {
+    const PointsView points = selected.points();
     constexpr double kCoarseScales[] = {0.4, 0.25, 0.15, 0.1};  // m, by iteration
     constexpr double kSmall = 0.01;                             // m, change by one iteration
     constexpr double kScale = 0.06;                             // m
@@ -87,7 +89,7 @@ class PlaneAligner {
       if (equations.change(step) <= kConverged) break;
     }
     count_inliers(result);
-    collect_sectors(points, kScale);
+    collect_support(selected, kScale);
     const CorrectionSupport::Result certain = support_.test(result.found, equations, prior);
     result.supported = certain.step;
     result.is_significant = certain.is_significant;
@@ -102,7 +104,7 @@ class PlaneAligner {
 
   /// How well the upright surfaces of a scan fit at a pose: number of points at a small distance
   /// from an upright plane, of which the points of one plane count as at most 8. Points without a
-  /// plane do not count. `points`: as for align().
+  /// plane do not count. `points`: m, sensor frame.
   double upright_fit(PointsView points, VoxelPlanes& planes, const Pose& T) {
     constexpr double kScale = 0.15;  // m
     find_planes(points, kCoarseStep, planes, T);
@@ -177,12 +179,14 @@ class PlaneAligner {
     return equations;
   }
 
-  // The terms of the last sum, by sector.
-  void collect_sectors(PointsView points, double scale) {
+  // The terms of the last sum, by their witnesses.
+  void collect_support(const AlignmentPoints& selected, double scale) {
+    const PointsView points = selected.points();
     support_.clear();
     weigh_matches(scale, [&](const Match& match, const auto& derivatives, double weight) {
-      support_.add(points.x[match.point], points.y[match.point], derivatives, match.distance,
-                   weight);
+      const std::size_t i = match.point;
+      support_.add({points.x[i], points.y[i], points.z[i], selected.is_on_object(i)}, derivatives,
+                   match.distance, weight);
     });
   }
 

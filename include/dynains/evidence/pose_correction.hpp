@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "dynains/evidence/alignment_points.hpp"
 #include "dynains/evidence/motion_prediction.hpp"
 #include "dynains/evidence/pose_alignment.hpp"
 #include "dynains/evidence/voxel_planes.hpp"
@@ -28,14 +29,16 @@ class PoseCorrection {
  public:
   /// `tolerance`: root mean square distance (m) between static surfaces up to which a pose stays;
   /// 0: all poses stay, and there are no residuals.
-  explicit PoseCorrection(double tolerance) : tolerance_(tolerance) {}
+  /// `longest_object`, `highest_object`: see AlignmentPoints.
+  PoseCorrection(double tolerance, double longest_object, double highest_object)
+      : tolerance_(tolerance), selected_(longest_object, highest_object) {}
 
   /// Allocates all memory.
   void reserve() {
     if (!is_active()) return;
     planes_.reserve();
-    selected_.grow(kMostSelected);
-    aligner_.reserve(kMostSelected);
+    selected_.reserve();
+    aligner_.reserve(AlignmentPoints::kMost);
   }
 
   /// Forgets all scans and the motion. `T_world_sensor`: pose of the first scan of the next epoch.
@@ -65,7 +68,7 @@ class PoseCorrection {
   /// Pose of a scan for comparisons with other scans. `T_world_level`, `split`: pushed pose and
   /// points, m. `time`: s, if known. Updates residual() and misfit().
   Pose correct(const Pose& T_world_level, const GroundSplit& split,
-               const std::optional<double>& time = {}) {
+               const ScanInstances& instances = {}, const std::optional<double>& time = {}) {
     if (!is_active()) return T_world_level;
     residual_.reset();
     misfit_.reset();
@@ -76,7 +79,8 @@ class PoseCorrection {
     Pose T_newest = T_guess;
     motion_.begin_scan(time);
     if (inserted_ > 0) {
-      align(split, T_pushed, T_guess, T_newest);
+      selected_.select(split, instances);
+      align(T_pushed, T_guess, T_newest);
       check_motion(T_newest);
     }
     T_origin_newest_ = T_newest;
@@ -123,8 +127,6 @@ class PoseCorrection {
 
  private:
   using Step = NormalEquations::Vector;
-  static constexpr std::size_t kSelected = 3000;        // points that are aligned
-  static constexpr std::size_t kMostSelected = 3072;    // with padding
   static constexpr std::size_t kInserted = 12000;       // points of a scan in the planes
   static constexpr std::size_t kFirstInserted = 24000;  // the same for the scans after the first
   static constexpr std::size_t kFirstScans = 5;
@@ -134,41 +136,14 @@ class PoseCorrection {
   static constexpr double kLeastInliers = 0.65;  // ratio to the usual share of inliers
   static constexpr int kFewestFits = 2;          // scans that tell the usual share
   static constexpr double kLever = 10.0;         // m
-  static constexpr double kNearest = 3.0, kFarthest = 50.0;  // m, horizontal
 
   bool is_active() const { return tolerance_ > 0.0; }
 
-  // Calls `visit(index, x, y, z)` for about `wanted` points of a scan. They are spread evenly over
-  // its order, at pseudo-random distances, since beams repeat at regular ones.
-  template <class Visit>
-  static void visit_some(const GroundSplit& split, std::size_t wanted, Visit&& visit) {
-    const std::size_t step = split.count / wanted + 1;
-    std::uint32_t random = 1;
-    for (std::size_t begin = 0; begin < split.count; begin += step) {
-      random = random * 1664525U + 1013904223U;
-      const std::size_t i = begin + (random >> 8) % step;
-      if (i >= split.count) return;
-      const double x = static_cast<double>(split.points.x[i]);
-      const double y = static_cast<double>(split.points.y[i]);
-      const double squared = x * x + y * y;
-      if (squared < kNearest * kNearest || squared > kFarthest * kFarthest) continue;
-      visit(i, x, y, static_cast<double>(split.points.z[i]));
-    }
-  }
-
-  PointsView select(const GroundSplit& split) {
-    selected_.clear();
-    visit_some(split, kSelected, [&](std::size_t i, double, double, double) {
-      selected_.push_back(split.points.x[i], split.points.y[i], split.points.z[i]);
-    });
-    return selected_;
-  }
-
   // Aligns the newest scan from its pose `T_guess` with the lasting offset, and writes `T_newest`.
-  void align(const GroundSplit& split, const Pose& T_pushed, const Pose& T_guess, Pose& T_newest) {
+  void align(const Pose& T_pushed, const Pose& T_guess, Pose& T_newest) {
     const Step before = open_;
     open_ = {};
-    const Alignment alignment = aligner_.align(select(split), planes_, T_guess, prior());
+    const Alignment alignment = aligner_.align(selected_, planes_, T_guess, prior());
     if (inexact_scans_ > 0) --inexact_scans_;
     if (alignment.matched < kFewestMatches) return;
     if (!fits(static_cast<double>(alignment.inliers) / static_cast<double>(alignment.matched))) {
@@ -254,9 +229,10 @@ class PoseCorrection {
       error = deviation.translation;
       bool has_jumped = motion_.is_impossible(*error);
       if (!has_jumped && (*error > kNear || deviation.rotation > kNearDegrees)) {
-        const double expected = aligner_.upright_fit(selected_, planes_, *T_predicted);
-        has_jumped = expected > kFewestPoints &&
-                     aligner_.upright_fit(selected_, planes_, T_newest) < kLeastRatio * expected;
+        const double expected = aligner_.upright_fit(selected_.points(), planes_, *T_predicted);
+        has_jumped =
+            expected > kFewestPoints &&
+            aligner_.upright_fit(selected_.points(), planes_, T_newest) < kLeastRatio * expected;
       }
       if (has_jumped) misfit_ = EpochReason::kJump;
     }
@@ -322,7 +298,7 @@ class PoseCorrection {
   int inexact_scans_ = 0;       // number of next scans whose poses are presumed to be inexact
   bool is_doubtful_ = false;    // whether the pose of the last scan may be wrong
   bool was_left_out_ = false;   // whether the last insert() left its scan out
-  PointBuffer selected_;
+  AlignmentPoints selected_;
   PlaneAligner aligner_;
 };
 

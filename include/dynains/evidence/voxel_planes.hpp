@@ -117,6 +117,7 @@ class VoxelPlanes {
   static constexpr double kMostFlatness = 0.04;   // smallest eigenvalue to the sum
   static constexpr double kLeastBreadth = 0.04;   // product of the other two to their squared sum
 
+  static constexpr double kEdgeOn = 0.04;      // the same, of a plane that contains the beam
   static constexpr double kGrazing = 0.3;      // sine of the angle between beam and plane
   static constexpr double kLeastLength = 0.2;  // m, standard deviation along the beam
 
@@ -187,8 +188,9 @@ class VoxelPlanes {
     return plane;
   }
 
-  // The noise of the ranges spreads the points of one beam over a plane that contains the beam. It
-  // moves with the sensor. A surface at such an angle is longer along the beams than the noise.
+  // The points of one beam in foliage or on a rough wall spread over a plane that contains the
+  // beam, and so does the noise of its ranges. Such a plane moves with the sensor. A surface at a
+  // small angle to the beams is longer along them than the noise.
   bool is_trace_of_beam(const Plane& plane, const PlaneMoments& points) const {
     double beam[3];
     for (std::size_t k = 0; k < 3; ++k) beam[k] = plane.mean[k] - sensor_[k];
@@ -196,6 +198,7 @@ class VoxelPlanes {
     const double(&n)[3] = plane.normal;
     const double across = beam[0] * n[0] + beam[1] * n[1] + beam[2] * n[2];
     if (std::abs(across) >= kGrazing * range) return false;
+    if (std::abs(across) < kEdgeOn * range) return true;
     const double length = std::sqrt(range * range - across * across);
     for (std::size_t k = 0; k < 3; ++k) beam[k] = (beam[k] - across * n[k]) / length;
     return variance_along(points, beam) < kLeastLength * kLeastLength;
