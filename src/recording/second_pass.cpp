@@ -136,13 +136,12 @@ bool SecondPass::revise(PointsView points, std::uint32_t number, const Pose& T_w
   const std::uint64_t before = restored_ + removed_;
   places_.for_each_place(points_, verdict.labels, T_world_sensor,
                          [&](std::size_t i, const Place* place) {
-                           if (place == nullptr) return;
-                           if (verdict.labels[i] == PointLabel::kDynamic) {
+                           if (verdict.labels[i] == PointLabel::kGround) {
+                             place_of_[i] = changed_at_ground(i, place, T_world_sensor);
+                           } else if (place == nullptr) {
+                             return;
+                           } else if (verdict.labels[i] == PointLabel::kDynamic) {
                              if (stands(*place, number)) restore(i, verdict);
-                           } else if (verdict.labels[i] == PointLabel::kGround) {
-                             if (place->state != PlaceState::kChanged) return;
-                             if (!ground_.rises(world_point(points_, i, T_world_sensor))) return;
-                             place_of_[i] = place;
                            } else if (place->state != PlaceState::kUnknown) {
                              place_of_[i] = place;
                            }
@@ -150,6 +149,17 @@ bool SecondPass::revise(PointsView points, std::uint32_t number, const Pose& T_w
   restored_ += ground_.restore(points_, T_world_sensor, verdict);
   remove_objects(number, T_world_sensor, verdict);
   return restored_ + removed_ > before;
+}
+
+// The place that has changed of a ground point that rises, or one that touches it if nothing is
+// known of its own place; else null.
+const SecondPass::Place* SecondPass::changed_at_ground(std::size_t point, const Place* place,
+                                                       const Pose& T_world_sensor) {
+  if (place != nullptr && place->state == PlaceState::kStays) return nullptr;
+  const Eigen::Vector3d at = world_point(points_, point, T_world_sensor);
+  if (!ground_.rises(at)) return nullptr;
+  const bool is_known = place != nullptr && place->state == PlaceState::kChanged;
+  return is_known ? place : places_.changed_beside(at);
 }
 
 // Whether what scan `number` measured in a place is no part of the static map.

@@ -193,6 +193,30 @@ TEST_CASE("a part of something that stays stays") {
   }
 }
 
+TEST_CASE("places that looks from any range passed are no contact, but a part of the object") {
+  RecordingPlacesConfig config;
+  config.object_places = 2;
+  config.most_contact = 1.0;
+  for (const int touching : {4, 5}) {
+    Recorder recorder(config);
+    recorder.measure(4);
+    recorder.measure(touching, 0, 10.5F);
+    recorder.look(BeamResult::kHit, 5);
+    const auto passed = [&](double from, double to) {
+      recorder.look_by(
+          [=](const Eigen::Vector3d& at) {
+            if (at.x() > 10.4) return BeamResult::kHit;
+            return at.y() > from && at.y() < to ? BeamResult::kFree : BeamResult::kUnknown;
+          },
+          10);
+    };
+    passed(0.0, 0.8);
+    recorder.sensor.x() = -5.0;  // too far away to tell of places alone
+    passed(0.8, 1.6);
+    CHECK(recorder.changed() == (touching == 4 ? 4U : 0U));
+  }
+}
+
 TEST_CASE("an object across the border of tiles is one object") {
   Recorder recorder;
   const int border = RecordingPlaces::kTile;  // places
@@ -318,6 +342,50 @@ TEST_CASE("places beside those that changed join them, if the first pass removed
     });
     recorder.look(BeamResult::kHit, 5);
     CHECK(recorder.changed() == (removed == 1 ? 6U : 10U));
+  }
+}
+
+TEST_CASE("places beside those that changed join them, if enough looks passed from any range") {
+  const int enough = RecordingPlacesConfig().free_looks;
+  for (const int looks : {enough - 1, enough}) {
+    for (const bool is_kept_in_between : {false, true}) {
+      Recorder recorder;
+      // 64 of 70 places join: looks passed all of them.
+      recorder.judge(is_kept_in_between ? enough + 2 : 40, {kKept, kKept, kKept}, 70);
+      recorder.look_by(
+          [](const Eigen::Vector3d& at) {
+            return at.y() < 2.4 ? BeamResult::kFree : BeamResult::kUnknown;
+          },
+          enough);
+      recorder.sensor.x() = -5.0;  // too far away to tell of places alone
+      recorder.look_by(
+          [](const Eigen::Vector3d& at) {
+            return at.y() < 2.4 ? BeamResult::kUnknown : BeamResult::kFree;
+          },
+          looks);
+      const bool joins = looks == enough && !is_kept_in_between;
+      CHECK(recorder.changed() == (joins ? 70U : 6U));
+    }
+  }
+}
+
+TEST_CASE("a point touches what changed, if fewer places beside it stay") {
+  for (const int staying : {2, 3}) {  // of 3 x 3 x 3 places around the point, 3 have changed
+    Recorder recorder;
+    recorder.measure(6);
+    recorder.measure(staying, 1, 10.9F);
+    recorder.look(BeamResult::kHit, 5);
+    recorder.look_by(
+        [](const Eigen::Vector3d& at) {
+          return at.x() < 10.4 ? BeamResult::kFree : BeamResult::kHit;
+        },
+        10);
+    REQUIRE(recorder.changed() == 6);
+    const Eigen::Vector3d between(10.6, 1.0, 0.2);
+    const RecordingPlace* const beside = recorder.places.changed_beside(between);
+    REQUIRE((beside != nullptr) == (staying == 2));
+    if (beside != nullptr) CHECK(beside->state == PlaceState::kChanged);
+    CHECK(recorder.places.changed_beside({9.4, 1.0, 0.2}) == nullptr);
   }
 }
 

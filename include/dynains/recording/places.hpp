@@ -66,7 +66,7 @@ struct RecordingPlacesConfig {
 ///   removed its points.
 /// - An object left: the last epoch removed its points, and looks passed the place after it.
 /// - It touches such places, and its first or last two epochs removed its points, or looks from
-///   farther away tell that it came or left.
+///   farther away tell one of the above.
 ///
 /// A place takes about 170 bytes.
 class RecordingPlaces {
@@ -175,6 +175,20 @@ class RecordingPlaces {
       }
       for (std::size_t k = 0; k < block.count; ++k) visit(block.points[k], places[k]);
     });
+  }
+
+  /// A place that has changed and touches a point (m, world frame), if more such places than ones
+  /// that stay touch it; else null.
+  const Place* changed_beside(const Eigen::Vector3d& point) {
+    const Position at = position_of(point);
+    const Place* found = nullptr;
+    int majority = 0;
+    for_each_touching(at.tile, at.key, [&](const Member&, const Place& place) {
+      if (place.state == PlaceState::kChanged) found = &place;
+      majority += place.state == PlaceState::kChanged ? 1 : 0;
+      majority -= place.state == PlaceState::kStays ? 1 : 0;
+    });
+    return majority > 0 ? found : nullptr;
   }
 
   std::size_t size() const { return tiles_.size(); }
@@ -379,15 +393,19 @@ class RecordingPlaces {
     return {look_scans_[place.begin[k]].first, look_scans_[place.end[k]].second};
   }
 
+  // Whether looks of a class of ranges tell that what was measured in a place came or went. Beams
+  // that pass what others hit tell of something porous.
+  bool has_changed(const Place& place, std::size_t k) const {
+    const bool is_free = place.longest[k] >= config_.free_looks;
+    return place.came(k) || place.left(k) ||
+           (is_free && !place.present.any_within(span_of(place, k)));
+  }
+
   PlaceState state_of(Place& place) const {
     place.first.end_epoch();
     const std::size_t k = class_of(place);
-    if (place.came(k) || place.left(k)) return PlaceState::kChanged;
-    const std::uint8_t longest = place.longest[k];
-    const bool is_free = longest >= config_.free_looks;
-    // Beams that pass what others hit tell of something porous.
-    if (is_free && !place.present.any_within(span_of(place, k))) return PlaceState::kChanged;
-    return place.hits > 0 || longest > 0 ? PlaceState::kStays : PlaceState::kUnknown;
+    if (has_changed(place, k)) return PlaceState::kChanged;
+    return place.hits > 0 || place.longest[k] > 0 ? PlaceState::kStays : PlaceState::kUnknown;
   }
 
   // A place of a tile.
@@ -437,46 +455,51 @@ class RecordingPlaces {
   // of them: a mover may have passed beside something that stands.
   bool is_whole(const std::vector<Member>& members, std::size_t contacts) {
     const auto fewest = static_cast<std::size_t>(config_.object_places);
-    std::size_t changed = 0, kept = 0, changed_kept = 0;
+    std::size_t changed = 0, kept = 0, passed = 0, passed_kept = 0;
     for (const Member& member : members) {
       const Place& place = at(member);
-      const bool has_changed = place.state == PlaceState::kChanged;
-      changed += has_changed ? 1 : 0;
+      const bool is_passed = place.state == PlaceState::kChanged || has_changed(place, kAnyRange);
+      changed += place.state == PlaceState::kChanged ? 1 : 0;
       kept += place.first.any_kept ? 1 : 0;
-      changed_kept += has_changed && place.first.any_kept ? 1 : 0;
+      passed += is_passed ? 1 : 0;
+      passed_kept += is_passed && place.first.any_kept ? 1 : 0;
     }
-    const bool is_kept_part_passed = kept < fewest || 10 * changed_kept >= kept;
-    return changed >= fewest && 3 * changed >= members.size() && is_kept_part_passed &&
-           static_cast<double>(contacts) <= config_.most_contact * static_cast<double>(changed);
+    const bool is_kept_part_passed = kept < fewest || 10 * passed_kept >= kept;
+    return changed >= fewest && 3 * passed >= members.size() && is_kept_part_passed &&
+           static_cast<double>(contacts) <= config_.most_contact * static_cast<double>(passed);
   }
 
-  // Adds the changed places that touch a member to its component, and those that stay to
-  // `contacts`.
-  void add_neighbours(Member member, std::vector<Member>& members, std::vector<Member>& contacts) {
-    const VoxelKey key = tiles_.find(member.first)->keys[member.second];
+  // Calls `visit(member, place)` for a place of a tile, if it is there, and for those that touch
+  // it.
+  template <class Visitor>
+  void for_each_touching(const GroundTile& tile, VoxelKey key, Visitor&& visit) {
     for (int n = 0; n < 27; ++n) {
       std::array<std::int64_t, 3> index;
       for (int axis = 0; axis < 3; ++axis) {
         const int step = (axis == 0 ? n : axis == 1 ? n / 3 : n / 9) % 3 - 1;
         index[static_cast<std::size_t>(axis)] = voxel_index(key, axis) + step;
       }
-      const GroundTile beside = {member.first[0] + (index[0] >> 6),
-                                 member.first[1] + (index[1] >> 6)};
-      const Tile* const tile = tiles_.find(beside);
-      if (tile == nullptr) continue;
+      const GroundTile beside = {tile[0] + (index[0] >> 6), tile[1] + (index[1] >> 6)};
+      const Tile* const places = tiles_.find(beside);
+      if (places == nullptr) continue;
       const std::uint32_t number =
-          tile->numbers.find(voxel_key(index[0] & (kTile - 1), index[1] & (kTile - 1), index[2]));
-      if (number == kNone) continue;
-      const Place& place = tile->values[number];
-      if (place.state == PlaceState::kStays && place.hits > 0 && !place.first.moved()) {
-        contacts.push_back({beside, number});
-      }
-      const bool joins = place.state == PlaceState::kChanged || place.first.moved() ||
-                         place.came(kAnyRange) || place.left(kAnyRange);
-      if (!joins || place.object != 0) continue;
-      change({beside, number}).object = kNone;
-      members.push_back({beside, number});
+          places->numbers.find(voxel_key(index[0] & (kTile - 1), index[1] & (kTile - 1), index[2]));
+      if (number != kNone) visit(Member{beside, number}, places->values[number]);
     }
+  }
+
+  // Adds the changed places that touch a member to its component, and those that stay to
+  // `contacts`.
+  void add_neighbours(Member member, std::vector<Member>& members, std::vector<Member>& contacts) {
+    const VoxelKey key = tiles_.find(member.first)->keys[member.second];
+    for_each_touching(member.first, key, [&](const Member& beside, const Place& place) {
+      const bool joins = place.state == PlaceState::kChanged || place.first.moved() ||
+                         has_changed(place, kAnyRange);
+      if (!joins && place.state == PlaceState::kStays && place.hits > 0) contacts.push_back(beside);
+      if (!joins || place.object != 0) return;
+      change(beside).object = kNone;
+      members.push_back(beside);
+    });
   }
 
   // Collects the samples of the places that are near the sensor.

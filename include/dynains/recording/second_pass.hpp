@@ -132,6 +132,7 @@ class SecondPass {
 
   void read(const Reference& kept, RecordingReference& reference);
   void list_objects();
+  const Place* changed_at_ground(std::size_t point, const Place* place, const Pose& T_world_sensor);
   bool has_changed(const Place& place, std::uint32_t number) const;
   bool stands(const Place& place, std::uint32_t number) const;
   void restore(std::size_t point, VerdictArrays& verdict);
