@@ -11,6 +11,7 @@ using Points = std::vector<Eigen::Vector3d>;
 
 constexpr double kCoarse = 0.5;     // m
 constexpr double kFineShift = 0.1;  // m
+constexpr std::size_t kFewestPoints = 60;
 
 Points thinned(const Points& points) {
   constexpr std::size_t kMost = 800;
@@ -25,10 +26,26 @@ Pose moved(Pose T, const Eigen::Vector3d& way) {
   return T;
 }
 
-double gap_of(const Landmarks& a, const Points& points, const Pose& T) {
+/// Mean distance to `a`, each at most `most` (m).
+double gap_of(const Landmarks& a, const Points& points, const Pose& T, double most = 1.0) {
   double sum = 0.0;
-  for (const Eigen::Vector3d& p : points) sum += a.distance_to(T * p);
+  for (const Eigen::Vector3d& p : points) sum += std::min(most, a.distance_to(T * p));
   return sum / static_cast<double>(points.size());
+}
+
+/// The `points` of another scan that do not keep their place beside `a`, as traffic ahead and
+/// samples of smooth walls do; all if those are few.
+Points decisive_of(const Points& points, const Landmarks& a, const Pose& standing) {
+  constexpr double kKeptPlace = 0.5;    // m
+  constexpr double kLeastShare = 0.15;  // of the points
+  Points decisive;
+  for (const Eigen::Vector3d& p : points) {
+    if (a.distance_to(standing * p) > kKeptPlace) decisive.push_back(p);
+  }
+  const double least_count = kLeastShare * static_cast<double>(points.size());
+  const bool are_few =
+      static_cast<double>(decisive.size()) < least_count || decisive.size() < kFewestPoints;
+  return are_few ? points : decisive;
 }
 
 /// The index of the least gap; empty if it is at an end, or if another minimum is nearly as low.
@@ -54,35 +71,27 @@ double mean_gap(const Landmarks& a, const Landmarks& b, const Pose& T_a_b) {
 
 std::optional<Pose> search_way(const Landmarks& a, const Landmarks& b, const Pose& T_a_b,
                                const Eigen::Vector3d& direction, double farthest) {
-  constexpr double kKeptPlace = 0.5;    // m
-  constexpr std::size_t kFewest = 60;   // points
-  constexpr double kLeastShare = 0.15;  // of the points, that do not keep their place
+  constexpr double kMostGap = 0.4;  // m; traffic of another speed must not pull at the minimum
   const Points of_a = thinned(a.points());
   const Points of_b = thinned(b.points());
-  if (of_a.size() < kFewest || of_b.size() < kFewest) return std::nullopt;
+  if (of_a.size() < kFewestPoints || of_b.size() < kFewestPoints) return std::nullopt;
   const double way = direction.dot(T_a_b.translation());
   const Pose standing = moved(T_a_b, -way * direction);
-  Points decisive;
-  for (const Eigen::Vector3d& p : of_b) {
-    if (a.distance_to(standing * p) > kKeptPlace) decisive.push_back(p);
-  }
-  const double least_count = kLeastShare * static_cast<double>(of_b.size());
-  if (static_cast<double>(decisive.size()) < least_count || decisive.size() < kFewest) {
-    decisive = of_b;
-  }
+  const Points decisive_a = decisive_of(of_a, b, standing.inverse());
+  const Points decisive_b = decisive_of(of_b, a, standing);
   std::vector<double> gaps;
   const auto steps = static_cast<int>(std::ceil(farthest / kCoarse));
   for (int k = -steps; k <= steps; ++k) {
-    gaps.push_back(gap_of(a, decisive, moved(T_a_b, kCoarse * k * direction)));
+    gaps.push_back(gap_of(a, decisive_b, moved(T_a_b, kCoarse * k * direction)));
   }
   const auto least_gap = clear_minimum(gaps);
   if (!least_gap) return std::nullopt;
   const double coarse = kCoarse * (static_cast<double>(*least_gap) - static_cast<double>(steps));
 
-  // Fine steps count all points, in both directions.
   const auto gap_at = [&](double displacement) {
     const Pose T = moved(T_a_b, displacement * direction);
-    return 0.5 * (gap_of(a, of_b, T) + gap_of(b, of_a, T.inverse()));
+    return 0.5 *
+           (gap_of(a, decisive_b, T, kMostGap) + gap_of(b, decisive_a, T.inverse(), kMostGap));
   };
   double best = coarse;
   double least = gap_at(best);

@@ -163,6 +163,17 @@ TEST_CASE("Oncoming traffic on a motorway does not contradict right poses") {
               })).sound());
 }
 
+TEST_CASE("Traffic of nearly the own speed does not make right ways too long, and wrong ones are") {
+  const Drive drive(short_world(22025));
+  CHECK(diagnose(drive.recording()).sound());
+  const Diagnosis scaled = diagnose(drive.recording([](std::size_t, Pose T) {
+    T.translation() *= 1.1;
+    return T;
+  }));
+  CHECK(scaled.verdict == PoseVerdict::kScaled);
+  CHECK(scaled.convention.scale == Approx(1.0 / 1.1).margin(0.02));
+}
+
 TEST_CASE("A few registrations confirm right poses, and never those of a turned body") {
   const auto sensor = GENERATE(simulation::Sensor::kOs1_64, simulation::Sensor::kVlp16);
   const Drive drive(simulation::Scene::kStopAndGo, sensor, 4);
