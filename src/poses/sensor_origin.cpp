@@ -114,6 +114,23 @@ class HiddenPoints {
     return all == 0 ? 0.0 : static_cast<double>(hidden) / static_cast<double>(all);
   }
 
+  /// Whether every horizontal displacement moves rays sideways: along a ray, it changes nothing
+  /// that the ray hides. In an even view, whether that is wider than 109 deg.
+  bool shows_place() {
+    constexpr double kMostAligned = 0.5;
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();  // of axes, as directions of the double azimuth
+    std::size_t all = 0;
+    for (const PointBuffer& scan : scans_) {
+      for (std::size_t i = 0; i < scan.size(); ++i) {
+        const double x = scan.x[i], y = scan.y[i], squared = x * x + y * y;
+        if (!(squared > 0.0)) continue;
+        sum += Eigen::Vector2d(x * x - y * y, 2.0 * x * y) / squared;
+        ++all;
+      }
+    }
+    return sum.norm() < kMostAligned * static_cast<double>(all);
+  }
+
  private:
   static constexpr float kCell = 0.8F;  // deg
   static constexpr std::size_t kColumns = 452;
@@ -261,15 +278,17 @@ bool are_fewer_hidden(double elsewhere, double as_given) {
 }
 
 /// By points that are hidden by nearer ones. Seen from above, few are, so that this shows x and y
-/// only.
+/// at most.
 std::optional<RayOrigin> origin_of_shadows(HiddenPoints& hidden, double as_given) {
   constexpr double kTooMany = 0.18;  // scans of one sensor had up to 0.14
-  const Candidate found = climbed(hidden, {}, {1.0, 0.5, 0.25, 0.1}, 2,
-                                  [](double value, double best) { return value < 0.99 * best; });
-  const bool is_there =
-      found.position.norm() > kLeastOffset && are_fewer_hidden(found.value, as_given);
-  if (is_there) {
-    return RayOrigin{RayOrigin::Known::kHorizontal, found.position, as_given, found.value};
+  if (hidden.shows_place()) {
+    const Candidate found = climbed(hidden, {}, {1.0, 0.5, 0.25, 0.1}, 2,
+                                    [](double value, double best) { return value < 0.99 * best; });
+    const bool is_there =
+        found.position.norm() > kLeastOffset && are_fewer_hidden(found.value, as_given);
+    if (is_there) {
+      return RayOrigin{RayOrigin::Known::kHorizontal, found.position, as_given, found.value};
+    }
   }
   if (as_given < kTooMany) return std::nullopt;
   return RayOrigin{RayOrigin::Known::kNothing, Eigen::Vector3d::Zero(), as_given, as_given};

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -105,6 +106,43 @@ TEST_CASE("Rays that begin along the way of a scan are those of compensated moti
 
 TEST_CASE("Without beams of fixed elevations, clouds of the sensor raise no alarm") {
   CHECK_FALSE(find_ray_origin(scans_of(Scene::kUrban, Sensor::kLivox)));
+}
+
+/// Posts before a wall in a view of some width (deg) along x, by rays of any elevation that begin
+/// at `origin`.
+std::vector<PointBuffer> view_of(double width, const Eigen::Vector2d& origin) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> azimuth(-0.5 * width, 0.5 * width), slope(-0.3, 0.3);
+  std::vector<PointBuffer> scans(1);
+  for (int k = 0; k < 60000; ++k) {
+    const double degrees = azimuth(random);
+    const double range = std::fmod(degrees + 360.0, 4.0) < 2.0 ? 6.0 : 18.0;
+    const double x = range * std::cos(degrees * M_PI / 180.0);
+    const double y = range * std::sin(degrees * M_PI / 180.0);
+    scans[0].push_back(static_cast<float>(x + origin.x()), static_cast<float>(y + origin.y()),
+                       static_cast<float>(range * slope(random)));
+  }
+  return scans;
+}
+
+TEST_CASE("Shadows show the place where rays begin unless these are nearly parallel") {
+  const auto known_in = [](double width) {
+    const auto found = find_ray_origin(view_of(width, {0.0, 1.0}));
+    return found && found->known == RayOrigin::Known::kHorizontal;
+  };
+  CHECK(known_in(140.0));
+  CHECK(known_in(112.0));
+  CHECK_FALSE(known_in(106.0));
+  CHECK_FALSE(known_in(70.0));
+}
+
+TEST_CASE("A sensor that looks ahead below trees raises no alarm") {
+  simulation::Config config = simulation::random_world(21086);
+  config.scans = 30;
+  simulation::Simulator simulator(config);
+  const TemporaryFolder folder;
+  REQUIRE(simulation::write_sequence(simulator, folder.path()));
+  CHECK_FALSE(find_ray_origin(Recording(folder.path()), 0, 29));
 }
 
 TEST_CASE("Beams that meet a little better elsewhere are those of compensated motion") {
