@@ -545,7 +545,7 @@ TEST_CASE("a full map of planes forgets the oldest voxels") {
   VoxelPlanes planes;
   planes.reserve();
   for (int scan = 0; scan < 400; ++scan) {
-    planes.begin_scan(Pose::Identity());
+    planes.begin_scan(Pose(Eigen::Translation3d(scan, 50.0, 30.0)));
     VoxelPlanes::Block block;
     for (int y = 0; y < 100; ++y) {
       for (int k = 0; k < 12; ++k) {

@@ -83,27 +83,22 @@ class CorrectionSupport {
       }
     }
     const SymmetricEigen<6> eigen = symmetric_eigen<6>(covariance);
+    std::array<Direction, 6> directions;
     for (std::size_t k = 0; k < 6; ++k) {
-      Vector step;
-      double along = 0.0;
-      for (std::size_t i = 0; i < 6; ++i) {
-        along += eigen.vectors[k][i] * scaled[i];
-        step[i] = eigen.vectors[k][i] / unit(i);
+      directions[k] = direction_of(eigen, k, scaled);
+      const double variance = directions[k].variance + variance_along(shared, eigen.vectors[k]);
+      if (directions[k].exceeds(directions[k].deviations_of_exact(), variance)) {
+        result.is_significant = true;
       }
-      const double sectors = sectors_that_tell(step);
-      if (sectors < kFewestSectors) continue;
-      const double own_variance = std::max(eigen.values[k], 0.0);
-      const double exact_variance = own_variance + variance_along(shared, eigen.vectors[k]);
-      const double deviations = deviations_of_exact(sectors);
-      const bool is_significant = along * along > deviations * deviations * exact_variance;
-      if (is_significant) result.is_significant = true;
-      const bool is_certain = prior == Prior::kExact
-                                  ? is_significant
-                                  : along * along > kDeviations * kDeviations * own_variance;
-      if (!is_certain) continue;
-      const double variance = prior == Prior::kExact ? exact_variance : own_variance;
-      const double kept = 1.0 - kShrink * kShrink * variance / (along * along);
-      for (std::size_t i = 0; i < 6; ++i) result.step[i] += kept * along * step[i];
+    }
+    if (prior == Prior::kExact && !result.is_significant) return result;
+    for (const Direction& direction : directions) {
+      const double deviations =
+          prior == Prior::kExact ? direction.deviations_of_exact() : kDeviations;
+      if (!direction.exceeds(deviations, direction.variance)) continue;
+      const double along = direction.along;
+      const double kept = 1.0 - kShrink * kShrink * direction.variance / (along * along);
+      for (std::size_t i = 0; i < 6; ++i) result.step[i] += kept * along * direction.step[i];
     }
     return result;
   }
@@ -116,9 +111,33 @@ class CorrectionSupport {
   static constexpr double kFirstError = 1.0;  // m, standard deviation of the first estimate
   static constexpr double kShrink = 1.5;      // standard deviations, see James and Stein
 
-  // Standard deviations that show an error of an exact pose. A variance that few sectors tell is
-  // uncertain itself, as in the quantiles of Student's distribution.
-  static double deviations_of_exact(double sectors) { return kDeviations * (1.0 + 6.0 / sectors); }
+  // A principal direction of the uncertainty.
+  struct Direction {
+    Vector step = {};       // of length 1, rotations by their lever
+    double along = 0.0;     // length of the correction
+    double variance = 0.0;  // of that length
+    double sectors = 0.0;   // effective number of those that tell
+
+    // A variance that few sectors tell is uncertain itself, as in the quantiles of Student's
+    // distribution.
+    double deviations_of_exact() const { return kDeviations * (1.0 + 6.0 / sectors); }
+
+    bool exceeds(double deviations, double other_variance) const {
+      return sectors >= kFewestSectors && along * along > deviations * deviations * other_variance;
+    }
+  };
+
+  Direction direction_of(const SymmetricEigen<6>& eigen, std::size_t k,
+                         const Vector& scaled) const {
+    Direction direction;
+    for (std::size_t i = 0; i < 6; ++i) {
+      direction.along += eigen.vectors[k][i] * scaled[i];
+      direction.step[i] = eigen.vectors[k][i] / unit(i);
+    }
+    direction.variance = std::max(eigen.values[k], 0.0);
+    direction.sectors = sectors_that_tell(direction.step);
+    return direction;
+  }
 
   // Rotations are compared with translations as the movement of a point at this distance.
   static double unit(std::size_t i) {
