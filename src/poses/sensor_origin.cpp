@@ -116,7 +116,7 @@ class HiddenPoints {
 
   /// Whether every horizontal displacement moves rays sideways: along a ray, it changes nothing
   /// that the ray hides. In an even view, whether that is wider than 109 deg.
-  bool shows_place() {
+  bool shows_place() const {
     constexpr double kMostAligned = 0.5;
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();  // of axes, as directions of the double azimuth
     std::size_t all = 0;

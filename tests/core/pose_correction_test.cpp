@@ -293,15 +293,22 @@ TEST_CASE("one object alone does not decide about a direction") {
   }
 }
 
-// Adds the rear of a vehicle around (x, y) (m), 1.8 m wide and 1.5 m high, 500 points.
-void add_rear(std::uint64_t seed, float x, float y, GroundSplit& split) {
+// An upright surface across the corridor: its centre, half its width, its top (m) and its points.
+struct Surface {
+  float x, y;
+  double half_width, top;
+  std::size_t count;
+};
+
+// Adds a surface that begins 1.5 m below the sensor.
+void add_surface(std::uint64_t seed, const Surface& surface, GroundSplit& split) {
   Random random(seed);
   const std::size_t begin = split.count;
-  split.resize(begin + 500);
+  split.resize(begin + surface.count);
   for (std::size_t i = begin; i < split.count; ++i) {
-    split.points.x[i] = x + 0.01F * static_cast<float>(random.normal());
-    split.points.y[i] = y + random.uniform_float(-0.9, 0.9);
-    split.points.z[i] = random.uniform_float(-1.5, 0.0);
+    split.points.x[i] = surface.x + 0.01F * static_cast<float>(random.normal());
+    split.points.y[i] = surface.y + random.uniform_float(-surface.half_width, surface.half_width);
+    split.points.z[i] = random.uniform_float(-1.5, surface.top);
   }
 }
 
@@ -318,7 +325,8 @@ double correction_by_traffic(double longest_object, double highest_object) {
     std::vector<std::uint32_t> instance_of(split.count, kNoCluster);
     std::uint32_t instance = 0;
     for (const auto& place : kPlaces) {
-      add_rear(900 + instance, place[0] + 0.05F * static_cast<float>(scan), place[1], split);
+      const float x = place[0] + 0.05F * static_cast<float>(scan);
+      add_surface(900 + instance, {x, place[1], 0.9, 0.0, 500}, split);
       instance_of.resize(split.count, instance++);
     }
     const Pose T = correction.correct(T_exact, split, {instance_of, instance});
@@ -365,18 +373,6 @@ TEST_CASE("an error shows that an exact pose is none, biases of beams do not") {
   CHECK_FALSE(shows_error(0.02));
 }
 
-// Adds a wall across the corridor at `x` (m), 2,000 points.
-void add_wall_across(std::uint64_t seed, float x, float half_width, GroundSplit& split) {
-  Random random(seed);
-  const std::size_t begin = split.count;
-  split.resize(begin + 2000);
-  for (std::size_t i = begin; i < split.count; ++i) {
-    split.points.x[i] = x + 0.01F * static_cast<float>(random.normal());
-    split.points.y[i] = random.uniform_float(-half_width, half_width);
-    split.points.z[i] = random.uniform_float(-1.5, 0.9);
-  }
-}
-
 // Position along the corridor that is found for the last scan. One object alone gives the position
 // of the earlier scans. `doubtful` scans with walls across the corridor are pushed wrong by `error`
 // (m), and so are their walls if they are in the planes.
@@ -387,9 +383,9 @@ double last_position(int doubtful, double error) {
     const std::uint64_t seed = 100 * static_cast<std::uint64_t>(scan);
     const bool is_first = scan == 0, is_last = scan == doubtful + 1;
     GroundSplit split = corridor(seed, 0.0F, 0.0F, false);
-    if (!is_last) add_wall_across(seed + 1, 8.5F, 0.9F, split);
+    if (!is_last) add_surface(seed + 1, {8.5F, 0.0F, 0.9F, 0.9, 2000}, split);
     for (const float x : {-22.5F, -15.5F, 15.5F, 22.5F}) {
-      if (!is_first) add_wall_across(seed + 2, x, 3.5F, split);
+      if (!is_first) add_surface(seed + 2, {x, 0.0F, 3.5F, 0.9, 2000}, split);
     }
     const double pushed_x = is_first || is_last ? 0.0 : error;
     const Eigen::Isometry3d T =

@@ -11,7 +11,7 @@
 namespace dynains::test {
 namespace {
 
-/// What a sensor on a road sees: posts beside it, and vehicles ahead.
+/// Makes the landmarks that a sensor on a road measures on posts beside it and on vehicles ahead.
 class Road {
  public:
   explicit Road(unsigned seed) : random_(seed) {

@@ -175,28 +175,33 @@ TEST_CASE("an object needs enough places") {
   }
 }
 
-TEST_CASE("a part of something that stays stays") {
+// Two places are an object, if no more places that stay touch it.
+RecordingPlacesConfig with_small_objects() {
   RecordingPlacesConfig config;
   config.object_places = 2;
   config.most_contact = 1.0;
+  return config;
+}
+
+// Looks pass the places before x = 10.4 m and hit the others.
+BeamResult pass_near_ones(const Eigen::Vector3d& at) {
+  return at.x() < 10.4 ? BeamResult::kFree : BeamResult::kHit;
+}
+
+TEST_CASE("a part of something that stays stays") {
+  const RecordingPlacesConfig config = with_small_objects();
   for (const int touching : {2, 3}) {
     Recorder recorder(config);
     recorder.measure(2);                   // these leave
     recorder.measure(touching, 0, 10.5F);  // beside them
     recorder.look(BeamResult::kHit, 5);
-    recorder.look_by(
-        [](const Eigen::Vector3d& at) {
-          return at.x() < 10.4 ? BeamResult::kFree : BeamResult::kHit;
-        },
-        10);
+    recorder.look_by(pass_near_ones, 10);
     CHECK(recorder.changed() == (touching == 2 ? 2U : 0U));
   }
 }
 
 TEST_CASE("places that looks from any range passed are no contact, but a part of the object") {
-  RecordingPlacesConfig config;
-  config.object_places = 2;
-  config.most_contact = 1.0;
+  const RecordingPlacesConfig config = with_small_objects();
   for (const int touching : {4, 5}) {
     Recorder recorder(config);
     recorder.measure(4);
@@ -375,11 +380,7 @@ TEST_CASE("a point touches what changed, if fewer places beside it stay") {
     recorder.measure(6);
     recorder.measure(staying, 1, 10.9F);
     recorder.look(BeamResult::kHit, 5);
-    recorder.look_by(
-        [](const Eigen::Vector3d& at) {
-          return at.x() < 10.4 ? BeamResult::kFree : BeamResult::kHit;
-        },
-        10);
+    recorder.look_by(pass_near_ones, 10);
     REQUIRE(recorder.changed() == 6);
     const Eigen::Vector3d between(10.6, 1.0, 0.2);
     const RecordingPlace* const beside = recorder.places.changed_beside(between);

@@ -69,11 +69,12 @@ class CorrectionSupport {
   /// Tests `correction` by direction. `equations`: those of all added distances, with attractions.
   Result test(const Vector& correction, const NormalEquations& equations, Prior prior) const {
     const Matrix inverse = inverse_of(equations);
-    Matrix covariance = covariance_of(equations, inverse);
+    const Vector least_squares = equations.solve();
+    Matrix covariance = covariance_of(equations, inverse, least_squares);
     Result result;
     result.covariance = covariance;
     add_first_error(equations, inverse, result.covariance);
-    Matrix shared = shared_covariance(equations);
+    Matrix shared = shared_covariance(equations, least_squares);
     Vector scaled = correction;
     for (std::size_t i = 0; i < 6; ++i) {
       scaled[i] *= unit(i);
@@ -213,10 +214,11 @@ class CorrectionSupport {
     }
   }
 
-  Matrix covariance_of(const NormalEquations& all, const Matrix& inverse) const {
+  // `step`: the solution of `all`.
+  Matrix covariance_of(const NormalEquations& all, const Matrix& inverse,
+                       const Vector& step) const {
     Matrix covariance = covariance_of_distances(inverse);
     // Pairs of adjacent sectors, so that no object is divided. They overlap, so each counts half.
-    const Vector step = all.solve();
     for (std::size_t sector = 0; sector < kSectors; ++sector) {
       NormalEquations pair = sectors_[sector];
       pair += sectors_[(sector + 1) % kSectors];
@@ -225,10 +227,9 @@ class CorrectionSupport {
     return covariance;
   }
 
-  // Of errors that many sectors share.
-  Matrix shared_covariance(const NormalEquations& all) const {
+  // The covariance of errors that many sectors share. `step`: the solution of `all`.
+  Matrix shared_covariance(const NormalEquations& all, const Vector& step) const {
     Matrix covariance = {};
-    const Vector step = all.solve();
     add_change_without(objects_, all, step, 1.0, covariance);
     for (const NormalEquations& band : bands_) add_change_without(band, all, step, 1.0, covariance);
     return covariance;
@@ -250,8 +251,9 @@ class CorrectionSupport {
   static double variance_along(const Matrix& covariance, const Vector& direction) {
     double variance = 0.0;
     for (std::size_t i = 0; i < 6; ++i) {
-      for (std::size_t j = 0; j < 6; ++j)
+      for (std::size_t j = 0; j < 6; ++j) {
         variance += direction[i] * covariance[i][j] * direction[j];
+      }
     }
     return variance;
   }

@@ -60,9 +60,9 @@ class PlaneAligner {
   /// Allocates memory for `count` points.
   void reserve(std::size_t count) { matches_.reserve(count); }
 
-  /// Aligns points with planes, from a first estimate of the pose that is wrong
-  /// by at most half a voxel. `prior`: what is presumed about it. Directions without information
-  /// keep the first estimate.
+  /// Aligns points with planes, from a first estimate of the pose that is wrong by at most half a
+  /// voxel. `prior`: what is presumed about it. Directions without information keep the first
+  /// estimate.
   Alignment align(const AlignmentPoints& selected, VoxelPlanes& planes, const Pose& T_guess,
                   CorrectionSupport::Prior prior) {
     const PointsView points = selected.points();

@@ -401,6 +401,11 @@ class RecordingPlaces {
            (is_free && !place.present.any_within(span_of(place, k)));
   }
 
+  // Whether a place has changed, by its own class of ranges or by all ranges.
+  bool has_changed_by_any(const Place& place) const {
+    return place.state == PlaceState::kChanged || has_changed(place, kAnyRange);
+  }
+
   PlaceState state_of(Place& place) const {
     place.first.end_epoch();
     const std::size_t k = class_of(place);
@@ -458,7 +463,7 @@ class RecordingPlaces {
     std::size_t changed = 0, kept = 0, passed = 0, passed_kept = 0;
     for (const Member& member : members) {
       const Place& place = at(member);
-      const bool is_passed = place.state == PlaceState::kChanged || has_changed(place, kAnyRange);
+      const bool is_passed = has_changed_by_any(place);
       changed += place.state == PlaceState::kChanged ? 1 : 0;
       kept += place.first.any_kept ? 1 : 0;
       passed += is_passed ? 1 : 0;
@@ -493,8 +498,7 @@ class RecordingPlaces {
   void add_neighbours(Member member, std::vector<Member>& members, std::vector<Member>& contacts) {
     const VoxelKey key = tiles_.find(member.first)->keys[member.second];
     for_each_touching(member.first, key, [&](const Member& beside, const Place& place) {
-      const bool joins = place.state == PlaceState::kChanged || place.first.moved() ||
-                         has_changed(place, kAnyRange);
+      const bool joins = place.first.moved() || has_changed_by_any(place);
       if (!joins && place.state == PlaceState::kStays && place.hits > 0) contacts.push_back(beside);
       if (!joins || place.object != 0) return;
       change(beside).object = kNone;
