@@ -168,19 +168,17 @@ struct RemoverConfig {
                       "revert proposals of the window by belief (Eq. 13-19); false: the IOC-only "
                       "variant of the paper"});
     visitor(Parameter{"belief_observations", self.belief_observations, Bounds(), "",
-                      "observations that update the belief (Eq. 15, 16); newest: only the newest, "
-                      "compared with the whole cluster; sequence: the second to the newest, each "
-                      "compared with the cluster up to that observation; all: all observations, "
-                      "each compared with the whole cluster; others: all, each compared with all "
-                      "others"});
+                      "observations that update the belief (Eq. 15, 16), and what each is compared "
+                      "with; newest: the newest, with the whole cluster; sequence: the second to "
+                      "the newest, with the cluster up to it; all: all, with the whole cluster; "
+                      "others: all, with all others"});
     visitor(Parameter{"compared_clusters", self.compared_clusters, Bounds(), "",
                       "clusters of a window that can be dynamic: with points in both its ends, or "
                       "in the newest scan and any before it, where those without points in the "
-                      "oldest scan have no belief (public implementation of the paper)"});
+                      "oldest scan have no belief"});
     visitor(Parameter{"big_is_static", self.big_is_static, Bounds(), "",
                       "clusters of the window that are longer than 25 m, higher than 3.5 m, reach "
-                      "3.5 m over the sensor or have at most three points in each end are static "
-                      "(public implementation of the paper)"});
+                      "3.5 m over the sensor or have at most three points in each end are static"});
     visitor(Parameter{"votes", self.votes, closed(0, 64), "windows",
                       "windows that must call a point dynamic for the final verdict; 0: the newest "
                       "window alone decides, without latency"});
@@ -193,7 +191,7 @@ struct RemoverConfig {
                       "judged"});
     visitor(Parameter{"sensor_origin_x", self.sensor_origin_x, closed(-1000, 1000), "m",
                       "x of the sensor in the frame of the pushed clouds and poses: not 0 for "
-                      "clouds that were moved into a body frame, such as base_link"});
+                      "clouds in a body frame, such as base_link"});
     visitor(Parameter{"sensor_origin_y", self.sensor_origin_y, closed(-1000, 1000), "m",
                       "y of the sensor in that frame"});
     visitor(Parameter{"sensor_origin_z", self.sensor_origin_z, closed(-1000, 1000), "m",

@@ -67,11 +67,10 @@ void print_markdown() {
   const std::string number = "FLOAT in ";
   std::cout
       << "# Parameters\n\n"
-         "Written by `dynains config --markdown`; a test compares. As flags and in config files "
-         "names have hyphens\n(`--tau-s 0.5`); in C++ they are fields of the member that the "
-         "heading names (`config.belief.tau_p`), in\nPython of the configuration itself "
-         "(`config.tau_p`). Each name is followed by its default, the values of other\npresets "
-         "that differ, and its range.\n";
+         "Written by `dynains config --markdown`: name, default, values of presets that differ, "
+         "range, meaning. Flags and config\nfiles have hyphens (`--tau-s 0.5`). In C++, a name is "
+         "a field of the member in the heading (`config.belief.tau_p`), in\nPython one of the "
+         "configuration (`config.tau_p`).\n";
   const DynaInsRemover::Config config;
   DynaInsRemover::Config::visit_sections(config, [&](const char* name, const auto& section) {
     std::cout << "\n## " << name << ": `" << member_of(config, &section) << "`\n\n";

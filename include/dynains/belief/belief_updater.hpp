@@ -43,7 +43,7 @@ class BeliefUpdater {
                         "probability of being dynamic before any observation (Eq. 14)"});
       visitor(Parameter{"vanished_weight", self.vanished_weight, closed(1, 10), "",
                         "weight of a cell that is empty in the observation or in the cluster "
-                        "(Eq. 18; public implementation of the paper: 1)"});
+                        "(Eq. 18)"});
     }
 
     /// Throws ConfigError.

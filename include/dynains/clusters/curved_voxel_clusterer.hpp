@@ -66,7 +66,7 @@ class CurvedVoxelClusterer {
     template <class Self, class Visitor>
     static void visit(Self& self, Visitor&& visitor) {
       visitor(Parameter{"voxel_range", self.voxel_range, closed(0.05, 20), "m",
-                        "depth of a curved voxel (public implementation of the paper: 0.5)"});
+                        "depth of a curved voxel"});
       visitor(Parameter{"voxel_azimuth", self.voxel_azimuth, closed(0, 30), "deg",
                         "width of a curved voxel; 0: from the sensor"});
       visitor(Parameter{"voxel_elevation", self.voxel_elevation, closed(0, 45), "deg",

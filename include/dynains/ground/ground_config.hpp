@@ -53,46 +53,46 @@ struct GroundConfig {
     visitor(Parameter{"sensor_height", self.sensor_height, closed(0, 100), "m",
                       "height of the sensor over the ground; 0: estimated from scans"});
     visitor(Parameter{"ground_min_range", self.ground_min_range, closed(0, 100), "m",
-                      "inner edge of the first ring of ground patches (Patchwork)"});
+                      "inner edge of the first ring of ground patches"});
     visitor(Parameter{"ground_max_range", self.ground_max_range, closed(1, 1000), "m",
-                      "outer edge of the last ring of ground patches (Patchwork)"});
+                      "outer edge of the last ring of ground patches"});
     visitor(Parameter{"ground_iterations", self.ground_iterations, closed(1, 10), "",
-                      "plane fits per patch (Patchwork)"});
+                      "plane fits per patch"});
     visitor(Parameter{"ground_lowest_points", self.ground_lowest_points, closed(1, kMaxLowest), "",
-                      "lowest points of a patch that seed its plane (Patchwork)"});
+                      "lowest points of a patch that seed its plane"});
     visitor(Parameter{"ground_min_points", self.ground_min_points, closed(3, 1000), "",
-                      "patches with fewer points are not ground (Patchwork)"});
+                      "patches with fewer points are not ground"});
     visitor(Parameter{"ground_fit_points", self.ground_fit_points, closed(64, 1000000), "",
                       "maximum number of points of a patch that its plane is fitted to"});
     visitor(Parameter{"ground_seed_margin", self.ground_seed_margin, half_open_below(0, 10), "m",
-                      "height over the seeds up to which points enter the first fit (Patchwork)"});
+                      "height over the seeds up to which points enter the first fit"});
     visitor(Parameter{"ground_distance", self.ground_distance, half_open_below(0, 2), "m",
-                      "height over the plane up to which points are ground (Patchwork)"});
+                      "height over the plane up to which points are ground"});
     visitor(Parameter{"ground_uprightness", self.ground_uprightness, closed(0, 1), "",
-                      "smallest vertical component of a ground plane's normal (Patchwork)"});
+                      "smallest vertical component of a ground plane's normal"});
     visitor(Parameter{"ground_below", self.ground_below, closed(0, 10), "",
                       "depth under the ground, as a ratio of sensor_height, from which points "
-                      "of the inner zone do not seed a plane (Patchwork)"});
+                      "of the inner zone do not seed a plane"});
     visitor(
         Parameter{"ground_step", self.ground_step, closed(0, 100), "m",
                   "a patch more than this above most of its neighbours is not ground, except in "
                   "the outermost zone; 0: no such check"});
     visitor(Parameter{"ground_elevation_1", self.ground_elevation[0], closed(-100, 100), "m",
-                      "height over ground from which a patch of ring 1 must be flat (Patchwork)"});
+                      "height over ground from which a patch of ring 1 must be flat"});
     visitor(Parameter{"ground_elevation_2", self.ground_elevation[1], closed(-100, 100), "m",
-                      "height over ground from which a patch of ring 2 must be flat (Patchwork)"});
+                      "height over ground from which a patch of ring 2 must be flat"});
     visitor(Parameter{"ground_elevation_3", self.ground_elevation[2], closed(-100, 100), "m",
-                      "height over ground from which a patch of ring 3 must be flat (Patchwork)"});
+                      "height over ground from which a patch of ring 3 must be flat"});
     visitor(Parameter{"ground_elevation_4", self.ground_elevation[3], closed(-100, 100), "m",
-                      "height over ground from which a patch of ring 4 must be flat (Patchwork)"});
+                      "height over ground from which a patch of ring 4 must be flat"});
     visitor(Parameter{"ground_flatness_1", self.ground_flatness[0], closed(0, 1), "",
-                      "flatness below which a high patch of ring 1 is ground (Patchwork)"});
+                      "flatness below which a high patch of ring 1 is ground"});
     visitor(Parameter{"ground_flatness_2", self.ground_flatness[1], closed(0, 1), "",
-                      "flatness below which a high patch of ring 2 is ground (Patchwork)"});
+                      "flatness below which a high patch of ring 2 is ground"});
     visitor(Parameter{"ground_flatness_3", self.ground_flatness[2], closed(0, 1), "",
-                      "flatness below which a high patch of ring 3 is ground (Patchwork)"});
+                      "flatness below which a high patch of ring 3 is ground"});
     visitor(Parameter{"ground_flatness_4", self.ground_flatness[3], closed(0, 1), "",
-                      "flatness below which a high patch of ring 4 is ground (Patchwork)"});
+                      "flatness below which a high patch of ring 4 is ground"});
   }
 
   /// Throws ConfigError.
