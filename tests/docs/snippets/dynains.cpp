@@ -1,7 +1,6 @@
 // Blocks of the pages, each in code that has what the text around it presupposes. Their includes do
 // nothing within a function, because they are here as well.
 #include <Eigen/Geometry>
-#include <cstddef>
 #include <vector>
 
 #include "dynains/adapters/sophus.hpp"
@@ -15,13 +14,6 @@ struct KissIcpLookAlike {
                      const std::vector<double>& timestamps);
   const Sophus::SE3d& pose() const;
 };
-
-void getting_started(const std::vector<float>& xyzi, const Eigen::Isometry3d& T_world_sensor,
-                     double time) {
-  const std::size_t count = xyzi.size() / 4;
-  const std::size_t i = 0;
-#include "getting_started_1.inc"
-}
 
 void kiss_icp_loop(KissIcpLookAlike& odometry, const std::vector<Eigen::Vector3d>& points,
                    const std::vector<double>& timestamps, double time,
