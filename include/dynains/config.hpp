@@ -51,18 +51,6 @@ struct Offers : std::false_type {};
 template <template <class> class Operation, class T>
 struct Offers<Operation, T, std::void_t<Operation<T>>> : std::true_type {};
 
-/// Number of scans between two reference scans; 1 if the config has no member `reference_step`.
-template <class Config>
-using ReferenceStep = decltype(std::declval<Config&>().reference_step);
-template <class Config>
-int reference_step(const Config& config) {
-  if constexpr (Offers<ReferenceStep, Config>::value) {
-    return config.reference_step;
-  } else {
-    return 1;
-  }
-}
-
 /// `Config::paper()`, or the defaults if the config has no such member.
 template <class Config>
 using Paper = decltype(Config::paper());
@@ -215,7 +203,7 @@ struct RemoverConfig {
     visitor(Parameter{
         "threads", self.threads, closed(1, 2), "threads",
         "2: stages work in two threads at a time, with the same verdicts; a final verdict "
-        "comes one scan later, unless it has no latency or revise_map is true"});
+        "comes one scan later, unless it has no latency"});
     visitor(Parameter{"build_map", self.build_map, Bounds(), "", "accumulate the static map"});
   }
 
@@ -255,7 +243,6 @@ struct PipelineConfig : RemoverConfig {
   detail::ConfigOf<typename Stages::Belief> belief;
   detail::ConfigOf<Evidence> evidence;
   detail::ConfigOf<typename Stages::Map> map;
-  MapRevisionConfig revision;
 
   /// Method and parameters of the paper. Voxels, cells and ground, for which the paper gives no
   /// values, follow its public implementation. Ranges differ, see docs/algorithm.md.
@@ -326,7 +313,6 @@ struct PipelineConfig : RemoverConfig {
     visitor("BeliefUpdater", self.belief);
     visitor("FreeSpaceEvidence", self.evidence);
     visitor("StaticMapAccumulator", self.map);
-    visitor("MapRevision", self.revision);
   }
 
   /// Calls `visitor` with the Parameter of every field; names are unique over all stages.
@@ -340,18 +326,6 @@ struct PipelineConfig : RemoverConfig {
   /// Throws ConfigError for an invalid section or contradictory sections.
   void validate() const {
     visit_sections(*this, [](const char*, const auto& section) { section.validate(); });
-    if (!revision.revise_map) return;
-    if (decision != Decision::kFreeSpace) {
-      throw ConfigError("MapRevision.revise_map = true needs decision = free_space");
-    }
-    if (!build_map) throw ConfigError("MapRevision.revise_map = true needs build_map = true");
-    // Each reference scan must update the belief of a map block at most once.
-    const int step = detail::reference_step(evidence);
-    if (revision.revision_period < step) {
-      throw ConfigError(
-          "MapRevision.revision_period = " + std::to_string(revision.revision_period) +
-          " must not be below FreeSpaceEvidence.reference_step = " + std::to_string(step));
-    }
   }
 };
 

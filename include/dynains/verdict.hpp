@@ -60,7 +60,6 @@ struct StageTimes {
   double judge = 0.0;     ///< verdicts by free space, also on ground; images of references
   double verdict = 0.0;   ///< conversion of verdicts on clusters and groups to points
   double map = 0.0;       ///< Eq. 1
-  double revision = 0.0;  ///< revision of the map by the newest scan
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
@@ -72,7 +71,6 @@ struct StageTimes {
     visitor("judge", self.judge);
     visitor("verdict", self.verdict);
     visitor("map", self.map);
-    visitor("revision", self.revision);
   }
 
   double total() const {

@@ -39,8 +39,7 @@ struct Candidates {
 
 }  // namespace
 
-CityMap::CityMap(const City& city, const MapRevisionConfig& config)
-    : city_(city), config_((config.validate(), config)), sessions_(city.sessions()) {
+CityMap::CityMap(const City& city) : city_(city), sessions_(city.sessions()) {
   references_.reserve(sessions_.size());
   for (const SessionInfo& session : sessions_) references_.emplace_back(city_, session);
 }
@@ -63,7 +62,7 @@ std::vector<TileIndex> CityMap::tiles() const {
 }
 
 TileHistory CityMap::history(const TileIndex& tile, std::uint32_t last) const {
-  TileHistory history(city_.grid(), config_);
+  TileHistory history(city_.grid());
   const std::size_t count = std::min<std::size_t>(sessions_.size(), std::size_t{last} + 1);
   for (std::size_t i = 0; i < count; ++i) {
     history.add_session(city_.read_tile(sessions_[i], tile));
@@ -120,7 +119,7 @@ std::vector<bool> CityMap::free_before(const TileIndex& tile,
   if (points.empty()) return {};
   const std::uint32_t end = *std::max_element(sessions.begin(), sessions.end());
   // The points are session 0 here, and session i of the map is session i + 1.
-  TileHistory reversed(city_.grid(), config_);
+  TileHistory reversed(city_.grid());
   std::vector<SessionPoint> places;
   places.reserve(points.size());
   for (const ChangedPoint& changed : points) places.push_back(changed.point);
@@ -145,7 +144,7 @@ void CityMap::revise(TileHistory& history, const TileIndex& tile, std::size_t se
   const Eigen::Vector3d middle =
       corner + Eigen::Vector3d(0.5 * city_.grid().tile, 0.5 * city_.grid().tile, 0.0);
   // Beyond this distance, no point of the tile is in range.
-  const double reach = config_.revision_range + std::sqrt(0.5) * city_.grid().tile;
+  const double reach = TileHistory::kRange + std::sqrt(0.5) * city_.grid().tile;
   for (const SessionReferenceReader::Entry& entry : references_[session].entries()) {
     if ((entry.sensor - middle).head<2>().norm() > reach) continue;
     references_[session].read(entry, reference);

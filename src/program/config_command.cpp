@@ -38,7 +38,6 @@ std::string member_of(const DynaInsRemover::Config& config, const void* section)
       {&config.belief, "config.belief"},
       {&config.evidence, "config.evidence"},
       {&config.map, "config.map"},
-      {&config.revision, "config.revision"},
   };
   return members.at(section);
 }

@@ -169,7 +169,7 @@ void add_run_command(CLI::App& app) {
       .add_option("--passes", options->passes,
                   "2: after the last scan, scans of the whole recording remove what came or went "
                   "at any time, and bring back what stands; 1: the verdicts of the stream [2; 1 "
-                  "with --decision window or --revise-map true]")
+                  "with --decision window]")
       ->check(CLI::Range(1, 2))
       ->type_name("1|2");
   command

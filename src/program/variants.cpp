@@ -31,7 +31,6 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
   for (const Variant& variant : variants) {
     DynaInsRemover::Config config = variant.config;
     config.build_map = false;
-    config.revision.revise_map = false;
     removers.emplace_back(config);
   }
   evaluation::LabelledScan scan;

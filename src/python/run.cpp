@@ -108,7 +108,7 @@ const std::array<RunSetting, 28> kRunSettings{{
      }},
     {"passes", "1 or 2",
      "2: scans of the whole recording revise what the first pass says; default: 2, and 1 with "
-     "decision window or revise_map",
+     "decision window",
      [](RunArguments& run, const py::handle& value) {
        if (!value.is_none()) run.settings.passes = value.cast<int>();
      }},
@@ -117,8 +117,7 @@ const std::array<RunSetting, 28> kRunSettings{{
      [](RunArguments& run, const py::handle& value) {
        const auto policy = value.cast<std::string>();
        if (policy != "always" && policy != "last") throw py::cast_error();
-       run.settings.static_policy =
-           policy == "last" ? StaticPolicy::kLast : StaticPolicy::kAlways;
+       run.settings.static_policy = policy == "last" ? StaticPolicy::kLast : StaticPolicy::kAlways;
      }},
     {"one_thread", "bool", "the run works, reads and writes in one thread",
      &set_flag<&RunSettings::one_thread>},

@@ -11,9 +11,6 @@ namespace program {
 RemoverWithMapOnDisk::Config with_map_on_disk(const DynaInsRemover::Config& config,
                                               const std::filesystem::path& folder,
                                               double megabytes) {
-  if (config.revision.revise_map) {
-    throw ConfigError("MapRevision.revise_map = true needs a map that is kept in memory");
-  }
   RemoverWithMapOnDisk::Config result;
   static_cast<RemoverConfig&>(result) = static_cast<const RemoverConfig&>(config);
   result.ground = config.ground;
@@ -21,7 +18,6 @@ RemoverWithMapOnDisk::Config with_map_on_disk(const DynaInsRemover::Config& conf
   result.descriptor = config.descriptor;
   result.belief = config.belief;
   result.evidence = config.evidence;
-  result.revision = config.revision;
   result.map.map_voxel = config.map.map_voxel;
   result.map.map_memory = megabytes;
   result.map.map_folder = folder;

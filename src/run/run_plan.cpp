@@ -97,9 +97,6 @@ void check_passes(const RunSettings& settings) {
   if (passes == 1 && settings.static_policy != StaticPolicy::kAlways) {
     throw ConfigError("--static last needs --passes 2: one pass does not know what stands at last");
   }
-  if (passes > 1 && settings.config.revision.revise_map) {
-    throw ConfigError("--revise-map true changes the map of one pass; --passes 2 finds more");
-  }
 }
 
 /// Outputs of the run. Throws ConfigError.

@@ -57,11 +57,9 @@ struct RunSettings {
 };
 
 /// Passes over the recording: as set, else two. One if the run decides by the window, which is what
-/// the paper does, or revises its map in the stream.
+/// the paper does.
 inline int passes_of(const RunSettings& settings) {
-  const bool is_stream =
-      settings.config.decision == Decision::kWindow || settings.config.revision.revise_map;
-  return settings.passes.value_or(is_stream ? 1 : 2);
+  return settings.passes.value_or(settings.config.decision == Decision::kWindow ? 1 : 2);
 }
 
 }  // namespace dynains::program

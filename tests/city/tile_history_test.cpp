@@ -79,7 +79,7 @@ TEST_CASE("a tile: ground above the ground of another session leaves, unless ano
   const auto is_raised = [](const SessionPoint& p) { return p.is_ground && p.z > 0.2F; };
   const std::size_t raised = 20, ground = street(0.19F).size();
   const auto history_of = [](std::vector<std::vector<SessionPoint>> sessions) {
-    TileHistory history(SessionGrid{}, MapRevisionConfig{});
+    TileHistory history(SessionGrid{});
     for (std::vector<SessionPoint>& points : sessions) history.add_session(std::move(points));
     for (std::size_t i = 0; i < history.session_count(); ++i) history.end_session();
     return history;
@@ -127,7 +127,7 @@ TEST_CASE("a tile: a tree that was felled beside a wall leaves with what no beam
   add_box(points, 20.0F, 22.4F, 0.0F, 6.0F, 70);
   const auto is_tree = [](const SessionPoint& point) { return point.label == 70; };
   const auto is_wall = [](const SessionPoint& point) { return point.label == 50; };
-  TileHistory history(SessionGrid{}, MapRevisionConfig{});
+  TileHistory history(SessionGrid{});
   history.add_session(points);
   history.add_session({});
   history.end_session();
@@ -148,7 +148,7 @@ TEST_CASE("a tile: tells what beams of the own session passed through, sooner or
   const auto passed = [](BeamResult first, int first_count, BeamResult second, int second_count) {
     std::vector<SessionPoint> points;
     add_box(points, 2.0F, 4.0F, 0.0F, 1.6F, 10);
-    TileHistory history(SessionGrid{}, MapRevisionConfig{});
+    TileHistory history(SessionGrid{});
     history.add_session(points);
     revise(history, first_count, [=](const Eigen::Vector3d&) { return first; });
     revise(history, second_count, [=](const Eigen::Vector3d&) { return second; });

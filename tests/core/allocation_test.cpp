@@ -42,7 +42,6 @@ TEST_CASE("a warm remover allocates nothing, except for the map when it grows") 
   const bool build_map = GENERATE(false, true);
   config.build_map = build_map;
   config.threads = GENERATE(1, 2);
-  config.revision.revise_map = build_map && config.decision == Decision::kFreeSpace;
   // Short rings: after seven rounds of twelve scans, every place in them has held every scan.
   config.evidence.lookahead_scans = 6;
   config.evidence.lookback_scans = 20;

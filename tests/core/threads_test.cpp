@@ -114,7 +114,7 @@ Answers check_equal(const FaintingConfig& config, const std::vector<Scan>& scans
   if (one.failures == 0) {
     CHECK((one.verdicts.newest == two.verdicts.newest));
     const std::size_t latency = FaintingRemover(config).latency();
-    const std::uint64_t delay = latency > 0 && !config.revision.revise_map ? 1 : 0;
+    const std::uint64_t delay = latency > 0 ? 1 : 0;
     for (std::size_t i = 0; i < scans.size(); ++i) {
       CHECK(one.finished_after[i] == std::min(i + latency + 1, scans.size()));
       CHECK(two.finished_after[i] == std::min(i + latency + delay + 1, scans.size()));
@@ -133,19 +133,11 @@ FaintingConfig with_lookahead(int scans, int reference_step = 2) {
 std::vector<FaintingConfig> configs() {
   FaintingConfig by_newest_window = FaintingConfig::paper();
   by_newest_window.votes = 0;
-  FaintingConfig revised = with_lookahead(8);
-  revised.revision.revise_map = true;
   FaintingConfig crowd = with_lookahead(8);
   crowd.evidence.dynamic_grid_ratio = 0.4;
-  return {FaintingConfig::paper(),
-          by_newest_window,
-          with_lookahead(30),
-          with_lookahead(5, 1),
-          with_lookahead(7, 3),
-          with_lookahead(0),
-          FaintingConfig::offline(),
-          revised,
-          crowd};
+  return {
+      FaintingConfig::paper(), by_newest_window,  with_lookahead(30),        with_lookahead(5, 1),
+      with_lookahead(7, 3),    with_lookahead(0), FaintingConfig::offline(), crowd};
 }
 
 const std::vector<Scan>& one_passing_van() {
@@ -184,7 +176,6 @@ TEST_CASE("two threads give the same answers where epochs begin again") {
   scans[25].points.clear();
   scans[25].object.clear();
   for (const FaintingConfig& config : configs()) {
-    if (config.revision.revise_map) continue;
     CHECK(check_equal(config, scans).epochs >= 3);
   }
 }

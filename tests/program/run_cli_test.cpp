@@ -142,10 +142,6 @@ TEST_CASE("Flag --map-memory needs a map and a possible size") {
   const Outcome negative = fixture.run({"--map-memory=-1"});
   CHECK(negative.code != 0);
   CHECK_THAT(negative.err, ContainsSubstring("TiledStaticMap.map_memory = -1"));
-  const Outcome revised = fixture.run({"--map-memory", "10", "--revise-map", "true"});
-  CHECK(revised.code != 0);
-  CHECK_THAT(revised.err,
-             ContainsSubstring("revise_map = true needs a map that is kept in memory"));
   CHECK(!fs::exists(fixture.out));
 }
 

@@ -110,19 +110,13 @@ TEST_CASE("a run of two passes that was killed is resumed to the same bytes") {
   CHECK(differing(recording.path("out"), recording.path("whole")).empty());
 }
 
-TEST_CASE("passes are one or two, and revise_map is part of one") {
+TEST_CASE("passes are one or two, and the policy of what stands needs two") {
   const TemporaryFolder folder;
   for (const char* const passes : {"0", "3"}) {
     CHECK(start({"run", folder / "seq", "--out", folder / "out", "--passes", passes}).code == 2);
   }
-  const Outcome both = start(
-      {"run", folder / "seq", "--out", folder / "out", "--passes", "2", "--revise-map", "true"});
-  CHECK(both.code == 2);
-  CHECK(both.err.find("--passes 2") != std::string::npos);
-  const std::vector<std::vector<std::string>> streams = {{"--passes", "1"},
-                                                         {"--preset", "paper"},
-                                                         {"--preset", "published"},
-                                                         {"--revise-map", "true"}};
+  const std::vector<std::vector<std::string>> streams = {
+      {"--passes", "1"}, {"--preset", "paper"}, {"--preset", "published"}};
   for (const std::vector<std::string>& stream : streams) {
     CAPTURE(stream.front());
     std::vector<std::string> flags = {"run",          folder / "seq", "--out",

@@ -109,11 +109,6 @@ def test_arguments_by_name(drive, tmp_path):
         ({"start": 50}, dynains.ConfigError, "leave no scan"),
         ({"map": "map.txt"}, dynains.ConfigError, "map.txt"),
         ({"crs": "EPSG:25832"}, dynains.ConfigError, "las"),
-        (
-            {"map_memory": 5, "config": dynains.Config(revise_map=True)},
-            dynains.ConfigError,
-            "revise_map",
-        ),
     ],
 )
 def test_wrong_arguments_write_nothing(drive, tmp_path, arguments, error, text):

@@ -26,6 +26,11 @@ class Recorder {
 
   /// Measures `count` places in a row along y, from place `first` on, at x = `x` m.
   void measure(int count, int first = 0, float x = 10.1F, PointLabel label = PointLabel::kStatic) {
+    measure_from(0.0F, count, first, x, label);
+  }
+  /// The same from a sensor at `sensor_x` m; `x`: m from there.
+  void measure_from(float sensor_x, int count, int first, float x,
+                    PointLabel label = PointLabel::kStatic) {
     PointBuffer points;
     for (int i = 0; i < count; ++i) {
       points.push_back(x, 0.4F * static_cast<float>(first + i) + 0.1F, 0.1F);
@@ -33,7 +38,8 @@ class Recorder {
     }
     const std::vector<PointLabel> labels(points.size(), label);
     const std::vector<Cause> causes(points.size(), Cause::kUnknown);
-    places.add(points, labels, causes, Pose::Identity(), time_, scan_);
+    const Eigen::Vector3d at(static_cast<double>(sensor_x), 0.0, 0.0);
+    places.add(points, labels, causes, Pose(Eigen::Translation3d(at)), time_, scan_);
   }
   /// The first pass judges the points of places in each of these scans, 1 s apart, and those of as
   /// many places beside them.
@@ -111,6 +117,34 @@ TEST_CASE("a place that enough looks in a row passed has changed") {
   few.look(BeamResult::kHit, 60);
   few.look(BeamResult::kFree, enough - 1);
   CHECK(few.changed() == 0);
+}
+
+TEST_CASE("points that were too far for looks leave with a place that looks of any range passed") {
+  const int enough = RecordingPlacesConfig().free_looks;
+  const auto range = static_cast<float>(RecordingPlacesConfig().place_range);
+  for (const float x : {range - 4.7F, range + 5.3F}) {
+    CAPTURE(x);
+    for (const int looks : {enough - 1, enough}) {
+      Recorder mover(any_size());
+      mover.measure(1, 0, x);
+      mover.sensor.x() = 31.0;
+      mover.look(BeamResult::kFree, looks);
+      CHECK(mover.changed() == (looks == enough ? 1 : 0));
+    }
+  }
+}
+
+TEST_CASE("points that are too far for looks do not tell how thin a place is") {
+  const int enough = RecordingPlacesConfig().free_looks;
+  const auto range = static_cast<float>(RecordingPlacesConfig().place_range);
+  for (const bool is_near : {false, true}) {
+    Recorder pole(any_size());
+    pole.measure(1, 0, range + 5.3F);
+    if (is_near) pole.measure_from(range, 1, 0, 5.3F);
+    pole.sensor.x() = 15.0;  // 50 m away
+    pole.look(BeamResult::kFree, enough);
+    CHECK(pole.changed() == (is_near ? 0 : 1));
+  }
 }
 
 TEST_CASE("a hit between free looks begins a new row of them") {

@@ -32,7 +32,7 @@ struct CityChanges {
 class CityMap {
  public:
   /// Throws ConfigError, IoError.
-  explicit CityMap(const City& city, const MapRevisionConfig& config = {});
+  explicit CityMap(const City& city);
 
   const std::vector<SessionInfo>& sessions() const { return sessions_; }
   /// Number of a session in the order of time. Throws ConfigError if there is none.
@@ -69,7 +69,6 @@ class CityMap {
   void revise(TileHistory& history, const TileIndex& tile, std::size_t session) const;
 
   City city_;
-  MapRevisionConfig config_;
   std::vector<SessionInfo> sessions_;
   std::vector<SessionReferenceReader> references_;  // by session
 };

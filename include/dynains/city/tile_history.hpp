@@ -13,7 +13,6 @@
 #include "dynains/city/common_blocks.hpp"
 #include "dynains/city/session_ground.hpp"
 #include "dynains/city/session_points.hpp"
-#include "dynains/evidence/free_space_config.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
@@ -27,7 +26,7 @@ namespace dynains {
 /// form blocks of 2 x 2 x 2 voxels. References test the blocks of their own session by its points,
 /// and those of other sessions by common samples: of each voxel, the point of the first session
 /// that has one (detail::CommonBlocks). A block sums its log-odds of being free session by session,
-/// by the rules of MapRevision:
+/// by Eq. 18:
 /// - Sessions before its own tell whether its place was free. Its own session tells whether it
 ///   stands there. A block whose place was free, and that its own session hit too seldom, does not
 ///   enter the map.
@@ -47,14 +46,11 @@ class TileHistory {
     std::uint32_t scan = 0;          ///< 0 if none passed: ground of another height removed it
   };
 
+  /// References do not test blocks at a larger horizontal range, m.
+  static constexpr double kRange = 60.0;
+
   /// Throws ConfigError.
-  TileHistory(const SessionGrid& grid, const MapRevisionConfig& config)
-      : grid_((grid.validate(), grid)),
-        config_((config.validate(), config)),
-        free_(static_cast<float>(log_odds(config.revision_free))),
-        hit_(static_cast<float>(log_odds(config.revision_hit))),
-        level_(static_cast<float>(log_odds(config.tau_revise))),
-        ground_(grid) {}
+  explicit TileHistory(const SessionGrid& grid) : grid_((grid.validate(), grid)), ground_(grid) {}
 
   std::size_t session_count() const { return sessions_.size(); }
   const std::vector<SessionPoint>& points(std::size_t session) const {
@@ -151,8 +147,7 @@ class TileHistory {
         if (verdict != 0) update(verdict > 0, scan, own, tested_[i]);
       }
     }
-    common_.test(scan, sensor, config_.revision_range, test_visibility,
-                 detail::FreeSpaceSum::judge);
+    common_.test(scan, sensor, kRange, test_visibility, detail::FreeSpaceSum::judge);
   }
 
   /// Number of sessions whose references have tested the points.
@@ -368,13 +363,12 @@ class TileHistory {
   void gather(const Session& session, const Eigen::Vector3d& sensor) {
     tested_.clear();
     begin_.assign(1, 0);
-    const double range = config_.revision_range;
     for (std::uint32_t block = 0; block < session.level.size(); ++block) {
       if (session.removal_of[block].session != kNever) continue;
       const SessionPoint& first = session.points[session.by_block[session.begin[block]]];
       const double dx = static_cast<double>(first.x) - sensor.x();
       const double dy = static_cast<double>(first.y) - sensor.y();
-      if (dx * dx + dy * dy > range * range) continue;
+      if (dx * dx + dy * dy > kRange * kRange) continue;
       std::uint32_t count = begin_.back();
       samples_.grow(count + (session.begin[block + 1] - session.begin[block]) + detail::kPackWidth);
       for (std::uint32_t i = session.begin[block]; i < session.begin[block + 1]; ++i) {
@@ -427,9 +421,11 @@ class TileHistory {
   }
 
   SessionGrid grid_;
-  MapRevisionConfig config_;
-  float free_, hit_;  // log-odds
-  float level_;       // log-odds from which a block is free
+  // Log-odds of update probabilities (Eq. 18), and of the belief from which a block is free (Eq.
+  // 19).
+  float free_ = static_cast<float>(log_odds(0.7));
+  float hit_ = static_cast<float>(log_odds(0.155));
+  float level_ = static_cast<float>(log_odds(0.95));
   std::vector<Session> sessions_;
   detail::CommonBlocks common_;
   std::size_t tested_count_ = 0;

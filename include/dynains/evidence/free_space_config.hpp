@@ -1,4 +1,4 @@
-// Parameters of the free-space evidence and of the map revision.
+// Parameters of the free-space evidence.
 #pragma once
 
 #include "dynains/parameters.hpp"
@@ -157,38 +157,6 @@ struct FreeSpaceConfig {
         "the zero-latency verdict removes compact instances at places without "
         "earlier evidence, from the sixth scan of an epoch on; no effect with lookahead_scans 0"});
   }
-};
-
-/// Parameters of the map revision, an extension of the paper. A car that is parked for longer than
-/// lookahead_scans enters the map. After the car has left, beams of later scans pass through its
-/// former voxels, and the revision removes these.
-struct MapRevisionConfig {
-  bool revise_map = false;
-  double revision_range = 60;   ///< m
-  int revision_period = 4;      ///< scans
-  double revision_free = 0.7;   ///< form of Eq. 18
-  double revision_hit = 0.155;  ///< form of Eq. 18
-  double tau_revise = 0.95;     ///< form of Eq. 19
-
-  template <class Self, class Visitor>
-  static void visit(Self& self, Visitor&& visitor) {
-    visitor(Parameter{"revise_map", self.revise_map, Bounds(), "",
-                      "remove blocks of the static map that are free in later scans; needs "
-                      "decision free_space, and a map in memory"});
-    visitor(Parameter{"revision_range", self.revision_range, closed(5, 300), "m",
-                      "blocks of the map at a larger horizontal range are not tested"});
-    visitor(Parameter{"revision_period", self.revision_period, closed(1, 100), "scans",
-                      "time between two tests of a block; not below reference_step"});
-    visitor(Parameter{"revision_free", self.revision_free, open(0.5, 1), "",
-                      "update probability of a scan whose beams pass a block (form of Eq. 18)"});
-    visitor(Parameter{"revision_hit", self.revision_hit, open(0, 0.5), "",
-                      "update probability of a scan whose beams hit a block (form of Eq. 18)"});
-    visitor(Parameter{"tau_revise", self.tau_revise, open(0.5, 1), "",
-                      "belief from which a block is removed (form of Eq. 19)"});
-  }
-
-  /// Throws ConfigError.
-  void validate() const { validate_parameters("MapRevision", *this); }
 };
 
 }  // namespace dynains

@@ -183,14 +183,6 @@ class FreeSpaceEvidence {
     propagate_beliefs(newest_);
   }
 
-  /// Visibility of the first `count` points (m; padded for packs) from the newest reference, which
-  /// is one of the last `reference_step` scans. The result is valid until the next call.
-  const detail::Visibility& test_visibility(const PointBuffer& points, std::size_t count,
-                                            const Pose& T_world_points) {
-    return references_.test(points, count, pose_correction_.corrected(T_world_points),
-                            references_.newest(), newest_tester_.visibility);
-  }
-
   /// Alignment of the newest scan with earlier scans, in the frame of its pose.
   const std::optional<PoseResidual>& pose_residual() const { return pose_correction_.residual(); }
 

@@ -90,16 +90,14 @@ class StaticMapAccumulator {
   }
 
   /// Number of points.
-  std::size_t size() const { return size_; }
-  bool empty() const { return size_ == 0; }
+  std::size_t size() const { return points_.size(); }
+  bool empty() const { return size() == 0; }
 
   /// Removes all points and frees their memory.
   void clear() {
     blocks_ = {};
     points_ = {};
     recent_ = {};
-    size_ = 0;
-    free_ = kNone;
   }
 
   /// Memory of the map, including its index, bytes.
@@ -141,35 +139,6 @@ class StaticMapAccumulator {
         }
       }
     }
-  }
-
-  /// Number of blocks. Blocks are numbered in the order of their first points.
-  std::uint32_t block_count() const { return blocks_.size(); }
-  /// The lowest corner (m, world frame) of a block; `block` is below block_count().
-  Eigen::Vector3d block_corner(std::uint32_t block) const {
-    const BlockIndex& index = blocks_[block].index;
-    return {index.x * block_size(0), index.y * block_size(1), index.z * block_size(2)};
-  }
-  /// Calls `visit(x, y, z)` for every point of a block (m, relative to its lowest corner); `block`
-  /// is below block_count().
-  template <class Visitor>
-  void visit_in_block(std::uint32_t block, Visitor&& visit) const {
-    for (std::uint32_t i = blocks_[block].data.first; i != kNone; i = points_[i].next) {
-      visit(points_[i].x, points_[i].y, points_[i].z);
-    }
-  }
-  /// Removes all points of a block; later points can fill its voxels again. `block` is below
-  /// block_count().
-  void erase_block(std::uint32_t block) {
-    BlockContent& content = blocks_[block].data;
-    const std::uint32_t first = content.first;
-    if (first == kNone) return;
-    content.occupied = 0;
-    std::uint32_t* link = &content.first;
-    for (; *link != kNone; link = &points_[*link].next) --size_;
-    *link = free_;
-    free_ = first;
-    content.first = kNone;
   }
 
  private:
@@ -335,22 +304,9 @@ class StaticMapAccumulator {
       const std::uint64_t bit = std::uint64_t{1} << batch.voxel[Batch::kFirst + i];
       if ((block.occupied & bit) != 0 && !keep_all_) continue;
       block.first =
-          add_point({batch.point[0][i], batch.point[1][i], batch.point[2][i], block.first});
+          points_.push_back({batch.point[0][i], batch.point[1][i], batch.point[2][i], block.first});
       block.occupied |= bit;
     }
-  }
-
-  // Stores a point and returns its index; reuses the indices of erased points.
-  std::uint32_t add_point(const Point& point) {
-    std::uint32_t index = free_;
-    if (index == kNone) {
-      index = points_.push_back(point);
-    } else {
-      free_ = points_[index].next;
-      points_[index] = point;
-    }
-    ++size_;
-    return index;
   }
 
   // Prefetches the points of the blocks from `first` to `last`, exclusive. Each point of a block
@@ -372,21 +328,22 @@ class StaticMapAccumulator {
 
   template <class Visitor>
   void visit_block(std::uint32_t block, Visitor&& visit) const {
-    const Eigen::Vector3d corner = block_corner(block);
-    visit_in_block(block, [&](float x, float y, float z) {
-      visit(Eigen::Vector3d(corner.x() + static_cast<double>(x),
-                            corner.y() + static_cast<double>(y),
-                            corner.z() + static_cast<double>(z)));
-    });
+    const BlockIndex& index = blocks_[block].index;
+    const Eigen::Vector3d corner(index.x * block_size(0), index.y * block_size(1),
+                                 index.z * block_size(2));
+    for (std::uint32_t i = blocks_[block].data.first; i != kNone; i = points_[i].next) {
+      const Point& point = points_[i];
+      visit(Eigen::Vector3d(corner.x() + static_cast<double>(point.x),
+                            corner.y() + static_cast<double>(point.y),
+                            corner.z() + static_cast<double>(point.z)));
+    }
   }
 
   Config config_;
   double voxel_;
   bool keep_all_;
-  std::size_t size_ = 0;
   Blocks blocks_;
   detail::ChunkedVector<Point, 512> points_;
-  std::uint32_t free_ = kNone;  // first erased point; Point::next links the others
   std::vector<Block*> recent_;  // by cache slot: the last block, or null
 };
 

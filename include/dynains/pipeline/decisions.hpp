@@ -13,7 +13,6 @@
 
 #include "dynains/clusters/cluster_set.hpp"
 #include "dynains/config.hpp"
-#include "dynains/map/map_revision.hpp"
 #include "dynains/pipeline/instance_ids.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
 #include "dynains/pipeline/scan_window.hpp"
@@ -65,8 +64,6 @@ class ScanDecision {
   /// Free and hit samples of the newest scan, by references of earlier scans.
   virtual std::optional<SurfaceCounts> surfaces() const { return std::nullopt; }
 
-  /// Updates the beliefs of map blocks by the newest scan and removes the blocks that are free.
-  virtual void revise(Map& /*map*/, const ScanSlot& /*newest*/) {}
   /// Restores the state after construction. Buffers keep their capacity.
   virtual void clear() = 0;
 };
@@ -251,7 +248,7 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
   using Evidence = typename PipelineConfig<Stages>::Evidence;
 
   FreeSpaceDecision(const PipelineConfig<Stages>& config, Background* other)
-      : evidence_(config.evidence), revision_(config.revision) {
+      : evidence_(config.evidence) {
     share_work_of_stage(evidence_, other);
   }
 
@@ -260,10 +257,7 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
   bool needs_sensor() const override { return true; }
   void adapt(const SensorModel& sensor) override { evidence_.adapt(sensor); }
   void reserve(std::size_t scans) override { reserve_stage(evidence_, scans); }
-  void clear() override {
-    revision_.clear();
-    instance_ids_.clear();
-  }
+  void clear() override { instance_ids_.clear(); }
 
   void observe(ScanRing& scans, const ScanWindow& window) override {
     const ScanSlot& newest = scans.newest();
@@ -288,15 +282,6 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
   std::optional<PoseResidual> pose_residual() const override { return pose_residual_of(evidence_); }
   std::optional<EpochReason> misfit() const override { return misfit_of(evidence_); }
   std::optional<SurfaceCounts> surfaces() const override { return surfaces_of(evidence_); }
-  void revise(Map& map, const ScanSlot& newest) override {
-    if constexpr (IsRevisable<Map, Evidence>::value) {
-      if (!revision_.config().revise_map) return;
-      revision_.revise(
-          map, newest.scan, newest.T_world_level.translation(),
-          [this](const PointBuffer& points, std::size_t count, const Pose& T_world_points)
-              -> const auto& { return evidence_.test_visibility(points, count, T_world_points); });
-    }
-  }
 
  private:
   void propagate_ids(ScanRing& scans) {
@@ -311,7 +296,6 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
 
   Evidence evidence_;
   EvidenceVerdict verdict_;  // of the last judge(); views of evidence_
-  MapRevision revision_;
   InstanceIds instance_ids_;
 };
 

@@ -122,7 +122,7 @@ class Pipeline {
         ground_(config.ground),
         clusterer_(config.clusterer),
         decision_(make_decision<Stages>(config, other_.get())),
-        finishes_later_(other_ && decision_->latency() > 0 && !config.revision.revise_map),
+        finishes_later_(other_ && decision_->latency() > 0),
         map_(config.map),
         scans_(std::max({decision_->window_length(), latency() + 1, kFewestSlots})) {}
   // Not copyable: window_ refers to memory of clusterer_.
@@ -161,9 +161,6 @@ class Pipeline {
 
   static const Config& validated(const Config& config) {
     config.validate();
-    if (config.revision.revise_map && !IsRevisable<Map, Evidence>::value) {
-      throw ConfigError("MapRevision.revise_map = true needs a map that is kept in memory");
-    }
     return config;
   }
 
@@ -239,7 +236,6 @@ FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Pose& T_world_s
   transaction.commit();
   if (!finishes_later_) finish_due(times);
   const std::optional<ScanVerdict> finished = take_finished();
-  timed(times.revision, [&] { decision_->revise(map_, newest); });
   const bool is_final = finished && finished->scan == newest.scan;
   FrameResult result = {is_final ? *finished : newest_verdict_.verdict(newest),
                         finished,

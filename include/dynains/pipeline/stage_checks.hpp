@@ -119,20 +119,6 @@ void insert_scan(Map& map, PointsView points, Span<const std::uint8_t> keep,
   }
 }
 
-/// Whether the map and the evidence have the members that MapRevision needs.
-template <class Map, class Evidence, class = void>
-struct IsRevisable : std::false_type {};
-template <class Map, class Evidence>
-struct IsRevisable<Map, Evidence,
-                   std::void_t<decltype(std::declval<Map&>().erase_block(std::uint32_t{})),
-                               decltype(std::declval<const Map&>().block_count()),
-                               decltype(std::declval<const Map&>().block_corner(std::uint32_t{})),
-                               decltype(std::declval<const Map&>().visit_in_block(
-                                   std::uint32_t{}, std::declval<void (*)(float, float, float)>())),
-                               decltype(std::declval<Evidence&>().test_visibility(
-                                   std::declval<const PointBuffer&>(), std::size_t{},
-                                   std::declval<const Pose&>()))>> : std::true_type {};
-
 /// Whether a stage has the optional members `needs_sensor()` and `adapt(const SensorModel&)`.
 template <class Stage, class = void>
 struct HasSensorMembers : std::false_type {};

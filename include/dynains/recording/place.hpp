@@ -105,7 +105,7 @@ struct alignas(64) RecordingPlace {
   Presence present;
   std::array<std::array<std::uint8_t, 3>, 8> samples;  ///< by octant, in 1/256 of a place
   std::uint8_t filled = 0;                             ///< octants with a sample
-  std::uint8_t farthest = 0;                           ///< m, range of its points
+  std::uint8_t farthest = 0;  ///< m, range of its points, as far as looks go; 0: none
 
   PlaceState state = PlaceState::kUnknown;
   std::uint8_t look_free = 0, look_hit = 0, look_range = 0;  ///< of the open look

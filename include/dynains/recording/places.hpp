@@ -36,7 +36,7 @@ struct RecordingPlacesConfig {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
     visitor(Parameter{"place_range", self.place_range, closed(5, 300), "m",
-                      "places at a larger horizontal range are not tested by a scan"});
+                      "a scan does not look at places at a larger horizontal range"});
     visitor(Parameter{"look_way", self.look_way, closed(0, 100), "m",
                       "way of the sensor between two independent looks at a place"});
     visitor(Parameter{"look_time", self.look_time, closed(0.01, 1000), "s",
@@ -61,7 +61,8 @@ struct RecordingPlacesConfig {
 /// these ways:
 /// - `free_looks` looks in a row are free, no hit lies between, and the first pass kept no points
 ///   of that time: beams that pass what others hit tell of something porous. Looks from farther
-///   away than the points of a place do not count, for beams that are far apart miss what is thin.
+///   away than the points of a place within `place_range` do not count, for beams that are far
+///   apart miss what is thin.
 /// - An object came: looks passed the place before any scan measured it, and the first epoch
 ///   removed its points.
 /// - An object left: the last epoch removed its points, and looks passed the place after it.
@@ -149,8 +150,8 @@ class RecordingPlaces {
     find_objects();
   }
 
-  /// Calls `visit(i, place)` for each point with a verdict within the range, m, sensor frame; null:
-  /// no scan brought a place there.
+  /// Calls `visit(i, place)` for each point with a verdict, m, sensor frame; null: no scan brought
+  /// a place there.
   template <class Visitor>
   void for_each_place(PointsView points, Span<const PointLabel> verdicts,
                       const Pose& T_world_sensor, Visitor&& visit) {
@@ -280,16 +281,13 @@ class RecordingPlaces {
     return std::sqrt(points.x[i] * points.x[i] + points.y[i] * points.y[i]);
   }
 
-  // Calls `visit(block)` for the points within the range of which `is_taken(i)`.
+  // Calls `visit(block)` for the points of which `is_taken(i)`.
   template <class IsTaken, class Visitor>
   void for_each_block(PointsView points, const Pose& T_world_sensor, IsTaken&& is_taken,
                       Visitor&& visit) const {
-    const auto range = static_cast<float>(config_.place_range);
     Block block;
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (!is_taken(i)) continue;
-      const float x = points.x[i], y = points.y[i];
-      if (x * x + y * y > range * range) continue;
       block.points[block.count] = i;
       block.at[block.count++] = position_of(world_point(points, i, T_world_sensor));
       if (block.count < kBlock) continue;
@@ -299,12 +297,15 @@ class RecordingPlaces {
     visit(block);
   }
 
-  // Adds a point of a scan. `range`: m.
+  // Adds a point of a scan. `range`: m. The first verdicts on points that are too far for looks say
+  // little of their place.
   void add_point(Place& place, const Position& at, float range, bool is_removed,
                  std::uint32_t scan) const {
-    place.first.add(is_removed, epoch_, scan);
     if (!is_removed) place.present.add(scan);
-    place.farthest = std::max(place.farthest, whole_metres(range));
+    if (range <= config_.place_range) {
+      place.first.add(is_removed, epoch_, scan);
+      place.farthest = std::max(place.farthest, std::max(whole_metres(range), std::uint8_t{1}));
+    }
     const auto bit = static_cast<std::uint8_t>(1U << at.octant);
     if ((place.filled & bit) != 0) return;
     place.filled = static_cast<std::uint8_t>(place.filled | bit);
@@ -381,10 +382,11 @@ class RecordingPlaces {
     place.end[k] = look;
   }
 
-  // The class of ranges from which looks at a place count: ranges at which it was measured.
+  // The class of ranges from which looks at a place count: ranges at which it was measured, or all
+  // if that was from too far only.
   static std::size_t class_of(const Place& place) {
     std::size_t k = kAnyRange;
-    while (k > 0 && kNear[k] > place.farthest) --k;
+    while (k > 0 && place.farthest > 0 && kNear[k] > place.farthest) --k;
     return k;
   }
 
