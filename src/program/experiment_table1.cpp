@@ -68,7 +68,8 @@ std::vector<Variant> table1_variants() {
   using Config = DynaInsRemover::Config;
   std::vector<Variant> variants = {{"dynains, paper preset, IOC only", Config::paper()},
                                    {"dynains, paper preset, full", Config::paper()},
-                                   {"dynains, default preset", Config()}};
+                                   {"dynains, default preset, one pass", Config()},
+                                   {"dynains, default preset", Config(), 2}};
   variants[0].config.use_belief = false;
   return variants;
 }

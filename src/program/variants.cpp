@@ -1,10 +1,63 @@
 #include "variants.hpp"
 
+#include <optional>
+
 #include "dynains/errors.hpp"
 #include "dynains/point_cloud_traits.hpp"
+#include "dynains/recording/second_pass.hpp"
 #include "run/naming_scan.hpp"
 
 namespace dynains::program {
+namespace {
+
+/// Both passes over the window for one variant.
+class RevisedVerdicts {
+ public:
+  explicit RevisedVerdicts(std::size_t scans) : verdicts_(scans) {}
+
+  void take(const ScanVerdict& verdict) { verdicts_[verdict.scan].take(verdict, false); }
+
+  /// Calls `visit(verdict)` with the verdicts of the second pass.
+  template <class Visitor>
+  void revise(LabelledSequence& sequence, Visitor&& visit) {
+    MemoryStore store;
+    SecondPass pass(store);
+    for_each_scan(sequence, [&](const ScanVerdict& verdict) { pass.add(points_, verdict); });
+    pass.test();
+    for_each_scan(sequence, [&](const ScanVerdict& verdict) {
+      pass.revise(points_, static_cast<std::uint32_t>(verdict.scan), verdict.T_world_sensor,
+                  verdicts_[verdict.scan]);
+      visit(verdict);
+    });
+  }
+
+ private:
+  // Calls `visit(verdict)`, which refers to the arrays, with the points of the scan in points_.
+  template <class Visitor>
+  void for_each_scan(LabelledSequence& sequence, Visitor&& visit) {
+    evaluation::LabelledScan scan;
+    for (std::size_t i = 0; sequence.read(i, scan); ++i) {
+      points_.clear();
+      for (std::size_t p = 0; p < scan.size(); ++p) {
+        const float* const at = scan.xyz + p * scan.stride;
+        points_.push_back(at[0], at[1], at[2]);
+      }
+      ScanVerdict verdict;
+      verdict.scan = i;
+      verdict.time = scan.time;
+      verdict.T_world_sensor = orthonormalized(scan.T_world_sensor);
+      verdict.labels = verdicts_[i].labels;
+      verdict.causes = verdicts_[i].causes;
+      verdict.instances = verdicts_[i].instances;
+      visit(verdict);
+    }
+  }
+
+  std::vector<VerdictArrays> verdicts_;
+  PointBuffer points_;
+};
+
+}  // namespace
 
 VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Variant>& variants,
                              Answer answer, const std::function<void(std::size_t)>& done) {
@@ -28,9 +81,18 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
   };
 
   std::vector<DynaInsRemover> removers;
+  std::vector<std::optional<RevisedVerdicts>> revised(variants.size());
+  const auto take_first = [&](std::size_t variant, const ScanVerdict& verdict) {
+    if (revised[variant]) {
+      revised[variant]->take(verdict);
+    } else {
+      take(variant, verdict);
+    }
+  };
   for (const Variant& variant : variants) {
     DynaInsRemover::Config config = variant.config;
     config.build_map = false;
+    if (variant.passes > 1) revised[removers.size()].emplace(sequence.size());
     removers.emplace_back(config);
   }
   evaluation::LabelledScan scan;
@@ -44,14 +106,17 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
       if (answer == Answer::kNewest) {
         take(v, frame.newest);
       } else if (frame.finished) {
-        take(v, *frame.finished);
+        take_first(v, *frame.finished);
       }
     }
     if (done) done(i + 1);
   }
   if (answer == Answer::kFinal) {
     for (std::size_t v = 0; v < removers.size(); ++v) {
-      removers[v].flush([&](const ScanVerdict& verdict) { take(v, verdict); });
+      removers[v].flush([&](const ScanVerdict& verdict) { take_first(v, verdict); });
+      if (!revised[v]) continue;
+      revised[v]->revise(sequence, [&](const ScanVerdict& verdict) { take(v, verdict); });
+      revised[v].reset();
     }
   }
   return verdicts;

@@ -15,6 +15,7 @@ namespace dynains::program {
 struct Variant {
   std::string name;
   DynaInsRemover::Config config;
+  int passes = 1;  ///< 2: final verdicts are those of the second pass over the window
 };
 
 /// Verdicts of all variants, in memory: one byte per point.
@@ -28,7 +29,8 @@ struct VariantVerdicts {
 /// Which answer of the remover is judged.
 enum class Answer { kFinal, kNewest };
 
-/// Runs every variant over the window. `done(scans)` is called after each scan.
+/// Runs every variant over the window. `done(scans)` is called after each scan of the first pass.
+/// The second pass takes another 6 bytes per point.
 /// Throws ConfigError for more than evaluation::kMaxEstimates variants.
 VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Variant>& variants,
                              Answer answer, const std::function<void(std::size_t)>& done);

@@ -352,7 +352,7 @@ TEST_CASE("The experiments run on any labelled sequence") {
   }
   SECTION("table1 takes every layout that is a recording") {
     fs::rename(fs::path(street) / "velodyne", fs::path(street) / "scans");
-    CHECK(has(call({"experiment", "table1", street, "--quiet"}), "dynains, default preset"));
+    CHECK(has(call({"experiment", "table1", street, "--quiet"}), "dynains, default preset, one pass"));
   }
   SECTION("table1 takes poses as run does") {
     const fs::path poses = folder.path() / "elsewhere.txt";
@@ -376,7 +376,7 @@ TEST_CASE("The experiments run on any labelled sequence") {
         call({"experiment", "table1", (folder.path() / "kitti").string(), "--quiet"});
     CHECK(has(text, "paper, full (published)"));
     CHECK(has(text, "0.989"));
-    CHECK(has(text, "dynains, default preset"));
+    CHECK(has(text, "dynains, default preset, one pass"));
     CHECK(has(message_of({"experiment", "table1", folder.path().string()}),
               "has no scans; expected a KITTI folder"));
     // One file of poses cannot belong to two sequences.

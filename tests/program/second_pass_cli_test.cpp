@@ -110,6 +110,28 @@ TEST_CASE("a run of two passes that was killed is resumed to the same bytes") {
   CHECK(differing(recording.path("out"), recording.path("whole")).empty());
 }
 
+TEST_CASE("table1 has the scores of a run with one pass, and of one with two") {
+  const CarPark recording;
+  const auto rows_of = [&](std::vector<std::string> arguments) {
+    const std::string json = recording.folder / "scores.json";
+    arguments.insert(arguments.end(), {"--unlabeled", "static", "--json", json});
+    REQUIRE(start(arguments).code == 0);
+    return nlohmann::json::parse(read_text(json));
+  };
+  const auto table = rows_of({"experiment", "table1", recording.seq})[0]["evaluation"]["rows"];
+  REQUIRE(table.size() == 6);
+  CHECK(table[5]["name"] == "dynains, default preset");
+  for (const std::size_t passes : {1U, 2U}) {
+    CAPTURE(passes);
+    const std::string out = std::to_string(passes);
+    REQUIRE(recording.run(out, {"--passes", out}).code == 0);
+    const auto run = rows_of({"eval", recording.seq, recording.path(out).string()})["rows"][2];
+    CHECK(table[3 + passes]["voxels"] == run["voxels"]);
+    CHECK(table[3 + passes]["points"] == run["points"]);
+  }
+  CHECK(table[4]["voxels"] != table[5]["voxels"]);
+}
+
 TEST_CASE("passes are one or two, and the policy of what stands needs two") {
   const TemporaryFolder folder;
   for (const char* const passes : {"0", "3"}) {
