@@ -14,6 +14,16 @@ bool adds(VoxelHashTable<>& table, VoxelKey key) {
   return table.insert(key) == count;
 }
 
+/// Whether a plane (m, sensor frame) contains the beams that hit it: those of one beam on persons,
+/// in foliage or on a rough wall lie in such a plane, which moves with the sensor.
+bool is_trace_of_beam(const CellSurface& surface) {
+  constexpr double kEdgeOn = 0.04;   // sine of the angle between beam and plane
+  constexpr double kDistance = 0.5;  // m, of the plane from the sensor; distant ground is farther
+  const double distance = std::abs(surface.directions[0].dot(surface.mean));
+  return surface.direction_count == 1 && distance < kDistance &&
+         distance < kEdgeOn * surface.mean.norm();
+}
+
 /// Normal equations at one motion, and how well it fits.
 struct Linearization {
   NormalEquations equations;
@@ -86,7 +96,7 @@ RegistrationScan::RegistrationScan(PointsView points) {
   for (std::size_t level = 0; level < kCellLevels; ++level) {
     for (const Cell& cell : cells[level]) {
       const CellSurface surface = surface_of(cell.moments, kCellEdges[level]);
-      if (surface.direction_count == 0) continue;
+      if (surface.direction_count == 0 || is_trace_of_beam(surface)) continue;
       index_[level].insert(cell.key);
       surfaces_[level].push_back(surface);
     }

@@ -15,6 +15,7 @@
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
 #include "io/files.hpp"
+#include "poses/scan_registration.hpp"
 #include "support/catch.hpp"
 
 namespace dynains::test {
@@ -147,6 +148,46 @@ TEST_CASE("Uneven motion within de-skewed scans does not make right poses inexac
   const SkewedDrive drive(short_world(21077));
   CHECK(drive.diagnose_with(0.0).verdict == PoseVerdict::kAgree);
   CHECK(drive.diagnose_with(0.1).verdict == PoseVerdict::kInexact);
+}
+
+TEST_CASE("Traces of beams on the persons of a crowd do not make right poses inexact") {
+  const Drive drive(short_world(21001));
+  CHECK(diagnose(drive.recording()).verdict == PoseVerdict::kAgree);
+  const Diagnosis noisy =
+      diagnose(drive.recording([random = std::mt19937(3)](std::size_t, Pose T) mutable {
+        std::normal_distribution<double> metres(0.0, 0.1);
+        T.translation() += Eigen::Vector3d(metres(random), metres(random), 0.0);
+        return T;
+      }));
+  CHECK(noisy.verdict == PoseVerdict::kInexact);
+}
+
+TEST_CASE("Right poses of a sparse sensor that comes to rest are no other recording's") {
+  const SkewedDrive drive(short_world(23009));
+  CHECK(drive.diagnose_with(0.0).verdict == PoseVerdict::kAgree);
+  CHECK(drive.diagnose_with(0.2).verdict != PoseVerdict::kAgree);
+}
+
+TEST_CASE("A plane that contains the beam through it is no surface") {
+  const auto has_surface = [](double range, double sine_to_beam) {
+    const Eigen::Vector3d middle(range, 0.5, 0.5);
+    const double sine = sine_to_beam + middle.z() / middle.norm();
+    const Eigen::Vector3d along(std::sqrt(1.0 - sine * sine), 0.0, sine);
+    PointBuffer points;
+    for (int i = -4; i <= 4; ++i) {
+      for (int k = -4; k <= 4; ++k) {
+        const Eigen::Vector3f p =
+            (middle + 0.1 * i * along + 0.1 * k * Eigen::Vector3d::UnitY()).cast<float>();
+        points.push_back(p.x(), p.y(), p.z());
+      }
+    }
+    return RegistrationScan(points).find(2, middle) != nullptr;
+  };
+  const auto sign = GENERATE(1.0, -1.0);
+  CHECK_FALSE(has_surface(10.5, 0.035 * sign));
+  CHECK(has_surface(10.5, 0.045 * sign));
+  CHECK_FALSE(has_surface(20.5, 0.45 / 20.5 * sign));
+  CHECK(has_surface(20.5, 0.55 / 20.5 * sign));  // ground far away
 }
 
 TEST_CASE("Oncoming traffic on a motorway does not contradict right poses") {
