@@ -432,8 +432,7 @@ void accept_proven_poses(const Recording& recording, Diagnosis& d) {
     return;
   }
   const GivenMotions motions = register_given(recording, 0, recording.size() - 1, kPlaces);
-  if (motions.certain.size() < kFewestMotions || 2 * motions.certain.size() < motions.tested)
-    return;
+  if (motions.certain.size() < kPlaces || 2 * motions.certain.size() < motions.tested) return;
   const BodyMotion given = motion_under(recording, recording.convention());
   const auto identity = Pose::Identity();
   const MotionError all = motion_error(motions.certain, given, identity);

@@ -180,6 +180,7 @@ bool agrees_best(const Recording& recording, const std::vector<PoseReading>& rea
                  const Mounting& mounting) {
   constexpr std::size_t kEvenPlaces = 4;
   constexpr double kDistinct = 0.1;  // m at points 10 m away
+  constexpr double kClearly = 0.02;  // share of a gap
   const std::size_t merged = scans_to_merge(recording);
   if (recording.size() < 2) return false;
   const auto starts = starts_between(recording, 0, recording.size() - 1, merged);
@@ -203,7 +204,8 @@ bool agrees_best(const Recording& recording, const std::vector<PoseReading>& rea
   if (given.points < 200 || !fits(given, standing) || given.gap > standing.gap) return false;
   return std::all_of(readings.begin(), readings.end(), [&](const PoseReading& reading) {
     if (difference_from_given(places, recording, reading.convention) < kDistinct) return true;
-    return agreement_of(places, poses_under(recording, reading.convention)).gap > given.gap;
+    const Agreement other = agreement_of(places, poses_under(recording, reading.convention));
+    return other.gap > (1.0 - kClearly) * given.gap;
   });
 }
 
