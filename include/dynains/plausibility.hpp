@@ -22,7 +22,8 @@ constexpr std::array<const char*, 4> value_names(Suspicion) {
 /// Shares over the last scans, [0, 1].
 struct Plausibility {
   float not_judged = 0.0F;     ///< points that are invalid, too near or too far
-  float ground_free = 0.0F;    ///< beams through the ground, of those that reach or pass it
+  float ground_free = 0.0F;    ///< beams through the ground, of those that reach or pass it, in all
+                               ///< scans but the worst
   float instance_free = 0.0F;  ///< samples above the ground seen free, of those seen free or hit
   float misfits = 0.0F;        ///< scans that begin an epoch because poses or surfaces do not fit
   float residual = 0.0F;       ///< m, mean translation of PoseResidual, each at most 0.15 m

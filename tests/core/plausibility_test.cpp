@@ -85,6 +85,23 @@ TEST_CASE("one jump is plausible, scans that begin anew again and again are not"
   CHECK(told[39] == Suspicion::kPoses);
 }
 
+TEST_CASE("ground that one scan of a window contradicts is plausible, by two it is not") {
+  const auto with_shocks = [](std::uint64_t shocks) {
+    PlausibilityCheck check;
+    Plausibility result;
+    for (std::size_t i = 0; i < kWindow; ++i) {
+      PlausibilityCheck::Scan scan = usual_scan();
+      scan.scan = i;
+      scan.surfaces.instances_free = 3000;
+      if (i >= 4 && i < 4 + shocks) scan.surfaces.ground_free = 90000;
+      result = check.add(scan);
+    }
+    return result.suspicion;
+  };
+  CHECK(with_shocks(1) == Suspicion::kNone);
+  CHECK(with_shocks(2) == Suspicion::kRays);
+}
+
 TEST_CASE("shares of too few samples tell nothing, and neither does less than a window") {
   PlausibilityCheck::Scan scan = usual_scan();
   scan.surfaces = {5, 20, 40, 36};

@@ -60,17 +60,22 @@ class PlausibilityCheck {
   Plausibility summary() const {
     const std::size_t count = std::min(count_, kWindow);
     SurfaceCounts sum;
+    const SurfaceCounts* most = &scans_[0].surfaces;
     std::uint64_t points = 0, judged = 0, misfits = 0, residuals = 0;
     double residual = 0.0;
     for (std::size_t i = 0; i < count; ++i) {
       const Scan& scan = scans_[i];
       sum += scan.surfaces;
+      if (scan.surfaces.ground_free > most->ground_free) most = &scan.surfaces;
       points += scan.points;
       judged += scan.judged;
       misfits += scan.is_misfit ? 1 : 0;
       residuals += scan.residual ? 1 : 0;
       residual += std::min(scan.residual.value_or(0.0), kMostCounted);
     }
+    // A fault of the recording is in all scans, the sway of a shock in one.
+    sum.ground_free -= most->ground_free;
+    sum.ground_hit -= most->ground_hit;
     Plausibility result;
     result.not_judged = ratio(points - judged, points, 1);
     result.ground_free = ratio(sum.ground_free, sum.ground_free + sum.ground_hit, kFewestBeams);
