@@ -134,18 +134,22 @@ bool SecondPass::revise(PointsView points, std::uint32_t number, const Pose& T_w
   is_restored_.assign(points_.size(), 0);
   if (!is_decided_) return false;
   const std::uint64_t before = restored_ + removed_;
-  places_.for_each_place(points_, verdict.labels, T_world_sensor,
-                         [&](std::size_t i, const Place* place) {
-                           if (verdict.labels[i] == PointLabel::kGround) {
-                             place_of_[i] = changed_at_ground(i, place, T_world_sensor);
-                           } else if (place == nullptr) {
-                             return;
-                           } else if (verdict.labels[i] == PointLabel::kDynamic) {
-                             if (stands(*place, number)) restore(i, verdict);
-                           } else if (place->state != PlaceState::kUnknown) {
-                             place_of_[i] = place;
-                           }
-                         });
+  const auto is_taken = [&](std::size_t i) {
+    const PointLabel label = verdict.labels[i];
+    return label == PointLabel::kStatic || label == PointLabel::kDynamic ||
+           (label == PointLabel::kGround && ground_.rises(world_point(points_, i, T_world_sensor)));
+  };
+  places_.for_each_place(points_, T_world_sensor, is_taken, [&](std::size_t i, const Place* place) {
+    if (verdict.labels[i] == PointLabel::kGround) {
+      place_of_[i] = changed_at_ground(i, place, T_world_sensor);
+    } else if (place == nullptr) {
+      return;
+    } else if (verdict.labels[i] == PointLabel::kDynamic) {
+      if (stands(*place, number)) restore(i, verdict);
+    } else if (place->state != PlaceState::kUnknown) {
+      place_of_[i] = place;
+    }
+  });
   restored_ += ground_.restore(points_, T_world_sensor, verdict);
   remove_objects(number, T_world_sensor, verdict);
   return restored_ + removed_ > before;
@@ -156,10 +160,8 @@ bool SecondPass::revise(PointsView points, std::uint32_t number, const Pose& T_w
 const SecondPass::Place* SecondPass::changed_at_ground(std::size_t point, const Place* place,
                                                        const Pose& T_world_sensor) {
   if (place != nullptr && place->state == PlaceState::kStays) return nullptr;
-  const Eigen::Vector3d at = world_point(points_, point, T_world_sensor);
-  if (!ground_.rises(at)) return nullptr;
   const bool is_known = place != nullptr && place->state == PlaceState::kChanged;
-  return is_known ? place : places_.changed_beside(at);
+  return is_known ? place : places_.changed_beside(world_point(points_, point, T_world_sensor));
 }
 
 // Whether what scan `number` measured in a place is no part of the static map.

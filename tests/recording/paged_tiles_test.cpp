@@ -30,7 +30,7 @@ TEST_CASE("tiles hold what was put into them, for any budget") {
   for (const std::size_t budget : {std::size_t{0}, std::size_t{20000}, std::size_t{1} << 30U}) {
     CAPTURE(budget);
     CountingStore store;
-    PagedTiles<int> tiles(store, kEdge, budget);
+    PagedTiles<VoxelTile<int>> tiles(store, kEdge, budget);
     std::map<std::pair<GroundTile, VoxelKey>, int> expected;
     std::mt19937 random(7);
     for (int i = 0; i < 3000; ++i) {
@@ -57,7 +57,7 @@ TEST_CASE("tiles hold what was put into them, for any budget") {
 
 TEST_CASE("tiles that are near stay in memory, and unchanged ones are stored once") {
   CountingStore store;
-  PagedTiles<int> tiles(store, kEdge, 0);
+  PagedTiles<VoxelTile<int>> tiles(store, kEdge, 0);
   for (std::int64_t x = 0; x < 4; ++x) {
     auto& tile = tiles.at({x, 0});
     tile.values[tile.add(1)] = 5;

@@ -6,13 +6,14 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <optional>
+#include <vector>
 
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/recording/paged_tiles.hpp"
 #include "dynains/recording/world_point.hpp"
-#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
 
@@ -31,8 +32,7 @@ class RecordingGround {
       if (verdicts[i] != PointLabel::kGround) continue;
       const Eigen::Vector3d at = world_point(points, i, T_world_sensor);
       const Index index = index_of(at);
-      auto& tile = tiles_.at({index[0] >> kShift, index[1] >> kShift});
-      Cell& cell = tile.values[tile.add(key_of(index))];
+      Cell& cell = tiles_.at(tile_of(index)).cells[cell_of(index)];
       if (cell.count++ == 0) cell.origin = at.z();
       cell.mean +=
           (static_cast<float>(at.z() - cell.origin) - cell.mean) / static_cast<float>(cell.count);
@@ -82,24 +82,41 @@ class RecordingGround {
     float mean = 0.0F;    // m, above it
     std::uint32_t count = 0;
   };
+  struct Tile {
+    std::vector<Cell> cells = std::vector<Cell>(std::size_t{1} << (2 * kShift));
+
+    std::size_t size() const { return cells.size(); }
+    std::size_t memory_bytes() const { return cells.size() * sizeof(Cell); }
+    void pack(std::vector<std::uint8_t>& bytes) const {
+      bytes.resize(memory_bytes());
+      std::memcpy(bytes.data(), cells.data(), bytes.size());
+    }
+    void unpack(const std::vector<std::uint8_t>& bytes) {
+      cells.resize(bytes.size() / sizeof(Cell));
+      std::memcpy(cells.data(), bytes.data(), bytes.size());
+    }
+  };
 
   static Index index_of(const Eigen::Vector3d& at) {
     return {static_cast<std::int64_t>(std::floor(at.x() / kCell)),
             static_cast<std::int64_t>(std::floor(at.y() / kCell))};
   }
-  static VoxelKey key_of(const Index& index) {
+  static GroundTile tile_of(const Index& index) { return {index[0] >> kShift, index[1] >> kShift}; }
+  // Index of a cell in its tile.
+  static std::size_t cell_of(const Index& index) {
     constexpr std::int64_t kMask = (std::int64_t{1} << kShift) - 1;
-    return voxel_key(index[0] & kMask, index[1] & kMask, 0);
+    return static_cast<std::size_t>((index[0] & kMask) << kShift | (index[1] & kMask));
   }
   // Mean height of the ground in a cell with enough points, m.
   std::optional<double> height_of(const Index& index) {
-    const auto* const tile = tiles_.find({index[0] >> kShift, index[1] >> kShift});
-    const Cell* const cell = tile == nullptr ? nullptr : tile->find(key_of(index));
-    if (cell == nullptr || cell->count < kFewest) return std::nullopt;
-    return cell->origin + static_cast<double>(cell->mean);
+    const Tile* const tile = tiles_.find(tile_of(index));
+    if (tile == nullptr) return std::nullopt;
+    const Cell& cell = tile->cells[cell_of(index)];
+    if (cell.count < kFewest) return std::nullopt;
+    return cell.origin + static_cast<double>(cell.mean);
   }
 
-  PagedTiles<Cell> tiles_;
+  PagedTiles<Tile> tiles_;
 };
 
 }  // namespace dynains

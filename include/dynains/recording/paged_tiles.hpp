@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstring>
 #include <map>
+#include <optional>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -43,6 +44,7 @@ struct VoxelTile {
     const std::uint32_t number = numbers.find(key);
     return number == VoxelHashTable<>::kNone ? nullptr : &values[number];
   }
+  std::size_t size() const { return keys.size(); }
   std::size_t memory_bytes() const {
     return numbers.memory_bytes() + keys.capacity() * sizeof(VoxelKey) +
            values.capacity() * sizeof(Value);
@@ -68,12 +70,11 @@ struct VoxelTile {
   }
 };
 
-/// Tiles by index. References to a tile are valid until free_far() frees it.
-template <class Value>
+/// Tiles by index. References to a tile are valid until free_far() frees it. `Tile`: VoxelTile, or
+/// another type with its functions size(), memory_bytes(), pack() and unpack().
+template <class Tile>
 class PagedTiles {
  public:
-  using Tile = VoxelTile<Value>;
-
   /// `edge`: m, of a tile. `budget`: bytes of the tiles that stay in memory, if the others are far.
   /// The store outlives this.
   PagedTiles(ByteStore& store, double edge, std::size_t budget)
@@ -81,20 +82,20 @@ class PagedTiles {
 
   /// The tile, which is new or not, to be changed. Throws what the store throws.
   Tile& at(const GroundTile& index) {
-    if (recent_ == nullptr || recent_index_ != index) {
-      recent_ = &entries_[index];
-      recent_index_ = index;
-    }
+    if (!is_recent(index)) take_recent(*entries_.try_emplace(index).first);
     load(*recent_);
     recent_->is_changed = true;
-    return recent_->tile;
+    return *recent_->tile;
   }
   /// Null: there is no such tile. Throws what the store throws.
   const Tile* find(const GroundTile& index) {
-    const auto found = entries_.find(index);
-    if (found == entries_.end()) return nullptr;
-    load(found->second);
-    return &found->second.tile;
+    if (!is_recent(index)) {
+      const auto found = entries_.find(index);
+      if (found == entries_.end()) return nullptr;
+      take_recent(*found);
+    }
+    load(*recent_);
+    return &*recent_->tile;
   }
 
   /// Calls `visit(index)` for all tiles, in the order of their indices.
@@ -106,7 +107,7 @@ class PagedTiles {
   std::size_t size() const {
     std::size_t size = 0;
     for (const auto& entry : entries_) {
-      size += entry.second.is_loaded ? entry.second.tile.keys.size() : entry.second.count;
+      size += entry.second.tile ? entry.second.tile->size() : entry.second.count;
     }
     return size;
   }
@@ -128,8 +129,8 @@ class PagedTiles {
     std::size_t bytes = 0;
     far_.clear();
     for (auto& [index, entry] : entries_) {
-      if (!entry.is_loaded) continue;
-      bytes += entry.tile.memory_bytes();
+      if (!entry.tile) continue;
+      bytes += entry.tile->memory_bytes();
       const double metres = distance(index, position);
       if (metres > keep) far_.emplace_back(metres, &entry);
     }
@@ -137,37 +138,43 @@ class PagedTiles {
     std::sort(far_.rbegin(), far_.rend());
     for (const auto& far : far_) {
       if (bytes <= budget_ - budget_ / 4) return;
-      bytes -= far.second->tile.memory_bytes();
+      bytes -= far.second->tile->memory_bytes();
       store(*far.second);
     }
   }
 
  private:
   struct Entry {
-    Tile tile;
-    bool is_loaded = true;
+    std::optional<Tile> tile;  // in memory
     bool is_changed = false;   // since it was stored
     std::uint64_t offset = 0;  // in the store
     std::size_t size = 0, count = 0;
   };
 
+  bool is_recent(const GroundTile& index) const {
+    return recent_ != nullptr && recent_index_ == index;
+  }
+  void take_recent(std::pair<const GroundTile, Entry>& entry) {
+    recent_index_ = entry.first;
+    recent_ = &entry.second;
+  }
+
   void load(Entry& entry) {
-    if (entry.is_loaded) return;
-    store_->read(entry.offset, entry.size, bytes_);
-    entry.tile.unpack(bytes_);
-    entry.is_loaded = true;
+    if (entry.tile) return;
+    if (entry.size > 0) store_->read(entry.offset, entry.size, bytes_);
+    entry.tile.emplace();
+    if (entry.size > 0) entry.tile->unpack(bytes_);
     entry.is_changed = false;
   }
 
   void store(Entry& entry) {
     if (entry.is_changed || entry.size == 0) {
-      entry.tile.pack(bytes_);
+      entry.tile->pack(bytes_);
       entry.offset = store_->append(bytes_);
       entry.size = bytes_.size();
-      entry.count = entry.tile.keys.size();
+      entry.count = entry.tile->size();
     }
-    entry.tile = Tile();
-    entry.is_loaded = false;
+    entry.tile.reset();
   }
 
   ByteStore* store_;

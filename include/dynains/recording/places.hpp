@@ -150,15 +150,12 @@ class RecordingPlaces {
     find_objects();
   }
 
-  /// Calls `visit(i, place)` for each point with a verdict, m, sensor frame; null: no scan brought
-  /// a place there.
-  template <class Visitor>
-  void for_each_place(PointsView points, Span<const PointLabel> verdicts,
-                      const Pose& T_world_sensor, Visitor&& visit) {
+  /// Calls `visit(i, place)` for the points (m, sensor frame) of which `is_taken(i)`; null: no scan
+  /// brought a place there.
+  template <class IsTaken, class Visitor>
+  void for_each_place(PointsView points, const Pose& T_world_sensor, IsTaken&& is_taken,
+                      Visitor&& visit) {
     free_far(T_world_sensor.translation());
-    const auto is_taken = [&](std::size_t i) {
-      return is_above_ground(verdicts[i]) || verdicts[i] == PointLabel::kGround;
-    };
     const Tile* tile = nullptr;
     GroundTile index = {};
     for_each_block(points, T_world_sensor, is_taken, [&](const Block& block) {
@@ -236,7 +233,7 @@ class RecordingPlaces {
   static constexpr std::array<std::uint8_t, 4> kNear = {12, 20, 35, 60};  // m
   static constexpr std::size_t kAnyRange = kNear.size() - 1;
 
-  using Tile = PagedTiles<Place>::Tile;
+  using Tile = VoxelTile<Place>;
   struct Position {
     GroundTile tile;
     VoxelKey key;  // of the place in the tile
@@ -550,7 +547,7 @@ class RecordingPlaces {
   }
 
   RecordingPlacesConfig config_;
-  PagedTiles<Place> tiles_;
+  PagedTiles<Tile> tiles_;
   std::uint32_t objects_ = 0;
 
   std::uint16_t epoch_ = 0;
