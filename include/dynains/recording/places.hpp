@@ -156,16 +156,12 @@ class RecordingPlaces {
   void for_each_place(PointsView points, const Pose& T_world_sensor, IsTaken&& is_taken,
                       Visitor&& visit) {
     free_far(T_world_sensor.translation());
-    const Tile* tile = nullptr;
-    GroundTile index = {};
     for_each_block(points, T_world_sensor, is_taken, [&](const Block& block) {
       std::array<const Tile*, kBlock> tiles;
       std::array<const Place*, kBlock> places;
       for (std::size_t k = 0; k < block.count; ++k) {
-        if (tile == nullptr || index != block.at[k].tile) tile = tiles_.find(block.at[k].tile);
-        index = block.at[k].tile;
-        tiles[k] = tile;
-        if (tile != nullptr) tile->numbers.prefetch(block.at[k].key);
+        tiles[k] = tiles_.find(block.at[k].tile);
+        if (tiles[k] != nullptr) tiles[k]->numbers.prefetch(block.at[k].key);
       }
       for (std::size_t k = 0; k < block.count; ++k) {
         places[k] = tiles[k] == nullptr ? nullptr : tiles[k]->find(block.at[k].key);
