@@ -102,12 +102,18 @@ class Recorrected {
   double last_ = -std::numeric_limits<double>::infinity();
 };
 
-/// The first scan behind i that sees what is beside the way in other directions; 0: none.
+constexpr double kScanLever = 10.0;  // m
+
+/// The first scan behind i that sees what is beside the way in other directions, or during which
+/// the sensor moves otherwise, so that its points are moved otherwise; 0: none.
 std::size_t partner_of(const Recording& recording, std::size_t i, std::size_t last) {
   constexpr double kWay = 8.0;       // m
+  constexpr double kOther = 0.3;     // m, difference of the motions during both scans
   constexpr std::size_t kMost = 50;  // scans
+  const Pose T_next_i = motion_between(recording, i + 1, i);
   for (std::size_t k = i + 1; k < last && k <= i + kMost; ++k) {
     if (extent_of(motion_between(recording, i, k), kWay) >= kWay) return k;
+    if (extent_of(T_next_i * motion_between(recording, k, k + 1), kScanLever) >= kOther) return k;
   }
   return 0;
 }
@@ -116,7 +122,6 @@ std::size_t partner_of(const Recording& recording, std::size_t i, std::size_t la
 
 PointTimesGaps point_times_gaps(const Recording& recording, std::size_t first, std::size_t last) {
   constexpr std::size_t kMostPairs = 10;
-  constexpr double kLever = 10.0;        // m
   constexpr double kLeastMotion = 0.15;  // m, within a scan, at that distance
   constexpr double kClearly = 0.02;
   PointTimesGaps gaps;
@@ -124,7 +129,8 @@ PointTimesGaps point_times_gaps(const Recording& recording, std::size_t first, s
   for (std::size_t pair = 0; pair < kMostPairs && first + 2 < last; ++pair) {
     const std::size_t i = first + 1 + pair * (last - first - 2) / kMostPairs;
     const std::size_t k = partner_of(recording, i, last);
-    if (k == 0 || extent_of(motion_between(recording, i, i + 1), kLever) < kLeastMotion) continue;
+    if (k == 0 || extent_of(motion_between(recording, i, i + 1), kScanLever) < kLeastMotion)
+      continue;
     const Recorrected a(recording, i), b(recording, k);
     if (a.is_empty() || b.is_empty()) continue;
     const Mounting mounting = estimate_mounting(a.points(PointTimesReading::kAsGiven));

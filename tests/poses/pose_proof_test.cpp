@@ -74,7 +74,7 @@ simulation::Config short_world(std::uint64_t seed) {
 /// A recording as measured, with times of points, whose poses can be replaced.
 class SkewedDrive {
  public:
-  explicit SkewedDrive(simulation::Config config) {
+  explicit SkewedDrive(simulation::Config config, bool runs_backwards = false) {
     config.rolling_shutter = true;
     config.deskewed = 0.0;
     simulation::Simulator simulator(config);
@@ -82,13 +82,15 @@ class SkewedDrive {
     std::vector<double> times;
     PointColumns columns;
     columns.time = true;
+    const double period = simulator.scan(1).time - simulator.scan(0).time;
     for (std::size_t i = 0; i < simulator.size(); ++i) {
       const simulation::SimulatedScan scan = simulator.scan(i);
       PointFileWriter file(folder_ / ("pcd/" + simulation::scan_name(i) + ".pcd"), columns);
       for (std::size_t k = 0; k < scan.times.size(); ++k) {
         FilePoint point;
         point.position = Eigen::Map<const Eigen::Vector3f>(&scan.xyzi[4 * k]).cast<double>();
-        point.time = static_cast<double>(scan.times[k]);
+        const auto time = static_cast<double>(scan.times[k]);
+        point.time = runs_backwards ? period - time : time;
         file.add(point);
       }
       file.commit();
@@ -188,6 +190,12 @@ TEST_CASE("A plane that contains the beam through it is no surface") {
   CHECK(has_surface(10.5, 0.045 * sign));
   CHECK_FALSE(has_surface(20.5, 0.45 / 20.5 * sign));
   CHECK(has_surface(20.5, 0.55 / 20.5 * sign));  // ground far away
+}
+
+TEST_CASE("Sway alone tells times of points that run backwards") {
+  CHECK(SkewedDrive(short_world(9304)).diagnose_with(0.0).point_times.empty());
+  CHECK(SkewedDrive(short_world(9304), true).diagnose_with(0.0).verdict ==
+        PoseVerdict::kPointTimes);
 }
 
 TEST_CASE("Oncoming traffic on a motorway does not contradict right poses") {
