@@ -163,6 +163,21 @@ TEST_CASE("a pose that jumps begins an epoch, or is corrected") {
   CHECK(epochs.static_share > without - 0.005);
 }
 
+// An odometry without a motion at first takes the second scan for the place of the first one.
+TEST_CASE("a wrong first motion begins one epoch, not all of them") {
+  simulation::Config config;
+  config.scene = simulation::Scene::kHighway;
+  config.sensor = simulation::Sensor::kHdl64;
+  config.scans = 12;
+  config.seed = 71;
+  std::vector<SimulatedScan> scans = simulate(config);
+  scans.front().T_world_sensor = scans[1].T_world_sensor;
+  CHECK(epochs_of(scans).scans == std::vector<std::size_t>{2});
+  // A pose that jumps and comes back begins two.
+  scans[7].T_world_sensor.translation().x() += 20.0;
+  CHECK(epochs_of(scans).scans == std::vector<std::size_t>{2, 7, 8});
+}
+
 TEST_CASE("exact poses begin no epoch: sparse sensors, two scans a second, lost scans") {
   using simulation::Scene;
   using simulation::Sensor;
@@ -224,6 +239,30 @@ TEST_CASE("a motion is impossible beyond four times gravity, unless such motions
   CHECK(motion.is_impossible(5.0));
   motion.clear();
   CHECK_FALSE(motion.predict(T_step));
+}
+
+TEST_CASE("a rejected motion that repeats is not the wrong one") {
+  detail::MotionPrediction motion;
+  const auto moved_by = [](double x) {
+    return Eigen::Isometry3d(Eigen::Translation3d(x, 0.0, 0.0));
+  };
+  motion.begin_scan(1.0);
+  motion.begin_scan(1.1);
+  motion.end_scan(moved_by(0.0), {});
+  motion.begin_scan(1.2);
+  CHECK_FALSE(motion.repeats_rejected(moved_by(2.0)));
+  motion.reject_scan(moved_by(2.0));
+  motion.begin_scan(1.3);  // 40 m/s^2 * 0.1 s * 0.1 s, and 0.1 m
+  CHECK(motion.repeats_rejected(moved_by(2.49)));
+  CHECK(motion.repeats_rejected(moved_by(1.51)));
+  CHECK_FALSE(motion.repeats_rejected(moved_by(2.51)));
+  CHECK_FALSE(motion.repeats_rejected(moved_by(1.49)));
+  CHECK_FALSE(motion.repeats_rejected(moved_by(-2.0)));  // back from a jump
+  CHECK(motion.predict(moved_by(0.0))->translation().x() == 0.0);
+  motion.end_scan(moved_by(2.0), {});
+  motion.begin_scan(1.4);
+  CHECK_FALSE(motion.repeats_rejected(moved_by(2.0)));
+  CHECK(motion.predict(moved_by(0.0))->translation().x() == Approx(2.0));
 }
 
 TEST_CASE("a motion is scaled along its turn") {

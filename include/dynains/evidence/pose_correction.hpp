@@ -222,25 +222,24 @@ class PoseCorrection {
     constexpr double kNear = 0.1, kNearDegrees = 0.5;  // m, deg
     constexpr double kFewestPoints = 8.0;              // see PlaneAligner::upright_fit()
     constexpr double kLeastRatio = 0.7;
+    const Pose T_motion = composed(inverted(T_origin_newest_), T_newest);
     const std::optional<Pose> T_predicted = motion_.predict(T_origin_newest_);
-    std::optional<double> error;
-    if (T_predicted) {
-      const PoseResidual deviation = difference(*T_predicted, T_newest);
-      error = deviation.translation;
-      bool has_jumped = motion_.is_impossible(*error);
-      if (!has_jumped && (*error > kNear || deviation.rotation > kNearDegrees)) {
-        const double expected = aligner_.upright_fit(selected_.points(), planes_, *T_predicted);
-        has_jumped =
-            expected > kFewestPoints &&
-            aligner_.upright_fit(selected_.points(), planes_, T_newest) < kLeastRatio * expected;
-      }
-      if (has_jumped) misfit_ = EpochReason::kJump;
+    const PoseResidual error = T_predicted ? difference(*T_predicted, T_newest) : PoseResidual();
+    const bool is_impossible = motion_.is_impossible(error.translation);
+    bool has_jumped = is_impossible && !motion_.repeats_rejected(T_motion);
+    if (!has_jumped && (error.translation > kNear || error.rotation > kNearDegrees)) {
+      const double expected = aligner_.upright_fit(selected_.points(), planes_, *T_predicted);
+      has_jumped =
+          expected > kFewestPoints &&
+          aligner_.upright_fit(selected_.points(), planes_, T_newest) < kLeastRatio * expected;
     }
+    if (has_jumped) misfit_ = EpochReason::kJump;
     if (misfit_) {
       residual_.reset();
-      return;
+      motion_.reject_scan(T_motion);
+    } else {
+      motion_.end_scan(T_motion, is_impossible ? 0.0 : error.translation);
     }
-    motion_.end_scan(composed(inverted(T_origin_newest_), T_newest), error);
   }
 
   // Poses are presumed to be exact until a correction shows that they are not.
