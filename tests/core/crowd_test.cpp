@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "support/catch.hpp"
+#include "support/drive_of.hpp"
 #include "support/simulated_runs.hpp"
 
 namespace dynains::test {
@@ -10,11 +11,8 @@ namespace {
 
 const std::vector<simulation::SimulatedScan>& crowd() {
   static const std::vector<simulation::SimulatedScan> scans = [] {
-    simulation::Config config;
-    config.scene = simulation::Scene::kCrowd;
-    config.sensor = simulation::Sensor::kOs1_64;
-    config.scans = 80;
-    config.seed = 6;
+    const simulation::Config config =
+        drive_of(simulation::Scene::kCrowd, simulation::Sensor::kOs1_64, 80, 6);
     return simulate(config);
   }();
   return scans;

@@ -7,6 +7,7 @@
 
 #include "dynains/evidence/motion_prediction.hpp"
 #include "support/catch.hpp"
+#include "support/drive_of.hpp"
 #include "support/random.hpp"
 #include "support/simulated_runs.hpp"
 
@@ -17,11 +18,8 @@ using simulation::SimulatedScan;
 
 const std::vector<SimulatedScan>& street() {
   static const std::vector<SimulatedScan> scans = [] {
-    simulation::Config config;
-    config.scene = simulation::Scene::kUrban;
-    config.sensor = simulation::Sensor::kOs1_64;
-    config.scans = 40;
-    config.seed = 33;
+    const simulation::Config config =
+        drive_of(simulation::Scene::kUrban, simulation::Sensor::kOs1_64, 40, 33);
     return simulate(config);
   }();
   return scans;
@@ -185,11 +183,7 @@ TEST_CASE("exact poses begin no epoch: sparse sensors, two scans a second, lost 
                                                               {Scene::kGarage, Sensor::kVlp16},
                                                               {Scene::kHighway, Sensor::kVlp16},
                                                               {Scene::kUrban, Sensor::kLivox}}));
-  simulation::Config config;
-  config.scene = scene;
-  config.sensor = sensor;
-  config.scans = 40;
-  config.seed = 61;
+  const simulation::Config config = drive_of(scene, sensor, 40, 61);
   const std::vector<SimulatedScan> all = simulate(config);
   std::vector<SimulatedScan> slow, lossy;
   Random random(4);

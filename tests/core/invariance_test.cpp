@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "support/catch.hpp"
+#include "support/drive_of.hpp"
 #include "support/random.hpp"
 #include "support/simulated_runs.hpp"
 
@@ -16,11 +17,8 @@ namespace {
 using simulation::SimulatedScan;
 
 std::vector<SimulatedScan> short_street() {
-  simulation::Config config;
-  config.scene = simulation::Scene::kUrban;
-  config.sensor = simulation::Sensor::kOs1_64;
-  config.scans = 50;
-  config.seed = 5;
+  const simulation::Config config =
+      drive_of(simulation::Scene::kUrban, simulation::Sensor::kOs1_64, 50, 5);
   return simulate(config);
 }
 

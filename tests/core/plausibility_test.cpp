@@ -6,6 +6,7 @@
 
 #include "dynains/pipeline/plausibility_check.hpp"
 #include "support/catch.hpp"
+#include "support/drive_of.hpp"
 #include "support/simulated_runs.hpp"
 
 namespace dynains::test {
@@ -115,11 +116,8 @@ TEST_CASE("shares of too few samples tell nothing, and neither does less than a 
 }
 
 TEST_CASE("right poses of a drive are plausible, inverse and turned ones are not") {
-  simulation::Config config;
-  config.scene = simulation::Scene::kUrban;
-  config.sensor = simulation::Sensor::kVlp16;
-  config.scans = 30;
-  config.seed = 12;
+  const simulation::Config config =
+      drive_of(simulation::Scene::kUrban, simulation::Sensor::kVlp16, 30, 12);
   const std::vector<simulation::SimulatedScan> scans = simulate(config);
   const auto first_doubt = [&](auto&& pose_of) {
     DynaInsRemover remover;

@@ -12,6 +12,7 @@
 
 #include "dynains/evidence/symmetric_eigen.hpp"
 #include "support/catch.hpp"
+#include "support/drive_of.hpp"
 #include "support/random.hpp"
 #include "support/simulated_runs.hpp"
 
@@ -33,11 +34,7 @@ PoseCorrection new_correction() {
 }
 
 std::vector<SimulatedScan> drive(Scene scene, Sensor sensor, int scans) {
-  simulation::Config config;
-  config.scene = scene;
-  config.sensor = sensor;
-  config.scans = scans;
-  config.seed = 31;
+  const simulation::Config config = drive_of(scene, sensor, scans, 31);
   return simulate(config);
 }
 

@@ -9,17 +9,13 @@
 #include "dynains/errors.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "support/catch.hpp"
+#include "support/drive_of.hpp"
 
 namespace dynains::test {
 namespace {
 
 simulation::Config place(simulation::Scene scene, std::size_t scans) {
-  simulation::Config config;
-  config.scene = scene;
-  config.sensor = simulation::Sensor::kVlp16;
-  config.scans = static_cast<int>(scans);
-  config.seed = 4711;
-  return config;
+  return drive_of(scene, simulation::Sensor::kVlp16, static_cast<int>(scans), 4711);
 }
 
 RawPoints<float> points_of(const simulation::SimulatedScan& scan) {

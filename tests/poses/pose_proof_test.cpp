@@ -1,69 +1,23 @@
 // Right poses of sparse sensors are accepted, and jumps of poses are found, in written recordings.
 #include <Eigen/Geometry>
 #include <cmath>
-#include <filesystem>
 #include <functional>
 #include <random>
 #include <string>
 #include <vector>
 
-#include "dynains/io/kitti.hpp"
-#include "dynains/io/point_file.hpp"
 #include "dynains/poses/diagnosis.hpp"
 #include "dynains/poses/pose_jumps.hpp"
 #include "dynains/simulation/random_world.hpp"
-#include "dynains/simulation/simulator.hpp"
-#include "dynains/simulation/write_sequence.hpp"
-#include "io/files.hpp"
 #include "poses/scan_registration.hpp"
 #include "support/catch.hpp"
+#include "support/drive_of.hpp"
+#include "support/written_drive.hpp"
 
 namespace dynains::test {
 namespace {
 
-namespace fs = std::filesystem;
-
-/// A recording whose poses can be replaced.
-class Drive {
- public:
-  Drive(simulation::Scene scene, simulation::Sensor sensor, std::uint32_t seed)
-      : Drive(config_of(scene, sensor, seed)) {}
-
-  explicit Drive(const simulation::Config& config) {
-    simulation::Simulator simulator(config);
-    fs::create_directories(folder_ / "velodyne");
-    for (std::size_t i = 0; i < simulator.size(); ++i) {
-      const simulation::SimulatedScan scan = simulator.scan(i);
-      write_scan(folder_ / ("velodyne/" + simulation::scan_name(i) + ".bin"), scan.xyzi);
-      poses_.push_back(scan.T_world_sensor);
-    }
-  }
-
-  Recording recording(const std::function<Pose(std::size_t, const Pose&)>& spoil) const {
-    std::vector<Pose> rows;
-    for (std::size_t i = 0; i < poses_.size(); ++i) rows.push_back(spoil(i, poses_[i]));
-    write_poses(folder_ / "poses.txt", rows);
-    return Recording(folder_.path());
-  }
-  Recording recording() const {
-    return recording([](std::size_t, const Pose& T) { return T; });
-  }
-  const Pose& pose(std::size_t i) const { return poses_[i]; }
-
- private:
-  static simulation::Config config_of(simulation::Scene scene, simulation::Sensor sensor,
-                                      std::uint32_t seed) {
-    simulation::Config config;
-    config.scene = scene;
-    config.sensor = sensor;
-    config.scans = 40;
-    config.seed = seed;
-    return config;
-  }
-
-  TemporaryFolder folder_;
-  std::vector<Pose> poses_;
-};
+using Drive = WrittenDrive;
 
 simulation::Config short_world(std::uint64_t seed) {
   simulation::Config config = simulation::random_world(seed);
@@ -71,50 +25,29 @@ simulation::Config short_world(std::uint64_t seed) {
   return config;
 }
 
-/// A recording as measured, with times of points, whose poses can be replaced.
-class SkewedDrive {
- public:
-  explicit SkewedDrive(simulation::Config config, bool runs_backwards = false) {
-    config.rolling_shutter = true;
-    config.deskewed = 0.0;
-    simulation::Simulator simulator(config);
-    fs::create_directories(folder_ / "pcd");
-    std::vector<double> times;
-    PointColumns columns;
-    columns.time = true;
-    const double period = simulator.scan(1).time - simulator.scan(0).time;
-    for (std::size_t i = 0; i < simulator.size(); ++i) {
-      const simulation::SimulatedScan scan = simulator.scan(i);
-      PointFileWriter file(folder_ / ("pcd/" + simulation::scan_name(i) + ".pcd"), columns);
-      for (std::size_t k = 0; k < scan.times.size(); ++k) {
-        FilePoint point;
-        point.position = Eigen::Map<const Eigen::Vector3f>(&scan.xyzi[4 * k]).cast<double>();
-        const auto time = static_cast<double>(scan.times[k]);
-        point.time = runs_backwards ? period - time : time;
-        file.add(point);
-      }
-      file.commit();
-      poses_.push_back(scan.T_world_sensor);
-      times.push_back(scan.time);
-    }
-    write_times(folder_ / "times.txt", times);
-  }
+/// As measured, with times of points.
+simulation::Config skewed_world(std::uint64_t seed) {
+  simulation::Config config = short_world(seed);
+  config.rolling_shutter = true;
+  config.deskewed = 0.0;
+  return config;
+}
 
-  Diagnosis diagnose_with(double metres) const {
-    std::mt19937 random(3);
-    std::normal_distribution<double> error(0.0, metres);
-    std::vector<Pose> rows = poses_;
-    for (Pose& T : rows) T.translation() += Eigen::Vector3d(error(random), error(random), 0.0);
-    write_poses(folder_ / "poses.txt", rows);
-    RecordingOptions options;
-    options.deskew = true;
-    return diagnose(Recording(folder_.path(), options));
-  }
-
- private:
-  TemporaryFolder folder_;
-  std::vector<Pose> poses_;
-};
+/// Finding on the drive as measured, with times of points, if its poses have errors of this size.
+Diagnosis diagnosis_with(
+    const Drive& drive, double metres,
+    const std::function<double(double)>& time_of = [](double s) { return s; }) {
+  const TemporaryFolder folder;
+  drive.write_with_times(folder.path(), time_of);
+  std::mt19937 random(3);
+  std::normal_distribution<double> error(0.0, metres);
+  std::vector<Pose> rows = drive.poses();
+  for (Pose& T : rows) T.translation() += Eigen::Vector3d(error(random), error(random), 0.0);
+  write_poses(folder / "poses.txt", rows);
+  RecordingOptions options;
+  options.deskew = true;
+  return diagnose(Recording(folder.path(), options));
+}
 
 Pose sideways(double metres, double degrees) {
   Pose T = Pose::Identity();
@@ -127,8 +60,8 @@ Pose sideways(double metres, double degrees) {
 TEST_CASE("Right poses of a sparse sensor in a crowd raise no doubt, wrong ones do") {
   const auto seed = GENERATE(71U, 72U);
   INFO("seed " << seed);
-  const Drive drive(simulation::Scene::kCrowd, simulation::Sensor::kMid360, seed);
-  const Diagnosis right = diagnose(drive.recording());
+  const Drive drive(drive_of(simulation::Scene::kCrowd, simulation::Sensor::kMid360, 40, seed));
+  const Diagnosis right = diagnose(Recording(drive.path()));
   CHECK((right.verdict == PoseVerdict::kAgree || right.verdict == PoseVerdict::kNoMotion));
   CHECK(right.option.empty());
 
@@ -136,10 +69,10 @@ TEST_CASE("Right poses of a sparse sensor in a crowd raise no doubt, wrong ones 
     return d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion;
   };
   CHECK_FALSE(is_accepted(
-      diagnose(drive.recording([](std::size_t, const Pose& T) { return Pose(T.inverse()); }))));
+      diagnose(drive.with_poses([](std::size_t, const Pose& T) { return Pose(T.inverse()); }))));
   std::mt19937 random(3);
   std::normal_distribution<double> metres(0.0, 0.2);
-  const Diagnosis noisy = diagnose(drive.recording([&](std::size_t, Pose T) {
+  const Diagnosis noisy = diagnose(drive.with_poses([&](std::size_t, Pose T) {
     T.translation() += Eigen::Vector3d(metres(random), metres(random), metres(random));
     return T;
   }));
@@ -147,16 +80,16 @@ TEST_CASE("Right poses of a sparse sensor in a crowd raise no doubt, wrong ones 
 }
 
 TEST_CASE("Uneven motion within de-skewed scans does not make right poses inexact") {
-  const SkewedDrive drive(short_world(21077));
-  CHECK(drive.diagnose_with(0.0).verdict == PoseVerdict::kAgree);
-  CHECK(drive.diagnose_with(0.1).verdict == PoseVerdict::kInexact);
+  const Drive drive(skewed_world(21077));
+  CHECK(diagnosis_with(drive, 0.0).verdict == PoseVerdict::kAgree);
+  CHECK(diagnosis_with(drive, 0.1).verdict == PoseVerdict::kInexact);
 }
 
 TEST_CASE("Traces of beams on the persons of a crowd do not make right poses inexact") {
   const Drive drive(short_world(21001));
-  CHECK(diagnose(drive.recording()).verdict == PoseVerdict::kAgree);
+  CHECK(diagnose(Recording(drive.path())).verdict == PoseVerdict::kAgree);
   const Diagnosis noisy =
-      diagnose(drive.recording([random = std::mt19937(3)](std::size_t, Pose T) mutable {
+      diagnose(drive.with_poses([random = std::mt19937(3)](std::size_t, Pose T) mutable {
         std::normal_distribution<double> metres(0.0, 0.1);
         T.translation() += Eigen::Vector3d(metres(random), metres(random), 0.0);
         return T;
@@ -165,9 +98,9 @@ TEST_CASE("Traces of beams on the persons of a crowd do not make right poses ine
 }
 
 TEST_CASE("Right poses of a sparse sensor that comes to rest are no other recording's") {
-  const SkewedDrive drive(short_world(23009));
-  CHECK(drive.diagnose_with(0.0).verdict == PoseVerdict::kAgree);
-  CHECK(drive.diagnose_with(0.2).verdict != PoseVerdict::kAgree);
+  const Drive drive(skewed_world(23009));
+  CHECK(diagnosis_with(drive, 0.0).verdict == PoseVerdict::kAgree);
+  CHECK(diagnosis_with(drive, 0.2).verdict != PoseVerdict::kAgree);
 }
 
 TEST_CASE("A plane that contains the beam through it is no surface") {
@@ -193,20 +126,22 @@ TEST_CASE("A plane that contains the beam through it is no surface") {
 }
 
 TEST_CASE("Sway alone tells times of points that run backwards") {
-  CHECK(SkewedDrive(short_world(9304)).diagnose_with(0.0).point_times.empty());
-  CHECK(SkewedDrive(short_world(9304), true).diagnose_with(0.0).verdict ==
+  const Drive drive(skewed_world(9304));
+  const double period = drive.scan(1).time - drive.scan(0).time;
+  CHECK(diagnosis_with(drive, 0.0).point_times.empty());
+  CHECK(diagnosis_with(drive, 0.0, [&](double s) { return period - s; }).verdict ==
         PoseVerdict::kPointTimes);
 }
 
 TEST_CASE("Oncoming traffic on a motorway does not contradict right poses") {
   const Drive drive(short_world(21057));
-  const Diagnosis right = diagnose(drive.recording());
+  const Diagnosis right = diagnose(Recording(drive.path()));
   CHECK(right.sound());
   CHECK(right.verdict != PoseVerdict::kInexact);
-  CHECK_FALSE(diagnose(drive.recording([](std::size_t, const Pose& T) {
+  CHECK_FALSE(diagnose(drive.with_poses([](std::size_t, const Pose& T) {
                 return Pose(T.inverse());
               })).sound());
-  CHECK_FALSE(diagnose(drive.recording([](std::size_t, Pose T) {
+  CHECK_FALSE(diagnose(drive.with_poses([](std::size_t, Pose T) {
                 T.translation() *= 1000.0;
                 return T;
               })).sound());
@@ -214,8 +149,8 @@ TEST_CASE("Oncoming traffic on a motorway does not contradict right poses") {
 
 TEST_CASE("Traffic of nearly the own speed does not make right ways too long, and wrong ones are") {
   const Drive drive(short_world(22025));
-  CHECK(diagnose(drive.recording()).sound());
-  const Diagnosis scaled = diagnose(drive.recording([](std::size_t, Pose T) {
+  CHECK(diagnose(Recording(drive.path())).sound());
+  const Diagnosis scaled = diagnose(drive.with_poses([](std::size_t, Pose T) {
     T.translation() *= 1.1;
     return T;
   }));
@@ -225,25 +160,25 @@ TEST_CASE("Traffic of nearly the own speed does not make right ways too long, an
 
 TEST_CASE("A few registrations confirm right poses, and never those of a turned body") {
   const auto sensor = GENERATE(simulation::Sensor::kOs1_64, simulation::Sensor::kVlp16);
-  const Drive drive(simulation::Scene::kStopAndGo, sensor, 4);
-  CHECK(confirms_poses(drive.recording(), 0, 39));
+  const Drive drive(drive_of(simulation::Scene::kStopAndGo, sensor, 40, 4));
+  CHECK(confirms_poses(Recording(drive.path()), 0, 39));
   CHECK_FALSE(confirms_poses(
-      drive.recording([](std::size_t, const Pose& T) { return Pose(T * sideways(0.0, 90.0)); }), 0,
+      drive.with_poses([](std::size_t, const Pose& T) { return Pose(T * sideways(0.0, 90.0)); }), 0,
       39));
   CHECK_FALSE(confirms_poses(
-      drive.recording([](std::size_t, const Pose& T) { return Pose(T.inverse()); }), 0, 39));
+      drive.with_poses([](std::size_t, const Pose& T) { return Pose(T.inverse()); }), 0, 39));
 }
 
 TEST_CASE("Jumps of poses are found with scan and size, and none in right poses") {
-  const Drive drive(simulation::Scene::kUrban, simulation::Sensor::kOs1_64, 41);
-  CHECK(find_pose_jumps(drive.recording(), 0, 39).empty());
+  const Drive drive(drive_of(simulation::Scene::kUrban, simulation::Sensor::kOs1_64, 40, 41));
+  CHECK(find_pose_jumps(Recording(drive.path()), 0, 39).empty());
   const auto [metres, degrees] = GENERATE(
       table<double, double>({{0.3, 0.3}, {1.5, 0.0}, {3.0, 2.0}, {0.0, 5.0}, {20.0, 0.0}}));
   INFO(metres << " m, " << degrees << " deg");
   const Pose& T_world_c = drive.pose(20);
   const Pose change = T_world_c * sideways(metres, degrees) * T_world_c.inverse();
   const Recording recording =
-      drive.recording([&](std::size_t i, const Pose& T) { return i < 20 ? T : Pose(change * T); });
+      drive.with_poses([&](std::size_t i, const Pose& T) { return i < 20 ? T : Pose(change * T); });
   const std::vector<PoseJump> jumps = find_pose_jumps(recording, 0, 39);
   REQUIRE(jumps.size() == 1);
   CHECK(jumps[0].scan == 20);

@@ -15,6 +15,7 @@
 #include "dynains/simulation/write_sequence.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
+#include "support/drive_of.hpp"
 
 namespace dynains::test {
 namespace {
@@ -37,11 +38,7 @@ std::vector<PointBuffer> moved(std::vector<PointBuffer> scans, const Eigen::Vect
 
 /// Four scans of a drive, sensor frame.
 std::vector<PointBuffer> scans_of(Scene scene, Sensor sensor) {
-  simulation::Config config;
-  config.scene = scene;
-  config.sensor = sensor;
-  config.scans = 40;
-  config.seed = 8;
+  const simulation::Config config = drive_of(scene, sensor, 40, 8);
   simulation::Simulator simulator(config);
   std::vector<PointBuffer> scans;
   for (const std::size_t i : {0U, 13U, 26U, 39U}) {

@@ -9,11 +9,10 @@
 #include <vector>
 
 #include "dynains/io/extrinsic.hpp"
-#include "dynains/io/kitti.hpp"
-#include "dynains/simulation/simulator.hpp"
-#include "io/files.hpp"
 #include "program/start.hpp"
 #include "support/catch.hpp"
+#include "support/drive_of.hpp"
+#include "support/written_drive.hpp"
 
 using namespace dynains;
 using namespace dynains::test;
@@ -25,53 +24,28 @@ using Poses = std::vector<Pose>;
 
 /// A drive around the bends of a hilly street.
 simulation::Config bends() {
-  simulation::Config config;
-  config.scene = simulation::Scene::kHill;
-  config.sensor = simulation::Sensor::kVlp16;
-  config.scans = 24;
+  simulation::Config config = drive_of(simulation::Scene::kHill, simulation::Sensor::kVlp16, 24, 4);
   config.rate = 5.0;
-  config.seed = 4;
   config.sensor_height = 1.9;
   return config;
 }
 
 /// A drive with bends and changes of speed, by a sensor whose scans determine its motion well.
 simulation::Config dense() {
-  simulation::Config config;
-  config.scene = simulation::Scene::kStopAndGo;
-  config.sensor = simulation::Sensor::kOs1_64;
-  config.scans = 24;
+  simulation::Config config =
+      drive_of(simulation::Scene::kStopAndGo, simulation::Sensor::kOs1_64, 24, 4);
   config.rate = 5.0;
-  config.seed = 4;
   return config;
 }
 
-/// A drive whose poses can be replaced.
-class Street {
+class Street : public WrittenDrive {
  public:
-  explicit Street(const simulation::Config& config = bends()) {
-    simulation::Simulator simulator(config);
-    fs::create_directories(folder_ / "velodyne");
-    for (std::size_t i = 0; i < simulator.size(); ++i) {
-      const simulation::SimulatedScan scan = simulator.scan(i);
-      write_scan(folder_ / ("velodyne/" + std::to_string(i) + ".bin"), scan.xyzi);
-      poses_.push_back(scan.T_world_sensor);
-    }
-  }
-
-  fs::path path() const { return folder_.path(); }
-  const Poses& poses() const { return poses_; }
+  explicit Street(const simulation::Config& config = bends()) : WrittenDrive(config) {}
 
   Diagnosis diagnose(const std::function<Eigen::Isometry3d(Eigen::Isometry3d)>& spoil) const {
-    Poses rows;
-    for (const Pose& pose : poses_) rows.push_back(spoil(pose));
-    write_poses(folder_ / "poses.txt", rows);
-    return dynains::diagnose(Recording(folder_.path()));
+    return dynains::diagnose(
+        with_poses([&](std::size_t, const Pose& T) { return Pose(spoil(T)); }));
   }
-
- private:
-  TemporaryFolder folder_;
-  Poses poses_;
 };
 
 Eigen::Isometry3d scaled(Eigen::Isometry3d pose, double factor) {
@@ -124,9 +98,9 @@ TEST_CASE("check names the mistake in the poses and the option against it") {
         }) == "--invert-poses --pose-frame camera --pose-units mm");
 
   std::string rows;
-  for (std::size_t i = 0; i < street.poses().size(); ++i) {
-    const Eigen::Quaterniond q(street.poses()[i].linear());
-    const Eigen::Vector3d t = street.poses()[i].translation();
+  for (std::size_t i = 0; i < street.size(); ++i) {
+    const Eigen::Quaterniond q(street.pose(i).linear());
+    const Eigen::Vector3d t = street.pose(i).translation();
     for (const double value :
          {0.2 * static_cast<double>(i), t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z()}) {
       rows += std::to_string(value) + ' ';
@@ -151,7 +125,6 @@ TEST_CASE("check names poses that belong to the scan before or behind, if the dr
   simulation::Config config = bends();
   config.scene = simulation::Scene::kUrban;
   const Street street(config);
-  write_poses(street.path() / "poses.txt", street.poses());
   const auto diagnosis_of = [&](int shift) {
     RecordingOptions options;
     options.convention.shift = shift;
@@ -197,7 +170,6 @@ TEST_CASE("check estimates the place of the lidar in the body whose poses are gi
 
 TEST_CASE("check names a robot description beside the recording") {
   const Street street(dense());
-  write_poses(street.path() / "poses.txt", street.poses());
   const std::string file = street.path() / "robot.urdf";
   write_text(file, "<robot/>");
   const std::string seq = street.path();
@@ -212,11 +184,11 @@ TEST_CASE("check estimates the offset of the clocks") {
   const Street street(dense());
   std::string scan_times;
   std::string rows;
-  for (std::size_t i = 0; i < street.poses().size(); ++i) {
+  for (std::size_t i = 0; i < street.size(); ++i) {
     const double time = 0.2 * static_cast<double>(i);
     scan_times += std::to_string(time) + '\n';
-    const Eigen::Vector3d t = street.poses()[i].translation();
-    const Eigen::Quaterniond q(street.poses()[i].linear());
+    const Eigen::Vector3d t = street.pose(i).translation();
+    const Eigen::Quaterniond q(street.pose(i).linear());
     for (const double value : {time + 0.15, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()}) {
       rows += std::to_string(value) + ' ';
     }
@@ -262,7 +234,7 @@ TEST_CASE("check sees that an odometry has not converged in the first scans") {
   // Each of the first four motions is too short by 25 cm.
   int i = 0;
   const Diagnosis early = street.diagnose([&](Eigen::Isometry3d T) {
-    T.translation() -= 0.25 * std::min(4, i++) * street.poses()[0].linear().col(0);
+    T.translation() -= 0.25 * std::min(4, i++) * street.pose(0).linear().col(0);
     return T;
   });
   CHECK(early.verdict == PoseVerdict::kInexact);
@@ -275,18 +247,15 @@ TEST_CASE("check sees that an odometry has not converged in the first scans") {
   // Errors of the same size in the middle of the drive do not set is_inexact_at_start.
   int k = 0;
   const Diagnosis late = street.diagnose([&](Eigen::Isometry3d T) {
-    T.translation() -= 0.25 * std::clamp(k++ - 10, 0, 4) * street.poses()[0].linear().col(0);
+    T.translation() -= 0.25 * std::clamp(k++ - 10, 0, 4) * street.pose(0).linear().col(0);
     return T;
   });
   CHECK_FALSE(late.is_inexact_at_start);
 }
 
 TEST_CASE("On a motorway, plants and posts tell the way that walls and rails leave open") {
-  simulation::Config config;
-  config.scene = simulation::Scene::kHighway;
-  config.sensor = simulation::Sensor::kHdl32;
-  config.scans = 24;
-  config.seed = GENERATE(31U, 32U);
+  const simulation::Config config =
+      drive_of(simulation::Scene::kHighway, simulation::Sensor::kHdl32, 24, GENERATE(31U, 32U));
   const Street road(config);
   INFO("seed " << config.seed);
   check_way_is_told(road);
@@ -300,21 +269,15 @@ TEST_CASE("On a motorway, plants and posts tell the way that walls and rails lea
 }
 
 TEST_CASE("A narrow view along a motorway tells the way, too") {
-  simulation::Config config;
-  config.scene = simulation::Scene::kHighway;
-  config.sensor = simulation::Sensor::kLivox;
-  config.scans = 40;
-  config.seed = 910;
+  const simulation::Config config =
+      drive_of(simulation::Scene::kHighway, simulation::Sensor::kLivox, 40, 910);
   const Street road(config);
   check_way_is_told(road);
 }
 
 TEST_CASE("few beams ahead on a fast empty road give no warning about the poses") {
-  simulation::Config config;
-  config.scene = simulation::Scene::kHighway;
-  config.sensor = simulation::Sensor::kLivox;
-  config.scans = 24;
-  config.seed = GENERATE(61U, 62U, 63U);
+  const simulation::Config config = drive_of(
+      simulation::Scene::kHighway, simulation::Sensor::kLivox, 24, GENERATE(61U, 62U, 63U));
   const Street road(config);
   INFO("seed " << config.seed);
   const Diagnosis sound = road.diagnose([](const Eigen::Isometry3d& T) { return T; });
@@ -417,18 +380,16 @@ TEST_CASE("check tells if there are more poses than scans") {
 
 TEST_CASE("check verifies the size of every scan file") {
   const Street street;
-  write_poses(street.path() / "poses.txt", street.poses());
-  const fs::path scans = street.path() / "velodyne";
   const std::string seq = street.path();
-  fs::resize_file(scans / "21.bin", fs::file_size(scans / "21.bin") - 3);
+  fs::resize_file(street.file_of(21), fs::file_size(street.file_of(21)) - 3);
   const std::string first =
-      "dynains: error: " + (scans / "21.bin").string() + ": truncated at byte " +
-      std::to_string(fs::file_size(scans / "21.bin")) + ": expected a multiple of 16 bytes";
+      "dynains: error: " + (street.file_of(21)).string() + ": truncated at byte " +
+      std::to_string(fs::file_size(street.file_of(21))) + ": expected a multiple of 16 bytes";
   const Outcome one = start({"check", seq});
   CHECK(one.code == 1);
   CHECK_THAT(one.err, StartsWith(first) && !ContainsSubstring("more scan files"));
-  fs::resize_file(scans / "22.bin", 7);
-  fs::resize_file(scans / "23.bin", 17);
+  fs::resize_file(street.file_of(22), 7);
+  fs::resize_file(street.file_of(23), 17);
   const Outcome three = start({"check", seq});
   CHECK(three.code == 1);
   CHECK_THAT(three.err, StartsWith(first) && ContainsSubstring("; 2 more scan files are broken\n"));
@@ -436,9 +397,8 @@ TEST_CASE("check verifies the size of every scan file") {
 
 TEST_CASE("check and run report scans that are too far apart in time to be compared") {
   const Street street;
-  write_poses(street.path() / "poses.txt", street.poses());
   std::string milliseconds;
-  for (std::size_t i = 0; i < street.poses().size(); ++i) {
+  for (std::size_t i = 0; i < street.size(); ++i) {
     milliseconds += std::to_string(200 * i) + '\n';
   }
   write_text(street.path() / "times.txt", milliseconds);
@@ -460,7 +420,6 @@ TEST_CASE("check and run report scans that are too far apart in time to be compa
 TEST_CASE("run takes PCD scans and writes cleaned ones that can be read again") {
   const Street street;
   const TemporaryFolder folder;
-  write_poses(street.path() / "poses.txt", street.poses());
   const Recording source(street.path());
   fs::create_directories(folder / "seq/pcd");
   PointColumns columns;

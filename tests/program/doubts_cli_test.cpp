@@ -2,19 +2,15 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <filesystem>
-#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-#include "dynains/io/kitti.hpp"
-#include "dynains/io/point_file.hpp"
 #include "dynains/simulation/random_world.hpp"
-#include "dynains/simulation/simulator.hpp"
-#include "dynains/simulation/write_sequence.hpp"
-#include "io/files.hpp"
 #include "program/start.hpp"
 #include "support/catch.hpp"
+#include "support/drive_of.hpp"
+#include "support/written_drive.hpp"
 
 using namespace dynains;
 using namespace dynains::test;
@@ -23,44 +19,15 @@ namespace fs = std::filesystem;
 namespace {
 
 simulation::Config street() {
-  simulation::Config config;
-  config.scene = simulation::Scene::kStopAndGo;
-  config.sensor = simulation::Sensor::kVlp16;
-  config.scans = 30;
-  config.seed = 4;
-  return config;
+  return drive_of(simulation::Scene::kStopAndGo, simulation::Sensor::kVlp16, 30, 4);
 }
 
-/// A recording whose poses and scans can be replaced.
-class Drive {
+/// A drive that the program runs over.
+class Drive : public WrittenDrive {
  public:
-  using Spoil = std::function<Pose(std::size_t, const Pose&)>;
+  explicit Drive(const simulation::Config& config = street()) : WrittenDrive(config) {}
 
-  explicit Drive(const simulation::Config& config = street()) {
-    simulation::Simulator simulator(config);
-    fs::create_directories(folder_ / "seq/velodyne");
-    for (std::size_t i = 0; i < simulator.size(); ++i) {
-      scans_.push_back(simulator.scan(i));
-      write_scan(file_of(i), scans_.back().xyzi);
-    }
-    pose([](std::size_t, const Pose& T) { return T; });
-  }
-
-  std::string path() const { return folder_ / "seq"; }
   std::string out() const { return folder_ / "out"; }
-  const simulation::SimulatedScan& scan(std::size_t i) const { return scans_[i]; }
-  std::size_t size() const { return scans_.size(); }
-  fs::path file_of(std::size_t i) const {
-    return folder_ / ("seq/velodyne/" + simulation::scan_name(i) + ".bin");
-  }
-
-  void pose(const Spoil& spoil) const {
-    std::vector<Pose> rows;
-    for (std::size_t i = 0; i < scans_.size(); ++i) {
-      rows.push_back(spoil(i, scans_[i].T_world_sensor));
-    }
-    write_poses(folder_ / "seq/poses.txt", rows);
-  }
 
   Outcome run(std::vector<std::string> flags = {}) const {
     std::vector<std::string> arguments = {"run", path(), "-o", out(), "-q"};
@@ -74,7 +41,6 @@ class Drive {
 
  private:
   TemporaryFolder folder_;
-  std::vector<simulation::SimulatedScan> scans_;
 };
 
 Pose yawed(double degrees) {
@@ -82,6 +48,17 @@ Pose yawed(double degrees) {
   T.linear() =
       Eigen::AngleAxisd(degrees * M_PI / 180.0, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   return T;
+}
+
+/// Writes points in the frame of a world that is moved by `shift`, and its poses.
+void write_world(const Drive& drive, const Eigen::Vector3d& shift) {
+  drive.move_points([&](const simulation::SimulatedScan& scan, const Eigen::Vector3d& p) {
+    return Eigen::Vector3d(scan.T_world_sensor * p + shift);
+  });
+  drive.with_poses([&](std::size_t, Pose T) {
+    T.translation() += shift;
+    return T;
+  });
 }
 
 }  // namespace
@@ -98,7 +75,7 @@ TEST_CASE("run says nothing about a right recording, and its report has no doubt
 
 TEST_CASE("run stops before its first output if the poses are those of a turned body") {
   const Drive drive;
-  drive.pose([](std::size_t, const Pose& T) { return Pose(T * yawed(90.0)); });
+  drive.with_poses([](std::size_t, const Pose& T) { return Pose(T * yawed(90.0)); });
   const Outcome stopped = drive.run();
   CHECK(stopped.code == 2);
   CHECK_THAT(stopped.err,
@@ -116,11 +93,11 @@ TEST_CASE("run stops before its first output if the poses are those of a turned 
 
 TEST_CASE("check and run name the scan at which poses jump, and the size") {
   const Drive drive;
-  const Pose& T_world_c = drive.scan(15).T_world_sensor;
+  const Pose& T_world_c = drive.pose(15);
   Pose sideways = yawed(2.0);
   sideways.translation().y() = 3.0;
   const Pose change = T_world_c * sideways * T_world_c.inverse();
-  drive.pose([&](std::size_t i, const Pose& T) { return i < 15 ? T : Pose(change * T); });
+  drive.with_poses([&](std::size_t i, const Pose& T) { return i < 15 ? T : Pose(change * T); });
   CHECK_THAT(start({"check", drive.path()}).out,
              ContainsSubstring("poses jump 1 time, at scan 000015 by ") &&
                  ContainsSubstring(" m and 2.0 deg"));
@@ -140,26 +117,8 @@ TEST_CASE("check and run name the scan at which poses jump, and the size") {
 TEST_CASE("check and run tell coordinates that float32 put into stripes") {
   const Drive drive;
   const Eigen::Vector3d utm(512345.0, 5412345.0, 100.0);
-  const auto write_world = [&](std::size_t i, bool in_stripes) {
-    const simulation::SimulatedScan& scan = drive.scan(i);
-    std::vector<float> world;
-    const Eigen::Vector3d origin = in_stripes ? utm : Eigen::Vector3d(12.0, 34.0, 1.0);
-    for (std::size_t k = 0; k + 3 < scan.xyzi.size(); k += 4) {
-      const Eigen::Vector3d p =
-          scan.T_world_sensor *
-              Eigen::Vector3f(scan.xyzi[k], scan.xyzi[k + 1], scan.xyzi[k + 2]).cast<double>() +
-          origin;
-      for (const double value : {p.x(), p.y(), p.z()}) world.push_back(static_cast<float>(value));
-      world.push_back(0.0F);
-    }
-    write_scan(drive.file_of(i), world);
-  };
   for (const bool in_stripes : {true, false}) {
-    for (std::size_t i = 0; i < drive.size(); ++i) write_world(i, in_stripes);
-    drive.pose([&](std::size_t, Pose T) {
-      T.translation() += in_stripes ? utm : Eigen::Vector3d(12.0, 34.0, 1.0);
-      return T;
-    });
+    write_world(drive, in_stripes ? utm : Eigen::Vector3d(12.0, 34.0, 1.0));
     const Outcome checked = start({"check", drive.path(), "--frame", "world"});
     CHECK((checked.out.find("lie in stripes of 0.50 m") != std::string::npos) == in_stripes);
     const Outcome outcome = drive.run({"--frame", "world", "--accept-poses"});
@@ -169,27 +128,10 @@ TEST_CASE("check and run tell coordinates that float32 put into stripes") {
 
 TEST_CASE("check and run tell points of the world that are taken for those of the sensor") {
   const Drive drive;
-  const auto write_world = [&](const Eigen::Vector3d& shift) {
-    for (std::size_t i = 0; i < drive.size(); ++i) {
-      std::vector<float> xyzi = drive.scan(i).xyzi;
-      for (std::size_t k = 0; k + 3 < xyzi.size(); k += 4) {
-        const Eigen::Vector3d p =
-            drive.scan(i).T_world_sensor *
-                Eigen::Vector3f(xyzi[k], xyzi[k + 1], xyzi[k + 2]).cast<double>() +
-            shift;
-        for (int axis = 0; axis < 3; ++axis) xyzi[k + axis] = static_cast<float>(p[axis]);
-      }
-      write_scan(drive.file_of(i), xyzi);
-    }
-    drive.pose([&](std::size_t, Pose T) {
-      T.translation() += shift;
-      return T;
-    });
-  };
-  const Eigen::Vector3d first = drive.scan(0).T_world_sensor.translation();
+  const Eigen::Vector3d first = drive.pose(0).translation();
   for (const Eigen::Vector3d& shift :
        {Eigen::Vector3d(-first), Eigen::Vector3d(400.0, -300.0, 5.0)}) {
-    write_world(shift);
+    write_world(drive, shift);
     CHECK_THAT(start({"check", drive.path()}).out, ContainsSubstring("pass --frame world"));
     const Outcome stopped = drive.run();
     CHECK(stopped.code == 2);
@@ -200,16 +142,12 @@ TEST_CASE("check and run tell points of the world that are taken for those of th
 
 TEST_CASE("check and run tell points that lie on a grid") {
   const Drive drive;
-  for (const float step : {0.2F, 0.02F}) {
-    for (std::size_t i = 0; i < drive.size(); ++i) {
-      std::vector<float> xyzi = drive.scan(i).xyzi;
-      for (std::size_t k = 0; k < xyzi.size(); ++k) {
-        // Centres of voxels.
-        if (k % 4 < 3) xyzi[k] = step * (std::floor(xyzi[k] / step) + 0.5F);
-      }
-      write_scan(drive.file_of(i), xyzi);
-    }
-    const bool is_coarse = step > 0.1F;
+  for (const double step : {0.2, 0.02}) {
+    drive.move_points([&](const simulation::SimulatedScan&, const Eigen::Vector3d& p) {
+      const Eigen::Array3d centre_of_voxel = step * ((p.array() / step).floor() + 0.5);
+      return Eigen::Vector3d(centre_of_voxel);
+    });
+    const bool is_coarse = step > 0.1;
     const auto is_told = [](const std::string& text) {
       return text.find("points lie on a grid of 0.20 m") != std::string::npos;
     };
@@ -242,16 +180,10 @@ TEST_CASE("check and run propose the mounting of a sensor that lies on its side"
   const double pitch = 60.0 * M_PI / 180.0;
   Pose T_level_sensor = Pose::Identity();
   T_level_sensor.linear() = Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()).toRotationMatrix();
-  for (std::size_t i = 0; i < drive.size(); ++i) {
-    std::vector<float> xyzi = drive.scan(i).xyzi;
-    for (std::size_t k = 0; k + 3 < xyzi.size(); k += 4) {
-      const Eigen::Vector3d p = T_level_sensor.linear().transpose() *
-                                Eigen::Vector3f(xyzi[k], xyzi[k + 1], xyzi[k + 2]).cast<double>();
-      for (int axis = 0; axis < 3; ++axis) xyzi[k + axis] = static_cast<float>(p[axis]);
-    }
-    write_scan(drive.file_of(i), xyzi);
-  }
-  drive.pose([&](std::size_t, const Pose& T) { return Pose(T * T_level_sensor); });
+  drive.move_points([&](const simulation::SimulatedScan&, const Eigen::Vector3d& p) {
+    return Eigen::Vector3d(T_level_sensor.linear().transpose() * p);
+  });
+  drive.with_poses([&](std::size_t, const Pose& T) { return Pose(T * T_level_sensor); });
   const std::string told = start({"check", drive.path()}).out;
   CAPTURE(told);
   const std::size_t at = told.find("--mounting-pitch ");
@@ -269,7 +201,7 @@ TEST_CASE("check names ways of the poses that are too long, and the factor") {
   config.seed = 41;
   const Drive drive(config);
   for (const double factor : {1.1, 0.9}) {
-    drive.pose([&](std::size_t, const Pose& T) {
+    drive.with_poses([&](std::size_t, const Pose& T) {
       Pose scaled = T;
       scaled.translation() *= factor;
       return scaled;
@@ -298,11 +230,8 @@ TEST_CASE("check proposes to de-skew points whose times explain what the poses d
 }
 
 TEST_CASE("check and run tell poses of other scans behind clouds that were lost") {
-  simulation::Config config;
-  config.scene = simulation::Scene::kHill;
-  config.sensor = simulation::Sensor::kOs1_64;
-  config.scans = 60;
-  config.seed = 7;
+  const simulation::Config config =
+      drive_of(simulation::Scene::kHill, simulation::Sensor::kOs1_64, 60, 7);
   const Drive drive(config);
   constexpr std::size_t kLost = 3, kFirst = 20;
   for (std::size_t i = kFirst; i + kLost < drive.size(); ++i) {
@@ -311,11 +240,9 @@ TEST_CASE("check and run tell poses of other scans behind clouds that were lost"
   for (std::size_t i = drive.size() - kLost; i < drive.size(); ++i) fs::remove(drive.file_of(i));
   // The rows of the poses are as many as the scans, or more.
   for (const bool has_equal_rows : {true, false}) {
-    std::vector<Pose> rows;
-    for (std::size_t i = 0; i + (has_equal_rows ? kLost : 0) < drive.size(); ++i) {
-      rows.push_back(drive.scan(i).T_world_sensor);
-    }
-    write_poses(drive.path() + "/poses.txt", rows);
+    std::vector<Pose> rows = drive.poses();
+    if (has_equal_rows) rows.resize(rows.size() - kLost);
+    write_poses(drive.path() / "poses.txt", rows);
     const Outcome outcome = start({"check", drive.path()});
     CHECK(outcome.code == 1);
     CHECK_THAT(outcome.out, ContainsSubstring("Clouds seem to be missing between the scans") &&
@@ -328,11 +255,8 @@ TEST_CASE("check and run tell poses of other scans behind clouds that were lost"
 }
 
 TEST_CASE("check and run find clouds that were lost at constant speed, if poses are left over") {
-  simulation::Config config;
-  config.scene = simulation::Scene::kUrban;
-  config.sensor = simulation::Sensor::kOs1_64;
-  config.scans = 40;
-  config.seed = 11;
+  simulation::Config config =
+      drive_of(simulation::Scene::kUrban, simulation::Sensor::kOs1_64, 40, 11);
   config.ego_speed = 12;
   const Drive drive(config);
   constexpr std::size_t kLost = 2, kFirst = 17;
@@ -363,35 +287,14 @@ TEST_CASE("check and run tell times of points that run backwards") {
   const Drive drive(config);
   const TemporaryFolder folder;
   const fs::path seq = folder / "seq";
-  const auto write = [&](const std::function<double(double)>& time) {
-    fs::create_directories(seq / "pcd");
-    for (std::size_t i = 0; i < drive.size(); ++i) {
-      const simulation::SimulatedScan& scan = drive.scan(i);
-      PointColumns columns;
-      columns.time = true;
-      PointFileWriter file(seq / "pcd" / (simulation::scan_name(i) + ".pcd"), columns);
-      for (std::size_t k = 0; k < scan.times.size(); ++k) {
-        FilePoint point;
-        point.position = Eigen::Map<const Eigen::Vector3f>(&scan.xyzi[4 * k]).cast<double>();
-        point.time = time(static_cast<double>(scan.times[k]));
-        file.add(point);
-      }
-      file.commit();
-    }
-    std::vector<double> times;
-    for (std::size_t i = 0; i < drive.size(); ++i) times.push_back(drive.scan(i).time);
-    write_times(seq / "times.txt", times);
-    fs::copy_file(drive.path() + "/poses.txt", seq / "poses.txt",
-                  fs::copy_options::overwrite_existing);
-  };
   const auto run = [&] {
     return start({"run", seq, "-o", folder / "out", "-q", "--force", "--deskew"});
   };
-  write([](double time) { return time; });
+  drive.write_with_times(seq);
   CHECK(start({"check", seq, "--deskew"}).code == 0);
   CHECK(run().code == 0);
   const double period = drive.scan(1).time;
-  write([&](double time) { return period - time; });
+  drive.write_with_times(seq, [&](double time) { return period - time; });
   const Outcome backwards = start({"check", seq, "--deskew"});
   CHECK(backwards.code == 1);
   CHECK_THAT(backwards.out, ContainsSubstring("agree better if they run backwards in each scan"));
