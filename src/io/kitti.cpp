@@ -1,12 +1,9 @@
 #include "dynains/io/kitti.hpp"
 
-#include <fstream>
 #include <system_error>
 
 #include "dynains/io/atomic_file.hpp"
 #include "failure.hpp"
-#include "input_file.hpp"
-#include "kitti_files.hpp"
 #include "sequential_file.hpp"
 #include "text.hpp"
 
@@ -44,49 +41,6 @@ void write_all(const fs::path& path, Span<const T> values) {
 
 }  // namespace
 
-KittiSequence::KittiSequence(const fs::path& folder) : folder_(folder) {
-  if (!is_folder(folder)) fail(folder, "is not a folder");
-  const std::vector<NumberedScan> scans = list_kitti_scans(folder / "velodyne");
-
-  const fs::path poses_path = folder / "poses.txt";
-  if (!is_there(poses_path)) {
-    fail(poses_path, "not found: expected a row of 12 numbers for each scan");
-  }
-  const std::vector<Pose> poses = read_kitti_poses(poses_path);
-  const std::uint64_t last = scans.back().number;
-  const bool by_order = last >= poses.size() && poses.size() == scans.size();
-  const std::size_t needed = by_order ? scans.size() : static_cast<std::size_t>(last) + 1;
-  check_rows(poses_path, poses.size(), needed);
-
-  const fs::path times_path = folder / "times.txt";
-  std::vector<double> times;
-  const bool has_times = is_there(times_path);
-  if (has_times) {
-    times = read_kitti_times(times_path);
-    check_rows(times_path, times.size(), needed);
-  }
-
-  const fs::path calib_path = folder / "calib.txt";
-  const Pose Tr = is_there(calib_path) ? read_kitti_calib(calib_path) : Pose::Identity();
-
-  scans_.resize(scans.size());
-  for (std::size_t i = 0; i < scans.size(); ++i) {
-    const std::size_t row = by_order ? i : static_cast<std::size_t>(scans[i].number);
-    scans_[i].name = scans[i].name;
-    scans_[i].T_world_sensor = Tr.inverse() * poses[row] * Tr;
-    scans_[i].time = has_times ? times[row] : kKittiPeriod * static_cast<double>(row);
-  }
-  has_labels_ = is_folder(folder / "labels");
-}
-
-fs::path KittiSequence::scan_path(std::size_t i) const {
-  return folder_ / "velodyne" / (name(i) + ".bin");
-}
-
-std::size_t KittiSequence::point_count(std::size_t i) const {
-  return count_scan_points(scan_path(i));
-}
-
 std::size_t count_scan_points(const fs::path& file) {
   const std::uintmax_t size = size_of(file);
   if (size % kBytesPerPoint != 0) {
@@ -94,16 +48,6 @@ std::size_t count_scan_points(const fs::path& file) {
                    std::to_string(kBytesPerPoint) + " bytes (float32 x y z intensity)");
   }
   return static_cast<std::size_t>(size / kBytesPerPoint);
-}
-
-std::vector<float> KittiSequence::read_scan(std::size_t i) const {
-  std::vector<float> xyzi;
-  read_scan(i, xyzi);
-  return xyzi;
-}
-
-void KittiSequence::read_scan(std::size_t i, std::vector<float>& xyzi) const {
-  dynains::read_scan(scan_path(i), xyzi);
 }
 
 void read_scan(const fs::path& file, std::vector<float>& xyzi) {
@@ -114,10 +58,6 @@ void read_scan(const fs::path& file, std::vector<float>& xyzi) {
   }
   xyzi.resize(count);
   read_all(file, xyzi);
-}
-
-std::vector<std::uint32_t> KittiSequence::read_labels(std::size_t i) const {
-  return dynains::read_labels(folder_ / "labels" / (name(i) + ".label"), point_count(i));
 }
 
 void check_labels(const fs::path& file, std::size_t count) {

@@ -89,14 +89,6 @@ std::optional<Pose> nearest_rigid(const double* rows) {
   return pose;
 }
 
-std::vector<Pose> read_kitti_poses(const fs::path& path) {
-  std::vector<Pose> poses;
-  for_each_row(path, [&](std::string_view line, std::size_t number) {
-    poses.push_back(parse_pose(line, path, number));
-  });
-  return poses;
-}
-
 std::vector<double> read_kitti_times(const fs::path& path) {
   std::vector<double> times;
   for_each_row(path, [&](std::string_view line, std::size_t number) {

@@ -23,7 +23,6 @@ struct NumberedScan {
 /// Scans NNNNNN.bin of a folder in the order of their numbers, at least one.
 std::vector<NumberedScan> list_kitti_scans(const std::filesystem::path& folder);
 
-std::vector<Pose> read_kitti_poses(const std::filesystem::path& path);
 /// Strictly increasing.
 std::vector<double> read_kitti_times(const std::filesystem::path& path);
 /// `Tr`, from the sensor to the frame of the poses.

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "dynains/compiled_remover.hpp"
-#include "dynains/io/kitti.hpp"
+#include "dynains/io/recording.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
@@ -244,9 +244,9 @@ TEST_CASE("Height and tilt of every sensor in every simulated scene") {
 void check_mounting(const std::string& name, double height, double tilt) {
   const auto folder = dynains::test::recording_or_skip(name);
   if (!folder) return;
-  const dynains::KittiSequence sequence(*folder);
-  for (const std::size_t i : {std::size_t{0}, sequence.size() / 2, sequence.size() - 1}) {
-    const Mounting mounting = estimate_mounting(points_of(sequence.read_scan(i)));
+  const dynains::Recording recording(*folder);
+  for (const std::size_t i : {std::size_t{0}, recording.size() / 2, recording.size() - 1}) {
+    const Mounting mounting = estimate_mounting(points_of(recording.read_scan(i).xyzi));
     CAPTURE(i);
     REQUIRE(mounting.known);
     CHECK(std::abs(mounting.height - height) < 0.1);

