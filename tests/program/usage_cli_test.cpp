@@ -67,11 +67,12 @@ TEST_CASE("An unknown command or option gives the nearest one") {
     std::string expected;
   };
   const std::string all =
-      "xpected one of run, remap, clean, map, fleet, check, odometry, config, simulate, eval, "
-      "experiment, view, man, completion (";
+      "xpected one of run, remap, clean, map, fleet, check, odometry, config, simulate, "
+      "statistics, eval, experiment, view, man, completion (";
   const std::vector<Case> cases = {
       {{"runn", "seq", "--out", "out"}, "\"runn\" is no command; did you mean run? E" + all},
       {{"sim", "out"}, "\"sim\" is no command; did you mean simulate? E" + all},
+      {{"statistic"}, "did you mean statistics?"},
       {{"chekc", "seq"}, "did you mean check?"},
       {{"remove", "seq"}, "\"remove\" is no command; e" + all},
       {{""}, "\"\" is no command; e" + all},
