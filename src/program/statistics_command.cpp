@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "command.hpp"
-#include "dynains/io/kitti.hpp"
+#include "dynains/io/recording.hpp"
 #include "dynains/simulation/statistics.hpp"
 
 namespace dynains::program {
@@ -16,14 +16,14 @@ namespace {
 using simulation::ScanStatistics;
 
 ScanStatistics statistics_of(const std::string& folder, std::size_t step) {
-  const KittiSequence sequence(folder);
+  const Recording recording(folder);
   ScanStatistics statistics;
-  std::vector<float> xyzi;
-  for (std::size_t i = 0; i < sequence.size(); i += step) {
-    sequence.read_scan(i, xyzi);
+  RecordedScan scan;
+  for (std::size_t i = 0; i < recording.size(); i += step) {
+    recording.read_scan(i, scan);
     std::vector<std::uint32_t> labels;
-    if (sequence.has_labels()) labels = sequence.read_labels(i);
-    statistics.add(xyzi, labels);
+    if (recording.has_labels()) labels = recording.read_labels(i);
+    statistics.add(scan.xyzi, labels);
   }
   return statistics;
 }
@@ -60,7 +60,7 @@ void add_statistics_command(CLI::App& app) {
       "statistics", "Numbers by which simulated and real scans can be compared");
   auto folders = std::make_shared<std::vector<std::string>>();
   auto step = std::make_shared<std::size_t>(1);
-  command.add_option("SEQ", *folders, "sequences in KITTI layout")->required()->type_name("");
+  command.add_option("SEQ", *folders, "recordings")->required()->type_name("");
   command.add_option("--step", *step, "look at every n-th scan only [1]")
       ->check(CLI::Range(std::size_t{1}, std::size_t{1000000}))
       ->type_name("INT");

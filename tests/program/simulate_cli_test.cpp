@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "dynains/io/folder_lock.hpp"
-#include "dynains/io/kitti.hpp"
+#include "dynains/io/recording.hpp"
 #include "io/files.hpp"
 #include "program/start.hpp"
 #include "support/catch.hpp"
@@ -29,9 +29,9 @@ TEST_CASE("simulate makes a sequence for run and eval, with equal bytes for equa
   const std::string b = folder / "b";
   REQUIRE(simulate(a, {"--scans", "6", "--seed", "3"}).code == 0);
   REQUIRE(simulate(b, {"--scans", "6", "--seed", "3", "--quiet"}).out.empty());
-  const KittiSequence sequence(a);
-  CHECK(sequence.size() == 6);
-  CHECK(sequence.read_labels(5).size() * 4 == sequence.read_scan(5).size());
+  const Recording recording(a);
+  CHECK(recording.size() == 6);
+  CHECK(recording.read_labels(5).size() * 4 == recording.read_scan(5).xyzi.size());
   for (const char* file : {"/velodyne/000005.bin", "/labels/000005.label", "/poses.txt",
                            "/times.txt", "/simulation.json"}) {
     CHECK(read_text(a + file) == read_text(b + file));
@@ -91,9 +91,9 @@ TEST_CASE("simulate replaces only its own results, and only by --force") {
   const std::string out = folder / "sim";
   REQUIRE(simulate(out, {"--scans", "3"}).code == 0);
   CHECK(simulate(out, {"--scans", "2"}).code == 1);
-  CHECK(KittiSequence(out).size() == 3);
+  CHECK(Recording(out).size() == 3);
   REQUIRE(simulate(out, {"--scans", "2", "--force"}).code == 0);
-  CHECK(KittiSequence(out).size() == 2);
+  CHECK(Recording(out).size() == 2);
 
   CHECK_FALSE(fs::exists(out + "/.dynains_staging"));
 
@@ -104,13 +104,13 @@ TEST_CASE("simulate replaces only its own results, and only by --force") {
     const Outcome refused = simulate(out, {"--scans", "1", "--force"});
     CHECK(refused.code == 1);
     CHECK_THAT(refused.err, ContainsSubstring("simulation.json: was not written by dynains sim"));
-    CHECK(KittiSequence(out).size() == 2);
+    CHECK(Recording(out).size() == 2);
   }
   fs::remove(out + "/simulation.json");
   const Outcome refused = simulate(out, {"--scans", "1", "--force"});
   CHECK(refused.code == 1);
   CHECK_THAT(refused.err, ContainsSubstring("no simulation.json"));
-  CHECK(KittiSequence(out).size() == 2);
+  CHECK(Recording(out).size() == 2);
 }
 
 TEST_CASE("Until a simulation by --force is complete, the earlier one stays as it is") {
@@ -126,13 +126,13 @@ TEST_CASE("Until a simulation by --force is complete, the earlier one stays as i
     ::kill(process.id(), signal);
     const Outcome outcome = process.wait();
     CHECK(outcome.code == 128 + signal);
-    CHECK(KittiSequence(out).size() == 3);
+    CHECK(Recording(out).size() == 3);
     CHECK(fs::exists(staging) == (signal == SIGKILL));
   }
   const auto marker = [&] { return nlohmann::json::parse(read_text(out + "/simulation.json")); };
   CHECK(marker()["complete"] == true);
   REQUIRE(simulate(out, {"--scans", "2", "--force"}).code == 0);
-  CHECK(KittiSequence(out).size() == 2);
+  CHECK(Recording(out).size() == 2);
   CHECK(marker()["outputs"]["scans"] == nlohmann::json({"000000", "000001"}));
   CHECK_FALSE(fs::exists(staging));
 }
@@ -159,7 +159,7 @@ TEST_CASE("statistics is a table with one row for each sequence") {
   TemporaryFolder folder;
   const std::string seq = folder / "seq";
   REQUIRE(simulate(seq, {"--scans", "3", "--seed", "5"}).code == 0);
-  const KittiSequence sequence(seq);
+  const Recording recording(seq);
   const auto row_of = [&](const Outcome& outcome) {
     const std::size_t from = outcome.out.find("| " + seq);
     return from == std::string::npos ? std::string() : outcome.out.substr(from);
@@ -168,7 +168,8 @@ TEST_CASE("statistics is a table with one row for each sequence") {
   // The mean over all scans; with --step 2 over the first and the third.
   const auto mean = [&](std::vector<std::size_t> scans) {
     double points = 0;
-    for (const std::size_t i : scans) points += static_cast<double>(sequence.read_labels(i).size());
+    for (const std::size_t i : scans)
+      points += static_cast<double>(recording.read_labels(i).size());
     return std::llround(points / static_cast<double>(scans.size()));
   };
   const Outcome all = start({"statistics", seq, seq});
