@@ -455,7 +455,7 @@ bool confirms_poses(const Recording& recording, std::size_t first, std::size_t l
   // Largest error and noise at points 10 m away, over some scans, m. Registrations of sparse scans
   // are less exact; the mistakes that a run refuses are larger.
   const bool is_dense = scans_to_merge(recording) == 1;
-  const double near = is_dense ? 0.04 : 0.1;
+  const double near = is_dense ? 0.03 : 0.1;
   const double noisy = is_dense ? 0.05 : 0.1;
   if (may_have_lost_clouds(recording)) return false;
   const GivenMotions motions = register_given(recording, first, last, 1);
