@@ -323,7 +323,7 @@ struct PipelineConfig : RemoverConfig {
     });
   }
 
-  /// Throws ConfigError for an invalid section or contradictory sections.
+  /// Throws ConfigError for an invalid section.
   void validate() const {
     visit_sections(*this, [](const char*, const auto& section) { section.validate(); });
   }

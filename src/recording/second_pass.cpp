@@ -136,8 +136,10 @@ bool SecondPass::revise(PointsView points, std::uint32_t number, const Pose& T_w
   const std::uint64_t before = restored_ + removed_;
   const auto is_taken = [&](std::size_t i) {
     const PointLabel label = verdict.labels[i];
-    return label == PointLabel::kStatic || label == PointLabel::kDynamic ||
-           (label == PointLabel::kGround && ground_.rises(world_point(points_, i, T_world_sensor)));
+    if (label == PointLabel::kGround) {
+      return ground_.rises(world_point(points_, i, T_world_sensor));
+    }
+    return RecordingPlaces::is_above_ground(label);
   };
   places_.for_each_place(points_, T_world_sensor, is_taken, [&](std::size_t i, const Place* place) {
     if (verdict.labels[i] == PointLabel::kGround) {

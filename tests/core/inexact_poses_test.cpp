@@ -163,12 +163,8 @@ TEST_CASE("a pose that jumps begins an epoch, or is corrected") {
 
 // An odometry without a motion at first takes the second scan for the place of the first one.
 TEST_CASE("a wrong first motion begins one epoch, not all of them") {
-  simulation::Config config;
-  config.scene = simulation::Scene::kHighway;
-  config.sensor = simulation::Sensor::kHdl64;
-  config.scans = 12;
-  config.seed = 71;
-  std::vector<SimulatedScan> scans = simulate(config);
+  std::vector<SimulatedScan> scans =
+      simulate(drive_of(simulation::Scene::kHighway, simulation::Sensor::kHdl64, 12, 71));
   scans.front().T_world_sensor = scans[1].T_world_sensor;
   CHECK(epochs_of(scans).scans == std::vector<std::size_t>{2});
   // A pose that jumps and comes back begins two.

@@ -28,7 +28,8 @@ class Recorder {
   void measure(int count, int first = 0, float x = 10.1F, PointLabel label = PointLabel::kStatic) {
     measure_from(0.0F, count, first, x, label);
   }
-  /// The same from a sensor at `sensor_x` m; `x`: m from there.
+  /// Measures `count` places in a row along y, from place `first` on, `x` m in front of a sensor at
+  /// x = `sensor_x` m.
   void measure_from(float sensor_x, int count, int first, float x,
                     PointLabel label = PointLabel::kStatic) {
     PointBuffer points;

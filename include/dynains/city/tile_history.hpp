@@ -421,11 +421,10 @@ class TileHistory {
   }
 
   SessionGrid grid_;
-  // Log-odds of update probabilities (Eq. 18), and of the belief from which a block is free (Eq.
-  // 19).
+  // Log-odds of the update probabilities of a free and of a hit block (Eq. 18).
   float free_ = static_cast<float>(log_odds(0.7));
   float hit_ = static_cast<float>(log_odds(0.155));
-  float level_ = static_cast<float>(log_odds(0.95));
+  float level_ = static_cast<float>(log_odds(0.95));  // from which a block is free (Eq. 19)
   std::vector<Session> sessions_;
   detail::CommonBlocks common_;
   std::size_t tested_count_ = 0;

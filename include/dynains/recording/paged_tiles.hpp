@@ -161,9 +161,12 @@ class PagedTiles {
 
   void load(Entry& entry) {
     if (entry.tile) return;
-    if (entry.size > 0) store_->read(entry.offset, entry.size, bytes_);
-    entry.tile.emplace();
-    if (entry.size > 0) entry.tile->unpack(bytes_);
+    Tile tile;
+    if (entry.size > 0) {
+      store_->read(entry.offset, entry.size, bytes_);
+      tile.unpack(bytes_);
+    }
+    entry.tile = std::move(tile);
     entry.is_changed = false;
   }
 

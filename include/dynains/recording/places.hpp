@@ -187,6 +187,11 @@ class RecordingPlaces {
 
   std::size_t size() const { return tiles_.size(); }
 
+  /// Whether points with a verdict are in places.
+  static bool is_above_ground(PointLabel verdict) {
+    return verdict == PointLabel::kStatic || verdict == PointLabel::kDynamic;
+  }
+
   /// First and last scan of the longest row of looks that passed a place; was_passed() must be
   /// true.
   ScanSpan free_scans(const Place& place) const {
@@ -266,9 +271,6 @@ class RecordingPlaces {
     return position;
   }
 
-  static bool is_above_ground(PointLabel verdict) {
-    return verdict == PointLabel::kStatic || verdict == PointLabel::kDynamic;
-  }
   // Horizontal, m.
   static float range_of(PointsView points, std::size_t i) {
     return std::sqrt(points.x[i] * points.x[i] + points.y[i] * points.y[i]);
