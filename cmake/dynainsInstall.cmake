@@ -71,9 +71,10 @@ install(FILES ${PROJECT_BINARY_DIR}/dynainsConfig.cmake
   ${PROJECT_BINARY_DIR}/dynainsConfigVersion.cmake ${dynains_adapters}
   DESTINATION ${dynains_cmake_dir} COMPONENT dynains_core)
 
-# The pkg-config file names the prefix relative to itself, so that the tree can be moved.
+# The pkg-config file names the prefix relative to itself, so that the tree can be moved. It is of
+# headers alone, and therefore of every architecture.
 file(RELATIVE_PATH dynains_pc_to_prefix
-  ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
+  ${CMAKE_INSTALL_FULL_DATADIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
 string(REGEX REPLACE "/$" "" dynains_pc_to_prefix "${dynains_pc_to_prefix}")
 set(dynains_pc_includedir "\${prefix}/${CMAKE_INSTALL_INCLUDEDIR}")
 if(IS_ABSOLUTE "${CMAKE_INSTALL_INCLUDEDIR}")
@@ -81,5 +82,5 @@ if(IS_ABSOLUTE "${CMAKE_INSTALL_INCLUDEDIR}")
 endif()
 configure_file(cmake/dynains.pc.in ${PROJECT_BINARY_DIR}/dynains.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/dynains.pc
-  DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT dynains_core)
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/pkgconfig COMPONENT dynains_core)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT dynains_core)

@@ -4,7 +4,7 @@ if(NOT PKG_CONFIG)
   return()
 endif()
 
-set(ENV{PKG_CONFIG_PATH} ${PREFIX}/${LIB_DIR}/pkgconfig)
+set(ENV{PKG_CONFIG_PATH} ${PREFIX}/${DATA_DIR}/pkgconfig)
 execute_process(COMMAND ${PKG_CONFIG} --exact-version=${VERSION} --print-errors dynains
   RESULT_VARIABLE result)
 execute_process(COMMAND ${PKG_CONFIG} --atleast-version=99 dynains RESULT_VARIABLE too_new)

@@ -22,7 +22,7 @@ set(PACKAGE_FIND_VERSION ${VERSION})
 include(${PREFIX}/${CONFIG_DIR}/dynainsConfigVersion.cmake)
 expect_version("dynainsConfigVersion.cmake" "${PACKAGE_VERSION}")
 
-file(STRINGS ${PREFIX}/${LIB_DIR}/pkgconfig/dynains.pc line REGEX "^Version: ")
+file(STRINGS ${PREFIX}/${DATA_DIR}/pkgconfig/dynains.pc line REGEX "^Version: ")
 string(REPLACE "Version: " "" line "${line}")
 expect_version("dynains.pc" "${line}")
 
