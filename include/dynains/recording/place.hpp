@@ -60,11 +60,11 @@ class Presence {
 /// in time and in the place of the sensor.
 struct FirstVerdicts {
   std::uint16_t epoch = 0;                      ///< the open one
-  std::uint8_t kept = 0, removed = 0;           ///< points in the open epoch
+  std::uint16_t kept = 0, removed = 0;          ///< points in the open epoch
   std::uint8_t removed_first = 0;               ///< epochs that only removed, before all others
   std::uint8_t removed_last = 0;                ///< the same, after all others
   bool any_kept = false, any_removed = false;   ///< whether any epoch kept or removed points
-  bool kept_first = false, kept_last = false;   ///< epochs before and after all that removed kept
+  bool kept_first = false, kept_last = false;   ///< the first, the last epoch kept half or more
   std::uint32_t first_scan = 0, last_scan = 0;  ///< that measured the place
 
   /// Adds a point. Epochs and scans ascend.
@@ -74,15 +74,15 @@ struct FirstVerdicts {
     if (of_epoch != epoch) end_epoch();
     epoch = of_epoch;
     last_scan = scan;
-    std::uint8_t& number = is_removed ? removed : kept;
-    if (number < UINT8_MAX) ++number;
+    std::uint16_t& number = is_removed ? removed : kept;
+    if (number < UINT16_MAX) ++number;
   }
 
   void end_epoch() {
     if (kept + removed == 0) return;
     const bool only_removed = kept == 0;
-    if (removed == 0) kept_first = kept_first || !any_removed;
-    kept_last = removed == 0;
+    kept_last = kept >= removed;
+    if (!any_kept && !any_removed) kept_first = kept_last;
     if (only_removed && !any_kept && removed_first < UINT8_MAX) ++removed_first;
     if (!only_removed) {
       removed_last = 0;
@@ -132,12 +132,12 @@ struct alignas(64) RecordingPlace {
   bool stands_since(std::uint32_t scan) const {
     return is_hit_at_last && first.removed_last == 0 && scan > last_free;
   }
-  /// Whether the first pass removed points of something that stands: it kept them before and after,
-  /// and looks hit the place and never passed it.
+  /// Whether the first pass removed points of something that stands: it kept most of them at first
+  /// and at last, and at least twice as many looks hit the place as passed it in a row.
   bool stands() const {
-    constexpr std::uint8_t kFewestHits = 2;
+    constexpr int kFewestHits = 2;
     return first.any_removed && first.kept_first && first.kept_last && hits >= kFewestHits &&
-           !was_free;
+           hits >= 2 * longest.back();
   }
 };
 
