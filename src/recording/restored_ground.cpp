@@ -6,7 +6,7 @@
 namespace dynains {
 namespace {
 
-constexpr double kMostRise = 0.01;                    // m, of ground
+constexpr double kMostRise = 0.02;                    // m, of ground
 constexpr double kFootBegin = 0.05, kFootEnd = 0.60;  // m above the ground
 constexpr double kRise = 0.10;  // m, more than a pose that is off by 0.1 deg moves ground 50 m away
 constexpr double kColumn = 0.1;  // m

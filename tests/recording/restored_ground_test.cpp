@@ -39,8 +39,8 @@ bool comes_back(float rise, float foot_distance, float foot_rise, Cause cause) {
 TEST_CASE("removed ground comes back unless it rises above the ground of the recording") {
   for (const Cause cause : {Cause::kUnderInstance, Cause::kWithInstance}) {
     CHECK(comes_back(0.0F, 0.35F, 0.3F, cause));
-    CHECK(comes_back(0.008F, 0.35F, 0.3F, cause));
-    CHECK_FALSE(comes_back(0.012F, 0.35F, 0.3F, cause));
+    CHECK(comes_back(0.018F, 0.35F, 0.3F, cause));
+    CHECK_FALSE(comes_back(0.022F, 0.35F, 0.3F, cause));
   }
 }
 
