@@ -10,15 +10,15 @@ using namespace dynains;
 
 namespace {
 
-/// A place whose points the first pass kept (k), removed (r) or both (b) in one epoch each, or
-/// removed two of three (m).
+/// A place of which the first pass kept a point (k), removed one (r) or both (b) in one epoch each,
+/// or kept two and removed one (m).
 RecordingPlace judged(const std::string& epochs) {
   RecordingPlace place;
   std::uint16_t epoch = 1;
   for (const char verdict : epochs) {
     if (verdict != 'r') place.first.add(false, epoch, epoch);
     if (verdict != 'k') place.first.add(true, epoch, epoch);
-    if (verdict == 'm') place.first.add(true, epoch, epoch);
+    if (verdict == 'm') place.first.add(false, epoch, epoch);
     ++epoch;
   }
   place.first.end_epoch();
@@ -34,25 +34,25 @@ bool stands(const std::string& epochs, std::uint8_t hits = 2, std::uint8_t free_
 
 }  // namespace
 
-TEST_CASE("a place stands if most of its points were kept at first and at last") {
-  for (const char* const epochs : {"krk", "kkrbrk", "b", "bk", "kb", "kmk", "brmb"}) {
+TEST_CASE("a place stands if most of its points were kept at first, at last and in all") {
+  for (const char* const epochs : {"krk", "kkrbrkkkk", "m", "mk", "km", "kbk", "mrkk"}) {
     CAPTURE(epochs);
     CHECK(stands(epochs));
   }
-  for (const char* const epochs : {"rk", "kr", "mk", "km", "r", "m", "kkk", "krkr", "rkrk"}) {
+  for (const char* const epochs : {"rkk", "kkr", "bkkk", "kkkb", "r", "b", "kkk", "krbk"}) {
     CAPTURE(epochs);
     CHECK_FALSE(stands(epochs));
   }
 }
 
 TEST_CASE("what most points of an epoch tell does not end at 255 points") {
-  for (const bool removes_more : {false, true}) {
+  for (const int removed : {200, 201}) {
     RecordingPlace place;
     place.hits = 2;
-    for (int i = 0; i < 400; ++i) place.first.add(removes_more, 1, 1);
-    for (int i = 0; i < 300; ++i) place.first.add(!removes_more, 1, 1);
+    for (int i = 0; i < 400; ++i) place.first.add(false, 1, 1);
+    for (int i = 0; i < removed; ++i) place.first.add(true, 1, 1);
     place.first.end_epoch();
-    CHECK(place.stands() == !removes_more);
+    CHECK(place.stands() == (removed == 200));
   }
 }
 
