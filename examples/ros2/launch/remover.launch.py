@@ -17,7 +17,7 @@ ARGUMENTS = {
     "namespace": ("dynains", "namespace of the node and its topics static, dynamic and map"),
     "use_sim_time": ("false", "time of /clock, for logs that are played"),
     "parameters": (PathJoinSubstitution([FindPackageShare("dynains_ros"), "config",
-                                         "remover.yaml"]), "file of parameters"),
+                                         "remover.yaml"]), "file of all other parameters"),
 }
 
 
