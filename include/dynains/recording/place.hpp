@@ -65,7 +65,8 @@ struct FirstVerdicts {
   std::uint8_t removed_last = 0;                ///< the same, after all others
   bool any_kept = false, any_removed = false;   ///< whether any epoch kept or removed points
   bool kept_first = false, kept_last = false;   ///< the first, the last epoch kept most points
-  std::uint32_t all_kept = 0, all_removed = 0;  ///< points in the closed epochs
+  bool all_first = false, all_last = false;     ///< the first, the last epoch kept all points
+  std::uint32_t sum_kept = 0, sum_removed = 0;  ///< points in the closed epochs
   std::uint32_t first_scan = 0, last_scan = 0;  ///< that measured the place
 
   /// Adds a point. Epochs and scans ascend.
@@ -83,9 +84,13 @@ struct FirstVerdicts {
     if (kept + removed == 0) return;
     const bool only_removed = kept == 0;
     kept_last = is_mostly_kept(kept, removed);
-    if (!any_kept && !any_removed) kept_first = kept_last;
-    all_kept += kept;
-    all_removed += removed;
+    all_last = removed == 0;
+    if (!any_kept && !any_removed) {
+      kept_first = kept_last;
+      all_first = all_last;
+    }
+    sum_kept += kept;
+    sum_removed += removed;
     if (only_removed && !any_kept && removed_first < UINT8_MAX) ++removed_first;
     if (!only_removed) {
       removed_last = 0;
@@ -101,8 +106,11 @@ struct FirstVerdicts {
   static bool is_mostly_kept(std::uint32_t kept, std::uint32_t removed) {
     return kept >= 2 * removed;
   }
-  /// Whether most points were kept at first, at last and in all.
-  bool are_kept() const { return kept_first && kept_last && is_mostly_kept(all_kept, all_removed); }
+  /// Whether all points were kept at first and at last, or most there and in all.
+  bool are_kept() const {
+    return kept_first && kept_last &&
+           ((all_first && all_last) || is_mostly_kept(sum_kept, sum_removed));
+  }
   /// Whether the first or the last two epochs removed all points, and others did not.
   bool moved() const { return any_kept && (removed_first >= 2 || removed_last >= 2); }
 };
@@ -141,8 +149,8 @@ struct alignas(64) RecordingPlace {
   bool stands_since(std::uint32_t scan) const {
     return is_hit_at_last && first.removed_last == 0 && scan > last_free;
   }
-  /// Whether the first pass removed points of something that stands: it kept most of them, and at
-  /// least twice as many looks hit the place as passed it in a row.
+  /// Whether the first pass removed points of something that stands: it kept most of them or all
+  /// at both ends, and at least twice as many looks hit the place as passed it in a row.
   bool stands() const {
     constexpr int kFewestHits = 2;
     return first.any_removed && first.are_kept() && hits >= kFewestHits &&
