@@ -6,10 +6,13 @@
 #include <iomanip>
 #include <limits>
 #include <sstream>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
+#include "in_two_threads.hpp"
 #include "io/finite_points.hpp"
 #include "io/text.hpp"
 
@@ -18,97 +21,104 @@ namespace {
 
 constexpr float kNearest = 1.5F;    // m; nearer points belong to the vehicle, or are noise
 constexpr float kFarthest = 50.0F;  // m; farther points hardly depend on the origin
+constexpr detail::PackConstant kToDegrees(static_cast<float>(180.0 / M_PI));
 
-/// Directions of points around a candidate for the origin.
-struct Directions {
-  std::vector<float> azimuth, elevation, range;  // deg, deg, m
-
-  template <bool kWithAzimuth>
-  void measure(PointsView points, const Eigen::Vector3d& origin) {
-    range.resize(points.size() + detail::kMaxPackWidth);
-    elevation.resize(range.size());
-    if (kWithAzimuth) azimuth.resize(range.size());
-    const std::array<detail::PackConstant, 3> o = {
-        detail::PackConstant(static_cast<float>(origin.x())),
-        detail::PackConstant(static_cast<float>(origin.y())),
-        detail::PackConstant(static_cast<float>(origin.z()))};
-    static constexpr detail::PackConstant kToDegrees(static_cast<float>(180.0 / M_PI));
-    detail::for_packs(points.size(), [&](auto at) {
-      const auto x = at.load(points.x.data()) - o[0];
-      const auto y = at.load(points.y.data()) - o[1];
-      const auto z = at.load(points.z.data()) - o[2];
-      const auto planar = sqrt(x * x + y * y);
-      const auto length = sqrt(planar * planar + z * z);
-      if constexpr (kWithAzimuth) {
-        (detail::azimuth_of(y, x, planar) * kToDegrees).store(&azimuth[at.begin]);
-      }
-      (detail::elevation_of(z, planar, length) * kToDegrees).store(&elevation[at.begin]);
-      length.store(&range[at.begin]);
-    });
-  }
-
-  bool is_within(std::size_t i) const { return range[i] > kNearest && range[i] < kFarthest; }
-};
+/// Calls `use(at, x, y, planar, range, elevation)` for packs of points `at`, seen from a candidate
+/// for the origin: m, and deg.
+template <class Use>
+void for_rays(PointsView points, const Eigen::Vector3d& origin, Use&& use) {
+  const std::array<detail::PackConstant, 3> o = {
+      detail::PackConstant(static_cast<float>(origin.x())),
+      detail::PackConstant(static_cast<float>(origin.y())),
+      detail::PackConstant(static_cast<float>(origin.z()))};
+  detail::for_packs(points.size(), [&](auto at) {
+    const auto x = at.load(points.x.data()) - o[0];
+    const auto y = at.load(points.y.data()) - o[1];
+    const auto z = at.load(points.z.data()) - o[2];
+    const auto planar = sqrt(x * x + y * y);
+    const auto range = sqrt(planar * planar + z * z);
+    use(at, x, y, planar, range, detail::elevation_of(z, planar, range) * kToDegrees);
+  });
+}
 
 /// Tells how sharply the elevations of points gather, as those of the beams of a spinning sensor do
 /// around its origin: about 1 for smooth distributions.
 class BeamSharpness {
  public:
-  explicit BeamSharpness(PointBuffer points) : points_(std::move(points)) {}
+  explicit BeamSharpness(PointBuffer points)
+      : points_(std::move(points)), bins_(points_.size() + detail::kMaxPackWidth) {}
 
   double at(const Eigen::Vector3d& origin) {
-    directions_.measure<false>(points_, origin);
-    counts_.fill(0);
+    for_rays(points_, origin, [&](auto at, auto&, auto&, auto&, auto& range, auto elevation) {
+      static constexpr detail::PackConstant kLowest(90.5F), kPerDegree(kBinsPerDegree),
+          kLeast(kNearest), kMost(kFarthest);
+      const auto bin = truncate((elevation + kLowest) * kPerDegree);
+      const auto is_seen = (range > kLeast) & (range < kMost);
+      select(is_seen, bin, std::decay_t<decltype(bin)>(std::int32_t{kUnseen}))
+          .store(&bins_[at.begin]);
+    });
+    std::array<std::array<std::uint32_t, kBins>, 2> halves{};  // neighbours are mostly of one bin
     for (std::size_t i = 0; i < points_.size(); ++i) {
-      if (!directions_.is_within(i)) continue;
-      const auto bin = static_cast<std::size_t>((directions_.elevation[i] + 90.5F) / kBin);
-      ++counts_[std::min(bin, kBins - 1)];
+      ++halves[i % 2][static_cast<std::size_t>(bins_[i])];
     }
-    double squares = 0.0;
-    double smooth_squares = 0.0;  // of each count with the mean of its surroundings
-    double around = 0.0;
-    for (std::size_t i = 0; i < kBins + kReach; ++i) {
-      if (i < kBins) around += counts_[i];
-      if (i >= 2 * kReach + 1) around -= counts_[i - 2 * kReach - 1];
-      if (i < kReach) continue;
-      const double count = counts_[i - kReach];
+    std::uint64_t squares = 0;
+    std::uint64_t smooth_squares = 0;  // of each count with the sum of its surroundings
+    std::uint64_t around = 0;
+    for (std::size_t i = 0; i < kBins; ++i) {
+      counts_[kReach + i] = i == kUnseen ? 0 : halves[0][i] + halves[1][i];
+    }
+    for (std::size_t i = 0; i < 2 * kReach; ++i) around += counts_[i];
+    for (std::size_t i = 0; i < kBins; ++i) {
+      around += counts_[i + 2 * kReach];
+      const std::uint64_t count = counts_[i + kReach];
       squares += count * count;
-      smooth_squares += count * around / static_cast<double>(2 * kReach + 1);
+      smooth_squares += count * around;
+      around -= counts_[i];
     }
-    return smooth_squares > 0.0 ? squares / smooth_squares : 0.0;
+    if (smooth_squares == 0) return 0.0;
+    return static_cast<double>((2 * kReach + 1) * squares) / static_cast<double>(smooth_squares);
   }
 
  private:
-  static constexpr float kBin = 0.1F;  // deg
+  static constexpr float kBinsPerDegree = 10.0F;
   static constexpr std::size_t kBins = 1820;
+  static constexpr std::size_t kUnseen = 0;  // no elevation is so low
   static constexpr std::size_t kReach = 20;  // bins on both sides
 
   PointBuffer points_;
-  Directions directions_;
-  std::array<std::uint32_t, kBins> counts_{};
+  std::vector<std::int32_t> bins_;                               // of points
+  std::array<std::uint32_t, kReach + kBins + kReach> counts_{};  // by bin, zeros at both ends
 };
 
 /// Ratio of points that are clearly farther than another point in their direction. Around the
 /// origin of the rays, only points beside the edges of objects are.
 class HiddenPoints {
  public:
-  explicit HiddenPoints(const std::vector<PointBuffer>& scans) : scans_(scans) {}
+  explicit HiddenPoints(std::vector<PointsView> scans) : scans_(std::move(scans)) {}
 
   double at(const Eigen::Vector3d& origin) {
     std::size_t hidden = 0;
     std::size_t all = 0;
-    for (const PointBuffer& scan : scans_) {
-      directions_.measure<true>(scan, origin);
-      nearest_.assign(kColumns * kRows, std::numeric_limits<float>::max());
-      for (std::size_t i = 0; i < scan.size(); ++i) {
-        if (!directions_.is_within(i)) continue;
-        float& nearest = nearest_[cell(i)];
-        nearest = std::min(nearest, directions_.range[i]);
+    for (const PointsView& scan : scans_) {
+      for (auto* const values : {&azimuth_, &elevation_, &range_}) {
+        values->resize(scan.size() + detail::kMaxPackWidth);
       }
+      for_rays(scan, origin, [&](auto at, auto& x, auto& y, auto& planar, auto& range, auto up) {
+        (detail::azimuth_of(y, x, planar) * kToDegrees).store(&azimuth_[at.begin]);
+        up.store(&elevation_[at.begin]);
+        range.store(&range_[at.begin]);
+      });
+      nearest_.assign(kColumns * kRows, std::numeric_limits<float>::max());
+      seen_.clear();
       for (std::size_t i = 0; i < scan.size(); ++i) {
-        if (!directions_.is_within(i)) continue;
-        ++all;
-        if (directions_.range[i] > 1.25F * nearest_[cell(i)] + 0.5F) ++hidden;
+        if (!(range_[i] > kNearest && range_[i] < kFarthest)) continue;
+        seen_.emplace_back(cell(i), range_[i]);
+        float& nearest = nearest_[seen_.back().first];
+        nearest = std::min(nearest, range_[i]);
+      }
+      all += seen_.size();
+      for (const auto& [at, range] : seen_) {
+        if (range > 1.25F * nearest_[at] + 0.5F) ++hidden;
       }
     }
     return all == 0 ? 0.0 : static_cast<double>(hidden) / static_cast<double>(all);
@@ -120,7 +130,7 @@ class HiddenPoints {
     constexpr double kMostAligned = 0.5;
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();  // of axes, as directions of the double azimuth
     std::size_t all = 0;
-    for (const PointBuffer& scan : scans_) {
+    for (const PointsView& scan : scans_) {
       for (std::size_t i = 0; i < scan.size(); ++i) {
         const double x = scan.x[i], y = scan.y[i], squared = x * x + y * y;
         if (!(squared > 0.0)) continue;
@@ -137,14 +147,15 @@ class HiddenPoints {
   static constexpr std::size_t kRows = 227;
 
   std::size_t cell(std::size_t i) const {
-    const auto column = static_cast<std::size_t>((directions_.azimuth[i] + 180.5F) / kCell);
-    const auto row = static_cast<std::size_t>((directions_.elevation[i] + 90.5F) / kCell);
+    const auto column = static_cast<std::size_t>((azimuth_[i] + 180.5F) / kCell);
+    const auto row = static_cast<std::size_t>((elevation_[i] + 90.5F) / kCell);
     return std::min(column, kColumns - 1) * kRows + std::min(row, kRows - 1);
   }
 
-  const std::vector<PointBuffer>& scans_;
-  Directions directions_;
-  std::vector<float> nearest_;
+  std::vector<PointsView> scans_;
+  std::vector<float> azimuth_, elevation_, range_;   // deg, deg, m
+  std::vector<float> nearest_;                       // m, by cell
+  std::vector<std::pair<std::size_t, float>> seen_;  // cells of points, and their ranges, m
 };
 
 /// About `count` points of all scans.
@@ -172,23 +183,29 @@ const Eigen::Vector3d kHighest(4.0, 1.0, 3.0);
 
 /// The positions of a grid that stand out most among those of their height, best first, at least
 /// 0.6 m apart. Seen from near the ground, all elevations are alike, wherever the rays begin.
-std::vector<Candidate> best_on_grid(BeamSharpness& sharpness) {
+std::vector<Candidate> best_on_grid(const BeamSharpness& sharpness) {
   constexpr double kStep = 0.25;  // m
   constexpr std::size_t kKept = 6;
+  const double height = kHighest.z() - kLowest.z();
+  const auto layers =
+      in_two_threads(static_cast<std::size_t>(height / kStep) + 1, [&](std::size_t layer) {
+        BeamSharpness own = sharpness;
+        std::vector<Candidate> candidates;
+        const double z = kLowest.z() + kStep * static_cast<double>(layer);
+        double sum = 0.0;
+        for (double x = kLowest.x(); x <= kHighest.x(); x += kStep) {
+          for (double y = kLowest.y(); y <= kHighest.y(); y += kStep) {
+            const Eigen::Vector3d position(x, y, z);
+            candidates.push_back({position, own.at(position)});
+            sum += candidates.back().value;
+          }
+        }
+        const double mean = sum / static_cast<double>(candidates.size());
+        for (Candidate& candidate : candidates) candidate.value /= std::max(mean, 1e-9);
+        return candidates;
+      });
   std::vector<Candidate> all;
-  for (double z = kLowest.z(); z <= kHighest.z(); z += kStep) {
-    const std::size_t first = all.size();
-    double sum = 0.0;
-    for (double x = kLowest.x(); x <= kHighest.x(); x += kStep) {
-      for (double y = kLowest.y(); y <= kHighest.y(); y += kStep) {
-        const Eigen::Vector3d position(x, y, z);
-        all.push_back({position, sharpness.at(position)});
-        sum += all.back().value;
-      }
-    }
-    const double mean = sum / static_cast<double>(all.size() - first);
-    for (std::size_t k = first; k < all.size(); ++k) all[k].value /= std::max(mean, 1e-9);
-  }
+  for (const auto& layer : layers) all.insert(all.end(), layer.begin(), layer.end());
   std::stable_sort(all.begin(), all.end(),
                    [](const Candidate& a, const Candidate& b) { return a.value > b.value; });
   std::vector<Candidate> kept;
@@ -253,11 +270,14 @@ BeamFinding origin_of_beams(const std::vector<PointBuffer>& scans, Eigen::Vector
   const Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   const double given = std::max(fine.at(origin), largest_around(fine, origin, 0.1));
   if (given > 1.5 * largest_around(fine, origin, 0.5)) return BeamFinding::kAsGiven;
-  BeamSharpness coarse(sample_of(scans, 4000));
+  const std::vector<Candidate> starts = best_on_grid(BeamSharpness(sample_of(scans, 4000)));
+  const auto tops = in_two_threads(starts.size(), [&](std::size_t i) {
+    BeamSharpness own = fine;
+    return climbed(own, starts[i], {0.1, 0.05, 0.02}, 3,
+                   [](double value, double best) { return value > best; });
+  });
   Candidate found;
-  for (const Candidate& start : best_on_grid(coarse)) {
-    const Candidate top = climbed(fine, start, {0.1, 0.05, 0.02}, 3,
-                                  [](double value, double best) { return value > best; });
+  for (const Candidate& top : tops) {
     if (top.value > found.value) found = top;
   }
   // On open ground, rings are rings seen from any height: then the maximum is not sharp.
@@ -277,13 +297,22 @@ bool are_fewer_hidden(double elsewhere, double as_given) {
   return as_given - elsewhere > kLeast && elsewhere < kFewer * as_given;
 }
 
+/// A horizontal position from which fewer points are hidden.
+Candidate least_hidden(HiddenPoints& hidden) {
+  return climbed(hidden, {}, {1.0, 0.5, 0.25, 0.1}, 2,
+                 [](double value, double best) { return value < 0.99 * best; });
+}
+
 /// By points that are hidden by nearer ones. Seen from above, few are, so that this shows x and y
-/// at most.
-std::optional<RayOrigin> origin_of_shadows(HiddenPoints& hidden, double as_given) {
+/// at most. All scans are looked at if a middle one speaks for another place.
+std::optional<RayOrigin> origin_of_shadows(const std::vector<PointBuffer>& scans,
+                                           HiddenPoints& hidden, double as_given) {
   constexpr double kTooMany = 0.18;  // scans of one sensor had up to 0.14
-  if (hidden.shows_place()) {
-    const Candidate found = climbed(hidden, {}, {1.0, 0.5, 0.25, 0.1}, 2,
-                                    [](double value, double best) { return value < 0.99 * best; });
+  constexpr double kSpeaks = 0.8;    // ratio
+  HiddenPoints of_one({scans[scans.size() / 2]});
+  const double of_one_as_given = of_one.at(Eigen::Vector3d::Zero());
+  if (least_hidden(of_one).value < kSpeaks * of_one_as_given && hidden.shows_place()) {
+    const Candidate found = least_hidden(hidden);
     const bool is_there =
         found.position.norm() > kLeastOffset && are_fewer_hidden(found.value, as_given);
     if (is_there) {
@@ -310,7 +339,7 @@ std::optional<RayOrigin> find_ray_origin(const std::vector<PointBuffer>& scans) 
   RayOrigin result;
   const BeamFinding by_beams = origin_of_beams(scans, result.position);
   if (by_beams == BeamFinding::kAsGiven) return std::nullopt;
-  HiddenPoints hidden(scans);
+  HiddenPoints hidden({scans.begin(), scans.end()});
   result.hidden_as_given = hidden.at(Eigen::Vector3d::Zero());
   if (by_beams != BeamFinding::kNothing) {
     constexpr double kFewer = 0.9;
@@ -321,7 +350,7 @@ std::optional<RayOrigin> find_ray_origin(const std::vector<PointBuffer>& scans) 
                               : are_fewer_hidden(result.hidden, result.hidden_as_given);
     if (is_there) return result;
   }
-  return origin_of_shadows(hidden, result.hidden_as_given);
+  return origin_of_shadows(scans, hidden, result.hidden_as_given);
 }
 
 std::optional<RayOrigin> find_ray_origin(const Recording& recording, std::size_t first,
