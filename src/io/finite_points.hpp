@@ -12,6 +12,7 @@ namespace dynains {
 /// The points with finite coordinates that are not all zero, m, sensor frame.
 inline PointBuffer finite_points(const RecordedScan& scan) {
   PointBuffer points;
+  for (auto* const axis : {&points.x, &points.y, &points.z}) axis->reserve(scan.size());
   for (std::size_t i = 0; i < scan.size(); ++i) {
     const float* p = scan.xyzi.data() + 4 * i;
     const bool finite = std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);

@@ -47,6 +47,12 @@ struct CellMoments {
     sum += relative;
     squares += relative * relative.transpose();
   }
+  /// Adds those of another cell with the same origin.
+  void add(const CellMoments& other) {
+    count += other.count;
+    sum += other.sum;
+    squares += other.squares;
+  }
 };
 
 /// Plane, or upright pole, through the points of a cell.
@@ -91,7 +97,7 @@ class NormalEquations {
   }
   /// Adds a point that is `distance` (m) from its place, with the derivative of this distance.
   void add(const Vector6& jacobian, double distance, double weight) {
-    hessian_.selfadjointView<Eigen::Lower>().rankUpdate(jacobian, weight);
+    for (Eigen::Index i = 0; i < 6; ++i) hessian_.col(i) += (weight * jacobian[i]) * jacobian;
     gradient_ += (weight * distance) * jacobian;
   }
 
@@ -112,7 +118,7 @@ class NormalEquations {
   }
 
  private:
-  Matrix6 hessian_ = Matrix6::Zero();  // lower triangle
+  Matrix6 hessian_ = Matrix6::Zero();  // its lower triangle counts
   Vector6 gradient_ = Vector6::Zero();
   std::size_t count_ = 0;
 };

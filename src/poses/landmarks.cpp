@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "dynains/voxels/voxel_hash_table.hpp"
+#include "io/finite_points.hpp"
 
 namespace dynains {
 namespace {
@@ -13,11 +14,17 @@ namespace {
 constexpr double kCell = 1.0;         // m, edge of a column
 constexpr double kFarthestGap = 1.0;  // m, at most kCell
 
+/// Rounded down, without a call of libm.
+std::int64_t floored(double value) {
+  const auto number = static_cast<std::int64_t>(value);
+  return number - (static_cast<double>(number) > value ? 1 : 0);
+}
+
 /// Number of a cell of a grid around the sensor, in the order of x, y and z.
-std::uint64_t cell_of(const Eigen::Vector3d& p, double edge) {
+std::uint64_t cell_of(const Eigen::Vector3d& p, double per_metre) {
   std::uint64_t key = 0;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    key = key << 16U | static_cast<std::uint64_t>(std::floor(p[axis] / edge) + 4096.0);
+    key = key << 16U | static_cast<std::uint64_t>(floored(p[axis] * per_metre) + 4096);
   }
   return key;
 }
@@ -34,24 +41,28 @@ Landmarks::Landmarks(PointsView points, const Mounting& mounting, double farthes
       columns_(4 * static_cast<std::size_t>(half_) * static_cast<std::size_t>(half_)) {
   constexpr double kNearest = 2.0;     // m; nearer points belong to the own vehicle
   constexpr double kOverGround = 0.5;  // m; ground agrees under every motion along it
-  constexpr double kThinned = 0.25;    // m
+  constexpr double kPerMetre = 4.0;    // voxels
+  struct Kept {                        // the first point of each voxel
+    std::uint64_t cell, voxel;
+    Eigen::Vector3d point;
+  };
   VoxelHashTable<> occupied;
-  std::vector<std::pair<std::uint64_t, Eigen::Vector3d>> kept;  // the first point of each cell
+  std::vector<Kept> kept;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d p(points.x[i], points.y[i], points.z[i]);
     const double range = p.norm();
     if (!(range > kNearest && range < farthest)) continue;
     if (mounting.known && mounting.up_sensor.dot(p) + mounting.height < kOverGround) continue;
-    const std::uint64_t cell = cell_of(p, kThinned);
-    const bool is_first = occupied.insert(cell) + 1 > kept.size();
-    if (is_first) kept.emplace_back(cell, p);
+    const std::uint64_t voxel = cell_of(p, kPerMetre);
+    const bool is_first = occupied.insert(voxel) + 1 > kept.size();
+    if (is_first) kept.push_back({cell_of(p, 1.0 / kCell), voxel, p});
   }
-  const auto by_cell = [](const auto& a, const auto& b) { return a.first < b.first; };
-  std::sort(kept.begin(), kept.end(), by_cell);
-  for (auto& [cell, p] : kept) cell = cell_of(p, kCell);
-  std::stable_sort(kept.begin(), kept.end(), by_cell);
+  std::sort(kept.begin(), kept.end(), [](const Kept& a, const Kept& b) {
+    return a.cell != b.cell ? a.cell < b.cell : a.voxel < b.voxel;
+  });
   points_.reserve(kept.size());
-  for (const auto& [cell, p] : kept) {
+  for (const Kept& one : kept) {
+    const Eigen::Vector3d& p = one.point;
     Column& column = columns_[index_of(column_of(p.x()), column_of(p.y()))];
     const auto number = static_cast<std::uint32_t>(points_.size());
     if (column.begin == column.end) column.begin = number;
@@ -77,22 +88,21 @@ double Landmarks::distance_to(const Eigen::Vector3d& p) const {
     const Column& column = columns_[index_of(x + dx, y + dy)];
     const auto end = points_.begin() + column.end;
     // The cells of a column ascend along z.
-    const double lowest = std::floor(p.z() / kCell) - 1.0;
-    auto q = std::partition_point(
-        points_.begin() + column.begin, end,
-        [&](const Eigen::Vector3d& at) { return std::floor(at.z() / kCell) < lowest; });
-    for (; q != end && std::floor(q->z() / kCell) <= lowest + 2.0; ++q) {
+    const double lowest = kCell * (static_cast<double>(floored(p.z() / kCell)) - 1.0);
+    auto q = std::partition_point(points_.begin() + column.begin, end,
+                                  [&](const Eigen::Vector3d& at) { return at.z() < lowest; });
+    for (; q != end && q->z() < lowest + 3.0 * kCell; ++q) {
       squared = std::min(squared, (p - *q).squaredNorm());
     }
   }
   return std::sqrt(squared);
 }
 
-Agreement Landmarks::compare(const Landmarks& other, const Pose& T_this_other) const {
-  constexpr std::size_t kQueries = 1200;  // compared points
-  constexpr double kAgreeing = 0.3;       // m
+Agreement Landmarks::compare(const Landmarks& other, const Pose& T_this_other,
+                             std::size_t most) const {
+  constexpr double kAgreeing = 0.3;  // m
   if (points_.empty() || other.points_.empty()) return {};
-  const std::size_t step = std::max<std::size_t>(1, other.points_.size() / kQueries);
+  const std::size_t step = std::max<std::size_t>(1, other.points_.size() / most);
   std::size_t close = 0;
   std::size_t count = 0;
   double sum = 0.0;
@@ -107,7 +117,7 @@ Agreement Landmarks::compare(const Landmarks& other, const Pose& T_this_other) c
 }
 
 int Landmarks::column_of(double coordinate) const {
-  return static_cast<int>(std::floor(coordinate / kCell)) + half_;
+  return static_cast<int>(floored(coordinate / kCell)) + half_;
 }
 
 std::size_t Landmarks::index_of(int column_x, int column_y) const {
@@ -115,10 +125,21 @@ std::size_t Landmarks::index_of(int column_x, int column_y) const {
          2 * static_cast<std::size_t>(half_) * static_cast<std::size_t>(column_x);
 }
 
+Mounting mounting_of(PointsView points) {
+  constexpr std::size_t kMost = 40000;
+  const std::size_t stride = 1 + points.size() / kMost;
+  if (stride == 1) return estimate_mounting(points);
+  PointBuffer sample;
+  for (std::size_t i = 0; i < points.size(); i += stride) {
+    sample.push_back(points.x[i], points.y[i], points.z[i]);
+  }
+  return estimate_mounting(sample);
+}
+
 Landmarks landmarks_of(const Recording& recording, std::size_t i, RecordedScan& scan) {
   recording.read_scan(i, scan);
   const PointBuffer points = finite_points(scan);
-  return Landmarks(points, estimate_mounting(points));
+  return Landmarks(points, mounting_of(points));
 }
 
 }  // namespace dynains

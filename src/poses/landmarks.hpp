@@ -25,8 +25,9 @@ class Landmarks {
   std::size_t size() const { return points_.size(); }
   const std::vector<Eigen::Vector3d>& points() const { return points_; }
   /// Agreement of `other` with this scan under the pose `T_this_other`. It is symmetric except for
-  /// occlusion.
-  Agreement compare(const Landmarks& other, const Pose& T_this_other) const;
+  /// occlusion. `most`: compared points, about.
+  Agreement compare(const Landmarks& other, const Pose& T_this_other,
+                    std::size_t most = 1200) const;
   /// Distance from `p` (m, sensor frame) to the nearest point, m, at most 1.
   double distance_to(const Eigen::Vector3d& p) const;
 
@@ -45,6 +46,9 @@ class Landmarks {
   std::vector<Column> columns_;          // square grid around the sensor, row-major
   std::vector<Eigen::Vector3d> points_;  // by column, ascending along z in each
 };
+
+/// The mounting that a sample of the points of one scan (m, sensor frame) shows.
+Mounting mounting_of(PointsView points);
 
 /// Those of scan i, without the ground under its mounting. `scan`: memory for the scan. Throws
 /// IoError.

@@ -14,6 +14,29 @@ bool adds(VoxelHashTable<>& table, VoxelKey key) {
   return table.insert(key) == count;
 }
 
+struct Cell {
+  VoxelKey key;
+  CellMoments moments;
+};
+
+/// The moments of the cell `key`, a new one if `numbers` does not have it.
+CellMoments& cell_of(VoxelKey key, VoxelHashTable<>& numbers, std::vector<Cell>& cells) {
+  const std::uint32_t number = numbers.insert(key);
+  if (number == cells.size()) cells.push_back({key, {}});
+  return cells[number].moments;
+}
+
+/// Cells of twice the edge.
+std::vector<Cell> joined(const std::vector<Cell>& cells) {
+  VoxelHashTable<> numbers;
+  std::vector<Cell> result;
+  for (const Cell& cell : cells) {
+    const auto half = [&](int axis) { return voxel_index(cell.key, axis) >> 1; };
+    cell_of(voxel_key(half(0), half(1), half(2)), numbers, result).add(cell.moments);
+  }
+  return result;
+}
+
 /// Whether a plane (m, sensor frame) contains the beams that hit it: those of one beam on persons,
 /// in foliage or on a rough wall lie in such a plane, which moves with the sensor.
 bool is_trace_of_beam(const CellSurface& surface) {
@@ -69,13 +92,9 @@ Pose refine(const RegistrationScan& a, const RegistrationScan& b, const Pose& T,
 RegistrationScan::RegistrationScan(PointsView points) {
   constexpr double kThinned = 0.4;  // m
   constexpr double kNearest = 2.0, kFarthest = 60.0;
-  struct Cell {
-    VoxelKey key;
-    CellMoments moments;
-  };
-  std::array<VoxelHashTable<>, kCellLevels> numbers;
-  std::array<std::vector<Cell>, kCellLevels> cells;
-  VoxelHashTable<> taken, thinned;
+  constexpr std::size_t kFinest = kCellLevels - 1;
+  std::vector<Cell> cells;  // of the finest level
+  VoxelHashTable<> numbers, taken, thinned;
   constexpr std::size_t kMost = 40000;  // points
   const std::size_t stride = 1 + points.size() / kMost;
   for (std::size_t i = 0; i < points.size(); i += stride) {
@@ -85,16 +104,12 @@ RegistrationScan::RegistrationScan(PointsView points) {
     if (!(range > kNearest && range < kFarthest)) continue;
     // Dense rings would outweigh others: a cell takes one point for each small voxel.
     if (!adds(taken, cell_key(p, 0.1))) continue;
-    for (std::size_t level = 0; level < kCellLevels; ++level) {
-      const VoxelKey key = cell_key(p, kCellEdges[level]);
-      const std::uint32_t number = numbers[level].insert(key);
-      if (number == cells[level].size()) cells[level].push_back({key, {}});
-      cells[level][number].moments.add(p);
-    }
+    cell_of(cell_key(p, kCellEdges[kFinest]), numbers, cells).add(p);
     if (adds(thinned, cell_key(p, kThinned))) points_.push_back(p);
   }
-  for (std::size_t level = 0; level < kCellLevels; ++level) {
-    for (const Cell& cell : cells[level]) {
+  for (std::size_t level = kCellLevels; level-- > 0;) {
+    if (level < kFinest) cells = joined(cells);
+    for (const Cell& cell : cells) {
       const CellSurface surface = surface_of(cell.moments, kCellEdges[level]);
       if (surface.direction_count == 0 || is_trace_of_beam(surface)) continue;
       index_[level].insert(cell.key);
