@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <iomanip>
+#include <map>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -14,6 +15,7 @@
 #include "agreement_sum.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/median.hpp"
+#include "in_two_threads.hpp"
 #include "io/finite_points.hpp"
 #include "io/text.hpp"
 #include "landmarks.hpp"
@@ -34,33 +36,110 @@ constexpr double kFast = 2.0;       // m from scan to scan; overlap of pairs is 
 struct Pair {
   std::size_t first;
   std::size_t second;
-  Landmarks a;
-  Landmarks b;
+  const Landmarks& a;
+  const Landmarks& b;
 };
 
-/// At most `most` evenly spread pairs (i, i + stride) of the scans `first` to `last`; `load(i)`
-/// gives the landmarks of a scan.
-template <class Load>
-std::vector<Pair> take_pairs(std::size_t first, std::size_t last, std::size_t stride,
-                             std::size_t most, Load&& load) {
-  const std::size_t starts = last - first + 1 - stride;
-  const std::size_t count = std::min(most, starts);
-  std::vector<Pair> pairs;
-  for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t at = first + (count == 1 ? 0 : k * (starts - 1) / (count - 1));
-    Landmarks a = load(at);
-    Landmarks b = load(at + stride);
-    pairs.push_back({at, at + stride, std::move(a), std::move(b)});
+/// Scans that are compared, each of which is read once. They are described, too.
+class ScanSample {
+ public:
+  explicit ScanSample(const Recording& recording) : recording_(recording) {}
+
+  /// At most `most` evenly spread pairs (i, i + stride) of the scans `first` to `last`, which live
+  /// as long as this. Throws IoError.
+  std::vector<Pair> pairs(std::size_t first, std::size_t last, std::size_t stride,
+                          std::size_t most) {
+    const std::size_t starts = last - first + 1 - stride;
+    const std::size_t count = std::min(most, starts);
+    std::vector<std::size_t> scans;
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t at = first + (count == 1 ? 0 : k * (starts - 1) / (count - 1));
+      scans.insert(scans.end(), {at, at + stride});
+    }
+    read(scans);
+    std::vector<Pair> pairs;
+    for (std::size_t k = 0; k < scans.size(); k += 2) {
+      pairs.push_back({scans[k], scans[k + 1], scans_.at(scans[k]).landmarks,
+                       scans_.at(scans[k + 1]).landmarks});
+    }
+    return pairs;
   }
-  return pairs;
-}
+
+  /// Reads those of `scans` that were not read yet.
+  void read(const std::vector<std::size_t>& scans) {
+    std::vector<std::size_t> missing;
+    for (const std::size_t i : scans) {
+      if (scans_.count(i) == 0) missing.push_back(i);
+    }
+    std::sort(missing.begin(), missing.end());
+    missing.erase(std::unique(missing.begin(), missing.end()), missing.end());
+    std::vector<Scan> read =
+        in_two_threads(missing.size(), [&](std::size_t k) { return Scan(recording_, missing[k]); });
+    for (std::size_t k = 0; k < read.size(); ++k) scans_.emplace(missing[k], std::move(read[k]));
+  }
+
+  /// Sets the members of `d` that describe points and mounting.
+  void describe(Diagnosis& d) const {
+    std::size_t all = 0, valid = 0, near = 0;  // points
+    std::vector<double> ranges, heights;
+    Eigen::Vector3d up = Eigen::Vector3d::Zero();
+    for (const auto& [i, scan] : scans_) {
+      all += scan.all;
+      valid += scan.valid;
+      near += scan.near;
+      ranges.insert(ranges.end(), scan.ranges.begin(), scan.ranges.end());
+      if (!scan.mounting.known) continue;
+      heights.push_back(scan.mounting.height);
+      up += scan.mounting.up_sensor;
+    }
+    if (!scans_.empty()) d.points = static_cast<double>(all) / static_cast<double>(scans_.size());
+    if (all > 0) d.invalid_share = static_cast<double>(all - valid) / static_cast<double>(all);
+    if (valid > 0) d.ego_share = static_cast<double>(near) / static_cast<double>(valid);
+    if (!ranges.empty()) {
+      const auto at = ranges.begin() + static_cast<std::ptrdiff_t>(99 * (ranges.size() - 1) / 100);
+      std::nth_element(ranges.begin(), at, ranges.end());
+      d.farthest = *at;
+    }
+    if (2 * heights.size() > scans_.size()) d.mounting = {median(heights), up.normalized(), true};
+  }
+
+ private:
+  struct Scan {
+    std::size_t all = 0;  // points
+    std::size_t valid = 0;
+    std::size_t near = 0;
+    std::vector<double> ranges;  // m, of some points
+    Mounting mounting;
+    Landmarks landmarks;
+
+    Scan(const Recording& recording, std::size_t i) : Scan(recording.read_scan(i)) {}
+
+   private:
+    explicit Scan(const RecordedScan& scan) : Scan(finite_points(scan)) { all = scan.size(); }
+    explicit Scan(const PointBuffer& points)
+        : valid(points.size()), mounting(mounting_of(points)), landmarks(points, mounting) {
+      for (std::size_t k = 0; k < points.size(); ++k) {
+        const float x = points.x[k], y = points.y[k], z = points.z[k];
+        const double range = std::sqrt(x * x + (y * y + z * z));
+        if (range < 2.0) ++near;
+        if (k % 37 == 0) ranges.push_back(range);
+      }
+    }
+  };
+
+  const Recording& recording_;
+  std::map<std::size_t, Scan> scans_;
+};
+
+constexpr std::size_t kAllPoints = 1200;  // compared points of a pair
+constexpr std::size_t kFewPoints = 150;
 
 Agreement agreement_under(const PoseConvention& convention, const Recording& recording,
-                          const std::vector<Pair>& pairs) {
+                          const std::vector<Pair>& pairs, std::size_t points = kAllPoints) {
   AgreementSum sum;
   for (const Pair& pair : pairs) {
     const auto T_a_b = motion_under(recording, convention, pair.first, pair.second);
-    if (T_a_b) sum.add(pair.a.compare(pair.b, *T_a_b));
+    if (T_a_b) sum.add(pair.a.compare(pair.b, *T_a_b, points));
   }
   return sum.mean();
 }
@@ -192,15 +271,21 @@ bool is_best(const Diagnosis& d) {
 /// Computes the agreement of `pairs` under the poses and under common mistakes.
 void compare(const Recording& recording, const std::vector<Pair>& pairs, std::size_t stride,
              Diagnosis& d) {
+  constexpr double kHopeless = 1.2;  // ratio of gaps, of a few points
   d.stride = stride;
   d.standing = standing_agreement(pairs);
   d.as_given = agreement_under(recording.convention(), recording, pairs);
-  d.readings.clear();
   if (recording.frame() == PointFrame::kSensor) {
-    for (const Change& change : usual_mistakes(recording)) {
-      d.readings.push_back({change.meaning, change.option, change.convention,
-                            agreement_under(change.convention, recording, pairs)});
-    }
+    const std::vector<Change> changes = usual_mistakes(recording);
+    d.readings = in_two_threads(changes.size(), [&](std::size_t i) {
+      const Change& change = changes[i];
+      Agreement agreement = agreement_under(change.convention, recording, pairs, kFewPoints);
+      if (agreement.gap < kHopeless * d.as_given.gap ||
+          agreement.gap < kHopeless * d.standing.gap) {
+        agreement = agreement_under(change.convention, recording, pairs);
+      }
+      return PoseReading{change.meaning, change.option, change.convention, agreement};
+    });
     // A reading with fewer changes stays first unless another one is clearly better.
     for (std::size_t i = 1; i < d.readings.size(); ++i) {
       if (is_clearly_better(d.readings[i].agreement, d.readings.front().agreement)) {
@@ -228,17 +313,17 @@ std::optional<ShiftedGaps> shifted_gaps(const Recording& recording, const Pair& 
 
 /// Looks for poses that are shifted by one or two scans: that changes the agreement little, so it
 /// takes more pairs.
-void look_for_shift(const Recording& recording, Diagnosis& d) {
+void look_for_shift(const Recording& recording, ScanSample& sample, Diagnosis& d) {
   constexpr std::size_t kManyPairs = 24;
   const auto margin = static_cast<std::size_t>(kFarthestShift);
   if (recording.size() < kLeastShiftPairs + kStride + 2 * margin) return;
-  RecordedScan scan;
   const std::vector<Pair> pairs =
-      take_pairs(margin, recording.size() - 1 - margin, kStride, kManyPairs,
-                 [&](std::size_t i) { return landmarks_of(recording, i, scan); });
+      sample.pairs(margin, recording.size() - 1 - margin, kStride, kManyPairs);
+  const auto of_pairs = in_two_threads(
+      pairs.size(), [&](std::size_t k) { return shifted_gaps(recording, pairs[k]); });
   std::vector<ShiftedGaps> gaps;
-  for (const Pair& pair : pairs) {
-    if (const auto of_pair = shifted_gaps(recording, pair)) gaps.push_back(*of_pair);
+  for (const auto& of_pair : of_pairs) {
+    if (of_pair) gaps.push_back(*of_pair);
   }
   const int shift = best_shift(gaps);
   if (shift == 0) return;
@@ -265,114 +350,58 @@ void describe_motion(const Recording& recording, Diagnosis& d) {
   if (!steps.empty()) d.longest_step = *std::max_element(steps.begin(), steps.end());
 }
 
-/// Reads scans and counts their points.
-class ScanSample {
- public:
-  explicit ScanSample(const Recording& recording) : recording_(recording) {}
-
-  Landmarks read(std::size_t i) {
-    recording_.read_scan(i, scan_);
-    const PointBuffer points = finite_points(scan_);
-    all_ += scan_.size();
-    valid_ += points.size();
-    ++read_;
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      const double range = std::hypot(points.x[k], points.y[k], points.z[k]);
-      if (range < 2.0) ++near_;
-      if (k % 37 == 0) ranges_.push_back(range);
-    }
-    const Mounting mounting = estimate_mounting(points);
-    if (mounting.known) {
-      heights_.push_back(mounting.height);
-      up_ += mounting.up_sensor;
-    }
-    return Landmarks(points, mounting);
-  }
-
-  /// Sets the members of `d` that describe points and mounting.
-  void describe(Diagnosis& d) {
-    d.points = read_ == 0 ? 0.0 : static_cast<double>(all_) / static_cast<double>(read_);
-    if (all_ > 0) d.invalid_share = static_cast<double>(all_ - valid_) / static_cast<double>(all_);
-    if (valid_ > 0) d.ego_share = static_cast<double>(near_) / static_cast<double>(valid_);
-    if (!ranges_.empty()) {
-      const auto at =
-          ranges_.begin() + static_cast<std::ptrdiff_t>(99 * (ranges_.size() - 1) / 100);
-      std::nth_element(ranges_.begin(), at, ranges_.end());
-      d.farthest = *at;
-    }
-    if (2 * heights_.size() > read_) d.mounting = {median(heights_), up_.normalized(), true};
-  }
-
- private:
-  const Recording& recording_;
-  RecordedScan scan_;
-  std::size_t all_ = 0;  // points
-  std::size_t valid_ = 0;
-  std::size_t near_ = 0;
-  std::size_t read_ = 0;  // scans
-  std::vector<double> ranges_;
-  std::vector<double> heights_;
-  Eigen::Vector3d up_ = Eigen::Vector3d::Zero();
-};
-
 struct SampledPairs {
   std::vector<Pair> pairs;  // (i, i + stride)
   std::size_t stride = 0;
-  std::vector<Pair> neighbours;  // (i, i + 1); empty if stride is 1
 };
 
-/// Increases the stride until the pairs do not agree without motion: scans farther apart show more
-/// of the motion of a slow sensor.
+/// Pairs of neighbours if these do not agree without motion. Else the stride increases until pairs
+/// do not: scans farther apart show more of the motion of a slow sensor.
 SampledPairs sample_pairs(const Recording& recording, ScanSample& sample) {
-  const auto read = [&](std::size_t i) { return sample.read(i); };
+  constexpr double kFastAgreement = 0.35;  // of neighbours
+  const std::size_t scans = recording.size();
+  if (scans < 2) return {};
   SampledPairs result;
-  for (const std::size_t wanted : {std::size_t{1}, kStride, 4 * kStride, 16 * kStride}) {
-    const std::size_t next = std::min(wanted, recording.size() - 1);
-    if (next == 0 || (!result.pairs.empty() && 2 * next > recording.size())) break;
-    result.stride = next;
-    if (!result.pairs.empty() && result.neighbours.empty()) {
-      result.neighbours = std::move(result.pairs);
-    }
-    result.pairs = take_pairs(0, recording.size() - 1, next, kPairs, read);
-    if (standing_agreement(result.pairs).share < (next == 1 ? 0.35 : kLeastAgreement)) break;
+  for (std::size_t stride = kStride; stride <= 16 * kStride && 2 * stride <= scans; stride *= 4) {
+    result = {sample.pairs(0, scans - 1, stride, kPairs), stride};
+    if (standing_agreement(result.pairs).share < kLeastAgreement) break;
   }
-  if (result.pairs.empty() && recording.size() > 0) sample.read(0);
-  return result;
+  if (result.stride > kStride) return result;
+  // With the first scans of the pairs above.
+  const std::size_t last = result.pairs.empty() ? scans - 1 : scans - kStride;
+  SampledPairs neighbours{sample.pairs(0, last, 1, kPairs), 1};
+  const bool is_fast = standing_agreement(neighbours.pairs).share < kFastAgreement;
+  return is_fast || result.pairs.empty() ? neighbours : result;
 }
 
-/// Diagnosis by the agreement of scans.
-Diagnosis diagnose_agreement(const Recording& recording) {
-  Diagnosis d;
-  d.scan_files = recording.scan_file_count();
-  d.pose_rows = recording.pose_count();
-  d.scans = recording.size();
-  describe_motion(recording, d);
-  ScanSample sample(recording);
+/// Judges by the agreement of scans. Returns whether more pairs may show shifted poses.
+bool judge_agreement(const Recording& recording, ScanSample& sample, Diagnosis& d) {
   const SampledPairs sampled = sample_pairs(recording, sample);
+  if (recording.size() == 1) sample.read({0});
   sample.describe(d);
-
   compare(recording, sampled.pairs, sampled.stride, d);
   if (d.verdict == PoseVerdict::kDisagree && sampled.stride > 1 && d.step > kFast) {
     // Fast and with few objects in sight, as on a motorway: such pairs may have only traffic in
     // common, while neighbouring scans overlap.
     Diagnosis near_by = d;
-    compare(recording, sampled.neighbours, 1, near_by);
+    compare(recording, sample.pairs(0, recording.size() - 1, 1, kPairs), 1, near_by);
     if (near_by.verdict == PoseVerdict::kDisagree && is_best(near_by)) {
       near_by.verdict = PoseVerdict::kNoMotion;
     }
-    if (near_by.sound()) return near_by;
+    if (near_by.sound()) {
+      d = std::move(near_by);
+      return false;
+    }
   }
-  if (d.verdict == PoseVerdict::kAgree) look_for_shift(recording, d);
-  return d;
+  return d.verdict == PoseVerdict::kAgree;
 }
 
 /// Agreement of a few pairs (i, i + stride) of the scans `first` to `last`.
 PoseAgreement agreement_at(const Recording& recording, std::size_t first, std::size_t last,
                            std::size_t stride) {
   constexpr std::size_t kFewPairs = 4;
-  RecordedScan scan;
-  const auto load = [&](std::size_t i) { return landmarks_of(recording, i, scan); };
-  const std::vector<Pair> pairs = take_pairs(first, last, stride, kFewPairs, load);
+  ScanSample sample(recording);
+  const std::vector<Pair> pairs = sample.pairs(first, last, stride, kFewPairs);
   AgreementSum as_given;
   for (const Pair& pair : pairs) {
     as_given.add(pair.a.compare(pair.b, recording.T_world_sensor(pair.first).inverse() *
@@ -406,14 +435,23 @@ constexpr const char* kDeskewOption = "--deskew";
 
 /// Diagnosis of the poses, without that of the rays.
 Diagnosis diagnose_poses(const Recording& recording) {
-  Diagnosis d = diagnose_agreement(recording);
+  Diagnosis d;
+  d.scan_files = recording.scan_file_count();
+  d.pose_rows = recording.pose_count();
+  d.scans = recording.size();
+  d.time_offset = recording.time_offset();
+  describe_motion(recording, d);
+  ScanSample sample(recording);
+  const bool may_be_shifted = judge_agreement(recording, sample, d);
   if (d.verdict == PoseVerdict::kUnknown && seems_in_world(recording)) {
     d.verdict = PoseVerdict::kDisagree;
     d.option = kWorldOption;
     return d;
   }
-  compare_with_registration(recording, d);
-  accept_proven_poses(recording, d);
+  if (!accept_proven_poses(recording, d)) {
+    if (may_be_shifted) look_for_shift(recording, sample, d);
+    compare_with_registration(recording, d);
+  }
   if (!d.sound()) return d;
   d.lost_scans = find_lost_clouds(recording);
   if (d.lost_scans) d.verdict = PoseVerdict::kLostScans;

@@ -383,10 +383,28 @@ void judge_exactness(const std::vector<RegisteredMotion>& motions, const ErrorsA
   if (d.verdict == PoseVerdict::kInexact && is_still) d.verdict = PoseVerdict::kDisagree;
 }
 
+/// Whether most motions are certain, and none of them contradicts the poses.
+bool are_all_exact(const GivenMotions& motions, const BodyMotion& given) {
+  constexpr double kNoisy = 0.05;  // m at points 10 m away
+  std::size_t steps = 0, exact = 0;
+  for (const RegisteredMotion& motion : motions.certain) {
+    if (motion.difference.norm() >= kNoisy) continue;
+    if (error_at_points({motion}, given) >= kExact) return false;
+    steps += motion.second == motion.first + 1 ? 1 : 0;
+    ++exact;
+  }
+  return 4 * exact >= 3 * motions.tested && steps >= kFewestPairs;
+}
+
+/// Whether rows of poses or clouds may be missing, so that poses belong to other scans behind.
+bool may_have_lost_rows(const Recording& recording) {
+  const bool is_timed = recording.pose_after(0, 0.0).has_value();
+  return may_have_lost_clouds(recording) || (recording.missing_pose_count() > 0 && !is_timed);
+}
+
 }  // namespace
 
 void compare_with_registration(const Recording& recording, Diagnosis& d) {
-  d.time_offset = recording.time_offset();
   if (d.verdict == PoseVerdict::kOtherwise) {
     d.convention = d.readings.front().convention;
     d.option = d.readings.front().option;
@@ -424,30 +442,30 @@ void compare_with_registration(const Recording& recording, Diagnosis& d) {
   judge_exactness(motions, errors, d);
 }
 
-void accept_proven_poses(const Recording& recording, Diagnosis& d) {
-  constexpr std::size_t kPlaces = 5;
-  const bool is_doubted = d.verdict != PoseVerdict::kAgree && d.verdict != PoseVerdict::kNoMotion &&
-                          d.verdict != PoseVerdict::kUnknown;
-  if (!is_doubted || recording.frame() != PointFrame::kSensor || scans_to_merge(recording) == 1) {
-    return;
-  }
-  const GivenMotions motions = register_given(recording, 0, recording.size() - 1, kPlaces);
-  if (motions.certain.size() < kPlaces || 2 * motions.certain.size() < motions.tested) return;
+bool accept_proven_poses(const Recording& recording, Diagnosis& d) {
+  constexpr std::size_t kNeighbours = 6;
+  constexpr std::size_t kFewest = 5;
+  const bool is_doubted = d.verdict != PoseVerdict::kAgree && d.verdict != PoseVerdict::kNoMotion;
+  const bool is_dense = scans_to_merge(recording) == 1;
+  if (recording.frame() != PointFrame::kSensor || d.verdict == PoseVerdict::kUnknown) return false;
+  if (is_dense && (is_doubted || may_have_lost_rows(recording))) return false;
+  const GivenMotions motions = register_given(recording, 0, recording.size() - 1, kNeighbours);
+  if (motions.certain.size() < kFewest || 2 * motions.certain.size() < motions.tested) return false;
   const BodyMotion given = motion_under(recording, recording.convention());
   const auto identity = Pose::Identity();
   const MotionError all = motion_error(motions.certain, given, identity);
   const MotionError steps = motion_error(motions.certain, given, identity, Motions::kSteps);
-  if (!(all.at_points < std::max(kExact, 2.0 * all.noise))) return;
-  if (is_inexact(steps, usual_error(recording, steps))) return;
-  if (!agrees_best(recording, d.readings, d.mounting)) return;
-  d.verdict = PoseVerdict::kAgree;
+  if (!(all.at_points < std::max(kExact, 2.0 * all.noise))) return false;
+  if (is_inexact(steps, usual_error(recording, steps))) return false;
+  if (is_dense ? !are_all_exact(motions, given) : !agrees_best(recording, d.readings, d.mounting)) {
+    return false;
+  }
+  if (is_doubted) d.verdict = PoseVerdict::kAgree;
   d.convention = recording.convention();
-  d.time_offset = recording.time_offset();
-  d.option.clear();
   d.translation_error = steps.translation;
   d.rotation_error = steps.rotation;
   d.registered_pairs = steps.pairs;
-  d.is_inexact_at_start = false;
+  return true;
 }
 
 bool confirms_poses(const Recording& recording, std::size_t first, std::size_t last) {

@@ -3,13 +3,13 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <memory>
 #include <numeric>
 #include <utility>
 
 #include "cell_surfaces.hpp"
 #include "dynains/median.hpp"
+#include "dynains/threads/background.hpp"
 #include "given_motion.hpp"
 #include "io/finite_points.hpp"
 #include "landmarks.hpp"
@@ -36,27 +36,6 @@ class ChainScan {
   PointBuffer points_;
   RegistrationScan planes_;
   std::optional<Landmarks> landmarks_;
-};
-
-/// Reads scans on demand and keeps those of one chain.
-class ChainScans {
- public:
-  explicit ChainScans(const Recording& recording) : recording_(recording) {}
-
-  ChainScan& get(std::size_t i) {
-    std::unique_ptr<ChainScan>& entry = scans_[i];
-    if (entry == nullptr) {
-      recording_.read_scan(i, scan_);
-      entry = std::make_unique<ChainScan>(finite_points(scan_));
-    }
-    return *entry;
-  }
-  void clear() { scans_.clear(); }
-
- private:
-  const Recording& recording_;
-  RecordedScan scan_;
-  std::map<std::size_t, std::unique_ptr<ChainScan>> scans_;
 };
 
 /// Guesses of the motion to the next scan: as given, none, the given distance in each direction,
@@ -280,42 +259,89 @@ std::vector<std::size_t> starts_of_chains(std::size_t scans) {
   return starts;
 }
 
+/// Motions from one scan to others behind it, ever farther apart.
+class Chain {
+ public:
+  Chain(const Recording& recording, std::size_t number, std::size_t first)
+      : recording_(&recording), number_(number), first_(first) {}
+
+  const std::vector<RegisteredMotion>& motions() const { return motions_; }
+
+  /// Registers the next scan. `elsewhere`: a motion from one scan to the next at another place.
+  void begin(const std::optional<Pose>& elsewhere) {
+    constexpr double kFarthestStep = 6.0;  // m
+    a_ = read(first_);
+    add(1, first_guesses(motion_between(*recording_, first_, first_ + 1), elsewhere),
+        kFarthestStep);
+  }
+
+  /// Registers scans farther away, from the motion found before.
+  void finish() {
+    constexpr std::size_t kLongest = 16;        // scans
+    constexpr std::size_t kLongEnough = 4;      // scans
+    constexpr double kFar = 3.0;                // m
+    constexpr double kFarthestFromGuess = 1.5;  // m
+    constexpr double kTurned = 0.25;            // rad
+    for (std::size_t step = 2; step <= kLongest && !motions_.empty(); step *= 2) {
+      const Pose& T = motions_.back().T_first_second;
+      const bool is_far = T.translation().norm() > kFar && step > kLongEnough;
+      if (is_far || angle_of(T.linear()) > kTurned || first_ + step >= recording_->size()) break;
+      const Pose guess = T * T;
+      if (!add(step, {guess}, kFarthestFromGuess)) break;
+      const Pose& found = motions_.back().T_first_second;
+      if ((found.translation() - guess.translation()).norm() < kFarthestFromGuess) continue;
+      motions_.pop_back();
+      break;
+    }
+    a_.reset();
+  }
+
+ private:
+  std::unique_ptr<ChainScan> read(std::size_t i) const {
+    return std::make_unique<ChainScan>(finite_points(recording_->read_scan(i)));
+  }
+  bool add(std::size_t step, const std::vector<Pose>& guesses, double farthest) {
+    const std::size_t second = first_ + step;
+    const auto found = register_both_ways(
+        *a_, *read(second), motion_between(*recording_, first_, second), guesses, farthest);
+    if (!found) return false;
+    motions_.push_back(
+        {number_, first_, second, found->T_a_b, found->difference, found->deviation});
+    return true;
+  }
+
+  const Recording* recording_;
+  std::size_t number_;
+  std::size_t first_;
+  std::unique_ptr<ChainScan> a_;  // the first scan
+  std::vector<RegisteredMotion> motions_;
+};
+
 }  // namespace
 
 std::vector<RegisteredMotion> register_motions(const Recording& recording) {
-  constexpr std::size_t kLongest = 16;        // scans
-  constexpr std::size_t kLongEnough = 4;      // scans
-  constexpr double kFar = 3.0;                // m
-  constexpr double kFarthestStep = 6.0;       // m
-  constexpr double kFarthestFromGuess = 1.5;  // m
-  constexpr double kTurned = 0.25;            // rad
   std::vector<RegisteredMotion> motions;
   if (recording.size() < 2) return motions;
   const std::vector<std::size_t> starts = starts_of_chains(recording.size());
-  ChainScans scans(recording);
+  std::optional<Chain> before;
   std::optional<Pose> elsewhere;
-  for (std::size_t chain = 0; chain < starts.size(); ++chain) {
-    scans.clear();
-    const std::size_t first = starts[chain];
-    std::vector<Pose> guesses =
-        first_guesses(motion_between(recording, first, first + 1), elsewhere);
-    for (std::size_t step = 1; step <= kLongest && first + step < recording.size(); step *= 2) {
-      const auto found = register_both_ways(scans.get(first), scans.get(first + step),
-                                            motion_between(recording, first, first + step), guesses,
-                                            step == 1 ? kFarthestStep : kFarthestFromGuess);
-      const bool is_steady =
-          found &&
-          (step == 1 || (found->T_a_b.translation() - guesses.front().translation()).norm() <
-                            kFarthestFromGuess);
-      if (!is_steady) break;
-      motions.push_back(
-          {chain, first, first + step, found->T_a_b, found->difference, found->deviation});
-      if (step == 1) elsewhere = found->T_a_b;
-      const bool is_far = found->T_a_b.translation().norm() > kFar && step >= kLongEnough;
-      if (is_far || angle_of(found->T_a_b.linear()) > kTurned) break;
-      guesses = {found->T_a_b * found->T_a_b};
-    }
+  Background other;
+  const auto finish = [&] {
+    if (before) before->finish();
+  };
+  const auto take = [&] {
+    if (before) motions.insert(motions.end(), before->motions().begin(), before->motions().end());
+  };
+  for (std::size_t number = 0; number < starts.size(); ++number) {
+    Chain chain(recording, number, starts[number]);
+    run_both(
+        &other, [&] { chain.begin(elsewhere); }, finish);
+    take();
+    if (!chain.motions().empty()) elsewhere = chain.motions().front().T_first_second;
+    before.emplace(std::move(chain));
   }
+  finish();
+  take();
   return motions;
 }
 

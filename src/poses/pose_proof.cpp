@@ -4,9 +4,11 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <utility>
 
 #include "agreement_sum.hpp"
 #include "given_motion.hpp"
+#include "in_two_threads.hpp"
 #include "io/finite_points.hpp"
 #include "landmarks.hpp"
 #include "merged_scans.hpp"
@@ -72,10 +74,12 @@ std::vector<std::size_t> telling_starts(const Recording& recording, const Starts
   return result;
 }
 
+/// From the first to the last one; the middle one if `count` is 1.
 std::vector<std::size_t> even_starts(const Starts& starts, std::size_t count) {
   std::vector<std::size_t> result;
   for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t i = starts.first + (2 * k + 1) * (starts.last - starts.first) / (2 * count);
+    const std::size_t way = starts.last - starts.first;
+    const std::size_t i = starts.first + (count == 1 ? way / 2 : k * way / (count - 1));
     if (result.empty() || i > result.back()) result.push_back(i);
   }
   return result;
@@ -91,22 +95,20 @@ std::vector<Landmarks> landmarks_of(const Recording& recording,
                                     const std::vector<std::size_t>& scans,
                                     const Mounting& mounting) {
   std::vector<Landmarks> result;
-  RecordedScan scan;
   for (const std::size_t i : scans) {
-    recording.read_scan(i, scan);
-    result.emplace_back(finite_points(scan), mounting);
+    result.emplace_back(finite_points(recording.read_scan(i)), mounting);
   }
   return result;
 }
 
 using PoseOfScan = std::function<std::optional<Pose>(std::size_t)>;
 
-Agreement agreement_at(const Place& place, const PoseOfScan& pose_of) {
-  constexpr std::size_t kComparedPoints = 600;
+/// `most`: compared points, about.
+Agreement agreement_at(const Place& place, const PoseOfScan& pose_of, std::size_t most) {
   constexpr double kMostGap = 0.3;  // m
   std::size_t points = 0;
   for (const Landmarks& b : place.b) points += b.size();
-  const std::size_t stride = 1 + points / kComparedPoints;
+  const std::size_t stride = 1 + points / most;
   Agreement sum{0.0, 0.0, 0};
   for (std::size_t k = 0; k < place.b.size(); ++k) {
     const auto T_world_b = pose_of(place.scans_b[k]);
@@ -132,9 +134,10 @@ Agreement agreement_at(const Place& place, const PoseOfScan& pose_of) {
   return {sum.share / count, sum.gap / count, sum.points};
 }
 
-Agreement agreement_of(const std::vector<Place>& places, const PoseOfScan& pose_of) {
+Agreement agreement_of(const std::vector<Place>& places, const PoseOfScan& pose_of,
+                       std::size_t most = 600) {
   AgreementSum sum;
-  for (const Place& place : places) sum.add(agreement_at(place, pose_of));
+  for (const Place& place : places) sum.add(agreement_at(place, pose_of, most));
   return sum.mean();
 }
 
@@ -164,15 +167,24 @@ GivenMotions register_given(const Recording& recording, std::size_t first, std::
   const std::size_t merged = scans_to_merge(recording);
   const auto starts = starts_between(recording, first, last, merged);
   if (!starts) return motions;
-  const auto add = [&](std::size_t i, std::size_t k) {
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  for (const std::size_t i : telling_starts(recording, *starts)) {
+    pairs.emplace_back(i, i + starts->step);
+  }
+  for (const std::size_t i : even_starts(*starts, neighbours)) {
+    const std::pair pair(i, i + 1);
+    if (std::find(pairs.begin(), pairs.end(), pair) == pairs.end()) pairs.push_back(pair);
+  }
+  motions.tested = pairs.size();
+  const auto registered = in_two_threads(pairs.size(), [&](std::size_t pair) {
+    const auto [i, k] = pairs[pair];
     const PointBuffer a = merged_scans(recording, i, i + 1 - merged, i);
     const PointBuffer b = merged_scans(recording, k, k, k + merged - 1);
-    const auto motion = register_from(a, b, motion_between(recording, i, k), i, k);
+    return register_from(a, b, motion_between(recording, i, k), i, k);
+  });
+  for (const auto& motion : registered) {
     if (motion) motions.certain.push_back(*motion);
-    ++motions.tested;
-  };
-  for (const std::size_t i : telling_starts(recording, *starts)) add(i, i + starts->step);
-  for (const std::size_t i : even_starts(*starts, neighbours)) add(i, i + 1);
+  }
   return motions;
 }
 
@@ -181,14 +193,16 @@ bool agrees_best(const Recording& recording, const std::vector<PoseReading>& rea
   constexpr std::size_t kEvenPlaces = 4;
   constexpr double kDistinct = 0.1;  // m at points 10 m away
   constexpr double kClearly = 0.02;  // share of a gap
+  constexpr double kHopeless = 1.2;  // ratio of gaps, of a few points
+  constexpr std::size_t kFewPoints = 75;
   const std::size_t merged = scans_to_merge(recording);
   if (recording.size() < 2) return false;
   const auto starts = starts_between(recording, 0, recording.size() - 1, merged);
   if (!starts) return false;
   std::vector<std::size_t> begins = telling_starts(recording, *starts);
   for (const std::size_t i : even_starts(*starts, kEvenPlaces)) begins.push_back(i);
-  std::vector<Place> places;
-  for (const std::size_t i : begins) {
+  const auto places = in_two_threads(begins.size(), [&](std::size_t number) {
+    const std::size_t i = begins[number];
     Place place;
     for (std::size_t k = 0; k < merged; ++k) {
       place.scans_a.push_back(i + 1 - merged + k);
@@ -196,17 +210,20 @@ bool agrees_best(const Recording& recording, const std::vector<PoseReading>& rea
     }
     place.a = landmarks_of(recording, place.scans_a, mounting);
     place.b = landmarks_of(recording, place.scans_b, mounting);
-    places.push_back(std::move(place));
-  }
+    return place;
+  });
   const Agreement given = agreement_of(places, poses_under(recording, recording.convention()));
   const Agreement standing =
       agreement_of(places, [](std::size_t) { return std::optional<Pose>(Pose::Identity()); });
   if (given.points < 200 || !fits(given, standing) || given.gap > standing.gap) return false;
-  return std::all_of(readings.begin(), readings.end(), [&](const PoseReading& reading) {
-    if (difference_from_given(places, recording, reading.convention) < kDistinct) return true;
-    const Agreement other = agreement_of(places, poses_under(recording, reading.convention));
-    return other.gap > (1.0 - kClearly) * given.gap;
+  const auto are_worse = in_two_threads(readings.size(), [&](std::size_t i) {
+    const PoseConvention& convention = readings[i].convention;
+    if (difference_from_given(places, recording, convention) < kDistinct) return true;
+    const PoseOfScan pose_of = poses_under(recording, convention);
+    return agreement_of(places, pose_of, kFewPoints).gap > kHopeless * given.gap ||
+           agreement_of(places, pose_of).gap > (1.0 - kClearly) * given.gap;
   });
+  return std::find(are_worse.begin(), are_worse.end(), false) == are_worse.end();
 }
 
 }  // namespace dynains

@@ -260,10 +260,10 @@ void add_run_command(CLI::App& app) {
              "also write verdicts.mcap, a log of ROS 2 with all scans, their labels, instances, "
              "beliefs and causes, the poses and the map");
   command
-      .add_flag(
-          "--one-thread", options->one_thread,
-          "the run works, reads and writes in one thread, for machines on which many runs use "
-          "all cores")
+      .add_flag("--one-thread", options->one_thread,
+                "after the check of poses, the run works, reads and writes in one thread, for "
+                "machines on which many runs use "
+                "all cores")
       ->group(kOutputs);
   command.add_flag("--view", options->view,
                    "also write the page view.html, which shows the results (see `dynains view`), "

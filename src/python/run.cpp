@@ -119,7 +119,8 @@ const std::array<RunSetting, 28> kRunSettings{{
        if (policy != "always" && policy != "last") throw py::cast_error();
        run.settings.static_policy = policy == "last" ? StaticPolicy::kLast : StaticPolicy::kAlways;
      }},
-    {"one_thread", "bool", "the run works, reads and writes in one thread",
+    {"one_thread", "bool",
+     "after the check of poses, the run works, reads and writes in one thread",
      &set_flag<&RunSettings::one_thread>},
     {"write_online", "bool", "also write the verdicts without latency",
      &set_flag<&RunSettings::write_online>},

@@ -1,14 +1,18 @@
 // Right poses of sparse sensors are accepted, and jumps of poses are found, in written recordings.
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <random>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "dynains/poses/diagnosis.hpp"
 #include "dynains/poses/pose_jumps.hpp"
 #include "dynains/simulation/random_world.hpp"
+#include "poses/in_two_threads.hpp"
+#include "poses/pose_diagnosis.hpp"
 #include "poses/scan_registration.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
@@ -167,6 +171,42 @@ TEST_CASE("A few registrations confirm right poses, and never those of a turned 
       39));
   CHECK_FALSE(confirms_poses(
       drive.with_poses([](std::size_t, const Pose& T) { return Pose(T.inverse()); }), 0, 39));
+}
+
+TEST_CASE("Few registrations prove poses whose errors are below 3 cm, and no others") {
+  const Drive drive(drive_of(simulation::Scene::kStopAndGo, simulation::Sensor::kOs1_64, 40, 4));
+  double longest = 0.0;  // m, over five scans
+  for (std::size_t i = 0; i + 5 < drive.size(); ++i) {
+    longest =
+        std::max(longest, (drive.pose(i + 5).translation() - drive.pose(i).translation()).norm());
+  }
+  const auto is_proven = [&](double error) {
+    const Recording recording = drive.with_poses([&](std::size_t, Pose T) {
+      T.translation() *= 1.0 + error / longest;
+      return T;
+    });
+    Diagnosis d;
+    d.verdict = PoseVerdict::kAgree;
+    return accept_proven_poses(recording, d);
+  };
+  INFO(longest << " m");
+  CHECK(is_proven(0.0));
+  CHECK(is_proven(0.02));
+  CHECK_FALSE(is_proven(0.04));
+}
+
+TEST_CASE("Results of two threads keep their order, and the first exception is thrown") {
+  const auto squares = in_two_threads(100, [](std::size_t i) { return i * i; });
+  REQUIRE(squares.size() == 100);
+  for (std::size_t i = 0; i < squares.size(); ++i) CHECK(squares[i] == i * i);
+  const auto fail_from = [](std::size_t first) {
+    in_two_threads(100, [&](std::size_t i) {
+      return i < first ? i : throw std::out_of_range(std::to_string(i));
+    });
+  };
+  CHECK_THROWS_WITH(fail_from(7), "7");
+  CHECK_NOTHROW(fail_from(100));
+  CHECK(in_two_threads(0, [](std::size_t i) { return i; }).empty());
 }
 
 TEST_CASE("Jumps of poses are found with scan and size, and none in right poses") {

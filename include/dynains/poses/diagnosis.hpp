@@ -132,8 +132,8 @@ struct PoseAgreement {
   }
 };
 
-/// Compares a sample of scans. The time, a few seconds, does not depend on the length of the
-/// recording. Throws IoError.
+/// Compares a sample of scans, in two threads. A few registrations prove right poses; others take
+/// more. The time, a second, does not depend on the length of the recording. Throws IoError.
 Diagnosis diagnose(const Recording& recording);
 
 /// Compares a small sample of the scans `first` to `last` (inclusive) under the given poses, for
