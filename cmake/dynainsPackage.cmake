@@ -5,6 +5,7 @@ if(NOT DYNAINS_INSTALL)
 endif()
 
 # Builds all that is installed, and nothing else. cpack then does not build tests and examples.
+# Without them, the target install builds what it installs, as vcpkg expects.
 get_property(dynains_components GLOBAL PROPERTY DYNAINS_COMPONENTS)
 add_custom_target(dynains_installed)
 foreach(part ${dynains_components} program python)
@@ -12,7 +13,9 @@ foreach(part ${dynains_components} program python)
     add_dependencies(dynains_installed dynains_${part})
   endif()
 endforeach()
-set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON)
+if(dynains_has_tests OR dynains_has_examples)
+  set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON)
+endif()
 file(WRITE ${PROJECT_BINARY_DIR}/build_installed.cmake
   "execute_process(COMMAND \"${CMAKE_COMMAND}\" --build \"${PROJECT_BINARY_DIR}\"
     --target dynains_installed RESULT_VARIABLE failed)

@@ -26,6 +26,18 @@ endif()
 expect("no program: not found: CLI11 .Debian: libcli11-dev." "no Python module: not found: "
   "no city and evaluation components: not found: nlohmann_json" "no tests: not found: Catch2")
 
+# vcpkg builds the target install alone. A dry run of make tells what that builds, one of Ninja not.
+set(off "")
+foreach(part PROGRAM PYTHON EXAMPLES TESTS)
+  list(APPEND off -DDYNAINS_BUILD_${part}=OFF)
+endforeach()
+execute_process(
+  COMMAND ${CMAKE_COMMAND} -S ${SOURCE_DIR} -B ${WORK_DIR}/parts/port -G "Unix Makefiles"
+    -DCMAKE_CXX_COMPILER=${COMPILER} -DEigen3_DIR=${EIGEN_DIR} ${off} OUTPUT_QUIET)
+execute_process(COMMAND ${CMAKE_COMMAND} --build ${WORK_DIR}/parts/port --target install -- -n
+  OUTPUT_VARIABLE output ERROR_VARIABLE output)
+expect("libdynains_remover")
+
 execute_process(
   COMMAND ${CMAKE_COMMAND} -S ${SOURCE_DIR} -B ${WORK_DIR}/parts/required ${common} ${without}
     -DDYNAINS_BUILD_PYTHON=ON
