@@ -121,7 +121,6 @@ struct RemoverConfig {
   bool level = true;
   double mounting_pitch = 0.0;  ///< deg, nose down
   double mounting_roll = 0.0;   ///< deg, left side up
-  bool newest_verdict = true;
   int threads = 1;
   bool build_map = true;
 
@@ -196,10 +195,6 @@ struct RemoverConfig {
                       "roll; if pitch and roll are 0, the tilt is found in the first scan"});
     visitor(Parameter{"mounting_roll", self.mounting_roll, closed(-180, 180), "deg",
                       "tilt of the sensor about its x axis, left side up"});
-    visitor(
-        Parameter{"newest_verdict", self.newest_verdict, Bounds(), "",
-                  "give a verdict on the newest scan, without latency; false saves its time, and "
-                  "only scans whose verdict is final have labels"});
     visitor(Parameter{
         "threads", self.threads, closed(1, 2), "threads",
         "2: stages work in two threads at a time, with the same verdicts; a final verdict "

@@ -57,8 +57,8 @@ struct StageTimes {
   double window = 0.0;    ///< Eq. 3
   double cluster = 0.0;   ///< curved voxels
   double evidence = 0.0;  ///< Eq. 4-19 of the window, or the free-space evidence of the newest scan
-  double judge = 0.0;     ///< verdicts by free space, also on ground; images of references
-  double verdict = 0.0;   ///< conversion of verdicts on clusters and groups to points
+  double judge = 0.0;     ///< verdicts by free space on instances; images of references
+  double verdict = 0.0;   ///< verdicts on ground and points; FrameResult::newest is not included
   double map = 0.0;       ///< Eq. 1
 
   template <class Self, class Visitor>
@@ -94,6 +94,82 @@ struct ScanVerdict {
   /// without evidence.
   Span<const float> beliefs;
   Span<const Cause> causes;
+};
+
+namespace detail {
+/// Makes the verdict on the newest scan.
+class NewestVerdictMaker {
+ public:
+  virtual const ScanVerdict& newest_verdict() = 0;
+
+ protected:
+  ~NewestVerdictMaker() = default;
+};
+}  // namespace detail
+
+/// A ScanVerdict whose arrays are made when one of them is first read, so that they cost nothing
+/// where nobody reads them. The first reading is a call of the remover: not by two threads at a
+/// time, and before the next push. It may throw std::bad_alloc.
+struct NewestVerdict {
+  /// One value per input point, as a Span.
+  template <class T>
+  class Values {
+   public:
+    Values() = default;
+    Values(Span<const T> values) : values_(values) {}
+    Values(detail::NewestVerdictMaker& maker, Span<const T> ScanVerdict::*array)
+        : maker_(&maker), array_(array) {}
+
+    const T* data() const { return made().data(); }
+    std::size_t size() const { return made().size(); }
+    bool empty() const { return made().empty(); }
+    const T* begin() const { return made().begin(); }
+    const T* end() const { return made().end(); }
+    const T& operator[](std::size_t i) const { return made()[i]; }
+    operator Span<const T>() const&& { return made(); }
+
+   private:
+    const Span<const T>& made() const {
+      if (maker_ != nullptr) values_ = maker_->newest_verdict().*array_;
+      maker_ = nullptr;
+      return values_;
+    }
+
+    mutable detail::NewestVerdictMaker* maker_ = nullptr;  // null: made
+    Span<const T> ScanVerdict::*array_ = nullptr;
+    mutable Span<const T> values_;
+  };
+
+  NewestVerdict() = default;
+  NewestVerdict(const ScanVerdict& made)
+      : scan(made.scan),
+        time(made.time),
+        T_world_sensor(made.T_world_sensor),
+        labels(made.labels),
+        instances(made.instances),
+        beliefs(made.beliefs),
+        causes(made.causes) {}
+  NewestVerdict(std::uint64_t number, double time_of_scan, const Pose& T,
+                detail::NewestVerdictMaker& maker)
+      : scan(number),
+        time(time_of_scan),
+        T_world_sensor(T),
+        labels(maker, &ScanVerdict::labels),
+        instances(maker, &ScanVerdict::instances),
+        beliefs(maker, &ScanVerdict::beliefs),
+        causes(maker, &ScanVerdict::causes) {}
+
+  operator ScanVerdict() const {
+    return {scan, time, T_world_sensor, labels, instances, beliefs, causes};
+  }
+
+  std::uint64_t scan = 0;
+  double time = 0.0;
+  Pose T_world_sensor = Pose::Identity();
+  Values<PointLabel> labels;
+  Values<std::uint32_t> instances;
+  Values<float> beliefs;
+  Values<Cause> causes;
 };
 
 /// Alignment of a scan with the static surfaces of earlier scans: the error of the pushed motion of
@@ -146,9 +222,7 @@ constexpr std::array<const char*, 5> value_names(EpochReason) {
 
 /// Result of one push.
 struct FrameResult {
-  /// Verdict on the pushed scan by this and earlier scans; final if latency() is 0. Its spans are
-  /// empty if RemoverConfig::newest_verdict is false.
-  ScanVerdict newest;
+  NewestVerdict newest;  ///< by the pushed scan and earlier scans; final if latency() is 0
   std::optional<ScanVerdict> finished;  ///< final verdict on the scan latency() pushes ago
   StageTimes times;
   /// Empty for the first scan of an epoch, without enough common surfaces, and if free space is not

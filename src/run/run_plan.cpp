@@ -77,17 +77,6 @@ void add_map_attributes(const RunSettings& settings, const DynaInsRemover::Confi
   wkt_of(outputs.crs);
 }
 
-/// The verdict without latency takes time, so it is made for --write-online alone. Throws
-/// ConfigError.
-DynaInsRemover::Config config_of(const RunSettings& settings) {
-  DynaInsRemover::Config config = settings.config;
-  if (settings.write_online && !config.newest_verdict) {
-    throw ConfigError("--write-online needs --newest-verdict true");
-  }
-  config.newest_verdict = settings.write_online;
-  return config;
-}
-
 /// Throws ConfigError.
 void check_passes(const RunSettings& settings) {
   const int passes = passes_of(settings);
@@ -126,7 +115,7 @@ std::optional<RemoverWithMapOnDisk::Config> map_on_disk_of(const RunSettings& se
                                                            const RunOutputs& outputs) {
   if (!settings.map_memory) return std::nullopt;
   if (!settings.config.build_map) throw ConfigError("--map-memory needs --build-map true");
-  return with_map_on_disk(config_of(settings), outputs.folder / kTileFolder, *settings.map_memory);
+  return with_map_on_disk(settings.config, outputs.folder / kTileFolder, *settings.map_memory);
 }
 
 InputFiles inputs_of(const RunSettings& settings, const Recording& sequence) {
@@ -238,14 +227,10 @@ fs::path map_path(const std::string& name, const fs::path& out) {
   return map;
 }
 
-void check_settings(const RunSettings& settings) {
-  config_of(settings);
-  map_on_disk_of(settings, outputs_of(settings));
-}
+void check_settings(const RunSettings& settings) { map_on_disk_of(settings, outputs_of(settings)); }
 
 RunPlan make_plan(const RunSettings& given, Recording sequence) {
   RunSettings settings = given;
-  settings.config = config_of(given);
   DynaInsRemover::Config& config = settings.config;
   RunOutputs outputs = outputs_of(settings);
   const ScanRange range = select_scans(sequence, settings.window);

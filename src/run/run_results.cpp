@@ -156,7 +156,7 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
   }
 }
 
-void RunResults::take_newest(const ScanVerdict& verdict) {
+void RunResults::take_newest(const NewestVerdict& verdict) {
   if (online_labels_) online_labels_->write(recording_.name(range_.first + verdict.scan), verdict);
 }
 

@@ -106,7 +106,7 @@ class RunResults {
              std::unique_ptr<MapFile> outside_map = nullptr);
 
   /// The verdict on the scan just pushed.
-  void take_newest(const ScanVerdict& verdict);
+  void take_newest(const NewestVerdict& verdict);
   /// The final verdict on a scan, in the order of the scans. Keeps the content of `scan` and gives
   /// the content of an earlier scan back, whose memory the caller can use again. If `scan` is null,
   /// the scan is read from its file. Throws IoError, for the scan before as well.

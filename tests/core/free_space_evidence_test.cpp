@@ -53,7 +53,7 @@ class Watch {
     std::fill_n(instance_of.begin(), instance.size(), 0U);
     evidence_.observe(splits_.size(), epoch, Eigen::Isometry3d::Identity(), split, instance_of,
                       instance.size() > 0 ? 1 : 0);
-    evidence_.judge(splits_.size(), false, split);
+    evidence_.judge(splits_.size(), false);
     evidence_.make_reference(split);
     splits_.push_back(split);
     sizes_.push_back(instance.size());
@@ -62,7 +62,8 @@ class Watch {
 
   // Causes of all points of the instance.
   std::set<Cause> causes(std::size_t scan, bool is_final = true) {
-    const EvidenceVerdict said = evidence_.judge(scan, is_final, splits_[scan]);
+    evidence_.judge(scan, is_final);
+    const EvidenceVerdict said = evidence_.verdict(is_final, splits_[scan]);
     std::set<Cause> result;
     for (std::size_t i = 0; i < sizes_[scan]; ++i) {
       result.insert(said.groups[said.group_of[i]].cause);

@@ -371,9 +371,9 @@ class FaintingEvidence : public FreeSpaceEvidence {
     if (std::exchange(fails_to_adapt_, false)) throw std::bad_alloc();
     FreeSpaceEvidence::adapt(sensor);
   }
-  EvidenceVerdict judge(std::uint64_t scan, bool is_final, const GroundSplit& split) {
+  void judge(std::uint64_t scan, bool is_final) {
     if (is_final && verdicts_left_-- == 0) throw std::bad_alloc();
-    return FreeSpaceEvidence::judge(scan, is_final, split);
+    FreeSpaceEvidence::judge(scan, is_final);
   }
 
  private:

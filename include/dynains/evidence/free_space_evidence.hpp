@@ -92,6 +92,10 @@ class FreeSpaceEvidence {
     std::vector<std::uint32_t>& by_point = roomy.evidence.samples.number_of_point;
     by_point.resize(by_point.size() + by_point.size() / 8);
     for (std::size_t i = 0; i < std::min(scans, records_.size()); ++i) records_[i] = roomy;
+    for (Judged* judged : {&provisional_, &final_}) {
+      detail::ensure_capacity(judged->supervoxels, roomy.evidence.samples.supervoxel_count());
+      detail::ensure_capacity(judged->removed, roomy.evidence.samples.instance_count());
+    }
   }
 
   /// Lets `other`, which outlives this, work for observe() and make_reference(). Results stay the
@@ -137,27 +141,34 @@ class FreeSpaceEvidence {
     propagate_beliefs(scan);
   }
 
-  /// Verdict on scan number `scan` by the evidence of all observed scans. The scan is at most
-  /// lookahead_scans(), or the argument of keep(), scans before the newest. `is_final`: no presumed
-  /// instances. `split`: points of the scan, as in observe(). The spans are valid until the next
-  /// judge().
-  EvidenceVerdict judge(std::uint64_t scan, bool is_final, const GroundSplit& split) {
-    Record& record = record_of(scan);
-    judge_instances(is_final, record);
-    judge_by_dynamic_grid(scan, record);
+  /// Judges the instances of scan number `scan` by the evidence of all observed scans: the newest
+  /// one, or with `is_final`, without presumed instances, one at most lookahead_scans() before it.
+  void judge(std::uint64_t scan, bool is_final) {
+    Judged& judged = is_final ? final_ : provisional_;
+    judged.scan = scan;
+    judge_instances(is_final, judged);
+    judge_by_dynamic_grid(judged);
+  }
+
+  /// Verdict on the scan of the last judge() with the same `is_final`, before the next observe().
+  /// `split`: points of the scan, as in observe(). The spans are valid until the next call.
+  EvidenceVerdict verdict(bool is_final, const GroundSplit& split) {
+    const Judged& judged = is_final ? final_ : provisional_;
+    const Record& record = record_of(judged.scan);
     const detail::InstanceSamples& samples = record.evidence.samples;
     groups_.assign(1, {Cause::kNotJudged, 0.0F});
     groups_.resize(samples.supervoxel_of_number.size());
     for (std::size_t i = 1; i < groups_.size(); ++i) {
-      groups_[i] = verdicts_[samples.supervoxel_of_number[i]];
+      groups_[i] = judged.supervoxels[samples.supervoxel_of_number[i]];
     }
+    for (const std::size_t instance : judged.removed) add_hull(record.evidence, instance);
     moved_ground_.add(split.non_ground(), samples.number_of_point, groups_);
     return {groups_, samples.number_of_point,
             moved_ground_.find(split.ground(), record.ground_boxes, record.ground)};
   }
 
   /// Makes the range image of the newest scan, if it is a reference, without what surely moves.
-  /// Call it once for each scan, after the first judge() of the scan. `split`: points of the scan.
+  /// Call it once for each scan, after its first judge(). `split`: points of the scan.
   void make_reference(const GroundSplit& split) {
     const Record& record = record_of(newest_);
     if (phase_of(record) != 0) return;
@@ -218,6 +229,11 @@ class FreeSpaceEvidence {
     std::vector<detail::DynamicOccupancyGrid::Count> counted;  // by supervoxel
     std::vector<detail::GroundBox> ground_boxes;               // by block of 64 ground points
     detail::GroundSamples ground;
+  };
+  struct Judged {
+    std::uint64_t scan = 0;
+    std::vector<Verdict> supervoxels;
+    std::vector<std::size_t> removed;  // instances, as a whole
   };
   // Working memory of a thread that tests samples.
   struct Tester {
@@ -371,12 +387,14 @@ class FreeSpaceEvidence {
     }
   }
 
-  void judge_instances(bool is_final, const Record& record) {
+  void judge_instances(bool is_final, Judged& judged) {
+    const Record& record = record_of(judged.scan);
     // In the first scans of an epoch, nearly everything is without evidence of earlier scans.
     constexpr std::uint64_t kFirstScans = 5;
     const bool may_presume = !is_final && record.since_begin >= kFirstScans;
-    judge_.judge(record.evidence, updater(), may_presume, verdicts_,
-                 [&](std::size_t instance) { add_hull(record.evidence, instance); });
+    judged.removed.clear();
+    judge_.judge(record.evidence, updater(), may_presume, judged.supervoxels,
+                 [&](std::size_t instance) { judged.removed.push_back(instance); });
   }
 
   // Adds the ground below a compact instance that is removed as a whole.
@@ -391,15 +409,16 @@ class FreeSpaceEvidence {
     moved_ground_.add_hull(PointsView(samples.points).subview(begin, end - begin));
   }
 
-  void judge_by_dynamic_grid(std::uint64_t scan, Record& record) {
-    if (scan < epoch_begin_) return;  // the grid has the origin frame of the newest epoch
-    dynamic_grid_.judge(scan, record.evidence.samples,
+  void judge_by_dynamic_grid(Judged& judged) {
+    if (judged.scan < epoch_begin_) return;  // the grid has the origin frame of the newest epoch
+    Record& record = record_of(judged.scan);
+    dynamic_grid_.judge(judged.scan, record.evidence.samples,
                         detail::composed(T_origin_world_, record.T_world_sensor), record.counted,
-                        verdicts_);
+                        judged.supervoxels);
   }
 
   bool surely_moves(const detail::InstanceEvidence& evidence, std::uint32_t supervoxel) const {
-    return judge_.surely_moves(evidence, supervoxel, verdicts_[supervoxel].cause);
+    return judge_.surely_moves(evidence, supervoxel, provisional_.supervoxels[supervoxel].cause);
   }
   // Whether the instance of a supervoxel is small enough to move, and does not stand still by the
   // evidence on this scan. Slow vehicles around the sensor would pull its pose along.
@@ -445,10 +464,10 @@ class FreeSpaceEvidence {
   std::uint64_t epoch_ = 0;         // number of the begun epochs
   std::uint64_t epoch_begin_ = 0;   // first scan of the epoch of the newest scan
   std::uint64_t newest_ = 0;
-  std::vector<std::vector<int>> lags_before_;       // by scan since the begin, modulo their number
-  std::vector<std::vector<int>> lags_after_;        // by scans since the latest reference
-  std::vector<Record> records_;                     // ring buffer, by scan number
-  std::vector<Verdict> verdicts_;                   // by supervoxel
+  std::vector<std::vector<int>> lags_before_;  // by scan since the begin, modulo their number
+  std::vector<std::vector<int>> lags_after_;   // by scans since the latest reference
+  std::vector<Record> records_;                // ring buffer, by scan number
+  Judged provisional_, final_;
   std::vector<Verdict> groups_;                     // by number of the supervoxel
   std::vector<std::uint8_t> is_marked_group_;       // by number of the supervoxel
   std::vector<std::uint8_t> is_moving_, may_move_;  // by non-ground point

@@ -29,7 +29,7 @@ namespace dynains::detail {
 
 /// Collects evidence on scans and classifies their points as static or dynamic. The caller calls
 /// observe() and judge() for each scan, and judge() again for the same scan after latency() later
-/// scans. Each verdict is written before the next call of judge().
+/// scans, followed by write_final().
 template <class Map>
 class ScanDecision {
  public:
@@ -50,7 +50,8 @@ class ScanDecision {
   /// Judges `scan`. Without `is_final` it is the newest scan, and evidence of later scans is
   /// missing.
   virtual void judge(const ScanSlot& scan, bool is_final) = 0;
-  /// Writes the verdict without latency of the last judge(), after VerdictWriter::begin().
+  /// Writes the verdict without latency on the newest scan, after VerdictWriter::begin(). The final
+  /// verdict on an older scan may come before.
   virtual void write_newest(const ScanSlot& newest, VerdictWriter& writer) = 0;
   /// Writes the final verdict of the last judge(), with keep flags, after VerdictWriter::begin().
   virtual void write_final(const ScanSlot& scan, VerdictWriter& writer) = 0;
@@ -268,15 +269,16 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
   }
 
   void judge(const ScanSlot& scan, bool is_final) override {
-    verdict_ = evidence_.judge(scan.scan, is_final, scan.split);
+    evidence_.judge(scan.scan, is_final);
     if (!is_final) evidence_.make_reference(scan.split);
   }
   void write_newest(const ScanSlot& newest, VerdictWriter& writer) override {
-    writer.write_groups(newest, verdict_);
+    writer.write_groups(newest, evidence_.verdict(false, newest.split));
   }
   void write_final(const ScanSlot& scan, VerdictWriter& writer) override {
-    writer.write_groups(scan, verdict_);
-    writer.flag_groups(scan, verdict_);
+    const EvidenceVerdict verdict = evidence_.verdict(true, scan.split);
+    writer.write_groups(scan, verdict);
+    writer.flag_groups(scan, verdict);
   }
 
   std::optional<PoseResidual> pose_residual() const override { return pose_residual_of(evidence_); }
@@ -295,7 +297,6 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
   }
 
   Evidence evidence_;
-  EvidenceVerdict verdict_;  // of the last judge(); views of evidence_
   InstanceIds instance_ids_;
 };
 

@@ -88,7 +88,7 @@ void timed(double& milliseconds, Work&& work) {
 /// Implementation of BasicDynaInsRemover, with the same calls and errors. Owns the stages and every
 /// buffer.
 template <class Stages>
-class Pipeline {
+class Pipeline final : private NewestVerdictMaker {
  public:
   using Config = PipelineConfig<Stages>;
   using Ground = typename Stages::Ground;
@@ -110,7 +110,7 @@ class Pipeline {
                 "is_dynamic()");
   static_assert(IsConfigurable<Evidence>::value && IsEvidence<Evidence>::value,
                 "Stages::Evidence needs Config, adapt(SensorModel), observe(...), judge(...), "
-                "make_reference(GroundSplit), predecessors() and lookahead_scans()");
+                "verdict(...), make_reference(GroundSplit), predecessors() and lookahead_scans()");
   static_assert(IsConfigurable<Map>::value && IsMap<Map>::value,
                 "Stages::Map needs Config, insert(PointsView, flags, T_world_sensor) and clear()");
 
@@ -168,7 +168,7 @@ class Pipeline {
   bool is_sensor_wanted() const;
   void find_sensor(ScanSlot& newest);
   Eigen::Matrix3d level(ScanSlot& scan) const;
-  void write_newest(ScanSlot& newest);
+  const ScanVerdict& newest_verdict() override;
   ScanVerdict finish_oldest(StageTimes& times);
   void finish_due(StageTimes& times);
   bool is_finished_known() const { return finished_ || finishing_error_; }
@@ -181,6 +181,7 @@ class Pipeline {
   void forget_scans() {
     decision_->clear();
     frame_.forget();
+    unwritten_ = nullptr;
     scans_.clear();
     rate_ = {};
     plausibility_ = {};
@@ -198,8 +199,10 @@ class Pipeline {
   Clusterer clusterer_;
   std::unique_ptr<ScanDecision<Map>> decision_;
   bool finishes_later_;  // the next push finishes a scan, beside its first stages
-  VerdictWriter newest_verdict_;
-  VerdictWriter final_verdict_;
+  VerdictWriter newest_writer_;
+  VerdictWriter final_writer_;
+  ScanVerdict newest_;                   // of the last push
+  const ScanSlot* unwritten_ = nullptr;  // its scan, until newest_ is made
   Map map_;
   ScanRing scans_;
   ScanRate rate_;
@@ -216,6 +219,7 @@ FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Pose& T_world_s
   ScanSlot& newest = scans_.prepare(T_world_sensor, time, config_);
   timed(times.ingest, [&] { ingest(cloud, newest); });
   PushTransaction transaction(scans_, newest);
+  unwritten_ = nullptr;
   if (is_sensor_wanted()) {
     if (finishes_later_) finish_due(times);  // before the stages are adapted
     timed(times.ingest, [&] { find_sensor(newest); });
@@ -232,12 +236,16 @@ FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Pose& T_world_s
   }
   timed(times.evidence, [&] { decision_->observe(scans_, window_); });  // Eq. 4-18
   timed(times.judge, [&] { decision_->judge(newest, false); });         // Eq. 19
-  timed(times.verdict, [&] { write_newest(newest); });                  // Eq. 2
+  timed(times.verdict, [&] { newest.assign_instances(window_.newest_cluster_of()); });
   transaction.commit();
   if (!finishes_later_) finish_due(times);
   const std::optional<ScanVerdict> finished = take_finished();
-  const bool is_final = finished && finished->scan == newest.scan;
-  FrameResult result = {is_final ? *finished : newest_verdict_.verdict(newest),
+  if (finished && finished->scan == newest.scan) {
+    newest_ = *finished;
+  } else {
+    unwritten_ = &newest;
+  }
+  FrameResult result = {{newest.scan, newest.time, newest.T_world_sensor, *this},
                         finished,
                         times,
                         pose_residual(),
@@ -249,11 +257,13 @@ FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Pose& T_world_s
 }
 
 template <class Stages>
-void Pipeline<Stages>::write_newest(ScanSlot& newest) {
-  newest.assign_instances(window_.newest_cluster_of());
-  if (!config_.newest_verdict) return;
-  newest_verdict_.begin(newest);
-  decision_->write_newest(newest, newest_verdict_);
+const ScanVerdict& Pipeline<Stages>::newest_verdict() {
+  if (unwritten_ == nullptr) return newest_;
+  newest_writer_.begin(*unwritten_);
+  decision_->write_newest(*unwritten_, newest_writer_);  // Eq. 2
+  newest_ = newest_writer_.verdict(*unwritten_);
+  unwritten_ = nullptr;
+  return newest_;
 }
 
 /// Finishes the oldest scan if its verdict is due and no other one waits for take_finished().
@@ -279,16 +289,16 @@ ScanVerdict Pipeline<Stages>::finish_oldest(StageTimes& times) {
   const ScanSlot& scan = scans_.finish_oldest();
   timed(times.judge, [&] { decision_->judge(scan, true); });
   timed(times.verdict, [&] {
-    final_verdict_.begin(scan);
-    decision_->write_final(scan, final_verdict_);
+    final_writer_.begin(scan);
+    decision_->write_final(scan, final_writer_);
   });
   if (build_map_) {
     const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
     timed(times.map, [&] {
-      insert_scan(map_, points, final_verdict_.is_kept(), scan.T_world_level, scan.T_world_sensor);
+      insert_scan(map_, points, final_writer_.is_kept(), scan.T_world_level, scan.T_world_sensor);
     });
   }
-  return final_verdict_.verdict(scan);
+  return final_writer_.verdict(scan);
 }
 
 /// Filters the input points. If the sensor is known, the valid points are rotated into the level
@@ -394,16 +404,17 @@ void Pipeline<Stages>::reserve_like(const CloudView& example, std::size_t scans)
   // Margin: scans of one sensor differ slightly in size.
   const std::size_t points = example.size() + example.size() / 16;
   for (std::size_t i = 0; i < std::min(scans, scans_.capacity()); ++i) scans_[i].touch(points);
-  if (config_.newest_verdict) newest_verdict_.touch(points);
-  final_verdict_.touch(points);
+  newest_writer_.touch(points);
+  final_writer_.touch(points);
   const WarmUp<Pipeline> warm_up(*this);
   // After four scans, each kind of decision has compared a scan with a reference.
   const std::size_t enough = std::max<std::size_t>(decision_->window_length(), 4);
   for (std::size_t i = 0; i < std::min(scans, enough); ++i) {
     push(example, Pose::Identity(), next_time());
+    newest_verdict();
   }
   for (ScanSlot& slot : scans_.slots()) slot.ensure_capacity_like(scans_.newest());
-  final_verdict_.ensure_capacity_like(newest_verdict_);
+  final_writer_.ensure_capacity_like(newest_writer_);
   decision_->reserve(scans);
 }
 

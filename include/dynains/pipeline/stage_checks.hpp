@@ -75,26 +75,27 @@ struct IsBelief<
     : std::true_type {};
 
 /// Required: observe(scan, epoch, T_world_sensor, split, instance_of, instance_count), called in
-/// the order of scans, of which only those of one epoch are compared; judge(scan, is_final, split).
+/// the order of scans, of which only those of one epoch are compared; judge(scan, is_final);
+/// verdict(is_final, split).
 template <class Stage, class = void>
 struct IsEvidence : std::false_type {};
 template <class Stage>
 struct IsEvidence<
-    Stage,
-    std::void_t<
-        decltype(std::declval<Stage&>().adapt(SensorModel())),
-        decltype(std::declval<Stage&>().observe(
-            std::uint64_t{}, std::uint64_t{}, std::declval<const Pose&>(),
-            std::declval<const GroundSplit&>(), Span<const std::uint32_t>(), std::size_t{})),
-        decltype(std::declval<Stage&>().make_reference(std::declval<const GroundSplit&>())),
-        std::enable_if_t<
-            std::is_convertible_v<decltype(std::declval<Stage&>().judge(
-                                      std::uint64_t{}, bool{}, std::declval<const GroundSplit&>())),
-                                  EvidenceVerdict> &&
-            std::is_convertible_v<decltype(std::declval<const Stage&>().lookahead_scans()),
-                                  std::size_t> &&
-            std::is_convertible_v<decltype(std::declval<const Stage&>().predecessors()),
-                                  Span<const std::uint32_t>>>>> : std::true_type {};
+    Stage, std::void_t<
+               decltype(std::declval<Stage&>().adapt(SensorModel())),
+               decltype(std::declval<Stage&>().observe(
+                   std::uint64_t{}, std::uint64_t{}, std::declval<const Pose&>(),
+                   std::declval<const GroundSplit&>(), Span<const std::uint32_t>(), std::size_t{})),
+               decltype(std::declval<Stage&>().make_reference(std::declval<const GroundSplit&>())),
+               decltype(std::declval<Stage&>().judge(std::uint64_t{}, bool{})),
+               std::enable_if_t<
+                   std::is_convertible_v<decltype(std::declval<Stage&>().verdict(
+                                             bool{}, std::declval<const GroundSplit&>())),
+                                         EvidenceVerdict> &&
+                   std::is_convertible_v<decltype(std::declval<const Stage&>().lookahead_scans()),
+                                         std::size_t> &&
+                   std::is_convertible_v<decltype(std::declval<const Stage&>().predecessors()),
+                                         Span<const std::uint32_t>>>>> : std::true_type {};
 
 template <class Stage, class = void>
 struct IsMap : std::false_type {};
